@@ -1,0 +1,2 @@
+//! The `viscera` program.
+fn main() {}

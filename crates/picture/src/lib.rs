@@ -1,0 +1,1 @@
+//! Software renderer: pictures of deformed tissue with no GPU and no display.

@@ -1,0 +1,6 @@
+//! # viscera
+//!
+//! Real-time soft-tissue simulation for surgical applications.
+
+pub mod mesh;
+pub mod scalar;
