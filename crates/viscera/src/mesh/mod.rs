@@ -23,7 +23,54 @@ pub struct SurfaceMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
+/// What had to be put right to make a mesh usable; zero everywhere for a clean mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MeshRepairs {
+    /// Tetrahedra whose winding was reversed.
+    pub rewound_tets: usize,
+}
+
+/// Why numbers are not a mesh. Indices count from 0.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// A tetrahedron refers to a vertex that does not exist.
+    #[error("tetrahedron {tet} refers to vertex {vertex}; the mesh has {vertex_count}")]
+    IndexOutOfRange {
+        /// The tetrahedron.
+        tet: usize,
+        /// The index it names.
+        vertex: u32,
+        /// How many vertices there are.
+        vertex_count: usize,
+    },
+}
+
 impl TetMesh {
+    /// Checks the numbers, repairs what can be repaired (winding) and builds the mesh.
+    ///
+    /// `vertices` [m], shape [vertex_count]; `tets` and `regions`, shape [tet_count].
+    pub fn new(
+        vertices: Vec<Vec3<f64>>,
+        mut tets: Vec<[u32; 4]>,
+        regions: Vec<u32>,
+    ) -> Result<(Self, MeshRepairs), MeshError> {
+        let mut repairs = MeshRepairs::default();
+        for (index, tet) in tets.iter_mut().enumerate() {
+            for &vertex in tet.iter() {
+                if vertex as usize >= vertices.len() {
+                    let vertex_count = vertices.len();
+                    return Err(MeshError::IndexOutOfRange { tet: index, vertex, vertex_count });
+                }
+            }
+            if tet_volume(tet.map(|v| vertices[v as usize])) < 0.0 {
+                tet.swap(2, 3);
+                repairs.rewound_tets += 1;
+            }
+        }
+        Ok((Self { vertices, tets, regions }, repairs))
+    }
+
     /// Positions [m], shape [vertex_count].
     pub fn vertices(&self) -> &[Vec3<f64>] {
         &self.vertices
