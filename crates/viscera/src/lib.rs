@@ -2,5 +2,12 @@
 //!
 //! Real-time soft-tissue simulation for surgical applications.
 
+pub mod coloring;
+pub mod elements;
+pub mod material;
 pub mod mesh;
 pub mod scalar;
+pub mod settings;
+pub mod model;
+pub mod state;
+pub mod solver;
