@@ -177,8 +177,9 @@ impl fmt::Display for MeshSummary {
         let (min, mean, max) = (self.min_edge, self.mean_edge, self.max_edge);
         row(f, "edges", format!("{} to {}, mean {}", Length(min), Length(max), Length(mean)))?;
         let quality = &self.quality;
-        let (worst, tet, mean) = (quality.worst, quality.worst_tet, quality.mean);
-        let shape = format!("worst {worst:.3} (tetrahedron {tet}), mean {mean:.3}; 1 is regular");
+        let (worst, mean) = (significant(quality.worst), significant(quality.mean));
+        let tet = quality.worst_tet;
+        let shape = format!("worst {worst} (tetrahedron {tet}), mean {mean}; 1 is regular");
         row(f, "shape quality", shape)?;
         let (min, max) = (quality.min_dihedral.to_degrees(), quality.max_dihedral.to_degrees());
         row(f, "dihedral angles", format!("{min:.1} to {max:.1} degrees"))?;
@@ -240,7 +241,7 @@ impl fmt::Display for SurfaceSummary {
         row(f, "vertices", self.vertex_count)?;
         row(f, "triangles", self.triangle_count)?;
         write_box(f, self.box_min, self.box_max)?;
-        row(f, "area", format!("{} cm^2", significant(self.area * 1e4)))?;
+        row(f, "area", format!("{} cm²", significant(self.area * 1e4)))?;
         match self.open_edge_count {
             0 if self.volume < 0.0 => {
                 row(f, "enclosed volume", format!("{}, wound inwards", Volume(-self.volume)))?;
@@ -260,11 +261,20 @@ fn write_format(f: &mut fmt::Formatter<'_>, format: Option<Format>) -> fmt::Resu
 }
 
 fn write_box(f: &mut fmt::Formatter<'_>, min: [f64; 3], max: [f64; 3]) -> fmt::Result {
-    let size = [0, 1, 2].map(|axis| Length(max[axis] - min[axis]));
-    row(f, "size", format!("{} x {} x {}", size[0], size[1], size[2]))?;
-    let [min, max] = [min, max].map(|x| x.map(Length));
-    row(f, "from", format!("{}, {}, {}", min[0], min[1], min[2]))?;
-    row(f, "to", format!("{}, {}, {}", max[0], max[1], max[2]))
+    let size = [0, 1, 2].map(|axis| max[axis] - min[axis]);
+    row(f, "size", in_one_unit(size, " x "))?;
+    row(f, "from", in_one_unit(min, ", "))?;
+    row(f, "to", in_one_unit(max, ", "))
+}
+
+/// Three lengths [m] in the unit, and with the digits, of the largest.
+fn in_one_unit(lengths: [f64; 3], separator: &str) -> String {
+    let largest = lengths.iter().fold(0.0f64, |largest, length| largest.max(length.abs()));
+    let (size, name) = fitting_unit(largest, &LENGTH_UNITS);
+    let digits = if largest / size >= 100.0 { 1 } else { 2 };
+    // Adding zero turns -0.0 into 0.0.
+    let texts = lengths.map(|length| format!("{:.digits$}", length / size + 0.0));
+    format!("{} {name}", texts.join(separator))
 }
 
 fn write_skipped(f: &mut fmt::Formatter<'_>, skipped: &[SkippedElements]) -> fmt::Result {
@@ -274,36 +284,32 @@ fn write_skipped(f: &mut fmt::Formatter<'_>, skipped: &[SkippedElements]) -> fmt
     row(f, "skipped", SkippedElements::list(skipped))
 }
 
+const LENGTH_UNITS: [(f64, &str); 4] = [(1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")];
+const VOLUME_UNITS: [(f64, &str); 4] = [(1.0, "m³"), (1e-3, "l"), (1e-6, "ml"), (1e-9, "mm³")];
+
 /// A length [m], shown with a prefix that suits it.
-#[derive(Clone, Copy)]
 struct Length(f64);
 
 impl fmt::Display for Length {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_with_unit(f, self.0, &[(1.0, "m"), (1e-3, "mm"), (1e-6, "um"), (1e-9, "nm")])
+        let (size, name) = fitting_unit(self.0, &LENGTH_UNITS);
+        write!(f, "{} {name}", significant(self.0 / size))
     }
 }
 
 /// A volume [m^3], shown with a unit that suits it.
-#[derive(Clone, Copy)]
 struct Volume(f64);
 
 impl fmt::Display for Volume {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_with_unit(f, self.0, &[(1.0, "m^3"), (1e-3, "l"), (1e-6, "ml"), (1e-9, "mm^3")])
+        let (size, name) = fitting_unit(self.0, &VOLUME_UNITS);
+        write!(f, "{} {name}", significant(self.0 / size))
     }
 }
 
-/// Shows a value in the largest unit that leaves at least 1, or in the smallest one.
-fn write_with_unit(f: &mut fmt::Formatter<'_>, value: f64, units: &[(f64, &str)]) -> fmt::Result {
-    if value == 0.0 {
-        return f.write_str("0");
-    }
-    let fitting = units.iter().find(|(size, _)| value.abs() >= *size);
-    match fitting.or(units.last()) {
-        Some((size, name)) => write!(f, "{} {name}", significant(value / size)),
-        None => write!(f, "{value:e}"),
-    }
+/// The largest unit that leaves a value of at least 1, or else the smallest.
+fn fitting_unit<'a>(value: f64, units: &[(f64, &'a str); 4]) -> (f64, &'a str) {
+    units.iter().copied().find(|(size, _)| value.abs() >= *size).unwrap_or(units[3])
 }
 
 /// About four significant digits.
@@ -313,6 +319,7 @@ fn significant(value: f64) -> String {
         large if large >= 1000.0 => format!("{value:.0}"),
         large if large >= 100.0 => format!("{value:.1}"),
         large if large >= 10.0 => format!("{value:.2}"),
+        zero if zero == 0.0 => "0".into(),
         large if large >= 0.01 => format!("{value:.3}"),
         _ => format!("{value:.3e}"),
     }

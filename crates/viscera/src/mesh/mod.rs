@@ -43,7 +43,7 @@ pub struct TetMesh {
 pub struct SurfaceMesh {
     /// Positions [m], shape [vertex_count].
     pub vertices: Vec<Vec3<f64>>,
-    /// Vertex indices, shape [triangle_count].
+    /// Vertex indices, shape [triangle_count]; below vertex_count, which readers make sure of.
     pub triangles: Vec<[u32; 3]>,
 }
 
@@ -78,7 +78,9 @@ impl TetMesh {
         regions: Vec<u32>,
     ) -> Result<(Self, MeshRepairs), MeshError> {
         check_counts(&vertices, &tets, &regions)?;
-        check_vertices(&vertices)?;
+        for (vertex, &position) in vertices.iter().enumerate() {
+            check_vertex(vertex, position)?;
+        }
         let mut rewound_tets = 0;
         for (index, tet) in tets.iter_mut().enumerate() {
             check_indices(index, tet, vertices.len())?;
@@ -184,15 +186,14 @@ fn check_counts(
     Ok(())
 }
 
-fn check_vertices(vertices: &[Vec3<f64>]) -> Result<(), MeshError> {
-    for (vertex, position) in vertices.iter().enumerate() {
-        if !position.is_finite() {
-            return Err(MeshError::NonFinite { vertex });
-        }
-        let distance = position.x.abs().max(position.y.abs()).max(position.z.abs());
-        if distance > MAX_COORDINATE {
-            return Err(MeshError::TooFar { vertex, distance });
-        }
+/// A vertex must be finite and near enough for single precision.
+fn check_vertex(vertex: usize, position: Vec3<f64>) -> Result<(), MeshError> {
+    if !position.is_finite() {
+        return Err(MeshError::NonFinite { vertex });
+    }
+    let distance = position.x.abs().max(position.y.abs()).max(position.z.abs());
+    if distance > MAX_COORDINATE {
+        return Err(MeshError::TooFar { vertex, distance });
     }
     Ok(())
 }

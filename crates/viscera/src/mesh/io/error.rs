@@ -104,8 +104,8 @@ pub enum ReadProblem {
         found: String,
     },
     /// An element refers to a vertex number that the file does not list.
-    #[error("{element} refers to vertex {vertex}; the file has {vertex_count}{}; \
-        export all vertices", if *.first_number == 1 { "" } else { ", numbered otherwise" })]
+    #[error("{element} refers to vertex {vertex}; the file has {vertex_count}{note}; \
+        export all vertices", note = NumbersNote { numbers: *.numbers, count: *.vertex_count })]
     UnknownVertex {
         /// The element, with its number in the file.
         element: String,
@@ -113,8 +113,8 @@ pub enum ReadProblem {
         vertex: String,
         /// How many vertices the file lists.
         vertex_count: usize,
-        /// Lowest vertex number in the file.
-        first_number: u64,
+        /// Lowest and highest vertex number in the file, if it has any.
+        numbers: Option<(u64, u64)>,
     },
     /// Two vertices have the same number.
     #[error("vertex number {number} is used twice; renumber the vertices")]
@@ -142,6 +142,24 @@ pub enum ReadProblem {
     Mesh(MeshError),
 }
 
+/// Which numbers vertices have, where they do not just count from 1.
+struct NumbersNote {
+    numbers: Option<(u64, u64)>,
+    count: usize,
+}
+
+impl fmt::Display for NumbersNote {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.numbers {
+            Some((low, high)) if (low, high) != (1, self.count as u64) => {
+                write!(f, ", numbered {low} to {high}")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The lines of many files number elements differently from the mesh.
 struct CountingNote(MeshPlace);
 
 impl fmt::Display for CountingNote {

@@ -37,6 +37,13 @@ struct VertexList {
     lines: Vec<usize>,
 }
 
+impl VertexList {
+    fn number_range(&self) -> Option<(u64, u64)> {
+        let (first, last) = (self.index_of_number.first()?, self.index_of_number.last()?);
+        Some((first.0, last.0))
+    }
+}
+
 /// Tetrahedra as listed in the file.
 #[derive(Default)]
 struct TetList {
@@ -264,7 +271,7 @@ fn build(
                         element: format!("tetrahedron {element}"),
                         vertex: number.to_string(),
                         vertex_count: vertices.positions.len(),
-                        first_number: vertices.index_of_number.first().map_or(1, |entry| entry.0),
+                        numbers: vertices.number_range(),
                     },
                 )
             })?;

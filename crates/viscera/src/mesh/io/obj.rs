@@ -8,7 +8,7 @@ use std::fmt::Write;
 use super::error::{Fault, ReadProblem, WriteError};
 use super::lines::{Line, Lines, bad_word, parse_word, shorten};
 use super::{Format, Parsed, SkippedElements};
-use crate::mesh::{MAX_COORDINATE, MeshError, MeshRepairs, SurfaceMesh};
+use crate::mesh::{MeshRepairs, SurfaceMesh, check_vertex};
 use crate::scalar::{Vec3, vec3};
 
 /// Reads a surface; positions are multiplied by the unit.
@@ -43,17 +43,6 @@ pub(super) fn read(bytes: &[u8], unit_in_meters: f64) -> Result<Parsed<SurfaceMe
     Ok(Parsed { mesh, repairs: MeshRepairs::default(), format: Format::Obj, skipped })
 }
 
-fn check_vertex(vertex: usize, position: Vec3<f64>) -> Result<(), MeshError> {
-    if !position.is_finite() {
-        return Err(MeshError::NonFinite { vertex });
-    }
-    let distance = position.x.abs().max(position.y.abs()).max(position.z.abs());
-    if distance > MAX_COORDINATE {
-        return Err(MeshError::TooFar { vertex, distance });
-    }
-    Ok(())
-}
-
 /// The vertex that a word such as `12/3/4` of a face names.
 fn read_corner(word: &[u8], line: Line, vertex_count: usize) -> Result<u32, Fault> {
     let number = word.split(|&byte| byte == b'/').next().unwrap_or_default();
@@ -70,7 +59,7 @@ fn read_corner(word: &[u8], line: Line, vertex_count: usize) -> Result<u32, Faul
             element: "the face".into(),
             vertex: shorten(word),
             vertex_count,
-            first_number: 1,
+            numbers: None,
         })),
     }
 }
