@@ -4,6 +4,7 @@ use viscera::mesh::io::{
     Format, ReadError, ReadProblem, ReadReport, WriteError, gmsh, obj, pvd, read_surface,
     read_tet_mesh, vtu,
 };
+use viscera::mesh::topology::count_open_edges;
 use viscera::mesh::{MeshError, SurfaceMesh, TetMesh, boundary_surface, inspect, inspect_surface};
 use viscera::scalar::{Vec3, vec3};
 
@@ -210,6 +211,22 @@ fn wrong_counts_are_refused() {
 }
 
 #[test]
+fn lines_are_counted_across_comments_and_windows_line_ends() {
+    let commented = VTU.replace("0 0 1\n", "0 0 1 <!-- a\ncomment -->\n");
+    assert_eq!(read("a.vtu", &commented).unwrap().0, read("a.vtu", VTU).unwrap().0);
+    let bad = commented.replace("1 1 1\n", "1 x 1\n");
+    for text in [bad.replace('\n', "\r\n"), bad] {
+        assert_eq!(problem("a.vtu", &text).0, Some(11));
+    }
+}
+
+#[test]
+fn grid_without_regions_is_region_zero() {
+    let (mesh, _) = read("a.vtu", &VTU.replace("\"region\"", "\"pressure\"")).unwrap();
+    assert_eq!(mesh.regions(), [0, 0]);
+}
+
+#[test]
 fn repeated_vertex_number_is_refused() {
     let found = problem("a.msh", &GMSH_1.replace("40 1 1 1", "20 1 1 1"));
     assert_eq!(found, (Some(7), ReadProblem::RepeatedNumber { number: 20 }));
@@ -376,7 +393,7 @@ fn liver_loads_at_life_size() {
     assert_eq!(summary.components.len(), 1);
     // 36.6 cubic units of 32 mm, as the data's description says.
     assert!((summary.volume / (36.6 * 0.032f64.powi(3)) - 1.0).abs() < 0.01);
-    assert_eq!(topology_of(&mesh), 0);
+    assert_eq!(open_edge_count(&mesh), 0);
 }
 
 #[test]
@@ -398,10 +415,10 @@ fn tongue_loads_with_its_poor_tets() {
     println!("{summary}");
     assert_eq!((summary.vertex_count, summary.tet_count), (2238, 10980));
     assert!(summary.quality.worst > 0.0);
-    assert_eq!(topology_of(&mesh), 0);
+    assert_eq!(open_edge_count(&mesh), 0);
 }
 
-/// Open edges of the boundary.
-fn topology_of(mesh: &TetMesh) -> usize {
-    viscera::mesh::topology::count_open_edges(&boundary_surface(mesh).surface)
+/// Open edges of the boundary; none, for the boundary of a volume has no boundary.
+fn open_edge_count(mesh: &TetMesh) -> usize {
+    count_open_edges(&boundary_surface(mesh).surface)
 }

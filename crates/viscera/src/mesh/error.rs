@@ -39,7 +39,7 @@ pub enum MeshError {
     TooFar {
         /// The vertex.
         vertex: usize,
-        /// Its largest coordinate [m].
+        /// Its largest coordinate `[m]`.
         distance: f64,
     },
     /// A tetrahedron refers to a vertex that does not exist.
@@ -77,7 +77,7 @@ pub enum MeshError {
     TooSmall {
         /// The tetrahedron.
         tet: usize,
-        /// Its longest edge [m].
+        /// Its longest edge `[m]`.
         longest_edge: f64,
     },
     /// A tetrahedron without volume, relative to its own size.

@@ -25,7 +25,7 @@ pub struct RegionSummary {
     pub region: u32,
     /// How many tetrahedra have it.
     pub tet_count: usize,
-    /// Their volume [m^3].
+    /// Their volume `[m^3]`.
     pub volume: f64,
 }
 
@@ -40,17 +40,17 @@ pub struct MeshSummary {
     pub tet_count: usize,
     /// Number of triangles of the boundary.
     pub boundary_triangle_count: usize,
-    /// Lowest corner of the bounding box [m].
+    /// Lowest corner of the bounding box `[m]`.
     pub box_min: [f64; 3],
-    /// Highest corner of the bounding box [m].
+    /// Highest corner of the bounding box `[m]`.
     pub box_max: [f64; 3],
-    /// Total volume [m^3].
+    /// Total volume `[m^3]`.
     pub volume: f64,
-    /// Shortest edge [m].
+    /// Shortest edge `[m]`.
     pub min_edge: f64,
-    /// Mean length of the edges [m].
+    /// Mean length of the edges `[m]`.
     pub mean_edge: f64,
-    /// Longest edge [m].
+    /// Longest edge `[m]`.
     pub max_edge: f64,
     /// Shapes of the tetrahedra.
     pub quality: QualitySummary,
@@ -133,13 +133,13 @@ pub struct SurfaceSummary {
     pub triangle_count: usize,
     /// Edges that do not have exactly two triangles; 0 for a closed surface.
     pub open_edge_count: usize,
-    /// Lowest corner of the bounding box [m].
+    /// Lowest corner of the bounding box `[m]`.
     pub box_min: [f64; 3],
-    /// Highest corner of the bounding box [m].
+    /// Highest corner of the bounding box `[m]`.
     pub box_max: [f64; 3],
-    /// Area [m^2].
+    /// Area `[m^2]`.
     pub area: f64,
-    /// Enclosed volume [m^3], negative if wound inwards; has a meaning for closed surfaces only.
+    /// Enclosed volume `[m^3]`, negative if wound inwards; has a meaning for closed surfaces only.
     pub volume: f64,
     /// Elements of the file that are not part of the surface.
     pub skipped: Vec<SkippedElements>,
@@ -267,7 +267,7 @@ fn write_box(f: &mut fmt::Formatter<'_>, min: [f64; 3], max: [f64; 3]) -> fmt::R
     row(f, "to", in_one_unit(max, ", "))
 }
 
-/// Three lengths [m] in the unit, and with the digits, of the largest.
+/// Three lengths `[m]` in the unit, and with the digits, of the largest.
 fn in_one_unit(lengths: [f64; 3], separator: &str) -> String {
     let largest = lengths.iter().fold(0.0f64, |largest, length| largest.max(length.abs()));
     let (size, name) = fitting_unit(largest, &LENGTH_UNITS);
@@ -287,7 +287,7 @@ fn write_skipped(f: &mut fmt::Formatter<'_>, skipped: &[SkippedElements]) -> fmt
 const LENGTH_UNITS: [(f64, &str); 4] = [(1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")];
 const VOLUME_UNITS: [(f64, &str); 4] = [(1.0, "m³"), (1e-3, "l"), (1e-6, "ml"), (1e-9, "mm³")];
 
-/// A length [m], shown with a prefix that suits it.
+/// A length `[m]`, shown with a prefix that suits it.
 struct Length(f64);
 
 impl fmt::Display for Length {
@@ -297,7 +297,7 @@ impl fmt::Display for Length {
     }
 }
 
-/// A volume [m^3], shown with a unit that suits it.
+/// A volume `[m^3]`, shown with a unit that suits it.
 struct Volume(f64);
 
 impl fmt::Display for Volume {
@@ -319,7 +319,7 @@ fn significant(value: f64) -> String {
         large if large >= 1000.0 => format!("{value:.0}"),
         large if large >= 100.0 => format!("{value:.1}"),
         large if large >= 10.0 => format!("{value:.2}"),
-        zero if zero == 0.0 => "0".into(),
+        0.0 => "0".into(),
         large if large >= 0.01 => format!("{value:.3}"),
         _ => format!("{value:.3e}"),
     }

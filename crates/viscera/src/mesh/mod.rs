@@ -16,11 +16,11 @@ pub use topology::boundary_surface;
 
 use crate::scalar::{Mat3, Vec3};
 
-/// Largest coordinate [m]. Kernels multiply up to four lengths in single precision: `(1e9)^4` is
+/// Largest coordinate `[m]`. Kernels multiply up to four lengths in single precision: `(1e9)^4` is
 /// below its largest number, 3e38. A larger bound would let them overflow.
 pub const MAX_COORDINATE: f64 = 1e9;
 
-/// Shortest length [m] that the longest edge of a tetrahedron may have: `(1e-9)^4` is above the
+/// Shortest length `[m]` that the longest edge of a tetrahedron may have: `(1e-9)^4` is above the
 /// smallest normal number in single precision, 1e-38. A smaller bound would let it underflow.
 pub const MIN_EDGE: f64 = 1e-9;
 
@@ -41,9 +41,9 @@ pub struct TetMesh {
 /// (counter-clockwise seen from outside).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SurfaceMesh {
-    /// Positions [m], shape [vertex_count].
+    /// Positions `[m]`, shape `[vertex_count]`.
     pub vertices: Vec<Vec3<f64>>,
-    /// Vertex indices, shape [triangle_count]; below vertex_count, which readers make sure of.
+    /// Vertex indices, shape `[triangle_count]`; below vertex_count, which readers make sure of.
     pub triangles: Vec<[u32; 3]>,
 }
 
@@ -71,7 +71,7 @@ impl TetMesh {
     /// Checks the numbers, repairs what can be repaired (winding, unused vertices) and builds the
     /// mesh.
     ///
-    /// `vertices` [m], shape [vertex_count]; `tets` and `regions`, shape [tet_count].
+    /// `vertices` `[m]`, shape `[vertex_count]`; `tets` and `regions`, shape `[tet_count]`.
     pub fn new(
         vertices: Vec<Vec3<f64>>,
         mut tets: Vec<[u32; 4]>,
@@ -97,34 +97,34 @@ impl TetMesh {
         Ok((Self { vertices, tets, regions }, MeshRepairs { rewound_tets, removed_vertices }))
     }
 
-    /// Positions [m], shape [vertex_count].
+    /// Positions `[m]`, shape `[vertex_count]`.
     pub fn vertices(&self) -> &[Vec3<f64>] {
         &self.vertices
     }
 
-    /// Four vertex indices per tetrahedron, positively wound, shape [tet_count].
+    /// Four vertex indices per tetrahedron, positively wound, shape `[tet_count]`.
     pub fn tets(&self) -> &[[u32; 4]] {
         &self.tets
     }
 
-    /// Region label per tetrahedron (Gmsh physical group, VTU cell array), shape [tet_count].
+    /// Region label per tetrahedron (Gmsh physical group, VTU cell array), shape `[tet_count]`.
     pub fn regions(&self) -> &[u32] {
         &self.regions
     }
 
-    /// The four corner positions [m] of a tetrahedron.
+    /// The four corner positions `[m]` of a tetrahedron.
     pub fn corners(&self, tet: usize) -> [Vec3<f64>; 4] {
         self.tets[tet].map(|v| self.vertices[v as usize])
     }
 
-    /// Total volume [m^3].
+    /// Total volume `[m^3]`.
     pub fn volume(&self) -> f64 {
         (0..self.tets.len()).map(|tet| tet_volume(self.corners(tet))).sum()
     }
 }
 
 impl SurfaceMesh {
-    /// Enclosed volume [m^3], negative if the triangles are wound inwards: the sum of the signed
+    /// Enclosed volume `[m^3]`, negative if the triangles are wound inwards: the sum of the signed
     /// tetrahedra between a point and each triangle. Has a meaning for closed surfaces only.
     pub fn enclosed_volume(&self) -> f64 {
         // From the middle of the surface, so that a far-off placement costs no digits.
@@ -135,7 +135,7 @@ impl SurfaceMesh {
             .sum()
     }
 
-    /// Total area [m^2].
+    /// Total area `[m^2]`.
     pub fn area(&self) -> f64 {
         let double: f64 = self
             .triangles
@@ -153,12 +153,12 @@ impl SurfaceMesh {
     }
 }
 
-/// Edge vectors from corner 0 as columns, [m]: `Ds = [x1-x0, x2-x0, x3-x0]`.
+/// Edge vectors from corner 0 as columns, `[m]`: `Ds = [x1-x0, x2-x0, x3-x0]`.
 pub fn edge_matrix(x: [Vec3<f64>; 4]) -> Mat3<f64> {
     Mat3::from_columns(x[1] - x[0], x[2] - x[0], x[3] - x[0])
 }
 
-/// Signed volume [m^3] of a tetrahedron: `det(Ds) / 6`.
+/// Signed volume `[m^3]` of a tetrahedron: `det(Ds) / 6`.
 pub fn tet_volume(x: [Vec3<f64>; 4]) -> f64 {
     edge_matrix(x).determinant() / 6.0
 }

@@ -18,12 +18,12 @@ use crate::scalar::Vec3;
 /// The six edges of a tetrahedron as pairs of corners.
 pub const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
-/// Lengths [m] of the six edges, in the order of [`TET_EDGES`].
+/// Lengths `[m]` of the six edges, in the order of [`TET_EDGES`].
 pub fn edge_lengths(x: [Vec3<f64>; 4]) -> [f64; 6] {
     TET_EDGES.map(|[a, b]| (x[b] - x[a]).length())
 }
 
-/// Shape quality in [-1, 1], see the head of this module. Zero where all corners coincide.
+/// Shape quality in `[-1, 1]`, see the head of this module. Zero where all corners coincide.
 pub fn shape_quality(x: [Vec3<f64>; 4]) -> f64 {
     let squares = TET_EDGES.map(|[a, b]| (x[b] - x[a]).length_squared());
     let mean_square = squares.iter().sum::<f64>() / 6.0;
@@ -34,7 +34,7 @@ pub fn shape_quality(x: [Vec3<f64>; 4]) -> f64 {
     }
 }
 
-/// Dihedral angles [rad] at the six edges, in the order of [`TET_EDGES`].
+/// Dihedral angles `[rad]` at the six edges, in the order of [`TET_EDGES`].
 pub fn dihedral_angles(x: [Vec3<f64>; 4]) -> [f64; 6] {
     let normals = TET_FACES.map(|[a, b, c]| (x[b] - x[a]).cross(x[c] - x[a]));
     // Two faces meet at the edge that neither is opposite to: edge (a, b) and faces c, d.
@@ -57,9 +57,9 @@ pub struct QualitySummary {
     pub worst_tet: usize,
     /// Mean shape quality, dimensionless, 0 to 1.
     pub mean: f64,
-    /// Smallest dihedral angle [rad].
+    /// Smallest dihedral angle `[rad]`.
     pub min_dihedral: f64,
-    /// Largest dihedral angle [rad].
+    /// Largest dihedral angle `[rad]`.
     pub max_dihedral: f64,
 }
 

@@ -51,9 +51,9 @@ pub struct BoundarySurface {
     /// The boundary triangles, wound outwards, by tetrahedron.
     pub surface: SurfaceMesh,
     /// The vertex of the tetrahedral mesh behind each vertex of the surface, ascending,
-    /// shape [surface vertex_count].
+    /// shape `[surface vertex_count]`.
     pub mesh_vertices: Vec<u32>,
-    /// The tetrahedron behind each triangle, ascending, shape [triangle_count].
+    /// The tetrahedron behind each triangle, ascending, shape `[triangle_count]`.
     pub tets: Vec<u32>,
 }
 
@@ -133,7 +133,7 @@ pub fn count_open_edges(surface: &SurfaceMesh) -> usize {
 pub struct Components {
     /// How many parts there are.
     pub count: usize,
-    /// The part of each vertex, numbered by their lowest vertex, shape [vertex_count].
+    /// The part of each vertex, numbered by their lowest vertex, shape `[vertex_count]`.
     pub labels: Vec<u32>,
 }
 
@@ -174,9 +174,9 @@ fn find_root(parent: &mut [u32], mut vertex: u32) -> u32 {
 /// The tetrahedra around each vertex, stored one after the other.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct VertexTets {
-    /// Where the list of a vertex starts in `tets`, shape [vertex_count + 1].
+    /// Where the list of a vertex starts in `tets`, shape `[vertex_count + 1]`.
     pub offsets: Vec<u32>,
-    /// Tetrahedra, ascending for each vertex, shape [4 tet_count].
+    /// Tetrahedra, ascending for each vertex, shape `[4 tet_count]`.
     pub tets: Vec<u32>,
 }
 
@@ -210,14 +210,14 @@ pub fn vertex_tets(mesh: &TetMesh) -> VertexTets {
 /// The smallest box along the axes that holds all points.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BoundingBox {
-    /// Lowest corner [m].
+    /// Lowest corner `[m]`.
     pub min: Vec3<f64>,
-    /// Highest corner [m].
+    /// Highest corner `[m]`.
     pub max: Vec3<f64>,
 }
 
 impl BoundingBox {
-    /// The box around points [m]; a single point at the origin if there are none.
+    /// The box around points `[m]`; a single point at the origin if there are none.
     pub fn around(points: &[Vec3<f64>]) -> Self {
         let Some((&first, rest)) = points.split_first() else {
             return Self::default();
@@ -228,12 +228,12 @@ impl BoundingBox {
         })
     }
 
-    /// Extent along the axes [m].
+    /// Extent along the axes `[m]`.
     pub fn size(&self) -> Vec3<f64> {
         self.max - self.min
     }
 
-    /// Centre [m].
+    /// Centre `[m]`.
     pub fn center(&self) -> Vec3<f64> {
         (self.min + self.max) * 0.5
     }

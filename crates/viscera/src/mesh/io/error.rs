@@ -37,7 +37,7 @@ pub enum ReadProblem {
     /// The unit of the file is not a length.
     #[error("a unit of {meters} m is not a length; give a number above 0, 0.001 for millimetres")]
     Unit {
-        /// The unit given [m].
+        /// The unit given `[m]`.
         meters: f64,
     },
     /// Neither content nor extension tell a format.

@@ -93,7 +93,7 @@ struct Parsed<Mesh> {
 /// Reads tetrahedra from the bytes of a Gmsh (1 or 2.x ASCII) or VTU (ASCII) file.
 ///
 /// `name` is the file's name, for its extension and for errors; `unit_in_meters` is the length of
-/// one unit of the file [m].
+/// one unit of the file `[m]`.
 pub fn read_tet_mesh(
     name: &str,
     bytes: &[u8],

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-/// The text of a `.pvd` file for frames given as time [s] and path relative to it.
+/// The text of a `.pvd` file for frames given as time `[s]` and path relative to it.
 pub fn write(frames: &[(f64, &str)]) -> String {
     let mut text = String::from(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n",

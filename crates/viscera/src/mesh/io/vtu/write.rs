@@ -53,8 +53,8 @@ impl Array {
 
 /// A grid of tetrahedra as the bytes of a `.vtu` file.
 ///
-/// `points` [m], shape [point_count]; `tets`, shape [tet_count]; each of `point_data` has an entry
-/// for each point, each of `cell_data` for each tetrahedron.
+/// `points` `[m]`, shape `[point_count]`; `tets`, shape `[tet_count]`; each of `point_data` has an
+/// entry for each point, each of `cell_data` for each tetrahedron.
 pub fn write<R: Real>(
     points: &[Vec3<R>],
     tets: &[[u32; 4]],
@@ -64,7 +64,7 @@ pub fn write<R: Real>(
     write_grid(points, tets, VTK_TETRA, point_data, cell_data)
 }
 
-/// A grid of triangles as the bytes of a `.vtu` file; shapes as for [`write`].
+/// A grid of triangles as the bytes of a `.vtu` file; shapes as for [`write()`].
 pub fn write_surface<R: Real>(
     points: &[Vec3<R>],
     triangles: &[[u32; 3]],
