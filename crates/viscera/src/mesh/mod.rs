@@ -3,6 +3,10 @@
 //! A [`TetMesh`] can only be built valid: finite vertices, indices in range, no tetrahedron flat
 //! relative to its own size, every tetrahedron wound so that its volume is positive.
 
+pub mod distance;
+mod lattice;
+pub mod tetrahedralize;
+
 use crate::scalar::{Mat3, Vec3};
 
 /// A tetrahedral mesh in SI units. Valid by construction, see [`TetMesh::new`].
