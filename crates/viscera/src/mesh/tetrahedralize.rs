@@ -384,6 +384,6 @@ fn diagonal_leaves_first(p: Corner, q: Corner, outside: Corner) -> bool {
         let exceeding = (0..3).filter(|&axis| p.coordinates[axis] > outside.coordinates[axis]);
         exceeding.count() % 2 == 0
     } else {
-        p.is_long_neighbor(outside)
+        q.is_long_neighbor(outside)
     }
 }
