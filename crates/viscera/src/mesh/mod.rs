@@ -4,7 +4,10 @@
 //! relative to its own size, every tetrahedron wound so that its volume is positive.
 
 pub mod distance;
+pub mod embed;
 mod lattice;
+pub mod liver;
+pub mod shapes;
 pub mod tetrahedralize;
 
 use crate::scalar::{Mat3, Vec3};
