@@ -351,3 +351,45 @@ fn miss(shape: &dyn SignedDistance, spacing: f64) -> TetrahedralizeError {
     }
     TetrahedralizeError::Empty
 }
+
+#[cfg(test)]
+impl<'a> Lattice<'a> {
+    /// A lattice of 5 x 5 x 5 cubes of edge 2, outside everywhere: ground for one tetrahedron.
+    pub fn blank(shape: &'a dyn SignedDistance) -> Self {
+        let mut lattice = Self {
+            shape,
+            spacing: 2.0,
+            origin: Vec3::ZERO,
+            cubes: [5; 3],
+            signs: Vec::new(),
+            cuts: Vec::new(),
+            warped: Vec::new(),
+        };
+        lattice.signs = vec![Sign::Outside; lattice.vertex_count()];
+        lattice
+    }
+
+    /// Makes the centre of the middle cube lie inside, so that its tetrahedra are visited.
+    pub fn mark_center_inside(&mut self) {
+        let center = self.id(1, [2; 3]);
+        self.signs[center as usize] = Sign::Inside;
+    }
+
+    /// Prescribes cut points (inside, outside, fraction) and warps (vertex, towards, fraction).
+    pub fn prescribe(&mut self, cuts: &[(u32, u32, f64)], warps: &[(u32, u32, f64)]) {
+        let cut = |&(inside, outside, fraction): &(u32, u32, f64)| Cut { inside, outside, fraction };
+        self.cuts = cuts.iter().map(cut).collect();
+        self.cuts.sort_unstable_by_key(|cut| (cut.inside, cut.outside));
+        self.warped.clear();
+        for &(vertex, towards, fraction) in warps {
+            let (from, to) = (self.regular_position(vertex), self.regular_position(towards));
+            self.warped.push((vertex, from + (to - from) * fraction));
+        }
+        self.warped.sort_unstable_by_key(|&(vertex, _)| vertex);
+    }
+
+    /// The neighbours along lattice edges, for tests.
+    pub fn all_neighbors(&self, id: u32) -> [u32; 14] {
+        self.neighbors(id)
+    }
+}
