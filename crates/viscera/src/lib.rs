@@ -5,5 +5,6 @@
 pub mod material;
 pub mod mesh;
 pub mod scalar;
+pub mod scene;
 pub mod settings;
 pub mod units;
