@@ -8,6 +8,7 @@ pub mod material;
 pub mod mesh;
 pub mod model;
 pub mod scalar;
+pub mod scene;
 pub mod settings;
 pub mod solver;
 pub mod state;

@@ -281,7 +281,7 @@ macro_rules! default_text {
         "required".to_owned()
     };
     (($($default:tt)+), $kind:expr) => {
-        $crate::settings::Kind::value_text(&$kind, &$($default)+)
+        $crate::settings::value_text_of(&$kind, $($default)+)
     };
     ($default:tt, $kind:expr) => {
         $crate::settings::default_text!(($default), $kind)
@@ -327,7 +327,7 @@ macro_rules! settings_table {
     (
         $(#[doc = $table_doc:literal])+
         $vis:vis struct $table:ident {
-            $( $(#[doc = $doc:literal])+ $field:ident: $type:ty = $default:tt, $kind:expr; )*
+            $( $(#[doc = $doc:literal])+ $field:ident: $type:ty = $default:tt, $kind:expr; )+
             $( with $taken:ty as $taken_field:ident; )?
         }
     ) => {
@@ -351,7 +351,7 @@ macro_rules! settings_table {
             const DOC: &'static str = concat!($($table_doc, "\n"),+);
 
             fn names(names: &mut Vec<&'static str>) {
-                names.extend([$( $crate::settings::key_name(stringify!($field)) ),*]);
+                $( names.push($crate::settings::key_name(stringify!($field))); )*
                 $( <$taken as $crate::settings::Table>::names(names); )?
             }
 
@@ -430,6 +430,11 @@ macro_rules! choices {
 }
 
 pub(crate) use {choices, default_text, default_value, read_field, settings_table};
+
+/// A default as one would write it.
+pub(crate) fn value_text_of<K: Kind>(kind: &K, value: K::Value) -> String {
+    kind.value_text(&value)
+}
 
 /// Describes one key of a table.
 pub(crate) fn describe_key<K: Kind>(
