@@ -81,8 +81,7 @@ impl ForceBalance {
                 }
                 if let Some(start) = strains.get(tet) {
                     let rate = material.viscosity.to_f64() / dt;
-                    let change =
-                        std::array::from_fn(|p| (strain[p] - start[p].to_f64()) * rate);
+                    let change = std::array::from_fn(|p| (strain[p] - start[p].to_f64()) * rate);
                     piola = piola + green_strain::piola(&f, &change, lambda, mu);
                 }
                 let forces = internal_forces(&piola, &shape, volume);
@@ -101,8 +100,7 @@ impl ForceBalance {
             }
         }
         let attachments = &model.attachments;
-        let anchors =
-            if inputs.anchors.is_empty() { &model.rest_anchors } else { &inputs.anchors };
+        let anchors = if inputs.anchors.is_empty() { &model.rest_anchors } else { &inputs.anchors };
         for (i, &v) in attachments.vertices.iter().enumerate() {
             let x = state.positions[v as usize].cast::<f64>();
             let anchor = anchors[attachments.order[i] as usize].cast();

@@ -85,10 +85,7 @@ impl<S: Real> Workspace<S> {
                 iterate(accelerated),
                 iterate(settings.acceleration == Acceleration::Chebyshev),
             ],
-            multiplier_weights: vec![
-                S::ZERO;
-                if accelerated { model.multiplier_count } else { 0 }
-            ],
+            multiplier_weights: vec![S::ZERO; if accelerated { model.multiplier_count } else { 0 }],
             chebyshev: Chebyshev::default(),
             anderson: Anderson::new(window, length),
         }
@@ -447,8 +444,7 @@ impl<S: Real> Sweep<'_, S> {
             let at = viscous_offset + 6 * tet;
             let l = read(self.multipliers, at);
             let x = copies.map(|copy| self.points[copy as usize]);
-            let scale =
-                S::ONE / (set.rest_volume[tet] * material.viscosity * S::from_f64(self.dt));
+            let scale = S::ONE / (set.rest_volume[tet] * material.viscosity * S::from_f64(self.dt));
             let (target, compliance) = (&start_strain[tet], &material.compliance);
             let change = green_strain::solve(&x, &w, shape, &l, target, compliance, scale);
             self.apply(at, &copies, &change.multipliers, &change.positions);
@@ -472,8 +468,7 @@ impl<S: Real> Sweep<'_, S> {
 
     fn solve_attachments(&mut self, model: &Model<S>, inputs: &Inputs<S>, color: usize) {
         let set = &model.attachments;
-        let anchors =
-            if inputs.anchors.is_empty() { &model.rest_anchors } else { &inputs.anchors };
+        let anchors = if inputs.anchors.is_empty() { &model.rest_anchors } else { &inputs.anchors };
         for i in set.color_offsets[color] as usize..set.color_offsets[color + 1] as usize {
             let copy = set.copies[i];
             let x = self.points[copy as usize];
