@@ -14,6 +14,13 @@ pub use error::{MeshError, MeshPlace};
 pub use inspect::{MeshSummary, SurfaceSummary, inspect, inspect_surface};
 pub use topology::boundary_surface;
 
+pub mod distance;
+pub mod embed;
+mod lattice;
+pub mod liver;
+pub mod shapes;
+pub mod tetrahedralize;
+
 use crate::scalar::{Mat3, Vec3};
 
 /// Largest coordinate `[m]`. Kernels multiply up to four lengths in single precision: `(1e9)^4` is
