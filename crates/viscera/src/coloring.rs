@@ -102,9 +102,8 @@ impl ConstraintGraph {
 
         for constraint in self.order(&valence) {
             let vertices = self.vertices(constraint as usize);
-            let taken = |v: u32, color: usize| -> u32 {
-                used[v as usize].get(color).copied().unwrap_or(0)
-            };
+            let taken =
+                |v: u32, color: usize| -> u32 { used[v as usize].get(color).copied().unwrap_or(0) };
             let conflicts = |color: usize| {
                 vertices.iter().filter(|&&v| taken(v, color) >= copies[v as usize]).count()
             };

@@ -82,10 +82,9 @@ fn measure_tet<S: Real>(
             let energy = green_strain::energy_density(&strain, lambda, mu);
             (energy, green_strain::piola(&f, &strain, lambda, mu))
         }
-        MaterialModel::StableNeoHookean => (
-            neo_hookean::energy_density(&f, lambda, mu),
-            neo_hookean::piola(&f, lambda, mu),
-        ),
+        MaterialModel::StableNeoHookean => {
+            (neo_hookean::energy_density(&f, lambda, mu), neo_hookean::piola(&f, lambda, mu))
+        }
     };
     let volume_ratio = f.determinant();
     let divisor = volume_ratio.abs().max(SMALLEST_VOLUME_RATIO).copysign(volume_ratio);
@@ -269,11 +268,8 @@ mod tests {
 
     #[test]
     fn von_mises_of_uniaxial_stress_is_that_stress() {
-        let cauchy = Mat3::from_columns(
-            vec3(250.0, 0.0, 0.0),
-            vec3(0.0, 0.0, 0.0),
-            vec3(0.0, 0.0, 0.0),
-        );
+        let cauchy =
+            Mat3::from_columns(vec3(250.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0));
         assert!((von_mises(&cauchy) - 250.0).abs() < 1e-12);
         assert!(von_mises(&(Mat3::IDENTITY * 40.0)) < 1e-12);
     }

@@ -397,9 +397,8 @@ impl ModelBuilder {
     }
 
     fn lay_out_tets<S: Real>(&self, layout: &mut Layout<'_>, model: MaterialModel) -> TetSet<S> {
-        let of_model = |&tet: &usize| {
-            self.materials[self.tet_material[tet] as usize].model() == model
-        };
+        let of_model =
+            |&tet: &usize| self.materials[self.tet_material[tet] as usize].model() == model;
         let chosen: Vec<usize> = (0..self.tets.len()).filter(of_model).collect();
         let (order, color_offsets) = layout.sort(chosen);
         let material: Vec<u32> = order.iter().map(|&t| self.tet_material[t as usize]).collect();

@@ -57,7 +57,8 @@ fn cases() -> Vec<Case> {
             vec3(0.2, random.uniform(0.5, 2.0), random.uniform(-0.3, 0.3)),
             vec3(random.uniform(-0.3, 0.3), -0.1, random.uniform(0.5, 2.0)),
         );
-        let squeeze = |z| Mat3::from_columns(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, z));
+        let squeeze =
+            |z| Mat3::from_columns(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, z));
         let f = match name {
             "flattened" => squeeze(1e-3) * stretch,
             "inverted" => squeeze(-0.7) * stretch,
@@ -359,7 +360,10 @@ fn single_precision_follows_double() {
         let spread = case.corners.iter().fold(0.0f64, |a, x| a.max(x.length())) / case.height;
         for p in 0..6 {
             let difference = (strain[p] - f64::from(rough[p])).abs();
-            assert!(difference < 32.0 * f64::from(f32::EPSILON) * spread.max(1.0), "{difference:e}");
+            assert!(
+                difference < 32.0 * f64::from(f32::EPSILON) * spread.max(1.0),
+                "{difference:e}"
+            );
         }
     }
 }
@@ -383,8 +387,7 @@ fn degenerate_shapes_give_finite_corrections() {
     ];
     for x in shapes {
         let w = [1.0; 4];
-        let green =
-            green_strain::solve(&x, &w, &shape, &[0.0; 6], &[0.0; 6], &compliance, 6.0);
+        let green = green_strain::solve(&x, &w, &shape, &[0.0; 6], &[0.0; 6], &compliance, 6.0);
         let neo = neo_hookean::solve(&x, &w, &shape, &[0.0; 2], 1e4, 1e3, 1.0 / 6.0);
         for moved in green.positions.iter().chain(&neo.positions) {
             assert!(moved.is_finite(), "{x:?} {moved:?}");

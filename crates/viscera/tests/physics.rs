@@ -276,10 +276,8 @@ fn viscosity_decays_with_the_retardation_time() {
         }
         let end = |side: f64| {
             let chosen = mesh.vertices().iter().zip(&run.state.positions);
-            let xs: Vec<f64> = chosen
-                .filter(|(rest, _)| (rest.x - side).abs() < 1e-9)
-                .map(|(_, x)| x.x)
-                .collect();
+            let xs: Vec<f64> =
+                chosen.filter(|(rest, _)| (rest.x - side).abs() < 1e-9).map(|(_, x)| x.x).collect();
             xs.iter().sum::<f64>() / xs.len() as f64
         };
         let strain = (end(0.04) - end(0.0)) / 0.04 - 1.0;

@@ -1,7 +1,8 @@
 //! The shipped scenes, and what a scene file can say.
 
 use viscera::material::MaterialModel;
-use viscera::scalar::vec3;
+use viscera::mesh::{TetMesh, shapes};
+use viscera::scalar::{Vec3, vec3};
 use viscera::scene::{BodyShape, Scene, SceneError, Selector, describe_markdown, describe_text};
 use viscera::settings::{Acceleration, Colors, Precision, SolverSettings, Start};
 
@@ -93,6 +94,40 @@ fn every_shipped_scene_is_valid_and_needs_no_file() {
         assert!(!scene.title.is_empty() && !scene.description.is_empty(), "{name}");
         assert!((60..=600).contains(&scene.frame_count()), "{name}");
         assert!(!scene.fixings.is_empty(), "{name}");
+    }
+}
+
+fn mesh_of(shape: &BodyShape) -> TetMesh {
+    match *shape {
+        BodyShape::Beam { length, width, height, cells_across } => {
+            shapes::beam(length, width, height, cells_across as usize).unwrap()
+        }
+        BodyShape::Block { size, cells } => {
+            shapes::block(Vec3::from_f64(size), cells.map(|count| count as usize)).unwrap()
+        }
+        BodyShape::Liver { spacing, scale } => shapes::liver(spacing, scale).unwrap().tets,
+        _ => panic!("no shipped scene uses {shape:?}"),
+    }
+}
+
+#[test]
+fn every_patch_of_a_shipped_scene_is_found_and_no_vertex_is_held_twice() {
+    for (name, text) in SHIPPED {
+        let scene = Scene::parse(name, text, &[]).unwrap();
+        let meshes: Vec<_> = scene.bodies.iter().map(|body| mesh_of(&body.shape)).collect();
+        let fixed = scene.fixings.iter().map(|fixing| &fixing.patch);
+        let moved = scene.motions.iter().map(|motion| &motion.patch);
+        let mut held = std::collections::BTreeSet::new();
+        for patch in fixed.chain(moved) {
+            let (mesh, placement) = (&meshes[patch.body], &scene.bodies[patch.body].placement);
+            let rest: Vec<_> = mesh.vertices().iter().map(|&x| placement.apply(x)).collect();
+            let vertices = patch.select(&rest, mesh.tets(), mesh.regions()).unwrap();
+            println!("{name}, {}: {} of {} vertices", patch.purpose, vertices.len(), rest.len());
+            assert!(vertices.len() < rest.len() / 4, "{name}, {}", patch.purpose);
+            for vertex in vertices {
+                assert!(held.insert((patch.body, vertex)), "{name}, {}", patch.purpose);
+            }
+        }
     }
 }
 

@@ -42,11 +42,7 @@ pub fn strain<S: Scalar>(deformation_gradient: &Mat3<S>) -> Voigt<S> {
 /// The symmetric 3 x 3 matrix whose components are `v` (without halving the shear).
 #[inline(always)]
 pub fn symmetric<S: Scalar>(v: &Voigt<S>) -> Mat3<S> {
-    Mat3::from_columns(
-        vec3(v[0], v[5], v[4]),
-        vec3(v[5], v[1], v[3]),
-        vec3(v[4], v[3], v[2]),
-    )
+    Mat3::from_columns(vec3(v[0], v[5], v[4]), vec3(v[5], v[1], v[3]), vec3(v[4], v[3], v[2]))
 }
 
 /// Energy density [Pa]: `W = C^T D C / 2` with `D` isotropic.

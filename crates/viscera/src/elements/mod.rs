@@ -41,10 +41,7 @@ pub fn edge_matrix<S: Scalar>(x: &[Vec3<S>; 4]) -> Mat3<S> {
 
 /// `F = Ds Dm^-1`.
 #[inline(always)]
-pub fn deformation_gradient<S: Scalar>(
-    x: &[Vec3<S>; 4],
-    inverse_rest_shape: &Mat3<S>,
-) -> Mat3<S> {
+pub fn deformation_gradient<S: Scalar>(x: &[Vec3<S>; 4], inverse_rest_shape: &Mat3<S>) -> Mat3<S> {
     edge_matrix(x) * *inverse_rest_shape
 }
 

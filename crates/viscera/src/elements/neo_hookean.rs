@@ -110,8 +110,7 @@ pub fn solve<S: Scalar>(
     let ratio = a01 / a00;
     let d1 = (b1 - ratio * b0) / (a11 - ratio * a01);
     let d0 = (b0 - a01 * d1) / a00;
-    let positions =
-        [0, 1, 2, 3].map(|i| (volume_gradient[i] * d0 + shear_gradient[i] * d1) * w[i]);
+    let positions = [0, 1, 2, 3].map(|i| (volume_gradient[i] * d0 + shear_gradient[i] * d1) * w[i]);
     TetCorrection { multipliers: [d0, d1], positions }
 }
 

@@ -21,7 +21,7 @@
 
 mod presets;
 
-pub use presets::{PRESETS, Preset, UnknownPreset, preset};
+pub use presets::{PRESET_CAUTION, PRESETS, Preset, UnknownPreset, preset};
 
 use crate::settings::choices;
 use crate::units::Dimension;

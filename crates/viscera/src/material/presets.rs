@@ -9,8 +9,8 @@ use crate::settings::suggest;
 use crate::units::{Dimension, shorten};
 
 /// What holds for every preset.
-const CAUTION: &str = "A starting point, not a measurement of your patient: published values for \
-    one tissue differ by a factor of 2 to 10 with method, strain and health.";
+pub const PRESET_CAUTION: &str = "A preset is a starting point, not a measurement of a patient: \
+    published values for one tissue differ by a factor of 2 to 10 with method, strain and health.";
 
 /// Typical parameters of a tissue.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,10 +41,8 @@ pub struct UnknownPreset {
     pub hint: String,
 }
 
-const LIVER_STUDY: &str =
-    "PMC6925591, table 1 (abdominal tissue of patients, shear-wave elastography)";
-const ARDA: &str =
-    "Arda et al. 2011, doi:10.2214/AJR.10.5449 (shear-wave elastography of volunteers)";
+const LIVER_STUDY: &str = "PMC6925591, table 1";
+const ARDA: &str = "Arda et al. 2011, doi:10.2214/AJR.10.5449, shear-wave elastography";
 
 /// Every preset, softest organs of the abdomen first.
 pub const PRESETS: &[Preset] = &[
@@ -82,7 +80,7 @@ pub const PRESETS: &[Preset] = &[
         poisson: 0.49,
         density: 1050.0,
         source: ARDA,
-        caution: "One study; volunteers differ by more than half of the value.",
+        caution: "The spread is more than half of the value.",
     },
     Preset {
         name: "kidney_pelvis",
@@ -91,7 +89,7 @@ pub const PRESETS: &[Preset] = &[
         poisson: 0.49,
         density: 1050.0,
         source: ARDA,
-        caution: "One study of volunteers.",
+        caution: "Much stiffer than the cortex.",
     },
     Preset {
         name: "spleen",
@@ -197,7 +195,7 @@ impl Preset {
         Material::new(model, self.young, self.poisson, self.density)
     }
 
-    /// One paragraph: numbers, source and cautions.
+    /// One paragraph: numbers, source and caution; [`PRESET_CAUTION`] holds besides.
     pub fn description(&self) -> String {
         let pressure = |value| Dimension::Pressure.format(value);
         let range = match self.young_range {
@@ -205,7 +203,7 @@ impl Preset {
             None => "no range published".to_owned(),
         };
         format!(
-            "E {} ({range}), nu {}, {}. {}. {} {CAUTION}",
+            "E {} ({range}), nu {}, {}. {}. {}",
             pressure(self.young),
             self.poisson,
             Dimension::Density.format(self.density),
@@ -229,7 +227,7 @@ mod tests {
             // Soft tissue: heavier than fat is light, lighter than skin is heavy.
             assert!((900.0..1200.0).contains(&preset.density), "{name}");
             assert!((0.45..=0.499).contains(&preset.poisson), "{name}");
-            assert!(!preset.source.is_empty() && preset.description().contains("starting point"));
+            assert!(!preset.source.is_empty() && !preset.caution.is_empty());
             assert!(
                 PRESETS[..index].iter().all(|other| other.name != name),
                 "{name} is there twice"

@@ -203,9 +203,7 @@ impl<A: SignedDistance> SignedDistance for Placed<A> {
             let pick = |axis: usize| if index >> axis & 1 == 0 { lower[axis] } else { upper[axis] };
             self.rotation * (vec3(pick(0), pick(1), pick(2)) * self.scale) + self.translation
         };
-        (1..8)
-            .map(corner)
-            .fold((corner(0), corner(0)), |(low, high), x| (low.min(x), high.max(x)))
+        (1..8).map(corner).fold((corner(0), corner(0)), |(low, high), x| (low.min(x), high.max(x)))
     }
 }
 
@@ -213,7 +211,8 @@ impl<A: SignedDistance> SignedDistance for Placed<A> {
 pub fn rotation_about(axis: Vec3<f64>, angle: f64) -> Mat3<f64> {
     let n = axis * (1.0 / axis.length());
     let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
-    let cross = Mat3::from_columns(vec3(0.0, n.z, -n.y), vec3(-n.z, 0.0, n.x), vec3(n.y, -n.x, 0.0));
+    let cross =
+        Mat3::from_columns(vec3(0.0, n.z, -n.y), vec3(-n.z, 0.0, n.x), vec3(n.y, -n.x, 0.0));
     Mat3::IDENTITY * cosine + cross * sine + Mat3::outer(n, n) * (1.0 - cosine)
 }
 

@@ -131,11 +131,7 @@ impl Embedding {
     }
 }
 
-fn check_length(
-    what: &'static str,
-    found: usize,
-    expected: usize,
-) -> Result<(), EmbeddingError> {
+fn check_length(what: &'static str, found: usize, expected: usize) -> Result<(), EmbeddingError> {
     if found == expected { Ok(()) } else { Err(EmbeddingError::Length { what, found, expected }) }
 }
 
@@ -313,7 +309,8 @@ pub fn closest_point_on_triangle(triangle: [Vec3<f64>; 3], point: Vec3<f64>) -> 
         let edge = to - from;
         let length_squared = edge.length_squared();
         // Two corners in one place: either will do.
-        let fraction = if length_squared > 0.0 { (point - from).dot(edge) / length_squared } else { 0.0 };
+        let fraction =
+            if length_squared > 0.0 { (point - from).dot(edge) / length_squared } else { 0.0 };
         from + edge * fraction.clamp(0.0, 1.0)
     };
     let distance = |x: Vec3<f64>| (x - point).length_squared();

@@ -99,7 +99,8 @@ impl<'a> Lattice<'a> {
             return Err(TetrahedralizeError::Bounds);
         }
         let half_cubes = |spacing: f64| size.to_array().map(|s| (0.5 * s / spacing).ceil() + 1.0);
-        let count = |spacing: f64| half_cubes(spacing).iter().map(|m| 2.0 * m + 1.0).product::<f64>();
+        let count =
+            |spacing: f64| half_cubes(spacing).iter().map(|m| 2.0 * m + 1.0).product::<f64>();
         let (lattice_vertices, limit) = (2.0 * count(spacing), MAX_LATTICE_VERTICES as f64);
         if lattice_vertices > limit {
             let mut suggestion = spacing;
@@ -261,7 +262,8 @@ impl<'a> Lattice<'a> {
             (outside, inside)
         });
         // (vertex, cut) for both ends of each cut: grouped by vertex, in order of vertex ids.
-        let from_inside = (0..self.cuts.len() as u32).map(|cut| (self.cuts[cut as usize].inside, cut));
+        let from_inside =
+            (0..self.cuts.len() as u32).map(|cut| (self.cuts[cut as usize].inside, cut));
         let from_outside = by_outside.iter().map(|&cut| (self.cuts[cut as usize].outside, cut));
         let mut ends: Vec<(u32, u32)> = from_inside.chain(from_outside).collect();
         ends.sort_unstable();
@@ -377,7 +379,8 @@ impl<'a> Lattice<'a> {
 
     /// Prescribes cut points (inside, outside, fraction) and warps (vertex, towards, fraction).
     pub fn prescribe(&mut self, cuts: &[(u32, u32, f64)], warps: &[(u32, u32, f64)]) {
-        let cut = |&(inside, outside, fraction): &(u32, u32, f64)| Cut { inside, outside, fraction };
+        let cut =
+            |&(inside, outside, fraction): &(u32, u32, f64)| Cut { inside, outside, fraction };
         self.cuts = cuts.iter().map(cut).collect();
         self.cuts.sort_unstable_by_key(|cut| (cut.inside, cut.outside));
         self.warped.clear();

@@ -306,7 +306,8 @@ impl Builder<'_> {
             _ => {
                 let inner = [p, q, r].map(|v| self.vertex(v));
                 let outer = [p, q, r].map(|v| self.cut(v, s));
-                let diagonals = [(p, q), (q, r), (r, p)].map(|(a, b)| diagonal_leaves_first(a, b, s));
+                let diagonals =
+                    [(p, q), (q, r), (r, p)].map(|(a, b)| diagonal_leaves_first(a, b, s));
                 self.push_prism(inner, outer, diagonals);
             }
         }

@@ -1,13 +1,33 @@
 //! Every key a scene file can have, from the declarations of the settings themselves.
 
 use super::tables::SceneTable;
-use crate::material::PRESETS;
+use crate::material::{PRESET_CAUTION, PRESETS};
 use crate::settings::{KeyDescription, TableDescription, describe_table};
 use std::fmt::Write;
 
 /// Every table of a scene file and its keys, the scene itself first.
 pub fn describe() -> Vec<TableDescription> {
     describe_table::<SceneTable>("", false)
+}
+
+/// The tables of [`describe`] for printing: what several have in common (a selector of a fixing, of
+/// a motion, of a force) is said once, under all their headers.
+fn printed_tables() -> Vec<(String, TableDescription)> {
+    let mut printed: Vec<(String, TableDescription)> = Vec::new();
+    for table in describe() {
+        let header = header(&table);
+        let same = |(_, other): &&mut (String, TableDescription)| {
+            other.doc == table.doc && other.keys == table.keys
+        };
+        match printed.iter_mut().find(same) {
+            Some((headers, _)) => {
+                headers.push(' ');
+                headers.push_str(&header);
+            }
+            None => printed.push((header, table)),
+        }
+    }
+    printed
 }
 
 /// The header under which a table is written: `[solver]`, `[[body]]`.
@@ -36,8 +56,8 @@ fn facts(key: &KeyDescription) -> String {
 /// Every key, as plain text for a terminal.
 pub fn describe_text() -> String {
     let mut text = String::new();
-    for table in describe() {
-        push_line(&mut text, format_args!("{}", header(&table)));
+    for (headers, table) in printed_tables() {
+        push_wrapped(&mut text, "", &headers);
         push_wrapped(&mut text, "    ", &table.doc);
         for key in &table.keys {
             push_line(&mut text, format_args!("\n    {}", key.name));
@@ -47,6 +67,7 @@ pub fn describe_text() -> String {
         text.push('\n');
     }
     text.push_str("presets of material.preset\n");
+    push_wrapped(&mut text, "    ", PRESET_CAUTION);
     for preset in PRESETS {
         push_line(&mut text, format_args!("\n    {}", preset.name));
         push_wrapped(&mut text, "        ", &preset.description());
@@ -57,8 +78,9 @@ pub fn describe_text() -> String {
 /// Every key, as Markdown.
 pub fn describe_markdown() -> String {
     let mut text = String::from("# Scene files\n");
-    for table in describe() {
-        push_line(&mut text, format_args!("\n## `{}`\n\n{}\n", header(&table), table.doc));
+    for (headers, table) in printed_tables() {
+        let headers = headers.replace(' ', "` `");
+        push_line(&mut text, format_args!("\n## `{headers}`\n\n{}\n", table.doc));
         text.push_str("| key | takes | what it does |\n|---|---|---|\n");
         for key in &table.keys {
             let cell = |content: &str| content.replace('|', "\\|");
@@ -66,7 +88,8 @@ pub fn describe_markdown() -> String {
             push_line(&mut text, format_args!("| `{}` | {facts} | {doc} |", key.name));
         }
     }
-    text.push_str("\n## Presets of `material.preset`\n\n| preset | what it is |\n|---|---|\n");
+    push_line(&mut text, format_args!("\n## Presets of `material.preset`\n\n{PRESET_CAUTION}\n"));
+    text.push_str("| preset | what it is |\n|---|---|\n");
     for preset in PRESETS {
         push_line(&mut text, format_args!("| `{}` | {} |", preset.name, preset.description()));
     }

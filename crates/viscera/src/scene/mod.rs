@@ -289,7 +289,7 @@ pub enum SceneError {
         /// What it is for.
         purpose: String,
         /// Why.
-        error: SelectError,
+        error: Box<SelectError>,
     },
 }
 

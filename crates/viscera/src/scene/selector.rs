@@ -235,7 +235,7 @@ impl Patch {
         self.selector.select(rest_positions, tets, regions).map_err(|error| SceneError::Selection {
             place: self.place.clone(),
             purpose: self.purpose.clone(),
-            error,
+            error: Box::new(error),
         })
     }
 }

@@ -6,9 +6,9 @@ use crate::material::{
 };
 use crate::scalar::{Vec3, vec3};
 use crate::settings::{
-    ANY, Kind, Node, Placed, SettingError, SolverSettings, Value, ValueError, above, at_least,
-    choices, direction, name, number, one_of, optional, placed, quantity, settings_table, several,
-    table, tables, text, truth, value_error, vector, whole,
+    ANY, Kind, Node, Placed, Range, SettingError, SolverSettings, Value, ValueError, above,
+    at_least, choices, direction, name, number, one_of, optional, placed, quantity, settings_table,
+    several, table, tables, text, truth, value_error, vector, whole,
 };
 use crate::units::Dimension;
 
@@ -101,7 +101,7 @@ choices! {
 }
 
 /// Sizes from a micrometre to a hundred metres: what lies beyond is a slip of the unit.
-const SIZE: crate::settings::Range = at_least(1e-6).up_to(100.0);
+const SIZE: Range = at_least(1e-6).up_to(100.0);
 
 settings_table! {
     /// A body: a mesh from a file (`mesh`, `unit`) or a `shape`, put in place, and what it is made
@@ -332,7 +332,7 @@ settings_table! {
         from: Placed<PatchTable> = required, placed(table::<PatchTable>());
         /// The other end.
         to: Placed<PatchTable> = required, placed(table::<PatchTable>());
-        /// Stiffness.
+        /// Force per length beyond `rest_length`.
         stiffness: f64 = required, quantity(Dimension::Stiffness, above(0.0));
         /// Length without force; the distance at rest where unset.
         rest_length: Option<f64> = None, optional(quantity(Dimension::Length, at_least(0.0)));

@@ -5,6 +5,7 @@
 //! `Default`, reading it from TOML with errors that name line, column and the nearest valid name,
 //! overrides, and the descriptions that `viscera scene describe` prints.
 
+mod compound;
 mod kind;
 mod solver;
 mod tree;
@@ -14,11 +15,11 @@ pub use solver::{
 };
 pub use tree::Place;
 
+pub(crate) use compound::*;
 pub(crate) use kind::*;
 pub(crate) use tree::{Node, Value, apply_override, parse_tree};
 
-use crate::units::UnitError;
-use crate::units::shorten;
+use crate::units::{UnitError, shorten};
 
 /// Why a setting could not be read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -66,7 +67,7 @@ pub enum SettingError {
         /// The value.
         written: String,
         /// Why not.
-        problem: ValueError,
+        problem: Box<ValueError>,
     },
     /// An override's key is not a path of names.
     #[error("override of {key}: a key is names joined by dots, for example solver.iterations")]
@@ -229,7 +230,7 @@ pub(crate) fn describe_table<T: Table>(path: &str, repeated: bool) -> Vec<TableD
 /// An error about the value of one key.
 pub(crate) fn value_error(key: &str, node: &Node, problem: ValueError) -> SettingError {
     let (place, written) = (node.place.clone(), node.value.written());
-    SettingError::Value { place, key: shorten(key), written, problem }
+    SettingError::Value { place, key: shorten(key), written, problem: Box::new(problem) }
 }
 
 /// The nearest valid name where one is near, otherwise all of them.

@@ -180,19 +180,16 @@ impl Assembly {
         };
         let placed =
             TetMesh::new(place(mesh.vertices()), mesh.tets().to_vec(), mesh.regions().to_vec());
-        let (mesh, _) = placed.map_err(|error| AssembleError::Placement {
-            body: body.name.clone(),
-            error,
-        })?;
+        let (mesh, _) =
+            placed.map_err(|error| AssembleError::Placement { body: body.name.clone(), error })?;
         self.note_report(&body.name, &report);
         let has_fine_surface = surface.is_some();
         let surface = match surface {
             Some(surface) => SurfaceMesh { vertices: place(&surface.vertices), ..surface },
             None => boundary_surface(&mesh).surface,
         };
-        let embedding = Embedding::new(&mesh, &surface).map_err(|error| {
-            AssembleError::Embedding { body: body.name.clone(), error }
-        })?;
+        let embedding = Embedding::new(&mesh, &surface)
+            .map_err(|error| AssembleError::Embedding { body: body.name.clone(), error })?;
         let typical = (mesh.volume() / mesh.tets().len() as f64).cbrt();
         if has_fine_surface && embedding.max_distance() > 3.0 * typical {
             self.notes.push(format!(
@@ -273,8 +270,7 @@ impl Assembly {
         let mut notes = Vec::new();
         for (later, (name, vertices)) in patches.iter().enumerate() {
             for (other, others) in &patches[..later] {
-                let shared =
-                    vertices.iter().filter(|&v| others.binary_search(v).is_ok()).count();
+                let shared = vertices.iter().filter(|&v| others.binary_search(v).is_ok()).count();
                 if shared > 0 {
                     notes.push(format!(
                         "{shared} vertices belong to both `{other}` and `{name}`; they follow \
@@ -324,9 +320,8 @@ fn make_mesh(
     load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
 ) -> Result<(TetMesh, Option<SurfaceMesh>, ReadReport), AssembleError> {
     let built = |mesh| (mesh, None, ReadReport::default());
-    let curved = |shape: shapes::CurvedShape| {
-        (shape.tets, Some(shape.surface), ReadReport::default())
-    };
+    let curved =
+        |shape: shapes::CurvedShape| (shape.tets, Some(shape.surface), ReadReport::default());
     let made = match &body.shape {
         BodyShape::File { mesh, unit, surface } => {
             let mut bytes =

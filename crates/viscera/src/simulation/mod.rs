@@ -5,8 +5,7 @@ mod assemble;
 pub use assemble::{AssembleError, AssembledBody, Assembly, ResolvedPatch};
 
 use crate::measure::{
-    DeformationSummary, Energies, TetMeasure, measure_energies, measure_tets,
-    summarize_deformation,
+    DeformationSummary, Energies, TetMeasure, measure_energies, measure_tets, summarize_deformation,
 };
 use crate::model::{Model, ModelError};
 use crate::scalar::{Real, Vec3};
@@ -205,10 +204,12 @@ impl<S: Real> Simulation<S> {
         for (motion, patch) in self.scene.motions.iter().zip(&self.assembly.motions) {
             if motion.is_held(time) {
                 let pose = motion.pose(time);
-                self.inputs.pins.extend(patch.vertices.iter().map(|&v| Pin {
-                    vertex: v,
-                    target: pose.apply(rest[v as usize]).cast(),
-                }));
+                self.inputs.pins.extend(
+                    patch
+                        .vertices
+                        .iter()
+                        .map(|&v| Pin { vertex: v, target: pose.apply(rest[v as usize]).cast() }),
+                );
             }
         }
         self.inputs.forces.clear();

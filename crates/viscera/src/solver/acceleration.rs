@@ -57,11 +57,8 @@ impl Chebyshev {
             self.omega = 1.0;
         } else {
             let squared = self.radius * self.radius;
-            self.omega = if k == delay {
-                2.0 / (2.0 - squared)
-            } else {
-                4.0 / (4.0 - squared * self.omega)
-            };
+            self.omega =
+                if k == delay { 2.0 / (2.0 - squared) } else { 4.0 / (4.0 - squared * self.omega) };
         }
         self.omega
     }

@@ -81,8 +81,7 @@ impl ForceBalance {
                 }
                 if let Some(start) = strains.get(tet) {
                     let rate = material.viscosity.to_f64() / dt;
-                    let change =
-                        std::array::from_fn(|p| (strain[p] - start[p].to_f64()) * rate);
+                    let change = std::array::from_fn(|p| (strain[p] - start[p].to_f64()) * rate);
                     piola = piola + green_strain::piola(&f, &change, lambda, mu);
                 }
                 let forces = internal_forces(&piola, &shape, volume);

@@ -85,10 +85,7 @@ impl<S: Real> Workspace<S> {
                 iterate(accelerated),
                 iterate(settings.acceleration == Acceleration::Chebyshev),
             ],
-            multiplier_weights: vec![
-                S::ZERO;
-                if accelerated { model.multiplier_count } else { 0 }
-            ],
+            multiplier_weights: vec![S::ZERO; if accelerated { model.multiplier_count } else { 0 }],
             chebyshev: Chebyshev::default(),
             anderson: Anderson::new(window, length),
         }
@@ -450,8 +447,7 @@ impl<S: Real> Sweep<'_, S> {
             let at = viscous_offset + 6 * tet;
             let l = read(self.multipliers, at);
             let x = copies.map(|copy| self.points[copy as usize]);
-            let scale =
-                S::ONE / (set.rest_volume[tet] * material.viscosity * S::from_f64(self.dt));
+            let scale = S::ONE / (set.rest_volume[tet] * material.viscosity * S::from_f64(self.dt));
             let (target, compliance) = (&start_strain[tet], &material.compliance);
             let change = green_strain::solve(&x, &w, shape, &l, target, compliance, scale);
             self.apply(at, &copies, &change.multipliers, &change.positions);

@@ -110,9 +110,7 @@ impl<'a, S: Real> Run<'a, S> {
 
     pub fn frame(&mut self, inputs: &Inputs<S>, keep: f64) {
         for _ in 0..self.solver.settings().substeps {
-            self.solver
-                .step(self.model, &mut self.state, inputs, self.dt)
-                .expect("a legal step");
+            self.solver.step(self.model, &mut self.state, inputs, self.dt).expect("a legal step");
         }
         for v in &mut self.state.velocities {
             *v = *v * S::from_f64(keep);

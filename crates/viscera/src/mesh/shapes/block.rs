@@ -23,7 +23,8 @@ pub enum Splitting {
     Six,
 }
 
-const FIVE: [[usize; 4]; 5] = [[0, 3, 5, 6], [1, 0, 3, 5], [2, 0, 6, 3], [4, 0, 5, 6], [7, 3, 6, 5]];
+const FIVE: [[usize; 4]; 5] =
+    [[0, 3, 5, 6], [1, 0, 3, 5], [2, 0, 6, 3], [4, 0, 5, 6], [7, 3, 6, 5]];
 const SIX: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
 
@@ -83,8 +84,9 @@ impl Block {
             for j in 0..=ny {
                 for i in 0..=nx {
                     let at = vec3(i as f64, j as f64, k as f64).scale(cell);
-                    let is_interior =
-                        [(i, nx), (j, ny), (k, nz)].iter().all(|&(index, n)| 0 < index && index < n);
+                    let is_interior = [(i, nx), (j, ny), (k, nz)]
+                        .iter()
+                        .all(|&(index, n)| 0 < index && index < n);
                     let shift = if is_interior && reach > 0.0 {
                         random.point_in_ball() * reach
                     } else {
@@ -116,7 +118,9 @@ impl Block {
     }
 
     fn check(&self) -> Result<(), ShapeError> {
-        for (axis, name) in ["block's x size", "block's y size", "block's z size"].iter().enumerate() {
+        for (axis, name) in
+            ["block's x size", "block's y size", "block's z size"].iter().enumerate()
+        {
             check_length(name, self.size[axis])?;
         }
         if !self.corner.is_finite() {
@@ -147,13 +151,9 @@ impl Block {
     /// between two planes at most that width apart.
     fn safe_displacement(&self) -> f64 {
         let cell = self.cell_size();
-        let corner = |c: usize| {
-            vec3((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2) as f64).scale(cell)
-        };
-        self.splitting
-            .tets([0; 3])
-            .map(|tet| width(tet.map(corner)))
-            .fold(f64::INFINITY, f64::min)
+        let corner =
+            |c: usize| vec3((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2) as f64).scale(cell);
+        self.splitting.tets([0; 3]).map(|tet| width(tet.map(corner))).fold(f64::INFINITY, f64::min)
             * 0.5
     }
 }

@@ -9,9 +9,7 @@ mod block;
 
 use super::distance::{Capsule, SignedDistance, Sphere};
 use super::liver::Liver;
-use super::tetrahedralize::{
-    TetrahedralizeError, TetrahedralizeReport, surface, tetrahedralize,
-};
+use super::tetrahedralize::{TetrahedralizeError, TetrahedralizeReport, surface, tetrahedralize};
 use super::{MeshError, SurfaceMesh, TetMesh};
 use crate::scalar::{Vec3, vec3};
 
