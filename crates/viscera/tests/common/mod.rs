@@ -118,18 +118,18 @@ impl<'a, S: Real> Run<'a, S> {
     }
 }
 
-/// The rebase with kept multipliers: exact at rest.
+/// The rebase with kept multipliers, one substep per frame: exact at rest.
 pub fn exact(iterations: u32) -> SolverSettings {
-    SolverSettings {
-        substeps: 1,
-        iterations,
-        rebase: true,
-        keep_multipliers: true,
-        ..SolverSettings::default()
-    }
+    SolverSettings { substeps: 1, iterations, ..SolverSettings::default() }
 }
 
 /// XPBD as published: multipliers from zero, no rebase.
 pub fn plain(substeps: u32, iterations: u32) -> SolverSettings {
-    SolverSettings { substeps, iterations, ..SolverSettings::default() }
+    SolverSettings {
+        substeps,
+        iterations,
+        rebase: false,
+        keep_multipliers: false,
+        ..SolverSettings::default()
+    }
 }
