@@ -1,0 +1,216 @@
+//! Green-strain block: six constraints of a tetrahedron solved together.
+//!
+//! ```text
+//! E = (F^T F - I)/2 = (H + H^T + H^T H)/2,  H = F - I
+//! C = (E00, E11, E22, 2 E12, 2 E02, 2 E01)                      Voigt order, engineering shear
+//! W = C^T D C / 2 = mu E:E + lambda/2 tr(E)^2                   Saint Venant-Kirchhoff
+//! [grad C M^-1 grad C^T + a~] dl = -C - a~ l,   a~ = D^-1/(V dt^2)
+//! dx_i = w_i grad_i C^T dl = w_i F (L g_i),     L the symmetric matrix of dl
+//! ```
+//!
+//! XPBD: Macklin, Mueller, Chentanez, "XPBD", MIG 2016, eq. 18; here with all six components of
+//! the Green strain as one block, so that the compliance is the material's full 6 x 6.
+//!
+//! The strain cannot see inversion (`E(RF) = E(F)` for reflections `R` too): prefer the stable
+//! neo-Hookean element where tissue may turn inside out.
+
+use super::{CornerLoad, TetCorrection, shape_gradients};
+use crate::scalar::{Mat3, Scalar, Vec3, vec3};
+
+/// A symmetric 6 x 6 matrix, or six constraint values.
+pub type Voigt<S> = [S; 6];
+
+/// The pairs of axes of the six components.
+pub const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
+
+/// `C = (E00, E11, E22, 2 E12, 2 E02, 2 E01)`, from `H = F - I` so that small strains keep their
+/// digits in single precision.
+#[inline(always)]
+pub fn strain<S: Scalar>(deformation_gradient: &Mat3<S>) -> Voigt<S> {
+    let h = *deformation_gradient - Mat3::IDENTITY;
+    let [a, b, c] = h.columns;
+    [
+        a.x + S::HALF * a.dot(a),
+        b.y + S::HALF * b.dot(b),
+        c.z + S::HALF * c.dot(c),
+        (b.z + c.y) + b.dot(c),
+        (a.z + c.x) + a.dot(c),
+        (a.y + b.x) + a.dot(b),
+    ]
+}
+
+/// The symmetric 3 x 3 matrix whose components are `v` (without halving the shear).
+#[inline(always)]
+pub fn symmetric<S: Scalar>(v: &Voigt<S>) -> Mat3<S> {
+    Mat3::from_columns(
+        vec3(v[0], v[5], v[4]),
+        vec3(v[5], v[1], v[3]),
+        vec3(v[4], v[3], v[2]),
+    )
+}
+
+/// Energy density [Pa]: `W = C^T D C / 2` with `D` isotropic.
+#[inline(always)]
+pub fn energy_density<S: Scalar>(c: &Voigt<S>, lame_lambda: S, lame_mu: S) -> S {
+    let trace = c[0] + c[1] + c[2];
+    let direct = c[0] * c[0] + c[1] * c[1] + c[2] * c[2];
+    let shear = c[3] * c[3] + c[4] * c[4] + c[5] * c[5];
+    lame_mu * (direct + S::HALF * shear) + S::HALF * lame_lambda * trace * trace
+}
+
+/// First Piola stress [Pa]: `P = F S`, `S = 2 mu E + lambda tr(E) I`.
+#[inline(always)]
+pub fn piola<S: Scalar>(
+    deformation_gradient: &Mat3<S>,
+    c: &Voigt<S>,
+    lame_lambda: S,
+    lame_mu: S,
+) -> Mat3<S> {
+    let pressure = lame_lambda * (c[0] + c[1] + c[2]);
+    let twice = S::TWO * lame_mu;
+    let stress = [
+        twice * c[0] + pressure,
+        twice * c[1] + pressure,
+        twice * c[2] + pressure,
+        lame_mu * c[3],
+        lame_mu * c[4],
+        lame_mu * c[5],
+    ];
+    *deformation_gradient * symmetric(&stress)
+}
+
+/// Gradient of each constraint by one corner position [1/m]: `E_aa: g[a] F_a`,
+/// `2 E_ab: g[b] F_a + g[a] F_b`.
+#[inline(always)]
+pub fn gradient<S: Scalar>(deformation_gradient: &Mat3<S>, g: Vec3<S>) -> [Vec3<S>; 6] {
+    let f = &deformation_gradient.columns;
+    PAIRS.map(|(a, b)| if a == b { f[a] * g[a] } else { f[a] * g[b] + f[b] * g[a] })
+}
+
+/// `grad C M^-1 grad C^T` [1/(kg m^2)], from `K = F^T F` and `G = sum_i w_i g_i g_i^T`:
+/// with `J_(ab) = g_b F_a + g_a F_b` (halved for `a = b`), the entry for pairs `(a,b)`, `(c,d)` is
+/// `G_bd K_ac + G_bc K_ad + G_ad K_bc + G_ac K_bd`. Lower triangle only.
+#[inline(always)]
+fn gram<S: Scalar>(f: &Mat3<S>, g: &[Vec3<S>; 4], w: &[S; 4]) -> [[S; 6]; 6] {
+    let mut k = [[S::ZERO; 3]; 3];
+    let mut m = [[S::ZERO; 3]; 3];
+    for a in 0..3 {
+        for b in 0..=a {
+            let products = w[0] * g[0][a] * g[0][b] + w[1] * g[1][a] * g[1][b];
+            let products = products + w[2] * g[2][a] * g[2][b] + w[3] * g[3][a] * g[3][b];
+            k[a][b] = f.columns[a].dot(f.columns[b]);
+            m[a][b] = products;
+            k[b][a] = k[a][b];
+            m[b][a] = m[a][b];
+        }
+    }
+    let mut matrix = [[S::ZERO; 6]; 6];
+    for p in 0..6 {
+        let (a, b) = PAIRS[p];
+        for q in 0..=p {
+            let (c, d) = PAIRS[q];
+            matrix[p][q] = match (p < 3, q < 3) {
+                (true, true) => m[a][c] * k[a][c],
+                (false, true) => m[a][c] * k[b][c] + m[b][c] * k[a][c],
+                _ => {
+                    (m[b][d] * k[a][c] + m[b][c] * k[a][d])
+                        + (m[a][d] * k[b][c] + m[a][c] * k[b][d])
+                }
+            };
+        }
+    }
+    matrix
+}
+
+/// Solves `A x = b` for a symmetric positive definite matrix given by its lower triangle:
+/// `A = L D L^T`, no square roots and no branches.
+#[inline(always)]
+fn solve_symmetric<S: Scalar>(mut a: [[S; 6]; 6], mut b: Voigt<S>) -> Voigt<S> {
+    let mut inverse_pivot = [S::ZERO; 6];
+    for j in 0..6 {
+        // Row j of `a` left of the diagonal becomes L; the diagonal holds D.
+        let mut scaled = [S::ZERO; 6];
+        let mut pivot = a[j][j];
+        for k in 0..j {
+            scaled[k] = a[j][k];
+            a[j][k] = a[j][k] * inverse_pivot[k];
+            pivot -= a[j][k] * scaled[k];
+        }
+        inverse_pivot[j] = S::ONE / pivot;
+        for i in j + 1..6 {
+            let mut value = a[i][j];
+            for k in 0..j {
+                value -= a[i][k] * a[j][k];
+            }
+            a[i][j] = value;
+        }
+    }
+    for i in 0..6 {
+        for k in 0..i {
+            let value = a[i][k] * b[k];
+            b[i] -= value;
+        }
+    }
+    for i in (0..6).rev() {
+        b[i] = b[i] * inverse_pivot[i];
+        for k in i + 1..6 {
+            let value = a[k][i] * b[k];
+            b[i] -= value;
+        }
+    }
+    b
+}
+
+/// One block solve: the multiplier and position changes that satisfy the linearised constraint
+/// `C(x) - target + a~ (l + dl) + grad C dx = 0`.
+///
+/// `w` are the inverse masses [1/kg] of the corners (of their copies), `compliance` is `D^-1`
+/// [1/Pa], `compliance_scale` is `1/(V dt^2)`, so that `a~ = compliance * compliance_scale`.
+#[inline(always)]
+pub fn solve<S: Scalar>(
+    x: &[Vec3<S>; 4],
+    w: &[S; 4],
+    inverse_rest_shape: &Mat3<S>,
+    multipliers: &Voigt<S>,
+    target: &Voigt<S>,
+    compliance: &[[S; 6]; 6],
+    compliance_scale: S,
+) -> TetCorrection<S, 6> {
+    let f = super::deformation_gradient(x, inverse_rest_shape);
+    let g = shape_gradients(inverse_rest_shape);
+    let c = strain(&f);
+    let mut matrix = gram(&f, &g, w);
+    let mut right = [S::ZERO; 6];
+    for p in 0..6 {
+        let mut compliant = S::ZERO;
+        for q in 0..6 {
+            compliant += compliance[p][q] * multipliers[q];
+        }
+        right[p] = -(c[p] - target[p]) - compliance_scale * compliant;
+        for q in 0..=p {
+            matrix[p][q] += compliance_scale * compliance[p][q];
+        }
+    }
+    let change = solve_symmetric(matrix, right);
+    let stress = symmetric(&change);
+    let positions = [0, 1, 2, 3].map(|i| f * (stress * g[i]) * w[i]);
+    TetCorrection { multipliers: change, positions }
+}
+
+/// `grad C^T l` on each corner, and the Gershgorin bound of its geometric stiffness
+/// `sum_b |g_i^T L g_b|` (L the symmetric matrix of the multipliers; the volume is inside them).
+#[inline(always)]
+pub fn corner_loads<S: Scalar>(
+    x: &[Vec3<S>; 4],
+    inverse_rest_shape: &Mat3<S>,
+    multipliers: &Voigt<S>,
+) -> [CornerLoad<S>; 4] {
+    let f = super::deformation_gradient(x, inverse_rest_shape);
+    let g = shape_gradients(inverse_rest_shape);
+    let stress = symmetric(multipliers);
+    [0, 1, 2, 3].map(|i| {
+        let v = stress * g[i];
+        let mass_bound = v.dot(g[0]).abs() + v.dot(g[1]).abs() + v.dot(g[2]).abs();
+        CornerLoad { impulse: f * v, mass_bound: mass_bound + v.dot(g[3]).abs() }
+    })
+}

@@ -1,0 +1,67 @@
+//! Elements: everything that acts on tissue, each an energy with a constraint view.
+//!
+//! One file per kind. Each holds pure functions of positions and rest data, generic over
+//! [`Scalar`](crate::scalar::Scalar): constraint, gradient, energy, and the local solve of one
+//! constraint block. They load and store nothing; the solver does.
+//!
+//! Linear tetrahedra share this file's kinematics. With `Ds = [x1-x0, x2-x0, x3-x0]` and its rest
+//! value `Dm`, the deformation gradient is `F = Ds Dm^-1 = sum_i x_i g_i^T`, where `g_1..g_3` are
+//! the rows of `Dm^-1` and `g_0 = -(g_1 + g_2 + g_3)`.
+
+pub mod attachment;
+pub mod green_strain;
+pub mod neo_hookean;
+pub mod spring;
+
+use crate::scalar::{Mat3, Scalar, Vec3};
+
+/// What a local solve of a tetrahedron changes.
+#[derive(Clone, Copy, Debug)]
+pub struct TetCorrection<S, const N: usize> {
+    /// Change of the multipliers [J s^2], one per constraint.
+    pub multipliers: [S; N],
+    /// Change of the corner positions [m].
+    pub positions: [Vec3<S>; 4],
+}
+
+/// What a constraint with its multipliers puts on one corner.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CornerLoad<S> {
+    /// `grad C^T lambda` [N s^2]: the force times the squared step.
+    pub impulse: Vec3<S>,
+    /// Bound on the row of the geometric stiffness `sum lambda d^2 C` [kg].
+    pub mass_bound: S,
+}
+
+/// Edge vectors from corner 0 as columns [m].
+#[inline(always)]
+pub fn edge_matrix<S: Scalar>(x: &[Vec3<S>; 4]) -> Mat3<S> {
+    Mat3::from_columns(x[1] - x[0], x[2] - x[0], x[3] - x[0])
+}
+
+/// `F = Ds Dm^-1`.
+#[inline(always)]
+pub fn deformation_gradient<S: Scalar>(
+    x: &[Vec3<S>; 4],
+    inverse_rest_shape: &Mat3<S>,
+) -> Mat3<S> {
+    edge_matrix(x) * *inverse_rest_shape
+}
+
+/// Gradients [1/m] of the four linear shape functions.
+#[inline(always)]
+pub fn shape_gradients<S: Scalar>(inverse_rest_shape: &Mat3<S>) -> [Vec3<S>; 4] {
+    let [g1, g2, g3] = inverse_rest_shape.transpose().columns;
+    [-(g1 + g2 + g3), g1, g2, g3]
+}
+
+/// Internal forces [N] of one tetrahedron on its corners: `f_i = -V P g_i`, `P` the first Piola
+/// stress [Pa].
+#[inline(always)]
+pub fn internal_forces<S: Scalar>(
+    piola: &Mat3<S>,
+    inverse_rest_shape: &Mat3<S>,
+    rest_volume: S,
+) -> [Vec3<S>; 4] {
+    shape_gradients(inverse_rest_shape).map(|g| -(*piola * g) * rest_volume)
+}

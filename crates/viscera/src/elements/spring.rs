@@ -1,0 +1,61 @@
+//! Spring between two vertices: `C = |x1 - x0| - L`, energy `k C^2 / 2`, compliance `1/k`.
+
+use super::CornerLoad;
+use crate::scalar::{Scalar, Vec3};
+
+/// Shortest length [m] at which a spring still has a direction; below it the spring rests for
+/// one solve rather than push along round-off.
+const SHORTEST: f64 = 1e-12;
+
+/// Direction from the first to the second end, and the length [m].
+#[inline(always)]
+pub fn direction<S: Scalar>(x: &[Vec3<S>; 2]) -> (Vec3<S>, S) {
+    let edge = x[1] - x[0];
+    let length = edge.length();
+    let short = length.less(S::from_f64(SHORTEST));
+    let inverse = S::select(short, S::ZERO, S::ONE / length);
+    (edge * inverse, length)
+}
+
+/// Energy [J].
+#[inline(always)]
+pub fn energy<S: Scalar>(x: &[Vec3<S>; 2], rest_length: S, stiffness: S) -> S {
+    let (_, length) = direction(x);
+    let c = length - rest_length;
+    S::HALF * stiffness * c * c
+}
+
+/// Forces [N] on the two ends.
+#[inline(always)]
+pub fn forces<S: Scalar>(x: &[Vec3<S>; 2], rest_length: S, stiffness: S) -> [Vec3<S>; 2] {
+    let (n, length) = direction(x);
+    let pull = n * (stiffness * (length - rest_length));
+    [pull, -pull]
+}
+
+/// One solve: change of the multiplier [J s^2 / m] and of the two positions [m].
+/// `compliance_tilde = 1/(k dt^2)`.
+#[inline(always)]
+pub fn solve<S: Scalar>(
+    x: &[Vec3<S>; 2],
+    w: &[S; 2],
+    rest_length: S,
+    multiplier: S,
+    compliance_tilde: S,
+) -> (S, [Vec3<S>; 2]) {
+    let (n, length) = direction(x);
+    let numerator = -(length - rest_length) - compliance_tilde * multiplier;
+    let change = numerator / (w[0] + w[1] + compliance_tilde);
+    (change, [n * (-change * w[0]), n * (change * w[1])])
+}
+
+/// `grad C^T l` on both ends; `d^2 C = (I - n n^T)/|x1 - x0|` gives the bound `2 |l|/|x1 - x0|`.
+#[inline(always)]
+pub fn corner_loads<S: Scalar>(x: &[Vec3<S>; 2], multiplier: S) -> [CornerLoad<S>; 2] {
+    let (n, length) = direction(x);
+    let mass_bound = S::TWO * multiplier.abs() / length.max(S::from_f64(SHORTEST));
+    [
+        CornerLoad { impulse: n * -multiplier, mass_bound },
+        CornerLoad { impulse: n * multiplier, mass_bound },
+    ]
+}

@@ -1,0 +1,227 @@
+//! Errors of reading and writing mesh files.
+
+use std::fmt;
+
+use crate::mesh::{MeshError, MeshPlace};
+
+/// Why a file could not be read: which file, where in it, and what to do.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{file}{}: {problem}", LineSuffix(*line))]
+pub struct ReadError {
+    /// The name under which the bytes were given.
+    pub file: String,
+    /// The line, counting from 1, where the problem has one.
+    pub line: Option<usize>,
+    /// What is wrong.
+    pub problem: ReadProblem,
+}
+
+struct LineSuffix(Option<usize>);
+
+impl fmt::Display for LineSuffix {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(line) => write!(f, ", line {line}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What is wrong with a file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadProblem {
+    /// No bytes, or only blanks.
+    #[error("the file is empty; export the mesh again")]
+    Empty,
+    /// The unit of the file is not a length.
+    #[error("a unit of {meters} m is not a length; give a number above 0, 0.001 for millimetres")]
+    Unit {
+        /// The unit given `[m]`.
+        meters: f64,
+    },
+    /// Neither content nor extension tell a format.
+    #[error(
+        "not a mesh file known here; known are Gmsh 1 and 2.2 ASCII (.msh), VTK XML (.vtu), \
+        and OBJ surfaces (.obj)"
+    )]
+    UnknownFormat,
+    /// A known format, or a variant of one, that is not read.
+    #[error("{found} cannot be read here; {advice}")]
+    Unsupported {
+        /// What the file is.
+        found: String,
+        /// How to get a file that can be read.
+        advice: &'static str,
+    },
+    /// The bytes stop before the data does.
+    #[error("the file ends inside {reading}; it was cut short, copy or export it again")]
+    UnexpectedEnd {
+        /// What was being read.
+        reading: String,
+    },
+    /// A part that a mesh needs is not there.
+    #[error("the file has no {what}; export the mesh again with it")]
+    Missing {
+        /// The part.
+        what: String,
+    },
+    /// A part that may occur once occurs again.
+    #[error("a second {what}; keep one of them, or merge them before the export")]
+    SecondPart {
+        /// The part.
+        what: String,
+    },
+    /// More entries are announced than the rest of the file can hold.
+    #[error(
+        "{claimed} {what} are announced, but only {bytes_left} bytes follow; the file was cut \
+        short or the number is wrong, export it again"
+    )]
+    TooManyClaimed {
+        /// What is counted.
+        what: &'static str,
+        /// The number announced.
+        claimed: u64,
+        /// Bytes after the announcement.
+        bytes_left: usize,
+    },
+    /// Two counts that must agree do not.
+    #[error("{what}: {claimed} are announced, {found} are there; export the mesh again")]
+    CountMismatch {
+        /// What is counted.
+        what: String,
+        /// The number announced, or needed.
+        claimed: usize,
+        /// The number found.
+        found: usize,
+    },
+    /// A word is not what belongs in its place.
+    #[error("expected {expected}, found `{found}`; correct the line or export the mesh again")]
+    BadWord {
+        /// What belongs there.
+        expected: &'static str,
+        /// What is there, shortened; empty at the end of a line.
+        found: String,
+    },
+    /// An element refers to a vertex number that the file does not list.
+    #[error("{element} refers to vertex {vertex}; the file has {vertex_count}{note}; \
+        export all vertices", note = NumbersNote { numbers: *.numbers, count: *.vertex_count })]
+    UnknownVertex {
+        /// The element, with its number in the file.
+        element: String,
+        /// The vertex number it names.
+        vertex: String,
+        /// How many vertices the file lists.
+        vertex_count: usize,
+        /// Lowest and highest vertex number in the file, if it has any.
+        numbers: Option<(u64, u64)>,
+    },
+    /// Two vertices have the same number.
+    #[error("vertex number {number} is used twice; renumber the vertices")]
+    RepeatedNumber {
+        /// The number.
+        number: u64,
+    },
+    /// No element of the file is a tetrahedron of four vertices.
+    #[error(
+        "the file has no tetrahedra of four vertices (it has {others}); \
+        mesh the volume with first-order tetrahedra"
+    )]
+    NoTets {
+        /// What the file has instead.
+        others: String,
+    },
+    /// The file is not well-formed XML.
+    #[error("not well-formed XML ({reason}); the file is damaged or cut short, export it again")]
+    Xml {
+        /// What the XML parser says.
+        reason: String,
+    },
+    /// The numbers could be read, but are no mesh. Indices count from 0, whatever the file does.
+    #[error("{0}{note}", note = CountingNote(.0.place()))]
+    Mesh(MeshError),
+}
+
+/// Which numbers vertices have, where they do not just count from 1.
+struct NumbersNote {
+    numbers: Option<(u64, u64)>,
+    count: usize,
+}
+
+impl fmt::Display for NumbersNote {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.numbers {
+            Some((low, high)) if (low, high) != (1, self.count as u64) => {
+                write!(f, ", numbered {low} to {high}")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The lines of many files number elements differently from the mesh.
+struct CountingNote(MeshPlace);
+
+impl fmt::Display for CountingNote {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            MeshPlace::Whole => Ok(()),
+            MeshPlace::Vertex(_) | MeshPlace::Tet(_) => f.write_str(" (counting from 0)"),
+        }
+    }
+}
+
+/// A problem and its line; becomes a [`ReadError`] where the file's name is known.
+pub(super) struct Fault {
+    pub line: Option<usize>,
+    pub problem: ReadProblem,
+}
+
+impl Fault {
+    pub fn at(line: usize, problem: ReadProblem) -> Self {
+        Self { line: Some(line), problem }
+    }
+
+    pub fn whole_file(problem: ReadProblem) -> Self {
+        Self { line: None, problem }
+    }
+}
+
+/// Why arrays could not be written.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// An array does not have one entry for each point, or for each cell.
+    #[error("array `{array}` has {found} entries; {wanted} are needed, one for each {what}")]
+    Length {
+        /// The array's name.
+        array: String,
+        /// "point" or "cell".
+        what: &'static str,
+        /// Entries needed.
+        wanted: usize,
+        /// Entries given.
+        found: usize,
+    },
+    /// A value is not finite in single precision; other programs refuse to read such a file.
+    #[error(
+        "array `{array}`, entry {entry} is not a finite number in single precision; \
+        write an earlier state, or leave the array out"
+    )]
+    NonFinite {
+        /// The array's name.
+        array: String,
+        /// The entry, counting from 0.
+        entry: usize,
+    },
+    /// A cell refers to a point that does not exist.
+    #[error("cell {cell} refers to point {point}; there are {point_count}")]
+    IndexOutOfRange {
+        /// The cell, counting from 0.
+        cell: usize,
+        /// The point it names.
+        point: u32,
+        /// How many points there are.
+        point_count: usize,
+    },
+}

@@ -1,0 +1,240 @@
+//! How a mesh hangs together: faces, boundary, edges, components, tetrahedra around a vertex.
+//!
+//! Every result has a fixed order (ascending vertex or tetrahedron), so runs can be repeated.
+
+use super::quality::TET_EDGES;
+use super::{SurfaceMesh, TetMesh};
+use crate::scalar::Vec3;
+
+/// The faces of a positively wound tetrahedron as corners, wound outwards; face i is opposite to
+/// corner i.
+pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// One side of a face: which tetrahedron has it, and as which of its faces.
+struct FaceSide {
+    /// Vertices, ascending: equal for all sides of a face.
+    key: [u32; 3],
+    tet: u32,
+    face: u8,
+    /// True if the outward winding is an even permutation of `key`.
+    even: bool,
+}
+
+/// All sides of all faces; the sides of one face follow one another, by tetrahedron.
+fn sorted_face_sides(tets: &[[u32; 4]]) -> Vec<FaceSide> {
+    let mut sides = Vec::with_capacity(4 * tets.len());
+    for (tet, corners) in tets.iter().enumerate() {
+        for (face, local) in TET_FACES.iter().enumerate() {
+            let [a, b, c] = local.map(|corner| corners[corner]);
+            let mut key = [a, b, c];
+            key.sort_unstable();
+            // Sorting three different numbers is an even permutation exactly for the rotations.
+            let even = key == [a, b, c] || key == [b, c, a] || key == [c, a, b];
+            sides.push(FaceSide { key, tet: tet as u32, face: face as u8, even });
+        }
+    }
+    sides.sort_unstable_by_key(|side| (side.key, side.tet));
+    sides
+}
+
+/// A tetrahedron that is the third on a face, with that face, if there is one.
+pub(super) fn find_crowded_face(tets: &[[u32; 4]]) -> Option<(usize, [u32; 3])> {
+    sorted_face_sides(tets)
+        .chunk_by(|a, b| a.key == b.key)
+        .filter_map(|sides| sides.get(2).map(|third| (third.tet as usize, third.key)))
+        .min()
+}
+
+/// The boundary of a tetrahedral mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BoundarySurface {
+    /// The boundary triangles, wound outwards, by tetrahedron.
+    pub surface: SurfaceMesh,
+    /// The vertex of the tetrahedral mesh behind each vertex of the surface, ascending,
+    /// shape `[surface vertex_count]`.
+    pub mesh_vertices: Vec<u32>,
+    /// The tetrahedron behind each triangle, ascending, shape `[triangle_count]`.
+    pub tets: Vec<u32>,
+}
+
+/// The faces that belong to one tetrahedron only.
+pub fn boundary_surface(mesh: &TetMesh) -> BoundarySurface {
+    let sides = sorted_face_sides(mesh.tets());
+    let mut outer: Vec<(u32, u8)> = sides
+        .chunk_by(|a, b| a.key == b.key)
+        .filter(|sides| sides.len() == 1)
+        .map(|sides| (sides[0].tet, sides[0].face))
+        .collect();
+    outer.sort_unstable();
+
+    let corners = |&(tet, face): &(u32, u8)| {
+        TET_FACES[face as usize].map(|corner| mesh.tets()[tet as usize][corner])
+    };
+    let mut on_boundary = vec![false; mesh.vertices().len()];
+    for side in &outer {
+        for vertex in corners(side) {
+            on_boundary[vertex as usize] = true;
+        }
+    }
+    let mut surface_vertex = vec![0u32; on_boundary.len()];
+    let mut mesh_vertices = Vec::new();
+    for vertex in (0..on_boundary.len()).filter(|&v| on_boundary[v]) {
+        surface_vertex[vertex] = mesh_vertices.len() as u32;
+        mesh_vertices.push(vertex as u32);
+    }
+    BoundarySurface {
+        surface: SurfaceMesh {
+            vertices: mesh_vertices.iter().map(|&v| mesh.vertices()[v as usize]).collect(),
+            triangles: outer
+                .iter()
+                .map(|side| corners(side).map(|v| surface_vertex[v as usize]))
+                .collect(),
+        },
+        mesh_vertices,
+        tets: outer.iter().map(|&(tet, _)| tet).collect(),
+    }
+}
+
+/// Counts the faces whose two tetrahedra lie on the same side of it, so that they overlap. A mesh
+/// with an inverted tetrahedron has some once its winding is repaired.
+pub fn count_folded_faces(mesh: &TetMesh) -> usize {
+    sorted_face_sides(mesh.tets())
+        .chunk_by(|a, b| a.key == b.key)
+        .filter(|sides| sides.len() == 2 && sides[0].even == sides[1].even)
+        .count()
+}
+
+/// Every edge once, as ascending vertices, in ascending order.
+pub fn edges(mesh: &TetMesh) -> Vec<[u32; 2]> {
+    let mut edges: Vec<[u32; 2]> = mesh
+        .tets()
+        .iter()
+        .flat_map(|tet| TET_EDGES.map(|[a, b]| [tet[a].min(tet[b]), tet[a].max(tet[b])]))
+        .collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}
+
+/// Counts the edges of a surface that do not have exactly two triangles.
+pub fn count_open_edges(surface: &SurfaceMesh) -> usize {
+    let mut edges: Vec<[u32; 2]> = surface
+        .triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+        .map(|[a, b]| [a.min(b), a.max(b)])
+        .collect();
+    edges.sort_unstable();
+    edges.chunk_by(|a, b| a == b).filter(|uses| uses.len() != 2).count()
+}
+
+/// The parts of a mesh that no tetrahedron ties together.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Components {
+    /// How many parts there are.
+    pub count: usize,
+    /// The part of each vertex, numbered by their lowest vertex, shape `[vertex_count]`.
+    pub labels: Vec<u32>,
+}
+
+/// Splits a mesh into parts; tetrahedra that share a vertex belong together.
+pub fn connected_components(mesh: &TetMesh) -> Components {
+    // A forest in which every root is the lowest vertex of its tree.
+    let mut parent: Vec<u32> = (0..mesh.vertices().len() as u32).collect();
+    for tet in mesh.tets() {
+        for &vertex in &tet[1..] {
+            let a = find_root(&mut parent, tet[0]);
+            let b = find_root(&mut parent, vertex);
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut labels = vec![0; parent.len()];
+    let mut count = 0;
+    for vertex in 0..parent.len() {
+        let root = find_root(&mut parent, vertex as u32) as usize;
+        if root == vertex {
+            labels[vertex] = count;
+            count += 1;
+        } else {
+            labels[vertex] = labels[root];
+        }
+    }
+    Components { count: count as usize, labels }
+}
+
+fn find_root(parent: &mut [u32], mut vertex: u32) -> u32 {
+    while parent[vertex as usize] != vertex {
+        let grandparent = parent[parent[vertex as usize] as usize];
+        parent[vertex as usize] = grandparent;
+        vertex = grandparent;
+    }
+    vertex
+}
+
+/// The tetrahedra around each vertex, stored one after the other.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct VertexTets {
+    /// Where the list of a vertex starts in `tets`, shape `[vertex_count + 1]`.
+    pub offsets: Vec<u32>,
+    /// Tetrahedra, ascending for each vertex, shape `[4 tet_count]`.
+    pub tets: Vec<u32>,
+}
+
+impl VertexTets {
+    /// The tetrahedra that have this vertex, ascending.
+    pub fn around(&self, vertex: usize) -> &[u32] {
+        &self.tets[self.offsets[vertex] as usize..self.offsets[vertex + 1] as usize]
+    }
+}
+
+/// Lists the tetrahedra around each vertex.
+pub fn vertex_tets(mesh: &TetMesh) -> VertexTets {
+    let mut offsets = vec![0u32; mesh.vertices().len() + 1];
+    for vertex in mesh.tets().iter().flatten() {
+        offsets[*vertex as usize + 1] += 1;
+    }
+    for vertex in 1..offsets.len() {
+        offsets[vertex] += offsets[vertex - 1];
+    }
+    let mut next = offsets.clone();
+    let mut tets = vec![0; 4 * mesh.tets().len()];
+    for (tet, corners) in mesh.tets().iter().enumerate() {
+        for &vertex in corners {
+            tets[next[vertex as usize] as usize] = tet as u32;
+            next[vertex as usize] += 1;
+        }
+    }
+    VertexTets { offsets, tets }
+}
+
+/// The smallest box along the axes that holds all points.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BoundingBox {
+    /// Lowest corner `[m]`.
+    pub min: Vec3<f64>,
+    /// Highest corner `[m]`.
+    pub max: Vec3<f64>,
+}
+
+impl BoundingBox {
+    /// The box around points `[m]`; a single point at the origin if there are none.
+    pub fn around(points: &[Vec3<f64>]) -> Self {
+        let Some((&first, rest)) = points.split_first() else {
+            return Self::default();
+        };
+        rest.iter().fold(Self { min: first, max: first }, |bounds, &point| Self {
+            min: bounds.min.min(point),
+            max: bounds.max.max(point),
+        })
+    }
+
+    /// Extent along the axes `[m]`.
+    pub fn size(&self) -> Vec3<f64> {
+        self.max - self.min
+    }
+
+    /// Centre `[m]`.
+    pub fn center(&self) -> Vec3<f64> {
+        (self.min + self.max) * 0.5
+    }
+}

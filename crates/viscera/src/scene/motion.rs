@@ -1,0 +1,232 @@
+//! Paths over time: poses of moved patches, shares of forces.
+//!
+//! A pose turns by the rotation vector `r` (axis times angle) about a point `c`, then moves by `t`:
+//! `x -> c + R(r) (x - c) + t`, with Rodrigues' formula `R = I + sin(a) K + (1 - cos(a)) K^2`,
+//! `a = |r|`, `K` the cross product with `r/a`. Between keys `r` and `t` are interpolated.
+
+use super::selector::Patch;
+use super::tables::Interpolation;
+use crate::scalar::{Mat3, Vec3, vec3};
+
+/// A rotation and a translation: `x -> rotation * x + translation`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RigidTransform {
+    /// Orthonormal, determinant 1.
+    pub rotation: Mat3<f64>,
+    /// [m].
+    pub translation: Vec3<f64>,
+}
+
+impl RigidTransform {
+    /// Leaves everything where it is.
+    pub const IDENTITY: Self = Self { rotation: Mat3::IDENTITY, translation: Vec3::ZERO };
+
+    /// Turns by a rotation vector [rad] about a point [m], then moves by `translation` [m].
+    pub fn about(point: Vec3<f64>, rotation: Vec3<f64>, translation: Vec3<f64>) -> Self {
+        let rotation = rotation_matrix(rotation);
+        // In this order a rotation by nothing is exactly the translation.
+        Self { rotation, translation: translation + (point - rotation * point) }
+    }
+
+    /// Where a point [m] goes.
+    pub fn apply(&self, point: Vec3<f64>) -> Vec3<f64> {
+        self.rotation * point + self.translation
+    }
+}
+
+/// The rotation by `|r|` radians about the axis `r`. Sine and cosine are the same bits on every
+/// machine.
+fn rotation_matrix(r: Vec3<f64>) -> Mat3<f64> {
+    let angle = r.length();
+    if angle == 0.0 || !angle.is_finite() {
+        return Mat3::IDENTITY;
+    }
+    let axis = r * (1.0 / angle);
+    let cross = Mat3::from_columns(
+        vec3(0.0, axis.z, -axis.y),
+        vec3(-axis.z, 0.0, axis.x),
+        vec3(axis.y, -axis.x, 0.0),
+    );
+    let half = libm::sin(0.5 * angle);
+    // 1 - cos(a) = 2 sin(a/2)^2, without cancellation.
+    Mat3::IDENTITY + cross * libm::sin(angle) + (cross * cross) * (2.0 * half * half)
+}
+
+/// A pose at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionKey {
+    /// [s].
+    pub time: f64,
+    /// Displacement from rest [m].
+    pub translation: Vec3<f64>,
+    /// Axis times angle [rad].
+    pub rotation: Vec3<f64>,
+}
+
+/// A patch that is held and moved along a path.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    /// The name, or "motion 0" and so on.
+    pub name: String,
+    /// What is held.
+    pub patch: Patch,
+    /// At least one, times ascending, the first at time 0.
+    pub keys: Vec<MotionKey>,
+    /// Between keys.
+    pub interpolation: Interpolation,
+    /// The point [m] that rotations turn about.
+    pub about: Vec3<f64>,
+    /// When the patch is let go [s].
+    pub release: Option<f64>,
+}
+
+impl Motion {
+    /// Where the patch is at a time [s], relative to rest.
+    pub fn pose(&self, time: f64) -> RigidTransform {
+        let (before, after, share) = between(&self.keys, |key| key.time, time);
+        let Some((a, b)) = before.zip(after) else { return RigidTransform::IDENTITY };
+        let share = self.interpolation.shape(share);
+        RigidTransform::about(
+            self.about,
+            mix(a.rotation, b.rotation, share),
+            mix(a.translation, b.translation, share),
+        )
+    }
+
+    /// Whether the patch is still held at a time [s].
+    pub fn is_held(&self, time: f64) -> bool {
+        self.release.is_none_or(|release| time < release)
+    }
+}
+
+/// The share of a force at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceKey {
+    /// [s].
+    pub time: f64,
+    /// The share of the full force.
+    pub factor: f64,
+}
+
+/// A patch that is pulled with a force, shared equally among its vertices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Force {
+    /// The name, or "force 0" and so on.
+    pub name: String,
+    /// What is pulled.
+    pub patch: Patch,
+    /// The full force on the whole patch [N].
+    pub force: Vec3<f64>,
+    /// Its share over time, times ascending; empty for the full force throughout.
+    pub keys: Vec<ForceKey>,
+    /// Between keys.
+    pub interpolation: Interpolation,
+}
+
+impl Force {
+    /// The force [N] on the whole patch at a time [s].
+    pub fn at(&self, time: f64) -> Vec3<f64> {
+        let (before, after, share) = between(&self.keys, |key| key.time, time);
+        let Some((a, b)) = before.zip(after) else { return self.force };
+        let share = self.interpolation.shape(share);
+        self.force * (a.factor * (1.0 - share) + b.factor * share)
+    }
+}
+
+impl Interpolation {
+    fn shape(self, share: f64) -> f64 {
+        match self {
+            Self::Linear => share,
+            Self::Smooth => share * share * (3.0 - 2.0 * share),
+        }
+    }
+}
+
+/// Exact at both ends.
+fn mix(a: Vec3<f64>, b: Vec3<f64>, share: f64) -> Vec3<f64> {
+    a * (1.0 - share) + b * share
+}
+
+/// The keys before and after a time, and how far it is from one to the other (0 to 1).
+fn between<K>(keys: &[K], time_of: impl Fn(&K) -> f64, time: f64) -> (Option<&K>, Option<&K>, f64) {
+    let next = keys.partition_point(|key| time_of(key) <= time);
+    match (next.checked_sub(1).and_then(|last| keys.get(last)), keys.get(next)) {
+        (Some(a), Some(b)) => (Some(a), Some(b), (time - time_of(a)) / (time_of(b) - time_of(a))),
+        (Some(last), None) => (Some(last), Some(last), 0.0),
+        (None, first) => (first, first, 0.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::selector::Selector;
+    use crate::settings::Place;
+    use std::f64::consts::PI;
+
+    fn motion(interpolation: Interpolation, keys: Vec<MotionKey>) -> Motion {
+        let place = Place::Override { key: "test".into() };
+        let selector = Selector::Region(0);
+        Motion {
+            name: "pull".into(),
+            patch: Patch { body: 0, selector, purpose: "motion `pull`".into(), place },
+            keys,
+            interpolation,
+            about: vec3(0.1, 0.2, 0.3),
+            release: Some(1.5),
+        }
+    }
+
+    fn key(time: f64, translation: [f64; 3], rotation: [f64; 3]) -> MotionKey {
+        MotionKey {
+            time,
+            translation: Vec3::from_f64(translation),
+            rotation: Vec3::from_f64(rotation),
+        }
+    }
+
+    #[test]
+    fn a_motion_starts_exactly_at_rest_and_ends_at_its_last_key() {
+        let end = [0.01, -0.02, 0.04];
+        let pull = motion(
+            Interpolation::Smooth,
+            vec![key(0.0, [0.0; 3], [0.0; 3]), key(1.0, end, [0.0; 3])],
+        );
+        assert_eq!(pull.pose(0.0), RigidTransform::IDENTITY);
+        assert_eq!(pull.pose(7.0).translation, Vec3::from_f64(end));
+        assert_eq!(pull.pose(0.5).translation, Vec3::from_f64(end) * 0.5);
+        // Smooth: the first hundredth of the time covers 3 s^2 of the way, to order s^3.
+        assert!(pull.pose(0.01).translation.z < 0.04 * 3.0 * 0.01 * 0.01);
+        assert!(pull.is_held(1.49) && !pull.is_held(1.5));
+    }
+
+    #[test]
+    fn a_rotation_keeps_lengths_and_its_centre() {
+        let turn = motion(
+            Interpolation::Linear,
+            vec![key(0.0, [0.0; 3], [0.0; 3]), key(1.0, [0.0; 3], [0.0, 0.0, 2.0 * PI])],
+        );
+        let quarter = turn.pose(0.25);
+        let close = |a: Vec3<f64>, b: Vec3<f64>| (a - b).length() <= 16.0 * f64::EPSILON;
+        assert!(close(quarter.apply(turn.about), turn.about));
+        assert!(close(quarter.apply(vec3(1.1, 0.2, 0.3)), vec3(0.1, 1.2, 0.3)));
+        for step in 0..50 {
+            let rotation = turn.pose(0.02 * f64::from(step)).rotation;
+            let defect = rotation * rotation.transpose() - Mat3::IDENTITY;
+            assert!(defect.norm_squared().sqrt() <= 16.0 * f64::EPSILON);
+            assert!((rotation.determinant() - 1.0).abs() <= 16.0 * f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn a_force_follows_its_keys_and_is_full_without() {
+        let full = vec3(0.0, 0.0, 2.0);
+        let patch = motion(Interpolation::Linear, Vec::new()).patch;
+        let keys = vec![ForceKey { time: 1.0, factor: 0.0 }, ForceKey { time: 2.0, factor: 1.0 }];
+        let interpolation = Interpolation::Linear;
+        let mut force = Force { name: "weight".into(), patch, force: full, keys, interpolation };
+        assert_eq!([0.5, 1.5, 9.0].map(|time| force.at(time).z), [0.0, 1.0, 2.0]);
+        force.keys.clear();
+        assert_eq!(force.at(0.0), full);
+    }
+}

@@ -1,0 +1,170 @@
+//! The solver's settings.
+
+use super::{
+    Kind, Node, SettingError, Table, Value, ValueError, above, at_least, choices, number, one_of,
+    settings_table, truth, value_error, whole,
+};
+
+choices! {
+    /// Floating point format of the simulation state.
+    pub enum Precision {
+        /// Single precision: the product.
+        F32 = "f32",
+        /// Double precision: the oracle, for checks and studies.
+        F64 = "f64",
+    }
+}
+
+/// How many colours the constraints are separated into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Colors {
+    /// As many as it takes: no vertex is copied, coloured Gauss-Seidel.
+    Unlimited,
+    /// This many, at least 1: vertices are copied where more would be needed. One is Jacobi.
+    Limited(u32),
+}
+
+choices! {
+    /// What over-relaxation scales.
+    pub enum RelaxationForm {
+        /// Displacement and multiplier alike, so that they keep corresponding.
+        Consistent = "consistent",
+        /// The displacement only, as published: changes the stiffness it converges to.
+        Published = "published",
+    }
+}
+
+choices! {
+    /// What is done with the sequence of sweeps.
+    pub enum Acceleration {
+        /// Nothing.
+        None = "none",
+        /// The Chebyshev semi-iterative method (Wang 2015).
+        Chebyshev = "chebyshev",
+        /// Anderson acceleration, type II (Peng et al. 2018).
+        Anderson = "anderson",
+    }
+}
+
+choices! {
+    /// The unknowns that Anderson acceleration mixes.
+    pub enum AndersonOn {
+        /// Positions alone: the multipliers lag behind and the body becomes too stiff.
+        Positions = "positions",
+        /// Multipliers alone, positions recomputed from them: diverges under strong stress.
+        Multipliers = "multipliers",
+        /// Both with the same weights, which keeps them consistent.
+        Both = "both",
+    }
+}
+
+choices! {
+    /// Where the iteration of a substep starts.
+    pub enum Start {
+        /// `inertial` where multipliers are kept, otherwise `predicted`.
+        Auto = "auto",
+        /// x + h v + h^2 g.
+        Predicted = "predicted",
+        /// x + h v: kept multipliers already balance gravity.
+        Inertial = "inertial",
+        /// x of the last substep.
+        Previous = "previous",
+    }
+}
+
+settings_table! {
+    #[default]
+    /// How a step is solved. The family is XPBD; one sweep solves every constraint once.
+    pub struct SolverSettings {
+        /// Floating point format of the simulation state.
+        precision: Precision = (Precision::F32), one_of::<Precision>();
+        /// Substeps per frame. More lose less motion to numerical damping and, at one iteration
+        /// each, are the strongest plain XPBD; the cost grows alike. Fewer than about 20 with one
+        /// iteration leave a visible error.
+        substeps: u32 = 20, whole(1, 1000);
+        /// Sweeps per substep. More solve a substep better; without `rebase` they approach an
+        /// answer that depends on the path, so more are not always closer to the truth.
+        iterations: u32 = 1, whole(1, 10_000);
+        /// Colours of the constraint graph: "unlimited" for Gauss-Seidel, 1 for Jacobi, a few
+        /// for clique separation. Fewer run more in parallel and need more sweeps.
+        colors: Colors = (Colors::Unlimited), ColorsKind;
+        /// Over-relaxation factor omega. Above 1 hurries, below 1 calms. Safe up to 1.8 for one
+        /// colour, 1.5 for a few, about 1.2 for unlimited; beyond that sweeps overshoot and may
+        /// diverge. With `rebase` and one colour only 1 is safe.
+        relaxation: f64 = 1.0, number(above(0.0).below(2.0));
+        /// What over-relaxation scales.
+        relaxation_form: RelaxationForm = (RelaxationForm::Consistent), one_of::<RelaxationForm>();
+        /// What is done with the sequence of sweeps of a substep. Needs several iterations to pay.
+        acceleration: Acceleration = (Acceleration::None), one_of::<Acceleration>();
+        /// Chebyshev's estimate rho of how much of the error a sweep leaves; 0 measures it from the
+        /// ratio of successive steps. Too small gains nothing, too large blows up: with unlimited
+        /// colours from about 0.97.
+        chebyshev_radius: f64 = 0.0, number(at_least(0.0).below(1.0));
+        /// Plain sweeps before Chebyshev begins. Fewer let it amplify the rough errors of the first
+        /// sweeps, more leave it less to gain.
+        chebyshev_delay: u32 = 10, whole(0, 10_000);
+        /// Chebyshev's under-relaxation gamma; 0.6 to 1 is usual. Smaller is calmer and slower.
+        chebyshev_damping: f64 = 1.0, number(above(0.0).up_to(1.0));
+        /// How many past sweeps Anderson mixes. Longer windows converge faster until the
+        /// small least-squares problem becomes ill-conditioned, in single precision sooner.
+        anderson_window: u32 = 5, whole(1, 10);
+        /// The unknowns that Anderson mixes.
+        anderson_on: AndersonOn = (AndersonOn::Both), one_of::<AndersonOn>();
+        /// Restart Anderson when the residual grows. Without it a bad mixture can
+        /// throw a strongly deformed body; it bounds the residual, not the energy.
+        residual_guard: bool = true, truth();
+        /// Stabilised rebase before each sweep: positions are pulled back onto the multipliers,
+        /// so that the iteration converges to implicit Euler exactly. One more pass over the
+        /// tetrahedra per sweep.
+        rebase: bool = false, truth();
+        /// The share theta of the rebase that is applied. Less than 1 is calmer and slower.
+        rebase_factor: f64 = 1.0, number(above(0.0).up_to(1.0));
+        /// Keep the multipliers from step to step. With `rebase` this makes the stiffness
+        /// independent of the number of iterations; without it the body freezes.
+        keep_multipliers: bool = false, truth();
+        /// Where the iteration of a substep starts.
+        start: Start = (Start::Auto), one_of::<Start>();
+    }
+}
+
+impl SolverSettings {
+    /// Every key and its value as one would write it, for the record of a run.
+    pub fn values(&self) -> Vec<(&'static str, String)> {
+        let mut values = Vec::new();
+        Table::values(self, &mut values);
+        values
+    }
+}
+
+/// Reads `colors`: the word "unlimited", or a count.
+struct ColorsKind;
+
+impl Kind for ColorsKind {
+    type Value = Colors;
+
+    fn read(&self, key: &str, node: &Node) -> Result<Colors, SettingError> {
+        match &node.value {
+            Value::Text(text) if text == "unlimited" => Ok(Colors::Unlimited),
+            Value::Text(_) => {
+                let hint = "did you mean \"unlimited\"? Or write a whole number".to_owned();
+                Err(value_error(key, node, ValueError::Choice { hint }))
+            }
+            _ => whole(1, u32::MAX).read(key, node).map(Colors::Limited),
+        }
+    }
+
+    fn type_text(&self) -> String {
+        "\"unlimited\" or a whole number".to_owned()
+    }
+
+    fn value_text(&self, value: &Colors) -> String {
+        match value {
+            Colors::Unlimited => "\"unlimited\"".to_owned(),
+            Colors::Limited(count) => count.to_string(),
+        }
+    }
+
+    fn range_text(&self) -> String {
+        "at least 1".to_owned()
+    }
+}

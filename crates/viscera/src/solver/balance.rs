@@ -1,0 +1,132 @@
+//! The force balance at the end of a step: how well the implicit-Euler equations hold.
+//!
+//! ```text
+//! r_i = m_i (x_i - xt_i)/dt^2 - f_i(x)
+//! ```
+//!
+//! `f` are the forces of all elements. On free vertices `r` is the solver's error as a force
+//! [N]; on pinned ones it is what holds them: the force of the fixing or the tool on the tissue.
+
+use super::Inputs;
+use super::cpu::Workspace;
+use crate::elements::{attachment, deformation_gradient, green_strain, internal_forces};
+use crate::elements::{neo_hookean, spring};
+use crate::material::MaterialModel;
+use crate::model::Model;
+use crate::scalar::{Mat3, Real, Vec3};
+use crate::state::State;
+
+/// Forces and works of one step, in double precision.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ForceBalance {
+    /// `r_i` [N], shape [vertex_count].
+    pub residual: Vec<Vec3<f64>>,
+    /// Sum of `|r_i|` [N] over free vertices.
+    pub unbalanced: f64,
+    /// Sum of the magnitudes of all loads [N]: weights, external forces, reactions of pins.
+    pub load: f64,
+    /// Work [J] of the elastic forces through the displacement from rest, `sum V P : (F - I)`.
+    pub elastic_work: f64,
+    /// Work [J] of the residuals of free vertices through their displacements from rest.
+    pub residual_work: f64,
+}
+
+impl ForceBalance {
+    /// `unbalanced / load`; 0 where nothing acts.
+    pub fn relative_residual(&self) -> f64 {
+        if self.load > 0.0 { self.unbalanced / self.load } else { 0.0 }
+    }
+
+    /// The share of the elastic work that nothing on the outside does: for a body at rest, how
+    /// much too little (positive) or too much (negative) it has been deformed, an estimate of the
+    /// error of the apparent stiffness. For a linear body at rest the displacement `u` has
+    /// `u K u - u f` here, which is 0 for the solution and 1 - s for a shape s times the solution.
+    pub fn stiffness_error(&self) -> f64 {
+        if self.elastic_work.abs() > 0.0 { self.residual_work / self.elastic_work } else { 0.0 }
+    }
+
+    pub(super) fn measure<S: Real>(
+        &mut self,
+        model: &Model<S>,
+        state: &State<S>,
+        inputs: &Inputs<S>,
+        work: &Workspace<S>,
+    ) {
+        let dt = state.multiplier_dt;
+        *self = Self { residual: std::mem::take(&mut self.residual), ..Self::default() };
+        self.residual.clear();
+        self.residual.resize(model.vertex_count(), Vec3::ZERO);
+        if dt <= 0.0 {
+            return;
+        }
+        for (set, strains) in model.tet_sets().into_iter().zip(&work.start_strain) {
+            for tet in 0..set.len() {
+                let vertices = set.vertices[tet];
+                let x = vertices.map(|v| state.positions[v as usize].cast::<f64>());
+                let shape = set.inverse_rest_shape[tet].cast::<f64>();
+                let volume = set.rest_volume[tet].to_f64();
+                let material = &model.materials[set.material[tet] as usize];
+                let (lambda, mu) = (material.lame_lambda.to_f64(), material.lame_mu.to_f64());
+                let f = deformation_gradient(&x, &shape);
+                let strain = green_strain::strain(&f);
+                let mut piola = match set.model {
+                    MaterialModel::SaintVenantKirchhoff => {
+                        green_strain::piola(&f, &strain, lambda, mu)
+                    }
+                    MaterialModel::StableNeoHookean => neo_hookean::piola(&f, lambda, mu),
+                };
+                let h = f - Mat3::IDENTITY;
+                for axis in 0..3 {
+                    self.elastic_work += volume * piola.columns[axis].dot(h.columns[axis]);
+                }
+                if let Some(start) = strains.get(tet) {
+                    let rate = material.viscosity.to_f64() / dt;
+                    let change =
+                        std::array::from_fn(|p| (strain[p] - start[p].to_f64()) * rate);
+                    piola = piola + green_strain::piola(&f, &change, lambda, mu);
+                }
+                let forces = internal_forces(&piola, &shape, volume);
+                for (v, force) in vertices.into_iter().zip(forces) {
+                    self.residual[v as usize] -= force;
+                }
+            }
+        }
+        let springs = &model.springs;
+        for (i, ends) in springs.vertices.iter().enumerate() {
+            let x = ends.map(|v| state.positions[v as usize].cast::<f64>());
+            let (length, stiffness) = (springs.rest_length[i], springs.stiffness[i]);
+            let forces = spring::forces(&x, length.to_f64(), stiffness.to_f64());
+            for (v, force) in ends.iter().zip(forces) {
+                self.residual[*v as usize] -= force;
+            }
+        }
+        let attachments = &model.attachments;
+        let anchors =
+            if inputs.anchors.is_empty() { &model.rest_anchors } else { &inputs.anchors };
+        for (i, &v) in attachments.vertices.iter().enumerate() {
+            let x = state.positions[v as usize].cast::<f64>();
+            let anchor = anchors[attachments.order[i] as usize].cast();
+            let force = attachment::force(x, anchor, attachments.stiffness[i].to_f64());
+            self.residual[v as usize] -= force;
+            self.load += force.length();
+        }
+        let gravity = inputs.gravity.cast::<f64>();
+        for &(_, force) in &inputs.forces {
+            self.load += force.cast::<f64>().length();
+        }
+        for v in 0..model.vertex_count() {
+            let mass = model.masses[v].to_f64();
+            let x = state.positions[v].cast::<f64>();
+            let inertia = (x - work.predicted[v].cast()) * (mass / (dt * dt));
+            self.residual[v] += inertia;
+            let residual = self.residual[v];
+            if work.inverse_masses[v] == S::ZERO {
+                self.load += residual.length();
+            } else {
+                self.unbalanced += residual.length();
+                self.load += mass * gravity.length();
+                self.residual_work += residual.dot(x - model.rest_positions[v].cast());
+            }
+        }
+    }
+}

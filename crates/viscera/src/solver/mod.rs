@@ -1,0 +1,204 @@
+//! The solver: advances a [`State`] by one step of a [`Model`].
+//!
+//! ```text
+//! minimise  1/2 |x - xt|_M^2 + dt^2 V(x),   xt = x_n + dt v_n + dt^2 M^-1 f_ext      implicit Euler
+//! XPBD: sweep over constraints, [J M^-1 J^T + a~] dl = -C - a~ l,  x += M^-1 J^T dl,  l += dl
+//! ```
+//!
+//! What one step does is a list of stages ([`plan`]); a backend carries them out ([`cpu`]).
+
+pub mod acceleration;
+pub mod balance;
+pub mod cpu;
+pub mod plan;
+
+use crate::model::Model;
+use crate::scalar::{Real, Vec3};
+use crate::settings::SolverSettings;
+use crate::state::State;
+use plan::Plan;
+
+/// A vertex that is moved, not simulated, during a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pin<S> {
+    /// The vertex.
+    pub vertex: u32,
+    /// Where it is at the end of the step [m].
+    pub target: Vec3<S>,
+}
+
+/// What acts on the model from outside during one step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inputs<S> {
+    /// Acceleration of gravity [m/s^2].
+    pub gravity: Vec3<S>,
+    /// Pinned vertices. The set may change from step to step.
+    pub pins: Vec<Pin<S>>,
+    /// Where each attachment's anchor is at the end of the step [m], the user's order. Empty:
+    /// all anchors at rest.
+    pub anchors: Vec<Vec3<S>>,
+    /// External forces [N] on single vertices; several on one vertex add up.
+    pub forces: Vec<(u32, Vec3<S>)>,
+}
+
+impl<S: Real> Default for Inputs<S> {
+    fn default() -> Self {
+        Self { gravity: Vec3::ZERO, pins: Vec::new(), anchors: Vec::new(), forces: Vec::new() }
+    }
+}
+
+/// Why a step cannot be made. The state is unchanged.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StepError {
+    /// The step is not a positive, finite time.
+    #[error("the step must be above zero and finite, not {dt} s")]
+    BadStep {
+        /// The step given [s].
+        dt: f64,
+    },
+    /// An input names no vertex.
+    #[error("a {what} names vertex {vertex}; the model has {vertex_count}")]
+    UnknownVertex {
+        /// "pin" or "force".
+        what: &'static str,
+        /// The index given.
+        vertex: u32,
+        /// How many vertices there are.
+        vertex_count: usize,
+    },
+    /// The list of anchors is neither empty nor complete.
+    #[error("{given} anchors for {expected} attachments; give all of them or none")]
+    AnchorCount {
+        /// How many were given.
+        given: usize,
+        /// How many there are.
+        expected: usize,
+    },
+    /// An input is infinite or not a number.
+    #[error("the {what} of a step must be finite")]
+    NotFinite {
+        /// The input concerned.
+        what: &'static str,
+    },
+    /// State, model and solver do not belong together.
+    #[error("the {what} has {given} entries; the model needs {expected}")]
+    Mismatch {
+        /// The array concerned.
+        what: &'static str,
+        /// Its length.
+        given: usize,
+        /// The length that fits.
+        expected: usize,
+    },
+}
+
+/// A solver for one model. All memory is taken when it is built; a step allocates nothing.
+#[derive(Clone, Debug)]
+pub struct Solver<S> {
+    settings: SolverSettings,
+    plan: Plan,
+    work: cpu::Workspace<S>,
+}
+
+impl<S: Real> Solver<S> {
+    /// Plans the steps and takes the memory for them.
+    pub fn new(model: &Model<S>, settings: &SolverSettings) -> Self {
+        Self {
+            settings: settings.clone(),
+            plan: Plan::new(model, settings),
+            work: cpu::Workspace::new(model, settings),
+        }
+    }
+
+    /// The settings in force.
+    pub fn settings(&self) -> &SolverSettings {
+        &self.settings
+    }
+
+    /// The stages of a step.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Advances the state by one step of `dt` [s].
+    ///
+    /// On an error nothing has moved. A frame of a scene is `substeps` such steps.
+    pub fn step(
+        &mut self,
+        model: &Model<S>,
+        state: &mut State<S>,
+        inputs: &Inputs<S>,
+        dt: f64,
+    ) -> Result<(), StepError> {
+        check(model, state, inputs, dt)?;
+        self.work.check(model)?;
+        let step = cpu::Step { model, inputs, dt, settings: &self.settings };
+        for stage in &self.plan.prologue {
+            self.work.run(stage, &step, state);
+        }
+        for _ in 0..self.plan.repeat {
+            for stage in &self.plan.body {
+                self.work.run(stage, &step, state);
+            }
+        }
+        for stage in &self.plan.epilogue {
+            self.work.run(stage, &step, state);
+        }
+        Ok(())
+    }
+
+    /// The force balance at the end of the last step, see [`balance::ForceBalance`].
+    pub fn force_balance(
+        &self,
+        model: &Model<S>,
+        state: &State<S>,
+        inputs: &Inputs<S>,
+        balance: &mut balance::ForceBalance,
+    ) {
+        balance.measure(model, state, inputs, &self.work);
+    }
+}
+
+fn check<S: Real>(
+    model: &Model<S>,
+    state: &State<S>,
+    inputs: &Inputs<S>,
+    dt: f64,
+) -> Result<(), StepError> {
+    if !(dt > 0.0 && dt.is_finite()) {
+        return Err(StepError::BadStep { dt });
+    }
+    let vertex_count = model.vertex_count();
+    let lengths = [
+        ("list of positions", state.positions.len(), vertex_count),
+        ("list of velocities", state.velocities.len(), vertex_count),
+        ("list of multipliers", state.multipliers.len(), model.multiplier_count),
+    ];
+    for (what, given, expected) in lengths {
+        if given != expected {
+            return Err(StepError::Mismatch { what, given, expected });
+        }
+    }
+    let expected = model.rest_anchors.len();
+    if !inputs.anchors.is_empty() && inputs.anchors.len() != expected {
+        return Err(StepError::AnchorCount { given: inputs.anchors.len(), expected });
+    }
+    let vertices = (inputs.pins.iter().map(|pin| ("pin", pin.vertex)))
+        .chain(inputs.forces.iter().map(|&(vertex, _)| ("force", vertex)));
+    for (what, vertex) in vertices {
+        if vertex as usize >= vertex_count {
+            return Err(StepError::UnknownVertex { what, vertex, vertex_count });
+        }
+    }
+    let finite = [
+        ("gravity", inputs.gravity.is_finite()),
+        ("pin targets", inputs.pins.iter().all(|pin| pin.target.is_finite())),
+        ("anchors", inputs.anchors.iter().all(|anchor| anchor.is_finite())),
+        ("forces", inputs.forces.iter().all(|(_, force)| force.is_finite())),
+    ];
+    match finite.into_iter().find(|(_, finite)| !finite) {
+        Some((what, _)) => Err(StepError::NotFinite { what }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,107 @@
+//! The algorithm as data: the list of stages that make one step.
+//!
+//! A backend matches on [`Stage`] exhaustively, so a stage that one backend lacks does not
+//! compile. What a stage does is told here once; how, in the backend.
+
+use crate::model::Model;
+use crate::settings::{Acceleration, AndersonOn, SolverSettings, Start};
+
+/// One stage of a step. `x` are positions, `l` multipliers, `w` inverse masses of the sweep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Stage {
+    /// Remembers the Green strain of viscous tetrahedra at the start of the step.
+    MeasureStrain,
+    /// `xt = x + dt v + dt^2 M^-1 f_ext`; `x` becomes the start of the iteration, pins move to
+    /// their targets; `w = 1/m`.
+    Predict(Start),
+    /// `l = 0`.
+    ResetMultipliers,
+    /// `l *= (dt/dt_last)^2`: multipliers are forces times the squared step.
+    RescaleMultipliers,
+    /// Remembers `(x, l)` before a sweep, for the acceleration.
+    RememberIterate,
+    /// `J^T l` and the bound of its geometric stiffness, per corner.
+    LoadCorners,
+    /// `r = M (x - xt) - J^T l`, `mh = m + sum bounds`, `x -= theta r/mh`, `w = 1/mh`.
+    Rebase,
+    /// `x = xt + M^-1 J^T l`.
+    RecomputePositions,
+    /// Gives every copy its vertex's position.
+    SplitCopies,
+    /// Solves all constraints of one colour; they share no copy.
+    SolveColor(u32),
+    /// `x` becomes the mean of its copies.
+    JoinCopies,
+    /// Chebyshev semi-iterative step on `(x, l)`.
+    Chebyshev,
+    /// Anderson mixing.
+    Anderson(AndersonOn),
+    /// `v = (x - x_n)/dt`.
+    UpdateVelocities,
+}
+
+/// The stages of one step: `prologue`, then `repeat` times `body`, then `epilogue`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Plan {
+    /// Once, first.
+    pub prologue: Vec<Stage>,
+    /// Number of iterations.
+    pub repeat: u32,
+    /// One iteration.
+    pub body: Vec<Stage>,
+    /// Once, last.
+    pub epilogue: Vec<Stage>,
+}
+
+impl Plan {
+    /// The XPBD family.
+    pub fn new<S>(model: &Model<S>, settings: &SolverSettings) -> Self
+    where
+        S: crate::scalar::Real,
+    {
+        let mut prologue = Vec::new();
+        if model.tet_sets().iter().any(|set| set.viscous_offset.is_some()) {
+            prologue.push(Stage::MeasureStrain);
+        }
+        // A kept multiplier already carries gravity: adding it to the start counts it twice.
+        let start = match (settings.start, settings.keep_multipliers) {
+            (Start::Auto, true) => Start::Inertial,
+            (Start::Auto, false) => Start::Predicted,
+            (chosen, _) => chosen,
+        };
+        prologue.push(Stage::Predict(start));
+        prologue.push(if settings.keep_multipliers {
+            Stage::RescaleMultipliers
+        } else {
+            Stage::ResetMultipliers
+        });
+
+        let mut body = Vec::new();
+        if settings.acceleration != Acceleration::None {
+            body.push(Stage::RememberIterate);
+        }
+        if settings.rebase {
+            body.extend([Stage::LoadCorners, Stage::Rebase]);
+        }
+        if model.is_split() {
+            body.push(Stage::SplitCopies);
+        }
+        body.extend((0..model.color_count as u32).map(Stage::SolveColor));
+        if model.is_split() {
+            body.push(Stage::JoinCopies);
+        }
+        match (settings.acceleration, settings.anderson_on) {
+            (Acceleration::None, _) => {}
+            (Acceleration::Chebyshev, _) => body.push(Stage::Chebyshev),
+            (Acceleration::Anderson, on) => {
+                body.push(Stage::Anderson(on));
+                if on == AndersonOn::Multipliers {
+                    body.extend([Stage::LoadCorners, Stage::RecomputePositions]);
+                }
+            }
+        }
+        let epilogue = vec![Stage::UpdateVelocities];
+        Self { prologue, repeat: settings.iterations, body, epilogue }
+    }
+}

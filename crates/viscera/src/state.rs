@@ -1,0 +1,35 @@
+//! The state: everything that moves.
+
+use crate::model::Model;
+use crate::scalar::{Real, Vec3};
+
+/// Positions, velocities and multipliers of a model at one moment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State<S> {
+    /// Positions [m], shape [vertex_count].
+    pub positions: Vec<Vec3<S>>,
+    /// Velocities [m/s], shape [vertex_count].
+    pub velocities: Vec<Vec3<S>>,
+    /// Multipliers [J s^2] of all constraints, in the model's layout, shape [multiplier_count].
+    /// A solver that keeps them from step to step starts from the last step's forces.
+    pub multipliers: Vec<S>,
+    /// The step [s] to which the multipliers belong: they are forces times its square.
+    pub multiplier_dt: f64,
+}
+
+impl<S: Real> State<S> {
+    /// The model at rest.
+    pub fn at_rest(model: &Model<S>) -> Self {
+        Self {
+            positions: model.rest_positions.clone(),
+            velocities: vec![Vec3::ZERO; model.vertex_count()],
+            multipliers: vec![S::ZERO; model.multiplier_count],
+            multiplier_dt: 0.0,
+        }
+    }
+
+    /// True while every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.positions.iter().chain(&self.velocities).all(|v| v.is_finite())
+    }
+}

@@ -1,0 +1,398 @@
+//! Every energy and constraint against central differences of the same source in double
+//! precision, and every local solve against the linear system that defines it.
+
+mod common;
+
+use common::Random;
+use viscera::elements::{
+    attachment, deformation_gradient, green_strain, internal_forces, neo_hookean, shape_gradients,
+    spring,
+};
+use viscera::scalar::{Mat3, Scalar, Vec3, vec3};
+
+/// Step of the differences as a fraction of the tetrahedron's smallest height. The formula is of
+/// fourth order: exact for the energies (quartic polynomials), so the step is as large as `|F|`,
+/// the one function here that is no polynomial, allows.
+const STEP: f64 = 2e-3;
+const TOLERANCE: f64 = 1e-7;
+
+/// A rest shape, a deformed shape and the smallest height of the rest shape.
+struct Case {
+    name: &'static str,
+    inverse_rest_shape: Mat3<f64>,
+    volume: f64,
+    corners: [Vec3<f64>; 4],
+    height: f64,
+}
+
+fn smallest_height(x: &[Vec3<f64>; 4]) -> f64 {
+    let volume = viscera::mesh::tet_volume(*x).abs();
+    let faces = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
+    let areas = faces.map(|[a, b, c]| 0.5 * (x[b] - x[a]).cross(x[c] - x[a]).length());
+    areas.iter().fold(f64::INFINITY, |h, area| h.min(3.0 * volume / area))
+}
+
+/// Tetrahedra of about 5 mm: random ones, rest shapes squeezed to a thousandth, deformed shapes
+/// squeezed flat, turned inside out, and rotated.
+fn cases() -> Vec<Case> {
+    let mut random = Random(7);
+    let mut cases = Vec::new();
+    for round in 0..400 {
+        let name = ["random", "flat at rest", "flattened", "inverted", "rotated"][round % 5];
+        let mut rest: [Vec3<f64>; 4] = std::array::from_fn(|_| random.vector(0.005));
+        if name == "flat at rest" {
+            rest = rest.map(|x| vec3(x.x, x.y, 1e-3 * x.z));
+        }
+        if viscera::mesh::tet_volume(rest) < 0.0 {
+            rest.swap(2, 3);
+        }
+        let longest = (rest[1] - rest[0]).length().max((rest[2] - rest[0]).length());
+        let height = smallest_height(&rest);
+        if height < 1e-5 * longest || (name != "flat at rest" && height < 0.05 * longest) {
+            continue;
+        }
+        let rotation = random.rotation();
+        let stretch = Mat3::from_columns(
+            vec3(random.uniform(0.5, 2.0), random.uniform(-0.3, 0.3), 0.1),
+            vec3(0.2, random.uniform(0.5, 2.0), random.uniform(-0.3, 0.3)),
+            vec3(random.uniform(-0.3, 0.3), -0.1, random.uniform(0.5, 2.0)),
+        );
+        let squeeze = |z| Mat3::from_columns(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, z));
+        let f = match name {
+            "flattened" => squeeze(1e-3) * stretch,
+            "inverted" => squeeze(-0.7) * stretch,
+            "rotated" => rotation * stretch,
+            _ => stretch,
+        };
+        let inverse_rest_shape = viscera::mesh::edge_matrix(rest).inverse();
+        let volume = viscera::mesh::tet_volume(rest);
+        cases.push(Case { name, inverse_rest_shape, volume, corners: rest.map(|x| f * x), height });
+    }
+    assert!(cases.len() > 250);
+    for name in ["random", "flat at rest", "flattened", "inverted", "rotated"] {
+        assert!(cases.iter().filter(|c| c.name == name).count() > 20, "too few: {name}");
+    }
+    cases
+}
+
+/// Normwise relative difference between an analytic gradient and central differences of `value`.
+fn gradient_error<const N: usize>(
+    x: &[Vec3<f64>; N],
+    step: f64,
+    value: impl Fn(&[Vec3<f64>; N]) -> f64,
+    gradient: &[Vec3<f64>; N],
+) -> f64 {
+    let (mut difference, mut norm) = (0.0, 0.0);
+    for corner in 0..N {
+        for axis in 0..3 {
+            // Fourth order: (8 (v(h) - v(-h)) - (v(2h) - v(-2h)))/(12 h).
+            let at = |multiple: f64| {
+                let mut moved = *x;
+                moved[corner][axis] += multiple * step;
+                value(&moved)
+            };
+            let numeric = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * step);
+            let analytic = gradient[corner][axis];
+            difference += (numeric - analytic).powi(2);
+            norm += analytic.powi(2);
+        }
+    }
+    (difference / norm).sqrt()
+}
+
+const LAMBDA: f64 = 15e3;
+const MU: f64 = 1.7e3;
+
+#[test]
+fn forces_are_minus_the_gradient_of_each_energy() {
+    let mut worst: [(f64, &str); 2] = [(0.0, ""); 2];
+    for case in cases() {
+        let f_of = |x: &[Vec3<f64>; 4]| deformation_gradient(x, &case.inverse_rest_shape);
+        let f = f_of(&case.corners);
+        let strain = green_strain::strain(&f);
+        let green = green_strain::piola(&f, &strain, LAMBDA, MU);
+        let neo = neo_hookean::piola(&f, LAMBDA, MU);
+        let errors = [
+            gradient_error(
+                &case.corners,
+                STEP * case.height,
+                |x| {
+                    let strain = green_strain::strain(&f_of(x));
+                    case.volume * green_strain::energy_density(&strain, LAMBDA, MU)
+                },
+                &internal_forces(&green, &case.inverse_rest_shape, case.volume).map(|v| -v),
+            ),
+            gradient_error(
+                &case.corners,
+                STEP * case.height,
+                |x| case.volume * neo_hookean::energy_density(&f_of(x), LAMBDA, MU),
+                &internal_forces(&neo, &case.inverse_rest_shape, case.volume).map(|v| -v),
+            ),
+        ];
+        for (worst, error) in worst.iter_mut().zip(errors) {
+            if error > worst.0 {
+                *worst = (error, case.name);
+            }
+        }
+    }
+    println!("energy gradients, worst: Green strain {:?}, neo-Hookean {:?}", worst[0], worst[1]);
+    assert!(worst[0].0 < TOLERANCE && worst[1].0 < TOLERANCE, "{worst:?}");
+}
+
+#[test]
+fn constraint_gradients_match_differences() {
+    let mut worst = 0.0f64;
+    for case in cases() {
+        let f_of = |x: &[Vec3<f64>; 4]| deformation_gradient(x, &case.inverse_rest_shape);
+        let f = f_of(&case.corners);
+        let g = shape_gradients(&case.inverse_rest_shape);
+        let green = g.map(|g| green_strain::gradient(&f, g));
+        for p in 0..6 {
+            let value = |x: &[Vec3<f64>; 4]| green_strain::strain(&f_of(x))[p];
+            let gradient = green.map(|rows| rows[p]);
+            let error = gradient_error(&case.corners, STEP * case.height, value, &gradient);
+            worst = worst.max(error);
+            assert!(error < TOLERANCE, "{} Green strain {p}: {error:e}", case.name);
+        }
+        let neo = g.map(|g| neo_hookean::gradient(&f, g));
+        for p in 0..2 {
+            let value = |x: &[Vec3<f64>; 4]| neo_hookean::constraints(&f_of(x), LAMBDA, MU)[p];
+            let gradient = neo.map(|rows| rows[p]);
+            let error = gradient_error(&case.corners, STEP * case.height, value, &gradient);
+            worst = worst.max(error);
+            assert!(error < TOLERANCE, "{} neo-Hookean {p}: {error:e}", case.name);
+        }
+    }
+    println!("constraint gradients, worst: {worst:e}");
+}
+
+#[test]
+fn spring_and_attachment_forces_match_differences() {
+    let mut random = Random(3);
+    for _ in 0..50 {
+        let ends: [Vec3<f64>; 2] = std::array::from_fn(|_| random.vector(0.01));
+        let forces = spring::forces(&ends, 0.004, 120.0).map(|f| -f);
+        let length = (ends[1] - ends[0]).length();
+        let energy = |x: &[Vec3<f64>; 2]| spring::energy(x, 0.004, 120.0);
+        let error = gradient_error(&ends, STEP * length, energy, &forces);
+        assert!(error < TOLERANCE, "spring: {error:e}");
+
+        let energy = |x: &[Vec3<f64>; 1]| attachment::energy(x[0], ends[1], 80.0);
+        let force = [-attachment::force(ends[0], ends[1], 80.0)];
+        let error = gradient_error(&[ends[0]], STEP * length, energy, &force);
+        assert!(error < TOLERANCE, "attachment: {error:e}");
+    }
+}
+
+/// At small strain both materials are linear elasticity with the typed E and nu.
+#[test]
+fn both_materials_have_the_typed_stiffness_at_small_strain() {
+    let (young, poisson): (f64, f64) = (5e3, 0.45);
+    let lambda = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
+    let mu = young / (2.0 * (1.0 + poisson));
+    let size = 1e-6;
+    // Uniaxial stress: sides contract by nu.
+    let lateral = 1.0 - poisson * size;
+    let f = Mat3::from_columns(
+        vec3(1.0 + size, 0.0, 0.0),
+        vec3(0.0, lateral, 0.0),
+        vec3(0.0, 0.0, lateral),
+    );
+    for piola in [
+        green_strain::piola(&f, &green_strain::strain(&f), lambda, mu),
+        neo_hookean::piola(&f, lambda, mu),
+    ] {
+        let expected = young * size;
+        // The next term of both energies is of relative size `size` times lambda/E, about 3.
+        assert!((piola.columns[0].x / expected - 1.0).abs() < 20.0 * size, "{piola:?}");
+        assert!(piola.columns[1].y.abs() < 20.0 * size * expected, "{piola:?}");
+    }
+}
+
+/// `A dl = b` with A assembled entry by entry from the gradients that the test above checks.
+#[test]
+fn green_strain_solve_satisfies_its_linear_system() {
+    let mut random = Random(11);
+    let material = common::material(common::STVK, 5e3, 0.45);
+    let compliance = material.compliance_matrix();
+    for case in cases() {
+        let w: [f64; 4] = std::array::from_fn(|_| 1.0 / random.uniform(1e-6, 1e-4));
+        let multipliers: [f64; 6] = std::array::from_fn(|_| random.uniform(-1e-9, 1e-9));
+        let target: [f64; 6] = std::array::from_fn(|_| random.uniform(-0.1, 0.1));
+        let scale = 1.0 / (case.volume * 1e-4);
+        let change = green_strain::solve(
+            &case.corners,
+            &w,
+            &case.inverse_rest_shape,
+            &multipliers,
+            &target,
+            &compliance,
+            scale,
+        );
+        let f = deformation_gradient(&case.corners, &case.inverse_rest_shape);
+        let c = green_strain::strain(&f);
+        let rows = shape_gradients(&case.inverse_rest_shape).map(|g| green_strain::gradient(&f, g));
+        for p in 0..6 {
+            let (mut left, mut size) = (0.0, 0.0);
+            for q in 0..6 {
+                let mut entry = scale * compliance[p][q];
+                for i in 0..4 {
+                    entry += w[i] * rows[i][p].dot(rows[i][q]);
+                }
+                left += entry * change.multipliers[q];
+                size += (entry * change.multipliers[q]).abs();
+            }
+            let mut right = -(c[p] - target[p]);
+            for q in 0..6 {
+                right -= scale * compliance[p][q] * multipliers[q];
+                size += (scale * compliance[p][q] * multipliers[q]).abs();
+            }
+            // Backward error of a 6 x 6 factorisation: a few n eps of the terms summed.
+            let tolerance = 200.0 * f64::EPSILON * (size + c[p].abs() + target[p].abs());
+            assert!((left - right).abs() < tolerance, "{}: {left:e} {right:e}", case.name);
+        }
+        for i in 0..4 {
+            let mut expected = Vec3::ZERO;
+            let mut size = 0.0;
+            for p in 0..6 {
+                expected += rows[i][p] * (w[i] * change.multipliers[p]);
+                size += rows[i][p].length() * w[i] * change.multipliers[p].abs();
+            }
+            assert!((change.positions[i] - expected).length() < 64.0 * f64::EPSILON * size);
+        }
+    }
+}
+
+#[test]
+fn neo_hookean_solve_satisfies_its_linear_system() {
+    let mut random = Random(12);
+    for case in cases() {
+        let w: [f64; 4] = std::array::from_fn(|_| 1.0 / random.uniform(1e-6, 1e-4));
+        let multipliers = [random.uniform(-1e-9, 1e-9), random.uniform(-1e-9, 0.0)];
+        let step_volume = case.volume * 1e-4;
+        let shape = &case.inverse_rest_shape;
+        let change =
+            neo_hookean::solve(&case.corners, &w, shape, &multipliers, LAMBDA, MU, step_volume);
+        let f = deformation_gradient(&case.corners, shape);
+        let c = neo_hookean::constraints(&f, LAMBDA, MU);
+        let rows = shape_gradients(shape).map(|g| neo_hookean::gradient(&f, g));
+        let compliance = [1.0 / ((LAMBDA + MU) * step_volume), 1.0 / (MU * step_volume)];
+        for p in 0..2 {
+            let (mut left, mut size) = (0.0, 0.0);
+            for q in 0..2 {
+                let mut entry = if p == q { compliance[p] } else { 0.0 };
+                for i in 0..4 {
+                    entry += w[i] * rows[i][p].dot(rows[i][q]);
+                }
+                left += entry * change.multipliers[q];
+                size += (entry * change.multipliers[q]).abs();
+            }
+            let right = -c[p] - compliance[p] * multipliers[p];
+            size += c[p].abs() + (compliance[p] * multipliers[p]).abs();
+            let error = (left - right).abs() / size;
+            assert!(error < 200.0 * f64::EPSILON, "{}: {error:e}", case.name);
+        }
+    }
+}
+
+/// With `D` the diagonal of the mass bounds and `K = d(J^T l)/dx` (by differences), `-D <= K <= D`:
+/// what makes the rebase stable. Checked as the spectral radius of `D^-1/2 K D^-1/2`.
+#[test]
+fn mass_bounds_cover_the_geometric_stiffness() {
+    let mut random = Random(13);
+    for case in cases() {
+        let six: [f64; 6] = std::array::from_fn(|_| random.uniform(-1.0, 1.0));
+        let two = [random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0)];
+        let shape = &case.inverse_rest_shape;
+        // With the multipliers fixed, J^T l is linear (Green strain) or smooth in x.
+        let green = |x: &[Vec3<f64>; 4]| green_strain::corner_loads(x, shape, &six);
+        let neo = |x: &[Vec3<f64>; 4]| neo_hookean::corner_loads(x, shape, &two);
+        check_bound(&case, green, "Green strain");
+        check_bound(&case, neo, "neo-Hookean");
+    }
+}
+
+fn check_bound(
+    case: &Case,
+    loads: impl Fn(&[Vec3<f64>; 4]) -> [viscera::elements::CornerLoad<f64>; 4],
+    name: &str,
+) {
+    let step = STEP * case.height;
+    let scale = loads(&case.corners).map(|load| 1.0 / load.mass_bound.sqrt());
+    let mut matrix = [[0.0; 12]; 12];
+    for column in 0..12 {
+        let (b, axis) = (column / 3, column % 3);
+        let moved = |sign: f64| {
+            let mut x = case.corners;
+            x[b][axis] += sign * step;
+            loads(&x)
+        };
+        let (plus, minus) = (moved(1.0), moved(-1.0));
+        for i in 0..4 {
+            let derivative = (plus[i].impulse - minus[i].impulse) * (0.5 / step);
+            for row in 0..3 {
+                matrix[3 * i + row][column] = derivative[row] * scale[i] * scale[b];
+            }
+        }
+    }
+    let mut vector: [f64; 12] = std::array::from_fn(|i| 1.0 + 0.1 * i as f64);
+    let mut radius = 0.0;
+    for _ in 0..300 {
+        let image: [f64; 12] =
+            std::array::from_fn(|i| (0..12).map(|j| matrix[i][j] * vector[j]).sum());
+        let norm = |v: &[f64; 12]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        radius = norm(&image) / norm(&vector);
+        vector = image.map(|x| x / norm(&image));
+    }
+    // Differences of J^T l are good to about 1e-8 of their size.
+    assert!(radius <= 1.0 + 1e-6, "{} {name}: {radius}", case.name);
+    assert!(radius > 1e-3, "{} {name}: the bound is empty, {radius}", case.name);
+}
+
+/// In single precision the kernels work in the same source: their error is round-off.
+#[test]
+fn single_precision_follows_double() {
+    for case in cases().iter().filter(|c| c.name == "random" || c.name == "rotated") {
+        let strain = strains::<f64>(case);
+        let rough = strains::<f32>(case);
+        // Positions relative to the shortest height lose that factor of precision.
+        let spread = case.corners.iter().fold(0.0f64, |a, x| a.max(x.length())) / case.height;
+        for p in 0..6 {
+            let difference = (strain[p] - f64::from(rough[p])).abs();
+            assert!(difference < 32.0 * f64::from(f32::EPSILON) * spread.max(1.0), "{difference:e}");
+        }
+    }
+}
+
+fn strains<S: viscera::scalar::Real>(case: &Case) -> [S; 6] {
+    let x = case.corners.map(|x| x.cast::<S>());
+    green_strain::strain(&deformation_gradient(&x, &case.inverse_rest_shape.cast::<S>()))
+}
+
+/// A collapsed tetrahedron, a point, a line: finite results everywhere.
+#[test]
+fn degenerate_shapes_give_finite_corrections() {
+    let shape = Mat3::<f32>::IDENTITY;
+    let material = common::material(common::STVK, 5e3, 0.45);
+    let compliance = material.compliance_matrix().map(|row| row.map(f32::from_f64));
+    let zero = Vec3::ZERO;
+    let shapes: [[Vec3<f32>; 4]; 3] = [
+        [zero; 4],
+        [zero, vec3(1.0, 0.0, 0.0), vec3(2.0, 0.0, 0.0), vec3(3.0, 0.0, 0.0)],
+        [zero, vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(1.0, 1.0, 0.0)],
+    ];
+    for x in shapes {
+        let w = [1.0; 4];
+        let green =
+            green_strain::solve(&x, &w, &shape, &[0.0; 6], &[0.0; 6], &compliance, 6.0);
+        let neo = neo_hookean::solve(&x, &w, &shape, &[0.0; 2], 1e4, 1e3, 1.0 / 6.0);
+        for moved in green.positions.iter().chain(&neo.positions) {
+            assert!(moved.is_finite(), "{x:?} {moved:?}");
+        }
+        for load in neo_hookean::corner_loads(&x, &shape, &[1.0, -1.0]) {
+            assert!(load.impulse.is_finite() && load.mass_bound.is_finite());
+        }
+    }
+    let (change, moves) = spring::solve(&[zero; 2], &[1.0; 2], 0.0f32, 0.0, 1.0);
+    assert!(change.is_finite() && moves[0].is_finite());
+}
