@@ -29,7 +29,8 @@ fn affine_motions_are_reproduced_to_round_off() {
     // Half of these points lie outside, up to 0.7 m away.
     let surface = points(grid(-0.3, 1.3, 17));
     let embedding = Embedding::new(&mesh, &surface).unwrap();
-    let matrix = Mat3::from_columns(vec3(1.2, 0.3, -0.1), vec3(-0.4, 0.8, 0.2), vec3(0.1, 0.5, 1.1));
+    let matrix =
+        Mat3::from_columns(vec3(1.2, 0.3, -0.1), vec3(-0.4, 0.8, 0.2), vec3(0.1, 0.5, 1.1));
     let map = |x: Vec3<f64>| matrix * x + vec3(5.0, -3.0, 2.0);
     let moved: Vec<_> = mesh.vertices().iter().map(|&x| map(x)).collect();
     let mut found = vec![Vec3::ZERO; surface.vertices.len()];
@@ -158,8 +159,13 @@ fn a_real_liver_surface_embeds_in_its_coarse_mesh() {
             line.split_whitespace().skip(1).map_while(|w| w.parse().ok()).collect();
         vec3(words[0], words[1], words[2])
     };
-    let surface =
-        points(read("liver_surface.obj").lines().filter(|l| l.starts_with("v ")).map(coordinates).collect());
+    let surface = points(
+        read("liver_surface.obj")
+            .lines()
+            .filter(|l| l.starts_with("v "))
+            .map(coordinates)
+            .collect(),
+    );
     assert_eq!(surface.vertices.len(), 2194);
     let embedding = Embedding::new(&mesh, &surface).unwrap();
     let weight = embedding.weights().iter().flatten().fold(0.0_f64, |max, w| max.max(w.abs()));

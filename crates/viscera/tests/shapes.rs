@@ -9,10 +9,6 @@ use viscera::mesh::shapes::{
 use viscera::mesh::{TetMesh, tet_volume};
 use viscera::scalar::{Vec3, vec3};
 
-fn volume(mesh: &TetMesh) -> f64 {
-    (0..mesh.tets().len()).map(|tet| tet_volume(mesh.corners(tet))).sum()
-}
-
 /// How many faces belong to one tetrahedron; asserts that none belongs to more than two.
 fn boundary_face_count(mesh: &TetMesh) -> usize {
     let mut faces: BTreeMap<[u32; 3], usize> = BTreeMap::new();
@@ -39,7 +35,7 @@ fn blocks_conform_and_fill_their_box() {
             assert_eq!(mesh.vertices().len(), (nx + 1) * (ny + 1) * (nz + 1));
             // Faces that do not match would add to the boundary's two triangles per square.
             assert_eq!(boundary_face_count(&mesh), 4 * (nx * ny + ny * nz + nz * nx));
-            assert!((volume(&mesh) - 0.006).abs() < 1e-16 * 100.0);
+            assert!((mesh.volume() - 0.006).abs() < 1e-16 * 100.0);
             assert!((0..mesh.tets().len()).all(|tet| tet_volume(mesh.corners(tet)) > 0.0));
         }
     }
@@ -56,7 +52,7 @@ fn jitter_moves_interior_vertices_only_and_never_inverts() {
             assert!((0..mesh.tets().len()).all(|tet| tet_volume(mesh.corners(tet)) > 0.0));
             let moved = mesh.vertices().iter().zip(rest.vertices()).filter(|(a, b)| a != b);
             assert_eq!(moved.count(), 5 * 4 * 3);
-            assert!((volume(&mesh) - volume(&rest)).abs() < 1e-14 * volume(&rest));
+            assert!((mesh.volume() - rest.volume()).abs() < 1e-14 * rest.volume());
         }
     }
 }
@@ -69,7 +65,8 @@ fn a_beam_has_cubic_cells_and_a_centred_cross_section() {
         .vertices()
         .iter()
         .fold((Vec3::splat(1.0), Vec3::splat(-1.0)), |(low, high), &x| (low.min(x), high.max(x)));
-    let error = (lower - vec3(0.0, -0.02, -0.01)).length() + (upper - vec3(0.2, 0.02, 0.01)).length();
+    let error =
+        (lower - vec3(0.0, -0.02, -0.01)).length() + (upper - vec3(0.2, 0.02, 0.01)).length();
     assert!(error < 1e-15, "{lower:?} {upper:?}");
 }
 
@@ -81,10 +78,10 @@ fn round_shapes_have_their_volumes() {
     // Inscribed triangles with edges up to 1.5 spacings h lose about h^2 / 4 r per radius r.
     let lost = |radius: f64, spacing: f64| (spacing / radius).powi(2);
     let exact = 4.0 / 3.0 * pi * 0.05_f64.powi(3);
-    let ratio = volume(&ball.tets) / exact;
+    let ratio = ball.tets.volume() / exact;
     assert!((1.0 - lost(0.05, 0.008)..1.0).contains(&ratio), "{ratio}");
     let exact = 4.0 / 3.0 * pi * 0.03_f64.powi(3) + pi * 0.03_f64.powi(2) * 0.1;
-    let ratio = volume(&pill.tets) / exact;
+    let ratio = pill.tets.volume() / exact;
     assert!((1.0 - lost(0.03, 0.006)..1.0).contains(&ratio), "{ratio}");
 }
 
@@ -94,7 +91,7 @@ fn the_liver_is_life_size_in_one_piece_of_about_three_thousand_tetrahedra() {
     let count = organ.tets.tets().len();
     assert!((2500..3500).contains(&count), "{count} tetrahedra");
     assert_eq!((organ.report.components, organ.report.non_manifold_edges), (1, 0));
-    let litres = volume(&organ.tets) * 1000.0;
+    let litres = organ.tets.volume() * 1000.0;
     assert!((1.2..1.5).contains(&litres), "{litres} l");
     let (lower, upper) = organ
         .surface

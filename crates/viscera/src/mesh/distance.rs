@@ -15,10 +15,10 @@ use crate::scalar::{Mat3, Vec3, vec3};
 
 /// A shape given by its signed distance.
 pub trait SignedDistance {
-    /// Distance to the surface [m]: negative inside, zero on the surface, positive outside.
+    /// Distance to the surface `[m]`: negative inside, zero on the surface, positive outside.
     fn distance(&self, point: Vec3<f64>) -> f64;
 
-    /// Lower and upper corner [m] of a box that holds the whole shape.
+    /// Lower and upper corner `[m]` of a box that holds the whole shape.
     fn bounds(&self) -> (Vec3<f64>, Vec3<f64>);
 }
 
@@ -43,9 +43,9 @@ impl<T: SignedDistance + ?Sized> SignedDistance for Box<T> {
 /// A ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
-    /// Centre [m].
+    /// Centre `[m]`.
     pub center: Vec3<f64>,
-    /// Radius [m].
+    /// Radius `[m]`.
     pub radius: f64,
 }
 
@@ -62,11 +62,11 @@ impl SignedDistance for Sphere {
 /// All points within a radius of a line segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
-    /// First end of the segment [m].
+    /// First end of the segment `[m]`.
     pub start: Vec3<f64>,
-    /// Other end of the segment [m].
+    /// Other end of the segment `[m]`.
     pub end: Vec3<f64>,
-    /// Radius [m].
+    /// Radius `[m]`.
     pub radius: f64,
 }
 
@@ -91,11 +91,11 @@ impl SignedDistance for Capsule {
 /// A box with edges along the axes, its edges and corners rounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cuboid {
-    /// Centre [m].
+    /// Centre `[m]`.
     pub center: Vec3<f64>,
-    /// Half of the edge lengths [m].
+    /// Half of the edge lengths `[m]`.
     pub half_size: Vec3<f64>,
-    /// Radius of the rounded edges [m], at most the smallest half size; zero is sharp.
+    /// Radius of the rounded edges `[m]`, at most the smallest half size; zero is sharp.
     pub rounding: f64,
 }
 
@@ -116,9 +116,9 @@ impl SignedDistance for Cuboid {
 /// distance `k0 (k0 - 1) / k1` with `k0 = |p / r|`, `k1 = |p / r^2|`, exact on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ellipsoid {
-    /// Centre [m].
+    /// Centre `[m]`.
     pub center: Vec3<f64>,
-    /// Half axes [m].
+    /// Half axes `[m]`.
     pub radii: Vec3<f64>,
 }
 
@@ -142,7 +142,7 @@ pub struct SmoothUnion<A, B> {
     pub first: A,
     /// The other shape.
     pub second: B,
-    /// Blend length [m], positive: a fillet of about this radius; adds at most a sixth of it.
+    /// Blend length `[m]`, positive: a fillet of about this radius; adds at most a sixth of it.
     pub blend: f64,
 }
 
@@ -165,7 +165,7 @@ pub struct SmoothSubtraction<A, B> {
     pub shape: A,
     /// What is taken away.
     pub removed: B,
-    /// Blend length [m], positive: the rim is rounded with about this radius.
+    /// Blend length `[m]`, positive: the rim is rounded with about this radius.
     pub blend: f64,
 }
 
@@ -188,7 +188,7 @@ pub struct Placed<A> {
     pub rotation: Mat3<f64>,
     /// Positive factor on all lengths.
     pub scale: f64,
-    /// Where the local origin comes to lie [m].
+    /// Where the local origin comes to lie `[m]`.
     pub translation: Vec3<f64>,
 }
 
@@ -203,17 +203,16 @@ impl<A: SignedDistance> SignedDistance for Placed<A> {
             let pick = |axis: usize| if index >> axis & 1 == 0 { lower[axis] } else { upper[axis] };
             self.rotation * (vec3(pick(0), pick(1), pick(2)) * self.scale) + self.translation
         };
-        (1..8)
-            .map(corner)
-            .fold((corner(0), corner(0)), |(low, high), x| (low.min(x), high.max(x)))
+        (1..8).map(corner).fold((corner(0), corner(0)), |(low, high), x| (low.min(x), high.max(x)))
     }
 }
 
-/// The rotation by an angle [rad] about an axis of any length: Rodrigues' formula.
+/// The rotation by an angle `[rad]` about an axis of any length: Rodrigues' formula.
 pub fn rotation_about(axis: Vec3<f64>, angle: f64) -> Mat3<f64> {
     let n = axis * (1.0 / axis.length());
     let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
-    let cross = Mat3::from_columns(vec3(0.0, n.z, -n.y), vec3(-n.z, 0.0, n.x), vec3(n.y, -n.x, 0.0));
+    let cross =
+        Mat3::from_columns(vec3(0.0, n.z, -n.y), vec3(-n.z, 0.0, n.x), vec3(n.y, -n.x, 0.0));
     Mat3::IDENTITY * cosine + cross * sine + Mat3::outer(n, n) * (1.0 - cosine)
 }
 

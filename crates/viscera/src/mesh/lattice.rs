@@ -50,11 +50,11 @@ pub(super) struct Lattice<'a> {
     origin: Vec3<f64>,
     /// Cubes along each axis.
     cubes: [usize; 3],
-    /// Shape [vertex_count].
+    /// Shape `[vertex_count]`.
     signs: Vec<Sign>,
     /// Ordered by (inside, outside).
     cuts: Vec<Cut>,
-    /// Warped vertices and their positions [m], ordered by id.
+    /// Warped vertices and their positions `[m]`, ordered by id.
     warped: Vec<(u32, Vec3<f64>)>,
 }
 
@@ -99,7 +99,8 @@ impl<'a> Lattice<'a> {
             return Err(TetrahedralizeError::Bounds);
         }
         let half_cubes = |spacing: f64| size.to_array().map(|s| (0.5 * s / spacing).ceil() + 1.0);
-        let count = |spacing: f64| half_cubes(spacing).iter().map(|m| 2.0 * m + 1.0).product::<f64>();
+        let count =
+            |spacing: f64| half_cubes(spacing).iter().map(|m| 2.0 * m + 1.0).product::<f64>();
         let (lattice_vertices, limit) = (2.0 * count(spacing), MAX_LATTICE_VERTICES as f64);
         if lattice_vertices > limit {
             let mut suggestion = spacing;
@@ -146,14 +147,14 @@ impl<'a> Lattice<'a> {
         (0..3).any(|axis| indices[axis] == 0 || indices[axis] + 1 == self.cubes[axis])
     }
 
-    /// Position [m] before warping.
+    /// Position `[m]` before warping.
     fn regular_position(&self, id: u32) -> Vec3<f64> {
         let (grid, [i, j, k]) = self.indices(id);
         let offset = 0.5 * grid as f64;
         self.origin + vec3(i as f64 + offset, j as f64 + offset, k as f64 + offset) * self.spacing
     }
 
-    /// Position [m] of a lattice vertex, warped if it is.
+    /// Position `[m]` of a lattice vertex, warped if it is.
     pub fn position(&self, id: u32) -> Vec3<f64> {
         match self.warped.binary_search_by_key(&id, |&(warped, _)| warped) {
             Ok(found) => self.warped[found].1,
@@ -241,7 +242,7 @@ impl<'a> Lattice<'a> {
         Ok(0.5 * (low + high))
     }
 
-    /// Position [m] of a cut point.
+    /// Position `[m]` of a cut point.
     pub fn cut_position(&self, cut: usize) -> Vec3<f64> {
         let Cut { inside, outside, fraction } = self.cuts[cut];
         let (start, end) = (self.regular_position(inside), self.regular_position(outside));
@@ -261,7 +262,8 @@ impl<'a> Lattice<'a> {
             (outside, inside)
         });
         // (vertex, cut) for both ends of each cut: grouped by vertex, in order of vertex ids.
-        let from_inside = (0..self.cuts.len() as u32).map(|cut| (self.cuts[cut as usize].inside, cut));
+        let from_inside =
+            (0..self.cuts.len() as u32).map(|cut| (self.cuts[cut as usize].inside, cut));
         let from_outside = by_outside.iter().map(|&cut| (self.cuts[cut as usize].outside, cut));
         let mut ends: Vec<(u32, u32)> = from_inside.chain(from_outside).collect();
         ends.sort_unstable();
@@ -377,7 +379,8 @@ impl<'a> Lattice<'a> {
 
     /// Prescribes cut points (inside, outside, fraction) and warps (vertex, towards, fraction).
     pub fn prescribe(&mut self, cuts: &[(u32, u32, f64)], warps: &[(u32, u32, f64)]) {
-        let cut = |&(inside, outside, fraction): &(u32, u32, f64)| Cut { inside, outside, fraction };
+        let cut =
+            |&(inside, outside, fraction): &(u32, u32, f64)| Cut { inside, outside, fraction };
         self.cuts = cuts.iter().map(cut).collect();
         self.cuts.sort_unstable_by_key(|cut| (cut.inside, cut.outside));
         self.warped.clear();

@@ -87,7 +87,7 @@ impl SignedDistance for Liver {
     }
 }
 
-/// An ellipsoid [mm], turned in the frontal plane: positive degrees lower its left end.
+/// An ellipsoid `[mm]`, turned in the frontal plane: positive degrees lower its left end.
 fn ellipsoid(center: [f64; 3], radii: [f64; 3], degrees: f64) -> Placed<Ellipsoid> {
     Placed {
         shape: Ellipsoid { center: Vec3::ZERO, radii: Vec3::from_f64(radii) },
@@ -97,7 +97,7 @@ fn ellipsoid(center: [f64; 3], radii: [f64; 3], degrees: f64) -> Placed<Ellipsoi
     }
 }
 
-/// A capsule [mm].
+/// A capsule `[mm]`.
 fn capsule(start: [f64; 3], end: [f64; 3], radius: f64) -> Capsule {
     Capsule { start: Vec3::from_f64(start), end: Vec3::from_f64(end), radius }
 }

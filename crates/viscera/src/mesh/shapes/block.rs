@@ -23,7 +23,8 @@ pub enum Splitting {
     Six,
 }
 
-const FIVE: [[usize; 4]; 5] = [[0, 3, 5, 6], [1, 0, 3, 5], [2, 0, 6, 3], [4, 0, 5, 6], [7, 3, 6, 5]];
+const FIVE: [[usize; 4]; 5] =
+    [[0, 3, 5, 6], [1, 0, 3, 5], [2, 0, 6, 3], [4, 0, 5, 6], [7, 3, 6, 5]];
 const SIX: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
 
@@ -49,9 +50,9 @@ impl Splitting {
 /// A block and how to cut it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Block {
-    /// The corner with the smallest coordinates [m].
+    /// The corner with the smallest coordinates `[m]`.
     pub corner: Vec3<f64>,
-    /// Edge lengths [m].
+    /// Edge lengths `[m]`.
     pub size: Vec3<f64>,
     /// Boxes along each axis.
     pub cells: [usize; 3],
@@ -83,8 +84,9 @@ impl Block {
             for j in 0..=ny {
                 for i in 0..=nx {
                     let at = vec3(i as f64, j as f64, k as f64).scale(cell);
-                    let is_interior =
-                        [(i, nx), (j, ny), (k, nz)].iter().all(|&(index, n)| 0 < index && index < n);
+                    let is_interior = [(i, nx), (j, ny), (k, nz)]
+                        .iter()
+                        .all(|&(index, n)| 0 < index && index < n);
                     let shift = if is_interior && reach > 0.0 {
                         random.point_in_ball() * reach
                     } else {
@@ -116,7 +118,9 @@ impl Block {
     }
 
     fn check(&self) -> Result<(), ShapeError> {
-        for (axis, name) in ["block's x size", "block's y size", "block's z size"].iter().enumerate() {
+        for (axis, name) in
+            ["block's x size", "block's y size", "block's z size"].iter().enumerate()
+        {
             check_length(name, self.size[axis])?;
         }
         if !self.corner.is_finite() {
@@ -142,23 +146,19 @@ impl Block {
         vec3(self.size.x / nx, self.size.y / ny, self.size.z / nz)
     }
 
-    /// How far [m] every vertex may move, in any direction, before a tetrahedron can go flat: half
+    /// How far `[m]` every vertex may move, in any direction, before a tetrahedron can go flat: half
     /// the smallest width. Were it flat, all its corners would lie in one plane, so before the move
     /// between two planes at most that width apart.
     fn safe_displacement(&self) -> f64 {
         let cell = self.cell_size();
-        let corner = |c: usize| {
-            vec3((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2) as f64).scale(cell)
-        };
-        self.splitting
-            .tets([0; 3])
-            .map(|tet| width(tet.map(corner)))
-            .fold(f64::INFINITY, f64::min)
+        let corner =
+            |c: usize| vec3((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2) as f64).scale(cell);
+        self.splitting.tets([0; 3]).map(|tet| width(tet.map(corner))).fold(f64::INFINITY, f64::min)
             * 0.5
     }
 }
 
-/// Smallest distance [m] between two parallel planes that hold a tetrahedron between them: a corner
+/// Smallest distance `[m]` between two parallel planes that hold a tetrahedron between them: a corner
 /// and its opposite face, or two opposite edges, lie in them.
 fn width(x: [Vec3<f64>; 4]) -> f64 {
     let distance = |u: Vec3<f64>, v: Vec3<f64>, across: Vec3<f64>| {
