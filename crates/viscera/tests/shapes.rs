@@ -2,10 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use viscera::mesh::distance::SignedDistance;
 use viscera::mesh::embed::Embedding;
+use viscera::mesh::liver::Liver;
 use viscera::mesh::shapes::{
     Block, LIVER_SPACING, ShapeError, Splitting, beam, block, capsule, liver, sphere,
 };
+use viscera::mesh::tetrahedralize::surface;
 use viscera::mesh::{TetMesh, tet_volume};
 use viscera::scalar::{Vec3, vec3};
 
@@ -109,6 +112,27 @@ fn the_liver_is_life_size_in_one_piece_of_about_three_thousand_tetrahedra() {
         organ.surface.triangles.len(),
         embedding.max_distance()
     );
+}
+
+#[test]
+fn the_liver_stays_two_millimetres_inside_its_bounds() {
+    let organ = Liver::scaled(1.0);
+    let (lower, upper) = organ.bounds();
+    // A lattice around enlarged bounds finds what reaches past the stated ones.
+    struct Enlarged(Liver);
+    impl SignedDistance for Enlarged {
+        fn distance(&self, point: Vec3<f64>) -> f64 {
+            self.0.distance(point)
+        }
+        fn bounds(&self) -> (Vec3<f64>, Vec3<f64>) {
+            (Vec3::splat(-0.16), Vec3::splat(0.16))
+        }
+    }
+    let skin = surface(&Enlarged(organ), 0.006).unwrap();
+    for x in skin.vertices {
+        let spare = (x - lower).min(upper - x);
+        assert!(spare.x.min(spare.y).min(spare.z) > 0.002, "{x:?}");
+    }
 }
 
 #[test]

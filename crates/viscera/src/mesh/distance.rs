@@ -222,3 +222,92 @@ pub fn smooth_minimum(a: f64, b: f64, blend: f64) -> f64 {
     // A blend of zero is the plain minimum: 0 / 0 must not spoil it.
     if h > 0.0 { a.min(b) - h * h * h * blend / 6.0 } else { a.min(b) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on a grid through and around shapes of about unit size, off the symmetry planes.
+    fn points() -> impl Iterator<Item = Vec3<f64>> {
+        let at = |i: i32| f64::from(i) * 0.31 - 1.8;
+        (0..1728).map(move |n| vec3(at(n % 12), at(n / 12 % 12), at(n / 144)))
+    }
+
+    fn slope(shape: &dyn SignedDistance, x: Vec3<f64>) -> f64 {
+        let h = 1e-5;
+        let along = |axis: Vec3<f64>| {
+            (shape.distance(x + axis * h) - shape.distance(x - axis * h)) / (2.0 * h)
+        };
+        vec3(along(vec3(1.0, 0.0, 0.0)), along(vec3(0.0, 1.0, 0.0)), along(vec3(0.0, 0.0, 1.0)))
+            .length()
+    }
+
+    const BALL: Sphere = Sphere { center: vec3(0.1, 0.2, -0.1), radius: 0.7 };
+    const PILL: Capsule =
+        Capsule { start: vec3(-0.5, 0.0, 0.1), end: vec3(0.4, 0.3, 0.2), radius: 0.4 };
+    const CRATE: Cuboid =
+        Cuboid { center: vec3(0.1, 0.0, 0.0), half_size: vec3(0.5, 0.6, 0.7), rounding: 0.1 };
+    const EGG: Ellipsoid = Ellipsoid { center: vec3(0.1, -0.1, 0.0), radii: vec3(0.9, 0.5, 0.7) };
+
+    #[test]
+    fn exact_distances_have_slope_one_outside() {
+        let shapes: [&dyn SignedDistance; 3] = [&BALL, &PILL, &CRATE];
+        for shape in shapes {
+            for x in points().filter(|&x| shape.distance(x) > 0.01) {
+                // Central differences: h^2 times the third derivative, plus round-off over h.
+                assert!((slope(shape, x) - 1.0).abs() < 1e-4, "{x:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_ellipsoid_has_the_right_sign_and_slope_one_on_its_surface() {
+        for direction in points() {
+            let n = direction * (1.0 / direction.length());
+            let x = EGG.center + n.scale(EGG.radii);
+            assert!(EGG.distance(EGG.center + n.scale(EGG.radii) * 0.999) < 0.0);
+            assert!(EGG.distance(EGG.center + n.scale(EGG.radii) * 1.001) > 0.0);
+            assert!((slope(&EGG, x) - 1.0).abs() < 1e-4);
+        }
+        assert_eq!(EGG.distance(EGG.center), -0.5);
+    }
+
+    #[test]
+    fn a_union_holds_both_shapes_and_a_subtraction_nothing_of_what_was_removed() {
+        let both = SmoothUnion { first: BALL, second: PILL, blend: 0.2 };
+        let rest = SmoothSubtraction { shape: BALL, removed: PILL, blend: 0.2 };
+        for x in points() {
+            let (a, b) = (BALL.distance(x), PILL.distance(x));
+            assert!(both.distance(x) <= a.min(b) && both.distance(x) >= a.min(b) - 0.2 / 6.0);
+            assert!(rest.distance(x) >= a.max(-b) && rest.distance(x) <= a.max(-b) + 0.2 / 6.0);
+        }
+        assert_eq!(smooth_minimum(2.0, 1.0, 0.0), 1.0);
+        assert_eq!(smooth_minimum(1.0, 1.0, 0.0), 1.0);
+    }
+
+    #[test]
+    fn bounds_hold_the_shape() {
+        let rotation = rotation_about(vec3(1.0, 2.0, -1.0), 0.7);
+        let translation = vec3(0.2, -0.1, 0.3);
+        let placed = Placed { shape: EGG, rotation, scale: 1.2, translation };
+        let both = SmoothUnion { first: EGG, second: PILL, blend: 0.3 };
+        let shapes: [&dyn SignedDistance; 6] = [&BALL, &PILL, &CRATE, &EGG, &placed, &both];
+        for shape in shapes {
+            let (lower, upper) = shape.bounds();
+            for x in points().filter(|&x| shape.distance(x) <= 0.0) {
+                assert_eq!((x.max(lower), x.min(upper)), (x, x));
+            }
+        }
+    }
+
+    #[test]
+    fn placing_a_shape_moves_its_points() {
+        let rotation = rotation_about(vec3(0.0, 0.0, 2.0), std::f64::consts::FRAC_PI_2);
+        let placed =
+            Placed { shape: CRATE, rotation, scale: 2.0, translation: vec3(1.0, 0.0, 0.0) };
+        for x in points() {
+            let moved = vec3(-x.y, x.x, x.z) * 2.0 + vec3(1.0, 0.0, 0.0);
+            assert!((placed.distance(moved) - 2.0 * CRATE.distance(x)).abs() < 1e-14);
+        }
+    }
+}

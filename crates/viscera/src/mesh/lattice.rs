@@ -60,35 +60,35 @@ pub(super) struct Lattice<'a> {
 
 impl<'a> Lattice<'a> {
     /// Steps 1 and 2: evaluates the function and finds the cut points.
+    ///
+    /// There may be no vertex inside, where the shape is small.
     pub fn sample(
         shape: &'a dyn SignedDistance,
         spacing: f64,
     ) -> Result<Self, TetrahedralizeError> {
         let mut lattice = Self::around(shape, spacing)?;
         lattice.signs = Vec::with_capacity(lattice.vertex_count());
-        let mut any_inside = false;
         for id in 0..lattice.vertex_count() as u32 {
             let sign = match lattice.evaluate(lattice.regular_position(id))? {
                 value if value < 0.0 => Sign::Inside,
                 value if value > 0.0 => Sign::Outside,
                 _ => Sign::Surface,
             };
-            any_inside |= sign == Sign::Inside;
             if sign == Sign::Inside && lattice.is_on_rim(id) {
                 let point = lattice.regular_position(id).to_array();
                 return Err(TetrahedralizeError::BoundsTooTight { point });
             }
             lattice.signs.push(sign);
         }
-        if !any_inside {
-            return Err(miss(shape, spacing));
-        }
         lattice.find_cuts()?;
         Ok(lattice)
     }
 
     /// An empty lattice around the shape, centred on its bounds, with one cube to spare.
-    fn around(shape: &'a dyn SignedDistance, spacing: f64) -> Result<Self, TetrahedralizeError> {
+    pub fn around(
+        shape: &'a dyn SignedDistance,
+        spacing: f64,
+    ) -> Result<Self, TetrahedralizeError> {
         if !(spacing > 0.0 && spacing.is_finite()) {
             return Err(TetrahedralizeError::Spacing { spacing });
         }
@@ -332,26 +332,6 @@ impl<'a> Lattice<'a> {
             }
         }
     }
-}
-
-/// The error of a lattice that has no vertex inside, with a spacing that was tried and has one.
-fn miss(shape: &dyn SignedDistance, spacing: f64) -> TetrahedralizeError {
-    let (lower, upper) = shape.bounds();
-    let size = (upper - lower).to_array();
-    let mut suggestion = spacing;
-    // Ten halvings or a million vertices, whichever comes first.
-    for _ in 0..10 {
-        suggestion *= 0.5;
-        let Ok(lattice) = Lattice::around(shape, suggestion) else { break };
-        let count = lattice.vertex_count();
-        if count > 1_000_000 {
-            break;
-        }
-        if (0..count as u32).any(|id| shape.distance(lattice.regular_position(id)) < 0.0) {
-            return TetrahedralizeError::TooCoarse { spacing, size, suggestion };
-        }
-    }
-    TetrahedralizeError::Empty
 }
 
 #[cfg(test)]

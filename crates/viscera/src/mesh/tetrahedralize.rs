@@ -83,7 +83,7 @@ pub enum TetrahedralizeError {
         /// A spacing that fits `[m]`.
         suggestion: f64,
     },
-    /// No lattice vertex fell inside.
+    /// No lattice vertex fell inside, or the few that did moved onto the surface.
     #[error(
         "a spacing of {spacing} m misses the shape, whose box is {:.3e} x {:.3e} x {:.3e} m; use at most {suggestion:.3e} m",
         size[0], size[1], size[2]
@@ -125,7 +125,7 @@ pub fn tetrahedralize(
     shape: &dyn SignedDistance,
     spacing: f64,
 ) -> Result<(TetMesh, TetrahedralizeReport), TetrahedralizeError> {
-    let filling = Filling::new(shape, spacing, Extent::Whole)?;
+    let filling = Filling::of_something(shape, spacing, Extent::Whole)?;
     let mut report = TetrahedralizeReport {
         lattice_vertices: filling.lattice_vertices,
         warped_vertices: filling.warped_vertices,
@@ -144,7 +144,7 @@ pub fn surface(
     shape: &dyn SignedDistance,
     spacing: f64,
 ) -> Result<SurfaceMesh, TetrahedralizeError> {
-    Ok(Filling::new(shape, spacing, Extent::Skin)?.surface())
+    Ok(Filling::of_something(shape, spacing, Extent::Skin)?.surface())
 }
 
 /// How much of a shape is filled.
@@ -170,7 +170,37 @@ struct Filling {
 
 const NO_VERTEX: u32 = u32::MAX;
 
+/// Where the search for a spacing that finds the shape gives up: halvings of the given spacing.
+const SEARCH_HALVINGS: usize = 10;
+/// And the size of lattice `[vertices]` that it tries, a fraction of a second each.
+const SEARCH_LATTICE_VERTICES: usize = 1_000_000;
+
 impl Filling {
+    /// A filling that is not empty. The error of an empty one names a spacing that was tried.
+    fn of_something(
+        shape: &dyn SignedDistance,
+        spacing: f64,
+        extent: Extent,
+    ) -> Result<Self, TetrahedralizeError> {
+        let filling = Self::new(shape, spacing, extent)?;
+        if !filling.tets.is_empty() {
+            return Ok(filling);
+        }
+        let (lower, upper) = shape.bounds();
+        let size = (upper - lower).to_array();
+        let mut suggestion = spacing;
+        for _ in 0..SEARCH_HALVINGS {
+            suggestion *= 0.5;
+            if Lattice::around(shape, suggestion)?.vertex_count() > SEARCH_LATTICE_VERTICES {
+                break;
+            }
+            if !Self::new(shape, suggestion, extent)?.tets.is_empty() {
+                return Err(TetrahedralizeError::TooCoarse { spacing, size, suggestion });
+            }
+        }
+        Err(TetrahedralizeError::Empty)
+    }
+
     fn new(
         shape: &dyn SignedDistance,
         spacing: f64,
