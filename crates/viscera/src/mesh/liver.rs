@@ -3,7 +3,9 @@
 //! Axes: +x towards the patient's left, +z up (towards the head), +y towards the back; a viewer in
 //! front of the patient looks along +y and sees the right lobe on the left of the picture. The
 //! origin lies where the lobes meet. Nothing here is measured from a person: proportions follow
-//! anatomy textbooks (a wedge about 20 cm wide and 15 cm tall, 1.2 to 1.5 litres).
+//! anatomy textbooks. It is 22 cm wide, 16 cm tall, 12 cm deep, and holds 1.45 litres.
+//!
+//! Four ellipsoids run together by smooth unions; hollows and grooves are smoothly subtracted.
 
 use super::distance::{Capsule, Ellipsoid, Placed, SignedDistance, rotation_about, smooth_minimum};
 use crate::scalar::{Vec3, vec3};

@@ -136,7 +136,7 @@ pub fn liver(spacing: f64, scale: f64) -> Result<CurvedShape, ShapeError> {
 
 /// Lattice spacing `[m]` that fills the life-size liver with about three thousand tetrahedra: enough
 /// to bend both lobes, few enough for a real-time step on one core.
-pub const LIVER_SPACING: f64 = 0.0185;
+pub const LIVER_SPACING: f64 = 0.0186;
 
 fn fill(shape: &dyn SignedDistance, spacing: f64) -> Result<CurvedShape, ShapeError> {
     let (tets, report) = tetrahedralize(shape, spacing)?;
