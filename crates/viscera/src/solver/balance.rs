@@ -101,8 +101,7 @@ impl ForceBalance {
             }
         }
         let attachments = &model.attachments;
-        let anchors =
-            if inputs.anchors.is_empty() { &model.rest_anchors } else { &inputs.anchors };
+        let anchors = inputs.anchors_of(model);
         for (i, &v) in attachments.vertices.iter().enumerate() {
             let x = state.positions[v as usize].cast::<f64>();
             let anchor = anchors[attachments.order[i] as usize].cast();

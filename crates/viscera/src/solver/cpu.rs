@@ -41,7 +41,7 @@ pub(super) struct Workspace<S> {
     pub start_strain: [Vec<green_strain::Voigt<S>>; 2],
     /// Iterate before the sweep, and the one before that.
     iterate: [Iterate<S>; 2],
-    /// `a~` of each multiplier (its diagonal) [1/(J s^2)...]: the norm of an acceleration.
+    /// Diagonal of `a~` of each multiplier: weights of the norm in which iterates are compared.
     multiplier_weights: Vec<S>,
     chebyshev: Chebyshev,
     anderson: Anderson<S>,
@@ -299,6 +299,9 @@ impl<S: Real> Workspace<S> {
         let measured = settings.chebyshev_radius == 0.0;
         let omega = self.chebyshev.weight(change, settings.chebyshev_delay, measured);
         let gamma = S::from_f64(settings.chebyshev_damping);
+        if omega == 1.0 && settings.chebyshev_damping == 1.0 {
+            return;
+        }
         let omega = S::from_f64(omega);
         let [now, older] = &self.iterate;
         for v in 0..state.positions.len() {
@@ -472,8 +475,7 @@ impl<S: Real> Sweep<'_, S> {
 
     fn solve_attachments(&mut self, model: &Model<S>, inputs: &Inputs<S>, color: usize) {
         let set = &model.attachments;
-        let anchors =
-            if inputs.anchors.is_empty() { &model.rest_anchors } else { &inputs.anchors };
+        let anchors = inputs.anchors_of(model);
         for i in set.color_offsets[color] as usize..set.color_offsets[color + 1] as usize {
             let copy = set.copies[i];
             let x = self.points[copy as usize];

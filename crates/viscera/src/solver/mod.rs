@@ -47,6 +47,13 @@ impl<S: Real> Default for Inputs<S> {
     }
 }
 
+impl<S: Real> Inputs<S> {
+    /// Where the anchors of a model's attachments are, the user's order.
+    pub fn anchors_of<'a>(&'a self, model: &'a Model<S>) -> &'a [Vec3<S>] {
+        if self.anchors.is_empty() { &model.rest_anchors } else { &self.anchors }
+    }
+}
+
 /// Why a step cannot be made. The state is unchanged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]

@@ -1,0 +1,280 @@
+//! What a state means: strains, stresses, energies. In double precision, in the user's order.
+//!
+//! ```text
+//! J = det F                                       relative volume
+//! s_1 >= s_2 >= s_3, s_i^2 eigenvalues of F^T F   principal stretches; s_3 < 0 where J < 0
+//! sigma = P F^T / J                               Cauchy stress
+//! von Mises = sqrt(3/2 dev(sigma) : dev(sigma))
+//! ```
+
+use crate::elements::{attachment, deformation_gradient, green_strain, neo_hookean, spring};
+use crate::material::MaterialModel;
+use crate::model::{Model, TetSet};
+use crate::scalar::{Mat3, Real, Vec3};
+use crate::solver::Inputs;
+use crate::state::State;
+
+/// What is known of one tetrahedron.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TetMeasure {
+    /// Rest volume [m^3].
+    pub rest_volume: f64,
+    /// Relative volume `J`; zero or less where inverted.
+    pub volume_ratio: f64,
+    /// Principal stretches, largest first.
+    pub stretches: [f64; 3],
+    /// Von Mises stress [Pa] of the Cauchy stress.
+    pub von_mises: f64,
+    /// Elastic energy density [Pa] of the rest volume.
+    pub energy_density: f64,
+}
+
+/// Sums over a model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Energies {
+    /// Elastic energy [J] of tetrahedra, springs and attachments.
+    pub elastic: f64,
+    /// Kinetic energy [J].
+    pub kinetic: f64,
+    /// Potential energy [J] in gravity, zero at rest.
+    pub gravitational: f64,
+}
+
+impl Energies {
+    /// Their sum [J].
+    pub fn total(&self) -> f64 {
+        self.elastic + self.kinetic + self.gravitational
+    }
+}
+
+/// Stress of a collapsed tetrahedron is divided by at least this relative volume, so that it
+/// stays a number.
+const SMALLEST_VOLUME_RATIO: f64 = 1e-6;
+
+/// Measures every tetrahedron; `measures` gets the user's order, shape [tet_count].
+pub fn measure_tets<S: Real>(
+    model: &Model<S>,
+    positions: &[Vec3<S>],
+    measures: &mut Vec<TetMeasure>,
+) {
+    measures.clear();
+    measures.resize(model.tet_count(), TetMeasure::default());
+    for set in model.tet_sets() {
+        for tet in 0..set.len() {
+            measures[set.order[tet] as usize] = measure_tet(model, set, positions, tet);
+        }
+    }
+}
+
+fn measure_tet<S: Real>(
+    model: &Model<S>,
+    set: &TetSet<S>,
+    positions: &[Vec3<S>],
+    tet: usize,
+) -> TetMeasure {
+    let x = set.vertices[tet].map(|v| positions[v as usize].cast::<f64>());
+    let f = deformation_gradient(&x, &set.inverse_rest_shape[tet].cast());
+    let material = &model.materials[set.material[tet] as usize];
+    let (lambda, mu) = (material.lame_lambda.to_f64(), material.lame_mu.to_f64());
+    let (energy_density, piola) = match set.model {
+        MaterialModel::SaintVenantKirchhoff => {
+            let strain = green_strain::strain(&f);
+            let energy = green_strain::energy_density(&strain, lambda, mu);
+            (energy, green_strain::piola(&f, &strain, lambda, mu))
+        }
+        MaterialModel::StableNeoHookean => (
+            neo_hookean::energy_density(&f, lambda, mu),
+            neo_hookean::piola(&f, lambda, mu),
+        ),
+    };
+    let volume_ratio = f.determinant();
+    let divisor = volume_ratio.abs().max(SMALLEST_VOLUME_RATIO).copysign(volume_ratio);
+    let cauchy = piola * f.transpose() * (1.0 / divisor);
+    TetMeasure {
+        rest_volume: set.rest_volume[tet].to_f64(),
+        volume_ratio,
+        stretches: principal_stretches(&f),
+        von_mises: von_mises(&cauchy),
+        energy_density,
+    }
+}
+
+/// Principal stretches, largest first; the smallest is negative for an inverted `f`.
+pub fn principal_stretches(f: &Mat3<f64>) -> [f64; 3] {
+    let squared = symmetric_eigenvalues(f.transpose() * *f);
+    let mut stretches = squared.map(|value| value.max(0.0).sqrt());
+    if f.determinant() < 0.0 {
+        stretches[2] = -stretches[2];
+    }
+    stretches
+}
+
+/// Eigenvalues of a symmetric matrix, largest first, by cyclic Jacobi rotations: slower than a
+/// closed form, but accurate for equal eigenvalues too.
+fn symmetric_eigenvalues(matrix: Mat3<f64>) -> [f64; 3] {
+    let mut a = matrix.columns.map(|column| column.to_array());
+    // Quadratic convergence: four sweeps reach round-off, the rest is for odd inputs.
+    for _ in 0..8 {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            if a[p][q].abs() <= f64::EPSILON * (a[p][p] * a[q][q]).abs().sqrt() {
+                continue;
+            }
+            let theta = 0.5 * (a[q][q] - a[p][p]) / a[p][q];
+            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+            let c = 1.0 / (t * t + 1.0).sqrt();
+            let s = t * c;
+            for k in 0..3 {
+                let (x, y) = (a[k][p], a[k][q]);
+                (a[k][p], a[k][q]) = (c * x - s * y, s * x + c * y);
+            }
+            for k in 0..3 {
+                let (x, y) = (a[p][k], a[q][k]);
+                (a[p][k], a[q][k]) = (c * x - s * y, s * x + c * y);
+            }
+        }
+    }
+    let mut values = [a[0][0], a[1][1], a[2][2]];
+    values.sort_by(|x, y| y.total_cmp(x));
+    values
+}
+
+fn von_mises(cauchy: &Mat3<f64>) -> f64 {
+    let pressure = cauchy.trace() / 3.0;
+    let deviator = *cauchy - Mat3::IDENTITY * pressure;
+    (1.5 * deviator.norm_squared()).sqrt()
+}
+
+/// Energies of a state.
+pub fn measure_energies<S: Real>(
+    model: &Model<S>,
+    state: &State<S>,
+    inputs: &Inputs<S>,
+    tets: &[TetMeasure],
+) -> Energies {
+    let mut energies = Energies::default();
+    for tet in tets {
+        energies.elastic += tet.rest_volume * tet.energy_density;
+    }
+    let springs = &model.springs;
+    for (i, ends) in springs.vertices.iter().enumerate() {
+        let x = ends.map(|v| state.positions[v as usize].cast::<f64>());
+        let (length, stiffness) = (springs.rest_length[i], springs.stiffness[i]);
+        energies.elastic += spring::energy(&x, length.to_f64(), stiffness.to_f64());
+    }
+    let attachments = &model.attachments;
+    let anchors = inputs.anchors_of(model);
+    for (i, &v) in attachments.vertices.iter().enumerate() {
+        let x = state.positions[v as usize].cast::<f64>();
+        let anchor = anchors[attachments.order[i] as usize].cast();
+        energies.elastic += attachment::energy(x, anchor, attachments.stiffness[i].to_f64());
+    }
+    let gravity = inputs.gravity.cast::<f64>();
+    for v in 0..model.vertex_count() {
+        let mass = model.masses[v].to_f64();
+        let velocity = state.velocities[v].cast::<f64>();
+        let moved = state.positions[v].cast::<f64>() - model.rest_positions[v].cast();
+        energies.kinetic += 0.5 * mass * velocity.length_squared();
+        energies.gravitational -= mass * gravity.dot(moved);
+    }
+    energies
+}
+
+/// Extremes and sums over tetrahedra.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct DeformationSummary {
+    /// Present volume over rest volume.
+    pub volume_ratio: f64,
+    /// Largest principal stretch.
+    pub largest_stretch: f64,
+    /// Smallest principal stretch; negative where a tetrahedron is inverted.
+    pub smallest_stretch: f64,
+    /// Number of tetrahedra with `J <= 0`.
+    pub inverted: usize,
+}
+
+/// Summarises measures of tetrahedra.
+pub fn summarize_deformation(tets: &[TetMeasure]) -> DeformationSummary {
+    let (mut rest, mut now) = (0.0, 0.0);
+    let mut summary = DeformationSummary {
+        volume_ratio: 1.0,
+        largest_stretch: 0.0,
+        smallest_stretch: f64::INFINITY,
+        inverted: 0,
+    };
+    for tet in tets {
+        rest += tet.rest_volume;
+        now += tet.rest_volume * tet.volume_ratio;
+        summary.largest_stretch = summary.largest_stretch.max(tet.stretches[0]);
+        summary.smallest_stretch = summary.smallest_stretch.min(tet.stretches[2]);
+        // Written so that a volume that is no number counts as inverted.
+        summary.inverted += usize::from(!matches!(
+            tet.volume_ratio.partial_cmp(&0.0),
+            Some(std::cmp::Ordering::Greater)
+        ));
+    }
+    if rest > 0.0 {
+        summary.volume_ratio = now / rest;
+    }
+    summary
+}
+
+/// Displacements from rest [m] and their largest length.
+pub fn measure_displacements<S: Real>(
+    model: &Model<S>,
+    positions: &[Vec3<S>],
+    displacements: &mut Vec<Vec3<f64>>,
+) -> f64 {
+    displacements.clear();
+    let pairs = positions.iter().zip(&model.rest_positions);
+    displacements.extend(pairs.map(|(x, rest)| x.cast::<f64>() - rest.cast()));
+    displacements.iter().fold(0.0, |largest: f64, u| largest.max(u.length()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scalar::vec3;
+
+    #[test]
+    fn stretches_of_a_rotated_stretch_are_the_stretch() {
+        let rotation = |a: f64, b: f64| {
+            let about_z = Mat3::from_columns(
+                vec3(a.cos(), a.sin(), 0.0),
+                vec3(-a.sin(), a.cos(), 0.0),
+                vec3(0.0, 0.0, 1.0),
+            );
+            let about_x = Mat3::from_columns(
+                vec3(1.0, 0.0, 0.0),
+                vec3(0.0, b.cos(), b.sin()),
+                vec3(0.0, -b.sin(), b.cos()),
+            );
+            about_z * about_x
+        };
+        for wanted in [[2.0, 1.0, 0.5], [1.5, 1.5, 0.2], [1.0, 1.0, 1.0], [3.0, 1.0, -0.4]] {
+            let stretch = Mat3::from_columns(
+                vec3(wanted[1], 0.0, 0.0),
+                vec3(0.0, wanted[2], 0.0),
+                vec3(0.0, 0.0, wanted[0]),
+            );
+            let f = rotation(0.3, 1.1) * stretch * rotation(-0.7, 0.4);
+            let found = principal_stretches(&f);
+            for i in 0..3 {
+                // The square root of the smallest eigenvalue loses digits against the largest.
+                let scale = wanted[0] * wanted[0] / wanted[i].abs();
+                let tolerance = 16.0 * f64::EPSILON * scale;
+                assert!((found[i] - wanted[i]).abs() < tolerance, "{found:?} {wanted:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn von_mises_of_uniaxial_stress_is_that_stress() {
+        let cauchy = Mat3::from_columns(
+            vec3(250.0, 0.0, 0.0),
+            vec3(0.0, 0.0, 0.0),
+            vec3(0.0, 0.0, 0.0),
+        );
+        assert!((von_mises(&cauchy) - 250.0).abs() < 1e-12);
+        assert!(von_mises(&(Mat3::IDENTITY * 40.0)) < 1e-12);
+    }
+}

@@ -1,0 +1,354 @@
+//! From a scene and its files to meshes in the world, vertex patches and a model builder.
+
+use crate::mesh::embed::{Embedding, EmbeddingError};
+use crate::mesh::io::{self, ReadError, ReadReport};
+use crate::mesh::shapes::{self, ShapeError};
+use crate::mesh::topology::{boundary_surface, connected_components};
+use crate::mesh::{MeshError, SurfaceMesh, TetMesh};
+use crate::model::{ModelBuilder, ModelError};
+use crate::scalar::Vec3;
+use crate::scene::{Body, BodyShape, Scene, SceneError, nearest_pair};
+
+/// Why a scene cannot be put together.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AssembleError {
+    /// A file could not be loaded; the caller's words.
+    #[error("{message}")]
+    Load {
+        /// What the caller said.
+        message: String,
+    },
+    /// A mesh file is damaged or of another kind.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A shape cannot be made.
+    #[error("body `{body}`: {error}")]
+    Shape {
+        /// The body.
+        body: String,
+        /// Why not.
+        error: ShapeError,
+    },
+    /// A placement that takes a mesh out of the world.
+    #[error("body `{body}` where the scene puts it: {error}")]
+    Placement {
+        /// The body.
+        body: String,
+        /// Why not.
+        error: MeshError,
+    },
+    /// A surface that cannot be bound to its tetrahedra.
+    #[error("body `{body}`: {error}")]
+    Embedding {
+        /// The body.
+        body: String,
+        /// Why not.
+        error: EmbeddingError,
+    },
+    /// A material for a region that the mesh does not have.
+    #[error("body `{body}` has no region {label}; its regions are {known}")]
+    UnknownRegion {
+        /// The body.
+        body: String,
+        /// The label given.
+        label: u32,
+        /// The labels there are.
+        known: String,
+    },
+    /// A patch selects nothing.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A spring between two patches without two different points.
+    #[error("{spring} finds no two vertices apart from each other; choose other patches")]
+    Spring {
+        /// The spring.
+        spring: String,
+    },
+    /// The model cannot be built.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}
+
+/// One body in the world.
+#[derive(Clone, Debug)]
+pub struct AssembledBody {
+    /// The name.
+    pub name: String,
+    /// Its tetrahedra at rest, world coordinates.
+    pub mesh: TetMesh,
+    /// The surface to show, at rest.
+    pub surface: SurfaceMesh,
+    /// Binds the surface to the tetrahedra.
+    pub embedding: Embedding,
+    /// True where the surface is finer than the tetrahedra's boundary.
+    pub has_fine_surface: bool,
+    /// Its vertices among those of all bodies.
+    pub vertices: std::ops::Range<usize>,
+    /// Its tetrahedra among those of all bodies.
+    pub tets: std::ops::Range<usize>,
+}
+
+/// The vertices that a fixing, motion or force concerns, numbered over all bodies.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ResolvedPatch {
+    /// The vertices, ascending.
+    pub vertices: Vec<u32>,
+    /// Numbers of the attachments, for an elastic fixing.
+    pub attachments: Vec<usize>,
+}
+
+/// A scene with its meshes.
+#[derive(Clone, Debug)]
+pub struct Assembly {
+    /// The bodies, in the scene's order.
+    pub bodies: Vec<AssembledBody>,
+    /// The model to build.
+    pub builder: ModelBuilder,
+    /// Patches of the scene's fixings.
+    pub fixings: Vec<ResolvedPatch>,
+    /// Patches of the scene's motions.
+    pub motions: Vec<ResolvedPatch>,
+    /// Patches of the scene's forces.
+    pub forces: Vec<ResolvedPatch>,
+    /// What was repaired, and what a person should know before waiting for the result.
+    pub notes: Vec<String>,
+}
+
+impl Assembly {
+    /// Reads or makes the meshes of a scene and finds its patches. `load` gets the name of a file
+    /// as the scene has it and returns its bytes, or a message that says what went wrong.
+    pub fn new(
+        scene: &Scene,
+        load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+    ) -> Result<Self, AssembleError> {
+        let mut assembly = Self {
+            bodies: Vec::new(),
+            builder: ModelBuilder::new(),
+            fixings: Vec::new(),
+            motions: Vec::new(),
+            forces: Vec::new(),
+            notes: Vec::new(),
+        };
+        for body in &scene.bodies {
+            assembly.add_body(body, load)?;
+        }
+        for fixing in &scene.fixings {
+            let mut patch = assembly.resolve(&fixing.patch)?;
+            if let Some(stiffness) = fixing.stiffness {
+                let share = stiffness / patch.vertices.len() as f64;
+                for &v in &patch.vertices {
+                    let anchor = assembly.builder.positions()[v as usize];
+                    patch.attachments.push(assembly.builder.add_attachment(v, anchor, share)?);
+                }
+            }
+            assembly.fixings.push(patch);
+        }
+        for motion in &scene.motions {
+            let patch = assembly.resolve(&motion.patch)?;
+            assembly.motions.push(patch);
+        }
+        for force in &scene.forces {
+            let patch = assembly.resolve(&force.patch)?;
+            assembly.forces.push(patch);
+        }
+        for spring in &scene.springs {
+            let from = assembly.resolve(&spring.from)?.vertices;
+            let to = assembly.resolve(&spring.to)?.vertices;
+            let points = |patch: &[u32]| -> Vec<Vec3<f64>> {
+                patch.iter().map(|&v| assembly.builder.positions()[v as usize]).collect()
+            };
+            let Some((a, b)) = nearest_pair(&points(&from), &points(&to)) else {
+                return Err(AssembleError::Spring { spring: spring.name.clone() });
+            };
+            let ends = [from[a], to[b]];
+            assembly.builder.add_spring(ends, spring.stiffness, spring.rest_length)?;
+        }
+        assembly.note_overlaps(scene);
+        assembly.note_loose_parts(scene);
+        Ok(assembly)
+    }
+
+    fn add_body(
+        &mut self,
+        body: &Body,
+        load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+    ) -> Result<(), AssembleError> {
+        let (mesh, surface, report) = make_mesh(body, load)?;
+        let place = |points: &[Vec3<f64>]| -> Vec<Vec3<f64>> {
+            points.iter().map(|x| body.placement.apply(*x)).collect()
+        };
+        let placed =
+            TetMesh::new(place(mesh.vertices()), mesh.tets().to_vec(), mesh.regions().to_vec());
+        let (mesh, _) = placed.map_err(|error| AssembleError::Placement {
+            body: body.name.clone(),
+            error,
+        })?;
+        self.note_report(&body.name, &report);
+        let has_fine_surface = surface.is_some();
+        let surface = match surface {
+            Some(surface) => SurfaceMesh { vertices: place(&surface.vertices), ..surface },
+            None => boundary_surface(&mesh).surface,
+        };
+        let embedding = Embedding::new(&mesh, &surface).map_err(|error| {
+            AssembleError::Embedding { body: body.name.clone(), error }
+        })?;
+        let typical = (mesh.volume() / mesh.tets().len() as f64).cbrt();
+        if has_fine_surface && embedding.max_distance() > 3.0 * typical {
+            self.notes.push(format!(
+                "body `{}`: the surface lies up to {:.1} mm outside the tetrahedra; do mesh and \
+                 surface belong together?",
+                body.name,
+                1e3 * embedding.max_distance()
+            ));
+        }
+
+        let index = self.builder.add_body(&mesh, &body.material)?;
+        for region in &body.regions {
+            let count = self.builder.set_region_material(index, region.label, &region.material)?;
+            if count == 0 {
+                let mut known: Vec<u32> = mesh.regions().to_vec();
+                known.sort_unstable();
+                known.dedup();
+                let known: Vec<String> = known.iter().take(12).map(u32::to_string).collect();
+                return Err(AssembleError::UnknownRegion {
+                    body: body.name.clone(),
+                    label: region.label,
+                    known: known.join(", "),
+                });
+            }
+        }
+        let ranges = self.builder.body(index)?.clone();
+        self.bodies.push(AssembledBody {
+            name: body.name.clone(),
+            mesh,
+            surface,
+            embedding,
+            has_fine_surface,
+            vertices: ranges.vertices,
+            tets: ranges.tets,
+        });
+        Ok(())
+    }
+
+    fn resolve(&self, patch: &crate::scene::Patch) -> Result<ResolvedPatch, AssembleError> {
+        let body = &self.bodies[patch.body];
+        let mesh = &body.mesh;
+        let local = patch.select(mesh.vertices(), mesh.tets(), mesh.regions())?;
+        let first = body.vertices.start as u32;
+        let vertices = local.into_iter().map(|v| v + first).collect();
+        Ok(ResolvedPatch { vertices, attachments: Vec::new() })
+    }
+
+    fn note_report(&mut self, name: &str, report: &ReadReport) {
+        let repairs = &report.repairs;
+        if repairs.rewound_tets > 0 {
+            self.notes.push(format!(
+                "body `{name}`: reversed the winding of {} tetrahedra",
+                repairs.rewound_tets
+            ));
+        }
+        if !repairs.removed_vertices.is_empty() {
+            self.notes.push(format!(
+                "body `{name}`: left out {} vertices that no tetrahedron uses",
+                repairs.removed_vertices.len()
+            ));
+        }
+        for skipped in &report.skipped {
+            self.notes.push(format!(
+                "body `{name}`: left out {} elements of kind {}",
+                skipped.count, skipped.kind
+            ));
+        }
+    }
+
+    /// A vertex that is both fixed and moved follows the motion, the later of two motions wins,
+    /// and each patch counts its force: worth saying.
+    fn note_overlaps(&mut self, scene: &Scene) {
+        let rigid = scene.fixings.iter().zip(&self.fixings).filter(|(f, _)| f.stiffness.is_none());
+        let mut patches: Vec<(&str, &[u32])> =
+            rigid.map(|(fixing, patch)| (fixing.name.as_str(), &patch.vertices[..])).collect();
+        let motions = scene.motions.iter().zip(&self.motions);
+        patches.extend(motions.map(|(motion, p)| (motion.name.as_str(), &p.vertices[..])));
+        let mut notes = Vec::new();
+        for (later, (name, vertices)) in patches.iter().enumerate() {
+            for (other, others) in &patches[..later] {
+                let shared =
+                    vertices.iter().filter(|&v| others.binary_search(v).is_ok()).count();
+                if shared > 0 {
+                    notes.push(format!(
+                        "{shared} vertices belong to both `{other}` and `{name}`; they follow \
+                         `{name}`"
+                    ));
+                }
+            }
+        }
+        self.notes.append(&mut notes);
+    }
+
+    /// Parts of a mesh that nothing ties to the rest, and parts that nothing holds up.
+    fn note_loose_parts(&mut self, scene: &Scene) {
+        let held: Vec<u32> = (self.fixings.iter().chain(&self.motions))
+            .flat_map(|patch| patch.vertices.iter().copied())
+            .collect();
+        let mut is_held = vec![false; self.builder.positions().len()];
+        held.iter().for_each(|&v| is_held[v as usize] = true);
+        let falls = scene.world.gravity.length() > 0.0 && scene.springs.is_empty();
+        for body in &self.bodies {
+            let parts = connected_components(&body.mesh);
+            let mut part_held = vec![false; parts.count];
+            for (v, &part) in parts.labels.iter().enumerate() {
+                part_held[part as usize] |= is_held[body.vertices.start + v];
+            }
+            let loose = part_held.iter().filter(|&&held| !held).count();
+            if parts.count > 1 {
+                self.notes.push(format!(
+                    "body `{}` is in {} parts that share no vertex; they do not hold together",
+                    body.name, parts.count
+                ));
+            }
+            if falls && loose > 0 {
+                let what = if parts.count == 1 { "it".into() } else { format!("{loose} of them") };
+                self.notes.push(format!(
+                    "body `{}`: no fixing or motion holds {what}, so gravity pulls {what} down",
+                    body.name
+                ));
+            }
+        }
+    }
+}
+
+/// A body's tetrahedra, its fine surface where it has one, and what reading said; before placing.
+fn make_mesh(
+    body: &Body,
+    load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+) -> Result<(TetMesh, Option<SurfaceMesh>, ReadReport), AssembleError> {
+    let built = |mesh| (mesh, None, ReadReport::default());
+    let curved = |shape: shapes::CurvedShape| {
+        (shape.tets, Some(shape.surface), ReadReport::default())
+    };
+    let made = match &body.shape {
+        BodyShape::File { mesh, unit, surface } => {
+            let mut bytes =
+                |file: &str| load(file).map_err(|message| AssembleError::Load { message });
+            let (tets, report) = io::read_tet_mesh(mesh, &bytes(mesh)?, *unit)?;
+            let surface = match surface {
+                Some(file) => Some(io::read_surface(file, &bytes(file)?, *unit)?.0),
+                None => None,
+            };
+            return Ok((tets, surface, report));
+        }
+        &BodyShape::Beam { length, width, height, cells_across } => {
+            shapes::beam(length, width, height, cells_across as usize).map(built)
+        }
+        BodyShape::Block { size, cells } => {
+            shapes::block(Vec3::from_f64(*size), cells.map(|c| c as usize)).map(built)
+        }
+        &BodyShape::Sphere { radius, spacing } => shapes::sphere(radius, spacing).map(curved),
+        &BodyShape::Capsule { radius, length, spacing } => {
+            shapes::capsule(radius, length, spacing).map(curved)
+        }
+        &BodyShape::Liver { spacing, scale } => shapes::liver(spacing, scale).map(curved),
+    };
+    made.map_err(|error| AssembleError::Shape { body: body.name.clone(), error })
+}
