@@ -27,8 +27,9 @@ mod stencil_tests;
 
 /// Smallest and largest dihedral angle `[degrees]` of any mesh that [`tetrahedralize`] makes.
 ///
-/// The angles depend only on signs, cut points and warps near one lattice tetrahedron: a bounded
-/// set, searched as in the paper. A test enumerates it.
+/// The angles depend only on the signs, cut points and warps of one lattice tetrahedron, a bounded
+/// set: the paper proves 10.7 and 164.8 for its choice of thresholds, a test here enumerates the set
+/// for the two below.
 pub const DIHEDRAL_BOUNDS_DEG: (f64, f64) = (10.78, 164.71);
 
 /// Warping threshold of long edges, as a fraction of the length. With [`ALPHA_SHORT`], the pair of
