@@ -75,28 +75,28 @@ impl Embedding {
         Ok(embedding)
     }
 
-    /// The tetrahedron each surface vertex follows, shape [surface_vertex_count].
+    /// The tetrahedron each surface vertex follows, shape `[surface_vertex_count]`.
     pub fn tets(&self) -> &[u32] {
         &self.tets
     }
 
-    /// That tetrahedron's vertices, shape [surface_vertex_count].
+    /// That tetrahedron's vertices, shape `[surface_vertex_count]`.
     pub fn corners(&self) -> &[[u32; 4]] {
         &self.corners
     }
 
-    /// Weights of those vertices, summing to 1, shape [surface_vertex_count].
+    /// Weights of those vertices, summing to 1, shape `[surface_vertex_count]`.
     pub fn weights(&self) -> &[[f64; 4]] {
         &self.weights
     }
 
-    /// How far outside its tetrahedron each surface vertex lies [m], zero inside, shape
-    /// [surface_vertex_count].
+    /// How far outside its tetrahedron each surface vertex lies `[m]`, zero inside, shape
+    /// `[surface_vertex_count]`.
     pub fn distances(&self) -> &[f64] {
         &self.distances
     }
 
-    /// The largest distance [m] of a surface vertex from the tetrahedra. Extrapolation is exact for
+    /// The largest distance `[m]` of a surface vertex from the tetrahedra. Extrapolation is exact for
     /// affine motions whatever the distance; beyond about the size of a tetrahedron it exaggerates
     /// bending and twisting, and the surface probably belongs to another mesh or unit.
     pub fn max_distance(&self) -> f64 {
@@ -108,8 +108,8 @@ impl Embedding {
         self.distances.iter().filter(|&&distance| distance > self.tolerance).count()
     }
 
-    /// Moves the surface: `tet_positions` [m], shape [tet_vertex_count], to `surface_positions` [m],
-    /// shape [surface_vertex_count]. Allocates nothing.
+    /// Moves the surface: `tet_positions` `[m]`, shape `[tet_vertex_count]`, to `surface_positions` `[m]`,
+    /// shape `[surface_vertex_count]`. Allocates nothing.
     pub fn apply<S: Real>(
         &self,
         tet_positions: &[Vec3<S>],
@@ -139,7 +139,7 @@ fn check_length(what: &'static str, found: usize, expected: usize) -> Result<(),
 #[derive(Clone, Copy)]
 struct Found {
     tet: u32,
-    /// Distance [m] to the tetrahedron, zero inside.
+    /// Distance `[m]` to the tetrahedron, zero inside.
     distance: f64,
     weights: [f64; 4],
 }
@@ -166,7 +166,7 @@ struct TetTree<'a> {
     mesh: &'a TetMesh,
     order: Vec<u32>,
     branches: Vec<Branch>,
-    /// Distances [m] closer than this are equal: round-off on the scale of the mesh.
+    /// Distances `[m]` closer than this are equal: round-off on the scale of the mesh.
     tolerance: f64,
 }
 
@@ -280,7 +280,7 @@ impl<'a> TetTree<'a> {
 }
 
 impl Branch {
-    /// Distance [m] from a point to the box, zero inside.
+    /// Distance `[m]` from a point to the box, zero inside.
     fn distance(&self, point: Vec3<f64>) -> f64 {
         (self.lower - point).max(point - self.upper).max(Vec3::ZERO).length()
     }

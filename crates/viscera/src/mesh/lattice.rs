@@ -50,45 +50,45 @@ pub(super) struct Lattice<'a> {
     origin: Vec3<f64>,
     /// Cubes along each axis.
     cubes: [usize; 3],
-    /// Shape [vertex_count].
+    /// Shape `[vertex_count]`.
     signs: Vec<Sign>,
     /// Ordered by (inside, outside).
     cuts: Vec<Cut>,
-    /// Warped vertices and their positions [m], ordered by id.
+    /// Warped vertices and their positions `[m]`, ordered by id.
     warped: Vec<(u32, Vec3<f64>)>,
 }
 
 impl<'a> Lattice<'a> {
     /// Steps 1 and 2: evaluates the function and finds the cut points.
+    ///
+    /// There may be no vertex inside, where the shape is small.
     pub fn sample(
         shape: &'a dyn SignedDistance,
         spacing: f64,
     ) -> Result<Self, TetrahedralizeError> {
         let mut lattice = Self::around(shape, spacing)?;
         lattice.signs = Vec::with_capacity(lattice.vertex_count());
-        let mut any_inside = false;
         for id in 0..lattice.vertex_count() as u32 {
             let sign = match lattice.evaluate(lattice.regular_position(id))? {
                 value if value < 0.0 => Sign::Inside,
                 value if value > 0.0 => Sign::Outside,
                 _ => Sign::Surface,
             };
-            any_inside |= sign == Sign::Inside;
             if sign == Sign::Inside && lattice.is_on_rim(id) {
                 let point = lattice.regular_position(id).to_array();
                 return Err(TetrahedralizeError::BoundsTooTight { point });
             }
             lattice.signs.push(sign);
         }
-        if !any_inside {
-            return Err(miss(shape, spacing));
-        }
         lattice.find_cuts()?;
         Ok(lattice)
     }
 
     /// An empty lattice around the shape, centred on its bounds, with one cube to spare.
-    fn around(shape: &'a dyn SignedDistance, spacing: f64) -> Result<Self, TetrahedralizeError> {
+    pub fn around(
+        shape: &'a dyn SignedDistance,
+        spacing: f64,
+    ) -> Result<Self, TetrahedralizeError> {
         if !(spacing > 0.0 && spacing.is_finite()) {
             return Err(TetrahedralizeError::Spacing { spacing });
         }
@@ -147,14 +147,14 @@ impl<'a> Lattice<'a> {
         (0..3).any(|axis| indices[axis] == 0 || indices[axis] + 1 == self.cubes[axis])
     }
 
-    /// Position [m] before warping.
+    /// Position `[m]` before warping.
     fn regular_position(&self, id: u32) -> Vec3<f64> {
         let (grid, [i, j, k]) = self.indices(id);
         let offset = 0.5 * grid as f64;
         self.origin + vec3(i as f64 + offset, j as f64 + offset, k as f64 + offset) * self.spacing
     }
 
-    /// Position [m] of a lattice vertex, warped if it is.
+    /// Position `[m]` of a lattice vertex, warped if it is.
     pub fn position(&self, id: u32) -> Vec3<f64> {
         match self.warped.binary_search_by_key(&id, |&(warped, _)| warped) {
             Ok(found) => self.warped[found].1,
@@ -242,7 +242,7 @@ impl<'a> Lattice<'a> {
         Ok(0.5 * (low + high))
     }
 
-    /// Position [m] of a cut point.
+    /// Position `[m]` of a cut point.
     pub fn cut_position(&self, cut: usize) -> Vec3<f64> {
         let Cut { inside, outside, fraction } = self.cuts[cut];
         let (start, end) = (self.regular_position(inside), self.regular_position(outside));
@@ -332,26 +332,6 @@ impl<'a> Lattice<'a> {
             }
         }
     }
-}
-
-/// The error of a lattice that has no vertex inside, with a spacing that was tried and has one.
-fn miss(shape: &dyn SignedDistance, spacing: f64) -> TetrahedralizeError {
-    let (lower, upper) = shape.bounds();
-    let size = (upper - lower).to_array();
-    let mut suggestion = spacing;
-    // Ten halvings or a million vertices, whichever comes first.
-    for _ in 0..10 {
-        suggestion *= 0.5;
-        let Ok(lattice) = Lattice::around(shape, suggestion) else { break };
-        let count = lattice.vertex_count();
-        if count > 1_000_000 {
-            break;
-        }
-        if (0..count as u32).any(|id| shape.distance(lattice.regular_position(id)) < 0.0) {
-            return TetrahedralizeError::TooCoarse { spacing, size, suggestion };
-        }
-    }
-    TetrahedralizeError::Empty
 }
 
 #[cfg(test)]

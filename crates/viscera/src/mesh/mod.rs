@@ -18,6 +18,7 @@ pub mod distance;
 pub mod embed;
 mod lattice;
 pub mod liver;
+pub mod normals;
 pub mod shapes;
 pub mod tetrahedralize;
 

@@ -18,16 +18,18 @@
 
 use super::distance::SignedDistance;
 use super::lattice::{Corner, Lattice, Sign};
+use super::topology::{TET_FACES, connected_components, count_open_edges};
 use super::{MeshError, SurfaceMesh, TetMesh};
 use crate::scalar::Vec3;
 
 #[cfg(test)]
 mod stencil_tests;
 
-/// Smallest and largest dihedral angle [degrees] of any mesh that [`tetrahedralize`] makes.
+/// Smallest and largest dihedral angle `[degrees]` of any mesh that [`tetrahedralize`] makes.
 ///
-/// The angles depend only on signs, cut points and warps near one lattice tetrahedron: a bounded
-/// set, searched as in the paper. A test enumerates it.
+/// The angles depend only on the signs, cut points and warps of one lattice tetrahedron, a bounded
+/// set: the paper proves 10.7 and 164.8 for its choice of thresholds, a test here enumerates the set
+/// for the two below.
 pub const DIHEDRAL_BOUNDS_DEG: (f64, f64) = (10.78, 164.71);
 
 /// Warping threshold of long edges, as a fraction of the length. With [`ALPHA_SHORT`], the pair of
@@ -39,7 +41,7 @@ pub(super) const ALPHA_LONG: f64 = 0.285;
 /// Warping threshold of short edges, see [`ALPHA_LONG`].
 pub(super) const ALPHA_SHORT: f64 = 0.399;
 
-/// Largest lattice [vertices]: about half a gigabyte of signs and indices.
+/// Largest lattice `[vertices]`: about half a gigabyte of signs and indices.
 pub const MAX_LATTICE_VERTICES: usize = 100_000_000;
 
 /// What came of a [`tetrahedralize`] call, beside the mesh.
@@ -63,7 +65,7 @@ pub enum TetrahedralizeError {
     /// The spacing is not a positive number.
     #[error("a lattice spacing of {spacing} m is impossible; give a positive length")]
     Spacing {
-        /// What was asked for [m].
+        /// What was asked for `[m]`.
         spacing: f64,
     },
     /// The bounds are not finite, or the upper corner is below the lower one.
@@ -75,24 +77,24 @@ pub enum TetrahedralizeError {
          {MAX_LATTICE_VERTICES}; use at least {suggestion:.3e} m"
     )]
     TooFine {
-        /// What was asked for [m].
+        /// What was asked for `[m]`.
         spacing: f64,
         /// How many lattice vertices that takes.
         lattice_vertices: f64,
-        /// A spacing that fits [m].
+        /// A spacing that fits `[m]`.
         suggestion: f64,
     },
-    /// No lattice vertex fell inside.
+    /// No lattice vertex fell inside, or the few that did moved onto the surface.
     #[error(
         "a spacing of {spacing} m misses the shape, whose box is {:.3e} x {:.3e} x {:.3e} m; use at most {suggestion:.3e} m",
         size[0], size[1], size[2]
     )]
     TooCoarse {
-        /// What was asked for [m].
+        /// What was asked for `[m]`.
         spacing: f64,
-        /// Edge lengths of the shape's box [m].
+        /// Edge lengths of the shape's box `[m]`.
         size: [f64; 3],
-        /// A spacing that finds the shape [m].
+        /// A spacing that finds the shape `[m]`.
         suggestion: f64,
     },
     /// The function is negative nowhere, as far as could be found.
@@ -101,13 +103,13 @@ pub enum TetrahedralizeError {
     /// The shape reaches past its bounds.
     #[error("the shape reaches past its bounds at ({}, {}, {}) m; enlarge them", point[0], point[1], point[2])]
     BoundsTooTight {
-        /// A point inside the shape on the rim of the lattice [m].
+        /// A point inside the shape on the rim of the lattice `[m]`.
         point: [f64; 3],
     },
     /// The function returned something that is not a number.
     #[error("the distance at ({}, {}, {}) m is not a finite number", point[0], point[1], point[2])]
     NotFinite {
-        /// Where [m].
+        /// Where `[m]`.
         point: [f64; 3],
     },
     /// The mesh was refused.
@@ -117,56 +119,51 @@ pub enum TetrahedralizeError {
 
 /// Fills a shape with tetrahedra.
 ///
-/// `spacing` [m] is the edge length of the lattice's cubes, and of the longest edges in the
+/// `spacing` `[m]` is the edge length of the lattice's cubes, and of the longest edges in the
 /// interior; one cube of the interior holds 12 tetrahedra. All tetrahedra get region 0. The same
 /// arguments give the same bits, on every machine.
 pub fn tetrahedralize(
     shape: &dyn SignedDistance,
     spacing: f64,
 ) -> Result<(TetMesh, TetrahedralizeReport), TetrahedralizeError> {
-    let filling = Filling::new(shape, spacing)?;
-    let boundary = filling.boundary();
-    let report = TetrahedralizeReport {
+    let filling = Filling::of_something(shape, spacing, Extent::Whole)?;
+    let mut report = TetrahedralizeReport {
         lattice_vertices: filling.lattice_vertices,
         warped_vertices: filling.warped_vertices,
-        components: filling.component_count(),
-        non_manifold_edges: non_manifold_edge_count(&boundary),
+        components: 0,
+        non_manifold_edges: count_open_edges(&filling.surface()),
     };
     let regions = vec![0; filling.tets.len()];
     let (mesh, _) = TetMesh::new(filling.vertices, filling.tets, regions)?;
+    report.components = connected_components(&mesh).count;
     Ok((mesh, report))
 }
 
 /// A closed triangle surface of a shape: the boundary of its tetrahedra, every vertex on the zero
-/// set. `spacing` [m] as for [`tetrahedralize`]; most triangle edges are a little shorter.
+/// set. `spacing` `[m]` as for [`tetrahedralize`]; most triangle edges are a little shorter.
 pub fn surface(
     shape: &dyn SignedDistance,
     spacing: f64,
 ) -> Result<SurfaceMesh, TetrahedralizeError> {
-    let filling = Filling::new(shape, spacing)?;
-    let mut triangles = filling.boundary();
-    let mut new_index = vec![u32::MAX; filling.vertices.len()];
-    let mut vertices = Vec::new();
-    for triangle in &mut triangles {
-        for vertex in triangle {
-            let index = &mut new_index[*vertex as usize];
-            if *index == u32::MAX {
-                *index = vertices.len() as u32;
-                vertices.push(filling.vertices[*vertex as usize]);
-            }
-            *vertex = *index;
-        }
-    }
-    Ok(SurfaceMesh { vertices, triangles })
+    Ok(Filling::of_something(shape, spacing, Extent::Skin)?.surface())
+}
+
+/// How much of a shape is filled.
+#[derive(Clone, Copy, PartialEq)]
+enum Extent {
+    /// All of it.
+    Whole,
+    /// Only lattice tetrahedra that can have a face on the surface.
+    Skin,
 }
 
 /// Tetrahedra in the making.
 struct Filling {
-    /// Positions [m], shape [vertex_count].
+    /// Positions `[m]`, shape `[vertex_count]`.
     vertices: Vec<Vec3<f64>>,
-    /// True for cut points and for lattice vertices on the surface, shape [vertex_count].
+    /// True for cut points and for lattice vertices on the surface, shape `[vertex_count]`.
     on_surface: Vec<bool>,
-    /// Vertex indices, positively wound, shape [tet_count].
+    /// Vertex indices, positively wound, shape `[tet_count]`.
     tets: Vec<[u32; 4]>,
     lattice_vertices: usize,
     warped_vertices: usize,
@@ -174,8 +171,42 @@ struct Filling {
 
 const NO_VERTEX: u32 = u32::MAX;
 
+/// Where the search for a spacing that finds the shape gives up: halvings of the given spacing.
+const SEARCH_HALVINGS: usize = 10;
+/// And the size of lattice `[vertices]` that it tries, a fraction of a second each.
+const SEARCH_LATTICE_VERTICES: usize = 1_000_000;
+
 impl Filling {
-    fn new(shape: &dyn SignedDistance, spacing: f64) -> Result<Self, TetrahedralizeError> {
+    /// A filling that is not empty. The error of an empty one names a spacing that was tried.
+    fn of_something(
+        shape: &dyn SignedDistance,
+        spacing: f64,
+        extent: Extent,
+    ) -> Result<Self, TetrahedralizeError> {
+        let filling = Self::new(shape, spacing, extent)?;
+        if !filling.tets.is_empty() {
+            return Ok(filling);
+        }
+        let (lower, upper) = shape.bounds();
+        let size = (upper - lower).to_array();
+        let mut suggestion = spacing;
+        for _ in 0..SEARCH_HALVINGS {
+            suggestion *= 0.5;
+            if Lattice::around(shape, suggestion)?.vertex_count() > SEARCH_LATTICE_VERTICES {
+                break;
+            }
+            if !Self::new(shape, suggestion, extent)?.tets.is_empty() {
+                return Err(TetrahedralizeError::TooCoarse { spacing, size, suggestion });
+            }
+        }
+        Err(TetrahedralizeError::Empty)
+    }
+
+    fn new(
+        shape: &dyn SignedDistance,
+        spacing: f64,
+        extent: Extent,
+    ) -> Result<Self, TetrahedralizeError> {
         let mut lattice = Lattice::sample(shape, spacing)?;
         let warped_vertices = lattice.warp();
         let mut builder = Builder {
@@ -186,17 +217,22 @@ impl Filling {
             on_surface: Vec::new(),
             tets: Vec::new(),
         };
-        lattice.for_each_tet(|corners| builder.fill(corners));
+        lattice.for_each_tet(|corners| {
+            if extent == Extent::Whole || may_touch_surface(&corners) {
+                builder.fill(corners);
+            }
+        });
         let Builder { vertices, on_surface, tets, .. } = builder;
         let lattice_vertices = lattice.vertex_count();
         Ok(Self { vertices, on_surface, tets, lattice_vertices, warped_vertices })
     }
 
-    /// Triangles that belong to one tetrahedron only, wound outwards.
-    fn boundary(&self) -> Vec<[u32; 3]> {
+    /// The boundary: faces that belong to one tetrahedron only, wound outwards.
+    fn surface(&self) -> SurfaceMesh {
         let mut faces = Vec::new();
-        for &[a, b, c, d] in &self.tets {
-            for face in [[b, c, d], [a, d, c], [a, b, d], [a, c, b]] {
+        for tet in &self.tets {
+            for face in TET_FACES {
+                let face = face.map(|corner| tet[corner]);
                 // Only these can be on the boundary: it lies on the zero set.
                 if face.iter().all(|&v| self.on_surface[v as usize]) {
                     let mut key = face;
@@ -206,47 +242,28 @@ impl Filling {
             }
         }
         faces.sort_unstable();
-        faces
-            .chunk_by(|a, b| a.0 == b.0)
-            .filter(|same| same.len() == 1)
-            .map(|same| same[0].1)
-            .collect()
-    }
-
-    /// Number of parts that share no vertex.
-    fn component_count(&self) -> usize {
-        let mut parent: Vec<u32> = (0..self.vertices.len() as u32).collect();
-        let root = |parent: &mut Vec<u32>, mut v: u32| {
-            while parent[v as usize] != v {
-                // Halving the path keeps later walks short.
-                parent[v as usize] = parent[parent[v as usize] as usize];
-                v = parent[v as usize];
-            }
-            v
-        };
-        let mut count = self.vertices.len();
-        for tet in &self.tets {
-            for &other in &tet[1..] {
-                let (a, b) = (root(&mut parent, tet[0]), root(&mut parent, other));
-                if a != b {
-                    parent[a.max(b) as usize] = a.min(b);
-                    count -= 1;
+        let single = faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1);
+        let mut surface_index = vec![NO_VERTEX; self.vertices.len()];
+        let mut surface = SurfaceMesh::default();
+        for same in single {
+            let triangle = same[0].1.map(|vertex| {
+                let index = &mut surface_index[vertex as usize];
+                if *index == NO_VERTEX {
+                    *index = surface.vertices.len() as u32;
+                    surface.vertices.push(self.vertices[vertex as usize]);
                 }
-            }
+                *index
+            });
+            surface.triangles.push(triangle);
         }
-        count
+        surface
     }
 }
 
-/// Edges of a triangle surface that do not belong to exactly two triangles.
-fn non_manifold_edge_count(triangles: &[[u32; 3]]) -> usize {
-    let mut edges: Vec<[u32; 2]> = triangles
-        .iter()
-        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
-        .map(|[a, b]| [a.min(b), a.max(b)])
-        .collect();
-    edges.sort_unstable();
-    edges.chunk_by(|a, b| a == b).filter(|same| same.len() != 2).count()
+/// True if filling this lattice tetrahedron can leave a face on the surface.
+fn may_touch_surface(corners: &[Corner; 4]) -> bool {
+    let count = |sign| corners.iter().filter(|corner| corner.sign == sign).count();
+    count(Sign::Outside) > 0 || count(Sign::Surface) >= 3
 }
 
 /// Step 4: the stencils.

@@ -50,9 +50,9 @@ impl Splitting {
 /// A block and how to cut it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Block {
-    /// The corner with the smallest coordinates [m].
+    /// The corner with the smallest coordinates `[m]`.
     pub corner: Vec3<f64>,
-    /// Edge lengths [m].
+    /// Edge lengths `[m]`.
     pub size: Vec3<f64>,
     /// Boxes along each axis.
     pub cells: [usize; 3],
@@ -146,7 +146,7 @@ impl Block {
         vec3(self.size.x / nx, self.size.y / ny, self.size.z / nz)
     }
 
-    /// How far [m] every vertex may move, in any direction, before a tetrahedron can go flat: half
+    /// How far `[m]` every vertex may move, in any direction, before a tetrahedron can go flat: half
     /// the smallest width. Were it flat, all its corners would lie in one plane, so before the move
     /// between two planes at most that width apart.
     fn safe_displacement(&self) -> f64 {
@@ -158,7 +158,7 @@ impl Block {
     }
 }
 
-/// Smallest distance [m] between two parallel planes that hold a tetrahedron between them: a corner
+/// Smallest distance `[m]` between two parallel planes that hold a tetrahedron between them: a corner
 /// and its opposite face, or two opposite edges, lie in them.
 fn width(x: [Vec3<f64>; 4]) -> f64 {
     let distance = |u: Vec3<f64>, v: Vec3<f64>, across: Vec3<f64>| {

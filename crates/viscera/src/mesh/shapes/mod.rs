@@ -3,7 +3,7 @@
 //! | shape | tetrahedra | fine surface |
 //! |---|---|---|
 //! | [`block`], [`beam`] | structured: every box of a grid is split alike | the boundary itself |
-//! | [`sphere`], [`capsule`], [`liver`] | isosurface stuffing | three times as fine, for pictures |
+//! | [`sphere`], [`capsule`], [`liver`] | isosurface stuffing | up to three times as fine, for pictures |
 
 mod block;
 
@@ -19,12 +19,16 @@ pub use block::{Block, Splitting};
 /// order of magnitude smaller than a tetrahedron's face, and pictures look smooth.
 const SURFACE_FRACTION: f64 = 1.0 / 3.0;
 
+/// But it is at least this fraction of the shape's longest side, unless the tetrahedra are finer
+/// still: some fifty thousand triangles, beyond which a picture gains nothing.
+const SURFACE_RESOLUTION: f64 = 1.0 / 100.0;
+
 /// A curved shape: tetrahedra to compute with and a finer surface to show.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CurvedShape {
     /// The tetrahedra, all in region 0.
     pub tets: TetMesh,
-    /// The same shape's surface at a third of the spacing.
+    /// The same shape's surface, up to three times as fine.
     pub surface: SurfaceMesh,
     /// How the filling went.
     pub report: TetrahedralizeReport,
@@ -39,7 +43,7 @@ pub enum ShapeError {
     Length {
         /// Which length.
         name: &'static str,
-        /// What was asked for [m].
+        /// What was asked for `[m]`.
         value: f64,
     },
     /// A factor that is not positive and finite.
@@ -74,17 +78,17 @@ pub enum ShapeError {
     Mesh(#[from] MeshError),
 }
 
-/// Largest structured mesh [tetrahedra]: about two gigabytes with its vertices.
+/// Largest structured mesh `[tetrahedra]`: about two gigabytes with its vertices.
 pub const MAX_TETS: usize = 50_000_000;
 
-/// A block from the origin to `size` [m], `cells` boxes along each axis, split by
+/// A block from the origin to `size` `[m]`, `cells` boxes along each axis, split by
 /// [`Splitting::Five`]. More choices: [`Block`].
 pub fn block(size: Vec3<f64>, cells: [usize; 3]) -> Result<TetMesh, ShapeError> {
     Block::new(size, cells).mesh()
 }
 
 /// A beam along +x from the plane x = 0, its cross-section centred on the x axis: `length` by
-/// `width` (along y) by `height` (along z) [m].
+/// `width` (along y) by `height` (along z) `[m]`.
 ///
 /// `cells_across` counts boxes over the thinner side of the cross-section; the other counts follow
 /// so that boxes are as cubic as can be.
@@ -106,14 +110,14 @@ pub fn beam(
     block.mesh()
 }
 
-/// A ball around the origin: `radius` [m], lattice `spacing` [m].
+/// A ball around the origin: `radius` `[m]`, lattice `spacing` `[m]`.
 pub fn sphere(radius: f64, spacing: f64) -> Result<CurvedShape, ShapeError> {
     check_length("sphere's radius", radius)?;
     fill(&Sphere { center: Vec3::ZERO, radius }, spacing)
 }
 
-/// A capsule along x around the origin: a cylinder of `radius` and `length` [m], without the caps,
-/// closed by half-balls; lattice `spacing` [m].
+/// A capsule along x around the origin: a cylinder of `radius` and `length` `[m]`, without the caps,
+/// closed by half-balls; lattice `spacing` `[m]`.
 pub fn capsule(radius: f64, length: f64, spacing: f64) -> Result<CurvedShape, ShapeError> {
     check_length("capsule's radius", radius)?;
     check_length("capsule's length", length)?;
@@ -121,7 +125,7 @@ pub fn capsule(radius: f64, length: f64, spacing: f64) -> Result<CurvedShape, Sh
     fill(&Capsule { start: -end, end, radius }, spacing)
 }
 
-/// The procedural [`Liver`], life-size at `scale` 1; lattice `spacing` [m], of which
+/// The procedural [`Liver`], life-size at `scale` 1; lattice `spacing` `[m]`, of which
 /// [`LIVER_SPACING`] times the scale makes about three thousand tetrahedra.
 pub fn liver(spacing: f64, scale: f64) -> Result<CurvedShape, ShapeError> {
     if !(scale > 0.0 && scale.is_finite()) {
@@ -130,13 +134,16 @@ pub fn liver(spacing: f64, scale: f64) -> Result<CurvedShape, ShapeError> {
     fill(&Liver::scaled(scale), spacing)
 }
 
-/// Lattice spacing [m] that fills the life-size liver with about three thousand tetrahedra: enough
+/// Lattice spacing `[m]` that fills the life-size liver with about three thousand tetrahedra: enough
 /// to bend both lobes, few enough for a real-time step on one core.
-pub const LIVER_SPACING: f64 = 0.017;
+pub const LIVER_SPACING: f64 = 0.0186;
 
 fn fill(shape: &dyn SignedDistance, spacing: f64) -> Result<CurvedShape, ShapeError> {
     let (tets, report) = tetrahedralize(shape, spacing)?;
-    let surface = surface(shape, spacing * SURFACE_FRACTION)?;
+    let (lower, upper) = shape.bounds();
+    let size = upper - lower;
+    let least = size.x.max(size.y).max(size.z) * SURFACE_RESOLUTION;
+    let surface = surface(shape, (spacing * SURFACE_FRACTION).max(least).min(spacing))?;
     Ok(CurvedShape { tets, surface, report })
 }
 
