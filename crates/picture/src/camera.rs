@@ -1,7 +1,7 @@
 //! Where a picture is taken from.
 //!
-//! A pinhole camera, z up. For a box to fit between the sides of the view, with half-opening
-//! tangent `t`, every corner `p` (in camera axes, the camera looking along -z from `c`) must satisfy
+//! A pinhole camera, z up. For tissue to fit between the sides of the view, with half-opening
+//! tangent `t`, every position `p` (in camera axes, the camera looking along -z from `c`) must satisfy
 //!
 //! ```text
 //! |p.x - c.x| <= t (c.z - p.z)
@@ -9,6 +9,8 @@
 //!
 //! With `A = max(p.x + t p.z)` and `B = max(t p.z - p.x)` the nearest such place is
 //! `c.z = (A + B) / 2t`, `c.x = (A - B) / 2`. The same holds for y; the farther `c.z` of the two wins.
+
+use std::sync::LazyLock;
 
 use viscera::scalar::{Vec3, vec3};
 
@@ -30,26 +32,56 @@ pub(crate) fn unit(v: Vec3<f64>) -> Vec3<f64> {
     if length > 0.0 && length.is_finite() { v * (1.0 / length) } else { Vec3::ZERO }
 }
 
-/// The axis-parallel box around everything that will be seen. Include all frames of an animation,
-/// so that the view does not jump.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// The extent of everything that will be seen. Include all frames of an animation, so that the
+/// view does not jump.
+///
+/// Keeps the farthest position in each of many directions: a tighter fit than a box, at a size
+/// that does not grow.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bounds {
+    /// Lowest and highest corner of the axis-parallel box [m].
     corners: Option<(Vec3<f64>, Vec3<f64>)>,
+    /// The farthest position [m] in each of [`DIRECTIONS`]; empty or complete.
+    farthest: Vec<Vec3<f64>>,
 }
 
+/// Enough that what lies between two directions sticks out by less than 2 % of the size.
+const DIRECTION_COUNT: usize = 96;
+
+/// Unit vectors spread evenly over the sphere: a spiral with the golden angle.
+static DIRECTIONS: LazyLock<Vec<Vec3<f64>>> = LazyLock::new(|| {
+    let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    (0..DIRECTION_COUNT)
+        .map(|k| {
+            let z = 1.0 - (2.0 * k as f64 + 1.0) / DIRECTION_COUNT as f64;
+            let (sin, cos) = libm::sincos(golden_angle * k as f64);
+            let radius = (1.0 - z * z).sqrt();
+            vec3(radius * cos, radius * sin, z)
+        })
+        .collect()
+});
+
 impl Bounds {
-    /// The box around some positions [m].
+    /// The extent of some positions [m].
     pub fn of(positions: &[Vec3<f64>]) -> Self {
         let mut bounds = Self::default();
         bounds.include(positions);
         bounds
     }
 
-    /// Grows the box around more positions [m]; what is not finite is left out.
+    /// Grows by more positions [m]; what is not finite is left out.
     pub fn include(&mut self, positions: &[Vec3<f64>]) {
         for &p in positions.iter().filter(|&&p| is_drawable(p)) {
             self.corners =
                 Some(self.corners.map_or((p, p), |(low, high)| (low.min(p), high.max(p))));
+            if self.farthest.is_empty() {
+                self.farthest = vec![p; DIRECTION_COUNT];
+            }
+            for (farthest, &direction) in self.farthest.iter_mut().zip(DIRECTIONS.iter()) {
+                if p.dot(direction) > farthest.dot(direction) {
+                    *farthest = p;
+                }
+            }
         }
     }
 
@@ -113,7 +145,7 @@ pub(crate) struct Projected {
 }
 
 impl Camera {
-    /// A camera that sees the whole box and leaves the margins to titles and scales.
+    /// A camera that sees all of it and leaves the margins to titles and scales.
     pub fn framing(bounds: &Bounds, direction: ViewDirection, size: ImageSize) -> Self {
         let usual = ViewDirection::default();
         let or_usual = |angle: f64, usual: f64| if angle.is_finite() { angle } else { usual };
@@ -126,7 +158,7 @@ impl Camera {
         let right = vec3(-sin_a, cos_a, 0.0);
         let up = backward.cross(right);
 
-        let (low, high) = bounds.corners().unwrap_or((Vec3::splat(-0.5), Vec3::splat(0.5)));
+        let (low, high) = bounds.corners().unwrap_or_default();
         let middle = (low + high) * 0.5;
         // A single point is shown as the middle of a millimetre, or of what its digits resolve.
         let smallest = 1e-3_f64.max(1e-6 * middle.length());
@@ -139,10 +171,14 @@ impl Camera {
         let tangent =
             [0.5 * (area.right - area.left) / focal, 0.5 * (area.bottom - area.top) / focal];
 
+        // Positions about the middle; a single point or nothing at all is given some room.
+        let mut positions: Vec<_> = bounds.farthest.iter().map(|&p| p - middle).collect();
+        if bounds.diagonal() < smallest {
+            positions =
+                [right, up].into_iter().flat_map(|v| [v * smallest, -v * smallest]).collect();
+        }
         let mut reach = [[f64::NEG_INFINITY; 2]; 2];
-        for corner in 0..8 {
-            let sign = |bit: usize| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
-            let p = half.scale(vec3(sign(0), sign(1), sign(2)));
+        for p in positions {
             for (axis, side) in [p.dot(right), p.dot(up)].into_iter().enumerate() {
                 let near = tangent[axis] * p.dot(backward);
                 reach[axis][0] = reach[axis][0].max(near + side);

@@ -88,7 +88,7 @@ impl LineMask {
     /// Adds the border of the area that a shape covers. Fainter where `tissue` is before it.
     pub fn add_contour(&mut self, shape: &Visibility, tissue: &DepthMap, hidden_opacity: f32) {
         let depth = DepthMap::of(shape);
-        let smooth = smoothed_coverage(shape, 1 + self.height / 700);
+        let smooth = smoothed_coverage(shape, 1 + self.height / 1000);
         for y in 0..self.height {
             for x in 0..self.width {
                 let m = smooth[y * self.width + x];

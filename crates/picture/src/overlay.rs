@@ -36,7 +36,7 @@ impl ColorScale {
         let exact = Self::new(title, min, max)?;
         // The third part of a tick's step loses little of the map and keeps the ends short.
         let step = nice_at_most((max - min) / 12.0);
-        let (low, high) = ((min / step - 1e-9).floor() * step, (max / step + 1e-9).ceil() * step);
+        let (low, high) = ((min / step + 1e-9).floor() * step, (max / step - 1e-9).ceil() * step);
         Ok(if low < high && (high - low).is_finite() {
             Self { min: low, max: high, ..exact }
         } else {

@@ -156,7 +156,7 @@ impl Lights {
         let grazing = 1.0 - (n.dot(to_viewer) as f32).clamp(0.0, 1.0);
         let fresnel = 0.03 + 0.97 * power_of_two(grazing, 2) * grazing;
         let lit = if key > 0.0 { 0.07 * broad + 0.42 * tight } else { 0.0 };
-        let mirrored = (lit + 0.26 * fresnel * sky) * (0.3 + 0.7 * openness);
+        let mirrored = (lit + 0.20 * fresnel * sky) * (0.3 + 0.7 * openness);
         // Towards white, never past it.
         diffuse.mix(Color::new(1.0, 0.99, 0.97), mirrored.min(1.0))
     }
