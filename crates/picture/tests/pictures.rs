@@ -86,7 +86,7 @@ fn nearer_shape_hides_the_farther_in_any_order() {
     let one = middle(vec![flat(&near, green), flat(&far, red)]);
     let other = middle(vec![flat(&far, red), flat(&near, green)]);
     assert_eq!(one, other);
-    assert!(one[1] > 2 * one[0], "{one:?} is not green");
+    assert!(one[1] > 100 && one[0] < 60, "{one:?} is not green");
 }
 
 #[test]
