@@ -21,7 +21,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let beam = beam(48, 8);
     let bent: Vec<_> = beam.vertices.iter().map(|&p| bend(p)).collect();
     let fixed: Vec<_> = beam.vertices.iter().copied().filter(|p| p.x == 0.0).collect();
-    let started = Instant::now();
     let picture = draw(&Subject {
         title: "Cantilever",
         caption: "t = 2.00 s",
@@ -32,7 +31,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         marker_radius: 1.2e-3,
         size,
     })?;
-    println!("beam: {} triangles, {:?}", beam.triangles.len(), started.elapsed());
     std::fs::write(folder.join("beam.png"), write_png(&picture)?)?;
 
     let organ = bumpy_sphere(100, 100);
@@ -46,7 +44,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .collect();
     let grabbed: Vec<_> =
         positions.iter().zip(&organ.vertices).filter(|p| near_grip(*p.1)).map(|p| *p.0).collect();
-    let started = Instant::now();
     let picture = draw(&Subject {
         title: "Liver retraction",
         caption: "t = 1.25 s",
@@ -57,7 +54,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         marker_radius: 1.1e-3,
         size,
     })?;
-    println!("organ: {} triangles, {:?}", organ.triangles.len(), started.elapsed());
     std::fs::write(folder.join("organ.png"), write_png(&picture)?)?;
 
     let size = ImageSize::new(640, 400)?;
@@ -153,7 +149,12 @@ fn draw(subject: &Subject) -> Result<viscera_picture::Image, viscera_picture::Pi
         length_scale: true,
         ..Drawing::default()
     };
-    Ok(drawing.draw(&camera)?.image)
+    let started = Instant::now();
+    let drawn = drawing.draw(&camera)?;
+    if subject.size.width() > 1000 {
+        println!("{}: {} triangles, {:?}", subject.title, rest.triangles.len(), started.elapsed());
+    }
+    Ok(drawn.image)
 }
 
 /// A beam of 0.2 x 0.03 x 0.03 m: the surface of a grid of `along` x `across` x `across` cells.

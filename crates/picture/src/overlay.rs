@@ -165,7 +165,7 @@ impl Layout {
             let edge = 0.05 * width.min(height);
             return Area { left: edge, top: edge, right: width - edge, bottom: height - edge };
         }
-        let beside = f64::from(self.bar_width() + (TICK_LETTERS + 1) * self.letter);
+        let beside = f64::from(self.bar_width() + (TICK_LETTERS + 2) * self.letter);
         let line = f64::from(self.line);
         Area {
             left: 1.5 * margin,
