@@ -87,11 +87,20 @@ impl Visibility {
         for row in rows {
             let mut here = edge;
             let mut depth_here = depth;
-            let first = row * self.width;
-            for column in columns.clone() {
+            let samples = row * self.width + columns.start..row * self.width + columns.end;
+            let depths = self.inverse_depth[samples.clone()].iter_mut();
+            let mut was_inside = false;
+            for (depth, seen) in depths.zip(&mut self.shape[samples]) {
                 // The sign bit of the union is clear only if all three are inside.
                 if (here[0] | here[1] | here[2]) >= 0 {
-                    self.put(first + column, depth_here as f32, shape);
+                    was_inside = true;
+                    if depth_here as f32 > *depth {
+                        *depth = depth_here as f32;
+                        *seen = shape;
+                    }
+                } else if was_inside {
+                    // A row meets a triangle once.
+                    break;
                 }
                 for i in 0..3 {
                     here[i] += dx[i];

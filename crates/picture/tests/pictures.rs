@@ -69,14 +69,12 @@ fn sphere_covers_the_disc_that_perspective_gives_it() {
 
 #[test]
 fn nearer_shape_hides_the_farther_in_any_order() {
-    let camera = {
-        let mut bounds = Bounds::of(&[vec3(-0.1, -0.2, -0.1), vec3(0.1, 0.2, 0.1)]);
-        bounds.include(&[Vec3::ZERO]);
-        let front = ViewDirection { azimuth: -90.0, elevation: 0.0 };
-        Camera::framing(&bounds, front, size(200, 200))
-    };
     let near = sphere(vec3(0.0, -0.15, 0.0), 24);
     let far = sphere(vec3(0.0, 0.15, 0.0), 24);
+    let mut bounds = Bounds::of(&near.vertices);
+    bounds.include(&far.vertices);
+    let front = ViewDirection { azimuth: -90.0, elevation: 0.0 };
+    let camera = Camera::framing(&bounds, front, size(200, 200));
     let (green, red) = (Color::new(0.0, 0.5, 0.0), Color::new(0.5, 0.0, 0.0));
     let middle = |surfaces| {
         let image = Drawing { surfaces, ..Drawing::default() }.draw(&camera).unwrap().image;
