@@ -335,13 +335,13 @@ fn draw_outline(image: &mut Image, camera: &Camera, tissue: &DepthMap, outline: 
         skipped += usize::from(!drawn);
     }
     let mut mask = LineMask::new(tissue.width, tissue.height);
-    mask.add_contour(&own, tissue, HIDDEN_CONTOUR);
-    let own = DepthMap::of(&own);
+    let own_depth = DepthMap::of(&own);
+    mask.add_contour(&own, &own_depth, tissue, HIDDEN_CONTOUR);
     let width = f64::from(camera.size().height()) / 600.0;
     for edge in feature_edges(outline.positions, outline.triangles) {
         let [Some(a), Some(b)] = edge.map(|v| projected[v as usize]) else { continue };
         mask.add_segment([a, b], width.clamp(0.8, 3.0), |x, y, depth| {
-            let hidden = own.hides(x, y, depth) || tissue.hides(x, y, depth);
+            let hidden = own_depth.hides(x, y, depth) || tissue.hides(x, y, depth);
             if hidden { 0.0 } else { FEATURE_EDGE }
         });
     }

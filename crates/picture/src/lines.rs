@@ -4,6 +4,8 @@
 //! pixel, smoothed over its neighbours, `4 m (1 - m)` is one exactly on the border and zero a
 //! little away from it on both sides: a smooth line of even width, however the triangles lie.
 
+use std::ops::Range;
+
 use viscera::scalar::Vec3;
 
 use crate::camera::{Camera, Projected, unit};
@@ -42,11 +44,13 @@ pub(crate) struct LineMask {
     height: usize,
     /// 0 to 1, shape [height * width].
     coverage: Vec<f32>,
+    /// The pixels from the first to the last that is covered.
+    touched: Range<usize>,
 }
 
 impl LineMask {
     pub fn new(width: usize, height: usize) -> Self {
-        Self { width, height, coverage: vec![0.0; width * height] }
+        Self { width, height, coverage: vec![0.0; width * height], touched: 0..0 }
     }
 
     /// Adds a line with round ends, `line_width` [pixels]. Where the line runs at a pixel, with its
@@ -86,8 +90,14 @@ impl LineMask {
     }
 
     /// Adds the border of the area that a shape covers. Fainter where `tissue` is before it.
-    pub fn add_contour(&mut self, shape: &Visibility, tissue: &DepthMap, hidden_opacity: f32) {
-        let depth = DepthMap::of(shape);
+    /// `depth` is that of the shape itself.
+    pub fn add_contour(
+        &mut self,
+        shape: &Visibility,
+        depth: &DepthMap,
+        tissue: &DepthMap,
+        hidden_opacity: f32,
+    ) {
         let smooth = smoothed_coverage(shape, 1 + self.height / 1000);
         for y in 0..self.height {
             for x in 0..self.width {
@@ -111,16 +121,20 @@ impl LineMask {
 
     fn raise(&mut self, pixel: usize, coverage: f32) {
         self.coverage[pixel] = self.coverage[pixel].max(coverage);
+        self.touched = if self.touched.is_empty() {
+            pixel..pixel + 1
+        } else {
+            self.touched.start.min(pixel)..self.touched.end.max(pixel + 1)
+        };
     }
 
     /// Lays the lines over a picture of the same size.
     pub fn paint(&self, image: &mut Image, srgb: [u8; 3], opacity: f32) {
-        for y in 0..self.height {
-            for x in 0..self.width {
-                let coverage = self.coverage[y * self.width + x];
-                if coverage > 0.0 {
-                    image.blend(x as i32, y as i32, srgb, coverage * opacity);
-                }
+        for pixel in self.touched.clone() {
+            let coverage = self.coverage[pixel];
+            if coverage > 0.0 {
+                let (x, y) = (pixel % self.width, pixel / self.width);
+                image.blend(x as i32, y as i32, srgb, coverage * opacity);
             }
         }
     }
