@@ -17,7 +17,7 @@ const UNCHANGED: u8 = 255;
 
 /// A channel may be this far [levels of 255] from the truth before a pixel is drawn again. Larger
 /// leaves trails behind moving edges, smaller doubles the file for differences nobody sees.
-const TOLERANCE: u8 = 3;
+const TOLERANCE: u8 = 2;
 
 /// Every how many pixels one is looked at to train a palette. 1 is best and slowest.
 const TRAINING_STRIDE: i32 = 3;
@@ -134,12 +134,18 @@ impl Animation {
     }
 }
 
+/// Colours of a frame that are taken over exactly, the most frequent ones: backgrounds and scales,
+/// where the eye sees the slightest trail. More would leave too few for the shading.
+const EXACT: usize = 64;
+
 /// Few colours that stand for many.
 struct Palette {
+    /// First the exact ones, sorted; then the network's.
     colors: Vec<[u8; 3]>,
-    /// None where the colours are exact and sorted.
+    exact_count: usize,
+    /// None where all colours are exact.
     network: Option<NeuQuant>,
-    /// Index by colour, for colours already looked up; `UNCHANGED` elsewhere. Shape [2^18], six
+    /// Index by colour, for colours already looked up; `UNCHANGED` elsewhere. Shape [2^21], seven
     /// bits a channel.
     known: Vec<u8>,
 }
@@ -147,28 +153,43 @@ struct Palette {
 impl Palette {
     fn of(pixels: impl Iterator<Item = [u8; 3]>) -> Self {
         let pixels: Vec<[u8; 3]> = pixels.collect();
-        let mut distinct = pixels.clone();
-        distinct.sort_unstable();
-        distinct.dedup();
-        if distinct.len() <= COLORS {
-            return Self { colors: distinct, network: None, known: Vec::new() };
+        let mut sorted = pixels.clone();
+        sorted.sort_unstable();
+        let mut counts: Vec<(usize, [u8; 3])> =
+            sorted.chunk_by(|a, b| a == b).map(|same| (same.len(), same[0])).collect();
+        let all_fit = counts.len() <= COLORS;
+        if !all_fit {
+            counts.sort_unstable_by(|a, b| b.cmp(a));
+            counts.truncate(EXACT);
         }
-        let rgba: Vec<u8> = pixels.iter().flat_map(|&[r, g, b]| [r, g, b, 255]).collect();
-        // The network reads past the end of very short inputs, which are exact anyway.
-        let stride = if pixels.len() < 20_000 { 1 } else { TRAINING_STRIDE };
-        let network = NeuQuant::new(stride, COLORS, &rgba);
-        let colors = network.color_map_rgb().chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
-        Self { colors, network: Some(network), known: vec![UNCHANGED; 1 << 18] }
+        let mut colors: Vec<[u8; 3]> = counts.into_iter().map(|c| c.1).collect();
+        colors.sort_unstable();
+        let exact_count = colors.len();
+        if all_fit {
+            return Self { colors, exact_count, network: None, known: Vec::new() };
+        }
+        let rgba: Vec<u8> = pixels
+            .iter()
+            .filter(|&p| colors.binary_search(p).is_err())
+            .flat_map(|&[r, g, b]| [r, g, b, 255])
+            .collect();
+        // Little to learn from deserves to be looked at completely.
+        let stride = if rgba.len() < 80_000 { 1 } else { TRAINING_STRIDE };
+        let network = NeuQuant::new(stride, COLORS - exact_count, &rgba);
+        colors.extend(network.color_map_rgb().chunks_exact(3).map(|c| [c[0], c[1], c[2]]));
+        Self { colors, exact_count, network: Some(network), known: vec![UNCHANGED; 1 << 21] }
     }
 
     fn index_of(&mut self, color: [u8; 3]) -> u8 {
-        let Some(network) = &self.network else {
-            return self.colors.binary_search(&color).unwrap_or(0) as u8;
+        let exact = self.colors[..self.exact_count].binary_search(&color);
+        let (Err(_), Some(network)) = (exact, &self.network) else {
+            return exact.unwrap_or(0) as u8;
         };
-        let [r, g, b] = color.map(|c| usize::from(c >> 2));
-        let cell = &mut self.known[r << 12 | g << 6 | b];
+        let [r, g, b] = color.map(|c| usize::from(c >> 1));
+        let cell = &mut self.known[r << 14 | g << 7 | b];
         if *cell == UNCHANGED {
-            *cell = network.index_of(&[color[0], color[1], color[2], 255]) as u8;
+            let learned = network.index_of(&[color[0], color[1], color[2], 255]);
+            *cell = (self.exact_count + learned) as u8;
         }
         *cell
     }
