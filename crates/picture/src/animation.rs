@@ -1,0 +1,203 @@
+//! Moving pictures, frame by frame.
+//!
+//! A GIF frame has 255 colours and may leave pixels as they were. Each frame therefore gets a
+//! palette of its own, trained only on the pixels that changed, and everything that already looks
+//! right stays: backgrounds, scales and letters cost nothing after the first frame.
+
+use std::borrow::Cow;
+
+use color_quant::NeuQuant;
+
+use crate::error::PictureError;
+use crate::image::{Image, ImageSize};
+
+/// Colours of a frame; one more stands for "as it was".
+const COLORS: usize = 255;
+const UNCHANGED: u8 = 255;
+
+/// A channel may be this far [levels of 255] from the truth before a pixel is drawn again. Larger
+/// leaves trails behind moving edges, smaller doubles the file for differences nobody sees.
+const TOLERANCE: u8 = 2;
+
+/// Every how many pixels one is looked at to train a palette. 1 is best and slowest.
+const TRAINING_STRIDE: i32 = 3;
+
+/// Shortest time between frames [1/100 s]; browsers slow anything faster down to a tenth second.
+const SHORTEST_DELAY: f64 = 2.0;
+
+/// A GIF in the making. Frames are compressed as they come, so that memory holds one of them.
+pub struct Animation {
+    size: ImageSize,
+    encoder: gif::Encoder<Vec<u8>>,
+    /// Wanted time between frames [1/100 s].
+    delay: f64,
+    /// Time that rounding has withheld so far [1/100 s].
+    owed: f64,
+    /// What a viewer shows after the last frame.
+    shown: Option<Vec<[u8; 3]>>,
+}
+
+fn failed(error: gif::EncodingError) -> PictureError {
+    PictureError::Encoding { format: "gif", reason: error.to_string() }
+}
+
+impl Animation {
+    /// An endless animation, `frame_time` [s] from one frame to the next.
+    pub fn new(size: ImageSize, frame_time: f64) -> Result<Self, PictureError> {
+        let (width, height) = (size.width() as u16, size.height() as u16);
+        let mut encoder = gif::Encoder::new(Vec::new(), width, height, &[]).map_err(failed)?;
+        encoder.set_repeat(gif::Repeat::Infinite).map_err(failed)?;
+        let delay = frame_time * 100.0;
+        // A minute a frame is beyond anything wanted, and what is not a number gets a usual pace.
+        let delay = if delay.is_nan() { 4.0 } else { delay.clamp(SHORTEST_DELAY, 6000.0) };
+        Ok(Self { size, encoder, delay, owed: 0.0, shown: None })
+    }
+
+    /// Adds a frame, shown for the usual time.
+    pub fn push(&mut self, image: &Image) -> Result<(), PictureError> {
+        self.push_held(image, self.delay / 100.0)
+    }
+
+    /// Adds a frame that stays for `seconds`: the last one, before the motion repeats.
+    pub fn push_held(&mut self, image: &Image, seconds: f64) -> Result<(), PictureError> {
+        if image.size() != self.size {
+            return Err(PictureError::FrameSize {
+                width: image.size().width(),
+                height: image.size().height(),
+                expected_width: self.size.width(),
+                expected_height: self.size.height(),
+            });
+        }
+        let wanted = if seconds.is_nan() { self.delay } else { seconds * 100.0 };
+        let wanted = wanted.clamp(SHORTEST_DELAY, 6000.0);
+        let delay = (wanted + self.owed).round().max(SHORTEST_DELAY);
+        self.owed = wanted + self.owed - delay;
+        let frame = self.changes(image, delay as u16);
+        self.encoder.write_frame(&frame).map_err(failed)
+    }
+
+    /// The bytes of the GIF file.
+    pub fn finish(self) -> Result<Vec<u8>, PictureError> {
+        self.encoder
+            .into_inner()
+            .map_err(|e| PictureError::Encoding { format: "gif", reason: e.to_string() })
+    }
+
+    /// The smallest rectangle around all pixels that no longer look right, and what is shown then.
+    fn changes(&mut self, image: &Image, delay: u16) -> gif::Frame<'static> {
+        let pixels = image.pixels();
+        let width = self.size.width() as usize;
+        let stale: Vec<bool> = match &self.shown {
+            None => vec![true; pixels.len()],
+            Some(shown) => pixels
+                .iter()
+                .zip(shown)
+                .map(|(new, old)| (0..3).any(|c| new[c].abs_diff(old[c]) > TOLERANCE))
+                .collect(),
+        };
+        let (mut left, mut right, mut top, mut bottom) = (usize::MAX, 0, usize::MAX, 0);
+        for i in (0..stale.len()).filter(|&i| stale[i]) {
+            (left, right) = (left.min(i % width), right.max(i % width));
+            (top, bottom) = (top.min(i / width), bottom.max(i / width));
+        }
+        if left > right {
+            // Nothing changed: a single unchanged pixel carries the delay.
+            (left, right, top, bottom) = (0, 0, 0, 0);
+        }
+
+        let mut palette = Palette::of(pixels.iter().zip(&stale).filter(|p| *p.1).map(|p| *p.0));
+        let shown = self.shown.get_or_insert_with(|| vec![[0; 3]; pixels.len()]);
+        let mut buffer = Vec::with_capacity((right - left + 1) * (bottom - top + 1));
+        for y in top..=bottom {
+            for i in y * width + left..=y * width + right {
+                if stale[i] {
+                    let index = palette.index_of(pixels[i]);
+                    shown[i] = palette.colors[usize::from(index)];
+                    buffer.push(index);
+                } else {
+                    buffer.push(UNCHANGED);
+                }
+            }
+        }
+        gif::Frame {
+            delay,
+            dispose: gif::DisposalMethod::Keep,
+            transparent: Some(UNCHANGED),
+            left: left as u16,
+            top: top as u16,
+            width: (right - left + 1) as u16,
+            height: (bottom - top + 1) as u16,
+            palette: Some(palette.bytes()),
+            buffer: Cow::Owned(buffer),
+            ..gif::Frame::default()
+        }
+    }
+}
+
+/// Colours of a frame that are taken over exactly, the most frequent ones: backgrounds and scales,
+/// where the eye sees the slightest trail. More would leave too few for the shading.
+const EXACT: usize = 64;
+
+/// Few colours that stand for many.
+struct Palette {
+    /// First the exact ones, sorted; then the network's.
+    colors: Vec<[u8; 3]>,
+    exact_count: usize,
+    /// None where all colours are exact.
+    network: Option<NeuQuant>,
+    /// Index by colour, for colours already looked up; `UNCHANGED` elsewhere. Shape [2^21], seven
+    /// bits a channel.
+    known: Vec<u8>,
+}
+
+impl Palette {
+    fn of(pixels: impl Iterator<Item = [u8; 3]>) -> Self {
+        let pixels: Vec<[u8; 3]> = pixels.collect();
+        let mut sorted = pixels.clone();
+        sorted.sort_unstable();
+        let mut counts: Vec<(usize, [u8; 3])> =
+            sorted.chunk_by(|a, b| a == b).map(|same| (same.len(), same[0])).collect();
+        let all_fit = counts.len() <= COLORS;
+        if !all_fit {
+            counts.sort_unstable_by(|a, b| b.cmp(a));
+            counts.truncate(EXACT);
+        }
+        let mut colors: Vec<[u8; 3]> = counts.into_iter().map(|c| c.1).collect();
+        colors.sort_unstable();
+        let exact_count = colors.len();
+        if all_fit {
+            return Self { colors, exact_count, network: None, known: Vec::new() };
+        }
+        let rgba: Vec<u8> = pixels
+            .iter()
+            .filter(|&p| colors.binary_search(p).is_err())
+            .flat_map(|&[r, g, b]| [r, g, b, 255])
+            .collect();
+        // Little to learn from deserves to be looked at completely.
+        let stride = if rgba.len() < 80_000 { 1 } else { TRAINING_STRIDE };
+        let network = NeuQuant::new(stride, COLORS - exact_count, &rgba);
+        colors.extend(network.color_map_rgb().chunks_exact(3).map(|c| [c[0], c[1], c[2]]));
+        Self { colors, exact_count, network: Some(network), known: vec![UNCHANGED; 1 << 21] }
+    }
+
+    fn index_of(&mut self, color: [u8; 3]) -> u8 {
+        let exact = self.colors[..self.exact_count].binary_search(&color);
+        let (Err(_), Some(network)) = (exact, &self.network) else {
+            return exact.unwrap_or(0) as u8;
+        };
+        let [r, g, b] = color.map(|c| usize::from(c >> 1));
+        let cell = &mut self.known[r << 14 | g << 7 | b];
+        if *cell == UNCHANGED {
+            let learned = network.index_of(&[color[0], color[1], color[2], 255]);
+            *cell = (self.exact_count + learned) as u8;
+        }
+        *cell
+    }
+
+    /// Three bytes a colour; the entry for unchanged pixels included.
+    fn bytes(&self) -> Vec<u8> {
+        let mut colors = self.colors.clone();
+        colors.resize(COLORS + 1, [0; 3]);
+        colors.into_flattened()
+    }
+}

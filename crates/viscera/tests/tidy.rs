@@ -1,0 +1,203 @@
+//! The shape of the project: what ARCHITECTURE.md and README.md promise, and who may use whom.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn read(path: &str) -> String {
+    fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}; write it"))
+}
+
+/// All Rust files of the library with their path below its `src`, sorted.
+fn library_sources() -> Vec<(String, String)> {
+    let src = root().join("crates/viscera/src");
+    let mut files = Vec::new();
+    let mut folders = vec![src.clone()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display())) {
+            let path = entry.expect("a readable folder entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                let name = path.strip_prefix(&src).expect("a path below src");
+                let name = name.to_string_lossy().replace('\\', "/");
+                files.push((name, fs::read_to_string(&path).expect("readable source")));
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
+/// Source without line comments, where words are only words. A quoted text is cut at `//` too.
+fn code_of(source: &str) -> String {
+    source.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
+}
+
+/// Modules of the library from the ground up. A module uses those of its own layer and of the
+/// layers below.
+const LAYERS: &[&[&str]] = &[
+    &["scalar", "settings", "units"],
+    &["mesh"],
+    &["material"],
+    &["elements"],
+    &["coloring"],
+    &["scene", "model", "state"],
+    &["contact", "tools", "cut"],
+    &["solver"],
+    &["record"],
+];
+
+fn layer_of(module: &str) -> Option<usize> {
+    LAYERS.iter().position(|layer| layer.contains(&module))
+}
+
+/// Modules named in `crate::a` and in `crate::{a, b::c}`.
+fn used_modules(code: &str) -> Vec<String> {
+    let first_name = |text: &str| -> String {
+        text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
+    };
+    let mut modules = Vec::new();
+    for (at, found) in code.match_indices("crate::") {
+        // `$crate::` in a macro counts; `mycrate::` does not.
+        let before = code[..at].chars().next_back();
+        if before.is_some_and(|c| c.is_alphanumeric() || c == '_') {
+            continue;
+        }
+        let rest = &code[at + found.len()..];
+        let Some(group) = rest.strip_prefix('{') else {
+            modules.push(first_name(rest));
+            continue;
+        };
+        let (mut depth, mut name_follows) = (0, true);
+        for (i, c) in group.char_indices() {
+            match c {
+                '}' if depth == 0 => break,
+                '{' => depth += 1,
+                '}' => depth -= 1,
+                ',' if depth == 0 => name_follows = true,
+                c if name_follows && !c.is_whitespace() => {
+                    modules.push(first_name(&group[i..]));
+                    name_follows = false;
+                }
+                _ => {}
+            }
+        }
+    }
+    modules.retain(|m| !m.is_empty());
+    modules
+}
+
+#[test]
+fn used_modules_are_found_alone_and_in_groups() {
+    let code =
+        "use crate::{mesh::{TetMesh, io}, scalar::Vec3,\n solver};\nfn f() { crate::units::x() }";
+    assert_eq!(used_modules(code), ["mesh", "scalar", "solver", "units"]);
+}
+
+#[test]
+fn modules_use_only_what_lies_below_them() {
+    let mut complaints = Vec::new();
+    for (name, source) in library_sources() {
+        let module = name.split('/').next().unwrap_or("").trim_end_matches(".rs");
+        if module == "lib" {
+            continue;
+        }
+        let Some(own) = layer_of(module) else {
+            complaints.push(format!("{name}: give `{module}` a place in LAYERS of this test"));
+            continue;
+        };
+        for used in used_modules(&code_of(&source)) {
+            if layer_of(&used).is_some_and(|layer| layer > own) {
+                complaints.push(format!("{name}: `{module}` must not use `{used}`, a layer above"));
+            }
+        }
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}
+
+#[test]
+fn library_touches_neither_files_nor_clocks() {
+    let forbidden = ["std::fs", "std::env", "std::net", "Instant", "SystemTime"];
+    let mut complaints = Vec::new();
+    for (name, source) in library_sources() {
+        // Tests inside the library may read data.
+        let code = code_of(&source);
+        let code = code.split("#[cfg(test)]").next().unwrap_or("");
+        for word in forbidden.into_iter().filter(|w| code.contains(w)) {
+            complaints.push(format!("{name}: `{word}`; take bytes or seconds as an argument"));
+        }
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}
+
+/// Packages that programs are built from; every other package is a program.
+const LIBRARIES: &[&str] = &["crates/viscera", "crates/picture"];
+
+#[test]
+fn libraries_leave_arguments_and_reports_to_programs() {
+    for library in LIBRARIES {
+        let manifest = read(&format!("{library}/Cargo.toml"));
+        let used = |name: &str| manifest.lines().any(|line| line.trim_start().starts_with(name));
+        for name in ["clap", "anyhow"] {
+            assert!(!used(name), "{library}/Cargo.toml: `{name}` belongs in programs");
+        }
+    }
+}
+
+/// Texts between single backticks, code blocks left out.
+fn code_spans(markdown: &str) -> Vec<&str> {
+    let mut spans = Vec::new();
+    let mut in_block = false;
+    for line in markdown.lines() {
+        if line.trim_start().starts_with("```") {
+            in_block = !in_block;
+        } else if !in_block {
+            spans.extend(line.split('`').skip(1).step_by(2));
+        }
+    }
+    spans
+}
+
+/// True for `crates/viscera/src/scalar.rs`, `mesh/` and `README.md`; not for commands, patterns
+/// and Rust paths.
+fn looks_like_a_path(text: &str) -> bool {
+    let plain = text.chars().all(|c| c.is_ascii_alphanumeric() || "/._-".contains(c))
+        && text.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '.');
+    let endings = ["/", ".rs", ".md", ".toml", ".cff", ".wgsl", ".yml"];
+    let folders = ["crates/", "scenes/", "docs/", ".ci/", ".cargo/"];
+    plain
+        && (endings.iter().any(|e| text.ends_with(e))
+            || folders.iter().any(|folder| text.starts_with(folder)))
+}
+
+#[test]
+fn paths_in_architecture_exist() {
+    let text = read("ARCHITECTURE.md");
+    let paths: Vec<&str> = code_spans(&text).into_iter().filter(|s| looks_like_a_path(s)).collect();
+    assert!(paths.len() >= 5, "ARCHITECTURE.md names hardly a path; put paths in backticks");
+    // From the repository's root, or from the library's source.
+    let exists =
+        |p: &str| ["", "crates/viscera/src"].iter().any(|at| root().join(at).join(p).exists());
+    let missing: Vec<&str> = paths.into_iter().filter(|p| !exists(p)).collect();
+    assert!(missing.is_empty(), "ARCHITECTURE.md names what does not exist: {missing:?}");
+}
+
+#[test]
+fn readme_example_is_the_file_that_is_tested() {
+    let text = read("README.md");
+    let Some((before, rest)) = text.split_once("```rust\n") else {
+        panic!("README.md: show the library's example in a ```rust block");
+    };
+    let block = rest.split("```").next().unwrap_or("");
+    let is_example = |s: &&str| s.starts_with("crates/viscera/examples/") && s.ends_with(".rs");
+    let Some(name) = code_spans(before).into_iter().rfind(is_example) else {
+        panic!("README.md: name `crates/viscera/examples/<name>.rs` before the ```rust block");
+    };
+    // Checked out on Windows, files may end their lines otherwise.
+    let same = |s: &str| s.replace("\r\n", "\n").trim().to_owned();
+    assert_eq!(same(block), same(&read(name)), "README.md and {name} differ: copy the file");
+}
