@@ -17,7 +17,7 @@ const UNCHANGED: u8 = 255;
 
 /// A channel may be this far [levels of 255] from the truth before a pixel is drawn again. Larger
 /// leaves trails behind moving edges, smaller doubles the file for differences nobody sees.
-const TOLERANCE: u8 = 2;
+const TOLERANCE: u8 = 3;
 
 /// Every how many pixels one is looked at to train a palette. 1 is best and slowest.
 const TRAINING_STRIDE: i32 = 3;
@@ -111,7 +111,7 @@ impl Animation {
         for y in top..=bottom {
             for i in y * width + left..=y * width + right {
                 if stale[i] {
-                    let index = palette.index_of(pixels[i]);
+                    let index = palette.index_of(pixels[i], dithered(pixels[i], i % width, y));
                     shown[i] = palette.colors[usize::from(index)];
                     buffer.push(index);
                 } else {
@@ -134,9 +134,17 @@ impl Animation {
     }
 }
 
+/// A colour shifted by a pattern that repeats every four pixels (B. Bayer, 1973), by about half the
+/// distance between a palette's colours: smooth shading without visible steps.
+fn dithered(color: [u8; 3], x: usize, y: usize) -> [u8; 3] {
+    const PATTERN: [[i16; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
+    let shift = (PATTERN[y % 4][x % 4] - 8) / 3;
+    color.map(|c| (i16::from(c) + shift).clamp(0, 255) as u8)
+}
+
 /// Colours of a frame that are taken over exactly, the most frequent ones: backgrounds and scales,
 /// where the eye sees the slightest trail. More would leave too few for the shading.
-const EXACT: usize = 64;
+const EXACT: usize = 40;
 
 /// Few colours that stand for many.
 struct Palette {
@@ -180,15 +188,16 @@ impl Palette {
         Self { colors, exact_count, network: Some(network), known: vec![UNCHANGED; 1 << 21] }
     }
 
-    fn index_of(&mut self, color: [u8; 3]) -> u8 {
+    /// The index of a colour, or else of the nearest one to its dithered version.
+    fn index_of(&mut self, color: [u8; 3], dithered: [u8; 3]) -> u8 {
         let exact = self.colors[..self.exact_count].binary_search(&color);
         let (Err(_), Some(network)) = (exact, &self.network) else {
             return exact.unwrap_or(0) as u8;
         };
-        let [r, g, b] = color.map(|c| usize::from(c >> 1));
+        let [r, g, b] = dithered.map(|c| usize::from(c >> 1));
         let cell = &mut self.known[r << 14 | g << 7 | b];
         if *cell == UNCHANGED {
-            let learned = network.index_of(&[color[0], color[1], color[2], 255]);
+            let learned = network.index_of(&[dithered[0], dithered[1], dithered[2], 255]);
             *cell = (self.exact_count + learned) as u8;
         }
         *cell
