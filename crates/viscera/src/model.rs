@@ -38,6 +38,12 @@ pub enum ModelError {
         /// How many vertices there are.
         vertex_count: usize,
     },
+    /// A spring that connects nothing.
+    #[error("a spring leads from vertex {vertex} to itself; give it two different ends")]
+    SpringEnds {
+        /// The vertex given twice.
+        vertex: u32,
+    },
     /// A stiffness or length that no spring has.
     #[error("{what} must be {range} and finite, not {value}")]
     BadValue {
@@ -311,6 +317,9 @@ impl ModelBuilder {
     ) -> Result<usize, ModelError> {
         for vertex in ends {
             self.check_vertex("a spring", vertex)?;
+        }
+        if ends[0] == ends[1] {
+            return Err(ModelError::SpringEnds { vertex: ends[0] });
         }
         check_positive("spring stiffness [N/m]", stiffness)?;
         let [a, b] = ends.map(|v| self.positions[v as usize]);
