@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use crate::coloring::{Coloring, ConstraintGraph};
 use crate::material::{Material, MaterialModel};
-use crate::mesh::TetMesh;
+use crate::mesh::{MAX_COORDINATE, TetMesh};
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::settings::Colors;
 
@@ -341,6 +341,12 @@ impl ModelBuilder {
         stiffness: f64,
     ) -> Result<usize, ModelError> {
         self.check_vertex("an attachment", vertex)?;
+        for value in anchor.to_array() {
+            if value.is_nan() || value.abs() > MAX_COORDINATE {
+                let (what, range) = ("anchor's coordinate [m]", "within 1e9 m of the origin");
+                return Err(ModelError::BadValue { what, range, value });
+            }
+        }
         check_positive("attachment stiffness [N/m]", stiffness)?;
         self.attachments.push((vertex, anchor, stiffness));
         Ok(self.attachments.len() - 1)
