@@ -21,6 +21,16 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     })
 }
 
+/// Prints text; a reader that has seen enough (`| head`) is no error.
+pub fn print(text: &str) -> Result<()> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(error).context("cannot print the result")
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Where a scene's mesh files are looked for: beside the scene, then in the data folder.
 pub struct Library {
     folders: Vec<PathBuf>,
@@ -63,9 +73,8 @@ pub struct OutputFolder {
 impl OutputFolder {
     /// Makes the folder and makes sure that it can be written to, before anything is computed.
     pub fn create(path: &Path) -> Result<Self> {
-        let advice = || {
-            format!("cannot write to {}; choose another folder with --out", path.display())
-        };
+        let advice =
+            || format!("cannot write to {}; choose another folder with --out", path.display());
         fs::create_dir_all(path).with_context(advice)?;
         let probe = path.join(".probe.part");
         fs::write(&probe, b"").and_then(|()| fs::remove_file(&probe)).with_context(advice)?;

@@ -147,7 +147,9 @@ impl Film {
             let markers: Vec<Vec3<f64>> = shot.markers.iter().map(|x| x.cast()).collect();
             let (fixed, moved) = markers.split_at(self.fixed_count);
             let radius = MARKER_RADIUS * diagonal;
-            let marks = |positions, color| Markers { positions, radius, color, see_through: 0.0 };
+            // What pulls is the point of the picture: it shines through where tissue hides it.
+            let marks =
+                |positions, color, see_through| Markers { positions, radius, color, see_through };
             let drawing = Drawing {
                 title: &self.title,
                 caption: &caption(shot),
@@ -161,7 +163,7 @@ impl Film {
                     triangles: &self.rest.triangles,
                     color: Color::REST,
                 }],
-                markers: vec![marks(fixed, Color::FIXED), marks(moved, Color::PULLED)],
+                markers: vec![marks(fixed, Color::FIXED, 0.0), marks(moved, Color::PULLED, 0.4)],
                 arrows: self.arrows(shot, diagonal, strongest),
                 color_scale: Some(scale.clone()),
                 length_scale: true,

@@ -34,7 +34,10 @@ pub fn execute(command: &MeshCommand) -> Result<()> {
         .parse(unit)
         .map_err(|error| anyhow::anyhow!("--unit: {error}"))
         .and_then(|unit| {
-            anyhow::ensure!(unit > 0.0, "--unit: a length above zero is needed, for example \"1 mm\"");
+            anyhow::ensure!(
+                unit > 0.0,
+                "--unit: a length above zero is needed, for example \"1 mm\""
+            );
             Ok(unit)
         })?;
     let bytes = files::read(file)?;
@@ -52,9 +55,8 @@ pub fn execute(command: &MeshCommand) -> Result<()> {
 fn print<T: Serialize + Display>(name: &str, summary: &T, json: bool) -> Result<()> {
     if json {
         let text = serde_json::to_string_pretty(summary).context("cannot write JSON")?;
-        println!("{text}");
+        files::print(&format!("{text}\n"))
     } else {
-        println!("{name}\n{summary}");
+        files::print(&format!("{name}\n{summary}"))
     }
-    Ok(())
 }

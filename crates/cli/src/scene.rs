@@ -19,6 +19,5 @@ pub enum SceneCommand {
 pub fn execute(command: &SceneCommand) -> Result<()> {
     let SceneCommand::Describe { markdown } = command;
     let text = if *markdown { describe_markdown() } else { describe_text() };
-    print!("{text}");
-    Ok(())
+    crate::files::print(&text)
 }

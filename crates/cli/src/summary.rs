@@ -45,7 +45,7 @@ pub struct Summary {
     pub velocity_factor: f64,
     pub gravity: [f64; 3],
     /// Solver settings, as a scene file would have them.
-    pub solver: BTreeMap<&'static str, String>,
+    pub solver: BTreeMap<&'static str, serde_json::Value>,
     pub model: ModelSummary,
     /// What was repaired and what to know.
     pub notes: Vec<String>,
@@ -67,7 +67,12 @@ impl Summary {
             frame_seconds: scene.time.frame,
             velocity_factor: scene.time.velocity_factor,
             gravity: scene.world.gravity.to_array(),
-            solver: scene.solver.values().into_iter().collect(),
+            solver: scene
+                .solver
+                .values()
+                .into_iter()
+                .map(|(key, text)| (key, json(text)))
+                .collect(),
             model: ModelSummary {
                 bodies: model.bodies.len(),
                 vertices: model.vertex_count(),
@@ -124,10 +129,11 @@ impl Summary {
         }
         if let Some(last) = self.frames.last() {
             for patch in &last.report.patches {
-                let [x, y, z] = patch.force;
-                let size = (x * x + y * y + z * z).sqrt();
+                let ([x, y, z], [a, b, c]) = (patch.force, patch.torque);
+                let (force, torque) = (x.hypot(y).hypot(z), a.hypot(b).hypot(c));
                 text.push_str(&format!(
-                    "force at {}: {size:.4} N, as a vector ({x:.4}, {y:.4}, {z:.4}) N\n",
+                    "{}: force {force:.4} N, as a vector ({x:.4}, {y:.4}, {z:.4}) N, torque \
+                     {torque:.4} N m\n",
                     patch.name
                 ));
             }
@@ -136,19 +142,24 @@ impl Summary {
     }
 }
 
+/// A setting as a scene file writes it is JSON as well: a number, a truth value or a quoted word.
+fn json(text: String) -> serde_json::Value {
+    serde_json::from_str(&text).unwrap_or(serde_json::Value::String(text))
+}
+
 /// A result whose apparent stiffness is off by more than this is not what was asked for.
 const STIFFNESS_ERROR: f64 = 0.05;
+
+/// Fewer frames than these are the first jerk of a run, in which multipliers are still building up.
+const FEWEST_FRAMES: usize = 5;
 
 fn warnings(frames: &[FrameLine]) -> Vec<String> {
     let mut warnings = Vec::new();
     // The last quarter: a single frame of a moving body says little.
     let tail = &frames[frames.len() - frames.len().div_ceil(4)..];
-    if tail.is_empty() {
-        return warnings;
-    }
-    let mean = tail.iter().map(|frame| frame.report.stiffness_error).sum::<f64>()
-        / tail.len() as f64;
-    if mean.abs() > STIFFNESS_ERROR {
+    let mean =
+        tail.iter().map(|frame| frame.report.stiffness_error).sum::<f64>() / tail.len() as f64;
+    if tail.len() >= FEWEST_FRAMES && mean.abs() > STIFFNESS_ERROR {
         let how = if mean > 0.0 { "softer" } else { "stiffer" };
         warnings.push(format!(
             "the solver falls short: the tissue answers as if it were about {:.0} % {how} than \
