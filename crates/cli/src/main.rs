@@ -1,2 +1,58 @@
 //! The `viscera` program.
-fn main() {}
+
+mod files;
+mod film;
+mod mesh;
+mod run;
+mod scene;
+mod series;
+mod summary;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Real-time soft-tissue simulation for surgical applications.
+#[derive(Parser)]
+#[command(name = "viscera", version, arg_required_else_help = true, after_help = EXAMPLES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  viscera run scenes/liver_retraction.toml
+  viscera run scenes/cantilever.toml --set body.bar.material.young=\"10 kPa\" --out out/soft
+  viscera mesh inspect liver.msh --unit \"32 mm\"
+  viscera scene describe";
+
+#[derive(Subcommand)]
+enum Command {
+    /// Simulate a scene; write meshes, a picture, an animation and the numbers
+    Run(run::RunArguments),
+    /// Look at mesh files
+    #[command(subcommand)]
+    Mesh(mesh::MeshCommand),
+    /// What a scene file can say
+    #[command(subcommand)]
+    Scene(scene::SceneCommand),
+}
+
+/// Exit code of a run that Ctrl-C ended, as shells report it.
+const INTERRUPTED: u8 = 130;
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Mesh(command) => mesh::execute(&command).map(|()| run::Outcome::Finished),
+        Command::Scene(command) => scene::execute(&command).map(|()| run::Outcome::Finished),
+    };
+    match result {
+        Ok(run::Outcome::Finished) => ExitCode::SUCCESS,
+        Ok(run::Outcome::Interrupted) => ExitCode::from(INTERRUPTED),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -189,7 +189,10 @@ pub fn solve<S: Scalar>(
     }
     let change = solve_symmetric(matrix, right);
     let stress = symmetric(&change);
-    let positions = [0, 1, 2, 3].map(|i| f * (stress * g[i]) * w[i]);
+    let mut positions = [Vec3::ZERO; 4];
+    for i in 0..4 {
+        positions[i] = f * (stress * g[i]) * w[i];
+    }
     TetCorrection { multipliers: change, positions }
 }
 
@@ -204,9 +207,11 @@ pub fn corner_loads<S: Scalar>(
     let f = super::deformation_gradient(x, inverse_rest_shape);
     let g = shape_gradients(inverse_rest_shape);
     let stress = symmetric(multipliers);
-    [0, 1, 2, 3].map(|i| {
+    let mut loads = [CornerLoad::default(); 4];
+    for i in 0..4 {
         let v = stress * g[i];
         let mass_bound = v.dot(g[0]).abs() + v.dot(g[1]).abs() + v.dot(g[2]).abs();
-        CornerLoad { impulse: f * v, mass_bound: mass_bound + v.dot(g[3]).abs() }
-    })
+        loads[i] = CornerLoad { impulse: f * v, mass_bound: mass_bound + v.dot(g[3]).abs() };
+    }
+    loads
 }

@@ -92,8 +92,12 @@ pub fn solve<S: Scalar>(
     let g = shape_gradients(inverse_rest_shape);
     let cofactor = f.cofactor();
     let scale = inverse_norm(&f);
-    let volume_gradient = g.map(|g| cofactor * g);
-    let shear_gradient = g.map(|g| f * g * scale);
+    let mut volume_gradient = [Vec3::ZERO; 4];
+    let mut shear_gradient = [Vec3::ZERO; 4];
+    for i in 0..4 {
+        volume_gradient[i] = cofactor * g[i];
+        shear_gradient[i] = f * g[i] * scale;
+    }
     let [volume, shear] = constraints(&f, lame_lambda, lame_mu);
     let volume_compliance = S::ONE / ((lame_lambda + lame_mu) * step_volume);
     let shear_compliance = S::ONE / (lame_mu * step_volume);
@@ -110,7 +114,10 @@ pub fn solve<S: Scalar>(
     let ratio = a01 / a00;
     let d1 = (b1 - ratio * b0) / (a11 - ratio * a01);
     let d0 = (b0 - a01 * d1) / a00;
-    let positions = [0, 1, 2, 3].map(|i| (volume_gradient[i] * d0 + shear_gradient[i] * d1) * w[i]);
+    let mut positions = [Vec3::ZERO; 4];
+    for i in 0..4 {
+        positions[i] = (volume_gradient[i] * d0 + shear_gradient[i] * d1) * w[i];
+    }
     TetCorrection { multipliers: [d0, d1], positions }
 }
 
@@ -127,12 +134,14 @@ pub fn corner_loads<S: Scalar>(
     let [volume, shear] = *multipliers;
     let shear = shear * inverse_norm(&f);
     let stress = f.cofactor() * volume + f * shear;
-    [0, 1, 2, 3].map(|i| {
+    let mut loads = [CornerLoad::default(); 4];
+    for i in 0..4 {
         let mut mass_bound = S::ZERO;
         for b in 0..4 {
             let twist = if b == i { S::ZERO } else { (f * g[i].cross(g[b])).length() };
             mass_bound += shear.abs() * g[i].dot(g[b]).abs() + volume.abs() * twist;
         }
-        CornerLoad { impulse: stress * g[i], mass_bound }
-    })
+        loads[i] = CornerLoad { impulse: stress * g[i], mass_bound };
+    }
+    loads
 }

@@ -8,6 +8,7 @@ use super::tables::{
 };
 use super::{Body, BodyShape, Fixing, Region, Scene, SceneError, Spring};
 use crate::material::{Material, MaterialModel};
+use crate::mesh::shapes::LIVER_SPACING;
 use crate::scalar::Vec3;
 use crate::settings::{Choice, Place, Placed, suggest};
 use crate::units::shorten;
@@ -235,7 +236,7 @@ fn build_shape(body: &BodyTable) -> Result<BodyShape, String> {
             BodyShape::Capsule { radius, length, spacing: body.spacing.unwrap_or(0.25 * radius) }
         }
         Some(ShapeName::Liver) => {
-            BodyShape::Liver { spacing: body.spacing.unwrap_or(0.017), scale }
+            BodyShape::Liver { spacing: body.spacing.unwrap_or(LIVER_SPACING * scale), scale }
         }
     };
     let cells = cell_count(&shape);

@@ -133,7 +133,7 @@ settings_table! {
         /// Radius of a sphere or capsule.
         radius: Option<f64> = None, optional(quantity(Dimension::Length, SIZE));
         /// Distance of the lattice points that a sphere, capsule or liver is filled with. Where
-        /// unset, a quarter of the radius, or 17 mm for a liver.
+        /// unset, a quarter of the radius, or 18.6 mm times the scale for a liver.
         spacing: Option<f64> = None, optional(quantity(Dimension::Length, SIZE));
         /// Size of a mesh or a liver relative to the file or to the standard liver; 1 where unset.
         scale: Option<f64> = None, optional(number(at_least(1e-3).up_to(1e3)));

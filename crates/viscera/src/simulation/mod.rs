@@ -54,6 +54,8 @@ pub struct PatchForce {
     /// Force [N] of the fixing, tool or load on the tissue: minus internal forces, plus inertia,
     /// minus gravity, summed over the patch.
     pub force: [f64; 3],
+    /// Torque [N m] of the same about the middle of the patch.
+    pub torque: [f64; 3],
 }
 
 /// The numbers of one frame.
@@ -220,40 +222,50 @@ impl<S: Real> Simulation<S> {
     }
 
     fn patch_forces(&self) -> Vec<PatchForce> {
-        let reaction = |vertices: &[u32]| {
-            let mut sum = Vec3::<f64>::ZERO;
-            for &v in vertices {
-                sum += self.balance.residual.get(v as usize).copied().unwrap_or_default();
-            }
-            sum
-        };
+        let held = |v: u32| self.balance.residual.get(v as usize).copied().unwrap_or_default();
         let mut forces = Vec::new();
-        let mut push = |name: &str, kind, force: Vec3<f64>| {
-            forces.push(PatchForce { name: name.to_owned(), kind, force: force.to_array() });
-        };
         for (fixing, patch) in self.scene.fixings.iter().zip(&self.assembly.fixings) {
-            let force = match fixing.stiffness {
-                None => reaction(&patch.vertices),
+            let share = fixing.stiffness.map(|total| total / patch.vertices.len() as f64);
+            let on_vertex = |v: u32| match share {
+                None => held(v),
                 Some(stiffness) => {
-                    let share = stiffness / patch.vertices.len() as f64;
-                    let mut sum = Vec3::ZERO;
-                    for &v in &patch.vertices {
-                        let rest = self.assembly.builder.positions()[v as usize];
-                        sum += (rest - self.state.positions[v as usize].cast()) * share;
-                    }
-                    sum
+                    let rest = self.assembly.builder.positions()[v as usize];
+                    (rest - self.state.positions[v as usize].cast()) * stiffness
                 }
             };
-            push(&fixing.name, PatchKind::Fixing, force);
+            forces.push(self.sum(&fixing.name, PatchKind::Fixing, patch, on_vertex));
         }
         for (motion, patch) in self.scene.motions.iter().zip(&self.assembly.motions) {
-            let held = motion.is_held(self.time());
-            let force = if held { reaction(&patch.vertices) } else { Vec3::ZERO };
-            push(&motion.name, PatchKind::Motion, force);
+            let is_held = motion.is_held(self.time());
+            let on_vertex = |v: u32| if is_held { held(v) } else { Vec3::ZERO };
+            forces.push(self.sum(&motion.name, PatchKind::Motion, patch, on_vertex));
         }
-        for force in &self.scene.forces {
-            push(&force.name, PatchKind::Force, force.at(self.time()));
+        for (force, patch) in self.scene.forces.iter().zip(&self.assembly.forces) {
+            let share = force.at(self.time()) * (1.0 / patch.vertices.len() as f64);
+            forces.push(self.sum(&force.name, PatchKind::Force, patch, |_| share));
         }
         forces
+    }
+
+    /// Adds up forces [N] on the vertices of a patch, and their torque about its middle.
+    fn sum(
+        &self,
+        name: &str,
+        kind: PatchKind,
+        patch: &ResolvedPatch,
+        on_vertex: impl Fn(u32) -> Vec3<f64>,
+    ) -> PatchForce {
+        let position = |v: u32| self.state.positions[v as usize].cast::<f64>();
+        let mut middle = Vec3::<f64>::ZERO;
+        for &v in &patch.vertices {
+            middle += position(v) * (1.0 / patch.vertices.len() as f64);
+        }
+        let (mut force, mut torque) = (Vec3::ZERO, Vec3::ZERO);
+        for &v in &patch.vertices {
+            force += on_vertex(v);
+            torque += (position(v) - middle).cross(on_vertex(v));
+        }
+        let (force, torque) = (force.to_array(), torque.to_array());
+        PatchForce { name: name.to_owned(), kind, force, torque }
     }
 }

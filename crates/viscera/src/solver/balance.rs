@@ -13,7 +13,7 @@ use crate::elements::{attachment, deformation_gradient, green_strain, internal_f
 use crate::elements::{neo_hookean, spring};
 use crate::material::MaterialModel;
 use crate::model::Model;
-use crate::scalar::{Mat3, Real, Vec3};
+use crate::scalar::{Real, Vec3};
 use crate::state::State;
 
 /// Forces and works of one step, in double precision.
@@ -25,8 +25,8 @@ pub struct ForceBalance {
     pub unbalanced: f64,
     /// Sum of the magnitudes of all loads [N]: weights, external forces, reactions of pins.
     pub load: f64,
-    /// Work [J] of the elastic forces through the displacement from rest, `sum V P : (F - I)`.
-    pub elastic_work: f64,
+    /// Elastic energy [J] of the tetrahedra.
+    pub elastic_energy: f64,
     /// Work [J] of the residuals of free vertices through their displacements from rest.
     pub residual_work: f64,
 }
@@ -37,12 +37,13 @@ impl ForceBalance {
         if self.load > 0.0 { self.unbalanced / self.load } else { 0.0 }
     }
 
-    /// The share of the elastic work that nothing on the outside does: for a body at rest, how
-    /// much too little (positive) or too much (negative) it has been deformed, an estimate of the
-    /// error of the apparent stiffness. For a linear body at rest the displacement `u` has
-    /// `u K u - u f` here, which is 0 for the solution and 1 - s for a shape s times the solution.
+    /// Residual work over twice the elastic energy: an estimate of how far the apparent stiffness
+    /// is off. A linear body at rest has `u (K u - f)/(u K u)` here, which is `1 - s` where `u` is
+    /// `1/s` times the solution: 0 for the solution, positive where the body has given way too
+    /// much, negative where too little. Energy, not the work of the stresses, because that one
+    /// means nothing after a turn.
     pub fn stiffness_error(&self) -> f64 {
-        if self.elastic_work.abs() > 0.0 { self.residual_work / self.elastic_work } else { 0.0 }
+        if self.elastic_energy > 0.0 { 0.5 * self.residual_work / self.elastic_energy } else { 0.0 }
     }
 
     pub(super) fn measure<S: Real>(
@@ -69,16 +70,17 @@ impl ForceBalance {
                 let (lambda, mu) = (material.lame_lambda.to_f64(), material.lame_mu.to_f64());
                 let f = deformation_gradient(&x, &shape);
                 let strain = green_strain::strain(&f);
-                let mut piola = match set.model {
-                    MaterialModel::SaintVenantKirchhoff => {
-                        green_strain::piola(&f, &strain, lambda, mu)
-                    }
-                    MaterialModel::StableNeoHookean => neo_hookean::piola(&f, lambda, mu),
+                let (energy, mut piola) = match set.model {
+                    MaterialModel::SaintVenantKirchhoff => (
+                        green_strain::energy_density(&strain, lambda, mu),
+                        green_strain::piola(&f, &strain, lambda, mu),
+                    ),
+                    MaterialModel::StableNeoHookean => (
+                        neo_hookean::energy_density(&f, lambda, mu),
+                        neo_hookean::piola(&f, lambda, mu),
+                    ),
                 };
-                let h = f - Mat3::IDENTITY;
-                for axis in 0..3 {
-                    self.elastic_work += volume * piola.columns[axis].dot(h.columns[axis]);
-                }
+                self.elastic_energy += volume * energy;
                 if let Some(start) = strains.get(tet) {
                     let rate = material.viscosity.to_f64() / dt;
                     let change = std::array::from_fn(|p| (strain[p] - start[p].to_f64()) * rate);

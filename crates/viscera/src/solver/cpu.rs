@@ -144,7 +144,7 @@ impl<S: Real> Workspace<S> {
     fn measure_strain(&mut self, step: &Step<'_, S>, state: &State<S>) {
         for (set, strains) in step.model.tet_sets().into_iter().zip(&mut self.start_strain) {
             for (tet, strain) in strains.iter_mut().enumerate() {
-                let x = set.vertices[tet].map(|v| state.positions[v as usize]);
+                let x = corners(&state.positions, set.vertices[tet]);
                 let f = deformation_gradient(&x, &set.inverse_rest_shape[tet]);
                 *strain = green_strain::strain(&f);
             }
@@ -205,7 +205,7 @@ impl<S: Real> Workspace<S> {
         let (x, l) = (&state.positions, &state.multipliers);
         for set in model.tet_sets() {
             for tet in 0..set.len() {
-                let corners = set.vertices[tet].map(|v| x[v as usize]);
+                let corners = corners(x, set.vertices[tet]);
                 let shape = &set.inverse_rest_shape[tet];
                 let mut loads = match set.model {
                     MaterialModel::SaintVenantKirchhoff => green_strain::corner_loads(
@@ -427,11 +427,13 @@ impl<S: Real> Sweep<'_, S> {
         tet: usize,
     ) {
         let copies = set.copies[tet];
-        let w = set.vertices[tet].map(|v| self.weights[v as usize]);
+        let [a, b, c, d] = set.vertices[tet];
+        let weight = |v: u32| self.weights[v as usize];
+        let w = [weight(a), weight(b), weight(c), weight(d)];
         let shape = &set.inverse_rest_shape[tet];
         let material = &model.materials[set.material[tet] as usize];
         let step_volume = set.rest_volume[tet] * S::from_f64(self.dt * self.dt);
-        let x = copies.map(|copy| self.points[copy as usize]);
+        let x = corners(self.points, copies);
         match set.model {
             MaterialModel::SaintVenantKirchhoff => {
                 let at = set.multiplier_offset + 6 * tet;
@@ -454,7 +456,7 @@ impl<S: Real> Sweep<'_, S> {
             // Kelvin-Voigt as an energy: eta V |C - C_n|_D^2 / (2 dt), so a~ = D^-1/(V eta dt).
             let at = viscous_offset + 6 * tet;
             let l = read(self.multipliers, at);
-            let x = copies.map(|copy| self.points[copy as usize]);
+            let x = corners(self.points, copies);
             let scale = S::ONE / (set.rest_volume[tet] * material.viscosity * S::from_f64(self.dt));
             let (target, compliance) = (&start_strain[tet], &material.compliance);
             let change = green_strain::solve(&x, &w, shape, &l, target, compliance, scale);
@@ -603,8 +605,16 @@ fn fill_multiplier_weights<S: Real>(step: &Step<'_, S>, weights: &mut [S]) {
 }
 
 #[inline(always)]
-fn read<S: Copy, const N: usize>(values: &[S], at: usize) -> [S; N] {
-    std::array::from_fn(|i| values[at + i])
+fn read<S: Real, const N: usize>(values: &[S], at: usize) -> [S; N] {
+    let mut numbers = [S::ZERO; N];
+    numbers.copy_from_slice(&values[at..at + N]);
+    numbers
+}
+
+/// Positions of a tetrahedron's corners.
+#[inline(always)]
+fn corners<S: Real>(points: &[Vec3<S>], [a, b, c, d]: [u32; 4]) -> [Vec3<S>; 4] {
+    [points[a as usize], points[b as usize], points[c as usize], points[d as usize]]
 }
 
 #[inline(always)]

@@ -1,0 +1,123 @@
+//! Files in and out: messages that name the place, and writing that leaves no half of a file.
+
+use anyhow::{Context, Result, bail};
+use std::fs;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+/// The bytes of a file, or a message with the next move.
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    if path.is_dir() {
+        bail!("{} is a folder; name a file in it", path.display());
+    }
+    fs::read(path).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => {
+            anyhow::anyhow!("{}: there is no such file; check the name", path.display())
+        }
+        ErrorKind::PermissionDenied => {
+            anyhow::anyhow!("{}: no permission to read it", path.display())
+        }
+        _ => anyhow::anyhow!("{}: {error}", path.display()),
+    })
+}
+
+/// Prints text; a reader that has seen enough (`| head`) is no error.
+pub fn print(text: &str) -> Result<()> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(error).context("cannot print the result")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Where a scene's mesh files are looked for: beside the scene, then in the data folder.
+pub struct Library {
+    folders: Vec<PathBuf>,
+}
+
+impl Library {
+    /// For a scene file and the folder that `--data` names.
+    pub fn new(scene: &Path, data: Option<&Path>) -> Self {
+        let beside = scene.parent().unwrap_or(Path::new(".")).to_owned();
+        Self { folders: std::iter::once(beside).chain(data.map(Path::to_owned)).collect() }
+    }
+
+    /// The bytes of a file as a scene names it, or a message with the next move.
+    pub fn load(&self, name: &str) -> Result<Vec<u8>, String> {
+        let path = self.folders.iter().map(|folder| folder.join(name)).find(|path| path.exists());
+        match path {
+            Some(path) => read(&path).map_err(|error| error.to_string()),
+            None => {
+                let folders: Vec<String> =
+                    self.folders.iter().map(|folder| shown_folder(folder)).collect();
+                Err(format!(
+                    "{name}: there is no such file in {}; put it there, or name its folder with \
+                     --data",
+                    folders.join(" or ")
+                ))
+            }
+        }
+    }
+}
+
+fn shown_folder(folder: &Path) -> String {
+    if folder.as_os_str().is_empty() { "this folder".into() } else { folder.display().to_string() }
+}
+
+/// The folder a run writes to.
+pub struct OutputFolder {
+    path: PathBuf,
+}
+
+impl OutputFolder {
+    /// Makes the folder and makes sure that it can be written to, before anything is computed.
+    pub fn create(path: &Path) -> Result<Self> {
+        let advice =
+            || format!("cannot write to {}; choose another folder with --out", path.display());
+        fs::create_dir_all(path).with_context(advice)?;
+        let probe = path.join(".probe.part");
+        fs::write(&probe, b"").and_then(|()| fs::remove_file(&probe)).with_context(advice)?;
+        Ok(Self { path: path.to_owned() })
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes a file aside and renames it, so that no reader ever meets a part of it.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        let target = self.path.join(name);
+        let part = self.path.join(format!("{name}.part"));
+        let write = || -> std::io::Result<()> {
+            if let Some(folder) = target.parent() {
+                fs::create_dir_all(folder)?;
+            }
+            let mut file = fs::File::create(&part)?;
+            file.write_all(bytes)?;
+            file.sync_data()?;
+            fs::rename(&part, &target)
+        };
+        write().map_err(|error| {
+            // Nothing half-written stays behind; the first error is the one to report.
+            let _ = fs::remove_file(&part);
+            anyhow::anyhow!("cannot write {}: {error}", target.display())
+        })
+    }
+
+    /// Removes what an earlier run left in a sub-folder: files of these kinds, nothing else.
+    pub fn clear(&self, folder: &str, prefixes: &[&str], extension: &str) -> Result<()> {
+        let Ok(entries) = fs::read_dir(self.path.join(folder)) else { return Ok(()) };
+        for entry in entries.flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let is_ours = prefixes.iter().any(|prefix| name.starts_with(prefix));
+            if is_ours && name.ends_with(extension) {
+                let path = entry.path();
+                fs::remove_file(&path)
+                    .with_context(|| format!("cannot remove the old {}", path.display()))?;
+            }
+        }
+        Ok(())
+    }
+}

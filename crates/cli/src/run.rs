@@ -1,0 +1,207 @@
+//! `viscera run`.
+
+use crate::files::{self, Library, OutputFolder};
+use crate::film::Film;
+use crate::series::Series;
+use crate::summary::{FrameLine, Summary};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+use viscera::scalar::Real;
+use viscera::scene::Scene;
+use viscera::settings::Precision;
+use viscera::simulation::{Assembly, Simulation};
+
+/// Simulate a scene; write meshes, a picture, an animation and the numbers
+///
+/// Writes to the output folder: tissue.pvd (open it in ParaView: displacement, velocity, J,
+/// principal stretches, von Mises stress, energy density, region), surface.pvd, final.vtu,
+/// final_surface.obj, picture.png, motion.gif and summary.json. Ctrl-C ends a run cleanly: what is
+/// finished is kept and summary.json says so.
+#[derive(Args)]
+pub struct RunArguments {
+    /// The scene file
+    scene: PathBuf,
+    /// Folder for the results [default: out/NAME-OF-THE-SCENE]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Compute so many frames instead of the scene's duration
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    frames: Option<u64>,
+    /// Write every K-th frame; the same as --set output.every=K
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    every: Option<u32>,
+    /// Change a setting: KEY=VALUE, as in `solver.iterations=20` or
+    /// `body.liver.material.young="8 kPa"`; may be repeated. `viscera scene describe` lists keys
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
+    /// Folder where mesh files are looked for that are not beside the scene
+    #[arg(long, value_name = "DIR", env = "VISCERA_DATA")]
+    data: Option<PathBuf>,
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Everything was computed and written.
+    Finished,
+    /// Ctrl-C ended it; what was finished is written.
+    Interrupted,
+}
+
+/// Carries out `viscera run`.
+pub fn run(arguments: &RunArguments) -> Result<Outcome> {
+    let scene = read_scene(arguments)?;
+    let library = Library::new(&arguments.scene, arguments.data.as_deref());
+    let assembly = Assembly::new(&scene, &mut |name| library.load(name))?;
+    let stem = arguments.scene.file_stem().unwrap_or(arguments.scene.as_os_str());
+    let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem));
+    let out = OutputFolder::create(&folder)?;
+    let frames = arguments.frames.unwrap_or_else(|| scene.frame_count());
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupted);
+    // A second Ctrl-C ends the program at once, as one would expect of the first elsewhere.
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .context("cannot listen for Ctrl-C")?;
+    match scene.solver.precision {
+        Precision::F32 => simulate::<f32>(scene, assembly, &out, frames, &interrupted),
+        Precision::F64 => simulate::<f64>(scene, assembly, &out, frames, &interrupted),
+    }
+}
+
+fn read_scene(arguments: &RunArguments) -> Result<Scene> {
+    let name = arguments.scene.display().to_string();
+    let bytes = files::read(&arguments.scene)?;
+    let Ok(text) = String::from_utf8(bytes) else {
+        bail!("{name} is not a text file; a scene is TOML in UTF-8");
+    };
+    let every = arguments.every.map(|every| every.to_string());
+    let mut overrides = Vec::new();
+    for setting in &arguments.settings {
+        let Some((key, value)) = setting.split_once('=') else {
+            bail!("--set {setting}: write KEY=VALUE, for example --set solver.iterations=20");
+        };
+        overrides.push((key.trim(), value.trim()));
+    }
+    if let Some(every) = &every {
+        overrides.push(("output.every", every));
+    }
+    Ok(Scene::parse(&name, &text, &overrides)?)
+}
+
+fn simulate<S: Real>(
+    scene: Scene,
+    assembly: Assembly,
+    out: &OutputFolder,
+    frames: u64,
+    interrupted: &AtomicBool,
+) -> Result<Outcome> {
+    for note in &assembly.notes {
+        eprintln!("note: {note}");
+    }
+    let mut simulation = Simulation::<S>::new(scene, assembly)?;
+    let mut summary = Summary::new(&simulation);
+    let model = &summary.model;
+    println!(
+        "{}: {} tetrahedra, {} vertices, {:.3} kg, {} colours, {} frames of {} substeps x {} \
+         iterations",
+        summary.title,
+        model.tets,
+        model.vertices,
+        model.mass,
+        model.colors,
+        frames,
+        simulation.scene().solver.substeps,
+        simulation.scene().solver.iterations,
+    );
+    let draws = simulation.scene().output.picture;
+    let mut film = draws.then(|| Film::new(&simulation, frames)).transpose()?;
+    let mut series = Series::create(out)?;
+    series.push(out, &simulation)?;
+    let every = u64::from(simulation.scene().output.every);
+    let bar = progress_bar(frames, "simulating", "{msg}");
+    let mut failure = None;
+    while simulation.frame() < frames && !interrupted.load(Ordering::Relaxed) {
+        let start = Instant::now();
+        if let Err(error) = simulation.advance_frame() {
+            failure = Some(error);
+            break;
+        }
+        let wall_seconds = start.elapsed().as_secs_f64();
+        let report = simulation.report();
+        let last = simulation.frame() == frames;
+        if last || simulation.frame() % every == 0 {
+            series.push(out, &simulation)?;
+        }
+        if let Some(film) = &mut film {
+            film.push(&simulation, &report, last || interrupted.load(Ordering::Relaxed));
+        }
+        summary.frames.push(FrameLine { report, wall_seconds });
+        let speed = simulation.time() / summary.wall_seconds();
+        bar.set_position(simulation.frame());
+        bar.set_message(format!("t = {:.2} s, {speed:.2} x real time", simulation.time()));
+    }
+    bar.finish_and_clear();
+
+    summary.finished = simulation.frame() == frames && failure.is_none();
+    summary.stopped = match &failure {
+        Some(error) => Some(error.to_string()),
+        None if summary.finished => None,
+        None => Some("interrupted".into()),
+    };
+    summary.judge();
+    if failure.is_none() {
+        series.finish(out, &simulation)?;
+    }
+    // Numbers before pictures: drawing takes a while, and a second Ctrl-C may cut it short.
+    write_summary(out, &summary)?;
+    if let Some(film) = &film {
+        let bar = progress_bar(film.picture_count(), "drawing", "{pos} of {len} pictures");
+        film.develop(out, simulation.scene().time.frame, &bar)?;
+        bar.finish_and_clear();
+    }
+    if let Some(error) = failure {
+        let kept = summary.frames.len();
+        bail!("{error} ({kept} frames before that are in {})", out.path().display());
+    }
+    print!("{}", summary.table());
+    let wall = summary.wall_seconds();
+    println!(
+        "{:.2} s simulated in {wall:.2} s: {:.2} x real time, {:.2} ms per frame",
+        simulation.time(),
+        simulation.time() / wall,
+        1e3 * wall / summary.frames.len().max(1) as f64
+    );
+    for warning in &summary.warnings {
+        println!("warning: {warning}");
+    }
+    println!("results: {}", out.path().display());
+    if summary.finished {
+        return Ok(Outcome::Finished);
+    }
+    eprintln!("interrupted after {} of {frames} frames", simulation.frame());
+    Ok(Outcome::Interrupted)
+}
+
+fn write_summary(out: &OutputFolder, summary: &Summary) -> Result<()> {
+    let text = serde_json::to_string_pretty(summary).context("cannot write summary.json")?;
+    out.write("summary.json", text.as_bytes())
+}
+
+fn progress_bar(length: u64, what: &str, tail: &str) -> ProgressBar {
+    let bar = ProgressBar::new(length);
+    let template = format!("{what} [{{bar:30}}] {tail}, {{eta}} left");
+    // The template is ours and valid; a bar without it would still count.
+    if let Ok(style) = ProgressStyle::with_template(&template) {
+        bar.set_style(style.progress_chars("=> "));
+    }
+    bar
+}

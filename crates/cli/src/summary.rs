@@ -1,0 +1,181 @@
+//! `summary.json`, and the table and advice printed at the end of a run.
+
+use serde::Serialize;
+use std::collections::BTreeMap;
+use viscera::scalar::Real;
+use viscera::simulation::{FrameReport, Simulation};
+
+/// The numbers of one frame and what it took.
+#[derive(Serialize)]
+pub struct FrameLine {
+    #[serde(flatten)]
+    pub report: FrameReport,
+    /// Time it took to compute [s].
+    pub wall_seconds: f64,
+}
+
+/// What was simulated.
+#[derive(Serialize)]
+pub struct ModelSummary {
+    pub bodies: usize,
+    pub vertices: usize,
+    pub tets: usize,
+    /// Mass of all vertices [kg].
+    pub mass: f64,
+    pub colors: usize,
+    /// The most constraints at one vertex.
+    pub largest_clique: usize,
+    /// Copies of vertices that a sweep works on; as many as vertices where nothing is split.
+    pub copies: usize,
+    pub springs: usize,
+    pub attachments: usize,
+}
+
+/// The content of `summary.json`. Units are SI throughout.
+#[derive(Serialize)]
+pub struct Summary {
+    pub viscera: &'static str,
+    pub scene: String,
+    pub title: String,
+    /// False where the run was interrupted or failed.
+    pub finished: bool,
+    /// Why the run ended early.
+    pub stopped: Option<String>,
+    pub frame_seconds: f64,
+    pub velocity_factor: f64,
+    pub gravity: [f64; 3],
+    /// Solver settings, as a scene file would have them.
+    pub solver: BTreeMap<&'static str, serde_json::Value>,
+    pub model: ModelSummary,
+    /// What was repaired and what to know.
+    pub notes: Vec<String>,
+    /// Where the result falls short.
+    pub warnings: Vec<String>,
+    pub frames: Vec<FrameLine>,
+}
+
+impl Summary {
+    /// Before the first frame.
+    pub fn new<S: Real>(simulation: &Simulation<S>) -> Self {
+        let (scene, model) = (simulation.scene(), simulation.model());
+        Self {
+            viscera: env!("CARGO_PKG_VERSION"),
+            scene: scene.name.clone(),
+            title: scene.title.clone(),
+            finished: false,
+            stopped: None,
+            frame_seconds: scene.time.frame,
+            velocity_factor: scene.time.velocity_factor,
+            gravity: scene.world.gravity.to_array(),
+            solver: scene
+                .solver
+                .values()
+                .into_iter()
+                .map(|(key, text)| (key, json(text)))
+                .collect(),
+            model: ModelSummary {
+                bodies: model.bodies.len(),
+                vertices: model.vertex_count(),
+                tets: model.tet_count(),
+                mass: model.masses.iter().map(|m| m.to_f64()).sum(),
+                colors: model.color_count,
+                largest_clique: model.largest_clique,
+                copies: model.copy_count(),
+                springs: model.springs.vertices.len(),
+                attachments: model.attachments.vertices.len(),
+            },
+            notes: simulation.assembly().notes.clone(),
+            warnings: Vec::new(),
+            frames: Vec::new(),
+        }
+    }
+
+    /// Looks for what a person must know before believing the result.
+    pub fn judge(&mut self) {
+        self.warnings = warnings(&self.frames);
+    }
+
+    /// Wall time of all frames [s].
+    pub fn wall_seconds(&self) -> f64 {
+        self.frames.iter().map(|frame| frame.wall_seconds).sum()
+    }
+
+    /// A short table of the run.
+    pub fn table(&self) -> String {
+        let mut text = format!(
+            "{:>8} {:>11} {:>11} {:>9} {:>9} {:>9} {:>9}\n",
+            "time", "elastic", "kinetic", "volume", "stretch", "inverted", "residual"
+        );
+        let count = self.frames.len();
+        let rows = 6.min(count);
+        let mut shown = usize::MAX;
+        for row in 1..=rows {
+            let index = (row * count).div_ceil(rows) - 1;
+            if index == shown {
+                continue;
+            }
+            shown = index;
+            let report = &self.frames[index].report;
+            text.push_str(&format!(
+                "{:>6.3} s {:>9.3} mJ {:>9.3} mJ {:>8.2}% {:>9.3} {:>9} {:>9.1e}\n",
+                report.time,
+                1e3 * report.energy.elastic,
+                1e3 * report.energy.kinetic,
+                100.0 * report.deformation.volume_ratio,
+                report.deformation.largest_stretch,
+                report.deformation.inverted,
+                report.relative_residual,
+            ));
+        }
+        if let Some(last) = self.frames.last() {
+            for patch in &last.report.patches {
+                let ([x, y, z], [a, b, c]) = (patch.force, patch.torque);
+                let (force, torque) = (x.hypot(y).hypot(z), a.hypot(b).hypot(c));
+                text.push_str(&format!(
+                    "{}: force {force:.4} N, as a vector ({x:.4}, {y:.4}, {z:.4}) N, torque \
+                     {torque:.4} N m\n",
+                    patch.name
+                ));
+            }
+        }
+        text
+    }
+}
+
+/// A setting as a scene file writes it is JSON as well: a number, a truth value or a quoted word.
+fn json(text: String) -> serde_json::Value {
+    serde_json::from_str(&text).unwrap_or(serde_json::Value::String(text))
+}
+
+/// A result whose apparent stiffness is off by more than this is not what was asked for.
+const STIFFNESS_ERROR: f64 = 0.05;
+
+/// Fewer frames than these are the first jerk of a run, in which multipliers are still building up.
+const FEWEST_FRAMES: usize = 5;
+
+fn warnings(frames: &[FrameLine]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    // The last quarter: a single frame of a moving body says little.
+    let tail = &frames[frames.len() - frames.len().div_ceil(4)..];
+    let mean =
+        tail.iter().map(|frame| frame.report.stiffness_error).sum::<f64>() / tail.len() as f64;
+    if tail.len() >= FEWEST_FRAMES && mean.abs() > STIFFNESS_ERROR {
+        let how = if mean > 0.0 { "softer" } else { "stiffer" };
+        warnings.push(format!(
+            "the solver falls short: the tissue answers as if it were about {:.0} % {how} than \
+             asked for (mean of the last {} frames); raise solver.iterations or solver.substeps, \
+             and keep solver.rebase and solver.keep_multipliers on",
+            100.0 * mean.abs(),
+            tail.len()
+        ));
+    }
+    let inverted = frames.iter().map(|frame| frame.report.deformation.inverted).max().unwrap_or(0);
+    let left = frames.last().map_or(0, |frame| frame.report.deformation.inverted);
+    if inverted > 0 {
+        warnings.push(format!(
+            "up to {inverted} tetrahedra were inverted during the run, {left} at its end; pull \
+             less, spread the pull over more vertices, or use model = \"stable_neo_hookean\""
+        ));
+    }
+    warnings
+}
