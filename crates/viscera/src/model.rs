@@ -477,7 +477,7 @@ impl ModelBuilder {
     fn intern(&mut self, material: &Material) -> u32 {
         let known = self.materials.iter().position(|m| m == material);
         let index = known.unwrap_or_else(|| {
-            self.materials.push(material.clone());
+            self.materials.push(*material);
             self.materials.len() - 1
         });
         index as u32

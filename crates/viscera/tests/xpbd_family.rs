@@ -470,7 +470,7 @@ fn pinned_vertices_change_from_step_to_step() {
             let mut free_steps = 0;
             for frame in 0..60 {
                 let mut inputs = Inputs::default();
-                let taken = |v: usize| (v + frame / 5) % 7 == 0 && frame % 15 < 10;
+                let taken = |v: usize| (v + frame / 5).is_multiple_of(7) && frame % 15 < 10;
                 let shift = random.vector(0.002);
                 for (v, x) in run.state.positions.iter().enumerate().filter(|(v, _)| taken(*v)) {
                     inputs.pins.push(Pin { vertex: v as u32, target: *x + shift });
