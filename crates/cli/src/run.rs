@@ -138,7 +138,7 @@ fn simulate<S: Real>(
         let wall_seconds = start.elapsed().as_secs_f64();
         let report = simulation.report();
         let last = simulation.frame() == frames;
-        if last || simulation.frame() % every == 0 {
+        if last || simulation.frame().is_multiple_of(every) {
             series.push(out, &simulation)?;
         }
         if let Some(film) = &mut film {
