@@ -8,10 +8,11 @@
 use std::ops::Range;
 
 use crate::coloring::{Coloring, ConstraintGraph};
+use crate::elements::TetForm;
 use crate::material::{Material, MaterialModel};
 use crate::mesh::{MAX_COORDINATE, TetMesh};
 use crate::scalar::{Mat3, Real, Vec3};
-use crate::settings::Colors;
+use crate::settings::{NeoHookean, SolverSettings};
 
 /// Why a model cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -93,6 +94,8 @@ pub struct MaterialConstants<S> {
 pub struct TetSet<S> {
     /// The elastic energy of the whole set.
     pub model: MaterialModel,
+    /// Its constraints.
+    pub form: TetForm,
     /// Vertices, shape [tet_count].
     pub vertices: Vec<[u32; 4]>,
     /// The copies that a sweep works on, shape [tet_count].
@@ -107,7 +110,7 @@ pub struct TetSet<S> {
     pub order: Vec<u32>,
     /// Tetrahedra of colour `c` are `color_offsets[c] .. color_offsets[c + 1]`.
     pub color_offsets: Vec<u32>,
-    /// First multiplier; a tetrahedron has [`TetSet::multiplier_count`] of them.
+    /// First multiplier; a tetrahedron has [`TetForm::multiplier_count`] of them.
     pub multiplier_offset: usize,
     /// First multiplier of the viscous block, six per tetrahedron, where any material is viscous.
     pub viscous_offset: Option<usize>,
@@ -193,14 +196,6 @@ pub struct Model<S> {
 }
 
 impl<S> TetSet<S> {
-    /// Elastic multipliers of one tetrahedron: six, or two for the stable neo-Hookean pair.
-    pub fn multiplier_count(&self) -> usize {
-        match self.model {
-            MaterialModel::SaintVenantKirchhoff => 6,
-            MaterialModel::StableNeoHookean => 2,
-        }
-    }
-
     /// Number of tetrahedra.
     pub fn len(&self) -> usize {
         self.vertices.len()
@@ -353,7 +348,10 @@ impl ModelBuilder {
     }
 
     /// Colours the constraints and lays out the arrays.
-    pub fn build<S: Real>(&self, colors: Colors) -> Result<Model<S>, ModelError> {
+    ///
+    /// The layout depends on the solver's colours and on the form in which it solves the stable
+    /// neo-Hookean energy: build a solver for the model with the same settings.
+    pub fn build<S: Real>(&self, settings: &SolverSettings) -> Result<Model<S>, ModelError> {
         if self.bodies.is_empty() {
             return Err(ModelError::Empty);
         }
@@ -367,11 +365,11 @@ impl ModelBuilder {
         for (vertex, ..) in &self.attachments {
             graph.push(&[*vertex]);
         }
-        let coloring = graph.color(self.positions.len(), colors);
+        let coloring = graph.color(self.positions.len(), settings.colors);
         debug_assert_eq!(coloring.validate(&graph), None);
         let mut layout = Layout { graph: &graph, coloring: &coloring, multipliers: 0, corners: 0 };
-        let green_strain = self.lay_out_tets(&mut layout, MaterialModel::SaintVenantKirchhoff);
-        let neo_hookean = self.lay_out_tets(&mut layout, MaterialModel::StableNeoHookean);
+        let green_strain = self.lay_out_tets(&mut layout, TetForm::GreenStrain);
+        let neo_hookean = self.lay_out_tets(&mut layout, neo_hookean_form(settings));
         let springs = self.lay_out_springs(&mut layout);
         let attachments = self.lay_out_attachments(&mut layout);
         let (multiplier_count, corner_count) = (layout.multipliers, layout.corners);
@@ -411,7 +409,13 @@ impl ModelBuilder {
         })
     }
 
-    fn lay_out_tets<S: Real>(&self, layout: &mut Layout<'_>, model: MaterialModel) -> TetSet<S> {
+    fn lay_out_tets<S: Real>(&self, layout: &mut Layout<'_>, form: TetForm) -> TetSet<S> {
+        let model = match form {
+            TetForm::GreenStrain => MaterialModel::SaintVenantKirchhoff,
+            TetForm::NeoHookeanPair | TetForm::NeoHookeanStretch => {
+                MaterialModel::StableNeoHookean
+            }
+        };
         let of_model =
             |&tet: &usize| self.materials[self.tet_material[tet] as usize].model() == model;
         let chosen: Vec<usize> = (0..self.tets.len()).filter(of_model).collect();
@@ -426,6 +430,7 @@ impl ModelBuilder {
             shapes.map(|(shape, volume)| (shape.cast(), S::from_f64(volume))).unzip();
         let mut set = TetSet {
             model,
+            form,
             vertices: order.iter().map(|&t| self.tets[t as usize]).collect(),
             copies: order.iter().map(|&t| layout.copies(t as usize)).collect(),
             inverse_rest_shape,
@@ -437,7 +442,7 @@ impl ModelBuilder {
             corner_offset: layout.take_corners(4 * order.len()),
             order,
         };
-        set.multiplier_offset = layout.take_multipliers(set.multiplier_count() * set.len());
+        set.multiplier_offset = layout.take_multipliers(form.multiplier_count() * set.len());
         set.viscous_offset = viscous.then(|| layout.take_multipliers(6 * set.len()));
         set
     }
@@ -489,6 +494,14 @@ impl ModelBuilder {
             return Ok(());
         }
         Err(ModelError::UnknownVertex { what, vertex, vertex_count })
+    }
+}
+
+/// The stretch form is made for the rebase; XPBD as published has the pair.
+fn neo_hookean_form(settings: &SolverSettings) -> TetForm {
+    match (settings.neo_hookean, settings.rebase) {
+        (NeoHookean::Pair, _) | (NeoHookean::Auto, false) => TetForm::NeoHookeanPair,
+        (NeoHookean::Stretch, _) | (NeoHookean::Auto, true) => TetForm::NeoHookeanStretch,
     }
 }
 

@@ -45,6 +45,8 @@ pub trait Scalar:
     const HALF: Self;
     /// Two in every lane.
     const TWO: Self;
+    /// Sweeps of Jacobi rotations after which a 3 x 3 matrix is diagonal to this precision.
+    const JACOBI_SWEEPS: usize;
     /// The nearest representable value, in every lane.
     fn from_f64(value: f64) -> Self;
     /// Square root, correctly rounded.
@@ -74,13 +76,14 @@ pub trait Real: Scalar<Mask = bool> + PartialOrd {
 }
 
 macro_rules! implement_real {
-    ($type:ident) => {
+    ($type:ident, $jacobi_sweeps:literal) => {
         impl Scalar for $type {
             type Mask = bool;
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
             const HALF: Self = 0.5;
             const TWO: Self = 2.0;
+            const JACOBI_SWEEPS: usize = $jacobi_sweeps;
             #[inline(always)]
             fn from_f64(value: f64) -> Self {
                 value as $type
@@ -125,8 +128,9 @@ macro_rules! implement_real {
         }
     };
 }
-implement_real!(f32);
-implement_real!(f64);
+// Convergence is quadratic from the second sweep on.
+implement_real!(f32, 4);
+implement_real!(f64, 5);
 
 /// A vector of three components.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

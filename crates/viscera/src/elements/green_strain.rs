@@ -14,7 +14,7 @@
 //! The strain cannot see inversion (`E(RF) = E(F)` for reflections `R` too): prefer the stable
 //! neo-Hookean element where tissue may turn inside out.
 
-use super::{CornerLoad, TetCorrection, shape_gradients};
+use super::{CornerLoad, TetCorrection, shape_gradients, solve_symmetric};
 use crate::scalar::{Mat3, Scalar, Vec3, vec3};
 
 /// A symmetric 6 x 6 matrix, or six constraint values.
@@ -116,45 +116,6 @@ fn gram<S: Scalar>(f: &Mat3<S>, g: &[Vec3<S>; 4], w: &[S; 4]) -> [[S; 6]; 6] {
         }
     }
     matrix
-}
-
-/// Solves `A x = b` for a symmetric positive definite matrix given by its lower triangle:
-/// `A = L D L^T`, no square roots and no branches.
-#[inline(always)]
-fn solve_symmetric<S: Scalar>(mut a: [[S; 6]; 6], mut b: Voigt<S>) -> Voigt<S> {
-    let mut inverse_pivot = [S::ZERO; 6];
-    for j in 0..6 {
-        // Row j of `a` left of the diagonal becomes L; the diagonal holds D.
-        let mut scaled = [S::ZERO; 6];
-        let mut pivot = a[j][j];
-        for k in 0..j {
-            scaled[k] = a[j][k];
-            a[j][k] *= inverse_pivot[k];
-            pivot -= a[j][k] * scaled[k];
-        }
-        inverse_pivot[j] = S::ONE / pivot;
-        for i in j + 1..6 {
-            let mut value = a[i][j];
-            for k in 0..j {
-                value -= a[i][k] * a[j][k];
-            }
-            a[i][j] = value;
-        }
-    }
-    for i in 0..6 {
-        for k in 0..i {
-            let value = a[i][k] * b[k];
-            b[i] -= value;
-        }
-    }
-    for i in (0..6).rev() {
-        b[i] *= inverse_pivot[i];
-        for k in i + 1..6 {
-            let value = a[k][i] * b[k];
-            b[i] -= value;
-        }
-    }
-    b
 }
 
 /// One block solve: the multiplier and position changes that satisfy the linearised constraint

@@ -14,6 +14,9 @@
 pub mod attachment;
 pub mod green_strain;
 pub mod neo_hookean;
+pub mod neo_hookean_pair;
+pub mod neo_hookean_stretch;
+pub mod singular_values;
 pub mod spring;
 
 use crate::scalar::{Mat3, Scalar, Vec3};
@@ -34,6 +37,27 @@ pub struct CornerLoad<S> {
     pub impulse: Vec3<S>,
     /// Bound on the row of the geometric stiffness `sum lambda d^2 C` [kg].
     pub mass_bound: S,
+}
+
+/// How the energy of a tetrahedron is written as constraints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TetForm {
+    /// Saint Venant-Kirchhoff as six components of the Green strain.
+    GreenStrain,
+    /// Stable neo-Hookean as volume and norm of the deformation gradient, as published.
+    NeoHookeanPair,
+    /// Stable neo-Hookean as six components of the stretch, exact at rest without added mass.
+    NeoHookeanStretch,
+}
+
+impl TetForm {
+    /// Multipliers of one tetrahedron.
+    pub fn multiplier_count(self) -> usize {
+        match self {
+            Self::GreenStrain | Self::NeoHookeanStretch => 6,
+            Self::NeoHookeanPair => 2,
+        }
+    }
 }
 
 /// Edge vectors from corner 0 as columns [m].
@@ -68,4 +92,43 @@ pub fn internal_forces<S: Scalar>(
         *force = -(*piola * *force) * rest_volume;
     }
     forces
+}
+
+/// Solves `A x = b` for a symmetric positive definite matrix given by its lower triangle:
+/// `A = L D L^T`, no square roots and no branches.
+#[inline(always)]
+fn solve_symmetric<S: Scalar>(mut a: [[S; 6]; 6], mut b: [S; 6]) -> [S; 6] {
+    let mut inverse_pivot = [S::ZERO; 6];
+    for j in 0..6 {
+        // Row j of `a` left of the diagonal becomes L; the diagonal holds D.
+        let mut scaled = [S::ZERO; 6];
+        let mut pivot = a[j][j];
+        for k in 0..j {
+            scaled[k] = a[j][k];
+            a[j][k] *= inverse_pivot[k];
+            pivot -= a[j][k] * scaled[k];
+        }
+        inverse_pivot[j] = S::ONE / pivot;
+        for i in j + 1..6 {
+            let mut value = a[i][j];
+            for k in 0..j {
+                value -= a[i][k] * a[j][k];
+            }
+            a[i][j] = value;
+        }
+    }
+    for i in 0..6 {
+        for k in 0..i {
+            let value = a[i][k] * b[k];
+            b[i] -= value;
+        }
+    }
+    for i in (0..6).rev() {
+        b[i] *= inverse_pivot[i];
+        for k in i + 1..6 {
+            let value = a[k][i] * b[k];
+            b[i] -= value;
+        }
+    }
+    b
 }

@@ -11,7 +11,7 @@ mod solver;
 mod tree;
 
 pub use solver::{
-    Acceleration, AndersonOn, Colors, Precision, RelaxationForm, SolverSettings, Start,
+    Acceleration, AndersonOn, Colors, NeoHookean, Precision, RelaxationForm, SolverSettings, Start,
 };
 pub use tree::Place;
 

@@ -59,6 +59,18 @@ choices! {
 }
 
 choices! {
+    /// The constraints of a stable neo-Hookean tetrahedron.
+    pub enum NeoHookean {
+        /// `stretch` with `rebase`, otherwise `pair`.
+        Auto = "auto",
+        /// Volume and norm of the deformation gradient, as published.
+        Pair = "pair",
+        /// Six components of the stretch: right at rest and in motion. Needs `rebase`.
+        Stretch = "stretch",
+    }
+}
+
+choices! {
     /// Where the iteration of a substep starts.
     pub enum Start {
         /// `inertial` where multipliers are kept, otherwise `predicted`.
@@ -125,6 +137,9 @@ settings_table! {
         /// Keep the multipliers from step to step. With `rebase` this makes the stiffness
         /// independent of the number of iterations; without it the body freezes.
         keep_multipliers: bool = true, truth();
+        /// The constraints of a stable neo-Hookean tetrahedron. With `rebase` the pair comes to the
+        /// right rest as well, but slowly: it moves as if it were heavier.
+        neo_hookean: NeoHookean = (NeoHookean::Auto), one_of::<NeoHookean>();
         /// Where the iteration of a substep starts.
         start: Start = (Start::Auto), one_of::<Start>();
     }

@@ -95,7 +95,7 @@ pub struct Simulation<S> {
 impl<S: Real> Simulation<S> {
     /// Builds the model and takes the memory for its steps.
     pub fn new(scene: Scene, assembly: Assembly) -> Result<Self, ModelError> {
-        let model = assembly.builder.build::<S>(scene.solver.colors)?;
+        let model = assembly.builder.build::<S>(&scene.solver)?;
         let pins = assembly.fixings.iter().chain(&assembly.motions);
         let forces = assembly.forces.iter().map(|patch| patch.vertices.len()).sum();
         let inputs = Inputs {

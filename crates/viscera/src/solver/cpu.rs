@@ -4,9 +4,8 @@ use super::Inputs;
 use super::StepError;
 use super::acceleration::{Anderson, Chebyshev, chebyshev_update};
 use super::plan::Stage;
-use crate::elements::{CornerLoad, attachment, deformation_gradient, green_strain};
-use crate::elements::{neo_hookean, spring};
-use crate::material::MaterialModel;
+use crate::elements::{CornerLoad, TetForm, attachment, deformation_gradient, green_strain};
+use crate::elements::{neo_hookean_pair, neo_hookean_stretch, spring};
 use crate::model::{Model, TetSet};
 use crate::scalar::{Real, Vec3};
 use crate::settings::{Acceleration, AndersonOn, RelaxationForm, SolverSettings, Start};
@@ -207,17 +206,17 @@ impl<S: Real> Workspace<S> {
             for tet in 0..set.len() {
                 let corners = corners(x, set.vertices[tet]);
                 let shape = &set.inverse_rest_shape[tet];
-                let mut loads = match set.model {
-                    MaterialModel::SaintVenantKirchhoff => green_strain::corner_loads(
-                        &corners,
-                        shape,
-                        &read(l, set.multiplier_offset + 6 * tet),
-                    ),
-                    MaterialModel::StableNeoHookean => neo_hookean::corner_loads(
-                        &corners,
-                        shape,
-                        &read(l, set.multiplier_offset + 2 * tet),
-                    ),
+                let at = set.multiplier_offset + set.form.multiplier_count() * tet;
+                let mut loads = match set.form {
+                    TetForm::GreenStrain => {
+                        green_strain::corner_loads(&corners, shape, &read(l, at))
+                    }
+                    TetForm::NeoHookeanPair => {
+                        neo_hookean_pair::corner_loads(&corners, shape, &read(l, at))
+                    }
+                    TetForm::NeoHookeanStretch => {
+                        neo_hookean_stretch::corner_loads(&corners, shape, &read(l, at))
+                    }
                 };
                 if let Some(offset) = set.viscous_offset {
                     let viscous = read(l, offset + 6 * tet);
@@ -434,20 +433,24 @@ impl<S: Real> Sweep<'_, S> {
         let material = &model.materials[set.material[tet] as usize];
         let step_volume = set.rest_volume[tet] * S::from_f64(self.dt * self.dt);
         let x = corners(self.points, copies);
-        match set.model {
-            MaterialModel::SaintVenantKirchhoff => {
-                let at = set.multiplier_offset + 6 * tet;
+        let at = set.multiplier_offset + set.form.multiplier_count() * tet;
+        let (lambda, mu) = (material.lame_lambda, material.lame_mu);
+        match set.form {
+            TetForm::GreenStrain => {
                 let l = read(self.multipliers, at);
                 let (compliance, scale) = (&material.compliance, S::ONE / step_volume);
                 let rest = [S::ZERO; 6];
                 let change = green_strain::solve(&x, &w, shape, &l, &rest, compliance, scale);
                 self.apply(at, &copies, &change.multipliers, &change.positions);
             }
-            MaterialModel::StableNeoHookean => {
-                let at = set.multiplier_offset + 2 * tet;
+            TetForm::NeoHookeanPair => {
                 let l = read(self.multipliers, at);
-                let (lambda, mu) = (material.lame_lambda, material.lame_mu);
-                let change = neo_hookean::solve(&x, &w, shape, &l, lambda, mu, step_volume);
+                let change = neo_hookean_pair::solve(&x, &w, shape, &l, lambda, mu, step_volume);
+                self.apply(at, &copies, &change.multipliers, &change.positions);
+            }
+            TetForm::NeoHookeanStretch => {
+                let l = read(self.multipliers, at);
+                let change = neo_hookean_stretch::solve(&x, &w, shape, &l, lambda, mu, step_volume);
                 self.apply(at, &copies, &change.multipliers, &change.positions);
             }
         }
@@ -568,19 +571,19 @@ fn fill_multiplier_weights<S: Real>(step: &Step<'_, S>, weights: &mut [S]) {
     let model = step.model;
     let dt = S::from_f64(step.dt);
     for set in model.tet_sets() {
-        let count = set.multiplier_count();
+        let count = set.form.multiplier_count();
         for tet in 0..set.len() {
             let material = &model.materials[set.material[tet] as usize];
             let volume = set.rest_volume[tet];
             let scale = S::ONE / (volume * dt * dt);
             let at = set.multiplier_offset + count * tet;
-            match set.model {
-                MaterialModel::SaintVenantKirchhoff => {
+            match set.form {
+                TetForm::GreenStrain | TetForm::NeoHookeanStretch => {
                     for p in 0..6 {
                         weights[at + p] = material.compliance[p][p] * scale;
                     }
                 }
-                MaterialModel::StableNeoHookean => {
+                TetForm::NeoHookeanPair => {
                     weights[at] = scale / (material.lame_lambda + material.lame_mu);
                     weights[at + 1] = scale / material.lame_mu;
                 }

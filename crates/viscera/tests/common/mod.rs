@@ -5,7 +5,7 @@ use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Mat3, Real, Vec3, vec3};
-use viscera::settings::{Colors, SolverSettings};
+use viscera::settings::SolverSettings;
 use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
 
@@ -52,10 +52,14 @@ pub fn material(model: MaterialModel, young: f64, poisson: f64) -> Material {
 }
 
 /// One body of one material.
-pub fn single_body<S: Real>(mesh: &TetMesh, material: &Material, colors: Colors) -> Model<S> {
+pub fn single_body<S: Real>(
+    mesh: &TetMesh,
+    material: &Material,
+    settings: &SolverSettings,
+) -> Model<S> {
     let mut builder = ModelBuilder::new();
     builder.add_body(mesh, material).expect("a legal body");
-    builder.build(colors).expect("a legal model")
+    builder.build(settings).expect("a legal model")
 }
 
 /// Structured block [m] of six tetrahedra per cell, its interior vertices jittered by up to

@@ -1,0 +1,196 @@
+//! Stable neo-Hookean tetrahedron in the stretch form: six multipliers conjugate to the signed
+//! polar stretch.
+//!
+//! ```text
+//! F = U diag(s) V^T                            signed singular values
+//! t_i = mu s_i + e s_j s_k,  e = lh (J - a)    Biot stress, principal values
+//! L: symmetric, material axes; L' = V^T L V, g' = V^T g
+//! impulse on a corner: R L g = U L' g',  R = U V^T
+//! r = (L'_11 + s t_1, L'_22 + s t_2, L'_33 + s t_3, L'_23, L'_13, L'_12),  s = V dt^2
+//! (C + sum_i w_i B_i B_i^T) d = -C r;  L' += d;  x_i += w_i U (D g'_i)
+//! ```
+//!
+//! `D` is the symmetric matrix of `d`; rows of `B_i` are `g'_a u_a` and `g'_a u_b + g'_b u_a`. `C` is
+//! the inverse of the stiffness of the principal stretches and of the shears between them, divided
+//! by `s`. It preconditions only: a fixed point needs `r = 0`, so clamps never move it.
+//!
+//! Unlike the pair of `J` and `|F|`, the multipliers vanish at rest, and so does the geometric
+//! stiffness `(t_i + t_j)/(s_i + s_j)` of the rotation: with the rebase the tissue carries no added
+//! mass at rest. It is defined through inversion.
+
+use super::green_strain::{Voigt, symmetric};
+use super::singular_values::{SignedSvd, signed_svd};
+use super::{CornerLoad, TetCorrection, deformation_gradient, shape_gradients, solve_symmetric};
+use crate::scalar::{Mat3, Scalar, Vec3};
+
+/// The stiffness of the principal stretches counts as positive while its minors exceed this
+/// fraction of those of `mu I`; below, its indefinite part is left out.
+const CLEARLY_POSITIVE: f64 = 1e-3;
+
+/// Smallest shear stiffness as a fraction of mu.
+const SOFTEST_SHEAR: f64 = 0.1;
+
+/// Smallest `s_i + s_j` in the mass bound. The true one vanishes where a tetrahedron passes
+/// through a flat inverted state; smaller values would freeze it there.
+const SMALLEST_PAIR: f64 = 0.3;
+
+/// Principal Biot stresses `t` [Pa], and `e` [Pa].
+#[inline(always)]
+fn biot_stress<S: Scalar>(sigma: &[S; 3], lame_lambda: S, lame_mu: S) -> ([S; 3], S) {
+    let [a, b, c] = *sigma;
+    let volume_modulus = lame_lambda + lame_mu;
+    let e = volume_modulus * (a * b * c - S::ONE) - lame_mu;
+    ([lame_mu * a + e * b * c, lame_mu * b + e * a * c, lame_mu * c + e * a * b], e)
+}
+
+/// `V^T L V` as six components.
+#[inline(always)]
+fn turn<S: Scalar>(v: &Mat3<S>, components: &Voigt<S>) -> Voigt<S> {
+    let image = symmetric(components) * *v;
+    let [a, b, c] = v.columns;
+    let [x, y, z] = image.columns;
+    [a.dot(x), b.dot(y), c.dot(z), b.dot(z), a.dot(z), a.dot(y)]
+}
+
+/// Inverse of the stiffness of the principal stretches, times `1/(V dt^2)`; lower triangle
+/// `(00, 10, 11, 20, 21, 22)`.
+#[inline(always)]
+fn stretch_compliance<S: Scalar>(
+    sigma: &[S; 3],
+    lame_lambda: S,
+    lame_mu: S,
+    e: S,
+    step_volume: S,
+) -> [S; 6] {
+    let [s1, s2, s3] = *sigma;
+    let volume_modulus = lame_lambda + lame_mu;
+    let c = [s2 * s3, s1 * s3, s1 * s2];
+    let entries = |e: S| {
+        [
+            lame_mu + volume_modulus * c[0] * c[0],
+            volume_modulus * c[1] * c[0] + e * s3,
+            lame_mu + volume_modulus * c[1] * c[1],
+            volume_modulus * c[2] * c[0] + e * s2,
+            volume_modulus * c[2] * c[1] + e * s1,
+            lame_mu + volume_modulus * c[2] * c[2],
+        ]
+    };
+    let minor = |d: &[S; 6]| d[0] * d[2] - d[1] * d[1];
+    let determinant = |d: &[S; 6]| {
+        d[0] * (d[2] * d[5] - d[4] * d[4]) - d[1] * (d[1] * d[5] - d[4] * d[3])
+            + d[3] * (d[1] * d[4] - d[2] * d[3])
+    };
+    let full = entries(e);
+    let floor = S::from_f64(CLEARLY_POSITIVE) * lame_mu * lame_mu;
+    let keep = S::select(minor(&full).less(floor), S::ZERO, S::ONE);
+    let keep = S::select(determinant(&full).less(floor * lame_mu), S::ZERO, keep);
+    let d = entries(keep * e);
+    let scale = S::ONE / (determinant(&d) * step_volume);
+    [
+        (d[2] * d[5] - d[4] * d[4]) * scale,
+        (d[3] * d[4] - d[1] * d[5]) * scale,
+        (d[0] * d[5] - d[3] * d[3]) * scale,
+        (d[1] * d[4] - d[3] * d[2]) * scale,
+        (d[1] * d[3] - d[0] * d[4]) * scale,
+        minor(&d) * scale,
+    ]
+}
+
+/// One block solve. `w` are the inverse masses [1/kg] of the corners, `multipliers` the components
+/// of `L` [J s^2] in material axes, `step_volume = V dt^2` [m^3 s^2].
+#[inline(always)]
+pub fn solve<S: Scalar>(
+    x: &[Vec3<S>; 4],
+    w: &[S; 4],
+    inverse_rest_shape: &Mat3<S>,
+    multipliers: &Voigt<S>,
+    lame_lambda: S,
+    lame_mu: S,
+    step_volume: S,
+) -> TetCorrection<S, 6> {
+    let f = deformation_gradient(x, inverse_rest_shape);
+    let SignedSvd { u, sigma, v } = signed_svd(&f);
+    let mut g = shape_gradients(inverse_rest_shape);
+    let material_axes = v.transpose();
+    for gradient in &mut g {
+        *gradient = material_axes * *gradient;
+    }
+    let (stress, e) = biot_stress(&sigma, lame_lambda, lame_mu);
+    let principal = turn(&v, multipliers);
+    let residual = [
+        principal[0] + step_volume * stress[0],
+        principal[1] + step_volume * stress[1],
+        principal[2] + step_volume * stress[2],
+        principal[3],
+        principal[4],
+        principal[5],
+    ];
+
+    // sum_i w_i B_i B_i^T, from G = sum_i w_i g'_i g'_i^T; the axes u are orthonormal.
+    let entry = |a: usize, b: usize| {
+        (w[0] * g[0][a] * g[0][b] + w[1] * g[1][a] * g[1][b])
+            + (w[2] * g[2][a] * g[2][b] + w[3] * g[3][a] * g[3][b])
+    };
+    let (g00, g11, g22) = (entry(0, 0), entry(1, 1), entry(2, 2));
+    let (g12, g02, g01) = (entry(1, 2), entry(0, 2), entry(0, 1));
+    let zero = S::ZERO;
+    let c = stretch_compliance(&sigma, lame_lambda, lame_mu, e, step_volume);
+    let shear = |k: usize| {
+        let stiffness = (S::from_f64(SOFTEST_SHEAR) * lame_mu).max(lame_mu - e * sigma[k]);
+        S::TWO / (stiffness * step_volume)
+    };
+    let shears = [shear(0), shear(1), shear(2)];
+    let matrix = [
+        [c[0] + g00, zero, zero, zero, zero, zero],
+        [c[1], c[2] + g11, zero, zero, zero, zero],
+        [c[3], c[4], c[5] + g22, zero, zero, zero],
+        [zero, g12, g12, shears[0] + g11 + g22, zero, zero],
+        [g02, zero, g02, g01, shears[1] + g00 + g22, zero],
+        [g01, g01, zero, g02, g12, shears[2] + g00 + g11],
+    ];
+    let right = [
+        -(c[0] * residual[0] + c[1] * residual[1] + c[3] * residual[2]),
+        -(c[1] * residual[0] + c[2] * residual[1] + c[4] * residual[2]),
+        -(c[3] * residual[0] + c[4] * residual[1] + c[5] * residual[2]),
+        -(shears[0] * residual[3]),
+        -(shears[1] * residual[4]),
+        -(shears[2] * residual[5]),
+    ];
+    let change = solve_symmetric(matrix, right);
+    let turned = symmetric(&change);
+    let mut positions = [Vec3::ZERO; 4];
+    for i in 0..4 {
+        positions[i] = u * (turned * g[i]) * w[i];
+    }
+    TetCorrection { multipliers: turn(&material_axes, &change), positions }
+}
+
+/// `R L g` on each corner, and the bound of its geometric stiffness: with
+/// `tau = max_(i<j) (|L'_ii + L'_jj| + 2 max |L'_offdiagonal|)/(s_i + s_j)`, `tau sum_b |g_i . g_b|`.
+#[inline(always)]
+pub fn corner_loads<S: Scalar>(
+    x: &[Vec3<S>; 4],
+    inverse_rest_shape: &Mat3<S>,
+    multipliers: &Voigt<S>,
+) -> [CornerLoad<S>; 4] {
+    let f = deformation_gradient(x, inverse_rest_shape);
+    let SignedSvd { u, sigma, v } = signed_svd(&f);
+    let g = shape_gradients(inverse_rest_shape);
+    let l = turn(&v, multipliers);
+    let off_diagonal = S::TWO * l[3].abs().max(l[4].abs()).max(l[5].abs());
+    let pair = |i: usize, j: usize| {
+        let floor = S::from_f64(SMALLEST_PAIR);
+        ((l[i] + l[j]).abs() + off_diagonal) / (sigma[i] + sigma[j]).max(floor)
+    };
+    let tau = pair(0, 1).max(pair(0, 2)).max(pair(1, 2));
+    let stress = u * v.transpose() * symmetric(multipliers);
+    let mut loads = [CornerLoad::default(); 4];
+    for i in 0..4 {
+        let mut reach = S::ZERO;
+        for b in 0..4 {
+            reach += g[i].dot(g[b]).abs();
+        }
+        loads[i] = CornerLoad { impulse: stress * g[i], mass_bound: tau * reach };
+    }
+    loads
+}

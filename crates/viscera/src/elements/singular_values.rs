@@ -1,0 +1,121 @@
+//! Signed singular value decomposition of a 3 x 3 matrix.
+//!
+//! ```text
+//! F = U diag(s_1, s_2, s_3) V^T,   det U = det V = 1,   s_1 >= s_2 >= |s_3|,   s_3 < 0 where det F < 0
+//! ```
+//!
+//! (the convention of Irving, Teran, Fedkiw, "Invertible Finite Elements For Robust Simulation of
+//! Large Deformation", SCA 2004). `V` comes from cyclic Jacobi rotations of `F^T F`, a fixed number
+//! of them and without branches; `U` from `F V`, so that small singular values, which `F^T F` loses,
+//! are as accurate as `F`.
+
+use crate::scalar::{Mat3, Scalar, Vec3, vec3};
+
+/// The decomposition.
+#[derive(Clone, Copy, Debug)]
+pub struct SignedSvd<S> {
+    /// Rotation of the principal axes in space; columns are left singular vectors.
+    pub u: Mat3<S>,
+    /// Signed singular values: principal stretches, largest first.
+    pub sigma: [S; 3],
+    /// Principal axes of the material; columns are right singular vectors.
+    pub v: Mat3<S>,
+}
+
+/// Off-diagonal entries below this are zero: their rotation would be by less than any precision
+/// here can hold, for stretches up to 1e10.
+const NEGLIGIBLE: f64 = 1e-30;
+
+/// A singular value below this fraction of the largest has no usable direction.
+const DIRECTIONLESS: f64 = 1e-6;
+
+/// Decomposes any matrix; collapsed ones too, with an arbitrary rotation then.
+#[inline(always)]
+pub fn signed_svd<S: Scalar>(f: &Mat3<S>) -> SignedSvd<S> {
+    let columns = f.columns;
+    let mut a = [[S::ZERO; 3]; 3];
+    for p in 0..3 {
+        for q in p..3 {
+            a[p][q] = columns[p].dot(columns[q]);
+        }
+    }
+    let mut v = Mat3::IDENTITY.columns;
+    for _ in 0..S::JACOBI_SWEEPS {
+        rotate(&mut a, &mut v, 0, 1);
+        rotate(&mut a, &mut v, 0, 2);
+        rotate(&mut a, &mut v, 1, 2);
+    }
+    let mut values = [a[0][0], a[1][1], a[2][2]];
+    order(&mut values, &mut v, 0, 1);
+    order(&mut values, &mut v, 1, 2);
+    order(&mut values, &mut v, 0, 1);
+
+    let [f1, f2, f3] = [*f * v[0], *f * v[1], *f * v[2]];
+    let length = f1.length();
+    let collapsed = length.less(S::from_f64(DIRECTIONLESS));
+    let x_axis = vec3(S::ONE, S::ZERO, S::ZERO);
+    let u1 = select(collapsed, x_axis, f1 * (S::ONE / length));
+    let across = f2 - u1 * u1.dot(f2);
+    let width = across.length();
+    let directionless = width.less(length.max(S::ONE) * S::from_f64(DIRECTIONLESS));
+    let u2 = select(directionless, any_normal(u1), across * (S::ONE / width));
+    let u3 = u1.cross(u2);
+    SignedSvd {
+        u: Mat3::from_columns(u1, u2, u3),
+        sigma: [u1.dot(f1), u2.dot(f2), u3.dot(f3)],
+        v: Mat3::from_columns(v[0], v[1], v[2]),
+    }
+}
+
+/// One Jacobi rotation that zeroes entry `(p, q)`, `p < q`, of the upper triangle.
+#[inline(always)]
+fn rotate<S: Scalar>(a: &mut [[S; 3]; 3], v: &mut [Vec3<S>; 3], p: usize, q: usize) {
+    let apq = a[p][q];
+    let theta = (a[q][q] - a[p][p]) / (S::TWO * apq);
+    let size = S::ONE / (theta.abs() + (theta * theta + S::ONE).sqrt());
+    let t = S::select(theta.less(S::ZERO), -size, size);
+    let t = S::select(apq.abs().less(S::from_f64(NEGLIGIBLE)), S::ZERO, t);
+    let c = S::ONE / (t * t + S::ONE).sqrt();
+    let s = t * c;
+    a[p][p] -= t * apq;
+    a[q][q] += t * apq;
+    a[p][q] = S::ZERO;
+    // The third index; its entries stand above the diagonal.
+    let r = 3 - p - q;
+    let (rp, rq) = ((p.min(r), p.max(r)), (q.min(r), q.max(r)));
+    let (arp, arq) = (a[rp.0][rp.1], a[rq.0][rq.1]);
+    a[rp.0][rp.1] = c * arp - s * arq;
+    a[rq.0][rq.1] = s * arp + c * arq;
+    let (vp, vq) = (v[p], v[q]);
+    v[p] = vp * c - vq * s;
+    v[q] = vp * s + vq * c;
+}
+
+/// Puts the larger value first; the sign keeps the axes right-handed.
+#[inline(always)]
+fn order<S: Scalar>(values: &mut [S; 3], v: &mut [Vec3<S>; 3], i: usize, j: usize) {
+    let swap = values[i].less(values[j]);
+    (values[i], values[j]) =
+        (S::select(swap, values[j], values[i]), S::select(swap, values[i], values[j]));
+    (v[i], v[j]) = (select(swap, v[j], v[i]), select(swap, -v[i], v[j]));
+}
+
+/// A unit vector normal to a unit vector.
+#[inline(always)]
+fn any_normal<S: Scalar>(u: Vec3<S>) -> Vec3<S> {
+    let along_x = S::from_f64(0.6).less(u.x.abs());
+    let x_axis = vec3(S::ONE, S::ZERO, S::ZERO);
+    let y_axis = vec3(S::ZERO, S::ONE, S::ZERO);
+    let axis = select(along_x, y_axis, x_axis);
+    let normal = axis - u * u.dot(axis);
+    normal * (S::ONE / normal.length())
+}
+
+#[inline(always)]
+fn select<S: Scalar>(mask: S::Mask, if_true: Vec3<S>, if_false: Vec3<S>) -> Vec3<S> {
+    vec3(
+        S::select(mask, if_true.x, if_false.x),
+        S::select(mask, if_true.y, if_false.y),
+        S::select(mask, if_true.z, if_false.z),
+    )
+}
