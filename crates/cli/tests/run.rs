@@ -148,7 +148,7 @@ fn forces_on_patches_and_weight_balance_at_rest() {
     let scene = format!(
         "{}\n[[force]]\nname = \"hook\"\nbody = \"bar\"\n\
          box = {{ min = [\"19 mm\", \"-1 m\", \"-1 m\"], max = [\"21 mm\", \"1 m\", \"1 m\"] }}\n\
-         keys = [{{ time = 0, force = [0, \"0.3 N\", 0] }}]\n",
+         force = [0, \"0.3 N\", 0]\n",
         TINY.replace("\"0.2 s\"", "\"1 s\"")
     );
     let bench = Bench::new(&scene);
