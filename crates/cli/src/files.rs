@@ -128,7 +128,8 @@ impl OutputFolder {
         for entry in entries.flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
             let is_ours = prefixes.iter().any(|prefix| name.starts_with(prefix));
-            if is_ours && name.ends_with(extension) {
+            // A run that was killed leaves the file it was writing.
+            if is_ours && name.trim_end_matches(".part").ends_with(extension) {
                 self.remove(&format!("{folder}/{name}"))?;
             }
         }

@@ -224,8 +224,8 @@ fn fixing_that_selects_nothing() {
     let message = refusal_with("point = [0, 0, 0]", "point = [\"-1 m\", 0, 0]");
     assert!(message.starts_with("scene.toml, line 12"), "{message}");
     assert!(message.contains("wall") && message.contains("selects nothing"), "{message}");
-    // Where the mesh is: 0 to 40 mm.
-    assert!(message.contains("0.04") || message.contains("40"), "{message}");
+    // Where the mesh is.
+    assert!(message.contains("40"), "{message}");
 }
 
 #[test]

@@ -129,9 +129,10 @@ const WEIGHT: f64 = 0.016 * 9.81;
 #[test]
 fn the_force_that_holds_a_hanging_body_is_its_weight() {
     let bench = Bench::new(&hanging());
-    for fixing in ["[]", "[\"200 N/m\"]"] {
-        let stiff = if fixing == "[]" { "" } else { "stiffness = \"200 N/m\"\n" };
-        let scene = hanging().replace("name = \"wall\"\n", &format!("name = \"wall\"\n{stiff}"));
+    // Held rigidly, and by an elastic fixing.
+    for stiffness in ["", "stiffness = \"200 N/m\"\n"] {
+        let scene =
+            hanging().replace("name = \"wall\"\n", &format!("name = \"wall\"\n{stiffness}"));
         bench.write("scene.toml", scene.as_bytes());
         let summary = bench.summary_of(&["--every", "60", "--set", "output.picture=false"]);
         let force = patch_force(last_frame(&summary), "wall");
@@ -142,7 +143,7 @@ fn the_force_that_holds_a_hanging_body_is_its_weight() {
 }
 
 /// Internal forces add up to nothing, so at rest patches carry exactly the weight; what is missing
-/// is the unbalanced force on free vertices, which the residual bounds.
+/// is the unbalanced force on free vertices, which the residual bounds: some 1e-6 of the loads here.
 #[test]
 fn forces_on_patches_and_weight_balance_at_rest() {
     let scene = format!(
@@ -163,7 +164,7 @@ fn forces_on_patches_and_weight_balance_at_rest() {
     }
     println!("left over: {total:?} N of {loads} N");
     assert!(patch_force(frame, "hook") == [0.0, 0.3, 0.0]);
-    assert!(total.iter().all(|f| f.abs() < 1e-3 * loads), "{total:?} N of {loads} N");
+    assert!(total.iter().all(|f| f.abs() < 1e-4 * loads), "{total:?} N of {loads} N");
 }
 
 /// The grip leaves the world after some good frames.
