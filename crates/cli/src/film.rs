@@ -89,7 +89,7 @@ impl Film {
 
     /// Remembers a frame where the film needs it; `last` is needed always.
     pub fn push<S: Real>(&mut self, simulation: &Simulation<S>, report: &FrameReport, last: bool) {
-        if !last && simulation.frame() % self.every != 0 {
+        if !last && !simulation.frame().is_multiple_of(self.every) {
             return;
         }
         let positions = &simulation.state().positions;

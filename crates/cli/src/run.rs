@@ -147,7 +147,7 @@ fn simulate<S: Real>(
         // Asked once, so that series and film end with the same frame.
         stop = interrupted.load(Ordering::Relaxed);
         let last = stop || simulation.frame() == frames;
-        if last || simulation.frame() % every == 0 {
+        if last || simulation.frame().is_multiple_of(every) {
             series.push(out, &simulation)?;
         }
         if let Some(film) = &mut film {

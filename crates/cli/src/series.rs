@@ -44,7 +44,7 @@ impl Series {
             self.surfaces.push((time, name));
         }
         let count = self.tets.len().max(self.surfaces.len());
-        if count <= LIST_EVERY || count % LIST_EVERY == 0 {
+        if count <= LIST_EVERY || count.is_multiple_of(LIST_EVERY) {
             self.write_lists(out)?;
         }
         Ok(())

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use crate::coloring::{Coloring, ConstraintGraph};
 use crate::material::{Material, MaterialModel};
-use crate::mesh::TetMesh;
+use crate::mesh::{MAX_COORDINATE, TetMesh};
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::settings::Colors;
 
@@ -37,6 +37,12 @@ pub enum ModelError {
         vertex: u32,
         /// How many vertices there are.
         vertex_count: usize,
+    },
+    /// A spring that connects nothing.
+    #[error("a spring leads from vertex {vertex} to itself; give it two different ends")]
+    SpringEnds {
+        /// The vertex given twice.
+        vertex: u32,
     },
     /// A stiffness or length that no spring has.
     #[error("{what} must be {range} and finite, not {value}")]
@@ -312,6 +318,9 @@ impl ModelBuilder {
         for vertex in ends {
             self.check_vertex("a spring", vertex)?;
         }
+        if ends[0] == ends[1] {
+            return Err(ModelError::SpringEnds { vertex: ends[0] });
+        }
         check_positive("spring stiffness [N/m]", stiffness)?;
         let [a, b] = ends.map(|v| self.positions[v as usize]);
         let rest_length = rest_length.unwrap_or((b - a).length());
@@ -332,6 +341,12 @@ impl ModelBuilder {
         stiffness: f64,
     ) -> Result<usize, ModelError> {
         self.check_vertex("an attachment", vertex)?;
+        for value in anchor.to_array() {
+            if value.is_nan() || value.abs() > MAX_COORDINATE {
+                let (what, range) = ("anchor's coordinate [m]", "within 1e9 m of the origin");
+                return Err(ModelError::BadValue { what, range, value });
+            }
+        }
         check_positive("attachment stiffness [N/m]", stiffness)?;
         self.attachments.push((vertex, anchor, stiffness));
         Ok(self.attachments.len() - 1)
@@ -462,7 +477,7 @@ impl ModelBuilder {
     fn intern(&mut self, material: &Material) -> u32 {
         let known = self.materials.iter().position(|m| m == material);
         let index = known.unwrap_or_else(|| {
-            self.materials.push(material.clone());
+            self.materials.push(*material);
             self.materials.len() - 1
         });
         index as u32

@@ -174,7 +174,7 @@ fn uniaxial_stretch_matches_the_closed_form() {
                 run.frame(&inputs, 0.9);
             }
             let mut balance = ForceBalance::default();
-            run.solver.force_balance(&model, &run.state, &inputs, &mut balance);
+            run.solver.force_balance(&model, &run.state, &inputs, &mut balance).expect("a balance");
             let (mut pull, mut widest) = (0.0, 0.0f64);
             for (v, x) in mesh.vertices().iter().enumerate() {
                 if x.x > size[0] - 1e-9 {

@@ -48,6 +48,8 @@ const LAYERS: &[&[&str]] = &[
     &["scene", "model", "state"],
     &["contact", "tools", "cut"],
     &["solver"],
+    &["measure"],
+    &["simulation"],
     &["record"],
 ];
 

@@ -129,7 +129,7 @@ fn solve_symmetric<S: Scalar>(mut a: [[S; 6]; 6], mut b: Voigt<S>) -> Voigt<S> {
         let mut pivot = a[j][j];
         for k in 0..j {
             scaled[k] = a[j][k];
-            a[j][k] = a[j][k] * inverse_pivot[k];
+            a[j][k] *= inverse_pivot[k];
             pivot -= a[j][k] * scaled[k];
         }
         inverse_pivot[j] = S::ONE / pivot;
@@ -148,7 +148,7 @@ fn solve_symmetric<S: Scalar>(mut a: [[S; 6]; 6], mut b: Voigt<S>) -> Voigt<S> {
         }
     }
     for i in (0..6).rev() {
-        b[i] = b[i] * inverse_pivot[i];
+        b[i] *= inverse_pivot[i];
         for k in i + 1..6 {
             let value = a[k][i] * b[k];
             b[i] -= value;

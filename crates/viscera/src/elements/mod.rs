@@ -1,7 +1,7 @@
 //! Elements: everything that acts on tissue, each an energy with a constraint view.
 //!
 //! One file per kind. Each holds pure functions of positions and rest data, generic over
-//! [`Scalar`](crate::scalar::Scalar): constraint, gradient, energy, and the local solve of one
+//! [`Scalar`]: constraint, gradient, energy, and the local solve of one
 //! constraint block. They load and store nothing; the solver does.
 //!
 //! Kernels loop over the corners rather than `map` over arrays: `map` is a call that the compiler

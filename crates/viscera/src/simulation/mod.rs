@@ -169,7 +169,7 @@ impl<S: Real> Simulation<S> {
         if !self.state.is_finite() {
             return Err(FrameError::Diverged { time: self.time() });
         }
-        self.solver.force_balance(&self.model, &self.state, &self.inputs, &mut self.balance);
+        self.solver.force_balance(&self.model, &self.state, &self.inputs, &mut self.balance)?;
         measure_tets(&self.model, &self.state.positions, &mut self.tets);
         let factor = S::from_f64(self.scene.time.velocity_factor);
         for velocity in &mut self.state.velocities {

@@ -87,7 +87,7 @@ impl<S: Real> Anderson<S> {
     /// History for vectors of the given length.
     pub fn new(window: usize, length: usize) -> Self {
         let window = window.min(LARGEST_WINDOW);
-        let slots = if length == 0 { 0 } else { window + 1 };
+        let slots = window + 1;
         Self {
             window,
             mapped: vec![vec![S::ZERO; length]; slots],

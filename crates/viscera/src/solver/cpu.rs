@@ -23,6 +23,8 @@ pub(super) struct Step<'a, S> {
 /// Everything a step needs beside model and state.
 #[derive(Clone, Debug)]
 pub(super) struct Workspace<S> {
+    /// What [`sizes`] says of the model that this is for.
+    sizes: [usize; 7],
     /// Positions at the start of the step [m].
     previous: Vec<Vec3<S>>,
     /// Inertial prediction `xt` [m], of pinned vertices too.
@@ -70,6 +72,7 @@ impl<S: Real> Workspace<S> {
         let window = settings.anderson_window as usize;
         let length = if anderson { 3 * vertices + model.multiplier_count } else { 0 };
         Self {
+            sizes: sizes(model).map(|(_, size)| size),
             previous: vec![Vec3::ZERO; vertices],
             predicted: vec![Vec3::ZERO; vertices],
             external: vec![Vec3::ZERO; vertices],
@@ -94,12 +97,14 @@ impl<S: Real> Workspace<S> {
         }
     }
 
+    /// The model is one of the same shape as that for which the memory was taken.
     pub fn check(&self, model: &Model<S>) -> Result<(), StepError> {
-        let (given, expected) = (self.previous.len(), model.vertex_count());
-        if given == expected {
-            return Ok(());
+        for (given, (what, expected)) in self.sizes.into_iter().zip(sizes(model)) {
+            if given != expected {
+                return Err(StepError::Mismatch { what, given, expected });
+            }
         }
-        Err(StepError::Mismatch { what: "solver's workspace", given, expected })
+        Ok(())
     }
 
     pub fn run(&mut self, stage: &Stage, step: &Step<'_, S>, state: &mut State<S>) {
@@ -505,6 +510,21 @@ impl<S: Real> Sweep<'_, S> {
             self.points[*copy as usize] += *change * self.relaxation.positions;
         }
     }
+}
+
+/// Everything in a model that decides how much memory a step needs and which stages it has.
+fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 7] {
+    let viscous =
+        model.tet_sets().map(|set| if set.viscous_offset.is_some() { set.len() } else { 0 });
+    [
+        ("solver's list of vertices", model.vertex_count()),
+        ("solver's list of multipliers", model.multiplier_count),
+        ("solver's list of colors", model.color_count),
+        ("solver's list of copies", model.copy_count()),
+        ("solver's list of corners", model.gather_slots.len()),
+        ("solver's list of viscous Saint Venant-Kirchhoff tetrahedra", viscous[0]),
+        ("solver's list of viscous neo-Hookean tetrahedra", viscous[1]),
+    ]
 }
 
 /// The more copies a vertex has, the further a sweep's primal part runs ahead of its multipliers;

@@ -58,8 +58,8 @@ impl<S: Real> Inputs<S> {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StepError {
-    /// The step is not a positive, finite time.
-    #[error("the step must be above zero and finite, not {dt} s")]
+    /// The step is not a positive, finite time, or too extreme for the precision in use.
+    #[error("the step must be above zero and finite, and so must its square; {dt} s is not")]
     BadStep {
         /// The step given [s].
         dt: f64,
@@ -138,7 +138,12 @@ impl<S: Real> Solver<S> {
         inputs: &Inputs<S>,
         dt: f64,
     ) -> Result<(), StepError> {
-        check(model, state, inputs, dt)?;
+        // Multipliers are forces times the squared step, so that the square must be a number too.
+        let squared = S::from_f64(dt * dt);
+        if !(dt > 0.0 && squared > S::ZERO && squared.is_finite()) {
+            return Err(StepError::BadStep { dt });
+        }
+        check(model, state, inputs)?;
         self.work.check(model)?;
         let step = cpu::Step { model, inputs, dt, settings: &self.settings };
         for stage in &self.plan.prologue {
@@ -155,27 +160,24 @@ impl<S: Real> Solver<S> {
         Ok(())
     }
 
-    /// The force balance at the end of the last step, see [`balance::ForceBalance`].
+    /// The force balance at the end of the last step, see [`balance::ForceBalance`]. `inputs` are
+    /// those of that step.
     pub fn force_balance(
         &self,
         model: &Model<S>,
         state: &State<S>,
         inputs: &Inputs<S>,
         balance: &mut balance::ForceBalance,
-    ) {
+    ) -> Result<(), StepError> {
+        check(model, state, inputs)?;
+        self.work.check(model)?;
         balance.measure(model, state, inputs, &self.work);
+        Ok(())
     }
 }
 
-fn check<S: Real>(
-    model: &Model<S>,
-    state: &State<S>,
-    inputs: &Inputs<S>,
-    dt: f64,
-) -> Result<(), StepError> {
-    if !(dt > 0.0 && dt.is_finite()) {
-        return Err(StepError::BadStep { dt });
-    }
+/// State and inputs fit the model.
+fn check<S: Real>(model: &Model<S>, state: &State<S>, inputs: &Inputs<S>) -> Result<(), StepError> {
     let vertex_count = model.vertex_count();
     let lengths = [
         ("list of positions", state.positions.len(), vertex_count),

@@ -1,0 +1,226 @@
+//! A step takes no memory: a haptic loop cannot wait for an allocator.
+#![allow(unsafe_code)]
+
+mod common;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use common::{SNH, STVK, block, material};
+use viscera::model::{Model, ModelBuilder};
+use viscera::scalar::{Real, vec3};
+use viscera::scene::Scene;
+use viscera::settings::{Acceleration, AndersonOn, Colors, SolverSettings};
+use viscera::simulation::{Assembly, Simulation};
+use viscera::solver::balance::ForceBalance;
+use viscera::solver::{Inputs, Pin, Solver};
+use viscera::state::State;
+
+thread_local! {
+    /// Requests of this thread to the allocator; tests run side by side, each on its own thread.
+    static REQUESTS: Cell<usize> = const { Cell::new(0) };
+}
+
+/// The system's allocator, counting.
+struct Counting;
+
+fn count_request() {
+    // While a thread ends its counter may be gone already; nothing is measured then.
+    let _ = REQUESTS.try_with(|requests| requests.set(requests.get() + 1));
+}
+
+// SAFETY: every call goes to the system's allocator unchanged; the counter is a constant-initialised
+// cell without destructor, so that counting itself never allocates.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count_request();
+        // SAFETY: the caller keeps the contract, which is the system allocator's.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        count_request();
+        // SAFETY: `pointer` came from the system allocator with this layout.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count_request();
+        // SAFETY: `pointer` came from the system allocator with this layout.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// How often `action` asks the allocator for anything.
+fn requests_of(action: impl FnOnce()) -> usize {
+    let before = REQUESTS.with(Cell::get);
+    action();
+    REQUESTS.with(Cell::get) - before
+}
+
+#[test]
+fn the_counter_counts() {
+    let requests = requests_of(|| drop(std::hint::black_box(Box::new(1))));
+    assert_eq!(requests, 2, "one allocation, one release");
+}
+
+/// Both materials, one of them viscous, springs and attachments.
+fn everything<S: Real>(colors: Colors) -> Model<S> {
+    let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
+    let mut builder = ModelBuilder::new();
+    let viscous = material(SNH, 1e4, 0.4).with_viscosity(0.05).expect("legal");
+    builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
+    builder.add_body(&mesh, &viscous).expect("a body");
+    let half = mesh.vertices().len() as u32;
+    for v in (0..half).step_by(3) {
+        builder.add_spring([v, half + v], 40.0, Some(0.01)).expect("a spring");
+        let anchor = mesh.vertices()[v as usize];
+        builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
+    }
+    builder.build(colors).expect("a model")
+}
+
+fn accelerations() -> Vec<SolverSettings> {
+    let plain = SolverSettings::default();
+    let chebyshev = SolverSettings {
+        acceleration: Acceleration::Chebyshev,
+        chebyshev_delay: 2,
+        chebyshev_damping: 0.8,
+        ..plain.clone()
+    };
+    let mut all = vec![plain.clone(), chebyshev];
+    for anderson_on in [AndersonOn::Positions, AndersonOn::Multipliers, AndersonOn::Both] {
+        let acceleration = Acceleration::Anderson;
+        all.push(SolverSettings { acceleration, anderson_on, ..plain.clone() });
+    }
+    all
+}
+
+fn steps_allocate_nothing<S: Real>() {
+    for colors in [Colors::Limited(1), Colors::Limited(4), Colors::Unlimited] {
+        let model = everything::<S>(colors);
+        let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81).cast(), ..Inputs::default() };
+        for (v, x) in model.rest_positions.iter().enumerate().take(6) {
+            inputs.pins.push(Pin { vertex: v as u32, target: *x });
+            inputs.forces.push((v as u32 + 10, vec3(0.01, 0.0, 0.0).cast()));
+        }
+        inputs.anchors = model.rest_anchors.clone();
+        for settings in accelerations() {
+            for (rebase, keep_multipliers) in [(true, true), (true, false), (false, false)] {
+                let settings = SolverSettings {
+                    colors,
+                    rebase,
+                    keep_multipliers,
+                    iterations: 6,
+                    ..settings.clone()
+                };
+                let mut solver = Solver::new(&model, &settings);
+                let mut state = State::at_rest(&model);
+                // The first step included: all memory is taken when the solver is built.
+                let requests = requests_of(|| {
+                    for dt in [1e-3, 1e-3, 2e-3] {
+                        solver.step(&model, &mut state, &inputs, dt).expect("a legal step");
+                    }
+                });
+                assert_eq!(requests, 0, "{} {settings:?}", S::NAME);
+
+                let mut balance = ForceBalance::default();
+                let mut measure = || {
+                    let result = solver.force_balance(&model, &state, &inputs, &mut balance);
+                    result.expect("a balance");
+                };
+                measure();
+                let requests = requests_of(measure);
+                assert_eq!(requests, 0, "force balance, {} {settings:?}", S::NAME);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_step_in_single_precision_allocates_nothing() {
+    steps_allocate_nothing::<f32>();
+}
+
+#[test]
+fn a_step_in_double_precision_allocates_nothing() {
+    steps_allocate_nothing::<f64>();
+}
+
+const SCENE: &str = r#"
+title = "Everything at once"
+description = "Two blocks, tied together, held, moved, pushed and let go."
+
+[time]
+duration = "0.2 s"
+
+[[body]]
+name = "upper"
+shape = "block"
+size = ["40 mm", "40 mm", "20 mm"]
+cells = [3, 3, 2]
+material = { young = "10 kPa", poisson = 0.45, viscosity = "10 ms" }
+
+[[body]]
+name = "lower"
+shape = "block"
+size = ["40 mm", "40 mm", "20 mm"]
+cells = [3, 3, 2]
+position = [0, 0, "-30 mm"]
+material = { young = "10 kPa", poisson = 0.3, model = "saint_venant_kirchhoff" }
+
+[[fixing]]
+name = "table"
+body = "lower"
+half_space = { point = [0, 0, "-30 mm"], normal = [0, 0, -1] }
+
+[[fixing]]
+name = "bed"
+body = "upper"
+half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
+stiffness = "200 N/m"
+
+[[motion]]
+name = "forceps"
+body = "upper"
+nearest = { point = ["20 mm", "20 mm", "20 mm"] }
+keys = [{ time = "0.05 s", translation = [0, 0, "10 mm"] }]
+release = "0.1 s"
+
+[[force]]
+name = "push"
+body = "upper"
+half_space = { point = ["40 mm", 0, 0], normal = [1, 0, 0] }
+force = ["0.1 N", 0, 0]
+
+[[spring]]
+name = "tie"
+stiffness = "50 N/m"
+from = { body = "upper", half_space = { point = [0, 0, 0], normal = [0, 0, -1] } }
+to = { body = "lower", half_space = { point = [0, 0, "-10 mm"], normal = [0, 0, 1] } }
+"#;
+
+/// The motion ends within these frames, and with it the set of pinned vertices changes.
+#[test]
+fn a_frame_of_a_scene_allocates_nothing_after_the_first() {
+    for acceleration in ["none", "chebyshev", "anderson"] {
+        for colors in ["1", "4", "unlimited"] {
+            let overrides = [("solver.acceleration", acceleration), ("solver.colors", colors)];
+            let scene = Scene::parse("everything.toml", SCENE, &overrides);
+            let scene = scene.unwrap_or_else(|error| panic!("{error}"));
+            let assembly = Assembly::new(&scene, &mut |name| Err(format!("no file {name}")));
+            let assembly = assembly.unwrap_or_else(|error| panic!("{error}"));
+            let mut simulation = Simulation::<f32>::new(scene, assembly).expect("a model");
+            simulation.advance_frame().expect("a frame");
+            let requests = requests_of(|| {
+                for _ in 1..12 {
+                    simulation.advance_frame().expect("a frame");
+                }
+            });
+            assert_eq!(requests, 0, "{acceleration}, {colors} colours");
+        }
+    }
+}
