@@ -55,7 +55,7 @@ pub enum Outcome {
 
 /// Carries out `viscera run`.
 pub fn run(arguments: &RunArguments) -> Result<Outcome> {
-    let scene = read_scene(arguments)?;
+    let (scene, overrides) = read_scene(arguments)?;
     let library = Library::new(&arguments.scene, arguments.data.as_deref());
     let assembly = Assembly::new(&scene, &mut |name| library.load(name))?;
     let stem = arguments.scene.file_stem().unwrap_or(arguments.scene.as_os_str());
@@ -72,12 +72,15 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     })
     .context("cannot listen for Ctrl-C")?;
     match scene.solver.precision {
-        Precision::F32 => simulate::<f32>(scene, assembly, &out, frames, &interrupted),
-        Precision::F64 => simulate::<f64>(scene, assembly, &out, frames, &interrupted),
+        Precision::F32 => simulate::<f32>(scene, assembly, overrides, &out, frames, &interrupted),
+        Precision::F64 => simulate::<f64>(scene, assembly, overrides, &out, frames, &interrupted),
     }
 }
 
-fn read_scene(arguments: &RunArguments) -> Result<Scene> {
+/// Keys and values that the command line puts over those of the scene file.
+type Overrides = Vec<(String, String)>;
+
+fn read_scene(arguments: &RunArguments) -> Result<(Scene, Overrides)> {
     let name = arguments.scene.display().to_string();
     let bytes = files::read(&arguments.scene)?;
     let Ok(text) = String::from_utf8(bytes) else {
@@ -94,12 +97,15 @@ fn read_scene(arguments: &RunArguments) -> Result<Scene> {
     if let Some(every) = &every {
         overrides.push(("output.every", every));
     }
-    Ok(Scene::parse(&name, &text, &overrides)?)
+    let scene = Scene::parse(&name, &text, &overrides)?;
+    let owned = overrides.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned()));
+    Ok((scene, owned.collect()))
 }
 
 fn simulate<S: Real>(
     scene: Scene,
     assembly: Assembly,
+    overrides: Overrides,
     out: &OutputFolder,
     frames: u64,
     interrupted: &AtomicBool,
@@ -108,11 +114,11 @@ fn simulate<S: Real>(
         eprintln!("note: {note}");
     }
     let mut simulation = Simulation::<S>::new(scene, assembly)?;
-    let mut summary = Summary::new(&simulation);
+    let mut summary = Summary::new(&simulation, overrides);
     let model = &summary.model;
-    println!(
-        "{}: {} tetrahedra, {} vertices, {:.3} kg, {} colours, {} frames of {} substeps x {} \
-         iterations",
+    files::print(&format!(
+        "{}: {} tetrahedra, {} vertices, {:.3} kg, colours: {}, frames: {} of {} substeps x {} \
+         iterations\n",
         summary.title,
         model.tets,
         model.vertices,
@@ -121,7 +127,7 @@ fn simulate<S: Real>(
         frames,
         simulation.scene().solver.substeps,
         simulation.scene().solver.iterations,
-    );
+    ))?;
     let draws = simulation.scene().output.picture;
     let mut film = draws.then(|| Film::new(&simulation, frames)).transpose()?;
     let mut series = Series::create(out)?;
@@ -129,7 +135,8 @@ fn simulate<S: Real>(
     let every = u64::from(simulation.scene().output.every);
     let bar = progress_bar(frames, "simulating", "{msg}");
     let mut failure = None;
-    while simulation.frame() < frames && !interrupted.load(Ordering::Relaxed) {
+    let mut stop = interrupted.load(Ordering::Relaxed);
+    while simulation.frame() < frames && !stop {
         let start = Instant::now();
         if let Err(error) = simulation.advance_frame() {
             failure = Some(error);
@@ -137,12 +144,14 @@ fn simulate<S: Real>(
         }
         let wall_seconds = start.elapsed().as_secs_f64();
         let report = simulation.report();
-        let last = simulation.frame() == frames;
+        // Asked once, so that series and film end with the same frame.
+        stop = interrupted.load(Ordering::Relaxed);
+        let last = stop || simulation.frame() == frames;
         if last || simulation.frame().is_multiple_of(every) {
             series.push(out, &simulation)?;
         }
         if let Some(film) = &mut film {
-            film.push(&simulation, &report, last || interrupted.load(Ordering::Relaxed));
+            film.push(&simulation, &report, last);
         }
         summary.frames.push(FrameLine { report, wall_seconds });
         let speed = simulation.time() / summary.wall_seconds();
@@ -158,8 +167,10 @@ fn simulate<S: Real>(
         None => Some("interrupted".into()),
     };
     summary.judge();
-    if failure.is_none() {
-        series.finish(out, &simulation)?;
+    // Positions that are no numbers are no mesh; the frames before them are.
+    match &failure {
+        None => series.finish(out, &simulation)?,
+        Some(_) => series.write_lists(out)?,
     }
     // Numbers before pictures: drawing takes a while, and a second Ctrl-C may cut it short.
     write_summary(out, &summary)?;
@@ -172,18 +183,11 @@ fn simulate<S: Real>(
         let kept = summary.frames.len();
         bail!("{error} ({kept} frames before that are in {})", out.path().display());
     }
-    print!("{}", summary.table());
-    let wall = summary.wall_seconds();
-    println!(
-        "{:.2} s simulated in {wall:.2} s: {:.2} x real time, {:.2} ms per frame",
-        simulation.time(),
-        simulation.time() / wall,
-        1e3 * wall / summary.frames.len().max(1) as f64
-    );
+    let mut text = summary.table();
     for warning in &summary.warnings {
-        println!("warning: {warning}");
+        text.push_str(&format!("warning: {warning}\n"));
     }
-    println!("results: {}", out.path().display());
+    files::print(&format!("{text}results: {}\n", out.path().display()))?;
     if summary.finished {
         return Ok(Outcome::Finished);
     }

@@ -23,9 +23,9 @@ pub struct Series {
 }
 
 impl Series {
-    /// An empty series, with the frames of an earlier run removed.
+    /// An empty series.
     pub fn create(out: &OutputFolder) -> Result<Self> {
-        out.clear(FOLDER, &["tets_", "surface_"], ".vtu")?;
+        clear(out)?;
         Ok(Self::default())
     }
 
@@ -61,7 +61,8 @@ impl Series {
         Ok(())
     }
 
-    fn write_lists(&self, out: &OutputFolder) -> Result<()> {
+    /// Writes the lists of all frames so far.
+    pub fn write_lists(&self, out: &OutputFolder) -> Result<()> {
         for (name, frames) in [("tissue.pvd", &self.tets), ("surface.pvd", &self.surfaces)] {
             if !frames.is_empty() {
                 let list: Vec<(f64, &str)> = frames.iter().map(|(t, f)| (*t, f.as_str())).collect();
@@ -70,6 +71,23 @@ impl Series {
         }
         Ok(())
     }
+}
+
+/// Removes an earlier run's results, so that no file of it is taken for one of this run. The lists
+/// go first: they never name a frame that is gone.
+fn clear(out: &OutputFolder) -> Result<()> {
+    for name in [
+        "tissue.pvd",
+        "surface.pvd",
+        "summary.json",
+        "final.vtu",
+        "final_surface.obj",
+        "picture.png",
+        "motion.gif",
+    ] {
+        out.remove(name)?;
+    }
+    out.clear(FOLDER, &["tets_", "surface_"], ".vtu")
 }
 
 /// All bodies' tetrahedra with what is known of them.

@@ -44,6 +44,8 @@ pub struct Summary {
     pub frame_seconds: f64,
     pub velocity_factor: f64,
     pub gravity: [f64; 3],
+    /// What the command line put over the scene file.
+    pub overrides: BTreeMap<String, String>,
     /// Solver settings, as a scene file would have them.
     pub solver: BTreeMap<&'static str, serde_json::Value>,
     pub model: ModelSummary,
@@ -56,7 +58,7 @@ pub struct Summary {
 
 impl Summary {
     /// Before the first frame.
-    pub fn new<S: Real>(simulation: &Simulation<S>) -> Self {
+    pub fn new<S: Real>(simulation: &Simulation<S>, overrides: Vec<(String, String)>) -> Self {
         let (scene, model) = (simulation.scene(), simulation.model());
         Self {
             viscera: env!("CARGO_PKG_VERSION"),
@@ -67,6 +69,7 @@ impl Summary {
             frame_seconds: scene.time.frame,
             velocity_factor: scene.time.velocity_factor,
             gravity: scene.world.gravity.to_array(),
+            overrides: overrides.into_iter().collect(),
             solver: scene
                 .solver
                 .values()
@@ -129,7 +132,7 @@ impl Summary {
         }
         if let Some(last) = self.frames.last() {
             for patch in &last.report.patches {
-                let ([x, y, z], [a, b, c]) = (patch.force, patch.torque);
+                let ([x, y, z], [a, b, c]) = (patch.force.map(unsigned_zero), patch.torque);
                 let (force, torque) = (x.hypot(y).hypot(z), a.hypot(b).hypot(c));
                 text.push_str(&format!(
                     "{}: force {force:.4} N, as a vector ({x:.4}, {y:.4}, {z:.4}) N, torque \
@@ -137,9 +140,20 @@ impl Summary {
                     patch.name
                 ));
             }
+            let (time, wall) = (last.report.time, self.wall_seconds());
+            text.push_str(&format!(
+                "{time:.2} s simulated in {wall:.2} s: {:.2} x real time, {:.2} ms per frame\n",
+                time / wall,
+                1e3 * wall / count as f64
+            ));
         }
         text
     }
+}
+
+/// A component of a force [N] as the table shows it: what rounds to zero has no sign.
+fn unsigned_zero(component: f64) -> f64 {
+    if component.abs() < 0.5e-4 { 0.0 } else { component }
 }
 
 /// A setting as a scene file writes it is JSON as well: a number, a truth value or a quoted word.

@@ -1,5 +1,8 @@
 //! An embedded surface follows its tetrahedra.
 
+#[path = "common/data.rs"]
+mod data;
+
 use viscera::mesh::embed::{Embedding, EmbeddingError, closest_point_on_triangle};
 use viscera::mesh::shapes::{Block, sphere};
 use viscera::mesh::{SurfaceMesh, TetMesh};
@@ -134,11 +137,8 @@ fn impossible_bindings_are_errors() {
 /// Throwaway readers: vertices and tetrahedra of a version 1 Gmsh file, vertices of an OBJ file.
 #[test]
 fn a_real_liver_surface_embeds_in_its_coarse_mesh() {
-    let Ok(folder) = std::env::var("VISCERA_DATA") else {
-        println!("skipped: VISCERA_DATA is not set");
-        return;
-    };
-    let read = |name: &str| std::fs::read_to_string(format!("{folder}/{name}")).unwrap();
+    let Some(folder) = data::data_folder() else { return };
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
     let text = read("liver_coarse.msh");
     let (mut vertices, mut tets, mut number) = (Vec::new(), Vec::new(), Vec::new());
     for line in text.lines() {

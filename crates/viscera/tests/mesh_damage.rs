@@ -1,6 +1,9 @@
 //! Damaged mesh files: cut anywhere, changed anywhere, or never a mesh. Nothing may panic, and a
 //! cut file is an error unless only blanks were lost.
 
+#[path = "common/data.rs"]
+mod data;
+
 use proptest::prelude::*;
 use viscera::mesh::TetMesh;
 use viscera::mesh::io::{gmsh, obj, read_surface, read_tet_mesh, vtu};
@@ -93,11 +96,7 @@ fn surface_cut_at_any_byte_is_an_error_or_a_part_of_it() {
 
 #[test]
 fn real_files_cut_at_every_37th_byte_are_errors() {
-    let Some(folder) = std::env::var_os("VISCERA_DATA") else {
-        println!("skipped: VISCERA_DATA is not set");
-        return;
-    };
-    let folder = std::path::Path::new(&folder);
+    let Some(folder) = data::data_folder() else { return };
     let bytes = std::fs::read(folder.join("liver_coarse.msh")).unwrap();
     for end in (0..bytes.len() - 8).step_by(37) {
         assert!(read_tet_mesh("liver_coarse.msh", &bytes[..end], 1.0).is_err(), "{end}");

@@ -1,5 +1,8 @@
 //! Mesh files: what is read, what is refused and in which words, what is written.
 
+#[path = "common/data.rs"]
+mod data;
+
 use viscera::mesh::io::{
     Format, ReadError, ReadProblem, ReadReport, WriteError, gmsh, obj, pvd, read_surface,
     read_tet_mesh, vtu,
@@ -376,11 +379,7 @@ fn series_lists_every_frame_with_its_time() {
 
 /// The bytes of a real mesh, or none where the data folder is not at hand.
 fn anatomy(name: &str) -> Option<Vec<u8>> {
-    let Some(folder) = std::env::var_os("VISCERA_DATA") else {
-        println!("skipped: VISCERA_DATA is not set");
-        return None;
-    };
-    Some(std::fs::read(std::path::Path::new(&folder).join(name)).unwrap())
+    data::data_folder().map(|folder| std::fs::read(folder.join(name)).unwrap())
 }
 
 #[test]

@@ -212,7 +212,7 @@ fn keys_that_do_not_go_together_are_refused() {
         (
             "\"1/60 s\"",
             "\"1 us\"\nduration = \"1 min\"",
-            "s.toml: 60000000 frames are too many; shorten time.duration or lengthen time.frame",
+            "s.toml: 6.0e7 frames are too many; shorten time.duration or lengthen time.frame",
         ),
         (
             "[[fixing]]",

@@ -177,7 +177,7 @@ fn every_key_arrives_in_si_units() {
 #[test]
 fn defaults_are_those_declared() {
     let solver = SolverSettings::default();
-    assert_eq!((solver.substeps, solver.iterations), (20, 1));
+    assert_eq!((solver.substeps, solver.iterations), (10, 2));
     assert_eq!((solver.precision, solver.colors), (Precision::F32, Colors::Unlimited));
     assert_eq!((solver.start, solver.residual_guard), (Start::Auto, true));
     let text = "[[body]]\nname = \"a\"\nshape = \"liver\"\nmaterial = { preset = \"liver\" }";

@@ -241,7 +241,8 @@ impl fmt::Display for SurfaceSummary {
         row(f, "vertices", self.vertex_count)?;
         row(f, "triangles", self.triangle_count)?;
         write_box(f, self.box_min, self.box_max)?;
-        row(f, "area", format!("{} cm²", significant(self.area * 1e4)))?;
+        let (size, name) = fitting_unit(self.area, &AREA_UNITS);
+        row(f, "area", format!("{} {name}", significant(self.area / size)))?;
         match self.open_edge_count {
             0 if self.volume < 0.0 => {
                 row(f, "enclosed volume", format!("{}, wound inwards", Volume(-self.volume)))?;
@@ -262,14 +263,15 @@ fn write_format(f: &mut fmt::Formatter<'_>, format: Option<Format>) -> fmt::Resu
 
 fn write_box(f: &mut fmt::Formatter<'_>, min: [f64; 3], max: [f64; 3]) -> fmt::Result {
     let size = [0, 1, 2].map(|axis| max[axis] - min[axis]);
-    row(f, "size", in_one_unit(size, " x "))?;
-    row(f, "from", in_one_unit(min, ", "))?;
-    row(f, "to", in_one_unit(max, ", "))
+    let all = [size, min, max];
+    let largest = all.iter().flatten().fold(0.0f64, |largest, length| largest.max(length.abs()));
+    row(f, "size", in_unit_of(largest, size, " x "))?;
+    row(f, "from", in_unit_of(largest, min, ", "))?;
+    row(f, "to", in_unit_of(largest, max, ", "))
 }
 
-/// Three lengths `[m]` in the unit, and with the digits, of the largest.
-fn in_one_unit(lengths: [f64; 3], separator: &str) -> String {
-    let largest = lengths.iter().fold(0.0f64, |largest, length| largest.max(length.abs()));
+/// Three lengths `[m]` in the unit that suits `largest`, with about four digits.
+fn in_unit_of(largest: f64, lengths: [f64; 3], separator: &str) -> String {
     let (size, name) = fitting_unit(largest, &LENGTH_UNITS);
     let digits = if largest / size >= 100.0 { 1 } else { 2 };
     // Adding zero turns -0.0 into 0.0.
@@ -285,6 +287,7 @@ fn write_skipped(f: &mut fmt::Formatter<'_>, skipped: &[SkippedElements]) -> fmt
 }
 
 const LENGTH_UNITS: [(f64, &str); 4] = [(1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")];
+const AREA_UNITS: [(f64, &str); 4] = [(1.0, "m²"), (1e-4, "cm²"), (1e-6, "mm²"), (1e-12, "µm²")];
 const VOLUME_UNITS: [(f64, &str); 4] = [(1.0, "m³"), (1e-3, "l"), (1e-6, "ml"), (1e-9, "mm³")];
 
 /// A length `[m]`, shown with a prefix that suits it.

@@ -273,7 +273,7 @@ pub enum SceneError {
     },
     /// More frames than anybody waits for.
     #[error(
-        "{name}: {frames:.0} frames are too many; shorten time.duration or lengthen time.frame"
+        "{name}: {frames:.1e} frames are too many; shorten time.duration or lengthen time.frame"
     )]
     TooManyFrames {
         /// The scene.
