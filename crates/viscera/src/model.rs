@@ -412,9 +412,7 @@ impl ModelBuilder {
     fn lay_out_tets<S: Real>(&self, layout: &mut Layout<'_>, form: TetForm) -> TetSet<S> {
         let model = match form {
             TetForm::GreenStrain => MaterialModel::SaintVenantKirchhoff,
-            TetForm::NeoHookeanPair | TetForm::NeoHookeanStretch => {
-                MaterialModel::StableNeoHookean
-            }
+            TetForm::NeoHookeanPair | TetForm::NeoHookeanStretch => MaterialModel::StableNeoHookean,
         };
         let of_model =
             |&tet: &usize| self.materials[self.tet_material[tet] as usize].model() == model;

@@ -45,8 +45,8 @@ pub trait Scalar:
     const HALF: Self;
     /// Two in every lane.
     const TWO: Self;
-    /// Sweeps of Jacobi rotations after which a 3 x 3 matrix is diagonal to this precision.
-    const JACOBI_SWEEPS: usize;
+    /// Distance from 1 to the next larger number.
+    const EPSILON: f64;
     /// The nearest representable value, in every lane.
     fn from_f64(value: f64) -> Self;
     /// Square root, correctly rounded.
@@ -59,14 +59,14 @@ pub trait Scalar:
     fn max(self, other: Self) -> Self;
     /// Lane by lane, `self < other`; false where either is not a number.
     fn less(self, other: Self) -> Self::Mask;
+    /// True where the mask holds in every lane: for loops that all lanes leave together.
+    fn all(mask: Self::Mask) -> bool;
     /// Lane by lane, `if_true` where the mask holds and `if_false` elsewhere.
     fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self;
 }
 
 /// A single number: what state is stored in.
 pub trait Real: Scalar<Mask = bool> + PartialOrd {
-    /// Distance from 1 to the next larger number.
-    const EPSILON: f64;
     /// "f32" or "f64".
     const NAME: &'static str;
     /// The same value in double precision.
@@ -76,14 +76,14 @@ pub trait Real: Scalar<Mask = bool> + PartialOrd {
 }
 
 macro_rules! implement_real {
-    ($type:ident, $jacobi_sweeps:literal) => {
+    ($type:ident) => {
         impl Scalar for $type {
             type Mask = bool;
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
             const HALF: Self = 0.5;
             const TWO: Self = 2.0;
-            const JACOBI_SWEEPS: usize = $jacobi_sweeps;
+            const EPSILON: f64 = $type::EPSILON as f64;
             #[inline(always)]
             fn from_f64(value: f64) -> Self {
                 value as $type
@@ -109,13 +109,16 @@ macro_rules! implement_real {
                 self < other
             }
             #[inline(always)]
+            fn all(mask: bool) -> bool {
+                mask
+            }
+            #[inline(always)]
             fn select(mask: bool, if_true: Self, if_false: Self) -> Self {
                 if mask { if_true } else { if_false }
             }
         }
 
         impl Real for $type {
-            const EPSILON: f64 = $type::EPSILON as f64;
             const NAME: &'static str = stringify!($type);
             #[inline(always)]
             fn to_f64(self) -> f64 {
@@ -128,9 +131,8 @@ macro_rules! implement_real {
         }
     };
 }
-// Convergence is quadratic from the second sweep on.
-implement_real!(f32, 4);
-implement_real!(f64, 5);
+implement_real!(f32);
+implement_real!(f64);
 
 /// A vector of three components.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

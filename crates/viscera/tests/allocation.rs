@@ -80,7 +80,7 @@ fn everything<S: Real>(colors: Colors) -> Model<S> {
         let anchor = mesh.vertices()[v as usize];
         builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
     }
-    builder.build(colors).expect("a model")
+    builder.build(&common::colored(colors)).expect("a model")
 }
 
 fn accelerations() -> Vec<SolverSettings> {

@@ -204,7 +204,8 @@ fn twin_corners(graph: &ConstraintGraph, coloring: &Coloring) -> Option<(usize, 
 fn a_model_keeps_colors_copies_and_order() {
     for sample in samples() {
         for (wanted, tissue) in WANTED.into_iter().zip([STVK, SNH, STVK, SNH, STVK]) {
-            let model = sample.builder(tissue).build::<f64>(wanted).expect("a model");
+            let model =
+                sample.builder(tissue).build::<f64>(&common::colored(wanted)).expect("a model");
             let set = if tissue == STVK { &model.green_strain } else { &model.neo_hookean };
             let mut user = vec![None; model.copy_count()];
             for color in 0..model.color_count {
@@ -305,7 +306,10 @@ fn loads(model: &Model<f64>, x: &[Vec3<f64>], l: &[f64]) -> Vec<(Vec3<f64>, f64)
 fn the_mean_of_the_copies_answers_to_the_multipliers() {
     let sample = Sample::new("block", block([0.1, 0.05, 0.05], [4, 2, 2], 0.1));
     for tissue in [STVK, SNH] {
-        let model = sample.builder(tissue).build::<f64>(Colors::Limited(1)).expect("a model");
+        let model = sample
+            .builder(tissue)
+            .build::<f64>(&common::colored(Colors::Limited(1)))
+            .expect("a model");
         let (start, state) = sweep(&model, Colors::Limited(1));
         let sums = loads(&model, &start, &state.multipliers);
         let (mut worst, mut largest) = (0.0f64, 0.0f64);
@@ -333,7 +337,11 @@ fn a_sweep_of_any_coloring_keeps_the_centre_of_mass() {
     let mesh = block([0.1, 0.05, 0.05], [4, 2, 2], 0.1);
     for tissue in [STVK, SNH] {
         for wanted in WANTED {
-            let model = common::single_body::<f64>(&mesh, &material(tissue, 1e4, 0.4), wanted);
+            let model = common::single_body::<f64>(
+                &mesh,
+                &material(tissue, 1e4, 0.4),
+                &common::colored(wanted),
+            );
             let (start, state) = sweep(&model, wanted);
             let (mut shift, mut moved, mut size) = (Vec3::ZERO, 0.0, 0.0);
             for (v, &mass) in model.masses.iter().enumerate() {

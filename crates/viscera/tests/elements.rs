@@ -5,8 +5,8 @@ mod common;
 
 use common::Random;
 use viscera::elements::{
-    attachment, deformation_gradient, green_strain, internal_forces, neo_hookean, shape_gradients,
-    spring,
+    attachment, deformation_gradient, green_strain, internal_forces, neo_hookean, neo_hookean_pair,
+    neo_hookean_stretch, shape_gradients, singular_values, spring,
 };
 use viscera::scalar::{Mat3, Scalar, Vec3, vec3};
 
@@ -155,9 +155,9 @@ fn constraint_gradients_match_differences() {
             worst = worst.max(error);
             assert!(error < TOLERANCE, "{} Green strain {p}: {error:e}", case.name);
         }
-        let neo = g.map(|g| neo_hookean::gradient(&f, g));
+        let neo = g.map(|g| neo_hookean_pair::gradient(&f, g));
         for p in 0..2 {
-            let value = |x: &[Vec3<f64>; 4]| neo_hookean::constraints(&f_of(x), LAMBDA, MU)[p];
+            let value = |x: &[Vec3<f64>; 4]| neo_hookean_pair::constraints(&f_of(x), LAMBDA, MU)[p];
             let gradient = neo.map(|rows| rows[p]);
             let error = gradient_error(&case.corners, STEP * case.height, value, &gradient);
             worst = worst.max(error);
@@ -272,11 +272,18 @@ fn neo_hookean_solve_satisfies_its_linear_system() {
         let multipliers = [random.uniform(-1e-9, 1e-9), random.uniform(-1e-9, 0.0)];
         let step_volume = case.volume * 1e-4;
         let shape = &case.inverse_rest_shape;
-        let change =
-            neo_hookean::solve(&case.corners, &w, shape, &multipliers, LAMBDA, MU, step_volume);
+        let change = neo_hookean_pair::solve(
+            &case.corners,
+            &w,
+            shape,
+            &multipliers,
+            LAMBDA,
+            MU,
+            step_volume,
+        );
         let f = deformation_gradient(&case.corners, shape);
-        let c = neo_hookean::constraints(&f, LAMBDA, MU);
-        let rows = shape_gradients(shape).map(|g| neo_hookean::gradient(&f, g));
+        let c = neo_hookean_pair::constraints(&f, LAMBDA, MU);
+        let rows = shape_gradients(shape).map(|g| neo_hookean_pair::gradient(&f, g));
         let compliance = [1.0 / ((LAMBDA + MU) * step_volume), 1.0 / (MU * step_volume)];
         for p in 0..2 {
             let (mut left, mut size) = (0.0, 0.0);
@@ -307,9 +314,108 @@ fn mass_bounds_cover_the_geometric_stiffness() {
         let shape = &case.inverse_rest_shape;
         // With the multipliers fixed, J^T l is linear (Green strain) or smooth in x.
         let green = |x: &[Vec3<f64>; 4]| green_strain::corner_loads(x, shape, &six);
-        let neo = |x: &[Vec3<f64>; 4]| neo_hookean::corner_loads(x, shape, &two);
+        let neo = |x: &[Vec3<f64>; 4]| neo_hookean_pair::corner_loads(x, shape, &two);
         check_bound(&case, green, "Green strain");
-        check_bound(&case, neo, "neo-Hookean");
+        check_bound(&case, neo, "neo-Hookean pair");
+        // Through inversion, where two stretches cancel, the bound of the stretch form is a choice.
+        let f = deformation_gradient(&case.corners, shape);
+        let [_, s2, s3] = singular_values::signed_svd(&f).sigma;
+        if s2 + s3 > 0.3 {
+            let stretch = |x: &[Vec3<f64>; 4]| neo_hookean_stretch::corner_loads(x, shape, &six);
+            check_bound(&case, stretch, "neo-Hookean stretch");
+        }
+    }
+}
+
+/// `F = U diag(s) V^T` with rotations, sorted, the last value carrying the sign of the determinant;
+/// for random, flat, inverted, diagonal, equal and collapsed stretches.
+#[test]
+fn singular_values_rebuild_the_matrix() {
+    fn check<S: viscera::scalar::Real>(f: &Mat3<f64>, name: &str) {
+        let f = f.cast::<S>();
+        let svd = singular_values::signed_svd(&f);
+        let sigma = svd.sigma.map(|s| s.to_f64());
+        let [u, v, f] = [svd.u.cast::<f64>(), svd.v.cast::<f64>(), f.cast::<f64>()];
+        let diagonal = Mat3::from_columns(
+            vec3(sigma[0], 0.0, 0.0),
+            vec3(0.0, sigma[1], 0.0),
+            vec3(0.0, 0.0, sigma[2]),
+        );
+        let size = f.norm_squared().sqrt().max(1e-30);
+        // Round-off of a dozen rotations; V is off by what `F^T F` cannot resolve, which only turns
+        // axes of nearly equal stretch.
+        let limit = 64.0 * S::EPSILON;
+        let rebuilt = (u * diagonal * v.transpose() - f).norm_squared().sqrt() / size;
+        let collapsed = sigma[1].abs() < 1e-5 * sigma[0];
+        assert!(collapsed || rebuilt < limit, "{name}: {} rebuilt to {rebuilt:e}", S::NAME);
+        for rotation in [u, v] {
+            let gap = rotation.transpose() * rotation - Mat3::IDENTITY;
+            assert!(gap.norm_squared().sqrt() < limit, "{name}: {rotation:?}");
+            assert!((rotation.determinant() - 1.0).abs() < limit, "{name}");
+        }
+        let slack = limit * size;
+        assert!(sigma[0] + slack >= sigma[1] && sigma[1] + slack >= sigma[2].abs(), "{sigma:?}");
+        let sign = f.determinant() * sigma[2];
+        assert!(sign >= -slack * size.powi(3), "{name}: {sigma:?}");
+    }
+    let mut random = Random(17);
+    let mut matrices: Vec<(Mat3<f64>, &str)> = cases()
+        .iter()
+        .map(|case| (deformation_gradient(&case.corners, &case.inverse_rest_shape), case.name))
+        .collect();
+    let diagonal = |a: f64, b: f64, c: f64| {
+        Mat3::from_columns(vec3(a, 0.0, 0.0), vec3(0.0, b, 0.0), vec3(0.0, 0.0, c))
+    };
+    for (a, b, c) in
+        [(1.0, 1.0, 1.0), (1.0, 2.0, 3.0), (2.0, 2.0, -1.0), (-1.0, -1.0, -1.0), (1.0, 0.0, 0.0)]
+    {
+        matrices.push((diagonal(a, b, c), "diagonal"));
+        let turned = random.rotation() * diagonal(a, b, c) * random.rotation();
+        matrices.push((turned, "turned diagonal"));
+    }
+    matrices.push((Mat3::ZERO, "zero"));
+    for (f, name) in &matrices {
+        check::<f64>(f, name);
+        check::<f32>(f, name);
+    }
+}
+
+/// With the multipliers at their constitutive value `-V dt^2` times the Biot stress, the corner
+/// loads are the internal forces times `dt^2`, and the local solve moves nothing.
+#[test]
+fn stretch_form_rests_where_the_energy_does() {
+    for case in cases() {
+        let shape = &case.inverse_rest_shape;
+        let f = deformation_gradient(&case.corners, shape);
+        let svd = singular_values::signed_svd(&f);
+        // Close stretches are told apart to round-off over their gap only; the stress is smooth.
+        let piola = neo_hookean::piola(&f, LAMBDA, MU);
+        let biot = svd.v * svd.u.transpose() * piola;
+        let step_volume = case.volume * 1e-4;
+        let [a, b, c] = biot.columns;
+        let multipliers = [a.x, b.y, c.z, 0.5 * (b.z + c.y), 0.5 * (a.z + c.x), 0.5 * (a.y + b.x)]
+            .map(|t| -t * step_volume);
+        let loads = neo_hookean_stretch::corner_loads(&case.corners, shape, &multipliers);
+        let forces = internal_forces(&piola, shape, case.volume);
+        let size = forces.iter().fold(0.0f64, |m, f| m.max(f.length())) * 1e-4;
+        for (load, force) in loads.iter().zip(forces) {
+            let error = (load.impulse - force * 1e-4).length() / size;
+            assert!(error < 1e-10, "{}: {error:e}", case.name);
+        }
+        let w = [1e5; 4];
+        let change = neo_hookean_stretch::solve(
+            &case.corners,
+            &w,
+            shape,
+            &multipliers,
+            LAMBDA,
+            MU,
+            step_volume,
+        );
+        let largest = multipliers.iter().fold(0.0f64, |m, l| m.max(l.abs()));
+        for change in change.multipliers {
+            assert!(change.abs() < 1e-9 * largest, "{}: {change:e} of {largest:e}", case.name);
+        }
     }
 }
 
@@ -388,11 +494,11 @@ fn degenerate_shapes_give_finite_corrections() {
     for x in shapes {
         let w = [1.0; 4];
         let green = green_strain::solve(&x, &w, &shape, &[0.0; 6], &[0.0; 6], &compliance, 6.0);
-        let neo = neo_hookean::solve(&x, &w, &shape, &[0.0; 2], 1e4, 1e3, 1.0 / 6.0);
+        let neo = neo_hookean_pair::solve(&x, &w, &shape, &[0.0; 2], 1e4, 1e3, 1.0 / 6.0);
         for moved in green.positions.iter().chain(&neo.positions) {
             assert!(moved.is_finite(), "{x:?} {moved:?}");
         }
-        for load in neo_hookean::corner_loads(&x, &shape, &[1.0, -1.0]) {
+        for load in neo_hookean_pair::corner_loads(&x, &shape, &[1.0, -1.0]) {
             assert!(load.impulse.is_finite() && load.mass_bound.is_finite());
         }
     }

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Random, Run, SNH, STVK, block, material, single_body};
+use common::{Random, Run, SNH, STVK, block, colored, material, single_body};
 use viscera::measure::measure_tets;
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder, ModelError};
@@ -36,7 +36,7 @@ fn violent_grabs_end_in_numbers() {
         (5, Colors::Unlimited, Acceleration::Anderson),
     ] {
         let settings = SolverSettings { colors, acceleration, ..SolverSettings::default() };
-        let model = single_body::<f32>(&mesh, &material(SNH, 1e4, 0.45), colors);
+        let model = single_body::<f32>(&mesh, &material(SNH, 1e4, 0.45), &settings);
         let (mut grabbed, mut ended, mut worst_end, mut farthest) = (0, 0, 0, 0.0f64);
         for seed in 0..seeds {
             let mut random = Random(seed);
@@ -77,7 +77,7 @@ fn workbench() -> (Model<f32>, State<f32>, Solver<f32>) {
     builder.add_body(&mesh, &material(SNH, 1e4, 0.4)).expect("a body");
     builder.add_attachment(0, mesh.vertices()[0], 10.0).expect("an attachment");
     builder.add_attachment(1, mesh.vertices()[1], 10.0).expect("an attachment");
-    let model = builder.build(Colors::Unlimited).expect("a model");
+    let model = builder.build(&SolverSettings::default()).expect("a model");
     let solver = Solver::new(&model, &SolverSettings::default());
     (model.clone(), State::at_rest(&model), solver)
 }
@@ -165,7 +165,7 @@ fn a_solver_made_for_another_model_is_refused() {
         for &ends in springs {
             builder.add_spring(ends, 10.0, None).expect("a spring");
         }
-        builder.build(colors).expect("a model")
+        builder.build(&colored(colors)).expect("a model")
     };
     let any = Colors::Unlimited;
     let models = [
@@ -201,7 +201,7 @@ fn a_solver_made_for_another_model_is_refused() {
 #[test]
 fn elements_that_cannot_be_are_refused() {
     let mut builder = ModelBuilder::new();
-    assert_eq!(builder.build::<f64>(Colors::Unlimited), Err(ModelError::Empty));
+    assert_eq!(builder.build::<f64>(&SolverSettings::default()), Err(ModelError::Empty));
     assert!(matches!(builder.body(0), Err(ModelError::UnknownBody { .. })));
     let tissue = material(SNH, 1e4, 0.4);
     assert!(builder.set_region_material(0, 0, &tissue).is_err());
@@ -222,15 +222,15 @@ fn elements_that_cannot_be_are_refused() {
     }
     assert!(builder.add_spring([0, 8], 1.0, None).is_err());
     assert!(builder.add_attachment(8, Vec3::ZERO, 1.0).is_err());
-    let model = builder.build::<f64>(Colors::Limited(0)).expect("zero colours mean one");
+    let model = builder.build::<f64>(&colored(Colors::Limited(0))).expect("zero colours mean one");
     assert_eq!(model.color_count, 1);
 }
 
 /// A mesh of nothing is a legal default; nothing comes of it.
 #[test]
 fn a_body_without_vertices_does_nothing() {
-    let model =
-        single_body::<f32>(&TetMesh::default(), &material(SNH, 1e4, 0.4), Colors::Unlimited);
+    let any = SolverSettings::default();
+    let model = single_body::<f32>(&TetMesh::default(), &material(SNH, 1e4, 0.4), &any);
     for acceleration in [Acceleration::None, Acceleration::Chebyshev, Acceleration::Anderson] {
         let settings = SolverSettings { acceleration, ..SolverSettings::default() };
         Run::new(&model, &settings).frame(&Inputs::default(), 1.0);
@@ -280,7 +280,7 @@ fn a_single_tetrahedron_falls_under_all_settings() {
     let (dt, steps) = (0.01, 10);
     let fall = implicit_fall(10.0, dt, steps);
     for colors in [Colors::Unlimited, Colors::Limited(1)] {
-        let model = single_body::<f64>(&mesh, &material(STVK, 1e4, 0.4), colors);
+        let model = single_body::<f64>(&mesh, &material(STVK, 1e4, 0.4), &colored(colors));
         for settings in odd_settings() {
             let settings = SolverSettings { keep_multipliers: false, colors, ..settings };
             let mut run = Run::new(&model, &settings);
@@ -311,9 +311,9 @@ fn extreme_steps_and_loads_never_panic() {
     let mut runs = 0;
     for tissue in [STVK, SNH] {
         for colors in [Colors::Unlimited, Colors::Limited(1)] {
-            let model = single_body::<f32>(&mesh, &material(tissue, 1e4, 0.4), colors);
             for settings in odd_settings() {
                 let settings = SolverSettings { colors, ..settings };
+                let model = single_body::<f32>(&mesh, &material(tissue, 1e4, 0.4), &settings);
                 for (dt, load) in [(1e18, 0.0), (1e-18, 0.0), (10.0, 0.01), (0.01, 1e30)] {
                     let mut run = Run::new(&model, &settings);
                     for _ in 0..3 {
@@ -336,9 +336,9 @@ fn a_body_pinned_everywhere_goes_where_it_is_put() {
     let place = |x: &Vec3<f64>, shift: Vec3<f64>| (*x + shift).cast::<f32>();
     for tissue in [STVK, SNH] {
         for colors in [Colors::Unlimited, Colors::Limited(4), Colors::Limited(1)] {
-            let model = single_body::<f32>(&mesh, &material(tissue, 1e4, 0.4), colors);
             for settings in odd_settings() {
                 let settings = SolverSettings { colors, ..settings };
+                let model = single_body::<f32>(&mesh, &material(tissue, 1e4, 0.4), &settings);
                 let mut run = Run::new(&model, &settings);
                 let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81), ..Inputs::default() };
                 for _ in 0..3 {
@@ -364,7 +364,11 @@ fn a_tissue_of_any_size_stays_finite() {
     for scale in [1e-3, 1e-1, 10.0] {
         for tissue in [STVK, SNH] {
             let mesh = block([2.0 * scale, scale, scale], [4, 2, 2], 0.1);
-            let model = single_body::<f32>(&mesh, &material(tissue, 1e5, 0.45), Colors::Unlimited);
+            let model = single_body::<f32>(
+                &mesh,
+                &material(tissue, 1e5, 0.45),
+                &colored(Colors::Unlimited),
+            );
             let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81), ..Inputs::default() };
             for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x == 0.0) {
                 inputs.pins.push(Pin { vertex: v as u32, target: x.cast() });

@@ -6,7 +6,7 @@
 
 mod common;
 
-use common::{Random, Run, SNH, STVK, block, exact, material, plain, single_body};
+use common::{Random, Run, SNH, STVK, block, colored, exact, material, plain, single_body};
 use viscera::elements::{deformation_gradient, green_strain};
 use viscera::material::MaterialModel;
 use viscera::mesh::TetMesh;
@@ -39,13 +39,13 @@ impl Cantilever {
         Self { mesh, young, inputs }
     }
 
-    fn model(&self, tissue: MaterialModel, colors: Colors) -> Model<f64> {
-        single_body(&self.mesh, &material(tissue, self.young, 0.45), colors)
+    fn model(&self, tissue: MaterialModel, settings: &SolverSettings) -> Model<f64> {
+        single_body(&self.mesh, &material(tissue, self.young, 0.45), settings)
     }
 
     /// The state after one step of a frame from rest, and the solver's force balance.
     fn step(&self, settings: &SolverSettings) -> (State<f64>, ForceBalance) {
-        let model = self.model(STVK, settings.colors);
+        let model = self.model(STVK, settings);
         let (mut state, mut balance) = (State::at_rest(&model), ForceBalance::default());
         let mut solver = Solver::new(&model, settings);
         solver.step(&model, &mut state, &self.inputs, FRAME).expect("a legal step");
@@ -59,7 +59,7 @@ impl Cantilever {
 
     /// `|a - b|_M` [m kg^(1/2)].
     fn distance(&self, a: &[Vec3<f64>], b: &[Vec3<f64>]) -> f64 {
-        let masses = self.model(STVK, ANY).masses;
+        let masses = self.model(STVK, &colored(ANY)).masses;
         let squares =
             a.iter().zip(b).zip(&masses).map(|((a, b), m)| m * (*a - *b).length_squared());
         squares.sum::<f64>().sqrt()
@@ -74,7 +74,7 @@ impl Cantilever {
 
     /// Root of the volume-weighted mean of `|E|^2`.
     fn strain(&self, x: &[Vec3<f64>]) -> f64 {
-        let set = self.model(STVK, ANY).green_strain;
+        let set = self.model(STVK, &colored(ANY)).green_strain;
         let mut sum = 0.0;
         for (tet, vertices) in set.vertices.iter().enumerate() {
             let corners = vertices.map(|v| x[v as usize]);
@@ -412,7 +412,7 @@ fn a_body_at_rest_without_load_stays_to_the_bit() {
         let mesh = block([0.25, 0.25, 0.125], [2, 2, 1], 0.0);
         for colors in [ANY, Colors::Limited(4), JACOBI] {
             let tissue = material(STVK, 1e4, 0.4).with_viscosity(0.1).expect("legal");
-            let model = single_body::<S>(&mesh, &tissue, colors);
+            let model = single_body::<S>(&mesh, &tissue, &colored(colors));
             for settings in every_setting() {
                 let mut run = Run::new(&model, &SolverSettings { colors, ..settings.clone() });
                 for _ in 0..2 {
@@ -435,7 +435,7 @@ fn a_neo_hookean_body_at_rest_stays_to_round_off() {
     let mesh = block([0.5, 0.25, 0.25], [4, 2, 2], 0.0);
     let (young, cell) = (1e4, 0.125);
     for colors in [ANY, Colors::Limited(4), JACOBI] {
-        let model = single_body::<f32>(&mesh, &material(SNH, young, 0.4), colors);
+        let model = single_body::<f32>(&mesh, &material(SNH, young, 0.4), &colored(colors));
         let settings = SolverSettings { colors, ..SolverSettings::default() };
         let mut run = Run::new(&model, &settings);
         for _ in 0..60 {
@@ -479,7 +479,7 @@ fn share_of_fall(run: &mut Run<'_, f64>, frames: u32) -> f64 {
 fn a_dropped_body_falls_with_gravity() {
     let mesh = block([0.02, 0.01, 0.01], [4, 2, 2], 0.2);
     for (tissue, iterations) in [(STVK, 2), (SNH, 2), (SNH, 20), (SNH, 200)] {
-        let model = single_body::<f64>(&mesh, &material(tissue, 1e4, 0.45), ANY);
+        let model = single_body::<f64>(&mesh, &material(tissue, 1e4, 0.45), &colored(ANY));
         let settings = SolverSettings { iterations, ..SolverSettings::default() };
         let share = share_of_fall(&mut Run::new(&model, &settings), 10);
         println!("{tissue:?}, {iterations} sweeps per substep: falls {share:.6} of the way");
@@ -502,7 +502,7 @@ fn pinned_vertices_change_from_step_to_step() {
     let mut random = Random(2);
     for tissue in [STVK, SNH] {
         for colors in [ANY, Colors::Limited(4), JACOBI] {
-            let model = single_body::<f64>(&mesh, &material(tissue, 2e4, 0.4), colors);
+            let model = single_body::<f64>(&mesh, &material(tissue, 2e4, 0.4), &colored(colors));
             let settings = SolverSettings { colors, ..exact(10) };
             let mut run = Run::new(&model, &settings);
             let mut balance = ForceBalance::default();

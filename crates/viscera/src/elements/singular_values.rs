@@ -5,8 +5,7 @@
 //! ```
 //!
 //! (the convention of Irving, Teran, Fedkiw, "Invertible Finite Elements For Robust Simulation of
-//! Large Deformation", SCA 2004). `V` comes from cyclic Jacobi rotations of `F^T F`, a fixed number
-//! of them and without branches; `U` from `F V`, so that small singular values, which `F^T F` loses,
+//! Large Deformation", SCA 2004). `V` comes from cyclic Jacobi rotations of `F^T F`; `U` from `F V`, so that small singular values, which `F^T F` loses,
 //! are as accurate as `F`.
 
 use crate::scalar::{Mat3, Scalar, Vec3, vec3};
@@ -22,9 +21,17 @@ pub struct SignedSvd<S> {
     pub v: Mat3<S>,
 }
 
-/// Off-diagonal entries below this are zero: their rotation would be by less than any precision
-/// here can hold, for stretches up to 1e10.
-const NEGLIGIBLE: f64 = 1e-30;
+/// Most sweeps of three rotations. Convergence is quadratic: two or three sweeps do for tissue, the
+/// rest is for odd inputs.
+const MOST_SWEEPS: usize = 6;
+
+/// An off-diagonal entry is zero when it is below this share of round-off: what it would turn the
+/// axes by is then lost in the arithmetic anyway. Far smaller values would be rotated away too, at
+/// the price of denormal numbers, which are slow.
+const NEGLIGIBLE: f64 = 0.01;
+
+/// Keeps a zero matrix from dividing by zero.
+const SMALLEST: f64 = 1e-30;
 
 /// A singular value below this fraction of the largest has no usable direction.
 const DIRECTIONLESS: f64 = 1e-6;
@@ -40,7 +47,13 @@ pub fn signed_svd<S: Scalar>(f: &Mat3<S>) -> SignedSvd<S> {
         }
     }
     let mut v = Mat3::IDENTITY.columns;
-    for _ in 0..S::JACOBI_SWEEPS {
+    for _ in 0..MOST_SWEEPS {
+        // A rotation of something negligible changes nothing, so leaving early is only faster.
+        let largest = a[0][1].abs().max(a[0][2].abs()).max(a[1][2].abs());
+        let smallest = a[0][0].min(a[1][1]).min(a[2][2]);
+        if S::all(largest.less(negligible(smallest, smallest))) {
+            break;
+        }
         rotate(&mut a, &mut v, 0, 1);
         rotate(&mut a, &mut v, 0, 2);
         rotate(&mut a, &mut v, 1, 2);
@@ -67,6 +80,12 @@ pub fn signed_svd<S: Scalar>(f: &Mat3<S>) -> SignedSvd<S> {
     }
 }
 
+/// Below this an entry between two diagonal ones is zero.
+#[inline(always)]
+fn negligible<S: Scalar>(app: S, aqq: S) -> S {
+    (app + aqq) * S::from_f64(NEGLIGIBLE * S::EPSILON) + S::from_f64(SMALLEST)
+}
+
 /// One Jacobi rotation that zeroes entry `(p, q)`, `p < q`, of the upper triangle.
 #[inline(always)]
 fn rotate<S: Scalar>(a: &mut [[S; 3]; 3], v: &mut [Vec3<S>; 3], p: usize, q: usize) {
@@ -74,7 +93,7 @@ fn rotate<S: Scalar>(a: &mut [[S; 3]; 3], v: &mut [Vec3<S>; 3], p: usize, q: usi
     let theta = (a[q][q] - a[p][p]) / (S::TWO * apq);
     let size = S::ONE / (theta.abs() + (theta * theta + S::ONE).sqrt());
     let t = S::select(theta.less(S::ZERO), -size, size);
-    let t = S::select(apq.abs().less(S::from_f64(NEGLIGIBLE)), S::ZERO, t);
+    let t = S::select(apq.abs().less(negligible(a[p][p], a[q][q])), S::ZERO, t);
     let c = S::ONE / (t * t + S::ONE).sqrt();
     let s = t * c;
     a[p][p] -= t * apq;

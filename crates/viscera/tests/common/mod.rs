@@ -5,7 +5,7 @@ use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Mat3, Real, Vec3, vec3};
-use viscera::settings::SolverSettings;
+use viscera::settings::{Colors, SolverSettings};
 use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
 
@@ -125,6 +125,11 @@ impl<'a, S: Real> Run<'a, S> {
 /// The rebase with kept multipliers, one substep per frame: exact at rest.
 pub fn exact(iterations: u32) -> SolverSettings {
     SolverSettings { substeps: 1, iterations, ..SolverSettings::default() }
+}
+
+/// The defaults with other colours.
+pub fn colored(colors: Colors) -> SolverSettings {
+    SolverSettings { colors, ..SolverSettings::default() }
 }
 
 /// XPBD as published: multipliers from zero, no rebase.
