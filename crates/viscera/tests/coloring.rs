@@ -4,7 +4,9 @@ mod common;
 
 use common::{Random, SNH, STVK, block, material, plain};
 use viscera::coloring::{Coloring, ConstraintGraph};
-use viscera::elements::{CornerLoad, green_strain, neo_hookean, spring};
+use viscera::elements::{
+    CornerLoad, TetForm, green_strain, neo_hookean_pair, neo_hookean_stretch, spring,
+};
 use viscera::material::MaterialModel;
 use viscera::mesh::io::read_tet_mesh;
 use viscera::mesh::shapes::{self, Block, LIVER_SPACING, Splitting};
@@ -275,14 +277,15 @@ fn loads(model: &Model<f64>, x: &[Vec3<f64>], l: &[f64]) -> Vec<(Vec3<f64>, f64)
         for (tet, vertices) in set.vertices.iter().enumerate() {
             let corners = vertices.map(|v| x[v as usize]);
             let shape = &set.inverse_rest_shape[tet];
-            let at = set.multiplier_offset + set.multiplier_count() * tet;
-            let corner_loads = match set.model {
-                MaterialModel::SaintVenantKirchhoff => {
-                    let l = std::array::from_fn(|i| l[at + i]);
-                    green_strain::corner_loads(&corners, shape, &l)
+            let at = set.multiplier_offset + set.form.multiplier_count() * tet;
+            let six = || std::array::from_fn(|i| l[at + i]);
+            let corner_loads = match set.form {
+                TetForm::GreenStrain => green_strain::corner_loads(&corners, shape, &six()),
+                TetForm::NeoHookeanPair => {
+                    neo_hookean_pair::corner_loads(&corners, shape, &[l[at], l[at + 1]])
                 }
-                MaterialModel::StableNeoHookean => {
-                    neo_hookean::corner_loads(&corners, shape, &[l[at], l[at + 1]])
+                TetForm::NeoHookeanStretch => {
+                    neo_hookean_stretch::corner_loads(&corners, shape, &six())
                 }
             };
             add(vertices, &corner_loads);

@@ -132,7 +132,9 @@ settings_table! {
         rebase: bool = true, truth();
         /// The share theta of the rebase that is applied; 0 chooses: 1 for unlimited colours, 1/4
         /// for one colour, 1/2 between. The fixed point is the same for all; the fewer the colours,
-        /// the smaller the share at which the iteration is stable.
+        /// the smaller the share at which the iteration is stable. A share below 1 leaves
+        /// (1 - theta)^iterations of inertia undone in every substep, so that motion (not rest) is
+        /// slower: give few colours more iterations.
         rebase_factor: f64 = 0.0, number(at_least(0.0).up_to(1.0));
         /// Keep the multipliers from step to step. With `rebase` this makes the stiffness
         /// independent of the number of iterations; without it the body freezes.

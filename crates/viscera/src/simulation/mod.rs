@@ -18,9 +18,9 @@ use crate::state::State;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
-    /// Positions are no longer numbers.
+    /// Positions or stresses are no longer numbers.
     #[error(
-        "the simulation diverged at {time:.4} s: positions are no longer numbers; raise \
+        "the simulation diverged at {time:.4} s: positions or stresses are no longer numbers; raise \
          solver.substeps, lower solver.relaxation, or turn solver.acceleration off"
     )]
     Diverged {
@@ -171,6 +171,13 @@ impl<S: Real> Simulation<S> {
         }
         self.solver.force_balance(&self.model, &self.state, &self.inputs, &mut self.balance)?;
         measure_tets(&self.model, &self.state.positions, &mut self.tets);
+        // Files and pictures are in single precision: what it cannot hold has run away as well.
+        let is_number = |tet: &TetMeasure| {
+            (tet.energy_density as f32).is_finite() && (tet.von_mises as f32).is_finite()
+        };
+        if !self.tets.iter().all(is_number) {
+            return Err(FrameError::Diverged { time: self.time() });
+        }
         let factor = S::from_f64(self.scene.time.velocity_factor);
         for velocity in &mut self.state.velocities {
             *velocity = *velocity * factor;

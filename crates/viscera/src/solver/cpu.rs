@@ -23,7 +23,7 @@ pub(super) struct Step<'a, S> {
 #[derive(Clone, Debug)]
 pub(super) struct Workspace<S> {
     /// What [`sizes`] says of the model that this is for.
-    sizes: [usize; 7],
+    sizes: [usize; 9],
     /// Positions at the start of the step [m].
     previous: Vec<Vec3<S>>,
     /// Inertial prediction `xt` [m], of pinned vertices too.
@@ -516,7 +516,7 @@ impl<S: Real> Sweep<'_, S> {
 }
 
 /// Everything in a model that decides how much memory a step needs and which stages it has.
-fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 7] {
+fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 9] {
     let viscous =
         model.tet_sets().map(|set| if set.viscous_offset.is_some() { set.len() } else { 0 });
     [
@@ -525,6 +525,8 @@ fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 7] {
         ("solver's list of colors", model.color_count),
         ("solver's list of copies", model.copy_count()),
         ("solver's list of corners", model.gather_slots.len()),
+        ("solver's list of Saint Venant-Kirchhoff tetrahedra", model.green_strain.len()),
+        ("solver's list of neo-Hookean tetrahedra", model.neo_hookean.len()),
         ("solver's list of viscous Saint Venant-Kirchhoff tetrahedra", viscous[0]),
         ("solver's list of viscous neo-Hookean tetrahedra", viscous[1]),
     ]
