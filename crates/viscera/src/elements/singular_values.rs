@@ -90,9 +90,10 @@ fn negligible<S: Scalar>(app: S, aqq: S) -> S {
 #[inline(always)]
 fn rotate<S: Scalar>(a: &mut [[S; 3]; 3], v: &mut [Vec3<S>; 3], p: usize, q: usize) {
     let apq = a[p][q];
-    let theta = (a[q][q] - a[p][p]) / (S::TWO * apq);
-    let size = S::ONE / (theta.abs() + (theta * theta + S::ONE).sqrt());
-    let t = S::select(theta.less(S::ZERO), -size, size);
+    // The tangent of the smaller of the two angles that do it.
+    let (gap, twice) = (a[q][q] - a[p][p], S::TWO * apq);
+    let root = (gap * gap + twice * twice).sqrt();
+    let t = twice / (gap + S::select(gap.less(S::ZERO), -root, root));
     let t = S::select(apq.abs().less(negligible(a[p][p], a[q][q])), S::ZERO, t);
     let c = S::ONE / (t * t + S::ONE).sqrt();
     let s = t * c;
