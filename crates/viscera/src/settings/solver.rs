@@ -139,6 +139,10 @@ settings_table! {
         /// Keep the multipliers from step to step. With `rebase` this makes the stiffness
         /// independent of the number of iterations; without it the body freezes.
         keep_multipliers: bool = true, truth();
+        /// Take a step back that ends at a higher incremental potential (inertia plus elastic energy)
+        /// than the best place it could have started from. Acts with `rebase`; XPBD as published has
+        /// no potential that it lowers. Without it stiff tissue at a small budget may never settle.
+        step_guard: bool = true, truth();
         /// The constraints of a stable neo-Hookean tetrahedron. With `rebase` the pair comes to the
         /// right rest as well, but slowly: it moves as if it were heavier.
         neo_hookean: NeoHookean = (NeoHookean::Auto), one_of::<NeoHookean>();
@@ -148,6 +152,11 @@ settings_table! {
 }
 
 impl SolverSettings {
+    /// Whether steps are guarded: published XPBD is shown as it is.
+    pub(crate) fn guards_steps(&self) -> bool {
+        self.step_guard && self.rebase
+    }
+
     /// Every key and its value as one would write it, for the record of a run.
     pub fn values(&self) -> Vec<(&'static str, String)> {
         let mut values = Vec::new();

@@ -70,6 +70,8 @@ pub struct FrameReport {
     pub relative_residual: f64,
     /// Estimate of the error of the apparent stiffness, see [`ForceBalance::stiffness_error`].
     pub stiffness_error: f64,
+    /// Substeps of this frame that the step guard took back.
+    pub rejected_substeps: u64,
     /// Energies [J].
     pub energy: Energies,
     /// Extremes of the deformation.
@@ -90,6 +92,7 @@ pub struct Simulation<S> {
     balance: ForceBalance,
     tets: Vec<TetMeasure>,
     frame: u64,
+    rejected_substeps: u64,
 }
 
 impl<S: Real> Simulation<S> {
@@ -111,6 +114,7 @@ impl<S: Real> Simulation<S> {
             balance: ForceBalance::default(),
             tets: Vec::with_capacity(model.tet_count()),
             frame: 0,
+            rejected_substeps: 0,
             model,
             scene,
             assembly,
@@ -161,11 +165,13 @@ impl<S: Real> Simulation<S> {
         let substeps = self.solver.settings().substeps;
         let dt = self.scene.time.frame / f64::from(substeps);
         let start = self.time();
+        let rejected = self.solver.rejected_steps();
         for substep in 0..substeps {
             self.act(start + f64::from(substep + 1) * dt);
             self.solver.step(&self.model, &mut self.state, &self.inputs, dt)?;
         }
         self.frame += 1;
+        self.rejected_substeps = self.solver.rejected_steps() - rejected;
         if !self.state.is_finite() {
             return Err(FrameError::Diverged { time: self.time() });
         }
@@ -192,6 +198,7 @@ impl<S: Real> Simulation<S> {
             time: self.time(),
             relative_residual: self.balance.relative_residual(),
             stiffness_error: self.balance.stiffness_error(),
+            rejected_substeps: self.rejected_substeps,
             energy: measure_energies(&self.model, &self.state, &self.inputs, &self.tets),
             deformation: summarize_deformation(&self.tets),
             patches: self.patch_forces(),

@@ -9,9 +9,8 @@
 
 use super::Inputs;
 use super::cpu::Workspace;
-use crate::elements::{attachment, deformation_gradient, green_strain, internal_forces};
-use crate::elements::{neo_hookean, spring};
-use crate::material::MaterialModel;
+use super::potential::Tissue;
+use crate::elements::{attachment, deformation_gradient, internal_forces, spring};
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
 use crate::state::State;
@@ -67,26 +66,17 @@ impl ForceBalance {
                 let shape = set.inverse_rest_shape[tet].cast::<f64>();
                 let volume = set.rest_volume[tet].to_f64();
                 let material = &model.materials[set.material[tet] as usize];
-                let (lambda, mu) = (material.lame_lambda.to_f64(), material.lame_mu.to_f64());
-                let f = deformation_gradient(&x, &shape);
-                let strain = green_strain::strain(&f);
-                let (energy, mut piola) = match set.model {
-                    MaterialModel::SaintVenantKirchhoff => (
-                        green_strain::energy_density(&strain, lambda, mu),
-                        green_strain::piola(&f, &strain, lambda, mu),
-                    ),
-                    MaterialModel::StableNeoHookean => (
-                        neo_hookean::energy_density(&f, lambda, mu),
-                        neo_hookean::piola(&f, lambda, mu),
-                    ),
+                let start = strains.get(tet).map(|start| start.map(|c| c.to_f64()));
+                let tissue = Tissue {
+                    model: set.model,
+                    lame_lambda: material.lame_lambda.to_f64(),
+                    lame_mu: material.lame_mu.to_f64(),
+                    viscosity_rate: material.viscosity.to_f64() / dt,
                 };
-                self.elastic_energy += volume * energy;
-                if let Some(start) = strains.get(tet) {
-                    let rate = material.viscosity.to_f64() / dt;
-                    let change = std::array::from_fn(|p| (strain[p] - start[p].to_f64()) * rate);
-                    piola = piola + green_strain::piola(&f, &change, lambda, mu);
-                }
-                let forces = internal_forces(&piola, &shape, volume);
+                let f = deformation_gradient(&x, &shape);
+                let response = tissue.respond(&f, start.as_ref());
+                self.elastic_energy += volume * response.elastic_energy;
+                let forces = internal_forces(&response.piola, &shape, volume);
                 for (v, force) in vertices.into_iter().zip(forces) {
                     self.residual[v as usize] -= force;
                 }

@@ -10,7 +10,10 @@
 pub mod acceleration;
 pub mod balance;
 pub mod cpu;
+mod guard;
 pub mod plan;
+mod potential;
+mod sweep;
 
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
@@ -158,6 +161,11 @@ impl<S: Real> Solver<S> {
             self.work.run(stage, &step, state);
         }
         Ok(())
+    }
+
+    /// How often steps have been taken back since the solver was built.
+    pub fn rejected_steps(&self) -> u64 {
+        self.work.guard.rejected
     }
 
     /// The force balance at the end of the last step, see [`balance::ForceBalance`]. `inputs` are

@@ -19,6 +19,10 @@ pub enum Stage {
     ResetMultipliers,
     /// `l *= (dt/dt_last)^2`: multipliers are forces times the squared step.
     RescaleMultipliers,
+    /// Remembers the best of three starts: its incremental potential bounds the step.
+    ChooseStart,
+    /// Takes a step back whose incremental potential exceeds that bound.
+    GuardStep,
     /// Remembers `(x, l)` before a sweep, for the acceleration.
     RememberIterate,
     /// `J^T l` and the bound of its geometric stiffness, per corner.
@@ -77,6 +81,10 @@ impl Plan {
             Stage::ResetMultipliers
         });
 
+        if settings.guards_steps() {
+            prologue.push(Stage::ChooseStart);
+        }
+
         let mut body = Vec::new();
         if settings.acceleration != Acceleration::None {
             body.push(Stage::RememberIterate);
@@ -101,7 +109,11 @@ impl Plan {
                 }
             }
         }
-        let epilogue = vec![Stage::UpdateVelocities];
+        let mut epilogue = Vec::new();
+        if settings.guards_steps() {
+            epilogue.push(Stage::GuardStep);
+        }
+        epilogue.push(Stage::UpdateVelocities);
         Self { prologue, repeat: settings.iterations, body, epilogue }
     }
 }

@@ -1,0 +1,142 @@
+//! The step guard: no step ends at a higher incremental potential than the best of its starts.
+//!
+//! ```text
+//! Phi_limit = min(Phi(x_n with pins moved), Phi(xt), Phi(start)),  x_s where it is lowest
+//! Phi(x_K) <= Phi_limit: accept
+//! else x_s + t (x_K - x_s), t = 0.5, 0.2, 0.08, 0.032: take the first that is not above
+//! else three steps of descent from x_s: d_i = -grad_i Phi / (m_i + sum curvature), Armijo
+//! ```
+//!
+//! A bound by `Phi(x_n)` bounds kinetic plus elastic energy; a bound by `Phi(xt)` alone lets nearly
+//! everything pass. **The multipliers are kept** after a rejection: recomputing them from positions
+//! looks safer and freezes the body, because the next sweeps start from what has just failed. Only
+//! multipliers that are no numbers start again from zero.
+
+use super::cpu::{Step, Workspace};
+use super::potential::{Potential, load_forces, potential};
+use crate::model::Model;
+use crate::scalar::{Real, Vec3};
+use crate::state::State;
+
+/// Shares of a rejected step that are tried in turn.
+const SHARES: [f64; 4] = [0.5, 0.2, 0.08, 0.032];
+
+/// Steps of descent where no share will do.
+const DESCENTS: usize = 3;
+
+/// Of the decrease that the slope promises, a descent must deliver this share (Armijo).
+const SUFFICIENT: f64 = 1e-4;
+
+/// A descent that overshoots is shortened by this factor, at most [`SHORTENINGS`] times.
+const SHORTEN: f64 = 0.4;
+const SHORTENINGS: usize = 12;
+
+/// What a guarded step remembers.
+#[derive(Clone, Debug)]
+pub(super) struct Guard<S> {
+    /// `x_s` [m]; empty where steps are not guarded.
+    start: Vec<Vec3<S>>,
+    /// Positions under test [m].
+    trial: Vec<Vec3<S>>,
+    limit: f64,
+    /// Steps taken back so far.
+    pub rejected: u64,
+}
+
+impl<S: Real> Guard<S> {
+    pub fn new(vertices: usize) -> Self {
+        let positions = vec![Vec3::ZERO; vertices];
+        Self { start: positions.clone(), trial: positions, limit: 0.0, rejected: 0 }
+    }
+}
+
+impl<S: Real> Workspace<S> {
+    fn potential_at(&self, step: &Step<'_, S>, x: &[Vec3<S>]) -> Potential {
+        potential(step, &self.predicted, &self.inverse_masses, &self.start_strain, x)
+    }
+
+    /// [`super::plan::Stage::ChooseStart`].
+    pub(super) fn choose_start(&mut self, step: &Step<'_, S>, state: &State<S>) {
+        self.guard.start.copy_from_slice(&state.positions);
+        self.guard.limit = self.potential_at(step, &state.positions).value;
+        for from_rest in [true, false] {
+            let mut trial = std::mem::take(&mut self.guard.trial);
+            trial.copy_from_slice(if from_rest { &self.previous } else { &self.predicted });
+            for pin in &step.inputs.pins {
+                trial[pin.vertex as usize] = pin.target;
+            }
+            let value = self.potential_at(step, &trial).value;
+            // Written so that a limit that is no number gives way.
+            if value < self.guard.limit || !self.guard.limit.is_finite() {
+                self.guard.limit = value;
+                self.guard.start.copy_from_slice(&trial);
+            }
+            self.guard.trial = trial;
+        }
+    }
+
+    /// [`super::plan::Stage::GuardStep`].
+    pub(super) fn guard_step(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
+        if self.is_accepted(step, &state.positions) {
+            return;
+        }
+        self.guard.rejected += 1;
+        let mut trial = std::mem::take(&mut self.guard.trial);
+        let share = SHARES.into_iter().find(|&share| {
+            let share = S::from_f64(share);
+            for v in 0..trial.len() {
+                let start = self.guard.start[v];
+                trial[v] = start + (state.positions[v] - start) * share;
+            }
+            self.is_accepted(step, &trial)
+        });
+        if share.is_none() {
+            trial.copy_from_slice(&self.guard.start);
+            for _ in 0..DESCENTS {
+                self.descend(step, &mut trial, &mut state.positions);
+            }
+        }
+        state.positions.copy_from_slice(&trial);
+        self.guard.trial = trial;
+        if !state.multipliers.iter().all(|l| l.is_finite()) {
+            state.multipliers.fill(S::ZERO);
+        }
+    }
+
+    fn is_accepted(&self, step: &Step<'_, S>, x: &[Vec3<S>]) -> bool {
+        let Potential { value, noise } = self.potential_at(step, x);
+        value <= self.guard.limit + noise
+    }
+
+    /// One step of descent from `x`, with `scratch` for the places tried.
+    fn descend(&mut self, step: &Step<'_, S>, x: &mut [Vec3<S>], scratch: &mut [Vec3<S>]) {
+        load_forces(step, &self.start_strain, x, &mut self.loads);
+        let before = self.potential_at(step, x).value;
+        let mut length = 1.0;
+        for _ in 0..SHORTENINGS {
+            let mut slope = 0.0;
+            for v in 0..x.len() {
+                let (gradient, direction) = self.descent(step.model, x, v);
+                slope += gradient.dot(direction).to_f64();
+                scratch[v] = x[v] + direction * S::from_f64(length);
+            }
+            let after = self.potential_at(step, scratch).value;
+            if after <= before + SUFFICIENT * length * slope {
+                x.copy_from_slice(scratch);
+                return;
+            }
+            length *= SHORTEN;
+        }
+    }
+
+    /// Gradient of `Phi` by one vertex and the direction of descent; zero for a pinned one.
+    fn descent(&self, model: &Model<S>, x: &[Vec3<S>], v: usize) -> (Vec3<S>, Vec3<S>) {
+        if self.inverse_masses[v] == S::ZERO {
+            return (Vec3::ZERO, Vec3::ZERO);
+        }
+        let load = self.gather(model, v);
+        let mass = model.masses[v];
+        let gradient = (x[v] - self.predicted[v]) * mass - load.impulse;
+        (gradient, gradient * (-S::ONE / (mass + load.mass_bound)))
+    }
+}
