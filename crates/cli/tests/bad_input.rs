@@ -209,7 +209,7 @@ fn misspelt_value() {
 fn negative_time_step() {
     let message = refusal_with("duration = \"0.2 s\"", "frame = \"-1 ms\"");
     assert!(message.starts_with("scene.toml, line 3, column 10"), "{message}");
-    assert!(message.contains("above 0 s"), "{message}");
+    assert!(message.contains("at least 1 us"), "{message}");
 }
 
 #[test]
