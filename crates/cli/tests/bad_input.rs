@@ -285,6 +285,17 @@ fn unit_that_is_none() {
 }
 
 #[test]
+fn triangles_without_area_are_left_out_of_a_surface_and_it_is_said() {
+    let bench = organ(&gmsh(&CORNERS, &TETS));
+    let scene = FROM_FILE.replace("unit =", "surface = \"skin.obj\"\nunit =");
+    bench.write("scene.toml", scene.as_bytes());
+    bench.write("skin.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n");
+    let end = bench.run(&[]);
+    assert_eq!(end.code, Some(0), "{}", end.stderr);
+    assert!(end.stderr.contains("left out 1 elements of kind triangle without area"));
+}
+
+#[test]
 fn surface_given_as_tetrahedra() {
     let bench = Bench::new(&FROM_FILE.replace("organ.msh", "organ.obj"));
     bench.write("organ.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
