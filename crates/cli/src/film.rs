@@ -57,7 +57,6 @@ impl Film {
     pub fn new<S: Real>(simulation: &Simulation<S>, frames: u64) -> Result<Self> {
         let output = &simulation.scene().output;
         let [width, height] = output.picture_size;
-        let from = output.view_from;
         let assembly = simulation.assembly();
         let mut visible = BTreeSet::new();
         for body in &assembly.bodies {
@@ -74,10 +73,7 @@ impl Film {
         let fixed_count = fixed.len();
         Ok(Self {
             title: simulation.scene().title.clone(),
-            view: ViewDirection {
-                azimuth: from.y.atan2(from.x).to_degrees(),
-                elevation: from.z.atan2(from.x.hypot(from.y)).to_degrees().clamp(-89.0, 89.0),
-            },
+            view: ViewDirection::from_vector(output.view_from),
             size: ImageSize::new(width, height)?,
             rest: rest_surface(simulation),
             marked: fixed.into_iter().chain(moved).collect(),

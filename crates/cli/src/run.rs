@@ -135,6 +135,7 @@ fn simulate<S: Real>(
     let every = u64::from(simulation.scene().output.every);
     let bar = progress_bar(frames, "simulating", "{msg}");
     let mut failure = None;
+    let mut wall_total = 0.0;
     let mut stop = interrupted.load(Ordering::Relaxed);
     while simulation.frame() < frames && !stop {
         let start = Instant::now();
@@ -143,6 +144,7 @@ fn simulate<S: Real>(
             break;
         }
         let wall_seconds = start.elapsed().as_secs_f64();
+        wall_total += wall_seconds;
         let report = simulation.report();
         // Asked once, so that series and film end with the same frame.
         stop = interrupted.load(Ordering::Relaxed);
@@ -154,7 +156,7 @@ fn simulate<S: Real>(
             film.push(&simulation, &report, last);
         }
         summary.frames.push(FrameLine { report, wall_seconds });
-        let speed = simulation.time() / summary.wall_seconds();
+        let speed = simulation.time() / wall_total;
         bar.set_position(simulation.frame());
         bar.set_message(format!("t = {:.2} s, {speed:.2} x real time", simulation.time()));
     }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use std::collections::BTreeMap;
 use viscera::scalar::Real;
+use viscera::scene::Scene;
 use viscera::simulation::{FrameReport, Simulation};
 
 /// The numbers of one frame and what it took.
@@ -48,6 +49,8 @@ pub struct Summary {
     pub overrides: BTreeMap<String, String>,
     /// Solver settings, as a scene file would have them.
     pub solver: BTreeMap<&'static str, serde_json::Value>,
+    /// Material of each body and region.
+    pub materials: BTreeMap<String, String>,
     pub model: ModelSummary,
     /// What was repaired and what to know.
     pub notes: Vec<String>,
@@ -76,6 +79,7 @@ impl Summary {
                 .into_iter()
                 .map(|(key, text)| (key, json(text)))
                 .collect(),
+            materials: materials(scene),
             model: ModelSummary {
                 bodies: model.bodies.len(),
                 vertices: model.vertex_count(),
@@ -151,6 +155,18 @@ impl Summary {
     }
 }
 
+fn materials(scene: &Scene) -> BTreeMap<String, String> {
+    let mut materials = BTreeMap::new();
+    for body in &scene.bodies {
+        materials.insert(body.name.clone(), body.material.to_string());
+        for region in &body.regions {
+            let name = format!("{}, region {}", body.name, region.label);
+            materials.insert(name, region.material.to_string());
+        }
+    }
+    materials
+}
+
 /// A component of a force [N] as the table shows it: what rounds to zero has no sign.
 fn unsigned_zero(component: f64) -> f64 {
     if component.abs() < 0.5e-4 { 0.0 } else { component }
@@ -168,6 +184,10 @@ const STIFFNESS_ERROR: f64 = 0.02;
 /// even where the estimate of the stiffness, which sees smooth errors only, looks well.
 const RESIDUAL: f64 = 0.1;
 
+/// The stiffness is judged where elastic energy is at least this share of the energies of motion and
+/// weight. A body that merely falls has round-off for its strain, and the estimate divides by that.
+const STRAINED: f64 = 0.01;
+
 /// Fewer frames than these are the first jerk of a run, in which multipliers are still building up.
 const FEWEST_FRAMES: usize = 5;
 
@@ -178,17 +198,27 @@ fn warnings(frames: &[FrameLine]) -> Vec<String> {
     let mean = |value: fn(&FrameReport) -> f64| {
         tail.iter().map(|frame| value(&frame.report)).sum::<f64>() / tail.len().max(1) as f64
     };
-    let stiffness = mean(|report| report.stiffness_error);
+    let share = mean(|report| report.energy.elastic)
+        / mean(|report| report.energy.kinetic + report.energy.gravitational.abs());
+    // No motion and no weight: the share is infinite, or no number where nothing happens at all.
+    let is_strained = share.is_nan() || share > STRAINED;
+    let stiffness = if is_strained { mean(|report| report.stiffness_error) } else { 0.0 };
     let residual = mean(|report| report.relative_residual);
     if tail.len() >= FEWEST_FRAMES && (stiffness.abs() > STIFFNESS_ERROR || residual > RESIDUAL) {
         let how = if stiffness > 0.0 { "softer" } else { "stiffer" };
+        let answer = if is_strained {
+            let percent = 100.0 * stiffness.abs();
+            format!(
+                "the tissue answers as if it were about {percent:.1} % {how} than asked for, and "
+            )
+        } else {
+            String::new()
+        };
         warnings.push(format!(
-            "the solver falls short: over the last {} frames the tissue answers as if it were \
-             about {:.1} % {how} than asked for, and unbalanced forces are {:.0} % of the loads; \
-             raise solver.iterations or solver.substeps, and keep solver.rebase and \
+            "the solver falls short: over the last {} frames {answer}unbalanced forces are {:.0} % \
+             of the loads; raise solver.iterations or solver.substeps, and keep solver.rebase and \
              solver.keep_multipliers on",
             tail.len(),
-            100.0 * stiffness.abs(),
             100.0 * residual,
         ));
     }

@@ -209,7 +209,7 @@ fn misspelt_value() {
 fn negative_time_step() {
     let message = refusal_with("duration = \"0.2 s\"", "frame = \"-1 ms\"");
     assert!(message.starts_with("scene.toml, line 3, column 10"), "{message}");
-    assert!(message.contains("above 0 s"), "{message}");
+    assert!(message.contains("at least 1 us"), "{message}");
 }
 
 #[test]
@@ -282,6 +282,17 @@ fn unit_that_is_none() {
         let end = bench.end_of(&["mesh", "inspect", "organ.msh", "--unit", unit]);
         assert!(end.error().starts_with("--unit: "), "{}", end.error());
     }
+}
+
+#[test]
+fn triangles_without_area_are_left_out_of_a_surface_and_it_is_said() {
+    let bench = organ(&gmsh(&CORNERS, &TETS));
+    let scene = FROM_FILE.replace("unit =", "surface = \"skin.obj\"\nunit =");
+    bench.write("scene.toml", scene.as_bytes());
+    bench.write("skin.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n");
+    let end = bench.run(&[]);
+    assert_eq!(end.code, Some(0), "{}", end.stderr);
+    assert!(end.stderr.contains("left out 1 elements of kind triangle without area"));
 }
 
 #[test]

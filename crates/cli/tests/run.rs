@@ -69,6 +69,8 @@ fn overrides_reach_the_settings_and_the_record() {
     let stiff = bench.summary_of(&arguments);
     assert_eq!(stiff["solver"]["iterations"], 5);
     assert_eq!(stiff["overrides"]["body.bar.material.young"], "\"20 kPa\"");
+    let material = stiff["materials"]["bar"].as_str().expect("a material");
+    assert!(material.contains("E 20 kPa, nu 0.45, 1000 kg/m^3"), "{material}");
     // Held and pulled by the same lengths, with little weight: force is in proportion to Young's
     // modulus. The weight is 0.16 N of some 4 N and the bar at rest to within 1 %.
     let force = |summary| patch_force(last_frame(summary), "grip")[0];
@@ -140,6 +142,20 @@ fn the_force_that_holds_a_hanging_body_is_its_weight() {
         assert!((force[0] + WEIGHT).abs() < 0.01 * WEIGHT, "{force:?}");
         assert!(force[1].abs() < 0.01 * WEIGHT && force[2].abs() < 0.01 * WEIGHT, "{force:?}");
     }
+}
+
+/// Strain is round-off then, and says nothing of the stiffness. A budget that slows the fall is still
+/// named.
+#[test]
+fn a_falling_body_is_not_called_stiff() {
+    let scene = hanging();
+    let (before, rest) = scene.split_once("[[fixing]]").expect("a fixing");
+    let world = rest.split_once("[world]").map_or("", |(_, world)| world);
+    let bench = Bench::new(&format!("{before}[world]{world}"));
+    let run = |colors| bench.summary_of(&["--set", "output.picture=false", "--set", colors]);
+    assert_eq!(run("solver.colors=unlimited")["warnings"], serde_json::json!([]));
+    let warnings = run("solver.colors=1")["warnings"].to_string();
+    assert!(warnings.contains("unbalanced forces") && !warnings.contains("stiffer"), "{warnings}");
 }
 
 /// Internal forces add up to nothing, so at rest patches carry exactly the weight; what is missing

@@ -105,6 +105,15 @@ pub struct ViewDirection {
     pub elevation: f64,
 }
 
+impl ViewDirection {
+    /// From the side that a vector of any length points to, away from the tissue.
+    pub fn from_vector(v: Vec3<f64>) -> Self {
+        let degrees = |y: f64, x: f64| libm::atan2(y, x).to_degrees();
+        let elevation = degrees(v.z, libm::hypot(v.x, v.y)).clamp(-89.0, 89.0);
+        Self { azimuth: degrees(v.y, v.x), elevation }
+    }
+}
+
 impl Default for ViewDirection {
     /// From the front, a little from the right and from above.
     fn default() -> Self {

@@ -1,6 +1,8 @@
 //! Colours and copies: what makes one code Jacobi, clique separation and Gauss-Seidel.
 
 mod common;
+#[path = "common/data.rs"]
+mod data;
 
 use common::{Random, SNH, STVK, block, material, plain};
 use viscera::coloring::{Coloring, ConstraintGraph};
@@ -64,11 +66,7 @@ impl Sample {
 
 /// The bytes of a real mesh, or none where the data folder is not at hand.
 fn anatomy(name: &str, unit: f64) -> Option<TetMesh> {
-    let Some(folder) = std::env::var_os("VISCERA_DATA") else {
-        println!("skipped {name}: VISCERA_DATA is not set");
-        return None;
-    };
-    let bytes = std::fs::read(std::path::Path::new(&folder).join(name)).expect("a readable file");
+    let bytes = std::fs::read(data::data_folder()?.join(name)).expect("a readable file");
     Some(read_tet_mesh(name, &bytes, unit).expect("a legal mesh").0)
 }
 

@@ -303,6 +303,85 @@ fn neo_hookean_solve_satisfies_its_linear_system() {
     }
 }
 
+/// `(C + sum_i w_i B_i B_i^T) d = -C r`, multiplied by `C^-1` (the stiffness times `V dt^2`), which is
+/// derived here once more from the energy. Where the stiffness is far from indefinite and far from
+/// the floor of the shears, so that no clamp acts.
+#[test]
+fn stretch_solve_satisfies_its_linear_system() {
+    let mut random = Random(14);
+    let lh = LAMBDA + MU;
+    let mut checked = 0;
+    for case in cases() {
+        let shape = &case.inverse_rest_shape;
+        // Scaled to about the volume at which the second term of the energy vanishes.
+        let volume_ratio = deformation_gradient(&case.corners, shape).determinant();
+        let wanted = (1.0 + MU / lh) * random.uniform(0.98, 1.02);
+        let corners = case.corners.map(|x| x * (wanted / volume_ratio).abs().cbrt());
+        let f = deformation_gradient(&corners, shape);
+        let singular_values::SignedSvd { u, sigma: s, v } = singular_values::signed_svd(&f);
+        let e = lh * (s[0] * s[1] * s[2] - 1.0) - MU;
+        // Gershgorin on the part that may be negative. Flat rest shapes multiply round-off by the
+        // square of their thousandfold gradients.
+        if case.name == "flat at rest" || e.abs() * s[0].max(s[1].abs() + s[2].abs()) > 0.5 * MU {
+            continue;
+        }
+        checked += 1;
+        let w: [f64; 4] = std::array::from_fn(|_| 1.0 / random.uniform(1e-6, 1e-4));
+        let multipliers: [f64; 6] = std::array::from_fn(|_| random.uniform(-1e-9, 1e-9));
+        let step_volume = case.volume * 1e-4;
+        let change =
+            neo_hookean_stretch::solve(&corners, &w, shape, &multipliers, LAMBDA, MU, step_volume);
+        let principal = |l: &[f64; 6]| {
+            let turned = v.transpose() * green_strain::symmetric(l) * v;
+            let [a, b, c] = turned.columns;
+            [a.x, b.y, c.z, b.z, a.z, a.y]
+        };
+        let (l, d) = (principal(&multipliers), principal(&change.multipliers));
+        // d^2 W/(ds_a ds_b), and half of mu - e s_c for the shear of the other two.
+        let stiffness = |p: usize, q: usize| match (p < 3, q < 3) {
+            (true, true) => {
+                let others = |k: usize| s[(k + 1) % 3] * s[(k + 2) % 3];
+                let coupling = if p == q { MU } else { e * s[3 - p - q] };
+                lh * others(p) * others(q) + coupling
+            }
+            (false, false) if p == q => 0.5 * (MU - e * s[p - 3]),
+            _ => 0.0,
+        };
+        let rows = shape_gradients(shape).map(|g| {
+            let g = v.transpose() * g;
+            green_strain::PAIRS.map(|(a, b)| {
+                let (u, same) = (u.columns, a == b);
+                if same { u[a] * g[a] } else { u[a] * g[b] + u[b] * g[a] }
+            })
+        });
+        let moved: [f64; 6] = std::array::from_fn(|p| {
+            let product =
+                |q: usize| (0..4).map(|i| w[i] * rows[i][p].dot(rows[i][q])).sum::<f64>() * d[q];
+            (0..6).map(product).sum()
+        });
+        for p in 0..6 {
+            let stress = if p < 3 { MU * s[p] + e * s[(p + 1) % 3] * s[(p + 2) % 3] } else { 0.0 };
+            let residual = l[p] + step_volume * stress;
+            let (mut left, mut size) = (d[p] + residual, d[p].abs() + residual.abs());
+            for q in 0..6 {
+                let term = step_volume * stiffness(p, q) * moved[q];
+                left += term;
+                size += term.abs();
+            }
+            // The block is solved in compliances: its condition number, below 1e4 here, comes in.
+            assert!(left.abs() < 1e-10 * size, "{} {p}: {left:e} of {size:e}", case.name);
+        }
+        for i in 0..4 {
+            let expected = (0..6).fold(Vec3::ZERO, |sum, p| sum + rows[i][p] * (w[i] * d[p]));
+            let error = (change.positions[i] - expected).length();
+            let size: f64 = (0..6).map(|p| rows[i][p].length() * w[i] * d[p].abs()).sum();
+            assert!(error < 1e-12 * size, "{}: {error:e}", case.name);
+        }
+    }
+    println!("{checked} cases without a clamp");
+    assert!(checked > 100, "only {checked} cases without a clamp");
+}
+
 /// With `D` the diagonal of the mass bounds and `K = d(J^T l)/dx` (by differences), `-D <= K <= D`:
 /// what makes the rebase stable. Checked as the spectral radius of `D^-1/2 K D^-1/2`.
 #[test]
@@ -495,10 +574,13 @@ fn degenerate_shapes_give_finite_corrections() {
         let w = [1.0; 4];
         let green = green_strain::solve(&x, &w, &shape, &[0.0; 6], &[0.0; 6], &compliance, 6.0);
         let neo = neo_hookean_pair::solve(&x, &w, &shape, &[0.0; 2], 1e4, 1e3, 1.0 / 6.0);
-        for moved in green.positions.iter().chain(&neo.positions) {
+        let stretch = neo_hookean_stretch::solve(&x, &w, &shape, &[0.0; 6], 1e4, 1e3, 1.0 / 6.0);
+        for moved in green.positions.iter().chain(&neo.positions).chain(&stretch.positions) {
             assert!(moved.is_finite(), "{x:?} {moved:?}");
         }
-        for load in neo_hookean_pair::corner_loads(&x, &shape, &[1.0, -1.0]) {
+        let pair = neo_hookean_pair::corner_loads(&x, &shape, &[1.0, -1.0]);
+        let six = neo_hookean_stretch::corner_loads(&x, &shape, &[1.0; 6]);
+        for load in pair.into_iter().chain(six) {
             assert!(load.impulse.is_finite() && load.mass_bound.is_finite());
         }
     }

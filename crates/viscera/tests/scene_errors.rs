@@ -77,8 +77,8 @@ fn a_bad_value_says_why_and_what_to_write() {
         (
             "\"1/60 s\"",
             "\"-16 ms\"",
-            "s.toml, line 2, column 1: frame = \"-16 ms\": out of range; it must be above 0 s and \
-             at most 1 s",
+            "s.toml, line 2, column 1: frame = \"-16 ms\": out of range; it must be at least 1 us \
+             and at most 1 s",
         ),
         (
             "0.45",
@@ -236,6 +236,30 @@ fn a_scene_without_a_body_or_that_is_not_toml_is_refused() {
     assert!(matches!(Scene::parse("s.toml", "body = []", &[]), Err(SceneError::NoBody { .. })));
     assert!(message("[time\nframe = 1").starts_with("s.toml, line 1, column 6: "));
     assert!(message("\u{e4} = 1").starts_with("s.toml, line 1, column 1: "));
+}
+
+/// Single precision holds what a step makes of a legal number; the others are slips of the unit.
+#[test]
+fn numbers_that_no_tissue_has_are_refused_with_the_legal_range() {
+    for (key, value, range) in [
+        ("body.bar.material.young", "1e-30 Pa", "at least 1 mPa and at most 1000 GPa"),
+        ("body.bar.material.young", "1e30 Pa", "at least 1 mPa and at most 1000 GPa"),
+        ("body.bar.material.density", "1e-40 kg/m^3", "at least 0.001 kg/m^3"),
+        ("fixing.0.stiffness", "1e-50 N/m", "at least 1e-6 N/m"),
+        ("time.frame", "1e-25 s", "at least 1 us"),
+        ("output.picture_size", "[8192, 600]", "16 to 4096"),
+    ] {
+        let message = Scene::parse("s.toml", GOOD, &[(key, value)]).unwrap_err().to_string();
+        assert!(message.contains(range), "{message}");
+    }
+}
+
+/// Tables nested as deep as the key has dots would overflow the stack.
+#[test]
+fn an_override_with_endless_dots_is_refused() {
+    let key = vec!["a"; 100_000].join(".");
+    let message = Scene::parse("s.toml", GOOD, &[(&key, "1")]).unwrap_err().to_string();
+    assert!(message.contains("names joined by dots"), "{message}");
 }
 
 proptest! {

@@ -48,7 +48,7 @@ settings_table! {
         duration: f64 = 2.0, quantity(Dimension::Time, above(0.0).up_to(86_400.0));
         /// Time step of a frame; `solver.substeps` divides it further. Longer frames lose more
         /// motion to numerical damping. A fraction is legal: "1/60 s".
-        frame: f64 = (1.0 / 60.0), quantity(Dimension::Time, above(0.0).up_to(1.0));
+        frame: f64 = (1.0 / 60.0), quantity(Dimension::Time, at_least(1e-6).up_to(1.0));
         /// Velocities are multiplied with this once per frame: 1 adds no damping, 0.9 makes a body
         /// settle, 0 keeps it quasi-static.
         velocity_factor: f64 = 1.0, number(at_least(0.0).up_to(1.0));
@@ -77,7 +77,7 @@ settings_table! {
         /// Draw a picture of the last frame and an animated image of the motion.
         picture: bool = true, truth();
         /// Width and height of pictures in pixels.
-        picture_size: [u32; 2] = ([960, 720]), several::<2, _>(whole(16, 8192));
+        picture_size: [u32; 2] = ([960, 720]), several::<2, _>(whole(16, 4096));
         /// Direction from the body towards the camera.
         view_from: Vec3<f64> = (vec3(0.36, -0.8, 0.48)), direction();
     }
@@ -102,6 +102,13 @@ choices! {
 
 /// Sizes from a micrometre to a hundred metres: what lies beyond is a slip of the unit.
 const SIZE: Range = at_least(1e-6).up_to(100.0);
+
+/// From far below a gel to diamond, and the same for the two below. What lies beyond is a slip of
+/// the unit, and the constants of a step would leave single precision: the run would diverge with
+/// advice that does not help.
+const YOUNG: Range = at_least(1e-3).up_to(1e12);
+const DENSITY: Range = at_least(1e-3).up_to(1e5);
+const STIFFNESS: Range = at_least(1e-6).up_to(1e12);
 
 settings_table! {
     /// A body: a mesh from a file (`mesh`, `unit`) or a `shape`, put in place, and what it is made
@@ -158,14 +165,14 @@ settings_table! {
         /// The law between strain and energy; "stable_neo_hookean" where unset.
         model: Option<MaterialModel> = None, optional(one_of::<MaterialModel>());
         /// Young's modulus E at small strain. Needed where there is no preset.
-        young: Option<f64> = None, optional(quantity(Dimension::Pressure, above(0.0))
+        young: Option<f64> = None, optional(quantity(Dimension::Pressure, YOUNG)
             .checked(|value| check_young(value).map_err(|error| error.to_string())));
         /// Poisson ratio nu; 0.45 where unset. Tissue is nearly incompressible (0.49), and the
         /// nearer to 0.5 the more iterations a step needs.
         poisson: Option<f64> = None, optional(number(above(-1.0).up_to(LARGEST_POISSON))
             .checked(|value| check_poisson(value).map_err(|error| error.to_string())));
         /// Density; "1000 kg/m^3" where unset.
-        density: Option<f64> = None, optional(quantity(Dimension::Density, above(0.0))
+        density: Option<f64> = None, optional(quantity(Dimension::Density, DENSITY)
             .checked(|value| check_density(value).map_err(|error| error.to_string())));
         /// Kelvin-Voigt retardation time: viscous stress is this times stiffness times strain
         /// rate. None where unset.
@@ -249,7 +256,7 @@ settings_table! {
         /// Total stiffness of an elastic attachment: every vertex of the patch is tied to its rest
         /// position by a spring of this stiffness divided by their number, so that a finer mesh is
         /// held equally firmly. Rigid where unset.
-        stiffness: Option<f64> = None, optional(quantity(Dimension::Stiffness, above(0.0)));
+        stiffness: Option<f64> = None, optional(quantity(Dimension::Stiffness, STIFFNESS));
         with PatchTable as patch;
     }
 }
@@ -333,7 +340,7 @@ settings_table! {
         /// The other end.
         to: Placed<PatchTable> = required, placed(table::<PatchTable>());
         /// Force per length beyond `rest_length`.
-        stiffness: f64 = required, quantity(Dimension::Stiffness, above(0.0));
+        stiffness: f64 = required, quantity(Dimension::Stiffness, STIFFNESS);
         /// Length without force; the distance at rest where unset.
         rest_length: Option<f64> = None, optional(quantity(Dimension::Length, at_least(0.0)));
     }

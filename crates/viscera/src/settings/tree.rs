@@ -139,14 +139,19 @@ fn value_of(value: DeValue<'_>, place: &dyn Fn(usize) -> Place) -> Value {
     }
 }
 
+/// More steps than any key of a scene has. Without a bound a long path of dots would nest tables
+/// until walking them overflows the stack.
+const MOST_STEPS: usize = 16;
+
 /// Lays one override over the tree. `key` is a path of names; into a list of tables the step is a
 /// position from 0 or the table's `name`.
 pub(crate) fn apply_override(root: &mut Node, key: &str, text: &str) -> Result<(), SettingError> {
     let place = Place::Override { key: key.into() };
     let mut node = root;
     let mut walked = String::new();
+    let is_too_long = key.split('.').count() > MOST_STEPS;
     for step in key.split('.').map(str::trim) {
-        if step.is_empty() {
+        if is_too_long || step.is_empty() {
             return Err(SettingError::OverrideKey { key: shorten(key) });
         }
         node = match &mut node.value {

@@ -190,7 +190,7 @@ impl Assembly {
         };
         let embedding = Embedding::new(&mesh, &surface)
             .map_err(|error| AssembleError::Embedding { body: body.name.clone(), error })?;
-        let typical = (mesh.volume() / mesh.tets().len() as f64).cbrt();
+        let typical = libm::cbrt(mesh.volume() / mesh.tets().len() as f64);
         if has_fine_surface && embedding.max_distance() > 3.0 * typical {
             self.notes.push(format!(
                 "body `{}`: the surface lies up to {:.1} mm outside the tetrahedra; do mesh and \
@@ -326,9 +326,13 @@ fn make_mesh(
         BodyShape::File { mesh, unit, surface } => {
             let mut bytes =
                 |file: &str| load(file).map_err(|message| AssembleError::Load { message });
-            let (tets, report) = io::read_tet_mesh(mesh, &bytes(mesh)?, *unit)?;
+            let (tets, mut report) = io::read_tet_mesh(mesh, &bytes(mesh)?, *unit)?;
             let surface = match surface {
-                Some(file) => Some(io::read_surface(file, &bytes(file)?, *unit)?.0),
+                Some(file) => {
+                    let (surface, of_surface) = io::read_surface(file, &bytes(file)?, *unit)?;
+                    report.skipped.extend(of_surface.skipped);
+                    Some(surface)
+                }
                 None => None,
             };
             return Ok((tets, surface, report));
