@@ -6,6 +6,7 @@ use crate::series::{deformed_surface, rest_surface};
 use anyhow::Result;
 use indicatif::ProgressBar;
 use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicBool, Ordering};
 use viscera::mesh::SurfaceMesh;
 use viscera::mesh::topology::boundary_surface;
 use viscera::scalar::{Real, Vec3};
@@ -114,13 +115,15 @@ impl Film {
     }
 
     /// Draws `picture.png` and `motion.gif`; `frame_time` is the simulated time of a frame [s].
+    /// Returns false where an interruption left the animation undone.
     pub fn develop(
         &self,
         out: &OutputFolder,
         frame_time: f64,
         progress: &ProgressBar,
-    ) -> Result<()> {
-        let Some(last) = self.shots.last() else { return Ok(()) };
+        interrupted: &AtomicBool,
+    ) -> Result<bool> {
+        let Some(last) = self.shots.last() else { return Ok(true) };
         let mut largest = 0.0f64;
         let mut strongest = 0.0f64;
         let mut bounds = Bounds::of(&self.rest.vertices);
@@ -176,6 +179,9 @@ impl Film {
         let camera = Camera::framing(&bounds, self.view, small);
         let mut animation = Animation::new(small, frame_time * self.every as f64)?;
         for (index, shot) in self.shots.iter().enumerate() {
+            if interrupted.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
             let image = draw(shot, &camera)?;
             if index + 1 < self.shots.len() {
                 animation.push(&image)?;
@@ -183,7 +189,8 @@ impl Film {
                 animation.push_held(&image, LAST_FRAME_HELD)?;
             }
         }
-        out.write("motion.gif", &animation.finish()?)
+        out.write("motion.gif", &animation.finish()?)?;
+        Ok(true)
     }
 
     /// Displacement of each surface vertex [mm].

@@ -114,7 +114,7 @@ fn simulate<S: Real>(
         eprintln!("note: {note}");
     }
     let mut simulation = Simulation::<S>::new(scene, assembly)?;
-    let mut summary = Summary::new(&simulation, overrides);
+    let summary = Summary::new(&simulation, overrides);
     let model = &summary.model;
     files::print(&format!(
         "{}: {} tetrahedra, {} vertices, {:.3} kg, colours: {}, frames: {} of {} substeps x {} \
@@ -129,72 +129,98 @@ fn simulate<S: Real>(
         simulation.scene().solver.iterations,
     ))?;
     let draws = simulation.scene().output.picture;
-    let mut film = draws.then(|| Film::new(&simulation, frames)).transpose()?;
-    let mut series = Series::create(out)?;
-    series.push(out, &simulation)?;
-    let every = u64::from(simulation.scene().output.every);
-    let bar = progress_bar(frames, "simulating", "{msg}");
-    let mut failure = None;
-    let mut wall_total = 0.0;
-    let mut stop = interrupted.load(Ordering::Relaxed);
-    while simulation.frame() < frames && !stop {
-        let start = Instant::now();
-        if let Err(error) = simulation.advance_frame() {
-            failure = Some(error);
-            break;
-        }
-        let wall_seconds = start.elapsed().as_secs_f64();
-        wall_total += wall_seconds;
-        let report = simulation.report();
-        // Asked once, so that series and film end with the same frame.
-        stop = interrupted.load(Ordering::Relaxed);
-        let last = stop || simulation.frame() == frames;
-        if last || simulation.frame().is_multiple_of(every) {
-            series.push(out, &simulation)?;
-        }
-        if let Some(film) = &mut film {
-            film.push(&simulation, &report, last);
-        }
-        summary.frames.push(FrameLine { report, wall_seconds });
-        let speed = simulation.time() / wall_total;
-        bar.set_position(simulation.frame());
-        bar.set_message(format!("t = {:.2} s, {speed:.2} x real time", simulation.time()));
-    }
-    bar.finish_and_clear();
-
-    summary.finished = simulation.frame() == frames && failure.is_none();
-    summary.stopped = match &failure {
-        Some(error) => Some(error.to_string()),
-        None if summary.finished => None,
-        None => Some("interrupted".into()),
+    let mut recording = Recording {
+        film: draws.then(|| Film::new(&simulation, frames)).transpose()?,
+        series: Series::create(out)?,
+        summary,
+    };
+    let ended = recording.compute(&mut simulation, out, frames, interrupted);
+    let Recording { film, series, mut summary } = recording;
+    let complete = simulation.frame() == frames;
+    summary.finished = complete && ended.is_ok();
+    summary.stopped = match &ended {
+        Err(error) => Some(error.to_string()),
+        Ok(()) if complete => None,
+        Ok(()) => Some("interrupted".into()),
     };
     summary.judge();
-    // Positions that are no numbers are no mesh; the frames before them are.
-    match &failure {
-        None => series.finish(out, &simulation)?,
-        Some(_) => series.write_lists(out)?,
-    }
-    // Numbers before pictures: drawing takes a while, and a second Ctrl-C may cut it short.
+    // Numbers before meshes and pictures: those take a while, and may be what failed.
     write_summary(out, &summary)?;
+    // Positions that are no numbers are no mesh; the frames before them are.
+    match &ended {
+        Ok(()) => series.finish(out, &simulation)?,
+        Err(_) => series.write_lists(out)?,
+    }
+    let mut drawn = true;
     if let Some(film) = &film {
         let bar = progress_bar(film.picture_count(), "drawing", "{pos} of {len} pictures");
-        film.develop(out, simulation.scene().time.frame, &bar)?;
+        // A run that was interrupted still shows what it has; the next Ctrl-C ends the drawing.
+        interrupted.store(false, Ordering::Relaxed);
+        drawn = film.develop(out, simulation.scene().time.frame, &bar, interrupted)?;
         bar.finish_and_clear();
     }
-    if let Some(error) = failure {
+    if let Err(error) = ended {
         let kept = summary.frames.len();
-        bail!("{error} ({kept} frames before that are in {})", out.path().display());
+        bail!("{error:#} ({kept} frames before that are in {})", out.path().display());
     }
     let mut text = summary.table();
     for warning in &summary.warnings {
         text.push_str(&format!("warning: {warning}\n"));
     }
     files::print(&format!("{text}results: {}\n", out.path().display()))?;
-    if summary.finished {
-        return Ok(Outcome::Finished);
+    match (summary.finished, drawn) {
+        (true, true) => return Ok(Outcome::Finished),
+        (true, false) => eprintln!("interrupted while drawing; meshes and numbers are complete"),
+        (false, _) => eprintln!("interrupted after {} of {frames} frames", simulation.frame()),
     }
-    eprintln!("interrupted after {} of {frames} frames", simulation.frame());
     Ok(Outcome::Interrupted)
+}
+
+/// What a run keeps of its frames.
+struct Recording {
+    film: Option<Film>,
+    series: Series,
+    summary: Summary,
+}
+
+impl Recording {
+    /// Computes frames and records them until they are all there, Ctrl-C is pressed, or something
+    /// fails.
+    fn compute<S: Real>(
+        &mut self,
+        simulation: &mut Simulation<S>,
+        out: &OutputFolder,
+        frames: u64,
+        interrupted: &AtomicBool,
+    ) -> Result<()> {
+        self.series.push(out, simulation)?;
+        let every = u64::from(simulation.scene().output.every);
+        let bar = progress_bar(frames, "simulating", "{msg}");
+        let mut wall_total = 0.0;
+        let mut stop = interrupted.load(Ordering::Relaxed);
+        while simulation.frame() < frames && !stop {
+            let start = Instant::now();
+            simulation.advance_frame()?;
+            let wall_seconds = start.elapsed().as_secs_f64();
+            wall_total += wall_seconds;
+            let report = simulation.report();
+            // Asked once, so that series and film end with the same frame.
+            stop = interrupted.load(Ordering::Relaxed);
+            let last = stop || simulation.frame() == frames;
+            if last || simulation.frame().is_multiple_of(every) {
+                self.series.push(out, simulation)?;
+            }
+            if let Some(film) = &mut self.film {
+                film.push(simulation, &report, last);
+            }
+            self.summary.frames.push(FrameLine { report, wall_seconds });
+            let speed = simulation.time() / wall_total;
+            bar.set_position(simulation.frame());
+            bar.set_message(format!("t = {:.2} s, {speed:.2} x real time", simulation.time()));
+        }
+        bar.finish_and_clear();
+        Ok(())
+    }
 }
 
 fn write_summary(out: &OutputFolder, summary: &Summary) -> Result<()> {

@@ -93,7 +93,10 @@ pub enum MaterialError {
         value: f64,
     },
     /// Each number is possible, but a constant made of them is not.
-    #[error("Young's modulus {young} Pa with Poisson ratio {poisson} is beyond double precision")]
+    #[error(
+        "Young's modulus {young} Pa with Poisson ratio {poisson} is beyond double precision; tissue \
+         has 100 Pa to 10 MPa"
+    )]
     Overflow {
         /// Young's modulus [Pa].
         young: f64,

@@ -86,7 +86,9 @@ pub enum StepError {
         expected: usize,
     },
     /// An input is infinite or not a number.
-    #[error("the {what} of a step must be finite")]
+    #[error(
+        "the {what} of a step must be finite in the solver's precision; look for a slip of the unit"
+    )]
     NotFinite {
         /// The input concerned.
         what: &'static str,
