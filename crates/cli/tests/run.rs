@@ -152,9 +152,13 @@ fn a_falling_body_is_not_called_stiff() {
     let (before, rest) = scene.split_once("[[fixing]]").expect("a fixing");
     let world = rest.split_once("[world]").map_or("", |(_, world)| world);
     let bench = Bench::new(&format!("{before}[world]{world}"));
-    let run = |colors| bench.summary_of(&["--set", "output.picture=false", "--set", colors]);
-    assert_eq!(run("solver.colors=unlimited")["warnings"], serde_json::json!([]));
-    let warnings = run("solver.colors=1")["warnings"].to_string();
+    let run = |colors, guard| {
+        bench.summary_of(&["--set", "output.picture=false", "--set", colors, "--set", guard])
+    };
+    for colors in ["solver.colors=unlimited", "solver.colors=1"] {
+        assert_eq!(run(colors, "solver.step_guard=true")["warnings"], serde_json::json!([]));
+    }
+    let warnings = run("solver.colors=1", "solver.step_guard=false")["warnings"].to_string();
     assert!(warnings.contains("unbalanced forces") && !warnings.contains("stiffer"), "{warnings}");
 }
 
