@@ -163,7 +163,7 @@ impl Film {
                     color: Color::REST,
                 }],
                 markers: vec![marks(fixed, Color::FIXED, 0.0), marks(moved, Color::PULLED, 0.4)],
-                arrows: self.arrows(shot, diagonal, strongest),
+                arrows: in_front(self.arrows(shot, diagonal, strongest), camera),
                 color_scale: Some(scale.clone()),
                 length_scale: true,
                 ..Drawing::default()
@@ -220,6 +220,21 @@ impl Film {
         let height = (height * ANIMATION_WIDTH).div_ceil(width).max(16);
         Ok(ImageSize::new(ANIMATION_WIDTH, height)?)
     }
+}
+
+/// How far arrows are moved towards the camera, as a share of the way.
+const IN_FRONT: f64 = 0.4;
+
+/// Arrows where one sees them: moved towards the camera along their lines of sight, and shrunk alike,
+/// they look the same and no tissue hides them.
+fn in_front(mut arrows: Vec<Arrow>, camera: &Camera) -> Vec<Arrow> {
+    let eye = camera.position();
+    for arrow in &mut arrows {
+        arrow.from += (eye - arrow.from) * IN_FRONT;
+        arrow.to += (eye - arrow.to) * IN_FRONT;
+        arrow.radius *= 1.0 - IN_FRONT;
+    }
+    arrows
 }
 
 fn caption(shot: &Shot) -> String {
