@@ -50,6 +50,8 @@ pub struct Film {
     marked: Vec<u32>,
     fixed_count: usize,
     every: u64,
+    /// The moment of the still picture [s]; the last one where unset.
+    still: Option<f64>,
     shots: Vec<Shot>,
 }
 
@@ -80,6 +82,7 @@ impl Film {
             marked: fixed.into_iter().chain(moved).collect(),
             fixed_count,
             every: frames.div_ceil(MOST_FRAMES).max(1),
+            still: output.picture_time,
             shots: Vec::new(),
         })
     }
@@ -173,7 +176,13 @@ impl Film {
             drawn
         };
 
-        let still = draw(last, &Camera::framing(&bounds, self.view, self.size))?;
+        let distance = |shot: &Shot| self.still.map_or(0.0, |time| (shot.time - time).abs());
+        // Without a wish all are equally near, and the last stays.
+        let shown = self
+            .shots
+            .iter()
+            .fold(last, |best, shot| if distance(shot) < distance(best) { shot } else { best });
+        let still = draw(shown, &Camera::framing(&bounds, self.view, self.size))?;
         out.write("picture.png", &write_png(&still)?)?;
         let small = self.small_size()?;
         let camera = Camera::framing(&bounds, self.view, small);

@@ -144,6 +144,19 @@ fn the_force_that_holds_a_hanging_body_is_its_weight() {
     }
 }
 
+/// Twelve frames of a sixtieth: the last is at 0.2 s.
+#[test]
+fn the_picture_shows_the_moment_asked_for() {
+    let bench = Bench::new(TINY);
+    let picture = |wish: &[&str]| {
+        bench.summary_of(wish);
+        bench.read("out/picture.png")
+    };
+    let last = picture(&[]);
+    assert_eq!(picture(&["--set", "output.picture_time=9 s"]), last);
+    assert_ne!(picture(&["--set", "output.picture_time=0.1 s"]), last);
+}
+
 /// Strain is round-off then, and says nothing of the stiffness. A budget that slows the fall is still
 /// named.
 #[test]

@@ -74,8 +74,11 @@ settings_table! {
         tets: bool = true, truth();
         /// Write the surface of the last frame as OBJ.
         surface: bool = true, truth();
-        /// Draw a picture of the last frame and an animated image of the motion.
+        /// Draw a picture of one frame and an animated image of the motion.
         picture: bool = true, truth();
+        /// The moment that the picture shows, to the nearest frame of the animation; the last frame
+        /// where unset.
+        picture_time: Option<f64> = None, optional(quantity(Dimension::Time, at_least(0.0)));
         /// Width and height of pictures in pixels.
         picture_size: [u32; 2] = ([960, 720]), several::<2, _>(whole(16, 4096));
         /// Direction from the body towards the camera.
