@@ -287,6 +287,45 @@ fn viscosity_decays_with_the_retardation_time() {
     }
 }
 
+/// Two regions in series carry one force, so that at small strain they stretch in inverse proportion
+/// to their stiffness. Without lateral contraction the clamped bar is a line.
+#[test]
+fn regions_have_materials_of_their_own() {
+    let size = [0.04, 0.02, 0.02];
+    let plain = block(size, [4, 2, 2], 0.0);
+    let is_right = |tet: usize| plain.corners(tet).iter().map(|x| x.x).sum::<f64>() > 4.0 * 0.02;
+    let regions = (0..plain.tets().len()).map(|tet| u32::from(is_right(tet))).collect();
+    let mesh = TetMesh::new(plain.vertices().to_vec(), plain.tets().to_vec(), regions)
+        .expect("a legal mesh")
+        .0;
+    for model in [STVK, SNH] {
+        let mut builder = ModelBuilder::new();
+        let body = builder.add_body(&mesh, &material(model, 1e4, 0.0)).expect("a body");
+        let stiff = material(model, 3e4, 0.0);
+        let count = builder.set_region_material(body, 1, &stiff).expect("a region");
+        assert_eq!(2 * count, mesh.tets().len());
+        let built = builder.build::<f64>(&exact(20)).expect("a model");
+        let stretch = 1e-4 * size[0];
+        let mut inputs = Inputs::default();
+        for (v, x) in mesh.vertices().iter().enumerate() {
+            if x.x < 1e-9 || x.x > size[0] - 1e-9 {
+                let shift = if x.x > 1e-9 { stretch } else { 0.0 };
+                inputs.pins.push(Pin { vertex: v as u32, target: *x + vec3(shift, 0.0, 0.0) });
+            }
+        }
+        let mut run = Run::new(&built, &exact(20));
+        for _ in 0..120 {
+            run.frame(&inputs, 0.9);
+        }
+        let middle = mesh.vertices().iter().zip(&run.state.positions);
+        for (rest, x) in middle.filter(|(rest, _)| (rest.x - 0.02).abs() < 1e-9) {
+            let share = (x.x - rest.x) / stretch;
+            // The next term of both energies is of the size of the strain, 1e-4 and below.
+            assert!((share - 0.75).abs() < 1e-3, "{model:?}: {share}");
+        }
+    }
+}
+
 /// A body hanging from a soft attachment and a spring finds the balance of their closed forms.
 #[test]
 fn attachments_and_springs_carry_the_weight() {

@@ -14,7 +14,7 @@
 //! The strain cannot see inversion (`E(RF) = E(F)` for reflections `R` too): prefer the stable
 //! neo-Hookean element where tissue may turn inside out.
 
-use super::{CornerLoad, TetCorrection, shape_gradients, solve_symmetric};
+use super::{CornerLoad, TetCorrection, shape_gradients, solve_symmetric, weighted_product};
 use crate::scalar::{Mat3, Scalar, Vec3, vec3};
 
 /// A symmetric 6 x 6 matrix, or six constraint values.
@@ -92,10 +92,8 @@ fn gram<S: Scalar>(f: &Mat3<S>, g: &[Vec3<S>; 4], w: &[S; 4]) -> [[S; 6]; 6] {
     let mut m = [[S::ZERO; 3]; 3];
     for a in 0..3 {
         for b in 0..=a {
-            let products = w[0] * g[0][a] * g[0][b] + w[1] * g[1][a] * g[1][b];
-            let products = products + w[2] * g[2][a] * g[2][b] + w[3] * g[3][a] * g[3][b];
             k[a][b] = f.columns[a].dot(f.columns[b]);
-            m[a][b] = products;
+            m[a][b] = weighted_product(g, w, a, b);
             k[b][a] = k[a][b];
             m[b][a] = m[a][b];
         }

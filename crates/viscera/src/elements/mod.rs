@@ -94,6 +94,13 @@ pub fn internal_forces<S: Scalar>(
     forces
 }
 
+/// Entry `(a, b)` of `sum_i w_i g_i g_i^T` over the corners.
+#[inline(always)]
+fn weighted_product<S: Scalar>(g: &[Vec3<S>; 4], w: &[S; 4], a: usize, b: usize) -> S {
+    (w[0] * g[0][a] * g[0][b] + w[1] * g[1][a] * g[1][b])
+        + (w[2] * g[2][a] * g[2][b] + w[3] * g[3][a] * g[3][b])
+}
+
 /// Solves `A x = b` for a symmetric positive definite matrix given by its lower triangle:
 /// `A = L D L^T`, no square roots and no branches.
 #[inline(always)]

@@ -20,7 +20,10 @@
 
 use super::green_strain::{Voigt, symmetric};
 use super::singular_values::{SignedSvd, signed_svd};
-use super::{CornerLoad, TetCorrection, deformation_gradient, shape_gradients, solve_symmetric};
+use super::{
+    CornerLoad, TetCorrection, deformation_gradient, shape_gradients, solve_symmetric,
+    weighted_product,
+};
 use crate::scalar::{Mat3, Scalar, Vec3};
 
 /// The stiffness of the principal stretches counts as positive while its minors exceed this
@@ -127,10 +130,7 @@ pub fn solve<S: Scalar>(
     ];
 
     // sum_i w_i B_i B_i^T, from G = sum_i w_i g'_i g'_i^T; the axes u are orthonormal.
-    let entry = |a: usize, b: usize| {
-        (w[0] * g[0][a] * g[0][b] + w[1] * g[1][a] * g[1][b])
-            + (w[2] * g[2][a] * g[2][b] + w[3] * g[3][a] * g[3][b])
-    };
+    let entry = |a: usize, b: usize| weighted_product(&g, w, a, b);
     let (g00, g11, g22) = (entry(0, 0), entry(1, 1), entry(2, 2));
     let (g12, g02, g01) = (entry(1, 2), entry(0, 2), entry(0, 1));
     let zero = S::ZERO;
