@@ -1,0 +1,3 @@
+//! The program `viscera-lab`.
+
+fn main() {}
