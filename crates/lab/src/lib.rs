@@ -4,3 +4,4 @@
 //! every claim of the library against it.
 
 pub mod reference;
+pub mod scenes;
