@@ -148,10 +148,10 @@ fn a_stretched_bar_is_the_closed_form() {
     let mut worst = 0.0f64;
     for (model, young, poisson, stretch) in [
         (STVK, 1e4, 0.3, 1.3),
-        (STVK, 1e4, 0.45, 0.9),
+        (STVK, 1e4, 0.45, 0.98),
         (SNH, 1e4, 0.3, 1.6),
         (SNH, 1e5, 0.45, 1.3),
-        (SNH, 1e3, 0.49, 0.8),
+        (SNH, 1e3, 0.49, 0.98),
     ] {
         let tissue = material(model, young, poisson);
         let (side, stress) = uniaxial(&tissue, stretch);
@@ -179,7 +179,8 @@ fn a_stretched_bar_is_the_closed_form() {
             inputs.pins.push(Pin { vertex, target: exact[vertex as usize] });
         }
         let mut reference = Reference::new(&body(&mesh, &tissue));
-        // Under dead pressure a bar would rather turn over: begin near the state that is meant.
+        // A bar twice as long as wide buckles under more than pi^2/48 = 5 % of compression (after
+        // Euler, one end free): the two compressed ones stay below.
         let mut random = Random(4);
         let start: Vec<_> = exact.iter().map(|x| *x + random.vector(2e-4)).collect();
         let solution = reference.settle(&start, &inputs).expect("a state of rest");
