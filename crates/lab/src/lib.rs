@@ -4,3 +4,5 @@
 //! every claim of the library against it.
 
 pub mod reference;
+pub mod report;
+pub mod validate;
