@@ -19,6 +19,7 @@ use crate::model::Model;
 use crate::scalar::{Real, Vec3};
 use crate::settings::SolverSettings;
 use crate::state::State;
+pub use guard::StepReport;
 use plan::Plan;
 
 /// A vertex that is moved, not simulated, during a step.
@@ -168,6 +169,11 @@ impl<S: Real> Solver<S> {
     /// How often steps have been taken back since the solver was built.
     pub fn rejected_steps(&self) -> u64 {
         self.work.guard.rejected
+    }
+
+    /// How the last step ended; nothing before the first, and where steps are not guarded.
+    pub fn last_step(&self) -> Option<StepReport> {
+        self.work.guard.report
     }
 
     /// The force balance at the end of the last step, see [`balance::ForceBalance`]. `inputs` are

@@ -112,9 +112,13 @@ impl<'a, S: Real> Run<'a, S> {
         Self { model, state, solver, dt: 1.0 / 60.0 / f64::from(settings.substeps) }
     }
 
+    pub fn step(&mut self, inputs: &Inputs<S>) {
+        self.solver.step(self.model, &mut self.state, inputs, self.dt).expect("a legal step");
+    }
+
     pub fn frame(&mut self, inputs: &Inputs<S>, keep: f64) {
         for _ in 0..self.solver.settings().substeps {
-            self.solver.step(self.model, &mut self.state, inputs, self.dt).expect("a legal step");
+            self.step(inputs);
         }
         for v in &mut self.state.velocities {
             *v = *v * S::from_f64(keep);
