@@ -139,7 +139,9 @@ fn inputs_that_do_not_fit_are_refused_and_nothing_moves() {
         assert_eq!(solver.step(&model, &mut state, &inputs, 0.01), Err(expected.clone()));
         assert_eq!(state, before);
         let measured = solver.force_balance(&model, &state, &inputs, &mut balance);
-        assert_eq!(measured, Err(expected));
+        assert_eq!(measured, Err(expected.clone()));
+        assert_eq!(solver.restart(&model, &mut state, &inputs, 0.01), Err(expected));
+        assert_eq!(state, before);
     }
 }
 

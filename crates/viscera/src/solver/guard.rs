@@ -9,8 +9,7 @@
 //!
 //! A bound by `Phi(x_n)` bounds kinetic plus elastic energy; a bound by `Phi(xt)` alone lets nearly
 //! everything pass. **The multipliers are kept** after a rejection: recomputing them from positions
-//! looks safer and freezes the body, because the next sweeps start from what has just failed. Only
-//! multipliers that are no numbers start again from zero.
+//! looks safer and freezes the body, because the next sweeps start from what has just failed.
 
 use super::cpu::{Step, Workspace};
 use super::potential::{Potential, load_forces, potential};
@@ -124,9 +123,6 @@ impl<S: Real> Workspace<S> {
         self.guard.report = Some(StepReport { rejected: true, ..report });
         state.positions.copy_from_slice(&trial);
         self.guard.trial = trial;
-        if !state.multipliers.iter().all(|l| l.is_finite()) {
-            state.multipliers.fill(S::ZERO);
-        }
     }
 
     fn report_at(&self, step: &Step<'_, S>, x: &[Vec3<S>]) -> StepReport {

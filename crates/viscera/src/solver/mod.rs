@@ -11,6 +11,7 @@ pub mod acceleration;
 pub mod balance;
 pub mod cpu;
 mod guard;
+mod history;
 pub mod plan;
 mod potential;
 mod sweep;
@@ -144,13 +145,7 @@ impl<S: Real> Solver<S> {
         inputs: &Inputs<S>,
         dt: f64,
     ) -> Result<(), StepError> {
-        // Multipliers are forces times the squared step, so that the square must be a number too.
-        let squared = S::from_f64(dt * dt);
-        if !(dt > 0.0 && squared > S::ZERO && squared.is_finite()) {
-            return Err(StepError::BadStep { dt });
-        }
-        check(model, state, inputs)?;
-        self.work.check(model)?;
+        self.check(model, state, inputs, dt)?;
         let step = cpu::Step { model, inputs, dt, settings: &self.settings };
         for stage in &self.plan.prologue {
             self.work.run(stage, &step, state);
@@ -164,6 +159,39 @@ impl<S: Real> Solver<S> {
             self.work.run(stage, &step, state);
         }
         Ok(())
+    }
+
+    /// Starts a new history, for a caller who has put vertices elsewhere in `state.positions`: the
+    /// multipliers no longer tell where the body comes from, but what its elements answer to the
+    /// places the vertices are at now. Positions and velocities stay as they are.
+    ///
+    /// `inputs` and `dt` are those of the next step; of the inputs the anchors matter.
+    pub fn restart(
+        &mut self,
+        model: &Model<S>,
+        state: &mut State<S>,
+        inputs: &Inputs<S>,
+        dt: f64,
+    ) -> Result<(), StepError> {
+        self.check(model, state, inputs, dt)?;
+        self.work.restart(&cpu::Step { model, inputs, dt, settings: &self.settings }, state);
+        Ok(())
+    }
+
+    fn check(
+        &self,
+        model: &Model<S>,
+        state: &State<S>,
+        inputs: &Inputs<S>,
+        dt: f64,
+    ) -> Result<(), StepError> {
+        // Multipliers are forces times the squared step, so that the square must be a number too.
+        let squared = S::from_f64(dt * dt);
+        if !(dt > 0.0 && squared > S::ZERO && squared.is_finite()) {
+            return Err(StepError::BadStep { dt });
+        }
+        check(model, state, inputs)?;
+        self.work.check(model)
     }
 
     /// How often steps have been taken back since the solver was built.

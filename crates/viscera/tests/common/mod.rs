@@ -146,3 +146,19 @@ pub fn plain(substeps: u32, iterations: u32) -> SolverSettings {
         ..SolverSettings::default()
     }
 }
+
+/// Both materials, one of them viscous, springs and attachments.
+pub fn everything<S: Real>(colors: Colors) -> Model<S> {
+    let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
+    let mut builder = ModelBuilder::new();
+    let viscous = material(SNH, 1e4, 0.4).with_viscosity(0.05).expect("legal");
+    builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
+    builder.add_body(&mesh, &viscous).expect("a body");
+    let half = mesh.vertices().len() as u32;
+    for v in (0..half).step_by(3) {
+        builder.add_spring([v, half + v], 40.0, Some(0.01)).expect("a spring");
+        let anchor = mesh.vertices()[v as usize];
+        builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
+    }
+    builder.build(&colored(colors)).expect("a model")
+}
