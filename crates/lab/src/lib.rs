@@ -6,11 +6,12 @@
 //! | to | look at |
 //! |---|---|
 //! | solve a step or a state of rest exactly | [`reference::Reference`] |
-//! | set up what the studies share | [`scenes`] |
+//! | set up what the studies share | [`scenes`], [`settling`] |
 //! | compare the library with what must come out | [`validate`] |
 //! | write reports with tables and plots | [`report`] |
 
 pub mod reference;
 pub mod report;
 pub mod scenes;
+pub mod settling;
 pub mod validate;

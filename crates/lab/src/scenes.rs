@@ -1,6 +1,271 @@
-//! Scenes that the studies share.
+//! Scenes that the studies share: a body, what holds it, what moves, for how long.
+//!
+//! | scene | what happens |
+//! |---|---|
+//! | cantilever | a bar fixed at one end droops under its weight |
+//! | twist | a bar's end is turned by 60 degrees and pulled by 12 % |
+//! | grab | a patch on a block is pulled up by 64 % of its height |
+//! | press | half of a block's top is pressed down by 24 % of its height |
+//! | organ | the procedural liver in elastic ligaments sags and is pulled by a spring |
 
-use viscera::scalar::{Vec3, vec3};
+use std::fmt;
+
+use anyhow::{Context as _, Result};
+use viscera::material::{Material, MaterialModel};
+use viscera::mesh::TetMesh;
+use viscera::mesh::shapes::{self, Block, Splitting};
+use viscera::model::{Model, ModelBuilder};
+use viscera::scalar::{Real, Vec3, vec3};
+use viscera::settings::SolverSettings;
+use viscera::solver::{Inputs, Pin};
+
+/// Acceleration of gravity [m/s^2].
+pub const GRAVITY: Vec3<f64> = vec3(0.0, 0.0, -9.81);
+
+/// Frames per second.
+pub const FRAME_RATE: f64 = 60.0;
+
+/// Density of all tissue here [kg/m^3].
+const DENSITY: f64 = 1000.0;
+
+/// Where driven vertices go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Path {
+    /// By an offset [m].
+    Shift(Vec3<f64>),
+    /// Turned by an angle [rad] about an axis along x through a point, and shifted along x [m].
+    Screw {
+        /// A point on the axis [m].
+        center: Vec3<f64>,
+        /// [rad].
+        angle: f64,
+        /// [m].
+        advance: f64,
+    },
+}
+
+impl Path {
+    /// Where a point is after a share of the way.
+    pub fn at(&self, x: Vec3<f64>, share: f64) -> Vec3<f64> {
+        match *self {
+            Self::Shift(offset) => x + offset * share,
+            Self::Screw { center, angle, advance } => {
+                let (sin, cos) = (libm::sin(angle * share), libm::cos(angle * share));
+                let r = x - center;
+                let turned = vec3(r.x, cos * r.y - sin * r.z, sin * r.y + cos * r.z);
+                center + turned + vec3(advance * share, 0.0, 0.0)
+            }
+        }
+    }
+}
+
+/// An elastic hold of one vertex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hold {
+    /// The vertex.
+    pub vertex: u32,
+    /// [N/m].
+    pub stiffness: f64,
+    /// Whether its anchor follows the path.
+    pub driven: bool,
+}
+
+/// A body, what holds it, what moves.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// One word.
+    pub name: &'static str,
+    /// The body at rest.
+    pub mesh: TetMesh,
+    /// What it is made of.
+    pub tissue: Material,
+    /// [m/s^2].
+    pub gravity: Vec3<f64>,
+    /// Pinned where they are.
+    pub fixed: Vec<u32>,
+    /// Pinned, and moved along the path.
+    pub driven: Vec<u32>,
+    /// Held elastically.
+    pub holds: Vec<Hold>,
+    /// Where what is driven goes.
+    pub path: Path,
+    /// Frames that it takes to get there.
+    pub path_frames: u32,
+}
+
+impl fmt::Display for Scene {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (young, poisson) = (self.tissue.young() / 1e3, self.tissue.poisson());
+        write!(f, "{} {young} kPa, nu {poisson}, {} tets", self.name, self.mesh.tets().len())
+    }
+}
+
+impl Scene {
+    /// The scene of a name, with about as many tetrahedra.
+    pub fn new(name: &'static str, size: Size, tissue: Material) -> Result<Self> {
+        let mut scene = Self {
+            name,
+            mesh: TetMesh::default(),
+            tissue,
+            gravity: Vec3::ZERO,
+            fixed: Vec::new(),
+            driven: Vec::new(),
+            holds: Vec::new(),
+            path: Path::Shift(Vec3::ZERO),
+            path_frames: 1,
+        };
+        match name {
+            "cantilever" => {
+                scene.mesh = bar(size)?;
+                scene.gravity = GRAVITY;
+                scene.fixed = scene.select(|x| x.x < NEAR);
+            }
+            "twist" => {
+                scene.mesh = bar(size)?;
+                scene.fixed = scene.select(|x| x.x < NEAR);
+                scene.driven = scene.select(|x| x.x > BAR[0] - NEAR);
+                let center = vec3(0.0, 0.5 * BAR[1], 0.5 * BAR[2]);
+                let angle = std::f64::consts::PI / 3.0;
+                scene.path = Path::Screw { center, angle, advance: 0.12 * BAR[0] };
+                scene.path_frames = 12;
+            }
+            "grab" => {
+                scene.mesh = block(size)?;
+                scene.gravity = GRAVITY;
+                scene.fixed = scene.select(|x| x.z < NEAR);
+                let in_patch = |x: f64| (x - 0.5 * BLOCK[0]).abs() < 0.2 * BLOCK[0];
+                scene.driven =
+                    scene.select(|x| x.z > BLOCK[2] - NEAR && in_patch(x.x) && in_patch(x.y));
+                scene.path = Path::Shift(vec3(0.0, 0.0, 0.032));
+                scene.path_frames = 8;
+            }
+            "press" => {
+                scene.mesh = block(size)?;
+                scene.fixed = scene.select(|x| x.z < NEAR);
+                scene.driven =
+                    scene.select(|x| x.z > BLOCK[2] - NEAR && x.x < 0.5 * BLOCK[0] + NEAR);
+                scene.path = Path::Shift(vec3(0.0, 0.0, -0.012));
+                scene.path_frames = 6;
+            }
+            _ => {
+                let spacing = match size {
+                    Size::Tiny => 0.06,
+                    Size::Small => 0.04,
+                    Size::Large => 0.022,
+                };
+                scene.mesh = shapes::liver(spacing, 1.0)?.tets;
+                scene.gravity = GRAVITY;
+                scene.hold_organ();
+                scene.path = Path::Shift(vec3(0.0, 0.0, 0.05));
+                scene.path_frames = 12;
+            }
+        }
+        Ok(scene)
+    }
+
+    /// Ligaments on the uppermost quarter, a spring at the rightmost point.
+    fn hold_organ(&mut self) {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for x in self.mesh.vertices() {
+            (low, high) = (low.min(x.z), high.max(x.z));
+        }
+        let top = self.select(|x| x.z > high - 0.25 * (high - low));
+        // 2000 N/m in all: a liver of 1.5 kg sinks by some millimetres.
+        let stiffness = 2000.0 / top.len() as f64;
+        self.holds.extend(top.iter().map(|&vertex| Hold { vertex, stiffness, driven: false }));
+        let vertices = self.mesh.vertices().iter().enumerate();
+        let rightmost = vertices.max_by(|(_, a), (_, b)| a.x.total_cmp(&b.x));
+        let vertex = rightmost.map_or(0, |(v, _)| v as u32);
+        self.holds.push(Hold { vertex, stiffness: 100.0, driven: true });
+    }
+
+    fn select(&self, inside: impl Fn(Vec3<f64>) -> bool) -> Vec<u32> {
+        let vertices = self.mesh.vertices().iter().enumerate();
+        vertices.filter(|(_, x)| inside(**x)).map(|(v, _)| v as u32).collect()
+    }
+
+    /// The model for a solver of the given settings.
+    pub fn model<S: Real>(&self, settings: &SolverSettings) -> Result<Model<S>> {
+        let mut builder = ModelBuilder::new();
+        builder.add_body(&self.mesh, &self.tissue)?;
+        for hold in &self.holds {
+            let anchor = self.mesh.vertices()[hold.vertex as usize];
+            builder.add_attachment(hold.vertex, anchor, hold.stiffness)?;
+        }
+        builder.build(settings).with_context(|| self.to_string())
+    }
+
+    /// What acts at the end of a frame, counted from 1; between frames at fractions.
+    pub fn inputs<S: Real>(&self, frame: f64) -> Inputs<S> {
+        let share = (frame / f64::from(self.path_frames)).min(1.0);
+        let rest = self.mesh.vertices();
+        let pin = |&vertex: &u32, target: Vec3<f64>| Pin { vertex, target: target.cast() };
+        let mut pins: Vec<_> = self.fixed.iter().map(|v| pin(v, rest[*v as usize])).collect();
+        pins.extend(self.driven.iter().map(|v| pin(v, self.path.at(rest[*v as usize], share))));
+        let anchor = |hold: &Hold| {
+            let x = rest[hold.vertex as usize];
+            if hold.driven { self.path.at(x, share).cast() } else { x.cast() }
+        };
+        let anchors = self.holds.iter().map(anchor).collect();
+        Inputs { gravity: self.gravity.cast(), pins, anchors, forces: Vec::new() }
+    }
+
+    /// Vertices that are not pinned.
+    pub fn free(&self) -> Vec<u32> {
+        let mut is_free = vec![true; self.mesh.vertices().len()];
+        for &v in self.fixed.iter().chain(&self.driven) {
+            is_free[v as usize] = false;
+        }
+        (0..is_free.len() as u32).filter(|&v| is_free[v as usize]).collect()
+    }
+}
+
+/// All scenes' names.
+pub const NAMES: [&str; 5] = ["cantilever", "twist", "grab", "press", "organ"];
+
+/// How fine a scene is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Size {
+    /// Some 100 tetrahedra.
+    Tiny,
+    /// About 600 tetrahedra.
+    Small,
+    /// About 3000 tetrahedra.
+    Large,
+}
+
+/// Distance [m] within which a vertex counts as lying on a face.
+const NEAR: f64 = 1e-9;
+
+/// Edge lengths of the bar [m].
+pub const BAR: [f64; 3] = [0.2, 0.05, 0.05];
+
+/// Edge lengths of the block [m].
+pub const BLOCK: [f64; 3] = [0.1, 0.1, 0.05];
+
+fn bar(size: Size) -> Result<TetMesh> {
+    irregular(BAR, [[4, 2, 2], [10, 3, 3], [20, 5, 5]], size)
+}
+
+fn block(size: Size) -> Result<TetMesh> {
+    irregular(BLOCK, [[4, 4, 2], [6, 6, 3], [10, 10, 5]], size)
+}
+
+/// No two tetrahedra are alike.
+fn irregular(edges: [f64; 3], cells: [[usize; 3]; 3], size: Size) -> Result<TetMesh> {
+    let block = Block {
+        splitting: Splitting::Six,
+        jitter: 0.6,
+        seed: 1,
+        ..Block::new(Vec3::from_f64(edges), cells[size as usize])
+    };
+    block.mesh().context("a block of the studies")
+}
+
+/// Tissue of the studies.
+pub fn tissue(model: MaterialModel, young: f64, poisson: f64) -> Result<Material> {
+    Ok(Material::new(model, young, poisson, DENSITY)?)
+}
 
 /// Seeded numbers (splitmix64): the same on every machine.
 #[derive(Clone, Debug)]

@@ -1,0 +1,197 @@
+//! A scene brought to rest by the library's solver, and the same by the reference.
+
+use anyhow::{Context as _, Result};
+use viscera::measure::measure_tets;
+use viscera::scalar::{Real, Vec3};
+use viscera::settings::SolverSettings;
+use viscera::solver::Solver;
+use viscera::state::State;
+
+use crate::reference::{Reference, Standing};
+use crate::scenes::{FRAME_RATE, Scene};
+
+/// Frames of a settling: three seconds.
+pub const FRAMES: u32 = 180;
+
+/// Share of the velocities that is left after each frame.
+pub const KEPT_VELOCITY: f64 = 0.9;
+
+/// A frame counts as moving while its root mean square speed is above this share of the fastest
+/// frame's so far.
+const STILL: f64 = 0.01;
+
+/// Parts of the path that the reference takes one after the other, so that it ends in the state that
+/// the motion leads to.
+const PATH_PARTS: u32 = 8;
+
+/// Where the solver came to.
+#[derive(Clone, Debug)]
+pub struct Settled {
+    /// Positions [m], shape [vertex_count].
+    pub positions: Vec<Vec3<f64>>,
+    /// Share of all steps that the guard took back.
+    pub rejected: f64,
+    /// Share of the steps that the guard took back in frames in which the body moved.
+    pub rejected_moving: f64,
+    /// Root mean square speed [m/s] in the last frame.
+    pub speed: f64,
+}
+
+/// Runs a scene for [`FRAMES`] frames of one sixtieth of a second each, all velocities times
+/// [`KEPT_VELOCITY`] after each.
+pub fn settle<S: Real>(scene: &Scene, settings: &SolverSettings) -> Result<Settled> {
+    let model = scene.model::<S>(settings)?;
+    let mut solver = Solver::new(&model, settings);
+    let mut state = State::at_rest(&model);
+    let dt = 1.0 / FRAME_RATE / f64::from(settings.substeps);
+    let (mut moving, mut rejected_moving) = (0u64, 0u64);
+    let (mut fastest, mut speed) = (0.0f64, 0.0);
+    for frame in 0..FRAMES {
+        let before = solver.rejected_steps();
+        for substep in 1..=settings.substeps {
+            let share = f64::from(substep) / f64::from(settings.substeps);
+            let inputs = scene.inputs(f64::from(frame) + share);
+            solver.step(&model, &mut state, &inputs, dt)?;
+        }
+        speed = root_mean_square(&state.velocities);
+        fastest = fastest.max(speed);
+        if speed > STILL * fastest {
+            moving += u64::from(settings.substeps);
+            rejected_moving += solver.rejected_steps() - before;
+        }
+        for velocity in &mut state.velocities {
+            *velocity = *velocity * S::from_f64(KEPT_VELOCITY);
+        }
+    }
+    let steps = u64::from(FRAMES) * u64::from(settings.substeps);
+    Ok(Settled {
+        positions: state.positions.iter().map(|x| x.cast()).collect(),
+        rejected: solver.rejected_steps() as f64 / steps as f64,
+        rejected_moving: rejected_moving as f64 / moving.max(1) as f64,
+        speed,
+    })
+}
+
+fn root_mean_square<S: Real>(values: &[Vec3<S>]) -> f64 {
+    let sum: f64 = values.iter().map(|v| v.length_squared().to_f64()).sum();
+    (sum / values.len().max(1) as f64).sqrt()
+}
+
+/// The state of rest of a scene, by Newton's method.
+#[derive(Clone, Debug)]
+pub struct Truth {
+    /// Positions [m], shape [vertex_count].
+    pub positions: Vec<Vec3<f64>>,
+    /// Its potential and what is left of the gradient.
+    pub standing: Standing,
+    /// Volume [m^3] of the body there.
+    pub volume: f64,
+    /// False where the reference stopped at a saddle.
+    pub minimum: bool,
+    /// Tetrahedra turned inside out.
+    pub inverted: usize,
+}
+
+/// Follows the scene's path to its end with the reference.
+pub fn truth(scene: &Scene) -> Result<Truth> {
+    let model = scene.model::<f64>(&SolverSettings::default())?;
+    let mut reference = Reference::new(&model);
+    let mut positions = model.rest_positions.clone();
+    let mut minimum = false;
+    let parts = if scene.driven.is_empty() { 1 } else { PATH_PARTS };
+    for part in 1..=parts {
+        let share = f64::from(part) / f64::from(parts);
+        let inputs = scene.inputs(share * f64::from(scene.path_frames));
+        let solution = reference
+            .settle(&positions, &inputs)
+            .with_context(|| format!("the reference of {scene}"))?;
+        positions = solution.positions;
+        minimum = solution.convergence.minimum;
+    }
+    let standing = reference.standing(&positions, &scene.inputs(f64::INFINITY))?;
+    let (volume, inverted) = volume(scene, &positions)?;
+    Ok(Truth { positions, standing, volume, minimum, inverted })
+}
+
+/// The body's volume [m^3], and how many tetrahedra are inside out.
+fn volume(scene: &Scene, positions: &[Vec3<f64>]) -> Result<(f64, usize)> {
+    let model = scene.model::<f64>(&SolverSettings::default())?;
+    let mut tets = Vec::new();
+    measure_tets(&model, positions, &mut tets);
+    // The measures are in the user's order of tetrahedra.
+    let rest =
+        (0..scene.mesh.tets().len()).map(|t| viscera::mesh::tet_volume(scene.mesh.corners(t)));
+    let sum = tets.iter().zip(rest).map(|(tet, rest)| tet.volume_ratio * rest).sum();
+    let inverted = tets.iter().filter(|tet| tet.volume_ratio <= 0.0).count();
+    Ok((sum, inverted))
+}
+
+/// How far a settled state is from the truth.
+#[derive(Clone, Copy, Debug)]
+pub struct Error {
+    /// Root mean square distance over root mean square displacement, free vertices.
+    pub rms: f64,
+    /// Largest distance over largest displacement.
+    pub largest: f64,
+    /// Apparent stiffness: the true displacement over ours along it; 1 is right.
+    pub stiffness: f64,
+    /// Relative error of the volume.
+    pub volume: f64,
+    /// Unbalanced force of our state over the load, or over the reaction where nothing weighs.
+    pub gradient: f64,
+    /// Our potential minus the true one, over the true elastic energy.
+    pub energy: f64,
+    /// Tetrahedra turned inside out.
+    pub inverted: usize,
+}
+
+impl Error {
+    /// True where the state is in balance yet elsewhere: another minimum than the reference's.
+    pub fn is_other_minimum(&self) -> bool {
+        self.rms > 0.01 && self.gradient < 1e-4
+    }
+}
+
+/// Compares.
+pub fn compare(scene: &Scene, truth: &Truth, positions: &[Vec3<f64>]) -> Result<Error> {
+    let model = scene.model::<f64>(&SolverSettings::default())?;
+    let reference = Reference::new(&model);
+    let inputs = scene.inputs(f64::INFINITY);
+    let (mut error, mut moved, mut along) = (0.0, 0.0, 0.0);
+    let (mut largest_error, mut largest_move) = (0.0f64, 0.0f64);
+    for v in scene.free() {
+        let rest = scene.mesh.vertices()[v as usize];
+        let (exact, ours) = (truth.positions[v as usize] - rest, positions[v as usize] - rest);
+        error += (exact - ours).length_squared();
+        moved += exact.length_squared();
+        along += exact.dot(ours);
+        largest_error = largest_error.max((exact - ours).length());
+        largest_move = largest_move.max(exact.length());
+    }
+    let finite = positions.iter().all(|x| x.is_finite());
+    if !finite {
+        let lost = f64::INFINITY;
+        return Ok(Error {
+            rms: lost,
+            largest: lost,
+            stiffness: f64::NAN,
+            volume: lost,
+            gradient: lost,
+            energy: lost,
+            inverted: scene.mesh.tets().len(),
+        });
+    }
+    let standing = reference.standing(positions, &inputs)?;
+    let reactions = reference.reactions(&truth.positions, &inputs)?;
+    let reaction = reactions.iter().map(|r| r.length_squared()).sum::<f64>().sqrt();
+    let (volume, inverted) = volume(scene, positions)?;
+    Ok(Error {
+        rms: (error / moved).sqrt(),
+        largest: largest_error / largest_move,
+        stiffness: moved / along,
+        volume: volume / truth.volume - 1.0,
+        gradient: standing.gradient / standing.load.max(reaction),
+        energy: (standing.potential - truth.standing.potential) / truth.standing.elastic_energy,
+        inverted,
+    })
+}
