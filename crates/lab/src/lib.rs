@@ -2,5 +2,15 @@
 //!
 //! The truth beside the solver: a Newton reference in double precision, and the studies that hold
 //! every claim of the library against it.
+//!
+//! | to | look at |
+//! |---|---|
+//! | solve a step or a state of rest exactly | [`reference::Reference`] |
+//! | set up what the studies share | [`scenes`] |
+//! | compare the library with what must come out | [`validate`] |
+//! | write reports with tables and plots | [`report`] |
 
 pub mod reference;
+pub mod report;
+pub mod scenes;
+pub mod validate;

@@ -11,7 +11,8 @@ pub struct State<S> {
     /// Velocities [m/s], shape [vertex_count].
     pub velocities: Vec<Vec3<S>>,
     /// Multipliers [J s^2] of all constraints, in the model's layout, shape [multiplier_count].
-    /// A solver that keeps them from step to step starts from the last step's forces.
+    /// A solver that keeps them from step to step starts from the last step's forces. After
+    /// changing positions by hand, start a new history: [`crate::solver::Solver::restart`].
     pub multipliers: Vec<S>,
     /// The step [s] to which the multipliers belong: they are forces times its square.
     pub multiplier_dt: f64,

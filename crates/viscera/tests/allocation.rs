@@ -6,8 +6,7 @@ mod common;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use common::{SNH, STVK, block, material};
-use viscera::model::{Model, ModelBuilder};
+use common::everything;
 use viscera::scalar::{Real, vec3};
 use viscera::scene::Scene;
 use viscera::settings::{Acceleration, AndersonOn, Colors, SolverSettings};
@@ -67,22 +66,6 @@ fn the_counter_counts() {
     assert_eq!(requests, 2, "one allocation, one release");
 }
 
-/// Both materials, one of them viscous, springs and attachments.
-fn everything<S: Real>(colors: Colors) -> Model<S> {
-    let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
-    let mut builder = ModelBuilder::new();
-    let viscous = material(SNH, 1e4, 0.4).with_viscosity(0.05).expect("legal");
-    builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
-    builder.add_body(&mesh, &viscous).expect("a body");
-    let half = mesh.vertices().len() as u32;
-    for v in (0..half).step_by(3) {
-        builder.add_spring([v, half + v], 40.0, Some(0.01)).expect("a spring");
-        let anchor = mesh.vertices()[v as usize];
-        builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
-    }
-    builder.build(&common::colored(colors)).expect("a model")
-}
-
 fn accelerations() -> Vec<SolverSettings> {
     let plain = SolverSettings::default();
     let chebyshev = SolverSettings {
@@ -124,6 +107,7 @@ fn steps_allocate_nothing<S: Real>() {
                     for dt in [1e-3, 1e-3, 2e-3] {
                         solver.step(&model, &mut state, &inputs, dt).expect("a legal step");
                     }
+                    solver.restart(&model, &mut state, &inputs, 1e-3).expect("a new history");
                 });
                 assert_eq!(requests, 0, "{} {settings:?}", S::NAME);
 

@@ -382,6 +382,76 @@ fn stretch_solve_satisfies_its_linear_system() {
     assert!(checked > 100, "only {checked} cases without a clamp");
 }
 
+/// Each solve leaves its constitutive multipliers alone, and their load is `dt^2` times the force.
+#[test]
+fn constitutive_multipliers_leave_no_residual_and_carry_the_force() {
+    let mut random = Random(15);
+    let material = common::material(common::STVK, 5e3, 0.45);
+    let compliance = material.compliance_matrix();
+    let (lambda, mu) = (material.lame_lambda(), material.lame_mu());
+    let (mut worst_change, mut worst_force) = ([0.0f64; 4], [0.0f64; 4]);
+    for case in cases() {
+        let (x, shape) = (&case.corners, &case.inverse_rest_shape);
+        let w: [f64; 4] = std::array::from_fn(|_| 1.0 / random.uniform(1e-6, 1e-4));
+        let f = deformation_gradient(x, shape);
+        let s = case.volume * 1e-4;
+        let mut check = |form: usize, before: &[f64], change: &[f64], piola: Mat3<f64>, loads| {
+            let norm = |l: &[f64]| l.iter().map(|l| l * l).sum::<f64>().sqrt();
+            worst_change[form] = worst_change[form].max(norm(change) / norm(before));
+            let loads: [viscera::elements::CornerLoad<f64>; 4] = loads;
+            let forces = internal_forces(&piola, shape, s);
+            let size = s * (piola.norm_squared() * shape.norm_squared()).sqrt();
+            for (load, force) in loads.iter().zip(forces) {
+                let error = (load.impulse - force).length() / size;
+                worst_force[form] = worst_force[form].max(error);
+            }
+        };
+
+        let (rest, start) = ([0.0; 6], std::array::from_fn(|_| random.uniform(-0.1, 0.1)));
+        for (form, target) in [(0, rest), (1, start)] {
+            let strain = green_strain::strain(&f);
+            let c = std::array::from_fn(|p| strain[p] - target[p]);
+            let l = green_strain::constitutive_multipliers(&c, lambda, mu, s);
+            let d = green_strain::solve(x, &w, shape, &l, &target, &compliance, 1.0 / s);
+            let piola = green_strain::piola(&f, &c, lambda, mu);
+            let loads = green_strain::corner_loads(x, shape, &l);
+            check(form, &l, &d.multipliers, piola, loads);
+        }
+        let piola = neo_hookean::piola(&f, lambda, mu);
+        let l = neo_hookean_pair::constitutive_multipliers(&f, lambda, mu, s);
+        let d = neo_hookean_pair::solve(x, &w, shape, &l, lambda, mu, s);
+        let loads = neo_hookean_pair::corner_loads(x, shape, &l);
+        check(2, &l, &d.multipliers, piola, loads);
+        let l = neo_hookean_stretch::constitutive_multipliers(&f, lambda, mu, s);
+        let d = neo_hookean_stretch::solve(x, &w, shape, &l, lambda, mu, s);
+        let loads = neo_hookean_stretch::corner_loads(x, shape, &l);
+        check(3, &l, &d.multipliers, piola, loads);
+    }
+    println!("changes {worst_change:?}, loads {worst_force:?}");
+    // The condition number of D is (3 lambda + 2 mu)/mu = 29; it enters in the residual and once
+    // more in the solve.
+    let tolerance = 29.0 * 29.0 * 8.0 * f64::EPSILON;
+    assert!(worst_change.iter().all(|change| *change < tolerance), "{worst_change:?}");
+    assert!(worst_force.iter().all(|error| *error < tolerance), "{worst_force:?}");
+
+    let ends: [Vec3<f64>; 2] = std::array::from_fn(|_| random.vector(0.01));
+    let (stiffness, squared) = (120.0, 1e-4);
+    let compliance_tilde = 1.0 / (stiffness * squared);
+    let l = spring::constitutive_multiplier(&ends, 0.004, compliance_tilde);
+    let (change, _) = spring::solve(&ends, &[1e4, 2e4], 0.004, l, compliance_tilde);
+    assert!(change.abs() < 8.0 * f64::EPSILON * l.abs(), "{change:e} of {l:e}");
+    let forces = spring::forces(&ends, 0.004, stiffness);
+    for (load, force) in spring::corner_loads(&ends, l).iter().zip(forces) {
+        let error = (load.impulse - force * squared).length();
+        assert!(error < 8.0 * f64::EPSILON * squared * force.length(), "{error:e}");
+    }
+    let l = attachment::constitutive_multipliers(ends[0], ends[1], compliance_tilde);
+    let (change, _) = attachment::solve(ends[0], 1e4, ends[1], l, compliance_tilde);
+    assert!(change.length() < 8.0 * f64::EPSILON * l.length(), "{change:?} of {l:?}");
+    let force = attachment::force(ends[0], ends[1], stiffness) * squared;
+    assert!((l - force).length() < 8.0 * f64::EPSILON * force.length(), "{l:?} {force:?}");
+}
+
 /// With `D` the diagonal of the mass bounds and `K = d(J^T l)/dx` (by differences), `-D <= K <= D`:
 /// what makes the rebase stable. Checked as the spectral radius of `D^-1/2 K D^-1/2`.
 #[test]

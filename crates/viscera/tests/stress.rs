@@ -24,7 +24,8 @@ fn damage<S: Real>(model: &Model<S>, state: &State<S>) -> (usize, f64) {
 }
 
 /// Vertices jump at once to places up to one body length away, stay for ten frames, are let go.
-/// The step guard takes back what such a jump does to the sweeps, whatever colours and acceleration.
+/// The step guard takes back what such a jump does to the sweeps, whatever colours and acceleration:
+/// no step ends at a higher incremental potential than the best place it could have started from.
 #[test]
 fn violent_grabs_end_in_numbers() {
     let size = [0.08, 0.04, 0.04];
@@ -39,7 +40,7 @@ fn violent_grabs_end_in_numbers() {
         let settings = SolverSettings { colors, acceleration, ..SolverSettings::default() };
         let model = single_body::<f32>(&mesh, &material(SNH, 1e4, 0.45), &settings);
         let (mut grabbed, mut ended, mut worst_end, mut farthest) = (0, 0, 0, 0.0f64);
-        let mut rejected = 0;
+        let (mut rejected, mut above) = (0, 0);
         for seed in 0..seeds {
             let mut random = Random(seed);
             let mut inputs = Inputs::default();
@@ -54,7 +55,11 @@ fn violent_grabs_end_in_numbers() {
                     grabbed += damage(&model, &run.state).0;
                     inputs.pins.clear();
                 }
-                run.frame(&inputs, 1.0);
+                for _ in 0..settings.substeps {
+                    run.step(&inputs);
+                    let report = run.solver.last_step().expect("a guarded step");
+                    above += usize::from(!report.keeps_limit());
+                }
             }
             assert!(run.state.is_finite(), "seed {seed}, {colors:?}, {acceleration:?}: no number");
             rejected += run.solver.rejected_steps();
@@ -69,6 +74,9 @@ fn violent_grabs_end_in_numbers() {
             mesh.tets().len(),
             seeds * frames * u64::from(settings.substeps)
         );
+        assert_eq!(above, 0, "{colors:?}, {acceleration:?}: steps that end above their limit");
+        // Without any the guard would not have been asked.
+        assert!(rejected > 0);
     }
 }
 
@@ -131,7 +139,9 @@ fn inputs_that_do_not_fit_are_refused_and_nothing_moves() {
         assert_eq!(solver.step(&model, &mut state, &inputs, 0.01), Err(expected.clone()));
         assert_eq!(state, before);
         let measured = solver.force_balance(&model, &state, &inputs, &mut balance);
-        assert_eq!(measured, Err(expected));
+        assert_eq!(measured, Err(expected.clone()));
+        assert_eq!(solver.restart(&model, &mut state, &inputs, 0.01), Err(expected));
+        assert_eq!(state, before);
     }
 }
 

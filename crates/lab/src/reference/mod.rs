@@ -1,1 +1,398 @@
-//! The Newton reference.
+//! The Newton reference: implicit Euler steps and static equilibrium in double precision, by exact
+//! Newton steps with a sparse Cholesky factor.
+//!
+//! It minimises what the library's solver minimises, over the same model and inputs, and shares with
+//! it only the pure functions for energy and stress of an element. It is slow and takes much memory:
+//! [`Reference::cost`] tells how much before anything is solved.
+//!
+//! | file | what |
+//! |---|---|
+//! | `tissue` | second derivative of the energy |
+//! | `problem` | tetrahedra, linear or quadratic, springs, attachments |
+//! | `objective` | potential, gradient, Hessian |
+//! | `matrix` | sparse matrix, factor, cost |
+//! | `newton` | the iteration |
+//! | `fixing` | whether a body can be at rest |
+
+pub mod fixing;
+pub mod matrix;
+pub mod newton;
+pub mod objective;
+pub mod problem;
+pub mod tissue;
+
+use viscera::material::Material;
+use viscera::mesh::TetMesh;
+use viscera::model::Model;
+use viscera::scalar::Vec3;
+use viscera::solver::Inputs;
+use viscera::state::State;
+
+pub use matrix::Cost;
+pub use newton::{Convergence, Tolerance};
+
+use matrix::{FactorError, Factorization, Pattern};
+use objective::{Load, Objective, creep_at};
+use problem::Problem;
+
+/// Memory [B] that a reference takes at most unless told otherwise.
+pub const DEFAULT_MEMORY: u64 = 8 << 30;
+
+/// Why there is no reference solution.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReferenceError {
+    /// More memory than allowed.
+    #[error(
+        "the reference would need {:.1} GB for {unknowns} unknowns, more than the {:.1} GB allowed; \
+         take a coarser mesh, or allow more with `Reference::allow_memory`",
+        *bytes as f64 / 1e9, *limit as f64 / 1e9
+    )]
+    TooLarge {
+        /// Three per free vertex.
+        unknowns: usize,
+        /// What it would take [B].
+        bytes: u64,
+        /// What it may take [B].
+        limit: u64,
+    },
+    /// A body can drift or turn freely.
+    #[error("{}", loose_text(*.vertex, *.turns))]
+    Loose {
+        /// A vertex of that body.
+        vertex: u32,
+        /// True where only turning is left free.
+        turns: bool,
+    },
+    /// An input names no vertex.
+    #[error("a {what} names vertex {vertex}; the model has {vertex_count}")]
+    UnknownVertex {
+        /// "pin" or "force".
+        what: &'static str,
+        /// The index given.
+        vertex: u32,
+        /// How many vertices there are.
+        vertex_count: usize,
+    },
+    /// A list has the wrong length.
+    #[error("the {what} has {given} entries; the model needs {expected}")]
+    Mismatch {
+        /// The list.
+        what: &'static str,
+        /// Its length.
+        given: usize,
+        /// The length that fits.
+        expected: usize,
+    },
+    /// A number is none, or the step is no time.
+    #[error("the {what} must be finite{}", if *.what == "step" { " and above zero" } else { "" })]
+    NotFinite {
+        /// What is not.
+        what: &'static str,
+    },
+    /// Quadratic tetrahedra have no lumped masses.
+    #[error("quadratic tetrahedra have no lumped masses: only `settle` is defined for them")]
+    NoStep,
+    /// Newton's method came to no minimum.
+    #[error(
+        "Newton's method stopped after {steps} steps with a gradient of {gradient:.1e} N, {:.1e} of \
+         the first; start nearer to the solution, or load in smaller steps",
+        gradient / start_gradient
+    )]
+    NotConverged {
+        /// Newton steps done.
+        steps: u32,
+        /// Gradient at the end [N].
+        gradient: f64,
+        /// Gradient at the start [N].
+        start_gradient: f64,
+    },
+}
+
+fn loose_text(vertex: u32, turns: bool) -> String {
+    let (what, cure) = if turns {
+        ("is held but free to turn", "hold at least three of its vertices that are not in line")
+    } else {
+        ("is not held by anything", "pin or attach some of its vertices")
+    };
+    format!("the body of vertex {vertex} {what}, so it has no state of rest; {cure}")
+}
+
+/// A solution and how it was found.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Positions [m], shape [vertex_count].
+    pub positions: Vec<Vec3<f64>>,
+    /// How the solve went.
+    pub convergence: Convergence,
+}
+
+/// What a state's potential looks like where it is, for comparing minima.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Standing {
+    /// Potential [J]: elastic energy minus the work of dead loads.
+    pub potential: f64,
+    /// Elastic energy [J].
+    pub elastic_energy: f64,
+    /// Norm of the unbalanced forces [N] over free vertices.
+    pub gradient: f64,
+    /// Norm of the dead loads [N] over free vertices.
+    pub load: f64,
+}
+
+/// Newton's method for one model.
+pub struct Reference {
+    problem: Problem,
+    tolerance: Tolerance,
+    memory: u64,
+    lumped: bool,
+    /// Of the pins last used.
+    analysis: Option<Analysis>,
+}
+
+/// Pattern and elimination order for one set of pins.
+struct Analysis {
+    pinned: Vec<bool>,
+    pattern: Pattern,
+    factorization: Factorization,
+}
+
+impl Reference {
+    /// For the library's model.
+    pub fn new(model: &Model<f64>) -> Self {
+        Self::of(Problem::linear(model), true)
+    }
+
+    /// For one body of quadratic tetrahedra, with a node on every edge of the mesh; the mesh's
+    /// vertices keep their numbers.
+    pub fn quadratic(mesh: &TetMesh, material: &Material) -> Self {
+        Self::of(Problem::quadratic(mesh, material), false)
+    }
+
+    fn of(problem: Problem, lumped: bool) -> Self {
+        let tolerance = Tolerance::default();
+        Self { problem, tolerance, memory: DEFAULT_MEMORY, lumped, analysis: None }
+    }
+
+    /// Changes the tolerance.
+    pub fn with_tolerance(mut self, tolerance: Tolerance) -> Self {
+        self.tolerance = tolerance;
+        self
+    }
+
+    /// Changes how much memory [B] may be taken.
+    pub fn allow_memory(mut self, bytes: u64) -> Self {
+        self.memory = bytes;
+        self
+    }
+
+    /// What is solved.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// What a solve with these inputs would cost. Takes the memory of the pattern only.
+    pub fn cost(&mut self, inputs: &Inputs<f64>) -> Result<Cost, ReferenceError> {
+        let analysis = self.analyse(self.pinned(inputs)?)?;
+        let cost = analysis.factorization.cost(&analysis.pattern, &self.problem);
+        self.analysis = Some(analysis);
+        Ok(cost)
+    }
+
+    /// Static equilibrium near `start` [m]: pins at their targets, gravity and forces as dead loads.
+    pub fn settle(
+        &mut self,
+        start: &[Vec3<f64>],
+        inputs: &Inputs<f64>,
+    ) -> Result<Solution, ReferenceError> {
+        let pinned = self.check(start, inputs)?;
+        let x = with_pins(start, inputs);
+        if let Some(loose) = fixing::find_loose(&self.problem, &pinned, &x) {
+            return Err(ReferenceError::Loose { vertex: loose.vertex, turns: loose.turns });
+        }
+        self.minimise(pinned, x, inputs, Load::Forces(dead_loads(&self.problem, inputs)))
+    }
+
+    /// One step of implicit Euler; changes positions and velocities of the state.
+    pub fn step(
+        &mut self,
+        state: &mut State<f64>,
+        inputs: &Inputs<f64>,
+        dt: f64,
+    ) -> Result<Convergence, ReferenceError> {
+        if !self.lumped {
+            return Err(ReferenceError::NoStep);
+        }
+        if !(dt > 0.0 && (dt * dt).is_finite() && 1.0 / (dt * dt) < f64::MAX) {
+            return Err(ReferenceError::NotFinite { what: "step" });
+        }
+        let pinned = self.check(&state.positions, inputs)?;
+        let expected = self.problem.vertex_count();
+        if state.velocities.len() != expected {
+            let (what, given) = ("list of velocities", state.velocities.len());
+            return Err(ReferenceError::Mismatch { what, given, expected });
+        }
+        let loads = dead_loads(&self.problem, inputs);
+        let mut predicted = state.positions.clone();
+        for v in 0..expected {
+            let acceleration = loads[v] * (1.0 / self.problem.masses[v]);
+            predicted[v] += state.velocities[v] * dt + acceleration * (dt * dt);
+        }
+        let x = with_pins(&predicted, inputs);
+        let creep = creep_at(&self.problem, &state.positions, dt);
+        let load = Load::Inertia { dt, predicted, creep };
+        let solution = self.minimise(pinned, x, inputs, load)?;
+        for (v, x) in solution.positions.into_iter().enumerate() {
+            state.velocities[v] = (x - state.positions[v]) * (1.0 / dt);
+            state.positions[v] = x;
+        }
+        Ok(solution.convergence)
+    }
+
+    /// Potential, energy and unbalanced forces of statics at `x`.
+    pub fn standing(
+        &self,
+        x: &[Vec3<f64>],
+        inputs: &Inputs<f64>,
+    ) -> Result<Standing, ReferenceError> {
+        let pinned = self.check(x, inputs)?;
+        let loads = dead_loads(&self.problem, inputs);
+        let objective = Objective {
+            problem: &self.problem,
+            anchors: anchors(&self.problem, inputs),
+            load: Load::Forces(loads.clone()),
+        };
+        let norm = |values: &[Vec3<f64>]| {
+            let free = values.iter().zip(&pinned).filter(|(_, pinned)| !**pinned);
+            free.map(|(value, _)| value.length_squared()).sum::<f64>().sqrt()
+        };
+        Ok(Standing {
+            potential: objective.value(x).sum,
+            elastic_energy: objective.elastic_energy(x),
+            gradient: norm(&objective.gradient(x)),
+            load: norm(&loads),
+        })
+    }
+
+    /// Forces [N] by which pins hold their vertices at `x`, shape [pin_count].
+    pub fn reactions(
+        &self,
+        x: &[Vec3<f64>],
+        inputs: &Inputs<f64>,
+    ) -> Result<Vec<Vec3<f64>>, ReferenceError> {
+        self.check(x, inputs)?;
+        let load = Load::Forces(dead_loads(&self.problem, inputs));
+        let anchors = anchors(&self.problem, inputs);
+        let gradient = Objective { problem: &self.problem, anchors, load }.gradient(x);
+        Ok(inputs.pins.iter().map(|pin| gradient[pin.vertex as usize]).collect())
+    }
+
+    fn minimise(
+        &mut self,
+        pinned: Vec<bool>,
+        mut x: Vec<Vec3<f64>>,
+        inputs: &Inputs<f64>,
+        load: Load,
+    ) -> Result<Solution, ReferenceError> {
+        let mut analysis = self.analyse(pinned)?;
+        let Analysis { pattern, factorization, .. } = &mut analysis;
+        let cost = factorization.cost(pattern, &self.problem);
+        let (unknowns, bytes, limit) = (cost.unknowns, cost.bytes, self.memory);
+        let too_large = ReferenceError::TooLarge { unknowns, bytes, limit };
+        if bytes > limit {
+            return Err(too_large);
+        }
+        let anchors = anchors(&self.problem, inputs);
+        let objective = Objective { problem: &self.problem, anchors, load };
+        let solved = newton::minimise(&objective, pattern, factorization, &self.tolerance, &mut x);
+        self.analysis = Some(analysis);
+        let convergence = match solved {
+            Ok(convergence) => convergence,
+            Err(FactorError::TooLarge) => return Err(too_large),
+            Err(FactorError::Indefinite) => {
+                return Err(ReferenceError::NotFinite { what: "curvature of the potential" });
+            }
+        };
+        if !convergence.converged {
+            let Convergence { steps, gradient, start_gradient, .. } = convergence;
+            return Err(ReferenceError::NotConverged { steps, gradient, start_gradient });
+        }
+        Ok(Solution { positions: x, convergence })
+    }
+
+    /// The analysis for a set of pins: the last one, where it is of the same.
+    fn analyse(&mut self, pinned: Vec<bool>) -> Result<Analysis, ReferenceError> {
+        if let Some(known) = self.analysis.take_if(|known| known.pinned == pinned) {
+            return Ok(known);
+        }
+        let pattern = Pattern::new(&self.problem, &pinned);
+        let unknowns = pattern.unknowns();
+        let factorization = Factorization::new(&pattern).map_err(|_| ReferenceError::TooLarge {
+            unknowns,
+            bytes: u64::MAX,
+            limit: self.memory,
+        })?;
+        Ok(Analysis { pinned, pattern, factorization })
+    }
+
+    fn check(&self, x: &[Vec3<f64>], inputs: &Inputs<f64>) -> Result<Vec<bool>, ReferenceError> {
+        let expected = self.problem.vertex_count();
+        if x.len() != expected {
+            let (what, given) = ("list of positions", x.len());
+            return Err(ReferenceError::Mismatch { what, given, expected });
+        }
+        let finite = [
+            ("positions", x.iter().all(|x| x.is_finite())),
+            ("gravity", inputs.gravity.is_finite()),
+            ("pin targets", inputs.pins.iter().all(|pin| pin.target.is_finite())),
+            ("anchors", inputs.anchors.iter().all(|anchor| anchor.is_finite())),
+            ("forces", inputs.forces.iter().all(|(_, force)| force.is_finite())),
+        ];
+        if let Some((what, _)) = finite.into_iter().find(|(_, finite)| !finite) {
+            return Err(ReferenceError::NotFinite { what });
+        }
+        let (given, expected) = (inputs.anchors.len(), self.problem.rest_anchors.len());
+        if given != 0 && given != expected {
+            let what = "list of anchors";
+            return Err(ReferenceError::Mismatch { what, given, expected });
+        }
+        self.pinned(inputs)
+    }
+
+    fn pinned(&self, inputs: &Inputs<f64>) -> Result<Vec<bool>, ReferenceError> {
+        let vertex_count = self.problem.vertex_count();
+        let vertices = (inputs.pins.iter().map(|pin| ("pin", pin.vertex)))
+            .chain(inputs.forces.iter().map(|&(vertex, _)| ("force", vertex)));
+        for (what, vertex) in vertices {
+            if vertex as usize >= vertex_count {
+                return Err(ReferenceError::UnknownVertex { what, vertex, vertex_count });
+            }
+        }
+        let mut pinned = vec![false; vertex_count];
+        for pin in &inputs.pins {
+            pinned[pin.vertex as usize] = true;
+        }
+        Ok(pinned)
+    }
+}
+
+fn with_pins(x: &[Vec3<f64>], inputs: &Inputs<f64>) -> Vec<Vec3<f64>> {
+    let mut x = x.to_vec();
+    for pin in &inputs.pins {
+        x[pin.vertex as usize] = pin.target;
+    }
+    x
+}
+
+fn anchors<'a>(problem: &'a Problem, inputs: &'a Inputs<f64>) -> &'a [Vec3<f64>] {
+    if inputs.anchors.is_empty() { &problem.rest_anchors } else { &inputs.anchors }
+}
+
+/// Weight and external forces [N].
+fn dead_loads(problem: &Problem, inputs: &Inputs<f64>) -> Vec<Vec3<f64>> {
+    let mut loads: Vec<_> = problem.masses.iter().map(|&m| inputs.gravity * m).collect();
+    for &(vertex, force) in &inputs.forces {
+        loads[vertex as usize] += force;
+    }
+    loads
+}

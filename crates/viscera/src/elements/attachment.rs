@@ -30,3 +30,13 @@ pub fn solve<S: Scalar>(
     let change = (anchor - x - multipliers * compliance_tilde) * scale;
     (change, change * w)
 }
+
+/// The multipliers at which the residual of [`solve`] is zero: `-C/a~`.
+#[inline(always)]
+pub fn constitutive_multipliers<S: Scalar>(
+    x: Vec3<S>,
+    anchor: Vec3<S>,
+    compliance_tilde: S,
+) -> Vec3<S> {
+    (anchor - x) * (S::ONE / compliance_tilde)
+}

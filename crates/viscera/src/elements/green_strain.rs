@@ -54,7 +54,22 @@ pub fn energy_density<S: Scalar>(c: &Voigt<S>, lame_lambda: S, lame_mu: S) -> S 
     lame_mu * (direct + S::HALF * shear) + S::HALF * lame_lambda * trace * trace
 }
 
-/// First Piola stress [Pa]: `P = F S`, `S = 2 mu E + lambda tr(E) I`.
+/// Second Piola stress [Pa]: `D C`, the components of `S = 2 mu E + lambda tr(E) I`.
+#[inline(always)]
+fn second_piola<S: Scalar>(c: &Voigt<S>, lame_lambda: S, lame_mu: S) -> Voigt<S> {
+    let pressure = lame_lambda * (c[0] + c[1] + c[2]);
+    let twice = S::TWO * lame_mu;
+    [
+        twice * c[0] + pressure,
+        twice * c[1] + pressure,
+        twice * c[2] + pressure,
+        lame_mu * c[3],
+        lame_mu * c[4],
+        lame_mu * c[5],
+    ]
+}
+
+/// First Piola stress [Pa]: `P = F S`.
 #[inline(always)]
 pub fn piola<S: Scalar>(
     deformation_gradient: &Mat3<S>,
@@ -62,17 +77,19 @@ pub fn piola<S: Scalar>(
     lame_lambda: S,
     lame_mu: S,
 ) -> Mat3<S> {
-    let pressure = lame_lambda * (c[0] + c[1] + c[2]);
-    let twice = S::TWO * lame_mu;
-    let stress = [
-        twice * c[0] + pressure,
-        twice * c[1] + pressure,
-        twice * c[2] + pressure,
-        lame_mu * c[3],
-        lame_mu * c[4],
-        lame_mu * c[5],
-    ];
-    *deformation_gradient * symmetric(&stress)
+    *deformation_gradient * symmetric(&second_piola(c, lame_lambda, lame_mu))
+}
+
+/// The multipliers at which the residual of [`solve`] is zero: `l = -a~^-1 c = -s D c`, with `c` the
+/// strain less its target and `s` the inverse of the compliance's scale.
+#[inline(always)]
+pub fn constitutive_multipliers<S: Scalar>(
+    c: &Voigt<S>,
+    lame_lambda: S,
+    lame_mu: S,
+    step_volume: S,
+) -> Voigt<S> {
+    second_piola(c, lame_lambda, lame_mu).map(|stress| -step_volume * stress)
 }
 
 /// Gradient of each constraint by one corner position [1/m]: `E_aa: g[a] F_a`,

@@ -27,6 +27,18 @@ pub fn constraints<S: Scalar>(f: &Mat3<S>, lame_lambda: S, lame_mu: S) -> [S; 2]
     [volume_change(f) - offset, f.norm_squared().sqrt()]
 }
 
+/// The multipliers at which the residual of [`solve`] is zero: `-V dt^2 (lh C_H, mu C_D)`.
+#[inline(always)]
+pub fn constitutive_multipliers<S: Scalar>(
+    f: &Mat3<S>,
+    lame_lambda: S,
+    lame_mu: S,
+    step_volume: S,
+) -> [S; 2] {
+    let [volume, shear] = constraints(f, lame_lambda, lame_mu);
+    [-(lame_lambda + lame_mu) * step_volume * volume, -lame_mu * step_volume * shear]
+}
+
 /// Gradients of `(C_H, C_D)` by one corner position [1/m]: `cof F g`, `F g / |F|`.
 #[inline(always)]
 pub fn gradient<S: Scalar>(f: &Mat3<S>, g: Vec3<S>) -> [Vec3<S>; 2] {

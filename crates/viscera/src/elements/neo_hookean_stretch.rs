@@ -55,6 +55,21 @@ fn turn<S: Scalar>(v: &Mat3<S>, components: &Voigt<S>) -> Voigt<S> {
     [a.dot(x), b.dot(y), c.dot(z), b.dot(z), a.dot(z), a.dot(y)]
 }
 
+/// The multipliers at which the residual of [`solve`] is zero: `L = -V dt^2 V diag(t) V^T`, the Biot
+/// stress in material axes.
+#[inline(always)]
+pub fn constitutive_multipliers<S: Scalar>(
+    f: &Mat3<S>,
+    lame_lambda: S,
+    lame_mu: S,
+    step_volume: S,
+) -> Voigt<S> {
+    let SignedSvd { sigma, v, .. } = signed_svd(f);
+    let ([a, b, c], _) = biot_stress(&sigma, lame_lambda, lame_mu);
+    let principal = [a, b, c, S::ZERO, S::ZERO, S::ZERO];
+    turn(&v.transpose(), &principal.map(|stress| -step_volume * stress))
+}
+
 /// Inverse of the stiffness of the principal stretches, times `1/(V dt^2)`; lower triangle
 /// `(00, 10, 11, 20, 21, 22)`.
 #[inline(always)]

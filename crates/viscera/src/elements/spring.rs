@@ -49,6 +49,17 @@ pub fn solve<S: Scalar>(
     (change, [n * (-change * w[0]), n * (change * w[1])])
 }
 
+/// The multiplier at which the residual of [`solve`] is zero: `-C/a~`.
+#[inline(always)]
+pub fn constitutive_multiplier<S: Scalar>(
+    x: &[Vec3<S>; 2],
+    rest_length: S,
+    compliance_tilde: S,
+) -> S {
+    let (_, length) = direction(x);
+    (rest_length - length) / compliance_tilde
+}
+
 /// `grad C^T l` on both ends; `d^2 C = (I - n n^T)/|x1 - x0|` gives the bound `2 |l|/|x1 - x0|`.
 #[inline(always)]
 pub fn corner_loads<S: Scalar>(x: &[Vec3<S>; 2], multiplier: S) -> [CornerLoad<S>; 2] {

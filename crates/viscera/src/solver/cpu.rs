@@ -138,6 +138,7 @@ impl<S: Real> Workspace<S> {
             Stage::Anderson(on) => self.anderson(step, state, on),
             Stage::ChooseStart => self.choose_start(step, state),
             Stage::GuardStep => self.guard_step(step, state),
+            Stage::RepairMultipliers => self.repair_multipliers(step, state),
             Stage::UpdateVelocities => {
                 let rate = S::from_f64(1.0 / step.dt);
                 for (v, velocity) in state.velocities.iter_mut().enumerate() {
@@ -147,7 +148,7 @@ impl<S: Real> Workspace<S> {
         }
     }
 
-    fn measure_strain(&mut self, step: &Step<'_, S>, state: &State<S>) {
+    pub(super) fn measure_strain(&mut self, step: &Step<'_, S>, state: &State<S>) {
         for (set, strains) in step.model.tet_sets().into_iter().zip(&mut self.start_strain) {
             for (tet, strain) in strains.iter_mut().enumerate() {
                 let x = corners(&state.positions, set.vertices[tet]);

@@ -9,8 +9,7 @@
 //!
 //! A bound by `Phi(x_n)` bounds kinetic plus elastic energy; a bound by `Phi(xt)` alone lets nearly
 //! everything pass. **The multipliers are kept** after a rejection: recomputing them from positions
-//! looks safer and freezes the body, because the next sweeps start from what has just failed. Only
-//! multipliers that are no numbers start again from zero.
+//! looks safer and freezes the body, because the next sweeps start from what has just failed.
 
 use super::cpu::{Step, Workspace};
 use super::potential::{Potential, load_forces, potential};
@@ -31,6 +30,26 @@ const SUFFICIENT: f64 = 1e-4;
 const SHORTEN: f64 = 0.4;
 const SHORTENINGS: usize = 12;
 
+/// How a guarded step ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepReport {
+    /// Incremental potential [J s^2] at the end of the step.
+    pub potential: f64,
+    /// The lowest incremental potential [J s^2] of the places the step could have started from.
+    pub limit: f64,
+    /// What round-off can pretend of `potential` [J s^2]; at most this much above `limit` passes.
+    pub noise: f64,
+    /// Whether the sweeps ended above the limit, so that the step was taken back.
+    pub rejected: bool,
+}
+
+impl StepReport {
+    /// Whether the step holds what the guard promises: it ends no higher than its limit.
+    pub fn keeps_limit(&self) -> bool {
+        self.potential <= self.limit + self.noise
+    }
+}
+
 /// What a guarded step remembers.
 #[derive(Clone, Debug)]
 pub(super) struct Guard<S> {
@@ -41,12 +60,14 @@ pub(super) struct Guard<S> {
     limit: f64,
     /// Steps taken back so far.
     pub rejected: u64,
+    /// How the last step ended.
+    pub report: Option<StepReport>,
 }
 
 impl<S: Real> Guard<S> {
     pub fn new(vertices: usize) -> Self {
         let positions = vec![Vec3::ZERO; vertices];
-        Self { start: positions.clone(), trial: positions, limit: 0.0, rejected: 0 }
+        Self { start: positions.clone(), trial: positions, limit: 0.0, rejected: 0, report: None }
     }
 }
 
@@ -77,35 +98,36 @@ impl<S: Real> Workspace<S> {
 
     /// [`super::plan::Stage::GuardStep`].
     pub(super) fn guard_step(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
-        if self.is_accepted(step, &state.positions) {
+        let swept = self.report_at(step, &state.positions);
+        if swept.keeps_limit() {
+            self.guard.report = Some(swept);
             return;
         }
         self.guard.rejected += 1;
         let mut trial = std::mem::take(&mut self.guard.trial);
-        let share = SHARES.into_iter().find(|&share| {
+        let shortened = SHARES.into_iter().find_map(|share| {
             let share = S::from_f64(share);
             for v in 0..trial.len() {
                 let start = self.guard.start[v];
                 trial[v] = start + (state.positions[v] - start) * share;
             }
-            self.is_accepted(step, &trial)
+            Some(self.report_at(step, &trial)).filter(StepReport::keeps_limit)
         });
-        if share.is_none() {
+        let report = shortened.unwrap_or_else(|| {
             trial.copy_from_slice(&self.guard.start);
             for _ in 0..DESCENTS {
                 self.descend(step, &mut trial, &mut state.positions);
             }
-        }
+            self.report_at(step, &trial)
+        });
+        self.guard.report = Some(StepReport { rejected: true, ..report });
         state.positions.copy_from_slice(&trial);
         self.guard.trial = trial;
-        if !state.multipliers.iter().all(|l| l.is_finite()) {
-            state.multipliers.fill(S::ZERO);
-        }
     }
 
-    fn is_accepted(&self, step: &Step<'_, S>, x: &[Vec3<S>]) -> bool {
+    fn report_at(&self, step: &Step<'_, S>, x: &[Vec3<S>]) -> StepReport {
         let Potential { value, noise } = self.potential_at(step, x);
-        value <= self.guard.limit + noise
+        StepReport { potential: value, limit: self.guard.limit, noise, rejected: false }
     }
 
     /// One step of descent from `x`, with `scratch` for the places tried.

@@ -11,6 +11,7 @@ pub mod acceleration;
 pub mod balance;
 pub mod cpu;
 mod guard;
+mod history;
 pub mod plan;
 mod potential;
 mod sweep;
@@ -19,6 +20,7 @@ use crate::model::Model;
 use crate::scalar::{Real, Vec3};
 use crate::settings::SolverSettings;
 use crate::state::State;
+pub use guard::StepReport;
 use plan::Plan;
 
 /// A vertex that is moved, not simulated, during a step.
@@ -143,13 +145,7 @@ impl<S: Real> Solver<S> {
         inputs: &Inputs<S>,
         dt: f64,
     ) -> Result<(), StepError> {
-        // Multipliers are forces times the squared step, so that the square must be a number too.
-        let squared = S::from_f64(dt * dt);
-        if !(dt > 0.0 && squared > S::ZERO && squared.is_finite()) {
-            return Err(StepError::BadStep { dt });
-        }
-        check(model, state, inputs)?;
-        self.work.check(model)?;
+        self.check(model, state, inputs, dt)?;
         let step = cpu::Step { model, inputs, dt, settings: &self.settings };
         for stage in &self.plan.prologue {
             self.work.run(stage, &step, state);
@@ -165,9 +161,47 @@ impl<S: Real> Solver<S> {
         Ok(())
     }
 
+    /// Starts a new history, for a caller who has put vertices elsewhere in `state.positions`: the
+    /// multipliers no longer tell where the body comes from, but what its elements answer to the
+    /// places the vertices are at now. Positions and velocities stay as they are.
+    ///
+    /// `inputs` and `dt` are those of the next step; of the inputs the anchors matter.
+    pub fn restart(
+        &mut self,
+        model: &Model<S>,
+        state: &mut State<S>,
+        inputs: &Inputs<S>,
+        dt: f64,
+    ) -> Result<(), StepError> {
+        self.check(model, state, inputs, dt)?;
+        self.work.restart(&cpu::Step { model, inputs, dt, settings: &self.settings }, state);
+        Ok(())
+    }
+
+    fn check(
+        &self,
+        model: &Model<S>,
+        state: &State<S>,
+        inputs: &Inputs<S>,
+        dt: f64,
+    ) -> Result<(), StepError> {
+        // Multipliers are forces times the squared step, so that the square must be a number too.
+        let squared = S::from_f64(dt * dt);
+        if !(dt > 0.0 && squared > S::ZERO && squared.is_finite()) {
+            return Err(StepError::BadStep { dt });
+        }
+        check(model, state, inputs)?;
+        self.work.check(model)
+    }
+
     /// How often steps have been taken back since the solver was built.
     pub fn rejected_steps(&self) -> u64 {
         self.work.guard.rejected
+    }
+
+    /// How the last step ended; nothing before the first, and where steps are not guarded.
+    pub fn last_step(&self) -> Option<StepReport> {
+        self.work.guard.report
     }
 
     /// The force balance at the end of the last step, see [`balance::ForceBalance`]. `inputs` are

@@ -23,6 +23,8 @@ pub enum Stage {
     ChooseStart,
     /// Takes a step back whose incremental potential exceeds that bound.
     GuardStep,
+    /// Multipliers that are no numbers start a new history: all are taken from the positions.
+    RepairMultipliers,
     /// Remembers `(x, l)` before a sweep, for the acceleration.
     RememberIterate,
     /// `J^T l` and the bound of its geometric stiffness, per corner.
@@ -112,6 +114,9 @@ impl Plan {
         let mut epilogue = Vec::new();
         if settings.guards_steps() {
             epilogue.push(Stage::GuardStep);
+        }
+        if settings.keep_multipliers {
+            epilogue.push(Stage::RepairMultipliers);
         }
         epilogue.push(Stage::UpdateVelocities);
         Self { prologue, repeat: settings.iterations, body, epilogue }

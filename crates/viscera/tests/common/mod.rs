@@ -112,9 +112,13 @@ impl<'a, S: Real> Run<'a, S> {
         Self { model, state, solver, dt: 1.0 / 60.0 / f64::from(settings.substeps) }
     }
 
+    pub fn step(&mut self, inputs: &Inputs<S>) {
+        self.solver.step(self.model, &mut self.state, inputs, self.dt).expect("a legal step");
+    }
+
     pub fn frame(&mut self, inputs: &Inputs<S>, keep: f64) {
         for _ in 0..self.solver.settings().substeps {
-            self.solver.step(self.model, &mut self.state, inputs, self.dt).expect("a legal step");
+            self.step(inputs);
         }
         for v in &mut self.state.velocities {
             *v = *v * S::from_f64(keep);
@@ -141,4 +145,20 @@ pub fn plain(substeps: u32, iterations: u32) -> SolverSettings {
         keep_multipliers: false,
         ..SolverSettings::default()
     }
+}
+
+/// Both materials, one of them viscous, springs and attachments.
+pub fn everything<S: Real>(colors: Colors) -> Model<S> {
+    let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
+    let mut builder = ModelBuilder::new();
+    let viscous = material(SNH, 1e4, 0.4).with_viscosity(0.05).expect("legal");
+    builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
+    builder.add_body(&mesh, &viscous).expect("a body");
+    let half = mesh.vertices().len() as u32;
+    for v in (0..half).step_by(3) {
+        builder.add_spring([v, half + v], 40.0, Some(0.01)).expect("a spring");
+        let anchor = mesh.vertices()[v as usize];
+        builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
+    }
+    builder.build(&colored(colors)).expect("a model")
 }
