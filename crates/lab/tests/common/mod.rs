@@ -12,9 +12,6 @@ use viscera::scalar::{Real, Vec3};
 use viscera::settings::SolverSettings;
 use viscera::solver::{Inputs, Pin};
 
-/// Two materials of every fixture that has two.
-pub const MATERIALS: [&str; 2] = ["stvk", "snh"];
-
 /// Numbers computed by independent finite elements. A file that does not fit is a mistake of ours,
 /// so reading it panics and says where.
 pub struct Fixture {
@@ -138,6 +135,35 @@ impl Fixture {
     pub fn inputs(&self) -> Inputs<f64> {
         Inputs { gravity: self.gravity(), pins: self.pins(), ..Inputs::default() }
     }
+}
+
+/// Fixtures by the beginnings and endings of their names.
+fn read_all(
+    beginnings: &'static [&'static str],
+    endings: &'static [&'static str],
+) -> impl Iterator<Item = (String, Fixture)> {
+    let with_ending =
+        |&beginning: &&'static str| endings.iter().map(move |e| format!("{beginning}_{e}"));
+    beginnings.iter().flat_map(with_ending).map(|name| {
+        let fixture = Fixture::read(&name);
+        (name, fixture)
+    })
+}
+
+/// Bodies deformed at random.
+pub fn configurations() -> impl Iterator<Item = (String, Fixture)> {
+    read_all(&["configuration_xs", "inverted_xs"], &["stvk", "snh"])
+}
+
+/// Bodies at rest under load.
+pub fn equilibria() -> impl Iterator<Item = (String, Fixture)> {
+    read_all(&["cantilever_xs", "cantilever_s", "stretch_xs"], &["stvk", "snh"])
+        .chain(read_all(&["cantilever_soft_xs"], &["snh"]))
+}
+
+/// Steps of implicit Euler.
+pub fn motions() -> impl Iterator<Item = (String, Fixture)> {
+    read_all(&["steps_xs"], &["stvk", "stvk_viscous", "snh", "snh_viscous"])
 }
 
 /// Length of the longest vector.
