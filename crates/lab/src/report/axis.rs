@@ -91,7 +91,8 @@ impl Span {
     }
 }
 
-/// Ends and ticks at multiples of 1, 2 or 5 times a power of ten, about six of them.
+/// The ends as they are, and ticks between them at multiples of 1, 2 or 5 times a power of ten: three
+/// to eight.
 fn linear_ticks(low: f64, high: f64) -> (f64, f64, Vec<Tick>) {
     let largest = low.abs().max(high.abs());
     let (low, high) = if low > high || largest < 1e-100 {
@@ -102,12 +103,12 @@ fn linear_ticks(low: f64, high: f64) -> (f64, f64, Vec<Tick>) {
     } else {
         (low, high)
     };
-    let rough = (high - low) / 6.0;
+    let rough = (high - low) / 7.0;
     let power = libm::floor(libm::log10(rough)) as i32;
     let unit = power_of_ten(power);
     let step = [1.0, 2.0, 5.0].map(|s| s * unit).into_iter().find(|s| *s >= rough);
     let step = step.unwrap_or(10.0 * unit);
-    let (first, last) = (libm::floor(low / step + 1e-9), libm::ceil(high / step - 1e-9));
+    let (first, last) = (libm::ceil(low / step - 1e-9), libm::floor(high / step + 1e-9));
     let largest = step * first.abs().max(last.abs());
     let plain = (-4..=5).contains(&power) && largest < 1e6;
     // A step that was rounded up to the next power of ten needs one decimal less, and says so by
@@ -124,7 +125,7 @@ fn linear_ticks(low: f64, high: f64) -> (f64, f64, Vec<Tick>) {
         };
         Tick { coordinate: value, label: Some(label) }
     });
-    (first * step, last * step, ticks.collect())
+    (low, high, ticks.collect())
 }
 
 /// Up to so many decades also have labels at 2 and 5.
@@ -145,7 +146,7 @@ fn logarithmic_ticks(low: f64, high: f64) -> (f64, f64, Vec<Tick>) {
     for power in bottom..=top {
         for digit in 1..10 {
             let label = match digit {
-                1 if (power - bottom) % stride.max(1) == 0 => Some(power_text(1, power, few)),
+                1 if power.rem_euclid(stride.max(1)) == 0 => Some(power_text(1, power, few)),
                 2 | 5 if few => Some(power_text(digit, power, few)),
                 _ => None,
             };
@@ -229,9 +230,9 @@ mod tests {
         );
         assert_eq!(
             labels(Axis::linear(""), &[0.82, 1.38]).first().map(String::as_str),
-            Some("0.8")
+            Some("0.9")
         );
-        assert_eq!(labels(Axis::linear(""), &[0.0, 3e-9])[1], "5e-10");
+        assert_eq!(labels(Axis::linear(""), &[0.0, 3e-9])[1], "5.0e-10");
     }
 
     #[test]

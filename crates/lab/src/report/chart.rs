@@ -235,8 +235,8 @@ impl Layout {
     }
 }
 
-/// Entries in rows, and where the rows end. A single series without a reference needs no legend:
-/// the title names it.
+/// Entries in rows, and where the rows end. A single series without a name needs no legend: the
+/// title names it.
 fn place_legend(plot: &Plot, left: i32, right: i32, top: i32) -> (Vec<Entry>, i32) {
     let reference = plot.reference.iter().map(|(_, name)| name);
     let names: Vec<&String> =
