@@ -4,7 +4,7 @@ use viscera::material::MaterialModel;
 use viscera::mesh::{TetMesh, shapes};
 use viscera::scalar::{Vec3, vec3};
 use viscera::scene::{BodyShape, Scene, SceneError, Selector, describe_markdown, describe_text};
-use viscera::settings::{Acceleration, Colors, Precision, SolverSettings, Start};
+use viscera::settings::{Acceleration, AndersonGuard, Colors, Precision, SolverSettings, Start};
 
 const SHIPPED: [(&str, &str); 5] = [
     ("liver_retraction.toml", include_str!("../../../scenes/liver_retraction.toml")),
@@ -179,7 +179,7 @@ fn defaults_are_those_declared() {
     let solver = SolverSettings::default();
     assert_eq!((solver.substeps, solver.iterations), (10, 2));
     assert_eq!((solver.precision, solver.colors), (Precision::F32, Colors::Unlimited));
-    assert_eq!((solver.start, solver.residual_guard), (Start::Auto, true));
+    assert_eq!((solver.start, solver.anderson_guard), (Start::Auto, AndersonGuard::Energy));
     let text = "[[body]]\nname = \"a\"\nshape = \"liver\"\nmaterial = { preset = \"liver\" }";
     let scene = Scene::parse("small.toml", text, &[]).unwrap();
     assert_eq!(scene.solver, solver);

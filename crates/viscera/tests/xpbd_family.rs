@@ -13,7 +13,8 @@ use viscera::mesh::TetMesh;
 use viscera::model::Model;
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{
-    Acceleration, AndersonOn, Colors, NeoHookean, RelaxationForm, SolverSettings, Start,
+    Acceleration, AndersonGuard, AndersonOn, Colors, NeoHookean, RelaxationForm, SolverSettings,
+    Start,
 };
 use viscera::solver::acceleration::Anderson;
 use viscera::solver::balance::ForceBalance;
@@ -398,11 +399,12 @@ fn the_residual_guard_restarts_the_history() {
         let target = *x + vec3(0.1, 0.0, 0.05);
         bar.inputs.pins.push(Pin { vertex: v as u32, target });
     }
-    let step = |residual_guard| {
+    let step = |anderson_guard| {
         let settings = anderson(5, AndersonOn::Both, exact(60));
-        bar.step(&SolverSettings { colors: JACOBI, residual_guard, ..settings })
+        bar.step(&SolverSettings { colors: JACOBI, anderson_guard, ..settings })
     };
-    let ((with, guarded), (without, unguarded)) = (step(true), step(false));
+    let ((with, guarded), (without, unguarded)) =
+        (step(AndersonGuard::Residual), step(AndersonGuard::None));
     let residuals = [guarded, unguarded].map(|balance| balance.relative_residual());
     println!("unbalanced forces with the guard {:.1e}, without {:.1e}", residuals[0], residuals[1]);
     assert_ne!(with.positions, without.positions, "the guard never acted");

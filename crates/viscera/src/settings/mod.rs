@@ -11,7 +11,8 @@ mod solver;
 mod tree;
 
 pub use solver::{
-    Acceleration, AndersonOn, Colors, NeoHookean, Precision, RelaxationForm, SolverSettings, Start,
+    Acceleration, AndersonGuard, AndersonOn, Colors, NeoHookean, Precision, RelaxationForm,
+    SolverSettings, Start,
 };
 pub use tree::Place;
 

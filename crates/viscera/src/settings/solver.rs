@@ -59,6 +59,19 @@ choices! {
 }
 
 choices! {
+    /// What keeps Anderson's mixtures in bounds.
+    pub enum AndersonGuard {
+        /// Nothing.
+        None = "none",
+        /// A grown residual restarts the history. It does not bound the energy.
+        Residual = "residual",
+        /// Of mixture and plain sweep the first is taken that does not raise the incremental
+        /// potential; acts where steps are guarded, elsewhere as `residual`.
+        Energy = "energy",
+    }
+}
+
+choices! {
     /// The constraints of a stable neo-Hookean tetrahedron.
     pub enum NeoHookean {
         /// `stretch` with `rebase`, otherwise `pair`.
@@ -122,9 +135,11 @@ settings_table! {
         anderson_window: u32 = 5, whole(1, 10);
         /// The unknowns that Anderson mixes.
         anderson_on: AndersonOn = (AndersonOn::Both), one_of::<AndersonOn>();
-        /// Restart Anderson when the residual grows. Without it a bad mixture can
-        /// throw a strongly deformed body; it bounds the residual, not the energy.
-        residual_guard: bool = true, truth();
+        /// What keeps Anderson's mixtures in bounds. Without it a bad mixture can throw a strongly
+        /// deformed body. "residual" restarts on a grown residual, which bounds no energy;
+        /// "energy" takes no mixture that raises the incremental potential, for one to two
+        /// evaluations of it per sweep, and acts with `step_guard` (without it as "residual").
+        anderson_guard: AndersonGuard = (AndersonGuard::Energy), one_of::<AndersonGuard>();
         /// Stabilised rebase before each sweep: positions are pulled back onto the multipliers,
         /// so that the iteration converges to implicit Euler exactly. One more pass over the
         /// tetrahedra per sweep. Turn it off together with `keep_multipliers` for XPBD as
@@ -155,6 +170,14 @@ impl SolverSettings {
     /// Whether steps are guarded: published XPBD is shown as it is.
     pub(crate) fn guards_steps(&self) -> bool {
         self.step_guard && self.rebase
+    }
+
+    /// The guard of Anderson's mixtures that is in force.
+    pub(crate) fn guard_of_mixtures(&self) -> AndersonGuard {
+        match self.anderson_guard {
+            AndersonGuard::Energy if !self.guards_steps() => AndersonGuard::Residual,
+            chosen => chosen,
+        }
     }
 
     /// Every key and its value as one would write it, for the record of a run.

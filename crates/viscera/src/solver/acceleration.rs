@@ -111,6 +111,11 @@ impl<S: Real> Anderson<S> {
         (&mut self.mapped[self.newest], &mut self.residuals[self.newest])
     }
 
+    /// `G_k`, and whether there is anything older to mix it with.
+    pub fn newest(&self) -> (&[S], bool) {
+        (&self.mapped[self.newest], self.count > 1)
+    }
+
     /// The history entry `age` steps back.
     fn place(&self, age: usize) -> usize {
         (self.newest + self.window + 1 - age) % (self.window + 1)

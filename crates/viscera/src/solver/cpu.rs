@@ -10,7 +10,7 @@ use crate::elements::{CornerLoad, TetForm, deformation_gradient, green_strain};
 use crate::elements::{neo_hookean_pair, neo_hookean_stretch, spring};
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
-use crate::settings::{Acceleration, AndersonOn, SolverSettings, Start};
+use crate::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Start};
 use crate::state::State;
 
 /// What a stage may look at but not change.
@@ -49,7 +49,7 @@ pub(super) struct Workspace<S> {
     /// The share of the rebase that is applied.
     rebase_factor: S,
     chebyshev: Chebyshev,
-    anderson: Anderson<S>,
+    pub anderson: Anderson<S>,
     /// Empty where steps are not guarded.
     pub guard: Guard<S>,
 }
@@ -138,6 +138,7 @@ impl<S: Real> Workspace<S> {
             Stage::Anderson(on) => self.anderson(step, state, on),
             Stage::ChooseStart => self.choose_start(step, state),
             Stage::GuardStep => self.guard_step(step, state),
+            Stage::GuardIterate => self.guard_iterate(step, state),
             Stage::RepairMultipliers => self.repair_multipliers(step, state),
             Stage::UpdateVelocities => {
                 let rate = S::from_f64(1.0 / step.dt);
@@ -362,7 +363,7 @@ impl<S: Real> Workspace<S> {
             (true, _) => masses[i / 3].to_f64(),
             (false, _) => multiplier_weights[i - 3 * vertices].to_f64(),
         };
-        let guard = step.settings.residual_guard;
+        let guard = step.settings.guard_of_mixtures() == AndersonGuard::Residual;
         let (weights, count) = self.anderson.mixing_weights(norm_weight, guard);
         let weights = &weights[..count];
         if on != AndersonOn::Multipliers {

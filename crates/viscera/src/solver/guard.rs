@@ -10,9 +10,14 @@
 //! A bound by `Phi(x_n)` bounds kinetic plus elastic energy; a bound by `Phi(xt)` alone lets nearly
 //! everything pass. **The multipliers are kept** after a rejection: recomputing them from positions
 //! looks safer and freezes the body, because the next sweeps start from what has just failed.
+//!
+//! Anderson's mixtures can be guarded one by one: the mixture if `Phi` is not above the best so far,
+//! else the plain sweep if its is not, else go on from it once; at the second failure in a row one
+//! step of descent from the best. `x_s` is then the best iterate.
 
 use super::cpu::{Step, Workspace};
 use super::potential::{Potential, load_forces, potential};
+use super::sweep::read_vec3;
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
 use crate::state::State;
@@ -50,14 +55,21 @@ impl StepReport {
     }
 }
 
+/// Of plain sweeps in a row that raise the potential this many lead to a step of descent.
+const TOLERATED: u32 = 2;
+
 /// What a guarded step remembers.
 #[derive(Clone, Debug)]
 pub(super) struct Guard<S> {
-    /// `x_s` [m]; empty where steps are not guarded.
+    /// `x_s` [m]: the best start, or a better iterate; empty where steps are not guarded.
     start: Vec<Vec3<S>>,
     /// Positions under test [m].
     trial: Vec<Vec3<S>>,
     limit: f64,
+    /// `Phi` [J s^2] at `x_s`.
+    best: f64,
+    /// Plain sweeps in a row that have ended above it.
+    failures: u32,
     /// Steps taken back so far.
     pub rejected: u64,
     /// How the last step ended.
@@ -67,7 +79,15 @@ pub(super) struct Guard<S> {
 impl<S: Real> Guard<S> {
     pub fn new(vertices: usize) -> Self {
         let positions = vec![Vec3::ZERO; vertices];
-        Self { start: positions.clone(), trial: positions, limit: 0.0, rejected: 0, report: None }
+        Self {
+            start: positions.clone(),
+            trial: positions,
+            limit: 0.0,
+            best: 0.0,
+            failures: 0,
+            rejected: 0,
+            report: None,
+        }
     }
 }
 
@@ -94,6 +114,53 @@ impl<S: Real> Workspace<S> {
             }
             self.guard.trial = trial;
         }
+        self.guard.best = self.guard.limit;
+        self.guard.failures = 0;
+    }
+
+    /// [`super::plan::Stage::GuardIterate`].
+    pub(super) fn guard_iterate(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
+        if self.is_best(step, &state.positions) {
+            return;
+        }
+        let (plain, is_mixed) = self.anderson.newest();
+        if is_mixed {
+            let (positions, multipliers) = plain.split_at(3 * state.positions.len());
+            for (v, x) in state.positions.iter_mut().enumerate() {
+                *x = read_vec3(positions, 3 * v);
+            }
+            state.multipliers.copy_from_slice(multipliers);
+            if self.is_best(step, &state.positions) {
+                return;
+            }
+        }
+        self.guard.failures += 1;
+        if self.guard.failures < TOLERATED {
+            return;
+        }
+        let mut trial = std::mem::take(&mut self.guard.trial);
+        trial.copy_from_slice(&self.guard.start);
+        self.descend(step, &mut trial, &mut state.positions);
+        state.positions.copy_from_slice(&trial);
+        self.guard.trial = trial;
+        self.is_best(step, &state.positions);
+        self.guard.failures = 0;
+        // The older sweeps started elsewhere.
+        self.anderson.start();
+    }
+
+    /// Whether an iterate is at least as good as the best so far; becomes it where it is better.
+    fn is_best(&mut self, step: &Step<'_, S>, x: &[Vec3<S>]) -> bool {
+        let Potential { value, noise } = self.potential_at(step, x);
+        if value < self.guard.best {
+            self.guard.best = value;
+            self.guard.start.copy_from_slice(x);
+        }
+        let good = value <= self.guard.best + noise;
+        if good {
+            self.guard.failures = 0;
+        }
+        good
     }
 
     /// [`super::plan::Stage::GuardStep`].

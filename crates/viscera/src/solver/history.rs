@@ -7,6 +7,11 @@
 //! Kept multipliers tell where the body comes from. Where that means nothing any more, because the
 //! caller has put vertices elsewhere or the multipliers are no numbers, these take their place.
 //! After a rejected step they must not: see [`super::guard`].
+//!
+//! Pins that are let go keep the history, however hard they pulled. Forgetting it then (all
+//! multipliers zero) was measured over 20 frames against 100 to 200 sweeps per step, a block of 324
+//! tetrahedra: at 10 x 2 and 4 x 5 the error of the motion after a large release falls by 1 to 10 %
+//! of itself, and after the release of one settled pin it grows to 4 to 9 times itself.
 
 use super::cpu::{Step, Workspace};
 use super::sweep::corners;

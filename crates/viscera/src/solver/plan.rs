@@ -4,7 +4,7 @@
 //! compile. What a stage does is told here once; how, in the backend.
 
 use crate::model::Model;
-use crate::settings::{Acceleration, AndersonOn, SolverSettings, Start};
+use crate::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Start};
 
 /// One stage of a step. `x` are positions, `l` multipliers, `w` inverse masses of the sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +43,9 @@ pub enum Stage {
     Chebyshev,
     /// Anderson mixing.
     Anderson(AndersonOn),
+    /// Takes a mixture back that raises the incremental potential, in favour of the plain sweep;
+    /// where that fails twice in a row as well, goes on from a step of descent.
+    GuardIterate,
     /// `v = (x - x_n)/dt`.
     UpdateVelocities,
 }
@@ -108,6 +111,9 @@ impl Plan {
                 body.push(Stage::Anderson(on));
                 if on == AndersonOn::Multipliers {
                     body.extend([Stage::LoadCorners, Stage::RecomputePositions]);
+                }
+                if settings.guard_of_mixtures() == AndersonGuard::Energy {
+                    body.push(Stage::GuardIterate);
                 }
             }
         }
