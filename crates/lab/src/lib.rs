@@ -6,10 +6,11 @@
 //! | to | look at |
 //! |---|---|
 //! | solve a step or a state of rest exactly | [`reference::Reference`] |
-//! | set up what the studies share | [`scenes`], [`settling`] |
+//! | set up what the studies share | [`scenes`], [`settling`], [`motion`] |
 //! | compare the library with what must come out | [`validate`] |
 //! | write reports with tables and plots | [`report`] |
 
+pub mod motion;
 pub mod reference;
 pub mod report;
 pub mod scenes;

@@ -71,6 +71,37 @@ impl ConstraintGraph {
         &self.corners[self.corner_range(constraint)]
     }
 
+    /// The connected component of each vertex, numbered by first vertex, and how many there are.
+    pub fn components(&self, vertex_count: usize) -> (Vec<u32>, usize) {
+        let mut parent: Vec<u32> = (0..vertex_count as u32).collect();
+        fn root(parent: &mut [u32], mut v: u32) -> u32 {
+            while parent[v as usize] != v {
+                parent[v as usize] = parent[parent[v as usize] as usize];
+                v = parent[v as usize];
+            }
+            v
+        }
+        for constraint in 0..self.constraint_count() {
+            for pair in self.vertices(constraint).windows(2) {
+                let (a, b) = (root(&mut parent, pair[0]), root(&mut parent, pair[1]));
+                parent[a.max(b) as usize] = a.min(b);
+            }
+        }
+        let mut count = 0;
+        let mut component_of = vec![0; vertex_count];
+        for v in 0..vertex_count as u32 {
+            // A component's root is its first vertex, so its number is known by now.
+            let first = root(&mut parent, v);
+            component_of[v as usize] = if first == v {
+                count += 1;
+                count - 1
+            } else {
+                component_of[first as usize]
+            };
+        }
+        (component_of, count as usize)
+    }
+
     /// Constraints whose vertices lie in many others come first: they have the fewest free
     /// colours left when they wait. Ties by index, so that the result is always the same.
     fn order(&self, valence: &[u32]) -> Vec<u32> {

@@ -180,6 +180,10 @@ pub struct Model<S> {
     pub attachments: AttachmentSet<S>,
     /// Anchors of the attachments where nothing moves them [m], the user's order.
     pub rest_anchors: Vec<Vec3<S>>,
+    /// Which part each vertex belongs to, shape [vertex_count]; tetrahedra and springs connect.
+    pub component_of: Vec<u32>,
+    /// Number of such parts.
+    pub component_count: usize,
     /// Number of colours.
     pub color_count: usize,
     /// Copies of vertex `v` are `copy_offsets[v] .. copy_offsets[v + 1]`.
@@ -367,6 +371,7 @@ impl ModelBuilder {
         }
         let coloring = graph.color(self.positions.len(), settings.colors);
         debug_assert_eq!(coloring.validate(&graph), None);
+        let (component_of, component_count) = graph.components(self.positions.len());
         let mut layout = Layout { graph: &graph, coloring: &coloring, multipliers: 0, corners: 0 };
         let green_strain = self.lay_out_tets(&mut layout, TetForm::GreenStrain);
         let neo_hookean = self.lay_out_tets(&mut layout, neo_hookean_form(settings));
@@ -400,6 +405,8 @@ impl ModelBuilder {
             springs,
             attachments,
             rest_anchors: self.attachments.iter().map(|(_, anchor, _)| anchor.cast()).collect(),
+            component_of,
+            component_count,
             color_count: coloring.color_count as usize,
             largest_clique: coloring.largest_clique as usize,
             copy_offsets: coloring.copy_offsets,

@@ -46,6 +46,9 @@ pub struct StepReport {
     pub noise: f64,
     /// Whether the sweeps ended above the limit, so that the step was taken back.
     pub rejected: bool,
+    /// The share of its velocities that the energy limit left to the part of the model that it
+    /// slowed most; 1 where it did not act.
+    pub kept_speed: f64,
 }
 
 impl StepReport {
@@ -107,6 +110,9 @@ impl<S: Real> Workspace<S> {
                 trial[pin.vertex as usize] = pin.target;
             }
             let value = self.potential_at(step, &trial).value;
+            if from_rest {
+                self.begin_energy(step, &trial, &state.velocities);
+            }
             // Written so that a limit that is no number gives way.
             if value < self.guard.limit || !self.guard.limit.is_finite() {
                 self.guard.limit = value;
@@ -194,7 +200,13 @@ impl<S: Real> Workspace<S> {
 
     fn report_at(&self, step: &Step<'_, S>, x: &[Vec3<S>]) -> StepReport {
         let Potential { value, noise } = self.potential_at(step, x);
-        StepReport { potential: value, limit: self.guard.limit, noise, rejected: false }
+        StepReport {
+            potential: value,
+            limit: self.guard.limit,
+            noise,
+            rejected: false,
+            kept_speed: 1.0,
+        }
     }
 
     /// One step of descent from `x`, with `scratch` for the places tried.

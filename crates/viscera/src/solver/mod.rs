@@ -10,6 +10,7 @@
 pub mod acceleration;
 pub mod balance;
 pub mod cpu;
+mod energy;
 mod guard;
 mod history;
 pub mod plan;

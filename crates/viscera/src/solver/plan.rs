@@ -29,7 +29,7 @@ pub enum Stage {
     RememberIterate,
     /// `J^T l` and the bound of its geometric stiffness, per corner.
     LoadCorners,
-    /// `r = M (x - xt) - J^T l`, `mh = m + sum bounds`, `x -= theta r/mh`, `w = 1/mh`.
+    /// `r = M (x - xt) - J^T l`, `mh = m + share of the bounds`, `x -= theta r/mh`, `w = 1/mh`.
     Rebase,
     /// `x = xt + M^-1 J^T l`.
     RecomputePositions,
@@ -48,6 +48,8 @@ pub enum Stage {
     GuardIterate,
     /// `v = (x - x_n)/dt`.
     UpdateVelocities,
+    /// Scales velocities down where the step would end with more mechanical energy than it had.
+    LimitEnergy,
 }
 
 /// The stages of one step: `prologue`, then `repeat` times `body`, then `epilogue`.
@@ -125,6 +127,9 @@ impl Plan {
             epilogue.push(Stage::RepairMultipliers);
         }
         epilogue.push(Stage::UpdateVelocities);
+        if settings.guards_steps() {
+            epilogue.push(Stage::LimitEnergy);
+        }
         Self { prologue, repeat: settings.iterations, body, epilogue }
     }
 }

@@ -38,21 +38,29 @@ pub(super) struct Response<S> {
 }
 
 impl<S: Scalar> Tissue<S> {
+    /// Elastic energy density [Pa].
+    #[inline(always)]
+    fn elastic_energy(&self, f: &Mat3<S>) -> S {
+        let (lambda, mu) = (self.lame_lambda, self.lame_mu);
+        match self.model {
+            MaterialModel::SaintVenantKirchhoff => {
+                green_strain::energy_density(&green_strain::strain(f), lambda, mu)
+            }
+            MaterialModel::StableNeoHookean => neo_hookean::energy_density(f, lambda, mu),
+        }
+    }
+
     /// Energies and stress; `start` is the Green strain at the start of the step, where the tissue
     /// is viscous.
     #[inline(always)]
     pub fn respond(&self, f: &Mat3<S>, start: Option<&Voigt<S>>) -> Response<S> {
         let (lambda, mu) = (self.lame_lambda, self.lame_mu);
         let strain = green_strain::strain(f);
-        let (elastic_energy, piola) = match self.model {
-            MaterialModel::SaintVenantKirchhoff => (
-                green_strain::energy_density(&strain, lambda, mu),
-                green_strain::piola(f, &strain, lambda, mu),
-            ),
-            MaterialModel::StableNeoHookean => {
-                (neo_hookean::energy_density(f, lambda, mu), neo_hookean::piola(f, lambda, mu))
-            }
+        let piola = match self.model {
+            MaterialModel::SaintVenantKirchhoff => green_strain::piola(f, &strain, lambda, mu),
+            MaterialModel::StableNeoHookean => neo_hookean::piola(f, lambda, mu),
         };
+        let elastic_energy = self.elastic_energy(f);
         let mut response = Response { elastic_energy, viscous_energy: S::ZERO, piola };
         if let Some(start) = start {
             let mut change = strain;
@@ -77,8 +85,9 @@ impl<S: Scalar> Tissue<S> {
             MaterialModel::SaintVenantKirchhoff => {
                 let strain = green_strain::strain(f);
                 let pressure = lambda * (strain[0] + strain[1] + strain[2]);
-                let along = g.dot(green_strain::symmetric(&strain) * g);
-                // S has the shear once off the diagonal, `symmetric` has it doubled: bound it.
+                let [a, b, c, yz, xz, xy] = strain;
+                let tensor = [a, b, c, S::HALF * yz, S::HALF * xz, S::HALF * xy];
+                let along = g.dot(green_strain::symmetric(&tensor) * g);
                 stretch + (S::TWO * mu * along + pressure * g.length_squared()).max(S::ZERO)
             }
             MaterialModel::StableNeoHookean => {
@@ -146,6 +155,37 @@ pub(super) fn potential<S: Real>(
     // Rounding has no direction: squares add up. Two evaluations are compared, each of which has
     // also its own arithmetic's round-off, of the same size.
     Potential { value, noise: 4.0 * noise.sqrt() + 8.0 * f64::EPSILON * value.abs() }
+}
+
+/// Adds the stored energy [J] of tissue (without viscosity), springs and attachments at `x` to the
+/// part of the model in which it is stored.
+pub(super) fn add_stored_energy<S: Real>(
+    step: &Step<'_, S>,
+    x: &[Vec3<S>],
+    mut add: impl FnMut(usize, f64),
+) {
+    let model = step.model;
+    let mut store =
+        |vertex: u32, energy: f64| add(model.component_of[vertex as usize] as usize, energy);
+    for set in model.tet_sets() {
+        for (tet, vertices) in set.vertices.iter().enumerate() {
+            let f = deformation_gradient(&corners(x, *vertices), &set.inverse_rest_shape[tet]);
+            let density = tissue(model, set, tet, step.dt).elastic_energy(&f);
+            store(vertices[0], (set.rest_volume[tet] * density).to_f64());
+        }
+    }
+    let springs = &model.springs;
+    for (i, ends) in springs.vertices.iter().enumerate() {
+        let places = [x[ends[0] as usize], x[ends[1] as usize]];
+        let energy = spring::energy(&places, springs.rest_length[i], springs.stiffness[i]);
+        store(ends[0], energy.to_f64());
+    }
+    let attachments = &model.attachments;
+    let anchors = step.inputs.anchors_of(model);
+    for (i, &v) in attachments.vertices.iter().enumerate() {
+        let anchor = anchors[attachments.order[i] as usize];
+        store(v, attachment::energy(x[v as usize], anchor, attachments.stiffness[i]).to_f64());
+    }
 }
 
 /// Per corner `dt^2` times the force of its element, and the bound of its curvature: the gradient of

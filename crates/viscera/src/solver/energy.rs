@@ -1,0 +1,128 @@
+//! The energy limit: no step ends with more mechanical energy than it began with and was given.
+//!
+//! ```text
+//! T_1 <= T_n + V(x_n with pins moved) - V(x_1) + sum_i (m_i g + f_i) . (x_1 - x_n)_i
+//! v *= sqrt(limit/T_1) where it is exceeded;  T: kinetic energy of the free vertices, V: stored energy
+//! ```
+//!
+//! Implicit Euler dissipates: where the stored energy is convex along the step, its exact solution holds
+//! this by itself. Sweeps that stop early do not: the step guard bounds `Phi`, which lets the kinetic
+//! energy grow up to fourfold, and kept multipliers that trail a fast motion push it on, step after
+//! step. With several substeps stiff, nearly incompressible tissue then never comes to rest. Scaling
+//! velocities takes that energy back and moves no position, so that the state of rest is untouched.
+//! Round-off gets no allowance: what a step may gain by it, step after step, would add up.
+//!
+//! Every connected part of the model has a limit of its own, so that one body does not slow another. A
+//! part that nothing holds keeps its momentum: there everything is relative to its center of mass.
+
+use super::cpu::{Step, Workspace};
+use super::potential::add_stored_energy;
+use crate::scalar::{Real, Vec3};
+use crate::state::State;
+
+/// What a connected part has and is given during a step; sums over its free vertices.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Energy {
+    /// Whether a pin or an attachment holds it.
+    held: bool,
+    /// [kg].
+    mass: f64,
+    /// [N].
+    load: Vec3<f64>,
+    /// Work of the load [J].
+    work: f64,
+    /// Mass times displacement [kg m].
+    shift: Vec3<f64>,
+    /// With the places and velocities of the step's start, and of its end.
+    start: Motion,
+    end: Motion,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Motion {
+    /// Stored energy [J].
+    stored: f64,
+    /// Kinetic energy [J].
+    kinetic: f64,
+    /// [kg m/s].
+    momentum: Vec3<f64>,
+}
+
+impl Motion {
+    fn add<S: Real>(&mut self, mass: f64, velocity: Vec3<S>) {
+        let velocity = velocity.cast::<f64>();
+        self.kinetic += 0.5 * mass * velocity.length_squared();
+        self.momentum += velocity * mass;
+    }
+}
+
+impl Energy {
+    /// Velocity [m/s] that is not scaled, and the share that what is beside it keeps.
+    fn limit(&self) -> (Vec3<f64>, f64) {
+        let mut given = self.start.kinetic + self.start.stored - self.end.stored + self.work;
+        let mut kinetic = self.end.kinetic;
+        let mut drift = Vec3::ZERO;
+        if !self.held && self.mass > 0.0 {
+            let inverse = 1.0 / self.mass;
+            drift = self.end.momentum * inverse;
+            kinetic -= 0.5 * inverse * self.end.momentum.length_squared();
+            given -= 0.5 * inverse * self.start.momentum.length_squared();
+            given -= inverse * self.load.dot(self.shift);
+        }
+        let share = if kinetic > given { (given.max(0.0) / kinetic).sqrt() } else { 1.0 };
+        (drift, share)
+    }
+}
+
+impl<S: Real> Workspace<S> {
+    /// Remembers energy and momentum before the step: `x` are the start's positions with pins moved.
+    pub(super) fn begin_energy(&mut self, step: &Step<'_, S>, x: &[Vec3<S>], v: &[Vec3<S>]) {
+        let model = step.model;
+        self.energies.fill(Energy::default());
+        add_stored_energy(step, x, |part, energy| self.energies[part].start.stored += energy);
+        for &vertex in &model.attachments.vertices {
+            self.energies[model.component_of[vertex as usize] as usize].held = true;
+        }
+        for (vertex, &velocity) in v.iter().enumerate() {
+            let part = &mut self.energies[model.component_of[vertex] as usize];
+            if self.inverse_masses[vertex] == S::ZERO {
+                part.held = true;
+            } else {
+                part.start.add(model.masses[vertex].to_f64(), velocity);
+            }
+        }
+    }
+
+    /// [`super::plan::Stage::LimitEnergy`].
+    pub(super) fn limit_energy(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
+        let model = step.model;
+        let (positions, energies) = (&state.positions, &mut self.energies);
+        add_stored_energy(step, positions, |part, energy| energies[part].end.stored += energy);
+        for (v, x) in positions.iter().enumerate() {
+            if self.inverse_masses[v] == S::ZERO {
+                continue;
+            }
+            let part = &mut energies[model.component_of[v] as usize];
+            let mass = model.masses[v].to_f64();
+            let load = (step.inputs.gravity * model.masses[v] + self.external[v]).cast::<f64>();
+            let moved = (*x - self.previous[v]).cast::<f64>();
+            part.end.add(mass, state.velocities[v]);
+            part.mass += mass;
+            part.load += load;
+            part.work += load.dot(moved);
+            part.shift += moved * mass;
+        }
+        let mut least = 1.0f64;
+        for (v, velocity) in state.velocities.iter_mut().enumerate() {
+            let (drift, share) = energies[model.component_of[v] as usize].limit();
+            if share < 1.0 && self.inverse_masses[v] != S::ZERO {
+                let drift = drift.cast::<S>();
+                *velocity = drift + (*velocity - drift) * S::from_f64(share);
+                least = least.min(share);
+            }
+        }
+        if let Some(report) = &mut self.guard.report {
+            report.kept_speed = least;
+        }
+    }
+}
