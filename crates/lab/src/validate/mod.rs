@@ -2,8 +2,10 @@
 //! report they write together.
 
 mod cases;
+mod methods;
 mod patch;
 mod progress;
+mod uniaxial;
 
 pub use progress::{CaseInProgress, Progress};
 
@@ -26,7 +28,7 @@ pub struct Section {
 }
 
 /// All sections, in the order of the report.
-pub const SECTIONS: &[Section] = &[patch::SECTION];
+pub const SECTIONS: &[Section] = &[patch::SECTION, uniaxial::SECTION];
 
 /// What a section works with.
 pub struct Context<'a> {
