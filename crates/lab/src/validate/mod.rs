@@ -1,6 +1,7 @@
 //! `viscera-lab validate`: sections that compare the library with what must come out, and the
 //! report they write together.
 
+mod cantilever;
 mod cases;
 mod methods;
 mod patch;
@@ -28,7 +29,7 @@ pub struct Section {
 }
 
 /// All sections, in the order of the report.
-pub const SECTIONS: &[Section] = &[patch::SECTION, uniaxial::SECTION];
+pub const SECTIONS: &[Section] = &[patch::SECTION, uniaxial::SECTION, cantilever::SECTION];
 
 /// What a section works with.
 pub struct Context<'a> {
