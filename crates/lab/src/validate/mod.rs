@@ -6,6 +6,7 @@ mod cases;
 mod methods;
 mod patch;
 mod progress;
+mod twist;
 mod uniaxial;
 
 pub use progress::{CaseInProgress, Progress};
@@ -29,7 +30,8 @@ pub struct Section {
 }
 
 /// All sections, in the order of the report.
-pub const SECTIONS: &[Section] = &[patch::SECTION, uniaxial::SECTION, cantilever::SECTION];
+pub const SECTIONS: &[Section] =
+    &[patch::SECTION, uniaxial::SECTION, cantilever::SECTION, twist::SECTION];
 
 /// What a section works with.
 pub struct Context<'a> {
