@@ -3,6 +3,7 @@
 
 mod cantilever;
 mod cases;
+mod frequency;
 mod methods;
 mod patch;
 mod progress;
@@ -31,7 +32,7 @@ pub struct Section {
 
 /// All sections, in the order of the report.
 pub const SECTIONS: &[Section] =
-    &[patch::SECTION, uniaxial::SECTION, cantilever::SECTION, twist::SECTION];
+    &[patch::SECTION, uniaxial::SECTION, cantilever::SECTION, twist::SECTION, frequency::SECTION];
 
 /// What a section works with.
 pub struct Context<'a> {
