@@ -4,7 +4,7 @@ use anyhow::Result;
 use viscera::material::MaterialModel;
 use viscera::settings::SolverSettings;
 
-use crate::report::scientific;
+use crate::report::{percent, scientific};
 use crate::scenes::Scene;
 use crate::settling::{Settled, settle};
 
@@ -44,10 +44,14 @@ impl Method {
 
     /// Brings a scene to rest.
     pub fn settle(self, scene: &Scene) -> Result<Settled> {
-        let settings = self.settings();
+        self.settle_with(scene, &self.settings())
+    }
+
+    /// The same with other settings, in the method's precision.
+    pub fn settle_with(self, scene: &Scene, settings: &SolverSettings) -> Result<Settled> {
         match self {
-            Self::Double | Self::Published => settle::<f64>(scene, &settings),
-            Self::Single => settle::<f32>(scene, &settings),
+            Self::Double | Self::Published => settle::<f64>(scene, settings),
+            Self::Single => settle::<f32>(scene, settings),
         }
     }
 }
@@ -68,4 +72,9 @@ pub(super) fn worse(a: f64, b: f64) -> f64 {
 /// An error in figures; one below `floor` is round-off, whose digits differ from machine to machine.
 pub(super) fn floored(error: f64, floor: f64) -> String {
     if error < floor { format!("< {}", scientific(floor)) } else { scientific(error) }
+}
+
+/// The same in percent.
+pub(super) fn floored_percent(error: f64, floor: f64) -> String {
+    if error < floor { format!("< {}", percent(floor)) } else { percent(error) }
 }

@@ -4,7 +4,9 @@
 mod cantilever;
 mod cases;
 mod frequency;
+mod indentation;
 mod methods;
+mod organ;
 mod patch;
 mod progress;
 mod twist;
@@ -31,8 +33,15 @@ pub struct Section {
 }
 
 /// All sections, in the order of the report.
-pub const SECTIONS: &[Section] =
-    &[patch::SECTION, uniaxial::SECTION, cantilever::SECTION, twist::SECTION, frequency::SECTION];
+pub const SECTIONS: &[Section] = &[
+    patch::SECTION,
+    uniaxial::SECTION,
+    cantilever::SECTION,
+    twist::SECTION,
+    frequency::SECTION,
+    indentation::SECTION,
+    organ::SECTION,
+];
 
 /// What a section works with.
 pub struct Context<'a> {

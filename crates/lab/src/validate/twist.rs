@@ -8,9 +8,9 @@ use anyhow::Result;
 use viscera::material::MaterialModel;
 use viscera::scalar::{Vec3, vec3};
 
-use super::methods::{Method, floored, worse};
+use super::methods::{Method, floored, floored_percent, worse};
 use super::{Context, Section};
-use crate::report::{Axis, Plot, Series, Style, Table, percent, scientific, si};
+use crate::report::{Axis, Plot, Series, Style, Table, percent, si};
 use crate::scenes::{BAR, Path, Scene, Size, tissue};
 use crate::settling::{Error, Truth, compare, truth_in_parts};
 
@@ -24,7 +24,7 @@ const POISSON: f64 = 0.45;
 const SPEED: u32 = 4;
 /// The reference's increments [degrees].
 const INCREMENT: u32 = 10;
-/// Below this a share of the energy is round-off.
+/// Below this an error is round-off, whose digits differ from machine to machine.
 const FLOOR: f64 = 1e-9;
 /// Asked of the library.
 const LIMIT: f64 = 1e-3;
@@ -125,12 +125,12 @@ fn errors(context: &mut Context, cases: &[Case], answers: &[Answer]) {
                 format!("{}°", case.angle),
                 answer.tet_count.to_string(),
                 if *method == Method::Single { "single" } else { "double" }.to_owned(),
-                percent(error.rms),
-                percent(error.largest),
-                percent((torque / answer.true_torque - 1.0).abs()),
-                percent(error.volume.abs()),
+                floored_percent(error.rms, FLOOR),
+                floored_percent(error.largest, FLOOR),
+                floored_percent((torque / answer.true_torque - 1.0).abs(), FLOOR),
+                floored_percent(error.volume.abs(), FLOOR),
                 floored(error.energy.abs(), FLOOR),
-                scientific(error.gradient),
+                floored(error.gradient, FLOOR),
                 error.inverted.to_string(),
                 if error.is_other_minimum() { "another minimum" } else { "" }.to_owned(),
             ]);
@@ -178,7 +178,12 @@ fn verdict(context: &mut Context, answers: &[Answer]) {
             worst = worse(worst, worse(places, worse(torque_error, error.volume.abs())));
         }
         let what = format!("twist to 360 degrees, largest error, {}", method.name());
-        context.verdict(what, format!("< {}", percent(LIMIT)), percent(worst), worst < LIMIT);
+        context.verdict(
+            what,
+            format!("< {}", percent(LIMIT)),
+            floored_percent(worst, FLOOR),
+            worst < LIMIT,
+        );
     }
     if others > 0 {
         context.document.paragraph(format!(
