@@ -26,7 +26,7 @@ pub const GRAVITY: Vec3<f64> = vec3(0.0, 0.0, -9.81);
 pub const FRAME_RATE: f64 = 60.0;
 
 /// Density of all tissue here [kg/m^3].
-const DENSITY: f64 = 1000.0;
+pub const DENSITY: f64 = 1000.0;
 
 /// Where driven vertices go.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -21,7 +21,7 @@ use super::methods::{Method, worse};
 use super::{Context, Section};
 use crate::reference::Reference;
 use crate::report::{Axis, Plot, Series, Style, Table, percent, si};
-use crate::scenes::{BAR, GRAVITY, NEAR, Scene, tissue};
+use crate::scenes::{BAR, DENSITY, GRAVITY, NEAR, Scene, tissue};
 use crate::settling::{Error, compare, truth};
 
 pub(super) const SECTION: Section =
@@ -295,7 +295,7 @@ fn beam_theory(poisson: f64, load: f64) -> (f64, f64) {
     let second_moment = area * height * height / 12.0;
     let shear_modulus = YOUNG / (2.0 * (1.0 + poisson));
     let shear_coefficient = 10.0 * (1.0 + poisson) / (12.0 + 11.0 * poisson);
-    let line_load = 1000.0 * 9.81 * load * area;
+    let line_load = -DENSITY * GRAVITY.z * load * area;
     let bending = line_load * length.powi(4) / (8.0 * YOUNG * second_moment);
     let shear = line_load * length.powi(2) / (2.0 * shear_coefficient * shear_modulus * area);
     (bending, shear)
