@@ -26,7 +26,7 @@ pub const GRAVITY: Vec3<f64> = vec3(0.0, 0.0, -9.81);
 pub const FRAME_RATE: f64 = 60.0;
 
 /// Density of all tissue here [kg/m^3].
-const DENSITY: f64 = 1000.0;
+pub const DENSITY: f64 = 1000.0;
 
 /// Where driven vertices go.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +42,13 @@ pub enum Path {
         /// [m].
         advance: f64,
     },
+    /// Away from a point, by a factor along each axis.
+    Stretch {
+        /// The point that stays [m].
+        center: Vec3<f64>,
+        /// Per axis.
+        factors: Vec3<f64>,
+    },
 }
 
 impl Path {
@@ -54,6 +61,10 @@ impl Path {
                 let r = x - center;
                 let turned = vec3(r.x, cos * r.y - sin * r.z, sin * r.y + cos * r.z);
                 center + turned + vec3(advance * share, 0.0, 0.0)
+            }
+            Self::Stretch { center, factors } => {
+                let growth = (factors - Vec3::splat(1.0)) * share;
+                x + (x - center).scale(growth)
             }
         }
     }
@@ -101,11 +112,11 @@ impl fmt::Display for Scene {
 }
 
 impl Scene {
-    /// The scene of a name, with about as many tetrahedra.
-    pub fn new(name: &'static str, size: Size, tissue: Material) -> Result<Self> {
-        let mut scene = Self {
+    /// A body that nothing holds and nothing pulls.
+    pub fn bare(name: &'static str, mesh: TetMesh, tissue: Material) -> Self {
+        Self {
             name,
-            mesh: TetMesh::default(),
+            mesh,
             tissue,
             gravity: Vec3::ZERO,
             fixed: Vec::new(),
@@ -113,7 +124,12 @@ impl Scene {
             holds: Vec::new(),
             path: Path::Shift(Vec3::ZERO),
             path_frames: 1,
-        };
+        }
+    }
+
+    /// The scene of a name, with about as many tetrahedra.
+    pub fn new(name: &'static str, size: Size, tissue: Material) -> Result<Self> {
+        let mut scene = Self::bare(name, TetMesh::default(), tissue);
         match name {
             "cantilever" => {
                 scene.mesh = bar(size)?;
@@ -179,7 +195,8 @@ impl Scene {
         self.holds.push(Hold { vertex, stiffness: 100.0, driven: true });
     }
 
-    fn select(&self, inside: impl Fn(Vec3<f64>) -> bool) -> Vec<u32> {
+    /// Vertices by where they are at rest.
+    pub fn select(&self, inside: impl Fn(Vec3<f64>) -> bool) -> Vec<u32> {
         let vertices = self.mesh.vertices().iter().enumerate();
         vertices.filter(|(_, x)| inside(**x)).map(|(v, _)| v as u32).collect()
     }
@@ -235,7 +252,7 @@ pub enum Size {
 }
 
 /// Distance [m] within which a vertex counts as lying on a face.
-const NEAR: f64 = 1e-9;
+pub const NEAR: f64 = 1e-9;
 
 /// Edge lengths of the bar [m].
 pub const BAR: [f64; 3] = [0.2, 0.05, 0.05];

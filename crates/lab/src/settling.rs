@@ -4,7 +4,8 @@ use anyhow::{Context as _, Result};
 use viscera::measure::measure_tets;
 use viscera::scalar::{Real, Vec3};
 use viscera::settings::SolverSettings;
-use viscera::solver::Solver;
+use viscera::solver::balance::ForceBalance;
+use viscera::solver::{Pin, Solver};
 use viscera::state::State;
 
 use crate::reference::{Reference, Standing};
@@ -35,6 +36,9 @@ pub struct Settled {
     pub rejected_moving: f64,
     /// Root mean square speed [m/s] in the last frame.
     pub speed: f64,
+    /// Forces [N] by which pins hold their vertices, in the order of the scene's inputs: what is
+    /// fixed, then what is driven.
+    pub pin_forces: Vec<Vec3<f64>>,
 }
 
 /// Runs a scene for [`FRAMES`] frames of one sixtieth of a second each, all velocities times
@@ -64,7 +68,12 @@ pub fn settle<S: Real>(scene: &Scene, settings: &SolverSettings) -> Result<Settl
         }
     }
     let steps = u64::from(FRAMES) * u64::from(settings.substeps);
+    let inputs = scene.inputs(f64::from(FRAMES));
+    let mut balance = ForceBalance::default();
+    solver.force_balance(&model, &state, &inputs, &mut balance)?;
+    let pin_force = |pin: &Pin<S>| balance.residual[pin.vertex as usize];
     Ok(Settled {
+        pin_forces: inputs.pins.iter().map(pin_force).collect(),
         positions: state.positions.iter().map(|x| x.cast()).collect(),
         rejected: solver.rejected_steps() as f64 / steps as f64,
         rejected_moving: rejected_moving as f64 / moving.max(1) as f64,
@@ -90,15 +99,22 @@ pub struct Truth {
     pub minimum: bool,
     /// Tetrahedra turned inside out.
     pub inverted: usize,
+    /// Forces [N] by which pins hold their vertices, in the order of the scene's inputs.
+    pub pin_forces: Vec<Vec3<f64>>,
 }
 
 /// Follows the scene's path to its end with the reference.
 pub fn truth(scene: &Scene) -> Result<Truth> {
+    truth_in_parts(scene, PATH_PARTS)
+}
+
+/// The same with the path in so many parts, for paths that are long.
+pub fn truth_in_parts(scene: &Scene, path_parts: u32) -> Result<Truth> {
     let model = scene.model::<f64>(&SolverSettings::default())?;
     let mut reference = Reference::new(&model);
     let mut positions = model.rest_positions.clone();
     let mut minimum = false;
-    let parts = if scene.driven.is_empty() { 1 } else { PATH_PARTS };
+    let parts = if scene.driven.is_empty() { 1 } else { path_parts };
     for part in 1..=parts {
         let share = f64::from(part) / f64::from(parts);
         let inputs = scene.inputs(share * f64::from(scene.path_frames));
@@ -108,13 +124,15 @@ pub fn truth(scene: &Scene) -> Result<Truth> {
         positions = solution.positions;
         minimum = solution.convergence.minimum;
     }
-    let standing = reference.standing(&positions, &scene.inputs(f64::INFINITY))?;
+    let end = scene.inputs(f64::INFINITY);
+    let standing = reference.standing(&positions, &end)?;
+    let pin_forces = reference.reactions(&positions, &end)?;
     let (volume, inverted) = volume(scene, &positions)?;
-    Ok(Truth { positions, standing, volume, minimum, inverted })
+    Ok(Truth { positions, standing, volume, minimum, inverted, pin_forces })
 }
 
 /// The body's volume [m^3], and how many tetrahedra are inside out.
-fn volume(scene: &Scene, positions: &[Vec3<f64>]) -> Result<(f64, usize)> {
+pub fn volume(scene: &Scene, positions: &[Vec3<f64>]) -> Result<(f64, usize)> {
     let model = scene.model::<f64>(&SolverSettings::default())?;
     let mut tets = Vec::new();
     measure_tets(&model, positions, &mut tets);
@@ -182,8 +200,7 @@ pub fn compare(scene: &Scene, truth: &Truth, positions: &[Vec3<f64>]) -> Result<
         });
     }
     let standing = reference.standing(positions, &inputs)?;
-    let reactions = reference.reactions(&truth.positions, &inputs)?;
-    let reaction = reactions.iter().map(|r| r.length_squared()).sum::<f64>().sqrt();
+    let reaction = truth.pin_forces.iter().map(|r| r.length_squared()).sum::<f64>().sqrt();
     let (volume, inverted) = volume(scene, positions)?;
     Ok(Error {
         rms: (error / moved).sqrt(),

@@ -249,6 +249,79 @@ fn a_body_on_springs_sinks_by_weight_over_stiffness() {
     assert!(error < 1e-8);
 }
 
+/// On attachments whose stiffness goes with the mass, a body oscillates as a whole with the square
+/// root of their rate; nothing is slower.
+#[test]
+fn the_slowest_mode_of_a_body_on_springs_has_their_rate() {
+    let mesh = block([2, 2, 1]);
+    let tissue = material(SNH, 1e4, 0.45);
+    let masses = body(&mesh, &tissue).masses;
+    let mut builder = ModelBuilder::new();
+    builder.add_body(&mesh, &tissue).expect("a body");
+    let rate = 600.0f64;
+    for (v, x) in mesh.vertices().iter().enumerate() {
+        builder.add_attachment(v as u32, *x, rate * masses[v]).expect("an attachment");
+    }
+    let model = build(&builder);
+    let up = vec3(0.0, 0.0, 1.0);
+    let mode = Reference::new(&model)
+        .lowest_mode(&model.rest_positions, &Inputs::default(), up)
+        .expect("a mode");
+    assert!((mode.omega / rate.sqrt() - 1.0).abs() < 1e-8, "{} rad/s", mode.omega);
+    // Normalised by the masses: one over the root of the body's.
+    let size = 1.0 / masses.iter().sum::<f64>().sqrt();
+    assert!(mode.shape.iter().all(|u| (*u - up * size).length() < 1e-8 * size));
+}
+
+/// A slender bar without lateral contraction has the frequency `1.8751^2 sqrt(E I/(rho A L^4))`;
+/// linear tetrahedra come to it from above, because they lock.
+#[test]
+fn a_finer_bar_bends_slower_but_not_slower_than_the_beam() {
+    let omega = |cells: usize| {
+        let size = vec3(0.2, 0.02, 0.02);
+        let mesh = Block::new(size, [10 * cells, cells, cells]).mesh().expect("a legal block");
+        let model = body(&mesh, &material(STVK, 1e5, 0.0));
+        let fixed = mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9);
+        let pins = fixed.map(|(v, x)| Pin { vertex: v as u32, target: *x }).collect();
+        let inputs = Inputs { pins, ..Inputs::default() };
+        let down = vec3(0.0, 0.0, -1.0);
+        let mode = Reference::new(&model).lowest_mode(mesh.vertices(), &inputs, down);
+        mode.expect("a mode").omega
+    };
+    let beam = 1.875_104_f64.powi(2) * (1e5_f64 * 0.02 * 0.02 / (12.0 * 1000.0)).sqrt() / 0.04;
+    let [coarse, fine] = [2, 4].map(|cells| omega(cells) / beam);
+    println!("{coarse:.4} and {fine:.4} of the beam's frequency");
+    // Shear and rotatory inertia take some 1 % from the beam of slenderness 10.
+    assert!(coarse > fine && fine > 0.98, "{coarse} and {fine}");
+    // Between first order, which would leave half of the error, and second, which leaves a quarter.
+    assert!((fine - 1.0) < 0.5 * (coarse - 1.0), "{coarse} and {fine}");
+}
+
+#[test]
+fn what_does_not_oscillate_has_no_mode() {
+    let mesh = block([2, 1, 1]);
+    let model = body(&mesh, &material(SNH, 1e4, 0.3));
+    let up = vec3(0.0, 0.0, 1.0);
+    let free = Reference::new(&model).lowest_mode(mesh.vertices(), &Inputs::default(), up);
+    assert!(matches!(free, Err(ReferenceError::Loose { turns: false, .. })), "{free:?}");
+    let ends = |x: &Vec3<f64>| x.x < 1e-12 || x.x > 0.02 - 1e-12;
+    let held = mesh.vertices().iter().enumerate().filter(|(_, x)| ends(x));
+    let squeezed = |x: &Vec3<f64>| vec3(0.3 * x.x, x.y, x.z);
+    let pins = held.map(|(v, x)| Pin { vertex: v as u32, target: squeezed(x) }).collect();
+    let inputs = Inputs { pins, ..Inputs::default() };
+    let positions: Vec<_> = mesh.vertices().iter().map(squeezed).collect();
+    // Saint Venant-Kirchhoff gives way below a stretch of 1/sqrt(3).
+    let yielding = body(&mesh, &material(STVK, 1e4, 0.3));
+    let unstable = Reference::new(&yielding).lowest_mode(&positions, &inputs, up);
+    assert!(matches!(unstable, Err(ReferenceError::Unstable)), "{unstable:?}");
+    let nowhere = Reference::new(&model).lowest_mode(&positions, &inputs, Vec3::ZERO);
+    assert!(matches!(nowhere, Err(ReferenceError::NotFinite { what: "direction" })));
+    let mut quadratic = Reference::quadratic(&mesh, &material(SNH, 1e4, 0.3));
+    let rest = quadratic.problem().rest_positions.clone();
+    let massless = quadratic.lowest_mode(&rest, &inputs, up);
+    assert!(matches!(massless, Err(ReferenceError::NoStep)));
+}
+
 /// Implicit Euler of a body that oscillates on attachments without strain:
 /// x' = (x + dt v + dt^2 (g + w^2 p))/(1 + dt^2 w^2).
 #[test]

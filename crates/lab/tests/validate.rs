@@ -49,6 +49,33 @@ fn the_quick_patch_test_writes_its_report_twice_the_same() {
     assert_eq!(fs::read_dir(folder.path().join("patch")).expect("the folder").count(), 1);
 }
 
+/// Everything that compares states of rest and the bending frequency, on small meshes.
+#[test]
+fn the_library_rests_where_the_reference_does() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let report = folder.path().join("rest.md");
+    let sections = "uniaxial,cantilever,twist,frequency,indentation,organ";
+    let output =
+        lab(&["validate", "--quick", "--only", sections, "--out", &report.to_string_lossy()]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let printed = text(&output.stdout);
+    assert!(printed.contains("13 of 13 claims are met"), "{printed}");
+    let markdown = fs::read_to_string(&report).expect("the report");
+    assert!(!markdown.contains("| another minimum"), "{markdown}");
+    assert!(!markdown.contains("not a number"), "{markdown}");
+    for figure in [
+        "uniaxial-force",
+        "cantilever-locking",
+        "twist-torque",
+        "frequency-error",
+        "frequency-amplitude",
+        "indentation-force",
+        "organ-iterations",
+    ] {
+        assert!(markdown.contains(&format!("(rest/{figure}.svg)")), "no {figure} in {markdown}");
+    }
+}
+
 #[test]
 fn an_unwritable_report_fails_before_the_work() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -12,9 +12,11 @@
 //! | `objective` | potential, gradient, Hessian |
 //! | `matrix` | sparse matrix, factor, cost |
 //! | `newton` | the iteration |
+//! | `frequency` | the slowest oscillation |
 //! | `fixing` | whether a body can be at rest |
 
 pub mod fixing;
+pub mod frequency;
 pub mod matrix;
 pub mod newton;
 pub mod objective;
@@ -28,6 +30,7 @@ use viscera::scalar::Vec3;
 use viscera::solver::Inputs;
 use viscera::state::State;
 
+pub use frequency::Mode;
 pub use matrix::Cost;
 pub use newton::{Convergence, Tolerance};
 
@@ -90,6 +93,9 @@ pub enum ReferenceError {
         /// What is not.
         what: &'static str,
     },
+    /// Positions that are no state of rest that returns after a push.
+    #[error("the body is not stable at these positions, so it does not oscillate; settle it first")]
+    Unstable,
     /// Quadratic tetrahedra have no lumped masses.
     #[error("quadratic tetrahedra have no lumped masses: only `settle` is defined for them")]
     NoStep,
@@ -295,20 +301,15 @@ impl Reference {
         load: Load,
     ) -> Result<Solution, ReferenceError> {
         let mut analysis = self.analyse(pinned)?;
+        let cost = self.check_memory(&analysis)?;
         let Analysis { pattern, factorization, .. } = &mut analysis;
-        let cost = factorization.cost(pattern, &self.problem);
-        let (unknowns, bytes, limit) = (cost.unknowns, cost.bytes, self.memory);
-        let too_large = ReferenceError::TooLarge { unknowns, bytes, limit };
-        if bytes > limit {
-            return Err(too_large);
-        }
         let anchors = anchors(&self.problem, inputs);
         let objective = Objective { problem: &self.problem, anchors, load };
         let solved = newton::minimise(&objective, pattern, factorization, &self.tolerance, &mut x);
         self.analysis = Some(analysis);
         let convergence = match solved {
             Ok(convergence) => convergence,
-            Err(FactorError::TooLarge) => return Err(too_large),
+            Err(FactorError::TooLarge) => return Err(self.too_large(&cost)),
             Err(FactorError::Indefinite) => {
                 return Err(ReferenceError::NotFinite { what: "curvature of the potential" });
             }
@@ -318,6 +319,17 @@ impl Reference {
             return Err(ReferenceError::NotConverged { steps, gradient, start_gradient });
         }
         Ok(Solution { positions: x, convergence })
+    }
+
+    /// What solving costs, where that is allowed.
+    fn check_memory(&self, analysis: &Analysis) -> Result<Cost, ReferenceError> {
+        let cost = analysis.factorization.cost(&analysis.pattern, &self.problem);
+        if cost.bytes > self.memory { Err(self.too_large(&cost)) } else { Ok(cost) }
+    }
+
+    fn too_large(&self, cost: &Cost) -> ReferenceError {
+        let (unknowns, bytes, limit) = (cost.unknowns, cost.bytes, self.memory);
+        ReferenceError::TooLarge { unknowns, bytes, limit }
     }
 
     /// The analysis for a set of pins: the last one, where it is of the same.

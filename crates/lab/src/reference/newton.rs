@@ -137,12 +137,14 @@ fn factorize(
         Err(FactorError::Indefinite) => {}
     }
     let mut matrix = objective.hessian(x, pattern, true);
-    let mut shift = 0.0;
+    let mut shift = 0.0f64;
     loop {
         match factorization.factorize(pattern, &matrix) {
             Ok(()) => return Ok(false),
             // A matrix without numbers has no finite shift either: the caller's positions are none.
-            Err(error) if error == FactorError::TooLarge || !(shift < 1e12) => return Err(error),
+            Err(error) if error == FactorError::TooLarge || shift.is_nan() || shift >= 1e12 => {
+                return Err(error);
+            }
             Err(_) => {
                 let scale = matrix.largest_diagonal(pattern);
                 let next = if shift == 0.0 { FIRST_SHIFT * scale } else { 10.0 * shift };

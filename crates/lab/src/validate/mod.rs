@@ -1,9 +1,16 @@
 //! `viscera-lab validate`: sections that compare the library with what must come out, and the
 //! report they write together.
 
+mod cantilever;
 mod cases;
+mod frequency;
+mod indentation;
+mod methods;
+mod organ;
 mod patch;
 mod progress;
+mod twist;
+mod uniaxial;
 
 pub use progress::{CaseInProgress, Progress};
 
@@ -26,7 +33,15 @@ pub struct Section {
 }
 
 /// All sections, in the order of the report.
-pub const SECTIONS: &[Section] = &[patch::SECTION];
+pub const SECTIONS: &[Section] = &[
+    patch::SECTION,
+    uniaxial::SECTION,
+    cantilever::SECTION,
+    twist::SECTION,
+    frequency::SECTION,
+    indentation::SECTION,
+    organ::SECTION,
+];
 
 /// What a section works with.
 pub struct Context<'a> {

@@ -4,6 +4,7 @@
 //! `x -> A x` with a stretch along x, the matching contraction across, and some shear. The error is
 //! the largest distance of a vertex from `A x`, over the largest displacement.
 
+use super::methods::{METHODS, MODELS, Method, model_name, worse};
 use super::{Context, Section};
 use crate::report::{Axis, Plot, Series, Style, Table, percent, scientific};
 use anyhow::{Context as _, Result};
@@ -32,32 +33,6 @@ const KEPT_VELOCITY: f64 = 0.9;
 const DOUBLE_LIMIT: f64 = 1e-10;
 const SINGLE_LIMIT: f64 = 1e-5;
 
-const MODELS: [MaterialModel; 2] =
-    [MaterialModel::StableNeoHookean, MaterialModel::SaintVenantKirchhoff];
-
-/// How the block is solved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Method {
-    /// The defaults, in double precision.
-    Double,
-    /// The defaults, in single precision.
-    Single,
-    /// Multipliers from zero and no rebase, in double precision.
-    Published,
-}
-
-const METHODS: [Method; 3] = [Method::Double, Method::Single, Method::Published];
-
-impl Method {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Double => "exact at rest, double precision",
-            Self::Single => "exact at rest, single precision",
-            Self::Published => "XPBD as published",
-        }
-    }
-}
-
 /// One block, moved and settled.
 #[derive(Clone, Copy, Debug)]
 struct Case {
@@ -74,13 +49,6 @@ impl fmt::Display for Case {
         let Self { model, stretch, method, substeps, iterations, .. } = self;
         let (model, method) = (model_name(*model), method.name());
         write!(f, "{model}, {method}, stretch {stretch}, {substeps} x {iterations}")
-    }
-}
-
-fn model_name(model: MaterialModel) -> &'static str {
-    match model {
-        MaterialModel::StableNeoHookean => "stable neo-Hookean",
-        MaterialModel::SaintVenantKirchhoff => "Saint Venant-Kirchhoff",
     }
 }
 
@@ -177,11 +145,6 @@ fn stretches(context: &mut Context) -> Result<()> {
     Ok(())
 }
 
-/// The larger of two errors; one that is no number is the worst.
-fn worse(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
-}
-
 fn iterations(context: &mut Context) -> Result<()> {
     let cases = iteration_cases(context.quick);
     let errors = context.run_cases(&cases, error_of)?;
@@ -221,13 +184,10 @@ fn error_of(case: &Case) -> Result<f64> {
 }
 
 fn settled_error<S: Real>(case: &Case) -> Result<f64> {
-    let exact = case.method != Method::Published;
     let settings = SolverSettings {
         substeps: case.substeps,
         iterations: case.iterations,
-        rebase: exact,
-        keep_multipliers: exact,
-        ..SolverSettings::default()
+        ..case.method.settings()
     };
     let mesh = block(case.quick)?;
     let mut builder = ModelBuilder::new();

@@ -1,0 +1,80 @@
+//! Ways to solve that the sections compare.
+
+use anyhow::Result;
+use viscera::material::MaterialModel;
+use viscera::settings::SolverSettings;
+
+use crate::report::{percent, scientific};
+use crate::scenes::Scene;
+use crate::settling::{Settled, settle};
+
+/// Both materials.
+pub(super) const MODELS: [MaterialModel; 2] =
+    [MaterialModel::StableNeoHookean, MaterialModel::SaintVenantKirchhoff];
+
+/// How a scene is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Method {
+    /// The defaults, in double precision.
+    Double,
+    /// The defaults, in single precision.
+    Single,
+    /// Multipliers from zero and no rebase, in double precision.
+    Published,
+}
+
+/// All of them.
+pub(super) const METHODS: [Method; 3] = [Method::Double, Method::Single, Method::Published];
+
+impl Method {
+    /// As tables and legends call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Double => "exact at rest, double precision",
+            Self::Single => "exact at rest, single precision",
+            Self::Published => "XPBD as published",
+        }
+    }
+
+    /// The defaults, but for what makes the method.
+    pub fn settings(self) -> SolverSettings {
+        let exact = self != Self::Published;
+        SolverSettings { rebase: exact, keep_multipliers: exact, ..SolverSettings::default() }
+    }
+
+    /// Brings a scene to rest.
+    pub fn settle(self, scene: &Scene) -> Result<Settled> {
+        self.settle_with(scene, &self.settings())
+    }
+
+    /// The same with other settings, in the method's precision.
+    pub fn settle_with(self, scene: &Scene, settings: &SolverSettings) -> Result<Settled> {
+        match self {
+            Self::Double | Self::Published => settle::<f64>(scene, settings),
+            Self::Single => settle::<f32>(scene, settings),
+        }
+    }
+}
+
+/// A material's law in words.
+pub(super) fn model_name(model: MaterialModel) -> &'static str {
+    match model {
+        MaterialModel::StableNeoHookean => "stable neo-Hookean",
+        MaterialModel::SaintVenantKirchhoff => "Saint Venant-Kirchhoff",
+    }
+}
+
+/// The larger of two errors; one that is no number is the worst.
+pub(super) fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+/// An error in figures; one below `floor` is round-off, whose digits differ from machine to machine.
+pub(super) fn floored(error: f64, floor: f64) -> String {
+    if error < floor { format!("< {}", scientific(floor)) } else { scientific(error) }
+}
+
+/// The same in percent.
+pub(super) fn floored_percent(error: f64, floor: f64) -> String {
+    if error < floor { format!("< {}", percent(floor)) } else { percent(error) }
+}
