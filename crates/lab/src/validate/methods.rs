@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use viscera::material::MaterialModel;
-use viscera::settings::SolverSettings;
+use viscera::settings::{Colors, SolverSettings};
 
 use crate::report::{percent, scientific};
 use crate::scenes::Scene;
@@ -77,4 +77,40 @@ pub(super) fn floored(error: f64, floor: f64) -> String {
 /// The same in percent.
 pub(super) fn floored_percent(error: f64, floor: f64) -> String {
     if error < floor { format!("< {}", percent(floor)) } else { percent(error) }
+}
+
+/// How constraints are separated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Form {
+    /// As many colours as it takes.
+    Colored,
+    /// Four colours.
+    Clique,
+    /// One colour.
+    Jacobi,
+}
+
+impl Form {
+    /// As tables and legends call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Colored => "coloured",
+            Self::Clique => "clique, 4 colours",
+            Self::Jacobi => "Jacobi",
+        }
+    }
+
+    /// The setting.
+    pub fn colors(self) -> Colors {
+        match self {
+            Self::Colored => Colors::Unlimited,
+            Self::Clique => Colors::Limited(4),
+            Self::Jacobi => Colors::Limited(1),
+        }
+    }
+}
+
+/// The defaults with other colours, substeps and iterations.
+pub(super) fn scheduled(form: Form, substeps: u32, iterations: u32) -> SolverSettings {
+    SolverSettings { colors: form.colors(), substeps, iterations, ..SolverSettings::default() }
 }

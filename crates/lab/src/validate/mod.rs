@@ -5,10 +5,14 @@ mod cantilever;
 mod cases;
 mod frequency;
 mod indentation;
+mod independence;
 mod methods;
+mod motion;
 mod organ;
 mod patch;
 mod progress;
+mod rest;
+mod stress;
 mod twist;
 mod uniaxial;
 
@@ -41,6 +45,10 @@ pub const SECTIONS: &[Section] = &[
     frequency::SECTION,
     indentation::SECTION,
     organ::SECTION,
+    rest::SECTION,
+    independence::SECTION,
+    motion::SECTION,
+    stress::SECTION,
 ];
 
 /// What a section works with.

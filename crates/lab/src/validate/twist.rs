@@ -20,8 +20,8 @@ pub(super) const SECTION: Section =
 /// Young's modulus [Pa].
 const YOUNG: f64 = 1e4;
 const POISSON: f64 = 0.45;
-/// How fast the end turns [degrees/frame]: a whole turn takes half of the settling's three seconds.
-const SPEED: u32 = 4;
+/// How fast the end turns [degrees/frame]: a whole turn takes a third of the settling's three seconds.
+const SPEED: u32 = 6;
 /// The reference's increments [degrees].
 const INCREMENT: u32 = 10;
 /// Below this an error is round-off, whose digits differ from machine to machine.

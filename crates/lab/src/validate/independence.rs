@@ -1,0 +1,243 @@
+//! Iteration independence: the stiffness that tissue seems to have, whatever the budget.
+
+use std::fmt;
+
+use anyhow::Result;
+use viscera::material::MaterialModel;
+use viscera::settings::{Colors, SolverSettings};
+
+use super::methods::worse;
+use super::{Context, Section};
+use crate::report::{Axis, Plot, Series, Style, Table};
+use crate::scenes::{Scene, Size, tissue};
+use crate::settling::{Error, compare, settle, truth};
+
+pub(super) const SECTION: Section =
+    Section { name: "independence", title: "Iteration independence", cases: case_count, run };
+
+/// Young's modulus [Pa] and Poisson's ratio: the hard end of organs.
+const YOUNG: f64 = 1e5;
+const POISSON: f64 = 0.45;
+/// Asked of the apparent stiffness.
+const LIMIT: f64 = 1e-3;
+/// Below this the rest of the damped motion is seen.
+const FLOOR: f64 = 1e-9;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Method {
+    Exact,
+    Published,
+}
+
+impl Method {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact at rest",
+            Self::Published => "XPBD as published",
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Case {
+    scene: &'static str,
+    size: Size,
+    method: Method,
+    colors: Colors,
+    substeps: u32,
+    iterations: u32,
+    single: bool,
+}
+
+impl fmt::Display for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { scene, method, substeps, iterations, .. } = self;
+        write!(f, "{scene}, {}, {substeps} x {iterations}", method.name())
+    }
+}
+
+fn scenes(quick: bool) -> &'static [&'static str] {
+    if quick { &["cantilever"] } else { &["cantilever", "grab", "organ"] }
+}
+
+fn iterations(quick: bool) -> &'static [u32] {
+    if quick { &[5, 20] } else { &[5, 10, 20, 50, 100, 200] }
+}
+
+const SUBSTEPS: [u32; 4] = [1, 2, 4, 8];
+
+const COLORS: [Colors; 5] = [
+    Colors::Unlimited,
+    Colors::Limited(8),
+    Colors::Limited(4),
+    Colors::Limited(2),
+    Colors::Limited(1),
+];
+
+/// Over iterations, over substeps, over colours: three lists.
+fn cases(quick: bool) -> [Vec<Case>; 3] {
+    let size = if quick { Size::Tiny } else { Size::Small };
+    let mut lists = [Vec::new(), Vec::new(), Vec::new()];
+    let methods: &[(Method, bool)] =
+        &[(Method::Exact, false), (Method::Exact, true), (Method::Published, false)];
+    for &scene in scenes(quick) {
+        for &(method, single) in methods {
+            let case = |colors, substeps, iterations| Case {
+                scene,
+                size,
+                method,
+                colors,
+                substeps,
+                iterations,
+                single,
+            };
+            let any = Colors::Unlimited;
+            lists[0].extend(iterations(quick).iter().map(|&k| case(any, 1, k)));
+            lists[1].extend(SUBSTEPS.map(|s| case(any, s, 5)));
+            if method == Method::Exact && !single {
+                lists[2].extend(COLORS.map(|colors| case(colors, 1, 20)));
+            }
+        }
+    }
+    lists
+}
+
+fn case_count(quick: bool) -> usize {
+    cases(quick).iter().map(Vec::len).sum()
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Answer {
+    error: Error,
+    rejected_moving: f64,
+}
+
+fn answer(case: &Case) -> Result<Answer> {
+    let material = tissue(MaterialModel::StableNeoHookean, YOUNG, POISSON)?;
+    let scene = Scene::new(case.scene, case.size, material)?;
+    let exact = case.method == Method::Exact;
+    let settings = SolverSettings {
+        colors: case.colors,
+        substeps: case.substeps,
+        iterations: case.iterations,
+        rebase: exact,
+        keep_multipliers: exact,
+        ..SolverSettings::default()
+    };
+    let settled = if case.single {
+        settle::<f32>(&scene, &settings)?
+    } else {
+        settle::<f64>(&scene, &settings)?
+    };
+    let error = compare(&scene, &truth(&scene)?, &settled.positions)?;
+    Ok(Answer { error, rejected_moving: settled.rejected_moving })
+}
+
+fn label(case: &Case) -> String {
+    let precision = if case.single { ", single precision" } else { "" };
+    format!("{}{precision}", case.method.name())
+}
+
+fn color_name(colors: Colors) -> String {
+    match colors {
+        Colors::Unlimited => "unlimited".to_owned(),
+        Colors::Limited(count) => count.to_string(),
+    }
+}
+
+fn run(context: &mut Context) -> Result<()> {
+    context.document.paragraph(format!(
+        "Apparent stiffness: the reference's displacement over ours along it, over all free vertices, \
+         after 180 frames with velocities times 0.9 after each. 1 is right, 2 would feel twice as \
+         stiff. Stable neo-Hookean, E = {} kPa, nu = {POISSON}, about 600 tetrahedra (the organ 310).",
+        YOUNG / 1e3
+    ));
+    let lists = cases(context.quick);
+    let answers = [
+        context.run_cases(&lists[0], answer)?,
+        context.run_cases(&lists[1], answer)?,
+        context.run_cases(&lists[2], answer)?,
+    ];
+    context.document.subheading("Over iterations, one step per frame");
+    let counts = iterations(context.quick).iter().map(|k| k.to_string());
+    tabulate(context, &lists[0], &answers[0], counts.collect());
+    figure(context, &lists[0], &answers[0])?;
+    context.document.subheading("Over substeps, five iterations each");
+    tabulate(context, &lists[1], &answers[1], SUBSTEPS.map(|s| s.to_string()).to_vec());
+    context.document.subheading("Over colours, one step of 20 iterations per frame");
+    tabulate(context, &lists[2], &answers[2], COLORS.map(color_name).to_vec());
+    judge(context, "iterations", &lists[0], &answers[0]);
+    judge(context, "substeps", &lists[1], &answers[1]);
+    judge(context, "colours", &lists[2], &answers[2]);
+    Ok(())
+}
+
+/// A row per scene and method, a column per budget.
+fn tabulate(context: &mut Context, cases: &[Case], answers: &[Answer], budgets: Vec<String>) {
+    let count = budgets.len();
+    let mut table =
+        Table::new(["scene".to_owned(), "method".to_owned()].into_iter().chain(budgets));
+    for (cases, answers) in cases.chunks(count).zip(answers.chunks(count)) {
+        let names = [cases[0].scene.to_owned(), label(&cases[0])];
+        let cells = answers.iter().map(|answer| {
+            let other = if answer.error.is_other_minimum() { " (other minimum)" } else { "" };
+            format!("{:.4}{other}", answer.error.stiffness)
+        });
+        table.row(names.into_iter().chain(cells));
+    }
+    context.document.table(&table);
+}
+
+fn figure(context: &mut Context, cases: &[Case], answers: &[Answer]) -> Result<()> {
+    let mut plot = Plot::new(
+        "How far the apparent stiffness is off, cantilever",
+        Axis::logarithmic("iterations per frame"),
+        Axis::logarithmic("|apparent stiffness - 1|"),
+    );
+    let count = iterations(context.quick).len();
+    for (cases, answers) in cases.chunks(count).zip(answers.chunks(count)) {
+        if cases[0].scene != "cantilever" {
+            continue;
+        }
+        let points = cases.iter().zip(answers).map(|(case, answer)| {
+            let off = (answer.error.stiffness - 1.0).abs();
+            [f64::from(case.iterations), off.max(FLOOR)]
+        });
+        plot.series(Series::new(label(&cases[0]), points).with_style(Style::MarkedLine));
+    }
+    plot.reference(LIMIT, "0.1 %");
+    context.document.figure("independence-iterations", &plot)
+}
+
+fn judge(context: &mut Context, over: &str, cases: &[Case], answers: &[Answer]) {
+    let (mut off, mut rejected) = (0.0, 0.0);
+    let (mut least, mut most) = (f64::INFINITY, 0.0f64);
+    for (case, answer) in cases.iter().zip(answers) {
+        let error = (answer.error.stiffness - 1.0).abs();
+        match case.method {
+            Method::Exact if !case.single => {
+                off = worse(off, error);
+                rejected = worse(rejected, answer.rejected_moving);
+            }
+            Method::Exact => {}
+            Method::Published => (least, most) = (least.min(error), most.max(error)),
+        }
+    }
+    let plain = if most > 0.0 {
+        format!(" (as published {:.1} to {:.0} % off)", 100.0 * least, 100.0 * most)
+    } else {
+        String::new()
+    };
+    context.verdict(
+        format!("apparent stiffness over {over}"),
+        "within 0.1 % of the reference",
+        format!("{:.4} % off{plain}", 100.0 * off),
+        off < LIMIT,
+    );
+    context.verdict(
+        format!("moving steps taken back, over {over}"),
+        "< 50 %",
+        format!("{:.0} %", 100.0 * rejected),
+        rejected < 0.5,
+    );
+}

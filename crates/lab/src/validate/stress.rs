@@ -1,0 +1,194 @@
+//! Stress: violent grabs and scrambled starts at five iterations per frame.
+
+use std::fmt;
+
+use anyhow::Result;
+use viscera::material::MaterialModel;
+use viscera::mesh::shapes::{Block, Splitting};
+use viscera::mesh::tet_volume;
+use viscera::scalar::Vec3;
+use viscera::settings::{Acceleration, SolverSettings};
+use viscera::solver::{Inputs, Pin, Solver};
+use viscera::state::State;
+
+use super::methods::{Form, scheduled};
+use super::{Context, Section};
+use crate::report::{Table, percent};
+use crate::scenes::{FRAME_RATE, Random, Scene, tissue};
+
+pub(super) const SECTION: Section =
+    Section { name: "stress", title: "Stress", cases: case_count, run };
+
+const SIZE: [f64; 3] = [0.08, 0.04, 0.04];
+const CELLS: [usize; 3] = [8, 4, 4];
+const YOUNG: f64 = 1e4;
+const POISSON: f64 = 0.45;
+/// Frames in all; grabs are let go after the first third.
+const FRAMES: u32 = 60;
+const HELD: u32 = 20;
+/// Asked of the share of tetrahedra inside out at the end.
+const INVERTED: f64 = 0.01;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// Vertices jump to places up to a body length away, twice, and are let go.
+    Grab,
+    /// All vertices start at random places in the body's box.
+    Scramble,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Case {
+    kind: Kind,
+    form: Form,
+    anderson: bool,
+    seed: u64,
+}
+
+impl fmt::Display for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = match self.kind {
+            Kind::Grab => "violent grab",
+            Kind::Scramble => "scramble",
+        };
+        write!(f, "{kind} {}", self.seed)
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Answer {
+    steps: u64,
+    rejected: u64,
+    above: u64,
+    is_finite: bool,
+    tets: usize,
+    inverted: usize,
+}
+
+/// Lists of runs with what they are.
+fn batches(quick: bool) -> Vec<(String, Vec<Case>)> {
+    let mut batches = Vec::new();
+    let many = if quick { 4 } else { 200 };
+    let few = if quick { 1 } else { 25 };
+    for (kind, name) in [(Kind::Grab, "violent grabs"), (Kind::Scramble, "scrambles")] {
+        for (form, anderson, count) in [
+            (Form::Colored, false, many),
+            (Form::Colored, true, few),
+            (Form::Clique, false, few),
+            (Form::Jacobi, false, few),
+        ] {
+            let label = if anderson { ", Anderson" } else { "" };
+            let cases = (0..count).map(|seed| Case { kind, form, anderson, seed });
+            batches.push((format!("{name}, {}{label}", form.name()), cases.collect()));
+        }
+    }
+    batches
+}
+
+fn case_count(quick: bool) -> usize {
+    batches(quick).iter().map(|(_, cases)| cases.len()).sum()
+}
+
+fn answer(case: &Case) -> Result<Answer> {
+    let block = Block {
+        splitting: Splitting::Six,
+        jitter: 0.6,
+        seed: 1,
+        ..Block::new(Vec3::from_f64(SIZE), CELLS)
+    };
+    let material = tissue(MaterialModel::StableNeoHookean, YOUNG, POISSON)?;
+    let scene = Scene::bare("bar", block.mesh()?, material);
+    let acceleration = if case.anderson { Acceleration::Anderson } else { Acceleration::None };
+    let settings = SolverSettings { acceleration, ..scheduled(case.form, 1, 5) };
+    let model = scene.model::<f64>(&settings)?;
+    let mut solver = Solver::new(&model, &settings);
+    let mut state = State::at_rest(&model);
+    let mut random = Random(case.seed);
+    let mut inputs = Inputs::default();
+    let dt = 1.0 / FRAME_RATE;
+    let mut grabbed = Vec::new();
+    match case.kind {
+        Kind::Grab => {
+            let count = 2 + random.bits() % 6;
+            for _ in 0..count {
+                grabbed.push((random.bits() % model.vertex_count() as u64) as u32);
+            }
+        }
+        Kind::Scramble => {
+            for x in &mut state.positions {
+                *x = Vec3::from_f64(SIZE.map(|side| random.uniform(0.0, side)));
+            }
+            solver.restart(&model, &mut state, &inputs, dt)?;
+        }
+    }
+    let mut answer = Answer { tets: model.tet_count(), ..Answer::default() };
+    for frame in 0..FRAMES {
+        if case.kind == Kind::Grab && (frame == 0 || frame == HELD / 2) {
+            inputs.pins.clear();
+            for &vertex in &grabbed {
+                let target = model.rest_positions[vertex as usize] + random.vector(SIZE[0]);
+                inputs.pins.push(Pin { vertex, target });
+            }
+        }
+        if frame == HELD {
+            inputs.pins.clear();
+        }
+        solver.step(&model, &mut state, &inputs, dt)?;
+        answer.steps += 1;
+        answer.above += u64::from(!solver.last_step().is_some_and(|step| step.keeps_limit()));
+    }
+    answer.rejected = solver.rejected_steps();
+    answer.is_finite = state.is_finite();
+    for tet in scene.mesh.tets() {
+        let corners = tet.map(|v| state.positions[v as usize]);
+        answer.inverted += usize::from(!(tet_volume(corners) > 0.0));
+    }
+    Ok(answer)
+}
+
+fn run(context: &mut Context) -> Result<()> {
+    context.document.paragraph(format!(
+        "A bar of {} mm, E = {} kPa, nu = {POISSON}, stable neo-Hookean, one step of five iterations per \
+         frame. *Violent grabs*: two to seven vertices jump to places up to a body length away, jump again \
+         after {} frames, and are let go after {HELD}. *Scrambles*: every vertex starts at a random place \
+         of the bar's box. A step counts as above when its incremental potential ends above the lowest \
+         of the step's candidate starts, by more than round-off.",
+        SIZE.map(|side| format!("{:.0}", 1e3 * side)).join(" x "),
+        YOUNG / 1e3,
+        HELD / 2,
+    ));
+    let mut table = Table::new([
+        "runs",
+        "count",
+        "steps",
+        "taken back",
+        "steps above",
+        "runs without numbers",
+        "tets inside out at the end",
+    ]);
+    for (name, cases) in batches(context.quick) {
+        let answers = context.run_cases(&cases, answer)?;
+        let sum = |of: fn(&Answer) -> u64| answers.iter().map(of).sum::<u64>();
+        let (steps, above) = (sum(|a| a.steps), sum(|a| a.above));
+        let lost = sum(|a| u64::from(!a.is_finite));
+        let (tets, inverted) = (sum(|a| a.tets as u64), sum(|a| a.inverted as u64));
+        let share = inverted as f64 / tets as f64;
+        table.row([
+            name.clone(),
+            cases.len().to_string(),
+            steps.to_string(),
+            percent(sum(|a| a.rejected) as f64 / steps as f64),
+            above.to_string(),
+            lost.to_string(),
+            percent(share),
+        ]);
+        context.verdict(
+            format!("{} {name}: steps above; runs without numbers; tets inverted", cases.len()),
+            "0; 0; < 1 %",
+            format!("{above}; {lost}; {}", percent(share)),
+            above == 0 && lost == 0 && share < INVERTED,
+        );
+    }
+    context.document.table(&table);
+    Ok(())
+}
