@@ -97,3 +97,33 @@ fn a_body_in_trouble_does_not_slow_another() {
         assert!((moved.z / -fall - 1.0).abs() < 1e-9, "fell {} m of {fall} m", -moved.z);
     }
 }
+
+/// Pins that drag viscous tissue load its viscosity: what that gives back within the step is no gain.
+/// Solved to the end, a step needs no limit.
+#[test]
+fn the_limit_leaves_well_solved_steps_alone() {
+    let mesh = block([0.04, 0.02, 0.02], [4, 2, 2], 0.2);
+    for retardation in [0.0, 0.01, 0.05] {
+        let tissue = material(SNH, 1e4, 0.45).with_viscosity(retardation).expect("legal");
+        let settings = SolverSettings { substeps: 4, iterations: 200, ..SolverSettings::default() };
+        let model = single_body::<f64>(&mesh, &tissue, &settings);
+        let mut run = Run::new(&model, &settings);
+        let mut least = 1.0f64;
+        for step in 1..=24 {
+            let mut inputs = Inputs { gravity: GRAVITY, ..Inputs::default() };
+            for (v, x) in mesh.vertices().iter().enumerate() {
+                // One end stays, the other is pulled at 0.12 m/s.
+                let pull = vec3(0.12 * run.dt * f64::from(step), 0.0, 0.0);
+                if x.x < 1e-9 {
+                    inputs.pins.push(Pin { vertex: v as u32, target: *x });
+                } else if x.x > 0.04 - 1e-9 {
+                    inputs.pins.push(Pin { vertex: v as u32, target: *x + pull });
+                }
+            }
+            run.solver.step(&model, &mut run.state, &inputs, run.dt).expect("a legal step");
+            least = least.min(run.solver.last_step().expect("a guarded step").kept_speed);
+        }
+        println!("retardation {retardation} s: at least {least:.6} of the speed is kept");
+        assert!(least > 0.999, "retardation {retardation} s: {least}");
+    }
+}

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! T_1 <= T_n + V(x_n with pins moved) - V(x_1) + sum_i (m_i g + f_i) . (x_1 - x_n)_i
-//! v *= sqrt(limit/T_1) where it is exceeded;  T: kinetic energy of the free vertices, V: stored energy
+//! v *= sqrt(limit/T_1) where it is exceeded;  T: kinetic energy of the free vertices, V: tissue with
+//! its viscosity, springs, attachments
 //! ```
 //!
 //! Implicit Euler dissipates: where the stored energy is convex along the step, its exact solution holds
@@ -16,7 +17,7 @@
 //! part that nothing holds keeps its momentum: there everything is relative to its center of mass.
 
 use super::cpu::{Step, Workspace};
-use super::potential::add_stored_energy;
+use super::potential::add_inner_potential;
 use crate::scalar::{Real, Vec3};
 use crate::state::State;
 
@@ -40,7 +41,7 @@ pub(super) struct Energy {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Motion {
-    /// Stored energy [J].
+    /// Of tissue, springs and attachments [J].
     stored: f64,
     /// Kinetic energy [J].
     kinetic: f64,
@@ -79,7 +80,9 @@ impl<S: Real> Workspace<S> {
     pub(super) fn begin_energy(&mut self, step: &Step<'_, S>, x: &[Vec3<S>], v: &[Vec3<S>]) {
         let model = step.model;
         self.energies.fill(Energy::default());
-        add_stored_energy(step, x, |part, energy| self.energies[part].start.stored += energy);
+        let energies = &mut self.energies;
+        let add = |part: usize, energy| energies[part].start.stored += energy;
+        add_inner_potential(step, &self.start_strain, x, add);
         for &vertex in &model.attachments.vertices {
             self.energies[model.component_of[vertex as usize] as usize].held = true;
         }
@@ -97,7 +100,8 @@ impl<S: Real> Workspace<S> {
     pub(super) fn limit_energy(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
         let model = step.model;
         let (positions, energies) = (&state.positions, &mut self.energies);
-        add_stored_energy(step, positions, |part, energy| energies[part].end.stored += energy);
+        let add = |part: usize, energy| energies[part].end.stored += energy;
+        add_inner_potential(step, &self.start_strain, positions, add);
         for (v, x) in positions.iter().enumerate() {
             if self.inverse_masses[v] == S::ZERO {
                 continue;

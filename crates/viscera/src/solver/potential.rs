@@ -50,25 +50,35 @@ impl<S: Scalar> Tissue<S> {
         }
     }
 
+    /// Density [Pa] of the viscous part of the potential.
+    #[inline(always)]
+    fn viscous_energy(&self, change: &Voigt<S>) -> S {
+        self.viscosity_rate * green_strain::energy_density(change, self.lame_lambda, self.lame_mu)
+    }
+
+    /// Density [Pa] of the potential; `start` as in [`Tissue::respond`].
+    #[inline(always)]
+    fn potential(&self, f: &Mat3<S>, start: Option<&Voigt<S>>) -> S {
+        let viscous = start.map(|start| self.viscous_energy(&change_since(f, start)));
+        self.elastic_energy(f) + viscous.unwrap_or(S::ZERO)
+    }
+
     /// Energies and stress; `start` is the Green strain at the start of the step, where the tissue
     /// is viscous.
     #[inline(always)]
     pub fn respond(&self, f: &Mat3<S>, start: Option<&Voigt<S>>) -> Response<S> {
         let (lambda, mu) = (self.lame_lambda, self.lame_mu);
-        let strain = green_strain::strain(f);
         let piola = match self.model {
-            MaterialModel::SaintVenantKirchhoff => green_strain::piola(f, &strain, lambda, mu),
+            MaterialModel::SaintVenantKirchhoff => {
+                green_strain::piola(f, &green_strain::strain(f), lambda, mu)
+            }
             MaterialModel::StableNeoHookean => neo_hookean::piola(f, lambda, mu),
         };
         let elastic_energy = self.elastic_energy(f);
         let mut response = Response { elastic_energy, viscous_energy: S::ZERO, piola };
         if let Some(start) = start {
-            let mut change = strain;
-            for p in 0..6 {
-                change[p] -= start[p];
-            }
-            let energy = green_strain::energy_density(&change, lambda, mu);
-            response.viscous_energy = self.viscosity_rate * energy;
+            let change = change_since(f, start);
+            response.viscous_energy = self.viscous_energy(&change);
             let viscous = green_strain::piola(f, &change, lambda, mu);
             response.piola = response.piola + viscous * self.viscosity_rate;
         }
@@ -97,6 +107,16 @@ impl<S: Scalar> Tissue<S> {
         };
         elastic + self.viscosity_rate * stretch
     }
+}
+
+/// Change of the Green strain since the start of the step.
+#[inline(always)]
+fn change_since<S: Scalar>(f: &Mat3<S>, start: &Voigt<S>) -> Voigt<S> {
+    let mut change = green_strain::strain(f);
+    for p in 0..6 {
+        change[p] -= start[p];
+    }
+    change
 }
 
 /// The potential and what of it round-off can pretend.
@@ -157,20 +177,21 @@ pub(super) fn potential<S: Real>(
     Potential { value, noise: 4.0 * noise.sqrt() + 8.0 * f64::EPSILON * value.abs() }
 }
 
-/// Adds the stored energy [J] of tissue (without viscosity), springs and attachments at `x` to the
-/// part of the model in which it is stored.
-pub(super) fn add_stored_energy<S: Real>(
+/// Adds the potential [J] of tissue, springs and attachments at `x` to the part of the model to which
+/// it belongs.
+pub(super) fn add_inner_potential<S: Real>(
     step: &Step<'_, S>,
+    start_strain: &[Vec<Voigt<S>>; 2],
     x: &[Vec3<S>],
     mut add: impl FnMut(usize, f64),
 ) {
     let model = step.model;
     let mut store =
         |vertex: u32, energy: f64| add(model.component_of[vertex as usize] as usize, energy);
-    for set in model.tet_sets() {
+    for (set, strains) in model.tet_sets().into_iter().zip(start_strain) {
         for (tet, vertices) in set.vertices.iter().enumerate() {
             let f = deformation_gradient(&corners(x, *vertices), &set.inverse_rest_shape[tet]);
-            let density = tissue(model, set, tet, step.dt).elastic_energy(&f);
+            let density = tissue(model, set, tet, step.dt).potential(&f, strains.get(tet));
             store(vertices[0], (set.rest_volume[tet] * density).to_f64());
         }
     }
