@@ -8,6 +8,7 @@ use viscera::simulation::Simulation;
 use viscera::solver::Solver;
 use viscera::state::State;
 
+use super::memory::Memory;
 use super::path::Rest;
 use crate::reference::Reference;
 use crate::report::{percent, scientific};
@@ -72,9 +73,10 @@ pub fn compare(
     simulation: &Simulation<f64>,
     rest: &Rest,
     ours: &[Vec3<f64>],
+    memory: Memory,
 ) -> Result<Vec<(&'static str, String)>> {
     let model = simulation.model();
-    let mut reference = Reference::new(model);
+    let mut reference = Reference::new(model).allow_memory(memory.0);
     let pinned = reference.check_held(ours, &rest.inputs)?;
     let free: Vec<u32> = (0u32..).zip(&pinned).filter(|(_, p)| !**p).map(|(v, _)| v).collect();
     let distance =

@@ -53,10 +53,12 @@ pub struct RestArguments {
 
 const EXAMPLES: &str = "\
 Examples:
-  viscera-lab rest scenes/cantilever.toml                            the droop, and the force at the wall
-  viscera-lab rest scenes/liver_retraction.toml --compare            how far `viscera run` is from the truth
-  viscera-lab rest scenes/twist.toml --parts 48 --out out/twist.vtu  a long way in small parts
-  viscera-lab rest scenes/cantilever.toml --set body.bar.cells_across=8 --memory \"16 GB\"";
+  viscera-lab rest scenes/cantilever.toml            the droop, and the force at the wall
+  viscera-lab rest scenes/grab.toml --compare        how far `viscera run` is from the truth
+  viscera-lab rest scenes/twist.toml --parts 48 --out out/twist.vtu
+                                                     a long way, in small parts
+  viscera-lab rest scenes/cantilever.toml --set body.bar.cells_across=8 --memory \"16 GB\"
+                                                     a finer mesh";
 
 /// Carries out `viscera-lab rest`; `print` gets the text part by part.
 pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Result<()> {
@@ -76,8 +78,8 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
     print(&heading(&simulation))?;
     let (cost, seconds) = path.cost()?;
     print(&format!(
-        "reference: {} unknowns, {} entries in the matrix, {} in its factor; about {} and {} for \
-         {} of {} parts in which something changes\n",
+        "reference: {} unknowns, {} entries in the matrix, {} in its factor; about {} and {} \
+         for {} parts of {}; the others change nothing\n",
         cost.unknowns,
         cost.matrix_entries,
         cost.factor_entries,
@@ -110,7 +112,7 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
         print(&format!("state of rest: {}\n", out.display()))?;
     }
     if let Some(settled) = settled {
-        let rows = comparison::compare(&simulation, &rest, &settled?)?;
+        let rows = comparison::compare(&simulation, &rest, &settled?, arguments.memory)?;
         print(&format!("the library's solver after {frames} frames, against the reference:\n"))?;
         print(&lines(&rows))?;
     }
