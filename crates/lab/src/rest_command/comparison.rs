@@ -21,6 +21,9 @@ const SETTLING: f64 = 3.0;
 /// Farther than this share of the displacement is another place, no inaccuracy.
 const ELSEWHERE: f64 = 0.01;
 
+/// Rounding of positions in single precision, relative to their size, and of what adds up from it.
+const ROUNDING: f64 = 1e-6;
+
 /// How many frames the library computes for a scene.
 pub fn frame_count(scene: &Scene) -> u64 {
     scene.frame_count() + (SETTLING / scene.time.frame).ceil() as u64
@@ -83,12 +86,19 @@ pub fn compare(
         |from: &[Vec3<f64>]| Distance::new(&model.rest_positions, &rest.positions, from, &free);
     let Distance { rms, largest, stiffness } = distance(ours);
     let standing = reference.standing(ours, &rest.inputs)?;
-    let verdict = if rms <= ELSEWHERE {
+    // Where nothing moves, a share of the displacement says nothing: within the rounding of single
+    // precision two places are one.
+    let reach = rest.positions.iter().map(|x| x.length()).fold(0.0, f64::max);
+    let is_near = |from: &[Vec3<f64>]| {
+        let gap = from.iter().zip(&rest.positions).map(|(x, y)| (*x - *y).length());
+        distance(from).rms <= ELSEWHERE || gap.fold(0.0, f64::max) <= ROUNDING * reach
+    };
+    let verdict = if is_near(ours) {
         "the reference's state of rest".to_owned()
     } else {
         // Newton's method from there tells a state of rest of its own from one not yet reached.
         match reference.settle(ours, &rest.inputs) {
-            Ok(near) if distance(&near.positions).rms > ELSEWHERE => {
+            Ok(near) if !is_near(&near.positions) => {
                 let near = reference.standing(&near.positions, &rest.inputs)?;
                 let more = (near.potential - rest.standing.potential) * 1e3;
                 let how = if more > 0.0 { "above" } else { "below" };

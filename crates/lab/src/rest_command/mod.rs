@@ -77,16 +77,18 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
     }
     print(&heading(&simulation))?;
     let (cost, seconds) = path.cost()?;
+    let parts = match arguments.parts - path.len() as u32 {
+        0 => format!("{} parts", arguments.parts),
+        idle => format!("{} of {} parts; {idle} change nothing", path.len(), arguments.parts),
+    };
     print(&format!(
-        "reference: {} unknowns, {} entries in the matrix, {} in its factor; about {} and {} \
-         for {} parts of {}; the others change nothing\n",
+        "reference: {} unknowns, {} entries in the matrix, {} in its factor; about {} and {} for \
+         {parts}\n",
         cost.unknowns,
         cost.matrix_entries,
         cost.factor_entries,
         Memory(cost.bytes),
         si(seconds, "s"),
-        path.len(),
-        arguments.parts,
     ))?;
     path.check_memory(&cost)?;
 
@@ -106,7 +108,7 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
     let (rest, settled) = done?;
     let mut tets = Vec::new();
     measure_tets(simulation.model(), &rest.positions, &mut tets);
-    print(&describe(&simulation, &rest, &tets))?;
+    print(&describe(&simulation, &rest, &tets, arguments.parts))?;
     if let Some(out) = &arguments.out {
         write(&simulation, &rest, &tets, out)?;
         print(&format!("state of rest: {}\n", out.display()))?;
@@ -131,7 +133,7 @@ fn heading(simulation: &Simulation<f64>) -> String {
 }
 
 /// The state of rest in words.
-fn describe(simulation: &Simulation<f64>, rest: &Rest, tets: &[TetMeasure]) -> String {
+fn describe(simulation: &Simulation<f64>, rest: &Rest, tets: &[TetMeasure], parts: u32) -> String {
     let moved = measure_displacements(simulation.model(), &rest.positions, &mut Vec::new());
     let deformation = summarize_deformation(tets);
     let smallest = tets.iter().map(|tet| tet.volume_ratio).fold(f64::INFINITY, f64::min);
@@ -139,15 +141,23 @@ fn describe(simulation: &Simulation<f64>, rest: &Rest, tets: &[TetMeasure]) -> S
         true => "yes",
         false => "no: a saddle, from which a push leads elsewhere; try other --parts",
     };
+    let inverted = match deformation.inverted {
+        0 => "0".to_owned(),
+        count => format!(
+            "{count}; smaller parts may lead to another minimum, for example --parts {}",
+            parts.saturating_mul(4)
+        ),
+    };
+    let gradient = rest.standing.gradient;
     let mut text = format!("at rest at {:.3} s:\n", rest.time);
     text.push_str(&lines(&[
         ("largest displacement", si(moved, "m")),
         ("volume change", percent(deformation.volume_ratio - 1.0)),
         ("elastic energy", format!("{:.6} mJ", 1e3 * rest.standing.elastic_energy)),
         ("smallest volume ratio", format!("{smallest:.4}")),
-        ("inverted tetrahedra", deformation.inverted.to_string()),
+        ("inverted tetrahedra", inverted),
         ("Newton steps", rest.steps.to_string()),
-        ("|grad| / load", scientific(rest.relative_gradient())),
+        ("|grad| / load", format!("{} ({gradient:.1e} N)", scientific(rest.relative_gradient()))),
         ("minimum", minimum.to_owned()),
     ]));
     // More digits than a run has: Newton's method has them.
