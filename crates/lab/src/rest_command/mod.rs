@@ -78,6 +78,7 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
     print(&heading(&simulation))?;
     let (cost, seconds) = path.cost()?;
     let parts = match arguments.parts - path.len() as u32 {
+        0 if arguments.parts == 1 => "one part".to_owned(),
         0 => format!("{} parts", arguments.parts),
         idle => format!("{} of {} parts; {idle} change nothing", path.len(), arguments.parts),
     };
