@@ -136,13 +136,7 @@ impl Summary {
         }
         if let Some(last) = self.frames.last() {
             for patch in &last.report.patches {
-                let ([x, y, z], [a, b, c]) = (patch.force.map(unsigned_zero), patch.torque);
-                let (force, torque) = (x.hypot(y).hypot(z), a.hypot(b).hypot(c));
-                text.push_str(&format!(
-                    "{}: force {force:.4} N, as a vector ({x:.4}, {y:.4}, {z:.4}) N, torque \
-                     {torque:.4} N m\n",
-                    patch.name
-                ));
+                text.push_str(&format!("{patch:.4}\n"));
             }
             let (time, wall) = (last.report.time, self.wall_seconds());
             text.push_str(&format!(
@@ -165,11 +159,6 @@ fn materials(scene: &Scene) -> BTreeMap<String, String> {
         }
     }
     materials
-}
-
-/// A component of a force [N] as the table shows it: what rounds to zero has no sign.
-fn unsigned_zero(component: f64) -> f64 {
-    if component.abs() < 0.5e-4 { 0.0 } else { component }
 }
 
 /// A setting as a scene file writes it is JSON as well: a number, a truth value or a quoted word.

@@ -8,11 +8,13 @@
 //! | solve a step or a state of rest exactly | [`reference::Reference`] |
 //! | set up what the studies share | [`scenes`], [`settling`], [`motion`] |
 //! | compare the library with what must come out | [`validate`] |
+//! | ask the reference about a scene file | [`rest_command`] |
 //! | write reports with tables and plots | [`report`] |
 
 pub mod motion;
 pub mod reference;
 pub mod report;
+pub mod rest_command;
 pub mod scenes;
 pub mod settling;
 pub mod validate;

@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand};
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use viscera_lab::rest_command::{self, RestArguments};
 use viscera_lab::validate::{self, Options, SECTIONS};
 
 /// The truth beside the solver: studies that hold its claims against references.
@@ -20,12 +21,15 @@ const EXAMPLES: &str = "\
 Examples:
   viscera-lab validate
   viscera-lab validate --quick --out out/validation.md
-  viscera-lab validate --list";
+  viscera-lab validate --list
+  viscera-lab rest scenes/cantilever.toml --compare";
 
 #[derive(Subcommand)]
 enum Command {
     /// Compare the library with closed forms and the reference; write a report
     Validate(ValidateArguments),
+    /// Find the exact state of rest at the end of a scene with the Newton reference
+    Rest(RestArguments),
 }
 
 /// Compare the library with closed forms and the reference; write a report
@@ -65,6 +69,7 @@ fn section_names() -> PossibleValuesParser {
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Validate(arguments) => validate(arguments),
+        Command::Rest(arguments) => rest_command::run(&arguments, &print),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

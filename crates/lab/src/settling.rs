@@ -144,6 +144,43 @@ pub fn volume(scene: &Scene, positions: &[Vec3<f64>]) -> Result<(f64, usize)> {
     Ok((sum, inverted))
 }
 
+/// How far places are from the true ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distance {
+    /// Root mean square distance over root mean square displacement.
+    pub rms: f64,
+    /// Largest distance over largest displacement.
+    pub largest: f64,
+    /// Apparent stiffness: the true displacement over ours along it; 1 is right.
+    pub stiffness: f64,
+}
+
+impl Distance {
+    /// Over the vertices given, of positions [m], shape [vertex_count].
+    pub fn new(
+        rest: &[Vec3<f64>],
+        truth: &[Vec3<f64>],
+        positions: &[Vec3<f64>],
+        vertices: &[u32],
+    ) -> Self {
+        let (mut error, mut moved, mut along) = (0.0, 0.0, 0.0);
+        let (mut largest_error, mut largest_move) = (0.0f64, 0.0f64);
+        for v in vertices.iter().map(|&v| v as usize) {
+            let (exact, ours) = (truth[v] - rest[v], positions[v] - rest[v]);
+            error += (exact - ours).length_squared();
+            moved += exact.length_squared();
+            along += exact.dot(ours);
+            largest_error = largest_error.max((exact - ours).length());
+            largest_move = largest_move.max(exact.length());
+        }
+        Self {
+            rms: (error / moved).sqrt(),
+            largest: largest_error / largest_move,
+            stiffness: moved / along,
+        }
+    }
+}
+
 /// How far a settled state is from the truth.
 #[derive(Clone, Copy, Debug)]
 pub struct Error {
@@ -175,17 +212,8 @@ pub fn compare(scene: &Scene, truth: &Truth, positions: &[Vec3<f64>]) -> Result<
     let model = scene.model::<f64>(&SolverSettings::default())?;
     let reference = Reference::new(&model);
     let inputs = scene.inputs(f64::INFINITY);
-    let (mut error, mut moved, mut along) = (0.0, 0.0, 0.0);
-    let (mut largest_error, mut largest_move) = (0.0f64, 0.0f64);
-    for v in scene.free() {
-        let rest = scene.mesh.vertices()[v as usize];
-        let (exact, ours) = (truth.positions[v as usize] - rest, positions[v as usize] - rest);
-        error += (exact - ours).length_squared();
-        moved += exact.length_squared();
-        along += exact.dot(ours);
-        largest_error = largest_error.max((exact - ours).length());
-        largest_move = largest_move.max(exact.length());
-    }
+    let rest = scene.mesh.vertices();
+    let distance = Distance::new(rest, &truth.positions, positions, &scene.free());
     let finite = positions.iter().all(|x| x.is_finite());
     if !finite {
         let lost = f64::INFINITY;
@@ -203,9 +231,9 @@ pub fn compare(scene: &Scene, truth: &Truth, positions: &[Vec3<f64>]) -> Result<
     let reaction = truth.pin_forces.iter().map(|r| r.length_squared()).sum::<f64>().sqrt();
     let (volume, inverted) = volume(scene, positions)?;
     Ok(Error {
-        rms: (error / moved).sqrt(),
-        largest: largest_error / largest_move,
-        stiffness: moved / along,
+        rms: distance.rms,
+        largest: distance.largest,
+        stiffness: distance.stiffness,
         volume: volume / truth.volume - 1.0,
         gradient: standing.gradient / standing.load.max(reaction),
         energy: (standing.potential - truth.standing.potential) / truth.standing.elastic_energy,

@@ -211,11 +211,8 @@ impl Reference {
         start: &[Vec3<f64>],
         inputs: &Inputs<f64>,
     ) -> Result<Solution, ReferenceError> {
-        let pinned = self.check(start, inputs)?;
+        let pinned = self.check_held(start, inputs)?;
         let x = with_pins(start, inputs);
-        if let Some(loose) = fixing::find_loose(&self.problem, &pinned, &x) {
-            return Err(ReferenceError::Loose { vertex: loose.vertex, turns: loose.turns });
-        }
         self.minimise(pinned, x, inputs, Load::Forces(dead_loads(&self.problem, inputs)))
     }
 
@@ -291,6 +288,20 @@ impl Reference {
         let anchors = anchors(&self.problem, inputs);
         let gradient = Objective { problem: &self.problem, anchors, load }.gradient(x);
         Ok(inputs.pins.iter().map(|pin| gradient[pin.vertex as usize]).collect())
+    }
+
+    /// Fails where a solve would, for inputs that do not fit or bodies that nothing holds; tells
+    /// which vertices are pinned, shape [vertex_count]. Takes next to no time.
+    pub fn check_held(
+        &self,
+        start: &[Vec3<f64>],
+        inputs: &Inputs<f64>,
+    ) -> Result<Vec<bool>, ReferenceError> {
+        let pinned = self.check(start, inputs)?;
+        match fixing::find_loose(&self.problem, &pinned, &with_pins(start, inputs)) {
+            Some(fixing::Loose { vertex, turns }) => Err(ReferenceError::Loose { vertex, turns }),
+            None => Ok(pinned),
+        }
     }
 
     fn minimise(

@@ -120,6 +120,10 @@ pub fn minimise(
     }
     convergence.converged |= convergence.gradient <= tolerance.relative * start_gradient;
     let hessian = objective.hessian(x, pattern, false);
+    // Positions are stored to eps |x|, which the stiffness turns into this much of a gradient; where
+    // nothing acts there is no other, and no share of it can be asked for.
+    let noise = 4.0 * f64::EPSILON * hessian.largest_diagonal(pattern) * free_norm(pattern, x);
+    convergence.converged |= convergence.gradient <= noise;
     convergence.minimum = factorization.factorize(pattern, &hessian).is_ok();
     Ok(convergence)
 }

@@ -13,5 +13,6 @@ mod table;
 pub use axis::{Axis, Scale};
 pub use document::Document;
 pub use numbers::{percent, scientific, si};
+pub use output::{prepare_file, write_whole};
 pub use plot::{Plot, Series, Style};
 pub use table::Table;

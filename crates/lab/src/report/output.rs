@@ -27,16 +27,8 @@ impl Output {
         };
         let folder = document.with_extension("");
         fs::create_dir_all(&folder).map_err(|error| refused(&folder, &error))?;
-        let parent = match document.parent() {
-            Some(parent) if parent.as_os_str().is_empty() => Path::new("."),
-            Some(parent) => parent,
-            None => Path::new("."),
-        };
-        for place in [parent, &folder] {
-            let probe = place.join(".probe.part");
-            fs::write(&probe, b"")
-                .and_then(|()| fs::remove_file(&probe))
-                .map_err(|error| refused(place, &error))?;
+        for place in [folder_of(document), &folder] {
+            probe(place)?;
         }
         let folder_name = stem.to_owned();
         Ok(Self { document: document.to_owned(), folder, folder_name })
@@ -58,9 +50,9 @@ impl Output {
     /// report left and this one does not show.
     pub fn write(&self, text: &str, figures: &[(String, String)]) -> Result<()> {
         for (name, svg) in figures {
-            write_whole(&self.folder.join(format!("{name}.svg")), svg)?;
+            write_whole(&self.folder.join(format!("{name}.svg")), svg.as_bytes())?;
         }
-        write_whole(&self.document, text)?;
+        write_whole(&self.document, text.as_bytes())?;
         let is_shown = |path: &Path| {
             let stem = path.file_stem().and_then(|stem| stem.to_str());
             figures.iter().any(|(name, _)| Some(name.as_str()) == stem)
@@ -78,17 +70,41 @@ impl Output {
     }
 }
 
+/// Makes the folder of a single file and makes sure that it can be written to.
+pub fn prepare_file(file: &Path) -> Result<()> {
+    if file.is_dir() {
+        bail!("{} is a folder; name a file in it with --out", file.display());
+    }
+    let folder = folder_of(file);
+    fs::create_dir_all(folder).map_err(|error| refused(folder, &error))?;
+    probe(folder)
+}
+
+fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+fn probe(folder: &Path) -> Result<()> {
+    let probe = folder.join(".probe.part");
+    fs::write(&probe, b"")
+        .and_then(|()| fs::remove_file(&probe))
+        .map_err(|error| refused(folder, &error))
+}
+
 fn refused(place: &Path, error: &std::io::Error) -> anyhow::Error {
     anyhow::anyhow!("cannot write to {}: {error}; choose another file with --out", place.display())
 }
 
 /// Writes aside and renames, so that no reader ever meets a part of a file.
-fn write_whole(target: &Path, text: &str) -> Result<()> {
+pub fn write_whole(target: &Path, bytes: &[u8]) -> Result<()> {
     let mut part = target.as_os_str().to_owned();
     part.push(".part");
     let write = || -> std::io::Result<()> {
         let mut file = fs::File::create(&part)?;
-        file.write_all(text.as_bytes())?;
+        file.write_all(bytes)?;
         file.sync_data()?;
         fs::rename(&part, target)
     };

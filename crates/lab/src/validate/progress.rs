@@ -39,7 +39,7 @@ impl Progress {
     }
 
     /// Carries out a section and reports it.
-    pub(super) fn section<T>(&self, name: &str, run: impl FnOnce() -> T) -> T {
+    pub(crate) fn section<T>(&self, name: &str, run: impl FnOnce() -> T) -> T {
         let start = Instant::now();
         name.clone_into(&mut self.section.lock().unwrap_or_else(|e| e.into_inner()));
         let result = run();
@@ -49,7 +49,8 @@ impl Progress {
         result
     }
 
-    pub(super) fn finish(&self) {
+    /// Takes the bar away.
+    pub(crate) fn finish(&self) {
         self.bar.finish_and_clear();
     }
 

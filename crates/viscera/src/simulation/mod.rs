@@ -13,6 +13,7 @@ use crate::scene::Scene;
 use crate::solver::balance::ForceBalance;
 use crate::solver::{Inputs, Pin, Solver, StepError};
 use crate::state::State;
+use std::fmt;
 
 /// Why a frame could not be computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -58,6 +59,24 @@ pub struct PatchForce {
     pub torque: [f64; 3],
 }
 
+impl fmt::Display for PatchForce {
+    /// One line of a table, to four decimals unless a precision says otherwise.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let digits = f.precision().unwrap_or(4);
+        // What rounds to zero has no sign.
+        let smallest = (0..digits).fold(0.5, |smallest, _| 0.1 * smallest);
+        let unsigned = |component: f64| if component.abs() < smallest { 0.0 } else { component };
+        let ([x, y, z], [a, b, c]) = (self.force.map(unsigned), self.torque);
+        let (force, torque) = (x.hypot(y).hypot(z), a.hypot(b).hypot(c));
+        write!(
+            f,
+            "{}: force {force:.digits$} N, as a vector ({x:.digits$}, {y:.digits$}, {z:.digits$}) N, \
+             torque {torque:.digits$} N m",
+            self.name
+        )
+    }
+}
+
 /// The numbers of one frame.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct FrameReport {
@@ -99,18 +118,10 @@ impl<S: Real> Simulation<S> {
     /// Builds the model and takes the memory for its steps.
     pub fn new(scene: Scene, assembly: Assembly) -> Result<Self, ModelError> {
         let model = assembly.builder.build::<S>(&scene.solver)?;
-        let pins = assembly.fixings.iter().chain(&assembly.motions);
-        let forces = assembly.forces.iter().map(|patch| patch.vertices.len()).sum();
-        let inputs = Inputs {
-            gravity: scene.world.gravity.cast(),
-            pins: Vec::with_capacity(pins.map(|patch| patch.vertices.len()).sum()),
-            anchors: Vec::new(),
-            forces: Vec::with_capacity(forces),
-        };
         let mut simulation = Self {
             state: State::at_rest(&model),
             solver: Solver::new(&model, &scene.solver),
-            inputs,
+            inputs: inputs_at(&scene, &assembly, 0.0),
             balance: ForceBalance::default(),
             tets: Vec::with_capacity(model.tet_count()),
             frame: 0,
@@ -120,7 +131,6 @@ impl<S: Real> Simulation<S> {
             assembly,
         };
         measure_tets(&simulation.model, &simulation.state.positions, &mut simulation.tets);
-        simulation.act(0.0);
         Ok(simulation)
     }
 
@@ -167,7 +177,7 @@ impl<S: Real> Simulation<S> {
         let start = self.time();
         let rejected = self.solver.rejected_steps();
         for substep in 0..substeps {
-            self.act(start + f64::from(substep + 1) * dt);
+            act(&self.scene, &self.assembly, start + f64::from(substep + 1) * dt, &mut self.inputs);
             self.solver.step(&self.model, &mut self.state, &self.inputs, dt)?;
         }
         self.frame += 1;
@@ -205,81 +215,110 @@ impl<S: Real> Simulation<S> {
         }
     }
 
-    /// Puts what the scene does at a time [s] into the inputs.
-    fn act(&mut self, time: f64) {
-        let rest = self.assembly.builder.positions();
-        self.inputs.pins.clear();
-        for (fixing, patch) in self.scene.fixings.iter().zip(&self.assembly.fixings) {
-            if fixing.stiffness.is_none() {
-                let pins = patch.vertices.iter();
-                let pins = pins.map(|&v| Pin { vertex: v, target: rest[v as usize].cast() });
-                self.inputs.pins.extend(pins);
-            }
-        }
-        // Later pins win where patches overlap: a motion takes a fixed vertex along.
-        for (motion, patch) in self.scene.motions.iter().zip(&self.assembly.motions) {
-            if motion.is_held(time) {
-                let pose = motion.pose(time);
-                self.inputs.pins.extend(
-                    patch
-                        .vertices
-                        .iter()
-                        .map(|&v| Pin { vertex: v, target: pose.apply(rest[v as usize]).cast() }),
-                );
-            }
-        }
-        self.inputs.forces.clear();
-        for (force, patch) in self.scene.forces.iter().zip(&self.assembly.forces) {
-            let share = force.at(time) * (1.0 / patch.vertices.len() as f64);
-            self.inputs.forces.extend(patch.vertices.iter().map(|&v| (v, share.cast())));
-        }
+    /// What the scene does at a time [s].
+    pub fn inputs_at(&self, time: f64) -> Inputs<S> {
+        inputs_at(&self.scene, &self.assembly, time)
     }
 
     fn patch_forces(&self) -> Vec<PatchForce> {
-        let held = |v: u32| self.balance.residual.get(v as usize).copied().unwrap_or_default();
+        let positions: Vec<_> = self.state.positions.iter().map(|x| x.cast()).collect();
+        self.patch_forces_at(self.time(), &positions, &self.balance.residual)
+    }
+
+    /// Forces on the scene's patches at a time [s], for a caller with a state of its own:
+    /// `positions` [m], and the forces `holding` [N] by which held vertices are held where they are,
+    /// both of shape [vertex_count].
+    pub fn patch_forces_at(
+        &self,
+        time: f64,
+        positions: &[Vec3<f64>],
+        holding: &[Vec3<f64>],
+    ) -> Vec<PatchForce> {
+        let (scene, assembly) = (&self.scene, &self.assembly);
+        let rest = assembly.builder.positions();
+        let position = |v: u32| positions.get(v as usize).copied().unwrap_or(rest[v as usize]);
+        let held = |v: u32| holding.get(v as usize).copied().unwrap_or_default();
         let mut forces = Vec::new();
-        for (fixing, patch) in self.scene.fixings.iter().zip(&self.assembly.fixings) {
+        for (fixing, patch) in scene.fixings.iter().zip(&assembly.fixings) {
             let share = fixing.stiffness.map(|total| total / patch.vertices.len() as f64);
             let on_vertex = |v: u32| match share {
                 None => held(v),
-                Some(stiffness) => {
-                    let rest = self.assembly.builder.positions()[v as usize];
-                    (rest - self.state.positions[v as usize].cast()) * stiffness
-                }
+                Some(stiffness) => (rest[v as usize] - position(v)) * stiffness,
             };
-            forces.push(self.sum(&fixing.name, PatchKind::Fixing, patch, on_vertex));
+            forces.push(sum(&fixing.name, PatchKind::Fixing, patch, position, on_vertex));
         }
-        for (motion, patch) in self.scene.motions.iter().zip(&self.assembly.motions) {
-            let is_held = motion.is_held(self.time());
+        for (motion, patch) in scene.motions.iter().zip(&assembly.motions) {
+            let is_held = motion.is_held(time);
             let on_vertex = |v: u32| if is_held { held(v) } else { Vec3::ZERO };
-            forces.push(self.sum(&motion.name, PatchKind::Motion, patch, on_vertex));
+            forces.push(sum(&motion.name, PatchKind::Motion, patch, position, on_vertex));
         }
-        for (force, patch) in self.scene.forces.iter().zip(&self.assembly.forces) {
-            let share = force.at(self.time()) * (1.0 / patch.vertices.len() as f64);
-            forces.push(self.sum(&force.name, PatchKind::Force, patch, |_| share));
+        for (force, patch) in scene.forces.iter().zip(&assembly.forces) {
+            let share = force.at(time) * (1.0 / patch.vertices.len() as f64);
+            forces.push(sum(&force.name, PatchKind::Force, patch, position, |_| share));
         }
         forces
     }
+}
 
-    /// Adds up forces [N] on the vertices of a patch, and their torque about its middle.
-    fn sum(
-        &self,
-        name: &str,
-        kind: PatchKind,
-        patch: &ResolvedPatch,
-        on_vertex: impl Fn(u32) -> Vec3<f64>,
-    ) -> PatchForce {
-        let position = |v: u32| self.state.positions[v as usize].cast::<f64>();
-        let mut middle = Vec3::<f64>::ZERO;
-        for &v in &patch.vertices {
-            middle += position(v) * (1.0 / patch.vertices.len() as f64);
+/// What a scene does at a time [s], with room for what it does at any other.
+fn inputs_at<S: Real>(scene: &Scene, assembly: &Assembly, time: f64) -> Inputs<S> {
+    let count = |patches: &[ResolvedPatch]| -> usize {
+        patches.iter().map(|patch| patch.vertices.len()).sum()
+    };
+    let mut inputs = Inputs {
+        gravity: scene.world.gravity.cast(),
+        pins: Vec::with_capacity(count(&assembly.fixings) + count(&assembly.motions)),
+        anchors: Vec::new(),
+        forces: Vec::with_capacity(count(&assembly.forces)),
+    };
+    act(scene, assembly, time, &mut inputs);
+    inputs
+}
+
+/// Puts what a scene does at a time [s] into the inputs; takes no memory where they have room.
+fn act<S: Real>(scene: &Scene, assembly: &Assembly, time: f64, inputs: &mut Inputs<S>) {
+    let rest = assembly.builder.positions();
+    inputs.pins.clear();
+    for (fixing, patch) in scene.fixings.iter().zip(&assembly.fixings) {
+        if fixing.stiffness.is_none() {
+            let pins = patch.vertices.iter();
+            let pins = pins.map(|&v| Pin { vertex: v, target: rest[v as usize].cast() });
+            inputs.pins.extend(pins);
         }
-        let (mut force, mut torque) = (Vec3::ZERO, Vec3::ZERO);
-        for &v in &patch.vertices {
-            force += on_vertex(v);
-            torque += (position(v) - middle).cross(on_vertex(v));
-        }
-        let (force, torque) = (force.to_array(), torque.to_array());
-        PatchForce { name: name.to_owned(), kind, force, torque }
     }
+    // Later pins win where patches overlap: a motion takes a fixed vertex along.
+    for (motion, patch) in scene.motions.iter().zip(&assembly.motions) {
+        if motion.is_held(time) {
+            let pose = motion.pose(time);
+            let pins = patch.vertices.iter();
+            let target = |v: u32| pose.apply(rest[v as usize]).cast();
+            inputs.pins.extend(pins.map(|&v| Pin { vertex: v, target: target(v) }));
+        }
+    }
+    inputs.forces.clear();
+    for (force, patch) in scene.forces.iter().zip(&assembly.forces) {
+        let share = force.at(time) * (1.0 / patch.vertices.len() as f64);
+        inputs.forces.extend(patch.vertices.iter().map(|&v| (v, share.cast())));
+    }
+}
+
+/// Adds up forces [N] on the vertices of a patch, and their torque about its middle.
+fn sum(
+    name: &str,
+    kind: PatchKind,
+    patch: &ResolvedPatch,
+    position: impl Fn(u32) -> Vec3<f64>,
+    on_vertex: impl Fn(u32) -> Vec3<f64>,
+) -> PatchForce {
+    let mut middle = Vec3::<f64>::ZERO;
+    for &v in &patch.vertices {
+        middle += position(v) * (1.0 / patch.vertices.len() as f64);
+    }
+    let (mut force, mut torque) = (Vec3::ZERO, Vec3::ZERO);
+    for &v in &patch.vertices {
+        force += on_vertex(v);
+        torque += (position(v) - middle).cross(on_vertex(v));
+    }
+    let (force, torque) = (force.to_array(), torque.to_array());
+    PatchForce { name: name.to_owned(), kind, force, torque }
 }
