@@ -112,8 +112,10 @@ fn groups(quick: bool) -> Vec<Group> {
         cases
     };
     let mut groups = Vec::new();
+    let ends: Vec<_> = all.iter().copied().filter(|&(young, _)| young != 2e4).collect();
     for form in [Form::Colored, Form::Clique, Form::Jacobi] {
-        let cases = grid(form, size, SNH, all, false, PER_FRAME);
+        let tissues = if form == Form::Colored { all } else { &ends };
+        let cases = grid(form, size, SNH, tissues, false, PER_FRAME);
         groups.push(Group { title: form.name(), cases });
     }
     let cases = grid(Form::Colored, size, SNH, all, false, DEFAULT);
