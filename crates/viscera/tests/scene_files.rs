@@ -179,7 +179,7 @@ fn defaults_are_those_declared() {
     let solver = SolverSettings::default();
     assert_eq!((solver.substeps, solver.iterations), (10, 2));
     assert_eq!((solver.precision, solver.colors), (Precision::F32, Colors::Unlimited));
-    assert_eq!((solver.start, solver.anderson_guard), (Start::Auto, AndersonGuard::Energy));
+    assert_eq!((solver.start, solver.anderson_guard), (Start::Auto, AndersonGuard::Residual));
     let text = "[[body]]\nname = \"a\"\nshape = \"liver\"\nmaterial = { preset = \"liver\" }";
     let scene = Scene::parse("small.toml", text, &[]).unwrap();
     assert_eq!(scene.solver, solver);

@@ -4,7 +4,7 @@ use std::fmt;
 
 use anyhow::Result;
 use viscera::material::MaterialModel;
-use viscera::settings::{Acceleration, SolverSettings};
+use viscera::settings::{Acceleration, AndersonGuard, SolverSettings};
 
 use super::methods::{Form, scheduled};
 use super::{Context, Section};
@@ -25,21 +25,26 @@ struct Schedule {
     form: Form,
     substeps: u32,
     iterations: u32,
-    anderson: bool,
+    anderson: Option<AndersonGuard>,
     published: bool,
     /// The largest error that is asked for.
     limit: Option<f64>,
 }
 
 const fn schedule(form: Form, substeps: u32, iterations: u32) -> Schedule {
-    Schedule { form, substeps, iterations, anderson: false, published: false, limit: None }
+    Schedule { form, substeps, iterations, anderson: None, published: false, limit: None }
 }
 
-const SCHEDULES: [Schedule; 10] = [
+const SCHEDULES: [Schedule; 11] = [
     Schedule { limit: Some(0.03), ..schedule(Form::Colored, 4, 5) },
     schedule(Form::Colored, 10, 2),
     schedule(Form::Colored, 1, 20),
-    Schedule { anderson: true, limit: Some(0.02), ..schedule(Form::Colored, 1, 20) },
+    Schedule {
+        anderson: Some(AndersonGuard::Energy),
+        limit: Some(0.02),
+        ..schedule(Form::Colored, 1, 20)
+    },
+    Schedule { anderson: Some(AndersonGuard::Residual), ..schedule(Form::Colored, 1, 20) },
     schedule(Form::Colored, 4, 20),
     schedule(Form::Clique, 4, 5),
     schedule(Form::Clique, 4, 20),
@@ -52,8 +57,10 @@ impl fmt::Display for Schedule {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { form, substeps, iterations, anderson, published, .. } = self;
         write!(f, "{}, {substeps} x {iterations}", form.name())?;
-        if *anderson {
-            f.write_str(", Anderson")?;
+        match anderson {
+            None => {}
+            Some(AndersonGuard::Energy) => f.write_str(", Anderson guarded by energy")?,
+            Some(_) => f.write_str(", Anderson")?,
         }
         if *published {
             f.write_str(", XPBD as published")?;
@@ -76,7 +83,7 @@ impl fmt::Display for Case {
 
 fn cases(quick: bool) -> Vec<Case> {
     let of = |schedule| YOUNGS.map(|young| Case { young, schedule });
-    let kept = if quick { 4 } else { SCHEDULES.len() };
+    let kept = if quick { 5 } else { SCHEDULES.len() };
     SCHEDULES[..kept].iter().flat_map(|&schedule| of(schedule)).collect()
 }
 
@@ -88,9 +95,10 @@ fn answer(case: &Case) -> Result<Vec<f64>> {
     let material = tissue(MaterialModel::StableNeoHookean, case.young, POISSON)?;
     let scene = Scene::new("cantilever", Size::Small, material)?;
     let Schedule { form, substeps, iterations, anderson, published, .. } = case.schedule;
-    let acceleration = if anderson { Acceleration::Anderson } else { Acceleration::None };
+    let acceleration = anderson.map_or(Acceleration::None, |_| Acceleration::Anderson);
     let settings = SolverSettings {
         acceleration,
+        anderson_guard: anderson.unwrap_or(AndersonGuard::Residual),
         rebase: !published,
         keep_multipliers: !published,
         ..scheduled(form, substeps, iterations)

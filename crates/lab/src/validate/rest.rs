@@ -132,9 +132,12 @@ fn groups(quick: bool) -> Vec<Group> {
     let cases = grid(Form::Colored, size, STVK, green, false, PER_FRAME);
     groups.push(Group { title: "coloured, Saint Venant-Kirchhoff", cases });
     let some = &[(3e3, 0.3), (3e3, 0.49), (1e5, 0.3), (1e5, 0.49)];
-    let mut cases = grid(Form::Colored, size, SNH, some, false, ACCELERATED);
-    cases.iter_mut().for_each(|case| case.anderson = true);
-    groups.push(Group { title: "coloured, Anderson", cases });
+    for (form, title) in [(Form::Colored, "coloured, Anderson"), (Form::Jacobi, "Jacobi, Anderson")]
+    {
+        let mut cases = grid(form, size, SNH, some, false, ACCELERATED);
+        cases.iter_mut().for_each(|case| case.anderson = true);
+        groups.push(Group { title, cases });
+    }
     let cases = grid(Form::Colored, size, SNH, some, true, PER_FRAME);
     groups.push(Group { title: "coloured, single precision", cases });
     groups
@@ -208,7 +211,7 @@ fn worst(cases: &[Case], answers: &[Answer], budget: (u32, u32)) -> Worst {
                 worst.other_minima += 1;
                 continue;
             }
-            if !(outcome.error.rms <= worst.rms) {
+            if outcome.error.rms > worst.rms || outcome.error.rms.is_nan() {
                 worst.case = case.to_string();
             }
             worst.rms = worse(worst.rms, outcome.error.rms);
@@ -292,7 +295,11 @@ fn far(context: &mut Context, groups: &[Group], grids: &[Vec<Answer>]) {
     for (case, answer) in
         groups.iter().zip(grids).flat_map(|(g, answers)| g.cases.iter().zip(answers))
     {
-        for outcome in answer.outcomes.iter().filter(|outcome| !(outcome.error.rms < FAR)) {
+        for outcome in answer
+            .outcomes
+            .iter()
+            .filter(|outcome| outcome.error.rms >= FAR || outcome.error.rms.is_nan())
+        {
             count += 1;
             table.row([
                 case.to_string(),

@@ -141,7 +141,7 @@ fn answer(case: &Case) -> Result<Answer> {
     answer.is_finite = state.is_finite();
     for tet in scene.mesh.tets() {
         let corners = tet.map(|v| state.positions[v as usize]);
-        answer.inverted += usize::from(!(tet_volume(corners) > 0.0));
+        answer.inverted += usize::from(tet_volume(corners) <= 0.0 || !state.is_finite());
     }
     Ok(answer)
 }

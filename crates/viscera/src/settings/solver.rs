@@ -136,10 +136,12 @@ settings_table! {
         /// The unknowns that Anderson mixes.
         anderson_on: AndersonOn = (AndersonOn::Both), one_of::<AndersonOn>();
         /// What keeps Anderson's mixtures in bounds. Without it a bad mixture can throw a strongly
-        /// deformed body. "residual" restarts on a grown residual, which bounds no energy;
-        /// "energy" takes no mixture that raises the incremental potential, for one to two
-        /// evaluations of it per sweep, and acts with `step_guard` (without it as "residual").
-        anderson_guard: AndersonGuard = (AndersonGuard::Energy), one_of::<AndersonGuard>();
+        /// deformed body. "residual" restarts on a grown residual, which bounds no energy (`step_guard`
+        /// does that for the whole step); "energy" takes no mixture that raises the incremental
+        /// potential, for one to two evaluations of it per sweep: fewer steps are taken back, but with
+        /// few colours stiff tissue may stay far from its rest. It acts with `step_guard` (without it
+        /// as "residual").
+        anderson_guard: AndersonGuard = (AndersonGuard::Residual), one_of::<AndersonGuard>();
         /// Stabilised rebase before each sweep: positions are pulled back onto the multipliers,
         /// so that the iteration converges to implicit Euler exactly. One more pass over the
         /// tetrahedra per sweep. Turn it off together with `keep_multipliers` for XPBD as
