@@ -20,7 +20,7 @@ struct Arguments {
 const EXAMPLES: &str = "\
 Examples:
   viscera-lab validate
-  viscera-lab validate --quick --out out/validation.md
+  viscera-lab validate --quick
   viscera-lab validate --list
   viscera-lab rest scenes/cantilever.toml --compare";
 
@@ -44,9 +44,10 @@ struct ValidateArguments {
     /// Take fewer cases and smaller meshes
     #[arg(long)]
     quick: bool,
-    /// The report; figures go to the folder of the same name without `.md`
-    #[arg(long, value_name = "FILE", default_value = "docs/validation.md")]
-    out: PathBuf,
+    /// The report [default: docs/validation.md; with --quick or --only out/validation.md]; figures go
+    /// to the folder of the same name without `.md`
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
     /// Run these sections only, separated by commas; the report then has no others
     #[arg(long, value_name = "SECTION,...", value_delimiter = ',', value_parser = section_names())]
     only: Vec<String>,
@@ -58,7 +59,7 @@ struct ValidateArguments {
 const VALIDATE_EXAMPLES: &str = "\
 Examples:
   viscera-lab validate                                    everything, to docs/validation.md
-  viscera-lab validate --quick --out out/validation.md    a first look
+  viscera-lab validate --quick                            a first look, to out/validation.md
   viscera-lab validate --only patch --out out/patch.md    one section, to out/patch.md and out/patch/
   viscera-lab validate --list                             the names of all sections";
 
@@ -84,7 +85,10 @@ fn validate(ValidateArguments { quick, out, only, list }: ValidateArguments) -> 
     if list {
         return print(&validate::list().to_text());
     }
-    let options = Options { out, quick, only };
+    // A partial report must not take the place of the whole one.
+    let partial = quick || !only.is_empty();
+    let usual = if partial { "out/validation.md" } else { "docs/validation.md" };
+    let options = Options { out: out.unwrap_or_else(|| usual.into()), quick, only };
     let outcome = validate::run(&options)?;
     let (met, all) = (outcome.met_count(), outcome.verdicts.len());
     let table = outcome.table().to_text();

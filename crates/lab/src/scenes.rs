@@ -10,7 +10,7 @@
 
 use std::fmt;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
 use viscera::mesh::shapes::{self, Block, Splitting};
@@ -163,7 +163,7 @@ impl Scene {
                 scene.path = Path::Shift(vec3(0.0, 0.0, -0.012));
                 scene.path_frames = 6;
             }
-            _ => {
+            "organ" => {
                 let spacing = match size {
                     Size::Tiny => 0.06,
                     Size::Small => 0.04,
@@ -175,6 +175,7 @@ impl Scene {
                 scene.path = Path::Shift(vec3(0.0, 0.0, 0.05));
                 scene.path_frames = 12;
             }
+            _ => bail!("there is no scene `{name}`; there are {}", NAMES.join(", ")),
         }
         Ok(scene)
     }

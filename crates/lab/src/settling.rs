@@ -114,7 +114,8 @@ pub fn truth_in_parts(scene: &Scene, path_parts: u32) -> Result<Truth> {
     let mut reference = Reference::new(&model);
     let mut positions = model.rest_positions.clone();
     let mut minimum = false;
-    let parts = if scene.driven.is_empty() { 1 } else { path_parts };
+    let moves = !scene.driven.is_empty() || scene.holds.iter().any(|hold| hold.driven);
+    let parts = if moves { path_parts } else { 1 };
     for part in 1..=parts {
         let share = f64::from(part) / f64::from(parts);
         let inputs = scene.inputs(share * f64::from(scene.path_frames));

@@ -469,3 +469,18 @@ fn bad_inputs_are_refused() {
         assert!(matches!(stepped, Err(ReferenceError::NotFinite { what: "step" })), "{dt}");
     }
 }
+
+/// Green strain compressed everywhere below 1/sqrt 3 curves downwards in all directions: what is left
+/// after projection is nothing at all, and the search must still end.
+#[test]
+fn crushed_green_strain_ends_in_an_answer() {
+    let mesh = block([1, 1, 1]);
+    let model = body(&mesh, &material(STVK, 1e4, 0.3));
+    let half: Vec<_> = mesh.vertices().iter().map(|x| *x * 0.5).collect();
+    let pins = (0..7).map(|v| Pin { vertex: v, target: half[v as usize] }).collect();
+    let inputs = Inputs { pins, ..Inputs::default() };
+    match Reference::new(&model).settle(&half, &inputs) {
+        Ok(solution) => assert!(solution.convergence.converged),
+        Err(error) => println!("{error}"),
+    }
+}

@@ -9,7 +9,7 @@ use std::cell::Cell;
 use common::everything;
 use viscera::scalar::{Real, vec3};
 use viscera::scene::Scene;
-use viscera::settings::{Acceleration, AndersonOn, Colors, SolverSettings};
+use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, Colors, SolverSettings};
 use viscera::simulation::{Assembly, Simulation};
 use viscera::solver::balance::ForceBalance;
 use viscera::solver::{Inputs, Pin, Solver};
@@ -79,6 +79,9 @@ fn accelerations() -> Vec<SolverSettings> {
         let acceleration = Acceleration::Anderson;
         all.push(SolverSettings { acceleration, anderson_on, ..plain.clone() });
     }
+    // Enough sweeps for mixtures that raise the potential.
+    let (acceleration, anderson_guard) = (Acceleration::Anderson, AndersonGuard::Energy);
+    all.push(SolverSettings { acceleration, anderson_guard, iterations: 8, ..plain });
     all
 }
 

@@ -79,12 +79,12 @@ impl Reference {
             }
             mode = Mode { omega: next.sqrt(), shape };
             if (next - squared).abs() <= RELATIVE * next {
-                break;
+                self.analysis = Some(analysis);
+                return Ok(mode);
             }
             squared = next;
         }
-        self.analysis = Some(analysis);
-        Ok(mode)
+        Err(ReferenceError::NoMode { steps: STEPS })
     }
 }
 

@@ -99,6 +99,15 @@ pub enum ReferenceError {
     /// Quadratic tetrahedra have no lumped masses.
     #[error("quadratic tetrahedra have no lumped masses: only `settle` is defined for them")]
     NoStep,
+    /// Inverse iteration came to no mode.
+    #[error(
+        "no slowest oscillation after {steps} steps: nothing is free to move, or two are equally slow; \
+         begin with another direction"
+    )]
+    NoMode {
+        /// Steps done.
+        steps: u32,
+    },
     /// Newton's method came to no minimum.
     #[error(
         "Newton's method stopped after {steps} steps with a gradient of {gradient:.1e} N, {:.1e} of \
@@ -180,12 +189,6 @@ impl Reference {
         Self { problem, tolerance, memory: DEFAULT_MEMORY, lumped, analysis: None }
     }
 
-    /// Changes the tolerance.
-    pub fn with_tolerance(mut self, tolerance: Tolerance) -> Self {
-        self.tolerance = tolerance;
-        self
-    }
-
     /// Changes how much memory [B] may be taken.
     pub fn allow_memory(mut self, bytes: u64) -> Self {
         self.memory = bytes;
@@ -234,6 +237,9 @@ impl Reference {
         if state.velocities.len() != expected {
             let (what, given) = ("list of velocities", state.velocities.len());
             return Err(ReferenceError::Mismatch { what, given, expected });
+        }
+        if !state.velocities.iter().all(|v| v.is_finite()) {
+            return Err(ReferenceError::NotFinite { what: "velocities" });
         }
         let loads = dead_loads(&self.problem, inputs);
         let mut predicted = state.positions.clone();

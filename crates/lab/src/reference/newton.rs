@@ -24,6 +24,9 @@ const HALVINGS: u32 = 40;
 /// factorised; ten times more each time.
 const FIRST_SHIFT: f64 = 1e-12;
 
+/// As often: up to a thousand times the entry.
+const SHIFTS: i32 = 17;
+
 /// How far to go.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
@@ -135,28 +138,29 @@ fn factorize(
     factorization: &mut Factorization,
     x: &[Vec3<f64>],
 ) -> Result<bool, FactorError> {
-    match factorization.factorize(pattern, &objective.hessian(x, pattern, false)) {
+    let exact = objective.hessian(x, pattern, false);
+    match factorization.factorize(pattern, &exact) {
         Ok(()) => return Ok(true),
         Err(FactorError::TooLarge) => return Err(FactorError::TooLarge),
         Err(FactorError::Indefinite) => {}
     }
     let mut matrix = objective.hessian(x, pattern, true);
-    let mut shift = 0.0f64;
-    loop {
+    // The exact matrix's, because everywhere compressed tissue may have nothing positive at all.
+    let scale = exact.largest_diagonal(pattern);
+    let mut shift = 0.0;
+    for step in 0..SHIFTS {
         match factorization.factorize(pattern, &matrix) {
             Ok(()) => return Ok(false),
-            // A matrix without numbers has no finite shift either: the caller's positions are none.
-            Err(error) if error == FactorError::TooLarge || shift.is_nan() || shift >= 1e12 => {
-                return Err(error);
-            }
-            Err(_) => {
-                let scale = matrix.largest_diagonal(pattern);
-                let next = if shift == 0.0 { FIRST_SHIFT * scale } else { 10.0 * shift };
+            Err(FactorError::TooLarge) => return Err(FactorError::TooLarge),
+            Err(FactorError::Indefinite) => {
+                let next = scale * FIRST_SHIFT * 10f64.powi(step);
                 matrix.shift(pattern, next - shift);
                 shift = next;
             }
         }
     }
+    // Not even a multiple of the identity helps: there are no numbers in it.
+    Err(FactorError::Indefinite)
 }
 
 /// Euclidean norm [N] over free vertices.

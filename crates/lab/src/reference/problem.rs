@@ -5,7 +5,7 @@
 //! is the same for both.
 
 use viscera::elements::shape_gradients;
-use viscera::material::{Material, MaterialModel};
+use viscera::material::Material;
 use viscera::mesh::TetMesh;
 use viscera::model::Model;
 use viscera::scalar::{Mat3, Vec3};
@@ -206,12 +206,6 @@ impl Problem {
     /// Number of nodes.
     pub fn vertex_count(&self) -> usize {
         self.rest_positions.len()
-    }
-
-    /// True where any tissue has the given energy.
-    pub fn has(&self, model: MaterialModel) -> bool {
-        let used = self.linear.tissue.iter().chain(&self.quadratic.tissue);
-        used.into_iter().any(|&tissue| self.tissues[tissue as usize].model == model)
     }
 
     /// Pairs and larger groups of nodes that act on each other: tetrahedra, then springs.

@@ -109,11 +109,16 @@ pub fn compare(
         }
     };
     Ok(vec![
-        ("rms error", percent(rms)),
-        ("largest error", percent(largest)),
-        ("apparent stiffness", format!("{stiffness:.5}")),
+        ("rms error", moved(rms, percent)),
+        ("largest error", moved(largest, percent)),
+        ("apparent stiffness", moved(stiffness, |s| format!("{s:.5}"))),
         ("|grad| / load, library", scientific(standing.gradient / rest.load())),
         ("|grad| / load, reference", scientific(rest.relative_gradient())),
         ("the library is at", verdict),
     ])
+}
+
+/// A ratio to the displacement; where nothing is displaced there is none.
+fn moved(ratio: f64, shown: impl Fn(f64) -> String) -> String {
+    if ratio.is_finite() { shown(ratio) } else { "nothing moves".to_owned() }
 }

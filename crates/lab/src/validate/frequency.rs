@@ -21,7 +21,7 @@
 use std::f64::consts::PI;
 use std::fmt;
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result, bail};
 use viscera::material::MaterialModel;
 use viscera::mesh::shapes::Block;
 use viscera::scalar::{Real, Vec3, vec3};
@@ -285,9 +285,8 @@ fn plot(context: &mut Context, cases: &[Case], motions: &[Motion], omega: f64) -
     growth.reference(1.0, "implicit Euler");
     context.document.paragraph(
         "With too few iterations for the step, the multipliers trail behind the motion: it becomes \
-         slow and keeps more of its amplitude than implicit Euler leaves. Where `left per period` is \
-         above 1 the swing even grows. Rest does not depend on that; more substeps mend it at the \
-         same work.",
+         slow and keeps another share of its amplitude than implicit Euler leaves. Rest does not \
+         depend on that; more substeps mend it at the same work.",
     );
     context.document.figure("frequency-error", &error)?;
     context.document.figure("frequency-amplitude", &growth)
@@ -324,8 +323,8 @@ fn stiffer(context: &mut Context) -> Result<()> {
         "The same release with {substeps} substeps of {iterations} iterations and other stiffnesses. \
          `(E/rho) (h/edge)^2`, with the edge of a cell, is the square of how many cells a wave along \
          the bar passes in a substep. Where it is large for the number of iterations, an undamped \
-         small swing keeps too much of its amplitude, or grows (`left per period` above 1): take more \
-         substeps, which lower it by their square.",
+         small swing keeps too much of its amplitude: take more substeps, which lower it by their \
+         square.",
     ));
     context.document.table(&table);
     Ok(())
@@ -410,8 +409,7 @@ fn measure(q: &[f64], dt: f64) -> Result<Motion> {
         }
     }
     let (&[first, .., last], &[_, first_peak, .., last_peak]) = (&crossings[..], &peaks[..]) else {
-        ensure!(false, "the bar does not swing");
-        unreachable!()
+        bail!("the bar does not swing");
     };
     let half_periods = (crossings.len() - 1) as f64;
     let left = libm::pow(last_peak / first_peak, 2.0 / (peaks.len() - 2) as f64);

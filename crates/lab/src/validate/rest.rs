@@ -42,8 +42,16 @@ struct Case {
 
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { scene, young, poisson, form, .. } = self;
-        write!(f, "{scene}, {} kPa, nu {poisson}, {}", young / 1e3, form.name())
+        let Self { scene, size, model, young, poisson, form, anderson, single, .. } = self;
+        let (law, form) = (model_name(*model), form.name());
+        write!(f, "{scene} ({size:?}), {law}, {} kPa, nu {poisson}, {form}", young / 1e3)?;
+        if *anderson {
+            f.write_str(", Anderson")?;
+        }
+        if *single {
+            f.write_str(", single precision")?;
+        }
+        Ok(())
     }
 }
 
@@ -272,8 +280,8 @@ fn run(context: &mut Context) -> Result<()> {
     context.document.paragraph(
         "Left out are bodies whose reference has tetrahedra inside out (Saint Venant-Kirchhoff under \
          strong compression): Green strain has more than one minimum there. A state that is in balance \
-         yet elsewhere would be counted as another minimum; there is none unless the verdicts say so. In single precision positions are \
-         stored to 6e-8 of the body's size, which is the floor that its rows show.",
+         yet elsewhere is counted as another minimum, and its verdict says so. In single precision \
+         positions are stored to 6e-8 of the body's size, which is the floor that its rows show.",
     );
     far(context, &groups, &grids);
     plot(context, &groups, &grids)
@@ -367,7 +375,10 @@ fn plot(context: &mut Context, groups: &[Group], grids: &[Vec<Answer>]) -> Resul
         let points = group.cases.iter().zip(answers).flat_map(|(case, answer)| {
             let x = case.young / 1e3 * (1.0 + (case.poisson - 0.3));
             let few = answer.outcomes.iter().filter(|outcome| outcome.budget == (1, 5));
-            few.map(move |outcome| [x, outcome.error.rms.max(FLOOR)]).collect::<Vec<_>>()
+            few.map(move |outcome| {
+                [x, if outcome.error.rms < FLOOR { FLOOR } else { outcome.error.rms }]
+            })
+            .collect::<Vec<_>>()
         });
         plot.series(Series::new(group.title, points).with_style(Style::Markers));
     }
@@ -377,8 +388,8 @@ fn plot(context: &mut Context, groups: &[Group], grids: &[Vec<Answer>]) -> Resul
     let (least, most) = (sizes.iter().min().copied(), sizes.iter().max().copied());
     context.document.paragraph(format!(
         "Bodies have {} to {} tetrahedra. One point per body; {} law in all three. Five sweeps of one \
-         colour are too few for stiff, nearly incompressible tissue: there the guard takes nearly every \
-         step back and the body creeps.",
+         colour are too few for stiff, nearly incompressible tissue: the table above says how many of \
+         its steps the guard takes back.",
         least.unwrap_or(0),
         most.unwrap_or(0),
         model_name(SNH),

@@ -51,7 +51,8 @@ impl fmt::Display for Case {
             Kind::Grab => "violent grab",
             Kind::Scramble => "scramble",
         };
-        write!(f, "{kind} {}", self.seed)
+        let acceleration = if self.anderson { ", Anderson" } else { "" };
+        write!(f, "{kind} {}, {}{acceleration}", self.seed, self.form.name())
     }
 }
 

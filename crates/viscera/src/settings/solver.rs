@@ -156,8 +156,9 @@ settings_table! {
         /// Keep the multipliers from step to step. With `rebase` this makes the stiffness
         /// independent of the number of iterations; without it the body freezes.
         keep_multipliers: bool = true, truth();
-        /// Take a step back that ends at a higher incremental potential (inertia plus elastic energy)
-        /// than the best place it could have started from. Acts with `rebase`; XPBD as published has
+        /// Take a step back that ends at a higher incremental potential (inertia, tissue with its
+        /// viscosity, springs) than the best place it could have started from, and slow down what
+        /// would end it with more mechanical energy than it had and was given. Acts with `rebase`; XPBD as published has
         /// no potential that it lowers. Without it stiff tissue at a small budget may never settle.
         step_guard: bool = true, truth();
         /// The constraints of a stable neo-Hookean tetrahedron. With `rebase` the pair comes to the

@@ -17,7 +17,7 @@ use crate::state::State;
 /// The rebase multiplies an error of curvature `k` by `1 - k/mh`: stable from `mh >= k/2` on, so little
 /// more than half of the bound will do, and inertia is regained nearly twice as fast. With less, stiff
 /// and nearly incompressible tissue no longer settles in 5 sweeps; with all of it a bar that is dropped
-/// lags twice as far behind. Where vertices have copies, their sweeps need the whole bound.
+/// lags two to three times as far behind. Where vertices have copies, their sweeps need the whole bound.
 fn bound_share<S: Real>(model: &Model<S>) -> f64 {
     if model.is_split() { 1.0 } else { 0.6 }
 }

@@ -1,4 +1,5 @@
-//! The energy limit: no step ends with more mechanical energy than it began with and was given.
+//! The energy limit: no step ends with more mechanical energy than it began with and was given, as far
+//! as velocities can give it back.
 //!
 //! ```text
 //! T_1 <= T_n + V(x_n with pins moved) - V(x_1) + sum_i (m_i g + f_i) . (x_1 - x_n)_i

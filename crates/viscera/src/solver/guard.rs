@@ -1,17 +1,17 @@
 //! The step guard: no step ends at a higher incremental potential than the best of its starts.
 //!
 //! ```text
-//! Phi_limit = min(Phi(x_n with pins moved), Phi(xt), Phi(start)),  x_s where it is lowest
+//! Phi_limit = min(Phi(x_n), Phi(xt), Phi(start)), pins moved in all three,  x_s where it is lowest
 //! Phi(x_K) <= Phi_limit: accept
 //! else x_s + t (x_K - x_s), t = 0.5, 0.2, 0.08, 0.032: take the first that is not above
 //! else three steps of descent from x_s: d_i = -grad_i Phi / (m_i + sum curvature), Armijo
 //! ```
 //!
-//! A bound by `Phi(x_n)` bounds kinetic plus elastic energy; a bound by `Phi(xt)` alone lets nearly
-//! everything pass. **The multipliers are kept** after a rejection: recomputing them from positions
+//! A bound by `Phi(x_n)` bounds the stored energy (the kinetic energy is left to the energy limit,
+//! `energy.rs`); a bound by `Phi(xt)` alone lets nearly everything pass. **The multipliers are kept** after a rejection: recomputing them from positions
 //! looks safer and freezes the body, because the next sweeps start from what has just failed.
 //!
-//! Anderson's mixtures can be guarded one by one: the mixture if `Phi` is not above the best so far,
+//! With `anderson_guard = "energy"` Anderson's mixtures are guarded one by one: the mixture if `Phi` is not above the best so far,
 //! else the plain sweep if its is not, else go on from it once; at the second failure in a row one
 //! step of descent from the best. `x_s` is then the best iterate.
 

@@ -19,7 +19,8 @@ pub enum Stage {
     ResetMultipliers,
     /// `l *= (dt/dt_last)^2`: multipliers are forces times the squared step.
     RescaleMultipliers,
-    /// Remembers the best of three starts: its incremental potential bounds the step.
+    /// Remembers the best of three starts, whose incremental potential bounds the step, and the
+    /// mechanical energy.
     ChooseStart,
     /// Takes a step back whose incremental potential exceeds that bound.
     GuardStep,
