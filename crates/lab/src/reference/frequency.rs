@@ -21,6 +21,10 @@ const STEPS: u32 = 500;
 /// Done when `omega^2` changes by this share of itself.
 const RELATIVE: f64 = 1e-12;
 
+/// What of `omega^2` the last two steps may differ by where that is not reached: two modes that are
+/// nearly equally slow pass into each other slowly.
+const NEARLY: f64 = 1e-6;
+
 /// An oscillation of small amplitude.
 #[derive(Clone, Debug)]
 pub struct Mode {
@@ -67,7 +71,7 @@ impl Reference {
             shape.iter().zip(masses).map(|(u, mass)| *u * *mass).collect()
         };
         let mut mode = Mode { omega: 0.0, shape: vec![direction; x.len()] };
-        let mut squared = f64::INFINITY;
+        let (mut squared, mut before_last) = (f64::INFINITY, f64::INFINITY);
         for _ in 0..STEPS {
             let load = weighted(&mode.shape);
             let mut shape = factorization.solve(pattern, &load);
@@ -82,7 +86,12 @@ impl Reference {
                 self.analysis = Some(analysis);
                 return Ok(mode);
             }
-            squared = next;
+            (before_last, squared) = (squared, next);
+        }
+        let known = mode.omega * mode.omega;
+        self.analysis = Some(analysis);
+        if (known - before_last).abs() <= NEARLY * known {
+            return Ok(mode);
         }
         Err(ReferenceError::NoMode { steps: STEPS })
     }
