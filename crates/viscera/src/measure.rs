@@ -10,7 +10,7 @@
 use crate::elements::singular_values::signed_svd;
 use crate::elements::{attachment, deformation_gradient, green_strain, neo_hookean, spring};
 use crate::material::MaterialModel;
-use crate::model::{Model, TetSet};
+use crate::model::{Model, Tet};
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::Inputs;
 use crate::state::State;
@@ -61,23 +61,23 @@ pub fn measure_tets<S: Real>(
     measures.clear();
     measures.resize(model.tet_count(), TetMeasure::default());
     for set in model.tet_sets() {
-        for tet in 0..set.len() {
-            measures[set.order[tet] as usize] = measure_tet(model, set, positions, tet);
+        for tet in model.tets(set) {
+            measures[tet.number] = measure_tet(model, set.model, positions, &tet);
         }
     }
 }
 
 fn measure_tet<S: Real>(
     model: &Model<S>,
-    set: &TetSet<S>,
+    law: MaterialModel,
     positions: &[Vec3<S>],
-    tet: usize,
+    tet: &Tet<S>,
 ) -> TetMeasure {
-    let x = set.vertices[tet].map(|v| positions[v as usize].cast::<f64>());
-    let f = deformation_gradient(&x, &set.inverse_rest_shape[tet].cast());
-    let material = &model.materials[set.material[tet] as usize];
+    let x = tet.vertices.map(|v| positions[v as usize].cast::<f64>());
+    let f = deformation_gradient(&x, &tet.inverse_rest_shape.cast());
+    let material = &model.materials[tet.material];
     let (lambda, mu) = (material.lame_lambda.to_f64(), material.lame_mu.to_f64());
-    let (energy_density, piola) = match set.model {
+    let (energy_density, piola) = match law {
         MaterialModel::SaintVenantKirchhoff => {
             let strain = green_strain::strain(&f);
             let energy = green_strain::energy_density(&strain, lambda, mu);
@@ -91,7 +91,7 @@ fn measure_tet<S: Real>(
     let divisor = volume_ratio.abs().max(SMALLEST_VOLUME_RATIO).copysign(volume_ratio);
     let cauchy = piola * f.transpose() * (1.0 / divisor);
     TetMeasure {
-        rest_volume: set.rest_volume[tet].to_f64(),
+        rest_volume: tet.rest_volume.to_f64(),
         volume_ratio,
         stretches: signed_svd(&f).sigma,
         von_mises: von_mises(&cauchy),

@@ -14,7 +14,11 @@
 //! The strain cannot see inversion (`E(RF) = E(F)` for reflections `R` too): prefer the stable
 //! neo-Hookean element where tissue may turn inside out.
 
-use super::{CornerLoad, TetCorrection, shape_gradients, solve_symmetric, weighted_product};
+use super::{
+    CornerLoad, Symmetric, TetCorrection, displacements, shape_gradients, solve_symmetric,
+    weighted_products,
+};
+use crate::material::Compliance;
 use crate::scalar::{Mat3, Scalar, Vec3, vec3};
 
 /// A symmetric 6 x 6 matrix, or six constraint values.
@@ -100,75 +104,77 @@ pub fn gradient<S: Scalar>(deformation_gradient: &Mat3<S>, g: Vec3<S>) -> [Vec3<
     PAIRS.map(|(a, b)| if a == b { f[a] * g[a] } else { f[a] * g[b] + f[b] * g[a] })
 }
 
-/// `grad C M^-1 grad C^T` [1/(kg m^2)], from `K = F^T F` and `G = sum_i w_i g_i g_i^T`:
-/// with `J_(ab) = g_b F_a + g_a F_b` (halved for `a = b`), the entry for pairs `(a,b)`, `(c,d)` is
-/// `G_bd K_ac + G_bc K_ad + G_ad K_bc + G_ac K_bd`. Lower triangle only.
+/// `grad C M^-1 grad C^T + a~` [1/(kg m^2)], from `K = F^T F = I + 2 E` and
+/// `G = sum_i w_i g_i g_i^T`: with `J_(ab) = g_b F_a + g_a F_b` (halved for `a = b`), the entry for
+/// pairs `(a,b)`, `(c,d)` is `G_bd K_ac + G_bc K_ad + G_ad K_bc + G_ac K_bd`. Lower triangle only.
 #[inline(always)]
-fn gram<S: Scalar>(f: &Mat3<S>, g: &[Vec3<S>; 4], w: &[S; 4]) -> [[S; 6]; 6] {
-    let mut k = [[S::ZERO; 3]; 3];
-    let mut m = [[S::ZERO; 3]; 3];
-    for a in 0..3 {
-        for b in 0..=a {
-            k[a][b] = f.columns[a].dot(f.columns[b]);
-            m[a][b] = weighted_product(g, w, a, b);
-            k[b][a] = k[a][b];
-            m[b][a] = m[a][b];
-        }
-    }
-    let mut matrix = [[S::ZERO; 6]; 6];
-    for p in 0..6 {
-        let (a, b) = PAIRS[p];
-        for q in 0..=p {
-            let (c, d) = PAIRS[q];
-            matrix[p][q] = match (p < 3, q < 3) {
-                (true, true) => m[a][c] * k[a][c],
-                (false, true) => m[a][c] * k[b][c] + m[b][c] * k[a][c],
-                _ => {
-                    (m[b][d] * k[a][c] + m[b][c] * k[a][d])
-                        + (m[a][d] * k[b][c] + m[a][c] * k[b][d])
-                }
-            };
-        }
-    }
-    matrix
+fn system<S: Scalar>(c: &Voigt<S>, g: &Symmetric<S>, compliance: &Compliance<S>) -> [[S; 6]; 6] {
+    let (kxx, kyy, kzz) =
+        (S::ONE + S::TWO * c[0], S::ONE + S::TWO * c[1], S::ONE + S::TWO * c[2]);
+    let (kyz, kxz, kxy) = (c[3], c[4], c[5]);
+    let Symmetric { xx, yy, zz, yz, xz, xy } = *g;
+    let Compliance { normal, cross, shear } = *compliance;
+    let o = S::ZERO;
+    [
+        [xx * kxx + normal, o, o, o, o, o],
+        [xy * kxy + cross, yy * kyy + normal, o, o, o, o],
+        [xz * kxz + cross, yz * kyz + cross, zz * kzz + normal, o, o, o],
+        [
+            xy * kxz + xz * kxy,
+            yy * kyz + yz * kyy,
+            yz * kzz + zz * kyz,
+            (zz * kyy + yy * kzz) + S::TWO * (yz * kyz) + shear,
+            o,
+            o,
+        ],
+        [
+            xx * kxz + xz * kxx,
+            xy * kyz + yz * kxy,
+            xz * kzz + zz * kxz,
+            (zz * kxy + xz * kyz) + (yz * kxz + xy * kzz),
+            (zz * kxx + xx * kzz) + S::TWO * (xz * kxz) + shear,
+            o,
+        ],
+        [
+            xx * kxy + xy * kxx,
+            xy * kyy + yy * kxy,
+            xz * kyz + yz * kxz,
+            (xz * kyy + yz * kxy) + (xy * kyz + yy * kxz),
+            (xz * kxy + yz * kxx) + (xx * kyz + xy * kxz),
+            (yy * kxx + xx * kyy) + S::TWO * (xy * kxy) + shear,
+        ],
+    ]
 }
 
 /// One block solve: the multiplier and position changes that satisfy the linearised constraint
 /// `C(x) - target + a~ (l + dl) + grad C dx = 0`.
 ///
-/// `w` are the inverse masses [1/kg] of the corners (of their copies), `compliance` is `D^-1`
-/// [1/Pa], `compliance_scale` is `1/(V dt^2)`, so that `a~ = compliance * compliance_scale`.
+/// `w` are the inverse masses [1/kg] of the corners (of their copies), `compliance` is
+/// `a~ = D^-1/(V dt^2)`.
 #[inline(always)]
 pub fn solve<S: Scalar>(
     x: &[Vec3<S>; 4],
     w: &[S; 4],
     inverse_rest_shape: &Mat3<S>,
     multipliers: &Voigt<S>,
-    target: &Voigt<S>,
-    compliance: &[[S; 6]; 6],
-    compliance_scale: S,
+    target: Option<&Voigt<S>>,
+    compliance: &Compliance<S>,
 ) -> TetCorrection<S, 6> {
     let f = super::deformation_gradient(x, inverse_rest_shape);
     let g = shape_gradients(inverse_rest_shape);
     let c = strain(&f);
-    let mut matrix = gram(&f, &g, w);
-    let mut right = [S::ZERO; 6];
+    let matrix = system(&c, &weighted_products(&g, w), compliance);
+    let mut right = compliance.times(multipliers);
     for p in 0..6 {
-        let mut compliant = S::ZERO;
-        for q in 0..6 {
-            compliant += compliance[p][q] * multipliers[q];
-        }
-        right[p] = -(c[p] - target[p]) - compliance_scale * compliant;
-        for q in 0..=p {
-            matrix[p][q] += compliance_scale * compliance[p][q];
+        right[p] = -(c[p] + right[p]);
+    }
+    if let Some(target) = target {
+        for p in 0..6 {
+            right[p] += target[p];
         }
     }
     let change = solve_symmetric(matrix, right);
-    let stress = symmetric(&change);
-    let mut positions = [Vec3::ZERO; 4];
-    for i in 0..4 {
-        positions[i] = f * (stress * g[i]) * w[i];
-    }
+    let positions = displacements(&(f * symmetric(&change)), &g, w);
     TetCorrection { multipliers: change, positions }
 }
 

@@ -94,48 +94,83 @@ pub fn internal_forces<S: Scalar>(
     forces
 }
 
-/// Entry `(a, b)` of `sum_i w_i g_i g_i^T` over the corners.
+/// The body once for each literal, with the index as a constant: loops that compilers leave rolled
+/// keep their matrices in memory instead of registers.
+macro_rules! unrolled {
+    ($index:ident in [$($value:literal)*] $body:block) => {
+        $({
+            const $index: usize = $value;
+            $body
+        })*
+    };
+}
+
+/// A symmetric 3 x 3 matrix.
+#[derive(Clone, Copy, Debug)]
+struct Symmetric<S> {
+    xx: S,
+    yy: S,
+    zz: S,
+    yz: S,
+    xz: S,
+    xy: S,
+}
+
+/// `sum_i w_i g_i g_i^T` over the corners.
 #[inline(always)]
-fn weighted_product<S: Scalar>(g: &[Vec3<S>; 4], w: &[S; 4], a: usize, b: usize) -> S {
-    (w[0] * g[0][a] * g[0][b] + w[1] * g[1][a] * g[1][b])
-        + (w[2] * g[2][a] * g[2][b] + w[3] * g[3][a] * g[3][b])
+fn weighted_products<S: Scalar>(g: &[Vec3<S>; 4], w: &[S; 4]) -> Symmetric<S> {
+    let h = [g[0] * w[0], g[1] * w[1], g[2] * w[2], g[3] * w[3]];
+    let entry = |a: usize, b: usize| {
+        (h[0][a] * g[0][b] + h[1][a] * g[1][b]) + (h[2][a] * g[2][b] + h[3][a] * g[3][b])
+    };
+    Symmetric {
+        xx: entry(0, 0),
+        yy: entry(1, 1),
+        zz: entry(2, 2),
+        yz: entry(1, 2),
+        xz: entry(0, 2),
+        xy: entry(0, 1),
+    }
+}
+
+/// Corner displacements [m] `w_i P g_i`; as `g_0 = -(g_1 + g_2 + g_3)`, the first is the sum of the
+/// others turned round.
+#[inline(always)]
+fn displacements<S: Scalar>(p: &Mat3<S>, g: &[Vec3<S>; 4], w: &[S; 4]) -> [Vec3<S>; 4] {
+    let (a, b, c) = (*p * g[1], *p * g[2], *p * g[3]);
+    [(a + b + c) * -w[0], a * w[1], b * w[2], c * w[3]]
 }
 
 /// Solves `A x = b` for a symmetric positive definite matrix given by its lower triangle:
-/// `A = L D L^T`, no square roots and no branches.
+/// `A = L D L^T`, no square roots and no branches. `L` takes the place of the upper triangle.
 #[inline(always)]
 fn solve_symmetric<S: Scalar>(mut a: [[S; 6]; 6], mut b: [S; 6]) -> [S; 6] {
     let mut inverse_pivot = [S::ZERO; 6];
-    for j in 0..6 {
-        // Row j of `a` left of the diagonal becomes L; the diagonal holds D.
-        let mut scaled = [S::ZERO; 6];
-        let mut pivot = a[j][j];
-        for k in 0..j {
-            scaled[k] = a[j][k];
-            a[j][k] *= inverse_pivot[k];
-            pivot -= a[j][k] * scaled[k];
-        }
-        inverse_pivot[j] = S::ONE / pivot;
-        for i in j + 1..6 {
-            let mut value = a[i][j];
-            for k in 0..j {
-                value -= a[i][k] * a[j][k];
+    unrolled!(J in [0 1 2 3 4 5] {
+        inverse_pivot[J] = S::ONE / a[J][J];
+        unrolled!(I in [1 2 3 4 5] {
+            if I > J {
+                a[J][I] = a[I][J] * inverse_pivot[J];
+                unrolled!(K in [1 2 3 4 5] {
+                    if K > J && K <= I {
+                        let product = a[J][K] * a[I][J];
+                        a[I][K] -= product;
+                    }
+                });
+                let product = a[J][I] * b[J];
+                b[I] -= product;
             }
-            a[i][j] = value;
-        }
-    }
-    for i in 0..6 {
-        for k in 0..i {
-            let value = a[i][k] * b[k];
-            b[i] -= value;
-        }
-    }
-    for i in (0..6).rev() {
-        b[i] *= inverse_pivot[i];
-        for k in i + 1..6 {
-            let value = a[k][i] * b[k];
-            b[i] -= value;
-        }
-    }
+        });
+    });
+    unrolled!(FROM_LAST in [0 1 2 3 4 5] {
+        const I: usize = 5 - FROM_LAST;
+        b[I] *= inverse_pivot[I];
+        unrolled!(K in [1 2 3 4 5] {
+            if K > I {
+                let product = a[I][K] * b[K];
+                b[I] -= product;
+            }
+        });
+    });
     b
 }

@@ -21,8 +21,8 @@
 use super::green_strain::{Voigt, symmetric};
 use super::singular_values::{SignedSvd, signed_svd};
 use super::{
-    CornerLoad, TetCorrection, deformation_gradient, shape_gradients, solve_symmetric,
-    weighted_product,
+    CornerLoad, Symmetric, TetCorrection, deformation_gradient, displacements, shape_gradients,
+    solve_symmetric, weighted_products,
 };
 use crate::scalar::{Mat3, Scalar, Vec3};
 
@@ -145,9 +145,8 @@ pub fn solve<S: Scalar>(
     ];
 
     // sum_i w_i B_i B_i^T, from G = sum_i w_i g'_i g'_i^T; the axes u are orthonormal.
-    let entry = |a: usize, b: usize| weighted_product(&g, w, a, b);
-    let (g00, g11, g22) = (entry(0, 0), entry(1, 1), entry(2, 2));
-    let (g12, g02, g01) = (entry(1, 2), entry(0, 2), entry(0, 1));
+    let Symmetric { xx: g00, yy: g11, zz: g22, yz: g12, xz: g02, xy: g01 } =
+        weighted_products(&g, w);
     let zero = S::ZERO;
     let c = stretch_compliance(&sigma, lame_lambda, lame_mu, e, step_volume);
     let shear = |k: usize| {
@@ -172,11 +171,7 @@ pub fn solve<S: Scalar>(
         -(shears[2] * residual[5]),
     ];
     let change = solve_symmetric(matrix, right);
-    let turned = symmetric(&change);
-    let mut positions = [Vec3::ZERO; 4];
-    for i in 0..4 {
-        positions[i] = u * (turned * g[i]) * w[i];
-    }
+    let positions = displacements(&(u * symmetric(&change)), &g, w);
     TetCorrection { multipliers: turn(&material_axes, &change), positions }
 }
 

@@ -23,6 +23,7 @@ mod presets;
 
 pub use presets::{PRESET_CAUTION, PRESETS, Preset, UnknownPreset, preset};
 
+use crate::scalar::Scalar;
 use crate::settings::choices;
 use crate::units::Dimension;
 
@@ -227,9 +228,57 @@ impl Material {
     }
 
     /// The compliance D^-1 [1/Pa], from E and nu directly: exact where inverting D would cancel.
+    pub fn compliance(&self) -> Compliance<f64> {
+        Compliance {
+            normal: 1.0 / self.young,
+            cross: -self.poisson / self.young,
+            shear: 2.0 * (1.0 + self.poisson) / self.young,
+        }
+    }
+
+    /// The compliance as a matrix.
     pub fn compliance_matrix(&self) -> [[f64; 6]; 6] {
-        let shear = 2.0 * (1.0 + self.poisson) / self.young;
-        isotropic(1.0 / self.young, -self.poisson / self.young, shear)
+        let Compliance { normal, cross, shear } = self.compliance();
+        isotropic(normal, cross, shear)
+    }
+}
+
+/// The compliance `D^-1` of an isotropic law [1/Pa], or a multiple of it: the numbers of the 6 x 6
+/// matrix for `C = (E00, E11, E22, 2 E12, 2 E02, 2 E01)` that are not zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Compliance<S> {
+    /// Of a normal strain to its own stress.
+    pub normal: S,
+    /// Of a normal strain to the other two normal stresses.
+    pub cross: S,
+    /// Of a shear.
+    pub shear: S,
+}
+
+impl<S: Scalar> Compliance<S> {
+    /// A multiple of it.
+    #[inline(always)]
+    pub fn scaled(&self, factor: S) -> Self {
+        Self {
+            normal: self.normal * factor,
+            cross: self.cross * factor,
+            shear: self.shear * factor,
+        }
+    }
+
+    /// The matrix times six components.
+    #[inline(always)]
+    pub fn times(&self, v: &[S; 6]) -> [S; 6] {
+        let common = self.cross * (v[0] + v[1] + v[2]);
+        let own = self.normal - self.cross;
+        [
+            common + own * v[0],
+            common + own * v[1],
+            common + own * v[2],
+            self.shear * v[3],
+            self.shear * v[4],
+            self.shear * v[5],
+        ]
     }
 }
 

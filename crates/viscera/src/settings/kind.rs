@@ -174,7 +174,7 @@ impl Kind for Quantity {
 pub(crate) struct Whole(u32, u32);
 
 /// A whole number from `low` to `high`.
-pub(crate) fn whole(low: u32, high: u32) -> Whole {
+pub(crate) const fn whole(low: u32, high: u32) -> Whole {
     Whole(low, high)
 }
 

@@ -2,7 +2,7 @@
 
 use super::{
     Kind, Node, SettingError, Table, Value, ValueError, above, at_least, choices, number, one_of,
-    settings_table, truth, value_error, whole,
+    Whole, settings_table, truth, value_error, whole,
 };
 
 choices! {
@@ -23,6 +23,18 @@ pub enum Colors {
     /// This many, at least 1: vertices are copied where more would be needed. One is Jacobi.
     Limited(u32),
 }
+
+/// How many threads a solver works with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Threads {
+    /// One per processor where the mesh is large enough to gain by it.
+    Auto,
+    /// This many, from 1 to [`MOST_THREADS`].
+    Count(u32),
+}
+
+/// The most threads that can be asked for: more than any machine has processors that share memory.
+pub const MOST_THREADS: u32 = 1024;
 
 choices! {
     /// What over-relaxation scales.
@@ -112,7 +124,7 @@ settings_table! {
         iterations: u32 = 2, whole(1, 10_000);
         /// Colours of the constraint graph: "unlimited" for Gauss-Seidel, 1 for Jacobi, a few
         /// for clique separation. Fewer run more in parallel and need more sweeps.
-        colors: Colors = (Colors::Unlimited), ColorsKind;
+        colors: Colors = (Colors::Unlimited), COLORS;
         /// Over-relaxation factor omega. Above 1 hurries, below 1 calms. Safe up to 1.8 for one
         /// colour, 1.5 for a few, about 1.2 for unlimited; beyond that sweeps overshoot and may
         /// diverge. With `rebase` and one colour only 1 is safe.
@@ -164,6 +176,9 @@ settings_table! {
         /// The constraints of a stable neo-Hookean tetrahedron. With `rebase` the pair comes to the
         /// right rest as well, but slowly: it moves as if it were heavier.
         neo_hookean: NeoHookean = (NeoHookean::Auto), one_of::<NeoHookean>();
+        /// Threads: "auto" for one per processor where the mesh is large enough to gain by it (8000
+        /// tetrahedra). The result is the same to the bit for any number.
+        threads: Threads = (Threads::Auto), THREADS;
         /// Where the iteration of a substep starts.
         start: Start = (Start::Auto), one_of::<Start>();
     }
@@ -191,35 +206,57 @@ impl SolverSettings {
     }
 }
 
-/// Reads `colors`: the word "unlimited", or a count.
-struct ColorsKind;
+/// Reads a count, or the word that stands for none.
+struct CountOr<T> {
+    word: &'static str,
+    limits: Whole,
+    make: fn(Option<u32>) -> T,
+    count: fn(&T) -> Option<u32>,
+}
 
-impl Kind for ColorsKind {
-    type Value = Colors;
+const COLORS: CountOr<Colors> = CountOr {
+    word: "unlimited",
+    limits: whole(1, u32::MAX),
+    make: |count| count.map_or(Colors::Unlimited, Colors::Limited),
+    count: |colors| match colors {
+        Colors::Unlimited => None,
+        Colors::Limited(count) => Some(*count),
+    },
+};
 
-    fn read(&self, key: &str, node: &Node) -> Result<Colors, SettingError> {
+const THREADS: CountOr<Threads> = CountOr {
+    word: "auto",
+    limits: whole(1, MOST_THREADS),
+    make: |count| count.map_or(Threads::Auto, Threads::Count),
+    count: |threads| match threads {
+        Threads::Auto => None,
+        Threads::Count(count) => Some(*count),
+    },
+};
+
+impl<T> Kind for CountOr<T> {
+    type Value = T;
+
+    fn read(&self, key: &str, node: &Node) -> Result<T, SettingError> {
         match &node.value {
-            Value::Text(text) if text == "unlimited" => Ok(Colors::Unlimited),
+            Value::Text(text) if text == self.word => Ok((self.make)(None)),
             Value::Text(_) => {
-                let hint = "did you mean \"unlimited\"? Or write a whole number".to_owned();
+                let hint = format!("did you mean \"{}\"? Or write a whole number", self.word);
                 Err(value_error(key, node, ValueError::Choice { hint }))
             }
-            _ => whole(1, u32::MAX).read(key, node).map(Colors::Limited),
+            _ => self.limits.read(key, node).map(|count| (self.make)(Some(count))),
         }
     }
 
     fn type_text(&self) -> String {
-        "\"unlimited\" or a whole number".to_owned()
+        format!("\"{}\" or a whole number", self.word)
     }
 
-    fn value_text(&self, value: &Colors) -> String {
-        match value {
-            Colors::Unlimited => "\"unlimited\"".to_owned(),
-            Colors::Limited(count) => count.to_string(),
-        }
+    fn value_text(&self, value: &T) -> String {
+        (self.count)(value).map_or(format!("\"{}\"", self.word), |count| count.to_string())
     }
 
     fn range_text(&self) -> String {
-        "at least 1".to_owned()
+        self.limits.range_text()
     }
 }

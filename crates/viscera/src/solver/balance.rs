@@ -59,14 +59,14 @@ impl ForceBalance {
         if dt <= 0.0 {
             return;
         }
-        for (set, strains) in model.tet_sets().into_iter().zip(&work.start_strain) {
-            for tet in 0..set.len() {
-                let vertices = set.vertices[tet];
-                let x = vertices.map(|v| state.positions[v as usize].cast::<f64>());
-                let shape = set.inverse_rest_shape[tet].cast::<f64>();
-                let volume = set.rest_volume[tet].to_f64();
-                let material = &model.materials[set.material[tet] as usize];
-                let start = strains.get(tet).map(|start| start.map(|c| c.to_f64()));
+        let ground = &work.ground;
+        for (set, strains) in model.tet_sets().into_iter().zip(&ground.start_strain) {
+            for (tet, (block, lane)) in model.tets(set).zip(set.places()) {
+                let x = tet.vertices.map(|v| state.positions[v as usize].cast::<f64>());
+                let shape = tet.inverse_rest_shape.cast::<f64>();
+                let volume = tet.rest_volume.to_f64();
+                let material = &model.materials[tet.material];
+                let start = set.viscous.then(|| strains[block].map(|c| c[lane].to_f64()));
                 let tissue = Tissue {
                     model: set.model,
                     lame_lambda: material.lame_lambda.to_f64(),
@@ -77,7 +77,7 @@ impl ForceBalance {
                 let response = tissue.respond(&f, start.as_ref());
                 self.elastic_energy += volume * response.elastic_energy;
                 let forces = internal_forces(&response.piola, &shape, volume);
-                for (v, force) in vertices.into_iter().zip(forces) {
+                for (v, force) in tet.vertices.into_iter().zip(forces) {
                     self.residual[v as usize] -= force;
                 }
             }
@@ -107,10 +107,11 @@ impl ForceBalance {
         for v in 0..model.vertex_count() {
             let mass = model.masses[v].to_f64();
             let x = state.positions[v].cast::<f64>();
-            let inertia = (x - work.predicted[v].cast()) * (mass / (dt * dt));
-            self.residual[v] += inertia;
+            let place = model.numbering.of(v as u32);
+            let predicted = ground.predicted[place].vec3().cast();
+            self.residual[v] += (x - predicted) * (mass / (dt * dt));
             let residual = self.residual[v];
-            if work.inverse_masses[v] == S::ZERO {
+            if ground.inverse_masses[place] == S::ZERO {
                 self.load += residual.length();
             } else {
                 self.unbalanced += residual.length();

@@ -1,15 +1,19 @@
 //! The CPU backend: carries out the stages of a plan.
+#![allow(unsafe_code)]
 
 use super::Inputs;
 use super::StepError;
 use super::acceleration::{Anderson, Chebyshev, chebyshev_update};
 use super::energy::Energy;
+use super::forms::{Form, with_form};
 use super::guard::Guard;
+use super::loads::load_multipliers;
 use super::plan::Stage;
-use super::sweep::{Relaxation, Sweep, corners, read, read_vec3};
-use crate::elements::{CornerLoad, TetForm, deformation_gradient, green_strain};
-use crate::elements::{neo_hookean_pair, neo_hookean_stretch, spring};
+use super::potential::{Evaluator, measure_strain};
+use super::sweep::solve_color;
+use super::threads::{Shared, Workers};
 use crate::model::Model;
+use crate::scalar::lanes::{Eight, LANES, Point};
 use crate::scalar::{Real, Vec3};
 use crate::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Start};
 use crate::state::State;
@@ -22,6 +26,9 @@ fn bound_share<S: Real>(model: &Model<S>) -> f64 {
     if model.is_split() { 1.0 } else { 0.6 }
 }
 
+/// Vertices that a thread does at a time.
+const GRAIN: usize = 2048;
+
 /// What a stage may look at but not change.
 pub(super) struct Step<'a, S> {
     pub model: &'a Model<S>,
@@ -30,29 +37,45 @@ pub(super) struct Step<'a, S> {
     pub settings: &'a SolverSettings,
 }
 
-/// Everything a step needs beside model and state.
+/// Green strain at the start of the step of the blocks of viscous sets, `[green, neo]`.
+pub(super) type StartStrain<S> = [Vec<[Eight<S>; 6]>; 2];
+
+/// What stays the same from the prediction to the end of a step.
+#[derive(Clone, Debug)]
+pub(super) struct Ground<S> {
+    pub workers: Workers,
+    /// Positions at the start of the step [m].
+    pub previous: Vec<Point<S>>,
+    /// Inertial prediction `xt` [m], of pinned vertices too.
+    pub predicted: Vec<Point<S>>,
+    /// External forces [N] without gravity.
+    pub external: Vec<Vec3<S>>,
+    /// Masses [kg].
+    pub masses: Vec<S>,
+    /// `1/m`, zero where pinned [1/kg].
+    pub inverse_masses: Vec<S>,
+    /// See [`StartStrain`].
+    pub start_strain: StartStrain<S>,
+}
+
+/// Everything a step needs beside model and state, vertices in the solver's numbering.
 #[derive(Clone, Debug)]
 pub(super) struct Workspace<S> {
     /// What [`sizes`] says of the model that this is for.
-    sizes: [usize; 10],
-    /// Positions at the start of the step [m].
-    pub previous: Vec<Vec3<S>>,
+    sizes: [usize; 9],
+    pub ground: Ground<S>,
+    /// Positions [m]; with each travels the inverse mass of its copies during a sweep [1/kg].
+    pub points: Vec<Point<S>>,
+    /// Velocities [m/s].
+    pub velocities: Vec<Vec3<S>>,
     /// Of each part of the model; empty where steps are not guarded.
     pub energies: Vec<Energy>,
-    /// Inertial prediction `xt` [m], of pinned vertices too.
-    pub predicted: Vec<Vec3<S>>,
-    /// External forces [N] without gravity.
-    pub external: Vec<Vec3<S>>,
-    /// `1/m`, zero where pinned [1/kg].
-    pub inverse_masses: Vec<S>,
-    /// Inverse mass of each of a vertex's copies during a sweep [1/kg].
-    weights: Vec<S>,
-    /// Positions of the copies [m]; empty where nothing is split.
-    copies: Vec<Vec3<S>>,
-    /// One entry per corner of every constraint; empty where no stage needs it.
-    pub loads: Vec<CornerLoad<S>>,
-    /// Green strain at the start of the step of viscous sets, `[green, neo]`.
-    pub start_strain: [Vec<green_strain::Voigt<S>>; 2],
+    pub evaluator: Evaluator<S>,
+    /// Points of the copies; empty where nothing is split.
+    copies: Vec<Point<S>>,
+    /// What constraints put on each copy: impulse [N s^2] and bound [kg]; empty where no stage needs
+    /// it.
+    pub loads: Vec<Point<S>>,
     /// Iterate before the sweep, and the one before that.
     iterate: [Iterate<S>; 2],
     /// Diagonal of `a~` of each multiplier: weights of the norm in which iterates are compared.
@@ -69,7 +92,7 @@ pub(super) struct Workspace<S> {
 
 #[derive(Clone, Debug, Default)]
 struct Iterate<S> {
-    positions: Vec<Vec3<S>>,
+    positions: Vec<Point<S>>,
     multipliers: Vec<S>,
 }
 
@@ -77,35 +100,37 @@ impl<S: Real> Workspace<S> {
     pub fn new(model: &Model<S>, settings: &SolverSettings) -> Self {
         let vertices = model.vertex_count();
         let accelerated = settings.acceleration != Acceleration::None;
+        let points = |wanted: bool| vec![Point::default(); if wanted { vertices } else { 0 }];
         let iterate = |wanted: bool| Iterate {
-            positions: vec![Vec3::ZERO; if wanted { vertices } else { 0 }],
+            positions: points(wanted),
             multipliers: vec![S::ZERO; if wanted { model.multiplier_count } else { 0 }],
         };
-        let needs_loads = settings.rebase
-            || (settings.acceleration == Acceleration::Anderson
-                && settings.anderson_on == AndersonOn::Multipliers);
         let anderson = settings.acceleration == Acceleration::Anderson;
+        let needs_loads =
+            settings.rebase || (anderson && settings.anderson_on == AndersonOn::Multipliers);
         let window = settings.anderson_window as usize;
         let length = if anderson { 3 * vertices + model.multiplier_count } else { 0 };
+        let guarded = settings.guards_steps();
+        let strains = |set: &crate::model::TetSet<S>| {
+            vec![[[S::ZERO; LANES]; 6]; if set.viscous { set.block_count() } else { 0 }]
+        };
         Self {
             sizes: sizes(model).map(|(_, size)| size),
-            previous: vec![Vec3::ZERO; vertices],
-            energies: vec![
-                Energy::default();
-                if settings.guards_steps() { model.component_count } else { 0 }
-            ],
-            predicted: vec![Vec3::ZERO; vertices],
-            external: vec![Vec3::ZERO; vertices],
-            inverse_masses: vec![S::ZERO; vertices],
-            weights: vec![S::ZERO; vertices],
-            copies: vec![Vec3::ZERO; if model.is_split() { model.copy_count() } else { 0 }],
-            loads: vec![
-                CornerLoad::default();
-                if needs_loads { model.gather_slots.len() } else { 0 }
-            ],
-            start_strain: model.tet_sets().map(|set| {
-                vec![[S::ZERO; 6]; if set.viscous_offset.is_some() { set.len() } else { 0 }]
-            }),
+            ground: Ground {
+                workers: Workers::new(settings.threads, model.tet_count()),
+                previous: points(true),
+                predicted: points(true),
+                external: vec![Vec3::ZERO; vertices],
+                masses: model.numbering.order.iter().map(|&v| model.masses[v as usize]).collect(),
+                inverse_masses: vec![S::ZERO; vertices],
+                start_strain: model.tet_sets().map(strains),
+            },
+            points: points(true),
+            velocities: vec![Vec3::ZERO; vertices],
+            energies: vec![Energy::default(); if guarded { model.component_count } else { 0 }],
+            evaluator: Evaluator::new(guarded.then_some(model)),
+            copies: vec![Point::default(); if model.is_split() { model.copy_count() } else { 0 }],
+            loads: vec![Point::default(); if needs_loads { model.copy_count() } else { 0 }],
             iterate: [
                 iterate(accelerated),
                 iterate(settings.acceleration == Acceleration::Chebyshev),
@@ -115,15 +140,25 @@ impl<S: Real> Workspace<S> {
             bound_share: S::from_f64(bound_share(model)),
             chebyshev: Chebyshev::default(),
             anderson: Anderson::new(window, length),
-            guard: Guard::new(if settings.guards_steps() { vertices } else { 0 }),
+            guard: Guard::new(if guarded { vertices } else { 0 }),
         }
     }
 
-    /// The model is one of the same shape as that for which the memory was taken.
+    /// The model is one of the same shape as that for which the memory was taken, and its elements
+    /// stay within that memory.
     pub fn check(&self, model: &Model<S>) -> Result<(), StepError> {
         for (given, (what, expected)) in self.sizes.into_iter().zip(sizes(model)) {
             if given != expected {
                 return Err(StepError::Mismatch { what, given, expected });
+            }
+        }
+        let room = [model.numbering.order.len(), model.copy_count()];
+        for set in model.tet_sets() {
+            for (given, expected) in room.into_iter().zip(set.bounds) {
+                if given < expected {
+                    let what = "model's list of vertices";
+                    return Err(StepError::Mismatch { what, given, expected });
+                }
             }
         }
         Ok(())
@@ -131,8 +166,13 @@ impl<S: Real> Workspace<S> {
 
     pub fn run(&mut self, stage: &Stage, step: &Step<'_, S>, state: &mut State<S>) {
         match *stage {
-            Stage::MeasureStrain => self.measure_strain(step, state),
-            Stage::Predict(start) => self.predict(step, state, start),
+            Stage::ReadState => self.read_state(step.model, state),
+            Stage::MeasureStrain => {
+                let ground = &mut self.ground;
+                let (workers, strains) = (&ground.workers, &mut ground.start_strain);
+                measure_strain(workers, step.model, &self.points, strains);
+            }
+            Stage::Predict(start) => self.predict(step, start),
             Stage::ResetMultipliers => {
                 state.multipliers.fill(S::ZERO);
                 self.start_acceleration(step, state);
@@ -145,67 +185,86 @@ impl<S: Real> Workspace<S> {
                 }
                 self.start_acceleration(step, state);
             }
-            Stage::RememberIterate => self.remember_iterate(state),
-            Stage::LoadCorners => self.load_corners(step, state),
-            Stage::Rebase => self.rebase(step, state),
-            Stage::RecomputePositions => self.recompute_positions(step, state),
-            Stage::SplitCopies => split_copies(step.model, &state.positions, &mut self.copies),
-            Stage::SolveColor(color) => self.solve_color(step, state, color as usize),
-            Stage::JoinCopies => join_copies(step.model, &self.copies, &mut state.positions),
-            Stage::Chebyshev => self.chebyshev(step, state),
-            Stage::Anderson(on) => self.anderson(step, state, on),
-            Stage::ChooseStart => self.choose_start(step, state),
-            Stage::GuardStep => self.guard_step(step, state),
-            Stage::GuardIterate => self.guard_iterate(step, state),
-            Stage::RepairMultipliers => self.repair_multipliers(step, state),
+            Stage::RememberIterate => self.remember_iterate(&state.multipliers),
+            Stage::LoadCorners => {
+                let workers = &self.ground.workers;
+                let (x, l) = (&self.points, &state.multipliers);
+                load_multipliers(workers, step.model, x, l, &mut self.loads);
+            }
+            Stage::Rebase => self.rebase(step.model),
+            Stage::RecomputePositions => self.recompute_positions(step.model),
+            Stage::SplitCopies => self.split_copies(step.model),
+            Stage::SolveColor(color) => {
+                let split = step.model.is_split();
+                let points = if split { &mut self.copies } else { &mut self.points };
+                let Ground { workers, start_strain, .. } = &self.ground;
+                let multipliers = &mut state.multipliers;
+                solve_color(workers, step, points, multipliers, start_strain, color as usize);
+            }
+            Stage::JoinCopies => self.join_copies(step.model),
+            Stage::Chebyshev => self.chebyshev(step, &mut state.multipliers),
+            Stage::Anderson(on) => self.anderson(step, &mut state.multipliers, on),
+            Stage::ChooseStart => self.choose_start(step),
+            Stage::GuardStep => self.guard_step(step),
+            Stage::GuardIterate => self.guard_iterate(step, &mut state.multipliers),
+            Stage::RepairMultipliers => self.repair_multipliers(step, &mut state.multipliers),
             Stage::UpdateVelocities => {
                 let rate = S::from_f64(1.0 / step.dt);
-                for (v, velocity) in state.velocities.iter_mut().enumerate() {
-                    *velocity = (state.positions[v] - self.previous[v]) * rate;
+                for (v, velocity) in self.velocities.iter_mut().enumerate() {
+                    *velocity = (self.points[v].vec3() - self.ground.previous[v].vec3()) * rate;
                 }
             }
-            Stage::LimitEnergy => self.limit_energy(step, state),
-        }
-    }
-
-    pub(super) fn measure_strain(&mut self, step: &Step<'_, S>, state: &State<S>) {
-        for (set, strains) in step.model.tet_sets().into_iter().zip(&mut self.start_strain) {
-            for (tet, strain) in strains.iter_mut().enumerate() {
-                let x = corners(&state.positions, set.vertices[tet]);
-                let f = deformation_gradient(&x, &set.inverse_rest_shape[tet]);
-                *strain = green_strain::strain(&f);
+            Stage::LimitEnergy => self.limit_energy(step),
+            Stage::WriteState => {
+                for (v, &user) in step.model.numbering.order.iter().enumerate() {
+                    state.positions[user as usize] = self.points[v].vec3();
+                    state.velocities[user as usize] = self.velocities[v];
+                }
             }
         }
     }
 
-    fn predict(&mut self, step: &Step<'_, S>, state: &mut State<S>, start: Start) {
+    pub(super) fn read_positions(&mut self, model: &Model<S>, state: &State<S>) {
+        for (point, &user) in self.points.iter_mut().zip(&model.numbering.order) {
+            point.set_vec3(state.positions[user as usize]);
+        }
+    }
+
+    fn read_state(&mut self, model: &Model<S>, state: &State<S>) {
+        self.read_positions(model, state);
+        for (velocity, &user) in self.velocities.iter_mut().zip(&model.numbering.order) {
+            *velocity = state.velocities[user as usize];
+        }
+    }
+
+    fn predict(&mut self, step: &Step<'_, S>, start: Start) {
         let model = step.model;
-        self.external.fill(Vec3::ZERO);
+        let ground = &mut self.ground;
+        ground.external.fill(Vec3::ZERO);
         for &(vertex, force) in &step.inputs.forces {
-            self.external[vertex as usize] += force;
+            ground.external[model.numbering.of(vertex)] += force;
         }
         let dt = S::from_f64(step.dt);
         for v in 0..model.vertex_count() {
-            let x = state.positions[v];
-            let inverse_mass = S::ONE / model.masses[v];
-            let acceleration = step.inputs.gravity + self.external[v] * inverse_mass;
-            let inertial = x + state.velocities[v] * dt;
+            let x = self.points[v].vec3();
+            let inverse_mass = S::ONE / ground.masses[v];
+            let acceleration = step.inputs.gravity + ground.external[v] * inverse_mass;
+            let inertial = x + self.velocities[v] * dt;
             let predicted = inertial + acceleration * (dt * dt);
-            self.previous[v] = x;
-            self.predicted[v] = predicted;
-            self.inverse_masses[v] = inverse_mass;
-            state.positions[v] = match start {
+            ground.previous[v].set_vec3(x);
+            ground.predicted[v].set_vec3(predicted);
+            ground.inverse_masses[v] = inverse_mass;
+            let x = match start {
                 Start::Previous => x,
                 Start::Inertial => inertial,
                 Start::Predicted | Start::Auto => predicted,
             };
+            self.points[v] = Point::new(x, inverse_mass * copy_count(model, v));
         }
         for pin in &step.inputs.pins {
-            self.inverse_masses[pin.vertex as usize] = S::ZERO;
-            state.positions[pin.vertex as usize] = pin.target;
-        }
-        for v in 0..model.vertex_count() {
-            self.weights[v] = self.inverse_masses[v] * copy_count(model, v);
+            let v = model.numbering.of(pin.vertex);
+            ground.inverse_masses[v] = S::ZERO;
+            self.points[v] = Point::new(pin.target, S::ZERO);
         }
     }
 
@@ -218,118 +277,70 @@ impl<S: Real> Workspace<S> {
         }
     }
 
-    fn remember_iterate(&mut self, state: &State<S>) {
+    fn remember_iterate(&mut self, multipliers: &[S]) {
         self.iterate.swap(0, 1);
         if self.iterate[0].positions.is_empty() {
             self.iterate.swap(0, 1);
         }
-        self.iterate[0].positions.copy_from_slice(&state.positions);
-        self.iterate[0].multipliers.copy_from_slice(&state.multipliers);
-    }
-
-    fn load_corners(&mut self, step: &Step<'_, S>, state: &State<S>) {
-        let model = step.model;
-        let (x, l) = (&state.positions, &state.multipliers);
-        for set in model.tet_sets() {
-            for tet in 0..set.len() {
-                let corners = corners(x, set.vertices[tet]);
-                let shape = &set.inverse_rest_shape[tet];
-                let at = set.multiplier_offset + set.form.multiplier_count() * tet;
-                let mut loads = match set.form {
-                    TetForm::GreenStrain => {
-                        green_strain::corner_loads(&corners, shape, &read(l, at))
-                    }
-                    TetForm::NeoHookeanPair => {
-                        neo_hookean_pair::corner_loads(&corners, shape, &read(l, at))
-                    }
-                    TetForm::NeoHookeanStretch => {
-                        neo_hookean_stretch::corner_loads(&corners, shape, &read(l, at))
-                    }
-                };
-                if let Some(offset) = set.viscous_offset {
-                    let viscous = read(l, offset + 6 * tet);
-                    let more = green_strain::corner_loads(&corners, shape, &viscous);
-                    for (load, more) in loads.iter_mut().zip(more) {
-                        load.impulse += more.impulse;
-                        load.mass_bound += more.mass_bound;
-                    }
-                }
-                let first = set.corner_offset + 4 * tet;
-                self.loads[first..first + 4].copy_from_slice(&loads);
-            }
-        }
-        let springs = &model.springs;
-        for (i, ends) in springs.vertices.iter().enumerate() {
-            let ends = ends.map(|v| x[v as usize]);
-            let loads = spring::corner_loads(&ends, l[springs.multiplier_offset + i]);
-            let first = springs.corner_offset + 2 * i;
-            self.loads[first..first + 2].copy_from_slice(&loads);
-        }
-        let attachments = &model.attachments;
-        for i in 0..attachments.vertices.len() {
-            let impulse = read_vec3(l, attachments.multiplier_offset + 3 * i);
-            let load = CornerLoad { impulse, mass_bound: S::ZERO };
-            self.loads[attachments.corner_offset + i] = load;
-        }
-    }
-
-    /// Sum of a vertex's corner loads, in the model's fixed order.
-    pub fn gather(&self, model: &Model<S>, v: usize) -> CornerLoad<S> {
-        let range = model.gather_offsets[v] as usize..model.gather_offsets[v + 1] as usize;
-        let mut sum = CornerLoad::default();
-        for &slot in &model.gather_slots[range] {
-            let load = &self.loads[slot as usize];
-            sum.impulse += load.impulse;
-            sum.mass_bound += load.mass_bound;
-        }
-        sum
+        self.iterate[0].positions.copy_from_slice(&self.points);
+        self.iterate[0].multipliers.copy_from_slice(multipliers);
     }
 
     /// Stabilised rebase: pulls positions back onto `M (x - xt) = J(x)^T l`, from which path
     /// dependence drives them, by one damped step in the metric `mh`, a share of the bound of the
     /// geometric stiffness above the mass.
-    fn rebase(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
-        let model = step.model;
-        let factor = self.rebase_factor;
-        let share = self.bound_share;
-        for v in 0..model.vertex_count() {
-            if self.inverse_masses[v] == S::ZERO {
-                continue;
+    fn rebase(&mut self, model: &Model<S>) {
+        let (factor, share) = (self.rebase_factor, self.bound_share);
+        let (ground, loads) = (&self.ground, &self.loads);
+        self.ground.each_vertex(&mut self.points, |v, point| {
+            if ground.inverse_masses[v] == S::ZERO {
+                return;
             }
-            let load = self.gather(model, v);
-            let mass = model.masses[v];
-            let residual = (state.positions[v] - self.predicted[v]) * mass - load.impulse;
-            let inverse = S::ONE / (mass + load.mass_bound * share);
-            state.positions[v] -= residual * (factor * inverse);
-            self.weights[v] = inverse * copy_count(model, v);
+            let load = gather(model, loads, v);
+            let mass = ground.masses[v];
+            let residual = (point.vec3() - ground.predicted[v].vec3()) * mass - load.vec3();
+            let inverse = S::ONE / (mass + load.w * share);
+            let x = point.vec3() - residual * (factor * inverse);
+            *point = Point::new(x, inverse * copy_count(model, v));
+        });
+    }
+
+    fn recompute_positions(&mut self, model: &Model<S>) {
+        let (ground, loads) = (&self.ground, &self.loads);
+        self.ground.each_vertex(&mut self.points, |v, point| {
+            let inverse_mass = ground.inverse_masses[v];
+            if inverse_mass != S::ZERO {
+                let impulse = gather(model, loads, v).vec3();
+                point.set_vec3(ground.predicted[v].vec3() + impulse * inverse_mass);
+            }
+        });
+    }
+
+    fn split_copies(&mut self, model: &Model<S>) {
+        for (v, point) in self.points.iter().enumerate() {
+            self.copies[copies_of(model, v)].fill(*point);
         }
     }
 
-    fn recompute_positions(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
-        for v in 0..step.model.vertex_count() {
-            if self.inverse_masses[v] != S::ZERO {
-                let impulse = self.gather(step.model, v).impulse;
-                state.positions[v] = self.predicted[v] + impulse * self.inverse_masses[v];
+    /// Averages the changes of the copies, not the copies: the mean of equal numbers is then that
+    /// number, and a vertex nobody moved stays where it is to the bit.
+    fn join_copies(&mut self, model: &Model<S>) {
+        let copies = &self.copies;
+        self.ground.each_vertex(&mut self.points, |v, point| {
+            let range = copies_of(model, v);
+            let share = S::ONE / S::from_f64(range.len() as f64);
+            let x = point.vec3();
+            let mut sum = Vec3::ZERO;
+            for copy in &copies[range] {
+                sum += copy.vec3() - x;
             }
-        }
+            point.set_vec3(x + sum * share);
+        });
     }
 
-    fn solve_color(&mut self, step: &Step<'_, S>, state: &mut State<S>, color: usize) {
-        let model = step.model;
-        let split = model.is_split();
-        let sweep = Sweep {
-            points: if split { &mut self.copies } else { &mut state.positions },
-            multipliers: &mut state.multipliers,
-            weights: &self.weights,
-            dt: step.dt,
-            relaxation: Relaxation::new(step.settings),
-        };
-        sweep.solve(step, &self.start_strain, color);
-    }
-
-    fn chebyshev(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
+    fn chebyshev(&mut self, step: &Step<'_, S>, multipliers: &mut [S]) {
         let settings = step.settings;
-        let change = self.change_norm(step, state).sqrt();
+        let change = self.change_norm(multipliers).sqrt();
         let measured = settings.chebyshev_radius == 0.0;
         let omega = self.chebyshev.weight(change, settings.chebyshev_delay, measured);
         let gamma = S::from_f64(settings.chebyshev_damping);
@@ -338,46 +349,48 @@ impl<S: Real> Workspace<S> {
         }
         let omega = S::from_f64(omega);
         let [now, older] = &self.iterate;
-        for v in 0..state.positions.len() {
+        for (v, point) in self.points.iter_mut().enumerate() {
+            let mut x = point.vec3();
+            let (q, o) = (now.positions[v].vec3(), older.positions[v].vec3());
             for axis in 0..3 {
-                let (q, o) = (now.positions[v][axis], older.positions[v][axis]);
-                chebyshev_update(&mut state.positions[v][axis], q, o, omega, gamma);
+                chebyshev_update(&mut x[axis], q[axis], o[axis], omega, gamma);
             }
+            point.set_vec3(x);
         }
-        for (i, l) in state.multipliers.iter_mut().enumerate() {
+        for (i, l) in multipliers.iter_mut().enumerate() {
             chebyshev_update(l, now.multipliers[i], older.multipliers[i], omega, gamma);
         }
     }
 
     /// Squared norm of what the sweep changed: `sum m |dx|^2 + sum a~ dl^2`.
-    fn change_norm(&self, step: &Step<'_, S>, state: &State<S>) -> f64 {
+    fn change_norm(&self, multipliers: &[S]) -> f64 {
         let mut sum = 0.0;
-        for (v, x) in state.positions.iter().enumerate() {
-            let change = *x - self.iterate[0].positions[v];
-            sum += step.model.masses[v].to_f64() * change.length_squared().to_f64();
+        for (v, x) in self.points.iter().enumerate() {
+            let change = x.vec3() - self.iterate[0].positions[v].vec3();
+            sum += self.ground.masses[v].to_f64() * change.length_squared().to_f64();
         }
-        for (i, l) in state.multipliers.iter().enumerate() {
+        for (i, l) in multipliers.iter().enumerate() {
             let change = (*l - self.iterate[0].multipliers[i]).to_f64();
             sum += self.multiplier_weights[i].to_f64() * change * change;
         }
         sum
     }
 
-    fn anderson(&mut self, step: &Step<'_, S>, state: &mut State<S>, on: AndersonOn) {
-        let vertices = state.positions.len();
+    fn anderson(&mut self, step: &Step<'_, S>, multipliers: &mut [S], on: AndersonOn) {
+        let vertices = self.points.len();
         let (mapped, residual) = self.anderson.push();
         for v in 0..vertices {
-            let before = self.iterate[0].positions[v];
+            let (x, before) = (self.points[v].vec3(), self.iterate[0].positions[v].vec3());
             for axis in 0..3 {
-                mapped[3 * v + axis] = state.positions[v][axis];
-                residual[3 * v + axis] = state.positions[v][axis] - before[axis];
+                mapped[3 * v + axis] = x[axis];
+                residual[3 * v + axis] = x[axis] - before[axis];
             }
         }
-        for (i, &l) in state.multipliers.iter().enumerate() {
+        for (i, &l) in multipliers.iter().enumerate() {
             mapped[3 * vertices + i] = l;
             residual[3 * vertices + i] = l - self.iterate[0].multipliers[i];
         }
-        let masses = &step.model.masses;
+        let masses = &self.ground.masses;
         let multiplier_weights = &self.multiplier_weights;
         let norm_weight = |i: usize| match (i < 3 * vertices, on) {
             (true, AndersonOn::Multipliers) | (false, AndersonOn::Positions) => 0.0,
@@ -388,31 +401,61 @@ impl<S: Real> Workspace<S> {
         let (weights, count) = self.anderson.mixing_weights(norm_weight, guard);
         let weights = &weights[..count];
         if on != AndersonOn::Multipliers {
-            for v in 0..vertices {
-                for axis in 0..3 {
-                    state.positions[v][axis] = self.anderson.mixed(3 * v + axis, weights);
-                }
+            for (v, point) in self.points.iter_mut().enumerate() {
+                let mixed = |axis: usize| self.anderson.mixed(3 * v + axis, weights);
+                point.set_vec3(Vec3::new(mixed(0), mixed(1), mixed(2)));
             }
         }
         if on != AndersonOn::Positions {
-            for (i, l) in state.multipliers.iter_mut().enumerate() {
+            for (i, l) in multipliers.iter_mut().enumerate() {
                 *l = self.anderson.mixed(3 * vertices + i, weights);
             }
         }
     }
 }
 
+impl<S: Real> Ground<S> {
+    /// `change` on every vertex's point.
+    fn each_vertex(
+        &self,
+        points: &mut [Point<S>],
+        change: impl Fn(usize, &mut Point<S>) + Sync,
+    ) {
+        let points = Shared::new(points);
+        self.workers.each(points.len(), GRAIN, |range| {
+            // SAFETY: every vertex is worked on once.
+            let piece = unsafe { points.range(range.clone()) };
+            for (v, point) in range.zip(piece) {
+                change(v, point);
+            }
+        });
+    }
+}
+
+/// Sum of a vertex's loads, in the order of its copies.
+pub(super) fn gather<S: Real>(model: &Model<S>, loads: &[Point<S>], v: usize) -> Point<S> {
+    let mut sum = Point::default();
+    for load in &loads[copies_of(model, v)] {
+        super::tets::add_to(&mut sum, *load);
+    }
+    sum
+}
+
+/// Places for the energies of single tetrahedra: needed where they belong to different parts.
+pub(super) fn energy_slots<S: Real>(model: &Model<S>) -> usize {
+    let blocks: usize = model.tet_sets().into_iter().map(|set| set.block_count()).sum();
+    if model.component_count > 1 { LANES * blocks } else { 0 }
+}
+
 /// Everything in a model that decides how much memory a step needs and which stages it has.
-fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 10] {
-    let viscous =
-        model.tet_sets().map(|set| if set.viscous_offset.is_some() { set.len() } else { 0 });
+fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 9] {
+    let viscous = model.tet_sets().map(|set| if set.viscous { set.len() } else { 0 });
     [
         ("solver's list of vertices", model.vertex_count()),
         ("solver's list of multipliers", model.multiplier_count),
         ("solver's list of parts", model.component_count),
         ("solver's list of colors", model.color_count),
         ("solver's list of copies", model.copy_count()),
-        ("solver's list of corners", model.gather_slots.len()),
         ("solver's list of Saint Venant-Kirchhoff tetrahedra", model.green_strain.len()),
         ("solver's list of neo-Hookean tetrahedra", model.neo_hookean.len()),
         ("solver's list of viscous Saint Venant-Kirchhoff tetrahedra", viscous[0]),
@@ -433,27 +476,11 @@ fn rebase_factor<S: Real>(model: &Model<S>, settings: &SolverSettings) -> f64 {
 }
 
 fn copy_count<S: Real>(model: &Model<S>, v: usize) -> S {
-    S::from_f64(f64::from(model.copy_offsets[v + 1] - model.copy_offsets[v]))
+    S::from_f64(copies_of(model, v).len() as f64)
 }
 
-fn split_copies<S: Real>(model: &Model<S>, positions: &[Vec3<S>], copies: &mut [Vec3<S>]) {
-    for (v, x) in positions.iter().enumerate() {
-        copies[model.copy_offsets[v] as usize..model.copy_offsets[v + 1] as usize].fill(*x);
-    }
-}
-
-/// Averages the changes of the copies, not the copies: the mean of equal numbers is then that
-/// number, and a vertex nobody moved stays where it is to the bit.
-fn join_copies<S: Real>(model: &Model<S>, copies: &[Vec3<S>], positions: &mut [Vec3<S>]) {
-    for (v, x) in positions.iter_mut().enumerate() {
-        let range = model.copy_offsets[v] as usize..model.copy_offsets[v + 1] as usize;
-        let share = S::ONE / S::from_f64(range.len() as f64);
-        let mut sum = Vec3::ZERO;
-        for copy in &copies[range] {
-            sum += *copy - *x;
-        }
-        *x += sum * share;
-    }
+fn copies_of<S: Real>(model: &Model<S>, v: usize) -> std::ops::Range<usize> {
+    model.copy_offsets[v] as usize..model.copy_offsets[v + 1] as usize
 }
 
 /// The diagonal of `a~` of every multiplier.
@@ -461,30 +488,22 @@ fn fill_multiplier_weights<S: Real>(step: &Step<'_, S>, weights: &mut [S]) {
     let model = step.model;
     let dt = S::from_f64(step.dt);
     for set in model.tet_sets() {
-        let count = set.form.multiplier_count();
-        for tet in 0..set.len() {
-            let material = &model.materials[set.material[tet] as usize];
-            let volume = set.rest_volume[tet];
-            let scale = S::ONE / (volume * dt * dt);
-            let at = set.multiplier_offset + count * tet;
-            match set.form {
-                TetForm::GreenStrain | TetForm::NeoHookeanStretch => {
-                    for p in 0..6 {
-                        weights[at + p] = material.compliance[p][p] * scale;
-                    }
+        for (block, lane) in set.places() {
+            let material = &model.materials[set.blocks[block].material[lane] as usize];
+            let volume = set.blocks[block].rest_volume[lane];
+            let step_volume = volume * dt * dt;
+            let mut store = |offset: usize, values: &[S]| {
+                for (p, &value) in values.iter().enumerate() {
+                    weights[offset + LANES * (values.len() * block + p) + lane] = value;
                 }
-                TetForm::NeoHookeanPair => {
-                    weights[at] = scale / (material.lame_lambda + material.lame_mu);
-                    weights[at + 1] = scale / material.lame_mu;
-                }
-            }
-            if let Some(offset) = set.viscous_offset
-                && material.viscosity > S::ZERO
-            {
-                for p in 0..6 {
-                    weights[offset + 6 * tet + p] =
-                        material.compliance[p][p] / (volume * material.viscosity * dt);
-                }
+            };
+            with_form!(set.form, F => {
+                store(set.multiplier_offset, &F::compliances(material, step_volume));
+            });
+            if set.viscous && material.viscosity > S::ZERO {
+                let step_volume = volume * material.viscosity * dt;
+                let values = super::forms::GreenStrain::compliances(material, step_volume);
+                store(set.viscous_offset, &values);
             }
         }
     }

@@ -18,9 +18,7 @@
 //! part that nothing holds keeps its momentum: there everything is relative to its center of mass.
 
 use super::cpu::{Step, Workspace};
-use super::potential::add_inner_potential;
 use crate::scalar::{Real, Vec3};
-use crate::state::State;
 
 /// What a connected part has and is given during a step; sums over its free vertices.
 #[derive(Clone, Copy, Debug, Default)]
@@ -77,50 +75,52 @@ impl Energy {
 }
 
 impl<S: Real> Workspace<S> {
-    /// Remembers energy and momentum before the step: `x` are the start's positions with pins moved.
-    pub(super) fn begin_energy(&mut self, step: &Step<'_, S>, x: &[Vec3<S>], v: &[Vec3<S>]) {
+    /// Remembers energy and momentum before the step, with the last evaluation of the potential.
+    pub(super) fn begin_energy(&mut self, step: &Step<'_, S>) {
         let model = step.model;
         self.energies.fill(Energy::default());
-        let energies = &mut self.energies;
-        let add = |part: usize, energy| energies[part].start.stored += energy;
-        add_inner_potential(step, &self.start_strain, x, add);
-        for &vertex in &model.attachments.vertices {
-            self.energies[model.component_of[vertex as usize] as usize].held = true;
+        for (part, stored) in self.energies.iter_mut().zip(&self.evaluator.stored) {
+            part.start.stored = *stored;
         }
-        for (vertex, &velocity) in v.iter().enumerate() {
-            let part = &mut self.energies[model.component_of[vertex] as usize];
-            if self.inverse_masses[vertex] == S::ZERO {
+        for &vertex in &model.attachments.vertices {
+            let v = model.numbering.of(vertex);
+            self.energies[model.component_of[v] as usize].held = true;
+        }
+        for (v, &velocity) in self.velocities.iter().enumerate() {
+            let part = &mut self.energies[model.component_of[v] as usize];
+            if self.ground.inverse_masses[v] == S::ZERO {
                 part.held = true;
             } else {
-                part.start.add(model.masses[vertex].to_f64(), velocity);
+                part.start.add(self.ground.masses[v].to_f64(), velocity);
             }
         }
     }
 
-    /// [`super::plan::Stage::LimitEnergy`].
-    pub(super) fn limit_energy(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
+    /// [`super::plan::Stage::LimitEnergy`]. The last evaluation of the potential was that of the end.
+    pub(super) fn limit_energy(&mut self, step: &Step<'_, S>) {
         let model = step.model;
-        let (positions, energies) = (&state.positions, &mut self.energies);
-        let add = |part: usize, energy| energies[part].end.stored += energy;
-        add_inner_potential(step, &self.start_strain, positions, add);
-        for (v, x) in positions.iter().enumerate() {
-            if self.inverse_masses[v] == S::ZERO {
+        let (ground, energies) = (&self.ground, &mut self.energies);
+        for (part, stored) in energies.iter_mut().zip(&self.evaluator.stored) {
+            part.end.stored = *stored;
+        }
+        for (v, x) in self.points.iter().enumerate() {
+            if ground.inverse_masses[v] == S::ZERO {
                 continue;
             }
             let part = &mut energies[model.component_of[v] as usize];
-            let mass = model.masses[v].to_f64();
-            let load = (step.inputs.gravity * model.masses[v] + self.external[v]).cast::<f64>();
-            let moved = (*x - self.previous[v]).cast::<f64>();
-            part.end.add(mass, state.velocities[v]);
+            let mass = ground.masses[v].to_f64();
+            let load = (step.inputs.gravity * ground.masses[v] + ground.external[v]).cast::<f64>();
+            let moved = (x.vec3() - ground.previous[v].vec3()).cast::<f64>();
+            part.end.add(mass, self.velocities[v]);
             part.mass += mass;
             part.load += load;
             part.work += load.dot(moved);
             part.shift += moved * mass;
         }
         let mut least = 1.0f64;
-        for (v, velocity) in state.velocities.iter_mut().enumerate() {
+        for (v, velocity) in self.velocities.iter_mut().enumerate() {
             let (drift, share) = energies[model.component_of[v] as usize].limit();
-            if share < 1.0 && self.inverse_masses[v] != S::ZERO {
+            if share < 1.0 && ground.inverse_masses[v] != S::ZERO {
                 let drift = drift.cast::<S>();
                 *velocity = drift + (*velocity - drift) * S::from_f64(share);
                 least = least.min(share);

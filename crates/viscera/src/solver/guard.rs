@@ -15,12 +15,12 @@
 //! else the plain sweep if its is not, else go on from it once; at the second failure in a row one
 //! step of descent from the best. `x_s` is then the best iterate.
 
-use super::cpu::{Step, Workspace};
-use super::potential::{Potential, load_forces, potential};
+use super::cpu::{Ground, Step, Workspace, gather};
+use super::potential::{Potential, load_forces};
 use super::sweep::read_vec3;
 use crate::model::Model;
+use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
-use crate::state::State;
 
 /// Shares of a rejected step that are tried in turn.
 const SHARES: [f64; 4] = [0.5, 0.2, 0.08, 0.032];
@@ -65,9 +65,9 @@ const TOLERATED: u32 = 2;
 #[derive(Clone, Debug)]
 pub(super) struct Guard<S> {
     /// `x_s` [m]: the best start, or a better iterate; empty where steps are not guarded.
-    start: Vec<Vec3<S>>,
+    start: Vec<Point<S>>,
     /// Positions under test [m].
-    trial: Vec<Vec3<S>>,
+    trial: Vec<Point<S>>,
     limit: f64,
     /// `Phi` [J s^2] at `x_s`.
     best: f64,
@@ -81,7 +81,7 @@ pub(super) struct Guard<S> {
 
 impl<S: Real> Guard<S> {
     pub fn new(vertices: usize) -> Self {
-        let positions = vec![Vec3::ZERO; vertices];
+        let positions = vec![Point::default(); vertices];
         Self {
             start: positions.clone(),
             trial: positions,
@@ -95,23 +95,29 @@ impl<S: Real> Guard<S> {
 }
 
 impl<S: Real> Workspace<S> {
-    fn potential_at(&self, step: &Step<'_, S>, x: &[Vec3<S>]) -> Potential {
-        potential(step, &self.predicted, &self.inverse_masses, &self.start_strain, x)
+    fn potential_at(&mut self, step: &Step<'_, S>, x: &[Point<S>]) -> Potential {
+        self.evaluator.evaluate(&self.ground, step, x)
+    }
+
+    /// As [`Self::potential_at`] the positions.
+    fn potential_here(&mut self, step: &Step<'_, S>) -> Potential {
+        self.evaluator.evaluate(&self.ground, step, &self.points)
     }
 
     /// [`super::plan::Stage::ChooseStart`].
-    pub(super) fn choose_start(&mut self, step: &Step<'_, S>, state: &State<S>) {
-        self.guard.start.copy_from_slice(&state.positions);
-        self.guard.limit = self.potential_at(step, &state.positions).value;
+    pub(super) fn choose_start(&mut self, step: &Step<'_, S>) {
+        self.guard.start.copy_from_slice(&self.points);
+        self.guard.limit = self.potential_here(step).value;
         for from_rest in [true, false] {
             let mut trial = std::mem::take(&mut self.guard.trial);
-            trial.copy_from_slice(if from_rest { &self.previous } else { &self.predicted });
+            let Ground { previous, predicted, .. } = &self.ground;
+            trial.copy_from_slice(if from_rest { previous } else { predicted });
             for pin in &step.inputs.pins {
-                trial[pin.vertex as usize] = pin.target;
+                trial[step.model.numbering.of(pin.vertex)].set_vec3(pin.target);
             }
             let value = self.potential_at(step, &trial).value;
             if from_rest {
-                self.begin_energy(step, &trial, &state.velocities);
+                self.begin_energy(step);
             }
             // Written so that a limit that is no number gives way.
             if value < self.guard.limit || !self.guard.limit.is_finite() {
@@ -125,18 +131,18 @@ impl<S: Real> Workspace<S> {
     }
 
     /// [`super::plan::Stage::GuardIterate`].
-    pub(super) fn guard_iterate(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
-        if self.is_best(step, &state.positions) {
+    pub(super) fn guard_iterate(&mut self, step: &Step<'_, S>, multipliers: &mut [S]) {
+        if self.is_best(step) {
             return;
         }
         let (plain, is_mixed) = self.anderson.newest();
         if is_mixed {
-            let (positions, multipliers) = plain.split_at(3 * state.positions.len());
-            for (v, x) in state.positions.iter_mut().enumerate() {
-                *x = read_vec3(positions, 3 * v);
+            let (plain_positions, plain_multipliers) = plain.split_at(3 * self.points.len());
+            for (v, point) in self.points.iter_mut().enumerate() {
+                point.set_vec3(read_vec3(plain_positions, 3 * v));
             }
-            state.multipliers.copy_from_slice(multipliers);
-            if self.is_best(step, &state.positions) {
+            multipliers.copy_from_slice(plain_multipliers);
+            if self.is_best(step) {
                 return;
             }
         }
@@ -146,21 +152,28 @@ impl<S: Real> Workspace<S> {
         }
         let mut trial = std::mem::take(&mut self.guard.trial);
         trial.copy_from_slice(&self.guard.start);
-        self.descend(step, &mut trial, &mut state.positions);
-        state.positions.copy_from_slice(&trial);
+        self.descend(step, &mut trial);
+        self.take(&trial);
         self.guard.trial = trial;
-        self.is_best(step, &state.positions);
+        self.is_best(step);
         self.guard.failures = 0;
         // The older sweeps started elsewhere.
         self.anderson.start();
     }
 
-    /// Whether an iterate is at least as good as the best so far; becomes it where it is better.
-    fn is_best(&mut self, step: &Step<'_, S>, x: &[Vec3<S>]) -> bool {
-        let Potential { value, noise } = self.potential_at(step, x);
+    /// Takes positions over; weights stay.
+    fn take(&mut self, x: &[Point<S>]) {
+        for (point, x) in self.points.iter_mut().zip(x) {
+            point.set_vec3(x.vec3());
+        }
+    }
+
+    /// Whether the iterate is at least as good as the best so far; becomes it where it is better.
+    fn is_best(&mut self, step: &Step<'_, S>) -> bool {
+        let Potential { value, noise } = self.potential_here(step);
         if value < self.guard.best {
             self.guard.best = value;
-            self.guard.start.copy_from_slice(x);
+            self.guard.start.copy_from_slice(&self.points);
         }
         let good = value <= self.guard.best + noise;
         if good {
@@ -170,8 +183,9 @@ impl<S: Real> Workspace<S> {
     }
 
     /// [`super::plan::Stage::GuardStep`].
-    pub(super) fn guard_step(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
-        let swept = self.report_at(step, &state.positions);
+    pub(super) fn guard_step(&mut self, step: &Step<'_, S>) {
+        let swept = self.potential_here(step);
+        let swept = self.report(swept);
         if swept.keeps_limit() {
             self.guard.report = Some(swept);
             return;
@@ -181,25 +195,26 @@ impl<S: Real> Workspace<S> {
         let shortened = SHARES.into_iter().find_map(|share| {
             let share = S::from_f64(share);
             for v in 0..trial.len() {
-                let start = self.guard.start[v];
-                trial[v] = start + (state.positions[v] - start) * share;
+                let start = self.guard.start[v].vec3();
+                trial[v].set_vec3(start + (self.points[v].vec3() - start) * share);
             }
-            Some(self.report_at(step, &trial)).filter(StepReport::keeps_limit)
+            let potential = self.potential_at(step, &trial);
+            Some(self.report(potential)).filter(StepReport::keeps_limit)
         });
         let report = shortened.unwrap_or_else(|| {
             trial.copy_from_slice(&self.guard.start);
             for _ in 0..DESCENTS {
-                self.descend(step, &mut trial, &mut state.positions);
+                self.descend(step, &mut trial);
             }
-            self.report_at(step, &trial)
+            let potential = self.potential_at(step, &trial);
+            self.report(potential)
         });
         self.guard.report = Some(StepReport { rejected: true, ..report });
-        state.positions.copy_from_slice(&trial);
+        self.take(&trial);
         self.guard.trial = trial;
     }
 
-    fn report_at(&self, step: &Step<'_, S>, x: &[Vec3<S>]) -> StepReport {
-        let Potential { value, noise } = self.potential_at(step, x);
+    fn report(&self, Potential { value, noise }: Potential) -> StepReport {
         StepReport {
             potential: value,
             limit: self.guard.limit,
@@ -209,9 +224,10 @@ impl<S: Real> Workspace<S> {
         }
     }
 
-    /// One step of descent from `x`, with `scratch` for the places tried.
-    fn descend(&mut self, step: &Step<'_, S>, x: &mut [Vec3<S>], scratch: &mut [Vec3<S>]) {
-        load_forces(step, &self.start_strain, x, &mut self.loads);
+    /// One step of descent from `x`. The positions, which are not needed any more, hold the places
+    /// tried.
+    fn descend(&mut self, step: &Step<'_, S>, x: &mut [Point<S>]) {
+        load_forces(&self.ground, step, x, &mut self.loads);
         let before = self.potential_at(step, x).value;
         let mut length = 1.0;
         for _ in 0..SHORTENINGS {
@@ -219,11 +235,11 @@ impl<S: Real> Workspace<S> {
             for v in 0..x.len() {
                 let (gradient, direction) = self.descent(step.model, x, v);
                 slope += gradient.dot(direction).to_f64();
-                scratch[v] = x[v] + direction * S::from_f64(length);
+                self.points[v].set_vec3(x[v].vec3() + direction * S::from_f64(length));
             }
-            let after = self.potential_at(step, scratch).value;
+            let after = self.potential_here(step).value;
             if after <= before + SUFFICIENT * length * slope {
-                x.copy_from_slice(scratch);
+                x.copy_from_slice(&self.points);
                 return;
             }
             length *= SHORTEN;
@@ -231,13 +247,13 @@ impl<S: Real> Workspace<S> {
     }
 
     /// Gradient of `Phi` by one vertex and the direction of descent; zero for a pinned one.
-    fn descent(&self, model: &Model<S>, x: &[Vec3<S>], v: usize) -> (Vec3<S>, Vec3<S>) {
-        if self.inverse_masses[v] == S::ZERO {
+    fn descent(&self, model: &Model<S>, x: &[Point<S>], v: usize) -> (Vec3<S>, Vec3<S>) {
+        if self.ground.inverse_masses[v] == S::ZERO {
             return (Vec3::ZERO, Vec3::ZERO);
         }
-        let load = self.gather(model, v);
-        let mass = model.masses[v];
-        let gradient = (x[v] - self.predicted[v]) * mass - load.impulse;
-        (gradient, gradient * (-S::ONE / (mass + load.mass_bound)))
+        let load = gather(model, &self.loads, v);
+        let mass = self.ground.masses[v];
+        let gradient = (x[v].vec3() - self.ground.predicted[v].vec3()) * mass - load.vec3();
+        (gradient, gradient * (-S::ONE / (mass + load.w)))
     }
 }

@@ -13,13 +13,17 @@
 //! tetrahedra: at 10 x 2 and 4 x 5 the error of the motion after a large release falls by 1 to 10 %
 //! of itself, and after the release of one settled pin it grows to 4 to 9 times itself.
 
+#![allow(unsafe_code)]
+
+use std::marker::PhantomData;
+
 use super::cpu::{Step, Workspace};
-use super::sweep::corners;
-use crate::elements::{
-    TetForm, attachment, deformation_gradient, green_strain, neo_hookean_pair, neo_hookean_stretch,
-    spring,
-};
-use crate::model::TetSet;
+use super::forms::{Form, pass_by_form, with_form};
+use super::potential::measure_strain;
+use super::tets::{Block, TetPass, load_rows};
+use super::threads::Shared;
+use crate::elements::{attachment, deformation_gradient, green_strain, spring};
+use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::scalar::Real;
 use crate::state::State;
 
@@ -27,30 +31,35 @@ impl<S: Real> Workspace<S> {
     /// Takes the multipliers from the positions, as if the tissue had long been there: what is
     /// viscous has relaxed.
     pub(super) fn restart(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
-        self.measure_strain(step, state);
-        self.constitutive_multipliers(step, state);
+        self.read_positions(step.model, state);
+        let ground = &mut self.ground;
+        measure_strain(&ground.workers, step.model, &self.points, &mut ground.start_strain);
+        self.constitutive_multipliers(step, &mut state.multipliers);
         state.multiplier_dt = step.dt;
     }
 
     /// [`super::plan::Stage::RepairMultipliers`].
-    pub(super) fn repair_multipliers(&self, step: &Step<'_, S>, state: &mut State<S>) {
-        if !state.multipliers.iter().all(|l| l.is_finite()) {
-            self.constitutive_multipliers(step, state);
+    pub(super) fn repair_multipliers(&self, step: &Step<'_, S>, multipliers: &mut [S]) {
+        if !multipliers.iter().all(|l| l.is_finite()) {
+            self.constitutive_multipliers(step, multipliers);
         }
     }
 
-    fn constitutive_multipliers(&self, step: &Step<'_, S>, state: &mut State<S>) {
+    fn constitutive_multipliers(&self, step: &Step<'_, S>, l: &mut [S]) {
         let model = step.model;
-        for (set, strains) in model.tet_sets().into_iter().zip(&self.start_strain) {
-            for tet in 0..set.len() {
-                tet_multipliers(step, set, strains, tet, state);
-            }
+        let x = &self.points;
+        let shared = Shared::new(l);
+        for (set, start_strain) in model.tet_sets().into_iter().zip(&self.ground.start_strain) {
+            with_form!(set.form, F => {
+                let form = PhantomData::<F>;
+                let pass = Constitutive { x, start_strain, dt: step.dt, l: &shared, form };
+                self.ground.workers.pass(model, set, 0..set.block_count(), &pass);
+            });
         }
-        let (x, l) = (&state.positions, &mut state.multipliers);
         let squared = S::from_f64(step.dt * step.dt);
         let springs = &model.springs;
         for (i, ends) in springs.vertices.iter().enumerate() {
-            let ends = ends.map(|v| x[v as usize]);
+            let ends = ends.map(|v| x[model.numbering.of(v)].vec3());
             let compliance_tilde = S::ONE / (springs.stiffness[i] * squared);
             l[springs.multiplier_offset + i] =
                 spring::constitutive_multiplier(&ends, springs.rest_length[i], compliance_tilde);
@@ -61,8 +70,8 @@ impl<S: Real> Workspace<S> {
             let anchor = anchors[attachments.order[i] as usize];
             let compliance_tilde = S::ONE / (attachments.stiffness[i] * squared);
             let at = attachments.multiplier_offset + 3 * i;
-            let pull =
-                attachment::constitutive_multipliers(x[v as usize], anchor, compliance_tilde);
+            let place = x[model.numbering.of(v)].vec3();
+            let pull = attachment::constitutive_multipliers(place, anchor, compliance_tilde);
             l[at..at + 3].copy_from_slice(&pull.to_array());
         }
         // Of a tetrahedron too large for the number format nothing can be told.
@@ -72,45 +81,40 @@ impl<S: Real> Workspace<S> {
     }
 }
 
-fn tet_multipliers<S: Real>(
-    step: &Step<'_, S>,
-    set: &TetSet<S>,
-    start_strain: &[green_strain::Voigt<S>],
-    tet: usize,
-    state: &mut State<S>,
-) {
-    let material = &step.model.materials[set.material[tet] as usize];
-    let (lambda, mu) = (material.lame_lambda, material.lame_mu);
-    let step_volume = set.rest_volume[tet] * S::from_f64(step.dt * step.dt);
-    let x = corners(&state.positions, set.vertices[tet]);
-    let f = deformation_gradient(&x, &set.inverse_rest_shape[tet]);
-    let count = set.form.multiplier_count();
-    let at = set.multiplier_offset + count * tet;
-    let l = &mut state.multipliers[at..at + count];
-    match set.form {
-        TetForm::GreenStrain => {
-            let strain = green_strain::strain(&f);
-            let values = green_strain::constitutive_multipliers(&strain, lambda, mu, step_volume);
-            l.copy_from_slice(&values);
-        }
-        TetForm::NeoHookeanPair => l.copy_from_slice(&neo_hookean_pair::constitutive_multipliers(
-            &f,
-            lambda,
-            mu,
-            step_volume,
-        )),
-        TetForm::NeoHookeanStretch => l.copy_from_slice(
-            &neo_hookean_stretch::constitutive_multipliers(&f, lambda, mu, step_volume),
-        ),
-    }
-    let Some(viscous_offset) = set.viscous_offset else { return };
-    let mut change = green_strain::strain(&f);
-    for p in 0..6 {
-        change[p] -= start_strain[tet][p];
-    }
-    // Kelvin-Voigt: V eta dt takes the place of V dt^2.
-    let scale = set.rest_volume[tet] * material.viscosity * S::from_f64(step.dt);
-    let values = green_strain::constitutive_multipliers(&change, lambda, mu, scale);
-    let at = viscous_offset + 6 * tet;
-    state.multipliers[at..at + 6].copy_from_slice(&values);
+struct Constitutive<'a, S, F> {
+    x: &'a [Point<S>],
+    start_strain: &'a [[Eight<S>; 6]],
+    dt: f64,
+    l: &'a Shared<'a, S>,
+    form: PhantomData<F>,
 }
+
+impl<S: Real, F> Constitutive<'_, S, F> {
+    #[inline(always)]
+    fn store<L: Lanes<Real = S>, const N: usize>(&self, tets: &Block<'_, S>)
+    where
+        F: Form<N>,
+    {
+        let (corners, shape) = (tets.corners::<L>(self.x), tets.shape());
+        let (material, volume) = (tets.material::<L>(), tets.volume::<L>());
+        let step_volume = volume * L::from_f64(self.dt * self.dt);
+        let elastic: [L; N] = F::constitutive(&corners.x, &shape, &material, step_volume);
+        // SAFETY: every block has multipliers of its own and is worked on once.
+        unsafe { tets.store_multipliers(tets.set.multiplier_offset, self.l, elastic) };
+        if tets.set.viscous {
+            let mut change = green_strain::strain(&deformation_gradient(&corners.x, &shape));
+            let start: [L; 6] = load_rows(self.start_strain[tets.index].as_flattened());
+            for p in 0..6 {
+                change[p] -= start[p];
+            }
+            // Kelvin-Voigt: V eta dt takes the place of V dt^2.
+            let scale = volume * material.viscosity * L::from_f64(self.dt);
+            let (lambda, mu) = (material.lame_lambda, material.lame_mu);
+            let viscous = green_strain::constitutive_multipliers(&change, lambda, mu, scale);
+            // SAFETY: as above.
+            unsafe { tets.store_multipliers(tets.set.viscous_offset, self.l, viscous) };
+        }
+    }
+}
+
+pass_by_form!(Constitutive store);

@@ -11,11 +11,15 @@ pub mod acceleration;
 pub mod balance;
 pub mod cpu;
 mod energy;
+mod forms;
 mod guard;
 mod history;
+mod loads;
 pub mod plan;
 mod potential;
 mod sweep;
+mod tets;
+mod threads;
 
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
@@ -147,18 +151,14 @@ impl<S: Real> Solver<S> {
         dt: f64,
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
-        let step = cpu::Step { model, inputs, dt, settings: &self.settings };
-        for stage in &self.plan.prologue {
-            self.work.run(stage, &step, state);
-        }
-        for _ in 0..self.plan.repeat {
-            for stage in &self.plan.body {
-                self.work.run(stage, &step, state);
+        let Self { settings, plan, work } = self;
+        let step = cpu::Step { model, inputs, dt, settings };
+        let workers = work.ground.workers.clone();
+        workers.enter(|| {
+            for stage in plan.stages() {
+                work.run(stage, &step, state);
             }
-        }
-        for stage in &self.plan.epilogue {
-            self.work.run(stage, &step, state);
-        }
+        });
         Ok(())
     }
 
@@ -193,6 +193,11 @@ impl<S: Real> Solver<S> {
         }
         check(model, state, inputs)?;
         self.work.check(model)
+    }
+
+    /// How many threads a step is done by.
+    pub fn thread_count(&self) -> usize {
+        self.work.ground.workers.count()
     }
 
     /// How often steps have been taken back since the solver was built.

@@ -10,6 +10,8 @@ use crate::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, S
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Stage {
+    /// Takes positions and velocities over, in the solver's numbering.
+    ReadState,
     /// Remembers the Green strain of viscous tetrahedra at the start of the step.
     MeasureStrain,
     /// `xt = x + dt v + dt^2 M^-1 f_ext`; `x` becomes the start of the iteration, pins move to
@@ -51,6 +53,8 @@ pub enum Stage {
     UpdateVelocities,
     /// Scales velocities down where the step would end with more mechanical energy than it had.
     LimitEnergy,
+    /// Gives positions and velocities back, in the user's numbering.
+    WriteState,
 }
 
 /// The stages of one step: `prologue`, then `repeat` times `body`, then `epilogue`.
@@ -67,13 +71,19 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// All stages in the order in which they are run.
+    pub fn stages(&self) -> impl Iterator<Item = &Stage> {
+        let body = (0..self.repeat).flat_map(|_| &self.body);
+        self.prologue.iter().chain(body).chain(&self.epilogue)
+    }
+
     /// The XPBD family.
     pub fn new<S>(model: &Model<S>, settings: &SolverSettings) -> Self
     where
         S: crate::scalar::Real,
     {
-        let mut prologue = Vec::new();
-        if model.tet_sets().iter().any(|set| set.viscous_offset.is_some()) {
+        let mut prologue = vec![Stage::ReadState];
+        if model.tet_sets().iter().any(|set| set.viscous) {
             prologue.push(Stage::MeasureStrain);
         }
         // A kept multiplier already carries gravity: adding it to the start counts it twice.
@@ -131,6 +141,7 @@ impl Plan {
         if settings.guards_steps() {
             epilogue.push(Stage::LimitEnergy);
         }
+        epilogue.push(Stage::WriteState);
         Self { prologue, repeat: settings.iterations, body, epilogue }
     }
 }

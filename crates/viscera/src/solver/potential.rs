@@ -5,15 +5,22 @@
 //! viscosity: W += eta/(2 dt) |C - C_n|_D^2
 //! ```
 
-use super::cpu::Step;
-use super::sweep::corners;
+#![allow(unsafe_code)]
+
+use std::cell::Cell;
+
+use super::cpu::{Ground, StartStrain, Step, energy_slots};
+use super::loads::{add_load, points};
+use super::tets::{Block, TetPass, load_rows};
+use super::threads::Shared;
 use crate::elements::green_strain::{self, Voigt};
 use crate::elements::{
     CornerLoad, attachment, deformation_gradient, internal_forces, neo_hookean, shape_gradients,
     spring,
 };
 use crate::material::MaterialModel;
-use crate::model::{Model, TetSet};
+use crate::model::{MaterialConstants, Model, TetSet};
+use crate::scalar::lanes::{Eight, LANES, Lanes, Point};
 use crate::scalar::{Mat3, Real, Scalar, Vec3};
 
 /// The constants of a tetrahedron's tissue for one step.
@@ -38,6 +45,17 @@ pub(super) struct Response<S> {
 }
 
 impl<S: Scalar> Tissue<S> {
+    /// Of one material; `dt` is the step [s].
+    #[inline(always)]
+    pub fn new(model: MaterialModel, material: &MaterialConstants<S>, dt: f64) -> Self {
+        Self {
+            model,
+            lame_lambda: material.lame_lambda,
+            lame_mu: material.lame_mu,
+            viscosity_rate: material.viscosity * S::from_f64(1.0 / dt),
+        }
+    }
+
     /// Elastic energy density [Pa].
     #[inline(always)]
     fn elastic_energy(&self, f: &Mat3<S>) -> S {
@@ -54,13 +72,6 @@ impl<S: Scalar> Tissue<S> {
     #[inline(always)]
     fn viscous_energy(&self, change: &Voigt<S>) -> S {
         self.viscosity_rate * green_strain::energy_density(change, self.lame_lambda, self.lame_mu)
-    }
-
-    /// Density [Pa] of the potential; `start` as in [`Tissue::respond`].
-    #[inline(always)]
-    fn potential(&self, f: &Mat3<S>, start: Option<&Voigt<S>>) -> S {
-        let viscous = start.map(|start| self.viscous_energy(&change_since(f, start)));
-        self.elastic_energy(f) + viscous.unwrap_or(S::ZERO)
     }
 
     /// Energies and stress; `start` is the Green strain at the start of the step, where the tissue
@@ -128,140 +139,291 @@ pub(super) struct Potential {
     pub noise: f64,
 }
 
-/// One evaluation of `Phi`: adds up in double precision, in a fixed order.
-pub(super) fn potential<S: Real>(
-    step: &Step<'_, S>,
-    predicted: &[Vec3<S>],
-    inverse_masses: &[S],
-    start_strain: &[Vec<Voigt<S>>; 2],
-    x: &[Vec3<S>],
-) -> Potential {
-    let model = step.model;
-    let squared = step.dt * step.dt;
-    let (mut value, mut noise) = (0.0, 0.0);
-    let mut reach = 0.0f64;
-    for v in 0..x.len() {
-        reach = reach.max(x[v].length_squared().to_f64());
-        if inverse_masses[v] != S::ZERO {
-            value += 0.5 * (model.masses[v] * (x[v] - predicted[v]).length_squared()).to_f64();
-        }
-    }
-    let rounding = S::EPSILON * reach.sqrt();
-    for (set, strains) in model.tet_sets().into_iter().zip(start_strain) {
-        for tet in 0..set.len() {
-            let shape = &set.inverse_rest_shape[tet];
-            let f = deformation_gradient(&corners(x, set.vertices[tet]), shape);
-            let response = tissue(model, set, tet, step.dt).respond(&f, strains.get(tet));
-            let volume = squared * set.rest_volume[tet].to_f64();
-            value += volume * (response.elastic_energy + response.viscous_energy).to_f64();
-            let force =
-                volume * (response.piola.norm_squared() * shape.norm_squared()).sqrt().to_f64();
-            noise += (force * rounding) * (force * rounding);
-        }
-    }
-    let springs = &model.springs;
-    for (i, ends) in springs.vertices.iter().enumerate() {
-        let ends = [x[ends[0] as usize], x[ends[1] as usize]];
-        let energy = spring::energy(&ends, springs.rest_length[i], springs.stiffness[i]);
-        value += squared * energy.to_f64();
-    }
-    let attachments = &model.attachments;
-    let anchors = step.inputs.anchors_of(model);
-    for (i, &v) in attachments.vertices.iter().enumerate() {
-        let anchor = anchors[attachments.order[i] as usize];
-        let energy = attachment::energy(x[v as usize], anchor, attachments.stiffness[i]);
-        value += squared * energy.to_f64();
-    }
-    // Rounding has no direction: squares add up. Two evaluations are compared, each of which has
-    // also its own arithmetic's round-off, of the same size.
-    Potential { value, noise: 4.0 * noise.sqrt() + 8.0 * f64::EPSILON * value.abs() }
+/// Blocks, and vertices, whose sum is taken first. Part of the result's bits.
+const PIECE: usize = 64;
+const VERTEX_PIECE: usize = 1024;
+
+/// Evaluates `Phi`: adds up in double precision, in a fixed order.
+#[derive(Clone, Debug)]
+pub(super) struct Evaluator<S> {
+    /// Potential [J] of tissue, springs and attachments of each part of the model, as of the last
+    /// evaluation.
+    pub stored: Vec<f64>,
+    /// Of each tetrahedron [J], where there are several parts.
+    energies: Vec<S>,
+    partial: Vec<[f64; 2]>,
 }
 
-/// Adds the potential [J] of tissue, springs and attachments at `x` to the part of the model to which
-/// it belongs.
-pub(super) fn add_inner_potential<S: Real>(
-    step: &Step<'_, S>,
-    start_strain: &[Vec<Voigt<S>>; 2],
-    x: &[Vec3<S>],
-    mut add: impl FnMut(usize, f64),
-) {
-    let model = step.model;
-    let mut store =
-        |vertex: u32, energy: f64| add(model.component_of[vertex as usize] as usize, energy);
-    for (set, strains) in model.tet_sets().into_iter().zip(start_strain) {
-        for (tet, vertices) in set.vertices.iter().enumerate() {
-            let f = deformation_gradient(&corners(x, *vertices), &set.inverse_rest_shape[tet]);
-            let density = tissue(model, set, tet, step.dt).potential(&f, strains.get(tet));
-            store(vertices[0], (set.rest_volume[tet] * density).to_f64());
+impl<S: Real> Evaluator<S> {
+    /// For a model, or for none.
+    pub fn new(model: Option<&Model<S>>) -> Self {
+        let Some(model) = model else {
+            return Self { stored: Vec::new(), energies: Vec::new(), partial: Vec::new() };
+        };
+        let blocks = model.tet_sets().map(TetSet::block_count);
+        let pieces = blocks.map(|count| count.div_ceil(PIECE)).into_iter();
+        let pieces = pieces.max().unwrap_or(0).max(model.vertex_count().div_ceil(VERTEX_PIECE));
+        Self {
+            stored: vec![0.0; model.component_count],
+            energies: vec![S::ZERO; energy_slots(model)],
+            partial: vec![[0.0; 2]; pieces],
         }
     }
-    let springs = &model.springs;
-    for (i, ends) in springs.vertices.iter().enumerate() {
-        let places = [x[ends[0] as usize], x[ends[1] as usize]];
-        let energy = spring::energy(&places, springs.rest_length[i], springs.stiffness[i]);
-        store(ends[0], energy.to_f64());
-    }
-    let attachments = &model.attachments;
-    let anchors = step.inputs.anchors_of(model);
-    for (i, &v) in attachments.vertices.iter().enumerate() {
-        let anchor = anchors[attachments.order[i] as usize];
-        store(v, attachment::energy(x[v as usize], anchor, attachments.stiffness[i]).to_f64());
-    }
-}
 
-/// Per corner `dt^2` times the force of its element, and the bound of its curvature: the gradient of
-/// `Phi` without inertia, in the slots that the rebase uses as well.
-pub(super) fn load_forces<S: Real>(
-    step: &Step<'_, S>,
-    start_strain: &[Vec<Voigt<S>>; 2],
-    x: &[Vec3<S>],
-    loads: &mut [CornerLoad<S>],
-) {
-    let model = step.model;
-    let squared = S::from_f64(step.dt * step.dt);
-    for (set, strains) in model.tet_sets().into_iter().zip(start_strain) {
-        for tet in 0..set.len() {
-            let shape = &set.inverse_rest_shape[tet];
-            let f = deformation_gradient(&corners(x, set.vertices[tet]), shape);
-            let tissue = tissue(model, set, tet, step.dt);
-            let response = tissue.respond(&f, strains.get(tet));
-            let volume = squared * set.rest_volume[tet];
-            let forces = internal_forces(&response.piola, shape, volume);
-            let g = shape_gradients(shape);
-            for i in 0..4 {
-                let mass_bound = volume * tissue.curvature(&f, g[i]);
-                loads[set.corner_offset + 4 * tet + i] =
-                    CornerLoad { impulse: forces[i], mass_bound };
+    /// `Phi` at `x`.
+    pub fn evaluate(
+        &mut self,
+        ground: &Ground<S>,
+        step: &Step<'_, S>,
+        x: &[Point<S>],
+    ) -> Potential {
+        let inertia = |range: std::ops::Range<usize>| {
+            let (mut sum, mut reach) = (0.0, 0.0f64);
+            for v in range {
+                let place = x[v].vec3();
+                reach = reach.max(place.length_squared().to_f64());
+                if ground.inverse_masses[v] != S::ZERO {
+                    let away = (place - ground.predicted[v].vec3()).length_squared();
+                    sum += (ground.masses[v] * away).to_f64();
+                }
+            }
+            [sum, reach]
+        };
+        let work = (x.len(), VERTEX_PIECE);
+        let combine = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1].max(b[1])];
+        let inertia = ground.workers.reduce(work, &mut self.partial, inertia, combine);
+        let [inertia, reach] = inertia.unwrap_or_default();
+
+        self.stored.fill(0.0);
+        let mut squared_noise = 0.0;
+        for (kind, set) in step.model.tet_sets().into_iter().enumerate() {
+            squared_noise += self.add_tets(ground, step, kind, x);
+            if self.stored.len() > 1 {
+                self.add_by_part(step.model, kind, set);
             }
         }
+        self.add_single(step, x);
+        let squared = step.dt * step.dt;
+        let value = 0.5 * inertia + squared * self.stored.iter().sum::<f64>();
+        let noise = squared * S::EPSILON * (reach * squared_noise).sqrt();
+        // Rounding has no direction: squares add up. Two evaluations are compared, each of which has
+        // also its own arithmetic's round-off, of the same size.
+        Potential { value, noise: 4.0 * noise + 8.0 * f64::EPSILON * value.abs() }
     }
+
+    /// Adds the energies of a set where there is one part; returns the sum of squared forces.
+    fn add_tets(
+        &mut self,
+        ground: &Ground<S>,
+        step: &Step<'_, S>,
+        kind: usize,
+        x: &[Point<S>],
+    ) -> f64 {
+        let model = step.model;
+        let set = model.tet_sets()[kind];
+        let first = if kind == 0 { 0 } else { LANES * model.green_strain.block_count() };
+        let energies = Shared::new(&mut self.energies);
+        let map = |blocks| {
+            let sums = Sums {
+                x,
+                start_strain: &ground.start_strain[kind],
+                dt: step.dt,
+                energies: (energies.len() > 0).then_some((&energies, first)),
+                energy: Cell::default(),
+                squared_force: Cell::default(),
+            };
+            ground.workers.piece(model, set, blocks, &sums);
+            [sums.energy, sums.squared_force].map(|lanes| lanes.get().iter().sum())
+        };
+        let work = (set.block_count(), PIECE);
+        let combine = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
+        let sums = ground.workers.reduce(work, &mut self.partial, map, combine);
+        let [energy, squared_force] = sums.unwrap_or_default();
+        if let [only] = &mut self.stored[..] {
+            *only += energy;
+        }
+        squared_force
+    }
+
+    /// Adds the energies of a set to the parts of the model, one by one.
+    fn add_by_part(&mut self, model: &Model<S>, kind: usize, set: &TetSet<S>) {
+        let first = if kind == 0 { 0 } else { model.green_strain.block_count() };
+        for (block, lane) in set.places() {
+            let part = model.component_of[set.blocks[block].vertices[0][lane] as usize];
+            self.stored[part as usize] += self.energies[LANES * (first + block) + lane].to_f64();
+        }
+    }
+
+    fn add_single(&mut self, step: &Step<'_, S>, x: &[Point<S>]) {
+        let model = step.model;
+        let mut store = |v: usize, energy: S| {
+            self.stored[model.component_of[v] as usize] += energy.to_f64();
+        };
+        let springs = &model.springs;
+        for (i, ends) in springs.vertices.iter().enumerate() {
+            let ends = ends.map(|v| model.numbering.of(v));
+            let places = ends.map(|v| x[v].vec3());
+            store(ends[0], spring::energy(&places, springs.rest_length[i], springs.stiffness[i]));
+        }
+        let attachments = &model.attachments;
+        let anchors = step.inputs.anchors_of(model);
+        for (i, &v) in attachments.vertices.iter().enumerate() {
+            let v = model.numbering.of(v);
+            let anchor = anchors[attachments.order[i] as usize];
+            store(v, attachment::energy(x[v].vec3(), anchor, attachments.stiffness[i]));
+        }
+    }
+}
+
+/// Energies [J] and squared forces [N^2] of a piece, lane by lane.
+struct Sums<'a, S> {
+    x: &'a [Point<S>],
+    start_strain: &'a [[Eight<S>; 6]],
+    dt: f64,
+    /// Where each tetrahedron's energy goes, and the place of the set's first.
+    energies: Option<(&'a Shared<'a, S>, usize)>,
+    energy: Cell<Eight<f64>>,
+    squared_force: Cell<Eight<f64>>,
+}
+
+impl<S: Real> TetPass<S> for Sums<'_, S> {
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let shape = tets.shape::<L>();
+        let (_, response) = respond::<S, L>(tets, self.x, self.start_strain, self.dt);
+        let volume = tets.volume::<L>();
+        let density = response.elastic_energy + response.viscous_energy;
+        let energy = (volume * density).to_array();
+        let stress = (response.piola.norm_squared() * shape.norm_squared()).to_array();
+        let volume = volume.to_array();
+        let (mut energies, mut forces) = (self.energy.get(), self.squared_force.get());
+        for lane in 0..LANES {
+            let counts = if lane < tets.filled() { 1.0 } else { 0.0 };
+            let volume = counts * volume[lane].to_f64();
+            energies[lane] += counts * energy[lane].to_f64();
+            forces[lane] += volume * volume * stress[lane].to_f64();
+        }
+        self.energy.set(energies);
+        self.squared_force.set(forces);
+        if let Some((all, first)) = self.energies {
+            let at = first + LANES * tets.index;
+            // SAFETY: every block has places of its own and is worked on once.
+            unsafe { all.range(at..at + LANES) }.copy_from_slice(&energy);
+        }
+    }
+}
+
+/// `F` and what the tissue answers to it.
+#[inline(always)]
+fn respond<S: Real, L: Lanes<Real = S>>(
+    tets: &Block<'_, S>,
+    x: &[Point<S>],
+    start_strain: &[[Eight<S>; 6]],
+    dt: f64,
+) -> (Mat3<L>, Response<L>) {
+    let f = deformation_gradient(&tets.corners::<L>(x).x, &tets.shape());
+    let tissue = Tissue::new(tets.set.model, &tets.material(), dt);
+    let response = if tets.set.viscous {
+        let start: Voigt<L> = load_rows(start_strain[tets.index].as_flattened());
+        tissue.respond(&f, Some(&start))
+    } else {
+        tissue.respond(&f, None)
+    };
+    (f, response)
+}
+
+/// Per copy `dt^2` times the force of its elements, and the bound of their curvature: the gradient of
+/// `Phi` without inertia, in the places that the rebase uses as well.
+pub(super) fn load_forces<S: Real>(
+    ground: &Ground<S>,
+    step: &Step<'_, S>,
+    x: &[Point<S>],
+    loads: &mut [Point<S>],
+) {
+    let model = step.model;
+    loads.fill(Point::default());
+    for color in 0..model.color_count {
+        let shared = Shared::new(loads);
+        for (set, start_strain) in model.tet_sets().into_iter().zip(&ground.start_strain) {
+            let pass = Forces { x, start_strain, dt: step.dt, loads: &shared };
+            ground.workers.pass(model, set, set.color(color), &pass);
+        }
+    }
+    let squared = S::from_f64(step.dt * step.dt);
     let springs = &model.springs;
     for (i, ends) in springs.vertices.iter().enumerate() {
-        let ends = [x[ends[0] as usize], x[ends[1] as usize]];
+        let ends = ends.map(|v| x[model.numbering.of(v)].vec3());
         let forces = spring::forces(&ends, springs.rest_length[i], springs.stiffness[i]);
         let mass_bound = squared * springs.stiffness[i];
-        for (end, force) in forces.into_iter().enumerate() {
-            loads[springs.corner_offset + 2 * i + end] =
-                CornerLoad { impulse: force * squared, mass_bound };
+        for (copy, force) in springs.copies[i].into_iter().zip(forces) {
+            add_load(loads, copy, &CornerLoad { impulse: force * squared, mass_bound });
         }
     }
     let attachments = &model.attachments;
     let anchors = step.inputs.anchors_of(model);
     for (i, &v) in attachments.vertices.iter().enumerate() {
-        let (anchor, stiffness) =
-            (anchors[attachments.order[i] as usize], attachments.stiffness[i]);
-        let force = attachment::force(x[v as usize], anchor, stiffness);
-        loads[attachments.corner_offset + i] =
-            CornerLoad { impulse: force * squared, mass_bound: squared * stiffness };
+        let stiffness = attachments.stiffness[i];
+        let anchor = anchors[attachments.order[i] as usize];
+        let force = attachment::force(x[model.numbering.of(v)].vec3(), anchor, stiffness);
+        let load = CornerLoad { impulse: force * squared, mass_bound: squared * stiffness };
+        add_load(loads, attachments.copies[i], &load);
     }
 }
 
-fn tissue<S: Real>(model: &Model<S>, set: &TetSet<S>, tet: usize, dt: f64) -> Tissue<S> {
-    let material = &model.materials[set.material[tet] as usize];
-    Tissue {
-        model: set.model,
-        lame_lambda: material.lame_lambda,
-        lame_mu: material.lame_mu,
-        viscosity_rate: material.viscosity * S::from_f64(1.0 / dt),
+struct Forces<'a, S> {
+    x: &'a [Point<S>],
+    start_strain: &'a [[Eight<S>; 6]],
+    dt: f64,
+    loads: &'a Shared<'a, Point<S>>,
+}
+
+impl<S: Real> TetPass<S> for Forces<'_, S> {
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let shape = tets.shape::<L>();
+        let (f, response) = respond(tets, self.x, self.start_strain, self.dt);
+        let tissue = Tissue::new(tets.set.model, &tets.material(), self.dt);
+        let volume = tets.volume::<L>() * L::from_f64(self.dt * self.dt);
+        let forces = internal_forces(&response.piola, &shape, volume);
+        let g = shape_gradients(&shape);
+        let mut loads = [CornerLoad::default(); 4];
+        for corner in 0..4 {
+            let mass_bound = volume * tissue.curvature(&f, g[corner]);
+            loads[corner] = CornerLoad { impulse: forces[corner], mass_bound };
+        }
+        // SAFETY: constraints of one colour share no copy, and every block is worked on once.
+        unsafe { tets.add(self.loads, &points(&loads)) };
+    }
+}
+
+/// Green strain at `x` of the tetrahedra of a viscous set.
+pub(super) fn measure_strain<S: Real>(
+    workers: &super::threads::Workers,
+    model: &Model<S>,
+    x: &[Point<S>],
+    start_strain: &mut StartStrain<S>,
+) {
+    for (set, strains) in model.tet_sets().into_iter().zip(start_strain) {
+        let pass = Strain { x, strains: Shared::new(strains) };
+        if set.viscous {
+            workers.pass(model, set, 0..set.block_count(), &pass);
+        }
+    }
+}
+
+struct Strain<'a, S> {
+    x: &'a [Point<S>],
+    strains: Shared<'a, [Eight<S>; 6]>,
+}
+
+impl<S: Real> TetPass<S> for Strain<'_, S> {
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let f = deformation_gradient(&tets.corners::<L>(self.x).x, &tets.shape());
+        // SAFETY: every block has a place of its own and is worked on once.
+        let place = unsafe { self.strains.at(tets.index) };
+        for (p, component) in green_strain::strain(&f).into_iter().enumerate() {
+            component.store(&mut place[p]);
+        }
     }
 }

@@ -1,169 +1,213 @@
 //! One colour of a sweep: loads a constraint's corners, solves it, stores what has changed.
+#![allow(unsafe_code)]
 
-use super::Inputs;
-use super::cpu::Step;
-use crate::elements::{TetForm, attachment, green_strain, neo_hookean_pair};
-use crate::elements::{neo_hookean_stretch, spring};
-use crate::model::{Model, TetSet};
+use std::marker::PhantomData;
+
+use super::cpu::{Step, StartStrain};
+use super::forms::{Form, pass_by_form, with_form};
+use super::tets::{Block, TetPass, load_rows};
+use super::threads::{Shared, Workers};
+use crate::elements::{attachment, green_strain, spring};
+use crate::model::Model;
+use crate::scalar::lanes::{Lanes, Point};
 use crate::scalar::{Real, Vec3};
 use crate::settings::{RelaxationForm, SolverSettings};
 
 /// How far a solve is over-relaxed: the multipliers by one factor, the positions by another.
 #[derive(Clone, Copy)]
-pub(super) struct Relaxation<S> {
+struct Relaxation<S> {
     multipliers: S,
     positions: S,
 }
 
 impl<S: Real> Relaxation<S> {
-    /// From the settings.
-    pub fn new(settings: &SolverSettings) -> Self {
+    fn new(settings: &SolverSettings) -> Self {
         let omega = S::from_f64(settings.relaxation);
         match settings.relaxation_form {
             RelaxationForm::Consistent => Self { multipliers: omega, positions: omega },
             RelaxationForm::Published => Self { multipliers: S::ONE, positions: omega },
         }
     }
+
+    /// What is left of a correction: multipliers and positions after it.
+    #[inline(always)]
+    fn apply<L: Lanes<Real = S>, const N: usize>(
+        self,
+        (l, x): (&[L; N], &[Vec3<L>; 4]),
+        (dl, dx): (&[L; N], &[Vec3<L>; 4]),
+    ) -> ([L; N], [Vec3<L>; 4]) {
+        let (mut l, mut x) = (*l, *x);
+        let [of_l, of_x] = [L::splat(self.multipliers), L::splat(self.positions)];
+        for p in 0..N {
+            l[p] += of_l * dl[p];
+        }
+        for corner in 0..4 {
+            x[corner] += dx[corner] * of_x;
+        }
+        (l, x)
+    }
 }
 
-/// One colour's solves.
-pub(super) struct Sweep<'a, S> {
-    /// Copies, or positions where nothing is split.
-    pub points: &'a mut [Vec3<S>],
-    pub multipliers: &'a mut [S],
-    pub weights: &'a [S],
-    pub dt: f64,
-    pub relaxation: Relaxation<S>,
+/// What solves of a colour have in common.
+struct Sweep<'a, S> {
+    /// Copies, or vertices where nothing is split; each carries its inverse mass.
+    points: Shared<'a, Point<S>>,
+    multipliers: Shared<'a, S>,
+    dt: f64,
+    relaxation: Relaxation<S>,
+}
+
+/// Solves all constraints of one colour; they share no copy.
+pub(super) fn solve_color<S: Real>(
+    workers: &Workers,
+    step: &Step<'_, S>,
+    points: &mut [Point<S>],
+    multipliers: &mut [S],
+    start_strain: &StartStrain<S>,
+    color: usize,
+) {
+    let model = step.model;
+    let mut sweep = Sweep {
+        points: Shared::new(points),
+        multipliers: Shared::new(multipliers),
+        dt: step.dt,
+        relaxation: Relaxation::new(step.settings),
+    };
+    for (set, strains) in model.tet_sets().into_iter().zip(start_strain) {
+        let blocks = set.color(color);
+        with_form!(set.form, F => {
+            let elastic = Elastic { sweep: &sweep, form: PhantomData::<F> };
+            workers.pass(model, set, blocks.clone(), &elastic);
+        });
+        if set.viscous {
+            let viscous = Viscous { sweep: &sweep, start: strains };
+            workers.pass(model, set, blocks, &viscous);
+        }
+    }
+    sweep.solve_springs(model, color);
+    sweep.solve_attachments(step, color);
+}
+
+struct Elastic<'a, S, F> {
+    sweep: &'a Sweep<'a, S>,
+    form: PhantomData<F>,
+}
+
+impl<S: Real, F> Elastic<'_, S, F> {
+    #[inline(always)]
+    fn solve<L: Lanes<Real = S>, const N: usize>(&self, tets: &Block<'_, S>)
+    where
+        F: Form<N>,
+    {
+        let sweep = self.sweep;
+        let material = tets.material::<L>();
+        let step_volume = tets.volume::<L>() * L::from_f64(sweep.dt * sweep.dt);
+        // SAFETY: constraints of one colour share no copy, and every block is worked on once.
+        let corners = unsafe { tets.copies::<L>(&sweep.points) };
+        // SAFETY: every block has multipliers of its own.
+        let l: [L; N] =
+            unsafe { tets.shared_multipliers(tets.set.multiplier_offset, &sweep.multipliers) };
+        let (x, w) = (&corners.x, &corners.w);
+        let change = F::solve(x, w, &tets.shape(), &l, &material, step_volume);
+        let (dl, dx) = (&change.multipliers, &change.positions);
+        let (l, x) = sweep.relaxation.apply((&l, x), (dl, dx));
+        // SAFETY: as above.
+        unsafe {
+            tets.store(&sweep.points, &x, w);
+            tets.store_multipliers(tets.set.multiplier_offset, &sweep.multipliers, l);
+        }
+    }
+}
+pass_by_form!(Elastic solve);
+
+/// Kelvin-Voigt as an energy: `eta V |C - C_n|_D^2/(2 dt)`, so `a~ = D^-1/(V eta dt)`.
+struct Viscous<'a, S> {
+    sweep: &'a Sweep<'a, S>,
+    start: &'a [[crate::scalar::lanes::Eight<S>; 6]],
+}
+
+impl<S: Real> TetPass<S> for Viscous<'_, S> {
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let material = tets.material::<L>();
+        // SAFETY: constraints of one colour share no copy, and every block is worked on once.
+        let corners = unsafe { tets.copies::<L>(&self.sweep.points) };
+        let target: [L; 6] = load_rows(self.start[tets.index].as_flattened());
+        let dt = L::from_f64(self.sweep.dt);
+        let scale = L::ONE / (tets.volume::<L>() * material.viscosity * dt);
+        let compliance = material.compliance.scaled(scale);
+        let is_viscous = L::ZERO.less(material.viscosity);
+        // SAFETY: every block has multipliers of its own.
+        let l: [L; 6] =
+            unsafe { tets.shared_multipliers(tets.set.viscous_offset, &self.sweep.multipliers) };
+        let (x, w) = (&corners.x, &corners.w);
+        let change = green_strain::solve(x, w, &tets.shape(), &l, Some(&target), &compliance);
+        let (mut dl, mut dx) = (change.multipliers, change.positions);
+        for p in 0..6 {
+            dl[p] = L::select(is_viscous, dl[p], L::ZERO);
+        }
+        for corner in 0..4 {
+            for axis in 0..3 {
+                dx[corner][axis] = L::select(is_viscous, dx[corner][axis], L::ZERO);
+            }
+        }
+        let (l, x) = self.sweep.relaxation.apply((&l, x), (&dl, &dx));
+        // SAFETY: as above.
+        unsafe {
+            tets.store(&self.sweep.points, &x, w);
+            tets.store_multipliers(tets.set.viscous_offset, &self.sweep.multipliers, l);
+        }
+    }
 }
 
 impl<S: Real> Sweep<'_, S> {
-    /// Solves the colour's constraints one after the other.
-    pub fn solve(
-        mut self,
-        step: &Step<'_, S>,
-        start_strain: &[Vec<green_strain::Voigt<S>>; 2],
-        color: usize,
-    ) {
-        let model = step.model;
-        for (set, strains) in model.tet_sets().into_iter().zip(start_strain) {
-            let range = set.color_offsets[color]..set.color_offsets[color + 1];
-            for tet in range {
-                self.solve_tet(model, set, strains, tet as usize);
-            }
-        }
-        self.solve_springs(model, color);
-        self.solve_attachments(model, step.inputs, color);
-    }
-
-    #[inline]
-    fn solve_tet(
-        &mut self,
-        model: &Model<S>,
-        set: &TetSet<S>,
-        start_strain: &[green_strain::Voigt<S>],
-        tet: usize,
-    ) {
-        let copies = set.copies[tet];
-        let [a, b, c, d] = set.vertices[tet];
-        let weight = |v: u32| self.weights[v as usize];
-        let w = [weight(a), weight(b), weight(c), weight(d)];
-        let shape = &set.inverse_rest_shape[tet];
-        let material = &model.materials[set.material[tet] as usize];
-        let step_volume = set.rest_volume[tet] * S::from_f64(self.dt * self.dt);
-        let x = corners(self.points, copies);
-        let at = set.multiplier_offset + set.form.multiplier_count() * tet;
-        let (lambda, mu) = (material.lame_lambda, material.lame_mu);
-        match set.form {
-            TetForm::GreenStrain => {
-                let l = read(self.multipliers, at);
-                let (compliance, scale) = (&material.compliance, S::ONE / step_volume);
-                let rest = [S::ZERO; 6];
-                let change = green_strain::solve(&x, &w, shape, &l, &rest, compliance, scale);
-                self.apply(at, &copies, &change.multipliers, &change.positions);
-            }
-            TetForm::NeoHookeanPair => {
-                let l = read(self.multipliers, at);
-                let change = neo_hookean_pair::solve(&x, &w, shape, &l, lambda, mu, step_volume);
-                self.apply(at, &copies, &change.multipliers, &change.positions);
-            }
-            TetForm::NeoHookeanStretch => {
-                let l = read(self.multipliers, at);
-                let change = neo_hookean_stretch::solve(&x, &w, shape, &l, lambda, mu, step_volume);
-                self.apply(at, &copies, &change.multipliers, &change.positions);
-            }
-        }
-        let Some(viscous_offset) = set.viscous_offset else { return };
-        if material.viscosity > S::ZERO {
-            // Kelvin-Voigt as an energy: eta V |C - C_n|_D^2 / (2 dt), so a~ = D^-1/(V eta dt).
-            let at = viscous_offset + 6 * tet;
-            let l = read(self.multipliers, at);
-            let x = corners(self.points, copies);
-            let scale = S::ONE / (set.rest_volume[tet] * material.viscosity * S::from_f64(self.dt));
-            let (target, compliance) = (&start_strain[tet], &material.compliance);
-            let change = green_strain::solve(&x, &w, shape, &l, target, compliance, scale);
-            self.apply(at, &copies, &change.multipliers, &change.positions);
-        }
-    }
-
     fn solve_springs(&mut self, model: &Model<S>, color: usize) {
         let springs = &model.springs;
         for i in springs.color_offsets[color] as usize..springs.color_offsets[color + 1] as usize {
             let copies = springs.copies[i];
-            let x = copies.map(|copy| self.points[copy as usize]);
-            let w = springs.vertices[i].map(|v| self.weights[v as usize]);
+            // SAFETY: nobody else works on the points now.
+            let ends = copies.map(|copy| unsafe { *self.points.at(copy as usize) });
             let at = springs.multiplier_offset + i;
             let compliance_tilde = S::ONE / (springs.stiffness[i] * S::from_f64(self.dt * self.dt));
-            let rest_length = springs.rest_length[i];
-            let l = self.multipliers[at];
-            let (change, moves) = spring::solve(&x, &w, rest_length, l, compliance_tilde);
-            self.apply(at, &copies, &[change], &moves);
+            // SAFETY: nor on the multipliers.
+            let l = unsafe { self.multipliers.at(at) };
+            let (x, w) = (ends.map(Point::vec3), ends.map(|end| end.w));
+            let (change, moves) =
+                spring::solve(&x, &w, springs.rest_length[i], *l, compliance_tilde);
+            *l += self.relaxation.multipliers * change;
+            for (copy, moved) in copies.into_iter().zip(moves) {
+                self.move_copy(copy, moved);
+            }
         }
     }
 
-    fn solve_attachments(&mut self, model: &Model<S>, inputs: &Inputs<S>, color: usize) {
-        let set = &model.attachments;
-        let anchors = inputs.anchors_of(model);
+    fn solve_attachments(&mut self, step: &Step<'_, S>, color: usize) {
+        let set = &step.model.attachments;
+        let anchors = step.inputs.anchors_of(step.model);
         for i in set.color_offsets[color] as usize..set.color_offsets[color + 1] as usize {
             let copy = set.copies[i];
-            let x = self.points[copy as usize];
-            let w = self.weights[set.vertices[i] as usize];
+            // SAFETY: nobody else works on points and multipliers now.
+            let point = unsafe { *self.points.at(copy as usize) };
             let at = set.multiplier_offset + 3 * i;
+            // SAFETY: as above.
+            let l = unsafe { self.multipliers.range(at..at + 3) };
             let compliance_tilde = S::ONE / (set.stiffness[i] * S::from_f64(self.dt * self.dt));
             let anchor = anchors[set.order[i] as usize];
-            let l = read_vec3(self.multipliers, at);
-            let (change, moved) = attachment::solve(x, w, anchor, l, compliance_tilde);
-            self.apply(at, &[copy], &change.to_array(), &[moved]);
+            let (x, w) = (point.vec3(), point.w);
+            let (change, moved) =
+                attachment::solve(x, w, anchor, read_vec3(l, 0), compliance_tilde);
+            for (l, change) in l.iter_mut().zip(change.to_array()) {
+                *l += self.relaxation.multipliers * change;
+            }
+            self.move_copy(copy, moved);
         }
     }
 
-    #[inline(always)]
-    fn apply<const N: usize, const M: usize>(
-        &mut self,
-        at: usize,
-        copies: &[u32; N],
-        multipliers: &[S; M],
-        moves: &[Vec3<S>; N],
-    ) {
-        for (l, change) in self.multipliers[at..at + M].iter_mut().zip(multipliers) {
-            *l += self.relaxation.multipliers * *change;
-        }
-        for (copy, change) in copies.iter().zip(moves) {
-            self.points[*copy as usize] += *change * self.relaxation.positions;
-        }
+    fn move_copy(&mut self, copy: u32, change: Vec3<S>) {
+        // SAFETY: nobody else works on the points now.
+        let point = unsafe { self.points.at(copy as usize) };
+        point.set_vec3(point.vec3() + change * self.relaxation.positions);
     }
-}
-
-#[inline(always)]
-pub(super) fn read<S: Real, const N: usize>(values: &[S], at: usize) -> [S; N] {
-    let mut numbers = [S::ZERO; N];
-    numbers.copy_from_slice(&values[at..at + N]);
-    numbers
-}
-
-/// Positions of a tetrahedron's corners.
-#[inline(always)]
-pub(super) fn corners<S: Real>(points: &[Vec3<S>], [a, b, c, d]: [u32; 4]) -> [Vec3<S>; 4] {
-    [points[a as usize], points[b as usize], points[c as usize], points[d as usize]]
 }
 
 #[inline(always)]

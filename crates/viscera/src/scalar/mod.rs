@@ -6,6 +6,12 @@
 //! which do look at single numbers, are generic over [`Real`].
 //!
 //! No operation here is fused or approximated, so results are the same bits on every machine.
+//! [`lanes`] holds eight numbers side by side.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+pub mod lanes;
+mod portable;
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Index, IndexMut, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -14,6 +20,11 @@ mod sealed {
     pub trait Sealed {}
     impl Sealed for f32 {}
     impl Sealed for f64 {}
+    impl<S: super::Real> Sealed for super::lanes::Portable<S> {}
+    #[cfg(target_arch = "x86_64")]
+    impl Sealed for super::avx2::F32x8 {}
+    #[cfg(target_arch = "x86_64")]
+    impl Sealed for super::avx2::F64x8 {}
 }
 
 /// What a kernel may do with a number, or with several numbers side by side.
@@ -69,6 +80,8 @@ pub trait Scalar:
 pub trait Real: Scalar<Mask = bool> + PartialOrd {
     /// "f32" or "f64".
     const NAME: &'static str;
+    /// Eight of them in the fastest way of the target; see [`lanes::run`].
+    type Fast: lanes::Lanes<Real = Self>;
     /// The same value in double precision.
     fn to_f64(self) -> f64;
     /// True unless infinite or not a number.
@@ -76,7 +89,7 @@ pub trait Real: Scalar<Mask = bool> + PartialOrd {
 }
 
 macro_rules! implement_real {
-    ($type:ident) => {
+    ($type:ident $fast:ident) => {
         impl Scalar for $type {
             type Mask = bool;
             const ZERO: Self = 0.0;
@@ -120,6 +133,7 @@ macro_rules! implement_real {
 
         impl Real for $type {
             const NAME: &'static str = stringify!($type);
+            type Fast = lanes::fast::$fast;
             #[inline(always)]
             fn to_f64(self) -> f64 {
                 f64::from(self)
@@ -131,8 +145,8 @@ macro_rules! implement_real {
         }
     };
 }
-implement_real!(f32);
-implement_real!(f64);
+implement_real!(f32 F32);
+implement_real!(f64 F64);
 
 /// A vector of three components.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

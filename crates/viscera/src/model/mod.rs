@@ -1,0 +1,234 @@
+//! The model: everything that does not move. Meshes, rest shapes, materials, springs,
+//! attachments, colours; flat arrays, sorted by colour, ready for any backend.
+//!
+//! Vertices and tetrahedra are numbered over all bodies in the order in which the bodies were
+//! added; [`Body`] says which range belongs to which. Everything public is in that order, but for
+//! constraints, which are sorted by colour: `order` maps back to the user's numbers. Within, vertices
+//! are numbered along a curve through space; see `numbering`.
+
+mod builder;
+mod numbering;
+mod tets;
+
+use std::ops::Range;
+
+pub use builder::ModelBuilder;
+pub(crate) use numbering::Numbering;
+pub(crate) use tets::TetBlock;
+pub use tets::{Tet, TetSet};
+
+use crate::material::Compliance;
+use crate::scalar::lanes::LANES;
+use crate::scalar::{Real, Vec3};
+
+/// Why a model cannot be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// Nothing was added.
+    #[error("the model has no body; add one with `ModelBuilder::add_body`")]
+    Empty,
+    /// An index names no body.
+    #[error("body {body} does not exist; the model has {body_count}")]
+    UnknownBody {
+        /// The index given.
+        body: usize,
+        /// How many bodies there are.
+        body_count: usize,
+    },
+    /// An index names no vertex.
+    #[error("{what} refers to vertex {vertex}; the model has {vertex_count}")]
+    UnknownVertex {
+        /// The kind of element.
+        what: &'static str,
+        /// The index given.
+        vertex: u32,
+        /// How many vertices there are.
+        vertex_count: usize,
+    },
+    /// A spring that connects nothing.
+    #[error("a spring leads from vertex {vertex} to itself; give it two different ends")]
+    SpringEnds {
+        /// The vertex given twice.
+        vertex: u32,
+    },
+    /// A stiffness or length that no spring has.
+    #[error("{what} must be {range} and finite, not {value}")]
+    BadValue {
+        /// The quantity, with its unit.
+        what: &'static str,
+        /// The legal range in words.
+        range: &'static str,
+        /// The value given.
+        value: f64,
+    },
+    /// More than 32-bit indices can number.
+    #[error("{count} {what} are more than the {limit} that 32-bit indices can number")]
+    TooLarge {
+        /// What there is too much of.
+        what: &'static str,
+        /// How many.
+        count: usize,
+        /// How many would do.
+        limit: usize,
+    },
+}
+
+/// The ranges of one body in the user's numbering.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Body {
+    /// Its vertices.
+    pub vertices: Range<usize>,
+    /// Its tetrahedra.
+    pub tets: Range<usize>,
+}
+
+/// Constants of one material in the solver's precision.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialConstants<S> {
+    /// Lame's first parameter [Pa].
+    pub lame_lambda: S,
+    /// Lame's second parameter, the shear modulus [Pa].
+    pub lame_mu: S,
+    /// Compliance `D^-1` [1/Pa].
+    pub compliance: Compliance<S>,
+    /// Retardation time [s] of the viscous stress; zero for none.
+    pub viscosity: S,
+}
+
+/// Springs between two vertices, sorted by colour.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SpringSet<S> {
+    /// The two ends, shape [spring_count].
+    pub vertices: Vec<[u32; 2]>,
+    /// The copies that a sweep works on, shape [spring_count].
+    pub copies: Vec<[u32; 2]>,
+    /// Length without force [m], shape [spring_count].
+    pub rest_length: Vec<S>,
+    /// Stiffness [N/m], shape [spring_count].
+    pub stiffness: Vec<S>,
+    /// The user's number of each spring, shape [spring_count].
+    pub order: Vec<u32>,
+    /// Springs of colour `c` are `color_offsets[c] .. color_offsets[c + 1]`.
+    pub color_offsets: Vec<u32>,
+    /// First multiplier, one per spring.
+    pub multiplier_offset: usize,
+}
+
+/// Elastic attachments of vertices to anchors, sorted by colour. The anchors move with the
+/// inputs of a step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AttachmentSet<S> {
+    /// The vertex held, shape [attachment_count].
+    pub vertices: Vec<u32>,
+    /// The copy that a sweep works on, shape [attachment_count].
+    pub copies: Vec<u32>,
+    /// Stiffness [N/m], shape [attachment_count].
+    pub stiffness: Vec<S>,
+    /// The user's number of each attachment, shape [attachment_count].
+    pub order: Vec<u32>,
+    /// Attachments of colour `c` are `color_offsets[c] .. color_offsets[c + 1]`.
+    pub color_offsets: Vec<u32>,
+    /// First multiplier, three per attachment.
+    pub multiplier_offset: usize,
+}
+
+/// Everything that does not move.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model<S> {
+    /// The bodies in the order in which they were added.
+    pub bodies: Vec<Body>,
+    /// Rest positions [m], shape [vertex_count].
+    pub rest_positions: Vec<Vec3<S>>,
+    /// Lumped masses [kg]: a quarter of each tetrahedron's, shape [vertex_count].
+    pub masses: Vec<S>,
+    /// Materials in use.
+    pub materials: Vec<MaterialConstants<S>>,
+    /// Saint Venant-Kirchhoff tetrahedra.
+    pub green_strain: TetSet<S>,
+    /// Stable neo-Hookean tetrahedra.
+    pub neo_hookean: TetSet<S>,
+    /// Springs.
+    pub springs: SpringSet<S>,
+    /// Attachments.
+    pub attachments: AttachmentSet<S>,
+    /// Anchors of the attachments where nothing moves them [m], the user's order.
+    pub rest_anchors: Vec<Vec3<S>>,
+    /// Number of connected parts; tetrahedra and springs connect.
+    pub component_count: usize,
+    /// Number of colours.
+    pub color_count: usize,
+    /// The most constraints at one vertex.
+    pub largest_clique: usize,
+    /// Number of multipliers of all constraints, those of the fillings of blocks included.
+    pub multiplier_count: usize,
+    pub(crate) numbering: Numbering,
+    /// Which part each vertex belongs to, in the solver's numbering.
+    pub(crate) component_of: Vec<u32>,
+    /// Copies of vertex `v`, in the solver's numbering, are `copy_offsets[v] .. copy_offsets[v + 1]`.
+    pub(crate) copy_offsets: Vec<u32>,
+}
+
+impl<S: Real> Model<S> {
+    /// Number of vertices of all bodies.
+    pub fn vertex_count(&self) -> usize {
+        self.rest_positions.len()
+    }
+
+    /// Number of tetrahedra of all bodies.
+    pub fn tet_count(&self) -> usize {
+        self.green_strain.len() + self.neo_hookean.len()
+    }
+
+    /// Number of copies that a sweep works on.
+    pub fn copy_count(&self) -> usize {
+        self.copy_offsets.last().map_or(0, |&count| count as usize)
+    }
+
+    /// True where a vertex has more than one copy.
+    pub fn is_split(&self) -> bool {
+        self.copy_count() > self.vertex_count()
+    }
+
+    /// The two sets of tetrahedra.
+    pub fn tet_sets(&self) -> [&TetSet<S>; 2] {
+        [&self.green_strain, &self.neo_hookean]
+    }
+
+    /// The tetrahedra of a set one by one, sorted by colour, with the user's numbers.
+    pub fn tets(&self, set: &TetSet<S>) -> impl Iterator<Item = Tet<S>> {
+        set.places().zip(&set.order).map(|((block, lane), &number)| {
+            let constants = &set.blocks[block];
+            let user = |v: u32| self.numbering.order[v as usize];
+            let count = set.form.multiplier_count();
+            Tet {
+                number: number as usize,
+                vertices: constants.vertices.map(|corner| user(corner[lane])),
+                copies: set.copies_of(block).map(|corner| corner[lane]),
+                inverse_rest_shape: constants.shape(lane),
+                rest_volume: constants.rest_volume[lane],
+                material: constants.material[lane] as usize,
+                color: set.color_offsets.partition_point(|&first| first as usize <= block) - 1,
+                first_multiplier: set.multiplier_offset + LANES * count * block + lane,
+            }
+        })
+    }
+
+    /// The copies of one of the user's vertices.
+    pub fn copies_of(&self, vertex: u32) -> Range<usize> {
+        let v = self.numbering.of(vertex);
+        self.copy_offsets[v] as usize..self.copy_offsets[v + 1] as usize
+    }
+
+    /// Bytes of the arrays that grow with the mesh.
+    pub fn bytes(&self) -> usize {
+        let sets: usize = self.tet_sets().into_iter().map(TetSet::bytes).sum();
+        sets + size_of_val(&self.rest_positions[..])
+            + size_of_val(&self.masses[..])
+            + size_of_val(&self.numbering.order[..])
+            + size_of_val(&self.numbering.rank[..])
+            + size_of_val(&self.component_of[..])
+            + size_of_val(&self.copy_offsets[..])
+    }
+}
+

@@ -1,0 +1,158 @@
+//! Tetrahedra in blocks of eight, sorted by colour.
+//!
+//! A block holds the constants of eight tetrahedra of one colour component by component, so that a
+//! kernel loads each component of all eight at once. The last block of a colour is filled up with
+//! copies of its last tetrahedron, whose results nobody keeps.
+
+use std::ops::Range;
+
+use crate::elements::TetForm;
+use crate::material::MaterialModel;
+use crate::scalar::lanes::{Eight, LANES};
+use crate::scalar::{Mat3, Real, Vec3, vec3};
+
+/// Constants of eight tetrahedra.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(32))]
+pub(crate) struct TetBlock<S> {
+    /// Vertices in the solver's numbering, per corner.
+    pub vertices: [Eight<u32>; 4],
+    /// `Dm^-1` [1/m] by columns.
+    pub inverse_rest_shape: [Eight<S>; 9],
+    /// Rest volume [m^3].
+    pub rest_volume: Eight<S>,
+    /// Index into [`super::Model::materials`].
+    pub material: Eight<u32>,
+}
+
+/// Tetrahedra of one material model, in blocks of eight sorted by colour.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TetSet<S> {
+    /// The elastic energy of the whole set.
+    pub model: MaterialModel,
+    /// Its constraints.
+    pub form: TetForm,
+    /// Whether any of its materials is viscous: each tetrahedron then has a viscous block as well.
+    pub viscous: bool,
+    pub(crate) blocks: Vec<TetBlock<S>>,
+    /// How many tetrahedra of each block count: eight, or fewer in a colour's last.
+    pub(crate) filled: Vec<u8>,
+    /// The copies that a sweep works on, per corner; empty where nothing is split: the vertices.
+    pub(crate) copies: Vec<[Eight<u32>; 4]>,
+    /// The user's number of each tetrahedron, shape [tet_count]; without fillings.
+    pub(crate) order: Vec<u32>,
+    /// Blocks of colour `c` are `color_offsets[c] .. color_offsets[c + 1]`.
+    pub(crate) color_offsets: Vec<u32>,
+    /// First multiplier of the elastic constraints.
+    pub(crate) multiplier_offset: usize,
+    /// First multiplier of the viscous constraints.
+    pub(crate) viscous_offset: usize,
+    /// Above all vertices, and all copies, of the blocks: passes rely on it.
+    pub(crate) bounds: [usize; 2],
+}
+
+/// One tetrahedron as [`super::Model::tets`] shows it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tet<S> {
+    /// The user's number.
+    pub number: usize,
+    /// The user's vertices.
+    pub vertices: [u32; 4],
+    /// The copies that a sweep works on.
+    pub copies: [u32; 4],
+    /// `Dm^-1` [1/m].
+    pub inverse_rest_shape: Mat3<S>,
+    /// Rest volume [m^3].
+    pub rest_volume: S,
+    /// Index into [`super::Model::materials`].
+    pub material: usize,
+    /// Its colour.
+    pub color: usize,
+    /// Where its first elastic multiplier stands in [`crate::state::State::multipliers`].
+    pub(super) first_multiplier: usize,
+}
+
+impl<S> Tet<S> {
+    /// Where one of its elastic multipliers stands in [`crate::state::State::multipliers`].
+    pub fn multiplier(&self, p: usize) -> usize {
+        self.first_multiplier + LANES * p
+    }
+}
+
+impl<S: Real> TetSet<S> {
+    /// Number of tetrahedra.
+    pub fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    /// True without tetrahedra.
+    pub fn is_empty(&self) -> bool {
+        self.order.is_empty()
+    }
+
+    /// Number of blocks, fillings included.
+    pub fn block_count(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// The blocks of a colour.
+    pub(crate) fn color(&self, color: usize) -> Range<usize> {
+        self.color_offsets[color] as usize..self.color_offsets[color + 1] as usize
+    }
+
+    /// The copies that a sweep of this block works on.
+    #[inline(always)]
+    pub(crate) fn copies_of(&self, block: usize) -> &[Eight<u32>; 4] {
+        if self.copies.is_empty() { &self.blocks[block].vertices } else { &self.copies[block] }
+    }
+
+    /// Elastic and viscous multipliers, fillings included.
+    pub(crate) fn multiplier_counts(&self) -> [usize; 2] {
+        let padded = LANES * self.blocks.len();
+        [self.form.multiplier_count() * padded, if self.viscous { 6 * padded } else { 0 }]
+    }
+
+    /// Every tetrahedron with block and lane, in the order of blocks.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (usize, usize)> {
+        let lanes = |(block, &filled): (usize, &u8)| (0..filled as usize).map(move |l| (block, l));
+        self.filled.iter().enumerate().flat_map(lanes)
+    }
+
+    /// Bytes of its arrays.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&self.blocks[..])
+            + size_of_val(&self.filled[..])
+            + size_of_val(&self.copies[..])
+            + size_of_val(&self.order[..])
+    }
+}
+
+impl<S: Real> TetBlock<S> {
+    /// Nothing yet.
+    pub fn empty() -> Self {
+        Self {
+            vertices: [[0; LANES]; 4],
+            inverse_rest_shape: [[S::ZERO; LANES]; 9],
+            rest_volume: [S::ZERO; LANES],
+            material: [0; LANES],
+        }
+    }
+
+    /// `Dm^-1` [1/m] of one lane.
+    pub fn shape(&self, lane: usize) -> Mat3<S> {
+        let column = |c: usize| -> Vec3<S> {
+            let entry = |row: usize| self.inverse_rest_shape[3 * c + row][lane];
+            vec3(entry(0), entry(1), entry(2))
+        };
+        Mat3::from_columns(column(0), column(1), column(2))
+    }
+
+    /// Sets `Dm^-1` [1/m] of one lane.
+    pub fn set_shape(&mut self, lane: usize, shape: &Mat3<S>) {
+        for (c, column) in shape.columns.iter().enumerate() {
+            for (row, value) in column.to_array().into_iter().enumerate() {
+                self.inverse_rest_shape[3 * c + row][lane] = value;
+            }
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! Passes over tetrahedra, eight at a time: what a kernel loads and stores.
+#![allow(unsafe_code)]
+
+use std::ops::Range;
+
+use super::threads::{Shared, Workers};
+use crate::model::{MaterialConstants, Model, TetBlock, TetSet};
+use crate::material::Compliance;
+use crate::scalar::lanes::{self, Eight, LANES, Lanes, Point};
+use crate::scalar::{Mat3, Real, Vec3, vec3};
+
+/// Blocks that a thread does at a time: about the ten microseconds that hide what a fork costs.
+const GRAIN: usize = 64;
+
+/// One pass: what to do with a block.
+pub(super) trait TetPass<S: Real> {
+    /// `#[inline(always)]`, or it is not compiled for the instructions chosen.
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>);
+}
+
+/// The block at hand.
+pub(super) struct Block<'a, S> {
+    pub set: &'a TetSet<S>,
+    pub index: usize,
+    constants: &'a TetBlock<S>,
+    materials: &'a [MaterialConstants<S>],
+}
+
+/// Positions [m] of a block's corners, and what travels along.
+pub(super) struct Corners<L> {
+    pub x: [Vec3<L>; 4],
+    pub w: [L; 4],
+}
+
+impl<'a, S: Real> Block<'a, S> {
+    #[inline(always)]
+    fn new(model: &'a Model<S>, set: &'a TetSet<S>, index: usize) -> Self {
+        Self { set, index, constants: &set.blocks[index], materials: &model.materials }
+    }
+
+    /// How many tetrahedra count.
+    #[inline(always)]
+    pub fn filled(&self) -> usize {
+        self.set.filled[self.index] as usize
+    }
+
+    /// `Dm^-1` [1/m].
+    #[inline(always)]
+    pub fn shape<L: Lanes<Real = S>>(&self) -> Mat3<L> {
+        let c = &self.constants.inverse_rest_shape;
+        Mat3::from_columns(
+            vec3(L::load(&c[0]), L::load(&c[1]), L::load(&c[2])),
+            vec3(L::load(&c[3]), L::load(&c[4]), L::load(&c[5])),
+            vec3(L::load(&c[6]), L::load(&c[7]), L::load(&c[8])),
+        )
+    }
+
+    /// Rest volume [m^3].
+    #[inline(always)]
+    pub fn volume<L: Lanes<Real = S>>(&self) -> L {
+        L::load(&self.constants.rest_volume)
+    }
+
+    /// The materials' constants. Most blocks are of one material.
+    #[inline(always)]
+    pub fn material<L: Lanes<Real = S>>(&self) -> MaterialConstants<L> {
+        let indices = &self.constants.material;
+        let mut uniform = true;
+        for lane in 1..LANES {
+            uniform &= indices[lane] == indices[0];
+        }
+        let first = &self.materials[indices[0] as usize];
+        macro_rules! fetch {
+            ($($field:ident).+) => {{
+                let mut values = [first.$($field).+; LANES];
+                if !uniform {
+                    for lane in 1..LANES {
+                        values[lane] = self.materials[indices[lane] as usize].$($field).+;
+                    }
+                }
+                L::load(&values)
+            }};
+        }
+        MaterialConstants {
+            lame_lambda: fetch!(lame_lambda),
+            lame_mu: fetch!(lame_mu),
+            compliance: Compliance {
+                normal: fetch!(compliance.normal),
+                cross: fetch!(compliance.cross),
+                shear: fetch!(compliance.shear),
+            },
+            viscosity: fetch!(viscosity),
+        }
+    }
+
+    /// Corners among the positions of vertices.
+    #[inline(always)]
+    pub fn corners<L: Lanes<Real = S>>(&self, points: &[Point<S>]) -> Corners<L> {
+        debug_assert!(points.len() >= self.set.bounds[0]);
+        // SAFETY: `Workspace::check` compares bounds and lengths, and nobody writes the slice.
+        unsafe { gather(points.as_ptr(), &self.constants.vertices) }
+    }
+
+    /// Corners among copies.
+    ///
+    /// # Safety
+    /// No other block of the pass has a copy of this one.
+    #[inline(always)]
+    pub unsafe fn copies<L: Lanes<Real = S>>(&self, points: &Shared<'_, Point<S>>) -> Corners<L> {
+        // SAFETY: within bounds as above; alone there by the caller's promise.
+        unsafe { gather(points.pointer(), self.set.copies_of(self.index)) }
+    }
+
+    /// Writes copies.
+    ///
+    /// # Safety
+    /// As [`Block::copies`].
+    #[inline(always)]
+    pub unsafe fn store<L: Lanes<Real = S>>(
+        &self,
+        points: &Shared<'_, Point<S>>,
+        x: &[Vec3<L>; 4],
+        w: &[L; 4],
+    ) {
+        let copies = self.set.copies_of(self.index);
+        let whole = self.filled() == LANES;
+        for corner in 0..4 {
+            let value = Point::new(x[corner], w[corner]);
+            // SAFETY: within bounds as above; alone there by the caller's promise.
+            unsafe {
+                if whole {
+                    L::scatter(points.pointer(), &copies[corner], value);
+                } else {
+                    let rows = rows(value);
+                    for (lane, row) in rows.into_iter().enumerate().take(self.filled()) {
+                        *points.at(copies[corner][lane] as usize) = row;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds to copies.
+    ///
+    /// # Safety
+    /// As [`Block::copies`].
+    #[inline(always)]
+    pub unsafe fn add<L: Lanes<Real = S>>(
+        &self,
+        points: &Shared<'_, Point<S>>,
+        values: &[Point<L>; 4],
+    ) {
+        let copies = self.set.copies_of(self.index);
+        let whole = self.filled() == LANES;
+        for corner in 0..4 {
+            // SAFETY: within bounds as above; alone there by the caller's promise.
+            unsafe {
+                if whole {
+                    L::scatter_add(points.pointer(), &copies[corner], values[corner]);
+                } else {
+                    let rows = rows(values[corner]);
+                    for (lane, row) in rows.into_iter().enumerate().take(self.filled()) {
+                        add_to(points.at(copies[corner][lane] as usize), row);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Where the block's `N` multipliers per tetrahedron stand.
+    #[inline(always)]
+    fn multipliers_at(&self, offset: usize, count: usize) -> Range<usize> {
+        let first = offset + LANES * count * self.index;
+        first..first + LANES * count
+    }
+
+    /// Multipliers of the block; `offset` is that of the set.
+    #[inline(always)]
+    pub fn multipliers<L: Lanes<Real = S>, const N: usize>(
+        &self,
+        offset: usize,
+        values: &[S],
+    ) -> [L; N] {
+        load_rows(&values[self.multipliers_at(offset, N)])
+    }
+
+    /// Replaces multipliers.
+    ///
+    /// # Safety
+    /// Nobody else is at the block's multipliers meanwhile.
+    #[inline(always)]
+    pub unsafe fn store_multipliers<L: Lanes<Real = S>, const N: usize>(
+        &self,
+        offset: usize,
+        values: &Shared<'_, S>,
+        multipliers: [L; N],
+    ) {
+        // SAFETY: alone there by the caller's promise.
+        store_rows(unsafe { values.range(self.multipliers_at(offset, N)) }, multipliers);
+    }
+
+    /// As [`Block::multipliers`], while they are shared.
+    ///
+    /// # Safety
+    /// As [`Block::store_multipliers`].
+    #[inline(always)]
+    pub unsafe fn shared_multipliers<L: Lanes<Real = S>, const N: usize>(
+        &self,
+        offset: usize,
+        values: &Shared<'_, S>,
+    ) -> [L; N] {
+        // SAFETY: alone there by the caller's promise.
+        load_rows(unsafe { values.range(self.multipliers_at(offset, N)) })
+    }
+}
+
+/// `N` rows of eight.
+#[inline(always)]
+pub(super) fn load_rows<L: Lanes, const N: usize>(values: &[L::Real]) -> [L; N] {
+    let mut rows = [L::ZERO; N];
+    for (row, eight) in rows.iter_mut().zip(values.as_chunks().0) {
+        *row = L::load(eight);
+    }
+    rows
+}
+
+/// `N` rows of eight.
+#[inline(always)]
+pub(super) fn store_rows<L: Lanes, const N: usize>(values: &mut [L::Real], rows: [L; N]) {
+    for (row, eight) in rows.into_iter().zip(values.as_chunks_mut().0) {
+        row.store(eight);
+    }
+}
+
+/// The lanes one by one.
+fn rows<L: Lanes>(values: Point<L>) -> [Point<L::Real>; LANES] {
+    let [x, y, z, w] = [values.x, values.y, values.z, values.w].map(L::to_array);
+    std::array::from_fn(|lane| Point { x: x[lane], y: y[lane], z: z[lane], w: w[lane] })
+}
+
+pub(super) fn add_to<S: Real>(point: &mut Point<S>, other: Point<S>) {
+    point.x += other.x;
+    point.y += other.y;
+    point.z += other.z;
+    point.w += other.w;
+}
+
+#[inline(always)]
+unsafe fn gather<L: Lanes>(points: *const Point<L::Real>, indices: &[Eight<u32>; 4]) -> Corners<L> {
+    let mut corners = Corners { x: [Vec3::ZERO; 4], w: [L::ZERO; 4] };
+    for corner in 0..4 {
+        // SAFETY: the caller's promise.
+        let point = unsafe { L::gather(points, &indices[corner]) };
+        corners.x[corner] = point.vec3();
+        corners.w[corner] = point.w;
+    }
+    corners
+}
+
+/// What a thread does at a time.
+struct Piece<'a, S, P> {
+    model: &'a Model<S>,
+    set: &'a TetSet<S>,
+    blocks: Range<usize>,
+    pass: &'a P,
+}
+
+impl<S: Real, P: TetPass<S>> lanes::Kernel<S> for Piece<'_, S, P> {
+    #[inline(always)]
+    fn run<L: Lanes<Real = S>>(self) {
+        for index in self.blocks {
+            self.pass.block::<L>(&Block::new(self.model, self.set, index));
+        }
+    }
+}
+
+impl Workers {
+    /// A pass over some blocks of a set, in no particular order.
+    pub fn pass<S: Real>(
+        &self,
+        model: &Model<S>,
+        set: &TetSet<S>,
+        blocks: Range<usize>,
+        pass: &(impl TetPass<S> + Sync),
+    ) {
+        self.each(blocks.len(), GRAIN, |piece| {
+            let blocks = blocks.start + piece.start..blocks.start + piece.end;
+            lanes::run(self.instructions, Piece { model, set, blocks, pass });
+        });
+    }
+
+    /// A pass over a piece of a set by the thread that is here.
+    pub fn piece<S: Real>(
+        &self,
+        model: &Model<S>,
+        set: &TetSet<S>,
+        blocks: Range<usize>,
+        pass: &impl TetPass<S>,
+    ) {
+        lanes::run(self.instructions, Piece { model, set, blocks, pass });
+    }
+}
