@@ -49,6 +49,15 @@ pub fn symmetric<S: Scalar>(v: &Voigt<S>) -> Mat3<S> {
     Mat3::from_columns(vec3(v[0], v[5], v[4]), vec3(v[5], v[1], v[3]), vec3(v[4], v[3], v[2]))
 }
 
+/// Six components times a number.
+#[inline(always)]
+pub fn scaled<S: Scalar>(mut v: Voigt<S>, factor: S) -> Voigt<S> {
+    for component in &mut v {
+        *component *= factor;
+    }
+    v
+}
+
 /// Energy density [Pa]: `W = C^T D C / 2` with `D` isotropic.
 #[inline(always)]
 pub fn energy_density<S: Scalar>(c: &Voigt<S>, lame_lambda: S, lame_mu: S) -> S {
@@ -93,7 +102,7 @@ pub fn constitutive_multipliers<S: Scalar>(
     lame_mu: S,
     step_volume: S,
 ) -> Voigt<S> {
-    second_piola(c, lame_lambda, lame_mu).map(|stress| -step_volume * stress)
+    scaled(second_piola(c, lame_lambda, lame_mu), -step_volume)
 }
 
 /// Gradient of each constraint by one corner position [1/m]: `E_aa: g[a] F_a`,

@@ -4,8 +4,9 @@
 //! [`Scalar`]: constraint, gradient, energy, and the local solve of one
 //! constraint block. They load and store nothing; the solver does.
 //!
-//! Kernels loop over the corners rather than `map` over arrays: `map` is a call that the compiler
-//! often leaves a call.
+//! Kernels loop over the corners rather than `map` over arrays, and call functions that are
+//! `#[inline(always)]` rather than closures: what the compiler leaves a call is not compiled for the
+//! instructions that [`crate::scalar::lanes::run`] chose.
 //!
 //! Linear tetrahedra share this file's kinematics. With `Ds = [x1-x0, x2-x0, x3-x0]` and its rest
 //! value `Dm`, the deformation gradient is `F = Ds Dm^-1 = sum_i x_i g_i^T`, where `g_1..g_3` are
@@ -120,17 +121,19 @@ struct Symmetric<S> {
 #[inline(always)]
 fn weighted_products<S: Scalar>(g: &[Vec3<S>; 4], w: &[S; 4]) -> Symmetric<S> {
     let h = [g[0] * w[0], g[1] * w[1], g[2] * w[2], g[3] * w[3]];
-    let entry = |a: usize, b: usize| {
-        (h[0][a] * g[0][b] + h[1][a] * g[1][b]) + (h[2][a] * g[2][b] + h[3][a] * g[3][b])
-    };
     Symmetric {
-        xx: entry(0, 0),
-        yy: entry(1, 1),
-        zz: entry(2, 2),
-        yz: entry(1, 2),
-        xz: entry(0, 2),
-        xy: entry(0, 1),
+        xx: sum_products(&h, g, 0, 0),
+        yy: sum_products(&h, g, 1, 1),
+        zz: sum_products(&h, g, 2, 2),
+        yz: sum_products(&h, g, 1, 2),
+        xz: sum_products(&h, g, 0, 2),
+        xy: sum_products(&h, g, 0, 1),
     }
+}
+
+#[inline(always)]
+fn sum_products<S: Scalar>(h: &[Vec3<S>; 4], g: &[Vec3<S>; 4], a: usize, b: usize) -> S {
+    (h[0][a] * g[0][b] + h[1][a] * g[1][b]) + (h[2][a] * g[2][b] + h[3][a] * g[3][b])
 }
 
 /// Corner displacements [m] `w_i P g_i`; as `g_0 = -(g_1 + g_2 + g_3)`, the first is the sum of the

@@ -18,7 +18,7 @@
 //! stiffness `(t_i + t_j)/(s_i + s_j)` of the rotation: with the rebase the tissue carries no added
 //! mass at rest. It is defined through inversion.
 
-use super::green_strain::{Voigt, symmetric};
+use super::green_strain::{Voigt, scaled, symmetric};
 use super::singular_values::{SignedSvd, signed_svd};
 use super::{
     CornerLoad, Symmetric, TetCorrection, deformation_gradient, displacements, shape_gradients,
@@ -67,11 +67,40 @@ pub fn constitutive_multipliers<S: Scalar>(
     let SignedSvd { sigma, v, .. } = signed_svd(f);
     let ([a, b, c], _) = biot_stress(&sigma, lame_lambda, lame_mu);
     let principal = [a, b, c, S::ZERO, S::ZERO, S::ZERO];
-    turn(&v.transpose(), &principal.map(|stress| -step_volume * stress))
+    turn(&v.transpose(), &scaled(principal, -step_volume))
 }
 
-/// Inverse of the stiffness of the principal stretches, times `1/(V dt^2)`; lower triangle
-/// `(00, 10, 11, 20, 21, 22)`.
+/// A symmetric 3 x 3 matrix by its lower triangle `(00, 10, 11, 20, 21, 22)`.
+type Lower<S> = [S; 6];
+
+/// Stiffness [Pa] of the principal stretches, whose indefinite part is that of `e`.
+#[inline(always)]
+fn stretch_stiffness<S: Scalar>(sigma: &[S; 3], volume_modulus: S, lame_mu: S, e: S) -> Lower<S> {
+    let [s1, s2, s3] = *sigma;
+    let c = [s2 * s3, s1 * s3, s1 * s2];
+    [
+        lame_mu + volume_modulus * c[0] * c[0],
+        volume_modulus * c[1] * c[0] + e * s3,
+        lame_mu + volume_modulus * c[1] * c[1],
+        volume_modulus * c[2] * c[0] + e * s2,
+        volume_modulus * c[2] * c[1] + e * s1,
+        lame_mu + volume_modulus * c[2] * c[2],
+    ]
+}
+
+/// The leading minor of two rows.
+#[inline(always)]
+fn minor<S: Scalar>(d: &Lower<S>) -> S {
+    d[0] * d[2] - d[1] * d[1]
+}
+
+#[inline(always)]
+fn determinant<S: Scalar>(d: &Lower<S>) -> S {
+    d[0] * (d[2] * d[5] - d[4] * d[4]) - d[1] * (d[1] * d[5] - d[4] * d[3])
+        + d[3] * (d[1] * d[4] - d[2] * d[3])
+}
+
+/// Inverse of the stiffness of the principal stretches, times `1/(V dt^2)`.
 #[inline(always)]
 fn stretch_compliance<S: Scalar>(
     sigma: &[S; 3],
@@ -79,30 +108,13 @@ fn stretch_compliance<S: Scalar>(
     lame_mu: S,
     e: S,
     step_volume: S,
-) -> [S; 6] {
-    let [s1, s2, s3] = *sigma;
+) -> Lower<S> {
     let volume_modulus = lame_lambda + lame_mu;
-    let c = [s2 * s3, s1 * s3, s1 * s2];
-    let entries = |e: S| {
-        [
-            lame_mu + volume_modulus * c[0] * c[0],
-            volume_modulus * c[1] * c[0] + e * s3,
-            lame_mu + volume_modulus * c[1] * c[1],
-            volume_modulus * c[2] * c[0] + e * s2,
-            volume_modulus * c[2] * c[1] + e * s1,
-            lame_mu + volume_modulus * c[2] * c[2],
-        ]
-    };
-    let minor = |d: &[S; 6]| d[0] * d[2] - d[1] * d[1];
-    let determinant = |d: &[S; 6]| {
-        d[0] * (d[2] * d[5] - d[4] * d[4]) - d[1] * (d[1] * d[5] - d[4] * d[3])
-            + d[3] * (d[1] * d[4] - d[2] * d[3])
-    };
-    let full = entries(e);
+    let full = stretch_stiffness(sigma, volume_modulus, lame_mu, e);
     let floor = S::from_f64(CLEARLY_POSITIVE) * lame_mu * lame_mu;
     let keep = S::select(minor(&full).less(floor), S::ZERO, S::ONE);
     let keep = S::select(determinant(&full).less(floor * lame_mu), S::ZERO, keep);
-    let d = entries(keep * e);
+    let d = stretch_stiffness(sigma, volume_modulus, lame_mu, keep * e);
     let scale = S::ONE / (determinant(&d) * step_volume);
     [
         (d[2] * d[5] - d[4] * d[4]) * scale,
@@ -112,6 +124,13 @@ fn stretch_compliance<S: Scalar>(
         (d[1] * d[3] - d[0] * d[4]) * scale,
         minor(&d) * scale,
     ]
+}
+
+/// Compliance of a shear in the plane across a principal axis, with the floor of its stiffness.
+#[inline(always)]
+fn shear_compliance<S: Scalar>(sigma: S, lame_mu: S, e: S, step_volume: S) -> S {
+    let stiffness = (S::from_f64(SOFTEST_SHEAR) * lame_mu).max(lame_mu - e * sigma);
+    S::TWO / (stiffness * step_volume)
 }
 
 /// One block solve. `w` are the inverse masses [1/kg] of the corners, `multipliers` the components
@@ -149,11 +168,11 @@ pub fn solve<S: Scalar>(
         weighted_products(&g, w);
     let zero = S::ZERO;
     let c = stretch_compliance(&sigma, lame_lambda, lame_mu, e, step_volume);
-    let shear = |k: usize| {
-        let stiffness = (S::from_f64(SOFTEST_SHEAR) * lame_mu).max(lame_mu - e * sigma[k]);
-        S::TWO / (stiffness * step_volume)
-    };
-    let shears = [shear(0), shear(1), shear(2)];
+    let shears = [
+        shear_compliance(sigma[0], lame_mu, e, step_volume),
+        shear_compliance(sigma[1], lame_mu, e, step_volume),
+        shear_compliance(sigma[2], lame_mu, e, step_volume),
+    ];
     let matrix = [
         [c[0] + g00, zero, zero, zero, zero, zero],
         [c[1], c[2] + g11, zero, zero, zero, zero],
@@ -188,11 +207,9 @@ pub fn corner_loads<S: Scalar>(
     let g = shape_gradients(inverse_rest_shape);
     let l = turn(&v, multipliers);
     let off_diagonal = S::TWO * l[3].abs().max(l[4].abs()).max(l[5].abs());
-    let pair = |i: usize, j: usize| {
-        let floor = S::from_f64(SMALLEST_PAIR);
-        ((l[i] + l[j]).abs() + off_diagonal) / (sigma[i] + sigma[j]).max(floor)
-    };
-    let tau = pair(0, 1).max(pair(0, 2)).max(pair(1, 2));
+    let tau = rotation_stiffness(&l, &sigma, off_diagonal, 0, 1)
+        .max(rotation_stiffness(&l, &sigma, off_diagonal, 0, 2))
+        .max(rotation_stiffness(&l, &sigma, off_diagonal, 1, 2));
     let stress = u * v.transpose() * symmetric(multipliers);
     let mut loads = [CornerLoad::default(); 4];
     for i in 0..4 {
@@ -203,4 +220,16 @@ pub fn corner_loads<S: Scalar>(
         loads[i] = CornerLoad { impulse: stress * g[i], mass_bound: tau * reach };
     }
     loads
+}
+
+#[inline(always)]
+fn rotation_stiffness<S: Scalar>(
+    l: &Voigt<S>,
+    sigma: &[S; 3],
+    off_diagonal: S,
+    i: usize,
+    j: usize,
+) -> S {
+    let floor = S::from_f64(SMALLEST_PAIR);
+    ((l[i] + l[j]).abs() + off_diagonal) / (sigma[i] + sigma[j]).max(floor)
 }
