@@ -29,6 +29,13 @@ impl<S: Real> State<S> {
         }
     }
 
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.positions[..])
+            + size_of_val(&self.velocities[..])
+            + size_of_val(&self.multipliers[..])
+    }
+
     /// True while every number is finite.
     pub fn is_finite(&self) -> bool {
         self.positions.iter().chain(&self.velocities).all(|v| v.is_finite())

@@ -208,35 +208,32 @@ fn a_model_keeps_colors_copies_and_order() {
                 sample.builder(tissue).build::<f64>(&common::colored(wanted)).expect("a model");
             let set = if tissue == STVK { &model.green_strain } else { &model.neo_hookean };
             let mut user = vec![None; model.copy_count()];
+            let mut take = |color: usize, copies: &[u32], vertices: &[u32]| {
+                for (&copy, &v) in copies.iter().zip(vertices) {
+                    assert!(model.copies_of(v).contains(&(copy as usize)));
+                    // Constraints come colour by colour.
+                    let before = user[copy as usize].replace(color);
+                    assert_ne!(before, Some(color), "{} {wanted:?}", sample.name);
+                }
+            };
             for color in 0..model.color_count {
-                let mut take = |copies: &[u32], vertices: &[u32]| {
-                    for (&copy, &v) in copies.iter().zip(vertices) {
-                        let range = model.copy_offsets[v as usize]..;
-                        assert!(range.contains(&copy) && copy < model.copy_offsets[v as usize + 1]);
-                        let before = user[copy as usize].replace(color);
-                        assert_ne!(before, Some(color), "{} {wanted:?}", sample.name);
-                    }
-                };
                 let range = |offsets: &[u32]| offsets[color] as usize..offsets[color + 1] as usize;
-                for tet in range(&set.color_offsets) {
-                    take(&set.copies[tet], &set.vertices[tet]);
+                for tet in model.tets(set).filter(|tet| tet.color == color) {
+                    take(color, &tet.copies, &tet.vertices);
                 }
                 for i in range(&model.springs.color_offsets) {
-                    take(&model.springs.copies[i], &model.springs.vertices[i]);
+                    take(color, &model.springs.copies[i], &model.springs.vertices[i]);
                 }
                 for i in range(&model.attachments.color_offsets) {
                     let set = &model.attachments;
-                    take(&set.copies[i..=i], &set.vertices[i..=i]);
+                    take(color, &set.copies[i..=i], &set.vertices[i..=i]);
                 }
             }
-            assert!(
-                set.order
-                    .iter()
-                    .zip(&set.vertices)
-                    .all(|(&tet, vertices)| { sample.mesh.tets()[tet as usize] == *vertices })
-            );
+            let tets: Vec<_> = model.tets(set).collect();
+            assert!(tets.iter().all(|tet| sample.mesh.tets()[tet.number] == tet.vertices));
+            let order = tets.iter().map(|tet| tet.number as u32).collect();
             for (order, count) in [
-                (&set.order, sample.mesh.tets().len()),
+                (&order, sample.mesh.tets().len()),
                 (&model.springs.order, sample.springs.len()),
                 (&model.attachments.order, sample.attachments.len()),
             ] {
@@ -272,21 +269,21 @@ fn loads(model: &Model<f64>, x: &[Vec3<f64>], l: &[f64]) -> Vec<(Vec3<f64>, f64)
         }
     };
     for set in model.tet_sets() {
-        for (tet, vertices) in set.vertices.iter().enumerate() {
-            let corners = vertices.map(|v| x[v as usize]);
-            let shape = &set.inverse_rest_shape[tet];
-            let at = set.multiplier_offset + set.form.multiplier_count() * tet;
-            let six = || std::array::from_fn(|i| l[at + i]);
+        for tet in model.tets(set) {
+            let corners = tet.vertices.map(|v| x[v as usize]);
+            let shape = &tet.inverse_rest_shape;
+            let six = || std::array::from_fn(|i| l[tet.multiplier(i)]);
             let corner_loads = match set.form {
                 TetForm::GreenStrain => green_strain::corner_loads(&corners, shape, &six()),
                 TetForm::NeoHookeanPair => {
-                    neo_hookean_pair::corner_loads(&corners, shape, &[l[at], l[at + 1]])
+                    let pair = [0, 1].map(|i| l[tet.multiplier(i)]);
+                    neo_hookean_pair::corner_loads(&corners, shape, &pair)
                 }
                 TetForm::NeoHookeanStretch => {
                     neo_hookean_stretch::corner_loads(&corners, shape, &six())
                 }
             };
-            add(vertices, &corner_loads);
+            add(&tet.vertices, &corner_loads);
         }
     }
     for (i, vertices) in model.springs.vertices.iter().enumerate() {

@@ -17,10 +17,8 @@ fn mechanical_energy(model: &Model<f64>, state: &State<f64>, inputs: &Inputs<f64
     let mut tets = Vec::new();
     measure_tets(model, &state.positions, &mut tets);
     let mut energy = 0.0;
-    for set in model.tet_sets() {
-        for (tet, order) in set.order.iter().enumerate() {
-            energy += set.rest_volume[tet] * tets[*order as usize].energy_density;
-        }
+    for tet in &tets {
+        energy += tet.rest_volume * tet.energy_density;
     }
     for v in 0..model.vertex_count() {
         if inputs.pins.iter().all(|pin| pin.vertex as usize != v) {

@@ -77,19 +77,20 @@ impl Cantilever {
 
     /// Root of the volume-weighted mean of `|E|^2`.
     fn strain(&self, x: &[Vec3<f64>]) -> f64 {
-        let set = self.model(STVK, &colored(ANY)).green_strain;
-        let mut sum = 0.0;
-        for (tet, vertices) in set.vertices.iter().enumerate() {
-            let corners = vertices.map(|v| x[v as usize]);
-            let f = deformation_gradient(&corners, &set.inverse_rest_shape[tet]);
+        let model = self.model(STVK, &colored(ANY));
+        let (mut sum, mut volume) = (0.0, 0.0);
+        for tet in model.tets(&model.green_strain) {
+            let corners = tet.vertices.map(|v| x[v as usize]);
+            let f = deformation_gradient(&corners, &tet.inverse_rest_shape);
             let strain = green_strain::symmetric(&green_strain::strain(&f));
             // Shear stands doubled off the diagonal.
             let c = strain.columns;
             let diagonal = c[0].x * c[0].x + c[1].y * c[1].y + c[2].z * c[2].z;
             let shear = strain.norm_squared() - diagonal;
-            sum += set.rest_volume[tet] * (diagonal + 0.25 * shear);
+            sum += tet.rest_volume * (diagonal + 0.25 * shear);
+            volume += tet.rest_volume;
         }
-        (sum / set.rest_volume.iter().sum::<f64>()).sqrt()
+        (sum / volume).sqrt()
     }
 
     /// Sweeps after which the error falls below a tolerance: an iteration count `k` whose error is

@@ -114,12 +114,12 @@ impl Problem {
                 lame_mu: material.lame_mu,
                 viscosity: material.viscosity,
             }));
-            for tet in 0..set.len() {
-                linear.nodes.push(set.vertices[tet]);
-                linear.tissue.push(first + set.material[tet]);
+            for tet in model.tets(set) {
+                linear.nodes.push(tet.vertices);
+                linear.tissue.push(first + tet.material as u32);
                 linear.points.push(Point {
-                    gradients: shape_gradients(&set.inverse_rest_shape[tet]),
-                    volume: set.rest_volume[tet],
+                    gradients: shape_gradients(&tet.inverse_rest_shape),
+                    volume: tet.rest_volume,
                 });
             }
         }

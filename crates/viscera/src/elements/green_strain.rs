@@ -118,8 +118,7 @@ pub fn gradient<S: Scalar>(deformation_gradient: &Mat3<S>, g: Vec3<S>) -> [Vec3<
 /// pairs `(a,b)`, `(c,d)` is `G_bd K_ac + G_bc K_ad + G_ad K_bc + G_ac K_bd`. Lower triangle only.
 #[inline(always)]
 fn system<S: Scalar>(c: &Voigt<S>, g: &Symmetric<S>, compliance: &Compliance<S>) -> [[S; 6]; 6] {
-    let (kxx, kyy, kzz) =
-        (S::ONE + S::TWO * c[0], S::ONE + S::TWO * c[1], S::ONE + S::TWO * c[2]);
+    let (kxx, kyy, kzz) = (S::ONE + S::TWO * c[0], S::ONE + S::TWO * c[1], S::ONE + S::TWO * c[2]);
     let (kyz, kxz, kxy) = (c[3], c[4], c[5]);
     let Symmetric { xx, yy, zz, yz, xz, xy } = *g;
     let Compliance { normal, cross, shear } = *compliance;

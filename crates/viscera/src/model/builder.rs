@@ -197,9 +197,8 @@ impl ModelBuilder {
             |&tet: &usize| self.materials[self.tet_material[tet] as usize].model() == model;
         let chosen: Vec<usize> = (0..self.tets.len()).filter(of_model).collect();
         let (order, colors) = layout.sort(chosen);
-        let viscous = |&t: &u32| {
-            self.materials[self.tet_material[t as usize] as usize].viscosity() > 0.0
-        };
+        let viscous =
+            |&t: &u32| self.materials[self.tet_material[t as usize] as usize].viscosity() > 0.0;
         let mut set = TetSet {
             model,
             form,
@@ -358,7 +357,8 @@ impl Layout<'_> {
         let vertices = self.graph.vertices(constraint);
         std::array::from_fn(|corner| {
             let v = vertices[corner];
-            let local = self.coloring.copy_of[first + corner] - self.coloring.copy_offsets[v as usize];
+            let local =
+                self.coloring.copy_of[first + corner] - self.coloring.copy_offsets[v as usize];
             self.copy_offsets[self.numbering.of(v)] + local
         })
     }

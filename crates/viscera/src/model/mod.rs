@@ -231,4 +231,3 @@ impl<S: Real> Model<S> {
             + size_of_val(&self.copy_offsets[..])
     }
 }
-

@@ -78,11 +78,7 @@ pub trait Lanes: Scalar {
     ///
     /// # Safety
     /// Every index is that of a point that nobody else reads or writes meanwhile.
-    unsafe fn scatter(
-        points: *mut Point<Self::Real>,
-        indices: &Eight<u32>,
-        values: Point<Self>,
-    );
+    unsafe fn scatter(points: *mut Point<Self::Real>, indices: &Eight<u32>, values: Point<Self>);
 
     /// Adds to eight points.
     ///

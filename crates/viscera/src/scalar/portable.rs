@@ -164,10 +164,5 @@ impl<S: Real> Lanes for Portable<S> {
 
 #[inline(always)]
 fn row<S: Real>(values: &Point<Portable<S>>, lane: usize) -> Point<S> {
-    Point {
-        x: values.x.0[lane],
-        y: values.y.0[lane],
-        z: values.z.0[lane],
-        w: values.w.0[lane],
-    }
+    Point { x: values.x.0[lane], y: values.y.0[lane], z: values.z.0[lane], w: values.w.0[lane] }
 }

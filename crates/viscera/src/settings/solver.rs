@@ -1,8 +1,8 @@
 //! The solver's settings.
 
 use super::{
-    Kind, Node, SettingError, Table, Value, ValueError, above, at_least, choices, number, one_of,
-    Whole, settings_table, truth, value_error, whole,
+    Kind, Node, SettingError, Table, Value, ValueError, Whole, above, at_least, choices, number,
+    one_of, settings_table, truth, value_error, whole,
 };
 
 choices! {

@@ -8,6 +8,7 @@ use crate::measure::{
     DeformationSummary, Energies, TetMeasure, measure_energies, measure_tets, summarize_deformation,
 };
 use crate::model::{Model, ModelError};
+use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::scene::Scene;
 use crate::solver::balance::ForceBalance;
@@ -152,6 +153,16 @@ impl<S: Real> Simulation<S> {
     /// What moves.
     pub fn state(&self) -> &State<S> {
         &self.state
+    }
+
+    /// The solver, for what it tells of itself.
+    pub fn solver(&self) -> &Solver<S> {
+        &self.solver
+    }
+
+    /// See [`Solver::use_instructions`].
+    pub fn use_instructions(&mut self, instructions: Instructions) {
+        self.solver.use_instructions(instructions);
     }
 
     /// Measures of the tetrahedra after the last frame, in the bodies' order.

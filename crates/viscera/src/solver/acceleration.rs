@@ -98,6 +98,12 @@ impl<S: Real> Anderson<S> {
         }
     }
 
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        let histories = self.mapped.iter().chain(&self.residuals);
+        histories.map(|vector| size_of_val(&vector[..])).sum()
+    }
+
     /// Forgets everything.
     pub fn start(&mut self) {
         self.count = 0;

@@ -144,6 +144,24 @@ impl<S: Real> Workspace<S> {
         }
     }
 
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> usize {
+        let Ground { previous, predicted, external, masses, inverse_masses, .. } = &self.ground;
+        let points = [&self.points, previous, predicted, &self.copies, &self.loads];
+        let iterates = self.iterate.iter();
+        points.into_iter().map(|points| size_of_val(&points[..])).sum::<usize>()
+            + [external, &self.velocities].map(|v| size_of_val(&v[..])).iter().sum::<usize>()
+            + [masses, inverse_masses].map(|m| size_of_val(&m[..])).iter().sum::<usize>()
+            + self.ground.start_strain.iter().map(|s| size_of_val(&s[..])).sum::<usize>()
+            + iterates.clone().map(|i| size_of_val(&i.positions[..])).sum::<usize>()
+            + iterates.map(|i| size_of_val(&i.multipliers[..])).sum::<usize>()
+            + size_of_val(&self.multiplier_weights[..])
+            + size_of_val(&self.energies[..])
+            + self.evaluator.bytes()
+            + self.anderson.bytes()
+            + self.guard.bytes()
+    }
+
     /// The model is one of the same shape as that for which the memory was taken, and its elements
     /// stay within that memory.
     pub fn check(&self, model: &Model<S>) -> Result<(), StepError> {
@@ -416,11 +434,7 @@ impl<S: Real> Workspace<S> {
 
 impl<S: Real> Ground<S> {
     /// `change` on every vertex's point.
-    fn each_vertex(
-        &self,
-        points: &mut [Point<S>],
-        change: impl Fn(usize, &mut Point<S>) + Sync,
-    ) {
+    fn each_vertex(&self, points: &mut [Point<S>], change: impl Fn(usize, &mut Point<S>) + Sync) {
         let points = Shared::new(points);
         self.workers.each(points.len(), GRAIN, |range| {
             // SAFETY: every vertex is worked on once.

@@ -92,6 +92,11 @@ impl<S: Real> Guard<S> {
             report: None,
         }
     }
+
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.start[..]) + size_of_val(&self.trial[..])
+    }
 }
 
 impl<S: Real> Workspace<S> {

@@ -23,8 +23,8 @@ use super::potential::measure_strain;
 use super::tets::{Block, TetPass, load_rows};
 use super::threads::Shared;
 use crate::elements::{attachment, deformation_gradient, green_strain, spring};
-use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::scalar::Real;
+use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::state::State;
 
 impl<S: Real> Workspace<S> {

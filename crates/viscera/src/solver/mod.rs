@@ -22,6 +22,7 @@ mod tets;
 mod threads;
 
 use crate::model::Model;
+use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::settings::SolverSettings;
 use crate::state::State;
@@ -193,6 +194,22 @@ impl<S: Real> Solver<S> {
         }
         check(model, state, inputs)?;
         self.work.check(model)
+    }
+
+    /// Works with these instructions from now on, or with what the processor has of them. The bits of
+    /// all results are the same; this is for tests of that, and for measurements.
+    pub fn use_instructions(&mut self, instructions: Instructions) {
+        self.work.ground.workers.instructions = instructions.or_detect();
+    }
+
+    /// The instructions that kernels are run with.
+    pub fn instructions(&self) -> Instructions {
+        self.work.ground.workers.instructions
+    }
+
+    /// Bytes of the memory taken, model and state not included.
+    pub fn bytes(&self) -> usize {
+        self.work.bytes()
     }
 
     /// How many threads a step is done by.

@@ -170,6 +170,13 @@ impl<S: Real> Evaluator<S> {
         }
     }
 
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.stored[..])
+            + size_of_val(&self.energies[..])
+            + size_of_val(&self.partial[..])
+    }
+
     /// `Phi` at `x`.
     pub fn evaluate(
         &mut self,

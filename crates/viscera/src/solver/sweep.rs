@@ -3,7 +3,7 @@
 
 use std::marker::PhantomData;
 
-use super::cpu::{Step, StartStrain};
+use super::cpu::{StartStrain, Step};
 use super::forms::{Form, pass_by_form, with_form};
 use super::tets::{Block, TetPass, load_rows};
 use super::threads::{Shared, Workers};

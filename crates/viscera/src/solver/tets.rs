@@ -4,8 +4,8 @@
 use std::ops::Range;
 
 use super::threads::{Shared, Workers};
-use crate::model::{MaterialConstants, Model, TetBlock, TetSet};
 use crate::material::Compliance;
+use crate::model::{MaterialConstants, Model, TetBlock, TetSet};
 use crate::scalar::lanes::{self, Eight, LANES, Lanes, Point};
 use crate::scalar::{Mat3, Real, Vec3, vec3};
 
