@@ -37,9 +37,6 @@ pub fn write(environment: &Environment) -> Result<String, String> {
 
 fn opening(about: &Value, rows: &[Value]) -> String {
     let text = |key: &str| about[key].as_str().unwrap_or("unknown").to_owned();
-    let times = rows.iter().filter_map(|row| row["yardstick_ms"].as_array()).flatten();
-    let times: Vec<f64> = times.filter_map(Value::as_f64).collect();
-    let (low, high) = times.iter().fold((f64::MAX, 0.0_f64), |(a, b), t| (a.min(*t), b.max(*t)));
     format!(
         "# Peers\n\n\
          Written by `cargo xtask peers`; the program writes it again, so edit the program.\n\n\
@@ -47,14 +44,21 @@ fn opening(about: &Value, rows: &[Value]) -> String {
          pins and frames of 1/60 s. One program runs at a time, on one thread of one core. Every \
          round runs everything once, the next in reverse order.\n\n\
          - processor: {}\n- command: `{}`\n- rounds: {}; numbers are medians over rounds\n\
-         - load: a fixed piece of arithmetic, timed before and after each run, took {} to {} ms; the \
+         - load: a fixed piece of arithmetic, timed before and after each run, took {}; the \
          further apart, the busier the machine. Compare only what stands in one table.",
         text("cpu"),
         text("command"),
         about["rounds"],
-        digits(low),
-        digits(high),
+        load(rows),
     )
+}
+
+/// The range of the yardstick's times.
+fn load(rows: &[Value]) -> String {
+    let times = rows.iter().filter_map(|row| row["yardstick_ms"].as_array()).flatten();
+    let times: Vec<f64> = times.filter_map(Value::as_f64).collect();
+    let (low, high) = times.iter().fold((f64::MAX, 0.0_f64), |(a, b), t| (a.min(*t), b.max(*t)));
+    format!("{} to {} ms", digits(low), digits(high))
 }
 
 const COLUMNS: &str = "\
@@ -74,7 +78,9 @@ body comes to rest. Sizes: s is 1280 tetrahedra, m 10 240, l 98 260.
   an explicit finite element solution with small steps, over its displacement, along the whole path.";
 
 const SETTINGS: &str = "\
-Each peer runs as the benchmark recommends it: its best trade, not its cheapest setting. *numbers* is the precision.
+At size s each peer has the setting that the benchmark recommends for it; above, where that would take too long, one
+that is affordable and need not be its best: an error of 100 % or more says that the setting does not fit the scene,
+not that the peer cannot do it. *numbers* is the precision.
 Settings left out are the peer's defaults.";
 
 const LIMITS: &str = "\
@@ -93,7 +99,7 @@ const METHODS: [(&str, &str); 9] = [
     ("NewtonVBD", "Newton (Warp): vertex block descent, coloured"),
     ("NewtonXPBD", "Newton (Warp): XPBD, Jacobi"),
     ("PyPBD_XPBD", "PositionBasedDynamics: XPBD, coloured"),
-    ("RapierFem", "Rapier: implicit finite elements"),
+    ("RapierFem", "Rapier: finite elements"),
     ("RapierConstraints", "Rapier: soft constraints"),
     ("NewtonSemiImplicit", "Newton (Warp): explicit"),
 ];
@@ -225,13 +231,17 @@ fn sweep_section(rows: &[Value]) -> String {
             ]);
         }
     }
+    let rounds = rows.iter().filter_map(|row| row["round"].as_u64()).max().map_or(0, |r| r + 1);
     format!(
         "## Cost of a sweep\n\n\
-         Scene A, 20 frames of 10 substeps, with 2 and with 8 iterations: the difference in CPU time, \
+         Scene B, 20 frames of 10 substeps, with 2 and with 8 iterations: the difference in CPU time, \
          over the tetrahedra and the sweeps between. What a substep costs besides is not in it. \
          *ratio*: to {} in the same round; below 1 is cheaper. A sweep is not a measure of progress: \
-         one over six constraints per tetrahedron does more than one over a single energy.\n\n{}",
+         one over six constraints per tetrahedron does more than one over a single energy.\n\n\
+         Command: `{}`; rounds: {rounds}; the yardstick of load took {}.\n\n{}",
         SWEEPERS[0].label,
+        rows.first().and_then(|row| row["command"].as_str()).unwrap_or("unknown"),
+        load(rows),
         table.to_markdown()
     )
 }

@@ -28,6 +28,7 @@ Options:
   --rounds N        Each round runs everything once; ratios are taken inside a round [default: 3]
   --quick           Scene A, size s, one round, where nothing else is said
   --out FILE        The document [default: docs/peers.md]
+  --only-sweeps     Run only the cost of a sweep; the rest is from the last run
   --again           Run nothing; write the document from the last run's results
 
 It needs CPython 3.11 on Linux, and the network for the first run (about 1.5 GB). A round at sizes s
@@ -41,6 +42,7 @@ pub struct Options {
     rounds: u32,
     out: Option<PathBuf>,
     again: bool,
+    only_sweeps: bool,
     /// As one would type it; without folders, which differ from machine to machine.
     command: String,
 }
@@ -49,7 +51,7 @@ impl Options {
     fn read(arguments: &[&str]) -> Result<Self, String> {
         let (mut bench, mut out) = (None, None);
         let (mut scenes, mut sizes, mut rounds) = (None, None, None);
-        let (mut quick, mut large, mut again) = (false, false, false);
+        let (mut quick, mut large, mut again, mut only_sweeps) = (false, false, false, false);
         let mut command = String::from("cargo xtask peers");
         let mut rest = arguments.iter();
         while let Some(&flag) = rest.next() {
@@ -58,6 +60,10 @@ impl Options {
                 "--bench" => bench = Some(PathBuf::from(value()?)),
                 "--out" => out = Some(PathBuf::from(value()?)),
                 "--again" => again = true,
+                "--only-sweeps" => {
+                    only_sweeps = true;
+                    command += " --only-sweeps";
+                }
                 "--quick" | "--large" => {
                     quick |= flag == "--quick";
                     large |= flag == "--large";
@@ -87,6 +93,7 @@ impl Options {
             rounds: rounds.unwrap_or(if quick { 1 } else { 3 }),
             out,
             again,
+            only_sweeps,
             command,
         })
     }

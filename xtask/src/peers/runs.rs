@@ -97,6 +97,10 @@ pub const SWEEPERS: [Sweeper; 7] = [
     },
 ];
 
+/// The gentle scene. In A, under as few sweeps, a sweep of PyPBD took up to four times as long as in
+/// B: its cost depends on how the body is thrown about.
+const SWEEP_SCENE: &str = "B";
+
 /// Substeps per frame while sweeps are counted: few sweeps of one long step throw a body about.
 const SWEEP_SUBSTEPS: u32 = 10;
 
@@ -109,10 +113,17 @@ pub const SWEEPS_BETWEEN: u32 = SWEEP_SUBSTEPS * (SWEEP_ITERATIONS[1] - SWEEP_IT
 /// Frames of a run that only tells a cost.
 const COST_FRAMES: &str = "20";
 
+/// CPU time [s] that a Python peer may take for one run. Less cuts the slow ones short on a loaded
+/// machine; the slowest take a minute at size m.
+const LONGEST: &str = "600";
+
 /// References and rounds, then sweeps, all into files of result lines.
 pub fn run_all(environment: &Environment, options: &Options) -> Result<(), String> {
     let results = environment.results();
-    for name in ["settled", "motion", "sweeps"] {
+    if options.only_sweeps {
+        return sweeps(environment, options);
+    }
+    for name in ["settled", "motion"] {
         write_whole(&results.join(format!("{name}.jsonl")), "")?;
     }
     let about = json!({ "command": options.command, "cpu": cpu_model(), "rounds": options.rounds });
@@ -153,7 +164,7 @@ fn rounds(
     let mut command = environment.python();
     command.env("SOFTBENCH_EXTERNAL", ours.join(";"));
     command.args(["run_bench.py", "--plan", plan, "--sizes", size, "--rounds", &rounds]);
-    command.arg("--scenes").args(&options.scenes);
+    command.args(["--max-seconds", LONGEST, "--scenes"]).args(&options.scenes);
     command.arg("--out").arg(environment.results().join(format!("{kind}.jsonl")));
     if kind == "motion" {
         command.arg("--transient");
@@ -171,6 +182,7 @@ fn sweeps(environment: &Environment, options: &Options) -> Result<(), String> {
         sizes.extend(options.sizes.last());
     }
     let path = environment.results().join("sweeps.jsonl");
+    write_whole(&path, "")?;
     let mut file = std::fs::File::options().append(true).open(&path);
     println!("\n== cost of a sweep, rounds: {}", options.rounds);
     for round in 0..options.rounds {
@@ -185,6 +197,7 @@ fn sweeps(environment: &Environment, options: &Options) -> Result<(), String> {
                 row["round"] = json!(round);
                 row["iterations"] = json!(iterations);
                 row["sweeper"] = json!(sweeper.label);
+                row["command"] = json!(options.command);
                 let written = match &mut file {
                     Ok(file) => writeln!(file, "{row}"),
                     Err(error) => Err(std::io::Error::from(error.kind())),
@@ -214,8 +227,16 @@ fn sweep(
             .args(["peers/external_peer.py", "--peer", sweeper.label, "--program"])
             .arg(format!("'{}' bench-scene", environment.program.display())),
     };
-    command.args(["--scene", "A", "--size", size, "--timing-only", "--frames", COST_FRAMES]);
-    command.args(["--max-seconds", "600", "--cfg", &settings.to_string()]);
+    command.args([
+        "--scene",
+        SWEEP_SCENE,
+        "--size",
+        size,
+        "--timing-only",
+        "--frames",
+        COST_FRAMES,
+    ]);
+    command.args(["--max-seconds", LONGEST, "--cfg", &settings.to_string()]);
     let output = command.stderr(Stdio::piped()).output();
     let output = output.map_err(|error| format!("Python could not be started: {error}"))?;
     let text = String::from_utf8_lossy(&output.stdout);
