@@ -1,4 +1,6 @@
-//! Project chores: `cargo xtask test`.
+//! Project chores: `cargo xtask test`, `cargo xtask peers`.
+
+mod peers;
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
@@ -17,6 +19,7 @@ Commands:
             documentation   cargo doc --workspace --no-deps, warnings are errors
             tests           cargo test --workspace
             main job        the `viscera` program runs a scene for two frames and draws it
+  peers   Compare with other simulators and write docs/peers.md; `cargo xtask peers --help`
   help    Print this text
 
 Options of `test`:
@@ -35,6 +38,8 @@ fn main() -> ExitCode {
     let wants_help = arguments.iter().any(|a| ["-h", "--help"].contains(a));
     match arguments.as_slice() {
         [] | ["help"] => println!("{HELP}"),
+        ["peers", ..] if wants_help => println!("{}", peers::HELP),
+        ["peers", options @ ..] => return peers::peers(options),
         _ if wants_help => println!("{HELP}"),
         ["test"] => return test(false),
         ["test", "--required"] => return test(true),

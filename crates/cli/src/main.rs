@@ -1,5 +1,6 @@
 //! The `viscera` program.
 
+mod bench_scene;
 mod files;
 mod film;
 mod mesh;
@@ -36,6 +37,9 @@ enum Command {
     /// What a scene file can say
     #[command(subcommand)]
     Scene(scene::SceneCommand),
+    // For a program, not for a person.
+    #[command(hide = true)]
+    BenchScene(bench_scene::BenchSceneArguments),
 }
 
 /// Exit code of a run that Ctrl-C ended, as shells report it.
@@ -46,6 +50,9 @@ fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Mesh(command) => mesh::execute(&command).map(|()| run::Outcome::Finished),
         Command::Scene(command) => scene::execute(&command).map(|()| run::Outcome::Finished),
+        Command::BenchScene(arguments) => {
+            bench_scene::execute(&arguments).map(|()| run::Outcome::Finished)
+        }
     };
     match result {
         Ok(run::Outcome::Finished) => ExitCode::SUCCESS,

@@ -1,0 +1,177 @@
+//! Where the benchmark runs: a copy of it, a Python environment, the programs that it starts.
+
+use super::{Options, finish};
+use crate::cargo;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Folders and programs of a run.
+pub struct Environment {
+    /// The repository.
+    pub root: PathBuf,
+    /// The benchmark as it was given; none where only the document is written.
+    given: Option<PathBuf>,
+    /// Everything that this chore makes.
+    folder: PathBuf,
+    /// `viscera`, in release.
+    pub program: PathBuf,
+}
+
+/// Environment variables by which libraries are told how many threads they may use.
+const THREAD_VARIABLES: [&str; 5] = [
+    "OMP_NUM_THREADS",
+    "TBB_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "RAYON_NUM_THREADS",
+];
+
+impl Environment {
+    /// Says what is missing before anything is done.
+    pub fn find(options: &Options) -> Result<Self, String> {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
+        let given = match (&options.bench, options.again) {
+            (_, true) => None,
+            (None, _) => {
+                return Err("where is the benchmark? Give its folder with --bench DIR or in the \
+                            environment variable VISCERA_BENCH"
+                    .into());
+            }
+            (Some(folder), _) if !folder.join("run_bench.py").is_file() => {
+                return Err(format!(
+                    "{}: no run_bench.py there; --bench names the folder that holds it",
+                    folder.display()
+                ));
+            }
+            (Some(folder), _) => Some(folder.clone()),
+        };
+        // This program is target/debug/xtask, wherever target may be.
+        let this = std::env::current_exe().map_err(|error| format!("where am I? {error}"))?;
+        let target = this.ancestors().nth(2).ok_or("no target folder above this program")?;
+        let name = format!("viscera{}", std::env::consts::EXE_SUFFIX);
+        Ok(Self {
+            root: root.to_owned(),
+            given,
+            folder: target.join("peers"),
+            program: target.join("release").join(name),
+        })
+    }
+
+    /// The copy of the benchmark: its programs write beside themselves, and the original stays
+    /// as it is.
+    pub fn bench(&self) -> PathBuf {
+        self.folder.join("bench")
+    }
+
+    /// Where result lines are kept.
+    pub fn results(&self) -> PathBuf {
+        self.folder.join("results")
+    }
+
+    fn rapier(&self) -> PathBuf {
+        self.bench().join("peers/rapier/target/release/rapier_peer")
+    }
+
+    /// The environment's Python, in the benchmark's folder.
+    pub fn python(&self) -> Command {
+        let mut command = Command::new(self.folder.join("venv/bin/python"));
+        command
+            .current_dir(self.bench())
+            .env("SOFTBENCH_CACHE", self.folder.join("cache"))
+            .env("RAPIER_PEER", self.rapier())
+            .env("PYTHONUNBUFFERED", "1");
+        command
+    }
+
+    /// Python on one thread of the last core; the benchmark's own rounds are run so too.
+    pub fn pinned_python(&self) -> Command {
+        const PIN: &str = "import os, sys; \
+            os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-1:]); \
+            os.execv(sys.executable, [sys.executable] + sys.argv[1:])";
+        let mut command = self.python();
+        THREAD_VARIABLES.iter().for_each(|name| {
+            command.env(name, "1");
+        });
+        command.args(["-c", PIN]);
+        command
+    }
+
+    /// Makes everything that a run needs; what is there already is kept.
+    pub fn prepare(&self) -> Result<(), String> {
+        let Some(given) = &self.given else { return Ok(()) };
+        copy_folder(given, &self.bench())?;
+        fs::create_dir_all(self.results()).map_err(|e| format!("cannot make a folder: {e}"))?;
+        self.install()?;
+        finish(
+            "build Rapier's peer",
+            cargo(&["build", "--release"]).current_dir(self.bench().join("peers/rapier")),
+            "its first build needs the network",
+        )?;
+        finish(
+            "build viscera",
+            cargo(&["build", "--release", "--package", "viscera-cli"]).current_dir(&self.root),
+            "mend the errors above",
+        )
+    }
+
+    /// A Python environment with the benchmark's requirements; a mark tells that it is complete.
+    fn install(&self) -> Result<(), String> {
+        let (venv, list) = (self.folder.join("venv"), self.bench().join("requirements.txt"));
+        let mark = venv.join("installed.txt");
+        let wanted = fs::read_to_string(&list)
+            .map_err(|error| format!("{}: {error}; is this the benchmark?", list.display()))?;
+        if fs::read_to_string(&mark).is_ok_and(|installed| installed == wanted) {
+            return Ok(());
+        }
+        let python = find_python()?;
+        finish(
+            "make a Python environment",
+            Command::new(python).args(["-m", "venv"]).arg(&venv),
+            "where Python's module venv is missing, install it (Debian: python3.11-venv)",
+        )?;
+        finish(
+            "install the peers (about 1.5 GB)",
+            self.python().args(["-m", "pip", "install", "-r", "requirements.txt"]),
+            "it needs the network and CPython 3.11",
+        )?;
+        fs::write(&mark, wanted).map_err(|error| format!("{}: {error}", mark.display()))
+    }
+}
+
+/// The peers' packages are built for one version of Python.
+fn find_python() -> Result<&'static str, String> {
+    const NAMES: [&str; 3] = ["python3.11", "python3", "python"];
+    let fits = |name: &&&str| {
+        let output = Command::new(**name).arg("--version").output();
+        output.is_ok_and(|o| o.stdout.starts_with(b"Python 3.11"))
+    };
+    NAMES
+        .iter()
+        .find(fits)
+        .copied()
+        .ok_or_else(|| format!("no CPython 3.11 under the names {}; install it", NAMES.join(", ")))
+}
+
+/// Copies what differs, so that nothing is built again without need. Leaves out hidden files and
+/// what programs have built.
+fn copy_folder(from: &Path, to: &Path) -> Result<(), String> {
+    let failed = |error: std::io::Error| format!("cannot copy {}: {error}", from.display());
+    fs::create_dir_all(to).map_err(failed)?;
+    for entry in fs::read_dir(from).map_err(failed)?.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name.starts_with('.') || ["target", "__pycache__", "results"].contains(&name.as_str()) {
+            continue;
+        }
+        let (source, copy) = (entry.path(), to.join(&name));
+        if source.is_dir() {
+            copy_folder(&source, &copy)?;
+            continue;
+        }
+        let bytes = fs::read(&source).map_err(failed)?;
+        if !fs::read(&copy).is_ok_and(|old| old == bytes) {
+            fs::write(&copy, bytes).map_err(failed)?;
+        }
+    }
+    Ok(())
+}
