@@ -15,7 +15,7 @@
 //! neo-Hookean element where tissue may turn inside out.
 
 use super::{
-    CornerLoad, Symmetric, TetCorrection, displacements, shape_gradients, solve_symmetric,
+    CornerLoad, Symmetric, TetCorrection, weighted_images, shape_gradients, solve_symmetric,
     weighted_products,
 };
 use crate::material::Compliance;
@@ -182,7 +182,7 @@ pub fn solve<S: Scalar>(
         }
     }
     let change = solve_symmetric(matrix, right);
-    let positions = displacements(&(f * symmetric(&change)), &g, w);
+    let positions = weighted_images(&(f * symmetric(&change)), &g, w);
     TetCorrection { multipliers: change, positions }
 }
 

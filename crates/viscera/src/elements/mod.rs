@@ -88,11 +88,7 @@ pub fn internal_forces<S: Scalar>(
     inverse_rest_shape: &Mat3<S>,
     rest_volume: S,
 ) -> [Vec3<S>; 4] {
-    let mut forces = shape_gradients(inverse_rest_shape);
-    for force in &mut forces {
-        *force = -(*piola * *force) * rest_volume;
-    }
-    forces
+    weighted_images(piola, &shape_gradients(inverse_rest_shape), &[-rest_volume; 4])
 }
 
 /// The body once for each literal, with the index as a constant: loops that compilers leave rolled
@@ -136,10 +132,10 @@ fn sum_products<S: Scalar>(h: &[Vec3<S>; 4], g: &[Vec3<S>; 4], a: usize, b: usiz
     (h[0][a] * g[0][b] + h[1][a] * g[1][b]) + (h[2][a] * g[2][b] + h[3][a] * g[3][b])
 }
 
-/// Corner displacements [m] `w_i P g_i`; as `g_0 = -(g_1 + g_2 + g_3)`, the first is the sum of the
+/// `w_i P g_i` for each corner; as `g_0 = -(g_1 + g_2 + g_3)`, the first is the sum of the
 /// others turned round.
 #[inline(always)]
-fn displacements<S: Scalar>(p: &Mat3<S>, g: &[Vec3<S>; 4], w: &[S; 4]) -> [Vec3<S>; 4] {
+fn weighted_images<S: Scalar>(p: &Mat3<S>, g: &[Vec3<S>; 4], w: &[S; 4]) -> [Vec3<S>; 4] {
     let (a, b, c) = (*p * g[1], *p * g[2], *p * g[3]);
     [(a + b + c) * -w[0], a * w[1], b * w[2], c * w[3]]
 }

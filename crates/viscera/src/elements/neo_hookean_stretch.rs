@@ -21,7 +21,7 @@
 use super::green_strain::{Voigt, scaled, symmetric};
 use super::singular_values::{SignedSvd, signed_svd};
 use super::{
-    CornerLoad, Symmetric, TetCorrection, deformation_gradient, displacements, shape_gradients,
+    CornerLoad, Symmetric, TetCorrection, deformation_gradient, weighted_images, shape_gradients,
     solve_symmetric, weighted_products,
 };
 use crate::scalar::{Mat3, Scalar, Vec3};
@@ -190,7 +190,7 @@ pub fn solve<S: Scalar>(
         -(shears[2] * residual[5]),
     ];
     let change = solve_symmetric(matrix, right);
-    let positions = displacements(&(u * symmetric(&change)), &g, w);
+    let positions = weighted_images(&(u * symmetric(&change)), &g, w);
     TetCorrection { multipliers: turn(&material_axes, &change), positions }
 }
 

@@ -5,6 +5,7 @@ use super::Inputs;
 use super::StepError;
 use super::acceleration::{Anderson, Chebyshev, chebyshev_update};
 use super::energy::Energy;
+use super::explicit::stable_step;
 use super::forms::{Form, with_form};
 use super::guard::Guard;
 use super::loads::load_multipliers;
@@ -15,7 +16,9 @@ use super::threads::{Shared, Workers};
 use crate::model::Model;
 use crate::scalar::lanes::{Eight, LANES, Point};
 use crate::scalar::{Real, Vec3};
-use crate::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Start};
+use crate::settings::{
+    Acceleration, AndersonGuard, AndersonOn, Method, SolverSettings, Start,
+};
 use crate::state::State;
 
 /// The rebase multiplies an error of curvature `k` by `1 - k/mh`: stable from `mh >= k/2` on, so little
@@ -35,6 +38,15 @@ pub(super) struct Step<'a, S> {
     pub inputs: &'a Inputs<S>,
     pub dt: f64,
     pub settings: &'a SolverSettings,
+    /// Of an explicit method in this step.
+    pub small_steps: u32,
+}
+
+impl<S> Step<'_, S> {
+    /// [s].
+    pub fn small_dt(&self) -> f64 {
+        self.dt / f64::from(self.small_steps)
+    }
 }
 
 /// Green strain at the start of the step of the blocks of viscous sets, `[green, neo]`.
@@ -88,6 +100,12 @@ pub(super) struct Workspace<S> {
     pub anderson: Anderson<S>,
     /// Empty where steps are not guarded.
     pub guard: Guard<S>,
+    /// Of an explicit method [s].
+    pub stable_step: f64,
+    /// Small steps done in this step.
+    pub small_step: u32,
+    /// Velocities at the start of an explicit step [m/s]; empty for other methods.
+    pub start_velocities: Vec<Vec3<S>>,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -99,15 +117,18 @@ struct Iterate<S> {
 impl<S: Real> Workspace<S> {
     pub fn new(model: &Model<S>, settings: &SolverSettings) -> Self {
         let vertices = model.vertex_count();
-        let accelerated = settings.acceleration != Acceleration::None;
+        let explicit = settings.method == Method::Explicit;
+        let acceleration = if explicit { Acceleration::None } else { settings.acceleration };
+        let accelerated = acceleration != Acceleration::None;
         let points = |wanted: bool| vec![Point::default(); if wanted { vertices } else { 0 }];
         let iterate = |wanted: bool| Iterate {
             positions: points(wanted),
             multipliers: vec![S::ZERO; if wanted { model.multiplier_count } else { 0 }],
         };
-        let anderson = settings.acceleration == Acceleration::Anderson;
-        let needs_loads =
-            settings.rebase || (anderson && settings.anderson_on == AndersonOn::Multipliers);
+        let anderson = acceleration == Acceleration::Anderson;
+        let needs_loads = explicit
+            || settings.rebase
+            || (anderson && settings.anderson_on == AndersonOn::Multipliers);
         let window = settings.anderson_window as usize;
         let length = if anderson { 3 * vertices + model.multiplier_count } else { 0 };
         let guarded = settings.guards_steps();
@@ -133,7 +154,7 @@ impl<S: Real> Workspace<S> {
             loads: vec![Point::default(); if needs_loads { model.copy_count() } else { 0 }],
             iterate: [
                 iterate(accelerated),
-                iterate(settings.acceleration == Acceleration::Chebyshev),
+                iterate(acceleration == Acceleration::Chebyshev),
             ],
             multiplier_weights: vec![S::ZERO; if accelerated { model.multiplier_count } else { 0 }],
             rebase_factor: S::from_f64(rebase_factor(model, settings)),
@@ -141,6 +162,9 @@ impl<S: Real> Workspace<S> {
             chebyshev: Chebyshev::default(),
             anderson: Anderson::new(window, length),
             guard: Guard::new(if guarded { vertices } else { 0 }),
+            stable_step: if explicit { stable_step(model, settings) } else { f64::INFINITY },
+            small_step: 0,
+            start_velocities: vec![Vec3::ZERO; if explicit { vertices } else { 0 }],
         }
     }
 
@@ -157,6 +181,7 @@ impl<S: Real> Workspace<S> {
             + iterates.map(|i| size_of_val(&i.multipliers[..])).sum::<usize>()
             + size_of_val(&self.multiplier_weights[..])
             + size_of_val(&self.energies[..])
+            + size_of_val(&self.start_velocities[..])
             + self.evaluator.bytes()
             + self.anderson.bytes()
             + self.guard.bytes()
@@ -233,6 +258,13 @@ impl<S: Real> Workspace<S> {
                 }
             }
             Stage::LimitEnergy => self.limit_energy(step),
+            Stage::BeginExplicit => {
+                state.multiplier_dt = step.dt;
+                self.begin_explicit(step);
+            }
+            Stage::LoadForces => self.load_explicit_forces(step),
+            Stage::AdvanceExplicit => self.advance_explicit(step),
+            Stage::EndExplicit => self.end_explicit(step),
             Stage::WriteState => {
                 for (v, &user) in step.model.numbering.order.iter().enumerate() {
                     state.positions[user as usize] = self.points[v].vec3();
@@ -255,34 +287,41 @@ impl<S: Real> Workspace<S> {
         }
     }
 
-    fn predict(&mut self, step: &Step<'_, S>, start: Start) {
-        let model = step.model;
-        let ground = &mut self.ground;
+    /// External forces, and the inverse masses, which pins have none of.
+    pub(super) fn prepare(&mut self, step: &Step<'_, S>) {
+        let (model, ground) = (step.model, &mut self.ground);
         ground.external.fill(Vec3::ZERO);
         for &(vertex, force) in &step.inputs.forces {
             ground.external[model.numbering.of(vertex)] += force;
         }
+        for (inverse, &mass) in ground.inverse_masses.iter_mut().zip(&ground.masses) {
+            *inverse = S::ONE / mass;
+        }
+        for pin in &step.inputs.pins {
+            ground.inverse_masses[model.numbering.of(pin.vertex)] = S::ZERO;
+        }
+    }
+
+    fn predict(&mut self, step: &Step<'_, S>, start: Start) {
+        self.prepare(step);
+        let (model, ground) = (step.model, &mut self.ground);
         let dt = S::from_f64(step.dt);
         for v in 0..model.vertex_count() {
             let x = self.points[v].vec3();
-            let inverse_mass = S::ONE / ground.masses[v];
-            let acceleration = step.inputs.gravity + ground.external[v] * inverse_mass;
+            let load = ground.external[v] * (S::ONE / ground.masses[v]);
             let inertial = x + self.velocities[v] * dt;
-            let predicted = inertial + acceleration * (dt * dt);
+            let predicted = inertial + (step.inputs.gravity + load) * (dt * dt);
             ground.previous[v].set_vec3(x);
             ground.predicted[v].set_vec3(predicted);
-            ground.inverse_masses[v] = inverse_mass;
             let x = match start {
                 Start::Previous => x,
                 Start::Inertial => inertial,
                 Start::Predicted | Start::Auto => predicted,
             };
-            self.points[v] = Point::new(x, inverse_mass * copy_count(model, v));
+            self.points[v] = Point::new(x, ground.inverse_masses[v] * copy_count(model, v));
         }
         for pin in &step.inputs.pins {
-            let v = model.numbering.of(pin.vertex);
-            ground.inverse_masses[v] = S::ZERO;
-            self.points[v] = Point::new(pin.target, S::ZERO);
+            self.points[model.numbering.of(pin.vertex)].set_vec3(pin.target);
         }
     }
 
@@ -434,7 +473,11 @@ impl<S: Real> Workspace<S> {
 
 impl<S: Real> Ground<S> {
     /// `change` on every vertex's point.
-    fn each_vertex(&self, points: &mut [Point<S>], change: impl Fn(usize, &mut Point<S>) + Sync) {
+    pub fn each_vertex(
+        &self,
+        points: &mut [Point<S>],
+        change: impl Fn(usize, &mut Point<S>) + Sync,
+    ) {
         let points = Shared::new(points);
         self.workers.each(points.len(), GRAIN, |range| {
             // SAFETY: every vertex is worked on once.
@@ -442,6 +485,20 @@ impl<S: Real> Ground<S> {
             for (v, point) in range.zip(piece) {
                 change(v, point);
             }
+        });
+    }
+
+    /// As [`Ground::each_vertex`], with the vertex's velocity.
+    pub fn each_vertex_with(
+        &self,
+        points: &mut [Point<S>],
+        velocities: &mut [Vec3<S>],
+        change: impl Fn(usize, &mut Point<S>, &mut Vec3<S>) + Sync,
+    ) {
+        let velocities = Shared::new(velocities);
+        self.each_vertex(points, |v, point| {
+            // SAFETY: every vertex is worked on once.
+            change(v, point, unsafe { velocities.at(v) });
         });
     }
 }

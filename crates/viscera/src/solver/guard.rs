@@ -232,7 +232,7 @@ impl<S: Real> Workspace<S> {
     /// One step of descent from `x`. The positions, which are not needed any more, hold the places
     /// tried.
     fn descend(&mut self, step: &Step<'_, S>, x: &mut [Point<S>]) {
-        load_forces(&self.ground, step, x, &mut self.loads);
+        load_forces::<S, true>(&self.ground, step, x, &mut self.loads);
         let before = self.potential_at(step, x).value;
         let mut length = 1.0;
         for _ in 0..SHORTENINGS {

@@ -11,6 +11,7 @@ pub mod acceleration;
 pub mod balance;
 pub mod cpu;
 mod energy;
+mod explicit;
 mod forms;
 mod guard;
 mod history;
@@ -24,7 +25,7 @@ mod threads;
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
-use crate::settings::SolverSettings;
+use crate::settings::{Method, SolverSettings};
 use crate::state::State;
 pub use guard::StepReport;
 use plan::Plan;
@@ -74,6 +75,17 @@ pub enum StepError {
     BadStep {
         /// The step given [s].
         dt: f64,
+    },
+    /// The explicit method would need more small steps than anybody waits for.
+    #[error(
+        "explicit steps are stable up to {stable:e} s, far below the {dt} s asked for; use \
+         `method = \"xpbd\"`, softer tissue, or larger tetrahedra of better shape"
+    )]
+    TooStiff {
+        /// The step given [s].
+        dt: f64,
+        /// The largest stable one [s].
+        stable: f64,
     },
     /// An input names no vertex.
     #[error("a {what} names vertex {vertex}; the model has {vertex_count}")]
@@ -153,10 +165,14 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         let Self { settings, plan, work } = self;
-        let step = cpu::Step { model, inputs, dt, settings };
+        let (repeat, small_steps) = match settings.method {
+            Method::Xpbd => (plan.repeat, 1),
+            Method::Explicit => [work.small_steps(dt)?; 2].into(),
+        };
+        let step = cpu::Step { model, inputs, dt, settings, small_steps };
         let workers = work.ground.workers.clone();
         workers.enter(|| {
-            for stage in plan.stages() {
+            for stage in plan.stages(repeat) {
                 work.run(stage, &step, state);
             }
         });
@@ -176,7 +192,8 @@ impl<S: Real> Solver<S> {
         dt: f64,
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
-        self.work.restart(&cpu::Step { model, inputs, dt, settings: &self.settings }, state);
+        let step = cpu::Step { model, inputs, dt, settings: &self.settings, small_steps: 1 };
+        self.work.restart(&step, state);
         Ok(())
     }
 
@@ -205,6 +222,11 @@ impl<S: Real> Solver<S> {
     /// The instructions that kernels are run with.
     pub fn instructions(&self) -> Instructions {
         self.work.ground.workers.instructions
+    }
+
+    /// The largest small step [s] of the explicit method, its margin included; infinite for others.
+    pub fn stable_step(&self) -> f64 {
+        self.work.stable_step
     }
 
     /// Bytes of the memory taken, model and state not included.

@@ -4,7 +4,10 @@
 //! compile. What a stage does is told here once; how, in the backend.
 
 use crate::model::Model;
-use crate::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Start};
+use crate::scalar::Real;
+use crate::settings::{
+    Acceleration, AndersonGuard, AndersonOn, Method, SolverSettings, Start,
+};
 
 /// One stage of a step. `x` are positions, `l` multipliers, `w` inverse masses of the sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,6 +56,14 @@ pub enum Stage {
     UpdateVelocities,
     /// Scales velocities down where the step would end with more mechanical energy than it had.
     LimitEnergy,
+    /// Masses and fixings of an explicit step; where tissue is viscous, its strain one small step ago.
+    BeginExplicit,
+    /// Forces of all elements, per copy.
+    LoadForces,
+    /// `v += h (g + M^-1 f)`, `x += h v` with the small step `h`; pins move by their share.
+    AdvanceExplicit,
+    /// The prediction that a force balance of the mean acceleration needs.
+    EndExplicit,
     /// Gives positions and velocities back, in the user's numbering.
     WriteState,
 }
@@ -62,7 +73,7 @@ pub enum Stage {
 pub struct Plan {
     /// Once, first.
     pub prologue: Vec<Stage>,
-    /// Number of iterations.
+    /// Number of iterations; an explicit method's are counted by the step.
     pub repeat: u32,
     /// One iteration.
     pub body: Vec<Stage>,
@@ -72,16 +83,26 @@ pub struct Plan {
 
 impl Plan {
     /// All stages in the order in which they are run.
-    pub fn stages(&self) -> impl Iterator<Item = &Stage> {
-        let body = (0..self.repeat).flat_map(|_| &self.body);
+    pub fn stages(&self, repeat: u32) -> impl Iterator<Item = &Stage> {
+        let body = (0..repeat).flat_map(|_| &self.body);
         self.prologue.iter().chain(body).chain(&self.epilogue)
     }
 
+    /// The stages that the settings ask for.
+    pub fn new<S: Real>(model: &Model<S>, settings: &SolverSettings) -> Self {
+        match settings.method {
+            Method::Xpbd => Self::xpbd(model, settings),
+            Method::Explicit => Self {
+                prologue: vec![Stage::ReadState, Stage::BeginExplicit],
+                repeat: 1,
+                body: vec![Stage::LoadForces, Stage::AdvanceExplicit],
+                epilogue: vec![Stage::EndExplicit, Stage::WriteState],
+            },
+        }
+    }
+
     /// The XPBD family.
-    pub fn new<S>(model: &Model<S>, settings: &SolverSettings) -> Self
-    where
-        S: crate::scalar::Real,
-    {
+    fn xpbd<S: Real>(model: &Model<S>, settings: &SolverSettings) -> Self {
         let mut prologue = vec![Stage::ReadState];
         if model.tet_sets().iter().any(|set| set.viscous) {
             prologue.push(Stage::MeasureStrain);

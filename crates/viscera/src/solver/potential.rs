@@ -340,8 +340,9 @@ fn respond<S: Real, L: Lanes<Real = S>>(
 }
 
 /// Per copy `dt^2` times the force of its elements, and the bound of their curvature: the gradient of
-/// `Phi` without inertia, in the places that the rebase uses as well.
-pub(super) fn load_forces<S: Real>(
+/// `Phi` without inertia, in the places that the rebase uses as well. Without `BOUND` the bounds are
+/// zero.
+pub(super) fn load_forces<S: Real, const BOUND: bool>(
     ground: &Ground<S>,
     step: &Step<'_, S>,
     x: &[Point<S>],
@@ -352,7 +353,7 @@ pub(super) fn load_forces<S: Real>(
     for color in 0..model.color_count {
         let shared = Shared::new(loads);
         for (set, start_strain) in model.tet_sets().into_iter().zip(&ground.start_strain) {
-            let pass = Forces { x, start_strain, dt: step.dt, loads: &shared };
+            let pass = Forces::<_, BOUND> { x, start_strain, dt: step.dt, loads: &shared };
             ground.workers.pass(model, set, set.color(color), &pass);
         }
     }
@@ -377,14 +378,14 @@ pub(super) fn load_forces<S: Real>(
     }
 }
 
-struct Forces<'a, S> {
+struct Forces<'a, S, const BOUND: bool> {
     x: &'a [Point<S>],
     start_strain: &'a [[Eight<S>; 6]],
     dt: f64,
     loads: &'a Shared<'a, Point<S>>,
 }
 
-impl<S: Real> TetPass<S> for Forces<'_, S> {
+impl<S: Real, const BOUND: bool> TetPass<S> for Forces<'_, S, BOUND> {
     #[inline(always)]
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
         let shape = tets.shape::<L>();
@@ -395,7 +396,8 @@ impl<S: Real> TetPass<S> for Forces<'_, S> {
         let g = shape_gradients(&shape);
         let mut loads = [CornerLoad::default(); 4];
         for corner in 0..4 {
-            let mass_bound = volume * tissue.curvature(&f, g[corner]);
+            let mass_bound =
+                if BOUND { volume * tissue.curvature(&f, g[corner]) } else { L::ZERO };
             loads[corner] = CornerLoad { impulse: forces[corner], mass_bound };
         }
         // SAFETY: constraints of one colour share no copy, and every block is worked on once.

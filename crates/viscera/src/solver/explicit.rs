@@ -1,0 +1,163 @@
+//! The explicit integrator: the cheap baseline, and the truth of motion where it is stable.
+//!
+//! ```text
+//! v_(k+1/2) = v_(k-1/2) + h M^-1 (f_ext + f(x_k)),   x_(k+1) = x_k + h v_(k+1/2)      symplectic Euler
+//! h <= (2/omega) (sqrt(1 + xi^2) - xi),   xi = eta omega/2       with viscosity eta
+//! omega^2 <= max_i sum_(e at i) rho(K_e)/m_i
+//! ```
+//!
+//! Energy stays within a band that narrows with `h`, for any number of steps, because the method is
+//! symplectic (Hairer, Lubich, Wanner, "Geometric Numerical Integration", 2006, chapter I); the limit of
+//! `h` with stiffness-proportional damping is that of Belytschko, Liu, Moran, "Nonlinear Finite
+//! Elements for Continua and Structures", 2000, section 6.2. The bound of the highest frequency holds
+//! because `K_e <= rho(K_e) I` on the vertices of every element `e`.
+
+use super::StepError;
+use super::cpu::{Step, Workspace, gather};
+use super::potential::{load_forces, measure_strain};
+use crate::elements::shape_gradients;
+use crate::model::Model;
+use crate::scalar::{Mat3, Real, Vec3};
+use crate::settings::SolverSettings;
+
+/// More small steps than this in one step are a mistake of units rather than patience.
+const MOST_SMALL_STEPS: f64 = 100_000.0;
+
+/// Rounds of the power method for an element's stiffness: 1 % is enough for a bound with a margin.
+const POWER_ROUNDS: usize = 20;
+
+/// The largest stable small step [s], with the margin of the settings.
+pub(super) fn stable_step<S: Real>(model: &Model<S>, settings: &SolverSettings) -> f64 {
+    let mut stiffness = vec![0.0; model.vertex_count()];
+    let mut viscosity = 0.0f64;
+    for set in model.tet_sets() {
+        for tet in model.tets(set) {
+            let material = &model.materials[tet.material];
+            viscosity = viscosity.max(material.viscosity.to_f64());
+            let shape = tet.inverse_rest_shape.cast::<f64>();
+            let lame = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
+            let largest = tet.rest_volume.to_f64() * element_stiffness(&shape, lame);
+            for v in tet.vertices {
+                stiffness[v as usize] += largest;
+            }
+        }
+    }
+    let springs = &model.springs;
+    for (ends, k) in springs.vertices.iter().zip(&springs.stiffness) {
+        for &v in ends {
+            stiffness[v as usize] += 2.0 * k.to_f64();
+        }
+    }
+    for (&v, k) in model.attachments.vertices.iter().zip(&model.attachments.stiffness) {
+        stiffness[v as usize] += k.to_f64();
+    }
+    let ratios = stiffness.iter().zip(&model.masses).map(|(k, m)| k / m.to_f64());
+    let omega = ratios.fold(0.0, f64::max).sqrt();
+    let xi = 0.5 * viscosity * omega;
+    settings.explicit_safety * (2.0 / omega) * ((1.0 + xi * xi).sqrt() - xi)
+}
+
+/// The largest eigenvalue of a tetrahedron's stiffness at rest, per volume [Pa/m^2]. Both laws have the
+/// same stiffness at rest: that of linear elasticity.
+fn element_stiffness(shape: &Mat3<f64>, [lambda, mu]: [f64; 2]) -> f64 {
+    let g = shape_gradients(shape);
+    // Any displacement but a rigid one will do; swelling and shear together meet every eigenvector.
+    let mut u = [g[1] + g[2] * 0.3, g[2] - g[0] * 0.2, g[3] + g[0] * 0.7, g[1] * -0.4 + g[0]];
+    let mut value = 0.0;
+    for _ in 0..POWER_ROUNDS {
+        let length = u.iter().map(|u| u.length_squared()).sum::<f64>().sqrt();
+        let mut gradient = Mat3::ZERO;
+        for (u, g) in u.iter().zip(g) {
+            gradient = gradient + Mat3::outer(*u * (1.0 / length), g);
+        }
+        let stress = (gradient + gradient.transpose()) * mu
+            + Mat3::IDENTITY * (lambda * gradient.trace());
+        for (u, g) in u.iter_mut().zip(g) {
+            *u = stress * g;
+        }
+        value = u.iter().map(|u| u.length_squared()).sum::<f64>().sqrt();
+    }
+    value
+}
+
+impl<S: Real> Workspace<S> {
+    /// How many small steps make a step of `dt` [s].
+    pub fn small_steps(&self, dt: f64) -> Result<u32, StepError> {
+        let count = (dt / self.stable_step).ceil().max(1.0);
+        if count <= MOST_SMALL_STEPS {
+            return Ok(count as u32);
+        }
+        Err(StepError::TooStiff { dt, stable: self.stable_step })
+    }
+
+    /// [`super::plan::Stage::BeginExplicit`].
+    pub(super) fn begin_explicit(&mut self, step: &Step<'_, S>) {
+        let model = step.model;
+        self.prepare(step);
+        self.ground.previous.copy_from_slice(&self.points);
+        self.start_velocities.copy_from_slice(&self.velocities);
+        if model.tet_sets().iter().any(|set| set.viscous) {
+            let back = S::from_f64(-step.small_dt());
+            self.drift(back);
+            let ground = &mut self.ground;
+            measure_strain(&ground.workers, model, &self.points, &mut ground.start_strain);
+            self.points.copy_from_slice(&self.ground.previous);
+        }
+        self.small_step = 0;
+    }
+
+    /// Moves points along their velocities for a time [s].
+    fn drift(&mut self, time: S) {
+        let velocities = &self.velocities;
+        self.ground.each_vertex(&mut self.points, |v, point| {
+            point.set_vec3(point.vec3() + velocities[v] * time);
+        });
+    }
+
+    /// [`super::plan::Stage::LoadForces`].
+    pub(super) fn load_explicit_forces(&mut self, step: &Step<'_, S>) {
+        let small = Step { dt: step.small_dt(), ..*step };
+        load_forces::<S, false>(&self.ground, &small, &self.points, &mut self.loads);
+        let ground = &mut self.ground;
+        measure_strain(&ground.workers, step.model, &self.points, &mut ground.start_strain);
+    }
+
+    /// [`super::plan::Stage::AdvanceExplicit`].
+    pub(super) fn advance_explicit(&mut self, step: &Step<'_, S>) {
+        let (model, h) = (step.model, step.small_dt());
+        let (small, rate) = (S::from_f64(h), S::from_f64(1.0 / h));
+        let (ground, loads) = (&self.ground, &self.loads);
+        ground.each_vertex_with(&mut self.points, &mut self.velocities, |v, point, velocity| {
+            let inverse_mass = ground.inverse_masses[v];
+            if inverse_mass == S::ZERO {
+                return;
+            }
+            let force = gather(model, loads, v).vec3() * rate + ground.external[v] * small;
+            *velocity += force * inverse_mass + step.inputs.gravity * small;
+            point.set_vec3(point.vec3() + *velocity * small);
+        });
+        self.small_step += 1;
+        let share = S::from_f64(f64::from(self.small_step) / f64::from(step.small_steps));
+        let (last, rate) = (self.small_step == step.small_steps, S::from_f64(1.0 / step.dt));
+        for pin in &step.inputs.pins {
+            let v = model.numbering.of(pin.vertex);
+            let start = self.ground.previous[v].vec3();
+            let place = if last { pin.target } else { start + (pin.target - start) * share };
+            self.points[v].set_vec3(place);
+            self.velocities[v] = (pin.target - start) * rate;
+        }
+    }
+
+    /// [`super::plan::Stage::EndExplicit`]: `xt = x - dt (v - v_n) + dt^2 (g + M^-1 f_ext)`, so that
+    /// `M (x - xt)/dt^2` is mass times mean acceleration, less the loads.
+    pub(super) fn end_explicit(&mut self, step: &Step<'_, S>) {
+        let dt = S::from_f64(step.dt);
+        for v in 0..self.points.len() {
+            let ground = &mut self.ground;
+            let load = step.inputs.gravity + ground.external[v] * (S::ONE / ground.masses[v]);
+            let change: Vec3<S> = self.velocities[v] - self.start_velocities[v];
+            let x = self.points[v].vec3();
+            ground.predicted[v].set_vec3(x - change * dt + load * (dt * dt));
+        }
+    }
+}
