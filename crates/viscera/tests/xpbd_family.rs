@@ -385,8 +385,10 @@ fn the_residual_guard_restarts_the_history() {
         for (mapped, residual) in [(1.0, 0.5), (1.25, 0.25), (2.0, 0.75)] {
             let (g, r) = history.push();
             (g[0], r[0]) = (mapped, residual);
-            let (weights, count) = history.mixing_weights(|_| 1.0, guard);
-            let mixed = history.mixed(0, &weights[..count]);
+            let (weights, count) = history.mixing_weights(&[1.0], guard);
+            let mut mixed = [0.0];
+            history.mix(&weights[..count], 0, &mut mixed);
+            let [mixed] = mixed;
             if residual == 0.75 {
                 assert_eq!(count, if guard { 0 } else { 2 });
                 assert_eq!(mixed == 2.0, guard, "{mixed}");

@@ -15,7 +15,7 @@
 //! neo-Hookean element where tissue may turn inside out.
 
 use super::{
-    CornerLoad, Symmetric, TetCorrection, weighted_images, shape_gradients, solve_symmetric,
+    CornerLoad, Symmetric, TetCorrection, shape_gradients, solve_symmetric, weighted_images,
     weighted_products,
 };
 use crate::material::Compliance;

@@ -21,8 +21,8 @@
 use super::green_strain::{Voigt, scaled, symmetric};
 use super::singular_values::{SignedSvd, signed_svd};
 use super::{
-    CornerLoad, Symmetric, TetCorrection, deformation_gradient, weighted_images, shape_gradients,
-    solve_symmetric, weighted_products,
+    CornerLoad, Symmetric, TetCorrection, deformation_gradient, shape_gradients, solve_symmetric,
+    weighted_images, weighted_products,
 };
 use crate::scalar::{Mat3, Scalar, Vec3};
 

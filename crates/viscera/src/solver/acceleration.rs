@@ -20,7 +20,14 @@
 //! weights, because affine combinations keep `M (x - xt) = J^T l` where the constraints are
 //! nearly linear. Mixing positions alone breaks that tie and stiffens the tissue.
 
+#![allow(unsafe_code)]
+
+use super::products::{PIECE, Products, products};
+use super::threads::{Shared, Workers};
 use crate::scalar::Real;
+
+/// Numbers that a thread mixes at a time.
+const GRAIN: usize = 1 << 15;
 
 /// The longest Anderson window.
 pub const LARGEST_WINDOW: usize = 10;
@@ -81,6 +88,7 @@ pub struct Anderson<S> {
     /// Number of valid entries.
     count: usize,
     last_norm: f64,
+    partial: Vec<Products>,
 }
 
 impl<S: Real> Anderson<S> {
@@ -95,13 +103,15 @@ impl<S: Real> Anderson<S> {
             newest: 0,
             count: 0,
             last_norm: f64::INFINITY,
+            partial: vec![Products::default(); length.div_ceil(PIECE)],
         }
     }
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
         let histories = self.mapped.iter().chain(&self.residuals);
-        histories.map(|vector| size_of_val(&vector[..])).sum()
+        let histories: usize = histories.map(|vector| size_of_val(&vector[..])).sum();
+        histories + size_of_val(&self.partial[..])
     }
 
     /// Forgets everything.
@@ -131,48 +141,63 @@ impl<S: Real> Anderson<S> {
     /// how many there are. With `guard`, a residual that has grown restarts the history.
     pub fn mixing_weights(
         &mut self,
-        norm_weight: impl Fn(usize) -> f64,
+        norm_weights: &[S],
+        guard: bool,
+    ) -> ([f64; LARGEST_WINDOW], usize) {
+        self.weights_by(&Workers::one(), norm_weights, guard)
+    }
+
+    /// As [`Anderson::mixing_weights`], by threads.
+    pub(super) fn weights_by(
+        &mut self,
+        workers: &Workers,
+        norm_weights: &[S],
         guard: bool,
     ) -> ([f64; LARGEST_WINDOW], usize) {
         let mut older = self.count.saturating_sub(1);
-        let mut gram = [[0.0; LARGEST_WINDOW]; LARGEST_WINDOW];
-        let mut right = [0.0; LARGEST_WINDOW];
-        let mut norm = 0.0;
+        let history: [&[S]; LARGEST_WINDOW] = std::array::from_fn(|j| {
+            let age = (j + 1).min(older);
+            let place = (self.newest + self.window + 1 - age) % (self.window + 1);
+            self.residuals[place].as_slice()
+        });
         let newest = &self.residuals[self.newest];
-        let history: [&[S]; LARGEST_WINDOW] =
-            std::array::from_fn(|j| self.residuals[self.place((j + 1).min(older))].as_slice());
-        let mut difference = [0.0; LARGEST_WINDOW];
-        for i in 0..newest.len() {
-            let weight = norm_weight(i);
-            let r = newest[i].to_f64();
-            norm += weight * r * r;
-            for j in 0..older {
-                difference[j] = history[j][i].to_f64() - r;
-                right[j] -= weight * difference[j] * r;
-                for k in 0..=j {
-                    gram[j][k] += weight * difference[j] * difference[k];
-                }
-            }
-        }
-        if guard && norm > self.last_norm {
+        let partial = &mut self.partial;
+        let mut products = products(workers, norm_weights, newest, history, older, partial);
+        if guard && products.norm > self.last_norm {
             self.count = 1;
             older = 0;
         }
-        self.last_norm = norm;
+        self.last_norm = products.norm;
         // In single precision the residuals themselves carry round-off of that size.
         let regularisation = if S::EPSILON > 1e-10 { 1e-7 } else { 1e-13 };
-        (least_squares(gram, right, older, regularisation), older)
+        for value in &mut products.right {
+            *value = -*value;
+        }
+        (least_squares(products.gram, products.right, older, regularisation), older)
     }
 
-    /// `G_k + sum_j w_j (G_(k-j) - G_k)`, component `i`.
-    pub fn mixed(&self, i: usize, weights: &[f64]) -> S {
-        let newest = self.mapped[self.newest][i];
-        let mut sum = newest;
-        for (j, &weight) in weights.iter().enumerate() {
-            let older = self.mapped[self.place(j + 1)][i];
-            sum += S::from_f64(weight) * (older - newest);
-        }
-        sum
+    /// `G_k + sum_j w_j (G_(k-j) - G_k)`, the components from `first` on.
+    pub fn mix(&self, weights: &[f64], first: usize, into: &mut [S]) {
+        self.mix_by(&Workers::one(), weights, first, into);
+    }
+
+    /// As [`Anderson::mix`], by threads.
+    pub(super) fn mix_by(&self, workers: &Workers, weights: &[f64], first: usize, into: &mut [S]) {
+        let into = Shared::new(into);
+        workers.each(into.len(), GRAIN, |range| {
+            let places = first + range.start..first + range.end;
+            let newest = &self.mapped[self.newest][places.clone()];
+            // SAFETY: every place is worked on once.
+            let into = unsafe { into.range(range) };
+            into.copy_from_slice(newest);
+            for (j, &weight) in weights.iter().enumerate() {
+                let older = &self.mapped[self.place(j + 1)][places.clone()];
+                let weight = S::from_f64(weight);
+                for ((sum, &older), &newest) in into.iter_mut().zip(older).zip(newest) {
+                    *sum += weight * (older - newest);
+                }
+            }
+        });
     }
 }
 
@@ -245,10 +270,8 @@ mod tests {
             for i in 0..3 {
                 residual[i] = g[i] - q[i];
             }
-            let (weights, count) = anderson.mixing_weights(|_| 1.0, false);
-            for i in 0..3 {
-                q[i] = anderson.mixed(i, &weights[..count]);
-            }
+            let (weights, count) = anderson.mixing_weights(&[1.0; 3], false);
+            anderson.mix(&weights[..count], 0, &mut q);
         }
         let g = map(q);
         for i in 0..3 {

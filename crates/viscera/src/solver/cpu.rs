@@ -11,14 +11,12 @@ use super::guard::Guard;
 use super::loads::load_multipliers;
 use super::plan::Stage;
 use super::potential::{Evaluator, measure_strain};
-use super::sweep::solve_color;
+use super::sweep::{read_vec3, solve_color};
 use super::threads::{Shared, Workers};
 use crate::model::Model;
 use crate::scalar::lanes::{Eight, LANES, Point};
 use crate::scalar::{Real, Vec3};
-use crate::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Method, SolverSettings, Start,
-};
+use crate::settings::{Acceleration, AndersonGuard, AndersonOn, Method, SolverSettings, Start};
 use crate::state::State;
 
 /// The rebase multiplies an error of curvature `k` by `1 - k/mh`: stable from `mh >= k/2` on, so little
@@ -90,14 +88,17 @@ pub(super) struct Workspace<S> {
     pub loads: Vec<Point<S>>,
     /// Iterate before the sweep, and the one before that.
     iterate: [Iterate<S>; 2],
-    /// Diagonal of `a~` of each multiplier: weights of the norm in which iterates are compared.
-    multiplier_weights: Vec<S>,
+    /// Weights of the norm in which iterates are compared, three of each vertex (its mass, in
+    /// Anderson's norm where positions count) and then of the multipliers (the diagonal of `a~`).
+    norm_weights: Vec<S>,
     /// The share of the rebase that is applied.
     rebase_factor: S,
     /// The share of the mass bounds that counts.
     bound_share: S,
     chebyshev: Chebyshev,
     pub anderson: Anderson<S>,
+    /// Positions that Anderson has mixed [m].
+    mixed: Vec<S>,
     /// Empty where steps are not guarded.
     pub guard: Guard<S>,
     /// Of an explicit method [s].
@@ -152,15 +153,16 @@ impl<S: Real> Workspace<S> {
             evaluator: Evaluator::new(guarded.then_some(model)),
             copies: vec![Point::default(); if model.is_split() { model.copy_count() } else { 0 }],
             loads: vec![Point::default(); if needs_loads { model.copy_count() } else { 0 }],
-            iterate: [
-                iterate(accelerated),
-                iterate(acceleration == Acceleration::Chebyshev),
+            iterate: [iterate(accelerated), iterate(acceleration == Acceleration::Chebyshev)],
+            norm_weights: vec![
+                S::ZERO;
+                if accelerated { 3 * vertices + model.multiplier_count } else { 0 }
             ],
-            multiplier_weights: vec![S::ZERO; if accelerated { model.multiplier_count } else { 0 }],
             rebase_factor: S::from_f64(rebase_factor(model, settings)),
             bound_share: S::from_f64(bound_share(model)),
             chebyshev: Chebyshev::default(),
             anderson: Anderson::new(window, length),
+            mixed: vec![S::ZERO; if anderson { 3 * vertices } else { 0 }],
             guard: Guard::new(if guarded { vertices } else { 0 }),
             stable_step: if explicit { stable_step(model, settings) } else { f64::INFINITY },
             small_step: 0,
@@ -179,7 +181,8 @@ impl<S: Real> Workspace<S> {
             + self.ground.start_strain.iter().map(|s| size_of_val(&s[..])).sum::<usize>()
             + iterates.clone().map(|i| size_of_val(&i.positions[..])).sum::<usize>()
             + iterates.map(|i| size_of_val(&i.multipliers[..])).sum::<usize>()
-            + size_of_val(&self.multiplier_weights[..])
+            + size_of_val(&self.norm_weights[..])
+            + size_of_val(&self.mixed[..])
             + size_of_val(&self.energies[..])
             + size_of_val(&self.start_velocities[..])
             + self.evaluator.bytes()
@@ -329,8 +332,22 @@ impl<S: Real> Workspace<S> {
         state.multiplier_dt = step.dt;
         self.anderson.start();
         self.chebyshev.start(step.settings.chebyshev_radius);
-        if !self.multiplier_weights.is_empty() {
-            fill_multiplier_weights(step, &mut self.multiplier_weights);
+        if !self.norm_weights.is_empty() {
+            let (positions, multipliers) =
+                self.norm_weights.split_at_mut(3 * step.model.vertex_count());
+            for (weights, &mass) in
+                positions.as_chunks_mut::<3>().0.iter_mut().zip(&self.ground.masses)
+            {
+                *weights = [mass; 3];
+            }
+            fill_multiplier_weights(step, multipliers);
+            if step.settings.acceleration == Acceleration::Anderson {
+                match step.settings.anderson_on {
+                    AndersonOn::Positions => multipliers.fill(S::ZERO),
+                    AndersonOn::Multipliers => positions.fill(S::ZERO),
+                    AndersonOn::Both => {}
+                }
+            }
         }
     }
 
@@ -426,47 +443,43 @@ impl<S: Real> Workspace<S> {
             let change = x.vec3() - self.iterate[0].positions[v].vec3();
             sum += self.ground.masses[v].to_f64() * change.length_squared().to_f64();
         }
+        let weights = &self.norm_weights[3 * self.points.len()..];
         for (i, l) in multipliers.iter().enumerate() {
             let change = (*l - self.iterate[0].multipliers[i]).to_f64();
-            sum += self.multiplier_weights[i].to_f64() * change * change;
+            sum += weights[i].to_f64() * change * change;
         }
         sum
     }
 
     fn anderson(&mut self, step: &Step<'_, S>, multipliers: &mut [S], on: AndersonOn) {
         let vertices = self.points.len();
+        let before = &self.iterate[0];
         let (mapped, residual) = self.anderson.push();
+        let (mapped_positions, mapped_multipliers) = mapped.split_at_mut(3 * vertices);
+        let (moved, changed) = residual.split_at_mut(3 * vertices);
         for v in 0..vertices {
-            let (x, before) = (self.points[v].vec3(), self.iterate[0].positions[v].vec3());
-            for axis in 0..3 {
-                mapped[3 * v + axis] = x[axis];
-                residual[3 * v + axis] = x[axis] - before[axis];
-            }
+            let (x, before) = (self.points[v].vec3(), before.positions[v].vec3());
+            mapped_positions[3 * v..3 * v + 3].copy_from_slice(&x.to_array());
+            moved[3 * v..3 * v + 3].copy_from_slice(&(x - before).to_array());
         }
-        for (i, &l) in multipliers.iter().enumerate() {
-            mapped[3 * vertices + i] = l;
-            residual[3 * vertices + i] = l - self.iterate[0].multipliers[i];
+        mapped_multipliers.copy_from_slice(multipliers);
+        for ((change, &l), &before) in
+            changed.iter_mut().zip(&*multipliers).zip(&before.multipliers)
+        {
+            *change = l - before;
         }
-        let masses = &self.ground.masses;
-        let multiplier_weights = &self.multiplier_weights;
-        let norm_weight = |i: usize| match (i < 3 * vertices, on) {
-            (true, AndersonOn::Multipliers) | (false, AndersonOn::Positions) => 0.0,
-            (true, _) => masses[i / 3].to_f64(),
-            (false, _) => multiplier_weights[i - 3 * vertices].to_f64(),
-        };
         let guard = step.settings.guard_of_mixtures() == AndersonGuard::Residual;
-        let (weights, count) = self.anderson.mixing_weights(norm_weight, guard);
+        let workers = &self.ground.workers;
+        let (weights, count) = self.anderson.weights_by(workers, &self.norm_weights, guard);
         let weights = &weights[..count];
         if on != AndersonOn::Multipliers {
+            self.anderson.mix_by(workers, weights, 0, &mut self.mixed);
             for (v, point) in self.points.iter_mut().enumerate() {
-                let mixed = |axis: usize| self.anderson.mixed(3 * v + axis, weights);
-                point.set_vec3(Vec3::new(mixed(0), mixed(1), mixed(2)));
+                point.set_vec3(read_vec3(&self.mixed, 3 * v));
             }
         }
         if on != AndersonOn::Positions {
-            for (i, l) in multipliers.iter_mut().enumerate() {
-                *l = self.anderson.mixed(3 * vertices + i, weights);
-            }
+            self.anderson.mix_by(workers, weights, 3 * vertices, multipliers);
         }
     }
 }

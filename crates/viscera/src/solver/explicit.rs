@@ -70,8 +70,8 @@ fn element_stiffness(shape: &Mat3<f64>, [lambda, mu]: [f64; 2]) -> f64 {
         for (u, g) in u.iter().zip(g) {
             gradient = gradient + Mat3::outer(*u * (1.0 / length), g);
         }
-        let stress = (gradient + gradient.transpose()) * mu
-            + Mat3::IDENTITY * (lambda * gradient.trace());
+        let stress =
+            (gradient + gradient.transpose()) * mu + Mat3::IDENTITY * (lambda * gradient.trace());
         for (u, g) in u.iter_mut().zip(g) {
             *u = stress * g;
         }

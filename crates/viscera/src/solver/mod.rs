@@ -18,6 +18,7 @@ mod history;
 mod loads;
 pub mod plan;
 mod potential;
+mod products;
 mod sweep;
 mod tets;
 mod threads;

@@ -5,9 +5,7 @@
 
 use crate::model::Model;
 use crate::scalar::Real;
-use crate::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Method, SolverSettings, Start,
-};
+use crate::settings::{Acceleration, AndersonGuard, AndersonOn, Method, SolverSettings, Start};
 
 /// One stage of a step. `x` are positions, `l` multipliers, `w` inverse masses of the sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

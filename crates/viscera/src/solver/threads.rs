@@ -35,6 +35,11 @@ impl Workers {
         Self { pool, instructions: Instructions::detect() }
     }
 
+    /// The thread that is here, alone.
+    pub fn one() -> Self {
+        Self { pool: None, instructions: Instructions::detect() }
+    }
+
     /// How many threads work.
     pub fn count(&self) -> usize {
         self.pool.as_ref().map_or(1, |pool| pool.current_num_threads())
