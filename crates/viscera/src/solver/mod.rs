@@ -18,6 +18,7 @@ mod history;
 mod loads;
 pub mod plan;
 mod potential;
+mod precision;
 mod products;
 mod sweep;
 mod tets;
@@ -30,6 +31,7 @@ use crate::settings::{Method, SolverSettings};
 use crate::state::State;
 pub use guard::StepReport;
 use plan::Plan;
+use precision::{Task, carry_out};
 
 /// A vertex that is moved, not simulated, during a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,12 +173,7 @@ impl<S: Real> Solver<S> {
             Method::Explicit => [work.small_steps(dt)?; 2].into(),
         };
         let step = cpu::Step { model, inputs, dt, settings, small_steps };
-        let workers = work.ground.workers.clone();
-        workers.enter(|| {
-            for stage in plan.stages(repeat) {
-                work.run(stage, &step, state);
-            }
-        });
+        carry_out(Task::Step(plan, repeat), work, &step, state);
         Ok(())
     }
 
@@ -194,7 +191,7 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         let step = cpu::Step { model, inputs, dt, settings: &self.settings, small_steps: 1 };
-        self.work.restart(&step, state);
+        carry_out(Task::Restart, &mut self.work, &step, state);
         Ok(())
     }
 
