@@ -1,22 +1,22 @@
-//! Eight numbers side by side: what kernels compute with when speed matters.
+//! Numbers side by side: what kernels compute with when speed matters.
 //!
-//! A kernel generic over [`Scalar`] runs on one number or on eight. Eight come in two types with the
-//! same bits: [`Portable`], an array, and on x86-64 a type of AVX2 registers, chosen once at run time
-//! ([`Instructions::detect`]); no build flag decides, and nothing is fused. A function is compiled
-//! for AVX2 by being inlined into one that carries `#[target_feature]` ([`run`]), so everything a
-//! kernel calls is `#[inline(always)]`.
+//! Storage holds numbers in groups of eight. A kernel generic over [`Lanes`] takes as many of a group at
+//! a time as its type has lanes: one (`f32`, `f64`: any processor), or a register of AVX2, chosen once
+//! at run time ([`Instructions::detect`]). The bits are the same: no build flag decides, nothing is
+//! fused, and sums keep the lanes of the group apart. A function is compiled for AVX2 by being inlined
+//! into one that carries `#[target_feature]` ([`run`]), so everything a kernel calls is
+//! `#[inline(always)]`.
 
 #![allow(unsafe_code)]
 
 #[cfg(target_arch = "x86_64")]
 use super::avx2;
-pub use super::portable::Portable;
 use super::{Real, Scalar, Vec3, vec3};
 
-/// Numbers side by side.
+/// Numbers of a group.
 pub const LANES: usize = 8;
 
-/// Positions of storage: a value for each lane.
+/// A group in memory.
 pub type Eight<S> = [S; LANES];
 
 /// Three components and a fourth that travels with them: a position with its weight, a force with
@@ -47,6 +47,15 @@ impl<S: Scalar> Point<S> {
         vec3(self.x, self.y, self.z)
     }
 
+    /// Adds all four components.
+    #[inline(always)]
+    pub fn add(&mut self, other: Self) {
+        self.x += other.x;
+        self.y += other.y;
+        self.z += other.z;
+        self.w += other.w;
+    }
+
     /// Replaces the three components.
     #[inline(always)]
     pub fn set_vec3(&mut self, v: Vec3<S>) {
@@ -54,55 +63,96 @@ impl<S: Scalar> Point<S> {
     }
 }
 
-/// Eight lanes of a [`Real`].
+/// Some lanes of a group, from one on.
 pub trait Lanes: Scalar {
     /// What each lane holds.
     type Real: Real;
 
-    /// The same value in all lanes.
-    fn splat(value: Self::Real) -> Self;
+    /// How many lanes; divides [`LANES`].
+    const WIDTH: usize;
 
-    /// From memory.
-    fn load(values: &Eight<Self::Real>) -> Self;
+    /// From memory, the lanes from `first` on.
+    fn load(group: &Eight<Self::Real>, first: usize) -> Self;
 
-    /// To memory.
-    fn store(self, values: &mut Eight<Self::Real>);
+    /// To memory, the lanes from `first` on.
+    fn store(self, group: &mut Eight<Self::Real>, first: usize);
 
-    /// Components of eight points.
+    /// Components of the points whose indices stand from `first` on.
     ///
     /// # Safety
     /// Every index is that of a point that may be read.
-    unsafe fn gather(points: *const Point<Self::Real>, indices: &Eight<u32>) -> Point<Self>;
+    unsafe fn gather(
+        points: *const Point<Self::Real>,
+        indices: &Eight<u32>,
+        first: usize,
+    ) -> Point<Self>;
 
-    /// Writes eight points.
+    /// Writes the points whose indices stand from `first` on.
     ///
     /// # Safety
     /// Every index is that of a point that nobody else reads or writes meanwhile.
-    unsafe fn scatter(points: *mut Point<Self::Real>, indices: &Eight<u32>, values: Point<Self>);
+    unsafe fn scatter(
+        points: *mut Point<Self::Real>,
+        indices: &Eight<u32>,
+        first: usize,
+        values: Point<Self>,
+    );
 
-    /// Adds to eight points.
+    /// Adds to the points whose indices stand from `first` on.
     ///
     /// # Safety
     /// As [`Lanes::scatter`].
     unsafe fn scatter_add(
         points: *mut Point<Self::Real>,
         indices: &Eight<u32>,
+        first: usize,
         values: Point<Self>,
     );
+}
 
-    /// The lanes as an array.
+/// One lane: the number itself.
+impl<R: Real> Lanes for R {
+    type Real = R;
+    const WIDTH: usize = 1;
+
     #[inline(always)]
-    fn to_array(self) -> Eight<Self::Real> {
-        let mut values = [Self::Real::ZERO; LANES];
-        self.store(&mut values);
-        values
+    fn load(group: &Eight<R>, first: usize) -> Self {
+        group[first]
+    }
+
+    #[inline(always)]
+    fn store(self, group: &mut Eight<R>, first: usize) {
+        group[first] = self;
+    }
+
+    #[inline(always)]
+    unsafe fn gather(points: *const Point<R>, indices: &Eight<u32>, first: usize) -> Point<R> {
+        // SAFETY: the caller's promise.
+        unsafe { *points.add(indices[first] as usize) }
+    }
+
+    #[inline(always)]
+    unsafe fn scatter(points: *mut Point<R>, indices: &Eight<u32>, first: usize, values: Point<R>) {
+        // SAFETY: the caller's promise.
+        unsafe { *points.add(indices[first] as usize) = values };
+    }
+
+    #[inline(always)]
+    unsafe fn scatter_add(
+        points: *mut Point<R>,
+        indices: &Eight<u32>,
+        first: usize,
+        values: Point<R>,
+    ) {
+        // SAFETY: the caller's promise.
+        unsafe { (*points.add(indices[first] as usize)).add(values) };
     }
 }
 
 /// The instructions that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Instructions {
-    /// What every processor of the target has.
+    /// What every processor of the target has: one number at a time.
     Portable,
     /// 256-bit registers of x86-64.
     Avx2,
@@ -138,16 +188,14 @@ pub fn run<R: Real>(instructions: Instructions, kernel: impl Kernel<R>) {
         #[cfg(target_arch = "x86_64")]
         #[allow(unsafe_code)]
         Instructions::Avx2 => unsafe { avx2::run(kernel) },
-        _ => kernel.run::<Portable<R>>(),
+        _ => kernel.run::<R>(),
     }
 }
 
 /// The fastest lanes of the target, for [`Real::Fast`].
 pub(super) mod fast {
     #[cfg(target_arch = "x86_64")]
-    pub use super::avx2::{F32x8 as F32, F64x8 as F64};
+    pub use super::avx2::{F32x8 as F32, F64x4 as F64};
     #[cfg(not(target_arch = "x86_64"))]
-    pub type F32 = super::Portable<f32>;
-    #[cfg(not(target_arch = "x86_64"))]
-    pub type F64 = super::Portable<f64>;
+    pub use {f32 as F32, f64 as F64};
 }

@@ -6,12 +6,11 @@
 //! which do look at single numbers, are generic over [`Real`].
 //!
 //! No operation here is fused or approximated, so results are the same bits on every machine.
-//! [`lanes`] holds eight numbers side by side.
+//! [`lanes`] holds numbers side by side.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 pub mod lanes;
-mod portable;
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Index, IndexMut, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -20,11 +19,10 @@ mod sealed {
     pub trait Sealed {}
     impl Sealed for f32 {}
     impl Sealed for f64 {}
-    impl<S: super::Real> Sealed for super::lanes::Portable<S> {}
     #[cfg(target_arch = "x86_64")]
     impl Sealed for super::avx2::F32x8 {}
     #[cfg(target_arch = "x86_64")]
-    impl Sealed for super::avx2::F64x8 {}
+    impl Sealed for super::avx2::F64x4 {}
 }
 
 /// What a kernel may do with a number, or with several numbers side by side.
@@ -80,7 +78,7 @@ pub trait Scalar:
 pub trait Real: Scalar<Mask = bool> + PartialOrd {
     /// "f32" or "f64".
     const NAME: &'static str;
-    /// Eight of them in the fastest way of the target; see [`lanes::run`].
+    /// As many of them side by side as the target's registers hold; see [`lanes::run`].
     type Fast: lanes::Lanes<Real = Self>;
     /// The same value in double precision.
     fn to_f64(self) -> f64;

@@ -520,7 +520,7 @@ impl<S: Real> Ground<S> {
 pub(super) fn gather<S: Real>(model: &Model<S>, loads: &[Point<S>], v: usize) -> Point<S> {
     let mut sum = Point::default();
     for load in &loads[copies_of(model, v)] {
-        super::tets::add_to(&mut sum, *load);
+        sum.add(*load);
     }
     sum
 }

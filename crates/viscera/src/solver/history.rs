@@ -103,7 +103,7 @@ impl<S: Real, F> Constitutive<'_, S, F> {
         unsafe { tets.store_multipliers(tets.set.multiplier_offset, self.l, elastic) };
         if tets.set.viscous {
             let mut change = green_strain::strain(&deformation_gradient(&corners.x, &shape));
-            let start: [L; 6] = load_rows(self.start_strain[tets.index].as_flattened());
+            let start: [L; 6] = load_rows(self.start_strain[tets.index].as_flattened(), tets.lane);
             for p in 0..6 {
                 change[p] -= start[p];
             }

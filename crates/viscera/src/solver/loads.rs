@@ -9,7 +9,7 @@ use std::marker::PhantomData;
 
 use super::forms::{Form, pass_by_form, with_form};
 use super::sweep::read_vec3;
-use super::tets::{Block, TetPass, add_to};
+use super::tets::{Block, TetPass};
 use super::threads::{Shared, Workers};
 use crate::elements::{CornerLoad, green_strain, spring};
 use crate::model::Model;
@@ -24,7 +24,7 @@ pub(super) fn as_point<L: Scalar>(load: &CornerLoad<L>) -> Point<L> {
 
 /// Adds to a copy what acts on it.
 pub(super) fn add_load<S: Real>(loads: &mut [Point<S>], copy: u32, load: &CornerLoad<S>) {
-    add_to(&mut loads[copy as usize], as_point(load));
+    loads[copy as usize].add(as_point(load));
 }
 
 /// `J^T l` at the vertices' positions `x`, into one place per copy.

@@ -300,13 +300,16 @@ impl<S: Real> TetPass<S> for Sums<'_, S> {
         let (_, response) = respond::<S, L>(tets, self.x, self.start_strain, self.dt);
         let volume = tets.volume::<L>();
         let density = response.elastic_energy + response.viscous_energy;
-        let energy = (volume * density).to_array();
-        let stress = (response.piola.norm_squared() * shape.norm_squared()).to_array();
-        let volume = volume.to_array();
+        let [mut energy, mut stress, mut volumes] = [[S::ZERO; LANES]; 3];
+        (volume * density).store(&mut energy, tets.lane);
+        let squared = response.piola.norm_squared() * shape.norm_squared();
+        squared.store(&mut stress, tets.lane);
+        volume.store(&mut volumes, tets.lane);
         let (mut energies, mut forces) = (self.energy.get(), self.squared_force.get());
-        for lane in 0..LANES {
+        let lanes = tets.lane..tets.lane + L::WIDTH;
+        for lane in lanes.clone() {
             let counts = if lane < tets.filled() { 1.0 } else { 0.0 };
-            let volume = counts * volume[lane].to_f64();
+            let volume = counts * volumes[lane].to_f64();
             energies[lane] += counts * energy[lane].to_f64();
             forces[lane] += volume * volume * stress[lane].to_f64();
         }
@@ -314,8 +317,9 @@ impl<S: Real> TetPass<S> for Sums<'_, S> {
         self.squared_force.set(forces);
         if let Some((all, first)) = self.energies {
             let at = first + LANES * tets.index;
-            // SAFETY: every block has places of its own and is worked on once.
-            unsafe { all.range(at..at + LANES) }.copy_from_slice(&energy);
+            // SAFETY: every tetrahedron has a place of its own and is worked on once.
+            let places = unsafe { all.range(at + lanes.start..at + lanes.end) };
+            places.copy_from_slice(&energy[lanes]);
         }
     }
 }
@@ -331,7 +335,7 @@ fn respond<S: Real, L: Lanes<Real = S>>(
     let f = deformation_gradient(&tets.corners::<L>(x).x, &tets.shape());
     let tissue = Tissue::new(tets.set.model, &tets.material(), dt);
     let response = if tets.set.viscous {
-        let start: Voigt<L> = load_rows(start_strain[tets.index].as_flattened());
+        let start: Voigt<L> = load_rows(start_strain[tets.index].as_flattened(), tets.lane);
         tissue.respond(&f, Some(&start))
     } else {
         tissue.respond(&f, None)
@@ -431,7 +435,7 @@ impl<S: Real> TetPass<S> for Strain<'_, S> {
         // SAFETY: every block has a place of its own and is worked on once.
         let place = unsafe { self.strains.at(tets.index) };
         for (p, component) in green_strain::strain(&f).into_iter().enumerate() {
-            component.store(&mut place[p]);
+            component.store(&mut place[p], tets.lane);
         }
     }
 }

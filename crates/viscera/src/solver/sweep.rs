@@ -9,7 +9,7 @@ use super::tets::{Block, TetPass, load_rows};
 use super::threads::{Shared, Workers};
 use crate::elements::{attachment, green_strain, spring};
 use crate::model::Model;
-use crate::scalar::lanes::{Lanes, Point};
+use crate::scalar::lanes::{LANES, Lanes, Point};
 use crate::scalar::{Real, Vec3};
 use crate::settings::{RelaxationForm, SolverSettings};
 
@@ -37,7 +37,8 @@ impl<S: Real> Relaxation<S> {
         (dl, dx): (&[L; N], &[Vec3<L>; 4]),
     ) -> ([L; N], [Vec3<L>; 4]) {
         let (mut l, mut x) = (*l, *x);
-        let [of_l, of_x] = [L::splat(self.multipliers), L::splat(self.positions)];
+        let of_l = L::load(&[self.multipliers; LANES], 0);
+        let of_x = L::load(&[self.positions; LANES], 0);
         for p in 0..N {
             l[p] += of_l * dl[p];
         }
@@ -132,7 +133,7 @@ impl<S: Real> TetPass<S> for Viscous<'_, S> {
         let material = tets.material::<L>();
         // SAFETY: constraints of one colour share no copy, and every block is worked on once.
         let corners = unsafe { tets.copies::<L>(&self.sweep.points) };
-        let target: [L; 6] = load_rows(self.start[tets.index].as_flattened());
+        let target: [L; 6] = load_rows(self.start[tets.index].as_flattened(), tets.lane);
         let dt = L::from_f64(self.sweep.dt);
         let scale = L::ONE / (tets.volume::<L>() * material.viscosity * dt);
         let compliance = material.compliance.scaled(scale);

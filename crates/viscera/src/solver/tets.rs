@@ -7,12 +7,12 @@ use super::threads::{Shared, Workers};
 use crate::material::Compliance;
 use crate::model::{MaterialConstants, Model, TetBlock, TetSet};
 use crate::scalar::lanes::{self, Eight, LANES, Lanes, Point};
-use crate::scalar::{Mat3, Real, Vec3, vec3};
+use crate::scalar::{Mat3, Real, Scalar, Vec3, vec3};
 
 /// Blocks that a thread does at a time: about the ten microseconds that hide what a fork costs.
 const GRAIN: usize = 64;
 
-/// One pass: what to do with a block.
+/// One pass: what to do with a block, or with some lanes of it at a time.
 pub(super) trait TetPass<S: Real> {
     /// `#[inline(always)]`, or it is not compiled for the instructions chosen.
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>);
@@ -22,6 +22,8 @@ pub(super) trait TetPass<S: Real> {
 pub(super) struct Block<'a, S> {
     pub set: &'a TetSet<S>,
     pub index: usize,
+    /// The first lane of the block that is worked on.
+    pub lane: usize,
     constants: &'a TetBlock<S>,
     materials: &'a [MaterialConstants<S>],
 }
@@ -34,31 +36,37 @@ pub(super) struct Corners<L> {
 
 impl<'a, S: Real> Block<'a, S> {
     #[inline(always)]
-    fn new(model: &'a Model<S>, set: &'a TetSet<S>, index: usize) -> Self {
-        Self { set, index, constants: &set.blocks[index], materials: &model.materials }
+    fn new(model: &'a Model<S>, set: &'a TetSet<S>, index: usize, lane: usize) -> Self {
+        Self { set, index, lane, constants: &set.blocks[index], materials: &model.materials }
     }
 
-    /// How many tetrahedra count.
+    /// How many tetrahedra of the block count.
     #[inline(always)]
     pub fn filled(&self) -> usize {
         self.set.filled[self.index] as usize
     }
 
+    /// Whether all lanes that are worked on count.
+    #[inline(always)]
+    fn whole<L: Lanes>(&self) -> bool {
+        self.lane + L::WIDTH <= self.filled()
+    }
+
     /// `Dm^-1` [1/m].
     #[inline(always)]
     pub fn shape<L: Lanes<Real = S>>(&self) -> Mat3<L> {
-        let c = &self.constants.inverse_rest_shape;
+        let (c, at) = (&self.constants.inverse_rest_shape, self.lane);
         Mat3::from_columns(
-            vec3(L::load(&c[0]), L::load(&c[1]), L::load(&c[2])),
-            vec3(L::load(&c[3]), L::load(&c[4]), L::load(&c[5])),
-            vec3(L::load(&c[6]), L::load(&c[7]), L::load(&c[8])),
+            vec3(L::load(&c[0], at), L::load(&c[1], at), L::load(&c[2], at)),
+            vec3(L::load(&c[3], at), L::load(&c[4], at), L::load(&c[5], at)),
+            vec3(L::load(&c[6], at), L::load(&c[7], at), L::load(&c[8], at)),
         )
     }
 
     /// Rest volume [m^3].
     #[inline(always)]
     pub fn volume<L: Lanes<Real = S>>(&self) -> L {
-        L::load(&self.constants.rest_volume)
+        L::load(&self.constants.rest_volume, self.lane)
     }
 
     /// The materials' constants. Most blocks are of one material.
@@ -78,7 +86,7 @@ impl<'a, S: Real> Block<'a, S> {
                         values[lane] = self.materials[indices[lane] as usize].$($field).+;
                     }
                 }
-                L::load(&values)
+                L::load(&values, self.lane)
             }};
         }
         MaterialConstants {
@@ -98,7 +106,7 @@ impl<'a, S: Real> Block<'a, S> {
     pub fn corners<L: Lanes<Real = S>>(&self, points: &[Point<S>]) -> Corners<L> {
         debug_assert!(points.len() >= self.set.bounds[0]);
         // SAFETY: `Workspace::check` compares bounds and lengths, and nobody writes the slice.
-        unsafe { gather(points.as_ptr(), &self.constants.vertices) }
+        unsafe { gather(points.as_ptr(), &self.constants.vertices, self.lane) }
     }
 
     /// Corners among copies.
@@ -108,7 +116,7 @@ impl<'a, S: Real> Block<'a, S> {
     #[inline(always)]
     pub unsafe fn copies<L: Lanes<Real = S>>(&self, points: &Shared<'_, Point<S>>) -> Corners<L> {
         // SAFETY: within bounds as above; alone there by the caller's promise.
-        unsafe { gather(points.pointer(), self.set.copies_of(self.index)) }
+        unsafe { gather(points.pointer(), self.set.copies_of(self.index), self.lane) }
     }
 
     /// Writes copies.
@@ -123,17 +131,16 @@ impl<'a, S: Real> Block<'a, S> {
         w: &[L; 4],
     ) {
         let copies = self.set.copies_of(self.index);
-        let whole = self.filled() == LANES;
         for corner in 0..4 {
             let value = Point::new(x[corner], w[corner]);
             // SAFETY: within bounds as above; alone there by the caller's promise.
             unsafe {
-                if whole {
-                    L::scatter(points.pointer(), &copies[corner], value);
+                if self.whole::<L>() {
+                    L::scatter(points.pointer(), &copies[corner], self.lane, value);
                 } else {
-                    let rows = rows(value);
-                    for (lane, row) in rows.into_iter().enumerate().take(self.filled()) {
-                        *points.at(copies[corner][lane] as usize) = row;
+                    let rows = rows(value, self.lane);
+                    for lane in self.lane..self.filled() {
+                        *points.at(copies[corner][lane] as usize) = rows[lane];
                     }
                 }
             }
@@ -151,16 +158,15 @@ impl<'a, S: Real> Block<'a, S> {
         values: &[Point<L>; 4],
     ) {
         let copies = self.set.copies_of(self.index);
-        let whole = self.filled() == LANES;
         for corner in 0..4 {
             // SAFETY: within bounds as above; alone there by the caller's promise.
             unsafe {
-                if whole {
-                    L::scatter_add(points.pointer(), &copies[corner], values[corner]);
+                if self.whole::<L>() {
+                    L::scatter_add(points.pointer(), &copies[corner], self.lane, values[corner]);
                 } else {
-                    let rows = rows(values[corner]);
-                    for (lane, row) in rows.into_iter().enumerate().take(self.filled()) {
-                        add_to(points.at(copies[corner][lane] as usize), row);
+                    let rows = rows(values[corner], self.lane);
+                    for lane in self.lane..self.filled() {
+                        points.at(copies[corner][lane] as usize).add(rows[lane]);
                     }
                 }
             }
@@ -181,7 +187,7 @@ impl<'a, S: Real> Block<'a, S> {
         offset: usize,
         values: &[S],
     ) -> [L; N] {
-        load_rows(&values[self.multipliers_at(offset, N)])
+        load_rows(&values[self.multipliers_at(offset, N)], self.lane)
     }
 
     /// Replaces multipliers.
@@ -196,7 +202,8 @@ impl<'a, S: Real> Block<'a, S> {
         multipliers: [L; N],
     ) {
         // SAFETY: alone there by the caller's promise.
-        store_rows(unsafe { values.range(self.multipliers_at(offset, N)) }, multipliers);
+        let rows = unsafe { values.range(self.multipliers_at(offset, N)) };
+        store_rows(rows, self.lane, multipliers);
     }
 
     /// As [`Block::multipliers`], while they are shared.
@@ -210,47 +217,47 @@ impl<'a, S: Real> Block<'a, S> {
         values: &Shared<'_, S>,
     ) -> [L; N] {
         // SAFETY: alone there by the caller's promise.
-        load_rows(unsafe { values.range(self.multipliers_at(offset, N)) })
+        load_rows(unsafe { values.range(self.multipliers_at(offset, N)) }, self.lane)
     }
 }
 
-/// `N` rows of eight.
+/// Lanes of `N` rows of eight, from one lane on.
 #[inline(always)]
-pub(super) fn load_rows<L: Lanes, const N: usize>(values: &[L::Real]) -> [L; N] {
+pub(super) fn load_rows<L: Lanes, const N: usize>(values: &[L::Real], lane: usize) -> [L; N] {
     let mut rows = [L::ZERO; N];
     for (row, eight) in rows.iter_mut().zip(values.as_chunks().0) {
-        *row = L::load(eight);
+        *row = L::load(eight, lane);
     }
     rows
 }
 
-/// `N` rows of eight.
 #[inline(always)]
-pub(super) fn store_rows<L: Lanes, const N: usize>(values: &mut [L::Real], rows: [L; N]) {
+fn store_rows<L: Lanes, const N: usize>(values: &mut [L::Real], lane: usize, rows: [L; N]) {
     for (row, eight) in rows.into_iter().zip(values.as_chunks_mut().0) {
-        row.store(eight);
+        row.store(eight, lane);
     }
 }
 
-/// The lanes one by one.
-fn rows<L: Lanes>(values: Point<L>) -> [Point<L::Real>; LANES] {
-    let [x, y, z, w] = [values.x, values.y, values.z, values.w].map(L::to_array);
+/// The lanes one by one, in their places.
+fn rows<L: Lanes>(values: Point<L>, lane: usize) -> [Point<L::Real>; LANES] {
+    let mut columns = [[L::Real::ZERO; LANES]; 4];
+    for (column, value) in columns.iter_mut().zip([values.x, values.y, values.z, values.w]) {
+        value.store(column, lane);
+    }
+    let [x, y, z, w] = columns;
     std::array::from_fn(|lane| Point { x: x[lane], y: y[lane], z: z[lane], w: w[lane] })
 }
 
-pub(super) fn add_to<S: Real>(point: &mut Point<S>, other: Point<S>) {
-    point.x += other.x;
-    point.y += other.y;
-    point.z += other.z;
-    point.w += other.w;
-}
-
 #[inline(always)]
-unsafe fn gather<L: Lanes>(points: *const Point<L::Real>, indices: &[Eight<u32>; 4]) -> Corners<L> {
+unsafe fn gather<L: Lanes>(
+    points: *const Point<L::Real>,
+    indices: &[Eight<u32>; 4],
+    lane: usize,
+) -> Corners<L> {
     let mut corners = Corners { x: [Vec3::ZERO; 4], w: [L::ZERO; 4] };
     for corner in 0..4 {
         // SAFETY: the caller's promise.
-        let point = unsafe { L::gather(points, &indices[corner]) };
+        let point = unsafe { L::gather(points, &indices[corner], lane) };
         corners.x[corner] = point.vec3();
         corners.w[corner] = point.w;
     }
@@ -269,7 +276,11 @@ impl<S: Real, P: TetPass<S>> lanes::Kernel<S> for Piece<'_, S, P> {
     #[inline(always)]
     fn run<L: Lanes<Real = S>>(self) {
         for index in self.blocks {
-            self.pass.block::<L>(&Block::new(self.model, self.set, index));
+            let mut lane = 0;
+            while lane < LANES {
+                self.pass.block::<L>(&Block::new(self.model, self.set, index, lane));
+                lane += L::WIDTH;
+            }
         }
     }
 }
