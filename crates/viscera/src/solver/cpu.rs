@@ -170,11 +170,21 @@ impl<S: Real> Workspace<S> {
                 return Err(StepError::Mismatch { what, given, expected });
             }
         }
-        let room = [model.numbering.order.len(), model.copy_count()];
+        // What the memory was taken by, of which callers can change the first. A set without copies
+        // of its own goes by vertices among copies as well.
+        // Of what decides where passes read and write, callers can change the number of vertices and
+        // the form of a set. A set without copies of its own goes by vertices among copies as well.
+        let vertices = model.vertex_count().min(model.copy_count());
         for set in model.tet_sets() {
-            for (given, expected) in room.into_iter().zip(set.bounds) {
+            let [elastic, viscous] = set.multiplier_counts();
+            for (what, given, expected) in [
+                ("model's list of vertices", vertices, set.bounds[0]),
+                ("model's list of copies", model.copy_count(), set.bounds[1]),
+                // Both kinds are written side by side: neither reaches into the other's places.
+                ("model's multipliers", set.viscous_offset, set.multiplier_offset + elastic),
+                ("model's multipliers", model.multiplier_count, set.viscous_offset + viscous),
+            ] {
                 if given < expected {
-                    let what = "model's list of vertices";
                     return Err(StepError::Mismatch { what, given, expected });
                 }
             }
@@ -463,17 +473,17 @@ pub(super) fn energy_slots<S: Real>(model: &Model<S>) -> usize {
 
 /// Everything in a model that decides how much memory a step needs and which stages it has.
 fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 9] {
-    let viscous = model.tet_sets().map(|set| if set.viscous { set.len() } else { 0 });
+    let viscous = model.tet_sets().map(|set| if set.viscous { set.block_count() } else { 0 });
     [
         ("solver's list of vertices", model.vertex_count()),
         ("solver's list of multipliers", model.multiplier_count),
         ("solver's list of parts", model.component_count),
         ("solver's list of colors", model.color_count),
         ("solver's list of copies", model.copy_count()),
-        ("solver's list of Saint Venant-Kirchhoff tetrahedra", model.green_strain.len()),
-        ("solver's list of neo-Hookean tetrahedra", model.neo_hookean.len()),
-        ("solver's list of viscous Saint Venant-Kirchhoff tetrahedra", viscous[0]),
-        ("solver's list of viscous neo-Hookean tetrahedra", viscous[1]),
+        ("solver's blocks of Saint Venant-Kirchhoff tetrahedra", model.green_strain.block_count()),
+        ("solver's blocks of neo-Hookean tetrahedra", model.neo_hookean.block_count()),
+        ("solver's blocks of viscous Saint Venant-Kirchhoff tetrahedra", viscous[0]),
+        ("solver's blocks of viscous neo-Hookean tetrahedra", viscous[1]),
     ]
 }
 

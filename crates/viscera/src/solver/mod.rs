@@ -176,7 +176,9 @@ impl<S: Real> Solver<S> {
         dt: f64,
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
-        self.work.restart(&cpu::Step { model, inputs, dt, settings: &self.settings }, state);
+        let step = cpu::Step { model, inputs, dt, settings: &self.settings };
+        let workers = self.work.ground.workers.clone();
+        workers.enter(|| self.work.restart(&step, state));
         Ok(())
     }
 

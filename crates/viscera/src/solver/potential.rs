@@ -305,10 +305,12 @@ impl<S: Real> TetPass<S> for Sums<'_, S> {
         let volume = volume.to_array();
         let (mut energies, mut forces) = (self.energy.get(), self.squared_force.get());
         for lane in 0..LANES {
-            let counts = if lane < tets.filled() { 1.0 } else { 0.0 };
-            let volume = counts * volume[lane].to_f64();
-            energies[lane] += counts * energy[lane].to_f64();
-            forces[lane] += volume * volume * stress[lane].to_f64();
+            // Selected, not multiplied by zero: energies may be infinite.
+            let counts = lane < tets.filled();
+            let volume = volume[lane].to_f64();
+            let force = volume * volume * stress[lane].to_f64();
+            energies[lane] += if counts { energy[lane].to_f64() } else { 0.0 };
+            forces[lane] += if counts { force } else { 0.0 };
         }
         self.energy.set(energies);
         self.squared_force.set(forces);
