@@ -88,13 +88,13 @@ fn wall_and_jumps(mesh: &TetMesh, step: u32) -> Inputs<f32> {
 /// threads share every stage. The jumps make steps that are taken back.
 #[test]
 fn threads_and_instructions_leave_every_bit_of_a_large_body() {
-    let mesh = block([0.08, 0.08, 0.08], [16, 16, 16], 0.2);
     let others = [(2, Avx2), (8, Avx2), (2, Portable)];
-    for (colors, tissue, viscosity) in [
-        (Colors::Unlimited, SNH, 0.01),
-        (Colors::Limited(4), STVK, 0.01),
-        (Colors::Limited(1), SNH, 0.0),
+    for (colors, cells, tissue, viscosity) in [
+        (Colors::Unlimited, 14, SNH, 0.01),
+        (Colors::Limited(4), 10, STVK, 0.01),
+        (Colors::Limited(1), 10, SNH, 0.0),
     ] {
+        let mesh = block([0.08, 0.08, 0.08], [cells; 3], 0.2);
         let settings = colored(colors);
         let tissue = material(tissue, 1e4, 0.45).with_viscosity(viscosity).expect("legal");
         let model = single_body::<f32>(&mesh, &tissue, &settings);
@@ -227,18 +227,19 @@ fn hash(name: &str, scene: &str, frames: u32) -> u64 {
 #[test]
 fn shipped_scenes_have_the_same_bits_on_every_machine() {
     let shipped = [
-        ("cantilever.toml", include_str!("../../../scenes/cantilever.toml"), 0),
+        ("cantilever.toml", include_str!("../../../scenes/cantilever.toml"), 0x2796_27ae_d8d1_3ab8),
         ("grab.toml", include_str!("../../../scenes/grab.toml"), 0),
         ("liver_retraction.toml", include_str!("../../../scenes/liver_retraction.toml"), 0),
     ];
-    for (name, scene, expected) in shipped {
-        let hash = hash(name, scene, 4);
+    let hashes = shipped.map(|(name, scene, _)| (name, hash(name, scene, 4)));
+    for ((name, hash), (.., expected)) in hashes.into_iter().zip(shipped) {
         println!("{name}: {hash:#018x}");
-        assert_eq!(hash, expected, "{name}: {hash:#018x} is not {expected:#018x}");
+        assert!(hash == expected, "{hashes:#x?}");
     }
 }
 
-/// The solver numbers vertices by their places, so that the caller's numbers are only names.
+/// The solver numbers vertices by their places, so that the caller's numbers are only names: where no two
+/// vertices share a cell of the curve there is not even round-off.
 #[test]
 fn the_order_of_vertices_changes_nothing() {
     let mesh = block([0.06, 0.03, 0.03], [6, 3, 3], 0.2);
@@ -274,9 +275,8 @@ fn the_order_of_vertices_changes_nothing() {
     let (expected, given) = (run(&mesh), run(&shuffled));
     for old in 0..count {
         let new = new_number[old] as usize;
-        // Twenty steps of round-off of coordinates up to 60 mm.
-        let apart = (given.positions[new] - expected.positions[old]).length();
-        assert!(apart <= 20.0 * 0.06 * f32::EPSILON, "vertex {old}: {apart:e} m apart");
+        assert_eq!(given.positions[new], expected.positions[old], "vertex {old}");
+        assert_eq!(given.velocities[new], expected.velocities[old], "vertex {old}");
     }
 }
 
@@ -289,7 +289,7 @@ fn everything_seen_is_in_the_callers_order() {
     let settings = SolverSettings::default();
     let mut builder = ModelBuilder::new();
     builder.add_body(&mesh, &material(SNH, 1e4, 0.4)).expect("a body");
-    let held = [40u32, 3, 17];
+    let held = [34u32, 3, 17];
     for v in held {
         builder.add_attachment(v, mesh.vertices()[v as usize], 1e4).expect("an attachment");
     }
@@ -329,7 +329,6 @@ fn everything_seen_is_in_the_callers_order() {
     assert_eq!(largest, [7, 12, 30], "what holds the pins is at the pins");
 }
 
-/// The helper's model has single-precision numbers as large as any other's.
 #[test]
 fn a_new_history_has_the_same_bits() {
     let model = everything::<f32>(Colors::Limited(4));
@@ -345,10 +344,10 @@ fn a_new_history_has_the_same_bits() {
         }
         let inputs = Inputs::default();
         solver.restart(&model, &mut state, &inputs, 1e-3).expect("a new history");
+        assert!(state.multipliers.iter().any(|l| *l != 0.0), "no forces to compare");
         bits(&state)
     };
     let expected = restarted(1, Avx2);
-    assert!(expected.iter().any(|&bits| f32::from_bits(bits).abs() > f32::EPSILON as f32));
     for (threads, instructions) in [(8, Avx2), (1, Portable), (8, Portable)] {
         assert!(restarted(threads, instructions) == expected, "{threads} {instructions:?}");
     }
