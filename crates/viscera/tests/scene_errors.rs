@@ -129,14 +129,12 @@ fn a_bad_value_says_why_and_what_to_write() {
         (
             "[[fixing]]",
             "[solver]\nthreads = 0\n[[fixing]]",
-            "s.toml, line 13, column 1: threads = 0: out of range; it must be at least 1 and at most \
-             1024",
+            "s.toml, line 13, column 1: threads = 0: out of range; it must be 1 to 1024",
         ),
         (
             "[[fixing]]",
             "[solver]\nthreads = 10000\n[[fixing]]",
-            "s.toml, line 13, column 1: threads = 10000: out of range; it must be at least 1 and at \
-             most 1024",
+            "s.toml, line 13, column 1: threads = 10000: out of range; it must be 1 to 1024",
         ),
         (
             "[[fixing]]",
@@ -275,11 +273,11 @@ fn numbers_that_no_tissue_has_are_refused_with_the_legal_range() {
 /// One line: the setting, what it was given, the legal range.
 #[test]
 fn threads_that_no_machine_has_are_refused_as_an_override_too() {
-    for (value, range) in [("0", "at least 1 and"), ("10000", "at most 1024")] {
+    for value in ["0", "10000"] {
         let message = Scene::parse("s.toml", GOOD, &[("solver.threads", value)]).unwrap_err();
-        let message = message.to_string();
-        assert!(message.contains("solver.threads") && message.contains(range), "{message}");
-        assert!(message.contains(value) && message.lines().count() == 1, "{message}");
+        let start = "override of solver.threads: threads = ";
+        let expected = format!("{start}{value}: out of range; it must be 1 to 1024");
+        assert_eq!(message.to_string(), expected);
     }
     for value in ["auto", "1", "1024"] {
         Scene::parse("s.toml", GOOD, &[("solver.threads", value)]).unwrap();

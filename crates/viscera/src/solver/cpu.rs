@@ -62,7 +62,7 @@ pub(super) struct Ground<S> {
 #[derive(Clone, Debug)]
 pub(super) struct Workspace<S> {
     /// What [`sizes`] says of the model that this is for.
-    sizes: [usize; 9],
+    sizes: [usize; 11],
     pub ground: Ground<S>,
     /// Positions [m]; with each travels the inverse mass of its copies during a sweep [1/kg].
     pub points: Vec<Point<S>>,
@@ -472,18 +472,20 @@ pub(super) fn energy_slots<S: Real>(model: &Model<S>) -> usize {
 }
 
 /// Everything in a model that decides how much memory a step needs and which stages it has.
-fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 9] {
-    let viscous = model.tet_sets().map(|set| if set.viscous { set.block_count() } else { 0 });
+fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 11] {
+    let viscous = model.tet_sets().map(|set| if set.viscous { set.len() } else { 0 });
     [
         ("solver's list of vertices", model.vertex_count()),
         ("solver's list of multipliers", model.multiplier_count),
         ("solver's list of parts", model.component_count),
         ("solver's list of colors", model.color_count),
         ("solver's list of copies", model.copy_count()),
+        ("solver's list of Saint Venant-Kirchhoff tetrahedra", model.green_strain.len()),
+        ("solver's list of neo-Hookean tetrahedra", model.neo_hookean.len()),
         ("solver's blocks of Saint Venant-Kirchhoff tetrahedra", model.green_strain.block_count()),
         ("solver's blocks of neo-Hookean tetrahedra", model.neo_hookean.block_count()),
-        ("solver's blocks of viscous Saint Venant-Kirchhoff tetrahedra", viscous[0]),
-        ("solver's blocks of viscous neo-Hookean tetrahedra", viscous[1]),
+        ("solver's list of viscous Saint Venant-Kirchhoff tetrahedra", viscous[0]),
+        ("solver's list of viscous neo-Hookean tetrahedra", viscous[1]),
     ]
 }
 
