@@ -1,12 +1,13 @@
-//! A step takes no memory: a haptic loop cannot wait for an allocator.
-#![allow(unsafe_code)]
+//! A step takes no memory: a haptic loop cannot wait for an allocator. What is taken before is small
+//! and known. For several threads see `allocation_threads.rs`.
 
 mod common;
+#[path = "common/counting.rs"]
+mod counting;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
-use common::everything;
+use common::{SNH, block, everything, material, single_body};
+use counting::{Counting, bytes_of, requests_of};
+use viscera::model::ModelBuilder;
 use viscera::scalar::{Real, vec3};
 use viscera::scene::Scene;
 use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, Colors, SolverSettings};
@@ -15,55 +16,15 @@ use viscera::solver::balance::ForceBalance;
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
-thread_local! {
-    /// Requests of this thread to the allocator; tests run side by side, each on its own thread.
-    static REQUESTS: Cell<usize> = const { Cell::new(0) };
-}
-
-/// The system's allocator, counting.
-struct Counting;
-
-fn count_request() {
-    // While a thread ends its counter may be gone already; nothing is measured then.
-    let _ = REQUESTS.try_with(|requests| requests.set(requests.get() + 1));
-}
-
-// SAFETY: every call goes to the system's allocator unchanged; the counter is a constant-initialised
-// cell without destructor, so that counting itself never allocates.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count_request();
-        // SAFETY: the caller keeps the contract, which is the system allocator's.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count_request();
-        // SAFETY: `pointer` came from the system allocator with this layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count_request();
-        // SAFETY: `pointer` came from the system allocator with this layout.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
-
-/// How often `action` asks the allocator for anything.
-fn requests_of(action: impl FnOnce()) -> usize {
-    let before = REQUESTS.with(Cell::get);
-    action();
-    REQUESTS.with(Cell::get) - before
-}
 
 #[test]
 fn the_counter_counts() {
     let requests = requests_of(|| drop(std::hint::black_box(Box::new(1))));
     assert_eq!(requests, 2, "one allocation, one release");
+    let (kept, bytes) = bytes_of(|| vec![0u8; 1000]);
+    assert_eq!(bytes, kept.len());
 }
 
 fn accelerations() -> Vec<SolverSettings> {
@@ -210,4 +171,49 @@ fn a_frame_of_a_scene_allocates_nothing_after_the_first() {
             assert_eq!(requests, 0, "{acceleration}, {colors} colours");
         }
     }
+}
+
+/// A bar of 30 000 tetrahedra at the defaults, single precision. A tetrahedron has 60 bytes of
+/// constants and 24 of multipliers; a viscous one 24 of multipliers and 24 of strain besides; a
+/// vertex, of which there is one for five tetrahedra, less than 200: about 120 and 170 bytes per
+/// tetrahedron, and 400 in any case.
+#[test]
+fn memory_is_small_and_as_large_as_is_said() {
+    let mesh = block([0.2, 0.05, 0.05], [50, 10, 10], 0.2);
+    let settings = SolverSettings::default();
+    for (viscosity, most) in [(0.0, 140), (0.01, 200)] {
+        let tissue = material(SNH, 1e4, 0.45).with_viscosity(viscosity).expect("legal");
+        let (model, of_model) = bytes_of(|| single_body::<f32>(&mesh, &tissue, &settings));
+        let (state, of_state) = bytes_of(|| State::at_rest(&model));
+        let (solver, of_solver) = bytes_of(|| Solver::new(&model, &settings));
+        for (what, said, taken) in [
+            ("model", model.bytes(), of_model),
+            ("state", state.bytes(), of_state),
+            ("solver", solver.bytes(), of_solver),
+        ] {
+            println!("{what}: {said} bytes, {taken} taken");
+            assert!(said <= taken, "{what}: {said} bytes are said, {taken} are taken");
+            assert!(taken * 100 <= said * 103, "{what}: {said} bytes are said, {taken} are taken");
+        }
+        let per_tet = (of_model + of_state + of_solver) / model.tet_count();
+        println!("{per_tet} bytes per tetrahedron, viscosity {viscosity} s");
+        assert!(per_tet <= most && most < 400, "{per_tet} bytes, viscosity {viscosity} s");
+    }
+}
+
+/// What grows with springs, attachments and bodies counts as well.
+#[test]
+fn memory_of_springs_and_attachments_is_said() {
+    let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
+    let mut builder = ModelBuilder::new();
+    builder.add_body(&mesh, &material(SNH, 1e4, 0.4)).expect("a body");
+    for (v, &x) in mesh.vertices().iter().enumerate().cycle().take(5000) {
+        builder.add_attachment(v as u32, x, 10.0).expect("an attachment");
+        let other = (v + 1) % mesh.vertices().len();
+        builder.add_spring([v as u32, other as u32], 10.0, None).expect("a spring");
+    }
+    let settings = common::colored(Colors::Limited(4));
+    let (model, taken) = bytes_of(|| builder.build::<f32>(&settings).expect("a model"));
+    let said = model.bytes();
+    assert!(said <= taken && taken * 100 <= said * 103, "{said} bytes said, {taken} taken");
 }

@@ -127,6 +127,22 @@ fn a_bad_value_says_why_and_what_to_write() {
             "s.toml, line 18, column 39: count = 100000000000000000000: this must be a whole number",
         ),
         (
+            "[[fixing]]",
+            "[solver]\nthreads = 0\n[[fixing]]",
+            "s.toml, line 13, column 1: threads = 0: out of range; it must be 1 to 1024",
+        ),
+        (
+            "[[fixing]]",
+            "[solver]\nthreads = 10000\n[[fixing]]",
+            "s.toml, line 13, column 1: threads = 10000: out of range; it must be 1 to 1024",
+        ),
+        (
+            "[[fixing]]",
+            "[solver]\nthreads = \"all\"\n[[fixing]]",
+            "s.toml, line 13, column 1: threads = \"all\": did you mean \"auto\"? Or write a whole \
+             number",
+        ),
+        (
             "0.45",
             "nan",
             "s.toml, line 10, column 31: poisson = NaN: Poisson ratio NaN is unstable; it must be \
@@ -251,6 +267,20 @@ fn numbers_that_no_tissue_has_are_refused_with_the_legal_range() {
     ] {
         let message = Scene::parse("s.toml", GOOD, &[(key, value)]).unwrap_err().to_string();
         assert!(message.contains(range), "{message}");
+    }
+}
+
+/// One line: the setting, what it was given, the legal range.
+#[test]
+fn threads_that_no_machine_has_are_refused_as_an_override_too() {
+    for value in ["0", "10000"] {
+        let message = Scene::parse("s.toml", GOOD, &[("solver.threads", value)]).unwrap_err();
+        let start = "override of solver.threads: threads = ";
+        let expected = format!("{start}{value}: out of range; it must be 1 to 1024");
+        assert_eq!(message.to_string(), expected);
+    }
+    for value in ["auto", "1", "1024"] {
+        Scene::parse("s.toml", GOOD, &[("solver.threads", value)]).unwrap();
     }
 }
 

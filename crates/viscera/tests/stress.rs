@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Random, Run, SNH, STVK, block, colored, exact, material, single_body};
+use viscera::elements::TetForm;
 use viscera::measure::measure_tets;
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder, ModelError};
@@ -240,6 +241,28 @@ fn a_solver_made_for_another_model_is_refused() {
                 }
             }
         }
+    }
+}
+
+/// Callers can change some of what memory is taken by; passes over tetrahedra must not leave it then.
+#[test]
+fn a_model_changed_behind_its_back_is_refused() {
+    let (model, ..) = workbench();
+    let settings = SolverSettings::default();
+    let mut fewer_vertices = model.clone();
+    fewer_vertices.rest_positions.truncate(3);
+    let mut other_form = model.clone();
+    other_form.neo_hookean.form = TetForm::NeoHookeanPair;
+    let mut more_constraints = model.clone();
+    more_constraints.neo_hookean.viscous = true;
+    for (changed, refused) in
+        [(fewer_vertices, true), (other_form, false), (more_constraints, true)]
+    {
+        let mut solver = Solver::new(&changed, &settings);
+        let mut state = State::at_rest(&changed);
+        let result = solver.step(&changed, &mut state, &Inputs::default(), 0.01);
+        // Fewer multipliers than there is room for do no harm.
+        assert_eq!(result.is_err(), refused, "{result:?}");
     }
 }
 

@@ -171,7 +171,7 @@ impl ModelBuilder {
         Ok(Model {
             bodies: self.bodies.clone(),
             rest_positions: self.positions.iter().map(|p| p.cast()).collect(),
-            masses: masses.into_iter().map(S::from_f64).collect(),
+            masses: masses.iter().map(|&mass| S::from_f64(mass)).collect(),
             materials: self.materials.iter().map(constants).collect(),
             green_strain,
             neo_hookean,
@@ -212,6 +212,9 @@ impl ModelBuilder {
             bounds: [self.positions.len(), layout.copy_count()],
             order,
         };
+        if layout.is_split() {
+            set.copies.reserve_exact(set.blocks.capacity());
+        }
         for color in colors.windows(2) {
             let tets = &set.order[color[0] as usize..color[1] as usize];
             for chosen in tets.chunks(LANES) {
@@ -340,7 +343,8 @@ impl Layout<'_> {
         for color in 1..offsets.len() {
             offsets[color] += offsets[color - 1];
         }
-        (constraints.into_iter().map(|c| c as u32).collect(), offsets)
+        // By reference: collected in place, the memory of the larger numbers would be kept.
+        (constraints.iter().map(|&c| c as u32).collect(), offsets)
     }
 
     fn copy_count(&self) -> usize {

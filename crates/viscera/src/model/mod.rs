@@ -115,6 +115,16 @@ pub struct SpringSet<S> {
     pub multiplier_offset: usize,
 }
 
+impl<S> SpringSet<S> {
+    fn bytes(&self) -> usize {
+        size_of_val(&self.vertices[..])
+            + size_of_val(&self.copies[..])
+            + size_of_val(&self.rest_length[..])
+            + size_of_val(&self.stiffness[..])
+            + size_of_val(&self.order[..])
+    }
+}
+
 /// Elastic attachments of vertices to anchors, sorted by colour. The anchors move with the
 /// inputs of a step.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -131,6 +141,15 @@ pub struct AttachmentSet<S> {
     pub color_offsets: Vec<u32>,
     /// First multiplier, three per attachment.
     pub multiplier_offset: usize,
+}
+
+impl<S> AttachmentSet<S> {
+    fn bytes(&self) -> usize {
+        size_of_val(&self.vertices[..])
+            + size_of_val(&self.copies[..])
+            + size_of_val(&self.stiffness[..])
+            + size_of_val(&self.order[..])
+    }
 }
 
 /// Everything that does not move.
@@ -220,10 +239,13 @@ impl<S: Real> Model<S> {
         self.copy_offsets[v] as usize..self.copy_offsets[v + 1] as usize
     }
 
-    /// Bytes of the arrays that grow with the mesh.
+    /// Bytes of the arrays that grow with meshes, springs and attachments.
     pub fn bytes(&self) -> usize {
         let sets: usize = self.tet_sets().into_iter().map(TetSet::bytes).sum();
-        sets + size_of_val(&self.rest_positions[..])
+        sets + self.springs.bytes()
+            + self.attachments.bytes()
+            + size_of_val(&self.rest_anchors[..])
+            + size_of_val(&self.rest_positions[..])
             + size_of_val(&self.masses[..])
             + size_of_val(&self.numbering.order[..])
             + size_of_val(&self.numbering.rank[..])

@@ -10,16 +10,16 @@ use std::arch::x86_64::*;
 use std::fmt;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
+use super::Scalar;
 use super::lanes::{Eight, Kernel, LANES, Lanes, Point};
-use super::{Real, Scalar};
 
 /// Compiles a kernel for AVX2 and runs it.
 ///
 /// # Safety
 /// The processor has AVX2.
 #[target_feature(enable = "avx2")]
-pub(super) unsafe fn run<R: Real>(kernel: impl Kernel<R>) {
-    kernel.run::<R::Fast>();
+pub(super) unsafe fn run<L: Lanes>(kernel: impl Kernel<L::Real>) {
+    kernel.run::<L>();
 }
 
 // No closures in what follows: one that is not inlined is not compiled for AVX2.

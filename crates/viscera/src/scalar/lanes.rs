@@ -9,8 +9,6 @@
 
 #![allow(unsafe_code)]
 
-#[cfg(target_arch = "x86_64")]
-use super::avx2;
 use super::{Real, Scalar, Vec3, vec3};
 
 /// Numbers of a group.
@@ -187,15 +185,7 @@ pub fn run<R: Real>(instructions: Instructions, kernel: impl Kernel<R>) {
         // SAFETY: `or_detect` answers `Avx2` only where the processor has it.
         #[cfg(target_arch = "x86_64")]
         #[allow(unsafe_code)]
-        Instructions::Avx2 => unsafe { avx2::run(kernel) },
+        Instructions::Avx2 => unsafe { R::run_avx2(kernel) },
         _ => kernel.run::<R>(),
     }
-}
-
-/// The fastest lanes of the target, for [`Real::Fast`].
-pub(super) mod fast {
-    #[cfg(target_arch = "x86_64")]
-    pub use super::avx2::{F32x8 as F32, F64x4 as F64};
-    #[cfg(not(target_arch = "x86_64"))]
-    pub use {f32 as F32, f64 as F64};
 }

@@ -78,8 +78,14 @@ pub trait Scalar:
 pub trait Real: Scalar<Mask = bool> + PartialOrd {
     /// "f32" or "f64".
     const NAME: &'static str;
-    /// As many of them side by side as the target's registers hold; see [`lanes::run`].
-    type Fast: lanes::Lanes<Real = Self>;
+    /// Runs a kernel in lanes of AVX2; [`lanes::run`] chooses.
+    ///
+    /// # Safety
+    /// The processor has AVX2.
+    #[cfg(target_arch = "x86_64")]
+    #[doc(hidden)]
+    #[allow(unsafe_code)]
+    unsafe fn run_avx2(kernel: impl lanes::Kernel<Self>);
     /// The same value in double precision.
     fn to_f64(self) -> f64;
     /// True unless infinite or not a number.
@@ -131,7 +137,13 @@ macro_rules! implement_real {
 
         impl Real for $type {
             const NAME: &'static str = stringify!($type);
-            type Fast = lanes::fast::$fast;
+            #[cfg(target_arch = "x86_64")]
+            #[allow(unsafe_code)]
+            #[inline]
+            unsafe fn run_avx2(kernel: impl lanes::Kernel<Self>) {
+                // SAFETY: the caller's promise.
+                unsafe { avx2::run::<avx2::$fast>(kernel) }
+            }
             #[inline(always)]
             fn to_f64(self) -> f64 {
                 f64::from(self)
@@ -143,8 +155,8 @@ macro_rules! implement_real {
         }
     };
 }
-implement_real!(f32 F32);
-implement_real!(f64 F64);
+implement_real!(f32 F32x8);
+implement_real!(f64 F64x4);
 
 /// A vector of three components.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -194,7 +194,7 @@ settings_table! {
         /// The constraints of a stable neo-Hookean tetrahedron. With `rebase` the pair comes to the
         /// right rest as well, but slowly: it moves as if it were heavier.
         neo_hookean: NeoHookean = (NeoHookean::Auto), one_of::<NeoHookean>();
-        /// Threads: "auto" for one per processor where the mesh is large enough to gain by it (8000
+        /// Threads: "auto" for one per processor where the mesh is large enough to gain by it (16,000
         /// tetrahedra). The result is the same to the bit for any number.
         threads: Threads = (Threads::Auto), THREADS;
         /// Where the iteration of a substep starts.

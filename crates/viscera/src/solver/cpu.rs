@@ -72,7 +72,7 @@ pub(super) struct Ground<S> {
 #[derive(Clone, Debug)]
 pub(super) struct Workspace<S> {
     /// What [`sizes`] says of the model that this is for.
-    sizes: [usize; 9],
+    sizes: [usize; 11],
     pub ground: Ground<S>,
     /// Positions [m]; with each travels the inverse mass of its copies during a sweep [1/kg].
     pub points: Vec<Point<S>>,
@@ -198,11 +198,21 @@ impl<S: Real> Workspace<S> {
                 return Err(StepError::Mismatch { what, given, expected });
             }
         }
-        let room = [model.numbering.order.len(), model.copy_count()];
+        // What the memory was taken by, of which callers can change the first. A set without copies
+        // of its own goes by vertices among copies as well.
+        // Of what decides where passes read and write, callers can change the number of vertices and
+        // the form of a set. A set without copies of its own goes by vertices among copies as well.
+        let vertices = model.vertex_count().min(model.copy_count());
         for set in model.tet_sets() {
-            for (given, expected) in room.into_iter().zip(set.bounds) {
+            let [elastic, viscous] = set.multiplier_counts();
+            for (what, given, expected) in [
+                ("model's list of vertices", vertices, set.bounds[0]),
+                ("model's list of copies", model.copy_count(), set.bounds[1]),
+                // Both kinds are written side by side: neither reaches into the other's places.
+                ("model's multipliers", set.viscous_offset, set.multiplier_offset + elastic),
+                ("model's multipliers", model.multiplier_count, set.viscous_offset + viscous),
+            ] {
                 if given < expected {
-                    let what = "model's list of vertices";
                     return Err(StepError::Mismatch { what, given, expected });
                 }
             }
@@ -532,7 +542,7 @@ pub(super) fn energy_slots<S: Real>(model: &Model<S>) -> usize {
 }
 
 /// Everything in a model that decides how much memory a step needs and which stages it has.
-fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 9] {
+fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 11] {
     let viscous = model.tet_sets().map(|set| if set.viscous { set.len() } else { 0 });
     [
         ("solver's list of vertices", model.vertex_count()),
@@ -542,6 +552,8 @@ fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 9] {
         ("solver's list of copies", model.copy_count()),
         ("solver's list of Saint Venant-Kirchhoff tetrahedra", model.green_strain.len()),
         ("solver's list of neo-Hookean tetrahedra", model.neo_hookean.len()),
+        ("solver's blocks of Saint Venant-Kirchhoff tetrahedra", model.green_strain.block_count()),
+        ("solver's blocks of neo-Hookean tetrahedra", model.neo_hookean.block_count()),
         ("solver's list of viscous Saint Venant-Kirchhoff tetrahedra", viscous[0]),
         ("solver's list of viscous neo-Hookean tetrahedra", viscous[1]),
     ]

@@ -308,10 +308,12 @@ impl<S: Real> TetPass<S> for Sums<'_, S> {
         let (mut energies, mut forces) = (self.energy.get(), self.squared_force.get());
         let lanes = tets.lane..tets.lane + L::WIDTH;
         for lane in lanes.clone() {
-            let counts = if lane < tets.filled() { 1.0 } else { 0.0 };
-            let volume = counts * volumes[lane].to_f64();
-            energies[lane] += counts * energy[lane].to_f64();
-            forces[lane] += volume * volume * stress[lane].to_f64();
+            // Selected, not multiplied by zero: energies may be infinite.
+            let counts = lane < tets.filled();
+            let volume = volumes[lane].to_f64();
+            let force = volume * volume * stress[lane].to_f64();
+            energies[lane] += if counts { energy[lane].to_f64() } else { 0.0 };
+            forces[lane] += if counts { force } else { 0.0 };
         }
         self.energy.set(energies);
         self.squared_force.set(forces);

@@ -9,8 +9,8 @@ use crate::model::{MaterialConstants, Model, TetBlock, TetSet};
 use crate::scalar::lanes::{self, Eight, LANES, Lanes, Point};
 use crate::scalar::{Mat3, Real, Scalar, Vec3, vec3};
 
-/// Blocks that a thread does at a time: about the ten microseconds that hide what a fork costs.
-const GRAIN: usize = 64;
+/// Blocks that a thread does at a time: about the five microseconds that hide what a fork costs.
+const GRAIN: usize = 32;
 
 /// One pass: what to do with a block, or with some lanes of it at a time.
 pub(super) trait TetPass<S: Real> {
@@ -104,7 +104,7 @@ impl<'a, S: Real> Block<'a, S> {
     /// Corners among the positions of vertices.
     #[inline(always)]
     pub fn corners<L: Lanes<Real = S>>(&self, points: &[Point<S>]) -> Corners<L> {
-        debug_assert!(points.len() >= self.set.bounds[0]);
+        assert!(points.len() >= self.set.bounds[0]);
         // SAFETY: `Workspace::check` compares bounds and lengths, and nobody writes the slice.
         unsafe { gather(points.as_ptr(), &self.constants.vertices, self.lane) }
     }

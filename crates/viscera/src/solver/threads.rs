@@ -9,10 +9,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::scalar::lanes::Instructions;
-use crate::settings::Threads;
+use crate::settings::{MOST_THREADS, Threads};
 
 /// Threads pay from this many tetrahedra on: below, waking them costs what they save.
-const WORTH_THREADS: usize = 8_000;
+const WORTH_THREADS: usize = 16_000;
 
 /// Threads and instructions of one solver.
 #[derive(Clone, Debug)]
@@ -28,7 +28,7 @@ impl Workers {
         let count = match wanted {
             Threads::Auto if tet_count < WORTH_THREADS => 1,
             Threads::Auto => std::thread::available_parallelism().map_or(1, usize::from),
-            Threads::Count(count) => count as usize,
+            Threads::Count(count) => count.min(MOST_THREADS) as usize,
         };
         let build = || rayon::ThreadPoolBuilder::new().num_threads(count).build().ok();
         let pool = if count > 1 { build().map(Arc::new) } else { None };
