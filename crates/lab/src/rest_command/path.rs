@@ -8,7 +8,6 @@ use viscera::scalar::Vec3;
 use viscera::simulation::Simulation;
 use viscera::solver::Inputs;
 
-use super::memory::Memory;
 use crate::reference::{Convergence, Cost, Reference, ReferenceError, Standing};
 use crate::validate::Progress;
 
