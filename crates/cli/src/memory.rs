@@ -2,35 +2,54 @@
 
 use anyhow::{Result, bail};
 use sysinfo::{MemoryRefreshKind, System};
-use viscera::settings::{Acceleration, Precision, SolverSettings};
+use viscera::settings::{Acceleration, Colors, Precision, SolverSettings};
 use viscera_report::Memory;
 
-/// What a mesh takes while it is made and checked [B per tetrahedron]. PLACEHOLDER
-pub const MESH: f64 = 300.0;
+/// What a mesh and the making of its model take at their peak, model included [B per tetrahedron]:
+/// 228 by VmHWM on a bar of 300,000 tetrahedra. Too small, and a machine starts to swap or ends the
+/// program; too large, and it is not used in full.
+const BUILDING: f64 = 240.0;
 
-/// What building model, state and solver takes at its peak, and keeps [B per tetrahedron]. PLACEHOLDER
-const SIMULATION: f64 = 900.0;
+/// What `viscera run` takes beside model, state and solver: meshes, surfaces, measures, a frame as VTU
+/// [B per tetrahedron]; 464 to 481 on a bar of 300,000, likewise.
+const RUNNING: f64 = 490.0;
 
-/// What model, state and solver of `tets` tetrahedra take at most, their mesh not counted.
-pub fn of_simulation(tets: usize, settings: &SolverSettings) -> Memory {
-    let wide = settings.precision == Precision::F64;
-    let mut each = SIMULATION * if wide { 1.6 } else { 1.0 };
-    if settings.acceleration == Acceleration::Anderson {
-        // Two histories of up to six multipliers and a vertex's share.
-        let number = if wide { 8.0 } else { 4.0 };
-        each += 2.0 * f64::from(settings.anderson_window) * 8.0 * number;
+/// What model, state and solver keep, at most [B per tetrahedron]; without viscosity. Measured 102 to
+/// 137 on bars from 10,000 tetrahedra on.
+const KEPT: f64 = 150.0;
+/// Copies of four corners, their loads, their numbers.
+const COPIES: f64 = 150.0;
+/// Two iterates and the weights of multipliers.
+const ITERATES: f64 = 90.0;
+/// Six multipliers and a vertex's share in one entry of Anderson's two histories.
+const HISTORY: f64 = 2.0 * 7.0 * 4.0;
+
+/// What model, state and solver keep at most [B per tetrahedron].
+pub fn kept(settings: &SolverSettings) -> f64 {
+    let mut kept = KEPT;
+    if settings.colors != Colors::Unlimited {
+        kept += COPIES;
     }
-    Memory((each * tets as f64) as u64)
+    if settings.acceleration != Acceleration::None {
+        kept += ITERATES;
+    }
+    if settings.acceleration == Acceleration::Anderson {
+        kept += HISTORY * f64::from(settings.anderson_window + 1);
+    }
+    match settings.precision {
+        Precision::F32 => kept,
+        Precision::F64 => 2.0 * kept,
+    }
 }
 
-/// Two solvers and states of one model.
-pub fn of_pair(tets: usize, settings: &SolverSettings) -> Memory {
-    Memory(2 * of_simulation(tets, settings).0)
+/// What `viscera run` takes for so many tetrahedra.
+pub fn of_run(tets: usize, settings: &SolverSettings) -> Memory {
+    Memory(((RUNNING + kept(settings)) * tets as f64) as u64)
 }
 
-/// What a mesh of so many tetrahedra takes at most while it is made.
-pub fn of_mesh(tets: usize) -> Memory {
-    Memory((MESH * tets as f64) as u64)
+/// What `viscera bench` takes, which has two solvers and states at a time.
+pub fn of_bench(tets: usize, settings: &SolverSettings) -> Memory {
+    Memory(((BUILDING + 2.0 * kept(settings)) * tets as f64) as u64)
 }
 
 /// What this process may still take; nothing where the system does not say.
@@ -45,48 +64,19 @@ pub fn free() -> Option<Memory> {
 }
 
 /// Refuses what does not fit: in what `--memory` allows, else in what is free.
-pub fn check(what: &str, needed: Memory, allowed: Option<Memory>) -> Result<()> {
-    let (room, whose) = match allowed {
-        Some(allowed) => (allowed, "--memory allows"),
-        None => match free() {
-            Some(free) => (free, "this machine has free"),
-            None => return Ok(()),
-        },
+pub fn check(what: &str, needed: Memory, allowed: Option<Memory>, cure: &str) -> Result<()> {
+    let (room, how) = match (allowed, free()) {
+        (Some(allowed), _) => (allowed, "allowed"),
+        (None, Some(free)) => (free, "free"),
+        (None, None) => return Ok(()),
     };
     if needed.0 <= room.0 {
         return Ok(());
     }
+    // A little more than needed, so that the advice holds.
+    let enough = Memory(needed.0.saturating_add(needed.0 / 10));
     bail!(
-        "{what} needs about {needed} of memory, and {whose} {room}: use fewer tetrahedra or a larger \
-         machine, or try all the same with --memory \"{}\"",
-        // Printed with three digits, it must not come out below what is needed.
-        Memory(needed.0 + needed.0 / 10)
+        "{what} needs about {needed} of memory, and {room} are {how}; {cure}, or try all the same \
+         with --memory \"{enough}\""
     )
-}
-
-/// The most memory that this process has resident, from a moment on; Linux tells.
-pub struct Peak {
-    /// Resident at that moment [B].
-    before: u64,
-}
-
-impl Peak {
-    /// From now on.
-    pub fn start() -> Option<Self> {
-        // 5 resets the peak; see proc_pid_clear_refs(5).
-        std::fs::write("/proc/self/clear_refs", "5").ok()?;
-        Some(Self { before: status("VmRSS:")? })
-    }
-
-    /// How much more it was than at the start [B].
-    pub fn bytes(self) -> Option<u64> {
-        Some(status("VmHWM:")?.saturating_sub(self.before))
-    }
-}
-
-/// A line of /proc/self/status in kB, as bytes.
-fn status(key: &str) -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix(key))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kilobytes| 1024 * kilobytes)
 }

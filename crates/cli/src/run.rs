@@ -43,7 +43,7 @@ pub struct RunArguments {
     /// Folder where mesh files are looked for that are not beside the scene
     #[arg(long, value_name = "DIR", env = "VISCERA_DATA")]
     data: Option<PathBuf>,
-    /// Memory that may be used beyond what the meshes take [default: what is free]
+    /// Memory that may be used [default: what is free]
     #[arg(long, value_name = "SIZE")]
     memory: Option<Memory>,
 }
@@ -64,7 +64,8 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     let assembly = Assembly::new(&scene, &mut |name| library.load(name))?;
     let tets = assembly.bodies.iter().map(|body| body.tets.len()).sum();
     let what = format!("{}: a simulation of {tets} tetrahedra", scene.name);
-    memory::check(&what, memory::of_simulation(tets, &scene.solver), arguments.memory)?;
+    let needed = memory::of_run(tets, &scene.solver);
+    memory::check(&what, needed, arguments.memory, "take a coarser mesh")?;
     let stem = arguments.scene.file_stem().unwrap_or(arguments.scene.as_os_str());
     let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem));
     let out = OutputFolder::create(&folder)?;

@@ -2,8 +2,7 @@
 
 use super::bandwidth::Bandwidth;
 use super::solvers::SolverEntry;
-use super::subjects::hanging;
-use crate::memory;
+use super::subjects::{Subject, hanging};
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 use std::time::Instant;
@@ -46,8 +45,6 @@ pub struct Measurement {
     pub unit_ns_per_tet: Option<f64>,
     /// Of model, state and solver.
     pub bytes_per_tet: f64,
-    /// The most memory while all of this was made, with its mesh; where the system tells.
-    pub peak_bytes_per_tet: Option<f64>,
     pub compulsory_bytes_per_tet: f64,
     /// Compulsory bytes over time, as a fraction of the memory bandwidth with as many threads.
     pub bandwidth_fraction: Option<f64>,
@@ -111,7 +108,6 @@ impl<'a> Bench<'a> {
             unit: self.entry.unit(),
             unit_ns_per_tet: unit_seconds.map(|s| s * per_tet),
             bytes_per_tet: bytes as f64 / tets as f64,
-            peak_bytes_per_tet: None,
             compulsory_bytes_per_tet: compulsory,
             bandwidth_fraction: unit_seconds.map(fraction),
         })
@@ -194,30 +190,48 @@ impl Runner {
     }
 }
 
-/// What is measured `with` solvers of this entry, for all bandwidths, and the most memory it took.
+/// Measures a solver on a subject, once for each bandwidth; `done` is told of each.
 pub fn measure_all(
     entry: &SolverEntry,
-    subject: &super::subjects::Subject<'_>,
+    subject: &Subject<'_>,
     bandwidths: &[Bandwidth],
     seconds: f64,
     done: &dyn Fn(),
 ) -> Result<Vec<Measurement>> {
-    let peak = memory::Peak::start();
-    let work = || -> Result<Vec<Measurement>> {
-        let mesh = subject.mesh()?;
-        let bench = Bench::new(entry, &mesh)?;
-        let measure = |bandwidth: &Bandwidth| {
-            let found = bench.measure(subject.name(), *bandwidth, seconds);
+    let measure = || -> Result<Vec<Measurement>> {
+        let bench = Bench::new(entry, &*subject.mesh()?)?;
+        let mut found = Vec::new();
+        for bandwidth in bandwidths {
+            found.push(bench.measure(subject.name(), *bandwidth, seconds)?);
             done();
-            found
-        };
-        bandwidths.iter().map(measure).collect()
+        }
+        Ok(found)
     };
-    let mut found =
-        work().with_context(|| format!("{} on {} tetrahedra", entry.name, subject.tet_count()))?;
-    let peak = peak.and_then(memory::Peak::bytes);
-    for measurement in &mut found {
-        measurement.peak_bytes_per_tet = peak.map(|bytes| bytes as f64 / measurement.tets as f64);
+    measure().with_context(|| format!("{} on {} tetrahedra", entry.name, subject.tet_count()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::solvers::SOLVERS;
+    use super::super::subjects::Size;
+    use super::*;
+
+    /// What decides whether a mesh fits into memory follows what is kept in fact.
+    #[test]
+    fn memory_is_foreseen_and_not_overstated() {
+        let mesh = Subject::Bar(Size(30_000));
+        let mesh = mesh.mesh().expect("a bar");
+        for entry in &SOLVERS {
+            let bench = Bench::new(entry, &mesh).expect("a model");
+            let runner = Runner::new(&bench, 1, 1);
+            let bytes = bench.model.bytes() + runner.state.bytes() + runner.solver.bytes();
+            let each = bytes as f64 / bench.model.tet_count() as f64;
+            let foreseen = crate::memory::kept(&entry.settings());
+            let (name, close) = (entry.name, 0.5 * foreseen..=foreseen);
+            assert!(
+                close.contains(&each),
+                "{name}: {each} B/tet, {foreseen} foreseen; see memory.rs"
+            );
+        }
     }
-    Ok(found)
 }

@@ -65,18 +65,18 @@ Examples:
 
 /// How numbers are counted; help and report say it alike.
 const COUNTING: &str = "\
-A step is one substep with the number of sweeps that the table shows. A sweep's time is the difference of
-the fastest steps with two numbers of sweeps, divided by the difference of these numbers: what a step
-costs besides its sweeps is not in it, the rebase and acceleration that go with each sweep are.
+A step is one substep with as many sweeps as the table shows. The time of a sweep is the difference of \
+the fastest steps with two numbers of sweeps, divided by the difference of these numbers: the rebase \
+and the acceleration that go with each sweep are in it, what a step costs besides is not.
 
-B/tet are the bytes of model, state and solver.
+B/tet are the bytes of model, state and solver over the tetrahedra.
 
-Compulsory bytes are what no sweep in single precision can do without: of each tetrahedron 60 B of
-constants read (4 vertex numbers, 9 entries of the inverse rest shape, volume, material) and its
-multipliers (4 B each) read and written; of each vertex 16 B (position, inverse mass) read and written.
-Each is counted once, whatever the solver does in fact.
-\"of bandwidth\" is these bytes over the time of a sweep, divided by the memory bandwidth: bytes read and
-written by a copy of 256 MiB with as many threads. Meshes that fit into the caches may be above 1.";
+Compulsory bytes are what no sweep in single precision can do without: of each tetrahedron 60 B of \
+constants read (four vertex numbers, nine entries of the inverse rest shape, volume, material) and its \
+multipliers of 4 B read and written; of each vertex 16 B (position, inverse mass) read and written. \
+Each counts once, whatever the solver does in fact. The column `of bandwidth` is these bytes over the \
+time of a sweep, divided by the memory bandwidth: the bytes read and written by a copy of 256 MiB \
+with as many threads, over its time. Meshes that fit into the caches may be above 100 %.";
 
 fn solver_names() -> PossibleValuesParser {
     PossibleValuesParser::new(SOLVERS.iter().map(|solver| solver.name))
@@ -104,7 +104,7 @@ pub fn execute(arguments: &BenchArguments) -> Result<()> {
     let solvers = arguments.solvers();
     check_memory(&subjects, &solvers, arguments.memory)?;
     let mut document = Document::prepare(&arguments.out.join("bench.md"), "What solvers cost")?;
-    prepare_file(&json)?;
+    prepare_file(&json, "--json")?;
 
     let threads = arguments.threads();
     let seconds = arguments.seconds.unwrap_or(if arguments.quick { 0.05 } else { 0.5 });
@@ -176,18 +176,14 @@ fn check_memory(
     solvers: &[&SolverEntry],
     allowed: Option<Memory>,
 ) -> Result<()> {
-    memory::check(
-        "the copy that measures the bandwidth",
-        Memory(2 * bandwidth::COPIED as u64),
-        allowed,
-    )?;
+    let copy = "the copy that measures the bandwidth";
+    memory::check(copy, Memory(2 * bandwidth::COPIED as u64), allowed, "close other programs")?;
     for subject in subjects {
         let tets = subject.tet_count();
         for entry in solvers {
-            // Two solvers with their states are measured by turns.
-            let needed = memory::of_mesh(tets).0 + memory::of_pair(tets, &entry.settings()).0;
             let what = format!("`{}` on {tets} tetrahedra", entry.name);
-            memory::check(&what, Memory(needed), allowed)?;
+            let needed = memory::of_bench(tets, &entry.settings());
+            memory::check(&what, needed, allowed, "choose smaller --sizes or another mesh")?;
         }
     }
     Ok(())

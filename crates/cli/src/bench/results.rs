@@ -6,7 +6,7 @@ use super::solvers::SolverEntry;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use sysinfo::{CpuRefreshKind, RefreshKind, System};
-use viscera_report::{Axis, Document, Plot, Series, Table, si};
+use viscera_report::{Axis, Document, Plot, Series, Table, percent, si};
 
 /// All of it.
 #[derive(Serialize)]
@@ -63,7 +63,6 @@ impl Results {
             "of bandwidth",
             "instructions",
         ]);
-        let or_none = |number: Option<f64>| number.map_or("-".into(), digits);
         for case in &self.cases {
             let of_sweep = case.unit_ns_per_tet.filter(|_| case.sweeps.is_some());
             table.row([
@@ -76,9 +75,9 @@ impl Results {
                 si(case.step_seconds_median, "s"),
                 si(case.step_seconds_min, "s"),
                 digits(case.step_ns_per_tet),
-                or_none(of_sweep),
+                of_sweep.map_or("-".into(), digits),
                 digits(case.bytes_per_tet),
-                or_none(case.bandwidth_fraction),
+                case.bandwidth_fraction.map_or("-".into(), percent),
                 case.instructions.clone(),
             ]);
         }
@@ -88,7 +87,7 @@ impl Results {
     /// The same as a report; it has one plot for each number of threads.
     pub fn fill(&self, document: &mut Document, solvers: &[&SolverEntry]) -> Result<()> {
         document.paragraph(format!("{}.", self.heading()));
-        document.paragraph(super::COUNTING.replace("\n\n", "\n").replace('\n', " "));
+        document.paragraph(super::COUNTING);
         document.table(&self.table());
         let mut names = Table::new(["solver", "what it is"]);
         for solver in solvers {

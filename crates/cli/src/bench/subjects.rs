@@ -2,6 +2,7 @@
 
 use crate::files;
 use anyhow::{Context, Result};
+use std::borrow::Cow;
 use std::path::Path;
 use viscera::mesh::shapes::{self, MAX_TETS};
 use viscera::mesh::{TetMesh, io};
@@ -64,14 +65,15 @@ impl Subject<'_> {
     }
 
     /// The mesh.
-    pub fn mesh(&self) -> Result<TetMesh> {
+    pub fn mesh(&self) -> Result<Cow<'_, TetMesh>> {
         match self {
             Self::Bar(size) => {
                 let cells = boxes(*size);
                 let edge = LENGTH / cells[0] as f64;
-                Ok(shapes::block(Vec3::from_f64(cells.map(|n| n as f64 * edge)), cells)?)
+                let size = Vec3::from_f64(cells.map(|n| n as f64 * edge));
+                Ok(Cow::Owned(shapes::block(size, cells)?))
             }
-            Self::Mesh(_, mesh) => Ok((*mesh).clone()),
+            Self::Mesh(_, mesh) => Ok(Cow::Borrowed(mesh)),
         }
     }
 }

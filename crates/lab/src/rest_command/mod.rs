@@ -63,7 +63,7 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
         if out.extension().is_none_or(|extension| extension != "vtu") {
             bail!("--out {}: give the file a name that ends in .vtu", out.display());
         }
-        prepare_file(out)?;
+        prepare_file(out, "--out")?;
     }
     let (scene, assembly) =
         files::load(&arguments.scene, &arguments.settings, arguments.data.as_deref())?;
