@@ -152,7 +152,7 @@ impl Runner {
 
     /// Meets the memory for the first time, and finds how many steps are worth a look at the clock.
     fn warm_up(&mut self, bench: &Bench<'_>) -> Result<()> {
-        self.batch_seconds(bench)?;
+        // A step of a large mesh takes seconds; no more of them than it takes.
         while self.batch_seconds(bench)? < LEAST && self.batch < 1 << 16 {
             self.batch *= 2;
         }
