@@ -1,9 +1,12 @@
 //! The `viscera` program.
 
+mod bench;
 mod bench_scene;
 mod files;
 mod film;
+mod memory;
 mod mesh;
+mod progress;
 mod run;
 mod scene;
 mod series;
@@ -25,7 +28,8 @@ Examples:
   viscera run scenes/liver_retraction.toml
   viscera run scenes/cantilever.toml --set body.bar.material.young=\"10 kPa\" --out out/soft
   viscera mesh inspect liver.msh --unit \"32 mm\"
-  viscera scene describe";
+  viscera scene describe
+  viscera bench --quick";
 
 #[derive(Subcommand)]
 enum Command {
@@ -37,6 +41,8 @@ enum Command {
     /// What a scene file can say
     #[command(subcommand)]
     Scene(scene::SceneCommand),
+    /// Measure what the solvers cost on this machine
+    Bench(bench::BenchArguments),
     // For a program, not for a person.
     #[command(hide = true)]
     BenchScene(bench_scene::BenchSceneArguments),
@@ -50,6 +56,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Mesh(command) => mesh::execute(&command).map(|()| run::Outcome::Finished),
         Command::Scene(command) => scene::execute(&command).map(|()| run::Outcome::Finished),
+        Command::Bench(arguments) => bench::execute(&arguments).map(|()| run::Outcome::Finished),
         Command::BenchScene(arguments) => {
             bench_scene::execute(&arguments).map(|()| run::Outcome::Finished)
         }

@@ -4,9 +4,9 @@ use crate::files::{self, Library, OutputFolder};
 use crate::film::Film;
 use crate::series::Series;
 use crate::summary::{FrameLine, Summary};
+use crate::{memory, progress};
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,6 +15,7 @@ use viscera::scalar::Real;
 use viscera::scene::Scene;
 use viscera::settings::Precision;
 use viscera::simulation::{Assembly, Simulation};
+use viscera_report::Memory;
 
 /// Simulate a scene; write meshes, a picture, an animation and the numbers
 ///
@@ -42,6 +43,9 @@ pub struct RunArguments {
     /// Folder where mesh files are looked for that are not beside the scene
     #[arg(long, value_name = "DIR", env = "VISCERA_DATA")]
     data: Option<PathBuf>,
+    /// Memory that may be used [default: what is free]
+    #[arg(long, value_name = "SIZE")]
+    memory: Option<Memory>,
 }
 
 /// How a run ended.
@@ -58,6 +62,10 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     let (scene, overrides) = read_scene(arguments)?;
     let library = Library::new(&arguments.scene, arguments.data.as_deref());
     let assembly = Assembly::new(&scene, &mut |name| library.load(name))?;
+    let tets = assembly.bodies.iter().map(|body| body.tets.len()).sum();
+    let what = format!("{}: a simulation of {tets} tetrahedra", scene.name);
+    let needed = memory::of_run(tets, &scene.solver);
+    memory::check(&what, needed, arguments.memory, "take a coarser mesh")?;
     let stem = arguments.scene.file_stem().unwrap_or(arguments.scene.as_os_str());
     let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem));
     let out = OutputFolder::create(&folder)?;
@@ -153,7 +161,7 @@ fn simulate<S: Real>(
     }
     let mut drawn = true;
     if let Some(film) = &film {
-        let bar = progress_bar(film.picture_count(), "drawing", "{pos} of {len} pictures");
+        let bar = progress::bar(film.picture_count(), "drawing", "{pos} of {len} pictures");
         // A run that was interrupted still shows what it has; the next Ctrl-C ends the drawing.
         interrupted.store(false, Ordering::Relaxed);
         drawn = film.develop(out, simulation.scene().time.frame, &bar, interrupted)?;
@@ -195,7 +203,7 @@ impl Recording {
     ) -> Result<()> {
         self.series.push(out, simulation)?;
         let every = u64::from(simulation.scene().output.every);
-        let bar = progress_bar(frames, "simulating", "{msg}");
+        let bar = progress::bar(frames, "simulating", "{msg}");
         let mut wall_total = 0.0;
         let mut stop = interrupted.load(Ordering::Relaxed);
         while simulation.frame() < frames && !stop {
@@ -226,14 +234,4 @@ impl Recording {
 fn write_summary(out: &OutputFolder, summary: &Summary) -> Result<()> {
     let text = serde_json::to_string_pretty(summary).context("cannot write summary.json")?;
     out.write("summary.json", text.as_bytes())
-}
-
-fn progress_bar(length: u64, what: &str, tail: &str) -> ProgressBar {
-    let bar = ProgressBar::new(length);
-    let template = format!("{what} [{{bar:30}}] {tail}, {{eta}} left");
-    // The template is ours and valid; a bar without it would still count.
-    if let Ok(style) = ProgressStyle::with_template(&template) {
-        bar.set_style(style.progress_chars("=> "));
-    }
-    bar
 }

@@ -302,3 +302,13 @@ fn surface_given_as_tetrahedra() {
     let message = refusal(&bench, &[]);
     assert!(message.starts_with("organ.obj"), "{message}");
 }
+
+#[test]
+fn mesh_that_does_not_fit_into_memory_is_refused_before_the_simulation() {
+    let message = refusal(&Bench::new(TINY), &["--memory", "1 kB"]);
+    assert!(message.contains("10 tetrahedra needs about"), "{message}");
+    assert!(message.contains("1 kB are allowed") && message.contains("coarser"), "{message}");
+    assert_eq!(Bench::new(TINY).run(&["--memory", "1 MB"]).code, Some(0));
+    let message = Bench::new(TINY).run(&["--memory", "1"]).error().to_owned();
+    assert!(message.contains("--memory"), "{message}");
+}

@@ -9,11 +9,10 @@
 //! | set up what the studies share | [`scenes`], [`settling`], [`motion`] |
 //! | compare the library with what must come out | [`validate`] |
 //! | ask the reference about a scene file | [`rest_command`] |
-//! | write reports with tables and plots | [`report`] |
+//! | write reports with tables and plots | [`viscera_report`] |
 
 pub mod motion;
 pub mod reference;
-pub mod report;
 pub mod rest_command;
 pub mod scenes;
 pub mod settling;

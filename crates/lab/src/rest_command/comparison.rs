@@ -8,12 +8,11 @@ use viscera::simulation::Simulation;
 use viscera::solver::Solver;
 use viscera::state::State;
 
-use super::memory::Memory;
 use super::path::Rest;
 use crate::reference::Reference;
-use crate::report::{percent, scientific};
 use crate::settling::{Distance, KEPT_VELOCITY};
 use crate::validate::Progress;
+use viscera_report::{Memory, percent, scientific};
 
 /// Time [s] given to the body to settle after the scene has ended.
 const SETTLING: f64 = 3.0;

@@ -2,10 +2,7 @@
 
 mod comparison;
 mod files;
-mod memory;
 mod path;
-
-pub use memory::Memory;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
@@ -14,9 +11,9 @@ use viscera::measure::{TetMeasure, measure_displacements, measure_tets, summariz
 use viscera::mesh::io::vtu::{self, Array};
 use viscera::simulation::Simulation;
 
-use crate::report::{percent, prepare_file, scientific, si, write_whole};
 use crate::validate::Progress;
 use path::{Path, Rest};
+use viscera_report::{Memory, percent, prepare_file, scientific, si, write_whole};
 
 /// Find the exact state of rest at the end of a scene with the Newton reference
 ///
@@ -66,7 +63,7 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
         if out.extension().is_none_or(|extension| extension != "vtu") {
             bail!("--out {}: give the file a name that ends in .vtu", out.display());
         }
-        prepare_file(out)?;
+        prepare_file(out, "--out")?;
     }
     let (scene, assembly) =
         files::load(&arguments.scene, &arguments.settings, arguments.data.as_deref())?;

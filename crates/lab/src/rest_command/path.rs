@@ -7,8 +7,8 @@ use anyhow::{Result, anyhow};
 use viscera::scalar::Vec3;
 use viscera::simulation::Simulation;
 use viscera::solver::Inputs;
+use viscera_report::Memory;
 
-use super::memory::Memory;
 use crate::reference::{Convergence, Cost, Reference, ReferenceError, Standing};
 use crate::validate::Progress;
 

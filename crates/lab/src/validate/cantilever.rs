@@ -20,9 +20,9 @@ use viscera::solver::{Inputs, Pin};
 use super::methods::{Method, worse};
 use super::{Context, Section};
 use crate::reference::Reference;
-use crate::report::{Axis, Plot, Series, Style, Table, percent, si};
 use crate::scenes::{BAR, DENSITY, GRAVITY, NEAR, Scene, tissue};
 use crate::settling::{Error, compare, truth};
+use viscera_report::{Axis, Plot, Series, Style, Table, percent, si};
 
 pub(super) const SECTION: Section =
     Section { name: "cantilever", title: "Cantilever", cases: case_count, run };

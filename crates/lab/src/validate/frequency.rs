@@ -32,8 +32,8 @@ use viscera::state::State;
 use super::methods::worse;
 use super::{Context, Section};
 use crate::reference::{Mode, Reference};
-use crate::report::{Axis, Plot, Series, Style, Table, percent, si};
 use crate::scenes::{BAR, DENSITY, FRAME_RATE, GRAVITY, NEAR, Scene, tissue};
+use viscera_report::{Axis, Plot, Series, Style, Table, percent, si};
 
 pub(super) const SECTION: Section =
     Section { name: "frequency", title: "First bending frequency", cases: case_count, run };

@@ -8,9 +8,9 @@ use viscera::scalar::{Vec3, vec3};
 
 use super::methods::{Method, floored, floored_percent, worse};
 use super::{Context, Section};
-use crate::report::{Axis, Plot, Series, Style, Table, percent, si};
 use crate::scenes::{BLOCK, NEAR, Path, Scene, Size, tissue};
 use crate::settling::{Error, Truth, compare, truth};
+use viscera_report::{Axis, Plot, Series, Style, Table, percent, si};
 
 pub(super) const SECTION: Section =
     Section { name: "indentation", title: "Indentation", cases: case_count, run };

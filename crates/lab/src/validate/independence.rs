@@ -8,9 +8,9 @@ use viscera::settings::{Colors, SolverSettings};
 
 use super::methods::worse;
 use super::{Context, Section};
-use crate::report::{Axis, Plot, Series, Style, Table};
 use crate::scenes::{Scene, Size, tissue};
 use crate::settling::{Error, compare, settle, truth};
+use viscera_report::{Axis, Plot, Series, Style, Table};
 
 pub(super) const SECTION: Section =
     Section { name: "independence", title: "Iteration independence", cases: case_count, run };

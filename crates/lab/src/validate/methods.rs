@@ -4,9 +4,9 @@ use anyhow::Result;
 use viscera::material::MaterialModel;
 use viscera::settings::{Colors, SolverSettings};
 
-use crate::report::{percent, scientific};
 use crate::scenes::Scene;
 use crate::settling::{Settled, settle};
+use viscera_report::{percent, scientific};
 
 /// Both materials.
 pub(super) const MODELS: [MaterialModel; 2] =

@@ -18,10 +18,10 @@ mod uniaxial;
 
 pub use progress::{CaseInProgress, Progress};
 
-use crate::report::{Document, Table};
 use anyhow::{Context as _, Result};
 use std::fmt::Display;
 use std::path::PathBuf;
+use viscera_report::{Document, Table};
 
 /// A part of the validation with a heading of its own in the report.
 #[derive(Clone, Copy)]

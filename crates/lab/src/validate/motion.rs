@@ -9,8 +9,8 @@ use viscera::settings::{Acceleration, AndersonGuard, SolverSettings};
 use super::methods::{Form, scheduled, worse};
 use super::{Context, Section};
 use crate::motion::{errors, exact, simulate};
-use crate::report::{Axis, Plot, Series, Style, Table, percent};
 use crate::scenes::{FRAME_RATE, Scene, Size, tissue};
+use viscera_report::{Axis, Plot, Series, Style, Table, percent};
 
 pub(super) const SECTION: Section =
     Section { name: "motion", title: "Motion", cases: case_count, run };

@@ -8,9 +8,9 @@ use viscera::settings::SolverSettings;
 
 use super::methods::{METHODS, Method, floored, floored_percent, worse};
 use super::{Context, Section};
-use crate::report::{Axis, Plot, Series, Style, Table, percent, si};
 use crate::scenes::{Scene, Size, tissue};
 use crate::settling::{Error, Truth, compare, truth};
+use viscera_report::{Axis, Plot, Series, Style, Table, percent, si};
 
 pub(super) const SECTION: Section =
     Section { name: "organ", title: "A pulled organ", cases: case_count, run };

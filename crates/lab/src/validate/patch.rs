@@ -6,7 +6,6 @@
 
 use super::methods::{METHODS, MODELS, Method, model_name, worse};
 use super::{Context, Section};
-use crate::report::{Axis, Plot, Series, Style, Table, percent, scientific};
 use anyhow::{Context as _, Result};
 use std::fmt;
 use viscera::material::{Material, MaterialModel};
@@ -17,6 +16,7 @@ use viscera::scalar::{Mat3, Real, Vec3, vec3};
 use viscera::settings::SolverSettings;
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
+use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 
 pub(super) const SECTION: Section =
     Section { name: "patch", title: "Patch test", cases: case_count, run };

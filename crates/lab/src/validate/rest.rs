@@ -9,9 +9,9 @@ use viscera::settings::{Acceleration, SolverSettings};
 
 use super::methods::{Form, floored, model_name, scheduled, worse};
 use super::{Context, Section};
-use crate::report::{Axis, Plot, Series, Style, Table, percent, scientific};
 use crate::scenes::{NAMES, Scene, Size, tissue};
 use crate::settling::{Error, compare, settle, truth};
+use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 
 pub(super) const SECTION: Section =
     Section { name: "rest", title: "XPBD, exact at rest", cases: case_count, run };

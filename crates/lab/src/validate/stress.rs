@@ -13,8 +13,8 @@ use viscera::state::State;
 
 use super::methods::{Form, scheduled};
 use super::{Context, Section};
-use crate::report::{Table, percent};
 use crate::scenes::{FRAME_RATE, Random, Scene, tissue};
+use viscera_report::{Table, percent};
 
 pub(super) const SECTION: Section =
     Section { name: "stress", title: "Stress", cases: case_count, run };

@@ -10,9 +10,9 @@ use viscera::scalar::{Vec3, vec3};
 
 use super::methods::{Method, floored, floored_percent, worse};
 use super::{Context, Section};
-use crate::report::{Axis, Plot, Series, Style, Table, percent, si};
 use crate::scenes::{BAR, Path, Scene, Size, tissue};
 use crate::settling::{Error, Truth, compare, truth_in_parts};
+use viscera_report::{Axis, Plot, Series, Style, Table, percent, si};
 
 pub(super) const SECTION: Section =
     Section { name: "twist", title: "Twist by 360 degrees", cases: case_count, run };

@@ -17,9 +17,9 @@ use viscera::scalar::{Vec3, vec3};
 
 use super::methods::{MODELS, Method, floored, model_name, worse};
 use super::{Context, Section};
-use crate::report::{Axis, Plot, Series, Style, Table, percent, scientific};
 use crate::scenes::{NEAR, Path, Scene, tissue};
 use crate::settling::{truth, volume};
+use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 
 pub(super) const SECTION: Section =
     Section { name: "uniaxial", title: "Uniaxial stretch", cases: case_count, run };

@@ -26,9 +26,9 @@ impl Output {
             bail!("{shown}: the report is Markdown; give it a name that ends in .md");
         };
         let folder = document.with_extension("");
-        fs::create_dir_all(&folder).map_err(|error| refused(&folder, &error))?;
+        fs::create_dir_all(&folder).map_err(|error| refused(&folder, &error, "--out"))?;
         for place in [folder_of(document), &folder] {
-            probe(place)?;
+            probe(place, "--out")?;
         }
         let folder_name = stem.to_owned();
         Ok(Self { document: document.to_owned(), folder, folder_name })
@@ -70,14 +70,15 @@ impl Output {
     }
 }
 
-/// Makes the folder of a single file and makes sure that it can be written to.
-pub fn prepare_file(file: &Path) -> Result<()> {
+/// Makes the folder of a single file, which `option` of the program names, and makes sure that it can
+/// be written to.
+pub fn prepare_file(file: &Path, option: &str) -> Result<()> {
     if file.is_dir() {
-        bail!("{} is a folder; name a file in it with --out", file.display());
+        bail!("{} is a folder; name a file in it with {option}", file.display());
     }
     let folder = folder_of(file);
-    fs::create_dir_all(folder).map_err(|error| refused(folder, &error))?;
-    probe(folder)
+    fs::create_dir_all(folder).map_err(|error| refused(folder, &error, option))?;
+    probe(folder, option)
 }
 
 fn folder_of(file: &Path) -> &Path {
@@ -87,15 +88,16 @@ fn folder_of(file: &Path) -> &Path {
     }
 }
 
-fn probe(folder: &Path) -> Result<()> {
+fn probe(folder: &Path, option: &str) -> Result<()> {
     let probe = folder.join(".probe.part");
     fs::write(&probe, b"")
         .and_then(|()| fs::remove_file(&probe))
-        .map_err(|error| refused(folder, &error))
+        .map_err(|error| refused(folder, &error, option))
 }
 
-fn refused(place: &Path, error: &std::io::Error) -> anyhow::Error {
-    anyhow::anyhow!("cannot write to {}: {error}; choose another file with --out", place.display())
+fn refused(place: &Path, error: &std::io::Error, option: &str) -> anyhow::Error {
+    let place = place.display();
+    anyhow::anyhow!("cannot write to {place}: {error}; choose another file with {option}")
 }
 
 /// Writes aside and renames, so that no reader ever meets a part of a file.

@@ -1,7 +1,7 @@
 //! Reports: tables that line up, figures that repeat to the byte, files whole or not at all.
 
 use std::fs;
-use viscera_lab::report::{Axis, Document, Plot, Series, Style, Table};
+use viscera_report::{Axis, Document, Plot, Series, Style, Table};
 
 fn convergence() -> Plot {
     let mut plot = Plot::new(

@@ -1,3 +1,5 @@
+//! # viscera-report
+//!
 //! What a study leaves behind: one Markdown file with tables, and its figures as SVG beside it.
 //!
 //! The same data give the same bytes: nothing here looks at a clock or at fonts.
@@ -5,6 +7,7 @@
 mod axis;
 mod chart;
 mod document;
+mod memory;
 mod numbers;
 mod output;
 mod plot;
@@ -12,6 +15,7 @@ mod table;
 
 pub use axis::{Axis, Scale};
 pub use document::Document;
+pub use memory::Memory;
 pub use numbers::{percent, scientific, si};
 pub use output::{prepare_file, write_whole};
 pub use plot::{Plot, Series, Style};

@@ -1,0 +1,78 @@
+//! The solvers that `viscera bench` measures.
+
+use viscera::material::{Material, MaterialError, MaterialModel};
+use viscera::settings::{Acceleration, Colors, SolverSettings};
+
+/// One of them.
+pub struct SolverEntry {
+    /// As `--solvers` and the results call it.
+    pub name: &'static str,
+    /// For the legend of the report.
+    pub what: &'static str,
+    pub material: MaterialModel,
+    /// Two numbers of sweeps per step. A step is measured with the first, a sweep by the difference
+    /// between both. `None` for a solver that does not sweep: its unit is the step.
+    pub sweeps: Option<[u32; 2]>,
+    /// What it changes of the default settings.
+    change: fn(&mut SolverSettings),
+}
+
+/// The default number of sweeps, and enough more for the difference to stand out.
+const FEW: Option<[u32; 2]> = Some([2, 10]);
+/// Beyond Chebyshev's delay of ten and with Anderson's window full: sweeps like all later ones.
+const LATER: Option<[u32; 2]> = Some([12, 20]);
+
+const GREEN: MaterialModel = MaterialModel::SaintVenantKirchhoff;
+const NEO: MaterialModel = MaterialModel::StableNeoHookean;
+
+/// All of them, in the order of the results.
+pub const SOLVERS: [SolverEntry; 8] = [
+    entry("green", "XPBD as published, Saint Venant-Kirchhoff", GREEN, FEW, publish),
+    entry("pair", "XPBD as published, stable neo-Hookean pair", NEO, FEW, publish),
+    entry("green-exact", "the default, Saint Venant-Kirchhoff", GREEN, FEW, |_| {}),
+    entry("exact", "the default, stable neo-Hookean", NEO, FEW, |_| {}),
+    entry("cliques", "the default with 4 colours", NEO, FEW, |s| s.colors = Colors::Limited(4)),
+    entry("jacobi", "the default with 1 colour", NEO, FEW, |s| s.colors = Colors::Limited(1)),
+    entry("chebyshev", "the default with Chebyshev acceleration", NEO, LATER, |s| {
+        s.acceleration = Acceleration::Chebyshev;
+    }),
+    entry("anderson", "the default with Anderson acceleration", NEO, LATER, |s| {
+        s.acceleration = Acceleration::Anderson;
+    }),
+];
+
+const fn entry(
+    name: &'static str,
+    what: &'static str,
+    material: MaterialModel,
+    sweeps: Option<[u32; 2]>,
+    change: fn(&mut SolverSettings),
+) -> SolverEntry {
+    SolverEntry { name, what, material, sweeps, change }
+}
+
+/// Sweeps and nothing else.
+fn publish(settings: &mut SolverSettings) {
+    settings.rebase = false;
+    settings.keep_multipliers = false;
+    settings.step_guard = false;
+}
+
+impl SolverEntry {
+    /// The default settings with its changes.
+    pub fn settings(&self) -> SolverSettings {
+        let mut settings = SolverSettings::default();
+        (self.change)(&mut settings);
+        settings
+    }
+
+    /// Soft tissue.
+    pub fn tissue(&self) -> Result<Material, MaterialError> {
+        Material::new(self.material, 10e3, 0.45, 1060.0)
+    }
+
+    /// What its cost is counted per.
+    pub fn unit(&self) -> &'static str {
+        if self.sweeps.is_some() { "sweep" } else { "step" }
+    }
+}
