@@ -205,6 +205,7 @@ impl ModelBuilder {
             viscous: order.iter().any(viscous),
             blocks: Vec::with_capacity(order.len() / LANES + colors.len()),
             filled: Vec::with_capacity(order.len() / LANES + colors.len()),
+            uniform: Vec::with_capacity(order.len() / LANES + colors.len()),
             copies: Vec::new(),
             color_offsets: vec![0],
             multiplier_offset: 0,
@@ -219,7 +220,9 @@ impl ModelBuilder {
             let tets = &set.order[color[0] as usize..color[1] as usize];
             for chosen in tets.chunks(LANES) {
                 set.filled.push(chosen.len() as u8);
-                set.blocks.push(self.block(layout, chosen));
+                let block = self.block(layout, chosen);
+                set.uniform.push(block.material.iter().all(|&m| m == block.material[0]));
+                set.blocks.push(block);
                 if layout.is_split() {
                     set.copies.push(layout.block_copies(chosen));
                 }

@@ -37,6 +37,8 @@ pub struct TetSet<S> {
     pub(crate) blocks: Vec<TetBlock<S>>,
     /// How many tetrahedra of each block count: eight, or fewer in a colour's last.
     pub(crate) filled: Vec<u8>,
+    /// Whether a block is of one material.
+    pub(crate) uniform: Vec<bool>,
     /// The copies that a sweep works on, per corner; empty where nothing is split: the vertices.
     pub(crate) copies: Vec<[Eight<u32>; 4]>,
     /// The user's number of each tetrahedron, shape [tet_count]; without fillings.
@@ -122,6 +124,7 @@ impl<S: Real> TetSet<S> {
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(&self.blocks[..])
             + size_of_val(&self.filled[..])
+            + size_of_val(&self.uniform[..])
             + size_of_val(&self.copies[..])
             + size_of_val(&self.order[..])
     }

@@ -135,9 +135,13 @@ macro_rules! avx2_lanes {
             }
         }
     };
-    (@memory $real:ident, $width:literal, $load:ident, $store:ident) => {
+    (@memory $real:ident, $width:literal, $set:ident, $load:ident, $store:ident) => {
         type Real = $real;
         const WIDTH: usize = $width;
+        #[inline(always)]
+        fn splat(value: $real) -> Self {
+            Self(unsafe { $set(value) })
+        }
         #[inline(always)]
         fn load(group: &Eight<$real>, first: usize) -> Self {
             assert!(first + $width <= LANES);
@@ -161,7 +165,7 @@ avx2_lanes!(F64x4: f64, __m256d, 4, "Four `f64`.",
     _mm256_blendv_pd, _mm256_movemask_pd);
 
 impl Lanes for F32x8 {
-    avx2_lanes!(@memory f32, 8, _mm256_loadu_ps, _mm256_storeu_ps);
+    avx2_lanes!(@memory f32, 8, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps);
 
     #[inline(always)]
     unsafe fn gather(points: *const Point<f32>, indices: &Eight<u32>, _: usize) -> Point<Self> {
@@ -237,7 +241,7 @@ unsafe fn transpose(rows: [__m256; 4]) -> [__m256; 4] {
 }
 
 impl Lanes for F64x4 {
-    avx2_lanes!(@memory f64, 4, _mm256_loadu_pd, _mm256_storeu_pd);
+    avx2_lanes!(@memory f64, 4, _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd);
 
     #[inline(always)]
     unsafe fn gather(points: *const Point<f64>, indices: &Eight<u32>, first: usize) -> Point<Self> {

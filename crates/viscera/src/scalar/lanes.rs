@@ -69,6 +69,9 @@ pub trait Lanes: Scalar {
     /// How many lanes; divides [`LANES`].
     const WIDTH: usize;
 
+    /// The same value in all lanes.
+    fn splat(value: Self::Real) -> Self;
+
     /// From memory, the lanes from `first` on.
     fn load(group: &Eight<Self::Real>, first: usize) -> Self;
 
@@ -112,6 +115,11 @@ pub trait Lanes: Scalar {
 impl<R: Real> Lanes for R {
     type Real = R;
     const WIDTH: usize = 1;
+
+    #[inline(always)]
+    fn splat(value: R) -> Self {
+        value
+    }
 
     #[inline(always)]
     fn load(group: &Eight<R>, first: usize) -> Self {

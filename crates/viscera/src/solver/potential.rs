@@ -143,6 +143,25 @@ pub(super) struct Potential {
 const PIECE: usize = 64;
 const VERTEX_PIECE: usize = 1024;
 
+/// Evaluates an expression with the law of a set, and whether it is viscous, as constants: kernels of
+/// one law each keep more of it in registers.
+macro_rules! with_law {
+    ($set:expr, $neo:ident, $viscous:ident => $result:expr) => {{
+        let neo = $set.model == MaterialModel::StableNeoHookean;
+        match (neo, $set.viscous) {
+            (false, false) => with_law!(@ $neo false $viscous false $result),
+            (false, true) => with_law!(@ $neo false $viscous true $result),
+            (true, false) => with_law!(@ $neo true $viscous false $result),
+            (true, true) => with_law!(@ $neo true $viscous true $result),
+        }
+    }};
+    (@ $neo:ident $is_neo:literal $viscous:ident $is_viscous:literal $result:expr) => {{
+        const $neo: bool = $is_neo;
+        const $viscous: bool = $is_viscous;
+        $result
+    }};
+}
+
 /// Evaluates `Phi`: adds up in double precision, in a fixed order.
 #[derive(Clone, Debug)]
 pub(super) struct Evaluator<S> {
@@ -239,7 +258,9 @@ impl<S: Real> Evaluator<S> {
                 energy: Cell::default(),
                 squared_force: Cell::default(),
             };
-            ground.workers.piece(model, set, blocks, &sums);
+            with_law!(set, NEO, VISCOUS => {
+                ground.workers.piece(model, set, blocks, &OfLaw::<_, NEO, VISCOUS>(&sums));
+            });
             [sums.energy, sums.squared_force].map(|lanes| lanes.get().iter().sum())
         };
         let work = (set.block_count(), PIECE);
@@ -293,11 +314,18 @@ struct Sums<'a, S> {
     squared_force: Cell<Eight<f64>>,
 }
 
-impl<S: Real> TetPass<S> for Sums<'_, S> {
+/// A pass over tetrahedra of one law.
+struct OfLaw<'a, P, const NEO: bool, const VISCOUS: bool>(&'a P);
+
+impl<S: Real, const NEO: bool, const VISCOUS: bool> TetPass<S>
+    for OfLaw<'_, Sums<'_, S>, NEO, VISCOUS>
+{
     #[inline(always)]
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let sums = self.0;
         let shape = tets.shape::<L>();
-        let (_, response) = respond::<S, L>(tets, self.x, self.start_strain, self.dt);
+        let (_, _, response) =
+            respond::<S, L, NEO, VISCOUS>(tets, sums.x, sums.start_strain, sums.dt);
         let volume = tets.volume::<L>();
         let density = response.elastic_energy + response.viscous_energy;
         let [mut energy, mut stress, mut volumes] = [[S::ZERO; LANES]; 3];
@@ -305,7 +333,7 @@ impl<S: Real> TetPass<S> for Sums<'_, S> {
         let squared = response.piola.norm_squared() * shape.norm_squared();
         squared.store(&mut stress, tets.lane);
         volume.store(&mut volumes, tets.lane);
-        let (mut energies, mut forces) = (self.energy.get(), self.squared_force.get());
+        let (mut energies, mut forces) = (sums.energy.get(), sums.squared_force.get());
         let lanes = tets.lane..tets.lane + L::WIDTH;
         for lane in lanes.clone() {
             // Selected, not multiplied by zero: energies may be infinite.
@@ -315,9 +343,9 @@ impl<S: Real> TetPass<S> for Sums<'_, S> {
             energies[lane] += if counts { energy[lane].to_f64() } else { 0.0 };
             forces[lane] += if counts { force } else { 0.0 };
         }
-        self.energy.set(energies);
-        self.squared_force.set(forces);
-        if let Some((all, first)) = self.energies {
+        sums.energy.set(energies);
+        sums.squared_force.set(forces);
+        if let Some((all, first)) = sums.energies {
             let at = first + LANES * tets.index;
             // SAFETY: every tetrahedron has a place of its own and is worked on once.
             let places = unsafe { all.range(at + lanes.start..at + lanes.end) };
@@ -326,23 +354,25 @@ impl<S: Real> TetPass<S> for Sums<'_, S> {
     }
 }
 
-/// `F` and what the tissue answers to it.
+/// `F`, the tissue, and what it answers to `F`.
 #[inline(always)]
-fn respond<S: Real, L: Lanes<Real = S>>(
+fn respond<S: Real, L: Lanes<Real = S>, const NEO: bool, const VISCOUS: bool>(
     tets: &Block<'_, S>,
     x: &[Point<S>],
     start_strain: &[[Eight<S>; 6]],
     dt: f64,
-) -> (Mat3<L>, Response<L>) {
+) -> (Mat3<L>, Tissue<L>, Response<L>) {
     let f = deformation_gradient(&tets.corners::<L>(x).x, &tets.shape());
-    let tissue = Tissue::new(tets.set.model, &tets.material(), dt);
-    let response = if tets.set.viscous {
+    let law =
+        if NEO { MaterialModel::StableNeoHookean } else { MaterialModel::SaintVenantKirchhoff };
+    let tissue = Tissue::new(law, &tets.material(), dt);
+    let response = if VISCOUS {
         let start: Voigt<L> = load_rows(start_strain[tets.index].as_flattened(), tets.lane);
         tissue.respond(&f, Some(&start))
     } else {
         tissue.respond(&f, None)
     };
-    (f, response)
+    (f, tissue, response)
 }
 
 /// Per copy `dt^2` times the force of its elements, and the bound of their curvature: the gradient of
@@ -359,8 +389,11 @@ pub(super) fn load_forces<S: Real, const BOUND: bool>(
     for color in 0..model.color_count {
         let shared = Shared::new(loads);
         for (set, start_strain) in model.tet_sets().into_iter().zip(&ground.start_strain) {
-            let pass = Forces::<_, BOUND> { x, start_strain, dt: step.dt, loads: &shared };
-            ground.workers.pass(model, set, set.color(color), &pass);
+            let forces = Forces::<_, BOUND> { x, start_strain, dt: step.dt, loads: &shared };
+            with_law!(set, NEO, VISCOUS => {
+                let pass = OfLaw::<_, NEO, VISCOUS>(&forces);
+                ground.workers.pass(model, set, set.color(color), &pass);
+            });
         }
     }
     let squared = S::from_f64(step.dt * step.dt);
@@ -391,22 +424,25 @@ struct Forces<'a, S, const BOUND: bool> {
     loads: &'a Shared<'a, Point<S>>,
 }
 
-impl<S: Real, const BOUND: bool> TetPass<S> for Forces<'_, S, BOUND> {
+impl<S: Real, const BOUND: bool, const NEO: bool, const VISCOUS: bool> TetPass<S>
+    for OfLaw<'_, Forces<'_, S, BOUND>, NEO, VISCOUS>
+{
     #[inline(always)]
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let Forces { x, start_strain, dt, loads: into } = *self.0;
+        let (f, tissue, response) = respond::<S, L, NEO, VISCOUS>(tets, x, start_strain, dt);
         let shape = tets.shape::<L>();
-        let (f, response) = respond(tets, self.x, self.start_strain, self.dt);
-        let tissue = Tissue::new(tets.set.model, &tets.material(), self.dt);
-        let volume = tets.volume::<L>() * L::from_f64(self.dt * self.dt);
+        let volume = tets.volume::<L>() * L::from_f64(dt * dt);
         let forces = internal_forces(&response.piola, &shape, volume);
         let g = shape_gradients(&shape);
         let mut loads = [CornerLoad::default(); 4];
         for corner in 0..4 {
-            let mass_bound = if BOUND { volume * tissue.curvature(&f, g[corner]) } else { L::ZERO };
+            let mass_bound =
+                if BOUND { volume * tissue.curvature(&f, g[corner]) } else { L::ZERO };
             loads[corner] = CornerLoad { impulse: forces[corner], mass_bound };
         }
         // SAFETY: constraints of one colour share no copy, and every block is worked on once.
-        unsafe { tets.add(self.loads, &points(&loads)) };
+        unsafe { tets.add(into, &points(&loads)) };
     }
 }
 

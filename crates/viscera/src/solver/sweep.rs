@@ -9,7 +9,7 @@ use super::tets::{Block, TetPass, load_rows};
 use super::threads::{Shared, Workers};
 use crate::elements::{attachment, green_strain, spring};
 use crate::model::Model;
-use crate::scalar::lanes::{LANES, Lanes, Point};
+use crate::scalar::lanes::{Lanes, Point};
 use crate::scalar::{Real, Vec3};
 use crate::settings::{RelaxationForm, SolverSettings};
 
@@ -37,8 +37,7 @@ impl<S: Real> Relaxation<S> {
         (dl, dx): (&[L; N], &[Vec3<L>; 4]),
     ) -> ([L; N], [Vec3<L>; 4]) {
         let (mut l, mut x) = (*l, *x);
-        let of_l = L::load(&[self.multipliers; LANES], 0);
-        let of_x = L::load(&[self.positions; LANES], 0);
+        let [of_l, of_x] = [L::splat(self.multipliers), L::splat(self.positions)];
         for p in 0..N {
             l[p] += of_l * dl[p];
         }

@@ -73,21 +73,20 @@ impl<'a, S: Real> Block<'a, S> {
     #[inline(always)]
     pub fn material<L: Lanes<Real = S>>(&self) -> MaterialConstants<L> {
         let indices = &self.constants.material;
-        let mut uniform = true;
-        for lane in 1..LANES {
-            uniform &= indices[lane] == indices[0];
-        }
+        let uniform = self.set.uniform[self.index];
         let first = &self.materials[indices[0] as usize];
         macro_rules! fetch {
-            ($($field:ident).+) => {{
-                let mut values = [first.$($field).+; LANES];
-                if !uniform {
-                    for lane in 1..LANES {
+            ($($field:ident).+) => {
+                if uniform {
+                    L::splat(first.$($field).+)
+                } else {
+                    let mut values = [S::ZERO; LANES];
+                    for lane in 0..LANES {
                         values[lane] = self.materials[indices[lane] as usize].$($field).+;
                     }
+                    L::load(&values, self.lane)
                 }
-                L::load(&values, self.lane)
-            }};
+            };
         }
         MaterialConstants {
             lame_lambda: fetch!(lame_lambda),
