@@ -2,7 +2,7 @@
 //!
 //! A block holds the constants of eight tetrahedra of one colour component by component, so that a
 //! kernel loads each component of all eight at once. The last block of a colour is filled up with
-//! copies of its last tetrahedron, whose results nobody keeps.
+//! copies of its last tetrahedron; what a kernel makes of these is not stored.
 
 use std::ops::Range;
 

@@ -437,8 +437,7 @@ impl<S: Real, const BOUND: bool, const NEO: bool, const VISCOUS: bool> TetPass<S
         let g = shape_gradients(&shape);
         let mut loads = [CornerLoad::default(); 4];
         for corner in 0..4 {
-            let mass_bound =
-                if BOUND { volume * tissue.curvature(&f, g[corner]) } else { L::ZERO };
+            let mass_bound = if BOUND { volume * tissue.curvature(&f, g[corner]) } else { L::ZERO };
             loads[corner] = CornerLoad { impulse: forces[corner], mass_bound };
         }
         // SAFETY: constraints of one colour share no copy, and every block is worked on once.

@@ -189,7 +189,7 @@ impl<'a, S: Real> Block<'a, S> {
         load_rows(&values[self.multipliers_at(offset, N)], self.lane)
     }
 
-    /// Replaces multipliers.
+    /// Replaces multipliers; those of fillings stay zero.
     ///
     /// # Safety
     /// Nobody else is at the block's multipliers meanwhile.
@@ -201,8 +201,17 @@ impl<'a, S: Real> Block<'a, S> {
         multipliers: [L; N],
     ) {
         // SAFETY: alone there by the caller's promise.
-        let rows = unsafe { values.range(self.multipliers_at(offset, N)) };
-        store_rows(rows, self.lane, multipliers);
+        let places = unsafe { values.range(self.multipliers_at(offset, N)) };
+        for (row, eight) in multipliers.into_iter().zip(places.as_chunks_mut().0) {
+            if self.whole::<L>() {
+                row.store(eight, self.lane);
+            } else {
+                let mut lanes = [S::ZERO; LANES];
+                row.store(&mut lanes, self.lane);
+                let counts = self.lane..self.filled();
+                eight[counts.clone()].copy_from_slice(&lanes[counts]);
+            }
+        }
     }
 
     /// As [`Block::multipliers`], while they are shared.
@@ -228,13 +237,6 @@ pub(super) fn load_rows<L: Lanes, const N: usize>(values: &[L::Real], lane: usiz
         *row = L::load(eight, lane);
     }
     rows
-}
-
-#[inline(always)]
-fn store_rows<L: Lanes, const N: usize>(values: &mut [L::Real], lane: usize, rows: [L; N]) {
-    for (row, eight) in rows.into_iter().zip(values.as_chunks_mut().0) {
-        row.store(eight, lane);
-    }
 }
 
 /// The lanes one by one, in their places.
@@ -275,8 +277,8 @@ impl<S: Real, P: TetPass<S>> lanes::Kernel<S> for Piece<'_, S, P> {
     #[inline(always)]
     fn run<L: Lanes<Real = S>>(self) {
         for index in self.blocks {
-            let mut lane = 0;
-            while lane < LANES {
+            let (mut lane, filled) = (0, self.set.filled[index] as usize);
+            while lane < filled {
                 self.pass.block::<L>(&Block::new(self.model, self.set, index, lane));
                 lane += L::WIDTH;
             }
