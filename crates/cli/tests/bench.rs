@@ -64,11 +64,21 @@ fn every_solver_is_measured_at_every_size_with_every_number_of_threads() {
     cases.iter().for_each(assert_is_measured);
     let mut solvers: Vec<&str> = cases.iter().filter_map(|case| case["solver"].as_str()).collect();
     solvers.dedup();
-    let one_size =
-        ["green", "pair", "green-exact", "exact", "cliques", "jacobi", "chebyshev", "anderson"];
+    let one_size = [
+        "green",
+        "pair",
+        "green-exact",
+        "exact",
+        "cliques",
+        "jacobi",
+        "chebyshev",
+        "anderson",
+        "explicit-green",
+        "explicit",
+    ];
     assert_eq!(solvers, [one_size, one_size].concat());
     let threads: Vec<_> = cases.iter().map(|case| case["threads"].as_u64()).collect();
-    assert_eq!(threads, [Some(1), Some(2)].repeat(16));
+    assert_eq!(threads, [Some(1), Some(2)].repeat(20));
     for case in &cases {
         // Bars are of whole slices of boxes.
         let asked = if case["tets"].as_u64() < Some(300) { 100.0 } else { 1000.0 };
@@ -131,7 +141,7 @@ fn a_mesh_of_three_tetrahedra_is_measured() {
         bench(&folder, &["--mesh", "three.msh", "--threads", "1,3", "--json", "deep/three.json"]);
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     let cases = cases(&folder, "deep/three.json");
-    assert_eq!(cases.len(), 16);
+    assert_eq!(cases.len(), 20);
     for case in &cases {
         assert_is_measured(case);
         assert_eq!((&case["tets"], &case["mesh"]), (&3.into(), &"three".into()));

@@ -17,7 +17,7 @@ pub struct Ours {
 }
 
 /// Another configuration is another line here.
-pub const OURS: [Ours; 3] = [
+pub const OURS: [Ours; 4] = [
     Ours {
         label: "viscera",
         settings: "material=stvk",
@@ -32,6 +32,11 @@ pub const OURS: [Ours; 3] = [
         label: "viscera, 20 x 5",
         settings: "material=stvk,substeps=20,iterations=5",
         words: "20 substeps x 5 iterations; Green strain",
+    },
+    Ours {
+        label: "viscera, explicit",
+        settings: "material=stvk,method=explicit,substeps=1",
+        words: "explicit small steps at half of the stable step; Green strain",
     },
 ];
 

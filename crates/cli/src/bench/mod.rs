@@ -74,6 +74,7 @@ B/tet are the bytes of model, state and solver over the tetrahedra.
 Compulsory bytes are what no sweep in single precision can do without: of each tetrahedron 60 B of \
 constants read (four vertex numbers, nine entries of the inverse rest shape, volume, material) and its \
 multipliers of 4 B read and written; of each vertex 16 B (position, inverse mass) read and written. \
+The explicit method's unit is a small step: no multipliers, but of each vertex its velocity and force as well. \
 Each counts once, whatever the solver does in fact. The column `of bandwidth` is these bytes over the \
 time of a sweep, divided by the memory bandwidth: the bytes read and written by a copy of 256 MiB \
 with as many threads, over its time. Meshes that fit into the caches may be above 100 %.";

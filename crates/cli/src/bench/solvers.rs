@@ -1,7 +1,7 @@
 //! The solvers that `viscera bench` measures.
 
 use viscera::material::{Material, MaterialError, MaterialModel};
-use viscera::settings::{Acceleration, Colors, SolverSettings};
+use viscera::settings::{Acceleration, Colors, Method, SolverSettings};
 
 /// One of them.
 pub struct SolverEntry {
@@ -10,7 +10,7 @@ pub struct SolverEntry {
     /// For the legend of the report.
     pub what: &'static str,
     pub material: MaterialModel,
-    /// Two numbers of sweeps per step. A step is measured with the first, a sweep by the difference
+    /// Two numbers of sweeps, or of small steps, per step. A step is measured with the first, a sweep by the difference
     /// between both. `None` for a solver that does not sweep: its unit is the step.
     pub sweeps: Option<[u32; 2]>,
     /// What it changes of the default settings.
@@ -22,11 +22,14 @@ const FEW: Option<[u32; 2]> = Some([2, 10]);
 /// Beyond Chebyshev's delay of ten and with Anderson's window full: sweeps like all later ones.
 const LATER: Option<[u32; 2]> = Some([12, 20]);
 
+/// Of an explicit step, small steps: what is done once per step falls out of the difference.
+const SMALL_STEPS: Option<[u32; 2]> = Some([10, 60]);
+
 const GREEN: MaterialModel = MaterialModel::SaintVenantKirchhoff;
 const NEO: MaterialModel = MaterialModel::StableNeoHookean;
 
 /// All of them, in the order of the results.
-pub const SOLVERS: [SolverEntry; 8] = [
+pub const SOLVERS: [SolverEntry; 10] = [
     entry("green", "XPBD as published, Saint Venant-Kirchhoff", GREEN, FEW, publish),
     entry("pair", "XPBD as published, stable neo-Hookean pair", NEO, FEW, publish),
     entry("green-exact", "the default, Saint Venant-Kirchhoff", GREEN, FEW, |_| {}),
@@ -39,6 +42,8 @@ pub const SOLVERS: [SolverEntry; 8] = [
     entry("anderson", "the default with Anderson acceleration", NEO, LATER, |s| {
         s.acceleration = Acceleration::Anderson;
     }),
+    entry("explicit-green", "explicit, Saint Venant-Kirchhoff", GREEN, SMALL_STEPS, explicit),
+    entry("explicit", "explicit, stable neo-Hookean", NEO, SMALL_STEPS, explicit),
 ];
 
 const fn entry(
@@ -75,4 +80,10 @@ impl SolverEntry {
     pub fn unit(&self) -> &'static str {
         if self.sweeps.is_some() { "sweep" } else { "step" }
     }
+}
+
+fn explicit(settings: &mut SolverSettings) {
+    settings.method = Method::Explicit;
+    // The cost of a small step does not depend on its size; small ones keep any mesh in one piece.
+    settings.explicit_safety = 0.05;
 }
