@@ -21,6 +21,7 @@ mod potential;
 mod precision;
 mod products;
 mod sweep;
+mod team;
 mod tets;
 mod threads;
 

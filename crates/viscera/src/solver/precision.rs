@@ -71,8 +71,8 @@ fn generic<S: Real>(
     step: &Step<'_, S>,
     state: &mut State<S>,
 ) {
-    let workers = work.ground.workers.clone();
-    workers.enter(|| match task {
+    let entrance = work.ground.workers.entrance();
+    entrance.enter(|| match task {
         Task::Step(plan, repeat) => {
             for stage in plan.stages(repeat) {
                 work.run(stage, step, state);

@@ -8,6 +8,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::team::Team;
 use crate::scalar::lanes::Instructions;
 use crate::settings::{MOST_THREADS, Threads};
 
@@ -15,10 +16,38 @@ use crate::settings::{MOST_THREADS, Threads};
 const WORTH_THREADS: usize = 16_000;
 
 /// Threads and instructions of one solver.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Workers {
-    pool: Option<Arc<rayon::ThreadPool>>,
+    crew: Option<Arc<Crew>>,
     pub instructions: Instructions,
+}
+
+#[derive(Debug)]
+struct Crew {
+    pool: Arc<rayon::ThreadPool>,
+    team: Team,
+}
+
+impl Clone for Workers {
+    /// The same threads, at the service of another solver.
+    fn clone(&self) -> Self {
+        let crew =
+            |crew: &Arc<Crew>| Arc::new(Crew { pool: Arc::clone(&crew.pool), team: Team::new() });
+        Self { crew: self.crew.as_ref().map(crew), instructions: self.instructions }
+    }
+}
+
+/// See [`Workers::entrance`].
+pub(super) struct Entrance(Option<Arc<Crew>>);
+
+impl Entrance {
+    /// Goes over to the threads for the whole of `work`: crossing costs more than a stage.
+    pub fn enter<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        match &self.0 {
+            Some(crew) => crew.team.lead(&crew.pool, crew.pool.current_num_threads() - 1, work),
+            None => work(),
+        }
+    }
 }
 
 impl Workers {
@@ -31,34 +60,32 @@ impl Workers {
             Threads::Count(count) => count.min(MOST_THREADS) as usize,
         };
         let build = || rayon::ThreadPoolBuilder::new().num_threads(count).build().ok();
-        let pool = if count > 1 { build().map(Arc::new) } else { None };
-        Self { pool, instructions: Instructions::detect() }
+        let pool = if count > 1 { build() } else { None };
+        let crew = pool.map(|pool| Arc::new(Crew { pool: Arc::new(pool), team: Team::new() }));
+        Self { crew, instructions: Instructions::detect() }
     }
 
     /// The thread that is here, alone.
     pub fn one() -> Self {
-        Self { pool: None, instructions: Instructions::detect() }
+        Self { crew: None, instructions: Instructions::detect() }
     }
 
     /// How many threads work.
     pub fn count(&self) -> usize {
-        self.pool.as_ref().map_or(1, |pool| pool.current_num_threads())
+        self.crew.as_ref().map_or(1, |crew| crew.pool.current_num_threads())
     }
 
-    /// Goes over to the threads for the whole of `work`: crossing costs more than a stage.
-    pub fn enter<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
-        match &self.pool {
-            Some(pool) => pool.install(work),
-            None => work(),
-        }
+    /// The way to the threads, apart from what they will work on.
+    pub fn entrance(&self) -> Entrance {
+        Entrance(self.crew.clone())
     }
 
-    /// `work` on all of `0..count`, in pieces of about `grain`.
+    /// `work` on all of `0..count`, in pieces of at least `grain`. Only the thread that has entered may
+    /// call it.
     pub fn each(&self, count: usize, grain: usize, work: impl Fn(Range<usize>) + Sync) {
-        if self.pool.is_some() {
-            halve(0..count, grain, &work);
-        } else if count > 0 {
-            work(0..count);
+        match &self.crew {
+            Some(crew) => crew.team.run(count, grain, &work),
+            None => work(0..count),
         }
     }
 
@@ -82,19 +109,6 @@ impl Workers {
         });
         partial[..pieces].iter().copied().reduce(combine)
     }
-}
-
-/// Halves a range among threads until pieces are small.
-fn halve(range: Range<usize>, grain: usize, work: &(impl Fn(Range<usize>) + Sync)) {
-    if range.len() <= grain {
-        if !range.is_empty() {
-            work(range);
-        }
-        return;
-    }
-    let middle = range.start + range.len() / 2;
-    let (left, right) = (range.start..middle, middle..range.end);
-    rayon::join(|| halve(left, grain, work), || halve(right, grain, work));
 }
 
 /// A slice of which several threads write different places.
