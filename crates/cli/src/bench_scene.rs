@@ -247,7 +247,7 @@ fn simulate<S: Real>(
     let mut run = Run::new(&scene, &mesh, &model, settings)?;
     let mut timing = Timing {
         wall_ms: Vec::new(),
-        threads: thread_count(settings),
+        threads: run.solver.thread_count().to_string(),
         precision: S::NAME,
         material: match material {
             MaterialModel::SaintVenantKirchhoff => "stvk",
@@ -280,11 +280,4 @@ fn simulate<S: Real>(
     )?;
     let text = serde_json::to_string(&timing).context("cannot write timing.json")?;
     out.write("timing.json", text.as_bytes())
-}
-
-/// What the settings say of threads; one where they say nothing.
-fn thread_count(settings: &SolverSettings) -> String {
-    let values = settings.values();
-    let threads = values.into_iter().find(|(key, _)| *key == "threads");
-    threads.map_or_else(|| "1".into(), |(_, count)| count)
 }
