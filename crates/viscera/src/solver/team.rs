@@ -2,13 +2,11 @@
 //!
 //! A step has hundreds of jobs of some ten microseconds, one per colour and pass. Handing each to a
 //! thread pool costs about as much as half of it; here the thread that steps announces a job by one
-//! store, everybody at hand claims pieces by counting up, and the thread that steps goes on when all
-//! are done. It never waits for a thread that has not come: what nobody claims it does itself.
+//! store, everybody at hand claims pieces, and the thread that steps goes on when all are done. It never waits for a thread that has not come: what nobody claims it does itself.
 #![allow(unsafe_code)]
 
 use std::cell::UnsafeCell;
 use std::fmt;
-use std::hint::spin_loop;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
@@ -16,7 +14,15 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 const MOST_PIECES: usize = u16::MAX as usize;
 
 /// Looks for a job before a thread offers its processor to others: about ten microseconds.
-const PATIENCE: u32 = 2_000;
+const PATIENCE: u32 = 20_000;
+
+/// Where a thread takes pieces from. The thread that steps begins at the front, the others at the back:
+/// so each finds in its cache what it had there in the job before.
+#[derive(Clone, Copy)]
+enum End {
+    Front,
+    Back,
+}
 
 /// A job: pieces of `0..count`.
 #[derive(Clone, Copy)]
@@ -26,18 +32,22 @@ struct Job {
     pieces: usize,
 }
 
+/// Alone in its cache lines, so that looking at one does not slow the others down.
+#[repr(align(128))]
+struct Apart<T>(T);
+
 /// What threads at hand share.
 pub(super) struct Team {
-    /// Number of the job (32 bits), next piece (16), pieces (16).
-    claims: AtomicU64,
+    /// Number of the job (32 bits), first open piece (16), end of the open pieces (16).
+    claims: Apart<AtomicU64>,
     /// Pieces that are done.
-    done: AtomicUsize,
+    done: Apart<AtomicUsize>,
     /// Written while no piece is open, read by whoever has claimed one.
     job: UnsafeCell<Option<Job>>,
     /// A piece has panicked on another thread.
     failed: AtomicBool,
     /// The step is over: threads at hand may go.
-    over: AtomicBool,
+    over: Apart<AtomicBool>,
 }
 
 // SAFETY: `job` is written by the thread that steps alone, and only while no piece is open; others read
@@ -56,11 +66,11 @@ impl Team {
     /// Without a job.
     pub fn new() -> Self {
         Self {
-            claims: AtomicU64::new(0),
-            done: AtomicUsize::new(0),
+            claims: Apart(AtomicU64::new(0)),
+            done: Apart(AtomicUsize::new(0)),
             job: UnsafeCell::new(None),
             failed: AtomicBool::new(false),
-            over: AtomicBool::new(true),
+            over: Apart(AtomicBool::new(true)),
         }
     }
 
@@ -71,7 +81,7 @@ impl Team {
         helpers: usize,
         step: impl FnOnce() -> R + Send,
     ) -> R {
-        self.over.store(false, Ordering::Release);
+        self.over.0.store(false, Ordering::Release);
         pool.install(|| {
             let lead = || {
                 let _over = Over(self);
@@ -94,8 +104,8 @@ impl Team {
 
     fn help(&self) {
         let mut idle = 0;
-        while !self.over.load(Ordering::Acquire) {
-            if let Some(piece) = self.claim() {
+        while !self.over.0.load(Ordering::Acquire) {
+            if let Some(piece) = self.claim(End::Back) {
                 self.execute(piece);
                 idle = 0;
             } else {
@@ -115,29 +125,32 @@ impl Team {
         let work: &'static (dyn Fn(Range<usize>) + Sync) = unsafe { std::mem::transmute(work) };
         // SAFETY: no piece is open, so that nobody else reads it.
         unsafe { *self.job.get() = Some(Job { work, count, pieces }) };
-        self.done.store(0, Ordering::Relaxed);
-        let number = (self.claims.load(Ordering::Relaxed) >> 32).wrapping_add(1);
-        self.claims.store(number << 32 | pieces as u64, Ordering::Release);
+        self.done.0.store(0, Ordering::Relaxed);
+        let number = (self.claims.0.load(Ordering::Relaxed) >> 32).wrapping_add(1);
+        self.claims.0.store(number << 32 | pieces as u64, Ordering::Release);
         let finish = Finish { team: self, pieces };
-        while let Some(piece) = self.claim() {
+        while let Some(piece) = self.claim(End::Front) {
             self.execute(piece);
         }
         drop(finish);
         assert!(!self.failed.swap(false, Ordering::AcqRel), "a thread of the solver panicked");
     }
 
-    /// The next open piece.
-    fn claim(&self) -> Option<usize> {
-        let mut word = self.claims.load(Ordering::Acquire);
+    /// An open piece.
+    fn claim(&self, end: End) -> Option<usize> {
+        let mut word = self.claims.0.load(Ordering::Acquire);
         loop {
-            let (next, pieces) = (word >> 16 & 0xffff, word & 0xffff);
-            if next >= pieces {
+            let (front, back) = (word >> 16 & 0xffff, word & 0xffff);
+            if front >= back {
                 return None;
             }
-            let taken = word + (1 << 16);
+            let (piece, left) = match end {
+                End::Front => (front, word + (1 << 16)),
+                End::Back => (back - 1, word - 1),
+            };
             let order = (Ordering::AcqRel, Ordering::Acquire);
-            match self.claims.compare_exchange_weak(word, taken, order.0, order.1) {
-                Ok(_) => return Some(next as usize),
+            match self.claims.0.compare_exchange_weak(word, left, order.0, order.1) {
+                Ok(_) => return Some(piece as usize),
                 Err(now) => word = now,
             }
         }
@@ -157,7 +170,8 @@ impl Team {
 fn wait(idle: &mut u32) {
     *idle += 1;
     if *idle < PATIENCE {
-        spin_loop();
+        // Not `spin_loop`: a virtual machine may take a processor away that pauses in a loop.
+        std::hint::black_box(());
     } else {
         std::thread::yield_now();
     }
@@ -171,7 +185,7 @@ impl Drop for Done<'_> {
         if std::thread::panicking() {
             self.0.failed.store(true, Ordering::Release);
         }
-        self.0.done.fetch_add(1, Ordering::Release);
+        self.0.done.0.fetch_add(1, Ordering::Release);
     }
 }
 
@@ -184,11 +198,11 @@ struct Finish<'a> {
 impl Drop for Finish<'_> {
     fn drop(&mut self) {
         // Pieces are left open by a panic only; nobody shall do them.
-        while self.team.claim().is_some() {
-            self.team.done.fetch_add(1, Ordering::Release);
+        while self.team.claim(End::Front).is_some() {
+            self.team.done.0.fetch_add(1, Ordering::Release);
         }
         let mut idle = 0;
-        while self.team.done.load(Ordering::Acquire) < self.pieces {
+        while self.team.done.0.load(Ordering::Acquire) < self.pieces {
             wait(&mut idle);
         }
     }
@@ -199,6 +213,6 @@ struct Over<'a>(&'a Team);
 
 impl Drop for Over<'_> {
     fn drop(&mut self) {
-        self.0.over.store(true, Ordering::Release);
+        self.0.over.0.store(true, Ordering::Release);
     }
 }
