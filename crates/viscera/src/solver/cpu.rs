@@ -23,7 +23,7 @@ use crate::state::State;
 /// more than half of the bound will do, and inertia is regained nearly twice as fast. With less, stiff
 /// and nearly incompressible tissue no longer settles in 5 sweeps; with all of it a bar that is dropped
 /// lags two to three times as far behind. Where vertices have copies, their sweeps need the whole bound.
-fn bound_share<S: Real>(model: &Model<S>) -> f64 {
+pub(super) fn bound_share<S: Real>(model: &Model<S>) -> f64 {
     if model.is_split() { 1.0 } else { 0.6 }
 }
 
@@ -350,7 +350,7 @@ impl<S: Real> Workspace<S> {
             {
                 *weights = [mass; 3];
             }
-            fill_multiplier_weights(step, multipliers);
+            fill_multiplier_weights(step.model, step.dt, multipliers);
             if step.settings.acceleration == Acceleration::Anderson {
                 match step.settings.anderson_on {
                     AndersonOn::Positions => multipliers.fill(S::ZERO),
@@ -562,7 +562,7 @@ fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 11] {
 /// The more copies a vertex has, the further a sweep's primal part runs ahead of its multipliers;
 /// slowing the rebase alone restores the balance and leaves the fixed point where it is. 1, 1/2
 /// and 1/4 are the largest powers of two that settled in every scene tried.
-fn rebase_factor<S: Real>(model: &Model<S>, settings: &SolverSettings) -> f64 {
+pub(super) fn rebase_factor<S: Real>(model: &Model<S>, settings: &SolverSettings) -> f64 {
     match (settings.rebase_factor > 0.0, model.is_split(), model.color_count) {
         (true, ..) => settings.rebase_factor,
         (_, false, _) => 1.0,
@@ -580,9 +580,8 @@ fn copies_of<S: Real>(model: &Model<S>, v: usize) -> std::ops::Range<usize> {
 }
 
 /// The diagonal of `a~` of every multiplier.
-fn fill_multiplier_weights<S: Real>(step: &Step<'_, S>, weights: &mut [S]) {
-    let model = step.model;
-    let dt = S::from_f64(step.dt);
+pub(super) fn fill_multiplier_weights<S: Real>(model: &Model<S>, dt: f64, weights: &mut [S]) {
+    let dt = S::from_f64(dt);
     for set in model.tet_sets() {
         for (block, lane) in set.places() {
             let material = &model.materials[set.blocks[block].material[lane] as usize];

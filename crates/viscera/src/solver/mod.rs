@@ -13,6 +13,8 @@ pub mod cpu;
 mod energy;
 mod explicit;
 mod forms;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod guard;
 mod history;
 mod loads;
@@ -204,12 +206,8 @@ impl<S: Real> Solver<S> {
         inputs: &Inputs<S>,
         dt: f64,
     ) -> Result<(), StepError> {
-        // Multipliers are forces times the squared step, so that the square must be a number too.
-        let squared = S::from_f64(dt * dt);
-        if !(dt > 0.0 && squared > S::ZERO && squared.is_finite()) {
-            return Err(StepError::BadStep { dt });
-        }
-        check(model, state, inputs)?;
+        check_step(dt, model, inputs)?;
+        check_state(model, state)?;
         self.work.check(model)
     }
 
@@ -258,15 +256,26 @@ impl<S: Real> Solver<S> {
         inputs: &Inputs<S>,
         balance: &mut balance::ForceBalance,
     ) -> Result<(), StepError> {
-        check(model, state, inputs)?;
+        check_state(model, state)?;
+        check_inputs(model, inputs)?;
         self.work.check(model)?;
         balance.measure(model, state, inputs, &self.work);
         Ok(())
     }
 }
 
-/// State and inputs fit the model.
-fn check<S: Real>(model: &Model<S>, state: &State<S>, inputs: &Inputs<S>) -> Result<(), StepError> {
+/// A step can be made with these inputs.
+fn check_step<S: Real>(dt: f64, model: &Model<S>, inputs: &Inputs<S>) -> Result<(), StepError> {
+    // Multipliers are forces times the squared step, so that the square must be a number too.
+    let squared = S::from_f64(dt * dt);
+    if !(dt > 0.0 && squared > S::ZERO && squared.is_finite()) {
+        return Err(StepError::BadStep { dt });
+    }
+    check_inputs(model, inputs)
+}
+
+/// The state fits the model.
+fn check_state<S: Real>(model: &Model<S>, state: &State<S>) -> Result<(), StepError> {
     let vertex_count = model.vertex_count();
     let lengths = [
         ("list of positions", state.positions.len(), vertex_count),
@@ -278,6 +287,12 @@ fn check<S: Real>(model: &Model<S>, state: &State<S>, inputs: &Inputs<S>) -> Res
             return Err(StepError::Mismatch { what, given, expected });
         }
     }
+    Ok(())
+}
+
+/// The inputs fit the model.
+fn check_inputs<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> Result<(), StepError> {
+    let vertex_count = model.vertex_count();
     let expected = model.rest_anchors.len();
     if !inputs.anchors.is_empty() && inputs.anchors.len() != expected {
         return Err(StepError::AnchorCount { given: inputs.anchors.len(), expected });

@@ -1,0 +1,176 @@
+//! Graphics processors: which there are, which one to take, and a device on it.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+
+use super::GpuError;
+
+/// What programs may ask for on any device: WebGPU's defaults. Kernels need no more.
+pub fn baseline() -> wgpu::Limits {
+    wgpu::Limits::default()
+}
+
+/// One adapter of this machine.
+#[derive(Clone, Debug)]
+pub struct Adapter {
+    adapter: wgpu::Adapter,
+}
+
+impl Adapter {
+    /// All adapters: discrete ones first, software last.
+    pub fn all() -> Vec<Self> {
+        let backends = wgpu::Backends::PRIMARY;
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+            backends,
+            ..wgpu::InstanceDescriptor::new_without_display_handle_from_env()
+        });
+        let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
+        adapters.sort_by_key(|adapter| rank(adapter.get_info().device_type));
+        adapters.into_iter().map(|adapter| Self { adapter }).collect()
+    }
+
+    /// The maker's name for it.
+    pub fn name(&self) -> String {
+        self.adapter.get_info().name
+    }
+
+    /// Name, kind, interface and driver.
+    pub fn info(&self) -> wgpu::AdapterInfo {
+        self.adapter.get_info()
+    }
+
+    /// What it can do.
+    pub fn limits(&self) -> wgpu::Limits {
+        self.adapter.limits()
+    }
+
+    /// Whether a processor does its work: right, but slower than the CPU backend.
+    pub fn is_software(&self) -> bool {
+        self.info().device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// What it lacks of the baseline, as one would say it; nothing where it has all.
+    pub fn shortfall(&self) -> Option<String> {
+        let mut lacking = Vec::new();
+        baseline().check_limits_with_fail_fn(&self.limits(), false, |what, asked, given| {
+            lacking.push(format!("{what} {given} where {asked} is needed"));
+        });
+        (!lacking.is_empty()).then(|| lacking.join(", "))
+    }
+
+    /// The first adapter whose name contains the text, whatever its case; without a text the first
+    /// that is no software, else the first.
+    pub fn find(name: Option<&str>) -> Result<Self, GpuError> {
+        let all = Self::all();
+        if all.is_empty() {
+            return Err(GpuError::NoAdapter);
+        }
+        let wanted = name.map(str::to_lowercase);
+        let found = all.iter().find(|adapter| match &wanted {
+            Some(name) => adapter.name().to_lowercase().contains(name),
+            None => true,
+        });
+        match (found, name) {
+            (Some(adapter), _) => Ok(adapter.clone()),
+            (None, name) => Err(GpuError::UnknownAdapter {
+                name: name.unwrap_or_default().to_owned(),
+                known: all.iter().map(Self::name).collect::<Vec<_>>().join(", "),
+            }),
+        }
+    }
+
+    /// A device on it, with limits raised where meshes gain by it, and timestamps where it has them.
+    pub fn open(&self) -> Result<Device, GpuError> {
+        if let Some(lacking) = self.shortfall() {
+            return Err(GpuError::BelowBaseline { name: self.name(), lacking });
+        }
+        let has = self.limits();
+        let limits = wgpu::Limits {
+            max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
+            max_buffer_size: has.max_buffer_size,
+            ..baseline()
+        };
+        self.open_with(limits)
+    }
+
+    /// A device within limits of the caller's choice, baseline or above.
+    pub fn open_with(&self, limits: wgpu::Limits) -> Result<Device, GpuError> {
+        let timestamps = wgpu::Features::TIMESTAMP_QUERY;
+        let request = wgpu::DeviceDescriptor {
+            label: Some("viscera"),
+            required_features: self.adapter.features() & timestamps,
+            required_limits: limits,
+            ..wgpu::DeviceDescriptor::default()
+        };
+        let opened = pollster::block_on(self.adapter.request_device(&request));
+        let (device, queue) = opened.map_err(|error| GpuError::Refused {
+            name: self.name(),
+            reason: error.to_string(),
+        })?;
+        Ok(Device::from_wgpu(device, queue, self.name()))
+    }
+}
+
+fn rank(kind: wgpu::DeviceType) -> u32 {
+    match kind {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    }
+}
+
+/// A device that solvers share, and the kernels compiled for it so far.
+#[derive(Clone, Debug)]
+pub struct Device {
+    pub(super) device: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
+    name: String,
+    pub(super) pipelines: Arc<Mutex<HashMap<String, Pipeline>>>,
+    lost: Arc<Mutex<Option<String>>>,
+}
+
+/// A kernel ready to run.
+#[derive(Clone, Debug)]
+pub(super) struct Pipeline {
+    pub pipeline: wgpu::ComputePipeline,
+    pub storage: wgpu::BindGroupLayout,
+}
+
+impl Device {
+    /// A device of the caller's, a window's for example, whose buffers it can then draw from.
+    pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue, name: String) -> Self {
+        let lost = Arc::new(Mutex::new(None));
+        let told = Arc::clone(&lost);
+        device.set_device_lost_callback(move |_, reason| {
+            if let Ok(mut lost) = told.lock() {
+                *lost = Some(reason);
+            }
+        });
+        Self { device, queue, name, pipelines: Arc::default(), lost }
+    }
+
+    /// The adapter's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What meshes may use.
+    pub fn limits(&self) -> wgpu::Limits {
+        self.device.limits()
+    }
+
+    /// The device of the graphics interface.
+    pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
+        (&self.device, &self.queue)
+    }
+
+    /// An error where the device is gone.
+    pub fn check(&self) -> Result<(), GpuError> {
+        match self.lost.lock().ok().and_then(|lost| lost.clone()) {
+            Some(reason) => Err(GpuError::Lost { name: self.name.clone(), reason }),
+            None => Ok(()),
+        }
+    }
+}

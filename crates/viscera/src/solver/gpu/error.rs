@@ -1,0 +1,65 @@
+//! What can go wrong with a graphics processor.
+
+/// Why the GPU backend cannot do what was asked. Nothing was changed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GpuError {
+    /// There is none.
+    #[error(
+        "no graphics adapter was found; install its Vulkan driver (without a graphics card: \
+         `apt-get install mesa-vulkan-drivers libvulkan1`), or use `device = \"cpu\"`"
+    )]
+    NoAdapter,
+    /// None has such a name.
+    #[error("no adapter is called `{name}`; there are: {known}")]
+    UnknownAdapter {
+        /// What was asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// The adapter cannot do what every kernel needs.
+    #[error("{name} is below WebGPU's default limits: {lacking}; use `device = \"cpu\"`")]
+    BelowBaseline {
+        /// The adapter.
+        name: String,
+        /// What it lacks.
+        lacking: String,
+    },
+    /// The driver said no.
+    #[error("{name} gave no device: {reason}; use another adapter or `device = \"cpu\"`")]
+    Refused {
+        /// The adapter.
+        name: String,
+        /// Its reason.
+        reason: String,
+    },
+    /// A mesh is too large for the device.
+    #[error(
+        "{what} of this model need {needed} bytes, and {name} binds at most {limit}: use a mesh of \
+         about {largest} tetrahedra or fewer, or `device = \"cpu\"`"
+    )]
+    TooLarge {
+        /// The array that does not fit.
+        what: &'static str,
+        /// Its size [bytes].
+        needed: u64,
+        /// What the device allows [bytes].
+        limit: u64,
+        /// The adapter.
+        name: String,
+        /// Tetrahedra that would fit, in proportion.
+        largest: u64,
+    },
+    /// The device was lost.
+    #[error("{name} was lost ({reason}); what was finished is kept")]
+    Lost {
+        /// The adapter.
+        name: String,
+        /// The driver's reason.
+        reason: String,
+    },
+    /// The GPU computes in single precision.
+    #[error("graphics processors compute in single precision; use `precision = \"f32\"` or `device = \"cpu\"`")]
+    DoublePrecision,
+}

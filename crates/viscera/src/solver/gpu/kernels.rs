@@ -1,0 +1,217 @@
+//! The kernels: which text each is made of, and what it is bound to.
+
+use super::buffers::Slot;
+use super::device::{Device, Pipeline};
+use crate::elements::TetForm;
+use crate::elements::wgsl;
+
+/// A kernel: an entry point of one of the files, with the storage that it names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Kernel {
+    /// The entry point.
+    pub entry: &'static str,
+    /// The file that holds it.
+    pub file: File,
+    /// Threads of a workgroup.
+    pub workgroup: u32,
+    /// What it is bound to.
+    pub slots: &'static [Slot],
+}
+
+/// Files with entry points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum File {
+    Vertices,
+    Sweep,
+    Single,
+    Loads,
+    Strain,
+    Multipliers,
+    Acceleration,
+}
+
+/// What the text of a file depends on, beside the kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Variant {
+    /// The form of the tetrahedra's constraints.
+    pub form: TetForm,
+    /// Whether a sweep works on copies.
+    pub is_split: bool,
+}
+
+macro_rules! kernels {
+    ($($name:ident = $file:ident $entry:literal $workgroup:literal [$($slot:ident)*];)*) => {
+        $(
+            #[doc = concat!("`", $entry, "`")]
+            pub const $name: Kernel = Kernel {
+                entry: $entry,
+                file: File::$file,
+                workgroup: $workgroup,
+                slots: &[$(Slot::$slot),*],
+            };
+        )*
+
+        /// All of them.
+        pub const ALL: &[Kernel] = &[$($name),*];
+    };
+}
+
+kernels! {
+    APPLY_UPDATES = Vertices "apply_updates" 64 [Predicted External Targets Updates];
+    PREDICT = Vertices "predict" 64 [Points Velocities Previous Predicted External Targets];
+    REBASE = Vertices "rebase" 64 [Offsets Points Loads Previous Predicted External];
+    RECOMPUTE_POSITIONS = Vertices "recompute_positions" 64 [Offsets Points Loads Predicted External];
+    SPLIT_COPIES = Vertices "split_copies" 64 [Offsets Points Copies];
+    JOIN_COPIES = Vertices "join_copies" 64 [Offsets Points Copies];
+    UPDATE_VELOCITIES = Vertices "update_velocities" 64 [Points Velocities Previous];
+    SOLVE = Sweep "solve" 64 [Tets Materials Points Multipliers StartStrain];
+    SOLVE_COPIES = Sweep "solve" 64 [Tets Materials CornerIndices Points Multipliers StartStrain];
+    SOLVE_SPRINGS = Single "solve_springs" 64 [Points Multipliers Springs];
+    SOLVE_ATTACHMENTS = Single "solve_attachments" 64 [Points Multipliers Attachments Anchors];
+    LOAD_SPRINGS = Single "load_springs" 64 [Points Multipliers Loads Springs];
+    LOAD_ATTACHMENTS = Single "load_attachments" 64 [Multipliers Loads Attachments];
+    LOAD_MULTIPLIERS = Loads "load_multipliers" 64 [Tets CornerIndices Points Multipliers Loads];
+    MEASURE_STRAIN = Strain "measure_strain" 64 [Tets Points StartStrain];
+    RESCALE_MULTIPLIERS = Multipliers "rescale_multipliers" 256 [Multipliers];
+    REMEMBER_ITERATE = Acceleration "remember_iterate" 256 [Unknowns Iterate];
+    START_ACCELERATION = Acceleration "start_acceleration" 1 [Control];
+    ANDERSON_PUSH = Acceleration "anderson_push" 128
+        [Unknowns Iterate Weights Residuals Mapped PartialSums Control];
+    ANDERSON_WEIGHTS = Acceleration "anderson_weights" 128 [PartialSums Control];
+    ANDERSON_MIX = Acceleration "anderson_mix" 256 [Unknowns Mapped Control];
+    CHEBYSHEV_CHANGE = Acceleration "chebyshev_change" 128 [Unknowns Iterate Weights PartialSums];
+    CHEBYSHEV_WEIGHT = Acceleration "chebyshev_weight" 128 [PartialSums Control];
+    CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control];
+}
+
+/// Records and storage, for every kernel.
+const SHARED: [&str; 4] = [
+    wgsl::ELEMENTS,
+    wgsl::GREEN_STRAIN,
+    include_str!("control.wgsl"),
+    include_str!("bindings.wgsl"),
+];
+
+/// The whole text that a kernel is compiled from.
+pub fn source(kernel: &Kernel, variant: Variant) -> String {
+    let form = || match variant.form {
+        TetForm::GreenStrain => vec![include_str!("form_green_strain.wgsl")],
+        TetForm::NeoHookeanPair => vec![
+            wgsl::NEO_HOOKEAN,
+            wgsl::NEO_HOOKEAN_PAIR,
+            include_str!("form_neo_hookean_pair.wgsl"),
+        ],
+        TetForm::NeoHookeanStretch => vec![
+            wgsl::SINGULAR_VALUES,
+            wgsl::NEO_HOOKEAN_STRETCH,
+            include_str!("form_neo_hookean_stretch.wgsl"),
+        ],
+    };
+    let corners = if variant.is_split {
+        include_str!("corners_of_copies.wgsl")
+    } else {
+        include_str!("corners_of_vertices.wgsl")
+    };
+    let single = [wgsl::SPRING, wgsl::ATTACHMENT];
+    let mut texts = SHARED.to_vec();
+    match kernel.file {
+        File::Vertices => texts.push(include_str!("vertices.wgsl")),
+        File::Sweep => {
+            texts.extend(form());
+            texts.extend([corners, include_str!("sweep.wgsl")]);
+        }
+        File::Single => {
+            texts.extend(single);
+            texts.push(include_str!("single.wgsl"));
+        }
+        File::Loads => {
+            texts.extend(form());
+            texts.push(include_str!("loads.wgsl"));
+        }
+        File::Strain => texts.push(include_str!("strain.wgsl")),
+        File::Multipliers => texts.push(include_str!("multipliers.wgsl")),
+        File::Acceleration => texts.push(include_str!("acceleration.wgsl")),
+    }
+    texts.join("\n")
+}
+
+/// Whether the text depends on the variant.
+fn varies(kernel: &Kernel) -> bool {
+    matches!(kernel.file, File::Sweep | File::Loads)
+}
+
+/// Compiles a kernel, or finds it compiled.
+pub(super) fn pipeline(device: &Device, kernel: &Kernel, variant: Variant) -> Pipeline {
+    let key = if varies(kernel) {
+        format!("{} {:?} {}", kernel.entry, variant.form, variant.is_split)
+    } else {
+        kernel.entry.to_owned()
+    };
+    let mut known = device.pipelines.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    if let Some(pipeline) = known.get(&key) {
+        return pipeline.clone();
+    }
+    let made = compile(device, kernel, variant, &key);
+    known.insert(key, made.clone());
+    made
+}
+
+fn compile(device: &Device, kernel: &Kernel, variant: Variant, label: &str) -> Pipeline {
+    let wgpu = &device.device;
+    let module = wgpu.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(label),
+        source: wgpu::ShaderSource::Wgsl(source(kernel, variant).into()),
+    });
+    let entries: Vec<_> = kernel.slots.iter().map(|&slot| storage_entry(slot)).collect();
+    let storage = wgpu.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some(label),
+        entries: &entries,
+    });
+    let uniforms = uniform_layout(wgpu);
+    let layout = wgpu.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(label),
+        bind_group_layouts: &[Some(&storage), Some(&uniforms)],
+        immediate_size: 0,
+    });
+    let pipeline = wgpu.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(label),
+        layout: Some(&layout),
+        module: &module,
+        entry_point: Some(kernel.entry),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        cache: None,
+    });
+    Pipeline { pipeline, storage }
+}
+
+fn storage_entry(slot: Slot) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding: slot as u32,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty: wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Storage { read_only: slot.is_read_only() },
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+        count: None,
+    }
+}
+
+/// What a dispatch does, and the constants of the step.
+pub(super) fn uniform_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding, has_dynamic_offset| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty: wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset,
+            min_binding_size: None,
+        },
+        count: None,
+    };
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("job and frame"),
+        entries: &[entry(0, true), entry(1, false)],
+    })
+}

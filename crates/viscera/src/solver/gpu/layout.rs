@@ -1,0 +1,226 @@
+//! How a model lies in the device's memory: its constants, where each constraint's loads go, and the
+//! pieces in which sums are taken.
+
+use super::buffers::{Attachment, Slot, Spring};
+use crate::model::Model;
+use crate::scalar::lanes::LANES;
+
+/// Bytes of `Control`, and of `Part`, in control.wgsl.
+pub(super) const CONTROL_SIZE: u64 = 528;
+pub(super) const PART_SIZE: u64 = 96;
+
+/// The material of a lane that only fills a block up.
+const FILLING: u32 = u32::MAX;
+
+/// Workgroups that sum products of long vectors: enough to keep a large device busy, few enough for one
+/// workgroup to add up what they leave.
+pub(super) const SUM_GROUPS: u32 = 512;
+
+/// Sums that a workgroup of Anderson's leaves.
+const PRODUCTS: u64 = 21;
+
+/// Elements or vertices whose energies one workgroup sums, and the numbers that it leaves.
+pub(super) const PIECE: usize = 512;
+const PIECE_SUMS: u64 = 16;
+
+/// Where loads go and what is summed together.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
+    /// Where each vertex's loads begin, one more at the end.
+    offsets: Vec<u32>,
+    /// Place of the load of each corner, per block and corner.
+    corners: Vec<[[u32; LANES]; 4]>,
+    springs: Vec<Spring>,
+    attachments: Vec<Attachment>,
+    /// Elements and vertices, part by part.
+    members: Vec<u32>,
+    /// `(part, first, end, 1 for vertices)` among the members; then for each part the range of its
+    /// pieces of elements and that of its pieces of vertices.
+    pieces: Vec<[u32; 4]>,
+    /// Pieces without the ranges behind them.
+    pub piece_count: u32,
+}
+
+impl Layout {
+    pub fn new(model: &Model<f32>) -> Self {
+        let of = |vertex: u32| model.numbering.of(vertex) as u32;
+        let mut counts = vec![0u32; model.vertex_count() + 1];
+        let mut count = |vertex: u32| {
+            let place = &mut counts[vertex as usize];
+            *place += 1;
+            *place - 1
+        };
+        // First the rank of each load at its vertex, then places.
+        let mut corners = Vec::new();
+        for set in model.tet_sets() {
+            for (block, &filled) in set.blocks.iter().zip(&set.filled) {
+                let mut ranks = [[0; LANES]; 4];
+                for lane in 0..filled as usize {
+                    for corner in 0..4 {
+                        ranks[corner][lane] = count(block.vertices[corner][lane]);
+                    }
+                }
+                corners.push(ranks);
+            }
+        }
+        let model_springs = &model.springs;
+        let mut springs: Vec<Spring> = Vec::new();
+        for (i, ends) in model_springs.vertices.iter().enumerate() {
+            let vertices = ends.map(of);
+            springs.push(Spring {
+                vertices,
+                copies: model_springs.copies[i],
+                slots: vertices.map(&mut count),
+                multiplier: (model_springs.multiplier_offset + i) as u32,
+                rest_length: model_springs.rest_length[i],
+                stiffness: model_springs.stiffness[i],
+                part: model.component_of[vertices[0] as usize],
+            });
+        }
+        let held = &model.attachments;
+        let mut attachments: Vec<Attachment> = Vec::new();
+        for (i, &vertex) in held.vertices.iter().enumerate() {
+            let vertex = of(vertex);
+            attachments.push(Attachment {
+                vertex,
+                copy_index: held.copies[i],
+                slot: count(vertex),
+                multiplier: (held.multiplier_offset + 3 * i) as u32,
+                stiffness: held.stiffness[i],
+                part: model.component_of[vertex as usize],
+            });
+        }
+        let mut offsets = Vec::with_capacity(counts.len());
+        let mut total = 0;
+        for count in counts {
+            offsets.push(total);
+            total += count;
+        }
+        let mut blocks = model.tet_sets().into_iter().flat_map(|set| set.blocks.iter().zip(&set.filled));
+        for ranks in &mut corners {
+            let Some((block, &filled)) = blocks.next() else { break };
+            for corner in 0..4 {
+                for lane in 0..filled as usize {
+                    ranks[corner][lane] += offsets[block.vertices[corner][lane] as usize];
+                }
+            }
+        }
+        for spring in &mut springs {
+            for (slot, vertex) in spring.slots.iter_mut().zip(spring.vertices) {
+                *slot += offsets[vertex as usize];
+            }
+        }
+        for attachment in &mut attachments {
+            attachment.slot += offsets[attachment.vertex as usize];
+        }
+        let (members, pieces) = pieces(model, &springs, &attachments);
+        let piece_count = (pieces.len() - model.component_count) as u32;
+        Self { offsets, corners, springs, attachments, members, pieces, piece_count }
+    }
+
+    /// Places for loads.
+    pub fn slot_count(&self) -> u64 {
+        self.offsets.last().copied().unwrap_or(0).into()
+    }
+
+    /// Bytes that sums of pieces need.
+    pub fn partial_sums_size(&self) -> u64 {
+        4 * (PRODUCTS * u64::from(SUM_GROUPS)).max(PIECE_SUMS * u64::from(self.piece_count))
+    }
+
+    /// What never changes, as the kernels read it.
+    pub fn constants(&self, model: &Model<f32>) -> Vec<(Slot, &'static str, Vec<u8>)> {
+        let bytes = |words: &[u32]| bytemuck::cast_slice(words).to_vec();
+        vec![
+            (Slot::Tets, "tetrahedra", tets(model)),
+            (Slot::Materials, "materials", materials(model)),
+            (Slot::CornerIndices, "corners", bytes(self.corners.as_flattened().as_flattened())),
+            (Slot::Offsets, "vertices", bytes(&self.offsets)),
+            (Slot::Springs, "springs", bytemuck::cast_slice(&self.springs).to_vec()),
+            (Slot::Attachments, "attachments", bytemuck::cast_slice(&self.attachments).to_vec()),
+            (Slot::Members, "elements", bytes(&self.members)),
+            (Slot::Pieces, "pieces", bytes(self.pieces.as_flattened())),
+        ]
+    }
+
+    /// Copies of each corner, and where those of each vertex begin.
+    pub fn copies(model: &Model<f32>) -> [Vec<u8>; 2] {
+        let sets = model.tet_sets().into_iter();
+        let indices: Vec<u32> = sets
+            .flat_map(|set| (0..set.block_count()).map(move |block| set.copies_of(block)))
+            .flat_map(|corners| corners.as_flattened().iter().copied())
+            .collect();
+        [indices, model.copy_offsets.clone()].map(|words| bytemuck::cast_slice(&words).to_vec())
+    }
+}
+
+/// Members of each part, in pieces.
+fn pieces(
+    model: &Model<f32>,
+    springs: &[Spring],
+    attachments: &[Attachment],
+) -> (Vec<u32>, Vec<[u32; 4]>) {
+    let mut elements = Vec::new();
+    let mut first = 0;
+    for set in model.tet_sets() {
+        for (block, lane) in set.places() {
+            let part = model.component_of[set.blocks[block].vertices[0][lane] as usize];
+            elements.push((part, (LANES * (first + block) + lane) as u32));
+        }
+        first += set.block_count();
+    }
+    let first = (LANES * first) as u32;
+    let after = |i: usize, before: usize| first + (before + i) as u32;
+    elements.extend(springs.iter().enumerate().map(|(i, s)| (s.part, after(i, 0))));
+    let before = springs.len();
+    elements.extend(attachments.iter().enumerate().map(|(i, a)| (a.part, after(i, before))));
+    elements.sort_by_key(|&(part, _)| part);
+    let mut vertices: Vec<(u32, u32)> =
+        model.component_of.iter().enumerate().map(|(v, &part)| (part, v as u32)).collect();
+    vertices.sort_by_key(|&(part, _)| part);
+
+    let mut ranges = vec![[0u32; 4]; model.component_count];
+    let (mut members, mut pieces) = (Vec::new(), Vec::new());
+    for (kind, list) in [elements, vertices].into_iter().enumerate() {
+        for of_part in list.chunk_by(|a, b| a.0 == b.0) {
+            let part = of_part[0].0;
+            ranges[part as usize][2 * kind] = pieces.len() as u32;
+            for piece in of_part.chunks(PIECE) {
+                let first = members.len() as u32;
+                members.extend(piece.iter().map(|&(_, member)| member));
+                pieces.push([part, first, members.len() as u32, kind as u32]);
+            }
+            ranges[part as usize][2 * kind + 1] = pieces.len() as u32;
+        }
+    }
+    pieces.extend(ranges);
+    (members, pieces)
+}
+
+fn tets(model: &Model<f32>) -> Vec<u8> {
+    let mut words = Vec::new();
+    for set in model.tet_sets() {
+        for (block, &filled) in set.blocks.iter().zip(&set.filled) {
+            words.extend(block.vertices.as_flattened());
+            words.extend(block.inverse_rest_shape.as_flattened().iter().map(|x| x.to_bits()));
+            words.extend(block.rest_volume.iter().map(|x| x.to_bits()));
+            let kind = |lane: usize| {
+                if lane < filled as usize { block.material[lane] } else { FILLING }
+            };
+            words.extend((0..LANES).map(kind));
+        }
+    }
+    bytemuck::cast_slice(&words).to_vec()
+}
+
+fn materials(model: &Model<f32>) -> Vec<u8> {
+    let constants: Vec<f32> = model
+        .materials
+        .iter()
+        .flat_map(|m| {
+            let c = &m.compliance;
+            [m.lame_lambda, m.lame_mu, c.normal, c.cross, c.shear, m.viscosity]
+        })
+        .collect();
+    bytemuck::cast_slice(&constants).to_vec()
+}

@@ -1,0 +1,435 @@
+//! The GPU backend: the stages of a plan as dispatches of one submission.
+//!
+//! ```text
+//! GpuSolver::new      constants, buffers and kernels onto the device; stages written down as dispatches
+//! GpuSolver::step     inputs and constants of the step, one compute pass, one submission; no waiting
+//! GpuSolver::request  copies what moves into memory that the host can read, behind the last step
+//! GpuSolver::newest   the newest copy that has arrived, if any; never waits
+//! ```
+//!
+//! The state lives on the device, vertices in the solver's numbering. What decides during a step (step
+//! lengths, weights, rejections) lies in one record there, `Control`; nothing is read back inside a step.
+
+mod buffers;
+mod device;
+mod error;
+mod frames;
+pub mod kernels;
+mod layout;
+mod record;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::Inputs;
+use super::StepError;
+use super::cpu::{bound_share, fill_multiplier_weights, rebase_factor};
+use super::plan::Plan;
+use crate::model::Model;
+use crate::scalar::Vec3;
+use crate::settings::{
+    Acceleration, AndersonOn, Precision, RelaxationForm, SolverSettings,
+};
+use crate::state::State;
+use buffers::{Buffers, Update};
+pub use buffers::Slot;
+pub use device::{Adapter, Device, baseline};
+pub use error::GpuError;
+pub use frames::Frame;
+use frames::Frames;
+use layout::Layout;
+use record::{Dispatch, Job, Recorder};
+
+/// `Frame` of bindings.wgsl.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+struct FrameConstants {
+    gravity: [f32; 3],
+    dt: f32,
+    squared_dt: f32,
+    inverse_dt: f32,
+    rescale: f32,
+    relaxation_multipliers: f32,
+    relaxation_positions: f32,
+    rebase_factor: f32,
+    bound_share: f32,
+    update_count: u32,
+    small_dt: f32,
+    inverse_small_dt: f32,
+    small_steps: u32,
+    chebyshev_damping: f32,
+}
+
+/// A dispatch ready to be sent.
+#[derive(Debug)]
+struct Ready {
+    pipeline: wgpu::ComputePipeline,
+    storage: wgpu::BindGroup,
+    /// Where its job lies among the jobs [bytes].
+    job: u32,
+    groups: [u32; 2],
+}
+
+/// Jobs lie this far apart [bytes]: the alignment that devices may ask of an offset.
+const JOB_STRIDE: u64 = 256;
+
+/// The most workgroups along one axis in the baseline.
+const MOST_GROUPS: u32 = 65_535;
+
+/// A solver for one model on a graphics processor, in single precision.
+#[derive(Debug)]
+pub struct GpuSolver {
+    device: Device,
+    settings: SolverSettings,
+    plan: Plan,
+    buffers: Buffers,
+    uniforms: wgpu::BindGroup,
+    frame: wgpu::Buffer,
+    jobs: wgpu::Buffer,
+    ready: [Vec<Ready>; 3],
+    frames: Frames,
+    /// What the device's multipliers belong to [s]; zero before the first step.
+    multiplier_dt: f64,
+    /// Vertices that the last step pulled or held, the solver's numbers.
+    touched: Vec<u32>,
+    updates: Vec<Update>,
+    /// Where each vertex stands in `updates`; `u32::MAX` for nowhere.
+    update_of: Vec<u32>,
+    shares: [f32; 2],
+    /// The step [s] that the norm's weights on the device belong to.
+    weights_dt: f64,
+}
+
+impl GpuSolver {
+    /// Puts a model onto the device, at rest, and plans its steps.
+    pub fn new(
+        device: &Device,
+        model: &Model<f32>,
+        settings: &SolverSettings,
+    ) -> Result<Self, GpuError> {
+        if settings.precision == Precision::F64 {
+            return Err(GpuError::DoublePrecision);
+        }
+        device.check()?;
+        let plan = Plan::new(model, settings);
+        let layout = Layout::new(model);
+        let buffers = Buffers::new(device, model, settings, &layout)?;
+        let recorder = Recorder {
+            model,
+            settings,
+            layout: &layout,
+            length: buffers.length,
+            multipliers_first: (buffers.multipliers_start / 4) as u32,
+        };
+        let record = recorder.record(&plan);
+        let lists = [record.prologue, record.body, record.epilogue];
+        let wgpu = &device.device;
+        let make = |label, size, usage| {
+            wgpu.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage: usage | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let job_count = lists.iter().map(Vec::len).sum::<usize>() as u64;
+        let uniform = wgpu::BufferUsages::UNIFORM;
+        let jobs = make("jobs", JOB_STRIDE * job_count.max(1), uniform);
+        let frame = make("frame", size_of::<FrameConstants>() as u64, uniform);
+        let uniforms = wgpu.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("job and frame"),
+            layout: &kernels::uniform_layout(wgpu),
+            entries: &[
+                wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                        buffer: &jobs,
+                        offset: 0,
+                        size: std::num::NonZero::new(size_of::<Job>() as u64),
+                    }),
+                },
+                wgpu::BindGroupEntry { binding: 1, resource: frame.as_entire_binding() },
+            ],
+        });
+        let mut next = 0;
+        let ready = lists.map(|list| {
+            let prepare = |dispatch: &Dispatch| {
+                let offset = next;
+                next += JOB_STRIDE;
+                device.queue.write_buffer(&jobs, offset, bytemuck::bytes_of(&dispatch.job));
+                prepare(device, &buffers, dispatch, offset as u32)
+            };
+            list.iter().map(prepare).collect()
+        });
+        let mut solver = Self {
+            frames: Frames::new(&buffers),
+            weights_dt: 0.0,
+            device: device.clone(),
+            settings: settings.clone(),
+            plan,
+            uniforms,
+            frame,
+            jobs,
+            ready,
+            buffers,
+            multiplier_dt: 0.0,
+            touched: Vec::new(),
+            updates: Vec::new(),
+            update_of: vec![u32::MAX; model.vertex_count()],
+            shares: [rebase_factor(model, settings) as f32, bound_share(model) as f32],
+        };
+        solver.upload_constants(model);
+        let rest = State::at_rest(model);
+        solver.put(model, &rest);
+        Ok(solver)
+    }
+
+    /// The settings in force.
+    pub fn settings(&self) -> &SolverSettings {
+        &self.settings
+    }
+
+    /// The stages of a step.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The device it works on.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// Dispatches of a step: once before the iterations, in each of them, and once after.
+    pub fn dispatches(&self) -> [usize; 3] {
+        [0, 1, 2].map(|list| self.ready[list].len())
+    }
+
+    /// Bytes of device memory.
+    pub fn bytes(&self) -> u64 {
+        self.buffers.bytes() + self.jobs.size() + self.frames.bytes()
+    }
+
+    /// Positions [m] as four floats a vertex, of which the last does not count, in the solver's
+    /// numbering ([`GpuSolver::vertex_order`]): to be drawn without a copy. The first
+    /// `16 * vertex_count` bytes count.
+    pub fn positions(&self) -> &wgpu::Buffer {
+        self.buffers.buffer(Slot::Unknowns)
+    }
+
+    /// The user's number of each vertex of [`GpuSolver::positions`].
+    pub fn vertex_order(model: &Model<f32>) -> &[u32] {
+        &model.numbering.order
+    }
+
+    /// Puts a state onto the device.
+    pub fn write(&mut self, model: &Model<f32>, state: &State<f32>) -> Result<(), StepError> {
+        super::check_state(model, state)?;
+        self.put(model, state);
+        Ok(())
+    }
+
+    fn put(&mut self, model: &Model<f32>, state: &State<f32>) {
+        let sorted = |values: &[Vec3<f32>]| -> Vec<[f32; 4]> {
+            let order = model.numbering.order.iter();
+            order.map(|&v| values[v as usize].to_array()).map(|[x, y, z]| [x, y, z, 0.0]).collect()
+        };
+        let queue = &self.device.queue;
+        let unknowns = self.buffers.buffer(Slot::Unknowns);
+        queue.write_buffer(unknowns, 0, bytemuck::cast_slice(&sorted(&state.positions)));
+        let start = self.buffers.multipliers_start;
+        queue.write_buffer(unknowns, start, bytemuck::cast_slice(&state.multipliers));
+        let velocities = self.buffers.buffer(Slot::Velocities);
+        queue.write_buffer(velocities, 0, bytemuck::cast_slice(&sorted(&state.velocities)));
+        self.multiplier_dt = state.multiplier_dt;
+    }
+
+    /// Advances the state on the device by one step of `dt` [s]: one submission, no waiting. On an
+    /// error nothing has moved.
+    pub fn step(
+        &mut self,
+        model: &Model<f32>,
+        inputs: &Inputs<f32>,
+        dt: f64,
+    ) -> Result<(), StepError> {
+        super::check_step(dt, model, inputs)?;
+        let mut encoder = self.encoder("step");
+        self.prepare_step(model, inputs, dt);
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some("step"),
+                timestamp_writes: None,
+            });
+            let [prologue, body, epilogue] = &self.ready;
+            self.send(&mut pass, prologue);
+            for _ in 0..self.plan.repeat {
+                self.send(&mut pass, body);
+            }
+            self.send(&mut pass, epilogue);
+        }
+        self.device.queue.submit([encoder.finish()]);
+        self.multiplier_dt = dt;
+        Ok(())
+    }
+
+    fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some(label) };
+        self.device.device.create_command_encoder(&descriptor)
+    }
+
+    fn send(&self, pass: &mut wgpu::ComputePass<'_>, list: &[Ready]) {
+        for dispatch in list {
+            pass.set_pipeline(&dispatch.pipeline);
+            pass.set_bind_group(0, &dispatch.storage, &[]);
+            pass.set_bind_group(1, &self.uniforms, &[dispatch.job]);
+            pass.dispatch_workgroups(dispatch.groups[0], dispatch.groups[1], 1);
+        }
+    }
+
+    /// Inputs and constants of a step.
+    fn prepare_step(&mut self, model: &Model<f32>, inputs: &Inputs<f32>, dt: f64) {
+        self.collect_updates(model, inputs);
+        let queue = &self.device.queue;
+        let updates = self.buffers.buffer(Slot::Updates);
+        queue.write_buffer(updates, 0, bytemuck::cast_slice(&self.updates));
+        let settings = &self.settings;
+        let held = &model.attachments;
+        if !held.vertices.is_empty() && (!inputs.anchors.is_empty() || self.multiplier_dt == 0.0) {
+            let anchors = inputs.anchors_of(model);
+            let places: Vec<[f32; 4]> = held
+                .order
+                .iter()
+                .map(|&i| anchors[i as usize].to_array())
+                .map(|[x, y, z]| [x, y, z, 0.0])
+                .collect();
+            queue.write_buffer(self.buffers.buffer(Slot::Anchors), 0, bytemuck::cast_slice(&places));
+        }
+        let last = self.multiplier_dt;
+        let rescale = match settings.keep_multipliers {
+            false => 0.0,
+            true if last > 0.0 && last != dt => (dt / last) * (dt / last),
+            true => 1.0,
+        };
+        if settings.acceleration != Acceleration::None && dt != self.weights_dt {
+            self.weights_dt = dt;
+            let weights = norm_weights(model, settings, &self.buffers, dt);
+            let buffer = self.buffers.buffer(Slot::Weights);
+            self.device.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&weights));
+        }
+        let omega = settings.relaxation as f32;
+        let constants = FrameConstants {
+            gravity: inputs.gravity.to_array(),
+            dt: dt as f32,
+            squared_dt: (dt * dt) as f32,
+            inverse_dt: (1.0 / dt) as f32,
+            rescale: rescale as f32,
+            relaxation_multipliers: match settings.relaxation_form {
+                RelaxationForm::Consistent => omega,
+                RelaxationForm::Published => 1.0,
+            },
+            relaxation_positions: omega,
+            rebase_factor: self.shares[0],
+            bound_share: self.shares[1],
+            update_count: self.updates.len() as u32,
+            chebyshev_damping: settings.chebyshev_damping as f32,
+            ..FrameConstants::default()
+        };
+        self.device.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&constants));
+    }
+
+    /// What acts on vertices in this step, and the freedom of those that the last one held.
+    fn collect_updates(&mut self, model: &Model<f32>, inputs: &Inputs<f32>) {
+        self.updates.clear();
+        let (updates, update_of) = (&mut self.updates, &mut self.update_of);
+        let mut update = |vertex: u32| {
+            let place = &mut update_of[vertex as usize];
+            if *place == u32::MAX {
+                *place = updates.len() as u32;
+                updates.push(Update { vertex, ..Update::default() });
+            }
+            *place as usize
+        };
+        for vertex in self.touched.drain(..) {
+            update(vertex);
+        }
+        let of = |vertex: u32| model.numbering.of(vertex) as u32;
+        let forces: Vec<(usize, [f32; 3])> = (inputs.forces.iter())
+            .map(|&(vertex, force)| (update(of(vertex)), force.to_array()))
+            .collect();
+        let pins: Vec<(usize, [f32; 3])> =
+            inputs.pins.iter().map(|pin| (update(of(pin.vertex)), pin.target.to_array())).collect();
+        for (place, force) in forces {
+            for axis in 0..3 {
+                self.updates[place].force[axis] += force[axis];
+            }
+        }
+        for (place, target) in pins {
+            self.updates[place].is_pinned = 1;
+            self.updates[place].place = target;
+        }
+        for update in &self.updates {
+            self.update_of[update.vertex as usize] = u32::MAX;
+            if update.is_pinned != 0 || update.force != [0.0; 3] {
+                self.touched.push(update.vertex);
+            }
+        }
+    }
+
+    /// What each vertex is made of: mass, inverse mass, number of copies.
+    fn upload_constants(&self, model: &Model<f32>) {
+        let order = &model.numbering.order;
+        let masses: Vec<f32> = order.iter().map(|&v| model.masses[v as usize]).collect();
+        let with_w = |w: &dyn Fn(usize) -> f32| -> Vec<[f32; 4]> {
+            (0..order.len()).map(|v| [0.0, 0.0, 0.0, w(v)]).collect()
+        };
+        let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
+        for (slot, values) in [
+            (Slot::Predicted, with_w(&|v| masses[v])),
+            (Slot::External, with_w(&|v| 1.0 / masses[v])),
+            (Slot::Previous, with_w(&copies)),
+        ] {
+            let buffer = self.buffers.buffer(slot);
+            self.device.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&values));
+        }
+    }
+}
+
+fn prepare(device: &Device, buffers: &Buffers, dispatch: &Dispatch, job: u32) -> Ready {
+    let made = kernels::pipeline(device, dispatch.kernel, dispatch.variant);
+    let entries: Vec<_> = (dispatch.kernel.slots.iter().zip(dispatch.places()))
+        .map(|(&slot, place)| wgpu::BindGroupEntry {
+            binding: slot as u32,
+            resource: wgpu::BindingResource::Buffer(buffers.bound(place)),
+        })
+        .collect();
+    let storage = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some(dispatch.kernel.entry),
+        layout: &made.storage,
+        entries: &entries,
+    });
+    let along = dispatch.groups.min(MOST_GROUPS);
+    let groups = [along, dispatch.groups.div_ceil(along.max(1))];
+    Ready { pipeline: made.pipeline, storage, job, groups }
+}
+
+/// Weights of the norm in which iterates are compared, for a step of `dt` [s].
+fn norm_weights(
+    model: &Model<f32>,
+    settings: &SolverSettings,
+    buffers: &Buffers,
+    dt: f64,
+) -> Vec<f32> {
+    let mut weights = vec![0.0; buffers.length as usize];
+    let (positions, multipliers) = weights.split_at_mut((buffers.multipliers_start / 4) as usize);
+    for (four, &v) in positions.as_chunks_mut::<4>().0.iter_mut().zip(&model.numbering.order) {
+        let mass = model.masses[v as usize];
+        *four = [mass, mass, mass, 0.0];
+    }
+    fill_multiplier_weights(model, dt, multipliers);
+    if settings.acceleration == Acceleration::Anderson {
+        match settings.anderson_on {
+            AndersonOn::Positions => multipliers.fill(0.0),
+            AndersonOn::Multipliers => positions.fill(0.0),
+            AndersonOn::Both => {}
+        }
+    }
+    weights
+}

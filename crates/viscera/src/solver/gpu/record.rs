@@ -1,0 +1,262 @@
+//! From stages to dispatches: what the device is asked to do in every step, written down once.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::buffers::Place;
+use super::kernels::{self, Kernel, Variant};
+use super::layout::{Layout, SUM_GROUPS};
+use crate::elements::TetForm;
+use crate::material::MaterialModel;
+use crate::model::{Model, TetSet};
+use crate::scalar::lanes::LANES;
+use crate::settings::{AndersonGuard, AndersonOn, SolverSettings, Start};
+use crate::solver::plan::{Plan, Stage};
+
+/// `Job` of bindings.wgsl.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Job {
+    pub first: u32,
+    pub count: u32,
+    pub set_first: u32,
+    pub multiplier_offset: u32,
+    pub viscous_offset: u32,
+    pub is_viscous: u32,
+    pub is_neo_hookean: u32,
+    pub mode: u32,
+    pub parameter: f32,
+}
+
+/// One dispatch.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Dispatch {
+    pub kernel: &'static Kernel,
+    pub variant: Variant,
+    pub job: Job,
+    pub groups: u32,
+    /// Whether it works on the copies of split vertices.
+    pub on_copies: bool,
+}
+
+impl Dispatch {
+    /// What the kernel finds at each of its bindings.
+    pub fn places(&self) -> impl Iterator<Item = Place> {
+        let on_copies = self.on_copies;
+        let place = move |&slot| if on_copies { Place::CopiesOf(slot) } else { Place::Whole(slot) };
+        self.kernel.slots.iter().map(place)
+    }
+}
+
+/// The dispatches of a step: once, so many times, once.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Record {
+    pub prologue: Vec<Dispatch>,
+    pub body: Vec<Dispatch>,
+    pub epilogue: Vec<Dispatch>,
+}
+
+/// Writes down what the stages of a plan ask for.
+pub(super) struct Recorder<'a> {
+    pub model: &'a Model<f32>,
+    pub settings: &'a SolverSettings,
+    pub layout: &'a Layout,
+    /// Numbers of the long vector, and where multipliers begin in it.
+    pub length: u32,
+    pub multipliers_first: u32,
+}
+
+impl Recorder<'_> {
+    pub fn record(&self, plan: &Plan) -> Record {
+        let all = |stages: &[Stage]| {
+            let mut dispatches = Vec::new();
+            for stage in stages {
+                self.stage(stage, &mut dispatches);
+            }
+            dispatches
+        };
+        Record {
+            prologue: all(&plan.prologue),
+            body: all(&plan.body),
+            epilogue: all(&plan.epilogue),
+        }
+    }
+
+    fn stage(&self, stage: &Stage, into: &mut Vec<Dispatch>) {
+        let model = self.model;
+        match *stage {
+            // The state lives on the device.
+            Stage::ReadState | Stage::WriteState => {}
+            Stage::MeasureStrain => self.each_set(&kernels::MEASURE_STRAIN, into),
+            Stage::Predict(start) => {
+                into.push(self.vertices(&kernels::APPLY_UPDATES, 0));
+                let mode = match start {
+                    Start::Previous => 0,
+                    Start::Inertial => 1,
+                    Start::Predicted | Start::Auto => 2,
+                };
+                into.push(self.vertices(&kernels::PREDICT, mode));
+            }
+            Stage::ResetMultipliers | Stage::RescaleMultipliers => {
+                let count = model.multiplier_count as u32;
+                let job = Job { count, ..Job::default() };
+                into.push(self.threads(&kernels::RESCALE_MULTIPLIERS, job));
+                let parameter = self.settings.chebyshev_radius as f32;
+                let job = Job { count: 1, parameter, ..Job::default() };
+                into.push(self.threads(&kernels::START_ACCELERATION, job));
+            }
+            Stage::RememberIterate => into.push(self.long(&kernels::REMEMBER_ITERATE, 0)),
+            Stage::LoadCorners => self.load_corners(into),
+            Stage::Rebase => into.push(self.vertices(&kernels::REBASE, 0)),
+            Stage::RecomputePositions => {
+                into.push(self.vertices(&kernels::RECOMPUTE_POSITIONS, 0));
+            }
+            Stage::SplitCopies => {
+                into.push(self.on_copies(self.vertices(&kernels::SPLIT_COPIES, 0)));
+            }
+            Stage::SolveColor(color) => self.solve_color(color as usize, into),
+            Stage::JoinCopies => {
+                into.push(self.on_copies(self.vertices(&kernels::JOIN_COPIES, 0)));
+            }
+            Stage::Chebyshev => self.chebyshev(into),
+            Stage::Anderson(on) => self.anderson(on, into),
+            Stage::UpdateVelocities => into.push(self.vertices(&kernels::UPDATE_VELOCITIES, 0)),
+            Stage::ChooseStart
+            | Stage::GuardStep
+            | Stage::RepairMultipliers
+            | Stage::GuardIterate
+            | Stage::LimitEnergy
+            | Stage::BeginExplicit
+            | Stage::LoadForces
+            | Stage::AdvanceExplicit
+            | Stage::EndExplicit => {}
+        }
+    }
+
+    fn variant(&self, form: TetForm) -> Variant {
+        Variant { form, is_split: self.model.is_split() }
+    }
+
+    /// As many threads as the job counts.
+    fn threads(&self, kernel: &'static Kernel, job: Job) -> Dispatch {
+        let variant = self.variant(TetForm::GreenStrain);
+        let groups = job.count.div_ceil(kernel.workgroup);
+        Dispatch { kernel, variant, job, groups, on_copies: false }
+    }
+
+    fn on_copies(&self, dispatch: Dispatch) -> Dispatch {
+        Dispatch { on_copies: true, ..dispatch }
+    }
+
+    /// A thread for each vertex.
+    fn vertices(&self, kernel: &'static Kernel, mode: u32) -> Dispatch {
+        let count = self.model.vertex_count() as u32;
+        self.threads(kernel, Job { count, mode, ..Job::default() })
+    }
+
+    /// A thread for each number of the long vector.
+    fn long(&self, kernel: &'static Kernel, mode: u32) -> Dispatch {
+        let set_first = self.settings.anderson_window;
+        let first = self.multipliers_first;
+        self.threads(kernel, Job { first, count: self.length, set_first, mode, ..Job::default() })
+    }
+
+    /// Sums over the long vector: as many workgroups as have enough to do.
+    fn sums(&self, kernel: &'static Kernel) -> Dispatch {
+        let groups = self.length.div_ceil(kernel.workgroup).min(SUM_GROUPS);
+        Dispatch { groups, ..self.long(kernel, groups) }
+    }
+
+    /// Blocks of a set.
+    fn blocks(
+        &self,
+        kernel: &'static Kernel,
+        kind: usize,
+        blocks: std::ops::Range<usize>,
+    ) -> Dispatch {
+        let sets = self.model.tet_sets();
+        let set: &TetSet<f32> = sets[kind];
+        let set_first = if kind == 0 { 0 } else { sets[0].block_count() as u32 };
+        let job = Job {
+            first: set_first + blocks.start as u32,
+            count: (LANES * blocks.len()) as u32,
+            set_first,
+            multiplier_offset: set.multiplier_offset as u32,
+            viscous_offset: set.viscous_offset as u32,
+            is_viscous: set.viscous.into(),
+            is_neo_hookean: (set.model == MaterialModel::StableNeoHookean).into(),
+            ..Job::default()
+        };
+        Dispatch { variant: self.variant(set.form), ..self.threads(kernel, job) }
+    }
+
+    fn each_set(&self, kernel: &'static Kernel, into: &mut Vec<Dispatch>) {
+        for (kind, set) in self.model.tet_sets().into_iter().enumerate() {
+            if !set.is_empty() {
+                into.push(self.blocks(kernel, kind, 0..set.block_count()));
+            }
+        }
+    }
+
+    fn load_corners(&self, into: &mut Vec<Dispatch>) {
+        self.each_set(&kernels::LOAD_MULTIPLIERS, into);
+        let counts = [self.model.springs.vertices.len(), self.model.attachments.vertices.len()];
+        for (kernel, count) in [&kernels::LOAD_SPRINGS, &kernels::LOAD_ATTACHMENTS].into_iter().zip(counts) {
+            if count > 0 {
+                into.push(self.threads(kernel, Job { count: count as u32, ..Job::default() }));
+            }
+        }
+    }
+
+    fn solve_color(&self, color: usize, into: &mut Vec<Dispatch>) {
+        let model = self.model;
+        let kernel =
+            if model.is_split() { &kernels::SOLVE_COPIES } else { &kernels::SOLVE };
+        for (kind, set) in model.tet_sets().into_iter().enumerate() {
+            let blocks = set.color(color);
+            if !blocks.is_empty() {
+                into.push(self.on_copies(self.blocks(kernel, kind, blocks)));
+            }
+        }
+        let offsets = [&model.springs.color_offsets, &model.attachments.color_offsets];
+        let single = [&kernels::SOLVE_SPRINGS, &kernels::SOLVE_ATTACHMENTS];
+        for (kernel, offsets) in single.into_iter().zip(offsets) {
+            let (first, end) = (offsets[color], offsets[color + 1]);
+            if first < end {
+                let job = Job { first, count: end - first, ..Job::default() };
+                into.push(self.on_copies(self.threads(kernel, job)));
+            }
+        }
+    }
+
+    fn chebyshev(&self, into: &mut Vec<Dispatch>) {
+        let sums = self.sums(&kernels::CHEBYSHEV_CHANGE);
+        let job = Job {
+            first: self.settings.chebyshev_delay,
+            count: sums.groups,
+            mode: (self.settings.chebyshev_radius == 0.0).into(),
+            ..Job::default()
+        };
+        into.push(sums);
+        into.push(Dispatch { groups: 1, ..self.threads(&kernels::CHEBYSHEV_WEIGHT, job) });
+        into.push(self.long(&kernels::CHEBYSHEV_MIX, 0));
+    }
+
+    fn anderson(&self, on: AndersonOn, into: &mut Vec<Dispatch>) {
+        let sums = self.sums(&kernels::ANDERSON_PUSH);
+        let guard = self.settings.guard_of_mixtures() == AndersonGuard::Residual;
+        let job = Job {
+            count: sums.groups,
+            set_first: self.settings.anderson_window,
+            mode: guard.into(),
+            ..Job::default()
+        };
+        into.push(sums);
+        into.push(Dispatch { groups: 1, ..self.threads(&kernels::ANDERSON_WEIGHTS, job) });
+        let mixed = match on {
+            AndersonOn::Positions => 1,
+            AndersonOn::Multipliers => 2,
+            AndersonOn::Both => 3,
+        };
+        into.push(self.long(&kernels::ANDERSON_MIX, mixed));
+    }
+}

@@ -1,0 +1,143 @@
+// Stages that work on vertices one by one (solver/cpu.rs).
+
+// What acts on single vertices: takes over what has changed since the last step.
+@compute @workgroup_size(64)
+fn apply_updates(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let thread = thread_of(id, groups, 64u);
+    if thread >= frame.update_count {
+        return;
+    }
+    let update = updates[thread];
+    let v = update.vertex;
+    let inverse_mass = select(1.0 / predicted[v].w, 0.0, update.is_pinned != 0u);
+    external[v] = vec4f(update.force[0], update.force[1], update.force[2], inverse_mass);
+    targets[v] = vec4f(update.place[0], update.place[1], update.place[2], 0.0);
+}
+
+// xt = x + dt v + dt^2 (g + M^-1 f); x becomes the start of the iteration: x (mode 0), x + dt v (mode 1)
+// or xt (mode 2); pins move to their places; w = 1/m per copy.
+@compute @workgroup_size(64)
+fn predict(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let v = thread_of(id, groups, 64u);
+    if v >= job.count {
+        return;
+    }
+    let x = points[v].xyz;
+    let mass = predicted[v].w;
+    let acting = external[v];
+    let load = acting.xyz * (1.0 / mass);
+    let inertial = x + velocities[v].xyz * frame.dt;
+    let xt = inertial + (frame.gravity + load) * frame.squared_dt;
+    let copy_count = previous[v].w;
+    previous[v] = vec4f(x, copy_count);
+    predicted[v] = vec4f(xt, mass);
+    var start = x;
+    if job.mode == 1u {
+        start = inertial;
+    } else if job.mode == 2u {
+        start = xt;
+    }
+    if acting.w == 0.0 {
+        start = targets[v].xyz;
+    }
+    points[v] = vec4f(start, acting.w * copy_count);
+}
+
+// Sum of what acts on a vertex, in the order of its places.
+fn gather(v: u32) -> vec4f {
+    var sum = vec4f();
+    let end = offsets[v + 1u];
+    for (var slot = offsets[v]; slot < end; slot++) {
+        sum += loads[slot];
+    }
+    return sum;
+}
+
+// Stabilised rebase: r = M (x - xt) - J^T l, mh = m + share of the bounds, x -= theta r/mh, w = 1/mh per
+// copy.
+@compute @workgroup_size(64)
+fn rebase(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let v = thread_of(id, groups, 64u);
+    if v >= job.count || external[v].w == 0.0 {
+        return;
+    }
+    let load = gather(v);
+    let place = points[v].xyz;
+    let inertia = predicted[v];
+    let residual = (place - inertia.xyz) * inertia.w - load.xyz;
+    let inverse = 1.0 / (inertia.w + load.w * frame.bound_share);
+    let x = place - residual * (frame.rebase_factor * inverse);
+    points[v] = vec4f(x, inverse * previous[v].w);
+}
+
+// x = xt + M^-1 J^T l.
+@compute @workgroup_size(64)
+fn recompute_positions(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let v = thread_of(id, groups, 64u);
+    if v >= job.count || external[v].w == 0.0 {
+        return;
+    }
+    let impulse = gather(v).xyz;
+    points[v] = vec4f(predicted[v].xyz + impulse * external[v].w, points[v].w);
+}
+
+@compute @workgroup_size(64)
+fn split_copies(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let v = thread_of(id, groups, 64u);
+    if v >= job.count {
+        return;
+    }
+    let point = points[v];
+    let end = offsets[v + 1u];
+    for (var copy = offsets[v]; copy < end; copy++) {
+        copies[copy] = point;
+    }
+}
+
+// Averages the changes of the copies: a vertex that nobody moved stays where it is to the bit.
+@compute @workgroup_size(64)
+fn join_copies(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let v = thread_of(id, groups, 64u);
+    if v >= job.count {
+        return;
+    }
+    let point = points[v];
+    let first = offsets[v];
+    let end = offsets[v + 1u];
+    var sum = vec3f();
+    for (var copy = first; copy < end; copy++) {
+        sum += copies[copy].xyz - point.xyz;
+    }
+    points[v] = vec4f(point.xyz + sum * (1.0 / f32(end - first)), point.w);
+}
+
+// v = (x - x_n)/dt.
+@compute @workgroup_size(64)
+fn update_velocities(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let v = thread_of(id, groups, 64u);
+    if v >= job.count {
+        return;
+    }
+    velocities[v] = vec4f((points[v].xyz - previous[v].xyz) * frame.inverse_dt, 0.0);
+}
