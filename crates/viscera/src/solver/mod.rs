@@ -34,6 +34,9 @@ use crate::settings::{Method, SolverSettings};
 use crate::state::State;
 pub use guard::StepReport;
 use plan::Plan;
+#[cfg(feature = "gpu")]
+#[doc(hidden)]
+pub use potential::{TISSUE_WGSL, Tissue};
 use precision::{Task, carry_out};
 
 /// A vertex that is moved, not simulated, during a step.

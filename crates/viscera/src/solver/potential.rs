@@ -23,8 +23,13 @@ use crate::model::{MaterialConstants, Model, TetSet};
 use crate::scalar::lanes::{Eight, LANES, Lanes, Point};
 use crate::scalar::{Mat3, Real, Scalar, Vec3};
 
+/// Twin of the functions of [`Tissue`]; needs those of the Green strain and of neo-Hookean tissue.
+#[cfg(feature = "gpu")]
+pub const TISSUE_WGSL: &str = include_str!("tissue.wgsl");
+
 /// The constants of a tetrahedron's tissue for one step.
-pub(super) struct Tissue<S> {
+pub struct Tissue<S> {
+    /// Its law.
     pub model: MaterialModel,
     /// [Pa].
     pub lame_lambda: S,
@@ -35,7 +40,7 @@ pub(super) struct Tissue<S> {
 }
 
 /// What a tetrahedron answers to a deformation.
-pub(super) struct Response<S> {
+pub struct Response<S> {
     /// Elastic energy density [Pa].
     pub elastic_energy: S,
     /// Density [Pa] of the viscous part of the potential.
@@ -99,7 +104,7 @@ impl<S: Scalar> Tissue<S> {
     /// Bound [Pa] of the curvature of the energy density by one corner, for the corner's shape
     /// gradient `g`: the vertex's diagonal block without its negative part.
     #[inline(always)]
-    fn curvature(&self, f: &Mat3<S>, g: Vec3<S>) -> S {
+    pub fn curvature(&self, f: &Mat3<S>, g: Vec3<S>) -> S {
         let (lambda, mu) = (self.lame_lambda, self.lame_mu);
         let stretch = (lambda + S::TWO * mu) * f.norm_squared() * g.length_squared();
         let elastic = match self.model {
