@@ -75,7 +75,7 @@ pub struct CornerLoad<S> {
 }
 
 /// How the energy of a tetrahedron is written as constraints.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TetForm {
     /// Saint Venant-Kirchhoff as six components of the Green strain.
     GreenStrain,

@@ -122,16 +122,16 @@ fn anderson_weights(@builtin(local_invocation_index) local: u32) {
     }
     let window = job.set_first;
     let has_difference = control.sweeps > 0u;
-    let new = control.next;
+    let newest = control.next;
     var n = select(0u, min(control.differences + 1u, window), has_difference);
     for (var j = 0u; j < n; j++) {
-        control.gram[LARGEST_WINDOW * new + j] = products[11u + j];
-        control.gram[LARGEST_WINDOW * j + new] = products[11u + j];
+        control.gram[LARGEST_WINDOW * newest + j] = products[11u + j];
+        control.gram[LARGEST_WINDOW * j + newest] = products[11u + j];
     }
     control.sweeps += 1u;
     control.differences = n;
     if has_difference {
-        control.next = (new + 1u) % window;
+        control.next = (newest + 1u) % window;
     }
     if job.mode != 0u && products[0] > control.last_norm {
         control.differences = 0u;

@@ -118,7 +118,7 @@ struct Frame {
 // Inertial prediction xt [m]; w: mass [kg].
 @group(0) @binding(10) var<storage, read_write> predicted: array<vec4f>;
 // External force [N] without gravity; w: inverse mass [1/kg], zero where pinned.
-@group(0) @binding(11) var<storage, read_write> external: array<vec4f>;
+@group(0) @binding(11) var<storage, read_write> acting: array<vec4f>;
 // Where pinned vertices are at the end of the step [m].
 @group(0) @binding(12) var<storage, read_write> targets: array<vec4f>;
 @group(0) @binding(13) var<storage, read> updates: array<Update>;

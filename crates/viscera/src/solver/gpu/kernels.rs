@@ -58,10 +58,10 @@ macro_rules! kernels {
 }
 
 kernels! {
-    APPLY_UPDATES = Vertices "apply_updates" 64 [Predicted External Targets Updates];
-    PREDICT = Vertices "predict" 64 [Points Velocities Previous Predicted External Targets];
-    REBASE = Vertices "rebase" 64 [Offsets Points Loads Previous Predicted External];
-    RECOMPUTE_POSITIONS = Vertices "recompute_positions" 64 [Offsets Points Loads Predicted External];
+    APPLY_UPDATES = Vertices "apply_updates" 64 [Predicted Acting Targets Updates];
+    PREDICT = Vertices "predict" 64 [Points Velocities Previous Predicted Acting Targets];
+    REBASE = Vertices "rebase" 64 [Offsets Points Loads Previous Predicted Acting];
+    RECOMPUTE_POSITIONS = Vertices "recompute_positions" 64 [Offsets Points Loads Predicted Acting];
     SPLIT_COPIES = Vertices "split_copies" 64 [Offsets Points Copies];
     JOIN_COPIES = Vertices "join_copies" 64 [Offsets Points Copies];
     UPDATE_VELOCITIES = Vertices "update_velocities" 64 [Points Velocities Previous];
@@ -87,7 +87,7 @@ kernels! {
 
 /// Records and storage, for every kernel.
 const SHARED: [&str; 4] = [
-    wgsl::ELEMENTS,
+    wgsl::KINEMATICS,
     wgsl::GREEN_STRAIN,
     include_str!("control.wgsl"),
     include_str!("bindings.wgsl"),

@@ -116,7 +116,6 @@ impl GpuSolver {
         let recorder = Recorder {
             model,
             settings,
-            layout: &layout,
             length: buffers.length,
             multipliers_first: (buffers.multipliers_start / 4) as u32,
         };
@@ -383,7 +382,7 @@ impl GpuSolver {
         let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
         for (slot, values) in [
             (Slot::Predicted, with_w(&|v| masses[v])),
-            (Slot::External, with_w(&|v| 1.0 / masses[v])),
+            (Slot::Acting, with_w(&|v| 1.0 / masses[v])),
             (Slot::Previous, with_w(&copies)),
         ] {
             let buffer = self.buffers.buffer(slot);

@@ -2,9 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::Place;
+use super::buffers::{Place, Slot};
 use super::kernels::{self, Kernel, Variant};
-use super::layout::{Layout, SUM_GROUPS};
+use super::layout::SUM_GROUPS;
 use crate::elements::TetForm;
 use crate::material::MaterialModel;
 use crate::model::{Model, TetSet};
@@ -39,10 +39,15 @@ pub(super) struct Dispatch {
 }
 
 impl Dispatch {
-    /// What the kernel finds at each of its bindings.
+    /// What the kernel finds at each of its bindings. Kernels that know vertices and copies find both;
+    /// those of a sweep find copies in the place of vertices.
     pub fn places(&self) -> impl Iterator<Item = Place> {
-        let on_copies = self.on_copies;
-        let place = move |&slot| if on_copies { Place::CopiesOf(slot) } else { Place::Whole(slot) };
+        let knows_both = self.kernel.slots.contains(&Slot::Copies);
+        let place = move |&slot| match slot {
+            Slot::Points if knows_both => Place::Whole(slot),
+            _ if self.on_copies => Place::CopiesOf(slot),
+            _ => Place::Whole(slot),
+        };
         self.kernel.slots.iter().map(place)
     }
 }
@@ -59,7 +64,6 @@ pub(super) struct Record {
 pub(super) struct Recorder<'a> {
     pub model: &'a Model<f32>,
     pub settings: &'a SolverSettings,
-    pub layout: &'a Layout,
     /// Numbers of the long vector, and where multipliers begin in it.
     pub length: u32,
     pub multipliers_first: u32,

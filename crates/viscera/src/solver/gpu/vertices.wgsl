@@ -13,7 +13,7 @@ fn apply_updates(
     let update = updates[thread];
     let v = update.vertex;
     let inverse_mass = select(1.0 / predicted[v].w, 0.0, update.is_pinned != 0u);
-    external[v] = vec4f(update.force[0], update.force[1], update.force[2], inverse_mass);
+    acting[v] = vec4f(update.force[0], update.force[1], update.force[2], inverse_mass);
     targets[v] = vec4f(update.place[0], update.place[1], update.place[2], 0.0);
 }
 
@@ -30,8 +30,8 @@ fn predict(
     }
     let x = points[v].xyz;
     let mass = predicted[v].w;
-    let acting = external[v];
-    let load = acting.xyz * (1.0 / mass);
+    let on_vertex = acting[v];
+    let load = on_vertex.xyz * (1.0 / mass);
     let inertial = x + velocities[v].xyz * frame.dt;
     let xt = inertial + (frame.gravity + load) * frame.squared_dt;
     let copy_count = previous[v].w;
@@ -43,10 +43,10 @@ fn predict(
     } else if job.mode == 2u {
         start = xt;
     }
-    if acting.w == 0.0 {
+    if on_vertex.w == 0.0 {
         start = targets[v].xyz;
     }
-    points[v] = vec4f(start, acting.w * copy_count);
+    points[v] = vec4f(start, on_vertex.w * copy_count);
 }
 
 // Sum of what acts on a vertex, in the order of its places.
@@ -67,7 +67,7 @@ fn rebase(
     @builtin(num_workgroups) groups: vec3u,
 ) {
     let v = thread_of(id, groups, 64u);
-    if v >= job.count || external[v].w == 0.0 {
+    if v >= job.count || acting[v].w == 0.0 {
         return;
     }
     let load = gather(v);
@@ -86,11 +86,11 @@ fn recompute_positions(
     @builtin(num_workgroups) groups: vec3u,
 ) {
     let v = thread_of(id, groups, 64u);
-    if v >= job.count || external[v].w == 0.0 {
+    if v >= job.count || acting[v].w == 0.0 {
         return;
     }
     let impulse = gather(v).xyz;
-    points[v] = vec4f(predicted[v].xyz + impulse * external[v].w, points[v].w);
+    points[v] = vec4f(predicted[v].xyz + impulse * acting[v].w, points[v].w);
 }
 
 @compute @workgroup_size(64)
