@@ -31,7 +31,8 @@ fn everything<S: Real>(settings: &SolverSettings) -> Model<S> {
     builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
     let up = |x: &Vec3<f64>| *x + vec3(0.0, 0.0, 0.05);
     let vertices: Vec<_> = mesh.vertices().iter().map(up).collect();
-    let above = TetMesh::new(vertices, mesh.tets().to_vec()).expect("a mesh");
+    let labels = mesh.labels().to_vec();
+    let (above, _) = TetMesh::new(vertices, mesh.tets().to_vec(), labels).expect("a mesh");
     builder.add_body(&above, &viscous).expect("a body");
     let half = mesh.vertices().len() as u32;
     for v in (0..half).step_by(3) {
