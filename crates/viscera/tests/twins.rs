@@ -1,20 +1,75 @@
-//! The WGSL twins of the elements' functions.
+//! The WGSL twins of the elements' functions against the oracle in double precision.
+//!
+//! Not against each other: both languages round, and neither is right. The device may err twice as
+//! much as the processor in single precision.
 
+mod common;
+mod gpu_common;
+
+use gpu_common::comparison::{check_nasty, check_percentiles, compare};
+use gpu_common::functions::{Twin, of_springs, of_tets};
+use gpu_common::{Gpu, inputs};
 use viscera::elements::wgsl;
 use viscera::solver::TISSUE_WGSL;
 
-/// Parses and validates a shader as wgpu will.
-fn validate(source: &str) {
-    let module = naga::front::wgsl::parse_str(source)
-        .unwrap_or_else(|error| panic!("{}", error.emit_to_string(source)));
-    let flags = naga::valid::ValidationFlags::all();
-    let capabilities = naga::valid::Capabilities::empty();
-    naga::valid::Validator::new(flags, capabilities)
-        .validate(&module)
-        .unwrap_or_else(|error| panic!("{}", error.emit_to_string(source)));
+/// Records of each kind.
+const COUNT: usize = 10_000;
+
+fn library() -> String {
+    wgsl::ALL.concat() + TISSUE_WGSL
 }
 
 #[test]
 fn all_files_together_are_a_valid_shader() {
-    validate(&[&wgsl::ALL[..], &[TISSUE_WGSL]].concat().concat());
+    let source = library();
+    let module = naga::front::wgsl::parse_str(&source)
+        .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&source)));
+    let flags = naga::valid::ValidationFlags::all();
+    let capabilities = naga::valid::Capabilities::empty();
+    naga::valid::Validator::new(flags, capabilities)
+        .validate(&module)
+        .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&source)));
+}
+
+/// Twins with their records, and the numbers of each record.
+type Kinds = [(Vec<Twin>, Vec<f32>, usize); 2];
+
+#[test]
+fn device_errs_at_most_twice_as_much_as_processor() {
+    let kinds: Kinds = [
+        (of_tets(), inputs::tets(COUNT), inputs::TET),
+        (of_springs(), inputs::springs(COUNT), inputs::SPRING),
+    ];
+    let (gpu, library) = (Gpu::open(), library());
+    println!("{}: relative errors, processor and device", gpu.name);
+    let mut wrong = Vec::new();
+    for (twins, records, inputs) in &kinds {
+        for twin in twins {
+            let results = compare(&gpu, &library, twin, records, *inputs);
+            wrong.extend(results.iter().filter_map(|result| check_percentiles(result)));
+        }
+    }
+    assert!(wrong.is_empty(), "{} errs more than twice as much:\n{}", gpu.name, wrong.join("\n"));
+}
+
+#[test]
+fn nasty_inputs_stay_finite_and_close() {
+    let kinds: Kinds = [
+        (of_tets(), inputs::nasty_tets(), inputs::TET),
+        (of_springs(), inputs::nasty_springs(), inputs::SPRING),
+    ];
+    let (gpu, library) = (Gpu::open(), library());
+    let mut wrong = Vec::new();
+    for (twins, records, inputs) in &kinds {
+        for twin in twins {
+            let results = compare(&gpu, &library, twin, records, *inputs);
+            let (found, close) = check_nasty(twin, &results, records, *inputs);
+            println!("{}: {:.0} % of the results are well-conditioned", twin.name, 100.0 * close);
+            assert!(close > 0.3, "{}: too few results were held close: {close}", twin.name);
+            wrong.extend(found);
+        }
+    }
+    let few = wrong.len().min(10);
+    let text = wrong[..few].join("\n");
+    assert!(wrong.is_empty(), "{} results on {}:\n{text}", wrong.len(), gpu.name);
 }

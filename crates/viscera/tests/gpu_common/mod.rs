@@ -1,5 +1,9 @@
 //! A graphics device for tests, and a shader run over records of numbers.
 
+pub mod comparison;
+pub mod functions;
+pub mod inputs;
+
 use wgpu::util::DeviceExt;
 
 /// Threads of a workgroup.
