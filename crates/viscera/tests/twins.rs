@@ -7,7 +7,7 @@ mod common;
 mod gpu_common;
 
 use gpu_common::comparison::{check_nasty, check_percentiles, compare};
-use gpu_common::functions::{Twin, of_springs, of_tets};
+use gpu_common::functions::{of_springs, of_tets};
 use gpu_common::{Gpu, inputs};
 use viscera::elements::wgsl;
 use viscera::solver::TISSUE_WGSL;
@@ -31,21 +31,15 @@ fn all_files_together_are_a_valid_shader() {
         .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&source)));
 }
 
-/// Twins with their records, and the numbers of each record.
-type Kinds = [(Vec<Twin>, Vec<f32>, usize); 2];
-
 #[test]
 fn device_errs_at_most_twice_as_much_as_processor() {
-    let kinds: Kinds = [
-        (of_tets(), inputs::tets(COUNT), inputs::TET),
-        (of_springs(), inputs::springs(COUNT), inputs::SPRING),
-    ];
+    let kinds = [(of_tets(), inputs::tets(COUNT)), (of_springs(), inputs::springs(COUNT))];
     let (gpu, library) = (Gpu::open(), library());
     println!("{}: relative errors, processor and device", gpu.name);
     let mut wrong = Vec::new();
-    for (twins, records, inputs) in &kinds {
+    for (twins, records) in &kinds {
         for twin in twins {
-            let results = compare(&gpu, &library, twin, records, *inputs);
+            let results = compare(&gpu, &library, twin, records);
             wrong.extend(results.iter().filter_map(|result| check_percentiles(result)));
         }
     }
@@ -54,16 +48,13 @@ fn device_errs_at_most_twice_as_much_as_processor() {
 
 #[test]
 fn nasty_inputs_stay_finite_and_close() {
-    let kinds: Kinds = [
-        (of_tets(), inputs::nasty_tets(), inputs::TET),
-        (of_springs(), inputs::nasty_springs(), inputs::SPRING),
-    ];
+    let kinds = [(of_tets(), inputs::nasty_tets()), (of_springs(), inputs::nasty_springs())];
     let (gpu, library) = (Gpu::open(), library());
     let mut wrong = Vec::new();
-    for (twins, records, inputs) in &kinds {
+    for (twins, records) in &kinds {
         for twin in twins {
-            let results = compare(&gpu, &library, twin, records, *inputs);
-            let (found, close) = check_nasty(twin, &results, records, *inputs);
+            let results = compare(&gpu, &library, twin, records);
+            let (found, close) = check_nasty(twin, &results, records);
             println!("{}: {:.0} % of the results are well-conditioned", twin.name, 100.0 * close);
             assert!(close > 0.3, "{}: too few results were held close: {close}", twin.name);
             wrong.extend(found);

@@ -1,7 +1,8 @@
 //! Errors of single precision on the processor and on the device, against the oracle.
 
 use super::Gpu;
-use super::functions::{Results, Twin};
+use super::functions::Twin;
+use super::inputs::Records;
 use crate::common::Random;
 
 /// Distance from 1 to the next larger number in single precision.
@@ -10,6 +11,10 @@ const EPSILON: f64 = f32::EPSILON as f64;
 /// Errors below this are not compared: where the processor is exact, a device may still round, and
 /// its divisions and square roots may be off by some units in the last place.
 const FLOOR: f64 = 2.0 * EPSILON;
+
+/// The square of a smaller number is denormal in single precision, and devices may take such numbers
+/// for zero.
+const NO_SQUARE: f64 = 1e-19;
 
 /// One function's results for one record, by unit.
 pub struct Comparison {
@@ -35,6 +40,10 @@ fn error(value: &[f64], oracle: &[f64]) -> f64 {
     if relative.is_nan() { f64::INFINITY } else { relative }
 }
 
+fn wide(values: &[f32]) -> Vec<f64> {
+    values.iter().map(|&value| f64::from(value)).collect()
+}
+
 fn finite(values: &[f64]) -> bool {
     values.iter().all(|value| value.is_finite())
 }
@@ -50,19 +59,12 @@ impl Comparison {
 }
 
 /// Runs a twin everywhere; comparisons in the order of results, then of records.
-pub fn compare(
-    gpu: &Gpu,
-    library: &str,
-    twin: &Twin,
-    records: &[f32],
-    inputs: usize,
-) -> Vec<Vec<Comparison>> {
-    let wide = |values: &[f32]| values.iter().map(|&value| f64::from(value)).collect::<Vec<_>>();
-    let layout = (twin.double)(&wide(&records[..inputs]));
+pub fn compare(gpu: &Gpu, library: &str, twin: &Twin, records: &Records) -> Vec<Vec<Comparison>> {
+    let layout = (twin.double)(&wide(&records.numbers[..records.size]));
     let outputs = layout.iter().map(|(_, values)| values.len()).sum();
-    let device = gpu.map(library, &twin.wgsl, records, inputs, outputs);
+    let device = gpu.map(library, &twin.wgsl, records, outputs);
     let mut all: Vec<_> = layout.iter().map(|_| Vec::new()).collect();
-    for (record, numbers) in records.chunks(inputs).enumerate() {
+    for (record, numbers) in records.each().enumerate() {
         let oracle = (twin.double)(&wide(numbers));
         let single = (twin.single)(numbers);
         let mut device = &device[outputs * record..];
@@ -102,20 +104,20 @@ pub fn check_percentiles(comparisons: &[Comparison]) -> Option<String> {
     (!within(half) || !within(most)).then_some(line)
 }
 
-/// How far the oracle's results move, relative, when its inputs move by one unit in the last place.
-fn sensitivity(twin: &Twin, numbers: &[f32], random: &mut Random) -> Vec<f64> {
-    let nudged = |random: &mut Random| {
-        let mut nudge = |&value: &f32| {
-            let sign = if random.next() % 2 == 0 { 1.0 } else { -1.0 };
-            f64::from(value) * (1.0 + sign * EPSILON)
-        };
-        (twin.double)(&numbers.iter().map(&mut nudge).collect::<Vec<_>>())
-    };
-    let exact: Vec<_> = numbers.iter().map(|&value| f64::from(value)).collect();
-    let oracle: Results<f64> = (twin.double)(&exact);
+/// How far the oracle's results move, relative, when its inputs move by one unit in the last place,
+/// and coordinates at least by what has no square.
+fn sensitivity(twin: &Twin, numbers: &[f32], coordinates: usize, random: &mut Random) -> Vec<f64> {
+    let exact = wide(numbers);
+    let oracle = (twin.double)(&exact);
     let mut largest = vec![0.0f64; oracle.len()];
     for _ in 0..8 {
-        for (place, (_, values)) in nudged(random).iter().enumerate() {
+        let mut nudged = exact.clone();
+        for (place, value) in nudged.iter_mut().enumerate().filter(|(_, value)| **value != 0.0) {
+            let least = if place < coordinates { NO_SQUARE } else { 0.0 };
+            let step = least + EPSILON * value.abs();
+            *value += if random.next() % 2 == 0 { step } else { -step };
+        }
+        for (place, (_, values)) in (twin.double)(&nudged).iter().enumerate() {
             largest[place] = largest[place].max(error(values, &oracle[place].1));
         }
     }
@@ -128,13 +130,12 @@ fn sensitivity(twin: &Twin, numbers: &[f32], random: &mut Random) -> Vec<f64> {
 pub fn check_nasty(
     twin: &Twin,
     comparisons: &[Vec<Comparison>],
-    records: &[f32],
-    inputs: usize,
+    records: &Records,
 ) -> (Vec<String>, f64) {
     let mut random = Random(5);
     let (mut wrong, mut close, mut count) = (Vec::new(), 0, 0);
-    for (record, numbers) in records.chunks(inputs).enumerate() {
-        let sensitivity = sensitivity(twin, numbers, &mut random);
+    for (record, numbers) in records.each().enumerate() {
+        let sensitivity = sensitivity(twin, numbers, records.coordinates, &mut random);
         for (comparisons, sensitivity) in comparisons.iter().zip(sensitivity) {
             let one = &comparisons[record];
             count += 1;

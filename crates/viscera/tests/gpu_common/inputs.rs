@@ -12,9 +12,29 @@ use crate::common::{Random, STVK, material};
 /// A substep [s].
 const DT: f64 = 1.0 / 600.0;
 
-/// Numbers of a tetrahedron's record, and of a spring's.
-pub const TET: usize = 59;
-pub const SPRING: usize = 15;
+/// Records of numbers, one after the other.
+pub struct Records {
+    pub numbers: Vec<f32>,
+    /// Numbers of a record.
+    pub size: usize,
+    /// How many of them, the first, are coordinates [m].
+    pub coordinates: usize,
+}
+
+impl Records {
+    fn of_tets(numbers: Vec<f32>) -> Self {
+        Self { numbers, size: 59, coordinates: 12 }
+    }
+
+    fn of_springs(numbers: Vec<f32>) -> Self {
+        Self { numbers, size: 15, coordinates: 6 }
+    }
+
+    /// One after the other.
+    pub fn each(&self) -> std::slice::Chunks<'_, f32> {
+        self.numbers.chunks(self.size)
+    }
+}
 
 /// Corners [m] of a tetrahedron at rest whose edges are about a centimetre; its smallest height is
 /// at least a tenth of that.
@@ -92,7 +112,7 @@ impl Tet {
 }
 
 /// Deformations of every size from 1e-4 to 1/2, rotated, some corners fixed, anywhere in an organ.
-pub fn tets(count: usize) -> Vec<f32> {
+pub fn tets(count: usize) -> Records {
     let mut random = Random(1);
     let record = |_| {
         let size = 10f64.powf(random.uniform(-4.0, -0.3));
@@ -101,7 +121,7 @@ pub fn tets(count: usize) -> Vec<f32> {
         let rest = rest_shape(&mut random);
         Tet::new(&mut random, rest, f, 0.1).record(&mut random)
     };
-    (0..count).flat_map(record).collect()
+    Records::of_tets((0..count).flat_map(record).collect())
 }
 
 fn diagonal(a: f64, b: f64, c: f64) -> Mat3<f64> {
@@ -157,7 +177,7 @@ const NASTY_STRETCHES: [[f64; 3]; 34] = [
 
 /// Every nasty stretch, in exact numbers, rotated, and far from the origin, with and without
 /// multipliers and free corners.
-pub fn nasty_tets() -> Vec<f32> {
+pub fn nasty_tets() -> Records {
     let mut random = Random(2);
     let mut records = Vec::new();
     for [a, b, c] in NASTY_STRETCHES {
@@ -179,7 +199,7 @@ pub fn nasty_tets() -> Vec<f32> {
             records.extend(tet.record(&mut random));
         }
     }
-    records
+    Records::of_tets(records)
 }
 
 /// A record of a spring with these ends; the stiffness is random.
@@ -199,7 +219,7 @@ fn spring(random: &mut Random, x: [Vec3<f64>; 2], w: [f64; 2], rest_length: f64)
 }
 
 /// Springs of millimetres to decimetres, stretched by up to a half, some ends fixed.
-pub fn springs(count: usize) -> Vec<f32> {
+pub fn springs(count: usize) -> Records {
     let mut random = Random(3);
     let record = |_| {
         let start = random.vector(0.1);
@@ -212,12 +232,12 @@ pub fn springs(count: usize) -> Vec<f32> {
         let w = [weight(), weight()];
         spring(&mut random, [start, start + edge], w, rest_length)
     };
-    (0..count).flat_map(record).collect()
+    Records::of_springs((0..count).flat_map(record).collect())
 }
 
 /// Coincident ends, and distances around the shortest with a direction; no mass free, no length at
 /// rest.
-pub fn nasty_springs() -> Vec<f32> {
+pub fn nasty_springs() -> Records {
     let mut random = Random(4);
     let mut records = Vec::new();
     for length in [0.0, 1e-20, 1e-13, 1e-12, 1.1e-12, 1e-11, 1e-9, 1e-6, 1.0, 100.0] {
@@ -234,5 +254,5 @@ pub fn nasty_springs() -> Vec<f32> {
             }
         }
     }
-    records
+    Records::of_springs(records)
 }
