@@ -85,15 +85,15 @@ fn percentile(errors: &mut [f64], share: f64) -> f64 {
 
 /// Holds the device's errors against twice the processor's, at the median and at the 99th percentile;
 /// prints a line and returns what is wrong.
-pub fn check_percentiles(comparisons: &[Comparison]) -> Option<String> {
+pub fn check_percentiles(kind: &str, comparisons: &[Comparison]) -> Option<String> {
     let mut cpu: Vec<_> = comparisons.iter().map(Comparison::cpu_error).collect();
     let mut gpu: Vec<_> = comparisons.iter().map(Comparison::gpu_error).collect();
     let [half, most] =
         [0.5, 0.99].map(|share| [percentile(&mut cpu, share), percentile(&mut gpu, share)]);
     let Comparison { twin, result, .. } = comparisons[0];
     let line = format!(
-        "{:50} median {:.1e} {:.1e}, 99 % {:.1e} {:.1e}",
-        format!("{twin}, {result}"),
+        "{:60} median {:.1e} {:.1e}, 99 % {:.1e} {:.1e}",
+        format!("{kind}, {twin}, {result}"),
         half[0],
         half[1],
         most[0],
@@ -115,7 +115,7 @@ fn sensitivity(twin: &Twin, numbers: &[f32], coordinates: usize, random: &mut Ra
         for (place, value) in nudged.iter_mut().enumerate().filter(|(_, value)| **value != 0.0) {
             let least = if place < coordinates { NO_SQUARE } else { 0.0 };
             let step = least + EPSILON * value.abs();
-            *value += if random.next() % 2 == 0 { step } else { -step };
+            *value += if random.next().is_multiple_of(2) { step } else { -step };
         }
         for (place, (_, values)) in (twin.double)(&nudged).iter().enumerate() {
             largest[place] = largest[place].max(error(values, &oracle[place].1));
