@@ -12,8 +12,8 @@ const EPSILON: f64 = f32::EPSILON as f64;
 /// its divisions and square roots may be off by some units in the last place.
 const FLOOR: f64 = 2.0 * EPSILON;
 
-/// The square of a smaller number is denormal in single precision, and devices may take such numbers
-/// for zero.
+/// The square of a smaller number is denormal in single precision, and devices may take such
+/// numbers for zero.
 const NO_SQUARE: f64 = 1e-19;
 
 /// One function's results for one record, by unit.
@@ -83,8 +83,8 @@ fn percentile(errors: &mut [f64], share: f64) -> f64 {
     errors[(share * (errors.len() - 1) as f64) as usize]
 }
 
-/// Holds the device's errors against twice the processor's, at the median and at the 99th percentile;
-/// prints a line and returns what is wrong.
+/// Holds the device's errors against twice the processor's, at the median and at the 99th
+/// percentile; prints a line and returns what is wrong.
 pub fn check_percentiles(kind: &str, comparisons: &[Comparison]) -> Option<String> {
     let mut cpu: Vec<_> = comparisons.iter().map(Comparison::cpu_error).collect();
     let mut gpu: Vec<_> = comparisons.iter().map(Comparison::gpu_error).collect();
@@ -124,9 +124,9 @@ fn sensitivity(twin: &Twin, numbers: &[f32], coordinates: usize, random: &mut Ra
     largest
 }
 
-/// Where the processor's results are finite the device's must be; where the oracle's hardly depend on
-/// the inputs' last digits, they must be close. Returns what is wrong, and the share of results that
-/// were held close.
+/// Where the processor's results are finite the device's must be; where the oracle's hardly depend
+/// on the inputs' last digits, they must be close. Returns what is wrong, and the share of results
+/// that were held close.
 pub fn check_nasty(
     twin: &Twin,
     comparisons: &[Vec<Comparison>],
