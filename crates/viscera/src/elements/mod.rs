@@ -23,7 +23,8 @@ pub mod spring;
 #[cfg(feature = "gpu")]
 pub mod wgsl {
     //! The twins of these functions for graphics processors: plain WGSL without bindings and entry
-    //! points, to be put before a kernel. Every file needs [`KINEMATICS`]; what else one needs is said.
+    //! points, to be put before a kernel. Every file needs [`KINEMATICS`]; what else one needs is
+    //! said.
 
     /// Linear tetrahedra, the 6 x 6 solve, and the records that all share; twin of [`super`].
     pub const KINEMATICS: &str = include_str!("mod.wgsl");

@@ -21,8 +21,10 @@ const SINGULAR_VALUES_MOST_SWEEPS = 6;
 // An off-diagonal entry is zero below this share of the diagonal: a hundredth of round-off.
 const SINGULAR_VALUES_NEGLIGIBLE = 0.01 * 1.1920929e-7;
 
-// Keeps a zero matrix from dividing by zero.
-const SINGULAR_VALUES_SMALLEST = 1e-30;
+// Keeps a zero matrix from dividing by zero. Larger than in the Rust twin, since devices may take
+// denormal numbers for zero: an entry that is rotated away needs a normal square. Only matrices
+// below 1e-9, a thousandth of what has a direction, can tell.
+const SINGULAR_VALUES_SMALLEST = 1e-18;
 
 // A singular value below this fraction of the largest has no usable direction.
 const SINGULAR_VALUES_DIRECTIONLESS = 1e-6;

@@ -151,9 +151,8 @@ fn strain_block<T: Scalar>(numbers_in: &[T]) -> Results<T> {
     let t = Tet::from(numbers_in);
     let f = deformation_gradient(&t.x, &t.shape);
     let c = green_strain::strain(&f);
-    let solve = |target| {
-        green_strain::solve(&t.x, &t.w, &t.shape, &t.strain, target, &t.compliance)
-    };
+    let solve =
+        |target| green_strain::solve(&t.x, &t.w, &t.shape, &t.strain, target, &t.compliance);
     let (elastic, viscous) = (solve(None), solve(Some(&t.target)));
     let loads = green_strain::corner_loads(&t.x, &t.shape, &t.strain);
     let piola = green_strain::piola(&f, &c, t.lambda, t.mu);
@@ -201,9 +200,8 @@ fn volume_pair<T: Scalar>(numbers_in: &[T]) -> Results<T> {
     let f = deformation_gradient(&t.x, &t.shape);
     let [volume, shear] =
         neo_hookean_pair::constitutive_multipliers(&f, t.lambda, t.mu, t.step_volume);
-    let TetCorrection { multipliers, positions } = neo_hookean_pair::solve(
-        &t.x, &t.w, &t.shape, &t.pair, t.lambda, t.mu, t.step_volume,
-    );
+    let TetCorrection { multipliers, positions } =
+        neo_hookean_pair::solve(&t.x, &t.w, &t.shape, &t.pair, t.lambda, t.mu, t.step_volume);
     let loads = neo_hookean_pair::corner_loads(&t.x, &t.shape, &t.pair);
     vec![
         ("volume_change", vec![neo_hookean::volume_change(&f)]),
@@ -234,9 +232,8 @@ fn stretch_block<T: Scalar>(numbers_in: &[T]) -> Results<T> {
     let again = Mat3::from_columns(a * s1, b * s2, c * s3) * svd.v.transpose();
     let rotation = svd.u * svd.v.transpose();
     let rest = neo_hookean_stretch::constitutive_multipliers(&f, t.lambda, t.mu, t.step_volume);
-    let TetCorrection { multipliers, positions } = neo_hookean_stretch::solve(
-        &t.x, &t.w, &t.shape, &t.stretch, t.lambda, t.mu, t.step_volume,
-    );
+    let TetCorrection { multipliers, positions } =
+        neo_hookean_stretch::solve(&t.x, &t.w, &t.shape, &t.stretch, t.lambda, t.mu, t.step_volume);
     let loads = neo_hookean_stretch::corner_loads(&t.x, &t.shape, &t.stretch);
     vec![
         ("signed_svd: sigma", svd.sigma.to_vec()),

@@ -1,5 +1,9 @@
 //! A graphics device for tests, and a shader run over records of numbers.
 
+pub mod comparison;
+pub mod functions;
+pub mod inputs;
+
 use wgpu::util::DeviceExt;
 
 /// Threads of a workgroup.
@@ -36,17 +40,16 @@ impl Gpu {
         Self { device, queue, name }
     }
 
-    /// Runs `body` once for each record of `inputs` numbers; it takes its numbers with `take()` and
+    /// Runs `body` once for each record; it takes its numbers with `take()` and
     /// its like and puts `outputs` results. `library` holds the functions that it calls.
     pub fn map(
         &self,
         library: &str,
         body: &str,
-        records: &[f32],
-        inputs: usize,
+        records: &inputs::Records,
         outputs: usize,
     ) -> Vec<f32> {
-        let count = records.len() / inputs;
+        let (inputs, count) = (records.size, records.each().len());
         let entry = format!(
             "const COUNT = {count}u;\nconst INPUTS = {inputs}u;\nconst OUTPUTS = {outputs}u;\n\
              @compute @workgroup_size({GROUP})\n\
@@ -69,7 +72,7 @@ impl Gpu {
         });
         let input = self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: None,
-            contents: bytemuck::cast_slice(records),
+            contents: bytemuck::cast_slice(&records.numbers),
             usage: wgpu::BufferUsages::STORAGE,
         });
         let size = (4 * outputs * count) as u64;
