@@ -31,8 +31,8 @@ fn everything<S: Real>(settings: &SolverSettings) -> Model<S> {
     builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
     let up = |x: &Vec3<f64>| *x + vec3(0.0, 0.0, 0.05);
     let vertices: Vec<_> = mesh.vertices().iter().map(up).collect();
-    let labels = mesh.labels().to_vec();
-    let (above, _) = TetMesh::new(vertices, mesh.tets().to_vec(), labels).expect("a mesh");
+    let regions = mesh.regions().to_vec();
+    let (above, _) = TetMesh::new(vertices, mesh.tets().to_vec(), regions).expect("a mesh");
     builder.add_body(&above, &viscous).expect("a body");
     let half = mesh.vertices().len() as u32;
     for v in (0..half).step_by(3) {
@@ -88,11 +88,7 @@ fn distances(device: &Device, settings: &SolverSettings, steps: u32) -> [f64; 3]
 #[test]
 fn every_form_and_order_agrees_with_the_cpu() {
     let device = device();
-    let plain = SolverSettings {
-        step_guard: false,
-        iterations: 3,
-        ..SolverSettings::default()
-    };
+    let plain = SolverSettings { step_guard: false, iterations: 3, ..SolverSettings::default() };
     let published = SolverSettings { rebase: false, keep_multipliers: false, ..plain.clone() };
     for colors in [Colors::Unlimited, Colors::Limited(4), Colors::Limited(1)] {
         for (name, settings) in [
@@ -118,11 +114,7 @@ fn every_form_and_order_agrees_with_the_cpu() {
 #[test]
 fn every_acceleration_agrees_with_the_cpu() {
     let device = device();
-    let plain = SolverSettings {
-        step_guard: false,
-        iterations: 8,
-        ..SolverSettings::default()
-    };
+    let plain = SolverSettings { step_guard: false, iterations: 8, ..SolverSettings::default() };
     for colors in [Colors::Unlimited, Colors::Limited(1)] {
         for (name, settings) in [
             (
@@ -133,10 +125,7 @@ fn every_acceleration_agrees_with_the_cpu() {
                     ..plain.clone()
                 },
             ),
-            (
-                "anderson",
-                SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() },
-            ),
+            ("anderson", SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() }),
             (
                 "anderson 10 unguarded",
                 SolverSettings {

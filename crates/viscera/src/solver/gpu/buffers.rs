@@ -146,11 +146,8 @@ impl Buffers {
         let xpbd = settings.method == Method::Xpbd;
         let accelerated = xpbd && settings.acceleration != Acceleration::None;
         let anderson = accelerated && settings.acceleration == Acceleration::Anderson;
-        let history = if anderson {
-            unknowns * (u64::from(settings.anderson_window) + 1)
-        } else {
-            0
-        };
+        let history =
+            if anderson { unknowns * (u64::from(settings.anderson_window) + 1) } else { 0 };
         let viscous = model.tet_sets().iter().any(|set| set.viscous);
         let blocks = model.tet_sets().iter().map(|set| set.block_count() as u64).sum::<u64>();
         let guarded = settings.guards_steps();
@@ -233,13 +230,7 @@ impl Buffers {
             let [indices, offsets] = Layout::copies(model);
             [filled("copies of corners", &indices), filled("copies of vertices", &offsets)]
         });
-        Ok(Self {
-            all,
-            copies,
-            points_size,
-            multipliers_start,
-            length: (unknowns / 4) as u32,
-        })
+        Ok(Self { all, copies, points_size, multipliers_start, length: (unknowns / 4) as u32 })
     }
 
     /// A buffer of its own.

@@ -103,10 +103,8 @@ impl Adapter {
             ..wgpu::DeviceDescriptor::default()
         };
         let opened = pollster::block_on(self.adapter.request_device(&request));
-        let (device, queue) = opened.map_err(|error| GpuError::Refused {
-            name: self.name(),
-            reason: error.to_string(),
-        })?;
+        let (device, queue) = opened
+            .map_err(|error| GpuError::Refused { name: self.name(), reason: error.to_string() })?;
         Ok(Device::from_wgpu(device, queue, self.name()))
     }
 }

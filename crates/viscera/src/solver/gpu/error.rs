@@ -60,6 +60,8 @@ pub enum GpuError {
         reason: String,
     },
     /// The GPU computes in single precision.
-    #[error("graphics processors compute in single precision; use `precision = \"f32\"` or `device = \"cpu\"`")]
+    #[error(
+        "graphics processors compute in single precision; use `precision = \"f32\"` or `device = \"cpu\"`"
+    )]
     DoublePrecision,
 }

@@ -118,7 +118,8 @@ impl GpuSolver {
     pub fn read(&self, model: &Model<f32>, state: &mut State<f32>) -> Result<(), GpuError> {
         let unknowns = self.read_buffer(Slot::Unknowns)?;
         let velocities = self.read_buffer(Slot::Velocities)?;
-        let places: &[[f32; 4]] = bytemuck::cast_slice(&unknowns[..self.buffers.points_size as usize]);
+        let places: &[[f32; 4]] =
+            bytemuck::cast_slice(&unknowns[..self.buffers.points_size as usize]);
         state.positions = in_user_order(model, places);
         let moving: &[[f32; 4]] =
             bytemuck::cast_slice(&velocities[..self.buffers.points_size as usize]);

@@ -96,7 +96,8 @@ impl Layout {
             offsets.push(total);
             total += count;
         }
-        let mut blocks = model.tet_sets().into_iter().flat_map(|set| set.blocks.iter().zip(&set.filled));
+        let mut blocks =
+            model.tet_sets().into_iter().flat_map(|set| set.blocks.iter().zip(&set.filled));
         for ranks in &mut corners {
             let Some((block, &filled)) = blocks.next() else { break };
             for corner in 0..4 {

@@ -26,12 +26,10 @@ use super::cpu::{bound_share, fill_multiplier_weights, rebase_factor};
 use super::plan::Plan;
 use crate::model::Model;
 use crate::scalar::Vec3;
-use crate::settings::{
-    Acceleration, AndersonOn, Precision, RelaxationForm, SolverSettings,
-};
+use crate::settings::{Acceleration, AndersonOn, Precision, RelaxationForm, SolverSettings};
 use crate::state::State;
-use buffers::{Buffers, Update};
 pub use buffers::Slot;
+use buffers::{Buffers, Update};
 pub use device::{Adapter, Device, baseline};
 pub use error::GpuError;
 pub use frames::Frame;
@@ -299,7 +297,11 @@ impl GpuSolver {
                 .map(|&i| anchors[i as usize].to_array())
                 .map(|[x, y, z]| [x, y, z, 0.0])
                 .collect();
-            queue.write_buffer(self.buffers.buffer(Slot::Anchors), 0, bytemuck::cast_slice(&places));
+            queue.write_buffer(
+                self.buffers.buffer(Slot::Anchors),
+                0,
+                bytemuck::cast_slice(&places),
+            );
         }
         let last = self.multiplier_dt;
         let rescale = match settings.keep_multipliers {

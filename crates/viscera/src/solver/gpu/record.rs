@@ -204,7 +204,9 @@ impl Recorder<'_> {
     fn load_corners(&self, into: &mut Vec<Dispatch>) {
         self.each_set(&kernels::LOAD_MULTIPLIERS, into);
         let counts = [self.model.springs.vertices.len(), self.model.attachments.vertices.len()];
-        for (kernel, count) in [&kernels::LOAD_SPRINGS, &kernels::LOAD_ATTACHMENTS].into_iter().zip(counts) {
+        for (kernel, count) in
+            [&kernels::LOAD_SPRINGS, &kernels::LOAD_ATTACHMENTS].into_iter().zip(counts)
+        {
             if count > 0 {
                 into.push(self.threads(kernel, Job { count: count as u32, ..Job::default() }));
             }
@@ -213,8 +215,7 @@ impl Recorder<'_> {
 
     fn solve_color(&self, color: usize, into: &mut Vec<Dispatch>) {
         let model = self.model;
-        let kernel =
-            if model.is_split() { &kernels::SOLVE_COPIES } else { &kernels::SOLVE };
+        let kernel = if model.is_split() { &kernels::SOLVE_COPIES } else { &kernels::SOLVE };
         for (kind, set) in model.tet_sets().into_iter().enumerate() {
             let blocks = set.color(color);
             if !blocks.is_empty() {
