@@ -192,7 +192,8 @@ fn least_squares(products: array<f32, 21>, n: u32) {
     }
 }
 
-// q = G_k - sum_j g_j dG_j, of positions (mode bit 0) and multipliers (mode bit 1).
+// q = G_k - sum_j g_j dG_j, of positions (mode bit 0) and multipliers (mode bit 1); with mode bit 2 the
+// result is remembered as the next iterate.
 @compute @workgroup_size(256)
 fn anderson_mix(
     @builtin(global_invocation_id) id: vec3u,
@@ -202,15 +203,17 @@ fn anderson_mix(
     if i >= job.count || !counts(i) {
         return;
     }
-    let bit = select(1u, 2u, i >= job.first);
-    if (job.mode & bit) == 0u {
-        return;
-    }
     var q = mapped[job.set_first * job.count + i];
-    for (var j = 0u; j < control.differences; j++) {
-        q -= control.shares[j] * mapped[j * job.count + i];
+    let bit = select(1u, 2u, i >= job.first);
+    if (job.mode & bit) != 0u {
+        for (var j = 0u; j < control.differences; j++) {
+            q -= control.shares[j] * mapped[j * job.count + i];
+        }
+        unknowns[i] = q;
     }
-    unknowns[i] = q;
+    if (job.mode & 4u) != 0u {
+        iterate[i] = q;
+    }
 }
 
 // Squared norm of what the sweep changed, in pieces.
@@ -273,7 +276,7 @@ fn chebyshev_weight(@builtin(local_invocation_index) local: u32) {
     }
 }
 
-// q_(k+1) = omega (gamma (g(q_k) - q_k) + q_k - q_(k-1)) + q_(k-1).
+// q_(k+1) = omega (gamma (g(q_k) - q_k) + q_k - q_(k-1)) + q_(k-1), remembered as the next iterate.
 @compute @workgroup_size(256)
 fn chebyshev_mix(
     @builtin(global_invocation_id) id: vec3u,
@@ -285,10 +288,13 @@ fn chebyshev_mix(
     }
     let q = iterate[i];
     let before = older[i];
-    older[i] = q;
     let omega = control.omega;
     let gamma = frame.chebyshev_damping;
+    var next = unknowns[i];
     if omega != 1.0 || gamma != 1.0 {
-        unknowns[i] = omega * (gamma * (unknowns[i] - q) + q - before) + before;
+        next = omega * (gamma * (next - q) + q - before) + before;
+        unknowns[i] = next;
     }
+    older[i] = q;
+    iterate[i] = next;
 }

@@ -24,8 +24,9 @@ pub struct Kernel {
 pub enum File {
     Vertices,
     Sweep,
-    Single,
+    SweepSingle,
     Loads,
+    LoadsSingle,
     Strain,
     Multipliers,
     Acceleration,
@@ -36,8 +37,24 @@ pub enum File {
 pub struct Variant {
     /// The form of the tetrahedra's constraints.
     pub form: TetForm,
-    /// Whether a sweep works on copies.
-    pub is_split: bool,
+    /// What sweeps read and write.
+    pub swept: Swept,
+}
+
+/// What sweeps read and write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Swept {
+    /// Vertices.
+    Vertices,
+    /// Copies of them.
+    Copies,
+    /// One colour, every copy with one constraint: reads vertices, writes copies.
+    Jacobi,
+}
+
+impl Swept {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Vertices, Self::Copies, Self::Jacobi];
 }
 
 macro_rules! kernels {
@@ -67,10 +84,15 @@ kernels! {
     UPDATE_VELOCITIES = Vertices "update_velocities" 64 [Points Velocities Previous];
     SOLVE = Sweep "solve" 64 [Tets Materials Points Multipliers StartStrain];
     SOLVE_COPIES = Sweep "solve" 64 [Tets Materials CornerIndices Points Multipliers StartStrain];
-    SOLVE_SPRINGS = Single "solve_springs" 64 [Points Multipliers Springs];
-    SOLVE_ATTACHMENTS = Single "solve_attachments" 64 [Points Multipliers Attachments Anchors];
-    LOAD_SPRINGS = Single "load_springs" 64 [Points Multipliers Loads Springs];
-    LOAD_ATTACHMENTS = Single "load_attachments" 64 [Multipliers Loads Attachments];
+    SOLVE_JACOBI = Sweep "solve" 64
+        [Tets Materials CornerIndices Points Copies Multipliers StartStrain];
+    SOLVE_SPRINGS = SweepSingle "solve_springs" 64 [Points Multipliers Springs];
+    SOLVE_ATTACHMENTS = SweepSingle "solve_attachments" 64 [Points Multipliers Attachments Anchors];
+    SOLVE_SPRINGS_JACOBI = SweepSingle "solve_springs" 64 [Points Copies Multipliers Springs];
+    SOLVE_ATTACHMENTS_JACOBI = SweepSingle "solve_attachments" 64
+        [Points Copies Multipliers Attachments Anchors];
+    LOAD_SPRINGS = LoadsSingle "load_springs" 64 [Points Multipliers Loads Springs];
+    LOAD_ATTACHMENTS = LoadsSingle "load_attachments" 64 [Multipliers Loads Attachments];
     LOAD_MULTIPLIERS = Loads "load_multipliers" 64 [Tets CornerIndices Points Multipliers Loads];
     MEASURE_STRAIN = Strain "measure_strain" 64 [Tets Points StartStrain];
     RESCALE_MULTIPLIERS = Multipliers "rescale_multipliers" 256 [Multipliers];
@@ -79,7 +101,7 @@ kernels! {
     ANDERSON_PUSH = Acceleration "anderson_push" 128
         [Unknowns Iterate Weights Residuals Mapped PartialSums Control];
     ANDERSON_WEIGHTS = Acceleration "anderson_weights" 128 [PartialSums Control];
-    ANDERSON_MIX = Acceleration "anderson_mix" 256 [Unknowns Mapped Control];
+    ANDERSON_MIX = Acceleration "anderson_mix" 256 [Unknowns Iterate Mapped Control];
     CHEBYSHEV_CHANGE = Acceleration "chebyshev_change" 128 [Unknowns Iterate Weights PartialSums];
     CHEBYSHEV_WEIGHT = Acceleration "chebyshev_weight" 128 [PartialSums Control];
     CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control];
@@ -108,10 +130,10 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
             include_str!("form_neo_hookean_stretch.wgsl"),
         ],
     };
-    let corners = if variant.is_split {
-        include_str!("corners_of_copies.wgsl")
-    } else {
-        include_str!("corners_of_vertices.wgsl")
+    let swept = match variant.swept {
+        Swept::Vertices => include_str!("sweep_vertices.wgsl"),
+        Swept::Copies => include_str!("sweep_copies.wgsl"),
+        Swept::Jacobi => include_str!("sweep_jacobi.wgsl"),
     };
     let single = [wgsl::SPRING, wgsl::ATTACHMENT];
     let mut texts = SHARED.to_vec();
@@ -119,11 +141,15 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
         File::Vertices => texts.push(include_str!("vertices.wgsl")),
         File::Sweep => {
             texts.extend(form());
-            texts.extend([corners, include_str!("sweep.wgsl")]);
+            texts.extend([swept, include_str!("sweep.wgsl")]);
         }
-        File::Single => {
+        File::SweepSingle => {
             texts.extend(single);
-            texts.push(include_str!("single.wgsl"));
+            texts.extend([swept, include_str!("sweep_single.wgsl")]);
+        }
+        File::LoadsSingle => {
+            texts.extend(single);
+            texts.push(include_str!("loads_single.wgsl"));
         }
         File::Loads => {
             texts.extend(form());
@@ -138,13 +164,13 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
 
 /// Whether the text depends on the variant.
 fn varies(kernel: &Kernel) -> bool {
-    matches!(kernel.file, File::Sweep | File::Loads)
+    matches!(kernel.file, File::Sweep | File::SweepSingle | File::Loads)
 }
 
 /// Compiles a kernel, or finds it compiled.
 pub(super) fn pipeline(device: &Device, kernel: &Kernel, variant: Variant) -> Pipeline {
     let key = if varies(kernel) {
-        format!("{} {:?} {}", kernel.entry, variant.form, variant.is_split)
+        format!("{} {:?} {:?}", kernel.entry, variant.form, variant.swept)
     } else {
         kernel.entry.to_owned()
     };

@@ -116,6 +116,8 @@ impl GpuSolver {
             settings,
             length: buffers.length,
             multipliers_first: (buffers.multipliers_start / 4) as u32,
+            swept: Recorder::swept(model),
+            mixes_remember: Recorder::mixes_remember(&plan),
         };
         let record = recorder.record(&plan);
         let lists = [record.prologue, record.body, record.epilogue];

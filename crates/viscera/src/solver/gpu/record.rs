@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::buffers::{Place, Slot};
-use super::kernels::{self, Kernel, Variant};
+use super::kernels::{self, Kernel, Swept, Variant};
 use super::layout::SUM_GROUPS;
 use crate::elements::TetForm;
 use crate::material::MaterialModel;
@@ -67,6 +67,8 @@ pub(super) struct Recorder<'a> {
     /// Numbers of the long vector, and where multipliers begin in it.
     pub length: u32,
     pub multipliers_first: u32,
+    pub swept: Swept,
+    pub mixes_remember: bool,
 }
 
 impl Recorder<'_> {
@@ -78,11 +80,24 @@ impl Recorder<'_> {
             }
             dispatches
         };
-        Record {
+        let mut record = Record {
             prologue: all(&plan.prologue),
             body: all(&plan.body),
             epilogue: all(&plan.epilogue),
+        };
+        if self.mixes_remember && plan.body.contains(&Stage::RememberIterate) {
+            record.prologue.push(self.long(&kernels::REMEMBER_ITERATE, 0));
         }
+        record
+    }
+
+    /// Whether what a mixture leaves is where the next sweep starts, so that it can be remembered in
+    /// the same pass.
+    pub fn mixes_remember(plan: &Plan) -> bool {
+        let changes = |stage: &Stage| {
+            matches!(stage, Stage::GuardIterate | Stage::Anderson(AndersonOn::Multipliers))
+        };
+        !plan.body.iter().any(changes)
     }
 
     fn stage(&self, stage: &Stage, into: &mut Vec<Dispatch>) {
@@ -108,12 +123,15 @@ impl Recorder<'_> {
                 let job = Job { count: 1, parameter, ..Job::default() };
                 into.push(self.threads(&kernels::START_ACCELERATION, job));
             }
+            Stage::RememberIterate if self.mixes_remember => {}
             Stage::RememberIterate => into.push(self.long(&kernels::REMEMBER_ITERATE, 0)),
             Stage::LoadCorners => self.load_corners(into),
             Stage::Rebase => into.push(self.vertices(&kernels::REBASE, 0)),
             Stage::RecomputePositions => {
                 into.push(self.vertices(&kernels::RECOMPUTE_POSITIONS, 0));
             }
+            // A sweep of one colour reads vertices.
+            Stage::SplitCopies if self.swept == Swept::Jacobi => {}
             Stage::SplitCopies => {
                 into.push(self.on_copies(self.vertices(&kernels::SPLIT_COPIES, 0)));
             }
@@ -136,8 +154,21 @@ impl Recorder<'_> {
         }
     }
 
+    /// What sweeps of a model read and write.
+    pub fn swept(model: &Model<f32>) -> Swept {
+        let sets = model.tet_sets().map(TetSet::len);
+        let [springs, attachments] =
+            [model.springs.vertices.len(), model.attachments.vertices.len()];
+        let corners = 4 * (sets[0] + sets[1]) + 2 * springs + attachments;
+        match (model.is_split(), model.color_count, model.copy_count() == corners) {
+            (false, ..) => Swept::Vertices,
+            (true, 1, true) => Swept::Jacobi,
+            _ => Swept::Copies,
+        }
+    }
+
     fn variant(&self, form: TetForm) -> Variant {
-        Variant { form, is_split: self.model.is_split() }
+        Variant { form, swept: self.swept }
     }
 
     /// As many threads as the job counts.
@@ -215,16 +246,27 @@ impl Recorder<'_> {
 
     fn solve_color(&self, color: usize, into: &mut Vec<Dispatch>) {
         let model = self.model;
-        let kernel = if model.is_split() { &kernels::SOLVE_COPIES } else { &kernels::SOLVE };
+        let [tets, springs, attachments] = match self.swept {
+            Swept::Vertices => {
+                [&kernels::SOLVE, &kernels::SOLVE_SPRINGS, &kernels::SOLVE_ATTACHMENTS]
+            }
+            Swept::Copies => {
+                [&kernels::SOLVE_COPIES, &kernels::SOLVE_SPRINGS, &kernels::SOLVE_ATTACHMENTS]
+            }
+            Swept::Jacobi => [
+                &kernels::SOLVE_JACOBI,
+                &kernels::SOLVE_SPRINGS_JACOBI,
+                &kernels::SOLVE_ATTACHMENTS_JACOBI,
+            ],
+        };
         for (kind, set) in model.tet_sets().into_iter().enumerate() {
             let blocks = set.color(color);
             if !blocks.is_empty() {
-                into.push(self.on_copies(self.blocks(kernel, kind, blocks)));
+                into.push(self.on_copies(self.blocks(tets, kind, blocks)));
             }
         }
         let offsets = [&model.springs.color_offsets, &model.attachments.color_offsets];
-        let single = [&kernels::SOLVE_SPRINGS, &kernels::SOLVE_ATTACHMENTS];
-        for (kernel, offsets) in single.into_iter().zip(offsets) {
+        for (kernel, offsets) in [springs, attachments].into_iter().zip(offsets) {
             let (first, end) = (offsets[color], offsets[color + 1]);
             if first < end {
                 let job = Job { first, count: end - first, ..Job::default() };
@@ -262,6 +304,7 @@ impl Recorder<'_> {
             AndersonOn::Multipliers => 2,
             AndersonOn::Both => 3,
         };
-        into.push(self.long(&kernels::ANDERSON_MIX, mixed));
+        let remembered = if self.mixes_remember { 4 } else { 0 };
+        into.push(self.long(&kernels::ANDERSON_MIX, mixed | remembered));
     }
 }

@@ -1,5 +1,5 @@
 // One colour of a sweep (solver/sweep.rs). Constraints of one colour share no copy, so that threads do
-// not meet. `points` holds the copies where vertices are split.
+// not meet. What is read and written, vertices or copies, says one of the files sweep_*.wgsl.
 
 // dl and dx over-relaxed, added to l and x.
 @compute @workgroup_size(64)
@@ -20,11 +20,11 @@ fn solve(
     let material = materials[kind];
     let rest_volume = tets[block].rest_volume[lane];
     let shape = shape_of(block, lane);
-    let corners = swept_corners(block, lane);
+    let places = read_places(block, lane);
     var x: array<vec3f, 4>;
     var w: array<f32, 4>;
     for (var i = 0u; i < 4u; i++) {
-        let point = points[corners[i]];
+        let point = points[places[i]];
         x[i] = point.xyz;
         w[i] = point.w;
     }
@@ -58,7 +58,8 @@ fn solve(
             x[i] += change.positions[i] * frame.relaxation_positions;
         }
     }
+    let written = write_places(block, lane);
     for (var i = 0u; i < 4u; i++) {
-        points[corners[i]] = vec4f(x[i], w[i]);
+        write_point(written[i], vec4f(x[i], w[i]));
     }
 }

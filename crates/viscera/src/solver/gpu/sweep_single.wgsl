@@ -1,6 +1,4 @@
-// Springs and attachments: one colour of a sweep (mode 0), or their loads (mode 1: J^T l, mode 2: squared
-// step times force). Threads below `job.first` do springs, the others attachments; the first of each
-// and their number stand in `set_first`, `multiplier_offset` and `viscous_offset`.
+// Springs and attachments in a sweep, one colour at a time (solver/sweep.rs); see sweep.wgsl.
 
 @compute @workgroup_size(64)
 fn solve_springs(
@@ -12,8 +10,8 @@ fn solve_springs(
         return;
     }
     let spring = springs[job.first + thread];
-    let a = points[spring.copies[0]];
-    let b = points[spring.copies[1]];
+    let a = points[read_place(spring.vertices[0], spring.copies[0])];
+    let b = points[read_place(spring.vertices[1], spring.copies[1])];
     let compliance_tilde = 1.0 / (spring.stiffness * frame.squared_dt);
     let l = multipliers[spring.multiplier];
     let change = spring_solve(
@@ -25,8 +23,10 @@ fn solve_springs(
     );
     multipliers[spring.multiplier] = l + frame.relaxation_multipliers * change.multiplier;
     let relaxation = frame.relaxation_positions;
-    points[spring.copies[0]] = vec4f(a.xyz + change.positions[0] * relaxation, a.w);
-    points[spring.copies[1]] = vec4f(b.xyz + change.positions[1] * relaxation, b.w);
+    let first = write_place(spring.vertices[0], spring.copies[0]);
+    let second = write_place(spring.vertices[1], spring.copies[1]);
+    write_point(first, vec4f(a.xyz + change.positions[0] * relaxation, a.w));
+    write_point(second, vec4f(b.xyz + change.positions[1] * relaxation, b.w));
 }
 
 @compute @workgroup_size(64)
@@ -40,7 +40,7 @@ fn solve_attachments(
     }
     let index = job.first + thread;
     let attachment = attachments[index];
-    let point = points[attachment.copy_index];
+    let point = points[read_place(attachment.vertex, attachment.copy_index)];
     let compliance_tilde = 1.0 / (attachment.stiffness * frame.squared_dt);
     let l = multipliers_of(attachment.multiplier);
     let change = attachment_solve(point.xyz, point.w, anchors[index].xyz, l, compliance_tilde);
@@ -49,39 +49,9 @@ fn solve_attachments(
     multipliers[attachment.multiplier + 1u] = after.y;
     multipliers[attachment.multiplier + 2u] = after.z;
     let x = point.xyz + change.position * frame.relaxation_positions;
-    points[attachment.copy_index] = vec4f(x, point.w);
+    write_point(write_place(attachment.vertex, attachment.copy_index), vec4f(x, point.w));
 }
 
 fn multipliers_of(first: u32) -> vec3f {
     return vec3f(multipliers[first], multipliers[first + 1u], multipliers[first + 2u]);
-}
-
-// J^T l and the bound of its geometric stiffness.
-@compute @workgroup_size(64)
-fn load_springs(
-    @builtin(global_invocation_id) id: vec3u,
-    @builtin(num_workgroups) groups: vec3u,
-) {
-    let thread = thread_of(id, groups, 64u);
-    if thread >= job.count {
-        return;
-    }
-    let spring = springs[thread];
-    let x = array<vec3f, 2>(points[spring.vertices[0]].xyz, points[spring.vertices[1]].xyz);
-    let load = spring_corner_loads(x, multipliers[spring.multiplier]);
-    loads[spring.slots[0]] = vec4f(load[0].impulse, load[0].mass_bound);
-    loads[spring.slots[1]] = vec4f(load[1].impulse, load[1].mass_bound);
-}
-
-@compute @workgroup_size(64)
-fn load_attachments(
-    @builtin(global_invocation_id) id: vec3u,
-    @builtin(num_workgroups) groups: vec3u,
-) {
-    let thread = thread_of(id, groups, 64u);
-    if thread >= job.count {
-        return;
-    }
-    let attachment = attachments[thread];
-    loads[attachment.slot] = vec4f(multipliers_of(attachment.multiplier), 0.0);
 }

@@ -1,0 +1,21 @@
+// Nothing is split: a sweep reads and writes the vertices themselves.
+
+fn read_places(block: u32, lane: u32) -> array<u32, 4> {
+    return vertices_of(block, lane);
+}
+
+fn write_places(block: u32, lane: u32) -> array<u32, 4> {
+    return vertices_of(block, lane);
+}
+
+fn read_place(vertex: u32, copy: u32) -> u32 {
+    return vertex;
+}
+
+fn write_place(vertex: u32, copy: u32) -> u32 {
+    return vertex;
+}
+
+fn write_point(place: u32, point: vec4f) {
+    points[place] = point;
+}
