@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::sync::OnceLock;
+
 use common::{SNH, STVK, block, material};
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
@@ -17,9 +19,13 @@ use viscera::state::State;
 
 const DT: f64 = 1.0 / 600.0;
 
-fn device() -> Device {
-    let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
-    adapter.open().unwrap_or_else(|error| panic!("{error}"))
+/// One device for all tests: kernels are compiled once.
+fn device() -> &'static Device {
+    static DEVICE: OnceLock<Device> = OnceLock::new();
+    DEVICE.get_or_init(|| {
+        let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
+        adapter.open().unwrap_or_else(|error| panic!("{error}"))
+    })
 }
 
 /// Two bars, one above the other, joined by springs; one of Saint Venant-Kirchhoff, the other viscous,
@@ -58,103 +64,204 @@ fn inputs_at<S: Real>(model: &Model<f64>, step: u32) -> Inputs<S> {
     inputs
 }
 
-fn largest(a: &[Vec3<f32>], b: &[Vec3<f64>]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a.cast::<f64>() - *b).length()).fold(0.0, f64::max)
+/// Root mean square of distances [m].
+fn distance(a: &[Vec3<f32>], b: &[Vec3<f64>]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| (a.cast::<f64>() - *b).length_squared());
+    (squares.sum::<f64>() / a.len() as f64).sqrt()
 }
 
-/// Largest distances [m] from the f64 run after some steps: CPU's, GPU's; and the largest displacement.
+/// Distances [m] from the f64 run, added up over moments of three motions: the CPU's and the GPU's; and
+/// how far things have moved.
 fn distances(device: &Device, settings: &SolverSettings, steps: u32) -> [f64; 3] {
     let (model32, model64) = (everything(settings), everything(settings));
     let double = SolverSettings { precision: Precision::F64, ..settings.clone() };
     let mut cpu = Solver::<f32>::new(&model32, settings);
     let mut oracle = Solver::<f64>::new(&model64, &double);
     let mut gpu = GpuSolver::new(device, &model32, settings).expect("a model that fits");
-    let (mut x32, mut x64) = (State::at_rest(&model32), State::at_rest(&model64));
-    for step in 0..steps {
-        cpu.step(&model32, &mut x32, &inputs_at(&model64, step), DT).expect("a legal step");
-        oracle.step(&model64, &mut x64, &inputs_at(&model64, step), DT).expect("a legal step");
-        gpu.step(&model32, &inputs_at(&model64, step), DT).expect("a legal step");
-    }
-    let mut read = State::at_rest(&model32);
-    gpu.read(&model32, &mut read).expect("a device");
     let rest = State::<f64>::at_rest(&model64);
-    [
-        largest(&x32.positions, &x64.positions),
-        largest(&read.positions, &x64.positions),
-        largest(&x32.positions, &rest.positions),
-    ]
+    let mut sums = [0.0; 3];
+    for tilt in [0.0, 3.0, -6.0] {
+        let (mut x32, mut x64) = (State::at_rest(&model32), State::at_rest(&model64));
+        gpu.write(&model32, &x32).expect("a state that fits");
+        let mut read = State::at_rest(&model32);
+        for step in 0..steps {
+            let mut inputs = inputs_at::<f32>(&model64, step);
+            let mut inputs64 = inputs_at::<f64>(&model64, step);
+            inputs.gravity.y = tilt as f32;
+            inputs64.gravity.y = tilt;
+            cpu.step(&model32, &mut x32, &inputs, DT).expect("a legal step");
+            oracle.step(&model64, &mut x64, &inputs64, DT).expect("a legal step");
+            gpu.step(&model32, &inputs, DT).expect("a legal step");
+            if (step + 1) % (steps / 3) == 0 {
+                gpu.read(&model32, &mut read).expect("a device");
+                sums[0] += distance(&x32.positions, &x64.positions);
+                sums[1] += distance(&read.positions, &x64.positions);
+                sums[2] += distance(&x32.positions, &rest.positions);
+            }
+        }
+    }
+    sums.map(|sum| sum / 9.0)
 }
 
+/// Two runs in single precision differ by their round-off, which has no reason to be the same: the device
+/// may be as far from the run in double precision as the CPU is, and as much again. Where the CPU is
+/// lucky, round-off of the places themselves, which are a tenth of a metre from the origin, stays.
+fn assert_agreement(name: &str, settings: &SolverSettings, steps: u32) {
+    let [cpu, gpu, moved] = distances(device(), settings, steps);
+    println!(
+        "{name}, {:?}: CPU {cpu:.2e} m, GPU {gpu:.2e} m, moved {moved:.2e} m",
+        settings.colors
+    );
+    let floor = 0.1 * f64::from(f32::EPSILON);
+    assert!(moved > 1e-3, "{name}: nothing moves");
+    assert!(gpu <= 2.0 * cpu.max(floor), "{name}: {settings:?}");
+}
+
+/// Exact at rest, as published, every form, over-relaxed; coloured, cliques, Jacobi.
 #[test]
-fn every_form_and_order_agrees_with_the_cpu() {
-    let device = device();
+fn sweeps_agree_with_the_cpu() {
     let plain = SolverSettings { step_guard: false, iterations: 3, ..SolverSettings::default() };
     let published = SolverSettings { rebase: false, keep_multipliers: false, ..plain.clone() };
+    let pair = SolverSettings { neo_hookean: NeoHookean::Pair, ..plain.clone() };
+    let relaxed = SolverSettings {
+        relaxation: 0.9,
+        relaxation_form: RelaxationForm::Published,
+        ..published.clone()
+    };
     for colors in [Colors::Unlimited, Colors::Limited(4), Colors::Limited(1)] {
-        for (name, settings) in [
-            ("exact", plain.clone()),
-            ("published", published.clone()),
-            ("pair", SolverSettings { neo_hookean: NeoHookean::Pair, ..plain.clone() }),
-            (
-                "relaxed",
-                SolverSettings {
-                    relaxation: 0.9,
-                    relaxation_form: RelaxationForm::Published,
-                    ..published.clone()
-                },
-            ),
-        ] {
-            let settings = SolverSettings { colors, ..settings };
-            let [cpu, gpu, moved] = distances(&device, &settings, 30);
-            println!("{name}, {colors:?}: CPU {cpu:e}, GPU {gpu:e}, moved {moved:e}");
+        let all =
+            [("exact", &plain), ("published", &published), ("pair", &pair), ("relaxed", &relaxed)];
+        for (name, settings) in all {
+            assert_agreement(name, &SolverSettings { colors, ..settings.clone() }, 120);
         }
     }
 }
 
 #[test]
-fn every_acceleration_agrees_with_the_cpu() {
-    let device = device();
+fn accelerations_agree_with_the_cpu() {
     let plain = SolverSettings { step_guard: false, iterations: 8, ..SolverSettings::default() };
+    let anderson = SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() };
+    let chebyshev = SolverSettings {
+        acceleration: Acceleration::Chebyshev,
+        chebyshev_delay: 3,
+        chebyshev_damping: 0.9,
+        ..plain
+    };
+    let long = SolverSettings {
+        anderson_window: 10,
+        anderson_guard: AndersonGuard::None,
+        ..anderson.clone()
+    };
+    let on = |anderson_on| SolverSettings { anderson_on, ..anderson.clone() };
     for colors in [Colors::Unlimited, Colors::Limited(1)] {
         for (name, settings) in [
-            (
-                "chebyshev",
-                SolverSettings {
-                    acceleration: Acceleration::Chebyshev,
-                    chebyshev_delay: 3,
-                    ..plain.clone()
-                },
-            ),
-            ("anderson", SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() }),
-            (
-                "anderson 10 unguarded",
-                SolverSettings {
-                    acceleration: Acceleration::Anderson,
-                    anderson_window: 10,
-                    anderson_guard: AndersonGuard::None,
-                    ..plain.clone()
-                },
-            ),
-            (
-                "anderson on multipliers",
-                SolverSettings {
-                    acceleration: Acceleration::Anderson,
-                    anderson_on: AndersonOn::Multipliers,
-                    ..plain.clone()
-                },
-            ),
-            (
-                "anderson on positions",
-                SolverSettings {
-                    acceleration: Acceleration::Anderson,
-                    anderson_on: AndersonOn::Positions,
-                    ..plain.clone()
-                },
-            ),
+            ("Chebyshev", chebyshev.clone()),
+            ("Anderson", anderson.clone()),
+            ("Anderson, window 10", long.clone()),
+            ("Anderson on multipliers", on(AndersonOn::Multipliers)),
+            ("Anderson on positions", on(AndersonOn::Positions)),
         ] {
-            let settings = SolverSettings { colors, ..settings };
-            let [cpu, gpu, moved] = distances(&device, &settings, 30);
-            println!("{name}, {colors:?}: CPU {cpu:e}, GPU {gpu:e}, moved {moved:e}");
+            assert_agreement(name, &SolverSettings { colors, ..settings }, 30);
         }
     }
+}
+
+/// The bits of everything that moves after some steps.
+fn bits(model: &Model<f32>, gpu: &mut GpuSolver, steps: u32) -> Vec<u32> {
+    let double: Model<f64> = everything(gpu.settings());
+    for step in 0..steps {
+        gpu.step(model, &inputs_at(&double, step), DT).expect("a legal step");
+    }
+    let mut state = State::at_rest(model);
+    gpu.read(model, &mut state).expect("a device");
+    let vectors = state.positions.iter().chain(&state.velocities).flat_map(|v| v.to_array());
+    vectors.chain(state.multipliers).map(f32::to_bits).collect()
+}
+
+/// Ten runs, also after another scene ran and on memory that was used before.
+#[test]
+fn a_device_gives_the_same_bits_again() {
+    let settings = SolverSettings {
+        colors: Colors::Limited(4),
+        acceleration: Acceleration::Anderson,
+        ..SolverSettings::default()
+    };
+    let model = everything(&settings);
+    let run = |left_over: Option<f32>, steps| {
+        let gpu = match left_over {
+            None => GpuSolver::new(device(), &model, &settings),
+            Some(value) => GpuSolver::on_used_memory(device(), &model, &settings, value),
+        };
+        bits(&model, &mut gpu.expect("a model that fits"), steps)
+    };
+    let first = run(None, 300);
+    let other = SolverSettings::default();
+    let other_model = everything(&other);
+    let mut another = GpuSolver::new(device(), &other_model, &other).expect("a model that fits");
+    for again in 0..9 {
+        if again == 4 {
+            bits(&other_model, &mut another, 20);
+        }
+        let left_over = [None, Some(f32::NAN), Some(1e9)][again % 3];
+        assert_eq!(run(left_over, 300), first, "run {again}, memory held {left_over:?}");
+    }
+}
+
+/// Published order, no rebase: what the device is asked to do in one iteration.
+#[test]
+fn dispatches_of_an_iteration_are_few() {
+    let jacobi = SolverSettings {
+        colors: Colors::Limited(1),
+        rebase: false,
+        keep_multipliers: false,
+        ..SolverSettings::default()
+    };
+    let mut builder = ModelBuilder::new();
+    let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
+    builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
+    for (acceleration, most) in [(Acceleration::None, 2), (Acceleration::Anderson, 4)] {
+        let settings = SolverSettings { acceleration, ..jacobi.clone() };
+        let model = builder.build(&settings).expect("a model");
+        let gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
+        let [before, iteration, after] = gpu.dispatches();
+        println!("{acceleration:?}: {before} + {iteration} per iteration + {after}");
+        assert!(iteration <= most, "{acceleration:?}: {iteration}");
+    }
+}
+
+/// Frames come while steps go on; none is older than the one before it.
+#[test]
+fn frames_arrive_without_waiting() {
+    let settings = SolverSettings::default();
+    let (model, double) = (everything(&settings), everything(&settings));
+    let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
+    let (mut seen, mut refused) = (Vec::new(), 0);
+    for step in 0..200 {
+        gpu.step(&model, &inputs_at(&double, step), DT).expect("a legal step");
+        refused += u32::from(gpu.request().is_none());
+        seen.extend(gpu.newest(&model).map(|frame| frame.number));
+    }
+    let mut state = State::at_rest(&model);
+    gpu.read(&model, &mut state).expect("a device");
+    let last = gpu.newest(&model).expect("the last frame has arrived by now");
+    assert!(seen.is_sorted_by(|a, b| a < b) && !seen.is_empty(), "{seen:?}, {refused} refused");
+    assert!(seen.iter().all(|&number| number < last.number));
+    if refused == 0 {
+        assert_eq!(last.positions, state.positions);
+    }
+}
+
+/// A model over the limits is refused before anything is allocated, with the numbers.
+#[test]
+fn a_model_over_the_limits_is_refused() {
+    let settings = SolverSettings::default();
+    let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
+    let limits = wgpu::Limits {
+        max_storage_buffer_binding_size: 1 << 13,
+        ..viscera::solver::gpu::baseline()
+    };
+    let small = adapter.open_with(limits).expect("a device");
+    let error = GpuSolver::new(&small, &everything(&settings), &settings).expect_err("too large");
+    let text = error.to_string();
+    assert!(text.contains("binds at most 8192") && text.contains("or fewer"), "{text}");
 }

@@ -291,10 +291,13 @@ fn chebyshev_mix(
     let omega = control.omega;
     let gamma = frame.chebyshev_damping;
     var next = unknowns[i];
-    if omega != 1.0 || gamma != 1.0 {
+    if omega != 1.0 {
         next = omega * (gamma * (next - q) + q - before) + before;
-        unknowns[i] = next;
+    } else if gamma != 1.0 {
+        // There need not be anything before the first iterate.
+        next = gamma * (next - q) + q;
     }
+    unknowns[i] = next;
     older[i] = q;
     iterate[i] = next;
 }

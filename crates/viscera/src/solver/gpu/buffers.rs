@@ -138,6 +138,7 @@ impl Buffers {
         model: &Model<f32>,
         settings: &SolverSettings,
         layout: &Layout,
+        left_over: &[u8],
     ) -> Result<Self, GpuError> {
         let vertices = model.vertex_count() as u64;
         let points_size = 16 * vertices;
@@ -201,13 +202,18 @@ impl Buffers {
 
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let make = |label: &str, size: u64, usage: BufferUsages| {
-            device.device.create_buffer(&wgpu::BufferDescriptor {
+            let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
                 // A binding is never empty.
                 size: size.max(512).next_multiple_of(16),
                 usage,
                 mapped_at_creation: false,
-            })
+            });
+            if !left_over.is_empty() {
+                let memory = left_over.repeat(buffer.size() as usize / left_over.len());
+                device.queue.write_buffer(&buffer, 0, &memory);
+            }
+            buffer
         };
         let filled = |label: &str, bytes: &[u8]| {
             let buffer = make(label, bytes.len() as u64, usage);

@@ -6,18 +6,18 @@ use crate::model::Model;
 use crate::scalar::lanes::LANES;
 
 /// Bytes of `Control`, and of `Part`, in control.wgsl.
-pub(super) const CONTROL_SIZE: u64 = 528;
+pub(super) const CONTROL_SIZE: u64 = 520;
 pub(super) const PART_SIZE: u64 = 96;
 
 /// The material of a lane that only fills a block up.
-const FILLING: u32 = u32::MAX;
+pub(super) const FILLING: u32 = u32::MAX;
 
 /// Workgroups that sum products of long vectors: enough to keep a large device busy, few enough for one
 /// workgroup to add up what they leave.
 pub(super) const SUM_GROUPS: u32 = 512;
 
 /// Sums that a workgroup of Anderson's leaves.
-const PRODUCTS: u64 = 21;
+pub(super) const PRODUCTS: u64 = 21;
 
 /// Elements or vertices whose energies one workgroup sums, and the numbers that it leaves.
 pub(super) const PIECE: usize = 512;

@@ -104,13 +104,34 @@ impl GpuSolver {
         model: &Model<f32>,
         settings: &SolverSettings,
     ) -> Result<Self, GpuError> {
+        Self::with_memory(device, model, settings, &[])
+    }
+
+    /// As [`GpuSolver::new`], with memory that held something before, for a test that nothing of it is
+    /// ever read.
+    #[doc(hidden)]
+    pub fn on_used_memory(
+        device: &Device,
+        model: &Model<f32>,
+        settings: &SolverSettings,
+        left_over: f32,
+    ) -> Result<Self, GpuError> {
+        Self::with_memory(device, model, settings, &left_over.to_ne_bytes())
+    }
+
+    fn with_memory(
+        device: &Device,
+        model: &Model<f32>,
+        settings: &SolverSettings,
+        left_over: &[u8],
+    ) -> Result<Self, GpuError> {
         if settings.precision == Precision::F64 {
             return Err(GpuError::DoublePrecision);
         }
         device.check()?;
         let plan = Plan::new(model, settings);
         let layout = Layout::new(model);
-        let buffers = Buffers::new(device, model, settings, &layout)?;
+        let buffers = Buffers::new(device, model, settings, &layout, left_over)?;
         let recorder = Recorder {
             model,
             settings,
@@ -232,10 +253,14 @@ impl GpuSolver {
             order.map(|&v| values[v as usize].to_array()).map(|[x, y, z]| [x, y, z, 0.0]).collect()
         };
         let queue = &self.device.queue;
-        let unknowns = self.buffers.buffer(Slot::Unknowns);
-        queue.write_buffer(unknowns, 0, bytemuck::cast_slice(&sorted(&state.positions)));
-        let start = self.buffers.multipliers_start;
-        queue.write_buffer(unknowns, start, bytemuck::cast_slice(&state.multipliers));
+        let mut unknowns = vec![0.0f32; self.buffers.length as usize];
+        let (positions, multipliers) =
+            unknowns.split_at_mut((self.buffers.multipliers_start / 4) as usize);
+        let places = sorted(&state.positions);
+        positions[..4 * places.len()].copy_from_slice(places.as_flattened());
+        multipliers[..state.multipliers.len()].copy_from_slice(&state.multipliers);
+        let buffer = self.buffers.buffer(Slot::Unknowns);
+        queue.write_buffer(buffer, 0, bytemuck::cast_slice(&unknowns));
         let velocities = self.buffers.buffer(Slot::Velocities);
         queue.write_buffer(velocities, 0, bytemuck::cast_slice(&sorted(&state.velocities)));
         self.multiplier_dt = state.multiplier_dt;
@@ -384,6 +409,8 @@ impl GpuSolver {
             (0..order.len()).map(|v| [0.0, 0.0, 0.0, w(v)]).collect()
         };
         let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
+        let control = [0u8; layout::CONTROL_SIZE as usize];
+        self.device.queue.write_buffer(self.buffers.buffer(Slot::Control), 0, &control);
         for (slot, values) in [
             (Slot::Predicted, with_w(&|v| masses[v])),
             (Slot::Acting, with_w(&|v| 1.0 / masses[v])),
@@ -435,4 +462,57 @@ fn norm_weights(
         }
     }
     weights
+}
+
+/// Name, bytes, and the name and place [bytes] of every field.
+pub type HostLayout = (&'static str, usize, Vec<(&'static str, usize)>);
+
+/// Records that host and kernels share, as the host lays them out: for the test that compares both.
+#[doc(hidden)]
+pub fn host_layouts() -> Vec<HostLayout> {
+    macro_rules! record {
+        ($name:literal $record:ty { $($field:ident)* }) => {
+            (
+                $name,
+                size_of::<$record>(),
+                vec![$((stringify!($field), std::mem::offset_of!($record, $field))),*],
+            )
+        };
+    }
+    use buffers::{Attachment, Spring};
+    vec![
+        record!("Job" Job {
+            first count set_first multiplier_offset viscous_offset is_viscous is_neo_hookean mode
+            parameter
+        }),
+        record!("Frame" FrameConstants {
+            gravity dt squared_dt inverse_dt rescale relaxation_multipliers relaxation_positions
+            rebase_factor bound_share update_count small_dt inverse_small_dt small_steps
+            chebyshev_damping
+        }),
+        record!("Update" Update { vertex is_pinned force place }),
+        record!("Spring" Spring {
+            vertices copies slots multiplier rest_length stiffness part
+        }),
+        record!("Attachment" Attachment {
+            vertex copy_index slot multiplier stiffness part
+        }),
+        record!("TetBlock" crate::model::TetBlock<f32> {
+            vertices inverse_rest_shape rest_volume material
+        }),
+    ]
+}
+
+/// Constants that host and kernels share, and sizes [bytes] of records that only kernels write.
+#[doc(hidden)]
+pub fn host_constants() -> ([(&'static str, u32); 4], [(&'static str, u64); 2]) {
+    use super::acceleration::LARGEST_WINDOW;
+    use crate::scalar::lanes::LANES;
+    let constants = [
+        ("LANES", LANES as u32),
+        ("FILLING", layout::FILLING),
+        ("LARGEST_WINDOW", LARGEST_WINDOW as u32),
+        ("PRODUCTS", layout::PRODUCTS as u32),
+    ];
+    (constants, [("Control", layout::CONTROL_SIZE), ("Part", layout::PART_SIZE)])
 }
