@@ -1,5 +1,6 @@
 //! Project chores: `cargo xtask test`, `cargo xtask peers`.
 
+mod drivers;
 mod peers;
 
 use std::path::Path;
@@ -17,14 +18,18 @@ Commands:
             format          cargo fmt --all --check
             lints           cargo clippy --workspace --all-targets -- -D warnings
             documentation   cargo doc --workspace --no-deps, warnings are errors
-            tests           cargo test --workspace
+            tests           cargo test --workspace, on a graphics driver; installs a software one
+                            where there is none and apt-get may
+            second driver   the tests of kernels once more, on a stricter software driver, where
+                            there is one
             main job        the `viscera` program runs a scene for two frames and draws it
   peers   Compare with other simulators and write docs/peers.md; `cargo xtask peers --help`
   help    Print this text
 
 Options of `test`:
   --required    Optional parts become mandatory: tests that need real data fail, instead of
-                being skipped, when VISCERA_DATA is not set. Sets VISCERA_REQUIRE=1
+                being skipped, when VISCERA_DATA is not set, and the second driver is installed.
+                Sets VISCERA_REQUIRE=1
 
 Real data is found through the environment variable VISCERA_DATA, a folder.
 While working, `cargo test -p viscera <name>` runs the tests whose name contains <name>.";
@@ -70,7 +75,17 @@ fn test(required: bool) -> ExitCode {
     let output = std::env::temp_dir().join(format!("viscera-main-job-{}", std::process::id()));
     let mut times: Vec<(&str, Duration)> = Vec::new();
     let mut failure = None;
-    for mut step in steps(&output) {
+    let second = match drivers::ensure().and_then(|()| drivers::second(required)) {
+        Ok(second) => second,
+        Err(next_move) => {
+            eprintln!("\nno graphics driver for the tests: {next_move}");
+            return ExitCode::FAILURE;
+        }
+    };
+    if second.is_none() {
+        println!("The second graphics driver is not installed: the first one has to do.");
+    }
+    for mut step in steps(&output, second.as_deref()) {
         println!("\n== {}: {}", step.title, shown(&step.command));
         if let Some(component) = step.component
             && !has_component(component)
@@ -113,7 +128,7 @@ fn test(required: bool) -> ExitCode {
     }
 }
 
-fn steps(output: &Path) -> Vec<Step> {
+fn steps(output: &Path, second_driver: Option<&Path>) -> Vec<Step> {
     let mut documentation = cargo(&["doc", "--workspace", "--no-deps"]);
     documentation.env("RUSTDOCFLAGS", "-Dwarnings");
     let mut steps = vec![
@@ -142,6 +157,19 @@ fn steps(output: &Path) -> Vec<Step> {
             component: None,
         },
     ];
+    if let Some(driver) = second_driver {
+        let mut command = cargo(&["test", "--workspace", "--test", "twins", "--test", "gpu", "--"]);
+        command.args(["twin", "portable"]);
+        for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
+            command.env(variable, driver);
+        }
+        steps.push(Step {
+            title: "second driver",
+            command,
+            next_move: "Run the command above with VK_DRIVER_FILES set to that driver's file.",
+            component: None,
+        });
+    }
     let mut main_job = cargo(&["run", "--release", "--", "run", MAIN_JOB_SCENE]);
     main_job.args(["--frames", "2", "--out"]).arg(output);
     steps.push(Step {
