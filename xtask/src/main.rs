@@ -159,7 +159,7 @@ fn steps(output: &Path, second_driver: Option<&Path>) -> Vec<Step> {
     ];
     if let Some(driver) = second_driver {
         let mut command = cargo(&["test", "--workspace", "--test", "twins", "--test", "gpu", "--"]);
-        command.args(["twin", "portable"]);
+        command.args(["device_errs", "nasty", "portable"]);
         for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
             command.env(variable, driver);
         }
