@@ -21,7 +21,11 @@ pub fn ensure() -> Result<(), String> {
         return Ok(());
     }
     install(&PACKAGES)?;
-    if has_driver() { Ok(()) } else { Err(format!("no Vulkan driver is installed. {}", advice(&PACKAGES))) }
+    if has_driver() {
+        Ok(())
+    } else {
+        Err(format!("no Vulkan driver is installed. {}", advice(&PACKAGES)))
+    }
 }
 
 /// The second driver's file; nothing where it may be missing and is.

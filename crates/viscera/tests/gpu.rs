@@ -147,7 +147,8 @@ fn portable_steps_agree_with_the_cpu() {
         ..SolverSettings::default()
     };
     for colors in [Colors::Limited(4), Colors::Limited(1)] {
-        let [cpu, gpu, moved] = distances(device(), &SolverSettings { colors, ..settings.clone() }, 3);
+        let [cpu, gpu, moved] =
+            distances(device(), &SolverSettings { colors, ..settings.clone() }, 3);
         println!("{colors:?}: CPU {cpu:.2e} m, GPU {gpu:.2e} m, moved {moved:.2e} m");
         assert!(moved > 1e-5 && gpu <= 2.0 * cpu.max(0.1 * f64::from(f32::EPSILON)), "{colors:?}");
     }

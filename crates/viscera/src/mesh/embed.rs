@@ -80,6 +80,11 @@ impl Embedding {
         &self.tets
     }
 
+    /// How many vertices the tetrahedra have.
+    pub fn tet_vertex_count(&self) -> usize {
+        self.tet_vertex_count
+    }
+
     /// That tetrahedron's vertices, shape `[surface_vertex_count]`.
     pub fn corners(&self) -> &[[u32; 4]] {
         &self.corners

@@ -80,16 +80,16 @@ fn element_stiffness(shape: &Mat3<f64>, [lambda, mu]: [f64; 2]) -> f64 {
     value
 }
 
-impl<S: Real> Workspace<S> {
-    /// How many small steps make a step of `dt` [s].
-    pub fn small_steps(&self, dt: f64) -> Result<u32, StepError> {
-        let count = (dt / self.stable_step).ceil().max(1.0);
-        if count <= MOST_SMALL_STEPS {
-            return Ok(count as u32);
-        }
-        Err(StepError::TooStiff { dt, stable: self.stable_step })
+/// How many small steps, of `stable` [s] at most, make a step of `dt` [s].
+pub(super) fn small_steps(dt: f64, stable: f64) -> Result<u32, StepError> {
+    let count = (dt / stable).ceil().max(1.0);
+    if count <= MOST_SMALL_STEPS {
+        return Ok(count as u32);
     }
+    Err(StepError::TooStiff { dt, stable })
+}
 
+impl<S: Real> Workspace<S> {
     /// [`super::plan::Stage::BeginExplicit`].
     pub(super) fn begin_explicit(&mut self, step: &Step<'_, S>) {
         let model = step.model;

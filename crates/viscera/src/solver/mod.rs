@@ -177,7 +177,7 @@ impl<S: Real> Solver<S> {
         let Self { settings, plan, work } = self;
         let (repeat, small_steps) = match settings.method {
             Method::Xpbd => (plan.repeat, 1),
-            Method::Explicit => [work.small_steps(dt)?; 2].into(),
+            Method::Explicit => [explicit::small_steps(dt, work.stable_step)?; 2].into(),
         };
         let step = cpu::Step { model, inputs, dt, settings, small_steps };
         carry_out(Task::Step(plan, repeat), work, &step, state);

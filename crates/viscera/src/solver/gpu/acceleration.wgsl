@@ -35,6 +35,7 @@ fn remember_iterate(
 
 @compute @workgroup_size(1)
 fn start_acceleration() {
+    atomicStore(&control.is_broken, 0u);
     control.sweeps = 0u;
     control.next = 0u;
     control.differences = 0u;

@@ -74,6 +74,9 @@ struct Job {
     mode: u32,
     // A number that only the kernel understands.
     parameter: f32,
+    // Of a kernel that does all constraints: threads of tetrahedra, then of springs; attachments follow.
+    tet_count: u32,
+    spring_count: u32,
 }
 
 // Constants of a step.
@@ -119,7 +122,8 @@ struct Frame {
 @group(0) @binding(10) var<storage, read_write> predicted: array<vec4f>;
 // External force [N] without gravity; w: inverse mass [1/kg], zero where pinned.
 @group(0) @binding(11) var<storage, read_write> acting: array<vec4f>;
-// Where pinned vertices are at the end of the step [m].
+// Where pinned vertices are at the end of the step [m], and in the explicit method where the attachments
+// of others pull to, with their stiffness in w [N/m].
 @group(0) @binding(12) var<storage, read_write> targets: array<vec4f>;
 @group(0) @binding(13) var<storage, read> updates: array<Update>;
 // Green strain at the start of the step, per block and component, where tissue is viscous.

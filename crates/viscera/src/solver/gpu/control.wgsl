@@ -34,7 +34,7 @@ struct Control {
     noise: f32,
     kept_speed: f32,
     // Multipliers that are no numbers were found.
-    is_broken: u32,
+    is_broken: atomic<u32>,
 }
 
 // Sums over the free vertices of a connected part; see energy.rs.

@@ -1,5 +1,7 @@
 //! What can go wrong with a graphics processor.
 
+use crate::mesh::embed::EmbeddingError;
+
 /// Why the GPU backend cannot do what was asked. Nothing was changed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -51,6 +53,24 @@ pub enum GpuError {
         /// Tetrahedra that would fit, in proportion.
         largest: u64,
     },
+    /// A fine surface is too large for the device.
+    #[error(
+        "a surface needs an array of {needed} bytes, and {name} binds at most {limit}: use one of about \
+         {largest} vertices or fewer"
+    )]
+    SurfaceTooLarge {
+        /// The size of the array [bytes].
+        needed: u64,
+        /// What the device allows [bytes].
+        limit: u64,
+        /// The adapter.
+        name: String,
+        /// Vertices that would fit, in proportion.
+        largest: u64,
+    },
+    /// A surface was bound to other tetrahedra.
+    #[error("a surface does not fit the model: {0}; bind it to the mesh that the model is made of")]
+    Embedding(#[from] EmbeddingError),
     /// The device was lost.
     #[error("{name} was lost ({reason}); what was finished is kept")]
     Lost {

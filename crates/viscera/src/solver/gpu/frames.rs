@@ -3,6 +3,7 @@
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use super::buffers::{Buffers, Slot};
+use super::device::Device;
 use super::{GpuError, GpuSolver};
 use crate::model::Model;
 use crate::scalar::{Vec3, vec3};
@@ -58,7 +59,7 @@ impl GpuSolver {
         let size = self.buffers.points_size;
         let buffer = match self.frames.free.pop() {
             Some(buffer) => buffer,
-            None if self.frames.under_way.len() < RING => self.staging(size),
+            None if self.frames.under_way.len() < RING => staging(&self.device, size),
             None => return None,
         };
         let mut encoder = self.encoder("frame");
@@ -105,15 +106,6 @@ impl GpuSolver {
         }
     }
 
-    fn staging(&self, size: u64) -> wgpu::Buffer {
-        self.device.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("frame"),
-            size,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        })
-    }
-
     /// Waits for the device and reads its whole state.
     pub fn read(&self, model: &Model<f32>, state: &mut State<f32>) -> Result<(), GpuError> {
         let unknowns = self.read_buffer(Slot::Unknowns)?;
@@ -133,26 +125,40 @@ impl GpuSolver {
 
     /// Waits for the device and reads a buffer.
     pub(super) fn read_buffer(&self, slot: Slot) -> Result<Vec<u8>, GpuError> {
-        let buffer = self.buffers.buffer(slot);
-        let staging = self.staging(buffer.size());
-        let mut encoder = self.encoder("read");
-        encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
-        self.device.queue.submit([encoder.finish()]);
-        let (told, heard) = channel();
-        staging.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-            let _ = told.send(result.is_ok());
-        });
-        let lost = |reason: String| GpuError::Lost { name: self.device.name().to_owned(), reason };
-        let polled = self.device.device.poll(wgpu::PollType::wait_indefinitely());
-        polled.map_err(|error| lost(error.to_string()))?;
-        self.device.check()?;
-        if heard.recv() != Ok(true) {
-            return Err(lost("its memory could not be read".into()));
-        }
-        let bytes = staging.slice(..).get_mapped_range();
-        let bytes = bytes.map_err(|error| lost(error.to_string()))?;
-        Ok(bytes.to_vec())
+        read(&self.device, self.buffers.buffer(slot))
     }
+}
+
+fn staging(device: &Device, size: u64) -> wgpu::Buffer {
+    device.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("frame"),
+        size,
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+/// Waits for the device and reads a buffer.
+pub(super) fn read(device: &Device, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
+    let staging = staging(device, buffer.size());
+    let descriptor = wgpu::CommandEncoderDescriptor { label: Some("read") };
+    let mut encoder = device.device.create_command_encoder(&descriptor);
+    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+    device.queue.submit([encoder.finish()]);
+    let (told, heard) = channel();
+    staging.slice(..).map_async(wgpu::MapMode::Read, move |result| {
+        let _ = told.send(result.is_ok());
+    });
+    let lost = |reason: String| GpuError::Lost { name: device.name().to_owned(), reason };
+    let polled = device.device.poll(wgpu::PollType::wait_indefinitely());
+    polled.map_err(|error| lost(error.to_string()))?;
+    device.check()?;
+    if heard.recv() != Ok(true) {
+        return Err(lost("its memory could not be read".into()));
+    }
+    let bytes = staging.slice(..).get_mapped_range();
+    let bytes = bytes.map_err(|error| lost(error.to_string()))?;
+    Ok(bytes.to_vec())
 }
 
 fn in_user_order(model: &Model<f32>, places: &[[f32; 4]]) -> Vec<Vec3<f32>> {

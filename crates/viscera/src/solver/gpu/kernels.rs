@@ -4,6 +4,7 @@ use super::buffers::Slot;
 use super::device::{Device, Pipeline};
 use crate::elements::TetForm;
 use crate::elements::wgsl;
+use crate::solver::potential::TISSUE_WGSL;
 
 /// A kernel: an entry point of one of the files, with the storage that it names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -30,6 +31,8 @@ pub enum File {
     Strain,
     Multipliers,
     Acceleration,
+    History,
+    Explicit,
 }
 
 /// What the text of a file depends on, beside the kernel.
@@ -104,6 +107,16 @@ kernels! {
     ANDERSON_MIX = Acceleration "anderson_mix" 256 [Unknowns Iterate Mapped Control];
     CHEBYSHEV_CHANGE = Acceleration "chebyshev_change" 128 [Unknowns Iterate Weights PartialSums];
     CHEBYSHEV_WEIGHT = Acceleration "chebyshev_weight" 128 [PartialSums Control];
+    FIND_BROKEN = History "find_broken" 256 [Unknowns Control];
+    REPAIR_MULTIPLIERS = History "repair_multipliers" 64
+        [Tets Materials StartStrain Unknowns Control Springs Attachments Anchors];
+    BEGIN_EXPLICIT = Explicit "begin_explicit" 64 [Points Velocities Previous Predicted Control];
+    BEGIN_STRAIN = Explicit "begin_strain" 64 [Tets Points Predicted StartStrain];
+    LOAD_FORCES = Explicit "load_forces" 64
+        [Tets Materials CornerIndices Points Loads StartStrain Control Springs];
+    ADVANCE_EXPLICIT = Explicit "advance_explicit" 64
+        [Offsets Points Loads Velocities Previous Acting Targets Control];
+    END_EXPLICIT = Explicit "end_explicit" 64 [Points Velocities Predicted Acting];
     CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control];
 }
 
@@ -158,13 +171,26 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
         File::Strain => texts.push(include_str!("strain.wgsl")),
         File::Multipliers => texts.push(include_str!("multipliers.wgsl")),
         File::Acceleration => texts.push(include_str!("acceleration.wgsl")),
+        File::History => {
+            // Functions of the tissue name those of both laws.
+            if variant.form == TetForm::GreenStrain {
+                texts.push(wgsl::NEO_HOOKEAN);
+            }
+            texts.extend(form());
+            texts.extend(single);
+            texts.extend([TISSUE_WGSL, include_str!("history.wgsl")]);
+        }
+        File::Explicit => {
+            texts.extend([wgsl::NEO_HOOKEAN, wgsl::SPRING, TISSUE_WGSL]);
+            texts.extend([include_str!("vertices.wgsl"), include_str!("explicit.wgsl")]);
+        }
     }
     texts.join("\n")
 }
 
 /// Whether the text depends on the variant.
 fn varies(kernel: &Kernel) -> bool {
-    matches!(kernel.file, File::Sweep | File::SweepSingle | File::Loads)
+    matches!(kernel.file, File::Sweep | File::SweepSingle | File::Loads | File::History)
 }
 
 /// Compiles a kernel, or finds it compiled.

@@ -13,29 +13,37 @@
 mod buffers;
 mod device;
 mod error;
+mod explicit;
 mod frames;
+mod history;
 pub mod kernels;
 mod layout;
 mod record;
+mod surface;
 
 use bytemuck::{Pod, Zeroable};
 
 use super::Inputs;
 use super::StepError;
 use super::cpu::{bound_share, fill_multiplier_weights, rebase_factor};
+use super::explicit::{small_steps, stable_step};
 use super::plan::Plan;
 use crate::model::Model;
 use crate::scalar::Vec3;
-use crate::settings::{Acceleration, AndersonOn, Precision, RelaxationForm, SolverSettings};
+use crate::settings::{
+    Acceleration, AndersonOn, Method, Precision, RelaxationForm, SolverSettings,
+};
 use crate::state::State;
 pub use buffers::Slot;
 use buffers::{Buffers, Update};
 pub use device::{Adapter, Device, baseline};
 pub use error::GpuError;
+use explicit::Hold;
 pub use frames::Frame;
 use frames::Frames;
 use layout::Layout;
 use record::{Dispatch, Job, Recorder};
+pub use surface::{GpuSurface, Skin};
 
 /// `Frame` of bindings.wgsl.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -73,6 +81,11 @@ const JOB_STRIDE: u64 = 256;
 /// The most workgroups along one axis in the baseline.
 const MOST_GROUPS: u32 = 65_535;
 
+/// Iterations, or small steps of the explicit method, in one submission. Drivers reset a device whose
+/// submission takes seconds; 256 small steps of a million tetrahedra take a tenth of that, and a
+/// submission costs less than one of them.
+const MOST_REPEATS: u32 = 256;
+
 /// A solver for one model on a graphics processor, in single precision.
 #[derive(Debug)]
 pub struct GpuSolver {
@@ -84,6 +97,7 @@ pub struct GpuSolver {
     frame: wgpu::Buffer,
     jobs: wgpu::Buffer,
     ready: [Vec<Ready>; 3],
+    restart: Vec<Ready>,
     frames: Frames,
     /// What the device's multipliers belong to [s]; zero before the first step.
     multiplier_dt: f64,
@@ -95,6 +109,11 @@ pub struct GpuSolver {
     shares: [f32; 2],
     /// The step [s] that the norm's weights on the device belong to.
     weights_dt: f64,
+    /// Whether the device's anchors may be elsewhere than at rest.
+    has_moved_anchors: bool,
+    /// Of the explicit method: its largest small step [s], and the attachments vertex by vertex.
+    stable_step: f64,
+    holds: Vec<Hold>,
 }
 
 impl GpuSolver {
@@ -141,7 +160,7 @@ impl GpuSolver {
             mixes_remember: Recorder::mixes_remember(&plan),
         };
         let record = recorder.record(&plan);
-        let lists = [record.prologue, record.body, record.epilogue];
+        let lists = [record.prologue, record.body, record.epilogue, record.restart];
         let wgpu = &device.device;
         let make = |label, size, usage| {
             wgpu.create_buffer(&wgpu::BufferDescriptor {
@@ -171,7 +190,7 @@ impl GpuSolver {
             ],
         });
         let mut next = 0;
-        let ready = lists.map(|list| {
+        let [prologue, body, epilogue, restart] = lists.map(|list| {
             let prepare = |dispatch: &Dispatch| {
                 let offset = next;
                 next += JOB_STRIDE;
@@ -180,6 +199,7 @@ impl GpuSolver {
             };
             list.iter().map(prepare).collect()
         });
+        let is_explicit = settings.method == Method::Explicit;
         let mut solver = Self {
             frames: Frames::new(&buffers),
             weights_dt: 0.0,
@@ -189,13 +209,17 @@ impl GpuSolver {
             uniforms,
             frame,
             jobs,
-            ready,
+            ready: [prologue, body, epilogue],
+            restart,
             buffers,
             multiplier_dt: 0.0,
             touched: Vec::new(),
             updates: Vec::new(),
             update_of: vec![u32::MAX; model.vertex_count()],
             shares: [rebase_factor(model, settings) as f32, bound_share(model) as f32],
+            has_moved_anchors: true,
+            stable_step: if is_explicit { stable_step(model, settings) } else { f64::INFINITY },
+            holds: if is_explicit { Hold::all(model) } else { Vec::new() },
         };
         solver.upload_constants(model);
         let rest = State::at_rest(model);
@@ -211,6 +235,11 @@ impl GpuSolver {
     /// The stages of a step.
     pub fn plan(&self) -> &Plan {
         &self.plan
+    }
+
+    /// The largest small step [s] of the explicit method, its margin included; infinite for others.
+    pub fn stable_step(&self) -> f64 {
+        self.stable_step
     }
 
     /// The device it works on.
@@ -266,8 +295,8 @@ impl GpuSolver {
         self.multiplier_dt = state.multiplier_dt;
     }
 
-    /// Advances the state on the device by one step of `dt` [s]: one submission, no waiting. On an
-    /// error nothing has moved.
+    /// Advances the state on the device by one step of `dt` [s]: one submission, or several where there are
+    /// many small steps, and no waiting. On an error nothing has moved.
     pub fn step(
         &mut self,
         model: &Model<f32>,
@@ -275,23 +304,39 @@ impl GpuSolver {
         dt: f64,
     ) -> Result<(), StepError> {
         super::check_step(dt, model, inputs)?;
-        let mut encoder = self.encoder("step");
-        self.prepare_step(model, inputs, dt);
-        {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some("step"),
-                timestamp_writes: None,
-            });
-            let [prologue, body, epilogue] = &self.ready;
-            self.send(&mut pass, prologue);
-            for _ in 0..self.plan.repeat {
-                self.send(&mut pass, body);
-            }
-            self.send(&mut pass, epilogue);
+        let (mut left, small_steps) = match self.settings.method {
+            Method::Xpbd => (self.plan.repeat, 1),
+            Method::Explicit => [small_steps(dt, self.stable_step)?; 2].into(),
+        };
+        self.prepare_step(model, inputs, dt, small_steps);
+        let [prologue, body, epilogue] = &self.ready;
+        let mut lists = vec![prologue];
+        while left > MOST_REPEATS {
+            lists.extend(std::iter::repeat_n(body, MOST_REPEATS as usize));
+            self.submit("step", &lists);
+            lists.clear();
+            left -= MOST_REPEATS;
         }
-        self.device.queue.submit([encoder.finish()]);
+        lists.extend(std::iter::repeat_n(body, left as usize));
+        lists.push(epilogue);
+        self.submit("step", &lists);
         self.multiplier_dt = dt;
         Ok(())
+    }
+
+    /// One submission of one compute pass.
+    fn submit(&self, label: &str, lists: &[&Vec<Ready>]) {
+        let mut encoder = self.encoder(label);
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some(label),
+                timestamp_writes: None,
+            });
+            for list in lists {
+                self.send(&mut pass, list);
+            }
+        }
+        self.device.queue.submit([encoder.finish()]);
     }
 
     fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
@@ -309,14 +354,21 @@ impl GpuSolver {
     }
 
     /// Inputs and constants of a step.
-    fn prepare_step(&mut self, model: &Model<f32>, inputs: &Inputs<f32>, dt: f64) {
+    fn prepare_step(
+        &mut self,
+        model: &Model<f32>,
+        inputs: &Inputs<f32>,
+        dt: f64,
+        small_steps: u32,
+    ) {
         self.collect_updates(model, inputs);
         let queue = &self.device.queue;
         let updates = self.buffers.buffer(Slot::Updates);
         queue.write_buffer(updates, 0, bytemuck::cast_slice(&self.updates));
         let settings = &self.settings;
         let held = &model.attachments;
-        if !held.vertices.is_empty() && (!inputs.anchors.is_empty() || self.multiplier_dt == 0.0) {
+        if !held.vertices.is_empty() && (!inputs.anchors.is_empty() || self.has_moved_anchors) {
+            self.has_moved_anchors = !inputs.anchors.is_empty();
             let anchors = inputs.anchors_of(model);
             let places: Vec<[f32; 4]> = held
                 .order
@@ -336,7 +388,9 @@ impl GpuSolver {
             true if last > 0.0 && last != dt => (dt / last) * (dt / last),
             true => 1.0,
         };
-        if settings.acceleration != Acceleration::None && dt != self.weights_dt {
+        let is_xpbd = settings.method == Method::Xpbd;
+        let small_dt = dt / f64::from(small_steps);
+        if is_xpbd && settings.acceleration != Acceleration::None && dt != self.weights_dt {
             self.weights_dt = dt;
             let weights = norm_weights(model, settings, &self.buffers, dt);
             let buffer = self.buffers.buffer(Slot::Weights);
@@ -357,8 +411,10 @@ impl GpuSolver {
             rebase_factor: self.shares[0],
             bound_share: self.shares[1],
             update_count: self.updates.len() as u32,
+            small_dt: small_dt as f32,
+            inverse_small_dt: (1.0 / small_dt) as f32,
+            small_steps,
             chebyshev_damping: settings.chebyshev_damping as f32,
-            ..FrameConstants::default()
         };
         self.device.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&constants));
     }
@@ -379,11 +435,16 @@ impl GpuSolver {
             update(vertex);
         }
         let of = |vertex: u32| model.numbering.of(vertex) as u32;
+        let holds: Vec<usize> = self.holds.iter().map(|hold| update(hold.vertex)).collect();
         let forces: Vec<(usize, [f32; 3])> = (inputs.forces.iter())
             .map(|&(vertex, force)| (update(of(vertex)), force.to_array()))
             .collect();
         let pins: Vec<(usize, [f32; 3])> =
             inputs.pins.iter().map(|pin| (update(of(pin.vertex)), pin.target.to_array())).collect();
+        let anchors = inputs.anchors_of(model);
+        for (place, hold) in holds.into_iter().zip(&self.holds) {
+            self.updates[place].place = hold.place(anchors);
+        }
         for (place, force) in forces {
             for axis in 0..3 {
                 self.updates[place].force[axis] += force[axis];
@@ -401,7 +462,7 @@ impl GpuSolver {
         }
     }
 
-    /// What each vertex is made of: mass, inverse mass, number of copies.
+    /// What each vertex is made of: mass, inverse mass, number of copies, stiffness of its attachments.
     fn upload_constants(&self, model: &Model<f32>) {
         let order = &model.numbering.order;
         let masses: Vec<f32> = order.iter().map(|&v| model.masses[v as usize]).collect();
@@ -411,10 +472,15 @@ impl GpuSolver {
         let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
         let control = [0u8; layout::CONTROL_SIZE as usize];
         self.device.queue.write_buffer(self.buffers.buffer(Slot::Control), 0, &control);
+        let mut stiffness = vec![0.0; order.len()];
+        for hold in &self.holds {
+            stiffness[hold.vertex as usize] = hold.stiffness as f32;
+        }
         for (slot, values) in [
             (Slot::Predicted, with_w(&|v| masses[v])),
             (Slot::Acting, with_w(&|v| 1.0 / masses[v])),
             (Slot::Previous, with_w(&copies)),
+            (Slot::Targets, with_w(&|v| stiffness[v])),
         ] {
             let buffer = self.buffers.buffer(slot);
             self.device.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&values));

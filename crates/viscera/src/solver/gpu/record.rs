@@ -25,6 +25,8 @@ pub(super) struct Job {
     pub is_neo_hookean: u32,
     pub mode: u32,
     pub parameter: f32,
+    pub tet_count: u32,
+    pub spring_count: u32,
 }
 
 /// One dispatch.
@@ -58,6 +60,8 @@ pub(super) struct Record {
     pub prologue: Vec<Dispatch>,
     pub body: Vec<Dispatch>,
     pub epilogue: Vec<Dispatch>,
+    /// Of a new history, instead of a step.
+    pub restart: Vec<Dispatch>,
 }
 
 /// Writes down what the stages of a plan ask for.
@@ -84,6 +88,7 @@ impl Recorder<'_> {
             prologue: all(&plan.prologue),
             body: all(&plan.body),
             epilogue: all(&plan.epilogue),
+            restart: self.restart(),
         };
         if self.mixes_remember && plan.body.contains(&Stage::RememberIterate) {
             record.prologue.push(self.long(&kernels::REMEMBER_ITERATE, 0));
@@ -142,15 +147,12 @@ impl Recorder<'_> {
             Stage::Chebyshev => self.chebyshev(into),
             Stage::Anderson(on) => self.anderson(on, into),
             Stage::UpdateVelocities => into.push(self.vertices(&kernels::UPDATE_VELOCITIES, 0)),
-            Stage::ChooseStart
-            | Stage::GuardStep
-            | Stage::RepairMultipliers
-            | Stage::GuardIterate
-            | Stage::LimitEnergy
-            | Stage::BeginExplicit
-            | Stage::LoadForces
-            | Stage::AdvanceExplicit
-            | Stage::EndExplicit => {}
+            Stage::RepairMultipliers => self.repair_multipliers(into),
+            Stage::BeginExplicit => self.begin_explicit(into),
+            Stage::LoadForces => into.push(self.load_forces()),
+            Stage::AdvanceExplicit => into.push(self.vertices(&kernels::ADVANCE_EXPLICIT, 0)),
+            Stage::EndExplicit => into.push(self.vertices(&kernels::END_EXPLICIT, 0)),
+            Stage::ChooseStart | Stage::GuardStep | Stage::GuardIterate | Stage::LimitEnergy => {}
         }
     }
 
@@ -167,12 +169,12 @@ impl Recorder<'_> {
         }
     }
 
-    fn variant(&self, form: TetForm) -> Variant {
+    pub(super) fn variant(&self, form: TetForm) -> Variant {
         Variant { form, swept: self.swept }
     }
 
     /// As many threads as the job counts.
-    fn threads(&self, kernel: &'static Kernel, job: Job) -> Dispatch {
+    pub(super) fn threads(&self, kernel: &'static Kernel, job: Job) -> Dispatch {
         let variant = self.variant(TetForm::GreenStrain);
         let groups = job.count.div_ceil(kernel.workgroup);
         Dispatch { kernel, variant, job, groups, on_copies: false }
@@ -183,7 +185,7 @@ impl Recorder<'_> {
     }
 
     /// A thread for each vertex.
-    fn vertices(&self, kernel: &'static Kernel, mode: u32) -> Dispatch {
+    pub(super) fn vertices(&self, kernel: &'static Kernel, mode: u32) -> Dispatch {
         let count = self.model.vertex_count() as u32;
         self.threads(kernel, Job { count, mode, ..Job::default() })
     }
@@ -224,7 +226,7 @@ impl Recorder<'_> {
         Dispatch { variant: self.variant(set.form), ..self.threads(kernel, job) }
     }
 
-    fn each_set(&self, kernel: &'static Kernel, into: &mut Vec<Dispatch>) {
+    pub(super) fn each_set(&self, kernel: &'static Kernel, into: &mut Vec<Dispatch>) {
         for (kind, set) in self.model.tet_sets().into_iter().enumerate() {
             if !set.is_empty() {
                 into.push(self.blocks(kernel, kind, 0..set.block_count()));

@@ -1,6 +1,7 @@
 // Stages that work on vertices one by one (solver/cpu.rs).
 
-// What acts on single vertices: takes over what has changed since the last step.
+// What acts on single vertices: takes over what has changed since the last step. The w of `targets` is the
+// explicit method's, and constant.
 @compute @workgroup_size(64)
 fn apply_updates(
     @builtin(global_invocation_id) id: vec3u,
@@ -14,7 +15,7 @@ fn apply_updates(
     let v = update.vertex;
     let inverse_mass = select(1.0 / predicted[v].w, 0.0, update.is_pinned != 0u);
     acting[v] = vec4f(update.force[0], update.force[1], update.force[2], inverse_mass);
-    targets[v] = vec4f(update.place[0], update.place[1], update.place[2], 0.0);
+    targets[v] = vec4f(update.place[0], update.place[1], update.place[2], targets[v].w);
 }
 
 // xt = x + dt v + dt^2 (g + M^-1 f); x becomes the start of the iteration: x (mode 0), x + dt v (mode 1)

@@ -1,0 +1,310 @@
+//! A fine surface bound to the tetrahedra, moved and lit on the device: ready to be drawn without a copy.
+//!
+//! ```text
+//! vertices: position [m] x y z 1, normal x y z 0      32 bytes each, two `Float32x4`
+//! indices:  three `u32` for each triangle
+//! ```
+
+use bytemuck::{Pod, Zeroable};
+use wgpu::BufferUsages;
+
+use super::device::{Device, Pipeline};
+use super::{GpuError, GpuSolver, MOST_GROUPS, frames};
+use crate::mesh::embed::{Embedding, EmbeddingError};
+use crate::model::Model;
+use crate::scalar::{Vec3, vec3};
+
+/// The surface of one body.
+#[derive(Clone, Copy, Debug)]
+pub struct Skin<'a> {
+    /// Binds its vertices to the body's tetrahedra.
+    pub embedding: &'a Embedding,
+    /// Three vertices each. One that names a vertex that there is not is passed over.
+    pub triangles: &'a [[u32; 3]],
+    /// The body's first vertex among the model's, the user's order.
+    pub first_vertex: usize,
+}
+
+/// The surfaces of all bodies on the device, in one list of vertices.
+#[derive(Debug)]
+pub struct GpuSurface {
+    device: Device,
+    vertices: wgpu::Buffer,
+    indices: wgpu::Buffer,
+    vertex_count: u32,
+    index_count: u32,
+    embed: Ready,
+    normals: Ready,
+}
+
+#[derive(Debug)]
+struct Ready {
+    pipeline: wgpu::ComputePipeline,
+    storage: wgpu::BindGroup,
+}
+
+/// `Bound` of surface.wgsl.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+struct Bound {
+    corners: [u32; 4],
+    weights: [f32; 4],
+}
+
+/// Threads of a workgroup in surface.wgsl.
+const WORKGROUP: u32 = 64;
+
+/// Bytes of a vertex.
+const STRIDE: u64 = 32;
+
+/// Numbers of the arrays in surface.wgsl, and what kernels only read.
+const POINTS: usize = 0;
+const BINDINGS: [(&str, bool); 5] = [
+    ("positions", true),
+    ("weights of the surface", true),
+    ("vertices of the surface", true),
+    ("triangles of the surface", true),
+    ("surface", false),
+];
+
+impl GpuSurface {
+    /// Binds surfaces to the tetrahedra of a solver's model.
+    pub fn new(
+        solver: &GpuSolver,
+        model: &Model<f32>,
+        skins: &[Skin<'_>],
+    ) -> Result<Self, GpuError> {
+        let device = solver.device();
+        let bounds = bounds(model, skins)?;
+        let triangles = triangles(skins);
+        let (offsets, others) = around(bounds.len(), &triangles);
+        let arrays: [&[u8]; 3] = [
+            bytemuck::cast_slice(&bounds),
+            bytemuck::cast_slice(&offsets),
+            bytemuck::cast_slice(&others),
+        ];
+        let indices: &[u8] = bytemuck::cast_slice(&triangles);
+        let size = STRIDE * bounds.len() as u64;
+        for bytes in arrays.iter().map(|array| array.len()).chain([indices.len()]) {
+            check_size(device, bytes as u64, bounds.len())?;
+        }
+        check_size(device, size, bounds.len())?;
+
+        let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+        let vertices = buffer(device, "surface", size, storage | BufferUsages::VERTEX);
+        let filled = |label, bytes: &[u8], usage| {
+            let buffer = buffer(device, label, bytes.len() as u64, usage);
+            device.queue.write_buffer(&buffer, 0, bytes);
+            buffer
+        };
+        let [bound, first, pairs] =
+            [1, 2, 3].map(|i| filled(BINDINGS[i].0, arrays[i - 1], storage));
+        let all = [solver.positions(), &bound, &first, &pairs, &vertices];
+        Ok(Self {
+            embed: prepare(device, "embed", &[POINTS, 1, 4], &all),
+            normals: prepare(device, "smooth_normals", &[1, 2, 3, 4], &all),
+            indices: filled("indices of the surface", indices, storage | BufferUsages::INDEX),
+            device: device.clone(),
+            vertices,
+            vertex_count: bounds.len() as u32,
+            index_count: 3 * triangles.len() as u32,
+        })
+    }
+
+    /// Moves the surface to where the solver's last step has brought the tissue: one submission, no
+    /// waiting.
+    pub fn update(&self) {
+        let wgpu = &self.device.device;
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("surface") };
+        let mut encoder = wgpu.create_command_encoder(&descriptor);
+        self.record(&mut encoder);
+        self.device.queue.submit([encoder.finish()]);
+    }
+
+    /// As [`GpuSurface::update`], in front of what the caller draws: two dispatches.
+    pub fn record(&self, encoder: &mut wgpu::CommandEncoder) {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("surface"),
+            timestamp_writes: None,
+        });
+        let groups = self.vertex_count.div_ceil(WORKGROUP);
+        let along = groups.min(MOST_GROUPS);
+        for ready in [&self.embed, &self.normals] {
+            pass.set_pipeline(&ready.pipeline);
+            pass.set_bind_group(0, &ready.storage, &[]);
+            pass.dispatch_workgroups(along, groups.div_ceil(along.max(1)), 1);
+        }
+    }
+
+    /// Positions [m] and normals, [`GpuSurface::vertex_layout`]; for vertex and storage bindings.
+    pub fn vertices(&self) -> &wgpu::Buffer {
+        &self.vertices
+    }
+
+    /// Triangles, three `u32` each; for index and storage bindings.
+    pub fn indices(&self) -> &wgpu::Buffer {
+        &self.indices
+    }
+
+    /// How many vertices there are.
+    pub fn vertex_count(&self) -> u32 {
+        self.vertex_count
+    }
+
+    /// How many indices there are: three for each triangle.
+    pub fn index_count(&self) -> u32 {
+        self.index_count
+    }
+
+    /// How a vertex lies in memory: the position at location 0, the normal at location 1.
+    pub fn vertex_layout() -> wgpu::VertexBufferLayout<'static> {
+        const ATTRIBUTES: [wgpu::VertexAttribute; 2] =
+            wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4];
+        wgpu::VertexBufferLayout {
+            array_stride: STRIDE,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &ATTRIBUTES,
+        }
+    }
+
+    /// Waits for the device and reads positions [m] and normals, shape [vertex_count] each.
+    pub fn read(&self) -> Result<[Vec<Vec3<f32>>; 2], GpuError> {
+        let bytes = frames::read(&self.device, &self.vertices)?;
+        let numbers: &[[f32; 4]] = bytemuck::cast_slice(&bytes);
+        let pairs = &numbers.as_chunks::<2>().0[..self.vertex_count as usize];
+        let column =
+            |i: usize| pairs.iter().map(move |pair| pair[i]).map(|[x, y, z, _]| vec3(x, y, z));
+        Ok([0, 1].map(|i| column(i).collect()))
+    }
+}
+
+/// What each vertex follows, in the solver's numbering.
+fn bounds(model: &Model<f32>, skins: &[Skin<'_>]) -> Result<Vec<Bound>, EmbeddingError> {
+    let mut bounds = Vec::new();
+    for skin in skins {
+        let (first, embedding) = (skin.first_vertex, skin.embedding);
+        let there = model.vertex_count().saturating_sub(first);
+        let expected = embedding.tet_vertex_count();
+        if there < expected {
+            let what = "tetrahedron vertices";
+            return Err(EmbeddingError::Length { what, found: there, expected });
+        }
+        let of = |v: u32| model.numbering.of(first as u32 + v) as u32;
+        let both = embedding.corners().iter().zip(embedding.weights());
+        bounds.extend(both.map(|(corners, weights)| Bound {
+            corners: corners.map(of),
+            weights: weights.map(|weight| weight as f32),
+        }));
+    }
+    Ok(bounds)
+}
+
+/// The triangles of all bodies among all vertices, without those that name what there is not.
+fn triangles(skins: &[Skin<'_>]) -> Vec<[u32; 3]> {
+    let mut all = Vec::new();
+    let mut first = 0;
+    for skin in skins {
+        let count = skin.embedding.weights().len() as u32;
+        let legal = skin.triangles.iter().filter(|t| t.iter().all(|&v| v < count));
+        all.extend(legal.map(|t| t.map(|v| first + v)));
+        first += count;
+    }
+    all
+}
+
+/// Where the triangles around each vertex begin, and the two other corners of each, in the order of the
+/// triangles.
+fn around(vertex_count: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 2]>) {
+    let mut offsets = vec![0u32; vertex_count + 1];
+    for &v in triangles.as_flattened() {
+        offsets[v as usize + 1] += 1;
+    }
+    for v in 0..vertex_count {
+        offsets[v + 1] += offsets[v];
+    }
+    let mut next = offsets.clone();
+    let mut others = vec![[0; 2]; 3 * triangles.len()];
+    for &[a, b, c] in triangles {
+        for (v, pair) in [(a, [b, c]), (b, [c, a]), (c, [a, b])] {
+            others[next[v as usize] as usize] = pair;
+            next[v as usize] += 1;
+        }
+    }
+    (offsets, others)
+}
+
+fn check_size(device: &Device, needed: u64, vertices: usize) -> Result<(), GpuError> {
+    let limits = device.limits();
+    let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    if needed <= limit {
+        return Ok(());
+    }
+    let largest = (vertices as f64 * limit as f64 / needed as f64) as u64;
+    Err(GpuError::SurfaceTooLarge { needed, limit, name: device.name().to_owned(), largest })
+}
+
+fn buffer(device: &Device, label: &str, size: u64, usage: BufferUsages) -> wgpu::Buffer {
+    device.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        // A binding is never empty.
+        size: size.max(STRIDE),
+        usage,
+        mapped_at_creation: false,
+    })
+}
+
+fn prepare(
+    device: &Device,
+    entry: &'static str,
+    bindings: &[usize],
+    all: &[&wgpu::Buffer; 5],
+) -> Ready {
+    let mut known = device.pipelines.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let made = known.entry(entry.to_owned()).or_insert_with(|| compile(device, entry, bindings));
+    let entries: Vec<_> = bindings
+        .iter()
+        .map(|&i| wgpu::BindGroupEntry { binding: i as u32, resource: all[i].as_entire_binding() })
+        .collect();
+    let storage = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some(entry),
+        layout: &made.storage,
+        entries: &entries,
+    });
+    Ready { pipeline: made.pipeline.clone(), storage }
+}
+
+fn compile(device: &Device, entry: &'static str, bindings: &[usize]) -> Pipeline {
+    let wgpu = &device.device;
+    let module = wgpu.create_shader_module(wgpu::include_wgsl!("surface.wgsl"));
+    let entries: Vec<_> = bindings
+        .iter()
+        .map(|&i| wgpu::BindGroupLayoutEntry {
+            binding: i as u32,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Storage { read_only: BINDINGS[i].1 },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        })
+        .collect();
+    let storage = wgpu.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some(entry),
+        entries: &entries,
+    });
+    let layout = wgpu.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(entry),
+        bind_group_layouts: &[Some(&storage)],
+        immediate_size: 0,
+    });
+    let pipeline = wgpu.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(entry),
+        layout: Some(&layout),
+        module: &module,
+        entry_point: Some(entry),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        cache: None,
+    });
+    Pipeline { pipeline, storage }
+}
