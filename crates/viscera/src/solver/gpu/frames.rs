@@ -131,12 +131,13 @@ impl GpuSolver {
         Ok(())
     }
 
-    /// Waits for the device and reads a buffer.
+    /// Waits for the device and reads all that a slot holds.
     pub(super) fn read_buffer(&self, slot: Slot) -> Result<Vec<u8>, GpuError> {
         let buffer = self.buffers.buffer(slot);
-        let staging = self.staging(buffer.size());
+        let [start, size] = self.buffers.span(slot);
+        let staging = self.staging(size);
         let mut encoder = self.encoder("read");
-        encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+        encoder.copy_buffer_to_buffer(buffer, start, &staging, 0, size);
         self.device.queue.submit([encoder.finish()]);
         let (told, heard) = channel();
         staging.slice(..).map_async(wgpu::MapMode::Read, move |result| {

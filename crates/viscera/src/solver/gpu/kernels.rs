@@ -4,6 +4,7 @@ use super::buffers::Slot;
 use super::device::{Device, Pipeline};
 use crate::elements::TetForm;
 use crate::elements::wgsl;
+use crate::solver::potential::TISSUE_WGSL;
 
 /// A kernel: an entry point of one of the files, with the storage that it names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -29,6 +30,10 @@ pub enum File {
     Strain,
     Multipliers,
     Acceleration,
+    Evaluate,
+    Guard,
+    Take,
+    Energy,
 }
 
 /// What the text of a file depends on, beside the kernel.
@@ -59,7 +64,8 @@ macro_rules! kernels {
 
 kernels! {
     APPLY_UPDATES = Vertices "apply_updates" 64 [Predicted Acting Targets Updates];
-    PREDICT = Vertices "predict" 64 [Points Velocities Previous Predicted Acting Targets];
+    PREDICT = Vertices "predict" 64
+        [Points Velocities Previous Predicted Acting Targets Starts];
     REBASE = Vertices "rebase" 64 [Offsets Points Loads Previous Predicted Acting];
     RECOMPUTE_POSITIONS = Vertices "recompute_positions" 64 [Offsets Points Loads Predicted Acting];
     SPLIT_COPIES = Vertices "split_copies" 64 [Offsets Points Copies];
@@ -83,6 +89,13 @@ kernels! {
     CHEBYSHEV_CHANGE = Acceleration "chebyshev_change" 128 [Unknowns Iterate Weights PartialSums];
     CHEBYSHEV_WEIGHT = Acceleration "chebyshev_weight" 128 [PartialSums Control];
     CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control];
+    EVALUATE = Evaluate "evaluate" 256 [Tets Points StartStrain PartialSums Control Ground Table];
+    SETTLE = Guard "settle" 256
+        [Tets Points Loads StartStrain PartialSums Control Ground Table];
+    JUDGE = Guard "judge" 256 [Tets Points Loads StartStrain PartialSums Control Ground Table];
+    TAKE = Take "take" 256 [Unknowns Mapped Control Ground Table];
+    LIMIT_PARTS = Energy "limit_parts" 256 [Points PartialSums Ground Table];
+    LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Ground Table];
 }
 
 /// Records and storage, for every kernel.
@@ -132,6 +145,16 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
         File::Strain => texts.push(include_str!("strain.wgsl")),
         File::Multipliers => texts.push(include_str!("multipliers.wgsl")),
         File::Acceleration => texts.push(include_str!("acceleration.wgsl")),
+        File::Evaluate | File::Guard | File::Take | File::Energy => {
+            texts.extend(single);
+            texts.extend([wgsl::NEO_HOOKEAN, TISSUE_WGSL, include_str!("potential.wgsl")]);
+            texts.push(match kernel.file {
+                File::Evaluate => include_str!("evaluate.wgsl"),
+                File::Guard => include_str!("guard.wgsl"),
+                File::Take => include_str!("take.wgsl"),
+                _ => include_str!("energy.wgsl"),
+            });
+        }
     }
     texts.join("\n")
 }

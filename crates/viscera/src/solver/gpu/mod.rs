@@ -17,6 +17,8 @@ mod frames;
 pub mod kernels;
 mod layout;
 mod record;
+mod record_guard;
+mod report;
 
 use bytemuck::{Pod, Zeroable};
 
@@ -35,7 +37,7 @@ pub use error::GpuError;
 pub use frames::Frame;
 use frames::Frames;
 use layout::Layout;
-use record::{Dispatch, Job, Recorder};
+use record::{Dispatch, Job, Pieces, Recorder};
 
 /// `Frame` of bindings.wgsl.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -93,6 +95,8 @@ pub struct GpuSolver {
     /// Where each vertex stands in `updates`; `u32::MAX` for nowhere.
     update_of: Vec<u32>,
     shares: [f32; 2],
+    /// Where the energy limit's numbers begin among the partial sums [bytes], and of how many parts.
+    parts: (usize, usize),
     /// The step [s] that the norm's weights on the device belong to.
     weights_dt: f64,
 }
@@ -116,6 +120,11 @@ impl GpuSolver {
             settings,
             length: buffers.length,
             multipliers_first: (buffers.multipliers_start / 4) as u32,
+            stride: Layout::stride(model),
+            pieces: Pieces {
+                count: layout.piece_count,
+                first_of_vertices: layout.first_of_vertices(),
+            },
         };
         let record = recorder.record(&plan);
         let lists = [record.prologue, record.body, record.epilogue];
@@ -167,12 +176,13 @@ impl GpuSolver {
             frame,
             jobs,
             ready,
-            buffers,
             multiplier_dt: 0.0,
             touched: Vec::new(),
+            parts: (buffers.parts_start as usize, model.component_count),
             updates: Vec::new(),
             update_of: vec![u32::MAX; model.vertex_count()],
             shares: [rebase_factor(model, settings) as f32, bound_share(model) as f32],
+            buffers,
         };
         solver.upload_constants(model);
         let rest = State::at_rest(model);
@@ -229,13 +239,10 @@ impl GpuSolver {
             let order = model.numbering.order.iter();
             order.map(|&v| values[v as usize].to_array()).map(|[x, y, z]| [x, y, z, 0.0]).collect()
         };
-        let queue = &self.device.queue;
-        let unknowns = self.buffers.buffer(Slot::Unknowns);
-        queue.write_buffer(unknowns, 0, bytemuck::cast_slice(&sorted(&state.positions)));
-        let start = self.buffers.multipliers_start;
-        queue.write_buffer(unknowns, start, bytemuck::cast_slice(&state.multipliers));
-        let velocities = self.buffers.buffer(Slot::Velocities);
-        queue.write_buffer(velocities, 0, bytemuck::cast_slice(&sorted(&state.velocities)));
+        let write = |slot, bytes: &[u8]| self.buffers.write(&self.device.queue, slot, bytes);
+        write(Slot::Points, bytemuck::cast_slice(&sorted(&state.positions)));
+        write(Slot::Multipliers, bytemuck::cast_slice(&state.multipliers));
+        write(Slot::Velocities, bytemuck::cast_slice(&sorted(&state.velocities)));
         self.multiplier_dt = state.multiplier_dt;
     }
 
@@ -285,8 +292,7 @@ impl GpuSolver {
     fn prepare_step(&mut self, model: &Model<f32>, inputs: &Inputs<f32>, dt: f64) {
         self.collect_updates(model, inputs);
         let queue = &self.device.queue;
-        let updates = self.buffers.buffer(Slot::Updates);
-        queue.write_buffer(updates, 0, bytemuck::cast_slice(&self.updates));
+        self.buffers.write(queue, Slot::Updates, bytemuck::cast_slice(&self.updates));
         let settings = &self.settings;
         let held = &model.attachments;
         if !held.vertices.is_empty() && (!inputs.anchors.is_empty() || self.multiplier_dt == 0.0) {
@@ -297,11 +303,7 @@ impl GpuSolver {
                 .map(|&i| anchors[i as usize].to_array())
                 .map(|[x, y, z]| [x, y, z, 0.0])
                 .collect();
-            queue.write_buffer(
-                self.buffers.buffer(Slot::Anchors),
-                0,
-                bytemuck::cast_slice(&places),
-            );
+            self.buffers.write(queue, Slot::Anchors, bytemuck::cast_slice(&places));
         }
         let last = self.multiplier_dt;
         let rescale = match settings.keep_multipliers {
@@ -312,8 +314,7 @@ impl GpuSolver {
         if settings.acceleration != Acceleration::None && dt != self.weights_dt {
             self.weights_dt = dt;
             let weights = norm_weights(model, settings, &self.buffers, dt);
-            let buffer = self.buffers.buffer(Slot::Weights);
-            self.device.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&weights));
+            self.buffers.write(queue, Slot::Weights, bytemuck::cast_slice(&weights));
         }
         let omega = settings.relaxation as f32;
         let constants = FrameConstants {
@@ -387,8 +388,7 @@ impl GpuSolver {
             (Slot::Acting, with_w(&|v| 1.0 / masses[v])),
             (Slot::Previous, with_w(&copies)),
         ] {
-            let buffer = self.buffers.buffer(slot);
-            self.device.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&values));
+            self.buffers.write(&self.device.queue, slot, bytemuck::cast_slice(&values));
         }
     }
 }

@@ -67,6 +67,16 @@ pub(super) struct Recorder<'a> {
     /// Numbers of the long vector, and where multipliers begin in it.
     pub length: u32,
     pub multipliers_first: u32,
+    /// Vertices from one range of the ground to the next.
+    pub stride: u32,
+    pub pieces: Pieces,
+}
+
+/// How many pieces sums are taken in, and which of them is the first of vertices.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pieces {
+    pub count: u32,
+    pub first_of_vertices: u32,
 }
 
 impl Recorder<'_> {
@@ -98,7 +108,10 @@ impl Recorder<'_> {
                     Start::Inertial => 1,
                     Start::Predicted | Start::Auto => 2,
                 };
-                into.push(self.vertices(&kernels::PREDICT, mode));
+                let keeps_starts = if self.settings.guards_steps() { 4 } else { 0 };
+                let mut predict = self.vertices(&kernels::PREDICT, mode | keeps_starts);
+                predict.job.set_first = self.stride;
+                into.push(predict);
             }
             Stage::ResetMultipliers | Stage::RescaleMultipliers => {
                 let count = model.multiplier_count as u32;
@@ -123,12 +136,14 @@ impl Recorder<'_> {
             }
             Stage::Chebyshev => self.chebyshev(into),
             Stage::Anderson(on) => self.anderson(on, into),
+            // Guarded steps get theirs from the energy limit.
+            Stage::UpdateVelocities if self.settings.guards_steps() => {}
             Stage::UpdateVelocities => into.push(self.vertices(&kernels::UPDATE_VELOCITIES, 0)),
-            Stage::ChooseStart
-            | Stage::GuardStep
-            | Stage::RepairMultipliers
-            | Stage::GuardIterate
-            | Stage::LimitEnergy
+            Stage::ChooseStart => self.choose_start(into),
+            Stage::GuardIterate => self.guard_iterate(into),
+            Stage::GuardStep => self.guard_step(into),
+            Stage::LimitEnergy => self.limit_energy(into),
+            Stage::RepairMultipliers
             | Stage::BeginExplicit
             | Stage::LoadForces
             | Stage::AdvanceExplicit
@@ -141,7 +156,7 @@ impl Recorder<'_> {
     }
 
     /// As many threads as the job counts.
-    fn threads(&self, kernel: &'static Kernel, job: Job) -> Dispatch {
+    pub(super) fn threads(&self, kernel: &'static Kernel, job: Job) -> Dispatch {
         let variant = self.variant(TetForm::GreenStrain);
         let groups = job.count.div_ceil(kernel.workgroup);
         Dispatch { kernel, variant, job, groups, on_copies: false }
@@ -158,7 +173,7 @@ impl Recorder<'_> {
     }
 
     /// A thread for each number of the long vector.
-    fn long(&self, kernel: &'static Kernel, mode: u32) -> Dispatch {
+    pub(super) fn long(&self, kernel: &'static Kernel, mode: u32) -> Dispatch {
         let set_first = self.settings.anderson_window;
         let first = self.multipliers_first;
         self.threads(kernel, Job { first, count: self.length, set_first, mode, ..Job::default() })
