@@ -145,17 +145,13 @@ struct Frame {
 @group(0) @binding(23) var<storage, read> springs: array<Spring>;
 @group(0) @binding(24) var<storage, read> attachments: array<Attachment>;
 // Where attachments are held [m].
-@group(0) @binding(25) var<storage, read> anchors: array<vec4f>;
-// The best place of the step so far [m], and one under test.
-@group(0) @binding(26) var<storage, read_write> best: array<vec4f>;
-@group(0) @binding(27) var<storage, read_write> trial: array<vec4f>;
-// Potential of each tetrahedron, spring and attachment [J] at the start of the step.
-@group(0) @binding(28) var<storage, read_write> energies: array<f32>;
-// What belongs to each part of the model, part by part, and the pieces in which it is summed.
-@group(0) @binding(29) var<storage, read> members: array<u32>;
-@group(0) @binding(30) var<storage, read> pieces: array<vec4u>;
-// What each part of the model has and is given; see energy.wgsl.
-@group(0) @binding(31) var<storage, read_write> parts: array<Part>;
+@group(0) @binding(25) var<storage, read_write> anchors: array<vec4f>;
+// Where the guard's step can start from [m]: three ranges of the ground.
+@group(0) @binding(26) var<storage, read_write> starts: array<vec4f>;
+// All that belongs to vertices, range by range; see potential.wgsl.
+@group(0) @binding(27) var<storage, read_write> ground: array<vec4f>;
+// All constants but the tetrahedra, as words; see potential.wgsl.
+@group(0) @binding(28) var<storage, read> table: array<u32>;
 
 @group(1) @binding(0) var<uniform> job: Job;
 @group(1) @binding(1) var<uniform> frame: Frame;

@@ -41,20 +41,16 @@ pub enum Slot {
     Springs,
     Attachments,
     Anchors,
-    Best,
-    Trial,
-    Energies,
-    Members,
-    Pieces,
-    Parts,
+    Starts,
+    Ground,
+    Table,
 }
 
 impl Slot {
     /// Whether kernels only read it.
     pub fn is_read_only(self) -> bool {
         use Slot::{
-            Anchors, Attachments, CornerIndices, Materials, Members, Offsets, Pieces, Springs,
-            Tets, Updates, Weights,
+            Attachments, CornerIndices, Materials, Offsets, Springs, Table, Tets, Updates, Weights,
         };
         matches!(
             self,
@@ -65,9 +61,7 @@ impl Slot {
                 | Weights
                 | Springs
                 | Attachments
-                | Anchors
-                | Members
-                | Pieces
+                | Table
         )
     }
 }
@@ -116,18 +110,34 @@ pub(super) struct Attachment {
     pub part: u32,
 }
 
-/// Multipliers begin at a multiple of this: the alignment [bytes] that devices may ask of a binding.
-const ALIGNMENT: u64 = 256;
+/// Ranges of buffers begin at a multiple of this: the alignment [bytes] that devices may ask of a
+/// binding.
+pub(super) const ALIGNMENT: u64 = 256;
+
+/// What lies in another slot's buffer: kernels that need a piece or two are bound to ranges, those that
+/// would need too many to the whole.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Range {
+    pub slot: Slot,
+    pub owner: Slot,
+    /// [bytes]
+    pub start: u64,
+    /// [bytes]
+    pub size: u64,
+}
 
 /// All buffers of a solver.
 #[derive(Debug)]
 pub(super) struct Buffers {
-    pub all: Vec<(Slot, wgpu::Buffer)>,
+    all: Vec<(Slot, wgpu::Buffer)>,
+    ranges: Vec<Range>,
     /// Copies per block and corner, and where those of each vertex begin.
     copies: Option<[wgpu::Buffer; 2]>,
     /// Bytes of all positions, and where multipliers begin [bytes].
     pub points_size: u64,
     pub multipliers_start: u64,
+    /// Where the energy limit's numbers begin among the partial sums [bytes].
+    pub parts_start: u64,
     /// Numbers of the long vector of all unknowns.
     pub length: u32,
 }
@@ -151,22 +161,13 @@ impl Buffers {
             if anderson { unknowns * (u64::from(settings.anderson_window) + 1) } else { 0 };
         let viscous = model.tet_sets().iter().any(|set| set.viscous);
         let blocks = model.tet_sets().iter().map(|set| set.block_count() as u64).sum::<u64>();
-        let guarded = settings.guards_steps();
         let when = |wanted: bool, size: u64| if wanted { size } else { 0 };
-        let element_count = LANES as u64 * blocks
-            + (model.springs.stiffness.len() + model.attachments.stiffness.len()) as u64;
+        let table = layout.table(model, settings.guards_steps());
         let split = model.is_split();
         use Slot::*;
         let sizes = [
-            (Points, "positions", 0),
             (Copies, "copies of vertices", when(split, 16 * model.copy_count() as u64)),
-            (Multipliers, "multipliers", 0),
             (Loads, "loads", 16 * layout.slot_count()),
-            (Velocities, "velocities", points_size),
-            (Previous, "positions", points_size),
-            (Predicted, "positions", points_size),
-            (Acting, "forces", points_size),
-            (Targets, "positions", points_size),
             (Updates, "inputs", size_of::<Update>() as u64 * vertices),
             (StartStrain, "strains", when(viscous, 6 * 4 * LANES as u64 * blocks)),
             (Unknowns, "unknowns", unknowns),
@@ -174,13 +175,9 @@ impl Buffers {
             (Older, "unknowns", when(accelerated && !anderson, unknowns)),
             (Residuals, "Anderson's residuals", history),
             (Mapped, "Anderson's iterates", history),
-            (PartialSums, "partial sums", layout.partial_sums_size()),
+            (PartialSums, "partial sums", table.sums_size),
             (Control, "control record", super::layout::CONTROL_SIZE),
-            (Anchors, "anchors", 16 * model.attachments.stiffness.len() as u64),
-            (Best, "positions", when(guarded, points_size)),
-            (Trial, "positions", when(guarded, points_size)),
-            (Energies, "energies", when(guarded, 4 * element_count)),
-            (Parts, "parts", super::layout::PART_SIZE * model.component_count as u64),
+            (Ground, "vertices", table.ground_size),
         ];
         let limits = device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
@@ -195,7 +192,8 @@ impl Buffers {
         for (_, what, size) in sizes {
             fits(what, size)?;
         }
-        let constants = layout.constants(model);
+        let constants =
+            [(Tets, "tetrahedra", super::layout::tets(model)), (Table, "tables", table.bytes)];
         for (_, what, bytes) in &constants {
             fits(what, bytes.len() as u64)?;
         }
@@ -222,10 +220,8 @@ impl Buffers {
         };
         let mut all = Vec::new();
         for (slot, label, size) in sizes {
-            if !matches!(slot, Points | Multipliers) {
-                let usage = if slot == Unknowns { usage | BufferUsages::VERTEX } else { usage };
-                all.push((slot, make(label, size, usage)));
-            }
+            let usage = if slot == Unknowns { usage | BufferUsages::VERTEX } else { usage };
+            all.push((slot, make(label, size, usage)));
         }
         for (slot, label, bytes) in &constants {
             all.push((*slot, filled(label, bytes)));
@@ -236,13 +232,44 @@ impl Buffers {
             let [indices, offsets] = Layout::copies(model);
             [filled("copies of corners", &indices), filled("copies of vertices", &offsets)]
         });
-        Ok(Self { all, copies, points_size, multipliers_start, length: (unknowns / 4) as u32 })
+        let mut ranges = table.ranges;
+        let rest = unknowns - multipliers_start;
+        ranges.push(Range { slot: Points, owner: Unknowns, start: 0, size: points_size });
+        let start = multipliers_start;
+        ranges.push(Range { slot: Multipliers, owner: Unknowns, start, size: rest });
+        let length = (unknowns / 4) as u32;
+        let parts_start = table.parts_start;
+        Ok(Self { all, ranges, copies, points_size, multipliers_start, parts_start, length })
     }
 
-    /// A buffer of its own.
+    /// The buffer that a slot lies in, and where.
+    fn find(&self, slot: Slot) -> wgpu::BufferBinding<'_> {
+        let range = self.ranges.iter().find(|range| range.slot == slot);
+        let owner = range.map_or(slot, |range| range.owner);
+        let found = self.all.iter().find(|(own, _)| *own == owner);
+        wgpu::BufferBinding {
+            buffer: &found.expect("every slot has a buffer or a range").1,
+            offset: range.map_or(0, |range| range.start),
+            size: range.and_then(|range| std::num::NonZero::new(range.size)),
+        }
+    }
+
+    /// A buffer that belongs to a slot, or that holds its range.
     pub fn buffer(&self, slot: Slot) -> &wgpu::Buffer {
-        let found = self.all.iter().find(|(own, _)| *own == slot);
-        &found.expect("positions and multipliers, which have none, lie in `Unknowns`").1
+        self.find(slot).buffer
+    }
+
+    /// Where a slot begins in its buffer, and its length [bytes].
+    pub fn span(&self, slot: Slot) -> [u64; 2] {
+        let found = self.find(slot);
+        let size = found.size.map_or(found.buffer.size() - found.offset, std::num::NonZero::get);
+        [found.offset, size]
+    }
+
+    /// Writes the beginning of a slot.
+    pub fn write(&self, queue: &wgpu::Queue, slot: Slot, bytes: &[u8]) {
+        let found = self.find(slot);
+        queue.write_buffer(found.buffer, found.offset, bytes);
     }
 
     /// What a kernel finds at a binding.
@@ -252,15 +279,7 @@ impl Buffers {
             (Place::CopiesOf(Slot::CornerIndices), Some([indices, _])) => whole(indices),
             (Place::CopiesOf(Slot::Offsets), Some([_, offsets])) => whole(offsets),
             (Place::CopiesOf(Slot::Points), Some(_)) => whole(self.buffer(Slot::Copies)),
-            (Place::Whole(Slot::Points) | Place::CopiesOf(Slot::Points), _) => {
-                let size = std::num::NonZero::new(self.points_size);
-                wgpu::BufferBinding { buffer: self.buffer(Slot::Unknowns), offset: 0, size }
-            }
-            (Place::Whole(Slot::Multipliers) | Place::CopiesOf(Slot::Multipliers), _) => {
-                let offset = self.multipliers_start;
-                wgpu::BufferBinding { buffer: self.buffer(Slot::Unknowns), offset, size: None }
-            }
-            (Place::Whole(slot) | Place::CopiesOf(slot), _) => whole(self.buffer(slot)),
+            (Place::Whole(slot) | Place::CopiesOf(slot), _) => self.find(slot),
         }
     }
 

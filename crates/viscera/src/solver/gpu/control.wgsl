@@ -23,34 +23,20 @@ struct Control {
     // Step guard; potentials [J s^2] are what is above the start of the step with its pins moved.
     limit: f32,
     best_value: f32,
-    // Whether what was tested last is good; whether it is better than the best.
+    // The range of the ground that holds the best start.
+    start: u32,
+    // Of mixtures: whether the iterate passes, whether it is better than the best, and what is taken
+    // in its place.
     is_good: u32,
     is_better: u32,
+    taken: u32,
     failures: u32,
+    // Steps taken back so far.
     rejected: u32,
     // Of the last step.
     was_rejected: u32,
     potential: f32,
     noise: f32,
-    kept_speed: f32,
     // Multipliers that are no numbers were found.
     is_broken: atomic<u32>,
-}
-
-// Sums over the free vertices of a connected part; see energy.rs.
-struct Part {
-    // Center, momentum and load at the end of the step.
-    momentum: vec3f,
-    mass: f32,
-    start_momentum: vec3f,
-    is_held: u32,
-    load: vec3f,
-    // [J]: kinetic at start and end, what was stored at the end above the start, work of the loads.
-    kinetic: f32,
-    shift: vec3f,
-    start_kinetic: f32,
-    stored: f32,
-    work: f32,
-    share: f32,
-    drift: vec3f,
 }

@@ -123,9 +123,10 @@ impl GpuSolver {
         Ok(())
     }
 
-    /// Waits for the device and reads a buffer.
+    /// Waits for the device and reads all that a slot holds.
     pub(super) fn read_buffer(&self, slot: Slot) -> Result<Vec<u8>, GpuError> {
-        read(&self.device, self.buffers.buffer(slot))
+        let [start, size] = self.buffers.span(slot);
+        read(&self.device, self.buffers.buffer(slot), start, size)
     }
 }
 
@@ -138,12 +139,17 @@ fn staging(device: &Device, size: u64) -> wgpu::Buffer {
     })
 }
 
-/// Waits for the device and reads a buffer.
-pub(super) fn read(device: &Device, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
-    let staging = staging(device, buffer.size());
+/// Waits for the device and reads a range of a buffer.
+pub(super) fn read(
+    device: &Device,
+    buffer: &wgpu::Buffer,
+    start: u64,
+    size: u64,
+) -> Result<Vec<u8>, GpuError> {
+    let staging = staging(device, size);
     let descriptor = wgpu::CommandEncoderDescriptor { label: Some("read") };
     let mut encoder = device.device.create_command_encoder(&descriptor);
-    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+    encoder.copy_buffer_to_buffer(buffer, start, &staging, 0, size);
     device.queue.submit([encoder.finish()]);
     let (told, heard) = channel();
     staging.slice(..).map_async(wgpu::MapMode::Read, move |result| {

@@ -33,6 +33,10 @@ pub enum File {
     Acceleration,
     History,
     Explicit,
+    Evaluate,
+    Guard,
+    Take,
+    Energy,
 }
 
 /// What the text of a file depends on, beside the kernel.
@@ -79,7 +83,8 @@ macro_rules! kernels {
 
 kernels! {
     APPLY_UPDATES = Vertices "apply_updates" 64 [Predicted Acting Targets Updates];
-    PREDICT = Vertices "predict" 64 [Points Velocities Previous Predicted Acting Targets];
+    PREDICT = Vertices "predict" 64
+        [Points Velocities Previous Predicted Acting Targets Starts];
     REBASE = Vertices "rebase" 64 [Offsets Points Loads Previous Predicted Acting];
     RECOMPUTE_POSITIONS = Vertices "recompute_positions" 64 [Offsets Points Loads Predicted Acting];
     SPLIT_COPIES = Vertices "split_copies" 64 [Offsets Points Copies];
@@ -118,6 +123,13 @@ kernels! {
         [Offsets Points Loads Velocities Previous Acting Targets Control];
     END_EXPLICIT = Explicit "end_explicit" 64 [Points Velocities Predicted Acting];
     CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control];
+    EVALUATE = Evaluate "evaluate" 256 [Tets Points StartStrain PartialSums Control Ground Table];
+    SETTLE = Guard "settle" 256
+        [Tets Points Loads StartStrain PartialSums Control Ground Table];
+    JUDGE = Guard "judge" 256 [Tets Points Loads StartStrain PartialSums Control Ground Table];
+    TAKE = Take "take" 256 [Unknowns Mapped Control Ground Table];
+    LIMIT_PARTS = Energy "limit_parts" 256 [Points PartialSums Ground Table];
+    LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Ground Table];
 }
 
 /// Records and storage, for every kernel.
@@ -183,6 +195,16 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
         File::Explicit => {
             texts.extend([wgsl::NEO_HOOKEAN, wgsl::SPRING, TISSUE_WGSL]);
             texts.extend([include_str!("vertices.wgsl"), include_str!("explicit.wgsl")]);
+        }
+        File::Evaluate | File::Guard | File::Take | File::Energy => {
+            texts.extend(single);
+            texts.extend([wgsl::NEO_HOOKEAN, TISSUE_WGSL, include_str!("potential.wgsl")]);
+            texts.push(match kernel.file {
+                File::Evaluate => include_str!("evaluate.wgsl"),
+                File::Guard => include_str!("guard.wgsl"),
+                File::Take => include_str!("take.wgsl"),
+                _ => include_str!("energy.wgsl"),
+            });
         }
     }
     texts.join("\n")

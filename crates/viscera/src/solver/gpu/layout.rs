@@ -1,13 +1,14 @@
 //! How a model lies in the device's memory: its constants, where each constraint's loads go, and the
 //! pieces in which sums are taken.
 
-use super::buffers::{Attachment, Slot, Spring};
+use bytemuck::{Pod, Zeroable};
+
+use super::buffers::{ALIGNMENT, Attachment, Range, Slot, Spring};
 use crate::model::Model;
 use crate::scalar::lanes::LANES;
 
-/// Bytes of `Control`, and of `Part`, in control.wgsl.
-pub(super) const CONTROL_SIZE: u64 = 520;
-pub(super) const PART_SIZE: u64 = 96;
+/// Bytes of `Control` in control.wgsl.
+pub(super) const CONTROL_SIZE: u64 = 528;
 
 /// The material of a lane that only fills a block up.
 pub(super) const FILLING: u32 = u32::MAX;
@@ -21,7 +22,66 @@ pub(super) const PRODUCTS: u64 = 21;
 
 /// Elements or vertices whose energies one workgroup sums, and the numbers that it leaves.
 pub(super) const PIECE: usize = 512;
-const PIECE_SUMS: u64 = 16;
+const PIECE_SUMS: u64 = 24;
+
+/// Numbers that the energy limit leaves for each part of the model.
+pub(super) const PART_NUMBERS: usize = 4;
+
+/// Where everything stands in the table, the ground and the partial sums; the first words of the table.
+/// potential.wgsl has the same order.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+struct Header {
+    /// Words of the table.
+    materials: u32,
+    corners: u32,
+    offsets: u32,
+    springs: u32,
+    attachments: u32,
+    pieces: u32,
+    members: u32,
+    /// Vertices from one range of the ground to the next, and where anchors begin.
+    stride: u32,
+    anchors: u32,
+    /// Places among the partial sums.
+    parts: u32,
+    energies: u32,
+    vertex_count: u32,
+    /// Lanes of all tetrahedra, and of those before the first neo-Hookean one.
+    tet_lanes: u32,
+    neo_hookean_from: u32,
+    spring_count: u32,
+    attachment_count: u32,
+    piece_count: u32,
+}
+
+/// The ranges of the ground that kernels know by a slot, in order; `None` for one that only the guard
+/// knows. Starts are three.
+const GROUND: [Option<Slot>; 10] = [
+    Some(Slot::Previous),
+    Some(Slot::Predicted),
+    Some(Slot::Acting),
+    Some(Slot::Targets),
+    Some(Slot::Velocities),
+    Some(Slot::Starts),
+    None,
+    None,
+    None,
+    None,
+];
+/// Of these, how many there are where steps are not guarded.
+const UNGUARDED: usize = 6;
+
+/// Constants in one buffer, and the ranges of that and others.
+pub(super) struct Table {
+    pub bytes: Vec<u8>,
+    pub ranges: Vec<Range>,
+    /// Bytes of what belongs to vertices, and of all sums.
+    pub ground_size: u64,
+    pub sums_size: u64,
+    /// Where the parts' numbers begin among the sums [bytes].
+    pub parts_start: u64,
+}
 
 /// Where loads go and what is summed together.
 #[derive(Clone, Debug)]
@@ -124,24 +184,72 @@ impl Layout {
         self.offsets.last().copied().unwrap_or(0).into()
     }
 
-    /// Bytes that sums of pieces need.
-    pub fn partial_sums_size(&self) -> u64 {
-        4 * (PRODUCTS * u64::from(SUM_GROUPS)).max(PIECE_SUMS * u64::from(self.piece_count))
+    /// What never changes beside the tetrahedra, and where everything stands.
+    pub fn table(&self, model: &Model<f32>, guarded: bool) -> Table {
+        let (mut bytes, mut ranges) = (vec![0; ALIGNMENT as usize], Vec::new());
+        let mut add = |slot: Option<Slot>, new: &[u8]| {
+            let start = bytes.len();
+            bytes.extend(new);
+            // A binding is never empty.
+            let end = bytes.len().next_multiple_of(ALIGNMENT as usize).max(start + 256);
+            bytes.resize(end, 0);
+            let (start, size) = (start as u64, (end - start) as u64);
+            ranges.extend(slot.map(|slot| Range { slot, owner: Slot::Table, start, size }));
+            (start / 4) as u32
+        };
+        let words = |words: &[u32]| bytemuck::cast_slice(words).to_vec();
+        let mut header = Header {
+            materials: add(Some(Slot::Materials), &materials(model)),
+            corners: add(
+                Some(Slot::CornerIndices),
+                &words(self.corners.as_flattened().as_flattened()),
+            ),
+            offsets: add(Some(Slot::Offsets), &words(&self.offsets)),
+            springs: add(Some(Slot::Springs), bytemuck::cast_slice(&self.springs)),
+            attachments: add(Some(Slot::Attachments), bytemuck::cast_slice(&self.attachments)),
+            pieces: add(None, &words(self.pieces.as_flattened())),
+            members: add(None, &words(&self.members)),
+            vertex_count: model.vertex_count() as u32,
+            tet_lanes: (LANES * self.corners.len()) as u32,
+            neo_hookean_from: (LANES * model.green_strain.block_count()) as u32,
+            spring_count: self.springs.len() as u32,
+            attachment_count: self.attachments.len() as u32,
+            piece_count: self.piece_count,
+            ..Header::default()
+        };
+
+        let each = 16 * u64::from(Self::stride(model));
+        let count = if guarded { GROUND.len() } else { UNGUARDED };
+        for (place, slot) in GROUND[..count].iter().enumerate() {
+            let size = if guarded && *slot == Some(Slot::Starts) { 3 * each } else { each };
+            let start = each * place as u64;
+            ranges.extend(slot.map(|slot| Range { slot, owner: Slot::Ground, start, size }));
+        }
+        let start = each * count as u64;
+        let size = (16 * self.attachments.len() as u64).next_multiple_of(ALIGNMENT).max(ALIGNMENT);
+        ranges.push(Range { slot: Slot::Anchors, owner: Slot::Ground, start, size });
+        (header.stride, header.anchors) = (Self::stride(model), (start / 16) as u32);
+
+        let pieces = PIECE_SUMS * u64::from(self.piece_count);
+        let parts = (PRODUCTS * u64::from(SUM_GROUPS)).max(if guarded { pieces } else { 0 });
+        let energies = parts + (PART_NUMBERS * model.component_count) as u64;
+        let elements = header.tet_lanes + header.spring_count + header.attachment_count;
+        let sums = energies + if guarded { elements.into() } else { 0 };
+        (header.parts, header.energies) = (parts as u32, energies as u32);
+        bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
+        let ground_size = start + size;
+        Table { bytes, ranges, ground_size, sums_size: 4 * sums, parts_start: 4 * parts }
     }
 
-    /// What never changes, as the kernels read it.
-    pub fn constants(&self, model: &Model<f32>) -> Vec<(Slot, &'static str, Vec<u8>)> {
-        let bytes = |words: &[u32]| bytemuck::cast_slice(words).to_vec();
-        vec![
-            (Slot::Tets, "tetrahedra", tets(model)),
-            (Slot::Materials, "materials", materials(model)),
-            (Slot::CornerIndices, "corners", bytes(self.corners.as_flattened().as_flattened())),
-            (Slot::Offsets, "vertices", bytes(&self.offsets)),
-            (Slot::Springs, "springs", bytemuck::cast_slice(&self.springs).to_vec()),
-            (Slot::Attachments, "attachments", bytemuck::cast_slice(&self.attachments).to_vec()),
-            (Slot::Members, "elements", bytes(&self.members)),
-            (Slot::Pieces, "pieces", bytes(self.pieces.as_flattened())),
-        ]
+    /// Vertices from one range of the ground to the next.
+    pub fn stride(model: &Model<f32>) -> u32 {
+        model.vertex_count().next_multiple_of((ALIGNMENT / 16) as usize) as u32
+    }
+
+    /// The first piece of vertices.
+    pub fn first_of_vertices(&self) -> u32 {
+        let pieces = &self.pieces[..self.piece_count as usize];
+        pieces.partition_point(|piece| piece[3] == 0) as u32
     }
 
     /// Copies of each corner, and where those of each vertex begin.
@@ -198,7 +306,8 @@ fn pieces(
     (members, pieces)
 }
 
-fn tets(model: &Model<f32>) -> Vec<u8> {
+/// Tetrahedra as `TetBlock` of bindings.wgsl.
+pub(super) fn tets(model: &Model<f32>) -> Vec<u8> {
     let mut words = Vec::new();
     for set in model.tet_sets() {
         for (block, &filled) in set.blocks.iter().zip(&set.filled) {

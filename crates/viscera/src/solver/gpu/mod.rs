@@ -19,6 +19,8 @@ mod history;
 pub mod kernels;
 mod layout;
 mod record;
+mod record_guard;
+mod report;
 mod surface;
 
 use bytemuck::{Pod, Zeroable};
@@ -42,7 +44,7 @@ use explicit::Hold;
 pub use frames::Frame;
 use frames::Frames;
 use layout::Layout;
-use record::{Dispatch, Job, Recorder};
+use record::{Dispatch, Job, Pieces, Recorder};
 pub use surface::{GpuSurface, Skin};
 
 /// `Frame` of bindings.wgsl.
@@ -107,6 +109,8 @@ pub struct GpuSolver {
     /// Where each vertex stands in `updates`; `u32::MAX` for nowhere.
     update_of: Vec<u32>,
     shares: [f32; 2],
+    /// Where the energy limit's numbers begin among the partial sums [bytes], and of how many parts.
+    parts: (usize, usize),
     /// The step [s] that the norm's weights on the device belong to.
     weights_dt: f64,
     /// Whether the device's anchors may be elsewhere than at rest.
@@ -158,6 +162,11 @@ impl GpuSolver {
             multipliers_first: (buffers.multipliers_start / 4) as u32,
             swept: Recorder::swept(model),
             mixes_remember: Recorder::mixes_remember(&plan),
+            stride: Layout::stride(model),
+            pieces: Pieces {
+                count: layout.piece_count,
+                first_of_vertices: layout.first_of_vertices(),
+            },
         };
         let record = recorder.record(&plan);
         let lists = [record.prologue, record.body, record.epilogue, record.restart];
@@ -211,15 +220,16 @@ impl GpuSolver {
             jobs,
             ready: [prologue, body, epilogue],
             restart,
-            buffers,
             multiplier_dt: 0.0,
             touched: Vec::new(),
+            parts: (buffers.parts_start as usize, model.component_count),
             updates: Vec::new(),
             update_of: vec![u32::MAX; model.vertex_count()],
             shares: [rebase_factor(model, settings) as f32, bound_share(model) as f32],
             has_moved_anchors: true,
             stable_step: if is_explicit { stable_step(model, settings) } else { f64::INFINITY },
             holds: if is_explicit { Hold::all(model) } else { Vec::new() },
+            buffers,
         };
         solver.upload_constants(model);
         let rest = State::at_rest(model);
@@ -281,17 +291,15 @@ impl GpuSolver {
             let order = model.numbering.order.iter();
             order.map(|&v| values[v as usize].to_array()).map(|[x, y, z]| [x, y, z, 0.0]).collect()
         };
-        let queue = &self.device.queue;
         let mut unknowns = vec![0.0f32; self.buffers.length as usize];
         let (positions, multipliers) =
             unknowns.split_at_mut((self.buffers.multipliers_start / 4) as usize);
         let places = sorted(&state.positions);
         positions[..4 * places.len()].copy_from_slice(places.as_flattened());
         multipliers[..state.multipliers.len()].copy_from_slice(&state.multipliers);
-        let buffer = self.buffers.buffer(Slot::Unknowns);
-        queue.write_buffer(buffer, 0, bytemuck::cast_slice(&unknowns));
-        let velocities = self.buffers.buffer(Slot::Velocities);
-        queue.write_buffer(velocities, 0, bytemuck::cast_slice(&sorted(&state.velocities)));
+        let write = |slot, bytes: &[u8]| self.buffers.write(&self.device.queue, slot, bytes);
+        write(Slot::Unknowns, bytemuck::cast_slice(&unknowns));
+        write(Slot::Velocities, bytemuck::cast_slice(&sorted(&state.velocities)));
         self.multiplier_dt = state.multiplier_dt;
     }
 
@@ -363,8 +371,7 @@ impl GpuSolver {
     ) {
         self.collect_updates(model, inputs);
         let queue = &self.device.queue;
-        let updates = self.buffers.buffer(Slot::Updates);
-        queue.write_buffer(updates, 0, bytemuck::cast_slice(&self.updates));
+        self.buffers.write(queue, Slot::Updates, bytemuck::cast_slice(&self.updates));
         let settings = &self.settings;
         let held = &model.attachments;
         if !held.vertices.is_empty() && (!inputs.anchors.is_empty() || self.has_moved_anchors) {
@@ -376,11 +383,7 @@ impl GpuSolver {
                 .map(|&i| anchors[i as usize].to_array())
                 .map(|[x, y, z]| [x, y, z, 0.0])
                 .collect();
-            queue.write_buffer(
-                self.buffers.buffer(Slot::Anchors),
-                0,
-                bytemuck::cast_slice(&places),
-            );
+            self.buffers.write(queue, Slot::Anchors, bytemuck::cast_slice(&places));
         }
         let last = self.multiplier_dt;
         let rescale = match settings.keep_multipliers {
@@ -393,8 +396,7 @@ impl GpuSolver {
         if is_xpbd && settings.acceleration != Acceleration::None && dt != self.weights_dt {
             self.weights_dt = dt;
             let weights = norm_weights(model, settings, &self.buffers, dt);
-            let buffer = self.buffers.buffer(Slot::Weights);
-            self.device.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&weights));
+            self.buffers.write(queue, Slot::Weights, bytemuck::cast_slice(&weights));
         }
         let omega = settings.relaxation as f32;
         let constants = FrameConstants {
@@ -482,8 +484,7 @@ impl GpuSolver {
             (Slot::Previous, with_w(&copies)),
             (Slot::Targets, with_w(&|v| stiffness[v])),
         ] {
-            let buffer = self.buffers.buffer(slot);
-            self.device.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&values));
+            self.buffers.write(&self.device.queue, slot, bytemuck::cast_slice(&values));
         }
     }
 }
@@ -571,7 +572,7 @@ pub fn host_layouts() -> Vec<HostLayout> {
 
 /// Constants that host and kernels share, and sizes [bytes] of records that only kernels write.
 #[doc(hidden)]
-pub fn host_constants() -> ([(&'static str, u32); 4], [(&'static str, u64); 2]) {
+pub fn host_constants() -> ([(&'static str, u32); 4], [(&'static str, u64); 1]) {
     use super::acceleration::LARGEST_WINDOW;
     use crate::scalar::lanes::LANES;
     let constants = [
@@ -580,5 +581,5 @@ pub fn host_constants() -> ([(&'static str, u32); 4], [(&'static str, u64); 2]) 
         ("LARGEST_WINDOW", LARGEST_WINDOW as u32),
         ("PRODUCTS", layout::PRODUCTS as u32),
     ];
-    (constants, [("Control", layout::CONTROL_SIZE), ("Part", layout::PART_SIZE)])
+    (constants, [("Control", layout::CONTROL_SIZE)])
 }

@@ -73,6 +73,16 @@ pub(super) struct Recorder<'a> {
     pub multipliers_first: u32,
     pub swept: Swept,
     pub mixes_remember: bool,
+    /// Vertices from one range of the ground to the next.
+    pub stride: u32,
+    pub pieces: Pieces,
+}
+
+/// How many pieces sums are taken in, and which of them is the first of vertices.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pieces {
+    pub count: u32,
+    pub first_of_vertices: u32,
 }
 
 impl Recorder<'_> {
@@ -118,7 +128,10 @@ impl Recorder<'_> {
                     Start::Inertial => 1,
                     Start::Predicted | Start::Auto => 2,
                 };
-                into.push(self.vertices(&kernels::PREDICT, mode));
+                let keeps_starts = if self.settings.guards_steps() { 4 } else { 0 };
+                let mut predict = self.vertices(&kernels::PREDICT, mode | keeps_starts);
+                predict.job.set_first = self.stride;
+                into.push(predict);
             }
             Stage::ResetMultipliers | Stage::RescaleMultipliers => {
                 let count = model.multiplier_count as u32;
@@ -146,13 +159,18 @@ impl Recorder<'_> {
             }
             Stage::Chebyshev => self.chebyshev(into),
             Stage::Anderson(on) => self.anderson(on, into),
+            // Guarded steps get theirs from the energy limit.
+            Stage::UpdateVelocities if self.settings.guards_steps() => {}
             Stage::UpdateVelocities => into.push(self.vertices(&kernels::UPDATE_VELOCITIES, 0)),
             Stage::RepairMultipliers => self.repair_multipliers(into),
             Stage::BeginExplicit => self.begin_explicit(into),
             Stage::LoadForces => into.push(self.load_forces()),
             Stage::AdvanceExplicit => into.push(self.vertices(&kernels::ADVANCE_EXPLICIT, 0)),
             Stage::EndExplicit => into.push(self.vertices(&kernels::END_EXPLICIT, 0)),
-            Stage::ChooseStart | Stage::GuardStep | Stage::GuardIterate | Stage::LimitEnergy => {}
+            Stage::ChooseStart => self.choose_start(into),
+            Stage::GuardIterate => self.guard_iterate(into),
+            Stage::GuardStep => self.guard_step(into),
+            Stage::LimitEnergy => self.limit_energy(into),
         }
     }
 
@@ -191,7 +209,7 @@ impl Recorder<'_> {
     }
 
     /// A thread for each number of the long vector.
-    fn long(&self, kernel: &'static Kernel, mode: u32) -> Dispatch {
+    pub(super) fn long(&self, kernel: &'static Kernel, mode: u32) -> Dispatch {
         let set_first = self.settings.anderson_window;
         let first = self.multipliers_first;
         self.threads(kernel, Job { first, count: self.length, set_first, mode, ..Job::default() })

@@ -169,7 +169,7 @@ impl GpuSurface {
 
     /// Waits for the device and reads positions [m] and normals, shape [vertex_count] each.
     pub fn read(&self) -> Result<[Vec<Vec3<f32>>; 2], GpuError> {
-        let bytes = frames::read(&self.device, &self.vertices)?;
+        let bytes = frames::read(&self.device, &self.vertices, 0, self.vertices.size())?;
         let numbers: &[[f32; 4]] = bytemuck::cast_slice(&bytes);
         let pairs = &numbers.as_chunks::<2>().0[..self.vertex_count as usize];
         let column =

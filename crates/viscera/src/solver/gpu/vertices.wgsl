@@ -19,7 +19,8 @@ fn apply_updates(
 }
 
 // xt = x + dt v + dt^2 (g + M^-1 f); x becomes the start of the iteration: x (mode 0), x + dt v (mode 1)
-// or xt (mode 2); pins move to their places; w = 1/m per copy.
+// or xt (mode 2); pins move to their places; w = 1/m per copy. Where steps are guarded (mode bit 2) the places
+// that the step could start from are kept, `job.set_first` vertices apart.
 @compute @workgroup_size(64)
 fn predict(
     @builtin(global_invocation_id) id: vec3u,
@@ -39,15 +40,19 @@ fn predict(
     previous[v] = vec4f(x, copy_count);
     predicted[v] = vec4f(xt, mass);
     var start = x;
-    if job.mode == 1u {
+    if (job.mode & 3u) == 1u {
         start = inertial;
-    } else if job.mode == 2u {
+    } else if (job.mode & 3u) == 2u {
         start = xt;
     }
-    if on_vertex.w == 0.0 {
-        start = targets[v].xyz;
-    }
+    let is_pinned = on_vertex.w == 0.0;
+    start = select(start, targets[v].xyz, is_pinned);
     points[v] = vec4f(start, on_vertex.w * copy_count);
+    if (job.mode & 4u) != 0u {
+        starts[v] = vec4f(select(x, start, is_pinned), 0.0);
+        starts[job.set_first + v] = vec4f(select(xt, start, is_pinned), 0.0);
+        starts[2u * job.set_first + v] = vec4f(start, 0.0);
+    }
 }
 
 // Sum of what acts on a vertex, in the order of its places.

@@ -1,0 +1,215 @@
+//! Step guard, guard of mixtures and energy limit on a graphics processor: they hold what they hold on the
+//! CPU.
+
+mod common;
+
+use common::{Random, SNH, STVK, block, material, single_body};
+use viscera::measure::measure_tets;
+use viscera::mesh::TetMesh;
+use viscera::model::{Model, ModelBuilder};
+use viscera::scalar::{Real, Vec3, vec3};
+use viscera::settings::{Acceleration, AndersonGuard, Colors, Precision, SolverSettings};
+use viscera::solver::gpu::{Adapter, Device, GpuSolver};
+use viscera::solver::{Inputs, Pin, Solver, StepReport};
+use viscera::state::State;
+
+const DT: f64 = 1.0 / 600.0;
+const GRAVITY: Vec3<f64> = vec3(0.0, 0.0, -9.81);
+
+fn device() -> Device {
+    let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
+    adapter.open().unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// One model on the device, in single and in double precision on the CPU.
+struct Trio<'a> {
+    models: (&'a Model<f32>, &'a Model<f64>),
+    gpu: GpuSolver,
+    cpu: Solver<f32>,
+    oracle: Solver<f64>,
+    states: (State<f32>, State<f64>),
+}
+
+impl<'a> Trio<'a> {
+    fn new(
+        device: &Device,
+        models: (&'a Model<f32>, &'a Model<f64>),
+        settings: &SolverSettings,
+    ) -> Self {
+        let double = SolverSettings { precision: Precision::F64, ..settings.clone() };
+        Self {
+            models,
+            gpu: GpuSolver::new(device, models.0, settings).expect("a model that fits"),
+            cpu: Solver::new(models.0, settings),
+            oracle: Solver::new(models.1, &double),
+            states: (State::at_rest(models.0), State::at_rest(models.1)),
+        }
+    }
+
+    fn step(&mut self, inputs: &Inputs<f64>) {
+        let single = Inputs {
+            gravity: inputs.gravity.cast(),
+            pins: inputs
+                .pins
+                .iter()
+                .map(|pin| Pin { vertex: pin.vertex, target: pin.target.cast() })
+                .collect(),
+            ..Inputs::default()
+        };
+        let (x32, x64) = (&mut self.states.0, &mut self.states.1);
+        self.cpu.step(self.models.0, x32, &single, DT).expect("a legal step");
+        self.oracle.step(self.models.1, x64, inputs, DT).expect("a legal step");
+        self.gpu.step(self.models.0, &single, DT).expect("a legal step");
+    }
+
+    fn read(&self) -> State<f32> {
+        let mut state = State::at_rest(self.models.0);
+        self.gpu.read(self.models.0, &mut state).expect("a device");
+        state
+    }
+
+    fn report(&self) -> StepReport {
+        self.gpu.last_step().expect("a device").expect("a guarded step")
+    }
+
+    /// Largest distances [m] from double precision: the CPU's, the device's.
+    fn distances(&self) -> [f64; 2] {
+        let exact = &self.states.1.positions;
+        [&self.states.0.positions, &self.read().positions].map(|x| {
+            x.iter().zip(exact).map(|(a, b)| (a.cast::<f64>() - *b).length()).fold(0.0, f64::max)
+        })
+    }
+}
+
+/// Two bars joined by springs, one of them viscous and in attachments; one that is pinned, of three
+/// pieces; one that nothing holds: three parts, four materials.
+fn many_parts<S: Real>(settings: &SolverSettings) -> (Model<S>, Vec<Vec3<f64>>) {
+    let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
+    let large = block([0.06, 0.03, 0.03], [8, 5, 5], 0.1);
+    let viscous = material(SNH, 1e4, 0.4).with_viscosity(0.05).expect("legal");
+    let mut builder = ModelBuilder::new();
+    let mut places = Vec::new();
+    for (mesh, tissue, height) in [
+        (&mesh, &material(STVK, 2e4, 0.3), 0.0),
+        (&mesh, &viscous, 0.05),
+        (&large, &material(SNH, 2e4, 0.45), 0.1),
+        (&mesh, &material(STVK, 1e4, 0.3), 0.15),
+    ] {
+        let up = |x: &Vec3<f64>| *x + vec3(0.0, 0.0, height);
+        let vertices: Vec<_> = mesh.vertices().iter().map(up).collect();
+        places.extend(&vertices);
+        let regions = mesh.regions().to_vec();
+        let (mesh, _) = TetMesh::new(vertices, mesh.tets().to_vec(), regions).expect("a mesh");
+        builder.add_body(&mesh, tissue).expect("a body");
+    }
+    let half = mesh.vertices().len() as u32;
+    for v in (0..half).step_by(3) {
+        builder.add_spring([v, half + v], 40.0, Some(0.04)).expect("a spring");
+        let anchor = places[(half + v) as usize];
+        builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
+    }
+    let model = builder.build(settings).expect("a model");
+    assert_eq!(model.component_count, 3);
+    (model, places)
+}
+
+/// Walls at the left end of the first and of the third bar; the first one's moves.
+fn walls(places: &[Vec3<f64>], step: u32) -> Inputs<f64> {
+    let mut inputs = Inputs { gravity: GRAVITY, ..Inputs::default() };
+    let away = vec3(0.0, 0.0, 1e-4 * f64::from(step));
+    for (v, x) in places.iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
+        let target = match x.z {
+            ..0.04 => *x + away,
+            0.09..0.14 => *x,
+            _ => continue,
+        };
+        inputs.pins.push(Pin { vertex: v as u32, target });
+    }
+    inputs
+}
+
+/// In quiet motion the device strays from double precision by round-off alone, as the CPU does.
+#[test]
+fn quiet_motion_agrees_with_the_cpu() {
+    let device = device();
+    let plain = SolverSettings::default();
+    let anderson =
+        SolverSettings { acceleration: Acceleration::Anderson, iterations: 6, ..plain.clone() };
+    for (name, settings) in [
+        ("default", plain.clone()),
+        ("Jacobi", SolverSettings { colors: Colors::Limited(1), iterations: 4, ..plain }),
+        ("residual", anderson.clone()),
+        ("energy", SolverSettings { anderson_guard: AndersonGuard::Energy, ..anderson }),
+    ] {
+        let (model32, places) = many_parts::<f32>(&settings);
+        let (model64, _) = many_parts::<f64>(&settings);
+        let mut trio = Trio::new(&device, (&model32, &model64), &settings);
+        let mut slowed = [0, 0];
+        for step in 0..30 {
+            trio.step(&walls(&places, step));
+            let reports = [trio.oracle.last_step().expect("a guarded step"), trio.report()];
+            for (slowed, report) in slowed.iter_mut().zip(reports) {
+                *slowed += usize::from(report.kept_speed < 1.0);
+            }
+        }
+        let [cpu, gpu] = trio.distances();
+        let rejected = trio.gpu.rejected_steps().expect("a device");
+        println!(
+            "{name}: CPU {cpu:e} m, device {gpu:e} m from double precision; rejected {} and \
+             {rejected}, slowed {slowed:?}",
+            trio.oracle.rejected_steps()
+        );
+        assert_eq!(rejected, trio.oracle.rejected_steps(), "{name}");
+        assert!(gpu <= 2.0 * cpu, "{name}: {gpu} and {cpu}");
+    }
+}
+
+/// Vertices jump at once to places up to a body length away and are let go: no step ends above its
+/// limit, and the body comes to rest where it does in double precision.
+#[test]
+fn violent_grabs_are_taken_back() {
+    let device = device();
+    let size = [0.06, 0.03, 0.03];
+    let mesh = block(size, [3, 2, 2], 0.2);
+    let plain = SolverSettings::default();
+    for (seed, settings) in [
+        (0, plain.clone()),
+        (1, plain.clone()),
+        (2, SolverSettings { colors: Colors::Limited(1), ..plain.clone() }),
+        (3, SolverSettings { acceleration: Acceleration::Anderson, iterations: 6, ..plain }),
+    ] {
+        let tissue = material(SNH, 1e4, 0.45);
+        let model32 = single_body::<f32>(&mesh, &tissue, &settings);
+        let model64 = single_body::<f64>(&mesh, &tissue, &settings);
+        let mut trio = Trio::new(&device, (&model32, &model64), &settings);
+        let mut random = Random(seed);
+        let mut inputs = Inputs::default();
+        for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
+            inputs.pins.push(Pin { vertex: v as u32, target: *x });
+        }
+        let held = inputs.clone();
+        for _ in 0..5 {
+            let vertex = random.next() % mesh.vertices().len() as u64;
+            let target = mesh.vertices()[vertex as usize] + random.vector(size[0]);
+            inputs.pins.retain(|pin| pin.vertex != vertex as u32);
+            inputs.pins.push(Pin { vertex: vertex as u32, target });
+        }
+        let mut above = [0, 0];
+        for step in 0..600 {
+            trio.step(if step < 40 { &inputs } else { &held });
+            let reports = [trio.cpu.last_step().expect("a guarded step"), trio.report()];
+            for (above, report) in above.iter_mut().zip(reports) {
+                *above += usize::from(!report.keeps_limit());
+            }
+        }
+        let state = trio.read();
+        let [cpu, gpu] = trio.distances();
+        let rejected = [trio.cpu.rejected_steps(), trio.gpu.rejected_steps().expect("a device")];
+        println!(
+            "seed {seed}: {rejected:?} taken back, {above:?} above; CPU {cpu:e}, device {gpu:e}"
+        );
+        assert!(state.is_finite(), "seed {seed}");
+        assert_eq!(above, [0, 0], "seed {seed}");
+        assert!(rejected.iter().all(|&count| count > 0), "seed {seed}: {rejected:?}");
+    }
+}
