@@ -241,3 +241,32 @@ pub(super) fn uniform_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         entries: &[entry(0, true), entry(1, false)],
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(name: &str, source: &str) {
+        let module = naga::front::wgsl::parse_str(source)
+            .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(source)));
+        let flags = naga::valid::ValidationFlags::all();
+        let capabilities = naga::valid::Capabilities::empty();
+        naga::valid::Validator::new(flags, capabilities)
+            .validate(&module)
+            .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(source)));
+    }
+
+    #[test]
+    fn all_kernels_are_valid_and_bind_what_every_device_can() {
+        use TetForm::{GreenStrain, NeoHookeanPair, NeoHookeanStretch};
+        for kernel in ALL {
+            assert!(kernel.slots.len() <= 8, "{}", kernel.entry);
+            for form in [GreenStrain, NeoHookeanPair, NeoHookeanStretch] {
+                for is_split in [false, true] {
+                    check(kernel.entry, &source(kernel, Variant { form, is_split }));
+                }
+            }
+        }
+        check("surface", include_str!("surface.wgsl"));
+    }
+}

@@ -16,6 +16,7 @@ mod error;
 mod explicit;
 mod frames;
 mod history;
+mod inputs;
 pub mod kernels;
 mod layout;
 mod record;
@@ -25,14 +26,12 @@ use bytemuck::{Pod, Zeroable};
 
 use super::Inputs;
 use super::StepError;
-use super::cpu::{bound_share, fill_multiplier_weights, rebase_factor};
+use super::cpu::{bound_share, rebase_factor};
 use super::explicit::{small_steps, stable_step};
 use super::plan::Plan;
 use crate::model::Model;
 use crate::scalar::Vec3;
-use crate::settings::{
-    Acceleration, AndersonOn, Method, Precision, RelaxationForm, SolverSettings,
-};
+use crate::settings::{Acceleration, Method, Precision, RelaxationForm, SolverSettings};
 use crate::state::State;
 pub use buffers::Slot;
 use buffers::{Buffers, Update};
@@ -41,6 +40,7 @@ pub use error::GpuError;
 use explicit::Hold;
 pub use frames::Frame;
 use frames::Frames;
+use inputs::norm_weights;
 use layout::Layout;
 use record::{Dispatch, Job, Recorder};
 pub use surface::{GpuSurface, Skin};
@@ -392,49 +392,6 @@ impl GpuSolver {
         self.device.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&constants));
     }
 
-    /// What acts on vertices in this step, and the freedom of those that the last one held.
-    fn collect_updates(&mut self, model: &Model<f32>, inputs: &Inputs<f32>) {
-        self.updates.clear();
-        let (updates, update_of) = (&mut self.updates, &mut self.update_of);
-        let mut update = |vertex: u32| {
-            let place = &mut update_of[vertex as usize];
-            if *place == u32::MAX {
-                *place = updates.len() as u32;
-                updates.push(Update { vertex, ..Update::default() });
-            }
-            *place as usize
-        };
-        for vertex in self.touched.drain(..) {
-            update(vertex);
-        }
-        let of = |vertex: u32| model.numbering.of(vertex) as u32;
-        let holds: Vec<usize> = self.holds.iter().map(|hold| update(hold.vertex)).collect();
-        let forces: Vec<(usize, [f32; 3])> = (inputs.forces.iter())
-            .map(|&(vertex, force)| (update(of(vertex)), force.to_array()))
-            .collect();
-        let pins: Vec<(usize, [f32; 3])> =
-            inputs.pins.iter().map(|pin| (update(of(pin.vertex)), pin.target.to_array())).collect();
-        let anchors = inputs.anchors_of(model);
-        for (place, hold) in holds.into_iter().zip(&self.holds) {
-            self.updates[place].place = hold.place(anchors);
-        }
-        for (place, force) in forces {
-            for axis in 0..3 {
-                self.updates[place].force[axis] += force[axis];
-            }
-        }
-        for (place, target) in pins {
-            self.updates[place].is_pinned = 1;
-            self.updates[place].place = target;
-        }
-        for update in &self.updates {
-            self.update_of[update.vertex as usize] = u32::MAX;
-            if update.is_pinned != 0 || update.force != [0.0; 3] {
-                self.touched.push(update.vertex);
-            }
-        }
-    }
-
     /// What each vertex is made of: mass, inverse mass, number of copies, stiffness of its attachments.
     fn upload_constants(&self, model: &Model<f32>) {
         let order = &model.numbering.order;
@@ -475,28 +432,4 @@ fn prepare(device: &Device, buffers: &Buffers, dispatch: &Dispatch, job: u32) ->
     let along = dispatch.groups.min(MOST_GROUPS);
     let groups = [along, dispatch.groups.div_ceil(along.max(1))];
     Ready { pipeline: made.pipeline, storage, job, groups }
-}
-
-/// Weights of the norm in which iterates are compared, for a step of `dt` [s].
-fn norm_weights(
-    model: &Model<f32>,
-    settings: &SolverSettings,
-    buffers: &Buffers,
-    dt: f64,
-) -> Vec<f32> {
-    let mut weights = vec![0.0; buffers.length as usize];
-    let (positions, multipliers) = weights.split_at_mut((buffers.multipliers_start / 4) as usize);
-    for (four, &v) in positions.as_chunks_mut::<4>().0.iter_mut().zip(&model.numbering.order) {
-        let mass = model.masses[v as usize];
-        *four = [mass, mass, mass, 0.0];
-    }
-    fill_multiplier_weights(model, dt, multipliers);
-    if settings.acceleration == Acceleration::Anderson {
-        match settings.anderson_on {
-            AndersonOn::Positions => multipliers.fill(0.0),
-            AndersonOn::Multipliers => positions.fill(0.0),
-            AndersonOn::Both => {}
-        }
-    }
-    weights
 }
