@@ -4,9 +4,9 @@ mod common;
 #[path = "common/device.rs"]
 mod device;
 
-use common::{SNH, STVK, block, material, single_body};
-use device::largest;
-use viscera::model::{Model, ModelBuilder};
+use common::{SNH, block, material, single_body};
+use device::{everything, largest};
+use viscera::model::Model;
 use viscera::scalar::{Real, vec3};
 use viscera::settings::{Acceleration, Colors, Method, Precision, SolverSettings};
 use viscera::solver::gpu::{Device, GpuSolver};
@@ -22,26 +22,6 @@ fn explicit(colors: Colors) -> SolverSettings {
     // Accelerations are for sweeps: the explicit method leaves them alone.
     let acceleration = Acceleration::Anderson;
     SolverSettings { method: Method::Explicit, acceleration, colors, ..SolverSettings::default() }
-}
-
-/// Two bars joined by springs, one viscous, with vertices that are attached twice.
-fn everything<S: Real>(settings: &SolverSettings) -> Model<S> {
-    let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
-    let mut builder = ModelBuilder::new();
-    let viscous = material(SNH, 1e4, 0.4).with_viscosity(0.02).expect("legal");
-    builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
-    builder.add_body(&mesh, &viscous).expect("a body");
-    let half = mesh.vertices().len() as u32;
-    for v in (0..half).step_by(3) {
-        builder.add_spring([v, half + v], 40.0, Some(0.01)).expect("a spring");
-        let anchor = mesh.vertices()[v as usize];
-        builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
-        if v % 2 == 0 {
-            let away = anchor + vec3(0.004, 0.0, 0.002);
-            builder.add_attachment(half + v, away, 10.0).expect("an attachment");
-        }
-    }
-    builder.build(settings).expect("a model")
 }
 
 /// A wall that moves and is let go, one attached vertex held for a while, a force, anchors that drift and

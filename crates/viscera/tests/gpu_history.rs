@@ -5,7 +5,8 @@ mod common;
 #[path = "common/device.rs"]
 mod device;
 
-use common::{Random, everything};
+use common::Random;
+use device::everything;
 use viscera::model::Model;
 use viscera::scalar::{Real, vec3};
 use viscera::settings::{Colors, NeoHookean, SolverSettings};
@@ -28,7 +29,7 @@ fn without_sweeps(neo_hookean: NeoHookean) -> SolverSettings {
     SolverSettings { iterations: 0, step_guard: false, neo_hookean, ..SolverSettings::default() }
 }
 
-/// Scrambled, moving, with multipliers of some history. The numbers are of single precision.
+/// Scrambled, moving, with multipliers of some history, but for fillings, which have none. The numbers are of single precision.
 fn scrambled(model: &Model<f32>) -> State<f32> {
     let mut random = Random(11);
     let mut state = State::at_rest(model);
@@ -36,8 +37,14 @@ fn scrambled(model: &Model<f32>) -> State<f32> {
         *x += random.vector(0.002).cast();
         *v = random.vector(0.1).cast();
     }
-    for l in &mut state.multipliers {
-        *l = random.uniform(-1e-6, 1e-6) as f32;
+    let form = model.neo_hookean.form.multiplier_count();
+    let mut places: Vec<usize> =
+        (model.springs.multiplier_offset..model.multiplier_count).collect();
+    for (set, count) in model.tet_sets().into_iter().zip([6, form]) {
+        places.extend(model.tets(set).flat_map(|tet| (0..count).map(move |p| tet.multiplier(p))));
+    }
+    for place in places {
+        state.multipliers[place] = random.uniform(-1e-6, 1e-6) as f32;
     }
     state.multiplier_dt = DT;
     state
@@ -90,10 +97,11 @@ fn multipliers_that_are_no_numbers_start_a_new_history() {
         (NeoHookean::Stretch, Colors::Limited(1)),
     ] {
         let settings = SolverSettings { colors, ..without_sweeps(neo_hookean) };
-        let (model, model64) = (everything(colors), everything(colors));
+        let (model, model64) = (everything(&settings), everything(&settings));
         let mut state = scrambled(&model);
         let last = state.multipliers.len() - 1;
-        for (broken, place) in [(f32::NAN, 0), (f32::INFINITY, last), (-f32::NAN, last / 2)] {
+        for (broken, place) in [(f32::NAN, 0), (f32::INFINITY, last), (f32::NEG_INFINITY, last / 2)]
+        {
             state.multipliers[place] = broken;
             let mut gpu = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
             gpu.write(&model, &state).expect("a state of this model");
@@ -118,7 +126,7 @@ fn multipliers_that_are_no_numbers_start_a_new_history() {
 fn fillings_are_repaired_and_numbers_are_left_alone() {
     let device = device::open();
     let settings = without_sweeps(NeoHookean::Stretch);
-    let model = everything(Colors::Unlimited);
+    let model = everything(&settings);
     let mut gpu = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
     let mut state = scrambled(&model);
     state.multipliers[5] = f32::MAX;
@@ -129,7 +137,8 @@ fn fillings_are_repaired_and_numbers_are_left_alone() {
     assert_eq!(read.multipliers, state.multipliers);
 
     // A new history has zeros in fillings alone.
-    let mut fresh = state.clone();
+    let mut fresh = State::at_rest(&model);
+    fresh.positions.clone_from(&state.positions);
     let mut solver = Solver::new(&model, &settings);
     solver.restart(&model, &mut fresh, &inputs(&model), DT).expect("a new history");
     let filling = fresh.multipliers.iter().position(|&l| l == 0.0).expect("a filling");
@@ -148,8 +157,7 @@ fn a_restart_takes_the_multipliers_from_the_positions() {
     for neo_hookean in [NeoHookean::Stretch, NeoHookean::Pair] {
         let settings =
             SolverSettings { step_guard: false, neo_hookean, ..SolverSettings::default() };
-        let colors = Colors::Unlimited;
-        let (model, model64) = (everything(colors), everything(colors));
+        let (model, model64) = (everything(&settings), everything(&settings));
         let state = scrambled(&model);
         let (mut cpu, mut oracle) = (state.clone(), in_double(&state));
         let mut gpu = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
@@ -195,7 +203,7 @@ fn compare_restart(model: &Model<f32>, cpu: &State<f32>, gpu: &State<f32>, oracl
 fn two_repairs_have_the_same_bits() {
     let device = device::open();
     let settings = without_sweeps(NeoHookean::Stretch);
-    let model = everything(Colors::Unlimited);
+    let model = everything(&settings);
     let mut state = scrambled(&model);
     state.multipliers[3] = f32::NAN;
     let [a, b] = [0, 1].map(|_| {

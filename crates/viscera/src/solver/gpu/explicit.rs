@@ -73,3 +73,49 @@ impl Hold {
         sum.cast::<f32>().to_array()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Adapter, GpuSolver, Slot};
+    use crate::material::{Material, MaterialModel};
+    use crate::mesh::shapes::Block;
+    use crate::model::ModelBuilder;
+    use crate::scalar::vec3;
+    use crate::settings::{Method, SolverSettings};
+    use crate::solver::{Inputs, Pin, Solver};
+    use crate::state::State;
+
+    /// A force balance of the mean acceleration needs it.
+    #[test]
+    fn prediction_is_the_processor_s() {
+        let settings = SolverSettings { method: Method::Explicit, ..SolverSettings::default() };
+        let mesh = Block::new(vec3(0.04, 0.02, 0.02), [2, 1, 1]).mesh().expect("a block");
+        let law = MaterialModel::StableNeoHookean;
+        let mut builder = ModelBuilder::new();
+        let tissue = Material::new(law, 1e4, 0.4, 1000.0).expect("a legal material");
+        builder.add_body(&mesh, &tissue).expect("a body");
+        let model = builder.build::<f32>(&settings).expect("a model");
+        let device = Adapter::find(None).and_then(|adapter| adapter.open());
+        let device = device.unwrap_or_else(|error| panic!("{error}"));
+        let inputs = Inputs {
+            gravity: vec3(0.0, 0.0, -9.81),
+            pins: vec![Pin { vertex: 0, target: model.rest_positions[0] }],
+            forces: vec![(5, vec3(0.01, 0.0, 0.0))],
+            ..Inputs::default()
+        };
+        let (mut cpu, mut state) = (Solver::new(&model, &settings), State::at_rest(&model));
+        let mut gpu = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
+        for _ in 0..3 {
+            cpu.step(&model, &mut state, &inputs, 0.01).expect("a legal step");
+            gpu.step(&model, &inputs, 0.01).expect("a legal step");
+        }
+        let bytes = gpu.read_buffer(Slot::Predicted).expect("a device");
+        let found: &[[f32; 4]] = bytemuck::cast_slice(&bytes);
+        for (v, expected) in cpu.work.ground.predicted.iter().enumerate() {
+            let [x, y, z, _] = found[v];
+            let away = (vec3(x, y, z) - expected.vec3()).length();
+            // Some thousand roundings of places of 4 cm, which mostly cancel.
+            assert!(away < 100.0 * 0.04 * f32::EPSILON, "vertex {v}: {away:e} m");
+        }
+    }
+}

@@ -184,8 +184,8 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
         File::Multipliers => texts.push(include_str!("multipliers.wgsl")),
         File::Acceleration => texts.push(include_str!("acceleration.wgsl")),
         File::History => {
-            // Functions of the tissue name those of both laws.
-            if variant.form == TetForm::GreenStrain {
+            // Functions of the tissue need those of both laws; the pair brings its own along.
+            if variant.form != TetForm::NeoHookeanPair {
                 texts.push(wgsl::NEO_HOOKEAN);
             }
             texts.extend(form());

@@ -16,6 +16,8 @@ mod error;
 mod explicit;
 mod frames;
 mod history;
+mod host;
+mod inputs;
 pub mod kernels;
 mod layout;
 mod record;
@@ -27,14 +29,12 @@ use bytemuck::{Pod, Zeroable};
 
 use super::Inputs;
 use super::StepError;
-use super::cpu::{bound_share, fill_multiplier_weights, rebase_factor};
+use super::cpu::{bound_share, rebase_factor};
 use super::explicit::{small_steps, stable_step};
 use super::plan::Plan;
 use crate::model::Model;
 use crate::scalar::Vec3;
-use crate::settings::{
-    Acceleration, AndersonOn, Method, Precision, RelaxationForm, SolverSettings,
-};
+use crate::settings::{Acceleration, Method, Precision, RelaxationForm, SolverSettings};
 use crate::state::State;
 pub use buffers::Slot;
 use buffers::{Buffers, Update};
@@ -43,6 +43,8 @@ pub use error::GpuError;
 use explicit::Hold;
 pub use frames::Frame;
 use frames::Frames;
+pub use host::{HostLayout, host_constants, host_layouts};
+use inputs::norm_weights;
 use layout::Layout;
 use record::{Dispatch, Job, Pieces, Recorder};
 pub use surface::{GpuSurface, Skin};
@@ -421,49 +423,6 @@ impl GpuSolver {
         self.device.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&constants));
     }
 
-    /// What acts on vertices in this step, and the freedom of those that the last one held.
-    fn collect_updates(&mut self, model: &Model<f32>, inputs: &Inputs<f32>) {
-        self.updates.clear();
-        let (updates, update_of) = (&mut self.updates, &mut self.update_of);
-        let mut update = |vertex: u32| {
-            let place = &mut update_of[vertex as usize];
-            if *place == u32::MAX {
-                *place = updates.len() as u32;
-                updates.push(Update { vertex, ..Update::default() });
-            }
-            *place as usize
-        };
-        for vertex in self.touched.drain(..) {
-            update(vertex);
-        }
-        let of = |vertex: u32| model.numbering.of(vertex) as u32;
-        let holds: Vec<usize> = self.holds.iter().map(|hold| update(hold.vertex)).collect();
-        let forces: Vec<(usize, [f32; 3])> = (inputs.forces.iter())
-            .map(|&(vertex, force)| (update(of(vertex)), force.to_array()))
-            .collect();
-        let pins: Vec<(usize, [f32; 3])> =
-            inputs.pins.iter().map(|pin| (update(of(pin.vertex)), pin.target.to_array())).collect();
-        let anchors = inputs.anchors_of(model);
-        for (place, hold) in holds.into_iter().zip(&self.holds) {
-            self.updates[place].place = hold.place(anchors);
-        }
-        for (place, force) in forces {
-            for axis in 0..3 {
-                self.updates[place].force[axis] += force[axis];
-            }
-        }
-        for (place, target) in pins {
-            self.updates[place].is_pinned = 1;
-            self.updates[place].place = target;
-        }
-        for update in &self.updates {
-            self.update_of[update.vertex as usize] = u32::MAX;
-            if update.is_pinned != 0 || update.force != [0.0; 3] {
-                self.touched.push(update.vertex);
-            }
-        }
-    }
-
     /// What each vertex is made of: mass, inverse mass, number of copies, stiffness of its attachments.
     fn upload_constants(&self, model: &Model<f32>) {
         let order = &model.numbering.order;
@@ -505,81 +464,4 @@ fn prepare(device: &Device, buffers: &Buffers, dispatch: &Dispatch, job: u32) ->
     let along = dispatch.groups.min(MOST_GROUPS);
     let groups = [along, dispatch.groups.div_ceil(along.max(1))];
     Ready { pipeline: made.pipeline, storage, job, groups }
-}
-
-/// Weights of the norm in which iterates are compared, for a step of `dt` [s].
-fn norm_weights(
-    model: &Model<f32>,
-    settings: &SolverSettings,
-    buffers: &Buffers,
-    dt: f64,
-) -> Vec<f32> {
-    let mut weights = vec![0.0; buffers.length as usize];
-    let (positions, multipliers) = weights.split_at_mut((buffers.multipliers_start / 4) as usize);
-    for (four, &v) in positions.as_chunks_mut::<4>().0.iter_mut().zip(&model.numbering.order) {
-        let mass = model.masses[v as usize];
-        *four = [mass, mass, mass, 0.0];
-    }
-    fill_multiplier_weights(model, dt, multipliers);
-    if settings.acceleration == Acceleration::Anderson {
-        match settings.anderson_on {
-            AndersonOn::Positions => multipliers.fill(0.0),
-            AndersonOn::Multipliers => positions.fill(0.0),
-            AndersonOn::Both => {}
-        }
-    }
-    weights
-}
-
-/// Name, bytes, and the name and place [bytes] of every field.
-pub type HostLayout = (&'static str, usize, Vec<(&'static str, usize)>);
-
-/// Records that host and kernels share, as the host lays them out: for the test that compares both.
-#[doc(hidden)]
-pub fn host_layouts() -> Vec<HostLayout> {
-    macro_rules! record {
-        ($name:literal $record:ty { $($field:ident)* }) => {
-            (
-                $name,
-                size_of::<$record>(),
-                vec![$((stringify!($field), std::mem::offset_of!($record, $field))),*],
-            )
-        };
-    }
-    use buffers::{Attachment, Spring};
-    vec![
-        record!("Job" Job {
-            first count set_first multiplier_offset viscous_offset is_viscous is_neo_hookean mode
-            parameter
-        }),
-        record!("Frame" FrameConstants {
-            gravity dt squared_dt inverse_dt rescale relaxation_multipliers relaxation_positions
-            rebase_factor bound_share update_count small_dt inverse_small_dt small_steps
-            chebyshev_damping
-        }),
-        record!("Update" Update { vertex is_pinned force place }),
-        record!("Spring" Spring {
-            vertices copies slots multiplier rest_length stiffness part
-        }),
-        record!("Attachment" Attachment {
-            vertex copy_index slot multiplier stiffness part
-        }),
-        record!("TetBlock" crate::model::TetBlock<f32> {
-            vertices inverse_rest_shape rest_volume material
-        }),
-    ]
-}
-
-/// Constants that host and kernels share, and sizes [bytes] of records that only kernels write.
-#[doc(hidden)]
-pub fn host_constants() -> ([(&'static str, u32); 4], [(&'static str, u64); 1]) {
-    use super::acceleration::LARGEST_WINDOW;
-    use crate::scalar::lanes::LANES;
-    let constants = [
-        ("LANES", LANES as u32),
-        ("FILLING", layout::FILLING),
-        ("LARGEST_WINDOW", LARGEST_WINDOW as u32),
-        ("PRODUCTS", layout::PRODUCTS as u32),
-    ];
-    (constants, [("Control", layout::CONTROL_SIZE)])
 }
