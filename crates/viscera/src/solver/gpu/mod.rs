@@ -11,6 +11,7 @@
 //! lengths, weights, rejections) lies in one record there, `Control`; nothing is read back inside a step.
 
 mod buffers;
+mod cost;
 mod device;
 mod error;
 mod frames;
@@ -30,7 +31,8 @@ use crate::settings::{Acceleration, AndersonOn, Precision, RelaxationForm, Solve
 use crate::state::State;
 pub use buffers::Slot;
 use buffers::{Buffers, Update};
-pub use device::{Adapter, Device, baseline};
+pub use cost::StepCost;
+pub use device::{Adapter, Device, baseline, shortfall};
 pub use error::GpuError;
 pub use frames::Frame;
 use frames::Frames;
@@ -177,6 +179,8 @@ impl GpuSolver {
         solver.upload_constants(model);
         let rest = State::at_rest(model);
         solver.put(model, &rest);
+        // Its memory may have been too little.
+        solver.device.check()?;
         Ok(solver)
     }
 
@@ -225,18 +229,21 @@ impl GpuSolver {
     }
 
     fn put(&mut self, model: &Model<f32>, state: &State<f32>) {
-        let sorted = |values: &[Vec3<f32>]| -> Vec<[f32; 4]> {
-            let order = model.numbering.order.iter();
-            order.map(|&v| values[v as usize].to_array()).map(|[x, y, z]| [x, y, z, 0.0]).collect()
-        };
         let queue = &self.device.queue;
         let unknowns = self.buffers.buffer(Slot::Unknowns);
-        queue.write_buffer(unknowns, 0, bytemuck::cast_slice(&sorted(&state.positions)));
+        let positions = in_solver_order(model, &state.positions);
+        queue.write_buffer(unknowns, 0, bytemuck::cast_slice(&positions));
         let start = self.buffers.multipliers_start;
         queue.write_buffer(unknowns, start, bytemuck::cast_slice(&state.multipliers));
-        let velocities = self.buffers.buffer(Slot::Velocities);
-        queue.write_buffer(velocities, 0, bytemuck::cast_slice(&sorted(&state.velocities)));
+        self.write_velocities(model, &state.velocities);
         self.multiplier_dt = state.multiplier_dt;
+    }
+
+    /// Puts velocities [m/s], the user's order, in the place of those on the device.
+    pub(crate) fn write_velocities(&self, model: &Model<f32>, velocities: &[Vec3<f32>]) {
+        let buffer = self.buffers.buffer(Slot::Velocities);
+        let sorted = in_solver_order(model, velocities);
+        self.device.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&sorted));
     }
 
     /// Advances the state on the device by one step of `dt` [s]: one submission, no waiting. On an
@@ -391,6 +398,11 @@ impl GpuSolver {
             self.device.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&values));
         }
     }
+}
+
+fn in_solver_order(model: &Model<f32>, values: &[Vec3<f32>]) -> Vec<[f32; 4]> {
+    let order = model.numbering.order.iter();
+    order.map(|&v| values[v as usize].to_array()).map(|[x, y, z]| [x, y, z, 0.0]).collect()
 }
 
 fn prepare(device: &Device, buffers: &Buffers, dispatch: &Dispatch, job: u32) -> Ready {
