@@ -12,7 +12,12 @@ use crate::solver::{Inputs, Solver};
 use crate::state::State;
 
 impl Elsewhere<f32> for GpuSolver {
-    fn step(&mut self, model: &Model<f32>, inputs: &Inputs<f32>, dt: f64) -> Result<(), FrameError> {
+    fn step(
+        &mut self,
+        model: &Model<f32>,
+        inputs: &Inputs<f32>,
+        dt: f64,
+    ) -> Result<(), FrameError> {
         self.device().check()?;
         Ok(GpuSolver::step(self, model, inputs, dt)?)
     }
