@@ -2,6 +2,7 @@
 
 mod bench;
 mod bench_scene;
+mod devices;
 mod files;
 mod film;
 mod memory;
@@ -43,6 +44,8 @@ enum Command {
     Scene(scene::SceneCommand),
     /// Measure what the solvers cost on this machine
     Bench(bench::BenchArguments),
+    /// List what there is to compute on, and how fast it is
+    Devices(devices::DevicesArguments),
     // For a program, not for a person.
     #[command(hide = true)]
     BenchScene(bench_scene::BenchSceneArguments),
@@ -57,6 +60,9 @@ fn main() -> ExitCode {
         Command::Mesh(command) => mesh::execute(&command).map(|()| run::Outcome::Finished),
         Command::Scene(command) => scene::execute(&command).map(|()| run::Outcome::Finished),
         Command::Bench(arguments) => bench::execute(&arguments).map(|()| run::Outcome::Finished),
+        Command::Devices(arguments) => {
+            devices::execute(&arguments).map(|()| run::Outcome::Finished)
+        }
         Command::BenchScene(arguments) => {
             bench_scene::execute(&arguments).map(|()| run::Outcome::Finished)
         }

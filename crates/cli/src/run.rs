@@ -126,7 +126,7 @@ fn simulate<S: Real>(
     let model = &summary.model;
     files::print(&format!(
         "{}: {} tetrahedra, {} vertices, {:.3} kg, colours: {}, frames: {} of {} substeps x {} \
-         iterations\n",
+         iterations\ndevice: {}\n",
         summary.title,
         model.tets,
         model.vertices,
@@ -135,6 +135,7 @@ fn simulate<S: Real>(
         frames,
         simulation.scene().solver.substeps,
         simulation.scene().solver.iterations,
+        summary.device,
     ))?;
     let draws = simulation.scene().output.picture;
     let mut recording = Recording {
@@ -152,6 +153,8 @@ fn simulate<S: Real>(
         Ok(()) => Some("interrupted".into()),
     };
     summary.judge();
+    summary.device = simulation.device_choice().to_owned();
+    summary.warnings.extend(simulation.device_warning().map(String::from));
     // Numbers before meshes and pictures: those take a while, and may be what failed.
     write_summary(out, &summary)?;
     // Positions that are no numbers are no mesh; the frames before them are.

@@ -47,6 +47,8 @@ pub struct Summary {
     pub gravity: [f64; 3],
     /// What the command line put over the scene file.
     pub overrides: BTreeMap<String, String>,
+    /// What computed the steps, and why.
+    pub device: String,
     /// Solver settings, as a scene file would have them.
     pub solver: BTreeMap<&'static str, serde_json::Value>,
     /// Material of each body and region.
@@ -73,6 +75,7 @@ impl Summary {
             velocity_factor: scene.time.velocity_factor,
             gravity: scene.world.gravity.to_array(),
             overrides: overrides.into_iter().collect(),
+            device: simulation.device_choice().to_owned(),
             solver: scene
                 .solver
                 .values()

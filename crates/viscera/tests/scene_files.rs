@@ -4,7 +4,9 @@ use viscera::material::MaterialModel;
 use viscera::mesh::{TetMesh, shapes};
 use viscera::scalar::{Vec3, vec3};
 use viscera::scene::{BodyShape, Scene, SceneError, Selector, describe_markdown, describe_text};
-use viscera::settings::{Acceleration, AndersonGuard, Colors, Precision, SolverSettings, Start};
+use viscera::settings::{
+    Acceleration, AndersonGuard, Colors, DeviceRequest, Precision, SolverSettings, Start,
+};
 
 const SHIPPED: [(&str, &str); 5] = [
     ("liver_retraction.toml", include_str!("../../../scenes/liver_retraction.toml")),
@@ -180,6 +182,7 @@ fn defaults_are_those_declared() {
     assert_eq!((solver.substeps, solver.iterations), (10, 2));
     assert_eq!((solver.precision, solver.colors), (Precision::F32, Colors::Unlimited));
     assert_eq!((solver.start, solver.anderson_guard), (Start::Auto, AndersonGuard::Residual));
+    assert_eq!(solver.device, DeviceRequest::Auto);
     let text = "[[body]]\nname = \"a\"\nshape = \"liver\"\nmaterial = { preset = \"liver\" }";
     let scene = Scene::parse("small.toml", text, &[]).unwrap();
     assert_eq!(scene.solver, solver);
@@ -236,6 +239,18 @@ fn a_bad_override_is_named() {
             "5 kPa",
             "override of body.liver.material.young: body has no item `liver`; it has: organ, bead",
         ),
+        (
+            "solver.device",
+            "7",
+            "override of solver.device: device = 7: this must be \"auto\", \"cpu\", \"gpu\" or part \
+             of an adapter's name",
+        ),
+        (
+            "solver.device",
+            "\" \"",
+            "override of solver.device: device = \" \": out of range; it must be a name without \
+             quotes and backslashes",
+        ),
         ("body.7.name", "x", "override of body.7.name: body has no item `7`; it has: organ, bead"),
         (
             "title.x",
@@ -255,7 +270,11 @@ fn a_bad_override_is_named() {
 
 #[test]
 fn recorded_solver_settings_read_back_as_they_were() {
-    let overrides = [("solver.relaxation", "1.5"), ("solver.acceleration", "chebyshev")];
+    let overrides = [
+        ("solver.relaxation", "1.5"),
+        ("solver.acceleration", "chebyshev"),
+        ("solver.device", "Radeon (TM) 780M"),
+    ];
     let scene = Scene::parse("everything.toml", EVERYTHING, &overrides).unwrap();
     let recorded = scene.solver.values();
     let overrides: Vec<(String, &str)> =
@@ -272,7 +291,7 @@ fn describe_lists_every_key_and_documents_it() {
     let written = EVERYTHING.split(['\n', '{', ',']).filter_map(|part| part.split_once('='));
     let keys: Vec<_> = written.map(|(key, _)| key.trim()).collect();
     let solver = SolverSettings::default().values();
-    assert!(keys.len() > 60 && solver.len() == 22);
+    assert!(keys.len() > 60 && solver.len() == 23);
     for key in keys.into_iter().chain(solver.iter().map(|(key, _)| *key)) {
         assert!(text.contains(&format!("\n    {key}\n")), "{key}");
         assert!(markdown.contains(&format!("| `{key}` |")), "{key}");

@@ -3,8 +3,8 @@
 mod bandwidth;
 mod measurement;
 mod results;
-mod solvers;
-mod subjects;
+pub mod solvers;
+pub mod subjects;
 
 use crate::{files, memory, progress};
 use anyhow::Result;
@@ -12,6 +12,7 @@ use bandwidth::Bandwidth;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use results::Results;
+pub use results::processor;
 use solvers::{SOLVERS, SolverEntry};
 use std::path::PathBuf;
 use subjects::{Size, Subject};

@@ -135,7 +135,7 @@ fn digits(number: f64) -> String {
 }
 
 /// As the processor calls itself.
-fn processor() -> String {
+pub fn processor() -> String {
     let wanted = RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing());
     let system = System::new_with_specifics(wanted).ok();
     let brand = system.as_ref().and_then(|s| s.cpus().first()).map(|cpu| cpu.brand().trim());

@@ -59,6 +59,8 @@ impl Bench {
     pub fn viscera(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_viscera"));
         command.current_dir(self.folder.path()).env_remove("VISCERA_DATA").args(arguments);
+        // Drivers complain where it is unset.
+        command.env("XDG_RUNTIME_DIR", self.folder.path());
         command
     }
 

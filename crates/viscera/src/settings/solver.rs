@@ -2,7 +2,7 @@
 
 use super::{
     Kind, Node, SettingError, Table, Value, ValueError, Whole, above, at_least, choices, number,
-    one_of, settings_table, truth, value_error, whole,
+    one_of, settings_table, truth, value_error, whole, wrong_type,
 };
 
 choices! {
@@ -35,6 +35,19 @@ pub enum Threads {
 
 /// The most threads that can be asked for: more than any machine has processors that share memory.
 pub const MOST_THREADS: u32 = 1024;
+
+/// What a simulation computes its steps on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DeviceRequest {
+    /// The faster one, as far as one can tell beforehand; the CPU where no GPU can do it.
+    Auto,
+    /// The processor.
+    Cpu,
+    /// The first graphics adapter, or none of the work is done.
+    Gpu,
+    /// The first adapter whose name contains this text, whatever its case.
+    Named(String),
+}
 
 choices! {
     /// How positions and velocities are advanced.
@@ -127,7 +140,7 @@ settings_table! {
         precision: Precision = (Precision::F32), one_of::<Precision>();
         /// How positions and velocities are advanced. "explicit" divides every substep into as many
         /// small steps as it takes to be stable; of the settings below it heeds `explicit_safety`,
-        /// `colors` and `threads`. It loses no motion to damping, and it is the cheapest for small soft
+        /// `colors`, `threads` and `device`. It loses no motion to damping, and it is the cheapest for small soft
         /// bodies; its cost grows with the square root of the stiffness, and with fineness once more.
         method: Method = (Method::Xpbd), one_of::<Method>();
         /// The share of the largest stable step of the body at rest that "explicit" takes. Tissue
@@ -197,6 +210,11 @@ settings_table! {
         /// Threads: "auto" for one per processor where the mesh is large enough to gain by it (16,000
         /// tetrahedra). The result is the same to the bit for any number.
         threads: Threads = (Threads::Auto), THREADS;
+        /// What computes the steps: "auto" for a graphics processor where the mesh is large enough to
+        /// gain by it and `precision` is "f32", otherwise and where that fails the CPU; "cpu"; "gpu"
+        /// for the first graphics adapter; or part of an adapter's name, of those that `viscera
+        /// devices` lists. Devices agree to round-off, not to the bit.
+        device: DeviceRequest = (DeviceRequest::Auto), DeviceNames;
         /// Where the iteration of a substep starts.
         start: Start = (Start::Auto), one_of::<Start>();
     }
@@ -276,5 +294,50 @@ impl<T> Kind for CountOr<T> {
 
     fn range_text(&self) -> String {
         self.limits.range_text()
+    }
+}
+
+/// Reads what computes the steps.
+struct DeviceNames;
+
+impl Kind for DeviceNames {
+    type Value = DeviceRequest;
+
+    fn read(&self, key: &str, node: &Node) -> Result<DeviceRequest, SettingError> {
+        let Value::Text(text) = &node.value else { return Err(wrong_type(self, key, node)) };
+        // No adapter has these letters, and without them a name is recorded as it was written.
+        let is_strange = |letter: char| letter.is_control() || "\"\\".contains(letter);
+        if text.trim().is_empty() || text.contains(is_strange) {
+            return Err(value_error(key, node, ValueError::Range { range: self.range_text() }));
+        }
+        Ok(match text.as_str() {
+            "auto" => DeviceRequest::Auto,
+            "cpu" => DeviceRequest::Cpu,
+            "gpu" => DeviceRequest::Gpu,
+            name => DeviceRequest::Named(name.to_owned()),
+        })
+    }
+
+    fn type_text(&self) -> String {
+        "\"auto\", \"cpu\", \"gpu\" or part of an adapter's name".to_owned()
+    }
+
+    fn value_text(&self, value: &DeviceRequest) -> String {
+        format!("\"{value}\"")
+    }
+
+    fn range_text(&self) -> String {
+        "a name without quotes and backslashes".to_owned()
+    }
+}
+
+impl std::fmt::Display for DeviceRequest {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Auto => "auto",
+            Self::Cpu => "cpu",
+            Self::Gpu => "gpu",
+            Self::Named(name) => name,
+        })
     }
 }

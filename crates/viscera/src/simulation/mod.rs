@@ -1,19 +1,28 @@
 //! A scene in motion: inputs from the scene's paths, frames of substeps, and what to report.
 
 mod assemble;
+mod device;
+#[cfg(feature = "gpu")]
+mod gpu;
 
 pub use assemble::{AssembleError, AssembledBody, Assembly, ResolvedPatch};
+pub use device::SimulationError;
 
 use crate::measure::{
     DeformationSummary, Energies, TetMeasure, measure_energies, measure_tets, summarize_deformation,
 };
-use crate::model::{Model, ModelError};
+use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::scene::Scene;
+#[cfg(feature = "gpu")]
+use crate::settings::DeviceRequest;
 use crate::solver::balance::ForceBalance;
+#[cfg(feature = "gpu")]
+use crate::solver::gpu::{Device, GpuError, GpuSolver};
 use crate::solver::{Inputs, Pin, Solver, StepError};
 use crate::state::State;
+use device::Backend;
 use std::fmt;
 
 /// Why a frame could not be computed.
@@ -32,6 +41,10 @@ pub enum FrameError {
     /// A step was refused.
     #[error(transparent)]
     Step(#[from] StepError),
+    /// The device failed. What [`Simulation::state`] gives is still that of the last frame.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
 }
 
 /// What holds or pulls a patch.
@@ -101,13 +114,14 @@ pub struct FrameReport {
 }
 
 /// A running scene.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Simulation<S> {
     scene: Scene,
     assembly: Assembly,
     model: Model<S>,
     state: State<S>,
     solver: Solver<S>,
+    backend: Backend<S>,
     inputs: Inputs<S>,
     balance: ForceBalance,
     tets: Vec<TetMeasure>,
@@ -116,12 +130,22 @@ pub struct Simulation<S> {
 }
 
 impl<S: Real> Simulation<S> {
-    /// Builds the model and takes the memory for its steps.
-    pub fn new(scene: Scene, assembly: Assembly) -> Result<Self, ModelError> {
+    /// Builds the model, chooses what computes its steps and takes the memory for them.
+    pub fn new(scene: Scene, assembly: Assembly) -> Result<Self, SimulationError> {
+        Self::on(scene, assembly, Backend::choose)
+    }
+
+    fn on(
+        scene: Scene,
+        assembly: Assembly,
+        choose: impl FnOnce(&Model<S>, &Solver<S>, f64) -> Result<Backend<S>, SimulationError>,
+    ) -> Result<Self, SimulationError> {
         let model = assembly.builder.build::<S>(&scene.solver)?;
+        let solver = Solver::new(&model, &scene.solver);
         let mut simulation = Self {
             state: State::at_rest(&model),
-            solver: Solver::new(&model, &scene.solver),
+            backend: choose(&model, &solver, substep_dt(&scene))?,
+            solver,
             inputs: inputs_at(&scene, &assembly, 0.0),
             balance: ForceBalance::default(),
             tets: Vec::with_capacity(model.tet_count()),
@@ -155,7 +179,24 @@ impl<S: Real> Simulation<S> {
         &self.state
     }
 
-    /// The solver, for what it tells of itself.
+    /// What computes the steps, and why: "CPU: the mesh has 1,280 tetrahedra; a GPU pays from about
+    /// 4,000 on".
+    pub fn device_choice(&self) -> &str {
+        &self.backend.choice
+    }
+
+    /// What a person should know of the device: that it was lost and the CPU went on.
+    pub fn device_warning(&self) -> Option<&str> {
+        self.backend.warning.as_deref()
+    }
+
+    /// The solver on a graphics processor, where one computes the steps.
+    #[cfg(feature = "gpu")]
+    pub fn gpu(&self) -> Option<&GpuSolver> {
+        self.backend.elsewhere.as_ref().map(|elsewhere| elsewhere.solver())
+    }
+
+    /// The CPU's solver, for what it tells of itself.
     pub fn solver(&self) -> &Solver<S> {
         &self.solver
     }
@@ -183,13 +224,15 @@ impl<S: Real> Simulation<S> {
     /// Advances by one frame and measures it. Where it fails, the simulation stays where it
     /// failed and will fail again.
     pub fn advance_frame(&mut self) -> Result<(), FrameError> {
-        let substeps = self.solver.settings().substeps;
-        let dt = self.scene.time.frame / f64::from(substeps);
-        let start = self.time();
         let rejected = self.solver.rejected_steps();
-        for substep in 0..substeps {
-            act(&self.scene, &self.assembly, start + f64::from(substep + 1) * dt, &mut self.inputs);
-            self.solver.step(&self.model, &mut self.state, &self.inputs, dt)?;
+        match self.compute_frame() {
+            #[cfg(feature = "gpu")]
+            Err(lost @ FrameError::Gpu(_)) if self.backend.gives_way => {
+                // The state is still that of the last frame.
+                self.backend.give_way(self.time(), &lost);
+                self.compute_frame()?;
+            }
+            computed => computed?,
         }
         self.frame += 1;
         self.rejected_substeps = self.solver.rejected_steps() - rejected;
@@ -205,11 +248,31 @@ impl<S: Real> Simulation<S> {
         if !self.tets.iter().all(is_number) {
             return Err(FrameError::Diverged { time: self.time() });
         }
-        let factor = S::from_f64(self.scene.time.velocity_factor);
-        for velocity in &mut self.state.velocities {
-            *velocity = *velocity * factor;
+        let factor = self.scene.time.velocity_factor;
+        if factor != 1.0 {
+            for velocity in &mut self.state.velocities {
+                *velocity = *velocity * S::from_f64(factor);
+            }
+            if let Some(elsewhere) = &mut self.backend.elsewhere {
+                elsewhere.write_velocities(&self.model, &self.state.velocities);
+            }
         }
         Ok(())
+    }
+
+    /// The substeps of a frame, and the state at its end.
+    fn compute_frame(&mut self) -> Result<(), FrameError> {
+        let dt = substep_dt(&self.scene);
+        let start = self.time();
+        let Self { model, state, solver, inputs, backend, .. } = self;
+        for substep in 0..self.scene.solver.substeps {
+            act(&self.scene, &self.assembly, start + f64::from(substep + 1) * dt, inputs);
+            backend.step(solver, model, state, inputs, dt)?;
+        }
+        match &mut backend.elsewhere {
+            Some(elsewhere) => elsewhere.read(model, state, solver),
+            None => Ok(()),
+        }
     }
 
     /// The numbers of the last frame.
@@ -269,6 +332,28 @@ impl<S: Real> Simulation<S> {
         }
         forces
     }
+}
+
+#[cfg(feature = "gpu")]
+impl Simulation<f32> {
+    /// A simulation on a device of the caller's, a window's for example, however small the mesh. The
+    /// settings say what to do where the device is lost: with `device = "auto"` the CPU goes on.
+    pub fn on_device(
+        scene: Scene,
+        assembly: Assembly,
+        device: &Device,
+    ) -> Result<Self, SimulationError> {
+        Self::on(scene, assembly, |model, solver, _| {
+            let settings = solver.settings();
+            let backend = gpu::on(device, model, settings, "the caller's choice")?;
+            Ok(Backend { gives_way: settings.device == DeviceRequest::Auto, ..backend })
+        })
+    }
+}
+
+/// A substep of a scene [s].
+fn substep_dt(scene: &Scene) -> f64 {
+    scene.time.frame / f64::from(scene.solver.substeps)
 }
 
 /// What a scene does at a time [s], with room for what it does at any other.

@@ -10,6 +10,15 @@ pub fn baseline() -> wgpu::Limits {
     wgpu::Limits::default()
 }
 
+/// What limits lack of the baseline, as one would say it; nothing where they have all.
+pub fn shortfall(limits: &wgpu::Limits) -> Option<String> {
+    let mut lacking = Vec::new();
+    baseline().check_limits_with_fail_fn(limits, false, |what, asked, given| {
+        lacking.push(format!("{what} {given} where {asked} is needed"));
+    });
+    (!lacking.is_empty()).then(|| lacking.join(", "))
+}
+
 /// One adapter of this machine.
 #[derive(Clone, Debug)]
 pub struct Adapter {
@@ -49,13 +58,20 @@ impl Adapter {
         self.info().device_type == wgpu::DeviceType::Cpu
     }
 
-    /// What it lacks of the baseline, as one would say it; nothing where it has all.
+    /// "discrete", "integrated", "virtual", "software" or "other".
+    pub fn kind(&self) -> &'static str {
+        match self.info().device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete",
+            wgpu::DeviceType::IntegratedGpu => "integrated",
+            wgpu::DeviceType::VirtualGpu => "virtual",
+            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::Other => "other",
+        }
+    }
+
+    /// See [`shortfall`].
     pub fn shortfall(&self) -> Option<String> {
-        let mut lacking = Vec::new();
-        baseline().check_limits_with_fail_fn(&self.limits(), false, |what, asked, given| {
-            lacking.push(format!("{what} {given} where {asked} is needed"));
-        });
-        (!lacking.is_empty()).then(|| lacking.join(", "))
+        shortfall(&self.limits())
     }
 
     /// The first adapter whose name contains the text, whatever its case; without a text the first
@@ -105,7 +121,9 @@ impl Adapter {
         let opened = pollster::block_on(self.adapter.request_device(&request));
         let (device, queue) = opened
             .map_err(|error| GpuError::Refused { name: self.name(), reason: error.to_string() })?;
-        Ok(Device::from_wgpu(device, queue, self.name()))
+        let device = Device::from_wgpu(device, queue, self.name());
+        device.take_errors();
+        Ok(device)
     }
 }
 
@@ -164,11 +182,38 @@ impl Device {
         (&self.device, &self.queue)
     }
 
-    /// An error where the device is gone.
+    /// An error where the device is gone, or was asked for more than it could do.
     pub fn check(&self) -> Result<(), GpuError> {
+        // Word of a loss comes while polling; where polling fails there is one.
+        let _ = self.device.poll(wgpu::PollType::Poll);
         match self.lost.lock().ok().and_then(|lost| lost.clone()) {
-            Some(reason) => Err(GpuError::Lost { name: self.name.clone(), reason }),
+            Some(reason) => Err(self.lost(reason)),
             None => Ok(()),
         }
+    }
+
+    pub(super) fn lost(&self, reason: String) -> GpuError {
+        GpuError::Lost { name: self.name.clone(), reason: reason.trim_end_matches('.').to_owned() }
+    }
+
+    /// Memory that ran out and faults of the driver end the device, not the program. What is left is
+    /// misuse by this library, which should be heard of.
+    fn take_errors(&self) {
+        let told = Arc::clone(&self.lost);
+        self.device.on_uncaptured_error(Arc::new(move |error| {
+            let Ok(mut lost) = told.lock() else { return };
+            match error {
+                wgpu::Error::Validation { .. } if lost.is_none() => {
+                    drop(lost);
+                    panic!("{error}");
+                }
+                wgpu::Error::OutOfMemory { .. } => {
+                    lost.get_or_insert("out of memory".into());
+                }
+                _ => {
+                    lost.get_or_insert(error.to_string());
+                }
+            }
+        }));
     }
 }

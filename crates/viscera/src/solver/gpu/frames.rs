@@ -1,12 +1,15 @@
 //! What comes back from the device: copies made behind a step, read when they have arrived.
 
+use std::ops::Range;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use super::buffers::{Buffers, Slot};
 use super::device::Device;
 use super::{GpuError, GpuSolver};
 use crate::model::Model;
+use crate::scalar::lanes::{Eight, Point};
 use crate::scalar::{Vec3, vec3};
+use crate::solver::Solver;
 use crate::state::State;
 
 /// Copies that may be under way at a time; more requests give way until one has arrived.
@@ -106,27 +109,80 @@ impl GpuSolver {
         }
     }
 
-    /// Waits for the device and reads its whole state.
+    /// Waits for the device and reads its whole state. On an error the state is as it was.
     pub fn read(&self, model: &Model<f32>, state: &mut State<f32>) -> Result<(), GpuError> {
-        let unknowns = self.read_buffer(Slot::Unknowns)?;
-        let velocities = self.read_buffer(Slot::Velocities)?;
-        let places: &[[f32; 4]] =
-            bytemuck::cast_slice(&unknowns[..self.buffers.points_size as usize]);
-        state.positions = in_user_order(model, places);
-        let moving: &[[f32; 4]] =
-            bytemuck::cast_slice(&velocities[..self.buffers.points_size as usize]);
-        state.velocities = in_user_order(model, moving);
+        self.read_buffers(&[Slot::Unknowns, Slot::Velocities], |read| {
+            self.take_state(model, state, read);
+        })
+    }
+
+    /// Reads the whole state and, into a CPU solver of the same model, what its force balance of the
+    /// last step needs: with one wait. On an error nothing is changed.
+    pub fn read_with_ground(
+        &self,
+        model: &Model<f32>,
+        state: &mut State<f32>,
+        solver: &mut Solver<f32>,
+    ) -> Result<(), GpuError> {
+        let mut slots = vec![Slot::Unknowns, Slot::Velocities, Slot::Predicted, Slot::Acting];
+        if model.tet_sets().iter().any(|set| set.viscous) {
+            slots.push(Slot::StartStrain);
+        }
+        self.read_buffers(&slots, |read| {
+            self.take_state(model, state, read);
+            let [predicted, acting] = [read[2], read[3]].map(bytemuck::cast_slice::<u8, [f32; 4]>);
+            let ground = &mut solver.work.ground;
+            for (v, point) in ground.predicted.iter_mut().enumerate() {
+                let [x, y, z, _] = predicted[v];
+                *point = Point::new(vec3(x, y, z), 0.0);
+                ground.inverse_masses[v] = acting[v][3];
+            }
+            let Some(strains) = read.get(4) else { return };
+            let mut strains: &[Eight<f32>] = bytemuck::cast_slice(strains);
+            for (set, own) in model.tet_sets().into_iter().zip(&mut ground.start_strain) {
+                // The device has room for all blocks, the CPU for those of viscous sets.
+                let (of_set, rest) = strains.split_at(6 * set.block_count());
+                let of_set = &of_set.as_chunks::<6>().0[..own.len()];
+                own.copy_from_slice(of_set);
+                strains = rest;
+            }
+        })
+    }
+
+    fn take_state(&self, model: &Model<f32>, state: &mut State<f32>, read: &[&[u8]]) {
+        let [unknowns, velocities] = [read[0], read[1]];
+        let points = |bytes: &[u8]| -> Vec<Vec3<f32>> {
+            let points = &bytes[..self.buffers.points_size as usize];
+            in_user_order(model, bytemuck::cast_slice(points))
+        };
+        state.positions = points(unknowns);
+        state.velocities = points(velocities);
         let start = self.buffers.multipliers_start as usize;
         let multipliers = &unknowns[start..start + 4 * model.multiplier_count];
         state.multipliers = bytemuck::cast_slice(multipliers).to_vec();
         state.multiplier_dt = self.multiplier_dt;
-        Ok(())
     }
 
     /// Waits for the device and reads all that a slot holds.
     pub(super) fn read_buffer(&self, slot: Slot) -> Result<Vec<u8>, GpuError> {
-        let [start, size] = self.buffers.span(slot);
-        read(&self.device, self.buffers.buffer(slot), start, size)
+        let mut bytes = Vec::new();
+        self.read_buffers(&[slot], |read| bytes.extend_from_slice(read[0]))?;
+        Ok(bytes)
+    }
+
+    /// Waits until everything that was asked of the device is done.
+    pub fn wait(&self) -> Result<(), GpuError> {
+        wait(&self.device)
+    }
+
+    /// Waits for the device, and lets the caller look at copies of what slots hold.
+    fn read_buffers(&self, slots: &[Slot], take: impl FnOnce(&[&[u8]])) -> Result<(), GpuError> {
+        let range = |&slot: &Slot| {
+            let [start, size] = self.buffers.span(slot);
+            (self.buffers.buffer(slot), start..start + size)
+        };
+        let ranges: Vec<_> = slots.iter().map(range).collect();
+        read(&self.device, &ranges, take)
     }
 }
 
@@ -139,32 +195,48 @@ fn staging(device: &Device, size: u64) -> wgpu::Buffer {
     })
 }
 
-/// Waits for the device and reads a range of a buffer.
+fn wait(device: &Device) -> Result<(), GpuError> {
+    let polled = device.device.poll(wgpu::PollType::wait_indefinitely());
+    polled.map_err(|error| device.lost(error.to_string()))?;
+    device.check()
+}
+
+/// Waits for the device, and lets the caller look at copies of ranges [bytes] of buffers.
 pub(super) fn read(
     device: &Device,
-    buffer: &wgpu::Buffer,
-    start: u64,
-    size: u64,
-) -> Result<Vec<u8>, GpuError> {
-    let staging = staging(device, size);
+    ranges: &[(&wgpu::Buffer, Range<u64>)],
+    take: impl FnOnce(&[&[u8]]),
+) -> Result<(), GpuError> {
+    device.check()?;
+    let size = |range: &Range<u64>| range.end - range.start;
+    let staging = staging(device, ranges.iter().map(|(_, range)| size(range)).sum());
     let descriptor = wgpu::CommandEncoderDescriptor { label: Some("read") };
     let mut encoder = device.device.create_command_encoder(&descriptor);
-    encoder.copy_buffer_to_buffer(buffer, start, &staging, 0, size);
+    let mut place = 0;
+    for (buffer, range) in ranges {
+        encoder.copy_buffer_to_buffer(buffer, range.start, &staging, place, size(range));
+        place += size(range);
+    }
     device.queue.submit([encoder.finish()]);
     let (told, heard) = channel();
     staging.slice(..).map_async(wgpu::MapMode::Read, move |result| {
         let _ = told.send(result.is_ok());
     });
-    let lost = |reason: String| GpuError::Lost { name: device.name().to_owned(), reason };
-    let polled = device.device.poll(wgpu::PollType::wait_indefinitely());
-    polled.map_err(|error| lost(error.to_string()))?;
-    device.check()?;
+    wait(device)?;
     if heard.recv() != Ok(true) {
-        return Err(lost("its memory could not be read".into()));
+        return Err(device.lost("its memory could not be read".into()));
     }
     let bytes = staging.slice(..).get_mapped_range();
-    let bytes = bytes.map_err(|error| lost(error.to_string()))?;
-    Ok(bytes.to_vec())
+    let bytes = bytes.map_err(|error| device.lost(error.to_string()))?;
+    let mut rest: &[u8] = &bytes;
+    let mut copies = Vec::with_capacity(ranges.len());
+    for (_, range) in ranges {
+        let (copy, after) = rest.split_at(size(range) as usize);
+        copies.push(copy);
+        rest = after;
+    }
+    take(&copies);
+    Ok(())
 }
 
 fn in_user_order(model: &Model<f32>, places: &[[f32; 4]]) -> Vec<Vec3<f32>> {

@@ -11,6 +11,7 @@
 //! lengths, weights, rejections) lies in one record there, `Control`; nothing is read back inside a step.
 
 mod buffers;
+mod cost;
 mod device;
 mod error;
 mod explicit;
@@ -38,7 +39,8 @@ use crate::settings::{Acceleration, Method, Precision, RelaxationForm, SolverSet
 use crate::state::State;
 pub use buffers::Slot;
 use buffers::{Buffers, Update};
-pub use device::{Adapter, Device, baseline};
+pub use cost::StepCost;
+pub use device::{Adapter, Device, baseline, shortfall};
 pub use error::GpuError;
 use explicit::Hold;
 pub use frames::Frame;
@@ -157,20 +159,10 @@ impl GpuSolver {
         let plan = Plan::new(model, settings);
         let layout = Layout::new(model);
         let buffers = Buffers::new(device, model, settings, &layout, left_over)?;
-        let recorder = Recorder {
-            model,
-            settings,
-            length: buffers.length,
-            multipliers_first: (buffers.multipliers_start / 4) as u32,
-            swept: Recorder::swept(model),
-            mixes_remember: Recorder::mixes_remember(&plan),
-            stride: Layout::stride(model),
-            pieces: Pieces {
-                count: layout.piece_count,
-                first_of_vertices: layout.first_of_vertices(),
-            },
-        };
-        let record = recorder.record(&plan);
+        let vector = [buffers.length, (buffers.multipliers_start / 4) as u32];
+        let pieces =
+            Pieces { count: layout.piece_count, first_of_vertices: layout.first_of_vertices() };
+        let record = Recorder::new(model, settings, &plan, vector, pieces).record(&plan);
         let lists = [record.prologue, record.body, record.epilogue, record.restart];
         let wgpu = &device.device;
         let make = |label, size, usage| {
@@ -236,6 +228,8 @@ impl GpuSolver {
         solver.upload_constants(model);
         let rest = State::at_rest(model);
         solver.put(model, &rest);
+        // Its memory may have been too little.
+        solver.device.check()?;
         Ok(solver)
     }
 
@@ -289,20 +283,23 @@ impl GpuSolver {
     }
 
     fn put(&mut self, model: &Model<f32>, state: &State<f32>) {
-        let sorted = |values: &[Vec3<f32>]| -> Vec<[f32; 4]> {
-            let order = model.numbering.order.iter();
-            order.map(|&v| values[v as usize].to_array()).map(|[x, y, z]| [x, y, z, 0.0]).collect()
-        };
+        let places = in_solver_order(model, &state.positions);
         let mut unknowns = vec![0.0f32; self.buffers.length as usize];
         let (positions, multipliers) =
             unknowns.split_at_mut((self.buffers.multipliers_start / 4) as usize);
-        let places = sorted(&state.positions);
         positions[..4 * places.len()].copy_from_slice(places.as_flattened());
         multipliers[..state.multipliers.len()].copy_from_slice(&state.multipliers);
-        let write = |slot, bytes: &[u8]| self.buffers.write(&self.device.queue, slot, bytes);
-        write(Slot::Unknowns, bytemuck::cast_slice(&unknowns));
-        write(Slot::Velocities, bytemuck::cast_slice(&sorted(&state.velocities)));
+        let bytes = bytemuck::cast_slice(&unknowns);
+        self.buffers.write(&self.device.queue, Slot::Unknowns, bytes);
+        self.write_velocities(model, &state.velocities);
         self.multiplier_dt = state.multiplier_dt;
+    }
+
+    /// Puts velocities [m/s], the user's order, in the place of those on the device.
+    pub(crate) fn write_velocities(&self, model: &Model<f32>, velocities: &[Vec3<f32>]) {
+        let sorted = in_solver_order(model, velocities);
+        let bytes = bytemuck::cast_slice(&sorted);
+        self.buffers.write(&self.device.queue, Slot::Velocities, bytes);
     }
 
     /// Advances the state on the device by one step of `dt` [s]: one submission, or several where there are
@@ -446,6 +443,11 @@ impl GpuSolver {
             self.buffers.write(&self.device.queue, slot, bytemuck::cast_slice(&values));
         }
     }
+}
+
+fn in_solver_order(model: &Model<f32>, values: &[Vec3<f32>]) -> Vec<[f32; 4]> {
+    let order = model.numbering.order.iter();
+    order.map(|&v| values[v as usize].to_array()).map(|[x, y, z]| [x, y, z, 0.0]).collect()
 }
 
 fn prepare(device: &Device, buffers: &Buffers, dispatch: &Dispatch, job: u32) -> Ready {

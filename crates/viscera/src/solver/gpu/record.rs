@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::buffers::{Place, Slot};
 use super::kernels::{self, Kernel, Swept, Variant};
-use super::layout::SUM_GROUPS;
+use super::layout::{Layout, SUM_GROUPS};
 use crate::elements::TetForm;
 use crate::material::MaterialModel;
 use crate::model::{Model, TetSet};
@@ -71,8 +71,10 @@ pub(super) struct Recorder<'a> {
     /// Numbers of the long vector, and where multipliers begin in it.
     pub length: u32,
     pub multipliers_first: u32,
-    pub swept: Swept,
-    pub mixes_remember: bool,
+    swept: Swept,
+    /// Whether what a mixture leaves is where the next sweep starts, so that it can be remembered in
+    /// the same pass.
+    mixes_remember: bool,
     /// Vertices from one range of the ground to the next.
     pub stride: u32,
     pub pieces: Pieces,
@@ -85,7 +87,32 @@ pub(super) struct Pieces {
     pub first_of_vertices: u32,
 }
 
-impl Recorder<'_> {
+impl<'a> Recorder<'a> {
+    /// For a model that is solved in this way; `vector` is the length of the long vector and the place
+    /// of the first multiplier in it.
+    pub fn new(
+        model: &'a Model<f32>,
+        settings: &'a SolverSettings,
+        plan: &Plan,
+        vector: [u32; 2],
+        pieces: Pieces,
+    ) -> Self {
+        let [length, multipliers_first] = vector;
+        let changes = |stage: &Stage| {
+            matches!(stage, Stage::GuardIterate | Stage::Anderson(AndersonOn::Multipliers))
+        };
+        Self {
+            model,
+            settings,
+            length,
+            multipliers_first,
+            swept: swept(model),
+            mixes_remember: !plan.body.iter().any(changes),
+            stride: Layout::stride(model),
+            pieces,
+        }
+    }
+
     pub fn record(&self, plan: &Plan) -> Record {
         let all = |stages: &[Stage]| {
             let mut dispatches = Vec::new();
@@ -104,15 +131,6 @@ impl Recorder<'_> {
             record.prologue.push(self.long(&kernels::REMEMBER_ITERATE, 0));
         }
         record
-    }
-
-    /// Whether what a mixture leaves is where the next sweep starts, so that it can be remembered in
-    /// the same pass.
-    pub fn mixes_remember(plan: &Plan) -> bool {
-        let changes = |stage: &Stage| {
-            matches!(stage, Stage::GuardIterate | Stage::Anderson(AndersonOn::Multipliers))
-        };
-        !plan.body.iter().any(changes)
     }
 
     fn stage(&self, stage: &Stage, into: &mut Vec<Dispatch>) {
@@ -171,19 +189,6 @@ impl Recorder<'_> {
             Stage::GuardIterate => self.guard_iterate(into),
             Stage::GuardStep => self.guard_step(into),
             Stage::LimitEnergy => self.limit_energy(into),
-        }
-    }
-
-    /// What sweeps of a model read and write.
-    pub fn swept(model: &Model<f32>) -> Swept {
-        let sets = model.tet_sets().map(TetSet::len);
-        let [springs, attachments] =
-            [model.springs.vertices.len(), model.attachments.vertices.len()];
-        let corners = 4 * (sets[0] + sets[1]) + 2 * springs + attachments;
-        match (model.is_split(), model.color_count, model.copy_count() == corners) {
-            (false, ..) => Swept::Vertices,
-            (true, 1, true) => Swept::Jacobi,
-            _ => Swept::Copies,
         }
     }
 
@@ -326,5 +331,17 @@ impl Recorder<'_> {
         };
         let remembered = if self.mixes_remember { 4 } else { 0 };
         into.push(self.long(&kernels::ANDERSON_MIX, mixed | remembered));
+    }
+}
+
+/// What sweeps of a model read and write.
+fn swept(model: &Model<f32>) -> Swept {
+    let sets = model.tet_sets().map(TetSet::len);
+    let [springs, attachments] = [model.springs.vertices.len(), model.attachments.vertices.len()];
+    let corners = 4 * (sets[0] + sets[1]) + 2 * springs + attachments;
+    match (model.is_split(), model.color_count, model.copy_count() == corners) {
+        (false, ..) => Swept::Vertices,
+        (true, 1, true) => Swept::Jacobi,
+        _ => Swept::Copies,
     }
 }

@@ -169,8 +169,11 @@ impl GpuSurface {
 
     /// Waits for the device and reads positions [m] and normals, shape [vertex_count] each.
     pub fn read(&self) -> Result<[Vec<Vec3<f32>>; 2], GpuError> {
-        let bytes = frames::read(&self.device, &self.vertices, 0, self.vertices.size())?;
-        let numbers: &[[f32; 4]] = bytemuck::cast_slice(&bytes);
+        let mut numbers: Vec<[f32; 4]> = Vec::new();
+        let whole = (&self.vertices, 0..self.vertices.size());
+        frames::read(&self.device, &[whole], |read| {
+            numbers.extend_from_slice(bytemuck::cast_slice(read[0]));
+        })?;
         let pairs = &numbers.as_chunks::<2>().0[..self.vertex_count as usize];
         let column =
             |i: usize| pairs.iter().map(move |pair| pair[i]).map(|[x, y, z, _]| vec3(x, y, z));

@@ -1,0 +1,128 @@
+//! Simulations on a graphics processor.
+
+use std::any::Any;
+
+use super::device::{Backend, Elsewhere};
+use super::{FrameError, SimulationError};
+use crate::model::Model;
+use crate::scalar::{Real, Vec3};
+use crate::settings::{DeviceRequest, SolverSettings};
+use crate::solver::gpu::{Adapter, Device, GpuError, GpuSolver, StepCost};
+use crate::solver::{Inputs, Solver};
+use crate::state::State;
+
+impl Elsewhere<f32> for GpuSolver {
+    fn step(
+        &mut self,
+        model: &Model<f32>,
+        inputs: &Inputs<f32>,
+        dt: f64,
+    ) -> Result<(), FrameError> {
+        self.device().check()?;
+        Ok(GpuSolver::step(self, model, inputs, dt)?)
+    }
+
+    fn read(
+        &mut self,
+        model: &Model<f32>,
+        state: &mut State<f32>,
+        solver: &mut Solver<f32>,
+    ) -> Result<(), FrameError> {
+        Ok(self.read_with_ground(model, state, solver)?)
+    }
+
+    fn write_velocities(&mut self, model: &Model<f32>, velocities: &[Vec3<f32>]) {
+        GpuSolver::write_velocities(self, model, velocities);
+    }
+
+    fn solver(&self) -> &GpuSolver {
+        self
+    }
+}
+
+/// What the settings ask for, with so many sweeps per step. They do not ask for the CPU.
+pub(super) fn choose<S: Real>(
+    model: &Model<S>,
+    settings: &SolverSettings,
+    sweeps: u32,
+) -> Result<Backend<S>, SimulationError> {
+    let model: &dyn Any = model;
+    let Some(model) = model.downcast_ref::<Model<f32>>() else {
+        return match settings.device {
+            DeviceRequest::Auto => Ok(Backend::cpu("double precision")),
+            _ => Err(GpuError::DoublePrecision.into()),
+        };
+    };
+    let chosen = match &settings.device {
+        DeviceRequest::Named(name) => asked_for(Some(name), model, settings)?,
+        DeviceRequest::Gpu => asked_for(None, model, settings)?,
+        _ => faster(model, settings, sweeps),
+    };
+    let mut chosen = Some(chosen);
+    // The model is in single precision, and so `S` is.
+    let chosen: &mut dyn Any = &mut chosen;
+    let chosen = chosen.downcast_mut::<Option<Backend<S>>>().and_then(Option::take);
+    chosen.ok_or(SimulationError::Gpu(GpuError::DoublePrecision))
+}
+
+fn asked_for(
+    name: Option<&str>,
+    model: &Model<f32>,
+    settings: &SolverSettings,
+) -> Result<Backend<f32>, GpuError> {
+    on(&Adapter::find(name)?.open()?, model, settings, "as asked for")
+}
+
+/// The one that is expected to be faster, and the CPU where no device can do it.
+fn faster(model: &Model<f32>, settings: &SolverSettings, sweeps: u32) -> Backend<f32> {
+    let cost = StepCost::new(model, settings, sweeps);
+    let tets = grouped(model.tet_count() as u64);
+    // Before any driver is loaded, which takes longer than a small scene.
+    if !cost.gpu_pays() {
+        let from = grouped(cost.pays_from());
+        return Backend::cpu(format!(
+            "the mesh has {tets} tetrahedra; a GPU pays from about {from} on"
+        ));
+    }
+    let (software, adapters): (Vec<_>, Vec<_>) =
+        Adapter::all().into_iter().partition(Adapter::is_software);
+    let mut reason = match software.first() {
+        Some(adapter) => format!("no graphics adapter but software ({})", adapter.name()),
+        None => "no graphics adapter".to_owned(),
+    };
+    for adapter in adapters {
+        let tried = adapter
+            .open()
+            .and_then(|device| on(&device, model, settings, &format!("{tets} tetrahedra")));
+        match tried {
+            Ok(backend) => return Backend { gives_way: true, ..backend },
+            Err(error) => reason = error.to_string(),
+        }
+    }
+    Backend::cpu(reason)
+}
+
+/// A device, for a reason.
+pub(super) fn on(
+    device: &Device,
+    model: &Model<f32>,
+    settings: &SolverSettings,
+    reason: &str,
+) -> Result<Backend<f32>, GpuError> {
+    let solver = GpuSolver::new(device, model, settings)?;
+    let choice = format!("{}: {reason}", device.name());
+    Ok(Backend { elsewhere: Some(Box::new(solver)), choice, warning: None, gives_way: false })
+}
+
+/// A count with its thousands apart: "1,280".
+fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let mut text = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}

@@ -1,0 +1,281 @@
+//! Scenes on a graphics processor: what is chosen and why, the same numbers as on the CPU, and devices
+//! that fail. A software driver does; without any the tests fail and say what to install.
+
+use viscera::scalar::Vec3;
+use viscera::scene::Scene;
+use viscera::settings::SolverSettings;
+use viscera::simulation::{Assembly, FrameError, FrameReport, Simulation, SimulationError};
+use viscera::solver::gpu::{Adapter, Device, GpuError, StepCost, baseline, shortfall};
+
+/// Two bars, joined by springs; one viscous, one in an elastic fixing; a motion that lets go, a force.
+/// Guards are off: what they decide may turn on the last digit.
+const SCENE: &str = r#"
+time = { duration = "1 s", velocity_factor = 0.9 }
+
+[[body]]
+name = "upper"
+shape = "block"
+size = ["40 mm", "20 mm", "20 mm"]
+cells = [4, 2, 2]
+material = { young = "10 kPa", poisson = 0.45, density = "1000 kg/m^3", viscosity = "20 ms" }
+
+[[body]]
+name = "lower"
+shape = "block"
+size = ["40 mm", "20 mm", "20 mm"]
+cells = [4, 2, 2]
+position = [0, 0, "-30 mm"]
+material = { young = "20 kPa", poisson = 0.3, density = "1000 kg/m^3", model = "saint_venant_kirchhoff" }
+
+[[fixing]]
+name = "wall"
+body = "upper"
+half_space = { point = [0, 0, 0], normal = [-1, 0, 0] }
+
+[[fixing]]
+name = "bed"
+body = "lower"
+half_space = { point = [0, 0, "-30 mm"], normal = [0, 0, -1] }
+stiffness = "500 N/m"
+
+[[motion]]
+name = "grip"
+body = "upper"
+half_space = { point = ["40 mm", 0, 0], normal = [1, 0, 0] }
+release = "0.12 s"
+keys = [{ time = "0.1 s", translation = ["10 mm", 0, 0] }]
+
+[[force]]
+name = "push"
+body = "lower"
+half_space = { point = ["40 mm", 0, "-30 mm"], normal = [1, 0, 0] }
+force = ["0.1 N", 0, 0]
+
+[[spring]]
+name = "tie"
+stiffness = "50 N/m"
+from = { body = "upper", half_space = { point = [0, 0, 0], normal = [0, 0, -1] } }
+to = { body = "lower", half_space = { point = [0, 0, "-10 mm"], normal = [0, 0, 1] } }
+
+[solver]
+step_guard = false
+"#;
+
+fn assembled(overrides: &[(&str, &str)]) -> (Scene, Assembly) {
+    let scene = Scene::parse("scene.toml", SCENE, overrides);
+    let scene = scene.unwrap_or_else(|error| panic!("{error}"));
+    let assembly = Assembly::new(&scene, &mut |name| Err(format!("no file {name}")));
+    (scene, assembly.unwrap_or_else(|error| panic!("{error}")))
+}
+
+fn adapter() -> Adapter {
+    Adapter::find(None).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn device() -> Device {
+    adapter().open().unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn simulation(overrides: &[(&str, &str)]) -> Result<Simulation<f32>, SimulationError> {
+    let (scene, assembly) = assembled(overrides);
+    Simulation::new(scene, assembly)
+}
+
+fn advanced(mut simulation: Simulation<f32>, frames: u32) -> Simulation<f32> {
+    for _ in 0..frames {
+        simulation.advance_frame().unwrap_or_else(|error| panic!("{error}"));
+    }
+    simulation
+}
+
+fn distance(a: &[Vec3<f32>], b: &[Vec3<f64>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a.cast::<f64>() - *b).length()).fold(0.0, f64::max)
+}
+
+/// Every number of a report that round-off touches little, each over the size that it is measured by.
+fn numbers(report: &FrameReport) -> Vec<(String, f64)> {
+    let elastic = report.energy.elastic;
+    let mut numbers = vec![
+        ("residual".to_owned(), report.relative_residual),
+        ("stiffness".to_owned(), report.stiffness_error),
+        ("kinetic".to_owned(), report.energy.kinetic / elastic),
+        ("gravitational".to_owned(), report.energy.gravitational / elastic),
+        ("volume".to_owned(), report.deformation.volume_ratio),
+        ("stretch".to_owned(), report.deformation.largest_stretch),
+    ];
+    let patches = report.patches.iter();
+    numbers.extend(patches.flat_map(|p| p.force.map(|f| (format!("force at {}", p.name), f))));
+    numbers
+}
+
+/// Positions of both are off by their round-off, so that the GPU may not be much further from double
+/// precision than the CPU is: twice as far by chance, and twice for sums in another order. Numbers of a
+/// report are differences of such positions, of 1e-8 m in bodies of 1e-2 m that deform by a tenth: five
+/// digits are left, of forces, which are second differences, three.
+#[test]
+fn frames_and_reports_agree_with_the_cpu() {
+    for overrides in [
+        &[][..],
+        &[("solver.colors", "1"), ("solver.iterations", "6")],
+        &[("solver.acceleration", "chebyshev"), ("solver.iterations", "14")],
+        &[("time.velocity_factor", "1")],
+    ] {
+        let with = |device| [overrides, &[("solver.device", device)]].concat();
+        let mut cpu = simulation(&with("cpu")).expect("a simulation");
+        let mut gpu = simulation(&with("gpu")).expect("a simulation");
+        assert!(gpu.gpu().is_some() && cpu.gpu().is_none());
+        let (scene, assembly) = assembled(&with("cpu"));
+        let mut oracle = Simulation::<f64>::new(scene, assembly).expect("a simulation");
+        for frame in 1..=12 {
+            cpu.advance_frame().expect("a frame");
+            gpu.advance_frame().expect("a frame");
+            oracle.advance_frame().expect("a frame");
+            let exact = &oracle.state().positions;
+            let [on_cpu, on_gpu] = [&cpu, &gpu].map(|s| distance(&s.state().positions, exact));
+            assert!(on_gpu <= 4.0 * on_cpu + 1e-8, "frame {frame}: {on_gpu:e} m, CPU {on_cpu:e} m");
+            for ((name, a), (_, b)) in numbers(&cpu.report()).iter().zip(numbers(&gpu.report())) {
+                assert!((a - b).abs() <= 2e-3, "{overrides:?}, frame {frame}, {name}: {a} and {b}");
+            }
+        }
+        let rest = &oracle.model().rest_positions;
+        assert!(distance(&gpu.state().positions, rest) > 5e-3, "nothing has moved");
+    }
+}
+
+#[test]
+fn the_choice_is_told_with_its_reason() {
+    let choice = |overrides: &[_]| simulation(overrides).map(|s| s.device_choice().to_owned());
+    let small = choice(&[]).expect("a simulation");
+    assert!(
+        small.starts_with("CPU: the mesh has 160 tetrahedra; a GPU pays from about "),
+        "{small}"
+    );
+    assert_eq!(choice(&[("solver.device", "cpu")]).as_deref(), Ok("CPU: as asked for"));
+    let name = adapter().name();
+    let asked = choice(&[("solver.device", "gpu")]).expect("a simulation");
+    assert_eq!(asked, format!("{name}: as asked for"));
+    // Whatever its case.
+    let part = name.split([' ', '(']).next().unwrap_or_default().to_uppercase();
+    assert_eq!(choice(&[("solver.device", &format!("\"{part}\""))]), Ok(asked));
+
+    let error = choice(&[("solver.device", "no such thing")]).expect_err("no such adapter");
+    let error = error.to_string();
+    assert!(error.starts_with("no adapter is called `no such thing`; there are: "), "{error}");
+    assert!(error.contains(&name), "{error}");
+}
+
+/// A software adapter is slower than the CPU backend; it must be asked for.
+#[test]
+fn large_meshes_go_to_hardware_and_never_to_software_by_themselves() {
+    let overrides = [("body.upper.cells", "[20, 20, 20]"), ("solver.iterations", "10")];
+    let large = simulation(&overrides).expect("a simulation");
+    let adapter = adapter();
+    if adapter.is_software() {
+        let told = format!("CPU: no graphics adapter but software ({})", adapter.name());
+        assert_eq!((large.device_choice(), large.gpu().is_some()), (told.as_str(), false));
+    } else {
+        let told = large.device_choice();
+        assert!(told.ends_with(": 40,080 tetrahedra") && large.gpu().is_some(), "{told}");
+    }
+}
+
+#[test]
+fn double_precision_stays_on_the_cpu() {
+    let double = |overrides: &[_]| {
+        let (scene, assembly) = assembled(overrides);
+        Simulation::<f64>::new(scene, assembly).map(|s| s.device_choice().to_owned())
+    };
+    assert_eq!(double(&[]).as_deref(), Ok("CPU: double precision"));
+    let error = double(&[("solver.device", "gpu")]);
+    assert_eq!(error, Err(SimulationError::Gpu(GpuError::DoublePrecision)));
+}
+
+#[test]
+fn auto_goes_on_with_the_cpu_where_the_device_is_lost() {
+    let device = device();
+    let (scene, assembly) = assembled(&[]);
+    let on_device = Simulation::on_device(scene, assembly, &device).expect("a simulation");
+    let mut lost = advanced(on_device, 5);
+    assert_eq!(lost.device_warning(), None);
+    device.wgpu().0.destroy();
+    lost.advance_frame().expect("a frame on the CPU");
+    let warning = lost.device_warning().expect("a warning").to_owned();
+    assert!(
+        warning.starts_with(&format!("after 0.0833 s {} was lost (", device.name())),
+        "{warning}"
+    );
+    assert!(lost.device_choice().starts_with("CPU: after 0.0833 s"), "{}", lost.device_choice());
+    let lost = advanced(lost, 6);
+    assert_eq!(lost.frame(), 12);
+
+    // As if the CPU had computed all of it, but for round-off.
+    let cpu = advanced(simulation(&[("solver.device", "cpu")]).expect("a simulation"), 12);
+    let apart = lost.state().positions.iter().zip(&cpu.state().positions);
+    let apart = apart.map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
+    assert!(apart <= 1e-6, "{apart} m");
+}
+
+#[test]
+fn a_device_that_was_asked_for_and_is_lost_ends_the_run_with_its_last_frame() {
+    let device = device();
+    let (scene, assembly) = assembled(&[("solver.device", "gpu")]);
+    let on_device = Simulation::on_device(scene, assembly, &device).expect("a simulation");
+    let mut lost = advanced(on_device, 2);
+    let before = lost.state().clone();
+    device.wgpu().0.destroy();
+    for _ in 0..2 {
+        let error = lost.advance_frame().expect_err("a lost device");
+        assert!(matches!(error, FrameError::Gpu(GpuError::Lost { .. })), "{error}");
+        assert_eq!(error.to_string().lines().count(), 1);
+        assert_eq!((lost.frame(), lost.state()), (2, &before));
+    }
+    let (scene, assembly) = assembled(&[("solver.device", "gpu")]);
+    let late = Simulation::on_device(scene, assembly, &device).map(|_| ());
+    assert!(matches!(late, Err(SimulationError::Gpu(GpuError::Lost { .. }))), "{late:?}");
+}
+
+#[test]
+fn a_mesh_beyond_the_limits_is_refused_with_the_size_that_fits() {
+    let limits = wgpu::Limits { max_storage_buffer_binding_size: 16 << 10, ..baseline() };
+    let device = adapter().open_with(limits).unwrap_or_else(|error| panic!("{error}"));
+    let (scene, assembly) = assembled(&[]);
+    let error = Simulation::on_device(scene, assembly, &device).map(|_| ());
+    let Err(SimulationError::Gpu(error)) = error else { panic!("{error:?}") };
+    let GpuError::TooLarge { needed, limit, largest, .. } = error else { panic!("{error}") };
+    assert!(needed > limit && limit == 16 << 10 && largest < 160, "{error}");
+    assert_eq!(error.to_string().lines().count(), 1);
+}
+
+#[test]
+fn what_an_adapter_lacks_is_named() {
+    assert_eq!(shortfall(&baseline()), None);
+    let limits = wgpu::Limits {
+        max_compute_invocations_per_workgroup: 128,
+        max_storage_buffers_per_shader_stage: 4,
+        ..baseline()
+    };
+    let lacking = shortfall(&limits).expect("too little");
+    assert!(
+        lacking.contains("max_storage_buffers_per_shader_stage 4 where 8 is needed"),
+        "{lacking}"
+    );
+    assert!(lacking.contains("max_compute_invocations_per_workgroup 128 where 256"), "{lacking}");
+}
+
+/// The estimate counts what is sent in fact, and its threshold is where both are equal.
+#[test]
+fn the_estimate_of_a_step_counts_its_dispatches() {
+    for overrides in [&[][..], &[("solver.colors", "4"), ("solver.acceleration", "anderson")]] {
+        let gpu = simulation(&[overrides, &[("solver.device", "gpu")]].concat());
+        let gpu = gpu.expect("a simulation");
+        let settings: &SolverSettings = &gpu.scene().solver;
+        let cost = StepCost::new(gpu.model(), settings, settings.iterations);
+        let solver = gpu.gpu().expect("a GPU");
+        let [before, each, after] = solver.dispatches();
+        let sent = before + settings.iterations as usize * each + after;
+        assert_eq!(cost.dispatches, sent as u64);
+        let per_tet = cost.cpu / gpu.model().tet_count() as f64;
+        assert!((cost.pays_from() as f64 * per_tet / cost.gpu - 1.0).abs() < 1e-2);
+        assert_eq!(cost.gpu_pays(), gpu.model().tet_count() as u64 > cost.pays_from());
+    }
+}
