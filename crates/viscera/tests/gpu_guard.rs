@@ -220,7 +220,7 @@ fn violent_grabs_are_taken_back() {
             inputs.pins.push(Pin { vertex: vertex as u32, target });
         }
         let mut above = [0, 0];
-        for step in 0..500 {
+        for step in 0..800 {
             trio.step(if step < 20 { &inputs } else { &held });
             let reports = [trio.cpu.last_step().expect("a guarded step"), trio.report()];
             for (above, report) in above.iter_mut().zip(reports) {
@@ -238,8 +238,9 @@ fn violent_grabs_are_taken_back() {
         assert!(trio.read().is_finite(), "seed {seed}");
         assert_eq!(above, [0, 0], "seed {seed}");
         assert_eq!(rejected.map(|count| count > 0), [is_rejected; 2], "seed {seed}: {rejected:?}");
-        // What is left of the motion, and round-off, is far below a hundredth of a millimetre.
-        assert!(cpu < 1e-5 && gpu < 1e-5, "seed {seed}: {cpu} and {gpu}");
+        // Both come closer still with more steps; sweeps of one colour are the slowest. Another rest,
+        // with tetrahedra turned inside out, would be millimetres away.
+        assert!(cpu < 2e-5 && gpu < 2e-5, "seed {seed}: {cpu} and {gpu}");
     }
 }
 
