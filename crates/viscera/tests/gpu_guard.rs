@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::collections::HashSet;
+
 use common::{Random, SNH, STVK, block, material, single_body};
 use viscera::measure::measure_tets;
 use viscera::mesh::TetMesh;
@@ -19,6 +21,15 @@ const GRAVITY: Vec3<f64> = vec3(0.0, 0.0, -9.81);
 fn device() -> Device {
     let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
     adapter.open().unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn single(inputs: &Inputs<f64>) -> Inputs<f32> {
+    let pins = inputs.pins.iter();
+    Inputs {
+        gravity: inputs.gravity.cast(),
+        pins: pins.map(|pin| Pin { vertex: pin.vertex, target: pin.target.cast() }).collect(),
+        ..Inputs::default()
+    }
 }
 
 /// One model on the device, in single and in double precision on the CPU.
@@ -47,15 +58,7 @@ impl<'a> Trio<'a> {
     }
 
     fn step(&mut self, inputs: &Inputs<f64>) {
-        let single = Inputs {
-            gravity: inputs.gravity.cast(),
-            pins: inputs
-                .pins
-                .iter()
-                .map(|pin| Pin { vertex: pin.vertex, target: pin.target.cast() })
-                .collect(),
-            ..Inputs::default()
-        };
+        let single = single(inputs);
         let (x32, x64) = (&mut self.states.0, &mut self.states.1);
         self.cpu.step(self.models.0, x32, &single, DT).expect("a legal step");
         self.oracle.step(self.models.1, x64, inputs, DT).expect("a legal step");
@@ -72,11 +75,22 @@ impl<'a> Trio<'a> {
         self.gpu.last_step().expect("a device").expect("a guarded step")
     }
 
-    /// Largest distances [m] from double precision: the CPU's, the device's.
-    fn distances(&self) -> [f64; 2] {
+    /// Takes away half of all velocities.
+    fn slow_down(&mut self) {
+        let mut state = self.read();
+        for states in [&mut self.states.0, &mut state] {
+            states.velocities.iter_mut().for_each(|v| *v = *v * 0.5);
+        }
+        self.states.1.velocities.iter_mut().for_each(|v| *v = *v * 0.5);
+        self.gpu.write(self.models.0, &state).expect("a state that fits");
+    }
+
+    /// Largest distances [m] of some vertices from double precision: the CPU's, the device's.
+    fn distances(&self, vertices: std::ops::Range<u32>) -> [f64; 2] {
         let exact = &self.states.1.positions;
         [&self.states.0.positions, &self.read().positions].map(|x| {
-            x.iter().zip(exact).map(|(a, b)| (a.cast::<f64>() - *b).length()).fold(0.0, f64::max)
+            let of = |v: u32| (x[v as usize].cast::<f64>() - exact[v as usize]).length();
+            vertices.clone().map(of).fold(0.0, f64::max)
         })
     }
 }
@@ -152,64 +166,152 @@ fn quiet_motion_agrees_with_the_cpu() {
                 *slowed += usize::from(report.kept_speed < 1.0);
             }
         }
-        let [cpu, gpu] = trio.distances();
         let rejected = trio.gpu.rejected_steps().expect("a device");
         println!(
-            "{name}: CPU {cpu:e} m, device {gpu:e} m from double precision; rejected {} and \
-             {rejected}, slowed {slowed:?}",
+            "{name}: rejected {} and {rejected}, slowed {slowed:?}",
             trio.oracle.rejected_steps()
         );
         assert_eq!(rejected, trio.oracle.rejected_steps(), "{name}");
-        assert!(gpu <= 2.0 * cpu, "{name}: {gpu} and {cpu}");
+        for (number, body) in model32.bodies.iter().enumerate() {
+            let [cpu, gpu] = trio.distances(body.vertices.start as u32..body.vertices.end as u32);
+            println!(
+                "{name}, body {number}: CPU {cpu:e} m, device {gpu:e} m from double precision"
+            );
+            assert!(gpu <= 2.0 * cpu, "{name}, body {number}: {gpu} and {cpu}");
+        }
     }
 }
 
-/// Vertices jump at once to places up to a body length away and are let go: no step ends above its
-/// limit, and the body comes to rest where it does in double precision.
+/// Vertices jump at once to places up to two body lengths away and are let go: steps are taken back, no
+/// step ends above its limit, and the body comes to rest where it does in double precision.
 #[test]
 fn violent_grabs_are_taken_back() {
     let device = device();
     let size = [0.06, 0.03, 0.03];
     let mesh = block(size, [3, 2, 2], 0.2);
     let plain = SolverSettings::default();
-    for (seed, settings) in [
-        (0, plain.clone()),
-        (1, plain.clone()),
-        (2, SolverSettings { colors: Colors::Limited(1), ..plain.clone() }),
-        (3, SolverSettings { acceleration: Acceleration::Anderson, iterations: 6, ..plain }),
+    let energy = SolverSettings {
+        acceleration: Acceleration::Anderson,
+        anderson_guard: AndersonGuard::Energy,
+        iterations: 6,
+        ..plain.clone()
+    };
+    // Chosen for what they lead to on the CPU: shares, descents, and mixtures in favour of which a
+    // descent goes on.
+    for (seed, law, settings, is_rejected) in [
+        (3, STVK, plain.clone(), true),
+        (0, SNH, SolverSettings { colors: Colors::Limited(1), ..plain }, true),
+        (2, SNH, energy, false),
     ] {
-        let tissue = material(SNH, 1e4, 0.45);
+        let tissue = material(law, 1e4, 0.45);
         let model32 = single_body::<f32>(&mesh, &tissue, &settings);
         let model64 = single_body::<f64>(&mesh, &tissue, &settings);
         let mut trio = Trio::new(&device, (&model32, &model64), &settings);
         let mut random = Random(seed);
-        let mut inputs = Inputs::default();
+        let mut inputs = Inputs { gravity: GRAVITY, ..Inputs::default() };
         for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
             inputs.pins.push(Pin { vertex: v as u32, target: *x });
         }
         let held = inputs.clone();
         for _ in 0..5 {
             let vertex = random.next() % mesh.vertices().len() as u64;
-            let target = mesh.vertices()[vertex as usize] + random.vector(size[0]);
+            let target = mesh.vertices()[vertex as usize] + random.vector(2.0 * size[0]);
             inputs.pins.retain(|pin| pin.vertex != vertex as u32);
             inputs.pins.push(Pin { vertex: vertex as u32, target });
         }
         let mut above = [0, 0];
-        for step in 0..600 {
-            trio.step(if step < 40 { &inputs } else { &held });
+        for step in 0..800 {
+            trio.step(if step < 20 { &inputs } else { &held });
             let reports = [trio.cpu.last_step().expect("a guarded step"), trio.report()];
             for (above, report) in above.iter_mut().zip(reports) {
                 *above += usize::from(!report.keeps_limit());
             }
+            if step > 100 && step % 10 == 0 {
+                trio.slow_down();
+            }
         }
-        let state = trio.read();
-        let [cpu, gpu] = trio.distances();
+        let [cpu, gpu] = trio.distances(0..mesh.vertices().len() as u32);
         let rejected = [trio.cpu.rejected_steps(), trio.gpu.rejected_steps().expect("a device")];
         println!(
             "seed {seed}: {rejected:?} taken back, {above:?} above; CPU {cpu:e}, device {gpu:e}"
         );
-        assert!(state.is_finite(), "seed {seed}");
+        assert!(trio.read().is_finite(), "seed {seed}");
         assert_eq!(above, [0, 0], "seed {seed}");
-        assert!(rejected.iter().all(|&count| count > 0), "seed {seed}: {rejected:?}");
+        assert_eq!(rejected.map(|count| count > 0), [is_rejected; 2], "seed {seed}: {rejected:?}");
+        // Both come closer still with more steps; sweeps of one colour are the slowest. Another rest,
+        // with tetrahedra turned inside out, would be millimetres away.
+        assert!(cpu < 2e-5 && gpu < 2e-5, "seed {seed}: {cpu} and {gpu}");
     }
+}
+
+/// Kinetic, elastic and potential energy [J] of the vertices that are not pinned.
+fn mechanical_energy(model: &Model<f32>, state: &State<f32>, inputs: &Inputs<f32>) -> f64 {
+    let mut tets = Vec::new();
+    measure_tets(model, &state.positions, &mut tets);
+    let elastic: f64 =
+        tets.iter().map(|tet| f64::from(tet.rest_volume) * f64::from(tet.energy_density)).sum();
+    let pinned: HashSet<u32> = inputs.pins.iter().map(|pin| pin.vertex).collect();
+    let free = (0..model.vertex_count()).filter(|v| !pinned.contains(&(*v as u32)));
+    free.fold(elastic, |sum, v| {
+        let mass = f64::from(model.masses[v]);
+        let height = GRAVITY.dot(state.positions[v].cast());
+        sum + mass * (0.5 * state.velocities[v].cast::<f64>().length_squared() - height)
+    })
+}
+
+/// Stiff tissue, swinging on a wall: what kept multipliers would push on is taken away.
+#[test]
+fn no_step_gains_mechanical_energy() {
+    let device = device();
+    let mesh = block([0.08, 0.02, 0.02], [12, 3, 3], 0.2);
+    let mut inputs = Inputs { gravity: GRAVITY.cast(), ..Inputs::default() };
+    for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
+        inputs.pins.push(Pin { vertex: v as u32, target: x.cast() });
+    }
+    let mut grown = [0, 0];
+    let mut noise = 0.0;
+    for (grown, step_guard) in grown.iter_mut().zip([true, false]) {
+        let settings = SolverSettings { step_guard, ..SolverSettings::default() };
+        let model = single_body::<f32>(&mesh, &material(SNH, 4e5, 0.45), &settings);
+        let mut gpu = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
+        let mut state = State::at_rest(&model);
+        let mut before = mechanical_energy(&model, &state, &inputs);
+        for _ in 0..150 {
+            gpu.step(&model, &inputs, DT).expect("a legal step");
+            gpu.read(&model, &mut state).expect("a device");
+            let after = mechanical_energy(&model, &state, &inputs);
+            if let Some(report) = gpu.last_step().expect("a device") {
+                // What rounding of positions can pretend of an energy [J].
+                noise = report.noise / (DT * DT);
+            }
+            *grown += usize::from(after > before + noise || after.is_nan());
+            before = after;
+        }
+    }
+    println!("{grown:?} of 150 steps gain energy, guarded and not; noise {noise:e} J");
+    assert_eq!(grown[0], 0);
+    assert!(grown[1] > 0, "the guard makes no difference");
+}
+
+/// Sums have a fixed order: the same bits in two runs.
+#[test]
+fn two_runs_have_the_same_bits() {
+    let device = device();
+    let settings = SolverSettings::default();
+    let (model, places) = many_parts::<f32>(&settings);
+    let run = || {
+        let mut gpu = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
+        for step in 0..8 {
+            let mut inputs = single(&walls(&places, step));
+            inputs.pins[0].target = vec3(0.1, 0.1, 0.0);
+            gpu.step(&model, &inputs, DT).expect("a legal step");
+        }
+        let mut state = State::at_rest(&model);
+        gpu.read(&model, &mut state).expect("a device");
+        let report = gpu.last_step().expect("a device").expect("a guarded step");
+        (state, report)
+    };
+    let (first, second) = (run(), run());
+    assert!(first.0.is_finite());
+    assert_eq!(first, second);
 }

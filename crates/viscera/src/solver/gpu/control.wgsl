@@ -2,6 +2,11 @@
 
 const LARGEST_WINDOW: u32 = 10u;
 
+// What takes the place of an iterate of Anderson's.
+const NOTHING: u32 = 0u;
+const PLAIN: u32 = 1u;
+const DESCENT: u32 = 2u;
+
 struct Control {
     // Anderson: sweeps in the history, the place of the next difference, how many there are.
     sweeps: u32,

@@ -13,11 +13,6 @@ const TOLERATED: u32 = 2u;
 const CHOOSES: u32 = 1u;
 const JUDGES: u32 = 2u;
 
-// What takes the place of an iterate.
-const NOTHING: u32 = 0u;
-const PLAIN: u32 = 1u;
-const DESCENT: u32 = 2u;
-
 var<workgroup> start_range: u32;
 
 // `Phi` [J s^2] above the start of the step, and what round-off can pretend of it.
@@ -134,9 +129,9 @@ fn take_back(local: u32) {
     let trial = TRIAL * table[STRIDE];
     let direction = DIRECTION * table[STRIDE];
     for (var v = local; v < table[VERTEX_COUNT]; v += THREADS) {
-        let from = ground_of(start, v).xyz;
-        ground[trial + v] = vec4f(from, 0.0);
-        ground[direction + v] = vec4f(points[v].xyz - from, 0.0);
+        let origin = ground_of(start, v).xyz;
+        ground[trial + v] = vec4f(origin, 0.0);
+        ground[direction + v] = vec4f(points[v].xyz - origin, 0.0);
     }
     storageBarrier();
     var shares = SHARES;
