@@ -5,6 +5,8 @@
 //! GpuSolver::step     inputs and constants of the step, one compute pass, one submission; no waiting
 //! GpuSolver::request  copies what moves into memory that the host can read, behind the last step
 //! GpuSolver::newest   the newest copy that has arrived, if any; never waits
+//! GpuSolver::restart  a new history: multipliers from positions
+//! GpuSurface::update  a fine surface behind the last step, ready to be drawn
 //! ```
 //!
 //! The state lives on the device, vertices in the solver's numbering. What decides during a step (step
