@@ -56,7 +56,7 @@ impl Frames {
 
 impl GpuSolver {
     /// Asks for the positions at the end of the last step; returns the request's number, or nothing
-    /// while [`RING`] others are under way. Does not wait.
+    /// while three others are under way. Does not wait.
     pub fn request(&mut self) -> Option<u64> {
         self.collect();
         let size = self.buffers.points_size;
