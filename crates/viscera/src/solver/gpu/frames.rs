@@ -15,7 +15,7 @@ use crate::state::State;
 /// Copies that may be under way at a time; more requests give way until one has arrived.
 const RING: usize = 3;
 
-/// Number of a request, and whether its copy is there.
+/// The number of a request, and whether its copy can be read.
 type Arrival = (u64, bool);
 
 /// Copies under way.
@@ -59,7 +59,7 @@ impl Frames {
 
 impl GpuSolver {
     /// Asks for the positions at the end of the last step; returns the request's number, or nothing
-    /// while [`RING`] others are under way. Does not wait.
+    /// while three others are under way. Does not wait.
     pub fn request(&mut self) -> Option<u64> {
         self.collect();
         let size = self.buffers.points_size;
