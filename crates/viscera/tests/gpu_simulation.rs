@@ -144,9 +144,13 @@ fn frames_and_reports_agree_with_the_cpu() {
 
 #[test]
 fn the_choice_is_told_with_its_reason() {
-    let choice = |overrides: &[_]| simulation(overrides).map(|s| s.device_choice().to_owned());
+    let choice =
+        |overrides: &[(&str, &str)]| simulation(overrides).map(|s| s.device_choice().to_owned());
     let small = choice(&[]).expect("a simulation");
-    assert!(small.starts_with("CPU: the mesh has 160 tetrahedra; a GPU pays from about "), "{small}");
+    assert!(
+        small.starts_with("CPU: the mesh has 160 tetrahedra; a GPU pays from about "),
+        "{small}"
+    );
     assert_eq!(choice(&[("solver.device", "cpu")]).as_deref(), Ok("CPU: as asked for"));
     let name = adapter().name();
     let asked = choice(&[("solver.device", "gpu")]).expect("a simulation");
@@ -178,7 +182,7 @@ fn large_meshes_go_to_hardware_and_never_to_software_by_themselves() {
 
 #[test]
 fn double_precision_stays_on_the_cpu() {
-    let double = |overrides: &[_]| {
+    let double = |overrides: &[(&str, &str)]| {
         let (scene, assembly) = assembled(overrides);
         Simulation::<f64>::new(scene, assembly).map(|s| s.device_choice().to_owned())
     };
@@ -197,7 +201,10 @@ fn auto_goes_on_with_the_cpu_where_the_device_is_lost() {
     device.wgpu().0.destroy();
     lost.advance_frame().expect("a frame on the CPU");
     let warning = lost.device_warning().expect("a warning").to_owned();
-    assert!(warning.starts_with(&format!("after 0.0833 s {} was lost (", device.name())), "{warning}");
+    assert!(
+        warning.starts_with(&format!("after 0.0833 s {} was lost (", device.name())),
+        "{warning}"
+    );
     assert!(lost.device_choice().starts_with("CPU: after 0.0833 s"), "{}", lost.device_choice());
     let lost = advanced(lost, 6);
     assert_eq!(lost.frame(), 12);
@@ -249,7 +256,10 @@ fn what_an_adapter_lacks_is_named() {
         ..baseline()
     };
     let lacking = shortfall(&limits).expect("too little");
-    assert!(lacking.contains("max_storage_buffers_per_shader_stage 4 where 8 is needed"), "{lacking}");
+    assert!(
+        lacking.contains("max_storage_buffers_per_shader_stage 4 where 8 is needed"),
+        "{lacking}"
+    );
     assert!(lacking.contains("max_compute_invocations_per_workgroup 128 where 256"), "{lacking}");
 }
 
