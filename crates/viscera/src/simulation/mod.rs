@@ -218,8 +218,8 @@ impl<S: Real> Simulation<S> {
     pub fn advance_frame(&mut self) -> Result<(), FrameError> {
         let rejected = self.solver.rejected_steps();
         match self.compute_frame() {
-            #[cfg(feature = "gpu")]
-            Err(lost @ FrameError::Gpu(_)) if self.backend.gives_way => {
+            // What a step refuses, the CPU would refuse as well.
+            Err(lost) if self.backend.gives_way && !matches!(lost, FrameError::Step(_)) => {
                 // The state is still that of the last frame.
                 self.backend.give_way(self.time(), &lost);
                 self.compute_frame()?;

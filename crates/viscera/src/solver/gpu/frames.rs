@@ -13,12 +13,15 @@ use crate::state::State;
 /// Copies that may be under way at a time; more requests give way until one has arrived.
 const RING: usize = 3;
 
+/// Which request was answered, and whether with a copy.
+type Arrival = (u64, bool);
+
 /// Copies under way.
 #[derive(Debug)]
 pub(super) struct Frames {
     free: Vec<wgpu::Buffer>,
     under_way: Vec<(u64, wgpu::Buffer)>,
-    arrivals: (Sender<(u64, bool)>, Receiver<(u64, bool)>),
+    arrivals: (Sender<Arrival>, Receiver<Arrival>),
     requested: u64,
     /// The newest copy that has arrived and was not asked for yet.
     arrived: Option<(u64, wgpu::Buffer)>,
