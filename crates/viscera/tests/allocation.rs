@@ -156,7 +156,11 @@ to = { body = "lower", half_space = { point = [0, 0, "-10 mm"], normal = [0, 0, 
 fn a_frame_of_a_scene_allocates_nothing_after_the_first() {
     for acceleration in ["none", "chebyshev", "anderson"] {
         for colors in ["1", "4", "unlimited"] {
-            let overrides = [("solver.acceleration", acceleration), ("solver.colors", colors)];
+            let overrides = [
+                ("solver.acceleration", acceleration),
+                ("solver.colors", colors),
+                ("solver.device", "cpu"),
+            ];
             let scene = Scene::parse("everything.toml", SCENE, &overrides);
             let scene = scene.unwrap_or_else(|error| panic!("{error}"));
             let assembly = Assembly::new(&scene, &mut |name| Err(format!("no file {name}")));

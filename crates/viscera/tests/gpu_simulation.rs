@@ -144,7 +144,8 @@ fn frames_and_reports_agree_with_the_cpu() {
 
 #[test]
 fn the_choice_is_told_with_its_reason() {
-    let choice = |overrides: &[_]| simulation(overrides).map(|s| s.device_choice().to_owned());
+    let choice =
+        |overrides: &[(&str, &str)]| simulation(overrides).map(|s| s.device_choice().to_owned());
     let small = choice(&[]).expect("a simulation");
     assert!(
         small.starts_with("CPU: the mesh has 160 tetrahedra; a GPU pays from about "),
@@ -181,7 +182,7 @@ fn large_meshes_go_to_hardware_and_never_to_software_by_themselves() {
 
 #[test]
 fn double_precision_stays_on_the_cpu() {
-    let double = |overrides: &[_]| {
+    let double = |overrides: &[(&str, &str)]| {
         let (scene, assembly) = assembled(overrides);
         Simulation::<f64>::new(scene, assembly).map(|s| s.device_choice().to_owned())
     };

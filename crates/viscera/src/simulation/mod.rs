@@ -15,11 +15,9 @@ use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::scene::Scene;
-#[cfg(feature = "gpu")]
-use crate::settings::DeviceRequest;
 use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]
-use crate::solver::gpu::{Device, GpuError, GpuSolver};
+use crate::solver::gpu::GpuError;
 use crate::solver::{Inputs, Pin, Solver, StepError};
 use crate::state::State;
 use device::Backend;
@@ -190,12 +188,6 @@ impl<S: Real> Simulation<S> {
         self.backend.warning.as_deref()
     }
 
-    /// The solver on a graphics processor, where one computes the steps.
-    #[cfg(feature = "gpu")]
-    pub fn gpu(&self) -> Option<&GpuSolver> {
-        self.backend.elsewhere.as_ref().map(|elsewhere| elsewhere.solver())
-    }
-
     /// The CPU's solver, for what it tells of itself.
     pub fn solver(&self) -> &Solver<S> {
         &self.solver
@@ -226,8 +218,8 @@ impl<S: Real> Simulation<S> {
     pub fn advance_frame(&mut self) -> Result<(), FrameError> {
         let rejected = self.solver.rejected_steps();
         match self.compute_frame() {
-            #[cfg(feature = "gpu")]
-            Err(lost @ FrameError::Gpu(_)) if self.backend.gives_way => {
+            // What a step refuses, the CPU would refuse as well.
+            Err(lost) if self.backend.gives_way && !matches!(lost, FrameError::Step(_)) => {
                 // The state is still that of the last frame.
                 self.backend.give_way(self.time(), &lost);
                 self.compute_frame()?;
@@ -331,23 +323,6 @@ impl<S: Real> Simulation<S> {
             forces.push(sum(&force.name, PatchKind::Force, patch, position, |_| share));
         }
         forces
-    }
-}
-
-#[cfg(feature = "gpu")]
-impl Simulation<f32> {
-    /// A simulation on a device of the caller's, a window's for example, however small the mesh. The
-    /// settings say what to do where the device is lost: with `device = "auto"` the CPU goes on.
-    pub fn on_device(
-        scene: Scene,
-        assembly: Assembly,
-        device: &Device,
-    ) -> Result<Self, SimulationError> {
-        Self::on(scene, assembly, |model, solver, _| {
-            let settings = solver.settings();
-            let backend = gpu::on(device, model, settings, "the caller's choice")?;
-            Ok(Backend { gives_way: settings.device == DeviceRequest::Auto, ..backend })
-        })
     }
 }
 
