@@ -45,6 +45,7 @@ fn is_made(kernel: &Kernel, variant: Variant) -> bool {
                 }
         }
         kernels::File::SweepSingle => copies == (variant.swept == Swept::Jacobi),
+        kernels::File::AndersonPush => copies == (variant.swept != Swept::Vertices),
         _ => true,
     }
 }

@@ -9,7 +9,7 @@ use crate::elements::TetForm;
 use crate::material::MaterialModel;
 use crate::model::{Model, TetSet};
 use crate::scalar::lanes::LANES;
-use crate::settings::{AndersonGuard, AndersonOn, SolverSettings, Start};
+use crate::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Start};
 use crate::solver::plan::{Plan, Stage};
 
 /// `Job` of bindings.wgsl.
@@ -172,6 +172,8 @@ impl<'a> Recorder<'a> {
                 into.push(self.on_copies(self.vertices(&kernels::SPLIT_COPIES, 0)));
             }
             Stage::SolveColor(color) => self.solve_color(color as usize, into),
+            // Anderson joins them in passing.
+            Stage::JoinCopies if self.settings.acceleration == Acceleration::Anderson => {}
             Stage::JoinCopies => {
                 into.push(self.on_copies(self.vertices(&kernels::JOIN_COPIES, 0)));
             }
@@ -314,7 +316,9 @@ impl<'a> Recorder<'a> {
     }
 
     fn anderson(&self, on: AndersonOn, into: &mut Vec<Dispatch>) {
-        let sums = self.sums(&kernels::ANDERSON_PUSH);
+        let is_split = self.swept != Swept::Vertices;
+        let push = if is_split { &kernels::ANDERSON_JOIN } else { &kernels::ANDERSON_PUSH };
+        let sums = self.sums(push);
         let guard = self.settings.guard_of_mixtures() == AndersonGuard::Residual;
         let job = Job {
             count: sums.groups,
