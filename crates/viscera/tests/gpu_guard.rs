@@ -248,8 +248,7 @@ fn violent_grabs_are_taken_back() {
 fn mechanical_energy(model: &Model<f32>, state: &State<f32>, inputs: &Inputs<f32>) -> f64 {
     let mut tets = Vec::new();
     measure_tets(model, &state.positions, &mut tets);
-    let elastic: f64 =
-        tets.iter().map(|tet| f64::from(tet.rest_volume) * f64::from(tet.energy_density)).sum();
+    let elastic: f64 = tets.iter().map(|tet| tet.rest_volume * tet.energy_density).sum();
     let pinned: HashSet<u32> = inputs.pins.iter().map(|pin| pin.vertex).collect();
     let free = (0..model.vertex_count()).filter(|v| !pinned.contains(&(*v as u32)));
     free.fold(elastic, |sum, v| {
