@@ -2,11 +2,11 @@
 //! run. A software driver does; without any the tests fail and say what to install.
 
 mod common;
+#[path = "common/device.rs"]
+mod device;
 
-use std::sync::OnceLock;
-
-use common::{SNH, STVK, block, material};
-use viscera::mesh::TetMesh;
+use common::{STVK, block, material};
+use device::{device, everything};
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{
@@ -18,36 +18,6 @@ use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
 const DT: f64 = 1.0 / 600.0;
-
-/// One device for all tests: kernels are compiled once.
-fn device() -> &'static Device {
-    static DEVICE: OnceLock<Device> = OnceLock::new();
-    DEVICE.get_or_init(|| {
-        let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
-        adapter.open().unwrap_or_else(|error| panic!("{error}"))
-    })
-}
-
-/// Two bars, one above the other, joined by springs; one of Saint Venant-Kirchhoff, the other viscous,
-/// neo-Hookean and in elastic attachments: everything a model can have.
-fn everything<S: Real>(settings: &SolverSettings) -> Model<S> {
-    let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
-    let mut builder = ModelBuilder::new();
-    let viscous = material(SNH, 1e4, 0.4).with_viscosity(0.05).expect("legal");
-    builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
-    let up = |x: &Vec3<f64>| *x + vec3(0.0, 0.0, 0.05);
-    let vertices: Vec<_> = mesh.vertices().iter().map(up).collect();
-    let regions = mesh.regions().to_vec();
-    let (above, _) = TetMesh::new(vertices, mesh.tets().to_vec(), regions).expect("a mesh");
-    builder.add_body(&above, &viscous).expect("a body");
-    let half = mesh.vertices().len() as u32;
-    for v in (0..half).step_by(3) {
-        builder.add_spring([v, half + v], 40.0, Some(0.04)).expect("a spring");
-        let anchor = above.vertices()[v as usize];
-        builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
-    }
-    builder.build(settings).expect("a model")
-}
 
 /// A wall that moves, a force that comes and goes, anchors that drift.
 fn inputs_at<S: Real>(model: &Model<f64>, step: u32) -> Inputs<S> {

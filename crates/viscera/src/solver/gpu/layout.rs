@@ -8,7 +8,7 @@ use crate::model::Model;
 use crate::scalar::lanes::LANES;
 
 /// Bytes of `Control` in control.wgsl.
-pub(super) const CONTROL_SIZE: u64 = 528;
+pub(super) const CONTROL_SIZE: u64 = 524;
 
 /// The material of a lane that only fills a block up.
 pub(super) const FILLING: u32 = u32::MAX;

@@ -47,7 +47,7 @@ pub use error::GpuError;
 use explicit::Hold;
 pub use frames::Frame;
 use frames::Frames;
-pub use host::{HostLayout, host_constants, host_layouts};
+pub use host::{HOST_CONTROL_SIZE, HostLayout, host_constants, host_layouts};
 use inputs::norm_weights;
 use layout::Layout;
 use record::{Dispatch, Job, Pieces, Recorder};
