@@ -97,7 +97,7 @@ fn two_runs_have_the_same_bits() {
 fn a_small_step_is_two_dispatches() {
     let settings = explicit(Colors::Unlimited);
     let model = everything(&settings);
-    let gpu = GpuSolver::new(&device::device(), &model, &settings).expect("a model that fits");
+    let gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");
     assert_eq!(gpu.dispatches()[1], 2);
     let cpu = Solver::new(&model, &settings);
     assert_eq!(gpu.stable_step(), cpu.stable_step());
@@ -111,7 +111,7 @@ fn too_many_small_steps_are_refused() {
     let settings = explicit(Colors::Unlimited);
     let mesh = block([3e-5, 1e-5, 1e-5], [3, 1, 1], 0.0);
     let model = single_body::<f32>(&mesh, &material(SNH, 1e9, 0.4), &settings);
-    let mut gpu = GpuSolver::new(&device::device(), &model, &settings).expect("a model that fits");
+    let mut gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");
     let mut before = State::at_rest(&model);
     before.velocities.fill(vec3(1.0, 2.0, 3.0));
     gpu.write(&model, &before).expect("a state of this model");

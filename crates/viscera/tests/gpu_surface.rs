@@ -174,7 +174,7 @@ fn a_window_s_own_device_draws_the_surface() {
     let device = Device::from_wgpu(wgpu.clone(), queue.clone(), "the window's".into());
     let bodies = bodies();
     let model = bodies.model::<f32>();
-    let solver = GpuSolver::new(device, &model, &settings()).expect("a model that fits");
+    let solver = GpuSolver::new(&device, &model, &settings()).expect("a model that fits");
     let ball = bodies.skins(&model)[1];
     let surface = GpuSurface::new(&solver, &model, &[ball]).expect("it fits");
     let covered = draw(wgpu, queue, &surface);
