@@ -1,6 +1,7 @@
 //! What can go wrong with a graphics processor.
 
 use crate::mesh::embed::EmbeddingError;
+use crate::solver::StepError;
 
 /// Why the GPU backend cannot do what was asked. Nothing was changed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -79,6 +80,9 @@ pub enum GpuError {
         /// The driver's reason.
         reason: String,
     },
+    /// A step that cannot be made.
+    #[error(transparent)]
+    Step(#[from] StepError),
     /// The GPU computes in single precision.
     #[error(
         "graphics processors compute in single precision; use `precision = \"f32\"` or `device = \"cpu\"`"

@@ -201,7 +201,7 @@ fn staging(device: &Device, size: u64) -> wgpu::Buffer {
     })
 }
 
-fn wait(device: &Device) -> Result<(), GpuError> {
+pub(super) fn wait(device: &Device) -> Result<(), GpuError> {
     let polled = device.device.poll(wgpu::PollType::wait_indefinitely());
     polled.map_err(|error| device.lost(error.to_string()))?;
     device.check()

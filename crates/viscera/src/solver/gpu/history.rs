@@ -3,7 +3,7 @@
 
 use super::kernels;
 use super::record::{Dispatch, Job, Recorder};
-use super::{GpuSolver, Inputs, StepError};
+use super::{GpuSolver, Inputs, Marks, StepError};
 use crate::elements::TetForm;
 use crate::model::Model;
 use crate::scalar::lanes::LANES;
@@ -73,7 +73,7 @@ impl GpuSolver {
     ) -> Result<(), StepError> {
         crate::solver::check_step(dt, model, inputs)?;
         self.prepare_step(model, inputs, dt, 1);
-        self.submit("restart", &[&self.restart]);
+        self.submit("restart", &[&self.restart], Marks::default());
         self.multiplier_dt = dt;
         Ok(())
     }

@@ -6,6 +6,7 @@
 //! GpuSolver::request  copies what moves into memory that the host can read, behind the last step
 //! GpuSolver::newest   the newest copy that has arrived, if any; never waits
 //! GpuSolver::restart  a new history: multipliers from positions
+//! GpuSolver::time_step  the same, timed stage by stage by the device's clock
 //! GpuSurface::update  a fine surface behind the last step, ready to be drawn
 //! ```
 //!
@@ -13,6 +14,7 @@
 //! lengths, weights, rejections) lies in one record there, `Control`; nothing is read back inside a step.
 
 mod buffers;
+mod copy;
 mod cost;
 mod device;
 mod error;
@@ -27,6 +29,7 @@ mod record;
 mod record_guard;
 mod report;
 mod surface;
+mod timing;
 
 use bytemuck::{Pod, Zeroable};
 
@@ -41,6 +44,7 @@ use crate::settings::{Acceleration, Method, Precision, RelaxationForm, SolverSet
 use crate::state::State;
 pub use buffers::Slot;
 use buffers::{Buffers, Update};
+pub use copy::MemoryCopy;
 pub use cost::StepCost;
 pub use device::{Adapter, Device, baseline, shortfall};
 pub use error::GpuError;
@@ -52,6 +56,8 @@ use inputs::norm_weights;
 use layout::Layout;
 use record::{Dispatch, Job, Pieces, Recorder};
 pub use surface::{GpuSurface, Skin};
+use timing::{Marks, StageRange};
+pub use timing::{StageTime, StepPart, StepTimes};
 
 /// `Frame` of bindings.wgsl.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -106,6 +112,8 @@ pub struct GpuSolver {
     frame: wgpu::Buffer,
     jobs: wgpu::Buffer,
     ready: [Vec<Ready>; 3],
+    /// Which of them belong to which stage.
+    stages: [Vec<StageRange>; 3],
     restart: Vec<Ready>,
     frames: Frames,
     /// What the device's multipliers belong to [s]; zero before the first step.
@@ -216,6 +224,7 @@ impl GpuSolver {
             frame,
             jobs,
             ready: [prologue, body, epilogue],
+            stages: record.stages,
             restart,
             multiplier_dt: 0.0,
             touched: Vec::new(),
@@ -313,34 +322,58 @@ impl GpuSolver {
         inputs: &Inputs<f32>,
         dt: f64,
     ) -> Result<(), StepError> {
-        super::check_step(dt, model, inputs)?;
-        let (mut left, small_steps) = match self.settings.method {
-            Method::Xpbd => (self.plan.repeat, 1),
-            Method::Explicit => [small_steps(dt, self.stable_step)?; 2].into(),
-        };
-        self.prepare_step(model, inputs, dt, small_steps);
-        let [prologue, body, epilogue] = &self.ready;
+        self.step_marked(model, inputs, dt, Marks::default())
+    }
+
+    /// A step at whose beginning and end the device's clock may be read.
+    fn step_marked(
+        &mut self,
+        model: &Model<f32>,
+        inputs: &Inputs<f32>,
+        dt: f64,
+        marks: Marks<'_>,
+    ) -> Result<(), StepError> {
+        let mut left = self.begin_step(model, inputs, dt)?;
+        let [prologue, body, epilogue] = self.ready.each_ref().map(Vec::as_slice);
         let mut lists = vec![prologue];
+        let mut now = marks;
         while left > MOST_REPEATS {
             lists.extend(std::iter::repeat_n(body, MOST_REPEATS as usize));
-            self.submit("step", &lists);
+            self.submit("step", &lists, now.before_the_end());
+            now = marks.after_the_beginning();
             lists.clear();
             left -= MOST_REPEATS;
         }
         lists.extend(std::iter::repeat_n(body, left as usize));
         lists.push(epilogue);
-        self.submit("step", &lists);
+        self.submit("step", &lists, now);
         self.multiplier_dt = dt;
         Ok(())
     }
 
+    /// Inputs and constants of a step; returns how many iterations, or small steps, it has.
+    fn begin_step(
+        &mut self,
+        model: &Model<f32>,
+        inputs: &Inputs<f32>,
+        dt: f64,
+    ) -> Result<u32, StepError> {
+        super::check_step(dt, model, inputs)?;
+        let [repeats, small_steps] = match self.settings.method {
+            Method::Xpbd => [self.plan.repeat, 1],
+            Method::Explicit => [small_steps(dt, self.stable_step)?; 2],
+        };
+        self.prepare_step(model, inputs, dt, small_steps);
+        Ok(repeats)
+    }
+
     /// One submission of one compute pass.
-    fn submit(&self, label: &str, lists: &[&Vec<Ready>]) {
+    fn submit(&self, label: &str, lists: &[&[Ready]], marks: Marks<'_>) {
         let mut encoder = self.encoder(label);
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                 label: Some(label),
-                timestamp_writes: None,
+                timestamp_writes: marks.writes(),
             });
             for list in lists {
                 self.send(&mut pass, list);

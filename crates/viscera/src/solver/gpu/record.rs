@@ -5,6 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use super::buffers::{Place, Slot};
 use super::kernels::{self, Kernel, Swept, Variant};
 use super::layout::{Layout, SUM_GROUPS};
+use super::timing::StageRange;
 use crate::elements::TetForm;
 use crate::material::MaterialModel;
 use crate::model::{Model, TetSet};
@@ -60,6 +61,9 @@ pub(super) struct Record {
     pub prologue: Vec<Dispatch>,
     pub body: Vec<Dispatch>,
     pub epilogue: Vec<Dispatch>,
+    /// Which of them belong to which stage, in these three lists; stages that need none are left out,
+    /// and the colours of a sweep are one.
+    pub stages: [Vec<StageRange>; 3],
     /// Of a new history, instead of a step.
     pub restart: Vec<Dispatch>,
 }
@@ -114,23 +118,39 @@ impl<'a> Recorder<'a> {
     }
 
     pub fn record(&self, plan: &Plan) -> Record {
-        let all = |stages: &[Stage]| {
-            let mut dispatches = Vec::new();
-            for stage in stages {
-                self.stage(stage, &mut dispatches);
-            }
-            dispatches
-        };
-        let mut record = Record {
-            prologue: all(&plan.prologue),
-            body: all(&plan.body),
-            epilogue: all(&plan.epilogue),
-            restart: self.restart(),
-        };
+        let [mut prologue, body, epilogue] =
+            [&plan.prologue, &plan.body, &plan.epilogue].map(|stages| self.list(stages));
         if self.mixes_remember && plan.body.contains(&Stage::RememberIterate) {
-            record.prologue.push(self.long(&kernels::REMEMBER_ITERATE, 0));
+            let first = prologue.0.len();
+            prologue.0.push(self.long(&kernels::REMEMBER_ITERATE, 0));
+            let stage = Stage::RememberIterate;
+            prologue.1.push(StageRange { stage, dispatches: first..first + 1 });
         }
-        record
+        Record {
+            prologue: prologue.0,
+            body: body.0,
+            epilogue: epilogue.0,
+            stages: [prologue.1, body.1, epilogue.1],
+            restart: self.restart(),
+        }
+    }
+
+    fn list(&self, stages: &[Stage]) -> (Vec<Dispatch>, Vec<StageRange>) {
+        let (mut dispatches, mut ranges) = (Vec::new(), Vec::<StageRange>::new());
+        for stage in stages {
+            let first = dispatches.len();
+            self.stage(stage, &mut dispatches);
+            let added = first..dispatches.len();
+            match (stage, ranges.last_mut()) {
+                _ if added.is_empty() => {}
+                (
+                    Stage::SolveColor(_),
+                    Some(StageRange { stage: Stage::SolveColor(_), dispatches }),
+                ) => dispatches.end = added.end,
+                _ => ranges.push(StageRange { stage: *stage, dispatches: added }),
+            }
+        }
+        (dispatches, ranges)
     }
 
     fn stage(&self, stage: &Stage, into: &mut Vec<Dispatch>) {
