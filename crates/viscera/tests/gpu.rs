@@ -254,3 +254,48 @@ fn a_model_over_the_limits_is_refused() {
     let text = error.to_string();
     assert!(text.contains("binds at most 8192") && text.contains("or fewer"), "{text}");
 }
+
+/// A step begun by the CPU and ended by the device, for every stage that it may change hands at.
+#[test]
+fn a_step_changes_hands_at_any_stage() {
+    let guarded = SolverSettings { iterations: 3, ..SolverSettings::default() };
+    let plain = SolverSettings { step_guard: false, ..guarded.clone() };
+    let anderson = SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() };
+    let mut hands = 0;
+    for (colors, settings) in [
+        (Colors::Limited(1), &anderson),
+        (Colors::Limited(4), &plain),
+        (Colors::Unlimited, &guarded),
+    ] {
+        let settings = SolverSettings { colors, ..settings.clone() };
+        let (model, double) = (everything(&settings), everything(&settings));
+        let mut cpu = Solver::<f32>::new(&model, &settings);
+        let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
+        // Something is under way when the step begins.
+        let mut start = State::at_rest(&model);
+        for step in 0..5 {
+            cpu.step(&model, &mut start, &inputs_at(&double, step), DT).expect("a legal step");
+        }
+        let inputs = inputs_at(&double, 5);
+        let mut whole = start.clone();
+        cpu.step(&model, &mut whole, &inputs, DT).expect("a legal step");
+        let moved = whole.positions.iter().zip(&start.positions);
+        let moved = moved.map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
+        let mut stages = [&gpu.plan().prologue[..], &gpu.plan().body[..]].concat();
+        stages.dedup_by_key(|stage| std::mem::discriminant(stage));
+        for stage in stages {
+            let mut state = start.clone();
+            let done = gpu.step_from(stage, &mut cpu, &model, &mut state, &inputs, DT);
+            let done = done.expect("a legal step");
+            gpu.read(&model, &mut state).expect("a device");
+            let apart = state.positions.iter().zip(&whole.positions);
+            let apart = apart.map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
+            println!("{colors:?}, {done} stages by the CPU, then {stage:?}: {apart:e} m apart");
+            // Round-off of places a tenth of a metre from the origin, and of a few sweeps.
+            let limit = 16.0 * 0.1 * f32::EPSILON;
+            assert!(apart < limit && moved > 1e-4, "{stage:?}: {apart:e} m apart of {moved:e} m");
+            hands += 1;
+        }
+    }
+    assert!(hands > 20, "{hands}");
+}

@@ -179,6 +179,11 @@ impl Layout {
         Self { offsets, corners, springs, attachments, members, pieces, piece_count }
     }
 
+    /// Where a vertex's loads begin.
+    pub fn first_load(&self, v: usize) -> usize {
+        self.offsets[v] as usize
+    }
+
     /// Places for loads.
     pub fn slot_count(&self) -> u64 {
         self.offsets.last().copied().unwrap_or(0).into()
