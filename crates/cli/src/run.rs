@@ -2,6 +2,7 @@
 
 use crate::files::{self, Library, OutputFolder};
 use crate::film::Film;
+use crate::scene::BuiltIn;
 use crate::series::Series;
 use crate::summary::{FrameLine, Summary};
 use crate::{memory, progress};
@@ -25,7 +26,7 @@ use viscera_report::Memory;
 /// finished is kept and summary.json says so.
 #[derive(Args)]
 pub struct RunArguments {
-    /// The scene file
+    /// The scene file, or the name of one that `viscera scene list` prints
     scene: PathBuf,
     /// Folder for the results [default: out/NAME-OF-THE-SCENE]
     #[arg(long, value_name = "DIR")]
@@ -90,7 +91,10 @@ type Overrides = Vec<(String, String)>;
 
 fn read_scene(arguments: &RunArguments) -> Result<(Scene, Overrides)> {
     let name = arguments.scene.display().to_string();
-    let bytes = files::read(&arguments.scene)?;
+    let bytes = match BuiltIn::find(&arguments.scene) {
+        Some(scene) => scene.text.as_bytes().to_vec(),
+        None => files::read(&arguments.scene)?,
+    };
     let Ok(text) = String::from_utf8(bytes) else {
         bail!("{name} is not a text file; a scene is TOML in UTF-8");
     };
