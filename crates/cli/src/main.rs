@@ -26,7 +26,7 @@ struct Arguments {
 
 const EXAMPLES: &str = "\
 Examples:
-  viscera run scenes/liver_retraction.toml
+  viscera run liver_retraction
   viscera run scenes/cantilever.toml --set body.bar.material.young=\"10 kPa\" --out out/soft
   viscera mesh inspect liver.msh --unit \"32 mm\"
   viscera scene describe
@@ -39,7 +39,7 @@ enum Command {
     /// Look at mesh files
     #[command(subcommand)]
     Mesh(mesh::MeshCommand),
-    /// What a scene file can say
+    /// What a scene file can say, and which scenes need none
     #[command(subcommand)]
     Scene(scene::SceneCommand),
     /// Measure what the solvers cost on this machine

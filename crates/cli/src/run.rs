@@ -2,6 +2,7 @@
 
 use crate::files::{self, Library, OutputFolder};
 use crate::film::Film;
+use crate::scene::BuiltIn;
 use crate::series::Series;
 use crate::summary::{FrameLine, Summary};
 use crate::{memory, progress};
@@ -13,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
-use viscera::settings::Precision;
+use viscera::settings::{Method, Precision};
 use viscera::simulation::{Assembly, Simulation};
 use viscera_report::Memory;
 
@@ -25,7 +26,7 @@ use viscera_report::Memory;
 /// finished is kept and summary.json says so.
 #[derive(Args)]
 pub struct RunArguments {
-    /// The scene file
+    /// The scene file, or the name of one that `viscera scene list` prints
     scene: PathBuf,
     /// Folder for the results [default: out/NAME-OF-THE-SCENE]
     #[arg(long, value_name = "DIR")]
@@ -90,7 +91,10 @@ type Overrides = Vec<(String, String)>;
 
 fn read_scene(arguments: &RunArguments) -> Result<(Scene, Overrides)> {
     let name = arguments.scene.display().to_string();
-    let bytes = files::read(&arguments.scene)?;
+    let bytes = match BuiltIn::find(&arguments.scene) {
+        Some(scene) => scene.text.as_bytes().to_vec(),
+        None => files::read(&arguments.scene)?,
+    };
     let Ok(text) = String::from_utf8(bytes) else {
         bail!("{name} is not a text file; a scene is TOML in UTF-8");
     };
@@ -124,9 +128,17 @@ fn simulate<S: Real>(
     let mut simulation = Simulation::<S>::new(scene, assembly)?;
     let summary = Summary::new(&simulation, overrides);
     let model = &summary.model;
+    let solver = &simulation.scene().solver;
+    let work = match solver.method {
+        Method::Xpbd => format!(" x {} iterations", solver.iterations),
+        Method::Explicit => {
+            let small = format!("{:.2e} s", simulation.solver().stable_step());
+            format!(", divided into small steps of at most {small}")
+        }
+    };
     files::print(&format!(
-        "{}: {} tetrahedra, {} vertices, {:.3} kg, colours: {}, frames: {} of {} substeps x {} \
-         iterations\ndevice: {}\n",
+        "{}: {} tetrahedra, {} vertices, {:.3} kg, colours: {}, frames: {} of {} substeps{}\n\
+         device: {}\n",
         summary.title,
         model.tets,
         model.vertices,
@@ -134,7 +146,7 @@ fn simulate<S: Real>(
         model.colors,
         frames,
         simulation.scene().solver.substeps,
-        simulation.scene().solver.iterations,
+        work,
         summary.device,
     ))?;
     let draws = simulation.scene().output.picture;

@@ -34,7 +34,6 @@ fn assert_is_measured(case: &Value) {
     for key in [
         "tets",
         "vertices",
-        "threads",
         "colors",
         "repetitions",
         "step_seconds_median",
@@ -45,6 +44,10 @@ fn assert_is_measured(case: &Value) {
     ] {
         assert!(case[key].as_f64().is_some_and(|number| number > 0.0), "{key} in {case}");
     }
+    // Processors have threads, GPUs have dispatches.
+    let [one, other] =
+        if case["device"] == "GPU" { ["dispatches", "threads"] } else { ["threads", "dispatches"] };
+    assert!(case[one].as_u64().is_some_and(|n| n > 0) && case[other].is_null(), "{case}");
     // A difference of times: missing where noise hides it, and never zero or below.
     for key in ["unit_ns_per_tet", "bandwidth_fraction"] {
         assert!(
@@ -71,6 +74,8 @@ fn every_solver_is_measured_at_every_size_with_every_number_of_threads() {
         "exact",
         "cliques",
         "jacobi",
+        "jacobi-green",
+        "jacobi-anderson",
         "chebyshev",
         "anderson",
         "explicit-green",
@@ -78,7 +83,7 @@ fn every_solver_is_measured_at_every_size_with_every_number_of_threads() {
     ];
     assert_eq!(solvers, [one_size, one_size].concat());
     let threads: Vec<_> = cases.iter().map(|case| case["threads"].as_u64()).collect();
-    assert_eq!(threads, [Some(1), Some(2)].repeat(20));
+    assert_eq!(threads, [Some(1), Some(2)].repeat(2 * one_size.len()));
     for case in &cases {
         // Bars are of whole slices of boxes.
         let asked = if case["tets"].as_u64() < Some(300) { 100.0 } else { 1000.0 };
@@ -141,7 +146,7 @@ fn a_mesh_of_three_tetrahedra_is_measured() {
         bench(&folder, &["--mesh", "three.msh", "--threads", "1,3", "--json", "deep/three.json"]);
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     let cases = cases(&folder, "deep/three.json");
-    assert_eq!(cases.len(), 20);
+    assert_eq!(cases.len(), 2 * 12, "every solver with one and with three threads");
     for case in &cases {
         assert_is_measured(case);
         assert_eq!((&case["tets"], &case["mesh"]), (&3.into(), &"three".into()));
@@ -204,4 +209,91 @@ fn places_that_cannot_be_written_are_refused_before_the_work() {
         assert!(end.error().contains("cannot write to"), "{}", end.stderr);
         assert!(end.error().contains(arguments[0]), "the option to change: {}", end.stderr);
     }
+}
+
+/// The CPU and the GPU on the same mesh; a software driver does.
+#[test]
+#[cfg(feature = "gpu")]
+fn a_graphics_processor_is_measured_beside_the_processor() {
+    let folder = Bench::new("");
+    let end = bench(
+        &folder,
+        &["--device", "gpu", "--sizes", "1k", "--solvers", "green", "--threads", "1"],
+    );
+    assert_eq!(end.code, Some(0), "{}", end.stderr);
+    let cases = cases(&folder, "out/bench.json");
+    cases.iter().for_each(assert_is_measured);
+    let devices: Vec<_> = cases.iter().map(|case| &case["device"]).collect();
+    assert_eq!(devices, ["CPU", "GPU"]);
+    assert_eq!(cases[0]["tets"], cases[1]["tets"]);
+
+    let results: Value = serde_json::from_slice(&folder.read("out/bench.json")).expect("JSON");
+    assert_eq!(results["bandwidths"].as_array().map(Vec::len), Some(2));
+    let has_clock = results["adapter"]["has_clock"].as_bool().expect("an adapter");
+    let gpu = &cases[1];
+    assert_eq!(gpu["step_device_seconds"].as_f64().is_some_and(|s| s > 0.0), has_clock, "{gpu}");
+    if has_clock {
+        let stages = gpu["stages"].as_array().expect("stages");
+        let dispatches = stages.iter().filter_map(|stage| stage["dispatches"].as_u64());
+        assert_eq!(Some(dispatches.sum::<u64>()), gpu["dispatches"].as_u64(), "{gpu}");
+        let parts: Vec<_> = stages.iter().map(|stage| &stage["part"]).collect();
+        assert_eq!(
+            parts,
+            ["prologue", "prologue", "iteration", "later iterations", "epilogue"],
+            "{gpu}"
+        );
+    }
+    let report = String::from_utf8(folder.read("out/bench.md")).expect("UTF-8");
+    for text in ["| dispatches |", "(bench/cpu-and-gpu.svg)", "(bench/ns-per-tet-gpu.svg)"] {
+        assert!(report.contains(text), "{text} is not in {report}");
+    }
+}
+
+#[test]
+#[cfg(feature = "gpu")]
+fn questions_are_answered_beside_their_aims() {
+    let folder = Bench::new("");
+    let end = folder.end_of(&[
+        "bench",
+        "--device",
+        "gpu",
+        "--questions",
+        "--sizes",
+        "100",
+        "--seconds",
+        "0",
+        "--threads",
+        "1",
+        "--out",
+        "out",
+    ]);
+    assert_eq!(end.code, Some(0), "{}", end.stderr);
+    let results: Value = serde_json::from_slice(&folder.read("out/bench.json")).expect("JSON");
+    let answers = results["answers"].as_array().expect("answers");
+    let asked: Vec<_> = answers.iter().map(|a| (&a["solver"], a["aim_seconds"].as_f64())).collect();
+    let [substep, colored, anderson] =
+        [("jacobi-green", 0.25e-3), ("green", 4e-3), ("jacobi-anderson", 1e-3)];
+    for (i, (solver, aim)) in
+        [substep, substep, colored, colored, anderson, anderson].into_iter().enumerate()
+    {
+        assert_eq!(asked[i], (&Value::from(solver), Some(aim)));
+        assert!(answers[i]["step_seconds"].as_f64().is_some_and(|s| s > 0.0), "{}", answers[i]);
+    }
+    let sweeps: Vec<_> =
+        results["cases"].as_array().expect("cases").iter().map(|case| &case["sweeps"]).collect();
+    assert_eq!(sweeps, [1, 1, 20, 20, 20, 20]);
+    assert!(end.stdout.contains("20 Jacobi + Anderson iterations"), "{}", end.stdout);
+}
+
+#[test]
+#[cfg(feature = "gpu")]
+fn an_unknown_adapter_is_refused_before_the_work() {
+    let message = refusal(&["--device", "no such thing"]);
+    assert!(message.contains("no adapter is called `no such thing`"), "{message}");
+}
+
+#[test]
+#[cfg(not(feature = "gpu"))]
+fn a_build_without_the_gpu_backend_says_so() {
+    assert!(refusal(&["--device", "gpu"]).contains("build with `--features gpu`"));
 }

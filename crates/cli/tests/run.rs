@@ -302,3 +302,26 @@ fn mesh_inspect_prints_json() {
     let table = bench.end_of(&["mesh", "inspect", "out/final.vtu"]);
     assert!(table.stdout.starts_with("out/final.vtu\n") && table.stdout.contains("ml\n"));
 }
+
+#[test]
+fn scenes_that_are_listed_run_without_their_files() {
+    let bench = Bench::new(TINY);
+    let listed = bench.end_of(&["scene", "list"]).stdout;
+    let names: Vec<&str> =
+        listed.lines().skip(1).filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(names.len() >= 5 && names.contains(&"liver_retraction"), "{listed}");
+    let end =
+        bench.end_of(&["run", "cantilever", "--frames", "1", "--set", "output.picture=false"]);
+    assert_eq!(end.code, Some(0), "{}", end.stderr);
+    assert_eq!(bench.summary("out/cantilever")["title"], "Cantilever");
+}
+
+#[test]
+fn a_file_goes_before_a_built_in_scene_of_its_name() {
+    let bench = Bench::new("");
+    bench.write("twist", TINY.as_bytes());
+    let plain = ["--frames", "1", "--set", "output.picture=false", "--out", "out"];
+    let end = bench.end_of(&[&["run", "twist"], &plain[..]].concat());
+    assert_eq!(end.code, Some(0), "{}", end.stderr);
+    assert_eq!(bench.summary("out")["title"], "Tiny");
+}

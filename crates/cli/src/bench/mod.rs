@@ -1,21 +1,33 @@
 //! `viscera bench`: what the solvers cost on this machine.
 
 mod bandwidth;
+mod computers;
+#[cfg(feature = "gpu")]
+mod gpu;
+#[cfg(not(feature = "gpu"))]
+#[path = "no_gpu.rs"]
+mod gpu;
 mod measurement;
+mod questions;
 mod results;
 pub mod solvers;
 pub mod subjects;
 
 use crate::{files, memory, progress};
-use anyhow::Result;
+use anyhow::{Context, Result};
 use bandwidth::Bandwidth;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use results::Results;
+use computers::{Computer, Processor};
+use gpu::Gpu;
+use measurement::Bench;
+use questions::{QUESTIONS, Question};
 pub use results::processor;
+use results::{Results, Skipped};
 use solvers::{SOLVERS, SolverEntry};
 use std::path::PathBuf;
 use subjects::{Size, Subject};
+use viscera::mesh::TetMesh;
 use viscera::settings::MOST_THREADS;
 use viscera_report::{Document, Memory, prepare_file, write_whole};
 
@@ -28,7 +40,7 @@ use viscera_report::{Document, Memory, prepare_file, write_whole};
 #[command(after_help = EXAMPLES, after_long_help = format!("{COUNTING}\n\n{EXAMPLES}"))]
 pub struct BenchArguments {
     /// About how many tetrahedra, separated by commas
-    /// [default: 1k,3k,10k,30k,100k,300k,1M; with --quick 1k,10k]
+    /// [default: 1k,3k,10k,30k,100k,300k,1M; with --quick 1k,10k; up to 10k on a software --device]
     #[arg(long, value_name = "SIZE,...", value_delimiter = ',', conflicts_with = "mesh")]
     sizes: Vec<Size>,
     /// Measure on this tetrahedral mesh instead of bars
@@ -37,6 +49,13 @@ pub struct BenchArguments {
     /// Measure these solvers only, separated by commas
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', value_parser = solver_names())]
     solvers: Vec<String>,
+    /// Measure on a graphics processor as well: `gpu`, or part of an adapter's name
+    #[arg(long, value_name = "gpu|NAME")]
+    device: Option<String>,
+    /// Measure what was asked of the GPU backend, and print it beside the aims: 20 coloured and 20
+    /// accelerated Jacobi iterations on 100k tetrahedra, one Jacobi substep on 1M, or each on --sizes
+    #[arg(long, conflicts_with_all = ["mesh", "solvers", "quick"])]
+    questions: bool,
     /// Numbers of threads, separated by commas [default: 1 and the number of processors]
     #[arg(long, value_name = "N,...", value_delimiter = ',',
           value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_THREADS)))]
@@ -62,7 +81,8 @@ const EXAMPLES: &str = "\
 Examples:
   viscera bench --quick
   viscera bench --sizes 10k,1M --solvers exact,green --threads 1,2,4
-  viscera bench --mesh liver.msh --solvers exact --out out/liver";
+  viscera bench --mesh liver.msh --solvers exact --out out/liver
+  viscera bench --device gpu --questions";
 
 /// How numbers are counted; help and report say it alike.
 const COUNTING: &str = "\
@@ -80,6 +100,14 @@ Each counts once, whatever the solver does in fact. The column `of bandwidth` is
 time of a sweep, divided by the memory bandwidth: the bytes read and written by a copy of 256 MiB \
 with as many threads, over its time. Meshes that fit into the caches may be above 100 %.";
 
+/// The same for rows of a graphics processor.
+const COUNTING_GPU: &str = "\
+Steps on the GPU are sent one after the other, each a submission of its own, and waited for together: the \
+columns `step, median` and `step, min` are the host's time over their number, `step, own clock` is the \
+device's from the beginning of the first to the end of the last. Numbers per tetrahedron, per sweep and of \
+bandwidth are by the device's clock where it has one. Its memory bandwidth is measured by a kernel that copies \
+128 MiB. Stages are timed in passes of their own, which adds a few microseconds to each.";
+
 fn solver_names() -> PossibleValuesParser {
     PossibleValuesParser::new(SOLVERS.iter().map(|solver| solver.name))
 }
@@ -95,60 +123,155 @@ fn read_seconds(text: &str) -> Result<f64, String> {
 const USUAL: [usize; 7] = [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000];
 const QUICK: [usize; 2] = [1_000, 10_000];
 
+/// The largest size by default where a processor does a graphics processor's work [tetrahedra].
+const MOST_ON_SOFTWARE: usize = 10_000;
+
+/// A solver on a mesh, and the question that it answers.
+struct Case<'a> {
+    subject: Subject<'a>,
+    entry: SolverEntry,
+    question: Option<&'static Question>,
+}
+
 /// Carries out `viscera bench`.
 pub fn execute(arguments: &BenchArguments) -> Result<()> {
     let json = arguments.json.clone().unwrap_or_else(|| arguments.out.join("bench.json"));
     let own = arguments.mesh.as_deref().map(subjects::read).transpose()?;
-    let subjects = match &own {
-        Some((name, mesh)) => vec![Subject::Mesh(name, mesh)],
-        None => arguments.sizes().into_iter().map(Subject::Bar).collect(),
-    };
-    let solvers = arguments.solvers();
-    check_memory(&subjects, &solvers, arguments.memory)?;
+    let gpu = arguments.gpu()?;
+    let is_software = gpu.as_ref().is_some_and(Gpu::is_software);
+    let cases = arguments.cases(own.as_ref(), is_software)?;
+    check_memory(&cases, gpu.is_some(), arguments.memory)?;
     let mut document = Document::prepare(&arguments.out.join("bench.md"), "What solvers cost")?;
     prepare_file(&json, "--json")?;
 
-    let threads = arguments.threads();
+    let mut results = Results::new(gpu.as_ref().map(Gpu::facts));
+    if is_software && arguments.sizes.is_empty() && own.is_none() {
+        results.notes.push(format!(
+            "the processor does this GPU's work: no mesh has more than {MOST_ON_SOFTWARE} \
+             tetrahedra unless --sizes asks for it"
+        ));
+    }
+    let processors = arguments.threads().into_iter().map(|threads| Processor { threads });
+    let mut computers: Vec<Box<dyn Computer>> =
+        processors.map(|processor| Box::new(processor) as Box<dyn Computer>).collect();
+    computers.extend(gpu.map(|gpu| Box::new(gpu) as Box<dyn Computer>));
     let seconds = arguments.seconds.unwrap_or(if arguments.quick { 0.05 } else { 0.5 });
-    let cases = (subjects.len() * solvers.len() + 1) * threads.len();
-    let bar = progress::bar(cases as u64, "measuring", "{pos} of {len} cases, {msg}");
-    bar.set_message("memory");
-    let bandwidth = |&threads: &u32| {
-        let measured = Bandwidth::measure(threads);
-        bar.inc(1);
-        measured
-    };
-    let bandwidths: Vec<Bandwidth> = threads.iter().map(bandwidth).collect();
-    let mut cases = Vec::new();
-    for subject in &subjects {
-        for entry in &solvers {
-            bar.set_message(format!("{} on {} tetrahedra", entry.name, subject.tet_count()));
-            let done = || bar.inc(1);
-            cases.extend(measurement::measure_all(entry, subject, &bandwidths, seconds, &done)?);
+    measure(&cases, &computers, seconds, &mut results)?;
+
+    let mut solvers: Vec<&SolverEntry> = Vec::new();
+    for Case { entry, .. } in &cases {
+        if solvers.iter().all(|known| known.name != entry.name) {
+            solvers.push(entry);
         }
     }
-    bar.finish_and_clear();
-
-    let results = Results::new(bandwidths, cases);
     results.fill(&mut document, &solvers)?;
     document.write()?;
     write_whole(&json, results.to_json()?.as_bytes())?;
     files::print(&format!(
-        "{}\n{}report: {}\nnumbers: {}\n",
-        results.heading(),
-        results.table().to_text(),
+        "{}report: {}\nnumbers: {}\n",
+        results.to_text(),
         document.path().display(),
         json.display()
     ))
 }
 
-impl BenchArguments {
-    fn sizes(&self) -> Vec<Size> {
-        match (self.sizes.is_empty(), self.quick) {
-            (false, _) => self.sizes.clone(),
-            (true, true) => QUICK.map(Size).to_vec(),
-            (true, false) => USUAL.map(Size).to_vec(),
+/// Measures all cases on all computers. What a graphics processor cannot do is told and left out.
+fn measure(
+    cases: &[Case<'_>],
+    computers: &[Box<dyn Computer>],
+    seconds: f64,
+    results: &mut Results,
+) -> Result<()> {
+    let length = (cases.len() + 1) * computers.len();
+    let bar = progress::bar(length as u64, "measuring", "{pos} of {len} cases, {msg}");
+    bar.set_message("memory");
+    for computer in computers {
+        results.bandwidths.push(Bandwidth::measure(&**computer)?);
+        bar.inc(1);
+    }
+    for Case { subject, entry, question } in cases {
+        let what = format!("{} on {} tetrahedra", entry.name, subject.tet_count());
+        bar.set_message(what.clone());
+        let bench = Bench::new(entry, &*subject.mesh()?).with_context(|| what.clone())?;
+        for (computer, bandwidth) in computers.iter().zip(results.bandwidths.clone()) {
+            match bench.measure(subject.name(), &**computer, bandwidth, seconds) {
+                Ok(measurement) => {
+                    results.answers.extend(question.map(|q| q.answer(&measurement)));
+                    results.cases.push(measurement);
+                }
+                Err(error) if computer.kind() == "GPU" => results.skipped.push(Skipped {
+                    mesh: subject.name().to_owned(),
+                    tets: subject.tet_count(),
+                    solver: entry.name,
+                    reason: format!("{error:#}"),
+                }),
+                Err(error) => return Err(error.context(what)),
+            }
+            bar.inc(1);
         }
+    }
+    bar.finish_and_clear();
+    Ok(())
+}
+
+impl BenchArguments {
+    /// None unless asked for.
+    fn gpu(&self) -> Result<Option<Gpu>> {
+        match self.device.as_deref() {
+            None | Some("cpu") => Ok(None),
+            Some("gpu") => Gpu::open(None).map(Some),
+            Some(name) => Gpu::open(Some(name)).map(Some),
+        }
+    }
+
+    fn cases<'a>(
+        &self,
+        own: Option<&'a (String, TetMesh)>,
+        is_software: bool,
+    ) -> Result<Vec<Case<'a>>> {
+        let most = if is_software { MOST_ON_SOFTWARE } else { usize::MAX };
+        if self.questions {
+            return self.question_cases(most);
+        }
+        let subjects: Vec<Subject<'a>> = match own {
+            Some((name, mesh)) => vec![Subject::Mesh(name, mesh)],
+            None => self.sizes(most).into_iter().map(Subject::Bar).collect(),
+        };
+        let solvers = self.solvers();
+        let of_subject = |&subject: &Subject<'a>| {
+            let case = move |entry: &&SolverEntry| Case {
+                subject,
+                entry: (*entry).clone(),
+                question: None,
+            };
+            solvers.iter().map(case).collect::<Vec<_>>()
+        };
+        Ok(subjects.iter().flat_map(of_subject).collect())
+    }
+
+    /// Each question on its own mesh, or on each of those asked for.
+    fn question_cases<'a>(&self, most: usize) -> Result<Vec<Case<'a>>> {
+        let mut cases = Vec::new();
+        for question in &QUESTIONS {
+            let mut sizes = self.sizes.clone();
+            if sizes.is_empty() {
+                sizes.push(Size(question.tets.min(most)));
+            }
+            for size in sizes {
+                let subject = Subject::Bar(size);
+                cases.push(Case { subject, entry: question.entry()?, question: Some(question) });
+            }
+        }
+        Ok(cases)
+    }
+
+    fn sizes(&self, most: usize) -> Vec<Size> {
+        let usual = match (self.sizes.is_empty(), self.quick) {
+            (false, _) => return self.sizes.clone(),
+            (true, true) => QUICK.to_vec(),
+            (true, false) => USUAL.to_vec(),
+        };
+        usual.into_iter().filter(|&size| size <= most).map(Size).collect()
     }
 
     /// In the order of the table.
@@ -173,20 +296,16 @@ impl BenchArguments {
 }
 
 /// Refuses before the work what does not fit: the largest case, or the arrays of the bandwidth.
-fn check_memory(
-    subjects: &[Subject<'_>],
-    solvers: &[&SolverEntry],
-    allowed: Option<Memory>,
-) -> Result<()> {
+fn check_memory(cases: &[Case<'_>], has_gpu: bool, allowed: Option<Memory>) -> Result<()> {
     let copy = "the copy that measures the bandwidth";
     memory::check(copy, Memory(2 * bandwidth::COPIED as u64), allowed, "close other programs")?;
-    for subject in subjects {
+    for Case { subject, entry, .. } in cases {
         let tets = subject.tet_count();
-        for entry in solvers {
-            let what = format!("`{}` on {tets} tetrahedra", entry.name);
-            let needed = memory::of_bench(tets, &entry.settings());
-            memory::check(&what, needed, allowed, "choose smaller --sizes or another mesh")?;
-        }
+        let what = format!("`{}` on {tets} tetrahedra", entry.name);
+        let Memory(needed) = memory::of_bench(tets, &entry.settings());
+        // What a device holds goes through the host's memory, and stays there where it is software.
+        let needed = Memory(if has_gpu { 2 * needed } else { needed });
+        memory::check(&what, needed, allowed, "choose smaller --sizes or another mesh")?;
     }
     Ok(())
 }

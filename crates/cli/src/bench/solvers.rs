@@ -4,6 +4,7 @@ use viscera::material::{Material, MaterialError, MaterialModel};
 use viscera::settings::{Acceleration, Colors, Method, SolverSettings};
 
 /// One of them.
+#[derive(Clone)]
 pub struct SolverEntry {
     /// As `--solvers` and the results call it.
     pub name: &'static str,
@@ -29,13 +30,28 @@ const GREEN: MaterialModel = MaterialModel::SaintVenantKirchhoff;
 const NEO: MaterialModel = MaterialModel::StableNeoHookean;
 
 /// All of them, in the order of the results.
-pub const SOLVERS: [SolverEntry; 10] = [
+pub const SOLVERS: [SolverEntry; 12] = [
     entry("green", "XPBD as published, Saint Venant-Kirchhoff", GREEN, FEW, publish),
     entry("pair", "XPBD as published, stable neo-Hookean pair", NEO, FEW, publish),
     entry("green-exact", "the default, Saint Venant-Kirchhoff", GREEN, FEW, |_| {}),
     entry("exact", "the default, stable neo-Hookean", NEO, FEW, |_| {}),
     entry("cliques", "the default with 4 colours", NEO, FEW, |s| s.colors = Colors::Limited(4)),
     entry("jacobi", "the default with 1 colour", NEO, FEW, |s| s.colors = Colors::Limited(1)),
+    entry("jacobi-green", "`green` with 1 colour", GREEN, FEW, |s| {
+        publish(s);
+        s.colors = Colors::Limited(1);
+    }),
+    entry(
+        "jacobi-anderson",
+        "`green` with 1 colour and Anderson acceleration",
+        GREEN,
+        LATER,
+        |s| {
+            publish(s);
+            s.colors = Colors::Limited(1);
+            s.acceleration = Acceleration::Anderson;
+        },
+    ),
     entry("chebyshev", "the default with Chebyshev acceleration", NEO, LATER, |s| {
         s.acceleration = Acceleration::Chebyshev;
     }),

@@ -41,6 +41,7 @@ impl std::str::FromStr for Size {
 }
 
 /// What a case is computed on.
+#[derive(Clone, Copy)]
 pub enum Subject<'a> {
     /// A bar of about so many tetrahedra.
     Bar(Size),

@@ -1,0 +1,218 @@
+//! What computes: the processor with so many threads, or a graphics processor.
+
+use super::bandwidth;
+use super::measurement::{Bench, DT};
+use anyhow::{Result, ensure};
+use serde::Serialize;
+use std::time::Instant;
+use viscera::settings::{SolverSettings, Threads};
+use viscera::solver::Solver;
+use viscera::state::State;
+
+/// One that solvers are measured on.
+pub trait Computer {
+    /// "CPU" or "GPU".
+    fn kind(&self) -> &'static str;
+
+    /// Threads, where it has them.
+    fn threads(&self) -> Option<u32>;
+
+    /// Bytes read and bytes written per second by a copy.
+    fn copy_bandwidth(&self) -> Result<f64>;
+
+    /// A solver on it, with so many sweeps or small steps per step.
+    fn stepper<'a>(&self, bench: &'a Bench<'_>, sweeps: u32) -> Result<Box<dyn Stepper + 'a>>;
+}
+
+/// What steps took, all together.
+#[derive(Clone, Copy, Debug)]
+pub struct Taken {
+    /// By the host's clock, waiting included [s].
+    pub wall: f64,
+    /// By the device's own clock [s].
+    pub device: Option<f64>,
+}
+
+/// A solver at work.
+pub trait Stepper {
+    /// Goes back to rest, then so many steps.
+    fn run(&mut self, count: u32) -> Result<Taken>;
+
+    /// Whether all that moves is still a number.
+    fn is_finite(&self) -> Result<bool>;
+
+    /// What is known of it.
+    fn facts(&self) -> Facts;
+
+    /// Stages of a step, one by one; none where nobody can tell.
+    fn stages(&mut self) -> Result<Vec<StageLine>>;
+}
+
+/// What is known of a solver.
+#[derive(Clone, Debug)]
+pub struct Facts {
+    pub threads: Option<usize>,
+    pub instructions: Option<String>,
+    /// Of a step.
+    pub dispatches: Option<usize>,
+    /// Of model, state and solver, where the work is done.
+    pub bytes: u64,
+    /// Steps are timed together until they take this long [s].
+    pub least: f64,
+    /// The most steps that are.
+    pub most_steps: u32,
+}
+
+/// What one stage of a step took.
+#[derive(Clone, Debug, Serialize)]
+pub struct StageLine {
+    /// "prologue", "iteration" (the first), "later iterations" (all others, as one stage) or "epilogue".
+    pub part: &'static str,
+    pub stage: String,
+    pub dispatches: usize,
+    pub seconds: f64,
+}
+
+/// The processor.
+pub struct Processor {
+    pub threads: u32,
+}
+
+impl Computer for Processor {
+    fn kind(&self) -> &'static str {
+        "CPU"
+    }
+
+    fn threads(&self) -> Option<u32> {
+        Some(self.threads)
+    }
+
+    fn copy_bandwidth(&self) -> Result<f64> {
+        Ok(bandwidth::of_memory(self.threads))
+    }
+
+    fn stepper<'a>(&self, bench: &'a Bench<'_>, sweeps: u32) -> Result<Box<dyn Stepper + 'a>> {
+        Ok(Box::new(CpuStepper::new(bench, self.threads, sweeps)))
+    }
+}
+
+/// A solver on the processor.
+pub struct CpuStepper<'a> {
+    bench: &'a Bench<'a>,
+    solver: Solver<f32>,
+    state: State<f32>,
+    /// [s].
+    dt: f64,
+}
+
+impl<'a> CpuStepper<'a> {
+    pub fn new(bench: &'a Bench<'_>, threads: u32, sweeps: u32) -> Self {
+        let settings = SolverSettings {
+            iterations: sweeps,
+            threads: Threads::Count(threads),
+            ..bench.entry.settings()
+        };
+        let solver = Solver::new(&bench.model, &settings);
+        let dt = step_size(bench, sweeps, solver.stable_step());
+        Self { bench, solver, state: State::at_rest(&bench.model), dt }
+    }
+}
+
+/// A step [s] with so many sweeps or small steps.
+pub fn step_size(bench: &Bench<'_>, sweeps: u32, stable_step: f64) -> f64 {
+    // A hair below, so that rounding makes no further small step.
+    if bench.is_explicit() { 0.999 * f64::from(sweeps) * stable_step } else { DT }
+}
+
+impl Stepper for CpuStepper<'_> {
+    fn run(&mut self, count: u32) -> Result<Taken> {
+        self.state.clone_from(&State::at_rest(&self.bench.model));
+        let start = Instant::now();
+        for _ in 0..count {
+            let (model, inputs) = (&self.bench.model, &self.bench.inputs);
+            self.solver.step(model, &mut self.state, inputs, self.dt)?;
+        }
+        Ok(Taken { wall: start.elapsed().as_secs_f64(), device: None })
+    }
+
+    fn is_finite(&self) -> Result<bool> {
+        Ok(self.state.is_finite())
+    }
+
+    fn facts(&self) -> Facts {
+        let bytes = self.bench.model.bytes() + self.state.bytes() + self.solver.bytes();
+        Facts {
+            threads: Some(self.solver.thread_count()),
+            instructions: Some(format!("{:?}", self.solver.instructions()).to_lowercase()),
+            dispatches: None,
+            bytes: bytes as u64,
+            // A clock's own cost and coarseness are then a thousandth of it.
+            least: 1e-4,
+            most_steps: 1 << 16,
+        }
+    }
+
+    fn stages(&mut self) -> Result<Vec<StageLine>> {
+        Ok(Vec::new())
+    }
+}
+
+/// A solver at work, and how long its steps took.
+pub struct Runner<'a> {
+    pub stepper: Box<dyn Stepper + 'a>,
+    pub facts: Facts,
+    /// Steps that are timed together.
+    batch: u32,
+    /// Of one step.
+    times: Vec<Taken>,
+}
+
+impl<'a> Runner<'a> {
+    pub fn new(stepper: Box<dyn Stepper + 'a>) -> Self {
+        Self { facts: stepper.facts(), stepper, batch: 1, times: Vec::new() }
+    }
+
+    /// Meets memory and kernels for the first time, and finds how many steps are worth a look at the clock.
+    pub fn warm_up(&mut self) -> Result<()> {
+        self.stepper.run(1)?;
+        // A step of a large mesh takes seconds; no more of them than it takes.
+        while self.stepper.run(self.batch)?.wall < self.facts.least
+            && self.batch < self.facts.most_steps
+        {
+            self.batch *= 2;
+        }
+        // Every batch starts from rest and goes the same way.
+        ensure!(
+            self.stepper.is_finite()?,
+            "the solver diverged, so that its time means nothing; leave it out with --solvers"
+        );
+        Ok(())
+    }
+
+    pub fn time(&mut self) -> Result<()> {
+        let Taken { wall, device } = self.stepper.run(self.batch)?;
+        let steps = f64::from(self.batch);
+        self.times.push(Taken { wall: wall / steps, device: device.map(|s| s / steps) });
+        Ok(())
+    }
+
+    pub fn repetitions(&self) -> usize {
+        self.times.len()
+    }
+
+    /// The fastest step by the host's clock [s].
+    pub fn fastest(&self) -> f64 {
+        self.times.iter().map(|taken| taken.wall).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The fastest step by the device's clock [s].
+    pub fn fastest_on_device(&self) -> Option<f64> {
+        self.times.iter().filter_map(|taken| taken.device).min_by(f64::total_cmp)
+    }
+
+    pub fn median(&self) -> f64 {
+        let mut times: Vec<f64> = self.times.iter().map(|taken| taken.wall).collect();
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
+    }
+}
