@@ -53,6 +53,8 @@ struct Line {
     baseline: bool,
     /// Tetrahedra times sweeps [1/s].
     tet_sweeps_per_second: Option<f64>,
+    /// About how many tetrahedra fit, solved as here [tetrahedra].
+    largest_mesh: Option<u64>,
     /// Why it cannot be used.
     problem: Option<String>,
 }
@@ -169,6 +171,7 @@ fn of_cpu(task: &Task) -> Result<Line> {
         limits: None,
         baseline: true,
         tet_sweeps_per_second: Some(speed),
+        largest_mesh: None,
         problem: None,
     })
 }
@@ -176,14 +179,17 @@ fn of_cpu(task: &Task) -> Result<Line> {
 #[cfg(feature = "gpu")]
 fn of_adapter(task: &Task, adapter: &Adapter) -> Line {
     let (info, limits) = (adapter.info(), adapter.limits());
-    let measure = || -> Result<f64> {
-        let mut solver = GpuSolver::new(&adapter.open()?, &task.model, &task.settings)?;
-        task.speed(|count| {
+    let measure = || -> Result<(f64, u64)> {
+        let device = adapter.open()?;
+        let mut solver = GpuSolver::new(&device, &task.model, &task.settings)?;
+        let largest = solver.largest_mesh(&task.model, &device.limits());
+        let speed = task.speed(|count| {
             for _ in 0..count {
                 solver.step(&task.model, &task.inputs, DT)?;
             }
             Ok(solver.wait()?)
-        })
+        })?;
+        Ok((speed, largest))
     };
     let measured = measure();
     Line {
@@ -197,7 +203,8 @@ fn of_adapter(task: &Task, adapter: &Adapter) -> Line {
             workgroup_bytes: limits.max_compute_workgroup_storage_size,
         }),
         baseline: adapter.shortfall().is_none(),
-        tet_sweeps_per_second: measured.as_ref().ok().copied(),
+        tet_sweeps_per_second: measured.as_ref().ok().map(|&(speed, _)| speed),
+        largest_mesh: measured.as_ref().ok().map(|&(_, largest)| largest),
         problem: measured.err().map(|error| error.to_string()),
         name: info.name,
     }
@@ -214,6 +221,7 @@ impl Listing {
             "buffer",
             "workgroup",
             "baseline",
+            "largest mesh",
             "speed",
         ]);
         for line in self.adapters.iter().chain([&self.cpu]) {
@@ -235,6 +243,7 @@ impl Listing {
                     (true, false) => "no",
                 }
                 .into(),
+                line.largest_mesh.map_or("-".into(), |t| format!("{:.1} M", 1e-6 * t as f64)),
                 line.tet_sweeps_per_second.map_or("-".into(), |s| format!("{:.1} M/s", 1e-6 * s)),
             ]);
         }
@@ -249,7 +258,8 @@ impl Listing {
         }
         let tets = task.model.tet_count();
         text.push_str(&format!(
-            "speed: million tetrahedra x sweeps per second, a bar of {tets} tetrahedra, one colour\n"
+            "speed: million tetrahedra x sweeps per second, a bar of {tets} tetrahedra, one colour; \
+             largest mesh: million tetrahedra that the limits take, solved in the same way\n"
         ));
         text
     }

@@ -142,6 +142,22 @@ pub(super) struct Buffers {
     pub length: u32,
 }
 
+/// Every array fits into a binding; the error names the one that would need to shrink most.
+fn check_sizes(
+    device: &Device,
+    tets: u64,
+    arrays: impl Iterator<Item = (&'static str, u64)>,
+) -> Result<(), GpuError> {
+    let limits = device.limits();
+    let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let Some((what, needed)) = arrays.max_by_key(|(_, size)| *size) else { return Ok(()) };
+    if needed <= limit {
+        return Ok(());
+    }
+    let largest = (tets as f64 * limit as f64 / needed as f64) as u64;
+    Err(GpuError::TooLarge { what, needed, limit, name: device.name().to_owned(), largest })
+}
+
 impl Buffers {
     pub fn new(
         device: &Device,
@@ -180,24 +196,11 @@ impl Buffers {
             (Control, "control record", super::layout::CONTROL_SIZE),
             (Ground, "vertices", table.ground_size),
         ];
-        let limits = device.limits();
-        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let tets = model.tet_count() as u64;
-        let fits = |what: &'static str, needed: u64| {
-            if needed <= limit {
-                return Ok(());
-            }
-            let largest = (tets as f64 * limit as f64 / needed as f64) as u64;
-            Err(GpuError::TooLarge { what, needed, limit, name: device.name().to_owned(), largest })
-        };
-        for (_, what, size) in sizes {
-            fits(what, size)?;
-        }
         let constants =
             [(Tets, "tetrahedra", super::layout::tets(model)), (Table, "tables", table.bytes)];
-        for (_, what, bytes) in &constants {
-            fits(what, bytes.len() as u64)?;
-        }
+        let of_constants = constants.iter().map(|(_, what, bytes)| (*what, bytes.len() as u64));
+        let arrays = sizes.iter().map(|&(_, what, size)| (what, size)).chain(of_constants);
+        check_sizes(device, model.tet_count() as u64, arrays)?;
 
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let make = |label: &str, size: u64, usage: BufferUsages| {
@@ -282,6 +285,13 @@ impl Buffers {
             (Place::CopiesOf(Slot::Points), Some(_)) => whole(self.buffer(Slot::Copies)),
             (Place::Whole(slot) | Place::CopiesOf(slot), _) => self.find(slot),
         }
+    }
+
+    /// Bytes of the largest binding.
+    pub fn largest(&self) -> u64 {
+        let copies = self.copies.iter().flatten();
+        let all = self.all.iter().map(|(_, buffer)| buffer).chain(copies);
+        all.map(wgpu::Buffer::size).max().unwrap_or(0)
     }
 
     /// Bytes of device memory.

@@ -275,6 +275,13 @@ impl GpuSolver {
         [0, 1, 2].map(|list| self.ready[list].len())
     }
 
+    /// About how many tetrahedra of meshes like this one, solved like this, a device with these limits
+    /// takes: as many as its largest array fits into a binding.
+    pub fn largest_mesh(&self, model: &Model<f32>, limits: &wgpu::Limits) -> u64 {
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        (model.tet_count() as f64 * limit as f64 / self.buffers.largest() as f64) as u64
+    }
+
     /// Bytes of device memory.
     pub fn bytes(&self) -> u64 {
         self.buffers.bytes() + self.jobs.size() + self.frames.bytes()
