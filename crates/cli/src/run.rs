@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
-use viscera::settings::Precision;
+use viscera::settings::{Method, Precision};
 use viscera::simulation::{Assembly, Simulation};
 use viscera_report::Memory;
 
@@ -128,9 +128,17 @@ fn simulate<S: Real>(
     let mut simulation = Simulation::<S>::new(scene, assembly)?;
     let summary = Summary::new(&simulation, overrides);
     let model = &summary.model;
+    let solver = &simulation.scene().solver;
+    let work = match solver.method {
+        Method::Xpbd => format!(" x {} iterations", solver.iterations),
+        Method::Explicit => {
+            let small = format!("{:.2e} s", simulation.solver().stable_step());
+            format!(", divided into small steps of at most {small}")
+        }
+    };
     files::print(&format!(
-        "{}: {} tetrahedra, {} vertices, {:.3} kg, colours: {}, frames: {} of {} substeps x {} \
-         iterations\ndevice: {}\n",
+        "{}: {} tetrahedra, {} vertices, {:.3} kg, colours: {}, frames: {} of {} substeps{}\n\
+         device: {}\n",
         summary.title,
         model.tets,
         model.vertices,
@@ -138,7 +146,7 @@ fn simulate<S: Real>(
         model.colors,
         frames,
         simulation.scene().solver.substeps,
-        simulation.scene().solver.iterations,
+        work,
         summary.device,
     ))?;
     let draws = simulation.scene().output.picture;

@@ -656,6 +656,18 @@ fn degenerate_shapes_give_finite_corrections() {
             assert!(load.impulse.is_finite() && load.mass_bound.is_finite());
         }
     }
+    // So small that squares of its entries are lost.
+    for size in [1e-8f32, 1e-12, 1e-20, 1e-38] {
+        let f = Mat3::from_columns(
+            vec3(size, 0.5 * size, 0.0),
+            vec3(0.5 * size, size, 0.0),
+            vec3(0.0, 0.0, size),
+        );
+        let svd = singular_values::signed_svd(&f);
+        let numbers = svd.u.columns.iter().chain(&svd.v.columns);
+        assert!(numbers.clone().all(|column| column.is_finite()), "{size:e}: {svd:?}");
+        assert!(svd.sigma.iter().all(|s| s.is_finite()), "{size:e}: {svd:?}");
+    }
     let (change, moves) = spring::solve(&[zero; 2], &[1.0; 2], 0.0f32, 0.0, 1.0);
     assert!(change.is_finite() && moves[0].is_finite());
 }

@@ -2,11 +2,11 @@
 //! run. A software driver does; without any the tests fail and say what to install.
 
 mod common;
+#[path = "common/device.rs"]
+mod device;
 
-use std::sync::OnceLock;
-
-use common::{SNH, STVK, block, material};
-use viscera::mesh::TetMesh;
+use common::{STVK, block, material};
+use device::{device, everything};
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{
@@ -18,36 +18,6 @@ use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
 const DT: f64 = 1.0 / 600.0;
-
-/// One device for all tests: kernels are compiled once.
-fn device() -> &'static Device {
-    static DEVICE: OnceLock<Device> = OnceLock::new();
-    DEVICE.get_or_init(|| {
-        let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
-        adapter.open().unwrap_or_else(|error| panic!("{error}"))
-    })
-}
-
-/// Two bars, one above the other, joined by springs; one of Saint Venant-Kirchhoff, the other viscous,
-/// neo-Hookean and in elastic attachments: everything a model can have.
-fn everything<S: Real>(settings: &SolverSettings) -> Model<S> {
-    let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
-    let mut builder = ModelBuilder::new();
-    let viscous = material(SNH, 1e4, 0.4).with_viscosity(0.05).expect("legal");
-    builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
-    let up = |x: &Vec3<f64>| *x + vec3(0.0, 0.0, 0.05);
-    let vertices: Vec<_> = mesh.vertices().iter().map(up).collect();
-    let regions = mesh.regions().to_vec();
-    let (above, _) = TetMesh::new(vertices, mesh.tets().to_vec(), regions).expect("a mesh");
-    builder.add_body(&above, &viscous).expect("a body");
-    let half = mesh.vertices().len() as u32;
-    for v in (0..half).step_by(3) {
-        builder.add_spring([v, half + v], 40.0, Some(0.04)).expect("a spring");
-        let anchor = above.vertices()[v as usize];
-        builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
-    }
-    builder.build(settings).expect("a model")
-}
 
 /// A wall that moves, a force that comes and goes, anchors that drift.
 fn inputs_at<S: Real>(model: &Model<f64>, step: u32) -> Inputs<S> {
@@ -283,4 +253,49 @@ fn a_model_over_the_limits_is_refused() {
     let error = GpuSolver::new(&small, &everything(&settings), &settings).expect_err("too large");
     let text = error.to_string();
     assert!(text.contains("binds at most 8192") && text.contains("or fewer"), "{text}");
+}
+
+/// A step begun by the CPU and ended by the device, for every stage that it may change hands at.
+#[test]
+fn a_step_changes_hands_at_any_stage() {
+    let guarded = SolverSettings { iterations: 3, ..SolverSettings::default() };
+    let plain = SolverSettings { step_guard: false, ..guarded.clone() };
+    let anderson = SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() };
+    let mut hands = 0;
+    for (colors, settings) in [
+        (Colors::Limited(1), &anderson),
+        (Colors::Limited(4), &plain),
+        (Colors::Unlimited, &guarded),
+    ] {
+        let settings = SolverSettings { colors, ..settings.clone() };
+        let (model, double) = (everything(&settings), everything(&settings));
+        let mut cpu = Solver::<f32>::new(&model, &settings);
+        let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
+        // Something is under way when the step begins.
+        let mut start = State::at_rest(&model);
+        for step in 0..5 {
+            cpu.step(&model, &mut start, &inputs_at(&double, step), DT).expect("a legal step");
+        }
+        let inputs = inputs_at(&double, 5);
+        let mut whole = start.clone();
+        cpu.step(&model, &mut whole, &inputs, DT).expect("a legal step");
+        let moved = whole.positions.iter().zip(&start.positions);
+        let moved = moved.map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
+        let mut stages = [&gpu.plan().prologue[..], &gpu.plan().body[..]].concat();
+        stages.dedup_by_key(|stage| std::mem::discriminant(stage));
+        for stage in stages {
+            let mut state = start.clone();
+            let done = gpu.step_from(stage, &mut cpu, &model, &mut state, &inputs, DT);
+            let done = done.expect("a legal step");
+            gpu.read(&model, &mut state).expect("a device");
+            let apart = state.positions.iter().zip(&whole.positions);
+            let apart = apart.map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
+            println!("{colors:?}, {done} stages by the CPU, then {stage:?}: {apart:e} m apart");
+            // Round-off of places a tenth of a metre from the origin, and of a few sweeps.
+            let limit = 16.0 * 0.1 * f32::EPSILON;
+            assert!(apart < limit && moved > 1e-4, "{stage:?}: {apart:e} m apart of {moved:e} m");
+            hands += 1;
+        }
+    }
+    assert!(hands > 20, "{hands}");
 }

@@ -69,12 +69,12 @@ fn run<S: Real>(settings: &SolverSettings) -> State<S> {
 /// Both round, and neither is right: the device may be twice as far from double precision.
 #[test]
 fn device_is_as_close_to_double_precision_as_the_processor() {
-    let device = device::open();
+    let device = device::device();
     for colors in [Colors::Unlimited, Colors::Limited(1)] {
         let settings = explicit(colors);
         let double = SolverSettings { precision: Precision::F64, ..settings.clone() };
         let (cpu, oracle) = (run::<f32>(&settings), run::<f64>(&double));
-        let gpu = run_on(&device, &settings);
+        let gpu = run_on(device, &settings);
         for (what, cpu, gpu, oracle) in [
             ("positions", &cpu.positions, &gpu.positions, &oracle.positions),
             ("velocities", &cpu.velocities, &gpu.velocities, &oracle.velocities),
@@ -89,15 +89,15 @@ fn device_is_as_close_to_double_precision_as_the_processor() {
 
 #[test]
 fn two_runs_have_the_same_bits() {
-    let (device, settings) = (device::open(), explicit(Colors::Unlimited));
-    assert_eq!(run_on(&device, &settings), run_on(&device, &settings));
+    let (device, settings) = (device::device(), explicit(Colors::Unlimited));
+    assert_eq!(run_on(device, &settings), run_on(device, &settings));
 }
 
 #[test]
 fn a_small_step_is_two_dispatches() {
     let settings = explicit(Colors::Unlimited);
     let model = everything(&settings);
-    let gpu = GpuSolver::new(&device::open(), &model, &settings).expect("a model that fits");
+    let gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");
     assert_eq!(gpu.dispatches()[1], 2);
     let cpu = Solver::new(&model, &settings);
     assert_eq!(gpu.stable_step(), cpu.stable_step());
@@ -111,7 +111,7 @@ fn too_many_small_steps_are_refused() {
     let settings = explicit(Colors::Unlimited);
     let mesh = block([3e-5, 1e-5, 1e-5], [3, 1, 1], 0.0);
     let model = single_body::<f32>(&mesh, &material(SNH, 1e9, 0.4), &settings);
-    let mut gpu = GpuSolver::new(&device::open(), &model, &settings).expect("a model that fits");
+    let mut gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");
     let mut before = State::at_rest(&model);
     before.velocities.fill(vec3(1.0, 2.0, 3.0));
     gpu.write(&model, &before).expect("a state of this model");

@@ -2,26 +2,24 @@
 //! CPU.
 
 mod common;
+#[path = "common/device.rs"]
+mod device;
 
 use std::collections::HashSet;
 
 use common::{Random, SNH, STVK, block, material, single_body};
+use device::device;
 use viscera::measure::measure_tets;
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{Acceleration, AndersonGuard, Colors, Precision, SolverSettings};
-use viscera::solver::gpu::{Adapter, Device, GpuSolver};
+use viscera::solver::gpu::{Device, GpuSolver};
 use viscera::solver::{Inputs, Pin, Solver, StepReport};
 use viscera::state::State;
 
 const DT: f64 = 1.0 / 600.0;
 const GRAVITY: Vec3<f64> = vec3(0.0, 0.0, -9.81);
-
-fn device() -> Device {
-    let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
-    adapter.open().unwrap_or_else(|error| panic!("{error}"))
-}
 
 fn single(inputs: &Inputs<f64>) -> Inputs<f32> {
     let pins = inputs.pins.iter();
@@ -157,7 +155,7 @@ fn quiet_motion_agrees_with_the_cpu() {
     ] {
         let (model32, places) = many_parts::<f32>(&settings);
         let (model64, _) = many_parts::<f64>(&settings);
-        let mut trio = Trio::new(&device, (&model32, &model64), &settings);
+        let mut trio = Trio::new(device, (&model32, &model64), &settings);
         let mut slowed = [0, 0];
         for step in 0..30 {
             trio.step(&walls(&places, step));
@@ -206,7 +204,7 @@ fn violent_grabs_are_taken_back() {
         let tissue = material(law, 1e4, 0.45);
         let model32 = single_body::<f32>(&mesh, &tissue, &settings);
         let model64 = single_body::<f64>(&mesh, &tissue, &settings);
-        let mut trio = Trio::new(&device, (&model32, &model64), &settings);
+        let mut trio = Trio::new(device, (&model32, &model64), &settings);
         let mut random = Random(seed);
         let mut inputs = Inputs { gravity: GRAVITY, ..Inputs::default() };
         for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
@@ -248,8 +246,7 @@ fn violent_grabs_are_taken_back() {
 fn mechanical_energy(model: &Model<f32>, state: &State<f32>, inputs: &Inputs<f32>) -> f64 {
     let mut tets = Vec::new();
     measure_tets(model, &state.positions, &mut tets);
-    let elastic: f64 =
-        tets.iter().map(|tet| f64::from(tet.rest_volume) * f64::from(tet.energy_density)).sum();
+    let elastic: f64 = tets.iter().map(|tet| tet.rest_volume * tet.energy_density).sum();
     let pinned: HashSet<u32> = inputs.pins.iter().map(|pin| pin.vertex).collect();
     let free = (0..model.vertex_count()).filter(|v| !pinned.contains(&(*v as u32)));
     free.fold(elastic, |sum, v| {
@@ -273,7 +270,7 @@ fn no_step_gains_mechanical_energy() {
     for (grown, step_guard) in grown.iter_mut().zip([true, false]) {
         let settings = SolverSettings { step_guard, ..SolverSettings::default() };
         let model = single_body::<f32>(&mesh, &material(SNH, 4e5, 0.45), &settings);
-        let mut gpu = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
+        let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
         let mut state = State::at_rest(&model);
         let mut before = mechanical_energy(&model, &state, &inputs);
         for _ in 0..150 {
@@ -300,7 +297,7 @@ fn two_runs_have_the_same_bits() {
     let settings = SolverSettings::default();
     let (model, places) = many_parts::<f32>(&settings);
     let run = || {
-        let mut gpu = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
+        let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
         for step in 0..8 {
             let mut inputs = single(&walls(&places, step));
             inputs.pins[0].target = vec3(0.1, 0.1, 0.0);

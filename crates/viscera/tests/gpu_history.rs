@@ -90,7 +90,7 @@ fn compare(model: &Model<f32>, cpu: &State<f32>, gpu: &State<f32>, oracle: &Stat
 
 #[test]
 fn multipliers_that_are_no_numbers_start_a_new_history() {
-    let device = device::open();
+    let device = device::device();
     for (neo_hookean, colors) in [
         (NeoHookean::Stretch, Colors::Unlimited),
         (NeoHookean::Pair, Colors::Unlimited),
@@ -103,7 +103,7 @@ fn multipliers_that_are_no_numbers_start_a_new_history() {
         for (broken, place) in [(f32::NAN, 0), (f32::INFINITY, last), (f32::NEG_INFINITY, last / 2)]
         {
             state.multipliers[place] = broken;
-            let mut gpu = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
+            let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
             gpu.write(&model, &state).expect("a state of this model");
             let (mut cpu, mut oracle) = (state.clone(), in_double(&state));
             let mut solver = Solver::new(&model, &settings);
@@ -124,10 +124,10 @@ fn multipliers_that_are_no_numbers_start_a_new_history() {
 /// every step.
 #[test]
 fn fillings_are_repaired_and_numbers_are_left_alone() {
-    let device = device::open();
+    let device = device::device();
     let settings = without_sweeps(NeoHookean::Stretch);
     let model = everything(&settings);
-    let mut gpu = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
+    let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
     let mut state = scrambled(&model);
     state.multipliers[5] = f32::MAX;
     gpu.write(&model, &state).expect("a state of this model");
@@ -153,14 +153,14 @@ fn fillings_are_repaired_and_numbers_are_left_alone() {
 
 #[test]
 fn a_restart_takes_the_multipliers_from_the_positions() {
-    let device = device::open();
+    let device = device::device();
     for neo_hookean in [NeoHookean::Stretch, NeoHookean::Pair] {
         let settings =
             SolverSettings { step_guard: false, neo_hookean, ..SolverSettings::default() };
         let (model, model64) = (everything(&settings), everything(&settings));
         let state = scrambled(&model);
         let (mut cpu, mut oracle) = (state.clone(), in_double(&state));
-        let mut gpu = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
+        let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
         gpu.write(&model, &state).expect("a state of this model");
         let (half, mut read) = (0.5 * DT, State::at_rest(&model));
         let (inputs, inputs64) = (inputs(&model), inputs(&model64));
@@ -201,13 +201,13 @@ fn compare_restart(model: &Model<f32>, cpu: &State<f32>, gpu: &State<f32>, oracl
 
 #[test]
 fn two_repairs_have_the_same_bits() {
-    let device = device::open();
+    let device = device::device();
     let settings = without_sweeps(NeoHookean::Stretch);
     let model = everything(&settings);
     let mut state = scrambled(&model);
     state.multipliers[3] = f32::NAN;
     let [a, b] = [0, 1].map(|_| {
-        let mut gpu = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
+        let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
         gpu.write(&model, &state).expect("a state of this model");
         gpu.step(&model, &inputs(&model), DT).expect("a legal step");
         let mut read = State::at_rest(&model);
@@ -215,4 +215,40 @@ fn two_repairs_have_the_same_bits() {
         read
     });
     assert_eq!(a, b);
+}
+
+/// A history of no numbers goes through all sweeps into all positions: the guard takes the step back, the
+/// repair starts a new history, and the body comes to the rest that it comes to anyway.
+#[test]
+fn a_body_survives_a_broken_history() {
+    let settings = SolverSettings { iterations: 5, ..SolverSettings::default() };
+    let model = everything::<f32>(&settings);
+    let inputs = inputs(&model);
+    let mut gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");
+    let rest = State::at_rest(&model);
+    let ends = [false, true].map(|is_broken| {
+        let mut state = rest.clone();
+        if is_broken {
+            state.multipliers.fill(f32::NAN);
+            state.multiplier_dt = DT;
+        }
+        gpu.write(&model, &state).expect("a state that fits");
+        for _ in 0..60 {
+            for _ in 0..10 {
+                gpu.step(&model, &inputs, DT).expect("a legal step");
+            }
+            gpu.read(&model, &mut state).expect("a device");
+            assert!(state.is_finite(), "broken from the start: {is_broken}");
+            state.velocities.iter_mut().for_each(|v| *v = *v * 0.5);
+            gpu.write(&model, &state).expect("a state that fits");
+        }
+        state.positions
+    });
+    let pairs = ends[0].iter().zip(&ends[1]);
+    let apart = pairs.map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
+    let moved = ends[0].iter().zip(&rest.positions);
+    let moved = moved.map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
+    println!("{apart:e} m apart after {moved:e} m");
+    assert!(moved > 1e-3 && apart < 1e-3 * moved, "{apart:e} m apart after {moved:e} m");
+    assert!(gpu.rejected_steps().expect("a device") > 0);
 }

@@ -93,9 +93,9 @@ fn fall(device: &Device, model: &Model<f32>) -> GpuSolver {
 
 #[test]
 fn surface_is_where_the_embedding_puts_it() {
-    let (device, bodies) = (device::open(), bodies());
+    let (device, bodies) = (device::device(), bodies());
     let model = bodies.model::<f32>();
-    let solver = fall(&device, &model);
+    let solver = fall(device, &model);
     let surface = GpuSurface::new(&solver, &model, &bodies.skins(&model)).expect("it fits");
     surface.update();
     let [places, normals] = surface.read().expect("a device");
@@ -120,7 +120,7 @@ fn surface_is_where_the_embedding_puts_it() {
         assert!(gpu <= 2.0 * cpu && gpu > 0.0, "{what}: CPU {cpu:e}, GPU {gpu:e}");
     }
     // Follows the next steps as well, with the same bits from run to run.
-    let again = fall(&device, &model);
+    let again = fall(device, &model);
     let other = GpuSurface::new(&again, &model, &bodies.skins(&model)).expect("it fits");
     other.update();
     assert_eq!(other.read().expect("a device"), [places, normals]);
@@ -128,9 +128,9 @@ fn surface_is_where_the_embedding_puts_it() {
 
 #[test]
 fn surfaces_of_other_meshes_are_refused_and_bad_triangles_passed_over() {
-    let (device, bodies) = (device::open(), bodies());
+    let (device, bodies) = (device::device(), bodies());
     let model = bodies.model::<f32>();
-    let solver = GpuSolver::new(&device, &model, &settings()).expect("a model that fits");
+    let solver = GpuSolver::new(device, &model, &settings()).expect("a model that fits");
     let [bar, ball] = bodies.skins(&model);
     let misplaced = Skin { first_vertex: ball.first_vertex + 1, ..ball };
     let error = GpuSurface::new(&solver, &model, &[bar, misplaced]).expect_err("another mesh");

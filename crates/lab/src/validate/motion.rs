@@ -144,7 +144,9 @@ fn run(context: &mut Context) -> Result<()> {
         if let Some(errors) = answers.last().filter(|_| schedule.form == Form::Colored) {
             let points = errors.iter().enumerate().skip(1);
             let points = points.map(|(frame, &e)| [(frame + 1) as f64 / FRAME_RATE, e]);
-            plot.series(Series::new(schedule.to_string(), points).with_style(Style::Line));
+            // There are more series than colours.
+            let style = if schedule.published { Style::Dashed } else { Style::Line };
+            plot.series(Series::new(schedule.to_string(), points).with_style(style));
         }
     }
     context.document.table(&table);

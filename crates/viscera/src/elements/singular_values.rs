@@ -30,8 +30,9 @@ const MOST_SWEEPS: usize = 6;
 /// the price of denormal numbers, which are slow.
 const NEGLIGIBLE: f64 = 0.01;
 
-/// Keeps a zero matrix from dividing by zero.
-const SMALLEST: f64 = 1e-30;
+/// Keeps a zero matrix from dividing by zero: its square must not be lost in the number format, in
+/// single precision not even where denormals are.
+const SMALLEST: [f64; 2] = [1e-18, 1e-30];
 
 /// A singular value below this fraction of the largest has no usable direction.
 const DIRECTIONLESS: f64 = 1e-6;
@@ -83,7 +84,8 @@ pub fn signed_svd<S: Scalar>(f: &Mat3<S>) -> SignedSvd<S> {
 /// Below this an entry between two diagonal ones is zero.
 #[inline(always)]
 fn negligible<S: Scalar>(app: S, aqq: S) -> S {
-    (app + aqq) * S::from_f64(NEGLIGIBLE * S::EPSILON) + S::from_f64(SMALLEST)
+    let smallest = if S::EPSILON > 1e-10 { SMALLEST[0] } else { SMALLEST[1] };
+    (app + aqq) * S::from_f64(NEGLIGIBLE * S::EPSILON) + S::from_f64(smallest)
 }
 
 /// One Jacobi rotation that zeroes entry `(p, q)`, `p < q`, of the upper triangle.

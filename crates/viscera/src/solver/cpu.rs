@@ -82,12 +82,12 @@ pub(super) struct Workspace<S> {
     pub energies: Vec<Energy>,
     pub evaluator: Evaluator<S>,
     /// Points of the copies; empty where nothing is split.
-    copies: Vec<Point<S>>,
+    pub copies: Vec<Point<S>>,
     /// What constraints put on each copy: impulse [N s^2] and bound [kg]; empty where no stage needs
     /// it.
     pub loads: Vec<Point<S>>,
     /// Iterate before the sweep, and the one before that.
-    iterate: [Iterate<S>; 2],
+    pub iterate: [Iterate<S>; 2],
     /// Weights of the norm in which iterates are compared, three of each vertex (its mass, in
     /// Anderson's norm where positions count) and then of the multipliers (the diagonal of `a~`).
     norm_weights: Vec<S>,
@@ -110,9 +110,9 @@ pub(super) struct Workspace<S> {
 }
 
 #[derive(Clone, Debug, Default)]
-struct Iterate<S> {
-    positions: Vec<Point<S>>,
-    multipliers: Vec<S>,
+pub(super) struct Iterate<S> {
+    pub positions: Vec<Point<S>>,
+    pub multipliers: Vec<S>,
 }
 
 impl<S: Real> Workspace<S> {

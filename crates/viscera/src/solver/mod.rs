@@ -173,6 +173,18 @@ impl<S: Real> Solver<S> {
         inputs: &Inputs<S>,
         dt: f64,
     ) -> Result<(), StepError> {
+        self.step_first(usize::MAX, model, state, inputs, dt)
+    }
+
+    /// As [`Solver::step`], the first so many stages of it.
+    fn step_first(
+        &mut self,
+        count: usize,
+        model: &Model<S>,
+        state: &mut State<S>,
+        inputs: &Inputs<S>,
+        dt: f64,
+    ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         let Self { settings, plan, work } = self;
         let (repeat, small_steps) = match settings.method {
@@ -180,7 +192,7 @@ impl<S: Real> Solver<S> {
             Method::Explicit => [explicit::small_steps(dt, work.stable_step)?; 2].into(),
         };
         let step = cpu::Step { model, inputs, dt, settings, small_steps };
-        carry_out(Task::Step(plan, repeat), work, &step, state);
+        carry_out(Task::Step(plan, repeat, count), work, &step, state);
         Ok(())
     }
 

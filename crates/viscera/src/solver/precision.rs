@@ -11,8 +11,8 @@ use crate::state::State;
 /// What a solver is asked to do.
 #[derive(Clone, Copy)]
 pub(super) enum Task<'a> {
-    /// The stages of a step, the body of the plan so many times.
-    Step(&'a Plan, u32),
+    /// The stages of a step, the body of the plan so many times; of these stages the first so many.
+    Step(&'a Plan, u32, usize),
     /// Multipliers from positions.
     Restart,
 }
@@ -73,8 +73,8 @@ fn generic<S: Real>(
 ) {
     let entrance = work.ground.workers.entrance();
     entrance.enter(|| match task {
-        Task::Step(plan, repeat) => {
-            for stage in plan.stages(repeat) {
+        Task::Step(plan, repeat, count) => {
+            for stage in plan.stages(repeat).take(count) {
                 work.run(stage, step, state);
             }
         }

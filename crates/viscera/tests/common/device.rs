@@ -1,6 +1,8 @@
 //! A graphics device for whole scenes, and a model; a software driver will do.
 #![allow(dead_code)]
 
+use std::sync::OnceLock;
+
 use crate::common::{SNH, STVK, block, material};
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
@@ -8,10 +10,14 @@ use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::SolverSettings;
 use viscera::solver::gpu::{Adapter, Device};
 
-/// The first device there is; without any the test fails and says what to install.
-pub fn open() -> Device {
-    let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
-    adapter.open().unwrap_or_else(|error| panic!("{error}"))
+/// The first device there is, one for all tests of a program: kernels are compiled once. Without any the
+/// test fails and says what to install.
+pub fn device() -> &'static Device {
+    static DEVICE: OnceLock<Device> = OnceLock::new();
+    DEVICE.get_or_init(|| {
+        let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
+        adapter.open().unwrap_or_else(|error| panic!("{error}"))
+    })
 }
 
 /// Largest distance of vectors from the oracle's.

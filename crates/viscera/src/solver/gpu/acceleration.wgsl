@@ -6,21 +6,8 @@
 // which spans the same space as differences to the newest: then the products of old differences with
 // each other need not be summed again, and their small values do not suffer from single precision.
 
-// Sums of products: |R_k|^2, then R_k . dR_j, then dR_new . dR_j.
-const PRODUCTS: u32 = 21u;
-
-// Numbers side by side whose sums are added up at the end. Part of the result's bits.
-const THREADS: u32 = 128u;
-
 // In single precision the residuals themselves carry round-off of that size.
 const REGULARISATION: f32 = 1e-6;
-
-var<workgroup> shared_sums: array<f32, 2688>;
-
-// The last of a vertex's four numbers is no unknown.
-fn counts(i: u32) -> bool {
-    return i >= job.first || i % 4u != 3u;
-}
 
 @compute @workgroup_size(256)
 fn remember_iterate(
@@ -44,56 +31,6 @@ fn start_acceleration() {
     control.omega = 1.0;
     control.radius = job.parameter;
     control.last_change = 0.0;
-}
-
-// Enters G = g(q) and R = G - q into the history. `job.first`: where multipliers begin in a vector,
-// `job.count` its length, `job.set_first` the window, `job.mode` the number of workgroups.
-@compute @workgroup_size(128)
-fn anderson_push(
-    @builtin(local_invocation_index) local: u32,
-    @builtin(workgroup_id) workgroup: vec3u,
-) {
-    let length = job.count;
-    let window = job.set_first;
-    let next = control.next;
-    let has_difference = control.sweeps > 0u;
-    let differences = select(0u, min(control.differences + 1u, window), has_difference);
-    var sums: array<f32, 21>;
-    for (var i = workgroup.x * THREADS + local; i < length; i += job.mode * THREADS) {
-        if !counts(i) {
-            continue;
-        }
-        let g = unknowns[i];
-        let r = g - iterate[i];
-        let weight = weights[i];
-        sums[0] += weight * r * r;
-        if has_difference {
-            let difference = r - residuals[window * length + i];
-            residuals[next * length + i] = difference;
-            mapped[next * length + i] = g - mapped[window * length + i];
-            for (var j = 0u; j < differences; j++) {
-                var other = difference;
-                if j != next {
-                    other = residuals[j * length + i];
-                }
-                sums[1u + j] += weight * r * other;
-                sums[11u + j] += weight * difference * other;
-            }
-        }
-        residuals[window * length + i] = r;
-        mapped[window * length + i] = g;
-    }
-    for (var k = 0u; k < PRODUCTS; k++) {
-        shared_sums[k * THREADS + local] = sums[k];
-    }
-    workgroupBarrier();
-    if local < PRODUCTS {
-        var sum = 0.0;
-        for (var t = 0u; t < THREADS; t++) {
-            sum += shared_sums[local * THREADS + t];
-        }
-        partial_sums[PRODUCTS * workgroup.x + local] = sum;
-    }
 }
 
 // The small least-squares problem. `job.count`: how many sums of pieces there are, `job.mode`: whether a

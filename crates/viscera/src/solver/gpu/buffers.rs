@@ -152,7 +152,8 @@ impl Buffers {
     ) -> Result<Self, GpuError> {
         let vertices = model.vertex_count() as u64;
         let points_size = 16 * vertices;
-        let multipliers_start = points_size.next_multiple_of(ALIGNMENT);
+        // Behind the vertices there is room for one more.
+        let multipliers_start = (points_size + 16).next_multiple_of(ALIGNMENT);
         let unknowns = multipliers_start + 4 * (model.multiplier_count as u64).max(1);
         let xpbd = settings.method == Method::Xpbd;
         let accelerated = xpbd && settings.acceleration != Acceleration::None;

@@ -5,6 +5,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use super::buffers::{Buffers, Slot};
 use super::device::Device;
+use super::report::Verdict;
 use super::{GpuError, GpuSolver};
 use crate::model::Model;
 use crate::scalar::lanes::{Eight, Point};
@@ -120,14 +121,15 @@ impl GpuSolver {
     }
 
     /// Reads the whole state and, into a CPU solver of the same model, what its force balance of the
-    /// last step needs: with one wait. On an error nothing is changed.
+    /// last step needs and how many steps were taken back: with one wait. On an error nothing is changed.
     pub fn read_with_ground(
         &self,
         model: &Model<f32>,
         state: &mut State<f32>,
         solver: &mut Solver<f32>,
     ) -> Result<(), GpuError> {
-        let mut slots = vec![Slot::Unknowns, Slot::Velocities, Slot::Predicted, Slot::Acting];
+        let mut slots =
+            vec![Slot::Unknowns, Slot::Velocities, Slot::Predicted, Slot::Acting, Slot::Control];
         if model.tet_sets().iter().any(|set| set.viscous) {
             slots.push(Slot::StartStrain);
         }
@@ -140,7 +142,8 @@ impl GpuSolver {
                 *point = Point::new(vec3(x, y, z), 0.0);
                 ground.inverse_masses[v] = acting[v][3];
             }
-            let Some(strains) = read.get(4) else { return };
+            solver.work.guard.rejected = Verdict::of(read[4]).rejected.into();
+            let Some(strains) = read.get(5) else { return };
             let mut strains: &[Eight<f32>] = bytemuck::cast_slice(strains);
             for (set, own) in model.tet_sets().into_iter().zip(&mut ground.start_strain) {
                 // The device has room for all blocks, the CPU for those of viscous sets.

@@ -22,7 +22,7 @@ pub fn host_layouts() -> Vec<HostLayout> {
     vec![
         record!("Job" Job {
             first count set_first multiplier_offset viscous_offset is_viscous is_neo_hookean mode
-            parameter
+            parameter tet_count spring_count
         }),
         record!("Frame" FrameConstants {
             gravity dt squared_dt inverse_dt rescale relaxation_multipliers relaxation_positions
@@ -42,16 +42,19 @@ pub fn host_layouts() -> Vec<HostLayout> {
     ]
 }
 
-/// Constants that host and kernels share, and sizes [bytes] of records that only kernels write.
+/// Constants that host and kernels share.
 #[doc(hidden)]
-pub fn host_constants() -> ([(&'static str, u32); 4], [(&'static str, u64); 1]) {
+pub fn host_constants() -> [(&'static str, u32); 4] {
     use crate::scalar::lanes::LANES;
     use crate::solver::acceleration::LARGEST_WINDOW;
-    let constants = [
+    [
         ("LANES", LANES as u32),
         ("FILLING", layout::FILLING),
         ("LARGEST_WINDOW", LARGEST_WINDOW as u32),
         ("PRODUCTS", layout::PRODUCTS as u32),
-    ];
-    (constants, [("Control", layout::CONTROL_SIZE)])
+    ]
 }
+
+/// Bytes of `Control`, which only kernels write.
+#[doc(hidden)]
+pub const HOST_CONTROL_SIZE: u64 = layout::CONTROL_SIZE;

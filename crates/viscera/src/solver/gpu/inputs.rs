@@ -72,5 +72,12 @@ pub(super) fn norm_weights(
             AndersonOn::Both => {}
         }
     }
+    // No weight: where a vertex's copies begin, which Anderson joins. Single precision numbers them all
+    // within the limits of a binding.
+    let (positions, _) = weights.split_at_mut((buffers.multipliers_start / 4) as usize);
+    let copies = model.copy_offsets.iter();
+    for (four, &first) in positions.as_chunks_mut::<4>().0.iter_mut().zip(copies) {
+        four[3] = first as f32;
+    }
     weights
 }

@@ -31,6 +31,7 @@ pub enum File {
     Strain,
     Multipliers,
     Acceleration,
+    AndersonPush,
     History,
     Explicit,
     Evaluate,
@@ -106,8 +107,10 @@ kernels! {
     RESCALE_MULTIPLIERS = Multipliers "rescale_multipliers" 256 [Multipliers];
     REMEMBER_ITERATE = Acceleration "remember_iterate" 256 [Unknowns Iterate];
     START_ACCELERATION = Acceleration "start_acceleration" 1 [Control];
-    ANDERSON_PUSH = Acceleration "anderson_push" 128
+    ANDERSON_PUSH = AndersonPush "anderson_push" 128
         [Unknowns Iterate Weights Residuals Mapped PartialSums Control];
+    ANDERSON_JOIN = AndersonPush "anderson_push" 128
+        [Copies Unknowns Iterate Weights Residuals Mapped PartialSums Control];
     ANDERSON_WEIGHTS = Acceleration "anderson_weights" 128 [PartialSums Control];
     ANDERSON_MIX = Acceleration "anderson_mix" 256 [Unknowns Iterate Mapped Control];
     CHEBYSHEV_CHANGE = Acceleration "chebyshev_change" 128 [Unknowns Iterate Weights PartialSums];
@@ -182,7 +185,16 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
         }
         File::Strain => texts.push(include_str!("strain.wgsl")),
         File::Multipliers => texts.push(include_str!("multipliers.wgsl")),
-        File::Acceleration => texts.push(include_str!("acceleration.wgsl")),
+        File::Acceleration => {
+            texts.extend([include_str!("sums.wgsl"), include_str!("acceleration.wgsl")]);
+        }
+        File::AndersonPush => {
+            let mapped = match variant.swept {
+                Swept::Vertices => include_str!("mapped_vertices.wgsl"),
+                Swept::Copies | Swept::Jacobi => include_str!("mapped_copies.wgsl"),
+            };
+            texts.extend([include_str!("sums.wgsl"), mapped, include_str!("anderson_push.wgsl")]);
+        }
         File::History => {
             // Functions of the tissue need those of both laws; the pair brings its own along.
             if variant.form != TetForm::NeoHookeanPair {
@@ -212,7 +224,10 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
 
 /// Whether the text depends on the variant.
 fn varies(kernel: &Kernel) -> bool {
-    matches!(kernel.file, File::Sweep | File::SweepSingle | File::Loads | File::History)
+    matches!(
+        kernel.file,
+        File::Sweep | File::SweepSingle | File::AndersonPush | File::Loads | File::History
+    )
 }
 
 /// Compiles a kernel, or finds it compiled.

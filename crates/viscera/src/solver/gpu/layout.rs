@@ -8,7 +8,7 @@ use crate::model::Model;
 use crate::scalar::lanes::LANES;
 
 /// Bytes of `Control` in control.wgsl.
-pub(super) const CONTROL_SIZE: u64 = 528;
+pub(super) const CONTROL_SIZE: u64 = 524;
 
 /// The material of a lane that only fills a block up.
 pub(super) const FILLING: u32 = u32::MAX;
@@ -177,6 +177,11 @@ impl Layout {
         let (members, pieces) = pieces(model, &springs, &attachments);
         let piece_count = (pieces.len() - model.component_count) as u32;
         Self { offsets, corners, springs, attachments, members, pieces, piece_count }
+    }
+
+    /// Where a vertex's loads begin.
+    pub fn first_load(&self, v: usize) -> usize {
+        self.offsets[v] as usize
     }
 
     /// Places for loads.

@@ -29,6 +29,7 @@ mod record;
 mod record_guard;
 mod report;
 mod surface;
+mod switch;
 mod timing;
 
 use bytemuck::{Pod, Zeroable};
@@ -51,7 +52,7 @@ pub use error::GpuError;
 use explicit::Hold;
 pub use frames::Frame;
 use frames::Frames;
-pub use host::{HostLayout, host_constants, host_layouts};
+pub use host::{HOST_CONTROL_SIZE, HostLayout, host_constants, host_layouts};
 use inputs::norm_weights;
 use layout::Layout;
 use record::{Dispatch, Job, Pieces, Recorder};
@@ -87,6 +88,8 @@ struct Ready {
     /// Where its job lies among the jobs [bytes].
     job: u32,
     groups: [u32; 2],
+    /// Whether it forgets the accelerations' past.
+    starts_acceleration: bool,
 }
 
 /// Jobs lie this far apart [bytes]: the alignment that devices may ask of an offset.
@@ -114,6 +117,7 @@ pub struct GpuSolver {
     ready: [Vec<Ready>; 3],
     /// Which of them belong to which stage.
     stages: [Vec<StageRange>; 3],
+    stage_starts: [Vec<usize>; 2],
     restart: Vec<Ready>,
     frames: Frames,
     /// What the device's multipliers belong to [s]; zero before the first step.
@@ -225,6 +229,7 @@ impl GpuSolver {
             jobs,
             ready: [prologue, body, epilogue],
             stages: record.stages,
+            stage_starts: record.stage_starts,
             restart,
             multiplier_dt: 0.0,
             touched: Vec::new(),
@@ -501,5 +506,6 @@ fn prepare(device: &Device, buffers: &Buffers, dispatch: &Dispatch, job: u32) ->
     });
     let along = dispatch.groups.min(MOST_GROUPS);
     let groups = [along, dispatch.groups.div_ceil(along.max(1))];
-    Ready { pipeline: made.pipeline, storage, job, groups }
+    let starts_acceleration = *dispatch.kernel == kernels::START_ACCELERATION;
+    Ready { pipeline: made.pipeline, storage, job, groups, starts_acceleration }
 }

@@ -10,7 +10,7 @@ use crate::elements::TetForm;
 use crate::material::MaterialModel;
 use crate::model::{Model, TetSet};
 use crate::scalar::lanes::LANES;
-use crate::settings::{AndersonGuard, AndersonOn, SolverSettings, Start};
+use crate::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Start};
 use crate::solver::plan::{Plan, Stage};
 
 /// `Job` of bindings.wgsl.
@@ -64,6 +64,8 @@ pub(super) struct Record {
     /// Which of them belong to which stage, in these three lists; stages that need none are left out,
     /// and the colours of a sweep are one.
     pub stages: [Vec<StageRange>; 3],
+    /// Where the dispatches of each stage of prologue and body begin, and where those of the last end.
+    pub stage_starts: [Vec<usize>; 2],
     /// Of a new history, instead of a step.
     pub restart: Vec<Dispatch>,
 }
@@ -131,13 +133,16 @@ impl<'a> Recorder<'a> {
             body: body.0,
             epilogue: epilogue.0,
             stages: [prologue.1, body.1, epilogue.1],
+            stage_starts: [prologue.2, body.2],
             restart: self.restart(),
         }
     }
 
-    fn list(&self, stages: &[Stage]) -> (Vec<Dispatch>, Vec<StageRange>) {
+    fn list(&self, stages: &[Stage]) -> (Vec<Dispatch>, Vec<StageRange>, Vec<usize>) {
         let (mut dispatches, mut ranges) = (Vec::new(), Vec::<StageRange>::new());
+        let mut starts = Vec::new();
         for stage in stages {
+            starts.push(dispatches.len());
             let first = dispatches.len();
             self.stage(stage, &mut dispatches);
             let added = first..dispatches.len();
@@ -150,7 +155,8 @@ impl<'a> Recorder<'a> {
                 _ => ranges.push(StageRange { stage: *stage, dispatches: added }),
             }
         }
-        (dispatches, ranges)
+        starts.push(dispatches.len());
+        (dispatches, ranges, starts)
     }
 
     fn stage(&self, stage: &Stage, into: &mut Vec<Dispatch>) {
@@ -192,6 +198,8 @@ impl<'a> Recorder<'a> {
                 into.push(self.on_copies(self.vertices(&kernels::SPLIT_COPIES, 0)));
             }
             Stage::SolveColor(color) => self.solve_color(color as usize, into),
+            // Anderson joins them in passing.
+            Stage::JoinCopies if self.settings.acceleration == Acceleration::Anderson => {}
             Stage::JoinCopies => {
                 into.push(self.on_copies(self.vertices(&kernels::JOIN_COPIES, 0)));
             }
@@ -334,7 +342,9 @@ impl<'a> Recorder<'a> {
     }
 
     fn anderson(&self, on: AndersonOn, into: &mut Vec<Dispatch>) {
-        let sums = self.sums(&kernels::ANDERSON_PUSH);
+        let is_split = self.swept != Swept::Vertices;
+        let push = if is_split { &kernels::ANDERSON_JOIN } else { &kernels::ANDERSON_PUSH };
+        let sums = self.sums(push);
         let guard = self.settings.guard_of_mixtures() == AndersonGuard::Residual;
         let job = Job {
             count: sums.groups,

@@ -13,7 +13,7 @@ const VERDICT: usize = 476;
 /// The step guard's part of `Control`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-struct Verdict {
+pub(super) struct Verdict {
     limit: f32,
     best_value: f32,
     start: u32,
@@ -21,16 +21,22 @@ struct Verdict {
     is_better: u32,
     taken: u32,
     failures: u32,
-    rejected: u32,
+    pub rejected: u32,
     was_rejected: u32,
     potential: f32,
     noise: f32,
 }
 
+impl Verdict {
+    /// Out of the bytes of `Control`.
+    pub fn of(control: &[u8]) -> Self {
+        bytemuck::pod_read_unaligned(&control[VERDICT..VERDICT + size_of::<Self>()])
+    }
+}
+
 impl GpuSolver {
     fn verdict(&self) -> Result<Verdict, GpuError> {
-        let control = self.read_buffer(Slot::Control)?;
-        Ok(bytemuck::pod_read_unaligned(&control[VERDICT..VERDICT + size_of::<Verdict>()]))
+        Ok(Verdict::of(&self.read_buffer(Slot::Control)?))
     }
 
     /// How often steps have been taken back since the solver was built. Waits for the device.

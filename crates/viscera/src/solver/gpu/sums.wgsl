@@ -1,0 +1,14 @@
+// Sums over the long vector of all unknowns, for the accelerations.
+
+// Sums of products: |R_k|^2, then R_k . dR_j, then dR_new . dR_j.
+const PRODUCTS: u32 = 21u;
+
+// Numbers side by side whose sums are added up at the end. Part of the result's bits.
+const THREADS: u32 = 128u;
+
+var<workgroup> shared_sums: array<f32, 2688>;
+
+// The last of a vertex's four numbers is no unknown.
+fn counts(i: u32) -> bool {
+    return i >= job.first || i % 4u != 3u;
+}

@@ -1,0 +1,192 @@
+//! A step that the CPU begins and the device ends: where a result is wrong, the stage from which on it
+//! is tells which twin to look at.
+
+use super::buffers::Slot;
+use super::layout::Layout;
+use super::{GpuSolver, Ready};
+use crate::model::Model;
+use crate::scalar::Vec3;
+use crate::scalar::lanes::{LANES, Point};
+use crate::solver::plan::{Plan, Stage};
+use crate::solver::{Inputs, Solver, StepError};
+use crate::state::State;
+
+impl GpuSolver {
+    /// Advances a state on the host by one step of `dt` [s], whose first stages `solver` computes, up to
+    /// and without the first of `stage`, and this solver the others. Both are of one model and the same
+    /// settings; of the iterations the CPU computes stages of the first only, and where steps are
+    /// guarded none after [`Stage::ChooseStart`]. Returns how many stages the CPU has computed. The
+    /// state ends on the device: [`GpuSolver::read`] fetches it.
+    pub fn step_from(
+        &mut self,
+        stage: Stage,
+        solver: &mut Solver<f32>,
+        model: &Model<f32>,
+        state: &mut State<f32>,
+        inputs: &Inputs<f32>,
+        dt: f64,
+    ) -> Result<usize, StepError> {
+        self.write(model, state)?;
+        let repeats = self.begin_step(model, inputs, dt)?;
+        let count = first_stages(&self.plan, stage);
+        solver.step_first(count, model, state, inputs, dt)?;
+        self.take_over(solver, model, state, inputs, count);
+        let [prologue, body, _] = &self.ready;
+        let (before, within) = split(&self.stage_starts, count, self.plan.prologue.len());
+        let mut lists: Vec<&[Ready]> = Vec::new();
+        // What a prologue prepares for the device's own way through the body.
+        let starts_acceleration = prologue.iter().filter(|ready| ready.starts_acceleration);
+        let starts_acceleration: Vec<&[Ready]> =
+            starts_acceleration.map(std::slice::from_ref).collect();
+        if before > 0 {
+            lists.extend(starts_acceleration);
+        }
+        lists.push(&prologue[before.min(prologue.len())..]);
+        lists.push(&body[within..]);
+        lists.extend(std::iter::repeat_n(body.as_slice(), repeats.saturating_sub(1) as usize));
+        lists.push(&self.ready[2]);
+        self.submit("step from a stage", &lists, super::Marks::default());
+        self.multiplier_dt = dt;
+        Ok(count)
+    }
+
+    /// Puts what the CPU has computed so far into the place of what the device would have.
+    fn take_over(
+        &self,
+        solver: &Solver<f32>,
+        model: &Model<f32>,
+        state: &State<f32>,
+        inputs: &Inputs<f32>,
+        count: usize,
+    ) {
+        let work = &solver.work;
+        let ground = &work.ground;
+        let put = |slot, values: &[[f32; 4]]| {
+            let bytes = bytemuck::cast_slice(values);
+            self.buffers.write(&self.device.queue, slot, bytes);
+        };
+        let each = |of: &dyn Fn(usize) -> [f32; 4]| -> Vec<[f32; 4]> {
+            (0..model.vertex_count()).map(of).collect()
+        };
+        let with = |v: Vec3<f32>, w: f32| [v.x, v.y, v.z, w];
+        let vector = |points: &[Point<f32>], multipliers: &[f32]| {
+            let mut vector = vec![0.0; self.buffers.length as usize];
+            let places: Vec<[f32; 4]> = points.iter().map(whole).collect();
+            vector[..4 * places.len()].copy_from_slice(places.as_flattened());
+            let first = (self.buffers.multipliers_start / 4) as usize;
+            vector[first..first + multipliers.len()].copy_from_slice(multipliers);
+            vector
+        };
+        let write = |slot, values: &[f32]| {
+            self.buffers.write(&self.device.queue, slot, bytemuck::cast_slice(values));
+        };
+        let has = |wanted: fn(&Stage) -> bool| self.plan.stages(1).take(count).any(wanted);
+        if count == 0 {
+            return;
+        }
+        write(Slot::Unknowns, &vector(&work.points, &state.multipliers));
+        put(Slot::Velocities, &each(&|v| with(work.velocities[v], 0.0)));
+        if model.tet_sets().iter().any(|set| set.viscous) {
+            let mut rows: Vec<f32> = Vec::new();
+            for (own, set) in ground.start_strain.iter().zip(model.tet_sets()) {
+                rows.extend(own.as_flattened().as_flattened());
+                rows.resize(rows.len() + 6 * LANES * (set.block_count() - own.len()), 0.0);
+            }
+            write(Slot::StartStrain, &rows);
+        }
+        // Before the prediction the rest is of the last step.
+        if !has(|stage| matches!(stage, Stage::Predict(_))) {
+            return;
+        }
+        let remembered = &work.iterate[0];
+        if !remembered.positions.is_empty() {
+            let is_valid = has(|stage| *stage == Stage::RememberIterate);
+            let now = (&work.points, &state.multipliers);
+            let (points, multipliers) =
+                if is_valid { (&remembered.positions, &remembered.multipliers) } else { now };
+            write(Slot::Iterate, &vector(points, multipliers));
+        }
+        let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
+        put(Slot::Previous, &each(&|v| with(ground.previous[v].vec3(), copies(v))));
+        put(Slot::Predicted, &each(&|v| with(ground.predicted[v].vec3(), ground.masses[v])));
+        put(Slot::Acting, &each(&|v| with(ground.external[v], ground.inverse_masses[v])));
+        let mut targets = each(&|_| [0.0; 4]);
+        for pin in &inputs.pins {
+            targets[model.numbering.of(pin.vertex)] = with(pin.target, 0.0);
+        }
+        if self.settings.guards_steps() {
+            let free = |v: usize| ground.inverse_masses[v] != 0.0;
+            let place = |v: usize, x: Vec3<f32>| if free(v) { with(x, 0.0) } else { targets[v] };
+            let starts = [&ground.previous, &ground.predicted, &work.points];
+            let mut rows = vec![[0.0; 4]; 3 * Layout::stride(model) as usize];
+            for (row, points) in rows.chunks_mut(Layout::stride(model) as usize).zip(starts) {
+                for (v, point) in points.iter().enumerate() {
+                    row[v] = place(v, point.vec3());
+                }
+            }
+            put(Slot::Starts, &rows);
+        }
+        put(Slot::Targets, &targets);
+        if model.is_split() {
+            let all: Vec<[f32; 4]> = work.copies.iter().map(whole).collect();
+            put(Slot::Copies, &all);
+        }
+        if !work.loads.is_empty() {
+            put(Slot::Loads, &Layout::new(model).loads(model, &work.loads));
+        }
+    }
+}
+
+fn whole(point: &Point<f32>) -> [f32; 4] {
+    [point.x, point.y, point.z, point.w]
+}
+
+impl Layout {
+    /// The loads of copies where the device looks for those of corners: all of a vertex's in its first
+    /// place.
+    fn loads(&self, model: &Model<f32>, of_copies: &[Point<f32>]) -> Vec<[f32; 4]> {
+        let mut loads = vec![[0.0; 4]; self.slot_count() as usize];
+        for v in 0..model.vertex_count() {
+            let load = crate::solver::cpu::gather(model, of_copies, v);
+            if let Some(place) = loads.get_mut(self.first_load(v)) {
+                *place = whole(&load);
+            }
+        }
+        loads
+    }
+}
+
+/// How many stages come before the first of that name, of those that the CPU may compute.
+fn first_stages(plan: &Plan, stage: Stage) -> usize {
+    let stages = || plan.prologue.iter().chain(&plan.body);
+    let decides = |other: &Stage| *other == Stage::ChooseStart;
+    let most = stages().position(decides).unwrap_or(plan.prologue.len() + plan.body.len());
+    stages().position(|other| *other == stage).unwrap_or(most).min(most)
+}
+
+/// How many dispatches of prologue and body belong to the first `count` stages.
+fn split(starts: &[Vec<usize>; 2], count: usize, prologue: usize) -> (usize, usize) {
+    let [of_prologue, of_body] = starts;
+    let end = |list: &[usize]| list.last().copied().unwrap_or(0);
+    if count < prologue {
+        return (of_prologue[count], 0);
+    }
+    // Behind the stages the prologue may have dispatches that stand for stages of the body.
+    let before = if count > prologue { usize::MAX } else { end(of_prologue) };
+    let within = of_body.get(count - prologue).copied().unwrap_or(end(of_body));
+    (before, within)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_are_divided_where_their_dispatches_are() {
+        let starts = [vec![0, 1, 3], vec![0, 0, 2, 5]];
+        assert_eq!(split(&starts, 0, 2), (0, 0));
+        assert_eq!(split(&starts, 1, 2), (1, 0));
+        assert_eq!(split(&starts, 2, 2), (3, 0));
+        assert_eq!(split(&starts, 4, 2), (usize::MAX, 2));
+    }
+}
