@@ -299,3 +299,61 @@ fn a_step_changes_hands_at_any_stage() {
     }
     assert!(hands > 20, "{hands}");
 }
+
+/// Another model than the solver's is an error, whatever is asked, and nothing panics.
+#[test]
+fn another_model_is_refused() {
+    let settings = SolverSettings::default();
+    let model = everything(&settings);
+    let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
+    let mut builder = ModelBuilder::new();
+    let mesh = block([0.06, 0.03, 0.03], [9, 5, 5], 0.1);
+    builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
+    let other = builder.build::<f32>(&settings).expect("a model");
+    let mut state = State::at_rest(&other);
+    assert!(gpu.step(&other, &Inputs::default(), DT).is_err());
+    assert!(gpu.restart(&other, &Inputs::default(), DT).is_err());
+    assert!(gpu.write(&other, &state).is_err());
+    assert!(gpu.read(&other, &mut state).is_err());
+    assert!(gpu.newest(&other).is_none());
+}
+
+/// Tetrahedra so small and soft that weights of multipliers are far above any number of copies: what
+/// lies behind the vertices is not taken for copies.
+#[test]
+fn small_soft_tetrahedra_are_joined_as_any_others() {
+    let settings = SolverSettings {
+        colors: Colors::Limited(1),
+        acceleration: Acceleration::Anderson,
+        iterations: 4,
+        step_guard: false,
+        ..SolverSettings::default()
+    };
+    let mesh = block([0.006, 0.003, 0.003], [6, 3, 3], 0.1);
+    let models = |_: ()| {
+        let mut builder = ModelBuilder::new();
+        builder.add_body(&mesh, &material(STVK, 500.0, 0.3)).expect("a body");
+        (builder.build::<f32>(&settings).expect("a model"), builder.build::<f64>(&settings))
+    };
+    let (model, double) = models(());
+    let double: Model<f64> = double.expect("a model");
+    let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
+    let (mut cpu, mut oracle) = (Solver::new(&model, &settings), Solver::new(&double, &settings));
+    let (mut x32, mut x64) = (State::at_rest(&model), State::at_rest(&double));
+    let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81f32), ..Inputs::default() };
+    let mut inputs64 = Inputs { gravity: vec3(0.0, 0.0, f64::from(-9.81f32)), ..Inputs::default() };
+    for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
+        inputs.pins.push(Pin { vertex: v as u32, target: x.cast() });
+        inputs64.pins.push(Pin { vertex: v as u32, target: x.cast::<f32>().cast() });
+    }
+    for _ in 0..10 {
+        gpu.step(&model, &inputs, DT).expect("a legal step");
+        cpu.step(&model, &mut x32, &inputs, DT).expect("a legal step");
+        oracle.step(&double, &mut x64, &inputs64, DT).expect("a legal step");
+    }
+    let mut read = State::at_rest(&model);
+    gpu.read(&model, &mut read).expect("a device");
+    let [cpu, gpu] = [&x32, &read].map(|state| distance(&state.positions, &x64.positions));
+    println!("CPU {cpu:.2e} m, GPU {gpu:.2e} m");
+    assert!(gpu <= 2.0 * cpu.max(0.01 * f64::from(f32::EPSILON)), "CPU {cpu:e} m, GPU {gpu:e} m");
+}

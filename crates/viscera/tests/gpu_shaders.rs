@@ -166,3 +166,18 @@ fn records_lie_alike_on_both_sides() {
         assert_eq!(*there, value, "{name}");
     }
 }
+
+/// Nothing is read back inside a step: the only place where memory is mapped is the one that answers
+/// requests, and no step calls it.
+#[test]
+fn steps_map_no_memory() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/solver/gpu");
+    let mut maps = Vec::new();
+    for file in std::fs::read_dir(folder).expect("the sources").flatten() {
+        let text = std::fs::read_to_string(file.path()).expect("a source");
+        let name = file.file_name().to_string_lossy().into_owned();
+        maps.extend((0..text.matches("map_async").count()).map(|_| name.clone()));
+    }
+    // `request` and `read`, neither of which `step` reaches.
+    assert_eq!(maps, ["frames.rs", "frames.rs"]);
+}

@@ -542,7 +542,7 @@ pub(super) fn energy_slots<S: Real>(model: &Model<S>) -> usize {
 }
 
 /// Everything in a model that decides how much memory a step needs and which stages it has.
-fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 11] {
+pub(super) fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 11] {
     let viscous = model.tet_sets().map(|set| if set.viscous { set.len() } else { 0 });
     [
         ("solver's list of vertices", model.vertex_count()),

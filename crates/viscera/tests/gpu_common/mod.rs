@@ -21,15 +21,15 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// The first Vulkan device; a software driver will do.
+    /// The first device; a software driver will do.
     pub fn open() -> Self {
-        let backends = wgpu::Backends::VULKAN;
+        let backends = wgpu::Backends::PRIMARY;
         let descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor { backends, ..descriptor });
         let adapter = pollster::block_on(instance.request_adapter(&Default::default()))
             .unwrap_or_else(|error| {
                 panic!(
-                    "no Vulkan device ({error}); a software driver will do: \
+                    "no graphics device ({error}); a software driver will do: \
                      apt-get install mesa-vulkan-drivers libvulkan1"
                 )
             });

@@ -110,6 +110,9 @@ pub(super) struct Attachment {
     pub part: u32,
 }
 
+/// Copies that single precision numbers exactly, which is how Anderson finds those of a vertex.
+const MOST_COPIES: usize = 1 << 24;
+
 /// Ranges of buffers begin at a multiple of this: the alignment [bytes] that devices may ask of a
 /// binding.
 pub(super) const ALIGNMENT: u64 = 256;
@@ -175,7 +178,7 @@ impl Buffers {
         let accelerated = xpbd && settings.acceleration != Acceleration::None;
         let anderson = accelerated && settings.acceleration == Acceleration::Anderson;
         let history =
-            if anderson { unknowns * (u64::from(settings.anderson_window) + 1) } else { 0 };
+            if anderson { unknowns * (u64::from(super::window(settings)) + 1) } else { 0 };
         let viscous = model.tet_sets().iter().any(|set| set.viscous);
         let blocks = model.tet_sets().iter().map(|set| set.block_count() as u64).sum::<u64>();
         let when = |wanted: bool, size: u64| if wanted { size } else { 0 };
@@ -201,6 +204,9 @@ impl Buffers {
         let of_constants = constants.iter().map(|(_, what, bytes)| (*what, bytes.len() as u64));
         let arrays = sizes.iter().map(|&(_, what, size)| (what, size)).chain(of_constants);
         check_sizes(device, model.tet_count() as u64, arrays)?;
+        if anderson && split && model.copy_count() >= MOST_COPIES {
+            return Err(GpuError::TooManyCopies { given: model.copy_count(), most: MOST_COPIES });
+        }
 
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let make = |label: &str, size: u64, usage: BufferUsages| {

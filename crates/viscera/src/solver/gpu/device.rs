@@ -155,7 +155,9 @@ pub(super) struct Pipeline {
 }
 
 impl Device {
-    /// A device of the caller's, a window's for example, whose buffers it can then draw from.
+    /// A device of the caller's, a window's for example, whose buffers it can then draw from. To hear of
+    /// its loss this replaces the callback that the caller may have set; clone the result rather than
+    /// make a second one of the same device.
     pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue, name: String) -> Self {
         let lost = Arc::new(Mutex::new(None));
         let told = Arc::clone(&lost);

@@ -72,6 +72,17 @@ pub enum GpuError {
     /// A surface was bound to other tetrahedra.
     #[error("a surface does not fit the model: {0}; bind it to the mesh that the model is made of")]
     Embedding(#[from] EmbeddingError),
+    /// Anderson on a device cannot number the copies of the vertices.
+    #[error(
+        "Anderson with few colours joins up to {most} copies of vertices on a device; this model has \
+         {given}: use more colours, another acceleration, or `device = \"cpu\"`"
+    )]
+    TooManyCopies {
+        /// Copies of this model.
+        given: usize,
+        /// How many there may be.
+        most: usize,
+    },
     /// The device was lost.
     #[error("{name} was lost ({reason}); what was finished is kept")]
     Lost {

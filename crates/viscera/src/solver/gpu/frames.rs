@@ -85,6 +85,9 @@ impl GpuSolver {
     /// The newest positions that have arrived since the last call. Does not wait.
     pub fn newest(&mut self, model: &Model<f32>) -> Option<Frame> {
         self.collect();
+        if self.check_model(model).is_err() {
+            return None;
+        }
         let (number, buffer) = self.frames.arrived.take()?;
         let frame = buffer.slice(..).get_mapped_range().ok().map(|bytes| {
             let places: &[[f32; 4]] = bytemuck::cast_slice(&bytes);
@@ -115,6 +118,7 @@ impl GpuSolver {
 
     /// Waits for the device and reads its whole state. On an error the state is as it was.
     pub fn read(&self, model: &Model<f32>, state: &mut State<f32>) -> Result<(), GpuError> {
+        self.check_model(model)?;
         self.read_buffers(&[Slot::Unknowns, Slot::Velocities], |read| {
             self.take_state(model, state, read);
         })
@@ -128,6 +132,8 @@ impl GpuSolver {
         state: &mut State<f32>,
         solver: &mut Solver<f32>,
     ) -> Result<(), GpuError> {
+        self.check_model(model)?;
+        solver.work.check(model)?;
         let mut slots =
             vec![Slot::Unknowns, Slot::Velocities, Slot::Predicted, Slot::Acting, Slot::Control];
         if model.tet_sets().iter().any(|set| set.viscous) {

@@ -308,7 +308,8 @@ fn go_on_from_best(local: u32) {
         control.next = 0u;
         control.differences = 0u;
         control.last_norm = 3e38;
-        if got_on && value < control.best_value {
+        control.is_better = select(0u, 1u, got_on && value < control.best_value);
+        if control.is_better != 0u {
             control.best_value = value;
         }
     }

@@ -71,6 +71,7 @@ impl GpuSolver {
         inputs: &Inputs<f32>,
         dt: f64,
     ) -> Result<(), StepError> {
+        self.check_model(model)?;
         crate::solver::check_step(dt, model, inputs)?;
         self.prepare_step(model, inputs, dt, 1);
         self.submit("restart", &[&self.restart], Marks::default());

@@ -72,10 +72,11 @@ pub(super) fn norm_weights(
             AndersonOn::Both => {}
         }
     }
-    // No weight: where a vertex's copies begin, which Anderson joins. Single precision numbers them all
-    // within the limits of a binding.
+    // No weight: where a vertex's copies begin, which Anderson joins; `Buffers` refuses more than single
+    // precision can number. What fills up behind the vertices has none.
     let (positions, _) = weights.split_at_mut((buffers.multipliers_start / 4) as usize);
-    let copies = model.copy_offsets.iter();
+    let all = model.copy_offsets.iter();
+    let copies = all.chain(std::iter::repeat(&(model.copy_offsets[model.vertex_count()])));
     for (four, &first) in positions.as_chunks_mut::<4>().0.iter_mut().zip(copies) {
         four[3] = first as f32;
     }

@@ -6,6 +6,9 @@ fn mapped_value(i: u32) -> f32 {
         return value;
     }
     let own = i | 3u;
+    if own + 4u >= job.first {
+        return value;
+    }
     let first = u32(weights[own]);
     let end = u32(weights[own + 4u]);
     if end <= first {

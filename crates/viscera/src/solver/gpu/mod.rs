@@ -36,7 +36,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::Inputs;
 use super::StepError;
-use super::cpu::{bound_share, rebase_factor};
+use super::cpu::{bound_share, rebase_factor, sizes};
 use super::explicit::{small_steps, stable_step};
 use super::plan::Plan;
 use crate::model::Model;
@@ -98,11 +98,16 @@ const JOB_STRIDE: u64 = 256;
 /// The most workgroups along one axis in the baseline.
 const MOST_GROUPS: u32 = 65_535;
 
-/// Iterations, or small steps of the explicit method, in one submission. Drivers reset a device whose
-/// submission takes some seconds. Reckoned from memory traffic, not measured: a small step of a million
-/// tetrahedra moves some 0.3 GB, a millisecond at 300 GB/s, so that 256 take a quarter of a second. Smaller,
-/// and submissions would count beside the work of small meshes.
-const MOST_REPEATS: u32 = 256;
+/// Dispatches of iterations, or of small steps, in one submission. Drivers reset a device whose submission
+/// takes some seconds. Reckoned, not measured: one of a million tetrahedra moves some 0.15 GB, half a
+/// millisecond at 300 GB/s, so that 1024 take half a second. Smaller, and submissions would count beside the
+/// work of small meshes.
+const MOST_DISPATCHES: usize = 1024;
+
+/// Anderson's window, within what kernels have room for.
+fn window(settings: &SolverSettings) -> u32 {
+    settings.anderson_window.clamp(1, super::acceleration::LARGEST_WINDOW as u32)
+}
 
 /// A solver for one model on a graphics processor, in single precision.
 #[derive(Debug)]
@@ -114,6 +119,8 @@ pub struct GpuSolver {
     uniforms: wgpu::BindGroup,
     frame: wgpu::Buffer,
     jobs: wgpu::Buffer,
+    /// What the model's sizes were.
+    sizes: [usize; 11],
     ready: [Vec<Ready>; 3],
     /// Which of them belong to which stage.
     stages: [Vec<StageRange>; 3],
@@ -171,6 +178,9 @@ impl GpuSolver {
             return Err(GpuError::DoublePrecision);
         }
         device.check()?;
+        if let Some(lacking) = shortfall(&device.limits()) {
+            return Err(GpuError::BelowBaseline { name: device.name().to_owned(), lacking });
+        }
         let plan = Plan::new(model, settings);
         let layout = Layout::new(model);
         let buffers = Buffers::new(device, model, settings, &layout, left_over)?;
@@ -227,6 +237,7 @@ impl GpuSolver {
             uniforms,
             frame,
             jobs,
+            sizes: sizes(model).map(|(_, size)| size),
             ready: [prologue, body, epilogue],
             stages: record.stages,
             stage_starts: record.stage_starts,
@@ -301,8 +312,19 @@ impl GpuSolver {
 
     /// Puts a state onto the device.
     pub fn write(&mut self, model: &Model<f32>, state: &State<f32>) -> Result<(), StepError> {
+        self.check_model(model)?;
         super::check_state(model, state)?;
         self.put(model, state);
+        Ok(())
+    }
+
+    /// The model is one of the same shape as that which lies on the device.
+    pub(super) fn check_model(&self, model: &Model<f32>) -> Result<(), StepError> {
+        for (given, (what, expected)) in self.sizes.into_iter().zip(sizes(model)) {
+            if given != expected {
+                return Err(StepError::Mismatch { what, given, expected });
+            }
+        }
         Ok(())
     }
 
@@ -346,21 +368,27 @@ impl GpuSolver {
         marks: Marks<'_>,
     ) -> Result<(), StepError> {
         let mut left = self.begin_step(model, inputs, dt)?;
+        let most = self.most_repeats();
         let [prologue, body, epilogue] = self.ready.each_ref().map(Vec::as_slice);
         let mut lists = vec![prologue];
         let mut now = marks;
-        while left > MOST_REPEATS {
-            lists.extend(std::iter::repeat_n(body, MOST_REPEATS as usize));
+        while left > most {
+            lists.extend(std::iter::repeat_n(body, most as usize));
             self.submit("step", &lists, now.before_the_end());
             now = marks.after_the_beginning();
             lists.clear();
-            left -= MOST_REPEATS;
+            left -= most;
         }
         lists.extend(std::iter::repeat_n(body, left as usize));
         lists.push(epilogue);
         self.submit("step", &lists, now);
         self.multiplier_dt = dt;
         Ok(())
+    }
+
+    /// Iterations, or small steps, in one submission.
+    fn most_repeats(&self) -> u32 {
+        (MOST_DISPATCHES / self.ready[1].len().max(1)).max(1) as u32
     }
 
     /// Inputs and constants of a step; returns how many iterations, or small steps, it has.
@@ -370,6 +398,7 @@ impl GpuSolver {
         inputs: &Inputs<f32>,
         dt: f64,
     ) -> Result<u32, StepError> {
+        self.check_model(model)?;
         super::check_step(dt, model, inputs)?;
         let [repeats, small_steps] = match self.settings.method {
             Method::Xpbd => [self.plan.repeat, 1],

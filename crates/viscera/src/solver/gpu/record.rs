@@ -243,7 +243,7 @@ impl<'a> Recorder<'a> {
 
     /// A thread for each number of the long vector.
     pub(super) fn long(&self, kernel: &'static Kernel, mode: u32) -> Dispatch {
-        let set_first = self.settings.anderson_window;
+        let set_first = super::window(self.settings);
         let first = self.multipliers_first;
         self.threads(kernel, Job { first, count: self.length, set_first, mode, ..Job::default() })
     }
@@ -348,7 +348,7 @@ impl<'a> Recorder<'a> {
         let guard = self.settings.guard_of_mixtures() == AndersonGuard::Residual;
         let job = Job {
             count: sums.groups,
-            set_first: self.settings.anderson_window,
+            set_first: super::window(self.settings),
             mode: guard.into(),
             ..Job::default()
         };

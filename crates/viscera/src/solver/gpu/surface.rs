@@ -74,6 +74,7 @@ impl GpuSurface {
         model: &Model<f32>,
         skins: &[Skin<'_>],
     ) -> Result<Self, GpuError> {
+        solver.check_model(model)?;
         let device = solver.device();
         let bounds = bounds(model, skins)?;
         let triangles = triangles(skins);

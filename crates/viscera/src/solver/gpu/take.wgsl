@@ -12,19 +12,23 @@ fn take(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
     let is_position = i < job.first && v < table[VERTEX_COUNT] && axis < 3u;
     let best = START * table[STRIDE] + v;
     if job.mode == 0u {
-        if is_position && control.start != START {
-            ground[best][axis] = ground_of(control.start, v)[axis];
+        if is_position && axis == 0u && control.start != START {
+            ground[best] = ground_of(control.start, v);
         }
         return;
     }
-    if control.is_better != 0u && is_position {
-        ground[best][axis] = unknowns[i];
+    // One thread for all of a vertex: parts of a vector are no places of their own.
+    if control.is_better != 0u && is_position && axis == 0u {
+        if control.taken == DESCENT {
+            ground[best] = ground_of(TRIAL, v);
+        } else {
+            ground[best] = vec4f(unknowns[i], unknowns[i + 1u], unknowns[i + 2u], 0.0);
+        }
     }
     if control.taken == PLAIN && (is_position || i >= job.first) {
         unknowns[i] = mapped[job.set_first * job.count + i];
     }
     if control.taken == DESCENT && is_position {
         unknowns[i] = ground_of(TRIAL, v)[axis];
-        ground[best][axis] = unknowns[i];
     }
 }

@@ -10,7 +10,7 @@
 
 use std::ops::Range;
 
-use super::{Device, GpuError, GpuSolver, MOST_REPEATS, frames};
+use super::{Device, GpuError, GpuSolver, frames};
 use crate::model::Model;
 use crate::solver::Inputs;
 use crate::solver::plan::Stage;
@@ -237,7 +237,7 @@ impl GpuSolver {
     pub(super) fn submit_repeats(&self, mut left: u32, marks: Marks<'_>) {
         let mut now = marks;
         while left > 0 {
-            let count = left.min(MOST_REPEATS);
+            let count = left.min(self.most_repeats());
             left -= count;
             let lists = vec![&self.ready[1][..]; count as usize];
             self.submit("iterations", &lists, if left > 0 { now.before_the_end() } else { now });
