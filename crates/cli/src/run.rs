@@ -8,7 +8,7 @@ use crate::summary::{FrameLine, Summary};
 use crate::{memory, progress};
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -69,7 +69,6 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     memory::check(&what, needed, arguments.memory, "take a coarser mesh")?;
     let stem = arguments.scene.file_stem().unwrap_or(arguments.scene.as_os_str());
     let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem));
-    let out = OutputFolder::create(&folder)?;
     let frames = arguments.frames.unwrap_or_else(|| scene.frame_count());
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
@@ -81,8 +80,12 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     })
     .context("cannot listen for Ctrl-C")?;
     match scene.solver.precision {
-        Precision::F32 => simulate::<f32>(scene, assembly, overrides, &out, frames, &interrupted),
-        Precision::F64 => simulate::<f64>(scene, assembly, overrides, &out, frames, &interrupted),
+        Precision::F32 => {
+            simulate::<f32>(scene, assembly, overrides, &folder, frames, &interrupted)
+        }
+        Precision::F64 => {
+            simulate::<f64>(scene, assembly, overrides, &folder, frames, &interrupted)
+        }
     }
 }
 
@@ -118,7 +121,7 @@ fn simulate<S: Real>(
     scene: Scene,
     assembly: Assembly,
     overrides: Overrides,
-    out: &OutputFolder,
+    folder: &Path,
     frames: u64,
     interrupted: &AtomicBool,
 ) -> Result<Outcome> {
@@ -126,6 +129,8 @@ fn simulate<S: Real>(
         eprintln!("note: {note}");
     }
     let mut simulation = Simulation::<S>::new(scene, assembly)?;
+    // Where the device is refused no folder stays behind.
+    let out = &OutputFolder::create(folder)?;
     let summary = Summary::new(&simulation, overrides);
     let model = &summary.model;
     let solver = &simulation.scene().solver;
