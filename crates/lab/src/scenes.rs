@@ -14,6 +14,7 @@ use anyhow::{Context as _, Result, bail};
 use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
 use viscera::mesh::shapes::{self, Block, Splitting};
+use viscera::mesh::topology::BoundingBox;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::SolverSettings;
@@ -138,12 +139,7 @@ impl Scene {
             }
             "twist" => {
                 scene.mesh = bar(size)?;
-                scene.fixed = scene.select(|x| x.x < NEAR);
-                scene.driven = scene.select(|x| x.x > BAR[0] - NEAR);
-                let center = vec3(0.0, 0.5 * BAR[1], 0.5 * BAR[2]);
-                let angle = std::f64::consts::PI / 3.0;
-                scene.path = Path::Screw { center, angle, advance: 0.12 * BAR[0] };
-                scene.path_frames = 12;
+                scene.twist_ends(NEAR);
             }
             "grab" => {
                 scene.mesh = block(size)?;
@@ -178,6 +174,30 @@ impl Scene {
             _ => bail!("there is no scene `{name}`; there are {}", NAMES.join(", ")),
         }
         Ok(scene)
+    }
+
+    /// One end held, the other turned and pulled; what lies within `depth` [m] of an end belongs to it.
+    fn twist_ends(&mut self, depth: f64) {
+        let extent = BoundingBox::around(self.mesh.vertices());
+        self.fixed = self.select(|x| x.x < extent.min.x + depth);
+        self.driven = self.select(|x| x.x > extent.max.x - depth);
+        let angle = std::f64::consts::PI / 3.0;
+        let advance = 0.12 * extent.size().x;
+        self.path = Path::Screw { center: extent.center(), angle, advance };
+        self.path_frames = 12;
+    }
+
+    /// This scene of a bar with another body, which lies along x and whose ends are what lies within a
+    /// twentieth of its length of them.
+    pub fn with_bar(mut self, mesh: TetMesh) -> Self {
+        let extent = BoundingBox::around(mesh.vertices());
+        let depth = 0.05 * extent.size().x;
+        self.mesh = mesh;
+        match self.driven.is_empty() {
+            true => self.fixed = self.select(|x| x.x < extent.min.x + depth),
+            false => self.twist_ends(depth),
+        }
+        self
     }
 
     /// Ligaments on the uppermost quarter, a spring at the rightmost point.

@@ -13,8 +13,8 @@ pub struct Document {
     opening: Vec<String>,
     /// Markdown, one text per block.
     blocks: Vec<String>,
-    /// Names and SVG, in order.
-    figures: Vec<(String, String)>,
+    /// Names and contents of the files beside it, in order.
+    files: Vec<(String, Vec<u8>)>,
 }
 
 impl Document {
@@ -26,7 +26,7 @@ impl Document {
             title: title.into(),
             opening: Vec::new(),
             blocks: Vec::new(),
-            figures: Vec::new(),
+            files: Vec::new(),
         })
     }
 
@@ -65,21 +65,44 @@ impl Document {
         self.blocks.push(table.to_markdown());
     }
 
-    /// A figure in a file of this name, which is made of small letters, digits and `-` and is given
+    /// A plot in an SVG file of this name, which is made of small letters, digits and `-` and is given
     /// once.
     pub fn figure(&mut self, name: &str, plot: &Plot) -> Result<()> {
+        self.show(&format!("{name}.svg"), &plot.title, plot.to_svg()?.into_bytes())
+    }
+
+    /// A picture in a PNG file of this name, with words for those who do not see it.
+    pub fn picture(&mut self, name: &str, words: &str, png: Vec<u8>) -> Result<()> {
+        self.show(&format!("{name}.png"), words, png)
+    }
+
+    /// A table's numbers in full, as a CSV file of this name that the text points to.
+    pub fn data(&mut self, name: &str, words: &str, table: &Table) -> Result<()> {
+        let file = format!("{name}.csv");
+        self.file(&file, table.to_csv().into_bytes())?;
+        self.blocks.push(format!("{words}: [{file}]({})", self.output.link(&file)));
+        Ok(())
+    }
+
+    fn show(&mut self, file: &str, words: &str, bytes: Vec<u8>) -> Result<()> {
+        self.file(file, bytes)?;
+        let words = words.replace(['[', ']'], "");
+        self.blocks.push(format!("![{words}]({})", self.output.link(file)));
+        Ok(())
+    }
+
+    fn file(&mut self, file: &str, bytes: Vec<u8>) -> Result<()> {
+        let name = file.split('.').next().unwrap_or_default();
         let legal = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
         ensure!(
-            !name.is_empty() && name.chars().all(legal),
+            !name.is_empty() && file.matches('.').count() == 1 && name.chars().all(legal),
             "figure `{name}`: make the name of small letters, digits and `-`"
         );
         ensure!(
-            self.figures.iter().all(|(taken, _)| taken != name),
+            self.files.iter().all(|(taken, _)| taken != file),
             "figure `{name}` is there already; give this one another name"
         );
-        self.figures.push((name.to_owned(), plot.to_svg()?));
-        let words = plot.title.replace(['[', ']'], "");
-        self.blocks.push(format!("![{words}]({})", self.output.link(name)));
+        self.files.push((file.to_owned(), bytes));
         Ok(())
     }
 
@@ -94,6 +117,6 @@ impl Document {
 
     /// Writes figures and text, each whole or not at all.
     pub fn write(&self) -> Result<()> {
-        self.output.write(&self.to_markdown(), &self.figures)
+        self.output.write(&self.to_markdown(), &self.files)
     }
 }

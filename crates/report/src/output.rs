@@ -39,23 +39,23 @@ impl Output {
         &self.document
     }
 
-    /// A figure's address as seen from the document.
-    pub fn link(&self, figure: &str) -> String {
-        let address = format!("{}/{figure}.svg", self.folder_name);
+    /// The address of a file in the folder as seen from the document.
+    pub fn link(&self, file: &str) -> String {
+        let address = format!("{}/{file}", self.folder_name);
         let plain = |c: char| c.is_ascii_alphanumeric() || "/._-".contains(c);
         if address.chars().all(plain) { address } else { format!("<{address}>") }
     }
 
-    /// Writes the figures, then the text that shows them, and removes figures that an earlier
-    /// report left and this one does not show.
-    pub fn write(&self, text: &str, figures: &[(String, String)]) -> Result<()> {
-        for (name, svg) in figures {
-            write_whole(&self.folder.join(format!("{name}.svg")), svg.as_bytes())?;
+    /// Writes the files of the folder, then the text that shows them, and removes plots that an
+    /// earlier report left and this one does not show.
+    pub fn write(&self, text: &str, files: &[(String, Vec<u8>)]) -> Result<()> {
+        for (name, bytes) in files {
+            write_whole(&self.folder.join(name), bytes)?;
         }
         write_whole(&self.document, text.as_bytes())?;
         let is_shown = |path: &Path| {
-            let stem = path.file_stem().and_then(|stem| stem.to_str());
-            figures.iter().any(|(name, _)| Some(name.as_str()) == stem)
+            let shown = path.file_name().and_then(|name| name.to_str());
+            files.iter().any(|(name, _)| Some(name.as_str()) == shown)
         };
         let Ok(entries) = fs::read_dir(&self.folder) else { return Ok(()) };
         for path in entries.flatten().map(|entry| entry.path()) {

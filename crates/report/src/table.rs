@@ -52,6 +52,16 @@ impl Table {
         text
     }
 
+    /// As CSV (RFC 4180): a line for the heads and for every row, cells with commas or quotes in quotes.
+    pub fn to_csv(&self) -> String {
+        let cell = |text: &String| match text.contains([',', '"', '\n', '\r']) {
+            true => format!("\"{}\"", text.replace('"', "\"\"")),
+            false => text.clone(),
+        };
+        let line = |cells: &Vec<String>| cells.iter().map(cell).collect::<Vec<_>>().join(",");
+        std::iter::once(&self.heads).chain(&self.rows).map(|cells| line(cells) + "\n").collect()
+    }
+
     /// Head first; every column with the same number of cells.
     fn columns(&self, clean: &dyn Fn(&str) -> String) -> Vec<Column> {
         let widest = self.rows.iter().map(Vec::len).max().unwrap_or(0).max(self.heads.len());

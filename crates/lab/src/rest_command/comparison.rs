@@ -10,8 +10,8 @@ use viscera::state::State;
 
 use super::path::Rest;
 use crate::reference::Reference;
+use crate::sections::Progress;
 use crate::settling::{Distance, KEPT_VELOCITY};
-use crate::validate::Progress;
 use viscera_report::{Memory, percent, scientific};
 
 /// Time [s] given to the body to settle after the scene has ended.

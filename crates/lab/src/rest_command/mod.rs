@@ -11,7 +11,7 @@ use viscera::measure::{TetMeasure, measure_displacements, measure_tets, summariz
 use viscera::mesh::io::vtu::{self, Array};
 use viscera::simulation::Simulation;
 
-use crate::validate::Progress;
+use crate::sections::Progress;
 use path::{Path, Rest};
 use viscera_report::{Memory, percent, prepare_file, scientific, si, write_whole};
 

@@ -10,7 +10,7 @@ use viscera::solver::Inputs;
 use viscera_report::Memory;
 
 use crate::reference::{Convergence, Cost, Reference, ReferenceError, Standing};
-use crate::validate::Progress;
+use crate::sections::Progress;
 
 /// What the scene does at one time.
 struct Stop {

@@ -176,6 +176,34 @@ impl<S: Real> Solver<S> {
         self.step_first(usize::MAX, model, state, inputs, dt)
     }
 
+    /// As [`Solver::step`]; shows the positions [m] of all vertices, the user's order, where the iteration
+    /// starts (0) and after each iteration: for plots of convergence. What ends the step, such as its
+    /// guard, comes after the last. Takes memory for the positions; an explicit method is watched at the
+    /// start and at the end of its small steps only.
+    pub fn step_watched(
+        &mut self,
+        model: &Model<S>,
+        state: &mut State<S>,
+        inputs: &Inputs<S>,
+        dt: f64,
+        mut watch: impl FnMut(u32, &[Vec3<f64>]) + Send,
+    ) -> Result<(), StepError> {
+        self.check(model, state, inputs, dt)?;
+        let Self { settings, plan, work } = self;
+        let (repeat, small_steps) = repeats(settings, plan, work, dt)?;
+        let step = cpu::Step { model, inputs, dt, settings, small_steps };
+        carry_out(Task::Watched(plan, repeat, &mut watch), work, &step, state);
+        Ok(())
+    }
+
+    /// Iterations of the steps to come, at least one; neither plan nor memory depends on them.
+    pub fn set_iterations(&mut self, count: u32) {
+        self.settings.iterations = count.max(1);
+        if self.settings.method == Method::Xpbd {
+            self.plan.repeat = self.settings.iterations;
+        }
+    }
+
     /// As [`Solver::step`], the first so many stages of it.
     fn step_first(
         &mut self,
@@ -187,10 +215,7 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         let Self { settings, plan, work } = self;
-        let (repeat, small_steps) = match settings.method {
-            Method::Xpbd => (plan.repeat, 1),
-            Method::Explicit => [explicit::small_steps(dt, work.stable_step)?; 2].into(),
-        };
+        let (repeat, small_steps) = repeats(settings, plan, work, dt)?;
         let step = cpu::Step { model, inputs, dt, settings, small_steps };
         carry_out(Task::Step(plan, repeat, count), work, &step, state);
         Ok(())
@@ -277,6 +302,19 @@ impl<S: Real> Solver<S> {
         balance.measure(model, state, inputs, &self.work);
         Ok(())
     }
+}
+
+/// How often the body of the plan is run, and how many small steps a step of `dt` [s] has.
+fn repeats<S>(
+    settings: &SolverSettings,
+    plan: &Plan,
+    work: &cpu::Workspace<S>,
+    dt: f64,
+) -> Result<(u32, u32), StepError> {
+    Ok(match settings.method {
+        Method::Xpbd => (plan.repeat, 1),
+        Method::Explicit => [explicit::small_steps(dt, work.stable_step)?; 2].into(),
+    })
 }
 
 /// A step can be made with these inputs.

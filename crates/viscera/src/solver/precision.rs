@@ -5,17 +5,21 @@ use std::any::Any;
 
 use super::cpu::{Step, Workspace};
 use super::plan::Plan;
-use crate::scalar::Real;
+use crate::scalar::{Real, Vec3};
 use crate::state::State;
 
 /// What a solver is asked to do.
-#[derive(Clone, Copy)]
 pub(super) enum Task<'a> {
     /// The stages of a step, the body of the plan so many times; of these stages the first so many.
     Step(&'a Plan, u32, usize),
+    /// The stages of a step, the body of the plan so many times, under somebody's eyes.
+    Watched(&'a Plan, u32, &'a mut Watch<'a>),
     /// Multipliers from positions.
     Restart,
 }
+
+/// Who looks at the places of all vertices [m], the user's order, after so many iterations.
+pub(super) type Watch<'a> = dyn FnMut(u32, &[Vec3<f64>]) + Send + 'a;
 
 /// Does it in the precision at hand.
 pub(super) fn carry_out<S: Real>(
@@ -77,6 +81,22 @@ fn generic<S: Real>(
             for stage in plan.stages(repeat).take(count) {
                 work.run(stage, step, state);
             }
+        }
+        Task::Watched(plan, repeat, watch) => {
+            let mut places = vec![Vec3::ZERO; step.model.vertex_count()];
+            let mut show = |work: &Workspace<S>, iteration| {
+                for (point, &user) in work.points.iter().zip(&step.model.numbering.order) {
+                    places[user as usize] = point.vec3().cast();
+                }
+                watch(iteration, &places);
+            };
+            plan.prologue.iter().for_each(|stage| work.run(stage, step, state));
+            show(work, 0);
+            for iteration in 1..=repeat {
+                plan.body.iter().for_each(|stage| work.run(stage, step, state));
+                show(work, iteration);
+            }
+            plan.epilogue.iter().for_each(|stage| work.run(stage, step, state));
         }
         Task::Restart => work.restart(step, state),
     });

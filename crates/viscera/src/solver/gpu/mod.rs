@@ -290,6 +290,27 @@ impl GpuSolver {
         [0, 1, 2].map(|list| self.ready[list].len())
     }
 
+    /// The same of a solver that is not built, and needs no device: how many passes over the mesh, one after
+    /// the other, an iteration is.
+    pub fn dispatches_of(model: &Model<f32>, settings: &SolverSettings) -> [usize; 3] {
+        let plan = Plan::new(model, settings);
+        let layout = Layout::new(model);
+        let multipliers = 4 * model.vertex_count() as u32;
+        let vector = [multipliers + model.multiplier_count as u32, multipliers];
+        let pieces =
+            Pieces { count: layout.piece_count, first_of_vertices: layout.first_of_vertices() };
+        let record = Recorder::new(model, settings, &plan, vector, pieces).record(&plan);
+        [record.prologue, record.body, record.epilogue].map(|list| list.len())
+    }
+
+    /// Iterations of the steps to come, at least one; neither kernels nor memory depend on them.
+    pub fn set_iterations(&mut self, count: u32) {
+        self.settings.iterations = count.max(1);
+        if self.settings.method == Method::Xpbd {
+            self.plan.repeat = self.settings.iterations;
+        }
+    }
+
     /// About how many tetrahedra of meshes like this one, solved like this, a device with these limits
     /// takes: as many as its largest array fits into a binding.
     pub fn largest_mesh(&self, model: &Model<f32>, limits: &wgpu::Limits) -> u64 {

@@ -1,0 +1,105 @@
+//! What a user wants otherwise: stiffness, compressibility or shape of the scenes.
+
+use anyhow::{Context as _, Result, bail, ensure};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use viscera::material::{Material, MaterialModel};
+use viscera::mesh::{TetMesh, io};
+use viscera::units::Dimension;
+
+use crate::scenes::{Scene, Size, tissue};
+
+/// Changes to the scenes of a study, from `--set KEY=VALUE`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Changes {
+    /// Young's modulus [Pa].
+    pub young: Option<f64>,
+    /// Poisson's ratio.
+    pub poisson: Option<f64>,
+    /// A mesh in the place of the bar.
+    pub mesh: Option<PathBuf>,
+    /// As they were written.
+    written: Vec<String>,
+}
+
+/// The keys, for help and errors.
+const KEYS: &str = "young, poisson or mesh";
+
+impl Changes {
+    /// Reads `KEY=VALUE` texts; of a key that is given twice the last counts.
+    pub fn parse(texts: &[String]) -> Result<Self> {
+        let mut changes = Self::default();
+        for text in texts {
+            let Some((key, value)) = text.split_once('=') else {
+                bail!("--set {text}: write KEY=VALUE, for example --set young=\"20 kPa\"");
+            };
+            changes.set(key.trim(), value.trim()).with_context(|| format!("--set {text}"))?;
+            changes.written.push(text.clone());
+        }
+        // A pair that no tissue has is told at once, not in the middle of the work.
+        changes.tissue(MaterialModel::StableNeoHookean, 1e4, 0.45).context("--set")?;
+        Ok(changes)
+    }
+
+    fn set(&mut self, key: &str, value: &str) -> Result<()> {
+        match key {
+            "young" => {
+                let young = Dimension::Pressure.parse(value)?;
+                ensure!(young > 0.0, "Young's modulus must be above zero, for example 20 kPa");
+                self.young = Some(young);
+            }
+            "poisson" => {
+                let poisson: f64 =
+                    value.parse().ok().filter(|p: &f64| p.is_finite()).with_context(|| {
+                        format!("{value} is no number; write for example --set poisson=0.45")
+                    })?;
+                self.poisson = Some(poisson);
+            }
+            "mesh" => {
+                let path = Path::new(value);
+                ensure!(path.is_file(), "there is no file {}", path.display());
+                self.mesh = Some(path.to_owned());
+            }
+            _ => bail!("there is no key `{key}`; a study's scenes have {KEYS}"),
+        }
+        Ok(())
+    }
+
+    /// Whether everything stays as it is.
+    pub fn is_empty(&self) -> bool {
+        self.written.is_empty()
+    }
+
+    /// Tissue with these numbers where nothing else is wanted.
+    pub fn tissue(&self, model: MaterialModel, young: f64, poisson: f64) -> Result<Material> {
+        tissue(model, self.young.unwrap_or(young), self.poisson.unwrap_or(poisson))
+    }
+
+    /// A scene of [`Scene::new`]; a mesh of the user's takes the place of a bar.
+    pub fn scene(&self, name: &'static str, size: Size, tissue: Material) -> Result<Scene> {
+        let scene = Scene::new(name, size, tissue)?;
+        match &self.mesh {
+            Some(path) if matches!(name, "cantilever" | "twist") => {
+                let mesh = read_mesh(path)?;
+                Ok(scene.with_bar(mesh))
+            }
+            _ => Ok(scene),
+        }
+    }
+}
+
+fn read_mesh(path: &Path) -> Result<TetMesh> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let name = path.display().to_string();
+    Ok(io::read_tet_mesh(&name, &bytes, 1.0)?.0)
+}
+
+impl fmt::Display for Changes {
+    /// As one writes them on the command line, with a blank before each.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.written.iter().try_for_each(|text| match text.contains(' ') {
+            true => write!(f, " --set \"{text}\""),
+            false => write!(f, " --set {text}"),
+        })
+    }
+}

@@ -1,0 +1,73 @@
+//! The methods that the study compares, by their settings.
+
+use viscera::settings::{
+    Acceleration, AndersonGuard, AndersonOn, Colors, RelaxationForm, SolverSettings, Threads,
+};
+
+/// Settings with the name that tables and legends give them.
+#[derive(Clone, Debug)]
+pub struct Method {
+    /// A few words.
+    pub name: String,
+    /// One step per frame, one thread.
+    pub settings: SolverSettings,
+}
+
+impl Method {
+    /// Named settings.
+    pub fn new(name: impl Into<String>, settings: SolverSettings) -> Self {
+        Self { name: name.into(), settings }
+    }
+
+    /// With so many iterations.
+    pub fn with_iterations(mut self, iterations: u32) -> Self {
+        self.settings.iterations = iterations;
+        self
+    }
+}
+
+impl std::fmt::Display for Method {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.name)
+    }
+}
+
+/// XPBD as published: multipliers from zero in every step, no rebase, no safeguards.
+pub fn published(colors: Colors) -> SolverSettings {
+    SolverSettings {
+        substeps: 1,
+        colors,
+        threads: Threads::Count(1),
+        rebase: false,
+        keep_multipliers: false,
+        step_guard: false,
+        anderson_guard: AndersonGuard::None,
+        ..SolverSettings::default()
+    }
+}
+
+/// XPBD, exact at rest: rebase, kept multipliers, safeguards.
+pub fn exact(colors: Colors) -> SolverSettings {
+    SolverSettings { substeps: 1, colors, threads: Threads::Count(1), ..SolverSettings::default() }
+}
+
+/// With over-relaxation by `omega`.
+pub fn relaxed(settings: SolverSettings, omega: f64, form: RelaxationForm) -> SolverSettings {
+    SolverSettings { relaxation: omega, relaxation_form: form, ..settings }
+}
+
+/// With Chebyshev's method; `radius` 0 measures it.
+pub fn chebyshev(settings: SolverSettings, radius: f64) -> SolverSettings {
+    SolverSettings { acceleration: Acceleration::Chebyshev, chebyshev_radius: radius, ..settings }
+}
+
+/// With Anderson's method, window 5, on these unknowns; the settings' guard stays.
+pub fn anderson(settings: SolverSettings, on: AndersonOn) -> SolverSettings {
+    SolverSettings { acceleration: Acceleration::Anderson, anderson_on: on, ..settings }
+}
+
+/// One colour: every tetrahedron has vertices of its own.
+pub const JACOBI: Colors = Colors::Limited(1);
+
+/// As many colours as it takes.
+pub const COLORED: Colors = Colors::Unlimited;

@@ -1,0 +1,223 @@
+//! One step whose exact end is known, and how methods come near it.
+//!
+//! Error of positions `x`: `|x - x*|_M / |xt - x*|_M`, with `x*` the minimum of the incremental potential
+//! by Newton's method, and `xt` the inertial prediction, from which everybody could start.
+
+use anyhow::{Context as _, Result};
+use std::time::Instant;
+use viscera::measure::measure_tets;
+use viscera::model::Model;
+use viscera::scalar::{Real, Vec3};
+use viscera::settings::SolverSettings;
+use viscera::solver::gpu::GpuSolver;
+use viscera::solver::{Inputs, Solver};
+use viscera::state::State;
+
+use crate::reference::Reference;
+use crate::scenes::{FRAME_RATE, Scene};
+
+/// Beyond this a curve has left the scene: it is cut there.
+const LOST: f64 = 1e6;
+
+/// A step of a frame, from a state that exact implicit Euler has led to.
+pub struct MeasuredStep {
+    /// Body and what happens to it.
+    pub scene: Scene,
+    /// At the beginning of the step.
+    pub state: State<f64>,
+    /// [s].
+    pub dt: f64,
+    /// Where all vertices are [m] at the end, exactly.
+    pub exact: Vec<Vec3<f64>>,
+    /// In the middle of things: frames before this one.
+    pub history: u32,
+    masses: Vec<f64>,
+    /// Of the prediction, in the norm of the masses.
+    start_error: f64,
+    /// Root mean square Green strain of the exact end.
+    strain: f64,
+}
+
+/// How a method comes near: errors after 0, 1, 2, ... iterations.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// Where the method starts, then after each iteration.
+    pub errors: Vec<f64>,
+    /// Root mean square Green strain at the end over the true one.
+    pub strain_ratio: f64,
+}
+
+/// What an iteration costs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cost {
+    /// Passes over the mesh that wait for each other: dispatches of the GPU backend.
+    pub passes: usize,
+    /// On one thread of this machine [s].
+    pub seconds: f64,
+}
+
+impl MeasuredStep {
+    /// The step after so many frames of the scene.
+    pub fn new(scene: Scene, history: u32) -> Result<Self> {
+        let model = scene.model::<f64>(&SolverSettings::default())?;
+        let mut reference = Reference::new(&model);
+        let mut state = State::at_rest(&model);
+        let dt = 1.0 / FRAME_RATE;
+        let mut advance = |state: &mut State<f64>, frame: u32| {
+            let inputs = scene.inputs(f64::from(frame));
+            reference
+                .step(state, &inputs, dt)
+                .with_context(|| format!("the reference of {scene}, frame {frame}"))
+        };
+        for frame in 1..=history {
+            advance(&mut state, frame)?;
+        }
+        let mut end = state.clone();
+        advance(&mut end, history + 1)?;
+        let mut step = Self {
+            state,
+            dt,
+            exact: end.positions,
+            history,
+            masses: model.masses.clone(),
+            start_error: 1.0,
+            strain: 1.0,
+            scene,
+        };
+        let mut predicted = step.state.positions.clone();
+        let inputs = step.inputs::<f64>();
+        for (x, v) in predicted.iter_mut().zip(&step.state.velocities) {
+            *x += *v * dt + inputs.gravity * (dt * dt);
+        }
+        for pin in &inputs.pins {
+            predicted[pin.vertex as usize] = pin.target;
+        }
+        step.start_error = step.error(&predicted);
+        step.strain = step.strain_of(&step.exact)?;
+        Ok(step)
+    }
+
+    /// What acts during the step.
+    pub fn inputs<S: Real>(&self) -> Inputs<S> {
+        self.scene.inputs(f64::from(self.history + 1))
+    }
+
+    /// How far positions [m] are from the exact end.
+    pub fn error(&self, positions: &[Vec3<f64>]) -> f64 {
+        let distances = positions.iter().zip(&self.exact).map(|(x, y)| (*x - *y).length_squared());
+        let sum: f64 = distances.zip(&self.masses).map(|(d, m)| d * m).sum();
+        sum.sqrt() / self.start_error
+    }
+
+    /// Root mean square Green strain over the body's volume.
+    fn strain_of(&self, positions: &[Vec3<f64>]) -> Result<f64> {
+        let model = self.scene.model::<f64>(&SolverSettings::default())?;
+        let mut tets = Vec::new();
+        measure_tets(&model, positions, &mut tets);
+        let squared = |stretches: [f64; 3]| -> f64 {
+            stretches.iter().map(|s| (0.5 * (s * s - 1.0)).powi(2)).sum()
+        };
+        let sum: f64 = tets.iter().map(|tet| tet.rest_volume * squared(tet.stretches)).sum();
+        Ok((sum / tets.iter().map(|tet| tet.rest_volume).sum::<f64>()).sqrt())
+    }
+
+    /// A method on this step. Steps of its own begin with its own rules, but where multipliers are kept:
+    /// the exact steps before have left those that answer to the positions.
+    pub fn follow<S: Real>(&self, settings: &SolverSettings) -> Result<Curve> {
+        let model = self.scene.model::<S>(settings)?;
+        let (mut solver, mut state) = self.begin(&model, settings)?;
+        let mut errors = Vec::with_capacity(settings.iterations as usize + 1);
+        let mut last = self.exact.clone();
+        solver.step_watched(&model, &mut state, &self.inputs(), self.dt, |_, x| {
+            let error = self.error(x);
+            if errors.last().is_none_or(|last| *last < LOST) {
+                errors.push(if error.is_finite() { error } else { f64::INFINITY });
+                last.copy_from_slice(x);
+            }
+        })?;
+        let strain_ratio = self.strain_ratio(&last)?;
+        Ok(Curve { errors, strain_ratio })
+    }
+
+    /// Strain of positions [m] over the true strain.
+    pub fn strain_ratio(&self, positions: &[Vec3<f64>]) -> Result<f64> {
+        Ok(self.strain_of(positions)? / self.strain)
+    }
+
+    /// Where a method has the vertices [m] after its iterations, safeguards of the step included.
+    pub fn end<S: Real>(&self, settings: &SolverSettings) -> Result<Vec<Vec3<f64>>> {
+        let model = self.scene.model::<S>(settings)?;
+        let (mut solver, mut state) = self.begin(&model, settings)?;
+        let dt = self.dt / f64::from(settings.substeps);
+        for substep in 1..=settings.substeps {
+            let share = f64::from(substep) / f64::from(settings.substeps);
+            let inputs = self.scene.inputs(f64::from(self.history) + share);
+            solver.step(&model, &mut state, &inputs, dt)?;
+        }
+        Ok(state.positions.iter().map(|x| x.cast()).collect())
+    }
+
+    /// A solver, and the state at the beginning.
+    pub fn begin<S: Real>(
+        &self,
+        model: &Model<S>,
+        settings: &SolverSettings,
+    ) -> Result<(Solver<S>, State<S>)> {
+        let mut solver = Solver::new(model, settings);
+        let mut state = State::at_rest(model);
+        state.positions = self.state.positions.iter().map(|x| x.cast()).collect();
+        state.velocities = self.state.velocities.iter().map(|v| v.cast()).collect();
+        let before: Inputs<S> = self.scene.inputs(f64::from(self.history));
+        let dt = self.dt / f64::from(settings.substeps);
+        solver.restart(model, &mut state, &before, dt)?;
+        Ok((solver, state))
+    }
+
+    /// What an iteration of a method costs, in single precision on one thread.
+    pub fn cost(&self, settings: &SolverSettings) -> Result<Cost> {
+        const ITERATIONS: u32 = 20;
+        let settings = SolverSettings {
+            threads: viscera::settings::Threads::Count(1),
+            step_guard: false,
+            ..settings.clone()
+        };
+        let model = self.scene.model::<f32>(&settings)?;
+        let (mut solver, start) = self.begin(&model, &settings)?;
+        let inputs = self.inputs();
+        // A step of so many iterations less one of a single one: what surrounds iterations goes out.
+        let mut least = |count: u32| -> Result<f64> {
+            solver.set_iterations(count);
+            let mut least = f64::INFINITY;
+            for _ in 0..3 {
+                let mut state = start.clone();
+                let begin = Instant::now();
+                solver.step(&model, &mut state, &inputs, self.dt)?;
+                least = least.min(begin.elapsed().as_secs_f64());
+            }
+            Ok(least)
+        };
+        let seconds = (least(1 + ITERATIONS)? - least(1)?) / f64::from(ITERATIONS);
+        let passes = GpuSolver::dispatches_of(&model, &settings)[1];
+        Ok(Cost { passes, seconds })
+    }
+}
+
+impl Curve {
+    /// The first iteration after which the error is at most `level`.
+    pub fn first_below(&self, level: f64) -> Option<usize> {
+        self.errors.iter().position(|error| *error <= level)
+    }
+
+    /// The smallest error.
+    pub fn least(&self) -> f64 {
+        self.errors.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Where the errors come to stand: the last fifth of the iterations no longer gains a tenth.
+    pub fn plateau(&self) -> Option<f64> {
+        let cut = self.errors.len() * 4 / 5;
+        let least = |errors: &[f64]| errors.iter().copied().fold(f64::INFINITY, f64::min);
+        let (before, after) = (least(&self.errors[..cut]), least(&self.errors[cut..]));
+        (after > 0.9 * before).then_some(before.min(after))
+    }
+}
