@@ -1,19 +1,11 @@
 //! The program `viscera-lab validate`.
 
+mod common;
+
+use common::{lab, text};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn lab(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_viscera-lab"))
-        .args(arguments)
-        .output()
-        .expect("the program starts")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
+use std::process::Output;
 
 fn quick_patch(out: &Path) -> Output {
     lab(&["validate", "--quick", "--only", "patch", "--out", &out.to_string_lossy()])

@@ -12,6 +12,12 @@ pub enum PictureError {
         /// Requested height [pixels].
         height: u32,
     },
+    /// Pictures that are to stand side by side differ in size.
+    #[error("picture {index} has another size than the first; draw all with one camera")]
+    UnequalSizes {
+        /// The first that differs.
+        index: usize,
+    },
     /// A triangle refers to a vertex that does not exist.
     #[error(
         "{part} {index}: triangle {triangle} refers to vertex {vertex}; there are {vertex_count}"

@@ -46,6 +46,30 @@ impl Image {
         Self { size, pixels: vec![srgb; size.width as usize * size.height as usize] }
     }
 
+    /// Pictures of one size in rows of so many.
+    pub fn tiled(images: &[Self], columns: usize) -> Result<Self, PictureError> {
+        let columns = columns.clamp(1, images.len().max(1));
+        let one = images.first().map_or(ImageSize { width: 0, height: 0 }, |image| image.size);
+        let rows = images.len().div_ceil(columns);
+        let size = ImageSize::new(
+            one.width.saturating_mul(columns as u32),
+            one.height.saturating_mul(rows as u32),
+        )?;
+        let mut tiled = Self::filled(size, [255; 3]);
+        for (index, image) in images.iter().enumerate() {
+            if image.size != one {
+                return Err(PictureError::UnequalSizes { index });
+            }
+            let left = (index % columns) * one.width as usize;
+            let top = (index / columns) * one.height as usize;
+            for (row, pixels) in image.pixels.chunks(one.width as usize).enumerate() {
+                let begin = (top + row) * size.width as usize + left;
+                tiled.pixels[begin..begin + pixels.len()].copy_from_slice(pixels);
+            }
+        }
+        Ok(tiled)
+    }
+
     /// Width and height.
     pub fn size(&self) -> ImageSize {
         self.size

@@ -214,7 +214,24 @@ fn dispatches_of_an_iteration_are_few() {
         let [before, iteration, after] = gpu.dispatches();
         println!("{acceleration:?}: {before} + {iteration} per iteration + {after}");
         assert!(iteration <= most, "{acceleration:?}: {iteration}");
+        assert_eq!(GpuSolver::dispatches_of(&model, &settings), gpu.dispatches());
     }
+}
+
+/// A number of iterations that is set later gives the bits of a solver built with it.
+#[test]
+fn iterations_can_be_set_from_step_to_step() {
+    let ends = [5, 2].map(|built_with| {
+        let settings = SolverSettings { iterations: built_with, ..SolverSettings::default() };
+        let (model, double) = (everything(&settings), everything(&settings));
+        let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
+        gpu.set_iterations(5);
+        gpu.step(&model, &inputs_at(&double, 0), DT).expect("a legal step");
+        let mut state = State::at_rest(&model);
+        gpu.read(&model, &mut state).expect("a device");
+        state
+    });
+    assert_eq!(ends[0], ends[1]);
 }
 
 /// Frames come while steps go on; none is older than the one before it.

@@ -104,7 +104,12 @@ impl MeasuredStep {
 
     /// How far positions [m] are from the exact end.
     pub fn error(&self, positions: &[Vec3<f64>]) -> f64 {
-        let distances = positions.iter().zip(&self.exact).map(|(x, y)| (*x - *y).length_squared());
+        self.distance(positions, &self.exact)
+    }
+
+    /// How far positions [m] are from others, in the same measure.
+    pub fn distance(&self, positions: &[Vec3<f64>], others: &[Vec3<f64>]) -> f64 {
+        let distances = positions.iter().zip(others).map(|(x, y)| (*x - *y).length_squared());
         let sum: f64 = distances.zip(&self.masses).map(|(d, m)| d * m).sum();
         sum.sqrt() / self.start_error
     }
@@ -148,13 +153,18 @@ impl MeasuredStep {
     pub fn end<S: Real>(&self, settings: &SolverSettings) -> Result<Vec<Vec3<f64>>> {
         let model = self.scene.model::<S>(settings)?;
         let (mut solver, mut state) = self.begin(&model, settings)?;
-        let dt = self.dt / f64::from(settings.substeps);
-        for substep in 1..=settings.substeps {
-            let share = f64::from(substep) / f64::from(settings.substeps);
-            let inputs = self.scene.inputs(f64::from(self.history) + share);
+        for (inputs, dt) in self.substeps(settings.substeps) {
             solver.step(&model, &mut state, &inputs, dt)?;
         }
         Ok(state.positions.iter().map(|x| x.cast()).collect())
+    }
+
+    /// The step divided into so many: what acts in each, and how long it is [s].
+    pub fn substeps<S: Real>(&self, count: u32) -> impl Iterator<Item = (Inputs<S>, f64)> {
+        (1..=count).map(move |substep| {
+            let share = f64::from(substep) / f64::from(count);
+            (self.scene.inputs(f64::from(self.history) + share), self.dt / f64::from(count))
+        })
     }
 
     /// A solver, and the state at the beginning.

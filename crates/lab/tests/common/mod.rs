@@ -1,9 +1,10 @@
-//! Helpers shared by the integration tests: the fixtures of `tests/fixtures`, see its README.
+//! Helpers shared by the integration tests: the program, and the fixtures of `tests/fixtures`, see its README.
 #![allow(dead_code)]
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+use std::process::{Command, Output};
 
 use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
@@ -180,4 +181,17 @@ pub fn difference(a: &[Vec3<f64>], b: &[Vec3<f64>]) -> Vec<Vec3<f64>> {
 /// Largest difference of positions over the largest displacement from rest.
 pub fn position_error(x: &[Vec3<f64>], expected: &[Vec3<f64>], rest: &[Vec3<f64>]) -> f64 {
     largest(&difference(x, expected)) / largest(&difference(expected, rest))
+}
+
+/// Runs the program.
+pub fn lab(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_viscera-lab"))
+        .args(arguments)
+        .output()
+        .expect("the program starts")
+}
+
+/// What a program has written.
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
 }
