@@ -1,12 +1,13 @@
 // The step guard and the guard of mixtures (solver/guard.rs), in one workgroup: what decides is small.
 // What follows a bad verdict is not, but rare: there the workgroup goes through the whole model, so that
-// a step that is accepted pays one dispatch for all of it.
+// a step that is accepted pays one dispatch for all of it, and one that does nothing.
 //
 // One loop takes turns. Each sums one potential, then the first thread says what is next:
 //
 //   PIECES -> DONE                                   nothing to search for
 //   PIECES -> SHARE ... -> MOVE                      a share of the step passes
 //   PIECES -> SHARE ... -> AIM -> LENGTH ... -> MOVE   none does: descent, up to three times from AIM on
+//   PIECES -> AIM -> LENGTH ... -> MOVE              mixtures and plain sweeps fail: one descent
 //
 // Compilers put a function in wherever it is called, and some take seconds for the energies: whatever is
 // long is called at one place.
