@@ -158,8 +158,11 @@ fn steps(output: &Path, second_driver: Option<&Path>) -> Vec<Step> {
         },
     ];
     if let Some(driver) = second_driver {
-        let mut command = cargo(&["test", "--workspace", "--test", "twins", "--test", "gpu", "--"]);
-        command.args(["device_errs", "nasty", "portable"]);
+        let mut command = cargo(&["test", "--workspace"]);
+        for test in ["twins", "gpu", "gpu_guard", "gpu_history", "gpu_explicit", "gpu_surface"] {
+            command.args(["--test", test]);
+        }
+        command.args(["--", "device_errs", "nasty", "portable"]);
         for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
             command.env(variable, driver);
         }

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
-use viscera::settings::{Method, Precision};
+use viscera::settings::{DeviceRequest, Method, Precision};
 use viscera::simulation::{Assembly, Simulation};
 use viscera_report::Memory;
 
@@ -128,7 +128,7 @@ fn simulate<S: Real>(
     for note in &assembly.notes {
         eprintln!("note: {note}");
     }
-    let mut simulation = Simulation::<S>::new(scene, assembly)?;
+    let mut simulation = build::<S>(scene, assembly)?;
     // Where the device is refused no folder stays behind.
     let out = &OutputFolder::create(folder)?;
     let summary = Summary::new(&simulation, overrides);
@@ -204,6 +204,18 @@ fn simulate<S: Real>(
     Ok(Outcome::Interrupted)
 }
 
+/// Some drivers compile kernels for seconds, here or with the first frame.
+fn build<S: Real>(scene: Scene, assembly: Assembly) -> Result<Simulation<S>> {
+    let device = &scene.solver.device;
+    let waiting = (*device != DeviceRequest::Cpu)
+        .then(|| progress::spinner(format!("compiling kernels for device \"{device}\"")));
+    let simulation = Simulation::new(scene, assembly);
+    if let Some(spinner) = waiting {
+        spinner.finish_and_clear();
+    }
+    Ok(simulation?)
+}
+
 /// What a run keeps of its frames.
 struct Recording {
     film: Option<Film>,
@@ -226,6 +238,9 @@ impl Recording {
         let bar = progress::bar(frames, "simulating", "{msg}");
         let mut wall_total = 0.0;
         let mut stop = interrupted.load(Ordering::Relaxed);
+        if simulation.is_on_device() {
+            bar.set_message("the driver may still be compiling kernels");
+        }
         while simulation.frame() < frames && !stop {
             let start = Instant::now();
             simulation.advance_frame()?;

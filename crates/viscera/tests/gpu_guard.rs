@@ -13,7 +13,7 @@ use viscera::measure::measure_tets;
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
-use viscera::settings::{Acceleration, AndersonGuard, Colors, Precision, SolverSettings};
+use viscera::settings::{Acceleration, AndersonGuard, Colors, Precision, SolverSettings, Start};
 use viscera::solver::gpu::{Device, GpuSolver};
 use viscera::solver::{Inputs, Pin, Solver, StepReport};
 use viscera::state::State;
@@ -239,6 +239,79 @@ fn violent_grabs_are_taken_back() {
         // Both come closer still with more steps; sweeps of one colour are the slowest. Another rest,
         // with tetrahedra turned inside out, would be millimetres away.
         assert!(cpu < 2e-5 && gpu < 2e-5, "seed {seed}: {cpu} and {gpu}");
+    }
+}
+
+/// A bar of a few tetrahedra whose vertices jump, for a second, slower driver: steps are taken back where the
+/// CPU takes them back, and none ends above its limit.
+#[test]
+fn portable_jumps_are_taken_back() {
+    let mesh = block([0.04, 0.02, 0.02], [2, 1, 1], 0.1);
+    let settings = SolverSettings::default();
+    let tissue = material(STVK, 1e4, 0.45);
+    let model32 = single_body::<f32>(&mesh, &tissue, &settings);
+    let model64 = single_body::<f64>(&mesh, &tissue, &settings);
+    // Chosen for what they lead to on the CPU.
+    for seed in [0, 1] {
+        let mut trio = Trio::new(device(), (&model32, &model64), &settings);
+        let mut random = Random(seed);
+        let mut inputs = Inputs { gravity: GRAVITY, ..Inputs::default() };
+        for vertex in [0, 5, 11] {
+            let target = mesh.vertices()[vertex as usize] + random.vector(0.08);
+            inputs.pins.push(Pin { vertex, target });
+        }
+        let mut taken_back = 0;
+        for step in 0..4 {
+            trio.step(&inputs);
+            let (cpu, gpu) = (trio.cpu.last_step().expect("a guarded step"), trio.report());
+            println!("seed {seed}, step {step}: {cpu:?}, {gpu:?}");
+            assert!(gpu.keeps_limit(), "seed {seed}, step {step}: {gpu:?}");
+            assert_eq!(gpu.rejected, cpu.rejected, "seed {seed}, step {step}");
+            taken_back += u32::from(gpu.rejected);
+        }
+        assert_eq!(taken_back, 1, "seed {seed}");
+    }
+}
+
+/// Where no start has an energy that is a number there is nothing to be below of: a step is taken back,
+/// however finite its end; below an infinite limit it passes.
+#[test]
+fn portable_limit_that_is_no_number_lets_nothing_pass() {
+    // No rebase to speak of, and from where vertices are: sweeps know nothing of the prediction.
+    let settings = SolverSettings {
+        rebase_factor: 1e-30,
+        start: Start::Previous,
+        iterations: 20,
+        ..SolverSettings::default()
+    };
+    let mesh = block([0.02, 0.01, 0.01], [2, 1, 1], 0.1);
+    let count = mesh.vertices().len();
+    let mut builder = ModelBuilder::new();
+    builder.add_body(&mesh, &material(STVK, 1e4, 0.3)).expect("a body");
+    builder.add_body(&mesh, &material(SNH, 1e4, 0.3)).expect("a body");
+    let model = builder.build::<f32>(&settings).expect("a model");
+    // The first body so large that its energy overflows, also where it is going to: an infinite limit.
+    let mut state = State::at_rest(&model);
+    state.positions[..count].iter_mut().for_each(|x| *x = *x * 2e9);
+    // The second is to be pulled apart so far that its volumes overflow, with either sign.
+    let mut random = Random(1);
+    let pulls = (0..count).map(|v| ((count + v) as u32, random.vector(3e18).cast()));
+    let pulls = pulls.collect::<Vec<_>>();
+    for (forces, limit_is_number) in [(vec![], true), (pulls, false)] {
+        let inputs = Inputs { forces, ..Inputs::default() };
+        let mut cpu = Solver::new(&model, &settings);
+        let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
+        gpu.write(&model, &state).expect("a state that fits");
+        cpu.step(&model, &mut state.clone(), &inputs, DT).expect("a legal step");
+        gpu.step(&model, &inputs, DT).expect("a legal step");
+        let (cpu, gpu) = (cpu.last_step().expect("a guarded step"), gpu.last_step());
+        let gpu = gpu.expect("a device").expect("a guarded step");
+        println!("{cpu:?}, {gpu:?}");
+        for report in [cpu, gpu] {
+            assert!(!report.limit.is_finite(), "{report:?}");
+            assert_eq!(report.limit.is_nan(), !limit_is_number, "{report:?}");
+            assert_eq!(report.rejected, !limit_is_number, "{report:?}");
+        }
     }
 }
 

@@ -4,7 +4,7 @@ mod common;
 #[path = "common/device.rs"]
 mod device;
 
-use common::{SNH, STVK, block, material};
+use common::{Random, SNH, STVK, block, material};
 use device::largest;
 use viscera::mesh::embed::Embedding;
 use viscera::mesh::normals::vertex_normals;
@@ -72,6 +72,27 @@ impl Bodies {
         }
         [places, normals]
     }
+
+    /// Both round, and neither is right: the device may be twice as far from double precision.
+    fn assert_agreement(
+        &self,
+        model: &Model<f32>,
+        state: &State<f32>,
+        [places, normals]: [&[Vec3<f32>]; 2],
+    ) {
+        let x: Vec<Vec3<f64>> = state.positions.iter().map(|x| x.cast()).collect();
+        let [places64, normals64] = self.surface(model, &x);
+        let [places32, normals32] = self.surface(model, &state.positions);
+        for (what, cpu, gpu, oracle) in [
+            ("positions", &places32, places, &places64),
+            ("normals", &normals32, normals, &normals64),
+        ] {
+            assert_eq!(gpu.len(), oracle.len());
+            let [cpu, gpu] = [largest(cpu, oracle), largest(gpu, oracle)];
+            println!("{what}: CPU {cpu:.1e}, GPU {gpu:.1e}");
+            assert!(gpu <= 2.0 * cpu && gpu > 0.0, "{what}: CPU {cpu:e}, GPU {gpu:e}");
+        }
+    }
 }
 
 fn settings() -> SolverSettings {
@@ -107,23 +128,31 @@ fn surface_is_where_the_embedding_puts_it() {
     );
     assert!(moved > 0.005, "nothing happened: {moved} m");
 
-    let x: Vec<Vec3<f64>> = state.positions.iter().map(|x| x.cast()).collect();
-    let [places64, normals64] = bodies.surface(&model, &x);
-    let [places32, normals32] = bodies.surface(&model, &state.positions);
-    for (what, cpu, gpu, oracle) in [
-        ("positions", &places32, &places, &places64),
-        ("normals", &normals32, &normals, &normals64),
-    ] {
-        assert_eq!(gpu.len(), oracle.len());
-        let [cpu, gpu] = [largest(cpu, oracle), largest(gpu, oracle)];
-        println!("{what}: CPU {cpu:.1e}, GPU {gpu:.1e}");
-        assert!(gpu <= 2.0 * cpu && gpu > 0.0, "{what}: CPU {cpu:e}, GPU {gpu:e}");
-    }
+    bodies.assert_agreement(&model, &state, [&places, &normals]);
     // Follows the next steps as well, with the same bits from run to run.
     let again = fall(device, &model);
     let other = GpuSurface::new(&again, &model, &bodies.skins(&model)).expect("it fits");
     other.update();
     assert_eq!(other.read().expect("a device"), [places, normals]);
+}
+
+/// Scrambled vertices and no step, for a second, slower driver.
+#[test]
+fn portable_surface_is_where_the_embedding_puts_it() {
+    let bodies = bodies();
+    let model = bodies.model::<f32>();
+    let mut state = State::at_rest(&model);
+    let mut random = Random(5);
+    for x in &mut state.positions {
+        *x += random.vector(0.002).cast();
+    }
+    let mut solver =
+        GpuSolver::new(device::device(), &model, &settings()).expect("a model that fits");
+    solver.write(&model, &state).expect("a state that fits");
+    let surface = GpuSurface::new(&solver, &model, &bodies.skins(&model)).expect("it fits");
+    surface.update();
+    let [places, normals] = surface.read().expect("a device");
+    bodies.assert_agreement(&model, &state, [&places, &normals]);
 }
 
 #[test]

@@ -2,7 +2,6 @@
 
 use super::computers::Computer;
 use super::measurement::Measurement;
-use anyhow::Result;
 use serde::Serialize;
 use std::time::Instant;
 
@@ -18,14 +17,22 @@ pub struct Bandwidth {
     pub device: &'static str,
     /// None of a GPU.
     pub threads: Option<u32>,
-    /// Bytes read and bytes written.
-    pub bytes_per_second: f64,
+    /// Bytes read and bytes written; none where it could not be measured.
+    pub bytes_per_second: Option<f64>,
 }
 
 impl Bandwidth {
-    pub fn measure(computer: &dyn Computer) -> Result<Self> {
-        let bytes_per_second = computer.copy_bandwidth()?;
-        Ok(Self { device: computer.kind(), threads: computer.threads(), bytes_per_second })
+    /// What goes wrong is noted: solvers can be measured without it.
+    pub fn measure(computer: &dyn Computer, notes: &mut Vec<String>) -> Self {
+        let device = computer.kind();
+        let measured = computer.copy_bandwidth();
+        if let Err(error) = &measured {
+            notes.push(format!(
+                "how fast the {device} copies memory could not be measured ({error:#}), so that \
+                 the column `of bandwidth` is empty for it"
+            ));
+        }
+        Self { device, threads: computer.threads(), bytes_per_second: measured.ok() }
     }
 
     /// Whether the case was measured on the same computer.
@@ -54,4 +61,44 @@ pub fn of_memory(threads: u32) -> f64 {
     // Nobody reads the target; the copies must happen all the same.
     std::hint::black_box(&target);
     2.0 * COPIED as f64 / fastest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::computers::Stepper;
+    use super::super::measurement::Bench;
+    use super::*;
+    use anyhow::{Result, bail};
+
+    struct Broken;
+
+    impl Computer for Broken {
+        fn kind(&self) -> &'static str {
+            "GPU"
+        }
+
+        fn threads(&self) -> Option<u32> {
+            None
+        }
+
+        fn copy_bandwidth(&self) -> Result<f64> {
+            bail!("its memory is too small")
+        }
+
+        fn stepper<'a>(&self, _: &'a Bench<'_>, _: u32) -> Result<Box<dyn Stepper + 'a>> {
+            bail!("it does no steps")
+        }
+    }
+
+    /// Told, and no end of the run.
+    #[test]
+    fn a_bandwidth_that_cannot_be_measured_is_noted() {
+        let mut notes = Vec::new();
+        let bandwidth = Bandwidth::measure(&Broken, &mut notes);
+        assert_eq!(bandwidth.bytes_per_second, None);
+        assert!(
+            matches!(&notes[..], [note] if note.contains("its memory is too small")),
+            "{notes:?}"
+        );
+    }
 }

@@ -114,7 +114,7 @@ impl<'a> Bench<'a> {
         // Noise above the signal is no cost below zero.
         let unit_seconds = (unit_seconds > 0.0).then_some(unit_seconds);
         let compulsory = self.compulsory_bytes() / tets as f64;
-        let fraction = |s: f64| compulsory * tets as f64 / s / bandwidth.bytes_per_second;
+        let fraction = |s: f64| Some(compulsory * tets as f64 / s / bandwidth.bytes_per_second?);
         let facts = few.facts.clone();
         Ok(Measurement {
             mesh: name.to_owned(),
@@ -136,7 +136,7 @@ impl<'a> Bench<'a> {
             unit_ns_per_tet: unit_seconds.map(|s| s * per_tet),
             bytes_per_tet: facts.bytes as f64 / tets as f64,
             compulsory_bytes_per_tet: compulsory,
-            bandwidth_fraction: unit_seconds.map(fraction),
+            bandwidth_fraction: unit_seconds.and_then(fraction),
             stages,
         })
     }

@@ -186,7 +186,7 @@ fn measure(
     let bar = progress::bar(length as u64, "measuring", "{pos} of {len} cases, {msg}");
     bar.set_message("memory");
     for computer in computers {
-        results.bandwidths.push(Bandwidth::measure(&**computer)?);
+        results.bandwidths.push(Bandwidth::measure(&**computer, &mut results.notes));
         bar.inc(1);
     }
     for Case { subject, entry, question } in cases {

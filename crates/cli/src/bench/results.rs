@@ -117,7 +117,8 @@ impl Results {
     fn heading(&self) -> String {
         let bandwidth = |b: &Bandwidth| {
             let with = b.threads.map_or("on the GPU".into(), |n| format!("with {}", threads(n)));
-            format!("{} {with}", si(b.bytes_per_second, "B/s"))
+            let speed = b.bytes_per_second.map_or("an unknown speed".into(), |s| si(s, "B/s"));
+            format!("{speed} {with}")
         };
         let bandwidths: Vec<String> = self.bandwidths.iter().map(bandwidth).collect();
         let gpu = self.adapter.as_ref().map_or(String::new(), |adapter| {

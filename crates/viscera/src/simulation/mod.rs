@@ -183,6 +183,11 @@ impl<S: Real> Simulation<S> {
         &self.backend.choice
     }
 
+    /// Whether something else than the CPU computes the steps.
+    pub fn is_on_device(&self) -> bool {
+        self.backend.elsewhere.is_some()
+    }
+
     /// What a person should know of the device: that it was lost and the CPU went on.
     pub fn device_warning(&self) -> Option<&str> {
         self.backend.warning.as_deref()

@@ -9,10 +9,10 @@ fn evaluate(
     if piece >= job.count {
         return;
     }
-    if (job.mode & UNLESS_GOOD) != 0u {
-        if agree(control.is_good != 0u, local) {
-            return;
-        }
+    let is_spared = (job.mode & UNLESS_GOOD) != 0u && control.is_good != 0u
+        || (job.mode & IF_REJECTED) != 0u && control.was_rejected == 0u;
+    if agree(is_spared, local) {
+        return;
     }
     sum_piece(piece, job.mode, local);
 }

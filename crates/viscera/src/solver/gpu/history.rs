@@ -1,12 +1,14 @@
 //! A new history on the device (solver/history.rs): two dispatches in a step, of which the second does
 //! nothing while all multipliers are numbers.
 
+use super::GpuSolver;
 use super::kernels;
 use super::record::{Dispatch, Job, Recorder};
-use super::{GpuSolver, Inputs, Marks, StepError};
+use super::timing::Marks;
 use crate::elements::TetForm;
 use crate::model::Model;
 use crate::scalar::lanes::LANES;
+use crate::solver::{Inputs, StepError};
 
 /// Workgroups of a repair: enough for a device to be busy when there is something to repair, few enough to
 /// cost little in all other steps.

@@ -1,9 +1,10 @@
 //! What a step gives to the device: what acts on vertices, and the weights of its norm.
 
+use super::GpuSolver;
 use super::buffers::{Buffers, Update};
-use super::{GpuSolver, Inputs};
 use crate::model::Model;
 use crate::settings::{Acceleration, AndersonOn, SolverSettings};
+use crate::solver::Inputs;
 use crate::solver::cpu::fill_multiplier_weights;
 
 impl GpuSolver {

@@ -129,7 +129,6 @@ kernels! {
     EVALUATE = Evaluate "evaluate" 256 [Tets Points StartStrain PartialSums Control Ground Table];
     SETTLE = Guard "settle" 256
         [Tets Points Loads StartStrain PartialSums Control Ground Table];
-    JUDGE = Guard "judge" 256 [Tets Points Loads StartStrain PartialSums Control Ground Table];
     TAKE = Take "take" 256 [Unknowns Mapped Control Ground Table];
     LIMIT_PARTS = Energy "limit_parts" 256 [Points PartialSums Ground Table];
     LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Ground Table];
@@ -147,15 +146,13 @@ const SHARED: [&str; 4] = [
 pub fn source(kernel: &Kernel, variant: Variant) -> String {
     let form = || match variant.form {
         TetForm::GreenStrain => vec![include_str!("form_green_strain.wgsl")],
-        TetForm::NeoHookeanPair => vec![
-            wgsl::NEO_HOOKEAN,
-            wgsl::NEO_HOOKEAN_PAIR,
-            include_str!("form_neo_hookean_pair.wgsl"),
-        ],
+        TetForm::NeoHookeanPair => {
+            vec![wgsl::NEO_HOOKEAN, wgsl::NEO_HOOKEAN_PAIR, include_str!("form_neo_hookean.wgsl")]
+        }
         TetForm::NeoHookeanStretch => vec![
             wgsl::SINGULAR_VALUES,
             wgsl::NEO_HOOKEAN_STRETCH,
-            include_str!("form_neo_hookean_stretch.wgsl"),
+            include_str!("form_neo_hookean.wgsl"),
         ],
     };
     let swept = match variant.swept {
@@ -219,7 +216,11 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
             });
         }
     }
-    texts.join("\n")
+    let [form, count] = match variant.form {
+        TetForm::NeoHookeanPair => ["neo_hookean_pair", "2"],
+        _ => ["neo_hookean_stretch", "6"],
+    };
+    texts.join("\n").replace("$form", form).replace("$count", count)
 }
 
 /// Whether the text depends on the variant.

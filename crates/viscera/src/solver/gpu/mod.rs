@@ -28,20 +28,18 @@ mod layout;
 mod record;
 mod record_guard;
 mod report;
+mod step;
 mod surface;
 mod switch;
 mod timing;
 
-use bytemuck::{Pod, Zeroable};
-
-use super::Inputs;
 use super::StepError;
 use super::cpu::{bound_share, rebase_factor, sizes};
-use super::explicit::{small_steps, stable_step};
+use super::explicit::stable_step;
 use super::plan::Plan;
 use crate::model::Model;
 use crate::scalar::Vec3;
-use crate::settings::{Acceleration, Method, Precision, RelaxationForm, SolverSettings};
+use crate::settings::{Method, Precision, SolverSettings};
 use crate::state::State;
 pub use buffers::Slot;
 use buffers::{Buffers, Update};
@@ -53,32 +51,12 @@ use explicit::Hold;
 pub use frames::Frame;
 use frames::Frames;
 pub use host::{HOST_CONTROL_SIZE, HostLayout, host_constants, host_layouts};
-use inputs::norm_weights;
 use layout::Layout;
 use record::{Dispatch, Job, Pieces, Recorder};
+use step::FrameConstants;
 pub use surface::{GpuSurface, Skin};
-use timing::{Marks, StageRange};
+use timing::StageRange;
 pub use timing::{StageTime, StepPart, StepTimes};
-
-/// `Frame` of bindings.wgsl.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-struct FrameConstants {
-    gravity: [f32; 3],
-    dt: f32,
-    squared_dt: f32,
-    inverse_dt: f32,
-    rescale: f32,
-    relaxation_multipliers: f32,
-    relaxation_positions: f32,
-    rebase_factor: f32,
-    bound_share: f32,
-    update_count: u32,
-    small_dt: f32,
-    inverse_small_dt: f32,
-    small_steps: u32,
-    chebyshev_damping: f32,
-}
 
 /// A dispatch ready to be sent.
 #[derive(Debug)]
@@ -97,12 +75,6 @@ const JOB_STRIDE: u64 = 256;
 
 /// The most workgroups along one axis in the baseline.
 const MOST_GROUPS: u32 = 65_535;
-
-/// Dispatches of iterations, or of small steps, in one submission. Drivers reset a device whose submission
-/// takes some seconds. Reckoned, not measured: one of a million tetrahedra moves some 0.15 GB, half a
-/// millisecond at 300 GB/s, so that 1024 take half a second. Smaller, and submissions would count beside the
-/// work of small meshes.
-const MOST_DISPATCHES: usize = 1024;
 
 /// Anderson's window, within what kernels have room for.
 fn window(settings: &SolverSettings) -> u32 {
@@ -371,155 +343,6 @@ impl GpuSolver {
         let sorted = in_solver_order(model, velocities);
         let bytes = bytemuck::cast_slice(&sorted);
         self.buffers.write(&self.device.queue, Slot::Velocities, bytes);
-    }
-
-    /// Advances the state on the device by one step of `dt` [s]: one submission, or several where there are
-    /// many small steps, and no waiting. On an error nothing has moved.
-    pub fn step(
-        &mut self,
-        model: &Model<f32>,
-        inputs: &Inputs<f32>,
-        dt: f64,
-    ) -> Result<(), StepError> {
-        self.step_marked(model, inputs, dt, Marks::default())
-    }
-
-    /// A step at whose beginning and end the device's clock may be read.
-    fn step_marked(
-        &mut self,
-        model: &Model<f32>,
-        inputs: &Inputs<f32>,
-        dt: f64,
-        marks: Marks<'_>,
-    ) -> Result<(), StepError> {
-        let mut left = self.begin_step(model, inputs, dt)?;
-        let most = self.most_repeats();
-        let [prologue, body, epilogue] = self.ready.each_ref().map(Vec::as_slice);
-        let mut lists = vec![prologue];
-        let mut now = marks;
-        while left > most {
-            lists.extend(std::iter::repeat_n(body, most as usize));
-            self.submit("step", &lists, now.before_the_end());
-            now = marks.after_the_beginning();
-            lists.clear();
-            left -= most;
-        }
-        lists.extend(std::iter::repeat_n(body, left as usize));
-        lists.push(epilogue);
-        self.submit("step", &lists, now);
-        self.multiplier_dt = dt;
-        Ok(())
-    }
-
-    /// Iterations, or small steps, in one submission.
-    fn most_repeats(&self) -> u32 {
-        (MOST_DISPATCHES / self.ready[1].len().max(1)).max(1) as u32
-    }
-
-    /// Inputs and constants of a step; returns how many iterations, or small steps, it has.
-    fn begin_step(
-        &mut self,
-        model: &Model<f32>,
-        inputs: &Inputs<f32>,
-        dt: f64,
-    ) -> Result<u32, StepError> {
-        self.check_model(model)?;
-        super::check_step(dt, model, inputs)?;
-        let [repeats, small_steps] = match self.settings.method {
-            Method::Xpbd => [self.plan.repeat, 1],
-            Method::Explicit => [small_steps(dt, self.stable_step)?; 2],
-        };
-        self.prepare_step(model, inputs, dt, small_steps);
-        Ok(repeats)
-    }
-
-    /// One submission of one compute pass.
-    fn submit(&self, label: &str, lists: &[&[Ready]], marks: Marks<'_>) {
-        let mut encoder = self.encoder(label);
-        {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some(label),
-                timestamp_writes: marks.writes(),
-            });
-            for list in lists {
-                self.send(&mut pass, list);
-            }
-        }
-        self.device.queue.submit([encoder.finish()]);
-    }
-
-    fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
-        let descriptor = wgpu::CommandEncoderDescriptor { label: Some(label) };
-        self.device.device.create_command_encoder(&descriptor)
-    }
-
-    fn send(&self, pass: &mut wgpu::ComputePass<'_>, list: &[Ready]) {
-        for dispatch in list {
-            pass.set_pipeline(&dispatch.pipeline);
-            pass.set_bind_group(0, &dispatch.storage, &[]);
-            pass.set_bind_group(1, &self.uniforms, &[dispatch.job]);
-            pass.dispatch_workgroups(dispatch.groups[0], dispatch.groups[1], 1);
-        }
-    }
-
-    /// Inputs and constants of a step.
-    fn prepare_step(
-        &mut self,
-        model: &Model<f32>,
-        inputs: &Inputs<f32>,
-        dt: f64,
-        small_steps: u32,
-    ) {
-        self.collect_updates(model, inputs);
-        let queue = &self.device.queue;
-        self.buffers.write(queue, Slot::Updates, bytemuck::cast_slice(&self.updates));
-        let settings = &self.settings;
-        let held = &model.attachments;
-        if !held.vertices.is_empty() && (!inputs.anchors.is_empty() || self.has_moved_anchors) {
-            self.has_moved_anchors = !inputs.anchors.is_empty();
-            let anchors = inputs.anchors_of(model);
-            let places: Vec<[f32; 4]> = held
-                .order
-                .iter()
-                .map(|&i| anchors[i as usize].to_array())
-                .map(|[x, y, z]| [x, y, z, 0.0])
-                .collect();
-            self.buffers.write(queue, Slot::Anchors, bytemuck::cast_slice(&places));
-        }
-        let last = self.multiplier_dt;
-        let rescale = match settings.keep_multipliers {
-            false => 0.0,
-            true if last > 0.0 && last != dt => (dt / last) * (dt / last),
-            true => 1.0,
-        };
-        let is_xpbd = settings.method == Method::Xpbd;
-        let small_dt = dt / f64::from(small_steps);
-        if is_xpbd && settings.acceleration != Acceleration::None && dt != self.weights_dt {
-            self.weights_dt = dt;
-            let weights = norm_weights(model, settings, &self.buffers, dt);
-            self.buffers.write(queue, Slot::Weights, bytemuck::cast_slice(&weights));
-        }
-        let omega = settings.relaxation as f32;
-        let constants = FrameConstants {
-            gravity: inputs.gravity.to_array(),
-            dt: dt as f32,
-            squared_dt: (dt * dt) as f32,
-            inverse_dt: (1.0 / dt) as f32,
-            rescale: rescale as f32,
-            relaxation_multipliers: match settings.relaxation_form {
-                RelaxationForm::Consistent => omega,
-                RelaxationForm::Published => 1.0,
-            },
-            relaxation_positions: omega,
-            rebase_factor: self.shares[0],
-            bound_share: self.shares[1],
-            update_count: self.updates.len() as u32,
-            small_dt: small_dt as f32,
-            inverse_small_dt: (1.0 / small_dt) as f32,
-            small_steps,
-            chebyshev_damping: settings.chebyshev_damping as f32,
-        };
-        self.device.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&constants));
     }
 
     /// What each vertex is made of: mass, inverse mass, number of copies, stiffness of its attachments.

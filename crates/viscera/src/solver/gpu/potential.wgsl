@@ -77,10 +77,11 @@ const SUMS: u32 = 24u;
 alias Sums = array<f32, 24>;
 
 // What is asked of a piece: the energies of the reference, and the other starts; motion for the energy
-// limit; nothing where the iterate has passed already.
+// limit; nothing where the iterate has passed already, or where the step was not taken back.
 const WITH_STARTS: u32 = 1u;
 const WITH_MOTION: u32 = 2u;
 const UNLESS_GOOD: u32 = 4u;
+const IF_REJECTED: u32 = 8u;
 
 var<workgroup> shared_sums: array<f32, 2048>;
 var<workgroup> totals: Sums;
@@ -255,13 +256,21 @@ fn inertia(v: u32, source: u32) -> f32 {
 }
 
 fn add_element(element: u32, mode: u32, into: ptr<function, Sums>) {
-    if (mode & WITH_STARTS) != 0u {
-        partial_sums[table[ENERGIES_AT] + element] = answer(element, REFERENCE, false).x;
-        let reference = reference_of(element);
-        (*into)[SUM_AHEAD] += answer(element, AHEAD, false).x - reference;
-        (*into)[SUM_START] += answer(element, START, false).x - reference;
+    // Energies are called at one place: compilers put them in wherever they are called.
+    var sources = array<u32, 4>(REFERENCE, AHEAD, START, POINTS);
+    for (var k = select(3u, 0u, (mode & WITH_STARTS) != 0u); k < 4u; k++) {
+        let source = sources[k];
+        let found = answer(element, source, source == POINTS);
+        if source == REFERENCE {
+            partial_sums[table[ENERGIES_AT] + element] = found.x;
+        } else if source == AHEAD {
+            (*into)[SUM_AHEAD] += found.x - reference_of(element);
+        } else if source == START {
+            (*into)[SUM_START] += found.x - reference_of(element);
+        } else {
+            add_tested(element, found, into);
+        }
     }
-    add_tested(element, POINTS, into);
     if element >= table[TET_LANES] + table[SPRING_COUNT] {
         (*into)[SUM_HELD] += 1.0;
     }
@@ -274,8 +283,8 @@ fn reference_of(element: u32) -> f32 {
     return select(0.0, energy, is_finite(energy));
 }
 
-fn add_tested(element: u32, source: u32, into: ptr<function, Sums>) {
-    let tested = answer(element, source, true);
+// `tested`: energy and squared force at the place tested.
+fn add_tested(element: u32, tested: vec2f, into: ptr<function, Sums>) {
     let difference = tested.x - reference_of(element);
     (*into)[SUM_TESTED] += difference;
     (*into)[SUM_MAGNITUDE] += abs(difference);

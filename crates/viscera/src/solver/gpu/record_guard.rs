@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! end of a step    evaluate all starts and the end, settle (which goes on alone where the step is taken
-//!                  back), limit of each part, velocities
-//! each mixture     evaluate, judge, take the plain sweep where it is bad;  evaluate that, judge, take
+//!                  back), evaluate where it did, limit of each part, velocities
+//! each mixture     evaluate, settle, take the plain sweep where it is bad;  evaluate that, settle, take
 //! ```
 //!
 //! Where no mixtures are guarded the best start is needed at the end only, and found there.
@@ -16,8 +16,11 @@ use crate::settings::{Acceleration, AndersonGuard};
 const WITH_STARTS: u32 = 1;
 const WITH_MOTION: u32 = 2;
 const UNLESS_GOOD: u32 = 4;
+const IF_REJECTED: u32 = 8;
 const CHOOSES: u32 = 1;
 const JUDGES: u32 = 2;
+const JUDGES_MIXTURE: u32 = 4;
+const JUDGES_PLAIN: u32 = 8;
 
 impl Recorder<'_> {
     fn guards_mixtures(&self) -> bool {
@@ -34,9 +37,9 @@ impl Recorder<'_> {
     }
 
     pub(super) fn guard_iterate(&self, into: &mut Vec<Dispatch>) {
-        for (evaluation, verdict) in [(0, 0), (UNLESS_GOOD, 1)] {
+        for (evaluation, verdict) in [(0, JUDGES_MIXTURE), (UNLESS_GOOD, JUDGES_PLAIN)] {
             into.push(self.each(&kernels::EVALUATE, 0, self.pieces.count, evaluation));
-            into.push(self.each(&kernels::JUDGE, 0, 1, verdict));
+            into.push(self.each(&kernels::SETTLE, 0, 1, verdict));
             into.push(self.long(&kernels::TAKE, 1));
         }
     }
@@ -48,6 +51,9 @@ impl Recorder<'_> {
         };
         into.push(self.each(&kernels::EVALUATE, 0, self.pieces.count, asked));
         into.push(self.each(&kernels::SETTLE, 0, 1, verdict));
+        // The energy limit takes over what pieces leave.
+        let again = WITH_MOTION | IF_REJECTED;
+        into.push(self.each(&kernels::EVALUATE, 0, self.pieces.count, again));
     }
 
     pub(super) fn limit_energy(&self, into: &mut Vec<Dispatch>) {

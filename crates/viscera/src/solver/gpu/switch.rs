@@ -3,6 +3,7 @@
 
 use super::buffers::Slot;
 use super::layout::Layout;
+use super::timing::Marks;
 use super::{GpuSolver, Ready};
 use crate::model::Model;
 use crate::scalar::Vec3;
@@ -45,7 +46,7 @@ impl GpuSolver {
         lists.push(&body[within..]);
         lists.extend(std::iter::repeat_n(body.as_slice(), repeats.saturating_sub(1) as usize));
         lists.push(&self.ready[2]);
-        self.submit("step from a stage", &lists, super::Marks::default());
+        self.submit("step from a stage", &lists, Marks::default());
         self.multiplier_dt = dt;
         Ok(count)
     }
