@@ -57,23 +57,27 @@ pub struct Cost {
 }
 
 impl MeasuredStep {
-    /// The step after so many frames of the scene.
+    /// The step of a frame after so many frames of the scene.
     pub fn new(scene: Scene, history: u32) -> Result<Self> {
+        Self::after(scene, history, 1.0 / FRAME_RATE)
+    }
+
+    /// A step of `dt` [s] after so many frames of the scene.
+    pub fn after(scene: Scene, history: u32, dt: f64) -> Result<Self> {
         let model = scene.model::<f64>(&SolverSettings::default())?;
         let mut reference = Reference::new(&model);
         let mut state = State::at_rest(&model);
-        let dt = 1.0 / FRAME_RATE;
-        let mut advance = |state: &mut State<f64>, frame: u32| {
-            let inputs = scene.inputs(f64::from(frame));
+        let mut advance = |state: &mut State<f64>, frame: f64, dt: f64| {
+            let inputs = scene.inputs(frame);
             reference
                 .step(state, &inputs, dt)
                 .with_context(|| format!("the reference of {scene}, frame {frame}"))
         };
         for frame in 1..=history {
-            advance(&mut state, frame)?;
+            advance(&mut state, f64::from(frame), 1.0 / FRAME_RATE)?;
         }
         let mut end = state.clone();
-        advance(&mut end, history + 1)?;
+        advance(&mut end, f64::from(history) + dt * FRAME_RATE, dt)?;
         let mut step = Self {
             state,
             dt,
@@ -99,7 +103,12 @@ impl MeasuredStep {
 
     /// What acts during the step.
     pub fn inputs<S: Real>(&self) -> Inputs<S> {
-        self.scene.inputs(f64::from(self.history + 1))
+        self.scene.inputs(self.time(1.0))
+    }
+
+    /// In frames, after a share of the step.
+    fn time(&self, share: f64) -> f64 {
+        f64::from(self.history) + share * (self.dt * FRAME_RATE)
     }
 
     /// How far positions [m] are from the exact end.
@@ -151,7 +160,7 @@ impl MeasuredStep {
         let dt = self.dt / f64::from(settings.substeps);
         for substep in 1..=settings.substeps {
             let share = f64::from(substep) / f64::from(settings.substeps);
-            let inputs = self.scene.inputs(f64::from(self.history) + share);
+            let inputs = self.scene.inputs(self.time(share));
             solver.step(&model, &mut state, &inputs, dt)?;
         }
         Ok(state.positions.iter().map(|x| x.cast()).collect())
@@ -167,7 +176,7 @@ impl MeasuredStep {
         let mut state = State::at_rest(model);
         state.positions = self.state.positions.iter().map(|x| x.cast()).collect();
         state.velocities = self.state.velocities.iter().map(|v| v.cast()).collect();
-        let before: Inputs<S> = self.scene.inputs(f64::from(self.history));
+        let before: Inputs<S> = self.scene.inputs(self.time(0.0));
         let dt = self.dt / f64::from(settings.substeps);
         solver.restart(model, &mut state, &before, dt)?;
         Ok((solver, state))
