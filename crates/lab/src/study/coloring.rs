@@ -55,10 +55,10 @@ fn run(context: &mut Context) -> Result<()> {
         "coloring",
         [
             "Every further colour moves the curve to the left: neighbours that see each other's \
-             results within an iteration need fewer of them. The curves do not go to zero but bend \
-             where the iteration comes to its own answer.",
+             results within an iteration need fewer of them. Where a curve bends level, the iteration \
+             comes to an answer of its own.",
             "The same curves over the passes that have to wait for each other, which is what a \
-             parallel machine pays for: much of the lead of many colours is gone.",
+             parallel machine pays for, fall together: a colour more costs as much as it gains.",
         ],
     )?;
     context.document.table(&table(&followed, &[1e-1, 1e-2]));
@@ -92,6 +92,15 @@ fn introduce(context: &mut Context, step: &MeasuredStep) {
 fn conclude(context: &mut Context, followed: &[Followed]) {
     let [first, .., last] = followed else { return };
     let (jacobi, colored) = (Reach::of(&first.curve, 0.1), Reach::of(&last.curve, 0.1));
+    let passes: Vec<usize> = followed
+        .iter()
+        .filter_map(|method| Some(method.curve.first_below(0.1)? * method.cost.passes))
+        .collect();
+    if let (Some(fewest), Some(most)) = (passes.iter().min(), passes.iter().max()) {
+        context.document.paragraph(format!(
+            "All of them together come to a tenth of the starting error within {fewest} to {most} passes."
+        ));
+    }
     context.document.paragraph(format!(
         "To a tenth of the starting error Jacobi takes {jacobi} iterations of {} passes, the coloured \
          sweep {colored} of {}. Percentages are shares of Jacobi's. Iterations alone flatter colours, \
@@ -104,8 +113,8 @@ fn conclude(context: &mut Context, followed: &[Followed]) {
         .map(|Followed { method, curve, .. }| format!("{} {:.4}", method.name, curve.least()))
         .collect();
     context.document.paragraph(format!(
-        "The smallest errors are {}. They do not fall to zero with more iterations, because a fixed \
-         point of published XPBD satisfies `C + a~ l = 0` but not `M (x - xt) = J(x)^T l`: `x` is the sum \
+        "The smallest errors are {}. With more iterations those that still fall come to stand as well, \
+         because a fixed point of published XPBD satisfies `C + a~ l = 0` but not `M (x - xt) = J(x)^T l`: `x` is the sum \
          of `M^-1 J(x_k)^T dl_k` with the gradients of all the places it came through. What it comes to \
          depends on the path, and so on the colours; section 4 shows it, and what to do about it.",
         ends.join(", ")

@@ -19,6 +19,9 @@ const POINTS_PER_DECADE: f64 = 20.0;
 /// Curves leave the plots above this error, so that one which diverges does not flatten the others.
 const CEILING: f64 = 10.0;
 
+/// And end below this one, where round-off begins.
+const FLOOR: f64 = 1e-9;
+
 /// What a table and a figure need of a method.
 pub(super) struct Followed {
     pub method: Method,
@@ -83,7 +86,7 @@ impl Reach {
                 format!(" ({})", percent(ours as f64 * unit / theirs as f64))
             }
             // The other one took more than that.
-            (Self::After(ours), Self::Above(theirs)) => {
+            (Self::After(ours), Self::Above(theirs)) if (ours as f64) * unit < theirs as f64 => {
                 format!(" (< {})", percent(ours as f64 * unit / theirs as f64))
             }
             _ => String::new(),
@@ -96,7 +99,7 @@ impl fmt::Display for Reach {
         match self {
             Self::After(count) => write!(f, "{count}"),
             Self::Above(count) => write!(f, "above {count}"),
-            Self::Stops(error) => write!(f, "stops at {error:.2}"),
+            Self::Stops(error) => write!(f, "stops at {}", scientific(*error)),
             Self::Diverges => f.write_str("diverges"),
         }
     }
@@ -139,9 +142,15 @@ pub(super) fn level_name(level: f64) -> String {
 
 fn end_of(curve: &Curve) -> String {
     match curve.errors.last() {
+        Some(error) if *error < FLOOR => format!("< {}", level_name(FLOOR)),
         Some(error) if *error < CEILING => scientific(*error),
         _ => "lost".to_owned(),
     }
+}
+
+/// An error as data: without round-off's digits.
+pub(super) fn in_data(error: f64) -> String {
+    if error.is_finite() { format!("{:.6e}", error.max(FLOOR)) } else { "lost".to_owned() }
 }
 
 /// The same curves over iterations and over dependent passes, and their points as data.
@@ -155,7 +164,8 @@ impl Figure {
     pub fn new(title: &str) -> Self {
         let plot = |over: &str| {
             let error = Axis::logarithmic("error, 1 = inertial prediction");
-            let mut plot = Plot::new(format!("{title}, over {over}"), Axis::logarithmic(over), error);
+            let mut plot =
+                Plot::new(format!("{title}, over {over}"), Axis::logarithmic(over), error);
             plot.reference(0.1, "1e-1");
             plot
         };
@@ -177,10 +187,11 @@ impl Figure {
         let points: Vec<(usize, f64)> =
             thinned(errors.len()).into_iter().map(|k| (k, errors[k])).collect();
         for (k, error) in &points {
-            let error = if error.is_finite() { format!("{error:.6e}") } else { "lost".to_owned() };
+            let error = in_data(*error);
             self.data.row([name, &k.to_string(), &(k * passes).to_string(), &error]);
         }
-        let shown = points.iter().skip(1).take_while(|(_, error)| *error < CEILING);
+        let is_shown = |(_, error): &&(usize, f64)| (FLOOR..CEILING).contains(error);
+        let shown = points.iter().skip(1).take_while(is_shown);
         let shown: Vec<(usize, f64)> = shown.copied().collect();
         for (plot, unit) in self.plots.iter_mut().zip([1, passes]) {
             let points = shown.iter().map(|(k, error)| [(k * unit) as f64, *error]);
@@ -245,6 +256,8 @@ mod tests {
         let falling = curve((0..100).map(|k| libm::exp10(-0.01 * f64::from(k))).collect());
         assert_eq!(Reach::of(&falling, 0.5), Reach::After(31));
         assert_eq!(Reach::of(&falling, 0.01), Reach::Above(99));
+        let slow = curve((0..100).map(|k| 1.0 - 3e-4 * f64::from(k)).collect());
+        assert_eq!(Reach::of(&slow, 0.5), Reach::Above(99));
         let standing = curve(vec![0.5; 100]);
         assert_eq!(Reach::of(&standing, 0.1), Reach::Stops(0.5));
         let lost = curve(vec![1.0, 3.0, 1e3, f64::INFINITY]);

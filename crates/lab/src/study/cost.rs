@@ -83,7 +83,10 @@ fn methods(iterations: [u32; 2]) -> Vec<Method> {
         ("coloured, Chebyshev measured", chebyshev(published(COLORED), 0.0)),
         ("coloured, Anderson on both", both(published(COLORED))),
         ("coloured, Anderson on positions", anderson(published(COLORED), AndersonOn::Positions)),
-        ("coloured, Anderson on multipliers", anderson(published(COLORED), AndersonOn::Multipliers)),
+        (
+            "coloured, Anderson on multipliers",
+            anderson(published(COLORED), AndersonOn::Multipliers),
+        ),
         ("exact, Jacobi, Anderson", both(exact(JACOBI))),
         ("exact, 4 colours, Anderson", both(exact(few))),
         ("exact, coloured", exact(COLORED)),
@@ -121,8 +124,7 @@ fn measure(context: &mut Context, task: &Task, data: &mut Table) -> Result<()> {
     let tissue = context.changes.tissue(MaterialModel::SaintVenantKirchhoff, task.young, 0.45)?;
     let scene = context.changes.scene(task.scene, task.size, tissue)?;
     let name = scene.to_string();
-    let steps =
-        context.run_cases(&[*task], |_| MeasuredStep::new(scene.clone(), task.history))?;
+    let steps = context.run_cases(&[*task], |_| MeasuredStep::new(scene.clone(), task.history))?;
     let methods = methods(task.iterations);
     let mut followed = Vec::new();
     for step in &steps {

@@ -222,11 +222,16 @@ impl Curve {
         self.errors.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Where the errors come to stand: the last fifth of the iterations no longer gains a tenth.
+    /// The last error, if errors have come to stand or grow: the last fifth of the iterations gains less
+    /// than a tenth of what the ones before have gained per iteration, in factors. A slow method that is
+    /// on its way gains alike all the time.
     pub fn plateau(&self) -> Option<f64> {
         let cut = self.errors.len() * 4 / 5;
         let least = |errors: &[f64]| errors.iter().copied().fold(f64::INFINITY, f64::min);
         let (before, after) = (least(&self.errors[..cut]), least(&self.errors[cut..]));
-        (after > 0.9 * before).then_some(before.min(after))
+        let (early, late) = (libm::log(self.errors[0] / before), libm::log(before / after));
+        // Four fifths came before.
+        let stands = late <= 0.1 * early / 4.0;
+        self.errors.last().copied().filter(|_| stands)
     }
 }
