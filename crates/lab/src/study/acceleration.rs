@@ -100,7 +100,7 @@ fn convergence(context: &mut Context) -> Result<()> {
     let size = if context.quick { Size::Tiny } else { Size::Large };
     let step = bar_from_rest(context, size)?;
     context.document.subheading("Accelerations of published XPBD");
-    let mut followed = follow::<f64>(context, &step, jacobi_methods(context.quick))?;
+    let mut followed = follow(context, &step, jacobi_methods(context.quick))?;
     let mut figure = Figure::new("Accelerated Jacobi");
     followed.iter().for_each(|method| figure.add(method));
     figure.show(
@@ -114,7 +114,7 @@ fn convergence(context: &mut Context) -> Result<()> {
              unknowns, and keeps its lead.",
         ],
     )?;
-    let colored = follow::<f64>(context, &step, colored_methods(context.quick))?;
+    let colored = follow(context, &step, colored_methods(context.quick))?;
     let mut figure = Figure::new("Accelerated coloured sweeps");
     colored.iter().for_each(|method| figure.add(method));
     figure.show(

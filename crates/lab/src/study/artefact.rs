@@ -4,10 +4,10 @@ use anyhow::Result;
 use std::fmt;
 use viscera::material::MaterialModel;
 use viscera::settings::{AndersonOn, SolverSettings};
-use viscera_report::{Axis, Plot, Series, Style, Table, scientific};
+use viscera_report::{Axis, Plot, Series, Style, Table};
 
 use super::Context;
-use super::convergence::in_data;
+use super::convergence::{in_data, in_words};
 use super::methods::{COLORED, JACOBI, anderson, exact, published};
 use super::step::{Curve, MeasuredStep};
 use crate::scenes::Size;
@@ -137,7 +137,7 @@ fn figure(context: &mut Context, cases: &[Case], curves: &[Curve]) -> Result<()>
             let (iterations, ratio) = (case.settings.iterations, curve.strain_ratio);
             points.push([f64::from(iterations), ratio]);
             let (iterations, ratio) = (iterations.to_string(), format!("{ratio:.6}"));
-            data.row([&scene, mix, &iterations, &ratio, &in_data(end(curve))]);
+            data.row([&scene, mix, &iterations, &ratio, &in_data(curve.last())]);
         }
         let (what, style) = match mix {
             POSITIONS => ("positions", Style::MarkedLine),
@@ -162,7 +162,7 @@ fn conclude(context: &mut Context, cases: &[Case], curves: &[Curve]) {
     for (cases, curves) in groups(context.quick, cases, curves) {
         let (Some(case), Some(curve)) = (cases.last(), curves.last()) else { continue };
         let (scene, ratio) = (case.scene(), curve.strain_ratio);
-        table.row([&scene, case.mix, &format!("{ratio:.3}"), &scientific(end(curve).max(1e-9))]);
+        table.row([&scene, case.mix, &format!("{ratio:.3}"), &in_words(curve.last())]);
         if case.mix == POSITIONS {
             stiff.push((scene, ratio));
         }
@@ -189,9 +189,4 @@ fn conclude(context: &mut Context, cases: &[Case], curves: &[Curve]) {
             within,
         );
     }
-}
-
-/// The last error of a curve.
-fn end(curve: &Curve) -> f64 {
-    curve.errors.last().copied().unwrap_or(f64::NAN)
 }

@@ -47,7 +47,7 @@ fn run(context: &mut Context) -> Result<()> {
     let size = if context.quick { Size::Tiny } else { Size::Large };
     let step = bar_from_rest(context, size)?;
     introduce(context, &step);
-    let followed = follow::<f64>(context, &step, methods(context.quick))?;
+    let followed = follow(context, &step, methods(context.quick))?;
     let mut figure = Figure::new("Published XPBD");
     followed.iter().for_each(|method| figure.add(method));
     figure.show(

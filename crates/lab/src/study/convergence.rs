@@ -2,7 +2,6 @@
 
 use anyhow::Result;
 use std::fmt;
-use viscera::scalar::Real;
 use viscera::settings::{Acceleration, AndersonOn, RelaxationForm, SolverSettings};
 
 use super::Context;
@@ -17,10 +16,10 @@ pub(super) const COST_CASES: usize = 1;
 const POINTS_PER_DECADE: f64 = 20.0;
 
 /// Curves leave the plots above this error, so that one which diverges does not flatten the others.
-const CEILING: f64 = 10.0;
+pub(super) const CEILING: f64 = 10.0;
 
 /// And end below this one, where round-off begins.
-const FLOOR: f64 = 1e-9;
+pub(super) const FLOOR: f64 = 1e-9;
 
 /// What a table and a figure need of a method.
 pub(super) struct Followed {
@@ -29,13 +28,13 @@ pub(super) struct Followed {
     pub cost: Cost,
 }
 
-/// Follows every method through its iterations, in the precision `S`.
-pub(super) fn follow<S: Real>(
+/// Follows every method through its iterations, in double precision.
+pub(super) fn follow(
     context: &Context,
     step: &MeasuredStep,
     methods: Vec<Method>,
 ) -> Result<Vec<Followed>> {
-    let curves = context.run_cases(&methods, |method| step.follow::<S>(&method.settings))?;
+    let curves = context.run_cases(&methods, |method| step.follow::<f64>(&method.settings))?;
     // One after the other: methods side by side would take the processor's time from each other.
     let costs = context.run_cases(&["milliseconds per iteration"], |_| {
         methods.iter().map(|method| step.cost(&method.settings)).collect::<Result<Vec<_>>>()
@@ -61,7 +60,7 @@ pub(super) enum Reach {
 impl Reach {
     /// Of a curve.
     pub fn of(curve: &Curve, level: f64) -> Self {
-        let last = curve.errors.last().copied().unwrap_or(f64::INFINITY);
+        let last = curve.last();
         match (curve.first_below(level), curve.plateau()) {
             (Some(iterations), _) => Self::After(iterations),
             (None, _) if last >= CEILING => Self::Diverges,
@@ -112,7 +111,7 @@ pub(super) fn table(followed: &[Followed], levels: &[f64]) -> Table {
         let level = level_name(*level);
         heads.extend([format!("to {level}: iterations"), "passes".into(), "ms".into()]);
     }
-    heads.push("error at the end".into());
+    heads.extend(["error at the end".to_owned(), "strain / true".into()]);
     let mut table = Table::new(heads);
     let Some(first) = followed.first() else { return table };
     for Followed { method, curve, cost } in followed {
@@ -129,7 +128,12 @@ pub(super) fn table(followed: &[Followed], levels: &[f64]) -> Table {
             ));
             row.push(reach.times(ms, 1));
         }
-        row.push(end_of(curve));
+        row.push(in_words(curve.last()));
+        row.push(if curve.last() < CEILING {
+            format!("{:.2}", curve.strain_ratio)
+        } else {
+            "-".into()
+        });
         table.row(row);
     }
     table
@@ -140,11 +144,12 @@ pub(super) fn level_name(level: f64) -> String {
     format!("{level:e}")
 }
 
-fn end_of(curve: &Curve) -> String {
-    match curve.errors.last() {
-        Some(error) if *error < FLOOR => format!("< {}", level_name(FLOOR)),
-        Some(error) if *error < CEILING => scientific(*error),
-        _ => "lost".to_owned(),
+/// An error in a table.
+pub(super) fn in_words(error: f64) -> String {
+    match error {
+        _ if error < FLOOR => format!("< {}", level_name(FLOOR)),
+        _ if error < CEILING => scientific(error),
+        _ => "diverges".to_owned(),
     }
 }
 

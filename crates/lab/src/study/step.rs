@@ -222,6 +222,11 @@ impl Curve {
         self.errors.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
+    /// The error after the last iteration.
+    pub fn last(&self) -> f64 {
+        self.errors.last().copied().unwrap_or(f64::INFINITY)
+    }
+
     /// The last error, if errors have come to stand or grow: the last fifth of the iterations gains less
     /// than a tenth of what the ones before have gained per iteration, in factors. A slow method that is
     /// on its way gains alike all the time.
@@ -232,6 +237,6 @@ impl Curve {
         let (early, late) = (libm::log(self.errors[0] / before), libm::log(before / after));
         // Four fifths came before.
         let stands = late <= 0.1 * early / 4.0;
-        self.errors.last().copied().filter(|_| stands)
+        stands.then(|| self.last())
     }
 }
