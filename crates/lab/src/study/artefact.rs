@@ -16,7 +16,7 @@ use crate::scenes::Size;
 const YOUNG: f64 = 1e4;
 
 /// Scenes and the frames before the measured step, which lies in the middle of the motion.
-const MOMENTS: [(&str, u32); 4] = [("cantilever", 10), ("twist", 8), ("twist", 11), ("grab", 7)];
+const MOMENTS: [(&str, u32); 3] = [("cantilever", 10), ("twist", 11), ("grab", 7)];
 
 /// What the ratio of strains is asked to lie within.
 const RATIO: [f64; 2] = [0.5, 0.9];

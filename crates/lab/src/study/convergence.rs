@@ -180,10 +180,10 @@ impl Figure {
         }
     }
 
-    /// Adds a method; dashed where it makes for another answer than the exact one.
+    /// Adds a method; dashed where it does not scale and mix positions and multipliers alike.
     pub fn add(&mut self, followed: &Followed) {
         let Followed { method, curve, cost } = followed;
-        let style = if is_tied(&method.settings) { Style::Line } else { Style::Dashed };
+        let style = if treats_alike(&method.settings) { Style::Line } else { Style::Dashed };
         self.add_curve(&method.name, &curve.errors, cost.passes, style);
     }
 
@@ -213,12 +213,13 @@ impl Figure {
     }
 }
 
-/// Whether positions and multipliers are scaled and mixed alike, which keeps them consistent.
-fn is_tied(settings: &SolverSettings) -> bool {
-    let published = settings.relaxation_form == RelaxationForm::Published;
-    let anderson = settings.acceleration == Acceleration::Anderson;
-    !(published && settings.relaxation != 1.0)
-        && !(anderson && settings.anderson_on != AndersonOn::Both)
+/// Whether positions and multipliers are scaled and mixed alike.
+fn treats_alike(settings: &SolverSettings) -> bool {
+    let scales_one =
+        settings.relaxation != 1.0 && settings.relaxation_form == RelaxationForm::Published;
+    let mixes_one =
+        settings.acceleration == Acceleration::Anderson && settings.anderson_on != AndersonOn::Both;
+    !(scales_one || mixes_one)
 }
 
 /// Which of so many points are shown: equally far apart on a logarithmic axis, the last in any case.
