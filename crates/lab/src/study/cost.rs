@@ -57,8 +57,8 @@ const TWIST: Task = Task {
     law: MaterialModel::SaintVenantKirchhoff,
     iterations: [2000, 1000],
 };
-/// Too long a step for Green strain on so fine a mesh: see the text.
-const HUGE: Task = Task { size: Size::Huge, iterations: [1000, 400], ..CANTILEVER };
+/// Finer than the way the bar falls in a step, of both tissues: some sweeps leave Green strain inverted.
+const HUGE: Task = Task { size: Size::Huge, iterations: [500, 300], ..CANTILEVER };
 const HUGE_NEO_HOOKEAN: Task = Task { law: MaterialModel::StableNeoHookean, ..HUGE };
 
 fn tasks(quick: bool) -> Vec<Task> {
