@@ -164,6 +164,7 @@ impl Scene {
                     Size::Tiny => 0.06,
                     Size::Small => 0.04,
                     Size::Large => 0.022,
+                    Size::Huge => 0.0085,
                 };
                 scene.mesh = shapes::liver(spacing, 1.0)?.tets;
                 scene.gravity = GRAVITY;
@@ -270,6 +271,8 @@ pub enum Size {
     Small,
     /// About 3000 tetrahedra.
     Large,
+    /// About 50,000 tetrahedra.
+    Huge,
 }
 
 /// Distance [m] within which a vertex counts as lying on a face.
@@ -282,15 +285,15 @@ pub const BAR: [f64; 3] = [0.2, 0.05, 0.05];
 pub const BLOCK: [f64; 3] = [0.1, 0.1, 0.05];
 
 fn bar(size: Size) -> Result<TetMesh> {
-    irregular(BAR, [[4, 2, 2], [10, 3, 3], [20, 5, 5]], size)
+    irregular(BAR, [[4, 2, 2], [10, 3, 3], [20, 5, 5], [52, 13, 13]], size)
 }
 
 fn block(size: Size) -> Result<TetMesh> {
-    irregular(BLOCK, [[4, 4, 2], [6, 6, 3], [10, 10, 5]], size)
+    irregular(BLOCK, [[4, 4, 2], [6, 6, 3], [10, 10, 5], [26, 26, 13]], size)
 }
 
 /// No two tetrahedra are alike.
-fn irregular(edges: [f64; 3], cells: [[usize; 3]; 3], size: Size) -> Result<TetMesh> {
+fn irregular(edges: [f64; 3], cells: [[usize; 3]; 4], size: Size) -> Result<TetMesh> {
     let block = Block {
         splitting: Splitting::Six,
         jitter: 0.6,

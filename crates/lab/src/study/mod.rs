@@ -1,11 +1,18 @@
 //! `viscera-lab study`: what the published method shows, what it leaves open, and how that is settled here.
 
+mod acceleration;
+mod artefact;
 mod bodies;
 mod coloring;
+mod convergence;
+mod cost;
 mod device;
 mod methods;
+mod multipliers;
 mod panels;
+mod stability;
 mod step;
+mod stiffness;
 
 use crate::sections::{Context, Program, Section};
 
@@ -13,5 +20,13 @@ use crate::sections::{Context, Program, Section};
 pub const PROGRAM: Program = Program {
     title: "The study",
     command: "viscera-lab study",
-    sections: &[coloring::SECTION, bodies::COLORS, bodies::ACCELERATIONS],
+    sections: &[
+        coloring::SECTION,
+        bodies::COLORS,
+        bodies::ACCELERATIONS,
+        acceleration::SECTION,
+        stiffness::SECTION,
+        stability::SECTION,
+        cost::SECTION,
+    ],
 };

@@ -57,23 +57,27 @@ pub struct Cost {
 }
 
 impl MeasuredStep {
-    /// The step after so many frames of the scene.
+    /// The step of a frame after so many frames of the scene.
     pub fn new(scene: Scene, history: u32) -> Result<Self> {
+        Self::after(scene, history, 1.0 / FRAME_RATE)
+    }
+
+    /// A step of `dt` [s] after so many frames of the scene.
+    pub fn after(scene: Scene, history: u32, dt: f64) -> Result<Self> {
         let model = scene.model::<f64>(&SolverSettings::default())?;
         let mut reference = Reference::new(&model);
         let mut state = State::at_rest(&model);
-        let dt = 1.0 / FRAME_RATE;
-        let mut advance = |state: &mut State<f64>, frame: u32| {
-            let inputs = scene.inputs(f64::from(frame));
+        let mut advance = |state: &mut State<f64>, frame: f64, dt: f64| {
+            let inputs = scene.inputs(frame);
             reference
                 .step(state, &inputs, dt)
                 .with_context(|| format!("the reference of {scene}, frame {frame}"))
         };
         for frame in 1..=history {
-            advance(&mut state, frame)?;
+            advance(&mut state, f64::from(frame), 1.0 / FRAME_RATE)?;
         }
         let mut end = state.clone();
-        advance(&mut end, history + 1)?;
+        advance(&mut end, f64::from(history) + dt * FRAME_RATE, dt)?;
         let mut step = Self {
             state,
             dt,
@@ -99,7 +103,12 @@ impl MeasuredStep {
 
     /// What acts during the step.
     pub fn inputs<S: Real>(&self) -> Inputs<S> {
-        self.scene.inputs(f64::from(self.history + 1))
+        self.scene.inputs(self.time(1.0))
+    }
+
+    /// In frames, after a share of the step.
+    fn time(&self, share: f64) -> f64 {
+        f64::from(self.history) + share * (self.dt * FRAME_RATE)
     }
 
     /// How far positions [m] are from the exact end.
@@ -163,7 +172,7 @@ impl MeasuredStep {
     pub fn substeps<S: Real>(&self, count: u32) -> impl Iterator<Item = (Inputs<S>, f64)> {
         (1..=count).map(move |substep| {
             let share = f64::from(substep) / f64::from(count);
-            (self.scene.inputs(f64::from(self.history) + share), self.dt / f64::from(count))
+            (self.scene.inputs(self.time(share)), self.dt / f64::from(count))
         })
     }
 
@@ -177,7 +186,7 @@ impl MeasuredStep {
         let mut state = State::at_rest(model);
         state.positions = self.state.positions.iter().map(|x| x.cast()).collect();
         state.velocities = self.state.velocities.iter().map(|v| v.cast()).collect();
-        let before: Inputs<S> = self.scene.inputs(f64::from(self.history));
+        let before: Inputs<S> = self.scene.inputs(self.time(0.0));
         let dt = self.dt / f64::from(settings.substeps);
         solver.restart(model, &mut state, &before, dt)?;
         Ok((solver, state))
@@ -223,11 +232,21 @@ impl Curve {
         self.errors.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Where the errors come to stand: the last fifth of the iterations no longer gains a tenth.
+    /// The error after the last iteration.
+    pub fn last(&self) -> f64 {
+        self.errors.last().copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// The last error, if errors have come to stand or grow: the last fifth of the iterations gains less
+    /// than a tenth of what the ones before have gained per iteration, in factors. A slow method that is
+    /// on its way gains alike all the time.
     pub fn plateau(&self) -> Option<f64> {
         let cut = self.errors.len() * 4 / 5;
         let least = |errors: &[f64]| errors.iter().copied().fold(f64::INFINITY, f64::min);
         let (before, after) = (least(&self.errors[..cut]), least(&self.errors[cut..]));
-        (after > 0.9 * before).then_some(before.min(after))
+        let (early, late) = (libm::log(self.errors[0] / before), libm::log(before / after));
+        // Four fifths came before.
+        let stands = late <= 0.1 * early / 4.0;
+        stands.then(|| self.last())
     }
 }
