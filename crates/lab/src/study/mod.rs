@@ -2,10 +2,15 @@
 
 mod coloring;
 mod methods;
+mod stability;
 mod step;
+mod stiffness;
 
 use crate::sections::{Context, Program, Section};
 
 /// All sections, in the order of the report.
-pub const PROGRAM: Program =
-    Program { title: "The study", command: "viscera-lab study", sections: &[coloring::SECTION] };
+pub const PROGRAM: Program = Program {
+    title: "The study",
+    command: "viscera-lab study",
+    sections: &[coloring::SECTION, stiffness::SECTION, stability::SECTION],
+};
