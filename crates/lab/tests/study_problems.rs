@@ -1,7 +1,7 @@
 //! What settles the open problems, each by a test that turns red without it.
 
-use viscera::material::MaterialModel;
-use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, Colors, SolverSettings, Threads};
+use viscera::material::{Material, MaterialModel};
+use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Threads};
 use viscera_lab::reference::Reference;
 use viscera_lab::scenes::{Scene, Size, tissue};
 use viscera_lab::settling::{Error, compare, settle, truth};
@@ -16,8 +16,7 @@ fn one_thread(iterations: u32) -> SolverSettings {
     }
 }
 
-fn rest(name: &'static str, young: f64, settings: &SolverSettings) -> Error {
-    let tissue = tissue(MaterialModel::StableNeoHookean, young, 0.45).expect("a tissue");
+fn rest(name: &'static str, tissue: Material, settings: &SolverSettings) -> Error {
     let scene = Scene::new(name, Size::Tiny, tissue).expect("a scene");
     let settled = settle::<f64>(&scene, settings).expect("a rest");
     compare(&scene, &truth(&scene).expect("a reference"), &settled.positions).expect("an error")
@@ -27,33 +26,33 @@ fn rest(name: &'static str, young: f64, settings: &SolverSettings) -> Error {
 /// alone run ahead of the forces that hold them.
 #[test]
 fn anderson_mixes_multipliers_with_positions() {
-    let published = |iterations| SolverSettings {
-        colors: Colors::Limited(1),
+    let tissue = tissue(MaterialModel::SaintVenantKirchhoff, 1e5, 0.45).expect("a tissue");
+    let published = SolverSettings {
         rebase: false,
         keep_multipliers: false,
         anderson_guard: AndersonGuard::None,
-        ..one_thread(iterations)
+        ..one_thread(50)
     };
-    let mixed = |on| SolverSettings {
-        acceleration: Acceleration::Anderson,
-        anderson_on: on,
-        ..published(60)
+    let stiffness = |settings: &SolverSettings| rest("cantilever", tissue, settings).stiffness;
+    let mixed = |anderson_on| {
+        let acceleration = Acceleration::Anderson;
+        stiffness(&SolverSettings { acceleration, anderson_on, ..published.clone() })
     };
-    let plain = rest("cantilever", 1e5, &published(2000)).stiffness;
-    let both = rest("cantilever", 1e5, &mixed(AndersonOn::Both)).stiffness;
-    let positions = rest("cantilever", 1e5, &mixed(AndersonOn::Positions)).stiffness;
+    let [both, positions] = [AndersonOn::Both, AndersonOn::Positions].map(mixed);
+    let plain = stiffness(&SolverSettings { iterations: 400, ..published.clone() });
     println!("apparent stiffness: plain {plain:.4}, both {both:.4}, positions {positions:.4}");
-    assert!((both / plain - 1.0).abs() < 0.02, "on both: {both}, plain: {plain}");
-    assert!(positions > 1.1 * plain, "on positions alone: {positions}, plain: {plain}");
+    assert!((both / plain - 1.0).abs() < 0.1, "on both: {both}, plain: {plain}");
+    assert!(positions > 1.5 * plain, "on positions alone: {positions}, plain: {plain}");
 }
 
 /// Without a guard that would cover it up: where geometric stiffness exceeds the mass, positions pulled
 /// back by the mass alone overshoot.
 #[test]
 fn the_mass_bound_lets_the_rebase_settle_deformed_bodies() {
+    let tissue = tissue(MaterialModel::StableNeoHookean, 1e4, 0.45).expect("a tissue");
     let settings = SolverSettings { step_guard: false, ..one_thread(20) };
     for scene in ["twist", "grab"] {
-        let Error { rms, stiffness, .. } = rest(scene, 1e4, &settings);
+        let Error { rms, stiffness, .. } = rest(scene, tissue, &settings);
         println!("{scene}: {rms:.1e} from its rest, apparent stiffness {stiffness:.6}");
         assert!(rms < 1e-3, "{scene}: {rms:e}");
     }
