@@ -173,8 +173,8 @@ fn draw_factors(context: &mut Context, cases: &[Case], outcomes: &[Outcome]) -> 
     context.plot(
         "stability-factors",
         &plot,
-        "Runs sorted by their worst step. Above 1 a step has put energy into the body that nothing gave it. \
-         Ways with the step guard never do; all others do in most runs.",
+        "Runs sorted by their worst step. Above 1 a step has put energy into the body that nothing gave it; \
+         holding every run at or below 1 is what the step guard is for.",
     )
 }
 
