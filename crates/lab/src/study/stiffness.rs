@@ -151,9 +151,10 @@ fn teach(context: &mut Context) {
     doc.paragraph(
         "Why `s` is not 1 as published: a sweep ends where `C + a~ l = 0`, and never looks at the other half, \
          `M (x - xt) = J^T l`; with `l` from zero in every frame, a few sweeps build up part of the stress \
-         only (too soft, `s < 1`) and many arrive, but along gradients that have turned on the way. *Anderson \
+         only, and many arrive where the gradients that turned on the way have led them: a place that depends \
+         on the path, too soft or too stiff. *Anderson \
          on positions* extrapolates `x` and leaves `l` behind: positions move as if forces had acted that `l` \
-         does not account for. *On multipliers*, `x = xt + M^-1 J(x)^T l` treats the geometric stiffness \
+         does not account for; with enough sweeps the body is too stiff. *On multipliers*, `x = xt + M^-1 J(x)^T l` treats the geometric stiffness \
          explicitly, which is stable only while `dt^2` times it stays below the mass. *On both*, equal \
          weights keep the two together where gradients are constant, so that it hurries towards the published \
          answer, right or wrong. The *exact form* pulls positions back to the other half before each sweep \

@@ -8,8 +8,8 @@ use viscera::material::MaterialModel;
 use super::{Context, Section};
 use crate::stress::{FRAMES, HELD, Kind, Run, SIZE};
 use runs::{
-    Case, MODELS, Outcome, ROUND_OFF, Rest, SAFE, SETTLING_YOUNG, UNGUARDED, YOUNG,
-    apparent_stiffness, cases, outcome, rests, ways,
+    Case, MODELS, Outcome, ROUND_OFF, Rest, SAFE, SETTLING_POISSON, SETTLING_YOUNG, UNGUARDED,
+    YOUNG, apparent_stiffness, cases, outcome, rests, ways,
 };
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 
@@ -77,9 +77,10 @@ fn teach(context: &mut Context) {
          towards it and, if need be, by descent. What then becomes of the multipliers decides whether the body \
          still moves: kept (the default), *recomputed* from positions, or *zeroed*. *Mixtures judged*: each \
          mixture must not raise `Phi` either. A guard that held the body fast would be the safest of all; so \
-         the last column has the apparent stiffness of a cantilever (E = {} kPa, section 5) that settles by \
+         the last column has the apparent stiffness of a cantilever (E = {} kPa, nu = {}) that settles by \
          the same way, and must be 1.",
         context.changes.young.unwrap_or(SETTLING_YOUNG) / 1e3,
+        context.changes.poisson.unwrap_or(SETTLING_POISSON),
     ));
 }
 
@@ -273,15 +274,16 @@ fn conclude(context: &mut Context, summaries: &[Summary]) {
         .iter()
         .filter(|summary| summary.steps_above == 0 && !summary.settles())
         .map(|summary| {
-            format!("\"{}\" ({}): {}", summary.name(), law(summary.model), summary.stiffness_text())
+            let (name, law) = (summary.name(), law(summary.model));
+            format!("\"{name}\" ({law}) {}", summary.stiffness_text())
         })
         .collect();
     let frozen = if frozen.is_empty() {
         "None of the ways that hold `Phi` in bounds fails to settle here.".to_owned()
     } else {
         format!(
-            "Never above and yet not right are - {} times as stiff as typed: they throw away the forces that \
-             the next step would start from, and their tables of stress look as good as any.",
+            "Never above, and yet wrong at rest, by its apparent stiffness - {}: what throws away the forces \
+             that the next step would start from may look as good as any in a table of stress.",
             frozen.join("; ")
         )
     };

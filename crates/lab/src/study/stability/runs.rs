@@ -13,10 +13,12 @@ use crate::settling::{AfterStep, compare, settle_with, truth};
 use crate::stress::{self, FRAMES, Kind, Run, SIZE};
 use crate::study::methods::{COLORED, Method, anderson, exact, published};
 
-/// Young's modulus [Pa] of the bar in trouble, and of the bar that shows who settles.
+/// Young's modulus [Pa] and Poisson's ratio of the bar in trouble.
 pub(super) const YOUNG: f64 = 1e4;
-pub(super) const SETTLING_YOUNG: f64 = 1e5;
 const POISSON: f64 = 0.45;
+/// Of the bar that shows who settles. Softer or more compressible tissue settles by wrong ways as well.
+pub(super) const SETTLING_YOUNG: f64 = 1e5;
+pub(super) const SETTLING_POISSON: f64 = 0.49;
 /// Of a potential, what its sums may lose to rounding.
 pub(super) const ROUND_OFF: f64 = 1e-9;
 /// A body this many times as long as at rest has blown up.
@@ -174,7 +176,7 @@ fn mechanical_energy(reference: &Reference, run: &Run<'_>) -> Result<f64> {
 fn is_blown(run: &Run<'_>) -> bool {
     let x = &run.state.positions;
     let first = x[0];
-    !run.state.is_finite() || x.iter().any(|x| !((*x - first).length() < BLOWN * SIZE[0]))
+    !run.state.is_finite() || x.iter().any(|x| (*x - first).length() >= BLOWN * SIZE[0])
 }
 
 /// Watches one run. `Phi` is computed outside the solver, whatever that believes.
@@ -213,7 +215,7 @@ pub(super) fn outcome(context: &Context, case: &Case) -> Result<Outcome> {
 /// The apparent stiffness of a cantilever of the same settings.
 pub(super) fn apparent_stiffness(context: &Context, rest: &Rest) -> Result<f64> {
     let size = if context.quick { Size::Tiny } else { Size::Small };
-    let tissue = context.changes.tissue(rest.model, SETTLING_YOUNG, POISSON)?;
+    let tissue = context.changes.tissue(rest.model, SETTLING_YOUNG, SETTLING_POISSON)?;
     let scene = context.changes.scene("cantilever", size, tissue)?;
     let way = &ways()[rest.way];
     let mut rejected = 0;
