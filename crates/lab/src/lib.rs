@@ -6,7 +6,7 @@
 //! | to | look at |
 //! |---|---|
 //! | solve a step or a state of rest exactly | [`reference::Reference`] |
-//! | set up what the studies share | [`scenes`], [`settling`], [`motion`] |
+//! | set up what the studies share | [`scenes`], [`settling`], [`motion`], [`stress`] |
 //! | compare the library with what must come out | [`validate`] |
 //! | see what the published method does, and what became of its open problems | [`study`] |
 //! | ask the reference about a scene file | [`rest_command`] |
@@ -18,5 +18,6 @@ pub mod rest_command;
 pub mod scenes;
 pub mod sections;
 pub mod settling;
+pub mod stress;
 pub mod study;
 pub mod validate;

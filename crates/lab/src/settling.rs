@@ -2,10 +2,11 @@
 
 use anyhow::{Context as _, Result};
 use viscera::measure::measure_tets;
+use viscera::model::Model;
 use viscera::scalar::{Real, Vec3};
 use viscera::settings::SolverSettings;
 use viscera::solver::balance::ForceBalance;
-use viscera::solver::{Pin, Solver};
+use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
 use crate::reference::{Reference, Standing};
@@ -44,6 +45,29 @@ pub struct Settled {
 /// Runs a scene for [`FRAMES`] frames of one sixtieth of a second each, all velocities times
 /// [`KEPT_VELOCITY`] after each.
 pub fn settle<S: Real>(scene: &Scene, settings: &SolverSettings) -> Result<Settled> {
+    settle_with(scene, settings, |_: &mut AfterStep<'_, S>| Ok(()))
+}
+
+/// What a settling has come to, for a caller who has a hand in it.
+pub struct AfterStep<'a, S> {
+    /// The scene's.
+    pub model: &'a Model<S>,
+    /// What moves it.
+    pub solver: &'a mut Solver<S>,
+    /// At the end of a step.
+    pub state: &'a mut State<S>,
+    /// Of the last step.
+    pub inputs: &'a Inputs<S>,
+    /// The length of a step [s].
+    pub dt: f64,
+}
+
+/// The same, with `after` called at the end of every step.
+pub fn settle_with<S: Real>(
+    scene: &Scene,
+    settings: &SolverSettings,
+    mut after: impl FnMut(&mut AfterStep<'_, S>) -> Result<()>,
+) -> Result<Settled> {
     let model = scene.model::<S>(settings)?;
     let mut solver = Solver::new(&model, settings);
     let mut state = State::at_rest(&model);
@@ -56,6 +80,8 @@ pub fn settle<S: Real>(scene: &Scene, settings: &SolverSettings) -> Result<Settl
             let share = f64::from(substep) / f64::from(settings.substeps);
             let inputs = scene.inputs(f64::from(frame) + share);
             solver.step(&model, &mut state, &inputs, dt)?;
+            let (solver, state) = (&mut solver, &mut state);
+            after(&mut AfterStep { model: &model, solver, state, inputs: &inputs, dt })?;
         }
         speed = root_mean_square(&state.velocities);
         fastest = fastest.max(speed);

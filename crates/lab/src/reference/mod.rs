@@ -241,12 +241,7 @@ impl Reference {
         if !state.velocities.iter().all(|v| v.is_finite()) {
             return Err(ReferenceError::NotFinite { what: "velocities" });
         }
-        let loads = dead_loads(&self.problem, inputs);
-        let mut predicted = state.positions.clone();
-        for v in 0..expected {
-            let acceleration = loads[v] * (1.0 / self.problem.masses[v]);
-            predicted[v] += state.velocities[v] * dt + acceleration * (dt * dt);
-        }
+        let predicted = self.predict(state, inputs, dt);
         let x = with_pins(&predicted, inputs);
         let creep = creep_at(&self.problem, &state.positions, dt);
         let load = Load::Inertia { dt, predicted, creep };
@@ -256,6 +251,50 @@ impl Reference {
             state.positions[v] = x;
         }
         Ok(solution.convergence)
+    }
+
+    /// Where inertia and loads alone would lead all vertices [m].
+    fn predict(&self, state: &State<f64>, inputs: &Inputs<f64>, dt: f64) -> Vec<Vec3<f64>> {
+        let mut predicted = state.positions.clone();
+        for (v, load) in dead_loads(&self.problem, inputs).into_iter().enumerate() {
+            let acceleration = load * (1.0 / self.problem.masses[v]);
+            predicted[v] += state.velocities[v] * dt + acceleration * (dt * dt);
+        }
+        predicted
+    }
+
+    /// The incremental potential [J] of a step from `state` at places `x` [m] and, before it, at the start
+    /// of the step with pins moved; pinned vertices have no inertia. Infinite where `x` are no numbers.
+    pub fn incremental(
+        &self,
+        state: &State<f64>,
+        x: &[Vec3<f64>],
+        inputs: &Inputs<f64>,
+        dt: f64,
+    ) -> Result<[f64; 2], ReferenceError> {
+        self.check(&state.positions, inputs)?;
+        let predicted = with_pins(&self.predict(state, inputs, dt), inputs);
+        let creep = creep_at(&self.problem, &state.positions, dt);
+        let load = Load::Inertia { dt, predicted, creep };
+        let anchors = anchors(&self.problem, inputs);
+        let objective = Objective { problem: &self.problem, anchors, load };
+        let value = |x: &[Vec3<f64>]| {
+            let sum = objective.value(x).sum;
+            if sum.is_finite() { sum } else { f64::INFINITY }
+        };
+        Ok([value(&with_pins(&state.positions, inputs)), value(x)])
+    }
+
+    /// Elastic energy [J] of tissue, springs and attachments at `x`.
+    pub fn elastic_energy(
+        &self,
+        x: &[Vec3<f64>],
+        inputs: &Inputs<f64>,
+    ) -> Result<f64, ReferenceError> {
+        self.check(x, inputs)?;
+        let anchors = anchors(&self.problem, inputs);
+        let load = Load::Forces(Vec::new());
+        Ok(Objective { problem: &self.problem, anchors, load }.elastic_energy(x))
     }
 
     /// Potential, energy and unbalanced forces of statics at `x`.

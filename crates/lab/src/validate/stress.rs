@@ -4,38 +4,21 @@ use std::fmt;
 
 use anyhow::Result;
 use viscera::material::MaterialModel;
-use viscera::mesh::shapes::{Block, Splitting};
-use viscera::mesh::tet_volume;
-use viscera::scalar::Vec3;
 use viscera::settings::{Acceleration, SolverSettings};
-use viscera::solver::{Inputs, Pin, Solver};
-use viscera::state::State;
 
 use super::methods::{Form, scheduled};
 use super::{Context, Section};
-use crate::scenes::{FRAME_RATE, Random, Scene, tissue};
+use crate::scenes::tissue;
+use crate::stress::{self, FRAMES, HELD, Kind, Run, SIZE};
 use viscera_report::{Table, percent};
 
 pub(super) const SECTION: Section =
     Section { name: "stress", title: "Stress", cases: case_count, run };
 
-const SIZE: [f64; 3] = [0.08, 0.04, 0.04];
-const CELLS: [usize; 3] = [8, 4, 4];
 const YOUNG: f64 = 1e4;
 const POISSON: f64 = 0.45;
-/// Frames in all; grabs are let go after the first third.
-const FRAMES: u32 = 60;
-const HELD: u32 = 20;
 /// Asked of the share of tetrahedra inside out at the end.
 const INVERTED: f64 = 0.01;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    /// Vertices jump to places up to a body length away, twice, and are let go.
-    Grab,
-    /// All vertices start at random places in the body's box.
-    Scramble,
-}
 
 #[derive(Clone, Copy, Debug)]
 struct Case {
@@ -47,12 +30,8 @@ struct Case {
 
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let kind = match self.kind {
-            Kind::Grab => "violent grab",
-            Kind::Scramble => "scramble",
-        };
         let acceleration = if self.anderson { ", Anderson" } else { "" };
-        write!(f, "{kind} {}, {}{acceleration}", self.seed, self.form.name())
+        write!(f, "{} {}, {}{acceleration}", self.kind, self.seed, self.form.name())
     }
 }
 
@@ -91,59 +70,19 @@ fn case_count(quick: bool) -> usize {
 }
 
 fn answer(case: &Case) -> Result<Answer> {
-    let block = Block {
-        splitting: Splitting::Six,
-        jitter: 0.6,
-        seed: 1,
-        ..Block::new(Vec3::from_f64(SIZE), CELLS)
-    };
-    let material = tissue(MaterialModel::StableNeoHookean, YOUNG, POISSON)?;
-    let scene = Scene::bare("bar", block.mesh()?, material);
+    let scene = stress::bar(tissue(MaterialModel::StableNeoHookean, YOUNG, POISSON)?)?;
     let acceleration = if case.anderson { Acceleration::Anderson } else { Acceleration::None };
     let settings = SolverSettings { acceleration, ..scheduled(case.form, 1, 5) };
-    let model = scene.model::<f64>(&settings)?;
-    let mut solver = Solver::new(&model, &settings);
-    let mut state = State::at_rest(&model);
-    let mut random = Random(case.seed);
-    let mut inputs = Inputs::default();
-    let dt = 1.0 / FRAME_RATE;
-    let mut grabbed = Vec::new();
-    match case.kind {
-        Kind::Grab => {
-            let count = 2 + random.bits() % 6;
-            for _ in 0..count {
-                grabbed.push((random.bits() % model.vertex_count() as u64) as u32);
-            }
-        }
-        Kind::Scramble => {
-            for x in &mut state.positions {
-                *x = Vec3::from_f64(SIZE.map(|side| random.uniform(0.0, side)));
-            }
-            solver.restart(&model, &mut state, &inputs, dt)?;
-        }
-    }
-    let mut answer = Answer { tets: model.tet_count(), ..Answer::default() };
-    for frame in 0..FRAMES {
-        if case.kind == Kind::Grab && (frame == 0 || frame == HELD / 2) {
-            inputs.pins.clear();
-            for &vertex in &grabbed {
-                let target = model.rest_positions[vertex as usize] + random.vector(SIZE[0]);
-                inputs.pins.push(Pin { vertex, target });
-            }
-        }
-        if frame == HELD {
-            inputs.pins.clear();
-        }
-        solver.step(&model, &mut state, &inputs, dt)?;
+    let mut run = Run::new(&scene, case.kind, case.seed, &settings)?;
+    let mut answer = Answer { tets: scene.mesh.tets().len(), ..Answer::default() };
+    for _ in 0..FRAMES {
+        run.step()?;
         answer.steps += 1;
-        answer.above += u64::from(!solver.last_step().is_some_and(|step| step.keeps_limit()));
+        answer.above += u64::from(!run.solver.last_step().is_some_and(|step| step.keeps_limit()));
     }
-    answer.rejected = solver.rejected_steps();
-    answer.is_finite = state.is_finite();
-    for tet in scene.mesh.tets() {
-        let corners = tet.map(|v| state.positions[v as usize]);
-        answer.inverted += usize::from(tet_volume(corners) <= 0.0 || !state.is_finite());
-    }
+    answer.rejected = run.solver.rejected_steps();
+    answer.is_finite = run.state.is_finite();
+    answer.inverted = run.inverted();
     Ok(answer)
 }
 

@@ -1,0 +1,226 @@
+//! Who is handled roughly, by which solver, and what is seen of it from outside.
+
+use std::fmt;
+
+use anyhow::Result;
+use viscera::material::MaterialModel;
+use viscera::settings::{AndersonGuard, AndersonOn, SolverSettings};
+
+use super::Context;
+use crate::reference::Reference;
+use crate::scenes::Size;
+use crate::settling::{AfterStep, compare, settle_with, truth};
+use crate::stress::{self, FRAMES, Kind, Run, SIZE};
+use crate::study::methods::{COLORED, Method, anderson, exact, published};
+
+/// Young's modulus [Pa] and Poisson's ratio of the bar in trouble.
+pub(super) const YOUNG: f64 = 1e4;
+const POISSON: f64 = 0.45;
+/// Of the bar that shows who settles. Softer or more compressible tissue settles by wrong ways as well.
+pub(super) const SETTLING_YOUNG: f64 = 1e5;
+pub(super) const SETTLING_POISSON: f64 = 0.49;
+/// Of a potential, what its sums may lose to rounding.
+pub(super) const ROUND_OFF: f64 = 1e-9;
+/// A body this many times as long as at rest has blown up.
+const BLOWN: f64 = 10.0;
+
+/// What happens to the multipliers of a step that was taken back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum AfterRejection {
+    Keep,
+    Recompute,
+    Zero,
+}
+
+/// A way to solve.
+pub(super) struct Way {
+    pub method: Method,
+    pub after: AfterRejection,
+    /// One of those that all runs are made of; the others are compared on a few.
+    pub is_main: bool,
+}
+
+/// Anderson's method, window 5, on both unknowns, with coloured sweeps.
+pub(super) fn ways() -> Vec<Way> {
+    use AfterRejection::{Keep, Recompute, Zero};
+    use AndersonGuard::{Energy, None, Residual};
+    let mixed = |settings, anderson_guard| SolverSettings {
+        anderson_guard,
+        iterations: 5,
+        ..anderson(settings, AndersonOn::Both)
+    };
+    let free = || SolverSettings { step_guard: false, ..exact(COLORED) };
+    let way = |name: &str, settings, after, is_main| Way {
+        method: Method::new(name, settings),
+        after,
+        is_main,
+    };
+    vec![
+        way("published", mixed(published(COLORED), None), Keep, true),
+        way("published, residual guard", mixed(published(COLORED), Residual), Keep, false),
+        way("rebase", mixed(free(), None), Keep, false),
+        way("rebase, residual guard", mixed(free(), Residual), Keep, false),
+        way("step guard, zeroed", mixed(exact(COLORED), Residual), Zero, false),
+        way("step guard, recomputed", mixed(exact(COLORED), Residual), Recompute, false),
+        way("step guard, mixtures judged", mixed(exact(COLORED), Energy), Keep, false),
+        way("step guard", mixed(exact(COLORED), Residual), Keep, true),
+    ]
+}
+
+/// The way without any safeguard, and the one that is recommended.
+pub(super) const UNGUARDED: usize = 0;
+pub(super) const SAFE: usize = 7;
+
+/// Takes back and forgets, where that is the way's rule.
+fn heed(after: AfterRejection, rejected: &mut u64, step: &mut AfterStep<'_, f64>) -> Result<()> {
+    let so_far = step.solver.rejected_steps();
+    if std::mem::replace(rejected, so_far) == so_far {
+        return Ok(());
+    }
+    match after {
+        AfterRejection::Keep => {}
+        AfterRejection::Recompute => {
+            step.solver.restart(step.model, step.state, step.inputs, step.dt)?;
+        }
+        AfterRejection::Zero => step.state.multipliers.fill(0.0),
+    }
+    Ok(())
+}
+
+#[derive(Clone, Copy)]
+pub(super) struct Case {
+    pub model: MaterialModel,
+    pub way: usize,
+    pub kind: Kind,
+    pub seed: u64,
+}
+
+impl fmt::Display for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = &ways()[self.way].method.name;
+        write!(f, "{} {}, {:?}, {name}", self.kind, self.seed, self.model)
+    }
+}
+
+/// Materials, ways, kinds, seeds: the last runs fastest.
+pub(super) fn cases(quick: bool) -> Vec<Case> {
+    let (many, few) = if quick { (3, 1) } else { (200, 25) };
+    let mut cases = Vec::new();
+    for model in MODELS {
+        for (index, way) in ways().iter().enumerate() {
+            let count = if way.is_main { many } else { few };
+            for kind in [Kind::Grab, Kind::Scramble] {
+                cases.extend((0..count).map(|seed| Case { model, way: index, kind, seed }));
+            }
+        }
+    }
+    cases
+}
+
+pub(super) const MODELS: [MaterialModel; 2] =
+    [MaterialModel::StableNeoHookean, MaterialModel::SaintVenantKirchhoff];
+
+/// A bar that settles by one of the ways.
+pub(super) struct Rest {
+    pub model: MaterialModel,
+    pub way: usize,
+}
+
+impl fmt::Display for Rest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "cantilever, {:?}, {}", self.model, ways()[self.way].method.name)
+    }
+}
+
+pub(super) fn rests() -> Vec<Rest> {
+    let of = |model| (0..ways().len()).map(move |way| Rest { model, way });
+    MODELS.into_iter().flat_map(of).collect()
+}
+
+/// One run.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Outcome {
+    /// Steps that end at a higher incremental potential than they began with.
+    pub above: u32,
+    /// The largest ratio of the two.
+    pub factor: f64,
+    /// No numbers, or a body of many times its length.
+    pub is_blown: bool,
+    /// Tetrahedra inside out at the end.
+    pub inverted: usize,
+    pub tets: usize,
+    pub rejected: u64,
+    /// Mechanical energy [J] at the start of the time in which nothing acts on the body, and then at the
+    /// end of every frame.
+    pub energies: Vec<f64>,
+}
+
+impl Outcome {
+    /// The highest mechanical energy of the free body over what it was let go with.
+    pub fn gain(&self) -> f64 {
+        let highest = self.energies.iter().copied().fold(0.0, f64::max);
+        self.energies.first().map_or(0.0, |first| highest / first)
+    }
+}
+
+/// Kinetic and elastic energy [J].
+fn mechanical_energy(reference: &Reference, run: &Run<'_>) -> Result<f64> {
+    if !run.state.is_finite() {
+        return Ok(f64::INFINITY);
+    }
+    let moving = run.state.velocities.iter().zip(&run.model.masses);
+    let kinetic: f64 = moving.map(|(v, m)| 0.5 * m * v.length_squared()).sum();
+    Ok(kinetic + reference.elastic_energy(&run.state.positions, &run.inputs)?)
+}
+
+fn is_blown(run: &Run<'_>) -> bool {
+    let x = &run.state.positions;
+    let first = x[0];
+    !run.state.is_finite() || x.iter().any(|x| (*x - first).length() >= BLOWN * SIZE[0])
+}
+
+/// Watches one run. `Phi` is computed outside the solver, whatever that believes.
+pub(super) fn outcome(context: &Context, case: &Case) -> Result<Outcome> {
+    let tissue = context.changes.tissue(case.model, YOUNG, POISSON)?;
+    let scene = stress::bar(tissue)?;
+    let way = &ways()[case.way];
+    let mut run = Run::new(&scene, case.kind, case.seed, &way.method.settings)?;
+    let reference = Reference::new(&run.model);
+    let mut outcome = Outcome { tets: scene.mesh.tets().len(), ..Outcome::default() };
+    let mut rejected = 0;
+    for _ in 0..FRAMES {
+        if run.is_free() && outcome.energies.is_empty() {
+            outcome.energies.push(mechanical_energy(&reference, &run)?);
+        }
+        let before = run.state.clone();
+        run.step()?;
+        let (x, inputs) = (&run.state.positions, &run.inputs);
+        let [start, end] = reference.incremental(&before, x, inputs, Run::DT)?;
+        outcome.above += u32::from(end > start * (1.0 + ROUND_OFF));
+        outcome.factor = outcome.factor.max(end / start);
+        outcome.is_blown |= is_blown(&run);
+        if !outcome.energies.is_empty() {
+            outcome.energies.push(mechanical_energy(&reference, &run)?);
+        }
+        if !run.state.is_finite() {
+            break;
+        }
+        heed(way.after, &mut rejected, &mut run.after_step())?;
+    }
+    outcome.rejected = run.solver.rejected_steps();
+    outcome.inverted = run.inverted();
+    Ok(outcome)
+}
+
+/// The apparent stiffness of a cantilever of the same settings.
+pub(super) fn apparent_stiffness(context: &Context, rest: &Rest) -> Result<f64> {
+    let size = if context.quick { Size::Tiny } else { Size::Small };
+    let tissue = context.changes.tissue(rest.model, SETTLING_YOUNG, SETTLING_POISSON)?;
+    let scene = context.changes.scene("cantilever", size, tissue)?;
+    let way = &ways()[rest.way];
+    let mut rejected = 0;
+    let settled = settle_with::<f64>(&scene, &way.method.settings, |step| {
+        heed(way.after, &mut rejected, step)
+    })?;
+    Ok(compare(&scene, &truth(&scene)?, &settled.positions)?.stiffness)
+}
