@@ -5,7 +5,9 @@ use viscera::settings::{AndersonOn, RelaxationForm, SolverSettings};
 use viscera_report::percent;
 
 use super::coloring::bar_from_rest;
-use super::convergence::{COST_CASES, Figure, Followed, Reach, follow, in_words, table};
+use super::convergence::{
+    COST_AND_DEVICE_CASES, Figure, Followed, Reach, follow_on_both, in_words, judge_device, table,
+};
 use super::methods::{COLORED, JACOBI, Method, anderson, chebyshev, exact, published, relaxed};
 use super::{Context, Section, artefact, multipliers};
 use crate::scenes::Size;
@@ -68,7 +70,7 @@ fn with_iterations(methods: Vec<Method>, iterations: u32) -> Vec<Method> {
 fn case_count(quick: bool) -> usize {
     jacobi_methods(quick).len()
         + colored_methods(quick).len()
-        + 2 * COST_CASES
+        + 2 * COST_AND_DEVICE_CASES
         + artefact::case_count(quick)
         + multipliers::case_count(quick)
 }
@@ -103,7 +105,7 @@ fn convergence(context: &mut Context) -> Result<()> {
     let size = if context.quick { Size::Tiny } else { Size::Large };
     let step = bar_from_rest(context, size)?;
     context.document.subheading("Accelerations of published XPBD");
-    let mut followed = follow(context, &step, jacobi_methods(context.quick))?;
+    let mut followed = follow_on_both(context, &step, jacobi_methods(context.quick))?;
     let mut figure = Figure::new("Accelerated Jacobi");
     followed.iter().for_each(|method| figure.add(method));
     figure.show(
@@ -117,7 +119,7 @@ fn convergence(context: &mut Context) -> Result<()> {
              unknowns, and keeps its lead.",
         ],
     )?;
-    let colored = follow(context, &step, colored_methods(context.quick))?;
+    let colored = follow_on_both(context, &step, colored_methods(context.quick))?;
     let mut figure = Figure::new("Accelerated coloured sweeps");
     colored.iter().for_each(|method| figure.add(method));
     figure.show(
@@ -132,6 +134,7 @@ fn convergence(context: &mut Context) -> Result<()> {
     followed.extend(colored);
     context.document.table(&table(&followed, &[1e-1, 1e-2]));
     judge(context, &followed);
+    judge_device(context, "figure 4", &followed);
     Ok(())
 }
 

@@ -4,10 +4,12 @@ use anyhow::Result;
 use viscera::material::MaterialModel;
 use viscera::settings::Colors;
 
-use super::convergence::{COST_CASES, Figure, Followed, Reach, follow, table};
+use super::convergence::{
+    COST_AND_DEVICE_CASES, Figure, Followed, Reach, follow_on_both, judge_device, table,
+};
 use super::methods::{COLORED, JACOBI, Method, published};
 use super::step::MeasuredStep;
-use super::{Context, Section};
+use super::{Context, Section, device};
 use crate::scenes::Size;
 
 pub(super) const SECTION: Section = Section {
@@ -40,14 +42,14 @@ fn methods(quick: bool) -> Vec<Method> {
 }
 
 fn case_count(quick: bool) -> usize {
-    methods(quick).len() + COST_CASES
+    methods(quick).len() + COST_AND_DEVICE_CASES
 }
 
 fn run(context: &mut Context) -> Result<()> {
     let size = if context.quick { Size::Tiny } else { Size::Large };
     let step = bar_from_rest(context, size)?;
     introduce(context, &step);
-    let followed = follow(context, &step, methods(context.quick))?;
+    let followed = follow_on_both(context, &step, methods(context.quick))?;
     let mut figure = Figure::new("Published XPBD");
     followed.iter().for_each(|method| figure.add(method));
     figure.show(
@@ -63,6 +65,7 @@ fn run(context: &mut Context) -> Result<()> {
     )?;
     context.document.table(&table(&followed, &[1e-1, 1e-2]));
     conclude(context, &followed);
+    judge_device(context, "figure 1", &followed);
     Ok(())
 }
 
@@ -105,8 +108,11 @@ fn conclude(context: &mut Context, followed: &[Followed]) {
         "To a tenth of the starting error Jacobi takes {jacobi} iterations of {} passes, the coloured \
          sweep {colored} of {}. Percentages are shares of Jacobi's. Iterations alone flatter colours, \
          passes alone flatter copies, and milliseconds are of a processor that does not care for \
-         passes: that is why the three stand side by side.",
-        first.cost.passes, last.cost.passes
+         passes: that is why the three stand side by side. {}: markers are errors after 1, 2, 5, 10, ... \
+         iterations.",
+        first.cost.passes,
+        last.cost.passes,
+        device::describe()
     ));
     let ends: Vec<String> = followed
         .iter()

@@ -5,12 +5,16 @@ use std::fmt;
 use viscera::settings::{Acceleration, AndersonOn, RelaxationForm, SolverSettings};
 
 use super::Context;
+use super::device::{self, Look};
 use super::methods::Method;
 use super::step::{Cost, Curve, MeasuredStep};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 
 /// Cases that [`follow`] counts besides one per method: the measurement of milliseconds.
 pub(super) const COST_CASES: usize = 1;
+
+/// Cases that [`follow_on_both`] counts besides one per method.
+pub(super) const COST_AND_DEVICE_CASES: usize = COST_CASES + 1;
 
 /// Points of a curve per factor of ten, in plots and data: more are not told apart.
 const POINTS_PER_DECADE: f64 = 20.0;
@@ -26,6 +30,8 @@ pub(super) struct Followed {
     pub method: Method,
     pub curve: Curve,
     pub cost: Cost,
+    /// By the GPU backend, where it was asked and there is an adapter.
+    pub looks: Vec<Look>,
 }
 
 /// Follows every method through its iterations, in double precision.
@@ -39,9 +45,57 @@ pub(super) fn follow(
     let costs = context.run_cases(&["milliseconds per iteration"], |_| {
         methods.iter().map(|method| step.cost(&method.settings)).collect::<Result<Vec<_>>>()
     })?;
-    let costs = costs.into_iter().flatten();
-    let all = methods.into_iter().zip(curves).zip(costs);
-    Ok(all.map(|((method, curve), cost)| Followed { method, curve, cost }).collect())
+    let all = methods.into_iter().zip(curves).zip(costs.into_iter().flatten());
+    let followed =
+        all.map(|((method, curve), cost)| Followed { method, curve, cost, looks: Vec::new() });
+    Ok(followed.collect())
+}
+
+/// The same, and by the GPU backend.
+pub(super) fn follow_on_both(
+    context: &Context,
+    step: &MeasuredStep,
+    methods: Vec<Method>,
+) -> Result<Vec<Followed>> {
+    let mut followed = follow(context, step, methods)?;
+    let looks = context.run_cases(&["the GPU backend"], |_| {
+        let Some(device) = device::device() else { return Ok(Vec::new()) };
+        let look = |followed: &Followed| {
+            device::follow(device, step, &followed.method.settings, followed.cost.passes)
+        };
+        followed.iter().map(look).collect::<Result<Vec<_>>>()
+    })?;
+    for (followed, looks) in followed.iter_mut().zip(looks.into_iter().flatten()) {
+        followed.looks = looks;
+    }
+    Ok(followed)
+}
+
+/// Whether the GPU backend draws the same curves: both backends work in single precision, each with
+/// round-off of its own, so that of all looks at a method half should be no farther from double precision
+/// than twice what the CPU is.
+pub(super) fn judge_device(context: &mut Context, what: &str, followed: &[Followed]) {
+    let (mut worst, mut count) = (0.0f64, 0);
+    for Followed { looks, .. } in followed {
+        let mut ratios: Vec<f64> = looks
+            .iter()
+            .filter(|look| look.error < CEILING)
+            .map(|look| look.device_rounding / look.cpu_rounding)
+            .collect();
+        ratios.sort_by(f64::total_cmp);
+        count += ratios.len();
+        worst = worst.max(ratios.get(ratios.len() / 2).copied().unwrap_or(0.0));
+    }
+    if count > 0 {
+        context.verdict(
+            format!(
+                "{what}: GPU's distance from double precision over the CPU's, median of each curve"
+            ),
+            "at most 2",
+            format!("{worst:.2} ({count} looks)"),
+            worst <= 2.0,
+        );
+    }
 }
 
 /// Whether and when a curve came down to a level.
@@ -114,7 +168,7 @@ pub(super) fn table(followed: &[Followed], levels: &[f64]) -> Table {
     heads.extend(["error at the end".to_owned(), "strain / true".into()]);
     let mut table = Table::new(heads);
     let Some(first) = followed.first() else { return table };
-    for Followed { method, curve, cost } in followed {
+    for Followed { method, curve, cost, .. } in followed {
         let ms = 1e3 * cost.seconds;
         let mut row = vec![method.name.clone(), cost.passes.to_string(), format!("{ms:.2}")];
         for level in levels {
@@ -161,6 +215,8 @@ pub(super) fn in_data(error: f64) -> String {
 /// The same curves over iterations and over dependent passes, and their points as data.
 pub(super) struct Figure {
     plots: [Plot; 2],
+    /// What the GPU backend found, of all methods.
+    device: [Vec<[f64; 2]>; 2],
     data: Table,
 }
 
@@ -176,15 +232,25 @@ impl Figure {
         };
         Self {
             plots: [plot("iterations"), plot("dependent passes")],
+            device: [Vec::new(), Vec::new()],
             data: Table::new(["curve", "iterations", "passes", "error"]),
         }
     }
 
     /// Adds a method; dashed where it does not scale and mix positions and multipliers alike.
     pub fn add(&mut self, followed: &Followed) {
-        let Followed { method, curve, cost } = followed;
+        let Followed { method, curve, cost, looks } = followed;
         let style = if treats_alike(&method.settings) { Style::Line } else { Style::Dashed };
         self.add_curve(&method.name, &curve.errors, cost.passes, style);
+        for Look { iterations, error, .. } in looks {
+            let passes = *iterations as usize * cost.passes;
+            let name = format!("{} (GPU)", method.name);
+            self.data.row([&name, &iterations.to_string(), &passes.to_string(), &in_data(*error)]);
+            if (FLOOR..CEILING).contains(error) {
+                self.device[0].push([f64::from(*iterations), *error]);
+                self.device[1].push([passes as f64, *error]);
+            }
+        }
     }
 
     /// Adds errors after 0, 1, 2, ... iterations of so many passes each.
@@ -205,7 +271,12 @@ impl Figure {
     }
 
     /// Both plots with what to see in them, and the data.
-    pub fn show(self, context: &mut Context, name: &str, see: [&str; 2]) -> Result<()> {
+    pub fn show(mut self, context: &mut Context, name: &str, see: [&str; 2]) -> Result<()> {
+        for (plot, points) in self.plots.iter_mut().zip(self.device) {
+            if !points.is_empty() {
+                plot.series(Series::new("GPU backend", points).with_style(Style::Markers));
+            }
+        }
         let [iterations, passes] = &self.plots;
         context.plot(&format!("{name}-iterations"), iterations, see[0])?;
         context.plot(&format!("{name}-passes"), passes, see[1])?;

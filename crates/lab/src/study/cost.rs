@@ -149,7 +149,7 @@ fn measure(context: &mut Context, task: &Task, data: &mut Table) -> Result<()> {
     }
     context.document.subheading(&name);
     context.document.table(&table(&followed, &LEVELS));
-    for Followed { method, curve, cost } in &followed {
+    for Followed { method, curve, cost, .. } in &followed {
         for level in LEVELS {
             let reach = Reach::of(curve, level).to_string();
             let passes = cost.passes.to_string();

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use std::sync::OnceLock;
-use viscera::scalar::Vec3;
+use viscera::scalar::{Real, Vec3};
 use viscera::settings::SolverSettings;
 use viscera::solver::gpu::{Adapter, Device, GpuSolver};
 
@@ -26,34 +26,74 @@ pub fn describe() -> String {
     }
 }
 
-/// Iterations after which the device is asked where it stands: every look is a run of its own.
-pub fn looks(most: u32) -> Vec<u32> {
-    let steps = [1, 2, 5].into_iter();
-    let decades = (0..6).flat_map(|decade| steps.clone().map(move |k| k * 10u32.pow(decade)));
-    decades.take_while(|k| *k <= most).collect()
+/// What the device has found after so many iterations, and how far it and the CPU in single precision
+/// are from double precision, in the measure of errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    pub iterations: u32,
+    pub error: f64,
+    pub device_rounding: f64,
+    pub cpu_rounding: f64,
 }
 
-/// As [`MeasuredStep::follow`], after the iterations given: `[iterations, error]`.
+/// Dispatches that all iterations up to a look may take: a software driver is slow.
+const MOST_DISPATCHES: usize = 6000;
+
+/// Iterations after which the device is asked where it stands: every look is a run of its own.
+fn looks(settings: &SolverSettings, passes: usize) -> impl Iterator<Item = u32> {
+    let most = settings.iterations.min((MOST_DISPATCHES / passes.max(1)) as u32);
+    let decades = (0..6).flat_map(|decade| [1, 2, 5].map(|k| k * 10u32.pow(decade)));
+    decades.take_while(move |k| *k <= most)
+}
+
+/// As [`MeasuredStep::follow`], by the device, where one iteration is so many passes.
 pub fn follow(
     device: &Device,
     step: &MeasuredStep,
     settings: &SolverSettings,
-    looks: &[u32],
-) -> Result<Vec<[f64; 2]>> {
-    let model = step.scene.model::<f32>(settings)?;
-    let (_, start) = step.begin::<f32>(&model, settings)?;
-    let mut solver = GpuSolver::new(device, &model, settings)?;
+    passes: usize,
+) -> Result<Vec<Look>> {
+    let looks: Vec<u32> = looks(settings, passes).collect();
+    let most = looks.last().copied().unwrap_or(1);
+    let settings = SolverSettings { iterations: most, ..settings.clone() };
+    let (double, single) =
+        (iterates::<f64>(step, &settings, &looks)?, iterates::<f32>(step, &settings, &looks)?);
+    let model = step.scene.model::<f32>(&settings)?;
+    let (_, start) = step.begin::<f32>(&model, &settings)?;
+    let mut solver = GpuSolver::new(device, &model, &settings)?;
     let mut state = start.clone();
-    let mut points = Vec::with_capacity(looks.len());
-    for &count in looks {
-        solver.set_iterations(count);
+    let mut found = Vec::with_capacity(looks.len());
+    for ((&iterations, double), single) in looks.iter().zip(&double).zip(&single) {
+        solver.set_iterations(iterations);
         solver.write(&model, &start)?;
         solver.step(&model, &step.inputs(), step.dt)?;
         solver.read(&model, &mut state)?;
-        let positions: Vec<Vec3<f64>> = state.positions.iter().map(|x| x.cast()).collect();
-        points.push([f64::from(count), step.error(&positions)]);
+        let places: Vec<Vec3<f64>> = state.positions.iter().map(|x| x.cast()).collect();
+        found.push(Look {
+            iterations,
+            error: step.error(&places),
+            device_rounding: step.distance(&places, double),
+            cpu_rounding: step.distance(single, double),
+        });
     }
-    Ok(points)
+    Ok(found)
+}
+
+/// Where the CPU has the vertices [m] after so many iterations each.
+fn iterates<S: Real>(
+    step: &MeasuredStep,
+    settings: &SolverSettings,
+    looks: &[u32],
+) -> Result<Vec<Vec<Vec3<f64>>>> {
+    let model = step.scene.model::<S>(settings)?;
+    let (mut solver, mut state) = step.begin(&model, settings)?;
+    let mut seen = Vec::with_capacity(looks.len());
+    solver.step_watched(&model, &mut state, &step.inputs(), step.dt, |iteration, x| {
+        if looks.contains(&iteration) {
+            seen.push(x.to_vec());
+        }
+    })?;
+    Ok(seen)
 }
 
 /// As [`MeasuredStep::end`].
