@@ -108,8 +108,8 @@ fn conclude(context: &mut Context, followed: &[Followed]) {
         "To a tenth of the starting error Jacobi takes {jacobi} iterations of {} passes, the coloured \
          sweep {colored} of {}. Percentages are shares of Jacobi's. Iterations alone flatter colours, \
          passes alone flatter copies, and milliseconds are of a processor that does not care for \
-         passes: that is why the three stand side by side. {}: markers are errors after 1, 2, 5, 10, ... \
-         iterations.",
+         passes: that is why the three stand side by side. {}; markers are errors after 1, 2, 5, 10, ... \
+         iterations in single precision, lines are of double precision.",
         first.cost.passes,
         last.cost.passes,
         device::describe()

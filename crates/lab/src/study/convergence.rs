@@ -25,6 +25,9 @@ pub(super) const CEILING: f64 = 10.0;
 /// And end below this one, where round-off begins.
 pub(super) const FLOOR: f64 = 1e-9;
 
+/// Who computes in single precision, as legends and data call them.
+const SINGLE: [&str; 2] = ["GPU, single precision", "CPU, single precision"];
+
 /// What a table and a figure need of a method.
 pub(super) struct Followed {
     pub method: Method,
@@ -79,8 +82,8 @@ pub(super) fn judge_device(context: &mut Context, what: &str, followed: &[Follow
     for Followed { looks, .. } in followed {
         let mut ratios: Vec<f64> = looks
             .iter()
-            .filter(|look| look.error < CEILING)
-            .map(|look| look.device_rounding / look.cpu_rounding)
+            .filter(|look| look.errors.iter().all(|error| *error < CEILING))
+            .map(|look| look.rounding[0] / look.rounding[1])
             .collect();
         ratios.sort_by(f64::total_cmp);
         count += ratios.len();
@@ -215,8 +218,8 @@ pub(super) fn in_data(error: f64) -> String {
 /// The same curves over iterations and over dependent passes, and their points as data.
 pub(super) struct Figure {
     plots: [Plot; 2],
-    /// What the GPU backend found, of all methods.
-    device: [Vec<[f64; 2]>; 2],
+    /// What device and CPU found in single precision, of all methods, for either plot.
+    single: [[Vec<[f64; 2]>; 2]; 2],
     data: Table,
 }
 
@@ -232,7 +235,7 @@ impl Figure {
         };
         Self {
             plots: [plot("iterations"), plot("dependent passes")],
-            device: [Vec::new(), Vec::new()],
+            single: Default::default(),
             data: Table::new(["curve", "iterations", "passes", "error"]),
         }
     }
@@ -242,13 +245,16 @@ impl Figure {
         let Followed { method, curve, cost, looks } = followed;
         let style = if treats_alike(&method.settings) { Style::Line } else { Style::Dashed };
         self.add_curve(&method.name, &curve.errors, cost.passes, style);
-        for Look { iterations, error, .. } in looks {
+        for Look { iterations, errors, .. } in looks {
             let passes = *iterations as usize * cost.passes;
-            let name = format!("{} (GPU)", method.name);
-            self.data.row([&name, &iterations.to_string(), &passes.to_string(), &in_data(*error)]);
-            if (FLOOR..CEILING).contains(error) {
-                self.device[0].push([f64::from(*iterations), *error]);
-                self.device[1].push([passes as f64, *error]);
+            for (backend, error) in errors.iter().enumerate() {
+                let name = format!("{}, {}", method.name, SINGLE[backend]);
+                let counts = [iterations.to_string(), passes.to_string()];
+                self.data.row([&name, &counts[0], &counts[1], &in_data(*error)]);
+                if (FLOOR..CEILING).contains(error) {
+                    self.single[backend][0].push([f64::from(*iterations), *error]);
+                    self.single[backend][1].push([passes as f64, *error]);
+                }
             }
         }
     }
@@ -272,9 +278,11 @@ impl Figure {
 
     /// Both plots with what to see in them, and the data.
     pub fn show(mut self, context: &mut Context, name: &str, see: [&str; 2]) -> Result<()> {
-        for (plot, points) in self.plots.iter_mut().zip(self.device) {
-            if !points.is_empty() {
-                plot.series(Series::new("GPU backend", points).with_style(Style::Markers));
+        for (name, points) in SINGLE.into_iter().zip(self.single) {
+            for (plot, points) in self.plots.iter_mut().zip(points) {
+                if !points.is_empty() {
+                    plot.series(Series::new(name, points).with_style(Style::Markers));
+                }
             }
         }
         let [iterations, passes] = &self.plots;

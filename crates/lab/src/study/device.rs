@@ -26,14 +26,14 @@ pub fn describe() -> String {
     }
 }
 
-/// What the device has found after so many iterations, and how far it and the CPU in single precision
-/// are from double precision, in the measure of errors.
+/// What device and CPU have found in single precision after so many iterations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     pub iterations: u32,
-    pub error: f64,
-    pub device_rounding: f64,
-    pub cpu_rounding: f64,
+    /// Distances from the exact end: the device, then the CPU.
+    pub errors: [f64; 2],
+    /// Distances from the CPU in double precision: the device, then the CPU.
+    pub rounding: [f64; 2],
 }
 
 /// Dispatches that all iterations up to a look may take: a software driver is slow.
@@ -71,9 +71,8 @@ pub fn follow(
         let places: Vec<Vec3<f64>> = state.positions.iter().map(|x| x.cast()).collect();
         found.push(Look {
             iterations,
-            error: step.error(&places),
-            device_rounding: step.distance(&places, double),
-            cpu_rounding: step.distance(single, double),
+            errors: [step.error(&places), step.error(single)],
+            rounding: [step.distance(&places, double), step.distance(single, double)],
         });
     }
     Ok(found)
