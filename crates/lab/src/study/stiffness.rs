@@ -342,12 +342,16 @@ fn conclude(context: &mut Context, cases: &[Case], errors: &[Error]) {
         .map(|(method, Method { name, .. })| {
             let [low, high] = range(cases, errors, method);
             let lost = of(method).filter(|(_, error)| is_lost(error)).count();
-            format!("{name}: {low:.2} to {high:.2}, {lost} of {} lost", of(method).count())
+            let all = of(method).count();
+            match all - lost {
+                0 => format!("{name}: all {all} bodies lost"),
+                _ => format!("{name}: {low:.2} to {high:.2}, {lost} of {all} bodies lost"),
+            }
         })
         .collect();
     context
         .document
-        .paragraph(format!("Over all tissues and budgets, `s` is - {}.", words.join("; ")));
+        .paragraph(format!("Over all tissues and budgets `s` is: {}.", words.join("; ")));
     for (method, limit) in [DOUBLE, SINGLE].into_iter().zip(LIMITS) {
         let mine = || of(method).filter(|(case, _)| is_neo(case));
         let others = mine().filter(|(_, error)| error.is_other_minimum()).count();

@@ -17,6 +17,7 @@ mod forms;
 pub mod gpu;
 mod guard;
 mod history;
+mod iterates;
 mod loads;
 pub mod plan;
 mod potential;

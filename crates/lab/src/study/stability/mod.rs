@@ -77,10 +77,10 @@ fn teach(context: &mut Context) {
          towards it and, if need be, by descent. What then becomes of the multipliers decides whether the body \
          still moves: kept (the default), *recomputed* from positions, or *zeroed*. *Mixtures judged*: each \
          mixture must not raise `Phi` either. A guard that held the body fast would be the safest of all; so \
-         the last column has the apparent stiffness of a cantilever (E = {} kPa, nu = {}) that settles by \
+         the last column has the apparent stiffness of two cantilevers (E = {} kPa, nu = {}) that settle by \
          the same way, and must be 1.",
         context.changes.young.unwrap_or(SETTLING_YOUNG) / 1e3,
-        context.changes.poisson.unwrap_or(SETTLING_POISSON),
+        SETTLING_POISSON.map(|nu| context.changes.poisson.unwrap_or(nu).to_string()).join(" and "),
     ));
 }
 
@@ -97,11 +97,12 @@ struct Summary {
     inverted: f64,
     rejected: f64,
     gain: f64,
-    stiffness: f64,
+    /// Of either bar.
+    stiffness: [f64; 2],
 }
 
 impl Summary {
-    fn new(rest: &Rest, stiffness: f64, cases: &[Case], outcomes: &[Outcome]) -> Self {
+    fn new(rest: &Rest, stiffness: [f64; 2], cases: &[Case], outcomes: &[Outcome]) -> Self {
         let mine = || {
             let pairs = cases.iter().zip(outcomes);
             pairs.filter(|(case, _)| case.model == rest.model && case.way == rest.way)
@@ -137,12 +138,15 @@ impl Summary {
     }
 
     fn settles(&self) -> bool {
-        (self.stiffness - 1.0).abs() <= STIFFNESS
+        self.stiffness.iter().all(|s| (s - 1.0).abs() <= STIFFNESS)
     }
 
     fn stiffness_text(&self) -> String {
-        let s = self.stiffness;
-        if s > 0.0 && s < 1e3 { format!("{s:.4}") } else { "lost".to_owned() }
+        let text = |s: f64| match s > 0.0 && s < 1e3 {
+            true => format!("{s:.4}"),
+            false => "lost".to_owned(),
+        };
+        self.stiffness.map(text).join(" and ")
     }
 }
 

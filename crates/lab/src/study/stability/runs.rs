@@ -16,9 +16,9 @@ use crate::study::methods::{COLORED, Method, anderson, exact, published};
 /// Young's modulus [Pa] and Poisson's ratio of the bar in trouble.
 pub(super) const YOUNG: f64 = 1e4;
 const POISSON: f64 = 0.45;
-/// Of the bar that shows who settles. Softer or more compressible tissue settles by wrong ways as well.
+/// Of the bars that show who settles: stiff ones, of which steps are taken back.
 pub(super) const SETTLING_YOUNG: f64 = 1e5;
-pub(super) const SETTLING_POISSON: f64 = 0.49;
+pub(super) const SETTLING_POISSON: [f64; 2] = [0.45, 0.49];
 /// Of a potential, what its sums may lose to rounding.
 pub(super) const ROUND_OFF: f64 = 1e-9;
 /// A body this many times as long as at rest has blown up.
@@ -212,10 +212,15 @@ pub(super) fn outcome(context: &Context, case: &Case) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// The apparent stiffness of a cantilever of the same settings.
-pub(super) fn apparent_stiffness(context: &Context, rest: &Rest) -> Result<f64> {
+/// The apparent stiffness of two cantilevers of the same settings.
+pub(super) fn apparent_stiffness(context: &Context, rest: &Rest) -> Result<[f64; 2]> {
+    let [compressible, other] = SETTLING_POISSON;
+    Ok([settled(context, rest, compressible)?, settled(context, rest, other)?])
+}
+
+fn settled(context: &Context, rest: &Rest, poisson: f64) -> Result<f64> {
     let size = if context.quick { Size::Tiny } else { Size::Small };
-    let tissue = context.changes.tissue(rest.model, SETTLING_YOUNG, SETTLING_POISSON)?;
+    let tissue = context.changes.tissue(rest.model, SETTLING_YOUNG, poisson)?;
     let scene = context.changes.scene("cantilever", size, tissue)?;
     let way = &ways()[rest.way];
     let mut rejected = 0;

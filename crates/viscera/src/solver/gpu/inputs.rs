@@ -5,7 +5,7 @@ use super::buffers::{Buffers, Update};
 use crate::model::Model;
 use crate::settings::{Acceleration, AndersonOn, SolverSettings};
 use crate::solver::Inputs;
-use crate::solver::cpu::fill_multiplier_weights;
+use crate::solver::iterates::fill_multiplier_weights;
 
 impl GpuSolver {
     /// What acts on vertices in this step, and the freedom of those that the last one held.
