@@ -55,7 +55,8 @@ pub fn follow(
 ) -> Result<Vec<Look>> {
     let looks: Vec<u32> = looks(settings, passes).collect();
     let most = looks.last().copied().unwrap_or(1);
-    let settings = SolverSettings { iterations: most, ..settings.clone() };
+    // Iterates are compared as they are, before a guard judges the end of the step.
+    let settings = SolverSettings { iterations: most, step_guard: false, ..settings.clone() };
     let (double, single) =
         (iterates::<f64>(step, &settings, &looks)?, iterates::<f32>(step, &settings, &looks)?);
     let model = step.scene.model::<f32>(&settings)?;
