@@ -112,11 +112,11 @@ fn convergence(context: &mut Context) -> Result<()> {
         context,
         "acceleration-jacobi",
         [
-            "Anderson on both and Chebyshev with the right radius take a small part of plain Jacobi's \
-             iterations. The measured radius is too small after ten sweeps, when rough errors still decay, \
-             and gains little. The dashed ones turn away from the solution or leave.",
+            "Compare each with plain Jacobi. Chebyshev needs the right radius: after ten sweeps, when rough \
+             errors still decay, the measured one is too small. Look where the dashed ones go that do not \
+             treat positions and multipliers alike.",
             "The same over passes: an acceleration adds passes to each iteration, for sums over all \
-             unknowns, and keeps its lead.",
+             unknowns.",
         ],
     )?;
     let colored = follow_on_both(context, &step, colored_methods(context.quick))?;
@@ -126,8 +126,8 @@ fn convergence(context: &mut Context) -> Result<()> {
         context,
         "acceleration-coloured",
         [
-            "Published forms bend where they come to their own answer; the exact form, with the rebase, \
-             goes on, and Anderson with it.",
+            "Look where published forms bend: that is their own answer. The exact form, with the rebase, \
+             has the true one.",
             "The same over passes. Coloured sweeps have many, so that an acceleration's own hardly count.",
         ],
     )?;
@@ -155,9 +155,9 @@ fn judge(context: &mut Context, followed: &[Followed]) {
         let [device, cpu] = look.errors.map(in_words);
         context.document.paragraph(format!(
             "Markers are of single precision, by the CPU and by the GPU backend. Anderson's method looks for \
-             small differences of large vectors and feels the rounding: over Jacobi sweeps both part from \
-             the line where it wants weights more exact than that, and after {} iterations they stand at {cpu} and \
-             {device}. Plain sweeps and Chebyshev stay on their lines.",
+             small differences of large vectors and feels the rounding: over Jacobi sweeps both may part from \
+             the line where it wants weights more exact than that; after {} iterations the CPU is at {cpu}, the \
+             GPU at {device}. Compare them with the markers on plain sweeps.",
             look.iterations
         ));
     }

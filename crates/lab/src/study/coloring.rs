@@ -56,11 +56,12 @@ fn run(context: &mut Context) -> Result<()> {
         context,
         "coloring",
         [
-            "Every further colour moves the curve to the left: neighbours that see each other's \
-             results within an iteration need fewer of them. Where a curve bends level, the iteration \
-             comes to an answer of its own.",
-            "The same curves over the passes that have to wait for each other, which is what a \
-             parallel machine pays for, fall together: a colour more costs as much as it gains.",
+            "Compare curves from one colour to all: neighbours that see each other's results within an \
+             iteration need fewer of them. Where a curve bends level, the iteration comes to an answer of \
+             its own.",
+            "The same curves over the passes that have to wait for each other, which is what a parallel \
+             machine pays for: look whether they still keep apart, or whether a further colour costs as \
+             much as it gains.",
         ],
     )?;
     context.document.table(&table(&followed, &[1e-1, 1e-2]));
@@ -101,12 +102,14 @@ fn conclude(context: &mut Context, followed: &[Followed]) {
         .collect();
     if let (Some(fewest), Some(most)) = (passes.iter().min(), passes.iter().max()) {
         context.document.paragraph(format!(
-            "All of them together come to a tenth of the starting error within {fewest} to {most} passes."
+            "{} of {} come to a tenth of the starting error, after {fewest} to {most} passes.",
+            passes.len(),
+            followed.len()
         ));
     }
     context.document.paragraph(format!(
-        "To a tenth of the starting error Jacobi takes {jacobi} iterations of {} passes, the coloured \
-         sweep {colored} of {}. Percentages are shares of Jacobi's. Iterations alone flatter colours, \
+        "Iterations to a tenth of the starting error: Jacobi {jacobi}, of {} passes each; coloured sweeps \
+         {colored}, of {}. Percentages are shares of Jacobi's. Iterations alone flatter colours, \
          passes alone flatter copies, and milliseconds are of a processor that does not care for \
          passes: that is why the three stand side by side. {}; markers are errors after 1, 2, 5, 10, ... \
          iterations in single precision, lines are of double precision.",

@@ -80,14 +80,9 @@ pub(super) fn follow_on_both(
 pub(super) fn judge_device(context: &mut Context, what: &str, followed: &[Followed]) {
     let (mut worst, mut count) = (0.0f64, 0);
     for Followed { looks, .. } in followed {
-        let mut ratios: Vec<f64> = looks
-            .iter()
-            .filter(|look| look.errors.iter().all(|error| *error < CEILING))
-            .map(|look| look.rounding[0] / look.rounding[1])
-            .collect();
-        ratios.sort_by(f64::total_cmp);
+        let ratios: Vec<f64> = looks.iter().filter_map(rounding_ratio).collect();
         count += ratios.len();
-        worst = worst.max(ratios.get(ratios.len() / 2).copied().unwrap_or(0.0));
+        worst = worst.max(median(ratios).unwrap_or(0.0));
     }
     if count > 0 {
         context.verdict(
@@ -99,6 +94,19 @@ pub(super) fn judge_device(context: &mut Context, what: &str, followed: &[Follow
             worst <= 2.0,
         );
     }
+}
+
+/// How much farther from double precision the device is than the CPU, where the CPU is in the scene; a
+/// device that is not counts as infinitely far.
+fn rounding_ratio(look: &Look) -> Option<f64> {
+    let in_scene = look.errors[1] < CEILING;
+    let ratio = look.rounding[0] / look.rounding[1];
+    in_scene.then_some(if ratio.is_finite() { ratio } else { f64::INFINITY })
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }
 
 /// Whether and when a curve came down to a level.
@@ -163,7 +171,7 @@ impl fmt::Display for Reach {
 
 /// Iterations, passes and milliseconds to each level, with the share of the first method's.
 pub(super) fn table(followed: &[Followed], levels: &[f64]) -> Table {
-    let mut heads = vec!["method".to_owned(), "passes".into(), "ms".into()];
+    let mut heads = vec!["method".to_owned(), "passes per iteration".into(), "ms".into()];
     for level in levels {
         let level = level_name(*level);
         heads.extend([format!("to {level}: iterations"), "passes".into(), "ms".into()]);
@@ -336,6 +344,21 @@ mod tests {
     }
 
     #[test]
+    fn a_device_that_leaves_the_scene_is_no_device_that_agrees() {
+        let look = |error, rounding| Look {
+            iterations: 1,
+            errors: [error, 0.5],
+            rounding: [rounding, 1e-6],
+        };
+        assert_eq!(rounding_ratio(&look(0.5, 2e-6)), Some(2.0));
+        assert_eq!(rounding_ratio(&look(f64::NAN, f64::NAN)), Some(f64::INFINITY));
+        assert!(rounding_ratio(&look(1e3, 1e3)).is_some_and(|ratio| ratio > 2.0));
+        let both_lost = Look { iterations: 1, errors: [1e3; 2], rounding: [1e3; 2] };
+        assert_eq!(rounding_ratio(&both_lost), None);
+        assert_eq!(median(vec![3.0, f64::INFINITY, 1.0]), Some(3.0));
+    }
+
+    #[test]
     fn a_curve_arrives_stops_diverges_or_is_on_its_way() {
         let curve = |errors: Vec<f64>| Curve { errors, strain_ratio: 1.0 };
         let falling = curve((0..100).map(|k| libm::exp10(-0.01 * f64::from(k))).collect());
@@ -343,6 +366,9 @@ mod tests {
         assert_eq!(Reach::of(&falling, 0.01), Reach::Above(99));
         let slow = curve((0..100).map(|k| 1.0 - 3e-4 * f64::from(k)).collect());
         assert_eq!(Reach::of(&slow, 0.5), Reach::Above(99));
+        // A power law that began with a drop gains ever less, and still comes down.
+        let power = |k: u32| if k == 0 { 1.0 } else { 0.3 / f64::from(k).sqrt() };
+        assert_eq!(Reach::of(&curve((0..6000).map(power).collect()), 1e-3), Reach::Above(5999));
         let standing = curve(vec![0.5; 100]);
         assert_eq!(Reach::of(&standing, 0.1), Reach::Stops(0.5));
         let lost = curve(vec![1.0, 3.0, 1e3, f64::INFINITY]);

@@ -7,7 +7,9 @@ use viscera::settings::{AndersonOn, Colors, RelaxationForm, SolverSettings};
 use viscera_report::{Table, si};
 
 use super::convergence::{COST_CASES, Followed, Reach, follow, level_name, table};
-use super::methods::{COLORED, JACOBI, Method, anderson, chebyshev, exact, published, relaxed};
+use super::methods::{
+    COLORED, JACOBI, Method, anderson, chebyshev, exact, law, published, relaxed,
+};
 use super::step::MeasuredStep;
 use super::{Context, Section};
 use crate::scenes::{FRAME_RATE, GRAVITY, Size};
@@ -105,11 +107,12 @@ fn case_count(quick: bool) -> usize {
 
 fn run(context: &mut Context) -> Result<()> {
     context.document.paragraph(
-        "Errors as in sections 1 and 4, of one step of 1/60 s with nu = 0.45; 1e-1 of the \
-         error of the inertial prediction is what the eye forgives, 1e-3 what a measurement needs. \
+        "Errors as in sections 1 and 4, of one step of 1/60 s with nu = 0.45; levels are \
+         shares of the error of the inertial prediction. \
          Percentages are shares of plain Jacobi's iterations and passes; '<' where Jacobi was not there \
          after all its iterations. 'above N': N iterations were not enough. 'stops at p': its error has come \
-         to stand at p, or grows: published XPBD at an answer of its own, others among crumpled tetrahedra. \
+         to stand at p, the median of its last fifth: published XPBD at an answer of its own, others among \
+         crumpled tetrahedra. \
          'diverges': its error grew beyond ten. Passes count the dispatches of an iteration on a GPU, one \
          after the other; milliseconds are of one thread in single precision, on the machine that made this.",
     );
@@ -136,11 +139,7 @@ fn run(context: &mut Context) -> Result<()> {
 fn measure(context: &mut Context, task: &Task, data: &mut Table) -> Result<()> {
     let tissue = context.changes.tissue(task.law, task.young, 0.45)?;
     let scene = context.changes.scene(task.scene, task.size, tissue)?;
-    let law = match task.law {
-        MaterialModel::SaintVenantKirchhoff => "Green strain",
-        MaterialModel::StableNeoHookean => "stable neo-Hookean",
-    };
-    let name = format!("{scene}, {law}");
+    let name = format!("{scene}, {}", law(task.law));
     let steps = context.run_cases(&[*task], |_| MeasuredStep::new(scene.clone(), task.history))?;
     let methods = methods(task.iterations);
     let mut followed = Vec::new();

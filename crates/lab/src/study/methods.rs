@@ -1,5 +1,6 @@
 //! The methods that the study compares, by their settings.
 
+use viscera::material::MaterialModel;
 use viscera::settings::{
     Acceleration, AndersonGuard, AndersonOn, Colors, RelaxationForm, SolverSettings, Threads,
 };
@@ -64,6 +65,14 @@ pub fn chebyshev(settings: SolverSettings, radius: f64) -> SolverSettings {
 /// With Anderson's method, window 5, on these unknowns; the settings' guard stays.
 pub fn anderson(settings: SolverSettings, on: AndersonOn) -> SolverSettings {
     SolverSettings { acceleration: Acceleration::Anderson, anderson_on: on, ..settings }
+}
+
+/// A material's law in words.
+pub fn law(model: MaterialModel) -> &'static str {
+    match model {
+        MaterialModel::StableNeoHookean => "stable neo-Hookean",
+        MaterialModel::SaintVenantKirchhoff => "Green strain",
+    }
 }
 
 /// One colour: every tetrahedron has vertices of its own.

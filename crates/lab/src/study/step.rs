@@ -47,7 +47,7 @@ pub struct Curve {
     pub strain_ratio: f64,
 }
 
-/// What an iteration costs.
+/// What an iteration or a frame costs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
     /// Passes over the mesh that wait for each other: dispatches of the GPU backend.
@@ -158,6 +158,11 @@ impl MeasuredStep {
         Ok(self.strain_of(positions)? / self.strain)
     }
 
+    /// Strain of positions [m] over that of others.
+    pub fn strain_over(&self, positions: &[Vec3<f64>], others: &[Vec3<f64>]) -> Result<f64> {
+        Ok(self.strain_of(positions)? / self.strain_of(others)?)
+    }
+
     /// Where a method has the vertices [m] after its iterations, safeguards of the step included.
     pub fn end<S: Real>(&self, settings: &SolverSettings) -> Result<Vec<Vec3<f64>>> {
         let model = self.scene.model::<S>(settings)?;
@@ -195,29 +200,38 @@ impl MeasuredStep {
     /// What an iteration of a method costs, in single precision on one thread.
     pub fn cost(&self, settings: &SolverSettings) -> Result<Cost> {
         const ITERATIONS: u32 = 20;
-        let settings = SolverSettings {
-            threads: viscera::settings::Threads::Count(1),
-            step_guard: false,
-            ..settings.clone()
+        let settings = SolverSettings { substeps: 1, step_guard: false, ..settings.clone() };
+        // A step of so many iterations less one of a single one: what surrounds iterations goes out.
+        let of = |iterations| {
+            self.frame_cost(&SolverSettings { iterations, ..settings.clone() }).map(|c| c.seconds)
         };
+        let seconds = ((of(1 + ITERATIONS)? - of(1)?) / f64::from(ITERATIONS)).max(0.0);
+        let model = self.scene.model::<f32>(&settings)?;
+        Ok(Cost { passes: GpuSolver::dispatches_of(&model, &settings)[1], seconds })
+    }
+
+    /// What a frame of a method costs, with everything around its iterations.
+    pub fn frame_cost(&self, settings: &SolverSettings) -> Result<Cost> {
+        /// The best of so many, and of so much time [s]: small meshes take microseconds.
+        const LEAST: (usize, f64) = (3, 5e-3);
+        let threads = viscera::settings::Threads::Count(1);
+        let settings = SolverSettings { threads, ..settings.clone() };
         let model = self.scene.model::<f32>(&settings)?;
         let (mut solver, start) = self.begin(&model, &settings)?;
-        let inputs = self.inputs();
-        // A step of so many iterations less one of a single one: what surrounds iterations goes out.
-        let mut least = |count: u32| -> Result<f64> {
-            solver.set_iterations(count);
-            let mut least = f64::INFINITY;
-            for _ in 0..3 {
-                let mut state = start.clone();
-                let begin = Instant::now();
-                solver.step(&model, &mut state, &inputs, self.dt)?;
-                least = least.min(begin.elapsed().as_secs_f64());
+        let inputs: Vec<(Inputs<f32>, f64)> = self.substeps(settings.substeps).collect();
+        let (mut seconds, mut times, mut total) = (f64::INFINITY, 0, 0.0);
+        while times < LEAST.0 || total < LEAST.1 {
+            let mut state = start.clone();
+            let begin = Instant::now();
+            for (inputs, dt) in &inputs {
+                solver.step(&model, &mut state, inputs, *dt)?;
             }
-            Ok(least)
-        };
-        let seconds = (least(1 + ITERATIONS)? - least(1)?) / f64::from(ITERATIONS);
-        let passes = GpuSolver::dispatches_of(&model, &settings)[1];
-        Ok(Cost { passes, seconds })
+            let taken = begin.elapsed().as_secs_f64();
+            (seconds, times, total) = (seconds.min(taken), times + 1, total + taken);
+        }
+        let [before, each, after] = GpuSolver::dispatches_of(&model, &settings);
+        let step = before + settings.iterations as usize * each + after;
+        Ok(Cost { passes: settings.substeps as usize * step, seconds })
     }
 }
 
@@ -237,16 +251,18 @@ impl Curve {
         self.errors.last().copied().unwrap_or(f64::INFINITY)
     }
 
-    /// The last error, if errors have come to stand or grow: the last fifth of the iterations gains less
-    /// than a tenth of what the ones before have gained per iteration, in factors. A slow method that is
-    /// on its way gains alike all the time.
+    /// Where errors have come to stand, or wander without gain: their median over the last fifth of the
+    /// iterations, if that fifth gains less than a twentieth, and less than a tenth of what the ones before
+    /// have gained per iteration, in factors. A slow method that is on its way gains alike all the time.
     pub fn plateau(&self) -> Option<f64> {
         let cut = self.errors.len() * 4 / 5;
         let least = |errors: &[f64]| errors.iter().copied().fold(f64::INFINITY, f64::min);
         let (before, after) = (least(&self.errors[..cut]), least(&self.errors[cut..]));
         let (early, late) = (libm::log(self.errors[0] / before), libm::log(before / after));
         // Four fifths came before.
-        let stands = late <= 0.1 * early / 4.0;
-        stands.then(|| self.last())
+        let stands = late <= (0.1 * early / 4.0).min(libm::log(1.05));
+        let mut last = self.errors[cut..].to_vec();
+        last.sort_by(f64::total_cmp);
+        last.get(last.len() / 2).copied().filter(|_| stands)
     }
 }

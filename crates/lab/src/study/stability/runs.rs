@@ -18,7 +18,7 @@ pub(super) const YOUNG: f64 = 1e4;
 const POISSON: f64 = 0.45;
 /// Of the bars that show who settles: stiff ones, of which steps are taken back.
 pub(super) const SETTLING_YOUNG: f64 = 1e5;
-pub(super) const SETTLING_POISSON: [f64; 2] = [0.45, 0.49];
+const SETTLING_POISSON: [f64; 2] = [0.45, 0.49];
 /// Of a potential, what its sums may lose to rounding.
 pub(super) const ROUND_OFF: f64 = 1e-9;
 /// A body this many times as long as at rest has blown up.
@@ -196,8 +196,11 @@ pub(super) fn outcome(context: &Context, case: &Case) -> Result<Outcome> {
         run.step()?;
         let (x, inputs) = (&run.state.positions, &run.inputs);
         let [start, end] = reference.incremental(&before, x, inputs, Run::DT)?;
-        outcome.above += u32::from(end > start * (1.0 + ROUND_OFF));
-        outcome.factor = outcome.factor.max(end / start);
+        // Written so that a potential that is no number counts.
+        outcome.above += u32::from(!(end <= start * (1.0 + ROUND_OFF)));
+        let factor = end / start;
+        outcome.factor =
+            outcome.factor.max(if factor.is_finite() { factor } else { f64::INFINITY });
         outcome.is_blown |= is_blown(&run);
         if !outcome.energies.is_empty() {
             outcome.energies.push(mechanical_energy(&reference, &run)?);
@@ -212,10 +215,14 @@ pub(super) fn outcome(context: &Context, case: &Case) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// The apparent stiffness of two cantilevers of the same settings.
-pub(super) fn apparent_stiffness(context: &Context, rest: &Rest) -> Result<[f64; 2]> {
-    let [compressible, other] = SETTLING_POISSON;
-    Ok([settled(context, rest, compressible)?, settled(context, rest, other)?])
+/// One, where the user wants it.
+pub(super) fn settling_poissons(context: &Context) -> Vec<f64> {
+    context.changes.poisson.map_or(SETTLING_POISSON.to_vec(), |poisson| vec![poisson])
+}
+
+/// The apparent stiffness of cantilevers of the same settings.
+pub(super) fn apparent_stiffness(context: &Context, rest: &Rest) -> Result<Vec<f64>> {
+    settling_poissons(context).into_iter().map(|poisson| settled(context, rest, poisson)).collect()
 }
 
 fn settled(context: &Context, rest: &Rest, poisson: f64) -> Result<f64> {
