@@ -9,7 +9,7 @@
 //!
 //! A bound by `Phi(x_n)` bounds the stored energy (the kinetic energy is left to the energy limit,
 //! `energy.rs`); a bound by `Phi(xt)` alone lets nearly everything pass. **The multipliers are kept** after a rejection: recomputing them from positions
-//! looks safer and freezes the body, because the next sweeps start from what has just failed.
+//! looks safer and holds stiff tissue fast, because the next sweeps start from what has just failed.
 //!
 //! With `anderson_guard = "energy"` Anderson's mixtures are guarded one by one: the mixture if `Phi` is not above the best so far,
 //! else the plain sweep if its is not, else go on from it once; at the second failure in a row one
