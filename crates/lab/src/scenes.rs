@@ -283,7 +283,7 @@ impl Scene {
 
 /// Whether three of the points are not in a line.
 fn span_a_plane(points: &[Vec3<f64>]) -> bool {
-    // Single precision rounds places by some 1e-7 of the body: what is off the line by less is on it.
+    // Of the line's length. Single precision rounds places by some 1e-7: what is that close is in it.
     const OFF_THE_LINE: f64 = 1e-6;
     let Some(&first) = points.first() else { return false };
     let ways = || points.iter().map(|&x| x - first);

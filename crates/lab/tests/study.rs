@@ -9,7 +9,8 @@ use std::path::Path;
 use std::process::Output;
 use viscera::mesh::shapes::Block;
 use viscera::mesh::{TetMesh, io::gmsh};
-use viscera::scalar::{Vec3, vec3};
+use viscera::scalar::vec3;
+use viscera_lab::{sections::Changes, study::PROGRAM};
 
 fn quick(out: &Path, more: &[&str]) -> Output {
     let out = out.to_string_lossy();
@@ -87,6 +88,15 @@ fn a_mesh_of_the_users_takes_the_place_of_the_bar() {
     let markdown = fs::read_to_string(&out).expect("the report");
     let tets = block.mesh().expect("a mesh").tets().len();
     assert!(markdown.contains(&format!("{tets} tets")), "{markdown}");
+
+    // It has one size: what the full study does on a finer mesh is left out.
+    let cost = PROGRAM.sections.iter().find(|section| section.name == "cost").expect("a section");
+    let cases = |texts: &[String], quick| {
+        (cost.cases)(quick, &Changes::parse(texts).expect("changes that make sense"))
+    };
+    let ours = [set];
+    assert_eq!(cases(&ours, true), cases(&[], true));
+    assert_eq!(2 * cases(&ours, false), cases(&[], false));
 }
 
 fn write_mesh(path: &Path, mesh: &TetMesh) {
