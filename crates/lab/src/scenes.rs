@@ -10,7 +10,7 @@
 
 use std::fmt;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, bail, ensure};
 use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
 use viscera::mesh::shapes::{self, Block, Splitting};
@@ -189,16 +189,38 @@ impl Scene {
     }
 
     /// This scene of a bar with another body, which lies along x and whose ends are what lies within a
-    /// twentieth of its length of them.
-    pub fn with_bar(mut self, mesh: TetMesh) -> Self {
+    /// twentieth of its length of them. Refuses one that could turn about what holds it, or cannot move.
+    pub fn with_bar(mut self, mesh: TetMesh) -> Result<Self> {
         let extent = BoundingBox::around(mesh.vertices());
         let depth = 0.05 * extent.size().x;
         self.mesh = mesh;
         match self.driven.is_empty() {
             true => self.fixed = self.select(|x| x.x < extent.min.x + depth),
-            false => self.twist_ends(depth),
+            false => {
+                self.twist_ends(depth);
+                self.check_end("high", &self.driven)?;
+            }
         }
-        self
+        self.check_end("low", &self.fixed)?;
+        ensure!(
+            !self.free().is_empty(),
+            "every vertex lies within a twentieth of the body's length of an end along x, so that none \
+             can move; refine it, or turn the body so that its length lies along x"
+        );
+        Ok(self)
+    }
+
+    /// Makes sure that pinned vertices leave no rotation free.
+    fn check_end(&self, end: &str, pinned: &[u32]) -> Result<()> {
+        let places: Vec<_> = pinned.iter().map(|&v| self.mesh.vertices()[v as usize]).collect();
+        ensure!(
+            span_a_plane(&places),
+            "the {end} end along x, a twentieth of the body's length, has {} vertices and no three that \
+             are not in a line, so that the body could turn about them; turn the body so that its length \
+             lies along x and this end is broad, or refine it",
+            places.len()
+        );
+        Ok(())
     }
 
     /// Ligaments on the uppermost quarter, a spring at the rightmost point.
@@ -257,6 +279,18 @@ impl Scene {
         }
         (0..is_free.len() as u32).filter(|&v| is_free[v as usize]).collect()
     }
+}
+
+/// Whether three of the points are not in a line.
+fn span_a_plane(points: &[Vec3<f64>]) -> bool {
+    // Of the line's length. Single precision rounds places by some 1e-7: what is that close is in it.
+    const OFF_THE_LINE: f64 = 1e-6;
+    let Some(&first) = points.first() else { return false };
+    let ways = || points.iter().map(|&x| x - first);
+    let Some(longest) = ways().max_by(|a, b| a.length().total_cmp(&b.length())) else {
+        return false;
+    };
+    ways().any(|way| longest.cross(way).length() > OFF_THE_LINE * longest.length_squared())
 }
 
 /// All scenes' names.

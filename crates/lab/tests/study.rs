@@ -7,6 +7,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::Output;
+use viscera::mesh::shapes::Block;
+use viscera::mesh::{TetMesh, io::gmsh};
+use viscera::scalar::vec3;
+use viscera_lab::{sections::Changes, study::PROGRAM};
 
 fn quick(out: &Path, more: &[&str]) -> Output {
     let out = out.to_string_lossy();
@@ -17,11 +21,11 @@ fn quick(out: &Path, more: &[&str]) -> Output {
     output
 }
 
-/// Names and contents of the files in a folder that end so.
+/// Names and contents of the files in a folder that end so, but for hidden ones.
 fn files(folder: &Path, ending: &str) -> BTreeMap<String, Vec<u8>> {
     let entries = fs::read_dir(folder).expect("a folder").flatten();
     let named = entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), entry));
-    let chosen = named.filter(|(name, _)| name.ends_with(ending));
+    let chosen = named.filter(|(name, _)| name.ends_with(ending) && !name.starts_with('.'));
     chosen.map(|(name, entry)| (name, fs::read(entry.path()).expect("a file"))).collect()
 }
 
@@ -76,18 +80,70 @@ fn changed_scenes_change_the_figures() {
 fn a_mesh_of_the_users_takes_the_place_of_the_bar() {
     let folder = tempfile::tempdir().expect("a folder");
     let mesh = folder.path().join("bar.msh");
-    let block = viscera::mesh::shapes::Block {
-        seed: 7,
-        ..viscera::mesh::shapes::Block::new(viscera::scalar::vec3(0.3, 0.04, 0.04), [6, 2, 2])
-    };
-    let written = viscera::mesh::io::gmsh::write(&block.mesh().expect("a mesh"));
-    fs::write(&mesh, written).expect("a file");
+    let block = Block { seed: 7, ..Block::new(vec3(0.3, 0.04, 0.04), [6, 2, 2]) };
+    write_mesh(&mesh, &block.mesh().expect("a mesh"));
     let set = format!("mesh={}", mesh.display());
     let out = folder.path().join("long.md");
     quick(&out, &["--only", "coloring", "--set", &set]);
     let markdown = fs::read_to_string(&out).expect("the report");
     let tets = block.mesh().expect("a mesh").tets().len();
-    assert!(markdown.contains(&format!("{tets} tetrahedra")), "{markdown}");
+    assert!(markdown.contains(&format!("{tets} tets")), "{markdown}");
+
+    // It has one size: what the full study does on a finer mesh is left out.
+    let cost = PROGRAM.sections.iter().find(|section| section.name == "cost").expect("a section");
+    let cases = |texts: &[String], quick| {
+        (cost.cases)(quick, &Changes::parse(texts).expect("changes that make sense"))
+    };
+    let ours = [set];
+    assert_eq!(cases(&ours, true), cases(&[], true));
+    assert_eq!(2 * cases(&ours, false), cases(&[], false));
+}
+
+fn write_mesh(path: &Path, mesh: &TetMesh) {
+    fs::write(path, gmsh::write(mesh)).expect("a file");
+}
+
+/// A tetrahedron with these distances [m] of its corners along x.
+fn tet(along: [f64; 4]) -> TetMesh {
+    let corners = [[0.0, 0.0], [0.1, 0.0], [0.0, 0.1], [0.1, 0.1]];
+    let places = (0..4).map(|k| vec3(along[k], corners[k][0], corners[k][1])).collect();
+    TetMesh::new(places, vec![[0, 1, 2, 3]], vec![0]).expect("a mesh").0
+}
+
+#[test]
+fn meshes_that_cannot_take_the_place_of_the_bar_are_refused_before_the_work() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("body.msh");
+    let refusal = |hint: &str| {
+        let set = format!("mesh={}", path.display());
+        let out = folder.path().join("report.md");
+        let output = lab(&["study", "--quick", "--set", &set, "--out", &out.to_string_lossy()]);
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{error}");
+        assert!(error.starts_with(&format!("error: --set {set}: ")), "{error}");
+        assert!(error.contains(hint) && error.lines().count() == 1, "{hint}: {error}");
+        assert!(output.stdout.is_empty() && !out.exists());
+    };
+    for content in ["", "no mesh\n", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"] {
+        fs::write(&path, content).expect("a file");
+        refusal("body.msh");
+    }
+    let sound = gmsh::write(&tet([0.0, 0.1, 0.1, 0.1]));
+    for number in ["1e300", "nan", "inf"] {
+        fs::write(&path, sound.replacen("1 0.0 0.0 0.0", &format!("1 {number} 0 0"), 1))
+            .expect("a file");
+        refusal("line 6");
+    }
+    for (mesh, hint) in [
+        (tet([0.0, 0.1, 0.1, 0.12]), "the low end along x"),
+        (tet([0.0, 0.1, 0.1, 0.0]), "the low end along x"),
+        (tet([0.0, 0.0, 0.0, 0.1]), "the high end along x"),
+        (Block::new(vec3(0.3, 0.04, 0.04), [1, 2, 2]).mesh().expect("a mesh"), "refine it"),
+    ] {
+        write_mesh(&path, &mesh);
+        refusal(hint);
+        refusal("turn the body so that");
+    }
 }
 
 #[test]
@@ -96,7 +152,7 @@ fn changes_that_make_no_sense_are_refused_before_the_work() {
         ("young", "write KEY=VALUE"),
         ("young=20 mm", "kPa"),
         ("young=0 kPa", "above zero"),
-        ("poisson=0.6", "0.5"),
+        ("poisson=0.6", "at most 0.499"),
         ("poisson=soft", "no number"),
         ("yuong=20 kPa", "young, poisson or mesh"),
         ("mesh=nowhere.msh", "no file nowhere.msh"),

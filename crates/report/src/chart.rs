@@ -51,9 +51,6 @@ const PALETTE: [RGBColor; 7] = [
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Point = (i32, i32);
 
-/// Begins a comment in the SVG's first lines: how a later report recognises figures of an earlier one.
-pub(super) const SIGNATURE: &str = "<!-- a figure of viscera";
-
 pub(super) fn draw(plot: &Plot) -> Result<String> {
     let layout = Layout::new(plot);
     let size = (WIDTH, layout.height);
@@ -69,8 +66,7 @@ pub(super) fn draw(plot: &Plot) -> Result<String> {
     let fine = format!("width=\"{}\" height=\"{}\" viewBox", size.0, size.1);
     let page = (size.0 / FINENESS, size.1 / FINENESS);
     let shown = format!("width=\"{}\" height=\"{}\" viewBox", page.0, page.1);
-    let svg = svg.replacen(&fine, &shown, 1);
-    Ok(svg.replacen(">\n", &format!(">\n{SIGNATURE} -->\n"), 1))
+    Ok(svg.replacen(&fine, &shown, 1))
 }
 
 struct Layout {

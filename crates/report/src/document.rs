@@ -92,10 +92,10 @@ impl Document {
     }
 
     fn file(&mut self, file: &str, bytes: Vec<u8>) -> Result<()> {
-        let name = file.split('.').next().unwrap_or_default();
+        let name = file.rsplit_once('.').map_or(file, |(name, _)| name);
         let legal = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
         ensure!(
-            !name.is_empty() && file.matches('.').count() == 1 && name.chars().all(legal),
+            !name.is_empty() && name.chars().all(legal),
             "figure `{name}`: make the name of small letters, digits and `-`"
         );
         ensure!(

@@ -1,10 +1,14 @@
 //! Files written whole or not at all.
 
-use super::chart::SIGNATURE;
 use anyhow::{Context, Result, bail};
+use std::ffi::OsStr;
 use std::fs;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+
+/// Lies in the folder and names the files that the report put there, one per line. The next report
+/// removes those that it does not show, and no others: the folder may hold files of somebody else.
+const MANIFEST: &str = ".viscera-report";
 
 /// A Markdown file, and the folder beside it that holds its figures and has its name.
 pub(super) struct Output {
@@ -46,27 +50,44 @@ impl Output {
         if address.chars().all(plain) { address } else { format!("<{address}>") }
     }
 
-    /// Writes the files of the folder, then the text that shows them, and removes plots that an
-    /// earlier report left and this one does not show.
+    /// Writes the files of the folder, then the text that shows them, and removes files that the
+    /// report before this one left and this one does not show.
     pub fn write(&self, text: &str, files: &[(String, Vec<u8>)]) -> Result<()> {
         for (name, bytes) in files {
             write_whole(&self.folder.join(name), bytes)?;
         }
         write_whole(&self.document, text.as_bytes())?;
-        let is_shown = |path: &Path| {
-            let shown = path.file_name().and_then(|name| name.to_str());
-            files.iter().any(|(name, _)| Some(name.as_str()) == shown)
-        };
-        let Ok(entries) = fs::read_dir(&self.folder) else { return Ok(()) };
-        for path in entries.flatten().map(|entry| entry.path()) {
-            let is_old = path.extension().is_some_and(|e| e == "svg") && !is_shown(&path);
-            // The folder may hold pictures of somebody else.
-            if is_old && fs::read_to_string(&path).is_ok_and(|svg| svg.contains(SIGNATURE)) {
-                fs::remove_file(&path)
-                    .with_context(|| format!("cannot remove the old {}", path.display()))?;
+        let manifest = self.folder.join(MANIFEST);
+        for name in names_in(&manifest)? {
+            if files.iter().all(|(shown, _)| *shown != name) {
+                remove(&self.folder.join(name))?;
             }
         }
-        Ok(())
+        let names: String = files.iter().map(|(name, _)| format!("{name}\n")).collect();
+        write_whole(&manifest, names.as_bytes())
+    }
+}
+
+/// The names in a manifest, none where there is no manifest.
+fn names_in(manifest: &Path) -> Result<Vec<String>> {
+    let text = match fs::read_to_string(manifest) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        read => read.with_context(|| {
+            let folder = folder_of(manifest).display();
+            format!("cannot read {}; remove it, and old files in {folder}", manifest.display())
+        })?,
+    };
+    // Whatever was written into it, nothing outside of its folder is touched.
+    let is_plain = |name: &&str| Path::new(name).file_name() == Some(OsStr::new(name));
+    Ok(text.lines().filter(is_plain).map(str::to_owned).collect())
+}
+
+/// Removes a file of an earlier report, which somebody may have removed already.
+fn remove(old: &Path) -> Result<()> {
+    match fs::remove_file(old) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(error)
+            .with_context(|| format!("cannot remove the old {}; remove it by hand", old.display())),
+        _ => Ok(()),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Reports: tables that line up, figures that repeat to the byte, files whole or not at all.
 
 use std::fs;
+use std::path::Path;
 use viscera_report::{Axis, Document, Plot, Series, Style, Table};
 
 fn convergence() -> Plot {
@@ -103,24 +104,65 @@ fn a_document_is_one_text_and_a_folder_of_figures() {
     document.heading("One");
     document.figure("convergence", &convergence()).expect("a figure");
     document.figure("other", &convergence()).expect("a figure");
+    document.picture("view", "a view", b"pixels".to_vec()).expect("a picture");
+    document.data("numbers", "All", &Table::new(["a", "b"])).expect("a table");
     document.open_with_paragraph("First of all.");
     document.write().expect("written");
     let text = fs::read_to_string(&path).expect("the report");
     let opening = "# A report\n\nFirst of all.\n\n## One\n\n![";
     assert!(text.starts_with(opening), "{text}");
     assert!(text.contains("](<my report/convergence.svg>)"), "{text}");
+    assert_eq!(
+        names_in(&figures),
+        [".viscera-report", "convergence.svg", "numbers.csv", "other.svg", "view.png"]
+    );
+}
 
-    // A second report without one of the figures: that one goes, a stranger's picture stays.
-    fs::write(figures.join("photograph.svg"), "<svg/>").expect("a picture");
+#[test]
+fn what_the_last_report_left_goes_and_what_others_put_there_stays() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("report.md");
+    let figures = folder.path().join("report");
+    let mut document = Document::prepare(&path, "A report").expect("a writable folder");
+    document.figure("convergence", &convergence()).expect("a figure");
+    document.figure("other", &convergence()).expect("a figure");
+    document.figure("removed-by-hand", &convergence()).expect("a figure");
+    document.picture("view", "a view", b"pixels".to_vec()).expect("a picture");
+    document.data("numbers", "All", &Table::new(["a", "b"])).expect("a table");
+    document.write().expect("written");
+
+    let strangers = ["photograph.svg", "photograph.png", "measured.csv"];
+    for name in strangers {
+        fs::write(figures.join(name), "of somebody else").expect("a file");
+    }
+    fs::remove_file(figures.join("removed-by-hand.svg")).expect("removed");
+    // A manifest that somebody spoilt reaches no further than its folder.
+    let beside = folder.path().join("beside.csv");
+    fs::write(&beside, "of somebody else").expect("a file");
+    let manifest = figures.join(".viscera-report");
+    let names = fs::read_to_string(&manifest).expect("the manifest");
+    fs::write(&manifest, format!("{names}../beside.csv\n{}\n..\n\n", beside.display()))
+        .expect("a manifest");
+
     let mut document = Document::prepare(&path, "A report").expect("a writable folder");
     document.figure("convergence", &convergence()).expect("a figure");
     document.write().expect("written");
-    let mut names: Vec<String> = fs::read_dir(&figures)
-        .expect("the figures")
-        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
-        .collect();
+    assert_eq!(
+        names_in(&figures),
+        [".viscera-report", "convergence.svg", "measured.csv", "photograph.png", "photograph.svg"]
+    );
+    assert_eq!(fs::read_to_string(&manifest).expect("the manifest"), "convergence.svg\n");
+    assert!(beside.is_file());
+}
+
+/// Sorted.
+fn names_in(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("a folder");
+    let name =
+        |entry: std::io::Result<fs::DirEntry>| entry.expect("an entry").file_name().into_string();
+    let mut names: Vec<_> = entries.map(|entry| name(entry).expect("a name")).collect();
     names.sort();
-    assert_eq!(names, ["convergence.svg", "photograph.svg"]);
+    names
 }
 
 #[test]

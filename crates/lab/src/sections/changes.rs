@@ -3,6 +3,7 @@
 use anyhow::{Context as _, Result, bail, ensure};
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use viscera::material::{Material, MaterialModel};
 use viscera::mesh::{TetMesh, io};
 use viscera::units::Dimension;
@@ -16,11 +17,30 @@ pub struct Changes {
     pub young: Option<f64>,
     /// Poisson's ratio.
     pub poisson: Option<f64>,
-    /// A mesh in the place of the bar.
-    pub mesh: Option<PathBuf>,
+    /// A body in the place of the bar.
+    pub mesh: Option<UserMesh>,
     /// As they were written.
     written: Vec<String>,
 }
+
+/// A mesh of the user's.
+#[derive(Clone, Debug)]
+pub struct UserMesh {
+    /// The file.
+    pub path: PathBuf,
+    /// What it holds, read once.
+    mesh: Arc<TetMesh>,
+}
+
+impl PartialEq for UserMesh {
+    /// By the files: what they hold is compared nowhere.
+    fn eq(&self, other: &Self) -> bool {
+        self.path == other.path
+    }
+}
+
+/// Scenes of a bar, where a mesh of the user's takes its place.
+const BARS: [&str; 2] = ["cantilever", "twist"];
 
 /// The keys, for help and errors.
 const KEYS: &str = "young, poisson or mesh";
@@ -36,8 +56,14 @@ impl Changes {
             changes.set(key.trim(), value.trim()).with_context(|| format!("--set {text}"))?;
             changes.written.push(text.clone());
         }
-        // A pair that no tissue has is told at once, not in the middle of the work.
-        changes.tissue(MaterialModel::StableNeoHookean, 1e4, 0.45).context("--set")?;
+        // A pair that no tissue has is told at once, not in the middle of the work; so is a body that
+        // cannot be held.
+        let tissue = changes.tissue(MaterialModel::StableNeoHookean, 1e4, 0.45).context("--set")?;
+        if changes.mesh.is_some() {
+            for name in BARS {
+                changes.scene(name, Size::Tiny, tissue)?;
+            }
+        }
         Ok(changes)
     }
 
@@ -58,7 +84,8 @@ impl Changes {
             "mesh" => {
                 let path = Path::new(value);
                 ensure!(path.is_file(), "there is no file {}", path.display());
-                self.mesh = Some(path.to_owned());
+                let mesh = Arc::new(read_mesh(path)?);
+                self.mesh = Some(UserMesh { path: path.to_owned(), mesh });
             }
             _ => bail!("there is no key `{key}`; a study's scenes have {KEYS}"),
         }
@@ -79,10 +106,9 @@ impl Changes {
     pub fn scene(&self, name: &'static str, size: Size, tissue: Material) -> Result<Scene> {
         let scene = Scene::new(name, size, tissue)?;
         match &self.mesh {
-            Some(path) if matches!(name, "cantilever" | "twist") => {
-                let mesh = read_mesh(path)?;
-                Ok(scene.with_bar(mesh))
-            }
+            Some(UserMesh { path, mesh }) if BARS.contains(&name) => scene
+                .with_bar(TetMesh::clone(mesh))
+                .with_context(|| format!("--set mesh={}", path.display())),
             _ => Ok(scene),
         }
     }

@@ -21,8 +21,8 @@ pub struct Section {
     pub name: &'static str,
     /// Its heading.
     pub title: &'static str,
-    /// How many cases it will count, quick or full.
-    pub cases: fn(quick: bool) -> usize,
+    /// How many cases it will count, quick or full, of scenes that may be changed.
+    pub cases: fn(quick: bool, changes: &Changes) -> usize,
     /// Does the work; adds text, tables, plots and verdicts.
     pub run: fn(&mut Context) -> Result<()>,
 }
@@ -161,8 +161,8 @@ impl Program {
             options.only.is_empty() || options.only.iter().any(|name| name == section.name)
         };
         let chosen: Vec<&Section> = self.sections.iter().filter(is_chosen).collect();
-        let cases = chosen.iter().map(|section| (section.cases)(options.quick)).sum();
-        let progress = Progress::new(cases);
+        let cases_of = |section: &Section| (section.cases)(options.quick, &options.changes);
+        let progress = Progress::new(chosen.iter().map(|section| cases_of(section)).sum());
         let mut verdicts = Vec::new();
         for section in &chosen {
             document.heading(section.title);
@@ -179,7 +179,7 @@ impl Program {
                 .section(section.name, || (section.run)(&mut context))
                 .with_context(|| format!("section {}", section.name))?;
             let counted = progress.done() - before;
-            debug_assert_eq!(counted, (section.cases)(options.quick), "cases of {}", section.name);
+            debug_assert_eq!(counted, cases_of(section), "cases of {}", section.name);
         }
         progress.finish();
         let outcome = Outcome { verdicts };
@@ -229,11 +229,12 @@ impl Program {
         document.open_with_table(&outcome.table());
     }
 
-    /// The names, titles and numbers of cases of all sections.
+    /// The names, titles and numbers of cases of all sections, of the usual scenes.
     pub fn list(&self) -> Table {
         let mut table = Table::new(["section", "what it shows", "cases", "quick"]);
+        let usual = Changes::default();
         for section in self.sections {
-            let counts = [false, true].map(|quick| (section.cases)(quick).to_string());
+            let counts = [false, true].map(|quick| (section.cases)(quick, &usual).to_string());
             let [full, quick] = counts;
             table.row([section.name.to_owned(), section.title.to_owned(), full, quick]);
         }

@@ -15,7 +15,7 @@ use crate::scenes::Size;
 pub(super) const SECTION: Section = Section {
     name: "acceleration",
     title: "4. What accelerations converge to",
-    cases: case_count,
+    cases: |quick, _| case_count(quick),
     run,
 };
 

@@ -19,14 +19,14 @@ use viscera_report::{Table, percent, si};
 pub(super) const COLORS: Section = Section {
     name: "bodies",
     title: "2. The same body with and without colours",
-    cases: |_| colors().len(),
+    cases: |_, _| colors().len(),
     run: run_colors,
 };
 
 pub(super) const ACCELERATIONS: Section = Section {
     name: "accelerated-bodies",
     title: "3. The same body with each acceleration",
-    cases: |_| accelerations(JACOBI).len() + accelerations(COLORED).len(),
+    cases: |_, _| accelerations(JACOBI).len() + accelerations(COLORED).len(),
     run: run_accelerations,
 };
 

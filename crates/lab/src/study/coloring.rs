@@ -15,7 +15,7 @@ use crate::scenes::Size;
 pub(super) const SECTION: Section = Section {
     name: "coloring",
     title: "1. Convergence with and without colours",
-    cases: case_count,
+    cases: |quick, _| case_count(quick),
     run,
 };
 

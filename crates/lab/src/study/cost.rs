@@ -13,6 +13,7 @@ use super::methods::{
 use super::step::MeasuredStep;
 use super::{Context, Section};
 use crate::scenes::{FRAME_RATE, GRAVITY, Size};
+use crate::sections::Changes;
 
 pub(super) const SECTION: Section =
     Section { name: "cost", title: "7. Iterations, passes and time", cases: case_count, run };
@@ -63,12 +64,18 @@ const TWIST: Task = Task {
 const HUGE: Task = Task { size: Size::Huge, iterations: [2000, 600], ..CANTILEVER };
 const HUGE_NEO_HOOKEAN: Task = Task { law: MaterialModel::StableNeoHookean, ..HUGE };
 
-fn tasks(quick: bool) -> Vec<Task> {
-    if !quick {
-        return vec![CANTILEVER, TWIST, HUGE, HUGE_NEO_HOOKEAN];
-    }
+fn tasks(quick: bool, changes: &Changes) -> Vec<Task> {
     let tiny = |task| Task { size: Size::Tiny, iterations: [200, 100], ..task };
-    vec![tiny(CANTILEVER), tiny(TWIST)]
+    match (quick, has_fine_mesh(quick, changes)) {
+        (true, _) => vec![tiny(CANTILEVER), tiny(TWIST)],
+        (false, true) => vec![CANTILEVER, TWIST, HUGE, HUGE_NEO_HOOKEAN],
+        (false, false) => vec![CANTILEVER, TWIST],
+    }
+}
+
+/// A mesh of the user's has one size.
+fn has_fine_mesh(quick: bool, changes: &Changes) -> bool {
+    !quick && changes.mesh.is_none()
 }
 
 /// Plain Jacobi is the first, which the others are compared with.
@@ -100,9 +107,9 @@ fn methods(iterations: [u32; 2]) -> Vec<Method> {
     named.into_iter().zip(counts).map(method).collect()
 }
 
-fn case_count(quick: bool) -> usize {
+fn case_count(quick: bool, changes: &Changes) -> usize {
     let methods = |task: &Task| methods(task.iterations).len() + COST_CASES;
-    tasks(quick).iter().map(|task| 1 + methods(task)).sum()
+    tasks(quick, changes).iter().map(|task| 1 + methods(task)).sum()
 }
 
 fn run(context: &mut Context) -> Result<()> {
@@ -116,7 +123,7 @@ fn run(context: &mut Context) -> Result<()> {
          'diverges': its error grew beyond ten. Passes count the dispatches of an iteration on a GPU, one \
          after the other; milliseconds are of one thread in single precision, on the machine that made this.",
     );
-    if !context.quick {
+    if has_fine_mesh(context.quick, context.changes) {
         let fall = -GRAVITY.z / (FRAME_RATE * FRAME_RATE);
         context.document.paragraph(format!(
             "The last column is the root mean square of strain over the true one. Far above 1 some \
@@ -129,7 +136,7 @@ fn run(context: &mut Context) -> Result<()> {
         ));
     }
     let mut data = Table::new(["scene", "method", "level", "iterations", "passes per iteration"]);
-    let tasks = tasks(context.quick);
+    let tasks = tasks(context.quick, context.changes);
     for task in &tasks {
         measure(context, task, &mut data)?;
     }

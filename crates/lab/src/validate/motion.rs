@@ -13,7 +13,7 @@ use crate::scenes::{FRAME_RATE, Scene, Size, tissue};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent};
 
 pub(super) const SECTION: Section =
-    Section { name: "motion", title: "Motion", cases: case_count, run };
+    Section { name: "motion", title: "Motion", cases: |quick, _| case_count(quick), run };
 
 /// Half a second.
 const FRAMES: u32 = 30;

@@ -19,7 +19,7 @@ use viscera::state::State;
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 
 pub(super) const SECTION: Section =
-    Section { name: "patch", title: "Patch test", cases: case_count, run };
+    Section { name: "patch", title: "Patch test", cases: |quick, _| case_count(quick), run };
 
 /// Edge lengths of the block `[m]`.
 const SIZE: [f64; 3] = [0.1, 0.05, 0.05];

@@ -179,8 +179,8 @@ impl<S: Real> Solver<S> {
 
     /// As [`Solver::step`]; shows the positions [m] of all vertices, the user's order, where the iteration
     /// starts (0) and after each iteration: for plots of convergence. What ends the step, such as its
-    /// guard, comes after the last. Takes memory for the positions; an explicit method is watched at the
-    /// start and at the end of its small steps only.
+    /// guard, comes after the last. Takes memory for the positions. An explicit method, which has no
+    /// iterations, is watched after each of its small steps.
     pub fn step_watched(
         &mut self,
         model: &Model<S>,
@@ -197,7 +197,7 @@ impl<S: Real> Solver<S> {
         Ok(())
     }
 
-    /// Iterations of the steps to come, at least one; neither plan nor memory depends on them.
+    /// Iterations of the steps to come, at least one; neither stages nor memory depend on them.
     pub fn set_iterations(&mut self, count: u32) {
         self.settings.iterations = count.max(1);
         if self.settings.method == Method::Xpbd {

@@ -297,7 +297,7 @@ fn set_out(start: u32, local: u32) {
 
 // `TRIAL` goes the share, or the length, that was found.
 fn advance(local: u32) {
-    // Zero times a direction may be no number.
+    // Else it stays where it is.
     if line != 0.0 {
         let trial = TRIAL * table[STRIDE];
         for (var v = local; v < table[VERTEX_COUNT]; v += THREADS) {

@@ -275,7 +275,7 @@ impl GpuSolver {
         [record.prologue, record.body, record.epilogue].map(|list| list.len())
     }
 
-    /// Iterations of the steps to come, at least one; neither kernels nor memory depend on them.
+    /// Iterations of the steps to come, at least one; neither stages nor memory depend on them.
     pub fn set_iterations(&mut self, count: u32) {
         self.settings.iterations = count.max(1);
         if self.settings.method == Method::Xpbd {

@@ -140,7 +140,12 @@ fn place(source: u32, v: u32) -> vec3f {
         return points[v].xyz;
     }
     if source == LINE {
-        return ground_of(TRIAL, v).xyz + line * ground_of(DIRECTION, v).xyz;
+        let origin = ground_of(TRIAL, v).xyz;
+        // Zero times a direction may be no number.
+        if line == 0.0 {
+            return origin;
+        }
+        return origin + line * ground_of(DIRECTION, v).xyz;
     }
     return ground_of(source, v).xyz;
 }
