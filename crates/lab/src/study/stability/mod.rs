@@ -301,8 +301,7 @@ fn conclude(context: &mut Context, summaries: &[Summary]) {
         percent(inside_out.inverted),
     ));
     let (up, blown) = (total(safe.up), safe.blown);
-    // Written so that a gain that is no number counts.
-    let gains = !(safe.gain <= 1.0 + ROUND_OFF);
+    let gains = safe.gain.is_nan() || safe.gain > 1.0 + ROUND_OFF;
     context.verdict(
         format!(
             "{} stress runs of guarded Anderson: runs with `Phi` up; most energy of the free body over its \

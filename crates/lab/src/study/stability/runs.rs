@@ -196,11 +196,11 @@ pub(super) fn outcome(context: &Context, case: &Case) -> Result<Outcome> {
         run.step()?;
         let (x, inputs) = (&run.state.positions, &run.inputs);
         let [start, end] = reference.incremental(&before, x, inputs, Run::DT)?;
-        // Written so that a potential that is no number counts.
-        outcome.above += u32::from(!(end <= start * (1.0 + ROUND_OFF)));
+        // A potential that is no number counts as well.
         let factor = end / start;
-        outcome.factor =
-            outcome.factor.max(if factor.is_finite() { factor } else { f64::INFINITY });
+        let factor = if factor.is_finite() { factor } else { f64::INFINITY };
+        outcome.above += u32::from(end > start * (1.0 + ROUND_OFF) || factor.is_infinite());
+        outcome.factor = outcome.factor.max(factor);
         outcome.is_blown |= is_blown(&run);
         if !outcome.energies.is_empty() {
             outcome.energies.push(mechanical_energy(&reference, &run)?);
