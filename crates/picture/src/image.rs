@@ -46,6 +46,13 @@ impl Image {
         Self { size, pixels: vec![srgb; size.width as usize * size.height as usize] }
     }
 
+    /// A picture of these sRGB values, shape [height * width], rows from the top; nothing where their
+    /// number is another.
+    pub fn from_pixels(size: ImageSize, pixels: Vec<[u8; 3]>) -> Option<Self> {
+        let count = size.width as usize * size.height as usize;
+        (pixels.len() == count).then_some(Self { size, pixels })
+    }
+
     /// Pictures of one size in rows of so many.
     pub fn tiled(images: &[Self], columns: usize) -> Result<Self, PictureError> {
         let columns = columns.clamp(1, images.len().max(1));
