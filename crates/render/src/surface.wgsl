@@ -56,7 +56,7 @@ fn shade(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location
     let diffuse = clamp((vec3<f32>(dot(n, key)) + wrap) / (1.0 + wrap), vec3<f32>(0.0), vec3<f32>(1.0));
     let side = max(dot(n, fill), 0.0);
     let sky = mix(vec3<f32>(0.16, 0.14, 0.13), vec3<f32>(0.42, 0.44, 0.48), 0.5 + 0.5 * n.z);
-    let light = 1.25 * diffuse + 0.22 * side + sky;
+    let light = 0.95 * diffuse + 0.16 * side + 0.7 * sky;
     let half_way = normalize(key + v);
     let shine = max(dot(n, half_way), 0.0);
     let fresnel = 0.028 + 0.972 * pow(1.0 - clamp(dot(n, v), 0.0, 1.0), 5.0);
