@@ -565,38 +565,3 @@ fn pinned_vertices_change_from_step_to_step() {
         }
     }
 }
-
-/// Who watches sees the start, every iterate, and at last what the step leaves; the step itself is the same
-/// to the bit, and so is one whose number of iterations is set later.
-#[test]
-fn a_watched_step_is_a_step() {
-    let bar = stiff();
-    for settings in [plain(1, 7), anderson(5, AndersonOn::Both, plain(1, 7)), exact(7)] {
-        let model = bar.model(STVK, &settings);
-        let (unseen, _) = bar.step(&settings);
-        let mut seen: Vec<Vec<Vec3<f64>>> = Vec::new();
-        let mut state = State::at_rest(&model);
-        let mut solver = Solver::new(&model, &settings);
-        let watch = |iteration: u32, x: &[Vec3<f64>]| {
-            assert_eq!(iteration as usize, seen.len());
-            seen.push(x.to_vec());
-        };
-        solver.step_watched(&model, &mut state, &bar.inputs, FRAME, watch).expect("a legal step");
-        assert_eq!(state, unseen);
-        assert_eq!(seen.len(), 8);
-        if !settings.rebase {
-            // Nothing comes after the last iteration; multipliers start from zero.
-            assert_eq!(seen[7], state.positions);
-        }
-
-        let fewer = SolverSettings { iterations: 3, ..settings.clone() };
-        let mut solver = Solver::new(&model, &settings);
-        solver.set_iterations(3);
-        let mut state = State::at_rest(&model);
-        solver.step(&model, &mut state, &bar.inputs, FRAME).expect("a legal step");
-        assert_eq!(state, bar.step(&fewer).0);
-        if !settings.rebase {
-            assert_eq!(seen[3], state.positions);
-        }
-    }
-}
