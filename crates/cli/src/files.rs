@@ -32,6 +32,7 @@ pub fn print(text: &str) -> Result<()> {
 }
 
 /// Where a scene's mesh files are looked for: beside the scene, then in the data folder.
+#[derive(Clone, Debug)]
 pub struct Library {
     folders: Vec<PathBuf>,
 }
@@ -65,6 +66,27 @@ fn shown_folder(folder: &Path) -> String {
     if folder.as_os_str().is_empty() { "this folder".into() } else { folder.display().to_string() }
 }
 
+/// Writes a file aside and renames it, so that no reader ever meets a part of it.
+pub fn write_whole(target: &Path, bytes: &[u8]) -> Result<()> {
+    let mut part = target.as_os_str().to_owned();
+    part.push(".part");
+    let part = PathBuf::from(part);
+    let write = || -> std::io::Result<()> {
+        if let Some(folder) = target.parent() {
+            fs::create_dir_all(folder)?;
+        }
+        let mut file = fs::File::create(&part)?;
+        file.write_all(bytes)?;
+        file.sync_data()?;
+        fs::rename(&part, target)
+    };
+    write().map_err(|error| {
+        // Nothing half-written stays behind; the first error is the one to report.
+        let _ = fs::remove_file(&part);
+        anyhow::anyhow!("cannot write {}: {error}", target.display())
+    })
+}
+
 /// The folder a run writes to.
 pub struct OutputFolder {
     path: PathBuf,
@@ -91,24 +113,9 @@ impl OutputFolder {
         &self.path
     }
 
-    /// Writes a file aside and renames it, so that no reader ever meets a part of it.
+    /// As [`write_whole`].
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
-        let target = self.path.join(name);
-        let part = self.path.join(format!("{name}.part"));
-        let write = || -> std::io::Result<()> {
-            if let Some(folder) = target.parent() {
-                fs::create_dir_all(folder)?;
-            }
-            let mut file = fs::File::create(&part)?;
-            file.write_all(bytes)?;
-            file.sync_data()?;
-            fs::rename(&part, &target)
-        };
-        write().map_err(|error| {
-            // Nothing half-written stays behind; the first error is the one to report.
-            let _ = fs::remove_file(&part);
-            anyhow::anyhow!("cannot write {}: {error}", target.display())
-        })
+        write_whole(&self.path.join(name), bytes)
     }
 
     /// Removes a file that an earlier run may have left.

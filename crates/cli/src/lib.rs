@@ -1,0 +1,84 @@
+//! The `viscera` program, and what the window shares with it: files, memory, built-in scenes.
+
+mod bench;
+mod bench_scene;
+mod devices;
+pub mod files;
+mod film;
+pub mod memory;
+mod mesh;
+mod progress;
+mod run;
+pub mod scene;
+mod series;
+mod summary;
+mod view;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Real-time soft-tissue simulation for surgical applications.
+#[derive(Parser)]
+#[command(name = "viscera", version, arg_required_else_help = true, after_help = EXAMPLES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  viscera run liver_retraction
+  viscera run scenes/cantilever.toml --set body.bar.material.young=\"10 kPa\" --out out/soft
+  viscera mesh inspect liver.msh --unit \"32 mm\"
+  viscera scene describe
+  viscera view grab
+  viscera bench --quick";
+
+#[derive(Subcommand)]
+enum Command {
+    /// Simulate a scene; write meshes, a picture, an animation and the numbers
+    Run(run::RunArguments),
+    /// Look at mesh files
+    #[command(subcommand)]
+    Mesh(mesh::MeshCommand),
+    /// What a scene file can say, and which scenes need none
+    #[command(subcommand)]
+    Scene(scene::SceneCommand),
+    /// Measure what the solvers cost on this machine
+    Bench(bench::BenchArguments),
+    /// Open a window: pull on the tissue and see it answer
+    View(view::ViewArguments),
+    /// List what there is to compute on, and how fast it is
+    Devices(devices::DevicesArguments),
+    // For a program, not for a person.
+    #[command(hide = true)]
+    BenchScene(bench_scene::BenchSceneArguments),
+}
+
+/// Exit code of a run that Ctrl-C ended, as shells report it.
+const INTERRUPTED: u8 = 130;
+
+/// Carries out what the command line asks for.
+pub fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Mesh(command) => mesh::execute(&command).map(|()| run::Outcome::Finished),
+        Command::Scene(command) => scene::execute(&command).map(|()| run::Outcome::Finished),
+        Command::Bench(arguments) => bench::execute(&arguments).map(|()| run::Outcome::Finished),
+        Command::View(arguments) => return view::execute(&arguments),
+        Command::Devices(arguments) => {
+            devices::execute(&arguments).map(|()| run::Outcome::Finished)
+        }
+        Command::BenchScene(arguments) => {
+            bench_scene::execute(&arguments).map(|()| run::Outcome::Finished)
+        }
+    };
+    match result {
+        Ok(run::Outcome::Finished) => ExitCode::SUCCESS,
+        Ok(run::Outcome::Interrupted) => ExitCode::from(INTERRUPTED),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,452 @@
+//! The window's state, and what happens to it.
+
+use eframe::egui::{self, CentralPanel, Panel, ScrollArea, Ui};
+use eframe::egui_wgpu::RenderState;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use crate::capture::{FOLDER, Recorder, free_name, save_picture};
+use crate::choices::{Choices, Settings, Side};
+use crate::document::Document;
+use crate::engine::{Command, Engine, Event, Frame, Stage};
+use crate::help::{self, Request};
+use crate::holds::Holds;
+use crate::messages::Messages;
+use crate::panels::time::Clock;
+use crate::panels::{self, Action, scene::Fields};
+use crate::preferences::Preferences;
+use crate::save::save;
+use crate::session::Session;
+use crate::viewport::{Gpu, Viewport};
+
+/// What the command line asks for.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The scene file, or the name of a built-in scene.
+    pub scene: PathBuf,
+    /// Settings laid over it.
+    pub settings: Settings,
+    /// Where mesh files are looked for that are not beside the scene.
+    pub data: Option<PathBuf>,
+    /// Where pictures and recordings go.
+    pub pictures: PathBuf,
+}
+
+/// The scene that is opened where none is named.
+pub const FIRST_SCENE: &str = "liver_retraction";
+
+/// The window.
+pub struct App {
+    engine: Engine,
+    session: Session,
+    viewport: Viewport,
+    holds: Holds,
+    preferences: Preferences,
+    clock: Clock,
+    messages: Messages,
+    stage: Option<Arc<Stage>>,
+    frame: Option<Box<Frame>>,
+    devices: Vec<String>,
+    fields: Fields,
+    recorder: Option<Recorder>,
+    pictures: PathBuf,
+    help_open: bool,
+    /// Number and moment of the frame from which the rate was counted last.
+    counted: (u64, Instant),
+}
+
+impl App {
+    /// Opens a scene. A scene that cannot be read is said in the window, with the first scene beneath.
+    pub fn new(
+        context: &egui::Context,
+        render_state: RenderState,
+        options: Options,
+        preferences: Preferences,
+    ) -> anyhow::Result<Self> {
+        let mut messages = Messages::default();
+        let data = options.data.as_deref();
+        let opened = Document::open(&options.scene, data)
+            .map_err(|error| format!("{error:#}"))
+            .and_then(|document| Session::new(document, options.settings));
+        let session = match opened {
+            Ok(session) => session,
+            Err(error) => {
+                messages.warn(error);
+                let first = Document::open(Path::new(FIRST_SCENE), None)?;
+                Session::new(first, Settings::new()).map_err(anyhow::Error::msg)?
+            }
+        };
+        let wake = context.clone();
+        let engine = Engine::start(move || wake.request_repaint())?;
+        let mut app = Self {
+            engine,
+            viewport: Viewport::new(Gpu::new(render_state)),
+            holds: Holds::default(),
+            clock: Clock::default(),
+            stage: None,
+            frame: None,
+            devices: Vec::new(),
+            fields: Fields::default(),
+            recorder: None,
+            pictures: options.pictures,
+            help_open: false,
+            counted: (0, Instant::now()),
+            session,
+            preferences,
+            messages,
+        };
+        app.name_save();
+        app.engine.send(Command::Color(app.preferences.coloring));
+        let load = app.session.load();
+        app.send([load]);
+        Ok(app)
+    }
+
+    /// The newest frame, as it is shown.
+    pub fn frame(&self) -> Option<&Frame> {
+        self.frame.as_deref()
+    }
+
+    /// What is open and chosen.
+    pub fn session(&self) -> &Session {
+        &self.session
+    }
+
+    /// What is held.
+    pub fn holds(&self) -> &Holds {
+        &self.holds
+    }
+
+    /// What the window has to say.
+    pub fn messages(&self) -> &Messages {
+        &self.messages
+    }
+
+    /// What the window remembers.
+    pub fn preferences(&self) -> &Preferences {
+        &self.preferences
+    }
+
+    /// Hears of the simulation, shows everything, does what is asked for.
+    pub fn show(&mut self, ui: &mut Ui) {
+        let context = ui.ctx().clone();
+        self.hear();
+        self.take_frame();
+        let coloring = self.preferences.coloring;
+        let mut actions: Vec<Action> =
+            help::requests(&context).into_iter().map(Action::Ask).collect();
+        self.show_panels(ui, &mut actions);
+        let central = CentralPanel::no_frame().show(ui, |ui| {
+            let frame = self.frame.as_deref();
+            self.viewport.show(ui, frame, &mut self.holds, &self.preferences)
+        });
+        let (commands, failed) = central.inner;
+        self.send(commands);
+        if let Some(error) = failed {
+            self.messages.warn(error);
+        }
+        self.messages.show(&context, central.response.rect, &mut actions);
+        help::show(&context, &mut self.help_open);
+        if self.preferences.coloring != coloring {
+            self.engine.send(Command::Color(self.preferences.coloring));
+        }
+        for action in actions {
+            self.act(action);
+        }
+        self.record();
+    }
+
+    fn show_panels(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
+        Panel::top("bar").show(ui, |ui| {
+            ui.add_space(3.0);
+            let recording = self.recorder.is_some();
+            let preferences = &mut self.preferences;
+            panels::time::show_bar(ui, &self.clock, &self.session, recording, preferences, actions);
+            ui.add_space(3.0);
+        });
+        Panel::bottom("status").show(ui, |ui| {
+            ui.horizontal_wrapped(|ui| match (&self.stage, &self.frame) {
+                (Some(stage), Some(frame)) => {
+                    panels::time::show_status(ui, &self.clock, stage, frame);
+                }
+                _ => {
+                    ui.weak("nothing is running yet");
+                }
+            });
+        });
+        if self.preferences.settings_open {
+            Panel::right("settings").default_size(330.0).show(ui, |ui| {
+                ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+                    self.show_settings(ui, actions);
+                });
+            });
+        }
+        if self.preferences.curve_open {
+            Panel::bottom("curve").resizable(true).default_size(130.0).show(ui, |ui| {
+                let now = self.frame.as_ref().map_or(0.0, |frame| frame.time);
+                panels::forces::show(ui, &self.holds, now, self.session.is_comparison());
+            });
+        }
+    }
+
+    fn show_settings(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
+        let stage = self.stage.as_deref();
+        panels::scene::show(ui, &self.session, stage, &mut self.fields, actions);
+        panels::view::show_grip(ui, &mut self.preferences, &self.holds, actions);
+        panels::view::show(ui, &mut self.preferences, actions);
+        panels::material::show(ui, self.session.scene(Side::First), actions);
+        let sides: &[(&str, Side)] = match self.session.is_comparison() {
+            true => &[("Solver A", Side::First), ("Solver B", Side::Second)],
+            false => &[("Solver", Side::First)],
+        };
+        for (number, (title, side)) in sides.iter().enumerate() {
+            let solver = &self.session.scene(*side).solver;
+            let device = self.devices.get(number).map(String::as_str);
+            panels::solver::show(ui, title, *side, solver, device, actions);
+        }
+    }
+
+    /// What the simulation's thread tells.
+    fn hear(&mut self) {
+        for event in self.engine.hear() {
+            match event {
+                Event::Busy(text) => {
+                    self.messages.failure = None;
+                    self.messages.expect = None;
+                    self.messages.busy = Some(text);
+                }
+                Event::Expect(text) => {
+                    self.messages.busy = None;
+                    self.messages.expect = Some(text);
+                }
+                Event::Ready(stage) => {
+                    self.messages.busy = None;
+                    self.messages.failure = None;
+                    self.holds.clear();
+                    if let Err(error) = self.viewport.enter(&stage) {
+                        self.messages.warn(error);
+                    }
+                    for note in &stage.assembly.notes {
+                        self.messages.tell(note.clone());
+                    }
+                    self.stage = Some(stage);
+                }
+                Event::Devices(devices) => self.devices = devices,
+                Event::Refused(text) => self.messages.warn(text),
+                Event::Failed(failure) => {
+                    self.messages.busy = None;
+                    self.clock.playing = false;
+                    self.messages.failure = Some(failure);
+                }
+            }
+        }
+    }
+
+    fn take_frame(&mut self) {
+        if !self.engine.newest(&mut self.frame) {
+            return;
+        }
+        let Some(frame) = &self.frame else { return };
+        if let Err(error) = self.viewport.place(frame) {
+            self.messages.warn(error);
+        }
+        self.holds.note(frame);
+        let (number, since) = self.counted;
+        let elapsed = since.elapsed().as_secs_f64();
+        if frame.number < number {
+            self.counted = (frame.number, Instant::now());
+        } else if elapsed > 0.5 {
+            self.clock.rate = (frame.number - number) as f64 / elapsed;
+            self.counted = (frame.number, Instant::now());
+        }
+    }
+
+    fn send(&self, commands: impl IntoIterator<Item = Command>) {
+        commands.into_iter().for_each(|command| self.engine.send(command));
+    }
+
+    /// Does what a panel asks for.
+    fn act(&mut self, action: Action) {
+        match action {
+            Action::Ask(request) => self.ask(request),
+            Action::Choose(side, settings, gesture) => {
+                let chosen = self.session.choose(side, &settings, gesture);
+                self.carry_out(chosen);
+            }
+            Action::Compare(second) => {
+                let ghost = self.session.choices().ghost;
+                let chosen = self.session.compare(second, ghost);
+                self.carry_out(chosen);
+            }
+            Action::Ghost(ghost) => {
+                let second = self.session.choices().second.clone();
+                let chosen = self.session.compare(second, ghost);
+                self.carry_out(chosen);
+            }
+            Action::Speed(speed) => {
+                self.clock.speed = speed;
+                self.engine.send(Command::Speed(speed));
+            }
+            Action::LetGo(hold) => {
+                let command = self.holds.let_go(hold);
+                self.send(command);
+            }
+            Action::Open(path) => self.open(&path),
+            Action::SaveAs(path) => self.save_as(&path),
+            Action::Proceed => {
+                self.messages.expect = None;
+                self.engine.send(Command::Proceed);
+            }
+            Action::UseCpu => {
+                let cpu = vec![("solver.device".to_owned(), "cpu".to_owned())];
+                let chosen = self.session.choose(Side::First, &cpu, false);
+                self.carry_out(chosen);
+                // Nothing runs that could take a change.
+                let load = self.session.load();
+                self.send([load]);
+                self.play(true);
+            }
+        }
+    }
+
+    fn carry_out(&mut self, commands: Result<Vec<Command>, String>) {
+        match commands {
+            Ok(commands) => self.send(commands),
+            Err(error) => self.messages.warn(error),
+        }
+    }
+
+    /// Does what a key or a button asks for.
+    fn ask(&mut self, request: Request) {
+        match request {
+            Request::PlayPause => self.play(!self.clock.playing),
+            Request::Step => {
+                self.clock.playing = false;
+                self.engine.send(Command::Step);
+            }
+            Request::Reset => {
+                self.engine.send(Command::Reset);
+                // What has diverged was stopped; beginning anew is meant to run.
+                if self.messages.failure.take().is_some() {
+                    self.play(true);
+                }
+            }
+            Request::Undo => {
+                let undone = self.session.undo();
+                self.carry_out(undone);
+            }
+            Request::Redo => {
+                let redone = self.session.redo();
+                self.carry_out(redone);
+            }
+            Request::Save => {
+                let path = PathBuf::from(self.fields.save.trim());
+                self.save_as(&path);
+            }
+            Request::Screenshot => self.take_picture(),
+            Request::Record => self.toggle_recording(),
+            Request::Frame => self.viewport.frame_all(),
+            Request::LetGo => {
+                let held: Vec<_> = self.holds.list().iter().map(|held| held.id).collect();
+                for hold in held {
+                    let command = self.holds.let_go(hold);
+                    self.send(command);
+                }
+            }
+            Request::Help => self.help_open = !self.help_open,
+        }
+    }
+
+    fn play(&mut self, playing: bool) {
+        self.clock.playing = playing;
+        self.counted = (self.frame.as_ref().map_or(0, |frame| frame.number), Instant::now());
+        self.engine.send(Command::Play(playing));
+    }
+
+    fn open(&mut self, path: &Path) {
+        let data = self.session.document().data.clone();
+        let opened = Document::open(path, data.as_deref())
+            .map_err(|error| format!("{error:#}"))
+            .and_then(|document| self.session.open(document));
+        match opened {
+            Ok(command) => {
+                self.send([command]);
+                self.play(true);
+                self.name_save();
+            }
+            Err(error) => self.messages.warn(error),
+        }
+    }
+
+    /// Proposes a name to save under: never that of the file that is open.
+    fn name_save(&mut self) {
+        let document = self.session.document();
+        let name = format!("{}_changed.toml", document.stem());
+        let path = document.path.with_file_name(name);
+        self.fields.save = path.display().to_string();
+    }
+
+    fn save_as(&mut self, path: &Path) {
+        let Choices { second, .. } = self.session.choices();
+        let is_comparison = second.is_some();
+        let settings = self.session.choices().of(Side::First);
+        match save(self.session.document(), &settings, path) {
+            Ok(()) => {
+                let of = if is_comparison { " (of A)" } else { "" };
+                let shown = path.display();
+                self.messages.tell(format!("saved{of}; run it with: viscera run {shown}"));
+            }
+            Err(error) => self.messages.warn(format!("{error:#}")),
+        }
+    }
+
+    fn take_picture(&mut self) {
+        let path = free_name(&self.pictures, &self.session.document().stem(), "png");
+        let saved = self.viewport.images().map_err(anyhow::Error::msg);
+        match saved.and_then(|images| save_picture(&images, &path)) {
+            Ok(()) => self.messages.tell(format!("saved {}", path.display())),
+            Err(error) => self.messages.warn(format!("{error:#}")),
+        }
+    }
+
+    fn toggle_recording(&mut self) {
+        if let Some(recorder) = self.recorder.take() {
+            match recorder.finish() {
+                Ok(told) => self.messages.tell(format!("saved {told}")),
+                Err(error) => self.messages.warn(format!("{error:#}")),
+            }
+            return;
+        }
+        let path = free_name(&self.pictures, &self.session.document().stem(), "gif");
+        match Recorder::start(path) {
+            Ok(recorder) => self.recorder = Some(recorder),
+            Err(error) => self.messages.warn(format!("{error:#}")),
+        }
+    }
+
+    /// Adds what is shown to the recording, where one is going on and a picture is due.
+    fn record(&mut self) {
+        let (Some(recorder), Some(frame)) = (&mut self.recorder, &self.frame) else { return };
+        if !recorder.is_due(frame.time) {
+            return;
+        }
+        let images = self.viewport.images().map_err(anyhow::Error::msg);
+        if let Err(error) = images.and_then(|images| recorder.push(&images, frame.time)) {
+            self.messages.warn(format!("{error:#}"));
+            self.recorder = None;
+        }
+    }
+
+    /// Ends what would otherwise be lost.
+    pub fn close(&mut self) {
+        if self.recorder.is_some() {
+            self.toggle_recording();
+        }
+    }
+}
+
+/// Where pictures go unless the command line says otherwise.
+pub fn default_pictures() -> PathBuf {
+    PathBuf::from(FOLDER)
+}

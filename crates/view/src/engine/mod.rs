@@ -1,0 +1,153 @@
+//! The simulation on a thread of its own. The window sends [`Command`]s, hears [`Event`]s, and takes the
+//! newest finished [`Frame`] when it likes; it never waits.
+
+mod color;
+mod frame;
+mod simulation;
+mod stage;
+mod worker;
+
+pub use frame::{Coloring, Frame, Hold, HoldId, Lane, Slot};
+pub use stage::{Plan, Stage};
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use viscera::scalar::Vec3;
+use viscera::scene::Scene;
+
+use crate::choices::Settings;
+
+/// What the window asks for.
+#[derive(Debug)]
+pub enum Command {
+    /// Builds these simulations and starts them from rest.
+    Load(Box<Plan>),
+    /// Goes on with a mesh that was said to be large.
+    Proceed,
+    /// Runs, or pauses.
+    Play(bool),
+    /// Computes one frame and pauses.
+    Step,
+    /// Starts from rest again.
+    Reset,
+    /// Simulated seconds per second of the clock; faster where it is infinite.
+    Speed(f64),
+    /// Takes hold of vertices.
+    Take {
+        /// The caller's number for what it takes hold of.
+        hold: HoldId,
+        /// Position of the body in the scene.
+        body: usize,
+        /// Where at rest [m].
+        rest: Vec3<f64>,
+        /// How many vertices.
+        count: u32,
+        /// Total stiffness [N/m] of the springs; rigidly where there is none.
+        stiffness: Option<f64>,
+    },
+    /// Moves what is held to so far from where it was taken [m].
+    Lead(HoldId, Vec3<f64>),
+    /// Lets go.
+    LetGo(HoldId),
+    /// Changes settings of one of the simulations; the scene is the one with them.
+    Change(usize, Settings, Box<Scene>),
+    /// What colours show.
+    Color(Coloring),
+    /// Ends the thread.
+    Quit,
+}
+
+/// What the window hears.
+#[derive(Debug)]
+pub enum Event {
+    /// Something that takes a while has begun.
+    Busy(String),
+    /// It is large: [`Command::Proceed`] goes on, another [`Command::Load`] does not.
+    Expect(String),
+    /// Everything is built; frames follow.
+    Ready(Arc<Stage>),
+    /// What computes each of the simulations has changed or been built again: its device, and why.
+    Devices(Vec<String>),
+    /// Something was refused, and nothing has changed.
+    Refused(String),
+    /// The simulation has stopped.
+    Failed(Failure),
+}
+
+/// Why a simulation has stopped, and what one can do.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    /// What happened.
+    pub message: String,
+    /// The next move.
+    pub cure: Cure,
+}
+
+/// What one can do about a failure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cure {
+    /// Start from rest again.
+    Reset,
+    /// Compute on the CPU.
+    Cpu,
+    /// Another scene.
+    Open,
+}
+
+/// The thread, seen from the window.
+#[derive(Debug)]
+pub struct Engine {
+    commands: Sender<Command>,
+    events: Receiver<Event>,
+    slot: Arc<Slot>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Engine {
+    /// Starts the thread. It calls `wake` when there is something to see or hear.
+    pub fn start(wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+        let (commands, receive) = channel();
+        let (send, events) = channel();
+        let slot = Arc::new(Slot::default());
+        let worker = worker::Worker::new(receive, send, Arc::clone(&slot), Box::new(wake));
+        let thread = std::thread::Builder::new()
+            .name("simulation".to_owned())
+            .spawn(move || worker.run())?;
+        Ok(Self { commands, events, slot, thread: Some(thread) })
+    }
+
+    /// Asks for something.
+    pub fn send(&self, command: Command) {
+        // A thread that has ended hears nothing; `hear` tells so.
+        let _ = self.commands.send(command);
+    }
+
+    /// What has happened since it was last asked.
+    pub fn hear(&mut self) -> Vec<Event> {
+        let mut heard: Vec<Event> = self.events.try_iter().collect();
+        if self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
+            self.thread = None;
+            heard.push(Event::Failed(Failure {
+                message: "the simulation's thread has ended; save the scene and start again".into(),
+                cure: Cure::Open,
+            }));
+        }
+        heard
+    }
+
+    /// The newest finished frame, where there is one newer than `shown`; that one's memory is used again.
+    pub fn newest(&self, shown: &mut Option<Box<Frame>>) -> bool {
+        self.slot.take(shown)
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        self.send(Command::Quit);
+        if let Some(thread) = self.thread.take() {
+            // A thread that panicked has said so.
+            let _ = thread.join();
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! The keyboard and the mouse: what each does, in one list that the window reads and shows.
+
+use eframe::egui::{self, Key, Modifiers};
+
+/// What a key asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// Runs or pauses.
+    PlayPause,
+    /// Computes one frame.
+    Step,
+    /// Begins anew.
+    Reset,
+    /// Takes a change back.
+    Undo,
+    /// Makes it again.
+    Redo,
+    /// Saves the scene.
+    Save,
+    /// Saves a picture.
+    Screenshot,
+    /// Begins or ends a recording.
+    Record,
+    /// Shows the whole tissue.
+    Frame,
+    /// Lets go of everything.
+    LetGo,
+    /// Shows this list.
+    Help,
+}
+
+struct Shortcut {
+    modifiers: Modifiers,
+    key: Key,
+    request: Request,
+    shown: &'static str,
+    text: &'static str,
+}
+
+const fn plain(key: Key, request: Request, shown: &'static str, text: &'static str) -> Shortcut {
+    Shortcut { modifiers: Modifiers::NONE, key, request, shown, text }
+}
+
+const fn command(key: Key, request: Request, shown: &'static str, text: &'static str) -> Shortcut {
+    Shortcut { modifiers: Modifiers::COMMAND, key, request, shown, text }
+}
+
+/// More modifiers first: Ctrl+Shift+Z would otherwise be heard as Ctrl+Z.
+const SHORTCUTS: &[Shortcut] = &[
+    Shortcut {
+        modifiers: Modifiers::COMMAND.plus(Modifiers::SHIFT),
+        key: Key::Z,
+        request: Request::Redo,
+        shown: "",
+        text: "",
+    },
+    command(Key::Z, Request::Undo, "Ctrl+Z", "take the last change of a setting back"),
+    command(Key::Y, Request::Redo, "Ctrl+Y", "make it again"),
+    command(Key::S, Request::Save, "Ctrl+S", "save the scene"),
+    plain(Key::Space, Request::PlayPause, "space", "run or pause"),
+    plain(Key::Period, Request::Step, ".", "one frame"),
+    plain(Key::R, Request::Reset, "R", "begin again from rest"),
+    plain(Key::F, Request::Frame, "F", "show everything"),
+    plain(Key::Escape, Request::LetGo, "Esc", "let go of everything"),
+    plain(Key::S, Request::Screenshot, "S", "save a picture, in pictures/"),
+    plain(Key::G, Request::Record, "G", "begin or end recording an animated image"),
+    plain(Key::F1, Request::Help, "F1, ?", "this list"),
+    plain(Key::Questionmark, Request::Help, "", ""),
+];
+
+const MOUSE: &[(&str, &str)] = &[
+    ("left, on tissue", "take hold and pull"),
+    ("left, beside it", "turn the view"),
+    ("right, or middle", "turn the view; with Ctrl or Shift move it"),
+    ("wheel", "nearer, farther"),
+    ("Shift at release", "hold on; Esc lets go"),
+];
+
+/// What the keyboard asks for. A text field that is being written in keeps its letters.
+pub fn requests(context: &egui::Context) -> Vec<Request> {
+    if context.text_edit_focused() {
+        return Vec::new();
+    }
+    context.input_mut(|input| {
+        let pressed =
+            SHORTCUTS.iter().filter(|s| input.consume_key(s.modifiers, s.key)).map(|s| s.request);
+        pressed.collect()
+    })
+}
+
+/// The list, in a window of its own.
+pub fn show(context: &egui::Context, open: &mut bool) {
+    egui::Window::new("Keyboard and mouse")
+        .open(open)
+        .resizable(false)
+        .collapsible(false)
+        .anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO)
+        .show(context, |ui| {
+            egui::Grid::new("shortcuts").num_columns(2).spacing([18.0, 5.0]).show(ui, |ui| {
+                let keys = SHORTCUTS.iter().map(|s| (s.shown, s.text));
+                for (shown, text) in MOUSE.iter().copied().chain(keys) {
+                    if !shown.is_empty() {
+                        ui.strong(shown);
+                        ui.label(text);
+                        ui.end_row();
+                    }
+                }
+            });
+        });
+}

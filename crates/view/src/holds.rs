@@ -1,0 +1,189 @@
+//! What a person holds: points of the tissue, where they are pulled to, and with what force.
+
+use std::collections::VecDeque;
+use viscera::scalar::Vec3;
+
+use crate::engine::{Command, Frame, HoldId};
+use crate::viewport::Pick;
+
+/// How one takes hold.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct Grip {
+    /// How many vertices.
+    pub count: u32,
+    /// Total stiffness [N/m] of the springs between hand and tissue.
+    pub stiffness: f64,
+    /// Hold rigidly, without springs.
+    pub rigid: bool,
+    /// Hold on when the button of the mouse is released.
+    pub keep: bool,
+}
+
+impl Default for Grip {
+    fn default() -> Self {
+        Self { count: 8, stiffness: 200.0, rigid: false, keep: false }
+    }
+}
+
+/// How much of the past a curve shows [s].
+pub const REMEMBERED: f64 = 8.0;
+
+/// One point that is held.
+#[derive(Debug)]
+pub struct Held {
+    /// Its number, which the simulations know it by.
+    pub id: HoldId,
+    /// Where it was taken [m].
+    pub taken: Vec3<f64>,
+    /// How far it is led from there [m].
+    pub translation: Vec3<f64>,
+    /// Times [s] and forces [N] of the first and the second simulation.
+    pub curve: VecDeque<(f64, [f64; 2])>,
+}
+
+/// Everything held.
+#[derive(Debug, Default)]
+pub struct Holds {
+    list: Vec<Held>,
+    taken_so_far: HoldId,
+    /// What is dragged, and the point of the drag's plane where its translation is zero [m].
+    drag: Option<(HoldId, Vec3<f64>)>,
+}
+
+impl Holds {
+    /// All of them, in the order in which they were taken.
+    pub fn list(&self) -> &[Held] {
+        &self.list
+    }
+
+    /// A point of the plane in which something is dragged [m].
+    pub fn drag_plane(&self) -> Option<Vec3<f64>> {
+        self.drag.map(|(_, origin)| origin)
+    }
+
+    /// Takes hold where the tissue was pressed, and drags it.
+    pub fn take(&mut self, pick: &Pick, grip: &Grip) -> Command {
+        self.taken_so_far += 1;
+        let id = self.taken_so_far;
+        self.drag = Some((id, pick.point));
+        self.list.push(Held {
+            id,
+            taken: pick.point,
+            translation: Vec3::ZERO,
+            curve: VecDeque::new(),
+        });
+        let stiffness = (!grip.rigid).then_some(grip.stiffness);
+        Command::Take { hold: id, body: pick.body, rest: pick.rest, count: grip.count, stiffness }
+    }
+
+    /// Drags what is held already.
+    pub fn resume(&mut self, id: HoldId) {
+        if let Some(held) = self.list.iter().find(|held| held.id == id) {
+            self.drag = Some((id, held.taken));
+        }
+    }
+
+    /// Leads what is dragged to a point of its plane [m].
+    pub fn lead(&mut self, point: Vec3<f64>) -> Option<Command> {
+        let (id, origin) = self.drag?;
+        let held = self.list.iter_mut().find(|held| held.id == id)?;
+        held.translation = point - origin;
+        Some(Command::Lead(id, held.translation))
+    }
+
+    /// Ends a drag: holds on, or lets go.
+    pub fn release(&mut self, keep: bool) -> Option<Command> {
+        let (id, _) = self.drag.take()?;
+        if keep { None } else { self.let_go(id) }
+    }
+
+    /// Lets go of one.
+    pub fn let_go(&mut self, id: HoldId) -> Option<Command> {
+        if self.drag.is_some_and(|(dragged, _)| dragged == id) {
+            self.drag = None;
+        }
+        let position = self.list.iter().position(|held| held.id == id)?;
+        self.list.remove(position);
+        Some(Command::LetGo(id))
+    }
+
+    /// Forgets everything: the simulations have begun anew.
+    pub fn clear(&mut self) {
+        self.list.clear();
+        self.drag = None;
+    }
+
+    /// Notes the forces of a frame.
+    pub fn note(&mut self, frame: &Frame) {
+        for held in &mut self.list {
+            let mut forces = [f64::NAN; 2];
+            for (force, lane) in forces.iter_mut().zip(&frame.lanes) {
+                if let Some(hold) = lane.holds.iter().find(|hold| hold.id == held.id) {
+                    *force = hold.force.length();
+                }
+            }
+            if forces[0].is_nan() {
+                continue;
+            }
+            // After a reset time begins anew.
+            if held.curve.back().is_some_and(|&(time, _)| time >= frame.time) {
+                held.curve.clear();
+            }
+            held.curve.push_back((frame.time, forces));
+            while held.curve.front().is_some_and(|&(time, _)| time < frame.time - REMEMBERED) {
+                held.curve.pop_front();
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viscera::scalar::vec3;
+
+    fn pick() -> Pick {
+        Pick { body: 0, point: vec3(1.0, 2.0, 3.0), rest: vec3(1.0, 2.0, 2.5) }
+    }
+
+    #[test]
+    fn a_release_is_clean_unless_it_is_kept() {
+        let mut holds = Holds::default();
+        holds.take(&pick(), &Grip::default());
+        let led = holds.lead(vec3(1.0, 2.0, 4.0));
+        assert!(matches!(led, Some(Command::Lead(1, moved)) if moved == vec3(0.0, 0.0, 1.0)));
+        assert!(holds.release(true).is_none());
+        assert_eq!(holds.list().len(), 1);
+        // Taken up again, it goes on from where it is held.
+        holds.resume(1);
+        assert!(matches!(holds.release(false), Some(Command::LetGo(1))));
+        assert!(holds.list().is_empty() && holds.lead(Vec3::ZERO).is_none());
+    }
+
+    #[test]
+    fn a_curve_forgets_what_is_long_past_and_what_a_reset_has_undone() {
+        let mut holds = Holds::default();
+        holds.take(&pick(), &Grip::default());
+        let at = |time: f64| {
+            let hold = crate::engine::Hold {
+                id: 1,
+                place: Vec3::ZERO,
+                target: Vec3::ZERO,
+                force: vec3(0.0, 3.0, 4.0),
+            };
+            let lane = crate::engine::Lane { holds: vec![hold], ..Default::default() };
+            Frame { time, lanes: vec![lane], ..Frame::default() }
+        };
+        for time in [1.0, 2.0, 1.5 + REMEMBERED] {
+            holds.note(&at(time));
+        }
+        let times = |holds: &Holds| -> Vec<f64> {
+            holds.list()[0].curve.iter().map(|(time, _)| *time).collect()
+        };
+        assert_eq!(times(&holds), [2.0, 1.5 + REMEMBERED]);
+        assert_eq!(holds.list()[0].curve[0].1[0], 5.0);
+        holds.note(&at(0.0));
+        assert_eq!(times(&holds), [0.0]);
+    }
+}

@@ -1,0 +1,49 @@
+//! The window's panels. Each shows what is, and says what a person wants changed; only the app changes it.
+
+mod choice;
+pub mod convergence;
+pub mod forces;
+pub mod material;
+pub mod scene;
+pub mod solver;
+pub mod time;
+pub mod view;
+
+use eframe::egui::{self, Ui};
+use std::path::PathBuf;
+
+use crate::choices::{Settings, Side};
+use crate::engine::HoldId;
+use crate::help::Request;
+
+/// What a person wants.
+#[derive(Clone, Debug)]
+pub enum Action {
+    /// What a key or a button asks for.
+    Ask(Request),
+    /// Settings of a solver; true while a slider is being dragged.
+    Choose(Side, Settings, bool),
+    /// Two solvers side by side: what the second differs in.
+    Compare(Option<Settings>),
+    /// The exact solution as a ghost.
+    Ghost(bool),
+    /// Simulated seconds per second of the clock.
+    Speed(f64),
+    /// Lets go of one point.
+    LetGo(HoldId),
+    /// Another scene.
+    Open(PathBuf),
+    /// Saves the scene there.
+    SaveAs(PathBuf),
+    /// Goes on with a large mesh.
+    Proceed,
+    /// Goes on with the CPU.
+    UseCpu,
+}
+
+/// A part of the settings that can be folded away.
+fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui)) {
+    egui::CollapsingHeader::new(egui::RichText::new(title).strong())
+        .default_open(open)
+        .show(ui, contents);
+}

@@ -1,0 +1,84 @@
+//! What is open, another scene, and saving.
+
+use eframe::egui::{self, Ui};
+use std::path::PathBuf;
+use viscera_cli::scene::BUILT_IN;
+
+use super::choice::{Chooser, Row};
+use super::{Action, section};
+use crate::choices::Side;
+use crate::engine::Stage;
+use crate::session::Session;
+
+/// What is being written into text fields.
+#[derive(Debug, Default)]
+pub struct Fields {
+    /// Of another scene.
+    pub open: String,
+    /// Where to save.
+    pub save: String,
+}
+
+/// The scene's title, its numbers, and text fields for files.
+pub fn show(
+    ui: &mut Ui,
+    session: &Session,
+    stage: Option<&Stage>,
+    fields: &mut Fields,
+    actions: &mut Vec<Action>,
+) {
+    section(ui, "Scene", true, |ui| {
+        let scene = session.scene(Side::First);
+        let title = ui.label(egui::RichText::new(&scene.title).size(15.0));
+        if !scene.description.is_empty() {
+            title.on_hover_text(scene.description.trim());
+        }
+        if let Some(stage) = stage {
+            let vertices = stage.assembly.builder.positions().len();
+            let text = format!("{} tetrahedra, {vertices} vertices", stage.tet_count());
+            ui.weak(text).on_hover_text(stage.assembly.notes.join("\n"));
+        }
+        gravity(ui, session, actions);
+        ui.horizontal(|ui| {
+            let label = ui.label("open");
+            let field = egui::TextEdit::singleline(&mut fields.open)
+                .hint_text("a scene file")
+                .desired_width(150.0);
+            let field = ui.add(field).labelled_by(label.id);
+            let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+            let button = ui.button("Open").on_hover_text("Reads the scene and begins from rest");
+            if (entered || button.clicked()) && !fields.open.trim().is_empty() {
+                actions.push(Action::Open(PathBuf::from(fields.open.trim())));
+            }
+            ui.menu_button("built-in", |ui| {
+                for scene in &BUILT_IN {
+                    if ui.button(scene.name).clicked() {
+                        actions.push(Action::Open(PathBuf::from(scene.name)));
+                        ui.close();
+                    }
+                }
+            });
+        });
+        ui.horizontal(|ui| {
+            let label = ui.label("save");
+            let field = egui::TextEdit::singleline(&mut fields.save).desired_width(150.0);
+            ui.add(field).labelled_by(label.id).on_hover_text(
+                "The file gets what was chosen here and keeps what was written; `viscera run` takes it",
+            );
+            if ui.button("Save").on_hover_text("Ctrl+S").clicked() {
+                actions.push(Action::SaveAs(PathBuf::from(fields.save.trim())));
+            }
+        });
+    });
+}
+
+fn gravity(ui: &mut Ui, session: &Session, actions: &mut Vec<Action>) {
+    let gravity = session.scene(Side::First).world.gravity;
+    // A scene may let it pull sideways; the slider is for what is usual.
+    if gravity.x == 0.0 && gravity.y == 0.0 && gravity.z <= 0.0 {
+        let help = "Acceleration downwards, along -z.";
+        let row = Row::new("world.gravity", "gravity", help).unit(" m/s²");
+        let mut chooser = Chooser { side: Side::First, actions };
+        chooser.slider(ui, &row, 0.0 - gravity.z, 0.0..=20.0, |value| format!("{value:.2} m/s^2"));
+    }
+}

@@ -1,0 +1,182 @@
+//! How steps are solved: all of it can be changed while the simulation runs.
+
+use eframe::egui::Ui;
+use viscera::settings::{Acceleration, Colors, DeviceRequest, Method, Precision, SolverSettings};
+
+use super::choice::{Chooser, Row};
+use super::{Action, section};
+use crate::choices::Side;
+
+/// One solver's settings.
+pub fn show(
+    ui: &mut Ui,
+    title: &str,
+    side: Side,
+    solver: &SolverSettings,
+    device: Option<&str>,
+    actions: &mut Vec<Action>,
+) {
+    section(ui, title, true, |ui| {
+        ui.push_id(title, |ui| {
+            let mut chooser = Chooser { side, actions };
+            known(ui, &mut chooser);
+            method(ui, solver, &mut chooser);
+            if solver.method == Method::Xpbd {
+                sweeps(ui, solver, &mut chooser);
+                acceleration(ui, solver, &mut chooser);
+                exactness(ui, solver, &mut chooser);
+            }
+            where_computed(ui, solver, device, &mut chooser);
+        });
+    });
+}
+
+/// Solvers worth comparing, by one click. Each says everything that another may have changed.
+const KNOWN: [(&str, &str, [(&str, &str); 7]); 4] = [
+    (
+        "exact",
+        "The default: exact at rest, coloured Gauss-Seidel, few sweeps.",
+        known_settings("unlimited", "10", "2", "none", "true"),
+    ),
+    (
+        "Jacobi 40",
+        "One colour, 40 sweeps of one step per frame.",
+        known_settings("1", "1", "40", "none", "true"),
+    ),
+    (
+        "Anderson 40",
+        "The same with Anderson acceleration.",
+        known_settings("1", "1", "40", "anderson", "true"),
+    ),
+    (
+        "as published",
+        "XPBD as published: its stiffness depends on substeps and iterations.",
+        known_settings("unlimited", "10", "2", "none", "false"),
+    ),
+];
+
+const fn known_settings(
+    colors: &'static str,
+    substeps: &'static str,
+    iterations: &'static str,
+    acceleration: &'static str,
+    exact: &'static str,
+) -> [(&'static str, &'static str); 7] {
+    [
+        ("solver.method", "xpbd"),
+        ("solver.colors", colors),
+        ("solver.substeps", substeps),
+        ("solver.iterations", iterations),
+        ("solver.acceleration", acceleration),
+        ("solver.rebase", exact),
+        ("solver.keep_multipliers", exact),
+    ]
+}
+
+fn known(ui: &mut Ui, chooser: &mut Chooser<'_>) {
+    ui.horizontal_wrapped(|ui| {
+        for (name, help, settings) in &KNOWN {
+            if ui.button(*name).on_hover_text(*help).clicked() {
+                chooser.all(settings);
+            }
+        }
+    });
+}
+
+fn method(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
+    let value = match solver.method {
+        Method::Xpbd => "xpbd",
+        Method::Explicit => "explicit",
+    };
+    let help = "XPBD sweeps over constraints in large steps. Explicit takes many small steps: no sweeps, \
+                no guards, cheap for small soft bodies.";
+    let names = [("xpbd", "XPBD"), ("explicit", "explicit")];
+    chooser.menu(ui, &Row::new("solver.method", "method", help), value, &names);
+    let help =
+        "Divide every frame. More lose less motion to numerical damping; the cost grows alike.";
+    let row = Row::new("solver.substeps", "substeps", help).whole().logarithmic();
+    let value = f64::from(solver.substeps);
+    chooser.slider(ui, &row, value, 1.0..=100.0, |value| value.to_string());
+}
+
+fn sweeps(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
+    let help = "Sweeps over all constraints in each substep.";
+    let row = Row::new("solver.iterations", "iterations", help).whole().logarithmic();
+    let value = f64::from(solver.iterations);
+    chooser.slider(ui, &row, value, 1.0..=200.0, |value| value.to_string());
+    let help = "Colours of the constraint graph: unlimited for Gauss-Seidel, 1 for Jacobi, a few for \
+                clique separation. Fewer run more in parallel and need more sweeps.";
+    let shown = match solver.colors {
+        Colors::Unlimited => "unlimited".to_owned(),
+        Colors::Limited(count) => count.to_string(),
+    };
+    let counts = [
+        ("unlimited", "unlimited (Gauss-Seidel)"),
+        ("1", "1 (Jacobi)"),
+        ("2", "2"),
+        ("3", "3"),
+        ("4", "4"),
+        ("6", "6"),
+        ("8", "8"),
+        ("12", "12"),
+        ("16", "16"),
+    ];
+    chooser.menu(ui, &Row::new("solver.colors", "colours", help), &shown, &counts);
+    let help = "Over-relaxation: above 1 hurries, below 1 calms. Safe up to 1.2 for unlimited colours; \
+                with one colour only 1 is.";
+    let row = Row::new("solver.relaxation", "relaxation", help);
+    chooser.slider(ui, &row, solver.relaxation, 0.1..=1.95, |value| format!("{value:.2}"));
+}
+
+fn acceleration(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
+    let value = match solver.acceleration {
+        Acceleration::None => "none",
+        Acceleration::Chebyshev => "chebyshev",
+        Acceleration::Anderson => "anderson",
+    };
+    let help =
+        "What is done with the sequence of sweeps of a substep. Needs several iterations to pay.";
+    let names = [("none", "none"), ("chebyshev", "Chebyshev"), ("anderson", "Anderson")];
+    chooser.menu(ui, &Row::new("solver.acceleration", "acceleration", help), value, &names);
+    if solver.acceleration == Acceleration::Anderson {
+        let help = "How many past sweeps Anderson mixes.";
+        let row = Row::new("solver.anderson_window", "window", help).whole();
+        let value = f64::from(solver.anderson_window);
+        chooser.slider(ui, &row, value, 1.0..=10.0, |value| value.to_string());
+    }
+}
+
+fn exactness(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
+    let help =
+        "Stabilised rebase before each sweep: the iteration converges to implicit Euler exactly.";
+    chooser.tick(ui, "solver.rebase", "rebase", help, solver.rebase);
+    let help = "With the rebase this makes the stiffness independent of the number of iterations; \
+                without it the body freezes.";
+    chooser.tick(ui, "solver.keep_multipliers", "keep multipliers", help, solver.keep_multipliers);
+    let help = "Take a step back that raises the incremental potential, and slow down what would gain \
+                energy. Acts with the rebase.";
+    chooser.tick(ui, "solver.step_guard", "step guard", help, solver.step_guard);
+}
+
+fn where_computed(
+    ui: &mut Ui,
+    solver: &SolverSettings,
+    device: Option<&str>,
+    chooser: &mut Chooser<'_>,
+) {
+    let help = "What computes the steps: auto takes what is expected to be faster.";
+    let value = match &solver.device {
+        DeviceRequest::Named(name) => name.clone(),
+        known => known.to_string(),
+    };
+    let names = [("auto", "auto"), ("cpu", "CPU"), ("gpu", "GPU")];
+    chooser.menu(ui, &Row::new("solver.device", "device", help), &value, &names);
+    let precision = match solver.precision {
+        Precision::F32 => "single precision",
+        Precision::F64 => "double precision",
+    };
+    let text = format!("{}; {precision}", device.unwrap_or("not built yet"));
+    let help =
+        "Precision is chosen when a scene is opened: solver.precision in the file, or --set.";
+    ui.weak(text).on_hover_text(help);
+}

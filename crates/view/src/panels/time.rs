@@ -1,0 +1,123 @@
+//! The bar above: running, stepping, beginning anew, speed; pictures; comparison.
+
+use eframe::egui::{self, Slider, Ui};
+
+use super::Action;
+use crate::engine::{Frame, Stage};
+use crate::help::Request;
+use crate::preferences::Preferences;
+use crate::session::Session;
+
+/// What runs, and how fast.
+#[derive(Clone, Copy, Debug)]
+pub struct Clock {
+    /// Whether it runs.
+    pub playing: bool,
+    /// Simulated seconds per second.
+    pub speed: f64,
+    /// Frames computed per second, smoothed; zero while paused.
+    pub rate: f64,
+}
+
+impl Default for Clock {
+    fn default() -> Self {
+        Self { playing: true, speed: 1.0, rate: 0.0 }
+    }
+}
+
+/// The bar above.
+pub fn show_bar(
+    ui: &mut Ui,
+    clock: &Clock,
+    session: &Session,
+    is_recording: bool,
+    preferences: &mut Preferences,
+    actions: &mut Vec<Action>,
+) {
+    ui.horizontal_wrapped(|ui| {
+        let mut ask = |ui: &mut Ui, name: &str, help: &str, enabled: bool, request: Request| {
+            let button = ui.add_enabled(enabled, egui::Button::new(name)).on_hover_text(help);
+            if button.clicked() {
+                actions.push(Action::Ask(request));
+            }
+        };
+        let play = if clock.playing { "⏸ Pause" } else { "▶ Run" };
+        ask(ui, play, "Run or pause (space)", true, Request::PlayPause);
+        ask(ui, "⏭ Step", "One frame (.)", true, Request::Step);
+        ask(ui, "⏮ Reset", "Begin again from rest (R)", true, Request::Reset);
+        ui.separator();
+        let history = session.history();
+        ask(ui, "⟲ Undo", "Ctrl+Z", history.can_undo(), Request::Undo);
+        ask(ui, "⟳ Redo", "Ctrl+Y", history.can_redo(), Request::Redo);
+        ui.separator();
+        ask(ui, "Picture", "Save a picture of the tissue (S)", true, Request::Screenshot);
+        let record = if is_recording { "⏹ Stop recording" } else { "⏺ Record" };
+        ask(ui, record, "An animated image of the motion (G)", true, Request::Record);
+        ask(ui, "Save scene", "Ctrl+S", true, Request::Save);
+        ui.separator();
+        compare(ui, session, actions);
+        ui.separator();
+        let mut speed = clock.speed;
+        let name = ui.label("speed");
+        let slider =
+            Slider::new(&mut speed, 0.05..=4.0).logarithmic(true).max_decimals(2).suffix(" x");
+        if ui.add(slider).labelled_by(name.id).changed() {
+            actions.push(Action::Speed(speed));
+        }
+        ui.separator();
+        ui.toggle_value(&mut preferences.settings_open, "Settings");
+        ui.toggle_value(&mut preferences.curve_open, "Forces");
+        if ui.button("?").on_hover_text("Keyboard and mouse (F1)").clicked() {
+            actions.push(Action::Ask(Request::Help));
+        }
+    });
+}
+
+fn compare(ui: &mut Ui, session: &Session, actions: &mut Vec<Action>) {
+    let mut on = session.is_comparison();
+    let help = "Two solvers side by side: same start, same drag, each with its own settings. Begins again \
+                from rest.";
+    if ui.toggle_value(&mut on, "A | B").on_hover_text(help).changed() {
+        actions.push(Action::Compare(on.then(Vec::new)));
+    }
+    let mut ghost = session.choices().ghost;
+    let help = "The exact solution as a ghost, for small meshes. Begins again from rest.";
+    if ui.toggle_value(&mut ghost, "true solution").on_hover_text(help).changed() {
+        actions.push(Action::Ghost(ghost));
+    }
+}
+
+/// The line below: what time it is, and what a frame costs.
+pub fn show_status(ui: &mut Ui, clock: &Clock, stage: &Stage, frame: &Frame) {
+    let dt = stage.scene.time.frame;
+    let real = clock.rate * dt;
+    ui.label(format!("t = {:.2} s", frame.time));
+    ui.separator();
+    let names = ["A", "B", "true"];
+    for (number, lane) in frame.lanes.iter().enumerate() {
+        let is_ghost = stage.has_ghost && number + 1 == frame.lanes.len();
+        let name = match (frame.lanes.len(), is_ghost) {
+            (1, _) => "",
+            (_, true) => names[2],
+            _ => names[number.min(1)],
+        };
+        let text = format!("{name} {:.1} ms per frame of {:.1} ms", 1e3 * lane.wall, 1e3 * dt);
+        ui.label(text.trim()).on_hover_text(format!(
+            "Substeps take {:.2} ms each. Energy: elastic {:.3e} J, kinetic {:.3e} J. Substeps taken back by \
+             the guard so far: {}.",
+            1e3 * lane.wall / f64::from(stage.scene.solver.substeps),
+            lane.energy.elastic,
+            lane.energy.kinetic,
+            lane.rejected,
+        ));
+        ui.weak(format!("residual {:.1e}", lane.residual))
+            .on_hover_text("Unbalanced forces over loads; at rest, how well the equations hold");
+        ui.separator();
+    }
+    if clock.playing {
+        ui.label(format!("{real:.2} x real time"));
+        ui.weak(format!("{:.0} frames/s", clock.rate));
+    } else {
+        ui.label("paused");
+    }
+}

@@ -1,0 +1,85 @@
+//! How the tissue is shown, and how one takes hold of it.
+
+use eframe::egui::{self, Slider, Ui};
+
+use super::{Action, section};
+use crate::engine::Coloring;
+use crate::help::Request;
+use crate::holds::Holds;
+use crate::preferences::Preferences;
+use crate::viewport::newtons;
+
+const COLORINGS: [(Coloring, &str, &str); 4] = [
+    (Coloring::Plain, "tissue", "The tissue's own colour"),
+    (Coloring::Displacement, "displacement", "How far each point is from where it is at rest"),
+    (Coloring::Strain, "strain", "By how much the most stretched direction is longer than at rest"),
+    (Coloring::Stress, "stress", "Von Mises stress"),
+];
+
+/// Colours, marks.
+pub fn show(ui: &mut Ui, preferences: &mut Preferences, actions: &mut Vec<Action>) {
+    section(ui, "View", true, |ui| {
+        ui.horizontal_wrapped(|ui| {
+            for (coloring, name, help) in COLORINGS {
+                ui.selectable_value(&mut preferences.coloring, coloring, name).on_hover_text(help);
+            }
+        });
+        ui.horizontal(|ui| {
+            ui.checkbox(&mut preferences.fixings, "fixings")
+                .on_hover_text("Mark vertices that are held in place");
+            ui.checkbox(&mut preferences.wireframe, "wireframe")
+                .on_hover_text("Draw the surface's triangles");
+            ui.checkbox(&mut preferences.shadow, "shadow");
+            if ui.button("whole").on_hover_text("Show everything (F)").clicked() {
+                actions.push(Action::Ask(Request::Frame));
+            }
+        });
+    });
+}
+
+/// The hand, and what it holds.
+pub fn show_grip(
+    ui: &mut Ui,
+    preferences: &mut Preferences,
+    holds: &Holds,
+    actions: &mut Vec<Action>,
+) {
+    section(ui, "Hand", true, |ui| {
+        let grip = &mut preferences.grip;
+        ui.horizontal(|ui| {
+            let name = ui.label("grip");
+            ui.add(Slider::new(&mut grip.count, 1..=60).suffix(" vertices"))
+                .labelled_by(name.id)
+                .on_hover_text("How many vertices the next press takes hold of");
+        });
+        ui.horizontal(|ui| {
+            let name = ui.label("spring");
+            let slider = Slider::new(&mut grip.stiffness, 10.0..=5000.0)
+                .logarithmic(true)
+                .max_decimals(0)
+                .suffix(" N/m");
+            ui.add_enabled(!grip.rigid, slider).labelled_by(name.id).on_hover_text(
+                "Stiffness of the spring between hand and tissue, all vertices together",
+            );
+        });
+        ui.horizontal(|ui| {
+            ui.checkbox(&mut grip.rigid, "rigid").on_hover_text("Hold without a spring");
+            ui.checkbox(&mut grip.keep, "keep")
+                .on_hover_text("Hold on when the button is released, as with Shift");
+        });
+        for (number, held) in holds.list().iter().enumerate() {
+            ui.horizontal(|ui| {
+                let force = held.curve.back().map_or(f64::NAN, |(_, forces)| forces[0]);
+                ui.label(format!("point {}", number + 1));
+                ui.strong(if force.is_nan() { "...".to_owned() } else { newtons(force) });
+                ui.weak(format!("{:.0} mm away", 1e3 * held.translation.length()));
+                if ui.button("let go").clicked() {
+                    actions.push(Action::LetGo(held.id));
+                }
+            });
+        }
+        if holds.list().is_empty() {
+            ui.label(egui::RichText::new("Press on the tissue and pull.").weak().italics());
+        }
+    });
+}

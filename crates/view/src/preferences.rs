@@ -1,0 +1,38 @@
+//! What the window remembers from one time to the next.
+
+use crate::engine::Coloring;
+use crate::holds::Grip;
+
+/// How things are shown and how one takes hold; no part of a scene.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct Preferences {
+    /// What the tissue's colour shows.
+    pub coloring: Coloring,
+    /// Whether the surface's triangles are drawn.
+    pub wireframe: bool,
+    /// Whether fixed vertices are marked.
+    pub fixings: bool,
+    /// Whether tissue throws a shadow.
+    pub shadow: bool,
+    /// How one takes hold.
+    pub grip: Grip,
+    /// Whether the panel of settings is open.
+    pub settings_open: bool,
+    /// Whether the curve of forces is open.
+    pub curve_open: bool,
+}
+
+impl Default for Preferences {
+    fn default() -> Self {
+        Self {
+            coloring: Coloring::Plain,
+            wireframe: false,
+            fixings: true,
+            shadow: true,
+            grip: Grip::default(),
+            settings_open: true,
+            curve_open: true,
+        }
+    }
+}

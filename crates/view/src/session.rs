@@ -1,0 +1,211 @@
+//! What is open and what is chosen: from choices to what the simulations are asked for.
+
+use viscera::scene::Scene;
+
+use crate::choices::{Choices, History, Settings, Side, difference};
+use crate::document::Document;
+use crate::engine::{Command, Plan};
+
+/// A scene with its choices.
+#[derive(Debug)]
+pub struct Session {
+    document: Document,
+    choices: Choices,
+    history: History,
+    /// One for each simulation, as chosen: the first, the second, the exact one.
+    scenes: Vec<Scene>,
+    generation: u64,
+}
+
+impl Session {
+    /// Opens a scene with settings of the command line.
+    pub fn new(document: Document, shared: Settings) -> Result<Self, String> {
+        let choices = Choices { shared, ..Choices::default() };
+        let scenes = scenes_of(&document, &choices)?;
+        Ok(Self { document, choices, history: History::default(), scenes, generation: 0 })
+    }
+
+    /// The scene file.
+    pub fn document(&self) -> &Document {
+        &self.document
+    }
+
+    /// What is chosen.
+    pub fn choices(&self) -> &Choices {
+        &self.choices
+    }
+
+    /// What can be taken back.
+    pub fn history(&self) -> &History {
+        &self.history
+    }
+
+    /// The scene of a side as chosen.
+    pub fn scene(&self, side: Side) -> &Scene {
+        match side {
+            Side::Second if self.is_comparison() => &self.scenes[1],
+            _ => &self.scenes[0],
+        }
+    }
+
+    /// Whether two solvers are compared.
+    pub fn is_comparison(&self) -> bool {
+        self.choices.second.is_some()
+    }
+
+    /// Builds everything anew. Numbers of frames tell this from what was before.
+    pub fn load(&mut self) -> Command {
+        self.generation += 1;
+        Command::Load(Box::new(Plan {
+            generation: self.generation,
+            scenes: self.scenes.clone(),
+            ends_with_ghost: self.choices.ghost,
+            library: self.document.library(),
+        }))
+    }
+
+    /// Another scene file, with the same generation counter.
+    pub fn open(&mut self, document: Document) -> Result<Command, String> {
+        let opened = Self::new(document, Settings::new())?;
+        *self = Self { generation: self.generation, ..opened };
+        Ok(self.load())
+    }
+
+    /// Changes settings. On an error, which the library words, nothing has changed.
+    pub fn choose(
+        &mut self,
+        side: Side,
+        settings: &[(String, String)],
+        gesture: bool,
+    ) -> Result<Vec<Command>, String> {
+        let mut next = self.choices.clone();
+        for (key, value) in settings {
+            next = next.with(side, key, value);
+        }
+        let key = settings.first().map_or("", |(key, _)| key.as_str()).to_owned();
+        self.change_to(next, &key, gesture)
+    }
+
+    /// Begins or ends a comparison, or the exact solution beside it.
+    pub fn compare(
+        &mut self,
+        second: Option<Settings>,
+        ghost: bool,
+    ) -> Result<Vec<Command>, String> {
+        let next = Choices { second, ghost, ..self.choices.clone() };
+        self.change_to(next, "compare", false)
+    }
+
+    /// Takes the last change back.
+    pub fn undo(&mut self) -> Result<Vec<Command>, String> {
+        match self.history.undo(&self.choices) {
+            Some(before) => self.adopt(before),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// Makes it again.
+    pub fn redo(&mut self) -> Result<Vec<Command>, String> {
+        match self.history.redo(&self.choices) {
+            Some(after) => self.adopt(after),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    fn change_to(
+        &mut self,
+        next: Choices,
+        key: &str,
+        gesture: bool,
+    ) -> Result<Vec<Command>, String> {
+        if next == self.choices {
+            return Ok(Vec::new());
+        }
+        let before = self.choices.clone();
+        let commands = self.adopt(next)?;
+        self.history.record(&before, key, gesture);
+        Ok(commands)
+    }
+
+    /// What takes the running simulations to other choices.
+    fn adopt(&mut self, next: Choices) -> Result<Vec<Command>, String> {
+        let scenes = scenes_of(&self.document, &next)?;
+        let same_lanes = next.second.is_some() == self.choices.second.is_some()
+            && next.ghost == self.choices.ghost;
+        let changes: Option<Vec<Settings>> =
+            self.scenes.iter().zip(&scenes).map(|(old, new)| difference(old, new)).collect();
+        self.choices = next;
+        let changes = changes.filter(|_| same_lanes);
+        self.scenes = scenes;
+        let Some(changes) = changes else { return Ok(vec![self.load()]) };
+        let lanes = changes.into_iter().zip(&self.scenes).enumerate();
+        let changed = lanes.filter(|(_, (settings, _))| !settings.is_empty());
+        Ok(changed
+            .map(|(lane, (settings, scene))| {
+                Command::Change(lane, settings, Box::new(scene.clone()))
+            })
+            .collect())
+    }
+}
+
+/// One scene for each simulation that the choices ask for.
+fn scenes_of(document: &Document, choices: &Choices) -> Result<Vec<Scene>, String> {
+    let read = |settings: &Settings| document.scene(settings).map_err(|error| error.to_string());
+    let mut scenes = vec![read(&choices.of(Side::First))?];
+    if choices.second.is_some() {
+        scenes.push(read(&choices.of(Side::Second))?);
+    }
+    if choices.ghost {
+        scenes.push(read(&choices.exact())?);
+    }
+    Ok(scenes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn session() -> Session {
+        let document = Document::open(Path::new("grab"), None).expect("a built-in scene");
+        Session::new(document, Settings::new()).expect("a legal scene")
+    }
+
+    fn pair(key: &str, value: &str) -> Vec<(String, String)> {
+        vec![(key.to_owned(), value.to_owned())]
+    }
+
+    #[test]
+    fn a_wrong_value_changes_nothing_and_says_why() {
+        let mut session = session();
+        let error = session
+            .choose(Side::First, &pair("solver.iterations", "0"), false)
+            .expect_err("no sweep at all");
+        assert!(error.contains("solver.iterations") || error.contains("iterations"), "{error}");
+        assert_eq!(*session.choices(), Choices::default());
+        assert!(!session.history().can_undo());
+    }
+
+    #[test]
+    fn changes_go_to_the_simulations_they_concern_and_undo_takes_them_back() {
+        let mut session = session();
+        let loaded = session.compare(Some(pair("solver.iterations", "40")), false);
+        assert!(matches!(loaded.expect("a comparison")[..], [Command::Load(_)]));
+        let mut change = |value| {
+            let commands = session.choose(Side::First, &pair("solver.iterations", value), false);
+            let lanes =
+                commands.expect("a legal change").into_iter().map(|command| match command {
+                    Command::Change(lane, settings, _) => (lane, settings),
+                    other => panic!("{other:?}"),
+                });
+            lanes.collect::<Vec<_>>()
+        };
+        // The second solver has its own number of iterations.
+        assert_eq!(change("7"), [(0, pair("solver.iterations", "7"))]);
+        assert!(change("7").is_empty());
+        let undone = session.undo().expect("the change before");
+        let was = session.scene(Side::First).solver.iterations;
+        assert!(was != 7 && undone.len() == 1);
+        assert_eq!(session.scene(Side::Second).solver.iterations, 40);
+    }
+}

@@ -1,0 +1,347 @@
+//! The tissue in the window: looking around it, pressing on it, pulling it.
+
+mod lens;
+mod overlay;
+mod pick;
+mod picture;
+
+pub use lens::Lens;
+pub use overlay::{Legend, newtons, on_screen};
+pub use pick::Pick;
+pub use picture::{Gpu, Picture, Scenery, Tissue};
+
+use eframe::egui::{self, PointerButton, Pos2, Rect, Sense, Ui, vec2};
+use std::sync::Arc;
+use viscera::scalar::Vec3;
+use viscera_picture::{Image, ImageSize};
+use viscera_render::Orbit;
+
+use crate::engine::{Coloring, Command, Frame, Stage};
+use crate::holds::{Grip, Holds};
+use crate::preferences::Preferences;
+use pick::{meet_plane, pick};
+
+/// A press so near to where something is held takes that up again [points].
+const NEAR: f32 = 14.0;
+
+/// Angle that the view turns by for a drag across its height [degrees].
+const TURN: f64 = 200.0;
+
+/// One picture for each solver, all with one camera.
+pub struct Viewport {
+    gpu: Gpu,
+    stage: Option<Arc<Stage>>,
+    orbit: Orbit,
+    extent: f64,
+    tissues: Vec<Tissue>,
+    pictures: Vec<Picture>,
+    fixed: Vec<u32>,
+    legend: Legend,
+    /// What the pictures show.
+    drawn: Option<Drawn>,
+}
+
+/// Two equal ones give the same pictures.
+#[derive(Clone, PartialEq)]
+struct Drawn {
+    frame: (u64, u64),
+    orbit: Orbit,
+    sizes: Vec<ImageSize>,
+    coloring: Coloring,
+    range: Option<[f32; 2]>,
+    marks: [bool; 3],
+    holds: usize,
+}
+
+impl Viewport {
+    /// An empty one.
+    pub fn new(gpu: Gpu) -> Self {
+        Self {
+            gpu,
+            stage: None,
+            orbit: Orbit::framing(&[]),
+            extent: 0.1,
+            tissues: Vec::new(),
+            pictures: Vec::new(),
+            fixed: Vec::new(),
+            legend: Legend::default(),
+            drawn: None,
+        }
+    }
+
+    /// Takes up simulations that were built. The camera stays where it is for the same bodies.
+    pub fn enter(&mut self, stage: &Arc<Stage>) -> Result<(), String> {
+        let rest = |stage: &Stage| stage.assembly.builder.positions().to_vec();
+        let known = self.stage.as_ref().is_some_and(|old| rest(old) == rest(stage));
+        self.tissues = (0..stage.lane_count)
+            .map(|_| Tissue::new(&self.gpu, stage))
+            .collect::<Result<_, _>>()?;
+        self.stage = Some(Arc::clone(stage));
+        self.fixed = stage.assembly.fixings.iter().flat_map(|p| p.vertices.clone()).collect();
+        self.drawn = None;
+        if !known {
+            self.frame_all();
+        }
+        Ok(())
+    }
+
+    /// Looks at everything from where the scene wants to be seen.
+    pub fn frame_all(&mut self) {
+        let Some(stage) = &self.stage else { return };
+        let rest = stage.assembly.builder.positions();
+        self.orbit = Orbit::framing(rest);
+        self.extent = 2.0 * self.orbit.distance * 0.24;
+        let from = stage.scene.output.view_from;
+        self.orbit.azimuth = angle(from.y, from.x);
+        self.orbit.elevation = angle(from.z, from.x.hypot(from.y)).clamp(-89.0, 89.0);
+    }
+
+    /// The camera.
+    pub fn orbit(&self) -> &Orbit {
+        &self.orbit
+    }
+
+    /// How many pictures there are side by side.
+    fn shown_lanes(&self) -> usize {
+        self.stage.as_ref().map_or(0, |stage| stage.lane_count - usize::from(stage.has_ghost))
+    }
+
+    /// A frame has come.
+    pub fn place(&mut self, frame: &Frame) -> Result<(), String> {
+        if self.stage.as_ref().is_none_or(|stage| stage.generation != frame.generation) {
+            return Ok(());
+        }
+        for (tissue, lane) in self.tissues.iter().zip(&frame.lanes) {
+            tissue.place(lane)?;
+        }
+        let shown = frame.lanes.iter().take(self.shown_lanes());
+        self.legend.follow(frame.coloring, shown.flat_map(|lane| lane.values.iter().copied()));
+        Ok(())
+    }
+
+    /// Shows everything, and says what the mouse asks for.
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        frame: Option<&Frame>,
+        holds: &mut Holds,
+        preferences: &Preferences,
+    ) -> (Vec<Command>, Option<String>) {
+        let area = ui.available_rect_before_wrap();
+        let count = self.shown_lanes().max(1);
+        let mut commands = Vec::new();
+        let width = (area.width() - 2.0 * (count as f32 - 1.0)) / count as f32;
+        let rects: Vec<Rect> = (0..count)
+            .map(|i| {
+                let left = area.left() + i as f32 * (width + 2.0);
+                Rect::from_min_size(egui::pos2(left, area.top()), vec2(width, area.height()))
+            })
+            .collect();
+        for (number, rect) in rects.iter().enumerate() {
+            let id = ui.scope_id().with(("viewport", number));
+            let response = ui.interact(*rect, id, Sense::drag());
+            let label = if count > 1 { ["view A", "view B"][number.min(1)] } else { "view" };
+            response.widget_info(|| {
+                egui::WidgetInfo::labeled(egui::Role::Canvas, ui.is_enabled(), label)
+            });
+            let lens = Lens { orbit: self.orbit, rect: *rect };
+            if let Some(frame) = frame {
+                self.handle(ui, &response, &lens, number, frame, holds, preferences, &mut commands);
+            }
+        }
+        let drawn = frame.map(|frame| self.draw(ui, frame, &rects, holds, preferences));
+        for (number, rect) in rects.iter().enumerate() {
+            let lens = Lens { orbit: self.orbit, rect: *rect };
+            self.paint(ui, &lens, number, frame, holds, preferences);
+        }
+        (commands, drawn.and_then(Result::err))
+    }
+
+    /// What the mouse does in one of the pictures.
+    #[expect(clippy::too_many_arguments, reason = "the window's state, lent for one event")]
+    fn handle(
+        &mut self,
+        ui: &Ui,
+        response: &egui::Response,
+        lens: &Lens,
+        lane: usize,
+        frame: &Frame,
+        holds: &mut Holds,
+        preferences: &Preferences,
+        commands: &mut Vec<Command>,
+    ) {
+        let modifiers = ui.input(|input| input.modifiers);
+        if let Some(pointer) = response.interact_pointer_pos() {
+            if response.drag_started_by(PointerButton::Primary) && !modifiers.command {
+                self.press(lens, lane, frame, pointer, holds, &preferences.grip, commands);
+            }
+            if let Some(plane) = holds.drag_plane() {
+                let [_, _, normal] = self.orbit.axes();
+                let (from, direction) = (self.orbit.position(), lens.ray(pointer));
+                if response.drag_delta() != vec2(0.0, 0.0)
+                    && let Some(point) = meet_plane(from, direction, plane, normal)
+                {
+                    commands.extend(holds.lead(point));
+                }
+            } else if response.dragged() {
+                self.look_around(response, lens, modifiers);
+            }
+        }
+        if response.drag_stopped() {
+            commands.extend(holds.release(preferences.grip.keep || modifiers.shift));
+        }
+        if response.contains_pointer() {
+            let (scroll, pinch) =
+                ui.input(|input| (input.smooth_scroll_delta.y, input.zoom_delta()));
+            self.orbit.zoom(f64::from((-0.0015 * scroll).exp() / pinch));
+        }
+    }
+
+    /// The left button goes down: on something held, on tissue, or beside it.
+    #[expect(clippy::too_many_arguments, reason = "the window's state, lent for one event")]
+    fn press(
+        &mut self,
+        lens: &Lens,
+        lane: usize,
+        frame: &Frame,
+        pointer: Pos2,
+        holds: &mut Holds,
+        grip: &Grip,
+        commands: &mut Vec<Command>,
+    ) {
+        let (Some(stage), Some(shown)) = (&self.stage, frame.lanes.get(lane)) else { return };
+        if stage.generation != frame.generation {
+            return;
+        }
+        let near = shown.holds.iter().find(|hold| {
+            [hold.place, hold.target]
+                .iter()
+                .any(|x| lens.place(*x).is_some_and(|place| place.distance(pointer) < NEAR))
+        });
+        match near {
+            Some(hold) => holds.resume(hold.id),
+            None => {
+                let hit = pick(stage, shown, self.orbit.position(), lens.ray(pointer));
+                commands.extend(hit.map(|hit| holds.take(&hit, grip)));
+            }
+        }
+    }
+
+    fn look_around(&mut self, response: &egui::Response, lens: &Lens, modifiers: egui::Modifiers) {
+        let moved = response.drag_delta();
+        let height = f64::from(lens.rect.height().max(1.0));
+        let [x, y] = [f64::from(moved.x) / height, f64::from(moved.y) / height];
+        if modifiers.command || modifiers.shift {
+            self.orbit.pan(x, -y);
+        } else {
+            self.orbit.turn(-TURN * x, TURN * y);
+        }
+    }
+
+    /// Draws what has changed since it was last drawn.
+    fn draw(
+        &mut self,
+        ui: &Ui,
+        frame: &Frame,
+        rects: &[Rect],
+        holds: &Holds,
+        preferences: &Preferences,
+    ) -> Result<(), String> {
+        let Some(stage) = &self.stage else { return Ok(()) };
+        if frame.generation != stage.generation {
+            return Ok(());
+        }
+        let scale = ui.pixels_per_point();
+        let sizes: Vec<ImageSize> = rects
+            .iter()
+            .filter_map(|rect| {
+                let side = |points: f32| ((points * scale).round() as u32).clamp(16, 4096);
+                ImageSize::new(side(rect.width()), side(rect.height())).ok()
+            })
+            .collect();
+        let wanted = Drawn {
+            frame: (frame.generation, frame.number),
+            orbit: self.orbit,
+            sizes: sizes.clone(),
+            coloring: frame.coloring,
+            range: self.legend.range(),
+            marks: [preferences.wireframe, preferences.shadow, preferences.fixings],
+            holds: holds.list().len(),
+        };
+        if self.drawn.as_ref() == Some(&wanted) {
+            return Ok(());
+        }
+        while self.pictures.len() < sizes.len() {
+            self.pictures.push(Picture::new(&self.gpu));
+        }
+        let ghost = stage.has_ghost.then(|| self.tissues.last()).flatten();
+        for (number, size) in sizes.iter().enumerate() {
+            let (Some(tissue), Some(lane)) = (self.tissues.get(number), frame.lanes.get(number))
+            else {
+                continue;
+            };
+            let at = |&v: &u32| lane.positions.get(v as usize).map(|x| x.cast::<f64>());
+            let fixed: Vec<Vec3<f64>> = match preferences.fixings {
+                true => self.fixed.iter().filter_map(at).collect(),
+                false => Vec::new(),
+            };
+            let pulls: Vec<_> = lane.holds.iter().map(|hold| [hold.place, hold.target]).collect();
+            let scenery = Scenery {
+                orbit: self.orbit,
+                tissue,
+                ghost,
+                range: self.legend.range(),
+                wireframe: preferences.wireframe,
+                shadow: preferences.shadow,
+                fixed: &fixed,
+                pulls: &pulls,
+                extent: self.extent,
+            };
+            self.pictures[number].draw(&self.gpu, *size, &scenery)?;
+        }
+        self.drawn = Some(wanted);
+        Ok(())
+    }
+
+    fn paint(
+        &self,
+        ui: &Ui,
+        lens: &Lens,
+        number: usize,
+        frame: Option<&Frame>,
+        holds: &Holds,
+        preferences: &Preferences,
+    ) {
+        let painter = ui.painter_at(lens.rect);
+        let Some((texture, frame)) =
+            self.pictures.get(number).and_then(Picture::texture).zip(frame)
+        else {
+            painter.rect_filled(lens.rect, 0.0, ui.visuals().extreme_bg_color);
+            return;
+        };
+        let whole = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+        painter.image(texture, lens.rect, whole, egui::Color32::WHITE);
+        let Some(lane) = frame.lanes.get(number) else { return };
+        overlay::forces(&painter, lens, lane, holds);
+        if preferences.coloring != Coloring::Plain {
+            self.legend.paint(&painter, lens.rect);
+        }
+        if self.shown_lanes() > 1 {
+            overlay::title(&painter, lens.rect, ["A", "B"][number.min(1)]);
+        }
+    }
+
+    /// The pictures as they are shown; waits for them.
+    pub fn images(&self) -> Result<Vec<Image>, String> {
+        self.pictures
+            .iter()
+            .take(self.shown_lanes())
+            .map(|picture| picture.read(&self.gpu))
+            .collect()
+    }
+}
+
+/// The angle of a point around the origin [degrees].
+fn angle(y: f64, x: f64) -> f64 {
+    y.atan2(x).to_degrees()
+}

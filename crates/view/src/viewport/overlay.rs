@@ -1,0 +1,205 @@
+//! What is written over a picture: the legend of its colours, forces in newtons, its title.
+
+use eframe::egui::{
+    Align2, Color32, CornerRadius, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2,
+};
+use viscera::units::Dimension;
+use viscera_picture::{Color, map_color};
+
+use super::lens::Lens;
+use crate::engine::{Coloring, Lane};
+use crate::holds::Holds;
+
+/// A colour of the renderer's as the window has it.
+pub fn on_screen(color: Color) -> Color32 {
+    let [r, g, b] = color.to_srgb();
+    Color32::from_rgb(r, g, b)
+}
+
+/// Which values the colours stand for. Its upper end is a round number, and calm: it grows with the values,
+/// and shrinks only where they have become much smaller.
+#[derive(Clone, Debug, Default)]
+pub struct Legend {
+    coloring: Coloring,
+    /// SI; nothing where there are no values.
+    high: Option<f32>,
+}
+
+/// Values may fall to this share of the scale before it shrinks. Larger makes the colours of a swinging
+/// body flicker.
+const LOWEST: f32 = 0.2;
+
+/// The least that colours tell apart: a tenth of a millimetre, a thousandth, a pascal. Round-off would show
+/// as colours otherwise.
+fn least(coloring: Coloring) -> f32 {
+    match coloring {
+        Coloring::Plain | Coloring::Stress => 1.0,
+        Coloring::Displacement => 1e-4,
+        Coloring::Strain => 1e-3,
+    }
+}
+
+impl Legend {
+    /// Follows the values of a frame.
+    pub fn follow(&mut self, coloring: Coloring, values: impl Iterator<Item = f32>) {
+        if coloring != self.coloring {
+            *self = Self { coloring, high: None };
+        }
+        let largest = values.filter(|value| value.is_finite()).reduce(f32::max);
+        let Some(largest) = largest else {
+            self.high = None;
+            return;
+        };
+        let largest = largest.max(least(coloring));
+        let fits = self.high.is_some_and(|high| largest <= high && largest >= LOWEST * high);
+        if !fits {
+            self.high = Some(round_up(largest));
+        }
+    }
+
+    /// The values of the first and the last colour; nothing for plain tissue.
+    pub fn range(&self) -> Option<[f32; 2]> {
+        self.high.map(|high| [0.0, high])
+    }
+
+    /// A value as the legend writes it.
+    fn text(&self, value: f32) -> String {
+        let value = f64::from(value);
+        match self.coloring {
+            Coloring::Plain => String::new(),
+            Coloring::Displacement => Dimension::Length.format(value),
+            Coloring::Strain => format!("{} %", viscera::units::format_number(100.0 * value)),
+            Coloring::Stress => Dimension::Pressure.format(value),
+        }
+    }
+
+    fn title(&self) -> &'static str {
+        match self.coloring {
+            Coloring::Plain => "",
+            Coloring::Displacement => "displacement",
+            Coloring::Strain => "largest strain",
+            Coloring::Stress => "von Mises stress",
+        }
+    }
+
+    /// Writes it into the right upper corner.
+    pub fn paint(&self, painter: &Painter, area: Rect) {
+        let Some(high) = self.high else { return };
+        const SIZE: [f32; 2] = [14.0, 150.0];
+        let corner = area.right_top() + vec2(-86.0, 34.0);
+        let bar = Rect::from_min_size(corner, SIZE.into());
+        let back =
+            Rect::from_min_max(area.right_top() + vec2(-136.0, 8.0), bar.max + vec2(80.0, 14.0));
+        painter.rect_filled(back, CornerRadius::same(6), Color32::from_white_alpha(190));
+        let mut mesh = Mesh::default();
+        const STEPS: u32 = 48;
+        for step in 0..=STEPS {
+            let share = step as f32 / STEPS as f32;
+            let y = bar.bottom() - share * bar.height();
+            let color = on_screen(map_color(share));
+            mesh.colored_vertex(pos2(bar.left(), y), color);
+            mesh.colored_vertex(pos2(bar.right(), y), color);
+            if step > 0 {
+                let v = 2 * step;
+                mesh.add_triangle(v - 2, v - 1, v);
+                mesh.add_triangle(v - 1, v, v + 1);
+            }
+        }
+        painter.add(Shape::mesh(mesh));
+        let font = FontId::proportional(12.0);
+        let ink = Color32::from_rgb(30, 34, 42);
+        let above = pos2(back.center().x, back.top() + 13.0);
+        painter.text(above, Align2::CENTER_CENTER, self.title(), font.clone(), ink);
+        for share in [0.0, 0.5, 1.0] {
+            let y = bar.bottom() - share * bar.height();
+            painter.line_segment(
+                [pos2(bar.right(), y), pos2(bar.right() + 4.0, y)],
+                Stroke::new(1.0, ink),
+            );
+            let place = pos2(bar.right() + 7.0, y);
+            painter.text(place, Align2::LEFT_CENTER, self.text(share * high), font.clone(), ink);
+        }
+    }
+}
+
+/// The next larger of 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8 times a power of ten.
+fn round_up(value: f32) -> f32 {
+    let power = 10f64.powf(f64::from(value).log10().floor());
+    let steps = [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
+    let step = steps.into_iter().find(|step| f64::from(value) <= step * power * (1.0 + 1e-6));
+    (step.unwrap_or(10.0) * power) as f32
+}
+
+/// A force as it is written everywhere: "1.25 N".
+pub fn newtons(force: f64) -> String {
+    match force {
+        force if force < 0.1 => format!("{:.1} mN", 1e3 * force),
+        force if force < 100.0 => format!("{force:.2} N"),
+        force => format!("{force:.0} N"),
+    }
+}
+
+/// Arrows from what is held to where it is pulled, and the forces beside them.
+pub fn forces(painter: &Painter, lens: &Lens, lane: &Lane, holds: &Holds) {
+    let pulled = on_screen(Color::PULLED);
+    for hold in &lane.holds {
+        if holds.list().iter().all(|held| held.id != hold.id) {
+            continue;
+        }
+        let (Some(place), Some(target)) = (lens.place(hold.place), lens.place(hold.target)) else {
+            continue;
+        };
+        let way = target - place;
+        if way.length() > 6.0 {
+            painter.arrow(place, way, Stroke::new(2.5, pulled));
+        }
+        painter.circle_filled(place, 4.0, pulled);
+        painter.circle_stroke(place, 4.0, Stroke::new(1.0, Color32::WHITE));
+        let side =
+            if way.x < 0.0 { (Align2::RIGHT_CENTER, -12.0) } else { (Align2::LEFT_CENTER, 12.0) };
+        label(painter, target + vec2(side.1, -10.0), side.0, &newtons(hold.force.length()), 15.0);
+    }
+}
+
+/// Names one of two pictures.
+pub fn title(painter: &Painter, area: Rect, text: &str) {
+    label(painter, area.left_top() + vec2(14.0, 20.0), Align2::LEFT_CENTER, text, 20.0);
+}
+
+/// Dark letters on a light ground, which stand out from tissue and from the background.
+fn label(painter: &Painter, place: Pos2, anchor: Align2, text: &str, size: f32) {
+    let ink = Color32::from_rgb(24, 28, 36);
+    let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(size), ink);
+    let rect = anchor.anchor_size(place, galley.size());
+    painter.rect_filled(
+        rect.expand2(vec2(5.0, 2.0)),
+        CornerRadius::same(4),
+        Color32::from_white_alpha(205),
+    );
+    painter.galley(rect.min, galley, ink);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scale_ends_at_a_round_number_and_stays_calm() {
+        assert_eq!([0.011, 0.1, 730.0, 9.5].map(round_up), [0.012, 0.1, 800.0, 10.0]);
+        let mut legend = Legend::default();
+        let mut after = |largest: f32| {
+            legend.follow(Coloring::Displacement, [0.0, largest, f32::NAN].into_iter());
+            legend.range().map(|range| range[1])
+        };
+        assert_eq!(after(0.011), Some(0.012));
+        assert_eq!(after(0.004), Some(0.012));
+        assert_eq!(after(0.013), Some(0.015));
+        assert_eq!(after(0.002), Some(0.002));
+        assert_eq!(after(1e-9), Some(1e-4));
+    }
+
+    #[test]
+    fn forces_are_read_at_a_glance() {
+        assert_eq!([0.0123, 1.254, 120.4].map(newtons), ["12.3 mN", "1.25 N", "120 N"]);
+    }
+}

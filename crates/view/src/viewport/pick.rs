@@ -1,0 +1,103 @@
+//! What lies under the pointer.
+
+use viscera::scalar::Vec3;
+
+use crate::engine::{Lane, Stage};
+
+/// A point on the tissue.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pick {
+    /// Position of the body in the scene.
+    pub body: usize,
+    /// Where it is [m].
+    pub point: Vec3<f64>,
+    /// Where it is at rest [m].
+    pub rest: Vec3<f64>,
+}
+
+/// The first point of the surfaces that a ray meets, as they are in a frame. `direction` has length 1.
+pub fn pick(stage: &Stage, lane: &Lane, from: Vec3<f64>, direction: Vec3<f64>) -> Option<Pick> {
+    let mut nearest = f64::INFINITY;
+    let mut found = None;
+    for (number, body) in stage.assembly.bodies.iter().enumerate() {
+        let tissue = lane.positions.get(body.vertices.clone())?;
+        let mut surface = vec![Vec3::<f32>::ZERO; body.surface.vertices.len()];
+        body.embedding.apply(tissue, &mut surface).ok()?;
+        for triangle in &body.surface.triangles {
+            let corners = triangle.map(|v| surface[v as usize].cast::<f64>());
+            let Some((distance, weights)) = meet(corners, from, direction) else { continue };
+            if distance < nearest {
+                nearest = distance;
+                let rest = triangle.map(|v| body.surface.vertices[v as usize]);
+                found = Some(Pick {
+                    body: number,
+                    point: from + direction * distance,
+                    rest: rest[0] * weights[0] + rest[1] * weights[1] + rest[2] * weights[2],
+                });
+            }
+        }
+    }
+    found
+}
+
+/// Distance [m] along a ray to a triangle, from whichever side, and the weights of its corners there.
+///
+/// ```text
+/// from + t d = (1 - u - v) a + u b + v c,  solved by Cramer's rule
+/// ```
+fn meet(corners: [Vec3<f64>; 3], from: Vec3<f64>, d: Vec3<f64>) -> Option<(f64, [f64; 3])> {
+    let [a, b, c] = corners;
+    let (ab, ac) = (b - a, c - a);
+    let p = d.cross(ac);
+    let determinant = ab.dot(p);
+    // Seen from its edge it covers nothing.
+    if determinant == 0.0 || !determinant.is_finite() {
+        return None;
+    }
+    let start = from - a;
+    let u = start.dot(p) / determinant;
+    let q = start.cross(ab);
+    let v = d.dot(q) / determinant;
+    let t = ac.dot(q) / determinant;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some((t, [1.0 - u - v, u, v]))
+}
+
+/// Where a ray meets the plane through a point, parallel to the picture.
+pub fn meet_plane(
+    from: Vec3<f64>,
+    direction: Vec3<f64>,
+    point: Vec3<f64>,
+    normal: Vec3<f64>,
+) -> Option<Vec3<f64>> {
+    let distance = (point - from).dot(normal) / direction.dot(normal);
+    (distance > 0.0 && distance.is_finite()).then(|| from + direction * distance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viscera::scalar::vec3;
+
+    #[test]
+    fn a_ray_meets_a_triangle_inside_it_and_in_front_alone() {
+        let corners = [vec3(0.0, 0.0, 0.0), vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0)];
+        let down = vec3(0.0, 0.0, -1.0);
+        let (distance, weights) = meet(corners, vec3(0.25, 0.5, 2.0), down).expect("a hit");
+        assert_eq!((distance, weights), (2.0, [0.25, 0.25, 0.5]));
+        assert_eq!(meet(corners, vec3(0.6, 0.6, 2.0), down), None);
+        assert_eq!(meet(corners, vec3(0.25, 0.5, -2.0), down), None);
+        // From behind: a surface that has turned inside out can still be taken hold of.
+        assert!(meet(corners, vec3(0.25, 0.5, -2.0), -down).is_some());
+        assert_eq!(meet(corners, vec3(-1.0, 0.5, 0.0), vec3(1.0, 0.0, 0.0)), None);
+    }
+
+    #[test]
+    fn a_drag_stays_in_the_plane_of_the_picture() {
+        let from = vec3(0.0, -2.0, 0.0);
+        let towards = vec3(0.6, 0.8, 0.0);
+        let normal = vec3(0.0, -1.0, 0.0);
+        let met = meet_plane(from, towards, vec3(5.0, 0.0, 7.0), normal).expect("in front");
+        assert!((met - vec3(1.5, 0.0, 0.0)).length() < 1e-12);
+        assert_eq!(meet_plane(from, -towards, vec3(5.0, 0.0, 7.0), normal), None);
+    }
+}
