@@ -274,14 +274,12 @@ impl App {
                 let chosen = self.session.choose(side, &settings, gesture);
                 self.carry_out(chosen);
             }
-            Action::Compare(second) => {
-                let ghost = self.session.choices().ghost;
-                let chosen = self.session.compare(second, ghost);
+            Action::Compare(on) => {
+                let chosen = self.session.compare(on, self.session.choices().ghost);
                 self.carry_out(chosen);
             }
             Action::Ghost(ghost) => {
-                let second = self.session.choices().second.clone();
-                let chosen = self.session.compare(second, ghost);
+                let chosen = self.session.compare(self.session.is_comparison(), ghost);
                 self.carry_out(chosen);
             }
             Action::Speed(speed) => {

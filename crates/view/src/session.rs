@@ -86,12 +86,14 @@ impl Session {
         self.change_to(next, &key, gesture)
     }
 
-    /// Begins or ends a comparison, or the exact solution beside it.
-    pub fn compare(
-        &mut self,
-        second: Option<Settings>,
-        ghost: bool,
-    ) -> Result<Vec<Command>, String> {
+    /// Begins or ends a comparison, or the exact solution beside it. The second solver begins as the first
+    /// is, and has settings of its own from then on.
+    pub fn compare(&mut self, on: bool, ghost: bool) -> Result<Vec<Command>, String> {
+        let copy = || {
+            let values = self.scene(Side::First).solver.values();
+            values.into_iter().map(|(key, value)| (format!("solver.{key}"), value)).collect()
+        };
+        let second = on.then(|| self.choices.second.clone().unwrap_or_else(copy));
         let next = Choices { second, ghost, ..self.choices.clone() };
         self.change_to(next, "compare", false)
     }
@@ -189,8 +191,9 @@ mod tests {
     #[test]
     fn changes_go_to_the_simulations_they_concern_and_undo_takes_them_back() {
         let mut session = session();
-        let loaded = session.compare(Some(pair("solver.iterations", "40")), false);
+        let loaded = session.compare(true, false);
         assert!(matches!(loaded.expect("a comparison")[..], [Command::Load(_)]));
+        let was = session.scene(Side::First).solver.iterations;
         let mut change = |value| {
             let commands = session.choose(Side::First, &pair("solver.iterations", value), false);
             let lanes =
@@ -204,8 +207,8 @@ mod tests {
         assert_eq!(change("7"), [(0, pair("solver.iterations", "7"))]);
         assert!(change("7").is_empty());
         let undone = session.undo().expect("the change before");
-        let was = session.scene(Side::First).solver.iterations;
+        assert_eq!(session.scene(Side::First).solver.iterations, was);
+        assert_eq!(session.scene(Side::Second).solver.iterations, was);
         assert!(was != 7 && undone.len() == 1);
-        assert_eq!(session.scene(Side::Second).solver.iterations, 40);
     }
 }

@@ -47,12 +47,32 @@ pub struct Lane {
     pub holds: Vec<Hold>,
     /// Wall time of the last frame [s].
     pub wall: f64,
+    /// What is measured now and then.
+    pub measures: Measures,
+}
+
+/// What takes a while to measure, and is measured ten times a second unless colours need it more often.
+#[derive(Clone, Debug, Default)]
+pub struct Measures {
     /// Unbalanced forces over loads, see [`viscera::simulation::FrameReport::relative_residual`].
     pub residual: f64,
     /// Energies [J].
     pub energy: Energies,
     /// Substeps that the step guard has taken back so far.
     pub rejected: u64,
+    /// What the scene itself moves and pulls.
+    pub tools: Vec<Tool>,
+}
+
+/// Something of the scene's that moves or pulls tissue.
+#[derive(Clone, Debug)]
+pub struct Tool {
+    /// Its name.
+    pub name: String,
+    /// Its vertices, the user's order.
+    pub vertices: Vec<u32>,
+    /// Force on the tissue [N].
+    pub force: Vec3<f64>,
 }
 
 /// Something held.

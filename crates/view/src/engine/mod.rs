@@ -7,7 +7,7 @@ mod simulation;
 mod stage;
 mod worker;
 
-pub use frame::{Coloring, Frame, Hold, HoldId, Lane, Slot};
+pub use frame::{Coloring, Frame, Hold, HoldId, Lane, Measures, Slot, Tool};
 pub use stage::{Plan, Stage};
 
 use std::sync::Arc;

@@ -6,13 +6,13 @@ use viscera::model::{Model, ModelBuilder, ModelError};
 use viscera::scalar::{Real, Vec3};
 use viscera::scene::{Scene, Selector};
 use viscera::settings::Precision;
-use viscera::simulation::{Assembly, Simulation};
+use viscera::simulation::{Assembly, PatchForce, PatchKind, ResolvedPatch, Simulation};
 use viscera::solver::balance::ForceBalance;
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
 use super::color::surface_values;
-use super::frame::{Coloring, Hold, HoldId, Lane};
+use super::frame::{Coloring, Hold, HoldId, Lane, Measures, Tool};
 use crate::choices::Settings;
 
 /// What the thread does with a simulation, in either precision.
@@ -31,7 +31,9 @@ pub trait Live: Send {
     fn change(&mut self, settings: &Settings, scene: &Scene) -> Result<(), String>;
     /// Computes a frame.
     fn advance(&mut self) -> Result<(), String>;
-    /// Says what it is now.
+    /// Measures what it is now: residual, energies, stresses.
+    fn measure(&mut self);
+    /// Says what it is now, and what was measured last.
     fn tell(&mut self, coloring: Coloring, lane: &mut Lane);
 }
 
@@ -66,6 +68,7 @@ struct Running<S> {
     inputs: Inputs<S>,
     balance: ForceBalance,
     tets: Vec<TetMeasure>,
+    measures: Measures,
     held: Vec<Held>,
     frame: u64,
 }
@@ -93,12 +96,29 @@ impl<S: Real> Running<S> {
             inputs: base.inputs_at(0.0),
             balance: ForceBalance::default(),
             tets: Vec::new(),
+            measures: Measures::default(),
             held: Vec::new(),
             frame: 0,
             scene,
             model,
             base,
         })
+    }
+
+    /// Forces of what the scene itself moves and pulls.
+    fn tools(&self) -> Vec<Tool> {
+        let positions: Vec<_> = self.state.positions.iter().map(|x| x.cast()).collect();
+        let holding = &self.balance.residual;
+        let patches = self.base.patch_forces_at(self.time(), &positions, holding);
+        let assembly = self.base.assembly();
+        let vertices = assembly.motions.iter().chain(&assembly.forces);
+        let pulling = patches.into_iter().filter(|patch| patch.kind != PatchKind::Fixing);
+        let tool = |(patch, resolved): (PatchForce, &ResolvedPatch)| Tool {
+            name: patch.name,
+            vertices: resolved.vertices.clone(),
+            force: Vec3::from_f64(patch.force),
+        };
+        pulling.zip(vertices).map(tool).collect()
     }
 
     fn time(&self) -> f64 {
@@ -233,17 +253,22 @@ impl<S: Real> Live for Running<S> {
         }
     }
 
-    fn tell(&mut self, coloring: Coloring, lane: &mut Lane) {
-        lane.positions.clear();
-        lane.positions.extend(self.state.positions.iter().map(|x| x.cast::<f32>()));
+    fn measure(&mut self) {
         let balanced =
             self.solver.force_balance(&self.model, &self.state, &self.inputs, &mut self.balance);
         if balanced.is_ok() {
-            lane.residual = self.balance.relative_residual();
+            self.measures.residual = self.balance.relative_residual();
         }
         measure_tets(&self.model, &self.state.positions, &mut self.tets);
-        lane.energy = measure_energies(&self.model, &self.state, &self.inputs, &self.tets);
-        lane.rejected = self.solver.rejected_steps();
+        self.measures.energy = measure_energies(&self.model, &self.state, &self.inputs, &self.tets);
+        self.measures.rejected = self.solver.rejected_steps();
+        self.measures.tools = self.tools();
+    }
+
+    fn tell(&mut self, coloring: Coloring, lane: &mut Lane) {
+        lane.positions.clear();
+        lane.positions.extend(self.state.positions.iter().map(|x| x.cast::<f32>()));
+        lane.measures.clone_from(&self.measures);
         lane.holds.clear();
         for held in &mut self.held {
             let (mut place, mut target) = (Vec3::ZERO, Vec3::ZERO);

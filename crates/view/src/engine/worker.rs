@@ -32,6 +32,8 @@ pub struct Worker {
     coloring: Coloring,
     /// When the next frame is due.
     due: Instant,
+    /// When frames were measured last.
+    measured: Option<Instant>,
 }
 
 struct Running {
@@ -50,6 +52,9 @@ enum Next {
 
 /// How far the clock may be ahead of the simulation before it is no longer caught up with [s].
 const MOST_LATE: Duration = Duration::from_millis(100);
+
+/// How often frames are measured where nothing needs it more often.
+const MEASURED_EVERY: Duration = Duration::from_millis(100);
 
 impl Worker {
     /// A thread with nothing to do yet.
@@ -71,6 +76,7 @@ impl Worker {
             speed: 1.0,
             coloring: Coloring::default(),
             due: Instant::now(),
+            measured: None,
         }
     }
 
@@ -297,7 +303,19 @@ impl Worker {
         }
     }
 
+    /// Whether this frame is to be measured: colours need it, or the last time was long ago. What is held
+    /// rigidly has its force from there.
+    fn is_measured(&mut self) -> bool {
+        let colors = matches!(self.coloring, Coloring::Strain | Coloring::Stress);
+        let long_ago = self.measured.is_none_or(|since| since.elapsed() > MEASURED_EVERY);
+        if long_ago || !self.playing {
+            self.measured = Some(Instant::now());
+        }
+        colors || long_ago || !self.playing
+    }
+
     fn publish(&mut self) {
+        let measured = self.is_measured();
         let Some(running) = &mut self.running else { return };
         let mut frame = self.slot.blank();
         frame.generation = running.stage.generation;
@@ -308,6 +326,9 @@ impl Worker {
         for ((lane, simulation), wall) in
             frame.lanes.iter_mut().zip(&mut running.lanes).zip(&running.walls)
         {
+            if measured {
+                simulation.measure();
+            }
             simulation.tell(self.coloring, lane);
             lane.wall = *wall;
         }

@@ -9,6 +9,12 @@ use crate::viewport::on_screen;
 
 /// One curve for each point held, dashed for the second solver.
 pub fn show(ui: &mut Ui, holds: &Holds, now: f64, is_comparison: bool) {
+    if holds.list().is_empty() {
+        ui.centered_and_justified(|ui| {
+            ui.weak("Press on the tissue and pull: its force is drawn here.")
+        });
+        return;
+    }
     let colors = [
         on_screen(Color::PULLED),
         Color32::from_rgb(64, 132, 214),

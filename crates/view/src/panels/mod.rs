@@ -23,8 +23,8 @@ pub enum Action {
     Ask(Request),
     /// Settings of a solver; true while a slider is being dragged.
     Choose(Side, Settings, bool),
-    /// Two solvers side by side: what the second differs in.
-    Compare(Option<Settings>),
+    /// Two solvers side by side, or one.
+    Compare(bool),
     /// The exact solution as a ghost.
     Ghost(bool),
     /// Simulated seconds per second of the clock.

@@ -41,17 +41,17 @@ pub fn show_bar(
                 actions.push(Action::Ask(request));
             }
         };
-        let play = if clock.playing { "⏸ Pause" } else { "▶ Run" };
+        let play = if clock.playing { "Pause" } else { "Run" };
         ask(ui, play, "Run or pause (space)", true, Request::PlayPause);
-        ask(ui, "⏭ Step", "One frame (.)", true, Request::Step);
-        ask(ui, "⏮ Reset", "Begin again from rest (R)", true, Request::Reset);
+        ask(ui, "Step", "One frame (.)", true, Request::Step);
+        ask(ui, "Reset", "Begin again from rest (R)", true, Request::Reset);
         ui.separator();
         let history = session.history();
-        ask(ui, "⟲ Undo", "Ctrl+Z", history.can_undo(), Request::Undo);
-        ask(ui, "⟳ Redo", "Ctrl+Y", history.can_redo(), Request::Redo);
+        ask(ui, "Undo", "Ctrl+Z", history.can_undo(), Request::Undo);
+        ask(ui, "Redo", "Ctrl+Y", history.can_redo(), Request::Redo);
         ui.separator();
         ask(ui, "Picture", "Save a picture of the tissue (S)", true, Request::Screenshot);
-        let record = if is_recording { "⏹ Stop recording" } else { "⏺ Record" };
+        let record = if is_recording { "Stop recording" } else { "Record" };
         ask(ui, record, "An animated image of the motion (G)", true, Request::Record);
         ask(ui, "Save scene", "Ctrl+S", true, Request::Save);
         ui.separator();
@@ -78,7 +78,7 @@ fn compare(ui: &mut Ui, session: &Session, actions: &mut Vec<Action>) {
     let help = "Two solvers side by side: same start, same drag, each with its own settings. Begins again \
                 from rest.";
     if ui.toggle_value(&mut on, "A | B").on_hover_text(help).changed() {
-        actions.push(Action::Compare(on.then(Vec::new)));
+        actions.push(Action::Compare(on));
     }
     let mut ghost = session.choices().ghost;
     let help = "The exact solution as a ghost, for small meshes. Begins again from rest.";
@@ -106,11 +106,11 @@ pub fn show_status(ui: &mut Ui, clock: &Clock, stage: &Stage, frame: &Frame) {
             "Substeps take {:.2} ms each. Energy: elastic {:.3e} J, kinetic {:.3e} J. Substeps taken back by \
              the guard so far: {}.",
             1e3 * lane.wall / f64::from(stage.scene.solver.substeps),
-            lane.energy.elastic,
-            lane.energy.kinetic,
-            lane.rejected,
+            lane.measures.energy.elastic,
+            lane.measures.energy.kinetic,
+            lane.measures.rejected,
         ));
-        ui.weak(format!("residual {:.1e}", lane.residual))
+        ui.weak(format!("residual {:.1e}", lane.measures.residual))
             .on_hover_text("Unbalanced forces over loads; at rest, how well the equations hold");
         ui.separator();
     }

@@ -322,6 +322,7 @@ impl Viewport {
         let whole = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
         painter.image(texture, lens.rect, whole, egui::Color32::WHITE);
         let Some(lane) = frame.lanes.get(number) else { return };
+        overlay::tools(&painter, lens, lane);
         overlay::forces(&painter, lens, lane, holds);
         if preferences.coloring != Coloring::Plain {
             self.legend.paint(&painter, lens.rect);

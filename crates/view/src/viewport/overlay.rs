@@ -3,6 +3,7 @@
 use eframe::egui::{
     Align2, Color32, CornerRadius, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2,
 };
+use viscera::scalar::Vec3;
 use viscera::units::Dimension;
 use viscera_picture::{Color, map_color};
 
@@ -86,10 +87,10 @@ impl Legend {
     pub fn paint(&self, painter: &Painter, area: Rect) {
         let Some(high) = self.high else { return };
         const SIZE: [f32; 2] = [14.0, 150.0];
-        let corner = area.right_top() + vec2(-86.0, 34.0);
+        let corner = area.right_top() + vec2(-92.0, 36.0);
         let bar = Rect::from_min_size(corner, SIZE.into());
         let back =
-            Rect::from_min_max(area.right_top() + vec2(-136.0, 8.0), bar.max + vec2(80.0, 14.0));
+            Rect::from_min_max(area.right_top() + vec2(-136.0, 8.0), bar.max + vec2(70.0, 14.0));
         painter.rect_filled(back, CornerRadius::same(6), Color32::from_white_alpha(190));
         let mut mesh = Mesh::default();
         const STEPS: u32 = 48;
@@ -158,6 +159,23 @@ pub fn forces(painter: &Painter, lens: &Lens, lane: &Lane, holds: &Holds) {
         let side =
             if way.x < 0.0 { (Align2::RIGHT_CENTER, -12.0) } else { (Align2::LEFT_CENTER, 12.0) };
         label(painter, target + vec2(side.1, -10.0), side.0, &newtons(hold.force.length()), 15.0);
+    }
+}
+
+/// Names and forces of what the scene itself moves and pulls.
+pub fn tools(painter: &Painter, lens: &Lens, lane: &Lane) {
+    for tool in &lane.measures.tools {
+        let mut middle = Vec3::ZERO;
+        for &v in &tool.vertices {
+            let place = lane.positions.get(v as usize).map(|x| x.cast::<f64>()).unwrap_or_default();
+            middle += place * (1.0 / tool.vertices.len() as f64);
+        }
+        let Some(place) = lens.place(middle).filter(|_| tool.force.length() > 0.0) else {
+            continue;
+        };
+        let text = format!("{} {}", tool.name, newtons(tool.force.length()));
+        painter.circle_filled(place, 3.5, on_screen(Color::PULLED));
+        label(painter, place + vec2(10.0, 12.0), Align2::LEFT_CENTER, &text, 13.0);
     }
 }
 

@@ -1,0 +1,274 @@
+//! Drives the window as a person would, without a display: presses, drags, sliders, buttons, keys.
+
+use eframe::egui::{Key, Modifiers, Pos2, Rect, vec2};
+use egui_kittest::kittest::Queryable;
+use egui_kittest::{Harness, wgpu};
+use std::path::Path;
+use std::time::{Duration, Instant};
+use viscera::scalar::Vec3;
+use viscera::scene::Scene;
+use viscera_view::choices::Side;
+use viscera_view::engine::Lane;
+use viscera_view::preferences::Preferences;
+use viscera_view::{App, Options};
+
+/// The longest that anything may take before a test fails; most take tenths of a second.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+struct Window {
+    harness: Harness<'static, App>,
+    /// Where everything is written.
+    folder: tempfile::TempDir,
+}
+
+impl Window {
+    /// Opens a scene in a folder of its own.
+    fn open(scene: &str, settings: &[(&str, &str)]) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let setup = wgpu::default_wgpu_setup();
+        let state =
+            wgpu::create_render_state(setup, eframe::egui_wgpu::RendererOptions::PREDICTABLE);
+        let options = Options {
+            scene: scene.into(),
+            settings: settings.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect(),
+            data: None,
+            pictures: folder.path().join("pictures"),
+        };
+        let context = eframe::egui::Context::default();
+        let preferences = Preferences::default();
+        let app = App::new(&context, state.clone(), options, preferences).expect("a window");
+        let renderer = wgpu::WgpuTestRenderer::from_render_state(state);
+        let harness = Harness::builder()
+            .with_size(vec2(1100.0, 760.0))
+            .with_step_dt(1.0 / 60.0)
+            .renderer(renderer)
+            .build_ui_state(|ui, app: &mut App| app.show(ui), app);
+        Self { harness, folder }
+    }
+
+    /// Opens a scene and waits until it moves.
+    fn running(scene: &str, settings: &[(&str, &str)]) -> Self {
+        let mut window = Self::open(scene, settings);
+        window.wait("frames", |app| app.frame().is_some_and(|frame| frame.number >= 2));
+        window
+    }
+
+    /// Shows frame after frame of the window until something holds.
+    fn wait(&mut self, what: &str, holds: impl Fn(&App) -> bool) {
+        let start = Instant::now();
+        while !holds(self.harness.state()) {
+            let texts: Vec<_> = self.harness.state().messages().texts().collect();
+            assert!(
+                start.elapsed() < PATIENCE,
+                "waited in vain for {what}; the window says {texts:?}"
+            );
+            self.harness.step();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        self.harness.step();
+    }
+
+    fn press(&mut self, name: &str) {
+        self.harness.get_by_label(name).click();
+        self.harness.step();
+        self.harness.step();
+    }
+
+    fn view(&self) -> Rect {
+        self.harness.get_by_label("view").rect()
+    }
+
+    /// The sum of the colours in the view, by pixels.
+    fn pixels(&mut self) -> Vec<[u8; 3]> {
+        let view = self.view();
+        let image = self.harness.render().expect("a picture of the window");
+        let inside = |x: u32, y: u32| view.contains(Pos2::new(x as f32, y as f32));
+        let pixels = image.enumerate_pixels().filter(|(x, y, _)| inside(*x, *y));
+        pixels.map(|(_, _, pixel)| [pixel[0], pixel[1], pixel[2]]).collect()
+    }
+
+    fn lane(&self, number: usize) -> &Lane {
+        &self.harness.state().frame().expect("a frame").lanes[number]
+    }
+
+    fn scene(&self) -> &Scene {
+        self.harness.state().session().scene(Side::First)
+    }
+}
+
+fn farthest(a: &[Vec3<f32>], b: &[Vec3<f32>]) -> f32 {
+    a.iter().zip(b).fold(0.0, |most, (a, b)| most.max((*a - *b).length()))
+}
+
+#[test]
+fn pressed_tissue_follows_the_pointer_and_is_let_go_cleanly() {
+    let mut window = Window::running("liver_retraction", &[("time.duration", "1 s")]);
+    let middle = window.view().center();
+    let before = window.lane(0).positions.clone();
+    let still = window.pixels();
+    window.harness.hover_at(middle);
+    window.harness.step();
+    window.harness.drag_at(middle);
+    window.harness.step();
+    assert_eq!(window.harness.state().holds().list().len(), 1, "a press in the middle takes hold");
+    for step in 1..=8 {
+        window.harness.hover_at(middle + vec2(0.0, -10.0 * step as f32));
+        window.harness.step();
+    }
+    window.wait("a force", |app| {
+        let hold = app.frame().and_then(|frame| frame.lanes[0].holds.first());
+        hold.is_some_and(|hold| hold.force.length() > 0.5)
+    });
+    let hold = window.lane(0).holds[0];
+    // The spring pulls upwards, as the pointer did.
+    assert!(hold.force.z > 0.4 && hold.target.z > hold.place.z, "{hold:?}");
+    assert!(farthest(&before, &window.lane(0).positions) > 0.002);
+    let changed = window.pixels().iter().zip(&still).filter(|(new, old)| new != old).count();
+    assert!(changed > 1000, "{changed} pixels changed");
+
+    window.harness.drop_at(middle + vec2(0.0, -80.0));
+    window.wait("a clean release", |app| {
+        app.holds().list().is_empty()
+            && app.frame().is_some_and(|frame| frame.lanes[0].holds.is_empty())
+    });
+}
+
+#[test]
+fn what_is_kept_stays_held_until_escape() {
+    let mut window = Window::running("grab", &[]);
+    window.press("keep");
+    let middle = window.view().center();
+    window.harness.hover_at(middle);
+    window.harness.step();
+    window.harness.drag_at(middle);
+    window.harness.step();
+    window.harness.hover_at(middle + vec2(30.0, 0.0));
+    window.harness.step();
+    window.harness.drop_at(middle + vec2(30.0, 0.0));
+    window.harness.step();
+    window.wait("a hold", |app| app.frame().is_some_and(|frame| frame.lanes[0].holds.len() == 1));
+    window.harness.key_press(Key::Escape);
+    window.wait("a release", |app| app.holds().list().is_empty());
+}
+
+#[test]
+fn a_slider_changes_the_tissue_and_undo_takes_it_back() {
+    let mut window = Window::running("liver_retraction", &[]);
+    for young in [2.0, 20.0] {
+        window.harness.get_by_label("stiffness E").set_value_accesskit(young);
+        window.harness.step();
+        window.harness.step();
+        assert_eq!(window.scene().bodies[0].material.young(), 1e3 * young);
+    }
+    let number = window.harness.state().frame().expect("a frame").number;
+    window.wait("frames after the change", |app| {
+        app.frame().is_some_and(|frame| frame.number > number + 2)
+    });
+    window.harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    window.harness.step();
+    window.harness.step();
+    assert_eq!(window.scene().bodies[0].material.young(), 2e3);
+    window.press("Redo");
+    assert_eq!(window.scene().bodies[0].material.young(), 20e3);
+}
+
+#[test]
+fn two_solvers_run_side_by_side_from_the_same_start() {
+    let mut window = Window::running("grab", &[]);
+    window.press("A | B");
+    window.wait("two frames", |app| {
+        app.frame().is_some_and(|frame| frame.lanes.len() == 2 && frame.number > 3)
+    });
+    // Equal settings give equal bits.
+    assert_eq!(window.lane(0).positions, window.lane(1).positions);
+    window.harness.get_by_label("view A");
+    window.harness.get_by_label("view B");
+    window.press("true solution");
+    window.wait("the exact solution", |app| {
+        app.frame().is_some_and(|frame| frame.lanes.len() == 3 && frame.number > 3)
+    });
+    let apart = farthest(&window.lane(0).positions, &window.lane(2).positions);
+    assert!(apart > 0.0 && apart < 0.05, "{apart} m apart");
+}
+
+#[test]
+fn a_saved_scene_is_what_was_chosen() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("mine.toml");
+    let text = viscera_cli::scene::BUILT_IN.iter().find(|scene| scene.name == "cantilever");
+    std::fs::write(&path, text.expect("a built-in scene").text).expect("a file");
+    let settings = [("solver.iterations", "7")];
+    let mut window = Window::running(&path.display().to_string(), &settings);
+    window.harness.get_by_label("substeps").set_value_accesskit(3.0);
+    window.harness.step();
+    // The file that is open may vanish.
+    std::fs::remove_file(&path).expect("the file");
+    window.harness.key_press_modifiers(Modifiers::COMMAND, Key::S);
+    window.harness.step();
+    window.harness.step();
+    let saved = std::fs::read_to_string(folder.path().join("mine_changed.toml"));
+    let scene = Scene::parse("saved", &saved.expect("a file"), &[]).expect("a legal scene");
+    assert_eq!((scene.solver.iterations, scene.solver.substeps), (7, 3));
+    assert!(!path.exists());
+}
+
+#[test]
+fn a_picture_and_a_recording_are_whole_files() {
+    let mut window = Window::running("grab", &[]);
+    window.press("Picture");
+    window.press("Record");
+    let number = window.harness.state().frame().expect("a frame").number;
+    window.wait("some frames", |app| app.frame().is_some_and(|frame| frame.number > number + 8));
+    // Closed while it records.
+    window.harness.state_mut().close();
+    let pictures = window.folder.path().join("pictures");
+    let png = std::fs::read(pictures.join("grab-0001.png")).expect("a picture");
+    assert!(png.starts_with(b"\x89PNG") && png.len() > 5000);
+    let file = std::fs::File::open(pictures.join("grab-0001.gif")).expect("a recording");
+    let mut decoder = gif::DecodeOptions::new().read_info(file).expect("a GIF");
+    let mut frames = 0;
+    while decoder.read_next_frame().expect("a whole frame").is_some() {
+        frames += 1;
+    }
+    assert!(frames >= 2, "{frames} frames");
+}
+
+#[test]
+fn what_cannot_be_opened_is_said_and_the_first_scene_shown() {
+    let window = Window::running("no_such_scene.toml", &[]);
+    let texts: Vec<_> = window.harness.state().messages().texts().collect();
+    assert!(texts.iter().any(|text| text.contains("no_such_scene.toml")), "{texts:?}");
+    assert_eq!(window.harness.state().session().document().path, Path::new("liver_retraction"));
+
+    let window = Window::running("grab", &[("solver.iterations", "many")]);
+    let texts: Vec<_> = window.harness.state().messages().texts().collect();
+    assert!(texts.iter().any(|text| text.contains("iterations")), "{texts:?}");
+}
+
+#[test]
+fn without_the_device_asked_for_the_cpu_is_offered() {
+    let mut window = Window::open("grab", &[("solver.device", "abacus")]);
+    window.wait("a message", |app| app.messages().failure.is_some());
+    let texts: Vec<_> = window.harness.state().messages().texts().collect();
+    assert!(texts.iter().any(|text| text.contains("abacus")), "{texts:?}");
+    window.press("Go on with the CPU");
+    window.wait("frames", |app| app.frame().is_some_and(|frame| frame.number > 2));
+    assert!(window.harness.state().messages().failure.is_none());
+}
+
+#[test]
+fn the_keyboard_pauses_steps_and_begins_again() {
+    let mut window = Window::running("grab", &[]);
+    window.harness.key_press(Key::Space);
+    window.harness.step();
+    std::thread::sleep(Duration::from_millis(200));
+    (0..3).for_each(|_| window.harness.step());
+    let paused = window.harness.state().frame().expect("a frame").number;
+    std::thread::sleep(Duration::from_millis(100));
+    window.harness.step();
+    assert_eq!(window.harness.state().frame().map(|frame| frame.number), Some(paused));
+    window.harness.key_press(Key::Period);
+    window.wait("a step", |app| app.frame().is_some_and(|frame| frame.number == paused + 1));
+    window.harness.key_press(Key::R);
+    window.wait("rest", |app| app.frame().is_some_and(|frame| frame.number == 0));
+}
