@@ -1,13 +1,15 @@
 //! The window's state, and what happens to it.
 
+mod files;
+
 use eframe::egui::{self, CentralPanel, Panel, ScrollArea, Ui};
 use eframe::egui_wgpu::RenderState;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::capture::{FOLDER, Recorder, free_name, save_picture};
-use crate::choices::{Choices, Settings, Side};
+use crate::capture::{FOLDER, Recorder};
+use crate::choices::{Settings, Side};
 use crate::document::Document;
 use crate::engine::{Command, Engine, Event, Frame, Stage};
 use crate::help::{self, Request};
@@ -16,7 +18,6 @@ use crate::messages::Messages;
 use crate::panels::time::Clock;
 use crate::panels::{self, Action, scene::Fields};
 use crate::preferences::Preferences;
-use crate::save::save;
 use crate::session::Session;
 use crate::viewport::{Gpu, Viewport};
 
@@ -360,87 +361,6 @@ impl App {
         self.clock.playing = playing;
         self.counted = (self.frame.as_ref().map_or(0, |frame| frame.number), Instant::now());
         self.engine.send(Command::Play(playing));
-    }
-
-    fn open(&mut self, path: &Path) {
-        let data = self.session.document().data.clone();
-        let opened = Document::open(path, data.as_deref())
-            .map_err(|error| format!("{error:#}"))
-            .and_then(|document| self.session.open(document));
-        match opened {
-            Ok(command) => {
-                self.send([command]);
-                self.play(true);
-                self.name_save();
-            }
-            Err(error) => self.messages.warn(error),
-        }
-    }
-
-    /// Proposes a name to save under: never that of the file that is open.
-    fn name_save(&mut self) {
-        let document = self.session.document();
-        let name = format!("{}_changed.toml", document.stem());
-        let path = document.path.with_file_name(name);
-        self.fields.save = path.display().to_string();
-    }
-
-    fn save_as(&mut self, path: &Path) {
-        let Choices { second, .. } = self.session.choices();
-        let is_comparison = second.is_some();
-        let settings = self.session.choices().of(Side::First);
-        match save(self.session.document(), &settings, path) {
-            Ok(()) => {
-                let of = if is_comparison { " (of A)" } else { "" };
-                let shown = path.display();
-                self.messages.tell(format!("saved{of}; run it with: viscera run {shown}"));
-            }
-            Err(error) => self.messages.warn(format!("{error:#}")),
-        }
-    }
-
-    fn take_picture(&mut self) {
-        let path = free_name(&self.pictures, &self.session.document().stem(), "png");
-        let saved = self.viewport.images().map_err(anyhow::Error::msg);
-        match saved.and_then(|images| save_picture(&images, &path)) {
-            Ok(()) => self.messages.tell(format!("saved {}", path.display())),
-            Err(error) => self.messages.warn(format!("{error:#}")),
-        }
-    }
-
-    fn toggle_recording(&mut self) {
-        if let Some(recorder) = self.recorder.take() {
-            match recorder.finish() {
-                Ok(told) => self.messages.tell(format!("saved {told}")),
-                Err(error) => self.messages.warn(format!("{error:#}")),
-            }
-            return;
-        }
-        let path = free_name(&self.pictures, &self.session.document().stem(), "gif");
-        match Recorder::start(path) {
-            Ok(recorder) => self.recorder = Some(recorder),
-            Err(error) => self.messages.warn(format!("{error:#}")),
-        }
-    }
-
-    /// Adds what is shown to the recording, where one is going on and a picture is due.
-    fn record(&mut self) {
-        let (Some(recorder), Some(frame)) = (&mut self.recorder, &self.frame) else { return };
-        if !recorder.is_due(frame.time) {
-            return;
-        }
-        let images = self.viewport.images().map_err(anyhow::Error::msg);
-        if let Err(error) = images.and_then(|images| recorder.push(&images, frame.time)) {
-            self.messages.warn(format!("{error:#}"));
-            self.recorder = None;
-        }
-    }
-
-    /// Ends what would otherwise be lost.
-    pub fn close(&mut self) {
-        if self.recorder.is_some() {
-            self.toggle_recording();
-        }
     }
 }
 

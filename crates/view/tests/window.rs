@@ -1,6 +1,6 @@
 //! Drives the window as a person would, without a display: presses, drags, sliders, buttons, keys.
 
-use eframe::egui::{Key, Modifiers, Pos2, Rect, vec2};
+use eframe::egui::{Key, Modifiers, Pos2, Rect, Role, vec2};
 use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, wgpu};
 use std::path::Path;
@@ -70,6 +70,12 @@ impl Window {
 
     fn press(&mut self, name: &str) {
         self.harness.get_by_label(name).click();
+        self.harness.step();
+        self.harness.step();
+    }
+
+    fn slide(&mut self, name: &str, value: f64) {
+        self.harness.get_by_role_and_label(Role::Slider, name).set_value_accesskit(value);
         self.harness.step();
         self.harness.step();
     }
@@ -155,9 +161,7 @@ fn what_is_kept_stays_held_until_escape() {
 fn a_slider_changes_the_tissue_and_undo_takes_it_back() {
     let mut window = Window::running("liver_retraction", &[]);
     for young in [2.0, 20.0] {
-        window.harness.get_by_label("stiffness E").set_value_accesskit(young);
-        window.harness.step();
-        window.harness.step();
+        window.slide("stiffness E", young);
         assert_eq!(window.scene().bodies[0].material.young(), 1e3 * young);
     }
     let number = window.harness.state().frame().expect("a frame").number;
@@ -199,8 +203,7 @@ fn a_saved_scene_is_what_was_chosen() {
     std::fs::write(&path, text.expect("a built-in scene").text).expect("a file");
     let settings = [("solver.iterations", "7")];
     let mut window = Window::running(&path.display().to_string(), &settings);
-    window.harness.get_by_label("substeps").set_value_accesskit(3.0);
-    window.harness.step();
+    window.slide("substeps", 3.0);
     // The file that is open may vanish.
     std::fs::remove_file(&path).expect("the file");
     window.harness.key_press_modifiers(Modifiers::COMMAND, Key::S);

@@ -295,11 +295,13 @@ impl Worker {
         if let Some(earliest) = Instant::now().checked_sub(MOST_LATE) {
             self.due = self.due.max(earliest);
         }
-        self.publish();
-        if let Some(message) = failed {
+        match failed {
+            None => self.publish(),
             // The last frame stays to be seen; Reset begins anew.
-            (self.playing, self.steps) = (false, 0);
-            self.tell(Event::Failed(Failure { message, cure: Cure::Reset }));
+            Some(message) => {
+                (self.playing, self.steps) = (false, 0);
+                self.tell(Event::Failed(Failure { message, cure: Cure::Reset }));
+            }
         }
     }
 

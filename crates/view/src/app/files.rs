@@ -1,0 +1,91 @@
+//! Files that the window reads and writes: scenes, pictures, recordings.
+
+use std::path::Path;
+
+use super::App;
+use crate::capture::{Recorder, free_name, save_picture};
+use crate::choices::Side;
+use crate::document::Document;
+use crate::save::save;
+
+impl App {
+    pub(super) fn open(&mut self, path: &Path) {
+        let data = self.session.document().data.clone();
+        let opened = Document::open(path, data.as_deref())
+            .map_err(|error| format!("{error:#}"))
+            .and_then(|document| self.session.open(document));
+        match opened {
+            Ok(command) => {
+                self.send([command]);
+                self.play(true);
+                self.name_save();
+            }
+            Err(error) => self.messages.warn(error),
+        }
+    }
+
+    /// Proposes a name to save under: never that of the file that is open.
+    pub(super) fn name_save(&mut self) {
+        let document = self.session.document();
+        let name = format!("{}_changed.toml", document.stem());
+        let path = document.path.with_file_name(name);
+        self.fields.save = path.display().to_string();
+    }
+
+    pub(super) fn save_as(&mut self, path: &Path) {
+        let is_comparison = self.session.is_comparison();
+        let settings = self.session.choices().of(Side::First);
+        match save(self.session.document(), &settings, path) {
+            Ok(()) => {
+                let of = if is_comparison { " (of A)" } else { "" };
+                let shown = path.display();
+                self.messages.tell(format!("saved{of}; run it with: viscera run {shown}"));
+            }
+            Err(error) => self.messages.warn(format!("{error:#}")),
+        }
+    }
+
+    pub(super) fn take_picture(&mut self) {
+        let path = free_name(&self.pictures, &self.session.document().stem(), "png");
+        let saved = self.viewport.images().map_err(anyhow::Error::msg);
+        match saved.and_then(|images| save_picture(&images, &path)) {
+            Ok(()) => self.messages.tell(format!("saved {}", path.display())),
+            Err(error) => self.messages.warn(format!("{error:#}")),
+        }
+    }
+
+    pub(super) fn toggle_recording(&mut self) {
+        if let Some(recorder) = self.recorder.take() {
+            match recorder.finish() {
+                Ok(told) => self.messages.tell(format!("saved {told}")),
+                Err(error) => self.messages.warn(format!("{error:#}")),
+            }
+            return;
+        }
+        let path = free_name(&self.pictures, &self.session.document().stem(), "gif");
+        match Recorder::start(path) {
+            Ok(recorder) => self.recorder = Some(recorder),
+            Err(error) => self.messages.warn(format!("{error:#}")),
+        }
+    }
+
+    /// Adds what is shown to the recording, where one is going on and a picture is due.
+    pub(super) fn record(&mut self) {
+        let (Some(recorder), Some(frame)) = (&mut self.recorder, &self.frame) else { return };
+        if !recorder.is_due(frame.time) {
+            return;
+        }
+        let images = self.viewport.images().map_err(anyhow::Error::msg);
+        if let Err(error) = images.and_then(|images| recorder.push(&images, frame.time)) {
+            self.messages.warn(format!("{error:#}"));
+            self.recorder = None;
+        }
+    }
+
+    /// Ends what would otherwise be lost.
+    pub fn close(&mut self) {
+        if self.recorder.is_some() {
+            self.toggle_recording();
+        }
+    }
+}
