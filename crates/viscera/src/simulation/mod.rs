@@ -344,6 +344,7 @@ fn inputs_at<S: Real>(scene: &Scene, assembly: &Assembly, time: f64) -> Inputs<S
     let mut inputs = Inputs {
         gravity: scene.world.gravity.cast(),
         pins: Vec::with_capacity(count(&assembly.fixings) + count(&assembly.motions)),
+        tethers: Vec::new(),
         anchors: Vec::new(),
         forces: Vec::with_capacity(count(&assembly.forces)),
     };
