@@ -268,7 +268,7 @@ impl Scene {
             if hold.driven { self.path.at(x, share).cast() } else { x.cast() }
         };
         let anchors = self.holds.iter().map(anchor).collect();
-        Inputs { gravity: self.gravity.cast(), pins, anchors, forces: Vec::new() }
+        Inputs { gravity: self.gravity.cast(), pins, anchors, ..Inputs::default() }
     }
 
     /// Vertices that are not pinned.

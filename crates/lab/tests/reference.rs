@@ -8,7 +8,7 @@ use viscera::mesh::topology::boundary_surface;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Mat3, Vec3, vec3};
 use viscera::settings::SolverSettings;
-use viscera::solver::{Inputs, Pin};
+use viscera::solver::{Inputs, Pin, Tether};
 use viscera::state::State;
 use viscera_lab::reference::matrix::Pattern;
 use viscera_lab::reference::objective::{Load, Objective, creep_at};
@@ -77,7 +77,9 @@ fn gradient_and_hessian_match_differences() {
     let step = Load::Inertia { dt, predicted: start, creep };
     let statics = Load::Forces(problem.masses.iter().map(|&m| GRAVITY * m).collect());
     for (name, load) in [("step", step), ("statics", statics)] {
-        let objective = Objective { problem: &problem, anchors: &problem.rest_anchors, load };
+        let tethers = &[Tether { vertex: 7, target: vec3(0.01, -0.02, 0.03), stiffness: 40.0 }];
+        let anchors = &problem.rest_anchors;
+        let objective = Objective { problem: &problem, anchors, tethers, load };
         let at = |t: f64| x.iter().zip(&d).map(|(x, d)| *x + *d * t).collect::<Vec<_>>();
         // Fourth-order differences: with t = 1e-3 the error of the formula is about t^4 = 1e-12 of
         // the fifth derivative, that of round-off eps/t = 2e-13 of the values.

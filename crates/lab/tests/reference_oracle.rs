@@ -33,7 +33,7 @@ fn gradient_and_hessian_are_the_oracles() {
         let problem = reference.problem();
         let x = fixture.vectors("positions");
         let load = Load::Forces(vec![Vec3::ZERO; x.len()]);
-        let objective = Objective { problem, anchors: &[], load };
+        let objective = Objective { problem, anchors: &[], tethers: &[], load };
         let forces: Vec<_> = objective.gradient(&x).into_iter().map(|g| -g).collect();
         let expected = fixture.vectors("forces");
         let force_error = largest(&difference(&forces, &expected)) / largest(&expected);

@@ -1,6 +1,7 @@
 //! Whether a body can be at rest at all: one that can drift or turn freely has no static solution.
 
 use viscera::scalar::Vec3;
+use viscera::solver::Inputs;
 
 use super::problem::Problem;
 
@@ -16,7 +17,12 @@ pub struct Loose {
 /// The first connected part of tissue that fewer than three points out of line hold: pins,
 /// attachments, or springs from other parts. Parts that only springs hold must hang, through them,
 /// on something fixed.
-pub fn find_loose(problem: &Problem, pinned: &[bool], x: &[Vec3<f64>]) -> Option<Loose> {
+pub fn find_loose(
+    problem: &Problem,
+    inputs: &Inputs<f64>,
+    pinned: &[bool],
+    x: &[Vec3<f64>],
+) -> Option<Loose> {
     let count = problem.vertex_count();
     let (mut tissue, mut all) = (Groups::new(count), Groups::new(count));
     let linear = problem.linear.nodes.iter().map(|nodes| nodes.as_slice());
@@ -32,7 +38,9 @@ pub fn find_loose(problem: &Problem, pinned: &[bool], x: &[Vec3<f64>]) -> Option
     }
     let mut held: Vec<(u32, u32)> = Vec::new();
     let mut fixed = vec![false; count];
-    let attached = problem.attachments.iter().map(|attachment| attachment.vertex);
+    let tethered = inputs.tethers.iter().filter(|tether| tether.stiffness > 0.0);
+    let attached = (problem.attachments.iter().map(|attachment| attachment.vertex))
+        .chain(tethered.map(|tether| tether.vertex));
     let pins = (0..count as u32).filter(|&v| pinned[v as usize]);
     for vertex in pins.chain(attached) {
         held.push((tissue.group(vertex), vertex));

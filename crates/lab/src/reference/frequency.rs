@@ -11,8 +11,8 @@ use viscera::scalar::Vec3;
 use viscera::solver::Inputs;
 
 use super::matrix::FactorError;
-use super::objective::{Load, Objective};
-use super::{Analysis, Reference, ReferenceError, anchors, dead_loads, fixing};
+use super::objective::Load;
+use super::{Analysis, Reference, ReferenceError, dead_loads, fixing, objective};
 
 /// Iterations at most. Of the error of `omega^2` each leaves the fourth power of the ratio of the
 /// two lowest frequencies, a fortieth and less in a slender bar.
@@ -50,16 +50,13 @@ impl Reference {
             return Err(ReferenceError::NotFinite { what: "direction" });
         }
         let pinned = self.check(x, inputs)?;
-        if let Some(loose) = fixing::find_loose(&self.problem, &pinned, x) {
+        if let Some(loose) = fixing::find_loose(&self.problem, inputs, &pinned, x) {
             return Err(ReferenceError::Loose { vertex: loose.vertex, turns: loose.turns });
         }
         let mut analysis = self.analyse(pinned)?;
         let cost = self.check_memory(&analysis)?;
-        let objective = Objective {
-            problem: &self.problem,
-            anchors: anchors(&self.problem, inputs),
-            load: Load::Forces(dead_loads(&self.problem, inputs)),
-        };
+        let objective =
+            objective(&self.problem, inputs, Load::Forces(dead_loads(&self.problem, inputs)));
         let Analysis { pattern, factorization, .. } = &mut analysis;
         let hessian = objective.hessian(x, pattern, false);
         factorization.factorize(pattern, &hessian).map_err(|error| match error {

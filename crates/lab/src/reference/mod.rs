@@ -27,7 +27,7 @@ use viscera::material::Material;
 use viscera::mesh::TetMesh;
 use viscera::model::Model;
 use viscera::scalar::Vec3;
-use viscera::solver::Inputs;
+use viscera::solver::{Inputs, Tether};
 use viscera::state::State;
 
 pub use frequency::Mode;
@@ -70,7 +70,7 @@ pub enum ReferenceError {
     /// An input names no vertex.
     #[error("a {what} names vertex {vertex}; the model has {vertex_count}")]
     UnknownVertex {
-        /// "pin" or "force".
+        /// "pin", "tether" or "force".
         what: &'static str,
         /// The index given.
         vertex: u32,
@@ -276,8 +276,7 @@ impl Reference {
         let predicted = with_pins(&self.predict(state, inputs, dt), inputs);
         let creep = creep_at(&self.problem, &state.positions, dt);
         let load = Load::Inertia { dt, predicted, creep };
-        let anchors = anchors(&self.problem, inputs);
-        let objective = Objective { problem: &self.problem, anchors, load };
+        let objective = objective(&self.problem, inputs, load);
         let value = |x: &[Vec3<f64>]| {
             let sum = objective.value(x).sum;
             if sum.is_finite() { sum } else { f64::INFINITY }
@@ -285,16 +284,15 @@ impl Reference {
         Ok([value(&with_pins(&state.positions, inputs)), value(x)])
     }
 
-    /// Elastic energy [J] of tissue, springs and attachments at `x`.
+    /// Elastic energy [J] of tissue, springs, attachments and tethers at `x`.
     pub fn elastic_energy(
         &self,
         x: &[Vec3<f64>],
         inputs: &Inputs<f64>,
     ) -> Result<f64, ReferenceError> {
         self.check(x, inputs)?;
-        let anchors = anchors(&self.problem, inputs);
         let load = Load::Forces(Vec::new());
-        Ok(Objective { problem: &self.problem, anchors, load }.elastic_energy(x))
+        Ok(objective(&self.problem, inputs, load).elastic_energy(x))
     }
 
     /// Potential, energy and unbalanced forces of statics at `x`.
@@ -305,11 +303,7 @@ impl Reference {
     ) -> Result<Standing, ReferenceError> {
         let pinned = self.check(x, inputs)?;
         let loads = dead_loads(&self.problem, inputs);
-        let objective = Objective {
-            problem: &self.problem,
-            anchors: anchors(&self.problem, inputs),
-            load: Load::Forces(loads.clone()),
-        };
+        let objective = objective(&self.problem, inputs, Load::Forces(loads.clone()));
         let norm = |values: &[Vec3<f64>]| {
             let free = values.iter().zip(&pinned).filter(|(_, pinned)| !**pinned);
             free.map(|(value, _)| value.length_squared()).sum::<f64>().sqrt()
@@ -330,8 +324,7 @@ impl Reference {
     ) -> Result<Vec<Vec3<f64>>, ReferenceError> {
         self.check(x, inputs)?;
         let load = Load::Forces(dead_loads(&self.problem, inputs));
-        let anchors = anchors(&self.problem, inputs);
-        let gradient = Objective { problem: &self.problem, anchors, load }.gradient(x);
+        let gradient = objective(&self.problem, inputs, load).gradient(x);
         Ok(inputs.pins.iter().map(|pin| gradient[pin.vertex as usize]).collect())
     }
 
@@ -343,7 +336,7 @@ impl Reference {
         inputs: &Inputs<f64>,
     ) -> Result<Vec<bool>, ReferenceError> {
         let pinned = self.check(start, inputs)?;
-        match fixing::find_loose(&self.problem, &pinned, &with_pins(start, inputs)) {
+        match fixing::find_loose(&self.problem, inputs, &pinned, &with_pins(start, inputs)) {
             Some(fixing::Loose { vertex, turns }) => Err(ReferenceError::Loose { vertex, turns }),
             None => Ok(pinned),
         }
@@ -359,8 +352,7 @@ impl Reference {
         let mut analysis = self.analyse(pinned)?;
         let cost = self.check_memory(&analysis)?;
         let Analysis { pattern, factorization, .. } = &mut analysis;
-        let anchors = anchors(&self.problem, inputs);
-        let objective = Objective { problem: &self.problem, anchors, load };
+        let objective = objective(&self.problem, inputs, load);
         let solved = newton::minimise(&objective, pattern, factorization, &self.tolerance, &mut x);
         self.analysis = Some(analysis);
         let convergence = match solved {
@@ -413,6 +405,7 @@ impl Reference {
             ("positions", x.iter().all(|x| x.is_finite())),
             ("gravity", inputs.gravity.is_finite()),
             ("pin targets", inputs.pins.iter().all(|pin| pin.target.is_finite())),
+            ("tethers", inputs.tethers.iter().all(is_legal)),
             ("anchors", inputs.anchors.iter().all(|anchor| anchor.is_finite())),
             ("forces", inputs.forces.iter().all(|(_, force)| force.is_finite())),
         ];
@@ -430,6 +423,7 @@ impl Reference {
     fn pinned(&self, inputs: &Inputs<f64>) -> Result<Vec<bool>, ReferenceError> {
         let vertex_count = self.problem.vertex_count();
         let vertices = (inputs.pins.iter().map(|pin| ("pin", pin.vertex)))
+            .chain(inputs.tethers.iter().map(|tether| ("tether", tether.vertex)))
             .chain(inputs.forces.iter().map(|&(vertex, _)| ("force", vertex)));
         for (what, vertex) in vertices {
             if vertex as usize >= vertex_count {
@@ -444,6 +438,10 @@ impl Reference {
     }
 }
 
+fn is_legal(tether: &Tether<f64>) -> bool {
+    tether.target.is_finite() && tether.stiffness >= 0.0 && tether.stiffness.is_finite()
+}
+
 fn with_pins(x: &[Vec3<f64>], inputs: &Inputs<f64>) -> Vec<Vec3<f64>> {
     let mut x = x.to_vec();
     for pin in &inputs.pins {
@@ -452,8 +450,10 @@ fn with_pins(x: &[Vec3<f64>], inputs: &Inputs<f64>) -> Vec<Vec3<f64>> {
     x
 }
 
-fn anchors<'a>(problem: &'a Problem, inputs: &'a Inputs<f64>) -> &'a [Vec3<f64>] {
-    if inputs.anchors.is_empty() { &problem.rest_anchors } else { &inputs.anchors }
+fn objective<'a>(problem: &'a Problem, inputs: &'a Inputs<f64>, load: Load) -> Objective<'a> {
+    let at_rest = inputs.anchors.is_empty();
+    let anchors = if at_rest { &problem.rest_anchors } else { &inputs.anchors };
+    Objective { problem, anchors, tethers: &inputs.tethers, load }
 }
 
 /// Weight and external forces [N].

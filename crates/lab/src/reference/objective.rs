@@ -5,10 +5,11 @@
 //! statics  Phi(x) = V(x) - sum_i (m_i g + f_i) . x_i
 //! ```
 //!
-//! `V` holds tissue, springs and attachments [J]; viscosity takes part in a step only.
+//! `V` holds tissue, springs, attachments and tethers [J]; viscosity takes part in a step only.
 
 use viscera::elements::{green_strain, spring};
 use viscera::scalar::{Mat3, Vec3};
+use viscera::solver::Tether;
 
 use super::matrix::{Assembly, Pattern};
 use super::problem::{Problem, TetElements};
@@ -21,6 +22,8 @@ pub struct Objective<'a> {
     pub problem: &'a Problem,
     /// Anchors of the attachments [m].
     pub anchors: &'a [Vec3<f64>],
+    /// Springs to places outside.
+    pub tethers: &'a [Tether<f64>],
     /// What pulls.
     pub load: Load,
 }
@@ -65,7 +68,15 @@ impl Objective<'_> {
         }
     }
 
-    /// Elastic energy alone [J]: tissue without viscosity, springs, attachments.
+    /// Attachments and tethers: vertex, stiffness [N/m] and anchor [m].
+    fn anchored(&self) -> impl Iterator<Item = (u32, f64, Vec3<f64>)> {
+        let attachments = self.problem.attachments.iter();
+        attachments
+            .map(|a| (a.vertex, a.stiffness, self.anchors[a.anchor as usize]))
+            .chain(self.tethers.iter().map(|t| (t.vertex, t.stiffness, t.target)))
+    }
+
+    /// Elastic energy alone [J]: tissue without viscosity, springs, attachments, tethers.
     pub fn elastic_energy(&self, x: &[Vec3<f64>]) -> f64 {
         let mut value = Value { sum: 0.0, size: 0.0 };
         self.add_elastic(x, false, &mut value);
@@ -101,9 +112,8 @@ impl Objective<'_> {
             let ends = s.ends.map(|v| x[v as usize]);
             value.add(spring::energy(&ends, s.rest_length, s.stiffness));
         }
-        for a in &problem.attachments {
-            let offset = x[a.vertex as usize] - self.anchors[a.anchor as usize];
-            value.add(0.5 * a.stiffness * offset.length_squared());
+        for (v, stiffness, anchor) in self.anchored() {
+            value.add(0.5 * stiffness * (x[v as usize] - anchor).length_squared());
         }
     }
 
@@ -120,9 +130,8 @@ impl Objective<'_> {
                 gradient[v as usize] += -force;
             }
         }
-        for a in &problem.attachments {
-            let offset = x[a.vertex as usize] - self.anchors[a.anchor as usize];
-            gradient[a.vertex as usize] += offset * a.stiffness;
+        for (v, stiffness, anchor) in self.anchored() {
+            gradient[v as usize] += (x[v as usize] - anchor) * stiffness;
         }
         match &self.load {
             Load::Forces(forces) => {
@@ -157,8 +166,8 @@ impl Objective<'_> {
             matrix.add(pattern, a, b, &across);
             matrix.add(pattern, b, a, &across);
         }
-        for a in &problem.attachments {
-            matrix.add(pattern, a.vertex, a.vertex, &diagonal(a.stiffness));
+        for (v, stiffness, _) in self.anchored() {
+            matrix.add(pattern, v, v, &diagonal(stiffness));
         }
         if let Load::Inertia { dt, .. } = &self.load {
             for (v, mass) in problem.masses.iter().enumerate() {

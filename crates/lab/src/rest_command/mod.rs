@@ -67,6 +67,25 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
     }
     let (scene, assembly) =
         files::load(&arguments.scene, &arguments.settings, arguments.data.as_deref())?;
+    // Where tissue was when it was taken hold of is a matter of its motion.
+    let taken = scene.motions.iter().find(|motion| motion.start > 0.0);
+    if let Some(motion) = taken {
+        bail!(
+            "{}: motion `{}` takes hold of moving tissue at {} s, which no state of rest tells of; let it start \
+             at 0 s",
+            scene.name,
+            motion.name,
+            motion.start
+        );
+    }
+    if let Some(change) = scene.changes.first() {
+        bail!(
+            "{}: settings change at {} s; write those of the end where the bodies and the solver are, and \
+             leave [[change]] out",
+            scene.name,
+            change.time
+        );
+    }
     let simulation = Simulation::<f64>::new(scene, assembly)?;
     let mut path = Path::new(&simulation, arguments.parts, arguments.memory)?;
     for note in &simulation.assembly().notes {

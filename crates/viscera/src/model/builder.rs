@@ -49,6 +49,15 @@ impl ModelBuilder {
         Ok(self.bodies.len() - 1)
     }
 
+    /// Gives all of a body another material.
+    pub fn set_material(&mut self, body: usize, material: &Material) -> Result<(), ModelError> {
+        let range = self.body(body)?.tets.clone();
+        let material = self.intern(material);
+        self.tet_material[range].fill(material);
+        self.forget_unused_materials();
+        Ok(())
+    }
+
     /// Gives one region of a body another material; returns how many tetrahedra that concerns.
     pub fn set_region_material(
         &mut self,
@@ -279,6 +288,20 @@ impl ModelBuilder {
             order: order.iter().map(|&c| c - first as u32).collect(),
             color_offsets,
         }
+    }
+
+    /// A body whose material is changed a thousand times still has one.
+    fn forget_unused_materials(&mut self) {
+        let mut new_number = vec![None; self.materials.len()];
+        let mut kept = Vec::new();
+        for number in &mut self.tet_material {
+            let old = *number as usize;
+            *number = *new_number[old].get_or_insert_with(|| {
+                kept.push(self.materials[old]);
+                kept.len() as u32 - 1
+            });
+        }
+        self.materials = kept;
     }
 
     fn intern(&mut self, material: &Material) -> u32 {

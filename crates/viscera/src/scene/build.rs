@@ -3,14 +3,14 @@
 use super::motion::{Force, ForceKey, Motion, MotionKey, RigidTransform};
 use super::selector::{Patch, Selector};
 use super::tables::{
-    BodyTable, ForceTable, MaterialTable, MotionKeyTable, PatchTable, SceneTable, ShapeName,
-    TimeSettings,
+    BodyTable, ChangeTable, ForceTable, MaterialTable, MotionTable, PatchTable, SceneTable,
+    ShapeName, TimeSettings,
 };
-use super::{Body, BodyShape, Fixing, Region, Scene, SceneError, Spring};
+use super::{Body, BodyShape, Change, Fixing, Region, Scene, SceneError, Spring};
 use crate::material::{Material, MaterialModel};
 use crate::mesh::shapes::LIVER_SPACING;
 use crate::scalar::Vec3;
-use crate::settings::{Choice, Place, Placed, suggest};
+use crate::settings::{Choice, Node, Place, Placed, read_table, suggest};
 use crate::units::shorten;
 
 /// Beyond this a run of one frame per millisecond would take hours.
@@ -20,7 +20,9 @@ const MOST_FRAMES: f64 = 1e7;
 /// slip of the unit would eat the machine's memory.
 const MOST_CELLS: f64 = 2e6;
 
-pub(super) fn build_scene(name: &str, tables: SceneTable) -> Result<Scene, SceneError> {
+/// A scene of a tree, which it keeps for changes to come.
+pub(super) fn build_scene(name: &str, tree: Node) -> Result<Scene, SceneError> {
+    let tables: SceneTable = read_table("", &tree)?;
     check_frame_count(name, &tables.time)?;
     let mut bodies: Vec<Body> = Vec::new();
     for table in &tables.body {
@@ -48,10 +50,12 @@ pub(super) fn build_scene(name: &str, tables: SceneTable) -> Result<Scene, Scene
         let purpose = purpose("motion", &value.name, index);
         motions.push(Motion {
             name,
-            keys: motion_keys(&value.keys, &purpose, place)?,
+            keys: motion_keys(value, &purpose, place)?,
             patch: build_patch(&bodies, &value.patch, purpose, place)?,
             interpolation: value.interpolation,
             about: value.about,
+            start: value.start,
+            stiffness: value.stiffness,
             release: value.release,
         });
     }
@@ -85,7 +89,9 @@ pub(super) fn build_scene(name: &str, tables: SceneTable) -> Result<Scene, Scene
         });
     }
     let title = if tables.title.is_empty() { name.to_owned() } else { tables.title };
-    Ok(Scene {
+    let (places, changes): (Vec<Place>, Vec<Change>) =
+        build_changes(&tables.change)?.into_iter().unzip();
+    let scene = Scene {
         name: name.to_owned(),
         title,
         description: tables.description,
@@ -96,9 +102,40 @@ pub(super) fn build_scene(name: &str, tables: SceneTable) -> Result<Scene, Scene
         motions,
         forces,
         springs,
+        changes,
         solver: tables.solver,
         output: tables.output,
-    })
+        tree,
+    };
+    // Every change is tried now: nobody wants to learn of a slip in the middle of a run.
+    let mut changed = scene.clone();
+    for (change, place) in scene.changes.iter().zip(places) {
+        changed.change(&change.settings).map_err(|error| SceneError::Change {
+            place,
+            time: change.time,
+            error: Box::new(error),
+        })?;
+    }
+    Ok(scene)
+}
+
+/// In the order of their times, with their places.
+fn build_changes(tables: &[Placed<ChangeTable>]) -> Result<Vec<(Place, Change)>, SceneError> {
+    let mut changes = Vec::new();
+    for Placed { place, value } in tables {
+        let mut settings = Vec::new();
+        for text in &value.set {
+            let Some((key, value)) = text.split_once('=') else {
+                let setting = shorten(text);
+                return Err(SceneError::ChangeText { place: place.clone(), setting });
+            };
+            settings.push((key.trim().to_owned(), value.trim().to_owned()));
+        }
+        changes.push((place.clone(), Change { time: value.time, settings }));
+    }
+    // Of two at one time the later one in the file comes later.
+    changes.sort_by(|(_, a), (_, b)| a.time.total_cmp(&b.time));
+    Ok(changes)
 }
 
 fn check_frame_count(name: &str, time: &TimeSettings) -> Result<(), SceneError> {
@@ -334,10 +371,11 @@ fn build_patch(
 }
 
 fn motion_keys(
-    keys: &[Placed<MotionKeyTable>],
+    motion: &MotionTable,
     purpose: &str,
     place: &Place,
 ) -> Result<Vec<MotionKey>, SceneError> {
+    let (keys, start) = (&motion.keys, motion.start);
     check_times(keys.iter().map(|key| (&key.place, key.value.time)), purpose)?;
     let Some(first) = keys.first() else {
         return Err(SceneError::Keys {
@@ -348,18 +386,29 @@ fn motion_keys(
                 .to_owned(),
         });
     };
-    let rest = MotionKey { time: 0.0, translation: Vec3::ZERO, rotation: Vec3::ZERO };
-    let start = (first.value.time > 0.0).then_some(rest);
+    if first.value.time < start {
+        return Err(SceneError::Keys {
+            place: first.place.clone(),
+            purpose: purpose.to_owned(),
+            problem: format!(
+                "its first key at {} s is before its start at {start} s; move one of them",
+                first.value.time
+            ),
+        });
+    }
+    let taken = MotionKey { time: start, translation: Vec3::ZERO, rotation: Vec3::ZERO };
+    let before = (first.value.time > start).then_some(taken);
     let written = keys.iter().map(|key| MotionKey {
         time: key.value.time,
         translation: key.value.translation,
         rotation: key.value.rotation_axis * key.value.rotation_angle,
     });
-    Ok(start.into_iter().chain(written).collect())
+    Ok(before.into_iter().chain(written).collect())
 }
 
 fn force_keys(table: &ForceTable, purpose: &str) -> Result<Vec<ForceKey>, SceneError> {
-    check_times(table.keys.iter().map(|key| (&key.place, key.value.time)), purpose)?;
+    let times = table.keys.iter().map(|key| (&key.place, key.value.time));
+    check_times(times, purpose)?;
     let key = |key: &Placed<super::tables::ForceKeyTable>| ForceKey {
         time: key.value.time,
         factor: key.value.factor,

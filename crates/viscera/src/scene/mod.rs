@@ -27,20 +27,21 @@
 //! ```
 
 mod build;
+mod change;
 mod describe;
 mod motion;
 mod selector;
 mod tables;
+mod write;
 
+pub use change::Change;
 pub use describe::{describe, describe_markdown, describe_text};
 pub use motion::{Force, ForceKey, Motion, MotionKey, RigidTransform};
 pub use selector::{Patch, SelectError, Selector, nearest_pair};
 pub use tables::{Interpolation, OutputSettings, TimeSettings, WorldSettings};
 
 use crate::material::{Material, MaterialError};
-use crate::settings::{
-    Place, SettingError, SolverSettings, apply_override, parse_tree, read_table,
-};
+use crate::settings::{Node, Place, SettingError, SolverSettings, apply_override, parse_tree};
 
 /// What a scene file says.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,10 +66,14 @@ pub struct Scene {
     pub forces: Vec<Force>,
     /// Springs between two vertices.
     pub springs: Vec<Spring>,
+    /// Settings that change while it runs, times ascending.
+    pub changes: Vec<Change>,
     /// How a step is solved.
     pub solver: SolverSettings,
     /// What a run writes.
     pub output: OutputSettings,
+    /// What was written, overrides and changes laid over it: changes to come begin with it.
+    tree: Node,
 }
 
 /// A body: its mesh, its place and what it is made of.
@@ -281,6 +286,36 @@ pub enum SceneError {
         /// How many there would be.
         frames: f64,
     },
+    /// A change that is no setting.
+    #[error(
+        "{place}: `{setting}` is no change; write KEY = VALUE, for example \
+             \"solver.iterations = 20\""
+    )]
+    ChangeText {
+        /// Where the change is.
+        place: Place,
+        /// What is written.
+        setting: String,
+    },
+    /// A change that cannot be made.
+    #[error("{place}: the change at {time} s: {error}")]
+    Change {
+        /// Where the change is.
+        place: Place,
+        /// When it was to happen [s].
+        time: f64,
+        /// Why not.
+        error: Box<SceneError>,
+    },
+    /// A change of what cannot change while a scene runs.
+    #[error(
+        "`{key}` cannot change while the scene runs; of `solver` all but `solver.precision` can, `world`, and \
+         the materials of bodies, such as `body.NAME.material.young`"
+    )]
+    FixedKey {
+        /// The key.
+        key: String,
+    },
     /// A selector finds nothing.
     #[error("{place}: {purpose} selects nothing: {error}")]
     Selection {
@@ -301,7 +336,7 @@ impl Scene {
         for (key, value) in overrides {
             apply_override(&mut tree, key, value)?;
         }
-        build::build_scene(name, read_table("", &tree)?)
+        build::build_scene(name, tree)
     }
 
     /// How many frames the scene lasts: its duration in frames, rounded, at least one.

@@ -70,18 +70,22 @@ pub struct Motion {
     pub name: String,
     /// What is held.
     pub patch: Patch,
-    /// At least one, times ascending, the first at time 0.
+    /// At least one, times ascending, the first at `start`.
     pub keys: Vec<MotionKey>,
     /// Between keys.
     pub interpolation: Interpolation,
     /// The point [m] that rotations turn about.
     pub about: Vec3<f64>,
+    /// When the patch is taken hold of [s]: poses are relative to where it is then.
+    pub start: f64,
+    /// Total stiffness [N/m] of springs that pull it along; `None` holds rigidly.
+    pub stiffness: Option<f64>,
     /// When the patch is let go [s].
     pub release: Option<f64>,
 }
 
 impl Motion {
-    /// Where the patch is at a time [s], relative to rest.
+    /// Where the patch is at a time [s], relative to where it was taken hold of.
     pub fn pose(&self, time: f64) -> RigidTransform {
         let (before, after, share) = between(&self.keys, |key| key.time, time);
         let Some((a, b)) = before.zip(after) else { return RigidTransform::IDENTITY };
@@ -93,9 +97,9 @@ impl Motion {
         )
     }
 
-    /// Whether the patch is still held at a time [s].
+    /// Whether the patch is held at a time [s].
     pub fn is_held(&self, time: f64) -> bool {
-        self.release.is_none_or(|release| time < release)
+        time >= self.start && self.release.is_none_or(|release| time < release)
     }
 }
 
@@ -142,9 +146,10 @@ impl Interpolation {
     }
 }
 
-/// Exact at both ends.
+/// Exact at both ends, and where they are the same: a hold that stood still stands still once it is read
+/// from a file, which tells of the end of that as well.
 fn mix(a: Vec3<f64>, b: Vec3<f64>, share: f64) -> Vec3<f64> {
-    a * (1.0 - share) + b * share
+    if a == b { a } else { a * (1.0 - share) + b * share }
 }
 
 /// The keys before and after a time, and how far it is from one to the other (0 to 1).
@@ -173,6 +178,8 @@ mod tests {
             keys,
             interpolation,
             about: vec3(0.1, 0.2, 0.3),
+            start: 0.0,
+            stiffness: None,
             release: Some(1.5),
         }
     }

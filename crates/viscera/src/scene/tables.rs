@@ -7,8 +7,8 @@ use crate::material::{
 use crate::scalar::{Vec3, vec3};
 use crate::settings::{
     ANY, Kind, Node, Placed, Range, SettingError, SolverSettings, Value, ValueError, above,
-    at_least, choices, direction, name, number, one_of, optional, placed, quantity, settings_table,
-    several, table, tables, text, truth, value_error, vector, whole,
+    at_least, choices, direction, each, name, number, one_of, optional, placed, quantity,
+    settings_table, several, table, tables, text, truth, value_error, vector, whole,
 };
 use crate::units::Dimension;
 
@@ -33,6 +33,8 @@ settings_table! {
         force: Vec<Placed<ForceTable>> = (Vec::new()), tables::<ForceTable>();
         /// Springs between two vertices.
         spring: Vec<Placed<SpringTable>> = (Vec::new()), tables::<SpringTable>();
+        /// Settings that change while the scene runs.
+        change: Vec<Placed<ChangeTable>> = (Vec::new()), tables::<ChangeTable>();
         /// How a step is solved.
         solver: SolverSettings = (SolverSettings::default()), table::<SolverSettings>();
         /// What a run writes.
@@ -279,7 +281,7 @@ settings_table! {
     pub(super) struct MotionKeyTable {
         /// When.
         time: f64 = required, quantity(Dimension::Time, at_least(0.0));
-        /// Displacement from rest.
+        /// Displacement from where the patch is taken hold of: from rest, without a `start`.
         translation: Vec3<f64> = (Vec3::ZERO), vector(Dimension::Length);
         /// Axis of the rotation, through the motion's `about`.
         rotation_axis: Vec3<f64> = (vec3(0.0, 0.0, 1.0)), direction();
@@ -290,8 +292,8 @@ settings_table! {
 }
 
 settings_table! {
-    /// A patch that is held and moved along a path. Before the first key it goes there from rest
-    /// at time 0, after the last it stays.
+    /// A patch that is held and moved along a path. Before the first key it goes there from where it is
+    /// taken hold of, after the last it stays.
     pub(super) struct MotionTable {
         /// A name for messages and results.
         name: Option<String> = None, optional(name());
@@ -301,9 +303,26 @@ settings_table! {
         interpolation: Interpolation = (Interpolation::Smooth), one_of::<Interpolation>();
         /// The point that rotations turn about.
         about: Vec3<f64> = (Vec3::ZERO), vector(Dimension::Length);
+        /// When the patch is taken hold of, at the beginning of the first frame that does not begin
+        /// earlier; where its vertices are then counts as the beginning of the path.
+        start: f64 = 0.0, quantity(Dimension::Time, at_least(0.0));
+        /// Total stiffness of springs that pull the patch along: every vertex follows its place on the path by
+        /// a spring of this stiffness divided by their number. Rigid where unset.
+        stiffness: Option<f64> = None, optional(quantity(Dimension::Stiffness, STIFFNESS));
         /// When the patch is let go; never where unset.
         release: Option<f64> = None, optional(quantity(Dimension::Time, at_least(0.0)));
         with PatchTable as patch;
+    }
+}
+
+settings_table! {
+    /// Settings that change while the scene runs; positions and velocities stay.
+    pub(super) struct ChangeTable {
+        /// When: at the beginning of the first frame that does not begin earlier.
+        time: f64 = required, quantity(Dimension::Time, at_least(0.0));
+        /// What, each as `KEY = VALUE` with the keys of overrides: of `solver` (but for its precision), `world`,
+        /// and the materials of bodies and their regions.
+        set: Vec<String> = required, each(text());
     }
 }
 

@@ -42,6 +42,36 @@ impl<K: Kind<Value: Copy + Default>, const COUNT: usize> Kind for Several<K, COU
     }
 }
 
+/// Any number of values of one kind.
+pub(crate) struct Each<K>(K);
+
+/// Any number of values of one kind.
+pub(crate) fn each<K: Kind>(kind: K) -> Each<K> {
+    Each(kind)
+}
+
+impl<K: Kind> Kind for Each<K> {
+    type Value = Vec<K::Value>;
+
+    fn read(&self, key: &str, node: &Node) -> Result<Self::Value, SettingError> {
+        let Value::List(items) = &node.value else { return Err(wrong_type(self, key, node)) };
+        items.iter().map(|item| self.0.read(key, item)).collect()
+    }
+
+    fn type_text(&self) -> String {
+        format!("a list, each {}", self.0.type_text())
+    }
+
+    fn value_text(&self, values: &Self::Value) -> String {
+        let texts: Vec<_> = values.iter().map(|value| self.0.value_text(value)).collect();
+        format!("[{}]", texts.join(", "))
+    }
+
+    fn range_text(&self) -> String {
+        self.0.range_text()
+    }
+}
+
 /// A key that may be left out.
 pub(crate) struct Optional<K>(K);
 

@@ -49,6 +49,16 @@ pub(crate) struct Node {
     pub value: Value,
 }
 
+impl Node {
+    /// Takes an entry out of a table.
+    pub fn remove(&mut self, key: &str) -> Option<Self> {
+        match &mut self.value {
+            Value::Table(entries) => entries.remove(key),
+            _ => None,
+        }
+    }
+}
+
 /// What can stand right of an equals sign.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {

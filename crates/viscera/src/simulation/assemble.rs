@@ -228,7 +228,11 @@ impl Assembly {
         Ok(())
     }
 
-    fn resolve(&self, patch: &crate::scene::Patch) -> Result<ResolvedPatch, AssembleError> {
+    /// The vertices of a patch, of a body that there is.
+    pub(super) fn resolve(
+        &self,
+        patch: &crate::scene::Patch,
+    ) -> Result<ResolvedPatch, AssembleError> {
         let body = &self.bodies[patch.body];
         let mesh = &body.mesh;
         let local = patch.select(mesh.vertices(), mesh.tets(), mesh.regions())?;

@@ -47,6 +47,9 @@ pub(super) trait Elsewhere<S>: Debug + Send {
         solver: &mut Solver<S>,
     ) -> Result<(), FrameError>;
 
+    /// Puts a state that fits the model in the place of the device's.
+    fn write(&mut self, model: &Model<S>, state: &State<S>);
+
     fn write_velocities(&mut self, model: &Model<S>, velocities: &[Vec3<S>]);
 
     #[cfg(feature = "gpu")]
@@ -91,6 +94,29 @@ impl<S: Real> Backend<S> {
             DeviceRequest::Cpu => Ok(Self::cpu("as asked for")),
             DeviceRequest::Auto => Ok(Self::cpu("the GPU backend was left out of this build")),
             device => Err(SimulationError::NoGpuBackend { device: device.clone() }),
+        }
+    }
+
+    /// For another model: on the device at hand, or, where the settings ask for another one, chosen anew.
+    pub fn renew(
+        &self,
+        same_device: bool,
+        model: &Model<S>,
+        solver: &Solver<S>,
+        dt: f64,
+    ) -> Result<Self, SimulationError> {
+        #[cfg(feature = "gpu")]
+        if same_device && let Some(again) = super::gpu::again(self, model, solver.settings()) {
+            return again;
+        }
+        let warning = self.warning.clone().filter(|_| same_device);
+        match warning {
+            // A device that was lost is not tried again before somebody asks for it.
+            Some(warning) => {
+                let cpu = Self::cpu(&warning);
+                Ok(Self { warning: Some(warning), ..cpu })
+            }
+            None => Self::choose(model, solver, dt),
         }
     }
 

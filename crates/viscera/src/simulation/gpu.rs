@@ -55,6 +55,11 @@ impl Elsewhere<f32> for GpuSolver {
         Ok(self.read_with_ground(model, state, solver)?)
     }
 
+    fn write(&mut self, model: &Model<f32>, state: &State<f32>) {
+        let written = GpuSolver::write(self, model, state);
+        debug_assert!(written.is_ok(), "{written:?}");
+    }
+
     fn write_velocities(&mut self, model: &Model<f32>, velocities: &[Vec3<f32>]) {
         GpuSolver::write_velocities(self, model, velocities);
     }
@@ -62,6 +67,34 @@ impl Elsewhere<f32> for GpuSolver {
     fn solver(&self) -> &GpuSolver {
         self
     }
+}
+
+/// The same device with another model; nothing where the CPU computes.
+pub(super) fn again<S: Real>(
+    backend: &Backend<S>,
+    model: &Model<S>,
+    settings: &SolverSettings,
+) -> Option<Result<Backend<S>, SimulationError>> {
+    let device = backend.elsewhere.as_ref()?.solver().device();
+    let model: &dyn Any = model;
+    let solver = GpuSolver::new(device, model.downcast_ref::<Model<f32>>()?, settings);
+    Some(solver.map_err(Into::into).and_then(|solver| {
+        let renewed = Backend {
+            elsewhere: Some(Box::new(solver)),
+            choice: backend.choice.clone(),
+            warning: None,
+            gives_way: backend.gives_way,
+        };
+        of_precision(renewed)
+    }))
+}
+
+/// The same backend, of a precision that is known to be single.
+fn of_precision<S: Real>(backend: Backend<f32>) -> Result<Backend<S>, SimulationError> {
+    let mut backend = Some(backend);
+    let backend: &mut dyn Any = &mut backend;
+    let backend = backend.downcast_mut::<Option<Backend<S>>>().and_then(Option::take);
+    backend.ok_or(SimulationError::Gpu(GpuError::DoublePrecision))
 }
 
 /// What the settings ask for, with so many sweeps per step. They do not ask for the CPU.
@@ -82,11 +115,7 @@ pub(super) fn choose<S: Real>(
         DeviceRequest::Gpu => asked_for(None, model, settings)?,
         _ => faster(model, settings, sweeps),
     };
-    let mut chosen = Some(chosen);
-    // The model is in single precision, and so `S` is.
-    let chosen: &mut dyn Any = &mut chosen;
-    let chosen = chosen.downcast_mut::<Option<Backend<S>>>().and_then(Option::take);
-    chosen.ok_or(SimulationError::Gpu(GpuError::DoublePrecision))
+    of_precision(chosen)
 }
 
 fn asked_for(

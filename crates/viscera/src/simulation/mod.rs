@@ -1,24 +1,28 @@
 //! A scene in motion: inputs from the scene's paths, frames of substeps, and what to report.
 
+mod acting;
 mod assemble;
 mod device;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod live;
 
+use acting::Taken;
 pub use assemble::{AssembleError, AssembledBody, Assembly, ResolvedPatch};
 pub use device::SimulationError;
+pub use live::{Live, LiveError};
 
 use crate::measure::{
     DeformationSummary, Energies, TetMeasure, measure_energies, measure_tets, summarize_deformation,
 };
 use crate::model::Model;
+use crate::scalar::Real;
 use crate::scalar::lanes::Instructions;
-use crate::scalar::{Real, Vec3};
-use crate::scene::Scene;
+use crate::scene::{Change, Scene};
 use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]
 use crate::solver::gpu::GpuError;
-use crate::solver::{Inputs, Pin, Solver, StepError};
+use crate::solver::{Inputs, Solver, StepError};
 use crate::state::State;
 use device::Backend;
 use std::fmt;
@@ -39,6 +43,9 @@ pub enum FrameError {
     /// A step was refused.
     #[error(transparent)]
     Step(#[from] StepError),
+    /// A change of settings, which the scene wants now, cannot be made.
+    #[error(transparent)]
+    Change(#[from] Box<LiveError>),
     /// The device failed. What [`Simulation::state`] gives is still that of the last frame.
     #[cfg(feature = "gpu")]
     #[error(transparent)]
@@ -121,6 +128,13 @@ pub struct Simulation<S> {
     solver: Solver<S>,
     backend: Backend<S>,
     inputs: Inputs<S>,
+    taken: Taken,
+    /// The scene without what was done to it by hand.
+    written: Scene,
+    /// Changes of the scene that have been made.
+    changes_made: usize,
+    /// Those of them that came by hand.
+    by_hand: Vec<Change>,
     balance: ForceBalance,
     tets: Vec<TetMeasure>,
     frame: u64,
@@ -144,7 +158,11 @@ impl<S: Real> Simulation<S> {
             state: State::at_rest(&model),
             backend: choose(&model, &solver, substep_dt(&scene))?,
             solver,
-            inputs: inputs_at(&scene, &assembly, 0.0),
+            inputs: Inputs::default(),
+            taken: Taken::default(),
+            written: scene.clone(),
+            changes_made: 0,
+            by_hand: Vec::new(),
             balance: ForceBalance::default(),
             tets: Vec::with_capacity(model.tet_count()),
             frame: 0,
@@ -153,6 +171,7 @@ impl<S: Real> Simulation<S> {
             scene,
             assembly,
         };
+        simulation.inputs = simulation.inputs_at(0.0);
         measure_tets(&simulation.model, &simulation.state.positions, &mut simulation.tets);
         Ok(simulation)
     }
@@ -221,6 +240,14 @@ impl<S: Real> Simulation<S> {
     /// Advances by one frame and measures it. Where it fails, the simulation stays where it
     /// failed and will fail again.
     pub fn advance_frame(&mut self) -> Result<(), FrameError> {
+        self.advance()?;
+        self.measure()
+    }
+
+    /// As [`Simulation::advance_frame`], without the measures, which are of an earlier frame then: for
+    /// who needs positions, not numbers.
+    pub fn advance(&mut self) -> Result<(), FrameError> {
+        self.begin_frame().map_err(Box::new)?;
         let rejected = self.solver.rejected_steps();
         match self.compute_frame() {
             // What a step refuses, the CPU would refuse as well.
@@ -236,15 +263,6 @@ impl<S: Real> Simulation<S> {
         if !self.state.is_finite() {
             return Err(FrameError::Diverged { time: self.time() });
         }
-        self.solver.force_balance(&self.model, &self.state, &self.inputs, &mut self.balance)?;
-        measure_tets(&self.model, &self.state.positions, &mut self.tets);
-        // Files and pictures are in single precision: what it cannot hold has run away as well.
-        let is_number = |tet: &TetMeasure| {
-            (tet.energy_density as f32).is_finite() && (tet.von_mises as f32).is_finite()
-        };
-        if !self.tets.iter().all(is_number) {
-            return Err(FrameError::Diverged { time: self.time() });
-        }
         let factor = self.scene.time.velocity_factor;
         if factor != 1.0 {
             for velocity in &mut self.state.velocities {
@@ -257,13 +275,27 @@ impl<S: Real> Simulation<S> {
         Ok(())
     }
 
+    /// Measures the last frame, for [`Simulation::tets`] and [`Simulation::report`].
+    pub fn measure(&mut self) -> Result<(), FrameError> {
+        self.solver.force_balance(&self.model, &self.state, &self.inputs, &mut self.balance)?;
+        measure_tets(&self.model, &self.state.positions, &mut self.tets);
+        // Files and pictures are in single precision: what it cannot hold has run away as well.
+        let is_number = |tet: &TetMeasure| {
+            (tet.energy_density as f32).is_finite() && (tet.von_mises as f32).is_finite()
+        };
+        if !self.tets.iter().all(is_number) {
+            return Err(FrameError::Diverged { time: self.time() });
+        }
+        Ok(())
+    }
+
     /// The substeps of a frame, and the state at its end.
     fn compute_frame(&mut self) -> Result<(), FrameError> {
         let dt = substep_dt(&self.scene);
         let start = self.time();
-        let Self { model, state, solver, inputs, backend, .. } = self;
-        for substep in 0..self.scene.solver.substeps {
-            act(&self.scene, &self.assembly, start + f64::from(substep + 1) * dt, inputs);
+        let Self { scene, assembly, taken, model, state, solver, inputs, backend, .. } = self;
+        for substep in 0..scene.solver.substeps {
+            taken.act(scene, assembly, start + f64::from(substep + 1) * dt, inputs);
             backend.step(solver, model, state, inputs, dt)?;
         }
         match &mut backend.elsewhere {
@@ -285,116 +317,9 @@ impl<S: Real> Simulation<S> {
             patches: self.patch_forces(),
         }
     }
-
-    /// What the scene does at a time [s].
-    pub fn inputs_at(&self, time: f64) -> Inputs<S> {
-        inputs_at(&self.scene, &self.assembly, time)
-    }
-
-    fn patch_forces(&self) -> Vec<PatchForce> {
-        let positions: Vec<_> = self.state.positions.iter().map(|x| x.cast()).collect();
-        self.patch_forces_at(self.time(), &positions, &self.balance.residual)
-    }
-
-    /// Forces on the scene's patches at a time [s], for a caller with a state of its own:
-    /// `positions` [m], and the forces `holding` [N] by which held vertices are held where they are,
-    /// both of shape [vertex_count].
-    pub fn patch_forces_at(
-        &self,
-        time: f64,
-        positions: &[Vec3<f64>],
-        holding: &[Vec3<f64>],
-    ) -> Vec<PatchForce> {
-        let (scene, assembly) = (&self.scene, &self.assembly);
-        let rest = assembly.builder.positions();
-        let position = |v: u32| positions.get(v as usize).copied().unwrap_or(rest[v as usize]);
-        let held = |v: u32| holding.get(v as usize).copied().unwrap_or_default();
-        let mut forces = Vec::new();
-        for (fixing, patch) in scene.fixings.iter().zip(&assembly.fixings) {
-            let share = fixing.stiffness.map(|total| total / patch.vertices.len() as f64);
-            let on_vertex = |v: u32| match share {
-                None => held(v),
-                Some(stiffness) => (rest[v as usize] - position(v)) * stiffness,
-            };
-            forces.push(sum(&fixing.name, PatchKind::Fixing, patch, position, on_vertex));
-        }
-        for (motion, patch) in scene.motions.iter().zip(&assembly.motions) {
-            let is_held = motion.is_held(time);
-            let on_vertex = |v: u32| if is_held { held(v) } else { Vec3::ZERO };
-            forces.push(sum(&motion.name, PatchKind::Motion, patch, position, on_vertex));
-        }
-        for (force, patch) in scene.forces.iter().zip(&assembly.forces) {
-            let share = force.at(time) * (1.0 / patch.vertices.len() as f64);
-            forces.push(sum(&force.name, PatchKind::Force, patch, position, |_| share));
-        }
-        forces
-    }
 }
 
 /// A substep of a scene [s].
 fn substep_dt(scene: &Scene) -> f64 {
     scene.time.frame / f64::from(scene.solver.substeps)
-}
-
-/// What a scene does at a time [s], with room for what it does at any other.
-fn inputs_at<S: Real>(scene: &Scene, assembly: &Assembly, time: f64) -> Inputs<S> {
-    let count = |patches: &[ResolvedPatch]| -> usize {
-        patches.iter().map(|patch| patch.vertices.len()).sum()
-    };
-    let mut inputs = Inputs {
-        gravity: scene.world.gravity.cast(),
-        pins: Vec::with_capacity(count(&assembly.fixings) + count(&assembly.motions)),
-        anchors: Vec::new(),
-        forces: Vec::with_capacity(count(&assembly.forces)),
-    };
-    act(scene, assembly, time, &mut inputs);
-    inputs
-}
-
-/// Puts what a scene does at a time [s] into the inputs; takes no memory where they have room.
-fn act<S: Real>(scene: &Scene, assembly: &Assembly, time: f64, inputs: &mut Inputs<S>) {
-    let rest = assembly.builder.positions();
-    inputs.pins.clear();
-    for (fixing, patch) in scene.fixings.iter().zip(&assembly.fixings) {
-        if fixing.stiffness.is_none() {
-            let pins = patch.vertices.iter();
-            let pins = pins.map(|&v| Pin { vertex: v, target: rest[v as usize].cast() });
-            inputs.pins.extend(pins);
-        }
-    }
-    // Later pins win where patches overlap: a motion takes a fixed vertex along.
-    for (motion, patch) in scene.motions.iter().zip(&assembly.motions) {
-        if motion.is_held(time) {
-            let pose = motion.pose(time);
-            let pins = patch.vertices.iter();
-            let target = |v: u32| pose.apply(rest[v as usize]).cast();
-            inputs.pins.extend(pins.map(|&v| Pin { vertex: v, target: target(v) }));
-        }
-    }
-    inputs.forces.clear();
-    for (force, patch) in scene.forces.iter().zip(&assembly.forces) {
-        let share = force.at(time) * (1.0 / patch.vertices.len() as f64);
-        inputs.forces.extend(patch.vertices.iter().map(|&v| (v, share.cast())));
-    }
-}
-
-/// Adds up forces [N] on the vertices of a patch, and their torque about its middle.
-fn sum(
-    name: &str,
-    kind: PatchKind,
-    patch: &ResolvedPatch,
-    position: impl Fn(u32) -> Vec3<f64>,
-    on_vertex: impl Fn(u32) -> Vec3<f64>,
-) -> PatchForce {
-    let mut middle = Vec3::<f64>::ZERO;
-    for &v in &patch.vertices {
-        middle += position(v) * (1.0 / patch.vertices.len() as f64);
-    }
-    let (mut force, mut torque) = (Vec3::ZERO, Vec3::ZERO);
-    for &v in &patch.vertices {
-        force += on_vertex(v);
-        torque += (position(v) - middle).cross(on_vertex(v));
-    }
-    let (force, torque) = (force.to_array(), torque.to_array());
-    PatchForce { name: name.to_owned(), kind, force, torque }
 }

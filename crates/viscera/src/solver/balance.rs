@@ -100,6 +100,12 @@ impl ForceBalance {
             self.residual[v as usize] -= force;
             self.load += force.length();
         }
+        for tether in &ground.tethers {
+            if ground.inverse_masses[tether.vertex] != S::ZERO {
+                let v = model.numbering.order[tether.vertex];
+                self.load += tether.force(state.positions[v as usize]).cast::<f64>().length();
+            }
+        }
         let gravity = inputs.gravity.cast::<f64>();
         for &(_, force) in &inputs.forces {
             self.load += force.cast::<f64>().length();
@@ -109,7 +115,8 @@ impl ForceBalance {
             let x = state.positions[v].cast::<f64>();
             let place = model.numbering.of(v as u32);
             let predicted = ground.predicted[place].vec3().cast();
-            self.residual[v] += (x - predicted) * (mass / (dt * dt));
+            let inertia = ground.inertias[place].to_f64();
+            self.residual[v] += (x - predicted) * (inertia / (dt * dt));
             let residual = self.residual[v];
             if ground.inverse_masses[place] == S::ZERO {
                 self.load += residual.length();

@@ -5,13 +5,14 @@ use super::Inputs;
 use super::StepError;
 use super::acceleration::{Anderson, Chebyshev};
 use super::energy::Energy;
-use super::explicit::stable_step;
+use super::explicit::Stability;
 use super::guard::Guard;
 use super::iterates::Iterate;
 use super::loads::load_multipliers;
 use super::plan::Stage;
 use super::potential::{Evaluator, measure_strain};
 use super::sweep::solve_color;
+use super::tethers::{Bundle, bundle};
 use super::threads::{Shared, Workers};
 use crate::model::Model;
 use crate::scalar::lanes::{Eight, LANES, Point};
@@ -62,7 +63,11 @@ pub(super) struct Ground<S> {
     pub external: Vec<Vec3<S>>,
     /// Masses [kg].
     pub masses: Vec<S>,
-    /// `1/m`, zero where pinned [1/kg].
+    /// Springs to places outside, one for a vertex that has any.
+    pub tethers: Vec<Bundle<S>>,
+    /// `m'`: masses, and what tethers make of them [kg]; see [`super::tethers`].
+    pub inertias: Vec<S>,
+    /// `1/m'`, zero where pinned [1/kg].
     pub inverse_masses: Vec<S>,
     /// See [`StartStrain`].
     pub start_strain: StartStrain<S>,
@@ -101,8 +106,8 @@ pub(super) struct Workspace<S> {
     pub mixed: Vec<S>,
     /// Empty where steps are not guarded.
     pub guard: Guard<S>,
-    /// Of an explicit method [s].
-    pub stable_step: f64,
+    /// Of an explicit method.
+    pub stability: Stability,
     /// Small steps done in this step.
     pub small_step: u32,
     /// Velocities at the start of an explicit step [m/s]; empty for other methods.
@@ -138,6 +143,8 @@ impl<S: Real> Workspace<S> {
                 predicted: points(true),
                 external: vec![Vec3::ZERO; vertices],
                 masses: model.numbering.order.iter().map(|&v| model.masses[v as usize]).collect(),
+                tethers: Vec::new(),
+                inertias: vec![S::ZERO; vertices],
                 inverse_masses: vec![S::ZERO; vertices],
                 start_strain: model.tet_sets().map(strains),
             },
@@ -158,7 +165,7 @@ impl<S: Real> Workspace<S> {
             anderson: Anderson::new(window, length),
             mixed: vec![S::ZERO; if anderson { 3 * vertices } else { 0 }],
             guard: Guard::new(if guarded { vertices } else { 0 }),
-            stable_step: if explicit { stable_step(model, settings) } else { f64::INFINITY },
+            stability: Stability::new(explicit.then_some(model), settings),
             small_step: 0,
             start_velocities: vec![Vec3::ZERO; if explicit { vertices } else { 0 }],
         }
@@ -166,12 +173,13 @@ impl<S: Real> Workspace<S> {
 
     /// Bytes of all arrays.
     pub fn bytes(&self) -> usize {
-        let Ground { previous, predicted, external, masses, inverse_masses, .. } = &self.ground;
+        let Ground { previous, predicted, external, masses, inertias, inverse_masses, .. } =
+            &self.ground;
         let points = [&self.points, previous, predicted, &self.copies, &self.loads];
         let iterates = self.iterate.iter();
         points.into_iter().map(|points| size_of_val(&points[..])).sum::<usize>()
             + [external, &self.velocities].map(|v| size_of_val(&v[..])).iter().sum::<usize>()
-            + [masses, inverse_masses].map(|m| size_of_val(&m[..])).iter().sum::<usize>()
+            + [masses, inertias, inverse_masses].map(|m| size_of_val(&m[..])).iter().sum::<usize>()
             + self.ground.start_strain.iter().map(|s| size_of_val(&s[..])).sum::<usize>()
             + iterates.clone().map(|i| size_of_val(&i.positions[..])).sum::<usize>()
             + iterates.map(|i| size_of_val(&i.multipliers[..])).sum::<usize>()
@@ -179,6 +187,7 @@ impl<S: Real> Workspace<S> {
             + size_of_val(&self.mixed[..])
             + size_of_val(&self.energies[..])
             + size_of_val(&self.start_velocities[..])
+            + self.stability.bytes()
             + self.evaluator.bytes()
             + self.anderson.bytes()
             + self.guard.bytes()
@@ -292,15 +301,24 @@ impl<S: Real> Workspace<S> {
         }
     }
 
-    /// External forces, and the inverse masses, which pins have none of.
+    /// External forces, inertias, and their inverses, which pins have none of.
     pub(super) fn prepare(&mut self, step: &Step<'_, S>) {
         let (model, ground) = (step.model, &mut self.ground);
         ground.external.fill(Vec3::ZERO);
         for &(vertex, force) in &step.inputs.forces {
             ground.external[model.numbering.of(vertex)] += force;
         }
-        for (inverse, &mass) in ground.inverse_masses.iter_mut().zip(&ground.masses) {
-            *inverse = S::ONE / mass;
+        bundle(model, step.inputs, &mut ground.tethers);
+        ground.inertias.copy_from_slice(&ground.masses);
+        // Small explicit steps take tethers as forces.
+        if step.settings.method == Method::Xpbd {
+            let squared = S::from_f64(step.dt * step.dt);
+            for tether in &ground.tethers {
+                ground.inertias[tether.vertex] += tether.stiffness * squared;
+            }
+        }
+        for (inverse, &inertia) in ground.inverse_masses.iter_mut().zip(&ground.inertias) {
+            *inverse = S::ONE / inertia;
         }
         for pin in &step.inputs.pins {
             ground.inverse_masses[model.numbering.of(pin.vertex)] = S::ZERO;
@@ -313,7 +331,7 @@ impl<S: Real> Workspace<S> {
         let dt = S::from_f64(step.dt);
         for v in 0..model.vertex_count() {
             let x = self.points[v].vec3();
-            let load = ground.external[v] * (S::ONE / ground.masses[v]);
+            let load = ground.external[v] * (S::ONE / ground.inertias[v]);
             let inertial = x + self.velocities[v] * dt;
             let predicted = inertial + (step.inputs.gravity + load) * (dt * dt);
             ground.previous[v].set_vec3(x);
@@ -324,6 +342,17 @@ impl<S: Real> Workspace<S> {
                 Start::Predicted | Start::Auto => predicted,
             };
             self.points[v] = Point::new(x, ground.inverse_masses[v] * copy_count(model, v));
+        }
+        for tether in &ground.tethers {
+            let v = tether.vertex;
+            let inertial = ground.previous[v].vec3() + self.velocities[v] * dt;
+            let pull = tether.force(inertial + step.inputs.gravity * (dt * dt));
+            let predicted =
+                ground.predicted[v].vec3() + pull * (S::ONE / ground.inertias[v]) * (dt * dt);
+            ground.predicted[v].set_vec3(predicted);
+            if matches!(start, Start::Predicted | Start::Auto) {
+                self.points[v].set_vec3(predicted);
+            }
         }
         for pin in &step.inputs.pins {
             self.points[model.numbering.of(pin.vertex)].set_vec3(pin.target);
@@ -341,7 +370,7 @@ impl<S: Real> Workspace<S> {
                 return;
             }
             let load = gather(model, loads, v);
-            let mass = ground.masses[v];
+            let mass = ground.inertias[v];
             let residual = (point.vec3() - ground.predicted[v].vec3()) * mass - load.vec3();
             let inverse = S::ONE / (mass + load.w * share);
             let x = point.vec3() - residual * (factor * inverse);

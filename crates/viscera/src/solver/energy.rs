@@ -4,7 +4,7 @@
 //! ```text
 //! T_1 <= T_n + V(x_n with pins moved) - V(x_1) + sum_i (m_i g + f_i) . (x_1 - x_n)_i
 //! v *= sqrt(limit/T_1) where it is exceeded;  T: kinetic energy of the free vertices, V: tissue with
-//! its viscosity, springs, attachments
+//! its viscosity, springs, attachments, tethers
 //! ```
 //!
 //! Implicit Euler dissipates: where the stored energy is convex along the step, its exact solution holds
@@ -23,7 +23,7 @@ use crate::scalar::{Real, Vec3};
 /// What a connected part has and is given during a step; sums over its free vertices.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Energy {
-    /// Whether a pin or an attachment holds it.
+    /// Whether a pin, an attachment or a tether holds it.
     held: bool,
     /// [kg].
     mass: f64,
@@ -86,6 +86,14 @@ impl<S: Real> Workspace<S> {
             let v = model.numbering.of(vertex);
             self.energies[model.component_of[v] as usize].held = true;
         }
+        for tether in &self.ground.tethers {
+            if self.ground.inverse_masses[tether.vertex] != S::ZERO {
+                let part = &mut self.energies[model.component_of[tether.vertex] as usize];
+                part.held = true;
+                let x = self.ground.previous[tether.vertex].vec3();
+                part.start.stored += tether.energy(x);
+            }
+        }
         for (v, &velocity) in self.velocities.iter().enumerate() {
             let part = &mut self.energies[model.component_of[v] as usize];
             if self.ground.inverse_masses[v] == S::ZERO {
@@ -102,6 +110,12 @@ impl<S: Real> Workspace<S> {
         let (ground, energies) = (&self.ground, &mut self.energies);
         for (part, stored) in energies.iter_mut().zip(&self.evaluator.stored) {
             part.end.stored = *stored;
+        }
+        for tether in &ground.tethers {
+            if ground.inverse_masses[tether.vertex] != S::ZERO {
+                let part = &mut energies[model.component_of[tether.vertex] as usize];
+                part.end.stored += tether.energy(self.points[tether.vertex].vec3());
+            }
         }
         for (v, x) in self.points.iter().enumerate() {
             if ground.inverse_masses[v] == S::ZERO {

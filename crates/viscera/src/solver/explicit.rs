@@ -13,10 +13,12 @@
 //! because `K_e <= rho(K_e) I` on the vertices of every element `e`.
 
 use super::StepError;
-use super::cpu::{Step, Workspace, gather};
+use super::cpu::{Ground, Step, Workspace, gather};
 use super::potential::{load_forces, measure_strain};
+use super::tethers::Bundle;
 use crate::elements::shape_gradients;
 use crate::model::Model;
+use crate::scalar::lanes::Point;
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::settings::SolverSettings;
 
@@ -26,8 +28,60 @@ const MOST_SMALL_STEPS: f64 = 100_000.0;
 /// Rounds of the power method for an element's stiffness: 1 % is enough for a bound with a margin.
 const POWER_ROUNDS: usize = 20;
 
-/// The largest stable small step [s], with the margin of the settings.
-pub(super) fn stable_step<S: Real>(model: &Model<S>, settings: &SolverSettings) -> f64 {
+/// What the largest stable small step depends on.
+#[derive(Clone, Debug)]
+pub(super) struct Stability {
+    /// The largest small step [s] without tethers, with the margin of the settings; infinite for other
+    /// methods.
+    pub step: f64,
+    /// Of the elements around each vertex, the user's order [N/m]; empty for other methods.
+    stiffness: Vec<f64>,
+    /// Largest [1/s].
+    frequency: f64,
+    /// Largest [s].
+    viscosity: f64,
+    safety: f64,
+}
+
+impl Stability {
+    /// Of a model that an explicit method moves; without one there is no limit.
+    pub fn new<S: Real>(model: Option<&Model<S>>, settings: &SolverSettings) -> Self {
+        let (stiffness, viscosity) = model.map(vertex_stiffness).unwrap_or_default();
+        let masses = model.map_or(&[][..], |model| &model.masses);
+        let ratios = stiffness.iter().zip(masses).map(|(k, m)| k / m.to_f64());
+        let frequency = ratios.fold(0.0, f64::max).sqrt();
+        let safety = settings.explicit_safety;
+        let step = f64::INFINITY;
+        let mut stability = Self { step, stiffness, frequency, viscosity, safety };
+        if model.is_some() {
+            stability.step = stability.at(frequency);
+        }
+        stability
+    }
+
+    /// The largest small step [s] with these tethers.
+    pub fn step<S: Real>(&self, model: &Model<S>, tethers: &[Bundle<S>]) -> f64 {
+        let frequency = tethers.iter().fold(self.frequency, |most: f64, tether| {
+            let v = model.numbering.order[tether.vertex] as usize;
+            let stiffness = self.stiffness[v] + tether.stiffness.to_f64();
+            most.max((stiffness / model.masses[v].to_f64()).sqrt())
+        });
+        if frequency > self.frequency { self.at(frequency) } else { self.step }
+    }
+
+    fn at(&self, omega: f64) -> f64 {
+        let xi = 0.5 * self.viscosity * omega;
+        self.safety * (2.0 / omega) * ((1.0 + xi * xi).sqrt() - xi)
+    }
+
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.stiffness[..])
+    }
+}
+
+/// Of the elements around each vertex [N/m], and the largest viscosity [s].
+fn vertex_stiffness<S: Real>(model: &Model<S>) -> (Vec<f64>, f64) {
     let mut stiffness = vec![0.0; model.vertex_count()];
     let mut viscosity = 0.0f64;
     for set in model.tet_sets() {
@@ -51,10 +105,20 @@ pub(super) fn stable_step<S: Real>(model: &Model<S>, settings: &SolverSettings) 
     for (&v, k) in model.attachments.vertices.iter().zip(&model.attachments.stiffness) {
         stiffness[v as usize] += k.to_f64();
     }
-    let ratios = stiffness.iter().zip(&model.masses).map(|(k, m)| k / m.to_f64());
-    let omega = ratios.fold(0.0, f64::max).sqrt();
-    let xi = 0.5 * viscosity * omega;
-    settings.explicit_safety * (2.0 / omega) * ((1.0 + xi * xi).sqrt() - xi)
+    (stiffness, viscosity)
+}
+
+impl<S: Real> Ground<S> {
+    /// Adds the tethers to the loads in the prediction of an explicit step; `place` gives a vertex's
+    /// position [m] by the solver's number.
+    pub fn load_tethers(&mut self, dt: f64, place: impl Fn(usize) -> Vec3<S>) {
+        for tether in &self.tethers {
+            let v = tether.vertex;
+            let load = tether.force(place(v)) * (S::ONE / self.masses[v]);
+            let predicted = self.predicted[v].vec3() + load * S::from_f64(dt * dt);
+            self.predicted[v].set_vec3(predicted);
+        }
+    }
 }
 
 /// The largest eigenvalue of a tetrahedron's stiffness at rest, per volume [Pa/m^2]. Both laws have the
@@ -118,6 +182,12 @@ impl<S: Real> Workspace<S> {
     pub(super) fn load_explicit_forces(&mut self, step: &Step<'_, S>) {
         let small = Step { dt: step.small_dt(), ..*step };
         load_forces::<S, false>(&self.ground, &small, &self.points, &mut self.loads);
+        let squared = S::from_f64(small.dt * small.dt);
+        for tether in &self.ground.tethers {
+            let force = tether.force(self.points[tether.vertex].vec3());
+            let copy = step.model.copy_offsets[tether.vertex] as usize;
+            self.loads[copy].add(Point::new(force * squared, S::ZERO));
+        }
         let ground = &mut self.ground;
         measure_strain(&ground.workers, step.model, &self.points, &mut ground.start_strain);
     }
@@ -148,8 +218,8 @@ impl<S: Real> Workspace<S> {
         }
     }
 
-    /// [`super::plan::Stage::EndExplicit`]: `xt = x - dt (v - v_n) + dt^2 (g + M^-1 f_ext)`, so that
-    /// `M (x - xt)/dt^2` is mass times mean acceleration, less the loads.
+    /// [`super::plan::Stage::EndExplicit`]: `xt = x - dt (v - v_n) + dt^2 (g + M^-1 f_ext)`, tethers
+    /// among the loads, so that `M (x - xt)/dt^2` is mass times mean acceleration, less the loads.
     pub(super) fn end_explicit(&mut self, step: &Step<'_, S>) {
         let dt = S::from_f64(step.dt);
         for v in 0..self.points.len() {
@@ -159,5 +229,7 @@ impl<S: Real> Workspace<S> {
             let x = self.points[v].vec3();
             ground.predicted[v].set_vec3(x - change * dt + load * (dt * dt));
         }
+        let Self { ground, points, .. } = self;
+        ground.load_tethers(step.dt, |v| points[v].vec3());
     }
 }

@@ -257,7 +257,7 @@ impl<S: Real> Workspace<S> {
             return (Vec3::ZERO, Vec3::ZERO);
         }
         let load = gather(model, &self.loads, v);
-        let mass = self.ground.masses[v];
+        let mass = self.ground.inertias[v];
         let gradient = (x[v].vec3() - self.ground.predicted[v].vec3()) * mass - load.vec3();
         (gradient, gradient * (-S::ONE / (mass + load.w)))
     }

@@ -25,6 +25,7 @@ mod precision;
 mod products;
 mod sweep;
 mod team;
+mod tethers;
 mod tets;
 mod threads;
 
@@ -49,6 +50,18 @@ pub struct Pin<S> {
     pub target: Vec3<S>,
 }
 
+/// A spring without length from a vertex to a place, for the time of a step: how a tool holds tissue that
+/// gives way. On a pinned vertex it does nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tether<S> {
+    /// The vertex.
+    pub vertex: u32,
+    /// Where it is pulled to, throughout the step [m].
+    pub target: Vec3<S>,
+    /// [N/m], zero or more.
+    pub stiffness: S,
+}
+
 /// What acts on the model from outside during one step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inputs<S> {
@@ -56,6 +69,8 @@ pub struct Inputs<S> {
     pub gravity: Vec3<S>,
     /// Pinned vertices. The set may change from step to step.
     pub pins: Vec<Pin<S>>,
+    /// Springs to places outside. The set may change from step to step; several on one vertex add up.
+    pub tethers: Vec<Tether<S>>,
     /// Where each attachment's anchor is at the end of the step [m], the user's order. Empty:
     /// all anchors at rest.
     pub anchors: Vec<Vec3<S>>,
@@ -65,7 +80,13 @@ pub struct Inputs<S> {
 
 impl<S: Real> Default for Inputs<S> {
     fn default() -> Self {
-        Self { gravity: Vec3::ZERO, pins: Vec::new(), anchors: Vec::new(), forces: Vec::new() }
+        Self {
+            gravity: Vec3::ZERO,
+            pins: Vec::new(),
+            tethers: Vec::new(),
+            anchors: Vec::new(),
+            forces: Vec::new(),
+        }
     }
 }
 
@@ -100,7 +121,7 @@ pub enum StepError {
     /// An input names no vertex.
     #[error("a {what} names vertex {vertex}; the model has {vertex_count}")]
     UnknownVertex {
-        /// "pin" or "force".
+        /// "pin", "tether" or "force".
         what: &'static str,
         /// The index given.
         vertex: u32,
@@ -191,7 +212,7 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         let Self { settings, plan, work } = self;
-        let (repeat, small_steps) = repeats(settings, plan, work, dt)?;
+        let (repeat, small_steps) = repeats(settings, plan, work, model, inputs, dt)?;
         let step = cpu::Step { model, inputs, dt, settings, small_steps };
         carry_out(Task::Watched(plan, repeat, &mut watch), work, &step, state);
         Ok(())
@@ -216,7 +237,7 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         let Self { settings, plan, work } = self;
-        let (repeat, small_steps) = repeats(settings, plan, work, dt)?;
+        let (repeat, small_steps) = repeats(settings, plan, work, model, inputs, dt)?;
         let step = cpu::Step { model, inputs, dt, settings, small_steps };
         carry_out(Task::Step(plan, repeat, count), work, &step, state);
         Ok(())
@@ -265,7 +286,7 @@ impl<S: Real> Solver<S> {
 
     /// The largest small step [s] of the explicit method, its margin included; infinite for others.
     pub fn stable_step(&self) -> f64 {
-        self.work.stable_step
+        self.work.stability.step
     }
 
     /// Bytes of the memory taken, model and state not included.
@@ -306,15 +327,21 @@ impl<S: Real> Solver<S> {
 }
 
 /// How often the body of the plan is run, and how many small steps a step of `dt` [s] has.
-fn repeats<S>(
+fn repeats<S: Real>(
     settings: &SolverSettings,
     plan: &Plan,
-    work: &cpu::Workspace<S>,
+    work: &mut cpu::Workspace<S>,
+    model: &Model<S>,
+    inputs: &Inputs<S>,
     dt: f64,
 ) -> Result<(u32, u32), StepError> {
     Ok(match settings.method {
         Method::Xpbd => (plan.repeat, 1),
-        Method::Explicit => [explicit::small_steps(dt, work.stable_step)?; 2].into(),
+        Method::Explicit => {
+            tethers::bundle(model, inputs, &mut work.ground.tethers);
+            let stable = work.stability.step(model, &work.ground.tethers);
+            [explicit::small_steps(dt, stable)?; 2].into()
+        }
     })
 }
 
@@ -326,6 +353,10 @@ fn check_step<S: Real>(dt: f64, model: &Model<S>, inputs: &Inputs<S>) -> Result<
         return Err(StepError::BadStep { dt });
     }
     check_inputs(model, inputs)
+}
+
+fn is_legal<S: Real>(tether: &Tether<S>) -> bool {
+    tether.target.is_finite() && tether.stiffness >= S::ZERO && tether.stiffness.is_finite()
 }
 
 /// The state fits the model.
@@ -352,6 +383,7 @@ fn check_inputs<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> Result<(), Ste
         return Err(StepError::AnchorCount { given: inputs.anchors.len(), expected });
     }
     let vertices = (inputs.pins.iter().map(|pin| ("pin", pin.vertex)))
+        .chain(inputs.tethers.iter().map(|tether| ("tether", tether.vertex)))
         .chain(inputs.forces.iter().map(|&(vertex, _)| ("force", vertex)));
     for (what, vertex) in vertices {
         if vertex as usize >= vertex_count {
@@ -361,6 +393,7 @@ fn check_inputs<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> Result<(), Ste
     let finite = [
         ("gravity", inputs.gravity.is_finite()),
         ("pin targets", inputs.pins.iter().all(|pin| pin.target.is_finite())),
+        ("tethers", inputs.tethers.iter().all(is_legal)),
         ("anchors", inputs.anchors.iter().all(|anchor| anchor.is_finite())),
         ("forces", inputs.forces.iter().all(|(_, force)| force.is_finite())),
     ];

@@ -215,7 +215,7 @@ impl<S: Real> Evaluator<S> {
                 reach = reach.max(place.length_squared().to_f64());
                 if ground.inverse_masses[v] != S::ZERO {
                     let away = (place - ground.predicted[v].vec3()).length_squared();
-                    sum += (ground.masses[v] * away).to_f64();
+                    sum += (ground.inertias[v] * away).to_f64();
                 }
             }
             [sum, reach]

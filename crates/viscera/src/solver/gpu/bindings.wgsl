@@ -52,8 +52,12 @@ struct Update {
     is_pinned: u32,
     // External force [N].
     force: array<f32, 3>,
-    // Where a pinned vertex is at the end of the step [m].
+    // Where a pinned vertex is at the end of the step, or where springs pull it to [m].
     place: array<f32, 3>,
+    // Of springs to places outside [N/m].
+    stiffness: f32,
+    // Mass, and what springs make of it [kg]; see solver/tethers.rs.
+    inertia: f32,
 }
 
 // One dispatch.

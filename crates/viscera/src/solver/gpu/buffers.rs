@@ -8,6 +8,7 @@ use super::device::Device;
 use super::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::LANES;
+use crate::scalar::{Vec3, vec3};
 use crate::settings::{Acceleration, Method, SolverSettings};
 
 /// Numbers of the storage buffers in all kernels; bindings.wgsl has the same ones.
@@ -83,6 +84,21 @@ pub(super) struct Update {
     pub is_pinned: u32,
     pub force: [f32; 3],
     pub place: [f32; 3],
+    pub stiffness: f32,
+    pub inertia: f32,
+}
+
+impl Update {
+    /// Adds a spring to a place [m]: all of them pull like one to the mean of their places.
+    pub fn add_spring(&mut self, stiffness: f32, target: Vec3<f32>) {
+        let sum = self.stiffness + stiffness;
+        let place = vec3(self.place[0], self.place[1], self.place[2]);
+        self.place = match self.stiffness == 0.0 {
+            true => target.to_array(),
+            false => (place + (target - place) * (stiffness / sum)).to_array(),
+        };
+        self.stiffness = sum;
+    }
 }
 
 /// `Spring` of bindings.wgsl.

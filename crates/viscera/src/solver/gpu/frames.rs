@@ -10,6 +10,7 @@ use super::{GpuError, GpuSolver};
 use crate::model::Model;
 use crate::scalar::lanes::{Eight, Point};
 use crate::scalar::{Vec3, vec3};
+use crate::settings::Method;
 use crate::solver::Solver;
 use crate::state::State;
 
@@ -144,9 +145,15 @@ impl GpuSolver {
             let [predicted, acting] = [read[2], read[3]].map(bytemuck::cast_slice::<u8, [f32; 4]>);
             let ground = &mut solver.work.ground;
             for (v, point) in ground.predicted.iter_mut().enumerate() {
-                let [x, y, z, _] = predicted[v];
+                let [x, y, z, inertia] = predicted[v];
                 *point = Point::new(vec3(x, y, z), 0.0);
+                ground.inertias[v] = inertia;
                 ground.inverse_masses[v] = acting[v][3];
+            }
+            ground.tethers.clone_from(&self.tethers);
+            if self.settings.method == Method::Explicit {
+                let place = |v: usize| state.positions[model.numbering.order[v] as usize];
+                ground.load_tethers(self.multiplier_dt, place);
             }
             solver.work.guard.rejected = Verdict::of(read[4]).rejected.into();
             let Some(strains) = read.get(5) else { return };

@@ -29,7 +29,7 @@ pub fn host_layouts() -> Vec<HostLayout> {
             rebase_factor bound_share update_count small_dt inverse_small_dt small_steps
             chebyshev_damping
         }),
-        record!("Update" Update { vertex is_pinned force place }),
+        record!("Update" Update { vertex is_pinned force place stiffness inertia }),
         record!("Spring" Spring {
             vertices copies slots multiplier rest_length stiffness part
         }),

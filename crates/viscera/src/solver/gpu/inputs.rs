@@ -3,13 +3,15 @@
 use super::GpuSolver;
 use super::buffers::{Buffers, Update};
 use crate::model::Model;
-use crate::settings::{Acceleration, AndersonOn, SolverSettings};
+use crate::settings::{Acceleration, AndersonOn, Method, SolverSettings};
 use crate::solver::Inputs;
 use crate::solver::iterates::fill_multiplier_weights;
+use crate::solver::tethers::bundle;
 
 impl GpuSolver {
     /// What acts on vertices in this step, and the freedom of those that the last one held.
-    pub(super) fn collect_updates(&mut self, model: &Model<f32>, inputs: &Inputs<f32>) {
+    pub(super) fn collect_updates(&mut self, model: &Model<f32>, inputs: &Inputs<f32>, dt: f64) {
+        bundle(model, inputs, &mut self.tethers);
         self.updates.clear();
         let (updates, update_of) = (&mut self.updates, &mut self.update_of);
         let mut update = |vertex: u32| {
@@ -30,9 +32,15 @@ impl GpuSolver {
             .collect();
         let pins: Vec<(usize, [f32; 3])> =
             inputs.pins.iter().map(|pin| (update(of(pin.vertex)), pin.target.to_array())).collect();
+        let tethers: Vec<usize> =
+            self.tethers.iter().map(|tether| update(tether.vertex as u32)).collect();
         let anchors = inputs.anchors_of(model);
         for (place, hold) in holds.into_iter().zip(&self.holds) {
             self.updates[place].place = hold.place(anchors);
+            self.updates[place].stiffness = hold.stiffness as f32;
+        }
+        for (place, tether) in tethers.into_iter().zip(&self.tethers) {
+            self.updates[place].add_spring(tether.stiffness, tether.target);
         }
         for (place, force) in forces {
             for axis in 0..3 {
@@ -42,10 +50,18 @@ impl GpuSolver {
         for (place, target) in pins {
             self.updates[place].is_pinned = 1;
             self.updates[place].place = target;
+            self.updates[place].stiffness = 0.0;
         }
-        for update in &self.updates {
+        // Small explicit steps take springs as forces.
+        let squared_dt = match self.settings.method {
+            Method::Xpbd => (dt * dt) as f32,
+            Method::Explicit => 0.0,
+        };
+        for update in &mut self.updates {
             self.update_of[update.vertex as usize] = u32::MAX;
-            if update.is_pinned != 0 || update.force != [0.0; 3] {
+            let mass = model.masses[model.numbering.order[update.vertex as usize] as usize];
+            update.inertia = mass + update.stiffness * squared_dt;
+            if update.is_pinned != 0 || update.force != [0.0; 3] || update.stiffness != 0.0 {
                 self.touched.push(update.vertex);
             }
         }

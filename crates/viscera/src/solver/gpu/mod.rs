@@ -35,8 +35,9 @@ mod timing;
 
 use super::StepError;
 use super::cpu::{bound_share, rebase_factor, sizes};
-use super::explicit::stable_step;
+use super::explicit::Stability;
 use super::plan::Plan;
+use super::tethers::Bundle;
 use crate::model::Model;
 use crate::scalar::Vec3;
 use crate::settings::{Method, Precision, SolverSettings};
@@ -113,8 +114,10 @@ pub struct GpuSolver {
     weights_dt: f64,
     /// Whether the device's anchors may be elsewhere than at rest.
     has_moved_anchors: bool,
-    /// Of the explicit method: its largest small step [s], and the attachments vertex by vertex.
-    stable_step: f64,
+    /// Of the explicit method: its small steps, and the attachments vertex by vertex.
+    stability: Stability,
+    /// Springs to places outside in the last step.
+    tethers: Vec<Bundle<f32>>,
     holds: Vec<Hold>,
 }
 
@@ -225,7 +228,8 @@ impl GpuSolver {
             update_of: vec![u32::MAX; model.vertex_count()],
             shares: [rebase_factor(model, settings) as f32, bound_share(model) as f32],
             has_moved_anchors: true,
-            stable_step: if is_explicit { stable_step(model, settings) } else { f64::INFINITY },
+            stability: Stability::new(is_explicit.then_some(model), settings),
+            tethers: Vec::new(),
             holds: if is_explicit { Hold::all(model) } else { Vec::new() },
             buffers,
         };
@@ -249,7 +253,7 @@ impl GpuSolver {
 
     /// The largest small step [s] of the explicit method, its margin included; infinite for others.
     pub fn stable_step(&self) -> f64 {
-        self.stable_step
+        self.stability.step
     }
 
     /// The device it works on.

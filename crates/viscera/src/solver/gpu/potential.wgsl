@@ -59,7 +59,7 @@ const SUM_REFERENCE: u32 = 3u;
 const SUM_MAGNITUDE: u32 = 4u;
 const SUM_FORCE: u32 = 5u;
 const SUM_REACH: u32 = 6u;
-// Pins and attachments.
+// Pins, attachments and tethers.
 const SUM_HELD: u32 = 7u;
 // Of free vertices: kinetic energies [J], also relative to the first vertex of the part; work [J] of the
 // loads, alike; mass [kg]; momenta [kg m/s], relative; load [N].
@@ -326,7 +326,9 @@ fn end_velocity(v: u32) -> vec3f {
 // What the energy limit needs (energy.wgsl). Large common motions would drown what is beside them:
 // relative to the first vertex of the part both are kept apart.
 fn add_motion(v: u32, first: u32, into: ptr<function, Sums>) {
-    let mass = ground_of(PREDICTED, v).w;
+    // Springs to places outside are no part of the mass: what they store is given, or taken.
+    let hold = ground_of(TARGETS, v);
+    let mass = ground_of(PREDICTED, v).w - hold.w * frame.squared_dt;
     let load = frame.gravity * mass + ground_of(ACTING, v).xyz;
     let before = ground_of(VELOCITIES, v).xyz;
     let after = end_velocity(v);
@@ -336,7 +338,11 @@ fn add_motion(v: u32, first: u32, into: ptr<function, Sums>) {
     (*into)[SUM_KINETIC] += 0.5 * mass * dot(after, after);
     (*into)[SUM_RELATIVE_START] += 0.5 * mass * dot(relative_before, relative_before);
     (*into)[SUM_RELATIVE] += 0.5 * mass * dot(relative, relative);
-    (*into)[SUM_WORK] += dot(load, points[v].xyz - ground_of(PREVIOUS, v).xyz);
+    let x = points[v].xyz;
+    let start = ground_of(PREVIOUS, v).xyz;
+    let springs = 0.5 * hold.w * dot(x - start, (x - hold.xyz) + (start - hold.xyz));
+    (*into)[SUM_WORK] += dot(load, x - start) - springs;
+    (*into)[SUM_HELD] += select(0.0, 1.0, hold.w > 0.0);
     (*into)[SUM_RELATIVE_WORK] += frame.dt * dot(load, relative);
     (*into)[SUM_MASS] += mass;
     for (var axis = 0u; axis < 3u; axis++) {

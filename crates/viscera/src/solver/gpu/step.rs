@@ -9,6 +9,7 @@ use super::{GpuSolver, Ready};
 use crate::model::Model;
 use crate::settings::{Acceleration, Method, RelaxationForm};
 use crate::solver::explicit::small_steps;
+use crate::solver::tethers::bundle;
 use crate::solver::{Inputs, StepError};
 
 /// `Frame` of bindings.wgsl.
@@ -92,7 +93,10 @@ impl GpuSolver {
         crate::solver::check_step(dt, model, inputs)?;
         let [repeats, small_steps] = match self.settings.method {
             Method::Xpbd => [self.plan.repeat, 1],
-            Method::Explicit => [small_steps(dt, self.stable_step)?; 2],
+            Method::Explicit => {
+                bundle(model, inputs, &mut self.tethers);
+                [small_steps(dt, self.stability.step(model, &self.tethers))?; 2]
+            }
         };
         self.prepare_step(model, inputs, dt, small_steps);
         Ok(repeats)
@@ -135,7 +139,7 @@ impl GpuSolver {
         dt: f64,
         small_steps: u32,
     ) {
-        self.collect_updates(model, inputs);
+        self.collect_updates(model, inputs, dt);
         let queue = &self.device.queue;
         self.buffers.write(queue, Slot::Updates, bytemuck::cast_slice(&self.updates));
         let settings = &self.settings;

@@ -109,9 +109,12 @@ impl GpuSolver {
         }
         let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
         put(Slot::Previous, &each(&|v| with(ground.previous[v].vec3(), copies(v))));
-        put(Slot::Predicted, &each(&|v| with(ground.predicted[v].vec3(), ground.masses[v])));
+        put(Slot::Predicted, &each(&|v| with(ground.predicted[v].vec3(), ground.inertias[v])));
         put(Slot::Acting, &each(&|v| with(ground.external[v], ground.inverse_masses[v])));
         let mut targets = each(&|_| [0.0; 4]);
+        for tether in &ground.tethers {
+            targets[tether.vertex] = with(tether.target, tether.stiffness);
+        }
         for pin in &inputs.pins {
             targets[model.numbering.of(pin.vertex)] = with(pin.target, 0.0);
         }

@@ -1,7 +1,6 @@
 // Stages that work on vertices one by one (solver/cpu.rs).
 
-// What acts on single vertices: takes over what has changed since the last step. The w of `targets` is the
-// explicit method's, and constant.
+// What acts on single vertices: takes over what has changed since the last step.
 @compute @workgroup_size(64)
 fn apply_updates(
     @builtin(global_invocation_id) id: vec3u,
@@ -13,12 +12,14 @@ fn apply_updates(
     }
     let update = updates[thread];
     let v = update.vertex;
-    let inverse_mass = select(1.0 / predicted[v].w, 0.0, update.is_pinned != 0u);
+    let inverse_mass = select(1.0 / update.inertia, 0.0, update.is_pinned != 0u);
     acting[v] = vec4f(update.force[0], update.force[1], update.force[2], inverse_mass);
-    targets[v] = vec4f(update.place[0], update.place[1], update.place[2], targets[v].w);
+    targets[v] = vec4f(update.place[0], update.place[1], update.place[2], update.stiffness);
+    predicted[v].w = update.inertia;
 }
 
-// xt = x + dt v + dt^2 (g + M^-1 f); x becomes the start of the iteration: x (mode 0), x + dt v (mode 1)
+// xt = x + dt v + dt^2 (g + M^-1 (f + k (a - y))), y without the last term: springs k to places a outside are
+// a part of the inertia (solver/tethers.rs). x becomes the start of the iteration: x (mode 0), x + dt v (mode 1)
 // or xt (mode 2); pins move to their places; w = 1/m per copy. Where steps are guarded (mode bit 2) the places
 // that the step could start from are kept, `job.set_first` vertices apart.
 @compute @workgroup_size(64)
@@ -33,8 +34,10 @@ fn predict(
     let x = points[v].xyz;
     let mass = predicted[v].w;
     let on_vertex = acting[v];
-    let load = on_vertex.xyz * (1.0 / mass);
     let inertial = x + velocities[v].xyz * frame.dt;
+    let hold = targets[v];
+    let pull = (hold.xyz - (inertial + frame.gravity * frame.squared_dt)) * hold.w;
+    let load = (on_vertex.xyz + pull) * (1.0 / mass);
     let xt = inertial + (frame.gravity + load) * frame.squared_dt;
     let copy_count = previous[v].w;
     previous[v] = vec4f(x, copy_count);
@@ -46,7 +49,7 @@ fn predict(
         start = xt;
     }
     let is_pinned = on_vertex.w == 0.0;
-    start = select(start, targets[v].xyz, is_pinned);
+    start = select(start, hold.xyz, is_pinned);
     points[v] = vec4f(start, on_vertex.w * copy_count);
     if (job.mode & 4u) != 0u {
         starts[v] = vec4f(select(x, start, is_pinned), 0.0);

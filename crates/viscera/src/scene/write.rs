@@ -1,0 +1,108 @@
+//! What was done to a scene by hand, as text that a scene file takes.
+
+use super::{Change, Interpolation, Motion, MotionKey, Patch, Scene, Selector};
+use crate::scalar::Vec3;
+use crate::settings::Choice;
+use std::fmt::Write;
+
+impl Scene {
+    /// Motions and changes as a scene file has them, to be put behind its other tables; every number but
+    /// rotations comes back with the same bits. The bodies are those of this scene.
+    pub fn write(&self, motions: &[Motion], changes: &[Change]) -> String {
+        let mut text = String::new();
+        for motion in motions {
+            self.write_motion(motion, &mut text);
+        }
+        for Change { time, settings } in changes {
+            let quoted: Vec<String> =
+                settings.iter().map(|(key, value)| quote(&format!("{key} = {value}"))).collect();
+            let list = quoted.join(", ");
+            put(&mut text, format_args!("\n[[change]]\ntime = \"{time} s\"\nset = [{list}]\n"));
+        }
+        text
+    }
+
+    fn write_motion(&self, motion: &Motion, text: &mut String) {
+        let Motion { name, patch, keys, interpolation, about, start, stiffness, release } = motion;
+        let body = self.bodies.get(patch.body).map_or("", |body| &body.name);
+        put(text, format_args!("\n[[motion]]\nname = {}\nbody = {}\n", quote(name), quote(body)));
+        put(text, format_args!("{}\n", selector_text(patch)));
+        let known = Interpolation::ALL.iter().find(|(value, ..)| value == interpolation);
+        if let Some((_, name, _)) = known {
+            put(text, format_args!("interpolation = \"{name}\"\n"));
+        }
+        if *about != Vec3::ZERO {
+            put(text, format_args!("about = {}\n", lengths(*about)));
+        }
+        if *start > 0.0 {
+            put(text, format_args!("start = \"{start} s\"\n"));
+        }
+        if let Some(stiffness) = stiffness {
+            put(text, format_args!("stiffness = \"{stiffness} N/m\"\n"));
+        }
+        if let Some(release) = release {
+            put(text, format_args!("release = \"{release} s\"\n"));
+        }
+        put(text, format_args!("keys = [\n"));
+        for key in keys {
+            put(text, format_args!("  {},\n", key_text(key)));
+        }
+        put(text, format_args!("]\n"));
+    }
+}
+
+fn key_text(key: &MotionKey) -> String {
+    let MotionKey { time, translation, rotation } = key;
+    let mut text = format!("{{ time = \"{time} s\", translation = {}", lengths(*translation));
+    let angle = rotation.length();
+    if angle > 0.0 {
+        let axis = *rotation * (1.0 / angle);
+        put(&mut text, format_args!(", rotation_axis = [{}, {}, {}]", axis.x, axis.y, axis.z));
+        put(&mut text, format_args!(", rotation_angle = \"{angle} rad\""));
+    }
+    text + " }"
+}
+
+fn selector_text(patch: &Patch) -> String {
+    match patch.selector {
+        Selector::Box { min, max } => {
+            format!("box = {{ min = {}, max = {} }}", lengths(min), lengths(max))
+        }
+        Selector::Sphere { center, radius } => {
+            format!("sphere = {{ center = {}, radius = \"{radius} m\" }}", lengths(center))
+        }
+        Selector::HalfSpace { point, normal: n } => {
+            let point = lengths(point);
+            format!("half_space = {{ point = {point}, normal = [{}, {}, {}] }}", n.x, n.y, n.z)
+        }
+        Selector::Nearest { point, count } => {
+            format!("nearest = {{ point = {}, count = {count} }}", lengths(point))
+        }
+        Selector::Region(label) => format!("region = {label}"),
+    }
+}
+
+fn lengths(v: Vec3<f64>) -> String {
+    format!("[\"{} m\", \"{} m\", \"{} m\"]", v.x, v.y, v.z)
+}
+
+/// As TOML has text.
+fn quote(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for letter in text.chars() {
+        match letter {
+            '"' | '\\' => quoted.extend(['\\', letter]),
+            letter if letter.is_control() => {
+                put(&mut quoted, format_args!("\\u{:04x}", letter as u32));
+            }
+            letter => quoted.push(letter),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+/// Writing to text does not fail.
+fn put(text: &mut String, what: std::fmt::Arguments<'_>) {
+    let _ = text.write_fmt(what);
+}

@@ -1,0 +1,238 @@
+//! What is done to a running simulation by hand. All of it becomes part of the scene, so that a scene file
+//! with [`Live`] behind its other tables does the same to the bit.
+
+use super::acting::{Taken, tolerance};
+use super::{AssembleError, Simulation, SimulationError, substep_dt};
+use crate::model::ModelError;
+use crate::scalar::{Real, Vec3};
+use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
+use crate::solver::Solver;
+use crate::state::State;
+
+/// Why something cannot be done to a running simulation. Nothing has changed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LiveError {
+    /// A setting that cannot be.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A patch without vertices.
+    #[error(transparent)]
+    Patch(#[from] AssembleError),
+    /// The model cannot be built or computed like that.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// A patch of a body that there is not.
+    #[error("there is no body {body}; the scene has {count}")]
+    NoBody {
+        /// The number given.
+        body: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A stiffness that is none.
+    #[error("a hold needs a stiffness above zero and finite [N/m]; {stiffness} is not")]
+    Stiffness {
+        /// The stiffness given [N/m].
+        stiffness: f64,
+    },
+    /// A place that is none.
+    #[error("a hold cannot be led to a place that is no number")]
+    NotFinite,
+    /// A hold that there is not, or that was let go.
+    #[error("there is no hold {hold}, or it was let go")]
+    NoHold {
+        /// The number given.
+        hold: usize,
+    },
+}
+
+/// What was done by hand since the beginning or the last [`Simulation::reset`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Live {
+    /// Holds, of which each is a motion.
+    pub motions: Vec<Motion>,
+    /// Settings.
+    pub changes: Vec<Change>,
+}
+
+impl<S: Real> Simulation<S> {
+    /// Takes hold of a patch where it is now: by springs of a total stiffness [N/m], or rigidly. Returns
+    /// the number of the motion that it becomes; its name is `name` with a number behind.
+    pub fn take_hold(
+        &mut self,
+        name: &str,
+        patch: Patch,
+        stiffness: Option<f64>,
+    ) -> Result<usize, LiveError> {
+        let count = self.scene.bodies.len();
+        if patch.body >= count {
+            return Err(LiveError::NoBody { body: patch.body, count });
+        }
+        if let Some(stiffness) = stiffness.filter(|k| !(*k > 0.0 && k.is_finite())) {
+            return Err(LiveError::Stiffness { stiffness });
+        }
+        let resolved = self.assembly.resolve(&patch)?;
+        let is_taken = |name: &String| self.scene.motions.iter().any(|other| other.name == *name);
+        let names = (1..).map(|number| format!("{name}-{number}"));
+        let name = names.into_iter().find(|name| !is_taken(name)).unwrap_or_default();
+        let time = self.time();
+        let key = MotionKey { time, translation: Vec3::ZERO, rotation: Vec3::ZERO };
+        self.scene.motions.push(Motion {
+            name,
+            patch,
+            keys: vec![key],
+            interpolation: Interpolation::Linear,
+            about: Vec3::ZERO,
+            start: time,
+            stiffness,
+            release: None,
+        });
+        self.assembly.motions.push(resolved);
+        Ok(self.scene.motions.len() - 1)
+    }
+
+    /// Says where a hold is to be at the end of the next frame, from where it was taken [m]; it goes
+    /// there steadily.
+    pub fn lead(&mut self, hold: usize, translation: Vec3<f64>) -> Result<(), LiveError> {
+        if !translation.is_finite() {
+            return Err(LiveError::NotFinite);
+        }
+        let (now, end) = (self.time(), (self.frame + 1) as f64 * self.scene.time.frame);
+        let keys = &mut self.hold(hold)?.keys;
+        if keys.last().is_some_and(|key| key.time == end) {
+            keys.pop();
+        }
+        let at = |time, translation| MotionKey { time, translation, rotation: Vec3::ZERO };
+        if let &[.., last] = keys.as_slice() {
+            let rests = last.translation == translation;
+            match keys.as_slice() {
+                // A hold that stands still needs no keys.
+                [.., before, _] if rests && before.translation == translation => {
+                    keys.pop();
+                }
+                _ if last.time < now => keys.push(at(now, last.translation)),
+                _ => {}
+            }
+        }
+        keys.push(at(end, translation));
+        Ok(())
+    }
+
+    /// Lets a hold go, from the next frame on.
+    pub fn let_go(&mut self, hold: usize) -> Result<(), LiveError> {
+        // Between the end of the last substep, which it held, and that of the next.
+        let release = self.time() + tolerance(&self.scene);
+        self.hold(hold)?.release = Some(release);
+        Ok(())
+    }
+
+    /// A hold that is held.
+    fn hold(&mut self, hold: usize) -> Result<&mut Motion, LiveError> {
+        let by_hand = hold >= self.written.motions.len();
+        let motion = self.scene.motions.get_mut(hold);
+        let held = motion.filter(|motion| by_hand && motion.release.is_none());
+        held.ok_or(LiveError::NoHold { hold })
+    }
+
+    /// Changes settings from the next frame on, keys and values as in overrides
+    /// ([`Scene::change`]): the model is built again, positions and velocities stay.
+    pub fn change(&mut self, settings: &[(String, String)]) -> Result<(), LiveError> {
+        self.make_changes()?;
+        let mut scene = self.scene.clone();
+        scene.change(settings)?;
+        let mut written = self.written.clone();
+        written.change(settings)?;
+        let change = Change { time: self.time(), settings: settings.to_vec() };
+        scene.changes.insert(self.changes_made, change.clone());
+        self.rebuild(scene)?;
+        self.written = written;
+        self.by_hand.push(change);
+        self.changes_made += 1;
+        Ok(())
+    }
+
+    /// Back to the beginning, at rest: what was held is let go, settings stay as they were set by hand.
+    pub fn reset(&mut self) -> Result<(), LiveError> {
+        let frame = std::mem::take(&mut self.frame);
+        if let Err(error) = self.rebuild(self.written.clone()) {
+            self.frame = frame;
+            return Err(error);
+        }
+        self.assembly.motions.truncate(self.written.motions.len());
+        self.taken = Taken::default();
+        self.by_hand.clear();
+        self.changes_made = 0;
+        self.rejected_substeps = 0;
+        self.put(State::at_rest(&self.model));
+        Ok(())
+    }
+
+    /// What was done by hand.
+    pub fn live(&self) -> Live {
+        let motions = self.scene.motions[self.written.motions.len()..].to_vec();
+        Live { motions, changes: self.by_hand.clone() }
+    }
+
+    /// What the scene wants at the beginning of a frame.
+    pub(super) fn begin_frame(&mut self) -> Result<(), LiveError> {
+        self.make_changes()?;
+        let time = self.time();
+        self.taken.take(&self.scene, &self.assembly, time, &self.state);
+        Ok(())
+    }
+
+    /// Makes the changes whose time has come.
+    fn make_changes(&mut self) -> Result<(), LiveError> {
+        let now = self.time() + tolerance(&self.scene);
+        while let Some(change) = self.scene.changes.get(self.changes_made)
+            && change.time <= now
+        {
+            let mut scene = self.scene.clone();
+            scene.change(&change.settings)?;
+            self.rebuild(scene)?;
+            self.changes_made += 1;
+        }
+        Ok(())
+    }
+
+    /// Goes on with another scene of the same bodies.
+    fn rebuild(&mut self, scene: Scene) -> Result<(), LiveError> {
+        let mut builder = self.assembly.builder.clone();
+        for (index, body) in scene.bodies.iter().enumerate() {
+            let set = |problem: ModelError| LiveError::Simulation(problem.into());
+            builder.set_material(index, &body.material).map_err(set)?;
+            for region in &body.regions {
+                builder.set_region_material(index, region.label, &region.material).map_err(set)?;
+            }
+        }
+        let model = builder.build::<S>(&scene.solver).map_err(SimulationError::from)?;
+        let mut solver = Solver::new(&model, &scene.solver);
+        solver.use_instructions(self.solver.instructions());
+        let same_device = scene.solver.device == self.scene.solver.device;
+        let backend = self.backend.renew(same_device, &model, &solver, substep_dt(&scene))?;
+        let rest = State::at_rest(&model);
+        let mut state = State {
+            positions: std::mem::take(&mut self.state.positions),
+            velocities: std::mem::take(&mut self.state.velocities),
+            ..rest
+        };
+        (self.scene, self.model, self.solver, self.backend) = (scene, model, solver, backend);
+        self.assembly.builder = builder;
+        // The new tissue's answer to where it is.
+        let inputs = self.inputs_at(self.time());
+        let dt = substep_dt(&self.scene);
+        let restarted = self.solver.restart(&self.model, &mut state, &inputs, dt);
+        debug_assert!(restarted.is_ok(), "{restarted:?}");
+        self.put(state);
+        Ok(())
+    }
+
+    /// The state from now on, on whatever computes the steps.
+    fn put(&mut self, state: State<S>) {
+        if let Some(elsewhere) = &mut self.backend.elsewhere {
+            elsewhere.write(&self.model, &state);
+        }
+        self.state = state;
+    }
+}
