@@ -132,11 +132,15 @@ fn a_hold_pulls_and_its_force_is_reported() {
     });
     let expected = mean * 150.0;
     assert!((Vec3::from_f64(force.force) - expected).length() < 1e-12 && expected.z > 0.1);
+    let shown = simulation.hold(hold).expect("it holds");
+    assert!((shown.force - expected).length() < 1e-12);
+    assert!((shown.target - shown.place - mean).length() < 1e-15);
     simulation.let_go(hold).expect("a hold");
     frames(&mut simulation, 1);
     let report = simulation.report();
     let force = report.patches.iter().find(|p| p.kind == PatchKind::Motion).expect("the hold");
     assert_eq!(force.force, [0.0; 3]);
+    assert_eq!(simulation.hold(hold), None);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::tables::{
     BodyTable, ChangeTable, ForceTable, MaterialTable, MotionTable, PatchTable, SceneTable,
     ShapeName, TimeSettings,
 };
-use super::{Body, BodyShape, Change, Fixing, Region, Scene, SceneError, Spring};
+use super::{Body, BodyShape, Change, Fixing, Region, Scene, SceneError, Spring, Written};
 use crate::material::{Material, MaterialModel};
 use crate::mesh::shapes::LIVER_SPACING;
 use crate::scalar::Vec3;
@@ -105,7 +105,7 @@ pub(super) fn build_scene(name: &str, tree: Node) -> Result<Scene, SceneError> {
         changes,
         solver: tables.solver,
         output: tables.output,
-        tree,
+        tree: Written(tree),
     };
     // Every change is tried now: nobody wants to learn of a slip in the middle of a run.
     let mut changed = scene.clone();

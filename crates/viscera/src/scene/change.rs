@@ -17,7 +17,7 @@ impl Scene {
     /// Changes settings of the solver, of the world and of materials; keys and values are those of
     /// [`Scene::parse`]'s overrides. On an error nothing is changed.
     pub fn change(&mut self, settings: &[(String, String)]) -> Result<(), SceneError> {
-        let mut tree = self.tree.clone();
+        let mut tree = self.tree.0.clone();
         for (key, value) in settings {
             if !may_change(key) {
                 return Err(SceneError::FixedKey { key: shorten(key) });

@@ -106,7 +106,37 @@ impl Taken {
     }
 }
 
+/// Something that holds tissue now.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Hold {
+    /// The middle of its patch [m].
+    pub place: Vec3<f64>,
+    /// Where that is to be [m].
+    pub target: Vec3<f64>,
+    /// Its force on the tissue [N]: of springs as it is now, of a rigid hold as last measured.
+    pub force: Vec3<f64>,
+}
+
 impl<S: Real> Simulation<S> {
+    /// What a motion does to its patch at the end of the last frame; nothing where it does not hold it.
+    pub fn hold(&self, motion: usize) -> Option<Hold> {
+        let (at, patch) = (self.scene.motions.get(motion)?, self.assembly.motions.get(motion)?);
+        let rest = self.assembly.builder.positions();
+        let places = self.taken.places(motion, at, patch, rest, self.time())?;
+        let share = 1.0 / patch.vertices.len() as f64;
+        let mut hold = Hold::default();
+        for (i, &v) in patch.vertices.iter().enumerate() {
+            hold.place += self.state.positions[v as usize].cast::<f64>() * share;
+            hold.target += places(i) * share;
+            let held = self.balance.residual.get(v as usize);
+            hold.force += held.copied().unwrap_or_default();
+        }
+        if let Some(stiffness) = at.stiffness {
+            hold.force = (hold.target - hold.place) * stiffness;
+        }
+        Some(hold)
+    }
+
     /// What the scene does at a time [s]. What is taken hold of later than now acts from then on.
     pub fn inputs_at(&self, time: f64) -> Inputs<S> {
         let mut inputs = Inputs::default();

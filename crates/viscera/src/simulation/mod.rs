@@ -7,6 +7,7 @@ mod device;
 mod gpu;
 mod live;
 
+pub use acting::Hold;
 use acting::Taken;
 pub use assemble::{AssembleError, AssembledBody, Assembly, ResolvedPatch};
 pub use device::SimulationError;
