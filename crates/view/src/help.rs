@@ -96,6 +96,7 @@ pub fn show(context: &egui::Context, open: &mut bool) {
         .collapsible(false)
         .anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO)
         .show(context, |ui| {
+            ui.set_min_width(400.0);
             egui::Grid::new("shortcuts").num_columns(2).spacing([18.0, 5.0]).show(ui, |ui| {
                 let keys = SHORTCUTS.iter().map(|s| (s.shown, s.text));
                 for (shown, text) in MOUSE.iter().copied().chain(keys) {

@@ -1,6 +1,6 @@
 //! The app in a window of the system.
 
-use anyhow::{Result, anyhow};
+use anyhow::{Result, anyhow, bail};
 use eframe::egui::{self, ViewportBuilder};
 use eframe::egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
 use eframe::wgpu;
@@ -17,6 +17,7 @@ const REMEMBERED: &str = "preferences";
 
 /// Opens the window and stays until it is closed.
 pub fn open(options: Options) -> Result<()> {
+    check_display()?;
     let native = eframe::NativeOptions {
         viewport: ViewportBuilder::default()
             .with_title("viscera")
@@ -38,13 +39,30 @@ pub fn open(options: Options) -> Result<()> {
             Ok(Box::new(App::new(&creation.egui_ctx, state, options, preferences)?))
         }),
     );
-    made.map_err(|error| {
-        anyhow!(
-            "cannot open a window: {error}. Without a display `viscera run SCENE` computes the same and \
-             writes pictures; on a machine without graphics hardware a software Vulkan driver draws \
-             (Debian, Ubuntu: mesa-vulkan-drivers)"
-        )
+    made.map_err(|error| match error {
+        eframe::Error::AppCreation(error) => anyhow!("{error}"),
+        error => anyhow!(
+            "cannot open a window: {error}; {HEADLESS}. Without graphics hardware a software Vulkan driver \
+             draws (Debian, Ubuntu: mesa-vulkan-drivers)"
+        ),
     })
+}
+
+/// What one can do without a window.
+const HEADLESS: &str = "`viscera run SCENE` needs none, computes the same and writes pictures";
+
+/// Where windows need a display server, an error if there is none: the window library's own words name
+/// the place in its source.
+fn check_display() -> Result<()> {
+    let servers = ["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"];
+    let is_set = |name: &&str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    let needed = cfg!(all(unix, not(target_os = "macos")));
+    if needed && !servers.iter().any(|name| is_set(&name)) {
+        bail!(
+            "there is no display to open a window on (neither DISPLAY nor WAYLAND_DISPLAY is set); {HEADLESS}"
+        );
+    }
+    Ok(())
 }
 
 /// A device that the drawing and the solver can share: with what the adapter can do.

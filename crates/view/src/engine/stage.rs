@@ -20,8 +20,8 @@ pub struct Plan {
     pub library: Library,
 }
 
-/// The largest mesh that has an exact solution beside it [tetrahedra]: it costs twenty sweeps in double
-/// precision for each substep.
+/// The largest mesh that has an exact solution beside it [tetrahedra]: it costs twenty sweeps for
+/// each substep.
 pub const MOST_GHOST_TETS: usize = 5000;
 
 /// What does not change while simulations run.
@@ -57,7 +57,7 @@ fn tet_count(assembly: &Assembly) -> usize {
 
 /// What one sweep over a tetrahedron takes, on a slow core without vector registers [s]. A guess that only
 /// has to warn in time: too small, and a window seems to hang; too large, and it asks for nothing.
-const SWEEP: f64 = 1e-7;
+const SWEEP: f64 = 2e-7;
 
 /// A frame that takes longer than this is worth a question [s].
 const LONG: f64 = 2.0;

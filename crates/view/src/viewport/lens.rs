@@ -13,7 +13,17 @@ pub struct Lens {
     pub rect: Rect,
 }
 
+/// Pictures narrower than this see from farther away, so that what is wide fits in.
+const NARROW: f64 = 1.3;
+
 impl Lens {
+    /// What a camera sees in a part of the window.
+    pub fn new(orbit: &Orbit, rect: Rect) -> Self {
+        let mut lens = Self { orbit: *orbit, rect };
+        lens.orbit.distance *= (NARROW / lens.aspect()).clamp(1.0, 4.0);
+        lens
+    }
+
     /// Width over height.
     pub fn aspect(&self) -> f64 {
         f64::from(self.rect.width() / self.rect.height().max(1.0))

@@ -144,14 +144,14 @@ impl Viewport {
             response.widget_info(|| {
                 egui::WidgetInfo::labeled(egui::Role::Canvas, ui.is_enabled(), label)
             });
-            let lens = Lens { orbit: self.orbit, rect: *rect };
+            let lens = Lens::new(&self.orbit, *rect);
             if let Some(frame) = frame {
                 self.handle(ui, &response, &lens, number, frame, holds, preferences, &mut commands);
             }
         }
         let drawn = frame.map(|frame| self.draw(ui, frame, &rects, holds, preferences));
         for (number, rect) in rects.iter().enumerate() {
-            let lens = Lens { orbit: self.orbit, rect: *rect };
+            let lens = Lens::new(&self.orbit, *rect);
             self.paint(ui, &lens, number, frame, holds, preferences);
         }
         (commands, drawn.and_then(Result::err))
@@ -177,7 +177,7 @@ impl Viewport {
             }
             if let Some(plane) = holds.drag_plane() {
                 let [_, _, normal] = self.orbit.axes();
-                let (from, direction) = (self.orbit.position(), lens.ray(pointer));
+                let (from, direction) = (lens.orbit.position(), lens.ray(pointer));
                 if response.drag_delta() != vec2(0.0, 0.0)
                     && let Some(point) = meet_plane(from, direction, plane, normal)
                 {
@@ -221,7 +221,7 @@ impl Viewport {
         match near {
             Some(hold) => holds.resume(hold.id),
             None => {
-                let hit = pick(stage, shown, self.orbit.position(), lens.ray(pointer));
+                let hit = pick(stage, shown, lens.orbit.position(), lens.ray(pointer));
                 commands.extend(hit.map(|hit| holds.take(&hit, grip)));
             }
         }
@@ -287,7 +287,7 @@ impl Viewport {
             };
             let pulls: Vec<_> = lane.holds.iter().map(|hold| [hold.place, hold.target]).collect();
             let scenery = Scenery {
-                orbit: self.orbit,
+                orbit: Lens::new(&self.orbit, rects[number]).orbit,
                 tissue,
                 ghost,
                 range: self.legend.range(),
