@@ -18,6 +18,7 @@ use crate::messages::Messages;
 use crate::panels::time::Clock;
 use crate::panels::{self, Action, scene::Fields};
 use crate::preferences::Preferences;
+use crate::probe::Curve;
 use crate::session::Session;
 use crate::viewport::{Gpu, Viewport};
 
@@ -55,6 +56,8 @@ pub struct App {
     help_open: bool,
     /// Number and moment of the frame from which the rate was counted last.
     counted: (u64, Instant),
+    /// How methods converge in a step of the first simulation.
+    curves: Vec<Curve>,
 }
 
 impl App {
@@ -93,12 +96,14 @@ impl App {
             pictures: options.pictures,
             help_open: false,
             counted: (0, Instant::now()),
+            curves: Vec::new(),
             session,
             preferences,
             messages,
         };
         app.name_save();
         app.engine.send(Command::Color(app.preferences.coloring));
+        app.engine.send(Command::Probe(app.preferences.methods()));
         let load = app.session.load();
         app.send([load]);
         Ok(app)
@@ -135,6 +140,7 @@ impl App {
         self.hear();
         self.take_frame();
         let coloring = self.preferences.coloring;
+        let methods = self.preferences.methods();
         let mut actions: Vec<Action> =
             help::requests(&context).into_iter().map(Action::Ask).collect();
         self.show_panels(ui, &mut actions);
@@ -151,6 +157,9 @@ impl App {
         help::show(&context, &mut self.help_open);
         if self.preferences.coloring != coloring {
             self.engine.send(Command::Color(self.preferences.coloring));
+        }
+        if self.preferences.methods() != methods {
+            self.engine.send(Command::Probe(self.preferences.methods()));
         }
         for action in actions {
             self.act(action);
@@ -183,6 +192,11 @@ impl App {
                 });
             });
         }
+        if self.preferences.convergence_open {
+            Panel::left("convergence").resizable(true).default_size(360.0).show(ui, |ui| {
+                panels::convergence::show(ui, &mut self.preferences, &self.curves);
+            });
+        }
         if self.preferences.curve_open {
             Panel::bottom("curve").resizable(true).default_size(130.0).show(ui, |ui| {
                 let now = self.frame.as_ref().map_or(0.0, |frame| frame.time);
@@ -193,7 +207,8 @@ impl App {
 
     fn show_settings(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
         let stage = self.stage.as_deref();
-        panels::scene::show(ui, &self.session, stage, &mut self.fields, actions);
+        let (fields, preferences) = (&mut self.fields, &mut self.preferences);
+        panels::scene::show(ui, &self.session, stage, fields, preferences, actions);
         panels::view::show_grip(ui, &mut self.preferences, &self.holds, actions);
         panels::view::show(ui, &mut self.preferences, actions);
         panels::material::show(ui, self.session.scene(Side::First), actions);
@@ -235,6 +250,8 @@ impl App {
                 }
                 Event::Devices(devices) => self.devices = devices,
                 Event::Refused(text) => self.messages.warn(text),
+                Event::Done { path, text, time } => self.write_scene(&path, &text, time),
+                Event::Curves(curves) => self.curves = curves,
                 Event::Failed(failure) => {
                     self.messages.busy = None;
                     self.clock.playing = false;
@@ -325,7 +342,8 @@ impl App {
                 self.engine.send(Command::Step);
             }
             Request::Reset => {
-                self.engine.send(Command::Reset);
+                let reset = self.session.begin_again();
+                self.engine.send(reset);
                 // What has diverged was stopped; beginning anew is meant to run.
                 if self.messages.failure.take().is_some() {
                     self.play(true);

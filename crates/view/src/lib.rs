@@ -10,6 +10,7 @@
 //! | looking, pressing, pulling | [`viewport`] |
 //! | what is chosen, undo | [`choices`], [`session`] |
 //! | the panels | [`panels`] |
+//! | one step by several methods | [`probe`] |
 
 pub mod app;
 pub mod capture;
@@ -21,6 +22,7 @@ pub mod holds;
 pub mod messages;
 pub mod panels;
 pub mod preferences;
+pub mod probe;
 pub mod save;
 pub mod session;
 pub mod viewport;

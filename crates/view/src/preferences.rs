@@ -2,6 +2,7 @@
 
 use crate::engine::Coloring;
 use crate::holds::Grip;
+use crate::probe::{METHODS, Method};
 
 /// How things are shown and how one takes hold; no part of a scene.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -21,6 +22,19 @@ pub struct Preferences {
     pub settings_open: bool,
     /// Whether the curve of forces is open.
     pub curve_open: bool,
+    /// Whether the plot of convergence is open.
+    pub convergence_open: bool,
+    /// Which of the methods are ticked there.
+    pub ticked: Vec<Method>,
+    /// Whether a saved scene repeats what was done by hand.
+    pub save_by_hand: bool,
+}
+
+impl Preferences {
+    /// Methods by which steps are to be repeated.
+    pub fn methods(&self) -> Vec<Method> {
+        if self.convergence_open { self.ticked.clone() } else { Vec::new() }
+    }
 }
 
 impl Default for Preferences {
@@ -33,6 +47,9 @@ impl Default for Preferences {
             grip: Grip::default(),
             settings_open: true,
             curve_open: true,
+            convergence_open: false,
+            ticked: vec![METHODS[0].0, METHODS[1].0, METHODS[5].0],
+            save_by_hand: true,
         }
     }
 }

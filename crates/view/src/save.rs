@@ -10,12 +10,13 @@ use viscera_cli::files::write_whole;
 use crate::choices::Settings;
 use crate::document::Document;
 
-/// Writes the scene with its settings, whole or not at all.
-pub fn save(document: &Document, settings: &Settings, path: &Path) -> Result<()> {
+/// Writes the scene with its settings and, behind them, what was done by hand; whole or not at all.
+pub fn save(document: &Document, settings: &Settings, by_hand: &str, path: &Path) -> Result<()> {
     if path.extension().is_none_or(|ending| ending != "toml") {
         bail!("{}: a scene file's name ends in .toml", path.display());
     }
-    let text = scene_text(document, settings)?;
+    let text = scene_text(document, settings)? + by_hand;
+    Scene::parse(&path.display().to_string(), &text, &[])?;
     // Mesh files are named relative to the scene.
     let folder = |path: &Path| path.parent().map(Path::to_owned).unwrap_or_default();
     let scene = document.scene(settings)?;
@@ -143,9 +144,9 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("scene.toml");
         let wrong = settings(&[("body.spleen.material.young", "20 kPa")]);
-        let error = save(&document(), &wrong, &path).expect_err("no such body");
+        let error = save(&document(), &wrong, "", &path).expect_err("no such body");
         assert!(format!("{error:#}").contains("spleen"), "{error:#}");
-        assert!(save(&document(), &Vec::new(), &folder.path().join("scene.txt")).is_err());
+        assert!(save(&document(), &Vec::new(), "", &folder.path().join("scene.txt")).is_err());
         assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0);
     }
 }

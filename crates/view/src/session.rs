@@ -11,6 +11,8 @@ use crate::engine::{Command, Plan};
 pub struct Session {
     document: Document,
     choices: Choices,
+    /// What was chosen when the simulations began at rest.
+    begun: Choices,
     history: History,
     /// One for each simulation, as chosen: the first, the second, the exact one.
     scenes: Vec<Scene>,
@@ -22,7 +24,8 @@ impl Session {
     pub fn new(document: Document, shared: Settings) -> Result<Self, String> {
         let choices = Choices { shared, ..Choices::default() };
         let scenes = scenes_of(&document, &choices)?;
-        Ok(Self { document, choices, history: History::default(), scenes, generation: 0 })
+        let (begun, history) = (choices.clone(), History::default());
+        Ok(Self { document, choices, begun, history, scenes, generation: 0 })
     }
 
     /// The scene file.
@@ -33,6 +36,17 @@ impl Session {
     /// What is chosen.
     pub fn choices(&self) -> &Choices {
         &self.choices
+    }
+
+    /// What was chosen when the simulations began at rest.
+    pub fn begun(&self) -> &Choices {
+        &self.begun
+    }
+
+    /// The simulations begin at rest again.
+    pub fn begin_again(&mut self) -> Command {
+        self.begun = self.choices.clone();
+        Command::Reset
     }
 
     /// What can be taken back.
@@ -56,6 +70,7 @@ impl Session {
     /// Builds everything anew. Numbers of frames tell this from what was before.
     pub fn load(&mut self) -> Command {
         self.generation += 1;
+        self.begun = self.choices.clone();
         Command::Load(Box::new(Plan {
             generation: self.generation,
             scenes: self.scenes.clone(),
@@ -140,13 +155,9 @@ impl Session {
         let changes = changes.filter(|_| same_lanes);
         self.scenes = scenes;
         let Some(changes) = changes else { return Ok(vec![self.load()]) };
-        let lanes = changes.into_iter().zip(&self.scenes).enumerate();
-        let changed = lanes.filter(|(_, (settings, _))| !settings.is_empty());
-        Ok(changed
-            .map(|(lane, (settings, scene))| {
-                Command::Change(lane, settings, Box::new(scene.clone()))
-            })
-            .collect())
+        let lanes = changes.into_iter().enumerate();
+        let changed = lanes.filter(|(_, settings)| !settings.is_empty());
+        Ok(changed.map(|(lane, settings)| Command::Change(lane, settings)).collect())
     }
 }
 
@@ -198,7 +209,7 @@ mod tests {
             let commands = session.choose(Side::First, &pair("solver.iterations", value), false);
             let lanes =
                 commands.expect("a legal change").into_iter().map(|command| match command {
-                    Command::Change(lane, settings, _) => (lane, settings),
+                    Command::Change(lane, settings) => (lane, settings),
                     other => panic!("{other:?}"),
                 });
             lanes.collect::<Vec<_>>()

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use super::App;
 use crate::capture::{Recorder, free_name, save_picture};
-use crate::choices::Side;
+use crate::choices::{Settings, Side, put};
 use crate::document::Document;
+use crate::engine::Command;
 use crate::save::save;
 
 impl App {
@@ -32,10 +33,30 @@ impl App {
         self.fields.save = path.display().to_string();
     }
 
+    /// Saves the scene: as it is set now, or as it began with what was done by hand since, which the
+    /// simulation's thread knows.
     pub(super) fn save_as(&mut self, path: &Path) {
+        match self.preferences.save_by_hand {
+            true => self.engine.send(Command::Save(path.to_owned())),
+            false => {
+                let settings = self.session.choices().of(Side::First);
+                self.write(path, &settings, "");
+            }
+        }
+    }
+
+    /// Saves the scene as it began, with what was done by hand up to a time [s].
+    pub(super) fn write_scene(&mut self, path: &Path, by_hand: &str, time: f64) {
+        let mut settings = self.session.begun().of(Side::First);
+        if time > 0.0 {
+            put(&mut settings, "time.duration", &format!("{time} s"));
+        }
+        self.write(path, &settings, by_hand);
+    }
+
+    fn write(&mut self, path: &Path, settings: &Settings, by_hand: &str) {
         let is_comparison = self.session.is_comparison();
-        let settings = self.session.choices().of(Side::First);
-        match save(self.session.document(), &settings, path) {
+        match save(self.session.document(), settings, by_hand, path) {
             Ok(()) => {
                 let of = if is_comparison { " (of A)" } else { "" };
                 let shown = path.display();

@@ -10,13 +10,14 @@ mod worker;
 pub use frame::{Coloring, Frame, Hold, HoldId, Lane, Measures, Slot, Tool};
 pub use stage::{Plan, Stage};
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use viscera::scalar::Vec3;
-use viscera::scene::Scene;
 
 use crate::choices::Settings;
+use crate::probe::{Curve, Method};
 
 /// What the window asks for.
 #[derive(Debug)]
@@ -50,8 +51,12 @@ pub enum Command {
     Lead(HoldId, Vec3<f64>),
     /// Lets go.
     LetGo(HoldId),
-    /// Changes settings of one of the simulations; the scene is the one with them.
-    Change(usize, Settings, Box<Scene>),
+    /// Changes settings of one of the simulations.
+    Change(usize, Settings),
+    /// Asks for what was done by hand, to be saved there.
+    Save(PathBuf),
+    /// Repeats steps of the first simulation by these methods, to compare how they converge.
+    Probe(Vec<Method>),
     /// What colours show.
     Color(Coloring),
     /// Ends the thread.
@@ -69,6 +74,17 @@ pub enum Event {
     Ready(Arc<Stage>),
     /// What computes each of the simulations has changed or been built again: its device, and why.
     Devices(Vec<String>),
+    /// What was done by hand to the first simulation, as text for its scene file, and its time [s].
+    Done {
+        /// Where it is to be saved.
+        path: PathBuf,
+        /// For the end of the scene file.
+        text: String,
+        /// Simulated time [s].
+        time: f64,
+    },
+    /// How the methods asked for converge in one step.
+    Curves(Vec<Curve>),
     /// Something was refused, and nothing has changed.
     Refused(String),
     /// The simulation has stopped.
@@ -106,7 +122,7 @@ pub struct Engine {
 
 impl Engine {
     /// Starts the thread. It calls `wake` when there is something to see or hear.
-    pub fn start(wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+    pub fn start(wake: impl Fn() + Send + Sync + 'static) -> std::io::Result<Self> {
         let (commands, receive) = channel();
         let (send, events) = channel();
         let slot = Arc::new(Slot::default());

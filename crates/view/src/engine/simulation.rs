@@ -3,7 +3,9 @@
 use viscera::scalar::{Real, Vec3};
 use viscera::scene::{Patch, Scene, Selector};
 use viscera::settings::{Place, Precision};
-use viscera::simulation::{Assembly, FrameError, Live, PatchForce, PatchKind, ResolvedPatch, Simulation};
+use viscera::simulation::{
+    Assembly, FrameError, Live, PatchForce, PatchKind, ResolvedPatch, Simulation,
+};
 
 use super::color::surface_values;
 use super::frame::{Coloring, Hold, HoldId, Lane, Measures, Tool};

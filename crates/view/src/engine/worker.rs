@@ -1,27 +1,28 @@
 //! What the thread does: builds, computes frame after frame at the pace of the clock, obeys in between.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
-use viscera::scene::Scene;
 use viscera::settings::DeviceRequest;
 use viscera::simulation::Assembly;
 
 use super::frame::{Coloring, Slot};
-use super::simulation::{Grip, Live, build};
+use super::simulation::{Grip, Handle, build};
 use super::stage::{MOST_GHOST_TETS, Plan, Stage, expectation};
 use super::{Command, Cure, Event, Failure};
 use crate::choices::{Settings, put};
+use crate::probe::{MOST_TETS, Method, Prober};
 
 /// Calls the window.
-pub type Wake = Box<dyn Fn() + Send>;
+pub type Wake = Box<dyn Fn() + Send + Sync>;
 
 /// The state of the thread.
 pub struct Worker {
     commands: Receiver<Command>,
     events: Sender<Event>,
     slot: Arc<Slot>,
-    wake: Wake,
+    wake: Arc<Wake>,
     /// What waits for a person's word.
     asked: Option<(Plan, Assembly)>,
     running: Option<Running>,
@@ -34,12 +35,18 @@ pub struct Worker {
     due: Instant,
     /// When frames were measured last.
     measured: Option<Instant>,
+    /// Methods by which steps are repeated, who does so, and when it was begun last.
+    probed: Vec<Method>,
+    prober: Option<Prober>,
+    probed_last: Option<Instant>,
 }
 
 struct Running {
     stage: Arc<Stage>,
-    /// Each with its scene as it was loaded or changed.
-    lanes: Vec<Box<dyn Live>>,
+    /// The first, the second, the exact one.
+    lanes: Vec<Box<dyn Handle>>,
+    /// What computes each, as it was told last.
+    devices: Vec<String>,
     walls: Vec<f64>,
     number: u64,
 }
@@ -53,6 +60,9 @@ enum Next {
 /// How far the clock may be ahead of the simulation before it is no longer caught up with [s].
 const MOST_LATE: Duration = Duration::from_millis(100);
 
+/// How often a step is repeated by other methods.
+const PROBED_EVERY: Duration = Duration::from_millis(700);
+
 /// How often frames are measured where nothing needs it more often.
 const MEASURED_EVERY: Duration = Duration::from_millis(100);
 
@@ -64,6 +74,14 @@ impl Worker {
         slot: Arc<Slot>,
         wake: Wake,
     ) -> Self {
+        let wake: Arc<Wake> = Arc::new(wake);
+        let (told, call) = (events.clone(), Arc::clone(&wake));
+        // Without that thread there are no curves.
+        let prober = Prober::start(move |curves| {
+            let _ = told.send(Event::Curves(curves));
+            call();
+        });
+        let prober = prober.ok();
         Self {
             commands,
             events,
@@ -77,6 +95,9 @@ impl Worker {
             coloring: Coloring::default(),
             due: Instant::now(),
             measured: None,
+            probed: Vec::new(),
+            prober,
+            probed_last: None,
         }
     }
 
@@ -105,18 +126,16 @@ impl Worker {
     /// Obeys everything that has been asked for so far. Of changes that follow each other only the last
     /// is worth building a model for.
     fn obey_all(&mut self, first: Command) -> Next {
-        let mut change: Vec<Option<(Settings, Box<Scene>)>> = Vec::new();
+        let mut change: Vec<Settings> = Vec::new();
         let mut next = Some(first);
         while let Some(command) = next {
             match command {
                 Command::Quit => return Next::Quit,
-                Command::Change(lane, settings, scene) => {
-                    change.resize_with(change.len().max(lane + 1), || None);
-                    let mut merged = change[lane].take().map(|(old, _)| old).unwrap_or_default();
+                Command::Change(lane, settings) => {
+                    change.resize_with(change.len().max(lane + 1), Settings::new);
                     for (key, value) in &settings {
-                        put(&mut merged, key, value);
+                        put(&mut change[lane], key, value);
                     }
-                    change[lane] = Some((merged, scene));
                 }
                 Command::Load(plan) => {
                     change.clear();
@@ -126,10 +145,8 @@ impl Worker {
             }
             next = self.commands.try_recv().ok();
         }
-        for (lane, wanted) in change.into_iter().enumerate() {
-            if let Some((settings, scene)) = wanted {
-                self.change(lane, &settings, &scene);
-            }
+        for (lane, settings) in change.into_iter().enumerate() {
+            self.change(lane, &settings);
         }
         Next::On
     }
@@ -157,14 +174,13 @@ impl Worker {
                 let grip = Grip { body, rest, count, stiffness };
                 self.each(|lane| lane.take(hold, &grip));
             }
-            Command::Lead(hold, translation) => self.each(|lane| {
-                lane.lead(hold, translation);
-                Ok(())
-            }),
-            Command::LetGo(hold) => self.each(|lane| {
-                lane.let_go(hold);
-                Ok(())
-            }),
+            Command::Lead(hold, translation) => self.each(|lane| lane.lead(hold, translation)),
+            Command::LetGo(hold) => self.each(|lane| lane.let_go(hold)),
+            Command::Save(path) => self.save(path),
+            Command::Probe(methods) => {
+                self.probed = methods;
+                self.probe();
+            }
             Command::Color(coloring) => {
                 self.coloring = coloring;
                 self.publish();
@@ -180,7 +196,7 @@ impl Worker {
         (self.wake)();
     }
 
-    fn each(&mut self, act: impl Fn(&mut Box<dyn Live>) -> Result<(), String>) {
+    fn each(&mut self, act: impl Fn(&mut Box<dyn Handle>) -> Result<(), String>) {
         let Some(running) = &mut self.running else { return };
         let refused = running.lanes.iter_mut().find_map(|lane| act(lane).err());
         if let Some(message) = refused {
@@ -229,11 +245,11 @@ impl Worker {
             lane_count: plan.scenes.len(),
             has_ghost: plan.ends_with_ghost,
         });
-        self.build(stage, plan.scenes, 0);
+        self.build(stage, plan.scenes);
     }
 
     /// Builds simulations at rest.
-    fn build(&mut self, stage: Arc<Stage>, scenes: Vec<Scene>, number: u64) {
+    fn build(&mut self, stage: Arc<Stage>, scenes: Vec<viscera::scene::Scene>) {
         self.running = None;
         let mut lanes = Vec::new();
         for scene in scenes {
@@ -252,29 +268,86 @@ impl Worker {
             }
         }
         let walls = vec![0.0; lanes.len()];
-        let devices = lanes.iter().map(|lane| lane.device()).collect();
         self.tell(Event::Ready(Arc::clone(&stage)));
-        self.tell(Event::Devices(devices));
-        self.running = Some(Running { stage, lanes, walls, number });
+        self.running = Some(Running { stage, lanes, walls, devices: Vec::new(), number: 0 });
+        self.tell_devices();
         self.due = Instant::now();
         self.publish();
     }
 
     fn reset(&mut self) {
-        let Some(running) = self.running.take() else { return };
-        let scenes = running.lanes.iter().map(|lane| lane.scene().clone()).collect();
-        self.build(running.stage, scenes, 0);
+        let Some(running) = &mut self.running else { return };
+        running.number = 0;
+        let stage = Arc::clone(&running.stage);
+        let refused = running.lanes.iter_mut().find_map(|lane| lane.reset().err());
+        self.due = Instant::now();
+        match refused {
+            None => {
+                self.tell(Event::Ready(stage));
+                self.publish();
+            }
+            Some(message) => self.fail(message, Cure::Open),
+        }
     }
 
-    fn change(&mut self, lane: usize, settings: &Settings, scene: &Scene) {
+    fn change(&mut self, lane: usize, settings: &Settings) {
         let Some(running) = &mut self.running else { return };
-        let Some(changed) = running.lanes.get_mut(lane) else { return };
-        match changed.change(settings, scene) {
-            Ok(()) => {
-                let devices = running.lanes.iter().map(|lane| lane.device()).collect();
-                self.tell(Event::Devices(devices));
-            }
+        let Some(changed) = running.lanes.get_mut(lane).filter(|_| !settings.is_empty()) else {
+            return;
+        };
+        match changed.change(settings) {
+            Ok(()) => self.tell_devices(),
             Err(message) => self.tell(Event::Refused(message)),
+        }
+    }
+
+    fn save(&mut self, path: PathBuf) {
+        let first = self.running.as_ref().and_then(|running| running.lanes.first());
+        match first.map(|lane| lane.done_by_hand()) {
+            Some((text, time)) => self.tell(Event::Done { path, text, time }),
+            None => self.tell(Event::Done { path, text: String::new(), time: 0.0 }),
+        }
+    }
+
+    /// What computes the simulations, where that is news: one that was lost has left it to the CPU.
+    fn tell_devices(&mut self) {
+        let Some(running) = &mut self.running else { return };
+        let now: Vec<_> = running.lanes.iter().map(|lane| lane.device()).collect();
+        let devices: Vec<String> = now.iter().map(|(device, _)| device.clone()).collect();
+        if devices == running.devices {
+            return;
+        }
+        running.devices.clone_from(&devices);
+        for (_, warning) in now {
+            if let Some(warning) = warning {
+                self.tell(Event::Refused(warning));
+            }
+        }
+        self.tell(Event::Devices(devices));
+    }
+
+    /// Gives the step that comes next to the thread that repeats it, where that has nothing to do.
+    fn probe(&mut self) {
+        let Some(running) = self.running.as_ref().filter(|_| !self.probed.is_empty()) else {
+            return;
+        };
+        let tets = running.stage.tet_count();
+        if tets > MOST_TETS {
+            self.probed.clear();
+            return self.tell(Event::Refused(format!(
+                "convergence is shown for meshes of at most {MOST_TETS} tetrahedra, and this one has {tets}"
+            )));
+        }
+        let long_ago = self.probed_last.is_none_or(|since| since.elapsed() > PROBED_EVERY);
+        if let Some(first) = running.lanes.first()
+            && (long_ago || !self.playing)
+            && self.prober.as_ref().is_some_and(Prober::is_idle)
+        {
+            let moment = first.moment();
+            self.probed_last = Some(Instant::now());
+            if let Some(prober) = &self.prober {
+                prober.probe(moment, self.probed.clone());
+            }
         }
     }
 
@@ -298,11 +371,14 @@ impl Worker {
         match failed {
             None => self.publish(),
             // The last frame stays to be seen; Reset begins anew.
-            Some(message) => {
-                (self.playing, self.steps) = (false, 0);
-                self.tell(Event::Failed(Failure { message, cure: Cure::Reset }));
-            }
+            Some(message) => self.stop(message),
         }
+    }
+
+    /// Stops where a simulation has failed.
+    fn stop(&mut self, message: String) {
+        (self.playing, self.steps) = (false, 0);
+        self.tell(Event::Failed(Failure { message, cure: Cure::Reset }));
     }
 
     /// Whether this frame is to be measured: colours need it, or the last time was long ago. What is held
@@ -319,6 +395,7 @@ impl Worker {
     fn publish(&mut self) {
         let measured = self.is_measured();
         let Some(running) = &mut self.running else { return };
+        let mut failed = None;
         let mut frame = self.slot.blank();
         frame.generation = running.stage.generation;
         frame.number = running.number;
@@ -328,13 +405,21 @@ impl Worker {
         for ((lane, simulation), wall) in
             frame.lanes.iter_mut().zip(&mut running.lanes).zip(&running.walls)
         {
-            if measured {
-                simulation.measure();
+            if measured && let Err(message) = simulation.measure() {
+                failed = Some(message);
             }
             simulation.tell(self.coloring, lane);
             lane.wall = *wall;
         }
         self.slot.publish(frame);
         (self.wake)();
+        match failed {
+            None if measured => {
+                self.tell_devices();
+                self.probe();
+            }
+            None => {}
+            Some(message) => self.stop(message),
+        }
     }
 }

@@ -1,35 +1,62 @@
 //! The live convergence plot: residual against iteration for the methods that are ticked.
 
-use eframe::egui::Ui;
+use eframe::egui::{self, Color32, Ui};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 
-/// One method's curve for the current step.
-#[derive(Clone, Debug, Default)]
-pub struct Curve {
-    /// The method, in words.
-    pub name: String,
-    /// Relative residual after each iteration, from before the first.
-    pub residuals: Vec<f64>,
-}
+use crate::preferences::Preferences;
+use crate::probe::{Curve, METHODS};
 
-/// Draws the curves, residuals as powers of ten.
-pub fn show(ui: &mut Ui, curves: &[Curve]) {
+/// Colours that colour-blind people tell apart (Okabe and Ito 2008), one for each method.
+const COLORS: [Color32; METHODS.len()] = [
+    Color32::from_rgb(240, 240, 240),
+    Color32::from_rgb(213, 94, 0),
+    Color32::from_rgb(230, 159, 0),
+    Color32::from_rgb(204, 121, 167),
+    Color32::from_rgb(86, 180, 233),
+    Color32::from_rgb(0, 158, 115),
+    Color32::from_rgb(90, 130, 255),
+    Color32::from_rgb(240, 228, 66),
+];
+
+/// Ticks for the methods, and their curves; residuals as powers of ten.
+pub fn show(ui: &mut Ui, preferences: &mut Preferences, curves: &[Curve]) {
+    ui.horizontal(|ui| {
+        ui.strong("Convergence");
+        ui.weak("of the step that comes next").on_hover_text(
+            "Each method begins the same step anew, in double precision. The residual is the sum of unbalanced \
+             forces over that of all loads.",
+        );
+    });
+    for ((method, name), color) in METHODS.iter().zip(COLORS) {
+        let mut ticked = preferences.ticked.contains(method);
+        let text = egui::RichText::new(*name).color(color);
+        if ui.checkbox(&mut ticked, text).changed() {
+            preferences.ticked.retain(|other| other != method);
+            if ticked {
+                preferences.ticked.push(*method);
+            }
+        }
+    }
+    for problem in curves.iter().filter_map(|curve| curve.problem.as_ref()) {
+        ui.colored_label(ui.visuals().warn_fg_color, problem);
+    }
     Plot::new("convergence")
         .x_axis_label("iteration")
-        .y_axis_label("log10 residual")
+        .y_axis_label("residual")
+        .y_axis_formatter(|mark, _| format!("1e{:.0}", mark.value))
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)
         .legend(Legend::default())
         .show(ui, |plot| {
             for curve in curves {
-                let logarithms = curve.residuals.iter().map(|residual| residual.log10());
-                let points: PlotPoints<'_> = logarithms
-                    .enumerate()
-                    .filter(|(_, y)| y.is_finite())
-                    .map(|(iteration, y)| [iteration as f64, y])
+                let color = METHODS.iter().position(|(_, name)| *name == curve.name);
+                let points: PlotPoints<'_> = (curve.residuals.iter())
+                    .map(|&(iteration, residual)| [f64::from(iteration), residual.log10()])
+                    .filter(|[_, y]| y.is_finite())
                     .collect();
-                plot.line(Line::new(curve.name.clone(), points).width(2.0));
+                let line = Line::new(curve.name.clone(), points).width(2.0);
+                plot.line(line.color(color.map_or(Color32::GRAY, |number| COLORS[number])));
             }
         });
 }

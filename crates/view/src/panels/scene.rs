@@ -8,6 +8,7 @@ use super::choice::{Chooser, Row};
 use super::{Action, section};
 use crate::choices::Side;
 use crate::engine::Stage;
+use crate::preferences::Preferences;
 use crate::session::Session;
 
 /// What is being written into text fields.
@@ -25,6 +26,7 @@ pub fn show(
     session: &Session,
     stage: Option<&Stage>,
     fields: &mut Fields,
+    preferences: &mut Preferences,
     actions: &mut Vec<Action>,
 ) {
     section(ui, "Scene", true, |ui| {
@@ -69,6 +71,10 @@ pub fn show(
                 actions.push(Action::SaveAs(PathBuf::from(fields.save.trim())));
             }
         });
+        ui.checkbox(&mut preferences.save_by_hand, "with what was done by hand").on_hover_text(
+            "The saved scene repeats everything since the last reset, pulls and changes at their times, to the \
+             bit. Without this it begins with the settings as they are now.",
+        );
     });
 }
 

@@ -67,6 +67,7 @@ pub fn show_bar(
         ui.separator();
         ui.toggle_value(&mut preferences.settings_open, "Settings");
         ui.toggle_value(&mut preferences.curve_open, "Forces");
+        ui.toggle_value(&mut preferences.convergence_open, "Convergence");
         if ui.button("?").on_hover_text("Keyboard and mouse (F1)").clicked() {
             actions.push(Action::Ask(Request::Help));
         }

@@ -99,7 +99,7 @@ impl<S: Real> Simulation<S> {
             return Err(LiveError::NotFinite);
         }
         let (now, end) = (self.time(), (self.frame + 1) as f64 * self.scene.time.frame);
-        let keys = &mut self.hold(hold)?.keys;
+        let keys = &mut self.held_motion(hold)?.keys;
         if keys.last().is_some_and(|key| key.time == end) {
             keys.pop();
         }
@@ -123,12 +123,12 @@ impl<S: Real> Simulation<S> {
     pub fn let_go(&mut self, hold: usize) -> Result<(), LiveError> {
         // Between the end of the last substep, which it held, and that of the next.
         let release = self.time() + tolerance(&self.scene);
-        self.hold(hold)?.release = Some(release);
+        self.held_motion(hold)?.release = Some(release);
         Ok(())
     }
 
     /// A hold that is held.
-    fn hold(&mut self, hold: usize) -> Result<&mut Motion, LiveError> {
+    fn held_motion(&mut self, hold: usize) -> Result<&mut Motion, LiveError> {
         let by_hand = hold >= self.written.motions.len();
         let motion = self.scene.motions.get_mut(hold);
         let held = motion.filter(|motion| by_hand && motion.release.is_none());

@@ -91,6 +91,23 @@ impl<S: Real> Default for Inputs<S> {
 }
 
 impl<S: Real> Inputs<S> {
+    /// The same in another precision.
+    pub fn cast<T: Real>(&self) -> Inputs<T> {
+        let pin = |pin: &Pin<S>| Pin { vertex: pin.vertex, target: pin.target.cast() };
+        let tether = |tether: &Tether<S>| Tether {
+            vertex: tether.vertex,
+            target: tether.target.cast(),
+            stiffness: T::from_f64(tether.stiffness.to_f64()),
+        };
+        Inputs {
+            gravity: self.gravity.cast(),
+            pins: self.pins.iter().map(pin).collect(),
+            tethers: self.tethers.iter().map(tether).collect(),
+            anchors: self.anchors.iter().map(|anchor| anchor.cast()).collect(),
+            forces: self.forces.iter().map(|&(vertex, force)| (vertex, force.cast())).collect(),
+        }
+    }
+
     /// Where the anchors of a model's attachments are, the user's order.
     pub fn anchors_of<'a>(&'a self, model: &'a Model<S>) -> &'a [Vec3<S>] {
         if self.anchors.is_empty() { &model.rest_anchors } else { &self.anchors }

@@ -72,6 +72,11 @@ pub enum GpuError {
     /// A surface was bound to other tetrahedra.
     #[error("a surface does not fit the model: {0}; bind it to the mesh that the model is made of")]
     Embedding(#[from] EmbeddingError),
+    /// Nobody but its solver places such a surface.
+    #[error(
+        "this surface is where its solver brings it; make one with `GpuSurface::following` to place it"
+    )]
+    FollowsSolver,
     /// Anderson on a device cannot number the copies of the vertices.
     #[error(
         "Anderson with few colours joins up to {most} copies of vertices on a device; this model has \

@@ -5,6 +5,8 @@
 //! indices:  three `u32` for each triangle
 //! ```
 
+use std::sync::OnceLock;
+
 use bytemuck::{Pod, Zeroable};
 use wgpu::BufferUsages;
 
@@ -25,16 +27,27 @@ pub struct Skin<'a> {
     pub first_vertex: usize,
 }
 
-/// The surfaces of all bodies on the device, in one list of vertices.
+/// The surfaces of all bodies on the device, in one list of vertices. They follow a solver on the same
+/// device, or positions that the caller brings.
 #[derive(Debug)]
 pub struct GpuSurface {
     device: Device,
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     vertex_count: u32,
-    index_count: u32,
+    triangles: Vec<[u32; 3]>,
+    /// Made when first asked for: few pictures show them.
+    edges: OnceLock<wgpu::Buffer>,
+    placed: Option<Placed>,
     embed: Ready,
     normals: Ready,
+}
+
+/// Where the caller puts the tetrahedra's vertices: four floats each, the user's order.
+#[derive(Debug)]
+struct Placed {
+    positions: wgpu::Buffer,
+    count: usize,
 }
 
 #[derive(Debug)]
@@ -68,19 +81,44 @@ const BINDINGS: [(&str, bool); 5] = [
 ];
 
 impl GpuSurface {
-    /// Binds surfaces to the tetrahedra of a solver's model.
+    /// Binds surfaces to the tetrahedra of a solver's model; they are where its last step has brought them.
     pub fn new(
         solver: &GpuSolver,
         model: &Model<f32>,
         skins: &[Skin<'_>],
     ) -> Result<Self, GpuError> {
         solver.check_model(model)?;
-        let device = solver.device();
-        let bounds = bounds(model, skins)?;
+        let order = |v: u32| model.numbering.of(v) as u32;
+        let bounds = bounds(model.vertex_count(), order, skins)?;
+        Self::bind(solver.device(), solver.positions(), &bounds, skins)
+    }
+
+    /// Binds surfaces to tetrahedra whose vertices [`GpuSurface::place`] puts somewhere: a simulation on the
+    /// CPU, a state at rest. Until then they are at the origin.
+    pub fn following(
+        device: &Device,
+        vertex_count: usize,
+        skins: &[Skin<'_>],
+    ) -> Result<Self, GpuError> {
+        let bounds = bounds(vertex_count, |v| v, skins)?;
+        let size = size_of::<[f32; 4]>() as u64 * vertex_count as u64;
+        check_size(device, size, bounds.len())?;
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+        let positions = buffer(device, BINDINGS[POINTS].0, size, usage);
+        let surface = Self::bind(device, &positions, &bounds, skins)?;
+        Ok(Self { placed: Some(Placed { positions, count: vertex_count }), ..surface })
+    }
+
+    fn bind(
+        device: &Device,
+        positions: &wgpu::Buffer,
+        bounds: &[Bound],
+        skins: &[Skin<'_>],
+    ) -> Result<Self, GpuError> {
         let triangles = triangles(skins);
         let (offsets, others) = around(bounds.len(), &triangles);
         let arrays: [&[u8]; 3] = [
-            bytemuck::cast_slice(&bounds),
+            bytemuck::cast_slice(bounds),
             bytemuck::cast_slice(&offsets),
             bytemuck::cast_slice(&others),
         ];
@@ -93,27 +131,43 @@ impl GpuSurface {
 
         let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let vertices = buffer(device, "surface", size, storage | BufferUsages::VERTEX);
-        let filled = |label, bytes: &[u8], usage| {
-            let buffer = buffer(device, label, bytes.len() as u64, usage);
-            device.queue.write_buffer(&buffer, 0, bytes);
-            buffer
-        };
         let [bound, first, pairs] =
-            [1, 2, 3].map(|i| filled(BINDINGS[i].0, arrays[i - 1], storage));
-        let all = [solver.positions(), &bound, &first, &pairs, &vertices];
-        Ok(Self {
+            [1, 2, 3].map(|i| filled(device, BINDINGS[i].0, arrays[i - 1], storage));
+        let all = [positions, &bound, &first, &pairs, &vertices];
+        let index = storage | BufferUsages::INDEX;
+        let surface = Self {
             embed: prepare(device, "embed", &[POINTS, 1, 4], &all),
             normals: prepare(device, "smooth_normals", &[1, 2, 3, 4], &all),
-            indices: filled("indices of the surface", indices, storage | BufferUsages::INDEX),
+            indices: filled(device, "indices of the surface", indices, index),
             device: device.clone(),
             vertices,
             vertex_count: bounds.len() as u32,
-            index_count: 3 * triangles.len() as u32,
-        })
+            triangles,
+            edges: OnceLock::new(),
+            placed: None,
+        };
+        // Its memory may have been too little.
+        device.check()?;
+        Ok(surface)
     }
 
-    /// Moves the surface to where the solver's last step has brought the tissue: one submission, no
-    /// waiting.
+    /// Puts the tetrahedra's vertices [m], the user's order, shape [vertex_count], for the next
+    /// [`GpuSurface::update`]. Of a surface that follows a solver, or another number of vertices, an error;
+    /// nothing has moved then.
+    pub fn place(&self, positions: &[Vec3<f32>]) -> Result<(), GpuError> {
+        let Some(placed) = &self.placed else { return Err(GpuError::FollowsSolver) };
+        if positions.len() != placed.count {
+            let (what, found, expected) = ("positions", positions.len(), placed.count);
+            return Err(EmbeddingError::Length { what, found, expected }.into());
+        }
+        let four = |x: &Vec3<f32>| [x.x, x.y, x.z, 1.0];
+        let numbers: Vec<[f32; 4]> = positions.iter().map(four).collect();
+        self.device.queue.write_buffer(&placed.positions, 0, bytemuck::cast_slice(&numbers));
+        Ok(())
+    }
+
+    /// Moves the surface to where the solver's last step, or the caller, has brought the tissue: one
+    /// submission, no waiting.
     pub fn update(&self) {
         let wgpu = &self.device.device;
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("surface") };
@@ -154,7 +208,16 @@ impl GpuSurface {
 
     /// How many indices there are: three for each triangle.
     pub fn index_count(&self) -> u32 {
-        self.index_count
+        3 * self.triangles.len() as u32
+    }
+
+    /// The edges of all triangles, each once, two `u32` for each; for index bindings.
+    pub fn edges(&self) -> &wgpu::Buffer {
+        self.edges.get_or_init(|| {
+            let edges = edges(&self.triangles);
+            let usage = BufferUsages::INDEX | BufferUsages::COPY_DST;
+            filled(&self.device, "edges of the surface", bytemuck::cast_slice(&edges), usage)
+        })
     }
 
     /// How a vertex lies in memory: the position at location 0, the normal at location 1.
@@ -182,18 +245,22 @@ impl GpuSurface {
     }
 }
 
-/// What each vertex follows, in the solver's numbering.
-fn bounds(model: &Model<f32>, skins: &[Skin<'_>]) -> Result<Vec<Bound>, EmbeddingError> {
+/// What each vertex follows; `order` numbers the tetrahedra's vertices as they lie on the device.
+fn bounds(
+    vertex_count: usize,
+    order: impl Fn(u32) -> u32,
+    skins: &[Skin<'_>],
+) -> Result<Vec<Bound>, EmbeddingError> {
     let mut bounds = Vec::new();
     for skin in skins {
         let (first, embedding) = (skin.first_vertex, skin.embedding);
-        let there = model.vertex_count().saturating_sub(first);
+        let there = vertex_count.saturating_sub(first);
         let expected = embedding.tet_vertex_count();
         if there < expected {
             let what = "tetrahedron vertices";
             return Err(EmbeddingError::Length { what, found: there, expected });
         }
-        let of = |v: u32| model.numbering.of(first as u32 + v) as u32;
+        let of = |v: u32| order(first as u32 + v);
         let both = embedding.corners().iter().zip(embedding.weights());
         bounds.extend(both.map(|(corners, weights)| Bound {
             corners: corners.map(of),
@@ -237,6 +304,18 @@ fn around(vertex_count: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 2
     (offsets, others)
 }
 
+/// Edges of triangles, the lower vertex first, sorted, each once.
+fn edges(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let of = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
+    let mut edges: Vec<[u32; 2]> = triangles.iter().flat_map(of).collect();
+    for edge in &mut edges {
+        edge.sort_unstable();
+    }
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}
+
 fn check_size(device: &Device, needed: u64, vertices: usize) -> Result<(), GpuError> {
     let limits = device.limits();
     let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
@@ -255,6 +334,12 @@ fn buffer(device: &Device, label: &str, size: u64, usage: BufferUsages) -> wgpu:
         usage,
         mapped_at_creation: false,
     })
+}
+
+fn filled(device: &Device, label: &str, bytes: &[u8], usage: BufferUsages) -> wgpu::Buffer {
+    let buffer = buffer(device, label, bytes.len() as u64, usage);
+    device.queue.write_buffer(&buffer, 0, bytes);
+    buffer
 }
 
 fn prepare(
