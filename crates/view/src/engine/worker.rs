@@ -202,6 +202,10 @@ impl Worker {
             Ok(assembly) => assembly,
             Err(error) => return self.fail(error.to_string(), Cure::Open),
         };
+        self.ask_or_start(plan, assembly);
+    }
+
+    fn ask_or_start(&mut self, plan: Plan, assembly: Assembly) {
         match expectation(&assembly, &plan.scenes) {
             Some(message) => {
                 self.asked = Some((plan, assembly));
@@ -267,6 +271,12 @@ impl Worker {
     }
 
     fn change(&mut self, lane: usize, settings: &Settings, scene: &Scene) {
+        if let Some((mut plan, assembly)) = self.asked.take() {
+            if let Some(changed) = plan.scenes.get_mut(lane) {
+                changed.clone_from(scene);
+            }
+            return self.ask_or_start(plan, assembly);
+        }
         let Some(running) = &mut self.running else { return };
         let Some(changed) = running.lanes.get_mut(lane) else { return };
         match changed.change(settings, scene) {
