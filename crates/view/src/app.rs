@@ -11,7 +11,7 @@ use std::time::Instant;
 use crate::capture::{FOLDER, Recorder};
 use crate::choices::{Settings, Side};
 use crate::document::Document;
-use crate::engine::{Command, Engine, Event, Frame, Stage};
+use crate::engine::{Command, Cure, Engine, Event, Frame, Stage};
 use crate::help::{self, Request};
 use crate::holds::Holds;
 use crate::messages::Messages;
@@ -318,16 +318,19 @@ impl App {
                 let cpu = vec![("solver.device".to_owned(), "cpu".to_owned())];
                 let chosen = self.session.choose(Side::First, &cpu, false);
                 self.carry_out(chosen);
-                // Nothing runs that could take a change.
-                let load = self.session.load();
-                self.send([load]);
-                self.play(true);
             }
         }
     }
 
     fn carry_out(&mut self, commands: Result<Vec<Command>, String>) {
         match commands {
+            Ok(commands) if commands.is_empty() => {}
+            // Nothing runs that could take a change: everything begins anew with it.
+            Ok(_) if self.messages.failure.as_ref().is_some_and(|f| f.cure != Cure::Reset) => {
+                let load = self.session.load();
+                self.send([load]);
+                self.play(true);
+            }
             Ok(commands) => self.send(commands),
             Err(error) => self.messages.warn(error),
         }

@@ -57,7 +57,7 @@ fn check_display() -> Result<()> {
     let servers = ["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"];
     let is_set = |name: &&str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     let needed = cfg!(all(unix, not(target_os = "macos")));
-    if needed && !servers.iter().any(|name| is_set(name)) {
+    if needed && !servers.iter().any(is_set) {
         bail!(
             "there is no display to open a window on (neither DISPLAY nor WAYLAND_DISPLAY is set); {HEADLESS}"
         );

@@ -275,3 +275,26 @@ fn the_keyboard_pauses_steps_and_begins_again() {
     window.harness.key_press(Key::R);
     window.wait("rest", |app| app.frame().is_some_and(|frame| frame.number == 0));
 }
+
+#[test]
+fn sliders_at_their_ends_leave_numbers() {
+    let mut window = Window::running("grab", &[]);
+    for (name, ends) in [
+        ("stiffness E", [0.5, 200.0]),
+        ("Poisson's ratio", [0.0, 0.499]),
+        ("density", [500.0, 2000.0]),
+        ("viscosity", [0.0, 100.0]),
+        ("gravity", [0.0, 20.0]),
+        ("iterations", [1.0, 50.0]),
+        ("substeps", [1.0, 20.0]),
+    ] {
+        for end in ends {
+            window.slide(name, end);
+            let number = window.harness.state().frame().expect("a frame").number;
+            window.wait("frames", |app| app.frame().is_some_and(|frame| frame.number > number + 1));
+            let is_number = window.lane(0).positions.iter().all(|x| x.is_finite());
+            let texts: Vec<_> = window.harness.state().messages().texts().collect();
+            assert!(is_number && texts.is_empty(), "{name} at {end}: {texts:?}");
+        }
+    }
+}

@@ -218,6 +218,10 @@ impl Worker {
             Ok(assembly) => assembly,
             Err(error) => return self.fail(error.to_string(), Cure::Open),
         };
+        self.ask_or_start(plan, assembly);
+    }
+
+    fn ask_or_start(&mut self, plan: Plan, assembly: Assembly) {
         match expectation(&assembly, &plan.scenes) {
             Some(message) => {
                 self.asked = Some((plan, assembly));
@@ -291,6 +295,13 @@ impl Worker {
     }
 
     fn change(&mut self, lane: usize, settings: &Settings) {
+        if let Some((mut plan, assembly)) = self.asked.take() {
+            let changed = plan.scenes.get_mut(lane).map_or(Ok(()), |scene| scene.change(settings));
+            if let Err(error) = changed {
+                self.tell(Event::Refused(error.to_string()));
+            }
+            return self.ask_or_start(plan, assembly);
+        }
         let Some(running) = &mut self.running else { return };
         let Some(changed) = running.lanes.get_mut(lane).filter(|_| !settings.is_empty()) else {
             return;
