@@ -119,6 +119,16 @@ impl App {
         &self.session
     }
 
+    /// Whether simulations run, as far as was asked for.
+    pub fn is_playing(&self) -> bool {
+        self.clock.playing
+    }
+
+    /// Proposes where to save.
+    pub fn save_under(&mut self, path: &Path) {
+        self.fields.save = path.display().to_string();
+    }
+
     /// What is held.
     pub fn holds(&self) -> &Holds {
         &self.holds
@@ -245,6 +255,13 @@ impl App {
                     }
                     for note in &stage.assembly.notes {
                         self.messages.tell(note.clone());
+                    }
+                    self.stage = Some(stage);
+                }
+                Event::Accompanied(stage) => {
+                    self.messages.busy = None;
+                    if let Err(error) = self.viewport.enter(&stage) {
+                        self.messages.warn(error);
                     }
                     self.stage = Some(stage);
                 }

@@ -1,12 +1,14 @@
 //! Drives the window as a person would, without a display: presses, drags, sliders, buttons, keys.
 
-use eframe::egui::{Key, Modifiers, Pos2, Rect, Role, vec2};
+use eframe::egui::{Key, Modifiers, Pos2, Rect, Role, Vec2, vec2};
 use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, wgpu};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use viscera::scalar::Vec3;
 use viscera::scene::Scene;
+use viscera::settings::{Acceleration, Colors};
+use viscera::simulation::{Assembly, Simulation};
 use viscera_view::choices::Side;
 use viscera_view::engine::Lane;
 use viscera_view::preferences::Preferences;
@@ -78,6 +80,32 @@ impl Window {
         self.harness.get_by_role_and_label(Role::Slider, name).set_value_accesskit(value);
         self.harness.step();
         self.harness.step();
+    }
+
+    /// Presses in the middle of the view, pulls so far, and lets the button go.
+    fn drag(&mut self, way: Vec2) {
+        let middle = self.view().center();
+        self.harness.hover_at(middle);
+        self.harness.step();
+        self.harness.drag_at(middle);
+        self.harness.step();
+        for share in [0.25, 0.5, 0.75, 1.0] {
+            self.harness.hover_at(middle + way * share);
+            self.harness.step();
+            let number = self.harness.state().frame().map_or(0, |frame| frame.number);
+            self.wait("a frame", |app| app.frame().is_some_and(|frame| frame.number > number));
+        }
+        self.harness.drop_at(middle + way);
+        self.harness.step();
+    }
+
+    /// Saves the scene there, and reads it.
+    fn save(&mut self, path: &Path) -> Scene {
+        self.harness.state_mut().save_under(path);
+        self.harness.key_press_modifiers(Modifiers::COMMAND, Key::S);
+        self.wait("the file", |_| path.exists());
+        let text = std::fs::read_to_string(path).expect("a file");
+        Scene::parse("saved", &text, &[]).unwrap_or_else(|error| panic!("{error}"))
     }
 
     fn view(&self) -> Rect {
@@ -188,8 +216,9 @@ fn two_solvers_run_side_by_side_from_the_same_start() {
     window.harness.get_by_label("view A");
     window.harness.get_by_label("view B");
     window.press("true solution");
+    let number = window.harness.state().frame().expect("a frame").number;
     window.wait("the exact solution", |app| {
-        app.frame().is_some_and(|frame| frame.lanes.len() == 3 && frame.number > 3)
+        app.frame().is_some_and(|frame| frame.lanes.len() == 3 && frame.number > number + 5)
     });
     let apart = farthest(&window.lane(0).positions, &window.lane(2).positions);
     assert!(apart > 0.0 && apart < 0.05, "{apart} m apart");
@@ -203,16 +232,71 @@ fn a_saved_scene_is_what_was_chosen() {
     std::fs::write(&path, text.expect("a built-in scene").text).expect("a file");
     let settings = [("solver.iterations", "7")];
     let mut window = Window::running(&path.display().to_string(), &settings);
+    window.press("with what was done by hand");
     window.slide("substeps", 3.0);
     // The file that is open may vanish.
     std::fs::remove_file(&path).expect("the file");
-    window.harness.key_press_modifiers(Modifiers::COMMAND, Key::S);
-    window.harness.step();
-    window.harness.step();
-    let saved = std::fs::read_to_string(folder.path().join("mine_changed.toml"));
-    let scene = Scene::parse("saved", &saved.expect("a file"), &[]).expect("a legal scene");
+    let scene = window.save(&folder.path().join("mine_changed.toml"));
     assert_eq!((scene.solver.iterations, scene.solver.substeps), (7, 3));
-    assert!(!path.exists());
+    assert!(scene.changes.is_empty() && !path.exists());
+}
+
+/// What `viscera run` computes of a scene.
+fn run(scene: Scene) -> Simulation<f32> {
+    let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned())).expect("an assembly");
+    let frames = scene.frame_count();
+    let mut simulation = Simulation::new(scene, assembly).expect("a simulation");
+    for _ in 0..frames {
+        simulation.advance_frame().expect("a frame");
+    }
+    simulation
+}
+
+/// Start; drag the liver; stiffen it; Jacobi with 40 iterations; Anderson beside it; a picture; save; run it
+/// without a window.
+#[test]
+fn a_first_visit_ends_in_a_scene_that_repeats_it() {
+    let mut window = Window::running("liver_retraction", &[("solver.substeps", "1")]);
+    let path = window.folder.path().join("visit.toml");
+    window.press("keep");
+    window.drag(vec2(20.0, -60.0));
+    let young = |window: &Window| window.scene().bodies[0].material.young();
+    assert!(young(&window) < 10e3);
+    window.slide("stiffness E", 20.0);
+    assert_eq!(young(&window), 20e3);
+    window.press("Jacobi 40");
+    assert_eq!(
+        (window.scene().solver.colors, window.scene().solver.iterations),
+        (Colors::Limited(1), 40)
+    );
+    let number = window.harness.state().frame().expect("a frame").number;
+    window.press("A | B");
+    window.wait("a second simulation", |app| {
+        app.frame().is_some_and(|frame| frame.lanes.len() == 2 && frame.number > number)
+    });
+    // It began where the first one is, and is held by the same hand.
+    let apart = farthest(&window.lane(0).positions, &window.lane(1).positions);
+    assert!(apart < 0.01, "{apart} m");
+    window.harness.get_all_by_label("Anderson 40").last().expect("one for each").click_accesskit();
+    window.wait("Anderson", |app| {
+        app.session().scene(Side::Second).solver.acceleration == Acceleration::Anderson
+    });
+    window.press("Picture");
+    assert!(window.folder.path().join("pictures/liver_retraction-0001.png").exists());
+    window.harness.key_press(Key::Escape);
+    window.harness.step();
+    window.harness.key_press(Key::Space);
+    window.wait("a pause", |app| !app.is_playing());
+    // What the thread had begun is finished.
+    std::thread::sleep(Duration::from_millis(300));
+    window.harness.step();
+    window.harness.step();
+    let scene = window.save(&path);
+    assert_eq!((scene.motions.len(), scene.changes.len()), (2, 2));
+    let frame = window.harness.state().frame().expect("a frame");
+    assert_eq!(scene.frame_count(), frame.number);
+    let repeated = run(scene);
+    assert_eq!(window.lane(0).positions, repeated.state().positions);
 }
 
 #[test]

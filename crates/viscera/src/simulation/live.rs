@@ -6,7 +6,7 @@ use super::{AssembleError, Simulation, SimulationError, substep_dt};
 use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
-use crate::settings::Precision;
+use crate::settings::{Precision, SolverSettings};
 use crate::solver::Solver;
 use crate::state::State;
 
@@ -155,10 +155,7 @@ impl<S: Real> Simulation<S> {
 
     /// Another simulation that goes on from here, in any precision, with settings of its own: for a comparison
     /// of solvers. Where this one was taken hold of, the other is held as well.
-    pub fn fork<T: Real>(
-        &self,
-        settings: &[(String, String)],
-    ) -> Result<Simulation<T>, LiveError> {
+    pub fn fork<T: Real>(&self, settings: &[(String, String)]) -> Result<Simulation<T>, LiveError> {
         let precision = match size_of::<T>() == size_of::<f64>() {
             true => Precision::F64,
             false => Precision::F32,
@@ -180,6 +177,16 @@ impl<S: Real> Simulation<S> {
         let velocities: Vec<Vec3<T>> = double(&self.state.velocities);
         let state = State { positions, velocities, ..State::at_rest(&fork.model) };
         fork.begin_at(state);
+        // Constraints in the same order, which settings decide, go on with the multipliers they have.
+        let order = |solver: &SolverSettings| (solver.colors, solver.neo_hookean, solver.rebase);
+        let same_order = order(&self.scene.solver) == order(&fork.scene.solver);
+        if same_order && self.model.multiplier_count == fork.model.multiplier_count {
+            let kept = self.state.multipliers.iter().map(|l| T::from_f64(l.to_f64())).collect();
+            let positions = std::mem::take(&mut fork.state.positions);
+            let velocities = std::mem::take(&mut fork.state.velocities);
+            let multiplier_dt = self.state.multiplier_dt;
+            fork.put(State { positions, velocities, multipliers: kept, multiplier_dt });
+        }
         Ok(fork)
     }
 
