@@ -1,19 +1,25 @@
 //! The procedural liver, a tenth of a second after its right end was let go, drawn without a window:
 //!
 //! `cargo run --release -p viscera-render --example liver -- liver.png`
+//!
+//! With `--everything` in colours of displacement, with its triangles, what is held, a pull, a shadow and the
+//! shape at rest as a ghost.
 
 use std::error::Error;
 
 use viscera::material::{Material, MaterialModel};
+use viscera::mesh::TetMesh;
 use viscera::mesh::embed::Embedding;
 use viscera::mesh::shapes;
-use viscera::model::ModelBuilder;
+use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Vec3, vec3};
 use viscera::settings::SolverSettings;
-use viscera::solver::gpu::{Adapter, GpuSolver, GpuSurface, Skin};
+use viscera::solver::gpu::{Adapter, Device, GpuSolver, GpuSurface, Skin};
 use viscera::solver::{Inputs, Pin};
 use viscera_picture::{Color, ImageSize, write_png};
-use viscera_render::{Look, Offscreen, Orbit};
+use viscera_render::{
+    Arrow, BodyView, Canvas, Drawing, Markers, Orbit, Paint, Quality, Room, ValueBuffer,
+};
 
 /// Edge of the tetrahedra [m].
 const SPACING: f64 = 0.02;
@@ -21,7 +27,12 @@ const SPACING: f64 = 0.02;
 const FRAMES: u32 = 6;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let file = std::env::args().nth(1).unwrap_or_else(|| "liver.png".to_owned());
+    let (flags, files): (Vec<_>, Vec<_>) =
+        std::env::args().skip(1).partition(|argument| argument.starts_with("--"));
+    if let Some(flag) = flags.iter().find(|flag| *flag != "--everything") {
+        return Err(format!("{flag} is unknown; there is --everything").into());
+    }
+    let file = files.first().map_or("liver.png", String::as_str);
     let liver = shapes::liver(SPACING, 1.0)?;
     let tissue = Material::new(MaterialModel::StableNeoHookean, 5e3, 0.45, 1060.0)?;
     let settings = SolverSettings { substeps: 1, iterations: 20, ..SolverSettings::default() };
@@ -35,23 +46,85 @@ fn main() -> Result<(), Box<dyn Error>> {
     let skin = Skin { embedding: &embedding, triangles: &liver.surface.triangles, first_vertex: 0 };
     let surface = GpuSurface::new(&solver, &model, &[skin])?;
 
-    // Its left half is held.
-    let places = liver.tets.vertices();
-    let middle = places.iter().map(|x| x.x).sum::<f64>() / places.len() as f64;
-    let held = (0..).zip(places).filter(|(_, x)| x.x < middle);
-    let pins =
-        held.map(|(vertex, x): (u32, &Vec3<f64>)| Pin { vertex, target: x.cast() }).collect();
-    let inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81), pins, ..Inputs::default() };
-    for _ in 0..FRAMES {
-        solver.step(&model, &inputs, 1.0 / 60.0)?;
-    }
+    let held = left_half(&liver.tets);
+    fall(&mut solver, &model, &held)?;
     surface.update();
 
-    let look =
-        Look { orbit: Orbit::framing(&liver.surface.vertices), aspect: 1.0, color: Color::TISSUE };
-    let offscreen = Offscreen::new(&device, ImageSize::new(960, 720)?)?;
-    let image = offscreen.draw(&look, &[&surface])?;
-    std::fs::write(&file, write_png(&image)?)?;
+    let orbit = Orbit::framing(&liver.surface.vertices);
+    let mut drawing = Drawing { bodies: vec![BodyView::of(&surface)], ..Drawing::from(orbit) };
+    let rest = GpuSurface::following(&device, liver.tets.vertices().len(), &[skin])?;
+    let values = ValueBuffer::new(&device, liver.surface.vertices.len());
+    if !flags.is_empty() {
+        rest.place(&liver.tets.vertices().iter().map(|x| x.cast()).collect::<Vec<_>>())?;
+        rest.update();
+        let extras = Extras { values: &values, rest: &rest, at_rest: &liver.surface.vertices };
+        extras.add(&mut drawing, held.into_iter().map(|(_, x)| x).collect())?;
+    }
+    let canvas = Canvas::new(&device, ImageSize::new(960, 640)?, quality(&device))?;
+    canvas.draw(&drawing)?;
+    std::fs::write(file, write_png(&canvas.read()?)?)?;
     println!("{file}: {} tetrahedra on {}", model.tet_count(), device.name());
     Ok(())
+}
+
+/// One picture may take its time: smooth edges everywhere.
+fn quality(device: &Device) -> Quality {
+    Quality { smooth_edges: true, ..Quality::suited_to(device) }
+}
+
+/// Vertices of the left half, and where they are [m].
+fn left_half(mesh: &TetMesh) -> Vec<(u32, Vec3<f64>)> {
+    let places = mesh.vertices();
+    let middle = places.iter().map(|x| x.x).sum::<f64>() / places.len() as f64;
+    (0..).zip(places.iter().copied()).filter(|(_, x)| x.x < middle).collect()
+}
+
+fn fall(
+    solver: &mut GpuSolver,
+    model: &Model<f32>,
+    held: &[(u32, Vec3<f64>)],
+) -> Result<(), Box<dyn Error>> {
+    let pins = held.iter().map(|&(vertex, x)| Pin { vertex, target: x.cast() }).collect();
+    let inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81), pins, ..Inputs::default() };
+    for _ in 0..FRAMES {
+        solver.step(model, &inputs, 1.0 / 60.0)?;
+    }
+    Ok(())
+}
+
+/// What `--everything` adds.
+struct Extras<'a> {
+    values: &'a ValueBuffer,
+    rest: &'a GpuSurface,
+    at_rest: &'a [Vec3<f64>],
+}
+
+impl<'a> Extras<'a> {
+    fn add(&self, drawing: &mut Drawing<'a>, held: Vec<Vec3<f64>>) -> Result<(), Box<dyn Error>> {
+        let [tissue] = drawing.bodies.as_mut_slice() else { return Ok(()) };
+        let [now, _] = tissue.surface.read()?;
+        let now: Vec<Vec3<f64>> = now.iter().map(|x| x.cast()).collect();
+        let moved = |(a, b): (&Vec3<f64>, &Vec3<f64>)| (*a - *b).length() as f32;
+        let moved: Vec<f32> = now.iter().zip(self.at_rest).map(moved).collect();
+        self.values.write(&moved)?;
+        let high = moved.iter().copied().fold(0.0, f32::max);
+        tissue.paint = Paint::Values { buffer: self.values, low: 0.0, high };
+        tissue.wireframe = true;
+        let color = Color::REST;
+        let ghost =
+            BodyView { paint: Paint::Plain(color), opacity: 0.25, ..BodyView::of(self.rest) };
+        drawing.bodies.push(ghost);
+
+        let extent = drawing.orbit.distance;
+        let picked = now.iter().copied().reduce(|a, b| if a.x > b.x { a } else { b });
+        let from = picked.unwrap_or_default();
+        let to = from + vec3(0.06, 0.0, 0.12) * extent;
+        let radius = 0.004 * extent;
+        let mark = |positions, radius, color| Markers { positions, radius, color };
+        drawing.markers.push(mark(held, 0.003 * extent, Color::FIXED));
+        drawing.markers.push(mark(vec![from], 2.0 * radius, Color::PULLED));
+        drawing.arrows.push(Arrow { from, to, radius, color: Color::PULLED });
+        drawing.shadow = Room::around(now.into_iter());
+        Ok(())
+    }
 }

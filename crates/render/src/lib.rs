@@ -1,18 +1,31 @@
 //! # viscera-render
 //!
-//! Draws tissue with wgpu and no user interface: a fine surface from the solver's own buffers, lit as
-//! wet tissue is, without a copy to the host.
+//! Draws tissue with wgpu and no user interface: fine surfaces from the solver's own buffers, lit as
+//! wet tissue is or coloured by values, without a copy to the host.
 //!
 //! | to | look at |
 //! |---|---|
+//! | say what a picture shows | [`Drawing`], [`BodyView`], [`Markers`], [`Arrow`] |
 //! | look around | [`Orbit`] |
-//! | draw into a texture of one's own | [`Renderer`] |
-//! | make a picture without a window | [`Offscreen`] |
+//! | draw it, for a window or without one | [`Canvas`] |
+//! | choose between fine and fast | [`Quality`] |
+//! | colour a surface by values | [`ValueBuffer`] |
 
-mod offscreen;
+mod canvas;
+mod drawing;
+mod error;
 mod orbit;
-mod renderer;
+mod pipelines;
+mod quality;
+mod shadow;
+mod solids;
+mod target;
+mod values;
+mod view;
 
-pub use offscreen::{Offscreen, RenderError};
+pub use canvas::Canvas;
+pub use drawing::{Arrow, Background, BodyView, Drawing, Markers, Paint, Room};
+pub use error::RenderError;
 pub use orbit::Orbit;
-pub use renderer::{DEPTH_FORMAT, Look, Renderer};
+pub use quality::Quality;
+pub use values::ValueBuffer;
