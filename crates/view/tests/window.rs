@@ -5,6 +5,8 @@ mod common;
 use common::Window;
 use eframe::egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::Queryable;
+use std::path::Path;
+use std::time::Duration;
 use viscera::scalar::Vec3;
 use viscera::scene::Scene;
 use viscera::settings::{Acceleration, Colors};
