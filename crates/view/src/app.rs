@@ -5,7 +5,7 @@ mod files;
 use eframe::egui::{self, CentralPanel, Panel, ScrollArea, Ui};
 use eframe::egui_wgpu::RenderState;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use crate::capture::{FOLDER, Recorder};
@@ -33,6 +33,8 @@ pub struct Options {
     pub data: Option<PathBuf>,
     /// Where pictures and recordings go.
     pub pictures: PathBuf,
+    /// Gets why the window had to close, where it did not close by itself.
+    pub farewell: Arc<OnceLock<String>>,
 }
 
 /// The scene that is opened where none is named.
@@ -53,6 +55,7 @@ pub struct App {
     fields: Fields,
     recorder: Option<Recorder>,
     pictures: PathBuf,
+    farewell: Arc<OnceLock<String>>,
     help_open: bool,
     /// Number and moment of the frame from which the rate was counted last.
     counted: (u64, Instant),
@@ -94,6 +97,7 @@ impl App {
             fields: Fields::default(),
             recorder: None,
             pictures: options.pictures,
+            farewell: options.farewell,
             help_open: false,
             counted: (0, Instant::now()),
             curves: Vec::new(),
@@ -129,6 +133,11 @@ impl App {
         self.fields.save = path.display().to_string();
     }
 
+    /// Whether the window's device was lost.
+    pub fn viewport_lost(&self) -> bool {
+        self.viewport.lost().is_some()
+    }
+
     /// What is held.
     pub fn holds(&self) -> &Holds {
         &self.holds
@@ -147,6 +156,9 @@ impl App {
     /// Hears of the simulation, shows everything, does what is asked for.
     pub fn show(&mut self, ui: &mut Ui) {
         let context = ui.ctx().clone();
+        if self.say_farewell(&context) {
+            return;
+        }
         self.hear();
         self.take_frame();
         let coloring = self.preferences.coloring;

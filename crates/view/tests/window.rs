@@ -265,3 +265,20 @@ fn sliders_at_their_ends_leave_numbers() {
         }
     }
 }
+
+#[test]
+fn without_its_device_the_window_saves_what_was_done_and_closes() {
+    let mut window = Window::running("grab", &[]);
+    window.press("keep");
+    window.drag(vec2(0.0, -40.0));
+    window.press("Record");
+    window.device.destroy();
+    window.wait("a last word", |app| app.viewport_lost());
+    window.harness.step();
+    let farewell = window.farewell.get().expect("a reason");
+    assert!(farewell.contains("lost") && farewell.contains("recovered"), "{farewell}");
+    let saved = window.folder.path().join("pictures/grab-recovered-0001.toml");
+    let text = std::fs::read_to_string(&saved).expect("what was done");
+    let scene = Scene::parse("saved", &text, &[]).expect("a legal scene");
+    assert!(scene.motions.iter().any(|motion| motion.name == "hand-1"));
+}

@@ -96,6 +96,11 @@ impl Viewport {
         self.orbit.elevation = angle(from.z, from.x.hypot(from.y)).clamp(-89.0, 89.0);
     }
 
+    /// Why nothing can be drawn any more, where the device was lost.
+    pub fn lost(&self) -> Option<String> {
+        self.gpu.device.check().err().map(|error| error.to_string())
+    }
+
     /// The camera.
     pub fn orbit(&self) -> &Orbit {
         &self.orbit

@@ -5,6 +5,7 @@ use eframe::egui::{Key, Modifiers, Pos2, Rect, Role, Vec2, vec2};
 use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, wgpu};
 use std::path::Path;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use viscera::scene::Scene;
 use viscera_view::choices::Side;
@@ -20,6 +21,10 @@ pub struct Window {
     pub harness: Harness<'static, App>,
     /// Where everything is written.
     pub folder: tempfile::TempDir,
+    /// What it is drawn with.
+    pub device: eframe::wgpu::Device,
+    /// Why it had to close.
+    pub farewell: Arc<OnceLock<String>>,
 }
 
 impl Window {
@@ -29,22 +34,25 @@ impl Window {
         let setup = wgpu::default_wgpu_setup();
         let state =
             wgpu::create_render_state(setup, eframe::egui_wgpu::RendererOptions::PREDICTABLE);
+        let farewell = Arc::default();
         let options = Options {
             scene: scene.into(),
             settings: settings.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect(),
             data: None,
             pictures: folder.path().join("pictures"),
+            farewell: Arc::clone(&farewell),
         };
         let context = eframe::egui::Context::default();
         let preferences = Preferences::default();
         let app = App::new(&context, state.clone(), options, preferences).expect("a window");
+        let device = state.device.clone();
         let renderer = wgpu::WgpuTestRenderer::from_render_state(state);
         let harness = Harness::builder()
             .with_size(vec2(1100.0, 760.0))
             .with_step_dt(1.0 / 60.0)
             .renderer(renderer)
             .build_ui_state(|ui, app: &mut App| app.show(ui), app);
-        Self { harness, folder }
+        Self { harness, folder, device, farewell }
     }
 
     /// Opens a scene and waits until it moves.
