@@ -111,7 +111,7 @@ impl Viewport {
         if self.stage.as_ref().is_none_or(|stage| stage.generation != frame.generation) {
             return Ok(());
         }
-        for (tissue, lane) in self.tissues.iter().zip(&frame.lanes) {
+        for (tissue, lane) in self.tissues.iter_mut().zip(&frame.lanes) {
             tissue.place(lane)?;
         }
         let shown = frame.lanes.iter().take(self.shown_lanes());
@@ -272,7 +272,7 @@ impl Viewport {
             return Ok(());
         }
         while self.pictures.len() < sizes.len() {
-            self.pictures.push(Picture::new(&self.gpu));
+            self.pictures.push(Picture::default());
         }
         let ghost = stage.has_ghost.then(|| self.tissues.last()).flatten();
         for (number, size) in sizes.iter().enumerate() {
@@ -334,11 +334,7 @@ impl Viewport {
 
     /// The pictures as they are shown; waits for them.
     pub fn images(&self) -> Result<Vec<Image>, String> {
-        self.pictures
-            .iter()
-            .take(self.shown_lanes())
-            .map(|picture| picture.read(&self.gpu))
-            .collect()
+        self.pictures.iter().take(self.shown_lanes()).map(Picture::read).collect()
     }
 }
 

@@ -140,9 +140,8 @@ pub fn newtons(force: f64) -> String {
     }
 }
 
-/// Arrows from what is held to where it is pulled, and the forces beside them.
+/// The force of each hold, beside where it pulls to.
 pub fn forces(painter: &Painter, lens: &Lens, lane: &Lane, holds: &Holds) {
-    let pulled = on_screen(Color::PULLED);
     for hold in &lane.holds {
         if holds.list().iter().all(|held| held.id != hold.id) {
             continue;
@@ -151,11 +150,6 @@ pub fn forces(painter: &Painter, lens: &Lens, lane: &Lane, holds: &Holds) {
             continue;
         };
         let way = target - place;
-        if way.length() > 6.0 {
-            painter.arrow(place, way, Stroke::new(2.5, pulled));
-        }
-        painter.circle_filled(place, 4.0, pulled);
-        painter.circle_stroke(place, 4.0, Stroke::new(1.0, Color32::WHITE));
         let side =
             if way.x < 0.0 { (Align2::RIGHT_CENTER, -12.0) } else { (Align2::LEFT_CENTER, 12.0) };
         label(painter, target + vec2(side.1, -10.0), side.0, &newtons(hold.force.length()), 15.0);

@@ -6,7 +6,10 @@ use eframe::wgpu;
 use viscera::scalar::Vec3;
 use viscera::solver::gpu::{Device, GpuSurface, Skin};
 use viscera_picture::{Color, Image, ImageSize};
-use viscera_render::{DEPTH_FORMAT, Look, Orbit, Renderer};
+use viscera_render::{
+    Arrow, BodyView, Canvas, Drawing, Markers, Orbit, Paint, Quality, RenderError, Room,
+    ValueBuffer,
+};
 
 use crate::engine::{Lane, Stage};
 
@@ -31,6 +34,11 @@ impl Gpu {
 /// The surfaces of one simulation.
 pub struct Tissue {
     surface: GpuSurface,
+    values: ValueBuffer,
+    /// Whether the newest frame has values.
+    has_values: bool,
+    /// Where it is.
+    room: Option<Room>,
 }
 
 impl Tissue {
@@ -47,13 +55,20 @@ impl Tissue {
             .collect();
         let count = stage.assembly.builder.positions().len();
         let surface = GpuSurface::following(&gpu.device, count, &skins);
-        Ok(Self { surface: surface.map_err(|error| error.to_string())? })
+        let surface = surface.map_err(|error| error.to_string())?;
+        let values = ValueBuffer::new(&gpu.device, surface.vertex_count() as usize);
+        Ok(Self { surface, values, has_values: false, room: None })
     }
 
     /// Moves it to where a frame has it.
-    pub fn place(&self, lane: &Lane) -> Result<(), String> {
+    pub fn place(&mut self, lane: &Lane) -> Result<(), String> {
         self.surface.place(&lane.positions).map_err(|error| error.to_string())?;
         self.surface.update();
+        self.has_values = !lane.values.is_empty();
+        if self.has_values {
+            self.values.write(&lane.values).map_err(|error| error.to_string())?;
+        }
+        self.room = Room::around(lane.positions.iter().map(|x| x.cast()));
         Ok(())
     }
 }
@@ -80,31 +95,59 @@ pub struct Scenery<'a> {
     pub extent: f64,
 }
 
-/// A texture of a size, and the window's number for it.
+impl Scenery<'_> {
+    /// Radii as shares of the size of things: large enough to be seen, too small to cover the tissue.
+    const FIXED: f64 = 0.0035;
+    const PICKED: f64 = 0.009;
+    const SHAFT: f64 = 0.0045;
+
+    fn drawing(&self) -> Drawing<'_> {
+        let tissue = self.tissue;
+        let paint = match self.range.filter(|_| tissue.has_values) {
+            Some([low, high]) => Paint::Values { buffer: &tissue.values, low, high },
+            None => Paint::Plain(Color::TISSUE),
+        };
+        let body = BodyView { paint, wireframe: self.wireframe, ..BodyView::of(&tissue.surface) };
+        let ghost = self.ghost.map(|ghost| BodyView {
+            paint: Paint::Plain(Color::REST),
+            opacity: 0.3,
+            ..BodyView::of(&ghost.surface)
+        });
+        let balls =
+            |positions, share, color| Markers { positions, radius: share * self.extent, color };
+        let picked = self.pulls.iter().map(|pull| pull[0]).collect();
+        let arrow = |&[from, to]: &[Vec3<f64>; 2]| Arrow {
+            from,
+            to,
+            radius: Self::SHAFT * self.extent,
+            color: Color::PULLED,
+        };
+        // Shorter ones are hidden by the point they begin at.
+        let is_long =
+            |[from, to]: &&[Vec3<f64>; 2]| (*to - *from).length() > Self::PICKED * self.extent;
+        Drawing {
+            bodies: [Some(body), ghost].into_iter().flatten().collect(),
+            markers: vec![
+                balls(self.fixed.to_vec(), Self::FIXED, Color::FIXED),
+                balls(picked, Self::PICKED, Color::PULLED),
+            ],
+            arrows: self.pulls.iter().filter(is_long).map(arrow).collect(),
+            shadow: tissue.room.filter(|_| self.shadow),
+            ..Drawing::from(self.orbit)
+        }
+    }
+}
+
+/// A picture in the window, and the window's number for it.
+#[derive(Default)]
 pub struct Picture {
-    renderer: Renderer,
-    target: Option<Target>,
+    shown: Option<(Canvas, TextureId)>,
 }
-
-struct Target {
-    size: ImageSize,
-    texture: wgpu::Texture,
-    color: wgpu::TextureView,
-    depth: wgpu::TextureView,
-    id: TextureId,
-}
-
-const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 impl Picture {
-    /// A picture that nothing is drawn in yet.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self { renderer: Renderer::new(&gpu.device, FORMAT), target: None }
-    }
-
     /// What the window shows.
     pub fn texture(&self) -> Option<TextureId> {
-        self.target.as_ref().map(|target| target.id)
+        self.shown.as_ref().map(|(_, id)| *id)
     }
 
     /// Draws; no waiting.
@@ -114,109 +157,34 @@ impl Picture {
         size: ImageSize,
         scenery: &Scenery<'_>,
     ) -> Result<(), String> {
-        if self.target.as_ref().is_none_or(|target| target.size != size) {
-            self.resize(gpu, size);
+        self.take_size(gpu, size).map_err(|error| error.to_string())?;
+        let Some((canvas, _)) = &self.shown else { return Ok(()) };
+        canvas.draw(&scenery.drawing()).map_err(|error| error.to_string())
+    }
+
+    /// Makes the canvas, or one of another size, and tells the window of it.
+    fn take_size(&mut self, gpu: &Gpu, size: ImageSize) -> Result<(), RenderError> {
+        let (device, filter) = (&gpu.state.device, wgpu::FilterMode::Linear);
+        match &mut self.shown {
+            None => {
+                let canvas = Canvas::new(&gpu.device, size, Quality::suited_to(&gpu.device))?;
+                let mut window = gpu.state.renderer.write();
+                let id = window.register_native_texture(device, canvas.view(), filter);
+                self.shown = Some((canvas, id));
+            }
+            Some((canvas, id)) if canvas.size() != size => {
+                canvas.resize(size)?;
+                let mut window = gpu.state.renderer.write();
+                window.update_egui_texture_from_wgpu_texture(device, canvas.view(), filter, *id);
+            }
+            Some(_) => {}
         }
-        let Some(target) = &self.target else { return Ok(()) };
-        let aspect = f64::from(size.width()) / f64::from(size.height());
-        self.renderer.look(&Look { orbit: scenery.orbit, aspect, color: Color::TISSUE });
-        let mut encoder = gpu.state.device.create_command_encoder(&Default::default());
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("tissue"),
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &target.color,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color { r: 0.9, g: 0.92, b: 0.95, a: 1.0 }),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
-                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: &target.depth,
-                    depth_ops: Some(wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(1.0),
-                        store: wgpu::StoreOp::Discard,
-                    }),
-                    stencil_ops: None,
-                }),
-                ..Default::default()
-            });
-            self.renderer.draw(&mut pass, &scenery.tissue.surface);
-        }
-        gpu.state.queue.submit([encoder.finish()]);
         Ok(())
     }
 
-    fn resize(&mut self, gpu: &Gpu, size: ImageSize) {
-        let texture = |format, usage| {
-            gpu.state.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("tissue"),
-                size: wgpu::Extent3d {
-                    width: size.width(),
-                    height: size.height(),
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-                view_formats: &[],
-            })
-        };
-        let read = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
-        let color_texture = texture(FORMAT, read);
-        let color = color_texture.create_view(&Default::default());
-        let depth = texture(DEPTH_FORMAT, wgpu::TextureUsages::empty());
-        let depth = depth.create_view(&Default::default());
-        let mut window = gpu.state.renderer.write();
-        let (device, filter) = (&gpu.state.device, wgpu::FilterMode::Linear);
-        let id = match &self.target {
-            Some(old) => {
-                window.update_egui_texture_from_wgpu_texture(device, &color, filter, old.id);
-                old.id
-            }
-            None => window.register_native_texture(device, &color, filter),
-        };
-        self.target = Some(Target { size, texture: color_texture, color, depth, id });
-    }
-
     /// Waits for the picture.
-    pub fn read(&self, gpu: &Gpu) -> Result<Image, String> {
-        let target = self.target.as_ref().ok_or("nothing has been drawn yet")?;
-        let (width, height) = (target.size.width(), target.size.height());
-        let row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let copy = gpu.state.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("picture"),
-            size: u64::from(row) * u64::from(height),
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let mut encoder = gpu.state.device.create_command_encoder(&Default::default());
-        encoder.copy_texture_to_buffer(
-            target.texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &copy,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(row),
-                    rows_per_image: None,
-                },
-            },
-            target.texture.size(),
-        );
-        gpu.state.queue.submit([encoder.finish()]);
-        copy.slice(..).map_async(wgpu::MapMode::Read, |_| ());
-        let lost = || "the device did not give the picture back".to_owned();
-        gpu.state.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|_| lost())?;
-        let bytes = copy.slice(..).get_mapped_range().map_err(|_| lost())?;
-        let mut pixels = Vec::with_capacity((width * height) as usize);
-        for row in bytes.chunks(row as usize) {
-            let texels = row.as_chunks::<4>().0.iter().take(width as usize);
-            pixels.extend(texels.map(|[r, g, b, _]| [*r, *g, *b]));
-        }
-        Image::from_pixels(target.size, pixels).ok_or_else(lost)
+    pub fn read(&self) -> Result<Image, String> {
+        let (canvas, _) = self.shown.as_ref().ok_or("nothing has been drawn yet")?;
+        canvas.read().map_err(|error| error.to_string())
     }
 }
