@@ -36,9 +36,7 @@ fn place_solid(
 
 fn solid_color(fragment: SolidFragment) -> vec3f {
     let n = normalize(fragment.normal);
-    let key = max((dot(n, view.key.xyz) + 0.25) / 1.25, 0.0);
-    let side = max(dot(n, view.fill.xyz), 0.0);
-    return srgb(fragment.color * (0.85 * key + 0.15 * side + 0.9 * sky_light(n)));
+    return srgb(fragment.color * 1.15 * diffuse_light(n, 1.0, vec3f(0.25)));
 }
 
 @fragment

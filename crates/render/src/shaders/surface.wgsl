@@ -57,7 +57,7 @@ fn place_wire(@location(0) position: vec4f) -> @builtin(position) vec4f {
 
 @fragment
 fn shade_wire() -> @location(0) vec4f {
-    return vec4f(0.05, 0.05, 0.08, 0.42 * body.color.a);
+    return vec4f(0.05, 0.05, 0.08, 0.30 * body.color.a);
 }
 
 fn in_shadow_map(v: vec3f) -> vec4f {
@@ -90,22 +90,29 @@ fn lit_share(v: vec3f, n: vec3f) -> f32 {
     return sum / 9.0;
 }
 
+// A ghost is as glass: clear where one looks straight at it, so that what it covers keeps its colours, and
+// denser at its rim. The mean over a ball is near its opacity.
+fn opacity(grazing: f32) -> f32 {
+    let ghost = min(body.color.a * (0.35 + 2.0 * grazing * grazing), 1.0);
+    return select(ghost, 1.0, body.color.a >= 1.0);
+}
+
 @fragment
 fn shade_tissue(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
     let v = normalize(fragment.to_viewer);
     let n = facing(fragment.normal, v, is_front);
-    let key = view.key.xyz;
     let lit = lit_share(-fragment.to_viewer, n);
-    let wrap = vec3f(0.35, 0.15, 0.1);
-    let diffuse = lit * clamp((vec3f(dot(n, key)) + wrap) / (1.0 + wrap), vec3f(0.0), vec3f(1.0));
-    let side = max(dot(n, view.fill.xyz), 0.0);
-    let sky = sky_light(n);
-    let light = 0.95 * diffuse + 0.16 * side + 0.7 * sky;
-    let shine = max(dot(n, normalize(key + v)), 0.0);
-    let fresnel = 0.028 + 0.972 * pow(1.0 - clamp(dot(n, v), 0.0, 1.0), 5.0);
-    let highlight = lit * (0.10 * pow(shine, 24.0) + 0.55 * pow(shine, 220.0));
-    let linear = body.color.rgb * light + highlight + 0.35 * fresnel * sky;
-    return vec4f(srgb(linear), body.color.a);
+    let light = diffuse_light(n, lit, vec3f(0.32, 0.24, 0.20));
+    let shine = max(dot(n, normalize(view.key.xyz + v)), 0.0);
+    let broad = pow(shine, 16.0);
+    let tight = pow(shine, 128.0);
+    let grazing = 1.0 - clamp(dot(n, v), 0.0, 1.0);
+    let fresnel = 0.03 + 0.97 * pow(grazing, 5.0);
+    let mirrored = lit * (0.09 * broad + 0.5 * tight) + 0.24 * fresnel * sky_share(n);
+    // Towards white, never past it; a ghost is no wetter than it is dense.
+    let white = min(mirrored * body.color.a, 1.0);
+    let linear = mix(body.color.rgb * light, vec3f(1.0, 0.99, 0.97), white);
+    return vec4f(srgb(linear), opacity(grazing));
 }
 
 // The colour of a value that is none: viscera_picture::Color::MISSING.
@@ -126,5 +133,6 @@ fn shade_values(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @l
     let wrapped = lit * max((dot(n, view.key.xyz) + 0.4) / 1.4, 0.0);
     // One where the key falls straight on it.
     let light = 0.58 + 0.32 * wrapped + 0.10 * max(dot(n, v), 0.0);
-    return vec4f(srgb(color_of(fragment.value) * light), body.color.a);
+    let grazing = 1.0 - clamp(dot(n, v), 0.0, 1.0);
+    return vec4f(srgb(color_of(fragment.value) * light), opacity(grazing));
 }

@@ -52,8 +52,22 @@ fn facing(normal: vec3f, v: vec3f, is_front: bool) -> vec3f {
     return select(v, normalize(raw), dot(raw, raw) > 1e-12);
 }
 
-fn sky_light(n: vec3f) -> vec3f {
-    return mix(vec3f(0.16, 0.14, 0.13), vec3f(0.42, 0.44, 0.48), 0.5 + 0.5 * n.z);
+const KEY_LIGHT: vec3f = vec3f(0.84, 0.81, 0.77);
+const FILL_LIGHT: vec3f = vec3f(0.12, 0.13, 0.14);
+const SKY_LIGHT: vec3f = vec3f(0.34, 0.35, 0.37);
+const GROUND_LIGHT: vec3f = vec3f(0.12, 0.11, 0.105);
+
+// How much of the sky a surface sees; the sky travels with the viewer too.
+fn sky_share(n: vec3f) -> f32 {
+    return 0.5 + 0.5 * (0.954 * dot(n, view.up.xyz) + 0.301 * dot(n, view.backward.xyz));
+}
+
+// Diffuse light: of the key, a share, which reaches as far past the terminator as `wrap` says.
+fn diffuse_light(n: vec3f, lit: f32, wrap: vec3f) -> vec3f {
+    let wrapped = max((vec3f(dot(n, view.key.xyz)) + wrap) / (1.0 + wrap), vec3f(0.0));
+    let side = max(dot(n, view.fill.xyz), 0.0);
+    return lit * KEY_LIGHT * wrapped + FILL_LIGHT * side
+        + mix(GROUND_LIGHT, SKY_LIGHT, sky_share(n));
 }
 
 struct Backdrop {

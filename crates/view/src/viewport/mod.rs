@@ -98,7 +98,7 @@ impl Viewport {
 
     /// Why nothing can be drawn any more, where the device was lost.
     pub fn lost(&self) -> Option<String> {
-        self.gpu.device.check().err().map(|error| error.to_string())
+        self.gpu.failure()
     }
 
     /// The camera.
@@ -307,8 +307,8 @@ impl Viewport {
                 ghost,
                 range: self.legend.range(),
                 wireframe: preferences.wireframe,
-                shadow: preferences.shadow.then_some(&lane.positions),
-                fixed,
+                shadow: preferences.shadow,
+                fixed: &fixed,
                 pulls: &pulls,
                 extent: self.extent,
             };

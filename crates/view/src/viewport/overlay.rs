@@ -140,7 +140,7 @@ pub fn newtons(force: f64) -> String {
     }
 }
 
-/// Forces beside where what is held is pulled to.
+/// The force of each hold, beside where it pulls to.
 pub fn forces(painter: &Painter, lens: &Lens, lane: &Lane, holds: &Holds) {
     for hold in &lane.holds {
         if holds.list().iter().all(|held| held.id != hold.id) {

@@ -3,11 +3,13 @@
 use eframe::egui::TextureId;
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
+use std::sync::{Arc, OnceLock};
 use viscera::scalar::Vec3;
 use viscera::solver::gpu::{Device, GpuSurface, Skin};
 use viscera_picture::{Color, Image, ImageSize};
 use viscera_render::{
-    Arrow, BodyView, Canvas, Drawing, Markers, Orbit, Paint, Quality, Room, ValueBuffer,
+    Arrow, BodyView, Canvas, Drawing, Markers, Orbit, Paint, Quality, RenderError, Room,
+    ValueBuffer,
 };
 
 use crate::engine::{Lane, Stage};
@@ -19,6 +21,8 @@ pub struct Gpu {
     pub device: Device,
     /// As the window knows it.
     pub state: RenderState,
+    /// The first thing that went wrong with it.
+    failed: Arc<OnceLock<String>>,
 }
 
 impl Gpu {
@@ -26,7 +30,22 @@ impl Gpu {
     pub fn new(state: RenderState) -> Self {
         let name = state.adapter.get_info().name;
         let device = Device::from_wgpu(state.device.clone(), state.queue.clone(), name);
-        Self { device, state }
+        let failed = Arc::new(OnceLock::new());
+        let told = Arc::clone(&failed);
+        // A device that is lost hands out things that cannot be used before it says so.
+        state.device.on_uncaptured_error(Arc::new(move |error| {
+            let text = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+            // What follows from the first is of no interest.
+            let _ = told.set(text);
+        }));
+        Self { device, state, failed }
+    }
+
+    /// Why nothing can be drawn any more.
+    pub fn failure(&self) -> Option<String> {
+        let lost = self.device.check().err().map(|error| error.to_string());
+        let name = self.device.name();
+        lost.or_else(|| Some(format!("the graphics device {name} failed: {}", self.failed.get()?)))
     }
 }
 
@@ -34,7 +53,10 @@ impl Gpu {
 pub struct Tissue {
     surface: GpuSurface,
     values: ValueBuffer,
+    /// Whether the newest frame has values.
     has_values: bool,
+    /// Where it is.
+    room: Option<Room>,
 }
 
 impl Tissue {
@@ -50,19 +72,21 @@ impl Tissue {
             })
             .collect();
         let count = stage.assembly.builder.positions().len();
-        let surface = GpuSurface::following(&gpu.device, count, &skins).map_err(text)?;
+        let surface = GpuSurface::following(&gpu.device, count, &skins);
+        let surface = surface.map_err(|error| error.to_string())?;
         let values = ValueBuffer::new(&gpu.device, surface.vertex_count() as usize);
-        Ok(Self { surface, values, has_values: false })
+        Ok(Self { surface, values, has_values: false, room: None })
     }
 
-    /// Moves it to where a frame has it, and takes over its values.
+    /// Moves it to where a frame has it.
     pub fn place(&mut self, lane: &Lane) -> Result<(), String> {
-        self.surface.place(&lane.positions).map_err(text)?;
+        self.surface.place(&lane.positions).map_err(|error| error.to_string())?;
         self.surface.update();
         self.has_values = !lane.values.is_empty();
         if self.has_values {
-            self.values.write(&lane.values).map_err(text)?;
+            self.values.write(&lane.values).map_err(|error| error.to_string())?;
         }
+        self.room = Room::around(lane.positions.iter().map(|x| x.cast()));
         Ok(())
     }
 }
@@ -79,63 +103,60 @@ pub struct Scenery<'a> {
     pub range: Option<[f32; 2]>,
     /// Whether the triangles are drawn.
     pub wireframe: bool,
-    /// What throws shadows on itself [m]; without places there are no shadows.
-    pub shadow: Option<&'a [Vec3<f32>]>,
+    /// Whether it throws a shadow.
+    pub shadow: bool,
     /// Vertices that are held in place [m].
-    pub fixed: Vec<Vec3<f64>>,
+    pub fixed: &'a [Vec3<f64>],
     /// Where tissue is held, and where it is pulled to [m].
     pub pulls: &'a [[Vec3<f64>; 2]],
     /// The size of things [m], for markers and arrows.
     pub extent: f64,
 }
 
-/// How much of what lies behind it a ghost covers.
-const GHOST: f32 = 0.4;
-
-/// Radii of marks, as shares of the size of things: seen, and not in the way.
-const FIXED: f64 = 0.004;
-const PULLED: f64 = 0.009;
-const SHAFT: f64 = 0.005;
-
-/// Arrows that are shorter than this share of the size of things say nothing.
-const SHORTEST: f64 = 0.01;
-
 impl Scenery<'_> {
+    /// Radii as shares of the size of things: large enough to be seen, too small to cover the tissue.
+    const FIXED: f64 = 0.0035;
+    const PICKED: f64 = 0.009;
+    const SHAFT: f64 = 0.0045;
+
     fn drawing(&self) -> Drawing<'_> {
-        let Self { tissue, extent, .. } = self;
-        let mut body = BodyView { wireframe: self.wireframe, ..BodyView::of(&tissue.surface) };
-        if let Some([low, high]) = self.range.filter(|_| tissue.has_values) {
-            body.paint = Paint::Values { buffer: &tissue.values, low, high };
-        }
+        let tissue = self.tissue;
+        let paint = match self.range.filter(|_| tissue.has_values) {
+            Some([low, high]) => Paint::Values { buffer: &tissue.values, low, high },
+            None => Paint::Plain(Color::TISSUE),
+        };
+        let body = BodyView { paint, wireframe: self.wireframe, ..BodyView::of(&tissue.surface) };
         let ghost = self.ghost.map(|ghost| BodyView {
             paint: Paint::Plain(Color::REST),
-            opacity: GHOST,
+            opacity: 0.3,
             ..BodyView::of(&ghost.surface)
         });
-        let held = self.pulls.iter().map(|[place, _]| *place).collect();
-        let far = |[from, to]: &&[Vec3<f64>; 2]| (*to - *from).length() > SHORTEST * extent;
+        let balls =
+            |positions, share, color| Markers { positions, radius: share * self.extent, color };
+        let picked = self.pulls.iter().map(|pull| pull[0]).collect();
         let arrow = |&[from, to]: &[Vec3<f64>; 2]| Arrow {
             from,
             to,
-            radius: SHAFT * extent,
+            radius: Self::SHAFT * self.extent,
             color: Color::PULLED,
         };
-        let marks = |positions, share, color| Markers { positions, radius: share * extent, color };
-        let room = |all: &[Vec3<f32>]| Room::around(all.iter().map(|x| x.cast()));
+        // Shorter ones are hidden by the point they begin at.
+        let is_long =
+            |[from, to]: &&[Vec3<f64>; 2]| (*to - *from).length() > Self::PICKED * self.extent;
         Drawing {
-            bodies: std::iter::once(body).chain(ghost).collect(),
+            bodies: [Some(body), ghost].into_iter().flatten().collect(),
             markers: vec![
-                marks(self.fixed.clone(), FIXED, Color::FIXED),
-                marks(held, PULLED, Color::PULLED),
+                balls(self.fixed.to_vec(), Self::FIXED, Color::FIXED),
+                balls(picked, Self::PICKED, Color::PULLED),
             ],
-            arrows: self.pulls.iter().filter(far).map(arrow).collect(),
-            shadow: self.shadow.and_then(room),
+            arrows: self.pulls.iter().filter(is_long).map(arrow).collect(),
+            shadow: tissue.room.filter(|_| self.shadow),
             ..Drawing::from(self.orbit)
         }
     }
 }
 
-/// A picture on the device, and the window's number for it.
+/// A picture in the window, and the window's number for it.
 #[derive(Default)]
 pub struct Picture {
     shown: Option<(Canvas, TextureId)>,
@@ -154,30 +175,27 @@ impl Picture {
         size: ImageSize,
         scenery: &Scenery<'_>,
     ) -> Result<(), String> {
-        self.resize(gpu, size)?;
-        match &self.shown {
-            Some((canvas, _)) => canvas.draw(&scenery.drawing()).map_err(text),
-            None => Ok(()),
-        }
+        self.take_size(gpu, size).map_err(|error| error.to_string())?;
+        let Some((canvas, _)) = &self.shown else { return Ok(()) };
+        canvas.draw(&scenery.drawing()).map_err(|error| error.to_string())
     }
 
-    fn resize(&mut self, gpu: &Gpu, size: ImageSize) -> Result<(), String> {
+    /// Makes the canvas, or one of another size, and tells the window of it.
+    fn take_size(&mut self, gpu: &Gpu, size: ImageSize) -> Result<(), RenderError> {
         let (device, filter) = (&gpu.state.device, wgpu::FilterMode::Linear);
         match &mut self.shown {
-            Some((canvas, _)) if canvas.size() == size => {}
-            Some((canvas, id)) => {
-                canvas.resize(size).map_err(text)?;
+            None => {
+                let canvas = Canvas::new(&gpu.device, size, Quality::suited_to(&gpu.device))?;
+                let mut window = gpu.state.renderer.write();
+                let id = window.register_native_texture(device, canvas.view(), filter);
+                self.shown = Some((canvas, id));
+            }
+            Some((canvas, id)) if canvas.size() != size => {
+                canvas.resize(size)?;
                 let mut window = gpu.state.renderer.write();
                 window.update_egui_texture_from_wgpu_texture(device, canvas.view(), filter, *id);
             }
-            None => {
-                let quality = Quality::suited_to(&gpu.device);
-                let canvas = Canvas::new(&gpu.device, size, quality).map_err(text)?;
-                let mut window = gpu.state.renderer.write();
-                let id = window.register_native_texture(device, canvas.view(), filter);
-                drop(window);
-                self.shown = Some((canvas, id));
-            }
+            Some(_) => {}
         }
         Ok(())
     }
@@ -185,10 +203,6 @@ impl Picture {
     /// Waits for the picture.
     pub fn read(&self) -> Result<Image, String> {
         let (canvas, _) = self.shown.as_ref().ok_or("nothing has been drawn yet")?;
-        canvas.read().map_err(text)
+        canvas.read().map_err(|error| error.to_string())
     }
-}
-
-fn text(error: impl std::fmt::Display) -> String {
-    error.to_string()
 }
