@@ -90,6 +90,11 @@ fn lit_share(v: vec3f, n: vec3f) -> f32 {
     return sum / 9.0;
 }
 
+fn eighth_power(x: f32) -> f32 {
+    let square = x * x;
+    return square * square * square * square;
+}
+
 // A ghost is as glass: clear where one looks straight at it, so that what it covers keeps its colours, and
 // denser at its rim. The mean over a ball is near its opacity.
 fn opacity(grazing: f32) -> f32 {
@@ -104,10 +109,10 @@ fn shade_tissue(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @l
     let lit = lit_share(-fragment.to_viewer, n);
     let light = diffuse_light(n, lit, vec3f(0.32, 0.24, 0.20));
     let shine = max(dot(n, normalize(view.key.xyz + v)), 0.0);
-    let broad = pow(shine, 16.0);
-    let tight = pow(shine, 128.0);
+    let broad = eighth_power(shine * shine);
+    let tight = eighth_power(broad);
     let grazing = 1.0 - clamp(dot(n, v), 0.0, 1.0);
-    let fresnel = 0.03 + 0.97 * pow(grazing, 5.0);
+    let fresnel = 0.03 + 0.97 * grazing * grazing * grazing * grazing * grazing;
     let mirrored = lit * (0.09 * broad + 0.5 * tight) + 0.24 * fresnel * sky_share(n);
     // Towards white, never past it; a ghost is no wetter than it is dense.
     let white = min(mirrored * body.color.a, 1.0);
