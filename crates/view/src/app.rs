@@ -59,6 +59,8 @@ pub struct App {
     help_open: bool,
     /// Number and moment of the frame from which the rate was counted last.
     counted: (u64, Instant),
+    /// Pictures of the window since then.
+    shown: u32,
     /// How methods converge in a step of the first simulation.
     curves: Vec<Curve>,
 }
@@ -100,6 +102,7 @@ impl App {
             farewell: options.farewell,
             help_open: false,
             counted: (0, Instant::now()),
+            shown: 0,
             curves: Vec::new(),
             session,
             preferences,
@@ -159,6 +162,7 @@ impl App {
         if self.say_farewell(&context) {
             return;
         }
+        self.shown += 1;
         self.hear();
         self.take_frame();
         let coloring = self.preferences.coloring;
@@ -303,8 +307,10 @@ impl App {
         let elapsed = since.elapsed().as_secs_f64();
         if frame.number < number {
             self.counted = (frame.number, Instant::now());
+            self.shown = 0;
         } else if elapsed > 0.5 {
             self.clock.rate = (frame.number - number) as f64 / elapsed;
+            self.clock.drawn = f64::from(std::mem::take(&mut self.shown)) / elapsed;
             self.counted = (frame.number, Instant::now());
         }
     }

@@ -17,11 +17,13 @@ pub struct Clock {
     pub speed: f64,
     /// Frames computed per second, smoothed; zero while paused.
     pub rate: f64,
+    /// Pictures of the window per second of the clock.
+    pub drawn: f64,
 }
 
 impl Default for Clock {
     fn default() -> Self {
-        Self { playing: true, speed: 1.0, rate: 0.0 }
+        Self { playing: true, speed: 1.0, rate: 0.0, drawn: 0.0 }
     }
 }
 
@@ -118,7 +120,7 @@ pub fn show_status(ui: &mut Ui, clock: &Clock, stage: &Stage, frame: &Frame) {
     if clock.playing {
         ui.label(format!("{real:.2} x real time"));
         let digits = if clock.rate < 10.0 { 1 } else { 0 };
-        ui.weak(format!("{:.digits$} frames/s", clock.rate));
+        ui.weak(format!("{:.digits$} frames/s, {:.0} drawn", clock.rate, clock.drawn));
     } else {
         ui.label("paused");
     }
