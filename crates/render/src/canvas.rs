@@ -10,8 +10,8 @@
 use bytemuck::{Pod, Zeroable};
 use viscera::solver::gpu::Device;
 use viscera_picture::{Color, Image, ImageSize};
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
+use crate::buffers::filled;
 use crate::drawing::{BodyView, Drawing, Paint};
 use crate::error::RenderError;
 use crate::pipelines::{BODY_BYTES, Painted, Pipelines};
@@ -75,11 +75,9 @@ impl Canvas {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let colors = wgpu.create_buffer_init(&BufferInitDescriptor {
-            label: Some("colours of values"),
-            contents: bytemuck::cast_slice(&palette()),
-            usage: wgpu::BufferUsages::UNIFORM,
-        });
+        let palette = palette();
+        let uniform = wgpu::BufferUsages::UNIFORM;
+        let colors = filled(device, "colours of values", bytemuck::cast_slice(&palette), uniform);
         let view_bound = wgpu.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("view"),
             layout: &pipelines.view_layout,
@@ -90,7 +88,7 @@ impl Canvas {
         });
         let canvas = Self {
             target,
-            meshes: Meshes::new(wgpu),
+            meshes: Meshes::new(device),
             shadow: ShadowMap::new(device, &pipelines, quality.shadow),
             pipelines,
             view,
@@ -131,7 +129,7 @@ impl Canvas {
         let view = View::of(drawing, aspect, self.shadow.edge);
         queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
         let bodies = self.bind(&drawing.bodies);
-        let solids = Solids::new(wgpu, &drawing.markers, &drawing.arrows);
+        let solids = Solids::new(&self.device, &drawing.markers, &drawing.arrows);
 
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("picture") };
         let mut encoder = wgpu.create_command_encoder(&descriptor);
@@ -163,11 +161,7 @@ impl Canvas {
         for (body, place) in bodies.iter().zip(bytes.chunks_mut(ALIGNMENT)) {
             place[..size_of::<Body>()].copy_from_slice(bytemuck::bytes_of(&Body::of(body)));
         }
-        let buffer = wgpu.create_buffer_init(&BufferInitDescriptor {
-            label: Some("bodies"),
-            contents: &bytes,
-            usage: wgpu::BufferUsages::UNIFORM,
-        });
+        let buffer = filled(&self.device, "bodies", &bytes, wgpu::BufferUsages::UNIFORM);
         wgpu.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("bodies"),
             layout: &self.pipelines.body_layout,

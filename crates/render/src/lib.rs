@@ -11,6 +11,7 @@
 //! | choose between fine and fast | [`Quality`] |
 //! | colour a surface by values | [`ValueBuffer`] |
 
+mod buffers;
 mod canvas;
 mod drawing;
 mod error;

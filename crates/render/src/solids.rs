@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use viscera::scalar::Vec3;
+use viscera::solver::gpu::Device;
 use viscera_picture::Color;
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
+use crate::buffers::filled;
 use crate::drawing::{Arrow, Markers, across};
 
 /// Sides of what is round, and rings of a ball: 200 triangles, round enough for a tenth of the picture.
@@ -108,7 +109,7 @@ pub(crate) struct Meshes {
 }
 
 impl Meshes {
-    pub fn new(device: &wgpu::Device) -> Self {
+    pub fn new(device: &Device) -> Self {
         let (mut corners, mut triangles) = (Vec::new(), Vec::<[u32; 3]>::new());
         let parts = profiles().map(|profile| {
             let (own, faces) = revolve(&profile);
@@ -117,10 +118,7 @@ impl Meshes {
             triangles.extend(faces);
             (begin..3 * triangles.len() as u32, first)
         });
-        let buffer = |contents, usage| {
-            let label = Some("solids");
-            device.create_buffer_init(&BufferInitDescriptor { label, contents, usage })
-        };
+        let buffer = |contents, usage| filled(device, "solids", contents, usage);
         Self {
             corners: buffer(bytemuck::cast_slice(&corners), wgpu::BufferUsages::VERTEX),
             indices: buffer(bytemuck::cast_slice(&triangles), wgpu::BufferUsages::INDEX),
@@ -152,7 +150,7 @@ pub(crate) struct Solids {
 impl Solids {
     /// What cannot be drawn is left out: places that are not finite, arrows of no length. Nothing where
     /// nothing is left.
-    pub fn new(device: &wgpu::Device, markers: &[Markers], arrows: &[Arrow]) -> Option<Self> {
+    pub fn new(device: &Device, markers: &[Markers], arrows: &[Arrow]) -> Option<Self> {
         let there = |radius: f64| radius.is_finite() && radius > 0.0;
         let of = |m: &Markers| {
             let (radius, color) = (m.radius, m.color);
@@ -166,13 +164,8 @@ impl Solids {
         let (first, count) = (all.len() as u32, pairs.len() as u32);
         all.extend(pairs.iter().map(|pair| pair[0]));
         all.extend(pairs.iter().map(|pair| pair[1]));
-        let places = (!all.is_empty()).then(|| {
-            device.create_buffer_init(&BufferInitDescriptor {
-                label: Some("places of solids"),
-                contents: bytemuck::cast_slice(&all),
-                usage: wgpu::BufferUsages::VERTEX,
-            })
-        })?;
+        let bytes = (!all.is_empty()).then(|| bytemuck::cast_slice(&all))?;
+        let places = filled(device, "places of solids", bytes, wgpu::BufferUsages::VERTEX);
         let ranges = [0..first, first..first + count, first + count..first + 2 * count];
         Some(Self { places, ranges })
     }

@@ -5,13 +5,13 @@ mod files;
 use eframe::egui::{self, CentralPanel, Panel, ScrollArea, Ui};
 use eframe::egui_wgpu::RenderState;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use crate::capture::{FOLDER, Recorder};
 use crate::choices::{Settings, Side};
 use crate::document::Document;
-use crate::engine::{Command, Engine, Event, Frame, Stage};
+use crate::engine::{Command, Cure, Engine, Event, Frame, Stage};
 use crate::help::{self, Request};
 use crate::holds::Holds;
 use crate::messages::Messages;
@@ -33,6 +33,8 @@ pub struct Options {
     pub data: Option<PathBuf>,
     /// Where pictures and recordings go.
     pub pictures: PathBuf,
+    /// Gets why the window had to close, where it did not close by itself.
+    pub farewell: Arc<OnceLock<String>>,
 }
 
 /// The scene that is opened where none is named.
@@ -53,6 +55,7 @@ pub struct App {
     fields: Fields,
     recorder: Option<Recorder>,
     pictures: PathBuf,
+    farewell: Arc<OnceLock<String>>,
     help_open: bool,
     /// Number and moment of the frame from which the rate was counted last.
     counted: (u64, Instant),
@@ -94,6 +97,7 @@ impl App {
             fields: Fields::default(),
             recorder: None,
             pictures: options.pictures,
+            farewell: options.farewell,
             help_open: false,
             counted: (0, Instant::now()),
             curves: Vec::new(),
@@ -119,6 +123,21 @@ impl App {
         &self.session
     }
 
+    /// Whether simulations run, as far as was asked for.
+    pub fn is_playing(&self) -> bool {
+        self.clock.playing
+    }
+
+    /// Proposes where to save.
+    pub fn save_under(&mut self, path: &Path) {
+        self.fields.save = path.display().to_string();
+    }
+
+    /// Whether the window's device was lost.
+    pub fn viewport_lost(&self) -> bool {
+        self.viewport.lost().is_some()
+    }
+
     /// What is held.
     pub fn holds(&self) -> &Holds {
         &self.holds
@@ -137,6 +156,9 @@ impl App {
     /// Hears of the simulation, shows everything, does what is asked for.
     pub fn show(&mut self, ui: &mut Ui) {
         let context = ui.ctx().clone();
+        if self.say_farewell(&context) {
+            return;
+        }
         self.hear();
         self.take_frame();
         let coloring = self.preferences.coloring;
@@ -248,6 +270,13 @@ impl App {
                     }
                     self.stage = Some(stage);
                 }
+                Event::Accompanied(stage) => {
+                    self.messages.busy = None;
+                    if let Err(error) = self.viewport.enter(&stage) {
+                        self.messages.warn(error);
+                    }
+                    self.stage = Some(stage);
+                }
                 Event::Devices(devices) => self.devices = devices,
                 Event::Refused(text) => self.messages.warn(text),
                 Event::Done { path, text, time } => self.write_scene(&path, &text, time),
@@ -318,16 +347,19 @@ impl App {
                 let cpu = vec![("solver.device".to_owned(), "cpu".to_owned())];
                 let chosen = self.session.choose(Side::First, &cpu, false);
                 self.carry_out(chosen);
-                // Nothing runs that could take a change.
-                let load = self.session.load();
-                self.send([load]);
-                self.play(true);
             }
         }
     }
 
     fn carry_out(&mut self, commands: Result<Vec<Command>, String>) {
         match commands {
+            Ok(commands) if commands.is_empty() => {}
+            // Nothing runs that could take a change: everything begins anew with it.
+            Ok(_) if self.messages.failure.as_ref().is_some_and(|f| f.cure != Cure::Reset) => {
+                let load = self.session.load();
+                self.send([load]);
+                self.play(true);
+            }
             Ok(commands) => self.send(commands),
             Err(error) => self.messages.warn(error),
         }

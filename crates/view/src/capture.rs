@@ -173,7 +173,7 @@ mod tests {
         let mut recorder = Recorder::start(path.clone()).expect("a recording");
         for step in 0..5u8 {
             let time = f64::from(step) * RECORDED_EVERY;
-            assert!(recorder.is_due(time) && (step == 0 || !recorder.is_due(time - 0.01 - 0.04)));
+            assert!(recorder.is_due(time) && (step == 0 || !recorder.is_due(time - 0.01)));
             recorder.push(&[picture(40 * step), picture(200)], time).expect("room for a picture");
         }
         drop(recorder);

@@ -47,7 +47,8 @@ fn read_setting(text: &str) -> Result<(String, String), String> {
 fn main() -> ExitCode {
     let Arguments { scene, settings, data, pictures } = Arguments::parse();
     let settings: Settings = settings;
-    match window::open(Options { scene, settings, data, pictures }) {
+    let options = Options { scene, settings, data, pictures, ..Options::default() };
+    match window::open(options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");

@@ -69,14 +69,18 @@ impl Session {
 
     /// Builds everything anew. Numbers of frames tell this from what was before.
     pub fn load(&mut self) -> Command {
-        self.generation += 1;
         self.begun = self.choices.clone();
-        Command::Load(Box::new(Plan {
+        Command::Load(self.plan())
+    }
+
+    fn plan(&mut self) -> Box<Plan> {
+        self.generation += 1;
+        Box::new(Plan {
             generation: self.generation,
             scenes: self.scenes.clone(),
             ends_with_ghost: self.choices.ghost,
             library: self.document.library(),
-        }))
+        })
     }
 
     /// Another scene file, with the same generation counter.
@@ -149,15 +153,25 @@ impl Session {
         let scenes = scenes_of(&self.document, &next)?;
         let same_lanes = next.second.is_some() == self.choices.second.is_some()
             && next.ghost == self.choices.ghost;
-        let changes: Option<Vec<Settings>> =
-            self.scenes.iter().zip(&scenes).map(|(old, new)| difference(old, new)).collect();
+        let first = difference(&self.scenes[0], &scenes[0]);
+        let others = self.scenes.iter().zip(&scenes).skip(1);
+        let others: Option<Vec<Settings>> = others.map(|(old, new)| difference(old, new)).collect();
         self.choices = next;
-        let changes = changes.filter(|_| same_lanes);
         self.scenes = scenes;
-        let Some(changes) = changes else { return Ok(vec![self.load()]) };
-        let lanes = changes.into_iter().enumerate();
-        let changed = lanes.filter(|(_, settings)| !settings.is_empty());
-        Ok(changed.map(|(lane, settings)| Command::Change(lane, settings)).collect())
+        let Some(first) = first else { return Ok(vec![self.load()]) };
+        let mut commands = vec![Command::Change(0, first)];
+        match others.filter(|_| same_lanes) {
+            Some(others) => {
+                let numbered = (1..).zip(others);
+                commands.extend(numbered.map(|(lane, change)| Command::Change(lane, change)));
+            }
+            // The first goes on, whatever comes to its side.
+            None => commands.push(Command::Accompany(self.plan())),
+        }
+        commands.retain(
+            |command| !matches!(command, Command::Change(_, settings) if settings.is_empty()),
+        );
+        Ok(commands)
     }
 }
 
@@ -203,7 +217,7 @@ mod tests {
     fn changes_go_to_the_simulations_they_concern_and_undo_takes_them_back() {
         let mut session = session();
         let loaded = session.compare(true, false);
-        assert!(matches!(loaded.expect("a comparison")[..], [Command::Load(_)]));
+        assert!(matches!(loaded.expect("a comparison")[..], [Command::Accompany(_)]));
         let was = session.scene(Side::First).solver.iterations;
         let mut change = |value| {
             let commands = session.choose(Side::First, &pair("solver.iterations", value), false);

@@ -18,6 +18,7 @@ const REMEMBERED: &str = "preferences";
 /// Opens the window and stays until it is closed.
 pub fn open(options: Options) -> Result<()> {
     check_display()?;
+    let farewell = Arc::clone(&options.farewell);
     let native = eframe::NativeOptions {
         viewport: ViewportBuilder::default()
             .with_title("viscera")
@@ -39,13 +40,17 @@ pub fn open(options: Options) -> Result<()> {
             Ok(Box::new(App::new(&creation.egui_ctx, state, options, preferences)?))
         }),
     );
-    made.map_err(|error| match error {
+    let ended = made.map_err(|error| match error {
         eframe::Error::AppCreation(error) => anyhow!("{error}"),
         error => anyhow!(
             "cannot open a window: {error}; {HEADLESS}. Without graphics hardware a software Vulkan driver \
              draws (Debian, Ubuntu: mesa-vulkan-drivers)"
         ),
-    })
+    });
+    match farewell.get() {
+        Some(reason) => bail!("the window had to close: {reason}"),
+        None => ended,
+    }
 }
 
 /// What one can do without a window.
@@ -57,7 +62,7 @@ fn check_display() -> Result<()> {
     let servers = ["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"];
     let is_set = |name: &&str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     let needed = cfg!(all(unix, not(target_os = "macos")));
-    if needed && !servers.iter().any(|name| is_set(name)) {
+    if needed && !servers.iter().any(is_set) {
         bail!(
             "there is no display to open a window on (neither DISPLAY nor WAYLAND_DISPLAY is set); {HEADLESS}"
         );

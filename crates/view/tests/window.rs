@@ -1,106 +1,17 @@
 //! Drives the window as a person would, without a display: presses, drags, sliders, buttons, keys.
 
-use eframe::egui::{Key, Modifiers, Pos2, Rect, Role, vec2};
+mod common;
+
+use common::Window;
+use eframe::egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::Queryable;
-use egui_kittest::{Harness, wgpu};
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use viscera::scalar::Vec3;
 use viscera::scene::Scene;
+use viscera::settings::{Acceleration, Colors};
+use viscera::simulation::{Assembly, Simulation};
 use viscera_view::choices::Side;
-use viscera_view::engine::Lane;
-use viscera_view::preferences::Preferences;
-use viscera_view::{App, Options};
-
-/// The longest that anything may take before a test fails; most take tenths of a second.
-const PATIENCE: Duration = Duration::from_secs(20);
-
-struct Window {
-    harness: Harness<'static, App>,
-    /// Where everything is written.
-    folder: tempfile::TempDir,
-}
-
-impl Window {
-    /// Opens a scene in a folder of its own.
-    fn open(scene: &str, settings: &[(&str, &str)]) -> Self {
-        let folder = tempfile::tempdir().expect("a folder");
-        let setup = wgpu::default_wgpu_setup();
-        let state =
-            wgpu::create_render_state(setup, eframe::egui_wgpu::RendererOptions::PREDICTABLE);
-        let options = Options {
-            scene: scene.into(),
-            settings: settings.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect(),
-            data: None,
-            pictures: folder.path().join("pictures"),
-        };
-        let context = eframe::egui::Context::default();
-        let preferences = Preferences::default();
-        let app = App::new(&context, state.clone(), options, preferences).expect("a window");
-        let renderer = wgpu::WgpuTestRenderer::from_render_state(state);
-        let harness = Harness::builder()
-            .with_size(vec2(1100.0, 760.0))
-            .with_step_dt(1.0 / 60.0)
-            .renderer(renderer)
-            .build_ui_state(|ui, app: &mut App| app.show(ui), app);
-        Self { harness, folder }
-    }
-
-    /// Opens a scene and waits until it moves.
-    fn running(scene: &str, settings: &[(&str, &str)]) -> Self {
-        let mut window = Self::open(scene, settings);
-        window.wait("frames", |app| app.frame().is_some_and(|frame| frame.number >= 2));
-        window
-    }
-
-    /// Shows frame after frame of the window until something holds.
-    fn wait(&mut self, what: &str, holds: impl Fn(&App) -> bool) {
-        let start = Instant::now();
-        while !holds(self.harness.state()) {
-            let texts: Vec<_> = self.harness.state().messages().texts().collect();
-            assert!(
-                start.elapsed() < PATIENCE,
-                "waited in vain for {what}; the window says {texts:?}"
-            );
-            self.harness.step();
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        self.harness.step();
-    }
-
-    fn press(&mut self, name: &str) {
-        self.harness.get_by_label(name).click();
-        self.harness.step();
-        self.harness.step();
-    }
-
-    fn slide(&mut self, name: &str, value: f64) {
-        self.harness.get_by_role_and_label(Role::Slider, name).set_value_accesskit(value);
-        self.harness.step();
-        self.harness.step();
-    }
-
-    fn view(&self) -> Rect {
-        self.harness.get_by_label("view").rect()
-    }
-
-    /// The sum of the colours in the view, by pixels.
-    fn pixels(&mut self) -> Vec<[u8; 3]> {
-        let view = self.view();
-        let image = self.harness.render().expect("a picture of the window");
-        let inside = |x: u32, y: u32| view.contains(Pos2::new(x as f32, y as f32));
-        let pixels = image.enumerate_pixels().filter(|(x, y, _)| inside(*x, *y));
-        pixels.map(|(_, _, pixel)| [pixel[0], pixel[1], pixel[2]]).collect()
-    }
-
-    fn lane(&self, number: usize) -> &Lane {
-        &self.harness.state().frame().expect("a frame").lanes[number]
-    }
-
-    fn scene(&self) -> &Scene {
-        self.harness.state().session().scene(Side::First)
-    }
-}
 
 fn farthest(a: &[Vec3<f32>], b: &[Vec3<f32>]) -> f32 {
     a.iter().zip(b).fold(0.0, |most, (a, b)| most.max((*a - *b).length()))
@@ -188,8 +99,9 @@ fn two_solvers_run_side_by_side_from_the_same_start() {
     window.harness.get_by_label("view A");
     window.harness.get_by_label("view B");
     window.press("true solution");
+    let number = window.harness.state().frame().expect("a frame").number;
     window.wait("the exact solution", |app| {
-        app.frame().is_some_and(|frame| frame.lanes.len() == 3 && frame.number > 3)
+        app.frame().is_some_and(|frame| frame.lanes.len() == 3 && frame.number > number + 5)
     });
     let apart = farthest(&window.lane(0).positions, &window.lane(2).positions);
     assert!(apart > 0.0 && apart < 0.05, "{apart} m apart");
@@ -203,16 +115,71 @@ fn a_saved_scene_is_what_was_chosen() {
     std::fs::write(&path, text.expect("a built-in scene").text).expect("a file");
     let settings = [("solver.iterations", "7")];
     let mut window = Window::running(&path.display().to_string(), &settings);
+    window.press("with what was done by hand");
     window.slide("substeps", 3.0);
     // The file that is open may vanish.
     std::fs::remove_file(&path).expect("the file");
-    window.harness.key_press_modifiers(Modifiers::COMMAND, Key::S);
-    window.harness.step();
-    window.harness.step();
-    let saved = std::fs::read_to_string(folder.path().join("mine_changed.toml"));
-    let scene = Scene::parse("saved", &saved.expect("a file"), &[]).expect("a legal scene");
+    let scene = window.save(&folder.path().join("mine_changed.toml"));
     assert_eq!((scene.solver.iterations, scene.solver.substeps), (7, 3));
-    assert!(!path.exists());
+    assert!(scene.changes.is_empty() && !path.exists());
+}
+
+/// What `viscera run` computes of a scene.
+fn run(scene: Scene) -> Simulation<f32> {
+    let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned())).expect("an assembly");
+    let frames = scene.frame_count();
+    let mut simulation = Simulation::new(scene, assembly).expect("a simulation");
+    for _ in 0..frames {
+        simulation.advance_frame().expect("a frame");
+    }
+    simulation
+}
+
+/// Start; drag the liver; stiffen it; Jacobi with 40 iterations; Anderson beside it; a picture; save; run it
+/// without a window.
+#[test]
+fn a_first_visit_ends_in_a_scene_that_repeats_it() {
+    let mut window = Window::running("liver_retraction", &[("solver.substeps", "1")]);
+    let path = window.folder.path().join("visit.toml");
+    window.press("keep");
+    window.drag(vec2(20.0, -60.0));
+    let young = |window: &Window| window.scene().bodies[0].material.young();
+    assert!(young(&window) < 10e3);
+    window.slide("stiffness E", 20.0);
+    assert_eq!(young(&window), 20e3);
+    window.press("Jacobi 40");
+    assert_eq!(
+        (window.scene().solver.colors, window.scene().solver.iterations),
+        (Colors::Limited(1), 40)
+    );
+    let number = window.harness.state().frame().expect("a frame").number;
+    window.press("A | B");
+    window.wait("a second simulation", |app| {
+        app.frame().is_some_and(|frame| frame.lanes.len() == 2 && frame.number > number)
+    });
+    // It began where the first one is, and is held by the same hand.
+    let apart = farthest(&window.lane(0).positions, &window.lane(1).positions);
+    assert!(apart < 0.01, "{apart} m");
+    window.harness.get_all_by_label("Anderson 40").last().expect("one for each").click_accesskit();
+    window.wait("Anderson", |app| {
+        app.session().scene(Side::Second).solver.acceleration == Acceleration::Anderson
+    });
+    window.press("Picture");
+    assert!(window.folder.path().join("pictures/liver_retraction-0001.png").exists());
+    window.harness.key_press(Key::Escape);
+    window.harness.step();
+    window.harness.key_press(Key::Space);
+    window.wait("a pause", |app| !app.is_playing());
+    // What the thread had begun is finished.
+    std::thread::sleep(Duration::from_millis(300));
+    window.harness.step();
+    window.harness.step();
+    let scene = window.save(&path);
+    assert_eq!((scene.motions.len(), scene.changes.len()), (2, 2));
+    let frame = window.harness.state().frame().expect("a frame");
+    assert_eq!(scene.frame_count(), frame.number);
+    let repeated = run(scene);
+    assert_eq!(window.lane(0).positions, repeated.state().positions);
 }
 
 #[test]
@@ -274,4 +241,44 @@ fn the_keyboard_pauses_steps_and_begins_again() {
     window.wait("a step", |app| app.frame().is_some_and(|frame| frame.number == paused + 1));
     window.harness.key_press(Key::R);
     window.wait("rest", |app| app.frame().is_some_and(|frame| frame.number == 0));
+}
+
+#[test]
+fn sliders_at_their_ends_leave_numbers() {
+    let mut window = Window::running("grab", &[]);
+    for (name, ends) in [
+        ("stiffness E", [0.5, 200.0]),
+        ("Poisson's ratio", [0.0, 0.499]),
+        ("density", [500.0, 2000.0]),
+        ("viscosity", [0.0, 100.0]),
+        ("gravity", [0.0, 20.0]),
+        ("iterations", [1.0, 50.0]),
+        ("substeps", [1.0, 20.0]),
+    ] {
+        for end in ends {
+            window.slide(name, end);
+            let number = window.harness.state().frame().expect("a frame").number;
+            window.wait("frames", |app| app.frame().is_some_and(|frame| frame.number > number + 1));
+            let is_number = window.lane(0).positions.iter().all(|x| x.is_finite());
+            let texts: Vec<_> = window.harness.state().messages().texts().collect();
+            assert!(is_number && texts.is_empty(), "{name} at {end}: {texts:?}");
+        }
+    }
+}
+
+#[test]
+fn without_its_device_the_window_saves_what_was_done_and_closes() {
+    let mut window = Window::running("grab", &[]);
+    window.press("keep");
+    window.drag(vec2(0.0, -40.0));
+    window.press("Record");
+    window.device.destroy();
+    window.wait("a last word", |app| app.viewport_lost());
+    window.harness.step();
+    let farewell = window.farewell.get().expect("a reason");
+    assert!(farewell.contains("device") && farewell.contains("recovered"), "{farewell}");
+    let saved = window.folder.path().join("pictures/grab-recovered-0001.toml");
+    let text = std::fs::read_to_string(&saved).expect("what was done");
+    let scene = Scene::parse("saved", &text, &[]).expect("a legal scene");
+    assert!(scene.motions.iter().any(|motion| motion.name == "hand-1"));
 }

@@ -234,3 +234,33 @@ fn changes_and_starts_that_cannot_be_are_told_before_the_run() {
         assert!(error.contains("bar.toml, line") && error.contains(expected), "{error}");
     }
 }
+
+#[test]
+fn a_fork_goes_on_from_the_same_state_with_settings_of_its_own() {
+    let mut first: Simulation<f32> = simulation(BAR, &[]);
+    frames(&mut first, 5);
+    let hold = first.take_hold("hand", tip(), Some(150.0)).expect("a hold");
+    first.lead(hold, vec3(0.0, 0.0, 0.01)).expect("a place");
+    frames(&mut first, 3);
+    let mut same: Simulation<f32> = first.fork(&[]).expect("a fork");
+    let mut exact: Simulation<f64> =
+        first.fork(&pairs(&[("solver.iterations", "20")])).expect("a fork in double precision");
+    assert_eq!(same.state().positions, first.state().positions);
+    assert_eq!((exact.time(), exact.live()), (first.time(), first.live()));
+    for _ in 0..10 {
+        first.advance().expect("a frame");
+        same.advance().expect("a frame");
+        exact.advance().expect("a frame");
+    }
+    // With the same settings it is the same to the bit; otherwise near, and held as well.
+    let apart = |a: &[Vec3<f32>], b: Vec<Vec3<f64>>| {
+        let pairs = a.iter().zip(b);
+        pairs.map(|(a, b)| (a.cast::<f64>() - b).length()).fold(0.0, f64::max)
+    };
+    let double = |all: &[Vec3<f32>]| all.iter().map(|x| x.cast()).collect::<Vec<Vec3<f64>>>();
+    let rest = first.model().rest_positions.clone();
+    let moved = apart(&rest, double(&first.state().positions));
+    assert_eq!(first.state(), same.state());
+    assert!(apart(&first.state().positions, exact.state().positions.clone()) < 0.1 * moved);
+    assert!(exact.hold(hold).is_some_and(|hold| hold.force.z > 0.01));
+}

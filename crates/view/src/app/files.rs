@@ -1,13 +1,19 @@
 //! Files that the window reads and writes: scenes, pictures, recordings.
 
+use anyhow::bail;
+use eframe::egui;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use super::App;
 use crate::capture::{Recorder, free_name, save_picture};
 use crate::choices::{Settings, Side, put};
 use crate::document::Document;
-use crate::engine::Command;
+use crate::engine::{Command, Event};
 use crate::save::save;
+
+/// How long a window that has to close waits for what is to be saved.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 impl App {
     pub(super) fn open(&mut self, path: &Path) {
@@ -47,11 +53,16 @@ impl App {
 
     /// Saves the scene as it began, with what was done by hand up to a time [s].
     pub(super) fn write_scene(&mut self, path: &Path, by_hand: &str, time: f64) {
+        self.write(path, &self.settings_begun(time), by_hand);
+    }
+
+    /// Settings as the simulations began, for so long [s].
+    fn settings_begun(&self, time: f64) -> Settings {
         let mut settings = self.session.begun().of(Side::First);
         if time > 0.0 {
             put(&mut settings, "time.duration", &format!("{time} s"));
         }
-        self.write(path, &settings, by_hand);
+        settings
     }
 
     fn write(&mut self, path: &Path, settings: &Settings, by_hand: &str) {
@@ -101,6 +112,45 @@ impl App {
             self.messages.warn(format!("{error:#}"));
             self.recorder = None;
         }
+    }
+
+    /// Without the window's device nothing can be drawn: saves what there is, and closes. True where that has
+    /// happened.
+    pub(super) fn say_farewell(&mut self, context: &egui::Context) -> bool {
+        if self.farewell.get().is_some() {
+            return true;
+        }
+        let Some(lost) = self.viewport.lost() else { return false };
+        self.close();
+        let stem = self.session.document().stem();
+        let path = free_name(&self.pictures, &format!("{stem}-recovered"), "toml");
+        let kept = match self.rescue(&path) {
+            Ok(()) => format!("what was done is in {}", path.display()),
+            Err(error) => format!("what was done could not be saved: {error:#}"),
+        };
+        // Nobody else sets it.
+        let _ = self.farewell.set(format!("{lost}; {kept}"));
+        context.send_viewport_cmd(egui::ViewportCommand::Close);
+        true
+    }
+
+    /// Saves what was done by hand; waits for the simulation's thread, which is not in a hurry.
+    fn rescue(&mut self, path: &Path) -> anyhow::Result<()> {
+        self.engine.send(Command::Save(path.to_owned()));
+        let start = Instant::now();
+        while start.elapsed() < PATIENCE {
+            for event in self.engine.hear() {
+                if let Event::Done { text, time, .. } = event {
+                    if let Some(folder) = path.parent() {
+                        std::fs::create_dir_all(folder)?;
+                    }
+                    let settings = self.settings_begun(time);
+                    return save(self.session.document(), &settings, &text, path);
+                }
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        bail!("the simulation did not answer")
     }
 
     /// Ends what would otherwise be lost.

@@ -24,6 +24,8 @@ use crate::probe::{Curve, Method};
 pub enum Command {
     /// Builds these simulations and starts them from rest.
     Load(Box<Plan>),
+    /// Puts these simulations beside the first one, which goes on: they begin where it is.
+    Accompany(Box<Plan>),
     /// Goes on with a mesh that was said to be large.
     Proceed,
     /// Runs, or pauses.
@@ -70,8 +72,10 @@ pub enum Event {
     Busy(String),
     /// It is large: [`Command::Proceed`] goes on, another [`Command::Load`] does not.
     Expect(String),
-    /// Everything is built; frames follow.
+    /// Everything is built and at rest; frames follow.
     Ready(Arc<Stage>),
+    /// Others are beside the first simulation now, or no longer.
+    Accompanied(Arc<Stage>),
     /// What computes each of the simulations has changed or been built again: its device, and why.
     Devices(Vec<String>),
     /// What was done by hand to the first simulation, as text for its scene file, and its time [s].

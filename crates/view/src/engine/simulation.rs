@@ -36,6 +36,8 @@ pub trait Handle: Send {
     fn done_by_hand(&self) -> (String, f64);
     /// The step that comes next.
     fn moment(&self) -> Moment;
+    /// Another simulation that goes on from here with another scene's solver.
+    fn fork(&self, scene: &Scene) -> Result<Box<dyn Handle>, String>;
 }
 
 /// What is taken hold of.
@@ -85,6 +87,17 @@ impl<S: Real> Running<S> {
         let by_hand = self.simulation.live().motions;
         let is_own = |tool: &Tool| by_hand.iter().all(|motion| motion.name != tool.name);
         pulling.zip(vertices).map(tool).filter(is_own).collect()
+    }
+
+    fn fork_as<T: Real>(&self, scene: &Scene) -> Result<Running<T>, String> {
+        let values = scene.solver.values().into_iter().filter(|(key, _)| *key != "precision");
+        let settings: Settings =
+            values.map(|(key, value)| (format!("solver.{key}"), value)).collect();
+        Ok(Running {
+            simulation: self.simulation.fork(&settings).map_err(text)?,
+            held: self.held.clone(),
+            measures: self.measures.clone(),
+        })
     }
 
     fn motion(&self, hold: HoldId) -> Option<usize> {
@@ -172,6 +185,13 @@ impl<S: Real> Handle for Running<S> {
     fn done_by_hand(&self) -> (String, f64) {
         let Live { motions, changes } = self.simulation.live();
         (self.simulation.scene().write(&motions, &changes), self.simulation.time())
+    }
+
+    fn fork(&self, scene: &Scene) -> Result<Box<dyn Handle>, String> {
+        Ok(match scene.solver.precision {
+            Precision::F32 => Box::new(self.fork_as::<f32>(scene)?),
+            Precision::F64 => Box::new(self.fork_as::<f64>(scene)?),
+        })
     }
 
     fn moment(&self) -> Moment {

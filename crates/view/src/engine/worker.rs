@@ -141,14 +141,23 @@ impl Worker {
                     change.clear();
                     self.load(*plan);
                 }
+                Command::Accompany(plan) => {
+                    // They are numbered anew.
+                    self.change_all(&mut change);
+                    self.accompany(*plan);
+                }
                 other => self.obey(other),
             }
             next = self.commands.try_recv().ok();
         }
-        for (lane, settings) in change.into_iter().enumerate() {
+        self.change_all(&mut change);
+        Next::On
+    }
+
+    fn change_all(&mut self, change: &mut Vec<Settings>) {
+        for (lane, settings) in change.drain(..).enumerate() {
             self.change(lane, &settings);
         }
-        Next::On
     }
 
     fn obey(&mut self, command: Command) {
@@ -186,7 +195,7 @@ impl Worker {
                 self.publish();
             }
             // The rest was obeyed where commands are gathered.
-            Command::Load(_) | Command::Change(..) | Command::Quit => {}
+            Command::Load(_) | Command::Accompany(_) | Command::Change(..) | Command::Quit => {}
         }
     }
 
@@ -218,6 +227,10 @@ impl Worker {
             Ok(assembly) => assembly,
             Err(error) => return self.fail(error.to_string(), Cure::Open),
         };
+        self.ask_or_start(plan, assembly);
+    }
+
+    fn ask_or_start(&mut self, plan: Plan, assembly: Assembly) {
         match expectation(&assembly, &plan.scenes) {
             Some(message) => {
                 self.asked = Some((plan, assembly));
@@ -227,7 +240,8 @@ impl Worker {
         }
     }
 
-    fn start(&mut self, mut plan: Plan, assembly: Assembly) {
+    /// The exact solution is for small meshes.
+    fn leave_ghost_out(&self, plan: &mut Plan, assembly: &Assembly) {
         let tets: usize = assembly.bodies.iter().map(|body| body.tets.len()).sum();
         if plan.ends_with_ghost && tets > MOST_GHOST_TETS {
             plan.scenes.pop();
@@ -237,6 +251,37 @@ impl Worker {
                  tetrahedra, and this one has {tets}"
             )));
         }
+    }
+
+    fn accompany(&mut self, mut plan: Plan) {
+        let Some(mut running) = self.running.take() else { return self.load(plan) };
+        self.leave_ghost_out(&mut plan, &running.stage.assembly);
+        self.tell(Event::Busy("building the model".to_owned()));
+        running.lanes.truncate(1);
+        running.walls.resize(1, 0.0);
+        for scene in plan.scenes.iter().skip(1) {
+            match running.lanes[0].fork(scene) {
+                Ok(lane) => running.lanes.push(lane),
+                Err(message) => return self.fail(message, Cure::Open),
+            }
+        }
+        running.walls.resize(running.lanes.len(), 0.0);
+        running.stage = Arc::new(Stage {
+            generation: plan.generation,
+            scene: running.stage.scene.clone(),
+            assembly: Arc::clone(&running.stage.assembly),
+            lane_count: running.lanes.len(),
+            has_ghost: plan.ends_with_ghost,
+        });
+        self.tell(Event::Accompanied(Arc::clone(&running.stage)));
+        self.running = Some(running);
+        self.tell_devices();
+        self.due = Instant::now();
+        self.publish();
+    }
+
+    fn start(&mut self, mut plan: Plan, assembly: Assembly) {
+        self.leave_ghost_out(&mut plan, &assembly);
         let Some(scene) = plan.scenes.first().cloned() else { return };
         let stage = Arc::new(Stage {
             generation: plan.generation,
@@ -291,6 +336,13 @@ impl Worker {
     }
 
     fn change(&mut self, lane: usize, settings: &Settings) {
+        if let Some((mut plan, assembly)) = self.asked.take() {
+            let changed = plan.scenes.get_mut(lane).map_or(Ok(()), |scene| scene.change(settings));
+            if let Err(error) = changed {
+                self.tell(Event::Refused(error.to_string()));
+            }
+            return self.ask_or_start(plan, assembly);
+        }
         let Some(running) = &mut self.running else { return };
         let Some(changed) = running.lanes.get_mut(lane).filter(|_| !settings.is_empty()) else {
             return;

@@ -1,6 +1,6 @@
 //! Rows of settings: a name, a slider or a menu, and what it means when one points at it.
 
-use eframe::egui::{self, Response, RichText, Slider, Ui};
+use eframe::egui::{self, Response, Slider, Ui};
 use std::ops::RangeInclusive;
 
 use super::Action;
@@ -136,21 +136,25 @@ impl<'a> Row<'a> {
 const NAMES: f32 = 104.0;
 
 fn labelled(ui: &mut Ui, row: &Row<'_>, control: impl FnOnce(&mut Ui) -> Response) -> Response {
+    named(ui, row.name, &format!("{}\n\n{}", row.help, row.key), control)
+}
+
+/// A control with its name before it and what it means for who points at it.
+pub fn named(
+    ui: &mut Ui,
+    name: &str,
+    help: &str,
+    control: impl FnOnce(&mut Ui) -> Response,
+) -> Response {
     ui.horizontal(|ui| {
-        let height = ui.spacing().interact_size.y;
-        let name = ui
-            .allocate_ui_with_layout(
-                egui::vec2(NAMES, height),
-                egui::Layout::left_to_right(egui::Align::Center),
-                |ui| {
-                    ui.set_min_width(NAMES);
-                    ui.label(row.name)
-                },
-            )
-            .inner;
-        let help = format!("{}\n\n{}", row.help, row.key);
-        let name = name.on_hover_text(RichText::new(&help));
-        control(ui).labelled_by(name.id).on_hover_text(help)
+        let size = egui::vec2(NAMES, ui.spacing().interact_size.y);
+        let layout = egui::Layout::left_to_right(egui::Align::Center);
+        let label = ui.allocate_ui_with_layout(size, layout, |ui| {
+            ui.set_min_width(NAMES);
+            ui.label(name)
+        });
+        let label = label.inner.on_hover_text(help);
+        control(ui).labelled_by(label.id).on_hover_text(help)
     })
     .inner
 }

@@ -4,7 +4,7 @@ use eframe::egui::{self, Ui};
 use viscera::material::{LARGEST_POISSON, PRESET_CAUTION, PRESETS, Preset};
 use viscera::scene::{Body, Scene};
 
-use super::choice::{Chooser, Row};
+use super::choice::{Chooser, Row, named};
 use super::{Action, section};
 use crate::choices::{Side, law_name};
 
@@ -69,8 +69,7 @@ fn presets(ui: &mut Ui, body: &Body, chooser: &mut Chooser<'_>) {
             && preset.density == material.density()
     };
     let shown = PRESETS.iter().find(is).map_or("own numbers", |preset| preset.name);
-    ui.horizontal(|ui| {
-        let name = ui.label("tissue").on_hover_text(PRESET_CAUTION);
+    named(ui, "tissue", PRESET_CAUTION, |ui| {
         let menu = egui::ComboBox::from_id_salt("preset").selected_text(shown).show_ui(ui, |ui| {
             for preset in PRESETS {
                 let label = ui.selectable_label(is(&preset), preset.name);
@@ -79,7 +78,7 @@ fn presets(ui: &mut Ui, body: &Body, chooser: &mut Chooser<'_>) {
                 }
             }
         });
-        menu.response.labelled_by(name.id).on_hover_text(PRESET_CAUTION);
+        menu.response
     });
 }
 

@@ -31,7 +31,12 @@ pub fn show(
 ) {
     section(ui, "Scene", true, |ui| {
         let scene = session.scene(Side::First);
-        let title = ui.label(egui::RichText::new(&scene.title).size(15.0));
+        // A scene without a title has its file's name, folders and all.
+        let title = match scene.title == scene.name {
+            true => session.document().stem(),
+            false => scene.title.clone(),
+        };
+        let title = ui.label(egui::RichText::new(title).size(15.0));
         if !scene.description.is_empty() {
             title.on_hover_text(scene.description.trim());
         }

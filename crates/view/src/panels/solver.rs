@@ -32,7 +32,7 @@ pub fn show(
 }
 
 /// Solvers worth comparing, by one click. Each says everything that another may have changed.
-const KNOWN: [(&str, &str, [(&str, &str); 7]); 4] = [
+const KNOWN: [(&str, &str, KnownSettings); 4] = [
     (
         "exact",
         "The default: exact at rest, coloured Gauss-Seidel, few sweeps.",
@@ -55,13 +55,15 @@ const KNOWN: [(&str, &str, [(&str, &str); 7]); 4] = [
     ),
 ];
 
+type KnownSettings = [(&'static str, &'static str); 7];
+
 const fn known_settings(
     colors: &'static str,
     substeps: &'static str,
     iterations: &'static str,
     acceleration: &'static str,
     exact: &'static str,
-) -> [(&'static str, &'static str); 7] {
+) -> KnownSettings {
     [
         ("solver.method", "xpbd"),
         ("solver.colors", colors),

@@ -117,7 +117,8 @@ pub fn show_status(ui: &mut Ui, clock: &Clock, stage: &Stage, frame: &Frame) {
     }
     if clock.playing {
         ui.label(format!("{real:.2} x real time"));
-        ui.weak(format!("{:.0} frames/s", clock.rate));
+        let digits = if clock.rate < 10.0 { 1 } else { 0 };
+        ui.weak(format!("{:.digits$} frames/s", clock.rate));
     } else {
         ui.label("paused");
     }

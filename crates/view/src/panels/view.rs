@@ -2,6 +2,7 @@
 
 use eframe::egui::{self, Slider, Ui};
 
+use super::choice::named;
 use super::{Action, section};
 use crate::engine::Coloring;
 use crate::help::Request;
@@ -46,22 +47,15 @@ pub fn show_grip(
 ) {
     section(ui, "Hand", true, |ui| {
         let grip = &mut preferences.grip;
-        ui.horizontal(|ui| {
-            let name = ui.label("grip");
-            ui.add(Slider::new(&mut grip.count, 1..=60).suffix(" vertices"))
-                .labelled_by(name.id)
-                .on_hover_text("How many vertices the next press takes hold of");
-        });
-        ui.horizontal(|ui| {
-            let name = ui.label("spring");
-            let slider = Slider::new(&mut grip.stiffness, 10.0..=5000.0)
-                .logarithmic(true)
-                .max_decimals(0)
-                .suffix(" N/m");
-            ui.add_enabled(!grip.rigid, slider).labelled_by(name.id).on_hover_text(
-                "Stiffness of the spring between hand and tissue, all vertices together",
-            );
-        });
+        let help = "How many vertices the next press takes hold of";
+        let slider = Slider::new(&mut grip.count, 1..=60).suffix(" vertices");
+        named(ui, "grip", help, |ui| ui.add(slider));
+        let help = "Stiffness of the spring between hand and tissue, all vertices together";
+        let slider = Slider::new(&mut grip.stiffness, 10.0..=5000.0)
+            .logarithmic(true)
+            .max_decimals(0)
+            .suffix(" N/m");
+        named(ui, "spring", help, |ui| ui.add_enabled(!grip.rigid, slider));
         ui.horizontal(|ui| {
             ui.checkbox(&mut grip.rigid, "rigid").on_hover_text("Hold without a spring");
             ui.checkbox(&mut grip.keep, "keep")

@@ -14,7 +14,7 @@ pub struct Lens {
 }
 
 /// Pictures narrower than this see from farther away, so that what is wide fits in.
-const NARROW: f64 = 1.3;
+const NARROW: f64 = 0.95;
 
 impl Lens {
     /// What a camera sees in a part of the window.

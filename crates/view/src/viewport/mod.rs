@@ -96,6 +96,11 @@ impl Viewport {
         self.orbit.elevation = angle(from.z, from.x.hypot(from.y)).clamp(-89.0, 89.0);
     }
 
+    /// Why nothing can be drawn any more, where the device was lost.
+    pub fn lost(&self) -> Option<String> {
+        self.gpu.failure()
+    }
+
     /// The camera.
     pub fn orbit(&self) -> &Orbit {
         &self.orbit
@@ -170,10 +175,20 @@ impl Viewport {
         preferences: &Preferences,
         commands: &mut Vec<Command>,
     ) {
-        let modifiers = ui.input(|input| input.modifiers);
+        // A slow window hears of a button and of keys that went with it in one frame: what counts is what was
+        // down, and where the pointer was, at that moment.
+        let (modifiers, pressed_at) = ui.input(|input| {
+            let of_button = |event: &egui::Event| match event {
+                egui::Event::PointerButton { modifiers, .. } => Some(*modifiers),
+                _ => None,
+            };
+            let last = input.events.iter().rev().find_map(of_button);
+            (last.unwrap_or(input.modifiers), input.pointer.press_origin())
+        });
         if let Some(pointer) = response.interact_pointer_pos() {
             if response.drag_started_by(PointerButton::Primary) && !modifiers.command {
-                self.press(lens, lane, frame, pointer, holds, &preferences.grip, commands);
+                let pressed = pressed_at.unwrap_or(pointer);
+                self.press(lens, lane, frame, pressed, holds, &preferences.grip, commands);
             }
             if let Some(plane) = holds.drag_plane() {
                 let [_, _, normal] = self.orbit.axes();

@@ -3,6 +3,7 @@
 use eframe::egui::TextureId;
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
+use std::sync::{Arc, OnceLock};
 use viscera::scalar::Vec3;
 use viscera::solver::gpu::{Device, GpuSurface, Skin};
 use viscera_picture::{Color, Image, ImageSize};
@@ -20,6 +21,8 @@ pub struct Gpu {
     pub device: Device,
     /// As the window knows it.
     pub state: RenderState,
+    /// The first thing that went wrong with it.
+    failed: Arc<OnceLock<String>>,
 }
 
 impl Gpu {
@@ -27,7 +30,22 @@ impl Gpu {
     pub fn new(state: RenderState) -> Self {
         let name = state.adapter.get_info().name;
         let device = Device::from_wgpu(state.device.clone(), state.queue.clone(), name);
-        Self { device, state }
+        let failed = Arc::new(OnceLock::new());
+        let told = Arc::clone(&failed);
+        // A device that is lost hands out things that cannot be used before it says so.
+        state.device.on_uncaptured_error(Arc::new(move |error| {
+            let text = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+            // What follows from the first is of no interest.
+            let _ = told.set(text);
+        }));
+        Self { device, state, failed }
+    }
+
+    /// Why nothing can be drawn any more.
+    pub fn failure(&self) -> Option<String> {
+        let lost = self.device.check().err().map(|error| error.to_string());
+        let name = self.device.name();
+        lost.or_else(|| Some(format!("the graphics device {name} failed: {}", self.failed.get()?)))
     }
 }
 

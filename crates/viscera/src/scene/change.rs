@@ -1,7 +1,7 @@
 //! Settings that change while a scene runs.
 
 use super::{Scene, SceneError, build};
-use crate::settings::apply_override;
+use crate::settings::{Choice, Precision, apply_override};
 use crate::units::shorten;
 
 /// Settings that change at a time; positions and velocities stay.
@@ -37,6 +37,17 @@ impl Scene {
             body.regions = changed.regions;
         }
         self.tree = changed.tree;
+        Ok(())
+    }
+}
+
+impl Scene {
+    /// The same scene in another precision: for another simulation of it.
+    pub(crate) fn set_precision(&mut self, precision: Precision) -> Result<(), SceneError> {
+        let known = Precision::ALL.iter().find(|(value, ..)| *value == precision);
+        let name = known.map_or("f32", |(_, name, _)| name);
+        apply_override(&mut self.tree.0, "solver.precision", name)?;
+        self.solver.precision = precision;
         Ok(())
     }
 }

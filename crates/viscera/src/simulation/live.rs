@@ -6,6 +6,7 @@ use super::{AssembleError, Simulation, SimulationError, substep_dt};
 use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
+use crate::settings::{Precision, SolverSettings};
 use crate::solver::Solver;
 use crate::state::State;
 
@@ -152,6 +153,43 @@ impl<S: Real> Simulation<S> {
         Ok(())
     }
 
+    /// Another simulation that goes on from here, in any precision, with settings of its own: for a comparison
+    /// of solvers. Where this one was taken hold of, the other is held as well.
+    pub fn fork<T: Real>(&self, settings: &[(String, String)]) -> Result<Simulation<T>, LiveError> {
+        let precision = match size_of::<T>() == size_of::<f64>() {
+            true => Precision::F64,
+            false => Precision::F32,
+        };
+        let of_fork = |scene: &Scene| -> Result<Scene, SceneError> {
+            let mut scene = scene.clone();
+            scene.set_precision(precision)?;
+            scene.change(settings)?;
+            Ok(scene)
+        };
+        let mut fork = Simulation::<T>::new(of_fork(&self.scene)?, self.assembly.clone())?;
+        fork.written = of_fork(&self.written)?;
+        fork.frame = self.frame;
+        fork.taken = self.taken.clone();
+        fork.changes_made = self.changes_made;
+        fork.by_hand.clone_from(&self.by_hand);
+        let double = |all: &[Vec3<S>]| all.iter().map(|x| x.cast::<f64>().cast()).collect();
+        let positions: Vec<Vec3<T>> = double(&self.state.positions);
+        let velocities: Vec<Vec3<T>> = double(&self.state.velocities);
+        let state = State { positions, velocities, ..State::at_rest(&fork.model) };
+        fork.begin_at(state);
+        // Constraints in the same order, which settings decide, go on with the multipliers they have.
+        let order = |solver: &SolverSettings| (solver.colors, solver.neo_hookean, solver.rebase);
+        let same_order = order(&self.scene.solver) == order(&fork.scene.solver);
+        if same_order && self.model.multiplier_count == fork.model.multiplier_count {
+            let kept = self.state.multipliers.iter().map(|l| T::from_f64(l.to_f64())).collect();
+            let positions = std::mem::take(&mut fork.state.positions);
+            let velocities = std::mem::take(&mut fork.state.velocities);
+            let multiplier_dt = self.state.multiplier_dt;
+            fork.put(State { positions, velocities, multipliers: kept, multiplier_dt });
+        }
+        Ok(fork)
+    }
+
     /// Back to the beginning, at rest: what was held is let go, settings stay as they were set by hand.
     pub fn reset(&mut self) -> Result<(), LiveError> {
         let frame = std::mem::take(&mut self.frame);
@@ -212,20 +250,24 @@ impl<S: Real> Simulation<S> {
         let same_device = scene.solver.device == self.scene.solver.device;
         let backend = self.backend.renew(same_device, &model, &solver, substep_dt(&scene))?;
         let rest = State::at_rest(&model);
-        let mut state = State {
+        let state = State {
             positions: std::mem::take(&mut self.state.positions),
             velocities: std::mem::take(&mut self.state.velocities),
             ..rest
         };
         (self.scene, self.model, self.solver, self.backend) = (scene, model, solver, backend);
         self.assembly.builder = builder;
-        // The new tissue's answer to where it is.
+        self.begin_at(state);
+        Ok(())
+    }
+
+    /// A state of this model, with the tissue's answer to where it is.
+    fn begin_at(&mut self, mut state: State<S>) {
         let inputs = self.inputs_at(self.time());
         let dt = substep_dt(&self.scene);
         let restarted = self.solver.restart(&self.model, &mut state, &inputs, dt);
         debug_assert!(restarted.is_ok(), "{restarted:?}");
         self.put(state);
-        Ok(())
     }
 
     /// The state from now on, on whatever computes the steps.

@@ -1,0 +1,138 @@
+//! The real window without a display: what drives it in tests and in `examples/dragging.rs`.
+#![allow(dead_code)]
+
+use eframe::egui::{Key, Modifiers, Pos2, Rect, Role, Vec2, vec2};
+use egui_kittest::kittest::Queryable;
+use egui_kittest::{Harness, wgpu};
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+use viscera::scene::Scene;
+use viscera_view::choices::Side;
+use viscera_view::engine::Lane;
+use viscera_view::preferences::Preferences;
+use viscera_view::{App, Options};
+
+/// The longest that anything may take before a test fails; most take tenths of a second.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// The window, driven from outside.
+pub struct Window {
+    pub harness: Harness<'static, App>,
+    /// Where everything is written.
+    pub folder: tempfile::TempDir,
+    /// What it is drawn with.
+    pub device: eframe::wgpu::Device,
+    /// Why it had to close.
+    pub farewell: Arc<OnceLock<String>>,
+}
+
+impl Window {
+    /// Opens a scene in a folder of its own.
+    pub fn open(scene: &str, settings: &[(&str, &str)]) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let setup = wgpu::default_wgpu_setup();
+        let state =
+            wgpu::create_render_state(setup, eframe::egui_wgpu::RendererOptions::PREDICTABLE);
+        let farewell = Arc::default();
+        let options = Options {
+            scene: scene.into(),
+            settings: settings.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect(),
+            data: None,
+            pictures: folder.path().join("pictures"),
+            farewell: Arc::clone(&farewell),
+        };
+        let context = eframe::egui::Context::default();
+        let preferences = Preferences::default();
+        let app = App::new(&context, state.clone(), options, preferences).expect("a window");
+        let device = state.device.clone();
+        let renderer = wgpu::WgpuTestRenderer::from_render_state(state);
+        let harness = Harness::builder()
+            .with_size(vec2(1100.0, 760.0))
+            .with_step_dt(1.0 / 60.0)
+            .renderer(renderer)
+            .build_ui_state(|ui, app: &mut App| app.show(ui), app);
+        Self { harness, folder, device, farewell }
+    }
+
+    /// Opens a scene and waits until it moves.
+    pub fn running(scene: &str, settings: &[(&str, &str)]) -> Self {
+        let mut window = Self::open(scene, settings);
+        window.wait("frames", |app| app.frame().is_some_and(|frame| frame.number >= 2));
+        window
+    }
+
+    /// Shows frame after frame of the window until something holds.
+    pub fn wait(&mut self, what: &str, holds: impl Fn(&App) -> bool) {
+        let start = Instant::now();
+        while !holds(self.harness.state()) {
+            let texts: Vec<_> = self.harness.state().messages().texts().collect();
+            assert!(
+                start.elapsed() < PATIENCE,
+                "waited in vain for {what}; the window says {texts:?}"
+            );
+            self.harness.step();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        self.harness.step();
+    }
+
+    pub fn press(&mut self, name: &str) {
+        self.harness.get_by_label(name).click();
+        self.harness.step();
+        self.harness.step();
+    }
+
+    pub fn slide(&mut self, name: &str, value: f64) {
+        self.harness.get_by_role_and_label(Role::Slider, name).set_value_accesskit(value);
+        self.harness.step();
+        self.harness.step();
+    }
+
+    /// Presses in the middle of the view, pulls so far, and lets the button go.
+    pub fn drag(&mut self, way: Vec2) {
+        let middle = self.view().center();
+        self.harness.hover_at(middle);
+        self.harness.step();
+        self.harness.drag_at(middle);
+        self.harness.step();
+        for share in [0.25, 0.5, 0.75, 1.0] {
+            self.harness.hover_at(middle + way * share);
+            self.harness.step();
+            let number = self.harness.state().frame().map_or(0, |frame| frame.number);
+            self.wait("a frame", |app| app.frame().is_some_and(|frame| frame.number > number));
+        }
+        self.harness.drop_at(middle + way);
+        self.harness.step();
+    }
+
+    /// Saves the scene there, and reads it.
+    pub fn save(&mut self, path: &Path) -> Scene {
+        self.harness.state_mut().save_under(path);
+        self.harness.key_press_modifiers(Modifiers::COMMAND, Key::S);
+        self.wait("the file", |_| path.exists());
+        let text = std::fs::read_to_string(path).expect("a file");
+        Scene::parse("saved", &text, &[]).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    pub fn view(&self) -> Rect {
+        self.harness.get_by_label("view").rect()
+    }
+
+    /// The sum of the colours in the view, by pixels.
+    pub fn pixels(&mut self) -> Vec<[u8; 3]> {
+        let view = self.view();
+        let image = self.harness.render().expect("a picture of the window");
+        let inside = |x: u32, y: u32| view.contains(Pos2::new(x as f32, y as f32));
+        let pixels = image.enumerate_pixels().filter(|(x, y, _)| inside(*x, *y));
+        pixels.map(|(_, _, pixel)| [pixel[0], pixel[1], pixel[2]]).collect()
+    }
+
+    pub fn lane(&self, number: usize) -> &Lane {
+        &self.harness.state().frame().expect("a frame").lanes[number]
+    }
+
+    pub fn scene(&self) -> &Scene {
+        self.harness.state().session().scene(Side::First)
+    }
+}
