@@ -179,6 +179,20 @@ fn a_ghost_lets_through_what_is_behind_it_and_shows_one_layer() {
 }
 
 #[test]
+fn a_ghost_of_tissue_where_that_is_is_not_seen() {
+    let ball = Ball::new(&device());
+    let canvas = ball.canvas([200, 150], Quality::plain());
+    let solid = ball.picture(&canvas, &ball.drawing());
+    let ghost =
+        BodyView { paint: Paint::Plain(Color::REST), opacity: 0.5, ..BodyView::of(&ball.surface) };
+    let bodies = vec![BodyView::of(&ball.surface), ghost];
+    let both = ball.picture(&canvas, &Drawing { bodies, ..ball.drawing() });
+    // Round-off may move the rim by some pixels.
+    let changed = difference(&solid, &both).len();
+    assert!(changed < 20, "{changed} pixels");
+}
+
+#[test]
 fn a_shadow_darkens_and_never_brightens() {
     let ball = Ball::new(&device());
     let [right, up, backward] = ball.orbit.axes();

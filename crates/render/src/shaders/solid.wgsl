@@ -47,5 +47,5 @@ fn shade_solid(fragment: SolidFragment) -> @location(0) vec4f {
 // Behind tissue: paler, so that one sees that it is there and that it is inside.
 @fragment
 fn shade_hidden_solid(fragment: SolidFragment) -> @location(0) vec4f {
-    return vec4f(mix(solid_color(fragment), vec3f(1.0), 0.25), 0.32);
+    return vec4f(mix(solid_color(fragment), vec3f(1.0), 0.15), 0.4);
 }

@@ -23,9 +23,14 @@ struct Fragment {
     @location(2) value: vec2f,
 }
 
+// Ghosts lie a little farther than they are, a share of the distance along the line of sight: where one is the
+// same as solid tissue, that is seen, and not a patchwork of both.
+const GHOST_SINK: f32 = 0.002;
+
 fn fragment_of(position: vec3f, normal: vec3f, value: vec2f) -> Fragment {
     let v = position - view.position.xyz;
-    return Fragment(on_screen(v), -v, normal, value);
+    let sink = select(0.0, GHOST_SINK, body.color.a < 1.0);
+    return Fragment(on_screen(v * (1.0 + sink)), -v, normal, value);
 }
 
 @vertex
@@ -90,9 +95,9 @@ fn lit_share(v: vec3f, n: vec3f) -> f32 {
     return sum / 9.0;
 }
 
-fn eighth_power(x: f32) -> f32 {
+fn fourth_power(x: f32) -> f32 {
     let square = x * x;
-    return square * square * square * square;
+    return square * square;
 }
 
 // A ghost is as glass: clear where one looks straight at it, so that what it covers keeps its colours, and
@@ -109,11 +114,12 @@ fn shade_tissue(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @l
     let lit = lit_share(-fragment.to_viewer, n);
     let light = diffuse_light(n, lit, vec3f(0.32, 0.24, 0.20));
     let shine = max(dot(n, normalize(view.key.xyz + v)), 0.0);
-    let broad = eighth_power(shine * shine);
-    let tight = eighth_power(broad);
+    let broad = fourth_power(fourth_power(shine));
+    // Tighter shows the triangles of a coarse surface.
+    let tight = fourth_power(broad);
     let grazing = 1.0 - clamp(dot(n, v), 0.0, 1.0);
-    let fresnel = 0.03 + 0.97 * grazing * grazing * grazing * grazing * grazing;
-    let mirrored = lit * (0.09 * broad + 0.5 * tight) + 0.24 * fresnel * sky_share(n);
+    let fresnel = 0.03 + 0.97 * grazing * fourth_power(grazing);
+    let mirrored = lit * (0.09 * broad + 0.36 * tight) + 0.24 * fresnel * sky_share(n);
     // Towards white, never past it; a ghost is no wetter than it is dense.
     let white = min(mirrored * body.color.a, 1.0);
     let linear = mix(body.color.rgb * light, vec3f(1.0, 0.99, 0.97), white);
@@ -137,7 +143,7 @@ fn shade_values(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @l
     let lit = lit_share(-fragment.to_viewer, n);
     let wrapped = lit * max((dot(n, view.key.xyz) + 0.4) / 1.4, 0.0);
     // One where the key falls straight on it.
-    let light = 0.58 + 0.32 * wrapped + 0.10 * max(dot(n, v), 0.0);
     let grazing = 1.0 - clamp(dot(n, v), 0.0, 1.0);
+    let light = 0.58 + 0.32 * wrapped + 0.10 * (1.0 - grazing);
     return vec4f(srgb(color_of(fragment.value) * light), opacity(grazing));
 }

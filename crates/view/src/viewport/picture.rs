@@ -115,7 +115,7 @@ pub struct Scenery<'a> {
 
 impl Scenery<'_> {
     /// Radii as shares of the size of things: large enough to be seen, too small to cover the tissue.
-    const FIXED: f64 = 0.0035;
+    const FIXED: f64 = 0.005;
     const PICKED: f64 = 0.009;
     const SHAFT: f64 = 0.0045;
 
