@@ -159,7 +159,9 @@ fn steps(output: &Path, second_driver: Option<&Path>) -> Vec<Step> {
     ];
     if let Some(driver) = second_driver {
         let mut command = cargo(&["test", "--workspace"]);
-        for test in ["twins", "gpu", "gpu_guard", "gpu_history", "gpu_explicit", "gpu_surface"] {
+        for test in
+            ["twins", "gpu", "gpu_guard", "gpu_history", "gpu_explicit", "gpu_surface", "tethers"]
+        {
             command.args(["--test", test]);
         }
         command.args(["--", "device_errs", "nasty", "portable"]);
