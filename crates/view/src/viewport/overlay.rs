@@ -183,6 +183,10 @@ fn label(painter: &Painter, place: Pos2, anchor: Align2, text: &str, size: f32) 
     let ink = Color32::from_rgb(24, 28, 36);
     let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(size), ink);
     let rect = anchor.anchor_size(place, galley.size());
+    // A label at the edge is pushed inside: half a number is worse than one beside its place.
+    let area = painter.clip_rect().shrink(8.0);
+    let inside = rect.min.max(area.min).min(area.max - rect.size());
+    let rect = Rect::from_min_size(inside, rect.size());
     painter.rect_filled(
         rect.expand2(vec2(5.0, 2.0)),
         CornerRadius::same(4),
