@@ -205,7 +205,7 @@ fn portable_tethers_on_the_device_agree_with_the_cpu() {
         let single: Model<f32> = model(SNH, settings, false);
         let mut oracle = Solver::new(&double, settings);
         let mut cpu = Solver::new(&single, settings);
-        let mut gpu = GpuSolver::new(&device, &single, settings).expect("a model that fits");
+        let mut gpu = GpuSolver::new(device, &single, settings).expect("a model that fits");
         let mut exact = State::at_rest(&double);
         let [mut near, mut state] = [(); 2].map(|()| State::at_rest(&single));
         let mut errors = [0.0f64; 2];
