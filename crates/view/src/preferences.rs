@@ -1,5 +1,7 @@
 //! What the window remembers from one time to the next.
 
+use eframe::wgpu;
+
 use crate::engine::Coloring;
 use crate::holds::Grip;
 use crate::probe::{METHODS, Method};
@@ -31,6 +33,13 @@ pub struct Preferences {
 }
 
 impl Preferences {
+    /// Where nothing is remembered: without shadows where a processor draws, which they would keep from drawing
+    /// five pictures a second.
+    pub fn suited_to(adapter: &wgpu::Adapter) -> Self {
+        let software = adapter.get_info().device_type == wgpu::DeviceType::Cpu;
+        Self { shadow: !software, ..Self::default() }
+    }
+
     /// Methods by which steps are to be repeated.
     pub fn methods(&self) -> Vec<Method> {
         if self.convergence_open { self.ticked.clone() } else { Vec::new() }

@@ -36,7 +36,8 @@ pub fn open(options: Options) -> Result<()> {
             let state = state.ok_or("there is no graphics device to draw with")?;
             let remembered = creation.storage.and_then(|storage| storage.get_string(REMEMBERED));
             let preferences = remembered.and_then(|text| serde_json::from_str(&text).ok());
-            let preferences: Preferences = preferences.unwrap_or_default();
+            let suited = || Preferences::suited_to(&state.adapter);
+            let preferences: Preferences = preferences.unwrap_or_else(suited);
             Ok(Box::new(App::new(&creation.egui_ctx, state, options, preferences)?))
         }),
     );

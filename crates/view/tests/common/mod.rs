@@ -43,7 +43,7 @@ impl Window {
             farewell: Arc::clone(&farewell),
         };
         let context = eframe::egui::Context::default();
-        let preferences = Preferences::default();
+        let preferences = Preferences::suited_to(&state.adapter);
         let app = App::new(&context, state.clone(), options, preferences).expect("a window");
         let device = state.device.clone();
         let renderer = wgpu::WgpuTestRenderer::from_render_state(state);
