@@ -172,9 +172,9 @@ impl Drawing<'_> {
             title: self.title,
             caption: self.caption,
             color_scale: self.color_scale.as_ref(),
-            length_scale: self.length_scale,
+            pixels_per_meter: self.length_scale.then(|| camera.pixels_per_meter()),
         };
-        overlay.draw(&mut image, camera);
+        overlay.draw(&mut image);
         Ok(Drawn { image, skipped })
     }
 

@@ -46,4 +46,4 @@ pub use color::{Color, map_color};
 pub use drawing::{Arrow, Drawing, Drawn, Line, Markers, Outline, Paint, Surface};
 pub use error::PictureError;
 pub use image::{Image, ImageSize, write_png};
-pub use overlay::ColorScale;
+pub use overlay::{ColorScale, Overlay};

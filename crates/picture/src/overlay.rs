@@ -2,7 +2,6 @@
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
-use crate::camera::Camera;
 use crate::color::map_color;
 use crate::error::PictureError;
 use crate::image::{Image, ImageSize};
@@ -176,17 +175,23 @@ impl Layout {
     }
 }
 
-/// What to write on a picture.
-pub(crate) struct Overlay<'a> {
+/// What is written on a picture, whoever has drawn it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Overlay<'a> {
+    /// Upper left, usually the scene's name.
     pub title: &'a str,
+    /// Below the title, usually the time.
     pub caption: &'a str,
+    /// Colours of values, at the right edge.
     pub color_scale: Option<&'a ColorScale>,
-    pub length_scale: bool,
+    /// For a bar of known length in the lower left corner: how many pixels a metre takes in the middle of
+    /// the scene.
+    pub pixels_per_meter: Option<f64>,
 }
 
 impl Overlay<'_> {
-    /// Writes it.
-    pub fn draw(&self, image: &mut Image, camera: &Camera) {
+    /// Writes it; on thumbnails, where letters would cover the tissue, nothing.
+    pub fn draw(&self, image: &mut Image) {
         let layout = Layout::of(image.size());
         if !layout.annotated {
             return;
@@ -204,8 +209,8 @@ impl Overlay<'_> {
         write_text(image, &layout, margin, margin, &shortened(self.title, room), INK);
         let below = margin + layout.line * 6 / 5;
         write_text(image, &layout, margin, below, &shortened(self.caption, room), SOFT_INK);
-        if self.length_scale {
-            draw_length_bar(image, &layout, camera);
+        if let Some(pixels) = self.pixels_per_meter.filter(|p| p.is_finite() && *p > 0.0) {
+            draw_length_bar(image, &layout, pixels);
         }
     }
 }
@@ -272,10 +277,10 @@ fn draw_color_bar(image: &mut Image, layout: &Layout, scale: &ColorScale) {
     }
 }
 
-fn draw_length_bar(image: &mut Image, layout: &Layout, camera: &Camera) {
-    let longest = 0.2 * f64::from(layout.size.width()) / camera.pixels_per_meter();
+fn draw_length_bar(image: &mut Image, layout: &Layout, pixels_per_meter: f64) {
+    let longest = 0.2 * f64::from(layout.size.width()) / pixels_per_meter;
     let length = nice_at_most(longest);
-    let pixels = (length * camera.pixels_per_meter()).round() as i32;
+    let pixels = (length * pixels_per_meter).round() as i32;
     let (left, bottom) = (layout.margin, layout.size.height() as i32 - layout.margin);
     let thick = (layout.line / 10).max(1);
     let tick = layout.line * 2 / 5;

@@ -16,7 +16,7 @@ use viscera::scalar::{Vec3, vec3};
 use viscera::settings::SolverSettings;
 use viscera::solver::gpu::{Adapter, Device, GpuSolver, GpuSurface, Skin};
 use viscera::solver::{Inputs, Pin};
-use viscera_picture::{Color, ImageSize, write_png};
+use viscera_picture::{Color, ColorScale, ImageSize, Overlay, write_png};
 use viscera_render::{
     Arrow, BodyView, Canvas, Drawing, Markers, Orbit, Paint, Quality, Room, ValueBuffer,
 };
@@ -54,15 +54,24 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut drawing = Drawing { bodies: vec![BodyView::of(&surface)], ..Drawing::from(orbit) };
     let rest = GpuSurface::following(&device, liver.tets.vertices().len(), &[skin])?;
     let values = ValueBuffer::new(&device, liver.surface.vertices.len());
+    let mut scale = None;
     if !flags.is_empty() {
         rest.place(&liver.tets.vertices().iter().map(|x| x.cast()).collect::<Vec<_>>())?;
         rest.update();
         let extras = Extras { values: &values, rest: &rest, at_rest: &liver.surface.vertices };
-        extras.add(&mut drawing, held.into_iter().map(|(_, x)| x).collect())?;
+        scale = extras.add(&mut drawing, held.into_iter().map(|(_, x)| x).collect())?;
     }
     let canvas = Canvas::new(&device, ImageSize::new(960, 640)?, quality(&device))?;
     canvas.draw(&drawing)?;
-    std::fs::write(file, write_png(&canvas.read()?)?)?;
+    let mut image = canvas.read()?;
+    let overlay = Overlay {
+        title: "Liver",
+        caption: "a tenth of a second after its right end was let go",
+        color_scale: scale.as_ref(),
+        pixels_per_meter: Some(orbit.pixels_per_meter(image.size().height())),
+    };
+    overlay.draw(&mut image);
+    std::fs::write(file, write_png(&image)?)?;
     println!("{file}: {} tetrahedra on {}", model.tet_count(), device.name());
     Ok(())
 }
@@ -100,14 +109,21 @@ struct Extras<'a> {
 }
 
 impl<'a> Extras<'a> {
-    fn add(&self, drawing: &mut Drawing<'a>, held: Vec<Vec3<f64>>) -> Result<(), Box<dyn Error>> {
-        let [tissue] = drawing.bodies.as_mut_slice() else { return Ok(()) };
+    /// Returns what the colours mean.
+    fn add(
+        &self,
+        drawing: &mut Drawing<'a>,
+        held: Vec<Vec3<f64>>,
+    ) -> Result<Option<ColorScale>, Box<dyn Error>> {
+        let [tissue] = drawing.bodies.as_mut_slice() else { return Ok(None) };
         let [now, _] = tissue.surface.read()?;
         let now: Vec<Vec3<f64>> = now.iter().map(|x| x.cast()).collect();
         let moved = |(a, b): (&Vec3<f64>, &Vec3<f64>)| (*a - *b).length() as f32;
         let moved: Vec<f32> = now.iter().zip(self.at_rest).map(moved).collect();
         self.values.write(&moved)?;
-        let high = moved.iter().copied().fold(0.0, f32::max);
+        let largest = moved.iter().copied().fold(0.0, f32::max);
+        let scale = ColorScale::rounded("displacement [mm]", 0.0, 1e3 * f64::from(largest))?;
+        let high = 1e-3 * scale.range()[1] as f32;
         tissue.paint = Paint::Values { buffer: self.values, low: 0.0, high };
         tissue.wireframe = true;
         let color = Color::REST;
@@ -125,6 +141,6 @@ impl<'a> Extras<'a> {
         drawing.markers.push(mark(vec![from], 2.0 * radius, Color::PULLED));
         drawing.arrows.push(Arrow { from, to, radius, color: Color::PULLED });
         drawing.shadow = Room::around(now.into_iter());
-        Ok(())
+        Ok(Some(scale))
     }
 }

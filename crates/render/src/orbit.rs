@@ -82,6 +82,11 @@ impl Orbit {
         direction * (1.0 / direction.length())
     }
 
+    /// How many pixels of a picture of this height a metre at the target takes.
+    pub fn pixels_per_meter(&self, height: u32) -> f64 {
+        0.5 * f64::from(height) / (HALF_OPENING * self.distance)
+    }
+
     /// What the shader multiplies sideways and upward distances by, over the depth.
     pub(crate) fn lens(aspect: f64) -> [f64; 2] {
         [1.0 / (HALF_OPENING * aspect.max(1e-3)), 1.0 / HALF_OPENING]
@@ -112,6 +117,15 @@ mod tests {
         let corner = orbit.ray([0.0, 0.0], 1.6);
         let [right, up, _] = orbit.axes();
         assert!(corner.dot(right) < 0.0 && corner.dot(up) > 0.0);
+    }
+
+    #[test]
+    fn a_metre_takes_its_pixels() {
+        let orbit = Orbit::framing(&[vec3(0.0, 0.0, 0.0), vec3(0.1, 0.2, 0.3)]);
+        // The height of what is seen at the target is twice the tangent of half the opening, times its
+        // distance.
+        let height = 2.0 * HALF_OPENING * orbit.distance;
+        assert!((orbit.pixels_per_meter(300) * height - 300.0).abs() < 1e-9);
     }
 
     #[test]

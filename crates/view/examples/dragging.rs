@@ -1,7 +1,9 @@
 //! Drags the procedural liver about for minutes, in the real window without a display, and tells what that takes:
 //! frames simulated and drawn per second, memory, from the movement of the mouse to moved tissue.
 //!
-//! `cargo run --release -p viscera-view --example dragging -- 10` drags for ten minutes.
+//! `cargo run --release -p viscera-view --example dragging -- 10` drags for ten minutes. More arguments change
+//! settings, as in `body.liver.spacing="5 mm" solver.device=gpu`; with `--hardware` the graphics card draws instead of a
+//! software driver.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -16,7 +18,12 @@ const REGRASPED_EVERY: Duration = Duration::from_secs(5);
 
 fn main() -> ExitCode {
     let minutes: f64 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(1.0);
-    let mut window = Window::running("liver_retraction", &[]);
+    let settings: Vec<String> = std::env::args().skip(2).collect();
+    let on_hardware = settings.iter().any(|setting| setting == "--hardware");
+    let settings: Vec<_> = settings.iter().filter_map(|setting| setting.split_once('=')).collect();
+    let open = if on_hardware { Window::open_on_hardware } else { Window::open };
+    let mut window = open("liver_retraction", &settings);
+    window.start();
     let view = window.view();
     let begun = Instant::now();
     let (mut drawn, mut grasp, mut told) = (0u32, 0u32, Instant::now());

@@ -63,6 +63,8 @@ pub struct App {
     shown: u32,
     /// How methods converge in a step of the first simulation.
     curves: Vec<Curve>,
+    /// What is being saved: where, and of what.
+    saving: Vec<(PathBuf, Document, Settings)>,
 }
 
 impl App {
@@ -104,6 +106,7 @@ impl App {
             counted: (0, Instant::now()),
             shown: 0,
             curves: Vec::new(),
+            saving: Vec::new(),
             session,
             preferences,
             messages,
@@ -265,7 +268,9 @@ impl App {
                 Event::Ready(stage) => {
                     self.messages.busy = None;
                     self.messages.failure = None;
-                    self.holds.clear();
+                    let late = self.holds.clear();
+                    self.send(late);
+                    self.curves.clear();
                     if let Err(error) = self.viewport.enter(&stage) {
                         self.messages.warn(error);
                     }
@@ -284,6 +289,12 @@ impl App {
                 Event::Devices(devices) => self.devices = devices,
                 Event::Refused(text) => self.messages.warn(text),
                 Event::Done { path, text, time } => self.write_scene(&path, &text, time),
+                Event::Kept { lane, key, value } => self.session.keep(lane, &key, &value),
+                Event::Alone(text) => {
+                    self.messages.busy = None;
+                    self.messages.warn(text);
+                    self.session.stay_alone();
+                }
                 Event::Curves(curves) => self.curves = curves,
                 Event::Failed(failure) => {
                     self.messages.busy = None;
@@ -383,7 +394,8 @@ impl App {
                 let reset = self.session.begin_again();
                 self.engine.send(reset);
                 // What has diverged was stopped; beginning anew is meant to run.
-                if self.messages.failure.take().is_some() {
+                let stopped = self.messages.failure.take_if(|failure| failure.cure == Cure::Reset);
+                if stopped.is_some() {
                     self.play(true);
                 }
             }

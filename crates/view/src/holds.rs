@@ -47,8 +47,17 @@ pub struct Held {
 pub struct Holds {
     list: Vec<Held>,
     taken_so_far: HoldId,
-    /// What is dragged, and the point of the drag's plane where its translation is zero [m].
-    drag: Option<(HoldId, Vec3<f64>)>,
+    drag: Option<Drag>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Drag {
+    hold: HoldId,
+    /// A point of the plane in which it is dragged [m].
+    plane: Vec3<f64>,
+    /// The place of the pointer in that plane at which its translation would be zero [m]; known from the first
+    /// movement on.
+    origin: Option<Vec3<f64>>,
 }
 
 impl Holds {
@@ -59,14 +68,14 @@ impl Holds {
 
     /// A point of the plane in which something is dragged [m].
     pub fn drag_plane(&self) -> Option<Vec3<f64>> {
-        self.drag.map(|(_, origin)| origin)
+        self.drag.map(|drag| drag.plane)
     }
 
     /// Takes hold where the tissue was pressed, and drags it.
     pub fn take(&mut self, pick: &Pick, grip: &Grip) -> Command {
         self.taken_so_far += 1;
         let id = self.taken_so_far;
-        self.drag = Some((id, pick.point));
+        self.drag = Some(Drag { hold: id, plane: pick.point, origin: Some(pick.point) });
         self.list.push(Held {
             id,
             taken: pick.point,
@@ -77,30 +86,33 @@ impl Holds {
         Command::Take { hold: id, body: pick.body, rest: pick.rest, count: grip.count, stiffness }
     }
 
-    /// Drags what is held already.
-    pub fn resume(&mut self, id: HoldId) {
-        if let Some(held) = self.list.iter().find(|held| held.id == id) {
-            self.drag = Some((id, held.taken));
+    /// Drags what is held already, from where it is led to now. False where there is no such hold.
+    pub fn resume(&mut self, id: HoldId) -> bool {
+        let held = self.list.iter().find(|held| held.id == id);
+        if let Some(held) = held {
+            self.drag = Some(Drag { hold: id, plane: held.taken + held.translation, origin: None });
         }
+        held.is_some()
     }
 
     /// Leads what is dragged to a point of its plane [m].
     pub fn lead(&mut self, point: Vec3<f64>) -> Option<Command> {
-        let (id, origin) = self.drag?;
-        let held = self.list.iter_mut().find(|held| held.id == id)?;
+        let drag = self.drag.as_mut()?;
+        let held = self.list.iter_mut().find(|held| held.id == drag.hold)?;
+        let origin = *drag.origin.get_or_insert(point - held.translation);
         held.translation = point - origin;
-        Some(Command::Lead(id, held.translation))
+        Some(Command::Lead(held.id, held.translation))
     }
 
     /// Ends a drag: holds on, or lets go.
     pub fn release(&mut self, keep: bool) -> Option<Command> {
-        let (id, _) = self.drag.take()?;
-        if keep { None } else { self.let_go(id) }
+        let Drag { hold, .. } = self.drag.take()?;
+        if keep { None } else { self.let_go(hold) }
     }
 
     /// Lets go of one.
     pub fn let_go(&mut self, id: HoldId) -> Option<Command> {
-        if self.drag.is_some_and(|(dragged, _)| dragged == id) {
+        if self.drag.is_some_and(|drag| drag.hold == id) {
             self.drag = None;
         }
         let position = self.list.iter().position(|held| held.id == id)?;
@@ -108,10 +120,11 @@ impl Holds {
         Some(Command::LetGo(id))
     }
 
-    /// Forgets everything: the simulations have begun anew.
-    pub fn clear(&mut self) {
-        self.list.clear();
+    /// Forgets everything: the simulations have begun anew. What was taken since, before this was known, is let
+    /// go.
+    pub fn clear(&mut self) -> Vec<Command> {
         self.drag = None;
+        self.list.drain(..).map(|held| Command::LetGo(held.id)).collect()
     }
 
     /// Notes the forces of a frame.
@@ -126,9 +139,13 @@ impl Holds {
             if forces[0].is_nan() {
                 continue;
             }
-            // After a reset time begins anew.
-            if held.curve.back().is_some_and(|&(time, _)| time >= frame.time) {
-                held.curve.clear();
+            // After a reset time begins anew; a frame may be told again.
+            match held.curve.back() {
+                Some(&(time, _)) if time > frame.time => held.curve.clear(),
+                Some(&(time, _)) if time == frame.time => {
+                    held.curve.pop_back();
+                }
+                _ => {}
             }
             held.curve.push_back((frame.time, forces));
             while held.curve.front().is_some_and(|&(time, _)| time < frame.time - REMEMBERED) {
@@ -155,8 +172,13 @@ mod tests {
         assert!(matches!(led, Some(Command::Lead(1, moved)) if moved == vec3(0.0, 0.0, 1.0)));
         assert!(holds.release(true).is_none());
         assert_eq!(holds.list().len(), 1);
-        // Taken up again, it goes on from where it is held.
-        holds.resume(1);
+        // Taken up again, wherever it is pressed, it goes on from where it was led to.
+        assert!(holds.resume(1) && !holds.resume(7));
+        assert_eq!(holds.drag_plane(), Some(vec3(1.0, 2.0, 4.0)));
+        let led = holds.lead(vec3(1.5, 2.0, 4.0));
+        assert!(matches!(led, Some(Command::Lead(1, moved)) if moved == vec3(0.0, 0.0, 1.0)));
+        let led = holds.lead(vec3(1.5, 2.25, 4.0));
+        assert!(matches!(led, Some(Command::Lead(1, moved)) if moved == vec3(0.0, 0.25, 1.0)));
         assert!(matches!(holds.release(false), Some(Command::LetGo(1))));
         assert!(holds.list().is_empty() && holds.lead(Vec3::ZERO).is_none());
     }
@@ -183,6 +205,8 @@ mod tests {
         };
         assert_eq!(times(&holds), [2.0, 1.5 + REMEMBERED]);
         assert_eq!(holds.list()[0].curve[0].1[0], 5.0);
+        holds.note(&at(1.5 + REMEMBERED));
+        assert_eq!(times(&holds), [2.0, 1.5 + REMEMBERED]);
         holds.note(&at(0.0));
         assert_eq!(times(&holds), [0.0]);
     }

@@ -117,6 +117,11 @@ pub struct Curve {
 /// The step of a moment by one method. Multipliers are those of tissue at its places.
 pub fn curve(moment: &Moment, method: Method, name: &str) -> Curve {
     let settings = method.settings(&moment.solver);
+    if settings.method == Integrator::Explicit {
+        // Its small steps approach nothing.
+        let problem = Some("the explicit method has no iterations".to_owned());
+        return Curve { name: name.to_owned(), residuals: Vec::new(), problem };
+    }
     let (residuals, problem) = match moment.builder.build::<f64>(&settings) {
         Ok(model) => match residuals(moment, &model, &settings) {
             Ok(residuals) => (residuals, None),

@@ -117,6 +117,27 @@ impl Session {
         self.change_to(next, "compare", false)
     }
 
+    /// A simulation has refused a setting, and goes on with this value.
+    pub fn keep(&mut self, lane: usize, key: &str, value: &str) {
+        let side = match lane {
+            0 => Side::First,
+            1 if self.is_comparison() => Side::Second,
+            _ => return,
+        };
+        let kept = self.choices.with(side, key, value);
+        if let Ok(scenes) = scenes_of(&self.document, &kept) {
+            (self.choices, self.scenes) = (kept, scenes);
+        }
+    }
+
+    /// Nothing could be put beside the first simulation.
+    pub fn stay_alone(&mut self) {
+        let alone = Choices { second: None, ghost: false, ..self.choices.clone() };
+        if let Ok(scenes) = scenes_of(&self.document, &alone) {
+            (self.choices, self.scenes) = (alone, scenes);
+        }
+    }
+
     /// Takes the last change back.
     pub fn undo(&mut self) -> Result<Vec<Command>, String> {
         match self.history.undo(&self.choices) {

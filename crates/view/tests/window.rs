@@ -65,7 +65,10 @@ fn what_is_kept_stays_held_until_escape() {
     window.harness.step();
     window.wait("a hold", |app| app.frame().is_some_and(|frame| frame.lanes[0].holds.len() == 1));
     window.harness.key_press(Key::Escape);
-    window.wait("a release", |app| app.holds().list().is_empty());
+    window.wait("a release", |app| {
+        let is_free = app.frame().is_some_and(|frame| frame.lanes[0].holds.is_empty());
+        app.holds().list().is_empty() && is_free
+    });
 }
 
 #[test]

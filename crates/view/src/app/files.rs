@@ -43,31 +43,39 @@ impl App {
     /// simulation's thread knows.
     pub(super) fn save_as(&mut self, path: &Path) {
         match self.preferences.save_by_hand {
-            true => self.engine.send(Command::Save(path.to_owned())),
+            true => self.ask_to_save(path),
             false => {
                 let settings = self.session.choices().of(Side::First);
-                self.write(path, &settings, "");
+                let document = self.session.document().clone();
+                self.write(&document, path, &settings, "");
             }
         }
     }
 
-    /// Saves the scene as it began, with what was done by hand up to a time [s].
-    pub(super) fn write_scene(&mut self, path: &Path, by_hand: &str, time: f64) {
-        self.write(path, &self.settings_begun(time), by_hand);
+    /// Asks the simulation's thread for what was done by hand. Until it answers, another scene may be open, or
+    /// this one may have begun anew: what is saved is what was there.
+    fn ask_to_save(&mut self, path: &Path) {
+        let begun = self.session.begun().of(Side::First);
+        self.saving.push((path.to_owned(), self.session.document().clone(), begun));
+        self.engine.send(Command::Save(path.to_owned()));
     }
 
-    /// Settings as the simulations began, for so long [s].
-    fn settings_begun(&self, time: f64) -> Settings {
-        let mut settings = self.session.begun().of(Side::First);
+    /// Saves the scene as it began, with what was done by hand up to a time [s].
+    pub(super) fn write_scene(&mut self, path: &Path, by_hand: &str, time: f64) {
+        let asked = self.saving.iter().position(|(asked, ..)| asked == path);
+        let Some((_, document, mut settings)) = asked.map(|number| self.saving.remove(number))
+        else {
+            return;
+        };
         if time > 0.0 {
             put(&mut settings, "time.duration", &format!("{time} s"));
         }
-        settings
+        self.write(&document, path, &settings, by_hand);
     }
 
-    fn write(&mut self, path: &Path, settings: &Settings, by_hand: &str) {
+    fn write(&mut self, document: &Document, path: &Path, settings: &Settings, by_hand: &str) {
         let is_comparison = self.session.is_comparison();
-        match save(self.session.document(), settings, by_hand, path) {
+        match save(document, settings, by_hand, path) {
             Ok(()) => {
                 let of = if is_comparison { " (of A)" } else { "" };
                 let shown = path.display();
@@ -79,7 +87,10 @@ impl App {
 
     pub(super) fn take_picture(&mut self) {
         let path = free_name(&self.pictures, &self.session.document().stem(), "png");
-        let saved = self.viewport.images().map_err(anyhow::Error::msg);
+        let Some(frame) = &self.frame else {
+            return self.messages.warn("nothing is shown yet");
+        };
+        let saved = self.viewport.images(frame).map_err(anyhow::Error::msg);
         match saved.and_then(|images| save_picture(&images, &path)) {
             Ok(()) => self.messages.tell(format!("saved {}", path.display())),
             Err(error) => self.messages.warn(format!("{error:#}")),
@@ -107,7 +118,7 @@ impl App {
         if !recorder.is_due(frame.time) {
             return;
         }
-        let images = self.viewport.images().map_err(anyhow::Error::msg);
+        let images = self.viewport.images(frame).map_err(anyhow::Error::msg);
         if let Err(error) = images.and_then(|images| recorder.push(&images, frame.time)) {
             self.messages.warn(format!("{error:#}"));
             self.recorder = None;
@@ -136,17 +147,19 @@ impl App {
 
     /// Saves what was done by hand; waits for the simulation's thread, which is not in a hurry.
     fn rescue(&mut self, path: &Path) -> anyhow::Result<()> {
-        self.engine.send(Command::Save(path.to_owned()));
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder)?;
+        }
+        self.ask_to_save(path);
         let start = Instant::now();
         while start.elapsed() < PATIENCE {
             for event in self.engine.hear() {
-                if let Event::Done { text, time, .. } = event {
-                    if let Some(folder) = path.parent() {
-                        std::fs::create_dir_all(folder)?;
-                    }
-                    let settings = self.settings_begun(time);
-                    return save(self.session.document(), &settings, &text, path);
+                if let Event::Done { path: saved, text, time } = event {
+                    self.write_scene(&saved, &text, time);
                 }
+            }
+            if path.exists() {
+                return Ok(());
             }
             std::thread::sleep(Duration::from_millis(10));
         }

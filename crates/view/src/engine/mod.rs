@@ -14,10 +14,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 use viscera::scalar::Vec3;
 
 use crate::choices::Settings;
 use crate::probe::{Curve, Method};
+
+/// How long the window waits for the thread to end when it is closed.
+const PATIENCE: Duration = Duration::from_millis(300);
 
 /// What the window asks for.
 #[derive(Debug)]
@@ -87,6 +91,17 @@ pub enum Event {
         /// Simulated time [s].
         time: f64,
     },
+    /// A setting was refused: this is the value that a simulation goes on with.
+    Kept {
+        /// Which simulation.
+        lane: usize,
+        /// The setting.
+        key: String,
+        /// As one would write it.
+        value: String,
+    },
+    /// Nothing could be put beside the first simulation, which goes on alone, and why.
+    Alone(String),
     /// How the methods asked for converge in one step.
     Curves(Vec<Curve>),
     /// Something was refused, and nothing has changed.
@@ -165,9 +180,13 @@ impl Engine {
 impl Drop for Engine {
     fn drop(&mut self) {
         self.send(Command::Quit);
-        if let Some(thread) = self.thread.take() {
-            // A thread that panicked has said so.
-            let _ = thread.join();
+        // It may be in the middle of a long frame, or of making a large mesh; nobody waits for that.
+        let start = Instant::now();
+        while let Some(thread) = &self.thread
+            && !thread.is_finished()
+            && start.elapsed() < PATIENCE
+        {
+            std::thread::sleep(Duration::from_millis(5));
         }
     }
 }

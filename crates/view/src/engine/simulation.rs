@@ -24,6 +24,8 @@ pub trait Handle: Send {
     fn let_go(&mut self, hold: HoldId) -> Result<(), String>;
     /// Changes settings; where one is wrong, none.
     fn change(&mut self, settings: &Settings) -> Result<(), String>;
+    /// The value of a setting of the solver, as one would write it.
+    fn setting(&self, key: &str) -> Option<String>;
     /// Starts from rest again, with the settings in force.
     fn reset(&mut self) -> Result<(), String>;
     /// Computes a frame.
@@ -77,6 +79,7 @@ impl<S: Real> Running<S> {
     /// Forces of what the scene itself moves and pulls.
     fn tools(&self, patches: Vec<PatchForce>) -> Vec<Tool> {
         let assembly = self.simulation.assembly();
+        let by_hand = self.simulation.first_hold()..assembly.motions.len();
         let vertices = assembly.motions.iter().chain(&assembly.forces);
         let pulling = patches.into_iter().filter(|patch| patch.kind != PatchKind::Fixing);
         let tool = |(patch, resolved): (PatchForce, &ResolvedPatch)| Tool {
@@ -84,9 +87,8 @@ impl<S: Real> Running<S> {
             vertices: resolved.vertices.clone(),
             force: Vec3::from_f64(patch.force),
         };
-        let by_hand = self.simulation.live().motions;
-        let is_own = |tool: &Tool| by_hand.iter().all(|motion| motion.name != tool.name);
-        pulling.zip(vertices).map(tool).filter(is_own).collect()
+        let all = pulling.zip(vertices).enumerate();
+        all.filter(|(number, _)| !by_hand.contains(number)).map(|(_, one)| tool(one)).collect()
     }
 
     fn fork_as<T: Real>(&self, scene: &Scene) -> Result<Running<T>, String> {
@@ -141,6 +143,12 @@ impl<S: Real> Handle for Running<S> {
 
     fn change(&mut self, settings: &Settings) -> Result<(), String> {
         self.simulation.change(settings).map_err(text)
+    }
+
+    fn setting(&self, key: &str) -> Option<String> {
+        let values = self.simulation.scene().solver.values();
+        let own = key.strip_prefix("solver.")?;
+        values.into_iter().find(|(name, _)| *name == own).map(|(_, value)| value)
     }
 
     fn reset(&mut self) -> Result<(), String> {

@@ -39,6 +39,8 @@ pub struct Worker {
     probed: Vec<Method>,
     prober: Option<Prober>,
     probed_last: Option<Instant>,
+    /// The last warning of something that goes on.
+    told: Option<String>,
 }
 
 struct Running {
@@ -98,6 +100,7 @@ impl Worker {
             probed: Vec::new(),
             prober,
             probed_last: None,
+            told: None,
         }
     }
 
@@ -146,7 +149,13 @@ impl Worker {
                     self.change_all(&mut change);
                     self.accompany(*plan);
                 }
-                other => self.obey(other),
+                other => {
+                    // Those have to do with what was changed before.
+                    if matches!(other, Command::Save(_) | Command::Reset | Command::Probe(_)) {
+                        self.change_all(&mut change);
+                    }
+                    self.obey(other);
+                }
             }
             next = self.commands.try_recv().ok();
         }
@@ -196,6 +205,14 @@ impl Worker {
             }
             // The rest was obeyed where commands are gathered.
             Command::Load(_) | Command::Accompany(_) | Command::Change(..) | Command::Quit => {}
+        }
+    }
+
+    /// Warns of what would otherwise be said ten times a second.
+    fn tell_once(&mut self, text: String) {
+        if self.told.as_ref() != Some(&text) {
+            self.told = Some(text.clone());
+            self.tell(Event::Refused(text));
         }
     }
 
@@ -254,27 +271,36 @@ impl Worker {
     }
 
     fn accompany(&mut self, mut plan: Plan) {
-        let Some(mut running) = self.running.take() else { return self.load(plan) };
-        self.leave_ghost_out(&mut plan, &running.stage.assembly);
+        let Some(running) = &self.running else { return self.load(plan) };
+        let stage = Arc::clone(&running.stage);
+        self.leave_ghost_out(&mut plan, &stage.assembly);
         self.tell(Event::Busy("building the model".to_owned()));
-        running.lanes.truncate(1);
-        running.walls.resize(1, 0.0);
-        for scene in plan.scenes.iter().skip(1) {
-            match running.lanes[0].fork(scene) {
-                Ok(lane) => running.lanes.push(lane),
-                Err(message) => return self.fail(message, Cure::Open),
+        let Some(running) = &mut self.running else { return };
+        let first = &running.lanes[0];
+        let forks: Result<Vec<_>, String> =
+            plan.scenes.iter().skip(1).map(|scene| first.fork(scene)).collect();
+        let forks = match forks {
+            Ok(forks) => forks,
+            Err(message) => {
+                plan.ends_with_ghost = false;
+                self.tell(Event::Alone(message));
+                Vec::new()
             }
-        }
+        };
+        let Some(running) = &mut self.running else { return };
+        running.lanes.truncate(1);
+        running.lanes.extend(forks);
+        running.walls.resize(1, 0.0);
         running.walls.resize(running.lanes.len(), 0.0);
         running.stage = Arc::new(Stage {
             generation: plan.generation,
-            scene: running.stage.scene.clone(),
-            assembly: Arc::clone(&running.stage.assembly),
+            scene: stage.scene.clone(),
+            assembly: Arc::clone(&stage.assembly),
             lane_count: running.lanes.len(),
             has_ghost: plan.ends_with_ghost,
         });
-        self.tell(Event::Accompanied(Arc::clone(&running.stage)));
-        self.running = Some(running);
+        let stage = Arc::clone(&running.stage);
+        self.tell(Event::Accompanied(stage));
         self.tell_devices();
         self.due = Instant::now();
         self.publish();
@@ -347,10 +373,19 @@ impl Worker {
         let Some(changed) = running.lanes.get_mut(lane).filter(|_| !settings.is_empty()) else {
             return;
         };
-        match changed.change(settings) {
-            Ok(()) => self.tell_devices(),
-            Err(message) => self.tell(Event::Refused(message)),
+        let mut refused = Vec::new();
+        if changed.change(settings).is_err() {
+            // What can be, is.
+            for setting in settings {
+                if let Err(message) = changed.change(&vec![setting.clone()]) {
+                    let key = setting.0.clone();
+                    let kept = changed.setting(&key).map(|value| Event::Kept { lane, key, value });
+                    refused.extend([Some(Event::Refused(message)), kept].into_iter().flatten());
+                }
+            }
         }
+        refused.into_iter().for_each(|event| self.tell(event));
+        self.tell_devices();
     }
 
     fn save(&mut self, path: PathBuf) {
@@ -385,10 +420,9 @@ impl Worker {
         };
         let tets = running.stage.tet_count();
         if tets > MOST_TETS {
-            self.probed.clear();
-            return self.tell(Event::Refused(format!(
+            return self.tell_once(format!(
                 "convergence is shown for meshes of at most {MOST_TETS} tetrahedra, and this one has {tets}"
-            )));
+            ));
         }
         let long_ago = self.probed_last.is_none_or(|since| since.elapsed() > PROBED_EVERY);
         if let Some(first) = running.lanes.first()

@@ -13,7 +13,7 @@ pub use picture::{Gpu, Picture, Scenery, Tissue};
 use eframe::egui::{self, PointerButton, Pos2, Rect, Sense, Ui, vec2};
 use std::sync::Arc;
 use viscera::scalar::Vec3;
-use viscera_picture::{Image, ImageSize};
+use viscera_picture::{Image, ImageSize, Overlay};
 use viscera_render::Orbit;
 
 use crate::engine::{Coloring, Command, Frame, Stage};
@@ -233,13 +233,11 @@ impl Viewport {
                 .iter()
                 .any(|x| lens.place(*x).is_some_and(|place| place.distance(pointer) < NEAR))
         });
-        match near {
-            Some(hold) => holds.resume(hold.id),
-            None => {
-                let hit = pick(stage, shown, lens.orbit.position(), lens.ray(pointer));
-                commands.extend(hit.map(|hit| holds.take(&hit, grip)));
-            }
+        if near.is_some_and(|hold| holds.resume(hold.id)) {
+            return;
         }
+        let hit = pick(stage, shown, lens.orbit.position(), lens.ray(pointer));
+        commands.extend(hit.map(|hit| holds.take(&hit, grip)));
     }
 
     fn look_around(&mut self, response: &egui::Response, lens: &Lens, modifiers: egui::Modifiers) {
@@ -347,9 +345,28 @@ impl Viewport {
         }
     }
 
-    /// The pictures as they are shown; waits for them.
-    pub fn images(&self) -> Result<Vec<Image>, String> {
-        self.pictures.iter().take(self.shown_lanes()).map(Picture::read).collect()
+    /// The pictures as they are shown, with scale, time and forces written on them; waits for them.
+    pub fn images(&self, frame: &Frame) -> Result<Vec<Image>, String> {
+        let scale = self.legend.scale();
+        let title = self.stage.as_ref().map_or("", |stage| &stage.scene.title);
+        let shown = self.pictures.iter().take(self.shown_lanes());
+        let mut images = Vec::new();
+        for (number, (picture, lane)) in shown.zip(&frame.lanes).enumerate() {
+            let mut image = picture.read()?;
+            let (width, height) = (image.size().width(), image.size().height());
+            let rect = Rect::from_min_size(Pos2::ZERO, vec2(width as f32, height as f32));
+            let orbit = Lens::new(&self.orbit, rect).orbit;
+            let side = if self.shown_lanes() > 1 { [": A", ": B"][number.min(1)] } else { "" };
+            let overlay = Overlay {
+                title: &format!("{title}{side}"),
+                caption: &overlay::caption(frame, lane),
+                color_scale: scale.as_ref(),
+                pixels_per_meter: Some(orbit.pixels_per_meter(height)),
+            };
+            overlay.draw(&mut image);
+            images.push(image);
+        }
+        Ok(images)
     }
 }
 

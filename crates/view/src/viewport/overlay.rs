@@ -5,10 +5,10 @@ use eframe::egui::{
 };
 use viscera::scalar::Vec3;
 use viscera::units::Dimension;
-use viscera_picture::{Color, map_color};
+use viscera_picture::{Color, ColorScale, map_color};
 
 use super::lens::Lens;
-use crate::engine::{Coloring, Lane};
+use crate::engine::{Coloring, Frame, Lane};
 use crate::holds::Holds;
 
 /// A colour of the renderer's as the window has it.
@@ -72,6 +72,19 @@ impl Legend {
             Coloring::Strain => format!("{} %", viscera::units::format_number(100.0 * value)),
             Coloring::Stress => Dimension::Pressure.format(value),
         }
+    }
+
+    /// The same for a picture without the window: numbers in a unit that the title names.
+    pub fn scale(&self) -> Option<ColorScale> {
+        let high = f64::from(self.high?);
+        let (unit, factor) = match self.coloring {
+            Coloring::Plain => return None,
+            Coloring::Displacement => ("mm", 1e3),
+            Coloring::Strain => ("%", 100.0),
+            Coloring::Stress if high < 1e3 => ("Pa", 1.0),
+            Coloring::Stress => ("kPa", 1e-3),
+        };
+        ColorScale::new(format!("{} [{unit}]", self.title()), 0.0, factor * high).ok()
     }
 
     fn title(&self) -> &'static str {
@@ -171,6 +184,18 @@ pub fn tools(painter: &Painter, lens: &Lens, lane: &Lane) {
         painter.circle_filled(place, 3.5, on_screen(Color::PULLED));
         label(painter, place + vec2(10.0, 12.0), Align2::LEFT_CENTER, &text, 13.0);
     }
+}
+
+/// Time and forces, as a picture without the window says them.
+pub fn caption(frame: &Frame, lane: &Lane) -> String {
+    let mut text = format!("t = {:.2} s", frame.time);
+    for hold in &lane.holds {
+        text.push_str(&format!("   pull {}", newtons(hold.force.length())));
+    }
+    for tool in lane.measures.tools.iter().filter(|tool| tool.force.length() > 0.0) {
+        text.push_str(&format!("   {} {}", tool.name, newtons(tool.force.length())));
+    }
+    text
 }
 
 /// Names one of two pictures.

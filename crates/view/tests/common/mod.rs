@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 use eframe::egui::{Key, Modifiers, Pos2, Rect, Role, Vec2, vec2};
+use eframe::egui_wgpu::WgpuSetup;
 use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, wgpu};
 use std::path::Path;
@@ -28,10 +29,23 @@ pub struct Window {
 }
 
 impl Window {
-    /// Opens a scene in a folder of its own.
+    /// Opens a scene in a folder of its own, drawn by a software driver where there is one: it gives the same
+    /// pictures everywhere.
     pub fn open(scene: &str, settings: &[(&str, &str)]) -> Self {
+        Self::open_on(wgpu::default_wgpu_setup(), scene, settings)
+    }
+
+    /// The same, drawn by the fastest hardware.
+    pub fn open_on_hardware(scene: &str, settings: &[(&str, &str)]) -> Self {
+        let mut setup = wgpu::default_wgpu_setup();
+        if let WgpuSetup::CreateNew(new) = &mut setup {
+            new.native_adapter_selector = None;
+        }
+        Self::open_on(setup, scene, settings)
+    }
+
+    fn open_on(setup: WgpuSetup, scene: &str, settings: &[(&str, &str)]) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
-        let setup = wgpu::default_wgpu_setup();
         let state =
             wgpu::create_render_state(setup, eframe::egui_wgpu::RendererOptions::PREDICTABLE);
         let farewell = Arc::default();
@@ -58,8 +72,13 @@ impl Window {
     /// Opens a scene and waits until it moves.
     pub fn running(scene: &str, settings: &[(&str, &str)]) -> Self {
         let mut window = Self::open(scene, settings);
-        window.wait("frames", |app| app.frame().is_some_and(|frame| frame.number >= 2));
+        window.start();
         window
+    }
+
+    /// Waits until it moves.
+    pub fn start(&mut self) {
+        self.wait("frames", |app| app.frame().is_some_and(|frame| frame.number >= 2));
     }
 
     /// Shows frame after frame of the window until something holds.

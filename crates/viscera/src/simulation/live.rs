@@ -3,14 +3,16 @@
 
 use super::acting::{Taken, tolerance};
 use super::{AssembleError, Simulation, SimulationError, substep_dt};
+use crate::measure::measure_tets;
 use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
 use crate::settings::{Precision, SolverSettings};
 use crate::solver::Solver;
+use crate::solver::balance::ForceBalance;
 use crate::state::State;
 
-/// Why something cannot be done to a running simulation. Nothing has changed.
+/// Why something cannot be done to a running simulation. Nothing of it has been done.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LiveError {
@@ -32,7 +34,7 @@ pub enum LiveError {
         count: usize,
     },
     /// A stiffness that is none.
-    #[error("a hold needs a stiffness above zero and finite [N/m]; {stiffness} is not")]
+    #[error("a hold needs a stiffness from 1e-6 N/m to 1e12 N/m; {stiffness} N/m is not")]
     Stiffness {
         /// The stiffness given [N/m].
         stiffness: f64,
@@ -70,7 +72,7 @@ impl<S: Real> Simulation<S> {
         if patch.body >= count {
             return Err(LiveError::NoBody { body: patch.body, count });
         }
-        if let Some(stiffness) = stiffness.filter(|k| !(*k > 0.0 && k.is_finite())) {
+        if let Some(stiffness) = stiffness.filter(|k| !(1e-6..=1e12).contains(k)) {
             return Err(LiveError::Stiffness { stiffness });
         }
         let resolved = self.assembly.resolve(&patch)?;
@@ -144,7 +146,10 @@ impl<S: Real> Simulation<S> {
         scene.change(settings)?;
         let mut written = self.written.clone();
         written.change(settings)?;
-        let change = Change { time: self.time(), settings: settings.to_vec() };
+        // Behind those that were made before, one of which may be a rounding later than its frame.
+        let made = self.changes_made.checked_sub(1).and_then(|last| scene.changes.get(last));
+        let time = made.map_or(self.time(), |last| last.time.max(self.time()));
+        let change = Change { time, settings: settings.to_vec() };
         scene.changes.insert(self.changes_made, change.clone());
         self.rebuild(scene)?;
         self.written = written;
@@ -172,6 +177,7 @@ impl<S: Real> Simulation<S> {
         fork.taken = self.taken.clone();
         fork.changes_made = self.changes_made;
         fork.by_hand.clone_from(&self.by_hand);
+        fork.balance.clone_from(&self.balance);
         let double = |all: &[Vec3<S>]| all.iter().map(|x| x.cast::<f64>().cast()).collect();
         let positions: Vec<Vec3<T>> = double(&self.state.positions);
         let velocities: Vec<Vec3<T>> = double(&self.state.velocities);
@@ -203,7 +209,15 @@ impl<S: Real> Simulation<S> {
         self.changes_made = 0;
         self.rejected_substeps = 0;
         self.put(State::at_rest(&self.model));
+        self.balance = ForceBalance::default();
+        self.inputs = self.inputs_at(0.0);
+        measure_tets(&self.model, &self.state.positions, &mut self.tets);
         Ok(())
+    }
+
+    /// Motions of the scene from this number on are holds that were taken by hand.
+    pub fn first_hold(&self) -> usize {
+        self.written.motions.len()
     }
 
     /// What was done by hand.
@@ -268,6 +282,7 @@ impl<S: Real> Simulation<S> {
         let restarted = self.solver.restart(&self.model, &mut state, &inputs, dt);
         debug_assert!(restarted.is_ok(), "{restarted:?}");
         self.put(state);
+        self.stepped = false;
     }
 
     /// The state from now on, on whatever computes the steps.

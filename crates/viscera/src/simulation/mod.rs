@@ -137,6 +137,8 @@ pub struct Simulation<S> {
     /// Those of them that came by hand.
     by_hand: Vec<Change>,
     balance: ForceBalance,
+    /// Whether the solver knows of a step: a new one has nothing to measure yet.
+    stepped: bool,
     tets: Vec<TetMeasure>,
     frame: u64,
     rejected_substeps: u64,
@@ -165,6 +167,7 @@ impl<S: Real> Simulation<S> {
             changes_made: 0,
             by_hand: Vec::new(),
             balance: ForceBalance::default(),
+            stepped: false,
             tets: Vec::with_capacity(model.tet_count()),
             frame: 0,
             rejected_substeps: 0,
@@ -260,6 +263,7 @@ impl<S: Real> Simulation<S> {
             computed => computed?,
         }
         self.frame += 1;
+        self.stepped = true;
         self.rejected_substeps = self.solver.rejected_steps() - rejected;
         if !self.state.is_finite() {
             return Err(FrameError::Diverged { time: self.time() });
@@ -276,9 +280,13 @@ impl<S: Real> Simulation<S> {
         Ok(())
     }
 
-    /// Measures the last frame, for [`Simulation::tets`] and [`Simulation::report`].
+    /// Measures the last frame, for [`Simulation::tets`] and [`Simulation::report`]. The balance of forces is
+    /// that of a step: after a change of settings it stays as it was until the next one.
     pub fn measure(&mut self) -> Result<(), FrameError> {
-        self.solver.force_balance(&self.model, &self.state, &self.inputs, &mut self.balance)?;
+        if self.stepped {
+            let Self { solver, model, state, inputs, balance, .. } = self;
+            solver.force_balance(model, state, inputs, balance)?;
+        }
         measure_tets(&self.model, &self.state.positions, &mut self.tets);
         // Files and pictures are in single precision: what it cannot hold has run away as well.
         let is_number = |tet: &TetMeasure| {
@@ -293,10 +301,13 @@ impl<S: Real> Simulation<S> {
     /// The substeps of a frame, and the state at its end.
     fn compute_frame(&mut self) -> Result<(), FrameError> {
         let dt = substep_dt(&self.scene);
-        let start = self.time();
+        // The end of the frame is a time of its own: that of the keys by which holds are led.
+        let (start, end) = (self.time(), (self.frame + 1) as f64 * self.scene.time.frame);
         let Self { scene, assembly, taken, model, state, solver, inputs, backend, .. } = self;
-        for substep in 0..scene.solver.substeps {
-            taken.act(scene, assembly, start + f64::from(substep + 1) * dt, inputs);
+        for substep in 1..=scene.solver.substeps {
+            let is_last = substep == scene.solver.substeps;
+            let time = if is_last { end } else { start + f64::from(substep) * dt };
+            taken.act(scene, assembly, time, inputs);
             backend.step(solver, model, state, inputs, dt)?;
         }
         match &mut backend.elsewhere {

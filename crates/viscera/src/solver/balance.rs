@@ -101,10 +101,8 @@ impl ForceBalance {
             self.load += force.length();
         }
         for tether in &ground.tethers {
-            if ground.inverse_masses[tether.vertex] != S::ZERO {
-                let v = model.numbering.order[tether.vertex];
-                self.load += tether.force(state.positions[v as usize]).cast::<f64>().length();
-            }
+            let v = model.numbering.order[tether.vertex];
+            self.load += tether.force(state.positions[v as usize]).cast::<f64>().length();
         }
         let gravity = inputs.gravity.cast::<f64>();
         for &(_, force) in &inputs.forces {

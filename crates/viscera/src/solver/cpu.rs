@@ -323,6 +323,8 @@ impl<S: Real> Workspace<S> {
         for pin in &step.inputs.pins {
             ground.inverse_masses[model.numbering.of(pin.vertex)] = S::ZERO;
         }
+        let inverse_masses = &ground.inverse_masses;
+        ground.tethers.retain(|tether| inverse_masses[tether.vertex] != S::ZERO);
     }
 
     fn predict(&mut self, step: &Step<'_, S>, start: Start) {

@@ -87,12 +87,9 @@ impl<S: Real> Workspace<S> {
             self.energies[model.component_of[v] as usize].held = true;
         }
         for tether in &self.ground.tethers {
-            if self.ground.inverse_masses[tether.vertex] != S::ZERO {
-                let part = &mut self.energies[model.component_of[tether.vertex] as usize];
-                part.held = true;
-                let x = self.ground.previous[tether.vertex].vec3();
-                part.start.stored += tether.energy(x);
-            }
+            let part = &mut self.energies[model.component_of[tether.vertex] as usize];
+            part.held = true;
+            part.start.stored += tether.energy(self.ground.previous[tether.vertex].vec3());
         }
         for (v, &velocity) in self.velocities.iter().enumerate() {
             let part = &mut self.energies[model.component_of[v] as usize];
@@ -112,10 +109,8 @@ impl<S: Real> Workspace<S> {
             part.end.stored = *stored;
         }
         for tether in &ground.tethers {
-            if ground.inverse_masses[tether.vertex] != S::ZERO {
-                let part = &mut energies[model.component_of[tether.vertex] as usize];
-                part.end.stored += tether.energy(self.points[tether.vertex].vec3());
-            }
+            let part = &mut energies[model.component_of[tether.vertex] as usize];
+            part.end.stored += tether.energy(self.points[tether.vertex].vec3());
         }
         for (v, x) in self.points.iter().enumerate() {
             if ground.inverse_masses[v] == S::ZERO {

@@ -52,6 +52,8 @@ impl GpuSolver {
             self.updates[place].place = target;
             self.updates[place].stiffness = 0.0;
         }
+        let is_free = |place: u32| self.updates[place as usize].is_pinned == 0;
+        self.tethers.retain(|tether| is_free(self.update_of[tether.vertex]));
         // Small explicit steps take springs as forces.
         let squared_dt = match self.settings.method {
             Method::Xpbd => (dt * dt) as f32,

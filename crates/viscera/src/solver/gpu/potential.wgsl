@@ -328,7 +328,7 @@ fn end_velocity(v: u32) -> vec3f {
 fn add_motion(v: u32, first: u32, into: ptr<function, Sums>) {
     // Springs to places outside are no part of the mass: what they store is given, or taken.
     let hold = ground_of(TARGETS, v);
-    let mass = ground_of(PREDICTED, v).w - hold.w * frame.squared_dt;
+    let mass = max(ground_of(PREDICTED, v).w - hold.w * frame.squared_dt, 0.0);
     let load = frame.gravity * mass + ground_of(ACTING, v).xyz;
     let before = ground_of(VELOCITIES, v).xyz;
     let after = end_velocity(v);
