@@ -2,7 +2,7 @@
 
 use viscera::scalar::{Vec3, vec3};
 use viscera::solver::gpu::GpuSurface;
-use viscera_picture::Color;
+use viscera_picture::{Arrow, Color};
 
 use crate::orbit::Orbit;
 use crate::values::ValueBuffer;
@@ -16,7 +16,7 @@ pub struct Drawing<'a> {
     pub bodies: Vec<BodyView<'a>>,
     /// Little balls: fixings, picked points.
     pub markers: Vec<Markers>,
-    /// Pulls.
+    /// Pulls, paler where tissue hides them.
     pub arrows: Vec<Arrow>,
     /// What lies behind.
     pub background: Background,
@@ -82,19 +82,6 @@ pub struct Markers {
     /// Radius [m].
     pub radius: f64,
     /// Colour, usually [`Color::FIXED`] or [`Color::PULLED`].
-    pub color: Color,
-}
-
-/// A solid arrow, paler where tissue hides it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Arrow {
-    /// Where it begins [m].
-    pub from: Vec3<f64>,
-    /// Where it points to [m].
-    pub to: Vec3<f64>,
-    /// Radius of its shaft [m].
-    pub radius: f64,
-    /// Its colour.
     pub color: Color,
 }
 

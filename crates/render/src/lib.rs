@@ -25,8 +25,9 @@ mod values;
 mod view;
 
 pub use canvas::Canvas;
-pub use drawing::{Arrow, Background, BodyView, Drawing, Markers, Paint, Room};
+pub use drawing::{Background, BodyView, Drawing, Markers, Paint, Room};
 pub use error::RenderError;
 pub use orbit::Orbit;
 pub use quality::Quality;
 pub use values::ValueBuffer;
+pub use viscera_picture::Arrow;

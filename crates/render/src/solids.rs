@@ -5,10 +5,10 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use viscera::scalar::Vec3;
 use viscera::solver::gpu::Device;
-use viscera_picture::Color;
+use viscera_picture::{Arrow, Color};
 
 use crate::buffers::filled;
-use crate::drawing::{Arrow, Markers, across};
+use crate::drawing::{Markers, across};
 
 /// Sides of what is round, and rings of a ball: 200 triangles, round enough for a tenth of the picture.
 const SIDES: u32 = 16;
