@@ -1,0 +1,14 @@
+//! All integration tests of the program: one program that is linked once.
+
+mod common;
+#[path = "../../../viscera/tests/all/common/data.rs"]
+mod data;
+
+mod anatomy;
+mod bad_input;
+mod bench;
+mod bench_scene;
+#[cfg(feature = "gpu")]
+mod devices;
+mod documents;
+mod run;

@@ -1,0 +1,12 @@
+//! All integration tests of `viscera-lab` and its library: one program that is linked once.
+
+mod common;
+
+mod holds;
+mod oracle;
+mod reference;
+mod reference_oracle;
+mod rest_command;
+mod study;
+mod study_problems;
+mod validate;

@@ -1,0 +1,216 @@
+//! A step takes no memory: a haptic loop cannot wait for an allocator. What is taken before is small
+//! and known. For several threads see `allocation_threads.rs`.
+
+use crate::common::counting::{bytes_of, requests_of};
+use crate::common::{SNH, block, everything, material, single_body};
+use viscera::model::ModelBuilder;
+use viscera::scalar::{Real, vec3};
+use viscera::scene::Scene;
+use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, Colors, SolverSettings};
+use viscera::simulation::{Assembly, Simulation};
+use viscera::solver::balance::ForceBalance;
+use viscera::solver::{Inputs, Pin, Solver};
+use viscera::state::State;
+
+#[test]
+fn the_counter_counts() {
+    let requests = requests_of(|| drop(std::hint::black_box(Box::new(1))));
+    assert_eq!(requests, 2, "one allocation, one release");
+    let (kept, bytes) = bytes_of(|| vec![0u8; 1000]);
+    assert_eq!(bytes, kept.len());
+}
+
+fn accelerations() -> Vec<SolverSettings> {
+    let plain = SolverSettings::default();
+    let chebyshev = SolverSettings {
+        acceleration: Acceleration::Chebyshev,
+        chebyshev_delay: 2,
+        chebyshev_damping: 0.8,
+        ..plain.clone()
+    };
+    let mut all = vec![plain.clone(), chebyshev];
+    for anderson_on in [AndersonOn::Positions, AndersonOn::Multipliers, AndersonOn::Both] {
+        let acceleration = Acceleration::Anderson;
+        all.push(SolverSettings { acceleration, anderson_on, ..plain.clone() });
+    }
+    // Enough sweeps for mixtures that raise the potential.
+    let (acceleration, anderson_guard) = (Acceleration::Anderson, AndersonGuard::Energy);
+    all.push(SolverSettings { acceleration, anderson_guard, iterations: 8, ..plain });
+    all
+}
+
+fn steps_allocate_nothing<S: Real>() {
+    for colors in [Colors::Limited(1), Colors::Limited(4), Colors::Unlimited] {
+        let model = everything::<S>(colors);
+        let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81).cast(), ..Inputs::default() };
+        for (v, x) in model.rest_positions.iter().enumerate().take(6) {
+            inputs.pins.push(Pin { vertex: v as u32, target: *x });
+            inputs.forces.push((v as u32 + 10, vec3(0.01, 0.0, 0.0).cast()));
+        }
+        inputs.anchors = model.rest_anchors.clone();
+        for settings in accelerations() {
+            for (rebase, keep_multipliers) in [(true, true), (true, false), (false, false)] {
+                let settings = SolverSettings {
+                    colors,
+                    rebase,
+                    keep_multipliers,
+                    iterations: 6,
+                    ..settings.clone()
+                };
+                let mut solver = Solver::new(&model, &settings);
+                let mut state = State::at_rest(&model);
+                // The first step included: all memory is taken when the solver is built.
+                let requests = requests_of(|| {
+                    for dt in [1e-3, 1e-3, 2e-3] {
+                        solver.step(&model, &mut state, &inputs, dt).expect("a legal step");
+                    }
+                    solver.restart(&model, &mut state, &inputs, 1e-3).expect("a new history");
+                });
+                assert_eq!(requests, 0, "{} {settings:?}", S::NAME);
+
+                let mut balance = ForceBalance::default();
+                let mut measure = || {
+                    let result = solver.force_balance(&model, &state, &inputs, &mut balance);
+                    result.expect("a balance");
+                };
+                measure();
+                let requests = requests_of(measure);
+                assert_eq!(requests, 0, "force balance, {} {settings:?}", S::NAME);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_step_in_single_precision_allocates_nothing() {
+    steps_allocate_nothing::<f32>();
+}
+
+#[test]
+fn a_step_in_double_precision_allocates_nothing() {
+    steps_allocate_nothing::<f64>();
+}
+
+const SCENE: &str = r#"
+title = "Everything at once"
+description = "Two blocks, tied together, held, moved, pushed and let go."
+
+[time]
+duration = "0.2 s"
+
+[[body]]
+name = "upper"
+shape = "block"
+size = ["40 mm", "40 mm", "20 mm"]
+cells = [3, 3, 2]
+material = { young = "10 kPa", poisson = 0.45, viscosity = "10 ms" }
+
+[[body]]
+name = "lower"
+shape = "block"
+size = ["40 mm", "40 mm", "20 mm"]
+cells = [3, 3, 2]
+position = [0, 0, "-30 mm"]
+material = { young = "10 kPa", poisson = 0.3, model = "saint_venant_kirchhoff" }
+
+[[fixing]]
+name = "table"
+body = "lower"
+half_space = { point = [0, 0, "-30 mm"], normal = [0, 0, -1] }
+
+[[fixing]]
+name = "bed"
+body = "upper"
+half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
+stiffness = "200 N/m"
+
+[[motion]]
+name = "forceps"
+body = "upper"
+nearest = { point = ["20 mm", "20 mm", "20 mm"] }
+keys = [{ time = "0.05 s", translation = [0, 0, "10 mm"] }]
+release = "0.1 s"
+
+[[force]]
+name = "push"
+body = "upper"
+half_space = { point = ["40 mm", 0, 0], normal = [1, 0, 0] }
+force = ["0.1 N", 0, 0]
+
+[[spring]]
+name = "tie"
+stiffness = "50 N/m"
+from = { body = "upper", half_space = { point = [0, 0, 0], normal = [0, 0, -1] } }
+to = { body = "lower", half_space = { point = [0, 0, "-10 mm"], normal = [0, 0, 1] } }
+"#;
+
+/// The motion ends within these frames, and with it the set of pinned vertices changes.
+#[test]
+fn a_frame_of_a_scene_allocates_nothing_after_the_first() {
+    for acceleration in ["none", "chebyshev", "anderson"] {
+        for colors in ["1", "4", "unlimited"] {
+            let overrides = [
+                ("solver.acceleration", acceleration),
+                ("solver.colors", colors),
+                ("solver.device", "cpu"),
+            ];
+            let scene = Scene::parse("everything.toml", SCENE, &overrides);
+            let scene = scene.unwrap_or_else(|error| panic!("{error}"));
+            let assembly = Assembly::new(&scene, &mut |name| Err(format!("no file {name}")));
+            let assembly = assembly.unwrap_or_else(|error| panic!("{error}"));
+            let mut simulation = Simulation::<f32>::new(scene, assembly).expect("a model");
+            simulation.advance_frame().expect("a frame");
+            let requests = requests_of(|| {
+                for _ in 1..12 {
+                    simulation.advance_frame().expect("a frame");
+                }
+            });
+            assert_eq!(requests, 0, "{acceleration}, {colors} colours");
+        }
+    }
+}
+
+/// A bar of 30 000 tetrahedra at the defaults, single precision. A tetrahedron has 60 bytes of
+/// constants and 24 of multipliers; a viscous one 24 of multipliers and 24 of strain besides; a
+/// vertex, of which there is one for five tetrahedra, less than 200: about 120 and 170 bytes per
+/// tetrahedron, and 400 in any case.
+#[test]
+fn memory_is_small_and_as_large_as_is_said() {
+    let mesh = block([0.2, 0.05, 0.05], [50, 10, 10], 0.2);
+    let settings = SolverSettings::default();
+    for (viscosity, most) in [(0.0, 140), (0.01, 200)] {
+        let tissue = material(SNH, 1e4, 0.45).with_viscosity(viscosity).expect("legal");
+        let (model, of_model) = bytes_of(|| single_body::<f32>(&mesh, &tissue, &settings));
+        let (state, of_state) = bytes_of(|| State::at_rest(&model));
+        let (solver, of_solver) = bytes_of(|| Solver::new(&model, &settings));
+        for (what, said, taken) in [
+            ("model", model.bytes(), of_model),
+            ("state", state.bytes(), of_state),
+            ("solver", solver.bytes(), of_solver),
+        ] {
+            println!("{what}: {said} bytes, {taken} taken");
+            assert!(said <= taken, "{what}: {said} bytes are said, {taken} are taken");
+            assert!(taken * 100 <= said * 103, "{what}: {said} bytes are said, {taken} are taken");
+        }
+        let per_tet = (of_model + of_state + of_solver) / model.tet_count();
+        println!("{per_tet} bytes per tetrahedron, viscosity {viscosity} s");
+        assert!(per_tet <= most && most < 400, "{per_tet} bytes, viscosity {viscosity} s");
+    }
+}
+
+/// What grows with springs, attachments and bodies counts as well.
+#[test]
+fn memory_of_springs_and_attachments_is_said() {
+    let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
+    let mut builder = ModelBuilder::new();
+    builder.add_body(&mesh, &material(SNH, 1e4, 0.4)).expect("a body");
+    for (v, &x) in mesh.vertices().iter().enumerate().cycle().take(5000) {
+        builder.add_attachment(v as u32, x, 10.0).expect("an attachment");
+        let other = (v + 1) % mesh.vertices().len();
+        builder.add_spring([v as u32, other as u32], 10.0, None).expect("a spring");
+    }
+    let settings = crate::common::colored(Colors::Limited(4));
+    let (model, taken) = bytes_of(|| builder.build::<f32>(&settings).expect("a model"));
+    let said = model.bytes();
+    assert!(said <= taken && taken * 100 <= said * 103, "{said} bytes said, {taken} taken");
+}

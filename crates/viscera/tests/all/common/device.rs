@@ -1,0 +1,50 @@
+//! A graphics device for whole scenes, and a model; a software driver will do.
+
+use std::sync::OnceLock;
+
+use crate::common::{SNH, STVK, block, material};
+use viscera::mesh::TetMesh;
+use viscera::model::{Model, ModelBuilder};
+use viscera::scalar::{Real, Vec3, vec3};
+use viscera::settings::SolverSettings;
+use viscera::solver::gpu::{Adapter, Device};
+
+/// The first device there is, one for all tests of a program: kernels are compiled once. Without any the
+/// test fails and says what to install.
+pub fn device() -> &'static Device {
+    static DEVICE: OnceLock<Device> = OnceLock::new();
+    DEVICE.get_or_init(|| {
+        let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
+        adapter.open().unwrap_or_else(|error| panic!("{error}"))
+    })
+}
+
+/// Largest distance of vectors from the oracle's.
+pub fn largest<S: Real>(a: &[Vec3<S>], oracle: &[Vec3<f64>]) -> f64 {
+    let pairs = a.iter().zip(oracle);
+    pairs.map(|(a, b)| (a.cast::<f64>() - *b).length()).fold(0.0, f64::max)
+}
+
+/// Two bars, one above the other, joined by springs; the upper one viscous, with vertices that are attached
+/// once and twice: everything a model can have.
+pub fn everything<S: Real>(settings: &SolverSettings) -> Model<S> {
+    let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
+    let up: Vec<_> = mesh.vertices().iter().map(|x| *x + vec3(0.0, 0.0, 0.05)).collect();
+    let (above, _) =
+        TetMesh::new(up, mesh.tets().to_vec(), mesh.regions().to_vec()).expect("a mesh");
+    let viscous = material(SNH, 1e4, 0.4).with_viscosity(0.02).expect("legal");
+    let mut builder = ModelBuilder::new();
+    builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
+    builder.add_body(&above, &viscous).expect("a body");
+    let half = mesh.vertices().len() as u32;
+    for v in (0..half).step_by(3) {
+        builder.add_spring([v, half + v], 40.0, Some(0.04)).expect("a spring");
+        let anchor = above.vertices()[v as usize];
+        builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
+        if v % 2 == 0 {
+            let away = anchor + vec3(0.004, 0.0, 0.002);
+            builder.add_attachment(half + v, away, 10.0).expect("an attachment");
+        }
+    }
+    builder.build(settings).expect("a model")
+}

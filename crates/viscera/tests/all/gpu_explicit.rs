@@ -1,0 +1,130 @@
+//! The explicit method on a graphics processor: the CPU's answers, and what it refuses.
+
+use crate::common::device;
+use crate::common::device::{everything, largest};
+use crate::common::{SNH, block, material, single_body};
+use viscera::model::Model;
+use viscera::scalar::{Real, vec3};
+use viscera::settings::{Acceleration, Colors, Method, Precision, SolverSettings};
+use viscera::solver::gpu::{Device, GpuSolver};
+use viscera::solver::{Inputs, Pin, Solver, StepError};
+use viscera::state::State;
+
+/// Some 400 small steps of `everything`: more than one submission.
+const DT: f64 = 1.0 / 100.0;
+
+const STEPS: u32 = 6;
+
+fn explicit(colors: Colors) -> SolverSettings {
+    // Accelerations are for sweeps: the explicit method leaves them alone.
+    let acceleration = Acceleration::Anderson;
+    SolverSettings { method: Method::Explicit, acceleration, colors, ..SolverSettings::default() }
+}
+
+/// A wall that moves and is let go, one attached vertex held for a while, a force, anchors that drift and
+/// come back.
+fn inputs_at<S: Real>(model: &Model<f64>, step: u32) -> Inputs<S> {
+    let away = vec3(0.0, 2e-4 * f64::from(step), 3e-4 * f64::from(step));
+    let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81).cast(), ..Inputs::default() };
+    let half = model.vertex_count() as u32 / 2;
+    if step < 4 {
+        let rest = (0..half).zip(&model.rest_positions).filter(|(_, x)| x.x < 1e-9);
+        inputs.pins.extend(rest.map(|(vertex, x)| Pin { vertex, target: (*x + away).cast() }));
+    }
+    if step == 2 {
+        let target = (model.rest_positions[half as usize] + away).cast();
+        inputs.pins.push(Pin { vertex: half, target });
+        inputs.forces.extend([(7, vec3(0.01, 0.02, 0.0).cast()), (7, vec3(0.0, 0.01, 0.0).cast())]);
+    }
+    if step < 4 {
+        inputs.anchors = model.rest_anchors.iter().map(|a| (*a + away).cast()).collect();
+    }
+    inputs
+}
+
+fn run_on(device: &Device, settings: &SolverSettings, steps: u32) -> State<f32> {
+    let (model, model64) = (everything(settings), everything(settings));
+    let mut gpu = GpuSolver::new(device, &model, settings).expect("a model that fits");
+    for step in 0..steps {
+        gpu.step(&model, &inputs_at(&model64, step), DT).expect("a legal step");
+    }
+    let mut read = State::at_rest(&model);
+    gpu.read(&model, &mut read).expect("a device");
+    read
+}
+
+fn run<S: Real>(settings: &SolverSettings, steps: u32) -> State<S> {
+    let (model, model64) = (everything::<S>(settings), everything(settings));
+    let mut solver = Solver::new(&model, settings);
+    let mut state = State::at_rest(&model);
+    for step in 0..steps {
+        solver.step(&model, &mut state, &inputs_at(&model64, step), DT).expect("a legal step");
+    }
+    state
+}
+
+/// Both round, and neither is right: the device may be twice as far from double precision.
+fn assert_agreement(colors: Colors, steps: u32) {
+    let settings = explicit(colors);
+    let double = SolverSettings { precision: Precision::F64, ..settings.clone() };
+    let (cpu, oracle) = (run::<f32>(&settings, steps), run::<f64>(&double, steps));
+    let gpu = run_on(device::device(), &settings, steps);
+    for (what, cpu, gpu, oracle) in [
+        ("positions", &cpu.positions, &gpu.positions, &oracle.positions),
+        ("velocities", &cpu.velocities, &gpu.velocities, &oracle.velocities),
+    ] {
+        let [cpu, gpu] = [largest(cpu, oracle), largest(gpu, oracle)];
+        println!("{what}, {colors:?}: CPU {cpu:.1e}, GPU {gpu:.1e}");
+        assert!(gpu <= 2.0 * cpu, "{what}, {colors:?}: GPU {gpu:e}, CPU {cpu:e}");
+    }
+    assert_eq!(gpu.multiplier_dt, DT);
+}
+
+#[test]
+fn device_is_as_close_to_double_precision_as_the_processor() {
+    for colors in [Colors::Unlimited, Colors::Limited(1)] {
+        assert_agreement(colors, STEPS);
+    }
+}
+
+/// A step alone, for a second, slower driver.
+#[test]
+fn portable_small_steps_agree_with_the_cpu() {
+    assert_agreement(Colors::Unlimited, 1);
+}
+
+#[test]
+fn two_runs_have_the_same_bits() {
+    let (device, settings) = (device::device(), explicit(Colors::Unlimited));
+    assert_eq!(run_on(device, &settings, STEPS), run_on(device, &settings, STEPS));
+}
+
+#[test]
+fn a_small_step_is_two_dispatches() {
+    let settings = explicit(Colors::Unlimited);
+    let model = everything(&settings);
+    let gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");
+    assert_eq!(gpu.dispatches()[1], 2);
+    let cpu = Solver::new(&model, &settings);
+    assert_eq!(gpu.stable_step(), cpu.stable_step());
+    println!("{} small steps", (DT / gpu.stable_step()).ceil());
+    assert!(DT / gpu.stable_step() > 300.0, "more than one submission: {}", gpu.stable_step());
+}
+
+/// Stiff tissue in small cells needs more steps than anybody waits for: told before anything moves.
+#[test]
+fn too_many_small_steps_are_refused() {
+    let settings = explicit(Colors::Unlimited);
+    let mesh = block([3e-5, 1e-5, 1e-5], [3, 1, 1], 0.0);
+    let model = single_body::<f32>(&mesh, &material(SNH, 1e9, 0.4), &settings);
+    let mut gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");
+    let mut before = State::at_rest(&model);
+    before.velocities.fill(vec3(1.0, 2.0, 3.0));
+    gpu.write(&model, &before).expect("a state of this model");
+    let error = gpu.step(&model, &Inputs::default(), 1.0 / 60.0);
+    let Err(StepError::TooStiff { stable, .. }) = error else { panic!("{error:?}") };
+    assert!(stable < 1e-7, "{stable}");
+    let mut after = State::at_rest(&model);
+    gpu.read(&model, &mut after).expect("a device");
+    assert_eq!(after, before);
+}

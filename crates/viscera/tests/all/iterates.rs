@@ -1,0 +1,55 @@
+//! Steps under somebody's eyes, and with another number of iterations than they were planned with.
+
+use crate::common::{STVK, block, exact, material, plain, single_body};
+use viscera::model::Model;
+use viscera::scalar::{Vec3, vec3};
+use viscera::settings::{Acceleration, SolverSettings};
+use viscera::solver::{Inputs, Pin, Solver};
+use viscera::state::State;
+
+const FRAME: f64 = 1.0 / 60.0;
+
+/// A bar that is held at one end and starts to fall.
+fn bar(settings: &SolverSettings) -> (Model<f64>, Inputs<f64>) {
+    let mesh = block([0.2, 0.05, 0.05], [8, 2, 2], 0.2);
+    let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81), ..Inputs::default() };
+    for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
+        inputs.pins.push(Pin { vertex: v as u32, target: *x });
+    }
+    (single_body(&mesh, &material(STVK, 1e5, 0.45), settings), inputs)
+}
+
+/// The state after one step of a frame from rest, its iterations set after the solver was built.
+fn stepped(settings: &SolverSettings, iterations: u32) -> State<f64> {
+    let (model, inputs) = bar(settings);
+    let (mut state, mut solver) = (State::at_rest(&model), Solver::new(&model, settings));
+    solver.set_iterations(iterations);
+    solver.step(&model, &mut state, &inputs, FRAME).expect("a legal step");
+    state
+}
+
+/// Who watches sees the start, every iterate, and at last what the step leaves; the step itself is the same
+/// to the bit, and so is one whose number of iterations is set later.
+#[test]
+fn a_watched_step_is_a_step() {
+    let mixed = SolverSettings { acceleration: Acceleration::Anderson, ..plain(1, 7) };
+    for settings in [plain(1, 7), mixed, exact(7)] {
+        let (model, inputs) = bar(&settings);
+        let mut seen: Vec<Vec<Vec3<f64>>> = Vec::new();
+        let (mut state, mut solver) = (State::at_rest(&model), Solver::new(&model, &settings));
+        let watch = |iteration: u32, x: &[Vec3<f64>]| {
+            assert_eq!(iteration as usize, seen.len());
+            seen.push(x.to_vec());
+        };
+        solver.step_watched(&model, &mut state, &inputs, FRAME, watch).expect("a legal step");
+        assert_eq!(state, stepped(&settings, 7));
+        assert_eq!(seen.len(), 8);
+        let fewer = SolverSettings { iterations: 3, ..settings.clone() };
+        assert_eq!(stepped(&settings, 3), stepped(&fewer, 3));
+        if !settings.rebase {
+            // Nothing comes after the last iteration; multipliers start from zero.
+            assert_eq!(seen[7], state.positions);
+            assert_eq!(seen[3], stepped(&settings, 3).positions);
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! All integration tests of the library: one program, so that it is linked once, opens one graphics device,
+//! and compiles its kernels once.
+
+mod common;
+mod gpu_common;
+
+mod allocation;
+mod allocation_threads;
+mod coloring;
+mod determinism;
+mod element_solves;
+mod elements;
+mod embed;
+mod energy;
+mod example;
+mod explicit;
+mod gpu;
+mod gpu_explicit;
+mod gpu_guard;
+mod gpu_history;
+mod gpu_shaders;
+mod gpu_simulation;
+mod gpu_surface;
+mod gpu_timing;
+mod history;
+mod iterates;
+mod lanes;
+mod live;
+mod mesh;
+mod mesh_damage;
+mod mesh_io;
+mod physics;
+mod scene_errors;
+mod scene_files;
+mod shapes;
+mod stress;
+mod tethers;
+mod tetrahedralize;
+mod tidy;
+mod twins;
+mod xpbd_family;
+
+/// Counts what tests ask the system's allocator for.
+#[global_allocator]
+static ALLOCATOR: common::counting::Counting = common::counting::Counting;

@@ -1,0 +1,198 @@
+//! Damaged mesh files: cut anywhere, changed anywhere, or never a mesh. Nothing may panic, and a
+//! cut file is an error unless only blanks were lost.
+
+use proptest::prelude::*;
+use viscera::mesh::TetMesh;
+use viscera::mesh::io::{gmsh, obj, read_surface, read_tet_mesh, vtu};
+use viscera::mesh::{SurfaceMesh, boundary_surface};
+use viscera::scalar::vec3;
+
+/// A row of tetrahedra, two regions.
+fn chain() -> TetMesh {
+    let vertices = (0..12)
+        .map(|i| {
+            let turn = f64::from(i % 3);
+            vec3(turn, turn * turn * 0.5, f64::from(i) * 0.4)
+        })
+        .collect();
+    let tets: Vec<[u32; 4]> = (0..9).map(|i| [i, i + 1, i + 2, i + 3]).collect();
+    let regions = (0..9).map(|i| i / 5).collect();
+    TetMesh::new(vertices, tets, regions).unwrap().0
+}
+
+fn version_1(mesh: &TetMesh) -> String {
+    gmsh::write(mesh)
+        .replace("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", "")
+        .replace("$Nodes", "$NOD")
+        .replace("$EndNodes", "$ENDNOD")
+        .replace("$Elements", "$ELM")
+        .replace("$EndElements", "$ENDELM")
+        .replace(" 4 2 0 0 ", " 4 0 0 4 ")
+        .replace(" 4 2 1 1 ", " 4 1 1 4 ")
+}
+
+fn tet_files() -> [(&'static str, Vec<u8>); 3] {
+    let mesh = chain();
+    let regions = vtu::Array::integers("region", mesh.regions());
+    let grid = vtu::write(mesh.vertices(), mesh.tets(), &[], &[regions]).unwrap();
+    [
+        ("chain_1.msh", version_1(&mesh).into_bytes()),
+        ("chain_2.msh", gmsh::write(&mesh).into_bytes()),
+        ("chain.vtu", grid),
+    ]
+}
+
+fn surface_file() -> (SurfaceMesh, Vec<u8>) {
+    let surface = boundary_surface(&chain()).surface;
+    let text = obj::write(&surface, None).unwrap();
+    (surface, text.into_bytes())
+}
+
+#[test]
+fn file_cut_at_any_byte_is_an_error() {
+    for (name, bytes) in tet_files() {
+        let whole = read_tet_mesh(name, &bytes, 1.0).unwrap().0;
+        for end in 0..bytes.len() {
+            match read_tet_mesh(name, &bytes[..end], 1.0) {
+                // Nothing but blanks was lost.
+                Ok((mesh, _)) => {
+                    assert!(bytes[end..].iter().all(u8::is_ascii_whitespace), "{name} {end}");
+                    assert_eq!(mesh, whole);
+                }
+                Err(error) => assert!(error.to_string().starts_with(name)),
+            }
+        }
+    }
+}
+
+#[test]
+fn file_cut_at_each_section_says_that_it_is_cut() {
+    for (name, bytes) in tet_files() {
+        let text = String::from_utf8(bytes).unwrap();
+        let marks = text.match_indices(['$', '<']).map(|(at, _)| at).skip(1);
+        for end in marks {
+            let error = read_tet_mesh(name, &text.as_bytes()[..end], 1.0).unwrap_err().to_string();
+            let says_so = ["cut short", "has no section"].iter().any(|part| error.contains(part));
+            assert!(says_so, "{error}");
+        }
+    }
+}
+
+#[test]
+fn surface_cut_at_any_byte_is_an_error_or_a_part_of_it() {
+    // OBJ has neither counts nor an end mark, so a cut between lines cannot be seen.
+    let (whole, bytes) = surface_file();
+    for end in 0..bytes.len() {
+        if let Ok((part, _)) = read_surface("chain.obj", &bytes[..end], 1.0) {
+            assert!(part.triangles.len() <= whole.triangles.len());
+            let count = part.vertices.len() as u32;
+            assert!(part.triangles.iter().flatten().all(|&vertex| vertex < count));
+        }
+    }
+}
+
+#[test]
+fn real_files_cut_at_every_37th_byte_are_errors() {
+    let Some(folder) = crate::common::data::data_folder() else { return };
+    let bytes = std::fs::read(folder.join("liver_coarse.msh")).unwrap();
+    for end in (0..bytes.len() - 8).step_by(37) {
+        assert!(read_tet_mesh("liver_coarse.msh", &bytes[..end], 1.0).is_err(), "{end}");
+    }
+    // Larger files at a stride that keeps the test in a second.
+    let bytes = std::fs::read(folder.join("tongue.vtu")).unwrap();
+    for end in (0..bytes.len() - 16).step_by(37 * 53) {
+        assert!(read_tet_mesh("tongue.vtu", &bytes[..end], 1.0).is_err(), "{end}");
+    }
+}
+
+#[test]
+fn deeply_nested_xml_does_not_exhaust_the_stack() {
+    let text = format!("<VTKFile>{}", "<a>".repeat(200_000));
+    assert!(read_tet_mesh("deep.vtu", text.as_bytes(), 1.0).is_err());
+}
+
+#[test]
+fn growing_xml_entities_are_refused() {
+    let mut text = String::from("<!DOCTYPE x [<!ENTITY e0 \"1 1 1 1 1 1 1 1 1 1\">");
+    for level in 1..12 {
+        let uses = format!("&e{};", level - 1).repeat(10);
+        text.push_str(&format!("<!ENTITY e{level} \"{uses}\">"));
+    }
+    text.push_str("]><VTKFile type=\"UnstructuredGrid\">&e11;</VTKFile>");
+    assert!(read_tet_mesh("bomb.vtu", text.as_bytes(), 1.0).is_err());
+}
+
+/// Reads bytes under every name; all that counts is that the calls return.
+fn read_all_ways(bytes: &[u8]) {
+    for name in ["a.msh", "a.vtu", "a.obj", "a"] {
+        let _ = read_tet_mesh(name, bytes, 1.0).map_err(|error| error.to_string());
+        let _ = read_surface(name, bytes, 1.0).map_err(|error| error.to_string());
+    }
+}
+
+/// Words that mean something to one of the formats.
+const WORDS: [&str; 22] = [
+    "$NOD\n",
+    "$ENDNOD\n",
+    "$ELM\n",
+    "$ENDELM\n",
+    "$MeshFormat\n",
+    "2.2 0 8\n",
+    "$EndMeshFormat\n",
+    "$Nodes\n",
+    "$EndNodes\n",
+    "$Elements\n",
+    "$EndElements\n",
+    "v ",
+    "f ",
+    "\n",
+    " ",
+    "4 ",
+    "-1 ",
+    "nan ",
+    "1e999 ",
+    "4294967296 ",
+    "18446744073709551616 ",
+    "/",
+];
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..Default::default() })]
+
+    #[test]
+    fn random_bytes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
+        read_all_ways(&bytes);
+        for start in [&b"$NOD\n"[..], b"$MeshFormat\n2.2 0 8\n", b"<VTKFile", b"v 0 0 0\n"] {
+            read_all_ways(&[start, &bytes].concat());
+        }
+    }
+
+    #[test]
+    fn random_words_never_panic(words in proptest::collection::vec(0..WORDS.len(), 0..60)) {
+        let text: String = words.iter().map(|&word| WORDS[word]).collect();
+        read_all_ways(text.as_bytes());
+    }
+
+    #[test]
+    fn changed_files_never_panic(
+        file in 0usize..4,
+        changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..WORDS.len(), 0u8..3), 1..6),
+    ) {
+        let mut bytes = match tet_files().into_iter().nth(file) {
+            Some((_, bytes)) => bytes,
+            None => surface_file().1,
+        };
+        for (place, byte, word, kind) in changes {
+            let at = place.index(bytes.len().max(1)).min(bytes.len().saturating_sub(1));
+            match kind {
+                0 => bytes[at] = byte,
+                1 => drop(bytes.splice(at..at, WORDS[word].bytes())),
+                _ => drop(bytes.splice(at..(at + usize::from(byte)).min(bytes.len()), [])),
+            }
+            if bytes.is_empty() {
+                break;
+            }
+        }
+        read_all_ways(&bytes);
+    }
+}

@@ -1,0 +1,323 @@
+//! The shipped scenes, and what a scene file can say.
+
+use viscera::material::MaterialModel;
+use viscera::mesh::{TetMesh, shapes};
+use viscera::scalar::{Vec3, vec3};
+use viscera::scene::{BodyShape, Scene, SceneError, Selector, describe_markdown, describe_text};
+use viscera::settings::{
+    Acceleration, AndersonGuard, Colors, DeviceRequest, Precision, SolverSettings, Start,
+};
+
+const SHIPPED: [(&str, &str); 5] = [
+    ("liver_retraction.toml", include_str!("../../../../scenes/liver_retraction.toml")),
+    ("cantilever.toml", include_str!("../../../../scenes/cantilever.toml")),
+    ("twist.toml", include_str!("../../../../scenes/twist.toml")),
+    ("stretch.toml", include_str!("../../../../scenes/stretch.toml")),
+    ("grab.toml", include_str!("../../../../scenes/grab.toml")),
+];
+
+/// Nearly every key there is, in one scene.
+const EVERYTHING: &str = r#"
+title = "Everything"
+description = "Two bodies"
+time = { duration = "1.5 s", frame = "1/50 s", velocity_factor = "90 %" }
+world = { gravity = [0, "-1 m/s^2", "-9 m/s^2"] }
+
+[[body]]
+name = "organ"
+mesh = "organ.msh"
+unit = "32 mm"
+scale = 0.5
+surface = "organ.obj"
+position = ["10 mm", 0, "1 cm"]
+rotation_axis = [0, 0, 2]
+rotation_angle = "90 deg"
+material = { preset = "liver", viscosity = "20 ms" }
+[[body.region]]
+label = 3
+young = "59 kPa"
+[[body.region]]
+label = 4
+preset = "fat"
+model = "saint_venant_kirchhoff"
+
+[[body]]
+name = "bead"
+shape = "sphere"
+radius = "2 cm"
+[body.material]
+young = "1 MPa"
+
+[[fixing]]
+body = "organ"
+region = 3
+stiffness = "500 N/m"
+
+[[motion]]
+name = "pull"
+body = "bead"
+nearest = { point = [0, 0, 0] }
+about = ["1 mm", 0, 0]
+interpolation = "linear"
+release = "1 s"
+[[motion.keys]]
+time = "0.25 s"
+[[motion.keys]]
+time = "0.75 s"
+translation = [0, 0, "40 mm"]
+
+[[force]]
+body = "bead"
+sphere = { center = [0, 0, 0], radius = "5 mm" }
+force = [0, 0, "0.5 N"]
+keys = [{ time = "1 s", factor = 0 }, { time = "2 s", factor = "100 %" }]
+
+[[spring]]
+from = { body = "organ", box = { min = [0, 0, 0], max = ["1 m", "1 m", "1 m"] } }
+to = { body = "bead", half_space = { point = [0, 0, 0], normal = [0, 3, 4] } }
+stiffness = "2 N/mm"
+rest_length = "5 mm"
+
+[solver]
+precision = "f64"
+colors = 4
+acceleration = "anderson"
+
+[output]
+every = 5
+picture_size = [640, 480]
+"#;
+
+#[test]
+fn every_shipped_scene_is_valid_and_needs_no_file() {
+    for (name, text) in SHIPPED {
+        let scene = Scene::parse(name, text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        assert!(scene.files().is_empty(), "{name}");
+        assert!(!scene.title.is_empty() && !scene.description.is_empty(), "{name}");
+        assert!((60..=600).contains(&scene.frame_count()), "{name}");
+        assert!(!scene.fixings.is_empty(), "{name}");
+    }
+}
+
+fn mesh_of(shape: &BodyShape) -> TetMesh {
+    match *shape {
+        BodyShape::Beam { length, width, height, cells_across } => {
+            shapes::beam(length, width, height, cells_across as usize).unwrap()
+        }
+        BodyShape::Block { size, cells } => {
+            shapes::block(Vec3::from_f64(size), cells.map(|count| count as usize)).unwrap()
+        }
+        BodyShape::Liver { spacing, scale } => shapes::liver(spacing, scale).unwrap().tets,
+        _ => panic!("no shipped scene uses {shape:?}"),
+    }
+}
+
+#[test]
+fn every_patch_of_a_shipped_scene_is_found_and_no_vertex_is_held_twice() {
+    for (name, text) in SHIPPED {
+        let scene = Scene::parse(name, text, &[]).unwrap();
+        let meshes: Vec<_> = scene.bodies.iter().map(|body| mesh_of(&body.shape)).collect();
+        let fixed = scene.fixings.iter().map(|fixing| &fixing.patch);
+        let moved = scene.motions.iter().map(|motion| &motion.patch);
+        let mut held = std::collections::BTreeSet::new();
+        for patch in fixed.chain(moved) {
+            let (mesh, placement) = (&meshes[patch.body], &scene.bodies[patch.body].placement);
+            let rest: Vec<_> = mesh.vertices().iter().map(|&x| placement.apply(x)).collect();
+            let vertices = patch.select(&rest, mesh.tets(), mesh.regions()).unwrap();
+            println!("{name}, {}: {} of {} vertices", patch.purpose, vertices.len(), rest.len());
+            assert!(vertices.len() < rest.len() / 4, "{name}, {}", patch.purpose);
+            for vertex in vertices {
+                assert!(held.insert((patch.body, vertex)), "{name}, {}", patch.purpose);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_key_arrives_in_si_units() {
+    let scene = Scene::parse("everything.toml", EVERYTHING, &[]).unwrap();
+    assert_eq!(scene.frame_count(), 75);
+    assert_eq!(scene.time.velocity_factor, 0.9);
+    assert_eq!(scene.world.gravity, vec3(0.0, -1.0, -9.0));
+    assert_eq!(scene.files(), ["organ.msh", "organ.obj"]);
+
+    let [organ, bead] = scene.bodies.as_slice() else { panic!("two bodies") };
+    let BodyShape::File { unit, .. } = organ.shape else { panic!("a file") };
+    assert_eq!(unit, 0.016);
+    let moved = organ.placement.apply(vec3(1.0, 0.0, 0.0));
+    assert!((moved - vec3(0.01, 1.0, 0.01)).length() <= 4.0 * f64::EPSILON);
+    assert_eq!(organ.material.model(), MaterialModel::StableNeoHookean);
+    assert_eq!((organ.material.young(), organ.material.viscosity()), (5100.0, 0.02));
+    let [fibrotic, fat] = organ.regions.as_slice() else { panic!("two regions") };
+    assert_eq!((fibrotic.label, fibrotic.material.young()), (3, 59e3));
+    // What a region leaves unsaid it takes from the body, or from its own preset.
+    assert_eq!(fibrotic.material.density(), organ.material.density());
+    assert_eq!(fat.material.density(), 950.0);
+    assert_eq!(fat.material.model(), MaterialModel::SaintVenantKirchhoff);
+    assert_eq!(bead.shape, BodyShape::Sphere { radius: 0.02, spacing: 0.005 });
+
+    assert_eq!(scene.fixings[0].name, "fixing 0");
+    assert_eq!(scene.fixings[0].stiffness, Some(500.0));
+    assert_eq!(scene.fixings[0].patch.selector, Selector::Region(3));
+    let motion = &scene.motions[0];
+    assert_eq!((motion.patch.body, motion.release), (1, Some(1.0)));
+    assert_eq!(motion.pose(0.1).translation, vec3(0.0, 0.0, 0.0));
+    assert!((motion.pose(0.5).translation.z - 0.02).abs() <= f64::EPSILON);
+    assert_eq!(scene.forces[0].at(1.5), vec3(0.0, 0.0, 0.25));
+    let spring = &scene.springs[0];
+    assert_eq!((spring.from.body, spring.to.body, spring.stiffness), (0, 1, 2000.0));
+    assert_eq!(spring.rest_length, Some(0.005));
+    let Selector::HalfSpace { normal, .. } = spring.to.selector else { panic!("a half-space") };
+    assert!((normal - vec3(0.0, 0.6, 0.8)).length() <= 2.0 * f64::EPSILON);
+
+    assert_eq!(scene.solver.precision, Precision::F64);
+    assert_eq!(scene.solver.colors, Colors::Limited(4));
+    assert_eq!(scene.solver.acceleration, Acceleration::Anderson);
+    assert_eq!(scene.output.picture_size, [640, 480]);
+}
+
+#[test]
+fn defaults_are_those_declared() {
+    let solver = SolverSettings::default();
+    assert_eq!((solver.substeps, solver.iterations), (10, 2));
+    assert_eq!((solver.precision, solver.colors), (Precision::F32, Colors::Unlimited));
+    assert_eq!((solver.start, solver.anderson_guard), (Start::Auto, AndersonGuard::Residual));
+    assert_eq!(solver.device, DeviceRequest::Auto);
+    let text = "[[body]]\nname = \"a\"\nshape = \"liver\"\nmaterial = { preset = \"liver\" }";
+    let scene = Scene::parse("small.toml", text, &[]).unwrap();
+    assert_eq!(scene.solver, solver);
+    assert_eq!(scene.time.frame, 1.0 / 60.0);
+    assert_eq!(scene.world.gravity, vec3(0.0, 0.0, -9.81));
+    assert_eq!(scene.title, "small.toml");
+}
+
+#[test]
+fn an_override_counts_as_if_it_were_in_the_file() {
+    let parse = |overrides| Scene::parse("everything.toml", EVERYTHING, overrides);
+    let scene = parse(&[
+        ("solver.iterations", "20"),
+        ("solver.colors", "unlimited"),
+        ("solver.rebase", "true"),
+        ("body.organ.material.young", "\"8 kPa\""),
+        ("body.1.material.poisson", "0.3"),
+        ("body.organ.region.0.young", "70 kPa"),
+        ("motion.pull.keys.1.translation", "[0, 0, \"10 mm\"]"),
+        ("output", "{ every = 7 }"),
+    ])
+    .unwrap();
+    assert_eq!(scene.solver.iterations, 20);
+    assert_eq!(scene.solver.colors, Colors::Unlimited);
+    assert!(scene.solver.rebase);
+    assert_eq!(scene.bodies[0].material.young(), 8000.0);
+    assert_eq!(scene.bodies[1].material.poisson(), 0.3);
+    assert_eq!(scene.bodies[0].regions[0].material.young(), 70e3);
+    assert_eq!(scene.motions[0].pose(9.0).translation.z, 0.01);
+    assert_eq!(scene.output.every, 7);
+}
+
+#[test]
+fn a_bad_override_is_named() {
+    for (key, value, message) in [
+        (
+            "solver.iteratoins",
+            "5",
+            "override of solver.iteratoins: unknown key `iteratoins` in `solver`; did you mean \
+             `iterations`?",
+        ),
+        (
+            "solver.iterations",
+            "none",
+            "override of solver.iterations: iterations = \"none\": this must be a whole number",
+        ),
+        (
+            "solver.iterations",
+            "0",
+            "override of solver.iterations: iterations = 0: out of range; it must be 1 to 10000",
+        ),
+        (
+            "body.liver.material.young",
+            "5 kPa",
+            "override of body.liver.material.young: body has no item `liver`; it has: organ, bead",
+        ),
+        (
+            "solver.device",
+            "7",
+            "override of solver.device: device = 7: this must be \"auto\", \"cpu\", \"gpu\" or part \
+             of an adapter's name",
+        ),
+        (
+            "solver.device",
+            "\" \"",
+            "override of solver.device: device = \" \": out of range; it must be a name without \
+             quotes and backslashes",
+        ),
+        ("body.7.name", "x", "override of body.7.name: body has no item `7`; it has: organ, bead"),
+        (
+            "title.x",
+            "5",
+            "override of title.x: title is a value and has no keys; shorten the override's key",
+        ),
+        (
+            "solver..x",
+            "5",
+            "override of solver..x: a key is names joined by dots, for example solver.iterations",
+        ),
+    ] {
+        let scene = Scene::parse("everything.toml", EVERYTHING, &[(key, value)]);
+        assert_eq!(scene.map_err(|error| error.to_string()), Err(message.into()));
+    }
+}
+
+#[test]
+fn recorded_solver_settings_read_back_as_they_were() {
+    let overrides = [
+        ("solver.relaxation", "1.5"),
+        ("solver.acceleration", "chebyshev"),
+        ("solver.device", "Radeon (TM) 780M"),
+    ];
+    let scene = Scene::parse("everything.toml", EVERYTHING, &overrides).unwrap();
+    let recorded = scene.solver.values();
+    let overrides: Vec<(String, &str)> =
+        recorded.iter().map(|(key, value)| (format!("solver.{key}"), value.as_str())).collect();
+    let overrides: Vec<_> = overrides.iter().map(|(key, value)| (key.as_str(), *value)).collect();
+    let (name, text) = SHIPPED[1];
+    assert_eq!(Scene::parse(name, text, &overrides).unwrap().solver, scene.solver);
+}
+
+/// Keys are found in a scene that uses nearly all of them, not in a list kept beside the code.
+#[test]
+fn describe_lists_every_key_and_documents_it() {
+    let (text, markdown) = (describe_text(), describe_markdown());
+    let written = EVERYTHING.split(['\n', '{', ',']).filter_map(|part| part.split_once('='));
+    let keys: Vec<_> = written.map(|(key, _)| key.trim()).collect();
+    let solver = SolverSettings::default().values();
+    assert!(keys.len() > 60 && solver.len() == 23);
+    for key in keys.into_iter().chain(solver.iter().map(|(key, _)| *key)) {
+        assert!(text.contains(&format!("\n    {key}\n")), "{key}");
+        assert!(markdown.contains(&format!("| `{key}` |")), "{key}");
+    }
+    for table in viscera::scene::describe() {
+        assert!(!table.doc.is_empty(), "{}", table.path);
+        for key in table.keys {
+            assert!(!key.doc.is_empty() && !key.type_text.is_empty(), "{}", key.name);
+        }
+    }
+}
+
+#[test]
+fn a_fixing_that_selects_nothing_says_where_the_body_is() {
+    let overrides = [("fixing.wall.half_space.point", "[\"-10 mm\", 0, 0]")];
+    let (name, text) = SHIPPED[1];
+    let scene = Scene::parse(name, text, &overrides).unwrap();
+    let bits = |i: u8| [i & 1, (i >> 1) & 1, i >> 2].map(f64::from);
+    let corners: Vec<_> =
+        (0..8).map(bits).map(|[x, y, z]| vec3(0.2 * x, 0.05 * y, 0.05 * z)).collect();
+    let error = scene.fixings[0].patch.select(&corners, &[], &[]).unwrap_err();
+    assert!(matches!(error, SceneError::Selection { .. }));
+    assert_eq!(
+        error.to_string(),
+        "cantilever.toml, line 17, column 1: fixing `wall` selects nothing: the body reaches from \
+         (0, 0, 0) mm to (200, 50, 50) mm, and its nearest vertex (0, 0, 0) mm is 10 mm away; move \
+         or enlarge the half-space"
+    );
+}
