@@ -193,6 +193,9 @@ impl App {
         for action in actions {
             self.act(action);
         }
+        if context.dragged_id().is_none() {
+            self.session.settle();
+        }
         self.record();
     }
 
@@ -344,12 +347,16 @@ impl App {
             }
             Action::Ghost(ghost) => {
                 let chosen = self.session.compare(self.session.is_comparison(), ghost);
+                if ghost && chosen.as_ref().is_ok_and(|commands| !commands.is_empty()) {
+                    self.messages.busy = Some("waiting for the true solution".to_owned());
+                }
                 self.carry_out(chosen);
             }
             Action::Speed(speed) => {
                 self.clock.speed = speed;
                 self.engine.send(Command::Speed(speed));
             }
+            Action::Warn(text) => self.messages.warn(text),
             Action::LetGo(hold) => {
                 let command = self.holds.let_go(hold);
                 self.send(command);

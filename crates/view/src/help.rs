@@ -63,7 +63,12 @@ const SHORTCUTS: &[Shortcut] = &[
     plain(Key::F, Request::Frame, "F", "show everything"),
     plain(Key::Escape, Request::LetGo, "Esc", "let go of everything"),
     plain(Key::S, Request::Screenshot, "S", "save a picture, in pictures/"),
-    plain(Key::G, Request::Record, "G", "begin or end recording an animated image"),
+    plain(
+        Key::G,
+        Request::Record,
+        "G",
+        "begin or end recording an animated image, at the pace of simulated time",
+    ),
     plain(Key::F1, Request::Help, "F1, ?", "this list"),
     plain(Key::Questionmark, Request::Help, "", ""),
 ];
