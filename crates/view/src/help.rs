@@ -81,9 +81,10 @@ const MOUSE: &[(&str, &str)] = &[
     ("Shift at release", "hold on; Esc lets go"),
 ];
 
-/// What the keyboard asks for. A text field that is being written in keeps its letters.
-pub fn requests(context: &egui::Context) -> Vec<Request> {
-    if context.text_edit_focused() {
+/// What the keyboard asks for. A text field that is being written in keeps its keys: Escape, which leaves it, as
+/// well, so `was_typing` says whether there was one in the frame before.
+pub fn requests(context: &egui::Context, was_typing: bool) -> Vec<Request> {
+    if was_typing || context.text_edit_focused() {
         return Vec::new();
     }
     context.input_mut(|input| {

@@ -119,7 +119,8 @@ impl Number<'_> {
             .custom_parser(keep)
             .suffix(suffix.trim_end());
         let response = ui.add(number);
-        (response, typed.take())
+        let is_abandoned = is_abandoned(ui, id);
+        (response, typed.take().filter(|_| !is_abandoned))
     }
 
     /// Change for a point of dragging, and for an arrow key while typing: the whole rail for its width.
@@ -134,6 +135,23 @@ impl Number<'_> {
         };
         span / f64::from(ui.spacing().slider_width.max(1.0))
     }
+}
+
+/// When Escape was pressed last, by the window's count of frames.
+#[derive(Clone, Copy)]
+struct Escaped(u64);
+
+/// Whether Escape has left a number. The toolkit knows of it in that frame alone, and takes over what was typed in
+/// the next.
+fn is_abandoned(ui: &Ui, id: Id) -> bool {
+    let frame = ui.ctx().cumulative_frame_nr();
+    let is_pressed = ui.input(|input| input.key_pressed(egui::Key::Escape));
+    ui.data_mut(|data| {
+        if is_pressed {
+            data.insert_temp(id, Escaped(frame));
+        }
+        data.get_temp(id).is_some_and(|Escaped(at)| frame <= at + 1)
+    })
 }
 
 /// A control with its name before it and what it means for who points at it. The control gets the label's

@@ -82,7 +82,8 @@ impl Legend {
     /// What the colours do not show, in words: a value beyond the scale, and places without one.
     pub fn remarks(&self) -> Vec<String> {
         let beyond = self.high.is_some_and(|high| self.largest > high);
-        let beyond = beyond.then(|| format!("largest {}", self.text(self.largest)));
+        let three_digits = |value: f32| format!("{value:.2e}").parse().unwrap_or(value);
+        let beyond = beyond.then(|| format!("largest {}", self.text(three_digits(self.largest))));
         let gaps = self.has_gaps.then(|| "grey: inverted".to_owned());
         beyond.into_iter().chain(gaps).collect()
     }
@@ -260,6 +261,7 @@ pub fn distances(frame: &Frame, stage: &Stage, number: usize) -> Vec<String> {
 /// A small distance [m] as it is written everywhere: "0.25 mm".
 fn millimetres(distance: f64) -> String {
     match 1e3 * distance {
+        0.0 => "0 mm".to_owned(),
         distance if distance < 0.01 => format!("{:.2} µm", 1e3 * distance),
         distance if distance < 10.0 => format!("{distance:.2} mm"),
         distance => format!("{distance:.0} mm"),
@@ -320,10 +322,10 @@ mod tests {
         let mut legend = Legend::default();
         // Stress of 1 to 5 kPa at a thousand vertices; four beside an inverted tetrahedron, and its own without.
         let many = (0..1000).map(|k| 1e3 + 4.0 * k as f32);
-        let few = [2e7, 3e8, 1e9, 5e7, f32::NAN, f32::NAN, f32::INFINITY];
+        let few = [2e7, 3e8, 1.2345e9, 5e7, f32::NAN, f32::NAN, f32::INFINITY];
         legend.follow(Coloring::Stress, many.clone().chain(few));
         assert_eq!(legend.range(), Some([0.0, 5e3]));
-        assert_eq!(legend.remarks(), ["largest 1 GPa", "grey: inverted"]);
+        assert_eq!(legend.remarks(), ["largest 1.23 GPa", "grey: inverted"]);
         legend.follow(Coloring::Stress, many);
         assert_eq!((legend.range(), legend.remarks().len()), (Some([0.0, 5e3]), 0));
         // All displacements are meant.
@@ -339,6 +341,7 @@ mod tests {
     #[test]
     fn forces_are_read_at_a_glance() {
         assert_eq!([0.0123, 1.254, 120.4].map(newtons), ["12.3 mN", "1.25 N", "120 N"]);
-        assert_eq!([1.5e-6, 8.3e-4, 0.032].map(millimetres), ["1.50 µm", "0.83 mm", "32 mm"]);
+        let distances = [0.0, 1.5e-6, 8.3e-4, 0.032].map(millimetres);
+        assert_eq!(distances, ["0 mm", "1.50 µm", "0.83 mm", "32 mm"]);
     }
 }
