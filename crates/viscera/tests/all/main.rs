@@ -37,6 +37,7 @@ mod stress;
 mod tethers;
 mod tetrahedralize;
 mod tidy;
+mod tiers;
 mod twins;
 mod xpbd_family;
 
