@@ -150,7 +150,7 @@ impl<S: Real> Workspace<S> {
             },
             points: points(true),
             velocities: vec![Vec3::ZERO; vertices],
-            energies: vec![Energy::default(); if guarded { model.component_count } else { 0 }],
+            energies: vec![Energy::default(); if guarded { model.part_count() } else { 0 }],
             evaluator: Evaluator::new(guarded.then_some(model)),
             copies: vec![Point::default(); if model.is_split() { model.copy_count() } else { 0 }],
             loads: vec![Point::default(); if needs_loads { model.copy_count() } else { 0 }],
@@ -458,7 +458,7 @@ pub(super) fn gather<S: Real>(model: &Model<S>, loads: &[Point<S>], v: usize) ->
 /// Places for the energies of single tetrahedra: needed where they belong to different parts.
 pub(super) fn energy_slots<S: Real>(model: &Model<S>) -> usize {
     let blocks: usize = model.tet_sets().into_iter().map(|set| set.block_count()).sum();
-    if model.component_count > 1 { LANES * blocks } else { 0 }
+    if model.part_count() > 1 { LANES * blocks } else { 0 }
 }
 
 /// Everything in a model that decides how much memory a step needs and which stages it has.
@@ -467,7 +467,7 @@ pub(super) fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 11] {
     [
         ("solver's list of vertices", model.vertex_count()),
         ("solver's list of multipliers", model.multiplier_count),
-        ("solver's list of parts", model.component_count),
+        ("solver's list of parts", model.part_count()),
         ("solver's list of colors", model.color_count),
         ("solver's list of copies", model.copy_count()),
         ("solver's list of Saint Venant-Kirchhoff tetrahedra", model.green_strain.len()),

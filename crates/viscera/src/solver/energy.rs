@@ -84,15 +84,15 @@ impl<S: Real> Workspace<S> {
         }
         for &vertex in &model.attachments.vertices {
             let v = model.numbering.of(vertex);
-            self.energies[model.component_of[v] as usize].held = true;
+            self.energies[model.part_at(v)].held = true;
         }
         for tether in &self.ground.tethers {
-            let part = &mut self.energies[model.component_of[tether.vertex] as usize];
+            let part = &mut self.energies[model.part_at(tether.vertex)];
             part.held = true;
             part.start.stored += tether.energy(self.ground.previous[tether.vertex].vec3());
         }
         for (v, &velocity) in self.velocities.iter().enumerate() {
-            let part = &mut self.energies[model.component_of[v] as usize];
+            let part = &mut self.energies[model.part_at(v)];
             if self.ground.inverse_masses[v] == S::ZERO {
                 part.held = true;
             } else {
@@ -109,14 +109,14 @@ impl<S: Real> Workspace<S> {
             part.end.stored = *stored;
         }
         for tether in &ground.tethers {
-            let part = &mut energies[model.component_of[tether.vertex] as usize];
+            let part = &mut energies[model.part_at(tether.vertex)];
             part.end.stored += tether.energy(self.points[tether.vertex].vec3());
         }
         for (v, x) in self.points.iter().enumerate() {
             if ground.inverse_masses[v] == S::ZERO {
                 continue;
             }
-            let part = &mut energies[model.component_of[v] as usize];
+            let part = &mut energies[model.part_at(v)];
             let mass = ground.masses[v].to_f64();
             let load = (step.inputs.gravity * ground.masses[v] + ground.external[v]).cast::<f64>();
             let moved = (x.vec3() - ground.previous[v].vec3()).cast::<f64>();
@@ -128,7 +128,7 @@ impl<S: Real> Workspace<S> {
         }
         let mut least = 1.0f64;
         for (v, velocity) in self.velocities.iter_mut().enumerate() {
-            let (drift, share) = energies[model.component_of[v] as usize].limit();
+            let (drift, share) = energies[model.part_at(v)].limit();
             if share < 1.0 && ground.inverse_masses[v] != S::ZERO {
                 let drift = drift.cast::<S>();
                 *velocity = drift + (*velocity - drift) * S::from_f64(share);

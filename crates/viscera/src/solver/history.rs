@@ -101,7 +101,7 @@ impl<S: Real, F> Constitutive<'_, S, F> {
         let elastic: [L; N] = F::constitutive(&corners.x, &shape, &material, step_volume);
         // SAFETY: every block has multipliers of its own and is worked on once.
         unsafe { tets.store_multipliers(tets.set.multiplier_offset, self.l, elastic) };
-        if tets.set.viscous {
+        if tets.is_viscous() {
             let mut change = green_strain::strain(&deformation_gradient(&corners.x, &shape));
             let start: [L; 6] = load_rows(self.start_strain[tets.index].as_flattened(), tets.lane);
             for p in 0..6 {

@@ -188,7 +188,7 @@ impl<S: Real> Evaluator<S> {
         let pieces = blocks.map(|count| count.div_ceil(PIECE)).into_iter();
         let pieces = pieces.max().unwrap_or(0).max(model.vertex_count().div_ceil(VERTEX_PIECE));
         Self {
-            stored: vec![0.0; model.component_count],
+            stored: vec![0.0; model.part_count()],
             energies: vec![S::ZERO; energy_slots(model)],
             partial: vec![[0.0; 2]; pieces],
         }
@@ -282,15 +282,15 @@ impl<S: Real> Evaluator<S> {
     fn add_by_part(&mut self, model: &Model<S>, kind: usize, set: &TetSet<S>) {
         let first = if kind == 0 { 0 } else { model.green_strain.block_count() };
         for (block, lane) in set.places() {
-            let part = model.component_of[set.blocks[block].vertices[0][lane] as usize];
-            self.stored[part as usize] += self.energies[LANES * (first + block) + lane].to_f64();
+            let part = model.part_at(set.blocks[block].vertices[0][lane] as usize);
+            self.stored[part] += self.energies[LANES * (first + block) + lane].to_f64();
         }
     }
 
     fn add_single(&mut self, step: &Step<'_, S>, x: &[Point<S>]) {
         let model = step.model;
         let mut store = |v: usize, energy: S| {
-            self.stored[model.component_of[v] as usize] += energy.to_f64();
+            self.stored[model.part_at(v)] += energy.to_f64();
         };
         let springs = &model.springs;
         for (i, ends) in springs.vertices.iter().enumerate() {
@@ -371,7 +371,7 @@ fn respond<S: Real, L: Lanes<Real = S>, const NEO: bool, const VISCOUS: bool>(
     let law =
         if NEO { MaterialModel::StableNeoHookean } else { MaterialModel::SaintVenantKirchhoff };
     let tissue = Tissue::new(law, &tets.material(), dt);
-    let response = if VISCOUS {
+    let response = if VISCOUS && tets.is_viscous() {
         let start: Voigt<L> = load_rows(start_strain[tets.index].as_flattened(), tets.lane);
         tissue.respond(&f, Some(&start))
     } else {

@@ -72,7 +72,7 @@ fn a_body_in_trouble_does_not_slow_another() {
     builder.add_body(&wall, &material(SNH, 1e5, 0.45)).expect("a body");
     builder.add_body(&ball, &material(SNH, 1e4, 0.45)).expect("a body");
     let model = builder.build::<f64>(&settings).expect("a model");
-    assert_eq!(model.component_count, 2);
+    assert_eq!(model.part_count(), 2);
     let mut inputs = Inputs { gravity: GRAVITY, ..Inputs::default() };
     for (v, x) in wall.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
         inputs.pins.push(Pin { vertex: v as u32, target: *x });

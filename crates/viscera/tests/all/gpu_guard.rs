@@ -117,7 +117,7 @@ fn many_parts<S: Real>(settings: &SolverSettings) -> (Model<S>, Vec<Vec3<f64>>) 
         builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
     }
     let model = builder.build(settings).expect("a model");
-    assert_eq!(model.component_count, 3);
+    assert_eq!(model.part_count(), 3);
     (model, places)
 }
 

@@ -134,7 +134,7 @@ impl Layout {
                 multiplier: (model_springs.multiplier_offset + i) as u32,
                 rest_length: model_springs.rest_length[i],
                 stiffness: model_springs.stiffness[i],
-                part: model.component_of[vertices[0] as usize],
+                part: model.part_at(vertices[0] as usize) as u32,
             });
         }
         let held = &model.attachments;
@@ -147,7 +147,7 @@ impl Layout {
                 slot: count(vertex),
                 multiplier: (held.multiplier_offset + 3 * i) as u32,
                 stiffness: held.stiffness[i],
-                part: model.component_of[vertex as usize],
+                part: model.part_at(vertex as usize) as u32,
             });
         }
         let mut offsets = Vec::with_capacity(counts.len());
@@ -175,7 +175,7 @@ impl Layout {
             attachment.slot += offsets[attachment.vertex as usize];
         }
         let (members, pieces) = pieces(model, &springs, &attachments);
-        let piece_count = (pieces.len() - model.component_count) as u32;
+        let piece_count = (pieces.len() - model.part_count()) as u32;
         Self { offsets, corners, springs, attachments, members, pieces, piece_count }
     }
 
@@ -237,7 +237,7 @@ impl Layout {
 
         let pieces = PIECE_SUMS * u64::from(self.piece_count);
         let parts = (PRODUCTS * u64::from(SUM_GROUPS)).max(if guarded { pieces } else { 0 });
-        let energies = parts + (PART_NUMBERS * model.component_count) as u64;
+        let energies = parts + (PART_NUMBERS * model.part_count()) as u64;
         let elements = header.tet_lanes + header.spring_count + header.attachment_count;
         let sums = energies + if guarded { elements.into() } else { 0 };
         (header.parts, header.energies) = (parts as u32, energies as u32);
@@ -278,7 +278,7 @@ fn pieces(
     let mut first = 0;
     for set in model.tet_sets() {
         for (block, lane) in set.places() {
-            let part = model.component_of[set.blocks[block].vertices[0][lane] as usize];
+            let part = model.part_at(set.blocks[block].vertices[0][lane] as usize) as u32;
             elements.push((part, (LANES * (first + block) + lane) as u32));
         }
         first += set.block_count();
@@ -290,10 +290,10 @@ fn pieces(
     elements.extend(attachments.iter().enumerate().map(|(i, a)| (a.part, after(i, before))));
     elements.sort_by_key(|&(part, _)| part);
     let mut vertices: Vec<(u32, u32)> =
-        model.component_of.iter().enumerate().map(|(v, &part)| (part, v as u32)).collect();
+        (0..model.vertex_count()).map(|v| (model.part_at(v) as u32, v as u32)).collect();
     vertices.sort_by_key(|&(part, _)| part);
 
-    let mut ranges = vec![[0u32; 4]; model.component_count];
+    let mut ranges = vec![[0u32; 4]; model.part_count()];
     let (mut members, mut pieces) = (Vec::new(), Vec::new());
     for (kind, list) in [elements, vertices].into_iter().enumerate() {
         for of_part in list.chunk_by(|a, b| a.0 == b.0) {

@@ -223,7 +223,7 @@ impl GpuSolver {
             restart,
             multiplier_dt: 0.0,
             touched: Vec::new(),
-            parts: (buffers.parts_start as usize, model.component_count),
+            parts: (buffers.parts_start as usize, model.part_count()),
             updates: Vec::new(),
             update_of: vec![u32::MAX; model.vertex_count()],
             shares: [rebase_factor(model, settings) as f32, bound_share(model) as f32],

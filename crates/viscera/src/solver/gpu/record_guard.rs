@@ -57,7 +57,7 @@ impl Recorder<'_> {
     }
 
     pub(super) fn limit_energy(&self, into: &mut Vec<Dispatch>) {
-        let parts = self.model.component_count as u32;
+        let parts = self.model.part_count() as u32;
         into.push(self.each(&kernels::LIMIT_PARTS, 0, parts, 0));
         let first = self.pieces.first_of_vertices;
         let count = self.pieces.count - first;
