@@ -23,17 +23,17 @@ use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
 
 /// Shares of a rejected step that are tried in turn.
-const SHARES: [f64; 4] = [0.5, 0.2, 0.08, 0.032];
+pub(super) const SHARES: [f64; 4] = [0.5, 0.2, 0.08, 0.032];
 
 /// Steps of descent where no share will do.
-const DESCENTS: usize = 3;
+pub(super) const DESCENTS: usize = 3;
 
 /// Of the decrease that the slope promises, a descent must deliver this share (Armijo).
-const SUFFICIENT: f64 = 1e-4;
+pub(super) const SUFFICIENT: f64 = 1e-4;
 
 /// A descent that overshoots is shortened by this factor, at most [`SHORTENINGS`] times.
-const SHORTEN: f64 = 0.4;
-const SHORTENINGS: usize = 12;
+pub(super) const SHORTEN: f64 = 0.4;
+pub(super) const SHORTENINGS: usize = 12;
 
 /// How a guarded step ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,10 +56,28 @@ impl StepReport {
     pub fn keeps_limit(&self) -> bool {
         self.potential <= self.limit + self.noise
     }
+
+    /// Of parts together; nothing of no part.
+    pub(super) fn of_all(parts: &[StepReport]) -> Option<StepReport> {
+        let height = |report: &StepReport| {
+            let above = report.potential - (report.limit + report.noise);
+            // Infinite at an infinite limit is at the limit; what is no number stands above everything.
+            let unknown = if report.keeps_limit() { 0.0 } else { f64::INFINITY };
+            if above.is_nan() { unknown } else { above }
+        };
+        parts.iter().copied().reduce(|worst, next| {
+            let report = if height(&next) > height(&worst) { next } else { worst };
+            StepReport {
+                rejected: worst.rejected || next.rejected,
+                kept_speed: worst.kept_speed.min(next.kept_speed),
+                ..report
+            }
+        })
+    }
 }
 
 /// Of plain sweeps in a row that raise the potential this many lead to a step of descent.
-const TOLERATED: u32 = 2;
+pub(super) const TOLERATED: u32 = 2;
 
 /// What a guarded step remembers.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use super::inputs::norm_weights;
 use super::timing::Marks;
 use super::{GpuSolver, Ready};
 use crate::model::Model;
-use crate::settings::{Acceleration, Method, RelaxationForm};
+use crate::settings::{Method, RelaxationForm};
 use crate::solver::explicit::small_steps;
 use crate::solver::tethers::bundle;
 use crate::solver::{Inputs, StepError};
@@ -23,13 +23,13 @@ pub(super) struct FrameConstants {
     pub rescale: f32,
     pub relaxation_multipliers: f32,
     pub relaxation_positions: f32,
-    pub rebase_factor: f32,
-    pub bound_share: f32,
     pub update_count: u32,
+    pub part_count: u32,
     pub small_dt: f32,
     pub inverse_small_dt: f32,
     pub small_steps: u32,
     pub chebyshev_damping: f32,
+    pub chebyshev_radius: f32,
 }
 
 /// Dispatches of iterations, or of small steps, in one submission. Drivers reset a device whose submission
@@ -161,9 +161,8 @@ impl GpuSolver {
             true if last > 0.0 && last != dt => (dt / last) * (dt / last),
             true => 1.0,
         };
-        let is_xpbd = settings.method == Method::Xpbd;
         let small_dt = dt / f64::from(small_steps);
-        if is_xpbd && settings.acceleration != Acceleration::None && dt != self.weights_dt {
+        if super::accelerates(settings) && dt != self.weights_dt {
             self.weights_dt = dt;
             let weights = norm_weights(model, settings, &self.buffers, dt);
             self.buffers.write(queue, Slot::Weights, bytemuck::cast_slice(&weights));
@@ -180,13 +179,13 @@ impl GpuSolver {
                 RelaxationForm::Published => 1.0,
             },
             relaxation_positions: omega,
-            rebase_factor: self.shares[0],
-            bound_share: self.shares[1],
             update_count: self.updates.len() as u32,
+            part_count: self.part_count as u32,
             small_dt: small_dt as f32,
             inverse_small_dt: (1.0 / small_dt) as f32,
             small_steps,
             chebyshev_damping: settings.chebyshev_damping as f32,
+            chebyshev_radius: settings.chebyshev_radius as f32,
         };
         self.device.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&constants));
     }

@@ -136,7 +136,7 @@ impl GpuSolver {
             put(Slot::Copies, &all);
         }
         if !work.loads.is_empty() {
-            put(Slot::Loads, &Layout::new(model).loads(model, &work.loads));
+            put(Slot::Loads, &Layout::new(model, &self.settings).loads(model, &work.loads));
         }
     }
 }
