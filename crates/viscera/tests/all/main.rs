@@ -29,6 +29,7 @@ mod live;
 mod mesh;
 mod mesh_damage;
 mod mesh_io;
+mod parts;
 mod physics;
 mod scene_errors;
 mod scene_files;

@@ -4,7 +4,7 @@ use super::buffers::Slot;
 use super::device::{Device, Pipeline};
 use crate::elements::TetForm;
 use crate::elements::wgsl;
-use crate::solver::potential::TISSUE_WGSL;
+use crate::solver::tissue::TISSUE_WGSL;
 
 /// A kernel: an entry point of one of the files, with the storage that it names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -34,9 +34,10 @@ mod switch;
 mod timing;
 
 use super::StepError;
-use super::cpu::{bound_share, rebase_factor, sizes};
+use super::cpu::sizes;
 use super::explicit::Stability;
 use super::plan::Plan;
+use super::rebase::{bound_share, rebase_factor};
 use super::tethers::Bundle;
 use crate::model::Model;
 use crate::scalar::Vec3;
@@ -226,7 +227,10 @@ impl GpuSolver {
             parts: (buffers.parts_start as usize, model.part_count()),
             updates: Vec::new(),
             update_of: vec![u32::MAX; model.vertex_count()],
-            shares: [rebase_factor(model, settings) as f32, bound_share(model) as f32],
+            shares: [
+                rebase_factor(model.is_split(), model.color_count, settings) as f32,
+                bound_share(model.is_split()) as f32,
+            ],
             has_moved_anchors: true,
             stability: Stability::new(is_explicit.then_some(model), settings),
             tethers: Vec::new(),
