@@ -9,7 +9,7 @@
 
 use super::Inputs;
 use super::cpu::Workspace;
-use super::potential::Tissue;
+use super::tissue::Tissue;
 use crate::elements::{attachment, deformation_gradient, internal_forces, spring};
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};

@@ -7,6 +7,8 @@
 //! else three steps of descent from x_s: d_i = -grad_i Phi / (m_i + sum curvature), Armijo
 //! ```
 //!
+//! Every connected part of the model is judged, and taken back, by itself: no other is even looked at again.
+//!
 //! A bound by `Phi(x_n)` bounds the stored energy (the kinetic energy is left to the energy limit,
 //! `energy.rs`); a bound by `Phi(xt)` alone lets nearly everything pass. **The multipliers are kept** after a rejection: recomputing them from positions
 //! looks safer and holds stiff tissue fast, because the next sweeps start from what has just failed.
@@ -15,8 +17,10 @@
 //! else the plain sweep if its is not, else go on from it once; at the second failure in a row one
 //! step of descent from the best. `x_s` is then the best iterate.
 
-use super::cpu::{Ground, Step, Workspace, gather};
+use super::cpu::{Ground, Step, Workspace};
+use super::iterates::scatter;
 use super::potential::{Potential, load_forces};
+use super::rebase::gather;
 use super::sweep::read_vec3;
 use crate::model::Model;
 use crate::scalar::lanes::Point;
@@ -35,7 +39,10 @@ pub(super) const SUFFICIENT: f64 = 1e-4;
 pub(super) const SHORTEN: f64 = 0.4;
 pub(super) const SHORTENINGS: usize = 12;
 
-/// How a guarded step ended.
+/// How a guarded step ended, for one connected part of the model or for all of them.
+///
+/// Of all parts together, potential, limit and noise are those of the part that ended highest above its limit,
+/// or least below it; so that [`StepReport::keeps_limit`] speaks for every part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReport {
     /// Incremental potential [J s^2] at the end of the step.
@@ -44,10 +51,10 @@ pub struct StepReport {
     pub limit: f64,
     /// What round-off can pretend of `potential` [J s^2]; at most this much above `limit` passes.
     pub noise: f64,
-    /// Whether the sweeps ended above the limit, so that the step was taken back.
+    /// Whether the sweeps ended above the limit, so that the step was taken back: the part's, or any part's.
     pub rejected: bool,
-    /// The share of its velocities that the energy limit left to the part of the model that it
-    /// slowed most; 1 where it did not act.
+    /// The share of its velocities that the energy limit left to the part, or to the part that it slowed
+    /// most; 1 where it did not act.
     pub kept_speed: f64,
 }
 
@@ -86,183 +93,246 @@ pub(super) struct Guard<S> {
     start: Vec<Point<S>>,
     /// Positions under test [m].
     trial: Vec<Point<S>>,
+    parts: Vec<PartGuard>,
+    /// Steps so far that were taken back for at least one part.
+    pub rejected: u64,
+    /// How the last step ended for each part.
+    reports: Vec<StepReport>,
+    /// Whether there has been one.
+    is_over: bool,
+}
+
+/// Of one part of the model.
+#[derive(Clone, Copy, Debug, Default)]
+struct PartGuard {
+    /// [J s^2].
     limit: f64,
     /// `Phi` [J s^2] at `x_s`.
     best: f64,
     /// Plain sweeps in a row that have ended above it.
     failures: u32,
-    /// Steps taken back so far.
-    pub rejected: u64,
-    /// How the last step ended.
-    pub report: Option<StepReport>,
 }
 
 impl<S: Real> Guard<S> {
-    pub fn new(vertices: usize) -> Self {
-        let positions = vec![Point::default(); vertices];
+    /// For a model, or for none.
+    pub fn new(model: Option<&Model<S>>) -> Self {
+        let positions = vec![Point::default(); model.map_or(0, Model::vertex_count)];
+        let parts = model.map_or(0, Model::part_count);
+        let report =
+            StepReport { potential: 0.0, limit: 0.0, noise: 0.0, rejected: false, kept_speed: 1.0 };
         Self {
             start: positions.clone(),
             trial: positions,
-            limit: 0.0,
-            best: 0.0,
-            failures: 0,
+            parts: vec![PartGuard::default(); parts],
             rejected: 0,
-            report: None,
+            reports: vec![report; parts],
+            is_over: false,
         }
     }
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.start[..]) + size_of_val(&self.trial[..])
+        size_of_val(&self.start[..])
+            + size_of_val(&self.trial[..])
+            + size_of_val(&self.parts[..])
+            + size_of_val(&self.reports[..])
+    }
+
+    /// How the last step ended for each part; nothing before the first.
+    pub fn part_reports(&self) -> &[StepReport] {
+        if self.is_over { &self.reports } else { &[] }
+    }
+
+    /// How the last step ended.
+    pub fn report(&self) -> Option<StepReport> {
+        StepReport::of_all(self.part_reports())
+    }
+
+    /// Enters the share of its velocities that the energy limit has left to a part.
+    pub fn set_kept_speed(&mut self, part: usize, share: f64) {
+        self.reports[part].kept_speed = share;
     }
 }
 
 impl<S: Real> Workspace<S> {
-    fn potential_at(&mut self, step: &Step<'_, S>, x: &[Point<S>]) -> Potential {
-        self.evaluator.evaluate(&self.ground, step, x)
-    }
-
-    /// As [`Self::potential_at`] the positions.
-    fn potential_here(&mut self, step: &Step<'_, S>) -> Potential {
-        self.evaluator.evaluate(&self.ground, step, &self.points)
+    /// `Phi` of one part at the positions.
+    fn potential_here(&mut self, step: &Step<'_, S>, part: usize) -> Potential {
+        self.evaluator.evaluate(&self.ground, step, &self.points, part)
     }
 
     /// [`super::plan::Stage::ChooseStart`].
     pub(super) fn choose_start(&mut self, step: &Step<'_, S>) {
         self.guard.start.copy_from_slice(&self.points);
-        self.guard.limit = self.potential_here(step).value;
+        self.evaluator.evaluate_all(&self.ground, step, &self.points);
+        for (part, potential) in self.guard.parts.iter_mut().zip(&self.evaluator.potentials) {
+            part.limit = potential.value;
+        }
         for from_rest in [true, false] {
-            let mut trial = std::mem::take(&mut self.guard.trial);
             let Ground { previous, predicted, .. } = &self.ground;
+            let trial = &mut self.guard.trial;
             trial.copy_from_slice(if from_rest { previous } else { predicted });
             for pin in &step.inputs.pins {
                 trial[step.model.numbering.of(pin.vertex)].set_vec3(pin.target);
             }
-            let value = self.potential_at(step, &trial).value;
+            self.evaluator.evaluate_all(&self.ground, step, trial);
             if from_rest {
                 self.begin_energy(step);
             }
-            // Written so that a limit that is no number gives way.
-            if value < self.guard.limit || !self.guard.limit.is_finite() {
-                self.guard.limit = value;
-                self.guard.start.copy_from_slice(&trial);
+            let Guard { start, trial, parts, .. } = &mut self.guard;
+            for (number, of) in step.model.parts.iter().enumerate() {
+                let (part, value) = (&mut parts[number], self.evaluator.potentials[number].value);
+                // Written so that a limit that is no number gives way.
+                if value < part.limit || !part.limit.is_finite() {
+                    part.limit = value;
+                    let vertices = of.vertices.clone();
+                    start[vertices.clone()].copy_from_slice(&trial[vertices]);
+                }
             }
-            self.guard.trial = trial;
         }
-        self.guard.best = self.guard.limit;
-        self.guard.failures = 0;
+        for part in &mut self.guard.parts {
+            part.best = part.limit;
+            part.failures = 0;
+        }
     }
 
     /// [`super::plan::Stage::GuardIterate`].
     pub(super) fn guard_iterate(&mut self, step: &Step<'_, S>, multipliers: &mut [S]) {
-        if self.is_best(step) {
-            return;
-        }
-        let (plain, is_mixed) = self.anderson.newest();
-        if is_mixed {
-            let (plain_positions, plain_multipliers) = plain.split_at(3 * self.points.len());
-            for (v, point) in self.points.iter_mut().enumerate() {
-                point.set_vec3(read_vec3(plain_positions, 3 * v));
+        self.evaluator.evaluate_all(&self.ground, step, &self.points);
+        for part in 0..step.model.part_count() {
+            if !self.is_best(step, part) {
+                self.guard_mixture(step, multipliers, part);
             }
-            multipliers.copy_from_slice(plain_multipliers);
-            if self.is_best(step) {
+        }
+    }
+
+    /// What becomes of a part whose iterate is above the best so far.
+    fn guard_mixture(&mut self, step: &Step<'_, S>, multipliers: &mut [S], part: usize) {
+        let of = &step.model.parts[part];
+        let (positions, plain_multipliers, is_mixed) = self.mixings[part].plain(of);
+        if is_mixed {
+            for (v, point) in self.points[of.vertices.clone()].iter_mut().enumerate() {
+                point.set_vec3(read_vec3(positions, 3 * v));
+            }
+            scatter(of, plain_multipliers, multipliers);
+            self.potential_here(step, part);
+            if self.is_best(step, part) {
                 return;
             }
         }
-        self.guard.failures += 1;
-        if self.guard.failures < TOLERATED {
+        self.guard.parts[part].failures += 1;
+        if self.guard.parts[part].failures < TOLERATED {
             return;
         }
         let mut trial = std::mem::take(&mut self.guard.trial);
-        trial.copy_from_slice(&self.guard.start);
-        self.descend(step, &mut trial);
-        self.take(&trial);
+        let vertices = of.vertices.clone();
+        trial[vertices.clone()].copy_from_slice(&self.guard.start[vertices]);
+        self.descend(step, &mut trial, part);
+        self.take(step, &trial, part);
         self.guard.trial = trial;
-        self.is_best(step);
-        self.guard.failures = 0;
+        self.potential_here(step, part);
+        self.is_best(step, part);
+        self.guard.parts[part].failures = 0;
         // The older sweeps started elsewhere.
-        self.anderson.start();
+        self.mixings[part].anderson.start();
     }
 
-    /// Takes positions over; weights stay.
-    fn take(&mut self, x: &[Point<S>]) {
-        for (point, x) in self.points.iter_mut().zip(x) {
-            point.set_vec3(x.vec3());
+    /// Takes positions of a part over; weights stay.
+    fn take(&mut self, step: &Step<'_, S>, x: &[Point<S>], part: usize) {
+        for v in step.model.parts[part].vertices.clone() {
+            self.points[v].set_vec3(x[v].vec3());
         }
     }
 
-    /// Whether the iterate is at least as good as the best so far; becomes it where it is better.
-    fn is_best(&mut self, step: &Step<'_, S>) -> bool {
-        let Potential { value, noise } = self.potential_here(step);
-        if value < self.guard.best {
-            self.guard.best = value;
-            self.guard.start.copy_from_slice(&self.points);
+    /// Whether a part's iterate, whose potential was evaluated last, is at least as good as the best so far;
+    /// becomes it where it is better.
+    fn is_best(&mut self, step: &Step<'_, S>, part: usize) -> bool {
+        let Potential { value, noise } = self.evaluator.potentials[part];
+        let Guard { start, parts, .. } = &mut self.guard;
+        let guard = &mut parts[part];
+        if value < guard.best {
+            guard.best = value;
+            let vertices = step.model.parts[part].vertices.clone();
+            start[vertices.clone()].copy_from_slice(&self.points[vertices]);
         }
-        let good = value <= self.guard.best + noise;
+        let good = value <= guard.best + noise;
         if good {
-            self.guard.failures = 0;
+            guard.failures = 0;
         }
         good
     }
 
     /// [`super::plan::Stage::GuardStep`].
     pub(super) fn guard_step(&mut self, step: &Step<'_, S>) {
-        let swept = self.potential_here(step);
-        let swept = self.report(swept);
-        if swept.keeps_limit() {
-            self.guard.report = Some(swept);
-            return;
+        self.evaluator.evaluate_all(&self.ground, step, &self.points);
+        let mut rejected = false;
+        for part in 0..step.model.part_count() {
+            let swept = self.report(part);
+            self.guard.reports[part] = if swept.keeps_limit() {
+                swept
+            } else {
+                rejected = true;
+                StepReport { rejected: true, ..self.take_back(step, part) }
+            };
         }
-        self.guard.rejected += 1;
+        self.guard.rejected += u64::from(rejected);
+        self.guard.is_over = true;
+    }
+
+    /// Shortens the step of a part, or descends.
+    fn take_back(&mut self, step: &Step<'_, S>, part: usize) -> StepReport {
+        let vertices = step.model.parts[part].vertices.clone();
         let mut trial = std::mem::take(&mut self.guard.trial);
         let shortened = SHARES.into_iter().find_map(|share| {
             let share = S::from_f64(share);
-            for v in 0..trial.len() {
+            for v in vertices.clone() {
                 let start = self.guard.start[v].vec3();
                 trial[v].set_vec3(start + (self.points[v].vec3() - start) * share);
             }
-            let potential = self.potential_at(step, &trial);
-            Some(self.report(potential)).filter(StepReport::keeps_limit)
+            self.evaluator.evaluate(&self.ground, step, &trial, part);
+            Some(self.report(part)).filter(StepReport::keeps_limit)
         });
         let report = shortened.unwrap_or_else(|| {
-            trial.copy_from_slice(&self.guard.start);
+            trial[vertices.clone()].copy_from_slice(&self.guard.start[vertices.clone()]);
             for _ in 0..DESCENTS {
-                self.descend(step, &mut trial);
+                self.descend(step, &mut trial, part);
             }
-            let potential = self.potential_at(step, &trial);
-            self.report(potential)
+            self.evaluator.evaluate(&self.ground, step, &trial, part);
+            self.report(part)
         });
-        self.guard.report = Some(StepReport { rejected: true, ..report });
-        self.take(&trial);
+        self.take(step, &trial, part);
         self.guard.trial = trial;
+        report
     }
 
-    fn report(&self, Potential { value, noise }: Potential) -> StepReport {
+    /// Of a part, whose potential was evaluated last.
+    fn report(&self, part: usize) -> StepReport {
+        let Potential { value, noise } = self.evaluator.potentials[part];
         StepReport {
             potential: value,
-            limit: self.guard.limit,
+            limit: self.guard.parts[part].limit,
             noise,
             rejected: false,
             kept_speed: 1.0,
         }
     }
 
-    /// One step of descent from `x`. The positions, which are not needed any more, hold the places
+    /// One step of descent of a part from `x`. Its positions, which are not needed any more, hold the places
     /// tried.
-    fn descend(&mut self, step: &Step<'_, S>, x: &mut [Point<S>]) {
-        load_forces::<S, true>(&self.ground, step, x, &mut self.loads);
-        let before = self.potential_at(step, x).value;
+    fn descend(&mut self, step: &Step<'_, S>, x: &mut [Point<S>], part: usize) {
+        let of = &step.model.parts[part];
+        load_forces::<S, true>(&self.ground, step, of, x, &mut self.loads);
+        let before = self.evaluator.evaluate(&self.ground, step, x, part).value;
         let mut length = 1.0;
         for _ in 0..SHORTENINGS {
             let mut slope = 0.0;
-            for v in 0..x.len() {
+            for v in of.vertices.clone() {
                 let (gradient, direction) = self.descent(step.model, x, v);
                 slope += gradient.dot(direction).to_f64();
                 self.points[v].set_vec3(x[v].vec3() + direction * S::from_f64(length));
             }
-            let after = self.potential_here(step).value;
+            let after = self.potential_here(step, part).value;
             if after <= before + SUFFICIENT * length * slope {
-                x.copy_from_slice(&self.points);
+                x[of.vertices.clone()].copy_from_slice(&self.points[of.vertices.clone()]);
                 return;
             }
             length *= SHORTEN;

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Kept multipliers tell where the body comes from. Where that means nothing any more, because the
-//! caller has put vertices elsewhere or the multipliers are no numbers, these take their place.
+//! caller has put vertices elsewhere or multipliers of a connected part are no numbers, these take their place.
 //! After a rejected step they must not: see [`super::guard`].
 //!
 //! Pins that are let go keep the history, however hard they pulled. Forgetting it then (all
@@ -23,6 +23,7 @@ use super::potential::measure_strain;
 use super::tets::{Block, TetPass, load_rows};
 use super::threads::Shared;
 use crate::elements::{attachment, deformation_gradient, green_strain, spring};
+use crate::model::Part;
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::state::State;
@@ -33,40 +34,49 @@ impl<S: Real> Workspace<S> {
     pub(super) fn restart(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
         self.read_positions(step.model, state);
         let ground = &mut self.ground;
-        measure_strain(&ground.workers, step.model, &self.points, &mut ground.start_strain);
-        self.constitutive_multipliers(step, &mut state.multipliers);
+        measure_strain(&ground.workers, step.model, None, &self.points, &mut ground.start_strain);
+        for part in step.model.parts.iter() {
+            self.constitutive_multipliers(step, part, &mut state.multipliers);
+        }
         state.multiplier_dt = step.dt;
     }
 
     /// [`super::plan::Stage::RepairMultipliers`].
     pub(super) fn repair_multipliers(&self, step: &Step<'_, S>, multipliers: &mut [S]) {
-        if !multipliers.iter().all(|l| l.is_finite()) {
-            self.constitutive_multipliers(step, multipliers);
+        for part in step.model.parts.iter() {
+            let mut of_part = part.multipliers.iter().map(|range| &multipliers[range.clone()]);
+            if !of_part.all(|range| range.iter().all(|l| l.is_finite())) {
+                self.constitutive_multipliers(step, part, multipliers);
+            }
         }
     }
 
-    fn constitutive_multipliers(&self, step: &Step<'_, S>, l: &mut [S]) {
+    fn constitutive_multipliers(&self, step: &Step<'_, S>, part: &Part, l: &mut [S]) {
         let model = step.model;
         let x = &self.points;
         let shared = Shared::new(l);
-        for (set, start_strain) in model.tet_sets().into_iter().zip(&self.ground.start_strain) {
+        for (kind, set) in model.tet_sets().into_iter().enumerate() {
+            let start_strain = &self.ground.start_strain[kind];
             with_form!(set.form, F => {
                 let form = PhantomData::<F>;
                 let pass = Constitutive { x, start_strain, dt: step.dt, l: &shared, form };
-                self.ground.workers.pass(model, set, 0..set.block_count(), &pass);
+                for blocks in part.blocks(kind) {
+                    self.ground.workers.pass(model, set, blocks, &pass);
+                }
             });
         }
         let squared = S::from_f64(step.dt * step.dt);
         let springs = &model.springs;
-        for (i, ends) in springs.vertices.iter().enumerate() {
-            let ends = ends.map(|v| x[model.numbering.of(v)].vec3());
+        for i in part.springs() {
+            let ends = springs.vertices[i].map(|v| x[model.numbering.of(v)].vec3());
             let compliance_tilde = S::ONE / (springs.stiffness[i] * squared);
             l[springs.multiplier_offset + i] =
                 spring::constitutive_multiplier(&ends, springs.rest_length[i], compliance_tilde);
         }
         let attachments = &model.attachments;
         let anchors = step.inputs.anchors_of(model);
-        for (i, &v) in attachments.vertices.iter().enumerate() {
+        for i in part.attachments() {
+            let v = attachments.vertices[i];
             let anchor = anchors[attachments.order[i] as usize];
             let compliance_tilde = S::ONE / (attachments.stiffness[i] * squared);
             let at = attachments.multiplier_offset + 3 * i;
@@ -75,8 +85,10 @@ impl<S: Real> Workspace<S> {
             l[at..at + 3].copy_from_slice(&pull.to_array());
         }
         // Of a tetrahedron too large for the number format nothing can be told.
-        for l in l.iter_mut().filter(|l| !l.is_finite()) {
-            *l = S::ZERO;
+        for range in &part.multipliers {
+            for l in l[range.clone()].iter_mut().filter(|l| !l.is_finite()) {
+                *l = S::ZERO;
+            }
         }
     }
 }

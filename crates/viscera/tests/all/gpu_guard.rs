@@ -307,6 +307,8 @@ fn portable_limit_that_is_no_number_lets_nothing_pass() {
     let mut builder = ModelBuilder::new();
     builder.add_body(&mesh, &material(STVK, 1e4, 0.3)).expect("a body");
     builder.add_body(&mesh, &material(SNH, 1e4, 0.3)).expect("a body");
+    // One part, whose energies are added up.
+    builder.add_spring([0, count as u32], 1e-9, None).expect("a spring");
     let model = builder.build::<f32>(&settings).expect("a model");
     // The first body so large that its energy overflows, also where it is going to: an infinite limit.
     let mut state = State::at_rest(&model);

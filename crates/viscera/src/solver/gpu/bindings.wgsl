@@ -92,13 +92,7 @@ struct Frame {
     update_count: u32,
     // Connected parts.
     part_count: u32,
-    // Of an explicit method: the small step [s], one over it, how many there are.
-    small_dt: f32,
-    inverse_small_dt: f32,
-    small_steps: u32,
     chebyshev_damping: f32,
-    // The radius that iterations start with.
-    chebyshev_radius: f32,
 }
 
 @group(0) @binding(0) var<storage, read> tets: array<TetBlock>;

@@ -45,6 +45,7 @@ pub enum Slot {
     Starts,
     Ground,
     Table,
+    SmallSteps,
 }
 
 impl Slot {

@@ -1,8 +1,10 @@
 // What the device decides during a step: no result comes back to the host inside one.
 
 struct Control {
-    // Explicit method: small steps done.
+    // Explicit method: the small step that is made, and how many are done. One is written where the other
+    // is read.
     small_step: u32,
+    small_steps_done: u32,
     // Steps so far, the last that was taken back for some part, and how many were.
     step: u32,
     rejected_step: atomic<u32>,

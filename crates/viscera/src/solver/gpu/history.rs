@@ -73,7 +73,7 @@ impl GpuSolver {
     ) -> Result<(), StepError> {
         self.check_model(model)?;
         crate::solver::check_step(dt, model, inputs)?;
-        self.prepare_step(model, inputs, dt, 1);
+        self.prepare_step(model, inputs, dt);
         self.submit("restart", &[&self.restart], Marks::default());
         self.multiplier_dt = dt;
         Ok(())

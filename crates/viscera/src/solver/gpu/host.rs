@@ -31,10 +31,9 @@ pub fn host_layouts() -> Vec<HostLayout> {
         }),
         record!("Frame" FrameConstants {
             gravity dt squared_dt inverse_dt rescale relaxation_multipliers relaxation_positions
-            update_count part_count small_dt inverse_small_dt small_steps chebyshev_damping
-            chebyshev_radius
+            update_count part_count chebyshev_damping
         }),
-        record!("Control" Control { small_step step rejected_step rejected parts }),
+        record!("Control" Control { small_step small_steps_done step rejected_step rejected parts }),
         record!("PartControl" PartControl {
             sweeps next differences last_norm shares gram iteration omega radius last_change limit
             was_rejected share descends potential noise kept_speed best_value failures

@@ -4,7 +4,7 @@ use super::buffers::Slot;
 use super::device::{Device, Pipeline};
 use crate::elements::TetForm;
 use crate::elements::wgsl;
-use crate::solver::potential::TISSUE_WGSL;
+use crate::solver::tissue::TISSUE_WGSL;
 
 /// A kernel: an entry point of one of the files, with the storage that it names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -86,8 +86,8 @@ kernels! {
     APPLY_UPDATES = Vertices "apply_updates" 64 [Predicted Acting Targets Updates Control];
     PREDICT = Vertices "predict" 64
         [Points Velocities Previous Predicted Acting Targets Starts];
-    REBASE = Vertices "rebase" 64 [Offsets Points Loads Previous Predicted Acting Table];
-    RECOMPUTE_POSITIONS = Vertices "recompute_positions" 64 [Offsets Points Loads Predicted Acting];
+    REBASE = Vertices "rebase" 64 [Points Loads Previous Predicted Acting Table];
+    RECOMPUTE_POSITIONS = Vertices "recompute_positions" 64 [Points Loads Predicted Acting Table];
     SPLIT_COPIES = Vertices "split_copies" 64 [Offsets Points Copies];
     JOIN_COPIES = Vertices "join_copies" 64 [Offsets Points Copies];
     UPDATE_VELOCITIES = Vertices "update_velocities" 64 [Points Velocities Previous];
@@ -118,11 +118,11 @@ kernels! {
     REPAIR_MULTIPLIERS = History "repair_multipliers" 64
         [Tets StartStrain Unknowns Control Springs Attachments Anchors Table];
     BEGIN_EXPLICIT = Explicit "begin_explicit" 64 [Points Velocities Previous Predicted Control];
-    BEGIN_STRAIN = Explicit "begin_strain" 64 [Tets Points Predicted StartStrain];
+    BEGIN_STRAIN = Explicit "begin_strain" 64 [Tets Points Predicted StartStrain Table];
     LOAD_FORCES = Explicit "load_forces" 64
-        [Tets Materials CornerIndices Points Loads StartStrain Control Springs];
+        [Tets CornerIndices Points Loads StartStrain Control Springs Table];
     ADVANCE_EXPLICIT = Explicit "advance_explicit" 64
-        [Offsets Points Loads Velocities Previous Acting Targets Control];
+        [Points Loads Velocities Previous Acting Targets Control Table];
     END_EXPLICIT = Explicit "end_explicit" 64 [Points Velocities Predicted Acting];
     CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control Table];
     EVALUATE = Evaluate "evaluate" 256 [Tets Points StartStrain PartialSums Control Ground Table];

@@ -4,11 +4,11 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::buffers::{ALIGNMENT, Attachment, Range, Slot, Spring, unknowns_size};
-use super::parts::{PartRow, Parts};
+use super::parts::{PartRow, Parts, SmallSteps};
 use super::record::Pieces;
 use crate::model::Model;
 use crate::scalar::lanes::LANES;
-use crate::settings::SolverSettings;
+use crate::settings::{Method, SolverSettings};
 
 /// The material of a lane that only fills a block up.
 pub(super) const FILLING: u32 = u32::MAX;
@@ -46,6 +46,7 @@ pub(super) struct Header {
     pub runs: u32,
     pub block_parts: u32,
     pub weights: u32,
+    pub small_steps: u32,
     /// Vertices from one range of the ground to the next, and where anchors begin.
     pub stride: u32,
     pub anchors: u32,
@@ -241,6 +242,10 @@ impl Layout {
             part_count: model.part_count() as u32,
             ..Header::default()
         };
+        if settings.method == Method::Explicit {
+            let small = vec![SmallSteps::default(); model.part_count()];
+            header.small_steps = add(Some(Slot::SmallSteps), bytemuck::cast_slice(&small));
+        }
         if super::accelerates(settings) {
             let weights = vec![0; unknowns_size(model) as usize];
             header.weights = add(Some(Slot::Weights), &weights);
@@ -386,7 +391,7 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
     let mut all = words!(Header {
         "MATERIALS_AT" materials "CORNERS_AT" corners "OFFSETS_AT" offsets "SPRINGS_AT" springs
         "ATTACHMENTS_AT" attachments "PIECES_AT" pieces "MEMBERS_AT" members "PARTS_AT" parts
-        "RUNS_AT" runs "BLOCK_PARTS_AT" block_parts "WEIGHTS_AT" weights "STRIDE_AT" stride
+        "RUNS_AT" runs "BLOCK_PARTS_AT" block_parts "WEIGHTS_AT" weights "SMALL_STEPS_AT" small_steps "STRIDE_AT" stride
         "ANCHORS_AT" anchors "LINES_AT" lines "ENERGIES_AT" energies "TET_LANES_AT" tet_lanes
         "NEO_HOOKEAN_FROM_AT" neo_hookean_from "SPRING_COUNT_AT" spring_count
         "PART_COUNT_AT" part_count
@@ -402,7 +407,11 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
         "PART_BOUND_SHARE" bound_share
     }));
     let size = |bytes: usize| (bytes / 4) as u32;
+    all.extend(words!(SmallSteps {
+        "SMALL_COUNT" count "SMALL_DT" dt "SMALL_INVERSE_DT" inverse_dt
+    }));
     all.extend([
+        ("SMALL_WORDS", size(size_of::<SmallSteps>())),
         ("PIECE_WORDS", size(size_of::<Piece>())),
         ("PART_WORDS", size(size_of::<PartRow>())),
         ("SPRING_WORDS", size(size_of::<Spring>())),

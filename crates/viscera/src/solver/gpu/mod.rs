@@ -54,6 +54,7 @@ pub use frames::Frame;
 use frames::Frames;
 pub use host::{HostLayout, host_layouts};
 use layout::Layout;
+use parts::SmallSteps;
 use record::{Dispatch, Job, Recorder};
 use step::FrameConstants;
 pub use surface::{GpuSurface, Skin};
@@ -127,6 +128,7 @@ pub struct GpuSolver {
     /// Springs to places outside in the last step.
     tethers: Vec<Bundle<f32>>,
     holds: Vec<Hold>,
+    small_steps: Vec<SmallSteps>,
 }
 
 impl GpuSolver {
@@ -236,6 +238,10 @@ impl GpuSolver {
             stability: Stability::new(is_explicit.then_some(model), settings),
             tethers: Vec::new(),
             holds: if is_explicit { Hold::all(model) } else { Vec::new() },
+            small_steps: vec![
+                SmallSteps::default();
+                if is_explicit { model.part_count() } else { 0 }
+            ],
             buffers,
         };
         solver.upload_constants(model);

@@ -7,7 +7,7 @@ use super::buffers::multipliers_start;
 use super::layout::{Piece, SUM_GROUPS};
 use crate::model::{Model, Part};
 use crate::settings::SolverSettings;
-use crate::solver::cpu::{bound_share, rebase_factor};
+use crate::solver::rebase::{bound_share, rebase_factor};
 
 /// What stands in the table for a part.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -29,6 +29,23 @@ pub(super) struct PartRow {
     /// Numbers of the rebase before a sweep.
     pub rebase_factor: f32,
     pub bound_share: f32,
+}
+
+/// The small steps of a part in a step of an explicit method: how many, of what length [s], and one over it.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct SmallSteps {
+    pub count: u32,
+    pub dt: f32,
+    pub inverse_dt: f32,
+}
+
+impl SmallSteps {
+    /// So many in a step of `dt` [s].
+    pub fn new(count: u32, dt: f64) -> Self {
+        let small = dt / f64::from(count);
+        Self { count, dt: small as f32, inverse_dt: (1.0 / small) as f32 }
+    }
 }
 
 /// A run of the long vector: where it begins in that of the part, and in that of the model.
@@ -71,8 +88,8 @@ impl Parts {
                 runs,
                 runs_end: parts.runs.len() as u32,
                 length,
-                rebase_factor: rebase_factor(model, settings) as f32,
-                bound_share: bound_share(model) as f32,
+                rebase_factor: rebase_factor(part.is_split(), part.colors.len(), settings) as f32,
+                bound_share: bound_share(part.is_split()) as f32,
             });
         }
         parts

@@ -168,7 +168,9 @@ impl<'a> Recorder<'a> {
             Stage::ReadState | Stage::WriteState => {}
             Stage::MeasureStrain => self.each_set(&kernels::MEASURE_STRAIN, into),
             Stage::Predict(start) => {
-                into.push(self.vertices(&kernels::APPLY_UPDATES, 1));
+                let mut begin = self.vertices(&kernels::APPLY_UPDATES, 1);
+                begin.job.parameter = self.settings.chebyshev_radius as f32;
+                into.push(begin);
                 let mode = match start {
                     Start::Previous => 0,
                     Start::Inertial => 1,

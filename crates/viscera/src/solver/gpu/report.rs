@@ -12,6 +12,7 @@ use crate::solver::acceleration::LARGEST_WINDOW;
 #[repr(C)]
 pub(super) struct Control {
     pub small_step: u32,
+    pub small_steps_done: u32,
     pub step: u32,
     pub rejected_step: u32,
     pub rejected: u32,
@@ -86,15 +87,26 @@ impl GpuSolver {
         Ok(StepReport::of_all(&self.part_reports()?))
     }
 
+    /// What the search of the last step came to for each connected part: the share of the step that passed, and
+    /// whether descents took its place.
+    #[doc(hidden)]
+    pub fn last_searches(&self) -> Result<Vec<[f32; 2]>, GpuError> {
+        let records = self.part_records()?;
+        Ok(records.iter().map(|part| [part.share, part.descends as f32]).collect())
+    }
+
     /// How the last step ended for each connected part of the model, see [`crate::model::Model::part_of`];
     /// empty before the first, and where steps are not guarded. Waits for the device.
     pub fn part_reports(&self) -> Result<Vec<StepReport>, GpuError> {
         if !self.settings.guards_steps() || self.multiplier_dt == 0.0 {
             return Ok(Vec::new());
         }
+        Ok(self.part_records()?.iter().map(PartControl::report).collect())
+    }
+
+    fn part_records(&self) -> Result<Vec<PartControl>, GpuError> {
         let control = self.read_buffer(Slot::Control)?;
         let records = control[PARTS_START..].chunks_exact(size_of::<PartControl>());
-        let records = records.take(self.part_count).map(bytemuck::pod_read_unaligned);
-        Ok(records.map(|part: PartControl| part.report()).collect())
+        Ok(records.take(self.part_count).map(bytemuck::pod_read_unaligned).collect())
     }
 }

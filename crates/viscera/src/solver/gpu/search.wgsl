@@ -173,15 +173,6 @@ fn direction_of(v: u32, origin: vec3f) -> Direction {
     return Direction(descent, dot(gradient, descent));
 }
 
-fn gather(v: u32) -> vec4f {
-    let row = table[OFFSETS_AT] + v;
-    var sum = vec4f();
-    for (var slot = table[row]; slot < table[row + 1u]; slot++) {
-        sum += loads[slot];
-    }
-    return sum;
-}
-
 // How many places are tried, and which is the `k`-th: all shares, or zero and all lengths, each from the one
 // before it.
 fn line_count() -> u32 {

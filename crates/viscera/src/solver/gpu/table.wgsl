@@ -35,3 +35,14 @@ fn material_of(kind: u32) -> Material {
     let compliance = Compliance(number(row + 2u), number(row + 3u), number(row + 4u));
     return Material(number(row), number(row + 1u), compliance, number(row + 5u));
 }
+
+// Sum of what acts on a vertex, in the order of its places.
+fn gather(v: u32) -> vec4f {
+    let row = table[OFFSETS_AT] + v;
+    var sum = vec4f();
+    let end = table[row + 1u];
+    for (var slot = table[row]; slot < end; slot++) {
+        sum += loads[slot];
+    }
+    return sum;
+}

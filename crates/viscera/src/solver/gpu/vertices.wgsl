@@ -19,7 +19,7 @@ fn apply_updates(
         control.parts[thread].last_norm = 3e38;
         control.parts[thread].iteration = 0u;
         control.parts[thread].omega = 1.0;
-        control.parts[thread].radius = frame.chebyshev_radius;
+        control.parts[thread].radius = job.parameter;
         control.parts[thread].last_change = 0.0;
     }
     if thread >= frame.update_count {
@@ -71,16 +71,6 @@ fn predict(
         starts[job.set_first + v] = vec4f(select(xt, start, is_pinned), 0.0);
         starts[2u * job.set_first + v] = vec4f(start, 0.0);
     }
-}
-
-// Sum of what acts on a vertex, in the order of its places.
-fn gather(v: u32) -> vec4f {
-    var sum = vec4f();
-    let end = offsets[v + 1u];
-    for (var slot = offsets[v]; slot < end; slot++) {
-        sum += loads[slot];
-    }
-    return sum;
 }
 
 // Stabilised rebase: r = M (x - xt) - J^T l, mh = m + share of the bounds, x -= theta r/mh, w = 1/mh per
