@@ -328,8 +328,8 @@ impl<S: Real> Workspace<S> {
             ground.predicted[v].set_vec3(predicted);
             let x = match start {
                 Start::Previous => x,
-                Start::Inertial => inertial,
-                Start::Predicted | Start::Auto => predicted,
+                Start::Inertial | Start::Auto => inertial,
+                Start::Predicted => predicted,
             };
             self.points[v] = Point::new(x, ground.inverse_masses[v] * copy_count(model, v));
         }
@@ -340,17 +340,50 @@ impl<S: Real> Workspace<S> {
             let predicted =
                 ground.predicted[v].vec3() + pull * (S::ONE / ground.inertias[v]) * (dt * dt);
             ground.predicted[v].set_vec3(predicted);
-            if matches!(start, Start::Predicted | Start::Auto) {
+            if start == Start::Predicted {
                 self.points[v].set_vec3(predicted);
             }
         }
         for pin in &step.inputs.pins {
             self.points[model.numbering.of(pin.vertex)].set_vec3(pin.target);
         }
+        if start == Start::Auto {
+            for part in model.parts.iter() {
+                if !self.ground.holds(part) {
+                    self.start_falling(step, part);
+                }
+            }
+        }
+    }
+
+    /// Starts a part that nothing holds where its center of mass will be. Inner forces do not move that, so
+    /// that no multiplier carries its acceleration; sweeps and a rebase that is not applied in full would
+    /// find it in part only, and the guard would have to take the step back.
+    fn start_falling(&mut self, step: &Step<'_, S>, part: &Part) {
+        let ground = &self.ground;
+        let (mut mass, mut force) = (0.0, Vec3::<f64>::ZERO);
+        for v in part.vertices.clone() {
+            mass += ground.masses[v].to_f64();
+            force += ground.external[v].cast();
+        }
+        let dt = S::from_f64(step.dt);
+        let acceleration = step.inputs.gravity + (force * (1.0 / mass)).cast();
+        for v in part.vertices.clone() {
+            let inertial = ground.previous[v].vec3() + self.velocities[v] * dt;
+            self.points[v].set_vec3(inertial + acceleration * (dt * dt));
+        }
     }
 }
 
 impl<S: Real> Ground<S> {
+    /// Whether a pin, an attachment or a tether holds a part.
+    pub fn holds(&self, part: &Part) -> bool {
+        let mut inverse_masses = self.inverse_masses[part.vertices.clone()].iter();
+        part.attachments().next().is_some()
+            || !self.tethers_of(part).is_empty()
+            || inverse_masses.any(|inverse| *inverse == S::ZERO)
+    }
+
     /// The tethers of a part.
     pub fn tethers_of(&self, part: &Part) -> &[Bundle<S>] {
         let place = |v: usize| self.tethers.partition_point(|tether| tether.vertex < v);

@@ -81,15 +81,12 @@ impl<S: Real> Workspace<S> {
         for (number, (energy, part)) in energies.iter_mut().zip(model.parts.iter()).enumerate() {
             *energy = Energy::default();
             energy.start.stored = self.evaluator.stored[number];
-            energy.held = part.attachments().next().is_some();
+            energy.held = ground.holds(part);
             for tether in ground.tethers_of(part) {
-                energy.held = true;
                 energy.start.stored += tether.energy(ground.previous[tether.vertex].vec3());
             }
             for v in part.vertices.clone() {
-                if ground.inverse_masses[v] == S::ZERO {
-                    energy.held = true;
-                } else {
+                if ground.inverse_masses[v] != S::ZERO {
                     energy.start.add(ground.masses[v].to_f64(), self.velocities[v]);
                 }
             }

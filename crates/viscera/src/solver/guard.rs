@@ -350,3 +350,111 @@ impl<S: Real> Workspace<S> {
         (gradient, gradient * (-S::ONE / (mass + load.w)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Inputs;
+    use super::super::probe::{begun, quiet};
+    use super::*;
+    use crate::material::{Material, MaterialModel};
+    use crate::mesh::TetMesh;
+    use crate::model::ModelBuilder;
+    use crate::settings::SolverSettings;
+
+    /// A tetrahedron that has swollen. Its corners go back together, which the bounds, one vertex at a time,
+    /// know nothing of: in long steps, where inertia is small, a whole step of descent overshoots.
+    fn swollen(settings: &SolverSettings) -> (Model<f64>, Vec<Vec3<f64>>) {
+        let corners = [[1.0; 3], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, 1.0]];
+        let rest = corners.map(|x| Vec3::from_f64(x) * 0.01).to_vec();
+        let mesh = TetMesh::new(rest, vec![[0, 1, 2, 3]], vec![0]).expect("a tetrahedron").0;
+        let law = MaterialModel::StableNeoHookean;
+        let tissue = Material::new(law, 1e4, 0.45, 1000.0).expect("legal");
+        let mut builder = ModelBuilder::new();
+        builder.add_body(&mesh, &tissue).expect("a body");
+        let places = mesh.vertices().iter().map(|x| *x * 1.02).collect();
+        (builder.build(settings).expect("a model"), places)
+    }
+
+    /// Before a descent: places, the places of a whole step of it, `Phi` at both, and the slope.
+    struct Descent {
+        before: Vec<Point<f64>>,
+        whole: Vec<Point<f64>>,
+        values: [f64; 2],
+        slope: f64,
+    }
+
+    fn descent(work: &mut Workspace<f64>, step: &Step<'_, f64>) -> Descent {
+        let before = work.points.clone();
+        load_forces::<_, true>(&work.ground, step, &step.model.parts[0], &before, &mut work.loads);
+        let (mut whole, mut slope) = (before.clone(), 0.0);
+        for v in 0..before.len() {
+            let (gradient, direction) = work.descent(step.model, &before, v);
+            slope += gradient.dot(direction);
+            whole[v].set_vec3(before[v].vec3() + direction);
+        }
+        let values =
+            [&before, &whole].map(|x| work.evaluator.evaluate(&work.ground, step, x, 0).value);
+        Descent { before, whole, values, slope }
+    }
+
+    /// Armijo's condition decides where `Phi` changes by less than 1e-4 of what the slope promises.
+    #[test]
+    fn a_descent_delivers_its_share_of_what_the_slope_promises() {
+        let (settings, inputs) = (SolverSettings::default(), Inputs::default());
+        let (model, places) = swollen(&settings);
+        // What a whole step changes, of what its slope promises: -1/2 in short steps.
+        let change = |dt: f64| {
+            let step = quiet(&model, &inputs, &settings, dt);
+            let Descent { values, slope, .. } = descent(&mut begun(&step, &places), &step);
+            (values[1] - values[0]) / slope.abs()
+        };
+        for (wanted, is_enough) in [(-2e-4, true), (-0.5e-4, false), (0.5e-4, false)] {
+            let (mut short, mut long) = (1e-5, 1.0);
+            assert!(change(short) < wanted && wanted < change(long));
+            for _ in 0..60 {
+                let middle = 0.5 * (short + long);
+                if change(middle) < wanted { short = middle } else { long = middle }
+            }
+            assert!((change(short) - wanted).abs() < 1e-6);
+            let step = quiet(&model, &inputs, &settings, short);
+            let mut work = begun(&step, &places);
+            let Descent { before, whole, values, slope } = descent(&mut work, &step);
+            let mut x = before.clone();
+            work.descend(&step, &mut x, 0);
+            let is_whole = x.iter().zip(&whole).all(|(a, b)| a.vec3() == b.vec3());
+            assert_eq!(is_whole, is_enough, "{wanted}");
+            // How far it went, and what that delivers.
+            let [gone, far] = [&x, &whole].map(|x| (x[0].vec3() - before[0].vec3()).length());
+            let after = work.evaluator.evaluate(&work.ground, &step, &x, 0).value;
+            assert!(gone > 0.0 && after - values[0] <= 1e-4 * (gone / far) * slope, "{wanted}");
+        }
+    }
+
+    /// What is no number, or as infinite as its limit, is not hidden by other parts.
+    #[test]
+    fn the_worst_part_speaks_for_all() {
+        let of = |potential, limit| StepReport {
+            potential,
+            limit,
+            noise: 0.0,
+            rejected: false,
+            kept_speed: 1.0,
+        };
+        let (good, over) = (of(1.0, 2.0), of(3.0, 2.0));
+        let (infinite, unknown) = (of(f64::INFINITY, f64::INFINITY), of(f64::NAN, 1.0));
+        for (parts, keeps) in [
+            (&[good, infinite][..], true),
+            (&[infinite, over, good], false),
+            (&[good, unknown, over], false),
+            (&[over, unknown], false),
+            (&[unknown, good], false),
+        ] {
+            let all = StepReport::of_all(parts).expect("parts");
+            assert_eq!(all.keeps_limit(), keeps, "{parts:?}");
+        }
+        assert_eq!(StepReport::of_all(&[]), None);
+        let rejected = StepReport { rejected: true, kept_speed: 0.5, ..good };
+        let all = StepReport::of_all(&[rejected, over]).expect("parts");
+        assert_eq!(all, StepReport { rejected: true, kept_speed: 0.5, ..over });
+    }
+}

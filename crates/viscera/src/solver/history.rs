@@ -130,3 +130,43 @@ impl<S: Real, F> Constitutive<'_, S, F> {
 }
 
 pass_by_form!(Constitutive store);
+
+#[cfg(test)]
+mod tests {
+    use super::super::Inputs;
+    use super::super::loads::load_multipliers;
+    use super::super::potential::load_forces;
+    use super::super::probe::{begun, everything, quiet, shake};
+    use crate::material::MaterialModel::{SaintVenantKirchhoff, StableNeoHookean};
+    use crate::settings::{NeoHookean, SolverSettings};
+
+    /// In the middle of a motion, so that viscous tissue resists: `J^T l = dt^2 f(x)`, every form, springs
+    /// and attachments, where one multiplier has been no number.
+    #[test]
+    fn repaired_multipliers_are_the_forces_of_the_elements() {
+        for neo_hookean in [NeoHookean::Stretch, NeoHookean::Pair] {
+            let settings = SolverSettings { neo_hookean, ..SolverSettings::default() };
+            let model = everything(&settings, [SaintVenantKirchhoff, StableNeoHookean], 0.4);
+            let inputs = Inputs::default();
+            let step = quiet(&model, &inputs, &settings, 1e-2);
+            let mut work = begun(&step, &model.rest_positions);
+            shake(&mut work.points);
+            let mut multipliers = vec![0.0; model.multiplier_count];
+            multipliers[3] = f64::NAN;
+            work.repair_multipliers(&step, &mut multipliers);
+            let [mut given, mut expected] = [(); 2].map(|()| work.loads.clone());
+            let workers = &work.ground.workers;
+            load_multipliers(workers, &model, &work.points, &multipliers, &mut given);
+            let part = &model.parts[0];
+            load_forces::<_, false>(&work.ground, &step, part, &work.points, &mut expected);
+            let largest = expected.iter().map(|load| load.vec3().length()).fold(0.0, f64::max);
+            for (given, expected) in given.iter().zip(&expected) {
+                let apart = (given.vec3() - expected.vec3()).length();
+                // A hundred roundings of stresses that may cancel.
+                assert!(apart < 1e-12 * largest, "{neo_hookean:?}: {apart:e} of {largest:e}");
+            }
+            // Viscosity is no small part of it.
+            assert!(model.tet_sets().iter().all(|set| set.viscous));
+        }
+    }
+}

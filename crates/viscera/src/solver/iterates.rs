@@ -230,3 +230,42 @@ pub(super) fn fill_multiplier_weights<S: Real>(model: &Model<S>, dt: f64, weight
         weights[at..at + 3].fill(S::ONE / (*stiffness * dt * dt));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Inputs;
+    use super::super::probe::{begun, everything, quiet, shake};
+    use super::*;
+    use crate::material::MaterialModel::SaintVenantKirchhoff;
+    use crate::settings::SolverSettings;
+
+    /// `1/2 sum a~ l^2 = dt^2 Psi` with the multipliers of the elements' forces: the norm has the measure of
+    /// the potential. Without a Poisson's ratio `a~` is its diagonal.
+    #[test]
+    fn the_norm_of_multipliers_is_the_energy_of_their_elements() {
+        let settings = SolverSettings::default();
+        let model = everything(&settings, [SaintVenantKirchhoff; 2], 0.0);
+        let inputs = Inputs::default();
+        let step = quiet(&model, &inputs, &settings, 1e-2);
+        let mut work = begun(&step, &model.rest_positions);
+        shake(&mut work.points);
+        let mut multipliers = vec![f64::NAN; model.multiplier_count];
+        work.repair_multipliers(&step, &mut multipliers);
+        let mut weights = vec![0.0; model.multiplier_count];
+        fill_multiplier_weights(&model, step.dt, &mut weights);
+        let half_norm = |range: std::ops::Range<usize>| {
+            let pairs = multipliers[range.clone()].iter().zip(&weights[range]);
+            0.5 * pairs.map(|(l, weight)| weight * l * l).sum::<f64>()
+        };
+        work.evaluator.evaluate_all(&work.ground, &step, &work.points);
+        let expected = step.dt * step.dt * work.evaluator.stored[0];
+        let norm = half_norm(0..model.multiplier_count);
+        assert!((norm / expected - 1.0).abs() < 1e-12, "{norm:e} and {expected:e}");
+        // Neither kind is too small to be seen in the sum.
+        let (springs, held) =
+            (model.springs.multiplier_offset, model.attachments.multiplier_offset);
+        for range in [0..springs, springs..held, held..model.multiplier_count] {
+            assert!(half_norm(range.clone()) > 1e-6 * norm, "{range:?}");
+        }
+    }
+}

@@ -22,6 +22,8 @@ mod loads;
 pub mod plan;
 mod potential;
 mod precision;
+#[cfg(test)]
+mod probe;
 mod products;
 mod rebase;
 mod sweep;

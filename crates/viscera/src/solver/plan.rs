@@ -16,7 +16,7 @@ pub enum Stage {
     /// Remembers the Green strain of viscous tetrahedra at the start of the step.
     MeasureStrain,
     /// `xt = x + dt v + dt^2 M^-1 f_ext`; `x` becomes the start of the iteration, pins move to
-    /// their targets; `w = 1/m`.
+    /// their targets; `w = 1/m`. `Start::Auto` is `Start::Inertial`, but for parts that nothing holds.
     Predict(Start),
     /// `l = 0`.
     ResetMultipliers,
@@ -106,9 +106,10 @@ impl Plan {
         if model.tet_sets().iter().any(|set| set.viscous) {
             prologue.push(Stage::MeasureStrain);
         }
-        // A kept multiplier already carries gravity: adding it to the start counts it twice.
+        // A kept multiplier already carries gravity: adding it to the start counts it twice, where anything holds
+        // the part.
         let start = match (settings.start, settings.keep_multipliers) {
-            (Start::Auto, true) => Start::Inertial,
+            (Start::Auto, true) => Start::Auto,
             (Start::Auto, false) => Start::Predicted,
             (chosen, _) => chosen,
         };

@@ -173,8 +173,8 @@ impl<'a> Recorder<'a> {
                 into.push(begin);
                 let mode = match start {
                     Start::Previous => 0,
-                    Start::Inertial => 1,
-                    Start::Predicted | Start::Auto => 2,
+                    Start::Inertial | Start::Auto => 1,
+                    Start::Predicted => 2,
                 };
                 let keeps_starts = if self.settings.guards_steps() { 4 } else { 0 };
                 let mut predict = self.vertices(&kernels::PREDICT, mode | keeps_starts);
