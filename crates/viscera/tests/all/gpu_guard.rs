@@ -117,7 +117,7 @@ fn many_parts<S: Real>(settings: &SolverSettings) -> (Model<S>, Vec<Vec3<f64>>) 
         builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
     }
     let model = builder.build(settings).expect("a model");
-    assert_eq!(model.component_count, 3);
+    assert_eq!(model.part_count(), 3);
     (model, places)
 }
 
@@ -164,7 +164,8 @@ fn assert_quiet_motion_agrees(steps: u32) {
             "{name}: rejected {} and {rejected}, slowed {slowed:?}",
             trio.oracle.rejected_steps()
         );
-        assert_eq!(rejected, trio.oracle.rejected_steps(), "{name}");
+        // The device judges all parts together: one may make up for another.
+        assert!(rejected <= trio.oracle.rejected_steps(), "{name}");
         for (number, body) in model32.bodies.iter().enumerate() {
             let [cpu, gpu] = trio.distances(body.vertices.start as u32..body.vertices.end as u32);
             println!(
@@ -307,22 +308,28 @@ fn portable_limit_that_is_no_number_lets_nothing_pass() {
     let mut builder = ModelBuilder::new();
     builder.add_body(&mesh, &material(STVK, 1e4, 0.3)).expect("a body");
     builder.add_body(&mesh, &material(SNH, 1e4, 0.3)).expect("a body");
+    // One part, whose energies are added up.
+    builder.add_spring([0, count as u32], 1e-9, None).expect("a spring");
     let model = builder.build::<f32>(&settings).expect("a model");
-    // The first body so large that its energy overflows, also where it is going to: an infinite limit.
-    let mut state = State::at_rest(&model);
-    state.positions[..count].iter_mut().for_each(|x| *x = *x * 2e9);
-    // The second is to be pulled apart so far that its volumes overflow, with either sign.
+    // The first body so large that its energy overflows, also where it is going to: an infinite limit. So is
+    // the second at last, and it is to be pulled apart so far that its volumes overflow, with either sign.
     let mut random = Random(1);
     let pulls = (0..count).map(|v| ((count + v) as u32, random.vector(3e18).cast()));
     let pulls = pulls.collect::<Vec<_>>();
     for (forces, limit_is_number) in [(vec![], true), (pulls, false)] {
+        let mut state = State::at_rest(&model);
+        let large = if limit_is_number { count } else { 2 * count };
+        state.positions[..large].iter_mut().for_each(|x| *x = *x * 2e9);
         let inputs = Inputs { forces, ..Inputs::default() };
         let mut cpu = Solver::new(&model, &settings);
         let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
         gpu.write(&model, &state).expect("a state that fits");
         cpu.step(&model, &mut state.clone(), &inputs, DT).expect("a legal step");
         gpu.step(&model, &inputs, DT).expect("a legal step");
-        let (cpu, gpu) = (cpu.last_step().expect("a guarded step"), gpu.last_step());
+        // Of the part that has such a limit.
+        let mut parts = cpu.part_reports().iter().rev();
+        let cpu = *parts.find(|part| !part.limit.is_finite()).expect("such a limit");
+        let gpu = gpu.last_step();
         let gpu = gpu.expect("a device").expect("a guarded step");
         println!("{cpu:?}, {gpu:?}");
         for report in [cpu, gpu] {
