@@ -169,7 +169,9 @@ fn simulate<S: Real>(
         Ok(()) if complete => None,
         Ok(()) => Some("interrupted".into()),
     };
-    summary.judge();
+    // What failed has no state to judge.
+    let rest = if ended.is_ok() { simulation.rest() } else { None };
+    summary.judge(simulation.scene(), rest);
     summary.device = simulation.device_choice().to_owned();
     summary.warnings.extend(simulation.device_warning().map(String::from));
     // Numbers before meshes and pictures: those take a while, and may be what failed.
@@ -184,7 +186,7 @@ fn simulate<S: Real>(
         let bar = progress::bar(film.picture_count(), "drawing", "{pos} of {len} pictures");
         // A run that was interrupted still shows what it has; the next Ctrl-C ends the drawing.
         interrupted.store(false, Ordering::Relaxed);
-        drawn = film.develop(out, simulation.scene().time.frame, &bar, interrupted)?;
+        drawn = film.develop(out, &bar, interrupted)?;
         bar.finish_and_clear();
     }
     if let Err(error) = ended {

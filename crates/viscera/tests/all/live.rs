@@ -94,9 +94,8 @@ fn handle_for<S: Real>(simulation: &mut Simulation<S>, [near, far]: [u32; 2]) {
     frames(simulation, 6);
 }
 
-fn repeat<S: Real>(overrides: &[(&str, &str)]) {
-    repeat_for::<S>(overrides, [20, 50]);
-}
+/// Frames that a hold is led for, twice: a visit of a few seconds.
+const A_VISIT: [u32; 2] = [20, 50];
 
 fn repeat_for<S: Real>(overrides: &[(&str, &str)], frames_led: [u32; 2]) {
     let mut by_hand: Simulation<S> = simulation(BAR, overrides);
@@ -117,9 +116,9 @@ fn repeat_for<S: Real>(overrides: &[(&str, &str)], frames_led: [u32; 2]) {
 
 #[test]
 fn a_saved_scene_repeats_what_was_done_by_hand_to_the_bit() {
-    repeat::<f32>(&[]);
-    repeat::<f64>(&[("solver.precision", "f64")]);
-    repeat::<f32>(&[("solver.method", "explicit")]);
+    repeat_for::<f32>(&[], A_VISIT);
+    repeat_for::<f64>(&[("solver.precision", "f64")], A_VISIT);
+    repeat_for::<f32>(&[("solver.method", "explicit")], A_VISIT);
 }
 
 #[test]
@@ -132,7 +131,7 @@ fn on_a_device_as_well() {
 #[test]
 #[ignore = "slow: some ninety frames, twice"]
 fn on_a_device_as_well_at_length() {
-    repeat::<f32>(&[("solver.device", "gpu")]);
+    repeat_for::<f32>(&[("solver.device", "gpu")], A_VISIT);
 }
 
 #[test]
