@@ -169,7 +169,9 @@ fn simulate<S: Real>(
         Ok(()) if complete => None,
         Ok(()) => Some("interrupted".into()),
     };
-    summary.judge();
+    // What failed has no state to judge.
+    let rest = if ended.is_ok() { simulation.rest() } else { None };
+    summary.judge(simulation.scene(), rest);
     summary.device = simulation.device_choice().to_owned();
     summary.warnings.extend(simulation.device_warning().map(String::from));
     // Numbers before meshes and pictures: those take a while, and may be what failed.

@@ -4,7 +4,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
-use viscera::simulation::{FrameReport, Simulation};
+use viscera::simulation::{FrameReport, RestReport, Simulation, advice};
 
 /// The numbers of one frame and what it took.
 #[derive(Serialize)]
@@ -58,6 +58,8 @@ pub struct Summary {
     pub notes: Vec<String>,
     /// Where the result falls short.
     pub warnings: Vec<String>,
+    /// How far the end is from the state of rest; nothing where the loads still change.
+    pub rest: Option<RestReport>,
     pub frames: Vec<FrameLine>,
 }
 
@@ -96,13 +98,15 @@ impl Summary {
             },
             notes: simulation.assembly().notes.clone(),
             warnings: Vec::new(),
+            rest: None,
             frames: Vec::new(),
         }
     }
 
     /// Looks for what a person must know before believing the result.
-    pub fn judge(&mut self) {
-        self.warnings = warnings(&self.frames);
+    pub fn judge(&mut self, scene: &Scene, rest: Option<RestReport>) {
+        self.rest = rest;
+        self.warnings = warnings(&self.frames, scene, rest);
     }
 
     /// Wall time of all frames [s].
@@ -169,58 +173,55 @@ fn json(text: String) -> serde_json::Value {
     serde_json::from_str(&text).unwrap_or(serde_json::Value::String(text))
 }
 
-/// Apparent stiffness further off than this is not what was asked for.
+/// Of a run whose loads change to its end, which has no state of rest to be compared with: apparent stiffness
+/// further off than this is not what was asked for.
 const STIFFNESS_ERROR: f64 = 0.02;
 
 /// Unbalanced forces beyond this share of the loads: forces and shapes are then a few percent off
 /// even where the estimate of the stiffness, which sees smooth errors only, looks well.
 const RESIDUAL: f64 = 0.1;
 
-/// The stiffness is judged where elastic energy is at least this share of the energies of motion and
-/// weight. A body that merely falls has round-off for its strain, and the estimate divides by that.
-const STRAINED: f64 = 0.01;
-
 /// Fewer frames than these are the first jerk of a run, in which multipliers are still building up.
 const FEWEST_FRAMES: usize = 5;
 
-fn warnings(frames: &[FrameLine]) -> Vec<String> {
+fn warnings(frames: &[FrameLine], scene: &Scene, rest: Option<RestReport>) -> Vec<String> {
     let mut warnings = Vec::new();
+    let time = frames.last().map_or(0.0, |frame| frame.report.time);
+    match rest {
+        Some(rest) => warnings.extend(rest.warning(scene, time)),
+        None => warnings.extend(warning_in_motion(frames, scene)),
+    }
+    let inverted = frames.iter().map(|frame| frame.report.deformation.inverted).max().unwrap_or(0);
+    let left = frames.last().map_or(0, |frame| frame.report.deformation.inverted);
+    if inverted > 0 {
+        let what = if inverted == 1 { "tetrahedron was" } else { "tetrahedra were" };
+        warnings.push(format!(
+            "up to {inverted} {what} inverted during the run, {left} at its end; {}",
+            advice::inverted(scene)
+        ));
+    }
+    warnings
+}
+
+/// Whether steps were solved too coarsely.
+fn warning_in_motion(frames: &[FrameLine], scene: &Scene) -> Option<String> {
     // The last quarter: a single frame of a moving body says little.
     let tail = &frames[frames.len() - frames.len().div_ceil(4)..];
     let mean = |value: fn(&FrameReport) -> f64| {
         tail.iter().map(|frame| value(&frame.report)).sum::<f64>() / tail.len().max(1) as f64
     };
-    let share = mean(|report| report.energy.elastic)
-        / mean(|report| report.energy.kinetic + report.energy.gravitational.abs());
-    // No motion and no weight: the share is infinite, or no number where nothing happens at all.
-    let is_strained = share.is_nan() || share > STRAINED;
-    let stiffness = if is_strained { mean(|report| report.stiffness_error) } else { 0.0 };
+    let stiffness = mean(|report| report.stiffness_error);
     let residual = mean(|report| report.relative_residual);
-    if tail.len() >= FEWEST_FRAMES && (stiffness.abs() > STIFFNESS_ERROR || residual > RESIDUAL) {
-        let how = if stiffness > 0.0 { "softer" } else { "stiffer" };
-        let answer = if is_strained {
-            let percent = 100.0 * stiffness.abs();
-            format!(
-                "the tissue answers as if it were about {percent:.1} % {how} than asked for, and "
-            )
-        } else {
-            String::new()
-        };
-        warnings.push(format!(
-            "the solver falls short: over the last {} frames {answer}unbalanced forces are {:.0} % \
-             of the loads; raise solver.iterations or solver.substeps, and keep solver.rebase and \
-             solver.keep_multipliers on",
+    let is_off = stiffness.abs() > STIFFNESS_ERROR || residual > RESIDUAL;
+    (tail.len() >= FEWEST_FRAMES && is_off).then(|| {
+        format!(
+            "the solver falls short: over the last {} frames, in motion, the tissue answers as if it were about \
+             {:.1} % {} than asked for, and unbalanced forces are {:.0} % of the loads; {}",
             tail.len(),
+            100.0 * stiffness.abs(),
+            if stiffness > 0.0 { "softer" } else { "stiffer" },
             100.0 * residual,
-        ));
-    }
-    let inverted = frames.iter().map(|frame| frame.report.deformation.inverted).max().unwrap_or(0);
-    let left = frames.last().map_or(0, |frame| frame.report.deformation.inverted);
-    if inverted > 0 {
-        warnings.push(format!(
-            "up to {inverted} tetrahedra were inverted during the run, {left} at its end; pull \
-             less, spread the pull over more vertices, or use model = \"stable_neo_hookean\""
-        ));
-    }
-    warnings
+            advice::budget(scene),
+        )
+    })
 }

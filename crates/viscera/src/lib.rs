@@ -50,6 +50,7 @@ pub mod material;
 pub mod measure;
 pub mod mesh;
 pub mod model;
+pub mod rest;
 pub mod scalar;
 pub mod scene;
 pub mod settings;

@@ -49,11 +49,10 @@ impl Taken {
         rest: &'a [Vec3<f64>],
         time: f64,
     ) -> Option<impl Fn(usize) -> Vec3<f64> + 'a> {
-        let taken = self.0.get(index).and_then(Option::as_ref);
-        let is_free = motion.start > 0.0 && taken.is_none();
-        if is_free || motion.release.is_some_and(|release| time >= release) {
+        if !self.holds(index, motion, time) {
             return None;
         }
+        let taken = self.0.get(index).and_then(Option::as_ref);
         let pose = motion.pose(time);
         Some(move |i: usize| {
             let origin = match taken {
@@ -62,6 +61,35 @@ impl Taken {
             };
             pose.apply(origin)
         })
+    }
+
+    /// Whether a motion holds its patch at a time [s].
+    fn holds(&self, index: usize, motion: &Motion, time: f64) -> bool {
+        let is_taken = self.0.get(index).is_some_and(Option::is_some);
+        let is_free = motion.start > 0.0 && !is_taken;
+        !is_free && motion.release.is_none_or(|release| time < release)
+    }
+
+    /// What a vertex is pinned by at a time [s]: where patches overlap, by the last of them only, in the order
+    /// in which [`Taken::act`] writes its pins.
+    fn pinned_by(
+        &self,
+        scene: &Scene,
+        assembly: &Assembly,
+        time: f64,
+        vertex: u32,
+    ) -> Option<PinnedBy> {
+        let has = |patch: &ResolvedPatch| patch.vertices.binary_search(&vertex).is_ok();
+        let motions = scene.motions.iter().zip(&assembly.motions).enumerate().rev();
+        let mut rigid = motions.filter(|(index, (motion, patch))| {
+            motion.stiffness.is_none() && has(patch) && self.holds(*index, motion, time)
+        });
+        if let Some((index, _)) = rigid.next() {
+            return Some(PinnedBy::Motion(index));
+        }
+        let fixings = scene.fixings.iter().zip(&assembly.fixings);
+        let last = fixings.rev().position(|(fixing, patch)| fixing.stiffness.is_none() && has(patch));
+        last.map(|behind| PinnedBy::Fixing(scene.fixings.len() - 1 - behind))
     }
 
     /// Puts what a scene does at a time [s] into the inputs; takes no memory where they have room.
@@ -106,6 +134,15 @@ impl Taken {
     }
 }
 
+/// The patch that a pinned vertex belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum PinnedBy {
+    /// A rigid fixing, by its number.
+    Fixing(usize),
+    /// A rigid motion, by its number.
+    Motion(usize),
+}
+
 /// Something that holds tissue now.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Hold {
@@ -113,7 +150,8 @@ pub struct Hold {
     pub place: Vec3<f64>,
     /// Where that is to be [m].
     pub target: Vec3<f64>,
-    /// Its force on the tissue [N]: of springs as it is now, of a rigid hold as last measured.
+    /// Its force on the tissue [N]: of springs as it is now, of a rigid hold as last measured; of a vertex
+    /// that something else pins, nothing.
     pub force: Vec3<f64>,
 }
 
@@ -122,17 +160,17 @@ impl<S: Real> Simulation<S> {
     pub fn hold(&self, motion: usize) -> Option<Hold> {
         let (at, patch) = (self.scene.motions.get(motion)?, self.assembly.motions.get(motion)?);
         let rest = self.assembly.builder.positions();
-        let places = self.taken.places(motion, at, patch, rest, self.time())?;
+        let time = self.time();
+        let places = self.taken.places(motion, at, patch, rest, time)?;
         let share = 1.0 / patch.vertices.len() as f64;
         let mut hold = Hold::default();
         for (i, &v) in patch.vertices.iter().enumerate() {
-            hold.place += self.state.positions[v as usize].cast::<f64>() * share;
-            hold.target += places(i) * share;
-            let held = self.balance.residual.get(v as usize);
-            hold.force += held.copied().unwrap_or_default();
-        }
-        if let Some(stiffness) = at.stiffness {
-            hold.force = (hold.target - hold.place) * stiffness;
+            let (place, target) = (self.state.positions[v as usize].cast::<f64>(), places(i));
+            hold.place += place * share;
+            hold.target += target * share;
+            let held = self.balance.residual.get(v as usize).copied().unwrap_or_default();
+            let pinned_by = self.taken.pinned_by(&self.scene, &self.assembly, time, v);
+            hold.force += on_moved(at, motion, pinned_by, held, (target - place) * share);
         }
         Some(hold)
     }
@@ -162,22 +200,28 @@ impl<S: Real> Simulation<S> {
         let rest = assembly.builder.positions();
         let position = |v: u32| positions.get(v as usize).copied().unwrap_or(rest[v as usize]);
         let held = |v: u32| holding.get(v as usize).copied().unwrap_or_default();
+        let pinned_by = |v: u32| self.taken.pinned_by(scene, assembly, time, v);
         let mut forces = Vec::new();
-        for (fixing, patch) in scene.fixings.iter().zip(&assembly.fixings) {
+        for (index, (fixing, patch)) in scene.fixings.iter().zip(&assembly.fixings).enumerate() {
             let share = fixing.stiffness.map(|total| total / patch.vertices.len() as f64);
             let on_vertex = |_: usize, v: u32| match share {
-                None => held(v),
+                // Springs of a fixing pull at a vertex that something else pins as well: they are part of the
+                // model, and what pins the vertex has to hold against them.
                 Some(stiffness) => (rest[v as usize] - position(v)) * stiffness,
+                None if pinned_by(v) == Some(PinnedBy::Fixing(index)) => held(v),
+                None => Vec3::ZERO,
             };
             forces.push(sum(&fixing.name, PatchKind::Fixing, patch, position, on_vertex));
         }
         for (index, (motion, patch)) in scene.motions.iter().zip(&assembly.motions).enumerate() {
             let places = self.taken.places(index, motion, patch, rest, time);
-            let share = motion.stiffness.map(|total| total / patch.vertices.len() as f64);
-            let on_vertex = |i: usize, v: u32| match (&places, share) {
-                (None, _) => Vec3::ZERO,
-                (Some(_), None) => held(v),
-                (Some(place), Some(stiffness)) => (place(i) - position(v)) * stiffness,
+            let share = 1.0 / patch.vertices.len() as f64;
+            let on_vertex = |i: usize, v: u32| match &places {
+                None => Vec3::ZERO,
+                Some(place) => {
+                    let away = (place(i) - position(v)) * share;
+                    on_moved(motion, index, pinned_by(v), held(v), away)
+                }
             };
             forces.push(sum(&motion.name, PatchKind::Motion, patch, position, on_vertex));
         }
@@ -186,6 +230,23 @@ impl<S: Real> Simulation<S> {
             forces.push(sum(&force.name, PatchKind::Force, patch, position, |_, _| share));
         }
         forces
+    }
+}
+
+/// The force [N] of a motion on a vertex of its patch: what `held` it there [N] where the vertex is this
+/// motion's, the pull of its springs where nothing pins it. `away` is the way to its target, divided by the
+/// number of vertices [m].
+fn on_moved(
+    motion: &Motion,
+    index: usize,
+    pinned_by: Option<PinnedBy>,
+    held: Vec3<f64>,
+    away: Vec3<f64>,
+) -> Vec3<f64> {
+    match (motion.stiffness, pinned_by) {
+        (None, Some(PinnedBy::Motion(last))) if last == index => held,
+        (Some(stiffness), None) => away * stiffness,
+        _ => Vec3::ZERO,
     }
 }
 

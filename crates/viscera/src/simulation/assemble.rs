@@ -263,22 +263,38 @@ impl Assembly {
         }
     }
 
-    /// A vertex that is both fixed and moved follows the motion, the later of two motions wins,
-    /// and each patch counts its force: worth saying.
+    /// A vertex that is both fixed and moved follows the motion, the later of two motions wins, and springs
+    /// do nothing where something rigid holds: worth saying.
     fn note_overlaps(&mut self, scene: &Scene) {
-        let rigid = scene.fixings.iter().zip(&self.fixings).filter(|(f, _)| f.stiffness.is_none());
-        let mut patches: Vec<(&str, &[u32])> =
-            rigid.map(|(fixing, patch)| (fixing.name.as_str(), &patch.vertices[..])).collect();
-        let motions = scene.motions.iter().zip(&self.motions);
-        patches.extend(motions.map(|(motion, p)| (motion.name.as_str(), &p.vertices[..])));
+        let fixings = scene.fixings.iter().zip(&self.fixings);
+        let fixings = fixings.filter(|(fixing, _)| fixing.stiffness.is_none());
+        let mut rigid: Vec<(&str, &[u32])> =
+            fixings.map(|(fixing, patch)| (fixing.name.as_str(), &patch.vertices[..])).collect();
+        let mut soft: Vec<(&str, &[u32])> = Vec::new();
+        for (motion, patch) in scene.motions.iter().zip(&self.motions) {
+            let patches = if motion.stiffness.is_none() { &mut rigid } else { &mut soft };
+            patches.push((motion.name.as_str(), &patch.vertices[..]));
+        }
+        let shared = |a: &[u32], b: &[u32]| a.iter().filter(|v| b.binary_search(v).is_ok()).count();
         let mut notes = Vec::new();
-        for (later, (name, vertices)) in patches.iter().enumerate() {
-            for (other, others) in &patches[..later] {
-                let shared = vertices.iter().filter(|&v| others.binary_search(v).is_ok()).count();
-                if shared > 0 {
+        for (later, (name, vertices)) in rigid.iter().enumerate() {
+            for (other, others) in &rigid[..later] {
+                let count = shared(vertices, others);
+                if count > 0 {
                     notes.push(format!(
-                        "{shared} vertices belong to both `{other}` and `{name}`; they follow \
-                         `{name}`"
+                        "{count} vertices belong to both `{other}` and `{name}`; they follow `{name}`, \
+                         and their forces count as its own"
+                    ));
+                }
+            }
+        }
+        for (name, vertices) in &soft {
+            for (other, others) in &rigid {
+                let count = shared(vertices, others);
+                if count > 0 {
+                    notes.push(format!(
+                        "{count} vertices belong to both `{other}` and `{name}`; the springs of \
+                         `{name}` do nothing there while `{other}` holds them"
                     ));
                 }
             }

@@ -1,23 +1,26 @@
 //! A scene in motion: inputs from the scene's paths, frames of substeps, and what to report.
 
 mod acting;
+pub mod advice;
 mod assemble;
 mod device;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod live;
+mod rest;
 
 pub use acting::Hold;
 use acting::Taken;
 pub use assemble::{AssembleError, AssembledBody, Assembly, ResolvedPatch};
 pub use device::SimulationError;
 pub use live::{Live, LiveError};
+pub use rest::{RestReport, Standing};
 
 use crate::measure::{
     DeformationSummary, Energies, TetMeasure, measure_energies, measure_tets, summarize_deformation,
 };
 use crate::model::Model;
-use crate::scalar::Real;
+use crate::scalar::{Real, Vec3};
 use crate::scalar::lanes::Instructions;
 use crate::scene::{Change, Scene};
 use crate::solver::balance::ForceBalance;
@@ -34,12 +37,13 @@ use std::fmt;
 pub enum FrameError {
     /// Positions or stresses are no longer numbers.
     #[error(
-        "the simulation diverged at {time:.4} s: positions or stresses are no longer numbers; raise \
-         solver.substeps, lower solver.relaxation, or turn solver.acceleration off"
+        "the simulation diverged at {time:.4} s: positions or stresses are no longer numbers; {advice}"
     )]
     Diverged {
         /// Simulated time [s].
         time: f64,
+        /// What the scene's settings leave to do.
+        advice: String,
     },
     /// A step was refused.
     #[error(transparent)]
@@ -73,7 +77,8 @@ pub struct PatchForce {
     /// What holds or pulls it.
     pub kind: PatchKind,
     /// Force [N] of the fixing, tool or load on the tissue: minus internal forces, plus inertia,
-    /// minus gravity, summed over the patch.
+    /// minus gravity, summed over the patch. A vertex of several patches belongs to the one that it follows,
+    /// the last, so that the forces of all patches of a body at rest sum to minus its weight.
     pub force: [f64; 3],
     /// Torque [N m] of the same about the middle of the patch.
     pub torque: [f64; 3],
@@ -137,6 +142,8 @@ pub struct Simulation<S> {
     /// Those of them that came by hand.
     by_hand: Vec<Change>,
     balance: ForceBalance,
+    /// Positions [m] at the beginning of the last frame, which tell how fast it moves.
+    before: Vec<Vec3<S>>,
     /// Whether the solver knows of a step: a new one has nothing to measure yet.
     stepped: bool,
     tets: Vec<TetMeasure>,
@@ -167,6 +174,7 @@ impl<S: Real> Simulation<S> {
             changes_made: 0,
             by_hand: Vec::new(),
             balance: ForceBalance::default(),
+            before: model.rest_positions.clone(),
             stepped: false,
             tets: Vec::with_capacity(model.tet_count()),
             frame: 0,
@@ -253,6 +261,7 @@ impl<S: Real> Simulation<S> {
     pub fn advance(&mut self) -> Result<(), FrameError> {
         self.begin_frame().map_err(Box::new)?;
         let rejected = self.solver.rejected_steps();
+        self.before.copy_from_slice(&self.state.positions);
         match self.compute_frame() {
             // What a step refuses, the CPU would refuse as well.
             Err(lost) if self.backend.gives_way && !matches!(lost, FrameError::Step(_)) => {
@@ -266,7 +275,7 @@ impl<S: Real> Simulation<S> {
         self.stepped = true;
         self.rejected_substeps = self.solver.rejected_steps() - rejected;
         if !self.state.is_finite() {
-            return Err(FrameError::Diverged { time: self.time() });
+            return Err(self.diverged());
         }
         let factor = self.scene.time.velocity_factor;
         if factor != 1.0 {
@@ -278,6 +287,10 @@ impl<S: Real> Simulation<S> {
             }
         }
         Ok(())
+    }
+
+    fn diverged(&self) -> FrameError {
+        FrameError::Diverged { time: self.time(), advice: advice::diverged(&self.scene) }
     }
 
     /// Measures the last frame, for [`Simulation::tets`] and [`Simulation::report`]. The balance of forces is
@@ -293,7 +306,7 @@ impl<S: Real> Simulation<S> {
             (tet.energy_density as f32).is_finite() && (tet.von_mises as f32).is_finite()
         };
         if !self.tets.iter().all(is_number) {
-            return Err(FrameError::Diverged { time: self.time() });
+            return Err(self.diverged());
         }
         Ok(())
     }

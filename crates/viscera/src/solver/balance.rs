@@ -10,9 +10,11 @@
 use super::Inputs;
 use super::cpu::Workspace;
 use super::tissue::Tissue;
-use crate::elements::{attachment, deformation_gradient, internal_forces, spring};
+use crate::elements::{
+    attachment, deformation_gradient, internal_forces, shape_gradients, spring,
+};
 use crate::model::Model;
-use crate::scalar::{Real, Vec3};
+use crate::scalar::{Mat3, Real, Vec3};
 use crate::state::State;
 
 /// Forces and works of one step, in double precision.
@@ -28,21 +30,37 @@ pub struct ForceBalance {
     pub elastic_energy: f64,
     /// Work [J] of the residuals of free vertices through their displacements from rest.
     pub residual_work: f64,
+    /// What rounding of positions pretends of `elastic_energy` [J]: the sum of `E V eps^2`.
+    pub energy_floor: f64,
+    /// What it pretends of `unbalanced` [N]: the sum of `E A eps`, and of `m eps/dt^2`.
+    pub force_floor: f64,
+    /// Largest displacement from rest [m].
+    pub displacement: f64,
 }
 
+/// Energy that is not this many times what rounding makes is no strain.
+const STRAINED: f64 = 100.0;
+
+/// So many times what rounding unbalances counts as a load.
+const ROUNDED: f64 = 10.0;
+
 impl ForceBalance {
-    /// `unbalanced / load`; 0 where nothing acts.
+    /// `unbalanced / load`; 0 where nothing acts. What rounding alone makes counts as a load.
     pub fn relative_residual(&self) -> f64 {
-        if self.load > 0.0 { self.unbalanced / self.load } else { 0.0 }
+        let load = self.load + ROUNDED * self.force_floor;
+        if load > 0.0 { self.unbalanced / load } else { 0.0 }
     }
 
     /// Residual work over twice the elastic energy: an estimate of how far the apparent stiffness
     /// is off. A linear body at rest has `u (K u - f)/(u K u)` here, which is `1 - s` where `u` is
     /// `1/s` times the solution: 0 for the solution, positive where the body has given way too
     /// much, negative where too little. Energy, not the work of the stresses, because that one
-    /// means nothing after a turn.
+    /// means nothing after a turn. 0 where all strain, or all of that work, is what rounding makes: of tissue that
+    /// moves as a whole.
     pub fn stiffness_error(&self) -> f64 {
-        if self.elastic_energy > 0.0 { 0.5 * self.residual_work / self.elastic_energy } else { 0.0 }
+        let is_strained = self.elastic_energy > STRAINED * self.energy_floor;
+        let is_work = self.residual_work.abs() > self.force_floor * self.displacement;
+        if is_strained && is_work { 0.5 * self.residual_work / self.elastic_energy } else { 0.0 }
     }
 
     pub(super) fn measure<S: Real>(
@@ -76,6 +94,9 @@ impl ForceBalance {
                 let f = deformation_gradient(&x, &shape);
                 let response = tissue.respond(&f, start.as_ref());
                 self.elastic_energy += volume * response.elastic_energy;
+                let [energy, force] = floors::<S>(&x, &shape, volume, &tissue);
+                self.energy_floor += energy;
+                self.force_floor += force;
                 let forces = internal_forces(&response.piola, &shape, volume);
                 for (v, force) in tet.vertices.into_iter().zip(forces) {
                     self.residual[v as usize] -= force;
@@ -115,14 +136,33 @@ impl ForceBalance {
             let predicted = ground.predicted[place].vec3().cast();
             let inertia = ground.inertias[place].to_f64();
             self.residual[v] += (x - predicted) * (inertia / (dt * dt));
+            self.force_floor += S::EPSILON * x.length() * inertia / (dt * dt);
             let residual = self.residual[v];
             if ground.inverse_masses[place] == S::ZERO {
                 self.load += residual.length();
             } else {
                 self.unbalanced += residual.length();
                 self.load += mass * gravity.length();
-                self.residual_work += residual.dot(x - model.rest_positions[v].cast());
+                let displacement = x - model.rest_positions[v].cast();
+                self.residual_work += residual.dot(displacement);
+                self.displacement = self.displacement.max(displacement.length());
             }
         }
     }
+}
+
+/// Energy [J] and forces [N] that rounding of a tetrahedron's corners to the precision makes, with the stiffness
+/// against a change of volume, the largest that tissue has.
+fn floors<S: Real>(
+    x: &[Vec3<f64>; 4],
+    shape: &Mat3<f64>,
+    volume: f64,
+    tissue: &Tissue<f64>,
+) -> [f64; 2] {
+    let reach = x.iter().fold(0.0, |reach: f64, x| reach.max(x.length()));
+    let slopes = shape_gradients(shape).map(|g| g.length());
+    let slope = slopes.into_iter().fold(0.0, f64::max);
+    let strain = S::EPSILON * reach * slope;
+    let force = (tissue.lame_lambda + 2.0 * tissue.lame_mu) * volume * strain;
+    [force * strain, force * slope]
 }

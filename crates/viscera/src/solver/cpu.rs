@@ -296,7 +296,14 @@ impl<S: Real> Workspace<S> {
         for &(vertex, force) in &step.inputs.forces {
             ground.external[model.numbering.of(vertex)] += force;
         }
+        ground.inverse_masses.fill(S::ONE);
+        for pin in &step.inputs.pins {
+            ground.inverse_masses[model.numbering.of(pin.vertex)] = S::ZERO;
+        }
         bundle(model, step.inputs, &mut ground.tethers);
+        // Before they make anything heavier: what holds a pinned vertex holds its own weight.
+        let inverse_masses = &ground.inverse_masses;
+        ground.tethers.retain(|tether| inverse_masses[tether.vertex] != S::ZERO);
         ground.inertias.copy_from_slice(&ground.masses);
         // Small explicit steps take tethers as forces.
         if step.settings.method == Method::Xpbd {
@@ -306,13 +313,10 @@ impl<S: Real> Workspace<S> {
             }
         }
         for (inverse, &inertia) in ground.inverse_masses.iter_mut().zip(&ground.inertias) {
-            *inverse = S::ONE / inertia;
+            if *inverse != S::ZERO {
+                *inverse = S::ONE / inertia;
+            }
         }
-        for pin in &step.inputs.pins {
-            ground.inverse_masses[model.numbering.of(pin.vertex)] = S::ZERO;
-        }
-        let inverse_masses = &ground.inverse_masses;
-        ground.tethers.retain(|tether| inverse_masses[tether.vertex] != S::ZERO);
     }
 
     fn predict(&mut self, step: &Step<'_, S>, start: Start) {

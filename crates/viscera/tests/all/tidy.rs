@@ -48,7 +48,7 @@ const LAYERS: &[&[&str]] = &[
     &["scene", "model", "state"],
     &["contact", "tools", "cut"],
     &["solver"],
-    &["measure"],
+    &["measure", "rest"],
     &["simulation"],
     &["record"],
 ];

@@ -1,0 +1,358 @@
+//! How far a state is from rest, judged by the forces alone: one step of Newton's method, by conjugate gradients.
+//!
+//! ```text
+//! V(x): elastic energy less the work of the loads,  r = -grad V(x),  K = grad grad V(x)
+//! K d = r:  d is what is left of the way to the state of rest [m]
+//! K p ~ (grad V(x + e p) - grad V(x))/e,   preconditioned by the diagonal of K at small strain
+//! ```
+//!
+//! Neither the solver's own word nor its multipliers go into it, and what made a state wrong does not matter: too
+//! few sweeps, motion that has not ended, or a form that is not exact at rest. Unbalanced forces themselves say
+//! little: small smooth ones stand for a long way, large rough ones for none. Conjugate gradients: Hestenes and
+//! Stiefel, 1952; the sum of `alpha r.z` over some iterations is what they add to `d.K d` and bounds what was
+//! missing before (Strakos and Tichy, "On error estimation in the conjugate gradient method", 2002, section 4).
+
+use crate::elements::{
+    attachment, deformation_gradient, green_strain, internal_forces, neo_hookean, shape_gradients,
+    spring,
+};
+use crate::material::MaterialModel;
+use crate::model::Model;
+use crate::scalar::{Real, Vec3};
+use crate::solver::Inputs;
+
+/// The difference quotient's step, as a share of the shortest distance over which strain changes by one: far
+/// above the square root of round-off, far below where curvature changes.
+const DIFFERENCE: f64 = 1e-6;
+
+/// Conjugate gradients end where the last of their iterations add less than this share of `d.K d`.
+const COMPLETE: f64 = 0.01;
+
+/// Passes over single tetrahedra that an estimate takes at most: seconds.
+const MOST_WORK: f64 = 1e7;
+
+/// Iterations at most, and at least where the mesh is large.
+const MOST_ITERATIONS: f64 = 1000.0;
+const FEWEST_ITERATIONS: f64 = 50.0;
+
+/// Positions are rounded by this many units of their precision, over a run.
+const ROUNDED: f64 = 16.0;
+
+/// What is left of the way to rest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WayToRest {
+    /// `d` [m], shape [vertex_count]; zero where a vertex is pinned, or its part is not held at all.
+    pub way: Vec<Vec3<f64>>,
+    /// The forces [N] at the place that `d` leads to by which what is pinned is held there, shape [vertex_count];
+    /// zero elsewhere.
+    pub holding: Vec<Vec3<f64>>,
+    /// Largest `|d|` [m], less what rounding may have moved a vertex by.
+    pub distance: f64,
+    /// Largest displacement [m] from the rest shape at the place that `d` leads to.
+    pub displacement: f64,
+    /// Apparent stiffness minus one: the displacement at rest over what there is of it, along it. Above zero the
+    /// tissue has given way too little.
+    pub stiffness: f64,
+    /// Elastic energy [J].
+    pub elastic_energy: f64,
+    /// False where the iterations ended before all of the way was found: it is at least this long.
+    pub complete: bool,
+    /// False where forces push the tissue on rather than back along some way: it may be about to buckle.
+    pub stable: bool,
+}
+
+impl WayToRest {
+    /// Largest distance from rest over largest displacement; 0 where nothing is displaced.
+    pub fn error(&self) -> f64 {
+        if self.displacement > 0.0 { self.distance / self.displacement } else { 0.0 }
+    }
+
+    /// Measures a state at `x` [m], shape [vertex_count], under these inputs. Takes memory for eight vectors of
+    /// that shape, and as long as some dozens to hundreds of passes over the mesh.
+    pub fn measure<S: Real>(model: &Model<S>, x: &[Vec3<S>], inputs: &Inputs<S>) -> Self {
+        let x: Vec<Vec3<f64>> = x.iter().map(|x| x.cast()).collect();
+        let statics = Statics::new(model, inputs);
+        let found = statics.solve(&x);
+        statics.judge(&x, found)
+    }
+}
+
+/// What conjugate gradients found.
+struct Found {
+    way: Vec<Vec3<f64>>,
+    complete: bool,
+    stable: bool,
+}
+
+/// The static equations of a model under inputs.
+struct Statics<'a, S> {
+    model: &'a Model<S>,
+    inputs: &'a Inputs<S>,
+    /// Neither pinned nor part of a body that nothing holds.
+    moves: Vec<bool>,
+    /// Inverse of the diagonal of `K` at small strain [m/N].
+    softness: Vec<f64>,
+    /// The length [m] over which strain changes by one, the smallest of the mesh.
+    shortest: f64,
+}
+
+impl<'a, S: Real> Statics<'a, S> {
+    fn new(model: &'a Model<S>, inputs: &'a Inputs<S>) -> Self {
+        let (stiffness, shortest) = diagonal(model, inputs);
+        let mut moves = held(model, inputs);
+        for pin in &inputs.pins {
+            moves[pin.vertex as usize] = false;
+        }
+        let softness = stiffness.iter().map(|&k| if k > 0.0 { 1.0 / k } else { 0.0 }).collect();
+        Self { model, inputs, moves, softness, shortest }
+    }
+
+    /// `grad V` [N] of vertices that move, zero for others.
+    fn gradient(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) {
+        self.full_gradient(x, gradient);
+        for (gradient, moves) in gradient.iter_mut().zip(&self.moves) {
+            if !moves {
+                *gradient = Vec3::ZERO;
+            }
+        }
+    }
+
+    /// `grad V` [N] of all vertices; returns the elastic energy of the tissue [J].
+    fn full_gradient(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) -> f64 {
+        let Self { model, inputs, .. } = self;
+        let gravity = inputs.gravity.cast::<f64>();
+        for (load, mass) in gradient.iter_mut().zip(&model.masses) {
+            *load = gravity * -mass.to_f64();
+        }
+        for &(v, force) in &inputs.forces {
+            gradient[v as usize] -= force.cast::<f64>();
+        }
+        for tether in inputs.tethers.iter().filter(|tether| self.moves[tether.vertex as usize]) {
+            let (v, target) = (tether.vertex as usize, tether.target.cast::<f64>());
+            gradient[v] -= attachment::force(x[v], target, tether.stiffness.to_f64());
+        }
+        let anchors = inputs.anchors_of(model);
+        let attachments = &model.attachments;
+        for (i, &v) in attachments.vertices.iter().enumerate() {
+            let anchor = anchors[attachments.order[i] as usize].cast::<f64>();
+            let stiffness = attachments.stiffness[i].to_f64();
+            gradient[v as usize] -= attachment::force(x[v as usize], anchor, stiffness);
+        }
+        let springs = &model.springs;
+        for (i, ends) in springs.vertices.iter().enumerate() {
+            let [length, stiffness] = [springs.rest_length[i], springs.stiffness[i]];
+            let places = ends.map(|v| x[v as usize]);
+            let forces = spring::forces(&places, length.to_f64(), stiffness.to_f64());
+            for (&v, force) in ends.iter().zip(forces) {
+                gradient[v as usize] -= force;
+            }
+        }
+        self.add_tissue(x, gradient)
+    }
+
+    /// Of the tetrahedra; returns their energy [J].
+    fn add_tissue(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) -> f64 {
+        let mut energy = 0.0;
+        for set in self.model.tet_sets() {
+            for tet in self.model.tets(set) {
+                let shape = tet.inverse_rest_shape.cast::<f64>();
+                let volume = tet.rest_volume.to_f64();
+                let material = &self.model.materials[tet.material];
+                let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
+                let f = deformation_gradient(&tet.vertices.map(|v| x[v as usize]), &shape);
+                let (density, piola) = match set.model {
+                    MaterialModel::SaintVenantKirchhoff => {
+                        let strain = green_strain::strain(&f);
+                        let density = green_strain::energy_density(&strain, lambda, mu);
+                        (density, green_strain::piola(&f, &strain, lambda, mu))
+                    }
+                    MaterialModel::StableNeoHookean => (
+                        neo_hookean::energy_density(&f, lambda, mu),
+                        neo_hookean::piola(&f, lambda, mu),
+                    ),
+                };
+                energy += volume * density;
+                let forces = internal_forces(&piola, &shape, volume);
+                for (v, force) in tet.vertices.into_iter().zip(forces) {
+                    gradient[v as usize] -= force;
+                }
+            }
+        }
+        energy
+    }
+
+    fn solve(&self, x: &[Vec3<f64>]) -> Found {
+        let n = x.len();
+        let mut at_x = vec![Vec3::ZERO; n];
+        self.gradient(x, &mut at_x);
+        let mut residual: Vec<Vec3<f64>> = at_x.iter().map(|&gradient| -gradient).collect();
+        let mut way = vec![Vec3::ZERO; n];
+        let [mut direction, mut image, mut moved] = [(); 3].map(|()| vec![Vec3::ZERO; n]);
+        let tets = self.model.tet_count().max(1) as f64;
+        let most = (MOST_WORK / tets).clamp(FEWEST_ITERATIONS, MOST_ITERATIONS) as usize;
+        // A smooth error is seen once information has gone through the whole body, some cells an iteration.
+        let delay = 10 + 2 * libm::cbrt(n as f64) as usize;
+        let mut added = Vec::with_capacity(most);
+        let (mut product, mut total) = (self.preconditioned(&residual), 0.0);
+        let mut beta = 0.0;
+        for _ in 0..most {
+            if !(product > 0.0 && product.is_finite()) {
+                break;
+            }
+            for v in 0..n {
+                direction[v] = residual[v] * self.softness[v] + direction[v] * beta;
+            }
+            self.times_stiffness(x, &at_x, &direction, &mut moved, &mut image);
+            let curvature = dot(&direction, &image);
+            if curvature.is_nan() || curvature <= 0.0 {
+                return Found { way, complete: false, stable: false };
+            }
+            let alpha = product / curvature;
+            for v in 0..n {
+                way[v] += direction[v] * alpha;
+                residual[v] -= image[v] * alpha;
+            }
+            total += alpha * product;
+            added.push(alpha * product);
+            let last: f64 = added.iter().rev().take(delay).sum();
+            if added.len() > delay && last < COMPLETE * total {
+                return Found { way, complete: true, stable: true };
+            }
+            let next = self.preconditioned(&residual);
+            beta = next / product;
+            product = next;
+        }
+        Found { way, complete: added.len() < most, stable: true }
+    }
+
+    /// `r.z` with `z` the preconditioned `r`.
+    fn preconditioned(&self, residual: &[Vec3<f64>]) -> f64 {
+        residual.iter().zip(&self.softness).map(|(r, c)| r.length_squared() * c).sum()
+    }
+
+    /// `K p`.
+    fn times_stiffness(
+        &self,
+        x: &[Vec3<f64>],
+        at_x: &[Vec3<f64>],
+        p: &[Vec3<f64>],
+        moved: &mut [Vec3<f64>],
+        image: &mut [Vec3<f64>],
+    ) {
+        let step = DIFFERENCE * self.shortest / longest(p).max(f64::MIN_POSITIVE);
+        for ((moved, x), p) in moved.iter_mut().zip(x).zip(p) {
+            *moved = *x + *p * step;
+        }
+        self.gradient(moved, image);
+        for (image, at_x) in image.iter_mut().zip(at_x) {
+            *image = (*image - *at_x) * (1.0 / step);
+        }
+    }
+
+    fn judge(&self, x: &[Vec3<f64>], found: Found) -> WayToRest {
+        let rest = &self.model.rest_positions;
+        let (mut displacement, mut reach) = (0.0f64, 0.0f64);
+        let (mut square, mut along) = (0.0, 0.0);
+        for ((x, rest), way) in x.iter().zip(rest).zip(&found.way) {
+            let now = *x - rest.cast();
+            let end = now + *way;
+            displacement = displacement.max(end.length());
+            reach = reach.max(x.length());
+            square += end.length_squared();
+            along += end.dot(now);
+        }
+        // Rounding of positions alone is no way.
+        let rounding = ROUNDED * S::EPSILON * reach;
+        let distance = (longest(&found.way) - rounding).max(0.0);
+        let stiffness = if along > 0.0 && distance > 0.0 { square / along - 1.0 } else { 0.0 };
+        let mut holding = vec![Vec3::ZERO; x.len()];
+        let elastic_energy = self.full_gradient(x, &mut holding);
+        let there: Vec<_> = x.iter().zip(&found.way).map(|(x, way)| *x + *way).collect();
+        self.full_gradient(&there, &mut holding);
+        for (holding, moves) in holding.iter_mut().zip(&self.moves) {
+            if *moves {
+                *holding = Vec3::ZERO;
+            }
+        }
+        WayToRest {
+            holding,
+            distance,
+            displacement: if displacement > rounding { displacement } else { 0.0 },
+            stiffness,
+            elastic_energy,
+            complete: found.complete,
+            stable: found.stable,
+            way: found.way,
+        }
+    }
+}
+
+fn dot(a: &[Vec3<f64>], b: &[Vec3<f64>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
+}
+
+fn longest(all: &[Vec3<f64>]) -> f64 {
+    all.iter().fold(0.0, |longest: f64, v| longest.max(v.length()))
+}
+
+/// The mean of the three diagonal entries of `K` at small strain, of each vertex [N/m], and the smallest height of
+/// a tetrahedron [m].
+fn diagonal<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> (Vec<f64>, f64) {
+    let mut stiffness = vec![0.0; model.vertex_count()];
+    let mut steepest = 0.0f64;
+    for set in model.tet_sets() {
+        for tet in model.tets(set) {
+            let material = &model.materials[tet.material];
+            let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
+            // `V ((lambda + mu) g g^T + mu |g|^2 I)`
+            let of_slope = tet.rest_volume.to_f64() * ((lambda + mu) / 3.0 + mu);
+            let gradients = shape_gradients(&tet.inverse_rest_shape.cast::<f64>());
+            for (v, g) in tet.vertices.into_iter().zip(gradients) {
+                stiffness[v as usize] += of_slope * g.length_squared();
+                steepest = steepest.max(g.length());
+            }
+        }
+    }
+    for (ends, k) in model.springs.vertices.iter().zip(&model.springs.stiffness) {
+        for &v in ends {
+            stiffness[v as usize] += k.to_f64() / 3.0;
+        }
+    }
+    for (&v, k) in model.attachments.vertices.iter().zip(&model.attachments.stiffness) {
+        stiffness[v as usize] += k.to_f64();
+    }
+    for tether in &inputs.tethers {
+        stiffness[tether.vertex as usize] += tether.stiffness.to_f64();
+    }
+    (stiffness, if steepest > 0.0 { 1.0 / steepest } else { 1.0 })
+}
+
+/// Vertices of parts that a pin, an attachment or a tether holds: others have no state of rest, or any.
+fn held<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> Vec<bool> {
+    let mut parent: Vec<u32> = (0..model.vertex_count() as u32).collect();
+    fn root(parent: &mut [u32], mut v: u32) -> u32 {
+        while parent[v as usize] != v {
+            parent[v as usize] = parent[parent[v as usize] as usize];
+            v = parent[v as usize];
+        }
+        v
+    }
+    let mut join = |a: u32, b: u32| {
+        let (a, b) = (root(&mut parent, a), root(&mut parent, b));
+        parent[a.max(b) as usize] = a.min(b);
+    };
+    for set in model.tet_sets() {
+        for tet in model.tets(set) {
+            tet.vertices[1..].iter().for_each(|&v| join(tet.vertices[0], v));
+        }
+    }
+    model.springs.vertices.iter().for_each(|&[a, b]| join(a, b));
+    let holders = (inputs.pins.iter().map(|pin| pin.vertex))
+        .chain(inputs.tethers.iter().map(|tether| tether.vertex))
+        .chain(model.attachments.vertices.iter().copied());
+    let mut is_held = vec![false; parent.len()];
+    for v in holders {
+        is_held[root(&mut parent, v) as usize] = true;
+    }
+    (0..parent.len() as u32).map(|v| is_held[root(&mut parent, v) as usize]).collect()
+}

@@ -1,0 +1,178 @@
+//! Whether a run has come to rest, and what to do where it has not.
+
+use super::Simulation;
+use crate::rest::WayToRest;
+use crate::scalar::{Real, Vec3};
+use crate::scene::Scene;
+use crate::settings::Method;
+
+/// A run is at rest where it is this share of its displacement away: half of a percent, which is told, is well
+/// below one, which has to be, and well above a fifth, which need not.
+const AWAY: f64 = 0.005;
+
+/// The share of the displacement that a run which goes on longer is to come to.
+const NEAR: f64 = 0.001;
+
+/// A way that takes longer than this many times what was simulated so far is not gone any more: the budget decides
+/// where the tissue stands.
+const PATIENCE: f64 = 10.0;
+
+/// A run at its end, whose loads no longer change, beside its state of rest.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct RestReport {
+    /// Estimate of the largest distance [m] of a vertex from its place at rest.
+    pub distance: f64,
+    /// The same over the largest displacement at rest.
+    pub error: f64,
+    /// The largest difference between the force on a patch and what it is at rest, over the largest such force.
+    pub force_error: f64,
+    /// Apparent stiffness over the true one, minus one: above zero the tissue is displaced too little so far.
+    pub stiffness: f64,
+    /// Estimate of the largest excursion over the largest displacement, if all that moves swings.
+    pub swing: f64,
+    /// Largest speed [m/s].
+    pub speed: f64,
+    /// The share of the way that is gone in a second [1/s]; zero or less where it is not gone.
+    pub approach: f64,
+    /// False where the estimate ended early: the distance is at least so much.
+    pub complete: bool,
+    /// False where the forces push tissue on rather than back along some way.
+    pub stable: bool,
+}
+
+/// Where a run stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// As near as matters.
+    AtRest,
+    /// It swings.
+    Swinging,
+    /// It goes there slowly.
+    Creeping,
+    /// It stands elsewhere.
+    Elsewhere,
+}
+
+impl RestReport {
+    /// Where the run stands, after so long a time [s].
+    pub fn standing(&self, time: f64) -> Standing {
+        let error = self.largest_error();
+        let has_far_to_go = error > AWAY || !self.stable && error > NEAR;
+        match () {
+            () if self.swing > AWAY && self.swing > 0.5 * error => Standing::Swinging,
+            () if !has_far_to_go => Standing::AtRest,
+            () if self.approach > 0.0 && self.time_left() < PATIENCE * time => Standing::Creeping,
+            () => Standing::Elsewhere,
+        }
+    }
+
+    /// Of displacement and forces.
+    pub fn largest_error(&self) -> f64 {
+        self.error.max(self.force_error)
+    }
+
+    /// How long [s] until a tenth of a percent is left, where the way goes on as it does.
+    pub fn time_left(&self) -> f64 {
+        (self.largest_error() / NEAR).max(1.0).ln() / self.approach
+    }
+
+    /// What a person should know, and do, where a scene has not come to rest after a time [s].
+    pub fn warning(&self, scene: &Scene, time: f64) -> Option<String> {
+        let standing = self.standing(time);
+        let away = format!(
+            "{} {:.1} % of the displacement ({:.2} mm) and {:.1} % of the forces away from the state of rest",
+            if self.complete { "about" } else { "at least" },
+            100.0 * self.error,
+            1e3 * self.distance,
+            100.0 * self.force_error,
+        );
+        let damping = match scene.time.velocity_factor {
+            factor if factor > 0.9 => "set time.velocity_factor = 0.9, give tissue viscosity, or ",
+            _ => "",
+        };
+        Some(match standing {
+            Standing::AtRest => return None,
+            Standing::Swinging => format!(
+                "not at rest yet: the tissue still moves at up to {:.1} mm/s and swings by about {:.1} % of its \
+                 displacement; {damping}raise time.duration",
+                1e3 * self.speed,
+                100.0 * self.swing.max(self.error),
+            ),
+            Standing::Creeping => format!(
+                "not at rest yet: {away} and still moving at up to {:.2} mm/s; raise time.duration to about {:.0} s{}",
+                1e3 * self.speed,
+                (time + self.time_left()).ceil(),
+                match scene.solver.method {
+                    Method::Xpbd => ", or solver.iterations, which brings it there faster",
+                    Method::Explicit => "",
+                },
+            ),
+            Standing::Elsewhere if !self.stable => format!(
+                "the tissue is not in a stable state: {away}, and some of it is pushed on rather than back; it \
+                 may be about to buckle: raise time.duration"
+            ),
+            Standing::Elsewhere => format!(
+                "the solver falls short: {away}, as if the tissue were {:.1} % {}; {}",
+                100.0 * self.stiffness.abs(),
+                if self.stiffness > 0.0 { "stiffer" } else { "softer" },
+                super::advice::budget(scene),
+            ),
+        })
+    }
+}
+
+impl<S: Real> Simulation<S> {
+    /// How far the last frame is from the state of rest; nothing before the first frame, and while what the scene
+    /// does changes: then there is none to come to. Takes about as long as some dozens of frames of a small mesh,
+    /// seconds for a large one, and memory while it lasts: for the end of a run.
+    pub fn rest(&self) -> Option<RestReport> {
+        let (time, frame) = (self.time(), self.scene.time.frame);
+        if !self.stepped {
+            return None;
+        }
+        let inputs = self.inputs_at(time);
+        if self.inputs_at(time - frame) != inputs {
+            return None;
+        }
+        let measured = WayToRest::measure(&self.model, &self.state.positions, &inputs);
+        let (mut speed, mut gone, mut kinetic) = (0.0f64, 0.0, 0.0);
+        for (v, way) in measured.way.iter().enumerate() {
+            let step: Vec3<f64> = self.state.positions[v].cast::<f64>() - self.before[v].cast();
+            let velocity = step * (1.0 / frame);
+            speed = speed.max(velocity.length());
+            gone += step.dot(*way);
+            if *way != Vec3::ZERO {
+                kinetic += 0.5 * self.model.masses[v].to_f64() * velocity.length_squared();
+            }
+        }
+        let length: f64 = measured.way.iter().map(|way| way.length_squared()).sum();
+        let energy = measured.elastic_energy;
+        let is_displaced = measured.displacement > 0.0 && energy > 0.0;
+        Some(RestReport {
+            distance: measured.distance,
+            error: measured.error(),
+            force_error: self.force_error(&measured),
+            stiffness: measured.stiffness,
+            swing: if is_displaced { (kinetic / energy).sqrt() } else { 0.0 },
+            speed,
+            approach: if length > 0.0 { gone / (length * frame) } else { 0.0 },
+            complete: measured.complete,
+            stable: measured.stable,
+        })
+    }
+
+    /// How far the forces on patches are from those at rest, over the largest of those.
+    fn force_error(&self, measured: &WayToRest) -> f64 {
+        let positions = self.state.positions.iter().zip(&measured.way);
+        let there: Vec<Vec3<f64>> = positions.map(|(x, way)| x.cast::<f64>() + *way).collect();
+        let now = self.patch_forces();
+        let at_rest = self.patch_forces_at(self.time(), &there, &measured.holding);
+        let length = |force: [f64; 3]| Vec3::from_f64(force).length();
+        let largest = at_rest.iter().map(|patch| length(patch.force)).fold(0.0, f64::max);
+        let apart = now.iter().zip(&at_rest);
+        let apart = apart.map(|(a, b)| (Vec3::from_f64(a.force) - Vec3::from_f64(b.force)).length());
+        // What rounding makes is no force.
+        let apart = (apart.fold(0.0, f64::max) - self.balance.force_floor).max(0.0);
+        if largest > self.balance.force_floor { apart / largest } else { 0.0 }
+    }
+}
