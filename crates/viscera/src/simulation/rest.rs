@@ -170,7 +170,8 @@ impl<S: Real> Simulation<S> {
         let length = |force: [f64; 3]| Vec3::from_f64(force).length();
         let largest = at_rest.iter().map(|patch| length(patch.force)).fold(0.0, f64::max);
         let apart = now.iter().zip(&at_rest);
-        let apart = apart.map(|(a, b)| (Vec3::from_f64(a.force) - Vec3::from_f64(b.force)).length());
+        let apart =
+            apart.map(|(a, b)| (Vec3::from_f64(a.force) - Vec3::from_f64(b.force)).length());
         // What rounding makes is no force.
         let apart = (apart.fold(0.0, f64::max) - self.balance.force_floor).max(0.0);
         if largest > self.balance.force_floor { apart / largest } else { 0.0 }

@@ -10,9 +10,7 @@
 use super::Inputs;
 use super::cpu::Workspace;
 use super::tissue::Tissue;
-use crate::elements::{
-    attachment, deformation_gradient, internal_forces, shape_gradients, spring,
-};
+use crate::elements::{attachment, deformation_gradient, internal_forces, shape_gradients, spring};
 use crate::model::Model;
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::state::State;

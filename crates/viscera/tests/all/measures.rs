@@ -60,11 +60,8 @@ fn stress_and_volume_of_a_tetrahedron_are_those_of_its_deformation() {
             [1.3, 0.9, -0.2],
         ] {
             let [a, b, c] = stretches;
-            let diagonal = Mat3::from_columns(
-                vec3(a, 0.0, 0.0),
-                vec3(0.0, b, 0.0),
-                vec3(0.0, 0.0, c),
-            );
+            let diagonal =
+                Mat3::from_columns(vec3(a, 0.0, 0.0), vec3(0.0, b, 0.0), vec3(0.0, 0.0, c));
             let f = random.rotation() * diagonal;
             let positions: Vec<Vec3<f64>> = mesh.vertices().iter().map(|x| f * *x).collect();
             let mut tets = Vec::new();
