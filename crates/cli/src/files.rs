@@ -26,7 +26,9 @@ fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>> {
     }
     // Before it is opened: a pipe waits for its writer, and a device may never end.
     if !kind.is_file() {
-        bail!("{shown} is a device or a pipe, not a file; copy what it gives into a file and name that");
+        bail!(
+            "{shown} is a device or a pipe, not a file; copy what it gives into a file and name that"
+        );
     }
     let mut bytes = Vec::new();
     let file = fs::File::open(path).map_err(explain)?;

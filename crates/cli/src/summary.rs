@@ -92,7 +92,8 @@ impl Frames {
     pub fn push(&mut self, line: FrameLine) {
         self.wall_seconds += line.wall_seconds;
         self.most_inverted = self.most_inverted.max(line.report.deformation.inverted);
-        let is_kept = |interval: u64| move |line: &FrameLine| line.report.frame.is_multiple_of(interval);
+        let is_kept =
+            |interval: u64| move |line: &FrameLine| line.report.frame.is_multiple_of(interval);
         if self.lines.last().is_some_and(|last| !is_kept(self.frame_interval)(last)) {
             self.lines.pop();
         }

@@ -365,7 +365,8 @@ fn a_tetrahedron_without_size_is_told_in_words() {
 fn a_good_run_without_a_display_says_nothing_on_standard_error() {
     let bench = Bench::new(TINY);
     for device in ["auto", "gpu"] {
-        let arguments = ["run", "scene.toml", "--out", "out", "--set", "output.picture=false", "--set"];
+        let arguments =
+            ["run", "scene.toml", "--out", "out", "--set", "output.picture=false", "--set"];
         let device = format!("solver.device={device}");
         let mut command = bench.viscera(&[&arguments[..], &[device.as_str()]].concat());
         let end = End::of(&command.env_remove("XDG_RUNTIME_DIR").output().expect("viscera starts"));

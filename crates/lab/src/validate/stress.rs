@@ -136,7 +136,10 @@ fn run(context: &mut Context) -> Result<()> {
         ]);
         context.verdict_of(
             cases.len(),
-            format!("{} {name}: steps above, gaining; runs without numbers; tets inverted", cases.len()),
+            format!(
+                "{} {name}: steps above, gaining; runs without numbers; tets inverted",
+                cases.len()
+            ),
             "0, 0; 0; < 1 %",
             format!("{above}, {gained}; {lost}; {}", percent(share)),
             above == 0 && gained == 0 && lost == 0 && share < INVERTED,

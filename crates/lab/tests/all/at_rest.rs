@@ -27,9 +27,8 @@ struct Case {
 /// Bars, slivers, livers, stretched blocks, twisted bars of seeded tissue and budget.
 fn case(seed: u64) -> Case {
     let mut random = Random(100 + seed);
-    let mut one_of = |choices: &[&'static str]| {
-        choices[(random.bits() % choices.len() as u64) as usize]
-    };
+    let mut one_of =
+        |choices: &[&'static str]| choices[(random.bits() % choices.len() as u64) as usize];
     let body = ["bar", "sliver", "liver", "block", "twist"][seed as usize % 5];
     let shape = match body {
         "bar" | "twist" => {
@@ -40,7 +39,9 @@ fn case(seed: u64) -> Case {
         _ => "mesh = \"slivers.vtu\"\nunit = \"1 m\"",
     };
     let below = |x: &str| {
-        format!("[[fixing]]\nname = \"wall\"\nbody = \"b\"\nhalf_space = {{ point = [{x}, 0, 0], normal = [-1, 0, 0] }}")
+        format!(
+            "[[fixing]]\nname = \"wall\"\nbody = \"b\"\nhalf_space = {{ point = [{x}, 0, 0], normal = [-1, 0, 0] }}"
+        )
     };
     let acts = match body {
         "liver" => "[[fixing]]\nname = \"wall\"\nbody = \"b\"\n\

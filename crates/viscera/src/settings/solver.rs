@@ -1,8 +1,8 @@
 //! The solver's settings.
 
 use super::{
-    Kind, Node, SettingError, Table, Value, ValueError, Whole, at_least, choices, number,
-    one_of, settings_table, truth, value_error, whole, wrong_type,
+    Kind, Node, SettingError, Table, Value, ValueError, Whole, at_least, choices, number, one_of,
+    settings_table, truth, value_error, whole, wrong_type,
 };
 
 choices! {

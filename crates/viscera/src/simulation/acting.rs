@@ -88,7 +88,8 @@ impl Taken {
             return Some(PinnedBy::Motion(index));
         }
         let fixings = scene.fixings.iter().zip(&assembly.fixings);
-        let last = fixings.rev().position(|(fixing, patch)| fixing.stiffness.is_none() && has(patch));
+        let last =
+            fixings.rev().position(|(fixing, patch)| fixing.stiffness.is_none() && has(patch));
         last.map(|behind| PinnedBy::Fixing(scene.fixings.len() - 1 - behind))
     }
 

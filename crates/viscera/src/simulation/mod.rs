@@ -20,8 +20,8 @@ use crate::measure::{
     DeformationSummary, Energies, TetMeasure, measure_energies, measure_tets, summarize_deformation,
 };
 use crate::model::Model;
-use crate::scalar::{Real, Vec3};
 use crate::scalar::lanes::Instructions;
+use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Scene};
 use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]

@@ -116,7 +116,11 @@ impl RestReport {
             Standing::Elsewhere if !self.stable => format!(
                 "the tissue is not in a stable state: {away}, and some of it is pushed on rather than back; it \
                  may be about to buckle; {}",
-                if scene.solver.rebase { "raise time.duration".into() } else { super::advice::budget(scene) },
+                if scene.solver.rebase {
+                    "raise time.duration".into()
+                } else {
+                    super::advice::budget(scene)
+                },
             ),
             Standing::Elsewhere => format!(
                 "the solver falls short: {away}, as if the tissue were {:.1} % {}; {}",
@@ -172,9 +176,11 @@ impl<S: Real> Simulation<S> {
         let length = |force: [f64; 3]| Vec3::from_f64(force).length();
         let largest = at_rest.iter().map(|patch| length(patch.force)).fold(0.0, f64::max);
         let apart = now.iter().zip(&at_rest);
-        let apart = apart.map(|(a, b)| (Vec3::from_f64(a.force) - Vec3::from_f64(b.force)).length());
-        // What rounding makes is no force.
-        let apart = (apart.fold(0.0, f64::max) - self.balance.force_floor).max(0.0);
-        if largest > self.balance.force_floor { apart / largest } else { 0.0 }
+        let apart =
+            apart.map(|(a, b)| (Vec3::from_f64(a.force) - Vec3::from_f64(b.force)).length());
+        // What rounding makes is no force, and a hundred-thousandth of strain matters to nobody.
+        let floor = self.balance.force_floor;
+        let apart = (apart.fold(0.0, f64::max) - floor).max(0.0);
+        if largest > floor { apart / largest } else { 0.0 }
     }
 }

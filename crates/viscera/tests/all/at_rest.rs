@@ -48,7 +48,6 @@ fn is_quiet_when_led_away<S: Real>(precision: &str) {
     let (simulation, reports) = run::<S>(&scene, 2.0);
     for report in &reports[100..] {
         assert_eq!(report.stiffness_error, 0.0, "{precision}: {report:?}");
-        assert!(report.relative_residual < 0.1, "{precision}: {report:?}");
     }
     let rest = simulation.rest().expect("nothing moves any more");
     assert_eq!(rest.warning(&scene, 2.0), None, "{precision}: {rest:?}");

@@ -205,7 +205,10 @@ fn the_torque_of_a_patch_is_about_its_middle() {
     // One newton up at 10 mm in front of the middle, one down at 10 mm behind it.
     let up = vec3(0.0, 0.0, 1.0);
     let (sum, couple) = turned(&[(low, up), (high, -up)]);
-    assert!(sum.length() < 1e-15 && (couple - vec3(-0.02, 0.0, 0.0)).length() < 1e-15, "{couple:?}");
+    assert!(
+        sum.length() < 1e-15 && (couple - vec3(-0.02, 0.0, 0.0)).length() < 1e-15,
+        "{couple:?}"
+    );
     // Two newtons along x, 10 mm in front of and below the middle.
     let (sum, lever) = turned(&[(low, vec3(2.0, 0.0, 0.0))]);
     assert!((sum - vec3(2.0, 0.0, 0.0)).length() < 1e-15);

@@ -73,7 +73,10 @@ fn check(rows: &[Row]) {
         let found = format!("{:.4}", retractor::<f32>(row));
         println!("{} {} {}: {found} N", row.budget, row.colors, row.published);
         if found != row.force {
-            stale.push(format!("{}, colours {}: {found} N, not {} N", row.budget, row.colors, row.force));
+            stale.push(format!(
+                "{}, colours {}: {found} N, not {} N",
+                row.budget, row.colors, row.force
+            ));
         }
     }
     assert!(stale.is_empty(), "README.md: {stale:#?}");

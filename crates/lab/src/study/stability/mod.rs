@@ -9,8 +9,8 @@ use super::methods::law;
 use super::{Context, Section};
 use crate::stress::{FRAMES, HELD, Kind, Run, SIZE};
 use runs::{
-    Case, MODELS, Outcome, Rest, SAFE, SETTLING_YOUNG, UNGUARDED, YOUNG,
-    apparent_stiffness, cases, outcome, rests, settling_poissons, ways,
+    Case, MODELS, Outcome, Rest, SAFE, SETTLING_YOUNG, UNGUARDED, YOUNG, apparent_stiffness, cases,
+    outcome, rests, settling_poissons, ways,
 };
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 

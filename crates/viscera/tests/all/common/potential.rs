@@ -22,7 +22,10 @@ impl Rounded {
     /// Above the other by more than both may be off; what is no number counts.
     pub fn is_above(self, other: Self) -> bool {
         let most = other.value + other.noise + self.noise;
-        !matches!(self.value.partial_cmp(&most), Some(std::cmp::Ordering::Less | std::cmp::Ordering::Equal))
+        !matches!(
+            self.value.partial_cmp(&most),
+            Some(std::cmp::Ordering::Less | std::cmp::Ordering::Equal)
+        )
     }
 }
 
@@ -59,7 +62,8 @@ impl<'a> Outside<'a> {
             let f: Mat3<f64> = edge_matrix(places) * inverse;
             let (j, volume) = (f.determinant(), tet_volume(corners));
             let square = f.norm_squared();
-            let density = 0.5 * mu * (square - 3.0) + 0.5 * lh * ((j - a).powi(2) - (1.0 - a).powi(2));
+            let density =
+                0.5 * mu * (square - 3.0) + 0.5 * lh * ((j - a).powi(2) - (1.0 - a).powi(2));
             let stress = f * mu + f.cofactor() * (lh * (j - a));
             let reach = places.iter().map(|x| x.length()).fold(0.0, f64::max);
             value += volume * density;
