@@ -8,6 +8,7 @@ use crate::summary::{FrameLine, Summary};
 use crate::{memory, progress};
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use clap::builder::RangedI64ValueParser;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -33,10 +34,10 @@ pub struct RunArguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Compute so many frames instead of the scene's duration
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = from_one::<u64>(), allow_negative_numbers = true)]
     frames: Option<u64>,
     /// Write every K-th frame; the same as --set output.every=K
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
+    #[arg(long, value_name = "K", value_parser = from_one::<u32>(), allow_negative_numbers = true)]
     every: Option<u32>,
     /// Change a setting: KEY=VALUE, as in `solver.iterations=20` or
     /// `body.liver.material.young="8 kPa"`; may be repeated. `viscera scene describe` lists keys
@@ -48,6 +49,11 @@ pub struct RunArguments {
     /// Memory that may be used [default: what is free]
     #[arg(long, value_name = "SIZE")]
     memory: Option<Memory>,
+}
+
+/// Counts from one on. Read with their sign, so that a negative one is told its range.
+fn from_one<T: TryFrom<i64>>() -> RangedI64ValueParser<T> {
+    RangedI64ValueParser::new().range(1..)
 }
 
 /// How a run ended.
