@@ -117,12 +117,10 @@ impl Film {
         self.shots.len() as u64 + 1
     }
 
-    /// Draws `picture.png` and `motion.gif`; `frame_time` is the simulated time of a frame [s].
-    /// Returns false where an interruption left the animation undone.
+    /// Draws `picture.png` and `motion.gif`, which takes as long as the simulated time. Returns false where an interruption left the animation undone.
     pub fn develop(
         &self,
         out: &OutputFolder,
-        frame_time: f64,
         progress: &ProgressBar,
         interrupted: &AtomicBool,
     ) -> Result<bool> {
@@ -186,19 +184,14 @@ impl Film {
         out.write("picture.png", &write_png(&still)?)?;
         let small = self.small_size()?;
         let camera = Camera::framing(&bounds, self.view, small);
-        let mut animation = Animation::new(small, frame_time * self.every as f64)?;
-        for (index, shot) in self.shots.iter().enumerate() {
+        let mut animation = Animation::new(small)?;
+        for shot in &self.shots {
             if interrupted.load(Ordering::Relaxed) {
                 return Ok(false);
             }
-            let image = draw(shot, &camera)?;
-            if index + 1 < self.shots.len() {
-                animation.push(&image)?;
-            } else {
-                animation.push_held(&image, LAST_FRAME_HELD)?;
-            }
+            animation.push(&draw(shot, &camera)?, shot.time)?;
         }
-        out.write("motion.gif", &animation.finish()?)?;
+        out.write("motion.gif", &animation.finish(LAST_FRAME_HELD)?)?;
         Ok(true)
     }
 

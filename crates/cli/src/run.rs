@@ -193,7 +193,7 @@ fn simulate<S: Real>(
         let bar = progress::bar(film.picture_count(), "drawing", "{pos} of {len} pictures");
         // A run that was interrupted still shows what it has; the next Ctrl-C ends the drawing.
         interrupted.store(false, Ordering::Relaxed);
-        drawn = film.develop(out, simulation.scene().time.frame, &bar, interrupted)?;
+        drawn = film.develop(out, &bar, interrupted)?;
         bar.finish_and_clear();
     }
     if let Err(error) = ended {

@@ -57,7 +57,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     std::fs::write(folder.join("organ.png"), write_png(&picture)?)?;
 
     let size = ImageSize::new(640, 400)?;
-    let mut animation = Animation::new(size, 1.0 / 30.0)?;
+    let mut animation = Animation::new(size)?;
     let started = Instant::now();
     for frame in 0..90 {
         let time = f64::from(frame) / 30.0;
@@ -78,12 +78,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             marker_radius: 1.1e-3,
             size,
         })?;
-        animation.push(&picture)?;
+        animation.push(&picture, time)?;
         if frame == 30 {
             std::fs::write(folder.join("organ_small.png"), write_png(&picture)?)?;
         }
     }
-    let gif = animation.finish()?;
+    let gif = animation.finish(1.0 / 30.0)?;
     println!("animation: {} bytes, {:?}", gif.len(), started.elapsed());
     std::fs::write(folder.join("organ.gif"), gif)?;
     Ok(())

@@ -1,5 +1,9 @@
 //! Moving pictures, frame by frame.
 //!
+//! A frame is shown from its time until that of the next one. A GIF counts hundredths of a second, and players
+//! take what is shorter than two of them for a tenth of a second: times are rounded from the beginning, so that
+//! no rounding adds up, and a frame whose successor comes too soon gives way to it.
+//!
 //! A GIF frame has 255 colours and may leave pixels as they were. Each frame therefore gets a
 //! palette of its own, trained only on the pixels that changed, and everything that already looks
 //! right stays: backgrounds, scales and letters cost nothing after the first frame.
@@ -23,16 +27,26 @@ const TOLERANCE: u8 = 3;
 const TRAINING_STRIDE: i32 = 3;
 
 /// Shortest time between frames [1/100 s]; browsers slow anything faster down to a tenth second.
-const SHORTEST_DELAY: f64 = 2.0;
+const SHORTEST_DELAY: u64 = 2;
+
+/// Longest time between frames [s]: the format counts to eleven minutes.
+const LONGEST_DELAY: f64 = 600.0;
+
+/// How long a frame stays whose successor is earlier: what is shown has begun again [s].
+const USUAL_DELAY: f64 = 0.04;
 
 /// A GIF in the making. Frames are compressed as they come, so that memory holds one of them.
 pub struct Animation {
     size: ImageSize,
     encoder: gif::Encoder<Vec<u8>>,
-    /// Wanted time between frames [1/100 s].
-    delay: f64,
-    /// Time that rounding has withheld so far [1/100 s].
-    owed: f64,
+    /// The frame whose end is not known yet.
+    waiting: Option<Image>,
+    /// The time of the last frame, as its giver counts [s].
+    last_time: f64,
+    /// When the last frame is shown, from the beginning [s].
+    clock: f64,
+    /// Delays written so far [1/100 s].
+    written: u64,
     /// What a viewer shows after the last frame.
     shown: Option<Vec<[u8; 3]>>,
 }
@@ -42,24 +56,18 @@ fn failed(error: gif::EncodingError) -> PictureError {
 }
 
 impl Animation {
-    /// An endless animation, `frame_time` [s] from one frame to the next.
-    pub fn new(size: ImageSize, frame_time: f64) -> Result<Self, PictureError> {
+    /// An endless animation.
+    pub fn new(size: ImageSize) -> Result<Self, PictureError> {
         let (width, height) = (size.width() as u16, size.height() as u16);
         let mut encoder = gif::Encoder::new(Vec::new(), width, height, &[]).map_err(failed)?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(failed)?;
-        let delay = frame_time * 100.0;
-        // A minute a frame is beyond anything wanted, and what is not a number gets a usual pace.
-        let delay = if delay.is_nan() { 4.0 } else { delay.clamp(SHORTEST_DELAY, 6000.0) };
-        Ok(Self { size, encoder, delay, owed: 0.0, shown: None })
+        let (waiting, shown) = (None, None);
+        Ok(Self { size, encoder, waiting, last_time: 0.0, clock: 0.0, written: 0, shown })
     }
 
-    /// Adds a frame, shown for the usual time.
-    pub fn push(&mut self, image: &Image) -> Result<(), PictureError> {
-        self.push_held(image, self.delay / 100.0)
-    }
-
-    /// Adds a frame that stays for `seconds`: the last one, before the motion repeats.
-    pub fn push_held(&mut self, image: &Image, seconds: f64) -> Result<(), PictureError> {
+    /// Adds a frame that is shown from a time [s] on, by any clock. Where that goes back, a motion has begun again
+    /// and follows the one before.
+    pub fn push(&mut self, image: &Image, time: f64) -> Result<(), PictureError> {
         if image.size() != self.size {
             return Err(PictureError::FrameSize {
                 width: image.size().width(),
@@ -68,19 +76,37 @@ impl Animation {
                 expected_height: self.size.height(),
             });
         }
-        let wanted = if seconds.is_nan() { self.delay } else { seconds * 100.0 };
-        let wanted = wanted.clamp(SHORTEST_DELAY, 6000.0);
-        let delay = (wanted + self.owed).round().max(SHORTEST_DELAY);
-        self.owed = wanted + self.owed - delay;
-        let frame = self.changes(image, delay as u16);
-        self.encoder.write_frame(&frame).map_err(failed)
+        if self.waiting.is_some() {
+            let step = time - self.last_time;
+            self.clock += if step >= 0.0 { step.min(LONGEST_DELAY) } else { USUAL_DELAY };
+            self.show_until(self.clock, 0)?;
+        }
+        self.waiting = Some(image.clone());
+        self.last_time = time;
+        Ok(())
     }
 
-    /// The bytes of the GIF file.
-    pub fn finish(self) -> Result<Vec<u8>, PictureError> {
+    /// The bytes of the GIF file. The last frame stays for `seconds` before the motion repeats.
+    pub fn finish(mut self, seconds: f64) -> Result<Vec<u8>, PictureError> {
+        self.show_until(self.clock + seconds.clamp(0.0, LONGEST_DELAY), SHORTEST_DELAY)?;
         self.encoder
             .into_inner()
             .map_err(|e| PictureError::Encoding { format: "gif", reason: e.to_string() })
+    }
+
+    /// Writes the frame that waits, shown until so far from the beginning [s]; not where that is too soon, unless
+    /// it stays for `least` [1/100 s] all the same.
+    fn show_until(&mut self, end: f64, least: u64) -> Result<(), PictureError> {
+        // What is no number becomes zero.
+        let end = (100.0 * end).round() as u64;
+        let delay = end.saturating_sub(self.written).max(least);
+        if delay < SHORTEST_DELAY {
+            return Ok(());
+        }
+        let Some(image) = self.waiting.take() else { return Ok(()) };
+        self.written += delay;
+        let frame = self.changes(&image, delay as u16);
+        self.encoder.write_frame(&frame).map_err(failed)
     }
 
     /// The smallest rectangle around all pixels that no longer look right, and what is shown then.

@@ -197,12 +197,11 @@ fn png_holds_every_pixel() {
 fn gif_shows_every_frame_nearly_as_drawn() {
     let camera = camera_for_everything();
     let frames: Vec<_> = (0..4).map(|k| full(&camera, 0.2 * f64::from(k))).collect();
-    let mut animation = Animation::new(camera.size(), 1.0 / 30.0).unwrap();
-    for frame in &frames {
-        animation.push(frame).unwrap();
+    let mut animation = Animation::new(camera.size()).unwrap();
+    for (k, frame) in frames.iter().enumerate() {
+        animation.push(frame, k as f64 / 30.0).unwrap();
     }
-    animation.push_held(&frames[3], 1.0).unwrap();
-    let bytes = animation.finish().unwrap();
+    let bytes = animation.finish(1.0).unwrap();
 
     let mut options = gif::DecodeOptions::new();
     options.set_color_output(gif::ColorOutput::RGBA);
@@ -217,7 +216,7 @@ fn gif_shows_every_frame_nearly_as_drawn() {
                 canvas[place] = [pixel[0], pixel[1], pixel[2]];
             }
         }
-        let frame = &frames[delays.len().min(3)];
+        let frame = &frames[delays.len()];
         let pairs = frame.pixels().as_flattened().iter().zip(canvas.as_flattened());
         let error =
             pairs.map(|p| f64::from(p.0.abs_diff(*p.1))).sum::<f64>() / (3.0 * 320.0 * 200.0);
@@ -226,7 +225,44 @@ fn gif_shows_every_frame_nearly_as_drawn() {
         delays.push(part.delay);
     }
     // Thirty frames a second do not divide into hundredths: the rest is carried on.
-    assert_eq!(delays, [3, 4, 3, 3, 100]);
+    assert_eq!(delays, [3, 4, 3, 100]);
+}
+
+/// Frames at these times [s], the last one held for a while [s]: their delays [1/100 s].
+fn delays(times: &[f64], held: f64) -> Vec<u16> {
+    let mut animation = Animation::new(size(16, 16)).unwrap();
+    for (k, time) in times.iter().enumerate() {
+        animation.push(&Image::filled(size(16, 16), [k as u8; 3]), *time).unwrap();
+    }
+    let bytes = animation.finish(held).unwrap();
+    let mut decoder = gif::DecodeOptions::new().read_info(std::io::Cursor::new(bytes)).unwrap();
+    let mut delays = Vec::new();
+    while let Some(frame) = decoder.read_next_frame().unwrap() {
+        delays.push(frame.delay);
+    }
+    delays
+}
+
+#[test]
+fn an_animation_takes_as_long_as_its_frames_say() {
+    // Pictures per second that do not divide into hundredths, more than players can show, and few.
+    for (rate, count) in [(30.0, 61), (60.0, 61), (24.0, 25), (240.0, 121), (7.0, 8), (0.7, 3)] {
+        let times: Vec<f64> = (0..count).map(|k| 5.0 + f64::from(k) / rate).collect();
+        let delays = delays(&times, 0.25);
+        let sum = delays.iter().map(|delay| f64::from(*delay) / 100.0).sum::<f64>();
+        let wanted = f64::from(count - 1) / rate + 0.25;
+        assert!((sum - wanted).abs() <= 0.005 + 1e-9, "{rate}: {sum} s for {wanted} s");
+        assert!(delays.iter().all(|delay| *delay >= 2), "{rate}: {delays:?}");
+    }
+}
+
+#[test]
+fn a_motion_that_begins_again_or_has_no_time_goes_on() {
+    assert_eq!(delays(&[0.0, 0.1, 0.0, 0.1], 0.3), [10, 4, 10, 30]);
+    assert_eq!(delays(&[0.0, f64::NAN, 1.0, -f64::INFINITY], f64::NAN), [4, 4, 4, 2]);
+    // A minute of standing still, and more minutes than the format can write.
+    assert_eq!(delays(&[0.0, 60.0, 1260.0], 0.0), [6000, 60000, 2]);
+    assert!(delays(&[], 1.0).is_empty());
 }
 
 #[test]
@@ -283,9 +319,9 @@ fn impossible_requests_are_errors() {
         |values| Surface { positions: &positions, triangles: &[], paint: Paint::Values(values) };
     assert!(matches!(draw(values(&[0.0; 2])), Err(PictureError::ValueCount { .. })));
     assert!(matches!(draw(values(&[0.0; 3])), Err(PictureError::NoColorScale { .. })));
-    let mut animation = Animation::new(size(64, 64), 0.04).unwrap();
+    let mut animation = Animation::new(size(64, 64)).unwrap();
     let wrong = Image::filled(size(64, 32), [0; 3]);
-    assert!(matches!(animation.push(&wrong), Err(PictureError::FrameSize { .. })));
+    assert!(matches!(animation.push(&wrong, 0.0), Err(PictureError::FrameSize { .. })));
 }
 
 #[test]

@@ -57,6 +57,8 @@ pub struct App {
     pictures: PathBuf,
     farewell: Arc<OnceLock<String>>,
     help_open: bool,
+    /// Whether a text field was being written in when the window was shown last.
+    was_typing: bool,
     /// Number and moment of the frame from which the rate was counted last.
     counted: (u64, Instant),
     /// Pictures of the window since then.
@@ -103,6 +105,7 @@ impl App {
             pictures: options.pictures,
             farewell: options.farewell,
             help_open: false,
+            was_typing: false,
             counted: (0, Instant::now()),
             shown: 0,
             curves: Vec::new(),
@@ -171,7 +174,7 @@ impl App {
         let coloring = self.preferences.coloring;
         let methods = self.preferences.methods();
         let mut actions: Vec<Action> =
-            help::requests(&context).into_iter().map(Action::Ask).collect();
+            help::requests(&context, self.was_typing).into_iter().map(Action::Ask).collect();
         self.show_panels(ui, &mut actions);
         let central = CentralPanel::no_frame().show(ui, |ui| {
             let frame = self.frame.as_deref();
@@ -193,6 +196,10 @@ impl App {
         for action in actions {
             self.act(action);
         }
+        if context.dragged_id().is_none() {
+            self.session.settle();
+        }
+        self.was_typing = context.text_edit_focused();
         self.record();
     }
 
@@ -344,12 +351,16 @@ impl App {
             }
             Action::Ghost(ghost) => {
                 let chosen = self.session.compare(self.session.is_comparison(), ghost);
+                if ghost && chosen.as_ref().is_ok_and(|commands| !commands.is_empty()) {
+                    self.messages.busy = Some("waiting for the true solution".to_owned());
+                }
                 self.carry_out(chosen);
             }
             Action::Speed(speed) => {
                 self.clock.speed = speed;
                 self.engine.send(Command::Speed(speed));
             }
+            Action::Warn(text) => self.messages.warn(text),
             Action::LetGo(hold) => {
                 let command = self.holds.let_go(hold);
                 self.send(command);

@@ -1,4 +1,5 @@
-//! Screenshots, and recordings of the motion as animated images.
+//! Screenshots, and recordings of the motion as animated images. A recording keeps simulated time: it takes as long
+//! as the motion does in the scene, however fast or slowly it was computed; what was paused takes no time.
 
 use anyhow::{Context, Result, anyhow};
 use std::path::{Path, PathBuf};
@@ -37,17 +38,30 @@ pub fn save_picture(images: &[Image], path: &Path) -> Result<()> {
 #[derive(Debug)]
 pub struct Recorder {
     path: PathBuf,
-    pictures: Option<SyncSender<Image>>,
+    pictures: Option<SyncSender<Sheet>>,
     thread: Option<JoinHandle<Result<u32>>>,
-    /// The simulated time of the last picture [s].
+    /// Simulated time of a frame: the last picture stays for as long [s].
+    frame: f64,
+    /// Simulated time now, and of the last picture [s].
+    now: f64,
     last: f64,
+    /// Simulated time so far, of all motions that were begun [s].
+    recorded: f64,
     /// Pictures that found no room.
     missed: u32,
 }
 
+/// What is sent to be compressed.
+enum Sheet {
+    /// A picture, and its simulated time [s].
+    Picture(Image, f64),
+    /// So long the last one stays [s].
+    Held(f64),
+}
+
 impl Recorder {
-    /// Begins a recording.
-    pub fn start(path: PathBuf) -> Result<Self> {
+    /// Begins a recording of simulations whose frames take so long [s].
+    pub fn start(path: PathBuf, frame: f64) -> Result<Self> {
         let (pictures, receive) = sync_channel(WAITING);
         let to = path.clone();
         let thread = std::thread::Builder::new()
@@ -55,7 +69,8 @@ impl Recorder {
             .spawn(move || compress(&receive, &to))
             .context("cannot start a recording")?;
         let (pictures, thread) = (Some(pictures), Some(thread));
-        Ok(Self { path, pictures, thread, last: f64::NEG_INFINITY, missed: 0 })
+        let (now, last) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        Ok(Self { path, pictures, thread, frame, now, last, recorded: 0.0, missed: 0 })
     }
 
     /// Where it will be.
@@ -63,10 +78,13 @@ impl Recorder {
         &self.path
     }
 
-    /// Whether a picture is due at a simulated time [s].
-    pub fn is_due(&self, time: f64) -> bool {
-        // Time goes back at a reset.
-        time >= self.last + RECORDED_EVERY - 1e-9 || time < self.last
+    /// Simulated time [s] has gone on: whether a picture is due.
+    pub fn is_due(&mut self, time: f64) -> bool {
+        // It goes back at a reset.
+        let begins = !self.now.is_finite() || time < self.now;
+        self.recorded += if begins { 0.0 } else { time - self.now };
+        self.now = time;
+        begins || time >= self.last + RECORDED_EVERY - 1e-9
     }
 
     /// Adds pictures, side by side.
@@ -74,7 +92,7 @@ impl Recorder {
         self.last = time;
         let image = Image::tiled(images, images.len().max(1))?;
         if let Some(pictures) = &self.pictures
-            && let Err(TrySendError::Full(_)) = pictures.try_send(image)
+            && let Err(TrySendError::Full(_)) = pictures.try_send(Sheet::Picture(image, time))
         {
             self.missed += 1;
         }
@@ -84,7 +102,9 @@ impl Recorder {
     /// Ends it and writes the file; what to tell a person.
     pub fn finish(mut self) -> Result<String> {
         let count = self.end()?;
-        let mut told = format!("{}: {count} pictures", self.path.display());
+        let path = self.path.display();
+        let seconds = self.recorded + self.frame;
+        let mut told = format!("{path}: {count} pictures, {seconds:.2} s of simulated time");
         if self.missed > 0 {
             told.push_str(&format!("; {} were left out, this machine being busy", self.missed));
         }
@@ -92,7 +112,10 @@ impl Recorder {
     }
 
     fn end(&mut self) -> Result<u32> {
-        self.pictures = None;
+        if let Some(pictures) = self.pictures.take() {
+            // A thread that has broken off says why when it is joined.
+            let _ = pictures.send(Sheet::Held(self.now - self.last + self.frame));
+        }
         match self.thread.take() {
             Some(thread) => {
                 thread.join().unwrap_or_else(|_| Err(anyhow!("the recording broke off")))
@@ -113,26 +136,32 @@ impl Drop for Recorder {
     }
 }
 
-fn compress(pictures: &Receiver<Image>, path: &Path) -> Result<u32> {
+fn compress(sheets: &Receiver<Sheet>, path: &Path) -> Result<u32> {
     let mut animation: Option<(Animation, ImageSize)> = None;
-    let mut count = 0;
-    for image in pictures {
-        let image = smaller(&image)?;
+    let (mut count, mut held) = (0, 0.0);
+    for sheet in sheets {
+        let (image, time) = match sheet {
+            Sheet::Picture(image, time) => (smaller(&image)?, time),
+            Sheet::Held(seconds) => {
+                held = seconds;
+                continue;
+            }
+        };
         if animation.is_none() {
-            animation = Some((Animation::new(image.size(), RECORDED_EVERY)?, image.size()));
+            animation = Some((Animation::new(image.size())?, image.size()));
         }
         // A window that changes its size ends no recording: what does not fit is left out.
         if let Some((animation, size)) = &mut animation
             && image.size() == *size
         {
-            animation.push(&image)?;
+            animation.push(&image, time)?;
             count += 1;
         }
     }
     let Some((animation, _)) = animation else {
         return Err(anyhow!("nothing was recorded; let the simulation run while recording"));
     };
-    write_whole(path, &animation.finish()?)?;
+    write_whole(path, &animation.finish(held)?)?;
     Ok(count)
 }
 
@@ -166,32 +195,64 @@ mod tests {
         Image::filled(ImageSize::new(64, 32).expect("a size"), [grey; 3])
     }
 
+    /// Delays of a GIF [s] and its size.
+    fn decode(path: &Path) -> (Vec<f64>, [u16; 2]) {
+        let file = std::fs::File::open(path).expect("the file");
+        let mut decoder = gif::DecodeOptions::new().read_info(file).expect("a GIF");
+        let mut delays = Vec::new();
+        while let Some(frame) = decoder.read_next_frame().expect("a whole frame") {
+            delays.push(f64::from(frame.delay) / 100.0);
+        }
+        (delays, [decoder.width(), decoder.height()])
+    }
+
+    /// Follows a simulation whose frames take so long [s] and are all seen but for every `unseen`th.
+    fn follow(recorder: &mut Recorder, frame: f64, count: u32, unseen: u32) -> u32 {
+        let mut taken = 0;
+        for number in (0..=count).filter(|number| !(number + 1).is_multiple_of(unseen)) {
+            let time = f64::from(number) * frame;
+            if recorder.is_due(time) {
+                recorder.push(&[picture(number as u8), picture(200)], time).expect("room");
+                taken += 1;
+            }
+        }
+        taken
+    }
+
+    #[test]
+    fn a_recording_takes_as_long_as_the_motion() {
+        let folder = tempfile::tempdir().expect("a folder");
+        // Sixty frames a second, forty, and one computed so slowly that ten are seen.
+        for (frame, count) in [(1.0 / 60.0, 40), (0.025, 30), (0.1, 9)] {
+            let path = free_name(folder.path(), "liver", "gif");
+            let mut recorder = Recorder::start(path.clone(), frame).expect("a recording");
+            let taken = follow(&mut recorder, frame, count, 7);
+            let told = recorder.finish().expect("a file");
+            let (delays, size) = decode(&path);
+            let sum = delays.iter().sum::<f64>();
+            let wanted = f64::from(count + 1) * frame;
+            assert!((sum - wanted).abs() < 0.01, "{sum} s for {wanted} s");
+            assert_eq!((delays.len(), size), (taken as usize, [128, 32]));
+            assert!(told.contains(&format!("{wanted:.2} s of simulated time")), "{told}");
+        }
+    }
+
     #[test]
     fn a_recording_that_is_dropped_is_whole() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = free_name(folder.path(), "liver", "gif");
-        let mut recorder = Recorder::start(path.clone()).expect("a recording");
-        for step in 0..5u8 {
-            let time = f64::from(step) * RECORDED_EVERY;
-            assert!(recorder.is_due(time) && (step == 0 || !recorder.is_due(time - 0.01)));
-            recorder.push(&[picture(40 * step), picture(200)], time).expect("room for a picture");
-        }
+        let mut recorder = Recorder::start(path.clone(), 0.02).expect("a recording");
+        // Begun again in between.
+        let taken = (0..2).map(|_| follow(&mut recorder, RECORDED_EVERY, 4, 100)).sum::<u32>();
         drop(recorder);
-        let file = std::fs::File::open(&path).expect("the file");
-        let mut decoder = gif::DecodeOptions::new().read_info(file).expect("a GIF");
-        assert_eq!((decoder.width(), decoder.height()), (128, 32));
-        let mut frames = 0;
-        while decoder.read_next_frame().expect("a whole frame").is_some() {
-            frames += 1;
-        }
-        assert_eq!(frames, 5);
+        assert_eq!((taken, decode(&path).0.len()), (10, 10));
         assert_eq!(free_name(folder.path(), "liver", "gif"), folder.path().join("liver-0002.gif"));
     }
 
     #[test]
     fn nothing_recorded_leaves_no_file() {
         let folder = tempfile::tempdir().expect("a folder");
-        let recorder = Recorder::start(folder.path().join("x.gif")).expect("a recording");
+        let recorder = Recorder::start(folder.path().join("x.gif"), 0.02).expect("a recording");
         assert!(recorder.finish().is_err());
         assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0);
     }

@@ -95,7 +95,8 @@ pub struct History {
 const MOST_STEPS: usize = 500;
 
 impl History {
-    /// Notes what held before a change. Changes of one key in one `gesture` are one step.
+    /// Notes what held before a change. Changes of one key in one `gesture`, which [`Self::settle`] ends, are
+    /// one step.
     pub fn record(&mut self, before: &Choices, key: &str, gesture: bool) {
         let goes_on = gesture && self.gesture.as_deref() == Some(key);
         if !goes_on {
@@ -107,8 +108,14 @@ impl History {
         self.gesture = gesture.then(|| key.to_owned());
     }
 
+    /// Nothing is being dragged any more: the next drag is a step of its own, of the same slider as well.
+    pub fn settle(&mut self) {
+        self.gesture = None;
+    }
+
     /// What held before the last step.
     pub fn undo(&mut self, now: &Choices) -> Option<Choices> {
+        self.settle();
         exchange(&mut self.done, &mut self.undone, now)
     }
 
@@ -210,17 +217,22 @@ mod tests {
     }
 
     #[test]
-    fn a_drag_of_a_slider_is_one_step_back() {
+    fn every_drag_of_a_slider_is_one_step_back() {
         let (mut history, mut now) = (History::default(), Choices::default());
-        for (value, gesture) in
-            [("6 kPa", true), ("7 kPa", true), ("8 kPa", true), ("9 kPa", false)]
-        {
-            history.record(&now, "body.bar.material.young", gesture);
-            now = now.with(Side::First, "body.bar.material.young", value);
+        for values in [["6 kPa", "7 kPa", "8 kPa"], ["9 kPa", "10 kPa", "11 kPa"]] {
+            for value in values {
+                history.record(&now, "body.bar.material.young", true);
+                now = now.with(Side::First, "body.bar.material.young", value);
+            }
+            history.settle();
         }
-        now = history.undo(&now).expect("the step after the drag");
-        assert_eq!(now.shared[0].1, "8 kPa");
-        now = history.undo(&now).expect("the drag");
+        history.record(&now, "body.bar.material.young", false);
+        now = now.with(Side::First, "body.bar.material.young", "12 kPa");
+        for before in ["11 kPa", "8 kPa"] {
+            now = history.undo(&now).expect("a step");
+            assert_eq!(now.shared[0].1, before);
+        }
+        now = history.undo(&now).expect("the first drag");
         assert_eq!(now, Choices::default());
         assert!(!history.can_undo());
         now = history.redo(&now).expect("the drag again");

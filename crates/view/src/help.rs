@@ -63,7 +63,12 @@ const SHORTCUTS: &[Shortcut] = &[
     plain(Key::F, Request::Frame, "F", "show everything"),
     plain(Key::Escape, Request::LetGo, "Esc", "let go of everything"),
     plain(Key::S, Request::Screenshot, "S", "save a picture, in pictures/"),
-    plain(Key::G, Request::Record, "G", "begin or end recording an animated image"),
+    plain(
+        Key::G,
+        Request::Record,
+        "G",
+        "begin or end recording an animated image, at the pace of simulated time",
+    ),
     plain(Key::F1, Request::Help, "F1, ?", "this list"),
     plain(Key::Questionmark, Request::Help, "", ""),
 ];
@@ -76,9 +81,10 @@ const MOUSE: &[(&str, &str)] = &[
     ("Shift at release", "hold on; Esc lets go"),
 ];
 
-/// What the keyboard asks for. A text field that is being written in keeps its letters.
-pub fn requests(context: &egui::Context) -> Vec<Request> {
-    if context.text_edit_focused() {
+/// What the keyboard asks for. A text field that is being written in keeps its keys: Escape, which leaves it, as
+/// well, so `was_typing` says whether there was one in the frame before.
+pub fn requests(context: &egui::Context, was_typing: bool) -> Vec<Request> {
+    if was_typing || context.text_edit_focused() {
         return Vec::new();
     }
     context.input_mut(|input| {

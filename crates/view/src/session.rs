@@ -138,6 +138,11 @@ impl Session {
         }
     }
 
+    /// Nothing is being dragged any more: what follows is another step of undo.
+    pub fn settle(&mut self) {
+        self.history.settle();
+    }
+
     /// Takes the last change back.
     pub fn undo(&mut self) -> Result<Vec<Command>, String> {
         match self.history.undo(&self.choices) {

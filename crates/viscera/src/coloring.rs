@@ -13,6 +13,8 @@
 //! * a few colours: clique separation;
 //! * unlimited: nothing is split: Gauss-Seidel.
 //!
+//! Every connected part is coloured as if it were alone.
+//!
 //! Invariant, checked by [`Coloring::validate`]: **no two constraints of a colour share a copy.**
 //!
 //! A vertex of inverse mass `w` with `k` copies gives each copy `k w`, and the copies are averaged
@@ -71,8 +73,8 @@ impl ConstraintGraph {
         &self.corners[self.corner_range(constraint)]
     }
 
-    /// The connected component of each vertex, numbered by first vertex, and how many there are.
-    pub fn components(&self, vertex_count: usize) -> (Vec<u32>, usize) {
+    /// The connected part of each vertex, numbered by first vertex, and how many there are.
+    pub fn parts(&self, vertex_count: usize) -> (Vec<u32>, usize) {
         let mut parent: Vec<u32> = (0..vertex_count as u32).collect();
         fn root(parent: &mut [u32], mut v: u32) -> u32 {
             while parent[v as usize] != v {
@@ -88,18 +90,18 @@ impl ConstraintGraph {
             }
         }
         let mut count = 0;
-        let mut component_of = vec![0; vertex_count];
+        let mut part_of = vec![0; vertex_count];
         for v in 0..vertex_count as u32 {
-            // A component's root is its first vertex, so its number is known by now.
+            // A part's root is its first vertex, so its number is known by now.
             let first = root(&mut parent, v);
-            component_of[v as usize] = if first == v {
+            part_of[v as usize] = if first == v {
                 count += 1;
                 count - 1
             } else {
-                component_of[first as usize]
+                part_of[first as usize]
             };
         }
-        (component_of, count as usize)
+        (part_of, count as usize)
     }
 
     /// Constraints whose vertices lie in many others come first: they have the fewest free
@@ -113,7 +115,7 @@ impl ConstraintGraph {
         order
     }
 
-    /// Colours greedily with at most the wanted number of colours.
+    /// Colours greedily with at most the wanted number of colours, connected parts independently.
     pub fn color(&self, vertex_count: usize, wanted: Colors) -> Coloring {
         let limit = match wanted {
             Colors::Unlimited => usize::MAX,
@@ -127,12 +129,16 @@ impl ConstraintGraph {
         // used[v][color]: how many constraints of that colour act on v; copies[v]: the largest.
         let mut used: Vec<Vec<u32>> = vec![Vec::new(); vertex_count];
         let mut copies = vec![1u32; vertex_count];
-        let mut load: Vec<u32> = Vec::new();
+        // Per part: how many constraints each open colour has.
+        let (part_of, part_count) = self.parts(vertex_count);
+        let mut loads: Vec<Vec<u32>> = vec![Vec::new(); part_count];
         let mut color_of = vec![0u32; self.constraint_count()];
         let mut local_copy = vec![0u32; self.corners.len()];
 
         for constraint in self.order(&valence) {
             let vertices = self.vertices(constraint as usize);
+            let Some(&first) = vertices.first() else { continue };
+            let load = &mut loads[part_of[first as usize] as usize];
             let taken =
                 |v: u32, color: usize| -> u32 { used[v as usize].get(color).copied().unwrap_or(0) };
             let conflicts = |color: usize| {
@@ -179,7 +185,7 @@ impl ConstraintGraph {
             .map(|(&local, &v)| copy_offsets[v as usize] + local)
             .collect();
         Coloring {
-            color_count: load.len() as u32,
+            color_count: loads.iter().map(Vec::len).max().unwrap_or(0) as u32,
             color_of,
             copy_of,
             copy_offsets,

@@ -30,6 +30,14 @@ pub struct TetMeasure {
     pub energy_density: f64,
 }
 
+impl TetMeasure {
+    /// Whether it is turned inside out, flat, or no number.
+    pub fn is_inverted(&self) -> bool {
+        // Written so that a volume that is no number counts.
+        !matches!(self.volume_ratio.partial_cmp(&0.0), Some(std::cmp::Ordering::Greater))
+    }
+}
+
 /// Sums over a model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Energies {
@@ -167,11 +175,7 @@ pub fn summarize_deformation(tets: &[TetMeasure]) -> DeformationSummary {
         now += tet.rest_volume * tet.volume_ratio;
         summary.largest_stretch = summary.largest_stretch.max(tet.stretches[0]);
         summary.smallest_stretch = summary.smallest_stretch.min(tet.stretches[2]);
-        // Written so that a volume that is no number counts as inverted.
-        summary.inverted += usize::from(!matches!(
-            tet.volume_ratio.partial_cmp(&0.0),
-            Some(std::cmp::Ordering::Greater)
-        ));
+        summary.inverted += usize::from(tet.is_inverted());
     }
     if rest > 0.0 {
         summary.volume_ratio = now / rest;

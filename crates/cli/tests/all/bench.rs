@@ -210,13 +210,12 @@ fn places_that_cannot_be_written_are_refused_before_the_work() {
 }
 
 /// The CPU and the GPU on the same mesh; a software driver does.
-#[test]
 #[cfg(feature = "gpu")]
-fn a_graphics_processor_is_measured_beside_the_processor() {
+fn assert_both_are_measured(sizes: &str) {
     let folder = Bench::new("");
     let end = bench(
         &folder,
-        &["--device", "gpu", "--sizes", "1k", "--solvers", "green", "--threads", "1"],
+        &["--device", "gpu", "--sizes", sizes, "--solvers", "green", "--threads", "1"],
     );
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     let cases = cases(&folder, "out/bench.json");
@@ -245,6 +244,19 @@ fn a_graphics_processor_is_measured_beside_the_processor() {
     for text in ["| dispatches |", "(bench/cpu-and-gpu.svg)", "(bench/ns-per-tet-gpu.svg)"] {
         assert!(report.contains(text), "{text} is not in {report}");
     }
+}
+
+#[test]
+#[cfg(feature = "gpu")]
+fn a_graphics_processor_is_measured_beside_the_processor() {
+    assert_both_are_measured("100");
+}
+
+#[test]
+#[cfg(feature = "gpu")]
+#[ignore = "slow: a thousand tetrahedra on a software driver"]
+fn a_graphics_processor_is_measured_beside_the_processor_at_length() {
+    assert_both_are_measured("1k");
 }
 
 #[test]

@@ -39,12 +39,10 @@ fn the_quick_patch_test_writes_its_report_twice_the_same() {
     assert_eq!(fs::read_dir(folder.path().join("patch")).expect("the folder").count(), 2);
 }
 
-/// Everything that compares states of rest and the bending frequency, on small meshes.
-#[test]
-fn the_library_rests_where_the_reference_does() {
+/// Runs sections quickly: all their claims are met, and their figures are there.
+fn assert_sections_hold(sections: &str, figures: &[&str]) {
     let folder = tempfile::tempdir().expect("a folder");
-    let report = folder.path().join("rest.md");
-    let sections = "uniaxial,cantilever,twist,frequency,indentation,organ";
+    let report = folder.path().join("report.md");
     let output =
         lab(&["validate", "--quick", "--only", sections, "--out", &report.to_string_lossy()]);
     assert!(output.status.success(), "{}", text(&output.stderr));
@@ -52,7 +50,21 @@ fn the_library_rests_where_the_reference_does() {
     let markdown = fs::read_to_string(&report).expect("the report");
     assert!(!markdown.contains("| another minimum"), "{markdown}");
     assert!(!markdown.contains("not a number"), "{markdown}");
-    for figure in [
+    for figure in figures {
+        assert!(markdown.contains(&format!("(report/{figure}.svg)")), "no {figure} in {markdown}");
+    }
+}
+
+/// What compares states of rest and the bending frequency, on small meshes.
+#[test]
+fn the_library_rests_where_the_reference_does() {
+    assert_sections_hold("uniaxial,twist,frequency", &["uniaxial-force", "twist-torque"]);
+}
+
+#[test]
+#[ignore = "slow: larger bodies come to rest by Newton's method"]
+fn the_library_rests_where_the_reference_does_at_length() {
+    let figures = [
         "uniaxial-force",
         "cantilever-locking",
         "twist-torque",
@@ -60,25 +72,21 @@ fn the_library_rests_where_the_reference_does() {
         "frequency-amplitude",
         "indentation-force",
         "organ-iterations",
-    ] {
-        assert!(markdown.contains(&format!("(rest/{figure}.svg)")), "no {figure} in {markdown}");
-    }
+    ];
+    assert_sections_hold("uniaxial,cantilever,twist,frequency,indentation,organ", &figures);
 }
 
 /// What is new here: stiffness does not depend on the budget, steps keep their limits, motion follows.
 #[test]
 fn stiffness_does_not_depend_on_the_budget() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let report = folder.path().join("budget.md");
-    let sections = "rest,independence,motion,stress";
-    let output =
-        lab(&["validate", "--quick", "--only", sections, "--out", &report.to_string_lossy()]);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    all_are_met(&text(&output.stdout));
-    let markdown = fs::read_to_string(&report).expect("the report");
-    for figure in ["rest-bodies", "independence-iterations", "motion-drop"] {
-        assert!(markdown.contains(&format!("(budget/{figure}.svg)")), "no {figure} in {markdown}");
-    }
+    assert_sections_hold("independence,stress", &["independence-iterations"]);
+}
+
+#[test]
+#[ignore = "slow: many bodies come to rest, and a drop is followed by Newton's method"]
+fn stiffness_does_not_depend_on_the_budget_at_length() {
+    let figures = ["rest-bodies", "independence-iterations", "motion-drop"];
+    assert_sections_hold("rest,independence,motion,stress", &figures);
 }
 
 /// Claims that are told as missed: five sweeps of one colour do not unscramble a bar, and Anderson's

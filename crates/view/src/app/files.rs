@@ -106,7 +106,8 @@ impl App {
             return;
         }
         let path = free_name(&self.pictures, &self.session.document().stem(), "gif");
-        match Recorder::start(path) {
+        let frame = self.session.scene(Side::First).time.frame;
+        match Recorder::start(path, frame) {
             Ok(recorder) => self.recorder = Some(recorder),
             Err(error) => self.messages.warn(format!("{error:#}")),
         }

@@ -4,6 +4,8 @@ use std::sync::Mutex;
 use viscera::measure::Energies;
 use viscera::scalar::Vec3;
 
+use super::stage::Stage;
+
 /// The window's number for something it holds.
 pub type HoldId = u64;
 
@@ -36,6 +38,20 @@ pub struct Frame {
     pub lanes: Vec<Lane>,
 }
 
+impl Frame {
+    /// The exact solution, where there is one.
+    pub fn ghost(&self, stage: &Stage) -> Option<&Lane> {
+        let is_here = stage.has_ghost && self.generation == stage.generation;
+        self.lanes.last().filter(|_| is_here)
+    }
+
+    /// Whether the others wait for the exact solution: it takes longer than a frame is to last [s], or has not
+    /// computed one yet.
+    pub fn waits_for_ghost(&self, stage: &Stage, pace: f64) -> bool {
+        self.ghost(stage).is_some_and(|ghost| ghost.wall == 0.0 || ghost.wall > pace)
+    }
+}
+
 /// What one simulation is at that time.
 #[derive(Debug, Default)]
 pub struct Lane {
@@ -51,6 +67,23 @@ pub struct Lane {
     pub measures: Measures,
 }
 
+impl Lane {
+    /// The largest distance [m] of a vertex from where another simulation has it.
+    pub fn distance(&self, other: &Self) -> f64 {
+        let pairs = self.positions.iter().zip(&other.positions);
+        pairs.fold(0.0, |most, (a, b)| f64::max(most, f64::from((*a - *b).length())))
+    }
+}
+
+/// How many tetrahedra are inverted, in words; nothing where there are none.
+pub fn inverted(lane: &Lane) -> Option<String> {
+    match lane.measures.inverted {
+        0 => None,
+        1 => Some("1 tetrahedron is inverted".to_owned()),
+        count => Some(format!("{count} tetrahedra are inverted")),
+    }
+}
+
 /// What takes a while to measure, and is measured ten times a second unless colours need it more often.
 #[derive(Clone, Debug, Default)]
 pub struct Measures {
@@ -60,6 +93,8 @@ pub struct Measures {
     pub energy: Energies,
     /// Substeps that the step guard has taken back so far.
     pub rejected: u64,
+    /// Tetrahedra that are turned inside out.
+    pub inverted: usize,
     /// What the scene itself moves and pulls.
     pub tools: Vec<Tool>,
 }

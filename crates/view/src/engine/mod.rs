@@ -7,7 +7,7 @@ mod simulation;
 mod stage;
 mod worker;
 
-pub use frame::{Coloring, Frame, Hold, HoldId, Lane, Measures, Slot, Tool};
+pub use frame::{Coloring, Frame, Hold, HoldId, Lane, Measures, Slot, Tool, inverted};
 pub use stage::{Plan, Stage};
 
 use std::path::PathBuf;

@@ -169,6 +169,7 @@ impl<S: Real> Handle for Running<S> {
         let report = self.simulation.report();
         self.measures.residual = report.relative_residual;
         self.measures.energy = report.energy;
+        self.measures.inverted = report.deformation.inverted;
         self.measures.rejected = self.simulation.solver().rejected_steps();
         self.measures.tools = self.tools(report.patches);
         Ok(())

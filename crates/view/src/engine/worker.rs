@@ -274,7 +274,9 @@ impl Worker {
         let Some(running) = &self.running else { return self.load(plan) };
         let stage = Arc::clone(&running.stage);
         self.leave_ghost_out(&mut plan, &stage.assembly);
-        self.tell(Event::Busy("building the model".to_owned()));
+        let what =
+            if plan.ends_with_ghost { "building the true solution" } else { "building the model" };
+        self.tell(Event::Busy(what.to_owned()));
         let Some(running) = &mut self.running else { return };
         let first = &running.lanes[0];
         let forks: Result<Vec<_>, String> =

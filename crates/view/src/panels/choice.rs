@@ -1,9 +1,10 @@
 //! Rows of settings: a name, a slider or a menu, and what it means when one points at it.
 
-use eframe::egui::{self, Response, Slider, Ui};
+use eframe::egui::{self, Response, Ui};
 use std::ops::RangeInclusive;
 
 use super::Action;
+use super::number::{Edit, Number, named};
 use crate::choices::{Settings, Side};
 
 /// Where rows put what is chosen.
@@ -27,30 +28,12 @@ impl Chooser<'_> {
         self.actions.push(Action::Choose(self.side, settings, gesture));
     }
 
-    /// A slider; `text` writes the value as a scene file has it.
-    pub fn slider(
-        &mut self,
-        ui: &mut Ui,
-        row: &Row<'_>,
-        value: f64,
-        range: RangeInclusive<f64>,
-        text: impl Fn(f64) -> String,
-    ) {
-        let mut shown = value;
-        let mut slider = Slider::new(&mut shown, range)
-            .logarithmic(row.logarithmic)
-            .suffix(row.suffix)
-            // What the scene has may lie beyond the slider, and is shown as it is.
-            .clamping(egui::SliderClamping::Edits)
-            .smart_aim(true);
-        if row.whole {
-            slider = slider.integer();
-        } else {
-            slider = slider.max_decimals(row.decimals);
-        }
-        let response = labelled(ui, row, |ui| ui.add(slider));
-        if response.changed() && shown != value {
-            self.one(row.key, text(shown), response.dragged());
+    /// A number of a scene file, in the row's unit.
+    pub fn number(&mut self, ui: &mut Ui, row: &Row<'_>, value: f64) {
+        let edit = labelled(ui, row, |ui, label| row.number.show(ui, value, label));
+        if let Some(edit) = edit {
+            let gesture = matches!(edit, Edit::Moved(_, true));
+            self.one(row.key, edit.text(row.number.unit), gesture);
         }
     }
 
@@ -66,8 +49,8 @@ impl Chooser<'_> {
     pub fn menu(&mut self, ui: &mut Ui, row: &Row<'_>, value: &str, names: &[(&str, &str)]) {
         let shown = names.iter().find(|(name, _)| *name == value).map_or(value, |(_, words)| words);
         let mut chosen = None;
-        labelled(ui, row, |ui| {
-            egui::ComboBox::from_id_salt(row.key)
+        labelled(ui, row, |ui, label| {
+            let menu = egui::ComboBox::from_id_salt(row.key)
                 .selected_text(shown)
                 .width(ui.spacing().slider_width + 40.0)
                 .show_ui(ui, |ui| {
@@ -76,8 +59,8 @@ impl Chooser<'_> {
                             chosen = Some(*name);
                         }
                     }
-                })
-                .response
+                });
+            (menu.response.labelled_by(label), ())
         });
         if let Some(name) = chosen
             && name != value
@@ -95,66 +78,53 @@ pub struct Row<'a> {
     pub name: &'a str,
     /// What it means.
     pub help: &'a str,
-    /// Behind the number: " kPa".
-    pub suffix: &'a str,
-    /// Equal steps are equal factors.
-    pub logarithmic: bool,
-    /// A count.
-    pub whole: bool,
-    /// Digits behind the point, at most.
-    pub decimals: usize,
+    /// How its number looks, where it is one.
+    pub number: Number<'a>,
 }
 
 impl<'a> Row<'a> {
     /// A plain one.
     pub fn new(key: &'a str, name: &'a str, help: &'a str) -> Self {
-        Self { key, name, help, suffix: "", logarithmic: false, whole: false, decimals: 2 }
+        let number =
+            Number { unit: "", rail: 0.0..=1.0, logarithmic: false, whole: false, decimals: 2 };
+        Self { key, name, help, number }
     }
 
-    /// With a unit.
-    pub fn unit(self, suffix: &'a str) -> Self {
-        Self { suffix, ..self }
+    /// With a rail from here to there; what is typed may lie beyond.
+    pub fn rail(mut self, rail: RangeInclusive<f64>) -> Self {
+        self.number.rail = rail;
+        self
+    }
+
+    /// With a unit, as a scene file has it.
+    pub fn unit(mut self, unit: &'a str) -> Self {
+        self.number.unit = unit;
+        self
     }
 
     /// Over factors.
-    pub fn logarithmic(self) -> Self {
-        Self { logarithmic: true, ..self }
+    pub fn logarithmic(mut self) -> Self {
+        self.number.logarithmic = true;
+        self
     }
 
     /// In whole numbers.
-    pub fn whole(self) -> Self {
-        Self { whole: true, ..self }
+    pub fn whole(mut self) -> Self {
+        self.number.whole = true;
+        self
     }
 
-    /// With so many digits behind the point at most.
-    pub fn decimals(self, decimals: usize) -> Self {
-        Self { decimals, ..self }
+    /// With so many digits behind the point at most, where it is slid.
+    pub fn decimals(mut self, decimals: usize) -> Self {
+        self.number.decimals = decimals;
+        self
     }
 }
 
-/// Width of the names before sliders [points].
-const NAMES: f32 = 104.0;
-
-fn labelled(ui: &mut Ui, row: &Row<'_>, control: impl FnOnce(&mut Ui) -> Response) -> Response {
-    named(ui, row.name, &format!("{}\n\n{}", row.help, row.key), control)
-}
-
-/// A control with its name before it and what it means for who points at it.
-pub fn named(
+fn labelled<T>(
     ui: &mut Ui,
-    name: &str,
-    help: &str,
-    control: impl FnOnce(&mut Ui) -> Response,
-) -> Response {
-    ui.horizontal(|ui| {
-        let size = egui::vec2(NAMES, ui.spacing().interact_size.y);
-        let layout = egui::Layout::left_to_right(egui::Align::Center);
-        let label = ui.allocate_ui_with_layout(size, layout, |ui| {
-            ui.set_min_width(NAMES);
-            ui.label(name)
-        });
-        let label = label.inner.on_hover_text(help);
-        control(ui).labelled_by(label.id).on_hover_text(help)
-    })
-    .inner
+    row: &Row<'_>,
+    control: impl FnOnce(&mut Ui, egui::Id) -> (Response, T),
+) -> T {
+    named(ui, row.name, &format!("{}\n\n{}", row.help, row.key), control)
 }

@@ -1,7 +1,7 @@
 //! The live convergence plot: residual against iteration for the methods that are ticked.
 
 use eframe::egui::{self, Color32, Ui};
-use egui_plot::{Legend, Line, Plot, PlotPoints};
+use egui_plot::{Line, Plot, PlotPoints, uniform_grid_spacer};
 
 use crate::preferences::Preferences;
 use crate::probe::{Curve, METHODS};
@@ -18,7 +18,8 @@ const COLORS: [Color32; METHODS.len()] = [
     Color32::from_rgb(240, 228, 66),
 ];
 
-/// Ticks for the methods, and their curves; residuals as powers of ten.
+/// Ticks for the methods in the colours of their curves, which is the legend, and the curves; residuals as powers
+/// of ten.
 pub fn show(ui: &mut Ui, preferences: &mut Preferences, curves: &[Curve]) {
     ui.horizontal(|ui| {
         ui.strong("Convergence");
@@ -43,11 +44,12 @@ pub fn show(ui: &mut Ui, preferences: &mut Preferences, curves: &[Curve]) {
     Plot::new("convergence")
         .x_axis_label("iteration")
         .y_axis_label("residual")
+        // Powers of ten, the finest of them.
+        .y_grid_spacer(uniform_grid_spacer(|_| [4.0, 2.0, 1.0]))
         .y_axis_formatter(|mark, _| format!("1e{:.0}", mark.value))
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)
-        .legend(Legend::default())
         .show(ui, |plot| {
             for curve in curves {
                 let color = METHODS.iter().position(|(_, name)| *name == curve.name);

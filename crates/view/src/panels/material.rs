@@ -4,11 +4,16 @@ use eframe::egui::{self, Ui};
 use viscera::material::{LARGEST_POISSON, PRESET_CAUTION, PRESETS, Preset};
 use viscera::scene::{Body, Scene};
 
-use super::choice::{Chooser, Row, named};
+use super::choice::{Chooser, Row};
+use super::number::named;
 use super::{Action, section};
 use crate::choices::{Side, law_name};
 
-/// Sliders of every body.
+/// Ends of the rail of Young's modulus [kPa]: all presets lie between them, with room beside them.
+const SOFTEST: f64 = 0.1;
+const STIFFEST: f64 = 1000.0;
+
+/// Numbers of every body.
 pub fn show(ui: &mut Ui, scene: &Scene, actions: &mut Vec<Action>) {
     let mut chooser = Chooser { side: Side::First, actions };
     for body in &scene.bodies {
@@ -34,29 +39,29 @@ fn show_body(ui: &mut Ui, body: &Body, chooser: &mut Chooser<'_>) {
         chooser.menu(ui, &Row::new(&key("model"), "law", help), law_name(material), &laws);
         let young = key("young");
         let row = Row::new(&young, "stiffness E", "Young's modulus at small strain.")
-            .unit(" kPa")
+            .unit("kPa")
+            .rail(SOFTEST..=STIFFEST)
             .logarithmic()
             .decimals(3);
-        chooser.slider(ui, &row, material.young() / 1e3, 0.5..=200.0, |value| {
-            format!("{} kPa", digits(value))
-        });
+        chooser.number(ui, &row, material.young() / 1e3);
         let poisson = key("poisson");
         let help = "0.5 would keep its volume exactly; tissue is at 0.45 to 0.49. The nearer to 0.5, \
                     the more iterations a step needs.";
-        let row = Row::new(&poisson, "Poisson's ratio", help).decimals(3);
-        chooser.slider(ui, &row, material.poisson(), 0.0..=LARGEST_POISSON, digits);
+        let row =
+            Row::new(&poisson, "Poisson's ratio", help).rail(0.0..=LARGEST_POISSON).decimals(3);
+        chooser.number(ui, &row, material.poisson());
         let density = key("density");
-        let row = Row::new(&density, "density", "Mass per volume.").unit(" kg/m³").decimals(0);
-        chooser.slider(ui, &row, material.density(), 500.0..=2000.0, |value| {
-            format!("{} kg/m^3", digits(value))
-        });
+        let row = Row::new(&density, "density", "Mass per volume.")
+            .unit("kg/m^3")
+            .rail(500.0..=2000.0)
+            .decimals(0);
+        chooser.number(ui, &row, material.density());
         let viscosity = key("viscosity");
         let help = "Kelvin-Voigt retardation time: viscous stress is this times stiffness times strain \
                     rate. More makes tissue settle sooner.";
-        let row = Row::new(&viscosity, "viscosity", help).unit(" ms").decimals(1);
-        chooser.slider(ui, &row, 1e3 * material.viscosity(), 0.0..=100.0, |value| {
-            format!("{} ms", digits(value))
-        });
+        let row =
+            Row::new(&viscosity, "viscosity", help).unit("ms").rail(0.0..=100.0).decimals(1);
+        chooser.number(ui, &row, 1e3 * material.viscosity());
     });
 }
 
@@ -68,18 +73,24 @@ fn presets(ui: &mut Ui, body: &Body, chooser: &mut Chooser<'_>) {
             && preset.poisson == material.poisson()
             && preset.density == material.density()
     };
-    let shown = PRESETS.iter().find(is).map_or("own numbers", |preset| preset.name);
-    named(ui, "tissue", PRESET_CAUTION, |ui| {
-        let menu = egui::ComboBox::from_id_salt("preset").selected_text(shown).show_ui(ui, |ui| {
+    let shown = PRESETS.iter().find(is).map_or("own numbers".to_owned(), in_words);
+    named(ui, "tissue", PRESET_CAUTION, |ui, label| {
+        let menu = egui::ComboBox::from_id_salt("preset").selected_text(shown);
+        let menu = menu.show_ui(ui, |ui| {
             for preset in PRESETS {
-                let label = ui.selectable_label(is(&preset), preset.name);
+                let label = ui.selectable_label(is(&preset), in_words(preset));
                 if label.on_hover_text(preset.description()).clicked() {
                     choose(body, preset, chooser);
                 }
             }
         });
-        menu.response
+        (menu.response.labelled_by(label), ())
     });
+}
+
+/// The name of a preset without its underscores.
+fn in_words(preset: &Preset) -> String {
+    preset.name.replace('_', " ")
 }
 
 /// A preset with its numbers, which may stand in the scene as well and would win over the preset's.
@@ -95,7 +106,20 @@ fn choose(body: &Body, preset: &Preset, chooser: &mut Chooser<'_>) {
     chooser.all(&pairs);
 }
 
-/// A number of a slider, without the digits that nobody chose.
+/// A number without the digits that nobody chose.
 fn digits(value: f64) -> String {
     viscera::units::format_number(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rail_reaches_every_preset() {
+        for preset in PRESETS {
+            let young = preset.young / 1e3;
+            assert!(young > SOFTEST && young < STIFFEST, "{}: {young} kPa", preset.name);
+        }
+    }
 }

@@ -4,6 +4,7 @@ mod choice;
 pub mod convergence;
 pub mod forces;
 pub mod material;
+mod number;
 pub mod scene;
 pub mod solver;
 pub mod time;
@@ -29,6 +30,8 @@ pub enum Action {
     Ghost(bool),
     /// Simulated seconds per second of the clock.
     Speed(f64),
+    /// Says why something cannot be.
+    Warn(String),
     /// Lets go of one point.
     LetGo(HoldId),
     /// Another scene.

@@ -85,11 +85,11 @@ pub fn show(
 
 fn gravity(ui: &mut Ui, session: &Session, actions: &mut Vec<Action>) {
     let gravity = session.scene(Side::First).world.gravity;
-    // A scene may let it pull sideways; the slider is for what is usual.
+    // A scene may let it pull sideways; the number is for what is usual.
     if gravity.x == 0.0 && gravity.y == 0.0 && gravity.z <= 0.0 {
         let help = "Acceleration downwards, along -z.";
-        let row = Row::new("world.gravity", "gravity", help).unit(" m/s²");
+        let row = Row::new("world.gravity", "gravity", help).unit("m/s^2").rail(0.0..=20.0);
         let mut chooser = Chooser { side: Side::First, actions };
-        chooser.slider(ui, &row, 0.0 - gravity.z, 0.0..=20.0, |value| format!("{value:.2} m/s^2"));
+        chooser.number(ui, &row, 0.0 - gravity.z);
     }
 }

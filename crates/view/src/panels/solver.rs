@@ -96,16 +96,14 @@ fn method(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
     chooser.menu(ui, &Row::new("solver.method", "method", help), value, &names);
     let help =
         "Divide every frame. More lose less motion to numerical damping; the cost grows alike.";
-    let row = Row::new("solver.substeps", "substeps", help).whole().logarithmic();
-    let value = f64::from(solver.substeps);
-    chooser.slider(ui, &row, value, 1.0..=100.0, |value| value.to_string());
+    let row = Row::new("solver.substeps", "substeps", help).rail(1.0..=100.0).whole().logarithmic();
+    chooser.number(ui, &row, f64::from(solver.substeps));
 }
 
 fn sweeps(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
     let help = "Sweeps over all constraints in each substep.";
-    let row = Row::new("solver.iterations", "iterations", help).whole().logarithmic();
-    let value = f64::from(solver.iterations);
-    chooser.slider(ui, &row, value, 1.0..=200.0, |value| value.to_string());
+    let row = Row::new("solver.iterations", "iterations", help).rail(1.0..=200.0);
+    chooser.number(ui, &row.whole().logarithmic(), f64::from(solver.iterations));
     let help = "Colours of the constraint graph: unlimited for Gauss-Seidel, 1 for Jacobi, a few for \
                 clique separation. Fewer run more in parallel and need more sweeps.";
     let shown = match solver.colors {
@@ -126,8 +124,8 @@ fn sweeps(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
     chooser.menu(ui, &Row::new("solver.colors", "colours", help), &shown, &counts);
     let help = "Over-relaxation: above 1 hurries, below 1 calms. Safe up to 1.2 for unlimited colours; \
                 with one colour only 1 is.";
-    let row = Row::new("solver.relaxation", "relaxation", help);
-    chooser.slider(ui, &row, solver.relaxation, 0.1..=1.95, |value| format!("{value:.2}"));
+    let row = Row::new("solver.relaxation", "relaxation", help).rail(0.1..=1.95);
+    chooser.number(ui, &row, solver.relaxation);
 }
 
 fn acceleration(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
@@ -142,9 +140,8 @@ fn acceleration(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>)
     chooser.menu(ui, &Row::new("solver.acceleration", "acceleration", help), value, &names);
     if solver.acceleration == Acceleration::Anderson {
         let help = "How many past sweeps Anderson mixes.";
-        let row = Row::new("solver.anderson_window", "window", help).whole();
-        let value = f64::from(solver.anderson_window);
-        chooser.slider(ui, &row, value, 1.0..=10.0, |value| value.to_string());
+        let row = Row::new("solver.anderson_window", "window", help).rail(1.0..=10.0).whole();
+        chooser.number(ui, &row, f64::from(solver.anderson_window));
     }
 }
 

@@ -1,9 +1,10 @@
 //! The bar above: running, stepping, beginning anew, speed; pictures; comparison.
 
-use eframe::egui::{self, Slider, Ui};
+use eframe::egui::{self, Ui};
 
 use super::Action;
-use crate::engine::{Frame, Stage};
+use super::number::Number;
+use crate::engine::{Frame, Stage, inverted};
 use crate::help::Request;
 use crate::preferences::Preferences;
 use crate::session::Session;
@@ -54,17 +55,25 @@ pub fn show_bar(
         ui.separator();
         ask(ui, "Picture", "Save a picture of the tissue (S)", true, Request::Screenshot);
         let record = if is_recording { "Stop recording" } else { "Record" };
-        ask(ui, record, "An animated image of the motion (G)", true, Request::Record);
+        ask(
+            ui,
+            record,
+            "An animated image of the motion, at the pace of simulated time (G)",
+            true,
+            Request::Record,
+        );
         ask(ui, "Save scene", "Ctrl+S", true, Request::Save);
         ui.separator();
         compare(ui, session, actions);
         ui.separator();
-        let mut speed = clock.speed;
         let name = ui.label("speed");
-        let slider =
-            Slider::new(&mut speed, 0.05..=4.0).logarithmic(true).max_decimals(2).suffix(" x");
-        if ui.add(slider).labelled_by(name.id).changed() {
-            actions.push(Action::Speed(speed));
+        let look =
+            Number { unit: "x", rail: 0.05..=4.0, logarithmic: true, whole: false, decimals: 2 };
+        let (_, edit) = look.show(ui, clock.speed, name.id);
+        if let Some(edit) = edit {
+            // Slower is standing still, faster is as fast as it goes.
+            let speed = look.read("speed", &edit, 1e-3..=1e3);
+            actions.push(speed.map_or_else(Action::Warn, Action::Speed));
         }
         ui.separator();
         ui.toggle_value(&mut preferences.settings_open, "Settings");
@@ -115,7 +124,21 @@ pub fn show_status(ui: &mut Ui, clock: &Clock, stage: &Stage, frame: &Frame) {
         ));
         ui.weak(format!("residual {:.1e}", lane.measures.residual))
             .on_hover_text("Unbalanced forces over loads; at rest, how well the equations hold");
+        if let Some(text) = inverted(lane) {
+            let text = if name.is_empty() { text } else { format!("{name}: {text}") };
+            ui.colored_label(ui.visuals().warn_fg_color, text).on_hover_text(
+                "Turned inside out. Their stress and strain mean nothing and are left out of the colours. Pull less \
+                 far, or take more substeps or iterations.",
+            );
+        }
         ui.separator();
+    }
+    let pace = dt / clock.speed;
+    if clock.playing && frame.waits_for_ghost(stage, pace) {
+        ui.spinner();
+        ui.label("waits for the true solution").on_hover_text(
+            "All simulations stay at one time, and the true solution takes longer than the clock.",
+        );
     }
     if clock.playing {
         ui.label(format!("{real:.2} x real time"));

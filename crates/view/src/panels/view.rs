@@ -1,8 +1,9 @@
 //! How the tissue is shown, and how one takes hold of it.
 
-use eframe::egui::{self, Slider, Ui};
+use eframe::egui::{self, Ui};
+use std::ops::RangeInclusive;
 
-use super::choice::named;
+use super::number::{Number, named};
 use super::{Action, section};
 use crate::engine::Coloring;
 use crate::help::Request;
@@ -38,6 +39,33 @@ pub fn show(ui: &mut Ui, preferences: &mut Preferences, actions: &mut Vec<Action
     });
 }
 
+/// Numbers of vertices that one can take hold of; more than a body has are all of them.
+const MOST_GRIPPED: RangeInclusive<f64> = 1.0..=1e6;
+
+/// Stiffness of the hand's spring [N/m]. Beyond, single precision is left without digits.
+const SPRINGS: RangeInclusive<f64> = 1e-3..=1e6;
+
+/// A number of the window's own, by its name and what it means: what it is now.
+fn own(
+    ui: &mut Ui,
+    (name, help): (&str, &str),
+    look: &Number<'_>,
+    value: f64,
+    legal: RangeInclusive<f64>,
+    actions: &mut Vec<Action>,
+) -> f64 {
+    let edit = named(ui, name, help, |ui, label| look.show(ui, value, label));
+    let chosen = edit.map(|edit| look.read(name, &edit, legal));
+    match chosen {
+        None => value,
+        Some(Ok(chosen)) => chosen,
+        Some(Err(error)) => {
+            actions.push(Action::Warn(error));
+            value
+        }
+    }
+}
+
 /// The hand, and what it holds.
 pub fn show_grip(
     ui: &mut Ui,
@@ -48,14 +76,27 @@ pub fn show_grip(
     section(ui, "Hand", true, |ui| {
         let grip = &mut preferences.grip;
         let help = "How many vertices the next press takes hold of";
-        let slider = Slider::new(&mut grip.count, 1..=60).suffix(" vertices");
-        named(ui, "grip", help, |ui| ui.add(slider));
+        let look = Number {
+            unit: "vertices",
+            rail: 1.0..=60.0,
+            logarithmic: false,
+            whole: true,
+            decimals: 0,
+        };
+        let count = own(ui, ("grip", help), &look, f64::from(grip.count), MOST_GRIPPED, actions);
+        grip.count = count as u32;
         let help = "Stiffness of the spring between hand and tissue, all vertices together";
-        let slider = Slider::new(&mut grip.stiffness, 10.0..=5000.0)
-            .logarithmic(true)
-            .max_decimals(0)
-            .suffix(" N/m");
-        named(ui, "spring", help, |ui| ui.add_enabled(!grip.rigid, slider));
+        let look = Number {
+            unit: "N/m",
+            rail: 10.0..=5000.0,
+            logarithmic: true,
+            whole: false,
+            decimals: 0,
+        };
+        ui.add_enabled_ui(!grip.rigid, |ui| {
+            let name = ("spring", help);
+            grip.stiffness = own(ui, name, &look, grip.stiffness, SPRINGS, actions);
+        });
         ui.horizontal(|ui| {
             ui.checkbox(&mut grip.rigid, "rigid").on_hover_text("Hold without a spring");
             ui.checkbox(&mut grip.keep, "keep")

@@ -13,14 +13,21 @@ pub struct Lens {
     pub rect: Rect,
 }
 
-/// Pictures narrower than this see from farther away, so that what is wide fits in.
+/// Pictures narrower than this see from farther away, so that what is wide fits in; what is framed takes as much of
+/// a picture's height.
 const NARROW: f64 = 0.95;
 
 impl Lens {
-    /// What a camera sees in a part of the window.
-    pub fn new(orbit: &Orbit, rect: Rect) -> Self {
+    /// What a camera sees in a part of the window whose right edge, so wide [points], is taken by something else:
+    /// what is framed stays out of it.
+    pub fn new(orbit: &Orbit, rect: Rect, taken: f32) -> Self {
         let mut lens = Self { orbit: *orbit, rect };
-        lens.orbit.distance *= (NARROW / lens.aspect()).clamp(1.0, 4.0);
+        let [width, height] = [rect.width(), rect.height().max(1.0)].map(f64::from);
+        let taken = f64::from(taken).min(0.5 * width);
+        let farther = (NARROW * height / (width - taken).max(1.0)).clamp(1.0, 4.0);
+        lens.orbit.distance *= farther;
+        let reaches = 0.5 * NARROW * height / farther - (0.5 * width - taken);
+        lens.orbit.pan(-reaches.clamp(0.0, 0.5 * taken) / height, 0.0);
         lens
     }
 
@@ -58,6 +65,33 @@ impl Lens {
 mod tests {
     use super::*;
     use viscera::scalar::vec3;
+
+    #[test]
+    fn what_is_framed_stays_beside_the_legend() {
+        let corners = [vec3(-0.1, -0.1, -0.1), vec3(0.1, 0.1, 0.1)];
+        let orbit = Orbit::framing(&corners);
+        for (width, height, taken) in [
+            (1200.0, 500.0, 136.0),
+            (694.0, 520.0, 136.0),
+            (346.0, 520.0, 136.0),
+            (346.0, 520.0, 0.0),
+        ] {
+            let rect = Rect::from_min_max(pos2(40.0, 20.0), pos2(40.0 + width, 20.0 + height));
+            let lens = Lens::new(&orbit, rect, taken);
+            // The sphere that is framed.
+            let radius = 0.1 * 3f64.sqrt();
+            let right = lens.place(orbit.axes()[0] * radius).expect("in front");
+            let left = lens.place(orbit.axes()[0] * -radius).expect("in front");
+            // To a point, and the sphere's rim is seen a little larger than its section.
+            assert!(
+                right.x < rect.right() - taken + 8.0,
+                "{width}: {} of {}",
+                right.x,
+                rect.right()
+            );
+            assert!(left.x > rect.left() - 8.0, "{width}: {}", left.x);
+        }
+    }
 
     #[test]
     fn a_point_is_seen_where_its_ray_goes() {

@@ -37,6 +37,8 @@ pub struct Viewport {
     pictures: Vec<Picture>,
     fixed: Vec<u32>,
     legend: Legend,
+    /// What each picture was seen through last.
+    lenses: Vec<Lens>,
     /// What the pictures show.
     drawn: Option<Drawn>,
 }
@@ -65,6 +67,7 @@ impl Viewport {
             pictures: Vec::new(),
             fixed: Vec::new(),
             legend: Legend::default(),
+            lenses: Vec::new(),
             drawn: None,
         }
     }
@@ -142,6 +145,8 @@ impl Viewport {
                 Rect::from_min_size(egui::pos2(left, area.top()), vec2(width, area.height()))
             })
             .collect();
+        let taken = self.legend.width();
+        self.lenses = rects.iter().map(|rect| Lens::new(&self.orbit, *rect, taken)).collect();
         for (number, rect) in rects.iter().enumerate() {
             let id = ui.scope_id().with(("viewport", number));
             let response = ui.interact(*rect, id, Sense::drag());
@@ -149,15 +154,16 @@ impl Viewport {
             response.widget_info(|| {
                 egui::WidgetInfo::labeled(egui::Role::Canvas, ui.is_enabled(), label)
             });
-            let lens = Lens::new(&self.orbit, *rect);
+            let lens = self.lenses[number];
             if let Some(frame) = frame {
                 self.handle(ui, &response, &lens, number, frame, holds, preferences, &mut commands);
             }
         }
-        let drawn = frame.map(|frame| self.draw(ui, frame, &rects, holds, preferences));
-        for (number, rect) in rects.iter().enumerate() {
-            let lens = Lens::new(&self.orbit, *rect);
-            self.paint(ui, &lens, number, frame, holds, preferences);
+        // The mouse may have turned the view.
+        self.lenses = rects.iter().map(|rect| Lens::new(&self.orbit, *rect, taken)).collect();
+        let drawn = frame.map(|frame| self.draw(ui, frame, holds, preferences));
+        for (number, lens) in self.lenses.iter().enumerate() {
+            self.paint(ui, lens, number, frame, holds, preferences);
         }
         (commands, drawn.and_then(Result::err))
     }
@@ -256,7 +262,6 @@ impl Viewport {
         &mut self,
         ui: &Ui,
         frame: &Frame,
-        rects: &[Rect],
         holds: &Holds,
         preferences: &Preferences,
     ) -> Result<(), String> {
@@ -265,16 +270,17 @@ impl Viewport {
             return Ok(());
         }
         let scale = ui.pixels_per_point();
-        let sizes: Vec<ImageSize> = rects
+        let sizes: Vec<ImageSize> = self
+            .lenses
             .iter()
-            .filter_map(|rect| {
+            .filter_map(|lens| {
                 let side = |points: f32| ((points * scale).round() as u32).clamp(16, 4096);
-                ImageSize::new(side(rect.width()), side(rect.height())).ok()
+                ImageSize::new(side(lens.rect.width()), side(lens.rect.height())).ok()
             })
             .collect();
         let wanted = Drawn {
             frame: (frame.generation, frame.number),
-            orbit: self.orbit,
+            orbit: self.lenses.first().map_or(self.orbit, |lens| lens.orbit),
             sizes: sizes.clone(),
             coloring: frame.coloring,
             range: self.legend.range(),
@@ -300,7 +306,7 @@ impl Viewport {
             };
             let pulls: Vec<_> = lane.holds.iter().map(|hold| [hold.place, hold.target]).collect();
             let scenery = Scenery {
-                orbit: Lens::new(&self.orbit, rects[number]).orbit,
+                orbit: self.lenses[number].orbit,
                 tissue,
                 ghost,
                 range: self.legend.range(),
@@ -340,9 +346,13 @@ impl Viewport {
         if preferences.coloring != Coloring::Plain {
             self.legend.paint(&painter, lens.rect);
         }
-        if self.shown_lanes() > 1 {
-            overlay::title(&painter, lens.rect, ["A", "B"][number.min(1)]);
-        }
+        let name = if self.shown_lanes() > 1 { ["A", "B"][number.min(1)] } else { "" };
+        overlay::title(&painter, lens.rect, name, &self.distances(frame, number));
+    }
+
+    fn distances(&self, frame: &Frame, number: usize) -> Vec<String> {
+        let stage = self.stage.as_ref();
+        stage.map_or_else(Vec::new, |stage| overlay::distances(frame, stage, number))
     }
 
     /// The pictures as they are shown, with scale, time and forces written on them; waits for them.
@@ -353,15 +363,16 @@ impl Viewport {
         let mut images = Vec::new();
         for (number, (picture, lane)) in shown.zip(&frame.lanes).enumerate() {
             let mut image = picture.read()?;
-            let (width, height) = (image.size().width(), image.size().height());
-            let rect = Rect::from_min_size(Pos2::ZERO, vec2(width as f32, height as f32));
-            let orbit = Lens::new(&self.orbit, rect).orbit;
+            let height = image.size().height();
+            let lens = self.lenses.get(number);
+            let mut remarks = self.legend.remarks();
+            remarks.extend(self.distances(frame, number));
             let side = if self.shown_lanes() > 1 { [": A", ": B"][number.min(1)] } else { "" };
             let overlay = Overlay {
                 title: &format!("{title}{side}"),
-                caption: &overlay::caption(frame, lane),
+                caption: &overlay::caption(frame, lane, &remarks),
                 color_scale: scale.as_ref(),
-                pixels_per_meter: Some(orbit.pixels_per_meter(height)),
+                pixels_per_meter: lens.map(|lens| lens.orbit.pixels_per_meter(height)),
             };
             overlay.draw(&mut image);
             images.push(image);

@@ -8,7 +8,7 @@ use viscera::units::Dimension;
 use viscera_picture::{Color, ColorScale, map_color};
 
 use super::lens::Lens;
-use crate::engine::{Coloring, Frame, Lane};
+use crate::engine::{Coloring, Frame, Lane, Stage, inverted};
 use crate::holds::Holds;
 
 /// A colour of the renderer's as the window has it.
@@ -18,12 +18,26 @@ pub fn on_screen(color: Color) -> Color32 {
 }
 
 /// Which values the colours stand for. Its upper end is a round number, and calm: it grows with the values,
-/// and shrinks only where they have become much smaller.
+/// and shrinks only where they have become much smaller. A few extreme values of strain and stress do not take the
+/// scale: they are beyond its end, and the legend says how large they are.
 #[derive(Clone, Debug, Default)]
 pub struct Legend {
     coloring: Coloring,
     /// SI; nothing where there are no values.
     high: Option<f32>,
+    /// The largest value, SI.
+    largest: f32,
+    /// Whether there are places without a value: around inverted tetrahedra.
+    has_gaps: bool,
+}
+
+/// The share of the coloured vertices that the scale holds. A stress concentration is at fewer than one in a
+/// hundred; those of displacement are no outliers.
+fn share_held(coloring: Coloring) -> f64 {
+    match coloring {
+        Coloring::Plain | Coloring::Displacement => 1.0,
+        Coloring::Strain | Coloring::Stress => 0.99,
+    }
 }
 
 /// Values may fall to this share of the scale before it shrinks. Larger makes the colours of a swinging
@@ -40,22 +54,38 @@ fn least(coloring: Coloring) -> f32 {
     }
 }
 
+/// Width of a legend with the margin beside it [points].
+const WIDTH: f32 = 136.0;
+
 impl Legend {
     /// Follows the values of a frame.
     pub fn follow(&mut self, coloring: Coloring, values: impl Iterator<Item = f32>) {
         if coloring != self.coloring {
-            *self = Self { coloring, high: None };
+            *self = Self { coloring, ..Self::default() };
         }
-        let largest = values.filter(|value| value.is_finite()).reduce(f32::max);
-        let Some(largest) = largest else {
+        let (mut known, gaps): (Vec<f32>, Vec<f32>) = values.partition(|value| value.is_finite());
+        self.has_gaps = !gaps.is_empty();
+        let held = (share_held(coloring) * known.len() as f64).ceil() as usize;
+        let Some(last) = held.checked_sub(1) else {
             self.high = None;
             return;
         };
-        let largest = largest.max(least(coloring));
-        let fits = self.high.is_some_and(|high| largest <= high && largest >= LOWEST * high);
+        let (_, end, beyond) = known.select_nth_unstable_by(last, f32::total_cmp);
+        self.largest = beyond.iter().copied().fold(*end, f32::max);
+        let end = end.max(least(coloring));
+        let fits = self.high.is_some_and(|high| end <= high && end >= LOWEST * high);
         if !fits {
-            self.high = Some(round_up(largest));
+            self.high = Some(round_up(end));
         }
+    }
+
+    /// What the colours do not show, in words: a value beyond the scale, and places without one.
+    pub fn remarks(&self) -> Vec<String> {
+        let beyond = self.high.is_some_and(|high| self.largest > high);
+        let three_digits = |value: f32| format!("{value:.2e}").parse().unwrap_or(value);
+        let beyond = beyond.then(|| format!("largest {}", self.text(three_digits(self.largest))));
+        let gaps = self.has_gaps.then(|| "grey: inverted".to_owned());
+        beyond.into_iter().chain(gaps).collect()
     }
 
     /// The values of the first and the last colour; nothing for plain tissue.
@@ -96,14 +126,22 @@ impl Legend {
         }
     }
 
+    /// How much of the right edge it takes [points].
+    pub fn width(&self) -> f32 {
+        if self.high.is_some() { WIDTH } else { 0.0 }
+    }
+
     /// Writes it into the right upper corner.
     pub fn paint(&self, painter: &Painter, area: Rect) {
         let Some(high) = self.high else { return };
         const SIZE: [f32; 2] = [14.0, 150.0];
         let corner = area.right_top() + vec2(-92.0, 36.0);
         let bar = Rect::from_min_size(corner, SIZE.into());
+        const LINE: f32 = 15.0;
+        let remarks = self.remarks();
+        let below = 14.0 + LINE * remarks.len() as f32;
         let back =
-            Rect::from_min_max(area.right_top() + vec2(-136.0, 8.0), bar.max + vec2(70.0, 14.0));
+            Rect::from_min_max(area.right_top() + vec2(-WIDTH, 8.0), bar.max + vec2(70.0, below));
         painter.rect_filled(back, CornerRadius::same(6), Color32::from_white_alpha(190));
         let mut mesh = Mesh::default();
         const STEPS: u32 = 48;
@@ -132,6 +170,11 @@ impl Legend {
             );
             let place = pos2(bar.right() + 7.0, y);
             painter.text(place, Align2::LEFT_CENTER, self.text(share * high), font.clone(), ink);
+        }
+        for (number, remark) in remarks.iter().enumerate() {
+            let y = bar.bottom() + 20.0 + LINE * number as f32;
+            let place = pos2(back.center().x, y);
+            painter.text(place, Align2::CENTER_CENTER, remark, font.clone(), ink);
         }
     }
 }
@@ -186,8 +229,8 @@ pub fn tools(painter: &Painter, lens: &Lens, lane: &Lane) {
     }
 }
 
-/// Time and forces, as a picture without the window says them.
-pub fn caption(frame: &Frame, lane: &Lane) -> String {
+/// Time, forces and what else there is to say, as a picture without the window says them.
+pub fn caption(frame: &Frame, lane: &Lane, remarks: &[String]) -> String {
     let mut text = format!("t = {:.2} s", frame.time);
     for hold in &lane.holds {
         text.push_str(&format!("   pull {}", newtons(hold.force.length())));
@@ -195,12 +238,47 @@ pub fn caption(frame: &Frame, lane: &Lane) -> String {
     for tool in lane.measures.tools.iter().filter(|tool| tool.force.length() > 0.0) {
         text.push_str(&format!("   {} {}", tool.name, newtons(tool.force.length())));
     }
+    for remark in inverted(lane).iter().chain(remarks) {
+        text.push_str(&format!("   {remark}"));
+    }
     text
 }
 
-/// Names one of two pictures.
-pub fn title(painter: &Painter, area: Rect, text: &str) {
-    label(painter, area.left_top() + vec2(14.0, 20.0), Align2::LEFT_CENTER, text, 20.0);
+/// How far a simulation is from the exact solution, and the second one from the first: lines of text.
+pub fn distances(frame: &Frame, stage: &Stage, number: usize) -> Vec<String> {
+    let (Some(lane), ghost) = (frame.lanes.get(number), frame.ghost(stage)) else {
+        return Vec::new();
+    };
+    let first = frame.lanes.first().filter(|_| number > 0);
+    let to = |other: Option<&Lane>, name: &str| {
+        let distance = millimetres(lane.distance(other?));
+        Some(format!("at most {distance} from {name}"))
+    };
+    let lines = [to(ghost, "the true solution, the ghost"), to(first, "A")];
+    lines.into_iter().flatten().collect()
+}
+
+/// A small distance [m] as it is written everywhere: "0.25 mm".
+fn millimetres(distance: f64) -> String {
+    match 1e3 * distance {
+        0.0 => "0 mm".to_owned(),
+        distance if distance < 0.01 => format!("{:.2} µm", 1e3 * distance),
+        distance if distance < 10.0 => format!("{distance:.2} mm"),
+        distance => format!("{distance:.0} mm"),
+    }
+}
+
+/// Names a picture, where it has a name, with lines of small letters below.
+pub fn title(painter: &Painter, area: Rect, text: &str, lines: &[String]) {
+    let mut place = area.left_top() + vec2(14.0, 20.0);
+    if !text.is_empty() {
+        label(painter, place, Align2::LEFT_CENTER, text, 20.0);
+        place.y += 26.0;
+    }
+    for line in lines {
+        label(painter, place, Align2::LEFT_CENTER, line, 13.0);
+        place.y += 20.0;
+    }
 }
 
 /// Dark letters on a light ground, which stand out from tissue and from the background.
@@ -240,7 +318,30 @@ mod tests {
     }
 
     #[test]
+    fn a_few_extreme_values_do_not_take_the_scale() {
+        let mut legend = Legend::default();
+        // Stress of 1 to 5 kPa at a thousand vertices; four beside an inverted tetrahedron, and its own without.
+        let many = (0..1000).map(|k| 1e3 + 4.0 * k as f32);
+        let few = [2e7, 3e8, 1.2345e9, 5e7, f32::NAN, f32::NAN, f32::INFINITY];
+        legend.follow(Coloring::Stress, many.clone().chain(few));
+        assert_eq!(legend.range(), Some([0.0, 5e3]));
+        assert_eq!(legend.remarks(), ["largest 1.23 GPa", "grey: inverted"]);
+        legend.follow(Coloring::Stress, many);
+        assert_eq!((legend.range(), legend.remarks().len()), (Some([0.0, 5e3]), 0));
+        // All displacements are meant.
+        legend.follow(Coloring::Displacement, (0..1000).map(|k| if k == 7 { 0.03 } else { 1e-3 }));
+        assert_eq!(legend.range(), Some([0.0, 0.03]));
+        // Of few values none is left out.
+        legend.follow(Coloring::Strain, [0.1, 0.2, 0.9].into_iter());
+        assert_eq!(legend.range(), Some([0.0, 1.0]));
+        legend.follow(Coloring::Strain, [f32::NAN].into_iter());
+        assert_eq!(legend.range(), None);
+    }
+
+    #[test]
     fn forces_are_read_at_a_glance() {
         assert_eq!([0.0123, 1.254, 120.4].map(newtons), ["12.3 mN", "1.25 N", "120 N"]);
+        let distances = [0.0, 1.5e-6, 8.3e-4, 0.032].map(millimetres);
+        assert_eq!(distances, ["0 mm", "1.50 µm", "0.83 mm", "32 mm"]);
     }
 }

@@ -1,7 +1,7 @@
 //! The real window without a display: what drives it in tests and in `examples/dragging.rs`.
 #![allow(dead_code)]
 
-use eframe::egui::{Key, Modifiers, Pos2, Rect, Role, Vec2, vec2};
+use eframe::egui::{Event, Key, Modifiers, Pos2, Rect, Role, Vec2, vec2};
 use eframe::egui_wgpu::WgpuSetup;
 use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, wgpu};
@@ -9,6 +9,7 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use viscera::scene::Scene;
+use viscera_picture::{Image, ImageSize, write_png};
 use viscera_view::choices::Side;
 use viscera_view::engine::Lane;
 use viscera_view::preferences::Preferences;
@@ -108,6 +109,38 @@ impl Window {
         self.harness.step();
     }
 
+    /// Goes into a number, replaces it key by key, and leaves it by another key.
+    pub fn type_number(&mut self, name: &str, text: &str, leave: Key) {
+        self.harness.get_by_role_and_label(Role::SpinButton, name).focus();
+        self.harness.step();
+        self.harness.step();
+        for letter in text.chars() {
+            self.harness.event(Event::Text(letter.to_string()));
+            // Time for the simulation to see what it should not.
+            let number = self.harness.state().frame().map_or(0, |frame| frame.number);
+            self.wait("a frame", |app| app.frame().is_some_and(|frame| frame.number > number));
+        }
+        self.harness.key_press(leave);
+        self.harness.step();
+        self.harness.step();
+    }
+
+    /// What the window says.
+    pub fn texts(&self) -> Vec<String> {
+        self.harness.state().messages().texts().map(str::to_owned).collect()
+    }
+
+    /// How many steps can be taken back.
+    pub fn undo_steps(&mut self) -> usize {
+        let mut steps = 0;
+        while self.harness.state().session().history().can_undo() {
+            self.press("Undo");
+            steps += 1;
+        }
+        (0..steps).for_each(|_| self.press("Redo"));
+        steps
+    }
+
     /// Presses in the middle of the view, pulls so far, and lets the button go.
     pub fn drag(&mut self, way: Vec2) {
         let middle = self.view().center();
@@ -145,6 +178,17 @@ impl Window {
         let inside = |x: u32, y: u32| view.contains(Pos2::new(x as f32, y as f32));
         let pixels = image.enumerate_pixels().filter(|(x, y, _)| inside(*x, *y));
         pixels.map(|(_, _, pixel)| [pixel[0], pixel[1], pixel[2]]).collect()
+    }
+
+    /// A picture of the whole window, for who wants to look: in the folder that VISCERA_PICTURES names.
+    pub fn picture(&mut self, name: &str) {
+        let Some(folder) = std::env::var_os("VISCERA_PICTURES") else { return };
+        let image = self.harness.render().expect("a picture of the window");
+        let size = ImageSize::new(image.width(), image.height()).expect("a size");
+        let pixels = image.pixels().map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        let image = Image::from_pixels(size, pixels).expect("a picture");
+        let bytes = write_png(&image).expect("a PNG");
+        std::fs::write(Path::new(&folder).join(format!("{name}.png")), bytes).expect("a file");
     }
 
     pub fn lane(&self, number: usize) -> &Lane {

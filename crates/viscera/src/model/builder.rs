@@ -1,6 +1,9 @@
 //! From meshes and materials to a [`Model`].
 
+use std::sync::Arc;
+
 use super::numbering::Numbering;
+use super::parts::Laid;
 use super::tets::{TetBlock, TetSet};
 use super::{AttachmentSet, Body, MaterialConstants, Model, ModelError, SpringSet};
 use crate::coloring::{Coloring, ConstraintGraph};
@@ -153,13 +156,15 @@ impl ModelBuilder {
         }
         let coloring = graph.color(self.positions.len(), settings.colors);
         debug_assert_eq!(coloring.validate(&graph), None);
-        let (component_of, component_count) = graph.components(self.positions.len());
-        let numbering = Numbering::along_curve(&self.positions);
+        let (part_of, part_count) = graph.parts(self.positions.len());
+        let numbering = Numbering::along_curves(&self.positions, &part_of, part_count);
+        let part_of: Vec<u32> = numbering.order.iter().map(|&v| part_of[v as usize]).collect();
         let copy_offsets = renumbered_copies(&coloring, &numbering);
         let mut layout = Layout {
             graph: &graph,
             coloring: &coloring,
             numbering: &numbering,
+            part_of: &part_of,
             copy_offsets: &copy_offsets,
             multipliers: 0,
         };
@@ -168,7 +173,39 @@ impl ModelBuilder {
         let springs = self.lay_out_springs(&mut layout);
         let attachments = self.lay_out_attachments(&mut layout);
         let multiplier_count = layout.multipliers;
+        let place = |v: u32| numbering.of(v) as u32;
+        let parts = Laid {
+            part_of: &part_of,
+            copy_offsets: &copy_offsets,
+            sets: [&green_strain, &neo_hookean],
+            springs: &springs,
+            attachments: &attachments,
+            first_ends: springs.vertices.iter().map(|ends| place(ends[0])).collect(),
+            held: attachments.vertices.iter().map(|&v| place(v)).collect(),
+            color_count: coloring.color_count as usize,
+        }
+        .parts();
+        Ok(Model {
+            bodies: self.bodies.clone(),
+            rest_positions: self.positions.iter().map(|p| p.cast()).collect(),
+            masses: self.masses(),
+            materials: self.materials.iter().map(constants).collect(),
+            green_strain,
+            neo_hookean,
+            springs,
+            attachments,
+            rest_anchors: self.attachments.iter().map(|(_, anchor, _)| anchor.cast()).collect(),
+            color_count: coloring.color_count as usize,
+            largest_clique: coloring.largest_clique as usize,
+            multiplier_count,
+            parts: Arc::from(parts),
+            numbering,
+            copy_offsets,
+        })
+    }
 
+    /// A quarter of each tetrahedron's [kg].
+    fn masses<S: Real>(&self) -> Vec<S> {
         let mut masses = vec![0.0; self.positions.len()];
         for (tet, &material) in self.tets.iter().zip(&self.tet_material) {
             let volume = crate::mesh::tet_volume(tet.map(|v| self.positions[v as usize]));
@@ -177,24 +214,7 @@ impl ModelBuilder {
                 masses[v as usize] += share;
             }
         }
-        Ok(Model {
-            bodies: self.bodies.clone(),
-            rest_positions: self.positions.iter().map(|p| p.cast()).collect(),
-            masses: masses.iter().map(|&mass| S::from_f64(mass)).collect(),
-            materials: self.materials.iter().map(constants).collect(),
-            green_strain,
-            neo_hookean,
-            springs,
-            attachments,
-            rest_anchors: self.attachments.iter().map(|(_, anchor, _)| anchor.cast()).collect(),
-            component_count,
-            color_count: coloring.color_count as usize,
-            largest_clique: coloring.largest_clique as usize,
-            multiplier_count,
-            component_of: numbering.order.iter().map(|&v| component_of[v as usize]).collect(),
-            numbering,
-            copy_offsets,
-        })
+        masses.into_iter().map(S::from_f64).collect()
     }
 
     fn lay_out_tets<S: Real>(&self, layout: &mut Layout<'_>, form: TetForm) -> TetSet<S> {
@@ -206,32 +226,34 @@ impl ModelBuilder {
             |&tet: &usize| self.materials[self.tet_material[tet] as usize].model() == model;
         let chosen: Vec<usize> = (0..self.tets.len()).filter(of_model).collect();
         let (order, colors) = layout.sort(chosen);
-        let viscous =
-            |&t: &u32| self.materials[self.tet_material[t as usize] as usize].viscosity() > 0.0;
+        let viscous_parts = self.viscous_parts(layout, &order);
+        let is_viscous = viscous_parts.contains(&true);
+        let in_blocks = |color: &[u32]| layout.blocks(&order, color).count();
+        let count = colors.windows(2).map(in_blocks).sum();
         let mut set = TetSet {
             model,
             form,
-            viscous: order.iter().any(viscous),
-            blocks: Vec::with_capacity(order.len() / LANES + colors.len()),
-            filled: Vec::with_capacity(order.len() / LANES + colors.len()),
-            uniform: Vec::with_capacity(order.len() / LANES + colors.len()),
-            copies: Vec::new(),
+            viscous: is_viscous,
+            blocks: Vec::with_capacity(count),
+            filled: Vec::with_capacity(count),
+            uniform: Vec::with_capacity(count),
+            viscous_blocks: Vec::with_capacity(if is_viscous { count } else { 0 }),
+            copies: Vec::with_capacity(if layout.is_split() { count } else { 0 }),
             color_offsets: vec![0],
             multiplier_offset: 0,
             viscous_offset: 0,
             bounds: [self.positions.len(), layout.copy_count()],
             order,
         };
-        if layout.is_split() {
-            set.copies.reserve_exact(set.blocks.capacity());
-        }
         for color in colors.windows(2) {
-            let tets = &set.order[color[0] as usize..color[1] as usize];
-            for chosen in tets.chunks(LANES) {
+            for chosen in layout.blocks(&set.order, color) {
                 set.filled.push(chosen.len() as u8);
                 let block = self.block(layout, chosen);
                 set.uniform.push(block.material.iter().all(|&m| m == block.material[0]));
                 set.blocks.push(block);
+                if is_viscous {
+                    set.viscous_blocks.push(viscous_parts[layout.part(chosen[0])]);
+                }
                 if layout.is_split() {
                     set.copies.push(layout.block_copies(chosen));
                 }
@@ -241,6 +263,17 @@ impl ModelBuilder {
         [set.multiplier_offset, set.viscous_offset] =
             set.multiplier_counts().map(|count| layout.take_multipliers(count));
         set
+    }
+
+    /// Whether any of some tetrahedra in each part is viscous.
+    fn viscous_parts(&self, layout: &Layout<'_>, tets: &[u32]) -> Vec<bool> {
+        let count = layout.part_of.last().map_or(0, |&last| last as usize + 1);
+        let mut viscous = vec![false; count];
+        for &tet in tets {
+            let material = self.tet_material[tet as usize] as usize;
+            viscous[layout.part(tet)] |= self.materials[material].viscosity() > 0.0;
+        }
+        viscous
     }
 
     /// The constants of up to eight tetrahedra.
@@ -348,13 +381,15 @@ struct Layout<'a> {
     graph: &'a ConstraintGraph,
     coloring: &'a Coloring,
     numbering: &'a Numbering,
+    /// Of the solver's vertices, ascending.
+    part_of: &'a [u32],
     /// Of the solver's vertices.
     copy_offsets: &'a [u32],
     multipliers: usize,
 }
 
 impl Layout<'_> {
-    /// Sorts constraints by colour, then by place, then by number; returns them with the offsets of
+    /// Sorts constraints by colour, then by place, and so by part, then by number; returns them with the offsets of
     /// the colours.
     fn sort(&self, mut constraints: Vec<usize>) -> (Vec<u32>, Vec<u32>) {
         let place = |c: usize| {
@@ -371,6 +406,19 @@ impl Layout<'_> {
         }
         // By reference: collected in place, the memory of the larger numbers would be kept.
         (constraints.iter().map(|&c| c as u32).collect(), offsets)
+    }
+
+    /// The part of a constraint.
+    fn part(&self, constraint: u32) -> usize {
+        let first = self.graph.vertices(constraint as usize)[0];
+        self.part_of[self.numbering.of(first)] as usize
+    }
+
+    /// Tetrahedra of a colour in blocks: up to eight of one part.
+    fn blocks<'t>(&self, order: &'t [u32], color: &[u32]) -> impl Iterator<Item = &'t [u32]> {
+        order[color[0] as usize..color[1] as usize]
+            .chunk_by(|&a, &b| self.part(a) == self.part(b))
+            .flat_map(|of_part| of_part.chunks(LANES))
     }
 
     fn copy_count(&self) -> usize {

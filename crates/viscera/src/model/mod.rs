@@ -4,16 +4,20 @@
 //! Vertices and tetrahedra are numbered over all bodies in the order in which the bodies were
 //! added; [`Body`] says which range belongs to which. Everything public is in that order, but for
 //! constraints, which are sorted by colour: `order` maps back to the user's numbers. Within, vertices
-//! are numbered along a curve through space; see `numbering`.
+//! are numbered along a curve through space, one connected part after the other; see `numbering` and
+//! `parts`.
 
 mod builder;
 mod numbering;
+mod parts;
 mod tets;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 pub use builder::ModelBuilder;
 pub(crate) use numbering::Numbering;
+pub(crate) use parts::Part;
 pub(crate) use tets::TetBlock;
 pub use tets::{Tet, TetSet};
 
@@ -173,8 +177,6 @@ pub struct Model<S> {
     pub attachments: AttachmentSet<S>,
     /// Anchors of the attachments where nothing moves them [m], the user's order.
     pub rest_anchors: Vec<Vec3<S>>,
-    /// Number of connected parts; tetrahedra and springs connect.
-    pub component_count: usize,
     /// Number of colours.
     pub color_count: usize,
     /// The most constraints at one vertex.
@@ -182,8 +184,8 @@ pub struct Model<S> {
     /// Number of multipliers of all constraints, those of the fillings of blocks included.
     pub multiplier_count: usize,
     pub(crate) numbering: Numbering,
-    /// Which part each vertex belongs to, in the solver's numbering.
-    pub(crate) component_of: Vec<u32>,
+    /// Connected parts, in the solver's numbering: the order of their first vertices in the user's.
+    pub(crate) parts: Arc<[Part]>,
     /// Copies of vertex `v`, in the solver's numbering, are `copy_offsets[v] .. copy_offsets[v + 1]`.
     pub(crate) copy_offsets: Vec<u32>,
 }
@@ -207,6 +209,21 @@ impl<S: Real> Model<S> {
     /// True where a vertex has more than one copy.
     pub fn is_split(&self) -> bool {
         self.copy_count() > self.vertex_count()
+    }
+
+    /// Number of connected parts: tetrahedra and springs connect vertices.
+    pub fn part_count(&self) -> usize {
+        self.parts.len()
+    }
+
+    /// The number of the part that one of the user's vertices belongs to.
+    pub fn part_of(&self, vertex: u32) -> usize {
+        self.part_at(self.numbering.of(vertex))
+    }
+
+    /// As [`Model::part_of`], of one of the solver's vertices.
+    pub(crate) fn part_at(&self, v: usize) -> usize {
+        self.parts.partition_point(|part| part.vertices.end <= v)
     }
 
     /// The two sets of tetrahedra.
@@ -249,7 +266,8 @@ impl<S: Real> Model<S> {
             + size_of_val(&self.masses[..])
             + size_of_val(&self.numbering.order[..])
             + size_of_val(&self.numbering.rank[..])
-            + size_of_val(&self.component_of[..])
+            + size_of_val(&self.parts[..])
+            + self.parts.iter().map(Part::bytes).sum::<usize>()
             + size_of_val(&self.copy_offsets[..])
     }
 }

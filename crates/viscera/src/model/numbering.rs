@@ -1,5 +1,6 @@
 //! The solver's numbering of vertices: neighbours in space get neighbouring numbers, so that what a
-//! block of tetrahedra loads lies close together. The user's numbering stays what it is.
+//! block of tetrahedra loads lies close together. Connected parts come one after the other, each along a curve
+//! through its own extent: where others are changes nothing. The user's numbering stays what it is.
 
 use crate::scalar::Vec3;
 
@@ -16,20 +17,26 @@ pub(crate) struct Numbering {
 const BITS: u32 = 16;
 
 impl Numbering {
-    /// Sorts vertices along a Z-order curve through their places [m]; ties keep the user's order.
-    pub fn along_curve(positions: &[Vec3<f64>]) -> Self {
-        let (mut low, mut high) = (Vec3::splat(f64::INFINITY), Vec3::splat(f64::NEG_INFINITY));
-        for p in positions {
-            (low, high) = (low.min(*p), high.max(*p));
+    /// Sorts vertices by part, then along a Z-order curve through their places [m]; ties keep the user's
+    /// order. `part_of` has the part of each vertex, `part_count` how many there are.
+    pub fn along_curves(positions: &[Vec3<f64>], part_of: &[u32], part_count: usize) -> Self {
+        let nothing = (Vec3::splat(f64::INFINITY), Vec3::splat(f64::NEG_INFINITY));
+        let mut extents = vec![nothing; part_count];
+        for (p, &part) in positions.iter().zip(part_of) {
+            let (low, high) = &mut extents[part as usize];
+            (*low, *high) = (low.min(*p), high.max(*p));
         }
-        let size = high - low;
-        let extent = size.x.max(size.y).max(size.z).max(f64::MIN_POSITIVE);
-        let scale = f64::from((1u32 << BITS) - 1) / extent;
-        let key = |p: &Vec3<f64>| {
+        let key = |(p, &part): (&Vec3<f64>, &u32)| {
+            let (low, high) = extents[part as usize];
+            let size = high - low;
+            let extent = size.x.max(size.y).max(size.z).max(f64::MIN_POSITIVE);
+            let scale = f64::from((1u32 << BITS) - 1) / extent;
             let cell = (*p - low) * scale;
-            spread(cell.x as u64) | spread(cell.y as u64) << 1 | spread(cell.z as u64) << 2
+            let place =
+                spread(cell.x as u64) | spread(cell.y as u64) << 1 | spread(cell.z as u64) << 2;
+            (part, place)
         };
-        let keys: Vec<u64> = positions.iter().map(key).collect();
+        let keys: Vec<(u32, u64)> = positions.iter().zip(part_of).map(key).collect();
         let mut order: Vec<u32> = (0..positions.len() as u32).collect();
         order.sort_by_key(|&v| (keys[v as usize], v));
         let mut rank = vec![0; order.len()];

@@ -1,8 +1,8 @@
 //! Tetrahedra in blocks of eight, sorted by colour.
 //!
 //! A block holds the constants of eight tetrahedra of one colour component by component, so that a
-//! kernel loads each component of all eight at once. The last block of a colour is filled up with
-//! copies of its last tetrahedron; what a kernel makes of these is not stored.
+//! kernel loads each component of all eight at once. The last block that a connected part has of a colour is
+//! filled up with copies of its last tetrahedron; what a kernel makes of these is not stored.
 
 use std::ops::Range;
 
@@ -32,13 +32,16 @@ pub struct TetSet<S> {
     pub model: MaterialModel,
     /// Its constraints.
     pub form: TetForm,
-    /// Whether any of its materials is viscous: each tetrahedron then has a viscous block as well.
+    /// Whether any of its materials is viscous: there are viscous multipliers then.
     pub viscous: bool,
     pub(crate) blocks: Vec<TetBlock<S>>,
-    /// How many tetrahedra of each block count: eight, or fewer in a colour's last.
+    /// How many tetrahedra of each block count: eight, or fewer in the last of a part and colour.
     pub(crate) filled: Vec<u8>,
     /// Whether a block is of one material.
     pub(crate) uniform: Vec<bool>,
+    /// Whether any tetrahedron of the block's part in this set is viscous: those of other parts have no viscous
+    /// constraints; empty where none is.
+    pub(crate) viscous_blocks: Vec<bool>,
     /// The copies that a sweep works on, per corner; empty where nothing is split: the vertices.
     pub(crate) copies: Vec<[Eight<u32>; 4]>,
     /// The user's number of each tetrahedron, shape [tet_count]; without fillings.
@@ -108,10 +111,20 @@ impl<S: Real> TetSet<S> {
         if self.copies.is_empty() { &self.blocks[block].vertices } else { &self.copies[block] }
     }
 
+    /// Whether a block has viscous constraints.
+    #[inline(always)]
+    pub(crate) fn is_viscous(&self, block: usize) -> bool {
+        self.viscous && self.viscous_blocks[block]
+    }
+
+    /// Elastic and viscous multipliers of a block, fillings included.
+    pub(crate) fn multipliers_per_block(&self) -> [usize; 2] {
+        [LANES * self.form.multiplier_count(), if self.viscous { LANES * 6 } else { 0 }]
+    }
+
     /// Elastic and viscous multipliers, fillings included.
     pub(crate) fn multiplier_counts(&self) -> [usize; 2] {
-        let padded = LANES * self.blocks.len();
-        [self.form.multiplier_count() * padded, if self.viscous { 6 * padded } else { 0 }]
+        self.multipliers_per_block().map(|count| count * self.blocks.len())
     }
 
     /// Every tetrahedron with block and lane, in the order of blocks.
@@ -125,6 +138,7 @@ impl<S: Real> TetSet<S> {
         size_of_val(&self.blocks[..])
             + size_of_val(&self.filled[..])
             + size_of_val(&self.uniform[..])
+            + size_of_val(&self.viscous_blocks[..])
             + size_of_val(&self.copies[..])
             + size_of_val(&self.order[..])
     }

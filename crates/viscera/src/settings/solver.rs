@@ -121,7 +121,8 @@ choices! {
 choices! {
     /// Where the iteration of a substep starts.
     pub enum Start {
-        /// `inertial` where multipliers are kept, otherwise `predicted`.
+        /// `inertial` where multipliers are kept, otherwise `predicted`; where nothing holds the tissue, `inertial` with
+        /// the acceleration of its centre of mass.
         Auto = "auto",
         /// x + h v + h^2 g.
         Predicted = "predicted",

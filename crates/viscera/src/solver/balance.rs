@@ -9,7 +9,7 @@
 
 use super::Inputs;
 use super::cpu::Workspace;
-use super::potential::Tissue;
+use super::tissue::Tissue;
 use crate::elements::{attachment, deformation_gradient, internal_forces, shape_gradients, spring};
 use crate::model::Model;
 use crate::scalar::{Mat3, Real, Vec3};
@@ -84,7 +84,7 @@ impl ForceBalance {
                 let shape = tet.inverse_rest_shape.cast::<f64>();
                 let volume = tet.rest_volume.to_f64();
                 let material = &model.materials[tet.material];
-                let start = set.viscous.then(|| strains[block].map(|c| c[lane].to_f64()));
+                let start = set.is_viscous(block).then(|| strains[block].map(|c| c[lane].to_f64()));
                 let tissue = Tissue {
                     model: set.model,
                     lame_lambda: material.lame_lambda.to_f64(),

@@ -3,30 +3,25 @@
 
 use super::Inputs;
 use super::StepError;
-use super::acceleration::{Anderson, Chebyshev};
+use super::acceleration::Chebyshev;
 use super::energy::Energy;
-use super::explicit::Stability;
+use super::explicit::{SmallSteps, Stability};
 use super::guard::Guard;
-use super::iterates::Iterate;
+use super::iterates::{Iterate, Mixing};
 use super::loads::load_multipliers;
 use super::plan::Stage;
 use super::potential::{Evaluator, measure_strain};
+use super::rebase::copy_count;
 use super::sweep::solve_color;
 use super::tethers::{Bundle, bundle};
 use super::threads::{Shared, Workers};
-use crate::model::Model;
+use std::sync::Arc;
+
+use crate::model::{Model, Part};
 use crate::scalar::lanes::{Eight, LANES, Point};
 use crate::scalar::{Real, Vec3};
 use crate::settings::{Acceleration, AndersonOn, Method, SolverSettings, Start};
 use crate::state::State;
-
-/// The rebase multiplies an error of curvature `k` by `1 - k/mh`: stable from `mh >= k/2` on, so little
-/// more than half of the bound will do, and inertia is regained nearly twice as fast. With less, stiff
-/// and nearly incompressible tissue no longer settles in 5 sweeps; with all of it a bar that is dropped
-/// lags two to three times as far behind. Where vertices have copies, their sweeps need the whole bound.
-pub(super) fn bound_share<S: Real>(model: &Model<S>) -> f64 {
-    if model.is_split() { 1.0 } else { 0.6 }
-}
 
 /// Vertices that a thread does at a time.
 const GRAIN: usize = 2048;
@@ -37,15 +32,6 @@ pub(super) struct Step<'a, S> {
     pub inputs: &'a Inputs<S>,
     pub dt: f64,
     pub settings: &'a SolverSettings,
-    /// Of an explicit method in this step.
-    pub small_steps: u32,
-}
-
-impl<S> Step<'_, S> {
-    /// [s].
-    pub fn small_dt(&self) -> f64 {
-        self.dt / f64::from(self.small_steps)
-    }
 }
 
 /// Green strain at the start of the step of the blocks of viscous sets, `[green, neo]`.
@@ -78,6 +64,8 @@ pub(super) struct Ground<S> {
 pub(super) struct Workspace<S> {
     /// What [`sizes`] says of the model that this is for.
     sizes: [usize; 11],
+    /// The connected parts of that model.
+    parts: Arc<[Part]>,
     pub ground: Ground<S>,
     /// Positions [m]; with each travels the inverse mass of its copies during a sweep [1/kg].
     pub points: Vec<Point<S>>,
@@ -85,7 +73,7 @@ pub(super) struct Workspace<S> {
     pub velocities: Vec<Vec3<S>>,
     /// Of each part of the model; empty where steps are not guarded.
     pub energies: Vec<Energy>,
-    pub evaluator: Evaluator<S>,
+    pub evaluator: Evaluator,
     /// Points of the copies; empty where nothing is split.
     pub copies: Vec<Point<S>>,
     /// What constraints put on each copy: impulse [N s^2] and bound [kg]; empty where no stage needs
@@ -93,23 +81,20 @@ pub(super) struct Workspace<S> {
     pub loads: Vec<Point<S>>,
     /// Iterate before the sweep, and the one before that.
     pub iterate: [Iterate<S>; 2],
-    /// Weights of the norm in which iterates are compared, three of each vertex (its mass, in
-    /// Anderson's norm where positions count) and then of the multipliers (the diagonal of `a~`).
-    pub norm_weights: Vec<S>,
-    /// The share of the rebase that is applied.
-    rebase_factor: S,
-    /// The share of the mass bounds that counts.
-    bound_share: S,
-    pub chebyshev: Chebyshev,
-    pub anderson: Anderson<S>,
-    /// Positions that Anderson has mixed [m].
+    /// The diagonal of `a~` of every multiplier; empty but for Chebyshev.
+    pub multiplier_weights: Vec<S>,
+    /// Of each part, where it is in use.
+    pub chebyshev: Vec<Chebyshev>,
+    /// Of each part, where Anderson is in use.
+    pub mixings: Vec<Mixing<S>>,
+    /// Positions of a part that Anderson has mixed [m].
     pub mixed: Vec<S>,
     /// Empty where steps are not guarded.
     pub guard: Guard<S>,
     /// Of an explicit method.
     pub stability: Stability,
-    /// Small steps done in this step.
-    pub small_step: u32,
+    /// Of each part in an explicit step; empty for other methods.
+    pub small_steps: Vec<SmallSteps>,
     /// Velocities at the start of an explicit step [m/s]; empty for other methods.
     pub start_velocities: Vec<Vec3<S>>,
 }
@@ -125,18 +110,21 @@ impl<S: Real> Workspace<S> {
             positions: points(wanted),
             multipliers: vec![S::ZERO; if wanted { model.multiplier_count } else { 0 }],
         };
+        let chebyshev = acceleration == Acceleration::Chebyshev;
         let anderson = acceleration == Acceleration::Anderson;
         let needs_loads = explicit
             || settings.rebase
             || (anderson && settings.anderson_on == AndersonOn::Multipliers);
         let window = settings.anderson_window as usize;
-        let length = if anderson { 3 * vertices + model.multiplier_count } else { 0 };
+        let parts = |wanted: bool| if wanted { &model.parts[..] } else { &[] };
+        let largest = parts(anderson).iter().map(|part| part.vertices.len()).max().unwrap_or(0);
         let guarded = settings.guards_steps();
         let strains = |set: &crate::model::TetSet<S>| {
             vec![[[S::ZERO; LANES]; 6]; if set.viscous { set.block_count() } else { 0 }]
         };
         Self {
             sizes: sizes(model).map(|(_, size)| size),
+            parts: Arc::clone(&model.parts),
             ground: Ground {
                 workers: Workers::new(settings.threads, model.tet_count()),
                 previous: points(true),
@@ -150,23 +138,18 @@ impl<S: Real> Workspace<S> {
             },
             points: points(true),
             velocities: vec![Vec3::ZERO; vertices],
-            energies: vec![Energy::default(); if guarded { model.component_count } else { 0 }],
+            energies: vec![Energy::default(); parts(guarded).len()],
             evaluator: Evaluator::new(guarded.then_some(model)),
             copies: vec![Point::default(); if model.is_split() { model.copy_count() } else { 0 }],
             loads: vec![Point::default(); if needs_loads { model.copy_count() } else { 0 }],
-            iterate: [iterate(accelerated), iterate(acceleration == Acceleration::Chebyshev)],
-            norm_weights: vec![
-                S::ZERO;
-                if accelerated { 3 * vertices + model.multiplier_count } else { 0 }
-            ],
-            rebase_factor: S::from_f64(rebase_factor(model, settings)),
-            bound_share: S::from_f64(bound_share(model)),
-            chebyshev: Chebyshev::default(),
-            anderson: Anderson::new(window, length),
-            mixed: vec![S::ZERO; if anderson { 3 * vertices } else { 0 }],
-            guard: Guard::new(if guarded { vertices } else { 0 }),
+            iterate: [iterate(accelerated), iterate(chebyshev)],
+            multiplier_weights: vec![S::ZERO; if chebyshev { model.multiplier_count } else { 0 }],
+            chebyshev: vec![Chebyshev::default(); parts(chebyshev).len()],
+            mixings: parts(anderson).iter().map(|part| Mixing::new(part, window)).collect(),
+            mixed: vec![S::ZERO; 3 * largest],
+            guard: Guard::new(guarded.then_some(model)),
             stability: Stability::new(explicit.then_some(model), settings),
-            small_step: 0,
+            small_steps: vec![SmallSteps::default(); parts(explicit).len()],
             start_velocities: vec![Vec3::ZERO; if explicit { vertices } else { 0 }],
         }
     }
@@ -183,13 +166,15 @@ impl<S: Real> Workspace<S> {
             + self.ground.start_strain.iter().map(|s| size_of_val(&s[..])).sum::<usize>()
             + iterates.clone().map(|i| size_of_val(&i.positions[..])).sum::<usize>()
             + iterates.map(|i| size_of_val(&i.multipliers[..])).sum::<usize>()
-            + size_of_val(&self.norm_weights[..])
+            + size_of_val(&self.multiplier_weights[..])
+            + size_of_val(&self.chebyshev[..])
             + size_of_val(&self.mixed[..])
             + size_of_val(&self.energies[..])
             + size_of_val(&self.start_velocities[..])
+            + size_of_val(&self.small_steps[..])
             + self.stability.bytes()
             + self.evaluator.bytes()
-            + self.anderson.bytes()
+            + self.mixings.iter().map(|m| size_of_val(m) + m.bytes()).sum::<usize>()
             + self.guard.bytes()
     }
 
@@ -200,6 +185,9 @@ impl<S: Real> Workspace<S> {
             if given != expected {
                 return Err(StepError::Mismatch { what, given, expected });
             }
+        }
+        if !Arc::ptr_eq(&self.parts, &model.parts) && self.parts != model.parts {
+            return Err(StepError::OtherParts);
         }
         // Of what decides where passes read and write, callers can change the number of vertices and
         // the form of a set. A set without copies of its own goes by vertices among copies as well.
@@ -227,7 +215,7 @@ impl<S: Real> Workspace<S> {
             Stage::MeasureStrain => {
                 let ground = &mut self.ground;
                 let (workers, strains) = (&ground.workers, &mut ground.start_strain);
-                measure_strain(workers, step.model, &self.points, strains);
+                measure_strain(workers, step.model, None, &self.points, strains);
             }
             Stage::Predict(start) => self.predict(step, start),
             Stage::ResetMultipliers => {
@@ -248,7 +236,7 @@ impl<S: Real> Workspace<S> {
                 let (x, l) = (&self.points, &state.multipliers);
                 load_multipliers(workers, step.model, x, l, &mut self.loads);
             }
-            Stage::Rebase => self.rebase(step.model),
+            Stage::Rebase => self.rebase(step),
             Stage::RecomputePositions => self.recompute_positions(step.model),
             Stage::SplitCopies => self.split_copies(step.model),
             Stage::SolveColor(color) => {
@@ -344,8 +332,8 @@ impl<S: Real> Workspace<S> {
             ground.predicted[v].set_vec3(predicted);
             let x = match start {
                 Start::Previous => x,
-                Start::Inertial => inertial,
-                Start::Predicted | Start::Auto => predicted,
+                Start::Inertial | Start::Auto => inertial,
+                Start::Predicted => predicted,
             };
             self.points[v] = Point::new(x, ground.inverse_masses[v] * copy_count(model, v));
         }
@@ -356,77 +344,66 @@ impl<S: Real> Workspace<S> {
             let predicted =
                 ground.predicted[v].vec3() + pull * (S::ONE / ground.inertias[v]) * (dt * dt);
             ground.predicted[v].set_vec3(predicted);
-            if matches!(start, Start::Predicted | Start::Auto) {
+            if start == Start::Predicted {
                 self.points[v].set_vec3(predicted);
             }
         }
         for pin in &step.inputs.pins {
             self.points[model.numbering.of(pin.vertex)].set_vec3(pin.target);
         }
-    }
-
-    /// Stabilised rebase: pulls positions back onto `M (x - xt) = J(x)^T l`, from which path
-    /// dependence drives them, by one damped step in the metric `mh`, a share of the bound of the
-    /// geometric stiffness above the mass.
-    fn rebase(&mut self, model: &Model<S>) {
-        let (factor, share) = (self.rebase_factor, self.bound_share);
-        let (ground, loads) = (&self.ground, &self.loads);
-        self.ground.each_vertex(&mut self.points, |v, point| {
-            if ground.inverse_masses[v] == S::ZERO {
-                return;
+        if start == Start::Auto {
+            for part in model.parts.iter() {
+                if !self.ground.holds(part) {
+                    self.start_falling(step, part);
+                }
             }
-            let load = gather(model, loads, v);
-            let mass = ground.inertias[v];
-            let residual = (point.vec3() - ground.predicted[v].vec3()) * mass - load.vec3();
-            let inverse = S::ONE / (mass + load.w * share);
-            let x = point.vec3() - residual * (factor * inverse);
-            *point = Point::new(x, inverse * copy_count(model, v));
-        });
-    }
-
-    fn recompute_positions(&mut self, model: &Model<S>) {
-        let (ground, loads) = (&self.ground, &self.loads);
-        self.ground.each_vertex(&mut self.points, |v, point| {
-            let inverse_mass = ground.inverse_masses[v];
-            if inverse_mass != S::ZERO {
-                let impulse = gather(model, loads, v).vec3();
-                point.set_vec3(ground.predicted[v].vec3() + impulse * inverse_mass);
-            }
-        });
-    }
-
-    fn split_copies(&mut self, model: &Model<S>) {
-        for (v, point) in self.points.iter().enumerate() {
-            self.copies[copies_of(model, v)].fill(*point);
         }
     }
 
-    /// Averages the changes of the copies, not the copies: the mean of equal numbers is then that
-    /// number, and a vertex nobody moved stays where it is to the bit.
-    fn join_copies(&mut self, model: &Model<S>) {
-        let copies = &self.copies;
-        self.ground.each_vertex(&mut self.points, |v, point| {
-            let range = copies_of(model, v);
-            let share = S::ONE / S::from_f64(range.len() as f64);
-            let x = point.vec3();
-            let mut sum = Vec3::ZERO;
-            for copy in &copies[range] {
-                sum += copy.vec3() - x;
-            }
-            point.set_vec3(x + sum * share);
-        });
+    /// Starts a part that nothing holds where its center of mass will be. Inner forces do not move that, so
+    /// that no multiplier carries its acceleration; sweeps and a rebase that is not applied in full would
+    /// find it in part only, and the guard would have to take the step back.
+    fn start_falling(&mut self, step: &Step<'_, S>, part: &Part) {
+        let ground = &self.ground;
+        let (mut mass, mut force) = (0.0, Vec3::<f64>::ZERO);
+        for v in part.vertices.clone() {
+            mass += ground.masses[v].to_f64();
+            force += ground.external[v].cast();
+        }
+        let dt = S::from_f64(step.dt);
+        let acceleration = step.inputs.gravity + (force * (1.0 / mass)).cast();
+        for v in part.vertices.clone() {
+            let inertial = ground.previous[v].vec3() + self.velocities[v] * dt;
+            self.points[v].set_vec3(inertial + acceleration * (dt * dt));
+        }
     }
 }
 
 impl<S: Real> Ground<S> {
-    /// `change` on every vertex's point.
+    /// Whether a pin, an attachment or a tether holds a part.
+    pub fn holds(&self, part: &Part) -> bool {
+        let mut inverse_masses = self.inverse_masses[part.vertices.clone()].iter();
+        part.attachments().next().is_some()
+            || !self.tethers_of(part).is_empty()
+            || inverse_masses.any(|inverse| *inverse == S::ZERO)
+    }
+
+    /// The tethers of a part.
+    pub fn tethers_of(&self, part: &Part) -> &[Bundle<S>] {
+        let place = |v: usize| self.tethers.partition_point(|tether| tether.vertex < v);
+        &self.tethers[place(part.vertices.start)..place(part.vertices.end)]
+    }
+
+    /// `change` on the point of every vertex of a part.
     pub fn each_vertex(
         &self,
+        part: &Part,
         points: &mut [Point<S>],
         change: impl Fn(usize, &mut Point<S>) + Sync,
     ) {
-        let points = Shared::new(points);
-        self.workers.each(points.len(), GRAIN, |range| {
+        let (first, points) = (part.vertices.start, Shared::new(points));
+        self.workers.each(part.vertices.len(), GRAIN, |range| {
+            let range = first + range.start..first + range.end;
             // SAFETY: every vertex is worked on once.
             let piece = unsafe { points.range(range.clone()) };
             for (v, point) in range.zip(piece) {
@@ -438,31 +415,17 @@ impl<S: Real> Ground<S> {
     /// As [`Ground::each_vertex`], with the vertex's velocity.
     pub fn each_vertex_with(
         &self,
+        part: &Part,
         points: &mut [Point<S>],
         velocities: &mut [Vec3<S>],
         change: impl Fn(usize, &mut Point<S>, &mut Vec3<S>) + Sync,
     ) {
         let velocities = Shared::new(velocities);
-        self.each_vertex(points, |v, point| {
+        self.each_vertex(part, points, |v, point| {
             // SAFETY: every vertex is worked on once.
             change(v, point, unsafe { velocities.at(v) });
         });
     }
-}
-
-/// Sum of a vertex's loads, in the order of its copies.
-pub(super) fn gather<S: Real>(model: &Model<S>, loads: &[Point<S>], v: usize) -> Point<S> {
-    let mut sum = Point::default();
-    for load in &loads[copies_of(model, v)] {
-        sum.add(*load);
-    }
-    sum
-}
-
-/// Places for the energies of single tetrahedra: needed where they belong to different parts.
-pub(super) fn energy_slots<S: Real>(model: &Model<S>) -> usize {
-    let blocks: usize = model.tet_sets().into_iter().map(|set| set.block_count()).sum();
-    if model.component_count > 1 { LANES * blocks } else { 0 }
 }
 
 /// Everything in a model that decides how much memory a step needs and which stages it has.
@@ -471,7 +434,7 @@ pub(super) fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 11] {
     [
         ("solver's list of vertices", model.vertex_count()),
         ("solver's list of multipliers", model.multiplier_count),
-        ("solver's list of parts", model.component_count),
+        ("solver's list of parts", model.part_count()),
         ("solver's list of colors", model.color_count),
         ("solver's list of copies", model.copy_count()),
         ("solver's list of Saint Venant-Kirchhoff tetrahedra", model.green_strain.len()),
@@ -481,24 +444,4 @@ pub(super) fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 11] {
         ("solver's list of viscous Saint Venant-Kirchhoff tetrahedra", viscous[0]),
         ("solver's list of viscous neo-Hookean tetrahedra", viscous[1]),
     ]
-}
-
-/// The more copies a vertex has, the further a sweep's primal part runs ahead of its multipliers;
-/// slowing the rebase alone restores the balance and leaves the fixed point where it is. 1, 1/2
-/// and 1/4 are the largest powers of two that settled in every scene tried.
-pub(super) fn rebase_factor<S: Real>(model: &Model<S>, settings: &SolverSettings) -> f64 {
-    match (settings.rebase_factor > 0.0, model.is_split(), model.color_count) {
-        (true, ..) => settings.rebase_factor,
-        (_, false, _) => 1.0,
-        (_, true, 1) => 0.25,
-        (_, true, _) => 0.5,
-    }
-}
-
-fn copy_count<S: Real>(model: &Model<S>, v: usize) -> S {
-    S::from_f64(copies_of(model, v).len() as f64)
-}
-
-fn copies_of<S: Real>(model: &Model<S>, v: usize) -> std::ops::Range<usize> {
-    model.copy_offsets[v] as usize..model.copy_offsets[v + 1] as usize
 }

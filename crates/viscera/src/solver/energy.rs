@@ -77,66 +77,52 @@ impl Energy {
 impl<S: Real> Workspace<S> {
     /// Remembers energy and momentum before the step, with the last evaluation of the potential.
     pub(super) fn begin_energy(&mut self, step: &Step<'_, S>) {
-        let model = step.model;
-        self.energies.fill(Energy::default());
-        for (part, stored) in self.energies.iter_mut().zip(&self.evaluator.stored) {
-            part.start.stored = *stored;
-        }
-        for &vertex in &model.attachments.vertices {
-            let v = model.numbering.of(vertex);
-            self.energies[model.component_of[v] as usize].held = true;
-        }
-        for tether in &self.ground.tethers {
-            let part = &mut self.energies[model.component_of[tether.vertex] as usize];
-            part.held = true;
-            part.start.stored += tether.energy(self.ground.previous[tether.vertex].vec3());
-        }
-        for (v, &velocity) in self.velocities.iter().enumerate() {
-            let part = &mut self.energies[model.component_of[v] as usize];
-            if self.ground.inverse_masses[v] == S::ZERO {
-                part.held = true;
-            } else {
-                part.start.add(self.ground.masses[v].to_f64(), velocity);
+        let (model, ground, energies) = (step.model, &self.ground, &mut self.energies);
+        for (number, (energy, part)) in energies.iter_mut().zip(model.parts.iter()).enumerate() {
+            *energy = Energy::default();
+            energy.start.stored = self.evaluator.stored[number];
+            energy.held = ground.holds(part);
+            for tether in ground.tethers_of(part) {
+                energy.start.stored += tether.energy(ground.previous[tether.vertex].vec3());
+            }
+            for v in part.vertices.clone() {
+                if ground.inverse_masses[v] != S::ZERO {
+                    energy.start.add(ground.masses[v].to_f64(), self.velocities[v]);
+                }
             }
         }
     }
 
-    /// [`super::plan::Stage::LimitEnergy`]. The last evaluation of the potential was that of the end.
+    /// [`super::plan::Stage::LimitEnergy`]. The last evaluation of each part's potential was that of its end.
     pub(super) fn limit_energy(&mut self, step: &Step<'_, S>) {
-        let model = step.model;
-        let (ground, energies) = (&self.ground, &mut self.energies);
-        for (part, stored) in energies.iter_mut().zip(&self.evaluator.stored) {
-            part.end.stored = *stored;
-        }
-        for tether in &ground.tethers {
-            let part = &mut energies[model.component_of[tether.vertex] as usize];
-            part.end.stored += tether.energy(self.points[tether.vertex].vec3());
-        }
-        for (v, x) in self.points.iter().enumerate() {
-            if ground.inverse_masses[v] == S::ZERO {
+        let (model, ground, energies) = (step.model, &self.ground, &mut self.energies);
+        for (number, (energy, part)) in energies.iter_mut().zip(model.parts.iter()).enumerate() {
+            energy.end.stored = self.evaluator.stored[number];
+            for tether in ground.tethers_of(part) {
+                energy.end.stored += tether.energy(self.points[tether.vertex].vec3());
+            }
+            let free = |v: &usize| ground.inverse_masses[*v] != S::ZERO;
+            for v in part.vertices.clone().filter(free) {
+                let mass = ground.masses[v].to_f64();
+                let load = step.inputs.gravity * ground.masses[v] + ground.external[v];
+                let load = load.cast::<f64>();
+                let moved = (self.points[v].vec3() - ground.previous[v].vec3()).cast::<f64>();
+                energy.end.add(mass, self.velocities[v]);
+                energy.mass += mass;
+                energy.load += load;
+                energy.work += load.dot(moved);
+                energy.shift += moved * mass;
+            }
+            let (drift, share) = energy.limit();
+            if !(share < 1.0 && energy.mass > 0.0) {
                 continue;
             }
-            let part = &mut energies[model.component_of[v] as usize];
-            let mass = ground.masses[v].to_f64();
-            let load = (step.inputs.gravity * ground.masses[v] + ground.external[v]).cast::<f64>();
-            let moved = (x.vec3() - ground.previous[v].vec3()).cast::<f64>();
-            part.end.add(mass, self.velocities[v]);
-            part.mass += mass;
-            part.load += load;
-            part.work += load.dot(moved);
-            part.shift += moved * mass;
-        }
-        let mut least = 1.0f64;
-        for (v, velocity) in self.velocities.iter_mut().enumerate() {
-            let (drift, share) = energies[model.component_of[v] as usize].limit();
-            if share < 1.0 && ground.inverse_masses[v] != S::ZERO {
-                let drift = drift.cast::<S>();
-                *velocity = drift + (*velocity - drift) * S::from_f64(share);
-                least = least.min(share);
+            let (drift, scale) = (drift.cast::<S>(), S::from_f64(share));
+            for v in part.vertices.clone().filter(free) {
+                let velocity = &mut self.velocities[v];
+                *velocity = drift + (*velocity - drift) * scale;
             }
-        }
-        if let Some(report) = &mut self.guard.report {
-            report.kept_speed = least;
+            self.guard.set_kept_speed(number, share);
         }
     }
 }

@@ -10,11 +10,13 @@
 //! symplectic (Hairer, Lubich, Wanner, "Geometric Numerical Integration", 2006, chapter I); the limit of
 //! `h` with stiffness-proportional damping is that of Belytschko, Liu, Moran, "Nonlinear Finite
 //! Elements for Continua and Structures", 2000, section 6.2. The bound of the highest frequency holds
-//! because `K_e <= rho(K_e) I` on the vertices of every element `e`.
+//! because `K_e <= rho(K_e) I` on the vertices of every element `e`. Every connected part of the model takes
+//! as many small steps as it needs itself.
 
 use super::StepError;
-use super::cpu::{Ground, Step, Workspace, gather};
+use super::cpu::{Ground, Step, Workspace};
 use super::potential::{load_forces, measure_strain};
+use super::rebase::gather;
 use super::tethers::Bundle;
 use crate::elements::shape_gradients;
 use crate::model::Model;
@@ -31,63 +33,90 @@ const POWER_ROUNDS: usize = 20;
 /// What the largest stable small step depends on.
 #[derive(Clone, Debug)]
 pub(super) struct Stability {
-    /// The largest small step [s] without tethers, with the margin of the settings; infinite for other
-    /// methods.
+    /// The largest small step [s] of the stiffest part without tethers, with the margin of the settings;
+    /// infinite for other methods.
     pub step: f64,
     /// Of the elements around each vertex, the user's order [N/m]; empty for other methods.
     stiffness: Vec<f64>,
+    /// Empty for other methods.
+    parts: Vec<PartStability>,
+    safety: f64,
+}
+
+/// Of one connected part of the model.
+#[derive(Clone, Copy, Debug, Default)]
+struct PartStability {
     /// Largest [1/s].
     frequency: f64,
     /// Largest [s].
     viscosity: f64,
-    safety: f64,
+}
+
+/// The small steps of a part in one step: as many as it needs, whatever others do.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SmallSteps {
+    count: u32,
+    done: u32,
+}
+
+impl SmallSteps {
+    /// [s]; `dt` is the whole step.
+    fn dt(self, dt: f64) -> f64 {
+        dt / f64::from(self.count)
+    }
 }
 
 impl Stability {
     /// Of a model that an explicit method moves; without one there is no limit.
     pub fn new<S: Real>(model: Option<&Model<S>>, settings: &SolverSettings) -> Self {
-        let (stiffness, viscosity) = model.map(vertex_stiffness).unwrap_or_default();
-        let masses = model.map_or(&[][..], |model| &model.masses);
-        let ratios = stiffness.iter().zip(masses).map(|(k, m)| k / m.to_f64());
-        let frequency = ratios.fold(0.0, f64::max).sqrt();
+        let (stiffness, parts) = model.map(part_stability).unwrap_or_default();
         let safety = settings.explicit_safety;
-        let step = f64::INFINITY;
-        let mut stability = Self { step, stiffness, frequency, viscosity, safety };
-        if model.is_some() {
-            stability.step = stability.at(frequency);
+        let mut stability = Self { step: f64::INFINITY, stiffness, parts, safety };
+        if let Some(model) = model {
+            stability.step = stability.step(model, &[]);
         }
         stability
     }
 
-    /// The largest small step [s] with these tethers.
+    /// The largest small step [s] of the stiffest part with these tethers.
     pub fn step<S: Real>(&self, model: &Model<S>, tethers: &[Bundle<S>]) -> f64 {
-        let frequency = tethers.iter().fold(self.frequency, |most: f64, tether| {
-            let v = model.numbering.order[tether.vertex] as usize;
-            let stiffness = self.stiffness[v] + tether.stiffness.to_f64();
-            most.max((stiffness / model.masses[v].to_f64()).sqrt())
-        });
-        if frequency > self.frequency { self.at(frequency) } else { self.step }
+        self.steps(model, tethers).fold(f64::INFINITY, f64::min)
     }
 
-    fn at(&self, omega: f64) -> f64 {
-        let xi = 0.5 * self.viscosity * omega;
-        self.safety * (2.0 / omega) * ((1.0 + xi * xi).sqrt() - xi)
+    /// The largest small step [s] of each part with these tethers, sorted by vertex.
+    pub fn steps<S: Real>(
+        &self,
+        model: &Model<S>,
+        tethers: &[Bundle<S>],
+    ) -> impl Iterator<Item = f64> {
+        let mut tethers = tethers.iter().peekable();
+        self.parts.iter().zip(model.parts.iter()).map(move |(stability, part)| {
+            let mut frequency = stability.frequency;
+            while let Some(tether) = tethers.next_if(|t| t.vertex < part.vertices.end) {
+                let v = model.numbering.order[tether.vertex] as usize;
+                let stiffness = self.stiffness[v] + tether.stiffness.to_f64();
+                frequency = frequency.max((stiffness / model.masses[v].to_f64()).sqrt());
+            }
+            let xi = 0.5 * stability.viscosity * frequency;
+            self.safety * (2.0 / frequency) * ((1.0 + xi * xi).sqrt() - xi)
+        })
     }
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.stiffness[..])
+        size_of_val(&self.stiffness[..]) + size_of_val(&self.parts[..])
     }
 }
 
-/// Of the elements around each vertex [N/m], and the largest viscosity [s].
-fn vertex_stiffness<S: Real>(model: &Model<S>) -> (Vec<f64>, f64) {
+/// Of the elements around each vertex [N/m], and what of it decides in each part.
+fn part_stability<S: Real>(model: &Model<S>) -> (Vec<f64>, Vec<PartStability>) {
     let mut stiffness = vec![0.0; model.vertex_count()];
-    let mut viscosity = 0.0f64;
+    let mut parts = vec![PartStability::default(); model.part_count()];
     for set in model.tet_sets() {
         for tet in model.tets(set) {
             let material = &model.materials[tet.material];
-            viscosity = viscosity.max(material.viscosity.to_f64());
+            let viscosity = &mut parts[model.part_of(tet.vertices[0])].viscosity;
+            *viscosity = viscosity.max(material.viscosity.to_f64());
             let shape = tet.inverse_rest_shape.cast::<f64>();
             let lame = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
             let largest = tet.rest_volume.to_f64() * element_stiffness(&shape, lame);
@@ -105,7 +134,12 @@ fn vertex_stiffness<S: Real>(model: &Model<S>) -> (Vec<f64>, f64) {
     for (&v, k) in model.attachments.vertices.iter().zip(&model.attachments.stiffness) {
         stiffness[v as usize] += k.to_f64();
     }
-    (stiffness, viscosity)
+    for (stability, part) in parts.iter_mut().zip(model.parts.iter()) {
+        let vertices = model.numbering.order[part.vertices.clone()].iter().map(|&v| v as usize);
+        let ratios = vertices.map(|v| stiffness[v] / model.masses[v].to_f64());
+        stability.frequency = ratios.fold(0.0, f64::max).sqrt();
+    }
+    (stiffness, parts)
 }
 
 impl<S: Real> Ground<S> {
@@ -154,6 +188,21 @@ pub(super) fn small_steps(dt: f64, stable: f64) -> Result<u32, StepError> {
 }
 
 impl<S: Real> Workspace<S> {
+    /// Decides how many small steps each part takes in a step of `dt` [s]; returns the most.
+    pub(super) fn count_small_steps(
+        &mut self,
+        model: &Model<S>,
+        dt: f64,
+    ) -> Result<u32, StepError> {
+        let tethers = &self.ground.tethers;
+        let most = small_steps(dt, self.stability.step(model, tethers))?;
+        for (small, stable) in self.small_steps.iter_mut().zip(self.stability.steps(model, tethers))
+        {
+            *small = SmallSteps { count: small_steps(dt, stable)?, done: 0 };
+        }
+        Ok(most)
+    }
+
     /// [`super::plan::Stage::BeginExplicit`].
     pub(super) fn begin_explicit(&mut self, step: &Step<'_, S>) {
         let model = step.model;
@@ -161,60 +210,69 @@ impl<S: Real> Workspace<S> {
         self.ground.previous.copy_from_slice(&self.points);
         self.start_velocities.copy_from_slice(&self.velocities);
         if model.tet_sets().iter().any(|set| set.viscous) {
-            let back = S::from_f64(-step.small_dt());
-            self.drift(back);
+            let velocities = &self.velocities;
+            for (part, small) in model.parts.iter().zip(&self.small_steps) {
+                let back = S::from_f64(-small.dt(step.dt));
+                self.ground.each_vertex(part, &mut self.points, |v, point| {
+                    point.set_vec3(point.vec3() + velocities[v] * back);
+                });
+            }
             let ground = &mut self.ground;
-            measure_strain(&ground.workers, model, &self.points, &mut ground.start_strain);
+            measure_strain(&ground.workers, model, None, &self.points, &mut ground.start_strain);
             self.points.copy_from_slice(&self.ground.previous);
         }
-        self.small_step = 0;
-    }
-
-    /// Moves points along their velocities for a time [s].
-    fn drift(&mut self, time: S) {
-        let velocities = &self.velocities;
-        self.ground.each_vertex(&mut self.points, |v, point| {
-            point.set_vec3(point.vec3() + velocities[v] * time);
-        });
     }
 
     /// [`super::plan::Stage::LoadForces`].
     pub(super) fn load_explicit_forces(&mut self, step: &Step<'_, S>) {
-        let small = Step { dt: step.small_dt(), ..*step };
-        load_forces::<S, false>(&self.ground, &small, &self.points, &mut self.loads);
-        let squared = S::from_f64(small.dt * small.dt);
-        for tether in &self.ground.tethers {
-            let force = tether.force(self.points[tether.vertex].vec3());
-            let copy = step.model.copy_offsets[tether.vertex] as usize;
-            self.loads[copy].add(Point::new(force * squared, S::ZERO));
+        let Self { ground, points, loads, small_steps, .. } = self;
+        for (part, small) in step.model.parts.iter().zip(small_steps) {
+            if small.done == small.count {
+                continue;
+            }
+            let small = Step { dt: small.dt(step.dt), ..*step };
+            load_forces::<S, false>(ground, &small, part, points, loads);
+            let squared = S::from_f64(small.dt * small.dt);
+            for tether in ground.tethers_of(part) {
+                let force = tether.force(points[tether.vertex].vec3());
+                let copy = step.model.copy_offsets[tether.vertex] as usize;
+                loads[copy].add(Point::new(force * squared, S::ZERO));
+            }
+            let (workers, strains) = (&ground.workers, &mut ground.start_strain);
+            measure_strain(workers, step.model, Some(part), points, strains);
         }
-        let ground = &mut self.ground;
-        measure_strain(&ground.workers, step.model, &self.points, &mut ground.start_strain);
     }
 
     /// [`super::plan::Stage::AdvanceExplicit`].
     pub(super) fn advance_explicit(&mut self, step: &Step<'_, S>) {
-        let (model, h) = (step.model, step.small_dt());
-        let (small, rate) = (S::from_f64(h), S::from_f64(1.0 / h));
-        let (ground, loads) = (&self.ground, &self.loads);
-        ground.each_vertex_with(&mut self.points, &mut self.velocities, |v, point, velocity| {
-            let inverse_mass = ground.inverse_masses[v];
-            if inverse_mass == S::ZERO {
-                return;
+        let model = step.model;
+        let Self { ground, points, velocities, loads, small_steps, .. } = self;
+        for (part, small) in model.parts.iter().zip(small_steps.iter_mut()) {
+            if small.done == small.count {
+                continue;
             }
-            let force = gather(model, loads, v).vec3() * rate + ground.external[v] * small;
-            *velocity += force * inverse_mass + step.inputs.gravity * small;
-            point.set_vec3(point.vec3() + *velocity * small);
-        });
-        self.small_step += 1;
-        let share = S::from_f64(f64::from(self.small_step) / f64::from(step.small_steps));
-        let (last, rate) = (self.small_step == step.small_steps, S::from_f64(1.0 / step.dt));
+            small.done += 1;
+            let h = small.dt(step.dt);
+            let (small, rate) = (S::from_f64(h), S::from_f64(1.0 / h));
+            ground.each_vertex_with(part, points, velocities, |v, point, velocity| {
+                let inverse_mass = ground.inverse_masses[v];
+                if inverse_mass == S::ZERO {
+                    return;
+                }
+                let force = gather(model, loads, v).vec3() * rate + ground.external[v] * small;
+                *velocity += force * inverse_mass + step.inputs.gravity * small;
+                point.set_vec3(point.vec3() + *velocity * small);
+            });
+        }
+        let rate = S::from_f64(1.0 / step.dt);
         for pin in &step.inputs.pins {
             let v = model.numbering.of(pin.vertex);
-            let start = self.ground.previous[v].vec3();
-            let place = if last { pin.target } else { start + (pin.target - start) * share };
-            self.points[v].set_vec3(place);
-            self.velocities[v] = (pin.target - start) * rate;
+            let SmallSteps { count, done } = small_steps[model.part_at(v)];
+            let share = S::from_f64(f64::from(done) / f64::from(count));
+            let start = ground.previous[v].vec3();
+            let moved = start + (pin.target - start) * share;
+            points[v].set_vec3(if done == count { pin.target } else { moved });
+            velocities[v] = (pin.target - start) * rate;
         }
     }
 

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Kept multipliers tell where the body comes from. Where that means nothing any more, because the
-//! caller has put vertices elsewhere or the multipliers are no numbers, these take their place.
+//! caller has put vertices elsewhere or multipliers of a connected part are no numbers, these take their place.
 //! After a rejected step they must not: see [`super::guard`].
 //!
 //! Pins that are let go keep the history, however hard they pulled. Forgetting it then (all
@@ -23,6 +23,7 @@ use super::potential::measure_strain;
 use super::tets::{Block, TetPass, load_rows};
 use super::threads::Shared;
 use crate::elements::{attachment, deformation_gradient, green_strain, spring};
+use crate::model::Part;
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::state::State;
@@ -33,40 +34,49 @@ impl<S: Real> Workspace<S> {
     pub(super) fn restart(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
         self.read_positions(step.model, state);
         let ground = &mut self.ground;
-        measure_strain(&ground.workers, step.model, &self.points, &mut ground.start_strain);
-        self.constitutive_multipliers(step, &mut state.multipliers);
+        measure_strain(&ground.workers, step.model, None, &self.points, &mut ground.start_strain);
+        for part in step.model.parts.iter() {
+            self.constitutive_multipliers(step, part, &mut state.multipliers);
+        }
         state.multiplier_dt = step.dt;
     }
 
     /// [`super::plan::Stage::RepairMultipliers`].
     pub(super) fn repair_multipliers(&self, step: &Step<'_, S>, multipliers: &mut [S]) {
-        if !multipliers.iter().all(|l| l.is_finite()) {
-            self.constitutive_multipliers(step, multipliers);
+        for part in step.model.parts.iter() {
+            let mut of_part = part.multipliers.iter().map(|range| &multipliers[range.clone()]);
+            if !of_part.all(|range| range.iter().all(|l| l.is_finite())) {
+                self.constitutive_multipliers(step, part, multipliers);
+            }
         }
     }
 
-    fn constitutive_multipliers(&self, step: &Step<'_, S>, l: &mut [S]) {
+    fn constitutive_multipliers(&self, step: &Step<'_, S>, part: &Part, l: &mut [S]) {
         let model = step.model;
         let x = &self.points;
         let shared = Shared::new(l);
-        for (set, start_strain) in model.tet_sets().into_iter().zip(&self.ground.start_strain) {
+        for (kind, set) in model.tet_sets().into_iter().enumerate() {
+            let start_strain = &self.ground.start_strain[kind];
             with_form!(set.form, F => {
                 let form = PhantomData::<F>;
                 let pass = Constitutive { x, start_strain, dt: step.dt, l: &shared, form };
-                self.ground.workers.pass(model, set, 0..set.block_count(), &pass);
+                for blocks in part.blocks(kind) {
+                    self.ground.workers.pass(model, set, blocks, &pass);
+                }
             });
         }
         let squared = S::from_f64(step.dt * step.dt);
         let springs = &model.springs;
-        for (i, ends) in springs.vertices.iter().enumerate() {
-            let ends = ends.map(|v| x[model.numbering.of(v)].vec3());
+        for i in part.springs() {
+            let ends = springs.vertices[i].map(|v| x[model.numbering.of(v)].vec3());
             let compliance_tilde = S::ONE / (springs.stiffness[i] * squared);
             l[springs.multiplier_offset + i] =
                 spring::constitutive_multiplier(&ends, springs.rest_length[i], compliance_tilde);
         }
         let attachments = &model.attachments;
         let anchors = step.inputs.anchors_of(model);
-        for (i, &v) in attachments.vertices.iter().enumerate() {
+        for i in part.attachments() {
+            let v = attachments.vertices[i];
             let anchor = anchors[attachments.order[i] as usize];
             let compliance_tilde = S::ONE / (attachments.stiffness[i] * squared);
             let at = attachments.multiplier_offset + 3 * i;
@@ -75,8 +85,10 @@ impl<S: Real> Workspace<S> {
             l[at..at + 3].copy_from_slice(&pull.to_array());
         }
         // Of a tetrahedron too large for the number format nothing can be told.
-        for l in l.iter_mut().filter(|l| !l.is_finite()) {
-            *l = S::ZERO;
+        for range in &part.multipliers {
+            for l in l[range.clone()].iter_mut().filter(|l| !l.is_finite()) {
+                *l = S::ZERO;
+            }
         }
     }
 }
@@ -101,7 +113,7 @@ impl<S: Real, F> Constitutive<'_, S, F> {
         let elastic: [L; N] = F::constitutive(&corners.x, &shape, &material, step_volume);
         // SAFETY: every block has multipliers of its own and is worked on once.
         unsafe { tets.store_multipliers(tets.set.multiplier_offset, self.l, elastic) };
-        if tets.set.viscous {
+        if tets.is_viscous() {
             let mut change = green_strain::strain(&deformation_gradient(&corners.x, &shape));
             let start: [L; 6] = load_rows(self.start_strain[tets.index].as_flattened(), tets.lane);
             for p in 0..6 {
@@ -118,3 +130,43 @@ impl<S: Real, F> Constitutive<'_, S, F> {
 }
 
 pass_by_form!(Constitutive store);
+
+#[cfg(test)]
+mod tests {
+    use super::super::Inputs;
+    use super::super::loads::load_multipliers;
+    use super::super::potential::load_forces;
+    use super::super::probe::{begun, everything, quiet, shake};
+    use crate::material::MaterialModel::{SaintVenantKirchhoff, StableNeoHookean};
+    use crate::settings::{NeoHookean, SolverSettings};
+
+    /// In the middle of a motion, so that viscous tissue resists: `J^T l = dt^2 f(x)`, every form, springs
+    /// and attachments, where one multiplier has been no number.
+    #[test]
+    fn repaired_multipliers_are_the_forces_of_the_elements() {
+        for neo_hookean in [NeoHookean::Stretch, NeoHookean::Pair] {
+            let settings = SolverSettings { neo_hookean, ..SolverSettings::default() };
+            let model = everything(&settings, [SaintVenantKirchhoff, StableNeoHookean], 0.4);
+            let inputs = Inputs::default();
+            let step = quiet(&model, &inputs, &settings, 1e-2);
+            let mut work = begun(&step, &model.rest_positions);
+            shake(&mut work.points);
+            let mut multipliers = vec![0.0; model.multiplier_count];
+            multipliers[3] = f64::NAN;
+            work.repair_multipliers(&step, &mut multipliers);
+            let [mut given, mut expected] = [(); 2].map(|()| work.loads.clone());
+            let workers = &work.ground.workers;
+            load_multipliers(workers, &model, &work.points, &multipliers, &mut given);
+            let part = &model.parts[0];
+            load_forces::<_, false>(&work.ground, &step, part, &work.points, &mut expected);
+            let largest = expected.iter().map(|load| load.vec3().length()).fold(0.0, f64::max);
+            for (given, expected) in given.iter().zip(&expected) {
+                let apart = (given.vec3() - expected.vec3()).length();
+                // A hundred roundings of stresses that may cancel.
+                assert!(apart < 1e-12 * largest, "{neo_hookean:?}: {apart:e} of {largest:e}");
+            }
+            // Viscosity is no small part of it.
+            assert!(model.tet_sets().iter().all(|set| set.viscous));
+        }
+    }
+}

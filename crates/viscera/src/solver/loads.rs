@@ -86,7 +86,7 @@ impl<S: Real, F> Loads<'_, S, F> {
         let (corners, shape) = (tets.corners::<L>(self.x), tets.shape());
         let l = tets.multipliers::<L, N>(set.multiplier_offset, self.multipliers);
         let mut loads = F::corner_loads(&corners.x, &shape, &l);
-        if set.viscous {
+        if tets.is_viscous() {
             let l = tets.multipliers::<L, 6>(set.viscous_offset, self.multipliers);
             let more = green_strain::corner_loads(&corners.x, &shape, &l);
             for corner in 0..4 {

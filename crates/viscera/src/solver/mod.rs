@@ -22,12 +22,16 @@ mod loads;
 pub mod plan;
 mod potential;
 mod precision;
+#[cfg(test)]
+mod probe;
 mod products;
+mod rebase;
 mod sweep;
 mod team;
 mod tethers;
 mod tets;
 mod threads;
+mod tissue;
 
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
@@ -36,10 +40,10 @@ use crate::settings::{Method, SolverSettings};
 use crate::state::State;
 pub use guard::StepReport;
 use plan::Plan;
+use precision::{Task, carry_out};
 #[cfg(feature = "gpu")]
 #[doc(hidden)]
-pub use potential::{TISSUE_WGSL, Tissue};
-use precision::{Task, carry_out};
+pub use tissue::{TISSUE_WGSL, Tissue};
 
 /// A vertex that is moved, not simulated, during a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,6 +165,11 @@ pub enum StepError {
         /// The input concerned.
         what: &'static str,
     },
+    /// The solver was built for a model that hangs together otherwise.
+    #[error(
+        "the model's connected parts are not those that the solver was built for; build another solver"
+    )]
+    OtherParts,
     /// State, model and solver do not belong together.
     #[error("the {what} has {given} entries; the model needs {expected}")]
     Mismatch {
@@ -229,8 +238,8 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         let Self { settings, plan, work } = self;
-        let (repeat, small_steps) = repeats(settings, plan, work, model, inputs, dt)?;
-        let step = cpu::Step { model, inputs, dt, settings, small_steps };
+        let repeat = repeats(settings, plan, work, model, inputs, dt)?;
+        let step = cpu::Step { model, inputs, dt, settings };
         carry_out(Task::Watched(plan, repeat, &mut watch), work, &step, state);
         Ok(())
     }
@@ -254,8 +263,8 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         let Self { settings, plan, work } = self;
-        let (repeat, small_steps) = repeats(settings, plan, work, model, inputs, dt)?;
-        let step = cpu::Step { model, inputs, dt, settings, small_steps };
+        let repeat = repeats(settings, plan, work, model, inputs, dt)?;
+        let step = cpu::Step { model, inputs, dt, settings };
         carry_out(Task::Step(plan, repeat, count), work, &step, state);
         Ok(())
     }
@@ -273,7 +282,7 @@ impl<S: Real> Solver<S> {
         dt: f64,
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
-        let step = cpu::Step { model, inputs, dt, settings: &self.settings, small_steps: 1 };
+        let step = cpu::Step { model, inputs, dt, settings: &self.settings };
         carry_out(Task::Restart, &mut self.work, &step, state);
         Ok(())
     }
@@ -301,7 +310,8 @@ impl<S: Real> Solver<S> {
         self.work.ground.workers.instructions
     }
 
-    /// The largest small step [s] of the explicit method, its margin included; infinite for others.
+    /// The largest small step [s] of the explicit method in the stiffest part of the model, its margin
+    /// included; infinite for others.
     pub fn stable_step(&self) -> f64 {
         self.work.stability.step
     }
@@ -316,14 +326,22 @@ impl<S: Real> Solver<S> {
         self.work.ground.workers.count()
     }
 
-    /// How often steps have been taken back since the solver was built.
+    /// How many steps have been taken back for at least one connected part of the model since the solver was
+    /// built.
     pub fn rejected_steps(&self) -> u64 {
         self.work.guard.rejected
     }
 
-    /// How the last step ended; nothing before the first, and where steps are not guarded.
+    /// How the last step ended, for all parts of the model together; nothing before the first, and where
+    /// steps are not guarded.
     pub fn last_step(&self) -> Option<StepReport> {
-        self.work.guard.report
+        self.work.guard.report()
+    }
+
+    /// How the last step ended for each connected part of the model, see [`Model::part_of`]; empty before the
+    /// first, and where steps are not guarded.
+    pub fn part_reports(&self) -> &[StepReport] {
+        self.work.guard.part_reports()
     }
 
     /// The force balance at the end of the last step, see [`balance::ForceBalance`]. `inputs` are
@@ -343,7 +361,7 @@ impl<S: Real> Solver<S> {
     }
 }
 
-/// How often the body of the plan is run, and how many small steps a step of `dt` [s] has.
+/// How often the body of the plan is run in a step of `dt` [s].
 fn repeats<S: Real>(
     settings: &SolverSettings,
     plan: &Plan,
@@ -351,15 +369,14 @@ fn repeats<S: Real>(
     model: &Model<S>,
     inputs: &Inputs<S>,
     dt: f64,
-) -> Result<(u32, u32), StepError> {
-    Ok(match settings.method {
-        Method::Xpbd => (plan.repeat, 1),
+) -> Result<u32, StepError> {
+    match settings.method {
+        Method::Xpbd => Ok(plan.repeat),
         Method::Explicit => {
             tethers::bundle(model, inputs, &mut work.ground.tethers);
-            let stable = work.stability.step(model, &work.ground.tethers);
-            [explicit::small_steps(dt, stable)?; 2].into()
+            work.count_small_steps(model, dt)
         }
-    })
+    }
 }
 
 /// A step can be made with these inputs.

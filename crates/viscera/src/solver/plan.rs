@@ -16,7 +16,7 @@ pub enum Stage {
     /// Remembers the Green strain of viscous tetrahedra at the start of the step.
     MeasureStrain,
     /// `xt = x + dt v + dt^2 M^-1 f_ext`; `x` becomes the start of the iteration, pins move to
-    /// their targets; `w = 1/m`.
+    /// their targets; `w = 1/m`. `Start::Auto` is `Start::Inertial`, but for parts that nothing holds.
     Predict(Start),
     /// `l = 0`.
     ResetMultipliers,
@@ -25,9 +25,9 @@ pub enum Stage {
     /// Remembers the best of three starts, whose incremental potential bounds the step, and the
     /// mechanical energy.
     ChooseStart,
-    /// Takes a step back whose incremental potential exceeds that bound.
+    /// Takes a step back whose incremental potential exceeds that bound, for each connected part by itself.
     GuardStep,
-    /// Multipliers that are no numbers start a new history: all are taken from the positions.
+    /// Multipliers that are no numbers start a new history: all of the part are taken from the positions.
     RepairMultipliers,
     /// Remembers `(x, l)` before a sweep, for the acceleration.
     RememberIterate,
@@ -58,7 +58,8 @@ pub enum Stage {
     BeginExplicit,
     /// Forces of all elements, per copy.
     LoadForces,
-    /// `v += h (g + M^-1 f)`, `x += h v` with the small step `h`; pins move by their share.
+    /// `v += h (g + M^-1 f)`, `x += h v` with the small step `h` of the part, until its last is done; pins move
+    /// by their share.
     AdvanceExplicit,
     /// The prediction that a force balance of the mean acceleration needs.
     EndExplicit,
@@ -71,7 +72,7 @@ pub enum Stage {
 pub struct Plan {
     /// Once, first.
     pub prologue: Vec<Stage>,
-    /// Number of iterations; an explicit method's are counted by the step.
+    /// Number of iterations; an explicit method's small steps are counted by the step.
     pub repeat: u32,
     /// One iteration.
     pub body: Vec<Stage>,
@@ -105,9 +106,10 @@ impl Plan {
         if model.tet_sets().iter().any(|set| set.viscous) {
             prologue.push(Stage::MeasureStrain);
         }
-        // A kept multiplier already carries gravity: adding it to the start counts it twice.
+        // A kept multiplier already carries gravity: adding it to the start counts it twice, where anything holds
+        // the part.
         let start = match (settings.start, settings.keep_multipliers) {
-            (Start::Auto, true) => Start::Inertial,
+            (Start::Auto, true) => Start::Auto,
             (Start::Auto, false) => Start::Predicted,
             (chosen, _) => chosen,
         };

@@ -8,135 +8,24 @@
 #![allow(unsafe_code)]
 
 use std::cell::Cell;
+use std::ops::Range;
 
-use super::cpu::{Ground, StartStrain, Step, energy_slots};
+use super::cpu::{Ground, StartStrain, Step};
 use super::loads::{add_load, points};
 use super::tets::{Block, TetPass, load_rows};
 use super::threads::Shared;
+use super::tissue::{Response, Tissue};
 use crate::elements::green_strain::{self, Voigt};
 use crate::elements::{
-    CornerLoad, attachment, deformation_gradient, internal_forces, neo_hookean, shape_gradients,
-    spring,
+    CornerLoad, attachment, deformation_gradient, internal_forces, shape_gradients, spring,
 };
 use crate::material::MaterialModel;
-use crate::model::{MaterialConstants, Model, TetSet};
+use crate::model::{Model, Part};
 use crate::scalar::lanes::{Eight, LANES, Lanes, Point};
-use crate::scalar::{Mat3, Real, Scalar, Vec3};
-
-/// Twin of the functions of [`Tissue`]; needs those of the Green strain and of neo-Hookean tissue.
-#[cfg(feature = "gpu")]
-pub const TISSUE_WGSL: &str = include_str!("tissue.wgsl");
-
-/// The constants of a tetrahedron's tissue for one step.
-pub struct Tissue<S> {
-    /// Its law.
-    pub model: MaterialModel,
-    /// [Pa].
-    pub lame_lambda: S,
-    /// [Pa].
-    pub lame_mu: S,
-    /// Retardation time over the step.
-    pub viscosity_rate: S,
-}
-
-/// What a tetrahedron answers to a deformation.
-pub struct Response<S> {
-    /// Elastic energy density [Pa].
-    pub elastic_energy: S,
-    /// Density [Pa] of the viscous part of the potential.
-    pub viscous_energy: S,
-    /// First Piola stress [Pa], viscosity included.
-    pub piola: Mat3<S>,
-}
-
-impl<S: Scalar> Tissue<S> {
-    /// Of one material; `dt` is the step [s].
-    #[inline(always)]
-    pub fn new(model: MaterialModel, material: &MaterialConstants<S>, dt: f64) -> Self {
-        Self {
-            model,
-            lame_lambda: material.lame_lambda,
-            lame_mu: material.lame_mu,
-            viscosity_rate: material.viscosity * S::from_f64(1.0 / dt),
-        }
-    }
-
-    /// Elastic energy density [Pa].
-    #[inline(always)]
-    fn elastic_energy(&self, f: &Mat3<S>) -> S {
-        let (lambda, mu) = (self.lame_lambda, self.lame_mu);
-        match self.model {
-            MaterialModel::SaintVenantKirchhoff => {
-                green_strain::energy_density(&green_strain::strain(f), lambda, mu)
-            }
-            MaterialModel::StableNeoHookean => neo_hookean::energy_density(f, lambda, mu),
-        }
-    }
-
-    /// Density [Pa] of the viscous part of the potential.
-    #[inline(always)]
-    fn viscous_energy(&self, change: &Voigt<S>) -> S {
-        self.viscosity_rate * green_strain::energy_density(change, self.lame_lambda, self.lame_mu)
-    }
-
-    /// Energies and stress; `start` is the Green strain at the start of the step, where the tissue
-    /// is viscous.
-    #[inline(always)]
-    pub fn respond(&self, f: &Mat3<S>, start: Option<&Voigt<S>>) -> Response<S> {
-        let (lambda, mu) = (self.lame_lambda, self.lame_mu);
-        let piola = match self.model {
-            MaterialModel::SaintVenantKirchhoff => {
-                green_strain::piola(f, &green_strain::strain(f), lambda, mu)
-            }
-            MaterialModel::StableNeoHookean => neo_hookean::piola(f, lambda, mu),
-        };
-        let elastic_energy = self.elastic_energy(f);
-        let mut response = Response { elastic_energy, viscous_energy: S::ZERO, piola };
-        if let Some(start) = start {
-            let change = change_since(f, start);
-            response.viscous_energy = self.viscous_energy(&change);
-            let viscous = green_strain::piola(f, &change, lambda, mu);
-            response.piola = response.piola + viscous * self.viscosity_rate;
-        }
-        response
-    }
-
-    /// Bound [Pa] of the curvature of the energy density by one corner, for the corner's shape
-    /// gradient `g`: the vertex's diagonal block without its negative part.
-    #[inline(always)]
-    pub fn curvature(&self, f: &Mat3<S>, g: Vec3<S>) -> S {
-        let (lambda, mu) = (self.lame_lambda, self.lame_mu);
-        let stretch = (lambda + S::TWO * mu) * f.norm_squared() * g.length_squared();
-        let elastic = match self.model {
-            MaterialModel::SaintVenantKirchhoff => {
-                let strain = green_strain::strain(f);
-                let pressure = lambda * (strain[0] + strain[1] + strain[2]);
-                let [a, b, c, yz, xz, xy] = strain;
-                let tensor = [a, b, c, S::HALF * yz, S::HALF * xz, S::HALF * xy];
-                let along = g.dot(green_strain::symmetric(&tensor) * g);
-                stretch + (S::TWO * mu * along + pressure * g.length_squared()).max(S::ZERO)
-            }
-            MaterialModel::StableNeoHookean => {
-                let volume = (f.cofactor() * g).length_squared();
-                mu * g.length_squared() + (lambda + mu) * volume
-            }
-        };
-        elastic + self.viscosity_rate * stretch
-    }
-}
-
-/// Change of the Green strain since the start of the step.
-#[inline(always)]
-fn change_since<S: Scalar>(f: &Mat3<S>, start: &Voigt<S>) -> Voigt<S> {
-    let mut change = green_strain::strain(f);
-    for p in 0..6 {
-        change[p] -= start[p];
-    }
-    change
-}
+use crate::scalar::{Mat3, Real};
 
 /// The potential and what of it round-off can pretend.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Potential {
     /// `Phi` [J s^2].
     pub value: f64,
@@ -144,7 +33,7 @@ pub(super) struct Potential {
     pub noise: f64,
 }
 
-/// Blocks, and vertices, whose sum is taken first. Part of the result's bits.
+/// Blocks, and vertices, of a part whose sum is taken first. Part of the result's bits.
 const PIECE: usize = 64;
 const VERTEX_PIECE: usize = 1024;
 
@@ -167,144 +56,215 @@ macro_rules! with_law {
     }};
 }
 
-/// Evaluates `Phi`: adds up in double precision, in a fixed order.
+/// Evaluates `Phi` part by part: adds up in double precision, in an order that other parts do not change.
 #[derive(Clone, Debug)]
-pub(super) struct Evaluator<S> {
-    /// Potential [J] of tissue, springs and attachments of each part of the model, as of the last
-    /// evaluation.
+pub(super) struct Evaluator {
+    /// Of each part of the model, as of its last evaluation.
+    pub potentials: Vec<Potential>,
+    /// Potential [J] of tissue, springs and attachments of each part, as of its last evaluation.
     pub stored: Vec<f64>,
-    /// Of each tetrahedron [J], where there are several parts.
-    energies: Vec<S>,
+    /// What is summed first, part by part.
+    pieces: Vec<Piece>,
+    /// The first piece of each part, and the end of the last one's.
+    first: Vec<usize>,
+    /// What the pieces sum up to.
     partial: Vec<[f64; 2]>,
 }
 
-impl<S: Real> Evaluator<S> {
+/// Vertices or blocks of a part whose sum is taken first.
+#[derive(Clone, Debug)]
+struct Piece {
+    part: usize,
+    of: PieceOf,
+    /// Among those of the part.
+    range: Range<usize>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum PieceOf {
+    Vertices,
+    /// Of one of the two sets.
+    Blocks(usize),
+}
+
+impl Evaluator {
     /// For a model, or for none.
-    pub fn new(model: Option<&Model<S>>) -> Self {
-        let Some(model) = model else {
-            return Self { stored: Vec::new(), energies: Vec::new(), partial: Vec::new() };
-        };
-        let blocks = model.tet_sets().map(TetSet::block_count);
-        let pieces = blocks.map(|count| count.div_ceil(PIECE)).into_iter();
-        let pieces = pieces.max().unwrap_or(0).max(model.vertex_count().div_ceil(VERTEX_PIECE));
+    pub fn new<S: Real>(model: Option<&Model<S>>) -> Self {
+        let parts = model.map_or(&[][..], |model| &model.parts);
+        let (mut pieces, mut first) = (Vec::new(), vec![0]);
+        for (number, part) in parts.iter().enumerate() {
+            let mut cut = |of, count: usize, size: usize| {
+                let starts = (0..count).step_by(size);
+                let ranges = starts.map(|start| start..(start + size).min(count));
+                pieces.extend(ranges.map(|range| Piece { part: number, of, range }));
+            };
+            cut(PieceOf::Vertices, part.vertices.len(), VERTEX_PIECE);
+            for kind in 0..2 {
+                cut(PieceOf::Blocks(kind), part.block_count(kind), PIECE);
+            }
+            first.push(pieces.len());
+        }
+        pieces.shrink_to_fit();
+        first.shrink_to_fit();
         Self {
-            stored: vec![0.0; model.component_count],
-            energies: vec![S::ZERO; energy_slots(model)],
-            partial: vec![[0.0; 2]; pieces],
+            potentials: vec![Potential::default(); parts.len()],
+            stored: vec![0.0; parts.len()],
+            partial: vec![[0.0; 2]; pieces.len()],
+            pieces,
+            first,
         }
     }
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.stored[..])
-            + size_of_val(&self.energies[..])
+        size_of_val(&self.potentials[..])
+            + size_of_val(&self.stored[..])
+            + size_of_val(&self.pieces[..])
+            + size_of_val(&self.first[..])
             + size_of_val(&self.partial[..])
     }
 
-    /// `Phi` at `x`.
-    pub fn evaluate(
+    /// `Phi` of every part at `x`, into `potentials`.
+    pub fn evaluate_all<S: Real>(
         &mut self,
         ground: &Ground<S>,
         step: &Step<'_, S>,
         x: &[Point<S>],
-    ) -> Potential {
-        let inertia = |range: std::ops::Range<usize>| {
-            let (mut sum, mut reach) = (0.0, 0.0f64);
-            for v in range {
-                let place = x[v].vec3();
-                reach = reach.max(place.length_squared().to_f64());
-                if ground.inverse_masses[v] != S::ZERO {
-                    let away = (place - ground.predicted[v].vec3()).length_squared();
-                    sum += (ground.inertias[v] * away).to_f64();
-                }
-            }
-            [sum, reach]
-        };
-        let work = (x.len(), VERTEX_PIECE);
-        let combine = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1].max(b[1])];
-        let inertia = ground.workers.reduce(work, &mut self.partial, inertia, combine);
-        let [inertia, reach] = inertia.unwrap_or_default();
-
-        self.stored.fill(0.0);
-        let mut squared_noise = 0.0;
-        for (kind, set) in step.model.tet_sets().into_iter().enumerate() {
-            squared_noise += self.add_tets(ground, step, kind, x);
-            if self.stored.len() > 1 {
-                self.add_by_part(step.model, kind, set);
-            }
+    ) {
+        let parts = 0..step.model.parts.len();
+        self.sum_pieces(ground, step, x, parts.clone());
+        for part in parts {
+            self.combine(step, x, part);
         }
-        self.add_single(step, x);
+    }
+
+    /// `Phi` of one part at `x`, of which only its vertices count.
+    pub fn evaluate<S: Real>(
+        &mut self,
+        ground: &Ground<S>,
+        step: &Step<'_, S>,
+        x: &[Point<S>],
+        part: usize,
+    ) -> Potential {
+        self.sum_pieces(ground, step, x, part..part + 1);
+        self.combine(step, x, part);
+        self.potentials[part]
+    }
+
+    /// Pieces of parts in a row.
+    fn sum_pieces<S: Real>(
+        &mut self,
+        ground: &Ground<S>,
+        step: &Step<'_, S>,
+        x: &[Point<S>],
+        parts: Range<usize>,
+    ) {
+        let range = self.first[parts.start]..self.first[parts.end];
+        let pieces = &self.pieces[range.clone()];
+        let partial = Shared::new(&mut self.partial[range]);
+        ground.workers.each(pieces.len(), 1, |range| {
+            for i in range {
+                let sum = pieces[i].sum(ground, step, x);
+                // SAFETY: every piece is worked on once.
+                unsafe { *partial.at(i) = sum };
+            }
+        });
+    }
+
+    /// Adds up the pieces of a part, in order.
+    fn combine<S: Real>(&mut self, step: &Step<'_, S>, x: &[Point<S>], part: usize) {
+        let range = self.first[part]..self.first[part + 1];
+        let of = |of: PieceOf| {
+            let all = self.pieces[range.clone()].iter().zip(&self.partial[range.clone()]);
+            all.filter(move |(piece, _)| piece.of == of).map(|(_, &sum)| sum)
+        };
+        let inertia = of(PieceOf::Vertices).reduce(|a, b| [a[0] + b[0], a[1].max(b[1])]);
+        let [inertia, reach] = inertia.unwrap_or_default();
+        let (mut stored, mut squared_noise) = (0.0, 0.0);
+        for kind in 0..2 {
+            let sums = of(PieceOf::Blocks(kind)).reduce(|a, b| [a[0] + b[0], a[1] + b[1]]);
+            let [energy, squared_force] = sums.unwrap_or_default();
+            stored += energy;
+            squared_noise += squared_force;
+        }
+        add_single_energies(&mut stored, step, x, &step.model.parts[part]);
         let squared = step.dt * step.dt;
-        let value = 0.5 * inertia + squared * self.stored.iter().sum::<f64>();
+        let value = 0.5 * inertia + squared * stored;
         let noise = squared * S::EPSILON * (reach * squared_noise).sqrt();
+        self.stored[part] = stored;
         // Rounding has no direction: squares add up. Two evaluations are compared, each of which has
         // also its own arithmetic's round-off, of the same size.
-        Potential { value, noise: 4.0 * noise + 8.0 * f64::EPSILON * value.abs() }
+        let noise = 4.0 * noise + 8.0 * f64::EPSILON * value.abs();
+        self.potentials[part] = Potential { value, noise };
     }
+}
 
-    /// Adds the energies of a set where there is one part; returns the sum of squared forces.
-    fn add_tets(
-        &mut self,
-        ground: &Ground<S>,
-        step: &Step<'_, S>,
-        kind: usize,
-        x: &[Point<S>],
-    ) -> f64 {
-        let model = step.model;
-        let set = model.tet_sets()[kind];
-        let first = if kind == 0 { 0 } else { LANES * model.green_strain.block_count() };
-        let energies = Shared::new(&mut self.energies);
-        let map = |blocks| {
-            let sums = Sums {
-                x,
-                start_strain: &ground.start_strain[kind],
-                dt: step.dt,
-                energies: (energies.len() > 0).then_some((&energies, first)),
-                energy: Cell::default(),
-                squared_force: Cell::default(),
-            };
-            with_law!(set, NEO, VISCOUS => {
-                ground.workers.piece(model, set, blocks, &OfLaw::<_, NEO, VISCOUS>(&sums));
-            });
-            [sums.energy, sums.squared_force].map(|lanes| lanes.get().iter().sum())
-        };
-        let work = (set.block_count(), PIECE);
-        let combine = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
-        let sums = ground.workers.reduce(work, &mut self.partial, map, combine);
-        let [energy, squared_force] = sums.unwrap_or_default();
-        if let [only] = &mut self.stored[..] {
-            *only += energy;
-        }
-        squared_force
-    }
-
-    /// Adds the energies of a set to the parts of the model, one by one.
-    fn add_by_part(&mut self, model: &Model<S>, kind: usize, set: &TetSet<S>) {
-        let first = if kind == 0 { 0 } else { model.green_strain.block_count() };
-        for (block, lane) in set.places() {
-            let part = model.component_of[set.blocks[block].vertices[0][lane] as usize];
-            self.stored[part as usize] += self.energies[LANES * (first + block) + lane].to_f64();
+impl Piece {
+    /// Twice the inertia's part of `Phi` and the largest squared distance from the origin, or energies [J] and
+    /// squared forces [N^2].
+    fn sum<S: Real>(&self, ground: &Ground<S>, step: &Step<'_, S>, x: &[Point<S>]) -> [f64; 2] {
+        let part = &step.model.parts[self.part];
+        let Range { start, end } = self.range;
+        match self.of {
+            PieceOf::Vertices => {
+                let first = part.vertices.start;
+                inertia(ground, x, first + start..first + end)
+            }
+            PieceOf::Blocks(kind) => {
+                let set = step.model.tet_sets()[kind];
+                let sums = Sums {
+                    x,
+                    start_strain: &ground.start_strain[kind],
+                    dt: step.dt,
+                    energy: Cell::default(),
+                    squared_force: Cell::default(),
+                };
+                let mut before = 0;
+                for blocks in part.blocks(kind) {
+                    let chosen = start.max(before)..end.min(before + blocks.len());
+                    if !chosen.is_empty() {
+                        let first = blocks.start - before;
+                        let blocks = first + chosen.start..first + chosen.end;
+                        with_law!(set, NEO, VISCOUS => {
+                            let pass = OfLaw::<_, NEO, VISCOUS>(&sums);
+                            ground.workers.piece(step.model, set, blocks, &pass);
+                        });
+                    }
+                    before += blocks.len();
+                }
+                [sums.energy, sums.squared_force].map(|lanes| lanes.get().iter().sum())
+            }
         }
     }
+}
 
-    fn add_single(&mut self, step: &Step<'_, S>, x: &[Point<S>]) {
-        let model = step.model;
-        let mut store = |v: usize, energy: S| {
-            self.stored[model.component_of[v] as usize] += energy.to_f64();
-        };
-        let springs = &model.springs;
-        for (i, ends) in springs.vertices.iter().enumerate() {
-            let ends = ends.map(|v| model.numbering.of(v));
-            let places = ends.map(|v| x[v].vec3());
-            store(ends[0], spring::energy(&places, springs.rest_length[i], springs.stiffness[i]));
+fn inertia<S: Real>(ground: &Ground<S>, x: &[Point<S>], vertices: Range<usize>) -> [f64; 2] {
+    let (mut sum, mut reach) = (0.0, 0.0f64);
+    for v in vertices {
+        let place = x[v].vec3();
+        reach = reach.max(place.length_squared().to_f64());
+        if ground.inverse_masses[v] != S::ZERO {
+            let away = (place - ground.predicted[v].vec3()).length_squared();
+            sum += (ground.inertias[v] * away).to_f64();
         }
-        let attachments = &model.attachments;
-        let anchors = step.inputs.anchors_of(model);
-        for (i, &v) in attachments.vertices.iter().enumerate() {
-            let v = model.numbering.of(v);
-            let anchor = anchors[attachments.order[i] as usize];
-            store(v, attachment::energy(x[v].vec3(), anchor, attachments.stiffness[i]));
-        }
+    }
+    [sum, reach]
+}
+
+/// Adds the energies [J] of a part's springs and attachments.
+fn add_single_energies<S: Real>(sum: &mut f64, step: &Step<'_, S>, x: &[Point<S>], part: &Part) {
+    let model = step.model;
+    let springs = &model.springs;
+    for i in part.springs() {
+        let places = springs.vertices[i].map(|v| x[model.numbering.of(v)].vec3());
+        *sum += spring::energy(&places, springs.rest_length[i], springs.stiffness[i]).to_f64();
+    }
+    let attachments = &model.attachments;
+    let anchors = step.inputs.anchors_of(model);
+    for i in part.attachments() {
+        let place = x[model.numbering.of(attachments.vertices[i])].vec3();
+        let anchor = anchors[attachments.order[i] as usize];
+        *sum += attachment::energy(place, anchor, attachments.stiffness[i]).to_f64();
     }
 }
 
@@ -313,8 +273,6 @@ struct Sums<'a, S> {
     x: &'a [Point<S>],
     start_strain: &'a [[Eight<S>; 6]],
     dt: f64,
-    /// Where each tetrahedron's energy goes, and the place of the set's first.
-    energies: Option<(&'a Shared<'a, S>, usize)>,
     energy: Cell<Eight<f64>>,
     squared_force: Cell<Eight<f64>>,
 }
@@ -340,7 +298,7 @@ impl<S: Real, const NEO: bool, const VISCOUS: bool> TetPass<S>
         volume.store(&mut volumes, tets.lane);
         let (mut energies, mut forces) = (sums.energy.get(), sums.squared_force.get());
         let lanes = tets.lane..tets.lane + L::WIDTH;
-        for lane in lanes.clone() {
+        for lane in lanes {
             // Selected, not multiplied by zero: energies may be infinite.
             let counts = lane < tets.filled();
             let volume = volumes[lane].to_f64();
@@ -350,12 +308,6 @@ impl<S: Real, const NEO: bool, const VISCOUS: bool> TetPass<S>
         }
         sums.energy.set(energies);
         sums.squared_force.set(forces);
-        if let Some((all, first)) = sums.energies {
-            let at = first + LANES * tets.index;
-            // SAFETY: every tetrahedron has a place of its own and is worked on once.
-            let places = unsafe { all.range(at + lanes.start..at + lanes.end) };
-            places.copy_from_slice(&energy[lanes]);
-        }
     }
 }
 
@@ -371,7 +323,7 @@ fn respond<S: Real, L: Lanes<Real = S>, const NEO: bool, const VISCOUS: bool>(
     let law =
         if NEO { MaterialModel::StableNeoHookean } else { MaterialModel::SaintVenantKirchhoff };
     let tissue = Tissue::new(law, &tets.material(), dt);
-    let response = if VISCOUS {
+    let response = if VISCOUS && tets.is_viscous() {
         let start: Voigt<L> = load_rows(start_strain[tets.index].as_flattened(), tets.lane);
         tissue.respond(&f, Some(&start))
     } else {
@@ -380,31 +332,34 @@ fn respond<S: Real, L: Lanes<Real = S>, const NEO: bool, const VISCOUS: bool>(
     (f, tissue, response)
 }
 
-/// Per copy `dt^2` times the force of its elements, and the bound of their curvature: the gradient of
+/// Per copy of a part `dt^2` times the force of its elements, and the bound of their curvature: the gradient of
 /// `Phi` without inertia, in the places that the rebase uses as well. Without `BOUND` the bounds are
 /// zero.
 pub(super) fn load_forces<S: Real, const BOUND: bool>(
     ground: &Ground<S>,
     step: &Step<'_, S>,
+    part: &Part,
     x: &[Point<S>],
     loads: &mut [Point<S>],
 ) {
     let model = step.model;
-    loads.fill(Point::default());
-    for color in 0..model.color_count {
+    loads[part.copies.clone()].fill(Point::default());
+    for color in &part.colors {
         let shared = Shared::new(loads);
-        for (set, start_strain) in model.tet_sets().into_iter().zip(&ground.start_strain) {
+        for (kind, set) in model.tet_sets().into_iter().enumerate() {
+            let blocks = color.blocks[kind].start as usize..color.blocks[kind].end as usize;
+            let start_strain = &ground.start_strain[kind];
             let forces = Forces::<_, BOUND> { x, start_strain, dt: step.dt, loads: &shared };
             with_law!(set, NEO, VISCOUS => {
                 let pass = OfLaw::<_, NEO, VISCOUS>(&forces);
-                ground.workers.pass(model, set, set.color(color), &pass);
+                ground.workers.pass(model, set, blocks, &pass);
             });
         }
     }
     let squared = S::from_f64(step.dt * step.dt);
     let springs = &model.springs;
-    for (i, ends) in springs.vertices.iter().enumerate() {
-        let ends = ends.map(|v| x[model.numbering.of(v)].vec3());
+    for i in part.springs() {
+        let ends = springs.vertices[i].map(|v| x[model.numbering.of(v)].vec3());
         let forces = spring::forces(&ends, springs.rest_length[i], springs.stiffness[i]);
         let mass_bound = squared * springs.stiffness[i];
         for (copy, force) in springs.copies[i].into_iter().zip(forces) {
@@ -413,10 +368,11 @@ pub(super) fn load_forces<S: Real, const BOUND: bool>(
     }
     let attachments = &model.attachments;
     let anchors = step.inputs.anchors_of(model);
-    for (i, &v) in attachments.vertices.iter().enumerate() {
+    for i in part.attachments() {
         let stiffness = attachments.stiffness[i];
         let anchor = anchors[attachments.order[i] as usize];
-        let force = attachment::force(x[model.numbering.of(v)].vec3(), anchor, stiffness);
+        let place = x[model.numbering.of(attachments.vertices[i])].vec3();
+        let force = attachment::force(place, anchor, stiffness);
         let load = CornerLoad { impulse: force * squared, mass_bound: squared * stiffness };
         add_load(loads, attachments.copies[i], &load);
     }
@@ -450,17 +406,22 @@ impl<S: Real, const BOUND: bool, const NEO: bool, const VISCOUS: bool> TetPass<S
     }
 }
 
-/// Green strain at `x` of the tetrahedra of a viscous set.
+/// Green strain at `x` of the tetrahedra of viscous sets, of all or of one part.
 pub(super) fn measure_strain<S: Real>(
     workers: &super::threads::Workers,
     model: &Model<S>,
+    part: Option<&Part>,
     x: &[Point<S>],
     start_strain: &mut StartStrain<S>,
 ) {
-    for (set, strains) in model.tet_sets().into_iter().zip(start_strain) {
+    for (kind, (set, strains)) in model.tet_sets().into_iter().zip(start_strain).enumerate() {
         let pass = Strain { x, strains: Shared::new(strains) };
-        if set.viscous {
-            workers.pass(model, set, 0..set.block_count(), &pass);
+        match part {
+            _ if !set.viscous => {}
+            None => workers.pass(model, set, 0..set.block_count(), &pass),
+            Some(part) => {
+                part.blocks(kind).for_each(|blocks| workers.pass(model, set, blocks, &pass));
+            }
         }
     }
 }

@@ -38,8 +38,8 @@ pub(super) fn carry_out<S: Real>(
                 model.downcast_ref(),
                 inputs.downcast_ref(),
             ) {
-                let Step { dt, settings, small_steps, .. } = *step;
-                let step = Step { model, inputs, dt, settings, small_steps };
+                let Step { dt, settings, .. } = *step;
+                let step = Step { model, inputs, dt, settings };
                 return $carry_out(task, work, &step, state);
             }
         };

@@ -129,6 +129,9 @@ struct Viscous<'a, S> {
 impl<S: Real> TetPass<S> for Viscous<'_, S> {
     #[inline(always)]
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        if !tets.is_viscous() {
+            return;
+        }
         let material = tets.material::<L>();
         // SAFETY: constraints of one colour share no copy, and every block is worked on once.
         let corners = unsafe { tets.copies::<L>(&self.sweep.points) };

@@ -46,6 +46,12 @@ impl<'a, S: Real> Block<'a, S> {
         self.set.filled[self.index] as usize
     }
 
+    /// Whether its tetrahedra have viscous constraints.
+    #[inline(always)]
+    pub fn is_viscous(&self) -> bool {
+        self.set.is_viscous(self.index)
+    }
+
     /// Whether all lanes that are worked on count.
     #[inline(always)]
     fn whole<L: Lanes>(&self) -> bool {

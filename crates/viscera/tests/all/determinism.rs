@@ -123,7 +123,7 @@ fn several_parts(settings: &SolverSettings) -> Model<f32> {
         builder.add_attachment(2 * half + v, anchor, 30.0).expect("an attachment");
     }
     let model = builder.build(settings).expect("a model");
-    assert_eq!(model.component_count, 3);
+    assert_eq!(model.part_count(), 3);
     model
 }
 

@@ -1,7 +1,7 @@
 //! Whole scenes on a graphics processor: the same answers as on the CPU, and the same bits from run to
 //! run. A software driver does; without any the tests fail and say what to install.
 
-use crate::common::device::{device, everything};
+use crate::common::device::{device, device_within, everything};
 use crate::common::{STVK, block, material};
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
@@ -9,7 +9,7 @@ use viscera::settings::{
     Acceleration, AndersonGuard, AndersonOn, Colors, NeoHookean, Precision, RelaxationForm,
     SolverSettings,
 };
-use viscera::solver::gpu::{Adapter, Device, GpuSolver, baseline};
+use viscera::solver::gpu::{Device, GpuSolver, baseline};
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
@@ -36,9 +36,22 @@ fn distance(a: &[Vec3<f32>], b: &[Vec3<f64>]) -> f64 {
     (squares.sum::<f64>() / a.len() as f64).sqrt()
 }
 
+/// How much is computed: a motion for each gravity [m/s^2] aside, so many steps, and how far things move at
+/// least [m], on average.
+#[derive(Clone, Copy)]
+struct Length {
+    tilts: &'static [f64],
+    steps: u32,
+    moved: f64,
+}
+
+const BRIEF: Length = Length { tilts: &[3.0], steps: 3, moved: 1e-5 };
+const LONG: Length = Length { tilts: &[0.0, 3.0, -6.0], steps: 30, moved: 1e-3 };
+
 /// Distances [m] from the f64 run, added up over moments of three motions: the CPU's and the GPU's; and
 /// how far things have moved.
-fn distances(device: &Device, settings: &SolverSettings, steps: u32) -> [f64; 3] {
+fn distances(device: &Device, settings: &SolverSettings, length: Length) -> [f64; 3] {
+    let Length { tilts, steps, .. } = length;
     let (model32, model64) = (everything(settings), everything(settings));
     let double = SolverSettings { precision: Precision::F64, ..settings.clone() };
     let mut cpu = Solver::<f32>::new(&model32, settings);
@@ -46,7 +59,7 @@ fn distances(device: &Device, settings: &SolverSettings, steps: u32) -> [f64; 3]
     let mut gpu = GpuSolver::new(device, &model32, settings).expect("a model that fits");
     let rest = State::<f64>::at_rest(&model64);
     let mut sums = [0.0; 3];
-    for tilt in [0.0, 3.0, -6.0] {
+    for &tilt in tilts {
         let (mut x32, mut x64) = (State::at_rest(&model32), State::at_rest(&model64));
         gpu.write(&model32, &x32).expect("a state that fits");
         let mut read = State::at_rest(&model32);
@@ -66,26 +79,25 @@ fn distances(device: &Device, settings: &SolverSettings, steps: u32) -> [f64; 3]
             }
         }
     }
-    sums.map(|sum| sum / 9.0)
+    sums.map(|sum| sum / (3 * tilts.len()) as f64)
 }
 
 /// Two runs in single precision differ by their round-off, which has no reason to be the same: the device
 /// may be as far from the run in double precision as the CPU is, and as much again. Where the CPU is
 /// lucky, round-off of the places themselves, which are a tenth of a metre from the origin, stays.
-fn assert_agreement(name: &str, settings: &SolverSettings, steps: u32) {
-    let [cpu, gpu, moved] = distances(device(), settings, steps);
+fn assert_agreement(name: &str, settings: &SolverSettings, length: Length) {
+    let [cpu, gpu, moved] = distances(device(), settings, length);
     println!(
         "{name}, {:?}: CPU {cpu:.2e} m, GPU {gpu:.2e} m, moved {moved:.2e} m",
         settings.colors
     );
     let floor = 0.1 * f64::from(f32::EPSILON);
-    assert!(moved > 1e-3, "{name}: nothing moves");
+    assert!(moved > length.moved, "{name}: nothing moves");
     assert!(gpu <= 2.0 * cpu.max(floor), "{name}: {settings:?}");
 }
 
 /// Exact at rest, as published, every form, over-relaxed; coloured, cliques, Jacobi.
-#[test]
-fn sweeps_agree_with_the_cpu() {
+fn assert_sweeps_agree(length: impl Fn(&str) -> Length) {
     let plain = SolverSettings { step_guard: false, iterations: 3, ..SolverSettings::default() };
     let published = SolverSettings { rebase: false, keep_multipliers: false, ..plain.clone() };
     let pair = SolverSettings { neo_hookean: NeoHookean::Pair, ..plain.clone() };
@@ -98,10 +110,23 @@ fn sweeps_agree_with_the_cpu() {
         let all =
             [("exact", &plain), ("published", &published), ("pair", &pair), ("relaxed", &relaxed)];
         for (name, settings) in all {
-            let steps = if ["exact", "published"].contains(&name) { 120 } else { 30 };
-            assert_agreement(name, &SolverSettings { colors, ..settings.clone() }, steps);
+            assert_agreement(name, &SolverSettings { colors, ..settings.clone() }, length(name));
         }
     }
+}
+
+#[test]
+fn sweeps_agree_with_the_cpu() {
+    assert_sweeps_agree(|_| BRIEF);
+}
+
+#[test]
+#[ignore = "slow: hundreds of steps in twelve ways"]
+fn sweeps_agree_with_the_cpu_at_length() {
+    assert_sweeps_agree(|name| {
+        let steps = if ["exact", "published"].contains(&name) { 120 } else { 30 };
+        Length { steps, ..LONG }
+    });
 }
 
 /// A few steps of everything at once, for a second, slower driver.
@@ -113,16 +138,17 @@ fn portable_steps_agree_with_the_cpu() {
         acceleration: Acceleration::Anderson,
         ..SolverSettings::default()
     };
+    let length = Length { tilts: LONG.tilts, ..BRIEF };
     for colors in [Colors::Limited(4), Colors::Limited(1)] {
         let [cpu, gpu, moved] =
-            distances(device(), &SolverSettings { colors, ..settings.clone() }, 3);
+            distances(device(), &SolverSettings { colors, ..settings.clone() }, length);
         println!("{colors:?}: CPU {cpu:.2e} m, GPU {gpu:.2e} m, moved {moved:.2e} m");
         assert!(moved > 1e-5 && gpu <= 2.0 * cpu.max(0.1 * f64::from(f32::EPSILON)), "{colors:?}");
     }
 }
 
-#[test]
-fn accelerations_agree_with_the_cpu() {
+/// Every acceleration by itself, as long as told by its name, with one colour and with many.
+fn assert_accelerations_agree(length: impl Fn(&str, Colors) -> Option<Length>) {
     let plain = SolverSettings { step_guard: false, iterations: 8, ..SolverSettings::default() };
     let anderson = SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() };
     let chebyshev = SolverSettings {
@@ -145,9 +171,26 @@ fn accelerations_agree_with_the_cpu() {
             ("Anderson on multipliers", on(AndersonOn::Multipliers)),
             ("Anderson on positions", on(AndersonOn::Positions)),
         ] {
-            assert_agreement(name, &SolverSettings { colors, ..settings }, 30);
+            if let Some(length) = length(name, colors) {
+                assert_agreement(name, &SolverSettings { colors, ..settings }, length);
+            }
         }
     }
+}
+
+#[test]
+fn accelerations_agree_with_the_cpu() {
+    assert_accelerations_agree(|name, colors| match colors {
+        // Shares of differences that are all but parallel have luck of their own: more moments.
+        Colors::Limited(_) => Some(Length { tilts: LONG.tilts, ..BRIEF }),
+        Colors::Unlimited => ["Chebyshev", "Anderson"].contains(&name).then_some(BRIEF),
+    });
+}
+
+#[test]
+#[ignore = "slow: ninety steps in ten ways"]
+fn accelerations_agree_with_the_cpu_at_length() {
+    assert_accelerations_agree(|_, _| Some(LONG));
 }
 
 /// The bits of everything that moves after some steps.
@@ -162,9 +205,8 @@ fn bits(model: &Model<f32>, gpu: &mut GpuSolver, steps: u32) -> Vec<u32> {
     vectors.chain(state.multipliers).map(f32::to_bits).collect()
 }
 
-/// Ten runs, also after another scene ran and on memory that was used before.
-#[test]
-fn a_device_gives_the_same_bits_again() {
+/// Some runs, also after another scene ran and on memory that was used before.
+fn assert_same_bits_again(runs: usize, steps: u32) {
     let settings = SolverSettings {
         colors: Colors::Limited(4),
         acceleration: Acceleration::Anderson,
@@ -178,17 +220,28 @@ fn a_device_gives_the_same_bits_again() {
         };
         bits(&model, &mut gpu.expect("a model that fits"), steps)
     };
-    let first = run(None, 300);
+    let first = run(None, steps);
     let other = SolverSettings::default();
     let other_model = everything(&other);
     let mut another = GpuSolver::new(device(), &other_model, &other).expect("a model that fits");
-    for again in 0..9 {
-        if again == 4 {
-            bits(&other_model, &mut another, 20);
+    for again in 1..runs {
+        if again == runs / 2 {
+            bits(&other_model, &mut another, 1 + steps / 15);
         }
         let left_over = [None, Some(f32::NAN), Some(1e9)][again % 3];
-        assert_eq!(run(left_over, 300), first, "run {again}, memory held {left_over:?}");
+        assert_eq!(run(left_over, steps), first, "run {again}, memory held {left_over:?}");
     }
+}
+
+#[test]
+fn a_device_gives_the_same_bits_again() {
+    assert_same_bits_again(3, 5);
+}
+
+#[test]
+#[ignore = "slow: ten runs of three hundred steps"]
+fn a_device_gives_the_same_bits_again_at_length() {
+    assert_same_bits_again(10, 300);
 }
 
 /// Published order, no rebase: what the device is asked to do in one iteration.
@@ -231,13 +284,12 @@ fn iterations_can_be_set_from_step_to_step() {
 }
 
 /// Frames come while steps go on; none is older than the one before it.
-#[test]
-fn frames_arrive_without_waiting() {
+fn assert_frames_arrive(steps: u32) {
     let settings = SolverSettings::default();
     let (model, double) = (everything(&settings), everything(&settings));
     let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
     let (mut seen, mut refused) = (Vec::new(), 0);
-    for step in 0..200 {
+    for step in 0..steps {
         gpu.step(&model, &inputs_at(&double, step), DT).expect("a legal step");
         refused += u64::from(gpu.request().is_none());
         seen.extend(gpu.newest(&model).map(|frame| frame.number));
@@ -248,19 +300,33 @@ fn frames_arrive_without_waiting() {
     let places = last.as_ref().map(|frame| frame.positions.clone());
     seen.extend(last.map(|frame| frame.number));
     assert!(seen.is_sorted_by(|a, b| a < b), "{seen:?}");
-    assert_eq!(seen.last(), Some(&(200 - refused)), "the last request has been answered");
+    assert_eq!(
+        seen.last(),
+        Some(&(u64::from(steps) - refused)),
+        "the last request has been answered"
+    );
     if let (Some(places), 0) = (places, refused) {
         assert_eq!(places, state.positions);
     }
+}
+
+#[test]
+fn frames_arrive_without_waiting() {
+    assert_frames_arrive(12);
+}
+
+#[test]
+#[ignore = "slow: two hundred steps"]
+fn frames_arrive_without_waiting_at_length() {
+    assert_frames_arrive(200);
 }
 
 /// A window's device that was opened with less than the baseline is refused, not met with a panic.
 #[test]
 fn a_device_below_the_baseline_is_refused() {
     let settings = SolverSettings::default();
-    let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
-    let limits = wgpu::Limits { max_storage_buffers_per_shader_stage: 4, ..baseline() };
-    let weak = adapter.open_with(limits).expect("a device");
+    let weak =
+        device_within(wgpu::Limits { max_storage_buffers_per_shader_stage: 4, ..baseline() });
     let error = GpuSolver::new(&weak, &everything(&settings), &settings).expect_err("too weak");
     let text = error.to_string();
     assert!(text.contains("4 where 8 is needed") && text.contains("cpu"), "{text}");
@@ -270,9 +336,8 @@ fn a_device_below_the_baseline_is_refused() {
 #[test]
 fn a_model_over_the_limits_is_refused() {
     let settings = SolverSettings::default();
-    let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
     let limits = wgpu::Limits { max_storage_buffer_binding_size: 1 << 13, ..baseline() };
-    let small = adapter.open_with(limits).expect("a device");
+    let small = device_within(limits);
     let error = GpuSolver::new(&small, &everything(&settings), &settings).expect_err("too large");
     let text = error.to_string();
     println!("{text}");
@@ -280,9 +345,8 @@ fn a_model_over_the_limits_is_refused() {
 }
 
 /// A step begun by the CPU and ended by the device, for every stage that it may change hands at.
-#[test]
-fn a_step_changes_hands_at_any_stage() {
-    let guarded = SolverSettings { iterations: 3, ..SolverSettings::default() };
+fn assert_hands_change(iterations: u32, before: u32) {
+    let guarded = SolverSettings { iterations, ..SolverSettings::default() };
     let plain = SolverSettings { step_guard: false, ..guarded.clone() };
     let anderson = SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() };
     let mut hands = 0;
@@ -297,10 +361,10 @@ fn a_step_changes_hands_at_any_stage() {
         let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
         // Something is under way when the step begins.
         let mut start = State::at_rest(&model);
-        for step in 0..5 {
+        for step in 0..before {
             cpu.step(&model, &mut start, &inputs_at(&double, step), DT).expect("a legal step");
         }
-        let inputs = inputs_at(&double, 5);
+        let inputs = inputs_at(&double, before);
         let mut whole = start.clone();
         cpu.step(&model, &mut whole, &inputs, DT).expect("a legal step");
         let moved = whole.positions.iter().zip(&start.positions);
@@ -322,6 +386,17 @@ fn a_step_changes_hands_at_any_stage() {
         }
     }
     assert!(hands > 20, "{hands}");
+}
+
+#[test]
+fn a_step_changes_hands_at_any_stage() {
+    assert_hands_change(1, 5);
+}
+
+#[test]
+#[ignore = "slow: three iterations at every stage"]
+fn a_step_changes_hands_at_any_stage_at_length() {
+    assert_hands_change(3, 5);
 }
 
 /// Another model than the solver's is an error, whatever is asked, and nothing panics.

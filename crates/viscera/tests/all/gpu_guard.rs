@@ -117,7 +117,7 @@ fn many_parts<S: Real>(settings: &SolverSettings) -> (Model<S>, Vec<Vec3<f64>>) 
         builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
     }
     let model = builder.build(settings).expect("a model");
-    assert_eq!(model.component_count, 3);
+    assert_eq!(model.part_count(), 3);
     (model, places)
 }
 
@@ -137,8 +137,7 @@ fn walls(places: &[Vec3<f64>], step: u32) -> Inputs<f64> {
 }
 
 /// In quiet motion the device strays from double precision by round-off alone, as the CPU does.
-#[test]
-fn quiet_motion_agrees_with_the_cpu() {
+fn assert_quiet_motion_agrees(steps: u32) {
     let device = device();
     let plain = SolverSettings::default();
     let anderson =
@@ -153,7 +152,7 @@ fn quiet_motion_agrees_with_the_cpu() {
         let (model64, _) = many_parts::<f64>(&settings);
         let mut trio = Trio::new(device, (&model32, &model64), &settings);
         let mut slowed = [0, 0];
-        for step in 0..30 {
+        for step in 0..steps {
             trio.step(&walls(&places, step));
             let reports = [trio.oracle.last_step().expect("a guarded step"), trio.report()];
             for (slowed, report) in slowed.iter_mut().zip(reports) {
@@ -165,7 +164,8 @@ fn quiet_motion_agrees_with_the_cpu() {
             "{name}: rejected {} and {rejected}, slowed {slowed:?}",
             trio.oracle.rejected_steps()
         );
-        assert_eq!(rejected, trio.oracle.rejected_steps(), "{name}");
+        // The device judges all parts together: one may make up for another.
+        assert!(rejected <= trio.oracle.rejected_steps(), "{name}");
         for (number, body) in model32.bodies.iter().enumerate() {
             let [cpu, gpu] = trio.distances(body.vertices.start as u32..body.vertices.end as u32);
             println!(
@@ -176,10 +176,21 @@ fn quiet_motion_agrees_with_the_cpu() {
     }
 }
 
-/// Vertices jump at once to places up to two body lengths away and are let go: steps are taken back, no
-/// step ends above its limit, and the body comes to rest where it does in double precision.
 #[test]
-fn violent_grabs_are_taken_back() {
+fn quiet_motion_agrees_with_the_cpu() {
+    assert_quiet_motion_agrees(4);
+}
+
+#[test]
+#[ignore = "slow: thirty steps in four ways"]
+fn quiet_motion_agrees_with_the_cpu_at_length() {
+    assert_quiet_motion_agrees(30);
+}
+
+/// Vertices jump at once to places up to two body lengths away and are let go: steps are taken back, no
+/// step ends above its limit, and with many of them the body comes to rest where it does in double
+/// precision.
+fn assert_grabs_are_taken_back(steps: u32, comes_to_rest: bool) {
     let device = device();
     let size = [0.06, 0.03, 0.03];
     let mesh = block(size, [3, 2, 2], 0.2);
@@ -214,7 +225,7 @@ fn violent_grabs_are_taken_back() {
             inputs.pins.push(Pin { vertex: vertex as u32, target });
         }
         let mut above = [0, 0];
-        for step in 0..800 {
+        for step in 0..steps {
             trio.step(if step < 20 { &inputs } else { &held });
             let reports = [trio.cpu.last_step().expect("a guarded step"), trio.report()];
             for (above, report) in above.iter_mut().zip(reports) {
@@ -234,8 +245,20 @@ fn violent_grabs_are_taken_back() {
         assert_eq!(rejected.map(|count| count > 0), [is_rejected; 2], "seed {seed}: {rejected:?}");
         // Both come closer still with more steps; sweeps of one colour are the slowest. Another rest,
         // with tetrahedra turned inside out, would be millimetres away.
-        assert!(cpu < 2e-5 && gpu < 2e-5, "seed {seed}: {cpu} and {gpu}");
+        let is_near = cpu < 2e-5 && gpu < 2e-5;
+        assert!(is_near || !comes_to_rest, "seed {seed}: {cpu} and {gpu}");
     }
+}
+
+#[test]
+fn violent_grabs_are_taken_back() {
+    assert_grabs_are_taken_back(24, false);
+}
+
+#[test]
+#[ignore = "slow: eight hundred steps to rest in three ways"]
+fn violent_grabs_are_taken_back_at_length() {
+    assert_grabs_are_taken_back(800, true);
 }
 
 /// A bar of a few tetrahedra whose vertices jump, for a second, slower driver: steps are taken back where the
@@ -285,22 +308,28 @@ fn portable_limit_that_is_no_number_lets_nothing_pass() {
     let mut builder = ModelBuilder::new();
     builder.add_body(&mesh, &material(STVK, 1e4, 0.3)).expect("a body");
     builder.add_body(&mesh, &material(SNH, 1e4, 0.3)).expect("a body");
+    // One part, whose energies are added up.
+    builder.add_spring([0, count as u32], 1e-9, None).expect("a spring");
     let model = builder.build::<f32>(&settings).expect("a model");
-    // The first body so large that its energy overflows, also where it is going to: an infinite limit.
-    let mut state = State::at_rest(&model);
-    state.positions[..count].iter_mut().for_each(|x| *x = *x * 2e9);
-    // The second is to be pulled apart so far that its volumes overflow, with either sign.
+    // The first body so large that its energy overflows, also where it is going to: an infinite limit. So is
+    // the second at last, and it is to be pulled apart so far that its volumes overflow, with either sign.
     let mut random = Random(1);
     let pulls = (0..count).map(|v| ((count + v) as u32, random.vector(3e18).cast()));
     let pulls = pulls.collect::<Vec<_>>();
     for (forces, limit_is_number) in [(vec![], true), (pulls, false)] {
+        let mut state = State::at_rest(&model);
+        let large = if limit_is_number { count } else { 2 * count };
+        state.positions[..large].iter_mut().for_each(|x| *x = *x * 2e9);
         let inputs = Inputs { forces, ..Inputs::default() };
         let mut cpu = Solver::new(&model, &settings);
         let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
         gpu.write(&model, &state).expect("a state that fits");
         cpu.step(&model, &mut state.clone(), &inputs, DT).expect("a legal step");
         gpu.step(&model, &inputs, DT).expect("a legal step");
-        let (cpu, gpu) = (cpu.last_step().expect("a guarded step"), gpu.last_step());
+        // Of the part that has such a limit.
+        let mut parts = cpu.part_reports().iter().rev();
+        let cpu = *parts.find(|part| !part.limit.is_finite()).expect("such a limit");
+        let gpu = gpu.last_step();
         let gpu = gpu.expect("a device").expect("a guarded step");
         println!("{cpu:?}, {gpu:?}");
         for report in [cpu, gpu] {
@@ -326,10 +355,9 @@ fn mechanical_energy(model: &Model<f32>, state: &State<f32>, inputs: &Inputs<f32
 }
 
 /// Stiff tissue, swinging on a wall: what kept multipliers would push on is taken away.
-#[test]
-fn no_step_gains_mechanical_energy() {
+fn assert_no_step_gains_energy(cells: [usize; 3], steps: u32) {
     let device = device();
-    let mesh = block([0.08, 0.02, 0.02], [12, 3, 3], 0.2);
+    let mesh = block([0.08, 0.02, 0.02], cells, 0.2);
     let mut inputs = Inputs { gravity: GRAVITY.cast(), ..Inputs::default() };
     for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
         inputs.pins.push(Pin { vertex: v as u32, target: x.cast() });
@@ -342,7 +370,7 @@ fn no_step_gains_mechanical_energy() {
         let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
         let mut state = State::at_rest(&model);
         let mut before = mechanical_energy(&model, &state, &inputs);
-        for _ in 0..150 {
+        for _ in 0..steps {
             gpu.step(&model, &inputs, DT).expect("a legal step");
             gpu.read(&model, &mut state).expect("a device");
             let after = mechanical_energy(&model, &state, &inputs);
@@ -354,9 +382,20 @@ fn no_step_gains_mechanical_energy() {
             before = after;
         }
     }
-    println!("{grown:?} of 150 steps gain energy, guarded and not; noise {noise:e} J");
+    println!("{grown:?} of {steps} steps gain energy, guarded and not; noise {noise:e} J");
     assert_eq!(grown[0], 0);
     assert!(grown[1] > 0, "the guard makes no difference");
+}
+
+#[test]
+fn no_step_gains_mechanical_energy() {
+    assert_no_step_gains_energy([6, 2, 2], 30);
+}
+
+#[test]
+#[ignore = "slow: a long bar over half a swing"]
+fn no_step_gains_mechanical_energy_at_length() {
+    assert_no_step_gains_energy([12, 3, 3], 150);
 }
 
 /// Sums have a fixed order: the same bits in two runs.

@@ -10,7 +10,7 @@ use viscera::mesh::{SurfaceMesh, TetMesh};
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::SolverSettings;
-use viscera::solver::gpu::{Adapter, Device, GpuError, GpuSolver, GpuSurface, Skin};
+use viscera::solver::gpu::{Device, GpuError, GpuSolver, GpuSurface, Skin};
 use viscera::solver::{Inputs, Pin};
 use viscera::state::State;
 
@@ -194,8 +194,7 @@ fn color() -> @location(0) vec4f {
 #[test]
 fn a_window_s_own_device_draws_the_surface() {
     // As a window would: its own instance, adapter and device.
-    let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
-    let opened = adapter.open().expect("a device");
+    let opened = device::own_device();
     let (wgpu, queue) = opened.wgpu();
     let device = Device::from_wgpu(wgpu.clone(), queue.clone(), "the window's".into());
     let bodies = bodies();

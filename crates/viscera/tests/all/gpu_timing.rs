@@ -1,20 +1,16 @@
 //! Steps that are timed are the steps that are not, and what is told of them fits together. Times
 //! themselves are not judged. Needs a graphics adapter, for which a software driver does.
 
+use crate::common::device::device;
 use crate::common::{STVK, block, material};
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::vec3;
 use viscera::settings::{Acceleration, Colors, Method, SolverSettings};
 use viscera::solver::Inputs;
-use viscera::solver::gpu::{Adapter, Device, GpuSolver, MemoryCopy, StepPart};
+use viscera::solver::gpu::{GpuSolver, MemoryCopy, StepPart};
 use viscera::state::State;
 
 const DT: f64 = 1.0 / 600.0;
-
-fn device() -> Device {
-    let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
-    adapter.open().unwrap_or_else(|error| panic!("{error}"))
-}
 
 fn bar(settings: &SolverSettings) -> Model<f32> {
     let mut builder = ModelBuilder::new();
@@ -49,7 +45,7 @@ fn timed_steps_are_ordinary_steps() {
     {
         let model = bar(&settings);
         let inputs = Inputs { gravity: vec3(0.3, 0.0, -9.81), ..Inputs::default() };
-        let make = || GpuSolver::new(&device, &model, &settings).expect("a model that fits");
+        let make = || GpuSolver::new(device, &model, &settings).expect("a model that fits");
         let [mut plain, mut together, mut apart] = [make(), make(), make()];
         for _ in 0..4 {
             plain.step(&model, &inputs, dt).expect("a legal step");
@@ -85,7 +81,7 @@ fn timed_steps_are_ordinary_steps() {
 fn no_steps_take_no_time() {
     let settings = SolverSettings::default();
     let model = bar(&settings);
-    let mut gpu = GpuSolver::new(&device(), &model, &settings).expect("a model that fits");
+    let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
     let before = bits(&gpu, &model);
     assert_eq!(gpu.time_steps(&model, &Inputs::default(), DT, 0).expect("a device"), None);
     assert_eq!(bits(&gpu, &model), before);
@@ -96,7 +92,7 @@ fn no_steps_take_no_time() {
 #[test]
 fn copies_move_the_bytes_that_they_name() {
     let device = device();
-    let copy = MemoryCopy::new(&device).expect("room");
+    let copy = MemoryCopy::new(device).expect("room");
     assert_eq!(copy.bytes(), 256 << 20);
     let seconds = copy.time(1).expect("a device");
     assert_eq!(seconds.is_some(), device.has_clock());

@@ -116,6 +116,15 @@ fn a_tether_pulls_with_stiffness_times_distance_and_lets_go() {
     let pull = |t: &Tether<f64>| (t.target - state.positions[t.vertex as usize]) * t.stiffness;
     let sum = tethers.iter().map(pull).fold(Vec3::ZERO, |a, b| a + b);
     assert!(sum.z > 0.05 && balance.unbalanced < 1e-6 * sum.z, "{sum:?} {}", balance.unbalanced);
+    // Everything that loads the tissue: weights, tethers, and what holds the near end.
+    let pinned = |v: usize| inputs::<f64>(60, false).pins.iter().any(|p| p.vertex as usize == v);
+    let weights = (0..model.vertex_count()).map(|v| match pinned(v) {
+        true => balance.residual[v].length(),
+        false => model.masses[v] * GRAVITY.length(),
+    });
+    let pulls = tethers.iter().map(|tether| pull(tether).length());
+    let load: f64 = weights.chain(pulls).sum();
+    assert!((balance.load / load - 1.0).abs() < 1e-12, "{} N of {load} N", balance.load);
     // The near end holds what gravity and tethers leave: its force on the tissue closes the balance.
     let held: Vec3<f64> = inputs::<f64>(60, false)
         .pins

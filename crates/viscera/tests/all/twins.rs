@@ -3,6 +3,7 @@
 //! Not against each other: both languages round, and neither is right. The device may err twice as
 //! much as the processor in single precision.
 
+use crate::common::device::device;
 use crate::gpu_common::comparison::{check_nasty, check_percentiles, compare};
 use crate::gpu_common::functions::{of_springs, of_tets};
 use crate::gpu_common::{Gpu, inputs};
@@ -35,8 +36,8 @@ fn device_errs_at_most_twice_as_much_as_processor() {
         ("unrotated", of_tets(), inputs::tets(COUNT, false)),
         ("any", of_springs(), inputs::springs(COUNT)),
     ];
-    let (gpu, library) = (Gpu::open(), library());
-    println!("{}: relative errors, processor and device", gpu.name);
+    let (gpu, library) = (Gpu(device()), library());
+    println!("{}: relative errors, processor and device", gpu.0.name());
     let mut wrong = Vec::new();
     for (kind, twins, records) in &kinds {
         for twin in twins {
@@ -44,13 +45,18 @@ fn device_errs_at_most_twice_as_much_as_processor() {
             wrong.extend(results.iter().filter_map(|result| check_percentiles(kind, result)));
         }
     }
-    assert!(wrong.is_empty(), "{} errs more than twice as much:\n{}", gpu.name, wrong.join("\n"));
+    assert!(
+        wrong.is_empty(),
+        "{} errs more than twice as much:\n{}",
+        gpu.0.name(),
+        wrong.join("\n")
+    );
 }
 
 #[test]
 fn nasty_inputs_stay_finite_and_close() {
     let kinds = [(of_tets(), inputs::nasty_tets()), (of_springs(), inputs::nasty_springs())];
-    let (gpu, library) = (Gpu::open(), library());
+    let (gpu, library) = (Gpu(device()), library());
     let mut wrong = Vec::new();
     for (twins, records) in &kinds {
         for twin in twins {
@@ -63,5 +69,5 @@ fn nasty_inputs_stay_finite_and_close() {
     }
     let few = wrong.len().min(10);
     let text = wrong[..few].join("\n");
-    assert!(wrong.is_empty(), "{} results on {}:\n{text}", wrong.len(), gpu.name);
+    assert!(wrong.is_empty(), "{} results on {}:\n{text}", wrong.len(), gpu.0.name());
 }

@@ -20,28 +20,25 @@ fn remember_iterate(
     }
 }
 
-@compute @workgroup_size(1)
-fn start_acceleration() {
-    atomicStore(&control.is_broken, 0u);
-    control.sweeps = 0u;
-    control.next = 0u;
-    control.differences = 0u;
-    control.last_norm = 3e38;
-    control.iteration = 0u;
-    control.omega = 1.0;
-    control.radius = job.parameter;
-    control.last_change = 0.0;
-}
-
-// The small least-squares problem. `job.count`: how many sums of pieces there are, `job.mode`: whether a
-// residual that has grown starts a new history.
+// The small least-squares problem, a workgroup for each of `job.count` parts. `job.mode`: whether a residual
+// that has grown starts a new history.
 @compute @workgroup_size(128)
-fn anderson_weights(@builtin(local_invocation_index) local: u32) {
+fn anderson_weights(
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let part = workgroup.x + workgroup.y * groups.x;
+    if part >= job.count {
+        return;
+    }
+    let first = first_group(part);
+    let end = table[part_row(part) + PART_GROUPS_END];
     // Six threads for each sum.
     let product = local / 6u;
     var sum = 0.0;
     if product < PRODUCTS {
-        for (var piece = local % 6u; piece < job.count; piece += 6u) {
+        for (var piece = first + local % 6u; piece < end; piece += 6u) {
             sum += partial_sums[PRODUCTS * piece + product];
         }
     }
@@ -59,43 +56,43 @@ fn anderson_weights(@builtin(local_invocation_index) local: u32) {
         products[k] = total;
     }
     let window = job.set_first;
-    let has_difference = control.sweeps > 0u;
-    let newest = control.next;
-    var n = select(0u, min(control.differences + 1u, window), has_difference);
+    let has_difference = control.parts[part].sweeps > 0u;
+    let newest = control.parts[part].next;
+    var n = select(0u, min(control.parts[part].differences + 1u, window), has_difference);
     for (var j = 0u; j < n; j++) {
-        control.gram[LARGEST_WINDOW * newest + j] = products[11u + j];
-        control.gram[LARGEST_WINDOW * j + newest] = products[11u + j];
+        control.parts[part].gram[LARGEST_WINDOW * newest + j] = products[11u + j];
+        control.parts[part].gram[LARGEST_WINDOW * j + newest] = products[11u + j];
     }
-    control.sweeps += 1u;
-    control.differences = n;
+    control.parts[part].sweeps += 1u;
+    control.parts[part].differences = n;
     if has_difference {
-        control.next = (newest + 1u) % window;
+        control.parts[part].next = (newest + 1u) % window;
     }
-    if job.mode != 0u && products[0] > control.last_norm {
-        control.differences = 0u;
-        control.next = 0u;
-        control.sweeps = 1u;
+    if job.mode != 0u && products[0] > control.parts[part].last_norm {
+        control.parts[part].differences = 0u;
+        control.parts[part].next = 0u;
+        control.parts[part].sweeps = 1u;
         n = 0u;
     }
-    control.last_norm = products[0];
-    least_squares(products, n);
+    control.parts[part].last_norm = products[0];
+    least_squares(part, products, n);
 }
 
 // Solves gram g = right with columns scaled to unit length and a small multiple of the identity added, by
 // Cholesky. Columns without length get no share.
-fn least_squares(products: array<f32, 21>, n: u32) {
+fn least_squares(part: u32, products: array<f32, 21>, n: u32) {
     var all = products;
     var scale: array<f32, 10>;
     var a: array<f32, 100>;
     var b: array<f32, 10>;
     for (var j = 0u; j < n; j++) {
-        let length = control.gram[11u * j];
+        let length = control.parts[part].gram[11u * j];
         scale[j] = select(0.0, inverseSqrt(length), length > 0.0);
         b[j] = all[1u + j] * scale[j];
     }
     for (var j = 0u; j < n; j++) {
         for (var k = 0u; k <= j; k++) {
-            a[10u * j + k] = control.gram[10u * j + k] * (scale[j] * scale[k]);
+            a[10u * j + k] = control.parts[part].gram[10u * j + k] * (scale[j] * scale[k]);
         }
         a[11u * j] += select(1.0, REGULARISATION, scale[j] > 0.0);
     }
@@ -126,7 +123,7 @@ fn least_squares(products: array<f32, 21>, n: u32) {
         b[j] /= a[11u * j];
     }
     for (var j = 0u; j < LARGEST_WINDOW; j++) {
-        control.shares[j] = select(0.0, b[j] * scale[j], j < n);
+        control.parts[part].shares[j] = select(0.0, b[j] * scale[j], j < n);
     }
 }
 
@@ -134,18 +131,28 @@ fn least_squares(products: array<f32, 21>, n: u32) {
 // result is remembered as the next iterate.
 @compute @workgroup_size(256)
 fn anderson_mix(
-    @builtin(global_invocation_id) id: vec3u,
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
     @builtin(num_workgroups) groups: vec3u,
 ) {
-    let i = thread_of(id, groups, 256u);
-    if i >= job.count || !counts(i) {
+    let span = span_of(workgroup, groups);
+    if span.groups == 0u {
         return;
     }
+    for (var j = span.group * 256u + local; j < span.length; j += span.groups * 256u) {
+        let i = number_at(span.part, j);
+        if counts(i) {
+            mix_number(span.part, i);
+        }
+    }
+}
+
+fn mix_number(part: u32, i: u32) {
     var q = mapped[job.set_first * job.count + i];
     let bit = select(1u, 2u, i >= job.first);
     if (job.mode & bit) != 0u {
-        for (var j = 0u; j < control.differences; j++) {
-            q -= control.shares[j] * mapped[j * job.count + i];
+        for (var j = 0u; j < control.parts[part].differences; j++) {
+            q -= control.parts[part].shares[j] * mapped[j * job.count + i];
         }
         unknowns[i] = q;
     }
@@ -159,12 +166,18 @@ fn anderson_mix(
 fn chebyshev_change(
     @builtin(local_invocation_index) local: u32,
     @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
 ) {
+    let span = span_of(workgroup, groups);
+    if span.groups == 0u {
+        return;
+    }
     var sum = 0.0;
-    for (var i = workgroup.x * THREADS + local; i < job.count; i += job.mode * THREADS) {
+    for (var j = span.group * THREADS + local; j < span.length; j += span.groups * THREADS) {
+        let i = number_at(span.part, j);
         if counts(i) {
             let change = unknowns[i] - iterate[i];
-            sum += weights[i] * change * change;
+            sum += weight_of(i) * change * change;
         }
     }
     shared_sums[local] = sum;
@@ -174,19 +187,28 @@ fn chebyshev_change(
         for (var t = 0u; t < THREADS; t++) {
             total += shared_sums[t];
         }
-        partial_sums[workgroup.x] = total;
+        partial_sums[first_group(span.part) + span.group] = total;
     }
 }
 
 // Measured radii are kept below this: at 1 the weights no longer contract.
 const LARGEST_RADIUS: f32 = 0.9999;
 
-// omega = 1 for k < S, then 2/(2 - rho^2), then 4/(4 - rho^2 omega). `job.count`: sums, `job.first`: the
-// delay S, `job.mode`: whether the radius is measured.
+// omega = 1 for k < S, then 2/(2 - rho^2), then 4/(4 - rho^2 omega), a workgroup for each of `job.count`
+// parts. `job.first`: the delay S, `job.mode`: whether the radius is measured.
 @compute @workgroup_size(128)
-fn chebyshev_weight(@builtin(local_invocation_index) local: u32) {
+fn chebyshev_weight(
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let part = workgroup.x + workgroup.y * groups.x;
+    if part >= job.count {
+        return;
+    }
+    let end = table[part_row(part) + PART_GROUPS_END];
     var sum = 0.0;
-    for (var piece = local; piece < job.count; piece += THREADS) {
+    for (var piece = first_group(part) + local; piece < end; piece += THREADS) {
         sum += partial_sums[piece];
     }
     shared_sums[local] = sum;
@@ -199,34 +221,44 @@ fn chebyshev_weight(@builtin(local_invocation_index) local: u32) {
         total += shared_sums[t];
     }
     let change = sqrt(total);
-    let k = control.iteration;
-    control.iteration = k + 1u;
+    let k = control.parts[part].iteration;
+    control.parts[part].iteration = k + 1u;
     if k < job.first {
-        if job.mode != 0u && control.last_change > 0.0 {
-            control.radius = min(change / control.last_change, LARGEST_RADIUS);
+        if job.mode != 0u && control.parts[part].last_change > 0.0 {
+            control.parts[part].radius = min(change / control.parts[part].last_change, LARGEST_RADIUS);
         }
-        control.last_change = change;
-        control.omega = 1.0;
+        control.parts[part].last_change = change;
+        control.parts[part].omega = 1.0;
     } else {
-        let squared = control.radius * control.radius;
+        let squared = control.parts[part].radius * control.parts[part].radius;
         let first = 2.0 / (2.0 - squared);
-        control.omega = select(4.0 / (4.0 - squared * control.omega), first, k == job.first);
+        control.parts[part].omega = select(4.0 / (4.0 - squared * control.parts[part].omega), first, k == job.first);
     }
 }
 
 // q_(k+1) = omega (gamma (g(q_k) - q_k) + q_k - q_(k-1)) + q_(k-1), remembered as the next iterate.
 @compute @workgroup_size(256)
 fn chebyshev_mix(
-    @builtin(global_invocation_id) id: vec3u,
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
     @builtin(num_workgroups) groups: vec3u,
 ) {
-    let i = thread_of(id, groups, 256u);
-    if i >= job.count || !counts(i) {
+    let span = span_of(workgroup, groups);
+    if span.groups == 0u {
         return;
     }
+    let omega = control.parts[span.part].omega;
+    for (var j = span.group * 256u + local; j < span.length; j += span.groups * 256u) {
+        let i = number_at(span.part, j);
+        if counts(i) {
+            extrapolate_number(i, omega);
+        }
+    }
+}
+
+fn extrapolate_number(i: u32, omega: f32) {
     let q = iterate[i];
     let before = older[i];
-    let omega = control.omega;
     let gamma = frame.chebyshev_damping;
     var next = unknowns[i];
     if omega != 1.0 {

@@ -5,12 +5,6 @@
 // eight of one colour, component by component, as on the CPU (model/tets.rs): eight neighbouring
 // threads load one piece of 32 bytes.
 
-// Lanes of a block.
-const LANES: u32 = 8u;
-
-// The material of a lane that only fills a block up.
-const FILLING: u32 = 0xffffffffu;
-
 // The constants of eight tetrahedra.
 struct TetBlock {
     vertices: array<array<u32, 8>, 4>,
@@ -95,13 +89,9 @@ struct Frame {
     rescale: f32,
     relaxation_multipliers: f32,
     relaxation_positions: f32,
-    rebase_factor: f32,
-    bound_share: f32,
     update_count: u32,
-    // Of an explicit method: the small step [s], one over it, how many there are.
-    small_dt: f32,
-    inverse_small_dt: f32,
-    small_steps: u32,
+    // Connected parts.
+    part_count: u32,
     chebyshev_damping: f32,
 }
 
@@ -137,8 +127,6 @@ struct Frame {
 // The same before the last sweep, and before the one before it.
 @group(0) @binding(16) var<storage, read_write> iterate: array<f32>;
 @group(0) @binding(17) var<storage, read_write> older: array<f32>;
-// Weights of the norm of such vectors.
-@group(0) @binding(18) var<storage, read> weights: array<f32>;
 // Anderson's history: differences of residuals and of mapped iterates, window vectors each, and the
 // last residual and mapped iterate behind them.
 @group(0) @binding(19) var<storage, read_write> residuals: array<f32>;
@@ -154,7 +142,7 @@ struct Frame {
 @group(0) @binding(26) var<storage, read_write> starts: array<vec4f>;
 // All that belongs to vertices, range by range; see potential.wgsl.
 @group(0) @binding(27) var<storage, read_write> ground: array<vec4f>;
-// All constants but the tetrahedra, as words; see potential.wgsl.
+// All constants but the tetrahedra, and the weights of the norm, as words; see table.wgsl.
 @group(0) @binding(28) var<storage, read> table: array<u32>;
 
 @group(1) @binding(0) var<uniform> job: Job;

@@ -9,7 +9,7 @@ use super::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::LANES;
 use crate::scalar::{Vec3, vec3};
-use crate::settings::{Acceleration, Method, SolverSettings};
+use crate::settings::{Acceleration, SolverSettings};
 
 /// Numbers of the storage buffers in all kernels; bindings.wgsl has the same ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -45,24 +45,17 @@ pub enum Slot {
     Starts,
     Ground,
     Table,
+    SmallSteps,
+    Falls,
 }
 
 impl Slot {
     /// Whether kernels only read it.
     pub fn is_read_only(self) -> bool {
-        use Slot::{
-            Attachments, CornerIndices, Materials, Offsets, Springs, Table, Tets, Updates, Weights,
-        };
+        use Slot::{Attachments, CornerIndices, Materials, Offsets, Springs, Table, Tets, Updates};
         matches!(
             self,
-            Tets | Materials
-                | CornerIndices
-                | Offsets
-                | Updates
-                | Weights
-                | Springs
-                | Attachments
-                | Table
+            Tets | Materials | CornerIndices | Offsets | Updates | Springs | Attachments | Table
         )
     }
 }
@@ -126,9 +119,6 @@ pub(super) struct Attachment {
     pub part: u32,
 }
 
-/// Copies that single precision numbers exactly, which is how Anderson finds those of a vertex.
-const MOST_COPIES: usize = 1 << 24;
-
 /// Ranges of buffers begin at a multiple of this: the alignment [bytes] that devices may ask of a
 /// binding.
 pub(super) const ALIGNMENT: u64 = 256;
@@ -145,6 +135,17 @@ pub(super) struct Range {
     pub size: u64,
 }
 
+/// Where the multipliers of a model, or a part, of so many vertices begin among its unknowns [bytes]: behind the
+/// vertices there is room for one more.
+pub(super) fn multipliers_start(vertices: usize) -> u64 {
+    (16 * vertices as u64 + 16).next_multiple_of(ALIGNMENT)
+}
+
+/// Bytes of all unknowns.
+pub(super) fn unknowns_size(model: &Model<f32>) -> u64 {
+    multipliers_start(model.vertex_count()) + 4 * (model.multiplier_count as u64).max(1)
+}
+
 /// All buffers of a solver.
 #[derive(Debug)]
 pub(super) struct Buffers {
@@ -155,8 +156,6 @@ pub(super) struct Buffers {
     /// Bytes of all positions, and where multipliers begin [bytes].
     pub points_size: u64,
     pub multipliers_start: u64,
-    /// Where the energy limit's numbers begin among the partial sums [bytes].
-    pub parts_start: u64,
     /// Numbers of the long vector of all unknowns.
     pub length: u32,
 }
@@ -187,18 +186,16 @@ impl Buffers {
     ) -> Result<Self, GpuError> {
         let vertices = model.vertex_count() as u64;
         let points_size = 16 * vertices;
-        // Behind the vertices there is room for one more.
-        let multipliers_start = (points_size + 16).next_multiple_of(ALIGNMENT);
-        let unknowns = multipliers_start + 4 * (model.multiplier_count as u64).max(1);
-        let xpbd = settings.method == Method::Xpbd;
-        let accelerated = xpbd && settings.acceleration != Acceleration::None;
+        let multipliers_start = multipliers_start(model.vertex_count());
+        let unknowns = unknowns_size(model);
+        let accelerated = super::accelerates(settings);
         let anderson = accelerated && settings.acceleration == Acceleration::Anderson;
         let history =
             if anderson { unknowns * (u64::from(super::window(settings)) + 1) } else { 0 };
         let viscous = model.tet_sets().iter().any(|set| set.viscous);
         let blocks = model.tet_sets().iter().map(|set| set.block_count() as u64).sum::<u64>();
         let when = |wanted: bool, size: u64| if wanted { size } else { 0 };
-        let table = layout.table(model, settings.guards_steps());
+        let table = layout.table(model, settings);
         let split = model.is_split();
         use Slot::*;
         let sizes = [
@@ -212,7 +209,7 @@ impl Buffers {
             (Residuals, "Anderson's residuals", history),
             (Mapped, "Anderson's iterates", history),
             (PartialSums, "partial sums", table.sums_size),
-            (Control, "control record", super::layout::CONTROL_SIZE),
+            (Control, "control records", super::report::control_size(model.part_count())),
             (Ground, "vertices", table.ground_size),
         ];
         let constants =
@@ -220,9 +217,6 @@ impl Buffers {
         let of_constants = constants.iter().map(|(_, what, bytes)| (*what, bytes.len() as u64));
         let arrays = sizes.iter().map(|&(_, what, size)| (what, size)).chain(of_constants);
         check_sizes(device, model.tet_count() as u64, arrays)?;
-        if anderson && split && model.copy_count() >= MOST_COPIES {
-            return Err(GpuError::TooManyCopies { given: model.copy_count(), most: MOST_COPIES });
-        }
 
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let make = |label: &str, size: u64, usage: BufferUsages| {
@@ -252,8 +246,6 @@ impl Buffers {
         for (slot, label, bytes) in &constants {
             all.push((*slot, filled(label, bytes)));
         }
-        let weights = make("weights", when(accelerated, unknowns), usage);
-        all.push((Weights, weights));
         let copies = split.then(|| {
             let [indices, offsets] = Layout::copies(model);
             [filled("copies of corners", &indices), filled("copies of vertices", &offsets)]
@@ -264,8 +256,7 @@ impl Buffers {
         let start = multipliers_start;
         ranges.push(Range { slot: Multipliers, owner: Unknowns, start, size: rest });
         let length = (unknowns / 4) as u32;
-        let parts_start = table.parts_start;
-        Ok(Self { all, ranges, copies, points_size, multipliers_start, parts_start, length })
+        Ok(Self { all, ranges, copies, points_size, multipliers_start, length })
     }
 
     /// The buffer that a slot lies in, and where.

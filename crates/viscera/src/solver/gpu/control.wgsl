@@ -1,13 +1,20 @@
 // What the device decides during a step: no result comes back to the host inside one.
 
-const LARGEST_WINDOW: u32 = 10u;
-
-// What takes the place of an iterate of Anderson's.
-const NOTHING: u32 = 0u;
-const PLAIN: u32 = 1u;
-const DESCENT: u32 = 2u;
-
 struct Control {
+    // Explicit method: the small step that is made, and how many are done. One is written where the other
+    // is read.
+    small_step: u32,
+    small_steps_done: u32,
+    // Steps so far, the last that was taken back for some part, and how many were.
+    step: u32,
+    rejected_step: atomic<u32>,
+    rejected: atomic<u32>,
+    // Each connected part decides for itself.
+    parts: array<PartControl>,
+}
+
+// `PartControl` of report.rs.
+struct PartControl {
     // Anderson: sweeps in the history, the place of the next difference, how many there are.
     sweeps: u32,
     next: u32,
@@ -23,25 +30,25 @@ struct Control {
     omega: f32,
     radius: f32,
     last_change: f32,
-    // Explicit method: small steps done.
-    small_step: u32,
     // Step guard; potentials [J s^2] are what is above the start of the step with its pins moved.
     limit: f32,
-    best_value: f32,
-    // The range of the ground that holds the best start.
-    start: u32,
-    // Of mixtures: whether the iterate passes, whether it is better than the best, and what is taken
-    // in its place.
-    is_good: u32,
-    is_better: u32,
-    taken: u32,
-    failures: u32,
-    // Steps taken back so far.
-    rejected: u32,
-    // Of the last step.
+    // Of the last step: whether it was taken back, and to which share of it; zero for none, from which
+    // descents follow.
     was_rejected: u32,
+    share: f32,
+    descends: u32,
+    // How the last step ended.
     potential: f32,
     noise: f32,
+    kept_speed: f32,
+    // Guard of mixtures: the best so far and failures in a row, after a plain sweep was judged; the same
+    // after the mixture was, and whether it passed. Two of each, because workgroups that decide the same
+    // must not read what one of them writes.
+    best_value: f32,
+    failures: u32,
+    mixture_best: f32,
+    mixture_failures: u32,
+    is_good: u32,
     // Multipliers that are no numbers were found.
     is_broken: atomic<u32>,
 }

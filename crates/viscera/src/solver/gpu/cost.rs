@@ -39,7 +39,7 @@ impl StepCost {
     pub fn new(model: &Model<f32>, settings: &SolverSettings, sweeps: u32) -> Self {
         // How many dispatches there are does not depend on the length of the long vector.
         let plan = Plan::new(model, settings);
-        let pieces = Pieces { count: 1, first_of_vertices: 0 };
+        let pieces = Pieces { count: 1, first_of_vertices: 0, groups: 1 };
         let record = Recorder::new(model, settings, &plan, [0; 2], pieces).record(&plan);
         let [prologue, body, epilogue] =
             [record.prologue, record.body, record.epilogue].map(|list| list.len() as u64);

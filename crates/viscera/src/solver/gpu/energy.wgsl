@@ -7,35 +7,77 @@ fn vector_at(sum: u32) -> vec3f {
     return vec3f(totals[sum], totals[sum + 1u], totals[sum + 2u]);
 }
 
-// The velocity [m/s] that is not scaled, and the share that what is beside it keeps: one workgroup for
-// each part.
+// The velocity [m/s] that is not scaled, and the share that what is beside it keeps.
+struct Limit {
+    drift: vec3f,
+    share: f32,
+}
+
+var<workgroup> limit: Limit;
+
+// v = (x - x_n)/dt, limited: one workgroup for each piece of vertices, each of which adds up what its part
+// has; the first reports how the step ended. `job.first`: the first of them.
 @compute @workgroup_size(256)
-fn limit_parts(
+fn limit_velocities(
     @builtin(local_invocation_index) local: u32,
     @builtin(workgroup_id) workgroup: vec3u,
     @builtin(num_workgroups) groups: vec3u,
 ) {
-    let part = workgroup.x + workgroup.y * groups.x;
-    if part >= job.count {
+    let place_of_piece = workgroup.x + workgroup.y * groups.x;
+    if place_of_piece >= job.count {
         return;
     }
-    let row = part_row(part);
+    let piece = job.first + place_of_piece;
+    let row = piece_row(piece);
+    let part = table[row + PIECE_PART];
+    let reports = piece == table[part_row(part) + PART_VERTEX_PIECES];
+    if reports {
+        var ended: Sums;
+        add_pieces(part, local, &ended);
+        reduce(ended, 1u, 1u << SUM_REACH, local);
+        if local == 0u {
+            let potential = potential_of_totals();
+            control.parts[part].potential = potential.value;
+            control.parts[part].noise = potential.noise;
+        }
+    }
     var sums: Sums;
+    add_motions(part, local, &sums);
+    reduce(sums, SUMS / 8u, 0u, local);
+    if local == 0u {
+        limit = limit_of(part);
+        if reports {
+            control.parts[part].kept_speed = limit.share;
+        }
+    }
+    let now = workgroupUniformLoad(&limit);
+    for (var v = table[row + PIECE_FIRST] + local; v < table[row + PIECE_END]; v += THREADS) {
+        var velocity = end_velocity(v);
+        if now.share < 1.0 && ground_of(ACTING, v).w != 0.0 {
+            velocity = now.drift + (velocity - now.drift) * now.share;
+        }
+        ground[VELOCITIES * table[STRIDE_AT] + v] = vec4f(velocity, 0.0);
+    }
+}
+
+fn add_motions(part: u32, local: u32, into: ptr<function, Sums>) {
+    let row = part_row(part);
     // Of elements what is stored, and whether something holds them.
-    for (var piece = table[row] + local; piece < table[row + 1u]; piece += THREADS) {
+    let elements_end = table[row + PART_ELEMENT_PIECES_END];
+    for (var piece = table[row + PART_ELEMENT_PIECES] + local; piece < elements_end; piece += THREADS) {
         for (var k = SUM_TESTED; k <= SUM_HELD; k++) {
-            sums[k] += partial_sums[SUMS * piece + k];
+            (*into)[k] += partial_sums[SUMS * piece + k];
         }
     }
-    for (var piece = table[row + 2u] + local; piece < table[row + 3u]; piece += THREADS) {
+    let vertices_end = table[row + PART_VERTEX_PIECES_END];
+    for (var piece = table[row + PART_VERTEX_PIECES] + local; piece < vertices_end; piece += THREADS) {
         for (var k = SUM_HELD; k < SUMS; k++) {
-            sums[k] += partial_sums[SUMS * piece + k];
+            (*into)[k] += partial_sums[SUMS * piece + k];
         }
     }
-    reduce(sums, 3u, local);
-    if local != 0u {
-        return;
-    }
+}
+
+fn limit_of(part: u32) -> Limit {
     var kinetic = totals[SUM_KINETIC];
     var given = totals[SUM_KINETIC_START] - totals[SUM_TESTED] + totals[SUM_WORK];
     var drift = vec3f();
@@ -54,34 +96,5 @@ fn limit_parts(
     if is_known && kinetic > given {
         share = sqrt(max(given, 0.0) / kinetic);
     }
-    let at = table[PARTS_AT] + 4u * part;
-    for (var axis = 0u; axis < 3u; axis++) {
-        partial_sums[at + axis] = drift[axis];
-    }
-    partial_sums[at + 3u] = share;
-}
-
-// v = (x - x_n)/dt, limited: one workgroup for each piece of vertices. `job.first`: the first of them.
-@compute @workgroup_size(256)
-fn limit_velocities(
-    @builtin(local_invocation_index) local: u32,
-    @builtin(workgroup_id) workgroup: vec3u,
-    @builtin(num_workgroups) groups: vec3u,
-) {
-    let piece = workgroup.x + workgroup.y * groups.x;
-    if piece >= job.count {
-        return;
-    }
-    let row = piece_row(job.first + piece);
-    let at = table[PARTS_AT] + 4u * table[row];
-    let drift = vec3f(partial_sums[at], partial_sums[at + 1u], partial_sums[at + 2u]);
-    let share = partial_sums[at + 3u];
-    for (var i = table[row + 1u] + local; i < table[row + 2u]; i += THREADS) {
-        let v = member(i);
-        var velocity = end_velocity(v);
-        if share < 1.0 && ground_of(ACTING, v).w != 0.0 {
-            velocity = drift + (velocity - drift) * share;
-        }
-        ground[VELOCITIES * table[STRIDE] + v] = vec4f(velocity, 0.0);
-    }
+    return Limit(drift, share);
 }

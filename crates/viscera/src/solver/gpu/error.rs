@@ -77,17 +77,6 @@ pub enum GpuError {
         "this surface is where its solver brings it; make one with `GpuSurface::following` to place it"
     )]
     FollowsSolver,
-    /// Anderson on a device cannot number the copies of the vertices.
-    #[error(
-        "Anderson with few colours joins up to {most} copies of vertices on a device; this model has \
-         {given}: use more colours, another acceleration, or `device = \"cpu\"`"
-    )]
-    TooManyCopies {
-        /// Copies of this model.
-        given: usize,
-        /// How many there may be.
-        most: usize,
-    },
     /// The device was lost.
     #[error("{name} was lost ({reason}); what was finished is kept")]
     Lost {

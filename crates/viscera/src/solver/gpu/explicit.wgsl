@@ -3,7 +3,16 @@
 //   v += h (g + M^-1 f),   x += h v
 //
 // Attachments of a vertex pull like one of their summed stiffness to the mean of their anchors, which
-// stand in `targets`: w is the stiffness [N/m]. Pinned vertices have their places there.
+// stand in `targets`: w is the stiffness [N/m]. Pinned vertices have their places there. Each connected part
+// takes as many small steps as it needs, and then waits for the others.
+
+fn small_row(part: u32) -> u32 {
+    return table[SMALL_STEPS_AT] + SMALL_WORDS * part;
+}
+
+fn part_of_block(block: u32) -> u32 {
+    return table[table[BLOCK_PARTS_AT] + block];
+}
 
 // Remembers positions and, in `predicted` until the end of the step, velocities.
 @compute @workgroup_size(64)
@@ -13,7 +22,7 @@ fn begin_explicit(
 ) {
     let v = thread_of(id, groups, 64u);
     if v == 0u {
-        control.small_step = 0u;
+        control.small_steps_done = 0u;
     }
     if v >= job.count {
         return;
@@ -38,9 +47,10 @@ fn begin_strain(
         return;
     }
     let vertices = vertices_of(block, lane);
+    let small_dt = number(small_row(part_of_block(block)) + SMALL_DT);
     var x: array<vec3f, 4>;
     for (var i = 0u; i < 4u; i++) {
-        x[i] = points[vertices[i]].xyz - predicted[vertices[i]].xyz * frame.small_dt;
+        x[i] = points[vertices[i]].xyz - predicted[vertices[i]].xyz * small_dt;
     }
     store_start_strain(block, lane, green_strain_strain(deformation_gradient(x, shape_of(block, lane))));
 }
@@ -60,7 +70,7 @@ fn load_forces(
 ) {
     let thread = thread_of(id, groups, 64u);
     if thread == 0u {
-        control.small_step += 1u;
+        control.small_step = control.small_steps_done + 1u;
     }
     if thread < job.tet_count {
         load_tet(thread / LANES, thread % LANES);
@@ -71,10 +81,12 @@ fn load_forces(
 
 fn load_tet(block: u32, lane: u32) {
     let kind = tets[block].material[lane];
-    if kind == FILLING {
+    let small = small_row(part_of_block(block));
+    if kind == FILLING || control.small_steps_done >= table[small + SMALL_COUNT] {
         return;
     }
-    let material = materials[kind];
+    let small_dt = number(small + SMALL_DT);
+    let material = material_of(kind);
     let lambda = material.lame_lambda;
     let mu = material.lame_mu;
     let vertices = vertices_of(block, lane);
@@ -87,11 +99,11 @@ fn load_tet(block: u32, lane: u32) {
     var piola = tissue_piola(block >= job.set_first, f, lambda, mu);
     if material.viscosity > 0.0 {
         let change = tissue_change_since(f, start_strain_of(block, lane));
-        let rate = material.viscosity * frame.inverse_small_dt;
+        let rate = material.viscosity * number(small + SMALL_INVERSE_DT);
         piola += tissue_viscous_piola(f, change, rate, lambda, mu);
         store_start_strain(block, lane, green_strain_strain(f));
     }
-    let volume = tets[block].rest_volume[lane] * (frame.small_dt * frame.small_dt);
+    let volume = tets[block].rest_volume[lane] * (small_dt * small_dt);
     let forces = internal_forces(piola, shape, volume);
     let slots = indices_of(block, lane);
     for (var i = 0u; i < 4u; i++) {
@@ -102,7 +114,8 @@ fn load_tet(block: u32, lane: u32) {
 fn load_spring(spring: Spring) {
     let x = array<vec3f, 2>(points[spring.vertices[0]].xyz, points[spring.vertices[1]].xyz);
     let forces = spring_forces(x, spring.rest_length, spring.stiffness);
-    let squared = frame.small_dt * frame.small_dt;
+    let small_dt = number(small_row(spring.part) + SMALL_DT);
+    let squared = small_dt * small_dt;
     loads[spring.slots[0]] = vec4f(forces[0] * squared, 0.0);
     loads[spring.slots[1]] = vec4f(forces[1] * squared, 0.0);
 }
@@ -116,21 +129,29 @@ fn advance_explicit(
     if v >= job.count {
         return;
     }
+    if v == 0u {
+        control.small_steps_done = control.small_step;
+    }
+    let small = small_row(part_with(PART_VERTICES_END, v));
+    let count = table[small + SMALL_COUNT];
+    if control.small_step > count {
+        return;
+    }
     let on_vertex = acting[v];
     let hold = targets[v];
     if on_vertex.w == 0.0 {
         let start = previous[v].xyz;
         let way = hold.xyz - start;
-        let share = f32(control.small_step) / f32(frame.small_steps);
-        let is_last = control.small_step == frame.small_steps;
+        let share = f32(control.small_step) / f32(count);
+        let is_last = control.small_step == count;
         points[v] = vec4f(select(start + way * share, hold.xyz, is_last), 0.0);
         velocities[v] = vec4f(way * frame.inverse_dt, 0.0);
         return;
     }
-    let h = frame.small_dt;
+    let h = number(small + SMALL_DT);
     let x = points[v].xyz;
     let pull = on_vertex.xyz + (hold.xyz - x) * hold.w;
-    let impulse = gather(v).xyz * frame.inverse_small_dt + pull * h;
+    let impulse = gather(v).xyz * number(small + SMALL_INVERSE_DT) + pull * h;
     let velocity = velocities[v].xyz + (impulse * on_vertex.w + frame.gravity * h);
     velocities[v] = vec4f(velocity, 0.0);
     points[v] = vec4f(x + velocity * h, 0.0);

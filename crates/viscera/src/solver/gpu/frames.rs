@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use super::buffers::{Buffers, Slot};
 use super::device::Device;
-use super::report::Verdict;
+use super::report::rejected_steps;
 use super::{GpuError, GpuSolver};
 use crate::model::Model;
 use crate::scalar::lanes::{Eight, Point};
@@ -155,7 +155,7 @@ impl GpuSolver {
                 let place = |v: usize| state.positions[model.numbering.order[v] as usize];
                 ground.load_tethers(self.multiplier_dt, place);
             }
-            solver.work.guard.rejected = Verdict::of(read[4]).rejected.into();
+            solver.work.guard.rejected = rejected_steps(read[4]);
             let Some(strains) = read.get(5) else { return };
             let mut strains: &[Eight<f32>] = bytemuck::cast_slice(strains);
             for (set, own) in model.tet_sets().into_iter().zip(&mut ground.start_strain) {

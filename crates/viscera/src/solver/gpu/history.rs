@@ -17,9 +17,7 @@ const REPAIR_GROUPS: u32 = 512;
 impl Recorder<'_> {
     /// [`crate::solver::plan::Stage::RepairMultipliers`].
     pub(super) fn repair_multipliers(&self, into: &mut Vec<Dispatch>) {
-        let count = self.model.multiplier_count as u32;
-        let job = Job { first: self.multipliers_first, count, ..Job::default() };
-        into.push(self.threads(&kernels::FIND_BROKEN, job));
+        into.push(self.parts_of_long(&kernels::FIND_BROKEN, 0));
         into.push(self.constitutive_multipliers(0));
     }
 
@@ -75,7 +73,7 @@ impl GpuSolver {
     ) -> Result<(), StepError> {
         self.check_model(model)?;
         crate::solver::check_step(dt, model, inputs)?;
-        self.prepare_step(model, inputs, dt, 1);
+        self.prepare_step(model, inputs, dt);
         self.submit("restart", &[&self.restart], Marks::default());
         self.multiplier_dt = dt;
         Ok(())

@@ -10,15 +10,28 @@ fn is_finite_number(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u;
 }
 
+// What one part has broken is no other's.
 @compute @workgroup_size(256)
 fn find_broken(
-    @builtin(global_invocation_id) id: vec3u,
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
     @builtin(num_workgroups) groups: vec3u,
 ) {
-    let i = thread_of(id, groups, 256u);
-    if i < job.count && !is_finite_number(unknowns[job.first + i]) {
-        atomicOr(&control.is_broken, 1u);
+    let span = span_of(workgroup, groups);
+    if span.groups == 0u {
+        return;
     }
+    for (var j = span.group * 256u + local; j < span.length; j += span.groups * 256u) {
+        let i = number_at(span.part, j);
+        if i != NOWHERE && i >= job.first && !is_finite_number(unknowns[i]) {
+            atomicOr(&control.parts[span.part].is_broken, 1u);
+        }
+    }
+}
+
+// Whether a part's multipliers are to be taken anew.
+fn is_repaired(part: u32) -> bool {
+    return job.mode != 0u || atomicLoad(&control.parts[part].is_broken) != 0u;
 }
 
 // Of a tetrahedron too large for the number format nothing can be told.
@@ -26,24 +39,25 @@ fn store_multiplier(place: u32, l: f32) {
     unknowns[job.first + place] = select(0.0, l, is_finite_number(l));
 }
 
-// Takes all multipliers from the positions, where one was found broken (mode 0) or whatever they are
-// (mode 1). Tetrahedra come first, then springs, then attachments.
+// Takes all multipliers of a part from the positions, where one was found broken (mode 0) or whatever they
+// are (mode 1). Tetrahedra come first, then springs, then attachments.
 @compute @workgroup_size(64)
 fn repair_multipliers(
     @builtin(global_invocation_id) id: vec3u,
     @builtin(num_workgroups) groups: vec3u,
 ) {
-    if job.mode == 0u && atomicLoad(&control.is_broken) == 0u {
-        return;
-    }
     let before_attachments = job.tet_count + job.spring_count;
     let stride = 64u * groups.x * groups.y;
     for (var i = thread_of(id, groups, 64u); i < job.count; i += stride) {
         if i < job.tet_count {
-            repair_tet(i / LANES, i % LANES);
+            if is_repaired(table[table[BLOCK_PARTS_AT] + i / LANES]) {
+                repair_tet(i / LANES, i % LANES);
+            }
         } else if i < before_attachments {
-            repair_spring(springs[i - job.tet_count]);
-        } else {
+            if is_repaired(springs[i - job.tet_count].part) {
+                repair_spring(springs[i - job.tet_count]);
+            }
+        } else if is_repaired(attachments[i - before_attachments].part) {
             repair_attachment(i - before_attachments);
         }
     }
@@ -65,7 +79,7 @@ fn repair_tet(block: u32, lane: u32) {
     let is_viscous = (job.is_viscous & select(1u, 2u, is_neo)) != 0u;
     let kind = tets[block].material[lane];
     let counts = kind != FILLING;
-    let material = materials[select(0u, kind, counts)];
+    let material = material_of(select(0u, kind, counts));
     let volume = select(0.0, tets[block].rest_volume[lane], counts);
     let vertices = vertices_of(block, lane);
     let x = array<vec3f, 4>(

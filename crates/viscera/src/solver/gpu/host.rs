@@ -2,7 +2,12 @@
 
 use super::buffers::{Attachment, Spring, Update};
 use super::record::Job;
+use super::record_guard::MODES;
+use super::report::{Control, PartControl};
 use super::{FrameConstants, layout};
+use crate::scalar::lanes::LANES;
+use crate::solver::acceleration::LARGEST_WINDOW;
+use crate::solver::guard;
 
 /// Name, bytes, and the name and place [bytes] of every field.
 pub type HostLayout = (&'static str, usize, Vec<(&'static str, usize)>);
@@ -26,8 +31,13 @@ pub fn host_layouts() -> Vec<HostLayout> {
         }),
         record!("Frame" FrameConstants {
             gravity dt squared_dt inverse_dt rescale relaxation_multipliers relaxation_positions
-            rebase_factor bound_share update_count small_dt inverse_small_dt small_steps
-            chebyshev_damping
+            update_count part_count chebyshev_damping
+        }),
+        record!("Control" Control { small_step small_steps_done step rejected_step rejected parts }),
+        record!("PartControl" PartControl {
+            sweeps next differences last_norm shares gram iteration omega radius last_change limit
+            was_rejected share descends potential noise kept_speed best_value failures
+            mixture_best mixture_failures is_good is_broken
         }),
         record!("Update" Update { vertex is_pinned force place stiffness inertia }),
         record!("Spring" Spring {
@@ -42,19 +52,30 @@ pub fn host_layouts() -> Vec<HostLayout> {
     ]
 }
 
-/// Constants that host and kernels share.
-#[doc(hidden)]
-pub fn host_constants() -> [(&'static str, u32); 4] {
-    use crate::scalar::lanes::LANES;
-    use crate::solver::acceleration::LARGEST_WINDOW;
-    [
+/// Constants that host and kernels share, as WGSL: every kernel's text begins with them.
+pub(super) fn constants() -> String {
+    let guarded = [
+        ("SHARE_COUNT", guard::SHARES.len() as u32),
+        ("SHORTENINGS", guard::SHORTENINGS as u32),
+        ("TOLERATED", guard::TOLERATED),
+    ];
+    let shared = [
         ("LANES", LANES as u32),
         ("FILLING", layout::FILLING),
-        ("LARGEST_WINDOW", LARGEST_WINDOW as u32),
+        ("WHOLE", layout::WHOLE),
         ("PRODUCTS", layout::PRODUCTS as u32),
-    ]
+        ("SUMS", layout::PIECE_SUMS as u32),
+        ("LINE_SUMS", layout::LINE_SUMS as u32),
+        ("LARGEST_WINDOW", LARGEST_WINDOW as u32),
+    ];
+    let ranges = (0..).zip(layout::GROUND).map(|(place, (name, _))| (name, place));
+    let numbers = layout::words().into_iter().chain(MODES.iter().copied());
+    let numbers = numbers.chain(ranges).chain(guarded).chain(shared);
+    let mut text: String =
+        numbers.map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect();
+    for (name, value) in [("SUFFICIENT", guard::SUFFICIENT), ("SHORTEN", guard::SHORTEN)] {
+        text += &format!("const {name}: f32 = {value:?};\n");
+    }
+    let shares = guard::SHARES.map(|share| format!("{share:?}")).join(", ");
+    text + &format!("const SHARES = array<f32, {}>({shares});\n", guard::SHARES.len())
 }
-
-/// Bytes of `Control`, which only kernels write.
-#[doc(hidden)]
-pub const HOST_CONTROL_SIZE: u64 = layout::CONTROL_SIZE;

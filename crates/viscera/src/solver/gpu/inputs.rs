@@ -2,6 +2,7 @@
 
 use super::GpuSolver;
 use super::buffers::{Buffers, Update};
+use super::layout::copy_offsets;
 use crate::model::Model;
 use crate::settings::{Acceleration, AndersonOn, Method, SolverSettings};
 use crate::solver::Inputs;
@@ -91,13 +92,13 @@ pub(super) fn norm_weights(
             AndersonOn::Both => {}
         }
     }
-    // No weight: where a vertex's copies begin, which Anderson joins; `Buffers` refuses more than single
-    // precision can number. What fills up behind the vertices has none.
+    // No weight, but the number of a vertex's first copy: Anderson joins them. What fills up behind the vertices
+    // has none.
     let (positions, _) = weights.split_at_mut((buffers.multipliers_start / 4) as usize);
-    let all = model.copy_offsets.iter();
-    let copies = all.chain(std::iter::repeat(&(model.copy_offsets[model.vertex_count()])));
-    for (four, &first) in positions.as_chunks_mut::<4>().0.iter_mut().zip(copies) {
-        four[3] = first as f32;
+    let mut copies = copy_offsets(model);
+    copies.resize(positions.len() / 4, model.copy_count() as u32);
+    for (four, first) in positions.as_chunks_mut::<4>().0.iter_mut().zip(copies) {
+        four[3] = f32::from_bits(first);
     }
     weights
 }

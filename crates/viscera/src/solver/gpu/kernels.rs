@@ -4,7 +4,7 @@ use super::buffers::Slot;
 use super::device::{Device, Pipeline};
 use crate::elements::TetForm;
 use crate::elements::wgsl;
-use crate::solver::potential::TISSUE_WGSL;
+use crate::solver::tissue::TISSUE_WGSL;
 
 /// A kernel: an entry point of one of the files, with the storage that it names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -35,7 +35,7 @@ pub enum File {
     History,
     Explicit,
     Evaluate,
-    Guard,
+    Search,
     Take,
     Energy,
 }
@@ -83,11 +83,11 @@ macro_rules! kernels {
 }
 
 kernels! {
-    APPLY_UPDATES = Vertices "apply_updates" 64 [Predicted Acting Targets Updates];
+    APPLY_UPDATES = Vertices "apply_updates" 64 [Predicted Acting Targets Updates Control];
     PREDICT = Vertices "predict" 64
-        [Points Velocities Previous Predicted Acting Targets Starts];
-    REBASE = Vertices "rebase" 64 [Offsets Points Loads Previous Predicted Acting];
-    RECOMPUTE_POSITIONS = Vertices "recompute_positions" 64 [Offsets Points Loads Predicted Acting];
+        [Points Velocities Previous Predicted Acting Targets Starts Table];
+    REBASE = Vertices "rebase" 64 [Points Loads Previous Predicted Acting Table];
+    RECOMPUTE_POSITIONS = Vertices "recompute_positions" 64 [Points Loads Predicted Acting Table];
     SPLIT_COPIES = Vertices "split_copies" 64 [Offsets Points Copies];
     JOIN_COPIES = Vertices "join_copies" 64 [Offsets Points Copies];
     UPDATE_VELOCITIES = Vertices "update_velocities" 64 [Points Velocities Previous];
@@ -106,40 +106,39 @@ kernels! {
     MEASURE_STRAIN = Strain "measure_strain" 64 [Tets Points StartStrain];
     RESCALE_MULTIPLIERS = Multipliers "rescale_multipliers" 256 [Multipliers];
     REMEMBER_ITERATE = Acceleration "remember_iterate" 256 [Unknowns Iterate];
-    START_ACCELERATION = Acceleration "start_acceleration" 1 [Control];
     ANDERSON_PUSH = AndersonPush "anderson_push" 128
-        [Unknowns Iterate Weights Residuals Mapped PartialSums Control];
+        [Unknowns Iterate Residuals Mapped PartialSums Control Table];
     ANDERSON_JOIN = AndersonPush "anderson_push" 128
-        [Copies Unknowns Iterate Weights Residuals Mapped PartialSums Control];
-    ANDERSON_WEIGHTS = Acceleration "anderson_weights" 128 [PartialSums Control];
-    ANDERSON_MIX = Acceleration "anderson_mix" 256 [Unknowns Iterate Mapped Control];
-    CHEBYSHEV_CHANGE = Acceleration "chebyshev_change" 128 [Unknowns Iterate Weights PartialSums];
-    CHEBYSHEV_WEIGHT = Acceleration "chebyshev_weight" 128 [PartialSums Control];
-    FIND_BROKEN = History "find_broken" 256 [Unknowns Control];
+        [Copies Unknowns Iterate Residuals Mapped PartialSums Control Table];
+    ANDERSON_WEIGHTS = Acceleration "anderson_weights" 128 [PartialSums Control Table];
+    ANDERSON_MIX = Acceleration "anderson_mix" 256 [Unknowns Iterate Mapped Control Table];
+    CHEBYSHEV_CHANGE = Acceleration "chebyshev_change" 128 [Unknowns Iterate PartialSums Table];
+    CHEBYSHEV_WEIGHT = Acceleration "chebyshev_weight" 128 [PartialSums Control Table];
+    FIND_BROKEN = History "find_broken" 256 [Unknowns Control Table];
     REPAIR_MULTIPLIERS = History "repair_multipliers" 64
-        [Tets Materials StartStrain Unknowns Control Springs Attachments Anchors];
+        [Tets StartStrain Unknowns Control Springs Attachments Anchors Table];
     BEGIN_EXPLICIT = Explicit "begin_explicit" 64 [Points Velocities Previous Predicted Control];
-    BEGIN_STRAIN = Explicit "begin_strain" 64 [Tets Points Predicted StartStrain];
+    BEGIN_STRAIN = Explicit "begin_strain" 64 [Tets Points Predicted StartStrain Table];
     LOAD_FORCES = Explicit "load_forces" 64
-        [Tets Materials CornerIndices Points Loads StartStrain Control Springs];
+        [Tets CornerIndices Points Loads StartStrain Control Springs Table];
     ADVANCE_EXPLICIT = Explicit "advance_explicit" 64
-        [Offsets Points Loads Velocities Previous Acting Targets Control];
+        [Points Loads Velocities Previous Acting Targets Control Table];
     END_EXPLICIT = Explicit "end_explicit" 64 [Points Velocities Predicted Acting];
-    CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control];
+    CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control Table];
     EVALUATE = Evaluate "evaluate" 256 [Tets Points StartStrain PartialSums Control Ground Table];
-    SETTLE = Guard "settle" 256
+    SEARCH = Search "search" 256
         [Tets Points Loads StartStrain PartialSums Control Ground Table];
-    TAKE = Take "take" 256 [Unknowns Mapped Control Ground Table];
-    LIMIT_PARTS = Energy "limit_parts" 256 [Points PartialSums Ground Table];
-    LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Ground Table];
+    TAKE = Take "take" 256 [Unknowns Mapped PartialSums Control Ground Table];
+    LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Control Ground Table];
 }
 
 /// Records and storage, for every kernel.
-const SHARED: [&str; 4] = [
+const SHARED: [&str; 5] = [
     wgsl::KINEMATICS,
     wgsl::GREEN_STRAIN,
     include_str!("control.wgsl"),
     include_str!("bindings.wgsl"),
+    include_str!("table.wgsl"),
 ];
 
 /// The whole text that a kernel is compiled from.
@@ -161,7 +160,9 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
         Swept::Jacobi => include_str!("sweep_jacobi.wgsl"),
     };
     let single = [wgsl::SPRING, wgsl::ATTACHMENT];
-    let mut texts = SHARED.to_vec();
+    let constants = super::host::constants();
+    let mut texts = vec![constants.as_str()];
+    texts.extend(SHARED);
     match kernel.file {
         File::Vertices => texts.push(include_str!("vertices.wgsl")),
         File::Sweep => {
@@ -183,14 +184,16 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
         File::Strain => texts.push(include_str!("strain.wgsl")),
         File::Multipliers => texts.push(include_str!("multipliers.wgsl")),
         File::Acceleration => {
-            texts.extend([include_str!("sums.wgsl"), include_str!("acceleration.wgsl")]);
+            texts.extend([include_str!("spans.wgsl"), include_str!("sums.wgsl")]);
+            texts.push(include_str!("acceleration.wgsl"));
         }
         File::AndersonPush => {
             let mapped = match variant.swept {
                 Swept::Vertices => include_str!("mapped_vertices.wgsl"),
                 Swept::Copies | Swept::Jacobi => include_str!("mapped_copies.wgsl"),
             };
-            texts.extend([include_str!("sums.wgsl"), mapped, include_str!("anderson_push.wgsl")]);
+            texts.extend([include_str!("spans.wgsl"), include_str!("sums.wgsl")]);
+            texts.extend([mapped, include_str!("anderson_push.wgsl")]);
         }
         File::History => {
             // Functions of the tissue need those of both laws; the pair brings its own along.
@@ -199,21 +202,22 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
             }
             texts.extend(form());
             texts.extend(single);
-            texts.extend([TISSUE_WGSL, include_str!("history.wgsl")]);
+            texts.extend([TISSUE_WGSL, include_str!("spans.wgsl"), include_str!("history.wgsl")]);
         }
         File::Explicit => {
             texts.extend([wgsl::NEO_HOOKEAN, wgsl::SPRING, TISSUE_WGSL]);
             texts.extend([include_str!("vertices.wgsl"), include_str!("explicit.wgsl")]);
         }
-        File::Evaluate | File::Guard | File::Take | File::Energy => {
+        File::Evaluate | File::Search | File::Take | File::Energy => {
             texts.extend(single);
             texts.extend([wgsl::NEO_HOOKEAN, TISSUE_WGSL, include_str!("potential.wgsl")]);
-            texts.push(match kernel.file {
-                File::Evaluate => include_str!("evaluate.wgsl"),
-                File::Guard => include_str!("guard.wgsl"),
-                File::Take => include_str!("take.wgsl"),
-                _ => include_str!("energy.wgsl"),
-            });
+            texts.push(include_str!("decide.wgsl"));
+            match kernel.file {
+                File::Evaluate => texts.push(include_str!("evaluate.wgsl")),
+                File::Search => texts.push(include_str!("search.wgsl")),
+                File::Take => texts.extend([include_str!("spans.wgsl"), include_str!("take.wgsl")]),
+                _ => texts.push(include_str!("energy.wgsl")),
+            }
         }
     }
     let [form, count] = match variant.form {

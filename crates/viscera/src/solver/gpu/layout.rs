@@ -3,17 +3,17 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{ALIGNMENT, Attachment, Range, Slot, Spring};
+use super::buffers::{ALIGNMENT, Attachment, Range, Slot, Spring, unknowns_size};
+use super::parts::{Fall, PartRow, Parts, SmallSteps};
+use super::record::Pieces;
 use crate::model::Model;
 use crate::scalar::lanes::LANES;
-
-/// Bytes of `Control` in control.wgsl.
-pub(super) const CONTROL_SIZE: u64 = 524;
+use crate::settings::{Method, SolverSettings};
 
 /// The material of a lane that only fills a block up.
 pub(super) const FILLING: u32 = u32::MAX;
 
-/// Workgroups that sum products of long vectors: enough to keep a large device busy, few enough for one
+/// Workgroups of a part that sum products of long vectors: enough to keep a large device busy, few enough for one
 /// workgroup to add up what they leave.
 pub(super) const SUM_GROUPS: u32 = 512;
 
@@ -22,52 +22,69 @@ pub(super) const PRODUCTS: u64 = 21;
 
 /// Elements or vertices whose energies one workgroup sums, and the numbers that it leaves.
 pub(super) const PIECE: usize = 512;
-const PIECE_SUMS: u64 = 24;
+pub(super) const PIECE_SUMS: u64 = 24;
 
-/// Numbers that the energy limit leaves for each part of the model.
-pub(super) const PART_NUMBERS: usize = 4;
+/// Numbers that it leaves of the shares of a step that are tried, and as many of the lengths of a descent.
+pub(super) const LINE_SUMS: u64 = 16;
+
+/// The material constants of [`materials`].
+pub(super) const MATERIAL_WORDS: u32 = 6;
 
 /// Where everything stands in the table, the ground and the partial sums; the first words of the table.
-/// potential.wgsl has the same order.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-struct Header {
+pub(super) struct Header {
     /// Words of the table.
-    materials: u32,
-    corners: u32,
-    offsets: u32,
-    springs: u32,
-    attachments: u32,
-    pieces: u32,
-    members: u32,
+    pub materials: u32,
+    pub corners: u32,
+    pub offsets: u32,
+    pub springs: u32,
+    pub attachments: u32,
+    pub pieces: u32,
+    pub members: u32,
+    pub parts: u32,
+    pub runs: u32,
+    pub block_parts: u32,
+    pub weights: u32,
+    pub small_steps: u32,
+    pub falls: u32,
     /// Vertices from one range of the ground to the next, and where anchors begin.
-    stride: u32,
-    anchors: u32,
+    pub stride: u32,
+    pub anchors: u32,
     /// Places among the partial sums.
-    parts: u32,
-    energies: u32,
-    vertex_count: u32,
+    pub lines: u32,
+    pub energies: u32,
     /// Lanes of all tetrahedra, and of those before the first neo-Hookean one.
-    tet_lanes: u32,
-    neo_hookean_from: u32,
-    spring_count: u32,
-    attachment_count: u32,
-    piece_count: u32,
+    pub tet_lanes: u32,
+    pub neo_hookean_from: u32,
+    pub spring_count: u32,
+    pub part_count: u32,
 }
 
-/// The ranges of the ground that kernels know by a slot, in order; `None` for one that only the guard
-/// knows. Starts are three.
-const GROUND: [Option<Slot>; 10] = [
-    Some(Slot::Previous),
-    Some(Slot::Predicted),
-    Some(Slot::Acting),
-    Some(Slot::Targets),
-    Some(Slot::Velocities),
-    Some(Slot::Starts),
-    None,
-    None,
-    None,
-    None,
+/// A piece: elements among the members, or vertices, of one part.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Piece {
+    pub part: u32,
+    pub first: u32,
+    pub end: u32,
+    pub are_vertices: u32,
+}
+
+/// The ranges of the ground, in order, with the slot that kernels know them by; `None` for one that only the
+/// guard knows. From the reference on there are the start of the step, the inertial prediction and the start of
+/// the iteration, pins moved in all: `Starts` are these three. Behind them a line along which places are tried.
+pub(super) const GROUND: [(&str, Option<Slot>); 10] = [
+    ("PREVIOUS", Some(Slot::Previous)),
+    ("PREDICTED", Some(Slot::Predicted)),
+    ("ACTING", Some(Slot::Acting)),
+    ("TARGETS", Some(Slot::Targets)),
+    ("VELOCITIES", Some(Slot::Velocities)),
+    ("REFERENCE", Some(Slot::Starts)),
+    ("AHEAD", None),
+    ("START", None),
+    ("TRIAL", None),
+    ("DIRECTION", None),
 ];
 /// Of these, how many there are where steps are not guarded.
 const UNGUARDED: usize = 6;
@@ -79,8 +96,6 @@ pub(super) struct Table {
     /// Bytes of what belongs to vertices, and of all sums.
     pub ground_size: u64,
     pub sums_size: u64,
-    /// Where the parts' numbers begin among the sums [bytes].
-    pub parts_start: u64,
 }
 
 /// Where loads go and what is summed together.
@@ -92,17 +107,17 @@ pub(super) struct Layout {
     corners: Vec<[[u32; LANES]; 4]>,
     springs: Vec<Spring>,
     attachments: Vec<Attachment>,
-    /// Elements and vertices, part by part.
+    /// Elements, part by part.
     members: Vec<u32>,
-    /// `(part, first, end, 1 for vertices)` among the members; then for each part the range of its
-    /// pieces of elements and that of its pieces of vertices.
-    pieces: Vec<[u32; 4]>,
-    /// Pieces without the ranges behind them.
-    pub piece_count: u32,
+    /// First those of elements.
+    pub pieces: Vec<Piece>,
+    /// The part of each block.
+    block_parts: Vec<u32>,
+    pub parts: Parts,
 }
 
 impl Layout {
-    pub fn new(model: &Model<f32>) -> Self {
+    pub fn new(model: &Model<f32>, settings: &SolverSettings) -> Self {
         let of = |vertex: u32| model.numbering.of(vertex) as u32;
         let mut counts = vec![0u32; model.vertex_count() + 1];
         let mut count = |vertex: u32| {
@@ -134,7 +149,7 @@ impl Layout {
                 multiplier: (model_springs.multiplier_offset + i) as u32,
                 rest_length: model_springs.rest_length[i],
                 stiffness: model_springs.stiffness[i],
-                part: model.component_of[vertices[0] as usize],
+                part: model.part_at(vertices[0] as usize) as u32,
             });
         }
         let held = &model.attachments;
@@ -147,7 +162,7 @@ impl Layout {
                 slot: count(vertex),
                 multiplier: (held.multiplier_offset + 3 * i) as u32,
                 stiffness: held.stiffness[i],
-                part: model.component_of[vertex as usize],
+                part: model.part_at(vertex as usize) as u32,
             });
         }
         let mut offsets = Vec::with_capacity(counts.len());
@@ -175,8 +190,12 @@ impl Layout {
             attachment.slot += offsets[attachment.vertex as usize];
         }
         let (members, pieces) = pieces(model, &springs, &attachments);
-        let piece_count = (pieces.len() - model.component_count) as u32;
-        Self { offsets, corners, springs, attachments, members, pieces, piece_count }
+        let parts = Parts::new(model, settings, &pieces);
+        let sets = model.tet_sets().into_iter();
+        let of_block = |vertices: &[[u32; LANES]; 4]| model.part_at(vertices[0][0] as usize) as u32;
+        let block_parts = sets.flat_map(|set| set.blocks.iter().map(|b| of_block(&b.vertices)));
+        let block_parts = block_parts.collect();
+        Self { offsets, corners, springs, attachments, members, pieces, block_parts, parts }
     }
 
     /// Where a vertex's loads begin.
@@ -190,7 +209,8 @@ impl Layout {
     }
 
     /// What never changes beside the tetrahedra, and where everything stands.
-    pub fn table(&self, model: &Model<f32>, guarded: bool) -> Table {
+    pub fn table(&self, model: &Model<f32>, settings: &SolverSettings) -> Table {
+        let guarded = settings.guards_steps();
         let (mut bytes, mut ranges) = (vec![0; ALIGNMENT as usize], Vec::new());
         let mut add = |slot: Option<Slot>, new: &[u8]| {
             let start = bytes.len();
@@ -212,20 +232,31 @@ impl Layout {
             offsets: add(Some(Slot::Offsets), &words(&self.offsets)),
             springs: add(Some(Slot::Springs), bytemuck::cast_slice(&self.springs)),
             attachments: add(Some(Slot::Attachments), bytemuck::cast_slice(&self.attachments)),
-            pieces: add(None, &words(self.pieces.as_flattened())),
+            pieces: add(None, bytemuck::cast_slice(&self.pieces)),
             members: add(None, &words(&self.members)),
-            vertex_count: model.vertex_count() as u32,
+            parts: add(None, bytemuck::cast_slice(&self.parts.rows)),
+            runs: add(None, &words(self.parts.runs.as_flattened())),
+            block_parts: add(None, &words(&self.block_parts)),
             tet_lanes: (LANES * self.corners.len()) as u32,
             neo_hookean_from: (LANES * model.green_strain.block_count()) as u32,
             spring_count: self.springs.len() as u32,
-            attachment_count: self.attachments.len() as u32,
-            piece_count: self.piece_count,
+            part_count: model.part_count() as u32,
             ..Header::default()
         };
+        let falls = vec![Fall::default(); model.part_count()];
+        header.falls = add(Some(Slot::Falls), bytemuck::cast_slice(&falls));
+        if settings.method == Method::Explicit {
+            let small = vec![SmallSteps::default(); model.part_count()];
+            header.small_steps = add(Some(Slot::SmallSteps), bytemuck::cast_slice(&small));
+        }
+        if super::accelerates(settings) {
+            let weights = vec![0; unknowns_size(model) as usize];
+            header.weights = add(Some(Slot::Weights), &weights);
+        }
 
         let each = 16 * u64::from(Self::stride(model));
         let count = if guarded { GROUND.len() } else { UNGUARDED };
-        for (place, slot) in GROUND[..count].iter().enumerate() {
+        for (place, (_, slot)) in GROUND[..count].iter().enumerate() {
             let size = if guarded && *slot == Some(Slot::Starts) { 3 * each } else { each };
             let start = each * place as u64;
             ranges.extend(slot.map(|slot| Range { slot, owner: Slot::Ground, start, size }));
@@ -235,15 +266,15 @@ impl Layout {
         ranges.push(Range { slot: Slot::Anchors, owner: Slot::Ground, start, size });
         (header.stride, header.anchors) = (Self::stride(model), (start / 16) as u32);
 
-        let pieces = PIECE_SUMS * u64::from(self.piece_count);
-        let parts = (PRODUCTS * u64::from(SUM_GROUPS)).max(if guarded { pieces } else { 0 });
-        let energies = parts + (PART_NUMBERS * model.component_count) as u64;
-        let elements = header.tet_lanes + header.spring_count + header.attachment_count;
-        let sums = energies + if guarded { elements.into() } else { 0 };
-        (header.parts, header.energies) = (parts as u32, energies as u32);
+        // Sums of the accelerations are read before pieces leave theirs.
+        let pieces = if guarded { self.pieces.len() as u64 } else { 0 };
+        let lines = (PRODUCTS * u64::from(self.parts.groups())).max(PIECE_SUMS * pieces);
+        let energies = lines + 2 * LINE_SUMS * pieces;
+        let elements = header.tet_lanes as usize + self.springs.len() + self.attachments.len();
+        let sums = energies + if guarded { elements as u64 } else { 0 };
+        (header.lines, header.energies) = (lines as u32, energies as u32);
         bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
-        let ground_size = start + size;
-        Table { bytes, ranges, ground_size, sums_size: 4 * sums, parts_start: 4 * parts }
+        Table { bytes, ranges, ground_size: start + size, sums_size: 4 * sums }
     }
 
     /// Vertices from one range of the ground to the next.
@@ -251,10 +282,13 @@ impl Layout {
         model.vertex_count().next_multiple_of((ALIGNMENT / 16) as usize) as u32
     }
 
-    /// The first piece of vertices.
-    pub fn first_of_vertices(&self) -> u32 {
-        let pieces = &self.pieces[..self.piece_count as usize];
-        pieces.partition_point(|piece| piece[3] == 0) as u32
+    /// How the work is divided.
+    pub fn pieces(&self) -> Pieces {
+        Pieces {
+            count: self.pieces.len() as u32,
+            first_of_vertices: self.pieces.partition_point(|piece| piece.are_vertices == 0) as u32,
+            groups: self.parts.groups(),
+        }
     }
 
     /// Copies of each corner, and where those of each vertex begin.
@@ -264,21 +298,34 @@ impl Layout {
             .flat_map(|set| (0..set.block_count()).map(move |block| set.copies_of(block)))
             .flat_map(|corners| corners.as_flattened().iter().copied())
             .collect();
-        [indices, model.copy_offsets.clone()].map(|words| bytemuck::cast_slice(&words).to_vec())
+        [indices, copy_offsets(model)].map(|words| bytemuck::cast_slice(&words).to_vec())
     }
 }
 
-/// Members of each part, in pieces.
+/// Where a vertex's copies begin is marked so in parts where no vertex has several: there copies are vertices,
+/// and nothing is averaged.
+pub(super) const WHOLE: u32 = 1 << 31;
+
+/// Where the copies of each vertex begin, one more at the end.
+pub(super) fn copy_offsets(model: &Model<f32>) -> Vec<u32> {
+    let mut offsets = model.copy_offsets.clone();
+    for part in model.parts.iter().filter(|part| !part.is_split()) {
+        offsets[part.vertices.clone()].iter_mut().for_each(|first| *first |= WHOLE);
+    }
+    offsets
+}
+
+/// Elements of each part in pieces, then vertices.
 fn pieces(
     model: &Model<f32>,
     springs: &[Spring],
     attachments: &[Attachment],
-) -> (Vec<u32>, Vec<[u32; 4]>) {
+) -> (Vec<u32>, Vec<Piece>) {
     let mut elements = Vec::new();
     let mut first = 0;
     for set in model.tet_sets() {
         for (block, lane) in set.places() {
-            let part = model.component_of[set.blocks[block].vertices[0][lane] as usize];
+            let part = model.part_at(set.blocks[block].vertices[0][lane] as usize) as u32;
             elements.push((part, (LANES * (first + block) + lane) as u32));
         }
         first += set.block_count();
@@ -289,25 +336,22 @@ fn pieces(
     let before = springs.len();
     elements.extend(attachments.iter().enumerate().map(|(i, a)| (a.part, after(i, before))));
     elements.sort_by_key(|&(part, _)| part);
-    let mut vertices: Vec<(u32, u32)> =
-        model.component_of.iter().enumerate().map(|(v, &part)| (part, v as u32)).collect();
-    vertices.sort_by_key(|&(part, _)| part);
 
-    let mut ranges = vec![[0u32; 4]; model.component_count];
     let (mut members, mut pieces) = (Vec::new(), Vec::new());
-    for (kind, list) in [elements, vertices].into_iter().enumerate() {
-        for of_part in list.chunk_by(|a, b| a.0 == b.0) {
-            let part = of_part[0].0;
-            ranges[part as usize][2 * kind] = pieces.len() as u32;
-            for piece in of_part.chunks(PIECE) {
-                let first = members.len() as u32;
-                members.extend(piece.iter().map(|&(_, member)| member));
-                pieces.push([part, first, members.len() as u32, kind as u32]);
-            }
-            ranges[part as usize][2 * kind + 1] = pieces.len() as u32;
+    for of_part in elements.chunk_by(|a, b| a.0 == b.0) {
+        for piece in of_part.chunks(PIECE) {
+            let first = members.len() as u32;
+            members.extend(piece.iter().map(|&(_, member)| member));
+            let end = members.len() as u32;
+            pieces.push(Piece { part: of_part[0].0, first, end, are_vertices: 0 });
         }
     }
-    pieces.extend(ranges);
+    for (part, own) in (0..).zip(model.parts.iter()) {
+        for first in own.vertices.clone().step_by(PIECE) {
+            let end = own.vertices.end.min(first + PIECE) as u32;
+            pieces.push(Piece { part, first: first as u32, end, are_vertices: 1 });
+        }
+    }
     (members, pieces)
 }
 
@@ -338,4 +382,46 @@ fn materials(model: &Model<f32>) -> Vec<u8> {
         })
         .collect();
     bytemuck::cast_slice(&constants).to_vec()
+}
+
+/// Names and places of words that kernels find in the table.
+pub(super) fn words() -> Vec<(&'static str, u32)> {
+    macro_rules! words {
+        ($record:ty { $($name:literal $field:ident)* }) => {
+            vec![$(($name, (std::mem::offset_of!($record, $field) / 4) as u32)),*]
+        };
+    }
+    let mut all = words!(Header {
+        "MATERIALS_AT" materials "CORNERS_AT" corners "OFFSETS_AT" offsets "SPRINGS_AT" springs
+        "ATTACHMENTS_AT" attachments "PIECES_AT" pieces "MEMBERS_AT" members "PARTS_AT" parts
+        "RUNS_AT" runs "BLOCK_PARTS_AT" block_parts "WEIGHTS_AT" weights "SMALL_STEPS_AT" small_steps "FALLS_AT" falls "STRIDE_AT" stride
+        "ANCHORS_AT" anchors "LINES_AT" lines "ENERGIES_AT" energies "TET_LANES_AT" tet_lanes
+        "NEO_HOOKEAN_FROM_AT" neo_hookean_from "SPRING_COUNT_AT" spring_count
+        "PART_COUNT_AT" part_count
+    });
+    all.extend(words!(Piece {
+        "PIECE_PART" part "PIECE_FIRST" first "PIECE_END" end "PIECE_ARE_VERTICES" are_vertices
+    }));
+    all.extend(words!(PartRow {
+        "PART_ELEMENT_PIECES" element_pieces "PART_ELEMENT_PIECES_END" element_pieces_end
+        "PART_VERTEX_PIECES" vertex_pieces "PART_VERTEX_PIECES_END" vertex_pieces_end
+        "PART_VERTICES_END" vertices_end "PART_GROUPS_END" groups_end "PART_RUNS" runs
+        "PART_RUNS_END" runs_end "PART_LENGTH" length "PART_REBASE_FACTOR" rebase_factor
+        "PART_BOUND_SHARE" bound_share
+    }));
+    let size = |bytes: usize| (bytes / 4) as u32;
+    all.extend(words!(SmallSteps {
+        "SMALL_COUNT" count "SMALL_DT" dt "SMALL_INVERSE_DT" inverse_dt
+    }));
+    all.extend(words!(Fall { "FALL_IS_FREE" is_free "FALL_ACCELERATION" acceleration }));
+    all.extend([
+        ("FALL_WORDS", size(size_of::<Fall>())),
+        ("SMALL_WORDS", size(size_of::<SmallSteps>())),
+        ("PIECE_WORDS", size(size_of::<Piece>())),
+        ("PART_WORDS", size(size_of::<PartRow>())),
+        ("SPRING_WORDS", size(size_of::<Spring>())),
+        ("ATTACHMENT_WORDS", size(size_of::<Attachment>())),
+        ("MATERIAL_WORDS", MATERIAL_WORDS),
+    ]);
+    all
 }

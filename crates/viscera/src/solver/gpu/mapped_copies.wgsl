@@ -1,5 +1,5 @@
-// The sweep has left positions in copies: here they are joined, as `join_copies` does. The last of a
-// vertex's four weights, which is no weight, holds where its copies begin.
+// The sweep has left positions in copies: here they are joined, as `join_copies` does. Where a vertex's
+// copies begin stands in the place of its fourth weight.
 fn mapped_value(i: u32) -> f32 {
     let value = unknowns[i];
     if i >= job.first {
@@ -9,10 +9,15 @@ fn mapped_value(i: u32) -> f32 {
     if own + 4u >= job.first {
         return value;
     }
-    let first = u32(weights[own]);
-    let end = u32(weights[own + 4u]);
+    let begin = table[table[WEIGHTS_AT] + own];
+    let first = begin & ~WHOLE;
+    let end = table[table[WEIGHTS_AT] + own + 4u] & ~WHOLE;
     if end <= first {
         return value;
+    }
+    if (begin & WHOLE) != 0u {
+        unknowns[i] = copies[first][i & 3u];
+        return unknowns[i];
     }
     var sum = 0.0;
     for (var copy = first; copy < end; copy++) {

@@ -25,6 +25,7 @@ mod host;
 mod inputs;
 pub mod kernels;
 mod layout;
+mod parts;
 mod record;
 mod record_guard;
 mod report;
@@ -34,13 +35,13 @@ mod switch;
 mod timing;
 
 use super::StepError;
-use super::cpu::{bound_share, rebase_factor, sizes};
+use super::cpu::sizes;
 use super::explicit::Stability;
-use super::plan::Plan;
+use super::plan::{Plan, Stage};
 use super::tethers::Bundle;
 use crate::model::Model;
 use crate::scalar::Vec3;
-use crate::settings::{Method, Precision, SolverSettings};
+use crate::settings::{Acceleration, Method, Precision, SolverSettings, Start};
 use crate::state::State;
 pub use buffers::Slot;
 use buffers::{Buffers, Update};
@@ -51,9 +52,10 @@ pub use error::GpuError;
 use explicit::Hold;
 pub use frames::Frame;
 use frames::Frames;
-pub use host::{HOST_CONTROL_SIZE, HostLayout, host_constants, host_layouts};
+pub use host::{HostLayout, host_layouts};
 use layout::Layout;
-use record::{Dispatch, Job, Pieces, Recorder};
+use parts::{Falls, SmallSteps};
+use record::{Dispatch, Job, Recorder};
 use step::FrameConstants;
 pub use surface::{GpuSurface, Skin};
 use timing::StageRange;
@@ -82,6 +84,14 @@ fn window(settings: &SolverSettings) -> u32 {
     settings.anderson_window.clamp(1, super::acceleration::LARGEST_WINDOW as u32)
 }
 
+/// Threads of a workgroup that sums products of long vectors.
+const SUM_THREADS: u32 = 128;
+
+/// Whether there is anything to accelerate, and it is asked for.
+fn accelerates(settings: &SolverSettings) -> bool {
+    settings.method == Method::Xpbd && settings.acceleration != Acceleration::None
+}
+
 /// A solver for one model on a graphics processor, in single precision.
 #[derive(Debug)]
 pub struct GpuSolver {
@@ -107,9 +117,8 @@ pub struct GpuSolver {
     updates: Vec<Update>,
     /// Where each vertex stands in `updates`; `u32::MAX` for nowhere.
     update_of: Vec<u32>,
-    shares: [f32; 2],
-    /// Where the energy limit's numbers begin among the partial sums [bytes], and of how many parts.
-    parts: (usize, usize),
+    /// Connected parts of the model.
+    part_count: usize,
     /// The step [s] that the norm's weights on the device belong to.
     weights_dt: f64,
     /// Whether the device's anchors may be elsewhere than at rest.
@@ -119,6 +128,9 @@ pub struct GpuSolver {
     /// Springs to places outside in the last step.
     tethers: Vec<Bundle<f32>>,
     holds: Vec<Hold>,
+    small_steps: Vec<SmallSteps>,
+    /// What nothing holds starts otherwise, where that is asked for.
+    falls: Option<Falls>,
 }
 
 impl GpuSolver {
@@ -161,12 +173,10 @@ impl GpuSolver {
             return Err(GpuError::BelowBaseline { name: device.name().to_owned(), lacking });
         }
         let plan = Plan::new(model, settings);
-        let layout = Layout::new(model);
+        let layout = Layout::new(model, settings);
         let buffers = Buffers::new(device, model, settings, &layout, left_over)?;
         let vector = [buffers.length, (buffers.multipliers_start / 4) as u32];
-        let pieces =
-            Pieces { count: layout.piece_count, first_of_vertices: layout.first_of_vertices() };
-        let record = Recorder::new(model, settings, &plan, vector, pieces).record(&plan);
+        let record = Recorder::new(model, settings, &plan, vector, layout.pieces()).record(&plan);
         let lists = [record.prologue, record.body, record.epilogue, record.restart];
         let wgpu = &device.device;
         let make = |label, size, usage| {
@@ -212,6 +222,7 @@ impl GpuSolver {
             weights_dt: 0.0,
             device: device.clone(),
             settings: settings.clone(),
+            falls: plan.prologue.contains(&Stage::Predict(Start::Auto)).then(|| Falls::new(model)),
             plan,
             uniforms,
             frame,
@@ -223,14 +234,17 @@ impl GpuSolver {
             restart,
             multiplier_dt: 0.0,
             touched: Vec::new(),
-            parts: (buffers.parts_start as usize, model.component_count),
+            part_count: model.part_count(),
             updates: Vec::new(),
             update_of: vec![u32::MAX; model.vertex_count()],
-            shares: [rebase_factor(model, settings) as f32, bound_share(model) as f32],
             has_moved_anchors: true,
             stability: Stability::new(is_explicit.then_some(model), settings),
             tethers: Vec::new(),
             holds: if is_explicit { Hold::all(model) } else { Vec::new() },
+            small_steps: vec![
+                SmallSteps::default();
+                if is_explicit { model.part_count() } else { 0 }
+            ],
             buffers,
         };
         solver.upload_constants(model);
@@ -270,12 +284,10 @@ impl GpuSolver {
     /// the other, an iteration is.
     pub fn dispatches_of(model: &Model<f32>, settings: &SolverSettings) -> [usize; 3] {
         let plan = Plan::new(model, settings);
-        let layout = Layout::new(model);
+        let layout = Layout::new(model, settings);
         let multipliers = 4 * model.vertex_count() as u32;
         let vector = [multipliers + model.multiplier_count as u32, multipliers];
-        let pieces =
-            Pieces { count: layout.piece_count, first_of_vertices: layout.first_of_vertices() };
-        let record = Recorder::new(model, settings, &plan, vector, pieces).record(&plan);
+        let record = Recorder::new(model, settings, &plan, vector, layout.pieces()).record(&plan);
         [record.prologue, record.body, record.epilogue].map(|list| list.len())
     }
 
@@ -357,7 +369,7 @@ impl GpuSolver {
             (0..order.len()).map(|v| [0.0, 0.0, 0.0, w(v)]).collect()
         };
         let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
-        let control = [0u8; layout::CONTROL_SIZE as usize];
+        let control = vec![0u8; report::control_size(model.part_count()) as usize];
         self.device.queue.write_buffer(self.buffers.buffer(Slot::Control), 0, &control);
         let mut stiffness = vec![0.0; order.len()];
         for hold in &self.holds {
@@ -394,6 +406,6 @@ fn prepare(device: &Device, buffers: &Buffers, dispatch: &Dispatch, job: u32) ->
     });
     let along = dispatch.groups.min(MOST_GROUPS);
     let groups = [along, dispatch.groups.div_ceil(along.max(1))];
-    let starts_acceleration = *dispatch.kernel == kernels::START_ACCELERATION;
+    let starts_acceleration = *dispatch.kernel == kernels::APPLY_UPDATES;
     Ready { pipeline: made.pipeline, storage, job, groups, starts_acceleration }
 }

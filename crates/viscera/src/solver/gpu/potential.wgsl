@@ -10,43 +10,13 @@
 const THREADS: u32 = 256u;
 const EPSILON: f32 = 1.1920929e-7;
 
-// The first words of the table: where everything stands (`Header` in layout.rs).
-const MATERIALS_AT: u32 = 0u;
-const CORNERS_AT: u32 = 1u;
-const OFFSETS_AT: u32 = 2u;
-const SPRINGS_AT: u32 = 3u;
-const ATTACHMENTS_AT: u32 = 4u;
-const PIECES_AT: u32 = 5u;
-const MEMBERS_AT: u32 = 6u;
-const STRIDE: u32 = 7u;
-const ANCHORS_AT: u32 = 8u;
-const PARTS_AT: u32 = 9u;
-const ENERGIES_AT: u32 = 10u;
-const VERTEX_COUNT: u32 = 11u;
-const TET_LANES: u32 = 12u;
-const NEO_HOOKEAN_FROM: u32 = 13u;
-const SPRING_COUNT: u32 = 14u;
-const ATTACHMENT_COUNT: u32 = 15u;
-const PIECE_COUNT: u32 = 16u;
-
-// The ranges of the ground.
-const PREVIOUS: u32 = 0u;
-const PREDICTED: u32 = 1u;
-const ACTING: u32 = 2u;
-const TARGETS: u32 = 3u;
-const VELOCITIES: u32 = 4u;
-// The start of the step, the inertial prediction and the start of the iteration, pins moved in all.
-const REFERENCE: u32 = 5u;
-const AHEAD: u32 = 6u;
-const START: u32 = 7u;
-// A line along which places are tried.
-const TRIAL: u32 = 8u;
-const DIRECTION: u32 = 9u;
-// Places beside the ranges: the positions, and `TRIAL + line * DIRECTION`.
+// Places beside the ranges of the ground: the positions, and `TRIAL + line * DIRECTION`.
 const POINTS: u32 = 100u;
 const LINE: u32 = 101u;
 
 var<private> line: f32;
+// Where the vertices are that are tested.
+var<private> tested_at: u32 = POINTS;
 
 // What a piece leaves, or a sum of pieces: potentials above the reference, of elements in [J], of inertia in
 // [J s^2]; and of how many elements the reference is no number.
@@ -73,22 +43,14 @@ const SUM_MASS: u32 = 14u;
 const SUM_MOMENTUM_START: u32 = 15u;
 const SUM_MOMENTUM: u32 = 18u;
 const SUM_LOAD: u32 = 21u;
-const SUMS: u32 = 24u;
-alias Sums = array<f32, 24>;
-
-// What is asked of a piece: the energies of the reference, and the other starts; motion for the energy
-// limit; nothing where the iterate has passed already, or where the step was not taken back.
-const WITH_STARTS: u32 = 1u;
-const WITH_MOTION: u32 = 2u;
-const UNLESS_GOOD: u32 = 4u;
-const IF_REJECTED: u32 = 8u;
+alias Sums = array<f32, SUMS>;
 
 var<workgroup> shared_sums: array<f32, 2048>;
 var<workgroup> totals: Sums;
 var<workgroup> decision: u32;
 
-// Sums over the workgroup, eight at a time (the reach is a maximum), into `totals`.
-fn reduce(given: Sums, groups: u32, local: u32) {
+// Sums over the workgroup, eight at a time, into `totals`; maxima where `maxima` has a bit.
+fn reduce(given: Sums, groups: u32, maxima: u32, local: u32) {
     var values = given;
     for (var group = 0u; group < groups; group++) {
         workgroupBarrier();
@@ -102,7 +64,8 @@ fn reduce(given: Sums, groups: u32, local: u32) {
                     let at = THREADS * k + local;
                     let a = shared_sums[at];
                     let b = shared_sums[at + half];
-                    shared_sums[at] = select(a + b, max(a, b), 8u * group + k == SUM_REACH);
+                    let is_maximum = (maxima & (1u << (8u * group + k))) != 0u;
+                    shared_sums[at] = select(a + b, max(a, b), is_maximum);
                 }
             }
             workgroupBarrier();
@@ -127,12 +90,8 @@ fn is_finite(value: f32) -> bool {
     return (bitcast<u32>(value) & 0x7f800000u) != 0x7f800000u;
 }
 
-fn number(word: u32) -> f32 {
-    return bitcast<f32>(table[word]);
-}
-
 fn ground_of(range: u32, v: u32) -> vec4f {
-    return ground[range * table[STRIDE] + v];
+    return ground[range * table[STRIDE_AT] + v];
 }
 
 fn place(source: u32, v: u32) -> vec3f {
@@ -140,17 +99,20 @@ fn place(source: u32, v: u32) -> vec3f {
         return points[v].xyz;
     }
     if source == LINE {
-        let origin = ground_of(TRIAL, v).xyz;
-        // Zero times a direction may be no number.
-        if line == 0.0 {
-            return origin;
-        }
-        return origin + line * ground_of(DIRECTION, v).xyz;
+        return along(ground_of(TRIAL, v).xyz, ground_of(DIRECTION, v).xyz, line);
     }
     return ground_of(source, v).xyz;
 }
 
-// A tetrahedron where the vertices are at one of the places.
+// Zero times a direction may be no number.
+fn along(origin: vec3f, direction: vec3f, length: f32) -> vec3f {
+    if length == 0.0 {
+        return origin;
+    }
+    return origin + length * direction;
+}
+
+// A tetrahedron whose vertices are somewhere.
 struct Deformed {
     f: mat3x3f,
     shape: mat3x3f,
@@ -163,26 +125,18 @@ struct Deformed {
     change: array<f32, 6>,
 }
 
-fn deformed(block: u32, lane: u32, source: u32) -> Deformed {
-    let vertices = vertices_of(block, lane);
-    let x = array<vec3f, 4>(
-        place(source, vertices[0]),
-        place(source, vertices[1]),
-        place(source, vertices[2]),
-        place(source, vertices[3]),
-    );
+fn deformed(block: u32, lane: u32, x: array<vec3f, 4>) -> Deformed {
     let shape = shape_of(block, lane);
     let f = deformation_gradient(x, shape);
-    // Of six constants the first, the second and the last.
-    let material = table[MATERIALS_AT] + 6u * tets[block].material[lane];
-    let rate = number(material + 5u) * frame.inverse_dt;
-    let neo = LANES * block + lane >= table[NEO_HOOKEAN_FROM];
+    let material = material_of(tets[block].material[lane]);
+    let rate = material.viscosity * frame.inverse_dt;
+    let neo = LANES * block + lane >= table[NEO_HOOKEAN_FROM_AT];
     var change: array<f32, 6>;
     if rate > 0.0 {
         change = tissue_change_since(f, start_strain_of(block, lane));
     }
     let volume = tets[block].rest_volume[lane];
-    return Deformed(f, shape, volume, number(material), number(material + 1u), rate, neo, change);
+    return Deformed(f, shape, volume, material.lame_lambda, material.lame_mu, rate, neo, change);
 }
 
 fn stress_of(tet: Deformed) -> mat3x3f {
@@ -195,11 +149,8 @@ fn stress_of(tet: Deformed) -> mat3x3f {
 }
 
 // Energy [J] of a tetrahedron and, where wanted, its squared force [N^2].
-fn tet_answer(block: u32, lane: u32, source: u32, with_force: bool) -> vec2f {
-    if tets[block].material[lane] == FILLING {
-        return vec2f();
-    }
-    let tet = deformed(block, lane, source);
+fn tet_answer(block: u32, lane: u32, x: array<vec3f, 4>, with_force: bool) -> vec2f {
+    let tet = deformed(block, lane, x);
     var density = tissue_elastic_energy(tet.neo, tet.f, tet.lame_lambda, tet.lame_mu);
     if tet.viscosity_rate > 0.0 {
         let rate = tet.viscosity_rate;
@@ -215,45 +166,50 @@ fn tet_answer(block: u32, lane: u32, source: u32, with_force: bool) -> vec2f {
 
 // Where a spring and an attachment stand in the table.
 fn spring_row(i: u32) -> u32 {
-    return table[SPRINGS_AT] + 10u * i;
+    return table[SPRINGS_AT] + SPRING_WORDS * i;
 }
 
 fn attachment_row(i: u32) -> u32 {
-    return table[ATTACHMENTS_AT] + 6u * i;
+    return table[ATTACHMENTS_AT] + ATTACHMENT_WORDS * i;
 }
 
 fn anchor_of(i: u32) -> vec3f {
     return ground[table[ANCHORS_AT] + i].xyz;
 }
 
-fn spring_ends(row: u32, source: u32) -> array<vec3f, 2> {
-    return array<vec3f, 2>(place(source, table[row]), place(source, table[row + 1u]));
-}
-
-fn element_count() -> u32 {
-    return table[TET_LANES] + table[SPRING_COUNT] + table[ATTACHMENT_COUNT];
-}
-
-// Of a tetrahedron, spring or attachment.
-fn answer(element: u32, source: u32, with_force: bool) -> vec2f {
-    let tet_lanes = table[TET_LANES];
+// The vertices of a tetrahedron, spring or attachment, as often as it takes to fill four places.
+fn corners_of(element: u32) -> array<u32, 4> {
+    let tet_lanes = table[TET_LANES_AT];
     if element < tet_lanes {
-        return tet_answer(element / LANES, element % LANES, source, with_force);
+        return vertices_of(element / LANES, element % LANES);
     }
     let single = element - tet_lanes;
-    if single < table[SPRING_COUNT] {
+    if single < table[SPRING_COUNT_AT] {
         let row = spring_row(single);
-        return vec2f(spring_energy(spring_ends(row, source), number(row + 7u), number(row + 8u)), 0.0);
+        return array<u32, 4>(table[row], table[row + 1u], table[row], table[row]);
     }
-    let i = single - table[SPRING_COUNT];
-    let row = attachment_row(i);
-    let x = place(source, table[row]);
-    return vec2f(attachment_energy(x, anchor_of(i), number(row + 4u)), 0.0);
+    let v = table[attachment_row(single - table[SPRING_COUNT_AT])];
+    return array<u32, 4>(v, v, v, v);
+}
+
+// Of a tetrahedron, spring or attachment whose vertices are at `x`.
+fn answer(element: u32, x: array<vec3f, 4>, with_force: bool) -> vec2f {
+    let tet_lanes = table[TET_LANES_AT];
+    if element < tet_lanes {
+        return tet_answer(element / LANES, element % LANES, x, with_force);
+    }
+    let single = element - tet_lanes;
+    if single < table[SPRING_COUNT_AT] {
+        let row = spring_row(single);
+        let ends = array<vec3f, 2>(x[0], x[1]);
+        return vec2f(spring_energy(ends, number(row + 7u), number(row + 8u)), 0.0);
+    }
+    let i = single - table[SPRING_COUNT_AT];
+    return vec2f(attachment_energy(x[0], anchor_of(i), number(attachment_row(i) + 4u)), 0.0);
 }
 
 // `m/2 (|x - xt|^2 - |x_ref - xt|^2)` of a free vertex [kg m^2] without its large terms.
-fn inertia(v: u32, source: u32) -> f32 {
-    let x = place(source, v);
+fn inertia(v: u32, x: vec3f) -> f32 {
     let predicted = ground_of(PREDICTED, v);
     let start = ground_of(PREVIOUS, v).xyz;
     let both = (x - predicted.xyz) + (start - predicted.xyz);
@@ -262,21 +218,28 @@ fn inertia(v: u32, source: u32) -> f32 {
 
 fn add_element(element: u32, mode: u32, into: ptr<function, Sums>) {
     // Energies are called at one place: compilers put them in wherever they are called.
-    var sources = array<u32, 4>(REFERENCE, AHEAD, START, POINTS);
+    var sources = array<u32, 4>(REFERENCE, AHEAD, START, tested_at);
+    let corners = corners_of(element);
     for (var k = select(3u, 0u, (mode & WITH_STARTS) != 0u); k < 4u; k++) {
         let source = sources[k];
-        let found = answer(element, source, source == POINTS);
-        if source == REFERENCE {
+        let x = array<vec3f, 4>(
+            place(source, corners[0]),
+            place(source, corners[1]),
+            place(source, corners[2]),
+            place(source, corners[3]),
+        );
+        let found = answer(element, x, k == 3u);
+        if k == 0u {
             partial_sums[table[ENERGIES_AT] + element] = found.x;
-        } else if source == AHEAD {
+        } else if k == 1u {
             (*into)[SUM_AHEAD] += found.x - reference_of(element);
-        } else if source == START {
+        } else if k == 2u {
             (*into)[SUM_START] += found.x - reference_of(element);
         } else {
             add_tested(element, found, into);
         }
     }
-    if element >= table[TET_LANES] + table[SPRING_COUNT] {
+    if element >= table[TET_LANES_AT] + table[SPRING_COUNT_AT] {
         (*into)[SUM_HELD] += 1.0;
     }
 }
@@ -300,18 +263,18 @@ fn add_tested(element: u32, tested: vec2f, into: ptr<function, Sums>) {
 }
 
 fn add_vertex(v: u32, first: u32, mode: u32, into: ptr<function, Sums>) {
-    let x = points[v].xyz;
+    let x = place(tested_at, v);
     (*into)[SUM_REACH] = max((*into)[SUM_REACH], dot(x, x));
     if ground_of(ACTING, v).w == 0.0 {
         (*into)[SUM_HELD] += 1.0;
         return;
     }
-    let tested = inertia(v, POINTS);
+    let tested = inertia(v, x);
     (*into)[SUM_TESTED] += tested;
     (*into)[SUM_MAGNITUDE] += abs(tested);
     if (mode & WITH_STARTS) != 0u {
-        (*into)[SUM_AHEAD] += inertia(v, AHEAD);
-        (*into)[SUM_START] += inertia(v, START);
+        (*into)[SUM_AHEAD] += inertia(v, ground_of(AHEAD, v).xyz);
+        (*into)[SUM_START] += inertia(v, ground_of(START, v).xyz);
     }
     if (mode & WITH_MOTION) != 0u {
         add_motion(v, first, into);
@@ -320,7 +283,7 @@ fn add_vertex(v: u32, first: u32, mode: u32, into: ptr<function, Sums>) {
 
 // Velocity at the end of the step [m/s].
 fn end_velocity(v: u32) -> vec3f {
-    return (points[v].xyz - ground_of(PREVIOUS, v).xyz) * frame.inverse_dt;
+    return (place(tested_at, v) - ground_of(PREVIOUS, v).xyz) * frame.inverse_dt;
 }
 
 // What the energy limit needs (energy.wgsl). Large common motions would drown what is beside them:
@@ -338,7 +301,7 @@ fn add_motion(v: u32, first: u32, into: ptr<function, Sums>) {
     (*into)[SUM_KINETIC] += 0.5 * mass * dot(after, after);
     (*into)[SUM_RELATIVE_START] += 0.5 * mass * dot(relative_before, relative_before);
     (*into)[SUM_RELATIVE] += 0.5 * mass * dot(relative, relative);
-    let x = points[v].xyz;
+    let x = place(tested_at, v);
     let start = ground_of(PREVIOUS, v).xyz;
     let springs = 0.5 * hold.w * dot(x - start, (x - hold.xyz) + (start - hold.xyz));
     (*into)[SUM_WORK] += dot(load, x - start) - springs;
@@ -352,42 +315,67 @@ fn add_motion(v: u32, first: u32, into: ptr<function, Sums>) {
     }
 }
 
-// A piece: `(part, first, end, 1 for vertices)` among the members.
-fn piece_row(piece: u32) -> u32 {
-    return table[PIECES_AT] + 4u * piece;
+fn first_vertex_of(part: u32) -> u32 {
+    return table[piece_row(table[part_row(part) + PART_VERTEX_PIECES]) + PIECE_FIRST];
 }
 
-// The pieces of a part: `(first, end)` of elements, then of vertices.
-fn part_row(part: u32) -> u32 {
-    return piece_row(table[PIECE_COUNT] + part);
-}
-
+// An element of a piece.
 fn member(i: u32) -> u32 {
     return table[table[MEMBERS_AT] + i];
 }
 
-fn first_vertex_of(part: u32) -> u32 {
-    return member(table[piece_row(table[part_row(part) + 2u]) + 1u]);
-}
-
 fn sum_piece(piece: u32, mode: u32, local: u32) {
     let row = piece_row(piece);
-    let end = table[row + 2u];
-    let are_vertices = table[row + 3u] != 0u;
+    let end = table[row + PIECE_END];
+    let are_vertices = table[row + PIECE_ARE_VERTICES] != 0u;
     var sums: Sums;
     if are_vertices {
-        let first = first_vertex_of(table[row]);
-        for (var i = table[row + 1u] + local; i < end; i += THREADS) {
-            add_vertex(member(i), first, mode, &sums);
+        let first = first_vertex_of(table[row + PIECE_PART]);
+        for (var v = table[row + PIECE_FIRST] + local; v < end; v += THREADS) {
+            add_vertex(v, first, mode, &sums);
         }
     } else {
-        for (var i = table[row + 1u] + local; i < end; i += THREADS) {
+        for (var i = table[row + PIECE_FIRST] + local; i < end; i += THREADS) {
             add_element(member(i), mode, &sums);
         }
     }
     let groups = select(1u, 3u, are_vertices && (mode & WITH_MOTION) != 0u);
-    reduce(sums, groups, local);
+    reduce(sums, groups, 1u << SUM_REACH, local);
     if local < 8u * groups {
         partial_sums[SUMS * piece + local] = totals[local];
+    }
+}
+
+// Pieces of a part, elements before vertices, and which of all the `i`-th is.
+fn piece_count(part: u32) -> u32 {
+    let row = part_row(part);
+    let elements = table[row + PART_ELEMENT_PIECES_END] - table[row + PART_ELEMENT_PIECES];
+    return elements + table[row + PART_VERTEX_PIECES_END] - table[row + PART_VERTEX_PIECES];
+}
+
+fn piece_at(part: u32, i: u32) -> u32 {
+    let row = part_row(part);
+    let first = table[row + PART_ELEMENT_PIECES];
+    let elements = table[row + PART_ELEMENT_PIECES_END] - first;
+    return select(first + i, table[row + PART_VERTEX_PIECES] + i - elements, i >= elements);
+}
+
+// Energies of elements are in [J], those of inertia in [J s^2].
+fn weight_of_piece(piece: u32) -> f32 {
+    return select(frame.squared_dt, 1.0, table[piece_row(piece) + PIECE_ARE_VERTICES] != 0u);
+}
+
+// Sums of a part's pieces. Vertices have no forces, elements no reach: their places are zero.
+fn add_pieces(part: u32, local: u32, into: ptr<function, Sums>) {
+    let count = piece_count(part);
+    for (var i = local; i < count; i += THREADS) {
+        let piece = piece_at(part, i);
+        let weight = weight_of_piece(piece);
+        let at = SUMS * piece;
+        for (var k = 0u; k <= SUM_MAGNITUDE; k++) {
+            (*into)[k] += weight * partial_sums[at + k];
+        }
+        (*into)[SUM_FORCE] += partial_sums[at + SUM_FORCE];
+        (*into)[SUM_REACH] = max((*into)[SUM_REACH], partial_sums[at + SUM_REACH]);
     }
 }

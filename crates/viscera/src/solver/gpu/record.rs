@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::buffers::{Place, Slot};
 use super::kernels::{self, Kernel, Swept, Variant};
-use super::layout::{Layout, SUM_GROUPS};
+use super::layout::Layout;
 use super::timing::StageRange;
 use crate::elements::TetForm;
 use crate::material::MaterialModel;
@@ -86,11 +86,13 @@ pub(super) struct Recorder<'a> {
     pub pieces: Pieces,
 }
 
-/// How many pieces sums are taken in, and which of them is the first of vertices.
+/// How many pieces sums are taken in, which of them is the first of vertices, and how many workgroups
+/// work on the long vector, part by part.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pieces {
     pub count: u32,
     pub first_of_vertices: u32,
+    pub groups: u32,
 }
 
 impl<'a> Recorder<'a> {
@@ -166,11 +168,14 @@ impl<'a> Recorder<'a> {
             Stage::ReadState | Stage::WriteState => {}
             Stage::MeasureStrain => self.each_set(&kernels::MEASURE_STRAIN, into),
             Stage::Predict(start) => {
-                into.push(self.vertices(&kernels::APPLY_UPDATES, 0));
+                let mut begin = self.vertices(&kernels::APPLY_UPDATES, 1);
+                begin.job.parameter = self.settings.chebyshev_radius as f32;
+                into.push(begin);
                 let mode = match start {
                     Start::Previous => 0,
                     Start::Inertial => 1,
-                    Start::Predicted | Start::Auto => 2,
+                    Start::Predicted => 2,
+                    Start::Auto => 3,
                 };
                 let keeps_starts = if self.settings.guards_steps() { 4 } else { 0 };
                 let mut predict = self.vertices(&kernels::PREDICT, mode | keeps_starts);
@@ -181,9 +186,6 @@ impl<'a> Recorder<'a> {
                 let count = model.multiplier_count as u32;
                 let job = Job { count, ..Job::default() };
                 into.push(self.threads(&kernels::RESCALE_MULTIPLIERS, job));
-                let parameter = self.settings.chebyshev_radius as f32;
-                let job = Job { count: 1, parameter, ..Job::default() };
-                into.push(self.threads(&kernels::START_ACCELERATION, job));
             }
             Stage::RememberIterate if self.mixes_remember => {}
             Stage::RememberIterate => into.push(self.long(&kernels::REMEMBER_ITERATE, 0)),
@@ -248,10 +250,15 @@ impl<'a> Recorder<'a> {
         self.threads(kernel, Job { first, count: self.length, set_first, mode, ..Job::default() })
     }
 
-    /// Sums over the long vector: as many workgroups as have enough to do.
-    fn sums(&self, kernel: &'static Kernel) -> Dispatch {
-        let groups = self.length.div_ceil(kernel.workgroup).min(SUM_GROUPS);
-        Dispatch { groups, ..self.long(kernel, groups) }
+    /// The long vector part by part: as many workgroups as have enough to do.
+    pub(super) fn parts_of_long(&self, kernel: &'static Kernel, mode: u32) -> Dispatch {
+        Dispatch { groups: self.pieces.groups, ..self.long(kernel, mode) }
+    }
+
+    /// A workgroup for each part.
+    fn each_part(&self, kernel: &'static Kernel, job: Job) -> Dispatch {
+        let count = self.model.part_count() as u32;
+        Dispatch { groups: count, ..self.threads(kernel, Job { count, ..job }) }
     }
 
     /// Blocks of a set.
@@ -329,38 +336,31 @@ impl<'a> Recorder<'a> {
     }
 
     fn chebyshev(&self, into: &mut Vec<Dispatch>) {
-        let sums = self.sums(&kernels::CHEBYSHEV_CHANGE);
         let job = Job {
             first: self.settings.chebyshev_delay,
-            count: sums.groups,
             mode: (self.settings.chebyshev_radius == 0.0).into(),
             ..Job::default()
         };
-        into.push(sums);
-        into.push(Dispatch { groups: 1, ..self.threads(&kernels::CHEBYSHEV_WEIGHT, job) });
-        into.push(self.long(&kernels::CHEBYSHEV_MIX, 0));
+        into.push(self.parts_of_long(&kernels::CHEBYSHEV_CHANGE, 0));
+        into.push(self.each_part(&kernels::CHEBYSHEV_WEIGHT, job));
+        into.push(self.parts_of_long(&kernels::CHEBYSHEV_MIX, 0));
     }
 
     fn anderson(&self, on: AndersonOn, into: &mut Vec<Dispatch>) {
         let is_split = self.swept != Swept::Vertices;
         let push = if is_split { &kernels::ANDERSON_JOIN } else { &kernels::ANDERSON_PUSH };
-        let sums = self.sums(push);
         let guard = self.settings.guard_of_mixtures() == AndersonGuard::Residual;
-        let job = Job {
-            count: sums.groups,
-            set_first: super::window(self.settings),
-            mode: guard.into(),
-            ..Job::default()
-        };
-        into.push(sums);
-        into.push(Dispatch { groups: 1, ..self.threads(&kernels::ANDERSON_WEIGHTS, job) });
+        let job =
+            Job { set_first: super::window(self.settings), mode: guard.into(), ..Job::default() };
+        into.push(self.parts_of_long(push, 0));
+        into.push(self.each_part(&kernels::ANDERSON_WEIGHTS, job));
         let mixed = match on {
             AndersonOn::Positions => 1,
             AndersonOn::Multipliers => 2,
             AndersonOn::Both => 3,
         };
         let remembered = if self.mixes_remember { 4 } else { 0 };
-        into.push(self.long(&kernels::ANDERSON_MIX, mixed | remembered));
+        into.push(self.parts_of_long(&kernels::ANDERSON_MIX, mixed | remembered));
     }
 }
 

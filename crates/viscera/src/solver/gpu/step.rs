@@ -4,10 +4,11 @@ use bytemuck::{Pod, Zeroable};
 
 use super::buffers::Slot;
 use super::inputs::norm_weights;
+use super::parts::SmallSteps;
 use super::timing::Marks;
 use super::{GpuSolver, Ready};
 use crate::model::Model;
-use crate::settings::{Acceleration, Method, RelaxationForm};
+use crate::settings::{Method, RelaxationForm};
 use crate::solver::explicit::small_steps;
 use crate::solver::tethers::bundle;
 use crate::solver::{Inputs, StepError};
@@ -23,12 +24,8 @@ pub(super) struct FrameConstants {
     pub rescale: f32,
     pub relaxation_multipliers: f32,
     pub relaxation_positions: f32,
-    pub rebase_factor: f32,
-    pub bound_share: f32,
     pub update_count: u32,
-    pub small_dt: f32,
-    pub inverse_small_dt: f32,
-    pub small_steps: u32,
+    pub part_count: u32,
     pub chebyshev_damping: f32,
 }
 
@@ -91,15 +88,28 @@ impl GpuSolver {
     ) -> Result<u32, StepError> {
         self.check_model(model)?;
         crate::solver::check_step(dt, model, inputs)?;
-        let [repeats, small_steps] = match self.settings.method {
-            Method::Xpbd => [self.plan.repeat, 1],
+        let repeats = match self.settings.method {
+            Method::Xpbd => self.plan.repeat,
             Method::Explicit => {
                 bundle(model, inputs, &mut self.tethers);
-                [small_steps(dt, self.stability.step(model, &self.tethers))?; 2]
+                let most = small_steps(dt, self.stability.step(model, &self.tethers))?;
+                self.write_small_steps(model, dt)?;
+                most
             }
         };
-        self.prepare_step(model, inputs, dt, small_steps);
+        self.prepare_step(model, inputs, dt);
         Ok(repeats)
+    }
+
+    /// How many small steps each part takes in a step of `dt` [s].
+    fn write_small_steps(&mut self, model: &Model<f32>, dt: f64) -> Result<(), StepError> {
+        let stable = self.stability.steps(model, &self.tethers);
+        for (small, stable) in self.small_steps.iter_mut().zip(stable) {
+            *small = SmallSteps::new(small_steps(dt, stable)?, dt);
+        }
+        let bytes = bytemuck::cast_slice(&self.small_steps);
+        self.buffers.write(&self.device.queue, Slot::SmallSteps, bytes);
+        Ok(())
     }
 
     /// One submission of one compute pass.
@@ -132,16 +142,14 @@ impl GpuSolver {
     }
 
     /// Inputs and constants of a step.
-    pub(super) fn prepare_step(
-        &mut self,
-        model: &Model<f32>,
-        inputs: &Inputs<f32>,
-        dt: f64,
-        small_steps: u32,
-    ) {
+    pub(super) fn prepare_step(&mut self, model: &Model<f32>, inputs: &Inputs<f32>, dt: f64) {
         self.collect_updates(model, inputs, dt);
         let queue = &self.device.queue;
         self.buffers.write(queue, Slot::Updates, bytemuck::cast_slice(&self.updates));
+        if let Some(falls) = &mut self.falls {
+            falls.find(model, inputs.gravity, &self.updates);
+            self.buffers.write(queue, Slot::Falls, bytemuck::cast_slice(&falls.all));
+        }
         let settings = &self.settings;
         let held = &model.attachments;
         if !held.vertices.is_empty() && (!inputs.anchors.is_empty() || self.has_moved_anchors) {
@@ -161,9 +169,7 @@ impl GpuSolver {
             true if last > 0.0 && last != dt => (dt / last) * (dt / last),
             true => 1.0,
         };
-        let is_xpbd = settings.method == Method::Xpbd;
-        let small_dt = dt / f64::from(small_steps);
-        if is_xpbd && settings.acceleration != Acceleration::None && dt != self.weights_dt {
+        if super::accelerates(settings) && dt != self.weights_dt {
             self.weights_dt = dt;
             let weights = norm_weights(model, settings, &self.buffers, dt);
             self.buffers.write(queue, Slot::Weights, bytemuck::cast_slice(&weights));
@@ -180,12 +186,8 @@ impl GpuSolver {
                 RelaxationForm::Published => 1.0,
             },
             relaxation_positions: omega,
-            rebase_factor: self.shares[0],
-            bound_share: self.shares[1],
             update_count: self.updates.len() as u32,
-            small_dt: small_dt as f32,
-            inverse_small_dt: (1.0 / small_dt) as f32,
-            small_steps,
+            part_count: self.part_count as u32,
             chebyshev_damping: settings.chebyshev_damping as f32,
         };
         self.device.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&constants));

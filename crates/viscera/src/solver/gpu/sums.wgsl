@@ -1,7 +1,5 @@
-// Sums over the long vector of all unknowns, for the accelerations.
-
-// Sums of products: |R_k|^2, then R_k . dR_j, then dR_new . dR_j.
-const PRODUCTS: u32 = 21u;
+// Sums over the long vector of all unknowns, for the accelerations; those of products are |R_k|^2, then
+// R_k . dR_j, then dR_new . dR_j.
 
 // Numbers side by side whose sums are added up at the end. Part of the result's bits.
 const THREADS: u32 = 128u;
@@ -10,5 +8,9 @@ var<workgroup> shared_sums: array<f32, 2688>;
 
 // The last of a vertex's four numbers is no unknown.
 fn counts(i: u32) -> bool {
-    return i >= job.first || i % 4u != 3u;
+    return i != NOWHERE && (i >= job.first || i % 4u != 3u);
+}
+
+fn weight_of(i: u32) -> f32 {
+    return number(table[WEIGHTS_AT] + i);
 }

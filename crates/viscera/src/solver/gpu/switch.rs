@@ -136,7 +136,7 @@ impl GpuSolver {
             put(Slot::Copies, &all);
         }
         if !work.loads.is_empty() {
-            put(Slot::Loads, &Layout::new(model).loads(model, &work.loads));
+            put(Slot::Loads, &Layout::new(model, &self.settings).loads(model, &work.loads));
         }
     }
 }
@@ -151,7 +151,7 @@ impl Layout {
     fn loads(&self, model: &Model<f32>, of_copies: &[Point<f32>]) -> Vec<[f32; 4]> {
         let mut loads = vec![[0.0; 4]; self.slot_count() as usize];
         for v in 0..model.vertex_count() {
-            let load = crate::solver::cpu::gather(model, of_copies, v);
+            let load = crate::solver::rebase::gather(model, of_copies, v);
             if let Some(place) = loads.get_mut(self.first_load(v)) {
                 *place = whole(&load);
             }

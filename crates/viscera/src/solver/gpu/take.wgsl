@@ -1,34 +1,120 @@
-// Carries out what the guard of mixtures has decided, number by number of the long vector. `job.first`:
-// where multipliers begin, `job.count` its length, `job.set_first` the window; mode 0 after the choice of
-// the start, which the best place so far starts from, mode 1 after a verdict.
+// Carries out what the guard of mixtures decides, part by part, on the long vector: the choice of the start,
+// which the best place so far starts from; a mixture that does not pass gives way to the plain sweep; a descent
+// takes the place of both. `job.first`: where multipliers begin, `job.count` the length, `job.set_first` the
+// window.
+
+struct Taken {
+    // The range that the best start lies in; whether the iterate becomes the best, or gives way.
+    range: u32,
+    is_better: u32,
+    gives_way: u32,
+    length: f32,
+}
+
+var<workgroup> taken: Taken;
+
 @compute @workgroup_size(256)
-fn take(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let i = thread_of(id, groups, 256u);
-    if i >= job.count {
+fn take(
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let span = span_of(workgroup, groups);
+    if span.groups == 0u {
         return;
     }
+    let is_descent = (job.mode & TAKES_DESCENT) != 0u;
+    if agree(is_descent && control.parts[span.part].descends == 0u, local) {
+        return;
+    }
+    var sums: Sums;
+    if is_descent {
+        add_lengths(span.part, local, &sums);
+    } else {
+        add_pieces(span.part, local, &sums);
+    }
+    reduce(sums, LINE_SUMS / 8u, select(1u << SUM_REACH, 0u, is_descent), local);
+    if local == 0u {
+        taken = decide(span.part, span.group == 0u);
+    }
+    let now = workgroupUniformLoad(&taken);
+    for (var j = span.group * THREADS + local; j < span.length; j += span.groups * THREADS) {
+        let i = number_at(span.part, j);
+        if i != NOWHERE {
+            take_number(i, now);
+        }
+    }
+}
+
+fn decide(part: u32, keeps: bool) -> Taken {
+    var now = Taken(START, 0u, 0u, 0.0);
+    if (job.mode & CHOOSES) != 0u {
+        let choice = choose();
+        now.range = choice.range;
+        if keeps {
+            control.parts[part].limit = choice.limit;
+            control.parts[part].best_value = choice.limit;
+            control.parts[part].failures = 0u;
+        }
+    } else if (job.mode & JUDGES_MIXTURE) != 0u {
+        let tested = potential_of_totals();
+        let best = control.parts[part].best_value;
+        let is_better = improves(tested.value, best);
+        let new_best = select(best, tested.value, is_better);
+        let is_good = passes(tested, new_best);
+        now.is_better = select(0u, 1u, is_better);
+        now.gives_way = select(1u, 0u, is_good);
+        if keeps {
+            control.parts[part].is_good = 1u - now.gives_way;
+            control.parts[part].mixture_best = new_best;
+            control.parts[part].mixture_failures = select(control.parts[part].failures, 0u, is_good);
+        }
+    } else {
+        let found = pick_length();
+        now.length = found.length;
+        if keeps {
+            control.parts[part].failures = 0u;
+            if found.length > 0.0 {
+                control.parts[part].best_value = found.value;
+            }
+            // The older sweeps started elsewhere: Anderson's history begins anew.
+            control.parts[part].sweeps = 0u;
+            control.parts[part].next = 0u;
+            control.parts[part].differences = 0u;
+            control.parts[part].last_norm = 3e38;
+        }
+    }
+    return now;
+}
+
+// One thread for all of a vertex: parts of a vector are no places of their own.
+fn take_number(i: u32, now: Taken) {
+    let is_vertex = i < job.first;
     let v = i / 4u;
-    let axis = i % 4u;
-    let is_position = i < job.first && v < table[VERTEX_COUNT] && axis < 3u;
-    let best = START * table[STRIDE] + v;
-    if job.mode == 0u {
-        if is_position && axis == 0u && control.start != START {
-            ground[best] = ground_of(control.start, v);
+    if is_vertex && i % 4u != 0u {
+        return;
+    }
+    let best = START * table[STRIDE_AT] + v;
+    if (job.mode & TAKES_DESCENT) != 0u {
+        if is_vertex {
+            let x = along(ground_of(TRIAL, v).xyz, ground_of(DIRECTION, v).xyz, now.length);
+            ground[best] = vec4f(x, 0.0);
+            for (var axis = 0u; axis < 3u; axis++) {
+                unknowns[i + axis] = x[axis];
+            }
         }
         return;
     }
-    // One thread for all of a vertex: parts of a vector are no places of their own.
-    if control.is_better != 0u && is_position && axis == 0u {
-        if control.taken == DESCENT {
-            ground[best] = ground_of(TRIAL, v);
-        } else {
-            ground[best] = vec4f(unknowns[i], unknowns[i + 1u], unknowns[i + 2u], 0.0);
+    if is_vertex && now.range != START {
+        ground[best] = ground_of(now.range, v);
+    }
+    if is_vertex && now.is_better != 0u {
+        ground[best] = vec4f(unknowns[i], unknowns[i + 1u], unknowns[i + 2u], 0.0);
+    }
+    if now.gives_way != 0u {
+        let plain = job.set_first * job.count + i;
+        for (var k = 0u; k < select(1u, 3u, is_vertex); k++) {
+            unknowns[i + k] = mapped[plain + k];
         }
-    }
-    if control.taken == PLAIN && (is_position || i >= job.first) {
-        unknowns[i] = mapped[job.set_first * job.count + i];
-    }
-    if control.taken == DESCENT && is_position {
-        unknowns[i] = ground_of(TRIAL, v)[axis];
     }
 }

@@ -1,12 +1,27 @@
 // Stages that work on vertices one by one (solver/cpu.rs).
 
-// What acts on single vertices: takes over what has changed since the last step.
+// What acts on single vertices: takes over what has changed since the last step. In mode 1 a thread for each
+// part begins its accelerations and forgets what was found broken.
 @compute @workgroup_size(64)
 fn apply_updates(
     @builtin(global_invocation_id) id: vec3u,
     @builtin(num_workgroups) groups: vec3u,
 ) {
     let thread = thread_of(id, groups, 64u);
+    if job.mode == 1u && thread == 0u {
+        control.step += 1u;
+    }
+    if job.mode == 1u && thread < frame.part_count {
+        atomicStore(&control.parts[thread].is_broken, 0u);
+        control.parts[thread].sweeps = 0u;
+        control.parts[thread].next = 0u;
+        control.parts[thread].differences = 0u;
+        control.parts[thread].last_norm = 3e38;
+        control.parts[thread].iteration = 0u;
+        control.parts[thread].omega = 1.0;
+        control.parts[thread].radius = job.parameter;
+        control.parts[thread].last_change = 0.0;
+    }
     if thread >= frame.update_count {
         return;
     }
@@ -19,8 +34,8 @@ fn apply_updates(
 }
 
 // xt = x + dt v + dt^2 (g + M^-1 (f + k (a - y))), y without the last term: springs k to places a outside are
-// a part of the inertia (solver/tethers.rs). x becomes the start of the iteration: x (mode 0), x + dt v (mode 1)
-// or xt (mode 2); pins move to their places; w = 1/m per copy. Where steps are guarded (mode bit 2) the places
+// a part of the inertia (solver/tethers.rs). x becomes the start of the iteration: x (mode 0), x + dt v (mode 1),
+// xt (mode 2) or, in mode 3, x + dt v, where nothing holds the part with its mean acceleration; pins move to their places; w = 1/m per copy. Where steps are guarded (mode bit 2) the places
 // that the step could start from are kept, `job.set_first` vertices apart.
 @compute @workgroup_size(64)
 fn predict(
@@ -47,6 +62,14 @@ fn predict(
         start = inertial;
     } else if (job.mode & 3u) == 2u {
         start = xt;
+    } else if (job.mode & 3u) == 3u {
+        start = inertial;
+        let fall = table[FALLS_AT] + FALL_WORDS * part_with(PART_VERTICES_END, v);
+        if table[fall + FALL_IS_FREE] != 0u {
+            let at = fall + FALL_ACCELERATION;
+            let acceleration = vec3f(number(at), number(at + 1u), number(at + 2u));
+            start = inertial + acceleration * frame.squared_dt;
+        }
     }
     let is_pinned = on_vertex.w == 0.0;
     start = select(start, hold.xyz, is_pinned);
@@ -56,16 +79,6 @@ fn predict(
         starts[job.set_first + v] = vec4f(select(xt, start, is_pinned), 0.0);
         starts[2u * job.set_first + v] = vec4f(start, 0.0);
     }
-}
-
-// Sum of what acts on a vertex, in the order of its places.
-fn gather(v: u32) -> vec4f {
-    var sum = vec4f();
-    let end = offsets[v + 1u];
-    for (var slot = offsets[v]; slot < end; slot++) {
-        sum += loads[slot];
-    }
-    return sum;
 }
 
 // Stabilised rebase: r = M (x - xt) - J^T l, mh = m + share of the bounds, x -= theta r/mh, w = 1/mh per
@@ -83,8 +96,9 @@ fn rebase(
     let place = points[v].xyz;
     let inertia = predicted[v];
     let residual = (place - inertia.xyz) * inertia.w - load.xyz;
-    let inverse = 1.0 / (inertia.w + load.w * frame.bound_share);
-    let x = place - residual * (frame.rebase_factor * inverse);
+    let row = part_row(part_with(PART_VERTICES_END, v));
+    let inverse = 1.0 / (inertia.w + load.w * number(row + PART_BOUND_SHARE));
+    let x = place - residual * (number(row + PART_REBASE_FACTOR) * inverse);
     points[v] = vec4f(x, inverse * previous[v].w);
 }
 
@@ -112,13 +126,14 @@ fn split_copies(
         return;
     }
     let point = points[v];
-    let end = offsets[v + 1u];
-    for (var copy = offsets[v]; copy < end; copy++) {
+    let end = offsets[v + 1u] & ~WHOLE;
+    for (var copy = offsets[v] & ~WHOLE; copy < end; copy++) {
         copies[copy] = point;
     }
 }
 
-// Averages the changes of the copies: a vertex that nobody moved stays where it is to the bit.
+// Averages the changes of the copies: a vertex that nobody moved stays where it is to the bit. Where a part has
+// no vertex of several copies they are its vertices, as if there were none.
 @compute @workgroup_size(64)
 fn join_copies(
     @builtin(global_invocation_id) id: vec3u,
@@ -129,8 +144,12 @@ fn join_copies(
         return;
     }
     let point = points[v];
-    let first = offsets[v];
-    let end = offsets[v + 1u];
+    let first = offsets[v] & ~WHOLE;
+    let end = offsets[v + 1u] & ~WHOLE;
+    if (offsets[v] & WHOLE) != 0u {
+        points[v] = vec4f(copies[first].xyz, point.w);
+        return;
+    }
     var sum = vec3f();
     for (var copy = first; copy < end; copy++) {
         sum += copies[copy].xyz - point.xyz;

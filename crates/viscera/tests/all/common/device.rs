@@ -9,14 +9,25 @@ use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::SolverSettings;
 use viscera::solver::gpu::{Adapter, Device};
 
-/// The first device there is, one for all tests of a program: kernels are compiled once. Without any the
-/// test fails and says what to install.
+/// The first adapter there is. Without any the test fails and says what to install.
+pub fn adapter() -> Adapter {
+    Adapter::find(None).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Its device, one for all tests of a program: kernels are compiled once.
 pub fn device() -> &'static Device {
     static DEVICE: OnceLock<Device> = OnceLock::new();
-    DEVICE.get_or_init(|| {
-        let adapter = Adapter::find(None).unwrap_or_else(|error| panic!("{error}"));
-        adapter.open().unwrap_or_else(|error| panic!("{error}"))
-    })
+    DEVICE.get_or_init(own_device)
+}
+
+/// A device of the test's own: to be lost, or because nobody else's work may be on it.
+pub fn own_device() -> Device {
+    adapter().open().unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// One within other limits.
+pub fn device_within(limits: wgpu::Limits) -> Device {
+    adapter().open_with(limits).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Largest distance of vectors from the oracle's.

@@ -1,9 +1,10 @@
-//! A graphics device for tests, and a shader run over records of numbers.
+//! A shader run over records of numbers.
 
 pub mod comparison;
 pub mod functions;
 pub mod inputs;
 
+use viscera::solver::gpu::Device;
 use wgpu::util::DeviceExt;
 
 /// Threads of a workgroup.
@@ -12,34 +13,10 @@ const GROUP: usize = 64;
 /// What shaders read and write: records of numbers, taken and put one after the other.
 const RECORDS: &str = include_str!("records.wgsl");
 
-/// An open device.
-pub struct Gpu {
-    device: wgpu::Device,
-    queue: wgpu::Queue,
-    /// The adapter and its driver.
-    pub name: String,
-}
+/// What runs it.
+pub struct Gpu(pub &'static Device);
 
 impl Gpu {
-    /// The first device; a software driver will do.
-    pub fn open() -> Self {
-        let backends = wgpu::Backends::PRIMARY;
-        let descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor { backends, ..descriptor });
-        let adapter = pollster::block_on(instance.request_adapter(&Default::default()))
-            .unwrap_or_else(|error| {
-                panic!(
-                    "no graphics device ({error}); a software driver will do: \
-                     apt-get install mesa-vulkan-drivers libvulkan1"
-                )
-            });
-        let info = adapter.get_info();
-        let name = format!("{} ({} {})", info.name, info.driver, info.driver_info);
-        let (device, queue) = pollster::block_on(adapter.request_device(&Default::default()))
-            .unwrap_or_else(|error| panic!("{name} does not open: {error}"));
-        Self { device, queue, name }
-    }
-
     /// Runs `body` once for each record; it takes its numbers with `take()` and
     /// its like and puts `outputs` results. `library` holds the functions that it calls.
     pub fn map(
@@ -58,11 +35,12 @@ impl Gpu {
                  next_input = id.x * INPUTS;\nnext_output = id.x * OUTPUTS;\n{body}\n}}\n"
         );
         let source = [library, RECORDS, &entry].concat();
-        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        let (device, queue) = self.0.wgpu();
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: None,
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
-        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: None,
             layout: None,
             module: &module,
@@ -70,7 +48,7 @@ impl Gpu {
             compilation_options: Default::default(),
             cache: None,
         });
-        let input = self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        let input = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: None,
             contents: bytemuck::cast_slice(&records.numbers),
             usage: wgpu::BufferUsages::STORAGE,
@@ -80,11 +58,11 @@ impl Gpu {
             let mapped_at_creation = false;
             let descriptor =
                 wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation };
-            self.device.create_buffer(&descriptor)
+            device.create_buffer(&descriptor)
         };
         let output = buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
         let readable = buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
-        let bind_group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout: &pipeline.get_bind_group_layout(0),
             entries: &[
@@ -92,7 +70,7 @@ impl Gpu {
                 wgpu::BindGroupEntry { binding: 1, resource: output.as_entire_binding() },
             ],
         });
-        let mut encoder = self.device.create_command_encoder(&Default::default());
+        let mut encoder = device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(&pipeline);
@@ -100,9 +78,9 @@ impl Gpu {
             pass.dispatch_workgroups(count.div_ceil(GROUP) as u32, 1, 1);
         }
         encoder.copy_buffer_to_buffer(&output, 0, &readable, 0, size);
-        self.queue.submit([encoder.finish()]);
+        queue.submit([encoder.finish()]);
         readable.map_async(wgpu::MapMode::Read, .., |result| result.expect("results come back"));
-        self.device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
+        device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
         let bytes = readable.get_mapped_range(..).expect("results are mapped");
         bytemuck::cast_slice(&bytes).to_vec()
     }

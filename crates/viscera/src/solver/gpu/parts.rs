@@ -1,0 +1,171 @@
+//! Connected parts as kernels see them: the pieces of their sums, and the numbers of the long vector that are
+//! theirs, in the order that they have in a model of the part alone.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::buffers::{Update, multipliers_start};
+use super::layout::{Piece, SUM_GROUPS};
+use crate::model::{Model, Part};
+use crate::scalar::{Vec3, vec3};
+use crate::settings::SolverSettings;
+use crate::solver::rebase::{bound_share, rebase_factor};
+
+/// What stands in the table for a part.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct PartRow {
+    /// Its pieces of elements, and of vertices.
+    pub element_pieces: u32,
+    pub element_pieces_end: u32,
+    pub vertex_pieces: u32,
+    pub vertex_pieces_end: u32,
+    /// Where its vertices end; the next part's begin there.
+    pub vertices_end: u32,
+    /// The same of workgroups that work on the long vector.
+    pub groups_end: u32,
+    /// Its runs of the long vector, and numbers of its own one.
+    pub runs: u32,
+    pub runs_end: u32,
+    pub length: u32,
+    /// Numbers of the rebase before a sweep.
+    pub rebase_factor: f32,
+    pub bound_share: f32,
+}
+
+/// The small steps of a part in a step of an explicit method: how many, of what length [s], and one over it.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct SmallSteps {
+    pub count: u32,
+    pub dt: f32,
+    pub inverse_dt: f32,
+}
+
+impl SmallSteps {
+    /// So many in a step of `dt` [s].
+    pub fn new(count: u32, dt: f64) -> Self {
+        let small = dt / f64::from(count);
+        Self { count, dt: small as f32, inverse_dt: (1.0 / small) as f32 }
+    }
+}
+
+/// Whether nothing holds a part in a step, and its mean acceleration [m/s^2] then.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Fall {
+    pub is_free: u32,
+    pub acceleration: [f32; 3],
+}
+
+/// What parts fall by.
+#[derive(Debug)]
+pub(super) struct Falls {
+    /// Of each part [kg], and whether it has attachments.
+    bodies: Vec<(f64, bool)>,
+    /// Forces on each part [N].
+    forces: Vec<Vec3<f64>>,
+    /// In this step.
+    pub all: Vec<Fall>,
+}
+
+impl Falls {
+    pub fn new(model: &Model<f32>) -> Self {
+        let mass = |v: usize| f64::from(model.masses[model.numbering.order[v] as usize]);
+        let body = |part: &Part| {
+            (part.vertices.clone().map(mass).sum(), part.attachments().next().is_some())
+        };
+        let bodies: Vec<_> = model.parts.iter().map(body).collect();
+        let count = bodies.len();
+        Self { bodies, forces: vec![Vec3::ZERO; count], all: vec![Fall::default(); count] }
+    }
+
+    /// Finds what nothing holds among what acts on vertices.
+    pub fn find(&mut self, model: &Model<f32>, gravity: Vec3<f32>, updates: &[Update]) {
+        self.forces.fill(Vec3::ZERO);
+        for (fall, (_, is_attached)) in self.all.iter_mut().zip(&self.bodies) {
+            fall.is_free = u32::from(!is_attached);
+        }
+        for update in updates {
+            let part = model.part_at(update.vertex as usize);
+            let [x, y, z] = update.force;
+            if update.is_pinned != 0 || update.stiffness != 0.0 {
+                self.all[part].is_free = 0;
+            }
+            self.forces[part] += vec3(x, y, z).cast::<f64>();
+        }
+        for ((fall, (mass, _)), force) in self.all.iter_mut().zip(&self.bodies).zip(&self.forces) {
+            let acceleration = gravity + (*force * (1.0 / mass)).cast();
+            fall.acceleration = acceleration.to_array();
+        }
+    }
+}
+
+/// A run of the long vector: where it begins in that of the part, and in that of the model.
+type Run = [u32; 2];
+
+/// Numbers that only fill up.
+const NOWHERE: u32 = u32::MAX;
+
+/// Of all parts, and their runs.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Parts {
+    pub rows: Vec<PartRow>,
+    pub runs: Vec<Run>,
+}
+
+impl Parts {
+    pub fn new(model: &Model<f32>, settings: &SolverSettings, pieces: &[Piece]) -> Self {
+        let mut parts = Self::default();
+        let mut groups_end = 0;
+        let first = (multipliers_start(model.vertex_count()) / 4) as u32;
+        for (number, part) in model.parts.iter().enumerate() {
+            let runs = parts.runs.len() as u32;
+            let length = parts.add_runs(part, first);
+            groups_end += length.div_ceil(super::SUM_THREADS).min(SUM_GROUPS);
+            let [elements, vertices] = [0, 1].map(|kind| {
+                let is_own = |p: &Piece| (p.are_vertices, p.part) < (kind, number as u32);
+                let first = pieces.partition_point(is_own);
+                let own = pieces[first..].iter();
+                let count =
+                    own.take_while(|p| (p.are_vertices, p.part) == (kind, number as u32)).count();
+                [first as u32, (first + count) as u32]
+            });
+            parts.rows.push(PartRow {
+                element_pieces: elements[0],
+                element_pieces_end: elements[1],
+                vertex_pieces: vertices[0],
+                vertex_pieces_end: vertices[1],
+                vertices_end: part.vertices.end as u32,
+                groups_end,
+                runs,
+                runs_end: parts.runs.len() as u32,
+                length,
+                rebase_factor: rebase_factor(part.is_split(), part.colors.len(), settings) as f32,
+                bound_share: bound_share(part.is_split()) as f32,
+            });
+        }
+        parts
+    }
+
+    /// Workgroups that work on the long vector.
+    pub fn groups(&self) -> u32 {
+        self.rows.last().map_or(0, |row| row.groups_end)
+    }
+
+    /// Returns how many numbers the part's own vector has. `first`: where the model's multipliers begin.
+    fn add_runs(&mut self, part: &Part, first: u32) -> u32 {
+        let vertices = &part.vertices;
+        self.runs.push([0, 4 * vertices.start as u32]);
+        self.runs.push([4 * vertices.len() as u32, NOWHERE]);
+        let mut length = (multipliers_start(vertices.len()) / 4) as u32;
+        for range in &part.multipliers {
+            self.runs.push([length, first + range.start as u32]);
+            length += range.len() as u32;
+        }
+        if part.multipliers.is_empty() {
+            // A vector has room for one multiplier.
+            length += 1;
+        }
+        length
+    }
+}

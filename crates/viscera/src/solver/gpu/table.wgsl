@@ -1,0 +1,48 @@
+// Constants of the model but the tetrahedra, as words, and where everything stands in them: names with `_AT`
+// are places in the header, `PART_` and `PIECE_` in a row; all come from the host (layout.rs, parts.rs).
+
+fn number(word: u32) -> f32 {
+    return bitcast<f32>(table[word]);
+}
+
+// Of a connected part.
+fn part_row(part: u32) -> u32 {
+    return table[PARTS_AT] + PART_WORDS * part;
+}
+
+// The first part whose word at `field`, which ascends from part to part, is above a value.
+fn part_with(field: u32, value: u32) -> u32 {
+    var low = 0u;
+    var high = table[PART_COUNT_AT] - 1u;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if value < table[part_row(middle) + field] {
+            high = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    return low;
+}
+
+// Of a piece of elements or vertices.
+fn piece_row(piece: u32) -> u32 {
+    return table[PIECES_AT] + PIECE_WORDS * piece;
+}
+
+fn material_of(kind: u32) -> Material {
+    let row = table[MATERIALS_AT] + MATERIAL_WORDS * kind;
+    let compliance = Compliance(number(row + 2u), number(row + 3u), number(row + 4u));
+    return Material(number(row), number(row + 1u), compliance, number(row + 5u));
+}
+
+// Sum of what acts on a vertex, in the order of its places.
+fn gather(v: u32) -> vec4f {
+    let row = table[OFFSETS_AT] + v;
+    var sum = vec4f();
+    let end = table[row + 1u];
+    for (var slot = table[row]; slot < end; slot++) {
+        sum += loads[slot];
+    }
+    return sum;
+}
