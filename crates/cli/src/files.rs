@@ -2,23 +2,42 @@
 
 use anyhow::{Context, Result, bail};
 use std::fs;
-use std::io::{ErrorKind, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+
+/// No mesh that fits into memory is larger [B]: some hundred million tetrahedra.
+const LARGEST: u64 = 16 << 30;
 
 /// The bytes of a file, or a message with the next move.
 pub fn read(path: &Path) -> Result<Vec<u8>> {
-    if path.is_dir() {
-        bail!("{} is a folder; name a file in it", path.display());
+    read_at_most(path, LARGEST)
+}
+
+fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>> {
+    let shown = path.display();
+    let explain = |error: std::io::Error| match error.kind() {
+        ErrorKind::NotFound => anyhow::anyhow!("{shown}: there is no such file; check the name"),
+        ErrorKind::PermissionDenied => anyhow::anyhow!("{shown}: no permission to read it"),
+        _ => anyhow::anyhow!("{shown}: {error}"),
+    };
+    let kind = fs::metadata(path).map_err(explain)?;
+    if kind.is_dir() {
+        bail!("{shown} is a folder; name a file in it");
     }
-    fs::read(path).map_err(|error| match error.kind() {
-        ErrorKind::NotFound => {
-            anyhow::anyhow!("{}: there is no such file; check the name", path.display())
-        }
-        ErrorKind::PermissionDenied => {
-            anyhow::anyhow!("{}: no permission to read it", path.display())
-        }
-        _ => anyhow::anyhow!("{}: {error}", path.display()),
-    })
+    // Before it is opened: a pipe waits for its writer, and a device may never end.
+    if !kind.is_file() {
+        bail!(
+            "{shown} is a device or a pipe, not a file; copy what it gives into a file and name that"
+        );
+    }
+    let mut bytes = Vec::new();
+    let file = fs::File::open(path).map_err(explain)?;
+    // Whatever its length was said to be: files grow, and those of the system have none.
+    file.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(explain)?;
+    if bytes.len() as u64 > most {
+        bail!("{shown} is larger than {most} bytes; is it what it is said to be?");
+    }
+    Ok(bytes)
 }
 
 /// Prints text; a reader that has seen enough (`| head`) is no error.
@@ -141,5 +160,20 @@ impl OutputFolder {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_longer_than_the_limit_is_not_read_to_its_end() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("long");
+        fs::write(&path, [7; 100]).expect("a file");
+        assert_eq!(read_at_most(&path, 100).expect("it fits"), [7; 100]);
+        let error = read_at_most(&path, 99).expect_err("too long").to_string();
+        assert!(error.contains("long is larger than 99 bytes"), "{error}");
     }
 }

@@ -60,6 +60,7 @@ const INTERRUPTED: u8 = 130;
 
 /// Carries out what the command line asks for.
 pub fn main() -> ExitCode {
+    quiet_drivers();
     let result = match Arguments::parse().command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Mesh(command) => mesh::execute(&command).map(|()| run::Outcome::Finished),
@@ -80,5 +81,17 @@ pub fn main() -> ExitCode {
             eprintln!("error: {error:#}");
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Graphics drivers look for a display below `XDG_RUNTIME_DIR` and complain on our standard error where it is unset
+/// or no absolute path, as in containers and jobs. There is no display then, wherever they look.
+#[allow(unsafe_code)]
+fn quiet_drivers() {
+    const FOLDER: &str = "XDG_RUNTIME_DIR";
+    let is_folder = |path: std::ffi::OsString| std::path::Path::new(&path).is_absolute();
+    if cfg!(target_os = "linux") && !std::env::var_os(FOLDER).is_some_and(is_folder) {
+        // SAFETY: the first statement of the program; there is no other thread that reads the environment.
+        unsafe { std::env::set_var(FOLDER, std::env::temp_dir()) };
     }
 }

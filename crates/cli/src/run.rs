@@ -8,6 +8,7 @@ use crate::summary::{FrameLine, Summary};
 use crate::{memory, progress};
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use clap::builder::RangedI64ValueParser;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,8 +23,9 @@ use viscera_report::Memory;
 ///
 /// Writes to the output folder: tissue.pvd (open it in ParaView: displacement, velocity, J,
 /// principal stretches, von Mises stress, energy density, region), surface.pvd, final.vtu,
-/// final_surface.obj, picture.png, motion.gif and summary.json. Ctrl-C ends a run cleanly: what is
-/// finished is kept and summary.json says so.
+/// final_surface.obj, picture.png, motion.gif and summary.json. Ctrl-C and SIGTERM end a run cleanly: what
+/// is finished is kept, summary.json says so, and the exit code is 130. Of more than 2,000 frames
+/// summary.json has every second, fourth ... and the last.
 #[derive(Args)]
 pub struct RunArguments {
     /// The scene file, or the name of one that `viscera scene list` prints
@@ -32,10 +34,10 @@ pub struct RunArguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Compute so many frames instead of the scene's duration
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = from_one::<u64>(), allow_negative_numbers = true)]
     frames: Option<u64>,
     /// Write every K-th frame; the same as --set output.every=K
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "K", value_parser = from_one::<u32>(), allow_negative_numbers = true)]
     every: Option<u32>,
     /// Change a setting: KEY=VALUE, as in `solver.iterations=20` or
     /// `body.liver.material.young="8 kPa"`; may be repeated. `viscera scene describe` lists keys
@@ -49,12 +51,17 @@ pub struct RunArguments {
     memory: Option<Memory>,
 }
 
+/// Counts from one on. Read with their sign, so that a negative one is told its range.
+fn from_one<T: TryFrom<i64>>() -> RangedI64ValueParser<T> {
+    RangedI64ValueParser::new().range(1..)
+}
+
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Everything was computed and written.
     Finished,
-    /// Ctrl-C ended it; what was finished is written.
+    /// Ctrl-C or SIGTERM ended it; what was finished is written.
     Interrupted,
 }
 
@@ -190,7 +197,7 @@ fn simulate<S: Real>(
         bar.finish_and_clear();
     }
     if let Err(error) = ended {
-        let kept = summary.frames.len();
+        let kept = summary.frames.computed();
         bail!("{error:#} ({kept} frames before that are in {})", out.path().display());
     }
     let mut text = summary.table();
@@ -209,7 +216,8 @@ fn simulate<S: Real>(
 /// Some drivers compile kernels for seconds, here or with the first frame.
 fn build<S: Real>(scene: Scene, assembly: Assembly) -> Result<Simulation<S>> {
     let device = &scene.solver.device;
-    let waiting = (*device != DeviceRequest::Cpu)
+    // What "auto" comes to is not known yet, and it is mostly the CPU.
+    let waiting = (!matches!(device, DeviceRequest::Cpu | DeviceRequest::Auto))
         .then(|| progress::spinner(format!("compiling kernels for device \"{device}\"")));
     let simulation = Simulation::new(scene, assembly);
     if let Some(spinner) = waiting {

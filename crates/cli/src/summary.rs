@@ -60,7 +60,54 @@ pub struct Summary {
     pub warnings: Vec<String>,
     /// How far the end is from the state of rest; nothing where the loads still change.
     pub rest: Option<RestReport>,
-    pub frames: Vec<FrameLine>,
+    #[serde(flatten)]
+    pub frames: Frames,
+}
+
+/// Frames that are kept at most, 2.6 MB of `summary.json`: of longer runs every second, every fourth ... and the
+/// last.
+const MOST_FRAMES: usize = 2000;
+
+/// The frames of a run, thinned as it grows.
+#[derive(Serialize)]
+pub struct Frames {
+    /// Of so many frames one is kept.
+    frame_interval: u64,
+    #[serde(rename = "frames")]
+    lines: Vec<FrameLine>,
+    /// Time that all of them took [s].
+    wall_seconds: f64,
+    /// The most tetrahedra that were inverted in any of them.
+    most_inverted: usize,
+}
+
+impl Default for Frames {
+    fn default() -> Self {
+        Self { frame_interval: 1, lines: Vec::new(), wall_seconds: 0.0, most_inverted: 0 }
+    }
+}
+
+impl Frames {
+    /// The next frame.
+    pub fn push(&mut self, line: FrameLine) {
+        self.wall_seconds += line.wall_seconds;
+        self.most_inverted = self.most_inverted.max(line.report.deformation.inverted);
+        let is_kept =
+            |interval: u64| move |line: &FrameLine| line.report.frame.is_multiple_of(interval);
+        if self.lines.last().is_some_and(|last| !is_kept(self.frame_interval)(last)) {
+            self.lines.pop();
+        }
+        if self.lines.len() == MOST_FRAMES {
+            self.frame_interval *= 2;
+            self.lines.retain(is_kept(self.frame_interval));
+        }
+        self.lines.push(line);
+    }
+
+    /// How many frames were computed.
+    pub fn computed(&self) -> u64 {
+        self.lines.last().map_or(0, |last| last.report.frame)
+    }
 }
 
 impl Summary {
@@ -99,7 +146,7 @@ impl Summary {
             notes: simulation.assembly().notes.clone(),
             warnings: Vec::new(),
             rest: None,
-            frames: Vec::new(),
+            frames: Frames::default(),
         }
     }
 
@@ -111,7 +158,7 @@ impl Summary {
 
     /// Wall time of all frames [s].
     pub fn wall_seconds(&self) -> f64 {
-        self.frames.iter().map(|frame| frame.wall_seconds).sum()
+        self.frames.wall_seconds
     }
 
     /// A short table of the run.
@@ -120,7 +167,8 @@ impl Summary {
             "{:>8} {:>11} {:>11} {:>9} {:>9} {:>9} {:>9}\n",
             "time", "elastic", "kinetic", "volume", "stretch", "inverted", "residual"
         );
-        let count = self.frames.len();
+        let lines = &self.frames.lines;
+        let count = lines.len();
         let rows = 6.min(count);
         let mut shown = usize::MAX;
         for row in 1..=rows {
@@ -129,7 +177,7 @@ impl Summary {
                 continue;
             }
             shown = index;
-            let report = &self.frames[index].report;
+            let report = &lines[index].report;
             text.push_str(&format!(
                 "{:>6.3} s {:>9.3} mJ {:>9.3} mJ {:>8.2}% {:>9.3} {:>9} {:>9.1e}\n",
                 report.time,
@@ -141,7 +189,7 @@ impl Summary {
                 report.relative_residual,
             ));
         }
-        if let Some(last) = self.frames.last() {
+        if let Some(last) = lines.last() {
             for patch in &last.report.patches {
                 text.push_str(&format!("{patch:.4}\n"));
             }
@@ -149,7 +197,7 @@ impl Summary {
             text.push_str(&format!(
                 "{time:.2} s simulated in {wall:.2} s: {:.2} x real time, {:.2} ms per frame\n",
                 time / wall,
-                1e3 * wall / count as f64
+                1e3 * wall / last.report.frame as f64
             ));
         }
         text
@@ -184,14 +232,15 @@ const RESIDUAL: f64 = 0.1;
 /// Fewer frames than these are the first jerk of a run, in which multipliers are still building up.
 const FEWEST_FRAMES: usize = 5;
 
-fn warnings(frames: &[FrameLine], scene: &Scene, rest: Option<RestReport>) -> Vec<String> {
+fn warnings(frames: &Frames, scene: &Scene, rest: Option<RestReport>) -> Vec<String> {
     let mut warnings = Vec::new();
+    let inverted = frames.most_inverted;
+    let frames = &frames.lines[..];
     let time = frames.last().map_or(0.0, |frame| frame.report.time);
     match rest {
         Some(rest) => warnings.extend(rest.warning(scene, time)),
         None => warnings.extend(warning_in_motion(frames, scene)),
     }
-    let inverted = frames.iter().map(|frame| frame.report.deformation.inverted).max().unwrap_or(0);
     let left = frames.last().map_or(0, |frame| frame.report.deformation.inverted);
     if inverted > 0 {
         let what = if inverted == 1 { "tetrahedron was" } else { "tetrahedra were" };
@@ -214,14 +263,59 @@ fn warning_in_motion(frames: &[FrameLine], scene: &Scene) -> Option<String> {
     let residual = mean(|report| report.relative_residual);
     let is_off = stiffness.abs() > STIFFNESS_ERROR || residual > RESIDUAL;
     (tail.len() >= FEWEST_FRAMES && is_off).then(|| {
+        let how = if stiffness > 0.0 { "softer" } else { "stiffer" };
+        let percent = 100.0 * stiffness.abs();
+        // Unstrained tissue has none.
+        let answer = match stiffness {
+            0.0 => String::new(),
+            _ => format!("the tissue answers as if it were about {percent:.1} % {how} than asked for, and "),
+        };
         format!(
-            "the solver falls short: over the last {} frames, in motion, the tissue answers as if it were about \
-             {:.1} % {} than asked for, and unbalanced forces are {:.0} % of the loads; {}",
+            "the solver falls short: over the last {} frames, in motion, {answer}unbalanced forces are {:.0} % of \
+             the loads; {}",
             tail.len(),
-            100.0 * stiffness.abs(),
-            if stiffness > 0.0 { "softer" } else { "stiffer" },
             100.0 * residual,
             advice::budget(scene),
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viscera::measure::{Energies, summarize_deformation};
+
+    fn line(frame: u64, inverted: usize) -> FrameLine {
+        let mut deformation = summarize_deformation(&[]);
+        deformation.inverted = inverted;
+        let report = FrameReport {
+            frame,
+            time: frame as f64 / 60.0,
+            relative_residual: 0.0,
+            stiffness_error: 0.0,
+            rejected_substeps: 0,
+            energy: Energies::default(),
+            deformation,
+            patches: Vec::new(),
+        };
+        FrameLine { report, wall_seconds: 0.5 }
+    }
+
+    /// Ten minutes: even, from the beginning to the last frame, within bounds, and nothing is lost of sums and
+    /// extremes.
+    #[test]
+    fn long_runs_keep_frames_at_an_interval_that_doubles() {
+        let mut frames = Frames::default();
+        for frame in 1..=36_007 {
+            frames.push(line(frame, usize::from(frame == 17) * 3));
+            assert!(frames.lines.len() <= MOST_FRAMES && frames.computed() == frame);
+            assert!(frame > MOST_FRAMES as u64 || frames.lines.len() as u64 == frame);
+        }
+        assert_eq!((frames.frame_interval, frames.most_inverted), (32, 3));
+        assert_eq!(frames.wall_seconds, 0.5 * 36_007.0);
+        let kept: Vec<u64> = frames.lines.iter().map(|line| line.report.frame).collect();
+        let (last, even) = kept.split_last().expect("frames");
+        assert_eq!(*last, 36_007);
+        assert!(even.iter().zip(1..).all(|(&frame, nth)| frame == 32 * nth), "{even:?}");
+    }
 }

@@ -12,11 +12,15 @@ use viscera::settings::SolverSettings;
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
+use crate::reference::{Reference, ReferenceError};
 use crate::scenes::{FRAME_RATE, Random, Scene};
 use crate::settling::AfterStep;
 
 /// Edge lengths of the bar [m].
 pub const SIZE: [f64; 3] = [0.08, 0.04, 0.04];
+
+/// Of a potential or an energy, what its sums may lose to rounding.
+pub const ROUND_OFF: f64 = 1e-9;
 
 /// Frames of a run.
 pub const FRAMES: u32 = 60;
@@ -119,6 +123,32 @@ impl<'a> Run<'a> {
         self.solver.step(&self.model, &mut self.state, &self.inputs, Self::DT)?;
         self.frame += 1;
         Ok(())
+    }
+
+    /// The next frame, and what `Phi`, computed outside the solver, is at its end over what it was at its start;
+    /// infinite where it is no number.
+    pub fn step_watched(&mut self, reference: &Reference) -> Result<f64> {
+        let before = self.state.clone();
+        self.step()?;
+        let x = &self.state.positions;
+        let [start, end] = reference.incremental(&before, x, &self.inputs, Self::DT)?;
+        let factor = end / start;
+        Ok(match (factor.is_finite(), end.abs() <= start.abs()) {
+            (true, _) => factor,
+            // A body that rests has no potential at all.
+            (false, true) => 1.0,
+            (false, false) => f64::INFINITY,
+        })
+    }
+
+    /// Kinetic and elastic energy [J], computed outside the solver; infinite where positions are no numbers.
+    pub fn mechanical_energy(&self, reference: &Reference) -> Result<f64, ReferenceError> {
+        if !self.state.is_finite() {
+            return Ok(f64::INFINITY);
+        }
+        let moving = self.state.velocities.iter().zip(&self.model.masses);
+        let kinetic: f64 = moving.map(|(v, m)| 0.5 * m * v.length_squared()).sum();
+        Ok(kinetic + reference.elastic_energy(&self.state.positions, &self.inputs)?)
     }
 
     /// For what is done after a step.

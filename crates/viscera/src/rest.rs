@@ -53,8 +53,9 @@ pub struct WayToRest {
     /// Apparent stiffness minus one: the displacement at rest over what there is of it, along it. Above zero the
     /// tissue has given way too little.
     pub stiffness: f64,
-    /// Elastic energy [J].
-    pub elastic_energy: f64,
+    /// Largest excursion [m] of what moves, if all of it swings in the shape of its velocities `v`, with
+    /// `omega^2 = v.K v/v.M v`: largest `|v|` over `omega`.
+    pub excursion: f64,
     /// False where the iterations ended before all of the way was found: it is at least this long.
     pub complete: bool,
     /// False where forces push the tissue on rather than back along some way: it may be about to buckle.
@@ -67,13 +68,23 @@ impl WayToRest {
         if self.displacement > 0.0 { self.distance / self.displacement } else { 0.0 }
     }
 
-    /// Measures a state at `x` [m], shape [vertex_count], under these inputs. Takes memory for eight vectors of
-    /// that shape, and as long as some dozens to hundreds of passes over the mesh.
-    pub fn measure<S: Real>(model: &Model<S>, x: &[Vec3<S>], inputs: &Inputs<S>) -> Self {
+    /// Measures a state at `x` [m] that moves with `velocities` [m/s], both of shape [vertex_count], under these
+    /// inputs. Takes memory for ten vectors of that shape, and as long as some dozens to hundreds of passes over the mesh.
+    /// Nothing where no part of the model is held.
+    pub fn measure<S: Real>(
+        model: &Model<S>,
+        x: &[Vec3<S>],
+        velocities: &[Vec3<f64>],
+        inputs: &Inputs<S>,
+    ) -> Option<Self> {
         let x: Vec<Vec3<f64>> = x.iter().map(|x| x.cast()).collect();
         let statics = Statics::new(model, inputs);
+        if !statics.is_held {
+            return None;
+        }
         let found = statics.solve(&x);
-        statics.judge(&x, found)
+        let excursion = statics.excursion(&x, velocities);
+        Some(WayToRest { excursion, ..statics.judge(&x, found) })
     }
 }
 
@@ -88,6 +99,8 @@ struct Found {
 struct Statics<'a, S> {
     model: &'a Model<S>,
     inputs: &'a Inputs<S>,
+    /// Whether anything is.
+    is_held: bool,
     /// Neither pinned nor part of a body that nothing holds.
     moves: Vec<bool>,
     /// Inverse of the diagonal of `K` at small strain [m/N].
@@ -100,11 +113,12 @@ impl<'a, S: Real> Statics<'a, S> {
     fn new(model: &'a Model<S>, inputs: &'a Inputs<S>) -> Self {
         let (stiffness, shortest) = diagonal(model, inputs);
         let mut moves = held(model, inputs);
+        let is_held = moves.contains(&true);
         for pin in &inputs.pins {
             moves[pin.vertex as usize] = false;
         }
         let softness = stiffness.iter().map(|&k| if k > 0.0 { 1.0 / k } else { 0.0 }).collect();
-        Self { model, inputs, moves, softness, shortest }
+        Self { model, inputs, is_held, moves, softness, shortest }
     }
 
     /// `grad V` [N] of vertices that move, zero for others.
@@ -117,8 +131,8 @@ impl<'a, S: Real> Statics<'a, S> {
         }
     }
 
-    /// `grad V` [N] of all vertices; returns the elastic energy of the tissue [J].
-    fn full_gradient(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) -> f64 {
+    /// `grad V` [N] of all vertices.
+    fn full_gradient(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) {
         let Self { model, inputs, .. } = self;
         let gravity = inputs.gravity.cast::<f64>();
         for (load, mass) in gradient.iter_mut().zip(&model.masses) {
@@ -147,12 +161,11 @@ impl<'a, S: Real> Statics<'a, S> {
                 gradient[v as usize] -= force;
             }
         }
-        self.add_tissue(x, gradient)
+        self.add_tissue(x, gradient);
     }
 
-    /// Of the tetrahedra; returns their energy [J].
-    fn add_tissue(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) -> f64 {
-        let mut energy = 0.0;
+    /// Of the tetrahedra.
+    fn add_tissue(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) {
         for set in self.model.tet_sets() {
             for tet in self.model.tets(set) {
                 let shape = tet.inverse_rest_shape.cast::<f64>();
@@ -160,25 +173,19 @@ impl<'a, S: Real> Statics<'a, S> {
                 let material = &self.model.materials[tet.material];
                 let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
                 let f = deformation_gradient(&tet.vertices.map(|v| x[v as usize]), &shape);
-                let (density, piola) = match set.model {
+                let piola = match set.model {
                     MaterialModel::SaintVenantKirchhoff => {
                         let strain = green_strain::strain(&f);
-                        let density = green_strain::energy_density(&strain, lambda, mu);
-                        (density, green_strain::piola(&f, &strain, lambda, mu))
+                        green_strain::piola(&f, &strain, lambda, mu)
                     }
-                    MaterialModel::StableNeoHookean => (
-                        neo_hookean::energy_density(&f, lambda, mu),
-                        neo_hookean::piola(&f, lambda, mu),
-                    ),
+                    MaterialModel::StableNeoHookean => neo_hookean::piola(&f, lambda, mu),
                 };
-                energy += volume * density;
                 let forces = internal_forces(&piola, &shape, volume);
                 for (v, force) in tet.vertices.into_iter().zip(forces) {
                     gradient[v as usize] -= force;
                 }
             }
         }
-        energy
     }
 
     fn solve(&self, x: &[Vec3<f64>]) -> Found {
@@ -249,6 +256,19 @@ impl<'a, S: Real> Statics<'a, S> {
         }
     }
 
+    /// See [`WayToRest::excursion`].
+    fn excursion(&self, x: &[Vec3<f64>], velocities: &[Vec3<f64>]) -> f64 {
+        let moving = velocities.iter().zip(&self.moves);
+        let v: Vec<_> = moving.map(|(&v, &moves)| if moves { v } else { Vec3::ZERO }).collect();
+        let [mut at_x, mut moved, mut image] = [(); 3].map(|()| vec![Vec3::ZERO; x.len()]);
+        self.gradient(x, &mut at_x);
+        self.times_stiffness(x, &at_x, &v, &mut moved, &mut image);
+        let masses = v.iter().zip(&self.model.masses);
+        let inertia: f64 = masses.map(|(v, mass)| mass.to_f64() * v.length_squared()).sum();
+        let curvature = dot(&v, &image);
+        if curvature > 0.0 { longest(&v) * (inertia / curvature).sqrt() } else { 0.0 }
+    }
+
     fn judge(&self, x: &[Vec3<f64>], found: Found) -> WayToRest {
         let rest = &self.model.rest_positions;
         let (mut displacement, mut reach) = (0.0f64, 0.0f64);
@@ -266,7 +286,6 @@ impl<'a, S: Real> Statics<'a, S> {
         let distance = (longest(&found.way) - rounding).max(0.0);
         let stiffness = if along > 0.0 && distance > 0.0 { square / along - 1.0 } else { 0.0 };
         let mut holding = vec![Vec3::ZERO; x.len()];
-        let elastic_energy = self.full_gradient(x, &mut holding);
         let there: Vec<_> = x.iter().zip(&found.way).map(|(x, way)| *x + *way).collect();
         self.full_gradient(&there, &mut holding);
         for (holding, moves) in holding.iter_mut().zip(&self.moves) {
@@ -279,7 +298,7 @@ impl<'a, S: Real> Statics<'a, S> {
             distance,
             displacement: if displacement > rounding { displacement } else { 0.0 },
             stiffness,
-            elastic_energy,
+            excursion: 0.0,
             complete: found.complete,
             stable: found.stable,
             way: found.way,

@@ -16,6 +16,8 @@ use viscera::solver::Inputs;
 pub const DT: f64 = 1.0 / 600.0;
 /// The fewest repetitions from which a median is taken.
 const FEWEST: usize = 3;
+/// Where noise hides a sweep, so many times the time is spent before it is given up.
+const PATIENCE: f64 = 4.0;
 /// The most: a longer case learns nothing more.
 const MOST: usize = 2000;
 /// Bytes of a number of the state, single precision.
@@ -67,6 +69,14 @@ impl Measurement {
     }
 }
 
+/// What one sweep costs [s], from steps [s] with few and with more of them; nothing where noise hides it: a sweep
+/// costs something, and as many as a step has cost no more than the step. The fastest of few repetitions can be one
+/// that something else of the machine has struck.
+fn unit_cost([few, more]: [f64; 2], counts: [u32; 2]) -> Option<f64> {
+    let unit = (more - few) / f64::from(counts[1] - counts[0]);
+    (unit > 0.0 && unit * f64::from(counts[0]) <= few).then_some(unit)
+}
+
 /// A model to measure a solver on.
 pub struct Bench<'a> {
     pub entry: &'a SolverEntry,
@@ -97,22 +107,25 @@ impl<'a> Bench<'a> {
         more.as_mut().map_or(Ok(()), Runner::warm_up)?;
         // By turns, so that what else the machine does strikes both alike.
         let start = Instant::now();
-        while few.repetitions() < FEWEST
-            || (start.elapsed().as_secs_f64() < seconds && few.repetitions() < MOST)
-        {
+        let best = |runner: &Runner<'_>| runner.fastest_on_device().unwrap_or(runner.fastest());
+        let unit = |few: &Runner<'_>, more: &Option<Runner<'_>>| match more {
+            Some(more) => unit_cost([best(few), best(more)], counts),
+            None => Some(best(few)),
+        };
+        loop {
+            let (spent, count) = (start.elapsed().as_secs_f64(), few.repetitions());
+            let is_due = spent >= seconds || count >= MOST;
+            let is_clear = count >= FEWEST && unit(&few, &more).is_some();
+            if count >= FEWEST && is_due && (is_clear || spent >= PATIENCE * seconds) {
+                break;
+            }
             few.time()?;
             more.as_mut().map_or(Ok(()), Runner::time)?;
         }
         let stages = few.stepper.stages()?;
         let tets = self.model.tet_count();
         let per_tet = 1e9 / tets as f64;
-        let best = |runner: &Runner<'_>| runner.fastest_on_device().unwrap_or(runner.fastest());
-        let unit_seconds = match &more {
-            Some(more) => (best(more) - best(&few)) / f64::from(counts[1] - counts[0]),
-            None => best(&few),
-        };
-        // Noise above the signal is no cost below zero.
-        let unit_seconds = (unit_seconds > 0.0).then_some(unit_seconds);
+        let unit_seconds = unit(&few, &more);
         let compulsory = self.compulsory_bytes() / tets as f64;
         let fraction = |s: f64| Some(compulsory * tets as f64 / s / bandwidth.bytes_per_second?);
         let facts = few.facts.clone();
@@ -165,6 +178,15 @@ mod tests {
     use super::super::solvers::SOLVERS;
     use super::super::subjects::{Size, Subject};
     use super::*;
+
+    /// Steps of two sweeps that take 163 ns per tetrahedron have no sweeps of 743 ns.
+    #[test]
+    fn a_sweep_costs_no_more_than_its_share_of_the_step() {
+        assert_eq!(unit_cost([10.0, 34.0], [2, 10]), Some(3.0));
+        assert_eq!(unit_cost([163.0, 163.0 + 8.0 * 743.0], [2, 10]), None);
+        assert_eq!(unit_cost([10.0, 50.1], [2, 10]), None);
+        assert_eq!(unit_cost([10.0, 9.0], [2, 10]), None);
+    }
 
     /// What decides whether a mesh fits into memory follows what is kept in fact.
     #[test]

@@ -310,3 +310,67 @@ fn mesh_that_does_not_fit_into_memory_is_refused_before_the_simulation() {
     let message = Bench::new(TINY).run(&["--memory", "1"]).error().to_owned();
     assert!(message.contains("--memory"), "{message}");
 }
+
+/// Devices never end and pipes wait for ever: neither is opened.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_is_no_file_is_not_read() {
+    let bench = Bench::new(&FROM_FILE.replace("organ.msh", "pipe.msh"));
+    let pipe = std::process::Command::new("mkfifo").arg(bench.path("pipe.msh")).status();
+    assert!(pipe.expect("mkfifo").success());
+    let message = refusal(&bench, &[]);
+    assert!(message.contains("pipe.msh is a device or a pipe"), "{message}");
+    let device = Bench::new(&FROM_FILE.replace("organ.msh", "/dev/zero"));
+    let message = refusal(&device, &[]);
+    assert!(message.contains("/dev/zero is a device or a pipe"), "{message}");
+    std::os::unix::fs::symlink("/dev/zero", device.path("link.toml")).expect("a link");
+    for arguments in [["run", "/dev/zero"], ["run", "link.toml"]] {
+        let end = device.end_of(&arguments);
+        assert!(end.error().contains("is a device or a pipe"), "{}", end.stderr);
+    }
+    for file in ["/dev/zero", "pipe.msh"] {
+        let end = bench.end_of(&["mesh", "inspect", file]);
+        assert!(end.error().contains("is a device or a pipe"), "{}", end.stderr);
+    }
+}
+
+#[test]
+fn numbers_that_mean_nothing_are_refused() {
+    for (setting, asked) in [
+        ("solver.relaxation=1e-320", "at least 0.001 and below 2"),
+        ("solver.explicit_safety=1e-300", "at least 0.001 and at most 1"),
+        ("solver.chebyshev_damping=5e-324", "at least 0.001 and at most 1"),
+        ("time.duration=1e-300 s", "at least 1 us"),
+    ] {
+        let message = refusal(&Bench::new(TINY), &["--set", setting]);
+        assert!(message.contains(asked), "{setting}: {message}");
+    }
+    for option in ["--frames", "--every"] {
+        let end = Bench::new(TINY).run(&[option, "-1"]);
+        let error = end.error();
+        assert!(error.contains("-1") && error.contains("1.."), "{}", end.stderr);
+        assert!(!end.stderr.contains("-- -1"), "{}", end.stderr);
+    }
+}
+
+/// A mesh whose points are all one.
+#[test]
+fn a_tetrahedron_without_size_is_told_in_words() {
+    let message = mesh_refusal(&gmsh(&["1 1 1"; 5], &TETS));
+    assert!(!message.contains("0e0"), "{message}");
+}
+
+/// Where no folder for displays is set, as in containers and jobs, drivers have nothing to complain of.
+#[test]
+fn a_good_run_without_a_display_says_nothing_on_standard_error() {
+    let bench = Bench::new(TINY);
+    for device in ["auto", "gpu"] {
+        let arguments =
+            ["run", "scene.toml", "--out", "out", "--set", "output.picture=false", "--set"];
+        let device = format!("solver.device={device}");
+        let mut command = bench.viscera(&[&arguments[..], &[device.as_str()]].concat());
+        let end = End::of(&command.env_remove("XDG_RUNTIME_DIR").output().expect("viscera starts"));
+        assert!(!end.stderr.contains("XDG"), "{device}: {}", end.stderr);
+        assert!(device.contains("gpu") || end.stderr.is_empty(), "{device}: {}", end.stderr);
+    }
+}

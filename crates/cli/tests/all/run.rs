@@ -241,9 +241,16 @@ fn a_reader_that_has_seen_enough_is_no_error() {
     assert_eq!(bench.summary("out")["finished"], true);
 }
 
+/// Ctrl-C, and what schedulers and containers send.
 #[cfg(unix)]
 #[test]
 fn interrupting_keeps_what_is_finished() {
+    interrupt("-INT");
+    interrupt("-TERM");
+}
+
+#[cfg(unix)]
+fn interrupt(signal: &str) {
     use std::process::Command;
     use std::time::{Duration, Instant};
 
@@ -260,7 +267,7 @@ fn interrupting_keeps_what_is_finished() {
         std::thread::sleep(Duration::from_millis(2));
     }
     let id = child.id().to_string();
-    let sent = Command::new("kill").args(["-INT", &id]).status().expect("a kill command");
+    let sent = Command::new("kill").args([signal, &id]).status().expect("a kill command");
     assert!(sent.success());
     let end = End::of(&child.wait_with_output().expect("viscera ends"));
     assert_eq!(end.code, Some(130), "{}", end.stderr);

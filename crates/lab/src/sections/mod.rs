@@ -77,6 +77,19 @@ impl Context<'_> {
         self.verdicts.push(Verdict { what, asked, measured, met });
     }
 
+    /// As [`Context::verdict`], of so many cases: a claim about none of them is not met.
+    pub fn verdict_of(
+        &mut self,
+        count: usize,
+        what: impl Into<String>,
+        asked: impl Into<String>,
+        measured: impl Into<String>,
+        met: bool,
+    ) {
+        let measured = if count > 0 { measured.into() } else { "no cases".to_owned() };
+        self.verdict(what, asked, measured, met && count > 0);
+    }
+
     /// A plot, and below it what to see and the command that made it.
     pub fn plot(&mut self, name: &str, plot: &Plot, see: &str) -> Result<()> {
         self.document.figure(name, plot)?;

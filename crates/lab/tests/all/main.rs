@@ -1,5 +1,6 @@
 //! All integration tests of `viscera-lab` and its library: one program that is linked once.
 
+mod at_rest;
 mod common;
 
 mod holds;

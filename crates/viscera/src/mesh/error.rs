@@ -70,8 +70,8 @@ pub enum MeshError {
     },
     /// A tetrahedron so small that its volume would underflow in single precision.
     #[error(
-        "tetrahedron {tet} has no edge longer than {longest_edge:e} m; \
-        at least {:e} m is needed, check the unit",
+        "tetrahedron {tet} {}; at least {:e} m is needed, check the unit",
+        longest_edge_text(*.longest_edge),
         super::MIN_EDGE
     )]
     TooSmall {
@@ -127,5 +127,13 @@ impl MeshError {
             | Self::FlatTet { tet, .. }
             | Self::CrowdedFace { tet, .. } => MeshPlace::Tet(tet),
         }
+    }
+}
+
+fn longest_edge_text(longest_edge: f64) -> String {
+    if longest_edge > 0.0 {
+        format!("has no edge longer than {longest_edge:e} m")
+    } else {
+        "has all its vertices in one place".to_owned()
     }
 }

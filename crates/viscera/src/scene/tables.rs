@@ -47,7 +47,7 @@ settings_table! {
     /// How long a scene lasts, in steps of one frame.
     pub struct TimeSettings {
         /// Simulated time.
-        duration: f64 = 2.0, quantity(Dimension::Time, above(0.0).up_to(86_400.0));
+        duration: f64 = 2.0, quantity(Dimension::Time, at_least(1e-6).up_to(86_400.0));
         /// Time step of a frame; `solver.substeps` divides it further. Longer frames lose more
         /// motion to numerical damping. A fraction is legal: "1/60 s".
         frame: f64 = (1.0 / 60.0), quantity(Dimension::Time, at_least(1e-6).up_to(1.0));
@@ -211,7 +211,7 @@ settings_table! {
         /// Its centre.
         center: Vec3<f64> = required, vector(Dimension::Length);
         /// Its radius.
-        radius: f64 = required, quantity(Dimension::Length, above(0.0));
+        radius: f64 = required, quantity(Dimension::Length, at_least(1e-9).up_to(1e6));
     }
 }
 
@@ -332,7 +332,7 @@ settings_table! {
         /// When.
         time: f64 = required, quantity(Dimension::Time, at_least(0.0));
         /// The share of the full force.
-        factor: f64 = required, number(ANY);
+        factor: f64 = required, number(at_least(-1e9).up_to(1e9));
     }
 }
 

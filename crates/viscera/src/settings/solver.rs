@@ -1,8 +1,8 @@
 //! The solver's settings.
 
 use super::{
-    Kind, Node, SettingError, Table, Value, ValueError, Whole, above, at_least, choices, number,
-    one_of, settings_table, truth, value_error, whole, wrong_type,
+    Kind, Node, SettingError, Table, Value, ValueError, Whole, at_least, choices, number, one_of,
+    settings_table, truth, value_error, whole, wrong_type,
 };
 
 choices! {
@@ -146,7 +146,7 @@ settings_table! {
         method: Method = (Method::Xpbd), one_of::<Method>();
         /// The share of the largest stable step of the body at rest that "explicit" takes. Tissue
         /// stiffens under strong deformation: lower this where a run diverges.
-        explicit_safety: f64 = 0.5, number(above(0.0).up_to(1.0));
+        explicit_safety: f64 = 0.5, number(at_least(1e-3).up_to(1.0));
         /// Substeps per frame. More lose less motion to numerical damping and follow it more
         /// closely; the cost grows alike. With `rebase` and `keep_multipliers` the shape at rest
         /// does not depend on them; plain XPBD needs about 50 for an error near 1 %.
@@ -160,7 +160,7 @@ settings_table! {
         /// Over-relaxation factor omega. Above 1 hurries, below 1 calms. Safe up to 1.8 for one
         /// colour, 1.5 for a few, about 1.2 for unlimited; beyond that sweeps overshoot and may
         /// diverge. With `rebase` and one colour only 1 is safe.
-        relaxation: f64 = 1.0, number(above(0.0).below(2.0));
+        relaxation: f64 = 1.0, number(at_least(1e-3).below(2.0));
         /// What over-relaxation scales.
         relaxation_form: RelaxationForm = (RelaxationForm::Consistent), one_of::<RelaxationForm>();
         /// What is done with the sequence of sweeps of a substep. Needs several iterations to pay.
@@ -173,7 +173,7 @@ settings_table! {
         /// sweeps, more leave it less to gain.
         chebyshev_delay: u32 = 10, whole(1, 10_000);
         /// Chebyshev's under-relaxation gamma; 0.6 to 1 is usual. Smaller is calmer and slower.
-        chebyshev_damping: f64 = 1.0, number(above(0.0).up_to(1.0));
+        chebyshev_damping: f64 = 1.0, number(at_least(1e-3).up_to(1.0));
         /// How many past sweeps Anderson mixes. Longer windows converge faster until the
         /// small least-squares problem becomes ill-conditioned, in single precision sooner.
         anderson_window: u32 = 5, whole(1, 10);

@@ -17,6 +17,10 @@ const NEAR: f64 = 0.001;
 /// where the tissue stands.
 const PATIENCE: f64 = 10.0;
 
+/// What is away from rest swings where its motion alone would carry it this share of the way: what creeps moves
+/// by thousandths of that.
+const SWINGING: f64 = 0.2;
+
 /// A run at its end, whose loads no longer change, beside its state of rest.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct RestReport {
@@ -59,8 +63,9 @@ impl RestReport {
         let error = self.largest_error();
         let has_far_to_go = error > AWAY || !self.stable && error > NEAR;
         match () {
-            () if self.swing > AWAY && self.swing > 0.5 * error => Standing::Swinging,
+            () if self.swing > AWAY && self.swing > SWINGING * error => Standing::Swinging,
             () if !has_far_to_go => Standing::AtRest,
+            () if self.swing > SWINGING * error => Standing::Swinging,
             () if self.approach > 0.0 && self.time_left() < PATIENCE * time => Standing::Creeping,
             () => Standing::Elsewhere,
         }
@@ -79,6 +84,7 @@ impl RestReport {
     /// What a person should know, and do, where a scene has not come to rest after a time [s].
     pub fn warning(&self, scene: &Scene, time: f64) -> Option<String> {
         let standing = self.standing(time);
+        let error = self.largest_error();
         let away = format!(
             "{} {:.1} % of the displacement ({:.2} mm) and {:.1} % of the forces away from the state of rest",
             if self.complete { "about" } else { "at least" },
@@ -96,7 +102,7 @@ impl RestReport {
                 "not at rest yet: the tissue still moves at up to {:.1} mm/s and swings by about {:.1} % of its \
                  displacement; {damping}raise time.duration",
                 1e3 * self.speed,
-                100.0 * self.swing.max(self.error),
+                100.0 * self.swing.max(error),
             ),
             Standing::Creeping => format!(
                 "not at rest yet: {away} and still moving at up to {:.2} mm/s; raise time.duration to about {:.0} s{}",
@@ -109,7 +115,12 @@ impl RestReport {
             ),
             Standing::Elsewhere if !self.stable => format!(
                 "the tissue is not in a stable state: {away}, and some of it is pushed on rather than back; it \
-                 may be about to buckle: raise time.duration"
+                 may be about to buckle; {}",
+                if scene.solver.rebase {
+                    "raise time.duration".into()
+                } else {
+                    super::advice::budget(scene)
+                },
             ),
             Standing::Elsewhere => format!(
                 "the solver falls short: {away}, as if the tissue were {:.1} % {}; {}",
@@ -122,8 +133,8 @@ impl RestReport {
 }
 
 impl<S: Real> Simulation<S> {
-    /// How far the last frame is from the state of rest; nothing before the first frame, and while what the scene
-    /// does changes: then there is none to come to. Takes about as long as some dozens of frames of a small mesh,
+    /// How far the last frame is from the state of rest; nothing before the first frame, where nothing is held, and
+    /// while what the scene does changes: then there is none to come to. Takes about as long as some dozens of frames of a small mesh,
     /// seconds for a large one, and memory while it lasts: for the end of a run.
     pub fn rest(&self) -> Option<RestReport> {
         let (time, frame) = (self.time(), self.scene.time.frame);
@@ -134,28 +145,23 @@ impl<S: Real> Simulation<S> {
         if self.inputs_at(time - frame) != inputs {
             return None;
         }
-        let measured = WayToRest::measure(&self.model, &self.state.positions, &inputs);
-        let (mut speed, mut gone, mut kinetic) = (0.0f64, 0.0, 0.0);
-        for (v, way) in measured.way.iter().enumerate() {
-            let step: Vec3<f64> = self.state.positions[v].cast::<f64>() - self.before[v].cast();
-            let velocity = step * (1.0 / frame);
-            speed = speed.max(velocity.length());
-            gone += step.dot(*way);
-            if *way != Vec3::ZERO {
-                kinetic += 0.5 * self.model.masses[v].to_f64() * velocity.length_squared();
-            }
-        }
+        // Over the frame: velocities of a last substep are also what sweeps correct.
+        let positions = &self.state.positions;
+        let steps = positions.iter().zip(&self.before).map(|(x, y)| x.cast::<f64>() - y.cast());
+        let velocities: Vec<Vec3<f64>> = steps.map(|step| step * (1.0 / frame)).collect();
+        let measured = WayToRest::measure(&self.model, positions, &velocities, &inputs)?;
+        let speed = velocities.iter().map(|v| v.length()).fold(0.0, f64::max);
+        let gone: f64 = velocities.iter().zip(&measured.way).map(|(v, way)| v.dot(*way)).sum();
         let length: f64 = measured.way.iter().map(|way| way.length_squared()).sum();
-        let energy = measured.elastic_energy;
-        let is_displaced = measured.displacement > 0.0 && energy > 0.0;
+        let is_displaced = measured.displacement > 0.0;
         Some(RestReport {
             distance: measured.distance,
             error: measured.error(),
             force_error: self.force_error(&measured),
             stiffness: measured.stiffness,
-            swing: if is_displaced { (kinetic / energy).sqrt() } else { 0.0 },
+            swing: if is_displaced { measured.excursion / measured.displacement } else { 0.0 },
             speed,
-            approach: if length > 0.0 { gone / (length * frame) } else { 0.0 },
+            approach: if length > 0.0 { gone / length } else { 0.0 },
             complete: measured.complete,
             stable: measured.stable,
         })
@@ -172,8 +178,9 @@ impl<S: Real> Simulation<S> {
         let apart = now.iter().zip(&at_rest);
         let apart =
             apart.map(|(a, b)| (Vec3::from_f64(a.force) - Vec3::from_f64(b.force)).length());
-        // What rounding makes is no force.
-        let apart = (apart.fold(0.0, f64::max) - self.balance.force_floor).max(0.0);
-        if largest > self.balance.force_floor { apart / largest } else { 0.0 }
+        // What rounding makes is no force, and a hundred-thousandth of strain matters to nobody.
+        let floor = self.balance.force_floor;
+        let apart = (apart.fold(0.0, f64::max) - floor).max(0.0);
+        if largest > floor { apart / largest } else { 0.0 }
     }
 }

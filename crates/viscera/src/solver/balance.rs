@@ -28,24 +28,25 @@ pub struct ForceBalance {
     pub elastic_energy: f64,
     /// Work [J] of the residuals of free vertices through their displacements from rest.
     pub residual_work: f64,
-    /// What rounding of positions pretends of `elastic_energy` [J]: the sum of `E V eps^2`.
+    /// Energy [J] of strains that mean nothing, the sum of `E V eps^2`: a hundred-thousandth, or what rounding of
+    /// positions makes.
     pub energy_floor: f64,
-    /// What it pretends of `unbalanced` [N]: the sum of `E A eps`, and of `m eps/dt^2`.
+    /// Forces [N] of such strains, the sum of `E A eps`, and of inertia where positions are rounded.
     pub force_floor: f64,
-    /// Largest displacement from rest [m].
-    pub displacement: f64,
+    /// What rounding pretends of `residual_work` [J].
+    pub work_floor: f64,
 }
 
-/// Energy that is not this many times what rounding makes is no strain.
-const STRAINED: f64 = 100.0;
+/// Strain that nobody sees or feels.
+const SMALLEST_STRAIN: f64 = 1e-5;
 
-/// So many times what rounding unbalances counts as a load.
+/// Positions are off by so many units of their precision.
 const ROUNDED: f64 = 10.0;
 
 impl ForceBalance {
-    /// `unbalanced / load`; 0 where nothing acts. What rounding alone makes counts as a load.
+    /// `unbalanced / load`; 0 where nothing acts. The forces of strains that mean nothing count as a load.
     pub fn relative_residual(&self) -> f64 {
-        let load = self.load + ROUNDED * self.force_floor;
+        let load = self.load + self.force_floor;
         if load > 0.0 { self.unbalanced / load } else { 0.0 }
     }
 
@@ -53,11 +54,11 @@ impl ForceBalance {
     /// is off. A linear body at rest has `u (K u - f)/(u K u)` here, which is `1 - s` where `u` is
     /// `1/s` times the solution: 0 for the solution, positive where the body has given way too
     /// much, negative where too little. Energy, not the work of the stresses, because that one
-    /// means nothing after a turn. 0 where all strain, or all of that work, is what rounding makes: of tissue that
-    /// moves as a whole.
+    /// means nothing after a turn. 0 where all strain means nothing, or all of that work is what rounding makes: of
+    /// tissue that moves as a whole.
     pub fn stiffness_error(&self) -> f64 {
-        let is_strained = self.elastic_energy > STRAINED * self.energy_floor;
-        let is_work = self.residual_work.abs() > self.force_floor * self.displacement;
+        let is_strained = self.elastic_energy > self.energy_floor;
+        let is_work = self.residual_work.abs() > self.work_floor;
         if is_strained && is_work { 0.5 * self.residual_work / self.elastic_energy } else { 0.0 }
     }
 
@@ -76,6 +77,7 @@ impl ForceBalance {
             return;
         }
         let ground = &work.ground;
+        let (mut rounding, mut displacement) = (0.0, 0.0f64);
         for (set, strains) in model.tet_sets().into_iter().zip(&ground.start_strain) {
             for (tet, (block, lane)) in model.tets(set).zip(set.places()) {
                 let x = tet.vertices.map(|v| state.positions[v as usize].cast::<f64>());
@@ -92,9 +94,10 @@ impl ForceBalance {
                 let f = deformation_gradient(&x, &shape);
                 let response = tissue.respond(&f, start.as_ref());
                 self.elastic_energy += volume * response.elastic_energy;
-                let [energy, force] = floors::<S>(&x, &shape, volume, &tissue);
-                self.energy_floor += energy;
-                self.force_floor += force;
+                let floors = Floors::new::<S>(&x, &shape, volume, &tissue);
+                self.energy_floor += floors.energy;
+                self.force_floor += floors.force;
+                rounding += floors.rounding;
                 let forces = internal_forces(&response.piola, &shape, volume);
                 for (v, force) in tet.vertices.into_iter().zip(forces) {
                     self.residual[v as usize] -= force;
@@ -134,33 +137,51 @@ impl ForceBalance {
             let predicted = ground.predicted[place].vec3().cast();
             let inertia = ground.inertias[place].to_f64();
             self.residual[v] += (x - predicted) * (inertia / (dt * dt));
-            self.force_floor += S::EPSILON * x.length() * inertia / (dt * dt);
+            self.force_floor += ROUNDED * S::EPSILON * x.length() * inertia / (dt * dt);
             let residual = self.residual[v];
             if ground.inverse_masses[place] == S::ZERO {
                 self.load += residual.length();
             } else {
                 self.unbalanced += residual.length();
                 self.load += mass * gravity.length();
-                let displacement = x - model.rest_positions[v].cast();
-                self.residual_work += residual.dot(displacement);
-                self.displacement = self.displacement.max(displacement.length());
+                let moved = x - model.rest_positions[v].cast();
+                self.residual_work += residual.dot(moved);
+                displacement = displacement.max(moved.length());
             }
         }
+        self.work_floor = rounding * displacement;
     }
 }
 
-/// Energy [J] and forces [N] that rounding of a tetrahedron's corners to the precision makes, with the stiffness
-/// against a change of volume, the largest that tissue has.
-fn floors<S: Real>(
-    x: &[Vec3<f64>; 4],
-    shape: &Mat3<f64>,
-    volume: f64,
-    tissue: &Tissue<f64>,
-) -> [f64; 2] {
-    let reach = x.iter().fold(0.0, |reach: f64, x| reach.max(x.length()));
-    let slopes = shape_gradients(shape).map(|g| g.length());
-    let slope = slopes.into_iter().fold(0.0, f64::max);
-    let strain = S::EPSILON * reach * slope;
-    let force = (tissue.lame_lambda + 2.0 * tissue.lame_mu) * volume * strain;
-    [force * strain, force * slope]
+/// What strains that mean nothing make of a tetrahedron.
+struct Floors {
+    /// [J].
+    energy: f64,
+    /// [N].
+    force: f64,
+    /// Of rounding of its corners to the precision alone [N].
+    rounding: f64,
+}
+
+impl Floors {
+    /// Rounding changes volumes as well, against the largest stiffness that tissue has.
+    fn new<S: Real>(
+        x: &[Vec3<f64>; 4],
+        shape: &Mat3<f64>,
+        volume: f64,
+        tissue: &Tissue<f64>,
+    ) -> Self {
+        let reach = x.iter().fold(0.0, |reach: f64, x| reach.max(x.length()));
+        let slopes = shape_gradients(shape).map(|g| g.length());
+        let slope = slopes.into_iter().fold(0.0, f64::max);
+        let rounding = S::EPSILON * reach * slope;
+        let bulk = volume * (tissue.lame_lambda + 2.0 * tissue.lame_mu);
+        let young = volume * 3.0 * tissue.lame_mu;
+        let strain = ROUNDED * rounding;
+        Self {
+            energy: bulk * strain * strain + young * SMALLEST_STRAIN * SMALLEST_STRAIN,
+            force: slope * (bulk * strain + young * SMALLEST_STRAIN),
+            rounding: slope * bulk * rounding,
+        }
+    }
 }

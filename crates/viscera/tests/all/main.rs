@@ -6,6 +6,7 @@ mod gpu_common;
 
 mod allocation;
 mod allocation_threads;
+mod at_rest;
 mod coloring;
 mod determinism;
 mod element_solves;
@@ -35,6 +36,7 @@ mod mesh_damage;
 mod mesh_io;
 mod parts;
 mod physics;
+mod readme;
 mod scene_errors;
 mod scene_files;
 mod shapes;

@@ -76,7 +76,7 @@ fn stress_and_volume_of_a_tetrahedron_are_those_of_its_deformation() {
 }
 
 /// `1 - s` where the displacement is `1/s` times the solution. So little weight that the answer is linear up to
-/// strains of 1e-6, and a step so long that inertia is nothing.
+/// strains of 1e-3, and a step so long that inertia is nothing.
 #[test]
 fn a_bar_displaced_by_a_share_of_its_solution_is_said_to_be_softer_by_that_share() {
     const LONG: f64 = 1e4;
@@ -87,7 +87,7 @@ fn a_bar_displaced_by_a_share_of_its_solution_is_said_to_be_softer_by_that_share
         let model: Model<f64> = single_body(&mesh, &material(law, YOUNG, POISSON), &settings);
         let wall = (0u32..).zip(mesh.vertices()).filter(|(_, x)| x.x < 1e-9);
         let inputs = Inputs {
-            gravity: vec3(0.0, 0.0, -1e-6),
+            gravity: vec3(0.0, 0.0, -1e-2),
             pins: wall.map(|(vertex, &target)| Pin { vertex, target }).collect(),
             ..Inputs::default()
         };
@@ -109,7 +109,10 @@ fn a_bar_displaced_by_a_share_of_its_solution_is_said_to_be_softer_by_that_share
             let mut balance = ForceBalance::default();
             solver.force_balance(&model, &state, &inputs, &mut balance).expect("a balance");
             let found = balance.stiffness_error();
-            assert!((found - (1.0 - stiffness)).abs() < 1e-4, "{law:?} {stiffness}: {found}");
+            assert!(
+                (found - (1.0 - stiffness)).abs() < 2e-3 * stiffness,
+                "{law:?} {stiffness}: {found}"
+            );
         }
     }
 }

@@ -7,10 +7,10 @@ use viscera::material::MaterialModel;
 
 use super::methods::law;
 use super::{Context, Section};
-use crate::stress::{FRAMES, HELD, Kind, Run, SIZE};
+use crate::stress::{FRAMES, HELD, Kind, ROUND_OFF, Run, SIZE};
 use runs::{
-    Case, MODELS, Outcome, ROUND_OFF, Rest, SAFE, SETTLING_YOUNG, UNGUARDED, YOUNG,
-    apparent_stiffness, cases, outcome, rests, settling_poissons, ways,
+    Case, MODELS, Outcome, Rest, SAFE, SETTLING_YOUNG, UNGUARDED, YOUNG, apparent_stiffness, cases,
+    outcome, rests, settling_poissons, ways,
 };
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 

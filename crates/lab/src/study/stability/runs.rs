@@ -10,7 +10,7 @@ use super::Context;
 use crate::reference::Reference;
 use crate::scenes::Size;
 use crate::settling::{AfterStep, compare, settle_with, truth};
-use crate::stress::{self, FRAMES, Kind, Run, SIZE};
+use crate::stress::{self, FRAMES, Kind, ROUND_OFF, Run, SIZE};
 use crate::study::methods::{COLORED, Method, anderson, exact, published};
 
 /// Young's modulus [Pa] and Poisson's ratio of the bar in trouble.
@@ -19,8 +19,6 @@ const POISSON: f64 = 0.45;
 /// Of the bars that show who settles: stiff ones, of which steps are taken back.
 pub(super) const SETTLING_YOUNG: f64 = 1e5;
 const SETTLING_POISSON: [f64; 2] = [0.45, 0.49];
-/// Of a potential, what its sums may lose to rounding.
-pub(super) const ROUND_OFF: f64 = 1e-9;
 /// A body this many times as long as at rest has blown up.
 const BLOWN: f64 = 10.0;
 
@@ -163,16 +161,6 @@ impl Outcome {
     }
 }
 
-/// Kinetic and elastic energy [J].
-fn mechanical_energy(reference: &Reference, run: &Run<'_>) -> Result<f64> {
-    if !run.state.is_finite() {
-        return Ok(f64::INFINITY);
-    }
-    let moving = run.state.velocities.iter().zip(&run.model.masses);
-    let kinetic: f64 = moving.map(|(v, m)| 0.5 * m * v.length_squared()).sum();
-    Ok(kinetic + reference.elastic_energy(&run.state.positions, &run.inputs)?)
-}
-
 fn is_blown(run: &Run<'_>) -> bool {
     let x = &run.state.positions;
     let first = x[0];
@@ -190,20 +178,14 @@ pub(super) fn outcome(context: &Context, case: &Case) -> Result<Outcome> {
     let mut rejected = 0;
     for _ in 0..FRAMES {
         if run.is_free() && outcome.energies.is_empty() {
-            outcome.energies.push(mechanical_energy(&reference, &run)?);
+            outcome.energies.push(run.mechanical_energy(&reference)?);
         }
-        let before = run.state.clone();
-        run.step()?;
-        let (x, inputs) = (&run.state.positions, &run.inputs);
-        let [start, end] = reference.incremental(&before, x, inputs, Run::DT)?;
-        // A potential that is no number counts as well.
-        let factor = end / start;
-        let factor = if factor.is_finite() { factor } else { f64::INFINITY };
-        outcome.above += u32::from(end > start * (1.0 + ROUND_OFF) || factor.is_infinite());
+        let factor = run.step_watched(&reference)?;
+        outcome.above += u32::from(factor > 1.0 + ROUND_OFF);
         outcome.factor = outcome.factor.max(factor);
         outcome.is_blown |= is_blown(&run);
         if !outcome.energies.is_empty() {
-            outcome.energies.push(mechanical_energy(&reference, &run)?);
+            outcome.energies.push(run.mechanical_energy(&reference)?);
         }
         if !run.state.is_finite() {
             break;

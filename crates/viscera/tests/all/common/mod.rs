@@ -3,6 +3,7 @@
 pub mod counting;
 pub mod data;
 pub mod device;
+pub mod potential;
 pub mod tets;
 
 use viscera::material::{Material, MaterialModel};

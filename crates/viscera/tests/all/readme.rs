@@ -1,0 +1,96 @@
+//! What README.md says of the retractor is what runs of its scene give.
+
+use viscera::scalar::{Real, Vec3};
+use viscera::scene::Scene;
+use viscera::simulation::{Assembly, PatchKind, Simulation};
+
+const README: &str = include_str!("../../../../README.md");
+const SCENE: &str = include_str!("../../../../scenes/liver_retraction.toml");
+
+/// A budget, its colours, and the force in the table as it is written there.
+struct Row {
+    budget: String,
+    colors: &'static str,
+    published: bool,
+    force: String,
+}
+
+/// The lines of the table; one that lists several budgets has as many forces.
+fn rows() -> Vec<Row> {
+    let start = README.find("| substeps x iterations |").expect("the table");
+    let lines = README[start..].lines().skip(2).take_while(|line| line.starts_with('|'));
+    let mut rows = Vec::new();
+    for line in lines {
+        let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
+        let [budgets, colors, forces] = cells[..] else { panic!("{line}") };
+        let (published, budgets) = match budgets.strip_prefix("as published: ") {
+            Some(budgets) => (true, budgets),
+            None => (false, budgets),
+        };
+        let colors = match colors.split(' ').next() {
+            Some("unlimited") => "unlimited",
+            Some("4") => "4",
+            Some("1") => "1",
+            _ => panic!("{line}"),
+        };
+        for (budget, force) in budgets.split(", ").zip(forces.split(", ")) {
+            let budget = budget.trim_end_matches(" (default)").to_owned();
+            let force = force.trim_end_matches(" N").to_owned();
+            rows.push(Row { budget, colors, published, force });
+        }
+    }
+    rows
+}
+
+/// The force [N] at the end of a run.
+fn retractor<S: Real>(row: &Row) -> f64 {
+    let (substeps, iterations) = row.budget.split_once(" x ").expect("a budget");
+    let form = if row.published { "false" } else { "true" };
+    let settings = [
+        ("solver.substeps", substeps),
+        ("solver.iterations", iterations),
+        ("solver.colors", row.colors),
+        ("solver.rebase", form),
+        ("solver.keep_multipliers", form),
+        ("solver.device", "cpu"),
+    ];
+    let scene = Scene::parse("liver.toml", SCENE, &settings).unwrap_or_else(|e| panic!("{e}"));
+    let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned())).expect("an assembly");
+    let frames = scene.frame_count();
+    let mut simulation = Simulation::<S>::new(scene, assembly).unwrap_or_else(|e| panic!("{e}"));
+    for _ in 0..frames {
+        simulation.advance().unwrap_or_else(|e| panic!("{e}"));
+    }
+    simulation.measure().expect("measures");
+    let patches = simulation.report().patches;
+    let motion = patches.iter().find(|patch| patch.kind == PatchKind::Motion).expect("a retractor");
+    Vec3::from_f64(motion.force).length()
+}
+
+fn check(rows: &[Row]) {
+    let mut stale = Vec::new();
+    for row in rows {
+        let found = format!("{:.4}", retractor::<f32>(row));
+        println!("{} {} {}: {found} N", row.budget, row.colors, row.published);
+        if found != row.force {
+            stale.push(format!(
+                "{}, colours {}: {found} N, not {} N",
+                row.budget, row.colors, row.force
+            ));
+        }
+    }
+    assert!(stale.is_empty(), "README.md: {stale:#?}");
+}
+
+#[test]
+fn the_force_in_the_readme_is_that_of_a_run() {
+    let rows = rows();
+    assert_eq!(rows.len(), 8);
+    check(&rows[..1]);
+}
+
+#[test]
+#[ignore = "slow: eight runs of a liver"]
+fn the_force_in_the_readme_is_that_of_a_run_at_length() {
+    check(&rows());
+}
