@@ -46,6 +46,7 @@ pub enum Slot {
     Ground,
     Table,
     SmallSteps,
+    Falls,
 }
 
 impl Slot {

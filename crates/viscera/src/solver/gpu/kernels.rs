@@ -85,7 +85,7 @@ macro_rules! kernels {
 kernels! {
     APPLY_UPDATES = Vertices "apply_updates" 64 [Predicted Acting Targets Updates Control];
     PREDICT = Vertices "predict" 64
-        [Points Velocities Previous Predicted Acting Targets Starts];
+        [Points Velocities Previous Predicted Acting Targets Starts Table];
     REBASE = Vertices "rebase" 64 [Points Loads Previous Predicted Acting Table];
     RECOMPUTE_POSITIONS = Vertices "recompute_positions" 64 [Points Loads Predicted Acting Table];
     SPLIT_COPIES = Vertices "split_copies" 64 [Offsets Points Copies];

@@ -4,7 +4,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::buffers::{ALIGNMENT, Attachment, Range, Slot, Spring, unknowns_size};
-use super::parts::{PartRow, Parts, SmallSteps};
+use super::parts::{Fall, PartRow, Parts, SmallSteps};
 use super::record::Pieces;
 use crate::model::Model;
 use crate::scalar::lanes::LANES;
@@ -47,6 +47,7 @@ pub(super) struct Header {
     pub block_parts: u32,
     pub weights: u32,
     pub small_steps: u32,
+    pub falls: u32,
     /// Vertices from one range of the ground to the next, and where anchors begin.
     pub stride: u32,
     pub anchors: u32,
@@ -242,6 +243,8 @@ impl Layout {
             part_count: model.part_count() as u32,
             ..Header::default()
         };
+        let falls = vec![Fall::default(); model.part_count()];
+        header.falls = add(Some(Slot::Falls), bytemuck::cast_slice(&falls));
         if settings.method == Method::Explicit {
             let small = vec![SmallSteps::default(); model.part_count()];
             header.small_steps = add(Some(Slot::SmallSteps), bytemuck::cast_slice(&small));
@@ -391,7 +394,7 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
     let mut all = words!(Header {
         "MATERIALS_AT" materials "CORNERS_AT" corners "OFFSETS_AT" offsets "SPRINGS_AT" springs
         "ATTACHMENTS_AT" attachments "PIECES_AT" pieces "MEMBERS_AT" members "PARTS_AT" parts
-        "RUNS_AT" runs "BLOCK_PARTS_AT" block_parts "WEIGHTS_AT" weights "SMALL_STEPS_AT" small_steps "STRIDE_AT" stride
+        "RUNS_AT" runs "BLOCK_PARTS_AT" block_parts "WEIGHTS_AT" weights "SMALL_STEPS_AT" small_steps "FALLS_AT" falls "STRIDE_AT" stride
         "ANCHORS_AT" anchors "LINES_AT" lines "ENERGIES_AT" energies "TET_LANES_AT" tet_lanes
         "NEO_HOOKEAN_FROM_AT" neo_hookean_from "SPRING_COUNT_AT" spring_count
         "PART_COUNT_AT" part_count
@@ -410,7 +413,9 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
     all.extend(words!(SmallSteps {
         "SMALL_COUNT" count "SMALL_DT" dt "SMALL_INVERSE_DT" inverse_dt
     }));
+    all.extend(words!(Fall { "FALL_IS_FREE" is_free "FALL_ACCELERATION" acceleration }));
     all.extend([
+        ("FALL_WORDS", size(size_of::<Fall>())),
         ("SMALL_WORDS", size(size_of::<SmallSteps>())),
         ("PIECE_WORDS", size(size_of::<Piece>())),
         ("PART_WORDS", size(size_of::<PartRow>())),

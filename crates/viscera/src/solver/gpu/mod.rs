@@ -37,11 +37,11 @@ mod timing;
 use super::StepError;
 use super::cpu::sizes;
 use super::explicit::Stability;
-use super::plan::Plan;
+use super::plan::{Plan, Stage};
 use super::tethers::Bundle;
 use crate::model::Model;
 use crate::scalar::Vec3;
-use crate::settings::{Acceleration, Method, Precision, SolverSettings};
+use crate::settings::{Acceleration, Method, Precision, SolverSettings, Start};
 use crate::state::State;
 pub use buffers::Slot;
 use buffers::{Buffers, Update};
@@ -54,7 +54,7 @@ pub use frames::Frame;
 use frames::Frames;
 pub use host::{HostLayout, host_layouts};
 use layout::Layout;
-use parts::SmallSteps;
+use parts::{Falls, SmallSteps};
 use record::{Dispatch, Job, Recorder};
 use step::FrameConstants;
 pub use surface::{GpuSurface, Skin};
@@ -129,6 +129,8 @@ pub struct GpuSolver {
     tethers: Vec<Bundle<f32>>,
     holds: Vec<Hold>,
     small_steps: Vec<SmallSteps>,
+    /// What nothing holds starts otherwise, where that is asked for.
+    falls: Option<Falls>,
 }
 
 impl GpuSolver {
@@ -220,6 +222,7 @@ impl GpuSolver {
             weights_dt: 0.0,
             device: device.clone(),
             settings: settings.clone(),
+            falls: plan.prologue.contains(&Stage::Predict(Start::Auto)).then(|| Falls::new(model)),
             plan,
             uniforms,
             frame,

@@ -3,9 +3,10 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::multipliers_start;
+use super::buffers::{Update, multipliers_start};
 use super::layout::{Piece, SUM_GROUPS};
 use crate::model::{Model, Part};
+use crate::scalar::{Vec3, vec3};
 use crate::settings::SolverSettings;
 use crate::solver::rebase::{bound_share, rebase_factor};
 
@@ -45,6 +46,57 @@ impl SmallSteps {
     pub fn new(count: u32, dt: f64) -> Self {
         let small = dt / f64::from(count);
         Self { count, dt: small as f32, inverse_dt: (1.0 / small) as f32 }
+    }
+}
+
+/// Whether nothing holds a part in a step, and its mean acceleration [m/s^2] then.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Fall {
+    pub is_free: u32,
+    pub acceleration: [f32; 3],
+}
+
+/// What parts fall by.
+#[derive(Debug)]
+pub(super) struct Falls {
+    /// Of each part [kg], and whether it has attachments.
+    bodies: Vec<(f64, bool)>,
+    /// Forces on each part [N].
+    forces: Vec<Vec3<f64>>,
+    /// In this step.
+    pub all: Vec<Fall>,
+}
+
+impl Falls {
+    pub fn new(model: &Model<f32>) -> Self {
+        let mass = |v: usize| f64::from(model.masses[model.numbering.order[v] as usize]);
+        let body = |part: &Part| {
+            (part.vertices.clone().map(mass).sum(), part.attachments().next().is_some())
+        };
+        let bodies: Vec<_> = model.parts.iter().map(body).collect();
+        let count = bodies.len();
+        Self { bodies, forces: vec![Vec3::ZERO; count], all: vec![Fall::default(); count] }
+    }
+
+    /// Finds what nothing holds among what acts on vertices.
+    pub fn find(&mut self, model: &Model<f32>, gravity: Vec3<f32>, updates: &[Update]) {
+        self.forces.fill(Vec3::ZERO);
+        for (fall, (_, is_attached)) in self.all.iter_mut().zip(&self.bodies) {
+            fall.is_free = u32::from(!is_attached);
+        }
+        for update in updates {
+            let part = model.part_at(update.vertex as usize);
+            let [x, y, z] = update.force;
+            if update.is_pinned != 0 || update.stiffness != 0.0 {
+                self.all[part].is_free = 0;
+            }
+            self.forces[part] += vec3(x, y, z).cast::<f64>();
+        }
+        for ((fall, (mass, _)), force) in self.all.iter_mut().zip(&self.bodies).zip(&self.forces) {
+            let acceleration = gravity + (*force * (1.0 / mass)).cast();
+            fall.acceleration = acceleration.to_array();
+        }
     }
 }
 

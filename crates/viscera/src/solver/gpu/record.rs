@@ -173,8 +173,9 @@ impl<'a> Recorder<'a> {
                 into.push(begin);
                 let mode = match start {
                     Start::Previous => 0,
-                    Start::Inertial | Start::Auto => 1,
+                    Start::Inertial => 1,
                     Start::Predicted => 2,
+                    Start::Auto => 3,
                 };
                 let keeps_starts = if self.settings.guards_steps() { 4 } else { 0 };
                 let mut predict = self.vertices(&kernels::PREDICT, mode | keeps_starts);

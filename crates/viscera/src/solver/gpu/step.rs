@@ -146,6 +146,10 @@ impl GpuSolver {
         self.collect_updates(model, inputs, dt);
         let queue = &self.device.queue;
         self.buffers.write(queue, Slot::Updates, bytemuck::cast_slice(&self.updates));
+        if let Some(falls) = &mut self.falls {
+            falls.find(model, inputs.gravity, &self.updates);
+            self.buffers.write(queue, Slot::Falls, bytemuck::cast_slice(&falls.all));
+        }
         let settings = &self.settings;
         let held = &model.attachments;
         if !held.vertices.is_empty() && (!inputs.anchors.is_empty() || self.has_moved_anchors) {

@@ -34,8 +34,8 @@ fn apply_updates(
 }
 
 // xt = x + dt v + dt^2 (g + M^-1 (f + k (a - y))), y without the last term: springs k to places a outside are
-// a part of the inertia (solver/tethers.rs). x becomes the start of the iteration: x (mode 0), x + dt v (mode 1)
-// or xt (mode 2); pins move to their places; w = 1/m per copy. Where steps are guarded (mode bit 2) the places
+// a part of the inertia (solver/tethers.rs). x becomes the start of the iteration: x (mode 0), x + dt v (mode 1),
+// xt (mode 2) or, in mode 3, x + dt v, where nothing holds the part with its mean acceleration; pins move to their places; w = 1/m per copy. Where steps are guarded (mode bit 2) the places
 // that the step could start from are kept, `job.set_first` vertices apart.
 @compute @workgroup_size(64)
 fn predict(
@@ -62,6 +62,14 @@ fn predict(
         start = inertial;
     } else if (job.mode & 3u) == 2u {
         start = xt;
+    } else if (job.mode & 3u) == 3u {
+        start = inertial;
+        let fall = table[FALLS_AT] + FALL_WORDS * part_with(PART_VERTICES_END, v);
+        if table[fall + FALL_IS_FREE] != 0u {
+            let at = fall + FALL_ACCELERATION;
+            let acceleration = vec3f(number(at), number(at + 1u), number(at + 2u));
+            start = inertial + acceleration * frame.squared_dt;
+        }
     }
     let is_pinned = on_vertex.w == 0.0;
     start = select(start, hold.xyz, is_pinned);
