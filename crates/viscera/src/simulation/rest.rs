@@ -5,6 +5,7 @@ use crate::rest::WayToRest;
 use crate::scalar::{Real, Vec3};
 use crate::scene::Scene;
 use crate::settings::Method;
+use crate::solver::balance::ForceBalance;
 
 /// A run is at rest where it is this share of its displacement away: half of a percent, which is told, is well
 /// below one, which has to be, and well above a fifth, which need not.
@@ -178,9 +179,9 @@ impl<S: Real> Simulation<S> {
         let apart = now.iter().zip(&at_rest);
         let apart =
             apart.map(|(a, b)| (Vec3::from_f64(a.force) - Vec3::from_f64(b.force)).length());
-        // What rounding makes is no force, and a hundred-thousandth of strain matters to nobody.
-        let floor = self.balance.force_floor;
-        let apart = (apart.fold(0.0, f64::max) - floor).max(0.0);
-        if largest > floor { apart / largest } else { 0.0 }
+        // What rounding makes is no difference, and the forces of strains that nobody sees are no measure.
+        let ForceBalance { rounding, force_floor, .. } = self.balance;
+        let apart = (apart.fold(0.0, f64::max) - rounding).max(0.0);
+        if apart > 0.0 { apart / (largest + force_floor) } else { 0.0 }
     }
 }

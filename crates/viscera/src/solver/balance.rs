@@ -33,8 +33,10 @@ pub struct ForceBalance {
     pub energy_floor: f64,
     /// Forces [N] of such strains, the sum of `E A eps`, and of inertia where positions are rounded.
     pub force_floor: f64,
-    /// What rounding pretends of `residual_work` [J].
-    pub work_floor: f64,
+    /// Forces [N] that rounding of positions alone makes.
+    pub rounding: f64,
+    /// Largest displacement of a free vertex from rest [m].
+    pub displacement: f64,
 }
 
 /// Strain that nobody sees or feels.
@@ -58,7 +60,7 @@ impl ForceBalance {
     /// tissue that moves as a whole.
     pub fn stiffness_error(&self) -> f64 {
         let is_strained = self.elastic_energy > self.energy_floor;
-        let is_work = self.residual_work.abs() > self.work_floor;
+        let is_work = self.residual_work.abs() > self.rounding * self.displacement;
         if is_strained && is_work { 0.5 * self.residual_work / self.elastic_energy } else { 0.0 }
     }
 
@@ -77,7 +79,6 @@ impl ForceBalance {
             return;
         }
         let ground = &work.ground;
-        let (mut rounding, mut displacement) = (0.0, 0.0f64);
         for (set, strains) in model.tet_sets().into_iter().zip(&ground.start_strain) {
             for (tet, (block, lane)) in model.tets(set).zip(set.places()) {
                 let x = tet.vertices.map(|v| state.positions[v as usize].cast::<f64>());
@@ -97,7 +98,7 @@ impl ForceBalance {
                 let floors = Floors::new::<S>(&x, &shape, volume, &tissue);
                 self.energy_floor += floors.energy;
                 self.force_floor += floors.force;
-                rounding += floors.rounding;
+                self.rounding += floors.rounding;
                 let forces = internal_forces(&response.piola, &shape, volume);
                 for (v, force) in tet.vertices.into_iter().zip(forces) {
                     self.residual[v as usize] -= force;
@@ -146,10 +147,9 @@ impl ForceBalance {
                 self.load += mass * gravity.length();
                 let moved = x - model.rest_positions[v].cast();
                 self.residual_work += residual.dot(moved);
-                displacement = displacement.max(moved.length());
+                self.displacement = self.displacement.max(moved.length());
             }
         }
-        self.work_floor = rounding * displacement;
     }
 }
 
