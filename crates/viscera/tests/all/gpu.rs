@@ -157,8 +157,10 @@ fn assert_accelerations_agree(length: impl Fn(&str, Colors) -> Option<Length>) {
         chebyshev_damping: 0.9,
         ..plain
     };
+    // Until the window is full.
     let long = SolverSettings {
         anderson_window: 10,
+        iterations: 12,
         anderson_guard: AndersonGuard::None,
         ..anderson.clone()
     };

@@ -126,15 +126,25 @@ impl Bench {
         ([info.width, info.height], pixels)
     }
 
-    /// Number of pictures in a GIF.
-    pub fn count_gif_frames(&self, name: &str) -> usize {
+    /// How long a GIF plays [s]; all of it is decoded.
+    pub fn gif_seconds(&self, name: &str) -> f64 {
         let bytes = self.read(name);
         let mut decoder = gif::DecodeOptions::new().read_info(&bytes[..]).expect("a GIF");
-        let mut count = 0;
-        while decoder.read_next_frame().expect("a whole GIF").is_some() {
-            count += 1;
+        let mut hundredths = 0;
+        while let Some(frame) = decoder.read_next_frame().expect("a whole GIF") {
+            hundredths += u32::from(frame.delay);
         }
-        count
+        f64::from(hundredths) / 100.0
+    }
+
+    /// Holds that `motion.gif` takes as long as the frames that a summary reports, its last one held [s].
+    pub fn assert_gif_keeps_time(&self, folder: &str, summary: &serde_json::Value) {
+        let frames = summary["frames"].as_array().expect("frames");
+        let times = [frames.first(), frames.last()]
+            .map(|frame| frame.and_then(|frame| frame["time"].as_f64()).expect("a time"));
+        let wanted = times[1] - times[0] + 1.5;
+        let played = self.gif_seconds(&format!("{folder}/motion.gif"));
+        assert!((played - wanted).abs() < 0.01, "{played} s for {wanted} s");
     }
 }
 

@@ -31,19 +31,25 @@ fn limit_velocities(
     let row = piece_row(piece);
     let part = table[row + PIECE_PART];
     let reports = piece == table[part_row(part) + PART_VERTEX_PIECES];
-    if reports {
-        var ended: Sums;
-        add_pieces(part, local, &ended);
-        reduce(ended, 1u, 1u << SUM_REACH, local);
+    // Whatever is long is called at one place.
+    for (var is_limited = !reports; ; is_limited = true) {
+        var sums: Sums;
+        if is_limited {
+            add_motions(part, local, &sums);
+        } else {
+            add_pieces(part, local, &sums);
+        }
+        let maxima = select(1u << SUM_REACH, 0u, is_limited);
+        reduce(sums, select(1u, SUMS / 8u, is_limited), maxima, local);
+        if is_limited {
+            break;
+        }
         if local == 0u {
             let potential = potential_of_totals();
             control.parts[part].potential = potential.value;
             control.parts[part].noise = potential.noise;
         }
     }
-    var sums: Sums;
-    add_motions(part, local, &sums);
-    reduce(sums, SUMS / 8u, 0u, local);
     if local == 0u {
         limit = limit_of(part);
         if reports {

@@ -21,21 +21,34 @@ fn evaluate(
     if agree(is_spared, local) {
         return;
     }
-    if (job.mode & IF_REJECTED) != 0u {
-        var lengths: Sums;
-        add_lengths(part, local, &lengths);
-        reduce(lengths, LINE_SUMS / 8u, 0u, local);
+    let are_vertices = table[row + PIECE_ARE_VERTICES] != 0u;
+    let sum_groups = select(1u, SUMS / 8u, are_vertices && (job.mode & WITH_MOTION) != 0u);
+    // Whatever is long is called at one place.
+    for (var is_found = (job.mode & IF_REJECTED) == 0u; ; is_found = true) {
+        var sums: Sums;
+        if is_found {
+            add_piece(row, job.mode, local, &sums);
+        } else {
+            add_lengths(part, local, &sums);
+        }
+        let maxima = select(0u, 1u << SUM_REACH, is_found);
+        reduce(sums, select(LINE_SUMS / 8u, sum_groups, is_found), maxima, local);
+        if is_found {
+            break;
+        }
         if local == 0u {
             let descends = control.parts[part].descends != 0u;
             found_line = select(control.parts[part].share, pick_length().length, descends);
         }
         line = workgroupUniformLoad(&found_line);
         tested_at = LINE;
-        if table[row + PIECE_ARE_VERTICES] != 0u {
+        if are_vertices {
             for (var v = table[row + PIECE_FIRST] + local; v < table[row + PIECE_END]; v += THREADS) {
                 points[v] = vec4f(place(LINE, v), points[v].w);
             }
         }
     }
-    sum_piece(piece, job.mode, local);
+    if local < 8u * sum_groups {
+        partial_sums[SUMS * piece + local] = totals[local];
+    }
 }

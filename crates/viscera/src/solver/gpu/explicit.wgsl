@@ -86,7 +86,7 @@ fn load_tet(block: u32, lane: u32) {
         return;
     }
     let small_dt = number(small + SMALL_DT);
-    let material = material_of(kind);
+    let material = law_of(kind);
     let lambda = material.lame_lambda;
     let mu = material.lame_mu;
     let vertices = vertices_of(block, lane);

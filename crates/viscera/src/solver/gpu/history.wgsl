@@ -79,7 +79,7 @@ fn repair_tet(block: u32, lane: u32) {
     let is_viscous = (job.is_viscous & select(1u, 2u, is_neo)) != 0u;
     let kind = tets[block].material[lane];
     let counts = kind != FILLING;
-    let material = material_of(select(0u, kind, counts));
+    let material = law_of(select(0u, kind, counts));
     let volume = select(0.0, tets[block].rest_volume[lane], counts);
     let vertices = vertices_of(block, lane);
     let x = array<vec3f, 4>(

@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use super::buffers::{ALIGNMENT, Attachment, Range, Slot, Spring, unknowns_size};
 use super::parts::{Fall, PartRow, Parts, SmallSteps};
 use super::record::Pieces;
-use crate::model::Model;
+use crate::model::{MaterialConstants, Model};
 use crate::scalar::lanes::LANES;
 use crate::settings::{Method, SolverSettings};
 
@@ -27,8 +27,15 @@ pub(super) const PIECE_SUMS: u64 = 24;
 /// Numbers that it leaves of the shares of a step that are tried, and as many of the lengths of a descent.
 pub(super) const LINE_SUMS: u64 = 16;
 
-/// The material constants of [`materials`].
-pub(super) const MATERIAL_WORDS: u32 = 6;
+/// `Material` of elements/mod.wgsl.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+struct Material {
+    lame_lambda: f32,
+    lame_mu: f32,
+    compliance: [f32; 3],
+    viscosity: f32,
+}
 
 /// Where everything stands in the table, the ground and the partial sums; the first words of the table.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -373,14 +380,13 @@ pub(super) fn tets(model: &Model<f32>) -> Vec<u8> {
 }
 
 fn materials(model: &Model<f32>) -> Vec<u8> {
-    let constants: Vec<f32> = model
-        .materials
-        .iter()
-        .flat_map(|m| {
-            let c = &m.compliance;
-            [m.lame_lambda, m.lame_mu, c.normal, c.cross, c.shear, m.viscosity]
-        })
-        .collect();
+    let of = |m: &MaterialConstants<f32>| Material {
+        lame_lambda: m.lame_lambda,
+        lame_mu: m.lame_mu,
+        compliance: [m.compliance.normal, m.compliance.cross, m.compliance.shear],
+        viscosity: m.viscosity,
+    };
+    let constants: Vec<Material> = model.materials.iter().map(of).collect();
     bytemuck::cast_slice(&constants).to_vec()
 }
 
@@ -402,6 +408,9 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
     all.extend(words!(Piece {
         "PIECE_PART" part "PIECE_FIRST" first "PIECE_END" end "PIECE_ARE_VERTICES" are_vertices
     }));
+    all.extend(words!(Material {
+        "MATERIAL_LAMBDA" lame_lambda "MATERIAL_MU" lame_mu "MATERIAL_VISCOSITY" viscosity
+    }));
     all.extend(words!(PartRow {
         "PART_ELEMENT_PIECES" element_pieces "PART_ELEMENT_PIECES_END" element_pieces_end
         "PART_VERTEX_PIECES" vertex_pieces "PART_VERTEX_PIECES_END" vertex_pieces_end
@@ -421,7 +430,7 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
         ("PART_WORDS", size(size_of::<PartRow>())),
         ("SPRING_WORDS", size(size_of::<Spring>())),
         ("ATTACHMENT_WORDS", size(size_of::<Attachment>())),
-        ("MATERIAL_WORDS", MATERIAL_WORDS),
+        ("MATERIAL_WORDS", size(size_of::<Material>())),
     ]);
     all
 }

@@ -128,7 +128,7 @@ struct Deformed {
 fn deformed(block: u32, lane: u32, x: array<vec3f, 4>) -> Deformed {
     let shape = shape_of(block, lane);
     let f = deformation_gradient(x, shape);
-    let material = material_of(tets[block].material[lane]);
+    let material = law_of(tets[block].material[lane]);
     let rate = material.viscosity * frame.inverse_dt;
     let neo = LANES * block + lane >= table[NEO_HOOKEAN_FROM_AT];
     var change: array<f32, 6>;
@@ -324,25 +324,17 @@ fn member(i: u32) -> u32 {
     return table[table[MEMBERS_AT] + i];
 }
 
-fn sum_piece(piece: u32, mode: u32, local: u32) {
-    let row = piece_row(piece);
+fn add_piece(row: u32, mode: u32, local: u32, into: ptr<function, Sums>) {
     let end = table[row + PIECE_END];
-    let are_vertices = table[row + PIECE_ARE_VERTICES] != 0u;
-    var sums: Sums;
-    if are_vertices {
+    if table[row + PIECE_ARE_VERTICES] != 0u {
         let first = first_vertex_of(table[row + PIECE_PART]);
         for (var v = table[row + PIECE_FIRST] + local; v < end; v += THREADS) {
-            add_vertex(v, first, mode, &sums);
+            add_vertex(v, first, mode, into);
         }
     } else {
         for (var i = table[row + PIECE_FIRST] + local; i < end; i += THREADS) {
-            add_element(member(i), mode, &sums);
+            add_element(member(i), mode, into);
         }
-    }
-    let groups = select(1u, 3u, are_vertices && (mode & WITH_MOTION) != 0u);
-    reduce(sums, groups, 1u << SUM_REACH, local);
-    if local < 8u * groups {
-        partial_sums[SUMS * piece + local] = totals[local];
     }
 }
 

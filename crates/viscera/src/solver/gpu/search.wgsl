@@ -36,45 +36,59 @@ fn search(
     if agree(is_over(part), local) {
         return;
     }
-    var tried: Sums;
-    if (job.mode & (JUDGES_STEP | JUDGES_PLAIN)) != 0u {
-        add_pieces(part, local, &tried);
-    } else if (job.mode & PICKS_SHARE) != 0u {
-        add_shares(part, local, &tried);
-    } else if (job.mode & PICKS_LENGTH) != 0u {
-        add_lengths(part, local, &tried);
-    }
-    reduce(tried, LINE_SUMS / 8u, maxima_tried(), local);
-    if local == 0u {
-        next = decide(part, piece == table[part_row(part) + PART_VERTEX_PIECES]);
-    }
-    let now = workgroupUniformLoad(&next);
-    if now.goes_on == 0u {
-        return;
-    }
-    var sums: Sums;
-    if table[row + PIECE_ARE_VERTICES] != 0u {
-        for (var v = table[row + PIECE_FIRST] + local; v < table[row + PIECE_END]; v += THREADS) {
-            try_vertex(v, now, &sums);
+    // First what was tried, then what is tried: whatever is long is called at one place.
+    for (var tries = false; ; tries = true) {
+        var sums: Sums;
+        if tries {
+            try_piece(row, next, local, &sums);
+        } else {
+            add_tried(part, local, &sums);
         }
-    } else {
-        for (var i = table[row + PIECE_FIRST] + local; i < table[row + PIECE_END]; i += THREADS) {
-            try_element(member(i), now, &sums);
+        reduce(sums, LINE_SUMS / 8u, maxima_of(tries), local);
+        if tries {
+            break;
+        }
+        if local == 0u {
+            next = decide(part, piece == table[part_row(part) + PART_VERTEX_PIECES]);
+        }
+        if workgroupUniformLoad(&next).goes_on == 0u {
+            return;
         }
     }
     let tries_shares = (job.mode & TRIES_SHARES) != 0u;
-    reduce(sums, LINE_SUMS / 8u, select(0u, REACHES, tries_shares), local);
     if local < LINE_SUMS && (job.mode & (TRIES_SHARES | TRIES_LENGTHS)) != 0u {
         let at = select(lengths_at(piece), shares_at(piece), tries_shares);
         partial_sums[at + local] = totals[local];
     }
 }
 
-fn maxima_tried() -> u32 {
+fn add_tried(part: u32, local: u32, into: ptr<function, Sums>) {
     if (job.mode & (JUDGES_STEP | JUDGES_PLAIN)) != 0u {
+        add_pieces(part, local, into);
+    } else if (job.mode & PICKS_SHARE) != 0u {
+        add_shares(part, local, into);
+    } else if (job.mode & PICKS_LENGTH) != 0u {
+        add_lengths(part, local, into);
+    }
+}
+
+fn try_piece(row: u32, now: Next, local: u32, into: ptr<function, Sums>) {
+    let are_vertices = table[row + PIECE_ARE_VERTICES] != 0u;
+    for (var i = table[row + PIECE_FIRST] + local; i < table[row + PIECE_END]; i += THREADS) {
+        if are_vertices {
+            try_vertex(i, now, into);
+        } else {
+            try_element(member(i), now, into);
+        }
+    }
+}
+
+fn maxima_of(tries: bool) -> u32 {
+    if !tries && (job.mode & (JUDGES_STEP | JUDGES_PLAIN)) != 0u {
         return 1u << SUM_REACH;
     }
-    return select(0u, REACHES, (job.mode & PICKS_SHARE) != 0u);
+    let of_shares = select(PICKS_SHARE, TRIES_SHARES, tries);
+    return select(0u, REACHES, (job.mode & of_shares) != 0u);
 }
 
 // Whether there is nothing to search for.

@@ -30,10 +30,20 @@ fn piece_row(piece: u32) -> u32 {
     return table[PIECES_AT] + PIECE_WORDS * piece;
 }
 
-fn material_of(kind: u32) -> Material {
+// A material without its compliance.
+struct Law {
+    lame_lambda: f32,
+    lame_mu: f32,
+    viscosity: f32,
+}
+
+fn law_of(kind: u32) -> Law {
     let row = table[MATERIALS_AT] + MATERIAL_WORDS * kind;
-    let compliance = Compliance(number(row + 2u), number(row + 3u), number(row + 4u));
-    return Material(number(row), number(row + 1u), compliance, number(row + 5u));
+    return Law(
+        number(row + MATERIAL_LAMBDA),
+        number(row + MATERIAL_MU),
+        number(row + MATERIAL_VISCOSITY),
+    );
 }
 
 // Sum of what acts on a vertex, in the order of its places.
