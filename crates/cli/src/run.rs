@@ -52,7 +52,11 @@ pub struct RunArguments {
 }
 
 /// Counts from one on. Read with their sign, so that a negative one is told its range.
-fn from_one<T: TryFrom<i64>>() -> RangedI64ValueParser<T> {
+fn from_one<T>() -> RangedI64ValueParser<T>
+where
+    T: TryFrom<i64> + Clone + Send + Sync,
+    <T as TryFrom<i64>>::Error: Send + Sync + 'static + std::error::Error,
+{
     RangedI64ValueParser::new().range(1..)
 }
 

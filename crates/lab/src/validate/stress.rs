@@ -41,8 +41,8 @@ struct Answer {
     steps: u64,
     rejected: u64,
     above: u64,
-    /// Steps of a body that nothing holds which end with more mechanical energy.
-    gained: u64,
+    /// Whether a body that nothing holds ever has more mechanical energy than it was let go with.
+    gained: bool,
     is_finite: bool,
     tets: usize,
     inverted: usize,
@@ -79,13 +79,16 @@ fn answer(case: &Case) -> Result<Answer> {
     let mut run = Run::new(&scene, case.kind, case.seed, &settings)?;
     let mut answer = Answer { tets: scene.mesh.tets().len(), ..Answer::default() };
     let reference = Reference::new(&run.model);
+    let mut let_go = None;
     for _ in 0..FRAMES {
-        let before = run.is_free().then(|| run.mechanical_energy(&reference)).transpose()?;
+        if run.is_free() && let_go.is_none() {
+            let_go = Some(run.mechanical_energy(&reference)?);
+        }
         answer.above += u64::from(run.step_watched(&reference)? > 1.0 + ROUND_OFF);
         answer.steps += 1;
-        if let Some(before) = before {
-            let after = run.mechanical_energy(&reference)?;
-            answer.gained += u64::from(after > before * (1.0 + ROUND_OFF));
+        if let Some(let_go) = let_go {
+            let now = run.mechanical_energy(&reference)?;
+            answer.gained |= now > let_go * (1.0 + ROUND_OFF) || now.is_nan();
         }
     }
     answer.rejected = run.solver.rejected_steps();
@@ -99,9 +102,9 @@ fn run(context: &mut Context) -> Result<()> {
         "A bar of {} mm, E = {} kPa, nu = {POISSON}, stable neo-Hookean, one step of five iterations per \
          frame. *Violent grabs*: two to seven vertices jump to places up to a body length away, jump again \
          after {} frames, and are let go after {HELD}. *Scrambles*: every vertex starts at a random place \
-         of the bar's box. A step counts as above when the incremental potential at its end is above that \
-         at its start with pins moved, and as gaining when a body that nothing holds ends it with more mechanical \
-         energy, by more than round-off ({ROUND_OFF:.0e}); both are computed by the reference, not by the solver.",
+         of the bar's box. A step counts as above when the incremental potential at its end is above that at its start with pins moved; \
+         a run gains energy when a body that nothing holds ever has more mechanical energy than it was let go with; both by \
+         more than round-off ({ROUND_OFF:.0e}), and both computed by the reference, not by the solver.",
         SIZE.map(|side| format!("{:.0}", 1e3 * side)).join(" x "),
         YOUNG / 1e3,
         HELD / 2,
@@ -112,7 +115,7 @@ fn run(context: &mut Context) -> Result<()> {
         "steps",
         "taken back",
         "steps above",
-        "steps gaining",
+        "runs that gain energy",
         "runs without numbers",
         "tets inside out at the end",
     ]);
@@ -120,7 +123,7 @@ fn run(context: &mut Context) -> Result<()> {
         let answers = context.run_cases(&cases, answer)?;
         let sum = |of: fn(&Answer) -> u64| answers.iter().map(of).sum::<u64>();
         let (steps, above) = (sum(|a| a.steps), sum(|a| a.above));
-        let gained = sum(|a| a.gained);
+        let gained = sum(|a| u64::from(a.gained));
         let lost = sum(|a| u64::from(!a.is_finite));
         let (tets, inverted) = (sum(|a| a.tets as u64), sum(|a| a.inverted as u64));
         let share = inverted as f64 / tets as f64;
@@ -137,11 +140,11 @@ fn run(context: &mut Context) -> Result<()> {
         context.verdict_of(
             cases.len(),
             format!(
-                "{} {name}: steps above, gaining; runs without numbers; tets inverted",
+                "{} {name}: steps above; runs that gain energy; runs without numbers; tets inverted",
                 cases.len()
             ),
-            "0, 0; 0; < 1 %",
-            format!("{above}, {gained}; {lost}; {}", percent(share)),
+            "0; 0; 0; < 1 %",
+            format!("{above}; {gained}; {lost}; {}", percent(share)),
             above == 0 && gained == 0 && lost == 0 && share < INVERTED,
         );
     }

@@ -26,7 +26,8 @@ pub struct ForceBalance {
     pub load: f64,
     /// Elastic energy [J] of the tetrahedra.
     pub elastic_energy: f64,
-    /// Work [J] of the residuals of free vertices through their displacements from rest.
+    /// Work [J] of the residuals of free vertices through their displacements from rest, less the mean
+    /// displacement of what is pinned: what is led away is not deformed by that.
     pub residual_work: f64,
     /// Energy [J] of strains that mean nothing, the sum of `E V eps^2`: a hundred-thousandth, or what rounding of
     /// positions makes.
@@ -131,6 +132,11 @@ impl ForceBalance {
         for &(_, force) in &inputs.forces {
             self.load += force.cast::<f64>().length();
         }
+        let displacement =
+            |v: usize| state.positions[v].cast::<f64>() - model.rest_positions[v].cast::<f64>();
+        let pins = inputs.pins.iter().map(|pin| displacement(pin.vertex as usize));
+        let led = pins.fold(Vec3::ZERO, |sum: Vec3<f64>, moved| sum + moved);
+        let led = led * (1.0 / inputs.pins.len().max(1) as f64);
         for v in 0..model.vertex_count() {
             let mass = model.masses[v].to_f64();
             let x = state.positions[v].cast::<f64>();
@@ -145,7 +151,7 @@ impl ForceBalance {
             } else {
                 self.unbalanced += residual.length();
                 self.load += mass * gravity.length();
-                let moved = x - model.rest_positions[v].cast();
+                let moved = displacement(v) - led;
                 self.residual_work += residual.dot(moved);
                 self.displacement = self.displacement.max(moved.length());
             }
