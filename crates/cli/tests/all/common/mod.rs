@@ -138,7 +138,7 @@ impl Bench {
     }
 
     /// Holds that `motion.gif` takes as long as the frames that a summary reports, its last one held [s].
-    pub fn assert_gif_keeps_time(&self, folder: &str, summary: &serde_json::Value) {
+    pub fn assert_gif_keeps_time(&self, folder: &str, summary: &Value) {
         let frames = summary["frames"].as_array().expect("frames");
         let times = [frames.first(), frames.last()]
             .map(|frame| frame.and_then(|frame| frame["time"].as_f64()).expect("a time"));
