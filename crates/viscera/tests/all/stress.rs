@@ -28,7 +28,7 @@ const WATCHED_SEEDS: u64 = 3;
 
 /// Vertices jump at once to places up to one body length away, stay for ten frames, are let go.
 /// The step guard takes back what such a jump does to the sweeps, whatever colours and acceleration:
-/// no step ends at a higher incremental potential than it began with, and none of a body that nothing holds with more
+/// no step ends at a higher incremental potential than the best of the places it could have started from, and none of a body that nothing holds with more
 /// mechanical energy. Both are computed here, whatever the solver says of itself.
 #[test]
 fn violent_grabs_end_in_numbers() {
