@@ -43,8 +43,11 @@ fn steps_of_two_threads_take_a_block_of_the_queue_now_and_then() {
             inputs.pins.push(Pin { vertex: v as u32, target: x.cast() });
         }
         let mut step = || solver.step(&model, &mut state, &inputs, 1e-3).expect("a legal step");
-        // The threads take what they need of their own when they first work.
-        step();
+        // The threads take what they need of their own when they first work; on a busy machine the first
+        // steps may be over before the second thread has woken up.
+        for _ in 0..STEPS_PER_BLOCK {
+            step();
+        }
         let mut by_step = [0; STEPS_PER_BLOCK];
         for requests in &mut by_step {
             *requests = requests_of_all_threads(&mut step);

@@ -17,6 +17,7 @@ mod example;
 mod explicit;
 mod explicit_limit;
 mod forces;
+mod free_fall;
 mod gpu;
 mod gpu_explicit;
 mod gpu_guard;
