@@ -23,18 +23,19 @@ fn damage<S: Real>(model: &Model<S>, state: &State<S>) -> (usize, f64) {
     (inverted, farthest)
 }
 
-/// Of so many seeds every step is watched while vertices are held and for three frames more.
+/// Of so many seeds every step is watched; of the others those that the solver says it took back.
 const WATCHED_SEEDS: u64 = 3;
 
 /// Vertices jump at once to places up to one body length away, stay for ten frames, are let go.
 /// The step guard takes back what such a jump does to the sweeps, whatever colours and acceleration:
-/// no step ends at a higher incremental potential than it began with, and none of a body that nothing holds with more
-/// mechanical energy. Both are computed here, whatever the solver says of itself.
+/// no step ends at a higher incremental potential than the best of the places it could have started from, and none of a body that nothing holds with more
+/// mechanical energy than it was let go with. Both are computed here, whatever the solver says of itself.
 #[test]
 fn violent_grabs_end_in_numbers() {
     let size = [0.08, 0.04, 0.04];
     let mesh = block(size, [6, 3, 3], 0.2);
     let (frames, held) = (60u64, 10);
+    let mut taken_back = Vec::new();
     for (seeds, colors, acceleration) in [
         (20, Colors::Unlimited, Acceleration::None),
         (5, Colors::Limited(4), Acceleration::None),
@@ -55,6 +56,7 @@ fn violent_grabs_end_in_numbers() {
                 inputs.pins.push(Pin { vertex, target: target.cast() });
             }
             let mut run = Run::new(&model, &settings);
+            let (mut watched, mut let_go) = (0, None);
             for frame in 0..frames {
                 if frame == held {
                     grabbed += damage(&model, &run.state).0;
@@ -63,13 +65,17 @@ fn violent_grabs_end_in_numbers() {
                 for _ in 0..settings.substeps {
                     let before = run.state.clone();
                     run.step(&inputs);
-                    if seed < WATCHED_SEEDS && frame < held + 3 {
+                    let seen = run.solver.rejected_steps();
+                    if seed < WATCHED_SEEDS || seen > watched {
+                        watched = seen;
                         let [start, end] =
                             outside.incremental(&before, &run.state, &inputs, run.dt);
                         above += usize::from(end.is_above(start));
-                        let [start, end] =
-                            [&before, &run.state].map(|state| outside.mechanical(state, run.dt));
-                        gained += usize::from(inputs.pins.is_empty() && end.is_above(start));
+                    }
+                    if seed < WATCHED_SEEDS && inputs.pins.is_empty() {
+                        let first = *let_go.get_or_insert(outside.mechanical(&before, run.dt));
+                        let now = outside.mechanical(&run.state, run.dt);
+                        gained += usize::from(now.is_above(first));
                     }
                 }
             }
@@ -87,10 +93,11 @@ fn violent_grabs_end_in_numbers() {
             seeds * frames * u64::from(settings.substeps)
         );
         assert_eq!(above, 0, "{colors:?}, {acceleration:?}: steps that raise the potential");
-        assert_eq!(gained, 0, "{colors:?}, {acceleration:?}: steps that gain energy");
-        // Without any the guard would not have been asked.
-        assert!(rejected > 0, "{colors:?}, {acceleration:?}");
+        assert_eq!(gained, 0, "{colors:?}, {acceleration:?}: energy above that at release");
+        taken_back.push(rejected);
     }
+    // Without any the guard would not have been asked.
+    assert!(taken_back.iter().all(|&count| count > 0), "{taken_back:?}");
 }
 
 /// Mixtures that raise the incremental potential are taken back one by one, and so early that the

@@ -74,7 +74,8 @@ impl<'a> Outside<'a> {
         Rounded { value, noise }
     }
 
-    /// `Phi` of a step of `dt` [s] from `before`: at its start with pins moved, and at its end.
+    /// `Phi` of a step of `dt` [s] from `before`: at the better of two places it could have started from, where it
+    /// was and where inertia leads, pins moved in both; and at its end.
     pub fn incremental<S: Real>(
         &self,
         before: &State<S>,
@@ -85,23 +86,27 @@ impl<'a> Outside<'a> {
         let double = |all: &[Vec3<S>]| all.iter().map(|x| x.cast()).collect::<Vec<Vec3<f64>>>();
         let [from, end, velocities] =
             [&before.positions, &after.positions, &before.velocities].map(|all| double(all));
-        let mut start = from.clone();
-        let mut is_pinned = vec![false; start.len()];
+        let fall = inputs.gravity.cast::<f64>() * (dt * dt);
+        let predicted: Vec<_> =
+            from.iter().zip(&velocities).map(|(x, v)| *x + *v * dt + fall).collect();
+        let mut is_pinned = vec![false; from.len()];
+        let mut starts = [from, predicted.clone()];
         for pin in &inputs.pins {
-            start[pin.vertex as usize] = pin.target.cast();
             is_pinned[pin.vertex as usize] = true;
+            starts.iter_mut().for_each(|x| x[pin.vertex as usize] = pin.target.cast());
         }
-        let gravity = inputs.gravity.cast::<f64>();
-        [start, end].map(|x| {
-            let Rounded { mut value, mut noise } = self.elastic(&x);
+        let phi = |x: &[Vec3<f64>]| {
+            let Rounded { mut value, mut noise } = self.elastic(x);
             for v in (0..x.len()).filter(|&v| !is_pinned[v]) {
-                let away = x[v] - from[v] - velocities[v] * dt - gravity * (dt * dt);
+                let away = x[v] - predicted[v];
                 let stiffness = self.masses[v] / (dt * dt);
                 value += 0.5 * stiffness * away.length_squared();
                 noise += stiffness * away.length() * 2.0 * self.epsilon * x[v].length();
             }
             Rounded { value, noise }
-        })
+        };
+        let [here, there] = starts.map(|x| phi(&x));
+        [if there.value < here.value { there } else { here }, phi(&end)]
     }
 
     /// Kinetic and elastic energy, where no load acts; velocities are differences of positions over `dt` [s].
