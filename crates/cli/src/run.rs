@@ -9,6 +9,8 @@ use crate::{memory, progress};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use clap::builder::RangedI64ValueParser;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag::{register, register_conditional_shutdown};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -82,14 +84,13 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem));
     let frames = arguments.frames.unwrap_or_else(|| scene.frame_count());
     let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&interrupted);
-    // A second Ctrl-C ends the program at once, as one would expect of the first elsewhere.
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })
-    .context("cannot listen for Ctrl-C")?;
+    for signal in [SIGINT, SIGTERM] {
+        // The second one ends the program at once, as one would expect of the first elsewhere: what is
+        // registered first looks at the flag before the other sets it.
+        register_conditional_shutdown(signal, crate::INTERRUPTED.into(), Arc::clone(&interrupted))
+            .and_then(|_| register(signal, Arc::clone(&interrupted)))
+            .context("cannot listen for Ctrl-C")?;
+    }
     match scene.solver.precision {
         Precision::F32 => {
             simulate::<f32>(scene, assembly, overrides, &folder, frames, &interrupted)

@@ -106,7 +106,15 @@ impl Program {
 
 /// Builds the test programs of the packages; on failure what to do.
 pub fn build(selection: &Selection<'_>) -> Result<Vec<Program>, String> {
-    let before: &[&str] = &["test", "--no-run", "--message-format=json-render-diagnostics"];
+    // Without the examples, which lints check and which take as long to link as tests.
+    let before: &[&str] = &[
+        "test",
+        "--no-run",
+        "--lib",
+        "--bins",
+        "--tests",
+        "--message-format=json-render-diagnostics",
+    ];
     let mut command = cargo(&[before, selection.packages].concat());
     let child = command.stdout(Stdio::piped()).spawn();
     let mut child = child.map_err(|e| format!("cargo could not be started: {e}"))?;

@@ -130,3 +130,41 @@ fn dot(a: &Batch, b: &Batch) -> f64 {
     }
     ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers that follow no pattern a sum could hide behind.
+    fn numbers(seed: usize, count: usize) -> Vec<f64> {
+        let number = |i: usize| libm::sin((i * i % 7919) as f64 + seed as f64);
+        (0..count).map(number).collect()
+    }
+
+    /// Several pieces, the last of them short: sums of all numbers, one after the other.
+    #[test]
+    fn products_are_sums_over_all_pieces() {
+        let count = 2 * PIECE + 77;
+        let (weights, newest) = (numbers(1, count), numbers(2, count));
+        let older = [numbers(3, count), numbers(4, count)];
+        let mut history: [&[f64]; LARGEST_WINDOW] = [&[]; LARGEST_WINDOW];
+        history[..2].copy_from_slice(&[&older[0], &older[1]]);
+        let mut partial = vec![Products::default(); 3];
+        let found = products(&Workers::one(), &weights, &newest, history, 2, &mut partial);
+
+        let difference = |j: usize, i: usize| older[j][i] - newest[i];
+        let sum = |of: &dyn Fn(usize) -> f64| (0..count).map(|i| weights[i] * of(i)).sum::<f64>();
+        // As many additions of numbers below four, in another order.
+        let rounding = 4.0 * f64::EPSILON * (count * count) as f64;
+        let expect = |found: f64, exact: f64| {
+            assert!((found - exact).abs() < rounding, "{found}, not {exact}");
+        };
+        expect(found.norm, sum(&|i| newest[i] * newest[i]));
+        for j in 0..2 {
+            expect(found.right[j], sum(&|i| difference(j, i) * newest[i]));
+            for k in 0..=j {
+                expect(found.gram[j][k], sum(&|i| difference(j, i) * difference(k, i)));
+            }
+        }
+    }
+}
