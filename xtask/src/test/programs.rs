@@ -16,8 +16,8 @@ use serde_json::Value;
 
 use crate::{cargo, setup};
 
-/// What a test says that finds no graphics device; see `NoAdapter` of the library.
-const NO_DEVICE: &str = "no graphics adapter was found";
+/// What a test says that finds no graphics device: the library's `NoAdapter`, in words or as a value.
+const NO_DEVICE: [&str; 2] = ["no graphics adapter was found", "NoAdapter"];
 
 /// Which tests are wanted.
 pub struct Selection<'a> {
@@ -310,7 +310,7 @@ impl Events<'_> {
         match what {
             "ok" => self.outcome.passed += 1,
             "ignored" => self.outcome.slow += 1,
-            "failed" if !self.has_driver && said.contains(NO_DEVICE) => {
+            "failed" if !self.has_driver && NO_DEVICE.iter().any(|words| said.contains(words)) => {
                 self.outcome.without_device += 1;
             }
             "failed" => {
