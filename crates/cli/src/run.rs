@@ -53,7 +53,7 @@ pub struct RunArguments {
     memory: Option<Memory>,
 }
 
-/// Counts from one on. Read with their sign, so that a negative one is told its range.
+/// Counts from one on. Read as signed numbers, so that the error for a negative one names the legal range.
 fn from_one<T>() -> RangedI64ValueParser<T>
 where
     T: TryFrom<i64> + Clone + Send + Sync,

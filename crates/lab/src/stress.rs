@@ -141,7 +141,7 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Kinetic and elastic energy [J], computed outside the solver; infinite where positions are no numbers.
+    /// Kinetic and elastic energy [J], computed outside the solver; infinite where positions are NaN.
     pub fn mechanical_energy(&self, reference: &Reference) -> Result<f64, ReferenceError> {
         if !self.state.is_finite() {
             return Ok(f64::INFINITY);
@@ -162,7 +162,7 @@ impl<'a> Run<'a> {
         self.kind == Kind::Scramble || self.frame >= HELD
     }
 
-    /// Tetrahedra inside out; all of them where positions are no numbers.
+    /// Tetrahedra inside out; all of them where positions are NaN.
     pub fn inverted(&self) -> usize {
         let is_finite = self.state.is_finite();
         let is_inverted = |tet: &&[u32; 4]| {

@@ -183,7 +183,7 @@ fn a_run_that_is_not_at_rest_says_so_at_length() {
     check(0..20);
 }
 
-/// A liver that is at rest in some seconds: what it is told to do brings it there.
+/// A liver that is at rest in some seconds: following the advice of the warning brings it there.
 #[test]
 fn what_a_creeping_run_is_told_to_do_helps() {
     let Case { text, what } = case(12);

@@ -130,7 +130,7 @@ impl Window {
         self.harness.state().messages().texts().map(str::to_owned).collect()
     }
 
-    /// How many steps can be taken back.
+    /// Number of undo steps.
     pub fn undo_steps(&mut self) -> usize {
         let mut steps = 0;
         while self.harness.state().session().history().can_undo() {

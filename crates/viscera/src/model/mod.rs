@@ -181,7 +181,7 @@ pub struct Model<S> {
     pub color_count: usize,
     /// The most constraints at one vertex.
     pub largest_clique: usize,
-    /// Number of multipliers of all constraints, those of the fillings of blocks included.
+    /// Number of multipliers of all constraints, those of padding lanes included.
     pub multiplier_count: usize,
     pub(crate) numbering: Numbering,
     /// Connected parts, in the solver's numbering: the order of their first vertices in the user's.

@@ -59,7 +59,7 @@ impl Part {
         self.colors.iter().flat_map(|color| widened(&color.attachments))
     }
 
-    /// How many multipliers it has, those of the fillings of blocks included.
+    /// How many multipliers it has, those of padding lanes included.
     pub fn multiplier_count(&self) -> usize {
         self.multipliers.iter().map(Range::len).sum()
     }

@@ -95,7 +95,7 @@ impl<S: Real> TetSet<S> {
         self.order.is_empty()
     }
 
-    /// Number of blocks, fillings included.
+    /// Number of blocks, padding lanes included.
     pub fn block_count(&self) -> usize {
         self.blocks.len()
     }
@@ -117,12 +117,12 @@ impl<S: Real> TetSet<S> {
         self.viscous && self.viscous_blocks[block]
     }
 
-    /// Elastic and viscous multipliers of a block, fillings included.
+    /// Elastic and viscous multipliers of a block, padding lanes included.
     pub(crate) fn multipliers_per_block(&self) -> [usize; 2] {
         [LANES * self.form.multiplier_count(), if self.viscous { LANES * 6 } else { 0 }]
     }
 
-    /// Elastic and viscous multipliers, fillings included.
+    /// Elastic and viscous multipliers, padding lanes included.
     pub(crate) fn multiplier_counts(&self) -> [usize; 2] {
         self.multipliers_per_block().map(|count| count * self.blocks.len())
     }

@@ -7,8 +7,8 @@ use crate::scene::Scene;
 use crate::settings::Method;
 use crate::solver::balance::ForceBalance;
 
-/// A run is at rest where it is this share of its displacement away: half of a percent, which is told, is well
-/// below one, which has to be, and well above a fifth, which need not.
+/// A run is at rest where it is less than this share of its displacement away. Half of a percent: an error of one percent must
+/// be warned of, one of a fifth of a percent must not.
 const AWAY: f64 = 0.005;
 
 /// The share of the displacement that a run which goes on longer is to come to.

@@ -27,7 +27,7 @@ pub enum Stage {
     ChooseStart,
     /// Takes a step back whose incremental potential exceeds that bound, for each connected part by itself.
     GuardStep,
-    /// Multipliers that are no numbers start a new history: all of the part are taken from the positions.
+    /// NaN multipliers reset the warm start: all of the part are taken from the positions.
     RepairMultipliers,
     /// Remembers `(x, l)` before a sweep, for the acceleration.
     RememberIterate,

@@ -5,7 +5,7 @@ struct Control {
     // is read.
     small_step: u32,
     small_steps_done: u32,
-    // Steps so far, the last that was taken back for some part, and how many were.
+    // Steps so far, the last that was rejected for some part, and the number of rejected steps.
     step: u32,
     rejected_step: atomic<u32>,
     rejected: atomic<u32>,
@@ -49,6 +49,6 @@ struct PartControl {
     mixture_best: f32,
     mixture_failures: u32,
     is_good: u32,
-    // Multipliers that are no numbers were found.
+    // NaN multipliers were found.
     is_broken: atomic<u32>,
 }
