@@ -1,8 +1,9 @@
-//! For tests inside the solver: a model of everything, and a workspace in the middle of a step.
+//! For tests inside the solver: a model of everything, and the memory in the middle of a step.
 
 use super::Inputs;
-use super::cpu::{Step, Workspace};
-use super::plan::Stage;
+use super::cpu::Memory;
+use super::step::data::Step;
+use super::step::stage::StepStage;
 use crate::material::{Material, MaterialModel};
 use crate::mesh::shapes::Block;
 use crate::model::{Model, ModelBuilder};
@@ -32,15 +33,17 @@ pub(super) fn everything(
     builder.build(settings).expect("a model")
 }
 
-/// A workspace that has begun a step from `places`, at rest there.
-pub(super) fn begun(step: &Step<'_, f64>, places: &[Vec3<f64>]) -> Workspace<f64> {
-    let mut work = Workspace::new(step.model, step.settings);
+/// Memory that has begun a step from `places`, at rest there.
+pub(super) fn begun(step: &Step<'_, f64>, places: &[Vec3<f64>]) -> Memory<f64> {
+    let mut memory = Memory::new(step.model, step.settings);
     let mut state = State::at_rest(step.model);
     state.positions.copy_from_slice(places);
-    for stage in [Stage::ReadState, Stage::MeasureStrain, Stage::Predict(Start::Previous)] {
-        work.run(&stage, step, &mut state);
+    for stage in
+        [StepStage::ReadState, StepStage::MeasureStrain, StepStage::Predict(Start::Previous)]
+    {
+        memory.run(&stage.into(), step, &mut state);
     }
-    work
+    memory
 }
 
 /// A step of `dt` [s] in which nothing acts from outside.

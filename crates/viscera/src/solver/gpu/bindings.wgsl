@@ -50,7 +50,7 @@ struct Update {
     place: array<f32, 3>,
     // Of springs to places outside [N/m].
     stiffness: f32,
-    // Mass, and what springs make of it [kg]; see solver/tethers.rs.
+    // Mass, and what springs make of it [kg]; see solver/step/tethers.rs.
     inertia: f32,
 }
 

@@ -1,150 +1,16 @@
 //! The buffer map: what lies in the device's memory.
 
-use bytemuck::{Pod, Zeroable};
 use wgpu::BufferUsages;
 
-use super::GpuError;
+use super::control::control_size;
 use super::device::Device;
-use super::layout::Layout;
+use super::error::GpuError;
+use super::layout::{self, Layout};
+use super::limits::{accelerates, window};
+use super::slots::{Place, Range, Slot, Update, multipliers_start, unknowns_size};
 use crate::model::Model;
 use crate::scalar::lanes::LANES;
-use crate::scalar::{Vec3, vec3};
 use crate::settings::{Acceleration, SolverSettings};
-
-/// Numbers of the storage buffers in all kernels; bindings.wgsl has the same ones.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[repr(u32)]
-#[allow(missing_docs)]
-pub enum Slot {
-    Tets = 0,
-    Materials,
-    CornerIndices,
-    Offsets,
-    Points,
-    Copies,
-    Multipliers,
-    Loads,
-    Velocities,
-    Previous,
-    Predicted,
-    Acting,
-    Targets,
-    Updates,
-    StartStrain,
-    Unknowns,
-    Iterate,
-    Older,
-    Weights,
-    Residuals,
-    Mapped,
-    PartialSums,
-    Control,
-    Springs,
-    Attachments,
-    Anchors,
-    Starts,
-    Ground,
-    Table,
-    SmallSteps,
-    Falls,
-}
-
-impl Slot {
-    /// Whether kernels only read it.
-    pub fn is_read_only(self) -> bool {
-        use Slot::{Attachments, CornerIndices, Materials, Offsets, Springs, Table, Tets, Updates};
-        matches!(
-            self,
-            Tets | Materials | CornerIndices | Offsets | Updates | Springs | Attachments | Table
-        )
-    }
-}
-
-/// A range of one of the buffers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Place {
-    /// The buffer of that number.
-    Whole(Slot),
-    /// Copies where [`Slot::CornerIndices`] or [`Slot::Offsets`] is asked for in a sweep.
-    CopiesOf(Slot),
-}
-
-/// What acts on one vertex; `Update` of bindings.wgsl.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Update {
-    pub vertex: u32,
-    pub is_pinned: u32,
-    pub force: [f32; 3],
-    pub place: [f32; 3],
-    pub stiffness: f32,
-    pub inertia: f32,
-}
-
-impl Update {
-    /// Adds a spring to a place [m]: all of them pull like one to the mean of their places.
-    pub fn add_spring(&mut self, stiffness: f32, target: Vec3<f32>) {
-        let sum = self.stiffness + stiffness;
-        let place = vec3(self.place[0], self.place[1], self.place[2]);
-        self.place = match self.stiffness == 0.0 {
-            true => target.to_array(),
-            false => (place + (target - place) * (stiffness / sum)).to_array(),
-        };
-        self.stiffness = sum;
-    }
-}
-
-/// `Spring` of bindings.wgsl.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Spring {
-    pub vertices: [u32; 2],
-    pub copies: [u32; 2],
-    pub slots: [u32; 2],
-    pub multiplier: u32,
-    pub rest_length: f32,
-    pub stiffness: f32,
-    pub part: u32,
-}
-
-/// `Attachment` of bindings.wgsl.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Attachment {
-    pub vertex: u32,
-    pub copy_index: u32,
-    pub slot: u32,
-    pub multiplier: u32,
-    pub stiffness: f32,
-    pub part: u32,
-}
-
-/// Ranges of buffers begin at a multiple of this: the alignment [bytes] that devices may ask of a
-/// binding.
-pub(super) const ALIGNMENT: u64 = 256;
-
-/// What lies in another slot's buffer: kernels that need a piece or two are bound to ranges, those that
-/// would need too many to the whole.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Range {
-    pub slot: Slot,
-    pub owner: Slot,
-    /// [bytes]
-    pub start: u64,
-    /// [bytes]
-    pub size: u64,
-}
-
-/// Where the multipliers of a model, or a part, of so many vertices begin among its unknowns [bytes]: behind the
-/// vertices there is room for one more.
-pub(super) fn multipliers_start(vertices: usize) -> u64 {
-    (16 * vertices as u64 + 16).next_multiple_of(ALIGNMENT)
-}
-
-/// Bytes of all unknowns.
-pub(super) fn unknowns_size(model: &Model<f32>) -> u64 {
-    multipliers_start(model.vertex_count()) + 4 * (model.multiplier_count as u64).max(1)
-}
 
 /// All buffers of a solver.
 #[derive(Debug)]
@@ -188,10 +54,9 @@ impl Buffers {
         let points_size = 16 * vertices;
         let multipliers_start = multipliers_start(model.vertex_count());
         let unknowns = unknowns_size(model);
-        let accelerated = super::accelerates(settings);
+        let accelerated = accelerates(settings);
         let anderson = accelerated && settings.acceleration == Acceleration::Anderson;
-        let history =
-            if anderson { unknowns * (u64::from(super::window(settings)) + 1) } else { 0 };
+        let history = if anderson { unknowns * (u64::from(window(settings)) + 1) } else { 0 };
         let viscous = model.tet_sets().iter().any(|set| set.viscous);
         let blocks = model.tet_sets().iter().map(|set| set.block_count() as u64).sum::<u64>();
         let when = |wanted: bool, size: u64| if wanted { size } else { 0 };
@@ -209,11 +74,10 @@ impl Buffers {
             (Residuals, "Anderson's residuals", history),
             (Mapped, "Anderson's iterates", history),
             (PartialSums, "partial sums", table.sums_size),
-            (Control, "control records", super::report::control_size(model.part_count())),
+            (Control, "control records", control_size(model.part_count())),
             (Ground, "vertices", table.ground_size),
         ];
-        let constants =
-            [(Tets, "tetrahedra", super::layout::tets(model)), (Table, "tables", table.bytes)];
+        let constants = [(Tets, "tetrahedra", layout::tets(model)), (Table, "tables", table.bytes)];
         let of_constants = constants.iter().map(|(_, what, bytes)| (*what, bytes.len() as u64));
         let arrays = sizes.iter().map(|&(_, what, size)| (what, size)).chain(of_constants);
         check_sizes(device, model.tet_count() as u64, arrays)?;

@@ -2,8 +2,11 @@
 
 use wgpu::BufferUsages;
 
+use super::device::Device;
+use super::error::GpuError;
+use super::frames;
+use super::limits::MOST_GROUPS;
 use super::timing::Clock;
-use super::{Device, GpuError, MOST_GROUPS, frames};
 
 /// Source and target [B each]: beyond the caches of most devices, and what every device can bind.
 const COPIED: u64 = 128 << 20;

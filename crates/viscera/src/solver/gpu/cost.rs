@@ -5,7 +5,8 @@
 //! GPU   dispatches x 4 us
 //! ```
 
-use super::record::{Pieces, Recorder};
+use super::layout::Pieces;
+use super::record::Recorder;
 use crate::model::Model;
 use crate::settings::SolverSettings;
 use crate::solver::plan::Plan;
@@ -40,7 +41,7 @@ impl StepCost {
         // How many dispatches there are does not depend on the length of the long vector.
         let plan = Plan::new(model, settings);
         let pieces = Pieces { count: 1, first_of_vertices: 0, groups: 1 };
-        let record = Recorder::new(model, settings, &plan, [0; 2], pieces).record(&plan);
+        let record = Recorder::new(model, settings, [0; 2], pieces).record(&plan);
         let [prologue, body, epilogue] =
             [record.prologue, record.body, record.epilogue].map(|list| list.len() as u64);
         let dispatches = prologue + u64::from(sweeps) * body + epilogue;

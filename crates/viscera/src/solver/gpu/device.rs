@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-use super::GpuError;
+use super::error::GpuError;
 
 /// What programs may ask for on any device: WebGPU's defaults. Kernels need no more.
 pub fn baseline() -> wgpu::Limits {

@@ -1,7 +1,7 @@
 //! What can go wrong with a graphics processor.
 
 use crate::mesh::embed::EmbeddingError;
-use crate::solver::StepError;
+use crate::solver::error::StepError;
 
 /// Why the GPU backend cannot do what was asked. Nothing was changed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

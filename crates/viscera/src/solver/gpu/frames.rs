@@ -1,12 +1,13 @@
 //! What comes back from the device: copies made behind a step, read when they have arrived.
 
 use std::ops::Range;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::channel;
 
-use super::buffers::{Buffers, Slot};
+use super::control::rejected_steps;
 use super::device::Device;
-use super::report::rejected_steps;
-use super::{GpuError, GpuSolver};
+use super::error::GpuError;
+use super::slots::Slot;
+use super::solver::GpuSolver;
 use crate::model::Model;
 use crate::scalar::lanes::{Eight, Point};
 use crate::scalar::{Vec3, vec3};
@@ -17,21 +18,6 @@ use crate::state::State;
 /// Copies that may be under way at a time; more requests give way until one has arrived.
 const RING: usize = 3;
 
-/// The number of a request, and whether its copy can be read.
-type Arrival = (u64, bool);
-
-/// Copies under way.
-#[derive(Debug)]
-pub(super) struct Frames {
-    free: Vec<wgpu::Buffer>,
-    under_way: Vec<(u64, wgpu::Buffer)>,
-    arrivals: (Sender<Arrival>, Receiver<Arrival>),
-    requested: u64,
-    /// The newest copy that has arrived and was not asked for yet.
-    arrived: Option<(u64, wgpu::Buffer)>,
-    size: u64,
-}
-
 /// Positions at the end of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
@@ -39,24 +25,6 @@ pub struct Frame {
     pub number: u64,
     /// Positions [m], the user's order, shape [vertex_count].
     pub positions: Vec<Vec3<f32>>,
-}
-
-impl Frames {
-    pub fn new(buffers: &Buffers) -> Self {
-        Self {
-            free: Vec::new(),
-            under_way: Vec::new(),
-            arrivals: channel(),
-            requested: 0,
-            arrived: None,
-            size: buffers.points_size,
-        }
-    }
-
-    pub fn bytes(&self) -> u64 {
-        let arrived = usize::from(self.arrived.is_some());
-        self.size * (self.free.len() + self.under_way.len() + arrived) as u64
-    }
 }
 
 impl GpuSolver {
@@ -134,7 +102,7 @@ impl GpuSolver {
         solver: &mut Solver<f32>,
     ) -> Result<(), GpuError> {
         self.check_model(model)?;
-        solver.work.check(model)?;
+        solver.memory.check(model)?;
         let mut slots =
             vec![Slot::Unknowns, Slot::Velocities, Slot::Predicted, Slot::Acting, Slot::Control];
         if model.tet_sets().iter().any(|set| set.viscous) {
@@ -143,22 +111,24 @@ impl GpuSolver {
         self.read_buffers(&slots, |read| {
             self.take_state(model, state, read);
             let [predicted, acting] = [read[2], read[3]].map(bytemuck::cast_slice::<u8, [f32; 4]>);
-            let ground = &mut solver.work.ground;
-            for (v, point) in ground.predicted.iter_mut().enumerate() {
+            let constants = &mut solver.memory.data.constants;
+            for (v, point) in constants.predicted.iter_mut().enumerate() {
                 let [x, y, z, inertia] = predicted[v];
                 *point = Point::new(vec3(x, y, z), 0.0);
-                ground.inertias[v] = inertia;
-                ground.inverse_masses[v] = acting[v][3];
+                constants.inertias[v] = inertia;
+                constants.inverse_masses[v] = acting[v][3];
             }
-            ground.tethers.clone_from(&self.tethers);
+            constants.tethers.clone_from(&self.tethers);
             if self.settings.method == Method::Explicit {
                 let place = |v: usize| state.positions[model.numbering.order[v] as usize];
-                ground.load_tethers(self.multiplier_dt, place);
+                constants.load_tethers(self.multiplier_dt, place);
             }
-            solver.work.guard.rejected = rejected_steps(read[4]);
+            if let Some(guard) = &mut solver.memory.guard {
+                guard.rejected = rejected_steps(read[4]);
+            }
             let Some(strains) = read.get(5) else { return };
             let mut strains: &[Eight<f32>] = bytemuck::cast_slice(strains);
-            for (set, own) in model.tet_sets().into_iter().zip(&mut ground.start_strain) {
+            for (set, own) in model.tet_sets().into_iter().zip(&mut constants.start_strain) {
                 // The device has room for all blocks, the CPU for those of viscous sets.
                 let (of_set, rest) = strains.split_at(6 * set.block_count());
                 let of_set = &of_set.as_chunks::<6>().0[..own.len()];

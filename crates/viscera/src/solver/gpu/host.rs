@@ -1,13 +1,13 @@
 //! What host and kernels share, as the host lays it out.
 
-use super::buffers::{Attachment, Spring, Update};
-use super::record::Job;
-use super::record_guard::MODES;
-use super::report::{Control, PartControl};
-use super::{FrameConstants, layout};
+use super::control::{Control, PartControl};
+use super::layout;
+use super::slots::{Attachment, Spring, Update};
+use super::uniforms::{FrameConstants, Job};
 use crate::scalar::lanes::LANES;
-use crate::solver::acceleration::LARGEST_WINDOW;
-use crate::solver::guard;
+use crate::solver::cpu::products::LARGEST_WINDOW;
+use crate::solver::step::guard;
+use crate::solver::step::modes::MODES;
 
 /// Name, bytes, and the name and place [bytes] of every field.
 pub type HostLayout = (&'static str, usize, Vec<(&'static str, usize)>);

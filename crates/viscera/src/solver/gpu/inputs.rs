@@ -1,13 +1,14 @@
 //! What a step gives to the device: what acts on vertices, and the weights of its norm.
 
-use super::GpuSolver;
-use super::buffers::{Buffers, Update};
+use super::buffers::Buffers;
 use super::layout::copy_offsets;
+use super::slots::Update;
+use super::solver::GpuSolver;
 use crate::model::Model;
 use crate::settings::{Acceleration, AndersonOn, Method, SolverSettings};
-use crate::solver::Inputs;
-use crate::solver::iterates::fill_multiplier_weights;
-use crate::solver::tethers::bundle;
+use crate::solver::inputs::Inputs;
+use crate::solver::step::tethers::bundle;
+use crate::solver::xpbd::iterates::fill_multiplier_weights;
 
 impl GpuSolver {
     /// What acts on vertices in this step, and the freedom of those that the last one held.

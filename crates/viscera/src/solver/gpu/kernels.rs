@@ -1,10 +1,10 @@
 //! The kernels: which text each is made of, and what it is bound to.
 
-use super::buffers::Slot;
 use super::device::{Device, Pipeline};
+use super::slots::Slot;
 use crate::elements::TetForm;
 use crate::elements::wgsl;
-use crate::solver::tissue::TISSUE_WGSL;
+use crate::solver::step::tissue::TISSUE_WGSL;
 
 /// A kernel: an entry point of one of the files, with the storage that it names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -23,7 +23,8 @@ pub struct Kernel {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]
 pub enum File {
-    Vertices,
+    Predict,
+    Rebase,
     Sweep,
     SweepSingle,
     Loads,
@@ -83,14 +84,14 @@ macro_rules! kernels {
 }
 
 kernels! {
-    APPLY_UPDATES = Vertices "apply_updates" 64 [Predicted Acting Targets Updates Control];
-    PREDICT = Vertices "predict" 64
+    APPLY_UPDATES = Predict "apply_updates" 64 [Predicted Acting Targets Updates Control];
+    PREDICT = Predict "predict" 64
         [Points Velocities Previous Predicted Acting Targets Starts Table];
-    REBASE = Vertices "rebase" 64 [Points Loads Previous Predicted Acting Table];
-    RECOMPUTE_POSITIONS = Vertices "recompute_positions" 64 [Points Loads Predicted Acting Table];
-    SPLIT_COPIES = Vertices "split_copies" 64 [Offsets Points Copies];
-    JOIN_COPIES = Vertices "join_copies" 64 [Offsets Points Copies];
-    UPDATE_VELOCITIES = Vertices "update_velocities" 64 [Points Velocities Previous];
+    REBASE = Rebase "rebase" 64 [Points Loads Previous Predicted Acting Table];
+    RECOMPUTE_POSITIONS = Rebase "recompute_positions" 64 [Points Loads Predicted Acting Table];
+    SPLIT_COPIES = Rebase "split_copies" 64 [Offsets Points Copies];
+    JOIN_COPIES = Rebase "join_copies" 64 [Offsets Points Copies];
+    UPDATE_VELOCITIES = Predict "update_velocities" 64 [Points Velocities Previous];
     SOLVE = Sweep "solve" 64 [Tets Materials Points Multipliers StartStrain];
     SOLVE_COPIES = Sweep "solve" 64 [Tets Materials CornerIndices Points Multipliers StartStrain];
     SOLVE_JACOBI = Sweep "solve" 64
@@ -144,56 +145,63 @@ const SHARED: [&str; 5] = [
 /// The whole text that a kernel is compiled from.
 pub fn source(kernel: &Kernel, variant: Variant) -> String {
     let form = || match variant.form {
-        TetForm::GreenStrain => vec![include_str!("form_green_strain.wgsl")],
+        TetForm::GreenStrain => vec![include_str!("../xpbd/forms_green_strain.wgsl")],
         TetForm::NeoHookeanPair => {
-            vec![wgsl::NEO_HOOKEAN, wgsl::NEO_HOOKEAN_PAIR, include_str!("form_neo_hookean.wgsl")]
+            vec![
+                wgsl::NEO_HOOKEAN,
+                wgsl::NEO_HOOKEAN_PAIR,
+                include_str!("../xpbd/forms_neo_hookean.wgsl"),
+            ]
         }
         TetForm::NeoHookeanStretch => vec![
             wgsl::SINGULAR_VALUES,
             wgsl::NEO_HOOKEAN_STRETCH,
-            include_str!("form_neo_hookean.wgsl"),
+            include_str!("../xpbd/forms_neo_hookean.wgsl"),
         ],
     };
     let swept = match variant.swept {
-        Swept::Vertices => include_str!("sweep_vertices.wgsl"),
-        Swept::Copies => include_str!("sweep_copies.wgsl"),
-        Swept::Jacobi => include_str!("sweep_jacobi.wgsl"),
+        Swept::Vertices => include_str!("../xpbd/sweep_vertices.wgsl"),
+        Swept::Copies => include_str!("../xpbd/sweep_copies.wgsl"),
+        Swept::Jacobi => include_str!("../xpbd/sweep_jacobi.wgsl"),
     };
     let single = [wgsl::SPRING, wgsl::ATTACHMENT];
     let constants = super::host::constants();
     let mut texts = vec![constants.as_str()];
     texts.extend(SHARED);
     match kernel.file {
-        File::Vertices => texts.push(include_str!("vertices.wgsl")),
+        File::Predict => texts.push(include_str!("../step/predict.wgsl")),
+        File::Rebase => texts.push(include_str!("../xpbd/rebase.wgsl")),
         File::Sweep => {
             texts.extend(form());
-            texts.extend([swept, include_str!("sweep.wgsl")]);
+            texts.extend([swept, include_str!("../xpbd/sweep.wgsl")]);
         }
         File::SweepSingle => {
             texts.extend(single);
-            texts.extend([swept, include_str!("sweep_single.wgsl")]);
+            texts.extend([swept, include_str!("../xpbd/sweep_single.wgsl")]);
         }
         File::LoadsSingle => {
             texts.extend(single);
-            texts.push(include_str!("loads_single.wgsl"));
+            texts.push(include_str!("../xpbd/loads_single.wgsl"));
         }
         File::Loads => {
             texts.extend(form());
-            texts.push(include_str!("loads.wgsl"));
+            texts.push(include_str!("../xpbd/loads.wgsl"));
         }
-        File::Strain => texts.push(include_str!("strain.wgsl")),
-        File::Multipliers => texts.push(include_str!("multipliers.wgsl")),
+        File::Strain => texts.push(include_str!("../step/strain.wgsl")),
+        File::Multipliers => texts.push(include_str!("../xpbd/multipliers.wgsl")),
         File::Acceleration => {
             texts.extend([include_str!("spans.wgsl"), include_str!("sums.wgsl")]);
-            texts.push(include_str!("acceleration.wgsl"));
+            texts.push(include_str!("../xpbd/acceleration.wgsl"));
         }
         File::AndersonPush => {
             let mapped = match variant.swept {
-                Swept::Vertices => include_str!("mapped_vertices.wgsl"),
-                Swept::Copies | Swept::Jacobi => include_str!("mapped_copies.wgsl"),
+                Swept::Vertices => include_str!("../xpbd/acceleration_mapped_vertices.wgsl"),
+                Swept::Copies | Swept::Jacobi => {
+                    include_str!("../xpbd/acceleration_mapped_copies.wgsl")
+                }
             };
             texts.extend([include_str!("spans.wgsl"), include_str!("sums.wgsl")]);
-            texts.extend([mapped, include_str!("anderson_push.wgsl")]);
+            texts.extend([mapped, include_str!("../xpbd/acceleration_push.wgsl")]);
         }
         File::History => {
             // Functions of the tissue need those of both laws; the pair brings its own along.
@@ -202,21 +210,26 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
             }
             texts.extend(form());
             texts.extend(single);
-            texts.extend([TISSUE_WGSL, include_str!("spans.wgsl"), include_str!("history.wgsl")]);
+            texts.extend([
+                TISSUE_WGSL,
+                include_str!("spans.wgsl"),
+                include_str!("../xpbd/history.wgsl"),
+            ]);
         }
         File::Explicit => {
             texts.extend([wgsl::NEO_HOOKEAN, wgsl::SPRING, TISSUE_WGSL]);
-            texts.extend([include_str!("vertices.wgsl"), include_str!("explicit.wgsl")]);
+            texts.extend([include_str!("../explicit/mod.wgsl")]);
         }
         File::Evaluate | File::Search | File::Take | File::Energy => {
             texts.extend(single);
-            texts.extend([wgsl::NEO_HOOKEAN, TISSUE_WGSL, include_str!("potential.wgsl")]);
-            texts.push(include_str!("decide.wgsl"));
+            texts.extend([wgsl::NEO_HOOKEAN, TISSUE_WGSL, include_str!("../step/potential.wgsl")]);
+            texts.push(include_str!("../step/guard_decide.wgsl"));
             match kernel.file {
-                File::Evaluate => texts.push(include_str!("evaluate.wgsl")),
-                File::Search => texts.push(include_str!("search.wgsl")),
-                File::Take => texts.extend([include_str!("spans.wgsl"), include_str!("take.wgsl")]),
-                _ => texts.push(include_str!("energy.wgsl")),
+                File::Evaluate => texts.push(include_str!("../step/guard_evaluate.wgsl")),
+                File::Search => texts.push(include_str!("../step/guard_search.wgsl")),
+                File::Take => texts
+                    .extend([include_str!("spans.wgsl"), include_str!("../step/guard_take.wgsl")]),
+                _ => texts.push(include_str!("../step/energy.wgsl")),
             }
         }
     }

@@ -3,19 +3,15 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{ALIGNMENT, Attachment, Range, Slot, Spring, unknowns_size};
-use super::parts::{Fall, PartRow, Parts, SmallSteps};
-use super::record::Pieces;
+use super::limits::accelerates;
+use super::parts::{Fall, PartRow, Parts, Piece, SmallSteps};
+use super::slots::{ALIGNMENT, Attachment, Range, Slot, Spring, unknowns_size};
 use crate::model::{MaterialConstants, Model};
 use crate::scalar::lanes::LANES;
 use crate::settings::{Method, SolverSettings};
 
 /// The material of a lane that only fills a block up.
 pub(super) const FILLING: u32 = u32::MAX;
-
-/// Workgroups of a part that sum products of long vectors: enough to keep a large device busy, few enough for one
-/// workgroup to add up what they leave.
-pub(super) const SUM_GROUPS: u32 = 512;
 
 /// Sums that a workgroup of Anderson's leaves.
 pub(super) const PRODUCTS: u64 = 21;
@@ -68,16 +64,6 @@ pub(super) struct Header {
     pub part_count: u32,
 }
 
-/// A piece: elements among the members, or vertices, of one part.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Piece {
-    pub part: u32,
-    pub first: u32,
-    pub end: u32,
-    pub are_vertices: u32,
-}
-
 /// The ranges of the ground, in order, with the slot that kernels know them by; `None` for one that only the
 /// guard knows. From the reference on there are the start of the step, the inertial prediction and the start of
 /// the iteration, pins moved in all: `Starts` are these three. Behind them a line along which places are tried.
@@ -103,6 +89,15 @@ pub(super) struct Table {
     /// Bytes of what belongs to vertices, and of all sums.
     pub ground_size: u64,
     pub sums_size: u64,
+}
+
+/// How many pieces sums are taken in, which of them is the first of vertices, and how many workgroups
+/// work on the long vector, part by part.
+#[derive(Clone, Copy, Debug)]
+pub struct Pieces {
+    pub count: u32,
+    pub first_of_vertices: u32,
+    pub groups: u32,
 }
 
 /// Where loads go and what is summed together.
@@ -256,7 +251,7 @@ impl Layout {
             let small = vec![SmallSteps::default(); model.part_count()];
             header.small_steps = add(Some(Slot::SmallSteps), bytemuck::cast_slice(&small));
         }
-        if super::accelerates(settings) {
+        if accelerates(settings) {
             let weights = vec![0; unknowns_size(model) as usize];
             header.weights = add(Some(Slot::Weights), &weights);
         }

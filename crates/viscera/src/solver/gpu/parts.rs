@@ -3,12 +3,26 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Update, multipliers_start};
-use super::layout::{Piece, SUM_GROUPS};
+use super::limits::SUM_THREADS;
+use super::slots::{Update, multipliers_start};
 use crate::model::{Model, Part};
 use crate::scalar::{Vec3, vec3};
 use crate::settings::SolverSettings;
-use crate::solver::rebase::{bound_share, rebase_factor};
+use crate::solver::xpbd::rebase::{bound_share, rebase_factor};
+
+/// Workgroups of a part that sum products of long vectors: enough to keep a large device busy, few enough for one
+/// workgroup to add up what they leave.
+pub(super) const SUM_GROUPS: u32 = 512;
+
+/// A piece: elements among the members, or vertices, of one part.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Piece {
+    pub part: u32,
+    pub first: u32,
+    pub end: u32,
+    pub are_vertices: u32,
+}
 
 /// What stands in the table for a part.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -121,7 +135,7 @@ impl Parts {
         for (number, part) in model.parts.iter().enumerate() {
             let runs = parts.runs.len() as u32;
             let length = parts.add_runs(part, first);
-            groups_end += length.div_ceil(super::SUM_THREADS).min(SUM_GROUPS);
+            groups_end += length.div_ceil(SUM_THREADS).min(SUM_GROUPS);
             let [elements, vertices] = [0, 1].map(|kind| {
                 let is_own = |p: &Piece| (p.are_vertices, p.part) < (kind, number as u32);
                 let first = pieces.partition_point(is_own);

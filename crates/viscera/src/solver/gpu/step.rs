@@ -1,33 +1,18 @@
 //! A step: its inputs and constants, and what is sent.
 
-use bytemuck::{Pod, Zeroable};
-
-use super::buffers::Slot;
 use super::inputs::norm_weights;
+use super::limits::accelerates;
 use super::parts::SmallSteps;
+use super::slots::Slot;
+use super::solver::{GpuSolver, Ready};
 use super::timing::Marks;
-use super::{GpuSolver, Ready};
+use super::uniforms::FrameConstants;
 use crate::model::Model;
-use crate::settings::{Method, RelaxationForm};
+use crate::settings::RelaxationForm;
+use crate::solver::error::StepError;
 use crate::solver::explicit::small_steps;
-use crate::solver::tethers::bundle;
-use crate::solver::{Inputs, StepError};
-
-/// `Frame` of bindings.wgsl.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct FrameConstants {
-    pub gravity: [f32; 3],
-    pub dt: f32,
-    pub squared_dt: f32,
-    pub inverse_dt: f32,
-    pub rescale: f32,
-    pub relaxation_multipliers: f32,
-    pub relaxation_positions: f32,
-    pub update_count: u32,
-    pub part_count: u32,
-    pub chebyshev_damping: f32,
-}
+use crate::solver::inputs::Inputs;
+use crate::solver::step::tethers::bundle;
 
 /// Dispatches of iterations, or of small steps, in one submission. Drivers reset a device whose submission
 /// takes some seconds. Reckoned, not measured: one of a million tetrahedra moves some 0.15 GB, half a
@@ -87,29 +72,24 @@ impl GpuSolver {
         dt: f64,
     ) -> Result<u32, StepError> {
         self.check_model(model)?;
-        crate::solver::check_step(dt, model, inputs)?;
-        let repeats = match self.settings.method {
-            Method::Xpbd => self.plan.repeat,
-            Method::Explicit => {
+        crate::solver::inputs::check_step(dt, model, inputs)?;
+        let repeats = match &self.stability {
+            None => self.plan.repeat,
+            Some(stability) => {
                 bundle(model, inputs, &mut self.tethers);
-                let most = small_steps(dt, self.stability.step(model, &self.tethers))?;
-                self.write_small_steps(model, dt)?;
+                let most = small_steps(dt, stability.step(model, &self.tethers))?;
+                for (small, stable) in
+                    self.small_steps.iter_mut().zip(stability.steps(model, &self.tethers))
+                {
+                    *small = SmallSteps::new(small_steps(dt, stable)?, dt);
+                }
+                let bytes = bytemuck::cast_slice(&self.small_steps);
+                self.buffers.write(&self.device.queue, Slot::SmallSteps, bytes);
                 most
             }
         };
         self.prepare_step(model, inputs, dt);
         Ok(repeats)
-    }
-
-    /// How many small steps each part takes in a step of `dt` [s].
-    fn write_small_steps(&mut self, model: &Model<f32>, dt: f64) -> Result<(), StepError> {
-        let stable = self.stability.steps(model, &self.tethers);
-        for (small, stable) in self.small_steps.iter_mut().zip(stable) {
-            *small = SmallSteps::new(small_steps(dt, stable)?, dt);
-        }
-        let bytes = bytemuck::cast_slice(&self.small_steps);
-        self.buffers.write(&self.device.queue, Slot::SmallSteps, bytes);
-        Ok(())
     }
 
     /// One submission of one compute pass.
@@ -169,7 +149,7 @@ impl GpuSolver {
             true if last > 0.0 && last != dt => (dt / last) * (dt / last),
             true => 1.0,
         };
-        if super::accelerates(settings) && dt != self.weights_dt {
+        if accelerates(settings) && dt != self.weights_dt {
             self.weights_dt = dt;
             let weights = norm_weights(model, settings, &self.buffers, dt);
             self.buffers.write(queue, Slot::Weights, bytemuck::cast_slice(&weights));

@@ -11,7 +11,10 @@ use bytemuck::{Pod, Zeroable};
 use wgpu::BufferUsages;
 
 use super::device::{Device, Pipeline};
-use super::{GpuError, GpuSolver, MOST_GROUPS, frames};
+use super::error::GpuError;
+use super::frames;
+use super::limits::MOST_GROUPS;
+use super::solver::GpuSolver;
 use crate::mesh::embed::{Embedding, EmbeddingError};
 use crate::model::Model;
 use crate::scalar::{Vec3, vec3};

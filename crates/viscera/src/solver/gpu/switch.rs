@@ -1,22 +1,26 @@
 //! A step that the CPU begins and the device ends: where a result is wrong, the stage from which on it
 //! is tells which twin to look at.
 
-use super::buffers::Slot;
 use super::layout::Layout;
+use super::slots::Slot;
+use super::solver::{GpuSolver, Ready};
 use super::timing::Marks;
-use super::{GpuSolver, Ready};
 use crate::model::Model;
 use crate::scalar::Vec3;
 use crate::scalar::lanes::{LANES, Point};
-use crate::solver::plan::{Plan, Stage};
-use crate::solver::{Inputs, Solver, StepError};
+use crate::solver::Solver;
+use crate::solver::cpu::memory::MethodMemory;
+use crate::solver::error::StepError;
+use crate::solver::inputs::Inputs;
+use crate::solver::plan::{Plan, Stage, StepStage, XpbdStage};
+use crate::solver::step::data::StepData;
 use crate::state::State;
 
 impl GpuSolver {
     /// Advances a state on the host by one step of `dt` [s], whose first stages `solver` computes, up to
     /// and without the first of `stage`, and this solver the others. Both are of one model and the same
     /// settings; of the iterations the CPU computes stages of the first only, and where steps are
-    /// guarded none after [`Stage::ChooseStart`]. Returns how many stages the CPU has computed. The
+    /// guarded none after [`StepStage::ChooseStart`]. Returns how many stages the CPU has computed. The
     /// state ends on the device: [`GpuSolver::read`] fetches it.
     pub fn step_from(
         &mut self,
@@ -42,7 +46,7 @@ impl GpuSolver {
         if before > 0 {
             lists.extend(starts_acceleration);
         }
-        lists.push(&prologue[before.min(prologue.len())..]);
+        lists.push(&prologue[before..]);
         lists.push(&body[within..]);
         lists.extend(std::iter::repeat_n(body.as_slice(), repeats.saturating_sub(1) as usize));
         lists.push(&self.ready[2]);
@@ -60,8 +64,7 @@ impl GpuSolver {
         inputs: &Inputs<f32>,
         count: usize,
     ) {
-        let work = &solver.work;
-        let ground = &work.ground;
+        let StepData { constants, points, velocities, loads } = &solver.memory.data;
         let put = |slot, values: &[[f32; 4]]| {
             let bytes = bytemuck::cast_slice(values);
             self.buffers.write(&self.device.queue, slot, bytes);
@@ -85,43 +88,47 @@ impl GpuSolver {
         if count == 0 {
             return;
         }
-        write(Slot::Unknowns, &vector(&work.points, &state.multipliers));
-        put(Slot::Velocities, &each(&|v| with(work.velocities[v], 0.0)));
+        write(Slot::Unknowns, &vector(points, &state.multipliers));
+        put(Slot::Velocities, &each(&|v| with(velocities[v], 0.0)));
         if model.tet_sets().iter().any(|set| set.viscous) {
             let mut rows: Vec<f32> = Vec::new();
-            for (own, set) in ground.start_strain.iter().zip(model.tet_sets()) {
+            for (own, set) in constants.start_strain.iter().zip(model.tet_sets()) {
                 rows.extend(own.as_flattened().as_flattened());
                 rows.resize(rows.len() + 6 * LANES * (set.block_count() - own.len()), 0.0);
             }
             write(Slot::StartStrain, &rows);
         }
         // Before the prediction the rest is of the last step.
-        if !has(|stage| matches!(stage, Stage::Predict(_))) {
+        if !has(|stage| matches!(stage, Stage::Step(StepStage::Predict(_)))) {
             return;
         }
-        let remembered = &work.iterate[0];
+        let MethodMemory::Xpbd(memory) = &solver.memory.method else { return };
+        let remembered = &memory.iterate[0];
         if !remembered.positions.is_empty() {
-            let is_valid = has(|stage| *stage == Stage::RememberIterate);
-            let now = (&work.points, &state.multipliers);
+            let is_valid = has(|stage| *stage == XpbdStage::RememberIterate.into());
+            let now = (points, &state.multipliers);
             let (points, multipliers) =
                 if is_valid { (&remembered.positions, &remembered.multipliers) } else { now };
             write(Slot::Iterate, &vector(points, multipliers));
         }
         let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
-        put(Slot::Previous, &each(&|v| with(ground.previous[v].vec3(), copies(v))));
-        put(Slot::Predicted, &each(&|v| with(ground.predicted[v].vec3(), ground.inertias[v])));
-        put(Slot::Acting, &each(&|v| with(ground.external[v], ground.inverse_masses[v])));
+        put(Slot::Previous, &each(&|v| with(constants.previous[v].vec3(), copies(v))));
+        put(
+            Slot::Predicted,
+            &each(&|v| with(constants.predicted[v].vec3(), constants.inertias[v])),
+        );
+        put(Slot::Acting, &each(&|v| with(constants.external[v], constants.inverse_masses[v])));
         let mut targets = each(&|_| [0.0; 4]);
-        for tether in &ground.tethers {
+        for tether in &constants.tethers {
             targets[tether.vertex] = with(tether.target, tether.stiffness);
         }
         for pin in &inputs.pins {
             targets[model.numbering.of(pin.vertex)] = with(pin.target, 0.0);
         }
         if self.settings.guards_steps() {
-            let free = |v: usize| ground.inverse_masses[v] != 0.0;
+            let free = |v: usize| constants.inverse_masses[v] != 0.0;
             let place = |v: usize, x: Vec3<f32>| if free(v) { with(x, 0.0) } else { targets[v] };
-            let starts = [&ground.previous, &ground.predicted, &work.points];
+            let starts = [&constants.previous, &constants.predicted, points];
             let mut rows = vec![[0.0; 4]; 3 * Layout::stride(model) as usize];
             for (row, points) in rows.chunks_mut(Layout::stride(model) as usize).zip(starts) {
                 for (v, point) in points.iter().enumerate() {
@@ -132,11 +139,11 @@ impl GpuSolver {
         }
         put(Slot::Targets, &targets);
         if model.is_split() {
-            let all: Vec<[f32; 4]> = work.copies.iter().map(whole).collect();
+            let all: Vec<[f32; 4]> = memory.copies.iter().map(whole).collect();
             put(Slot::Copies, &all);
         }
-        if !work.loads.is_empty() {
-            put(Slot::Loads, &Layout::new(model, &self.settings).loads(model, &work.loads));
+        if !loads.is_empty() {
+            put(Slot::Loads, &Layout::new(model, &self.settings).loads(model, loads));
         }
     }
 }
@@ -151,7 +158,7 @@ impl Layout {
     fn loads(&self, model: &Model<f32>, of_copies: &[Point<f32>]) -> Vec<[f32; 4]> {
         let mut loads = vec![[0.0; 4]; self.slot_count() as usize];
         for v in 0..model.vertex_count() {
-            let load = crate::solver::rebase::gather(model, of_copies, v);
+            let load = crate::solver::step::data::gather(model, of_copies, v);
             if let Some(place) = loads.get_mut(self.first_load(v)) {
                 *place = whole(&load);
             }
@@ -163,7 +170,7 @@ impl Layout {
 /// How many stages come before the first of that name, of those that the CPU may compute.
 fn first_stages(plan: &Plan, stage: Stage) -> usize {
     let stages = || plan.prologue.iter().chain(&plan.body);
-    let decides = |other: &Stage| *other == Stage::ChooseStart;
+    let decides = |other: &Stage| *other == StepStage::ChooseStart.into();
     let most = stages().position(decides).unwrap_or(plan.prologue.len() + plan.body.len());
     stages().position(|other| *other == stage).unwrap_or(most).min(most)
 }
@@ -175,10 +182,8 @@ fn split(starts: &[Vec<usize>; 2], count: usize, prologue: usize) -> (usize, usi
     if count < prologue {
         return (of_prologue[count], 0);
     }
-    // Behind the stages the prologue may have dispatches that stand for stages of the body.
-    let before = if count > prologue { usize::MAX } else { end(of_prologue) };
     let within = of_body.get(count - prologue).copied().unwrap_or(end(of_body));
-    (before, within)
+    (end(of_prologue), within)
 }
 
 #[cfg(test)]
@@ -191,6 +196,6 @@ mod tests {
         assert_eq!(split(&starts, 0, 2), (0, 0));
         assert_eq!(split(&starts, 1, 2), (1, 0));
         assert_eq!(split(&starts, 2, 2), (3, 0));
-        assert_eq!(split(&starts, 4, 2), (usize::MAX, 2));
+        assert_eq!(split(&starts, 4, 2), (3, 2));
     }
 }

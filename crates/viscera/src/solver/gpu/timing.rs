@@ -8,19 +8,13 @@
 //! The library reads no clock of the host's: whoever wants wall time as well takes it around these calls,
 //! which return when the device is done.
 
-use std::ops::Range;
-
-use super::{Device, GpuError, GpuSolver, frames};
+use super::device::Device;
+use super::error::GpuError;
+use super::frames;
+use super::solver::GpuSolver;
 use crate::model::Model;
-use crate::solver::Inputs;
+use crate::solver::inputs::Inputs;
 use crate::solver::plan::Stage;
-
-/// The dispatches of one stage among those of its part of the step.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct StageRange {
-    pub stage: Stage,
-    pub dispatches: Range<usize>,
-}
 
 /// Parts of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,8 +52,7 @@ pub struct StageTime {
 impl StageTime {
     /// The stage's name, without what it is given.
     pub fn name(&self) -> String {
-        let text = format!("{:?}", self.stage);
-        text.split('(').next().unwrap_or_default().to_owned()
+        self.stage.name()
     }
 }
 

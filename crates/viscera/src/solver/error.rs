@@ -1,0 +1,65 @@
+//! Why a step cannot be made.
+
+/// Why a step cannot be made. The state is unchanged.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StepError {
+    /// The step is not a positive, finite time, or too extreme for the precision in use.
+    #[error("the step must be above zero and finite, and so must its square; {dt} s is not")]
+    BadStep {
+        /// The step given [s].
+        dt: f64,
+    },
+    /// The explicit method would need more small steps than anybody waits for.
+    #[error(
+        "explicit steps are stable up to {stable:e} s, far below the {dt} s asked for; use \
+         `method = \"xpbd\"`, softer tissue, or larger tetrahedra of better shape"
+    )]
+    TooStiff {
+        /// The step given [s].
+        dt: f64,
+        /// The largest stable one [s].
+        stable: f64,
+    },
+    /// An input names no vertex.
+    #[error("a {what} names vertex {vertex}; the model has {vertex_count}")]
+    UnknownVertex {
+        /// "pin", "tether" or "force".
+        what: &'static str,
+        /// The index given.
+        vertex: u32,
+        /// How many vertices there are.
+        vertex_count: usize,
+    },
+    /// The list of anchors is neither empty nor complete.
+    #[error("{given} anchors for {expected} attachments; give all of them or none")]
+    AnchorCount {
+        /// How many were given.
+        given: usize,
+        /// How many there are.
+        expected: usize,
+    },
+    /// An input is infinite or not a number.
+    #[error(
+        "the {what} of a step must be finite in the solver's precision; look for a slip of the unit"
+    )]
+    NotFinite {
+        /// The input concerned.
+        what: &'static str,
+    },
+    /// The solver was built for a model that hangs together otherwise.
+    #[error(
+        "the model's connected parts are not those that the solver was built for; build another solver"
+    )]
+    OtherParts,
+    /// State, model and solver do not belong together.
+    #[error("the {what} has {given} entries; the model needs {expected}")]
+    Mismatch {
+        /// The array concerned.
+        what: &'static str,
+        /// Its length.
+        given: usize,
+        /// The length that fits.
+        expected: usize,
+    },
+}

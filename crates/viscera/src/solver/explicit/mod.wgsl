@@ -1,0 +1,175 @@
+// Stages of the explicit method (solver/explicit/mod.rs): two dispatches for a small step h.
+//
+//   v += h (g + M^-1 f),   x += h v
+//
+// Attachments of a vertex pull like one of their summed stiffness to the mean of their anchors, which
+// stand in `targets`: w is the stiffness [N/m]. Pinned vertices have their places there. Each connected part
+// takes as many small steps as it needs, and then waits for the others.
+
+fn small_row(part: u32) -> u32 {
+    return table[SMALL_STEPS_AT] + SMALL_WORDS * part;
+}
+
+fn part_of_block(block: u32) -> u32 {
+    return table[table[BLOCK_PARTS_AT] + block];
+}
+
+// Remembers positions and, in `predicted` until the end of the step, velocities.
+@compute @workgroup_size(64)
+fn begin_explicit(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let v = thread_of(id, groups, 64u);
+    if v == 0u {
+        control.small_steps_done = 0u;
+    }
+    if v >= job.count {
+        return;
+    }
+    previous[v] = vec4f(points[v].xyz, previous[v].w);
+    predicted[v] = vec4f(velocities[v].xyz, predicted[v].w);
+}
+
+// Green strain one small step ago, at x - h v.
+@compute @workgroup_size(64)
+fn begin_strain(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let thread = thread_of(id, groups, 64u);
+    if thread >= job.count {
+        return;
+    }
+    let block = thread / LANES;
+    let lane = thread % LANES;
+    if tets[block].material[lane] == FILLING {
+        return;
+    }
+    let vertices = vertices_of(block, lane);
+    let small_dt = number(small_row(part_of_block(block)) + SMALL_DT);
+    var x: array<vec3f, 4>;
+    for (var i = 0u; i < 4u; i++) {
+        x[i] = points[vertices[i]].xyz - predicted[vertices[i]].xyz * small_dt;
+    }
+    store_start_strain(block, lane, green_strain_strain(deformation_gradient(x, shape_of(block, lane))));
+}
+
+fn store_start_strain(block: u32, lane: u32, strain: array<f32, 6>) {
+    for (var p = 0u; p < 6u; p++) {
+        start_strain[6u * block + p][lane] = strain[p];
+    }
+}
+
+// h^2 times the forces of tetrahedra and then springs, into a place for each corner. The neo-Hookean
+// blocks begin at `job.set_first`. Counts the small step, which the other kernels only read.
+@compute @workgroup_size(64)
+fn load_forces(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let thread = thread_of(id, groups, 64u);
+    if thread == 0u {
+        control.small_step = control.small_steps_done + 1u;
+    }
+    if thread < job.tet_count {
+        load_tet(thread / LANES, thread % LANES);
+    } else if thread < job.count {
+        load_spring(springs[thread - job.tet_count]);
+    }
+}
+
+fn load_tet(block: u32, lane: u32) {
+    let kind = tets[block].material[lane];
+    let small = small_row(part_of_block(block));
+    if kind == FILLING || control.small_steps_done >= table[small + SMALL_COUNT] {
+        return;
+    }
+    let small_dt = number(small + SMALL_DT);
+    let material = law_of(kind);
+    let lambda = material.lame_lambda;
+    let mu = material.lame_mu;
+    let vertices = vertices_of(block, lane);
+    var x: array<vec3f, 4>;
+    for (var i = 0u; i < 4u; i++) {
+        x[i] = points[vertices[i]].xyz;
+    }
+    let shape = shape_of(block, lane);
+    let f = deformation_gradient(x, shape);
+    var piola = tissue_piola(block >= job.set_first, f, lambda, mu);
+    if material.viscosity > 0.0 {
+        let change = tissue_change_since(f, start_strain_of(block, lane));
+        let rate = material.viscosity * number(small + SMALL_INVERSE_DT);
+        piola += tissue_viscous_piola(f, change, rate, lambda, mu);
+        store_start_strain(block, lane, green_strain_strain(f));
+    }
+    let volume = tets[block].rest_volume[lane] * (small_dt * small_dt);
+    let forces = internal_forces(piola, shape, volume);
+    let slots = indices_of(block, lane);
+    for (var i = 0u; i < 4u; i++) {
+        loads[slots[i]] = vec4f(forces[i], 0.0);
+    }
+}
+
+fn load_spring(spring: Spring) {
+    let x = array<vec3f, 2>(points[spring.vertices[0]].xyz, points[spring.vertices[1]].xyz);
+    let forces = spring_forces(x, spring.rest_length, spring.stiffness);
+    let small_dt = number(small_row(spring.part) + SMALL_DT);
+    let squared = small_dt * small_dt;
+    loads[spring.slots[0]] = vec4f(forces[0] * squared, 0.0);
+    loads[spring.slots[1]] = vec4f(forces[1] * squared, 0.0);
+}
+
+@compute @workgroup_size(64)
+fn advance_explicit(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let v = thread_of(id, groups, 64u);
+    if v >= job.count {
+        return;
+    }
+    if v == 0u {
+        control.small_steps_done = control.small_step;
+    }
+    let small = small_row(part_with(PART_VERTICES_END, v));
+    let count = table[small + SMALL_COUNT];
+    if control.small_step > count {
+        return;
+    }
+    let on_vertex = acting[v];
+    let hold = targets[v];
+    if on_vertex.w == 0.0 {
+        let start = previous[v].xyz;
+        let way = hold.xyz - start;
+        let share = f32(control.small_step) / f32(count);
+        let is_last = control.small_step == count;
+        points[v] = vec4f(select(start + way * share, hold.xyz, is_last), 0.0);
+        velocities[v] = vec4f(way * frame.inverse_dt, 0.0);
+        return;
+    }
+    let h = number(small + SMALL_DT);
+    let x = points[v].xyz;
+    let pull = on_vertex.xyz + (hold.xyz - x) * hold.w;
+    let impulse = gather(v).xyz * number(small + SMALL_INVERSE_DT) + pull * h;
+    let velocity = velocities[v].xyz + (impulse * on_vertex.w + frame.gravity * h);
+    velocities[v] = vec4f(velocity, 0.0);
+    points[v] = vec4f(x + velocity * h, 0.0);
+}
+
+// xt = x - dt (v - v_n) + dt^2 (g + M^-1 f_ext).
+@compute @workgroup_size(64)
+fn end_explicit(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let v = thread_of(id, groups, 64u);
+    if v >= job.count {
+        return;
+    }
+    let mass = predicted[v].w;
+    let change = velocities[v].xyz - predicted[v].xyz;
+    let load = frame.gravity + acting[v].xyz * (1.0 / mass);
+    let xt = points[v].xyz - change * frame.dt + load * frame.squared_dt;
+    predicted[v] = vec4f(xt, mass);
+}

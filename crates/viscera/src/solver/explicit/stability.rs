@@ -1,0 +1,159 @@
+//! How large a small step may be.
+//!
+//! ```text
+//! h <= (2/omega) (sqrt(1 + xi^2) - xi),   xi = eta omega/2       with viscosity eta
+//! omega^2 <= max_i sum_(e at i) rho(K_e)/m_i
+//! ```
+
+use crate::elements::shape_gradients;
+use crate::model::Model;
+use crate::scalar::{Mat3, Real};
+use crate::settings::SolverSettings;
+use crate::solver::error::StepError;
+use crate::solver::step::tethers::Bundle;
+
+/// More small steps than this in one step are a mistake of units rather than patience.
+const MOST_SMALL_STEPS: f64 = 100_000.0;
+
+/// Rounds of the power method for an element's stiffness: 1 % is enough for a bound with a margin.
+const POWER_ROUNDS: usize = 20;
+
+/// What the largest stable small step depends on.
+#[derive(Clone, Debug)]
+pub struct Stability {
+    /// The largest small step [s] of the stiffest part without tethers, with the margin of the settings.
+    pub step: f64,
+    /// Of the elements around each vertex, the user's order [N/m].
+    stiffness: Vec<f64>,
+    parts: Vec<PartStability>,
+    safety: f64,
+}
+
+/// Of one connected part of the model.
+#[derive(Clone, Copy, Debug, Default)]
+struct PartStability {
+    /// Largest [1/s].
+    frequency: f64,
+    /// Largest [s].
+    viscosity: f64,
+}
+
+/// The small steps of a part in one step: as many as it needs, whatever others do.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SmallSteps {
+    pub count: u32,
+    pub done: u32,
+}
+
+impl SmallSteps {
+    /// [s]; `dt` is the whole step.
+    pub fn dt(self, dt: f64) -> f64 {
+        dt / f64::from(self.count)
+    }
+}
+
+impl Stability {
+    /// Of a model.
+    pub fn new<S: Real>(model: &Model<S>, settings: &SolverSettings) -> Self {
+        let (stiffness, parts) = part_stability(model);
+        let safety = settings.explicit_safety;
+        let mut stability = Self { step: f64::INFINITY, stiffness, parts, safety };
+        stability.step = stability.step(model, &[]);
+        stability
+    }
+
+    /// The largest small step [s] of the stiffest part with these tethers.
+    pub fn step<S: Real>(&self, model: &Model<S>, tethers: &[Bundle<S>]) -> f64 {
+        self.steps(model, tethers).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The largest small step [s] of each part with these tethers, sorted by vertex.
+    pub fn steps<S: Real>(
+        &self,
+        model: &Model<S>,
+        tethers: &[Bundle<S>],
+    ) -> impl Iterator<Item = f64> {
+        let mut tethers = tethers.iter().peekable();
+        self.parts.iter().zip(model.parts.iter()).map(move |(stability, part)| {
+            let mut frequency = stability.frequency;
+            while let Some(tether) = tethers.next_if(|t| t.vertex < part.vertices.end) {
+                let v = model.numbering.order[tether.vertex] as usize;
+                let stiffness = self.stiffness[v] + tether.stiffness.to_f64();
+                frequency = frequency.max((stiffness / model.masses[v].to_f64()).sqrt());
+            }
+            let xi = 0.5 * stability.viscosity * frequency;
+            self.safety * (2.0 / frequency) * ((1.0 + xi * xi).sqrt() - xi)
+        })
+    }
+
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.stiffness[..]) + size_of_val(&self.parts[..])
+    }
+}
+
+/// Of the elements around each vertex [N/m], and what of it decides in each part.
+fn part_stability<S: Real>(model: &Model<S>) -> (Vec<f64>, Vec<PartStability>) {
+    let mut stiffness = vec![0.0; model.vertex_count()];
+    let mut parts = vec![PartStability::default(); model.part_count()];
+    for set in model.tet_sets() {
+        for tet in model.tets(set) {
+            let material = &model.materials[tet.material];
+            let viscosity = &mut parts[model.part_of(tet.vertices[0])].viscosity;
+            *viscosity = viscosity.max(material.viscosity.to_f64());
+            let shape = tet.inverse_rest_shape.cast::<f64>();
+            let lame = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
+            let largest = tet.rest_volume.to_f64() * element_stiffness(&shape, lame);
+            for v in tet.vertices {
+                stiffness[v as usize] += largest;
+            }
+        }
+    }
+    let springs = &model.springs;
+    for (ends, k) in springs.vertices.iter().zip(&springs.stiffness) {
+        for &v in ends {
+            stiffness[v as usize] += 2.0 * k.to_f64();
+        }
+    }
+    for (&v, k) in model.attachments.vertices.iter().zip(&model.attachments.stiffness) {
+        stiffness[v as usize] += k.to_f64();
+    }
+    for (stability, part) in parts.iter_mut().zip(model.parts.iter()) {
+        let vertices = model.numbering.order[part.vertices.clone()].iter().map(|&v| v as usize);
+        let ratios = vertices.map(|v| stiffness[v] / model.masses[v].to_f64());
+        stability.frequency = ratios.fold(0.0, f64::max).sqrt();
+    }
+    (stiffness, parts)
+}
+
+/// The largest eigenvalue of a tetrahedron's stiffness at rest, per volume [Pa/m^2]. Both laws have the
+/// same stiffness at rest: that of linear elasticity.
+fn element_stiffness(shape: &Mat3<f64>, [lambda, mu]: [f64; 2]) -> f64 {
+    let g = shape_gradients(shape);
+    // Any displacement but a rigid one will do; swelling and shear together meet every eigenvector.
+    let mut u = [g[1] + g[2] * 0.3, g[2] - g[0] * 0.2, g[3] + g[0] * 0.7, g[1] * -0.4 + g[0]];
+    let mut value = 0.0;
+    for _ in 0..POWER_ROUNDS {
+        let length = u.iter().map(|u| u.length_squared()).sum::<f64>().sqrt();
+        let mut gradient = Mat3::ZERO;
+        for (u, g) in u.iter().zip(g) {
+            gradient = gradient + Mat3::outer(*u * (1.0 / length), g);
+        }
+        let stress =
+            (gradient + gradient.transpose()) * mu + Mat3::IDENTITY * (lambda * gradient.trace());
+        for (u, g) in u.iter_mut().zip(g) {
+            *u = stress * g;
+        }
+        value = u.iter().map(|u| u.length_squared()).sum::<f64>().sqrt();
+    }
+    value
+}
+
+/// How many small steps, of `stable` [s] at most, make a step of `dt` [s].
+pub fn small_steps(dt: f64, stable: f64) -> Result<u32, StepError> {
+    let count = (dt / stable).ceil().max(1.0);
+    if count <= MOST_SMALL_STEPS {
+        return Ok(count as u32);
+    }
+    Err(StepError::TooStiff { dt, stable })
+}

@@ -1,0 +1,73 @@
+//! The record of what the device decides during a step; its twin is control.wgsl.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::solver::cpu::products::LARGEST_WINDOW;
+use crate::solver::report::StepReport;
+
+/// `Control` of control.wgsl, with as many parts as there are in place of one.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Control {
+    pub small_step: u32,
+    pub small_steps_done: u32,
+    pub step: u32,
+    pub rejected_step: u32,
+    pub rejected: u32,
+    pub parts: PartControl,
+}
+
+/// Where the parts' records begin [bytes].
+pub const PARTS_START: usize = std::mem::offset_of!(Control, parts);
+
+/// `PartControl` of control.wgsl.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct PartControl {
+    pub sweeps: u32,
+    pub next: u32,
+    pub differences: u32,
+    pub last_norm: f32,
+    pub shares: [f32; LARGEST_WINDOW],
+    pub gram: [[f32; LARGEST_WINDOW]; LARGEST_WINDOW],
+    pub iteration: u32,
+    pub omega: f32,
+    pub radius: f32,
+    pub last_change: f32,
+    pub limit: f32,
+    pub was_rejected: u32,
+    pub share: f32,
+    pub descends: u32,
+    pub potential: f32,
+    pub noise: f32,
+    pub kept_speed: f32,
+    pub best_value: f32,
+    pub failures: u32,
+    pub mixture_best: f32,
+    pub mixture_failures: u32,
+    pub is_good: u32,
+    pub is_broken: u32,
+}
+
+/// Bytes of `Control` for so many parts.
+pub fn control_size(parts: usize) -> u64 {
+    (PARTS_START + parts.max(1) * size_of::<PartControl>()) as u64
+}
+
+/// How many steps were taken back, out of the bytes of `Control`.
+pub fn rejected_steps(control: &[u8]) -> u64 {
+    bytemuck::pod_read_unaligned::<Control>(&control[..size_of::<Control>()]).rejected.into()
+}
+
+impl PartControl {
+    /// How the step ended for the part.
+    pub fn report(&self) -> StepReport {
+        StepReport {
+            potential: self.potential.into(),
+            limit: self.limit.into(),
+            noise: self.noise.into(),
+            rejected: self.was_rejected != 0,
+            kept_speed: self.kept_speed.into(),
+        }
+    }
+}

@@ -1,0 +1,356 @@
+//! The solver of one model on a graphics processor: its memory and kernels.
+
+use super::buffers::Buffers;
+use super::control;
+use super::device::{Device, baseline, shortfall};
+use super::error::GpuError;
+use super::holds::Hold;
+use super::kernels;
+use super::layout::Layout;
+use super::limits::{JOB_STRIDE, MOST_GROUPS};
+use super::parts::{Falls, SmallSteps};
+use super::record::{Dispatch, Recorder};
+use super::ring::Frames;
+use super::slots::{Slot, Update};
+use super::stages::StageRange;
+use super::uniforms::{FrameConstants, Job};
+use crate::model::Model;
+use crate::scalar::Vec3;
+use crate::settings::{Method, Precision, SolverSettings, Start};
+use crate::solver::cpu::memory::sizes;
+use crate::solver::error::StepError;
+use crate::solver::explicit::Stability;
+use crate::solver::plan::{Plan, StepStage};
+use crate::solver::step::tethers::Bundle;
+use crate::state::State;
+
+/// A dispatch ready to be sent.
+#[derive(Debug)]
+pub(super) struct Ready {
+    pub pipeline: wgpu::ComputePipeline,
+    pub storage: wgpu::BindGroup,
+    /// Where its job lies among the jobs [bytes].
+    pub job: u32,
+    pub groups: [u32; 2],
+    /// Whether it forgets the accelerations' past.
+    pub starts_acceleration: bool,
+}
+
+/// A solver for one model on a graphics processor, in single precision.
+#[derive(Debug)]
+pub struct GpuSolver {
+    pub(super) device: Device,
+    pub(super) settings: SolverSettings,
+    pub(super) plan: Plan,
+    pub(super) buffers: Buffers,
+    pub(super) uniforms: wgpu::BindGroup,
+    pub(super) frame: wgpu::Buffer,
+    pub(super) jobs: wgpu::Buffer,
+    /// What the model's sizes were.
+    pub(super) sizes: [usize; 11],
+    pub(super) ready: [Vec<Ready>; 3],
+    /// Which of them belong to which stage.
+    pub(super) stages: [Vec<StageRange>; 3],
+    pub(super) stage_starts: [Vec<usize>; 2],
+    pub(super) restart: Vec<Ready>,
+    pub(super) frames: Frames,
+    /// What the device's multipliers belong to [s]; zero before the first step.
+    pub(super) multiplier_dt: f64,
+    /// Vertices that the last step pulled or held, the solver's numbers.
+    pub(super) touched: Vec<u32>,
+    pub(super) updates: Vec<Update>,
+    /// Where each vertex stands in `updates`; `u32::MAX` for nowhere.
+    pub(super) update_of: Vec<u32>,
+    /// Connected parts of the model.
+    pub(super) part_count: usize,
+    /// The step [s] that the norm's weights on the device belong to.
+    pub(super) weights_dt: f64,
+    /// Whether the device's anchors may be elsewhere than at rest.
+    pub(super) has_moved_anchors: bool,
+    /// Of the explicit method: its small steps, and the attachments vertex by vertex.
+    pub(super) stability: Option<Stability>,
+    /// Springs to places outside in the last step.
+    pub(super) tethers: Vec<Bundle<f32>>,
+    pub(super) holds: Vec<Hold>,
+    pub(super) small_steps: Vec<SmallSteps>,
+    /// What nothing holds starts otherwise, where that is asked for.
+    pub(super) falls: Option<Falls>,
+}
+
+impl GpuSolver {
+    /// Puts a model onto the device, at rest, and plans its steps.
+    pub fn new(
+        device: &Device,
+        model: &Model<f32>,
+        settings: &SolverSettings,
+    ) -> Result<Self, GpuError> {
+        Self::with_memory(device, model, settings, &[])
+    }
+
+    /// As [`GpuSolver::new`], with memory that held something before, for a test that nothing of it is
+    /// ever read.
+    #[doc(hidden)]
+    pub fn on_used_memory(
+        device: &Device,
+        model: &Model<f32>,
+        settings: &SolverSettings,
+        left_over: f32,
+    ) -> Result<Self, GpuError> {
+        Self::with_memory(device, model, settings, &left_over.to_ne_bytes())
+    }
+
+    fn with_memory(
+        device: &Device,
+        model: &Model<f32>,
+        settings: &SolverSettings,
+        left_over: &[u8],
+    ) -> Result<Self, GpuError> {
+        if settings.precision == Precision::F64 {
+            return Err(GpuError::DoublePrecision);
+        }
+        device.check()?;
+        // Sizes are compared array by array, below.
+        let wgpu::Limits { max_storage_buffer_binding_size, max_buffer_size, .. } = baseline();
+        let own = device.limits();
+        let own = wgpu::Limits { max_storage_buffer_binding_size, max_buffer_size, ..own };
+        if let Some(lacking) = shortfall(&own) {
+            return Err(GpuError::BelowBaseline { name: device.name().to_owned(), lacking });
+        }
+        let plan = Plan::new(model, settings);
+        let layout = Layout::new(model, settings);
+        let buffers = Buffers::new(device, model, settings, &layout, left_over)?;
+        let vector = [buffers.length, (buffers.multipliers_start / 4) as u32];
+        let record = Recorder::new(model, settings, vector, layout.pieces()).record(&plan);
+        let lists = [record.prologue, record.body, record.epilogue, record.restart];
+        let wgpu = &device.device;
+        let make = |label, size, usage| {
+            wgpu.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage: usage | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let job_count = lists.iter().map(Vec::len).sum::<usize>() as u64;
+        let uniform = wgpu::BufferUsages::UNIFORM;
+        let jobs = make("jobs", JOB_STRIDE * job_count.max(1), uniform);
+        let frame = make("frame", size_of::<FrameConstants>() as u64, uniform);
+        let uniforms = wgpu.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("job and frame"),
+            layout: &kernels::uniform_layout(wgpu),
+            entries: &[
+                wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                        buffer: &jobs,
+                        offset: 0,
+                        size: std::num::NonZero::new(size_of::<Job>() as u64),
+                    }),
+                },
+                wgpu::BindGroupEntry { binding: 1, resource: frame.as_entire_binding() },
+            ],
+        });
+        let mut next = 0;
+        let [prologue, body, epilogue, restart] = lists.map(|list| {
+            let prepare = |dispatch: &Dispatch| {
+                let offset = next;
+                next += JOB_STRIDE;
+                device.queue.write_buffer(&jobs, offset, bytemuck::bytes_of(&dispatch.job));
+                prepare(device, &buffers, dispatch, offset as u32)
+            };
+            list.iter().map(prepare).collect()
+        });
+        let is_explicit = settings.method == Method::Explicit;
+        let mut solver = Self {
+            frames: Frames::new(&buffers),
+            weights_dt: 0.0,
+            device: device.clone(),
+            settings: settings.clone(),
+            falls: plan
+                .prologue
+                .contains(&StepStage::Predict(Start::Auto).into())
+                .then(|| Falls::new(model)),
+            plan,
+            uniforms,
+            frame,
+            jobs,
+            sizes: sizes(model).map(|(_, size)| size),
+            ready: [prologue, body, epilogue],
+            stages: record.stages,
+            stage_starts: record.stage_starts,
+            restart,
+            multiplier_dt: 0.0,
+            touched: Vec::new(),
+            part_count: model.part_count(),
+            updates: Vec::new(),
+            update_of: vec![u32::MAX; model.vertex_count()],
+            has_moved_anchors: true,
+            stability: is_explicit.then(|| Stability::new(model, settings)),
+            tethers: Vec::new(),
+            holds: if is_explicit { Hold::all(model) } else { Vec::new() },
+            small_steps: vec![
+                SmallSteps::default();
+                if is_explicit { model.part_count() } else { 0 }
+            ],
+            buffers,
+        };
+        solver.upload_constants(model);
+        let rest = State::at_rest(model);
+        solver.put(model, &rest);
+        // Its memory may have been too little.
+        solver.device.check()?;
+        Ok(solver)
+    }
+
+    /// The settings in force.
+    pub fn settings(&self) -> &SolverSettings {
+        &self.settings
+    }
+
+    /// The stages of a step.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The largest small step [s] of the explicit method, its margin included; infinite for others.
+    pub fn stable_step(&self) -> f64 {
+        self.stability.as_ref().map_or(f64::INFINITY, |stability| stability.step)
+    }
+
+    /// The device it works on.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// Dispatches of a step: once before the iterations, in each of them, and once after.
+    pub fn dispatches(&self) -> [usize; 3] {
+        [0, 1, 2].map(|list| self.ready[list].len())
+    }
+
+    /// The same of a solver that is not built, and needs no device: how many passes over the mesh, one after
+    /// the other, an iteration is.
+    pub fn dispatches_of(model: &Model<f32>, settings: &SolverSettings) -> [usize; 3] {
+        let plan = Plan::new(model, settings);
+        let layout = Layout::new(model, settings);
+        let multipliers = 4 * model.vertex_count() as u32;
+        let vector = [multipliers + model.multiplier_count as u32, multipliers];
+        let record = Recorder::new(model, settings, vector, layout.pieces()).record(&plan);
+        [record.prologue, record.body, record.epilogue].map(|list| list.len())
+    }
+
+    /// Iterations of the steps to come, at least one; neither stages nor memory depend on them.
+    pub fn set_iterations(&mut self, count: u32) {
+        self.settings.iterations = count.max(1);
+        self.plan.set_iterations(&self.settings);
+    }
+
+    /// About how many tetrahedra of meshes like this one, solved like this, a device with these limits
+    /// takes: as many as its largest array fits into a binding.
+    pub fn largest_mesh(&self, model: &Model<f32>, limits: &wgpu::Limits) -> u64 {
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        (model.tet_count() as f64 * limit as f64 / self.buffers.largest() as f64) as u64
+    }
+
+    /// Bytes of device memory.
+    pub fn bytes(&self) -> u64 {
+        self.buffers.bytes() + self.jobs.size() + self.frames.bytes()
+    }
+
+    /// Positions [m] as four floats a vertex, of which the last does not count, in the solver's
+    /// numbering ([`GpuSolver::vertex_order`]): to be drawn without a copy. The first
+    /// `16 * vertex_count` bytes count.
+    pub fn positions(&self) -> &wgpu::Buffer {
+        self.buffers.buffer(Slot::Unknowns)
+    }
+
+    /// The user's number of each vertex of [`GpuSolver::positions`].
+    pub fn vertex_order(model: &Model<f32>) -> &[u32] {
+        &model.numbering.order
+    }
+
+    /// Puts a state onto the device.
+    pub fn write(&mut self, model: &Model<f32>, state: &State<f32>) -> Result<(), StepError> {
+        self.check_model(model)?;
+        crate::solver::inputs::check_state(model, state)?;
+        self.put(model, state);
+        Ok(())
+    }
+
+    /// The model is one of the same shape as that which lies on the device.
+    pub(super) fn check_model(&self, model: &Model<f32>) -> Result<(), StepError> {
+        for (given, (what, expected)) in self.sizes.into_iter().zip(sizes(model)) {
+            if given != expected {
+                return Err(StepError::Mismatch { what, given, expected });
+            }
+        }
+        Ok(())
+    }
+
+    fn put(&mut self, model: &Model<f32>, state: &State<f32>) {
+        let places = in_solver_order(model, &state.positions);
+        let mut unknowns = vec![0.0f32; self.buffers.length as usize];
+        let (positions, multipliers) =
+            unknowns.split_at_mut((self.buffers.multipliers_start / 4) as usize);
+        positions[..4 * places.len()].copy_from_slice(places.as_flattened());
+        multipliers[..state.multipliers.len()].copy_from_slice(&state.multipliers);
+        let bytes = bytemuck::cast_slice(&unknowns);
+        self.buffers.write(&self.device.queue, Slot::Unknowns, bytes);
+        self.write_velocities(model, &state.velocities);
+        self.multiplier_dt = state.multiplier_dt;
+    }
+
+    /// Puts velocities [m/s], the user's order, in the place of those on the device.
+    pub(crate) fn write_velocities(&self, model: &Model<f32>, velocities: &[Vec3<f32>]) {
+        let sorted = in_solver_order(model, velocities);
+        let bytes = bytemuck::cast_slice(&sorted);
+        self.buffers.write(&self.device.queue, Slot::Velocities, bytes);
+    }
+
+    /// What each vertex is made of: mass, inverse mass, number of copies, stiffness of its attachments.
+    fn upload_constants(&self, model: &Model<f32>) {
+        let order = &model.numbering.order;
+        let masses: Vec<f32> = order.iter().map(|&v| model.masses[v as usize]).collect();
+        let with_w = |w: &dyn Fn(usize) -> f32| -> Vec<[f32; 4]> {
+            (0..order.len()).map(|v| [0.0, 0.0, 0.0, w(v)]).collect()
+        };
+        let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
+        let control = vec![0u8; control::control_size(model.part_count()) as usize];
+        self.device.queue.write_buffer(self.buffers.buffer(Slot::Control), 0, &control);
+        let mut stiffness = vec![0.0; order.len()];
+        for hold in &self.holds {
+            stiffness[hold.vertex as usize] = hold.stiffness as f32;
+        }
+        for (slot, values) in [
+            (Slot::Predicted, with_w(&|v| masses[v])),
+            (Slot::Acting, with_w(&|v| 1.0 / masses[v])),
+            (Slot::Previous, with_w(&copies)),
+            (Slot::Targets, with_w(&|v| stiffness[v])),
+        ] {
+            self.buffers.write(&self.device.queue, slot, bytemuck::cast_slice(&values));
+        }
+    }
+}
+
+fn in_solver_order(model: &Model<f32>, values: &[Vec3<f32>]) -> Vec<[f32; 4]> {
+    let order = model.numbering.order.iter();
+    order.map(|&v| values[v as usize].to_array()).map(|[x, y, z]| [x, y, z, 0.0]).collect()
+}
+
+fn prepare(device: &Device, buffers: &Buffers, dispatch: &Dispatch, job: u32) -> Ready {
+    let made = kernels::pipeline(device, dispatch.kernel, dispatch.variant);
+    let entries: Vec<_> = (dispatch.kernel.slots.iter().zip(dispatch.places()))
+        .map(|(&slot, place)| wgpu::BindGroupEntry {
+            binding: slot as u32,
+            resource: wgpu::BindingResource::Buffer(buffers.bound(place)),
+        })
+        .collect();
+    let storage = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some(dispatch.kernel.entry),
+        layout: &made.storage,
+        entries: &entries,
+    });
+    let along = dispatch.groups.min(MOST_GROUPS);
+    let groups = [along, dispatch.groups.div_ceil(along.max(1))];
+    let starts_acceleration = *dispatch.kernel == kernels::APPLY_UPDATES;
+    Ready { pipeline: made.pipeline, storage, job, groups, starts_acceleration }
+}

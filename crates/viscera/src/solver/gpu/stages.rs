@@ -1,0 +1,68 @@
+//! From stages to dispatches: what the device is asked to do in every step, written down once.
+
+use std::ops::Range;
+
+use super::record::{Dispatch, Recorder};
+use crate::solver::plan::{Plan, Stage, XpbdStage};
+
+/// The dispatches of one stage among those of its part of the step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StageRange {
+    pub stage: Stage,
+    pub dispatches: Range<usize>,
+}
+
+/// The dispatches of a step: once, so many times, once.
+#[derive(Clone, Debug, Default)]
+pub struct Record {
+    pub prologue: Vec<Dispatch>,
+    pub body: Vec<Dispatch>,
+    pub epilogue: Vec<Dispatch>,
+    /// Which of them belong to which stage, in these three lists; stages that need none are left out,
+    /// and the colours of a sweep are one.
+    pub stages: [Vec<StageRange>; 3],
+    /// Where the dispatches of each stage of prologue and body begin, and where those of the last end.
+    pub stage_starts: [Vec<usize>; 2],
+    /// Of a new history, instead of a step.
+    pub restart: Vec<Dispatch>,
+}
+
+impl Recorder<'_> {
+    pub fn record(&self, plan: &Plan) -> Record {
+        let [prologue, body, epilogue] =
+            [&plan.prologue, &plan.body, &plan.epilogue].map(|stages| self.list(stages));
+        Record {
+            prologue: prologue.0,
+            body: body.0,
+            epilogue: epilogue.0,
+            stages: [prologue.1, body.1, epilogue.1],
+            stage_starts: [prologue.2, body.2],
+            restart: self.restart_stages(),
+        }
+    }
+
+    fn list(&self, stages: &[Stage]) -> (Vec<Dispatch>, Vec<StageRange>, Vec<usize>) {
+        let (mut dispatches, mut ranges) = (Vec::new(), Vec::<StageRange>::new());
+        let mut starts = Vec::new();
+        for stage in stages {
+            starts.push(dispatches.len());
+            let first = dispatches.len();
+            match *stage {
+                Stage::Step(stage) => self.step_stage(stage, &mut dispatches),
+                Stage::Xpbd(stage) => self.xpbd_stage(stage, &mut dispatches),
+                Stage::Explicit(stage) => self.explicit_stage(stage, &mut dispatches),
+            }
+            let added = first..dispatches.len();
+            match (stage, ranges.last_mut()) {
+                _ if added.is_empty() => {}
+                (
+                    Stage::Xpbd(XpbdStage::SolveColor(_)),
+                    Some(StageRange { stage: Stage::Xpbd(XpbdStage::SolveColor(_)), dispatches }),
+                ) => dispatches.end = added.end,
+                _ => ranges.push(StageRange { stage: *stage, dispatches: added }),
+            }
+        }
+        starts.push(dispatches.len());
+        (dispatches, ranges, starts)
+    }
+}

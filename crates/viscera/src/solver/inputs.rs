@@ -1,0 +1,141 @@
+//! What acts on a model from outside during a step, and whether it can.
+
+use super::error::StepError;
+use crate::model::Model;
+use crate::scalar::{Real, Vec3};
+use crate::state::State;
+
+/// A vertex that is moved, not simulated, during a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pin<S> {
+    /// The vertex.
+    pub vertex: u32,
+    /// Where it is at the end of the step [m].
+    pub target: Vec3<S>,
+}
+
+/// A spring without length from a vertex to a place, for the time of a step: how a tool holds tissue that
+/// gives way. On a pinned vertex it does nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tether<S> {
+    /// The vertex.
+    pub vertex: u32,
+    /// Where it is pulled to, throughout the step [m].
+    pub target: Vec3<S>,
+    /// [N/m], zero or more.
+    pub stiffness: S,
+}
+
+/// What acts on the model from outside during one step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inputs<S> {
+    /// Acceleration of gravity [m/s^2].
+    pub gravity: Vec3<S>,
+    /// Pinned vertices. The set may change from step to step.
+    pub pins: Vec<Pin<S>>,
+    /// Springs to places outside. The set may change from step to step; several on one vertex add up.
+    pub tethers: Vec<Tether<S>>,
+    /// Where each attachment's anchor is at the end of the step [m], the user's order. Empty:
+    /// all anchors at rest.
+    pub anchors: Vec<Vec3<S>>,
+    /// External forces [N] on single vertices; several on one vertex add up.
+    pub forces: Vec<(u32, Vec3<S>)>,
+}
+
+impl<S: Real> Default for Inputs<S> {
+    fn default() -> Self {
+        Self {
+            gravity: Vec3::ZERO,
+            pins: Vec::new(),
+            tethers: Vec::new(),
+            anchors: Vec::new(),
+            forces: Vec::new(),
+        }
+    }
+}
+
+impl<S: Real> Inputs<S> {
+    /// The same in another precision.
+    pub fn cast<T: Real>(&self) -> Inputs<T> {
+        let pin = |pin: &Pin<S>| Pin { vertex: pin.vertex, target: pin.target.cast() };
+        let tether = |tether: &Tether<S>| Tether {
+            vertex: tether.vertex,
+            target: tether.target.cast(),
+            stiffness: T::from_f64(tether.stiffness.to_f64()),
+        };
+        Inputs {
+            gravity: self.gravity.cast(),
+            pins: self.pins.iter().map(pin).collect(),
+            tethers: self.tethers.iter().map(tether).collect(),
+            anchors: self.anchors.iter().map(|anchor| anchor.cast()).collect(),
+            forces: self.forces.iter().map(|&(vertex, force)| (vertex, force.cast())).collect(),
+        }
+    }
+
+    /// Where the anchors of a model's attachments are, the user's order.
+    pub fn anchors_of<'a>(&'a self, model: &'a Model<S>) -> &'a [Vec3<S>] {
+        if self.anchors.is_empty() { &model.rest_anchors } else { &self.anchors }
+    }
+}
+
+/// A step can be made with these inputs.
+pub(crate) fn check_step<S: Real>(
+    dt: f64,
+    model: &Model<S>,
+    inputs: &Inputs<S>,
+) -> Result<(), StepError> {
+    // Multipliers are forces times the squared step, so that the square must be a number too.
+    let squared = S::from_f64(dt * dt);
+    if !(dt > 0.0 && squared > S::ZERO && squared.is_finite()) {
+        return Err(StepError::BadStep { dt });
+    }
+    check_inputs(model, inputs)
+}
+
+fn is_legal<S: Real>(tether: &Tether<S>) -> bool {
+    tether.target.is_finite() && tether.stiffness >= S::ZERO && tether.stiffness.is_finite()
+}
+
+/// The state fits the model.
+pub(crate) fn check_state<S: Real>(model: &Model<S>, state: &State<S>) -> Result<(), StepError> {
+    let vertex_count = model.vertex_count();
+    let lengths = [
+        ("list of positions", state.positions.len(), vertex_count),
+        ("list of velocities", state.velocities.len(), vertex_count),
+        ("list of multipliers", state.multipliers.len(), model.multiplier_count),
+    ];
+    for (what, given, expected) in lengths {
+        if given != expected {
+            return Err(StepError::Mismatch { what, given, expected });
+        }
+    }
+    Ok(())
+}
+
+/// The inputs fit the model.
+pub(crate) fn check_inputs<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> Result<(), StepError> {
+    let vertex_count = model.vertex_count();
+    let expected = model.rest_anchors.len();
+    if !inputs.anchors.is_empty() && inputs.anchors.len() != expected {
+        return Err(StepError::AnchorCount { given: inputs.anchors.len(), expected });
+    }
+    let vertices = (inputs.pins.iter().map(|pin| ("pin", pin.vertex)))
+        .chain(inputs.tethers.iter().map(|tether| ("tether", tether.vertex)))
+        .chain(inputs.forces.iter().map(|&(vertex, _)| ("force", vertex)));
+    for (what, vertex) in vertices {
+        if vertex as usize >= vertex_count {
+            return Err(StepError::UnknownVertex { what, vertex, vertex_count });
+        }
+    }
+    let finite = [
+        ("gravity", inputs.gravity.is_finite()),
+        ("pin targets", inputs.pins.iter().all(|pin| pin.target.is_finite())),
+        ("tethers", inputs.tethers.iter().all(is_legal)),
+        ("anchors", inputs.anchors.iter().all(|anchor| anchor.is_finite())),
+        ("forces", inputs.forces.iter().all(|(_, force)| force.is_finite())),
+    ];
+    match finite.into_iter().find(|(_, finite)| !finite) {
+        Some((what, _)) => Err(StepError::NotFinite { what }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,26 @@
+//! The methods of solution: one arm for each.
+
+use super::plan::Plan;
+use super::{explicit, xpbd};
+use crate::model::Model;
+use crate::scalar::Real;
+use crate::settings::{Method, SolverSettings};
+
+impl Plan {
+    /// The stages that the settings ask for.
+    pub fn new<S: Real>(model: &Model<S>, settings: &SolverSettings) -> Self {
+        match settings.method {
+            Method::Xpbd => xpbd::plan(model, settings),
+            Method::Explicit => explicit::plan(),
+        }
+    }
+
+    /// Iterations of the steps to come, where the method has iterations.
+    pub fn set_iterations(&mut self, settings: &SolverSettings) {
+        match settings.method {
+            Method::Xpbd => self.repeat = settings.iterations,
+            // Small steps are counted by the step.
+            Method::Explicit => {}
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! How a guarded step ended: a value that every backend fills.
+
+/// How a guarded step ended, for one connected part of the model or for all of them.
+///
+/// Of all parts together, potential, limit and noise are those of the part that ended highest above its limit,
+/// or least below it; so that [`StepReport::keeps_limit`] speaks for every part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepReport {
+    /// Incremental potential [J s^2] at the end of the step.
+    pub potential: f64,
+    /// The lowest incremental potential [J s^2] of the places the step could have started from.
+    pub limit: f64,
+    /// What round-off can pretend of `potential` [J s^2]; at most this much above `limit` passes.
+    pub noise: f64,
+    /// Whether the sweeps ended above the limit, so that the step was taken back: the part's, or any part's.
+    pub rejected: bool,
+    /// The share of its velocities that the energy limit left to the part, or to the part that it slowed
+    /// most; 1 where it did not act.
+    pub kept_speed: f64,
+}
+
+impl StepReport {
+    /// Whether the step holds what the guard promises: it ends no higher than its limit.
+    pub fn keeps_limit(&self) -> bool {
+        self.potential <= self.limit + self.noise
+    }
+
+    /// Of parts together; nothing of no part.
+    pub(crate) fn of_all(parts: &[StepReport]) -> Option<StepReport> {
+        let height = |report: &StepReport| {
+            let above = report.potential - (report.limit + report.noise);
+            // Infinite at an infinite limit is at the limit; what is no number stands above everything.
+            let unknown = if report.keeps_limit() { 0.0 } else { f64::INFINITY };
+            if above.is_nan() { unknown } else { above }
+        };
+        parts.iter().copied().reduce(|worst, next| {
+            let report = if height(&next) > height(&worst) { next } else { worst };
+            StepReport {
+                rejected: worst.rejected || next.rejected,
+                kept_speed: worst.kept_speed.min(next.kept_speed),
+                ..report
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is no number, or as infinite as its limit, is not hidden by other parts.
+    #[test]
+    fn the_worst_part_speaks_for_all() {
+        let of = |potential, limit| StepReport {
+            potential,
+            limit,
+            noise: 0.0,
+            rejected: false,
+            kept_speed: 1.0,
+        };
+        let (good, over) = (of(1.0, 2.0), of(3.0, 2.0));
+        let (infinite, unknown) = (of(f64::INFINITY, f64::INFINITY), of(f64::NAN, 1.0));
+        for (parts, keeps) in [
+            (&[good, infinite][..], true),
+            (&[infinite, over, good], false),
+            (&[good, unknown, over], false),
+            (&[over, unknown], false),
+            (&[unknown, good], false),
+        ] {
+            let all = StepReport::of_all(parts).expect("parts");
+            assert_eq!(all.keeps_limit(), keeps, "{parts:?}");
+        }
+        assert_eq!(StepReport::of_all(&[]), None);
+        let rejected = StepReport { rejected: true, kept_speed: 0.5, ..good };
+        let all = StepReport::of_all(&[rejected, over]).expect("parts");
+        assert_eq!(all, StepReport { rejected: true, kept_speed: 0.5, ..over });
+    }
+}

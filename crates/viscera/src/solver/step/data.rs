@@ -1,0 +1,173 @@
+//! The data of a step, vertices in the solver's numbering: what every stage may read, and what the stages of
+//! all methods change.
+#![allow(unsafe_code)]
+
+use super::tethers::Bundle;
+use crate::model::{Model, Part, TetSet};
+use crate::scalar::lanes::{Eight, LANES, Point};
+use crate::scalar::{Real, Vec3};
+use crate::settings::SolverSettings;
+use crate::solver::cpu::threads::{Shared, Workers};
+use crate::solver::inputs::Inputs;
+
+/// Vertices that a thread does at a time.
+const GRAIN: usize = 2048;
+
+/// What a stage may look at but not change.
+pub struct Step<'a, S> {
+    pub model: &'a Model<S>,
+    pub inputs: &'a Inputs<S>,
+    pub dt: f64,
+    pub settings: &'a SolverSettings,
+}
+
+/// Green strain at the start of the step of the blocks of viscous sets, `[green, neo]`.
+pub type StartStrain<S> = [Vec<[Eight<S>; 6]>; 2];
+
+/// What stays the same from the prediction to the end of a step, and the threads that work on it.
+#[derive(Clone, Debug)]
+pub struct StepConstants<S> {
+    pub workers: Workers,
+    /// Positions at the start of the step [m].
+    pub previous: Vec<Point<S>>,
+    /// Inertial prediction `xt` [m], of pinned vertices too.
+    pub predicted: Vec<Point<S>>,
+    /// External forces [N] without gravity.
+    pub external: Vec<Vec3<S>>,
+    /// Masses [kg].
+    pub masses: Vec<S>,
+    /// Soft position constraints, one for a vertex that has any.
+    pub tethers: Vec<Bundle<S>>,
+    /// `m'`: masses, and what tethers make of them [kg]; see [`super::tethers`].
+    pub inertias: Vec<S>,
+    /// `1/m'`, zero where pinned [1/kg].
+    pub inverse_masses: Vec<S>,
+    /// See [`StartStrain`].
+    pub start_strain: StartStrain<S>,
+}
+
+/// What the stages of every method work on.
+#[derive(Clone, Debug)]
+pub struct StepData<S> {
+    pub constants: StepConstants<S>,
+    /// Positions [m]; with each travels the inverse mass of its copies during a sweep [1/kg].
+    pub points: Vec<Point<S>>,
+    /// Velocities [m/s].
+    pub velocities: Vec<Vec3<S>>,
+    /// What elements put on each copy: impulse [N s^2] and bound [kg]; empty where no stage needs it.
+    pub loads: Vec<Point<S>>,
+}
+
+impl<S: Real> StepData<S> {
+    /// Memory for the steps of a model, with room for loads where stages of the method need it.
+    pub fn new(model: &Model<S>, settings: &SolverSettings, needs_loads: bool) -> Self {
+        let vertices = model.vertex_count();
+        let points = || vec![Point::default(); vertices];
+        let strains = |set: &TetSet<S>| {
+            vec![[[S::ZERO; LANES]; 6]; if set.viscous { set.block_count() } else { 0 }]
+        };
+        Self {
+            constants: StepConstants {
+                workers: Workers::new(settings.threads, model.tet_count()),
+                previous: points(),
+                predicted: points(),
+                external: vec![Vec3::ZERO; vertices],
+                masses: model.numbering.order.iter().map(|&v| model.masses[v as usize]).collect(),
+                tethers: Vec::new(),
+                inertias: vec![S::ZERO; vertices],
+                inverse_masses: vec![S::ZERO; vertices],
+                start_strain: model.tet_sets().map(strains),
+            },
+            points: points(),
+            velocities: vec![Vec3::ZERO; vertices],
+            loads: vec![Point::default(); if needs_loads { model.copy_count() } else { 0 }],
+        }
+    }
+
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> usize {
+        let StepConstants {
+            previous, predicted, external, masses, inertias, inverse_masses, ..
+        } = &self.constants;
+        let points = [&self.points, previous, predicted, &self.loads];
+        points.into_iter().map(|points| size_of_val(&points[..])).sum::<usize>()
+            + [external, &self.velocities].map(|v| size_of_val(&v[..])).iter().sum::<usize>()
+            + [masses, inertias, inverse_masses].map(|m| size_of_val(&m[..])).iter().sum::<usize>()
+            + self.constants.start_strain.iter().map(|s| size_of_val(&s[..])).sum::<usize>()
+    }
+
+    /// Positions of the state, in the solver's numbering.
+    pub fn read_positions(&mut self, model: &Model<S>, positions: &[Vec3<S>]) {
+        for (point, &user) in self.points.iter_mut().zip(&model.numbering.order) {
+            point.set_vec3(positions[user as usize]);
+        }
+    }
+}
+
+impl<S: Real> StepConstants<S> {
+    /// Whether a pin, an attachment or a tether holds a part.
+    pub fn holds(&self, part: &Part) -> bool {
+        let mut inverse_masses = self.inverse_masses[part.vertices.clone()].iter();
+        part.attachments().next().is_some()
+            || !self.tethers_of(part).is_empty()
+            || inverse_masses.any(|inverse| *inverse == S::ZERO)
+    }
+
+    /// The tethers of a part.
+    pub fn tethers_of(&self, part: &Part) -> &[Bundle<S>] {
+        let place = |v: usize| self.tethers.partition_point(|tether| tether.vertex < v);
+        &self.tethers[place(part.vertices.start)..place(part.vertices.end)]
+    }
+
+    /// `change` on the point of every vertex of a part.
+    pub fn each_vertex(
+        &self,
+        part: &Part,
+        points: &mut [Point<S>],
+        change: impl Fn(usize, &mut Point<S>) + Sync,
+    ) {
+        let (first, points) = (part.vertices.start, Shared::new(points));
+        self.workers.each(part.vertices.len(), GRAIN, |range| {
+            let range = first + range.start..first + range.end;
+            // SAFETY: every vertex is worked on once.
+            let piece = unsafe { points.range(range.clone()) };
+            for (v, point) in range.zip(piece) {
+                change(v, point);
+            }
+        });
+    }
+
+    /// As [`StepConstants::each_vertex`], with the vertex's velocity.
+    pub fn each_vertex_with(
+        &self,
+        part: &Part,
+        points: &mut [Point<S>],
+        velocities: &mut [Vec3<S>],
+        change: impl Fn(usize, &mut Point<S>, &mut Vec3<S>) + Sync,
+    ) {
+        let velocities = Shared::new(velocities);
+        self.each_vertex(part, points, |v, point| {
+            // SAFETY: every vertex is worked on once.
+            change(v, point, unsafe { velocities.at(v) });
+        });
+    }
+}
+
+/// The copies of one of the solver's vertices.
+pub fn copies_of<S: Real>(model: &Model<S>, v: usize) -> std::ops::Range<usize> {
+    model.copy_offsets[v] as usize..model.copy_offsets[v + 1] as usize
+}
+
+/// Sum of a vertex's loads, in the order of its copies.
+pub fn gather<S: Real>(model: &Model<S>, loads: &[Point<S>], v: usize) -> Point<S> {
+    let mut sum = Point::default();
+    for load in &loads[copies_of(model, v)] {
+        sum.add(*load);
+    }
+    sum
+}
+
+/// How many copies one of the solver's vertices has.
+pub fn copy_count<S: Real>(model: &Model<S>, v: usize) -> S {
+    S::from_f64(copies_of(model, v).len() as f64)
+}

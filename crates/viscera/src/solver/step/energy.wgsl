@@ -1,0 +1,106 @@
+// The energy limit (solver/step/energy.rs), part by part.
+//
+//   T_1 <= T_n + V(x_n with pins moved) - V(x_1) + sum_i (m_i g + f_i) . (x_1 - x_n)_i
+//   v *= sqrt(limit/T_1) where it is exceeded; without any hold relative to the center of mass
+
+fn vector_at(sum: u32) -> vec3f {
+    return vec3f(totals[sum], totals[sum + 1u], totals[sum + 2u]);
+}
+
+// The velocity [m/s] that is not scaled, and the share that what is beside it keeps.
+struct Limit {
+    drift: vec3f,
+    share: f32,
+}
+
+var<workgroup> limit: Limit;
+
+// v = (x - x_n)/dt, limited: one workgroup for each piece of vertices, each of which adds up what its part
+// has; the first reports how the step ended. `job.first`: the first of them.
+@compute @workgroup_size(256)
+fn limit_velocities(
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let place_of_piece = workgroup.x + workgroup.y * groups.x;
+    if place_of_piece >= job.count {
+        return;
+    }
+    let piece = job.first + place_of_piece;
+    let row = piece_row(piece);
+    let part = table[row + PIECE_PART];
+    let reports = piece == table[part_row(part) + PART_VERTEX_PIECES];
+    // Whatever is long is called at one place.
+    for (var is_limited = !reports; ; is_limited = true) {
+        var sums: Sums;
+        if is_limited {
+            add_motions(part, local, &sums);
+        } else {
+            add_pieces(part, local, &sums);
+        }
+        let maxima = select(1u << SUM_REACH, 0u, is_limited);
+        reduce(sums, select(1u, SUMS / 8u, is_limited), maxima, local);
+        if is_limited {
+            break;
+        }
+        if local == 0u {
+            let potential = potential_of_totals();
+            control.parts[part].potential = potential.value;
+            control.parts[part].noise = potential.noise;
+        }
+    }
+    if local == 0u {
+        limit = limit_of(part);
+        if reports {
+            control.parts[part].kept_speed = limit.share;
+        }
+    }
+    let now = workgroupUniformLoad(&limit);
+    for (var v = table[row + PIECE_FIRST] + local; v < table[row + PIECE_END]; v += THREADS) {
+        var velocity = end_velocity(v);
+        if now.share < 1.0 && ground_of(ACTING, v).w != 0.0 {
+            velocity = now.drift + (velocity - now.drift) * now.share;
+        }
+        ground[VELOCITIES * table[STRIDE_AT] + v] = vec4f(velocity, 0.0);
+    }
+}
+
+fn add_motions(part: u32, local: u32, into: ptr<function, Sums>) {
+    let row = part_row(part);
+    // Of elements what is stored, and whether something holds them.
+    let elements_end = table[row + PART_ELEMENT_PIECES_END];
+    for (var piece = table[row + PART_ELEMENT_PIECES] + local; piece < elements_end; piece += THREADS) {
+        for (var k = SUM_TESTED; k <= SUM_HELD; k++) {
+            (*into)[k] += partial_sums[SUMS * piece + k];
+        }
+    }
+    let vertices_end = table[row + PART_VERTEX_PIECES_END];
+    for (var piece = table[row + PART_VERTEX_PIECES] + local; piece < vertices_end; piece += THREADS) {
+        for (var k = SUM_HELD; k < SUMS; k++) {
+            (*into)[k] += partial_sums[SUMS * piece + k];
+        }
+    }
+}
+
+fn limit_of(part: u32) -> Limit {
+    var kinetic = totals[SUM_KINETIC];
+    var given = totals[SUM_KINETIC_START] - totals[SUM_TESTED] + totals[SUM_WORK];
+    var drift = vec3f();
+    if totals[SUM_HELD] == 0.0 && totals[SUM_MASS] > 0.0 {
+        let inverse = 1.0 / totals[SUM_MASS];
+        let before = vector_at(SUM_MOMENTUM_START);
+        let after = vector_at(SUM_MOMENTUM);
+        drift = end_velocity(first_vertex_of(part)) + after * inverse;
+        kinetic = totals[SUM_RELATIVE] - 0.5 * inverse * dot(after, after);
+        given = totals[SUM_RELATIVE_START] - 0.5 * inverse * dot(before, before);
+        given += totals[SUM_RELATIVE_WORK] - frame.dt * inverse * dot(vector_at(SUM_LOAD), after);
+        given -= totals[SUM_TESTED];
+    }
+    var share = 1.0;
+    let is_known = is_finite(given) && totals[SUM_REFERENCE] == 0.0;
+    if is_known && kinetic > given {
+        share = sqrt(max(given, 0.0) / kinetic);
+    }
+    return Limit(drift, share);
+}

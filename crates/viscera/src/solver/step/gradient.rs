@@ -1,0 +1,102 @@
+//! The gradient of the incremental potential without inertia, and the bound of its curvature.
+#![allow(unsafe_code)]
+
+use super::data::{Step, StepConstants};
+use super::law::{OfLaw, respond, with_law};
+use crate::elements::{CornerLoad, attachment, internal_forces, shape_gradients, spring};
+use crate::material::MaterialModel;
+use crate::model::Part;
+use crate::scalar::lanes::{Eight, Lanes, Point};
+use crate::scalar::{Real, Scalar};
+use crate::solver::cpu::tets::{Block, TetPass};
+use crate::solver::cpu::threads::Shared;
+
+/// Per copy of a part `dt^2` times the force of its elements, and the bound of their curvature: the gradient of
+/// `Phi` without inertia, in the places that the rebase uses as well. Without `BOUND` the bounds are
+/// zero.
+pub fn load_forces<S: Real, const BOUND: bool>(
+    constants: &StepConstants<S>,
+    step: &Step<'_, S>,
+    part: &Part,
+    x: &[Point<S>],
+    loads: &mut [Point<S>],
+) {
+    let model = step.model;
+    loads[part.copies.clone()].fill(Point::default());
+    for color in &part.colors {
+        let shared = Shared::new(loads);
+        for (kind, set) in model.tet_sets().into_iter().enumerate() {
+            let blocks = color.blocks[kind].start as usize..color.blocks[kind].end as usize;
+            let start_strain = &constants.start_strain[kind];
+            let forces = Forces::<_, BOUND> { x, start_strain, dt: step.dt, loads: &shared };
+            with_law!(set, NEO, VISCOUS => {
+                let pass = OfLaw::<_, NEO, VISCOUS>(&forces);
+                constants.workers.pass(model, set, blocks, &pass);
+            });
+        }
+    }
+    let squared = S::from_f64(step.dt * step.dt);
+    let springs = &model.springs;
+    for i in part.springs() {
+        let ends = springs.vertices[i].map(|v| x[model.numbering.of(v)].vec3());
+        let forces = spring::forces(&ends, springs.rest_length[i], springs.stiffness[i]);
+        let mass_bound = squared * springs.stiffness[i];
+        for (copy, force) in springs.copies[i].into_iter().zip(forces) {
+            add_load(loads, copy, &CornerLoad { impulse: force * squared, mass_bound });
+        }
+    }
+    let attachments = &model.attachments;
+    let anchors = step.inputs.anchors_of(model);
+    for i in part.attachments() {
+        let stiffness = attachments.stiffness[i];
+        let anchor = anchors[attachments.order[i] as usize];
+        let place = x[model.numbering.of(attachments.vertices[i])].vec3();
+        let force = attachment::force(place, anchor, stiffness);
+        let load = CornerLoad { impulse: force * squared, mass_bound: squared * stiffness };
+        add_load(loads, attachments.copies[i], &load);
+    }
+}
+
+struct Forces<'a, S, const BOUND: bool> {
+    x: &'a [Point<S>],
+    start_strain: &'a [[Eight<S>; 6]],
+    dt: f64,
+    loads: &'a Shared<'a, Point<S>>,
+}
+
+impl<S: Real, const BOUND: bool, const NEO: bool, const VISCOUS: bool> TetPass<S>
+    for OfLaw<'_, Forces<'_, S, BOUND>, NEO, VISCOUS>
+{
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let Forces { x, start_strain, dt, loads: into } = *self.0;
+        let (f, tissue, response) = respond::<S, L, NEO, VISCOUS>(tets, x, start_strain, dt);
+        let shape = tets.shape::<L>();
+        let volume = tets.volume::<L>() * L::from_f64(dt * dt);
+        let forces = internal_forces(&response.piola, &shape, volume);
+        let g = shape_gradients(&shape);
+        let mut loads = [CornerLoad::default(); 4];
+        for corner in 0..4 {
+            let mass_bound = if BOUND { volume * tissue.curvature(&f, g[corner]) } else { L::ZERO };
+            loads[corner] = CornerLoad { impulse: forces[corner], mass_bound };
+        }
+        // SAFETY: constraints of one colour share no copy, and every block is worked on once.
+        unsafe { tets.add(into, &points(&loads)) };
+    }
+}
+
+/// A load as a point: impulse [N s^2] and bound [kg].
+#[inline(always)]
+pub fn as_point<L: Scalar>(load: &CornerLoad<L>) -> Point<L> {
+    Point::new(load.impulse, load.mass_bound)
+}
+
+/// Adds to a copy what acts on it.
+pub fn add_load<S: Real>(loads: &mut [Point<S>], copy: u32, load: &CornerLoad<S>) {
+    loads[copy as usize].add(as_point(load));
+}
+
+#[inline(always)]
+pub fn points<L: Scalar>(loads: &[CornerLoad<L>; 4]) -> [Point<L>; 4] {
+    [as_point(&loads[0]), as_point(&loads[1]), as_point(&loads[2]), as_point(&loads[3])]
+}

@@ -1,0 +1,82 @@
+//! A step: its data, and the stages that all methods share.
+
+pub mod balance;
+pub mod data;
+mod energy;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+pub mod gradient;
+pub mod guard;
+mod law;
+#[cfg(feature = "gpu")]
+pub mod modes;
+mod potential;
+pub mod predict;
+pub mod stage;
+pub mod strain;
+pub mod tethers;
+pub mod tissue;
+
+use crate::model::Model;
+use crate::scalar::Real;
+use crate::state::State;
+use data::{Step, StepData};
+use guard::Guard;
+use stage::StepStage;
+use strain::measure_strain;
+
+/// Carries a stage out. Stages of the guard do nothing where there is none.
+pub fn run<S: Real>(
+    stage: StepStage,
+    step: &Step<'_, S>,
+    data: &mut StepData<S>,
+    guard: Option<&mut Guard<S>>,
+    state: &mut State<S>,
+) {
+    match stage {
+        StepStage::ReadState => read_state(step.model, data, state),
+        StepStage::MeasureStrain => {
+            let constants = &mut data.constants;
+            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
+            measure_strain(workers, step.model, None, &data.points, strains);
+        }
+        StepStage::Predict(start) => data.predict(step, start),
+        StepStage::ChooseStart => {
+            if let Some(guard) = guard {
+                guard.choose_start(step, data);
+            }
+        }
+        StepStage::GuardStep => {
+            if let Some(guard) = guard {
+                guard.guard_step(step, data);
+            }
+        }
+        StepStage::UpdateVelocities => update_velocities(step, data),
+        StepStage::LimitEnergy => {
+            update_velocities(step, data);
+            if let Some(guard) = guard {
+                guard.limit_energy(step, data);
+            }
+        }
+        StepStage::WriteState => {
+            for (v, &user) in step.model.numbering.order.iter().enumerate() {
+                state.positions[user as usize] = data.points[v].vec3();
+                state.velocities[user as usize] = data.velocities[v];
+            }
+        }
+    }
+}
+
+fn update_velocities<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>) {
+    let rate = S::from_f64(1.0 / step.dt);
+    for (v, velocity) in data.velocities.iter_mut().enumerate() {
+        *velocity = (data.points[v].vec3() - data.constants.previous[v].vec3()) * rate;
+    }
+}
+
+fn read_state<S: Real>(model: &Model<S>, data: &mut StepData<S>, state: &State<S>) {
+    data.read_positions(model, &state.positions);
+    for (velocity, &user) in data.velocities.iter_mut().zip(&model.numbering.order) {
+        *velocity = state.velocities[user as usize];
+    }
+}

@@ -1,0 +1,295 @@
+//! The incremental potential, which a step of implicit Euler minimises, and its gradient.
+//!
+//! ```text
+//! Phi(x) = 1/2 sum_i m_i |x_i - xt_i|^2 + dt^2 (sum_t V_t W(F_t) + springs + attachments)
+//! viscosity: W += eta/(2 dt) |C - C_n|_D^2
+//! ```
+
+#![allow(unsafe_code)]
+
+use std::cell::Cell;
+use std::ops::Range;
+
+use super::data::{Step, StepConstants};
+use super::law::{OfLaw, respond, with_law};
+use crate::elements::{attachment, spring};
+use crate::material::MaterialModel;
+use crate::model::{Model, Part};
+use crate::scalar::Real;
+use crate::scalar::lanes::{Eight, LANES, Lanes, Point};
+use crate::solver::cpu::tets::{Block, TetPass};
+use crate::solver::cpu::threads::Shared;
+
+/// The potential and what of it round-off can pretend.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Potential {
+    /// `Phi` [J s^2].
+    pub value: f64,
+    /// Positions are stored to `eps |x|`; through the stresses that makes this much of `Phi`.
+    pub noise: f64,
+}
+
+/// Blocks, and vertices, of a part whose sum is taken first. Part of the result's bits.
+const PIECE: usize = 64;
+const VERTEX_PIECE: usize = 1024;
+
+/// Evaluates `Phi` part by part: adds up in double precision, in an order that other parts do not change.
+#[derive(Clone, Debug)]
+pub struct Evaluator {
+    /// Of each part of the model, as of its last evaluation.
+    pub potentials: Vec<Potential>,
+    /// Potential [J] of tissue, springs and attachments of each part, as of its last evaluation.
+    pub stored: Vec<f64>,
+    /// What is summed first, part by part.
+    pieces: Vec<Piece>,
+    /// The first piece of each part, and the end of the last one's.
+    first: Vec<usize>,
+    /// What the pieces sum up to.
+    partial: Vec<[f64; 2]>,
+}
+
+/// Vertices or blocks of a part whose sum is taken first.
+#[derive(Clone, Debug)]
+struct Piece {
+    part: usize,
+    of: PieceOf,
+    /// Among those of the part.
+    range: Range<usize>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum PieceOf {
+    Vertices,
+    /// Of one of the two sets.
+    Blocks(usize),
+}
+
+impl Evaluator {
+    /// For a model.
+    pub fn new<S: Real>(model: &Model<S>) -> Self {
+        let parts = &model.parts;
+        let (mut pieces, mut first) = (Vec::new(), vec![0]);
+        for (number, part) in parts.iter().enumerate() {
+            let mut cut = |of, count: usize, size: usize| {
+                let starts = (0..count).step_by(size);
+                let ranges = starts.map(|start| start..(start + size).min(count));
+                pieces.extend(ranges.map(|range| Piece { part: number, of, range }));
+            };
+            cut(PieceOf::Vertices, part.vertices.len(), VERTEX_PIECE);
+            for kind in 0..2 {
+                cut(PieceOf::Blocks(kind), part.block_count(kind), PIECE);
+            }
+            first.push(pieces.len());
+        }
+        pieces.shrink_to_fit();
+        first.shrink_to_fit();
+        Self {
+            potentials: vec![Potential::default(); parts.len()],
+            stored: vec![0.0; parts.len()],
+            partial: vec![[0.0; 2]; pieces.len()],
+            pieces,
+            first,
+        }
+    }
+
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.potentials[..])
+            + size_of_val(&self.stored[..])
+            + size_of_val(&self.pieces[..])
+            + size_of_val(&self.first[..])
+            + size_of_val(&self.partial[..])
+    }
+
+    /// `Phi` of every part at `x`, into `potentials`.
+    pub fn evaluate_all<S: Real>(
+        &mut self,
+        constants: &StepConstants<S>,
+        step: &Step<'_, S>,
+        x: &[Point<S>],
+    ) {
+        let parts = 0..step.model.parts.len();
+        self.sum_pieces(constants, step, x, parts.clone());
+        for part in parts {
+            self.combine(step, x, part);
+        }
+    }
+
+    /// `Phi` of one part at `x`, of which only its vertices count.
+    pub fn evaluate<S: Real>(
+        &mut self,
+        constants: &StepConstants<S>,
+        step: &Step<'_, S>,
+        x: &[Point<S>],
+        part: usize,
+    ) -> Potential {
+        self.sum_pieces(constants, step, x, part..part + 1);
+        self.combine(step, x, part);
+        self.potentials[part]
+    }
+
+    /// Pieces of parts in a row.
+    fn sum_pieces<S: Real>(
+        &mut self,
+        constants: &StepConstants<S>,
+        step: &Step<'_, S>,
+        x: &[Point<S>],
+        parts: Range<usize>,
+    ) {
+        let range = self.first[parts.start]..self.first[parts.end];
+        let pieces = &self.pieces[range.clone()];
+        let partial = Shared::new(&mut self.partial[range]);
+        constants.workers.each(pieces.len(), 1, |range| {
+            for i in range {
+                let sum = pieces[i].sum(constants, step, x);
+                // SAFETY: every piece is worked on once.
+                unsafe { *partial.at(i) = sum };
+            }
+        });
+    }
+
+    /// Adds up the pieces of a part, in order.
+    fn combine<S: Real>(&mut self, step: &Step<'_, S>, x: &[Point<S>], part: usize) {
+        let range = self.first[part]..self.first[part + 1];
+        let of = |of: PieceOf| {
+            let all = self.pieces[range.clone()].iter().zip(&self.partial[range.clone()]);
+            all.filter(move |(piece, _)| piece.of == of).map(|(_, &sum)| sum)
+        };
+        let inertia = of(PieceOf::Vertices).reduce(|a, b| [a[0] + b[0], a[1].max(b[1])]);
+        let [inertia, reach] = inertia.unwrap_or_default();
+        let (mut stored, mut squared_noise) = (0.0, 0.0);
+        for kind in 0..2 {
+            let sums = of(PieceOf::Blocks(kind)).reduce(|a, b| [a[0] + b[0], a[1] + b[1]]);
+            let [energy, squared_force] = sums.unwrap_or_default();
+            stored += energy;
+            squared_noise += squared_force;
+        }
+        add_single_energies(&mut stored, step, x, &step.model.parts[part]);
+        let squared = step.dt * step.dt;
+        let value = 0.5 * inertia + squared * stored;
+        let noise = squared * S::EPSILON * (reach * squared_noise).sqrt();
+        self.stored[part] = stored;
+        // Rounding has no direction: squares add up. Two evaluations are compared, each of which has
+        // also its own arithmetic's round-off, of the same size.
+        let noise = 4.0 * noise + 8.0 * f64::EPSILON * value.abs();
+        self.potentials[part] = Potential { value, noise };
+    }
+}
+
+impl Piece {
+    /// Twice the inertia's part of `Phi` and the largest squared distance from the origin, or energies [J] and
+    /// squared forces [N^2].
+    fn sum<S: Real>(
+        &self,
+        constants: &StepConstants<S>,
+        step: &Step<'_, S>,
+        x: &[Point<S>],
+    ) -> [f64; 2] {
+        let part = &step.model.parts[self.part];
+        let Range { start, end } = self.range;
+        match self.of {
+            PieceOf::Vertices => {
+                let first = part.vertices.start;
+                inertia(constants, x, first + start..first + end)
+            }
+            PieceOf::Blocks(kind) => {
+                let set = step.model.tet_sets()[kind];
+                let sums = Sums {
+                    x,
+                    start_strain: &constants.start_strain[kind],
+                    dt: step.dt,
+                    energy: Cell::default(),
+                    squared_force: Cell::default(),
+                };
+                let mut before = 0;
+                for blocks in part.blocks(kind) {
+                    let chosen = start.max(before)..end.min(before + blocks.len());
+                    if !chosen.is_empty() {
+                        let first = blocks.start - before;
+                        let blocks = first + chosen.start..first + chosen.end;
+                        with_law!(set, NEO, VISCOUS => {
+                            let pass = OfLaw::<_, NEO, VISCOUS>(&sums);
+                            constants.workers.piece(step.model, set, blocks, &pass);
+                        });
+                    }
+                    before += blocks.len();
+                }
+                [sums.energy, sums.squared_force].map(|lanes| lanes.get().iter().sum())
+            }
+        }
+    }
+}
+
+fn inertia<S: Real>(
+    constants: &StepConstants<S>,
+    x: &[Point<S>],
+    vertices: Range<usize>,
+) -> [f64; 2] {
+    let (mut sum, mut reach) = (0.0, 0.0f64);
+    for v in vertices {
+        let place = x[v].vec3();
+        reach = reach.max(place.length_squared().to_f64());
+        if constants.inverse_masses[v] != S::ZERO {
+            let away = (place - constants.predicted[v].vec3()).length_squared();
+            sum += (constants.inertias[v] * away).to_f64();
+        }
+    }
+    [sum, reach]
+}
+
+/// Adds the energies [J] of a part's springs and attachments.
+fn add_single_energies<S: Real>(sum: &mut f64, step: &Step<'_, S>, x: &[Point<S>], part: &Part) {
+    let model = step.model;
+    let springs = &model.springs;
+    for i in part.springs() {
+        let places = springs.vertices[i].map(|v| x[model.numbering.of(v)].vec3());
+        *sum += spring::energy(&places, springs.rest_length[i], springs.stiffness[i]).to_f64();
+    }
+    let attachments = &model.attachments;
+    let anchors = step.inputs.anchors_of(model);
+    for i in part.attachments() {
+        let place = x[model.numbering.of(attachments.vertices[i])].vec3();
+        let anchor = anchors[attachments.order[i] as usize];
+        *sum += attachment::energy(place, anchor, attachments.stiffness[i]).to_f64();
+    }
+}
+
+/// Energies [J] and squared forces [N^2] of a piece, lane by lane.
+struct Sums<'a, S> {
+    x: &'a [Point<S>],
+    start_strain: &'a [[Eight<S>; 6]],
+    dt: f64,
+    energy: Cell<Eight<f64>>,
+    squared_force: Cell<Eight<f64>>,
+}
+
+impl<S: Real, const NEO: bool, const VISCOUS: bool> TetPass<S>
+    for OfLaw<'_, Sums<'_, S>, NEO, VISCOUS>
+{
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let sums = self.0;
+        let shape = tets.shape::<L>();
+        let (_, _, response) =
+            respond::<S, L, NEO, VISCOUS>(tets, sums.x, sums.start_strain, sums.dt);
+        let volume = tets.volume::<L>();
+        let density = response.elastic_energy + response.viscous_energy;
+        let [mut energy, mut stress, mut volumes] = [[S::ZERO; LANES]; 3];
+        (volume * density).store(&mut energy, tets.lane);
+        let squared = response.piola.norm_squared() * shape.norm_squared();
+        squared.store(&mut stress, tets.lane);
+        volume.store(&mut volumes, tets.lane);
+        let (mut energies, mut forces) = (sums.energy.get(), sums.squared_force.get());
+        let lanes = tets.lane..tets.lane + L::WIDTH;
+        for lane in lanes {
+            // Selected, not multiplied by zero: energies may be infinite.
+            let counts = lane < tets.filled();
+            let volume = volumes[lane].to_f64();
+            let force = volume * volume * stress[lane].to_f64();
+            energies[lane] += if counts { energy[lane].to_f64() } else { 0.0 };
+            forces[lane] += if counts { force } else { 0.0 };
+        }
+        sums.energy.set(energies);
+        sums.squared_force.set(forces);
+    }
+}

@@ -1,0 +1,47 @@
+//! Green strain of viscous tetrahedra, against which viscosity acts.
+#![allow(unsafe_code)]
+
+use super::data::StartStrain;
+use crate::elements::{deformation_gradient, green_strain};
+use crate::model::{Model, Part};
+use crate::scalar::Real;
+use crate::scalar::lanes::{Eight, Lanes, Point};
+use crate::solver::cpu::tets::{Block, TetPass};
+use crate::solver::cpu::threads::{Shared, Workers};
+
+/// Green strain at `x` of the tetrahedra of viscous sets, of all or of one part.
+pub fn measure_strain<S: Real>(
+    workers: &Workers,
+    model: &Model<S>,
+    part: Option<&Part>,
+    x: &[Point<S>],
+    start_strain: &mut StartStrain<S>,
+) {
+    for (kind, (set, strains)) in model.tet_sets().into_iter().zip(start_strain).enumerate() {
+        let pass = Strain { x, strains: Shared::new(strains) };
+        match part {
+            _ if !set.viscous => {}
+            None => workers.pass(model, set, 0..set.block_count(), &pass),
+            Some(part) => {
+                part.blocks(kind).for_each(|blocks| workers.pass(model, set, blocks, &pass));
+            }
+        }
+    }
+}
+
+struct Strain<'a, S> {
+    x: &'a [Point<S>],
+    strains: Shared<'a, [Eight<S>; 6]>,
+}
+
+impl<S: Real> TetPass<S> for Strain<'_, S> {
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let f = deformation_gradient(&tets.corners::<L>(self.x).x, &tets.shape());
+        // SAFETY: every block has a place of its own and is worked on once.
+        let place = unsafe { self.strains.at(tets.index) };
+        for (p, component) in green_strain::strain(&f).into_iter().enumerate() {
+            component.store(&mut place[p], tets.lane);
+        }
+    }
+}

@@ -1,0 +1,273 @@
+// Chebyshev and Anderson on q = (x, l) (solver/xpbd/acceleration.rs), with Anderson's least-squares problem in
+// successive differences,
+//
+//   g = argmin |R_k - sum_j g_j dR_j|,   q_(k+1) = G_k - sum_j g_j dG_j,   dR_j = R_(j+1) - R_j
+//
+// which spans the same space as differences to the newest: then the products of old differences with
+// each other need not be summed again, and their small values do not suffer from single precision.
+
+// In single precision the residuals themselves carry round-off of that size.
+const REGULARISATION: f32 = 1e-6;
+
+@compute @workgroup_size(256)
+fn remember_iterate(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let i = thread_of(id, groups, 256u);
+    if i < job.count {
+        iterate[i] = unknowns[i];
+    }
+}
+
+// The small least-squares problem, a workgroup for each of `job.count` parts. `job.mode`: whether a residual
+// that has grown starts a new history.
+@compute @workgroup_size(128)
+fn anderson_weights(
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let part = workgroup.x + workgroup.y * groups.x;
+    if part >= job.count {
+        return;
+    }
+    let first = first_group(part);
+    let end = table[part_row(part) + PART_GROUPS_END];
+    // Six threads for each sum.
+    let product = local / 6u;
+    var sum = 0.0;
+    if product < PRODUCTS {
+        for (var piece = first + local % 6u; piece < end; piece += 6u) {
+            sum += partial_sums[PRODUCTS * piece + product];
+        }
+    }
+    shared_sums[local] = sum;
+    workgroupBarrier();
+    if local != 0u {
+        return;
+    }
+    var products: array<f32, 21>;
+    for (var k = 0u; k < PRODUCTS; k++) {
+        var total = 0.0;
+        for (var t = 0u; t < 6u; t++) {
+            total += shared_sums[6u * k + t];
+        }
+        products[k] = total;
+    }
+    let window = job.set_first;
+    let has_difference = control.parts[part].sweeps > 0u;
+    let newest = control.parts[part].next;
+    var n = select(0u, min(control.parts[part].differences + 1u, window), has_difference);
+    for (var j = 0u; j < n; j++) {
+        control.parts[part].gram[LARGEST_WINDOW * newest + j] = products[11u + j];
+        control.parts[part].gram[LARGEST_WINDOW * j + newest] = products[11u + j];
+    }
+    control.parts[part].sweeps += 1u;
+    control.parts[part].differences = n;
+    if has_difference {
+        control.parts[part].next = (newest + 1u) % window;
+    }
+    if job.mode != 0u && products[0] > control.parts[part].last_norm {
+        control.parts[part].differences = 0u;
+        control.parts[part].next = 0u;
+        control.parts[part].sweeps = 1u;
+        n = 0u;
+    }
+    control.parts[part].last_norm = products[0];
+    least_squares(part, products, n);
+}
+
+// Solves gram g = right with columns scaled to unit length and a small multiple of the identity added, by
+// Cholesky. Columns without length get no share.
+fn least_squares(part: u32, products: array<f32, 21>, n: u32) {
+    var all = products;
+    var scale: array<f32, 10>;
+    var a: array<f32, 100>;
+    var b: array<f32, 10>;
+    for (var j = 0u; j < n; j++) {
+        let length = control.parts[part].gram[11u * j];
+        scale[j] = select(0.0, inverseSqrt(length), length > 0.0);
+        b[j] = all[1u + j] * scale[j];
+    }
+    for (var j = 0u; j < n; j++) {
+        for (var k = 0u; k <= j; k++) {
+            a[10u * j + k] = control.parts[part].gram[10u * j + k] * (scale[j] * scale[k]);
+        }
+        a[11u * j] += select(1.0, REGULARISATION, scale[j] > 0.0);
+    }
+    for (var j = 0u; j < n; j++) {
+        for (var k = 0u; k <= j; k++) {
+            var value = a[10u * j + k];
+            for (var i = 0u; i < k; i++) {
+                value -= a[10u * j + i] * a[10u * k + i];
+            }
+            if k < j {
+                a[10u * j + k] = value / a[11u * k];
+            } else {
+                a[11u * j] = sqrt(max(value, REGULARISATION));
+            }
+        }
+    }
+    for (var j = 0u; j < n; j++) {
+        for (var k = 0u; k < j; k++) {
+            b[j] -= a[10u * j + k] * b[k];
+        }
+        b[j] /= a[11u * j];
+    }
+    for (var step = 0u; step < n; step++) {
+        let j = n - 1u - step;
+        for (var k = j + 1u; k < n; k++) {
+            b[j] -= a[10u * k + j] * b[k];
+        }
+        b[j] /= a[11u * j];
+    }
+    for (var j = 0u; j < LARGEST_WINDOW; j++) {
+        control.parts[part].shares[j] = select(0.0, b[j] * scale[j], j < n);
+    }
+}
+
+// q = G_k - sum_j g_j dG_j, of positions (mode bit 0) and multipliers (mode bit 1); with mode bit 2 the
+// result is remembered as the next iterate.
+@compute @workgroup_size(256)
+fn anderson_mix(
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let span = span_of(workgroup, groups);
+    if span.groups == 0u {
+        return;
+    }
+    for (var j = span.group * 256u + local; j < span.length; j += span.groups * 256u) {
+        let i = number_at(span.part, j);
+        if counts(i) {
+            mix_number(span.part, i);
+        }
+    }
+}
+
+fn mix_number(part: u32, i: u32) {
+    var q = mapped[job.set_first * job.count + i];
+    let bit = select(1u, 2u, i >= job.first);
+    if (job.mode & bit) != 0u {
+        for (var j = 0u; j < control.parts[part].differences; j++) {
+            q -= control.parts[part].shares[j] * mapped[j * job.count + i];
+        }
+        unknowns[i] = q;
+    }
+    if (job.mode & 4u) != 0u {
+        iterate[i] = q;
+    }
+}
+
+// Squared norm of what the sweep changed, in pieces.
+@compute @workgroup_size(128)
+fn chebyshev_change(
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let span = span_of(workgroup, groups);
+    if span.groups == 0u {
+        return;
+    }
+    var sum = 0.0;
+    for (var j = span.group * THREADS + local; j < span.length; j += span.groups * THREADS) {
+        let i = number_at(span.part, j);
+        if counts(i) {
+            let change = unknowns[i] - iterate[i];
+            sum += weight_of(i) * change * change;
+        }
+    }
+    shared_sums[local] = sum;
+    workgroupBarrier();
+    if local == 0u {
+        var total = 0.0;
+        for (var t = 0u; t < THREADS; t++) {
+            total += shared_sums[t];
+        }
+        partial_sums[first_group(span.part) + span.group] = total;
+    }
+}
+
+// Measured radii are kept below this: at 1 the weights no longer contract.
+const LARGEST_RADIUS: f32 = 0.9999;
+
+// omega = 1 for k < S, then 2/(2 - rho^2), then 4/(4 - rho^2 omega), a workgroup for each of `job.count`
+// parts. `job.first`: the delay S, `job.mode`: whether the radius is measured.
+@compute @workgroup_size(128)
+fn chebyshev_weight(
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let part = workgroup.x + workgroup.y * groups.x;
+    if part >= job.count {
+        return;
+    }
+    let end = table[part_row(part) + PART_GROUPS_END];
+    var sum = 0.0;
+    for (var piece = first_group(part) + local; piece < end; piece += THREADS) {
+        sum += partial_sums[piece];
+    }
+    shared_sums[local] = sum;
+    workgroupBarrier();
+    if local != 0u {
+        return;
+    }
+    var total = 0.0;
+    for (var t = 0u; t < THREADS; t++) {
+        total += shared_sums[t];
+    }
+    let change = sqrt(total);
+    let k = control.parts[part].iteration;
+    control.parts[part].iteration = k + 1u;
+    if k < job.first {
+        if job.mode != 0u && control.parts[part].last_change > 0.0 {
+            control.parts[part].radius = min(change / control.parts[part].last_change, LARGEST_RADIUS);
+        }
+        control.parts[part].last_change = change;
+        control.parts[part].omega = 1.0;
+    } else {
+        let squared = control.parts[part].radius * control.parts[part].radius;
+        let first = 2.0 / (2.0 - squared);
+        control.parts[part].omega = select(4.0 / (4.0 - squared * control.parts[part].omega), first, k == job.first);
+    }
+}
+
+// q_(k+1) = omega (gamma (g(q_k) - q_k) + q_k - q_(k-1)) + q_(k-1), remembered as the next iterate.
+@compute @workgroup_size(256)
+fn chebyshev_mix(
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let span = span_of(workgroup, groups);
+    if span.groups == 0u {
+        return;
+    }
+    let omega = control.parts[span.part].omega;
+    for (var j = span.group * 256u + local; j < span.length; j += span.groups * 256u) {
+        let i = number_at(span.part, j);
+        if counts(i) {
+            extrapolate_number(i, omega);
+        }
+    }
+}
+
+fn extrapolate_number(i: u32, omega: f32) {
+    let q = iterate[i];
+    let before = older[i];
+    let gamma = frame.chebyshev_damping;
+    var next = unknowns[i];
+    if omega != 1.0 {
+        next = omega * (gamma * (next - q) + q - before) + before;
+    } else if gamma != 1.0 {
+        // There need not be anything before the first iterate.
+        next = gamma * (next - q) + q;
+    }
+    unknowns[i] = next;
+    older[i] = q;
+    iterate[i] = next;
+}

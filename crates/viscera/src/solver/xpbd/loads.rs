@@ -1,0 +1,92 @@
+//! What constraints put on vertices: `J^T l` and the bound of its geometric stiffness, or the forces
+//! of the elements and the bound of their curvature.
+//!
+//! Every copy of a vertex gathers what its constraints put on it, colour by colour, so that no two
+//! threads meet and the order of the sum is always the same; the vertex is the sum of its copies.
+#![allow(unsafe_code)]
+
+use std::marker::PhantomData;
+
+use super::forms::{Form, pass_by_form, with_form};
+use super::sweep::read_vec3;
+use crate::elements::{CornerLoad, green_strain, spring};
+use crate::model::Model;
+use crate::scalar::Real;
+use crate::scalar::lanes::{Lanes, Point};
+use crate::solver::cpu::tets::{Block, TetPass};
+use crate::solver::cpu::threads::{Shared, Workers};
+use crate::solver::step::gradient::{add_load, points};
+
+/// `J^T l` at the vertices' positions `x`, into one place per copy.
+pub fn load_multipliers<S: Real>(
+    workers: &Workers,
+    model: &Model<S>,
+    x: &[Point<S>],
+    multipliers: &[S],
+    loads: &mut [Point<S>],
+) {
+    loads.fill(Point::default());
+    for color in 0..model.color_count {
+        let shared = Shared::new(loads);
+        for set in model.tet_sets() {
+            with_form!(set.form, F => {
+                let pass = Loads { x, multipliers, loads: &shared, form: PhantomData::<F> };
+                workers.pass(model, set, set.color(color), &pass);
+            });
+        }
+    }
+    add_single_loads(model, x, multipliers, loads);
+}
+
+fn add_single_loads<S: Real>(
+    model: &Model<S>,
+    x: &[Point<S>],
+    multipliers: &[S],
+    loads: &mut [Point<S>],
+) {
+    let springs = &model.springs;
+    for (i, ends) in springs.vertices.iter().enumerate() {
+        let ends = ends.map(|v| x[model.numbering.of(v)].vec3());
+        let pulls = spring::corner_loads(&ends, multipliers[springs.multiplier_offset + i]);
+        for (copy, pull) in springs.copies[i].into_iter().zip(&pulls) {
+            add_load(loads, copy, pull);
+        }
+    }
+    let attachments = &model.attachments;
+    for (i, &copy) in attachments.copies.iter().enumerate() {
+        let impulse = read_vec3(multipliers, attachments.multiplier_offset + 3 * i);
+        add_load(loads, copy, &CornerLoad { impulse, mass_bound: S::ZERO });
+    }
+}
+
+struct Loads<'a, S, F> {
+    x: &'a [Point<S>],
+    multipliers: &'a [S],
+    loads: &'a Shared<'a, Point<S>>,
+    form: PhantomData<F>,
+}
+
+impl<S: Real, F> Loads<'_, S, F> {
+    #[inline(always)]
+    fn load<L: Lanes<Real = S>, const N: usize>(&self, tets: &Block<'_, S>)
+    where
+        F: Form<N>,
+    {
+        let set = tets.set;
+        let (corners, shape) = (tets.corners::<L>(self.x), tets.shape());
+        let l = tets.multipliers::<L, N>(set.multiplier_offset, self.multipliers);
+        let mut loads = F::corner_loads(&corners.x, &shape, &l);
+        if tets.is_viscous() {
+            let l = tets.multipliers::<L, 6>(set.viscous_offset, self.multipliers);
+            let more = green_strain::corner_loads(&corners.x, &shape, &l);
+            for corner in 0..4 {
+                loads[corner].impulse += more[corner].impulse;
+                loads[corner].mass_bound += more[corner].mass_bound;
+            }
+        }
+        // SAFETY: constraints of one colour share no copy, and every block is worked on once.
+        unsafe { tets.add(self.loads, &points(&loads)) };
+    }
+}
+
+pass_by_form!(Loads load);

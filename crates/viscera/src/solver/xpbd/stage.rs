@@ -1,0 +1,49 @@
+//! The stages of XPBD: sweeps over constraints, and what accelerates them.
+
+use crate::settings::AndersonOn;
+
+/// A stage of XPBD. `x` are positions, `l` multipliers, `w` inverse masses of the sweep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum XpbdStage {
+    /// `l = 0`.
+    ResetMultipliers,
+    /// `l *= (dt/dt_last)^2`: multipliers are forces times the squared step.
+    RescaleMultipliers,
+    /// NaN multipliers reset the warm start: all of the part are taken from the positions.
+    RepairMultipliers,
+    /// Remembers `(x, l)` before the first sweep, or before each where no acceleration does so, for the
+    /// acceleration.
+    RememberIterate,
+    /// `J^T l` and the bound of its geometric stiffness, per corner.
+    LoadCorners,
+    /// `r = M (x - xt) - J^T l`, `mh = m + share of the bounds`, `x -= theta r/mh`, `w = 1/mh`.
+    Rebase,
+    /// `x = xt + M^-1 J^T l`.
+    RecomputePositions,
+    /// Gives every copy its vertex's position.
+    SplitCopies,
+    /// Solves all constraints of one colour; they share no copy.
+    SolveColor(u32),
+    /// `SplitCopies` and `SolveColor(0)` in one, where every copy has one constraint.
+    SplitAndSolve,
+    /// `x` becomes the mean of its copies.
+    JoinCopies,
+    /// Chebyshev semi-iterative step on `(x, l)`, which is remembered for the next sweep.
+    Chebyshev,
+    /// Anderson mixing.
+    Anderson(Mix),
+    /// Takes an accelerated iterate back that raises the incremental potential, in favour of the plain sweep;
+    /// where that fails twice in a row as well, goes on from a step of descent.
+    GuardIterate,
+}
+
+/// One mixing, with what is done in the same pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mix {
+    /// What is mixed.
+    pub on: AndersonOn,
+    /// Whether `x` first becomes the mean of its copies.
+    pub joins: bool,
+    /// Whether the mixture is remembered for the next sweep: not where another stage still changes it.
+    pub remembers: bool,
+}
