@@ -51,6 +51,13 @@ pub struct RunArguments {
     /// Memory that may be used [default: what is free]
     #[arg(long, value_name = "SIZE")]
     memory: Option<Memory>,
+    /// Save the simulation after its last frame, also where it is interrupted, to go on later with --resume
+    #[arg(long, value_name = "FILE")]
+    save: Option<PathBuf>,
+    /// Go on from a file that --save wrote, with the same scene and settings: to the bit as if it had never
+    /// stopped. Frames count from the scene's beginning, those of the results from where it goes on
+    #[arg(long, value_name = "FILE")]
+    resume: Option<PathBuf>,
 }
 
 /// Counts from one on. Read as signed numbers, so that the error for a negative one names the legal range.
@@ -83,6 +90,9 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     let stem = arguments.scene.file_stem().unwrap_or(arguments.scene.as_os_str());
     let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem));
     let frames = arguments.frames.unwrap_or_else(|| scene.frame_count());
+    if let Some(file) = &arguments.save {
+        viscera_report::prepare_file(file, "--save")?;
+    }
     let interrupted = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
         // The second one ends the program at once, as one would expect of the first elsewhere: what is
@@ -93,10 +103,12 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     }
     match scene.solver.precision {
         Precision::F32 => {
-            simulate::<f32>(scene, assembly, overrides, &folder, frames, &interrupted)
+            let simulation = build::<f32>(scene, assembly, arguments, frames)?;
+            simulate(simulation, overrides, &folder, frames, &interrupted, arguments)
         }
         Precision::F64 => {
-            simulate::<f64>(scene, assembly, overrides, &folder, frames, &interrupted)
+            let simulation = build::<f64>(scene, assembly, arguments, frames)?;
+            simulate(simulation, overrides, &folder, frames, &interrupted, arguments)
         }
     }
 }
@@ -130,42 +142,17 @@ fn read_scene(arguments: &RunArguments) -> Result<(Scene, Overrides)> {
 }
 
 fn simulate<S: Real>(
-    scene: Scene,
-    assembly: Assembly,
+    mut simulation: Simulation<S>,
     overrides: Overrides,
     folder: &Path,
     frames: u64,
     interrupted: &AtomicBool,
+    arguments: &RunArguments,
 ) -> Result<Outcome> {
-    for note in &assembly.notes {
-        eprintln!("note: {note}");
-    }
-    let mut simulation = build::<S>(scene, assembly)?;
     // Where the device is refused no folder stays behind.
     let out = &OutputFolder::create(folder)?;
     let summary = Summary::new(&simulation, overrides);
-    let model = &summary.model;
-    let solver = &simulation.scene().solver;
-    let work = match solver.method {
-        Method::Xpbd => format!(" x {} iterations", solver.iterations),
-        Method::Explicit => {
-            let small = format!("{:.2e} s", simulation.solver().stable_step());
-            format!(", divided into small steps of at most {small}")
-        }
-    };
-    files::print(&format!(
-        "{}: {} tetrahedra, {} vertices, {:.3} kg, colours: {}, frames: {} of {} substeps{}\n\
-         device: {}\n",
-        summary.title,
-        model.tets,
-        model.vertices,
-        model.mass,
-        model.colors,
-        frames,
-        simulation.scene().solver.substeps,
-        work,
-        summary.device,
-    ))?;
+    files::print(&heading(&simulation, &summary, frames))?;
     let draws = simulation.scene().output.picture;
     let mut recording = Recording {
         film: draws.then(|| Film::new(&simulation, frames)).transpose()?,
@@ -183,6 +170,9 @@ fn simulate<S: Real>(
     };
     // What failed has no state to judge.
     let rest = if ended.is_ok() { simulation.rest() } else { None };
+    if let Some(file) = arguments.save.as_ref().filter(|_| ended.is_ok()) {
+        files::write_whole(file, &simulation.save())?;
+    }
     summary.judge(simulation.scene(), rest);
     summary.device = simulation.device_choice().to_owned();
     summary.warnings.extend(simulation.device_warning().map(String::from));
@@ -218,8 +208,44 @@ fn simulate<S: Real>(
     Ok(Outcome::Interrupted)
 }
 
+/// What is computed, and by what.
+fn heading<S: Real>(simulation: &Simulation<S>, summary: &Summary, frames: u64) -> String {
+    let model = &summary.model;
+    let solver = &simulation.scene().solver;
+    let work = match solver.method {
+        Method::Xpbd => format!(" x {} iterations", solver.iterations),
+        Method::Explicit => {
+            let small = format!("{:.2e} s", simulation.solver().stable_step());
+            format!(", divided into small steps of at most {small}")
+        }
+    };
+    let from = match simulation.frame() {
+        0 => String::new(),
+        frame => format!(" from {} on", frame + 1),
+    };
+    format!(
+        "{}: {} tetrahedra, {} vertices, {:.3} kg, colours: {}, frames: {frames}{from} of {} substeps{work}\n\
+         device: {}\n",
+        summary.title,
+        model.tets,
+        model.vertices,
+        model.mass,
+        model.colors,
+        solver.substeps,
+        summary.device,
+    )
+}
+
 /// Some drivers compile kernels for seconds, here or with the first frame.
-fn build<S: Real>(scene: Scene, assembly: Assembly) -> Result<Simulation<S>> {
+fn build<S: Real>(
+    scene: Scene,
+    assembly: Assembly,
+    arguments: &RunArguments,
+    frames: u64,
+) -> Result<Simulation<S>> {
+    for note in &assembly.notes {
+        eprintln!("note: {note}");
+    }
     let device = &scene.solver.device;
     // What "auto" comes to is not known yet, and it is mostly the CPU.
     let waiting = (!matches!(device, DeviceRequest::Cpu | DeviceRequest::Auto))
@@ -228,7 +254,14 @@ fn build<S: Real>(scene: Scene, assembly: Assembly) -> Result<Simulation<S>> {
     if let Some(spinner) = waiting {
         spinner.finish_and_clear();
     }
-    Ok(simulation?)
+    let Some(file) = &arguments.resume else { return Ok(simulation?) };
+    let resumed = simulation?.resume(&files::read(file)?);
+    let resumed = resumed.with_context(|| file.display().to_string())?;
+    if resumed.frame() >= frames {
+        let there = resumed.frame();
+        bail!("{} is at frame {there}; compute more than that with --frames", file.display());
+    }
+    Ok(resumed)
 }
 
 /// What a run keeps of its frames.
@@ -251,7 +284,7 @@ impl Recording {
         self.series.push(out, simulation)?;
         let every = u64::from(simulation.scene().output.every);
         let bar = progress::bar(frames, "simulating", "{msg}");
-        let mut wall_total = 0.0;
+        let (mut wall_total, begin) = (0.0, simulation.time());
         let mut stop = interrupted.load(Ordering::Relaxed);
         if simulation.is_on_device() {
             bar.set_message("the driver may still be compiling kernels");
@@ -272,7 +305,7 @@ impl Recording {
                 film.push(simulation, &report, last);
             }
             self.summary.frames.push(FrameLine { report, wall_seconds });
-            let speed = simulation.time() / wall_total;
+            let speed = (simulation.time() - begin) / wall_total;
             bar.set_position(simulation.frame());
             bar.set_message(format!("t = {:.2} s, {speed:.2} x real time", simulation.time()));
         }

@@ -7,9 +7,11 @@
 //! von Mises = sqrt(3/2 dev(sigma) : dev(sigma))
 //! ```
 
+use crate::elements::kinds::Energy;
 use crate::elements::singular_values::signed_svd;
-use crate::elements::{attachment, deformation_gradient, green_strain, neo_hookean, spring};
+use crate::elements::{deformation_gradient, law};
 use crate::material::MaterialModel;
+use crate::model::single::{ElementSet, for_each_kind};
 use crate::model::{Model, Tet};
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::Inputs;
@@ -77,7 +79,7 @@ pub fn measure_tets<S: Real>(
 
 fn measure_tet<S: Real>(
     model: &Model<S>,
-    law: MaterialModel,
+    model_law: MaterialModel,
     positions: &[Vec3<S>],
     tet: &Tet<S>,
 ) -> TetMeasure {
@@ -85,16 +87,7 @@ fn measure_tet<S: Real>(
     let f = deformation_gradient(&x, &tet.inverse_rest_shape.cast());
     let material = &model.materials[tet.material];
     let (lambda, mu) = (material.lame_lambda.to_f64(), material.lame_mu.to_f64());
-    let (energy_density, piola) = match law {
-        MaterialModel::SaintVenantKirchhoff => {
-            let strain = green_strain::strain(&f);
-            let energy = green_strain::energy_density(&strain, lambda, mu);
-            (energy, green_strain::piola(&f, &strain, lambda, mu))
-        }
-        MaterialModel::StableNeoHookean => {
-            (neo_hookean::energy_density(&f, lambda, mu), neo_hookean::piola(&f, lambda, mu))
-        }
-    };
+    let (energy_density, piola) = law::respond(model_law, &f, lambda, mu);
     let volume_ratio = f.determinant();
     let divisor = volume_ratio.abs().max(SMALLEST_VOLUME_RATIO).copysign(volume_ratio);
     let cauchy = piola * f.transpose() * (1.0 / divisor);
@@ -124,19 +117,8 @@ pub fn measure_energies<S: Real>(
     for tet in tets {
         energies.elastic += tet.rest_volume * tet.energy_density;
     }
-    let springs = &model.springs;
-    for (i, ends) in springs.vertices.iter().enumerate() {
-        let x = ends.map(|v| state.positions[v as usize].cast::<f64>());
-        let (length, stiffness) = (springs.rest_length[i], springs.stiffness[i]);
-        energies.elastic += spring::energy(&x, length.to_f64(), stiffness.to_f64());
-    }
-    let attachments = &model.attachments;
-    let anchors = inputs.anchors_of(model);
-    for (i, &v) in attachments.vertices.iter().enumerate() {
-        let x = state.positions[v as usize].cast::<f64>();
-        let anchor = anchors[attachments.order[i] as usize].cast();
-        energies.elastic += attachment::energy(x, anchor, attachments.stiffness[i].to_f64());
-    }
+    let elastic = &mut energies.elastic;
+    for_each_kind!(model, set => add_energies(set, model, state, inputs, elastic));
     let gravity = inputs.gravity.cast::<f64>();
     for v in 0..model.vertex_count() {
         let mass = model.masses[v].to_f64();
@@ -146,6 +128,21 @@ pub fn measure_energies<S: Real>(
         energies.gravitational -= mass * gravity.dot(moved);
     }
     energies
+}
+
+/// Adds the energies [J] of the elements of one kind.
+fn add_energies<S: Real, const N: usize, const M: usize>(
+    set: &impl ElementSet<S, N, M>,
+    model: &Model<S>,
+    state: &State<S>,
+    inputs: &Inputs<S>,
+    sum: &mut f64,
+) {
+    let anchors = inputs.anchors_of(model);
+    for i in 0..set.count() {
+        let x = set.vertices(i).map(|v| state.positions[v as usize].cast::<f64>());
+        *sum += set.element::<f64>(i, anchors).energy(&x);
+    }
 }
 
 /// Extremes and sums over tetrahedra.

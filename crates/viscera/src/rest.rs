@@ -12,12 +12,10 @@
 //! Stiefel, 1952; the sum of `alpha r.z` over some iterations is what they add to `d.K d` and bounds what was
 //! missing before (Strakos and Tichy, "On error estimation in the conjugate gradient method", 2002, section 4).
 
-use crate::elements::{
-    attachment, deformation_gradient, green_strain, internal_forces, neo_hookean, shape_gradients,
-    spring,
-};
-use crate::material::MaterialModel;
+use crate::elements::kinds::Energy;
+use crate::elements::{attachment, deformation_gradient, internal_forces, law, shape_gradients};
 use crate::model::Model;
+use crate::model::single::{ElementSet, for_each_kind};
 use crate::scalar::{Real, Vec3};
 use crate::solver::Inputs;
 
@@ -145,23 +143,27 @@ impl<'a, S: Real> Statics<'a, S> {
             let (v, target) = (tether.vertex as usize, tether.target.cast::<f64>());
             gradient[v] -= attachment::force(x[v], target, tether.stiffness.to_f64());
         }
-        let anchors = inputs.anchors_of(model);
-        let attachments = &model.attachments;
-        for (i, &v) in attachments.vertices.iter().enumerate() {
-            let anchor = anchors[attachments.order[i] as usize].cast::<f64>();
-            let stiffness = attachments.stiffness[i].to_f64();
-            gradient[v as usize] -= attachment::force(x[v as usize], anchor, stiffness);
-        }
-        let springs = &model.springs;
-        for (i, ends) in springs.vertices.iter().enumerate() {
-            let [length, stiffness] = [springs.rest_length[i], springs.stiffness[i]];
-            let places = ends.map(|v| x[v as usize]);
-            let forces = spring::forces(&places, length.to_f64(), stiffness.to_f64());
-            for (&v, force) in ends.iter().zip(forces) {
+        for_each_kind!(model, set => self.add_elements(set, x, gradient));
+        self.add_tissue(x, gradient);
+    }
+
+    /// Of the elements of one kind.
+    fn add_elements<const N: usize, const M: usize>(
+        &self,
+        set: &impl ElementSet<S, N, M>,
+        x: &[Vec3<f64>],
+        gradient: &mut [Vec3<f64>],
+    ) {
+        let anchors = self.inputs.anchors_of(self.model);
+        for i in 0..set.count() {
+            let vertices = set.vertices(i);
+            let places = vertices.map(|v| x[v as usize]);
+            for (v, force) in
+                vertices.into_iter().zip(set.element::<f64>(i, anchors).forces(&places))
+            {
                 gradient[v as usize] -= force;
             }
         }
-        self.add_tissue(x, gradient);
     }
 
     /// Of the tetrahedra.
@@ -173,13 +175,7 @@ impl<'a, S: Real> Statics<'a, S> {
                 let material = &self.model.materials[tet.material];
                 let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
                 let f = deformation_gradient(&tet.vertices.map(|v| x[v as usize]), &shape);
-                let piola = match set.model {
-                    MaterialModel::SaintVenantKirchhoff => {
-                        let strain = green_strain::strain(&f);
-                        green_strain::piola(&f, &strain, lambda, mu)
-                    }
-                    MaterialModel::StableNeoHookean => neo_hookean::piola(&f, lambda, mu),
-                };
+                let (_, piola) = law::respond(set.model, &f, lambda, mu);
                 let forces = internal_forces(&piola, &shape, volume);
                 for (v, force) in tet.vertices.into_iter().zip(forces) {
                     gradient[v as usize] -= force;

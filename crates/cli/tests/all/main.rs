@@ -12,3 +12,4 @@ mod bench_scene;
 mod devices;
 mod documents;
 mod run;
+mod saved;

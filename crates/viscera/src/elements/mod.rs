@@ -14,6 +14,8 @@
 
 pub mod attachment;
 pub mod green_strain;
+pub mod kinds;
+pub mod law;
 pub mod neo_hookean;
 pub mod neo_hookean_pair;
 pub mod neo_hookean_stretch;

@@ -4,12 +4,14 @@
 //! relative to its own size, every tetrahedron wound so that its volume is positive, every vertex
 //! part of some tetrahedron.
 
+mod corners;
 mod error;
 mod inspect;
 pub mod io;
 pub mod quality;
 pub mod topology;
 
+pub use corners::{edge_matrix, tet_volume};
 pub use error::{MeshError, MeshPlace};
 pub use inspect::{MeshSummary, SurfaceSummary, inspect, inspect_surface};
 pub use topology::boundary_surface;
@@ -22,7 +24,7 @@ pub mod normals;
 pub mod shapes;
 pub mod tetrahedralize;
 
-use crate::scalar::{Mat3, Vec3};
+use crate::scalar::Vec3;
 
 /// Largest coordinate `[m]`. Kernels multiply up to four lengths in single precision: `(1e9)^4` is
 /// below its largest number, 3e38. A larger bound would let them overflow.
@@ -98,7 +100,7 @@ impl TetMesh {
             }
         }
         check_repeated_tets(&tets)?;
-        if let Some((tet, face)) = topology::find_crowded_face(&tets) {
+        if let Some((tet, face)) = corners::find_crowded_face(&tets) {
             return Err(MeshError::CrowdedFace { tet, face });
         }
         let (vertices, removed_vertices) = remove_unused_vertices(vertices, &mut tets);
@@ -136,7 +138,7 @@ impl SurfaceMesh {
     /// tetrahedra between a point and each triangle. Has a meaning for closed surfaces only.
     pub fn enclosed_volume(&self) -> f64 {
         // From the middle of the surface, so that a far-off placement costs no digits.
-        let center = topology::BoundingBox::around(&self.vertices).center();
+        let center = corners::BoundingBox::around(&self.vertices).center();
         self.triangles
             .iter()
             .map(|t| tet_volume([center, self.at(t[0]), self.at(t[1]), self.at(t[2])]))
@@ -159,16 +161,6 @@ impl SurfaceMesh {
     fn at(&self, vertex: u32) -> Vec3<f64> {
         self.vertices[vertex as usize]
     }
-}
-
-/// Edge vectors from corner 0 as columns, `[m]`: `Ds = [x1-x0, x2-x0, x3-x0]`.
-pub fn edge_matrix(x: [Vec3<f64>; 4]) -> Mat3<f64> {
-    Mat3::from_columns(x[1] - x[0], x[2] - x[0], x[3] - x[0])
-}
-
-/// Signed volume `[m^3]` of a tetrahedron: `det(Ds) / 6`.
-pub fn tet_volume(x: [Vec3<f64>; 4]) -> f64 {
-    edge_matrix(x).determinant() / 6.0
 }
 
 fn check_counts(
@@ -220,11 +212,11 @@ fn check_indices(index: usize, tet: &[u32; 4], vertex_count: usize) -> Result<()
 
 /// The shape quality of a tetrahedron that is neither flat nor too small; its sign is the winding.
 fn check_shape(tet: usize, corners: [Vec3<f64>; 4]) -> Result<f64, MeshError> {
-    let longest_edge = quality::edge_lengths(corners).into_iter().fold(0.0, f64::max);
+    let longest_edge = corners::edge_lengths(corners).into_iter().fold(0.0, f64::max);
     if longest_edge < MIN_EDGE {
         return Err(MeshError::TooSmall { tet, longest_edge });
     }
-    let quality = quality::shape_quality(corners);
+    let quality = corners::shape_quality(corners);
     if quality.abs() < MIN_SHAPE_QUALITY {
         return Err(MeshError::FlatTet { tet, quality: quality.abs() });
     }

@@ -10,29 +10,10 @@
 //! Dihedral angle at the edge of two faces with outward normals `m` and `n`:
 //! `atan2(|m x n|, -m . n)`, accurate for small and for flat angles alike.
 
-use std::f64::consts::SQRT_2;
-
-use super::{TetMesh, tet_volume, topology::TET_FACES};
+use super::TetMesh;
+use super::corners::TET_FACES;
+pub use super::corners::{TET_EDGES, edge_lengths, shape_quality};
 use crate::scalar::Vec3;
-
-/// The six edges of a tetrahedron as pairs of corners.
-pub const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-
-/// Lengths `[m]` of the six edges, in the order of [`TET_EDGES`].
-pub fn edge_lengths(x: [Vec3<f64>; 4]) -> [f64; 6] {
-    TET_EDGES.map(|[a, b]| (x[b] - x[a]).length())
-}
-
-/// Shape quality in `[-1, 1]`, see the head of this module. Zero where all corners coincide.
-pub fn shape_quality(x: [Vec3<f64>; 4]) -> f64 {
-    let squares = TET_EDGES.map(|[a, b]| (x[b] - x[a]).length_squared());
-    let mean_square = squares.iter().sum::<f64>() / 6.0;
-    if mean_square > 0.0 {
-        6.0 * SQRT_2 * tet_volume(x) / (mean_square * mean_square.sqrt())
-    } else {
-        0.0
-    }
-}
 
 /// Dihedral angles `[rad]` at the six edges, in the order of [`TET_EDGES`].
 pub fn dihedral_angles(x: [Vec3<f64>; 4]) -> [f64; 6] {
@@ -91,6 +72,7 @@ pub fn summarize_quality(mesh: &TetMesh) -> QualitySummary {
 
 #[cfg(test)]
 mod tests {
+    use super::super::corners::tet_volume;
     use super::*;
     use crate::scalar::vec3;
     use std::f64::consts::{FRAC_PI_2, PI};

@@ -16,11 +16,14 @@
 //! Every vertex of the resulting boundary lies on the zero set, and all dihedral angles keep to
 //! [`DIHEDRAL_BOUNDS_DEG`], whatever the function.
 
+pub(super) mod error;
+
 use super::distance::SignedDistance;
 use super::lattice::{Corner, Lattice, Sign};
 use super::topology::{TET_FACES, connected_components, count_open_edges};
-use super::{MeshError, SurfaceMesh, TetMesh};
+use super::{SurfaceMesh, TetMesh};
 use crate::scalar::Vec3;
+pub use error::{MAX_LATTICE_VERTICES, TetrahedralizeError};
 
 #[cfg(test)]
 mod stencil_tests;
@@ -31,18 +34,6 @@ mod stencil_tests;
 /// set: the paper proves 10.7 and 164.8 for its choice of thresholds, a test here enumerates the set
 /// for the two below.
 pub const DIHEDRAL_BOUNDS_DEG: (f64, f64) = (10.78, 164.71);
-
-/// Warping threshold of long edges, as a fraction of the length. With [`ALPHA_SHORT`], the pair of
-/// the largest smallest angle, which the paper gives as 10.7 degrees with a largest of 164.8.
-/// A larger one lets three warped corners flatten a tetrahedron; a smaller one leaves slivers where
-/// a cut point and a warped vertex come close. For comparison 0.24999 with 0.41189 bounds the
-/// angles by 9.31 and 161.65 degrees.
-pub(super) const ALPHA_LONG: f64 = 0.285;
-/// Warping threshold of short edges, see [`ALPHA_LONG`].
-pub(super) const ALPHA_SHORT: f64 = 0.399;
-
-/// Largest lattice `[vertices]`: about half a gigabyte of signs and indices.
-pub const MAX_LATTICE_VERTICES: usize = 100_000_000;
 
 /// What came of a [`tetrahedralize`] call, beside the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,65 +47,6 @@ pub struct TetrahedralizeReport {
     /// Boundary edges not shared by exactly two boundary triangles. Not zero: two sheets of the
     /// surface touch, because the spacing does not resolve the gap or the wall between them.
     pub non_manifold_edges: usize,
-}
-
-/// Why a shape cannot be filled.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum TetrahedralizeError {
-    /// The spacing is not a positive number.
-    #[error("a lattice spacing of {spacing} m is impossible; give a positive length")]
-    Spacing {
-        /// What was asked for `[m]`.
-        spacing: f64,
-    },
-    /// The bounds are not finite, or the upper corner is below the lower one.
-    #[error("the shape's bounds are not a box: check that its sizes are positive and finite")]
-    Bounds,
-    /// The lattice would be too large.
-    #[error(
-        "a spacing of {spacing} m needs {lattice_vertices:.3e} lattice vertices, more than \
-         {MAX_LATTICE_VERTICES}; use at least {suggestion:.3e} m"
-    )]
-    TooFine {
-        /// What was asked for `[m]`.
-        spacing: f64,
-        /// How many lattice vertices that takes.
-        lattice_vertices: f64,
-        /// A spacing that fits `[m]`.
-        suggestion: f64,
-    },
-    /// No lattice vertex fell inside, or the few that did moved onto the surface.
-    #[error(
-        "a spacing of {spacing} m misses the shape, whose box is {:.3e} x {:.3e} x {:.3e} m; use at most {suggestion:.3e} m",
-        size[0], size[1], size[2]
-    )]
-    TooCoarse {
-        /// What was asked for `[m]`.
-        spacing: f64,
-        /// Edge lengths of the shape's box `[m]`.
-        size: [f64; 3],
-        /// A spacing that finds the shape `[m]`.
-        suggestion: f64,
-    },
-    /// The function is negative nowhere, as far as could be found.
-    #[error("the distance function is negative nowhere within its bounds: the shape is empty")]
-    Empty,
-    /// The shape reaches past its bounds.
-    #[error("the shape reaches past its bounds at ({}, {}, {}) m; enlarge them", point[0], point[1], point[2])]
-    BoundsTooTight {
-        /// A point inside the shape on the rim of the lattice `[m]`.
-        point: [f64; 3],
-    },
-    /// The function returned something that is not a number.
-    #[error("the distance at ({}, {}, {}) m is not a finite number", point[0], point[1], point[2])]
-    NotFinite {
-        /// Where `[m]`.
-        point: [f64; 3],
-    },
-    /// The mesh was refused.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
 }
 
 /// Fills a shape with tetrahedra.

@@ -2,48 +2,9 @@
 //!
 //! Every result has a fixed order (ascending vertex or tetrahedron), so runs can be repeated.
 
-use super::quality::TET_EDGES;
+use super::corners::sorted_face_sides;
+pub use super::corners::{BoundingBox, TET_EDGES, TET_FACES};
 use super::{SurfaceMesh, TetMesh};
-use crate::scalar::Vec3;
-
-/// The faces of a positively wound tetrahedron as corners, wound outwards; face i is opposite to
-/// corner i.
-pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
-
-/// One side of a face: which tetrahedron has it, and as which of its faces.
-struct FaceSide {
-    /// Vertices, ascending: equal for all sides of a face.
-    key: [u32; 3],
-    tet: u32,
-    face: u8,
-    /// True if the outward winding is an even permutation of `key`.
-    even: bool,
-}
-
-/// All sides of all faces; the sides of one face follow one another, by tetrahedron.
-fn sorted_face_sides(tets: &[[u32; 4]]) -> Vec<FaceSide> {
-    let mut sides = Vec::with_capacity(4 * tets.len());
-    for (tet, corners) in tets.iter().enumerate() {
-        for (face, local) in TET_FACES.iter().enumerate() {
-            let [a, b, c] = local.map(|corner| corners[corner]);
-            let mut key = [a, b, c];
-            key.sort_unstable();
-            // Sorting three different numbers is an even permutation exactly for the rotations.
-            let even = key == [a, b, c] || key == [b, c, a] || key == [c, a, b];
-            sides.push(FaceSide { key, tet: tet as u32, face: face as u8, even });
-        }
-    }
-    sides.sort_unstable_by_key(|side| (side.key, side.tet));
-    sides
-}
-
-/// A tetrahedron that is the third on a face, with that face, if there is one.
-pub(super) fn find_crowded_face(tets: &[[u32; 4]]) -> Option<(usize, [u32; 3])> {
-    sorted_face_sides(tets)
-        .chunk_by(|a, b| a.key == b.key)
-        .filter_map(|sides| sides.get(2).map(|third| (third.tet as usize, third.key)))
-        .min()
-}
 
 /// The boundary of a tetrahedral mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -205,36 +166,4 @@ pub fn vertex_tets(mesh: &TetMesh) -> VertexTets {
         }
     }
     VertexTets { offsets, tets }
-}
-
-/// The smallest box along the axes that holds all points.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BoundingBox {
-    /// Lowest corner `[m]`.
-    pub min: Vec3<f64>,
-    /// Highest corner `[m]`.
-    pub max: Vec3<f64>,
-}
-
-impl BoundingBox {
-    /// The box around points `[m]`; a single point at the origin if there are none.
-    pub fn around(points: &[Vec3<f64>]) -> Self {
-        let Some((&first, rest)) = points.split_first() else {
-            return Self::default();
-        };
-        rest.iter().fold(Self { min: first, max: first }, |bounds, &point| Self {
-            min: bounds.min.min(point),
-            max: bounds.max.max(point),
-        })
-    }
-
-    /// Extent along the axes `[m]`.
-    pub fn size(&self) -> Vec3<f64> {
-        self.max - self.min
-    }
-
-    /// Centre `[m]`.
-    pub fn center(&self) -> Vec3<f64> {
-        (self.min + self.max) * 0.5
-    }
 }

@@ -10,6 +10,7 @@
 mod builder;
 mod numbering;
 mod parts;
+pub(crate) mod single;
 mod tets;
 
 use std::ops::Range;

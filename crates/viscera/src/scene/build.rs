@@ -10,8 +10,22 @@ use super::{Body, BodyShape, Change, Fixing, Region, Scene, SceneError, Spring, 
 use crate::material::{Material, MaterialModel};
 use crate::mesh::shapes::LIVER_SPACING;
 use crate::scalar::Vec3;
-use crate::settings::{Choice, Node, Place, Placed, read_table, suggest};
+use crate::settings::{
+    Choice, Node, Place, Placed, apply_override, parse_tree, read_table, suggest,
+};
 use crate::units::shorten;
+
+impl Scene {
+    /// Reads a scene. `name` stands in errors; each override is a key such as `solver.iterations` or
+    /// `body.liver.material.young` and its value as one would write it in the file (quotes may be left out).
+    pub fn parse(name: &str, text: &str, overrides: &[(&str, &str)]) -> Result<Self, SceneError> {
+        let mut tree = parse_tree(name, text)?;
+        for (key, value) in overrides {
+            apply_override(&mut tree, key, value)?;
+        }
+        build_scene(name, tree)
+    }
+}
 
 /// Beyond this a run of one frame per millisecond would take hours.
 const MOST_FRAMES: f64 = 1e7;

@@ -1,17 +1,9 @@
 //! Settings that change while a scene runs.
 
-use super::{Scene, SceneError, build};
+use super::build::build_scene;
+use super::{Scene, SceneError};
 use crate::settings::{Choice, Precision, apply_override};
 use crate::units::shorten;
-
-/// Settings that change at a time; positions and velocities stay.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Change {
-    /// At the beginning of the first frame that does not begin earlier than this [s].
-    pub time: f64,
-    /// Keys and values, as in overrides.
-    pub settings: Vec<(String, String)>,
-}
 
 impl Scene {
     /// Changes settings of the solver, of the world and of materials; keys and values are those of
@@ -26,7 +18,7 @@ impl Scene {
         }
         // What else stands in the tree has been tried already, and the list of changes would be tried again.
         tree.remove("change");
-        let changed = build::build_scene(&self.name, tree)?;
+        let changed = build_scene(&self.name, tree)?;
         if changed.solver.precision != self.solver.precision {
             return Err(SceneError::FixedKey { key: "solver.precision".to_owned() });
         }

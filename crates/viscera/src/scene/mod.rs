@@ -34,14 +34,22 @@ mod selector;
 mod tables;
 mod write;
 
-pub use change::Change;
 pub use describe::{describe, describe_markdown, describe_text};
 pub use motion::{Force, ForceKey, Motion, MotionKey, RigidTransform};
 pub use selector::{Patch, SelectError, Selector, nearest_pair};
 pub use tables::{Interpolation, OutputSettings, TimeSettings, WorldSettings};
 
 use crate::material::{Material, MaterialError};
-use crate::settings::{Node, Place, SettingError, SolverSettings, apply_override, parse_tree};
+use crate::settings::{Node, Place, SettingError, SolverSettings};
+
+/// Settings that change at a time; positions and velocities stay.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// At the beginning of the first frame that does not begin earlier than this [s].
+    pub time: f64,
+    /// Keys and values, as in overrides.
+    pub settings: Vec<(String, String)>,
+}
 
 /// What a scene file says.
 #[derive(Clone, Debug, PartialEq)]
@@ -339,16 +347,6 @@ pub enum SceneError {
 }
 
 impl Scene {
-    /// Reads a scene. `name` stands in errors; each override is a key such as `solver.iterations` or
-    /// `body.liver.material.young` and its value as one would write it in the file (quotes may be left out).
-    pub fn parse(name: &str, text: &str, overrides: &[(&str, &str)]) -> Result<Self, SceneError> {
-        let mut tree = parse_tree(name, text)?;
-        for (key, value) in overrides {
-            apply_override(&mut tree, key, value)?;
-        }
-        build::build_scene(name, tree)
-    }
-
     /// How many frames the scene lasts: its duration in frames, rounded, at least one.
     pub fn frame_count(&self) -> u64 {
         (self.time.duration / self.time.frame).round().max(1.0) as u64

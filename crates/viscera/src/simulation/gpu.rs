@@ -3,37 +3,13 @@
 use std::any::Any;
 
 use super::device::{Backend, Elsewhere};
-use super::{Assembly, FrameError, Simulation, SimulationError};
+use super::error::{FrameError, SimulationError};
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
-use crate::scene::Scene;
 use crate::settings::{DeviceRequest, SolverSettings};
 use crate::solver::gpu::{Adapter, Device, GpuError, GpuSolver, StepCost};
 use crate::solver::{Inputs, Solver};
 use crate::state::State;
-
-impl<S: Real> Simulation<S> {
-    /// The solver on a graphics processor, where one computes the steps.
-    pub fn gpu(&self) -> Option<&GpuSolver> {
-        self.backend.elsewhere.as_ref().map(|elsewhere| elsewhere.solver())
-    }
-}
-
-impl Simulation<f32> {
-    /// A simulation on a device of the caller's, a window's for example, however small the mesh. The
-    /// settings say what to do where the device is lost: with `device = "auto"` the CPU goes on.
-    pub fn on_device(
-        scene: Scene,
-        assembly: Assembly,
-        device: &Device,
-    ) -> Result<Self, SimulationError> {
-        Self::on(scene, assembly, |model, solver, _| {
-            let settings = solver.settings();
-            let backend = on(device, model, settings, "the caller's choice")?;
-            Ok(Backend { gives_way: settings.device == DeviceRequest::Auto, ..backend })
-        })
-    }
-}
 
 impl Elsewhere<f32> for GpuSolver {
     fn step(
@@ -156,7 +132,7 @@ fn faster(model: &Model<f32>, settings: &SolverSettings, sweeps: u32) -> Backend
 }
 
 /// A device, for a reason.
-fn on(
+pub(super) fn on(
     device: &Device,
     model: &Model<f32>,
     settings: &SolverSettings,

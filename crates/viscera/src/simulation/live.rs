@@ -2,7 +2,8 @@
 //! with [`Live`] behind its other tables does the same to the bit.
 
 use super::acting::{Taken, tolerance};
-use super::{AssembleError, Simulation, SimulationError, substep_dt};
+use super::error::{LiveError, SimulationError};
+use super::{Simulation, substep_dt};
 use crate::measure::measure_tets;
 use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
@@ -11,44 +12,6 @@ use crate::settings::{Precision, SolverSettings};
 use crate::solver::Solver;
 use crate::solver::balance::ForceBalance;
 use crate::state::State;
-
-/// Why something cannot be done to a running simulation. Nothing of it has been done.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum LiveError {
-    /// A setting that cannot be.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// A patch without vertices.
-    #[error(transparent)]
-    Patch(#[from] AssembleError),
-    /// The model cannot be built or computed like that.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// A patch of a body that there is not.
-    #[error("there is no body {body}; the scene has {count}")]
-    NoBody {
-        /// The number given.
-        body: usize,
-        /// How many there are.
-        count: usize,
-    },
-    /// A stiffness that is none.
-    #[error("a hold needs a stiffness from 1e-6 N/m to 1e12 N/m; {stiffness} N/m is not")]
-    Stiffness {
-        /// The stiffness given [N/m].
-        stiffness: f64,
-    },
-    /// A place that is none.
-    #[error("a hold cannot be led to a place that is no number")]
-    NotFinite,
-    /// A hold that there is not, or that was let go.
-    #[error("there is no hold {hold}, or it was let go")]
-    NoHold {
-        /// The number given.
-        hold: usize,
-    },
-}
 
 /// What was done by hand since the beginning or the last [`Simulation::reset`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -237,9 +200,15 @@ impl<S: Real> Simulation<S> {
     /// Makes the changes whose time has come.
     fn make_changes(&mut self) -> Result<(), LiveError> {
         let now = self.time() + tolerance(&self.scene);
-        while let Some(change) = self.scene.changes.get(self.changes_made)
-            && change.time <= now
-        {
+        while self.scene.changes.get(self.changes_made).is_some_and(|change| change.time <= now) {
+            self.make_change()?;
+        }
+        Ok(())
+    }
+
+    /// Makes the next of the scene's changes, where there is one.
+    pub(super) fn make_change(&mut self) -> Result<(), LiveError> {
+        if let Some(change) = self.scene.changes.get(self.changes_made) {
             let mut scene = self.scene.clone();
             scene.change(&change.settings)?;
             self.rebuild(scene)?;
@@ -286,7 +255,7 @@ impl<S: Real> Simulation<S> {
     }
 
     /// The state from now on, on whatever computes the steps.
-    fn put(&mut self, state: State<S>) {
+    pub(super) fn put(&mut self, state: State<S>) {
         if let Some(elsewhere) = &mut self.backend.elsewhere {
             elsewhere.write(&self.model, &state);
         }

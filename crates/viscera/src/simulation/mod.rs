@@ -3,18 +3,25 @@
 mod acting;
 pub mod advice;
 mod assemble;
+mod choice;
 mod device;
+mod error;
+mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod live;
+#[cfg(feature = "gpu")]
+mod on_device;
 mod rest;
+mod saved;
 
-pub use acting::Hold;
 use acting::Taken;
 pub use assemble::{AssembleError, AssembledBody, Assembly, ResolvedPatch};
-pub use device::SimulationError;
-pub use live::{Live, LiveError};
+pub use error::{FrameError, LiveError, SimulationError};
+pub use forces::Hold;
+pub use live::Live;
 pub use rest::{RestReport, Standing};
+pub use saved::ResumeError;
 
 use crate::measure::{
     DeformationSummary, Energies, TetMeasure, measure_energies, measure_tets, summarize_deformation,
@@ -24,38 +31,10 @@ use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Scene};
 use crate::solver::balance::ForceBalance;
-#[cfg(feature = "gpu")]
-use crate::solver::gpu::GpuError;
-use crate::solver::{Inputs, Solver, StepError};
+use crate::solver::{Inputs, Solver};
 use crate::state::State;
 use device::Backend;
 use std::fmt;
-
-/// Why a frame could not be computed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FrameError {
-    /// Positions or stresses are no longer numbers.
-    #[error(
-        "the simulation diverged at {time:.4} s: positions or stresses are no longer numbers; {advice}"
-    )]
-    Diverged {
-        /// Simulated time [s].
-        time: f64,
-        /// What the scene's settings leave to do.
-        advice: String,
-    },
-    /// A step was refused.
-    #[error(transparent)]
-    Step(#[from] StepError),
-    /// A change of settings, which the scene wants now, cannot be made.
-    #[error(transparent)]
-    Change(#[from] Box<LiveError>),
-    /// The device failed. What [`Simulation::state`] gives is still that of the last frame.
-    #[cfg(feature = "gpu")]
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-}
 
 /// What holds or pulls a patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]

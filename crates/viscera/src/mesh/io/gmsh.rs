@@ -8,7 +8,7 @@ use std::fmt::Write;
 
 use super::error::{Fault, ReadProblem};
 use super::lines::{Line, Lines, Words, bad_word, shorten};
-use super::{Format, Parsed, SkippedElements};
+use super::parsed::{Format, Parsed, SkippedElements};
 use crate::mesh::{MeshError, MeshPlace, MeshRepairs, TetMesh};
 use crate::scalar::{Vec3, vec3};
 

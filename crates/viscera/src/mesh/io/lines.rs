@@ -112,3 +112,8 @@ pub(super) fn shorten(word: &[u8]) -> String {
     // Control characters could rewrite the terminal that shows the message.
     text.replace(char::is_control, "?")
 }
+
+/// True if the bytes hold a word somewhere.
+pub(super) fn holds(bytes: &[u8], word: &[u8]) -> bool {
+    bytes.windows(word.len()).any(|window| window == word)
+}

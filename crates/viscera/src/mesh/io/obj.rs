@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use super::error::{Fault, ReadProblem, WriteError};
 use super::lines::{Line, Lines, bad_word, parse_word, shorten};
-use super::{Format, Parsed, SkippedElements};
+use super::parsed::{Format, Parsed, SkippedElements};
 use crate::mesh::{MeshRepairs, SurfaceMesh, check_vertex};
 use crate::scalar::{Vec3, vec3};
 

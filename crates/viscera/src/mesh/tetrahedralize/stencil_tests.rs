@@ -2,6 +2,7 @@
 //! cut points and warped corners sampled over all that warping can leave. Not a formal proof: finer
 //! sampling, tried up to six places, finds the same extremes.
 
+use super::super::lattice::{ALPHA_LONG, ALPHA_SHORT};
 use super::*;
 use crate::mesh::distance::Sphere;
 use crate::mesh::quality::dihedral_angles;

@@ -5,8 +5,10 @@
 //! omega^2 <= max_i sum_(e at i) rho(K_e)/m_i
 //! ```
 
+use crate::elements::kinds::Energy;
 use crate::elements::shape_gradients;
 use crate::model::Model;
+use crate::model::single::{ElementSet, for_each_kind};
 use crate::scalar::{Mat3, Real};
 use crate::settings::SolverSettings;
 use crate::solver::error::StepError;
@@ -109,21 +111,27 @@ fn part_stability<S: Real>(model: &Model<S>) -> (Vec<f64>, Vec<PartStability>) {
             }
         }
     }
-    let springs = &model.springs;
-    for (ends, k) in springs.vertices.iter().zip(&springs.stiffness) {
-        for &v in ends {
-            stiffness[v as usize] += 2.0 * k.to_f64();
-        }
-    }
-    for (&v, k) in model.attachments.vertices.iter().zip(&model.attachments.stiffness) {
-        stiffness[v as usize] += k.to_f64();
-    }
+    for_each_kind!(model, set => add_stiffness(set, model, &mut stiffness));
     for (stability, part) in parts.iter_mut().zip(model.parts.iter()) {
         let vertices = model.numbering.order[part.vertices.clone()].iter().map(|&v| v as usize);
         let ratios = vertices.map(|v| stiffness[v] / model.masses[v].to_f64());
         stability.frequency = ratios.fold(0.0, f64::max).sqrt();
     }
     (stiffness, parts)
+}
+
+/// Adds the stiffness of the elements of one kind to their vertices [N/m].
+fn add_stiffness<S: Real, const N: usize, const M: usize>(
+    set: &impl ElementSet<S, N, M>,
+    model: &Model<S>,
+    stiffness: &mut [f64],
+) {
+    for i in 0..set.count() {
+        let of_element = set.element::<f64>(i, &model.rest_anchors).stiffness();
+        for v in set.vertices(i) {
+            stiffness[v as usize] += of_element;
+        }
+    }
 }
 
 /// The largest eigenvalue of a tetrahedron's stiffness at rest, per volume [Pa/m^2]. Both laws have the

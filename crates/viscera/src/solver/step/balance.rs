@@ -9,8 +9,10 @@
 
 use super::data::StepConstants;
 use super::tissue::Tissue;
-use crate::elements::{attachment, deformation_gradient, internal_forces, shape_gradients, spring};
+use crate::elements::kinds::Energy;
+use crate::elements::{deformation_gradient, internal_forces, shape_gradients};
 use crate::model::Model;
+use crate::model::single::{ElementSet, for_each_kind};
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::inputs::Inputs;
 use crate::state::State;
@@ -65,6 +67,27 @@ impl ForceBalance {
         if is_strained && is_work { 0.5 * self.residual_work / self.elastic_energy } else { 0.0 }
     }
 
+    /// Of the elements of one kind. What their forces sum to comes from outside.
+    fn add_elements<S: Real, const N: usize, const M: usize>(
+        &mut self,
+        set: &impl ElementSet<S, N, M>,
+        model: &Model<S>,
+        state: &State<S>,
+        inputs: &Inputs<S>,
+    ) {
+        let anchors = inputs.anchors_of(model);
+        for i in 0..set.count() {
+            let vertices = set.vertices(i);
+            let x = vertices.map(|v| state.positions[v as usize].cast::<f64>());
+            let mut from_outside = Vec3::<f64>::ZERO;
+            for (v, force) in vertices.into_iter().zip(set.element::<f64>(i, anchors).forces(&x)) {
+                self.residual[v as usize] -= force;
+                from_outside += force;
+            }
+            self.load += from_outside.length();
+        }
+    }
+
     pub(in crate::solver) fn measure<S: Real>(
         &mut self,
         model: &Model<S>,
@@ -105,24 +128,7 @@ impl ForceBalance {
                 }
             }
         }
-        let springs = &model.springs;
-        for (i, ends) in springs.vertices.iter().enumerate() {
-            let x = ends.map(|v| state.positions[v as usize].cast::<f64>());
-            let (length, stiffness) = (springs.rest_length[i], springs.stiffness[i]);
-            let forces = spring::forces(&x, length.to_f64(), stiffness.to_f64());
-            for (v, force) in ends.iter().zip(forces) {
-                self.residual[*v as usize] -= force;
-            }
-        }
-        let attachments = &model.attachments;
-        let anchors = inputs.anchors_of(model);
-        for (i, &v) in attachments.vertices.iter().enumerate() {
-            let x = state.positions[v as usize].cast::<f64>();
-            let anchor = anchors[attachments.order[i] as usize].cast();
-            let force = attachment::force(x, anchor, attachments.stiffness[i].to_f64());
-            self.residual[v as usize] -= force;
-            self.load += force.length();
-        }
+        for_each_kind!(model, set => self.add_elements(set, model, state, inputs));
         for tether in &constants.tethers {
             let v = model.numbering.order[tether.vertex];
             self.load += tether.force(state.positions[v as usize]).cast::<f64>().length();

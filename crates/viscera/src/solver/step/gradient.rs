@@ -2,10 +2,12 @@
 #![allow(unsafe_code)]
 
 use super::data::{Step, StepConstants};
-use super::law::{OfLaw, respond, with_law};
-use crate::elements::{CornerLoad, attachment, internal_forces, shape_gradients, spring};
-use crate::material::MaterialModel;
+use super::law::{OfLaw, respond, with_tissue};
+use crate::elements::kinds::Energy;
+use crate::elements::law::Law;
+use crate::elements::{CornerLoad, internal_forces, shape_gradients};
 use crate::model::Part;
+use crate::model::single::{ElementSet, for_each_kind};
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::scalar::{Real, Scalar};
 use crate::solver::cpu::tets::{Block, TetPass};
@@ -29,31 +31,32 @@ pub fn load_forces<S: Real, const BOUND: bool>(
             let blocks = color.blocks[kind].start as usize..color.blocks[kind].end as usize;
             let start_strain = &constants.start_strain[kind];
             let forces = Forces::<_, BOUND> { x, start_strain, dt: step.dt, loads: &shared };
-            with_law!(set, NEO, VISCOUS => {
-                let pass = OfLaw::<_, NEO, VISCOUS>(&forces);
+            with_tissue!(set, L, VISCOUS => {
+                let pass = OfLaw::<_, L, VISCOUS>::new(&forces);
                 constants.workers.pass(model, set, blocks, &pass);
             });
         }
     }
+    for_each_kind!(model, set => add_forces(set, step, part, x, loads));
+}
+
+/// Of a part's elements of one kind.
+fn add_forces<S: Real, const N: usize, const M: usize>(
+    set: &impl ElementSet<S, N, M>,
+    step: &Step<'_, S>,
+    part: &Part,
+    x: &[Point<S>],
+    loads: &mut [Point<S>],
+) {
     let squared = S::from_f64(step.dt * step.dt);
-    let springs = &model.springs;
-    for i in part.springs() {
-        let ends = springs.vertices[i].map(|v| x[model.numbering.of(v)].vec3());
-        let forces = spring::forces(&ends, springs.rest_length[i], springs.stiffness[i]);
-        let mass_bound = squared * springs.stiffness[i];
-        for (copy, force) in springs.copies[i].into_iter().zip(forces) {
+    let anchors = step.inputs.anchors_of(step.model);
+    for i in set.of_part(part) {
+        let element = set.element::<S>(i, anchors);
+        let forces = element.forces(&set.places(i, step.model, x));
+        let mass_bound = squared * element.curvature();
+        for (copy, force) in set.copies(i).into_iter().zip(forces) {
             add_load(loads, copy, &CornerLoad { impulse: force * squared, mass_bound });
         }
-    }
-    let attachments = &model.attachments;
-    let anchors = step.inputs.anchors_of(model);
-    for i in part.attachments() {
-        let stiffness = attachments.stiffness[i];
-        let anchor = anchors[attachments.order[i] as usize];
-        let place = x[model.numbering.of(attachments.vertices[i])].vec3();
-        let force = attachment::force(place, anchor, stiffness);
-        let load = CornerLoad { impulse: force * squared, mass_bound: squared * stiffness };
-        add_load(loads, attachments.copies[i], &load);
     }
 }
 
@@ -64,20 +67,21 @@ struct Forces<'a, S, const BOUND: bool> {
     loads: &'a Shared<'a, Point<S>>,
 }
 
-impl<S: Real, const BOUND: bool, const NEO: bool, const VISCOUS: bool> TetPass<S>
-    for OfLaw<'_, Forces<'_, S, BOUND>, NEO, VISCOUS>
+impl<S: Real, W: Law, const BOUND: bool, const VISCOUS: bool> TetPass<S>
+    for OfLaw<'_, Forces<'_, S, BOUND>, W, VISCOUS>
 {
     #[inline(always)]
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
-        let Forces { x, start_strain, dt, loads: into } = *self.0;
-        let (f, tissue, response) = respond::<S, L, NEO, VISCOUS>(tets, x, start_strain, dt);
+        let Forces { x, start_strain, dt, loads: into } = *self.pass;
+        let (f, tissue, response) = respond::<S, L, W, VISCOUS>(tets, x, start_strain, dt);
         let shape = tets.shape::<L>();
         let volume = tets.volume::<L>() * L::from_f64(dt * dt);
         let forces = internal_forces(&response.piola, &shape, volume);
         let g = shape_gradients(&shape);
         let mut loads = [CornerLoad::default(); 4];
         for corner in 0..4 {
-            let mass_bound = if BOUND { volume * tissue.curvature(&f, g[corner]) } else { L::ZERO };
+            let mass_bound =
+                if BOUND { volume * tissue.curvature_of::<W>(&f, g[corner]) } else { L::ZERO };
             loads[corner] = CornerLoad { impulse: forces[corner], mass_bound };
         }
         // SAFETY: constraints of one colour share no copy, and every block is worked on once.

@@ -1,53 +1,60 @@
 //! Passes over tetrahedra of one law, which is matched once per set of blocks, outside the lanes.
 
+use std::marker::PhantomData;
+
 use super::tissue::{Response, Tissue};
 use crate::elements::deformation_gradient;
 use crate::elements::green_strain::Voigt;
-use crate::material::MaterialModel;
+use crate::elements::law::Law;
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::scalar::{Mat3, Real};
 use crate::solver::cpu::tets::{Block, load_rows};
 
-/// Evaluates an expression with the law of a set, and whether it is viscous, as constants: kernels of
+/// Evaluates an expression with the law of a set as a type, and whether it is viscous as a constant: kernels of
 /// one law each keep more of it in registers.
-macro_rules! with_law {
-    ($set:expr, $neo:ident, $viscous:ident => $result:expr) => {{
-        let neo = $set.model == MaterialModel::StableNeoHookean;
-        match (neo, $set.viscous) {
-            (false, false) => with_law!(@ $neo false $viscous false $result),
-            (false, true) => with_law!(@ $neo false $viscous true $result),
-            (true, false) => with_law!(@ $neo true $viscous false $result),
-            (true, true) => with_law!(@ $neo true $viscous true $result),
-        }
-    }};
-    (@ $neo:ident $is_neo:literal $viscous:ident $is_viscous:literal $result:expr) => {{
-        const $neo: bool = $is_neo;
-        const $viscous: bool = $is_viscous;
-        $result
-    }};
+macro_rules! with_tissue {
+    ($set:expr, $law:ident, $viscous:ident => $result:expr) => {
+        $crate::elements::law::with_law!($set.model, $law => {
+            if $set.viscous {
+                const $viscous: bool = true;
+                $result
+            } else {
+                const $viscous: bool = false;
+                $result
+            }
+        })
+    };
 }
-pub(super) use with_law;
+pub(super) use with_tissue;
 
 /// A pass over tetrahedra of one law.
-pub struct OfLaw<'a, P, const NEO: bool, const VISCOUS: bool>(pub &'a P);
+pub struct OfLaw<'a, P, W, const VISCOUS: bool> {
+    pub pass: &'a P,
+    law: PhantomData<W>,
+}
+
+impl<'a, P, W, const VISCOUS: bool> OfLaw<'a, P, W, VISCOUS> {
+    /// What is done with each block.
+    pub fn new(pass: &'a P) -> Self {
+        Self { pass, law: PhantomData }
+    }
+}
 
 /// `F`, the tissue, and what it answers to `F`.
 #[inline(always)]
-pub fn respond<S: Real, L: Lanes<Real = S>, const NEO: bool, const VISCOUS: bool>(
+pub fn respond<S: Real, L: Lanes<Real = S>, W: Law, const VISCOUS: bool>(
     tets: &Block<'_, S>,
     x: &[Point<S>],
     start_strain: &[[Eight<S>; 6]],
     dt: f64,
 ) -> (Mat3<L>, Tissue<L>, Response<L>) {
     let f = deformation_gradient(&tets.corners::<L>(x).x, &tets.shape());
-    let law =
-        if NEO { MaterialModel::StableNeoHookean } else { MaterialModel::SaintVenantKirchhoff };
-    let tissue = Tissue::new(law, &tets.material(), dt);
+    let tissue = Tissue::new(W::MODEL, &tets.material(), dt);
     let response = if VISCOUS && tets.is_viscous() {
         let start: Voigt<L> = load_rows(start_strain[tets.index].as_flattened(), tets.lane);
-        tissue.respond(&f, Some(&start))
+        tissue.respond_by::<W>(&f, Some(&start))
     } else {
-        tissue.respond(&f, None)
+        tissue.respond_by::<W>(&f, None)
     };
     (f, tissue, response)
 }

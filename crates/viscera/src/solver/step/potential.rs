@@ -11,9 +11,10 @@ use std::cell::Cell;
 use std::ops::Range;
 
 use super::data::{Step, StepConstants};
-use super::law::{OfLaw, respond, with_law};
-use crate::elements::{attachment, spring};
-use crate::material::MaterialModel;
+use super::law::{OfLaw, respond, with_tissue};
+use crate::elements::kinds::Energy;
+use crate::elements::law::Law;
+use crate::model::single::{ElementSet, for_each_kind};
 use crate::model::{Model, Part};
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, LANES, Lanes, Point};
@@ -164,7 +165,8 @@ impl Evaluator {
             stored += energy;
             squared_noise += squared_force;
         }
-        add_single_energies(&mut stored, step, x, &step.model.parts[part]);
+        let of = &step.model.parts[part];
+        for_each_kind!(step.model, set => add_energies(set, &mut stored, step, x, of));
         let squared = step.dt * step.dt;
         let value = 0.5 * inertia + squared * stored;
         let noise = squared * S::EPSILON * (reach * squared_noise).sqrt();
@@ -207,8 +209,8 @@ impl Piece {
                     if !chosen.is_empty() {
                         let first = blocks.start - before;
                         let blocks = first + chosen.start..first + chosen.end;
-                        with_law!(set, NEO, VISCOUS => {
-                            let pass = OfLaw::<_, NEO, VISCOUS>(&sums);
+                        with_tissue!(set, L, VISCOUS => {
+                            let pass = OfLaw::<_, L, VISCOUS>::new(&sums);
                             constants.workers.piece(step.model, set, blocks, &pass);
                         });
                     }
@@ -237,20 +239,18 @@ fn inertia<S: Real>(
     [sum, reach]
 }
 
-/// Adds the energies [J] of a part's springs and attachments.
-fn add_single_energies<S: Real>(sum: &mut f64, step: &Step<'_, S>, x: &[Point<S>], part: &Part) {
-    let model = step.model;
-    let springs = &model.springs;
-    for i in part.springs() {
-        let places = springs.vertices[i].map(|v| x[model.numbering.of(v)].vec3());
-        *sum += spring::energy(&places, springs.rest_length[i], springs.stiffness[i]).to_f64();
-    }
-    let attachments = &model.attachments;
-    let anchors = step.inputs.anchors_of(model);
-    for i in part.attachments() {
-        let place = x[model.numbering.of(attachments.vertices[i])].vec3();
-        let anchor = anchors[attachments.order[i] as usize];
-        *sum += attachment::energy(place, anchor, attachments.stiffness[i]).to_f64();
+/// Adds the energies [J] of a part's elements of one kind.
+fn add_energies<S: Real, const N: usize, const M: usize>(
+    set: &impl ElementSet<S, N, M>,
+    sum: &mut f64,
+    step: &Step<'_, S>,
+    x: &[Point<S>],
+    part: &Part,
+) {
+    let anchors = step.inputs.anchors_of(step.model);
+    for i in set.of_part(part) {
+        let element = set.element::<S>(i, anchors);
+        *sum += element.energy(&set.places(i, step.model, x)).to_f64();
     }
 }
 
@@ -263,15 +263,13 @@ struct Sums<'a, S> {
     squared_force: Cell<Eight<f64>>,
 }
 
-impl<S: Real, const NEO: bool, const VISCOUS: bool> TetPass<S>
-    for OfLaw<'_, Sums<'_, S>, NEO, VISCOUS>
-{
+impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Sums<'_, S>, W, VISCOUS> {
     #[inline(always)]
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
-        let sums = self.0;
+        let sums = self.pass;
         let shape = tets.shape::<L>();
         let (_, _, response) =
-            respond::<S, L, NEO, VISCOUS>(tets, sums.x, sums.start_strain, sums.dt);
+            respond::<S, L, W, VISCOUS>(tets, sums.x, sums.start_strain, sums.dt);
         let volume = tets.volume::<L>();
         let density = response.elastic_energy + response.viscous_energy;
         let [mut energy, mut stress, mut volumes] = [[S::ZERO; LANES]; 3];

@@ -1,7 +1,7 @@
 //! What a tetrahedron's tissue answers to a deformation: both laws, and viscosity.
 
 use crate::elements::green_strain::{self, Voigt};
-use crate::elements::neo_hookean;
+use crate::elements::law::{Law, stretch_curvature, with_law};
 use crate::material::MaterialModel;
 use crate::model::MaterialConstants;
 use crate::scalar::{Mat3, Scalar, Vec3};
@@ -44,18 +44,6 @@ impl<S: Scalar> Tissue<S> {
         }
     }
 
-    /// Elastic energy density [Pa].
-    #[inline(always)]
-    fn elastic_energy(&self, f: &Mat3<S>) -> S {
-        let (lambda, mu) = (self.lame_lambda, self.lame_mu);
-        match self.model {
-            MaterialModel::SaintVenantKirchhoff => {
-                green_strain::energy_density(&green_strain::strain(f), lambda, mu)
-            }
-            MaterialModel::StableNeoHookean => neo_hookean::energy_density(f, lambda, mu),
-        }
-    }
-
     /// Density [Pa] of the viscous part of the potential.
     #[inline(always)]
     fn viscous_energy(&self, change: &Voigt<S>) -> S {
@@ -64,16 +52,16 @@ impl<S: Scalar> Tissue<S> {
 
     /// Energies and stress; `start` is the Green strain at the start of the step, where the tissue
     /// is viscous.
-    #[inline(always)]
     pub fn respond(&self, f: &Mat3<S>, start: Option<&Voigt<S>>) -> Response<S> {
+        with_law!(self.model, L => self.respond_by::<L>(f, start))
+    }
+
+    /// As [`Tissue::respond`], by a law that is known when this is compiled.
+    #[inline(always)]
+    pub fn respond_by<L: Law>(&self, f: &Mat3<S>, start: Option<&Voigt<S>>) -> Response<S> {
         let (lambda, mu) = (self.lame_lambda, self.lame_mu);
-        let piola = match self.model {
-            MaterialModel::SaintVenantKirchhoff => {
-                green_strain::piola(f, &green_strain::strain(f), lambda, mu)
-            }
-            MaterialModel::StableNeoHookean => neo_hookean::piola(f, lambda, mu),
-        };
-        let elastic_energy = self.elastic_energy(f);
+        let piola = L::piola(f, lambda, mu);
+        let elastic_energy = L::energy_density(f, lambda, mu);
         let mut response = Response { elastic_energy, viscous_energy: S::ZERO, piola };
         if let Some(start) = start {
             let change = change_since(f, start);
@@ -84,27 +72,18 @@ impl<S: Scalar> Tissue<S> {
         response
     }
 
-    /// Bound [Pa] of the curvature of the energy density by one corner, for the corner's shape
-    /// gradient `g`: the vertex's diagonal block without its negative part.
-    #[inline(always)]
+    /// Bound [Pa] of the curvature of the energy density by one corner, viscosity included, for the corner's
+    /// shape gradient `g`: the vertex's diagonal block without its negative part.
+    #[cfg(any(test, feature = "gpu"))]
     pub fn curvature(&self, f: &Mat3<S>, g: Vec3<S>) -> S {
+        with_law!(self.model, L => self.curvature_of::<L>(f, g))
+    }
+
+    /// As [`Tissue::curvature`], of a law that is known when this is compiled.
+    #[inline(always)]
+    pub fn curvature_of<L: Law>(&self, f: &Mat3<S>, g: Vec3<S>) -> S {
         let (lambda, mu) = (self.lame_lambda, self.lame_mu);
-        let stretch = (lambda + S::TWO * mu) * f.norm_squared() * g.length_squared();
-        let elastic = match self.model {
-            MaterialModel::SaintVenantKirchhoff => {
-                let strain = green_strain::strain(f);
-                let pressure = lambda * (strain[0] + strain[1] + strain[2]);
-                let [a, b, c, yz, xz, xy] = strain;
-                let tensor = [a, b, c, S::HALF * yz, S::HALF * xz, S::HALF * xy];
-                let along = g.dot(green_strain::symmetric(&tensor) * g);
-                stretch + (S::TWO * mu * along + pressure * g.length_squared()).max(S::ZERO)
-            }
-            MaterialModel::StableNeoHookean => {
-                let volume = (f.cofactor() * g).length_squared();
-                mu * g.length_squared() + (lambda + mu) * volume
-            }
-        };
-        elastic + self.viscosity_rate * stretch
+        L::curvature(f, g, lambda, mu) + self.viscosity_rate * stretch_curvature(f, g, lambda, mu)
     }
 }
 

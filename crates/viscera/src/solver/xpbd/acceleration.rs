@@ -71,7 +71,12 @@ impl Chebyshev {
 
 /// `q_(k+1)` from `g = g(q_k)`, `q = q_k`, `older = q_(k-1)`, written over `g`.
 pub fn chebyshev_update<S: Real>(g: &mut S, q: S, older: S, omega: S, gamma: S) {
-    *g = omega * (gamma * (*g - q) + q - older) + older;
+    *g = if omega == S::ONE {
+        // There need not be anything before the first iterate.
+        gamma * (*g - q) + q
+    } else {
+        omega * (gamma * (*g - q) + q - older) + older
+    };
 }
 
 /// History of an Anderson iteration over flat vectors. All memory is taken at the start.

@@ -18,8 +18,10 @@
 use std::marker::PhantomData;
 
 use super::forms::{Form, pass_by_form, with_form};
-use crate::elements::{attachment, deformation_gradient, green_strain, spring};
+use crate::elements::kinds::XpbdBlock;
+use crate::elements::{deformation_gradient, green_strain};
 use crate::model::Part;
+use crate::model::single::{ElementSet, for_each_kind};
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::solver::cpu::tets::{Block, TetPass, load_rows};
@@ -70,30 +72,30 @@ fn constitutive_multipliers<S: Real>(
             }
         });
     }
-    let squared = S::from_f64(step.dt * step.dt);
-    let springs = &model.springs;
-    for i in part.springs() {
-        let ends = springs.vertices[i].map(|v| x[model.numbering.of(v)].vec3());
-        let compliance_tilde = S::ONE / (springs.stiffness[i] * squared);
-        l[springs.multiplier_offset + i] =
-            spring::constitutive_multiplier(&ends, springs.rest_length[i], compliance_tilde);
-    }
-    let attachments = &model.attachments;
-    let anchors = step.inputs.anchors_of(model);
-    for i in part.attachments() {
-        let v = attachments.vertices[i];
-        let anchor = anchors[attachments.order[i] as usize];
-        let compliance_tilde = S::ONE / (attachments.stiffness[i] * squared);
-        let at = attachments.multiplier_offset + 3 * i;
-        let place = x[model.numbering.of(v)].vec3();
-        let pull = attachment::constitutive_multipliers(place, anchor, compliance_tilde);
-        l[at..at + 3].copy_from_slice(&pull.to_array());
-    }
+    for_each_kind!(model, set => constitutive_elements(set, step, part, x, l));
     // Of a tetrahedron too large for the number format nothing can be told.
     for range in &part.multipliers {
         for l in l[range.clone()].iter_mut().filter(|l| !l.is_finite()) {
             *l = S::ZERO;
         }
+    }
+}
+
+/// Of a part's elements of one kind.
+fn constitutive_elements<S: Real, const N: usize, const M: usize>(
+    set: &impl ElementSet<S, N, M>,
+    step: &Step<'_, S>,
+    part: &Part,
+    x: &[Point<S>],
+    l: &mut [S],
+) {
+    let squared = S::from_f64(step.dt * step.dt);
+    let anchors = step.inputs.anchors_of(step.model);
+    for i in set.of_part(part) {
+        let element = set.element::<S>(i, anchors);
+        let places = set.places(i, step.model, x);
+        let pulls = element.constitutive(&places, element.compliance(squared));
+        l[set.multipliers(i)].copy_from_slice(&pulls);
     }
 }
 

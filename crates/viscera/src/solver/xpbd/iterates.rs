@@ -2,6 +2,8 @@
 
 use super::acceleration::Anderson;
 use super::forms::{Form, GreenStrain, with_form};
+use crate::elements::kinds::Energy;
+use crate::model::single::{ElementSet, for_each_kind};
 use crate::model::{Model, Part};
 use crate::scalar::Real;
 use crate::scalar::lanes::{LANES, Point};
@@ -125,12 +127,19 @@ pub fn fill_multiplier_weights<S: Real>(model: &Model<S>, dt: f64, weights: &mut
             }
         }
     }
-    for (i, stiffness) in model.springs.stiffness.iter().enumerate() {
-        weights[model.springs.multiplier_offset + i] = S::ONE / (*stiffness * dt * dt);
-    }
-    for (i, stiffness) in model.attachments.stiffness.iter().enumerate() {
-        let at = model.attachments.multiplier_offset + 3 * i;
-        weights[at..at + 3].fill(S::ONE / (*stiffness * dt * dt));
+    for_each_kind!(model, set => fill_weights(set, model, dt, weights));
+}
+
+/// Of the elements of one kind: constraints whose energy has the curvature `k` have `a~ = 1/(k dt^2)`.
+fn fill_weights<S: Real, const N: usize, const M: usize>(
+    set: &impl ElementSet<S, N, M>,
+    model: &Model<S>,
+    dt: S,
+    weights: &mut [S],
+) {
+    for i in 0..set.count() {
+        let stiffness = set.element::<S>(i, &model.rest_anchors).curvature();
+        weights[set.multipliers(i)].fill(S::ONE / (stiffness * dt * dt));
     }
 }
 

@@ -8,9 +8,10 @@
 use std::marker::PhantomData;
 
 use super::forms::{Form, pass_by_form, with_form};
-use super::sweep::read_vec3;
-use crate::elements::{CornerLoad, green_strain, spring};
+use crate::elements::green_strain;
+use crate::elements::kinds::XpbdBlock;
 use crate::model::Model;
+use crate::model::single::{ElementSet, for_each_kind};
 use crate::scalar::Real;
 use crate::scalar::lanes::{Lanes, Point};
 use crate::solver::cpu::tets::{Block, TetPass};
@@ -35,27 +36,22 @@ pub fn load_multipliers<S: Real>(
             });
         }
     }
-    add_single_loads(model, x, multipliers, loads);
+    for_each_kind!(model, set => add_loads(set, model, x, multipliers, loads));
 }
 
-fn add_single_loads<S: Real>(
+fn add_loads<S: Real, K: ElementSet<S, N, M>, const N: usize, const M: usize>(
+    set: &K,
     model: &Model<S>,
     x: &[Point<S>],
     multipliers: &[S],
     loads: &mut [Point<S>],
 ) {
-    let springs = &model.springs;
-    for (i, ends) in springs.vertices.iter().enumerate() {
-        let ends = ends.map(|v| x[model.numbering.of(v)].vec3());
-        let pulls = spring::corner_loads(&ends, multipliers[springs.multiplier_offset + i]);
-        for (copy, pull) in springs.copies[i].into_iter().zip(&pulls) {
-            add_load(loads, copy, pull);
+    for i in 0..set.count() {
+        let (places, l) = (set.places(i, model, x), set.read(i, multipliers));
+        let on_vertices = <K::Element<S> as XpbdBlock<S, N, M>>::loads(&places, &l);
+        for (copy, load) in set.copies(i).into_iter().zip(&on_vertices) {
+            add_load(loads, copy, load);
         }
-    }
-    let attachments = &model.attachments;
-    for (i, &copy) in attachments.copies.iter().enumerate() {
-        let impulse = read_vec3(multipliers, attachments.multiplier_offset + 3 * i);
-        add_load(loads, copy, &CornerLoad { impulse, mass_bound: S::ZERO });
     }
 }
 

@@ -4,8 +4,9 @@
 use std::marker::PhantomData;
 
 use super::forms::{Form, pass_by_form, with_form};
-use crate::elements::{attachment, green_strain, spring};
-use crate::model::Model;
+use crate::elements::green_strain;
+use crate::elements::kinds::XpbdBlock;
+use crate::model::single::{ElementSet, for_each_kind};
 use crate::scalar::lanes::{Lanes, Point};
 use crate::scalar::{Real, Vec3};
 use crate::settings::{RelaxationForm, SolverSettings};
@@ -84,8 +85,7 @@ pub fn solve_color<S: Real>(
             workers.pass(model, set, blocks, &viscous);
         }
     }
-    sweep.solve_springs(model, color);
-    sweep.solve_attachments(step, color);
+    for_each_kind!(model, set => sweep.solve_elements(set, step, color));
 }
 
 struct Elastic<'a, S, F> {
@@ -164,45 +164,32 @@ impl<S: Real> TetPass<S> for Viscous<'_, S> {
 }
 
 impl<S: Real> Sweep<'_, S> {
-    fn solve_springs(&mut self, model: &Model<S>, color: usize) {
-        let springs = &model.springs;
-        for i in springs.color_offsets[color] as usize..springs.color_offsets[color + 1] as usize {
-            let copies = springs.copies[i];
+    /// Elements of one kind, one by one.
+    fn solve_elements<const N: usize, const M: usize>(
+        &mut self,
+        set: &impl ElementSet<S, N, M>,
+        step: &Step<'_, S>,
+        color: usize,
+    ) {
+        let anchors = step.inputs.anchors_of(step.model);
+        let squared = S::from_f64(self.dt * self.dt);
+        for i in set.color(color) {
+            let element = set.element::<S>(i, anchors);
+            let copies = set.copies(i);
             // SAFETY: nobody else works on the points now.
             let ends = copies.map(|copy| unsafe { *self.points.at(copy as usize) });
-            let at = springs.multiplier_offset + i;
-            let compliance_tilde = S::ONE / (springs.stiffness[i] * S::from_f64(self.dt * self.dt));
             // SAFETY: nor on the multipliers.
-            let l = unsafe { self.multipliers.at(at) };
+            let l = unsafe { self.multipliers.range(set.multipliers(i)) };
+            let now: [S; M] = std::array::from_fn(|p| l[p]);
             let (x, w) = (ends.map(Point::vec3), ends.map(|end| end.w));
-            let (change, moves) =
-                spring::solve(&x, &w, springs.rest_length[i], *l, compliance_tilde);
-            *l += self.relaxation.multipliers * change;
+            let compliance = element.compliance(squared);
+            let (changes, moves) = element.solve(&x, &w, &now, compliance);
+            for (l, change) in l.iter_mut().zip(changes) {
+                *l += self.relaxation.multipliers * change;
+            }
             for (copy, moved) in copies.into_iter().zip(moves) {
                 self.move_copy(copy, moved);
             }
-        }
-    }
-
-    fn solve_attachments(&mut self, step: &Step<'_, S>, color: usize) {
-        let set = &step.model.attachments;
-        let anchors = step.inputs.anchors_of(step.model);
-        for i in set.color_offsets[color] as usize..set.color_offsets[color + 1] as usize {
-            let copy = set.copies[i];
-            // SAFETY: nobody else works on points and multipliers now.
-            let point = unsafe { *self.points.at(copy as usize) };
-            let at = set.multiplier_offset + 3 * i;
-            // SAFETY: as above.
-            let l = unsafe { self.multipliers.range(at..at + 3) };
-            let compliance_tilde = S::ONE / (set.stiffness[i] * S::from_f64(self.dt * self.dt));
-            let anchor = anchors[set.order[i] as usize];
-            let (x, w) = (point.vec3(), point.w);
-            let (change, moved) =
-                attachment::solve(x, w, anchor, read_vec3(l, 0), compliance_tilde);
-            for (l, change) in l.iter_mut().zip(change.to_array()) {
-                *l += self.relaxation.multipliers * change;
-            }
-            self.move_copy(copy, moved);
         }
     }
 

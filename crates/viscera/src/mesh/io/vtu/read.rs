@@ -5,8 +5,8 @@ use roxmltree::{Document, Node};
 
 use super::VTK_TETRA;
 use crate::mesh::io::error::{Fault, ReadProblem};
-use crate::mesh::io::lines::{bad_word, parse_word};
-use crate::mesh::io::{Format, Parsed, SkippedElements, holds};
+use crate::mesh::io::lines::{bad_word, holds, parse_word};
+use crate::mesh::io::parsed::{Format, Parsed, SkippedElements};
 use crate::mesh::{MeshPlace, TetMesh};
 use crate::scalar::vec3;
 

@@ -1,0 +1,117 @@
+//! The laws of tissue: what every law answers, and the only list of them.
+
+use super::green_strain;
+use super::neo_hookean;
+use crate::material::MaterialModel;
+use crate::scalar::{Mat3, Scalar, Vec3};
+
+/// A law between the deformation gradient `F` and energy; `lambda` and `mu` are Lame's parameters [Pa].
+pub trait Law: Copy + Send + Sync {
+    /// Its name in settings.
+    const MODEL: MaterialModel;
+
+    /// Energy density [Pa].
+    fn energy_density<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> S;
+
+    /// First Piola stress [Pa].
+    fn piola<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> Mat3<S>;
+
+    /// Bound [Pa/m^2] of the curvature of the energy density by one corner, for the corner's shape gradient
+    /// `g` [1/m]: the vertex's diagonal block without its negative part.
+    fn curvature<S: Scalar>(f: &Mat3<S>, g: Vec3<S>, lambda: S, mu: S) -> S;
+}
+
+/// See [`green_strain`].
+#[derive(Clone, Copy, Debug)]
+pub struct SaintVenantKirchhoff;
+
+/// See [`neo_hookean`].
+#[derive(Clone, Copy, Debug)]
+pub struct StableNeoHookean;
+
+/// Evaluates an expression with `$law` as the type that belongs to a [`MaterialModel`]: the only list of laws.
+macro_rules! with_law {
+    ($model:expr, $law:ident => $result:expr) => {
+        match $model {
+            $crate::material::MaterialModel::SaintVenantKirchhoff => {
+                type $law = $crate::elements::law::SaintVenantKirchhoff;
+                $result
+            }
+            $crate::material::MaterialModel::StableNeoHookean => {
+                type $law = $crate::elements::law::StableNeoHookean;
+                $result
+            }
+        }
+    };
+}
+pub(crate) use with_law;
+
+/// Stretching of a line along `g`, of the Green strain: `(lambda + 2 mu) |F|^2 |g|^2`, a bound of its own.
+#[inline(always)]
+pub fn stretch_curvature<S: Scalar>(f: &Mat3<S>, g: Vec3<S>, lambda: S, mu: S) -> S {
+    (lambda + S::TWO * mu) * f.norm_squared() * g.length_squared()
+}
+
+impl Law for SaintVenantKirchhoff {
+    const MODEL: MaterialModel = MaterialModel::SaintVenantKirchhoff;
+
+    #[inline(always)]
+    fn energy_density<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> S {
+        green_strain::energy_density(&green_strain::strain(f), lambda, mu)
+    }
+
+    #[inline(always)]
+    fn piola<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> Mat3<S> {
+        green_strain::piola(f, &green_strain::strain(f), lambda, mu)
+    }
+
+    #[inline(always)]
+    fn curvature<S: Scalar>(f: &Mat3<S>, g: Vec3<S>, lambda: S, mu: S) -> S {
+        let strain = green_strain::strain(f);
+        let pressure = lambda * (strain[0] + strain[1] + strain[2]);
+        let [a, b, c, yz, xz, xy] = strain;
+        let tensor = [a, b, c, S::HALF * yz, S::HALF * xz, S::HALF * xy];
+        let along = g.dot(green_strain::symmetric(&tensor) * g);
+        stretch_curvature(f, g, lambda, mu)
+            + (S::TWO * mu * along + pressure * g.length_squared()).max(S::ZERO)
+    }
+}
+
+impl Law for StableNeoHookean {
+    const MODEL: MaterialModel = MaterialModel::StableNeoHookean;
+
+    #[inline(always)]
+    fn energy_density<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> S {
+        neo_hookean::energy_density(f, lambda, mu)
+    }
+
+    #[inline(always)]
+    fn piola<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> Mat3<S> {
+        neo_hookean::piola(f, lambda, mu)
+    }
+
+    #[inline(always)]
+    fn curvature<S: Scalar>(f: &Mat3<S>, g: Vec3<S>, lambda: S, mu: S) -> S {
+        let volume = (f.cofactor() * g).length_squared();
+        mu * g.length_squared() + (lambda + mu) * volume
+    }
+}
+
+/// Energy density [Pa] and first Piola stress [Pa] of a law that is known at run time only.
+pub fn respond<S: Scalar>(model: MaterialModel, f: &Mat3<S>, lambda: S, mu: S) -> (S, Mat3<S>) {
+    with_law!(model, L => (L::energy_density(f, lambda, mu), L::piola(f, lambda, mu)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Choice;
+
+    /// The list has every law, under its own name.
+    #[test]
+    fn every_law_is_on_the_list_under_its_name() {
+        for (model, ..) in MaterialModel::ALL {
+            assert_eq!(with_law!(model, L => L::MODEL), *model);
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Why a simulation cannot be built, changed, or go on.
+
+use super::assemble::AssembleError;
+use crate::model::ModelError;
+use crate::scene::SceneError;
+use crate::settings::DeviceRequest;
+use crate::solver::StepError;
+#[cfg(feature = "gpu")]
+use crate::solver::gpu::GpuError;
+
+/// Why a simulation cannot be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulationError {
+    /// Its bodies make no model.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A device was asked for that this build knows nothing of.
+    #[error(
+        "`device = \"{device}\"` needs the GPU backend, which was left out of this build; build with \
+         `--features gpu`, or use `device = \"cpu\"`"
+    )]
+    NoGpuBackend {
+        /// What was asked for.
+        device: DeviceRequest,
+    },
+    /// The device cannot do it.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+/// Why something cannot be done to a running simulation. Nothing of it has been done.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LiveError {
+    /// A setting that cannot be.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A patch without vertices.
+    #[error(transparent)]
+    Patch(#[from] AssembleError),
+    /// The model cannot be built or computed like that.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// A patch of a body that there is not.
+    #[error("there is no body {body}; the scene has {count}")]
+    NoBody {
+        /// The number given.
+        body: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A stiffness that is none.
+    #[error("a hold needs a stiffness from 1e-6 N/m to 1e12 N/m; {stiffness} N/m is not")]
+    Stiffness {
+        /// The stiffness given [N/m].
+        stiffness: f64,
+    },
+    /// A place that is none.
+    #[error("a hold cannot be led to a place that is no number")]
+    NotFinite,
+    /// A hold that there is not, or that was let go.
+    #[error("there is no hold {hold}, or it was let go")]
+    NoHold {
+        /// The number given.
+        hold: usize,
+    },
+}
+
+/// Why a frame could not be computed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FrameError {
+    /// Positions or stresses are no longer numbers.
+    #[error(
+        "the simulation diverged at {time:.4} s: positions or stresses are no longer numbers; {advice}"
+    )]
+    Diverged {
+        /// Simulated time [s].
+        time: f64,
+        /// What the scene's settings leave to do.
+        advice: String,
+    },
+    /// A step was refused.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// A change of settings, which the scene wants now, cannot be made.
+    #[error(transparent)]
+    Change(#[from] Box<LiveError>),
+    /// The device failed. What [`Simulation::state`] gives is still that of the last frame.
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}

@@ -1,0 +1,211 @@
+//! A simulation as bytes: saved after a frame and resumed, it goes on to the bit as if it had never stopped.
+//!
+//! All that is kept between frames is written: positions, velocities, multipliers, what was taken hold of, and
+//! how far the scene's changes have come. Settings are not: they come with the scene, and those that change no
+//! layout, such as threads, may be others. What was done by hand belongs into the scene file
+//! ([`Simulation::live`]).
+
+use super::Simulation;
+use super::acting::Taken;
+use super::error::LiveError;
+use crate::measure::measure_tets;
+use crate::model::Model;
+use crate::model::single::{ElementSet, for_each_kind};
+use crate::scalar::{Real, Vec3};
+use crate::state::State;
+
+/// Raised whenever the bytes mean something else.
+const FORMAT: u32 = 1;
+
+/// What the bytes begin with.
+const MAGIC: &[u8; 8] = b"viscera\x1a";
+
+/// Why a simulation cannot be resumed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ResumeError {
+    /// It does not begin like one.
+    #[error("this is no saved simulation; give a file that was written by saving one")]
+    NotSaved,
+    /// Bytes are missing or have changed.
+    #[error(
+        "the saved simulation is damaged or incomplete; save it again, or run the scene from its beginning"
+    )]
+    Damaged,
+    /// It was written by another version.
+    #[error(
+        "the saved simulation has format {found}, and this program reads {FORMAT}; resume it with the version \
+         that saved it"
+    )]
+    Format {
+        /// The format found.
+        found: u32,
+    },
+    /// Its numbers have another precision.
+    #[error(
+        "the simulation was saved with `precision = \"{saved}\"`; set `solver.precision` to that"
+    )]
+    Precision {
+        /// What it was saved with.
+        saved: &'static str,
+    },
+    /// It is of another scene.
+    #[error(
+        "the saved simulation has other {what} than the scene; resume it with the scene, meshes and solver \
+         settings with which it was saved, holds and changes by hand among them"
+    )]
+    OtherScene {
+        /// What differs.
+        what: &'static str,
+    },
+    /// A change that the scene made before cannot be made again.
+    #[error(transparent)]
+    Change(#[from] LiveError),
+}
+
+/// Numbers in double precision, which holds those of single precision exactly.
+type Vectors = Vec<[f64; 3]>;
+
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Saved {
+    /// Bytes of a number of the solver.
+    precision: u8,
+    /// See [`fingerprint`].
+    model: u64,
+    frame: u64,
+    changes_made: usize,
+    rejected_substeps: u64,
+    positions: Vectors,
+    velocities: Vectors,
+    /// Positions at the beginning of the last frame.
+    before: Vectors,
+    multipliers: Vec<f64>,
+    multiplier_dt: f64,
+    taken: Vec<Option<Vectors>>,
+}
+
+fn bare<S: Real>(vectors: &[Vec3<S>]) -> Vectors {
+    vectors.iter().map(|v| v.to_array().map(S::to_f64)).collect()
+}
+
+fn dressed<S: Real>(vectors: &[[f64; 3]]) -> Vec<Vec3<S>> {
+    vectors.iter().map(|v| Vec3::from_f64(*v)).collect()
+}
+
+impl<S: Real> Simulation<S> {
+    /// The simulation as it is after the last frame. [`Simulation::resume`] of one of the same scene goes on
+    /// from there.
+    pub fn save(&self) -> Vec<u8> {
+        let State { positions, velocities, multipliers, multiplier_dt } = self.state();
+        let saved = Saved {
+            precision: size_of::<S>() as u8,
+            model: fingerprint(&self.model),
+            frame: self.frame,
+            changes_made: self.changes_made,
+            rejected_substeps: self.rejected_substeps,
+            positions: bare(positions),
+            velocities: bare(velocities),
+            before: bare(&self.before),
+            multipliers: multipliers.iter().map(|l| l.to_f64()).collect(),
+            multiplier_dt: *multiplier_dt,
+            taken: self.taken.all().iter().map(|taken| taken.as_deref().map(bare)).collect(),
+        };
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend(FORMAT.to_le_bytes());
+        let written = postcard::to_allocvec_crc32(&saved, checksum().digest());
+        bytes.extend(written.expect("memory is all that it needs"));
+        bytes
+    }
+
+    /// Goes on from where another simulation of the same scene was saved, on whatever computes the steps here:
+    /// to the bit on the same backend. Forces and the force balance are known again after the next frame.
+    pub fn resume(mut self, saved: &[u8]) -> Result<Self, ResumeError> {
+        let saved = read(saved)?;
+        if usize::from(saved.precision) != size_of::<S>() {
+            let saved = if saved.precision == 8 { "f64" } else { "f32" };
+            return Err(ResumeError::Precision { saved });
+        }
+        self.frame = saved.frame;
+        while self.changes_made < saved.changes_made {
+            if self.scene.changes.len() <= self.changes_made {
+                return Err(ResumeError::OtherScene { what: "changes of settings" });
+            }
+            self.make_change()?;
+        }
+        let vertices = self.model.vertex_count();
+        let lengths = [saved.positions.len(), saved.velocities.len(), saved.before.len()];
+        for (what, fits) in [
+            ("vertices", lengths == [vertices; 3]),
+            ("constraints", saved.multipliers.len() == self.model.multiplier_count),
+            ("meshes or solver settings", saved.model == fingerprint(&self.model)),
+            ("motions", self.takes(&saved.taken)),
+        ] {
+            if !fits {
+                return Err(ResumeError::OtherScene { what });
+            }
+        }
+        self.taken = Taken::of(saved.taken.iter().map(|t| t.as_deref().map(dressed)).collect());
+        self.before = dressed(&saved.before);
+        self.rejected_substeps = saved.rejected_substeps;
+        self.put(State {
+            positions: dressed(&saved.positions),
+            velocities: dressed(&saved.velocities),
+            multipliers: saved.multipliers.iter().map(|&l| S::from_f64(l)).collect(),
+            multiplier_dt: saved.multiplier_dt,
+        });
+        self.inputs = self.inputs_at(self.time());
+        measure_tets(&self.model, &self.state.positions, &mut self.tets);
+        Ok(self)
+    }
+
+    /// Whether each motion has as many vertices as were taken hold of.
+    fn takes(&self, taken: &[Option<Vectors>]) -> bool {
+        let motions = &self.assembly.motions;
+        let fits = |(taken, patch): (&Option<Vectors>, &super::ResolvedPatch)| {
+            taken.as_ref().is_none_or(|places| places.len() == patch.vertices.len())
+        };
+        taken.len() <= motions.len() && taken.iter().zip(motions).all(fits)
+    }
+}
+
+fn checksum() -> crc::Crc<u32> {
+    crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC)
+}
+
+fn read(bytes: &[u8]) -> Result<Saved, ResumeError> {
+    let rest = bytes.strip_prefix(MAGIC).ok_or(ResumeError::NotSaved)?;
+    let (format, rest) = rest.split_first_chunk::<4>().ok_or(ResumeError::Damaged)?;
+    let found = u32::from_le_bytes(*format);
+    if found != FORMAT {
+        return Err(ResumeError::Format { found });
+    }
+    let crc = checksum();
+    postcard::from_bytes_crc32(rest, crc.digest()).map_err(|_| ResumeError::Damaged)
+}
+
+/// Differs where vertices, elements, or the order of their multipliers differ: 64 bits of FNV-1a.
+fn fingerprint<S: Real>(model: &Model<S>) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325u64;
+    let mut add = |number: u64| {
+        for byte in number.to_le_bytes() {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    };
+    for x in bare(&model.rest_positions).as_flattened() {
+        add(x.to_bits());
+    }
+    for set in model.tet_sets() {
+        add(set.form.multiplier_count() as u64);
+        add(u64::from(set.viscous));
+        for tet in model.tets(set) {
+            add(tet.multiplier(0) as u64);
+            tet.vertices.into_iter().for_each(|v| add(u64::from(v)));
+        }
+    }
+    for_each_kind!(model, set => {
+        for i in 0..set.count() {
+            set.vertices(i).into_iter().for_each(|v| add(u64::from(v)));
+        }
+    });
+    hash
+}

@@ -1,0 +1,201 @@
+//! Simulations saved and resumed: to the bit as if they had never stopped, by any threads and instructions, and
+//! on a graphics processor; and bytes that are not those of the scene.
+
+use crate::common::device::device;
+use proptest::prelude::*;
+use viscera::scalar::Real;
+use viscera::scalar::lanes::Instructions::{Avx2, Portable};
+use viscera::scene::Scene;
+use viscera::simulation::{Assembly, ResumeError, Simulation};
+
+/// A bar in an elastic bed, beside another that hangs from it; one is taken hold of on the way by springs, and
+/// settings change twice, once before frame 37.
+const SCENE: &str = r#"
+time = { duration = "1 s", velocity_factor = 0.97 }
+
+[[body]]
+name = "bar"
+shape = "block"
+size = ["40 mm", "20 mm", "20 mm"]
+cells = [4, 2, 2]
+material = { young = "8 kPa", poisson = 0.45, density = "1000 kg/m^3", viscosity = "20 ms" }
+
+[[body]]
+name = "weight"
+shape = "block"
+size = ["20 mm", "20 mm", "20 mm"]
+cells = [2, 2, 2]
+position = ["50 mm", 0, 0]
+material = { young = "20 kPa", poisson = 0.3, density = "1000 kg/m^3", model = "saint_venant_kirchhoff" }
+
+[[fixing]]
+name = "bed"
+body = "bar"
+half_space = { point = [0, 0, 0], normal = [-1, 0, 0] }
+stiffness = "400 N/m"
+
+[[motion]]
+name = "grip"
+body = "bar"
+nearest = { point = ["40 mm", 0, "20 mm"], count = 3 }
+start = "0.4 s"
+stiffness = "60 N/m"
+keys = [{ time = "0.4 s", translation = [0, 0, 0] }, { time = "0.9 s", translation = [0, "8 mm", "15 mm"] }]
+
+[[spring]]
+name = "tie"
+stiffness = "50 N/m"
+from = { body = "bar", nearest = { point = ["40 mm", 0, 0], count = 1 } }
+to = { body = "weight", nearest = { point = ["50 mm", 0, 0], count = 1 } }
+
+[[change]]
+time = "0.3 s"
+set = ['body.bar.material.young = "12 kPa"']
+
+[[change]]
+time = "0.8 s"
+set = ['solver.iterations = 3']
+
+[solver]
+substeps = 3
+"#;
+
+/// The frame after which it is saved, and how many there are.
+const SAVED: u64 = 37;
+const FRAMES: u64 = 56;
+
+fn scene(settings: &[(&str, &str)]) -> (Scene, Assembly) {
+    let scene = Scene::parse("saved.toml", SCENE, settings);
+    let scene = scene.unwrap_or_else(|error| panic!("{error}"));
+    let assembly = Assembly::new(&scene, &mut |name| Err(format!("no file {name}")));
+    (scene, assembly.unwrap_or_else(|error| panic!("{error}")))
+}
+
+fn cpu<S: Real>(settings: &[(&str, &str)]) -> Simulation<S> {
+    let settings = [&[("solver.device", "cpu")], settings].concat();
+    let (scene, assembly) = scene(&settings);
+    Simulation::new(scene, assembly).expect("a model")
+}
+
+fn advance<S: Real>(simulation: &mut Simulation<S>, end: u64) {
+    while simulation.frame() < end {
+        simulation.advance_frame().expect("a frame");
+    }
+}
+
+/// All that moves, the multipliers among it, and the report of the last frame.
+fn bits<S: Real>(simulation: &Simulation<S>) -> (Vec<u64>, String) {
+    let state = simulation.state();
+    let vectors = state.positions.iter().chain(&state.velocities).flat_map(|v| v.to_array());
+    let numbers = vectors.chain(state.multipliers.iter().copied());
+    let report = serde_json::to_string(&simulation.report()).expect("a report");
+    (numbers.map(|number| number.to_f64().to_bits()).collect(), report)
+}
+
+fn resumes_to_the_bit<S: Real>(settings: &[(&str, &str)], others: &[&str]) {
+    let mut whole = cpu::<S>(settings);
+    advance(&mut whole, SAVED);
+    let saved = whole.save();
+    advance(&mut whole, FRAMES);
+    let expected = bits(&whole);
+    for threads in others {
+        for instructions in [Avx2, Portable] {
+            let settings = [settings, &[("solver.threads", *threads)]].concat();
+            let mut resumed = cpu::<S>(&settings).resume(&saved).expect("the same scene");
+            resumed.use_instructions(instructions);
+            assert_eq!(resumed.frame(), SAVED);
+            advance(&mut resumed, FRAMES);
+            assert!(bits(&resumed) == expected, "{settings:?}, {instructions:?}");
+        }
+    }
+    // What was saved has moved, and goes on moving.
+    let rest = bits(&cpu::<S>(settings)).0;
+    let saved = bits(&cpu::<S>(settings).resume(&saved).expect("the same scene")).0;
+    assert!(rest != saved && saved != expected.0);
+}
+
+#[test]
+fn a_resumed_simulation_goes_on_to_the_bit() {
+    resumes_to_the_bit::<f32>(&[], &["1", "3", "8"]);
+    let anderson = [("solver.acceleration", "anderson"), ("solver.iterations", "6")];
+    resumes_to_the_bit::<f32>(&anderson, &["3"]);
+    // Its first sweeps know of no iterate of the step before.
+    let chebyshev = [
+        ("solver.acceleration", "chebyshev"),
+        ("solver.chebyshev_damping", "0.8"),
+        ("solver.iterations", "6"),
+        ("solver.chebyshev_delay", "2"),
+    ];
+    resumes_to_the_bit::<f32>(&chebyshev, &["1"]);
+    resumes_to_the_bit::<f32>(&[("solver.method", "explicit")], &["1"]);
+    resumes_to_the_bit::<f64>(&[("solver.precision", "f64"), ("solver.colors", "1")], &["1"]);
+}
+
+#[test]
+fn a_simulation_on_a_device_resumes_to_the_bit() {
+    for settings in [&[][..], &[("solver.method", "explicit")]] {
+        let new = || {
+            let (scene, assembly) = scene(settings);
+            Simulation::<f32>::on_device(scene, assembly, device()).expect("a device")
+        };
+        let mut whole = new();
+        advance(&mut whole, SAVED);
+        let saved = whole.save();
+        advance(&mut whole, FRAMES);
+        let mut resumed = new().resume(&saved).expect("the same scene");
+        advance(&mut resumed, FRAMES);
+        assert!(bits(&resumed) == bits(&whole), "{settings:?}");
+        assert!(resumed.is_on_device());
+    }
+}
+
+#[test]
+fn bytes_of_something_else_are_refused() {
+    let mut simulation = cpu::<f32>(&[]);
+    advance(&mut simulation, 2);
+    let saved = simulation.save();
+    let resume = |settings: &[(&str, &str)], bytes: &[u8]| {
+        let error = cpu::<f32>(settings).resume(bytes).map(|_| ()).expect_err("another scene");
+        println!("{error}");
+        error
+    };
+    assert_eq!(resume(&[], b"solver = 3"), ResumeError::NotSaved);
+    assert_eq!(resume(&[], &saved[..saved.len() / 2]), ResumeError::Damaged);
+    let mut newer = saved.clone();
+    newer[8] = 200;
+    assert_eq!(resume(&[], &newer), ResumeError::Format { found: 200 });
+    let colors = [("solver.colors", "1")];
+    assert!(matches!(resume(&colors, &saved), ResumeError::OtherScene { .. }));
+    let finer = [("body.bar.cells", "[5, 2, 2]")];
+    assert_eq!(resume(&finer, &saved), ResumeError::OtherScene { what: "vertices" });
+    let double = cpu::<f64>(&[("solver.precision", "f64")]).resume(&saved).map(|_| ());
+    assert_eq!(double, Err(ResumeError::Precision { saved: "f32" }));
+    // A change that was made belongs to the scene.
+    advance(&mut simulation, 30);
+    let (before, rest) = SCENE.split_once("[[change]]").expect("changes");
+    let (_, after) = rest.split_once("[solver]").expect("settings");
+    let without = format!("{before}[solver]{after}");
+    let scene = Scene::parse("saved.toml", &without, &[("solver.device", "cpu")]).expect("a scene");
+    let assembly = Assembly::new(&scene, &mut |name| Err(name.into())).expect("meshes");
+    let other = Simulation::<f32>::new(scene, assembly).expect("a model");
+    let refused = other.resume(&simulation.save()).map(|_| ());
+    assert_eq!(refused, Err(ResumeError::OtherScene { what: "changes of settings" }));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// Any byte that has changed, and any that is missing, is noticed.
+    #[test]
+    fn damage_is_noticed(place in any::<prop::sample::Index>(), change in 1u8.., cut in any::<bool>()) {
+        static SAVED: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
+        let mut bytes = SAVED.get_or_init(|| cpu::<f32>(&[]).save()).clone();
+        let place = place.index(bytes.len());
+        if cut {
+            bytes.truncate(place);
+        } else {
+            bytes[place] ^= change;
+        }
+        prop_assert!(cpu::<f32>(&[]).resume(&bytes).is_err());
+    }
+}
