@@ -5,6 +5,7 @@ use std::fmt::Debug;
 use super::error::FrameError;
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
+use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]
 use crate::solver::gpu::GpuSolver;
 use crate::solver::{Inputs, Solver};
@@ -14,12 +15,20 @@ use crate::state::State;
 pub(super) trait Elsewhere<S>: Debug + Send {
     fn step(&mut self, model: &Model<S>, inputs: &Inputs<S>, dt: f64) -> Result<(), FrameError>;
 
-    /// The state, and what a force balance needs, after the last step. On an error nothing is changed.
-    fn read(
-        &mut self,
+    /// Positions and velocities after the last step; how many steps were taken back so far. On an error nothing
+    /// is changed.
+    fn read_frame(&mut self, model: &Model<S>, state: &mut State<S>) -> Result<u64, FrameError>;
+
+    /// Multipliers after the last step.
+    fn multipliers(&self, model: &Model<S>) -> Result<Vec<S>, FrameError>;
+
+    /// The force balance of the last step.
+    fn force_balance(
+        &self,
         model: &Model<S>,
-        state: &mut State<S>,
-        solver: &mut Solver<S>,
+        state: &State<S>,
+        inputs: &Inputs<S>,
+        balance: &mut ForceBalance,
     ) -> Result<(), FrameError>;
 
     /// Puts a state that fits the model in the place of the device's.
@@ -39,13 +48,15 @@ pub(super) struct Backend<S> {
     pub warning: Option<String>,
     /// Whether the CPU goes on where the device is lost.
     pub gives_way: bool,
+    /// Steps that the device has taken back, as of the last frame.
+    pub rejected: u64,
 }
 
 impl<S: Real> Backend<S> {
     /// The CPU, for a reason.
     pub fn cpu(reason: impl std::fmt::Display) -> Self {
         let choice = format!("CPU: {reason}");
-        Self { elsewhere: None, choice, warning: None, gives_way: false }
+        Self { elsewhere: None, choice, warning: None, gives_way: false, rejected: 0 }
     }
 
     /// Advances by one step of `dt` [s].
@@ -61,6 +72,11 @@ impl<S: Real> Backend<S> {
             Some(elsewhere) => elsewhere.step(model, inputs, dt),
             None => Ok(solver.step(model, state, inputs, dt)?),
         }
+    }
+
+    /// Steps that have been taken back so far.
+    pub fn rejected_steps(&self, solver: &Solver<S>) -> u64 {
+        if self.elsewhere.is_some() { self.rejected } else { solver.rejected_steps() }
     }
 
     /// Goes on with the CPU.

@@ -7,8 +7,9 @@ use super::error::{FrameError, SimulationError};
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
 use crate::settings::{DeviceRequest, SolverSettings};
+use crate::solver::Inputs;
+use crate::solver::balance::ForceBalance;
 use crate::solver::gpu::{Adapter, Device, GpuError, GpuSolver, StepCost};
-use crate::solver::{Inputs, Solver};
 use crate::state::State;
 
 impl Elsewhere<f32> for GpuSolver {
@@ -22,13 +23,26 @@ impl Elsewhere<f32> for GpuSolver {
         Ok(GpuSolver::step(self, model, inputs, dt)?)
     }
 
-    fn read(
+    fn read_frame(
         &mut self,
         model: &Model<f32>,
         state: &mut State<f32>,
-        solver: &mut Solver<f32>,
+    ) -> Result<u64, FrameError> {
+        Ok(GpuSolver::read_frame(self, model, state)?)
+    }
+
+    fn multipliers(&self, model: &Model<f32>) -> Result<Vec<f32>, FrameError> {
+        Ok(GpuSolver::multipliers(self, model)?)
+    }
+
+    fn force_balance(
+        &self,
+        model: &Model<f32>,
+        state: &State<f32>,
+        inputs: &Inputs<f32>,
+        balance: &mut ForceBalance,
     ) -> Result<(), FrameError> {
-        Ok(self.read_with_ground(model, state, solver)?)
+        Ok(GpuSolver::force_balance(self, model, state, inputs, balance)?)
     }
 
     fn write(&mut self, model: &Model<f32>, state: &State<f32>) {
@@ -60,6 +74,7 @@ pub(super) fn again<S: Real>(
             choice: backend.choice.clone(),
             warning: None,
             gives_way: backend.gives_way,
+            rejected: 0,
         };
         of_precision(renewed)
     }))
@@ -140,7 +155,13 @@ pub(super) fn on(
 ) -> Result<Backend<f32>, GpuError> {
     let solver = GpuSolver::new(device, model, settings)?;
     let choice = format!("{}: {reason}", device.name());
-    Ok(Backend { elsewhere: Some(Box::new(solver)), choice, warning: None, gives_way: false })
+    Ok(Backend {
+        elsewhere: Some(Box::new(solver)),
+        choice,
+        warning: None,
+        gives_way: false,
+        rejected: 0,
+    })
 }
 
 /// A count with its thousands apart: "1,280".

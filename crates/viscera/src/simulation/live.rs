@@ -150,7 +150,8 @@ impl<S: Real> Simulation<S> {
         let order = |solver: &SolverSettings| (solver.colors, solver.neo_hookean, solver.rebase);
         let same_order = order(&self.scene.solver) == order(&fork.scene.solver);
         if same_order && self.model.multiplier_count == fork.model.multiplier_count {
-            let kept = self.state.multipliers.iter().map(|l| T::from_f64(l.to_f64())).collect();
+            let kept = self.whole_state().multipliers;
+            let kept = kept.into_iter().map(|l| T::from_f64(l.to_f64())).collect();
             let positions = std::mem::take(&mut fork.state.positions);
             let velocities = std::mem::take(&mut fork.state.velocities);
             let multiplier_dt = self.state.multiplier_dt;

@@ -182,7 +182,7 @@ impl<S: Real> Simulation<S> {
         &self.model
     }
 
-    /// What moves.
+    /// What moves. Where a graphics processor computes, its multipliers stay there: these are older ones.
     pub fn state(&self) -> &State<S> {
         &self.state
     }
@@ -239,20 +239,20 @@ impl<S: Real> Simulation<S> {
     /// who needs positions, not numbers.
     pub fn advance(&mut self) -> Result<(), FrameError> {
         self.begin_frame().map_err(Box::new)?;
-        let rejected = self.solver.rejected_steps();
         self.before.copy_from_slice(&self.state.positions);
         match self.compute_frame() {
             // What a step refuses, the CPU would refuse as well.
             Err(lost) if self.backend.gives_way && !matches!(lost, FrameError::Step(_)) => {
-                // The state is still that of the last frame.
+                // Positions are still those of the last frame; the multipliers are gone with the device.
                 self.backend.give_way(self.time(), &lost);
-                self.compute_frame()?;
+                let (inputs, dt) = (self.inputs_at(self.time()), substep_dt(&self.scene));
+                self.solver.restart(&self.model, &mut self.state, &inputs, dt)?;
+                self.rejected_substeps = self.compute_frame()?;
             }
-            computed => computed?,
+            computed => self.rejected_substeps = computed?,
         }
         self.frame += 1;
         self.stepped = true;
-        self.rejected_substeps = self.solver.rejected_steps() - rejected;
         if !self.state.is_finite() {
             return Err(self.diverged());
         }
@@ -276,8 +276,11 @@ impl<S: Real> Simulation<S> {
     /// that of a step: after a change of settings it stays as it was until the next one.
     pub fn measure(&mut self) -> Result<(), FrameError> {
         if self.stepped {
-            let Self { solver, model, state, inputs, balance, .. } = self;
-            solver.force_balance(model, state, inputs, balance)?;
+            let Self { solver, backend, model, state, inputs, balance, .. } = self;
+            match &backend.elsewhere {
+                Some(elsewhere) => elsewhere.force_balance(model, state, inputs, balance)?,
+                None => solver.force_balance(model, state, inputs, balance)?,
+            }
         }
         measure_tets(&self.model, &self.state.positions, &mut self.tets);
         // Files and pictures are in single precision: what it cannot hold has run away as well.
@@ -290,22 +293,39 @@ impl<S: Real> Simulation<S> {
         Ok(())
     }
 
-    /// The substeps of a frame, and the state at its end.
-    fn compute_frame(&mut self) -> Result<(), FrameError> {
+    /// The substeps of a frame, and the state at its end; returns how many of them were taken back.
+    fn compute_frame(&mut self) -> Result<u64, FrameError> {
         let dt = substep_dt(&self.scene);
         // The end of the frame is a time of its own: that of the keys by which holds are led.
         let (start, end) = (self.time(), (self.frame + 1) as f64 * self.scene.time.frame);
         let Self { scene, assembly, taken, model, state, solver, inputs, backend, .. } = self;
+        let before = backend.rejected_steps(solver);
         for substep in 1..=scene.solver.substeps {
             let is_last = substep == scene.solver.substeps;
             let time = if is_last { end } else { start + f64::from(substep) * dt };
             taken.act(scene, assembly, time, inputs);
             backend.step(solver, model, state, inputs, dt)?;
         }
-        match &mut backend.elsewhere {
-            Some(elsewhere) => elsewhere.read(model, state, solver),
-            None => Ok(()),
+        if let Some(elsewhere) = &mut backend.elsewhere {
+            backend.rejected = elsewhere.read_frame(model, state)?;
         }
+        Ok(backend.rejected_steps(solver) - before)
+    }
+
+    /// What moves, the multipliers included, wherever they are. Where a device is lost they are what the tissue
+    /// answers to its places.
+    pub(super) fn whole_state(&self) -> State<S> {
+        let mut state = self.state.clone();
+        let Some(elsewhere) = &self.backend.elsewhere else { return state };
+        match elsewhere.multipliers(&self.model) {
+            Ok(multipliers) => state.multipliers = multipliers,
+            Err(_) => {
+                let (inputs, dt) = (self.inputs_at(self.time()), substep_dt(&self.scene));
+                let restarted = self.solver.clone().restart(&self.model, &mut state, &inputs, dt);
+                debug_assert!(restarted.is_ok(), "{restarted:?}");
+            }
+        }
+        state
     }
 
     /// The numbers of the last frame.

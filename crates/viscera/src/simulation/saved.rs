@@ -96,7 +96,7 @@ impl<S: Real> Simulation<S> {
     /// The simulation as it is after the last frame. [`Simulation::resume`] of one of the same scene goes on
     /// from there.
     pub fn save(&self) -> Vec<u8> {
-        let State { positions, velocities, multipliers, multiplier_dt } = self.state();
+        let State { positions, velocities, multipliers, multiplier_dt } = &self.whole_state();
         let saved = Saved {
             precision: size_of::<S>() as u8,
             model: fingerprint(&self.model),

@@ -213,7 +213,7 @@ impl<S: Real> Solver<S> {
         check_state(model, state)?;
         check_inputs(model, inputs)?;
         self.memory.check(model)?;
-        balance.measure(model, state, inputs, &self.memory.data.constants);
+        balance.measure(model, state, inputs, &self.memory.data.constants.end_of_step());
         Ok(())
     }
 }

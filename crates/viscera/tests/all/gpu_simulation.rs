@@ -215,8 +215,12 @@ fn auto_goes_on_with_the_cpu_where_the_device_is_lost() {
     let lost = advanced(lost, 6);
     assert_eq!(lost.frame(), 12);
 
-    // As if the CPU had computed all of it, but for round-off.
-    let cpu = advanced(simulation(&[("solver.device", "cpu")]).expect("a simulation"), 12);
+    // As if the CPU had computed all of it, but for round-off, and for multipliers, which are gone with the device:
+    // they are taken from the places, as after a change of settings.
+    let cpu = advanced(simulation(&[("solver.device", "cpu")]).expect("a simulation"), 5);
+    let mut cpu = cpu;
+    cpu.change(&[("solver.threads".into(), "1".into())]).expect("a setting");
+    let cpu = advanced(cpu, 7);
     let apart = lost.state().positions.iter().zip(&cpu.state().positions);
     let apart = apart.map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
     assert!(apart <= 1e-6, "{apart} m");
@@ -285,4 +289,28 @@ fn the_estimate_of_a_step_counts_its_dispatches() {
         assert!((cost.pays_from() as f64 * per_tet / cost.gpu - 1.0).abs() < 1e-2);
         assert_eq!(cost.gpu_pays(), gpu.model().tet_count() as u64 > cost.pays_from());
     }
+}
+
+/// A frame reads back positions and velocities; multipliers, the largest part of the state, stay on the device.
+#[test]
+fn a_frame_reads_back_what_is_shown() {
+    let (scene, assembly) = assembled(&[]);
+    let simulation = Simulation::<f32>::on_device(scene, assembly, crate::common::device::device());
+    let mut simulation = simulation.expect("a device");
+    let places = simulation.state().positions.as_ptr();
+    simulation.advance_frame().expect("a frame");
+    simulation.advance_frame().expect("a frame");
+    let gpu = simulation.gpu().expect("it is there");
+    let model = simulation.model();
+    let [frame, balance, whole] = gpu.bytes_read_back(model);
+    let vertices = model.vertex_count() as u64;
+    println!("{frame} bytes a frame, {balance} for a force balance, {whole} the whole state");
+    assert!((32 * vertices..32 * vertices + 256).contains(&frame), "{frame}");
+    assert!(whole > frame + 4 * model.multiplier_count as u64 - 256, "{whole}");
+    // The caller may look at positions in the same place all the time.
+    assert_eq!(simulation.state().positions.as_ptr(), places);
+    // Those that stay are forces: they are there where they are asked for.
+    let multipliers = gpu.multipliers(model).expect("a device");
+    assert_eq!(multipliers.len(), model.multiplier_count);
+    assert!(multipliers.iter().any(|&l| l != 0.0) && multipliers.iter().all(|l| l.is_finite()));
 }

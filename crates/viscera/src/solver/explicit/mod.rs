@@ -25,9 +25,9 @@ use crate::settings::SolverSettings;
 use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
 use crate::solver::plan::Plan;
-use crate::solver::step::data::{Step, StepData, gather};
+use crate::solver::step::data::{Step, StepConstants, StepData, gather};
 use crate::solver::step::gradient::load_forces;
-use crate::solver::step::predict::Tethers;
+use crate::solver::step::predict::{Tethers, load_tethers};
 use crate::solver::step::stage::StepStage;
 use crate::solver::step::strain::measure_strain;
 use crate::solver::step::tethers::bundle;
@@ -202,5 +202,6 @@ fn end<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>, start_velocities: &[
         constants.predicted[v].set_vec3(x - change * dt + load * (dt * dt));
     }
     let StepData { constants, points, .. } = data;
-    constants.load_tethers(step.dt, |v| points[v].vec3());
+    let StepConstants { tethers, predicted, masses, .. } = constants;
+    load_tethers(tethers, predicted, step.dt, |v| masses[v], |v| points[v].vec3());
 }

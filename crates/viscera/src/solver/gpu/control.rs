@@ -56,7 +56,8 @@ pub fn control_size(parts: usize) -> u64 {
 
 /// How many steps were taken back, out of the bytes of `Control`.
 pub fn rejected_steps(control: &[u8]) -> u64 {
-    bytemuck::pod_read_unaligned::<Control>(&control[..size_of::<Control>()]).rejected.into()
+    let at = std::mem::offset_of!(Control, rejected);
+    bytemuck::pod_read_unaligned::<u32>(&control[at..at + 4]).into()
 }
 
 impl PartControl {

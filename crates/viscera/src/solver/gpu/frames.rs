@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::mpsc::channel;
 
-use super::control::rejected_steps;
+use super::control::{PARTS_START, rejected_steps};
 use super::device::Device;
 use super::error::GpuError;
 use super::slots::Slot;
@@ -12,7 +12,10 @@ use crate::model::Model;
 use crate::scalar::lanes::{Eight, Point};
 use crate::scalar::{Vec3, vec3};
 use crate::settings::Method;
-use crate::solver::Solver;
+use crate::solver::inputs::{Inputs, check_inputs, check_state};
+use crate::solver::step::balance::ForceBalance;
+use crate::solver::step::data::EndOfStep;
+use crate::solver::step::predict::load_tethers;
 use crate::state::State;
 
 /// Copies that may be under way at a time; more requests give way until one has arrived.
@@ -93,49 +96,97 @@ impl GpuSolver {
         })
     }
 
-    /// Reads the whole state and, into a CPU solver of the same model, what its force balance of the
-    /// last step needs and how many steps were taken back: with one wait. On an error nothing is changed.
-    pub fn read_with_ground(
+    /// Waits for the device and reads positions and velocities at the end of the last step, in place; returns how
+    /// many steps were taken back so far. Multipliers stay on the device. On an error nothing is changed.
+    pub fn read_frame(&self, model: &Model<f32>, state: &mut State<f32>) -> Result<u64, GpuError> {
+        self.check_model(model)?;
+        let part = |slot, size: u64| {
+            let [start, _] = self.buffers.span(slot);
+            (self.buffers.buffer(slot), start..start + size)
+        };
+        let points = self.buffers.points_size;
+        let ranges = [
+            part(Slot::Unknowns, points),
+            part(Slot::Velocities, points),
+            part(Slot::Control, PARTS_START as u64),
+        ];
+        let mut rejected = 0;
+        read(&self.device, &ranges, |read| {
+            put_in_user_order(model, bytemuck::cast_slice(read[0]), &mut state.positions);
+            put_in_user_order(model, bytemuck::cast_slice(read[1]), &mut state.velocities);
+            rejected = rejected_steps(read[2]);
+        })?;
+        state.multiplier_dt = self.multiplier_dt;
+        Ok(rejected)
+    }
+
+    /// How many bytes [`GpuSolver::read_frame`] reads, [`GpuSolver::force_balance`], and [`GpuSolver::read`].
+    pub fn bytes_read_back(&self, model: &Model<f32>) -> [u64; 3] {
+        let of_slot = |slot: &Slot| self.buffers.span(*slot)[1];
+        let frame = 2 * self.buffers.points_size + PARTS_START as u64;
+        let whole = [Slot::Unknowns, Slot::Velocities].iter().map(of_slot).sum();
+        [frame, balance_slots(model).iter().map(of_slot).sum(), whole]
+    }
+
+    /// Waits for the device and reads the multipliers [J s^2] at the end of the last step.
+    pub fn multipliers(&self, model: &Model<f32>) -> Result<Vec<f32>, GpuError> {
+        self.check_model(model)?;
+        let [start, _] = self.buffers.span(Slot::Multipliers);
+        let range = start..start + 4 * model.multiplier_count as u64;
+        let mut multipliers = Vec::new();
+        if !range.is_empty() {
+            let ranges = [(self.buffers.buffer(Slot::Multipliers), range)];
+            read(&self.device, &ranges, |read| {
+                multipliers = bytemuck::pod_collect_to_vec(read[0]);
+            })?;
+        }
+        Ok(multipliers)
+    }
+
+    /// The force balance at the end of the last step, see [`ForceBalance`]. `state` is what was read after it, and
+    /// `inputs` are its. Waits for the device.
+    pub fn force_balance(
         &self,
         model: &Model<f32>,
-        state: &mut State<f32>,
-        solver: &mut Solver<f32>,
+        state: &State<f32>,
+        inputs: &Inputs<f32>,
+        balance: &mut ForceBalance,
     ) -> Result<(), GpuError> {
         self.check_model(model)?;
-        solver.memory.check(model)?;
-        let mut slots =
-            vec![Slot::Unknowns, Slot::Velocities, Slot::Predicted, Slot::Acting, Slot::Control];
-        if model.tet_sets().iter().any(|set| set.viscous) {
-            slots.push(Slot::StartStrain);
-        }
-        self.read_buffers(&slots, |read| {
-            self.take_state(model, state, read);
-            let [predicted, acting] = [read[2], read[3]].map(bytemuck::cast_slice::<u8, [f32; 4]>);
-            let constants = &mut solver.memory.data.constants;
-            for (v, point) in constants.predicted.iter_mut().enumerate() {
-                let [x, y, z, inertia] = predicted[v];
-                *point = Point::new(vec3(x, y, z), 0.0);
-                constants.inertias[v] = inertia;
-                constants.inverse_masses[v] = acting[v][3];
-            }
-            constants.tethers.clone_from(&self.tethers);
+        check_state(model, state)?;
+        check_inputs(model, inputs)?;
+        self.read_buffers(&balance_slots(model), |read| {
+            let [predicted, acting] = [read[0], read[1]].map(bytemuck::cast_slice::<u8, [f32; 4]>);
+            let count = model.vertex_count();
+            let point = |&[x, y, z, _]: &[f32; 4]| Point::new(vec3(x, y, z), 0.0);
+            let mut places: Vec<Point<f32>> = predicted[..count].iter().map(point).collect();
+            let fourth = |rows: &[[f32; 4]]| -> Vec<f32> {
+                rows[..count].iter().map(|row| row[3]).collect()
+            };
             if self.settings.method == Method::Explicit {
-                let place = |v: usize| state.positions[model.numbering.order[v] as usize];
-                constants.load_tethers(self.multiplier_dt, place);
+                let user = |v: usize| model.numbering.order[v] as usize;
+                let mass = |v: usize| model.masses[user(v)];
+                let place = |v: usize| state.positions[user(v)];
+                load_tethers(&self.tethers, &mut places, self.multiplier_dt, mass, place);
             }
-            if let Some(guard) = &mut solver.memory.guard {
-                guard.rejected = rejected_steps(read[4]);
-            }
-            let Some(strains) = read.get(5) else { return };
-            let mut strains: &[Eight<f32>] = bytemuck::cast_slice(strains);
-            for (set, own) in model.tet_sets().into_iter().zip(&mut constants.start_strain) {
-                // The device has room for all blocks, the CPU for those of viscous sets.
-                let (of_set, rest) = strains.split_at(6 * set.block_count());
-                let of_set = &of_set.as_chunks::<6>().0[..own.len()];
-                own.copy_from_slice(of_set);
+            let mut strains: &[Eight<f32>] = read.get(2).map_or(&[], |s| bytemuck::cast_slice(s));
+            let start_strain = model.tet_sets().map(|set| {
+                // The device has room for all blocks, measures ask for those of viscous sets.
+                let blocks = if strains.is_empty() { 0 } else { set.block_count() };
+                let (of_set, rest) = strains.split_at(6 * blocks);
                 strains = rest;
-            }
-        })
+                if set.viscous { of_set.as_chunks::<6>().0.to_vec() } else { Vec::new() }
+            });
+            let end = EndOfStep {
+                predicted: &places,
+                inertias: &fourth(predicted),
+                inverse_masses: &fourth(acting),
+                tethers: &self.tethers,
+                start_strain: &start_strain,
+            };
+            balance.measure(model, state, inputs, &end);
+        })?;
+        Ok(())
     }
 
     fn take_state(&self, model: &Model<f32>, state: &mut State<f32>, read: &[&[u8]]) {
@@ -172,6 +223,22 @@ impl GpuSolver {
         };
         let ranges: Vec<_> = slots.iter().map(range).collect();
         read(&self.device, &ranges, take)
+    }
+}
+
+/// What a force balance needs of the device.
+fn balance_slots(model: &Model<f32>) -> Vec<Slot> {
+    let mut slots = vec![Slot::Predicted, Slot::Acting];
+    if model.tet_sets().iter().any(|set| set.viscous) {
+        slots.push(Slot::StartStrain);
+    }
+    slots
+}
+
+fn put_in_user_order(model: &Model<f32>, places: &[[f32; 4]], into: &mut [Vec3<f32>]) {
+    for (value, &v) in into.iter_mut().zip(&model.numbering.rank) {
+        let [x, y, z, _] = places[v as usize];
+        *value = vec3(x, y, z);
     }
 }
 

@@ -7,7 +7,7 @@
 //! `f` are the forces of all elements. On free vertices `r` is the solver's error as a force
 //! [N]; on pinned ones it is what holds them: the force of the fixing or the tool on the tissue.
 
-use super::data::StepConstants;
+use super::data::EndOfStep;
 use super::tissue::Tissue;
 use crate::elements::kinds::Energy;
 use crate::elements::{deformation_gradient, internal_forces, shape_gradients};
@@ -93,7 +93,7 @@ impl ForceBalance {
         model: &Model<S>,
         state: &State<S>,
         inputs: &Inputs<S>,
-        constants: &StepConstants<S>,
+        step: &EndOfStep<'_, S>,
     ) {
         let dt = state.multiplier_dt;
         *self = Self { residual: std::mem::take(&mut self.residual), ..Self::default() };
@@ -102,7 +102,7 @@ impl ForceBalance {
         if dt <= 0.0 {
             return;
         }
-        for (set, strains) in model.tet_sets().into_iter().zip(&constants.start_strain) {
+        for (set, strains) in model.tet_sets().into_iter().zip(step.start_strain) {
             for (tet, (block, lane)) in model.tets(set).zip(set.places()) {
                 let x = tet.vertices.map(|v| state.positions[v as usize].cast::<f64>());
                 let shape = tet.inverse_rest_shape.cast::<f64>();
@@ -129,7 +129,7 @@ impl ForceBalance {
             }
         }
         for_each_kind!(model, set => self.add_elements(set, model, state, inputs));
-        for tether in &constants.tethers {
+        for tether in step.tethers {
             let v = model.numbering.order[tether.vertex];
             self.load += tether.force(state.positions[v as usize]).cast::<f64>().length();
         }
@@ -146,12 +146,12 @@ impl ForceBalance {
             let mass = model.masses[v].to_f64();
             let x = state.positions[v].cast::<f64>();
             let place = model.numbering.of(v as u32);
-            let predicted = constants.predicted[place].vec3().cast();
-            let inertia = constants.inertias[place].to_f64();
+            let predicted = step.predicted[place].vec3().cast();
+            let inertia = step.inertias[place].to_f64();
             self.residual[v] += (x - predicted) * (inertia / (dt * dt));
             self.force_floor += ROUNDED * S::EPSILON * x.length() * inertia / (dt * dt);
             let residual = self.residual[v];
-            if constants.inverse_masses[place] == S::ZERO {
+            if step.inverse_masses[place] == S::ZERO {
                 self.load += residual.length();
             } else {
                 self.unbalanced += residual.length();

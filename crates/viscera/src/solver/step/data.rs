@@ -46,6 +46,22 @@ pub struct StepConstants<S> {
     pub start_strain: StartStrain<S>,
 }
 
+/// What measures of a step need after its end: values that every backend fills. Vertices in the solver's
+/// numbering.
+#[derive(Clone, Copy, Debug)]
+pub struct EndOfStep<'a, S> {
+    /// See [`StepConstants::predicted`].
+    pub predicted: &'a [Point<S>],
+    /// See [`StepConstants::inertias`].
+    pub inertias: &'a [S],
+    /// See [`StepConstants::inverse_masses`].
+    pub inverse_masses: &'a [S],
+    /// See [`StepConstants::tethers`].
+    pub tethers: &'a [Bundle<S>],
+    /// See [`StartStrain`].
+    pub start_strain: &'a StartStrain<S>,
+}
+
 /// What the stages of every method work on.
 #[derive(Clone, Debug)]
 pub struct StepData<S> {
@@ -105,6 +121,12 @@ impl<S: Real> StepData<S> {
 }
 
 impl<S: Real> StepConstants<S> {
+    /// For measures of the step.
+    pub fn end_of_step(&self) -> EndOfStep<'_, S> {
+        let Self { predicted, inertias, inverse_masses, tethers, start_strain, .. } = self;
+        EndOfStep { predicted, inertias, inverse_masses, tethers, start_strain }
+    }
+
     /// Whether a pin, an attachment or a tether holds a part.
     pub fn holds(&self, part: &Part) -> bool {
         let mut inverse_masses = self.inverse_masses[part.vertices.clone()].iter();

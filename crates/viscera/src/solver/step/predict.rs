@@ -4,8 +4,8 @@
 //! xt = x_n + dt v_n + dt^2 (g + M^-1 f_ext)
 //! ```
 
-use super::data::{Step, StepConstants, StepData, copy_count};
-use super::tethers::bundle;
+use super::data::{Step, StepData, copy_count};
+use super::tethers::{Bundle, bundle};
 use crate::model::Part;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
@@ -109,15 +109,19 @@ impl<S: Real> StepData<S> {
     }
 }
 
-impl<S: Real> StepConstants<S> {
-    /// Adds the tethers to the loads in the prediction of an explicit step; `place` gives a vertex's
-    /// position [m] by the solver's number.
-    pub fn load_tethers(&mut self, dt: f64, place: impl Fn(usize) -> Vec3<S>) {
-        for tether in &self.tethers {
-            let v = tether.vertex;
-            let load = tether.force(place(v)) * (S::ONE / self.masses[v]);
-            let predicted = self.predicted[v].vec3() + load * S::from_f64(dt * dt);
-            self.predicted[v].set_vec3(predicted);
-        }
+/// Adds the tethers to the loads in the prediction of an explicit step; `mass` [kg] and `place` [m] are those of
+/// the solver's vertices.
+pub fn load_tethers<S: Real>(
+    tethers: &[Bundle<S>],
+    predicted: &mut [Point<S>],
+    dt: f64,
+    mass: impl Fn(usize) -> S,
+    place: impl Fn(usize) -> Vec3<S>,
+) {
+    for tether in tethers {
+        let v = tether.vertex;
+        let load = tether.force(place(v)) * (S::ONE / mass(v));
+        let moved = predicted[v].vec3() + load * S::from_f64(dt * dt);
+        predicted[v].set_vec3(moved);
     }
 }
