@@ -7,6 +7,7 @@ use crate::{files, progress};
 use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use viscera::model::{Model, ModelBuilder};
 use viscera::settings::SolverSettings;
@@ -25,6 +26,9 @@ pub struct DevicesArguments {
     /// Print JSON, in bytes and SI units, instead of a table
     #[arg(long)]
     json: bool,
+    /// Write the text of every kernel, as devices get it, to this folder instead: one WGSL file each
+    #[arg(long, value_name = "DIR", conflicts_with = "json")]
+    kernels: Option<PathBuf>,
 }
 
 /// What a device is measured on [tetrahedra], with one colour: the same few dispatches for any mesh.
@@ -78,6 +82,9 @@ struct Listing {
 
 /// Carries out `viscera devices`.
 pub fn execute(arguments: &DevicesArguments) -> Result<()> {
+    if let Some(folder) = &arguments.kernels {
+        return write_kernels(folder);
+    }
     let task = Task::new()?;
     let listing = list(&task)?;
     if arguments.json {
@@ -85,6 +92,23 @@ pub fn execute(arguments: &DevicesArguments) -> Result<()> {
         return files::print(&format!("{text}\n"));
     }
     files::print(&listing.to_text(&task))
+}
+
+/// The texts of all kernels, each in a file of its name.
+#[cfg(feature = "gpu")]
+fn write_kernels(folder: &Path) -> Result<()> {
+    let texts = viscera::solver::gpu::kernels::texts();
+    for (name, text) in &texts {
+        let file = folder.join(format!("{name}.wgsl"));
+        viscera_report::prepare_file(&file, "--kernels")?;
+        files::write_whole(&file, text.as_bytes())?;
+    }
+    files::print(&format!("{} kernels are in {}\n", texts.len(), folder.display()))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn write_kernels(_: &Path) -> Result<()> {
+    anyhow::bail!("the GPU backend was left out of this build; build with `--features gpu`")
 }
 
 #[cfg(feature = "gpu")]

@@ -107,3 +107,26 @@ fn without_a_driver_everything_but_the_gpu_works() {
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     assert_eq!(bench.summary("out")["device"], "CPU: no graphics adapter");
 }
+
+/// Whole texts, one for each kernel and, where it depends on them, formulation and order of sweeps.
+#[test]
+fn kernels_are_written_as_devices_get_them() {
+    let bench = Bench::new(TINY);
+    let end = bench.end_of(&["devices", "--kernels", "kernels"]);
+    assert_eq!(end.code, Some(0), "{}", end.stderr);
+    let read = |name: &str| std::fs::read_to_string(bench.path(name)).expect(name);
+    for (name, words) in [
+        ("kernels/predict.wgsl", "fn predict("),
+        ("kernels/solve-GreenStrain-Vertices.wgsl", "fn green_strain_solve("),
+        ("kernels/solve-NeoHookeanStretch-Jacobi.wgsl", "fn neo_hookean_stretch_solve("),
+    ] {
+        let text = read(name);
+        assert!(text.contains(words) && text.contains("@compute"), "{name}");
+        assert!(!text.contains('$'), "{name}: something is left to fill in");
+    }
+    let count = std::fs::read_dir(bench.path("kernels")).expect("a folder").count();
+    assert!(end.stdout.starts_with(&format!("{count} kernels are in")), "{}", end.stdout);
+    assert!(count > 60, "{count}");
+    let end = bench.end_of(&["devices", "--kernels", "scene.toml"]);
+    assert!(end.code != Some(0) && end.error().contains("--kernels"), "{}", end.error());
+}

@@ -4,7 +4,7 @@ use super::motion::{Force, ForceKey, Motion, MotionKey, RigidTransform};
 use super::selector::{Patch, Selector};
 use super::tables::{
     BodyTable, ChangeTable, ForceTable, MaterialTable, MotionTable, PatchTable, SceneTable,
-    ShapeName, TimeSettings,
+    ShapeName, SpringTable, TimeSettings,
 };
 use super::{Body, BodyShape, Change, Fixing, Region, Scene, SceneError, Spring, Written};
 use crate::material::{Material, MaterialModel};
@@ -57,51 +57,6 @@ pub(super) fn build_scene(name: &str, tree: Node) -> Result<Scene, SceneError> {
             build_patch(&bodies, &value.patch, purpose("fixing", &value.name, index), place)?;
         fixings.push(Fixing { name, patch, stiffness: value.stiffness });
     }
-    let mut motions: Vec<Motion> = Vec::new();
-    for (index, Placed { place, value }) in tables.motion.iter().enumerate() {
-        let name = name_or_number(&value.name, "motion", index);
-        check_name(&motions, |motion| &motion.name, &name, "motion", place)?;
-        let purpose = purpose("motion", &value.name, index);
-        motions.push(Motion {
-            name,
-            keys: motion_keys(value, &purpose, place)?,
-            patch: build_patch(&bodies, &value.patch, purpose, place)?,
-            interpolation: value.interpolation,
-            about: value.about,
-            start: value.start,
-            stiffness: value.stiffness,
-            release: value.release,
-        });
-    }
-    let mut forces: Vec<Force> = Vec::new();
-    for (index, Placed { place, value }) in tables.force.iter().enumerate() {
-        let name = name_or_number(&value.name, "force", index);
-        check_name(&forces, |force| &force.name, &name, "force", place)?;
-        let purpose = purpose("force", &value.name, index);
-        forces.push(Force {
-            name,
-            keys: force_keys(value, &purpose)?,
-            patch: build_patch(&bodies, &value.patch, purpose, place)?,
-            force: value.force,
-            interpolation: value.interpolation,
-        });
-    }
-    let mut springs: Vec<Spring> = Vec::new();
-    for (index, Placed { place, value }) in tables.spring.iter().enumerate() {
-        let name = name_or_number(&value.name, "spring", index);
-        check_name(&springs, |spring| &spring.name, &name, "spring", place)?;
-        let end = |table: &PatchTable, which: &str, place: &Place| {
-            let purpose = format!("{}, end `{which}`,", purpose("spring", &value.name, index));
-            build_patch(&bodies, table, purpose, place)
-        };
-        springs.push(Spring {
-            name,
-            from: end(&value.from.value, "from", &value.from.place)?,
-            to: end(&value.to.value, "to", &value.to.place)?,
-            stiffness: value.stiffness,
-            rest_length: value.rest_length,
-        });
-    }
     let title = if tables.title.is_empty() { name.to_owned() } else { tables.title };
     let (places, changes): (Vec<Place>, Vec<Change>) =
         build_changes(&tables.change)?.into_iter().unzip();
@@ -111,11 +66,11 @@ pub(super) fn build_scene(name: &str, tree: Node) -> Result<Scene, SceneError> {
         description: tables.description,
         time: tables.time,
         world: tables.world,
-        bodies,
         fixings,
-        motions,
-        forces,
-        springs,
+        motions: build_motions(&bodies, &tables.motion)?,
+        forces: build_forces(&bodies, &tables.force)?,
+        springs: build_springs(&bodies, &tables.spring)?,
+        bodies,
         changes,
         solver: tables.solver,
         output: tables.output,
@@ -131,6 +86,69 @@ pub(super) fn build_scene(name: &str, tree: Node) -> Result<Scene, SceneError> {
         })?;
     }
     Ok(scene)
+}
+
+fn build_motions(
+    bodies: &[Body],
+    tables: &[Placed<MotionTable>],
+) -> Result<Vec<Motion>, SceneError> {
+    let mut motions: Vec<Motion> = Vec::new();
+    for (index, Placed { place, value }) in tables.iter().enumerate() {
+        let name = name_or_number(&value.name, "motion", index);
+        check_name(&motions, |motion| &motion.name, &name, "motion", place)?;
+        let purpose = purpose("motion", &value.name, index);
+        motions.push(Motion {
+            name,
+            keys: motion_keys(value, &purpose, place)?,
+            patch: build_patch(bodies, &value.patch, purpose, place)?,
+            interpolation: value.interpolation,
+            about: value.about,
+            start: value.start,
+            stiffness: value.stiffness,
+            release: value.release,
+        });
+    }
+    Ok(motions)
+}
+
+fn build_forces(bodies: &[Body], tables: &[Placed<ForceTable>]) -> Result<Vec<Force>, SceneError> {
+    let mut forces: Vec<Force> = Vec::new();
+    for (index, Placed { place, value }) in tables.iter().enumerate() {
+        let name = name_or_number(&value.name, "force", index);
+        check_name(&forces, |force| &force.name, &name, "force", place)?;
+        let purpose = purpose("force", &value.name, index);
+        forces.push(Force {
+            name,
+            keys: force_keys(value, &purpose)?,
+            patch: build_patch(bodies, &value.patch, purpose, place)?,
+            force: value.force,
+            interpolation: value.interpolation,
+        });
+    }
+    Ok(forces)
+}
+
+fn build_springs(
+    bodies: &[Body],
+    tables: &[Placed<SpringTable>],
+) -> Result<Vec<Spring>, SceneError> {
+    let mut springs: Vec<Spring> = Vec::new();
+    for (index, Placed { place, value }) in tables.iter().enumerate() {
+        let name = name_or_number(&value.name, "spring", index);
+        check_name(&springs, |spring| &spring.name, &name, "spring", place)?;
+        let end = |table: &PatchTable, which: &str, place: &Place| {
+            let purpose = format!("{}, end `{which}`,", purpose("spring", &value.name, index));
+            build_patch(bodies, table, purpose, place)
+        };
+        springs.push(Spring {
+            name,
+            from: end(&value.from.value, "from", &value.from.place)?,
+            to: end(&value.to.value, "to", &value.to.place)?,
+            stiffness: value.stiffness,
+            rest_length: value.rest_length,
+        });
+    }
+    Ok(springs)
 }
 
 /// In the order of their times, with their places.

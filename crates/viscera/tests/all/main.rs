@@ -38,6 +38,7 @@ mod mesh_damage;
 mod mesh_io;
 mod parts;
 mod physics;
+mod pins;
 mod readme;
 mod saved;
 mod scene_errors;

@@ -109,6 +109,14 @@ fn a_bad_value_says_why_and_what_to_write() {
             "s.toml, line 19, column 25: translation = [...]: this must be a list of three such as \
              [\"32 mm\", 0, 0]",
         ),
+    ] {
+        assert_eq!(error(old, new), message);
+    }
+}
+
+#[test]
+fn another_bad_value_says_why_and_what_to_write() {
+    for (old, new, message) in [
         (
             "normal = [-1, 0, 0]",
             "normal = [0, 0, 0]",
@@ -196,6 +204,14 @@ fn keys_that_do_not_go_together_are_refused() {
             "shape = \"beam\"\nmesh = \"bar.msh\"",
             "s.toml, line 4, column 1: body `bar`: `mesh` and `shape` exclude each other; keep one",
         ),
+    ] {
+        assert_eq!(error(old, new), message);
+    }
+}
+
+#[test]
+fn more_keys_that_do_not_go_together_are_refused() {
+    for (old, new, message) in [
         (
             "young = \"5 kPa\", ",
             "",

@@ -203,3 +203,61 @@ fn readme_example_is_the_file_that_is_tested() {
     let same = |s: &str| s.replace("\r\n", "\n").trim().to_owned();
     assert_eq!(same(block), same(&read(name)), "README.md and {name} differ: copy the file");
 }
+
+/// Sources of all packages, with their paths from the root.
+fn all_sources() -> Vec<(String, String)> {
+    let mut files = Vec::new();
+    let mut folders = vec![root().join("crates"), root().join("xtask")];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).expect("a folder of sources").flatten() {
+            let path = entry.path();
+            if path.is_dir() && !path.ends_with("target") {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs" || e == "wgsl") {
+                let text = fs::read_to_string(&path).expect("readable source");
+                files
+                    .push((path.strip_prefix(root()).unwrap_or(&path).display().to_string(), text));
+            }
+        }
+    }
+    files
+}
+
+/// A file and a function are read at one sitting.
+#[test]
+fn files_and_functions_are_short() {
+    let indent = |line: &str| line.len() - line.trim_start().len();
+    let mut complaints = Vec::new();
+    let sources = all_sources();
+    assert!(sources.len() > 300, "{} sources", sources.len());
+    let mut functions = 0;
+    for (name, text) in &sources {
+        let lines: Vec<&str> = text.lines().collect();
+        if lines.len() >= 500 {
+            complaints.push(format!("{name}: {} lines; below 500", lines.len()));
+        }
+        for (first, line) in lines.iter().enumerate() {
+            let words = line.trim_start();
+            let is_function =
+                ["fn ", "pub fn ", "pub(super) fn ", "pub(crate) fn ", "pub unsafe fn "]
+                    .iter()
+                    .any(|start| words.starts_with(start));
+            // What a trait only declares ends before it begins.
+            let opens = lines[first..].iter().find(|l| l.ends_with(['{', ';', '}']));
+            let has_body = opens.is_some_and(|line| line.ends_with('{'));
+            let is_end = |other: &str| indent(other) == indent(line) && other.trim() == "}";
+            if is_function
+                && has_body
+                && let Some(length) = lines[first..].iter().position(|other| is_end(other))
+            {
+                functions += 1;
+                let length = length + 1;
+                if length >= 80 {
+                    complaints.push(format!("{name}:{}: {length} lines; below 80", first + 1));
+                }
+            }
+        }
+    }
+    assert!(functions > 2000, "{functions} functions");
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}

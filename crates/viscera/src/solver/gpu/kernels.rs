@@ -142,102 +142,120 @@ const SHARED: [&str; 5] = [
     include_str!("table.wgsl"),
 ];
 
-/// The whole text that a kernel is compiled from.
-pub fn source(kernel: &Kernel, variant: Variant) -> String {
-    let form = || match variant.form {
+/// Sums over parts of the long vector.
+const SPANS: &str = include_str!("spans.wgsl");
+const SUMS: &str = include_str!("sums.wgsl");
+
+/// Springs and attachments.
+const SINGLE: [&str; 2] = [wgsl::SPRING, wgsl::ATTACHMENT];
+
+/// The potential, and what the guard decides by it.
+const GUARD: [&str; 6] = [
+    wgsl::SPRING,
+    wgsl::ATTACHMENT,
+    wgsl::NEO_HOOKEAN,
+    TISSUE_WGSL,
+    include_str!("../step/potential.wgsl"),
+    include_str!("../step/guard_decide.wgsl"),
+];
+
+/// The files that make a formulation of constraints.
+fn form(form: TetForm) -> Vec<&'static str> {
+    match form {
         TetForm::GreenStrain => vec![include_str!("../xpbd/forms_green_strain.wgsl")],
-        TetForm::NeoHookeanPair => {
-            vec![
-                wgsl::NEO_HOOKEAN,
-                wgsl::NEO_HOOKEAN_PAIR,
-                include_str!("../xpbd/forms_neo_hookean.wgsl"),
-            ]
-        }
+        TetForm::NeoHookeanPair => vec![
+            wgsl::NEO_HOOKEAN,
+            wgsl::NEO_HOOKEAN_PAIR,
+            include_str!("../xpbd/forms_neo_hookean_pair.wgsl"),
+        ],
         TetForm::NeoHookeanStretch => vec![
             wgsl::SINGULAR_VALUES,
             wgsl::NEO_HOOKEAN_STRETCH,
-            include_str!("../xpbd/forms_neo_hookean.wgsl"),
+            include_str!("../xpbd/forms_neo_hookean_stretch.wgsl"),
         ],
-    };
-    let swept = match variant.swept {
-        Swept::Vertices => include_str!("../xpbd/sweep_vertices.wgsl"),
-        Swept::Copies => include_str!("../xpbd/sweep_copies.wgsl"),
-        Swept::Jacobi => include_str!("../xpbd/sweep_jacobi.wgsl"),
-    };
-    let single = [wgsl::SPRING, wgsl::ATTACHMENT];
-    let constants = super::host::constants();
-    let mut texts = vec![constants.as_str()];
-    texts.extend(SHARED);
+    }
+}
+
+/// How a sweep reads and writes, and how an acceleration finds what a sweep has left.
+fn swept(swept: Swept) -> [&'static str; 2] {
+    let copies = include_str!("../xpbd/acceleration_mapped_copies.wgsl");
+    match swept {
+        Swept::Vertices => [
+            include_str!("../xpbd/sweep_vertices.wgsl"),
+            include_str!("../xpbd/acceleration_mapped_vertices.wgsl"),
+        ],
+        Swept::Copies => [include_str!("../xpbd/sweep_copies.wgsl"), copies],
+        Swept::Jacobi => [include_str!("../xpbd/sweep_jacobi.wgsl"), copies],
+    }
+}
+
+/// The files of a kernel, each whole, in order.
+fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
+    let [swept, mapped] = swept(variant.swept);
+    let form = form(variant.form);
+    let own = |file| vec![file];
     match kernel.file {
-        File::Predict => texts.push(include_str!("../step/predict.wgsl")),
-        File::Rebase => texts.push(include_str!("../xpbd/rebase.wgsl")),
-        File::Sweep => {
-            texts.extend(form());
-            texts.extend([swept, include_str!("../xpbd/sweep.wgsl")]);
-        }
-        File::SweepSingle => {
-            texts.extend(single);
-            texts.extend([swept, include_str!("../xpbd/sweep_single.wgsl")]);
-        }
-        File::LoadsSingle => {
-            texts.extend(single);
-            texts.push(include_str!("../xpbd/loads_single.wgsl"));
-        }
-        File::Loads => {
-            texts.extend(form());
-            texts.push(include_str!("../xpbd/loads.wgsl"));
-        }
-        File::Strain => texts.push(include_str!("../step/strain.wgsl")),
-        File::Multipliers => texts.push(include_str!("../xpbd/multipliers.wgsl")),
-        File::Acceleration => {
-            texts.extend([include_str!("spans.wgsl"), include_str!("sums.wgsl")]);
-            texts.push(include_str!("../xpbd/acceleration.wgsl"));
-        }
+        File::Predict => own(include_str!("../step/predict.wgsl")),
+        File::Rebase => own(include_str!("../xpbd/rebase.wgsl")),
+        File::Sweep => [form, vec![swept, include_str!("../xpbd/sweep.wgsl")]].concat(),
+        File::SweepSingle => [SINGLE, [swept, include_str!("../xpbd/sweep_single.wgsl")]].concat(),
+        File::LoadsSingle => [&SINGLE[..], &[include_str!("../xpbd/loads_single.wgsl")]].concat(),
+        File::Loads => [form, own(include_str!("../xpbd/loads.wgsl"))].concat(),
+        File::Strain => own(include_str!("../step/strain.wgsl")),
+        File::Multipliers => own(include_str!("../xpbd/multipliers.wgsl")),
+        File::Acceleration => vec![SPANS, SUMS, include_str!("../xpbd/acceleration.wgsl")],
         File::AndersonPush => {
-            let mapped = match variant.swept {
-                Swept::Vertices => include_str!("../xpbd/acceleration_mapped_vertices.wgsl"),
-                Swept::Copies | Swept::Jacobi => {
-                    include_str!("../xpbd/acceleration_mapped_copies.wgsl")
-                }
-            };
-            texts.extend([include_str!("spans.wgsl"), include_str!("sums.wgsl")]);
-            texts.extend([mapped, include_str!("../xpbd/acceleration_push.wgsl")]);
+            vec![SPANS, SUMS, mapped, include_str!("../xpbd/acceleration_push.wgsl")]
         }
         File::History => {
             // Functions of the tissue need those of both laws; the pair brings its own along.
-            if variant.form != TetForm::NeoHookeanPair {
-                texts.push(wgsl::NEO_HOOKEAN);
-            }
-            texts.extend(form());
-            texts.extend(single);
-            texts.extend([
-                TISSUE_WGSL,
-                include_str!("spans.wgsl"),
-                include_str!("../xpbd/history.wgsl"),
-            ]);
+            let has_law = variant.form == TetForm::NeoHookeanPair;
+            let law = if has_law { Vec::new() } else { own(wgsl::NEO_HOOKEAN) };
+            let rest = vec![TISSUE_WGSL, SPANS, include_str!("../xpbd/history.wgsl")];
+            [law, form, SINGLE.to_vec(), rest].concat()
         }
         File::Explicit => {
-            texts.extend([wgsl::NEO_HOOKEAN, wgsl::SPRING, TISSUE_WGSL]);
-            texts.extend([include_str!("../explicit/mod.wgsl")]);
+            vec![wgsl::NEO_HOOKEAN, wgsl::SPRING, TISSUE_WGSL, include_str!("../explicit/mod.wgsl")]
         }
-        File::Evaluate | File::Search | File::Take | File::Energy => {
-            texts.extend(single);
-            texts.extend([wgsl::NEO_HOOKEAN, TISSUE_WGSL, include_str!("../step/potential.wgsl")]);
-            texts.push(include_str!("../step/guard_decide.wgsl"));
-            match kernel.file {
-                File::Evaluate => texts.push(include_str!("../step/guard_evaluate.wgsl")),
-                File::Search => texts.push(include_str!("../step/guard_search.wgsl")),
-                File::Take => texts
-                    .extend([include_str!("spans.wgsl"), include_str!("../step/guard_take.wgsl")]),
-                _ => texts.push(include_str!("../step/energy.wgsl")),
+        File::Evaluate => [&GUARD[..], &[include_str!("../step/guard_evaluate.wgsl")]].concat(),
+        File::Search => [&GUARD[..], &[include_str!("../step/guard_search.wgsl")]].concat(),
+        File::Take => [&GUARD[..], &[SPANS, include_str!("../step/guard_take.wgsl")]].concat(),
+        File::Energy => [&GUARD[..], &[include_str!("../step/energy.wgsl")]].concat(),
+    }
+}
+
+/// The whole text that a kernel is compiled from: constants that the host shares, then whole files.
+pub fn source(kernel: &Kernel, variant: Variant) -> String {
+    let constants = super::host::constants();
+    let all = [&[constants.as_str()][..], &SHARED, &files(kernel, variant)].concat();
+    all.join("\n")
+}
+
+/// Every text that there is, with a name: the entry point, and the variant where the text depends on it.
+pub fn texts() -> Vec<(String, String)> {
+    let forms = [TetForm::GreenStrain, TetForm::NeoHookeanPair, TetForm::NeoHookeanStretch];
+    let variants =
+        forms.into_iter().flat_map(|form| Swept::ALL.map(|swept| Variant { form, swept }));
+    let mut texts: Vec<(String, String)> = Vec::new();
+    for kernel in ALL {
+        for variant in variants.clone() {
+            let text = source(kernel, variant);
+            let name = key(kernel, variant).replace(' ', "-");
+            if !texts.iter().any(|(known, _)| *known == name) {
+                texts.push((name, text));
             }
         }
     }
-    let [form, count] = match variant.form {
-        TetForm::NeoHookeanPair => ["neo_hookean_pair", "2"],
-        _ => ["neo_hookean_stretch", "6"],
-    };
-    texts.join("\n").replace("$form", form).replace("$count", count)
+    texts
+}
+
+/// What tells pipelines apart.
+fn key(kernel: &Kernel, variant: Variant) -> String {
+    if varies(kernel) {
+        format!("{} {:?} {:?}", kernel.entry, variant.form, variant.swept)
+    } else {
+        kernel.entry.to_owned()
+    }
 }
 
 /// Whether the text depends on the variant.
@@ -250,11 +268,7 @@ fn varies(kernel: &Kernel) -> bool {
 
 /// Compiles a kernel, or finds it compiled.
 pub(super) fn pipeline(device: &Device, kernel: &Kernel, variant: Variant) -> Pipeline {
-    let key = if varies(kernel) {
-        format!("{} {:?} {:?}", kernel.entry, variant.form, variant.swept)
-    } else {
-        kernel.entry.to_owned()
-    };
+    let key = key(kernel, variant);
     let mut known = device.pipelines.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     if let Some(pipeline) = known.get(&key) {
         return pipeline.clone();

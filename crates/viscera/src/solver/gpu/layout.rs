@@ -193,10 +193,7 @@ impl Layout {
         }
         let (members, pieces) = pieces(model, &springs, &attachments);
         let parts = Parts::new(model, settings, &pieces);
-        let sets = model.tet_sets().into_iter();
-        let of_block = |vertices: &[[u32; LANES]; 4]| model.part_at(vertices[0][0] as usize) as u32;
-        let block_parts = sets.flat_map(|set| set.blocks.iter().map(|b| of_block(&b.vertices)));
-        let block_parts = block_parts.collect();
+        let block_parts = block_parts(model);
         Self { offsets, corners, springs, attachments, members, pieces, block_parts, parts }
     }
 
@@ -315,6 +312,13 @@ pub(super) fn copy_offsets(model: &Model<f32>) -> Vec<u32> {
         offsets[part.vertices.clone()].iter_mut().for_each(|first| *first |= WHOLE);
     }
     offsets
+}
+
+/// The part of each block.
+fn block_parts(model: &Model<f32>) -> Vec<u32> {
+    let of_block = |vertices: &[[u32; LANES]; 4]| model.part_at(vertices[0][0] as usize) as u32;
+    let sets = model.tet_sets().into_iter();
+    sets.flat_map(|set| set.blocks.iter().map(|b| of_block(&b.vertices))).collect()
 }
 
 /// Elements of each part in pieces, then vertices.

@@ -122,34 +122,8 @@ impl GpuSolver {
         let vector = [buffers.length, (buffers.multipliers_start / 4) as u32];
         let record = Recorder::new(model, settings, vector, layout.pieces()).record(&plan);
         let lists = [record.prologue, record.body, record.epilogue, record.restart];
-        let wgpu = &device.device;
-        let make = |label, size, usage| {
-            wgpu.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size,
-                usage: usage | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        };
         let job_count = lists.iter().map(Vec::len).sum::<usize>() as u64;
-        let uniform = wgpu::BufferUsages::UNIFORM;
-        let jobs = make("jobs", JOB_STRIDE * job_count.max(1), uniform);
-        let frame = make("frame", size_of::<FrameConstants>() as u64, uniform);
-        let uniforms = wgpu.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("job and frame"),
-            layout: &kernels::uniform_layout(wgpu),
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                        buffer: &jobs,
-                        offset: 0,
-                        size: std::num::NonZero::new(size_of::<Job>() as u64),
-                    }),
-                },
-                wgpu::BindGroupEntry { binding: 1, resource: frame.as_entire_binding() },
-            ],
-        });
+        let (jobs, frame, uniforms) = make_uniforms(device, job_count);
         let mut next = 0;
         let [prologue, body, epilogue, restart] = lists.map(|list| {
             let prepare = |dispatch: &Dispatch| {
@@ -329,6 +303,38 @@ impl GpuSolver {
             self.buffers.write(&self.device.queue, slot, bytemuck::cast_slice(&values));
         }
     }
+}
+
+/// Buffers for so many jobs and for the constants of a step, and how kernels are bound to them.
+fn make_uniforms(device: &Device, job_count: u64) -> (wgpu::Buffer, wgpu::Buffer, wgpu::BindGroup) {
+    let wgpu = &device.device;
+    let make = |label, size, usage| {
+        wgpu.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    };
+    let uniform = wgpu::BufferUsages::UNIFORM;
+    let jobs = make("jobs", JOB_STRIDE * job_count.max(1), uniform);
+    let frame = make("frame", size_of::<FrameConstants>() as u64, uniform);
+    let uniforms = wgpu.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("job and frame"),
+        layout: &kernels::uniform_layout(wgpu),
+        entries: &[
+            wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                    buffer: &jobs,
+                    offset: 0,
+                    size: std::num::NonZero::new(size_of::<Job>() as u64),
+                }),
+            },
+            wgpu::BindGroupEntry { binding: 1, resource: frame.as_entire_binding() },
+        ],
+    });
+    (jobs, frame, uniforms)
 }
 
 fn in_solver_order(model: &Model<f32>, values: &[Vec3<f32>]) -> Vec<[f32; 4]> {

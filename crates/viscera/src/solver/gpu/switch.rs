@@ -65,14 +65,6 @@ impl GpuSolver {
         count: usize,
     ) {
         let StepData { constants, points, velocities, loads } = &solver.memory.data;
-        let put = |slot, values: &[[f32; 4]]| {
-            let bytes = bytemuck::cast_slice(values);
-            self.buffers.write(&self.device.queue, slot, bytes);
-        };
-        let each = |of: &dyn Fn(usize) -> [f32; 4]| -> Vec<[f32; 4]> {
-            (0..model.vertex_count()).map(of).collect()
-        };
-        let with = |v: Vec3<f32>, w: f32| [v.x, v.y, v.z, w];
         let vector = |points: &[Point<f32>], multipliers: &[f32]| {
             let mut vector = vec![0.0; self.buffers.length as usize];
             let places: Vec<[f32; 4]> = points.iter().map(whole).collect();
@@ -89,7 +81,7 @@ impl GpuSolver {
             return;
         }
         write(Slot::Unknowns, &vector(points, &state.multipliers));
-        put(Slot::Velocities, &each(&|v| with(velocities[v], 0.0)));
+        self.put_rows(Slot::Velocities, &each(model, &|v| with(velocities[v], 0.0)));
         if model.tet_sets().iter().any(|set| set.viscous) {
             let mut rows: Vec<f32> = Vec::new();
             for (own, set) in constants.start_strain.iter().zip(model.tet_sets()) {
@@ -111,14 +103,33 @@ impl GpuSolver {
                 if is_valid { (&remembered.positions, &remembered.multipliers) } else { now };
             write(Slot::Iterate, &vector(points, multipliers));
         }
+        self.take_over_prediction(&solver.memory.data, model, inputs);
+        if model.is_split() {
+            let all: Vec<[f32; 4]> = memory.copies.iter().map(whole).collect();
+            self.put_rows(Slot::Copies, &all);
+        }
+        if !loads.is_empty() {
+            self.put_rows(Slot::Loads, &Layout::new(model, &self.settings).loads(model, loads));
+        }
+    }
+
+    /// What the prediction leaves: constants of the step, targets, and where steps are guarded their starts.
+    fn take_over_prediction(&self, data: &StepData<f32>, model: &Model<f32>, inputs: &Inputs<f32>) {
+        let StepData { constants, points, .. } = data;
         let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
-        put(Slot::Previous, &each(&|v| with(constants.previous[v].vec3(), copies(v))));
-        put(
-            Slot::Predicted,
-            &each(&|v| with(constants.predicted[v].vec3(), constants.inertias[v])),
+        self.put_rows(
+            Slot::Previous,
+            &each(model, &|v| with(constants.previous[v].vec3(), copies(v))),
         );
-        put(Slot::Acting, &each(&|v| with(constants.external[v], constants.inverse_masses[v])));
-        let mut targets = each(&|_| [0.0; 4]);
+        self.put_rows(
+            Slot::Predicted,
+            &each(model, &|v| with(constants.predicted[v].vec3(), constants.inertias[v])),
+        );
+        self.put_rows(
+            Slot::Acting,
+            &each(model, &|v| with(constants.external[v], constants.inverse_masses[v])),
+        );
+        let mut targets = each(model, &|_| [0.0; 4]);
         for tether in &constants.tethers {
             targets[tether.vertex] = with(tether.target, tether.stiffness);
         }
@@ -135,17 +146,23 @@ impl GpuSolver {
                     row[v] = place(v, point.vec3());
                 }
             }
-            put(Slot::Starts, &rows);
+            self.put_rows(Slot::Starts, &rows);
         }
-        put(Slot::Targets, &targets);
-        if model.is_split() {
-            let all: Vec<[f32; 4]> = memory.copies.iter().map(whole).collect();
-            put(Slot::Copies, &all);
-        }
-        if !loads.is_empty() {
-            put(Slot::Loads, &Layout::new(model, &self.settings).loads(model, loads));
-        }
+        self.put_rows(Slot::Targets, &targets);
     }
+
+    fn put_rows(&self, slot: Slot, values: &[[f32; 4]]) {
+        self.buffers.write(&self.device.queue, slot, bytemuck::cast_slice(values));
+    }
+}
+
+/// A row for each of the solver's vertices.
+fn each(model: &Model<f32>, of: &dyn Fn(usize) -> [f32; 4]) -> Vec<[f32; 4]> {
+    (0..model.vertex_count()).map(of).collect()
+}
+
+fn with(v: Vec3<f32>, w: f32) -> [f32; 4] {
+    [v.x, v.y, v.z, w]
 }
 
 fn whole(point: &Point<f32>) -> [f32; 4] {
