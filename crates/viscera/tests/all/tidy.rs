@@ -172,6 +172,7 @@ fn looks_like_a_path(text: &str) -> bool {
     let endings = ["/", ".rs", ".md", ".toml", ".cff", ".wgsl", ".yml"];
     let folders = ["crates/", "scenes/", "docs/", ".ci/", ".cargo/"];
     plain
+        && !endings.contains(&text)
         && (endings.iter().any(|e| text.ends_with(e))
             || folders.iter().any(|folder| text.starts_with(folder)))
 }
@@ -186,6 +187,50 @@ fn paths_in_architecture_exist() {
         |p: &str| ["", "crates/viscera/src"].iter().any(|at| root().join(at).join(p).exists());
     let missing: Vec<&str> = paths.into_iter().filter(|p| !exists(p)).collect();
     assert!(missing.is_empty(), "ARCHITECTURE.md names what does not exist: {missing:?}");
+}
+
+/// `file::test`, of the integration tests.
+#[test]
+fn tests_in_architecture_exist() {
+    let text = read("ARCHITECTURE.md");
+    let start = text.find("## Invariants").expect("the invariants");
+    let rows: Vec<&str> =
+        text[start..].lines().filter(|line| line.starts_with("| ")).skip(1).collect();
+    assert!(rows.len() >= 10, "{} invariants", rows.len());
+    for row in rows {
+        let tests: Vec<&str> = code_spans(row).into_iter().filter(|s| s.contains("::")).collect();
+        assert!(!tests.is_empty(), "{row}: name its test");
+        for test in tests {
+            let (file, name) = test.split_once("::").expect("a test of a file");
+            let source = read(&format!("crates/viscera/tests/all/{file}.rs"));
+            let is_test = source.contains(&format!("#[test]\nfn {name}()"));
+            assert!(is_test, "{test}: no such test");
+        }
+    }
+}
+
+/// The code names of glossary and symbols are names in the library.
+#[test]
+fn symbols_of_the_algorithm_are_in_the_code() {
+    let text = read("docs/algorithm.md");
+    let sources: String = library_sources().into_iter().map(|(_, source)| source).collect();
+    let is_part = |c: char| c.is_alphanumeric() || c == '_';
+    let words: std::collections::BTreeSet<&str> = sources.split(|c| !is_part(c)).collect();
+    let mut count = 0;
+    for (head, column) in [("| term | symbol |", 4), ("| symbol | code |", 2)] {
+        let start = text.find(head).unwrap_or_else(|| panic!("no table `{head}`"));
+        let rows = text[start..].lines().skip(2).take_while(|line| line.starts_with('|'));
+        for row in rows {
+            let code = row.split('|').nth(column).expect("a column");
+            let names = code_spans(code).into_iter().flat_map(|span| span.split(|c| !is_part(c)));
+            // Numbers and single letters are mathematics.
+            for name in names.filter(|name| name.len() > 2 && name.parse::<f64>().is_err()) {
+                assert!(words.contains(name), "{row}: `{name}` is not in the library");
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 50, "{count} names");
 }
 
 #[test]
