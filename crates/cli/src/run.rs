@@ -8,7 +8,6 @@ use crate::summary::{FrameLine, Summary};
 use crate::{memory, progress};
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use clap::builder::RangedI64ValueParser;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::{register, register_conditional_shutdown};
 use std::path::{Path, PathBuf};
@@ -36,10 +35,10 @@ pub struct RunArguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Compute so many frames instead of the scene's duration
-    #[arg(long, value_name = "N", value_parser = from_one::<u64>(), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = from_one::<u64>, allow_negative_numbers = true)]
     frames: Option<u64>,
     /// Write every K-th frame; the same as --set output.every=K
-    #[arg(long, value_name = "K", value_parser = from_one::<u32>(), allow_negative_numbers = true)]
+    #[arg(long, value_name = "K", value_parser = from_one::<u32>, allow_negative_numbers = true)]
     every: Option<u32>,
     /// Change a setting: KEY=VALUE, as in `solver.iterations=20` or
     /// `body.liver.material.young="8 kPa"`; may be repeated. `viscera scene describe` lists keys
@@ -60,13 +59,11 @@ pub struct RunArguments {
     resume: Option<PathBuf>,
 }
 
-/// Counts from one on. Read as signed numbers, so that the error for a negative one names the legal range.
-fn from_one<T>() -> RangedI64ValueParser<T>
-where
-    T: TryFrom<i64> + Clone + Send + Sync,
-    <T as TryFrom<i64>>::Error: Send + Sync + 'static + std::error::Error,
-{
-    RangedI64ValueParser::new().range(1..)
+/// Counts from one on; the error says that, not the largest number there is.
+fn from_one<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
+    let count = text.trim().parse::<u64>().ok().filter(|&count| count > 0);
+    let count = count.and_then(|count| T::try_from(count).ok());
+    count.ok_or_else(|| "write a whole number from 1 on".to_owned())
 }
 
 /// How a run ended.

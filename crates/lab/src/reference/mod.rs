@@ -38,7 +38,7 @@ use matrix::{FactorError, Factorization, Pattern};
 use objective::{Load, Objective, creep_at};
 use problem::Problem;
 
-/// Memory [B] that a reference takes at most unless told otherwise.
+/// Memory [B] that a reference takes at most unless stated otherwise.
 pub const DEFAULT_MEMORY: u64 = 8 << 30;
 
 /// Why there is no reference solution.

@@ -22,7 +22,7 @@ pub struct Objective<'a> {
     pub problem: &'a Problem,
     /// Anchors of the attachments [m].
     pub anchors: &'a [Vec3<f64>],
-    /// Springs to places outside.
+    /// Soft position constraints.
     pub tethers: &'a [Tether<f64>],
     /// What pulls.
     pub load: Load,

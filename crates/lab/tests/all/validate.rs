@@ -89,7 +89,7 @@ fn stiffness_does_not_depend_on_the_budget_at_length() {
     assert_sections_hold("rest,independence,motion,stress", &figures);
 }
 
-/// Claims that are told as missed: five sweeps of one colour do not unscramble a bar, and Anderson's
+/// Known failures: five sweeps of one colour do not unscramble a bar, and Anderson's
 /// default guard follows a drop a little less closely than is asked.
 const TOLD: [&str; 2] = ["scrambles, Jacobi", "Anderson guarded by residual"];
 

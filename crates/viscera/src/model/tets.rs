@@ -44,7 +44,7 @@ pub struct TetSet<S> {
     pub(crate) viscous_blocks: Vec<bool>,
     /// The copies that a sweep works on, per corner; empty where nothing is split: the vertices.
     pub(crate) copies: Vec<[Eight<u32>; 4]>,
-    /// The user's number of each tetrahedron, shape [tet_count]; without fillings.
+    /// The user's number of each tetrahedron, shape [tet_count]; without padding lanes.
     pub(crate) order: Vec<u32>,
     /// Blocks of colour `c` are `color_offsets[c] .. color_offsets[c + 1]`.
     pub(crate) color_offsets: Vec<u32>,

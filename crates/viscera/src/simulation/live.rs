@@ -172,7 +172,7 @@ impl<S: Real> Simulation<S> {
         self.by_hand.clear();
         self.changes_made = 0;
         self.rejected_substeps = 0;
-        self.put(State::at_rest(&self.model));
+        self.put_at_rest();
         self.balance = ForceBalance::default();
         self.inputs = self.inputs_at(0.0);
         measure_tets(&self.model, &self.state.positions, &mut self.tets);
@@ -253,6 +253,17 @@ impl<S: Real> Simulation<S> {
         debug_assert!(restarted.is_ok(), "{restarted:?}");
         self.put(state);
         self.stepped = false;
+    }
+
+    /// At rest, in the same memory: callers look at positions where they are.
+    fn put_at_rest(&mut self) {
+        let mut rest = State::at_rest(&self.model);
+        let State { positions, velocities, .. } = &mut self.state;
+        positions.clone_from(&rest.positions);
+        velocities.clone_from(&rest.velocities);
+        rest.positions = std::mem::take(positions);
+        rest.velocities = std::mem::take(velocities);
+        self.put(rest);
     }
 
     /// The state from now on, on whatever computes the steps.

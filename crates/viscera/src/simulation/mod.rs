@@ -182,7 +182,8 @@ impl<S: Real> Simulation<S> {
         &self.model
     }
 
-    /// What moves. Where a graphics processor computes, its multipliers stay there: these are older ones.
+    /// What moves. Positions and velocities stay where they are in memory, as long as the simulation lives. Where a
+    /// graphics processor computes, multipliers stay there: these are older ones.
     pub fn state(&self) -> &State<S> {
         &self.state
     }

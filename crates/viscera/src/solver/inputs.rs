@@ -33,7 +33,7 @@ pub struct Inputs<S> {
     pub gravity: Vec3<S>,
     /// Pinned vertices. The set may change from step to step.
     pub pins: Vec<Pin<S>>,
-    /// Springs to places outside. The set may change from step to step; several on one vertex add up.
+    /// Soft position constraints to moving targets. The set may change from step to step; several on one vertex add up.
     pub tethers: Vec<Tether<S>>,
     /// Where each attachment's anchor is at the end of the step [m], the user's order. Empty:
     /// all anchors at rest.

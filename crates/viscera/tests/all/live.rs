@@ -321,3 +321,21 @@ fn what_is_measured_after_a_change_is_still_of_the_last_step() {
     let fork: Simulation<f32> = simulation.fork(&[]).expect("a fork");
     assert_eq!(fork.report().relative_residual, before.relative_residual);
 }
+
+/// Another language's view of positions stays good: frames, holds, changes of settings and a reset leave them where
+/// they are.
+#[test]
+fn positions_stay_where_they_are_in_memory() {
+    let mut simulation = simulation::<f32>(BAR, &[("solver.device", "cpu")]);
+    let place = simulation.state().positions.as_ptr();
+    let hold = simulation.take_hold("hand", tip(), Some(50.0)).expect("a hold");
+    simulation.lead(hold, vec3(0.0, 0.0, 0.01)).expect("a hold");
+    frames(&mut simulation, 25);
+    simulation.change(&pairs(&[("solver.colors", "1")])).expect("a setting");
+    frames(&mut simulation, 2);
+    assert_ne!(simulation.state().positions, simulation.model().rest_positions);
+    simulation.reset().expect("a model");
+    assert_eq!(simulation.state().positions, simulation.model().rest_positions);
+    frames(&mut simulation, 2);
+    assert_eq!(simulation.state().positions.as_ptr(), place);
+}

@@ -14,13 +14,13 @@ use crate::state::State;
 pub enum Task<'a> {
     /// The stages of a step, the body of the plan so many times; of these stages the first so many.
     Step(&'a Plan, u32, usize),
-    /// The stages of a step, the body of the plan so many times, under somebody's eyes.
+    /// The stages of a step, the body of the plan so many times, with an observer callback.
     Watched(&'a Plan, u32, &'a mut Watch<'a>),
     /// Multipliers from positions.
     Restart,
 }
 
-/// Who looks at the places of all vertices [m], the user's order, after so many iterations.
+/// Observer callback: gets the number of iterations and the positions of all vertices [m], the user's order.
 pub type Watch<'a> = dyn FnMut(u32, &[Vec3<f64>]) + Send + 'a;
 
 /// Does it in the precision at hand.

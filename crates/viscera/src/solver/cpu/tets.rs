@@ -110,7 +110,7 @@ impl<'a, S: Real> Block<'a, S> {
     #[inline(always)]
     pub fn corners<L: Lanes<Real = S>>(&self, points: &[Point<S>]) -> Corners<L> {
         assert!(points.len() >= self.set.bounds[0]);
-        // SAFETY: `Workspace::check` compares bounds and lengths, and nobody writes the slice.
+        // SAFETY: `Memory::check` compares bounds and lengths, and nobody writes the slice.
         unsafe { gather(points.as_ptr(), &self.constants.vertices, self.lane) }
     }
 
@@ -195,7 +195,7 @@ impl<'a, S: Real> Block<'a, S> {
         load_rows(&values[self.multipliers_at(offset, N)], self.lane)
     }
 
-    /// Replaces multipliers; those of fillings stay zero.
+    /// Replaces multipliers; those of padding lanes stay zero.
     ///
     /// # Safety
     /// Nobody else is at the block's multipliers meanwhile.

@@ -69,7 +69,7 @@ pub struct GpuSolver {
     pub(super) has_moved_anchors: bool,
     /// Of the explicit method: its small steps, and the attachments vertex by vertex.
     pub(super) stability: Option<Stability>,
-    /// Springs to places outside in the last step.
+    /// Soft position constraints of the last step.
     pub(super) tethers: Vec<Bundle<f32>>,
     pub(super) holds: Vec<Hold>,
     pub(super) small_steps: Vec<SmallSteps>,

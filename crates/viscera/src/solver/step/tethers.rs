@@ -1,4 +1,4 @@
-//! Springs from vertices to places outside, which come and go between steps: what tools hold tissue by.
+//! Soft position constraints to moving targets, which come and go between steps: what tools hold tissue by.
 //!
 //! ```text
 //! 1/2 m |x - xt|^2 + dt^2 k/2 |x - a|^2 = 1/2 m' |x - xt'|^2 + const
@@ -7,7 +7,7 @@
 //!
 //! A spring without length on one vertex is a heavier vertex with another inertial prediction: completing the
 //! square takes it into the step exactly, implicitly, and without a constraint, so that it costs no
-//! colour, no multiplier and no new model. Forms of constraints, guards and accelerations know nothing of it; the
+//! colour, no multiplier and no new model. Constraint formulations, guards and accelerations know nothing of it; the
 //! energy limit does, because kinetic energy is that of the mass alone.
 
 use crate::model::Model;

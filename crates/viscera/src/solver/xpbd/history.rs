@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Kept multipliers tell where the body comes from. Where that means nothing any more, because the
-//! caller has put vertices elsewhere or multipliers of a connected part are no numbers, these take their place.
+//! caller has put vertices elsewhere or multipliers of a connected part are NaN, these take their place.
 //! After a rejected step they must not: see [`crate::solver::step::guard`].
 //!
 //! Pins that are let go keep the history, however hard they pulled. Forgetting it then (all
