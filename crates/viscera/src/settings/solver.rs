@@ -182,7 +182,7 @@ settings_table! {
         /// What keeps Anderson's mixtures in bounds. Without it a bad mixture can throw a strongly
         /// deformed body. "residual" restarts on a grown residual, which bounds no energy (`step_guard`
         /// does that for the whole step); "energy" takes no mixture that raises the incremental
-        /// potential, for one to two evaluations of it per sweep: fewer steps are taken back, but with
+        /// potential, for one to two evaluations of it per sweep: fewer steps are rejected, but with
         /// few colours stiff tissue may stay far from its rest. It acts with `step_guard` (without it
         /// as "residual").
         anderson_guard: AndersonGuard = (AndersonGuard::Residual), one_of::<AndersonGuard>();

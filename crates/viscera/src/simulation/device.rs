@@ -15,7 +15,7 @@ use crate::state::State;
 pub(super) trait Elsewhere<S>: Debug + Send {
     fn step(&mut self, model: &Model<S>, inputs: &Inputs<S>, dt: f64) -> Result<(), FrameError>;
 
-    /// Positions and velocities after the last step; how many steps were taken back so far. On an error nothing
+    /// Positions and velocities after the last step; how many steps were rejected so far. On an error nothing
     /// is changed.
     fn read_frame(&mut self, model: &Model<S>, state: &mut State<S>) -> Result<u64, FrameError>;
 
@@ -48,7 +48,7 @@ pub(super) struct Backend<S> {
     pub warning: Option<String>,
     /// Whether the CPU goes on where the device is lost.
     pub gives_way: bool,
-    /// Steps that the device has taken back, as of the last frame.
+    /// Steps that the device has rejected, as of the last frame.
     pub rejected: u64,
 }
 
@@ -74,7 +74,7 @@ impl<S: Real> Backend<S> {
         }
     }
 
-    /// Steps that have been taken back so far.
+    /// Steps that have been rejected so far.
     pub fn rejected_steps(&self, solver: &Solver<S>) -> u64 {
         if self.elsewhere.is_some() { self.rejected } else { solver.rejected_steps() }
     }

@@ -294,7 +294,7 @@ impl<S: Real> Simulation<S> {
         Ok(())
     }
 
-    /// The substeps of a frame, and the state at its end; returns how many of them were taken back.
+    /// The substeps of a frame, and the state at its end; returns how many of them were rejected.
     fn compute_frame(&mut self) -> Result<u64, FrameError> {
         let dt = substep_dt(&self.scene);
         // The end of the frame is a time of its own: that of the keys by which holds are led.

@@ -1,13 +1,14 @@
 //! A simulation as bytes: saved after a frame and resumed, it goes on to the bit as if it had never stopped.
 //!
 //! All that is kept between frames is written: positions, velocities, multipliers, what was taken hold of, and
-//! how far the scene's changes have come. Settings are not: they come with the scene, and those that change no
-//! layout, such as threads, may be others. What was done by hand belongs into the scene file
+//! how far the scene's changes have come. Settings are not: they come with the scene. Threads, iterations and what
+//! acts may be others; meshes, materials and the duration of a frame may not. What was done by hand belongs into the scene file
 //! ([`Simulation::live`]).
 
 use super::Simulation;
 use super::acting::Taken;
 use super::error::LiveError;
+use crate::elements::kinds::Energy;
 use crate::measure::measure_tets;
 use crate::model::Model;
 use crate::model::single::{ElementSet, for_each_kind};
@@ -73,6 +74,8 @@ struct Saved {
     /// See [`fingerprint`].
     model: u64,
     frame: u64,
+    /// [s].
+    frame_duration: f64,
     changes_made: usize,
     rejected_substeps: u64,
     positions: Vectors,
@@ -101,6 +104,7 @@ impl<S: Real> Simulation<S> {
             precision: size_of::<S>() as u8,
             model: fingerprint(&self.model),
             frame: self.frame,
+            frame_duration: self.scene.time.frame,
             changes_made: self.changes_made,
             rejected_substeps: self.rejected_substeps,
             positions: bare(positions),
@@ -125,6 +129,9 @@ impl<S: Real> Simulation<S> {
             let saved = if saved.precision == 8 { "f64" } else { "f32" };
             return Err(ResumeError::Precision { saved });
         }
+        if saved.frame_duration != self.scene.time.frame {
+            return Err(ResumeError::OtherScene { what: "frame duration, `time.frame`," });
+        }
         self.frame = saved.frame;
         while self.changes_made < saved.changes_made {
             if self.scene.changes.len() <= self.changes_made {
@@ -137,7 +144,7 @@ impl<S: Real> Simulation<S> {
         for (what, fits) in [
             ("vertices", lengths == [vertices; 3]),
             ("constraints", saved.multipliers.len() == self.model.multiplier_count),
-            ("meshes or solver settings", saved.model == fingerprint(&self.model)),
+            ("meshes, materials or solver settings", saved.model == fingerprint(&self.model)),
             ("motions", self.takes(&saved.taken)),
         ] {
             if !fits {
@@ -183,7 +190,7 @@ fn read(bytes: &[u8]) -> Result<Saved, ResumeError> {
     postcard::from_bytes_crc32(rest, crc.digest()).map_err(|_| ResumeError::Damaged)
 }
 
-/// Differs where vertices, elements, or the order of their multipliers differ: 64 bits of FNV-1a.
+/// Differs where vertices, masses, elements, materials, or the order of multipliers differ: 64 bits of FNV-1a.
 fn fingerprint<S: Real>(model: &Model<S>) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325u64;
     let mut add = |number: u64| {
@@ -194,17 +201,27 @@ fn fingerprint<S: Real>(model: &Model<S>) -> u64 {
     for x in bare(&model.rest_positions).as_flattened() {
         add(x.to_bits());
     }
+    for mass in &model.masses {
+        add(mass.to_f64().to_bits());
+    }
+    for material in &model.materials {
+        for number in [material.lame_lambda, material.lame_mu, material.viscosity] {
+            add(number.to_f64().to_bits());
+        }
+    }
     for set in model.tet_sets() {
         add(set.form.multiplier_count() as u64);
         add(u64::from(set.viscous));
         for tet in model.tets(set) {
             add(tet.multiplier(0) as u64);
+            add(tet.material as u64);
             tet.vertices.into_iter().for_each(|v| add(u64::from(v)));
         }
     }
     for_each_kind!(model, set => {
         for i in 0..set.count() {
             set.vertices(i).into_iter().for_each(|v| add(u64::from(v)));
+            add(set.element::<f64>(i, &model.rest_anchors).stiffness().to_bits());
         }
     });
     hash

@@ -183,7 +183,7 @@ impl<S: Real> Solver<S> {
         self.memory.data.constants.workers.count()
     }
 
-    /// How many steps have been taken back for at least one connected part of the model since the solver was
+    /// How many steps have been rejected for at least one connected part of the model since the solver was
     /// built.
     pub fn rejected_steps(&self) -> u64 {
         self.memory.guard.as_ref().map_or(0, |guard| guard.rejected)

@@ -12,7 +12,7 @@ pub struct StepReport {
     pub limit: f64,
     /// What round-off can pretend of `potential` [J s^2]; at most this much above `limit` passes.
     pub noise: f64,
-    /// Whether the sweeps ended above the limit, so that the step was taken back: the part's, or any part's.
+    /// Whether the sweeps ended above the limit, so that the step was rejected: the part's, or any part's.
     pub rejected: bool,
     /// The share of its velocities that the energy limit left to the part, or to the part that it slowed
     /// most; 1 where it did not act.

@@ -165,6 +165,13 @@ fn bytes_of_something_else_are_refused() {
     assert!(matches!(resume(&colors, &saved), ResumeError::OtherScene { .. }));
     let finer = [("body.bar.cells", "[5, 2, 2]")];
     assert_eq!(resume(&finer, &saved), ResumeError::OtherScene { what: "vertices" });
+    let softer = [("body.weight.material.young", "19 kPa")];
+    let of_materials = ResumeError::OtherScene { what: "meshes, materials or solver settings" };
+    assert_eq!(resume(&softer, &saved), of_materials);
+    let stiffer = [("fixing.bed.stiffness", "500 N/m")];
+    assert_eq!(resume(&stiffer, &saved), of_materials);
+    let shorter = resume(&[("time.frame", "10 ms")], &saved);
+    assert!(shorter.to_string().contains("`time.frame`"), "{shorter}");
     let double = cpu::<f64>(&[("solver.precision", "f64")]).resume(&saved).map(|_| ());
     assert_eq!(double, Err(ResumeError::Precision { saved: "f32" }));
     // A change that was made belongs to the scene.

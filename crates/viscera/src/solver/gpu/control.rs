@@ -54,7 +54,7 @@ pub fn control_size(parts: usize) -> u64 {
     (PARTS_START + parts.max(1) * size_of::<PartControl>()) as u64
 }
 
-/// How many steps were taken back, out of the bytes of `Control`.
+/// How many steps were rejected, out of the bytes of `Control`.
 pub fn rejected_steps(control: &[u8]) -> u64 {
     let at = std::mem::offset_of!(Control, rejected);
     bytemuck::pod_read_unaligned::<u32>(&control[at..at + 4]).into()

@@ -32,7 +32,7 @@ struct PartControl {
     last_change: f32,
     // Step guard; potentials [J s^2] are what is above the start of the step with its pins moved.
     limit: f32,
-    // Of the last step: whether it was taken back, and to which share of it; zero for none, from which
+    // Of the last step: whether it was rejected, and to which share of it; zero for none, from which
     // descents follow.
     was_rejected: u32,
     share: f32,

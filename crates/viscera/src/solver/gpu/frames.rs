@@ -97,7 +97,7 @@ impl GpuSolver {
     }
 
     /// Waits for the device and reads positions and velocities at the end of the last step, in place; returns how
-    /// many steps were taken back so far. Multipliers stay on the device. On an error nothing is changed.
+    /// many steps were rejected so far. Multipliers stay on the device. On an error nothing is changed.
     pub fn read_frame(&self, model: &Model<f32>, state: &mut State<f32>) -> Result<u64, GpuError> {
         self.check_model(model)?;
         let part = |slot, size: u64| {

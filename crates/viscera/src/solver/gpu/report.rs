@@ -7,7 +7,7 @@ use super::solver::GpuSolver;
 use crate::solver::report::StepReport;
 
 impl GpuSolver {
-    /// How many steps have been taken back for at least one connected part of the model since the solver was
+    /// How many steps have been rejected for at least one connected part of the model since the solver was
     /// built. Waits for the device.
     pub fn rejected_steps(&self) -> Result<u64, GpuError> {
         Ok(rejected_steps(&self.read_buffer(Slot::Control)?))

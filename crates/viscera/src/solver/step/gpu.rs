@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! end of a step    evaluate all starts and the end;  judge, try all shares of the step;  pick one, or three
-//!                  descents;  evaluate where a step that was taken back ends;  limit, velocities
+//!                  descents;  evaluate where a step that was rejected ends;  limit, velocities
 //! each mixture     evaluate;  judge, take the plain sweep where it is bad;  evaluate that;  judge, a descent at the
 //!                  second failure
 //! ```

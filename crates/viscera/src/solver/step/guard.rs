@@ -52,7 +52,7 @@ pub struct Guard<S> {
     trial: Vec<Point<S>>,
     pub parts: Vec<PartGuard>,
     energies: Energies,
-    /// Steps so far that were taken back for at least one part.
+    /// Steps so far that were rejected for at least one part.
     pub rejected: u64,
     /// How the last step ended for each part.
     reports: Vec<StepReport>,

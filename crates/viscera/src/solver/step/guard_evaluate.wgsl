@@ -1,6 +1,6 @@
 // The potential of all pieces at once; `job.mode` says what is asked of them: the energies of the reference and
 // the other starts; motion for the energy limit; nothing where the iterate has passed already. Or, where a
-// step was taken back, where it ends then: places are written, and what is there is summed.
+// step was rejected, where it ends then: places are written, and what is there is summed.
 
 var<workgroup> found_line: f32;
 

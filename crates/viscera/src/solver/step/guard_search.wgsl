@@ -135,7 +135,7 @@ fn judge_step(part: u32, keeps: bool) -> Next {
             control.parts[part].limit = choice.limit;
         }
         control.parts[part].was_rejected = is_rejected;
-        // Counted once, however many parts were taken back.
+        // Counted once, however many parts were rejected.
         if is_rejected != 0u && atomicExchange(&control.rejected_step, control.step) != control.step {
             atomicAdd(&control.rejected, 1u);
         }

@@ -15,7 +15,7 @@ pub enum StepStage {
     /// Remembers the best of three starts, whose incremental potential bounds the step, and the
     /// mechanical energy.
     ChooseStart,
-    /// Takes a step back whose incremental potential exceeds that bound, for each connected part by itself.
+    /// Rejects a step whose incremental potential exceeds that bound, for each connected part by itself.
     GuardStep,
     /// `v = (x - x_n)/dt`.
     UpdateVelocities,
