@@ -7,11 +7,11 @@
 //! von Mises = sqrt(3/2 dev(sigma) : dev(sigma))
 //! ```
 
-use crate::elements::kinds::Energy;
+use crate::elements::kinds::{Energy, Kind};
 use crate::elements::singular_values::signed_svd;
 use crate::elements::{deformation_gradient, law};
 use crate::material::MaterialModel;
-use crate::model::single::{ElementSet, for_each_kind};
+use crate::model::elements::{ElementSet, Moments, for_each_kind};
 use crate::model::{Model, Tet};
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::Inputs;
@@ -70,7 +70,7 @@ pub fn measure_tets<S: Real>(
 ) {
     measures.clear();
     measures.resize(model.tet_count(), TetMeasure::default());
-    for set in model.tet_sets() {
+    for set in &model.tet_sets {
         for tet in model.tets(set) {
             measures[tet.number] = measure_tet(model, set.model, positions, &tet);
         }
@@ -131,17 +131,17 @@ pub fn measure_energies<S: Real>(
 }
 
 /// Adds the energies [J] of the elements of one kind.
-fn add_energies<S: Real, const N: usize, const M: usize>(
-    set: &impl ElementSet<S, N, M>,
+fn add_energies<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
+    set: &ElementSet<S, K, N, M>,
     model: &Model<S>,
     state: &State<S>,
     inputs: &Inputs<S>,
     sum: &mut f64,
 ) {
-    let anchors = inputs.anchors_of(model);
-    for i in 0..set.count() {
-        let x = set.vertices(i).map(|v| state.positions[v as usize].cast::<f64>());
-        *sum += set.element::<f64>(i, anchors).energy(&x);
+    let moments = Moments::at_rest(model, inputs.anchors_of(model));
+    for (i, vertices) in set.vertices.iter().enumerate() {
+        let x = vertices.map(|v| state.positions[v as usize].cast::<f64>());
+        *sum += set.element::<f64>(i, &moments).energy(&x);
     }
 }
 

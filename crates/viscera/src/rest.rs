@@ -12,10 +12,10 @@
 //! Stiefel, 1952; the sum of `alpha r.z` over some iterations is what they add to `d.K d` and bounds what was
 //! missing before (Strakos and Tichy, "On error estimation in the conjugate gradient method", 2002, section 4).
 
-use crate::elements::kinds::Energy;
+use crate::elements::kinds::{Energy, Kind};
 use crate::elements::{attachment, deformation_gradient, internal_forces, law, shape_gradients};
 use crate::model::Model;
-use crate::model::single::{ElementSet, for_each_kind};
+use crate::model::elements::{ElementSet, Moments, for_each_kind};
 use crate::scalar::{Real, Vec3};
 use crate::solver::Inputs;
 
@@ -148,18 +148,18 @@ impl<'a, S: Real> Statics<'a, S> {
     }
 
     /// Of the elements of one kind.
-    fn add_elements<const N: usize, const M: usize>(
+    fn add_elements<K: Kind<N, M>, const N: usize, const M: usize>(
         &self,
-        set: &impl ElementSet<S, N, M>,
+        set: &ElementSet<S, K, N, M>,
         x: &[Vec3<f64>],
         gradient: &mut [Vec3<f64>],
     ) {
-        let anchors = self.inputs.anchors_of(self.model);
-        for i in 0..set.count() {
-            let vertices = set.vertices(i);
+        let moments = Moments::at_rest(self.model, self.inputs.anchors_of(self.model));
+        for i in 0..set.len() {
+            let vertices = set.vertices[i];
             let places = vertices.map(|v| x[v as usize]);
             for (v, force) in
-                vertices.into_iter().zip(set.element::<f64>(i, anchors).forces(&places))
+                vertices.into_iter().zip(set.element::<f64>(i, &moments).forces(&places))
             {
                 gradient[v as usize] -= force;
             }
@@ -168,7 +168,7 @@ impl<'a, S: Real> Statics<'a, S> {
 
     /// Of the tetrahedra.
     fn add_tissue(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) {
-        for set in self.model.tet_sets() {
+        for set in &self.model.tet_sets {
             for tet in self.model.tets(set) {
                 let shape = tet.inverse_rest_shape.cast::<f64>();
                 let volume = tet.rest_volume.to_f64();
@@ -315,7 +315,7 @@ fn longest(all: &[Vec3<f64>]) -> f64 {
 fn diagonal<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> (Vec<f64>, f64) {
     let mut stiffness = vec![0.0; model.vertex_count()];
     let mut steepest = 0.0f64;
-    for set in model.tet_sets() {
+    for set in &model.tet_sets {
         for tet in model.tets(set) {
             let material = &model.materials[tet.material];
             let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
@@ -328,18 +328,27 @@ fn diagonal<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> (Vec<f64>, f64) {
             }
         }
     }
-    for (ends, k) in model.springs.vertices.iter().zip(&model.springs.stiffness) {
-        for &v in ends {
-            stiffness[v as usize] += k.to_f64() / 3.0;
-        }
-    }
-    for (&v, k) in model.attachments.vertices.iter().zip(&model.attachments.stiffness) {
-        stiffness[v as usize] += k.to_f64();
-    }
+    for_each_kind!(model, set => add_stiffness(set, model, &mut stiffness));
     for tether in &inputs.tethers {
         stiffness[tether.vertex as usize] += tether.stiffness.to_f64();
     }
     (stiffness, if steepest > 0.0 { 1.0 / steepest } else { 1.0 })
+}
+
+/// Adds to each vertex the mean curvature of the elements of one kind: a third of what all of their stiffness can be
+/// where it lies along one line, all of it where an anchor holds in every direction.
+fn add_stiffness<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
+    set: &ElementSet<S, K, N, M>,
+    model: &Model<S>,
+    stiffness: &mut [f64],
+) {
+    let moments = Moments::at_rest(model, &model.rest_anchors);
+    for (i, vertices) in set.vertices.iter().enumerate() {
+        let curvature = set.element::<f64>(i, &moments).curvature();
+        for &v in vertices {
+            stiffness[v as usize] += if M == 3 { curvature } else { curvature / 3.0 };
+        }
+    }
 }
 
 /// Vertices of parts that a pin, an attachment or a tether holds: others have no state of rest, or any.
@@ -356,15 +365,21 @@ fn held<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> Vec<bool> {
         let (a, b) = (root(&mut parent, a), root(&mut parent, b));
         parent[a.max(b) as usize] = a.min(b);
     };
-    for set in model.tet_sets() {
+    for set in &model.tet_sets {
         for tet in model.tets(set) {
             tet.vertices[1..].iter().for_each(|&v| join(tet.vertices[0], v));
         }
     }
-    model.springs.vertices.iter().for_each(|&[a, b]| join(a, b));
+    let mut anchored = Vec::new();
+    for_each_kind!(model, set => {
+        for all in &set.vertices {
+            all.iter().for_each(|&v| join(all[0], v));
+            anchored.extend((!set.anchors.is_empty()).then_some(all[0]));
+        }
+    });
     let holders = (inputs.pins.iter().map(|pin| pin.vertex))
         .chain(inputs.tethers.iter().map(|tether| tether.vertex))
-        .chain(model.attachments.vertices.iter().copied());
+        .chain(anchored);
     let mut is_held = vec![false; parent.len()];
     for v in holders {
         is_held[root(&mut parent, v) as usize] = true;

@@ -160,7 +160,7 @@ impl<'a> Bench<'a> {
     /// multipliers, but forces (16 B) and velocities (12 B).
     fn compulsory_bytes(&self) -> f64 {
         let count = |set: &TetSet<f32>| set.len() * set.form.multiplier_count();
-        let multipliers: usize = self.model.tet_sets().into_iter().map(count).sum();
+        let multipliers: usize = self.model.tet_sets.iter().map(count).sum();
         let (multipliers, vertex) =
             if self.is_explicit() { (0.0, 22.0) } else { (2.0 * multipliers as f64, 8.0) };
         let tets = 15.0 * self.model.tet_count() as f64;

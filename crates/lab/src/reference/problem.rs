@@ -106,7 +106,7 @@ impl Problem {
     pub fn linear(model: &Model<f64>) -> Self {
         let mut tissues = Vec::new();
         let mut linear = TetElements::new(1);
-        for set in model.tet_sets() {
+        for set in &model.tet_sets {
             let first = tissues.len() as u32;
             tissues.extend(model.materials.iter().map(|material| Tissue {
                 model: set.model,
@@ -123,7 +123,7 @@ impl Problem {
                 });
             }
         }
-        let (springs, attachments) = (&model.springs, &model.attachments);
+        let (springs, attachments) = (&model.elements.springs, &model.elements.attachments);
         Self {
             rest_positions: model.rest_positions.clone(),
             masses: model.masses.clone(),
@@ -133,15 +133,15 @@ impl Problem {
             springs: (0..springs.vertices.len())
                 .map(|i| Spring {
                     ends: springs.vertices[i],
-                    stiffness: springs.stiffness[i],
-                    rest_length: springs.rest_length[i],
+                    stiffness: springs.stiffness(i),
+                    rest_length: springs.rest_length(i),
                 })
                 .collect(),
             attachments: (0..attachments.vertices.len())
                 .map(|i| Attachment {
-                    vertex: attachments.vertices[i],
-                    stiffness: attachments.stiffness[i],
-                    anchor: attachments.order[i],
+                    vertex: attachments.vertices[i][0],
+                    stiffness: attachments.stiffness(i),
+                    anchor: attachments.anchors[i],
                 })
                 .collect(),
             rest_anchors: model.rest_anchors.clone(),

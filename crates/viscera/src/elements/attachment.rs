@@ -2,7 +2,79 @@
 //! `C = x - p` (three components), energy `k |C|^2 / 2`, compliance `1/k`. Linear, so it has no
 //! geometric stiffness.
 
-use crate::scalar::{Scalar, Vec3};
+use super::CornerLoad;
+use super::kinds::{CONSTANTS, Constant, Energy, Kind, Moment, XpbdBlock};
+use crate::scalar::{Real, Scalar, Vec3, vec3};
+
+/// The kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Attachments;
+
+/// One of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attachment<S> {
+    /// Where its vertex is pulled to [m].
+    pub anchor: Vec3<S>,
+    /// [N/m].
+    pub stiffness: S,
+}
+
+impl Kind<1, 3> for Attachments {
+    type Element<T: Real> = Attachment<T>;
+
+    const NAME: &'static str = "an attachment";
+
+    const IS_ANCHORED: bool = true;
+
+    const CONSTANTS: &'static [Constant] =
+        &[Constant { name: "attachment stiffness [N/m]", is_positive: true }];
+
+    const WGSL: &'static str = include_str!("attachment.wgsl");
+
+    fn element<T: Real>([stiffness, ..]: [T; CONSTANTS], moment: &Moment<T, 1>) -> Attachment<T> {
+        Attachment { anchor: moment.anchor, stiffness }
+    }
+}
+
+impl<S: Real> Energy<S, 1> for Attachment<S> {
+    fn energy(&self, &[x]: &[Vec3<S>; 1]) -> S {
+        energy(x, self.anchor, self.stiffness)
+    }
+
+    fn forces(&self, &[x]: &[Vec3<S>; 1]) -> [Vec3<S>; 1] {
+        [force(x, self.anchor, self.stiffness)]
+    }
+
+    fn curvature(&self) -> S {
+        self.stiffness
+    }
+
+    fn stiffness(&self) -> S {
+        self.stiffness
+    }
+}
+
+impl<S: Real> XpbdBlock<S, 1, 3> for Attachment<S> {
+    fn solve(
+        &self,
+        &[x]: &[Vec3<S>; 1],
+        &[w]: &[S; 1],
+        multipliers: &[S; 3],
+        compliance: S,
+    ) -> ([S; 3], [Vec3<S>; 1]) {
+        let [a, b, c] = *multipliers;
+        let (change, moved) = solve(x, w, self.anchor, vec3(a, b, c), compliance);
+        (change.to_array(), [moved])
+    }
+
+    fn loads(&self, _: &[Vec3<S>; 1], &[a, b, c]: &[S; 3], _: S) -> [CornerLoad<S>; 1] {
+        [CornerLoad { impulse: vec3(a, b, c), mass_bound: S::ZERO }]
+    }
+
+    fn constitutive(&self, &[x]: &[Vec3<S>; 1], compliance: S) -> [S; 3] {
+        constitutive_multipliers(x, self.anchor, compliance).to_array()
+    }
+}
 
 /// Energy [J].
 #[inline(always)]

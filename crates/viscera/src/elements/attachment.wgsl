@@ -38,3 +38,45 @@ fn attachment_constitutive_multipliers(
 ) -> vec3f {
     return (anchor - x) * (1.0 / compliance_tilde);
 }
+
+// The kind; its constant is the stiffness [N/m].
+
+fn attachments_energy(e: ElementMoment, x: array<vec3f, 4>) -> f32 {
+    return attachment_energy(x[0], e.anchor, e.constants.x);
+}
+
+fn attachments_forces(e: ElementMoment, x: array<vec3f, 4>) -> array<vec3f, 4> {
+    let force = attachment_force(x[0], e.anchor, e.constants.x);
+    return array<vec3f, 4>(force, vec3f(), vec3f(), vec3f());
+}
+
+fn attachments_curvature(e: ElementMoment) -> f32 {
+    return e.constants.x;
+}
+
+fn attachments_solve(
+    e: ElementMoment,
+    x: array<vec3f, 4>,
+    w: array<f32, 4>,
+    l: vec4f,
+    squared: f32,
+) -> ElementCorrection {
+    let compliance_tilde = 1.0 / (e.constants.x * squared);
+    let change = attachment_solve(x[0], w[0], e.anchor, l.xyz, compliance_tilde);
+    let moves = array<vec3f, 4>(change.position, vec3f(), vec3f(), vec3f());
+    return ElementCorrection(vec4f(change.multipliers, 0.0), moves);
+}
+
+fn attachments_loads(
+    e: ElementMoment,
+    x: array<vec3f, 4>,
+    l: vec4f,
+    squared: f32,
+) -> array<CornerLoad, 4> {
+    return array<CornerLoad, 4>(CornerLoad(l.xyz, 0.0), CornerLoad(), CornerLoad(), CornerLoad());
+}
+
+fn attachments_constitutive(e: ElementMoment, x: array<vec3f, 4>, squared: f32) -> vec4f {
+    let compliance_tilde = 1.0 / (e.constants.x * squared);
+    return vec4f(attachment_constitutive_multipliers(x[0], e.anchor, compliance_tilde), 0.0);
+}

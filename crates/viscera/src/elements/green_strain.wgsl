@@ -177,3 +177,32 @@ fn green_strain_corner_load(f: mat3x3f, g: array<vec3f, 4>, v: vec3f) -> CornerL
     let mass_bound = abs(dot(v, g[0])) + abs(dot(v, g[1])) + abs(dot(v, g[2])) + abs(dot(v, g[3]));
     return CornerLoad(f * v, mass_bound);
 }
+
+// The law of Saint Venant and Kirchhoff.
+
+fn saint_venant_kirchhoff_energy_density(f: mat3x3f, lame_lambda: f32, lame_mu: f32) -> f32 {
+    return green_strain_energy_density(green_strain_strain(f), lame_lambda, lame_mu);
+}
+
+fn saint_venant_kirchhoff_piola(f: mat3x3f, lame_lambda: f32, lame_mu: f32) -> mat3x3f {
+    return green_strain_piola(f, green_strain_strain(f), lame_lambda, lame_mu);
+}
+
+// Stretching of a line along `g`, of the Green strain.
+fn stretch_curvature(f: mat3x3f, g: vec3f, lame_lambda: f32, lame_mu: f32) -> f32 {
+    return (lame_lambda + 2.0 * lame_mu) * norm_squared(f) * dot(g, g);
+}
+
+fn saint_venant_kirchhoff_curvature(
+    f: mat3x3f,
+    g: vec3f,
+    lame_lambda: f32,
+    lame_mu: f32,
+) -> f32 {
+    let c = green_strain_strain(f);
+    let pressure = lame_lambda * (c[0] + c[1] + c[2]);
+    let tensor = array<f32, 6>(c[0], c[1], c[2], 0.5 * c[3], 0.5 * c[4], 0.5 * c[5]);
+    let along = dot(g, green_strain_symmetric(tensor) * g);
+    let stretch = stretch_curvature(f, g, lame_lambda, lame_mu);
+    return stretch + max(2.0 * lame_mu * along + pressure * dot(g, g), 0.0);
+}

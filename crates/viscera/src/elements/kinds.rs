@@ -1,8 +1,56 @@
-//! What every kind of element answers. Tetrahedra, of which a mesh has many, answer in lanes by their law
-//! ([`super::law`]) and their constraint formulation; all others, few and alike, answer here, one by one.
+//! What every kind of element answers; the list of kinds stands in [`super::list`]. Tetrahedra, of which a mesh has many, answer
+//! in lanes by their law ([`super::law`]) and their constraint formulation; all others, few and alike, answer
+//! here, one by one. Each kind has a file of its own, beside its twin for graphics processors.
 
-use super::{CornerLoad, attachment, spring};
-use crate::scalar::{Real, Scalar, Vec3, vec3};
+use super::CornerLoad;
+use crate::scalar::{Real, Scalar, Vec3};
+
+/// Constants of an element, at most: those that it does not use are zero.
+pub const CONSTANTS: usize = 4;
+
+/// Vertices of an element, and multipliers, at most.
+pub const MOST: usize = 4;
+
+/// A constant of an element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Constant {
+    /// Its name, with its unit.
+    pub name: &'static str,
+    /// Whether it must be above zero; else zero will do.
+    pub is_positive: bool,
+}
+
+/// What an element may depend on beside its constants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment<T, const N: usize> {
+    /// Its anchor at the end of the step [m], of kinds that have one.
+    pub anchor: Vec3<T>,
+    /// Its vertices at the start of the step [m]; `None` at rest, where they are what they were.
+    pub start: Option<[Vec3<T>; N]>,
+    /// The step [s].
+    pub dt: T,
+}
+
+/// A kind of element: `N` vertices, `M` multipliers.
+pub trait Kind<const N: usize, const M: usize>: Send + Sync + 'static {
+    /// One of them, in the precision of whoever asks.
+    type Element<T: Real>: XpbdBlock<T, N, M>;
+
+    /// What one is called in messages.
+    const NAME: &'static str;
+
+    /// Whether one has an anchor, which moves with the inputs of a step.
+    const IS_ANCHORED: bool;
+
+    /// Its constants, in the order in which [`Kind::element`] gets them.
+    const CONSTANTS: &'static [Constant];
+
+    /// Its functions for graphics processors, with the name of the kind's field before them.
+    const WGSL: &'static str;
+
+    /// From constants, and what is so in a step.
+    fn element<T: Real>(constants: [T; CONSTANTS], moment: &Moment<T, N>) -> Self::Element<T>;
+}
 
 /// An element on `N` vertices that stores energy. `x` are its vertices' positions [m].
 pub trait Energy<S: Scalar, const N: usize> {
@@ -19,129 +67,33 @@ pub trait Energy<S: Scalar, const N: usize> {
     fn stiffness(&self) -> S;
 }
 
-/// An element that XPBD can solve: `M` constraints with a multiplier each. Not every kind is one.
+/// An element that XPBD can solve: `M` constraints with a multiplier each. A kind that is none has no multipliers
+/// and no functions here: its forces act between sweeps, in the rebase.
 pub trait XpbdBlock<S: Scalar, const N: usize, const M: usize>: Energy<S, N> {
     /// `a~ = 1/(k dt^2)` of each constraint; `squared = dt^2` [s^2].
-    fn compliance(&self, squared: S) -> S;
+    fn compliance(&self, squared: S) -> S {
+        S::ONE / (self.curvature() * squared)
+    }
 
     /// One solve: change of the multipliers [J s^2/m] and of the positions [m]; `w` are inverse masses [1/kg].
     fn solve(
         &self,
-        x: &[Vec3<S>; N],
-        w: &[S; N],
-        multipliers: &[S; M],
-        compliance: S,
-    ) -> ([S; M], [Vec3<S>; N]);
+        _x: &[Vec3<S>; N],
+        _w: &[S; N],
+        _multipliers: &[S; M],
+        _compliance: S,
+    ) -> ([S; M], [Vec3<S>; N]) {
+        ([S::ZERO; M], [Vec3::splat(S::ZERO); N])
+    }
 
     /// Force times squared step on each vertex, and the bound of its geometric stiffness.
-    fn loads(x: &[Vec3<S>; N], multipliers: &[S; M]) -> [CornerLoad<S>; N];
+    fn loads(&self, x: &[Vec3<S>; N], _multipliers: &[S; M], squared: S) -> [CornerLoad<S>; N] {
+        let mass_bound = self.curvature() * squared;
+        self.forces(x).map(|force| CornerLoad { impulse: force * squared, mass_bound })
+    }
 
     /// The multipliers at which no constraint has a residual.
-    fn constitutive(&self, x: &[Vec3<S>; N], compliance: S) -> [S; M];
-}
-
-/// See [`spring`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spring<S> {
-    /// Length without force [m].
-    pub rest_length: S,
-    /// [N/m].
-    pub stiffness: S,
-}
-
-impl<S: Real> Energy<S, 2> for Spring<S> {
-    fn energy(&self, x: &[Vec3<S>; 2]) -> S {
-        spring::energy(x, self.rest_length, self.stiffness)
-    }
-
-    fn forces(&self, x: &[Vec3<S>; 2]) -> [Vec3<S>; 2] {
-        spring::forces(x, self.rest_length, self.stiffness)
-    }
-
-    fn curvature(&self) -> S {
-        self.stiffness
-    }
-
-    fn stiffness(&self) -> S {
-        S::TWO * self.stiffness
-    }
-}
-
-impl<S: Real> XpbdBlock<S, 2, 1> for Spring<S> {
-    fn compliance(&self, squared: S) -> S {
-        S::ONE / (self.stiffness * squared)
-    }
-
-    fn solve(
-        &self,
-        x: &[Vec3<S>; 2],
-        w: &[S; 2],
-        [multiplier]: &[S; 1],
-        compliance: S,
-    ) -> ([S; 1], [Vec3<S>; 2]) {
-        let (change, moves) = spring::solve(x, w, self.rest_length, *multiplier, compliance);
-        ([change], moves)
-    }
-
-    fn loads(x: &[Vec3<S>; 2], [multiplier]: &[S; 1]) -> [CornerLoad<S>; 2] {
-        spring::corner_loads(x, *multiplier)
-    }
-
-    fn constitutive(&self, x: &[Vec3<S>; 2], compliance: S) -> [S; 1] {
-        [spring::constitutive_multiplier(x, self.rest_length, compliance)]
-    }
-}
-
-/// See [`attachment`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Attachment<S> {
-    /// Where its vertex is pulled to [m].
-    pub anchor: Vec3<S>,
-    /// [N/m].
-    pub stiffness: S,
-}
-
-impl<S: Real> Energy<S, 1> for Attachment<S> {
-    fn energy(&self, &[x]: &[Vec3<S>; 1]) -> S {
-        attachment::energy(x, self.anchor, self.stiffness)
-    }
-
-    fn forces(&self, &[x]: &[Vec3<S>; 1]) -> [Vec3<S>; 1] {
-        [attachment::force(x, self.anchor, self.stiffness)]
-    }
-
-    fn curvature(&self) -> S {
-        self.stiffness
-    }
-
-    fn stiffness(&self) -> S {
-        self.stiffness
-    }
-}
-
-impl<S: Real> XpbdBlock<S, 1, 3> for Attachment<S> {
-    fn compliance(&self, squared: S) -> S {
-        S::ONE / (self.stiffness * squared)
-    }
-
-    fn solve(
-        &self,
-        &[x]: &[Vec3<S>; 1],
-        &[w]: &[S; 1],
-        multipliers: &[S; 3],
-        compliance: S,
-    ) -> ([S; 3], [Vec3<S>; 1]) {
-        let [a, b, c] = *multipliers;
-        let l = vec3(a, b, c);
-        let (change, moved) = attachment::solve(x, w, self.anchor, l, compliance);
-        (change.to_array(), [moved])
-    }
-
-    fn loads(_: &[Vec3<S>; 1], &[a, b, c]: &[S; 3]) -> [CornerLoad<S>; 1] {
-        [CornerLoad { impulse: vec3(a, b, c), mass_bound: S::ZERO }]
-    }
-
-    fn constitutive(&self, &[x]: &[Vec3<S>; 1], compliance: S) -> [S; 3] {
-        attachment::constitutive_multipliers(x, self.anchor, compliance).to_array()
+    fn constitutive(&self, _x: &[Vec3<S>; N], _compliance: S) -> [S; M] {
+        [S::ZERO; M]
     }
 }

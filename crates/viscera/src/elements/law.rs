@@ -1,14 +1,19 @@
 //! The laws of tissue: what every law answers, and the only list of them.
 
+use super::TetForm;
 use super::green_strain;
 use super::neo_hookean;
 use crate::material::MaterialModel;
 use crate::scalar::{Mat3, Scalar, Vec3};
+use crate::settings::{Choice, NeoHookean, SolverSettings};
 
 /// A law between the deformation gradient `F` and energy; `lambda` and `mu` are Lame's parameters [Pa].
 pub trait Law: Copy + Send + Sync {
     /// Its name in settings.
     const MODEL: MaterialModel;
+
+    /// Its functions for graphics processors, with its name in settings before them.
+    const WGSL: &'static str;
 
     /// Energy density [Pa].
     fn energy_density<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> S;
@@ -20,6 +25,9 @@ pub trait Law: Copy + Send + Sync {
     /// `g` [1/m]: the vertex's diagonal block without its negative part.
     fn curvature<S: Scalar>(f: &Mat3<S>, g: Vec3<S>, lambda: S, mu: S) -> S;
 }
+
+/// How many laws there are.
+pub const LAWS: usize = <MaterialModel as Choice>::ALL.len();
 
 /// See [`green_strain`].
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +54,16 @@ macro_rules! with_law {
 }
 pub(crate) use with_law;
 
+/// The constraint formulation in which XPBD solves a law. The stretch is made for the rebase; XPBD as published
+/// has the pair.
+pub fn law_form(law: MaterialModel, settings: &SolverSettings) -> TetForm {
+    match (law, settings.neo_hookean, settings.rebase) {
+        (MaterialModel::SaintVenantKirchhoff, ..) => TetForm::GreenStrain,
+        (_, NeoHookean::Pair, _) | (_, NeoHookean::Auto, false) => TetForm::NeoHookeanPair,
+        (_, NeoHookean::Stretch, _) | (_, NeoHookean::Auto, true) => TetForm::NeoHookeanStretch,
+    }
+}
+
 /// Stretching of a line along `g`, of the Green strain: `(lambda + 2 mu) |F|^2 |g|^2`, a bound of its own.
 #[inline(always)]
 pub fn stretch_curvature<S: Scalar>(f: &Mat3<S>, g: Vec3<S>, lambda: S, mu: S) -> S {
@@ -54,6 +72,8 @@ pub fn stretch_curvature<S: Scalar>(f: &Mat3<S>, g: Vec3<S>, lambda: S, mu: S) -
 
 impl Law for SaintVenantKirchhoff {
     const MODEL: MaterialModel = MaterialModel::SaintVenantKirchhoff;
+
+    const WGSL: &'static str = include_str!("green_strain.wgsl");
 
     #[inline(always)]
     fn energy_density<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> S {
@@ -80,6 +100,8 @@ impl Law for SaintVenantKirchhoff {
 impl Law for StableNeoHookean {
     const MODEL: MaterialModel = MaterialModel::StableNeoHookean;
 
+    const WGSL: &'static str = include_str!("neo_hookean.wgsl");
+
     #[inline(always)]
     fn energy_density<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> S {
         neo_hookean::energy_density(f, lambda, mu)
@@ -105,7 +127,6 @@ pub fn respond<S: Scalar>(model: MaterialModel, f: &Mat3<S>, lambda: S, mu: S) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::Choice;
 
     /// The list has every law, under its own name.
     #[test]

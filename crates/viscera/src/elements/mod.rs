@@ -13,49 +13,18 @@
 //! the rows of `Dm^-1` and `g_0 = -(g_1 + g_2 + g_3)`.
 
 pub mod attachment;
+pub(crate) mod forms;
 pub mod green_strain;
 pub mod kinds;
 pub mod law;
+pub(crate) mod list;
 pub mod neo_hookean;
 pub mod neo_hookean_pair;
 pub mod neo_hookean_stretch;
 pub mod singular_values;
 pub mod spring;
-
 #[cfg(feature = "gpu")]
-pub mod wgsl {
-    //! The twins of these functions for graphics processors: plain WGSL without bindings and entry
-    //! points, to be put before a kernel. Every file needs [`KINEMATICS`]; what else one needs is
-    //! said.
-
-    /// Linear tetrahedra, the 6 x 6 solve, and the records that all share; twin of [`super`].
-    pub const KINEMATICS: &str = include_str!("mod.wgsl");
-    /// Twin of [`super::green_strain`].
-    pub const GREEN_STRAIN: &str = include_str!("green_strain.wgsl");
-    /// Twin of [`super::neo_hookean`].
-    pub const NEO_HOOKEAN: &str = include_str!("neo_hookean.wgsl");
-    /// Twin of [`super::neo_hookean_pair`]; needs [`NEO_HOOKEAN`].
-    pub const NEO_HOOKEAN_PAIR: &str = include_str!("neo_hookean_pair.wgsl");
-    /// Twin of [`super::singular_values`].
-    pub const SINGULAR_VALUES: &str = include_str!("singular_values.wgsl");
-    /// Twin of [`super::neo_hookean_stretch`]; needs [`GREEN_STRAIN`] and [`SINGULAR_VALUES`].
-    pub const NEO_HOOKEAN_STRETCH: &str = include_str!("neo_hookean_stretch.wgsl");
-    /// Twin of [`super::spring`].
-    pub const SPRING: &str = include_str!("spring.wgsl");
-    /// Twin of [`super::attachment`].
-    pub const ATTACHMENT: &str = include_str!("attachment.wgsl");
-    /// Every file.
-    pub const ALL: [&str; 8] = [
-        KINEMATICS,
-        GREEN_STRAIN,
-        NEO_HOOKEAN,
-        NEO_HOOKEAN_PAIR,
-        SINGULAR_VALUES,
-        NEO_HOOKEAN_STRETCH,
-        SPRING,
-        ATTACHMENT,
-    ];
-}
+pub mod wgsl;
 
 use crate::scalar::{Mat3, Scalar, Vec3};
 

@@ -68,6 +68,13 @@ struct Material {
     viscosity: f32,
 }
 
+// A material without its compliance.
+struct TissueConstants {
+    lame_lambda: f32,
+    lame_mu: f32,
+    viscosity: f32,
+}
+
 // A multiple of it.
 fn compliance_scaled(compliance: Compliance, factor: f32) -> Compliance {
     return Compliance(

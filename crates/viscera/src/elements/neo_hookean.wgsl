@@ -41,3 +41,18 @@ fn neo_hookean_piola(f: mat3x3f, lame_lambda: f32, lame_mu: f32) -> mat3x3f {
     let pressure = (lame_lambda + lame_mu) * neo_hookean_volume_change(f);
     return (f - area) * lame_mu + area * pressure;
 }
+
+// The law.
+
+fn stable_neo_hookean_energy_density(f: mat3x3f, lame_lambda: f32, lame_mu: f32) -> f32 {
+    return neo_hookean_energy_density(f, lame_lambda, lame_mu);
+}
+
+fn stable_neo_hookean_piola(f: mat3x3f, lame_lambda: f32, lame_mu: f32) -> mat3x3f {
+    return neo_hookean_piola(f, lame_lambda, lame_mu);
+}
+
+fn stable_neo_hookean_curvature(f: mat3x3f, g: vec3f, lame_lambda: f32, lame_mu: f32) -> f32 {
+    let area = cofactor(f) * g;
+    return lame_mu * dot(g, g) + (lame_lambda + lame_mu) * dot(area, area);
+}

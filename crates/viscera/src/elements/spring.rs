@@ -1,7 +1,82 @@
 //! Spring between two vertices: `C = |x1 - x0| - L`, energy `k C^2 / 2`, compliance `1/k`.
 
 use super::CornerLoad;
-use crate::scalar::{Scalar, Vec3};
+use super::kinds::{CONSTANTS, Constant, Energy, Kind, Moment, XpbdBlock};
+use crate::scalar::{Real, Scalar, Vec3};
+
+/// The kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Springs;
+
+/// One of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spring<S> {
+    /// Length without force [m].
+    pub rest_length: S,
+    /// [N/m].
+    pub stiffness: S,
+}
+
+impl Kind<2, 1> for Springs {
+    type Element<T: Real> = Spring<T>;
+
+    const NAME: &'static str = "a spring";
+
+    const IS_ANCHORED: bool = false;
+
+    const CONSTANTS: &'static [Constant] = &[
+        Constant { name: "rest length [m]", is_positive: false },
+        Constant { name: "spring stiffness [N/m]", is_positive: true },
+    ];
+
+    const WGSL: &'static str = include_str!("spring.wgsl");
+
+    fn element<T: Real>(
+        [rest_length, stiffness, ..]: [T; CONSTANTS],
+        _: &Moment<T, 2>,
+    ) -> Spring<T> {
+        Spring { rest_length, stiffness }
+    }
+}
+
+impl<S: Real> Energy<S, 2> for Spring<S> {
+    fn energy(&self, x: &[Vec3<S>; 2]) -> S {
+        energy(x, self.rest_length, self.stiffness)
+    }
+
+    fn forces(&self, x: &[Vec3<S>; 2]) -> [Vec3<S>; 2] {
+        forces(x, self.rest_length, self.stiffness)
+    }
+
+    fn curvature(&self) -> S {
+        self.stiffness
+    }
+
+    fn stiffness(&self) -> S {
+        S::TWO * self.stiffness
+    }
+}
+
+impl<S: Real> XpbdBlock<S, 2, 1> for Spring<S> {
+    fn solve(
+        &self,
+        x: &[Vec3<S>; 2],
+        w: &[S; 2],
+        [multiplier]: &[S; 1],
+        compliance: S,
+    ) -> ([S; 1], [Vec3<S>; 2]) {
+        let (change, moves) = solve(x, w, self.rest_length, *multiplier, compliance);
+        ([change], moves)
+    }
+
+    fn loads(&self, x: &[Vec3<S>; 2], [multiplier]: &[S; 1], _: S) -> [CornerLoad<S>; 2] {
+        corner_loads(x, *multiplier)
+    }
+
+    fn constitutive(&self, x: &[Vec3<S>; 2], compliance: S) -> [S; 1] {
+        [constitutive_multiplier(x, self.rest_length, compliance)]
+    }
+}
 
 /// Shortest length [m] at which a spring still has a direction; below it the spring rests for
 /// one solve rather than push along round-off.

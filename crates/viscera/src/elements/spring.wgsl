@@ -69,3 +69,50 @@ fn spring_corner_loads(x: array<vec3f, 2>, multiplier: f32) -> array<CornerLoad,
         CornerLoad(along.n * multiplier, mass_bound),
     );
 }
+
+// The kind; constants are rest length [m] and stiffness [N/m].
+
+fn springs_energy(e: ElementMoment, x: array<vec3f, 4>) -> f32 {
+    return spring_energy(array<vec3f, 2>(x[0], x[1]), e.constants.x, e.constants.y);
+}
+
+fn springs_forces(e: ElementMoment, x: array<vec3f, 4>) -> array<vec3f, 4> {
+    let forces = spring_forces(array<vec3f, 2>(x[0], x[1]), e.constants.x, e.constants.y);
+    return array<vec3f, 4>(forces[0], forces[1], vec3f(), vec3f());
+}
+
+fn springs_curvature(e: ElementMoment) -> f32 {
+    return e.constants.y;
+}
+
+fn springs_solve(
+    e: ElementMoment,
+    x: array<vec3f, 4>,
+    w: array<f32, 4>,
+    l: vec4f,
+    squared: f32,
+) -> ElementCorrection {
+    let compliance_tilde = 1.0 / (e.constants.y * squared);
+    let ends = array<vec3f, 2>(x[0], x[1]);
+    let weights = array<f32, 2>(w[0], w[1]);
+    let change = spring_solve(ends, weights, e.constants.x, l.x, compliance_tilde);
+    let moves = array<vec3f, 4>(change.positions[0], change.positions[1], vec3f(), vec3f());
+    return ElementCorrection(vec4f(change.multiplier, 0.0, 0.0, 0.0), moves);
+}
+
+fn springs_loads(
+    e: ElementMoment,
+    x: array<vec3f, 4>,
+    l: vec4f,
+    squared: f32,
+) -> array<CornerLoad, 4> {
+    let load = spring_corner_loads(array<vec3f, 2>(x[0], x[1]), l.x);
+    return array<CornerLoad, 4>(load[0], load[1], CornerLoad(), CornerLoad());
+}
+
+fn springs_constitutive(e: ElementMoment, x: array<vec3f, 4>, squared: f32) -> vec4f {
+    let compliance_tilde = 1.0 / (e.constants.y * squared);
+    let ends = array<vec3f, 2>(x[0], x[1]);
+    let l = spring_constitutive_multiplier(ends, e.constants.x, compliance_tilde);
+    return vec4f(l, 0.0, 0.0, 0.0);
+}

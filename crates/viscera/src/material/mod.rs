@@ -55,6 +55,19 @@ pub struct Material {
     viscosity: f64,
 }
 
+/// Constants of one material in the solver's precision.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialConstants<S> {
+    /// Lame's first parameter [Pa].
+    pub lame_lambda: S,
+    /// Lame's second parameter, the shear modulus [Pa].
+    pub lame_mu: S,
+    /// Compliance `D^-1` [1/Pa].
+    pub compliance: Compliance<S>,
+    /// Retardation time [s] of the viscous stress; zero for none.
+    pub viscosity: S,
+}
+
 /// Why numbers are not a material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]

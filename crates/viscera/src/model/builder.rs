@@ -2,17 +2,24 @@
 
 use std::sync::Arc;
 
+use super::elements::{ElementSet, ElementSets, LayOut};
+use super::layout::{Layout, renumbered_copies};
 use super::numbering::Numbering;
 use super::parts::Laid;
 use super::tets::{TetBlock, TetSet};
-use super::{AttachmentSet, Body, MaterialConstants, Model, ModelError, SpringSet};
-use crate::coloring::{Coloring, ConstraintGraph};
+use super::{Body, MaterialConstants, Model, ModelError};
+use crate::coloring::ConstraintGraph;
 use crate::elements::TetForm;
+use crate::elements::attachment::Attachments;
+use crate::elements::kinds::{CONSTANTS, Constant, Kind};
+use crate::elements::law::law_form;
+use crate::elements::list::{KINDS, number_of};
+use crate::elements::spring::Springs;
 use crate::material::{Compliance, Material, MaterialModel};
 use crate::mesh::{MAX_COORDINATE, TetMesh};
-use crate::scalar::lanes::{Eight, LANES};
+use crate::scalar::lanes::LANES;
 use crate::scalar::{Real, Vec3};
-use crate::settings::{NeoHookean, SolverSettings};
+use crate::settings::{Choice, SolverSettings};
 
 /// Collects bodies, springs and attachments, then builds the [`Model`].
 #[derive(Clone, Debug, Default)]
@@ -23,8 +30,17 @@ pub struct ModelBuilder {
     regions: Vec<u32>,
     materials: Vec<Material>,
     tet_material: Vec<u32>,
-    springs: Vec<([u32; 2], f64, f64)>,
-    attachments: Vec<(u32, Vec3<f64>, f64)>,
+    /// By kind.
+    elements: [Vec<Given>; KINDS],
+    anchors: Vec<Vec3<f64>>,
+}
+
+/// An element as it was added.
+#[derive(Clone, Debug)]
+struct Given {
+    vertices: Vec<u32>,
+    constants: [f64; CONSTANTS],
+    anchor: Option<u32>,
 }
 
 impl ModelBuilder {
@@ -105,15 +121,9 @@ impl ModelBuilder {
         if ends[0] == ends[1] {
             return Err(ModelError::SpringEnds { vertex: ends[0] });
         }
-        check_positive("spring stiffness [N/m]", stiffness)?;
         let [a, b] = ends.map(|v| self.positions[v as usize]);
         let rest_length = rest_length.unwrap_or((b - a).length());
-        if !(rest_length >= 0.0 && rest_length.is_finite()) {
-            let (what, range) = ("rest length [m]", "zero or more");
-            return Err(ModelError::BadValue { what, range, value: rest_length });
-        }
-        self.springs.push((ends, stiffness, rest_length));
-        Ok(self.springs.len() - 1)
+        self.add_element::<Springs, 2, 1>(ends, &[rest_length, stiffness], None)
     }
 
     /// Holds a vertex at an anchor [m] with the given stiffness [N/m]; returns the number under
@@ -124,16 +134,42 @@ impl ModelBuilder {
         anchor: Vec3<f64>,
         stiffness: f64,
     ) -> Result<usize, ModelError> {
-        self.check_vertex("an attachment", vertex)?;
-        for value in anchor.to_array() {
+        self.add_element::<Attachments, 1, 3>([vertex], &[stiffness], Some(anchor))?;
+        Ok(self.anchors.len() - 1)
+    }
+
+    /// Adds an element of any kind with its constants, in the order of [`Kind::CONSTANTS`], and its anchor [m]
+    /// where the kind has one; returns its number among those of its kind.
+    pub fn add_element<K: Kind<N, M>, const N: usize, const M: usize>(
+        &mut self,
+        vertices: [u32; N],
+        constants: &[f64],
+        anchor: Option<Vec3<f64>>,
+    ) -> Result<usize, ModelError> {
+        let number = number_of::<K, N, M>();
+        for vertex in vertices {
+            self.check_vertex(K::NAME, vertex)?;
+        }
+        for value in anchor.map(Vec3::to_array).into_iter().flatten() {
             if value.is_nan() || value.abs() > MAX_COORDINATE {
                 let (what, range) = ("anchor's coordinate [m]", "within 1e9 m of the origin");
                 return Err(ModelError::BadValue { what, range, value });
             }
         }
-        check_positive("attachment stiffness [N/m]", stiffness)?;
-        self.attachments.push((vertex, anchor, stiffness));
-        Ok(self.attachments.len() - 1)
+        let mut given = [0.0; CONSTANTS];
+        for (i, constant) in K::CONSTANTS.iter().enumerate() {
+            let value = constants.get(i).copied().unwrap_or(f64::NAN);
+            check_constant(constant, value)?;
+            given[i] = value;
+        }
+        let anchor = K::IS_ANCHORED.then(|| {
+            self.anchors.push(anchor.unwrap_or(Vec3::ZERO));
+            self.anchors.len() as u32 - 1
+        });
+        let element = Given { vertices: vertices.to_vec(), constants: given, anchor };
+        let of_kind = &mut self.elements[number];
+        of_kind.push(element);
+        Ok(of_kind.len() - 1)
     }
 
     /// Colours the constraints and lays out the arrays.
@@ -148,11 +184,8 @@ impl ModelBuilder {
         for tet in &self.tets {
             graph.push(tet);
         }
-        for (ends, ..) in &self.springs {
-            graph.push(ends);
-        }
-        for (vertex, ..) in &self.attachments {
-            graph.push(&[*vertex]);
+        for element in self.elements.iter().flatten() {
+            graph.push(&element.vertices);
         }
         let coloring = graph.color(self.positions.len(), settings.colors);
         debug_assert_eq!(coloring.validate(&graph), None);
@@ -168,20 +201,17 @@ impl ModelBuilder {
             copy_offsets: &copy_offsets,
             multipliers: 0,
         };
-        let green_strain = self.lay_out_tets(&mut layout, TetForm::GreenStrain);
-        let neo_hookean = self.lay_out_tets(&mut layout, neo_hookean_form(settings));
-        let springs = self.lay_out_springs(&mut layout);
-        let attachments = self.lay_out_attachments(&mut layout);
+        let tet_sets: Vec<_> = (MaterialModel::ALL.iter())
+            .map(|(law, ..)| self.lay_out_tets(&mut layout, *law, law_form(*law, settings)))
+            .collect();
+        let tet_sets = tet_sets.try_into().unwrap_or_else(|_| unreachable!("a set for each law"));
+        let elements = ElementSets::laid_out(&mut OfKinds { builder: self, layout: &mut layout });
         let multiplier_count = layout.multipliers;
-        let place = |v: u32| numbering.of(v) as u32;
         let parts = Laid {
             part_of: &part_of,
             copy_offsets: &copy_offsets,
-            sets: [&green_strain, &neo_hookean],
-            springs: &springs,
-            attachments: &attachments,
-            first_ends: springs.vertices.iter().map(|ends| place(ends[0])).collect(),
-            held: attachments.vertices.iter().map(|&v| place(v)).collect(),
+            sets: &tet_sets,
+            elements: elements.laid(&numbering),
             color_count: coloring.color_count as usize,
         }
         .parts();
@@ -190,11 +220,9 @@ impl ModelBuilder {
             rest_positions: self.positions.iter().map(|p| p.cast()).collect(),
             masses: self.masses(),
             materials: self.materials.iter().map(constants).collect(),
-            green_strain,
-            neo_hookean,
-            springs,
-            attachments,
-            rest_anchors: self.attachments.iter().map(|(_, anchor, _)| anchor.cast()).collect(),
+            tet_sets,
+            elements,
+            rest_anchors: self.anchors.iter().map(|anchor| anchor.cast()).collect(),
             color_count: coloring.color_count as usize,
             largest_clique: coloring.largest_clique as usize,
             multiplier_count,
@@ -217,11 +245,12 @@ impl ModelBuilder {
         masses.into_iter().map(S::from_f64).collect()
     }
 
-    fn lay_out_tets<S: Real>(&self, layout: &mut Layout<'_>, form: TetForm) -> TetSet<S> {
-        let model = match form {
-            TetForm::GreenStrain => MaterialModel::SaintVenantKirchhoff,
-            TetForm::NeoHookeanPair | TetForm::NeoHookeanStretch => MaterialModel::StableNeoHookean,
-        };
+    fn lay_out_tets<S: Real>(
+        &self,
+        layout: &mut Layout<'_>,
+        model: MaterialModel,
+        form: TetForm,
+    ) -> TetSet<S> {
         let of_model =
             |&tet: &usize| self.materials[self.tet_material[tet] as usize].model() == model;
         let chosen: Vec<usize> = (0..self.tets.len()).filter(of_model).collect();
@@ -293,36 +322,6 @@ impl ModelBuilder {
         block
     }
 
-    fn lay_out_springs<S: Real>(&self, layout: &mut Layout<'_>) -> SpringSet<S> {
-        let first = self.tets.len();
-        let (order, color_offsets) = layout.sort((first..first + self.springs.len()).collect());
-        let spring = |&c: &u32| &self.springs[c as usize - first];
-        SpringSet {
-            vertices: order.iter().map(|c| spring(c).0).collect(),
-            copies: order.iter().map(|&c| layout.copies(c as usize)).collect(),
-            stiffness: order.iter().map(|c| S::from_f64(spring(c).1)).collect(),
-            rest_length: order.iter().map(|c| S::from_f64(spring(c).2)).collect(),
-            multiplier_offset: layout.take_multipliers(order.len()),
-            order: order.iter().map(|&c| c - first as u32).collect(),
-            color_offsets,
-        }
-    }
-
-    fn lay_out_attachments<S: Real>(&self, layout: &mut Layout<'_>) -> AttachmentSet<S> {
-        let first = self.tets.len() + self.springs.len();
-        let chosen = (first..first + self.attachments.len()).collect();
-        let (order, color_offsets) = layout.sort(chosen);
-        let attachment = |&c: &u32| &self.attachments[c as usize - first];
-        AttachmentSet {
-            vertices: order.iter().map(|c| attachment(c).0).collect(),
-            copies: order.iter().map(|&c| layout.copies::<1>(c as usize)[0]).collect(),
-            stiffness: order.iter().map(|c| S::from_f64(attachment(c).2)).collect(),
-            multiplier_offset: layout.take_multipliers(3 * order.len()),
-            order: order.iter().map(|&c| c - first as u32).collect(),
-            color_offsets,
-        }
-    }
-
     /// A body whose material is changed a thousand times still has one.
     fn forget_unused_materials(&mut self) {
         let mut new_number = vec![None; self.materials.len()];
@@ -355,107 +354,36 @@ impl ModelBuilder {
     }
 }
 
-/// The stretch form is made for the rebase; XPBD as published has the pair.
-fn neo_hookean_form(settings: &SolverSettings) -> TetForm {
-    match (settings.neo_hookean, settings.rebase) {
-        (NeoHookean::Pair, _) | (NeoHookean::Auto, false) => TetForm::NeoHookeanPair,
-        (NeoHookean::Stretch, _) | (NeoHookean::Auto, true) => TetForm::NeoHookeanStretch,
-    }
+/// Lays out other elements behind the tetrahedra, kind by kind.
+struct OfKinds<'a, 'b> {
+    builder: &'a ModelBuilder,
+    layout: &'a mut Layout<'b>,
 }
 
-/// First copy of each vertex in the solver's numbering.
-fn renumbered_copies(coloring: &Coloring, numbering: &Numbering) -> Vec<u32> {
-    let mut offsets = Vec::with_capacity(numbering.order.len() + 1);
-    let mut next = 0;
-    offsets.push(next);
-    for &v in &numbering.order {
-        let v = v as usize;
-        next += coloring.copy_offsets[v + 1] - coloring.copy_offsets[v];
-        offsets.push(next);
-    }
-    offsets
-}
-
-/// Hands out places in the flat arrays while the sets are laid out one after the other.
-struct Layout<'a> {
-    graph: &'a ConstraintGraph,
-    coloring: &'a Coloring,
-    numbering: &'a Numbering,
-    /// Of the solver's vertices, ascending.
-    part_of: &'a [u32],
-    /// Of the solver's vertices.
-    copy_offsets: &'a [u32],
-    multipliers: usize,
-}
-
-impl Layout<'_> {
-    /// Sorts constraints by colour, then by place, and so by part, then by number; returns them with the offsets of
-    /// the colours.
-    fn sort(&self, mut constraints: Vec<usize>) -> (Vec<u32>, Vec<u32>) {
-        let place = |c: usize| {
-            let vertices = self.graph.vertices(c).iter();
-            vertices.map(|&v| self.numbering.of(v)).min()
-        };
-        constraints.sort_by_cached_key(|&c| (self.coloring.color_of[c], place(c), c));
-        let mut offsets = vec![0u32; self.coloring.color_count as usize + 1];
-        for &c in &constraints {
-            offsets[self.coloring.color_of[c] as usize + 1] += 1;
+impl<S: Real> LayOut<S> for OfKinds<'_, '_> {
+    fn lay_out<K: Kind<N, M>, const N: usize, const M: usize>(
+        &mut self,
+        number: usize,
+    ) -> ElementSet<S, K, N, M> {
+        let (all, layout) = (&self.builder.elements, &mut *self.layout);
+        let before: usize = all[..number].iter().map(Vec::len).sum();
+        let first = self.builder.tets.len() + before;
+        let given = &all[number];
+        let (order, color_offsets) = layout.sort((first..first + given.len()).collect());
+        let element = |&c: &u32| &given[c as usize - first];
+        let corners = |c| std::array::from_fn(|corner| element(c).vertices[corner]);
+        let mut anchors: Vec<u32> = order.iter().filter_map(|c| element(c).anchor).collect();
+        anchors.shrink_to_fit();
+        ElementSet {
+            vertices: order.iter().map(corners).collect(),
+            copies: order.iter().map(|&c| layout.copies(c as usize)).collect(),
+            constants: order.iter().map(|c| element(c).constants.map(S::from_f64)).collect(),
+            anchors,
+            multiplier_offset: layout.take_multipliers(M * order.len()),
+            order: order.iter().map(|&c| c - first as u32).collect(),
+            color_offsets,
+            ..ElementSet::new(number)
         }
-        for color in 1..offsets.len() {
-            offsets[color] += offsets[color - 1];
-        }
-        // By reference: collected in place, the memory of the larger numbers would be kept.
-        (constraints.iter().map(|&c| c as u32).collect(), offsets)
-    }
-
-    /// The part of a constraint.
-    fn part(&self, constraint: u32) -> usize {
-        let first = self.graph.vertices(constraint as usize)[0];
-        self.part_of[self.numbering.of(first)] as usize
-    }
-
-    /// Tetrahedra of a colour in blocks: up to eight of one part.
-    fn blocks<'t>(&self, order: &'t [u32], color: &[u32]) -> impl Iterator<Item = &'t [u32]> {
-        order[color[0] as usize..color[1] as usize]
-            .chunk_by(|&a, &b| self.part(a) == self.part(b))
-            .flat_map(|of_part| of_part.chunks(LANES))
-    }
-
-    fn copy_count(&self) -> usize {
-        self.copy_offsets.last().map_or(0, |&count| count as usize)
-    }
-
-    fn is_split(&self) -> bool {
-        self.copy_count() > self.numbering.order.len()
-    }
-
-    /// The copies of a constraint's corners, in the solver's numbering.
-    fn copies<const N: usize>(&self, constraint: usize) -> [u32; N] {
-        let first = self.graph.corner_range(constraint).start;
-        let vertices = self.graph.vertices(constraint);
-        std::array::from_fn(|corner| {
-            let v = vertices[corner];
-            let local =
-                self.coloring.copy_of[first + corner] - self.coloring.copy_offsets[v as usize];
-            self.copy_offsets[self.numbering.of(v)] + local
-        })
-    }
-
-    /// The copies of up to eight tetrahedra.
-    fn block_copies(&self, tets: &[u32]) -> [Eight<u32>; 4] {
-        let mut block = [[0; LANES]; 4];
-        for lane in 0..LANES {
-            let copies = self.copies::<4>(tets[lane.min(tets.len() - 1)] as usize);
-            for (corner, copy) in copies.into_iter().enumerate() {
-                block[corner][lane] = copy;
-            }
-        }
-        block
-    }
-
-    fn take_multipliers(&mut self, count: usize) -> usize {
-        self.multipliers += count;
-        self.multipliers - count
     }
 }
 
@@ -474,9 +402,11 @@ fn check_count(what: &'static str, count: usize, limit: usize) -> Result<(), Mod
     if count <= limit { Ok(()) } else { Err(ModelError::TooLarge { what, count, limit }) }
 }
 
-fn check_positive(what: &'static str, value: f64) -> Result<(), ModelError> {
-    if value > 0.0 && value.is_finite() {
+fn check_constant(constant: &Constant, value: f64) -> Result<(), ModelError> {
+    let is_legal = if constant.is_positive { value > 0.0 } else { value >= 0.0 };
+    if is_legal && value.is_finite() {
         return Ok(());
     }
-    Err(ModelError::BadValue { what, range: "above zero", value })
+    let range = if constant.is_positive { "above zero" } else { "zero or more" };
+    Err(ModelError::BadValue { what: constant.name, range, value })
 }

@@ -8,21 +8,26 @@
 //! `parts`.
 
 mod builder;
+pub(crate) mod elements;
+mod layout;
 mod numbering;
 mod parts;
-pub(crate) mod single;
 mod tets;
 
 use std::ops::Range;
 use std::sync::Arc;
 
 pub use builder::ModelBuilder;
+pub use elements::{ElementSet, ElementSets};
 pub(crate) use numbering::Numbering;
 pub(crate) use parts::Part;
 pub(crate) use tets::TetBlock;
 pub use tets::{Tet, TetSet};
 
-use crate::material::Compliance;
+pub use crate::material::MaterialConstants;
+
+use crate::elements::law::LAWS;
+use crate::material::MaterialModel;
 use crate::scalar::lanes::LANES;
 use crate::scalar::{Real, Vec3};
 
@@ -88,75 +93,6 @@ pub struct Body {
     pub tets: Range<usize>,
 }
 
-/// Constants of one material in the solver's precision.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MaterialConstants<S> {
-    /// Lame's first parameter [Pa].
-    pub lame_lambda: S,
-    /// Lame's second parameter, the shear modulus [Pa].
-    pub lame_mu: S,
-    /// Compliance `D^-1` [1/Pa].
-    pub compliance: Compliance<S>,
-    /// Retardation time [s] of the viscous stress; zero for none.
-    pub viscosity: S,
-}
-
-/// Springs between two vertices, sorted by colour.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct SpringSet<S> {
-    /// The two ends, shape [spring_count].
-    pub vertices: Vec<[u32; 2]>,
-    /// The copies that a sweep works on, shape [spring_count].
-    pub copies: Vec<[u32; 2]>,
-    /// Length without force [m], shape [spring_count].
-    pub rest_length: Vec<S>,
-    /// Stiffness [N/m], shape [spring_count].
-    pub stiffness: Vec<S>,
-    /// The user's number of each spring, shape [spring_count].
-    pub order: Vec<u32>,
-    /// Springs of colour `c` are `color_offsets[c] .. color_offsets[c + 1]`.
-    pub color_offsets: Vec<u32>,
-    /// First multiplier, one per spring.
-    pub multiplier_offset: usize,
-}
-
-impl<S> SpringSet<S> {
-    fn bytes(&self) -> usize {
-        size_of_val(&self.vertices[..])
-            + size_of_val(&self.copies[..])
-            + size_of_val(&self.rest_length[..])
-            + size_of_val(&self.stiffness[..])
-            + size_of_val(&self.order[..])
-    }
-}
-
-/// Elastic attachments of vertices to anchors, sorted by colour. The anchors move with the
-/// inputs of a step.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct AttachmentSet<S> {
-    /// The vertex held, shape [attachment_count].
-    pub vertices: Vec<u32>,
-    /// The copy that a sweep works on, shape [attachment_count].
-    pub copies: Vec<u32>,
-    /// Stiffness [N/m], shape [attachment_count].
-    pub stiffness: Vec<S>,
-    /// The user's number of each attachment, shape [attachment_count].
-    pub order: Vec<u32>,
-    /// Attachments of colour `c` are `color_offsets[c] .. color_offsets[c + 1]`.
-    pub color_offsets: Vec<u32>,
-    /// First multiplier, three per attachment.
-    pub multiplier_offset: usize,
-}
-
-impl<S> AttachmentSet<S> {
-    fn bytes(&self) -> usize {
-        size_of_val(&self.vertices[..])
-            + size_of_val(&self.copies[..])
-            + size_of_val(&self.stiffness[..])
-            + size_of_val(&self.order[..])
-    }
-}
-
 /// Everything that does not move.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model<S> {
@@ -168,15 +104,11 @@ pub struct Model<S> {
     pub masses: Vec<S>,
     /// Materials in use.
     pub materials: Vec<MaterialConstants<S>>,
-    /// Saint Venant-Kirchhoff tetrahedra.
-    pub green_strain: TetSet<S>,
-    /// Stable neo-Hookean tetrahedra.
-    pub neo_hookean: TetSet<S>,
-    /// Springs.
-    pub springs: SpringSet<S>,
-    /// Attachments.
-    pub attachments: AttachmentSet<S>,
-    /// Anchors of the attachments where nothing moves them [m], the user's order.
+    /// Tetrahedra of each law of tissue, in the order of [`MaterialModel::ALL`].
+    pub tet_sets: [TetSet<S>; LAWS],
+    /// Springs, attachments: all elements that are no tetrahedra.
+    pub elements: ElementSets<S>,
+    /// Anchors of the elements that have one where nothing moves them [m], in the order in which they were added.
     pub rest_anchors: Vec<Vec3<S>>,
     /// Number of colours.
     pub color_count: usize,
@@ -199,7 +131,7 @@ impl<S: Real> Model<S> {
 
     /// Number of tetrahedra of all bodies.
     pub fn tet_count(&self) -> usize {
-        self.green_strain.len() + self.neo_hookean.len()
+        self.tet_sets.iter().map(TetSet::len).sum()
     }
 
     /// Number of copies that a sweep works on.
@@ -227,9 +159,19 @@ impl<S: Real> Model<S> {
         self.parts.partition_point(|part| part.vertices.end <= v)
     }
 
-    /// The two sets of tetrahedra.
-    pub fn tet_sets(&self) -> [&TetSet<S>; 2] {
-        [&self.green_strain, &self.neo_hookean]
+    /// The tetrahedra of one law.
+    pub fn tets_of(&self, law: MaterialModel) -> &TetSet<S> {
+        &self.tet_sets[law as usize]
+    }
+
+    /// Whether any tetrahedron is viscous.
+    pub fn is_viscous(&self) -> bool {
+        self.tet_sets.iter().any(|set| set.viscous)
+    }
+
+    /// Blocks of all laws.
+    pub(crate) fn block_count(&self) -> usize {
+        self.tet_sets.iter().map(TetSet::block_count).sum()
     }
 
     /// The tetrahedra of a set one by one, sorted by colour, with the user's numbers.
@@ -259,9 +201,8 @@ impl<S: Real> Model<S> {
 
     /// Bytes of the arrays that grow with meshes, springs and attachments.
     pub fn bytes(&self) -> usize {
-        let sets: usize = self.tet_sets().into_iter().map(TetSet::bytes).sum();
-        sets + self.springs.bytes()
-            + self.attachments.bytes()
+        let sets: usize = self.tet_sets.iter().map(TetSet::bytes).sum();
+        sets + self.elements.bytes()
             + size_of_val(&self.rest_anchors[..])
             + size_of_val(&self.rest_positions[..])
             + size_of_val(&self.masses[..])

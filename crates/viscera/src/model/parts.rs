@@ -8,7 +8,8 @@
 use std::ops::Range;
 
 use super::tets::TetSet;
-use super::{AttachmentSet, SpringSet};
+use crate::elements::law::LAWS;
+use crate::elements::list::{ARE_ANCHORED, KIND_SIZES, KINDS};
 use crate::scalar::Real;
 
 /// One connected part.
@@ -27,10 +28,10 @@ pub(crate) struct Part {
 /// What a part has of one colour.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct PartColor {
-    /// Blocks of both sets of tetrahedra.
-    pub blocks: [Range<u32>; 2],
-    pub springs: Range<u32>,
-    pub attachments: Range<u32>,
+    /// Blocks of tetrahedra of each law.
+    pub blocks: [Range<u32>; LAWS],
+    /// Other elements of each kind.
+    pub elements: [Range<u32>; KINDS],
 }
 
 impl Part {
@@ -49,14 +50,14 @@ impl Part {
         self.colors.iter().map(|color| color.blocks[kind].len()).sum()
     }
 
-    /// Its springs, in order.
-    pub fn springs(&self) -> impl Iterator<Item = usize> {
-        self.colors.iter().flat_map(|color| widened(&color.springs))
+    /// Its elements of one kind, in order.
+    pub fn elements(&self, kind: usize) -> impl Iterator<Item = usize> {
+        self.colors.iter().flat_map(move |color| widened(&color.elements[kind]))
     }
 
-    /// Its attachments, in order.
-    pub fn attachments(&self) -> impl Iterator<Item = usize> {
-        self.colors.iter().flat_map(|color| widened(&color.attachments))
+    /// Whether anchors hold it.
+    pub fn is_anchored(&self) -> bool {
+        (0..KINDS).any(|kind| ARE_ANCHORED[kind] && self.elements(kind).next().is_some())
     }
 
     /// How many multipliers it has, those of padding lanes included.
@@ -83,13 +84,17 @@ pub(super) struct Laid<'a, S> {
     /// The part of each vertex, parts in a row.
     pub part_of: &'a [u32],
     pub copy_offsets: &'a [u32],
-    pub sets: [&'a TetSet<S>; 2],
-    pub springs: &'a SpringSet<S>,
-    pub attachments: &'a AttachmentSet<S>,
-    /// The solver's vertex of each spring's first end, and of each attachment.
-    pub first_ends: Vec<u32>,
-    pub held: Vec<u32>,
+    pub sets: &'a [TetSet<S>; LAWS],
+    pub elements: [LaidElements<'a>; KINDS],
     pub color_count: usize,
+}
+
+/// The elements of one kind.
+pub(super) struct LaidElements<'a> {
+    /// The first vertex of each.
+    pub vertices: Vec<u32>,
+    pub color_offsets: &'a [u32],
+    pub multiplier_offset: usize,
 }
 
 impl<S: Real> Laid<'_, S> {
@@ -105,18 +110,17 @@ impl<S: Real> Laid<'_, S> {
         }
         let of = |vertex: u32| self.part_of[vertex as usize] as usize;
         for color in 0..self.color_count {
-            for (kind, set) in self.sets.into_iter().enumerate() {
+            for (kind, set) in self.sets.iter().enumerate() {
                 for block in set.color(color) {
                     let part = &mut parts[of(set.blocks[block].vertices[0][0])];
                     extend(&mut part.color(color).blocks[kind], block);
                 }
             }
-            let range = |offsets: &[u32]| offsets[color] as usize..offsets[color + 1] as usize;
-            for i in range(&self.springs.color_offsets) {
-                extend(&mut parts[of(self.first_ends[i])].color(color).springs, i);
-            }
-            for i in range(&self.attachments.color_offsets) {
-                extend(&mut parts[of(self.held[i])].color(color).attachments, i);
+            for (kind, set) in self.elements.iter().enumerate() {
+                for i in set.color_offsets[color]..set.color_offsets[color + 1] {
+                    let part = &mut parts[of(set.vertices[i as usize])];
+                    extend(&mut part.color(color).elements[kind], i as usize);
+                }
             }
         }
         for part in &mut parts {
@@ -129,7 +133,7 @@ impl<S: Real> Laid<'_, S> {
     /// Ranges of the multipliers of a part.
     fn multipliers(&self, part: &Part) -> Vec<Range<usize>> {
         let mut ranges = Vec::new();
-        for (kind, set) in self.sets.into_iter().enumerate() {
+        for (kind, set) in self.sets.iter().enumerate() {
             let [elastic, viscous] = set.multipliers_per_block();
             let mut add = |offset: usize, count: usize| {
                 let of = |blocks: Range<usize>| {
@@ -142,14 +146,12 @@ impl<S: Real> Laid<'_, S> {
                 add(set.viscous_offset, viscous);
             }
         }
-        let (springs, held) = (self.springs.multiplier_offset, self.attachments.multiplier_offset);
-        for color in &part.colors {
-            let Range { start, end } = widened(&color.springs);
-            ranges.push(springs + start..springs + end);
-        }
-        for color in &part.colors {
-            let Range { start, end } = widened(&color.attachments);
-            ranges.push(held + 3 * start..held + 3 * end);
+        for (kind, (set, [_, count])) in self.elements.iter().zip(KIND_SIZES).enumerate() {
+            for color in &part.colors {
+                let Range { start, end } = widened(&color.elements[kind]);
+                let first = set.multiplier_offset;
+                ranges.push(first + count * start..first + count * end);
+            }
         }
         let mut ranges: Vec<_> = joined(ranges.into_iter()).collect();
         ranges.shrink_to_fit();
@@ -199,7 +201,7 @@ mod tests {
         let numbers = &model.numbering.order[part.vertices.clone()];
         let places = numbers.iter().map(|&v| model.rest_positions[v as usize]).collect();
         let mut blocks = Vec::new();
-        for (kind, set) in model.tet_sets().into_iter().enumerate() {
+        for (kind, set) in model.tet_sets.iter().enumerate() {
             for block in part.blocks(kind).flatten() {
                 let constants = &set.blocks[block];
                 let vertices = constants.vertices.as_flattened().iter();
@@ -257,7 +259,7 @@ mod tests {
                 }
                 let counted = both.parts.iter().map(|part| part.multiplier_count()).sum::<usize>();
                 assert!(counted <= both.multiplier_count);
-                for (kind, set) in both.tet_sets().into_iter().enumerate() {
+                for (kind, set) in both.tet_sets.iter().enumerate() {
                     let count: usize = both.parts.iter().map(|part| part.block_count(kind)).sum();
                     assert_eq!(count, set.block_count());
                 }

@@ -8,10 +8,9 @@
 use super::Simulation;
 use super::acting::Taken;
 use super::error::LiveError;
-use crate::elements::kinds::Energy;
 use crate::measure::measure_tets;
 use crate::model::Model;
-use crate::model::single::{ElementSet, for_each_kind};
+use crate::model::elements::for_each_kind;
 use crate::scalar::{Real, Vec3};
 use crate::state::State;
 
@@ -209,7 +208,7 @@ fn fingerprint<S: Real>(model: &Model<S>) -> u64 {
             add(number.to_f64().to_bits());
         }
     }
-    for set in model.tet_sets() {
+    for set in &model.tet_sets {
         add(set.form.multiplier_count() as u64);
         add(u64::from(set.viscous));
         for tet in model.tets(set) {
@@ -219,9 +218,9 @@ fn fingerprint<S: Real>(model: &Model<S>) -> u64 {
         }
     }
     for_each_kind!(model, set => {
-        for i in 0..set.count() {
-            set.vertices(i).into_iter().for_each(|v| add(u64::from(v)));
-            add(set.element::<f64>(i, &model.rest_anchors).stiffness().to_bits());
+        for (vertices, constants) in set.vertices.iter().zip(&set.constants) {
+            vertices.iter().for_each(|&v| add(u64::from(v)));
+            constants.iter().for_each(|value| add(value.to_f64().to_bits()));
         }
     });
     hash

@@ -205,7 +205,7 @@ fn a_model_keeps_colors_copies_and_order() {
                 .builder(tissue)
                 .build::<f64>(&crate::common::colored(wanted))
                 .expect("a model");
-            let set = if tissue == STVK { &model.green_strain } else { &model.neo_hookean };
+            let set = model.tets_of(tissue);
             let mut user = vec![None; model.copy_count()];
             let mut take = |color: usize, copies: &[u32], vertices: &[u32]| {
                 for (&copy, &v) in copies.iter().zip(vertices) {
@@ -220,12 +220,16 @@ fn a_model_keeps_colors_copies_and_order() {
                 for tet in model.tets(set).filter(|tet| tet.color == color) {
                     take(color, &tet.copies, &tet.vertices);
                 }
-                for i in range(&model.springs.color_offsets) {
-                    take(color, &model.springs.copies[i], &model.springs.vertices[i]);
+                for i in range(&model.elements.springs.color_offsets) {
+                    take(
+                        color,
+                        &model.elements.springs.copies[i],
+                        &model.elements.springs.vertices[i],
+                    );
                 }
-                for i in range(&model.attachments.color_offsets) {
-                    let set = &model.attachments;
-                    take(color, &set.copies[i..=i], &set.vertices[i..=i]);
+                for i in range(&model.elements.attachments.color_offsets) {
+                    let set = &model.elements.attachments;
+                    take(color, &set.copies[i], &set.vertices[i]);
                 }
             }
             let tets: Vec<_> = model.tets(set).collect();
@@ -233,8 +237,8 @@ fn a_model_keeps_colors_copies_and_order() {
             let order = tets.iter().map(|tet| tet.number as u32).collect();
             for (order, count) in [
                 (&order, sample.mesh.tets().len()),
-                (&model.springs.order, sample.springs.len()),
-                (&model.attachments.order, sample.attachments.len()),
+                (&model.elements.springs.order, sample.springs.len()),
+                (&model.elements.attachments.order, sample.attachments.len()),
             ] {
                 let mut sorted = order.clone();
                 sorted.sort_unstable();
@@ -267,7 +271,7 @@ fn loads(model: &Model<f64>, x: &[Vec3<f64>], l: &[f64]) -> Vec<(Vec3<f64>, f64)
             sums[v as usize].1 += load.impulse.length();
         }
     };
-    for set in model.tet_sets() {
+    for set in &model.tet_sets {
         for tet in model.tets(set) {
             let corners = tet.vertices.map(|v| x[v as usize]);
             let shape = &tet.inverse_rest_shape;
@@ -285,12 +289,15 @@ fn loads(model: &Model<f64>, x: &[Vec3<f64>], l: &[f64]) -> Vec<(Vec3<f64>, f64)
             add(&tet.vertices, &corner_loads);
         }
     }
-    for (i, vertices) in model.springs.vertices.iter().enumerate() {
+    for (i, vertices) in model.elements.springs.vertices.iter().enumerate() {
         let ends = vertices.map(|v| x[v as usize]);
-        add(vertices, &spring::corner_loads(&ends, l[model.springs.multiplier_offset + i]));
+        add(
+            vertices,
+            &spring::corner_loads(&ends, l[model.elements.springs.multiplier_offset + i]),
+        );
     }
-    for (i, &v) in model.attachments.vertices.iter().enumerate() {
-        let at = model.attachments.multiplier_offset + 3 * i;
+    for (i, &[v]) in model.elements.attachments.vertices.iter().enumerate() {
+        let at = model.elements.attachments.multiplier_offset + 3 * i;
         let impulse = vec3(l[at], l[at + 1], l[at + 2]);
         add(&[v], &[CornerLoad { impulse, mass_bound: 0.0 }]);
     }

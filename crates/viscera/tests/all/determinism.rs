@@ -304,7 +304,7 @@ fn everything_seen_is_in_the_callers_order() {
     let model: Model<f32> = builder.build(&settings).expect("a model");
     let rest: Vec<Vec3<f32>> = mesh.vertices().iter().map(|x| x.cast()).collect();
     assert_eq!(model.rest_positions, rest);
-    for set in model.tet_sets() {
+    for set in &model.tet_sets {
         for tet in model.tets(set) {
             assert_eq!(tet.vertices, mesh.tets()[tet.number]);
         }

@@ -34,10 +34,10 @@ fn scrambled(model: &Model<f32>) -> State<f32> {
         *x += random.vector(0.002).cast();
         *v = random.vector(0.1).cast();
     }
-    let form = model.neo_hookean.form.multiplier_count();
+    let form = model.tet_sets[1].form.multiplier_count();
     let mut places: Vec<usize> =
-        (model.springs.multiplier_offset..model.multiplier_count).collect();
-    for (set, count) in model.tet_sets().into_iter().zip([6, form]) {
+        (model.elements.springs.multiplier_offset..model.multiplier_count).collect();
+    for (set, count) in model.tet_sets.iter().zip([6, form]) {
         places.extend(model.tets(set).flat_map(|tet| (0..count).map(move |p| tet.multiplier(p))));
     }
     for place in places {
@@ -60,8 +60,9 @@ fn in_double(state: &State<f32>) -> State<f64> {
 /// processor's, by their norm.
 fn compare(model: &Model<f32>, cpu: &State<f32>, gpu: &State<f32>, oracle: &State<f64>) {
     assert_eq!(gpu.multiplier_dt, cpu.multiplier_dt);
-    let (springs, held) = (model.springs.multiplier_offset, model.attachments.multiplier_offset);
-    let [neo, viscous] = [model.green_strain.block_count() * 48, viscous_offset(model)];
+    let (springs, held) =
+        (model.elements.springs.multiplier_offset, model.elements.attachments.multiplier_offset);
+    let [neo, viscous] = [model.tet_sets[0].block_count() * 48, viscous_offset(model)];
     for (what, range) in [
         ("Green strain", 0..neo),
         ("neo-Hookean", neo..viscous),
@@ -148,7 +149,7 @@ fn fillings_are_repaired_and_numbers_are_left_alone() {
     let mut solver = Solver::new(&model, &settings);
     solver.restart(&model, &mut fresh, &inputs(&model), DT).expect("a new history");
     let filling = fresh.multipliers.iter().position(|&l| l == 0.0).expect("a filling");
-    assert!(filling < 48 * model.green_strain.block_count());
+    assert!(filling < 48 * model.tet_sets[0].block_count());
     state.multipliers[filling] = f32::NAN;
     gpu.write(&model, &state).expect("a state of this model");
     gpu.step(&model, &inputs(&model), DT).expect("a legal step");
@@ -195,13 +196,13 @@ fn a_restart_takes_the_multipliers_from_the_positions() {
 
 /// Where the viscous multipliers begin: in front of the springs', 48 for each block of eight.
 fn viscous_offset(model: &Model<f32>) -> usize {
-    model.springs.multiplier_offset - 48 * model.neo_hookean.block_count()
+    model.elements.springs.multiplier_offset - 48 * model.tet_sets[1].block_count()
 }
 
 /// What is viscous has relaxed: zero in all precisions.
 fn compare_restart(model: &Model<f32>, cpu: &State<f32>, gpu: &State<f32>, oracle: &State<f64>) {
     compare(model, cpu, gpu, oracle);
-    let viscous = viscous_offset(model)..model.springs.multiplier_offset;
+    let viscous = viscous_offset(model)..model.elements.springs.multiplier_offset;
     assert!(gpu.multipliers[viscous].iter().all(|&l| l == 0.0));
 }
 

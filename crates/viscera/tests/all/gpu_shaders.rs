@@ -44,7 +44,7 @@ fn is_made(kernel: &Kernel, variant: Variant) -> bool {
                     Swept::Jacobi => (true, true),
                 }
         }
-        kernels::File::SweepSingle => copies == (variant.swept == Swept::Jacobi),
+        kernels::File::SweepElements => copies == (variant.swept == Swept::Jacobi),
         kernels::File::AndersonPush => copies == (variant.swept != Swept::Vertices),
         _ => true,
     }

@@ -271,9 +271,9 @@ fn a_model_changed_behind_its_back_is_refused() {
     let mut fewer_vertices = model.clone();
     fewer_vertices.rest_positions.truncate(3);
     let mut other_form = model.clone();
-    other_form.neo_hookean.form = TetForm::NeoHookeanPair;
+    other_form.tet_sets[1].form = TetForm::NeoHookeanPair;
     let mut more_constraints = model.clone();
-    more_constraints.neo_hookean.viscous = true;
+    more_constraints.tet_sets[1].viscous = true;
     for (changed, refused) in
         [(fewer_vertices, true), (other_form, false), (more_constraints, true)]
     {

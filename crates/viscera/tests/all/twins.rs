@@ -14,7 +14,7 @@ use viscera::solver::TISSUE_WGSL;
 const COUNT: usize = 10_000;
 
 fn library() -> String {
-    wgsl::ALL.concat() + TISSUE_WGSL
+    wgsl::everything() + TISSUE_WGSL
 }
 
 #[test]

@@ -77,7 +77,7 @@ impl Cantilever {
     fn strain(&self, x: &[Vec3<f64>]) -> f64 {
         let model = self.model(STVK, &colored(ANY));
         let (mut sum, mut volume) = (0.0, 0.0);
-        for tet in model.tets(&model.green_strain) {
+        for tet in model.tets(&model.tet_sets[0]) {
             let corners = tet.vertices.map(|v| x[v as usize]);
             let f = deformation_gradient(&corners, &tet.inverse_rest_shape);
             let strain = green_strain::symmetric(&green_strain::strain(&f));

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::elements::law::LAWS;
 use crate::model::{Model, Part};
 use crate::scalar::Real;
 use crate::settings::{Method, SolverSettings};
@@ -17,7 +18,7 @@ use crate::state::State;
 #[derive(Clone, Debug)]
 pub struct Memory<S> {
     /// What [`sizes`] says of the model that this is for.
-    sizes: [usize; 11],
+    sizes: [usize; SIZES],
     /// The connected parts of that model.
     parts: Arc<[Part]>,
     pub data: StepData<S>,
@@ -119,7 +120,7 @@ impl<S: Real> Memory<S> {
         // Of what decides where passes read and write, callers can change the number of vertices and
         // the form of a set. A set without copies of its own goes by vertices among copies as well.
         let vertices = model.vertex_count().min(model.copy_count());
-        for set in model.tet_sets() {
+        for set in &model.tet_sets {
             let [elastic, viscous] = set.multiplier_counts();
             for (what, given, expected) in [
                 ("model's list of vertices", vertices, set.bounds[0]),
@@ -138,19 +139,24 @@ impl<S: Real> Memory<S> {
 }
 
 /// Everything in a model that decides how much memory a step needs and which stages it has.
-pub fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); 11] {
-    let viscous = model.tet_sets().map(|set| if set.viscous { set.len() } else { 0 });
-    [
+pub fn sizes<S: Real>(model: &Model<S>) -> [(&'static str, usize); SIZES] {
+    let mut sizes = [("", 0); SIZES];
+    sizes[..5].copy_from_slice(&[
         ("solver's list of vertices", model.vertex_count()),
         ("solver's list of multipliers", model.multiplier_count),
         ("solver's list of parts", model.part_count()),
         ("solver's list of colors", model.color_count),
         ("solver's list of copies", model.copy_count()),
-        ("solver's list of Saint Venant-Kirchhoff tetrahedra", model.green_strain.len()),
-        ("solver's list of neo-Hookean tetrahedra", model.neo_hookean.len()),
-        ("solver's blocks of Saint Venant-Kirchhoff tetrahedra", model.green_strain.block_count()),
-        ("solver's blocks of neo-Hookean tetrahedra", model.neo_hookean.block_count()),
-        ("solver's list of viscous Saint Venant-Kirchhoff tetrahedra", viscous[0]),
-        ("solver's list of viscous neo-Hookean tetrahedra", viscous[1]),
-    ]
+    ]);
+    for (three, set) in sizes[5..].chunks_exact_mut(3).zip(&model.tet_sets) {
+        three.copy_from_slice(&[
+            ("solver's list of tetrahedra of one law", set.len()),
+            ("solver's blocks of tetrahedra of one law", set.block_count()),
+            ("solver's list of viscous tetrahedra", if set.viscous { set.len() } else { 0 }),
+        ]);
+    }
+    sizes
 }
+
+/// How many there are.
+pub const SIZES: usize = 5 + 3 * LAWS;

@@ -6,7 +6,7 @@ use crate::solver::gpu::record::{Dispatch, Recorder};
 use crate::solver::gpu::uniforms::Job;
 
 impl Recorder<'_> {
-    /// Writes a stage down. Attachments are no forces there: [`crate::solver::gpu::holds::Hold`].
+    /// Writes a stage down.
     pub fn explicit_stage(&self, stage: ExplicitStage, into: &mut Vec<Dispatch>) {
         match stage {
             ExplicitStage::Begin => self.begin_explicit(into),
@@ -19,7 +19,7 @@ impl Recorder<'_> {
     fn begin_explicit(&self, into: &mut Vec<Dispatch>) {
         into.push(self.vertices(&kernels::APPLY_UPDATES, 0));
         into.push(self.vertices(&kernels::BEGIN_EXPLICIT, 0));
-        if self.model.tet_sets().iter().any(|set| set.viscous) {
+        if self.model.is_viscous() {
             let job = Job { count: self.tet_threads(), ..Job::default() };
             into.push(self.threads(&kernels::BEGIN_STRAIN, job));
         }
@@ -27,12 +27,8 @@ impl Recorder<'_> {
 
     fn load_forces(&self) -> Dispatch {
         let tet_count = self.tet_threads();
-        let job = Job {
-            count: tet_count + self.model.springs.vertices.len() as u32,
-            set_first: self.model.tet_sets()[0].block_count() as u32,
-            tet_count,
-            ..Job::default()
-        };
+        let count = tet_count + self.element_count();
+        let job = Job { count, tet_count, ..Job::default() };
         let threads = self.threads(&kernels::LOAD_FORCES, job);
         // One thread counts the small steps, whatever there is to load.
         Dispatch { groups: threads.groups.max(1), ..threads }

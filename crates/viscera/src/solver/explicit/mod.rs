@@ -19,6 +19,7 @@ mod stability;
 pub mod stage;
 
 use crate::model::Model;
+use crate::model::elements::{Before, Moments};
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
 use crate::settings::SolverSettings;
@@ -115,7 +116,7 @@ impl<S: Real> Memory<S> {
         data.prepare(step, Tethers::AsForces);
         data.constants.previous.copy_from_slice(&data.points);
         self.start_velocities.copy_from_slice(&data.velocities);
-        if model.tet_sets().iter().any(|set| set.viscous) {
+        if model.is_viscous() {
             let velocities = &data.velocities;
             for (part, small) in model.parts.iter().zip(&self.small_steps) {
                 let back = S::from_f64(-small.dt(step.dt));
@@ -137,13 +138,15 @@ impl<S: Real> Memory<S> {
 
     /// [`ExplicitStage::LoadForces`].
     fn load_forces(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
-        let StepData { constants, points, loads, .. } = data;
+        let StepData { constants, points, velocities, loads } = data;
         for (part, small) in step.model.parts.iter().zip(&self.small_steps) {
             if small.done == small.count {
                 continue;
             }
             let small = Step { dt: small.dt(step.dt), ..*step };
-            load_forces::<S, false>(constants, &small, part, points, loads);
+            let start = Before::Moving(points, velocities);
+            let moments = Moments { start, ..constants.moments(&small) };
+            load_forces::<S, false>(constants, &small, &moments, part, points, loads);
             let squared = S::from_f64(small.dt * small.dt);
             for tether in constants.tethers_of(part) {
                 let force = tether.force(points[tether.vertex].vec3());

@@ -2,8 +2,7 @@
 //
 //   v += h (g + M^-1 f),   x += h v
 //
-// Attachments of a vertex pull like one of their summed stiffness to the mean of their anchors, which
-// stand in `targets`: w is the stiffness [N/m]. Pinned vertices have their places there. Each connected part
+// Tethers of a vertex stand in `targets`: w is their stiffness [N/m]. Pinned vertices have their places there. Each connected part
 // takes as many small steps as it needs, and then waits for the others.
 
 fn small_row(part: u32) -> u32 {
@@ -61,8 +60,8 @@ fn store_start_strain(block: u32, lane: u32, strain: array<f32, 6>) {
     }
 }
 
-// h^2 times the forces of tetrahedra and then springs, into a place for each corner. The neo-Hookean
-// blocks begin at `job.set_first`. Counts the small step, which the other kernels only read.
+// h^2 times the forces of tetrahedra and then of other elements, into a place for each corner. Counts the small
+// step, which the other kernels only read.
 @compute @workgroup_size(64)
 fn load_forces(
     @builtin(global_invocation_id) id: vec3u,
@@ -75,7 +74,7 @@ fn load_forces(
     if thread < job.tet_count {
         load_tet(thread / LANES, thread % LANES);
     } else if thread < job.count {
-        load_spring(springs[thread - job.tet_count]);
+        load_element(element_row(thread - job.tet_count));
     }
 }
 
@@ -86,7 +85,7 @@ fn load_tet(block: u32, lane: u32) {
         return;
     }
     let small_dt = number(small + SMALL_DT);
-    let material = law_of(kind);
+    let material = tissue_of(kind);
     let lambda = material.lame_lambda;
     let mu = material.lame_mu;
     let vertices = vertices_of(block, lane);
@@ -96,7 +95,7 @@ fn load_tet(block: u32, lane: u32) {
     }
     let shape = shape_of(block, lane);
     let f = deformation_gradient(x, shape);
-    var piola = tissue_piola(block >= job.set_first, f, lambda, mu);
+    var piola = law_piola(law_of(block), f, lambda, mu);
     if material.viscosity > 0.0 {
         let change = tissue_change_since(f, start_strain_of(block, lane));
         let rate = material.viscosity * number(small + SMALL_INVERSE_DT);
@@ -111,13 +110,20 @@ fn load_tet(block: u32, lane: u32) {
     }
 }
 
-fn load_spring(spring: Spring) {
-    let x = array<vec3f, 2>(points[spring.vertices[0]].xyz, points[spring.vertices[1]].xyz);
-    let forces = spring_forces(x, spring.rest_length, spring.stiffness);
-    let small_dt = number(small_row(spring.part) + SMALL_DT);
-    let squared = small_dt * small_dt;
-    loads[spring.slots[0]] = vec4f(forces[0] * squared, 0.0);
-    loads[spring.slots[1]] = vec4f(forces[1] * squared, 0.0);
+fn load_element(row: u32) {
+    let kind = table[row + ELEMENT_KIND];
+    let vertices = four_of(row + ELEMENT_VERTICES);
+    let h = number(small_row(table[row + ELEMENT_PART]) + SMALL_DT);
+    var x: array<vec3f, 4>;
+    var start: array<vec3f, 4>;
+    for (var i = 0u; i < 4u; i++) {
+        x[i] = points[vertices[i]].xyz;
+        start[i] = x[i] - ground[VELOCITIES * table[STRIDE_AT] + vertices[i]].xyz * h;
+    }
+    var forces = element_forces(kind, moment_of(row, start, h), x);
+    for (var i = 0u; i < element_corners(kind); i++) {
+        loads[table[row + ELEMENT_SLOTS + i]] = vec4f(forces[i] * (h * h), 0.0);
+    }
 }
 
 @compute @workgroup_size(64)

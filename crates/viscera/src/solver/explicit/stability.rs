@@ -5,10 +5,10 @@
 //! omega^2 <= max_i sum_(e at i) rho(K_e)/m_i
 //! ```
 
-use crate::elements::kinds::Energy;
+use crate::elements::kinds::{Energy, Kind};
 use crate::elements::shape_gradients;
 use crate::model::Model;
-use crate::model::single::{ElementSet, for_each_kind};
+use crate::model::elements::{ElementSet, Moments, for_each_kind};
 use crate::scalar::{Mat3, Real};
 use crate::settings::SolverSettings;
 use crate::solver::error::StepError;
@@ -98,7 +98,7 @@ impl Stability {
 fn part_stability<S: Real>(model: &Model<S>) -> (Vec<f64>, Vec<PartStability>) {
     let mut stiffness = vec![0.0; model.vertex_count()];
     let mut parts = vec![PartStability::default(); model.part_count()];
-    for set in model.tet_sets() {
+    for set in &model.tet_sets {
         for tet in model.tets(set) {
             let material = &model.materials[tet.material];
             let viscosity = &mut parts[model.part_of(tet.vertices[0])].viscosity;
@@ -121,14 +121,15 @@ fn part_stability<S: Real>(model: &Model<S>) -> (Vec<f64>, Vec<PartStability>) {
 }
 
 /// Adds the stiffness of the elements of one kind to their vertices [N/m].
-fn add_stiffness<S: Real, const N: usize, const M: usize>(
-    set: &impl ElementSet<S, N, M>,
+fn add_stiffness<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
+    set: &ElementSet<S, K, N, M>,
     model: &Model<S>,
     stiffness: &mut [f64],
 ) {
-    for i in 0..set.count() {
-        let of_element = set.element::<f64>(i, &model.rest_anchors).stiffness();
-        for v in set.vertices(i) {
+    let moments = Moments::at_rest(model, &model.rest_anchors);
+    for (i, vertices) in set.vertices.iter().enumerate() {
+        let of_element = set.element::<f64>(i, &moments).stiffness();
+        for &v in vertices {
             stiffness[v as usize] += of_element;
         }
     }

@@ -15,31 +15,6 @@ struct TetBlock {
     material: array<u32, 8>,
 }
 
-struct Spring {
-    vertices: array<u32, 2>,
-    copies: array<u32, 2>,
-    // Where its two loads go.
-    slots: array<u32, 2>,
-    multiplier: u32,
-    // [m]
-    rest_length: f32,
-    // [N/m]
-    stiffness: f32,
-    part: u32,
-}
-
-struct Attachment {
-    vertex: u32,
-    copy_index: u32,
-    // Where its load goes.
-    slot: u32,
-    // First of three.
-    multiplier: u32,
-    // [N/m]
-    stiffness: f32,
-    part: u32,
-}
-
 // What acts on one vertex in this step.
 struct Update {
     vertex: u32,
@@ -56,7 +31,7 @@ struct Update {
 
 // One dispatch.
 struct Job {
-    // The first block, spring, attachment or vertex.
+    // The first block, element or vertex.
     first: u32,
     // How many threads have work.
     count: u32,
@@ -66,15 +41,12 @@ struct Job {
     multiplier_offset: u32,
     viscous_offset: u32,
     is_viscous: u32,
-    // Whether the set's law is stable neo-Hookean.
-    is_neo_hookean: u32,
     // What a kernel with several uses is used for; see there.
     mode: u32,
     // A number that only the kernel understands.
     parameter: f32,
-    // Of a kernel that does all constraints: threads of tetrahedra, then of springs; attachments follow.
+    // Of a kernel that does all elements: threads of tetrahedra; the others follow.
     tet_count: u32,
-    spring_count: u32,
 }
 
 // Constants of a step.
@@ -134,16 +106,12 @@ struct Frame {
 // Sums of pieces.
 @group(0) @binding(21) var<storage, read_write> partial_sums: array<f32>;
 @group(0) @binding(22) var<storage, read_write> control: Control;
-@group(0) @binding(23) var<storage, read> springs: array<Spring>;
-@group(0) @binding(24) var<storage, read> attachments: array<Attachment>;
-// Where attachments are held [m].
-@group(0) @binding(25) var<storage, read_write> anchors: array<vec4f>;
 // Where the guard's step can start from [m]: three ranges of the ground.
-@group(0) @binding(26) var<storage, read_write> starts: array<vec4f>;
+@group(0) @binding(24) var<storage, read_write> starts: array<vec4f>;
 // All that belongs to vertices, range by range; see potential.wgsl.
-@group(0) @binding(27) var<storage, read_write> ground: array<vec4f>;
+@group(0) @binding(25) var<storage, read_write> ground: array<vec4f>;
 // All constants but the tetrahedra, and the weights of the norm, as words; see table.wgsl.
-@group(0) @binding(28) var<storage, read> table: array<u32>;
+@group(0) @binding(26) var<storage, read> table: array<u32>;
 
 @group(1) @binding(0) var<uniform> job: Job;
 @group(1) @binding(1) var<uniform> frame: Frame;

@@ -57,8 +57,8 @@ impl Buffers {
         let accelerated = accelerates(settings);
         let anderson = accelerated && settings.acceleration == Acceleration::Anderson;
         let history = if anderson { unknowns * (u64::from(window(settings)) + 1) } else { 0 };
-        let viscous = model.tet_sets().iter().any(|set| set.viscous);
-        let blocks = model.tet_sets().iter().map(|set| set.block_count() as u64).sum::<u64>();
+        let viscous = model.is_viscous();
+        let blocks = model.block_count() as u64;
         let when = |wanted: bool, size: u64| if wanted { size } else { 0 };
         let table = layout.table(model, settings);
         let split = model.is_split();

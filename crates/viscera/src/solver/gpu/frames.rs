@@ -156,9 +156,11 @@ impl GpuSolver {
         check_state(model, state)?;
         check_inputs(model, inputs)?;
         self.read_buffers(&balance_slots(model), |read| {
-            let [predicted, acting] = [read[0], read[1]].map(bytemuck::cast_slice::<u8, [f32; 4]>);
+            let [predicted, acting, before] =
+                [read[0], read[1], read[2]].map(bytemuck::cast_slice::<u8, [f32; 4]>);
             let count = model.vertex_count();
             let point = |&[x, y, z, _]: &[f32; 4]| Point::new(vec3(x, y, z), 0.0);
+            let before: Vec<Point<f32>> = before[..count].iter().map(point).collect();
             let mut places: Vec<Point<f32>> = predicted[..count].iter().map(point).collect();
             let fourth = |rows: &[[f32; 4]]| -> Vec<f32> {
                 rows[..count].iter().map(|row| row[3]).collect()
@@ -169,8 +171,8 @@ impl GpuSolver {
                 let place = |v: usize| state.positions[user(v)];
                 load_tethers(&self.tethers, &mut places, self.multiplier_dt, mass, place);
             }
-            let mut strains: &[Eight<f32>] = read.get(2).map_or(&[], |s| bytemuck::cast_slice(s));
-            let start_strain = model.tet_sets().map(|set| {
+            let mut strains: &[Eight<f32>] = read.get(3).map_or(&[], |s| bytemuck::cast_slice(s));
+            let start_strain = model.tet_sets.each_ref().map(|set| {
                 // The device has room for all blocks, measures ask for those of viscous sets.
                 let blocks = if strains.is_empty() { 0 } else { set.block_count() };
                 let (of_set, rest) = strains.split_at(6 * blocks);
@@ -178,6 +180,7 @@ impl GpuSolver {
                 if set.viscous { of_set.as_chunks::<6>().0.to_vec() } else { Vec::new() }
             });
             let end = EndOfStep {
+                previous: &before,
                 predicted: &places,
                 inertias: &fourth(predicted),
                 inverse_masses: &fourth(acting),
@@ -228,8 +231,8 @@ impl GpuSolver {
 
 /// What a force balance needs of the device.
 fn balance_slots(model: &Model<f32>) -> Vec<Slot> {
-    let mut slots = vec![Slot::Predicted, Slot::Acting];
-    if model.tet_sets().iter().any(|set| set.viscous) {
+    let mut slots = vec![Slot::Predicted, Slot::Acting, Slot::Previous];
+    if model.is_viscous() {
         slots.push(Slot::StartStrain);
     }
     slots

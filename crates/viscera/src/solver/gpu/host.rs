@@ -2,8 +2,9 @@
 
 use super::control::{Control, PartControl};
 use super::layout;
-use super::slots::{Attachment, Spring, Update};
+use super::slots::Update;
 use super::uniforms::{FrameConstants, Job};
+use crate::elements::law::LAWS;
 use crate::scalar::lanes::LANES;
 use crate::solver::cpu::products::LARGEST_WINDOW;
 use crate::solver::step::guard;
@@ -26,8 +27,8 @@ pub fn host_layouts() -> Vec<HostLayout> {
     }
     vec![
         record!("Job" Job {
-            first count set_first multiplier_offset viscous_offset is_viscous is_neo_hookean mode
-            parameter tet_count spring_count
+            first count set_first multiplier_offset viscous_offset is_viscous mode
+            parameter tet_count
         }),
         record!("Frame" FrameConstants {
             gravity dt squared_dt inverse_dt rescale relaxation_multipliers relaxation_positions
@@ -40,12 +41,6 @@ pub fn host_layouts() -> Vec<HostLayout> {
             mixture_best mixture_failures is_good is_broken
         }),
         record!("Update" Update { vertex is_pinned force place stiffness inertia }),
-        record!("Spring" Spring {
-            vertices copies slots multiplier rest_length stiffness part
-        }),
-        record!("Attachment" Attachment {
-            vertex copy_index slot multiplier stiffness part
-        }),
         record!("TetBlock" crate::model::TetBlock<f32> {
             vertices inverse_rest_shape rest_volume material
         }),
@@ -61,6 +56,7 @@ pub(super) fn constants() -> String {
     ];
     let shared = [
         ("LANES", LANES as u32),
+        ("LAW_COUNT", LAWS as u32),
         ("FILLING", layout::FILLING),
         ("WHOLE", layout::WHOLE),
         ("PRODUCTS", layout::PRODUCTS as u32),

@@ -4,7 +4,7 @@ use super::device::{Device, Pipeline};
 use super::slots::Slot;
 use crate::elements::TetForm;
 use crate::elements::wgsl;
-use crate::solver::step::tissue::TISSUE_WGSL;
+use crate::solver::step::tissue::{TISSUE_WGSL, VISCOUS_WGSL};
 
 /// A kernel: an entry point of one of the files, with the storage that it names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -26,14 +26,16 @@ pub enum File {
     Predict,
     Rebase,
     Sweep,
-    SweepSingle,
+    SweepElements,
     Loads,
-    LoadsSingle,
+    LoadsElements,
     Strain,
     Multipliers,
     Acceleration,
     AndersonPush,
     History,
+    HistoryTets,
+    HistoryElements,
     Explicit,
     Evaluate,
     Search,
@@ -96,13 +98,10 @@ kernels! {
     SOLVE_COPIES = Sweep "solve" 64 [Tets Materials CornerIndices Points Multipliers StartStrain];
     SOLVE_JACOBI = Sweep "solve" 64
         [Tets Materials CornerIndices Points Copies Multipliers StartStrain];
-    SOLVE_SPRINGS = SweepSingle "solve_springs" 64 [Points Multipliers Springs];
-    SOLVE_ATTACHMENTS = SweepSingle "solve_attachments" 64 [Points Multipliers Attachments Anchors];
-    SOLVE_SPRINGS_JACOBI = SweepSingle "solve_springs" 64 [Points Copies Multipliers Springs];
-    SOLVE_ATTACHMENTS_JACOBI = SweepSingle "solve_attachments" 64
-        [Points Copies Multipliers Attachments Anchors];
-    LOAD_SPRINGS = LoadsSingle "load_springs" 64 [Points Multipliers Loads Springs];
-    LOAD_ATTACHMENTS = LoadsSingle "load_attachments" 64 [Multipliers Loads Attachments];
+    SOLVE_ELEMENTS = SweepElements "solve_elements" 64 [Points Multipliers Ground Table];
+    SOLVE_ELEMENTS_JACOBI = SweepElements "solve_elements" 64
+        [Points Copies Multipliers Ground Table];
+    LOAD_ELEMENTS = LoadsElements "load_elements" 64 [Points Multipliers Loads Ground Table];
     LOAD_MULTIPLIERS = Loads "load_multipliers" 64 [Tets CornerIndices Points Multipliers Loads];
     MEASURE_STRAIN = Strain "measure_strain" 64 [Tets Points StartStrain];
     RESCALE_MULTIPLIERS = Multipliers "rescale_multipliers" 256 [Multipliers];
@@ -116,12 +115,13 @@ kernels! {
     CHEBYSHEV_CHANGE = Acceleration "chebyshev_change" 128 [Unknowns Iterate PartialSums Table];
     CHEBYSHEV_WEIGHT = Acceleration "chebyshev_weight" 128 [PartialSums Control Table];
     FIND_BROKEN = History "find_broken" 256 [Unknowns Control Table];
-    REPAIR_MULTIPLIERS = History "repair_multipliers" 64
-        [Tets StartStrain Unknowns Control Springs Attachments Anchors Table];
+    REPAIR_MULTIPLIERS = HistoryTets "repair_multipliers" 64
+        [Tets StartStrain Unknowns Control Table];
+    REPAIR_ELEMENTS = HistoryElements "repair_elements" 64 [Unknowns Control Ground Table];
     BEGIN_EXPLICIT = Explicit "begin_explicit" 64 [Points Velocities Previous Predicted Control];
     BEGIN_STRAIN = Explicit "begin_strain" 64 [Tets Points Predicted StartStrain Table];
     LOAD_FORCES = Explicit "load_forces" 64
-        [Tets CornerIndices Points Loads StartStrain Control Springs Table];
+        [Tets CornerIndices Points Loads StartStrain Control Ground Table];
     ADVANCE_EXPLICIT = Explicit "advance_explicit" 64
         [Points Loads Velocities Previous Acting Targets Control Table];
     END_EXPLICIT = Explicit "end_explicit" 64 [Points Velocities Predicted Acting];
@@ -146,35 +146,8 @@ const SHARED: [&str; 5] = [
 const SPANS: &str = include_str!("spans.wgsl");
 const SUMS: &str = include_str!("sums.wgsl");
 
-/// Springs and attachments.
-const SINGLE: [&str; 2] = [wgsl::SPRING, wgsl::ATTACHMENT];
-
-/// The potential, and what the guard decides by it.
-const GUARD: [&str; 6] = [
-    wgsl::SPRING,
-    wgsl::ATTACHMENT,
-    wgsl::NEO_HOOKEAN,
-    TISSUE_WGSL,
-    include_str!("../step/potential.wgsl"),
-    include_str!("../step/guard_decide.wgsl"),
-];
-
-/// The files that make a formulation of constraints.
-fn form(form: TetForm) -> Vec<&'static str> {
-    match form {
-        TetForm::GreenStrain => vec![include_str!("../xpbd/forms_green_strain.wgsl")],
-        TetForm::NeoHookeanPair => vec![
-            wgsl::NEO_HOOKEAN,
-            wgsl::NEO_HOOKEAN_PAIR,
-            include_str!("../xpbd/forms_neo_hookean_pair.wgsl"),
-        ],
-        TetForm::NeoHookeanStretch => vec![
-            wgsl::SINGULAR_VALUES,
-            wgsl::NEO_HOOKEAN_STRETCH,
-            include_str!("../xpbd/forms_neo_hookean_stretch.wgsl"),
-        ],
-    }
-}
+/// How elements that are no tetrahedra lie in the table.
+const ELEMENTS: &str = include_str!("elements.wgsl");
 
 /// How a sweep reads and writes, and how an acceleration finds what a sweep has left.
 fn swept(swept: Swept) -> [&'static str; 2] {
@@ -192,14 +165,25 @@ fn swept(swept: Swept) -> [&'static str; 2] {
 /// The files of a kernel, each whole, in order.
 fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
     let [swept, mapped] = swept(variant.swept);
-    let form = form(variant.form);
+    let form = wgsl::form_texts(variant.form);
     let own = |file| vec![file];
+    let laws = || vec![wgsl::LAW_TEXT.as_str(), TISSUE_WGSL];
+    let elements = |file| vec![wgsl::KIND_TEXT.as_str(), ELEMENTS, file];
+    let history = include_str!("../xpbd/history.wgsl");
+    // The potential, and what the guard decides by it.
+    let guard = |own: Vec<&'static str>| {
+        let potential =
+            [include_str!("../step/potential.wgsl"), include_str!("../step/guard_decide.wgsl")];
+        [laws(), elements(potential[0]), vec![potential[1]], own].concat()
+    };
     match kernel.file {
         File::Predict => own(include_str!("../step/predict.wgsl")),
         File::Rebase => own(include_str!("../xpbd/rebase.wgsl")),
         File::Sweep => [form, vec![swept, include_str!("../xpbd/sweep.wgsl")]].concat(),
-        File::SweepSingle => [SINGLE, [swept, include_str!("../xpbd/sweep_single.wgsl")]].concat(),
-        File::LoadsSingle => [&SINGLE[..], &[include_str!("../xpbd/loads_single.wgsl")]].concat(),
+        File::SweepElements => {
+            [vec![swept], elements(include_str!("../xpbd/sweep_elements.wgsl"))].concat()
+        }
+        File::LoadsElements => elements(include_str!("../xpbd/loads_elements.wgsl")),
         File::Loads => [form, own(include_str!("../xpbd/loads.wgsl"))].concat(),
         File::Strain => own(include_str!("../step/strain.wgsl")),
         File::Multipliers => own(include_str!("../xpbd/multipliers.wgsl")),
@@ -207,20 +191,19 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
         File::AndersonPush => {
             vec![SPANS, SUMS, mapped, include_str!("../xpbd/acceleration_push.wgsl")]
         }
-        File::History => {
-            // Functions of the tissue need those of both laws; the pair brings its own along.
-            let has_law = variant.form == TetForm::NeoHookeanPair;
-            let law = if has_law { Vec::new() } else { own(wgsl::NEO_HOOKEAN) };
-            let rest = vec![TISSUE_WGSL, SPANS, include_str!("../xpbd/history.wgsl")];
-            [law, form, SINGLE.to_vec(), rest].concat()
+        File::History => vec![SPANS, history, include_str!("../xpbd/history_broken.wgsl")],
+        File::HistoryTets => {
+            let own = vec![VISCOUS_WGSL, history, include_str!("../xpbd/history_tets.wgsl")];
+            [form, own].concat()
         }
-        File::Explicit => {
-            vec![wgsl::NEO_HOOKEAN, wgsl::SPRING, TISSUE_WGSL, include_str!("../explicit/mod.wgsl")]
+        File::HistoryElements => {
+            [vec![history], elements(include_str!("../xpbd/history_elements.wgsl"))].concat()
         }
-        File::Evaluate => [&GUARD[..], &[include_str!("../step/guard_evaluate.wgsl")]].concat(),
-        File::Search => [&GUARD[..], &[include_str!("../step/guard_search.wgsl")]].concat(),
-        File::Take => [&GUARD[..], &[SPANS, include_str!("../step/guard_take.wgsl")]].concat(),
-        File::Energy => [&GUARD[..], &[include_str!("../step/energy.wgsl")]].concat(),
+        File::Explicit => [laws(), elements(include_str!("../explicit/mod.wgsl"))].concat(),
+        File::Evaluate => guard(own(include_str!("../step/guard_evaluate.wgsl"))),
+        File::Search => guard(own(include_str!("../step/guard_search.wgsl"))),
+        File::Take => guard(vec![SPANS, include_str!("../step/guard_take.wgsl")]),
+        File::Energy => guard(own(include_str!("../step/energy.wgsl"))),
     }
 }
 
@@ -262,7 +245,7 @@ fn key(kernel: &Kernel, variant: Variant) -> String {
 fn varies(kernel: &Kernel) -> bool {
     matches!(
         kernel.file,
-        File::Sweep | File::SweepSingle | File::AndersonPush | File::Loads | File::History
+        File::Sweep | File::SweepElements | File::AndersonPush | File::Loads | File::HistoryTets
     )
 }
 

@@ -5,7 +5,11 @@ use bytemuck::{Pod, Zeroable};
 
 use super::limits::accelerates;
 use super::parts::{Fall, PartRow, Parts, Piece, SmallSteps};
-use super::slots::{ALIGNMENT, Attachment, Range, Slot, Spring, unknowns_size};
+use super::slots::{ALIGNMENT, Element, Range, Slot, unknowns_size};
+use crate::elements::kinds::{Kind, MOST};
+use crate::elements::law::LAWS;
+use crate::elements::list::KIND_SIZES;
+use crate::model::elements::{ElementSet, for_each_kind};
 use crate::model::{MaterialConstants, Model};
 use crate::scalar::lanes::LANES;
 use crate::settings::{Method, SolverSettings};
@@ -41,8 +45,7 @@ pub(super) struct Header {
     pub materials: u32,
     pub corners: u32,
     pub offsets: u32,
-    pub springs: u32,
-    pub attachments: u32,
+    pub elements: u32,
     pub pieces: u32,
     pub members: u32,
     pub parts: u32,
@@ -57,10 +60,9 @@ pub(super) struct Header {
     /// Places among the partial sums.
     pub lines: u32,
     pub energies: u32,
-    /// Lanes of all tetrahedra, and of those before the first neo-Hookean one.
+    /// Lanes of all tetrahedra, and the blocks where those of each law end.
     pub tet_lanes: u32,
-    pub neo_hookean_from: u32,
-    pub spring_count: u32,
+    pub law_ends: [u32; LAWS],
     pub part_count: u32,
 }
 
@@ -107,9 +109,9 @@ pub(super) struct Layout {
     offsets: Vec<u32>,
     /// Place of the load of each corner, per block and corner.
     corners: Vec<[[u32; LANES]; 4]>,
-    springs: Vec<Spring>,
-    attachments: Vec<Attachment>,
-    /// Elements, part by part.
+    /// Sorted by colour.
+    elements: Vec<Element>,
+    /// Numbers of elements, tetrahedra first, part by part.
     members: Vec<u32>,
     /// First those of elements.
     pub pieces: Vec<Piece>,
@@ -120,7 +122,6 @@ pub(super) struct Layout {
 
 impl Layout {
     pub fn new(model: &Model<f32>, settings: &SolverSettings) -> Self {
-        let of = |vertex: u32| model.numbering.of(vertex) as u32;
         let mut counts = vec![0u32; model.vertex_count() + 1];
         let mut count = |vertex: u32| {
             let place = &mut counts[vertex as usize];
@@ -129,7 +130,7 @@ impl Layout {
         };
         // First the rank of each load at its vertex, then places.
         let mut corners = Vec::new();
-        for set in model.tet_sets() {
+        for set in &model.tet_sets {
             for (block, &filled) in set.blocks.iter().zip(&set.filled) {
                 let mut ranks = [[0; LANES]; 4];
                 for lane in 0..filled as usize {
@@ -140,32 +141,14 @@ impl Layout {
                 corners.push(ranks);
             }
         }
-        let model_springs = &model.springs;
-        let mut springs: Vec<Spring> = Vec::new();
-        for (i, ends) in model_springs.vertices.iter().enumerate() {
-            let vertices = ends.map(of);
-            springs.push(Spring {
-                vertices,
-                copies: model_springs.copies[i],
-                slots: vertices.map(&mut count),
-                multiplier: (model_springs.multiplier_offset + i) as u32,
-                rest_length: model_springs.rest_length[i],
-                stiffness: model_springs.stiffness[i],
-                part: model.part_at(vertices[0] as usize) as u32,
-            });
-        }
-        let held = &model.attachments;
-        let mut attachments: Vec<Attachment> = Vec::new();
-        for (i, &vertex) in held.vertices.iter().enumerate() {
-            let vertex = of(vertex);
-            attachments.push(Attachment {
-                vertex,
-                copy_index: held.copies[i],
-                slot: count(vertex),
-                multiplier: (held.multiplier_offset + 3 * i) as u32,
-                stiffness: held.stiffness[i],
-                part: model.part_at(vertex as usize) as u32,
-            });
+        let mut elements = elements(model);
+        // Kind by kind, as the processor adds them up.
+        let by_kind = kind_by_kind(&elements);
+        for &i in &by_kind {
+            let element = &mut elements[i];
+            for corner in 0..KIND_SIZES[element.kind as usize][0] {
+                element.slots[corner] = count(element.vertices[corner]);
+            }
         }
         let mut offsets = Vec::with_capacity(counts.len());
         let mut total = 0;
@@ -173,8 +156,7 @@ impl Layout {
             offsets.push(total);
             total += count;
         }
-        let mut blocks =
-            model.tet_sets().into_iter().flat_map(|set| set.blocks.iter().zip(&set.filled));
+        let mut blocks = model.tet_sets.iter().flat_map(|set| set.blocks.iter().zip(&set.filled));
         for ranks in &mut corners {
             let Some((block, &filled)) = blocks.next() else { break };
             for corner in 0..4 {
@@ -183,18 +165,15 @@ impl Layout {
                 }
             }
         }
-        for spring in &mut springs {
-            for (slot, vertex) in spring.slots.iter_mut().zip(spring.vertices) {
+        for element in &mut elements {
+            for (slot, vertex) in element.slots.iter_mut().zip(element.vertices) {
                 *slot += offsets[vertex as usize];
             }
         }
-        for attachment in &mut attachments {
-            attachment.slot += offsets[attachment.vertex as usize];
-        }
-        let (members, pieces) = pieces(model, &springs, &attachments);
+        let (members, pieces) = pieces(model, &elements, &by_kind);
         let parts = Parts::new(model, settings, &pieces);
         let block_parts = block_parts(model);
-        Self { offsets, corners, springs, attachments, members, pieces, block_parts, parts }
+        Self { offsets, corners, elements, members, pieces, block_parts, parts }
     }
 
     /// Where a vertex's loads begin.
@@ -229,16 +208,14 @@ impl Layout {
                 &words(self.corners.as_flattened().as_flattened()),
             ),
             offsets: add(Some(Slot::Offsets), &words(&self.offsets)),
-            springs: add(Some(Slot::Springs), bytemuck::cast_slice(&self.springs)),
-            attachments: add(Some(Slot::Attachments), bytemuck::cast_slice(&self.attachments)),
+            elements: add(None, bytemuck::cast_slice(&self.elements)),
             pieces: add(None, bytemuck::cast_slice(&self.pieces)),
             members: add(None, &words(&self.members)),
             parts: add(None, bytemuck::cast_slice(&self.parts.rows)),
             runs: add(None, &words(self.parts.runs.as_flattened())),
             block_parts: add(None, &words(&self.block_parts)),
             tet_lanes: (LANES * self.corners.len()) as u32,
-            neo_hookean_from: (LANES * model.green_strain.block_count()) as u32,
-            spring_count: self.springs.len() as u32,
+            law_ends: law_ends(model),
             part_count: model.part_count() as u32,
             ..Header::default()
         };
@@ -261,7 +238,8 @@ impl Layout {
             ranges.extend(slot.map(|slot| Range { slot, owner: Slot::Ground, start, size }));
         }
         let start = each * count as u64;
-        let size = (16 * self.attachments.len() as u64).next_multiple_of(ALIGNMENT).max(ALIGNMENT);
+        let size =
+            (16 * model.rest_anchors.len() as u64).next_multiple_of(ALIGNMENT).max(ALIGNMENT);
         ranges.push(Range { slot: Slot::Anchors, owner: Slot::Ground, start, size });
         (header.stride, header.anchors) = (Self::stride(model), (start / 16) as u32);
 
@@ -269,7 +247,7 @@ impl Layout {
         let pieces = if guarded { self.pieces.len() as u64 } else { 0 };
         let lines = (PRODUCTS * u64::from(self.parts.groups())).max(PIECE_SUMS * pieces);
         let energies = lines + 2 * LINE_SUMS * pieces;
-        let elements = header.tet_lanes as usize + self.springs.len() + self.attachments.len();
+        let elements = header.tet_lanes as usize + self.elements.len();
         let sums = energies + if guarded { elements as u64 } else { 0 };
         (header.lines, header.energies) = (lines as u32, energies as u32);
         bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
@@ -292,7 +270,7 @@ impl Layout {
 
     /// Copies of each corner, and where those of each vertex begin.
     pub fn copies(model: &Model<f32>) -> [Vec<u8>; 2] {
-        let sets = model.tet_sets().into_iter();
+        let sets = model.tet_sets.iter();
         let indices: Vec<u32> = sets
             .flat_map(|set| (0..set.block_count()).map(move |block| set.copies_of(block)))
             .flat_map(|corners| corners.as_flattened().iter().copied())
@@ -314,22 +292,76 @@ pub(super) fn copy_offsets(model: &Model<f32>) -> Vec<u32> {
     offsets
 }
 
+/// The blocks where the tetrahedra of each law end.
+fn law_ends(model: &Model<f32>) -> [u32; LAWS] {
+    let mut end = 0;
+    model.tet_sets.each_ref().map(|set| {
+        end += set.block_count() as u32;
+        end
+    })
+}
+
+/// Elements that are no tetrahedra, sorted by colour, within a colour by kind; places of loads are not yet known.
+fn elements(model: &Model<f32>) -> Vec<Element> {
+    let mut all: Vec<(usize, Element)> = Vec::new();
+    for_each_kind!(model, set => {
+        for color in 0..model.color_count {
+            all.extend(set.color(color).map(|i| (color, element(set, i, model))));
+        }
+    });
+    all.sort_by_key(|(color, _)| *color);
+    all.into_iter().map(|(_, element)| element).collect()
+}
+
+fn element<K: Kind<N, M>, const N: usize, const M: usize>(
+    set: &ElementSet<f32, K, N, M>,
+    i: usize,
+    model: &Model<f32>,
+) -> Element {
+    let corner = |corner: usize| if corner < N { corner } else { 0 };
+    let vertices = set.vertices[i].map(|v| model.numbering.of(v) as u32);
+    Element {
+        kind: set.number as u32,
+        part: model.part_at(vertices[0] as usize) as u32,
+        multiplier: set.multipliers(i).start as u32,
+        anchor: set.anchors.get(i).copied().unwrap_or(0),
+        vertices: std::array::from_fn(|c| vertices[corner(c)]),
+        copies: std::array::from_fn(|c| set.copies[i][corner(c)]),
+        slots: [0; MOST],
+        constants: set.constants[i],
+    }
+}
+
+/// Places of elements, kind by kind and in each in the order of its set.
+fn kind_by_kind(elements: &[Element]) -> Vec<usize> {
+    let mut places: Vec<usize> = (0..elements.len()).collect();
+    places.sort_by_key(|&i| elements[i].kind);
+    places
+}
+
+/// The first of the elements of a colour, or of all, and how many there are.
+pub fn element_range(model: &Model<f32>, color: Option<usize>) -> [u32; 2] {
+    let [mut first, mut count] = [0; 2];
+    for_each_kind!(model, set => {
+        let range = color.map_or(0..set.len(), |color| set.color(color));
+        first += range.start as u32;
+        count += range.len() as u32;
+    });
+    [first, count]
+}
+
 /// The part of each block.
 fn block_parts(model: &Model<f32>) -> Vec<u32> {
     let of_block = |vertices: &[[u32; LANES]; 4]| model.part_at(vertices[0][0] as usize) as u32;
-    let sets = model.tet_sets().into_iter();
+    let sets = model.tet_sets.iter();
     sets.flat_map(|set| set.blocks.iter().map(|b| of_block(&b.vertices))).collect()
 }
 
 /// Elements of each part in pieces, then vertices.
-fn pieces(
-    model: &Model<f32>,
-    springs: &[Spring],
-    attachments: &[Attachment],
-) -> (Vec<u32>, Vec<Piece>) {
+fn pieces(model: &Model<f32>, others: &[Element], by_kind: &[usize]) -> (Vec<u32>, Vec<Piece>) {
     let mut elements = Vec::new();
     let mut first = 0;
-    for set in model.tet_sets() {
+    for set in &model.tet_sets {
         for (block, lane) in set.places() {
             let part = model.part_at(set.blocks[block].vertices[0][lane] as usize) as u32;
             elements.push((part, (LANES * (first + block) + lane) as u32));
@@ -337,10 +369,7 @@ fn pieces(
         first += set.block_count();
     }
     let first = (LANES * first) as u32;
-    let after = |i: usize, before: usize| first + (before + i) as u32;
-    elements.extend(springs.iter().enumerate().map(|(i, s)| (s.part, after(i, 0))));
-    let before = springs.len();
-    elements.extend(attachments.iter().enumerate().map(|(i, a)| (a.part, after(i, before))));
+    elements.extend(by_kind.iter().map(|&i| (others[i].part, first + i as u32)));
     elements.sort_by_key(|&(part, _)| part);
 
     let (mut members, mut pieces) = (Vec::new(), Vec::new());
@@ -364,7 +393,7 @@ fn pieces(
 /// Tetrahedra as `TetBlock` of bindings.wgsl.
 pub(super) fn tets(model: &Model<f32>) -> Vec<u8> {
     let mut words = Vec::new();
-    for set in model.tet_sets() {
+    for set in &model.tet_sets {
         for (block, &filled) in set.blocks.iter().zip(&set.filled) {
             words.extend(block.vertices.as_flattened());
             words.extend(block.inverse_rest_shape.as_flattened().iter().map(|x| x.to_bits()));
@@ -397,15 +426,20 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
         };
     }
     let mut all = words!(Header {
-        "MATERIALS_AT" materials "CORNERS_AT" corners "OFFSETS_AT" offsets "SPRINGS_AT" springs
-        "ATTACHMENTS_AT" attachments "PIECES_AT" pieces "MEMBERS_AT" members "PARTS_AT" parts
+        "MATERIALS_AT" materials "CORNERS_AT" corners "OFFSETS_AT" offsets "ELEMENTS_AT" elements
+        "PIECES_AT" pieces "MEMBERS_AT" members "PARTS_AT" parts
         "RUNS_AT" runs "BLOCK_PARTS_AT" block_parts "WEIGHTS_AT" weights "SMALL_STEPS_AT" small_steps "FALLS_AT" falls "STRIDE_AT" stride
         "ANCHORS_AT" anchors "LINES_AT" lines "ENERGIES_AT" energies "TET_LANES_AT" tet_lanes
-        "NEO_HOOKEAN_FROM_AT" neo_hookean_from "SPRING_COUNT_AT" spring_count
+        "LAW_ENDS_AT" law_ends
         "PART_COUNT_AT" part_count
     });
     all.extend(words!(Piece {
         "PIECE_PART" part "PIECE_FIRST" first "PIECE_END" end "PIECE_ARE_VERTICES" are_vertices
+    }));
+    all.extend(words!(Element {
+        "ELEMENT_KIND" kind "ELEMENT_PART" part "ELEMENT_MULTIPLIER" multiplier
+        "ELEMENT_ANCHOR" anchor "ELEMENT_VERTICES" vertices "ELEMENT_COPIES" copies
+        "ELEMENT_SLOTS" slots "ELEMENT_CONSTANTS" constants
     }));
     all.extend(words!(Material {
         "MATERIAL_LAMBDA" lame_lambda "MATERIAL_MU" lame_mu "MATERIAL_VISCOSITY" viscosity
@@ -427,8 +461,7 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
         ("SMALL_WORDS", size(size_of::<SmallSteps>())),
         ("PIECE_WORDS", size(size_of::<Piece>())),
         ("PART_WORDS", size(size_of::<PartRow>())),
-        ("SPRING_WORDS", size(size_of::<Spring>())),
-        ("ATTACHMENT_WORDS", size(size_of::<Attachment>())),
+        ("ELEMENT_WORDS", size(size_of::<Element>())),
         ("MATERIAL_WORDS", size(size_of::<Material>())),
     ]);
     all

@@ -21,7 +21,6 @@ mod device;
 mod error;
 mod frames;
 mod history;
-mod holds;
 mod host;
 mod inputs;
 pub mod kernels;

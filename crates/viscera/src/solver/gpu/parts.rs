@@ -74,7 +74,7 @@ pub(super) struct Fall {
 /// What parts fall by.
 #[derive(Debug)]
 pub(super) struct Falls {
-    /// Of each part [kg], and whether it has attachments.
+    /// Of each part [kg], and whether anchors hold it.
     bodies: Vec<(f64, bool)>,
     /// Forces on each part [N].
     forces: Vec<Vec3<f64>>,
@@ -85,9 +85,7 @@ pub(super) struct Falls {
 impl Falls {
     pub fn new(model: &Model<f32>) -> Self {
         let mass = |v: usize| f64::from(model.masses[model.numbering.order[v] as usize]);
-        let body = |part: &Part| {
-            (part.vertices.clone().map(mass).sum(), part.attachments().next().is_some())
-        };
+        let body = |part: &Part| (part.vertices.clone().map(mass).sum(), part.is_anchored());
         let bodies: Vec<_> = model.parts.iter().map(body).collect();
         let count = bodies.len();
         Self { bodies, forces: vec![Vec3::ZERO; count], all: vec![Fall::default(); count] }

@@ -1,13 +1,12 @@
 //! Dispatches, and how they are made: what the recorders of all stages share.
 
 use super::kernels::{Kernel, Swept, Variant};
-use super::layout::{Layout, Pieces};
+use super::layout::{Layout, Pieces, element_range};
 use super::limits::window;
 use super::slots::{Place, Slot};
 use super::uniforms::Job;
 use crate::elements::TetForm;
-use crate::material::MaterialModel;
-use crate::model::{Model, TetSet};
+use crate::model::Model;
 use crate::scalar::lanes::LANES;
 use crate::settings::SolverSettings;
 use crate::solver::xpbd::is_jacobi;
@@ -121,9 +120,9 @@ impl<'a> Recorder<'a> {
         kind: usize,
         blocks: std::ops::Range<usize>,
     ) -> Dispatch {
-        let sets = self.model.tet_sets();
-        let set: &TetSet<f32> = sets[kind];
-        let set_first = if kind == 0 { 0 } else { sets[0].block_count() as u32 };
+        let sets = &self.model.tet_sets;
+        let set = &sets[kind];
+        let set_first = sets[..kind].iter().map(|set| set.block_count() as u32).sum();
         let job = Job {
             first: set_first + blocks.start as u32,
             count: (LANES * blocks.len()) as u32,
@@ -131,14 +130,13 @@ impl<'a> Recorder<'a> {
             multiplier_offset: set.multiplier_offset as u32,
             viscous_offset: set.viscous_offset as u32,
             is_viscous: set.viscous.into(),
-            is_neo_hookean: (set.model == MaterialModel::StableNeoHookean).into(),
             ..Job::default()
         };
         Dispatch { variant: self.variant(set.form), ..self.threads(kernel, job) }
     }
 
     pub fn each_set(&self, kernel: &'static Kernel, into: &mut Vec<Dispatch>) {
-        for (kind, set) in self.model.tet_sets().into_iter().enumerate() {
+        for (kind, set) in self.model.tet_sets.iter().enumerate() {
             if !set.is_empty() {
                 into.push(self.blocks(kernel, kind, 0..set.block_count()));
             }
@@ -147,8 +145,19 @@ impl<'a> Recorder<'a> {
 
     /// Threads for all tetrahedra, lanes that only fill blocks up included.
     pub fn tet_threads(&self) -> u32 {
-        let blocks = self.model.tet_sets().into_iter().map(|set| set.block_count()).sum::<usize>();
-        (LANES * blocks) as u32
+        (LANES * self.model.block_count()) as u32
+    }
+
+    /// How many elements are no tetrahedra.
+    pub fn element_count(&self) -> u32 {
+        element_range(self.model, None)[1]
+    }
+
+    /// A thread for each element that is no tetrahedron: of one colour, or of all; nothing where there is none.
+    pub fn elements(&self, kernel: &'static Kernel, color: Option<usize>) -> Option<Dispatch> {
+        let [first, count] = element_range(self.model, color);
+        let job = Job { first, count, ..Job::default() };
+        (count > 0).then(|| self.threads(kernel, job))
     }
 
     /// A workgroup for each that the job counts.

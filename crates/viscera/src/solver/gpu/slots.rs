@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::elements::kinds::{CONSTANTS, MOST};
 use crate::model::Model;
 use crate::scalar::{Vec3, vec3};
 
@@ -33,8 +34,6 @@ pub enum Slot {
     Mapped,
     PartialSums,
     Control,
-    Springs,
-    Attachments,
     Anchors,
     Starts,
     Ground,
@@ -46,11 +45,8 @@ pub enum Slot {
 impl Slot {
     /// Whether kernels only read it.
     pub fn is_read_only(self) -> bool {
-        use Slot::{Attachments, CornerIndices, Materials, Offsets, Springs, Table, Tets, Updates};
-        matches!(
-            self,
-            Tets | Materials | CornerIndices | Offsets | Updates | Springs | Attachments | Table
-        )
+        use Slot::{CornerIndices, Materials, Offsets, Table, Tets, Updates};
+        matches!(self, Tets | Materials | CornerIndices | Offsets | Updates | Table)
     }
 }
 
@@ -88,29 +84,23 @@ impl Update {
     }
 }
 
-/// `Spring` of bindings.wgsl.
+/// An element that is no tetrahedron, as it stands in the table; lists that are longer than it has vertices repeat
+/// its first.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub struct Spring {
-    pub vertices: [u32; 2],
-    pub copies: [u32; 2],
-    pub slots: [u32; 2],
-    pub multiplier: u32,
-    pub rest_length: f32,
-    pub stiffness: f32,
+pub struct Element {
+    /// Its kind by the place in the list.
+    pub kind: u32,
     pub part: u32,
-}
-
-/// `Attachment` of bindings.wgsl.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub struct Attachment {
-    pub vertex: u32,
-    pub copy_index: u32,
-    pub slot: u32,
+    /// Where its first multiplier stands.
     pub multiplier: u32,
-    pub stiffness: f32,
-    pub part: u32,
+    /// The number of its anchor.
+    pub anchor: u32,
+    pub vertices: [u32; MOST],
+    pub copies: [u32; MOST],
+    /// Where its loads go.
+    pub slots: [u32; MOST],
+    pub constants: [f32; CONSTANTS],
 }
 
 /// Ranges of buffers begin at a multiple of this: the alignment [bytes] that devices may ask of a

@@ -4,7 +4,6 @@ use super::buffers::Buffers;
 use super::control;
 use super::device::{Device, baseline, shortfall};
 use super::error::GpuError;
-use super::holds::Hold;
 use super::kernels;
 use super::layout::Layout;
 use super::limits::{JOB_STRIDE, MOST_GROUPS};
@@ -17,7 +16,7 @@ use super::uniforms::{FrameConstants, Job};
 use crate::model::Model;
 use crate::scalar::Vec3;
 use crate::settings::{Method, Precision, SolverSettings, Start};
-use crate::solver::cpu::memory::sizes;
+use crate::solver::cpu::memory::{SIZES, sizes};
 use crate::solver::error::StepError;
 use crate::solver::explicit::Stability;
 use crate::solver::plan::{Plan, StepStage};
@@ -47,7 +46,7 @@ pub struct GpuSolver {
     pub(super) frame: wgpu::Buffer,
     pub(super) jobs: wgpu::Buffer,
     /// What the model's sizes were.
-    pub(super) sizes: [usize; 11],
+    pub(super) sizes: [usize; SIZES],
     pub(super) ready: [Vec<Ready>; 3],
     /// Which of them belong to which stage.
     pub(super) stages: [Vec<StageRange>; 3],
@@ -67,11 +66,10 @@ pub struct GpuSolver {
     pub(super) weights_dt: f64,
     /// Whether the device's anchors may be elsewhere than at rest.
     pub(super) has_moved_anchors: bool,
-    /// Of the explicit method: its small steps, and the attachments vertex by vertex.
+    /// Of the explicit method: its small steps.
     pub(super) stability: Option<Stability>,
     /// Soft position constraints of the last step.
     pub(super) tethers: Vec<Bundle<f32>>,
-    pub(super) holds: Vec<Hold>,
     pub(super) small_steps: Vec<SmallSteps>,
     /// What nothing holds starts otherwise, where that is asked for.
     pub(super) falls: Option<Falls>,
@@ -161,7 +159,6 @@ impl GpuSolver {
             has_moved_anchors: true,
             stability: is_explicit.then(|| Stability::new(model, settings)),
             tethers: Vec::new(),
-            holds: if is_explicit { Hold::all(model) } else { Vec::new() },
             small_steps: vec![
                 SmallSteps::default();
                 if is_explicit { model.part_count() } else { 0 }
@@ -280,7 +277,7 @@ impl GpuSolver {
         self.buffers.write(&self.device.queue, Slot::Velocities, bytes);
     }
 
-    /// What each vertex is made of: mass, inverse mass, number of copies, stiffness of its attachments.
+    /// What each vertex is made of: mass, inverse mass, number of copies.
     fn upload_constants(&self, model: &Model<f32>) {
         let order = &model.numbering.order;
         let masses: Vec<f32> = order.iter().map(|&v| model.masses[v as usize]).collect();
@@ -290,15 +287,11 @@ impl GpuSolver {
         let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
         let control = vec![0u8; control::control_size(model.part_count()) as usize];
         self.device.queue.write_buffer(self.buffers.buffer(Slot::Control), 0, &control);
-        let mut stiffness = vec![0.0; order.len()];
-        for hold in &self.holds {
-            stiffness[hold.vertex as usize] = hold.stiffness as f32;
-        }
         for (slot, values) in [
             (Slot::Predicted, with_w(&|v| masses[v])),
             (Slot::Acting, with_w(&|v| 1.0 / masses[v])),
             (Slot::Previous, with_w(&copies)),
-            (Slot::Targets, with_w(&|v| stiffness[v])),
+            (Slot::Targets, with_w(&|_| 0.0)),
         ] {
             self.buffers.write(&self.device.queue, slot, bytemuck::cast_slice(&values));
         }

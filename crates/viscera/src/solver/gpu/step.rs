@@ -8,6 +8,7 @@ use super::solver::{GpuSolver, Ready};
 use super::timing::Marks;
 use super::uniforms::FrameConstants;
 use crate::model::Model;
+use crate::scalar::Vec3;
 use crate::settings::RelaxationForm;
 use crate::solver::error::StepError;
 use crate::solver::explicit::small_steps;
@@ -131,17 +132,12 @@ impl GpuSolver {
             self.buffers.write(queue, Slot::Falls, bytemuck::cast_slice(&falls.all));
         }
         let settings = &self.settings;
-        let held = &model.attachments;
-        if !held.vertices.is_empty() && (!inputs.anchors.is_empty() || self.has_moved_anchors) {
+        let is_anchored = !model.rest_anchors.is_empty();
+        if is_anchored && (!inputs.anchors.is_empty() || self.has_moved_anchors) {
             self.has_moved_anchors = !inputs.anchors.is_empty();
-            let anchors = inputs.anchors_of(model);
-            let places: Vec<[f32; 4]> = held
-                .order
-                .iter()
-                .map(|&i| anchors[i as usize].to_array())
-                .map(|[x, y, z]| [x, y, z, 0.0])
-                .collect();
-            self.buffers.write(queue, Slot::Anchors, bytemuck::cast_slice(&places));
+            let row = |anchor: &Vec3<f32>| [anchor.x, anchor.y, anchor.z, 0.0];
+            let rows: Vec<[f32; 4]> = inputs.anchors_of(model).iter().map(row).collect();
+            self.buffers.write(queue, Slot::Anchors, bytemuck::cast_slice(&rows));
         }
         let last = self.multiplier_dt;
         let rescale = match settings.keep_multipliers {

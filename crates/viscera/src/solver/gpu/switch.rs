@@ -82,9 +82,9 @@ impl GpuSolver {
         }
         write(Slot::Unknowns, &vector(points, &state.multipliers));
         self.put_rows(Slot::Velocities, &each(model, &|v| with(velocities[v], 0.0)));
-        if model.tet_sets().iter().any(|set| set.viscous) {
+        if model.is_viscous() {
             let mut rows: Vec<f32> = Vec::new();
-            for (own, set) in constants.start_strain.iter().zip(model.tet_sets()) {
+            for (own, set) in constants.start_strain.iter().zip(&model.tet_sets) {
                 rows.extend(own.as_flattened().as_flattened());
                 rows.resize(rows.len() + 6 * LANES * (set.block_count() - own.len()), 0.0);
             }

@@ -30,16 +30,18 @@ fn piece_row(piece: u32) -> u32 {
     return table[PIECES_AT] + PIECE_WORDS * piece;
 }
 
-// A material without its compliance.
-struct Law {
-    lame_lambda: f32,
-    lame_mu: f32,
-    viscosity: f32,
+// The law of a block of tetrahedra, by its number among the laws, whose blocks stand one after the other.
+fn law_of(block: u32) -> u32 {
+    var law = 0u;
+    while law + 1u < LAW_COUNT && block >= table[LAW_ENDS_AT + law] {
+        law++;
+    }
+    return law;
 }
 
-fn law_of(kind: u32) -> Law {
+fn tissue_of(kind: u32) -> TissueConstants {
     let row = table[MATERIALS_AT] + MATERIAL_WORDS * kind;
-    return Law(
+    return TissueConstants(
         number(row + MATERIAL_LAMBDA),
         number(row + MATERIAL_MU),
         number(row + MATERIAL_VISCOSITY),

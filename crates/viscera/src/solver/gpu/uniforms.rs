@@ -12,11 +12,9 @@ pub struct Job {
     pub multiplier_offset: u32,
     pub viscous_offset: u32,
     pub is_viscous: u32,
-    pub is_neo_hookean: u32,
     pub mode: u32,
     pub parameter: f32,
     pub tet_count: u32,
-    pub spring_count: u32,
 }
 
 /// `Frame` of bindings.wgsl.

@@ -9,10 +9,10 @@
 
 use super::data::EndOfStep;
 use super::tissue::Tissue;
-use crate::elements::kinds::Energy;
+use crate::elements::kinds::{Energy, Kind};
 use crate::elements::{deformation_gradient, internal_forces, shape_gradients};
 use crate::model::Model;
-use crate::model::single::{ElementSet, for_each_kind};
+use crate::model::elements::{Before, ElementSet, Moments, for_each_kind};
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::inputs::Inputs;
 use crate::state::State;
@@ -68,19 +68,16 @@ impl ForceBalance {
     }
 
     /// Of the elements of one kind. What their forces sum to comes from outside.
-    fn add_elements<S: Real, const N: usize, const M: usize>(
+    fn add_elements<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
         &mut self,
-        set: &impl ElementSet<S, N, M>,
-        model: &Model<S>,
+        set: &ElementSet<S, K, N, M>,
         state: &State<S>,
-        inputs: &Inputs<S>,
+        moments: &Moments<'_, S>,
     ) {
-        let anchors = inputs.anchors_of(model);
-        for i in 0..set.count() {
-            let vertices = set.vertices(i);
+        for (i, &vertices) in set.vertices.iter().enumerate() {
             let x = vertices.map(|v| state.positions[v as usize].cast::<f64>());
             let mut from_outside = Vec3::<f64>::ZERO;
-            for (v, force) in vertices.into_iter().zip(set.element::<f64>(i, anchors).forces(&x)) {
+            for (v, force) in vertices.into_iter().zip(set.element::<f64>(i, moments).forces(&x)) {
                 self.residual[v as usize] -= force;
                 from_outside += force;
             }
@@ -102,7 +99,7 @@ impl ForceBalance {
         if dt <= 0.0 {
             return;
         }
-        for (set, strains) in model.tet_sets().into_iter().zip(step.start_strain) {
+        for (set, strains) in model.tet_sets.iter().zip(step.start_strain) {
             for (tet, (block, lane)) in model.tets(set).zip(set.places()) {
                 let x = tet.vertices.map(|v| state.positions[v as usize].cast::<f64>());
                 let shape = tet.inverse_rest_shape.cast::<f64>();
@@ -128,7 +125,13 @@ impl ForceBalance {
                 }
             }
         }
-        for_each_kind!(model, set => self.add_elements(set, model, state, inputs));
+        let moments = Moments {
+            anchors: inputs.anchors_of(model),
+            start: Before::Places(step.previous),
+            dt,
+            numbering: &model.numbering,
+        };
+        for_each_kind!(model, set => self.add_elements(set, state, &moments));
         for tether in step.tethers {
             let v = model.numbering.order[tether.vertex];
             self.load += tether.force(state.positions[v as usize]).cast::<f64>().length();

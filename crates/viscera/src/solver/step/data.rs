@@ -3,6 +3,8 @@
 #![allow(unsafe_code)]
 
 use super::tethers::Bundle;
+use crate::elements::law::LAWS;
+use crate::model::elements::{Before, Moments};
 use crate::model::{Model, Part, TetSet};
 use crate::scalar::lanes::{Eight, LANES, Point};
 use crate::scalar::{Real, Vec3};
@@ -21,8 +23,8 @@ pub struct Step<'a, S> {
     pub settings: &'a SolverSettings,
 }
 
-/// Green strain at the start of the step of the blocks of viscous sets, `[green, neo]`.
-pub type StartStrain<S> = [Vec<[Eight<S>; 6]>; 2];
+/// Green strain at the start of the step of the blocks of viscous sets, law by law.
+pub type StartStrain<S> = [Vec<[Eight<S>; 6]>; LAWS];
 
 /// What stays the same from the prediction to the end of a step, and the threads that work on it.
 #[derive(Clone, Debug)]
@@ -50,6 +52,8 @@ pub struct StepConstants<S> {
 /// numbering.
 #[derive(Clone, Copy, Debug)]
 pub struct EndOfStep<'a, S> {
+    /// See [`StepConstants::previous`].
+    pub previous: &'a [Point<S>],
     /// See [`StepConstants::predicted`].
     pub predicted: &'a [Point<S>],
     /// See [`StepConstants::inertias`].
@@ -92,7 +96,7 @@ impl<S: Real> StepData<S> {
                 tethers: Vec::new(),
                 inertias: vec![S::ZERO; vertices],
                 inverse_masses: vec![S::ZERO; vertices],
-                start_strain: model.tet_sets().map(strains),
+                start_strain: model.tet_sets.each_ref().map(strains),
             },
             points: points(),
             velocities: vec![Vec3::ZERO; vertices],
@@ -121,16 +125,27 @@ impl<S: Real> StepData<S> {
 }
 
 impl<S: Real> StepConstants<S> {
+    /// What elements depend on in a step.
+    pub fn moments<'a>(&'a self, step: &Step<'a, S>) -> Moments<'a, S> {
+        Moments {
+            anchors: step.inputs.anchors_of(step.model),
+            start: Before::Places(&self.previous),
+            dt: step.dt,
+            numbering: &step.model.numbering,
+        }
+    }
+
     /// For measures of the step.
     pub fn end_of_step(&self) -> EndOfStep<'_, S> {
-        let Self { predicted, inertias, inverse_masses, tethers, start_strain, .. } = self;
-        EndOfStep { predicted, inertias, inverse_masses, tethers, start_strain }
+        let Self { previous, predicted, inertias, inverse_masses, tethers, start_strain, .. } =
+            self;
+        EndOfStep { previous, predicted, inertias, inverse_masses, tethers, start_strain }
     }
 
     /// Whether a pin, an attachment or a tether holds a part.
     pub fn holds(&self, part: &Part) -> bool {
         let mut inverse_masses = self.inverse_masses[part.vertices.clone()].iter();
-        part.attachments().next().is_some()
+        part.is_anchored()
             || !self.tethers_of(part).is_empty()
             || inverse_masses.any(|inverse| *inverse == S::ZERO)
     }

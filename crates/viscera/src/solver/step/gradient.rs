@@ -3,11 +3,11 @@
 
 use super::data::{Step, StepConstants};
 use super::law::{OfLaw, respond, with_tissue};
-use crate::elements::kinds::Energy;
+use crate::elements::kinds::{Energy, Kind};
 use crate::elements::law::Law;
 use crate::elements::{CornerLoad, internal_forces, shape_gradients};
 use crate::model::Part;
-use crate::model::single::{ElementSet, for_each_kind};
+use crate::model::elements::{ElementSet, Moments, for_each_kind};
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::scalar::{Real, Scalar};
 use crate::solver::cpu::tets::{Block, TetPass};
@@ -19,6 +19,7 @@ use crate::solver::cpu::threads::Shared;
 pub fn load_forces<S: Real, const BOUND: bool>(
     constants: &StepConstants<S>,
     step: &Step<'_, S>,
+    moments: &Moments<'_, S>,
     part: &Part,
     x: &[Point<S>],
     loads: &mut [Point<S>],
@@ -27,7 +28,7 @@ pub fn load_forces<S: Real, const BOUND: bool>(
     loads[part.copies.clone()].fill(Point::default());
     for color in &part.colors {
         let shared = Shared::new(loads);
-        for (kind, set) in model.tet_sets().into_iter().enumerate() {
+        for (kind, set) in model.tet_sets.iter().enumerate() {
             let blocks = color.blocks[kind].start as usize..color.blocks[kind].end as usize;
             let start_strain = &constants.start_strain[kind];
             let forces = Forces::<_, BOUND> { x, start_strain, dt: step.dt, loads: &shared };
@@ -37,24 +38,23 @@ pub fn load_forces<S: Real, const BOUND: bool>(
             });
         }
     }
-    for_each_kind!(model, set => add_forces(set, step, part, x, loads));
+    for_each_kind!(model, set => add_forces(set, moments, part, x, loads));
 }
 
 /// Of a part's elements of one kind.
-fn add_forces<S: Real, const N: usize, const M: usize>(
-    set: &impl ElementSet<S, N, M>,
-    step: &Step<'_, S>,
+fn add_forces<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
+    set: &ElementSet<S, K, N, M>,
+    moments: &Moments<'_, S>,
     part: &Part,
     x: &[Point<S>],
     loads: &mut [Point<S>],
 ) {
-    let squared = S::from_f64(step.dt * step.dt);
-    let anchors = step.inputs.anchors_of(step.model);
+    let squared = S::from_f64(moments.dt * moments.dt);
     for i in set.of_part(part) {
-        let element = set.element::<S>(i, anchors);
-        let forces = element.forces(&set.places(i, step.model, x));
+        let element = set.element::<S>(i, moments);
+        let forces = element.forces(&set.places(i, moments.numbering, x));
         let mass_bound = squared * element.curvature();
-        for (copy, force) in set.copies(i).into_iter().zip(forces) {
+        for (copy, force) in set.copies[i].into_iter().zip(forces) {
             add_load(loads, copy, &CornerLoad { impulse: force * squared, mass_bound });
         }
     }

@@ -248,7 +248,8 @@ impl<S: Real> Guard<S> {
         part: usize,
     ) {
         let of = &step.model.parts[part];
-        load_forces::<S, true>(&data.constants, step, of, x, &mut data.loads);
+        let moments = data.constants.moments(step);
+        load_forces::<S, true>(&data.constants, step, &moments, of, x, &mut data.loads);
         let before = self.evaluator.evaluate(&data.constants, step, x, part).value;
         let mut length = 1.0;
         for _ in 0..SHORTENINGS {
@@ -329,7 +330,8 @@ mod tests {
         let data = &mut memory.data;
         let before = data.points.clone();
         let part = &step.model.parts[0];
-        load_forces::<_, true>(&data.constants, step, part, &before, &mut data.loads);
+        let moments = data.constants.moments(&step);
+        load_forces::<_, true>(&data.constants, &step, &moments, part, &before, &mut data.loads);
         let (mut whole, mut slope) = (before.clone(), 0.0);
         for v in 0..before.len() {
             let (gradient, direction) = descent(step.model, data, &before, v);

@@ -293,23 +293,17 @@ fn load_forces(element: u32, x: array<vec3f, 4>) {
             let slot = table[table[CORNERS_AT] + LANES * (4u * block + corner) + lane];
             let rate = tet.viscosity_rate;
             let curvature =
-                tissue_curvature(tet.neo, tet.f, g[corner], tet.lame_lambda, tet.lame_mu, rate);
+                tissue_curvature(tet.law, tet.f, g[corner], tet.lame_lambda, tet.lame_mu, rate);
             loads[slot] = vec4f(forces[corner], volume * curvature);
         }
         return;
     }
-    let single = element - tet_lanes;
-    if single < table[SPRING_COUNT_AT] {
-        let row = spring_row(single);
-        let stiffness = number(row + 8u);
-        let forces = spring_forces(array<vec3f, 2>(x[0], x[1]), number(row + 7u), stiffness);
-        loads[table[row + 4u]] = vec4f(forces[0] * squared, squared * stiffness);
-        loads[table[row + 5u]] = vec4f(forces[1] * squared, squared * stiffness);
-        return;
+    let row = element_row(element - tet_lanes);
+    let kind = table[row + ELEMENT_KIND];
+    let moment = moment_of(row, before_steps(four_of(row + ELEMENT_VERTICES)), frame.dt);
+    var forces = element_forces(kind, moment, x);
+    let curvature = element_curvature(kind, moment);
+    for (var i = 0u; i < element_corners(kind); i++) {
+        loads[table[row + ELEMENT_SLOTS + i]] = vec4f(forces[i] * squared, squared * curvature);
     }
-    let i = single - table[SPRING_COUNT_AT];
-    let row = attachment_row(i);
-    let stiffness = number(row + 4u);
-    let force = attachment_force(x[0], anchor_of(i), stiffness);
-    loads[table[row + 2u]] = vec4f(force * squared, squared * stiffness);
 }

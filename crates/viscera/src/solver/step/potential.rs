@@ -12,9 +12,9 @@ use std::ops::Range;
 
 use super::data::{Step, StepConstants};
 use super::law::{OfLaw, respond, with_tissue};
-use crate::elements::kinds::Energy;
-use crate::elements::law::Law;
-use crate::model::single::{ElementSet, for_each_kind};
+use crate::elements::kinds::{Energy, Kind};
+use crate::elements::law::{LAWS, Law};
+use crate::model::elements::{ElementSet, Moments, for_each_kind};
 use crate::model::{Model, Part};
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, LANES, Lanes, Point};
@@ -77,7 +77,7 @@ impl Evaluator {
                 pieces.extend(ranges.map(|range| Piece { part: number, of, range }));
             };
             cut(PieceOf::Vertices, part.vertices.len(), VERTEX_PIECE);
-            for kind in 0..2 {
+            for kind in 0..LAWS {
                 cut(PieceOf::Blocks(kind), part.block_count(kind), PIECE);
             }
             first.push(pieces.len());
@@ -112,7 +112,7 @@ impl Evaluator {
         let parts = 0..step.model.parts.len();
         self.sum_pieces(constants, step, x, parts.clone());
         for part in parts {
-            self.combine(step, x, part);
+            self.combine(constants, step, x, part);
         }
     }
 
@@ -125,7 +125,7 @@ impl Evaluator {
         part: usize,
     ) -> Potential {
         self.sum_pieces(constants, step, x, part..part + 1);
-        self.combine(step, x, part);
+        self.combine(constants, step, x, part);
         self.potentials[part]
     }
 
@@ -150,7 +150,13 @@ impl Evaluator {
     }
 
     /// Adds up the pieces of a part, in order.
-    fn combine<S: Real>(&mut self, step: &Step<'_, S>, x: &[Point<S>], part: usize) {
+    fn combine<S: Real>(
+        &mut self,
+        constants: &StepConstants<S>,
+        step: &Step<'_, S>,
+        x: &[Point<S>],
+        part: usize,
+    ) {
         let range = self.first[part]..self.first[part + 1];
         let of = |of: PieceOf| {
             let all = self.pieces[range.clone()].iter().zip(&self.partial[range.clone()]);
@@ -159,14 +165,15 @@ impl Evaluator {
         let inertia = of(PieceOf::Vertices).reduce(|a, b| [a[0] + b[0], a[1].max(b[1])]);
         let [inertia, reach] = inertia.unwrap_or_default();
         let (mut stored, mut squared_noise) = (0.0, 0.0);
-        for kind in 0..2 {
+        for kind in 0..LAWS {
             let sums = of(PieceOf::Blocks(kind)).reduce(|a, b| [a[0] + b[0], a[1] + b[1]]);
             let [energy, squared_force] = sums.unwrap_or_default();
             stored += energy;
             squared_noise += squared_force;
         }
         let of = &step.model.parts[part];
-        for_each_kind!(step.model, set => add_energies(set, &mut stored, step, x, of));
+        let moments = constants.moments(step);
+        for_each_kind!(step.model, set => add_energies(set, &mut stored, &moments, x, of));
         let squared = step.dt * step.dt;
         let value = 0.5 * inertia + squared * stored;
         let noise = squared * S::EPSILON * (reach * squared_noise).sqrt();
@@ -195,7 +202,7 @@ impl Piece {
                 inertia(constants, x, first + start..first + end)
             }
             PieceOf::Blocks(kind) => {
-                let set = step.model.tet_sets()[kind];
+                let set = &step.model.tet_sets[kind];
                 let sums = Sums {
                     x,
                     start_strain: &constants.start_strain[kind],
@@ -240,17 +247,16 @@ fn inertia<S: Real>(
 }
 
 /// Adds the energies [J] of a part's elements of one kind.
-fn add_energies<S: Real, const N: usize, const M: usize>(
-    set: &impl ElementSet<S, N, M>,
+fn add_energies<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
+    set: &ElementSet<S, K, N, M>,
     sum: &mut f64,
-    step: &Step<'_, S>,
+    moments: &Moments<'_, S>,
     x: &[Point<S>],
     part: &Part,
 ) {
-    let anchors = step.inputs.anchors_of(step.model);
     for i in set.of_part(part) {
-        let element = set.element::<S>(i, anchors);
-        *sum += element.energy(&set.places(i, step.model, x)).to_f64();
+        let element = set.element::<S>(i, moments);
+        *sum += element.energy(&set.places(i, moments.numbering, x)).to_f64();
     }
 }
 

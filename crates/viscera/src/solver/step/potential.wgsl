@@ -29,7 +29,7 @@ const SUM_REFERENCE: u32 = 3u;
 const SUM_MAGNITUDE: u32 = 4u;
 const SUM_FORCE: u32 = 5u;
 const SUM_REACH: u32 = 6u;
-// Pins, attachments and tethers.
+// Pins, anchors and tethers.
 const SUM_HELD: u32 = 7u;
 // Of free vertices: kinetic energies [J], also relative to the first vertex of the part; work [J] of the
 // loads, alike; mass [kg]; momenta [kg m/s], relative; load [N].
@@ -120,7 +120,8 @@ struct Deformed {
     lame_lambda: f32,
     lame_mu: f32,
     viscosity_rate: f32,
-    neo: bool,
+    // Its number among the laws.
+    law: u32,
     // Since the start of the step, where the tissue is viscous.
     change: array<f32, 6>,
 }
@@ -128,19 +129,19 @@ struct Deformed {
 fn deformed(block: u32, lane: u32, x: array<vec3f, 4>) -> Deformed {
     let shape = shape_of(block, lane);
     let f = deformation_gradient(x, shape);
-    let material = law_of(tets[block].material[lane]);
+    let material = tissue_of(tets[block].material[lane]);
     let rate = material.viscosity * frame.inverse_dt;
-    let neo = LANES * block + lane >= table[NEO_HOOKEAN_FROM_AT];
+    let law = law_of(block);
     var change: array<f32, 6>;
     if rate > 0.0 {
         change = tissue_change_since(f, start_strain_of(block, lane));
     }
     let volume = tets[block].rest_volume[lane];
-    return Deformed(f, shape, volume, material.lame_lambda, material.lame_mu, rate, neo, change);
+    return Deformed(f, shape, volume, material.lame_lambda, material.lame_mu, rate, law, change);
 }
 
 fn stress_of(tet: Deformed) -> mat3x3f {
-    let stress = tissue_piola(tet.neo, tet.f, tet.lame_lambda, tet.lame_mu);
+    let stress = law_piola(tet.law, tet.f, tet.lame_lambda, tet.lame_mu);
     if tet.viscosity_rate == 0.0 {
         return stress;
     }
@@ -151,7 +152,7 @@ fn stress_of(tet: Deformed) -> mat3x3f {
 // Energy [J] of a tetrahedron and, where wanted, its squared force [N^2].
 fn tet_answer(block: u32, lane: u32, x: array<vec3f, 4>, with_force: bool) -> vec2f {
     let tet = deformed(block, lane, x);
-    var density = tissue_elastic_energy(tet.neo, tet.f, tet.lame_lambda, tet.lame_mu);
+    var density = law_energy_density(tet.law, tet.f, tet.lame_lambda, tet.lame_mu);
     if tet.viscosity_rate > 0.0 {
         let rate = tet.viscosity_rate;
         density += tissue_viscous_energy(tet.change, rate, tet.lame_lambda, tet.lame_mu);
@@ -164,48 +165,25 @@ fn tet_answer(block: u32, lane: u32, x: array<vec3f, 4>, with_force: bool) -> ve
     return vec2f(tet.volume * density, squared);
 }
 
-// Where a spring and an attachment stand in the table.
-fn spring_row(i: u32) -> u32 {
-    return table[SPRINGS_AT] + SPRING_WORDS * i;
-}
-
-fn attachment_row(i: u32) -> u32 {
-    return table[ATTACHMENTS_AT] + ATTACHMENT_WORDS * i;
-}
-
-fn anchor_of(i: u32) -> vec3f {
-    return ground[table[ANCHORS_AT] + i].xyz;
-}
-
-// The vertices of a tetrahedron, spring or attachment, as often as it takes to fill four places.
+// The vertices of an element, as often as it takes to fill four places.
 fn corners_of(element: u32) -> array<u32, 4> {
     let tet_lanes = table[TET_LANES_AT];
     if element < tet_lanes {
         return vertices_of(element / LANES, element % LANES);
     }
-    let single = element - tet_lanes;
-    if single < table[SPRING_COUNT_AT] {
-        let row = spring_row(single);
-        return array<u32, 4>(table[row], table[row + 1u], table[row], table[row]);
-    }
-    let v = table[attachment_row(single - table[SPRING_COUNT_AT])];
-    return array<u32, 4>(v, v, v, v);
+    return four_of(element_row(element - tet_lanes) + ELEMENT_VERTICES);
 }
 
-// Of a tetrahedron, spring or attachment whose vertices are at `x`.
+// Energy [J] of an element whose vertices are at `x` and, of a tetrahedron where wanted, its squared force [N^2].
 fn answer(element: u32, x: array<vec3f, 4>, with_force: bool) -> vec2f {
     let tet_lanes = table[TET_LANES_AT];
     if element < tet_lanes {
         return tet_answer(element / LANES, element % LANES, x, with_force);
     }
-    let single = element - tet_lanes;
-    if single < table[SPRING_COUNT_AT] {
-        let row = spring_row(single);
-        let ends = array<vec3f, 2>(x[0], x[1]);
-        return vec2f(spring_energy(ends, number(row + 7u), number(row + 8u)), 0.0);
-    }
-    let i = single - table[SPRING_COUNT_AT];
-    return vec2f(attachment_energy(x[0], anchor_of(i), number(attachment_row(i) + 4u)), 0.0);
+    let row = element_row(element - tet_lanes);
+    let start = before_steps(four_of(row + ELEMENT_VERTICES));
+    let moment = moment_of(row, start, frame.dt);
+    return vec2f(element_energy(table[row + ELEMENT_KIND], moment, x), 0.0);
 }
 
 // `m/2 (|x - xt|^2 - |x_ref - xt|^2)` of a free vertex [kg m^2] without its large terms.
@@ -239,7 +217,8 @@ fn add_element(element: u32, mode: u32, into: ptr<function, Sums>) {
             add_tested(element, found, into);
         }
     }
-    if element >= table[TET_LANES_AT] + table[SPRING_COUNT_AT] {
+    let tet_lanes = table[TET_LANES_AT];
+    if element >= tet_lanes && element_is_anchored(table[element_row(element - tet_lanes) + ELEMENT_KIND]) {
         (*into)[SUM_HELD] += 1.0;
     }
 }

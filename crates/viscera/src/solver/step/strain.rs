@@ -17,7 +17,7 @@ pub fn measure_strain<S: Real>(
     x: &[Point<S>],
     start_strain: &mut StartStrain<S>,
 ) {
-    for (kind, (set, strains)) in model.tet_sets().into_iter().zip(start_strain).enumerate() {
+    for (kind, (set, strains)) in model.tet_sets.iter().zip(start_strain).enumerate() {
         let pass = Strain { x, strains: Shared::new(strains) };
         match part {
             _ if !set.viscous => {}

@@ -8,7 +8,12 @@ use crate::scalar::{Mat3, Scalar, Vec3};
 
 /// Twin of the functions of [`Tissue`]; needs those of the Green strain and of neo-Hookean tissue.
 #[cfg(feature = "gpu")]
-pub const TISSUE_WGSL: &str = include_str!("tissue.wgsl");
+pub const TISSUE_WGSL: &str =
+    concat!(include_str!("tissue_viscous.wgsl"), include_str!("tissue.wgsl"));
+
+/// Its viscous part, which needs no law.
+#[cfg(feature = "gpu")]
+pub const VISCOUS_WGSL: &str = include_str!("tissue_viscous.wgsl");
 
 /// The constants of a tetrahedron's tissue for one step.
 pub struct Tissue<S> {

@@ -1,7 +1,6 @@
 //! The stages of XPBD as dispatches.
 
 use super::stage::{Mix, XpbdStage};
-use crate::elements::TetForm;
 use crate::settings::{AndersonGuard, AndersonOn};
 use crate::solver::gpu::kernels::{self, Swept};
 use crate::solver::gpu::limits::window;
@@ -23,7 +22,7 @@ impl Recorder<'_> {
             }
             XpbdStage::RepairMultipliers => {
                 into.push(self.parts_of_long(&kernels::FIND_BROKEN, 0));
-                into.push(self.constitutive_multipliers(0));
+                self.constitutive_multipliers(0, into);
             }
             XpbdStage::RememberIterate => into.push(self.long(&kernels::REMEMBER_ITERATE, 0)),
             XpbdStage::LoadCorners => self.load_corners(into),
@@ -48,54 +47,32 @@ impl Recorder<'_> {
     /// A new history, instead of a step.
     pub fn restart_stages(&self) -> Vec<Dispatch> {
         let mut dispatches = vec![self.vertices(&kernels::APPLY_UPDATES, 0)];
-        if self.model.tet_sets().iter().any(|set| set.viscous) {
+        if self.model.is_viscous() {
             self.each_set(&kernels::MEASURE_STRAIN, &mut dispatches);
         }
-        dispatches.push(self.constitutive_multipliers(1));
+        self.constitutive_multipliers(1, &mut dispatches);
         dispatches
     }
 
     fn load_corners(&self, into: &mut Vec<Dispatch>) {
         self.each_set(&kernels::LOAD_MULTIPLIERS, into);
-        let counts = [self.model.springs.vertices.len(), self.model.attachments.vertices.len()];
-        for (kernel, count) in
-            [&kernels::LOAD_SPRINGS, &kernels::LOAD_ATTACHMENTS].into_iter().zip(counts)
-        {
-            if count > 0 {
-                into.push(self.threads(kernel, Job { count: count as u32, ..Job::default() }));
-            }
-        }
+        into.extend(self.elements(&kernels::LOAD_ELEMENTS, None));
     }
 
     fn solve_color(&self, color: usize, into: &mut Vec<Dispatch>) {
-        let model = self.model;
-        let [tets, springs, attachments] = match self.swept() {
-            Swept::Vertices => {
-                [&kernels::SOLVE, &kernels::SOLVE_SPRINGS, &kernels::SOLVE_ATTACHMENTS]
-            }
-            Swept::Copies => {
-                [&kernels::SOLVE_COPIES, &kernels::SOLVE_SPRINGS, &kernels::SOLVE_ATTACHMENTS]
-            }
-            Swept::Jacobi => [
-                &kernels::SOLVE_JACOBI,
-                &kernels::SOLVE_SPRINGS_JACOBI,
-                &kernels::SOLVE_ATTACHMENTS_JACOBI,
-            ],
+        let [tets, elements] = match self.swept() {
+            Swept::Vertices => [&kernels::SOLVE, &kernels::SOLVE_ELEMENTS],
+            Swept::Copies => [&kernels::SOLVE_COPIES, &kernels::SOLVE_ELEMENTS],
+            Swept::Jacobi => [&kernels::SOLVE_JACOBI, &kernels::SOLVE_ELEMENTS_JACOBI],
         };
-        for (kind, set) in model.tet_sets().into_iter().enumerate() {
+        for (law, set) in self.model.tet_sets.iter().enumerate() {
             let blocks = set.color(color);
             if !blocks.is_empty() {
-                into.push(self.on_copies(self.blocks(tets, kind, blocks)));
+                into.push(self.on_copies(self.blocks(tets, law, blocks)));
             }
         }
-        let offsets = [&model.springs.color_offsets, &model.attachments.color_offsets];
-        for (kernel, offsets) in [springs, attachments].into_iter().zip(offsets) {
-            let (first, end) = (offsets[color], offsets[color + 1]);
-            if first < end {
-                let job = Job { first, count: end - first, ..Job::default() };
-                into.push(self.on_copies(self.threads(kernel, job)));
-            }
-        }
+        let elements = self.elements(elements, Some(color));
+        into.extend(elements.map(|dispatch| self.on_copies(dispatch)));
     }
 
     fn chebyshev(&self, into: &mut Vec<Dispatch>) {
@@ -124,26 +101,14 @@ impl Recorder<'_> {
         into.push(self.parts_of_long(&kernels::ANDERSON_MIX, mixed | remembered));
     }
 
-    /// Of all constraints in one dispatch; `mode` as in history.wgsl.
-    fn constitutive_multipliers(&self, mode: u32) -> Dispatch {
-        let [green, neo] = self.model.tet_sets();
-        let tet_count = self.tet_threads();
-        let spring_count = self.model.springs.vertices.len() as u32;
-        let job = Job {
-            first: self.multipliers_first,
-            count: tet_count + spring_count + self.model.attachments.vertices.len() as u32,
-            set_first: green.block_count() as u32,
-            multiplier_offset: neo.multiplier_offset as u32,
-            viscous_offset: neo.viscous_offset as u32,
-            is_viscous: u32::from(green.viscous) | u32::from(neo.viscous) << 1,
-            mode,
-            tet_count,
-            spring_count,
-            ..Job::default()
-        };
-        let form = if neo.is_empty() { TetForm::GreenStrain } else { neo.form };
-        let threads = self.threads(&kernels::REPAIR_MULTIPLIERS, job);
-        let groups = threads.groups.min(REPAIR_GROUPS);
-        Dispatch { groups, variant: self.variant(form), ..threads }
+    /// Of all constraints; `mode` as in history.wgsl.
+    fn constitutive_multipliers(&self, mode: u32, into: &mut Vec<Dispatch>) {
+        let first = into.len();
+        self.each_set(&kernels::REPAIR_MULTIPLIERS, into);
+        into.extend(self.elements(&kernels::REPAIR_ELEMENTS, None));
+        for dispatch in &mut into[first..] {
+            dispatch.job = Job { first: self.multipliers_first, mode, ..dispatch.job };
+            dispatch.groups = dispatch.groups.min(REPAIR_GROUPS);
+        }
     }
 }

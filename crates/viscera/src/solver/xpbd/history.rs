@@ -17,11 +17,11 @@
 
 use std::marker::PhantomData;
 
-use super::forms::{Form, pass_by_form, with_form};
-use crate::elements::kinds::XpbdBlock;
+use crate::elements::forms::{Form, pass_by_form, with_form};
+use crate::elements::kinds::{Kind, XpbdBlock};
 use crate::elements::{deformation_gradient, green_strain};
 use crate::model::Part;
-use crate::model::single::{ElementSet, for_each_kind};
+use crate::model::elements::{ElementSet, Moments, for_each_kind};
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::solver::cpu::tets::{Block, TetPass, load_rows};
@@ -62,7 +62,7 @@ fn constitutive_multipliers<S: Real>(
     let model = step.model;
     let x = &data.points;
     let shared = Shared::new(l);
-    for (kind, set) in model.tet_sets().into_iter().enumerate() {
+    for (kind, set) in model.tet_sets.iter().enumerate() {
         let start_strain = &data.constants.start_strain[kind];
         with_form!(set.form, F => {
             let form = PhantomData::<F>;
@@ -72,7 +72,8 @@ fn constitutive_multipliers<S: Real>(
             }
         });
     }
-    for_each_kind!(model, set => constitutive_elements(set, step, part, x, l));
+    let moments = data.constants.moments(step);
+    for_each_kind!(model, set => constitutive_elements(set, &moments, part, x, l));
     // Of a tetrahedron too large for the number format nothing can be told.
     for range in &part.multipliers {
         for l in l[range.clone()].iter_mut().filter(|l| !l.is_finite()) {
@@ -82,18 +83,17 @@ fn constitutive_multipliers<S: Real>(
 }
 
 /// Of a part's elements of one kind.
-fn constitutive_elements<S: Real, const N: usize, const M: usize>(
-    set: &impl ElementSet<S, N, M>,
-    step: &Step<'_, S>,
+fn constitutive_elements<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
+    set: &ElementSet<S, K, N, M>,
+    moments: &Moments<'_, S>,
     part: &Part,
     x: &[Point<S>],
     l: &mut [S],
 ) {
-    let squared = S::from_f64(step.dt * step.dt);
-    let anchors = step.inputs.anchors_of(step.model);
+    let squared = S::from_f64(moments.dt * moments.dt);
     for i in set.of_part(part) {
-        let element = set.element::<S>(i, anchors);
-        let places = set.places(i, step.model, x);
+        let element = set.element::<S>(i, moments);
+        let places = set.places(i, moments.numbering, x);
         let pulls = element.constitutive(&places, element.compliance(squared));
         l[set.multipliers(i)].copy_from_slice(&pulls);
     }
@@ -162,10 +162,10 @@ mod tests {
             multipliers[3] = f64::NAN;
             repair_multipliers(&step, &data, &mut multipliers);
             let [mut given, mut expected] = [(); 2].map(|()| data.loads.clone());
-            let workers = &data.constants.workers;
-            load_multipliers(workers, &model, &data.points, &multipliers, &mut given);
-            let part = &model.parts[0];
-            load_forces::<_, false>(&data.constants, &step, part, &data.points, &mut expected);
+            let (constants, x) = (&data.constants, &data.points);
+            load_multipliers(constants, &step, x, &multipliers, &mut given);
+            let (part, moments) = (&model.parts[0], constants.moments(&step));
+            load_forces::<_, false>(constants, &step, &moments, part, x, &mut expected);
             let largest = expected.iter().map(|load| load.vec3().length()).fold(0.0, f64::max);
             for (given, expected) in given.iter().zip(&expected) {
                 let apart = (given.vec3() - expected.vec3()).length();
@@ -173,7 +173,7 @@ mod tests {
                 assert!(apart < 1e-12 * largest, "{neo_hookean:?}: {apart:e} of {largest:e}");
             }
             // Viscosity is no small part of it.
-            assert!(model.tet_sets().iter().all(|set| set.viscous));
+            assert!(model.tet_sets.iter().all(|set| set.viscous));
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Iterates of a step, and the norm in which they are compared: of each connected part by itself.
 
 use super::acceleration::Anderson;
-use super::forms::{Form, GreenStrain, with_form};
-use crate::elements::kinds::Energy;
-use crate::model::single::{ElementSet, for_each_kind};
+use crate::elements::forms::{Form, GreenStrain, with_form};
+use crate::elements::kinds::{Energy, Kind};
+use crate::model::elements::{ElementSet, Moments, for_each_kind};
 use crate::model::{Model, Part};
 use crate::scalar::Real;
 use crate::scalar::lanes::{LANES, Point};
@@ -107,7 +107,7 @@ pub fn fill_multiplier_weights<S: Real>(model: &Model<S>, dt: f64, weights: &mut
         return;
     }
     let dt = S::from_f64(dt);
-    for set in model.tet_sets() {
+    for set in &model.tet_sets {
         for (block, lane) in set.places() {
             let material = &model.materials[set.blocks[block].material[lane] as usize];
             let volume = set.blocks[block].rest_volume[lane];
@@ -131,14 +131,15 @@ pub fn fill_multiplier_weights<S: Real>(model: &Model<S>, dt: f64, weights: &mut
 }
 
 /// Of the elements of one kind: constraints whose energy has the curvature `k` have `a~ = 1/(k dt^2)`.
-fn fill_weights<S: Real, const N: usize, const M: usize>(
-    set: &impl ElementSet<S, N, M>,
+fn fill_weights<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
+    set: &ElementSet<S, K, N, M>,
     model: &Model<S>,
     dt: S,
     weights: &mut [S],
 ) {
-    for i in 0..set.count() {
-        let stiffness = set.element::<S>(i, &model.rest_anchors).curvature();
+    let moments = Moments::at_rest(model, &model.rest_anchors);
+    for i in 0..set.len() {
+        let stiffness = set.element::<S>(i, &moments).curvature();
         weights[set.multipliers(i)].fill(S::ONE / (stiffness * dt * dt));
     }
 }
@@ -177,8 +178,10 @@ mod tests {
         let norm = half_norm(0..model.multiplier_count);
         assert!((norm / expected - 1.0).abs() < 1e-12, "{norm:e} and {expected:e}");
         // Neither kind is too small to be seen in the sum.
-        let (springs, held) =
-            (model.springs.multiplier_offset, model.attachments.multiplier_offset);
+        let (springs, held) = (
+            model.elements.springs.multiplier_offset,
+            model.elements.attachments.multiplier_offset,
+        );
         for range in [0..springs, springs..held, held..model.multiplier_count] {
             assert!(half_norm(range.clone()) > 1e-6 * norm, "{range:?}");
         }

@@ -7,49 +7,52 @@
 
 use std::marker::PhantomData;
 
-use super::forms::{Form, pass_by_form, with_form};
+use crate::elements::forms::{Form, pass_by_form, with_form};
 use crate::elements::green_strain;
-use crate::elements::kinds::XpbdBlock;
-use crate::model::Model;
-use crate::model::single::{ElementSet, for_each_kind};
+use crate::elements::kinds::{Kind, XpbdBlock};
+use crate::model::elements::{ElementSet, Moments, for_each_kind};
 use crate::scalar::Real;
 use crate::scalar::lanes::{Lanes, Point};
 use crate::solver::cpu::tets::{Block, TetPass};
-use crate::solver::cpu::threads::{Shared, Workers};
+use crate::solver::cpu::threads::Shared;
+use crate::solver::step::data::{Step, StepConstants};
 use crate::solver::step::gradient::{add_load, points};
 
 /// `J^T l` at the vertices' positions `x`, into one place per copy.
 pub fn load_multipliers<S: Real>(
-    workers: &Workers,
-    model: &Model<S>,
+    constants: &StepConstants<S>,
+    step: &Step<'_, S>,
     x: &[Point<S>],
     multipliers: &[S],
     loads: &mut [Point<S>],
 ) {
+    let model = step.model;
     loads.fill(Point::default());
     for color in 0..model.color_count {
         let shared = Shared::new(loads);
-        for set in model.tet_sets() {
+        for set in &model.tet_sets {
             with_form!(set.form, F => {
                 let pass = Loads { x, multipliers, loads: &shared, form: PhantomData::<F> };
-                workers.pass(model, set, set.color(color), &pass);
+                constants.workers.pass(model, set, set.color(color), &pass);
             });
         }
     }
-    for_each_kind!(model, set => add_loads(set, model, x, multipliers, loads));
+    let moments = constants.moments(step);
+    for_each_kind!(model, set => add_loads(set, &moments, x, multipliers, loads));
 }
 
-fn add_loads<S: Real, K: ElementSet<S, N, M>, const N: usize, const M: usize>(
-    set: &K,
-    model: &Model<S>,
+fn add_loads<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
+    set: &ElementSet<S, K, N, M>,
+    moments: &Moments<'_, S>,
     x: &[Point<S>],
     multipliers: &[S],
     loads: &mut [Point<S>],
 ) {
-    for i in 0..set.count() {
-        let (places, l) = (set.places(i, model, x), set.read(i, multipliers));
-        let on_vertices = <K::Element<S> as XpbdBlock<S, N, M>>::loads(&places, &l);
-        for (copy, load) in set.copies(i).into_iter().zip(&on_vertices) {
+    let squared = S::from_f64(moments.dt * moments.dt);
+    for i in 0..set.len() {
+        let (places, l) = (set.places(i, moments.numbering, x), set.read(i, multipliers));
+        let on_vertices = set.element::<S>(i, moments).loads(&places, &l, squared);
+        for (copy, load) in set.copies[i].into_iter().zip(&on_vertices) {
             add_load(loads, copy, load);
         }
     }

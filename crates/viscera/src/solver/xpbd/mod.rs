@@ -2,7 +2,6 @@
 
 mod accelerate;
 pub mod acceleration;
-pub mod forms;
 #[cfg(feature = "gpu")]
 mod gpu;
 pub mod history;
@@ -15,6 +14,7 @@ pub mod stage;
 mod sweep;
 
 use crate::model::Model;
+use crate::model::elements::for_each_kind;
 use crate::scalar::Real;
 use crate::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Start};
 use crate::solver::plan::{Plan, Stage};
@@ -32,7 +32,7 @@ use sweep::solve_color;
 /// The stages of a step.
 pub fn plan<S: Real>(model: &Model<S>, settings: &SolverSettings) -> Plan {
     let mut prologue: Vec<Stage> = vec![StepStage::ReadState.into()];
-    if model.tet_sets().iter().any(|set| set.viscous) {
+    if model.is_viscous() {
         prologue.push(StepStage::MeasureStrain.into());
     }
     // A kept multiplier already carries gravity: adding it to the start counts it twice, where anything holds
@@ -132,8 +132,8 @@ fn mixes_remember(settings: &SolverSettings) -> bool {
 
 /// Whether every copy has one constraint, and all are of one colour.
 pub fn is_jacobi<S: Real>(model: &Model<S>) -> bool {
-    let tets = model.tet_sets().map(|set| set.len()).iter().sum::<usize>();
-    let corners = 4 * tets + 2 * model.springs.vertices.len() + model.attachments.vertices.len();
+    let mut corners = 4 * model.tet_count();
+    for_each_kind!(model, set => corners += set.vertices.as_flattened().len());
     model.color_count == 1 && model.copy_count() == corners
 }
 
@@ -169,7 +169,7 @@ impl<S: Real> Memory<S> {
             XpbdStage::RememberIterate => self.remember_iterate(&data.points, &state.multipliers),
             XpbdStage::LoadCorners => {
                 let StepData { constants, points, loads, .. } = data;
-                load_multipliers(&constants.workers, model, points, &state.multipliers, loads);
+                load_multipliers(constants, step, points, &state.multipliers, loads);
             }
             XpbdStage::Rebase => rebase(step, data),
             XpbdStage::RecomputePositions => recompute_positions(model, data),
@@ -212,7 +212,6 @@ impl<S: Real> Memory<S> {
         let split = step.model.is_split();
         let points = if split { &mut self.copies } else { &mut data.points };
         let constants = &data.constants;
-        let (workers, strains) = (&constants.workers, &constants.start_strain);
-        solve_color(workers, step, points, &mut state.multipliers, strains, color);
+        solve_color(constants, step, points, &mut state.multipliers, color);
     }
 }

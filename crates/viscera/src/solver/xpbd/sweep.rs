@@ -3,16 +3,16 @@
 
 use std::marker::PhantomData;
 
-use super::forms::{Form, pass_by_form, with_form};
+use crate::elements::forms::{Form, pass_by_form, with_form};
 use crate::elements::green_strain;
-use crate::elements::kinds::XpbdBlock;
-use crate::model::single::{ElementSet, for_each_kind};
+use crate::elements::kinds::{Kind, XpbdBlock};
+use crate::model::elements::{ElementSet, Moments, for_each_kind};
 use crate::scalar::lanes::{Lanes, Point};
 use crate::scalar::{Real, Vec3};
 use crate::settings::{RelaxationForm, SolverSettings};
 use crate::solver::cpu::tets::{Block, TetPass, load_rows};
-use crate::solver::cpu::threads::{Shared, Workers};
-use crate::solver::step::data::{StartStrain, Step};
+use crate::solver::cpu::threads::Shared;
+use crate::solver::step::data::{Step, StepConstants};
 
 /// How far a solve is over-relaxed: the multipliers by one factor, the positions by another.
 #[derive(Clone, Copy)]
@@ -60,11 +60,10 @@ struct Sweep<'a, S> {
 
 /// Solves all constraints of one colour; they share no copy.
 pub fn solve_color<S: Real>(
-    workers: &Workers,
+    constants: &StepConstants<S>,
     step: &Step<'_, S>,
     points: &mut [Point<S>],
     multipliers: &mut [S],
-    start_strain: &StartStrain<S>,
     color: usize,
 ) {
     let model = step.model;
@@ -74,18 +73,19 @@ pub fn solve_color<S: Real>(
         dt: step.dt,
         relaxation: Relaxation::new(step.settings),
     };
-    for (set, strains) in model.tet_sets().into_iter().zip(start_strain) {
+    for (set, strains) in model.tet_sets.iter().zip(&constants.start_strain) {
         let blocks = set.color(color);
         with_form!(set.form, F => {
             let elastic = Elastic { sweep: &sweep, form: PhantomData::<F> };
-            workers.pass(model, set, blocks.clone(), &elastic);
+            constants.workers.pass(model, set, blocks.clone(), &elastic);
         });
         if set.viscous {
             let viscous = Viscous { sweep: &sweep, start: strains };
-            workers.pass(model, set, blocks, &viscous);
+            constants.workers.pass(model, set, blocks, &viscous);
         }
     }
-    for_each_kind!(model, set => sweep.solve_elements(set, step, color));
+    let moments = constants.moments(step);
+    for_each_kind!(model, set => sweep.solve_elements(set, &moments, color));
 }
 
 struct Elastic<'a, S, F> {
@@ -165,17 +165,16 @@ impl<S: Real> TetPass<S> for Viscous<'_, S> {
 
 impl<S: Real> Sweep<'_, S> {
     /// Elements of one kind, one by one.
-    fn solve_elements<const N: usize, const M: usize>(
+    fn solve_elements<K: Kind<N, M>, const N: usize, const M: usize>(
         &mut self,
-        set: &impl ElementSet<S, N, M>,
-        step: &Step<'_, S>,
+        set: &ElementSet<S, K, N, M>,
+        moments: &Moments<'_, S>,
         color: usize,
     ) {
-        let anchors = step.inputs.anchors_of(step.model);
         let squared = S::from_f64(self.dt * self.dt);
         for i in set.color(color) {
-            let element = set.element::<S>(i, anchors);
-            let copies = set.copies(i);
+            let element = set.element::<S>(i, moments);
+            let copies = set.copies[i];
             // SAFETY: nobody else works on the points now.
             let ends = copies.map(|copy| unsafe { *self.points.at(copy as usize) });
             // SAFETY: nor on the multipliers.

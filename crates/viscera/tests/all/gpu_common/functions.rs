@@ -41,8 +41,8 @@ pub fn of_tets() -> Vec<Twin> {
         twin!(strain_block, TET, STRAIN_BLOCK),
         twin!(volume_pair, TET, VOLUME_PAIR),
         twin!(stretch_block, TET, STRETCH_BLOCK),
-        twin!(saint_venant_kirchhoff, TET, "let neo = false;", TISSUE),
-        twin!(stable_neo_hookean, TET, "let neo = true;", TISSUE),
+        twin!(saint_venant_kirchhoff, TET, "let law = 0u;", TISSUE),
+        twin!(stable_neo_hookean, TET, "let law = 1u;", TISSUE),
     ]
 }
 
@@ -291,16 +291,16 @@ fn tissue<T: Scalar>(model: MaterialModel, t: &Tet<T>) -> Results<T> {
 
 const TISSUE: &str = "
     let change = tissue_change_since(f, start);
-    let elastic = tissue_piola(neo, f, lambda, mu);
-    put(tissue_elastic_energy(neo, f, lambda, mu));
+    let elastic = law_piola(law, f, lambda, mu);
+    put(law_energy_density(law, f, lambda, mu));
     put(tissue_viscous_energy(change, viscosity_rate, lambda, mu));
     put_mat3(elastic);
     put_mat3(elastic + tissue_viscous_piola(f, change, viscosity_rate, lambda, mu));
     let g = shape_gradients(shape);
-    put(tissue_curvature(neo, f, g[0], lambda, mu, viscosity_rate));
-    put(tissue_curvature(neo, f, g[1], lambda, mu, viscosity_rate));
-    put(tissue_curvature(neo, f, g[2], lambda, mu, viscosity_rate));
-    put(tissue_curvature(neo, f, g[3], lambda, mu, viscosity_rate));
+    put(tissue_curvature(law, f, g[0], lambda, mu, viscosity_rate));
+    put(tissue_curvature(law, f, g[1], lambda, mu, viscosity_rate));
+    put(tissue_curvature(law, f, g[2], lambda, mu, viscosity_rate));
+    put(tissue_curvature(law, f, g[3], lambda, mu, viscosity_rate));
 ";
 
 /// A spring's record; an attachment holds its first end at the second.

@@ -22,7 +22,7 @@ fn form_corner_loads(x: array<vec3f, 4>, shape: mat3x3f, l: Multipliers) -> arra
 fn form_constitutive(
     x: array<vec3f, 4>,
     shape: mat3x3f,
-    material: Law,
+    material: TissueConstants,
     step_volume: f32,
 ) -> Multipliers {
     let c = green_strain_strain(deformation_gradient(x, shape));

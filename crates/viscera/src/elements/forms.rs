@@ -1,8 +1,8 @@
 //! The ways in which a tetrahedron's energy is written as constraints, behind one trait.
 
-use crate::elements::{CornerLoad, TetCorrection, deformation_gradient};
-use crate::elements::{green_strain, neo_hookean_pair, neo_hookean_stretch};
-use crate::model::MaterialConstants;
+use super::{CornerLoad, TetCorrection, deformation_gradient};
+use super::{green_strain, neo_hookean_pair, neo_hookean_stretch};
+use crate::material::MaterialConstants;
 use crate::scalar::{Mat3, Scalar, Vec3};
 
 /// `N` constraints of a tetrahedron.
@@ -50,21 +50,21 @@ macro_rules! with_form {
     ($chosen:expr, $form:ident => $result:expr) => {
         match $chosen {
             $crate::elements::TetForm::GreenStrain => {
-                type $form = $crate::solver::xpbd::forms::GreenStrain;
+                type $form = $crate::elements::forms::GreenStrain;
                 $result
             }
             $crate::elements::TetForm::NeoHookeanPair => {
-                type $form = $crate::solver::xpbd::forms::NeoHookeanPair;
+                type $form = $crate::elements::forms::NeoHookeanPair;
                 $result
             }
             $crate::elements::TetForm::NeoHookeanStretch => {
-                type $form = $crate::solver::xpbd::forms::NeoHookeanStretch;
+                type $form = $crate::elements::forms::NeoHookeanStretch;
                 $result
             }
         }
     };
 }
-pub(super) use with_form;
+pub(crate) use with_form;
 
 /// Makes a type with the form as its last parameter a pass, by its method for any form.
 macro_rules! pass_by_form {
@@ -74,7 +74,7 @@ macro_rules! pass_by_form {
         pass_by_form!(@ $pass $method NeoHookeanStretch 6);
     };
     (@ $pass:ident $method:ident $form:ident $count:literal) => {
-        impl<S: Real> TetPass<S> for $pass<'_, S, $crate::solver::xpbd::forms::$form> {
+        impl<S: Real> TetPass<S> for $pass<'_, S, $crate::elements::forms::$form> {
             #[inline(always)]
             fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
                 self.$method::<L, $count>(tets);
@@ -82,7 +82,7 @@ macro_rules! pass_by_form {
         }
     };
 }
-pub(super) use pass_by_form;
+pub(crate) use pass_by_form;
 
 /// `diag D^-1/(V dt^2)`, of both forms with six components.
 #[inline(always)]

@@ -21,7 +21,7 @@ fn form_corner_loads(x: array<vec3f, 4>, shape: mat3x3f, l: Multipliers) -> arra
 fn form_constitutive(
     x: array<vec3f, 4>,
     shape: mat3x3f,
-    material: Law,
+    material: TissueConstants,
     step_volume: f32,
 ) -> Multipliers {
     let f = deformation_gradient(x, shape);

@@ -1,0 +1,101 @@
+//! Constraints sorted by colour, and their places in the flat arrays.
+
+use super::numbering::Numbering;
+use crate::coloring::{Coloring, ConstraintGraph};
+use crate::scalar::lanes::{Eight, LANES};
+
+/// First copy of each vertex in the solver's numbering.
+pub(super) fn renumbered_copies(coloring: &Coloring, numbering: &Numbering) -> Vec<u32> {
+    let mut offsets = Vec::with_capacity(numbering.order.len() + 1);
+    let mut next = 0;
+    offsets.push(next);
+    for &v in &numbering.order {
+        let v = v as usize;
+        next += coloring.copy_offsets[v + 1] - coloring.copy_offsets[v];
+        offsets.push(next);
+    }
+    offsets
+}
+
+/// Hands out places in the flat arrays while the sets are laid out one after the other.
+pub(super) struct Layout<'a> {
+    pub graph: &'a ConstraintGraph,
+    pub coloring: &'a Coloring,
+    pub numbering: &'a Numbering,
+    /// Of the solver's vertices, ascending.
+    pub part_of: &'a [u32],
+    /// Of the solver's vertices.
+    pub copy_offsets: &'a [u32],
+    pub multipliers: usize,
+}
+
+impl Layout<'_> {
+    /// Sorts constraints by colour, then by place, and so by part, then by number; returns them with the offsets of
+    /// the colours.
+    pub fn sort(&self, mut constraints: Vec<usize>) -> (Vec<u32>, Vec<u32>) {
+        let place = |c: usize| {
+            let vertices = self.graph.vertices(c).iter();
+            vertices.map(|&v| self.numbering.of(v)).min()
+        };
+        constraints.sort_by_cached_key(|&c| (self.coloring.color_of[c], place(c), c));
+        let mut offsets = vec![0u32; self.coloring.color_count as usize + 1];
+        for &c in &constraints {
+            offsets[self.coloring.color_of[c] as usize + 1] += 1;
+        }
+        for color in 1..offsets.len() {
+            offsets[color] += offsets[color - 1];
+        }
+        // By reference: collected in place, the memory of the larger numbers would be kept.
+        (constraints.iter().map(|&c| c as u32).collect(), offsets)
+    }
+
+    /// The part of a constraint.
+    pub fn part(&self, constraint: u32) -> usize {
+        let first = self.graph.vertices(constraint as usize)[0];
+        self.part_of[self.numbering.of(first)] as usize
+    }
+
+    /// Tetrahedra of a colour in blocks: up to eight of one part.
+    pub fn blocks<'t>(&self, order: &'t [u32], color: &[u32]) -> impl Iterator<Item = &'t [u32]> {
+        order[color[0] as usize..color[1] as usize]
+            .chunk_by(|&a, &b| self.part(a) == self.part(b))
+            .flat_map(|of_part| of_part.chunks(LANES))
+    }
+
+    pub fn copy_count(&self) -> usize {
+        self.copy_offsets.last().map_or(0, |&count| count as usize)
+    }
+
+    pub fn is_split(&self) -> bool {
+        self.copy_count() > self.numbering.order.len()
+    }
+
+    /// The copies of a constraint's corners, in the solver's numbering.
+    pub fn copies<const N: usize>(&self, constraint: usize) -> [u32; N] {
+        let first = self.graph.corner_range(constraint).start;
+        let vertices = self.graph.vertices(constraint);
+        std::array::from_fn(|corner| {
+            let v = vertices[corner];
+            let local =
+                self.coloring.copy_of[first + corner] - self.coloring.copy_offsets[v as usize];
+            self.copy_offsets[self.numbering.of(v)] + local
+        })
+    }
+
+    /// The copies of up to eight tetrahedra.
+    pub fn block_copies(&self, tets: &[u32]) -> [Eight<u32>; 4] {
+        let mut block = [[0; LANES]; 4];
+        for lane in 0..LANES {
+            let copies = self.copies::<4>(tets[lane.min(tets.len() - 1)] as usize);
+            for (corner, copy) in copies.into_iter().enumerate() {
+                block[corner][lane] = copy;
+            }
+        }
+        block
+    }
+
+    pub fn take_multipliers(&mut self, count: usize) -> usize {
+        self.multipliers += count;
+        self.multipliers - count
+    }
+}

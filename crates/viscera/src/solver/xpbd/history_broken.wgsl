@@ -1,0 +1,18 @@
+// Parts with a multiplier that is no number (history.wgsl): what one part has broken is no other's.
+@compute @workgroup_size(256)
+fn find_broken(
+    @builtin(local_invocation_index) local: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+) {
+    let span = span_of(workgroup, groups);
+    if span.groups == 0u {
+        return;
+    }
+    for (var j = span.group * 256u + local; j < span.length; j += span.groups * 256u) {
+        let i = number_at(span.part, j);
+        if i != NOWHERE && i >= job.first && !is_finite_number(unknowns[i]) {
+            atomicOr(&control.parts[span.part].is_broken, 1u);
+        }
+    }
+}
