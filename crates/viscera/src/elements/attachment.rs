@@ -3,7 +3,7 @@
 //! geometric stiffness.
 
 use super::CornerLoad;
-use super::kinds::{CONSTANTS, Constant, Energy, Kind, Moment, XpbdBlock};
+use super::kinds::{CONSTANTS, Constant, Energy, Kind, Legal, Moment, XpbdBlock};
 use crate::scalar::{Real, Scalar, Vec3, vec3};
 
 /// The kind.
@@ -27,7 +27,7 @@ impl Kind<1, 3> for Attachments {
     const IS_ANCHORED: bool = true;
 
     const CONSTANTS: &'static [Constant] =
-        &[Constant { name: "attachment stiffness [N/m]", is_positive: true }];
+        &[Constant { name: "attachment stiffness [N/m]", legal: Legal::Positive }];
 
     const WGSL: &'static str = include_str!("attachment.wgsl");
 

@@ -16,8 +16,19 @@ pub const MOST: usize = 4;
 pub struct Constant {
     /// Its name, with its unit.
     pub name: &'static str,
-    /// Whether it must be above zero; else zero will do.
-    pub is_positive: bool,
+    /// What it may be.
+    pub legal: Legal,
+}
+
+/// What a constant may be, beside finite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Legal {
+    /// Above zero.
+    Positive,
+    /// Zero or more.
+    NotNegative,
+    /// Any number.
+    Any,
 }
 
 /// What an element may depend on beside its constants.

@@ -1,7 +1,7 @@
 //! Spring between two vertices: `C = |x1 - x0| - L`, energy `k C^2 / 2`, compliance `1/k`.
 
 use super::CornerLoad;
-use super::kinds::{CONSTANTS, Constant, Energy, Kind, Moment, XpbdBlock};
+use super::kinds::{CONSTANTS, Constant, Energy, Kind, Legal, Moment, XpbdBlock};
 use crate::scalar::{Real, Scalar, Vec3};
 
 /// The kind.
@@ -25,8 +25,8 @@ impl Kind<2, 1> for Springs {
     const IS_ANCHORED: bool = false;
 
     const CONSTANTS: &'static [Constant] = &[
-        Constant { name: "rest length [m]", is_positive: false },
-        Constant { name: "spring stiffness [N/m]", is_positive: true },
+        Constant { name: "rest length [m]", legal: Legal::NotNegative },
+        Constant { name: "spring stiffness [N/m]", legal: Legal::Positive },
     ];
 
     const WGSL: &'static str = include_str!("spring.wgsl");

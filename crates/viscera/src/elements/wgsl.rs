@@ -76,14 +76,14 @@ pub static KIND_TEXT: LazyLock<String> = LazyLock::new(|| {
         text += of_kind;
     }
     let names = || KIND_WGSL.iter().map(|[name, _]| *name);
-    let numbers: [(&str, &str, &dyn Fn(usize) -> String); 3] = [
-        ("corners", "u32", &|i| format!("{}u", KIND_SIZES[i][0])),
-        ("multipliers", "u32", &|i| format!("{}u", KIND_SIZES[i][1])),
-        ("is_anchored", "bool", &|i| ARE_ANCHORED[i].to_string()),
-    ];
-    for (function, returned, of) in numbers {
+    let of_kind = |i: usize| {
+        let [corners, multipliers] = KIND_SIZES[i].map(|count| format!("{count}u"));
+        [corners, multipliers, ARE_ANCHORED[i].to_string()]
+    };
+    let numbers = [("corners", "u32"), ("multipliers", "u32"), ("is_anchored", "bool")];
+    for (k, (function, returned)) in numbers.into_iter().enumerate() {
         let head = format!("element_{function}(kind: u32) -> {returned}");
-        text += &switch(&head, "kind", names(), |i, _| of(i));
+        text += &switch(&head, "kind", names(), |i, _| of_kind(i)[k].clone());
     }
     let at = "e: ElementMoment, x: array<vec3f, 4>";
     for (function, given, passed, returned) in [

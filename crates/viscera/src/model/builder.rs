@@ -11,7 +11,7 @@ use super::{Body, MaterialConstants, Model, ModelError};
 use crate::coloring::ConstraintGraph;
 use crate::elements::TetForm;
 use crate::elements::attachment::Attachments;
-use crate::elements::kinds::{CONSTANTS, Constant, Kind};
+use crate::elements::kinds::{CONSTANTS, Constant, Kind, Legal};
 use crate::elements::law::law_form;
 use crate::elements::list::{KINDS, number_of};
 use crate::elements::spring::Springs;
@@ -403,10 +403,13 @@ fn check_count(what: &'static str, count: usize, limit: usize) -> Result<(), Mod
 }
 
 fn check_constant(constant: &Constant, value: f64) -> Result<(), ModelError> {
-    let is_legal = if constant.is_positive { value > 0.0 } else { value >= 0.0 };
+    let (is_legal, range) = match constant.legal {
+        Legal::Positive => (value > 0.0, "above zero"),
+        Legal::NotNegative => (value >= 0.0, "zero or more"),
+        Legal::Any => (true, "a number"),
+    };
     if is_legal && value.is_finite() {
         return Ok(());
     }
-    let range = if constant.is_positive { "above zero" } else { "zero or more" };
     Err(ModelError::BadValue { what: constant.name, range, value })
 }
