@@ -1,9 +1,7 @@
 //! The only list of the kinds of elements that are no tetrahedra. A new kind is a file beside this one, its twin for
 //! graphics processors, and a line here.
 
-use super::attachment::Attachments;
 use super::kinds::Kind;
-use super::spring::Springs;
 
 /// Evaluates `$with! { ($arguments) ... }` with the list of kinds: the field of the model that holds them, the
 /// type, how many vertices and multipliers each has.
@@ -11,28 +9,28 @@ macro_rules! all_kinds {
     ([$($with:tt)*] $arguments:tt) => {
         $($with)*! {
             $arguments
-            springs Springs 2 1;
-            attachments Attachments 1 3;
+            springs spring::Springs 2 1;
+            attachments attachment::Attachments 1 3;
         }
     };
 }
 pub(crate) use all_kinds;
 
 macro_rules! constants {
-    (() $($field:ident $kind:ident $n:literal $m:literal;)*) => {
+    (() $($field:ident $file:ident::$kind:ident $n:literal $m:literal;)*) => {
         /// Names of all kinds, in order.
-        pub const KIND_NAMES: &[&str] = &[$(<$kind as Kind<$n, $m>>::NAME),*];
+        pub const KIND_NAMES: &[&str] = &[$(<$crate::elements::$file::$kind as Kind<$n, $m>>::NAME),*];
 
         /// Vertices and multipliers of one element of each kind.
         pub const KIND_SIZES: &[[usize; 2]] = &[$([$n, $m]),*];
 
         /// Whether each kind has anchors.
-        pub const ARE_ANCHORED: &[bool] = &[$(<$kind as Kind<$n, $m>>::IS_ANCHORED),*];
+        pub const ARE_ANCHORED: &[bool] = &[$(<$crate::elements::$file::$kind as Kind<$n, $m>>::IS_ANCHORED),*];
 
         /// The name of each kind's functions in WGSL, and their text.
         #[cfg(feature = "gpu")]
         pub const KIND_WGSL: &[[&str; 2]] =
-            &[$([stringify!($field), <$kind as Kind<$n, $m>>::WGSL]),*];
+            &[$([stringify!($field), <$crate::elements::$file::$kind as Kind<$n, $m>>::WGSL]),*];
     };
 }
 all_kinds! { [constants] () }

@@ -72,7 +72,7 @@ macro_rules! for_each_kind {
 pub(crate) use for_each_kind;
 
 macro_rules! each_set {
-    (($model:expr, $set:ident, $result:expr) $($field:ident $kind:ident $n:literal $m:literal;)*) => {{
+    (($model:expr, $set:ident, $result:expr) $($field:ident $file:ident::$kind:ident $n:literal $m:literal;)*) => {{
         $({
             let $set = &$model.elements.$field;
             $result
@@ -82,13 +82,13 @@ macro_rules! each_set {
 pub(crate) use each_set;
 
 macro_rules! sets {
-    (() $($field:ident $kind:ident $n:literal $m:literal;)*) => {
+    (() $($field:ident $file:ident::$kind:ident $n:literal $m:literal;)*) => {
         /// The sets of all kinds.
         #[derive(Clone, Debug, PartialEq)]
         pub struct ElementSets<S> {
             $(
-                #[doc = concat!("See [`", stringify!($kind), "`].")]
-                pub $field: ElementSet<S, $kind, $n, $m>,
+                #[doc = concat!("See [`crate::elements::", stringify!($file), "`].")]
+                pub $field: ElementSet<S, $crate::elements::$file::$kind, $n, $m>,
             )*
         }
 
@@ -97,7 +97,7 @@ macro_rules! sets {
             pub(super) fn laid_out(layout: &mut impl LayOut<S>) -> Self {
                 let mut numbers = 0..;
                 let mut next = || numbers.next().unwrap_or_default();
-                Self { $($field: layout.lay_out::<$kind, $n, $m>(next())),* }
+                Self { $($field: layout.lay_out::<$crate::elements::$file::$kind, $n, $m>(next())),* }
             }
 
             /// For the parts.

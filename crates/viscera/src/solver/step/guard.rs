@@ -330,8 +330,8 @@ mod tests {
         let data = &mut memory.data;
         let before = data.points.clone();
         let part = &step.model.parts[0];
-        let moments = data.constants.moments(&step);
-        load_forces::<_, true>(&data.constants, &step, &moments, part, &before, &mut data.loads);
+        let moments = data.constants.moments(step);
+        load_forces::<_, true>(&data.constants, step, &moments, part, &before, &mut data.loads);
         let (mut whole, mut slope) = (before.clone(), 0.0);
         for v in 0..before.len() {
             let (gradient, direction) = descent(step.model, data, &before, v);
