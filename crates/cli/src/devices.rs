@@ -3,7 +3,7 @@
 use crate::bench::processor;
 use crate::bench::solvers::SOLVERS;
 use crate::bench::subjects::{Size, Subject, hanging};
-use crate::{files, progress};
+use crate::progress;
 use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
@@ -15,7 +15,8 @@ use viscera::settings::SolverSettings;
 use viscera::solver::gpu::{Adapter, GpuError, GpuSolver};
 use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
-use viscera_report::{Memory, Table};
+use viscera_report::Table;
+use viscera_resources::{Memory, files};
 
 /// List what there is to compute on, and how fast it is
 ///
@@ -100,8 +101,8 @@ fn write_kernels(folder: &Path) -> Result<()> {
     let texts = viscera::solver::gpu::kernels::texts();
     for (name, text) in &texts {
         let file = folder.join(format!("{name}.wgsl"));
-        viscera_report::prepare_file(&file, "--kernels")?;
-        files::write_whole(&file, text.as_bytes())?;
+        files::prepare_file(&file, "--kernels")?;
+        files::write_atomic(&file, text.as_bytes())?;
     }
     files::print(&format!("{} kernels are in {}\n", texts.len(), folder.display()))
 }

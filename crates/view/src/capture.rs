@@ -5,8 +5,8 @@ use anyhow::{Context, Result, anyhow};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
-use viscera_cli::files::write_whole;
 use viscera_picture::{Animation, Image, ImageSize, write_png};
+use viscera_resources::files::write_atomic;
 
 /// Where pictures go, in the folder that the program was started in.
 pub const FOLDER: &str = "pictures";
@@ -31,7 +31,7 @@ pub fn free_name(folder: &Path, stem: &str, ending: &str) -> PathBuf {
 /// Puts pictures side by side and writes them as one PNG file.
 pub fn save_picture(images: &[Image], path: &Path) -> Result<()> {
     let image = Image::tiled(images, images.len().max(1))?;
-    write_whole(path, &write_png(&image)?)
+    write_atomic(path, &write_png(&image)?)
 }
 
 /// A recording in the making, compressed on a thread of its own.
@@ -161,7 +161,7 @@ fn compress(sheets: &Receiver<Sheet>, path: &Path) -> Result<u32> {
     let Some((animation, _)) = animation else {
         return Err(anyhow!("nothing was recorded; let the simulation run while recording"));
     };
-    write_whole(path, &animation.finish(held)?)?;
+    write_atomic(path, &animation.finish(held)?)?;
     Ok(count)
 }
 

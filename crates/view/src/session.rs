@@ -79,7 +79,7 @@ impl Session {
             generation: self.generation,
             scenes: self.scenes.clone(),
             ends_with_ghost: self.choices.ghost,
-            library: self.document.library(),
+            mesh_files: self.document.mesh_files(),
         })
     }
 

@@ -240,7 +240,7 @@ fn two_solvers_run_side_by_side_from_the_same_start() {
 fn a_saved_scene_is_what_was_chosen() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("mine.toml");
-    let text = viscera_cli::scene::BUILT_IN.iter().find(|scene| scene.name == "cantilever");
+    let text = viscera_resources::BUILT_IN.iter().find(|scene| scene.name == "cantilever");
     std::fs::write(&path, text.expect("a built-in scene").text).expect("a file");
     let settings = [("solver.iterations", "7")];
     let mut window = Window::running(&path.display().to_string(), &settings);

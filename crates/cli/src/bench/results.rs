@@ -7,7 +7,8 @@ use super::solvers::SolverEntry;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use sysinfo::{CpuRefreshKind, RefreshKind, System};
-use viscera_report::{Axis, Document, Memory, Plot, Series, Style, Table, percent, si};
+use viscera_report::{Axis, Document, Plot, Series, Style, Table, percent, si};
+use viscera_resources::Memory;
 
 /// All of it.
 #[derive(Serialize)]

@@ -13,7 +13,9 @@ use viscera::simulation::Simulation;
 
 use crate::sections::Progress;
 use path::{Path, Rest};
-use viscera_report::{Memory, percent, prepare_file, scientific, si, write_whole};
+use viscera_report::{percent, scientific, si};
+use viscera_resources::Memory;
+use viscera_resources::files::{prepare_file, write_atomic};
 
 /// Find the exact state of rest at the end of a scene with the Newton reference
 ///
@@ -213,5 +215,5 @@ fn write(
         Array::integers("body", &bodies),
     ];
     let bytes = vtu::write(&rest.positions, &tets, &point_data, &cell_data);
-    write_whole(out, &bytes.with_context(|| format!("cannot write {}", out.display()))?)
+    write_atomic(out, &bytes.with_context(|| format!("cannot write {}", out.display()))?)
 }

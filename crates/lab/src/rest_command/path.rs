@@ -7,7 +7,7 @@ use anyhow::{Result, anyhow};
 use viscera::scalar::Vec3;
 use viscera::simulation::Simulation;
 use viscera::solver::Inputs;
-use viscera_report::Memory;
+use viscera_resources::Memory;
 
 use crate::reference::{Convergence, Cost, Reference, ReferenceError, Standing};
 use crate::sections::Progress;

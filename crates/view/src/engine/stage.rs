@@ -4,8 +4,7 @@ use std::sync::Arc;
 use viscera::scene::Scene;
 use viscera::settings::SolverSettings;
 use viscera::simulation::{AssembleError, Assembly};
-use viscera_cli::files::Library;
-use viscera_cli::memory;
+use viscera_resources::{Memory, MeshFiles, memory};
 
 /// Simulations to build.
 #[derive(Debug)]
@@ -17,7 +16,7 @@ pub struct Plan {
     /// Whether the last one is the exact solution, which is left out for large meshes.
     pub ends_with_ghost: bool,
     /// Where mesh files are.
-    pub library: Library,
+    pub mesh_files: MeshFiles,
 }
 
 /// The largest mesh that has an exact solution beside it [tetrahedra]: it costs twenty sweeps for
@@ -46,8 +45,8 @@ impl Stage {
     }
 
     /// Reads or makes the meshes.
-    pub fn assemble(scene: &Scene, library: &Library) -> Result<Assembly, AssembleError> {
-        Assembly::new(scene, &mut |name| library.load(name))
+    pub fn assemble(scene: &Scene, mesh_files: &MeshFiles) -> Result<Assembly, AssembleError> {
+        Assembly::new(scene, &mut |name| mesh_files.load(name))
     }
 }
 
@@ -70,7 +69,7 @@ pub fn expectation(assembly: &Assembly, scenes: &[Scene]) -> Option<String> {
         bytes += memory::of_run(tets, &scene.solver).0;
         seconds += frame_seconds(tets, &scene.solver);
     }
-    let needed = viscera_report::Memory(bytes);
+    let needed = Memory(bytes);
     let free = memory::free();
     let fits = free.is_none_or(|free| needed.0 <= free.0);
     if fits && seconds <= LONG {

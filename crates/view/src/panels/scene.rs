@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, Ui};
 use std::path::PathBuf;
-use viscera_cli::scene::BUILT_IN;
+use viscera_resources::BUILT_IN;
 
 use super::choice::{Chooser, Row};
 use super::{Action, section};

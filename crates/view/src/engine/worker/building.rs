@@ -15,7 +15,7 @@ impl Worker {
         self.asked = None;
         let Some(scene) = plan.scenes.first() else { return };
         self.tell(Event::Busy("reading and making meshes".to_owned()));
-        let assembly = match Stage::assemble(scene, &plan.library) {
+        let assembly = match Stage::assemble(scene, &plan.mesh_files) {
             Ok(assembly) => assembly,
             Err(error) => return self.fail(error.to_string(), Cure::Open),
         };
