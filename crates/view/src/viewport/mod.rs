@@ -13,7 +13,7 @@ pub use picture::{Gpu, Picture, Scenery, Tissue};
 use eframe::egui::{self, PointerButton, Pos2, Rect, Sense, Ui, vec2};
 use std::sync::Arc;
 use viscera::scalar::Vec3;
-use viscera_picture::{Image, ImageSize, Overlay};
+use viscera_picture::{HALF_OPENING, Image, ImageSize, Overlay, ViewDirection};
 use viscera_render::Orbit;
 
 use crate::engine::{Coloring, Command, Frame, Stage};
@@ -93,10 +93,9 @@ impl Viewport {
         let Some(stage) = &self.stage else { return };
         let rest = stage.assembly.builder.positions();
         self.orbit = Orbit::framing(rest);
-        self.extent = 2.0 * self.orbit.distance * 0.24;
-        let from = stage.scene.output.view_from;
-        self.orbit.azimuth = angle(from.y, from.x);
-        self.orbit.elevation = angle(from.z, from.x.hypot(from.y)).clamp(-89.0, 89.0);
+        self.extent = 2.0 * self.orbit.distance * HALF_OPENING;
+        let direction = ViewDirection::from_vector(stage.scene.output.view_from);
+        (self.orbit.azimuth, self.orbit.elevation) = (direction.azimuth, direction.elevation);
     }
 
     /// Why nothing can be drawn any more, where the device was lost.
@@ -304,7 +303,8 @@ impl Viewport {
                 true => self.fixed.iter().filter_map(at).collect(),
                 false => Vec::new(),
             };
-            let pulls: Vec<_> = lane.holds.iter().map(|hold| [hold.place, hold.target]).collect();
+            let (picked, targets): (Vec<_>, Vec<_>) =
+                lane.holds.iter().map(|hold| (hold.place, hold.target)).unzip();
             let scenery = Scenery {
                 orbit: self.lenses[number].orbit,
                 tissue,
@@ -313,7 +313,8 @@ impl Viewport {
                 wireframe: preferences.wireframe,
                 shadow: preferences.shadow,
                 fixed: &fixed,
-                pulls: &pulls,
+                picked: &picked,
+                targets: &targets,
                 extent: self.extent,
             };
             self.pictures[number].draw(&self.gpu, *size, &scenery)?;
@@ -379,9 +380,4 @@ impl Viewport {
         }
         Ok(images)
     }
-}
-
-/// The angle of a point around the origin [degrees].
-fn angle(y: f64, x: f64) -> f64 {
-    y.atan2(x).to_degrees()
 }

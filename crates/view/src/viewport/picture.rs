@@ -8,8 +8,8 @@ use viscera::scalar::Vec3;
 use viscera::solver::gpu::{Device, GpuSurface, Skin};
 use viscera_picture::{Color, Image, ImageSize};
 use viscera_render::{
-    Arrow, BodyView, Canvas, Drawing, Markers, Orbit, Paint, Quality, RenderError, Room,
-    ValueBuffer,
+    Arrow, BodyView, BoundingSphere, Canvas, GpuDrawing, Markers, Orbit, Paint, Quality,
+    RenderError, ScaledValues, ValueBuffer,
 };
 
 use crate::engine::{Lane, Stage};
@@ -55,8 +55,8 @@ pub struct Tissue {
     values: ValueBuffer,
     /// Whether the newest frame has values.
     has_values: bool,
-    /// Where it is.
-    room: Option<Room>,
+    /// Encloses it, for its shadow.
+    enclosing: Option<BoundingSphere>,
 }
 
 impl Tissue {
@@ -75,7 +75,7 @@ impl Tissue {
         let surface = GpuSurface::following(&gpu.device, count, &skins);
         let surface = surface.map_err(|error| error.to_string())?;
         let values = ValueBuffer::new(&gpu.device, surface.vertex_count() as usize);
-        Ok(Self { surface, values, has_values: false, room: None })
+        Ok(Self { surface, values, has_values: false, enclosing: None })
     }
 
     /// Moves it to where a frame has it.
@@ -86,7 +86,7 @@ impl Tissue {
         if self.has_values {
             self.values.write(&lane.values).map_err(|error| error.to_string())?;
         }
-        self.room = Room::around(lane.positions.iter().map(|x| x.cast()));
+        self.enclosing = BoundingSphere::around(lane.positions.iter().map(|x| x.cast()));
         Ok(())
     }
 }
@@ -107,8 +107,10 @@ pub struct Scenery<'a> {
     pub shadow: bool,
     /// Vertices that are held in place [m].
     pub fixed: &'a [Vec3<f64>],
-    /// Where tissue is held, and where it is pulled to [m].
-    pub pulls: &'a [[Vec3<f64>; 2]],
+    /// Where tissue is held by hand [m].
+    pub picked: &'a [Vec3<f64>],
+    /// Where each of them is pulled to [m].
+    pub targets: &'a [Vec3<f64>],
     /// The size of things [m], for markers and arrows.
     pub extent: f64,
 }
@@ -119,39 +121,38 @@ impl Scenery<'_> {
     const PICKED: f64 = 0.009;
     const SHAFT: f64 = 0.0045;
 
-    fn drawing(&self) -> Drawing<'_> {
+    fn drawing(&self) -> GpuDrawing<'_> {
         let tissue = self.tissue;
         let paint = match self.range.filter(|_| tissue.has_values) {
-            Some([low, high]) => Paint::Values { buffer: &tissue.values, low, high },
-            None => Paint::Plain(Color::TISSUE),
+            Some([low, high]) => Paint::Values(ScaledValues { buffer: &tissue.values, low, high }),
+            None => Paint::Flat(Color::TISSUE),
         };
         let body = BodyView { paint, wireframe: self.wireframe, ..BodyView::of(&tissue.surface) };
         let ghost = self.ghost.map(|ghost| BodyView {
-            paint: Paint::Plain(Color::REST),
+            paint: Paint::Flat(Color::REST),
             opacity: 0.3,
             ..BodyView::of(&ghost.surface)
         });
-        let balls =
-            |positions, share, color| Markers { positions, radius: share * self.extent, color };
-        let picked = self.pulls.iter().map(|pull| pull[0]).collect();
-        let arrow = |&[from, to]: &[Vec3<f64>; 2]| Arrow {
-            from,
-            to,
-            radius: Self::SHAFT * self.extent,
-            color: Color::PULLED,
+        let balls = |positions, share, color| Markers {
+            positions,
+            radius: share * self.extent,
+            color,
+            see_through: 0.0,
         };
+        let radius = Self::SHAFT * self.extent;
+        let pulls = self.picked.iter().zip(self.targets);
+        let arrows = pulls.map(|(&from, &to)| Arrow { from, to, radius, color: Color::PULLED });
         // Shorter ones are hidden by the point they begin at.
-        let is_long =
-            |[from, to]: &&[Vec3<f64>; 2]| (*to - *from).length() > Self::PICKED * self.extent;
-        Drawing {
+        let is_long = |arrow: &Arrow| (arrow.to - arrow.from).length() > Self::PICKED * self.extent;
+        GpuDrawing {
             bodies: [Some(body), ghost].into_iter().flatten().collect(),
             markers: vec![
-                balls(self.fixed.to_vec(), Self::FIXED, Color::FIXED),
-                balls(picked, Self::PICKED, Color::PULLED),
+                balls(self.fixed, Self::FIXED, Color::FIXED),
+                balls(self.picked, Self::PICKED, Color::PULLED),
             ],
-            arrows: self.pulls.iter().filter(is_long).map(arrow).collect(),
-            shadow: tissue.room.filter(|_| self.shadow),
-            ..Drawing::from(self.orbit)
+            arrows: arrows.filter(is_long).collect(),
+            shadow: tissue.enclosing.filter(|_| self.shadow),
+            ..GpuDrawing::from(self.orbit)
         }
     }
 }
