@@ -41,7 +41,7 @@ fn main() -> ExitCode {
         while start.elapsed() < REGRASPED_EVERY {
             let angle = 2.0 * start.elapsed().as_secs_f32();
             let to = from + vec2(60.0 * angle.sin(), 50.0 * (angle.cos() - 1.0));
-            let before = window.lane(0).positions.clone();
+            let before = window.run(0).positions.clone();
             let moved = Instant::now();
             window.harness.hover_at(to);
             window.harness.step();
@@ -50,10 +50,10 @@ fn main() -> ExitCode {
                 return ExitCode::FAILURE;
             }
             drawn += 1;
-            if window.lane(0).positions != before {
+            if window.run(0).positions != before {
                 latency.push(moved.elapsed());
             }
-            if !window.lane(0).positions.iter().all(|x| x.is_finite()) {
+            if !window.run(0).positions.iter().all(|x| x.is_finite()) {
                 eprintln!("error: positions that are no numbers");
                 return ExitCode::FAILURE;
             }
@@ -62,7 +62,7 @@ fn main() -> ExitCode {
         window.harness.step();
         if told.elapsed().as_secs() >= 30 || begun.elapsed().as_secs_f64() >= 60.0 * minutes {
             let seconds = told.elapsed().as_secs_f64();
-            let now = window.harness.state().frame().map_or(0, |frame| frame.number);
+            let now = window.harness.state().snapshot().map_or(0, |snapshot| snapshot.number);
             let memory = resident_megabytes();
             first_memory = first_memory.or(memory);
             latency.sort();

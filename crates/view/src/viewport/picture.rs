@@ -12,7 +12,7 @@ use viscera_render::{
     RenderError, ScaledValues, ValueBuffer,
 };
 
-use crate::engine::{Lane, Stage};
+use crate::engine::{RunSnapshot, Setup};
 
 /// The window's device.
 #[derive(Clone)]
@@ -49,20 +49,20 @@ impl Gpu {
     }
 }
 
-/// The surfaces of one simulation.
-pub struct Tissue {
+/// The surfaces of one simulation, on the device.
+pub struct RunSurface {
     surface: GpuSurface,
     values: ValueBuffer,
-    /// Whether the newest frame has values.
+    /// Whether the newest snapshot has values.
     has_values: bool,
     /// Encloses it, for its shadow.
     enclosing: Option<BoundingSphere>,
 }
 
-impl Tissue {
+impl RunSurface {
     /// Binds the surfaces of all bodies.
-    pub fn new(gpu: &Gpu, stage: &Stage) -> Result<Self, String> {
-        let bodies = &stage.assembly.bodies;
+    pub fn new(gpu: &Gpu, setup: &Setup) -> Result<Self, String> {
+        let bodies = &setup.assembly.bodies;
         let skins: Vec<Skin<'_>> = bodies
             .iter()
             .map(|body| Skin {
@@ -71,34 +71,34 @@ impl Tissue {
                 first_vertex: body.vertices.start,
             })
             .collect();
-        let count = stage.assembly.builder.positions().len();
+        let count = setup.assembly.builder.positions().len();
         let surface = GpuSurface::following(&gpu.device, count, &skins);
         let surface = surface.map_err(|error| error.to_string())?;
         let values = ValueBuffer::new(&gpu.device, surface.vertex_count() as usize);
         Ok(Self { surface, values, has_values: false, enclosing: None })
     }
 
-    /// Moves it to where a frame has it.
-    pub fn place(&mut self, lane: &Lane) -> Result<(), String> {
-        self.surface.place(&lane.positions).map_err(|error| error.to_string())?;
+    /// Moves it to its place in a snapshot.
+    pub fn place(&mut self, run: &RunSnapshot) -> Result<(), String> {
+        self.surface.place(&run.positions).map_err(|error| error.to_string())?;
         self.surface.update();
-        self.has_values = !lane.values.is_empty();
+        self.has_values = !run.values.is_empty();
         if self.has_values {
-            self.values.write(&lane.values).map_err(|error| error.to_string())?;
+            self.values.write(&run.values).map_err(|error| error.to_string())?;
         }
-        self.enclosing = BoundingSphere::around(lane.positions.iter().map(|x| x.cast()));
+        self.enclosing = BoundingSphere::around(run.positions.iter().map(|x| x.cast()));
         Ok(())
     }
 }
 
 /// What a picture shows.
-pub struct Scenery<'a> {
+pub struct PictureContents<'a> {
     /// From where.
     pub orbit: Orbit,
-    /// The tissue.
-    pub tissue: &'a Tissue,
+    /// The simulation's surfaces.
+    pub surface: &'a RunSurface,
     /// The exact solution, which shines through.
-    pub ghost: Option<&'a Tissue>,
+    pub ghost: Option<&'a RunSurface>,
     /// The values that its colours begin and end at, where they show values.
     pub range: Option<[f32; 2]>,
     /// Whether the triangles are drawn.
@@ -115,19 +115,19 @@ pub struct Scenery<'a> {
     pub extent: f64,
 }
 
-impl Scenery<'_> {
+impl PictureContents<'_> {
     /// Radii as shares of the size of things: large enough to be seen, too small to cover the tissue.
     const FIXED: f64 = 0.005;
     const PICKED: f64 = 0.009;
     const SHAFT: f64 = 0.0045;
 
     fn drawing(&self) -> GpuDrawing<'_> {
-        let tissue = self.tissue;
-        let paint = match self.range.filter(|_| tissue.has_values) {
-            Some([low, high]) => Paint::Values(ScaledValues { buffer: &tissue.values, low, high }),
+        let surface = self.surface;
+        let paint = match self.range.filter(|_| surface.has_values) {
+            Some([low, high]) => Paint::Values(ScaledValues { buffer: &surface.values, low, high }),
             None => Paint::Flat(Color::TISSUE),
         };
-        let body = BodyView { paint, wireframe: self.wireframe, ..BodyView::of(&tissue.surface) };
+        let body = BodyView { paint, wireframe: self.wireframe, ..BodyView::of(&surface.surface) };
         let ghost = self.ghost.map(|ghost| BodyView {
             paint: Paint::Flat(Color::REST),
             opacity: 0.3,
@@ -151,7 +151,7 @@ impl Scenery<'_> {
                 balls(self.picked, Self::PICKED, Color::PULLED),
             ],
             arrows: arrows.filter(is_long).collect(),
-            shadow: tissue.enclosing.filter(|_| self.shadow),
+            shadow: surface.enclosing.filter(|_| self.shadow),
             ..GpuDrawing::from(self.orbit)
         }
     }
@@ -174,11 +174,11 @@ impl Picture {
         &mut self,
         gpu: &Gpu,
         size: ImageSize,
-        scenery: &Scenery<'_>,
+        contents: &PictureContents<'_>,
     ) -> Result<(), String> {
         self.take_size(gpu, size).map_err(|error| error.to_string())?;
         let Some((canvas, _)) = &self.shown else { return Ok(()) };
-        canvas.draw(&scenery.drawing()).map_err(|error| error.to_string())
+        canvas.draw(&contents.drawing()).map_err(|error| error.to_string())
     }
 
     /// Makes the canvas, or one of another size, and tells the window of it.
