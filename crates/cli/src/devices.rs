@@ -251,12 +251,12 @@ impl Listing {
         ]);
         for line in self.adapters.iter().chain([&self.cpu]) {
             let limit = |text: fn(&Limits) -> String| line.limits.as_ref().map_or("-".into(), text);
-            let told = |text: &Option<String>| text.clone().unwrap_or("-".into());
+            let or_dash = |text: &Option<String>| text.clone().unwrap_or("-".into());
             table.row([
                 line.name.clone(),
                 line.kind.into(),
-                told(&line.backend),
-                told(&line.driver),
+                or_dash(&line.backend),
+                or_dash(&line.driver),
                 limit(|l| Memory(l.storage_binding_bytes).to_string()),
                 limit(|l| Memory(l.buffer_bytes).to_string()),
                 limit(|l| {

@@ -174,7 +174,7 @@ fn simulate<S: Real>(
     summary.warnings.extend(simulation.device_warning().map(String::from));
     // Numbers before meshes and pictures: those take a while, and may be what failed.
     write_summary(out, &summary)?;
-    // Positions that are no numbers are no mesh; the frames before them are.
+    // Positions that are NaN are no mesh; the frames before them are.
     match &ended {
         Ok(()) => series.finish(out, &simulation)?,
         Err(_) => series.write_lists(out)?,

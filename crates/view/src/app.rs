@@ -352,7 +352,7 @@ impl App {
             Action::Ghost(ghost) => {
                 let chosen = self.session.compare(self.session.is_comparison(), ghost);
                 if ghost && chosen.as_ref().is_ok_and(|commands| !commands.is_empty()) {
-                    self.messages.busy = Some("waiting for the true solution".to_owned());
+                    self.messages.busy = Some("waiting for the reference".to_owned());
                 }
                 self.carry_out(chosen);
             }

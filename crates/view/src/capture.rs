@@ -99,16 +99,16 @@ impl Recorder {
         Ok(())
     }
 
-    /// Ends it and writes the file; what to tell a person.
+    /// Ends it and writes the file; returns a summary for the user.
     pub fn finish(mut self) -> Result<String> {
         let count = self.end()?;
         let path = self.path.display();
         let seconds = self.recorded + self.frame;
-        let mut told = format!("{path}: {count} pictures, {seconds:.2} s of simulated time");
+        let mut summary = format!("{path}: {count} pictures, {seconds:.2} s of simulated time");
         if self.missed > 0 {
-            told.push_str(&format!("; {} were left out, this machine being busy", self.missed));
+            summary.push_str(&format!("; {} were left out, this machine being busy", self.missed));
         }
-        Ok(told)
+        Ok(summary)
     }
 
     fn end(&mut self) -> Result<u32> {
@@ -227,13 +227,13 @@ mod tests {
             let path = free_name(folder.path(), "liver", "gif");
             let mut recorder = Recorder::start(path.clone(), frame).expect("a recording");
             let taken = follow(&mut recorder, frame, count, 7);
-            let told = recorder.finish().expect("a file");
+            let summary = recorder.finish().expect("a file");
             let (delays, size) = decode(&path);
             let sum = delays.iter().sum::<f64>();
             let wanted = f64::from(count + 1) * frame;
             assert!((sum - wanted).abs() < 0.01, "{sum} s for {wanted} s");
             assert_eq!((delays.len(), size), (taken as usize, [128, 32]));
-            assert!(told.contains(&format!("{wanted:.2} s of simulated time")), "{told}");
+            assert!(summary.contains(&format!("{wanted:.2} s of simulated time")), "{summary}");
         }
     }
 

@@ -10,7 +10,7 @@ use viscera_resources::files::write_atomic;
 use crate::choices::Settings;
 use crate::document::Document;
 
-/// Writes the scene with its settings and, behind them, what was done by hand; whole or not at all.
+/// Writes the scene with its settings and, behind them, what was done by hand; atomically.
 pub fn save(document: &Document, settings: &Settings, by_hand: &str, path: &Path) -> Result<()> {
     if path.extension().is_none_or(|ending| ending != "toml") {
         bail!("{}: a scene file's name ends in .toml", path.display());

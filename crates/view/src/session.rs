@@ -14,7 +14,7 @@ pub struct Session {
     /// What was chosen when the simulations began at rest.
     begun: Choices,
     history: History,
-    /// One for each simulation, as chosen: the first, the second, the exact one.
+    /// One for each simulation, as chosen: the first, the second, the reference.
     scenes: Vec<Scene>,
     generation: u64,
 }
@@ -49,7 +49,7 @@ impl Session {
         Command::Reset
     }
 
-    /// What can be taken back.
+    /// What can be undone.
     pub fn history(&self) -> &History {
         &self.history
     }
@@ -105,7 +105,7 @@ impl Session {
         self.change_to(next, &key, gesture)
     }
 
-    /// Begins or ends a comparison, or the exact solution beside it. The second solver begins as the first
+    /// Begins or ends a comparison, or the reference beside it. The second solver begins as the first
     /// is, and has settings of its own from then on.
     pub fn compare(&mut self, on: bool, ghost: bool) -> Result<Vec<Command>, String> {
         let copy = || {
@@ -209,7 +209,7 @@ fn scenes_of(document: &Document, choices: &Choices) -> Result<Vec<Scene>, Strin
         scenes.push(read(&choices.of(Side::Second))?);
     }
     if choices.ghost {
-        scenes.push(read(&choices.exact())?);
+        scenes.push(read(&choices.reference())?);
     }
     Ok(scenes)
 }

@@ -44,7 +44,7 @@ pub trait Stepper {
     /// What is known of it.
     fn facts(&self) -> SolverFacts;
 
-    /// Stages of a step, one by one; none where nobody can tell.
+    /// Stages of a step, one by one; none where they are not timed.
     fn stages(&mut self) -> Result<Vec<StageLine>>;
 }
 

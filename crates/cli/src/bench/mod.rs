@@ -176,7 +176,7 @@ pub fn execute(arguments: &BenchArguments) -> Result<()> {
     ))
 }
 
-/// Measures all cases on all computers. What a graphics processor cannot do is told and left out.
+/// Measures all cases on all computers. What a graphics processor cannot do is reported and left out.
 fn measure(
     cases: &[Case<'_>],
     computers: &[Box<dyn Computer>],

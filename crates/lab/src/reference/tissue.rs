@@ -143,7 +143,7 @@ fn cofactor_change(f: &Mat3<f64>, direction: &Mat3<f64>) -> Mat3<f64> {
 /// The nearest positive semi-definite matrix: negative eigenvalues become zero.
 pub fn project(matrix: &mut Stiffness) {
     let full = Mat::from_fn(9, 9, |i, j| 0.5 * (matrix[i][j] + matrix[j][i]));
-    // Only a matrix with entries that are no numbers has no eigenvalues; it stays what it is.
+    // Only a matrix with NaN entries has no eigenvalues; it stays what it is.
     let Ok(eigen) = full.self_adjoint_eigen(Side::Lower) else { return };
     let (values, vectors) = (eigen.S().column_vector(), eigen.U());
     *matrix = [[0.0; 9]; 9];

@@ -73,7 +73,7 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
     let taken = scene.motions.iter().find(|motion| motion.start > 0.0);
     if let Some(motion) = taken {
         bail!(
-            "{}: motion `{}` takes hold of moving tissue at {} s, which no state of rest tells of; let it start \
+            "{}: motion `{}` takes hold of moving tissue at {} s, which a state of rest does not determine; let it start \
              at 0 s",
             scene.name,
             motion.name,

@@ -96,7 +96,7 @@ fn introduce(context: &mut Context) {
          scaled and mixed with the same weights the tie holds as far as it is linear. The dashed curves do \
          otherwise: published over-relaxation scales positions alone, so that `M (x - xt) = omega J^T l` \
          and the tissue is `omega` times as stiff; Anderson on positions leaves the multipliers behind; \
-         Anderson on multipliers makes the tie anew after each mixture, `x = xt + M^-1 J(x)^T l`. These two \
+         Anderson on multipliers makes the tie anew after each accelerated iterate, `x = xt + M^-1 J(x)^T l`. These two \
          have parts of their own below.",
     );
 }

@@ -25,7 +25,7 @@ const RATIO: [f64; 2] = [0.5, 0.9];
 const POSITIONS: &str = "Jacobi, on positions";
 const BOTH: &str = "Jacobi, on both";
 
-fn budgets(quick: bool) -> &'static [u32] {
+fn iteration_counts(quick: bool) -> &'static [u32] {
     if quick { &[5, 20, 80] } else { &[2, 5, 10, 20, 50, 100, 200, 400] }
 }
 
@@ -69,7 +69,7 @@ impl fmt::Display for Moment {
 }
 
 pub(super) fn case_count(quick: bool) -> usize {
-    MOMENTS.len() * (1 + mixes().len() * budgets(quick).len())
+    MOMENTS.len() * (1 + mixes().len() * iteration_counts(quick).len())
 }
 
 pub(super) fn run(context: &mut Context) -> Result<()> {
@@ -84,7 +84,7 @@ pub(super) fn run(context: &mut Context) -> Result<()> {
     let mut cases = Vec::new();
     for step in &steps {
         for (mix, settings) in mixes() {
-            cases.extend(budgets(context.quick).iter().map(|&iterations| {
+            cases.extend(iteration_counts(context.quick).iter().map(|&iterations| {
                 let settings = SolverSettings { iterations, ..settings.clone() };
                 Case { step, mix, settings }
             }));
@@ -117,7 +117,7 @@ fn groups<'a>(
     cases: &'a [Case],
     curves: &'a [Curve],
 ) -> impl Iterator<Item = (&'a [Case<'a>], &'a [Curve])> {
-    let count = budgets(quick).len();
+    let count = iteration_counts(quick).len();
     cases.chunks(count).zip(curves.chunks(count))
 }
 
@@ -167,7 +167,7 @@ fn conclude(context: &mut Context, cases: &[Case], curves: &[Curve]) {
             stiff.push((scene, ratio));
         }
     }
-    let iterations = budgets(context.quick).last().copied().unwrap_or(0);
+    let iterations = iteration_counts(context.quick).last().copied().unwrap_or(0);
     context
         .document
         .paragraph(format!("After {iterations} iterations (everybody starts with error 1):"));

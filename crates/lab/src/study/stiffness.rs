@@ -1,4 +1,4 @@
-//! Figure 5: the first open problem, stiffness that depends on the budget.
+//! Figure 5: the first open problem, stiffness that depends on the iterations per frame.
 
 use std::fmt;
 
@@ -37,7 +37,7 @@ fn moduli(quick: bool) -> &'static [f64] {
 }
 
 /// Iterations per frame.
-fn budgets(quick: bool) -> &'static [u32] {
+fn iteration_counts(quick: bool) -> &'static [u32] {
     if quick { &[5, 20, 50] } else { &[5, 10, 20, 50, 100, 200] }
 }
 
@@ -105,7 +105,7 @@ fn cases(quick: bool) -> Vec<Case> {
     for (body, Body { model, young }) in bodies(quick).into_iter().enumerate() {
         for method in 0..methods().len() {
             let case = |&iterations| Case { body, model, young, method, iterations };
-            cases.extend(budgets(quick).iter().map(case));
+            cases.extend(iteration_counts(quick).iter().map(case));
         }
     }
     cases
@@ -147,7 +147,7 @@ fn run(context: &mut Context) -> Result<()> {
         truth(&scene(context, body.model, body.young)?)
     })?;
     let errors = context.run_cases(&cases, |case| answer(context, case, &truths[case.body]))?;
-    let count = budgets(context.quick).len();
+    let count = iteration_counts(context.quick).len();
     let rows: Vec<(&[Case], &[Error])> = cases.chunks(count).zip(errors.chunks(count)).collect();
     for (body, rows) in rows.chunks(methods().len()).enumerate() {
         draw_methods(context, body, rows)?;
@@ -219,7 +219,7 @@ fn draw_methods(context: &mut Context, body: usize, rows: &[(&[Case], &[Error])]
     context.plot(
         &name,
         &plot,
-        "A method whose curve is level at 1 gives the stiffness that was typed at any budget; bodies that \
+        "A method whose curve is level at 1 gives the stiffness that was typed with any number of iterations; bodies that \
          left the scene have no point.",
     )
 }
@@ -251,7 +251,7 @@ fn draw_exact(context: &mut Context, rows: &[(&[Case], &[Error])]) -> Result<()>
         "stiffness-exact",
         &plot,
         "What is left in double precision is the rest of the damped motion and of the sweeps; in single \
-         precision, round-off of positions. A curve that fell with the budget would be a stiffness that more \
+         precision, round-off of positions. A curve that fell with the iterations would be a stiffness that more \
          iterations have to buy.",
     )
 }
@@ -265,7 +265,7 @@ fn cell(error: &Error) -> String {
 }
 
 fn tabulate(context: &mut Context, rows: &[(&[Case], &[Error])]) {
-    let counts = budgets(context.quick).iter().map(|k| k.to_string());
+    let counts = iteration_counts(context.quick).iter().map(|k| k.to_string());
     let heads = ["tissue", "method"].map(str::to_owned).into_iter().chain(counts);
     let mut table = Table::new(heads);
     for (cases, errors) in rows {
@@ -302,16 +302,16 @@ fn record(context: &mut Context, cases: &[Case], errors: &[Error]) -> Result<()>
     context.document.data("stiffness", "All rests", &table)
 }
 
-/// What the budgets cost: dependent passes and time, beside the iterations.
+/// What the iterations cost: dependent passes and time, beside the iterations.
 fn costs(context: &mut Context) -> Result<()> {
     let stiff = scene(context, MaterialModel::StableNeoHookean, GREEN_YOUNG)?;
     let tets = stiff.mesh.tets().len();
     let step = MeasuredStep::new(stiff, 0)?;
-    let counts = budgets(context.quick).iter().map(|k| format!("{k} iterations"));
+    let counts = iteration_counts(context.quick).iter().map(|k| format!("{k} iterations"));
     let mut table = Table::new(["method".to_owned()].into_iter().chain(counts));
     for method in methods().into_iter().take(SINGLE) {
         let mut row = vec![method.name.clone()];
-        for &iterations in budgets(context.quick) {
+        for &iterations in iteration_counts(context.quick) {
             let settings = method.clone().with_iterations(iterations).settings;
             let Cost { passes, seconds } = step.frame_cost(&settings)?;
             row.push(format!("{passes} passes, {:.2} ms", 1e3 * seconds));
@@ -348,7 +348,8 @@ fn conclude(context: &mut Context, cases: &[Case], errors: &[Error]) {
             })
             .collect();
         let law = law(model);
-        let text = format!("Over all budgets of {law} bodies `s` is: {}.", words.join("; "));
+        let text =
+            format!("Over all numbers of iterations of {law} bodies `s` is: {}.", words.join("; "));
         context.document.paragraph(text);
     }
     for (method, limit) in [DOUBLE, SINGLE].into_iter().zip(LIMITS) {

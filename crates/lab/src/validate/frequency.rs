@@ -78,7 +78,7 @@ fn precision(single: bool) -> &'static str {
 
 /// Substeps and iterations, those with the most work first; then the defaults.
 fn cases(quick: bool) -> Vec<Case> {
-    let budgets: &[(u32, u32)] = match quick {
+    let schedules: &[(u32, u32)] = match quick {
         true => &[(10, 5), (2, 10), (4, 5)],
         false => &[
             (4, 20),
@@ -100,7 +100,7 @@ fn cases(quick: bool) -> Vec<Case> {
     };
     let SolverSettings { substeps, iterations, .. } = SolverSettings::default();
     let case = |substeps, iterations, single| Case { substeps, iterations, single, quick };
-    let mut cases: Vec<_> = budgets.iter().map(|&(n, k)| case(n, k, false)).collect();
+    let mut cases: Vec<_> = schedules.iter().map(|&(n, k)| case(n, k, false)).collect();
     cases.extend([false, true].map(|single| case(substeps, iterations, single)));
     cases
 }

@@ -1,4 +1,4 @@
-//! Iteration independence: the stiffness that tissue seems to have, whatever the budget.
+//! Iteration independence: the stiffness that tissue seems to have, whatever the number of iterations per frame.
 
 use std::fmt;
 
@@ -177,11 +177,11 @@ fn run(context: &mut Context) -> Result<()> {
     Ok(())
 }
 
-/// A row per scene and method, a column per budget.
-fn tabulate(context: &mut Context, cases: &[Case], answers: &[Answer], budgets: Vec<String>) {
-    let count = budgets.len();
+/// A row per scene and method, a column per number of iterations.
+fn tabulate(context: &mut Context, cases: &[Case], answers: &[Answer], columns: Vec<String>) {
+    let count = columns.len();
     let mut table =
-        Table::new(["scene".to_owned(), "method".to_owned()].into_iter().chain(budgets));
+        Table::new(["scene".to_owned(), "method".to_owned()].into_iter().chain(columns));
     for (cases, answers) in cases.chunks(count).zip(answers.chunks(count)) {
         let names = [cases[0].scene.to_owned(), label(&cases[0])];
         let cells = answers.iter().map(|answer| {
@@ -252,7 +252,7 @@ fn judge(context: &mut Context, over: &str, cases: &[Case], answers: &[Answer]) 
         );
     }
     context.document.paragraph(format!(
-        "Over {over} the guard takes back at most {:.0} % of the steps of moving bodies.",
+        "Over {over} the guard rejects at most {:.0} % of the steps of moving bodies.",
         100.0 * rejected
     ));
 }

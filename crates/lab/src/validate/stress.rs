@@ -113,10 +113,10 @@ fn run(context: &mut Context) -> Result<()> {
         "runs",
         "count",
         "steps",
-        "taken back",
+        "rejected steps",
         "steps above",
         "runs that gain energy",
-        "runs without numbers",
+        "runs with NaN",
         "tets inside out at the end",
     ]);
     for (name, cases) in batches(context.quick) {
@@ -140,7 +140,7 @@ fn run(context: &mut Context) -> Result<()> {
         context.verdict_of(
             cases.len(),
             format!(
-                "{} {name}: steps above; runs that gain energy; runs without numbers; tets inverted",
+                "{} {name}: steps above; runs that gain energy; runs with NaN; tets inverted",
                 cases.len()
             ),
             "0; 0; 0; < 1 %",

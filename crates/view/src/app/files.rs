@@ -100,7 +100,7 @@ impl App {
     pub(super) fn toggle_recording(&mut self) {
         if let Some(recorder) = self.recorder.take() {
             match recorder.finish() {
-                Ok(told) => self.messages.tell(format!("saved {told}")),
+                Ok(summary) => self.messages.tell(format!("saved {summary}")),
                 Err(error) => self.messages.warn(format!("{error:#}")),
             }
             return;

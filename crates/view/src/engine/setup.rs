@@ -13,13 +13,13 @@ pub struct BuildRequest {
     pub generation: u64,
     /// One scene for each simulation; they differ in their solvers.
     pub scenes: Vec<Scene>,
-    /// Whether the last one is the exact solution, which is left out for large meshes.
+    /// Whether the last one is the reference, which is left out for large meshes.
     pub ends_with_ghost: bool,
     /// Where mesh files are.
     pub mesh_files: MeshFiles,
 }
 
-/// The largest mesh that has an exact solution beside it [tetrahedra]: it costs twenty iterations for
+/// The largest mesh that has a reference beside it [tetrahedra]: it costs twenty iterations for
 /// each substep.
 pub const MOST_GHOST_TETS: usize = 5000;
 
@@ -34,7 +34,7 @@ pub struct Setup {
     pub assembly: Arc<Assembly>,
     /// How many simulations there are.
     pub run_count: usize,
-    /// Whether the last of them is the exact solution.
+    /// Whether the last of them is the reference.
     pub has_ghost: bool,
 }
 

@@ -39,13 +39,13 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// The exact solution, where there is one.
+    /// The reference, where there is one.
     pub fn ghost(&self, setup: &Setup) -> Option<&RunSnapshot> {
         let is_here = setup.has_ghost && self.generation == setup.generation;
         self.runs.last().filter(|_| is_here)
     }
 
-    /// Whether the others wait for the exact solution: it takes longer than a frame is to last [s], or has not
+    /// Whether the others wait for the reference: it takes longer than a frame is to last [s], or has not
     /// computed one yet.
     pub fn waits_for_ghost(&self, setup: &Setup, pace: f64) -> bool {
         self.ghost(setup).is_some_and(|ghost| ghost.wall == 0.0 || ghost.wall > pace)

@@ -46,7 +46,7 @@ pub struct Worker {
 
 struct Running {
     setup: Arc<Setup>,
-    /// The first, the second, the exact one.
+    /// The first, the second, the reference.
     runs: Vec<Box<dyn Run>>,
     /// What computes each, as it was sent last.
     devices: Vec<String>,

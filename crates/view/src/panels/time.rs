@@ -87,14 +87,13 @@ pub fn show_bar(
 
 fn compare(ui: &mut Ui, session: &Session, actions: &mut Vec<Action>) {
     let mut on = session.is_comparison();
-    let help = "Two solvers side by side: same start, same drag, each with its own settings. Begins again \
-                from rest.";
+    let help = "Two solvers side by side: from the same state, under the same hand, each with its own settings.";
     if ui.toggle_value(&mut on, "A | B").on_hover_text(help).changed() {
         actions.push(Action::Compare(on));
     }
     let mut ghost = session.choices().ghost;
-    let help = "The exact solution as a ghost, for small meshes. Begins again from rest.";
-    if ui.toggle_value(&mut ghost, "true solution").on_hover_text(help).changed() {
+    let help = "The converged solution as a ghost, from the same state; for small meshes.";
+    if ui.toggle_value(&mut ghost, "reference (converged)").on_hover_text(help).changed() {
         actions.push(Action::Ghost(ghost));
     }
 }
@@ -105,7 +104,7 @@ pub fn show_status(ui: &mut Ui, clock: &Clock, setup: &Setup, snapshot: &Snapsho
     let real = clock.rate * dt;
     ui.label(format!("t = {:.2} s", snapshot.time));
     ui.separator();
-    let names = ["A", "B", "true"];
+    let names = ["A", "B", "reference"];
     for (number, run) in snapshot.runs.iter().enumerate() {
         let is_ghost = setup.has_ghost && number + 1 == snapshot.runs.len();
         let name = match (snapshot.runs.len(), is_ghost) {
@@ -115,8 +114,8 @@ pub fn show_status(ui: &mut Ui, clock: &Clock, setup: &Setup, snapshot: &Snapsho
         };
         let text = format!("{name} {:.1} ms per frame of {:.1} ms", 1e3 * run.wall, 1e3 * dt);
         ui.label(text.trim()).on_hover_text(format!(
-            "Substeps take {:.2} ms each. Energy: elastic {:.3e} J, kinetic {:.3e} J. Substeps taken back by \
-             the guard so far: {}.",
+            "Substeps take {:.2} ms each. Energy: elastic {:.3e} J, kinetic {:.3e} J. Rejected substeps so \
+             far: {}.",
             1e3 * run.wall / f64::from(setup.scene.solver.substeps),
             run.measures.energy.elastic,
             run.measures.energy.kinetic,
@@ -136,8 +135,8 @@ pub fn show_status(ui: &mut Ui, clock: &Clock, setup: &Setup, snapshot: &Snapsho
     let pace = dt / clock.speed;
     if clock.playing && snapshot.waits_for_ghost(setup, pace) {
         ui.spinner();
-        ui.label("waits for the true solution").on_hover_text(
-            "All simulations stay at one time, and the true solution takes longer than the clock.",
+        ui.label("waits for the reference").on_hover_text(
+            "All simulations stay at one time, and the reference takes longer than the clock.",
         );
     }
     if clock.playing {

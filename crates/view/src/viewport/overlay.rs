@@ -244,7 +244,7 @@ pub fn caption(snapshot: &Snapshot, run: &RunSnapshot, remarks: &[String]) -> St
     text
 }
 
-/// How far a simulation is from the exact solution, and the second one from the first: lines of text.
+/// How far a simulation is from the reference, and the second one from the first: lines of text.
 pub fn distances(snapshot: &Snapshot, setup: &Setup, number: usize) -> Vec<String> {
     let (Some(run), ghost) = (snapshot.runs.get(number), snapshot.ghost(setup)) else {
         return Vec::new();
@@ -254,7 +254,7 @@ pub fn distances(snapshot: &Snapshot, setup: &Setup, number: usize) -> Vec<Strin
         let distance = millimetres(run.distance(other?));
         Some(format!("at most {distance} from {name}"))
     };
-    let lines = [to(ghost, "the true solution, the ghost"), to(first, "A")];
+    let lines = [to(ghost, "the reference, the ghost"), to(first, "A")];
     lines.into_iter().flatten().collect()
 }
 

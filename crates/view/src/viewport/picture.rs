@@ -31,12 +31,12 @@ impl Gpu {
         let name = state.adapter.get_info().name;
         let device = Device::from_wgpu(state.device.clone(), state.queue.clone(), name);
         let failed = Arc::new(OnceLock::new());
-        let told = Arc::clone(&failed);
+        let first_error = Arc::clone(&failed);
         // A device that is lost hands out things that cannot be used before it says so.
         state.device.on_uncaptured_error(Arc::new(move |error| {
             let text = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
             // What follows from the first is of no interest.
-            let _ = told.set(text);
+            let _ = first_error.set(text);
         }));
         Self { device, state, failed }
     }
@@ -97,7 +97,7 @@ pub struct PictureContents<'a> {
     pub orbit: Orbit,
     /// The simulation's surfaces.
     pub surface: &'a RunSurface,
-    /// The exact solution, which shines through.
+    /// The reference, which shines through.
     pub ghost: Option<&'a RunSurface>,
     /// The values that its colours begin and end at, where they show values.
     pub range: Option<[f32; 2]>,

@@ -32,14 +32,14 @@ impl Worker {
         }
     }
 
-    /// The exact solution is for small meshes.
+    /// The reference is for small meshes.
     fn leave_ghost_out(&self, request: &mut BuildRequest, assembly: &Assembly) {
         let tets: usize = assembly.bodies.iter().map(|body| body.tets.len()).sum();
         if request.ends_with_ghost && tets > MOST_GHOST_TETS {
             request.scenes.pop();
             request.ends_with_ghost = false;
             self.tell(Event::Refused(format!(
-                "the exact solution is left out: it is for meshes of at most {MOST_GHOST_TETS} \
+                "the reference is left out: it is for meshes of at most {MOST_GHOST_TETS} \
                  tetrahedra, and this one has {tets}"
             )));
         }
@@ -49,11 +49,8 @@ impl Worker {
         let Some(running) = &self.running else { return self.load(request) };
         let setup = Arc::clone(&running.setup);
         self.leave_ghost_out(&mut request, &setup.assembly);
-        let what = if request.ends_with_ghost {
-            "building the true solution"
-        } else {
-            "building the model"
-        };
+        let what =
+            if request.ends_with_ghost { "building the reference" } else { "building the model" };
         self.tell(Event::Busy(what.to_owned()));
         let Some(running) = &mut self.running else { return };
         let first = &running.runs[0];
