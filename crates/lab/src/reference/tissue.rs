@@ -19,7 +19,7 @@ pub type Stiffness = [[f64; 9]; 9];
 
 /// The constants of one material.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tissue {
+pub struct TissueLaw {
     /// Its energy.
     pub model: MaterialModel,
     /// Lame's first parameter [Pa].
@@ -39,7 +39,7 @@ pub struct Creep {
     pub rate: f64,
 }
 
-impl Tissue {
+impl TissueLaw {
     /// Energy density [Pa].
     pub fn energy_density(&self, f: &Mat3<f64>, creep: Option<&Creep>) -> f64 {
         let (lambda, mu) = (self.lame_lambda, self.lame_mu);

@@ -6,13 +6,13 @@ mod path;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
-use std::path::{Path as FilePath, PathBuf};
+use std::path::{Path, PathBuf};
 use viscera::measure::{TetMeasure, measure_displacements, measure_tets, summarize_deformation};
 use viscera::mesh::io::vtu::{self, Array};
 use viscera::simulation::Simulation;
 
 use crate::sections::Progress;
-use path::{Path, Rest};
+use path::{LoadPath, Rest};
 use viscera_report::{percent, scientific, si};
 use viscera_resources::Memory;
 use viscera_resources::files::{prepare_file, write_atomic};
@@ -89,7 +89,7 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
         );
     }
     let simulation = Simulation::<f64>::new(scene, assembly)?;
-    let mut path = Path::new(&simulation, arguments.parts, arguments.memory)?;
+    let mut path = LoadPath::new(&simulation, arguments.parts, arguments.memory)?;
     for note in &simulation.assembly().notes {
         eprintln!("note: {note}");
     }
@@ -195,7 +195,7 @@ fn write(
     simulation: &Simulation<f64>,
     rest: &Rest,
     measures: &[TetMeasure],
-    out: &FilePath,
+    out: &Path,
 ) -> Result<()> {
     let (mut tets, mut bodies) = (Vec::new(), Vec::new());
     for (index, body) in simulation.assembly().bodies.iter().enumerate() {

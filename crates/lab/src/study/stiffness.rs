@@ -6,10 +6,10 @@ use anyhow::Result;
 use viscera::material::MaterialModel;
 use viscera::settings::AndersonOn;
 
-use super::methods::{COLORED, Method, anderson, exact, law, published};
+use super::methods::{COLORED, NamedSettings, anderson, exact, law, published};
 use super::step::{Cost, MeasuredStep};
 use super::{Context, Section};
-use crate::scenes::{Scene, Size, tissue};
+use crate::load_cases::{LoadCase, Size, tissue};
 use crate::settling::{Error, FRAMES, KEPT_VELOCITY, Truth, compare, settle, truth};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 
@@ -46,16 +46,16 @@ fn size(quick: bool) -> Size {
 }
 
 /// The methods; the last two are the exact form in double and in single precision.
-fn methods() -> [Method; 6] {
+fn methods() -> [NamedSettings; 6] {
     let published = || published(COLORED);
     let on = |on| anderson(published(), on);
     [
-        Method::new("as published", published()),
-        Method::new("Anderson on positions", on(AndersonOn::Positions)),
-        Method::new("Anderson on multipliers", on(AndersonOn::Multipliers)),
-        Method::new("Anderson on both", on(AndersonOn::Both)),
-        Method::new("exact at rest", exact(COLORED)),
-        Method::new("exact at rest, single precision", exact(COLORED)),
+        NamedSettings::new("as published", published()),
+        NamedSettings::new("Anderson on positions", on(AndersonOn::Positions)),
+        NamedSettings::new("Anderson on multipliers", on(AndersonOn::Multipliers)),
+        NamedSettings::new("Anderson on both", on(AndersonOn::Both)),
+        NamedSettings::new("exact at rest", exact(COLORED)),
+        NamedSettings::new("exact at rest, single precision", exact(COLORED)),
     ]
 }
 
@@ -115,20 +115,20 @@ fn case_count(quick: bool) -> usize {
     bodies(quick).len() + cases(quick).len()
 }
 
-fn scene(context: &Context, model: MaterialModel, young: f64) -> Result<Scene> {
+fn load_case(context: &Context, model: MaterialModel, young: f64) -> Result<LoadCase> {
     let poisson = context.changes.poisson.unwrap_or(POISSON);
     let tissue = tissue(model, young, poisson)?;
-    context.changes.scene("cantilever", size(context.quick), tissue)
+    context.changes.load_case("cantilever", size(context.quick), tissue)
 }
 
 fn answer(context: &Context, case: &Case, truth: &Truth) -> Result<Error> {
-    let scene = scene(context, case.model, case.young)?;
+    let load_case = load_case(context, case.model, case.young)?;
     let settings = methods()[case.method].clone().with_iterations(case.iterations).settings;
     let settled = match case.method {
-        SINGLE => settle::<f32>(&scene, &settings)?,
-        _ => settle::<f64>(&scene, &settings)?,
+        SINGLE => settle::<f32>(&load_case, &settings)?,
+        _ => settle::<f64>(&load_case, &settings)?,
     };
-    compare(&scene, truth, &settled.positions)
+    compare(&load_case, truth, &settled.positions)
 }
 
 fn is_lost(error: &Error) -> bool {
@@ -144,7 +144,7 @@ fn run(context: &mut Context) -> Result<()> {
     teach(context);
     let cases = cases(context.quick);
     let truths = context.run_cases(&bodies(context.quick), |body| {
-        truth(&scene(context, body.model, body.young)?)
+        truth(&load_case(context, body.model, body.young)?)
     })?;
     let errors = context.run_cases(&cases, |case| answer(context, case, &truths[case.body]))?;
     let count = iteration_counts(context.quick).len();
@@ -304,7 +304,7 @@ fn record(context: &mut Context, cases: &[Case], errors: &[Error]) -> Result<()>
 
 /// What the iterations cost: dependent passes and time, beside the iterations.
 fn costs(context: &mut Context) -> Result<()> {
-    let stiff = scene(context, MaterialModel::StableNeoHookean, GREEN_YOUNG)?;
+    let stiff = load_case(context, MaterialModel::StableNeoHookean, GREEN_YOUNG)?;
     let tets = stiff.mesh.tets().len();
     let step = MeasuredStep::new(stiff, 0)?;
     let counts = iteration_counts(context.quick).iter().map(|k| format!("{k} iterations"));
@@ -335,7 +335,7 @@ fn conclude(context: &mut Context, cases: &[Case], errors: &[Error]) {
         let words: Vec<String> = methods()[..DOUBLE]
             .iter()
             .enumerate()
-            .map(|(method, Method { name, .. })| {
+            .map(|(method, NamedSettings { name, .. })| {
                 let kept = || of(method, model).filter(|(_, error)| !is_lost(error));
                 let [all, left] = [of(method, model).count(), kept().count()];
                 let range = kept().map(|(_, error)| error.stiffness);

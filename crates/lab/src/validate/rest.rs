@@ -9,7 +9,7 @@ use viscera::settings::{Acceleration, SolverSettings};
 
 use super::methods::{Form, floored, model_name, scheduled, worse};
 use super::{Context, Section};
-use crate::scenes::{NAMES, Scene, Size, tissue};
+use crate::load_cases::{LoadCase, NAMES, Size, tissue};
 use crate::settling::{Error, compare, settle, truth};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 
@@ -32,7 +32,7 @@ const STVK: MaterialModel = MaterialModel::SaintVenantKirchhoff;
 /// One body with several numbers of substeps and iterations.
 #[derive(Clone, Debug)]
 struct Case {
-    scene: &'static str,
+    load_case: &'static str,
     size: Size,
     model: MaterialModel,
     young: f64,
@@ -46,9 +46,9 @@ struct Case {
 
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { scene, size, model, young, poisson, form, anderson, single, .. } = self;
+        let Self { load_case, size, model, young, poisson, form, anderson, single, .. } = self;
         let (law, form) = (model_name(*model), form.name());
-        write!(f, "{scene} ({size:?}), {law}, {} kPa, nu {poisson}, {form}", young / 1e3)?;
+        write!(f, "{load_case} ({size:?}), {law}, {} kPa, nu {poisson}, {form}", young / 1e3)?;
         if *anderson {
             f.write_str(", Anderson")?;
         }
@@ -106,10 +106,10 @@ fn groups(quick: bool) -> Vec<Group> {
     };
     let grid = |form, size, model, tissues: &[(f64, f64)], single, schedules| {
         let mut cases = Vec::new();
-        for &scene in names {
+        for &load_case in names {
             for &(young, poisson) in tissues {
                 cases.push(Case {
-                    scene,
+                    load_case,
                     size,
                     model,
                     young,
@@ -136,7 +136,9 @@ fn groups(quick: bool) -> Vec<Group> {
         let stiff = &[(1e5, 0.45), (1e5, 0.49)];
         let mut cases = grid(Form::Colored, Size::Large, SNH, stiff, false, PER_FRAME);
         groups.push(Group { title: "coloured, about 3000 tetrahedra", cases: cases.clone() });
-        cases.retain(|case| case.poisson == 0.49 && ["cantilever", "organ"].contains(&case.scene));
+        cases.retain(|case| {
+            case.poisson == 0.49 && ["cantilever", "organ"].contains(&case.load_case)
+        });
         cases.iter_mut().for_each(|case| case.form = Form::Clique);
         groups.push(Group { title: "clique, about 3000 tetrahedra", cases });
     }
@@ -161,8 +163,8 @@ fn case_count(quick: bool) -> usize {
 
 fn answer(case: &Case) -> Result<Answer> {
     let material = tissue(case.model, case.young, case.poisson)?;
-    let scene = Scene::new(case.scene, case.size, material)?;
-    let truth = truth(&scene)?;
+    let load_case = LoadCase::new(case.load_case, case.size, material)?;
+    let truth = truth(&load_case)?;
     let mut outcomes = Vec::new();
     for &schedule in case.schedules {
         if truth.inverted > 0 {
@@ -172,18 +174,18 @@ fn answer(case: &Case) -> Result<Answer> {
         let settings =
             SolverSettings { acceleration, ..scheduled(case.form, schedule.0, schedule.1) };
         let settled = if case.single {
-            settle::<f32>(&scene, &settings)?
+            settle::<f32>(&load_case, &settings)?
         } else {
-            settle::<f64>(&scene, &settings)?
+            settle::<f64>(&load_case, &settings)?
         };
         outcomes.push(Outcome {
             schedule,
-            error: compare(&scene, &truth, &settled.positions)?,
+            error: compare(&load_case, &truth, &settled.positions)?,
             rejected: settled.rejected,
             rejected_moving: settled.rejected_moving,
         });
     }
-    Ok(Answer { tet_count: scene.mesh.tets().len(), outcomes })
+    Ok(Answer { tet_count: load_case.mesh.tets().len(), outcomes })
 }
 
 /// The worst of a group with one schedule.

@@ -7,11 +7,11 @@ use viscera::material::MaterialModel;
 use viscera::settings::{AndersonGuard, AndersonOn, SolverSettings};
 
 use super::Context;
+use crate::load_cases::Size;
 use crate::reference::Reference;
-use crate::scenes::Size;
 use crate::settling::{AfterStep, compare, settle_with, truth};
 use crate::stress::{self, FRAMES, Kind, ROUND_OFF, Run, SIZE};
-use crate::study::methods::{COLORED, Method, anderson, exact, published};
+use crate::study::methods::{COLORED, NamedSettings, anderson, exact, published};
 
 /// Young's modulus [Pa] and Poisson's ratio of the bar in trouble.
 pub(super) const YOUNG: f64 = 1e4;
@@ -32,7 +32,7 @@ pub(super) enum AfterRejection {
 
 /// A way to solve.
 pub(super) struct Way {
-    pub method: Method,
+    pub method: NamedSettings,
     pub after: AfterRejection,
     /// One of those that all runs are made of; the others are compared on a few.
     pub is_main: bool,
@@ -49,7 +49,7 @@ pub(super) fn ways() -> Vec<Way> {
     };
     let free = || SolverSettings { step_guard: false, ..exact(COLORED) };
     let way = |name: &str, settings, after, is_main| Way {
-        method: Method::new(name, settings),
+        method: NamedSettings::new(name, settings),
         after,
         is_main,
     };
@@ -174,11 +174,11 @@ fn is_blown(run: &Run<'_>) -> bool {
 /// Watches one run. `Phi` is computed outside the solver, whatever that believes.
 pub(super) fn outcome(context: &Context, case: &Case) -> Result<Outcome> {
     let tissue = context.changes.tissue(case.model, YOUNG, POISSON)?;
-    let scene = stress::bar(tissue)?;
+    let load_case = stress::bar(tissue)?;
     let way = &ways()[case.way];
-    let mut run = Run::new(&scene, case.kind, case.seed, &way.method.settings)?;
+    let mut run = Run::new(&load_case, case.kind, case.seed, &way.method.settings)?;
     let reference = Reference::new(&run.model);
-    let mut outcome = Outcome { tets: scene.mesh.tets().len(), ..Outcome::default() };
+    let mut outcome = Outcome { tets: load_case.mesh.tets().len(), ..Outcome::default() };
     let mut rejected = 0;
     for _ in 0..FRAMES {
         if run.is_free() && outcome.energies.is_empty() {
@@ -214,11 +214,11 @@ pub(super) fn apparent_stiffness(context: &Context, rest: &Rest) -> Result<Vec<f
 fn settled(context: &Context, rest: &Rest, poisson: f64) -> Result<f64> {
     let size = if context.quick { Size::Tiny } else { Size::Small };
     let tissue = context.changes.tissue(rest.model, SETTLING_YOUNG, poisson)?;
-    let scene = context.changes.scene("cantilever", size, tissue)?;
+    let load_case = context.changes.load_case("cantilever", size, tissue)?;
     let way = &ways()[rest.way];
     let mut rejected = 0;
-    let settled = settle_with::<f64>(&scene, &way.method.settings, |step| {
+    let settled = settle_with::<f64>(&load_case, &way.method.settings, |step| {
         treat_multipliers(way.after, &mut rejected, step)
     })?;
-    Ok(compare(&scene, &truth(&scene)?, &settled.positions)?.stiffness)
+    Ok(compare(&load_case, &truth(&load_case)?, &settled.positions)?.stiffness)
 }
