@@ -219,7 +219,7 @@ fn draw_methods(context: &mut Context, body: usize, rows: &[(&[Case], &[Error])]
     context.plot(
         &name,
         &plot,
-        "A method whose curve is level at 1 gives the stiffness that was typed with any number of iterations; bodies that \
+        "A method whose curve is level at 1 gives the typed stiffness with any number of iterations; bodies that \
          left the scene have no point.",
     )
 }
