@@ -1,6 +1,6 @@
 //! `viscera bench-scene`: a scene of the peers' benchmark, see docs/peers.md.
 
-use crate::files::{self, OutputFolder};
+use crate::output::OutputFolder;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use serde::{Deserialize, Serialize};
@@ -14,6 +14,7 @@ use viscera::scene::Scene;
 use viscera::settings::{Precision, SolverSettings};
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
+use viscera_resources::files;
 
 /// Run a scene of the benchmark that compares simulators, for its harness
 ///

@@ -3,7 +3,7 @@
 use crate::bench::processor;
 use crate::bench::solvers::SOLVERS;
 use crate::bench::subjects::{Size, Subject, hanging};
-use crate::{files, progress};
+use crate::progress;
 use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
@@ -15,7 +15,8 @@ use viscera::settings::SolverSettings;
 use viscera::solver::gpu::{Adapter, GpuError, GpuSolver};
 use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
-use viscera_report::{Memory, Table};
+use viscera_report::Table;
+use viscera_resources::{Memory, files};
 
 /// List what there is to compute on, and how fast it is
 ///
@@ -85,13 +86,13 @@ pub fn execute(arguments: &DevicesArguments) -> Result<()> {
     if let Some(folder) = &arguments.kernels {
         return write_kernels(folder);
     }
-    let task = Task::new()?;
-    let listing = list(&task)?;
+    let sample = SampleBar::new()?;
+    let listing = list(&sample)?;
     if arguments.json {
         let text = serde_json::to_string_pretty(&listing).context("cannot write JSON")?;
         return files::print(&format!("{text}\n"));
     }
-    files::print(&listing.to_text(&task))
+    files::print(&listing.to_text(&sample))
 }
 
 /// The texts of all kernels, each in a file of its name.
@@ -100,8 +101,8 @@ fn write_kernels(folder: &Path) -> Result<()> {
     let texts = viscera::solver::gpu::kernels::texts();
     for (name, text) in &texts {
         let file = folder.join(format!("{name}.wgsl"));
-        viscera_report::prepare_file(&file, "--kernels")?;
-        files::write_whole(&file, text.as_bytes())?;
+        files::prepare_file(&file, "--kernels")?;
+        files::write_atomic(&file, text.as_bytes())?;
     }
     files::print(&format!("{} kernels are in {}\n", texts.len(), folder.display()))
 }
@@ -112,27 +113,27 @@ fn write_kernels(_: &Path) -> Result<()> {
 }
 
 #[cfg(feature = "gpu")]
-fn list(task: &Task) -> Result<Listing> {
+fn list(sample: &SampleBar) -> Result<Listing> {
     let adapters = Adapter::all();
     let bar =
         progress::bar(adapters.len() as u64 + 1, "measuring", "{pos} of {len} devices, {msg}");
     let mut lines = Vec::new();
     for adapter in &adapters {
         bar.set_message(adapter.name());
-        lines.push(of_adapter(task, adapter));
+        lines.push(of_adapter(sample, adapter));
         bar.inc(1);
     }
     bar.set_message("CPU");
-    let cpu = of_cpu(task)?;
+    let cpu = of_cpu(sample)?;
     bar.finish_and_clear();
     let hint = lines.is_empty().then(|| GpuError::NoAdapter.to_string());
     Ok(Listing { cpu, adapters: lines, hint })
 }
 
 #[cfg(not(feature = "gpu"))]
-fn list(task: &Task) -> Result<Listing> {
+fn list(sample: &SampleBar) -> Result<Listing> {
     let bar = progress::bar(1, "measuring", "{pos} of {len} devices");
-    let cpu = of_cpu(task)?;
+    let cpu = of_cpu(sample)?;
     bar.finish_and_clear();
     let hint = "graphics adapters are not looked for: the GPU backend was left out of this build; \
                 build with `--features gpu`";
@@ -140,13 +141,13 @@ fn list(task: &Task) -> Result<Listing> {
 }
 
 /// A bar whose left end is held.
-struct Task {
+struct SampleBar {
     model: Model<f32>,
     settings: SolverSettings,
     inputs: Inputs<f32>,
 }
 
-impl Task {
+impl SampleBar {
     fn new() -> Result<Self> {
         let entry = SOLVERS.iter().find(|entry| entry.name == "jacobi");
         let entry = entry.context("`jacobi` is no longer among the solvers")?;
@@ -178,12 +179,12 @@ impl Task {
     }
 }
 
-fn of_cpu(task: &Task) -> Result<Line> {
-    let mut solver = Solver::new(&task.model, &task.settings);
-    let mut state = State::at_rest(&task.model);
-    let speed = task.speed(|count| {
+fn of_cpu(sample: &SampleBar) -> Result<Line> {
+    let mut solver = Solver::new(&sample.model, &sample.settings);
+    let mut state = State::at_rest(&sample.model);
+    let speed = sample.speed(|count| {
         for _ in 0..count {
-            solver.step(&task.model, &mut state, &task.inputs, DT)?;
+            solver.step(&sample.model, &mut state, &sample.inputs, DT)?;
         }
         Ok(())
     })?;
@@ -201,15 +202,15 @@ fn of_cpu(task: &Task) -> Result<Line> {
 }
 
 #[cfg(feature = "gpu")]
-fn of_adapter(task: &Task, adapter: &Adapter) -> Line {
+fn of_adapter(sample: &SampleBar, adapter: &Adapter) -> Line {
     let (info, limits) = (adapter.info(), adapter.limits());
     let measure = || -> Result<(f64, u64)> {
         let device = adapter.open()?;
-        let mut solver = GpuSolver::new(&device, &task.model, &task.settings)?;
-        let largest = solver.largest_mesh(&task.model, &device.limits());
-        let speed = task.speed(|count| {
+        let mut solver = GpuSolver::new(&device, &sample.model, &sample.settings)?;
+        let largest = solver.largest_mesh(&sample.model, &device.limits());
+        let speed = sample.speed(|count| {
             for _ in 0..count {
-                solver.step(&task.model, &task.inputs, DT)?;
+                solver.step(&sample.model, &sample.inputs, DT)?;
             }
             Ok(solver.wait()?)
         })?;
@@ -235,7 +236,7 @@ fn of_adapter(task: &Task, adapter: &Adapter) -> Line {
 }
 
 impl Listing {
-    fn to_text(&self, task: &Task) -> String {
+    fn to_text(&self, sample: &SampleBar) -> String {
         let mut table = Table::new([
             "device",
             "kind",
@@ -250,12 +251,12 @@ impl Listing {
         ]);
         for line in self.adapters.iter().chain([&self.cpu]) {
             let limit = |text: fn(&Limits) -> String| line.limits.as_ref().map_or("-".into(), text);
-            let told = |text: &Option<String>| text.clone().unwrap_or("-".into());
+            let or_dash = |text: &Option<String>| text.clone().unwrap_or("-".into());
             table.row([
                 line.name.clone(),
                 line.kind.into(),
-                told(&line.backend),
-                told(&line.driver),
+                or_dash(&line.backend),
+                or_dash(&line.driver),
                 limit(|l| Memory(l.storage_binding_bytes).to_string()),
                 limit(|l| Memory(l.buffer_bytes).to_string()),
                 limit(|l| {
@@ -280,7 +281,7 @@ impl Listing {
         if let Some(hint) = &self.hint {
             text.push_str(&format!("{hint}\n"));
         }
-        let tets = task.model.tet_count();
+        let tets = sample.model.tet_count();
         text.push_str(&format!(
             "speed: million tetrahedra x sweeps per second, a bar of {tets} tetrahedra, one colour; \
              largest mesh: million tetrahedra that the limits take, solved in the same way\n"

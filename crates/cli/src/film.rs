@@ -1,7 +1,7 @@
 //! The film of a run: frames are remembered while the scene runs and drawn afterwards, when it is
 //! known how far everything moves, so that camera and colours stay the same throughout.
 
-use crate::files::OutputFolder;
+use crate::output::OutputFolder;
 use crate::series::{deformed_surface, rest_surface};
 use anyhow::Result;
 use indicatif::ProgressBar;

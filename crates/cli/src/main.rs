@@ -1,7 +1,96 @@
-//! The `viscera` program.
+//! The program `viscera`.
 
+mod bench;
+mod bench_scene;
+mod devices;
+mod film;
+mod mesh;
+mod output;
+mod progress;
+mod run;
+mod scene;
+mod series;
+mod summary;
+mod view;
+
+use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
+/// Real-time soft-tissue simulation for surgical applications.
+#[derive(Parser)]
+#[command(name = "viscera", version, arg_required_else_help = true, after_help = EXAMPLES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  viscera run liver_retraction
+  viscera run scenes/cantilever.toml --set body.bar.material.young=\"10 kPa\" --out out/soft
+  viscera mesh inspect liver.msh --unit \"32 mm\"
+  viscera scene describe
+  viscera view grab
+  viscera bench --quick";
+
+#[derive(Subcommand)]
+enum Command {
+    /// Simulate a scene; write meshes, a picture, an animation and the numbers
+    Run(run::RunArguments),
+    /// Look at mesh files
+    #[command(subcommand)]
+    Mesh(mesh::MeshCommand),
+    /// What a scene file can say, and which scenes need none
+    #[command(subcommand)]
+    Scene(scene::SceneCommand),
+    /// Measure what the solvers cost on this machine
+    Bench(bench::BenchArguments),
+    /// Open a window: pull on the tissue and see it answer
+    View(view::ViewArguments),
+    /// List what there is to compute on, and how fast it is
+    Devices(devices::DevicesArguments),
+    // For a program, not for a person.
+    #[command(hide = true)]
+    BenchScene(bench_scene::BenchSceneArguments),
+}
+
+/// Exit code of a run that Ctrl-C ended, as shells report it.
+const INTERRUPTED: u8 = 130;
+
+/// Carries out what the command line asks for.
 fn main() -> ExitCode {
-    viscera_cli::main()
+    quiet_drivers();
+    let result = match Arguments::parse().command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Mesh(command) => mesh::execute(&command).map(|()| run::Outcome::Finished),
+        Command::Scene(command) => scene::execute(&command).map(|()| run::Outcome::Finished),
+        Command::Bench(arguments) => bench::execute(&arguments).map(|()| run::Outcome::Finished),
+        Command::View(arguments) => return view::execute(&arguments),
+        Command::Devices(arguments) => {
+            devices::execute(&arguments).map(|()| run::Outcome::Finished)
+        }
+        Command::BenchScene(arguments) => {
+            bench_scene::execute(&arguments).map(|()| run::Outcome::Finished)
+        }
+    };
+    match result {
+        Ok(run::Outcome::Finished) => ExitCode::SUCCESS,
+        Ok(run::Outcome::Interrupted) => ExitCode::from(INTERRUPTED),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Graphics drivers look for a display below `XDG_RUNTIME_DIR` and complain on our standard error where it is unset
+/// or no absolute path, as in containers and jobs. There is no display then, wherever they look.
+#[allow(unsafe_code)]
+fn quiet_drivers() {
+    const FOLDER: &str = "XDG_RUNTIME_DIR";
+    let is_folder = |path: std::ffi::OsString| std::path::Path::new(&path).is_absolute();
+    if cfg!(target_os = "linux") && !std::env::var_os(FOLDER).is_some_and(is_folder) {
+        // SAFETY: the first statement of the program; there is no other thread that reads the environment.
+        unsafe { std::env::set_var(FOLDER, std::env::temp_dir()) };
+    }
 }

@@ -1,6 +1,5 @@
 //! `viscera mesh`.
 
-use crate::files;
 use anyhow::{Context, Result};
 use clap::Subcommand;
 use serde::Serialize;
@@ -8,6 +7,7 @@ use std::fmt::Display;
 use std::path::PathBuf;
 use viscera::mesh::{inspect, inspect_surface, io};
 use viscera::units::Dimension;
+use viscera_resources::files;
 
 /// Look at mesh files
 #[derive(Subcommand)]

@@ -1,11 +1,10 @@
 //! `viscera run`.
 
-use crate::files::{self, Library, OutputFolder};
 use crate::film::Film;
-use crate::scene::BuiltIn;
+use crate::output::OutputFolder;
+use crate::progress;
 use crate::series::Series;
 use crate::summary::{FrameLine, Summary};
-use crate::{memory, progress};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -18,7 +17,7 @@ use viscera::scalar::Real;
 use viscera::scene::Scene;
 use viscera::settings::{DeviceRequest, Method, Precision};
 use viscera::simulation::{Assembly, Simulation};
-use viscera_report::Memory;
+use viscera_resources::{BuiltInScene, Memory, MeshFiles, files, memory};
 
 /// Simulate a scene; write meshes, a picture, an animation and the numbers
 ///
@@ -78,8 +77,8 @@ pub enum Outcome {
 /// Carries out `viscera run`.
 pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     let (scene, overrides) = read_scene(arguments)?;
-    let library = Library::new(&arguments.scene, arguments.data.as_deref());
-    let assembly = Assembly::new(&scene, &mut |name| library.load(name))?;
+    let meshes = MeshFiles::new(&arguments.scene, arguments.data.as_deref());
+    let assembly = Assembly::new(&scene, &mut |name| meshes.load(name))?;
     let tets = assembly.bodies.iter().map(|body| body.tets.len()).sum();
     let what = format!("{}: a simulation of {tets} tetrahedra", scene.name);
     let needed = memory::of_run(tets, &scene.solver);
@@ -88,7 +87,7 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem));
     let frames = arguments.frames.unwrap_or_else(|| scene.frame_count());
     if let Some(file) = &arguments.save {
-        viscera_report::prepare_file(file, "--save")?;
+        files::prepare_file(file, "--save")?;
     }
     let interrupted = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
@@ -115,7 +114,7 @@ type Overrides = Vec<(String, String)>;
 
 fn read_scene(arguments: &RunArguments) -> Result<(Scene, Overrides)> {
     let name = arguments.scene.display().to_string();
-    let bytes = match BuiltIn::find(&arguments.scene) {
+    let bytes = match BuiltInScene::find(&arguments.scene) {
         Some(scene) => scene.text.as_bytes().to_vec(),
         None => files::read(&arguments.scene)?,
     };
@@ -168,14 +167,14 @@ fn simulate<S: Real>(
     // What failed has no state to judge.
     let rest = if ended.is_ok() { simulation.rest() } else { None };
     if let Some(file) = arguments.save.as_ref().filter(|_| ended.is_ok()) {
-        files::write_whole(file, &simulation.save())?;
+        files::write_atomic(file, &simulation.save())?;
     }
     summary.judge(simulation.scene(), rest);
     summary.device = simulation.device_choice().to_owned();
     summary.warnings.extend(simulation.device_warning().map(String::from));
     // Numbers before meshes and pictures: those take a while, and may be what failed.
     write_summary(out, &summary)?;
-    // Positions that are no numbers are no mesh; the frames before them are.
+    // Positions that are NaN are no mesh; the frames before them are.
     match &ended {
         Ok(()) => series.finish(out, &simulation)?,
         Err(_) => series.write_lists(out)?,

@@ -1,6 +1,6 @@
 //! The time series of a run: one VTU file per written frame and a PVD file that lists them.
 
-use crate::files::OutputFolder;
+use crate::output::OutputFolder;
 use anyhow::Result;
 use viscera::measure::measure_displacements;
 use viscera::mesh::SurfaceMesh;

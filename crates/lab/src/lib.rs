@@ -6,16 +6,16 @@
 //! | to | look at |
 //! |---|---|
 //! | solve a step or a state of rest exactly | [`reference::Reference`] |
-//! | set up what the studies share | [`scenes`], [`settling`], [`motion`], [`stress`] |
+//! | set up what the studies share | [`load_cases`], [`settling`], [`motion`], [`stress`] |
 //! | compare the library with what must come out | [`validate`] |
 //! | see what the published method does, and what became of its open problems | [`study`] |
 //! | ask the reference about a scene file | [`rest_command`] |
 //! | write reports with tables and plots | [`viscera_report`] |
 
+pub mod load_cases;
 pub mod motion;
 pub mod reference;
 pub mod rest_command;
-pub mod scenes;
 pub mod sections;
 pub mod settling;
 pub mod stress;

@@ -1,14 +1,14 @@
 //! The program `viscera-lab`.
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
-use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viscera_lab::rest_command::{self, RestArguments};
 use viscera_lab::sections::{Changes, Options, Program};
 use viscera_lab::{study, validate};
+use viscera_resources::files::print;
 
 /// The truth beside the solver: studies that hold its claims against references.
 #[derive(Parser)]
@@ -150,14 +150,4 @@ fn report(
     let (met, all) = (outcome.met_count(), outcome.verdicts.len());
     let table = outcome.table().to_text();
     print(&format!("{table}{met} of {all} claims are met\nreport: {}\n", options.out.display()))
-}
-
-/// Prints text; a reader that has seen enough (`| head`) is no error.
-fn print(text: &str) -> Result<()> {
-    match std::io::stdout().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(error).context("cannot print the result")
-        }
-        _ => Ok(()),
-    }
 }

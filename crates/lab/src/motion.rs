@@ -6,22 +6,26 @@ use viscera::settings::SolverSettings;
 use viscera::solver::Solver;
 use viscera::state::State;
 
+use crate::load_cases::{FRAME_RATE, LoadCase};
 use crate::reference::Reference;
-use crate::scenes::{FRAME_RATE, Scene};
 
 /// Positions [m] at the end of every frame, shape [frame_count][vertex_count].
 pub type Motion = Vec<Vec<Vec3<f64>>>;
 
 /// What the library's solver does, from rest, without damping of its own.
-pub fn simulate<S: Real>(scene: &Scene, settings: &SolverSettings, frames: u32) -> Result<Motion> {
-    let model = scene.model::<S>(settings)?;
+pub fn simulate<S: Real>(
+    load_case: &LoadCase,
+    settings: &SolverSettings,
+    frames: u32,
+) -> Result<Motion> {
+    let model = load_case.model::<S>(settings)?;
     let mut solver = Solver::new(&model, settings);
     let mut state = State::at_rest(&model);
     let dt = 1.0 / FRAME_RATE / f64::from(settings.substeps);
     (0..frames)
         .map(|frame| {
             for time in times(frame, settings.substeps) {
-                solver.step(&model, &mut state, &scene.inputs(time), dt)?;
+                solver.step(&model, &mut state, &load_case.inputs(time), dt)?;
             }
             Ok(state.positions.iter().map(|x| x.cast()).collect())
         })
@@ -29,8 +33,8 @@ pub fn simulate<S: Real>(scene: &Scene, settings: &SolverSettings, frames: u32) 
 }
 
 /// What exact implicit Euler of the same substeps does.
-pub fn exact(scene: &Scene, substeps: u32, frames: u32) -> Result<Motion> {
-    let model = scene.model::<f64>(&SolverSettings::default())?;
+pub fn exact(load_case: &LoadCase, substeps: u32, frames: u32) -> Result<Motion> {
+    let model = load_case.model::<f64>(&SolverSettings::default())?;
     let mut reference = Reference::new(&model);
     let mut state = State::at_rest(&model);
     let dt = 1.0 / FRAME_RATE / f64::from(substeps);
@@ -38,8 +42,8 @@ pub fn exact(scene: &Scene, substeps: u32, frames: u32) -> Result<Motion> {
         .map(|frame| {
             for time in times(frame, substeps) {
                 reference
-                    .step(&mut state, &scene.inputs(time), dt)
-                    .with_context(|| format!("the reference of {scene}, frame {frame}"))?;
+                    .step(&mut state, &load_case.inputs(time), dt)
+                    .with_context(|| format!("the reference of {load_case}, frame {frame}"))?;
             }
             Ok(state.positions.clone())
         })
@@ -53,8 +57,8 @@ fn times(frame: u32, substeps: u32) -> impl Iterator<Item = f64> {
 
 /// Root mean square distance of every frame, over the largest root mean square displacement of the
 /// exact motion.
-pub fn errors(scene: &Scene, ours: &Motion, exact: &Motion) -> Vec<f64> {
-    let rest = scene.mesh.vertices();
+pub fn errors(load_case: &LoadCase, ours: &Motion, exact: &Motion) -> Vec<f64> {
+    let rest = load_case.mesh.vertices();
     let norm = |a: &[Vec3<f64>], b: &[Vec3<f64>]| -> f64 {
         a.iter().zip(b).map(|(a, b)| (*a - *b).length_squared()).sum::<f64>().sqrt()
     };

@@ -9,8 +9,8 @@ use viscera::solver::balance::ForceBalance;
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
+use crate::load_cases::{FRAME_RATE, LoadCase};
 use crate::reference::{Reference, Standing};
-use crate::scenes::{FRAME_RATE, Scene};
 
 /// Frames of a settling: three seconds.
 pub const FRAMES: u32 = 180;
@@ -44,8 +44,8 @@ pub struct Settled {
 
 /// Runs a scene for [`FRAMES`] frames of one sixtieth of a second each, all velocities times
 /// [`KEPT_VELOCITY`] after each.
-pub fn settle<S: Real>(scene: &Scene, settings: &SolverSettings) -> Result<Settled> {
-    settle_with(scene, settings, |_: &mut AfterStep<'_, S>| Ok(()))
+pub fn settle<S: Real>(load_case: &LoadCase, settings: &SolverSettings) -> Result<Settled> {
+    settle_with(load_case, settings, |_: &mut AfterStep<'_, S>| Ok(()))
 }
 
 /// What a settling has come to, for a caller who has a hand in it.
@@ -64,11 +64,11 @@ pub struct AfterStep<'a, S> {
 
 /// The same, with `after` called at the end of every step.
 pub fn settle_with<S: Real>(
-    scene: &Scene,
+    load_case: &LoadCase,
     settings: &SolverSettings,
     mut after: impl FnMut(&mut AfterStep<'_, S>) -> Result<()>,
 ) -> Result<Settled> {
-    let model = scene.model::<S>(settings)?;
+    let model = load_case.model::<S>(settings)?;
     let mut solver = Solver::new(&model, settings);
     let mut state = State::at_rest(&model);
     let dt = 1.0 / FRAME_RATE / f64::from(settings.substeps);
@@ -78,7 +78,7 @@ pub fn settle_with<S: Real>(
         let before = solver.rejected_steps();
         for substep in 1..=settings.substeps {
             let share = f64::from(substep) / f64::from(settings.substeps);
-            let inputs = scene.inputs(f64::from(frame) + share);
+            let inputs = load_case.inputs(f64::from(frame) + share);
             solver.step(&model, &mut state, &inputs, dt)?;
             let (solver, state) = (&mut solver, &mut state);
             after(&mut AfterStep { model: &model, solver, state, inputs: &inputs, dt })?;
@@ -94,7 +94,7 @@ pub fn settle_with<S: Real>(
         }
     }
     let steps = u64::from(FRAMES) * u64::from(settings.substeps);
-    let inputs = scene.inputs(f64::from(FRAMES));
+    let inputs = load_case.inputs(f64::from(FRAMES));
     let mut balance = ForceBalance::default();
     solver.force_balance(&model, &state, &inputs, &mut balance)?;
     let pin_force = |pin: &Pin<S>| balance.residual[pin.vertex as usize];
@@ -130,42 +130,42 @@ pub struct Truth {
 }
 
 /// Follows the scene's path to its end with the reference.
-pub fn truth(scene: &Scene) -> Result<Truth> {
-    truth_in_parts(scene, PATH_PARTS)
+pub fn truth(load_case: &LoadCase) -> Result<Truth> {
+    truth_in_parts(load_case, PATH_PARTS)
 }
 
 /// The same with the path in so many parts, for paths that are long.
-pub fn truth_in_parts(scene: &Scene, path_parts: u32) -> Result<Truth> {
-    let model = scene.model::<f64>(&SolverSettings::default())?;
+pub fn truth_in_parts(load_case: &LoadCase, path_parts: u32) -> Result<Truth> {
+    let model = load_case.model::<f64>(&SolverSettings::default())?;
     let mut reference = Reference::new(&model);
     let mut positions = model.rest_positions.clone();
     let mut minimum = false;
-    let moves = !scene.driven.is_empty() || scene.holds.iter().any(|hold| hold.driven);
+    let moves = !load_case.driven.is_empty() || load_case.holds.iter().any(|hold| hold.driven);
     let parts = if moves { path_parts } else { 1 };
     for part in 1..=parts {
         let share = f64::from(part) / f64::from(parts);
-        let inputs = scene.inputs(share * f64::from(scene.path_frames));
+        let inputs = load_case.inputs(share * f64::from(load_case.path_frames));
         let solution = reference
             .settle(&positions, &inputs)
-            .with_context(|| format!("the reference of {scene}"))?;
+            .with_context(|| format!("the reference of {load_case}"))?;
         positions = solution.positions;
         minimum = solution.convergence.minimum;
     }
-    let end = scene.inputs(f64::INFINITY);
+    let end = load_case.inputs(f64::INFINITY);
     let standing = reference.standing(&positions, &end)?;
     let pin_forces = reference.reactions(&positions, &end)?;
-    let (volume, inverted) = volume(scene, &positions)?;
+    let (volume, inverted) = volume(load_case, &positions)?;
     Ok(Truth { positions, standing, volume, minimum, inverted, pin_forces })
 }
 
 /// The body's volume [m^3], and how many tetrahedra are inside out.
-pub fn volume(scene: &Scene, positions: &[Vec3<f64>]) -> Result<(f64, usize)> {
-    let model = scene.model::<f64>(&SolverSettings::default())?;
+pub fn volume(load_case: &LoadCase, positions: &[Vec3<f64>]) -> Result<(f64, usize)> {
+    let model = load_case.model::<f64>(&SolverSettings::default())?;
     let mut tets = Vec::new();
     measure_tets(&model, positions, &mut tets);
     // The measures are in the user's order of tetrahedra.
-    let rest =
-        (0..scene.mesh.tets().len()).map(|t| viscera::mesh::tet_volume(scene.mesh.corners(t)));
+    let rest = (0..load_case.mesh.tets().len())
+        .map(|t| viscera::mesh::tet_volume(load_case.mesh.corners(t)));
     let sum = tets.iter().zip(rest).map(|(tet, rest)| tet.volume_ratio * rest).sum();
     let inverted = tets.iter().filter(|tet| tet.volume_ratio <= 0.0).count();
     Ok((sum, inverted))
@@ -235,12 +235,12 @@ impl Error {
 }
 
 /// Compares.
-pub fn compare(scene: &Scene, truth: &Truth, positions: &[Vec3<f64>]) -> Result<Error> {
-    let model = scene.model::<f64>(&SolverSettings::default())?;
+pub fn compare(load_case: &LoadCase, truth: &Truth, positions: &[Vec3<f64>]) -> Result<Error> {
+    let model = load_case.model::<f64>(&SolverSettings::default())?;
     let reference = Reference::new(&model);
-    let inputs = scene.inputs(f64::INFINITY);
-    let rest = scene.mesh.vertices();
-    let distance = Distance::new(rest, &truth.positions, positions, &scene.free());
+    let inputs = load_case.inputs(f64::INFINITY);
+    let rest = load_case.mesh.vertices();
+    let distance = Distance::new(rest, &truth.positions, positions, &load_case.free());
     let finite = positions.iter().all(|x| x.is_finite());
     if !finite {
         let lost = f64::INFINITY;
@@ -251,12 +251,12 @@ pub fn compare(scene: &Scene, truth: &Truth, positions: &[Vec3<f64>]) -> Result<
             volume: lost,
             gradient: lost,
             energy: lost,
-            inverted: scene.mesh.tets().len(),
+            inverted: load_case.mesh.tets().len(),
         });
     }
     let standing = reference.standing(positions, &inputs)?;
     let reaction = truth.pin_forces.iter().map(|r| r.length_squared()).sum::<f64>().sqrt();
-    let (volume, inverted) = volume(scene, positions)?;
+    let (volume, inverted) = volume(load_case, positions)?;
     Ok(Error {
         rms: distance.rms,
         largest: distance.largest,

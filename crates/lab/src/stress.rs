@@ -12,8 +12,8 @@ use viscera::settings::SolverSettings;
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
+use crate::load_cases::{FRAME_RATE, LoadCase, Random};
 use crate::reference::{Reference, ReferenceError};
-use crate::scenes::{FRAME_RATE, Random, Scene};
 use crate::settling::AfterStep;
 
 /// Edge lengths of the bar [m].
@@ -49,20 +49,20 @@ impl fmt::Display for Kind {
 }
 
 /// The bar, 768 tetrahedra, held by nothing.
-pub fn bar(tissue: Material) -> Result<Scene> {
+pub fn bar(tissue: Material) -> Result<LoadCase> {
     let block = Block {
         splitting: Splitting::Six,
         jitter: 0.6,
         seed: 1,
         ..Block::new(Vec3::from_f64(SIZE), CELLS)
     };
-    Ok(Scene::bare("bar", block.mesh()?, tissue))
+    Ok(LoadCase::bare("bar", block.mesh()?, tissue))
 }
 
 /// One bar in trouble, a step per frame.
 pub struct Run<'a> {
     /// The body.
-    pub scene: &'a Scene,
+    pub load_case: &'a LoadCase,
     /// For its solver.
     pub model: Model<f64>,
     /// What moves it.
@@ -83,8 +83,13 @@ impl<'a> Run<'a> {
     pub const DT: f64 = 1.0 / FRAME_RATE;
 
     /// Before the first step. Equal seeds do the same to every solver.
-    pub fn new(scene: &'a Scene, kind: Kind, seed: u64, settings: &SolverSettings) -> Result<Self> {
-        let model = scene.model::<f64>(settings)?;
+    pub fn new(
+        load_case: &'a LoadCase,
+        kind: Kind,
+        seed: u64,
+        settings: &SolverSettings,
+    ) -> Result<Self> {
+        let model = load_case.model::<f64>(settings)?;
         let mut solver = Solver::new(&model, settings);
         let mut state = State::at_rest(&model);
         let mut random = Random(seed);
@@ -104,7 +109,7 @@ impl<'a> Run<'a> {
                 solver.restart(&model, &mut state, &inputs, Self::DT)?;
             }
         }
-        Ok(Self { scene, model, solver, state, inputs, frame: 0, kind, random, grabbed })
+        Ok(Self { load_case, model, solver, state, inputs, frame: 0, kind, random, grabbed })
     }
 
     /// The next frame.
@@ -168,6 +173,6 @@ impl<'a> Run<'a> {
         let is_inverted = |tet: &&[u32; 4]| {
             !is_finite || tet_volume(tet.map(|v| self.state.positions[v as usize])) <= 0.0
         };
-        self.scene.mesh.tets().iter().filter(is_inverted).count()
+        self.load_case.mesh.tets().iter().filter(is_inverted).count()
     }
 }

@@ -96,6 +96,9 @@ impl Bounds {
     }
 }
 
+/// Highest angle above and below the horizon [degrees]: at 90 there is no up.
+pub const STEEPEST: f64 = 89.0;
+
 /// From which side the tissue is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewDirection {
@@ -109,8 +112,17 @@ impl ViewDirection {
     /// From the side that a vector of any length points to, away from the tissue.
     pub fn from_vector(v: Vec3<f64>) -> Self {
         let degrees = |y: f64, x: f64| libm::atan2(y, x).to_degrees();
-        let elevation = degrees(v.z, libm::hypot(v.x, v.y)).clamp(-89.0, 89.0);
+        let elevation = degrees(v.z, libm::hypot(v.x, v.y)).clamp(-STEEPEST, STEEPEST);
         Self { azimuth: degrees(v.y, v.x), elevation }
+    }
+
+    /// To the right, up, and towards the viewer, of length 1.
+    pub fn axes(self) -> [Vec3<f64>; 3] {
+        let (sin_a, cos_a) = libm::sincos(self.azimuth.to_radians());
+        let (sin_e, cos_e) = libm::sincos(self.elevation.to_radians());
+        let backward = vec3(cos_a * cos_e, sin_a * cos_e, sin_e);
+        let right = vec3(-sin_a, cos_a, 0.0);
+        [right, backward.cross(right), backward]
     }
 }
 
@@ -123,7 +135,7 @@ impl Default for ViewDirection {
 
 /// Half the vertical opening, as a tangent: 13.5 degrees. Wider distorts the organ, narrower
 /// flattens it.
-const HALF_OPENING: f64 = 0.24;
+pub const HALF_OPENING: f64 = 0.24;
 
 /// A camera for pictures of one size.
 #[derive(Clone, Debug, PartialEq)]
@@ -158,14 +170,10 @@ impl Camera {
     pub fn framing(bounds: &Bounds, direction: ViewDirection, size: ImageSize) -> Self {
         let usual = ViewDirection::default();
         let or_usual = |angle: f64, usual: f64| if angle.is_finite() { angle } else { usual };
-        let azimuth = or_usual(direction.azimuth, usual.azimuth).rem_euclid(360.0).to_radians();
-        let elevation =
-            or_usual(direction.elevation, usual.elevation).clamp(-89.0, 89.0).to_radians();
-        let (sin_a, cos_a) = libm::sincos(azimuth);
-        let (sin_e, cos_e) = libm::sincos(elevation);
-        let backward = vec3(cos_a * cos_e, sin_a * cos_e, sin_e);
-        let right = vec3(-sin_a, cos_a, 0.0);
-        let up = backward.cross(right);
+        let azimuth = or_usual(direction.azimuth, usual.azimuth).rem_euclid(360.0);
+        let elevation = or_usual(direction.elevation, usual.elevation);
+        let elevation = elevation.clamp(-STEEPEST, STEEPEST);
+        let [right, up, backward] = ViewDirection { azimuth, elevation }.axes();
 
         let (low, high) = bounds.corners().unwrap_or_default();
         let middle = (low + high) * 0.5;

@@ -8,19 +8,11 @@ use crate::color::Color;
 use crate::error::PictureError;
 use crate::image::Image;
 use crate::lines::{DepthMap, LineMask, feature_edges, project_line};
+use crate::marks::{Arrow, Background, Markers, Paint};
 use crate::normals::corner_normals;
 use crate::overlay::{ColorScale, Overlay};
 use crate::raster::{NOTHING, Visibility};
 use crate::shade::{Ball, Face, FacePaint, Finish, Shapes, resolve};
-
-/// What a surface is coloured with.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Paint<'a> {
-    /// One colour everywhere.
-    Flat(Color),
-    /// One value per vertex, in the unit of the drawing's [`ColorScale`], shape [vertex_count].
-    Values(&'a [f64]),
-}
 
 /// A shaded triangle mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,8 +21,8 @@ pub struct Surface<'a> {
     pub positions: &'a [Vec3<f64>],
     /// Vertex indices, counter-clockwise seen from outside, shape [triangle_count].
     pub triangles: &'a [[u32; 3]],
-    /// Its colour.
-    pub paint: Paint<'a>,
+    /// Its colour; values in the unit of the drawing's [`ColorScale`], shape [vertex_count].
+    pub paint: Paint<&'a [f64]>,
 }
 
 impl<'a> Surface<'a> {
@@ -49,32 +41,6 @@ pub struct Outline<'a> {
     /// Vertex indices, shape [triangle_count].
     pub triangles: &'a [[u32; 3]],
     /// Its colour, usually [`Color::REST`].
-    pub color: Color,
-}
-
-/// Small spheres: vertices that are held or pulled.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Markers<'a> {
-    /// Centres [m], shape [marker_count].
-    pub positions: &'a [Vec3<f64>],
-    /// Radius [m].
-    pub radius: f64,
-    /// Colour, usually [`Color::FIXED`] or [`Color::PULLED`].
-    pub color: Color,
-    /// How strongly a marker behind tissue shines through, 0 (not at all) to 1.
-    pub see_through: f32,
-}
-
-/// A solid arrow: the direction of a pull.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Arrow {
-    /// Where it begins [m].
-    pub from: Vec3<f64>,
-    /// Where it points to [m].
-    pub to: Vec3<f64>,
-    /// Radius of its shaft [m].
-    pub radius: f64,
-    /// Its colour.
     pub color: Color,
 }
 
@@ -112,6 +78,8 @@ pub struct Drawing<'a> {
     pub color_scale: Option<ColorScale>,
     /// Draws a bar of known length in the lower left corner; true in the middle of the scene.
     pub length_scale: bool,
+    /// What lies behind.
+    pub background: Background,
 }
 
 /// A finished picture.
@@ -157,7 +125,7 @@ impl Drawing<'_> {
         }
 
         let mut image = Image::filled(camera.size(), [255; 3]);
-        image.pixels_mut().copy_from_slice(&resolve(camera, &shapes, &seen));
+        image.pixels_mut().copy_from_slice(&resolve(camera, &shapes, &seen, self.background));
         let tissue = DepthMap::of(&seen);
         for outline in &self.outlines {
             skipped += draw_outline(&mut image, camera, &tissue, outline);

@@ -17,6 +17,7 @@ use viscera::scalar::Vec3;
 
 use crate::camera::{Camera, Projected, unit};
 use crate::color::{Color, map_color};
+use crate::marks::Background;
 use crate::raster::{NOTHING, SAMPLES, Visibility};
 
 /// How a shape takes light.
@@ -167,14 +168,11 @@ fn power_of_two(x: f32, doublings: u32) -> f32 {
     (0..doublings).fold(x, |p, _| p * p)
 }
 
-/// Background: a very soft gradient, lighter above, in sRGB levels.
-const BACKGROUND: [[f32; 3]; 2] = [[252.0, 252.0, 253.0], [232.0, 236.0, 241.0]];
-
-/// The background of a row, in linear light.
-fn background(y: usize, height: usize) -> Color {
+/// The background of a row, in linear light: even steps in sRGB levels.
+fn background_of_row(background: Background, y: usize, height: usize) -> Color {
     let t = y as f32 / height.max(1) as f32;
-    let level =
-        |c: usize| (BACKGROUND[0][c] + t * (BACKGROUND[1][c] - BACKGROUND[0][c]) + 0.5) as u8;
+    let [top, bottom] = [background.top, background.bottom].map(|c| c.to_srgb().map(f32::from));
+    let level = |c: usize| (top[c] + t * (bottom[c] - top[c]) + 0.5) as u8;
     Color::from_srgb([level(0), level(1), level(2)])
 }
 
@@ -182,13 +180,18 @@ fn background(y: usize, height: usize) -> Color {
 ///
 /// Light is worked out once for each shape in a pixel, not for each sample: edges stay smooth and
 /// most pixels hold one shape.
-pub(crate) fn resolve(camera: &Camera, shapes: &Shapes, seen: &Visibility) -> Vec<[u8; 3]> {
+pub(crate) fn resolve(
+    camera: &Camera,
+    shapes: &Shapes,
+    seen: &Visibility,
+    background: Background,
+) -> Vec<[u8; 3]> {
     let openness = Openness::of(camera, shapes, seen);
     let lights = Lights::of(camera);
     let (width, height) = (seen.width / SAMPLES, seen.height / SAMPLES);
     let mut pixels = Vec::with_capacity(width * height);
     for y in 0..height {
-        let behind = background(y, height);
+        let behind = background_of_row(background, y, height);
         let behind_srgb = behind.to_srgb();
         for x in 0..width {
             let samples = seen.samples_of(x, y);

@@ -3,8 +3,8 @@
 use viscera::mesh::SurfaceMesh;
 use viscera::scalar::{Vec3, vec3};
 use viscera_picture::{
-    Animation, Arrow, Bounds, Camera, Color, ColorScale, Drawing, Image, ImageSize, Line, Markers,
-    Outline, Paint, PictureError, Surface, ViewDirection, write_png,
+    Animation, Arrow, Background, Bounds, Camera, Color, ColorScale, Drawing, Image, ImageSize,
+    Line, Markers, Outline, Paint, PictureError, Surface, ViewDirection, write_png,
 };
 
 const RADIUS: f64 = 0.05;
@@ -164,6 +164,7 @@ fn full(camera: &Camera, shift: f64) -> Image {
         }],
         color_scale: Some(ColorScale::rounded("displacement [m]", 0.0, 0.03).unwrap()),
         length_scale: true,
+        background: Background::default(),
     };
     let drawn = drawing.draw(camera).unwrap();
     assert_eq!(drawn.skipped, 0);

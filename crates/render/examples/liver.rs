@@ -6,6 +6,7 @@
 //! shape at rest as a ghost.
 
 use std::error::Error;
+use std::slice;
 
 use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
@@ -18,7 +19,8 @@ use viscera::solver::gpu::{Adapter, Device, GpuSolver, GpuSurface, Skin};
 use viscera::solver::{Inputs, Pin};
 use viscera_picture::{Color, ColorScale, ImageSize, Overlay, write_png};
 use viscera_render::{
-    Arrow, BodyView, Canvas, Drawing, Markers, Orbit, Paint, Quality, Room, ValueBuffer,
+    Arrow, BodyView, BoundingSphere, Canvas, GpuDrawing, Markers, Orbit, Paint, Quality,
+    ScaledValues, ValueBuffer,
 };
 
 /// Edge of the tetrahedra [m].
@@ -51,15 +53,27 @@ fn main() -> Result<(), Box<dyn Error>> {
     surface.update();
 
     let orbit = Orbit::framing(&liver.surface.vertices);
-    let mut drawing = Drawing { bodies: vec![BodyView::of(&surface)], ..Drawing::from(orbit) };
+    let mut drawing =
+        GpuDrawing { bodies: vec![BodyView::of(&surface)], ..GpuDrawing::from(orbit) };
     let rest = GpuSurface::following(&device, liver.tets.vertices().len(), &[skin])?;
     let values = ValueBuffer::new(&device, liver.surface.vertices.len());
+    let held: Vec<_> = held.into_iter().map(|(_, x)| x).collect();
+    let now: Vec<Vec3<f64>> = surface.read()?[0].iter().map(|x| x.cast()).collect();
+    let picked = now.iter().copied().reduce(|a, b| if a.x > b.x { a } else { b });
+    let picked = picked.unwrap_or_default();
     let mut scale = None;
     if !flags.is_empty() {
         rest.place(&liver.tets.vertices().iter().map(|x| x.cast()).collect::<Vec<_>>())?;
         rest.update();
-        let extras = Extras { values: &values, rest: &rest, at_rest: &liver.surface.vertices };
-        scale = extras.add(&mut drawing, held.into_iter().map(|(_, x)| x).collect())?;
+        let extras = Extras {
+            values: &values,
+            rest: &rest,
+            at_rest: &liver.surface.vertices,
+            now: &now,
+            held: &held,
+            picked: &picked,
+        };
+        scale = extras.add(&mut drawing)?;
     }
     let canvas = Canvas::new(&device, ImageSize::new(960, 640)?, quality(&device))?;
     canvas.draw(&drawing)?;
@@ -105,42 +119,41 @@ fn fall(
 struct Extras<'a> {
     values: &'a ValueBuffer,
     rest: &'a GpuSurface,
+    /// The surface's vertices at rest and now [m].
     at_rest: &'a [Vec3<f64>],
+    now: &'a [Vec3<f64>],
+    /// Vertices that are held, and the one that is pulled [m].
+    held: &'a [Vec3<f64>],
+    picked: &'a Vec3<f64>,
 }
 
 impl<'a> Extras<'a> {
     /// Returns what the colours mean.
-    fn add(
-        &self,
-        drawing: &mut Drawing<'a>,
-        held: Vec<Vec3<f64>>,
-    ) -> Result<Option<ColorScale>, Box<dyn Error>> {
+    fn add(&self, drawing: &mut GpuDrawing<'a>) -> Result<Option<ColorScale>, Box<dyn Error>> {
         let [tissue] = drawing.bodies.as_mut_slice() else { return Ok(None) };
-        let [now, _] = tissue.surface.read()?;
-        let now: Vec<Vec3<f64>> = now.iter().map(|x| x.cast()).collect();
         let moved = |(a, b): (&Vec3<f64>, &Vec3<f64>)| (*a - *b).length() as f32;
-        let moved: Vec<f32> = now.iter().zip(self.at_rest).map(moved).collect();
+        let moved: Vec<f32> = self.now.iter().zip(self.at_rest).map(moved).collect();
         self.values.write(&moved)?;
         let largest = moved.iter().copied().fold(0.0, f32::max);
         let scale = ColorScale::rounded("displacement [mm]", 0.0, 1e3 * f64::from(largest))?;
         let high = 1e-3 * scale.range()[1] as f32;
-        tissue.paint = Paint::Values { buffer: self.values, low: 0.0, high };
+        tissue.paint = Paint::Values(ScaledValues { buffer: self.values, low: 0.0, high });
         tissue.wireframe = true;
         let color = Color::REST;
         let ghost =
-            BodyView { paint: Paint::Plain(color), opacity: 0.25, ..BodyView::of(self.rest) };
+            BodyView { paint: Paint::Flat(color), opacity: 0.25, ..BodyView::of(self.rest) };
         drawing.bodies.push(ghost);
 
         let extent = drawing.orbit.distance;
-        let picked = now.iter().copied().reduce(|a, b| if a.x > b.x { a } else { b });
-        let from = picked.unwrap_or_default();
+        let from = *self.picked;
         let to = from + vec3(0.06, 0.0, 0.12) * extent;
         let radius = 0.004 * extent;
-        let mark = |positions, radius, color| Markers { positions, radius, color };
-        drawing.markers.push(mark(held, 0.003 * extent, Color::FIXED));
-        drawing.markers.push(mark(vec![from], 2.0 * radius, Color::PULLED));
+        let mark =
+            |positions, radius, color| Markers { positions, radius, color, see_through: 0.0 };
+        drawing.markers.push(mark(self.held, 0.003 * extent, Color::FIXED));
+        drawing.markers.push(mark(slice::from_ref(self.picked), 2.0 * radius, Color::PULLED));
         drawing.arrows.push(Arrow { from, to, radius, color: Color::PULLED });
-        drawing.shadow = Room::around(now.into_iter());
+        drawing.shadow = BoundingSphere::around(self.now.iter().copied());
         Ok(Some(scale))
     }
 }

@@ -9,10 +9,10 @@
 
 use bytemuck::{Pod, Zeroable};
 use viscera::solver::gpu::Device;
-use viscera_picture::{Color, Image, ImageSize};
+use viscera_picture::{Color, Image, ImageSize, Paint};
 
 use crate::buffers::filled;
-use crate::drawing::{BodyView, Drawing, Paint};
+use crate::drawing::{BodyView, GpuDrawing, ScaledValues};
 use crate::error::RenderError;
 use crate::pipelines::{BODY_BYTES, Painted, Pipelines};
 use crate::quality::Quality;
@@ -51,8 +51,8 @@ const _: () = assert!(size_of::<Body>() as u64 == BODY_BYTES);
 impl Body {
     fn of(body: &BodyView<'_>) -> Self {
         let (Color { r, g, b }, [low, per_value]) = match body.paint {
-            Paint::Plain(color) => (color, [0.0, 0.0]),
-            Paint::Values { low, high, .. } => {
+            Paint::Flat(color) => (color, [0.0, 0.0]),
+            Paint::Values(ScaledValues { low, high, .. }) => {
                 // Where both ends are one, every value is the first colour.
                 let per_value = (high - low).recip();
                 let per_value = if per_value.is_finite() { per_value } else { 0.0 };
@@ -121,7 +121,7 @@ impl Canvas {
     }
 
     /// Draws surfaces as they are on the device: one submission, no waiting.
-    pub fn draw(&self, drawing: &Drawing<'_>) -> Result<(), RenderError> {
+    pub fn draw(&self, drawing: &GpuDrawing<'_>) -> Result<(), RenderError> {
         check(drawing)?;
         let (wgpu, queue) = self.device.wgpu();
         let size = self.target.size();
@@ -223,8 +223,8 @@ impl Brush<'_, '_> {
 
     fn surface(&mut self, body: &BodyView<'_>, painted: &Painted) {
         match body.paint {
-            Paint::Plain(_) => self.pass.set_pipeline(&painted.plain),
-            Paint::Values { buffer, .. } => {
+            Paint::Flat(_) => self.pass.set_pipeline(&painted.plain),
+            Paint::Values(ScaledValues { buffer, .. }) => {
                 self.pass.set_pipeline(&painted.values);
                 self.pass.set_vertex_buffer(1, buffer.buffer().slice(..));
             }
@@ -266,10 +266,10 @@ fn draw_triangles(pass: &mut wgpu::RenderPass<'_>, body: &BodyView<'_>) {
     pass.draw_indexed(0..surface.index_count(), 0, 0..1);
 }
 
-fn check(drawing: &Drawing<'_>) -> Result<(), RenderError> {
+fn check(drawing: &GpuDrawing<'_>) -> Result<(), RenderError> {
     for body in &drawing.bodies {
         let expected = body.surface.vertex_count() as usize;
-        if let Paint::Values { buffer, .. } = body.paint
+        if let Paint::Values(ScaledValues { buffer, .. }) = body.paint
             && buffer.count() != expected
         {
             return Err(RenderError::ValueCount { found: buffer.count(), expected });

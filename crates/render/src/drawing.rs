@@ -1,30 +1,30 @@
-//! What a picture shows, as plain data.
+//! What a picture shows, as plain data; tissue and its values are on the device.
 
 use viscera::scalar::{Vec3, vec3};
 use viscera::solver::gpu::GpuSurface;
-use viscera_picture::{Arrow, Color};
+use viscera_picture::{Arrow, Background, Color, Markers, Paint};
 
 use crate::orbit::Orbit;
 use crate::values::ValueBuffer;
 
-/// Everything in one picture.
+/// Everything in one picture whose surfaces are on the device.
 #[derive(Clone, Debug)]
-pub struct Drawing<'a> {
+pub struct GpuDrawing<'a> {
     /// Where the viewer is.
     pub orbit: Orbit,
     /// Tissue. See-through bodies lie over all others, in this order.
     pub bodies: Vec<BodyView<'a>>,
-    /// Little balls: fixings, picked points.
-    pub markers: Vec<Markers>,
+    /// Fixings, picked points.
+    pub markers: Vec<Markers<'a>>,
     /// Pulls, paler where tissue hides them.
     pub arrows: Vec<Arrow>,
     /// What lies behind.
     pub background: Background,
-    /// The room in which bodies throw shadows on themselves and each other; without one, no shadow.
-    pub shadow: Option<Room>,
+    /// Encloses the bodies that throw shadows on themselves and each other; without it, no shadow.
+    pub shadow: Option<BoundingSphere>,
 }
 
-impl Drawing<'_> {
+impl GpuDrawing<'_> {
     /// The background, seen from somewhere.
     pub fn from(orbit: Orbit) -> Self {
         Self {
@@ -44,7 +44,7 @@ pub struct BodyView<'a> {
     /// Where it is.
     pub surface: &'a GpuSurface,
     /// Its colours.
-    pub paint: Paint<'a>,
+    pub paint: Paint<ScaledValues<'a>>,
     /// Whether the edges of its triangles are drawn.
     pub wireframe: bool,
     /// 1 is solid; below, a ghost of which only the nearest layer is seen, and which throws no shadow.
@@ -54,64 +54,31 @@ pub struct BodyView<'a> {
 impl<'a> BodyView<'a> {
     /// Solid, in the colour of tissue.
     pub fn of(surface: &'a GpuSurface) -> Self {
-        Self { surface, paint: Paint::Plain(Color::TISSUE), wireframe: false, opacity: 1.0 }
+        Self { surface, paint: Paint::Flat(Color::TISSUE), wireframe: false, opacity: 1.0 }
     }
 }
 
-/// What a surface is coloured with.
+/// Values of a surface's vertices on the device, and the ends of the scale that colours them.
 #[derive(Clone, Copy, Debug)]
-pub enum Paint<'a> {
-    /// Wet tissue of one colour.
-    Plain(Color),
-    /// The colours of [`viscera_picture::map_color`] for values between two ends.
-    Values {
-        /// One for each vertex of the surface.
-        buffer: &'a ValueBuffer,
-        /// The value of the first colour.
-        low: f32,
-        /// The value of the last colour.
-        high: f32,
-    },
+pub struct ScaledValues<'a> {
+    /// One for each vertex of the surface.
+    pub buffer: &'a ValueBuffer,
+    /// The value of the first colour.
+    pub low: f32,
+    /// The value of the last colour.
+    pub high: f32,
 }
 
-/// Little balls of one size and colour.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Markers {
-    /// Centres [m], shape [marker_count].
-    pub positions: Vec<Vec3<f64>>,
-    /// Radius [m].
-    pub radius: f64,
-    /// Colour, usually [`Color::FIXED`] or [`Color::PULLED`].
-    pub color: Color,
-}
-
-/// What lies behind: from one colour above to another below.
+/// A sphere around things.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Background {
-    /// At the upper edge.
-    pub top: Color,
-    /// At the lower edge.
-    pub bottom: Color,
-}
-
-impl Default for Background {
-    /// That of the software renderer.
-    fn default() -> Self {
-        let [top, bottom] = [[252, 252, 253], [232, 236, 241]].map(Color::from_srgb);
-        Self { top, bottom }
-    }
-}
-
-/// A ball of space.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Room {
-    /// Its middle [m].
+pub struct BoundingSphere {
+    /// Its centre [m].
     pub center: Vec3<f64>,
     /// Its radius [m].
     pub radius: f64,
 }
 
-impl Room {
+impl BoundingSphere {
     /// Around positions [m]; those that are not finite are left out. Nothing around nothing.
     pub fn around(positions: impl Iterator<Item = Vec3<f64>>) -> Option<Self> {
         let both = |x: Vec3<f64>| [x, x];

@@ -5,7 +5,7 @@
 //!
 //! | to | look at |
 //! |---|---|
-//! | say what a picture shows | [`Drawing`], [`BodyView`], [`Markers`], [`Arrow`] |
+//! | say what a picture shows | [`GpuDrawing`], [`BodyView`]; [`Markers`], [`Arrow`], [`Paint`], [`Background`] are those of `viscera-picture` |
 //! | look around | [`Orbit`] |
 //! | draw it, for a window or without one | [`Canvas`] |
 //! | choose between fine and fast | [`Quality`] |
@@ -25,9 +25,9 @@ mod values;
 mod view;
 
 pub use canvas::Canvas;
-pub use drawing::{Background, BodyView, Drawing, Markers, Paint, Room};
+pub use drawing::{BodyView, BoundingSphere, GpuDrawing, ScaledValues};
 pub use error::RenderError;
 pub use orbit::Orbit;
 pub use quality::Quality;
 pub use values::ValueBuffer;
-pub use viscera_picture::Arrow;
+pub use viscera_picture::{Arrow, Background, Markers, Paint};

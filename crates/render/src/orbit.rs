@@ -1,12 +1,7 @@
 //! A camera that goes around a point.
 
-use viscera::scalar::{Vec3, vec3};
-
-/// Highest angle above and below the horizon [degrees]: at 90 there is no up.
-const STEEPEST: f64 = 89.0;
-
-/// Half the vertical opening, as a tangent: that of the software renderer.
-const HALF_OPENING: f64 = 0.24;
+use viscera::scalar::Vec3;
+use viscera_picture::{HALF_OPENING, STEEPEST, ViewDirection};
 
 /// Where the viewer is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,13 +23,14 @@ impl Orbit {
         let finite = || positions.iter().copied().filter(|x| x.is_finite());
         let low = finite().reduce(Vec3::min).unwrap_or_default();
         let high = finite().reduce(Vec3::max).unwrap_or_default();
+        let ViewDirection { azimuth, elevation } = ViewDirection::default();
         // A single point is given some room.
         let radius = (0.5 * (high - low).length()).max(1e-3);
         Self {
             target: (low + high) * 0.5,
             distance: 1.05 * radius / HALF_OPENING,
-            azimuth: -65.0,
-            elevation: 22.0,
+            azimuth,
+            elevation,
         }
     }
 
@@ -65,11 +61,7 @@ impl Orbit {
 
     /// To the right, up, and towards the viewer, of length 1.
     pub fn axes(&self) -> [Vec3<f64>; 3] {
-        let (sin_a, cos_a) = libm::sincos(self.azimuth.to_radians());
-        let (sin_e, cos_e) = libm::sincos(self.elevation.to_radians());
-        let backward = vec3(cos_a * cos_e, sin_a * cos_e, sin_e);
-        let right = vec3(-sin_a, cos_a, 0.0);
-        [right, backward.cross(right), backward]
+        ViewDirection { azimuth: self.azimuth, elevation: self.elevation }.axes()
     }
 
     /// Where a ray through a place of the picture goes: its direction, of length 1. Places are shares of
@@ -96,6 +88,7 @@ impl Orbit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use viscera::scalar::vec3;
 
     #[test]
     fn axes_are_a_right_handed_frame_whatever_the_angle() {

@@ -5,10 +5,10 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use viscera::scalar::Vec3;
 use viscera::solver::gpu::Device;
-use viscera_picture::{Arrow, Color};
+use viscera_picture::{Arrow, Color, Markers};
 
 use crate::buffers::filled;
-use crate::drawing::{Markers, across};
+use crate::drawing::across;
 
 /// Sides of what is round, and rings of a ball: 200 triangles, round enough for a tenth of the picture.
 const SIDES: u32 = 16;
@@ -16,6 +16,9 @@ const RINGS: u32 = 7;
 
 /// Head of an arrow, in radii of its shaft: length and radius.
 const HEAD: [f64; 2] = [5.0, 2.3];
+
+/// How strongly an arrow shines through tissue before it, 0 to 1.
+const ARROW_SEE_THROUGH: f32 = 0.4;
 
 /// A shorter arrow than this is drawn thinner, so that it stays an arrow [radii].
 const SHORTEST: f64 = 9.0;
@@ -26,21 +29,28 @@ const SHORTEST: f64 = 9.0;
 struct Solid {
     center: [f32; 4],
     axes: [[f32; 4]; 3],
+    /// Linear light, and how strongly it shines through tissue before it.
     color: [f32; 4],
 }
 
 impl Solid {
-    fn new(center: Vec3<f64>, axes: [Vec3<f64>; 3], color: Color) -> Self {
+    fn new(center: Vec3<f64>, axes: [Vec3<f64>; 3], color: Color, see_through: f32) -> Self {
         let four = |v: Vec3<f64>| [v.x as f32, v.y as f32, v.z as f32, 0.0];
-        let color = [color.r, color.g, color.b, 1.0];
+        let color = [color.r, color.g, color.b, see_through];
         Self { center: four(center), axes: axes.map(four), color }
     }
 
-    fn ball(center: Vec3<f64>, radius: f64, color: Color) -> Self {
-        let axis = |x, y, z| Vec3 { x, y, z } * radius;
+    fn ball(center: Vec3<f64>, markers: &Markers<'_>) -> Self {
+        let axis = |x, y, z| Vec3 { x, y, z } * markers.radius;
         let axes = [axis(1.0, 0.0, 0.0), axis(0.0, 1.0, 0.0), axis(0.0, 0.0, 1.0)];
-        Self::new(center, axes, color)
+        Self::new(center, axes, markers.color, strength(markers))
     }
+}
+
+/// How strongly markers shine through tissue before them, 0 to 1.
+fn strength(markers: &Markers<'_>) -> f32 {
+    // A comparison with NaN is false.
+    if markers.see_through > 0.0 { markers.see_through.min(1.0) } else { 0.0 }
 }
 
 /// Shaft and head, of a length above zero.
@@ -52,9 +62,10 @@ fn shaft_and_head(arrow: &Arrow) -> [Solid; 2] {
     let y = along.cross(x);
     let neck = length - HEAD[0] * radius;
     let (from, wide) = (arrow.from, HEAD[1] * radius);
+    let part = |center, axes| Solid::new(center, axes, arrow.color, ARROW_SEE_THROUGH);
     [
-        Solid::new(from, [x * radius, y * radius, along * neck], arrow.color),
-        Solid::new(from + along * neck, [x * wide, y * wide, along * (length - neck)], arrow.color),
+        part(from, [x * radius, y * radius, along * neck]),
+        part(from + along * neck, [x * wide, y * wide, along * (length - neck)]),
     ]
 }
 
@@ -145,17 +156,18 @@ pub(crate) struct Solids {
     places: wgpu::Buffer,
     /// Balls, rods and cones among the places.
     ranges: [Range<u32>; 3],
+    /// Whether any ball shines through tissue.
+    balls_shine_through: bool,
 }
 
 impl Solids {
     /// What cannot be drawn is left out: places that are not finite, arrows of no length. Nothing where
     /// nothing is left.
-    pub fn new(device: &Device, markers: &[Markers], arrows: &[Arrow]) -> Option<Self> {
+    pub fn new(device: &Device, markers: &[Markers<'_>], arrows: &[Arrow]) -> Option<Self> {
         let there = |radius: f64| radius.is_finite() && radius > 0.0;
-        let of = |m: &Markers| {
-            let (radius, color) = (m.radius, m.color);
-            let places: Vec<_> = m.positions.iter().filter(|x| x.is_finite()).copied().collect();
-            places.into_iter().map(move |x| Solid::ball(x, radius, color))
+        let of = |m: &Markers<'_>| -> Vec<Solid> {
+            let finite = m.positions.iter().filter(|x| x.is_finite());
+            finite.map(|x| Solid::ball(*x, m)).collect()
         };
         let balls = markers.iter().filter(|m| there(m.radius)).flat_map(of);
         let drawable = |a: &&Arrow| there(a.radius) && there((a.to - a.from).length());
@@ -167,15 +179,20 @@ impl Solids {
         let bytes = (!all.is_empty()).then(|| bytemuck::cast_slice(&all))?;
         let places = filled(device, "places of solids", bytes, wgpu::BufferUsages::VERTEX);
         let ranges = [0..first, first..first + count, first + count..first + 2 * count];
-        Some(Self { places, ranges })
+        let balls_shine_through = markers.iter().any(|m| strength(m) > 0.0);
+        Some(Self { places, ranges, balls_shine_through })
     }
 
-    /// Draws those of arrows, or all.
-    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, meshes: &Meshes, only_arrows: bool) {
+    /// Draws all, or those that tissue may hide and that shine through it.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, meshes: &Meshes, hidden: bool) {
         pass.set_vertex_buffer(0, meshes.corners.slice(..));
         pass.set_vertex_buffer(1, self.places.slice(..));
         pass.set_index_buffer(meshes.indices.slice(..), wgpu::IndexFormat::Uint32);
-        let parts = meshes.parts.iter().zip(&self.ranges).skip(usize::from(only_arrows));
+        let parts = meshes
+            .parts
+            .iter()
+            .zip(&self.ranges)
+            .skip(usize::from(hidden && !self.balls_shine_through));
         for ((indices, first), range) in parts.filter(|(_, range)| !range.is_empty()) {
             pass.draw_indexed(indices.clone(), *first, range.clone());
         }

@@ -119,14 +119,14 @@ impl Target {
         );
         queue.submit([encoder.finish()]);
         let lost = || RenderError::Lost { name: device.name().to_owned() };
-        let (told, hear) = mpsc::channel();
+        let (sender, receiver) = mpsc::channel();
         copy.slice(..).map_async(wgpu::MapMode::Read, move |result| {
             // Nobody listens where waiting has failed.
-            let _ = told.send(result.is_ok());
+            let _ = sender.send(result.is_ok());
         });
         let waited = wgpu.poll(wgpu::PollType::wait_indefinitely());
         device.check()?;
-        if waited.is_err() || !hear.try_recv().unwrap_or(false) {
+        if waited.is_err() || !receiver.try_recv().unwrap_or(false) {
             return Err(lost());
         }
         let bytes = copy.slice(..).get_mapped_range().map_err(|_| lost())?;

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use viscera::scalar::Vec3;
 
-use crate::drawing::{Drawing, Room, across};
+use crate::drawing::{BoundingSphere, GpuDrawing, across};
 use crate::orbit::Orbit;
 
 /// Towards the key light: right, up, towards the viewer.
@@ -38,7 +38,7 @@ pub(crate) struct View {
 
 impl View {
     /// Of a drawing for a picture of this width over height, with a shadow map of this edge [texels].
-    pub fn of(drawing: &Drawing<'_>, aspect: f64, shadow_edge: Option<u32>) -> Self {
+    pub fn of(drawing: &GpuDrawing<'_>, aspect: f64, shadow_edge: Option<u32>) -> Self {
         let orbit = &drawing.orbit;
         let [right, up, backward] = orbit.axes();
         let [x, y] = Orbit::lens(aspect);
@@ -57,7 +57,7 @@ impl View {
             ..Self::default()
         };
         match drawing.shadow.zip(shadow_edge) {
-            Some((room, edge)) => view.shadowed(&room, edge, towards(KEY), orbit.position()),
+            Some((sphere, edge)) => view.shadowed(&sphere, edge, towards(KEY), orbit.position()),
             None => view,
         }
     }
@@ -66,17 +66,23 @@ impl View {
         self.shadow[2] > 0.0
     }
 
-    /// A parallel light that just sees the whole room.
-    fn shadowed(self, room: &Room, edge: u32, key: Vec3<f64>, viewer: Vec3<f64>) -> Self {
+    /// A parallel light that just sees the whole sphere.
+    fn shadowed(
+        self,
+        sphere: &BoundingSphere,
+        edge: u32,
+        key: Vec3<f64>,
+        viewer: Vec3<f64>,
+    ) -> Self {
         let side = across(key);
-        let center = room.center - viewer;
+        let center = sphere.center - viewer;
         let row = |axis: Vec3<f64>, scale: f64, offset: f64| {
-            let axis = axis * (scale / room.radius);
+            let axis = axis * (scale / sphere.radius);
             four(axis, offset - axis.dot(center))
         };
         // The picture's width in the map is twice the radius.
         let texel = 1.0 / f64::from(edge);
-        let lift = SHADOW_LIFT * 2.0 * room.radius * texel;
+        let lift = SHADOW_LIFT * 2.0 * sphere.radius * texel;
         Self {
             shadow_across: row(side, 1.0, 0.0),
             shadow_up: row(key.cross(side), 1.0, 0.0),
@@ -101,23 +107,23 @@ mod tests {
     use viscera::scalar::vec3;
 
     #[test]
-    fn the_shadow_map_holds_the_whole_room() {
-        let room = Room { center: vec3(0.3, -0.2, 0.1), radius: 0.05 };
+    fn the_shadow_map_holds_the_whole_sphere() {
+        let sphere = BoundingSphere { center: vec3(0.3, -0.2, 0.1), radius: 0.05 };
         let mut orbit = Orbit::framing(&[vec3(0.25, -0.25, 0.05), vec3(0.35, -0.15, 0.15)]);
         orbit.turn(33.0, 20.0);
-        let drawing = Drawing { shadow: Some(room), ..Drawing::from(orbit) };
+        let drawing = GpuDrawing { shadow: Some(sphere), ..GpuDrawing::from(orbit) };
         let view = View::of(&drawing, 1.5, Some(512));
         let at = |row: [f32; 4], x: Vec3<f64>| {
             let v = four(x - orbit.position(), 1.0);
             (0..4).map(|i| f64::from(row[i]) * f64::from(v[i])).sum::<f64>()
         };
         let key = vec3(view.key[0], view.key[1], view.key[2]).cast::<f64>();
-        // Single precision of distances of half a metre over a room of five centimetres.
+        // Single precision of distances of half a metre over a sphere of five centimetres.
         let near = |a: f64, b: f64| (a - b).abs() < 1e-5;
-        assert!(near(at(view.shadow_depth, room.center), 0.5));
-        assert!(near(at(view.shadow_depth, room.center + key * room.radius), 0.0));
-        assert!(near(at(view.shadow_across, room.center), 0.0));
-        let edge = room.center + across(key) * room.radius;
+        assert!(near(at(view.shadow_depth, sphere.center), 0.5));
+        assert!(near(at(view.shadow_depth, sphere.center + key * sphere.radius), 0.0));
+        assert!(near(at(view.shadow_across, sphere.center), 0.0));
+        let edge = sphere.center + across(key) * sphere.radius;
         assert!(near(at(view.shadow_across, edge), 1.0) && near(at(view.shadow_up, edge), 0.0));
         assert!(!View::of(&drawing, 1.5, None).has_shadow());
     }

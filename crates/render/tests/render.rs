@@ -13,7 +13,8 @@ use viscera::solver::gpu::{GpuSolver, GpuSurface, Skin};
 use viscera::solver::{Inputs, Pin};
 use viscera_picture::{Color, ImageSize, map_color};
 use viscera_render::{
-    Arrow, BodyView, Canvas, Drawing, Markers, Paint, Quality, RenderError, Room, ValueBuffer,
+    Arrow, BodyView, BoundingSphere, Canvas, GpuDrawing, Markers, Paint, Quality, RenderError,
+    ScaledValues, ValueBuffer,
 };
 
 #[test]
@@ -33,7 +34,7 @@ fn a_ball_is_a_disc_of_its_size_and_two_pictures_are_the_same() {
         let ([r, _, b], [s, _, c]) = (pixel(&image, [100, 75]), pixel(&image, [0, 0]));
         assert!(r > b && c >= s);
         assert_eq!(ball.picture(&canvas, &drawing), image);
-        assert_eq!(tissue(&ball.picture(&canvas, &Drawing::from(ball.orbit))), 0);
+        assert_eq!(tissue(&ball.picture(&canvas, &GpuDrawing::from(ball.orbit))), 0);
     }
 }
 
@@ -67,9 +68,9 @@ fn values_take_the_colours_of_the_scale_and_none_is_grey() {
     let buffer = ValueBuffer::new(&device, ball.count);
     let middle = |value: f32, [low, high]: [f32; 2]| {
         buffer.write(&vec![value; ball.count]).expect("one for each");
-        let paint = Paint::Values { buffer: &buffer, low, high };
+        let paint = Paint::Values(ScaledValues { buffer: &buffer, low, high });
         let bodies = vec![BodyView { paint, ..BodyView::of(&ball.surface) }];
-        let image = ball.picture(&canvas, &Drawing { bodies, ..ball.drawing() });
+        let image = ball.picture(&canvas, &GpuDrawing { bodies, ..ball.drawing() });
         let [r, g, b] = pixel(&image, [80, 60]).map(|c| Color::from_srgb([c; 3]).r);
         Color::new(r, g, b)
     };
@@ -92,30 +93,35 @@ fn values_take_the_colours_of_the_scale_and_none_is_grey() {
     let error = buffer.write(&[1.0]).expect_err("too few");
     assert!(matches!(error, RenderError::ValueCount { found: 1, .. }), "{error}");
     let short = ValueBuffer::new(&device, 3);
-    let paint = Paint::Values { buffer: &short, low: 0.0, high: 1.0 };
+    let paint = Paint::Values(ScaledValues { buffer: &short, low: 0.0, high: 1.0 });
     let bodies = vec![BodyView { paint, ..BodyView::of(&ball.surface) }];
-    let error = canvas.draw(&Drawing { bodies, ..ball.drawing() }).expect_err("too few");
+    let error = canvas.draw(&GpuDrawing { bodies, ..ball.drawing() }).expect_err("too few");
     assert!(matches!(error, RenderError::ValueCount { found: 3, .. }), "{error}");
 }
 
 #[test]
-fn a_marker_is_seen_before_tissue_and_not_behind_it() {
+fn a_marker_is_seen_before_tissue_and_behind_it_where_it_shines_through() {
     let ball = Ball::new(&device());
     let canvas = ball.canvas([160, 120], Quality::plain());
     let without = ball.picture(&canvas, &ball.drawing());
     let [_, _, backward] = ball.orbit.axes();
-    let with = |position: Vec3<f64>| {
-        let markers =
-            vec![Markers { positions: vec![position], radius: 0.003, color: Color::FIXED }];
-        ball.picture(&canvas, &Drawing { markers, ..ball.drawing() })
+    let with_see_through = |position: Vec3<f64>, see_through: f32| {
+        let (positions, color) = (&[position], Color::FIXED);
+        let markers = vec![Markers { positions, radius: 0.003, color, see_through }];
+        ball.picture(&canvas, &GpuDrawing { markers, ..ball.drawing() })
     };
+    let with = |position| with_see_through(position, 0.0);
     let changed = difference(&without, &with(backward * (1.1 * RADIUS)));
     assert!(changed.contains(&[80, 60]), "{changed:?}");
     // A disc of radius 60 / 0.24 * 0.003 / (d - 1.1 r) pixels.
     let pixels = 60.0 / 0.24 * 0.003 / (ball.orbit.distance - 1.1 * RADIUS);
     let share = changed.len() as f64 / (std::f64::consts::PI * pixels * pixels);
     assert!((0.6..1.3).contains(&share), "{} pixels, {share} of the disc", changed.len());
-    assert_eq!(with(backward * (-1.1 * RADIUS)), without);
+    let behind = backward * (-1.1 * RADIUS);
+    assert_eq!(with(behind), without);
+    assert_eq!(with_see_through(behind, f32::NAN), without);
+    let weak = difference(&without, &with_see_through(behind, 0.5));
+    assert!(weak.contains(&[80, 60]) && weak.len() < changed.len(), "{weak:?}");
     assert_eq!(with(vec3(f64::NAN, 0.0, 0.0)), without);
 }
 
@@ -128,7 +134,7 @@ fn an_arrow_is_full_before_tissue_and_paler_behind_it() {
     let with = |depth: f64| {
         let (from, to) = (backward * depth - right * 0.02, backward * depth + right * 0.02);
         let arrows = vec![Arrow { from, to, radius: 0.002, color: Color::PULLED }];
-        ball.picture(&canvas, &Drawing { arrows, ..ball.drawing() })
+        ball.picture(&canvas, &GpuDrawing { arrows, ..ball.drawing() })
     };
     let [before, behind] = [1.1 * RADIUS, -1.1 * RADIUS].map(with);
     let [seen, hidden] = [&before, &behind].map(|image| difference(&without, image).len());
@@ -150,7 +156,7 @@ fn a_wireframe_darkens_lines_of_the_nearer_side() {
     let canvas = ball.canvas([200, 150], Quality::plain());
     let without = ball.picture(&canvas, &ball.drawing());
     let bodies = vec![BodyView { wireframe: true, ..BodyView::of(&ball.surface) }];
-    let with = ball.picture(&canvas, &Drawing { bodies, ..ball.drawing() });
+    let with = ball.picture(&canvas, &GpuDrawing { bodies, ..ball.drawing() });
     let changed = difference(&without, &with);
     let share = changed.len() as f64 / tissue(&without) as f64;
     assert!((0.05..0.8).contains(&share), "{share} of the tissue");
@@ -164,9 +170,9 @@ fn a_ghost_lets_through_what_is_behind_it_and_shows_one_layer() {
     let ball = Ball::new(&device());
     let canvas = ball.canvas([160, 120], Quality::plain());
     let middle = |opacity: f32, bodies: usize| {
-        let paint = Paint::Plain(Color::REST);
+        let paint = Paint::Flat(Color::REST);
         let ghost = BodyView { paint, opacity, ..BodyView::of(&ball.surface) };
-        let drawing = Drawing { bodies: vec![ghost; bodies], ..ball.drawing() };
+        let drawing = GpuDrawing { bodies: vec![ghost; bodies], ..ball.drawing() };
         brightness(pixel(&ball.picture(&canvas, &drawing), [80, 60]))
     };
     let empty = middle(1.0, 0);
@@ -184,9 +190,9 @@ fn a_ghost_of_tissue_where_that_is_is_not_seen() {
     let canvas = ball.canvas([200, 150], Quality::plain());
     let solid = ball.picture(&canvas, &ball.drawing());
     let ghost =
-        BodyView { paint: Paint::Plain(Color::REST), opacity: 0.5, ..BodyView::of(&ball.surface) };
+        BodyView { paint: Paint::Flat(Color::REST), opacity: 0.5, ..BodyView::of(&ball.surface) };
     let bodies = vec![BodyView::of(&ball.surface), ghost];
-    let both = ball.picture(&canvas, &Drawing { bodies, ..ball.drawing() });
+    let both = ball.picture(&canvas, &GpuDrawing { bodies, ..ball.drawing() });
     // Round-off may move the rim by some pixels.
     let changed = difference(&solid, &both).len();
     assert!(changed < 20, "{changed} pixels");
@@ -200,21 +206,21 @@ fn a_shadow_darkens_and_never_brightens() {
     let key = right * -0.45 + up * 0.65 + backward * 0.6;
     let small = ball.copy(0.25, key * (1.8 * RADIUS / key.length()));
     let canvas = ball.canvas([200, 150], Quality { shadow: Some(512), ..Quality::plain() });
-    let with = |room: Option<Room>| {
+    let with = |sphere: Option<BoundingSphere>| {
         let bodies = [&ball.surface, &small].map(BodyView::of).to_vec();
-        ball.picture(&canvas, &Drawing { bodies, shadow: room, ..ball.drawing() })
+        ball.picture(&canvas, &GpuDrawing { bodies, shadow: sphere, ..ball.drawing() })
     };
     let light = with(None);
-    let dark = with(Some(Room { center: Vec3::ZERO, radius: 3.0 * RADIUS }));
+    let dark = with(Some(BoundingSphere { center: Vec3::ZERO, radius: 3.0 * RADIUS }));
     let changed = difference(&light, &dark);
     assert!(changed.len() > 200, "{} pixels in the shadow", changed.len());
     let brighter =
         |place: &[usize; 2]| brightness(pixel(&dark, *place)) > brightness(pixel(&light, *place));
     assert!(!changed.iter().any(brighter));
     // Alone, the large ball is as bright where the light falls on it: it throws no spots on itself.
-    let alone = |shadow| ball.picture(&canvas, &Drawing { shadow, ..ball.drawing() });
-    let room = Room { center: Vec3::ZERO, radius: 1.5 * RADIUS };
-    let spots = difference(&alone(None), &alone(Some(room)));
+    let alone = |shadow| ball.picture(&canvas, &GpuDrawing { shadow, ..ball.drawing() });
+    let sphere = BoundingSphere { center: Vec3::ZERO, radius: 1.5 * RADIUS };
+    let spots = difference(&alone(None), &alone(Some(sphere)));
     let towards_light = |&&[x, y]: &&[usize; 2]| x < 100 && y < 75;
     assert_eq!(spots.iter().filter(towards_light).count(), 0);
 }
@@ -238,7 +244,7 @@ fn a_moved_body_is_drawn_where_the_last_step_has_brought_it() {
 
     let ball = Ball::new(&device);
     let canvas = ball.canvas([160, 120], Quality::plain());
-    let drawing = Drawing { bodies: vec![BodyView::of(&surface)], ..ball.drawing() };
+    let drawing = GpuDrawing { bodies: vec![BodyView::of(&surface)], ..ball.drawing() };
     let before = ball.picture(&canvas, &drawing);
     // All vertices far to the side: nothing is left in the picture.
     let away = vec3(10.0f32, 0.0, 0.0);

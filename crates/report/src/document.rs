@@ -115,7 +115,7 @@ impl Document {
         text
     }
 
-    /// Writes figures and text, each whole or not at all.
+    /// Writes figures and text, each file atomically.
     pub fn write(&self) -> Result<()> {
         self.output.write(&self.to_markdown(), &self.files)
     }

@@ -7,7 +7,6 @@
 mod axis;
 mod chart;
 mod document;
-mod memory;
 mod numbers;
 mod output;
 mod plot;
@@ -15,8 +14,6 @@ mod table;
 
 pub use axis::{Axis, Scale};
 pub use document::Document;
-pub use memory::Memory;
 pub use numbers::{percent, scientific, si};
-pub use output::{prepare_file, write_whole};
 pub use plot::{Plot, Series, Style};
 pub use table::Table;

@@ -1,10 +1,11 @@
-//! Files written whole or not at all.
+//! A report's files: written atomically, old ones of its own removed.
 
 use anyhow::{Context, Result, bail};
 use std::ffi::OsStr;
 use std::fs;
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use viscera_resources::files::{folder_of, prepare_folder, write_atomic};
 
 /// Lies in the folder and names the files that the report put there, one per line. The next report
 /// removes those that it does not show, and no others: the folder may hold files of somebody else.
@@ -30,9 +31,8 @@ impl Output {
             bail!("{shown}: the report is Markdown; give it a name that ends in .md");
         };
         let folder = document.with_extension("");
-        fs::create_dir_all(&folder).map_err(|error| refused(&folder, &error, "--out"))?;
-        for place in [folder_of(document), &folder] {
-            probe(place, "--out")?;
+        for place in [folder.as_path(), folder_of(document)] {
+            prepare_folder(place, "--out")?;
         }
         let folder_name = stem.to_owned();
         Ok(Self { document: document.to_owned(), folder, folder_name })
@@ -54,9 +54,9 @@ impl Output {
     /// report before this one left and this one does not show.
     pub fn write(&self, text: &str, files: &[(String, Vec<u8>)]) -> Result<()> {
         for (name, bytes) in files {
-            write_whole(&self.folder.join(name), bytes)?;
+            write_atomic(&self.folder.join(name), bytes)?;
         }
-        write_whole(&self.document, text.as_bytes())?;
+        write_atomic(&self.document, text.as_bytes())?;
         let manifest = self.folder.join(MANIFEST);
         for name in names_in(&manifest)? {
             if files.iter().all(|(shown, _)| *shown != name) {
@@ -64,7 +64,7 @@ impl Output {
             }
         }
         let names: String = files.iter().map(|(name, _)| format!("{name}\n")).collect();
-        write_whole(&manifest, names.as_bytes())
+        write_atomic(&manifest, names.as_bytes())
     }
 }
 
@@ -89,51 +89,4 @@ fn remove(old: &Path) -> Result<()> {
             .with_context(|| format!("cannot remove the old {}; remove it by hand", old.display())),
         _ => Ok(()),
     }
-}
-
-/// Makes the folder of a single file, which `option` of the program names, and makes sure that it can
-/// be written to.
-pub fn prepare_file(file: &Path, option: &str) -> Result<()> {
-    if file.is_dir() {
-        bail!("{} is a folder; name a file in it with {option}", file.display());
-    }
-    let folder = folder_of(file);
-    fs::create_dir_all(folder).map_err(|error| refused(folder, &error, option))?;
-    probe(folder, option)
-}
-
-fn folder_of(file: &Path) -> &Path {
-    match file.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    }
-}
-
-fn probe(folder: &Path, option: &str) -> Result<()> {
-    let probe = folder.join(".probe.part");
-    fs::write(&probe, b"")
-        .and_then(|()| fs::remove_file(&probe))
-        .map_err(|error| refused(folder, &error, option))
-}
-
-fn refused(place: &Path, error: &std::io::Error, option: &str) -> anyhow::Error {
-    let place = place.display();
-    anyhow::anyhow!("cannot write to {place}: {error}; choose another file with {option}")
-}
-
-/// Writes aside and renames, so that no reader ever meets a part of a file.
-pub fn write_whole(target: &Path, bytes: &[u8]) -> Result<()> {
-    let mut part = target.as_os_str().to_owned();
-    part.push(".part");
-    let write = || -> std::io::Result<()> {
-        let mut file = fs::File::create(&part)?;
-        file.write_all(bytes)?;
-        file.sync_data()?;
-        fs::rename(&part, target)
-    };
-    write().map_err(|error| {
-        // Nothing half-written stays behind; the first error is the one to report.
-        let _ = fs::remove_file(&part);
-        anyhow::anyhow!("cannot write {}: {error}", target.display())
-    })
 }

@@ -1,4 +1,4 @@
-//! Reports: tables that line up, figures that repeat to the byte, files whole or not at all.
+//! Reports: tables that line up, figures that repeat to the byte, atomic writes.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Drags the procedural liver about for minutes, in the real window without a display, and tells what that takes:
+//! Drags the procedural liver about for minutes, in the real window without a display, and reports what that takes:
 //! frames simulated and drawn per second, memory, from the movement of the mouse to moved tissue.
 //!
 //! `cargo run --release -p viscera-view --example dragging -- 10` drags for ten minutes. More arguments change
@@ -26,7 +26,7 @@ fn main() -> ExitCode {
     window.start();
     let view = window.view();
     let begun = Instant::now();
-    let (mut drawn, mut grasp, mut told) = (0u32, 0u32, Instant::now());
+    let (mut drawn, mut grasp, mut reported) = (0u32, 0u32, Instant::now());
     let (mut number, mut first_memory) = (0, None);
     let mut latency: Vec<Duration> = Vec::new();
     println!("minute  simulated/s  drawn/s  memory  holds  mouse to tissue (median)");
@@ -41,7 +41,7 @@ fn main() -> ExitCode {
         while start.elapsed() < REGRASPED_EVERY {
             let angle = 2.0 * start.elapsed().as_secs_f32();
             let to = from + vec2(60.0 * angle.sin(), 50.0 * (angle.cos() - 1.0));
-            let before = window.lane(0).positions.clone();
+            let before = window.run(0).positions.clone();
             let moved = Instant::now();
             window.harness.hover_at(to);
             window.harness.step();
@@ -50,19 +50,19 @@ fn main() -> ExitCode {
                 return ExitCode::FAILURE;
             }
             drawn += 1;
-            if window.lane(0).positions != before {
+            if window.run(0).positions != before {
                 latency.push(moved.elapsed());
             }
-            if !window.lane(0).positions.iter().all(|x| x.is_finite()) {
-                eprintln!("error: positions that are no numbers");
+            if !window.run(0).positions.iter().all(|x| x.is_finite()) {
+                eprintln!("error: positions that are NaN");
                 return ExitCode::FAILURE;
             }
         }
         window.harness.drop_at(from);
         window.harness.step();
-        if told.elapsed().as_secs() >= 30 || begun.elapsed().as_secs_f64() >= 60.0 * minutes {
-            let seconds = told.elapsed().as_secs_f64();
-            let now = window.harness.state().frame().map_or(0, |frame| frame.number);
+        if reported.elapsed().as_secs() >= 30 || begun.elapsed().as_secs_f64() >= 60.0 * minutes {
+            let seconds = reported.elapsed().as_secs_f64();
+            let now = window.harness.state().snapshot().map_or(0, |snapshot| snapshot.number);
             let memory = resident_megabytes();
             first_memory = first_memory.or(memory);
             latency.sort();
@@ -75,7 +75,7 @@ fn main() -> ExitCode {
                 grasp,
                 latency.get(latency.len() / 2).copied().unwrap_or_default(),
             );
-            (number, drawn, told) = (now, 0, Instant::now());
+            (number, drawn, reported) = (now, 0, Instant::now());
             latency.clear();
         }
     }

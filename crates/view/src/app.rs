@@ -11,7 +11,7 @@ use std::time::Instant;
 use crate::capture::{FOLDER, Recorder};
 use crate::choices::{Settings, Side};
 use crate::document::Document;
-use crate::engine::{Command, Cure, Engine, Event, Frame, Stage};
+use crate::engine::{Command, Cure, Engine, Event, Setup, Snapshot};
 use crate::help::{self, Request};
 use crate::holds::Holds;
 use crate::messages::Messages;
@@ -49,8 +49,8 @@ pub struct App {
     preferences: Preferences,
     clock: Clock,
     messages: Messages,
-    stage: Option<Arc<Stage>>,
-    frame: Option<Box<Frame>>,
+    setup: Option<Arc<Setup>>,
+    snapshot: Option<Box<Snapshot>>,
     devices: Vec<String>,
     fields: Fields,
     recorder: Option<Recorder>,
@@ -63,7 +63,7 @@ pub struct App {
     counted: (u64, Instant),
     /// Pictures of the window since then.
     shown: u32,
-    /// How methods converge in a step of the first simulation.
+    /// How solvers converge in a step of the first simulation.
     curves: Vec<Curve>,
     /// What is being saved: where, and of what.
     saving: Vec<(PathBuf, Document, Settings)>,
@@ -97,8 +97,8 @@ impl App {
             viewport: Viewport::new(Gpu::new(render_state)),
             holds: Holds::default(),
             clock: Clock::default(),
-            stage: None,
-            frame: None,
+            setup: None,
+            snapshot: None,
             devices: Vec::new(),
             fields: Fields::default(),
             recorder: None,
@@ -116,15 +116,15 @@ impl App {
         };
         app.name_save();
         app.engine.send(Command::Color(app.preferences.coloring));
-        app.engine.send(Command::Probe(app.preferences.methods()));
+        app.engine.send(Command::Probe(app.preferences.ticked_variants()));
         let load = app.session.load();
         app.send([load]);
         Ok(app)
     }
 
-    /// The newest frame, as it is shown.
-    pub fn frame(&self) -> Option<&Frame> {
-        self.frame.as_deref()
+    /// The newest snapshot, which is shown.
+    pub fn snapshot(&self) -> Option<&Snapshot> {
+        self.snapshot.as_deref()
     }
 
     /// What is open and chosen.
@@ -170,15 +170,15 @@ impl App {
         }
         self.shown += 1;
         self.hear();
-        self.take_frame();
+        self.take_snapshot();
         let coloring = self.preferences.coloring;
-        let methods = self.preferences.methods();
+        let variants = self.preferences.ticked_variants();
         let mut actions: Vec<Action> =
             help::requests(&context, self.was_typing).into_iter().map(Action::Ask).collect();
         self.show_panels(ui, &mut actions);
         let central = CentralPanel::no_frame().show(ui, |ui| {
-            let frame = self.frame.as_deref();
-            self.viewport.show(ui, frame, &mut self.holds, &self.preferences)
+            let snapshot = self.snapshot.as_deref();
+            self.viewport.show(ui, snapshot, &mut self.holds, &self.preferences)
         });
         let (commands, failed) = central.inner;
         self.send(commands);
@@ -190,8 +190,8 @@ impl App {
         if self.preferences.coloring != coloring {
             self.engine.send(Command::Color(self.preferences.coloring));
         }
-        if self.preferences.methods() != methods {
-            self.engine.send(Command::Probe(self.preferences.methods()));
+        if self.preferences.ticked_variants() != variants {
+            self.engine.send(Command::Probe(self.preferences.ticked_variants()));
         }
         for action in actions {
             self.act(action);
@@ -212,9 +212,9 @@ impl App {
             ui.add_space(3.0);
         });
         Panel::bottom("status").show(ui, |ui| {
-            ui.horizontal_wrapped(|ui| match (&self.stage, &self.frame) {
-                (Some(stage), Some(frame)) => {
-                    panels::time::show_status(ui, &self.clock, stage, frame);
+            ui.horizontal_wrapped(|ui| match (&self.setup, &self.snapshot) {
+                (Some(setup), Some(snapshot)) => {
+                    panels::time::show_status(ui, &self.clock, setup, snapshot);
                 }
                 _ => {
                     ui.weak("nothing is running yet");
@@ -235,16 +235,16 @@ impl App {
         }
         if self.preferences.curve_open {
             Panel::bottom("curve").resizable(true).default_size(130.0).show(ui, |ui| {
-                let now = self.frame.as_ref().map_or(0.0, |frame| frame.time);
+                let now = self.snapshot.as_ref().map_or(0.0, |snapshot| snapshot.time);
                 panels::forces::show(ui, &self.holds, now, self.session.is_comparison());
             });
         }
     }
 
     fn show_settings(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
-        let stage = self.stage.as_deref();
+        let setup = self.setup.as_deref();
         let (fields, preferences) = (&mut self.fields, &mut self.preferences);
-        panels::scene::show(ui, &self.session, stage, fields, preferences, actions);
+        panels::scene::show(ui, &self.session, setup, fields, preferences, actions);
         panels::view::show_grip(ui, &mut self.preferences, &self.holds, actions);
         panels::view::show(ui, &mut self.preferences, actions);
         panels::material::show(ui, self.session.scene(Side::First), actions);
@@ -259,7 +259,7 @@ impl App {
         }
     }
 
-    /// What the simulation's thread tells.
+    /// What the simulation's thread has sent.
     fn hear(&mut self) {
         for event in self.engine.hear() {
             match event {
@@ -272,31 +272,31 @@ impl App {
                     self.messages.busy = None;
                     self.messages.expect = Some(text);
                 }
-                Event::Ready(stage) => {
+                Event::Ready(setup) => {
                     self.messages.busy = None;
                     self.messages.failure = None;
                     let late = self.holds.clear();
                     self.send(late);
                     self.curves.clear();
-                    if let Err(error) = self.viewport.enter(&stage) {
+                    if let Err(error) = self.viewport.enter(&setup) {
                         self.messages.warn(error);
                     }
-                    for note in &stage.assembly.notes {
+                    for note in &setup.assembly.notes {
                         self.messages.tell(note.clone());
                     }
-                    self.stage = Some(stage);
+                    self.setup = Some(setup);
                 }
-                Event::Accompanied(stage) => {
+                Event::Accompanied(setup) => {
                     self.messages.busy = None;
-                    if let Err(error) = self.viewport.enter(&stage) {
+                    if let Err(error) = self.viewport.enter(&setup) {
                         self.messages.warn(error);
                     }
-                    self.stage = Some(stage);
+                    self.setup = Some(setup);
                 }
                 Event::Devices(devices) => self.devices = devices,
                 Event::Refused(text) => self.messages.warn(text),
                 Event::Done { path, text, time } => self.write_scene(&path, &text, time),
-                Event::Kept { lane, key, value } => self.session.keep(lane, &key, &value),
+                Event::Kept { run, key, value } => self.session.keep(run, &key, &value),
                 Event::Alone(text) => {
                     self.messages.busy = None;
                     self.messages.warn(text);
@@ -312,24 +312,24 @@ impl App {
         }
     }
 
-    fn take_frame(&mut self) {
-        if !self.engine.newest(&mut self.frame) {
+    fn take_snapshot(&mut self) {
+        if !self.engine.newest(&mut self.snapshot) {
             return;
         }
-        let Some(frame) = &self.frame else { return };
-        if let Err(error) = self.viewport.place(frame) {
+        let Some(snapshot) = &self.snapshot else { return };
+        if let Err(error) = self.viewport.place(snapshot) {
             self.messages.warn(error);
         }
-        self.holds.note(frame);
+        self.holds.note(snapshot);
         let (number, since) = self.counted;
         let elapsed = since.elapsed().as_secs_f64();
-        if frame.number < number {
-            self.counted = (frame.number, Instant::now());
+        if snapshot.number < number {
+            self.counted = (snapshot.number, Instant::now());
             self.shown = 0;
         } else if elapsed > 0.5 {
-            self.clock.rate = (frame.number - number) as f64 / elapsed;
+            self.clock.rate = (snapshot.number - number) as f64 / elapsed;
             self.clock.drawn = f64::from(std::mem::take(&mut self.shown)) / elapsed;
-            self.counted = (frame.number, Instant::now());
+            self.counted = (snapshot.number, Instant::now());
         }
     }
 
@@ -352,7 +352,7 @@ impl App {
             Action::Ghost(ghost) => {
                 let chosen = self.session.compare(self.session.is_comparison(), ghost);
                 if ghost && chosen.as_ref().is_ok_and(|commands| !commands.is_empty()) {
-                    self.messages.busy = Some("waiting for the true solution".to_owned());
+                    self.messages.busy = Some("waiting for the reference".to_owned());
                 }
                 self.carry_out(chosen);
             }
@@ -424,7 +424,7 @@ impl App {
             }
             Request::Screenshot => self.take_picture(),
             Request::Record => self.toggle_recording(),
-            Request::Frame => self.viewport.frame_all(),
+            Request::FitView => self.viewport.fit_view(),
             Request::LetGo => {
                 let held: Vec<_> = self.holds.list().iter().map(|held| held.id).collect();
                 for hold in held {
@@ -438,7 +438,8 @@ impl App {
 
     fn play(&mut self, playing: bool) {
         self.clock.playing = playing;
-        self.counted = (self.frame.as_ref().map_or(0, |frame| frame.number), Instant::now());
+        self.counted =
+            (self.snapshot.as_ref().map_or(0, |snapshot| snapshot.number), Instant::now());
         self.engine.send(Command::Play(playing));
     }
 }

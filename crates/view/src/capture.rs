@@ -5,8 +5,8 @@ use anyhow::{Context, Result, anyhow};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
-use viscera_cli::files::write_whole;
 use viscera_picture::{Animation, Image, ImageSize, write_png};
+use viscera_resources::files::write_atomic;
 
 /// Where pictures go, in the folder that the program was started in.
 pub const FOLDER: &str = "pictures";
@@ -31,7 +31,7 @@ pub fn free_name(folder: &Path, stem: &str, ending: &str) -> PathBuf {
 /// Puts pictures side by side and writes them as one PNG file.
 pub fn save_picture(images: &[Image], path: &Path) -> Result<()> {
     let image = Image::tiled(images, images.len().max(1))?;
-    write_whole(path, &write_png(&image)?)
+    write_atomic(path, &write_png(&image)?)
 }
 
 /// A recording in the making, compressed on a thread of its own.
@@ -99,16 +99,16 @@ impl Recorder {
         Ok(())
     }
 
-    /// Ends it and writes the file; what to tell a person.
+    /// Ends it and writes the file; returns a summary for the user.
     pub fn finish(mut self) -> Result<String> {
         let count = self.end()?;
         let path = self.path.display();
         let seconds = self.recorded + self.frame;
-        let mut told = format!("{path}: {count} pictures, {seconds:.2} s of simulated time");
+        let mut summary = format!("{path}: {count} pictures, {seconds:.2} s of simulated time");
         if self.missed > 0 {
-            told.push_str(&format!("; {} were left out, this machine being busy", self.missed));
+            summary.push_str(&format!("; {} were left out, this machine being busy", self.missed));
         }
-        Ok(told)
+        Ok(summary)
     }
 
     fn end(&mut self) -> Result<u32> {
@@ -161,7 +161,7 @@ fn compress(sheets: &Receiver<Sheet>, path: &Path) -> Result<u32> {
     let Some((animation, _)) = animation else {
         return Err(anyhow!("nothing was recorded; let the simulation run while recording"));
     };
-    write_whole(path, &animation.finish(held)?)?;
+    write_atomic(path, &animation.finish(held)?)?;
     Ok(count)
 }
 
@@ -227,13 +227,13 @@ mod tests {
             let path = free_name(folder.path(), "liver", "gif");
             let mut recorder = Recorder::start(path.clone(), frame).expect("a recording");
             let taken = follow(&mut recorder, frame, count, 7);
-            let told = recorder.finish().expect("a file");
+            let summary = recorder.finish().expect("a file");
             let (delays, size) = decode(&path);
             let sum = delays.iter().sum::<f64>();
             let wanted = f64::from(count + 1) * frame;
             assert!((sum - wanted).abs() < 0.01, "{sum} s for {wanted} s");
             assert_eq!((delays.len(), size), (taken as usize, [128, 32]));
-            assert!(told.contains(&format!("{wanted:.2} s of simulated time")), "{told}");
+            assert!(summary.contains(&format!("{wanted:.2} s of simulated time")), "{summary}");
         }
     }
 

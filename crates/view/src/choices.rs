@@ -6,14 +6,14 @@ use viscera::scene::Scene;
 /// Keys and values as `--set` of `viscera run` takes them; the later of two equal keys holds.
 pub type Settings = Vec<(String, String)>;
 
-/// All choices that undo takes back.
+/// All choices that undo restores.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Choices {
     /// Hold for every solver.
     pub shared: Settings,
     /// What the second solver differs in, where two are compared.
     pub second: Option<Settings>,
-    /// Whether the exact solution is shown as a ghost.
+    /// Whether the reference is shown as a ghost.
     pub ghost: bool,
 }
 
@@ -26,9 +26,9 @@ pub enum Side {
     Second,
 }
 
-/// The true solution: the exact form, with so many sweeps that round-off is what is left. In double
+/// The reference: the default method, with so many iterations that round-off is what is left. In double
 /// precision it would cost twice as much, and look the same.
-const EXACT: [(&str, &str); 11] = [
+const REFERENCE: [(&str, &str); 11] = [
     ("solver.method", "xpbd"),
     ("solver.colors", "unlimited"),
     ("solver.iterations", "20"),
@@ -54,10 +54,10 @@ impl Choices {
         settings
     }
 
-    /// The settings of the exact solution.
-    pub fn exact(&self) -> Settings {
+    /// The settings of the reference.
+    pub fn reference(&self) -> Settings {
         let mut settings = self.shared.clone();
-        for (key, value) in EXACT {
+        for (key, value) in REFERENCE {
             put(&mut settings, key, value);
         }
         settings
@@ -82,7 +82,7 @@ pub fn put(settings: &mut Settings, key: &str, value: &str) {
     }
 }
 
-/// Steps that can be taken back and made again. One drag of a slider is one step.
+/// Steps that can be undone and redone. One drag of a slider is one step.
 #[derive(Debug, Default)]
 pub struct History {
     done: Vec<Choices>,
@@ -124,12 +124,12 @@ impl History {
         exchange(&mut self.undone, &mut self.done, now)
     }
 
-    /// Whether there is something to take back.
+    /// Whether there is something to undo.
     pub fn can_undo(&self) -> bool {
         !self.done.is_empty()
     }
 
-    /// Whether there is something to make again.
+    /// Whether there is something to redo.
     pub fn can_redo(&self) -> bool {
         !self.undone.is_empty()
     }

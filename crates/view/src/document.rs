@@ -4,8 +4,7 @@ use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use viscera::scene::{Scene, SceneError};
-use viscera_cli::files::{self, Library};
-use viscera_cli::scene::BuiltIn;
+use viscera_resources::{BUILT_IN, BuiltInScene, MeshFiles, files};
 
 use crate::choices::Settings;
 
@@ -23,7 +22,7 @@ pub struct Document {
 impl Document {
     /// Reads a scene file, or finds a built-in scene of that name.
     pub fn open(path: &Path, data: Option<&Path>) -> Result<Self> {
-        let text = match BuiltIn::find(path) {
+        let text = match BuiltInScene::find(path) {
             Some(scene) => scene.text.into(),
             None => {
                 let bytes = files::read(path)
@@ -46,8 +45,8 @@ impl Document {
     }
 
     /// Finds the scene's mesh files.
-    pub fn library(&self) -> Library {
-        Library::new(&self.path, self.data.as_deref())
+    pub fn mesh_files(&self) -> MeshFiles {
+        MeshFiles::new(&self.path, self.data.as_deref())
     }
 
     /// The scene's name without folder and ending: "liver_retraction".
@@ -59,5 +58,5 @@ impl Document {
 
 /// The names of the scenes that need no file.
 pub fn built_in_names() -> String {
-    viscera_cli::scene::BUILT_IN.map(|scene| scene.name).join(", ")
+    BUILT_IN.map(|scene| scene.name).join(", ")
 }

@@ -21,8 +21,8 @@ pub enum Request {
     Screenshot,
     /// Begins or ends a recording.
     Record,
-    /// Shows the whole tissue.
-    Frame,
+    /// Fits all tissue into the view.
+    FitView,
     /// Lets go of everything.
     LetGo,
     /// Shows this list.
@@ -60,7 +60,7 @@ const SHORTCUTS: &[Shortcut] = &[
     plain(Key::Space, Request::PlayPause, "space", "run or pause"),
     plain(Key::Period, Request::Step, ".", "one frame"),
     plain(Key::R, Request::Reset, "R", "begin again from rest"),
-    plain(Key::F, Request::Frame, "F", "show everything"),
+    plain(Key::F, Request::FitView, "F", "fit view"),
     plain(Key::Escape, Request::LetGo, "Esc", "let go of everything"),
     plain(Key::S, Request::Screenshot, "S", "save a picture, in pictures/"),
     plain(

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use viscera::scalar::Vec3;
 
-use crate::engine::{Command, Frame, HoldId};
+use crate::engine::{Command, HoldId, Snapshot};
 use crate::viewport::Pick;
 
 /// How one takes hold.
@@ -127,28 +127,28 @@ impl Holds {
         self.list.drain(..).map(|held| Command::LetGo(held.id)).collect()
     }
 
-    /// Notes the forces of a frame.
-    pub fn note(&mut self, frame: &Frame) {
+    /// Notes the forces of a snapshot.
+    pub fn note(&mut self, snapshot: &Snapshot) {
         for held in &mut self.list {
             let mut forces = [f64::NAN; 2];
-            for (force, lane) in forces.iter_mut().zip(&frame.lanes) {
-                if let Some(hold) = lane.holds.iter().find(|hold| hold.id == held.id) {
+            for (force, run) in forces.iter_mut().zip(&snapshot.runs) {
+                if let Some(hold) = run.held.iter().find(|hold| hold.id == held.id) {
                     *force = hold.force.length();
                 }
             }
             if forces[0].is_nan() {
                 continue;
             }
-            // After a reset time begins anew; a frame may be told again.
+            // After a reset time begins anew; a snapshot may come again.
             match held.curve.back() {
-                Some(&(time, _)) if time > frame.time => held.curve.clear(),
-                Some(&(time, _)) if time == frame.time => {
+                Some(&(time, _)) if time > snapshot.time => held.curve.clear(),
+                Some(&(time, _)) if time == snapshot.time => {
                     held.curve.pop_back();
                 }
                 _ => {}
             }
-            held.curve.push_back((frame.time, forces));
-            while held.curve.front().is_some_and(|&(time, _)| time < frame.time - REMEMBERED) {
+            held.curve.push_back((snapshot.time, forces));
+            while held.curve.front().is_some_and(|&(time, _)| time < snapshot.time - REMEMBERED) {
                 held.curve.pop_front();
             }
         }
@@ -188,14 +188,14 @@ mod tests {
         let mut holds = Holds::default();
         holds.take(&pick(), &Grip::default());
         let at = |time: f64| {
-            let hold = crate::engine::Hold {
+            let hold = crate::engine::HeldPatch {
                 id: 1,
                 place: Vec3::ZERO,
                 target: Vec3::ZERO,
                 force: vec3(0.0, 3.0, 4.0),
             };
-            let lane = crate::engine::Lane { holds: vec![hold], ..Default::default() };
-            Frame { time, lanes: vec![lane], ..Frame::default() }
+            let run = crate::engine::RunSnapshot { held: vec![hold], ..Default::default() };
+            Snapshot { time, runs: vec![run], ..Snapshot::default() }
         };
         for time in [1.0, 2.0, 1.5 + REMEMBERED] {
             holds.note(&at(time));

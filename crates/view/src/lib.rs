@@ -10,7 +10,7 @@
 //! | looking, pressing, pulling | [`viewport`] |
 //! | what is chosen, undo | [`choices`], [`session`] |
 //! | the panels | [`panels`] |
-//! | one step by several methods | [`probe`] |
+//! | one step by several solvers | [`probe`] |
 
 pub mod app;
 pub mod capture;

@@ -104,7 +104,7 @@ fn cures(ui: &mut egui::Ui, cure: Cure, actions: &mut Vec<Action>) {
             if ui.button("Begin again from rest").clicked() {
                 actions.push(Action::Ask(Request::Reset));
             }
-            if ui.button("Take the last change back").clicked() {
+            if ui.button("Undo the last change").clicked() {
                 actions.push(Action::Ask(Request::Undo));
                 actions.push(Action::Ask(Request::Reset));
             }

@@ -4,7 +4,7 @@ use eframe::wgpu;
 
 use crate::engine::Coloring;
 use crate::holds::Grip;
-use crate::probe::{METHODS, Method};
+use crate::probe::{SolverVariant, VARIANTS};
 
 /// How things are shown and how one takes hold; no part of a scene.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -26,8 +26,8 @@ pub struct Preferences {
     pub curve_open: bool,
     /// Whether the plot of convergence is open.
     pub convergence_open: bool,
-    /// Which of the methods are ticked there.
-    pub ticked: Vec<Method>,
+    /// Which of the solvers are ticked there.
+    pub ticked: Vec<SolverVariant>,
     /// Whether a saved scene repeats what was done by hand.
     pub save_by_hand: bool,
 }
@@ -40,8 +40,8 @@ impl Preferences {
         Self { shadow: !software, ..Self::default() }
     }
 
-    /// Methods by which steps are to be repeated.
-    pub fn methods(&self) -> Vec<Method> {
+    /// Solvers by which steps are to be repeated.
+    pub fn ticked_variants(&self) -> Vec<SolverVariant> {
         if self.convergence_open { self.ticked.clone() } else { Vec::new() }
     }
 }
@@ -57,7 +57,7 @@ impl Default for Preferences {
             settings_open: true,
             curve_open: true,
             convergence_open: false,
-            ticked: vec![METHODS[0].0, METHODS[1].0, METHODS[5].0],
+            ticked: vec![VARIANTS[0].0, VARIANTS[1].0, VARIANTS[5].0],
             save_by_hand: true,
         }
     }

@@ -1,4 +1,4 @@
-//! The step that comes next, by several methods: how its residual falls with the iterations. On a thread of
+//! The step that comes next, by several solvers: how its residual falls with the iterations. On a thread of
 //! its own, so that neither the window nor the simulation waits for it.
 
 use std::sync::Arc;
@@ -7,16 +7,16 @@ use std::sync::mpsc::{Sender, channel};
 use viscera::model::ModelBuilder;
 use viscera::scalar::Vec3;
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, Method as Integrator, NeoHookean, Precision,
-    SolverSettings, Start, Threads,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Method, NeoHookean, Precision, SolverSettings,
+    Start, Threads,
 };
 use viscera::solver::balance::ForceBalance;
 use viscera::solver::{Inputs, Solver, StepError};
 use viscera::state::State;
 
-/// A method that can be ticked.
+/// A solver whose convergence can be shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub enum Method {
+pub enum SolverVariant {
     /// What the panel says, iterations apart.
     AsSet,
     /// One of the family: as published, or exact at rest; in one colour or in as many as it takes; with
@@ -31,13 +31,13 @@ pub enum Method {
     },
 }
 
-const fn xpbd(exact: bool, jacobi: bool, anderson: bool) -> Method {
-    Method::Xpbd { exact, jacobi, anderson }
+const fn xpbd(exact: bool, jacobi: bool, anderson: bool) -> SolverVariant {
+    SolverVariant::Xpbd { exact, jacobi, anderson }
 }
 
 /// All that can be ticked, with their names.
-pub const METHODS: [(Method, &str); 8] = [
-    (Method::AsSet, "as set"),
+pub const VARIANTS: [(SolverVariant, &str); 8] = [
+    (SolverVariant::AsSet, "as set"),
     (xpbd(false, true, false), "published, Jacobi"),
     (xpbd(false, true, true), "published, Jacobi + Anderson"),
     (xpbd(false, false, false), "published, coloured"),
@@ -58,8 +58,8 @@ fn is_measured(iteration: u32) -> bool {
     iteration <= 4 || iteration.is_multiple_of(4) || iteration == ITERATIONS
 }
 
-impl Method {
-    /// Its settings: those in force with the method's laid over them, in double precision on one thread.
+impl SolverVariant {
+    /// Its settings: those in force with the variant's laid over them, in double precision on one thread.
     fn settings(self, set: &SolverSettings) -> SolverSettings {
         let base = SolverSettings {
             precision: Precision::F64,
@@ -69,7 +69,7 @@ impl Method {
         };
         let Self::Xpbd { exact, jacobi, anderson } = self else { return base };
         SolverSettings {
-            method: Integrator::Xpbd,
+            method: Method::Xpbd,
             relaxation: 1.0,
             colors: if jacobi { Colors::Limited(1) } else { Colors::Unlimited },
             acceleration: if anderson { Acceleration::Anderson } else { Acceleration::None },
@@ -86,9 +86,9 @@ impl Method {
     }
 }
 
-/// What a simulation is before a step, and what acts in it.
+/// The step that comes next: the state before it, and what acts in it.
 #[derive(Clone, Debug)]
-pub struct Moment {
+pub struct NextStep {
     /// Settings in force.
     pub solver: SolverSettings,
     /// Meshes with their materials.
@@ -103,10 +103,10 @@ pub struct Moment {
     pub dt: f64,
 }
 
-/// One method's curve.
+/// The curve of one solver.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Curve {
-    /// The method, in words.
+    /// The solver, in words.
     pub name: String,
     /// Iteration, and unbalanced forces over loads after it; 0 is where the iteration starts.
     pub residuals: Vec<(u32, f64)>,
@@ -114,16 +114,16 @@ pub struct Curve {
     pub problem: Option<String>,
 }
 
-/// The step of a moment by one method. Multipliers are those of tissue at its places.
-pub fn curve(moment: &Moment, method: Method, name: &str) -> Curve {
-    let settings = method.settings(&moment.solver);
-    if settings.method == Integrator::Explicit {
+/// The step by one solver. Multipliers are those of tissue at its places.
+pub fn curve(next_step: &NextStep, variant: SolverVariant, name: &str) -> Curve {
+    let settings = variant.settings(&next_step.solver);
+    if settings.method == Method::Explicit {
         // Its small steps approach nothing.
         let problem = Some("the explicit method has no iterations".to_owned());
         return Curve { name: name.to_owned(), residuals: Vec::new(), problem };
     }
-    let (residuals, problem) = match moment.builder.build::<f64>(&settings) {
-        Ok(model) => match residuals(moment, &model, &settings) {
+    let (residuals, problem) = match next_step.builder.build::<f64>(&settings) {
+        Ok(model) => match residuals(next_step, &model, &settings) {
             Ok(residuals) => (residuals, None),
             Err(error) => (Vec::new(), Some(error.to_string())),
         },
@@ -133,15 +133,15 @@ pub fn curve(moment: &Moment, method: Method, name: &str) -> Curve {
 }
 
 fn residuals(
-    moment: &Moment,
+    next_step: &NextStep,
     model: &viscera::model::Model<f64>,
     settings: &SolverSettings,
 ) -> Result<Vec<(u32, f64)>, StepError> {
-    let Moment { inputs, dt, .. } = moment;
+    let NextStep { inputs, dt, .. } = next_step;
     let mut solver = Solver::new(model, settings);
     let mut state = State::at_rest(model);
-    state.positions.clone_from(&moment.positions);
-    state.velocities.clone_from(&moment.velocities);
+    state.positions.clone_from(&next_step.positions);
+    state.velocities.clone_from(&next_step.velocities);
     solver.restart(model, &mut state, inputs, *dt)?;
     let mut iterates: Vec<(u32, Vec<Vec3<f64>>)> = Vec::new();
     solver.step_watched(model, &mut state, inputs, *dt, |iteration, places| {
@@ -159,27 +159,27 @@ fn residuals(
     Ok(residuals)
 }
 
-/// The thread, seen from who gives it moments.
+/// The handle of the thread that repeats steps.
 #[derive(Debug)]
 pub struct Prober {
-    moments: Sender<(Moment, Vec<Method>)>,
+    steps: Sender<(NextStep, Vec<SolverVariant>)>,
     busy: Arc<AtomicBool>,
 }
 
 impl Prober {
-    /// Starts the thread; it ends with this. `tell` gets the curves of each moment.
+    /// Starts the thread; it ends with this. `tell` gets the curves of each step.
     pub fn start(tell: impl Fn(Vec<Curve>) + Send + 'static) -> std::io::Result<Self> {
-        let (moments, receive) = channel::<(Moment, Vec<Method>)>();
+        let (steps, receive) = channel::<(NextStep, Vec<SolverVariant>)>();
         let busy = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&busy);
         std::thread::Builder::new().name("convergence".to_owned()).spawn(move || {
-            for (moment, methods) in receive {
-                let ticked = METHODS.iter().filter(|(method, _)| methods.contains(method));
-                tell(ticked.map(|&(method, name)| curve(&moment, method, name)).collect());
+            for (next_step, variants) in receive {
+                let ticked = VARIANTS.iter().filter(|(variant, _)| variants.contains(variant));
+                tell(ticked.map(|&(variant, name)| curve(&next_step, variant, name)).collect());
                 flag.store(false, Ordering::Release);
             }
         })?;
-        Ok(Self { moments, busy })
+        Ok(Self { steps, busy })
     }
 
     /// Whether it would begin at once.
@@ -187,11 +187,11 @@ impl Prober {
         !self.busy.load(Ordering::Acquire)
     }
 
-    /// Gives it a moment; one at a time.
-    pub fn probe(&self, moment: Moment, methods: Vec<Method>) {
+    /// Gives it a step; one at a time.
+    pub fn probe(&self, next_step: NextStep, variants: Vec<SolverVariant>) {
         self.busy.store(true, Ordering::Release);
         // Without its thread it stays busy.
-        let _ = self.moments.send((moment, methods));
+        let _ = self.steps.send((next_step, variants));
     }
 }
 
@@ -201,7 +201,7 @@ mod tests {
     use viscera::scene::Scene;
     use viscera::simulation::{Assembly, Simulation};
 
-    fn moment() -> Moment {
+    fn next_step() -> NextStep {
         let text = include_str!("../../../scenes/grab.toml");
         let scene = Scene::parse("grab.toml", text, &[]).expect("a scene");
         let assembly = Assembly::new(&scene, &mut |f| Err(f.to_owned())).expect("an assembly");
@@ -210,7 +210,7 @@ mod tests {
             simulation.advance().expect("a frame");
         }
         let dt = simulation.scene().time.frame / f64::from(simulation.scene().solver.substeps);
-        Moment {
+        NextStep {
             solver: simulation.scene().solver.clone(),
             builder: simulation.assembly().builder.clone(),
             positions: simulation.state().positions.clone(),
@@ -222,9 +222,9 @@ mod tests {
 
     #[test]
     fn the_exact_form_ends_in_balance_and_anderson_hurries_it() {
-        let moment = moment();
-        let last = |method| {
-            let curve = curve(&moment, method, "method");
+        let next_step = next_step();
+        let last = |variant| {
+            let curve = curve(&next_step, variant, "method");
             assert_eq!(curve.problem, None);
             let (first, end) = (curve.residuals.first(), curve.residuals.last());
             assert_eq!(end.map(|(iteration, _)| *iteration), Some(ITERATIONS));

@@ -5,12 +5,12 @@ use anyhow::{Context, Result, anyhow, bail};
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, TableLike, Value};
 use viscera::scene::Scene;
-use viscera_cli::files::write_whole;
+use viscera_resources::files::write_atomic;
 
 use crate::choices::Settings;
 use crate::document::Document;
 
-/// Writes the scene with its settings and, behind them, what was done by hand; whole or not at all.
+/// Writes the scene with its settings and, behind them, what was done by hand; atomically.
 pub fn save(document: &Document, settings: &Settings, by_hand: &str, path: &Path) -> Result<()> {
     if path.extension().is_none_or(|ending| ending != "toml") {
         bail!("{}: a scene file's name ends in .toml", path.display());
@@ -28,7 +28,7 @@ pub fn save(document: &Document, settings: &Settings, by_hand: &str, path: &Path
             folder(&document.path).display()
         );
     }
-    write_whole(path, text.as_bytes())
+    write_atomic(path, text.as_bytes())
 }
 
 /// The text of the scene file.
@@ -100,7 +100,7 @@ fn value_of(text: &str) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use viscera_cli::scene::BUILT_IN;
+    use viscera_resources::BUILT_IN;
 
     fn document() -> Document {
         let scene = BUILT_IN.iter().find(|scene| scene.name == "liver_retraction");

@@ -4,7 +4,7 @@ use viscera::scene::Scene;
 
 use crate::choices::{Choices, History, Settings, Side, difference};
 use crate::document::Document;
-use crate::engine::{Command, Plan};
+use crate::engine::{BuildRequest, Command};
 
 /// A scene with its choices.
 #[derive(Debug)]
@@ -14,7 +14,7 @@ pub struct Session {
     /// What was chosen when the simulations began at rest.
     begun: Choices,
     history: History,
-    /// One for each simulation, as chosen: the first, the second, the exact one.
+    /// One for each simulation, as chosen: the first, the second, the reference.
     scenes: Vec<Scene>,
     generation: u64,
 }
@@ -49,7 +49,7 @@ impl Session {
         Command::Reset
     }
 
-    /// What can be taken back.
+    /// What can be undone.
     pub fn history(&self) -> &History {
         &self.history
     }
@@ -70,16 +70,16 @@ impl Session {
     /// Builds everything anew. Numbers of frames tell this from what was before.
     pub fn load(&mut self) -> Command {
         self.begun = self.choices.clone();
-        Command::Load(self.plan())
+        Command::Load(self.build_request())
     }
 
-    fn plan(&mut self) -> Box<Plan> {
+    fn build_request(&mut self) -> Box<BuildRequest> {
         self.generation += 1;
-        Box::new(Plan {
+        Box::new(BuildRequest {
             generation: self.generation,
             scenes: self.scenes.clone(),
             ends_with_ghost: self.choices.ghost,
-            library: self.document.library(),
+            mesh_files: self.document.mesh_files(),
         })
     }
 
@@ -105,7 +105,7 @@ impl Session {
         self.change_to(next, &key, gesture)
     }
 
-    /// Begins or ends a comparison, or the exact solution beside it. The second solver begins as the first
+    /// Begins or ends a comparison, or the reference beside it. The second solver begins as the first
     /// is, and has settings of its own from then on.
     pub fn compare(&mut self, on: bool, ghost: bool) -> Result<Vec<Command>, String> {
         let copy = || {
@@ -118,8 +118,8 @@ impl Session {
     }
 
     /// A simulation has refused a setting, and goes on with this value.
-    pub fn keep(&mut self, lane: usize, key: &str, value: &str) {
-        let side = match lane {
+    pub fn keep(&mut self, run: usize, key: &str, value: &str) {
+        let side = match run {
             0 => Side::First,
             1 if self.is_comparison() => Side::Second,
             _ => return,
@@ -189,10 +189,10 @@ impl Session {
         match others.filter(|_| same_lanes) {
             Some(others) => {
                 let numbered = (1..).zip(others);
-                commands.extend(numbered.map(|(lane, change)| Command::Change(lane, change)));
+                commands.extend(numbered.map(|(run, change)| Command::Change(run, change)));
             }
             // The first goes on, whatever comes to its side.
-            None => commands.push(Command::Accompany(self.plan())),
+            None => commands.push(Command::Accompany(self.build_request())),
         }
         commands.retain(
             |command| !matches!(command, Command::Change(_, settings) if settings.is_empty()),
@@ -209,7 +209,7 @@ fn scenes_of(document: &Document, choices: &Choices) -> Result<Vec<Scene>, Strin
         scenes.push(read(&choices.of(Side::Second))?);
     }
     if choices.ghost {
-        scenes.push(read(&choices.exact())?);
+        scenes.push(read(&choices.reference())?);
     }
     Ok(scenes)
 }
@@ -247,12 +247,11 @@ mod tests {
         let was = session.scene(Side::First).solver.iterations;
         let mut change = |value| {
             let commands = session.choose(Side::First, &pair("solver.iterations", value), false);
-            let lanes =
-                commands.expect("a legal change").into_iter().map(|command| match command {
-                    Command::Change(lane, settings) => (lane, settings),
-                    other => panic!("{other:?}"),
-                });
-            lanes.collect::<Vec<_>>()
+            let runs = commands.expect("a legal change").into_iter().map(|command| match command {
+                Command::Change(run, settings) => (run, settings),
+                other => panic!("{other:?}"),
+            });
+            runs.collect::<Vec<_>>()
         };
         // The second solver has its own number of iterations.
         assert_eq!(change("7"), [(0, pair("solver.iterations", "7"))]);

@@ -22,7 +22,7 @@ fn farthest(a: &[Vec3<f32>], b: &[Vec3<f32>]) -> f32 {
 fn pressed_tissue_follows_the_pointer_and_is_let_go_cleanly() {
     let mut window = Window::running("liver_retraction", &[("time.duration", "1 s")]);
     let middle = window.view().center();
-    let before = window.lane(0).positions.clone();
+    let before = window.run(0).positions.clone();
     let still = window.pixels();
     window.harness.hover_at(middle);
     window.harness.step();
@@ -34,20 +34,20 @@ fn pressed_tissue_follows_the_pointer_and_is_let_go_cleanly() {
         window.harness.step();
     }
     window.wait("a force", |app| {
-        let hold = app.frame().and_then(|frame| frame.lanes[0].holds.first());
+        let hold = app.snapshot().and_then(|snapshot| snapshot.runs[0].held.first());
         hold.is_some_and(|hold| hold.force.length() > 0.5)
     });
-    let hold = window.lane(0).holds[0];
+    let hold = window.run(0).held[0];
     // The spring pulls upwards, as the pointer did.
     assert!(hold.force.z > 0.4 && hold.target.z > hold.place.z, "{hold:?}");
-    assert!(farthest(&before, &window.lane(0).positions) > 0.002);
+    assert!(farthest(&before, &window.run(0).positions) > 0.002);
     let changed = window.pixels().iter().zip(&still).filter(|(new, old)| new != old).count();
     assert!(changed > 1000, "{changed} pixels changed");
 
     window.harness.drop_at(middle + vec2(0.0, -80.0));
     window.wait("a clean release", |app| {
         app.holds().list().is_empty()
-            && app.frame().is_some_and(|frame| frame.lanes[0].holds.is_empty())
+            && app.snapshot().is_some_and(|snapshot| snapshot.runs[0].held.is_empty())
     });
 }
 
@@ -64,10 +64,12 @@ fn what_is_kept_stays_held_until_escape() {
     window.harness.step();
     window.harness.drop_at(middle + vec2(30.0, 0.0));
     window.harness.step();
-    window.wait("a hold", |app| app.frame().is_some_and(|frame| frame.lanes[0].holds.len() == 1));
+    window.wait("a hold", |app| {
+        app.snapshot().is_some_and(|snapshot| snapshot.runs[0].held.len() == 1)
+    });
     window.harness.key_press(Key::Escape);
     window.wait("a release", |app| {
-        let is_free = app.frame().is_some_and(|frame| frame.lanes[0].holds.is_empty());
+        let is_free = app.snapshot().is_some_and(|snapshot| snapshot.runs[0].held.is_empty());
         app.holds().list().is_empty() && is_free
     });
 }
@@ -79,9 +81,9 @@ fn a_slider_changes_the_tissue_and_undo_takes_it_back() {
         window.slide("stiffness E", young);
         assert_eq!(window.scene().bodies[0].material.young(), 1e3 * young);
     }
-    let number = window.harness.state().frame().expect("a frame").number;
+    let number = window.harness.state().snapshot().expect("a frame").number;
     window.wait("frames after the change", |app| {
-        app.frame().is_some_and(|frame| frame.number > number + 2)
+        app.snapshot().is_some_and(|snapshot| snapshot.number > number + 2)
     });
     window.harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
     window.harness.step();
@@ -206,7 +208,7 @@ fn inverted_tetrahedra_are_counted_in_words() {
     // Pushed through the body and out of the side that is held.
     window.drag(vec2(0.0, 260.0));
     window.wait("inverted tetrahedra", |app| {
-        app.frame().is_some_and(|frame| frame.lanes[0].measures.inverted > 1)
+        app.snapshot().is_some_and(|snapshot| snapshot.runs[0].measures.inverted > 1)
     });
     window.harness.get_by_label_contains("tetrahedra are inverted");
     window.picture("inverted");
@@ -217,21 +219,22 @@ fn two_solvers_run_side_by_side_from_the_same_start() {
     let mut window = Window::running("grab", &[("solver.substeps", "1")]);
     window.press("A | B");
     window.wait("two frames", |app| {
-        app.frame().is_some_and(|frame| frame.lanes.len() == 2 && frame.number > 3)
+        app.snapshot().is_some_and(|snapshot| snapshot.runs.len() == 2 && snapshot.number > 3)
     });
     // Equal settings give equal bits.
-    assert_eq!(window.lane(0).positions, window.lane(1).positions);
+    assert_eq!(window.run(0).positions, window.run(1).positions);
     window.harness.get_by_label("view A");
     window.harness.get_by_label("view B");
-    window.press("true solution");
+    window.press("reference (converged)");
     assert!(window.harness.state().messages().busy.is_some(), "the window says that it waits");
-    let number = window.harness.state().frame().expect("a frame").number;
-    window.wait("the exact solution", |app| {
-        app.frame().is_some_and(|frame| frame.lanes.len() == 3 && frame.number > number + 5)
+    let number = window.harness.state().snapshot().expect("a frame").number;
+    window.wait("the reference", |app| {
+        app.snapshot()
+            .is_some_and(|snapshot| snapshot.runs.len() == 3 && snapshot.number > number + 5)
     });
-    let apart = farthest(&window.lane(0).positions, &window.lane(2).positions);
+    let apart = farthest(&window.run(0).positions, &window.run(2).positions);
     assert!(apart > 0.0 && apart < 0.05, "{apart} m apart");
-    assert_eq!(f64::from(apart), window.lane(0).distance(window.lane(2)));
+    assert_eq!(f64::from(apart), window.run(0).distance(window.run(2)));
     assert!(window.harness.state().messages().busy.is_none());
     window.picture("compared");
 }
@@ -240,7 +243,7 @@ fn two_solvers_run_side_by_side_from_the_same_start() {
 fn a_saved_scene_is_what_was_chosen() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("mine.toml");
-    let text = viscera_cli::scene::BUILT_IN.iter().find(|scene| scene.name == "cantilever");
+    let text = viscera_resources::BUILT_IN.iter().find(|scene| scene.name == "cantilever");
     std::fs::write(&path, text.expect("a built-in scene").text).expect("a file");
     let settings = [("solver.iterations", "7")];
     let mut window = Window::running(&path.display().to_string(), &settings);
@@ -281,13 +284,13 @@ fn a_first_visit_ends_in_a_scene_that_repeats_it() {
         (window.scene().solver.colors, window.scene().solver.iterations),
         (Colors::Limited(1), 40)
     );
-    let number = window.harness.state().frame().expect("a frame").number;
+    let number = window.harness.state().snapshot().expect("a frame").number;
     window.press("A | B");
     window.wait("a second simulation", |app| {
-        app.frame().is_some_and(|frame| frame.lanes.len() == 2 && frame.number > number)
+        app.snapshot().is_some_and(|snapshot| snapshot.runs.len() == 2 && snapshot.number > number)
     });
     // It began where the first one is, and is held by the same hand.
-    let apart = farthest(&window.lane(0).positions, &window.lane(1).positions);
+    let apart = farthest(&window.run(0).positions, &window.run(1).positions);
     assert!(apart < 0.01, "{apart} m");
     window.harness.get_all_by_label("Anderson 40").last().expect("one for each").click_accesskit();
     window.wait("Anderson", |app| {
@@ -305,10 +308,10 @@ fn a_first_visit_ends_in_a_scene_that_repeats_it() {
     window.harness.step();
     let scene = window.save(&path);
     assert_eq!((scene.motions.len(), scene.changes.len()), (2, 2));
-    let frame = window.harness.state().frame().expect("a frame");
-    assert_eq!(scene.frame_count(), frame.number);
+    let snapshot = window.harness.state().snapshot().expect("a frame");
+    assert_eq!(scene.frame_count(), snapshot.number);
     let repeated = run(scene);
-    assert_eq!(window.lane(0).positions, repeated.state().positions);
+    assert_eq!(window.run(0).positions, repeated.state().positions);
 }
 
 #[test]
@@ -316,8 +319,10 @@ fn a_picture_and_a_recording_are_whole_files() {
     let mut window = Window::running("grab", &[]);
     window.press("Picture");
     window.press("Record");
-    let number = window.harness.state().frame().expect("a frame").number;
-    window.wait("some frames", |app| app.frame().is_some_and(|frame| frame.number > number + 8));
+    let number = window.harness.state().snapshot().expect("a frame").number;
+    window.wait("some frames", |app| {
+        app.snapshot().is_some_and(|snapshot| snapshot.number > number + 8)
+    });
     // Closed while it records.
     window.harness.state_mut().close();
     let pictures = window.folder.path().join("pictures");
@@ -332,10 +337,13 @@ fn a_picture_and_a_recording_are_whole_files() {
     assert!(delays.len() >= 2, "{delays:?}");
     // As long as the window says, which rounds to hundredths.
     let texts = window.texts();
-    let told = texts.iter().find_map(|text| text.strip_suffix(" s of simulated time"));
-    let told = told.and_then(|text| text.rsplit(' ').next()?.parse::<f64>().ok());
-    let (told, played) = (told.expect("a time"), delays.iter().sum::<f64>());
-    assert!((played - told).abs() <= 0.015 && told > 8.0 / 60.0, "{played} s, told {told} s");
+    let reported = texts.iter().find_map(|text| text.strip_suffix(" s of simulated time"));
+    let reported = reported.and_then(|text| text.rsplit(' ').next()?.parse::<f64>().ok());
+    let (reported, played) = (reported.expect("a time"), delays.iter().sum::<f64>());
+    assert!(
+        (played - reported).abs() <= 0.015 && reported > 8.0 / 60.0,
+        "{played} s, reported {reported} s"
+    );
 }
 
 #[test]
@@ -357,7 +365,7 @@ fn without_the_device_asked_for_the_cpu_is_offered() {
     let texts: Vec<_> = window.harness.state().messages().texts().collect();
     assert!(texts.iter().any(|text| text.contains("abacus")), "{texts:?}");
     window.press("Go on with the CPU");
-    window.wait("frames", |app| app.frame().is_some_and(|frame| frame.number > 2));
+    window.wait("frames", |app| app.snapshot().is_some_and(|snapshot| snapshot.number > 2));
     assert!(window.harness.state().messages().failure.is_none());
 }
 
@@ -368,14 +376,15 @@ fn the_keyboard_pauses_steps_and_begins_again() {
     window.harness.step();
     std::thread::sleep(Duration::from_millis(200));
     (0..3).for_each(|_| window.harness.step());
-    let paused = window.harness.state().frame().expect("a frame").number;
+    let paused = window.harness.state().snapshot().expect("a frame").number;
     std::thread::sleep(Duration::from_millis(100));
     window.harness.step();
-    assert_eq!(window.harness.state().frame().map(|frame| frame.number), Some(paused));
+    assert_eq!(window.harness.state().snapshot().map(|snapshot| snapshot.number), Some(paused));
     window.harness.key_press(Key::Period);
-    window.wait("a step", |app| app.frame().is_some_and(|frame| frame.number == paused + 1));
+    window
+        .wait("a step", |app| app.snapshot().is_some_and(|snapshot| snapshot.number == paused + 1));
     window.harness.key_press(Key::R);
-    window.wait("rest", |app| app.frame().is_some_and(|frame| frame.number == 0));
+    window.wait("rest", |app| app.snapshot().is_some_and(|snapshot| snapshot.number == 0));
 }
 
 /// Slides to the ends of rails; every one leaves numbers, and nothing to say.
@@ -384,9 +393,11 @@ fn slide_to_ends(sliders: &[(&str, [f64; 2])]) {
     for (name, ends) in sliders {
         for end in ends {
             window.slide(name, *end);
-            let number = window.harness.state().frame().expect("a frame").number;
-            window.wait("frames", |app| app.frame().is_some_and(|frame| frame.number > number + 1));
-            let is_number = window.lane(0).positions.iter().all(|x| x.is_finite());
+            let number = window.harness.state().snapshot().expect("a frame").number;
+            window.wait("frames", |app| {
+                app.snapshot().is_some_and(|snapshot| snapshot.number > number + 1)
+            });
+            let is_number = window.run(0).positions.iter().all(|x| x.is_finite());
             let texts = window.texts();
             assert!(is_number && texts.is_empty(), "{name} at {end}: {texts:?}");
         }

@@ -1,4 +1,4 @@
-//! What computes: the processor with so many threads, or a graphics processor.
+//! Hardware to measure on: the processor with so many threads, or a graphics processor.
 
 use super::bandwidth;
 use super::measurement::{Bench, DT};
@@ -9,7 +9,7 @@ use viscera::settings::{SolverSettings, Threads};
 use viscera::solver::Solver;
 use viscera::state::State;
 
-/// One that solvers are measured on.
+/// Hardware that solvers are measured on.
 pub trait Computer {
     /// "CPU" or "GPU".
     fn kind(&self) -> &'static str;
@@ -24,9 +24,9 @@ pub trait Computer {
     fn stepper<'a>(&self, bench: &'a Bench<'_>, sweeps: u32) -> Result<Box<dyn Stepper + 'a>>;
 }
 
-/// What steps took, all together.
+/// How long steps took, all together.
 #[derive(Clone, Copy, Debug)]
-pub struct Taken {
+pub struct Elapsed {
     /// By the host's clock, waiting included [s].
     pub wall: f64,
     /// By the device's own clock [s].
@@ -36,21 +36,21 @@ pub struct Taken {
 /// A solver at work.
 pub trait Stepper {
     /// Goes back to rest, then so many steps.
-    fn run(&mut self, count: u32) -> Result<Taken>;
+    fn run(&mut self, count: u32) -> Result<Elapsed>;
 
     /// Whether all that moves is still a number.
     fn is_finite(&self) -> Result<bool>;
 
     /// What is known of it.
-    fn facts(&self) -> Facts;
+    fn facts(&self) -> SolverFacts;
 
-    /// Stages of a step, one by one; none where nobody can tell.
+    /// Stages of a step, one by one; none where they are not timed.
     fn stages(&mut self) -> Result<Vec<StageLine>>;
 }
 
 /// What is known of a solver.
 #[derive(Clone, Debug)]
-pub struct Facts {
+pub struct SolverFacts {
     pub threads: Option<usize>,
     pub instructions: Option<String>,
     /// Of a step.
@@ -125,23 +125,23 @@ pub fn step_size(bench: &Bench<'_>, sweeps: u32, stable_step: f64) -> f64 {
 }
 
 impl Stepper for CpuStepper<'_> {
-    fn run(&mut self, count: u32) -> Result<Taken> {
+    fn run(&mut self, count: u32) -> Result<Elapsed> {
         self.state.clone_from(&State::at_rest(&self.bench.model));
         let start = Instant::now();
         for _ in 0..count {
             let (model, inputs) = (&self.bench.model, &self.bench.inputs);
             self.solver.step(model, &mut self.state, inputs, self.dt)?;
         }
-        Ok(Taken { wall: start.elapsed().as_secs_f64(), device: None })
+        Ok(Elapsed { wall: start.elapsed().as_secs_f64(), device: None })
     }
 
     fn is_finite(&self) -> Result<bool> {
         Ok(self.state.is_finite())
     }
 
-    fn facts(&self) -> Facts {
+    fn facts(&self) -> SolverFacts {
         let bytes = self.bench.model.bytes() + self.state.bytes() + self.solver.bytes();
-        Facts {
+        SolverFacts {
             threads: Some(self.solver.thread_count()),
             instructions: Some(format!("{:?}", self.solver.instructions()).to_lowercase()),
             dispatches: None,
@@ -160,11 +160,11 @@ impl Stepper for CpuStepper<'_> {
 /// A solver at work, and how long its steps took.
 pub struct Runner<'a> {
     pub stepper: Box<dyn Stepper + 'a>,
-    pub facts: Facts,
+    pub facts: SolverFacts,
     /// Steps that are timed together.
     batch: u32,
     /// Of one step.
-    times: Vec<Taken>,
+    times: Vec<Elapsed>,
 }
 
 impl<'a> Runner<'a> {
@@ -190,9 +190,9 @@ impl<'a> Runner<'a> {
     }
 
     pub fn time(&mut self) -> Result<()> {
-        let Taken { wall, device } = self.stepper.run(self.batch)?;
+        let Elapsed { wall, device } = self.stepper.run(self.batch)?;
         let steps = f64::from(self.batch);
-        self.times.push(Taken { wall: wall / steps, device: device.map(|s| s / steps) });
+        self.times.push(Elapsed { wall: wall / steps, device: device.map(|s| s / steps) });
         Ok(())
     }
 
@@ -202,16 +202,16 @@ impl<'a> Runner<'a> {
 
     /// The fastest step by the host's clock [s].
     pub fn fastest(&self) -> f64 {
-        self.times.iter().map(|taken| taken.wall).fold(f64::INFINITY, f64::min)
+        self.times.iter().map(|elapsed| elapsed.wall).fold(f64::INFINITY, f64::min)
     }
 
     /// The fastest step by the device's clock [s].
     pub fn fastest_on_device(&self) -> Option<f64> {
-        self.times.iter().filter_map(|taken| taken.device).min_by(f64::total_cmp)
+        self.times.iter().filter_map(|elapsed| elapsed.device).min_by(f64::total_cmp)
     }
 
     pub fn median(&self) -> f64 {
-        let mut times: Vec<f64> = self.times.iter().map(|taken| taken.wall).collect();
+        let mut times: Vec<f64> = self.times.iter().map(|elapsed| elapsed.wall).collect();
         times.sort_by(f64::total_cmp);
         times[times.len() / 2]
     }

@@ -1,6 +1,6 @@
 //! The graphics processor: solvers on it, and its memory.
 
-use super::computers::{Computer, Facts, StageLine, Stepper, Taken, step_size};
+use super::computers::{Computer, Elapsed, SolverFacts, StageLine, Stepper, step_size};
 use super::measurement::Bench;
 use super::results::AdapterFacts;
 use anyhow::Result;
@@ -111,12 +111,12 @@ impl GpuStepper<'_> {
 }
 
 impl Stepper for GpuStepper<'_> {
-    fn run(&mut self, count: u32) -> Result<Taken> {
+    fn run(&mut self, count: u32) -> Result<Elapsed> {
         self.go_to_rest()?;
         let (model, inputs) = (&self.bench.model, &self.bench.inputs);
         let start = Instant::now();
         let device = self.solver.time_steps(model, inputs, self.dt, count)?;
-        Ok(Taken { wall: start.elapsed().as_secs_f64(), device })
+        Ok(Elapsed { wall: start.elapsed().as_secs_f64(), device })
     }
 
     fn is_finite(&self) -> Result<bool> {
@@ -125,9 +125,9 @@ impl Stepper for GpuStepper<'_> {
         Ok(state.is_finite())
     }
 
-    fn facts(&self) -> Facts {
+    fn facts(&self) -> SolverFacts {
         let [prologue, iteration, epilogue] = self.solver.dispatches();
-        Facts {
+        SolverFacts {
             threads: None,
             instructions: None,
             dispatches: Some(prologue + iteration * self.sweeps as usize + epilogue),

@@ -197,7 +197,7 @@ mod tests {
             let bench = Bench::new(entry, &mesh).expect("a model");
             let bytes = CpuStepper::new(&bench, 1, 1).facts().bytes;
             let each = bytes as f64 / bench.model.tet_count() as f64;
-            let foreseen = crate::memory::kept(&entry.settings());
+            let foreseen = viscera_resources::memory::kept(&entry.settings());
             let (name, close) = (entry.name, 0.5 * foreseen..=foreseen);
             assert!(
                 close.contains(&each),

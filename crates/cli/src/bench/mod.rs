@@ -13,7 +13,7 @@ mod results;
 pub mod solvers;
 pub mod subjects;
 
-use crate::{files, memory, progress};
+use crate::progress;
 use anyhow::{Context, Result};
 use bandwidth::Bandwidth;
 use clap::Args;
@@ -29,7 +29,8 @@ use std::path::PathBuf;
 use subjects::{Size, Subject};
 use viscera::mesh::TetMesh;
 use viscera::settings::MOST_THREADS;
-use viscera_report::{Document, Memory, prepare_file, write_whole};
+use viscera_report::Document;
+use viscera_resources::{Memory, files, memory};
 
 /// Measure what the solvers cost on this machine
 ///
@@ -142,7 +143,7 @@ pub fn execute(arguments: &BenchArguments) -> Result<()> {
     let cases = arguments.cases(own.as_ref(), is_software)?;
     check_memory(&cases, gpu.is_some(), arguments.memory)?;
     let mut document = Document::prepare(&arguments.out.join("bench.md"), "What solvers cost")?;
-    prepare_file(&json, "--json")?;
+    files::prepare_file(&json, "--json")?;
 
     let mut results = Results::new(gpu.as_ref().map(Gpu::facts));
     if is_software && arguments.sizes.is_empty() && own.is_none() {
@@ -166,7 +167,7 @@ pub fn execute(arguments: &BenchArguments) -> Result<()> {
     }
     results.fill(&mut document, &solvers)?;
     document.write()?;
-    write_whole(&json, results.to_json()?.as_bytes())?;
+    files::write_atomic(&json, results.to_json()?.as_bytes())?;
     files::print(&format!(
         "{}report: {}\nnumbers: {}\n",
         results.to_text(),
@@ -175,7 +176,7 @@ pub fn execute(arguments: &BenchArguments) -> Result<()> {
     ))
 }
 
-/// Measures all cases on all computers. What a graphics processor cannot do is told and left out.
+/// Measures all cases on all computers. What a graphics processor cannot do is reported and left out.
 fn measure(
     cases: &[Case<'_>],
     computers: &[Box<dyn Computer>],

@@ -7,7 +7,8 @@ use super::solvers::SolverEntry;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use sysinfo::{CpuRefreshKind, RefreshKind, System};
-use viscera_report::{Axis, Document, Memory, Plot, Series, Style, Table, percent, si};
+use viscera_report::{Axis, Document, Plot, Series, Style, Table, percent, si};
+use viscera_resources::Memory;
 
 /// All of it.
 #[derive(Serialize)]
@@ -36,7 +37,7 @@ pub struct AdapterFacts {
     pub driver: String,
     pub storage_binding_bytes: u64,
     pub buffer_bytes: u64,
-    /// Whether it tells how long its work took.
+    /// Whether it reports how long its work took.
     pub has_clock: bool,
 }
 
@@ -61,10 +62,10 @@ const COLUMNS: [Column; 16] = [
     ("tetrahedra", false, |case| case.tets.to_string()),
     ("solver", false, |case| case.solver.to_owned()),
     ("device", true, |case| case.device.to_owned()),
-    ("threads", false, |case| told(case.threads)),
+    ("threads", false, |case| or_dash(case.threads)),
     ("colours", false, |case| case.colors.to_string()),
-    ("sweeps", false, |case| told(case.sweeps)),
-    ("dispatches", true, |case| told(case.dispatches)),
+    ("sweeps", false, |case| or_dash(case.sweeps)),
+    ("dispatches", true, |case| or_dash(case.dispatches)),
     ("step, median", false, |case| si(case.step_seconds_median, "s")),
     ("step, min", false, |case| si(case.step_seconds_min, "s")),
     ("step, own clock", true, |case| case.step_device_seconds.map_or("-".into(), |s| si(s, "s"))),
@@ -75,10 +76,10 @@ const COLUMNS: [Column; 16] = [
     }),
     ("B/tet", false, |case| digits(case.bytes_per_tet)),
     ("of bandwidth", false, |case| case.bandwidth_fraction.map_or("-".into(), percent)),
-    ("instructions", false, |case| told(case.instructions.as_ref())),
+    ("instructions", false, |case| or_dash(case.instructions.as_ref())),
 ];
 
-fn told(value: Option<impl ToString>) -> String {
+fn or_dash(value: Option<impl ToString>) -> String {
     value.map_or("-".into(), |value| value.to_string())
 }
 
@@ -170,7 +171,7 @@ impl Results {
                 on,
                 si(answer.step_seconds, "s"),
                 si(answer.wall_seconds, "s"),
-                told(answer.dispatches),
+                or_dash(answer.dispatches),
                 answer.bandwidth_fraction.map_or("-".into(), percent),
                 answer.aim_bandwidth_fraction.map_or("-".into(), percent),
             ]);

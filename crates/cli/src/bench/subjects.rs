@@ -1,6 +1,5 @@
 //! What solvers are measured on: procedural bars, or a mesh of one's own.
 
-use crate::files;
 use anyhow::{Context, Result};
 use std::borrow::Cow;
 use std::path::Path;
@@ -8,6 +7,7 @@ use viscera::mesh::shapes::{self, MAX_TETS};
 use viscera::mesh::{TetMesh, io};
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::solver::{Inputs, Pin};
+use viscera_resources::files;
 
 /// Of a bar, which is four times as long as wide [m].
 const LENGTH: f64 = 0.2;

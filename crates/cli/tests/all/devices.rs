@@ -54,11 +54,17 @@ fn every_adapter_is_listed_with_its_limits_and_speed() {
 fn a_run_says_what_computed_it() {
     let bench = Bench::new(TINY);
     let end = bench.run(&["--frames", "2"]);
-    let told = end.stdout.lines().find_map(|line| line.strip_prefix("device: "));
-    let told = told.expect("a line about the device");
-    assert!(told.starts_with("CPU: the mesh has 10 tetrahedra; a GPU pays from about"), "{told}");
+    let printed = end.stdout.lines().find_map(|line| line.strip_prefix("device: "));
+    let printed = printed.expect("a line about the device");
+    assert!(
+        printed.starts_with("CPU: the mesh has 10 tetrahedra; a GPU pays from about"),
+        "{printed}"
+    );
     let summary = bench.summary("out");
-    assert_eq!((&summary["device"], &summary["solver"]["device"]), (&told.into(), &"auto".into()));
+    assert_eq!(
+        (&summary["device"], &summary["solver"]["device"]),
+        (&printed.into(), &"auto".into())
+    );
 
     let gpu = bench.summary_of(&["--frames", "2", "--set", "solver.device=gpu"]);
     let device = gpu["device"].as_str().expect("text");

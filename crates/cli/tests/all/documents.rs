@@ -11,9 +11,9 @@ fn scene_documentation_is_current() {
         .expect("viscera starts");
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/scene.md");
     let written = std::fs::read_to_string(&path).unwrap_or_default().replace("\r\n", "\n");
-    let told = String::from_utf8(output.stdout).expect("UTF-8");
+    let printed = String::from_utf8(output.stdout).expect("UTF-8");
     assert!(
-        written == told,
+        written == printed,
         "docs/scene.md is not what the program says; run\n\
          cargo run --release -- scene describe --markdown > docs/scene.md"
     );

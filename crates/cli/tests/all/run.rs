@@ -155,7 +155,7 @@ fn the_picture_shows_the_moment_asked_for() {
     assert_ne!(picture(&["--set", "output.picture_time=0.1 s"]), last);
 }
 
-/// Strain is round-off then, and says nothing of the stiffness. A budget that slows the fall is still
+/// Strain is round-off then, and says nothing of the stiffness. A number of iterations that slows the fall is still
 /// named.
 #[test]
 fn a_falling_body_is_not_called_stiff() {

@@ -122,11 +122,11 @@ impl Pattern {
 
 /// Values for a pattern.
 #[derive(Clone, Debug)]
-pub struct Assembly {
+pub struct MatrixValues {
     values: Vec<f64>,
 }
 
-impl Assembly {
+impl MatrixValues {
     /// Zeros.
     pub fn new(pattern: &Pattern) -> Self {
         Self { values: vec![0.0; pattern.rows.len()] }
@@ -249,7 +249,11 @@ impl Factorization {
     }
 
     /// Factorises.
-    pub fn factorize(&mut self, pattern: &Pattern, matrix: &Assembly) -> Result<(), FactorError> {
+    pub fn factorize(
+        &mut self,
+        pattern: &Pattern,
+        matrix: &MatrixValues,
+    ) -> Result<(), FactorError> {
         if !matrix.values.iter().all(|value| value.is_finite()) {
             return Err(FactorError::Indefinite);
         }

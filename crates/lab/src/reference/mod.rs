@@ -264,7 +264,7 @@ impl Reference {
     }
 
     /// The incremental potential [J] of a step from `state` at places `x` [m] and, before it, at the start
-    /// of the step with pins moved; pinned vertices have no inertia. Infinite where `x` are no numbers.
+    /// of the step with pins moved; pinned vertices have no inertia. Infinite where `x` is NaN.
     pub fn incremental(
         &self,
         state: &State<f64>,

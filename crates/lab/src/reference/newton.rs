@@ -159,7 +159,7 @@ fn factorize(
             }
         }
     }
-    // Not even a multiple of the identity helps: there are no numbers in it.
+    // Not even a multiple of the identity helps: its entries are NaN.
     Err(FactorError::Indefinite)
 }
 

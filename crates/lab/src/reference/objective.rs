@@ -11,7 +11,7 @@ use viscera::elements::{green_strain, spring};
 use viscera::scalar::{Mat3, Vec3};
 use viscera::solver::Tether;
 
-use super::matrix::{Assembly, Pattern};
+use super::matrix::{MatrixValues, Pattern};
 use super::problem::{Problem, TetElements};
 use super::tissue::{Creep, block, project};
 
@@ -150,9 +150,9 @@ impl Objective<'_> {
 
     /// Hessian of `Phi` [N/m] by the free vertices. `positive`: with the negative curvature of every
     /// quadrature point and spring left out.
-    pub fn hessian(&self, x: &[Vec3<f64>], pattern: &Pattern, positive: bool) -> Assembly {
+    pub fn hessian(&self, x: &[Vec3<f64>], pattern: &Pattern, positive: bool) -> MatrixValues {
         let problem = self.problem;
-        let mut matrix = Assembly::new(pattern);
+        let mut matrix = MatrixValues::new(pattern);
         let creep = |point| self.creep(point);
         add_stiffness(problem, &problem.linear, x, creep, positive, pattern, &mut matrix);
         add_stiffness(problem, &problem.quadratic, x, |_| None, positive, pattern, &mut matrix);
@@ -216,7 +216,7 @@ fn add_stiffness<'a, const N: usize>(
     creep: impl Fn(usize) -> Option<&'a Creep>,
     positive: bool,
     pattern: &Pattern,
-    matrix: &mut Assembly,
+    matrix: &mut MatrixValues,
 ) {
     for (i, point) in elements.points.iter().enumerate() {
         let tet = elements.tet_of(i);

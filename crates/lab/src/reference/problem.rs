@@ -10,7 +10,7 @@ use viscera::mesh::TetMesh;
 use viscera::model::Model;
 use viscera::scalar::{Mat3, Vec3};
 
-use super::tissue::Tissue;
+use super::tissue::TissueLaw;
 
 /// One quadrature point of a tetrahedron.
 #[derive(Clone, Copy, Debug)]
@@ -88,7 +88,7 @@ pub struct Problem {
     /// function. Negative at the corners of quadratic tetrahedra, as it must be.
     pub masses: Vec<f64>,
     /// Materials in use.
-    pub tissues: Vec<Tissue>,
+    pub tissues: Vec<TissueLaw>,
     /// Linear tetrahedra.
     pub linear: TetElements<4>,
     /// Quadratic tetrahedra.
@@ -108,7 +108,7 @@ impl Problem {
         let mut linear = TetElements::new(1);
         for set in &model.tet_sets {
             let first = tissues.len() as u32;
-            tissues.extend(model.materials.iter().map(|material| Tissue {
+            tissues.extend(model.materials.iter().map(|material| TissueLaw {
                 model: set.model,
                 lame_lambda: material.lame_lambda,
                 lame_mu: material.lame_mu,
@@ -189,7 +189,7 @@ impl Problem {
         Self {
             rest_positions,
             masses,
-            tissues: vec![Tissue {
+            tissues: vec![TissueLaw {
                 model: material.model(),
                 lame_lambda: material.lame_lambda(),
                 lame_mu: material.lame_mu(),

@@ -19,7 +19,7 @@ pub type Stiffness = [[f64; 9]; 9];
 
 /// The constants of one material.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tissue {
+pub struct TissueLaw {
     /// Its energy.
     pub model: MaterialModel,
     /// Lame's first parameter [Pa].
@@ -39,7 +39,7 @@ pub struct Creep {
     pub rate: f64,
 }
 
-impl Tissue {
+impl TissueLaw {
     /// Energy density [Pa].
     pub fn energy_density(&self, f: &Mat3<f64>, creep: Option<&Creep>) -> f64 {
         let (lambda, mu) = (self.lame_lambda, self.lame_mu);
@@ -143,7 +143,7 @@ fn cofactor_change(f: &Mat3<f64>, direction: &Mat3<f64>) -> Mat3<f64> {
 /// The nearest positive semi-definite matrix: negative eigenvalues become zero.
 pub fn project(matrix: &mut Stiffness) {
     let full = Mat::from_fn(9, 9, |i, j| 0.5 * (matrix[i][j] + matrix[j][i]));
-    // Only a matrix with entries that are no numbers has no eigenvalues; it stays what it is.
+    // Only a matrix with NaN entries has no eigenvalues; it stays what it is.
     let Ok(eigen) = full.self_adjoint_eigen(Side::Lower) else { return };
     let (values, vectors) = (eigen.S().column_vector(), eigen.U());
     *matrix = [[0.0; 9]; 9];

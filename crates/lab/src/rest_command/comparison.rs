@@ -12,7 +12,8 @@ use super::path::Rest;
 use crate::reference::Reference;
 use crate::sections::Progress;
 use crate::settling::{Distance, KEPT_VELOCITY};
-use viscera_report::{Memory, percent, scientific};
+use viscera_report::{percent, scientific};
+use viscera_resources::Memory;
 
 /// Time [s] given to the body to settle after the scene has ended.
 const SETTLING: f64 = 3.0;

@@ -6,14 +6,16 @@ mod path;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
-use std::path::{Path as FilePath, PathBuf};
+use std::path::{Path, PathBuf};
 use viscera::measure::{TetMeasure, measure_displacements, measure_tets, summarize_deformation};
 use viscera::mesh::io::vtu::{self, Array};
 use viscera::simulation::Simulation;
 
 use crate::sections::Progress;
-use path::{Path, Rest};
-use viscera_report::{Memory, percent, prepare_file, scientific, si, write_whole};
+use path::{LoadPath, Rest};
+use viscera_report::{percent, scientific, si};
+use viscera_resources::Memory;
+use viscera_resources::files::{prepare_file, write_atomic};
 
 /// Find the exact state of rest at the end of a scene with the Newton reference
 ///
@@ -71,7 +73,7 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
     let taken = scene.motions.iter().find(|motion| motion.start > 0.0);
     if let Some(motion) = taken {
         bail!(
-            "{}: motion `{}` takes hold of moving tissue at {} s, which no state of rest tells of; let it start \
+            "{}: motion `{}` takes hold of moving tissue at {} s, which a state of rest does not determine; let it start \
              at 0 s",
             scene.name,
             motion.name,
@@ -87,7 +89,7 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
         );
     }
     let simulation = Simulation::<f64>::new(scene, assembly)?;
-    let mut path = Path::new(&simulation, arguments.parts, arguments.memory)?;
+    let mut path = LoadPath::new(&simulation, arguments.parts, arguments.memory)?;
     for note in &simulation.assembly().notes {
         eprintln!("note: {note}");
     }
@@ -193,7 +195,7 @@ fn write(
     simulation: &Simulation<f64>,
     rest: &Rest,
     measures: &[TetMeasure],
-    out: &FilePath,
+    out: &Path,
 ) -> Result<()> {
     let (mut tets, mut bodies) = (Vec::new(), Vec::new());
     for (index, body) in simulation.assembly().bodies.iter().enumerate() {
@@ -213,5 +215,5 @@ fn write(
         Array::integers("body", &bodies),
     ];
     let bytes = vtu::write(&rest.positions, &tets, &point_data, &cell_data);
-    write_whole(out, &bytes.with_context(|| format!("cannot write {}", out.display()))?)
+    write_atomic(out, &bytes.with_context(|| format!("cannot write {}", out.display()))?)
 }

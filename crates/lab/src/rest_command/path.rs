@@ -7,7 +7,7 @@ use anyhow::{Result, anyhow};
 use viscera::scalar::Vec3;
 use viscera::simulation::Simulation;
 use viscera::solver::Inputs;
-use viscera_report::Memory;
+use viscera_resources::Memory;
 
 use crate::reference::{Convergence, Cost, Reference, ReferenceError, Standing};
 use crate::sections::Progress;
@@ -20,7 +20,7 @@ struct Stop {
 }
 
 /// The way to the end of a scene.
-pub struct Path<'a> {
+pub struct LoadPath<'a> {
     simulation: &'a Simulation<f64>,
     reference: Reference,
     memory: Memory,
@@ -62,7 +62,7 @@ impl Rest {
     }
 }
 
-impl<'a> Path<'a> {
+impl<'a> LoadPath<'a> {
     /// Divides the scene's time; fails where a body has no state of rest at one of the times.
     pub fn new(simulation: &'a Simulation<f64>, parts: u32, memory: Memory) -> Result<Self> {
         let scene = simulation.scene();

@@ -8,7 +8,7 @@ use viscera::material::{Material, MaterialModel};
 use viscera::mesh::{TetMesh, io};
 use viscera::units::Dimension;
 
-use crate::scenes::{Scene, Size, tissue};
+use crate::load_cases::{LoadCase, Size, tissue};
 
 /// Changes to the scenes of a study, from `--set KEY=VALUE`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -61,7 +61,7 @@ impl Changes {
         let tissue = changes.tissue(MaterialModel::StableNeoHookean, 1e4, 0.45).context("--set")?;
         if changes.mesh.is_some() {
             for name in BARS {
-                changes.scene(name, Size::Tiny, tissue)?;
+                changes.load_case(name, Size::Tiny, tissue)?;
             }
         }
         Ok(changes)
@@ -102,14 +102,14 @@ impl Changes {
         tissue(model, self.young.unwrap_or(young), self.poisson.unwrap_or(poisson))
     }
 
-    /// A scene of [`Scene::new`]; a mesh of the user's takes the place of a bar.
-    pub fn scene(&self, name: &'static str, size: Size, tissue: Material) -> Result<Scene> {
-        let scene = Scene::new(name, size, tissue)?;
+    /// A scene of [`LoadCase::new`]; a mesh of the user's takes the place of a bar.
+    pub fn load_case(&self, name: &'static str, size: Size, tissue: Material) -> Result<LoadCase> {
+        let load_case = LoadCase::new(name, size, tissue)?;
         match &self.mesh {
-            Some(UserMesh { path, mesh }) if BARS.contains(&name) => scene
+            Some(UserMesh { path, mesh }) if BARS.contains(&name) => load_case
                 .with_bar(TetMesh::clone(mesh))
                 .with_context(|| format!("--set mesh={}", path.display())),
-            _ => Ok(scene),
+            _ => Ok(load_case),
         }
     }
 }

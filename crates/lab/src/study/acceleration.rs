@@ -8,9 +8,11 @@ use super::coloring::bar_from_rest;
 use super::convergence::{
     COST_AND_DEVICE_CASES, Figure, Followed, Reach, follow_on_both, in_words, judge_device, table,
 };
-use super::methods::{COLORED, JACOBI, Method, anderson, chebyshev, exact, published, relaxed};
+use super::methods::{
+    COLORED, JACOBI, NamedSettings, anderson, chebyshev, exact, published, relaxed,
+};
 use super::{Context, Section, artefact, multipliers};
-use crate::scenes::Size;
+use crate::load_cases::Size;
 
 pub(super) const SECTION: Section = Section {
     name: "acceleration",
@@ -28,12 +30,12 @@ const COLORED_ON_BOTH: &str = "coloured, Anderson on both";
 const EXACT_ON_BOTH: &str = "exact form, Anderson on both";
 
 /// The accelerations of one kind of sweep; `omega` is what it bears.
-fn family(name: &str, plain: &SolverSettings, omega: f64) -> Vec<Method> {
-    let method = |what: &str, settings| Method::new(format!("{name}, {what}"), settings);
+fn family(name: &str, plain: &SolverSettings, omega: f64) -> Vec<NamedSettings> {
+    let method = |what: &str, settings| NamedSettings::new(format!("{name}, {what}"), settings);
     let relax = |form| relaxed(plain.clone(), omega, form);
     let mix = |on| anderson(plain.clone(), on);
     vec![
-        Method::new(name, plain.clone()),
+        NamedSettings::new(name, plain.clone()),
         method(&format!("omega {omega} consistent"), relax(RelaxationForm::Consistent)),
         method(&format!("omega {omega} published"), relax(RelaxationForm::Published)),
         method("Chebyshev measured", chebyshev(plain.clone(), 0.0)),
@@ -44,26 +46,26 @@ fn family(name: &str, plain: &SolverSettings, omega: f64) -> Vec<Method> {
 }
 
 /// Over Jacobi sweeps: the plain ones take the most iterations by far.
-fn jacobi_methods(quick: bool) -> Vec<Method> {
+fn jacobi_methods(quick: bool) -> Vec<NamedSettings> {
     let mut methods = family("Jacobi", &published(JACOBI), 1.5);
     // Tuned by hand on this scene; nobody knows it beforehand.
     let tuned = chebyshev(published(JACOBI), 0.997);
-    methods.insert(4, Method::new("Jacobi, Chebyshev 0.997", tuned));
+    methods.insert(4, NamedSettings::new("Jacobi, Chebyshev 0.997", tuned));
     with_iterations(methods, if quick { 300 } else { 3000 })
 }
 
 /// Over coloured sweeps, and the exact form of them.
-fn colored_methods(quick: bool) -> Vec<Method> {
+fn colored_methods(quick: bool) -> Vec<NamedSettings> {
     let mut methods = family("coloured", &published(COLORED), 1.2);
     let exact = exact(COLORED);
     let mixed = anderson(exact.clone(), AndersonOn::Both);
     // Before the two that are drawn dashed in colours which come for the second time.
-    methods.insert(5, Method::new("exact form", exact));
-    methods.insert(6, Method::new(EXACT_ON_BOTH, mixed));
+    methods.insert(5, NamedSettings::new("exact form", exact));
+    methods.insert(6, NamedSettings::new(EXACT_ON_BOTH, mixed));
     with_iterations(methods, if quick { 100 } else { 1000 })
 }
 
-fn with_iterations(methods: Vec<Method>, iterations: u32) -> Vec<Method> {
+fn with_iterations(methods: Vec<NamedSettings>, iterations: u32) -> Vec<NamedSettings> {
     methods.into_iter().map(|method| method.with_iterations(iterations)).collect()
 }
 
@@ -96,7 +98,7 @@ fn introduce(context: &mut Context) {
          scaled and mixed with the same weights the tie holds as far as it is linear. The dashed curves do \
          otherwise: published over-relaxation scales positions alone, so that `M (x - xt) = omega J^T l` \
          and the tissue is `omega` times as stiff; Anderson on positions leaves the multipliers behind; \
-         Anderson on multipliers makes the tie anew after each mixture, `x = xt + M^-1 J(x)^T l`. These two \
+         Anderson on multipliers makes the tie anew after each accelerated iterate, `x = xt + M^-1 J(x)^T l`. These two \
          have parts of their own below.",
     );
 }
@@ -151,14 +153,14 @@ fn judge(context: &mut Context, followed: &[Followed]) {
             in_words(exact.curve.last())
         ));
     }
-    if let Some(look) = mixed.looks.last() {
-        let [device, cpu] = look.errors.map(in_words);
+    if let Some(sample) = mixed.samples.last() {
+        let [device, cpu] = sample.errors.map(in_words);
         context.document.paragraph(format!(
             "Markers are of single precision, by the CPU and by the GPU backend. Anderson's method looks for \
              small differences of large vectors and feels the rounding: over Jacobi sweeps both may part from \
              the line where it wants weights more exact than that; after {} iterations the CPU is at {cpu}, the \
              GPU at {device}. Compare them with the markers on plain sweeps.",
-            look.iterations
+            sample.iterations
         ));
     }
     let [jacobi, anderson] = [plain, mixed].map(|method| Reach::of(&method.curve, 0.1));

@@ -10,7 +10,7 @@ use super::Context;
 use super::convergence::{in_data, in_words};
 use super::methods::{COLORED, JACOBI, anderson, exact, published};
 use super::step::{Curve, MeasuredStep};
-use crate::scenes::Size;
+use crate::load_cases::Size;
 
 /// Young's modulus [Pa]: soft tissue, under stress that shows.
 const YOUNG: f64 = 1e4;
@@ -25,7 +25,7 @@ const RATIO: [f64; 2] = [0.5, 0.9];
 const POSITIONS: &str = "Jacobi, on positions";
 const BOTH: &str = "Jacobi, on both";
 
-fn budgets(quick: bool) -> &'static [u32] {
+fn iteration_counts(quick: bool) -> &'static [u32] {
     if quick { &[5, 20, 80] } else { &[2, 5, 10, 20, 50, 100, 200, 400] }
 }
 
@@ -48,14 +48,14 @@ struct Case<'a> {
 }
 
 impl Case<'_> {
-    fn scene(&self) -> String {
-        format!("{}, frame {}", self.step.scene.name, self.step.history + 1)
+    fn load_case(&self) -> String {
+        format!("{}, frame {}", self.step.load_case.name, self.step.history + 1)
     }
 }
 
 impl fmt::Display for Case<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, Anderson, {}, {}", self.scene(), self.mix, self.settings.iterations)
+        write!(f, "{}, Anderson, {}, {}", self.load_case(), self.mix, self.settings.iterations)
     }
 }
 
@@ -69,7 +69,7 @@ impl fmt::Display for Moment {
 }
 
 pub(super) fn case_count(quick: bool) -> usize {
-    MOMENTS.len() * (1 + mixes().len() * budgets(quick).len())
+    MOMENTS.len() * (1 + mixes().len() * iteration_counts(quick).len())
 }
 
 pub(super) fn run(context: &mut Context) -> Result<()> {
@@ -79,12 +79,12 @@ pub(super) fn run(context: &mut Context) -> Result<()> {
     let moments = MOMENTS.map(|(name, frames)| Moment(name, frames));
     let changes = context.changes;
     let steps = context.run_cases(&moments, |Moment(name, frames)| {
-        MeasuredStep::new(changes.scene(name, size, tissue)?, *frames)
+        MeasuredStep::new(changes.load_case(name, size, tissue)?, *frames)
     })?;
     let mut cases = Vec::new();
     for step in &steps {
         for (mix, settings) in mixes() {
-            cases.extend(budgets(context.quick).iter().map(|&iterations| {
+            cases.extend(iteration_counts(context.quick).iter().map(|&iterations| {
                 let settings = SolverSettings { iterations, ..settings.clone() };
                 Case { step, mix, settings }
             }));
@@ -117,7 +117,7 @@ fn groups<'a>(
     cases: &'a [Case],
     curves: &'a [Curve],
 ) -> impl Iterator<Item = (&'a [Case<'a>], &'a [Curve])> {
-    let count = budgets(quick).len();
+    let count = iteration_counts(quick).len();
     cases.chunks(count).zip(curves.chunks(count))
 }
 
@@ -131,20 +131,20 @@ fn figure(context: &mut Context, cases: &[Case], curves: &[Curve]) -> Result<()>
     let mut data =
         Table::new(["scene", "anderson", "iterations", "strain ratio", "error at the end"]);
     for (cases, curves) in groups(context.quick, cases, curves) {
-        let (scene, mix) = (cases[0].scene(), cases[0].mix);
+        let (load_case, mix) = (cases[0].load_case(), cases[0].mix);
         let mut points = Vec::new();
         for (case, curve) in cases.iter().zip(curves) {
             let (iterations, ratio) = (case.settings.iterations, curve.strain_ratio);
             points.push([f64::from(iterations), ratio]);
             let (iterations, ratio) = (iterations.to_string(), format!("{ratio:.6}"));
-            data.row([&scene, mix, &iterations, &ratio, &in_data(curve.last())]);
+            data.row([&load_case, mix, &iterations, &ratio, &in_data(curve.last())]);
         }
         let (what, style) = match mix {
             POSITIONS => ("positions", Style::MarkedLine),
             BOTH => ("both", Style::Dashed),
             _ => continue,
         };
-        plot.series(Series::new(format!("{scene}, {what}"), points).with_style(style));
+        plot.series(Series::new(format!("{load_case}, {what}"), points).with_style(style));
     }
     context.plot(
         "acceleration-strain",
@@ -161,13 +161,13 @@ fn conclude(context: &mut Context, cases: &[Case], curves: &[Curve]) {
     let mut stiff = Vec::new();
     for (cases, curves) in groups(context.quick, cases, curves) {
         let (Some(case), Some(curve)) = (cases.last(), curves.last()) else { continue };
-        let (scene, ratio) = (case.scene(), curve.strain_ratio);
-        table.row([&scene, case.mix, &format!("{ratio:.3}"), &in_words(curve.last())]);
+        let (load_case, ratio) = (case.load_case(), curve.strain_ratio);
+        table.row([&load_case, case.mix, &format!("{ratio:.3}"), &in_words(curve.last())]);
         if case.mix == POSITIONS {
-            stiff.push((scene, ratio));
+            stiff.push((load_case, ratio));
         }
     }
-    let iterations = budgets(context.quick).last().copied().unwrap_or(0);
+    let iterations = iteration_counts(context.quick).last().copied().unwrap_or(0);
     context
         .document
         .paragraph(format!("After {iterations} iterations (everybody starts with error 1):"));
@@ -179,7 +179,7 @@ fn conclude(context: &mut Context, cases: &[Case], curves: &[Curve]) {
     );
     let within = stiff.iter().all(|(_, ratio)| (RATIO[0]..=RATIO[1]).contains(ratio));
     let measured: Vec<String> =
-        stiff.iter().map(|(scene, ratio)| format!("{scene}: {ratio:.2}")).collect();
+        stiff.iter().map(|(load_case, ratio)| format!("{load_case}: {ratio:.2}")).collect();
     // On the few tetrahedra of a quick run all methods come to their end and the artefact is small.
     if !context.quick {
         context.verdict(

@@ -8,12 +8,12 @@ use viscera::state::State;
 
 use super::convergence::in_data;
 use super::device;
-use super::methods::{COLORED, JACOBI, Method, anderson, chebyshev, published, relaxed};
+use super::methods::{COLORED, JACOBI, NamedSettings, anderson, chebyshev, published, relaxed};
 use super::panels::{self, Panel};
 use super::step::{Cost, MeasuredStep};
 use super::{Context, Section};
+use crate::load_cases::{LoadCase, Size};
 use crate::reference::Reference;
-use crate::scenes::{Scene, Size};
 use viscera_report::{Table, percent, si};
 
 pub(super) const COLORS: Section = Section {
@@ -41,32 +41,32 @@ const OMEGA: [f64; 2] = [1.8, 1.2];
 /// The name of the method that has its own truth.
 const SMALL_STEPS: &str = "40 small steps";
 
-fn colors() -> Vec<Method> {
+fn colors() -> Vec<NamedSettings> {
     let limited = |count| published(Colors::Limited(count));
     vec![
-        Method::new("Jacobi", published(JACOBI)),
-        Method::new("clique, 4 colours", limited(4)),
-        Method::new("clique, 8 colours", limited(8)),
-        Method::new("coloured", published(COLORED)),
+        NamedSettings::new("Jacobi", published(JACOBI)),
+        NamedSettings::new("clique, 4 colours", limited(4)),
+        NamedSettings::new("clique, 8 colours", limited(8)),
+        NamedSettings::new("coloured", published(COLORED)),
     ]
 }
 
-fn accelerations(order: Colors) -> Vec<Method> {
+fn accelerations(order: Colors) -> Vec<NamedSettings> {
     let plain = published(order);
     let omega = if order == JACOBI { OMEGA[0] } else { OMEGA[1] };
     let relaxed = |form| relaxed(plain.clone(), omega, form);
     vec![
-        Method::new("plain", plain.clone()),
-        Method::new("over-relaxed, published", relaxed(RelaxationForm::Published)),
-        Method::new("over-relaxed, consistent", relaxed(RelaxationForm::Consistent)),
-        Method::new("Chebyshev", chebyshev(plain.clone(), 0.0)),
-        Method::new("Anderson", anderson(plain.clone(), AndersonOn::Both)),
-        Method::new(SMALL_STEPS, SolverSettings { substeps: ITERATIONS, ..plain.clone() }),
+        NamedSettings::new("plain", plain.clone()),
+        NamedSettings::new("over-relaxed, published", relaxed(RelaxationForm::Published)),
+        NamedSettings::new("over-relaxed, consistent", relaxed(RelaxationForm::Consistent)),
+        NamedSettings::new("Chebyshev", chebyshev(plain.clone(), 0.0)),
+        NamedSettings::new("Anderson", anderson(plain.clone(), AndersonOn::Both)),
+        NamedSettings::new(SMALL_STEPS, SolverSettings { substeps: ITERATIONS, ..plain.clone() }),
     ]
 }
 
 /// All have as many sweeps: small steps have one each.
-fn scheduled(mut method: Method) -> Method {
+fn scheduled(mut method: NamedSettings) -> NamedSettings {
     method.settings.iterations = ITERATIONS / method.settings.substeps;
     method
 }
@@ -74,17 +74,17 @@ fn scheduled(mut method: Method) -> Method {
 fn step(context: &Context) -> Result<MeasuredStep> {
     let size = if context.quick { Size::Tiny } else { Size::Large };
     let tissue = context.changes.tissue(MaterialModel::SaintVenantKirchhoff, YOUNG, POISSON)?;
-    let scene = context.changes.scene("twist", size, tissue)?;
-    MeasuredStep::new(Scene { path_frames: HURRIED, ..scene }, 0)
+    let load_case = context.changes.load_case("twist", size, tissue)?;
+    MeasuredStep::new(LoadCase { path_frames: HURRIED, ..load_case }, 0)
 }
 
 /// The exact end [m] of a frame of so many small steps.
 fn exact_small_steps(step: &MeasuredStep, count: u32) -> Result<Vec<Vec3<f64>>> {
-    let model = step.scene.model::<f64>(&SolverSettings::default())?;
+    let model = step.load_case.model::<f64>(&SolverSettings::default())?;
     let mut reference = Reference::new(&model);
     let mut state = State::at_rest(&model);
     for small in 1..=count {
-        let inputs = step.scene.inputs(f64::from(small) / f64::from(count));
+        let inputs = step.load_case.inputs(f64::from(small) / f64::from(count));
         reference
             .step(&mut state, &inputs, step.dt / f64::from(count))
             .with_context(|| format!("the reference of small step {small}"))?;
@@ -94,14 +94,18 @@ fn exact_small_steps(step: &MeasuredStep, count: u32) -> Result<Vec<Vec3<f64>>> 
 
 /// What became of a body.
 struct Body {
-    method: Method,
+    method: NamedSettings,
     double: Vec<Vec3<f64>>,
     /// In single precision by the CPU, and by the GPU where there is one.
     single: Vec<Vec3<f64>>,
     device: Option<Vec<Vec3<f64>>>,
 }
 
-fn bodies(context: &Context, step: &MeasuredStep, methods: Vec<Method>) -> Result<Vec<Body>> {
+fn bodies(
+    context: &Context,
+    step: &MeasuredStep,
+    methods: Vec<NamedSettings>,
+) -> Result<Vec<Body>> {
     let ends = context.run_cases(&methods, |method| {
         Ok((step.end::<f64>(&method.settings)?, step.end::<f32>(&method.settings)?))
     })?;
@@ -172,7 +176,7 @@ fn show(
             truth: truth.to_vec(),
         });
     }
-    let image = panels::draw(&step.scene, &panels, if panels.len() > 4 { 3 } else { 2 })?;
+    let image = panels::draw(&step.load_case, &panels, if panels.len() > 4 { 3 } else { 2 })?;
     let words =
         format!("{} bars after one step, each with the true one as an outline", panels.len());
     let see = format!(
@@ -204,10 +208,10 @@ fn judge(context: &mut Context, name: &str, step: &MeasuredStep, bodies: &[Body]
 }
 
 fn introduce(context: &mut Context, step: &MeasuredStep) {
-    let scene = &step.scene;
-    let moved = scene.driven.iter().map(|&v| {
-        let x = scene.mesh.vertices()[v as usize];
-        (scene.path.at(x, 1.0 / f64::from(HURRIED)) - x).length()
+    let load_case = &step.load_case;
+    let moved = load_case.driven.iter().map(|&v| {
+        let x = load_case.mesh.vertices()[v as usize];
+        (load_case.path.at(x, 1.0 / f64::from(HURRIED)) - x).length()
     });
     context.document.paragraph(format!(
         "A bar of {} tetrahedra, Green strain (Saint Venant-Kirchhoff), E = {}, nu = {}, is held at its left \
@@ -219,9 +223,9 @@ fn introduce(context: &mut Context, step: &MeasuredStep) {
          iteration costs on a GPU, with those around the iterations; *ms*: the whole frame on one thread of the \
          processor. *GPU from CPU*: distance of the two \
          in single precision; *rounding*: of the CPU in single precision from double. {}",
-        scene.mesh.tets().len(),
-        si(scene.tissue.young(), "Pa"),
-        scene.tissue.poisson(),
+        load_case.mesh.tets().len(),
+        si(load_case.tissue.young(), "Pa"),
+        load_case.tissue.poisson(),
         si(moved.fold(0.0, f64::max), "m"),
         device::describe(),
     ));

@@ -7,10 +7,10 @@ use viscera::settings::Colors;
 use super::convergence::{
     COST_AND_DEVICE_CASES, Figure, Followed, Reach, follow_on_both, judge_device, table,
 };
-use super::methods::{COLORED, JACOBI, Method, published};
+use super::methods::{COLORED, JACOBI, NamedSettings, published};
 use super::step::MeasuredStep;
 use super::{Context, Section, device};
-use crate::scenes::Size;
+use crate::load_cases::Size;
 
 pub(super) const SECTION: Section = Section {
     name: "coloring",
@@ -22,14 +22,14 @@ pub(super) const SECTION: Section = Section {
 /// The stiff bar at the moment at which gravity sets in: all of published XPBD comes near its end.
 pub(super) fn bar_from_rest(context: &Context, size: Size) -> Result<MeasuredStep> {
     let tissue = context.changes.tissue(MaterialModel::SaintVenantKirchhoff, 1e5, 0.45)?;
-    MeasuredStep::new(context.changes.scene("cantilever", size, tissue)?, 0)
+    MeasuredStep::new(context.changes.load_case("cantilever", size, tissue)?, 0)
 }
 
 /// From one colour to as many as it takes, with fewer iterations where fewer suffice.
-fn methods(quick: bool) -> Vec<Method> {
+fn methods(quick: bool) -> Vec<NamedSettings> {
     let method = |name: &str, colors, iterations| {
         let iterations = if quick { iterations / 20 } else { iterations };
-        Method::new(name, published(colors)).with_iterations(iterations)
+        NamedSettings::new(name, published(colors)).with_iterations(iterations)
     };
     vec![
         method("Jacobi (1 colour)", JACOBI, 6000),
@@ -79,7 +79,7 @@ fn introduce(context: &mut Context, step: &MeasuredStep) {
          round-off, in the norm of the masses. The scene: {}, Green strain; gravity sets in, and one \
          step of 1/60 s is made. All methods here are XPBD as published (Macklin et al. 2016), with the \
          six strains of a tetrahedron as one block: multipliers start from zero in every step.",
-        step.scene
+        step.load_case
     ));
     context.document.paragraph(
         "Tetrahedra that share a vertex must not be solved at the same time. Colouring sorts them into \

@@ -5,8 +5,8 @@ use std::fmt;
 use viscera::settings::{Acceleration, AndersonOn, RelaxationForm, SolverSettings};
 
 use super::Context;
-use super::device::{self, Look};
-use super::methods::Method;
+use super::device::{self, DeviceSample};
+use super::methods::NamedSettings;
 use super::step::{Cost, Curve, MeasuredStep};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 
@@ -30,18 +30,18 @@ const SINGLE: [&str; 2] = ["GPU, single precision", "CPU, single precision"];
 
 /// What a table and a figure need of a method.
 pub(super) struct Followed {
-    pub method: Method,
+    pub method: NamedSettings,
     pub curve: Curve,
     pub cost: Cost,
     /// By the GPU backend, where it was asked and there is an adapter.
-    pub looks: Vec<Look>,
+    pub samples: Vec<DeviceSample>,
 }
 
 /// Follows every method through its iterations, in double precision.
 pub(super) fn follow(
     context: &Context,
     step: &MeasuredStep,
-    methods: Vec<Method>,
+    methods: Vec<NamedSettings>,
 ) -> Result<Vec<Followed>> {
     let curves = context.run_cases(&methods, |method| step.follow::<f64>(&method.settings))?;
     // One after the other: methods side by side would take the processor's time from each other.
@@ -50,7 +50,7 @@ pub(super) fn follow(
     })?;
     let all = methods.into_iter().zip(curves).zip(costs.into_iter().flatten());
     let followed =
-        all.map(|((method, curve), cost)| Followed { method, curve, cost, looks: Vec::new() });
+        all.map(|((method, curve), cost)| Followed { method, curve, cost, samples: Vec::new() });
     Ok(followed.collect())
 }
 
@@ -58,29 +58,29 @@ pub(super) fn follow(
 pub(super) fn follow_on_both(
     context: &Context,
     step: &MeasuredStep,
-    methods: Vec<Method>,
+    methods: Vec<NamedSettings>,
 ) -> Result<Vec<Followed>> {
     let mut followed = follow(context, step, methods)?;
-    let looks = context.run_cases(&["the GPU backend"], |_| {
+    let samples = context.run_cases(&["the GPU backend"], |_| {
         let Some(device) = device::device() else { return Ok(Vec::new()) };
-        let look = |followed: &Followed| {
+        let sample = |followed: &Followed| {
             device::follow(device, step, &followed.method.settings, followed.cost.passes)
         };
-        followed.iter().map(look).collect::<Result<Vec<_>>>()
+        followed.iter().map(sample).collect::<Result<Vec<_>>>()
     })?;
-    for (followed, looks) in followed.iter_mut().zip(looks.into_iter().flatten()) {
-        followed.looks = looks;
+    for (followed, samples) in followed.iter_mut().zip(samples.into_iter().flatten()) {
+        followed.samples = samples;
     }
     Ok(followed)
 }
 
 /// Whether the GPU backend draws the same curves: both backends work in single precision, each with
-/// round-off of its own, so that of all looks at a method half should be no farther from double precision
+/// round-off of its own, so that of all samples of a method half should be no farther from double precision
 /// than twice what the CPU is.
 pub(super) fn judge_device(context: &mut Context, what: &str, followed: &[Followed]) {
     let (mut worst, mut count) = (0.0f64, 0);
-    for Followed { looks, .. } in followed {
-        let ratios: Vec<f64> = looks.iter().filter_map(rounding_ratio).collect();
+    for Followed { samples, .. } in followed {
+        let ratios: Vec<f64> = samples.iter().filter_map(rounding_ratio).collect();
         count += ratios.len();
         worst = worst.max(median(ratios).unwrap_or(0.0));
     }
@@ -90,7 +90,7 @@ pub(super) fn judge_device(context: &mut Context, what: &str, followed: &[Follow
                 "{what}: GPU's distance from double precision over the CPU's, median of each curve"
             ),
             "at most 2",
-            format!("{worst:.2} ({count} looks)"),
+            format!("{worst:.2} ({count} samples)"),
             worst <= 2.0,
         );
     }
@@ -98,9 +98,9 @@ pub(super) fn judge_device(context: &mut Context, what: &str, followed: &[Follow
 
 /// How much farther from double precision the device is than the CPU, where the CPU is in the scene; a
 /// device that is not counts as infinitely far.
-fn rounding_ratio(look: &Look) -> Option<f64> {
-    let in_scene = look.errors[1] < CEILING;
-    let ratio = look.rounding[0] / look.rounding[1];
+fn rounding_ratio(sample: &DeviceSample) -> Option<f64> {
+    let in_scene = sample.errors[1] < CEILING;
+    let ratio = sample.rounding[0] / sample.rounding[1];
     in_scene.then_some(if ratio.is_finite() { ratio } else { f64::INFINITY })
 }
 
@@ -250,10 +250,10 @@ impl Figure {
 
     /// Adds a method; dashed where it does not scale and mix positions and multipliers alike.
     pub fn add(&mut self, followed: &Followed) {
-        let Followed { method, curve, cost, looks } = followed;
+        let Followed { method, curve, cost, samples } = followed;
         let style = if treats_alike(&method.settings) { Style::Line } else { Style::Dashed };
         self.add_curve(&method.name, &curve.errors, cost.passes, style);
-        for Look { iterations, errors, .. } in looks {
+        for DeviceSample { iterations, errors, .. } in samples {
             let passes = *iterations as usize * cost.passes;
             for (backend, error) in errors.iter().enumerate() {
                 let name = format!("{}, {}", method.name, SINGLE[backend]);
@@ -345,15 +345,15 @@ mod tests {
 
     #[test]
     fn a_device_that_leaves_the_scene_is_no_device_that_agrees() {
-        let look = |error, rounding| Look {
+        let sample = |error, rounding| DeviceSample {
             iterations: 1,
             errors: [error, 0.5],
             rounding: [rounding, 1e-6],
         };
-        assert_eq!(rounding_ratio(&look(0.5, 2e-6)), Some(2.0));
-        assert_eq!(rounding_ratio(&look(f64::NAN, f64::NAN)), Some(f64::INFINITY));
-        assert!(rounding_ratio(&look(1e3, 1e3)).is_some_and(|ratio| ratio > 2.0));
-        let both_lost = Look { iterations: 1, errors: [1e3; 2], rounding: [1e3; 2] };
+        assert_eq!(rounding_ratio(&sample(0.5, 2e-6)), Some(2.0));
+        assert_eq!(rounding_ratio(&sample(f64::NAN, f64::NAN)), Some(f64::INFINITY));
+        assert!(rounding_ratio(&sample(1e3, 1e3)).is_some_and(|ratio| ratio > 2.0));
+        let both_lost = DeviceSample { iterations: 1, errors: [1e3; 2], rounding: [1e3; 2] };
         assert_eq!(rounding_ratio(&both_lost), None);
         assert_eq!(median(vec![3.0, f64::INFINITY, 1.0]), Some(3.0));
     }

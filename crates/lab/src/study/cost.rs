@@ -8,11 +8,11 @@ use viscera_report::{Table, si};
 
 use super::convergence::{COST_CASES, Followed, Reach, follow, level_name, table};
 use super::methods::{
-    COLORED, JACOBI, Method, anderson, chebyshev, exact, law, published, relaxed,
+    COLORED, JACOBI, NamedSettings, anderson, chebyshev, exact, law, published, relaxed,
 };
 use super::step::MeasuredStep;
 use super::{Context, Section};
-use crate::scenes::{FRAME_RATE, GRAVITY, Size};
+use crate::load_cases::{FRAME_RATE, GRAVITY, Size};
 use crate::sections::Changes;
 
 pub(super) const SECTION: Section =
@@ -22,10 +22,10 @@ const LEVELS: [f64; 3] = [1e-1, 1e-2, 1e-3];
 
 /// A step that all methods are measured on.
 #[derive(Clone, Copy)]
-struct Task {
+struct CostProblem {
     /// In words, and in names of files.
     words: &'static str,
-    scene: &'static str,
+    load_case: &'static str,
     size: Size,
     /// Young's modulus [Pa] where the user wants no other.
     young: f64,
@@ -36,24 +36,24 @@ struct Task {
     iterations: [u32; 2],
 }
 
-impl fmt::Display for Task {
+impl fmt::Display for CostProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "truth of the {}", self.words)
     }
 }
 
-const CANTILEVER: Task = Task {
+const CANTILEVER: CostProblem = CostProblem {
     words: "cantilever from rest, E = 100 kPa",
-    scene: "cantilever",
+    load_case: "cantilever",
     size: Size::Large,
     young: 1e5,
     history: 0,
     law: MaterialModel::SaintVenantKirchhoff,
     iterations: [6000, 2000],
 };
-const TWIST: Task = Task {
+const TWIST: CostProblem = CostProblem {
     words: "twist in motion, E = 10 kPa",
-    scene: "twist",
+    load_case: "twist",
     size: Size::Large,
     young: 1e4,
     history: 11,
@@ -61,11 +61,11 @@ const TWIST: Task = Task {
     iterations: [2000, 1000],
 };
 /// Finer than the way the bar falls in a step, of both tissues: some sweeps leave Green strain inverted.
-const HUGE: Task = Task { size: Size::Huge, iterations: [2000, 600], ..CANTILEVER };
-const HUGE_NEO_HOOKEAN: Task = Task { law: MaterialModel::StableNeoHookean, ..HUGE };
+const HUGE: CostProblem = CostProblem { size: Size::Huge, iterations: [2000, 600], ..CANTILEVER };
+const HUGE_NEO_HOOKEAN: CostProblem = CostProblem { law: MaterialModel::StableNeoHookean, ..HUGE };
 
-fn tasks(quick: bool, changes: &Changes) -> Vec<Task> {
-    let tiny = |task| Task { size: Size::Tiny, iterations: [200, 100], ..task };
+fn cost_problems(quick: bool, changes: &Changes) -> Vec<CostProblem> {
+    let tiny = |case| CostProblem { size: Size::Tiny, iterations: [200, 100], ..case };
     match (quick, has_fine_mesh(quick, changes)) {
         (true, _) => vec![tiny(CANTILEVER), tiny(TWIST)],
         (false, true) => vec![CANTILEVER, TWIST, HUGE, HUGE_NEO_HOOKEAN],
@@ -79,7 +79,7 @@ fn has_fine_mesh(quick: bool, changes: &Changes) -> bool {
 }
 
 /// Plain Jacobi is the first, which the others are compared with.
-fn methods(iterations: [u32; 2]) -> Vec<Method> {
+fn methods(iterations: [u32; 2]) -> Vec<NamedSettings> {
     let few = Colors::Limited(4);
     let both = |settings| anderson(settings, AndersonOn::Both);
     let named: Vec<(&str, SolverSettings)> = vec![
@@ -103,13 +103,14 @@ fn methods(iterations: [u32; 2]) -> Vec<Method> {
         ("exact, coloured, Anderson", both(exact(COLORED))),
     ];
     let counts = [iterations[0]].into_iter().chain(std::iter::repeat(iterations[1]));
-    let method = |((name, settings), count)| Method::new(name, settings).with_iterations(count);
+    let method =
+        |((name, settings), count)| NamedSettings::new(name, settings).with_iterations(count);
     named.into_iter().zip(counts).map(method).collect()
 }
 
 fn case_count(quick: bool, changes: &Changes) -> usize {
-    let methods = |task: &Task| methods(task.iterations).len() + COST_CASES;
-    tasks(quick, changes).iter().map(|task| 1 + methods(task)).sum()
+    let methods = |case: &CostProblem| methods(case.iterations).len() + COST_CASES;
+    cost_problems(quick, changes).iter().map(|case| 1 + methods(case)).sum()
 }
 
 fn run(context: &mut Context) -> Result<()> {
@@ -136,19 +137,20 @@ fn run(context: &mut Context) -> Result<()> {
         ));
     }
     let mut data = Table::new(["scene", "method", "level", "iterations", "passes per iteration"]);
-    let tasks = tasks(context.quick, context.changes);
-    for task in &tasks {
-        measure(context, task, &mut data)?;
+    let cases = cost_problems(context.quick, context.changes);
+    for case in &cases {
+        measure(context, case, &mut data)?;
     }
     context.document.data("cost", "All tables but for milliseconds", &data)
 }
 
-fn measure(context: &mut Context, task: &Task, data: &mut Table) -> Result<()> {
-    let tissue = context.changes.tissue(task.law, task.young, 0.45)?;
-    let scene = context.changes.scene(task.scene, task.size, tissue)?;
-    let name = format!("{scene}, {}", law(task.law));
-    let steps = context.run_cases(&[*task], |_| MeasuredStep::new(scene.clone(), task.history))?;
-    let methods = methods(task.iterations);
+fn measure(context: &mut Context, case: &CostProblem, data: &mut Table) -> Result<()> {
+    let tissue = context.changes.tissue(case.law, case.young, 0.45)?;
+    let load_case = context.changes.load_case(case.load_case, case.size, tissue)?;
+    let name = format!("{load_case}, {}", law(case.law));
+    let steps =
+        context.run_cases(&[*case], |_| MeasuredStep::new(load_case.clone(), case.history))?;
+    let methods = methods(case.iterations);
     let mut followed = Vec::new();
     for step in &steps {
         followed = follow(context, step, methods.clone())?;

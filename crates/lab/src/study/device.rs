@@ -26,9 +26,9 @@ pub fn describe() -> String {
     }
 }
 
-/// What device and CPU have found in single precision after so many iterations.
+/// Where device and CPU are in single precision after so many iterations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
+pub struct DeviceSample {
     pub iterations: u32,
     /// Distances from the exact end: the device, then the CPU.
     pub errors: [f64; 2],
@@ -36,11 +36,11 @@ pub struct Look {
     pub rounding: [f64; 2],
 }
 
-/// Dispatches that all iterations up to a look may take: a software driver is slow.
+/// Dispatches that all iterations up to a sample may take: a software driver is slow.
 const MOST_DISPATCHES: usize = 6000;
 
-/// Iterations after which the device is asked where it stands: every look is a run of its own.
-fn looks(settings: &SolverSettings, passes: usize) -> impl Iterator<Item = u32> {
+/// Iterations after which the device is asked where it stands: every sample is a run of its own.
+fn counts(settings: &SolverSettings, passes: usize) -> impl Iterator<Item = u32> {
     let most = settings.iterations.min((MOST_DISPATCHES / passes.max(1)) as u32);
     let decades = (0..6).flat_map(|decade| [1, 2, 5].map(|k| k * 10u32.pow(decade)));
     decades.take_while(move |k| *k <= most)
@@ -52,25 +52,25 @@ pub fn follow(
     step: &MeasuredStep,
     settings: &SolverSettings,
     passes: usize,
-) -> Result<Vec<Look>> {
-    let looks: Vec<u32> = looks(settings, passes).collect();
-    let most = looks.last().copied().unwrap_or(1);
+) -> Result<Vec<DeviceSample>> {
+    let counts: Vec<u32> = counts(settings, passes).collect();
+    let most = counts.last().copied().unwrap_or(1);
     // Iterates are compared as they are, before a guard judges the end of the step.
     let settings = SolverSettings { iterations: most, step_guard: false, ..settings.clone() };
     let (double, single) =
-        (iterates::<f64>(step, &settings, &looks)?, iterates::<f32>(step, &settings, &looks)?);
-    let model = step.scene.model::<f32>(&settings)?;
+        (iterates::<f64>(step, &settings, &counts)?, iterates::<f32>(step, &settings, &counts)?);
+    let model = step.load_case.model::<f32>(&settings)?;
     let (_, start) = step.begin::<f32>(&model, &settings)?;
     let mut solver = GpuSolver::new(device, &model, &settings)?;
     let mut state = start.clone();
-    let mut found = Vec::with_capacity(looks.len());
-    for ((&iterations, double), single) in looks.iter().zip(&double).zip(&single) {
+    let mut found = Vec::with_capacity(counts.len());
+    for ((&iterations, double), single) in counts.iter().zip(&double).zip(&single) {
         solver.set_iterations(iterations);
         solver.write(&model, &start)?;
         solver.step(&model, &step.inputs(), step.dt)?;
         solver.read(&model, &mut state)?;
         let places: Vec<Vec3<f64>> = state.positions.iter().map(|x| x.cast()).collect();
-        found.push(Look {
+        found.push(DeviceSample {
             iterations,
             errors: [step.error(&places), step.error(single)],
             rounding: [step.distance(&places, double), step.distance(single, double)],
@@ -83,13 +83,13 @@ pub fn follow(
 fn iterates<S: Real>(
     step: &MeasuredStep,
     settings: &SolverSettings,
-    looks: &[u32],
+    counts: &[u32],
 ) -> Result<Vec<Vec<Vec3<f64>>>> {
-    let model = step.scene.model::<S>(settings)?;
+    let model = step.load_case.model::<S>(settings)?;
     let (mut solver, mut state) = step.begin(&model, settings)?;
-    let mut seen = Vec::with_capacity(looks.len());
+    let mut seen = Vec::with_capacity(counts.len());
     solver.step_watched(&model, &mut state, &step.inputs(), step.dt, |iteration, x| {
-        if looks.contains(&iteration) {
+        if counts.contains(&iteration) {
             seen.push(x.to_vec());
         }
     })?;
@@ -102,7 +102,7 @@ pub fn end(
     step: &MeasuredStep,
     settings: &SolverSettings,
 ) -> Result<Vec<Vec3<f64>>> {
-    let model = step.scene.model::<f32>(settings)?;
+    let model = step.load_case.model::<f32>(settings)?;
     let (_, mut state) = step.begin::<f32>(&model, settings)?;
     let mut solver = GpuSolver::new(device, &model, settings)?;
     solver.write(&model, &state)?;

@@ -7,14 +7,14 @@ use viscera::settings::{
 
 /// Settings with the name that tables and legends give them.
 #[derive(Clone, Debug)]
-pub struct Method {
+pub struct NamedSettings {
     /// A few words.
     pub name: String,
     /// One step per frame, one thread.
     pub settings: SolverSettings,
 }
 
-impl Method {
+impl NamedSettings {
     /// Named settings.
     pub fn new(name: impl Into<String>, settings: SolverSettings) -> Self {
         Self { name: name.into(), settings }
@@ -27,7 +27,7 @@ impl Method {
     }
 }
 
-impl std::fmt::Display for Method {
+impl std::fmt::Display for NamedSettings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.name)
     }

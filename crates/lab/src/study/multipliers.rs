@@ -11,7 +11,7 @@ use super::Context;
 use super::convergence::{CEILING, FLOOR, in_data, in_words, level_name};
 use super::methods::{COLORED, JACOBI, anderson, published};
 use super::step::MeasuredStep;
-use crate::scenes::{DENSITY, FRAME_RATE, Scene, Size};
+use crate::load_cases::{DENSITY, FRAME_RATE, LoadCase, Size};
 
 /// What diverges is drawn here.
 const LOST: f64 = 1e6;
@@ -30,7 +30,7 @@ fn moduli(quick: bool) -> &'static [f64] {
 }
 
 struct Case {
-    scene: &'static str,
+    load_case: &'static str,
     frames: u32,
     young: f64,
     parts: f64,
@@ -38,8 +38,8 @@ struct Case {
 
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { scene, young, parts, .. } = self;
-        write!(f, "Anderson on multipliers, {scene}, {young} Pa, 1/{} s", parts * FRAME_RATE)
+        let Self { load_case, young, parts, .. } = self;
+        write!(f, "Anderson on multipliers, {load_case}, {young} Pa, 1/{} s", parts * FRAME_RATE)
     }
 }
 
@@ -63,11 +63,11 @@ impl Answer {
 
 fn cases(quick: bool) -> Vec<Case> {
     let mut cases = Vec::new();
-    for (scene, frames, parts) in MOMENTS {
+    for (load_case, frames, parts) in MOMENTS {
         // A bar that hangs in 100 Pa has no shape that Green strain would tell from its reflection.
-        let least = if scene == "cantilever" { 1e4 } else { 0.0 };
+        let least = if load_case == "cantilever" { 1e4 } else { 0.0 };
         for &young in moduli(quick).iter().filter(|young| **young >= least) {
-            cases.extend(parts.iter().map(|&parts| Case { scene, frames, young, parts }));
+            cases.extend(parts.iter().map(|&parts| Case { load_case, frames, young, parts }));
         }
     }
     cases
@@ -96,16 +96,16 @@ pub(super) fn run(context: &mut Context) -> Result<()> {
     let answers = context.run_cases(&cases, |case| {
         let law = MaterialModel::SaintVenantKirchhoff;
         let poisson = changes.poisson.unwrap_or(0.45);
-        let tissue = crate::scenes::tissue(law, case.young, poisson)?;
-        answer(case, changes.scene(case.scene, size, tissue)?)
+        let tissue = crate::load_cases::tissue(law, case.young, poisson)?;
+        answer(case, changes.load_case(case.load_case, size, tissue)?)
     })?;
     report(context, &cases, &answers)
 }
 
-fn answer(case: &Case, scene: Scene) -> Result<Answer> {
+fn answer(case: &Case, load_case: LoadCase) -> Result<Answer> {
     let dt = 1.0 / FRAME_RATE / case.parts;
-    let edge = edge(&scene);
-    let step = MeasuredStep::after(scene, case.frames, dt)?;
+    let edge = edge(&load_case);
+    let step = MeasuredStep::after(load_case, case.frames, dt)?;
     let stress = stress(&step)?;
     let end = |colors: Colors, on| -> Result<f64> {
         let settings = anderson(published(colors), on);
@@ -122,19 +122,19 @@ fn answer(case: &Case, scene: Scene) -> Result<Answer> {
 }
 
 /// Edge [m] of a cube that six tetrahedra of the mean volume fill.
-fn edge(scene: &Scene) -> f64 {
-    let count = scene.mesh.tets().len();
+fn edge(load_case: &LoadCase) -> f64 {
+    let count = load_case.mesh.tets().len();
     let volume: f64 =
-        (0..count).map(|tet| viscera::mesh::tet_volume(scene.mesh.corners(tet))).sum();
+        (0..count).map(|tet| viscera::mesh::tet_volume(load_case.mesh.corners(tet))).sum();
     libm::cbrt(6.0 * volume / count as f64)
 }
 
 /// Largest principal second Piola stress [Pa], tension or pressure, at the end of a step.
 fn stress(step: &MeasuredStep) -> Result<f64> {
-    let model = step.scene.model::<f64>(&SolverSettings::default())?;
+    let model = step.load_case.model::<f64>(&SolverSettings::default())?;
     let mut tets = Vec::new();
     measure_tets(&model, &step.exact, &mut tets);
-    let (lambda, mu) = (step.scene.tissue.lame_lambda(), step.scene.tissue.lame_mu());
+    let (lambda, mu) = (step.load_case.tissue.lame_lambda(), step.load_case.tissue.lame_mu());
     let largest = tets.iter().map(|tet| {
         // S = 2 mu E + lambda tr(E) I has the axes of E.
         let strains = tet.stretches.map(|s| 0.5 * (s * s - 1.0));
@@ -166,7 +166,7 @@ fn tabulate(context: &mut Context, cases: &[Case], answers: &[Answer]) {
         let [young, step] = [(case.young / 1e3).to_string(), step_name(case)];
         let (stress, number) = (format!("{stress:.0}"), scientific(*number));
         let [colored, jacobi, both] = ends.map(in_words);
-        table.row([case.scene, &young, &step, &stress, &number, &colored, &jacobi, &both]);
+        table.row([case.load_case, &young, &step, &stress, &number, &colored, &jacobi, &both]);
     }
     context
         .document
@@ -186,17 +186,25 @@ fn figure(context: &mut Context, cases: &[Case], answers: &[Answer]) -> Result<(
     );
     plot.reference(CEILING, "counts as divergence");
     let mut data = Table::new(["scene", "young", "step", "number", "coloured", "jacobi", "both"]);
-    for (scene, ..) in MOMENTS {
+    for (load_case, ..) in MOMENTS {
         let mut points = Vec::new();
         for (case, Answer { number, ends, .. }) in
-            cases.iter().zip(answers).filter(|(case, _)| case.scene == scene)
+            cases.iter().zip(answers).filter(|(case, _)| case.load_case == load_case)
         {
             points.push([*number, ends[0].max(ends[1]).clamp(FLOOR, LOST)]);
             let [young, step] = [case.young.to_string(), step_name(case)];
             let [colored, jacobi, both] = ends.map(in_data);
-            data.row([scene, &young, &step, &format!("{number:.6e}"), &colored, &jacobi, &both]);
+            data.row([
+                load_case,
+                &young,
+                &step,
+                &format!("{number:.6e}"),
+                &colored,
+                &jacobi,
+                &both,
+            ]);
         }
-        plot.series(Series::new(scene, points).with_style(Style::Markers));
+        plot.series(Series::new(load_case, points).with_style(Style::Markers));
     }
     context.plot(
         "acceleration-bound",

@@ -8,7 +8,7 @@ use viscera_picture::{
     ViewDirection,
 };
 
-use crate::scenes::Scene;
+use crate::load_cases::LoadCase;
 
 /// Size of one panel [pixels].
 const PANEL: [u32; 2] = [640, 480];
@@ -26,8 +26,8 @@ pub struct Panel {
 }
 
 /// All panels in rows of `columns`, coloured by the distance from the true places [m].
-pub fn draw(scene: &Scene, panels: &[Panel], columns: usize) -> Result<Image> {
-    let boundary = boundary_surface(&scene.mesh);
+pub fn draw(load_case: &LoadCase, panels: &[Panel], columns: usize) -> Result<Image> {
+    let boundary = boundary_surface(&load_case.mesh);
     let on_surface = |x: &[Vec3<f64>]| -> Vec<Vec3<f64>> {
         boundary.mesh_vertices.iter().map(|&v| x[v as usize]).collect()
     };
@@ -53,7 +53,8 @@ pub fn draw(scene: &Scene, panels: &[Panel], columns: usize) -> Result<Image> {
     let camera = Camera::framing(&bounds, view, size);
     let mut images = Vec::with_capacity(panels.len());
     for (panel, (surface, ghost, distances)) in panels.iter().zip(&bodies) {
-        let held = [&scene.fixed, &scene.driven].map(|vertices| at(&panel.positions, vertices));
+        let held =
+            [&load_case.fixed, &load_case.driven].map(|vertices| at(&panel.positions, vertices));
         let drawing = Drawing {
             title: &panel.title,
             caption: &panel.caption,

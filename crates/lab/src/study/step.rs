@@ -13,8 +13,8 @@ use viscera::solver::gpu::GpuSolver;
 use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
 
+use crate::load_cases::{FRAME_RATE, LoadCase};
 use crate::reference::Reference;
-use crate::scenes::{FRAME_RATE, Scene};
 
 /// Beyond this a curve has left the scene: it is cut there.
 const LOST: f64 = 1e6;
@@ -22,7 +22,7 @@ const LOST: f64 = 1e6;
 /// A step of a frame, from a state that exact implicit Euler has led to.
 pub struct MeasuredStep {
     /// Body and what happens to it.
-    pub scene: Scene,
+    pub load_case: LoadCase,
     /// At the beginning of the step.
     pub state: State<f64>,
     /// [s].
@@ -58,20 +58,20 @@ pub struct Cost {
 
 impl MeasuredStep {
     /// The step of a frame after so many frames of the scene.
-    pub fn new(scene: Scene, history: u32) -> Result<Self> {
-        Self::after(scene, history, 1.0 / FRAME_RATE)
+    pub fn new(load_case: LoadCase, history: u32) -> Result<Self> {
+        Self::after(load_case, history, 1.0 / FRAME_RATE)
     }
 
     /// A step of `dt` [s] after so many frames of the scene.
-    pub fn after(scene: Scene, history: u32, dt: f64) -> Result<Self> {
-        let model = scene.model::<f64>(&SolverSettings::default())?;
+    pub fn after(load_case: LoadCase, history: u32, dt: f64) -> Result<Self> {
+        let model = load_case.model::<f64>(&SolverSettings::default())?;
         let mut reference = Reference::new(&model);
         let mut state = State::at_rest(&model);
         let mut advance = |state: &mut State<f64>, frame: f64, dt: f64| {
-            let inputs = scene.inputs(frame);
+            let inputs = load_case.inputs(frame);
             reference
                 .step(state, &inputs, dt)
-                .with_context(|| format!("the reference of {scene}, frame {frame}"))
+                .with_context(|| format!("the reference of {load_case}, frame {frame}"))
         };
         for frame in 1..=history {
             advance(&mut state, f64::from(frame), 1.0 / FRAME_RATE)?;
@@ -86,7 +86,7 @@ impl MeasuredStep {
             masses: model.masses.clone(),
             start_error: 1.0,
             strain: 1.0,
-            scene,
+            load_case,
         };
         let mut predicted = step.state.positions.clone();
         let inputs = step.inputs::<f64>();
@@ -103,7 +103,7 @@ impl MeasuredStep {
 
     /// What acts during the step.
     pub fn inputs<S: Real>(&self) -> Inputs<S> {
-        self.scene.inputs(self.time(1.0))
+        self.load_case.inputs(self.time(1.0))
     }
 
     /// In frames, after a share of the step.
@@ -125,7 +125,7 @@ impl MeasuredStep {
 
     /// Root mean square Green strain over the body's volume.
     fn strain_of(&self, positions: &[Vec3<f64>]) -> Result<f64> {
-        let model = self.scene.model::<f64>(&SolverSettings::default())?;
+        let model = self.load_case.model::<f64>(&SolverSettings::default())?;
         let mut tets = Vec::new();
         measure_tets(&model, positions, &mut tets);
         let squared = |stretches: [f64; 3]| -> f64 {
@@ -138,7 +138,7 @@ impl MeasuredStep {
     /// A method on this step. Steps of its own begin with its own rules, but where multipliers are kept:
     /// the exact steps before have left those that answer to the positions.
     pub fn follow<S: Real>(&self, settings: &SolverSettings) -> Result<Curve> {
-        let model = self.scene.model::<S>(settings)?;
+        let model = self.load_case.model::<S>(settings)?;
         let (mut solver, mut state) = self.begin(&model, settings)?;
         let mut errors = Vec::with_capacity(settings.iterations as usize + 1);
         let mut last = self.exact.clone();
@@ -165,7 +165,7 @@ impl MeasuredStep {
 
     /// Where a method has the vertices [m] after its iterations, safeguards of the step included.
     pub fn end<S: Real>(&self, settings: &SolverSettings) -> Result<Vec<Vec3<f64>>> {
-        let model = self.scene.model::<S>(settings)?;
+        let model = self.load_case.model::<S>(settings)?;
         let (mut solver, mut state) = self.begin(&model, settings)?;
         for (inputs, dt) in self.substeps(settings.substeps) {
             solver.step(&model, &mut state, &inputs, dt)?;
@@ -177,7 +177,7 @@ impl MeasuredStep {
     pub fn substeps<S: Real>(&self, count: u32) -> impl Iterator<Item = (Inputs<S>, f64)> {
         (1..=count).map(move |substep| {
             let share = f64::from(substep) / f64::from(count);
-            (self.scene.inputs(self.time(share)), self.dt / f64::from(count))
+            (self.load_case.inputs(self.time(share)), self.dt / f64::from(count))
         })
     }
 
@@ -191,7 +191,7 @@ impl MeasuredStep {
         let mut state = State::at_rest(model);
         state.positions = self.state.positions.iter().map(|x| x.cast()).collect();
         state.velocities = self.state.velocities.iter().map(|v| v.cast()).collect();
-        let before: Inputs<S> = self.scene.inputs(self.time(0.0));
+        let before: Inputs<S> = self.load_case.inputs(self.time(0.0));
         let dt = self.dt / f64::from(settings.substeps);
         solver.restart(model, &mut state, &before, dt)?;
         Ok((solver, state))
@@ -206,7 +206,7 @@ impl MeasuredStep {
             self.frame_cost(&SolverSettings { iterations, ..settings.clone() }).map(|c| c.seconds)
         };
         let seconds = ((of(1 + ITERATIONS)? - of(1)?) / f64::from(ITERATIONS)).max(0.0);
-        let model = self.scene.model::<f32>(&settings)?;
+        let model = self.load_case.model::<f32>(&settings)?;
         Ok(Cost { passes: GpuSolver::dispatches_of(&model, &settings)[1], seconds })
     }
 
@@ -216,7 +216,7 @@ impl MeasuredStep {
         const LEAST: (usize, f64) = (3, 5e-3);
         let threads = viscera::settings::Threads::Count(1);
         let settings = SolverSettings { threads, ..settings.clone() };
-        let model = self.scene.model::<f32>(&settings)?;
+        let model = self.load_case.model::<f32>(&settings)?;
         let (mut solver, start) = self.begin(&model, &settings)?;
         let inputs: Vec<(Inputs<f32>, f64)> = self.substeps(settings.substeps).collect();
         let (mut seconds, mut times, mut total) = (f64::INFINITY, 0, 0.0);

@@ -1,4 +1,4 @@
-//! Figure 5: the first open problem, stiffness that depends on the budget.
+//! Figure 5: the first open problem, stiffness that depends on the iterations per frame.
 
 use std::fmt;
 
@@ -6,10 +6,10 @@ use anyhow::Result;
 use viscera::material::MaterialModel;
 use viscera::settings::AndersonOn;
 
-use super::methods::{COLORED, Method, anderson, exact, law, published};
+use super::methods::{COLORED, NamedSettings, anderson, exact, law, published};
 use super::step::{Cost, MeasuredStep};
 use super::{Context, Section};
-use crate::scenes::{Scene, Size, tissue};
+use crate::load_cases::{LoadCase, Size, tissue};
 use crate::settling::{Error, FRAMES, KEPT_VELOCITY, Truth, compare, settle, truth};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 
@@ -37,7 +37,7 @@ fn moduli(quick: bool) -> &'static [f64] {
 }
 
 /// Iterations per frame.
-fn budgets(quick: bool) -> &'static [u32] {
+fn iteration_counts(quick: bool) -> &'static [u32] {
     if quick { &[5, 20, 50] } else { &[5, 10, 20, 50, 100, 200] }
 }
 
@@ -46,16 +46,16 @@ fn size(quick: bool) -> Size {
 }
 
 /// The methods; the last two are the exact form in double and in single precision.
-fn methods() -> [Method; 6] {
+fn methods() -> [NamedSettings; 6] {
     let published = || published(COLORED);
     let on = |on| anderson(published(), on);
     [
-        Method::new("as published", published()),
-        Method::new("Anderson on positions", on(AndersonOn::Positions)),
-        Method::new("Anderson on multipliers", on(AndersonOn::Multipliers)),
-        Method::new("Anderson on both", on(AndersonOn::Both)),
-        Method::new("exact at rest", exact(COLORED)),
-        Method::new("exact at rest, single precision", exact(COLORED)),
+        NamedSettings::new("as published", published()),
+        NamedSettings::new("Anderson on positions", on(AndersonOn::Positions)),
+        NamedSettings::new("Anderson on multipliers", on(AndersonOn::Multipliers)),
+        NamedSettings::new("Anderson on both", on(AndersonOn::Both)),
+        NamedSettings::new("exact at rest", exact(COLORED)),
+        NamedSettings::new("exact at rest, single precision", exact(COLORED)),
     ]
 }
 
@@ -105,7 +105,7 @@ fn cases(quick: bool) -> Vec<Case> {
     for (body, Body { model, young }) in bodies(quick).into_iter().enumerate() {
         for method in 0..methods().len() {
             let case = |&iterations| Case { body, model, young, method, iterations };
-            cases.extend(budgets(quick).iter().map(case));
+            cases.extend(iteration_counts(quick).iter().map(case));
         }
     }
     cases
@@ -115,20 +115,20 @@ fn case_count(quick: bool) -> usize {
     bodies(quick).len() + cases(quick).len()
 }
 
-fn scene(context: &Context, model: MaterialModel, young: f64) -> Result<Scene> {
+fn load_case(context: &Context, model: MaterialModel, young: f64) -> Result<LoadCase> {
     let poisson = context.changes.poisson.unwrap_or(POISSON);
     let tissue = tissue(model, young, poisson)?;
-    context.changes.scene("cantilever", size(context.quick), tissue)
+    context.changes.load_case("cantilever", size(context.quick), tissue)
 }
 
 fn answer(context: &Context, case: &Case, truth: &Truth) -> Result<Error> {
-    let scene = scene(context, case.model, case.young)?;
+    let load_case = load_case(context, case.model, case.young)?;
     let settings = methods()[case.method].clone().with_iterations(case.iterations).settings;
     let settled = match case.method {
-        SINGLE => settle::<f32>(&scene, &settings)?,
-        _ => settle::<f64>(&scene, &settings)?,
+        SINGLE => settle::<f32>(&load_case, &settings)?,
+        _ => settle::<f64>(&load_case, &settings)?,
     };
-    compare(&scene, truth, &settled.positions)
+    compare(&load_case, truth, &settled.positions)
 }
 
 fn is_lost(error: &Error) -> bool {
@@ -144,10 +144,10 @@ fn run(context: &mut Context) -> Result<()> {
     teach(context);
     let cases = cases(context.quick);
     let truths = context.run_cases(&bodies(context.quick), |body| {
-        truth(&scene(context, body.model, body.young)?)
+        truth(&load_case(context, body.model, body.young)?)
     })?;
     let errors = context.run_cases(&cases, |case| answer(context, case, &truths[case.body]))?;
-    let count = budgets(context.quick).len();
+    let count = iteration_counts(context.quick).len();
     let rows: Vec<(&[Case], &[Error])> = cases.chunks(count).zip(errors.chunks(count)).collect();
     for (body, rows) in rows.chunks(methods().len()).enumerate() {
         draw_methods(context, body, rows)?;
@@ -219,7 +219,7 @@ fn draw_methods(context: &mut Context, body: usize, rows: &[(&[Case], &[Error])]
     context.plot(
         &name,
         &plot,
-        "A method whose curve is level at 1 gives the stiffness that was typed at any budget; bodies that \
+        "A method whose curve is level at 1 gives the typed stiffness with any number of iterations; bodies that \
          left the scene have no point.",
     )
 }
@@ -251,7 +251,7 @@ fn draw_exact(context: &mut Context, rows: &[(&[Case], &[Error])]) -> Result<()>
         "stiffness-exact",
         &plot,
         "What is left in double precision is the rest of the damped motion and of the sweeps; in single \
-         precision, round-off of positions. A curve that fell with the budget would be a stiffness that more \
+         precision, round-off of positions. A curve that fell with the iterations would be a stiffness that more \
          iterations have to buy.",
     )
 }
@@ -265,7 +265,7 @@ fn cell(error: &Error) -> String {
 }
 
 fn tabulate(context: &mut Context, rows: &[(&[Case], &[Error])]) {
-    let counts = budgets(context.quick).iter().map(|k| k.to_string());
+    let counts = iteration_counts(context.quick).iter().map(|k| k.to_string());
     let heads = ["tissue", "method"].map(str::to_owned).into_iter().chain(counts);
     let mut table = Table::new(heads);
     for (cases, errors) in rows {
@@ -302,16 +302,16 @@ fn record(context: &mut Context, cases: &[Case], errors: &[Error]) -> Result<()>
     context.document.data("stiffness", "All rests", &table)
 }
 
-/// What the budgets cost: dependent passes and time, beside the iterations.
+/// What the iterations cost: dependent passes and time, beside the iterations.
 fn costs(context: &mut Context) -> Result<()> {
-    let stiff = scene(context, MaterialModel::StableNeoHookean, GREEN_YOUNG)?;
+    let stiff = load_case(context, MaterialModel::StableNeoHookean, GREEN_YOUNG)?;
     let tets = stiff.mesh.tets().len();
     let step = MeasuredStep::new(stiff, 0)?;
-    let counts = budgets(context.quick).iter().map(|k| format!("{k} iterations"));
+    let counts = iteration_counts(context.quick).iter().map(|k| format!("{k} iterations"));
     let mut table = Table::new(["method".to_owned()].into_iter().chain(counts));
     for method in methods().into_iter().take(SINGLE) {
         let mut row = vec![method.name.clone()];
-        for &iterations in budgets(context.quick) {
+        for &iterations in iteration_counts(context.quick) {
             let settings = method.clone().with_iterations(iterations).settings;
             let Cost { passes, seconds } = step.frame_cost(&settings)?;
             row.push(format!("{passes} passes, {:.2} ms", 1e3 * seconds));
@@ -335,7 +335,7 @@ fn conclude(context: &mut Context, cases: &[Case], errors: &[Error]) {
         let words: Vec<String> = methods()[..DOUBLE]
             .iter()
             .enumerate()
-            .map(|(method, Method { name, .. })| {
+            .map(|(method, NamedSettings { name, .. })| {
                 let kept = || of(method, model).filter(|(_, error)| !is_lost(error));
                 let [all, left] = [of(method, model).count(), kept().count()];
                 let range = kept().map(|(_, error)| error.stiffness);
@@ -348,7 +348,8 @@ fn conclude(context: &mut Context, cases: &[Case], errors: &[Error]) {
             })
             .collect();
         let law = law(model);
-        let text = format!("Over all budgets of {law} bodies `s` is: {}.", words.join("; "));
+        let text =
+            format!("Over all numbers of iterations of {law} bodies `s` is: {}.", words.join("; "));
         context.document.paragraph(text);
     }
     for (method, limit) in [DOUBLE, SINGLE].into_iter().zip(LIMITS) {

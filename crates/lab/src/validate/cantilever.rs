@@ -17,10 +17,10 @@ use viscera::mesh::shapes::Block;
 use viscera::scalar::Vec3;
 use viscera::solver::{Inputs, Pin};
 
-use super::methods::{Method, worse};
+use super::methods::{LibrarySolver, worse};
 use super::{Context, Section};
+use crate::load_cases::{BAR, DENSITY, GRAVITY, LoadCase, NEAR, tissue};
 use crate::reference::Reference;
-use crate::scenes::{BAR, DENSITY, GRAVITY, NEAR, Scene, tissue};
 use crate::settling::{Error, compare, truth};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, si};
 
@@ -328,18 +328,18 @@ fn answer(case: &Case) -> Result<Answer> {
         let tet_count = mesh.tets().len();
         return Ok(Answer { tip: tip(&mesh, &positions), library: None, tet_count });
     }
-    let mut scene = Scene::bare("cantilever", mesh, tissue);
-    scene.gravity = gravity;
-    scene.fixed = scene.select(|x| x.x < NEAR);
-    let truth = truth(&scene)?;
+    let mut load_case = LoadCase::bare("cantilever", mesh, tissue);
+    load_case.gravity = gravity;
+    load_case.fixed = load_case.select(|x| x.x < NEAR);
+    let truth = truth(&load_case)?;
     let mut library = None;
     if case.elements == Elements::Both {
-        let settled = Method::Double.settle(&scene)?;
-        let error = compare(&scene, &truth, &settled.positions)?;
-        library = Some((tip(&scene.mesh, &settled.positions), error));
+        let settled = LibrarySolver::Double.settle(&load_case)?;
+        let error = compare(&load_case, &truth, &settled.positions)?;
+        library = Some((tip(&load_case.mesh, &settled.positions), error));
     }
-    let tip = tip(&scene.mesh, &truth.positions);
-    Ok(Answer { tip, library, tet_count: scene.mesh.tets().len() })
+    let tip = tip(&load_case.mesh, &truth.positions);
+    Ok(Answer { tip, library, tet_count: load_case.mesh.tets().len() })
 }
 
 fn quadratic(mesh: &TetMesh, tissue: &Material, gravity: Vec3<f64>) -> Result<Vec<Vec3<f64>>> {

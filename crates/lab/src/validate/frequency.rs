@@ -31,8 +31,8 @@ use viscera::state::State;
 
 use super::methods::worse;
 use super::{Context, Section};
+use crate::load_cases::{BAR, DENSITY, FRAME_RATE, GRAVITY, LoadCase, NEAR, tissue};
 use crate::reference::{Mode, Reference};
-use crate::scenes::{BAR, DENSITY, FRAME_RATE, GRAVITY, NEAR, Scene, tissue};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, si};
 
 pub(super) const SECTION: Section = Section {
@@ -78,7 +78,7 @@ fn precision(single: bool) -> &'static str {
 
 /// Substeps and iterations, those with the most work first; then the defaults.
 fn cases(quick: bool) -> Vec<Case> {
-    let budgets: &[(u32, u32)] = match quick {
+    let schedules: &[(u32, u32)] = match quick {
         true => &[(10, 5), (2, 10), (4, 5)],
         false => &[
             (4, 20),
@@ -100,7 +100,7 @@ fn cases(quick: bool) -> Vec<Case> {
     };
     let SolverSettings { substeps, iterations, .. } = SolverSettings::default();
     let case = |substeps, iterations, single| Case { substeps, iterations, single, quick };
-    let mut cases: Vec<_> = budgets.iter().map(|&(n, k)| case(n, k, false)).collect();
+    let mut cases: Vec<_> = schedules.iter().map(|&(n, k)| case(n, k, false)).collect();
     cases.extend([false, true].map(|single| case(substeps, iterations, single)));
     cases
 }
@@ -155,8 +155,8 @@ fn run(context: &mut Context) -> Result<()> {
 fn meshes(context: &mut Context) -> Result<()> {
     let bars = bars(context.quick);
     let frequencies = context.run_cases(&bars, |bar| {
-        let scene = bar.scene()?;
-        Ok(bar.mode(&scene)?.omega / (2.0 * PI))
+        let load_case = bar.load_case()?;
+        Ok(bar.mode(&load_case)?.omega / (2.0 * PI))
     })?;
     let heads = POISSONS.iter().flat_map(|nu| [format!("nu {nu}"), "over Timoshenko".to_owned()]);
     let mut table = Table::new(std::iter::once("cells across".to_owned()).chain(heads));
@@ -201,13 +201,13 @@ struct Motion {
 fn motions(context: &mut Context) -> Result<()> {
     let cells = if context.quick { 2 } else { 4 };
     let bar = Bar { cells, young: YOUNG, poisson: POISSON };
-    let scene = bar.scene()?;
-    let mode = bar.mode(&scene)?;
-    let start = bent(&scene)?;
+    let load_case = bar.load_case()?;
+    let mode = bar.mode(&load_case)?;
+    let start = bent(&load_case)?;
     let cases = cases(context.quick);
     let motions = context.run_cases(&cases, |case| match case.single {
-        true => release::<f32>(case, &scene, &mode, &start),
-        false => release::<f64>(case, &scene, &mode, &start),
+        true => release::<f32>(case, &load_case, &mode, &start),
+        false => release::<f64>(case, &load_case, &mode, &start),
     })?;
     let exact = mode.omega / (2.0 * PI);
     context.document.subheading("The library's motion");
@@ -215,7 +215,7 @@ fn motions(context: &mut Context) -> Result<()> {
         "The bar ({cells} cells across, {} tetrahedra, nu {POISSON}) is bent by {} % of its weight and \
          let go. Its part in the first mode, `q = phi^T M u`, crosses zero every half period. The mesh \
          swings with {}; implicit Euler with a step `h` makes of that, for `w = 2 pi f`,",
-        scene.mesh.tets().len(),
+        load_case.mesh.tets().len(),
         100.0 * LOAD,
         si(exact, "Hz"),
     ));
@@ -302,9 +302,9 @@ fn stiffer(context: &mut Context) -> Result<()> {
     let SolverSettings { substeps, iterations, .. } = SolverSettings::default();
     let case = Case { substeps, iterations, single: false, quick: context.quick };
     let motions = context.run_cases(&bars, |bar| {
-        let scene = bar.scene()?;
-        let mode = bar.mode(&scene)?;
-        Ok((mode.omega, release::<f64>(&case, &scene, &mode, &bent(&scene)?)?))
+        let load_case = bar.load_case()?;
+        let mode = bar.mode(&load_case)?;
+        Ok((mode.omega, release::<f64>(&case, &load_case, &mode, &bent(&load_case)?)?))
     })?;
     let heads = ["E", "(E/rho) (h/edge)^2", "frequency", "implicit Euler", "off by"];
     let mut table = Table::new(heads.into_iter().chain(["left per period", "implicit Euler"]));
@@ -335,33 +335,37 @@ fn stiffer(context: &mut Context) -> Result<()> {
 }
 
 impl Bar {
-    fn scene(&self) -> Result<Scene> {
+    fn load_case(&self) -> Result<LoadCase> {
         let block = Block::new(Vec3::from_f64(BAR), [4 * self.cells, self.cells, self.cells]);
         let mesh = block.mesh().context("the bar of the frequency")?;
         let tissue = tissue(MaterialModel::StableNeoHookean, self.young, self.poisson)?;
-        let mut scene = Scene::bare("cantilever", mesh, tissue);
-        scene.fixed = scene.select(|x| x.x < NEAR);
-        Ok(scene)
+        let mut load_case = LoadCase::bare("cantilever", mesh, tissue);
+        load_case.fixed = load_case.select(|x| x.x < NEAR);
+        Ok(load_case)
     }
 
-    fn mode(&self, scene: &Scene) -> Result<Mode> {
-        let model = scene.model::<f64>(&SolverSettings::default())?;
+    fn mode(&self, load_case: &LoadCase) -> Result<Mode> {
+        let model = load_case.model::<f64>(&SolverSettings::default())?;
         let down = vec3(0.0, 0.0, -1.0);
-        Ok(Reference::new(&model).lowest_mode(&model.rest_positions, &scene.inputs(1.0), down)?)
+        Ok(Reference::new(&model).lowest_mode(
+            &model.rest_positions,
+            &load_case.inputs(1.0),
+            down,
+        )?)
     }
 }
 
 /// The bar at rest under a small load [m].
-fn bent(scene: &Scene) -> Result<Vec<Vec3<f64>>> {
-    let model = scene.model::<f64>(&SolverSettings::default())?;
-    let inputs = Inputs { gravity: GRAVITY * LOAD, ..scene.inputs(1.0) };
+fn bent(load_case: &LoadCase) -> Result<Vec<Vec3<f64>>> {
+    let model = load_case.model::<f64>(&SolverSettings::default())?;
+    let inputs = Inputs { gravity: GRAVITY * LOAD, ..load_case.inputs(1.0) };
     Ok(Reference::new(&model).settle(&model.rest_positions, &inputs)?.positions)
 }
 
 /// Lets the bent bar go and measures how it swings.
 fn release<S: Real>(
     case: &Case,
-    scene: &Scene,
+    load_case: &LoadCase,
     mode: &Mode,
     start: &[Vec3<f64>],
 ) -> Result<Motion> {
@@ -370,17 +374,17 @@ fn release<S: Real>(
         iterations: case.iterations,
         ..SolverSettings::default()
     };
-    let model = scene.model::<S>(&settings)?;
+    let model = load_case.model::<S>(&settings)?;
     let mut solver = Solver::new(&model, &settings);
     let mut state = State::at_rest(&model);
     for (x, start) in state.positions.iter_mut().zip(start) {
         *x = start.cast();
     }
     let dt = 1.0 / FRAME_RATE / f64::from(case.substeps);
-    let inputs = scene.inputs(1.0);
+    let inputs = load_case.inputs(1.0);
     solver.restart(&model, &mut state, &inputs, dt)?;
     let part = |state: &State<S>| -> f64 {
-        let moved = state.positions.iter().zip(scene.mesh.vertices());
+        let moved = state.positions.iter().zip(load_case.mesh.vertices());
         let terms = moved.zip(mode.shape.iter().zip(&model.masses));
         terms.map(|((x, rest), (u, m))| u.dot(x.cast() - *rest) * m.to_f64()).sum()
     };

@@ -6,9 +6,9 @@ use anyhow::Result;
 use viscera::material::MaterialModel;
 use viscera::scalar::{Vec3, vec3};
 
-use super::methods::{Method, floored, floored_percent, worse};
+use super::methods::{LibrarySolver, floored, floored_percent, worse};
 use super::{Context, Section};
-use crate::scenes::{BLOCK, NEAR, Path, Scene, Size, tissue};
+use crate::load_cases::{BLOCK, DrivenPath, LoadCase, NEAR, Size, tissue};
 use crate::settling::{Error, Truth, compare, truth};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, si};
 
@@ -26,7 +26,7 @@ const FLOOR: f64 = 1e-9;
 /// Asked of the library.
 const LIMIT: f64 = 1e-3;
 /// The library's answers, in the order of the table's rows.
-const METHODS: [Method; 2] = [Method::Double, Method::Single];
+const METHODS: [LibrarySolver; 2] = [LibrarySolver::Double, LibrarySolver::Single];
 
 #[derive(Clone, Copy, Debug)]
 struct Case {
@@ -99,7 +99,7 @@ fn table(context: &mut Context, cases: &[Case], answers: &[Answer]) {
                 format!("{} mm", case.depth),
                 newtons(answer.true_force),
                 percent(answer.true_volume - 1.0),
-                if *method == Method::Single { "single" } else { "double" }.to_owned(),
+                if *method == LibrarySolver::Single { "single" } else { "double" }.to_owned(),
                 newtons(*force),
                 floored_percent((force / answer.true_force - 1.0).abs(), FLOOR),
                 floored_percent(error.rms, FLOOR),
@@ -165,36 +165,37 @@ fn verdict(context: &mut Context, answers: &[Answer]) {
     }
 }
 
-fn scene(case: &Case) -> Result<Scene> {
+fn load_case(case: &Case) -> Result<LoadCase> {
     let tissue = tissue(MaterialModel::StableNeoHookean, YOUNG, case.poisson)?;
-    let mut scene = Scene::new("press", case.size, tissue)?;
+    let mut load_case = LoadCase::new("press", case.size, tissue)?;
     let under = |x: f64, edge: f64| (x - 0.5 * edge).abs() < HALF_PUNCH * edge + NEAR;
     let top = BLOCK[2] - NEAR;
-    scene.driven = scene.select(|x| x.z > top && under(x.x, BLOCK[0]) && under(x.y, BLOCK[1]));
+    load_case.driven =
+        load_case.select(|x| x.z > top && under(x.x, BLOCK[0]) && under(x.y, BLOCK[1]));
     let depth = 1e-3 * f64::from(case.depth);
-    scene.path = Path::Shift(vec3(0.0, 0.0, -depth));
-    scene.path_frames = (depth / SPEED).round() as u32;
-    Ok(scene)
+    load_case.path = DrivenPath::Shift(vec3(0.0, 0.0, -depth));
+    load_case.path_frames = (depth / SPEED).round() as u32;
+    Ok(load_case)
 }
 
 /// With which the driven pins press down [N].
-fn force(scene: &Scene, pin_forces: &[Vec3<f64>]) -> f64 {
-    pin_forces.iter().skip(scene.fixed.len()).map(|force| -force.z).sum()
+fn force(load_case: &LoadCase, pin_forces: &[Vec3<f64>]) -> f64 {
+    pin_forces.iter().skip(load_case.fixed.len()).map(|force| -force.z).sum()
 }
 
 fn answer(case: &Case) -> Result<Answer> {
-    let scene = scene(case)?;
-    let truth = truth(&scene)?;
-    let solve = |method: Method| -> Result<_> {
-        let settled = method.settle(&scene)?;
-        let error = compare(&scene, &truth, &settled.positions)?;
-        Ok((force(&scene, &settled.pin_forces), error))
+    let load_case = load_case(case)?;
+    let truth = truth(&load_case)?;
+    let solve = |method: LibrarySolver| -> Result<_> {
+        let settled = method.settle(&load_case)?;
+        let error = compare(&load_case, &truth, &settled.positions)?;
+        Ok((force(&load_case, &settled.pin_forces), error))
     };
     let [double, single] = METHODS.map(solve);
     Ok(Answer {
-        tet_count: scene.mesh.tets().len(),
-        true_force: force(&scene, &truth.pin_forces),
-        true_volume: truth.volume / scene.mesh.volume(),
+        tet_count: load_case.mesh.tets().len(),
+        true_force: force(&load_case, &truth.pin_forces),
+        true_volume: truth.volume / load_case.mesh.volume(),
         library: [double?, single?],
         truth,
     })

@@ -1,4 +1,4 @@
-//! Iteration independence: the stiffness that tissue seems to have, whatever the budget.
+//! Iteration independence: the stiffness that tissue seems to have, whatever the number of iterations per frame.
 
 use std::fmt;
 
@@ -8,7 +8,7 @@ use viscera::settings::{Colors, SolverSettings};
 
 use super::methods::worse;
 use super::{Context, Section};
-use crate::scenes::{Scene, Size, tissue};
+use crate::load_cases::{LoadCase, Size, tissue};
 use crate::settling::{Error, compare, settle, truth};
 use viscera_report::{Axis, Plot, Series, Style, Table};
 
@@ -28,12 +28,12 @@ const LIMIT: f64 = 1e-3;
 const FLOOR: f64 = 1e-9;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Method {
+enum Formulation {
     Exact,
     Published,
 }
 
-impl Method {
+impl Formulation {
     fn name(self) -> &'static str {
         match self {
             Self::Exact => "exact at rest",
@@ -44,9 +44,9 @@ impl Method {
 
 #[derive(Clone, Debug)]
 struct Case {
-    scene: &'static str,
+    load_case: &'static str,
     size: Size,
-    method: Method,
+    method: Formulation,
     colors: Colors,
     substeps: u32,
     iterations: u32,
@@ -55,13 +55,13 @@ struct Case {
 
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { scene, colors, substeps, iterations, .. } = self;
+        let Self { load_case, colors, substeps, iterations, .. } = self;
         let (label, colors) = (label(self), color_name(*colors));
-        write!(f, "{scene}, {label}, colours {colors}, {substeps} x {iterations}")
+        write!(f, "{load_case}, {label}, colours {colors}, {substeps} x {iterations}")
     }
 }
 
-fn scenes(quick: bool) -> &'static [&'static str] {
+fn load_cases(quick: bool) -> &'static [&'static str] {
     if quick { &["cantilever"] } else { &["cantilever", "grab", "organ"] }
 }
 
@@ -83,12 +83,12 @@ const COLORS: [Colors; 5] = [
 fn cases(quick: bool) -> [Vec<Case>; 3] {
     let size = if quick { Size::Tiny } else { Size::Small };
     let mut lists = [Vec::new(), Vec::new(), Vec::new()];
-    let methods: &[(Method, bool)] =
-        &[(Method::Exact, false), (Method::Exact, true), (Method::Published, false)];
-    for &scene in scenes(quick) {
+    let methods: &[(Formulation, bool)] =
+        &[(Formulation::Exact, false), (Formulation::Exact, true), (Formulation::Published, false)];
+    for &load_case in load_cases(quick) {
         for &(method, single) in methods {
             let case = |colors, substeps, iterations| Case {
-                scene,
+                load_case,
                 size,
                 method,
                 colors,
@@ -99,7 +99,7 @@ fn cases(quick: bool) -> [Vec<Case>; 3] {
             let any = Colors::Unlimited;
             lists[0].extend(iterations(quick).iter().map(|&k| case(any, 1, k)));
             lists[1].extend(SUBSTEPS.map(|s| case(any, s, 5)));
-            if method == Method::Exact && !single {
+            if method == Formulation::Exact && !single {
                 lists[2].extend(COLORS.map(|colors| case(colors, 1, 20)));
             }
         }
@@ -119,8 +119,8 @@ struct Answer {
 
 fn answer(case: &Case) -> Result<Answer> {
     let material = tissue(MaterialModel::StableNeoHookean, YOUNG, POISSON)?;
-    let scene = Scene::new(case.scene, case.size, material)?;
-    let exact = case.method == Method::Exact;
+    let load_case = LoadCase::new(case.load_case, case.size, material)?;
+    let exact = case.method == Formulation::Exact;
     let settings = SolverSettings {
         colors: case.colors,
         substeps: case.substeps,
@@ -130,11 +130,11 @@ fn answer(case: &Case) -> Result<Answer> {
         ..SolverSettings::default()
     };
     let settled = if case.single {
-        settle::<f32>(&scene, &settings)?
+        settle::<f32>(&load_case, &settings)?
     } else {
-        settle::<f64>(&scene, &settings)?
+        settle::<f64>(&load_case, &settings)?
     };
-    let error = compare(&scene, &truth(&scene)?, &settled.positions)?;
+    let error = compare(&load_case, &truth(&load_case)?, &settled.positions)?;
     Ok(Answer { error, rejected_moving: settled.rejected_moving })
 }
 
@@ -177,13 +177,13 @@ fn run(context: &mut Context) -> Result<()> {
     Ok(())
 }
 
-/// A row per scene and method, a column per budget.
-fn tabulate(context: &mut Context, cases: &[Case], answers: &[Answer], budgets: Vec<String>) {
-    let count = budgets.len();
+/// A row per scene and method, a column per number of iterations.
+fn tabulate(context: &mut Context, cases: &[Case], answers: &[Answer], columns: Vec<String>) {
+    let count = columns.len();
     let mut table =
-        Table::new(["scene".to_owned(), "method".to_owned()].into_iter().chain(budgets));
+        Table::new(["scene".to_owned(), "method".to_owned()].into_iter().chain(columns));
     for (cases, answers) in cases.chunks(count).zip(answers.chunks(count)) {
-        let names = [cases[0].scene.to_owned(), label(&cases[0])];
+        let names = [cases[0].load_case.to_owned(), label(&cases[0])];
         let cells = answers.iter().map(|answer| {
             let other = if answer.error.is_other_minimum() { " (other minimum)" } else { "" };
             format!("{:.4}{other}", answer.error.stiffness)
@@ -201,7 +201,7 @@ fn figure(context: &mut Context, cases: &[Case], answers: &[Answer]) -> Result<(
     );
     let count = iterations(context.quick).len();
     for (cases, answers) in cases.chunks(count).zip(answers.chunks(count)) {
-        if cases[0].scene != "cantilever" {
+        if cases[0].load_case != "cantilever" {
             continue;
         }
         let points = cases.iter().zip(answers).map(|(case, answer)| {
@@ -219,15 +219,15 @@ fn judge(context: &mut Context, over: &str, cases: &[Case], answers: &[Answer]) 
     let mut rejected = 0.0;
     for (case, answer) in cases.iter().zip(answers) {
         match case.method {
-            Method::Exact => rejected = worse(rejected, answer.rejected_moving),
-            Method::Published => {
+            Formulation::Exact => rejected = worse(rejected, answer.rejected_moving),
+            Formulation::Published => {
                 let error = (answer.error.stiffness - 1.0).abs();
                 (least, most) = (least.min(error), worse(most, error));
             }
         }
     }
     for single in [false, true] {
-        let is_meant = |case: &Case| case.method == Method::Exact && case.single == single;
+        let is_meant = |case: &Case| case.method == Formulation::Exact && case.single == single;
         let meant = cases.iter().zip(answers).filter(|(case, _)| is_meant(case));
         let errors = meant.map(|(_, answer)| (answer.error.stiffness - 1.0).abs());
         let errors: Vec<f64> = errors.collect();
@@ -252,7 +252,7 @@ fn judge(context: &mut Context, over: &str, cases: &[Case], answers: &[Answer]) 
         );
     }
     context.document.paragraph(format!(
-        "Over {over} the guard takes back at most {:.0} % of the steps of moving bodies.",
+        "Over {over} the guard rejects at most {:.0} % of the steps of moving bodies.",
         100.0 * rejected
     ));
 }

@@ -4,7 +4,7 @@ use anyhow::Result;
 use viscera::material::MaterialModel;
 use viscera::settings::{Colors, SolverSettings};
 
-use crate::scenes::Scene;
+use crate::load_cases::LoadCase;
 use crate::settling::{Settled, settle};
 use viscera_report::{percent, scientific};
 
@@ -14,7 +14,7 @@ pub(super) const MODELS: [MaterialModel; 2] =
 
 /// How a scene is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Method {
+pub(super) enum LibrarySolver {
     /// The defaults, in double precision.
     Double,
     /// The defaults, in single precision.
@@ -24,9 +24,10 @@ pub(super) enum Method {
 }
 
 /// All of them.
-pub(super) const METHODS: [Method; 3] = [Method::Double, Method::Single, Method::Published];
+pub(super) const METHODS: [LibrarySolver; 3] =
+    [LibrarySolver::Double, LibrarySolver::Single, LibrarySolver::Published];
 
-impl Method {
+impl LibrarySolver {
     /// As tables and legends call it.
     pub fn name(self) -> &'static str {
         match self {
@@ -43,15 +44,15 @@ impl Method {
     }
 
     /// Brings a scene to rest.
-    pub fn settle(self, scene: &Scene) -> Result<Settled> {
-        self.settle_with(scene, &self.settings())
+    pub fn settle(self, load_case: &LoadCase) -> Result<Settled> {
+        self.settle_with(load_case, &self.settings())
     }
 
     /// The same with other settings, in the method's precision.
-    pub fn settle_with(self, scene: &Scene, settings: &SolverSettings) -> Result<Settled> {
+    pub fn settle_with(self, load_case: &LoadCase, settings: &SolverSettings) -> Result<Settled> {
         match self {
-            Self::Double | Self::Published => settle::<f64>(scene, settings),
-            Self::Single => settle::<f32>(scene, settings),
+            Self::Double | Self::Published => settle::<f64>(load_case, settings),
+            Self::Single => settle::<f32>(load_case, settings),
         }
     }
 }

@@ -8,8 +8,8 @@ use viscera::settings::{Acceleration, AndersonGuard, SolverSettings};
 
 use super::methods::{Form, scheduled, worse};
 use super::{Context, Section};
+use crate::load_cases::{FRAME_RATE, LoadCase, Size, tissue};
 use crate::motion::{errors, exact, simulate};
-use crate::scenes::{FRAME_RATE, Scene, Size, tissue};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent};
 
 pub(super) const SECTION: Section =
@@ -97,7 +97,7 @@ fn case_count(quick: bool) -> usize {
 
 fn answer(case: &Case) -> Result<Vec<f64>> {
     let material = tissue(MaterialModel::StableNeoHookean, case.young, POISSON)?;
-    let scene = Scene::new("cantilever", Size::Small, material)?;
+    let load_case = LoadCase::new("cantilever", Size::Small, material)?;
     let Schedule { form, substeps, iterations, anderson, published, .. } = case.schedule;
     let acceleration = anderson.map_or(Acceleration::None, |_| Acceleration::Anderson);
     let settings = SolverSettings {
@@ -107,8 +107,8 @@ fn answer(case: &Case) -> Result<Vec<f64>> {
         keep_multipliers: !published,
         ..scheduled(form, substeps, iterations)
     };
-    let ours = simulate::<f64>(&scene, &settings, FRAMES)?;
-    Ok(errors(&scene, &ours, &exact(&scene, substeps, FRAMES)?))
+    let ours = simulate::<f64>(&load_case, &settings, FRAMES)?;
+    Ok(errors(&load_case, &ours, &exact(&load_case, substeps, FRAMES)?))
 }
 
 fn run(context: &mut Context) -> Result<()> {

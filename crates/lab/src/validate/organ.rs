@@ -6,9 +6,9 @@ use anyhow::Result;
 use viscera::material::MaterialModel;
 use viscera::settings::SolverSettings;
 
-use super::methods::{METHODS, Method, floored, floored_percent, worse};
+use super::methods::{LibrarySolver, METHODS, floored, floored_percent, worse};
 use super::{Context, Section};
-use crate::scenes::{Scene, Size, tissue};
+use crate::load_cases::{LoadCase, Size, tissue};
 use crate::settling::{Error, Truth, compare, truth};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, si};
 
@@ -26,7 +26,7 @@ const LIMIT: f64 = 1e-3;
 #[derive(Clone, Copy, Debug)]
 struct Case {
     poisson: f64,
-    method: Method,
+    method: LibrarySolver,
     iterations: u32,
     size: Size,
 }
@@ -51,7 +51,7 @@ fn plot_cases(quick: bool) -> Vec<Case> {
     let (counts, size): (&[u32], _) =
         if quick { (&[1, 5], Size::Tiny) } else { (&[1, 2, 5, 10], Size::Small) };
     let mut cases = Vec::new();
-    for method in [Method::Double, Method::Published] {
+    for method in [LibrarySolver::Double, LibrarySolver::Published] {
         for poisson in POISSONS {
             let of = |&iterations: &u32| Case { poisson, method, iterations, size };
             cases.extend(counts.iter().map(of));
@@ -107,7 +107,8 @@ fn table(context: &mut Context) -> Result<()> {
             if error.is_other_minimum() { "another minimum" } else { "" }.to_owned(),
         ]);
     }
-    let volumes = cases.iter().zip(&answers).filter(|(case, _)| case.method == Method::Double);
+    let volumes =
+        cases.iter().zip(&answers).filter(|(case, _)| case.method == LibrarySolver::Double);
     let volumes = volumes.map(|(case, answer)| {
         format!("{} at nu {}", percent(answer.true_volume - 1.0), case.poisson)
     });
@@ -120,7 +121,7 @@ fn table(context: &mut Context) -> Result<()> {
         volumes.collect::<Vec<_>>().join(", "),
     ));
     context.document.table(&table);
-    for method in [Method::Double, Method::Single] {
+    for method in [LibrarySolver::Double, LibrarySolver::Single] {
         let chosen = cases.iter().zip(&answers).filter(|(case, _)| case.method == method);
         let worst = chosen.fold(0.0, |worst, (_, Answer { error, .. })| {
             worse(worst, worse(worse(error.rms, error.largest), error.volume.abs()))
@@ -144,7 +145,7 @@ fn plot(context: &mut Context) -> Result<()> {
         Axis::logarithmic("iterations per substep"),
         Axis::logarithmic("rms error / rms displacement"),
     );
-    for method in [Method::Double, Method::Published] {
+    for method in [LibrarySolver::Double, LibrarySolver::Published] {
         for poisson in POISSONS {
             let chosen = cases.iter().zip(&answers);
             let chosen =
@@ -166,16 +167,16 @@ fn plot(context: &mut Context) -> Result<()> {
 
 fn answer(case: &Case) -> Result<Answer> {
     let tissue = tissue(MaterialModel::StableNeoHookean, YOUNG, case.poisson)?;
-    let scene = Scene::new("organ", case.size, tissue)?;
-    let truth = truth(&scene)?;
+    let load_case = LoadCase::new("organ", case.size, tissue)?;
+    let truth = truth(&load_case)?;
     let settings = SolverSettings { iterations: case.iterations, ..case.method.settings() };
-    let settled = case.method.settle_with(&scene, &settings)?;
-    let moved = truth.positions.iter().zip(scene.mesh.vertices());
+    let settled = case.method.settle_with(&load_case, &settings)?;
+    let moved = truth.positions.iter().zip(load_case.mesh.vertices());
     Ok(Answer {
-        tet_count: scene.mesh.tets().len(),
-        true_volume: truth.volume / scene.mesh.volume(),
+        tet_count: load_case.mesh.tets().len(),
+        true_volume: truth.volume / load_case.mesh.volume(),
         displacement: moved.map(|(x, rest)| (*x - *rest).length()).fold(0.0, f64::max),
-        error: compare(&scene, &truth, &settled.positions)?,
+        error: compare(&load_case, &truth, &settled.positions)?,
         truth,
     })
 }

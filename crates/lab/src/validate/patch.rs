@@ -4,7 +4,7 @@
 //! `x -> A x` with a stretch along x, the matching contraction across, and some shear. The error is
 //! the largest distance of a vertex from `A x`, over the largest displacement.
 
-use super::methods::{METHODS, MODELS, Method, model_name, worse};
+use super::methods::{LibrarySolver, METHODS, MODELS, model_name, worse};
 use super::{Context, Section};
 use anyhow::{Context as _, Result};
 use std::fmt;
@@ -38,7 +38,7 @@ const SINGLE_LIMIT: f64 = 1e-5;
 struct Case {
     model: MaterialModel,
     stretch: f64,
-    method: Method,
+    method: LibrarySolver,
     substeps: u32,
     iterations: u32,
     quick: bool,
@@ -105,7 +105,7 @@ fn run(context: &mut Context) -> Result<()> {
 fn stretches(context: &mut Context) -> Result<()> {
     let cases = stretch_cases(context.quick);
     let errors = context.run_cases(&cases, error_of)?;
-    let heads = ["material", "stretch"].into_iter().chain(METHODS.map(Method::name));
+    let heads = ["material", "stretch"].into_iter().chain(METHODS.map(LibrarySolver::name));
     let mut table = Table::new(heads);
     let (mut double, mut single) = (0.0f64, 0.0f64);
     let count = METHODS.len();
@@ -113,13 +113,13 @@ fn stretches(context: &mut Context) -> Result<()> {
         let mut row = Vec::new();
         for (case, &error) in cases.iter().zip(errors) {
             row.push(match case.method {
-                Method::Published => percent(error),
-                Method::Double | Method::Single => scientific(error),
+                LibrarySolver::Published => percent(error),
+                LibrarySolver::Double | LibrarySolver::Single => scientific(error),
             });
             match case.method {
-                Method::Double => double = worse(double, error),
-                Method::Single => single = worse(single, error),
-                Method::Published => {}
+                LibrarySolver::Double => double = worse(double, error),
+                LibrarySolver::Single => single = worse(single, error),
+                LibrarySolver::Published => {}
             }
         }
         let case = cases[0];
@@ -178,8 +178,8 @@ fn frames(quick: bool) -> u32 {
 
 fn error_of(case: &Case) -> Result<f64> {
     match case.method {
-        Method::Double | Method::Published => settled_error::<f64>(case),
-        Method::Single => settled_error::<f32>(case),
+        LibrarySolver::Double | LibrarySolver::Published => settled_error::<f64>(case),
+        LibrarySolver::Single => settled_error::<f32>(case),
     }
 }
 

@@ -1,4 +1,4 @@
-//! XPBD, exact at rest: whatever the scene, the tissue, the order of the sweep and its budget, the body
+//! XPBD, exact at rest: whatever the scene, the tissue, the order of the sweep and the iterations per frame, the body
 //! comes to the reference's state of rest.
 
 use std::fmt;
@@ -9,7 +9,7 @@ use viscera::settings::{Acceleration, SolverSettings};
 
 use super::methods::{Form, floored, model_name, scheduled, worse};
 use super::{Context, Section};
-use crate::scenes::{NAMES, Scene, Size, tissue};
+use crate::load_cases::{LoadCase, NAMES, Size, tissue};
 use crate::settling::{Error, compare, settle, truth};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 
@@ -29,10 +29,10 @@ const FAR: f64 = 1e-2;
 const SNH: MaterialModel = MaterialModel::StableNeoHookean;
 const STVK: MaterialModel = MaterialModel::SaintVenantKirchhoff;
 
-/// One body at several budgets.
+/// One body with several numbers of substeps and iterations.
 #[derive(Clone, Debug)]
 struct Case {
-    scene: &'static str,
+    load_case: &'static str,
     size: Size,
     model: MaterialModel,
     young: f64,
@@ -41,14 +41,14 @@ struct Case {
     anderson: bool,
     single: bool,
     /// Substeps and iterations.
-    budgets: &'static [(u32, u32)],
+    schedules: &'static [(u32, u32)],
 }
 
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { scene, size, model, young, poisson, form, anderson, single, .. } = self;
+        let Self { load_case, size, model, young, poisson, form, anderson, single, .. } = self;
         let (law, form) = (model_name(*model), form.name());
-        write!(f, "{scene} ({size:?}), {law}, {} kPa, nu {poisson}, {form}", young / 1e3)?;
+        write!(f, "{load_case} ({size:?}), {law}, {} kPa, nu {poisson}, {form}", young / 1e3)?;
         if *anderson {
             f.write_str(", Anderson")?;
         }
@@ -59,10 +59,10 @@ impl fmt::Display for Case {
     }
 }
 
-/// What became of a body at one budget.
+/// What became of a body with one of them.
 #[derive(Clone, Copy, Debug)]
 struct Outcome {
-    budget: (u32, u32),
+    schedule: (u32, u32),
     error: Error,
     rejected: f64,
     rejected_moving: f64,
@@ -81,9 +81,9 @@ struct Group {
 }
 
 const PER_FRAME: &[(u32, u32)] = &[(1, 5), (1, 20)];
-/// Mixing needs several sweeps.
+/// Acceleration needs several iterations.
 const ACCELERATED: &[(u32, u32)] = &[(1, 20)];
-/// What the defaults spend.
+/// Those of the default settings.
 const DEFAULT: &[(u32, u32)] = &[(10, 2)];
 
 fn groups(quick: bool) -> Vec<Group> {
@@ -104,12 +104,12 @@ fn groups(quick: bool) -> Vec<Group> {
             (1e5, 0.49),
         ]
     };
-    let grid = |form, size, model, tissues: &[(f64, f64)], single, budgets| {
+    let grid = |form, size, model, tissues: &[(f64, f64)], single, schedules| {
         let mut cases = Vec::new();
-        for &scene in names {
+        for &load_case in names {
             for &(young, poisson) in tissues {
                 cases.push(Case {
-                    scene,
+                    load_case,
                     size,
                     model,
                     young,
@@ -117,7 +117,7 @@ fn groups(quick: bool) -> Vec<Group> {
                     form,
                     anderson: false,
                     single,
-                    budgets,
+                    schedules,
                 });
             }
         }
@@ -131,12 +131,14 @@ fn groups(quick: bool) -> Vec<Group> {
         groups.push(Group { title: form.name(), cases });
     }
     let cases = grid(Form::Colored, size, SNH, all, false, DEFAULT);
-    groups.push(Group { title: "coloured, the default budget", cases });
+    groups.push(Group { title: "coloured, default iterations", cases });
     if !quick {
         let stiff = &[(1e5, 0.45), (1e5, 0.49)];
         let mut cases = grid(Form::Colored, Size::Large, SNH, stiff, false, PER_FRAME);
         groups.push(Group { title: "coloured, about 3000 tetrahedra", cases: cases.clone() });
-        cases.retain(|case| case.poisson == 0.49 && ["cantilever", "organ"].contains(&case.scene));
+        cases.retain(|case| {
+            case.poisson == 0.49 && ["cantilever", "organ"].contains(&case.load_case)
+        });
         cases.iter_mut().for_each(|case| case.form = Form::Clique);
         groups.push(Group { title: "clique, about 3000 tetrahedra", cases });
     }
@@ -161,33 +163,34 @@ fn case_count(quick: bool) -> usize {
 
 fn answer(case: &Case) -> Result<Answer> {
     let material = tissue(case.model, case.young, case.poisson)?;
-    let scene = Scene::new(case.scene, case.size, material)?;
-    let truth = truth(&scene)?;
+    let load_case = LoadCase::new(case.load_case, case.size, material)?;
+    let truth = truth(&load_case)?;
     let mut outcomes = Vec::new();
-    for &budget in case.budgets {
+    for &schedule in case.schedules {
         if truth.inverted > 0 {
             break;
         }
         let acceleration = if case.anderson { Acceleration::Anderson } else { Acceleration::None };
-        let settings = SolverSettings { acceleration, ..scheduled(case.form, budget.0, budget.1) };
+        let settings =
+            SolverSettings { acceleration, ..scheduled(case.form, schedule.0, schedule.1) };
         let settled = if case.single {
-            settle::<f32>(&scene, &settings)?
+            settle::<f32>(&load_case, &settings)?
         } else {
-            settle::<f64>(&scene, &settings)?
+            settle::<f64>(&load_case, &settings)?
         };
         outcomes.push(Outcome {
-            budget,
-            error: compare(&scene, &truth, &settled.positions)?,
+            schedule,
+            error: compare(&load_case, &truth, &settled.positions)?,
             rejected: settled.rejected,
             rejected_moving: settled.rejected_moving,
         });
     }
-    Ok(Answer { tet_count: scene.mesh.tets().len(), outcomes })
+    Ok(Answer { tet_count: load_case.mesh.tets().len(), outcomes })
 }
 
-/// The worst of a group at one budget.
+/// The worst of a group with one schedule.
 struct Worst {
-    budget: (u32, u32),
+    schedule: (u32, u32),
     count: usize,
     rms: f64,
     largest: f64,
@@ -201,9 +204,9 @@ struct Worst {
     case: String,
 }
 
-fn worst(cases: &[Case], answers: &[Answer], budget: (u32, u32)) -> Worst {
+fn worst(cases: &[Case], answers: &[Answer], schedule: (u32, u32)) -> Worst {
     let mut worst = Worst {
-        budget,
+        schedule,
         count: 0,
         rms: 0.0,
         largest: 0.0,
@@ -215,7 +218,7 @@ fn worst(cases: &[Case], answers: &[Answer], budget: (u32, u32)) -> Worst {
         case: String::new(),
     };
     for (case, answer) in cases.iter().zip(answers) {
-        for outcome in answer.outcomes.iter().filter(|outcome| outcome.budget == budget) {
+        for outcome in answer.outcomes.iter().filter(|outcome| outcome.schedule == schedule) {
             worst.count += 1;
             worst.rejected_moving = worse(worst.rejected_moving, outcome.rejected_moving);
             worst.inverted += outcome.error.inverted;
@@ -243,18 +246,18 @@ fn run(context: &mut Context) -> Result<()> {
          a bar turned by 60 degrees and pulled by 12 %; a patch pulled up by 64 % of a block's height; \
          half of a block's top pressed down by 24 %; the procedural liver in elastic ligaments, pulled by \
          a spring (its mesh is an isosurface stuffing, the others are irregular grids). Stable \
-         neo-Hookean unless told, E from 3 to 100 kPa, nu from 0.3 to 0.49, double precision unless told. \
-         A budget of `s x k` is s substeps per frame of k sweeps each.",
+         neo-Hookean unless stated, E from 3 to 100 kPa, nu from 0.3 to 0.49, double precision unless stated. \
+         Iterations per frame: `s x k` is s substeps of k iterations each.",
     );
     let mut table = Table::new([
         "order of the sweep",
-        "budget",
+        "iterations per frame",
         "bodies",
         "largest rms error",
         "largest error",
         "volume error",
         "off in stiffness",
-        "moving steps taken back",
+        "rejected moving steps",
         "inverted tets",
         "worst",
     ]);
@@ -262,11 +265,11 @@ fn run(context: &mut Context) -> Result<()> {
     let mut grids = Vec::new();
     for group in &groups {
         let answers = context.run_cases(&group.cases, answer)?;
-        for &budget in group.cases.first().map_or(PER_FRAME, |case| case.budgets) {
-            let worst = worst(&group.cases, &answers, budget);
+        for &schedule in group.cases.first().map_or(PER_FRAME, |case| case.schedules) {
+            let worst = worst(&group.cases, &answers, schedule);
             table.row([
                 group.title.to_owned(),
-                format!("{} x {}", budget.0, budget.1),
+                format!("{} x {}", schedule.0, schedule.1),
                 worst.count.to_string(),
                 floored(worst.rms, FLOOR),
                 floored(worst.largest, FLOOR),
@@ -291,16 +294,16 @@ fn run(context: &mut Context) -> Result<()> {
     plot(context, &groups, &grids)
 }
 
-/// What is more than 1 % off, with what tells a slow body from one in another minimum.
+/// Bodies that are more than 1 % off, with measures that tell a slow body from one in another minimum.
 fn far(context: &mut Context, groups: &[Group], grids: &[Vec<Answer>]) {
     let mut table = Table::new([
         "body",
-        "budget",
+        "iterations per frame",
         "rms error",
         "apparent stiffness",
         "|grad|",
         "energy",
-        "steps taken back",
+        "rejected steps",
         "",
     ]);
     let mut count = 0;
@@ -315,7 +318,7 @@ fn far(context: &mut Context, groups: &[Group], grids: &[Vec<Answer>]) {
             count += 1;
             table.row([
                 case.to_string(),
-                format!("{} x {}", outcome.budget.0, outcome.budget.1),
+                format!("{} x {}", outcome.schedule.0, outcome.schedule.1),
                 percent(outcome.error.rms),
                 format!("{:.3}", outcome.error.stiffness),
                 scientific(outcome.error.gradient),
@@ -341,13 +344,13 @@ fn far(context: &mut Context, groups: &[Group], grids: &[Vec<Answer>]) {
 
 /// The rows that are asked for.
 fn judge(context: &mut Context, title: &str, worst: &Worst) {
-    let limit = match (title, worst.budget) {
+    let limit = match (title, worst.schedule) {
         ("clique, 4 colours", (_, 5)) | ("clique, about 3000 tetrahedra", (_, 5)) => 1e-2,
-        // Told, not promised.
+        // Documented, not promised.
         ("Jacobi", (_, 5)) => return,
         _ => 1e-3,
     };
-    let (substeps, iterations) = worst.budget;
+    let (substeps, iterations) = worst.schedule;
     let others = match worst.other_minima {
         0 => String::new(),
         count => format!(", {count} in another minimum"),
@@ -371,7 +374,7 @@ fn plot(context: &mut Context, groups: &[Group], grids: &[Vec<Answer>]) -> Resul
     for (group, answers) in groups.iter().zip(grids).take(3) {
         let points = group.cases.iter().zip(answers).flat_map(|(case, answer)| {
             let x = case.young / 1e3 * (1.0 + (case.poisson - 0.3));
-            let few = answer.outcomes.iter().filter(|outcome| outcome.budget == (1, 5));
+            let few = answer.outcomes.iter().filter(|outcome| outcome.schedule == (1, 5));
             few.map(move |outcome| {
                 [x, if outcome.error.rms < FLOOR { FLOOR } else { outcome.error.rms }]
             })
@@ -386,7 +389,7 @@ fn plot(context: &mut Context, groups: &[Group], grids: &[Vec<Answer>]) -> Resul
     context.document.paragraph(format!(
         "Bodies have {} to {} tetrahedra. One point per body; {} law in all three. Five sweeps of one \
          colour are too few for stiff, nearly incompressible tissue: the table above says how many of \
-         its steps the guard takes back.",
+         its steps the guard rejects.",
         least.unwrap_or(0),
         most.unwrap_or(0),
         model_name(SNH),

@@ -8,9 +8,9 @@ use anyhow::Result;
 use viscera::material::MaterialModel;
 use viscera::scalar::{Vec3, vec3};
 
-use super::methods::{Method, floored, floored_percent, worse};
+use super::methods::{LibrarySolver, floored, floored_percent, worse};
 use super::{Context, Section};
-use crate::scenes::{BAR, Path, Scene, Size, tissue};
+use crate::load_cases::{BAR, DrivenPath, LoadCase, Size, tissue};
 use crate::settling::{Error, Truth, compare, truth_in_parts};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, si};
 
@@ -33,7 +33,7 @@ const FLOOR: f64 = 1e-9;
 /// Asked of the library.
 const LIMIT: f64 = 1e-3;
 /// The library's answers, in the order of the table's columns.
-const METHODS: [Method; 2] = [Method::Double, Method::Single];
+const METHODS: [LibrarySolver; 2] = [LibrarySolver::Double, LibrarySolver::Single];
 
 #[derive(Clone, Copy, Debug)]
 struct Case {
@@ -128,7 +128,7 @@ fn errors(context: &mut Context, cases: &[Case], answers: &[Answer]) {
             table.row([
                 format!("{}°", case.angle),
                 answer.tet_count.to_string(),
-                if *method == Method::Single { "single" } else { "double" }.to_owned(),
+                if *method == LibrarySolver::Single { "single" } else { "double" }.to_owned(),
                 floored_percent(error.rms, FLOOR),
                 floored_percent(error.largest, FLOOR),
                 floored_percent((torque / answer.true_torque - 1.0).abs(), FLOOR),
@@ -193,13 +193,13 @@ fn verdict(context: &mut Context, answers: &[Answer]) {
     }
 }
 
-fn scene(case: &Case) -> Result<Scene> {
+fn load_case(case: &Case) -> Result<LoadCase> {
     let tissue = tissue(MaterialModel::StableNeoHookean, YOUNG, POISSON)?;
-    let mut scene = Scene::new("twist", case.size, tissue)?;
+    let mut load_case = LoadCase::new("twist", case.size, tissue)?;
     let angle = f64::from(case.angle) * PI / 180.0;
-    scene.path = Path::Screw { center: axis_point(), angle, advance: 0.0 };
-    scene.path_frames = case.angle.div_ceil(SPEED);
-    Ok(scene)
+    load_case.path = DrivenPath::Screw { center: axis_point(), angle, advance: 0.0 };
+    load_case.path_frames = case.angle.div_ceil(SPEED);
+    Ok(load_case)
 }
 
 fn axis_point() -> Vec3<f64> {
@@ -207,25 +207,25 @@ fn axis_point() -> Vec3<f64> {
 }
 
 /// Of the pins of the turned end about the bar's axis [N m].
-fn torque(scene: &Scene, positions: &[Vec3<f64>], pin_forces: &[Vec3<f64>]) -> f64 {
-    let driven = scene.driven.iter().zip(pin_forces.iter().skip(scene.fixed.len()));
+fn torque(load_case: &LoadCase, positions: &[Vec3<f64>], pin_forces: &[Vec3<f64>]) -> f64 {
+    let driven = load_case.driven.iter().zip(pin_forces.iter().skip(load_case.fixed.len()));
     let arm = |v: u32| positions[v as usize] - axis_point();
     driven.map(|(&v, force)| arm(v).cross(*force).x).sum()
 }
 
 fn answer(case: &Case) -> Result<Answer> {
-    let scene = scene(case)?;
-    let truth = truth_in_parts(&scene, case.angle.div_ceil(INCREMENT))?;
+    let load_case = load_case(case)?;
+    let truth = truth_in_parts(&load_case, case.angle.div_ceil(INCREMENT))?;
     let library = METHODS.map(|method| -> Result<_> {
-        let settled = method.settle(&scene)?;
-        let error = compare(&scene, &truth, &settled.positions)?;
-        Ok((torque(&scene, &settled.positions, &settled.pin_forces), error))
+        let settled = method.settle(&load_case)?;
+        let error = compare(&load_case, &truth, &settled.positions)?;
+        Ok((torque(&load_case, &settled.positions, &settled.pin_forces), error))
     });
     let [double, single] = library;
     Ok(Answer {
-        tet_count: scene.mesh.tets().len(),
-        true_torque: torque(&scene, &truth.positions, &truth.pin_forces),
-        true_volume: truth.volume / scene.mesh.volume(),
+        tet_count: load_case.mesh.tets().len(),
+        true_torque: torque(&load_case, &truth.positions, &truth.pin_forces),
+        true_volume: truth.volume / load_case.mesh.volume(),
         truth,
         library: [double?, single?],
     })

@@ -15,9 +15,9 @@ use viscera::material::{Material, MaterialModel};
 use viscera::mesh::shapes::Block;
 use viscera::scalar::{Vec3, vec3};
 
-use super::methods::{MODELS, Method, floored, model_name, worse};
+use super::methods::{LibrarySolver, MODELS, floored, model_name, worse};
 use super::{Context, Section};
-use crate::scenes::{NEAR, Path, Scene, tissue};
+use crate::load_cases::{DrivenPath, LoadCase, NEAR, tissue};
 use crate::settling::{truth, volume};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
 
@@ -46,13 +46,16 @@ const LIMIT: f64 = 1e-3;
 const REFERENCE_LIMIT: f64 = 1e-8;
 
 /// Where an answer comes from, in the order of the table's columns.
-const SOLVERS: [Solver; 3] =
-    [Solver::Reference, Solver::Library(Method::Double), Solver::Library(Method::Single)];
+const SOLVERS: [ComparedSolver; 3] = [
+    ComparedSolver::Reference,
+    ComparedSolver::Library(LibrarySolver::Double),
+    ComparedSolver::Library(LibrarySolver::Single),
+];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Solver {
+enum ComparedSolver {
     Reference,
-    Library(Method),
+    Library(LibrarySolver),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -60,15 +63,15 @@ struct Case {
     model: MaterialModel,
     poisson: f64,
     stretch: f64,
-    solver: Solver,
+    solver: ComparedSolver,
 }
 
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { model, poisson, stretch, solver } = self;
         let solver = match solver {
-            Solver::Reference => "reference",
-            Solver::Library(method) => method.name(),
+            ComparedSolver::Reference => "reference",
+            ComparedSolver::Library(method) => method.name(),
         };
         write!(f, "{}, nu {poisson}, stretch {stretch}, {solver}", model_name(*model))
     }
@@ -207,7 +210,7 @@ fn plot(context: &mut Context, cases: &[Case], answers: &[Answer]) -> Result<()>
     }
     for model in MODELS {
         let chosen = cases.iter().zip(answers).filter(|(case, _)| {
-            case.model == model && case.solver == Solver::Library(Method::Single)
+            case.model == model && case.solver == ComparedSolver::Library(LibrarySolver::Single)
         });
         let points = chosen.map(|(case, answer)| [case.stretch, answer.stress]);
         let name = format!("library, {}", model_name(model));
@@ -229,12 +232,15 @@ fn verdicts(context: &mut Context, cases: &[Case], answers: &[Answer]) {
             worst = errors.fold(worst, |worst, error| worse(worst, error.abs()));
         }
         let (who, limit) = match solver {
-            Solver::Reference => ("the reference", REFERENCE_LIMIT),
-            Solver::Library(Method::Single) => ("defaults in single precision", LIMIT),
-            Solver::Library(_) => ("defaults in double precision", LIMIT),
+            ComparedSolver::Reference => ("the reference", REFERENCE_LIMIT),
+            ComparedSolver::Library(LibrarySolver::Single) => {
+                ("defaults in single precision", LIMIT)
+            }
+            ComparedSolver::Library(_) => ("defaults in double precision", LIMIT),
         };
-        let figure =
-            |error| if solver == Solver::Reference { scientific(error) } else { percent(error) };
+        let figure = |error| {
+            if solver == ComparedSolver::Reference { scientific(error) } else { percent(error) }
+        };
         let measured = if worst < FLOOR { floored(worst, FLOOR) } else { figure(worst) };
         let what = format!("uniaxial stretch, largest error: {who}");
         context.verdict(what, format!("< {}", figure(limit)), measured, worst < limit);
@@ -256,39 +262,39 @@ fn closed_form(tissue: &Material, s: f64) -> (f64, f64) {
     }
 }
 
-fn bar(case: &Case, side: f64) -> Result<Scene> {
+fn bar(case: &Case, side: f64) -> Result<LoadCase> {
     let block = Block { jitter: 0.5, seed: 2, ..Block::new(Vec3::from_f64(SIZE), CELLS) };
     let mesh = block.mesh().context("the bar of the uniaxial stretch")?;
-    let mut scene = Scene::bare("bar", mesh, tissue(case.model, YOUNG, case.poisson)?);
+    let mut load_case = LoadCase::bare("bar", mesh, tissue(case.model, YOUNG, case.poisson)?);
     // What is near to x = 0 is listed first, then the pulled end.
-    scene.driven = scene.select(|x| x.x < NEAR);
-    scene.driven.extend(scene.select(|x| x.x > SIZE[0] - NEAR));
+    load_case.driven = load_case.select(|x| x.x < NEAR);
+    load_case.driven.extend(load_case.select(|x| x.x > SIZE[0] - NEAR));
     let center = vec3(0.0, 0.5 * SIZE[1], 0.5 * SIZE[2]);
-    scene.path = Path::Stretch { center, factors: vec3(case.stretch, side, side) };
-    scene.path_frames = PATH_FRAMES;
-    Ok(scene)
+    load_case.path = DrivenPath::Stretch { center, factors: vec3(case.stretch, side, side) };
+    load_case.path_frames = PATH_FRAMES;
+    Ok(load_case)
 }
 
 fn answer(case: &Case) -> Result<Answer> {
     let tissue = tissue(case.model, YOUNG, case.poisson)?;
     let (side, stress) = closed_form(&tissue, case.stretch);
-    let scene = bar(case, side)?;
+    let load_case = bar(case, side)?;
     let (positions, pin_forces) = match case.solver {
-        Solver::Reference => {
-            let truth = truth(&scene)?;
+        ComparedSolver::Reference => {
+            let truth = truth(&load_case)?;
             (truth.positions, truth.pin_forces)
         }
-        Solver::Library(method) => {
-            let settled = method.settle(&scene)?;
+        ComparedSolver::Library(method) => {
+            let settled = method.settle(&load_case)?;
             (settled.positions, settled.pin_forces)
         }
     };
-    let rest = scene.mesh.vertices();
+    let rest = load_case.mesh.vertices();
     let (mut largest_error, mut largest_move) = (0.0, 0.0);
     // Lower and upper edge along y at half length.
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for (rest, x) in rest.iter().zip(&positions) {
-        let exact = scene.path.at(*rest, 1.0);
+        let exact = load_case.path.at(*rest, 1.0);
         let (distance, displacement) = ((*x - exact).length(), (exact - *rest).length());
         largest_error = worse(largest_error, distance);
         largest_move = worse(largest_move, displacement);
@@ -297,13 +303,15 @@ fn answer(case: &Case) -> Result<Answer> {
         }
     }
     let area = SIZE[1] * SIZE[2];
-    let pulled = pin_forces.iter().zip(&scene.driven).filter(|&(_, &v)| rest[v as usize].x > NEAR);
+    let pulled =
+        pin_forces.iter().zip(&load_case.driven).filter(|&(_, &v)| rest[v as usize].x > NEAR);
     let measured = pulled.map(|(force, _)| force.x).sum::<f64>() / area;
     Ok(Answer {
         largest: largest_error / largest_move,
         side: (high - low) / (SIZE[1] * side) - 1.0,
         force: measured / stress - 1.0,
-        volume: volume(&scene, &positions)?.0 / (case.stretch * side * side * SIZE[0] * area) - 1.0,
+        volume: volume(&load_case, &positions)?.0 / (case.stretch * side * side * SIZE[0] * area)
+            - 1.0,
         stress: measured / YOUNG,
     })
 }

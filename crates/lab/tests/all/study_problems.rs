@@ -2,8 +2,8 @@
 
 use viscera::material::{Material, MaterialModel};
 use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Threads};
+use viscera_lab::load_cases::{LoadCase, Size, tissue};
 use viscera_lab::reference::Reference;
-use viscera_lab::scenes::{Scene, Size, tissue};
 use viscera_lab::settling::{Error, compare, settle, truth};
 use viscera_lab::stress::{self, FRAMES, Kind, Run};
 
@@ -17,9 +17,10 @@ fn one_thread(iterations: u32) -> SolverSettings {
 }
 
 fn rest(name: &'static str, tissue: Material, settings: &SolverSettings) -> Error {
-    let scene = Scene::new(name, Size::Tiny, tissue).expect("a scene");
-    let settled = settle::<f64>(&scene, settings).expect("a rest");
-    compare(&scene, &truth(&scene).expect("a reference"), &settled.positions).expect("an error")
+    let load_case = LoadCase::new(name, Size::Tiny, tissue).expect("a scene");
+    let settled = settle::<f64>(&load_case, settings).expect("a rest");
+    compare(&load_case, &truth(&load_case).expect("a reference"), &settled.positions)
+        .expect("an error")
 }
 
 /// Mixed with the same weights, positions and multipliers come where plain sweeps come, sooner; positions
@@ -51,10 +52,10 @@ fn anderson_mixes_multipliers_with_positions() {
 fn the_mass_bound_lets_the_rebase_settle_deformed_bodies() {
     let tissue = tissue(MaterialModel::StableNeoHookean, 1e5, 0.45).expect("a tissue");
     let settings = SolverSettings { step_guard: false, ..one_thread(20) };
-    for scene in ["twist", "grab"] {
-        let Error { rms, stiffness, .. } = rest(scene, tissue, &settings);
-        println!("{scene}: {rms:.1e} from its rest, apparent stiffness {stiffness:.6}");
-        assert!(rms < 1e-3, "{scene}: {rms:e}");
+    for load_case in ["twist", "grab"] {
+        let Error { rms, stiffness, .. } = rest(load_case, tissue, &settings);
+        println!("{load_case}: {rms:.1e} from its rest, apparent stiffness {stiffness:.6}");
+        assert!(rms < 1e-3, "{load_case}: {rms:e}");
     }
 }
 
@@ -62,11 +63,11 @@ fn the_mass_bound_lets_the_rebase_settle_deformed_bodies() {
 #[test]
 fn the_step_guard_lets_no_step_raise_the_potential() {
     let tissue = tissue(MaterialModel::StableNeoHookean, 1e4, 0.45).expect("a tissue");
-    let scene = stress::bar(tissue).expect("a bar");
+    let load_case = stress::bar(tissue).expect("a bar");
     let guarded = SolverSettings { acceleration: Acceleration::Anderson, ..one_thread(5) };
     let free = SolverSettings { step_guard: false, ..guarded.clone() };
     let steps_above = |settings: &SolverSettings, kind, seed| {
-        let mut run = Run::new(&scene, kind, seed, settings).expect("a run");
+        let mut run = Run::new(&load_case, kind, seed, settings).expect("a run");
         let reference = Reference::new(&run.model);
         let mut above = 0;
         for _ in 0..FRAMES {

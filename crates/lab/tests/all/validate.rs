@@ -76,27 +76,27 @@ fn the_library_rests_where_the_reference_does_at_length() {
     assert_sections_hold("uniaxial,cantilever,twist,frequency,indentation,organ", &figures);
 }
 
-/// What is new here: stiffness does not depend on the budget, steps keep their limits, motion follows.
+/// What is new here: stiffness does not depend on the iterations, steps keep their limits, motion follows.
 #[test]
-fn stiffness_does_not_depend_on_the_budget() {
+fn stiffness_does_not_depend_on_the_iterations() {
     assert_sections_hold("independence,stress", &["independence-iterations"]);
 }
 
 #[test]
 #[ignore = "slow: many bodies come to rest, and a drop is followed by Newton's method"]
-fn stiffness_does_not_depend_on_the_budget_at_length() {
+fn stiffness_does_not_depend_on_the_iterations_at_length() {
     let figures = ["rest-bodies", "independence-iterations", "motion-drop"];
     assert_sections_hold("rest,independence,motion,stress", &figures);
 }
 
 /// Known failures: five sweeps of one colour do not unscramble a bar, and Anderson's
 /// default guard follows a drop a little less closely than is asked.
-const TOLD: [&str; 2] = ["scrambles, Jacobi", "Anderson guarded by residual"];
+const KNOWN_FAILURES: [&str; 2] = ["scrambles, Jacobi", "Anderson guarded by residual"];
 
 fn all_are_met(printed: &str) {
     assert!(printed.contains("claims are met"), "{printed}");
     for line in printed.lines().filter(|line| line.ends_with("missed")) {
-        assert!(TOLD.iter().any(|told| line.contains(told)), "{line}");
+        assert!(KNOWN_FAILURES.iter().any(|known| line.contains(known)), "{line}");
     }
 }
 

@@ -7,7 +7,7 @@ struct Solid {
     @location(3) x: vec4f,
     @location(4) y: vec4f,
     @location(5) z: vec4f,
-    // Linear light.
+    // Linear light, and how strongly it shines through tissue before it.
     @location(6) color: vec4f,
 }
 
@@ -15,6 +15,7 @@ struct SolidFragment {
     @builtin(position) place: vec4f,
     @location(0) normal: vec3f,
     @location(1) color: vec3f,
+    @location(2) @interpolate(flat) see_through: f32,
 }
 
 @vertex
@@ -31,7 +32,7 @@ fn place_solid(
     let v = solid.center.xyz - view.position.xyz + offset;
     // Normals go by the inverse transpose; the axes are perpendicular.
     let n = x * (normal.x / dot(x, x)) + y * (normal.y / dot(y, y)) + z * (normal.z / dot(z, z));
-    return SolidFragment(on_screen(v), normalize(n), solid.color.rgb);
+    return SolidFragment(on_screen(v), normalize(n), solid.color.rgb, solid.color.a);
 }
 
 fn solid_color(fragment: SolidFragment) -> vec3f {
@@ -47,5 +48,5 @@ fn shade_solid(fragment: SolidFragment) -> @location(0) vec4f {
 // Behind tissue: paler, so that one sees that it is there and that it is inside.
 @fragment
 fn shade_hidden_solid(fragment: SolidFragment) -> @location(0) vec4f {
-    return vec4f(mix(solid_color(fragment), vec3f(1.0), 0.15), 0.4);
+    return vec4f(mix(solid_color(fragment), vec3f(1.0), 0.15), fragment.see_through);
 }

@@ -5,7 +5,7 @@ use viscera::mesh::shapes::{CurvedShape, sphere};
 use viscera::scalar::Vec3;
 use viscera::solver::gpu::{Adapter, Device, GpuSurface, Skin, baseline};
 use viscera_picture::{Image, ImageSize};
-use viscera_render::{BodyView, Canvas, Drawing, Orbit, Quality};
+use viscera_render::{BodyView, Canvas, GpuDrawing, Orbit, Quality};
 
 /// Of the ball [m].
 pub const RADIUS: f64 = 0.05;
@@ -55,8 +55,8 @@ impl Ball {
     }
 
     /// The ball and nothing else.
-    pub fn drawing(&self) -> Drawing<'_> {
-        Drawing { bodies: vec![BodyView::of(&self.surface)], ..Drawing::from(self.orbit) }
+    pub fn drawing(&self) -> GpuDrawing<'_> {
+        GpuDrawing { bodies: vec![BodyView::of(&self.surface)], ..GpuDrawing::from(self.orbit) }
     }
 
     pub fn canvas(&self, [width, height]: [u32; 2], quality: Quality) -> Canvas {
@@ -64,7 +64,7 @@ impl Ball {
         Canvas::new(&self.device, size, quality).expect("a canvas")
     }
 
-    pub fn picture(&self, canvas: &Canvas, drawing: &Drawing<'_>) -> Image {
+    pub fn picture(&self, canvas: &Canvas, drawing: &GpuDrawing<'_>) -> Image {
         canvas.draw(drawing).expect("a legal drawing");
         canvas.read().expect("a picture")
     }

@@ -87,10 +87,10 @@ impl App {
 
     pub(super) fn take_picture(&mut self) {
         let path = free_name(&self.pictures, &self.session.document().stem(), "png");
-        let Some(frame) = &self.frame else {
+        let Some(snapshot) = &self.snapshot else {
             return self.messages.warn("nothing is shown yet");
         };
-        let saved = self.viewport.images(frame).map_err(anyhow::Error::msg);
+        let saved = self.viewport.images(snapshot).map_err(anyhow::Error::msg);
         match saved.and_then(|images| save_picture(&images, &path)) {
             Ok(()) => self.messages.tell(format!("saved {}", path.display())),
             Err(error) => self.messages.warn(format!("{error:#}")),
@@ -100,7 +100,7 @@ impl App {
     pub(super) fn toggle_recording(&mut self) {
         if let Some(recorder) = self.recorder.take() {
             match recorder.finish() {
-                Ok(told) => self.messages.tell(format!("saved {told}")),
+                Ok(summary) => self.messages.tell(format!("saved {summary}")),
                 Err(error) => self.messages.warn(format!("{error:#}")),
             }
             return;
@@ -115,12 +115,12 @@ impl App {
 
     /// Adds what is shown to the recording, where one is going on and a picture is due.
     pub(super) fn record(&mut self) {
-        let (Some(recorder), Some(frame)) = (&mut self.recorder, &self.frame) else { return };
-        if !recorder.is_due(frame.time) {
+        let (Some(recorder), Some(snapshot)) = (&mut self.recorder, &self.snapshot) else { return };
+        if !recorder.is_due(snapshot.time) {
             return;
         }
-        let images = self.viewport.images(frame).map_err(anyhow::Error::msg);
-        if let Err(error) = images.and_then(|images| recorder.push(&images, frame.time)) {
+        let images = self.viewport.images(snapshot).map_err(anyhow::Error::msg);
+        if let Err(error) = images.and_then(|images| recorder.push(&images, snapshot.time)) {
             self.messages.warn(format!("{error:#}"));
             self.recorder = None;
         }

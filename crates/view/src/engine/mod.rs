@@ -1,14 +1,17 @@
 //! The simulation on a thread of its own. The window sends [`Command`]s, hears [`Event`]s, and takes the
-//! newest finished [`Frame`] when it likes; it never waits.
+//! newest [`Snapshot`] when it likes; it never waits.
 
 mod color;
-mod frame;
+mod setup;
 mod simulation;
-mod stage;
+mod snapshot;
 mod worker;
 
-pub use frame::{Coloring, Frame, Hold, HoldId, Lane, Measures, Slot, Tool, inverted};
-pub use stage::{Plan, Stage};
+pub use setup::{BuildRequest, Setup};
+pub use snapshot::{
+    Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch, Snapshot, SnapshotExchange,
+    inverted,
+};
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,7 +21,7 @@ use std::time::{Duration, Instant};
 use viscera::scalar::Vec3;
 
 use crate::choices::Settings;
-use crate::probe::{Curve, Method};
+use crate::probe::{Curve, SolverVariant};
 
 /// How long the window waits for the thread to end when it is closed.
 const PATIENCE: Duration = Duration::from_millis(300);
@@ -27,9 +30,9 @@ const PATIENCE: Duration = Duration::from_millis(300);
 #[derive(Debug)]
 pub enum Command {
     /// Builds these simulations and starts them from rest.
-    Load(Box<Plan>),
+    Load(Box<BuildRequest>),
     /// Puts these simulations beside the first one, which goes on: they begin where it is.
-    Accompany(Box<Plan>),
+    Accompany(Box<BuildRequest>),
     /// Goes on with a mesh that was said to be large.
     Proceed,
     /// Runs, or pauses.
@@ -61,15 +64,15 @@ pub enum Command {
     Change(usize, Settings),
     /// Asks for what was done by hand, to be saved there.
     Save(PathBuf),
-    /// Repeats steps of the first simulation by these methods, to compare how they converge.
-    Probe(Vec<Method>),
+    /// Repeats steps of the first simulation by these solvers, to compare how they converge.
+    Probe(Vec<SolverVariant>),
     /// What colours show.
     Color(Coloring),
     /// Ends the thread.
     Quit,
 }
 
-/// What the window hears.
+/// What the thread answers.
 #[derive(Debug)]
 pub enum Event {
     /// Something that takes a while has begun.
@@ -77,9 +80,9 @@ pub enum Event {
     /// It is large: [`Command::Proceed`] goes on, another [`Command::Load`] does not.
     Expect(String),
     /// Everything is built and at rest; frames follow.
-    Ready(Arc<Stage>),
+    Ready(Arc<Setup>),
     /// Others are beside the first simulation now, or no longer.
-    Accompanied(Arc<Stage>),
+    Accompanied(Arc<Setup>),
     /// What computes each of the simulations has changed or been built again: its device, and why.
     Devices(Vec<String>),
     /// What was done by hand to the first simulation, as text for its scene file, and its time [s].
@@ -94,7 +97,7 @@ pub enum Event {
     /// A setting was refused: this is the value that a simulation goes on with.
     Kept {
         /// Which simulation.
-        lane: usize,
+        run: usize,
         /// The setting.
         key: String,
         /// As one would write it.
@@ -135,7 +138,7 @@ pub enum Cure {
 pub struct Engine {
     commands: Sender<Command>,
     events: Receiver<Event>,
-    slot: Arc<Slot>,
+    exchange: Arc<SnapshotExchange>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -144,12 +147,12 @@ impl Engine {
     pub fn start(wake: impl Fn() + Send + Sync + 'static) -> std::io::Result<Self> {
         let (commands, receive) = channel();
         let (send, events) = channel();
-        let slot = Arc::new(Slot::default());
-        let worker = worker::Worker::new(receive, send, Arc::clone(&slot), Box::new(wake));
+        let exchange = Arc::new(SnapshotExchange::default());
+        let worker = worker::Worker::new(receive, send, Arc::clone(&exchange), Box::new(wake));
         let thread = std::thread::Builder::new()
             .name("simulation".to_owned())
             .spawn(move || worker.run())?;
-        Ok(Self { commands, events, slot, thread: Some(thread) })
+        Ok(Self { commands, events, exchange, thread: Some(thread) })
     }
 
     /// Asks for something.
@@ -171,9 +174,9 @@ impl Engine {
         heard
     }
 
-    /// The newest finished frame, where there is one newer than `shown`; that one's memory is used again.
-    pub fn newest(&self, shown: &mut Option<Box<Frame>>) -> bool {
-        self.slot.take(shown)
+    /// The newest snapshot, where there is one newer than `shown`; that one's memory is used again.
+    pub fn newest(&self, shown: &mut Option<Box<Snapshot>>) -> bool {
+        self.exchange.take(shown)
     }
 }
 

@@ -1,4 +1,4 @@
-//! A simulation in either precision, with the window's numbers for what it holds.
+//! A simulation in either precision, with the window's numbers for the patches that it holds.
 
 use viscera::scalar::{Real, Vec3};
 use viscera::scene::{Patch, Scene, Selector};
@@ -8,16 +8,16 @@ use viscera::simulation::{
 };
 
 use super::color::surface_values;
-use super::frame::{Coloring, Hold, HoldId, Lane, Measures, Tool};
+use super::snapshot::{Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch};
 use crate::choices::Settings;
-use crate::probe::Moment;
+use crate::probe::NextStep;
 
-/// What the thread does with a simulation.
-pub trait Handle: Send {
+/// One of the simulations that the thread computes, in whichever precision.
+pub trait Run: Send {
     /// What computes it, and why; what a person should know of that.
     fn device(&self) -> (String, Option<String>);
     /// Takes hold of the vertices of a body nearest to a point at rest [m].
-    fn take(&mut self, hold: HoldId, grip: &Grip) -> Result<(), String>;
+    fn take(&mut self, hold: HoldId, grip: &GripTarget) -> Result<(), String>;
     /// Where what is held is to be at the end of the next frame, from where it was taken [m].
     fn lead(&mut self, hold: HoldId, translation: Vec3<f64>) -> Result<(), String>;
     /// Lets go.
@@ -32,19 +32,19 @@ pub trait Handle: Send {
     fn advance(&mut self) -> Result<(), String>;
     /// Measures what it is now: residual, energies, stresses.
     fn measure(&mut self) -> Result<(), String>;
-    /// Says what it is now, and what was measured last.
-    fn tell(&mut self, coloring: Coloring, lane: &mut Lane);
+    /// Fills a snapshot with its state now and what was measured last.
+    fn fill(&mut self, coloring: Coloring, snapshot: &mut RunSnapshot);
     /// What was done to it since it was at rest, as text for its scene file, and its time [s].
     fn done_by_hand(&self) -> (String, f64);
     /// The step that comes next.
-    fn moment(&self) -> Moment;
+    fn next_step(&self) -> NextStep;
     /// Another simulation that goes on from here with another scene's solver.
-    fn fork(&self, scene: &Scene) -> Result<Box<dyn Handle>, String>;
+    fn fork(&self, scene: &Scene) -> Result<Box<dyn Run>, String>;
 }
 
 /// What is taken hold of.
 #[derive(Clone, Copy, Debug)]
-pub struct Grip {
+pub struct GripTarget {
     /// Position of the body in the scene.
     pub body: usize,
     /// Where at rest [m].
@@ -56,46 +56,48 @@ pub struct Grip {
 }
 
 /// Builds a simulation in the precision that its scene asks for.
-pub fn build(scene: Scene, assembly: Assembly) -> Result<Box<dyn Handle>, String> {
+pub fn build(scene: Scene, assembly: Assembly) -> Result<Box<dyn Run>, String> {
     Ok(match scene.solver.precision {
-        Precision::F32 => Box::new(Running::<f32>::new(scene, assembly)?),
-        Precision::F64 => Box::new(Running::<f64>::new(scene, assembly)?),
+        Precision::F32 => Box::new(SimulationRun::<f32>::new(scene, assembly)?),
+        Precision::F64 => Box::new(SimulationRun::<f64>::new(scene, assembly)?),
     })
 }
 
-struct Running<S> {
+struct SimulationRun<S> {
     simulation: Simulation<S>,
     /// What is held, and the motion that each is.
     held: Vec<(HoldId, usize)>,
     measures: Measures,
 }
 
-impl<S: Real> Running<S> {
+impl<S: Real> SimulationRun<S> {
     fn new(scene: Scene, assembly: Assembly) -> Result<Self, String> {
         let simulation = Simulation::new(scene, assembly).map_err(text)?;
         Ok(Self { simulation, held: Vec::new(), measures: Measures::default() })
     }
 
     /// Forces of what the scene itself moves and pulls.
-    fn tools(&self, patches: Vec<PatchForce>) -> Vec<Tool> {
+    fn scene_patches(&self, patches: Vec<PatchForce>) -> Vec<ScenePatch> {
         let assembly = self.simulation.assembly();
         let by_hand = self.simulation.first_hold()..assembly.motions.len();
         let vertices = assembly.motions.iter().chain(&assembly.forces);
         let pulling = patches.into_iter().filter(|patch| patch.kind != PatchKind::Fixing);
-        let tool = |(patch, resolved): (PatchForce, &ResolvedPatch)| Tool {
+        let with_vertices = |(patch, resolved): (PatchForce, &ResolvedPatch)| ScenePatch {
             name: patch.name,
             vertices: resolved.vertices.clone(),
             force: Vec3::from_f64(patch.force),
         };
         let all = pulling.zip(vertices).enumerate();
-        all.filter(|(number, _)| !by_hand.contains(number)).map(|(_, one)| tool(one)).collect()
+        all.filter(|(number, _)| !by_hand.contains(number))
+            .map(|(_, one)| with_vertices(one))
+            .collect()
     }
 
-    fn fork_as<T: Real>(&self, scene: &Scene) -> Result<Running<T>, String> {
+    fn fork_as<T: Real>(&self, scene: &Scene) -> Result<SimulationRun<T>, String> {
         let values = scene.solver.values().into_iter().filter(|(key, _)| *key != "precision");
         let settings: Settings =
             values.map(|(key, value)| (format!("solver.{key}"), value)).collect();
-        Ok(Running {
+        Ok(SimulationRun {
             simulation: self.simulation.fork(&settings).map_err(text)?,
             held: self.held.clone(),
             measures: self.measures.clone(),
@@ -107,13 +109,13 @@ impl<S: Real> Running<S> {
     }
 }
 
-impl<S: Real> Handle for Running<S> {
+impl<S: Real> Run for SimulationRun<S> {
     fn device(&self) -> (String, Option<String>) {
         let warning = self.simulation.device_warning();
         (self.simulation.device_choice().to_owned(), warning.map(str::to_owned))
     }
 
-    fn take(&mut self, hold: HoldId, grip: &Grip) -> Result<(), String> {
+    fn take(&mut self, hold: HoldId, grip: &GripTarget) -> Result<(), String> {
         let bodies = &self.simulation.assembly().bodies;
         let most = bodies.get(grip.body).map_or(1, |body| body.mesh.vertices().len() as u32);
         let patch = Patch {
@@ -171,24 +173,24 @@ impl<S: Real> Handle for Running<S> {
         self.measures.energy = report.energy;
         self.measures.inverted = report.deformation.inverted;
         self.measures.rejected = self.simulation.solver().rejected_steps();
-        self.measures.tools = self.tools(report.patches);
+        self.measures.scene_patches = self.scene_patches(report.patches);
         Ok(())
     }
 
-    fn tell(&mut self, coloring: Coloring, lane: &mut Lane) {
+    fn fill(&mut self, coloring: Coloring, snapshot: &mut RunSnapshot) {
         let positions = &self.simulation.state().positions;
-        lane.positions.clear();
-        lane.positions.extend(positions.iter().map(|x| x.cast::<f32>()));
-        lane.measures.clone_from(&self.measures);
-        lane.holds.clear();
+        snapshot.positions.clear();
+        snapshot.positions.extend(positions.iter().map(|x| x.cast::<f32>()));
+        snapshot.measures.clone_from(&self.measures);
+        snapshot.held.clear();
         for &(id, motion) in &self.held {
             if let Some(hold) = self.simulation.hold(motion) {
                 let viscera::simulation::Hold { place, target, force } = hold;
-                lane.holds.push(Hold { id, place, target, force });
+                snapshot.held.push(HeldPatch { id, place, target, force });
             }
         }
         let assembly = self.simulation.assembly();
-        surface_values(assembly, coloring, positions, self.simulation.tets(), &mut lane.values);
+        surface_values(assembly, coloring, positions, self.simulation.tets(), &mut snapshot.values);
     }
 
     fn done_by_hand(&self) -> (String, f64) {
@@ -196,20 +198,20 @@ impl<S: Real> Handle for Running<S> {
         (self.simulation.scene().write(&motions, &changes), self.simulation.time())
     }
 
-    fn fork(&self, scene: &Scene) -> Result<Box<dyn Handle>, String> {
+    fn fork(&self, scene: &Scene) -> Result<Box<dyn Run>, String> {
         Ok(match scene.solver.precision {
             Precision::F32 => Box::new(self.fork_as::<f32>(scene)?),
             Precision::F64 => Box::new(self.fork_as::<f64>(scene)?),
         })
     }
 
-    fn moment(&self) -> Moment {
+    fn next_step(&self) -> NextStep {
         let simulation = &self.simulation;
         let scene = simulation.scene();
         let dt = scene.time.frame / f64::from(scene.solver.substeps);
         let inputs = simulation.inputs_at(simulation.time() + dt);
         let double = |all: &[Vec3<S>]| all.iter().map(|x| x.cast()).collect();
-        Moment {
+        NextStep {
             solver: scene.solver.clone(),
             builder: simulation.assembly().builder.clone(),
             positions: double(&simulation.state().positions),

@@ -8,12 +8,12 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 use viscera::simulation::Assembly;
 
-use super::frame::{Coloring, Slot};
-use super::simulation::{Grip, Handle};
-use super::stage::{Plan, Stage};
+use super::setup::{BuildRequest, Setup};
+use super::simulation::{GripTarget, Run};
+use super::snapshot::{Coloring, SnapshotExchange};
 use super::{Command, Cure, Event, Failure};
 use crate::choices::{Settings, put};
-use crate::probe::{MOST_TETS, Method, Prober};
+use crate::probe::{MOST_TETS, Prober, SolverVariant};
 
 /// Calls the window.
 pub type Wake = Box<dyn Fn() + Send + Sync>;
@@ -22,10 +22,10 @@ pub type Wake = Box<dyn Fn() + Send + Sync>;
 pub struct Worker {
     commands: Receiver<Command>,
     events: Sender<Event>,
-    slot: Arc<Slot>,
+    exchange: Arc<SnapshotExchange>,
     wake: Arc<Wake>,
-    /// What waits for a person's word.
-    asked: Option<(Plan, Assembly)>,
+    /// A large mesh that waits for a person's consent.
+    asked: Option<(BuildRequest, Assembly)>,
     running: Option<Running>,
     playing: bool,
     /// Frames still to be computed while paused.
@@ -36,19 +36,19 @@ pub struct Worker {
     due: Instant,
     /// When frames were measured last.
     measured: Option<Instant>,
-    /// Methods by which steps are repeated, who does so, and when it was begun last.
-    probed: Vec<Method>,
+    /// Solvers by which steps are repeated, the thread that does so, and when it was begun last.
+    probed: Vec<SolverVariant>,
     prober: Option<Prober>,
     probed_last: Option<Instant>,
     /// The last warning of something that goes on.
-    told: Option<String>,
+    last_warning: Option<String>,
 }
 
 struct Running {
-    stage: Arc<Stage>,
-    /// The first, the second, the exact one.
-    lanes: Vec<Box<dyn Handle>>,
-    /// What computes each, as it was told last.
+    setup: Arc<Setup>,
+    /// The first, the second, the reference.
+    runs: Vec<Box<dyn Run>>,
+    /// What computes each, as it was sent last.
     devices: Vec<String>,
     walls: Vec<f64>,
     number: u64,
@@ -74,21 +74,21 @@ impl Worker {
     pub fn new(
         commands: Receiver<Command>,
         events: Sender<Event>,
-        slot: Arc<Slot>,
+        exchange: Arc<SnapshotExchange>,
         wake: Wake,
     ) -> Self {
         let wake: Arc<Wake> = Arc::new(wake);
-        let (told, call) = (events.clone(), Arc::clone(&wake));
+        let (curves_sent, call) = (events.clone(), Arc::clone(&wake));
         // Without that thread there are no curves.
         let prober = Prober::start(move |curves| {
-            let _ = told.send(Event::Curves(curves));
+            let _ = curves_sent.send(Event::Curves(curves));
             call();
         });
         let prober = prober.ok();
         Self {
             commands,
             events,
-            slot,
+            exchange,
             wake,
             asked: None,
             running: None,
@@ -101,11 +101,11 @@ impl Worker {
             probed: Vec::new(),
             prober,
             probed_last: None,
-            told: None,
+            last_warning: None,
         }
     }
 
-    /// Works until it is told to quit.
+    /// Works until [`Command::Quit`].
     pub fn run(mut self) {
         loop {
             let idle = self.running.is_none() || !(self.playing || self.steps > 0);
@@ -135,20 +135,20 @@ impl Worker {
         while let Some(command) = next {
             match command {
                 Command::Quit => return Next::Quit,
-                Command::Change(lane, settings) => {
-                    change.resize_with(change.len().max(lane + 1), Settings::new);
+                Command::Change(run, settings) => {
+                    change.resize_with(change.len().max(run + 1), Settings::new);
                     for (key, value) in &settings {
-                        put(&mut change[lane], key, value);
+                        put(&mut change[run], key, value);
                     }
                 }
-                Command::Load(plan) => {
+                Command::Load(request) => {
                     change.clear();
-                    self.load(*plan);
+                    self.load(*request);
                 }
-                Command::Accompany(plan) => {
+                Command::Accompany(request) => {
                     // They are numbered anew.
                     self.change_all(&mut change);
-                    self.accompany(*plan);
+                    self.accompany(*request);
                 }
                 other => {
                     // Those have to do with what was changed before.
@@ -165,16 +165,16 @@ impl Worker {
     }
 
     fn change_all(&mut self, change: &mut Vec<Settings>) {
-        for (lane, settings) in change.drain(..).enumerate() {
-            self.change(lane, &settings);
+        for (run, settings) in change.drain(..).enumerate() {
+            self.change(run, &settings);
         }
     }
 
     fn obey(&mut self, command: Command) {
         match command {
             Command::Proceed => {
-                if let Some((plan, assembly)) = self.asked.take() {
-                    self.start(plan, assembly);
+                if let Some((request, assembly)) = self.asked.take() {
+                    self.start(request, assembly);
                 }
             }
             Command::Play(playing) => {
@@ -190,14 +190,14 @@ impl Worker {
             Command::Reset => self.reset(),
             Command::Speed(speed) => self.speed = speed,
             Command::Take { hold, body, rest, count, stiffness } => {
-                let grip = Grip { body, rest, count, stiffness };
-                self.each(|lane| lane.take(hold, &grip));
+                let grip = GripTarget { body, rest, count, stiffness };
+                self.each(|run| run.take(hold, &grip));
             }
-            Command::Lead(hold, translation) => self.each(|lane| lane.lead(hold, translation)),
-            Command::LetGo(hold) => self.each(|lane| lane.let_go(hold)),
+            Command::Lead(hold, translation) => self.each(|run| run.lead(hold, translation)),
+            Command::LetGo(hold) => self.each(|run| run.let_go(hold)),
             Command::Save(path) => self.save(path),
-            Command::Probe(methods) => {
-                self.probed = methods;
+            Command::Probe(variants) => {
+                self.probed = variants;
                 self.probe();
             }
             Command::Color(coloring) => {
@@ -210,9 +210,9 @@ impl Worker {
     }
 
     /// Warns of what would otherwise be said ten times a second.
-    fn tell_once(&mut self, text: String) {
-        if self.told.as_ref() != Some(&text) {
-            self.told = Some(text.clone());
+    fn warn_once(&mut self, text: String) {
+        if self.last_warning.as_ref() != Some(&text) {
+            self.last_warning = Some(text.clone());
             self.tell(Event::Refused(text));
         }
     }
@@ -223,9 +223,9 @@ impl Worker {
         (self.wake)();
     }
 
-    fn each(&mut self, act: impl Fn(&mut Box<dyn Handle>) -> Result<(), String>) {
+    fn each(&mut self, act: impl Fn(&mut Box<dyn Run>) -> Result<(), String>) {
         let Some(running) = &mut self.running else { return };
-        let refused = running.lanes.iter_mut().find_map(|lane| act(lane).err());
+        let refused = running.runs.iter_mut().find_map(|run| act(run).err());
         if let Some(message) = refused {
             self.tell(Event::Refused(message));
         }
@@ -239,28 +239,29 @@ impl Worker {
     fn reset(&mut self) {
         let Some(running) = &mut self.running else { return };
         running.number = 0;
-        let stage = Arc::clone(&running.stage);
-        let refused = running.lanes.iter_mut().find_map(|lane| lane.reset().err());
+        let setup = Arc::clone(&running.setup);
+        let refused = running.runs.iter_mut().find_map(|run| run.reset().err());
         self.due = Instant::now();
         match refused {
             None => {
-                self.tell(Event::Ready(stage));
+                self.tell(Event::Ready(setup));
                 self.publish();
             }
             Some(message) => self.fail(message, Cure::Open),
         }
     }
 
-    fn change(&mut self, lane: usize, settings: &Settings) {
-        if let Some((mut plan, assembly)) = self.asked.take() {
-            let changed = plan.scenes.get_mut(lane).map_or(Ok(()), |scene| scene.change(settings));
+    fn change(&mut self, run: usize, settings: &Settings) {
+        if let Some((mut request, assembly)) = self.asked.take() {
+            let changed =
+                request.scenes.get_mut(run).map_or(Ok(()), |scene| scene.change(settings));
             if let Err(error) = changed {
                 self.tell(Event::Refused(error.to_string()));
             }
-            return self.ask_or_start(plan, assembly);
+            return self.ask_or_start(request, assembly);
         }
         let Some(running) = &mut self.running else { return };
-        let Some(changed) = running.lanes.get_mut(lane).filter(|_| !settings.is_empty()) else {
+        let Some(changed) = running.runs.get_mut(run).filter(|_| !settings.is_empty()) else {
             return;
         };
         let mut refused = Vec::new();
@@ -269,7 +270,7 @@ impl Worker {
             for setting in settings {
                 if let Err(message) = changed.change(&vec![setting.clone()]) {
                     let key = setting.0.clone();
-                    let kept = changed.setting(&key).map(|value| Event::Kept { lane, key, value });
+                    let kept = changed.setting(&key).map(|value| Event::Kept { run, key, value });
                     refused.extend([Some(Event::Refused(message)), kept].into_iter().flatten());
                 }
             }
@@ -279,8 +280,8 @@ impl Worker {
     }
 
     fn save(&mut self, path: PathBuf) {
-        let first = self.running.as_ref().and_then(|running| running.lanes.first());
-        match first.map(|lane| lane.done_by_hand()) {
+        let first = self.running.as_ref().and_then(|running| running.runs.first());
+        match first.map(|run| run.done_by_hand()) {
             Some((text, time)) => self.tell(Event::Done { path, text, time }),
             None => self.tell(Event::Done { path, text: String::new(), time: 0.0 }),
         }
@@ -289,7 +290,7 @@ impl Worker {
     /// What computes the simulations, where that is news: one that was lost has left it to the CPU.
     fn tell_devices(&mut self) {
         let Some(running) = &mut self.running else { return };
-        let now: Vec<_> = running.lanes.iter().map(|lane| lane.device()).collect();
+        let now: Vec<_> = running.runs.iter().map(|run| run.device()).collect();
         let devices: Vec<String> = now.iter().map(|(device, _)| device.clone()).collect();
         if devices == running.devices {
             return;
@@ -308,21 +309,21 @@ impl Worker {
         let Some(running) = self.running.as_ref().filter(|_| !self.probed.is_empty()) else {
             return;
         };
-        let tets = running.stage.tet_count();
+        let tets = running.setup.tet_count();
         if tets > MOST_TETS {
-            return self.tell_once(format!(
+            return self.warn_once(format!(
                 "convergence is shown for meshes of at most {MOST_TETS} tetrahedra, and this one has {tets}"
             ));
         }
         let long_ago = self.probed_last.is_none_or(|since| since.elapsed() > PROBED_EVERY);
-        if let Some(first) = running.lanes.first()
+        if let Some(first) = running.runs.first()
             && (long_ago || !self.playing)
             && self.prober.as_ref().is_some_and(Prober::is_idle)
         {
-            let moment = first.moment();
+            let next_step = first.next_step();
             self.probed_last = Some(Instant::now());
             if let Some(prober) = &self.prober {
-                prober.probe(moment, self.probed.clone());
+                prober.probe(next_step, self.probed.clone());
             }
         }
     }
@@ -331,14 +332,14 @@ impl Worker {
     fn advance(&mut self) {
         let Some(running) = &mut self.running else { return };
         let mut failed = None;
-        for (lane, wall) in running.lanes.iter_mut().zip(&mut running.walls) {
+        for (run, wall) in running.runs.iter_mut().zip(&mut running.walls) {
             let start = Instant::now();
-            failed = failed.or(lane.advance().err());
+            failed = failed.or(run.advance().err());
             *wall = start.elapsed().as_secs_f64();
         }
         running.number += 1;
         self.steps = self.steps.saturating_sub(1);
-        let frame = Duration::try_from_secs_f64(running.stage.scene.time.frame / self.speed);
+        let frame = Duration::try_from_secs_f64(running.setup.scene.time.frame / self.speed);
         self.due += frame.unwrap_or_default();
         // What is lost is not caught up with: tissue would jump.
         if let Some(earliest) = Instant::now().checked_sub(MOST_LATE) {
@@ -372,22 +373,22 @@ impl Worker {
         let measured = self.is_measured();
         let Some(running) = &mut self.running else { return };
         let mut failed = None;
-        let mut frame = self.slot.blank();
-        frame.generation = running.stage.generation;
-        frame.number = running.number;
-        frame.time = running.number as f64 * running.stage.scene.time.frame;
-        frame.coloring = self.coloring;
-        frame.lanes.resize_with(running.lanes.len(), Default::default);
-        for ((lane, simulation), wall) in
-            frame.lanes.iter_mut().zip(&mut running.lanes).zip(&running.walls)
+        let mut snapshot = self.exchange.blank();
+        snapshot.generation = running.setup.generation;
+        snapshot.number = running.number;
+        snapshot.time = running.number as f64 * running.setup.scene.time.frame;
+        snapshot.coloring = self.coloring;
+        snapshot.runs.resize_with(running.runs.len(), Default::default);
+        for ((filled, run), wall) in
+            snapshot.runs.iter_mut().zip(&mut running.runs).zip(&running.walls)
         {
-            if measured && let Err(message) = simulation.measure() {
+            if measured && let Err(message) = run.measure() {
                 failed = Some(message);
             }
-            simulation.tell(self.coloring, lane);
-            lane.wall = *wall;
+            run.fill(self.coloring, filled);
+            filled.wall = *wall;
         }
-        self.slot.publish(frame);
+        self.exchange.publish(snapshot);
         (self.wake)();
         match failed {
             None if measured => {

@@ -1,13 +1,13 @@
-//! The live convergence plot: residual against iteration for the methods that are ticked.
+//! The live convergence plot: residual against iteration for the solvers that are ticked.
 
 use eframe::egui::{self, Color32, Ui};
 use egui_plot::{Line, Plot, PlotPoints, uniform_grid_spacer};
 
 use crate::preferences::Preferences;
-use crate::probe::{Curve, METHODS};
+use crate::probe::{Curve, VARIANTS};
 
-/// Colours that colour-blind people tell apart (Okabe and Ito 2008), one for each method.
-const COLORS: [Color32; METHODS.len()] = [
+/// Colours that colour-blind people tell apart (Okabe and Ito 2008), one for each solver.
+const COLORS: [Color32; VARIANTS.len()] = [
     Color32::from_rgb(240, 240, 240),
     Color32::from_rgb(213, 94, 0),
     Color32::from_rgb(230, 159, 0),
@@ -18,23 +18,23 @@ const COLORS: [Color32; METHODS.len()] = [
     Color32::from_rgb(240, 228, 66),
 ];
 
-/// Ticks for the methods in the colours of their curves, which is the legend, and the curves; residuals as powers
+/// Ticks for the solvers in the colours of their curves, which is the legend, and the curves; residuals as powers
 /// of ten.
 pub fn show(ui: &mut Ui, preferences: &mut Preferences, curves: &[Curve]) {
     ui.horizontal(|ui| {
         ui.strong("Convergence");
         ui.weak("of the step that comes next").on_hover_text(
-            "Each method begins the same step anew, in double precision. The residual is the sum of unbalanced \
+            "Each solver begins the same step anew, in double precision. The residual is the sum of unbalanced \
              forces over that of all loads.",
         );
     });
-    for ((method, name), color) in METHODS.iter().zip(COLORS) {
-        let mut ticked = preferences.ticked.contains(method);
+    for ((variant, name), color) in VARIANTS.iter().zip(COLORS) {
+        let mut ticked = preferences.ticked.contains(variant);
         let text = egui::RichText::new(*name).color(color);
         if ui.checkbox(&mut ticked, text).changed() {
-            preferences.ticked.retain(|other| other != method);
+            preferences.ticked.retain(|other| other != variant);
             if ticked {
-                preferences.ticked.push(*method);
+                preferences.ticked.push(*variant);
             }
         }
     }
@@ -52,7 +52,7 @@ pub fn show(ui: &mut Ui, preferences: &mut Preferences, curves: &[Curve]) {
         .allow_scroll(false)
         .show(ui, |plot| {
             for curve in curves {
-                let color = METHODS.iter().position(|(_, name)| *name == curve.name);
+                let color = VARIANTS.iter().position(|(_, name)| *name == curve.name);
                 let points: PlotPoints<'_> = (curve.residuals.iter())
                     .map(|&(iteration, residual)| [f64::from(iteration), residual.log10()])
                     .filter(|[_, y]| y.is_finite())

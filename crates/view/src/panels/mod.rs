@@ -26,7 +26,7 @@ pub enum Action {
     Choose(Side, Settings, bool),
     /// Two solvers side by side, or one.
     Compare(bool),
-    /// The exact solution as a ghost.
+    /// The reference as a ghost.
     Ghost(bool),
     /// Simulated seconds per second of the clock.
     Speed(f64),

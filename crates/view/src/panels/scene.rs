@@ -2,12 +2,12 @@
 
 use eframe::egui::{self, Ui};
 use std::path::PathBuf;
-use viscera_cli::scene::BUILT_IN;
+use viscera_resources::BUILT_IN;
 
 use super::choice::{Chooser, Row};
 use super::{Action, section};
 use crate::choices::Side;
-use crate::engine::Stage;
+use crate::engine::Setup;
 use crate::preferences::Preferences;
 use crate::session::Session;
 
@@ -24,7 +24,7 @@ pub struct Fields {
 pub fn show(
     ui: &mut Ui,
     session: &Session,
-    stage: Option<&Stage>,
+    setup: Option<&Setup>,
     fields: &mut Fields,
     preferences: &mut Preferences,
     actions: &mut Vec<Action>,
@@ -40,10 +40,10 @@ pub fn show(
         if !scene.description.is_empty() {
             title.on_hover_text(scene.description.trim());
         }
-        if let Some(stage) = stage {
-            let vertices = stage.assembly.builder.positions().len();
-            let text = format!("{} tetrahedra, {vertices} vertices", stage.tet_count());
-            ui.weak(text).on_hover_text(stage.assembly.notes.join("\n"));
+        if let Some(setup) = setup {
+            let vertices = setup.assembly.builder.positions().len();
+            let text = format!("{} tetrahedra, {vertices} vertices", setup.tet_count());
+            ui.weak(text).on_hover_text(setup.assembly.notes.join("\n"));
         }
         gravity(ui, session, actions);
         ui.horizontal(|ui| {

@@ -34,13 +34,14 @@ pub fn show(
 /// Solvers worth comparing, by one click. Each says everything that another may have changed.
 const KNOWN: [(&str, &str, KnownSettings); 4] = [
     (
-        "exact",
-        "The default: exact at rest, coloured Gauss-Seidel, few sweeps.",
+        "default (exact at rest)",
+        "Rebase and kept multipliers: in balance when it comes to rest. Coloured Gauss-Seidel, two iterations per \
+         substep.",
         known_settings("unlimited", "10", "2", "none", "true"),
     ),
     (
         "Jacobi 40",
-        "One colour, 40 sweeps of one step per frame.",
+        "One colour, 40 iterations of one step per frame.",
         known_settings("1", "1", "40", "none", "true"),
     ),
     (

@@ -4,7 +4,7 @@ use eframe::egui::{self, Ui};
 
 use super::Action;
 use super::number::Number;
-use crate::engine::{Frame, Stage, inverted};
+use crate::engine::{Setup, Snapshot, inverted};
 use crate::help::Request;
 use crate::preferences::Preferences;
 use crate::session::Session;
@@ -87,44 +87,43 @@ pub fn show_bar(
 
 fn compare(ui: &mut Ui, session: &Session, actions: &mut Vec<Action>) {
     let mut on = session.is_comparison();
-    let help = "Two solvers side by side: same start, same drag, each with its own settings. Begins again \
-                from rest.";
+    let help = "Two solvers side by side: from the same state, under the same hand, each with its own settings.";
     if ui.toggle_value(&mut on, "A | B").on_hover_text(help).changed() {
         actions.push(Action::Compare(on));
     }
     let mut ghost = session.choices().ghost;
-    let help = "The exact solution as a ghost, for small meshes. Begins again from rest.";
-    if ui.toggle_value(&mut ghost, "true solution").on_hover_text(help).changed() {
+    let help = "The converged solution as a ghost, from the same state; for small meshes.";
+    if ui.toggle_value(&mut ghost, "reference (converged)").on_hover_text(help).changed() {
         actions.push(Action::Ghost(ghost));
     }
 }
 
 /// The line below: what time it is, and what a frame costs.
-pub fn show_status(ui: &mut Ui, clock: &Clock, stage: &Stage, frame: &Frame) {
-    let dt = stage.scene.time.frame;
+pub fn show_status(ui: &mut Ui, clock: &Clock, setup: &Setup, snapshot: &Snapshot) {
+    let dt = setup.scene.time.frame;
     let real = clock.rate * dt;
-    ui.label(format!("t = {:.2} s", frame.time));
+    ui.label(format!("t = {:.2} s", snapshot.time));
     ui.separator();
-    let names = ["A", "B", "true"];
-    for (number, lane) in frame.lanes.iter().enumerate() {
-        let is_ghost = stage.has_ghost && number + 1 == frame.lanes.len();
-        let name = match (frame.lanes.len(), is_ghost) {
+    let names = ["A", "B", "reference"];
+    for (number, run) in snapshot.runs.iter().enumerate() {
+        let is_ghost = setup.has_ghost && number + 1 == snapshot.runs.len();
+        let name = match (snapshot.runs.len(), is_ghost) {
             (1, _) => "",
             (_, true) => names[2],
             _ => names[number.min(1)],
         };
-        let text = format!("{name} {:.1} ms per frame of {:.1} ms", 1e3 * lane.wall, 1e3 * dt);
+        let text = format!("{name} {:.1} ms per frame of {:.1} ms", 1e3 * run.wall, 1e3 * dt);
         ui.label(text.trim()).on_hover_text(format!(
-            "Substeps take {:.2} ms each. Energy: elastic {:.3e} J, kinetic {:.3e} J. Substeps taken back by \
-             the guard so far: {}.",
-            1e3 * lane.wall / f64::from(stage.scene.solver.substeps),
-            lane.measures.energy.elastic,
-            lane.measures.energy.kinetic,
-            lane.measures.rejected,
+            "Substeps take {:.2} ms each. Energy: elastic {:.3e} J, kinetic {:.3e} J. Rejected substeps so \
+             far: {}.",
+            1e3 * run.wall / f64::from(setup.scene.solver.substeps),
+            run.measures.energy.elastic,
+            run.measures.energy.kinetic,
+            run.measures.rejected,
         ));
-        ui.weak(format!("residual {:.1e}", lane.measures.residual))
+        ui.weak(format!("residual {:.1e}", run.measures.residual))
             .on_hover_text("Unbalanced forces over loads; at rest, how well the equations hold");
-        if let Some(text) = inverted(lane) {
+        if let Some(text) = inverted(run) {
             let text = if name.is_empty() { text } else { format!("{name}: {text}") };
             ui.colored_label(ui.visuals().warn_fg_color, text).on_hover_text(
                 "Turned inside out. Their stress and strain mean nothing and are left out of the colours. Pull less \
@@ -134,10 +133,10 @@ pub fn show_status(ui: &mut Ui, clock: &Clock, stage: &Stage, frame: &Frame) {
         ui.separator();
     }
     let pace = dt / clock.speed;
-    if clock.playing && frame.waits_for_ghost(stage, pace) {
+    if clock.playing && snapshot.waits_for_ghost(setup, pace) {
         ui.spinner();
-        ui.label("waits for the true solution").on_hover_text(
-            "All simulations stay at one time, and the true solution takes longer than the clock.",
+        ui.label("waits for the reference").on_hover_text(
+            "All simulations stay at one time, and the reference takes longer than the clock.",
         );
     }
     if clock.playing {

@@ -32,8 +32,8 @@ pub fn show(ui: &mut Ui, preferences: &mut Preferences, actions: &mut Vec<Action
             ui.checkbox(&mut preferences.wireframe, "wireframe")
                 .on_hover_text("Draw the surface's triangles");
             ui.checkbox(&mut preferences.shadow, "shadow");
-            if ui.button("whole").on_hover_text("Show everything (F)").clicked() {
-                actions.push(Action::Ask(Request::Frame));
+            if ui.button("fit view").on_hover_text("Show everything (F)").clicked() {
+                actions.push(Action::Ask(Request::FitView));
             }
         });
     });

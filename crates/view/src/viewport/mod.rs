@@ -8,15 +8,15 @@ mod picture;
 pub use lens::Lens;
 pub use overlay::{Legend, newtons, on_screen};
 pub use pick::Pick;
-pub use picture::{Gpu, Picture, Scenery, Tissue};
+pub use picture::{Gpu, Picture, PictureContents, RunSurface};
 
 use eframe::egui::{self, PointerButton, Pos2, Rect, Sense, Ui, vec2};
 use std::sync::Arc;
 use viscera::scalar::Vec3;
-use viscera_picture::{Image, ImageSize, Overlay};
+use viscera_picture::{HALF_OPENING, Image, ImageSize, Overlay, ViewDirection};
 use viscera_render::Orbit;
 
-use crate::engine::{Coloring, Command, Frame, Stage};
+use crate::engine::{Coloring, Command, Setup, Snapshot};
 use crate::holds::{Grip, Holds};
 use crate::preferences::Preferences;
 use pick::{meet_plane, pick};
@@ -30,23 +30,23 @@ const TURN: f64 = 200.0;
 /// One picture for each solver, all with one camera.
 pub struct Viewport {
     gpu: Gpu,
-    stage: Option<Arc<Stage>>,
+    setup: Option<Arc<Setup>>,
     orbit: Orbit,
     extent: f64,
-    tissues: Vec<Tissue>,
+    surfaces: Vec<RunSurface>,
     pictures: Vec<Picture>,
     fixed: Vec<u32>,
     legend: Legend,
     /// What each picture was seen through last.
     lenses: Vec<Lens>,
     /// What the pictures show.
-    drawn: Option<Drawn>,
+    drawn: Option<DrawnInputs>,
 }
 
-/// Two equal ones give the same pictures.
+/// What pictures are drawn from: two equal ones give the same pictures.
 #[derive(Clone, PartialEq)]
-struct Drawn {
-    frame: (u64, u64),
+struct DrawnInputs {
+    snapshot: (u64, u64),
     orbit: Orbit,
     sizes: Vec<ImageSize>,
     coloring: Coloring,
@@ -60,10 +60,10 @@ impl Viewport {
     pub fn new(gpu: Gpu) -> Self {
         Self {
             gpu,
-            stage: None,
+            setup: None,
             orbit: Orbit::framing(&[]),
             extent: 0.1,
-            tissues: Vec::new(),
+            surfaces: Vec::new(),
             pictures: Vec::new(),
             fixed: Vec::new(),
             legend: Legend::default(),
@@ -73,30 +73,29 @@ impl Viewport {
     }
 
     /// Takes up simulations that were built. The camera stays where it is for the same bodies.
-    pub fn enter(&mut self, stage: &Arc<Stage>) -> Result<(), String> {
-        let rest = |stage: &Stage| stage.assembly.builder.positions().to_vec();
-        let known = self.stage.as_ref().is_some_and(|old| rest(old) == rest(stage));
-        self.tissues = (0..stage.lane_count)
-            .map(|_| Tissue::new(&self.gpu, stage))
+    pub fn enter(&mut self, setup: &Arc<Setup>) -> Result<(), String> {
+        let rest = |setup: &Setup| setup.assembly.builder.positions().to_vec();
+        let known = self.setup.as_ref().is_some_and(|old| rest(old) == rest(setup));
+        self.surfaces = (0..setup.run_count)
+            .map(|_| RunSurface::new(&self.gpu, setup))
             .collect::<Result<_, _>>()?;
-        self.stage = Some(Arc::clone(stage));
-        self.fixed = stage.assembly.fixings.iter().flat_map(|p| p.vertices.clone()).collect();
+        self.setup = Some(Arc::clone(setup));
+        self.fixed = setup.assembly.fixings.iter().flat_map(|p| p.vertices.clone()).collect();
         self.drawn = None;
         if !known {
-            self.frame_all();
+            self.fit_view();
         }
         Ok(())
     }
 
     /// Looks at everything from where the scene wants to be seen.
-    pub fn frame_all(&mut self) {
-        let Some(stage) = &self.stage else { return };
-        let rest = stage.assembly.builder.positions();
+    pub fn fit_view(&mut self) {
+        let Some(setup) = &self.setup else { return };
+        let rest = setup.assembly.builder.positions();
         self.orbit = Orbit::framing(rest);
-        self.extent = 2.0 * self.orbit.distance * 0.24;
-        let from = stage.scene.output.view_from;
-        self.orbit.azimuth = angle(from.y, from.x);
-        self.orbit.elevation = angle(from.z, from.x.hypot(from.y)).clamp(-89.0, 89.0);
+        self.extent = 2.0 * self.orbit.distance * HALF_OPENING;
+        let direction = ViewDirection::from_vector(setup.scene.output.view_from);
+        (self.orbit.azimuth, self.orbit.elevation) = (direction.azimuth, direction.elevation);
     }
 
     /// Why nothing can be drawn any more, where the device was lost.
@@ -110,20 +109,20 @@ impl Viewport {
     }
 
     /// How many pictures there are side by side.
-    fn shown_lanes(&self) -> usize {
-        self.stage.as_ref().map_or(0, |stage| stage.lane_count - usize::from(stage.has_ghost))
+    fn shown_runs(&self) -> usize {
+        self.setup.as_ref().map_or(0, |setup| setup.run_count - usize::from(setup.has_ghost))
     }
 
-    /// A frame has come.
-    pub fn place(&mut self, frame: &Frame) -> Result<(), String> {
-        if self.stage.as_ref().is_none_or(|stage| stage.generation != frame.generation) {
+    /// Takes over a new snapshot.
+    pub fn place(&mut self, snapshot: &Snapshot) -> Result<(), String> {
+        if self.setup.as_ref().is_none_or(|setup| setup.generation != snapshot.generation) {
             return Ok(());
         }
-        for (tissue, lane) in self.tissues.iter_mut().zip(&frame.lanes) {
-            tissue.place(lane)?;
+        for (surface, run) in self.surfaces.iter_mut().zip(&snapshot.runs) {
+            surface.place(run)?;
         }
-        let shown = frame.lanes.iter().take(self.shown_lanes());
-        self.legend.follow(frame.coloring, shown.flat_map(|lane| lane.values.iter().copied()));
+        let shown = snapshot.runs.iter().take(self.shown_runs());
+        self.legend.follow(snapshot.coloring, shown.flat_map(|run| run.values.iter().copied()));
         Ok(())
     }
 
@@ -131,12 +130,12 @@ impl Viewport {
     pub fn show(
         &mut self,
         ui: &mut Ui,
-        frame: Option<&Frame>,
+        snapshot: Option<&Snapshot>,
         holds: &mut Holds,
         preferences: &Preferences,
     ) -> (Vec<Command>, Option<String>) {
         let area = ui.available_rect_before_wrap();
-        let count = self.shown_lanes().max(1);
+        let count = self.shown_runs().max(1);
         let mut commands = Vec::new();
         let width = (area.width() - 2.0 * (count as f32 - 1.0)) / count as f32;
         let rects: Vec<Rect> = (0..count)
@@ -155,15 +154,24 @@ impl Viewport {
                 egui::WidgetInfo::labeled(egui::Role::Canvas, ui.is_enabled(), label)
             });
             let lens = self.lenses[number];
-            if let Some(frame) = frame {
-                self.handle(ui, &response, &lens, number, frame, holds, preferences, &mut commands);
+            if let Some(snapshot) = snapshot {
+                self.handle(
+                    ui,
+                    &response,
+                    &lens,
+                    number,
+                    snapshot,
+                    holds,
+                    preferences,
+                    &mut commands,
+                );
             }
         }
         // The mouse may have turned the view.
         self.lenses = rects.iter().map(|rect| Lens::new(&self.orbit, *rect, taken)).collect();
-        let drawn = frame.map(|frame| self.draw(ui, frame, holds, preferences));
+        let drawn = snapshot.map(|snapshot| self.draw(ui, snapshot, holds, preferences));
         for (number, lens) in self.lenses.iter().enumerate() {
-            self.paint(ui, lens, number, frame, holds, preferences);
+            self.paint(ui, lens, number, snapshot, holds, preferences);
         }
         (commands, drawn.and_then(Result::err))
     }
@@ -175,8 +183,8 @@ impl Viewport {
         ui: &Ui,
         response: &egui::Response,
         lens: &Lens,
-        lane: usize,
-        frame: &Frame,
+        run: usize,
+        snapshot: &Snapshot,
         holds: &mut Holds,
         preferences: &Preferences,
         commands: &mut Vec<Command>,
@@ -194,7 +202,7 @@ impl Viewport {
         if let Some(pointer) = response.interact_pointer_pos() {
             if response.drag_started_by(PointerButton::Primary) && !modifiers.command {
                 let pressed = pressed_at.unwrap_or(pointer);
-                self.press(lens, lane, frame, pressed, holds, &preferences.grip, commands);
+                self.press(lens, run, snapshot, pressed, holds, &preferences.grip, commands);
             }
             if let Some(plane) = holds.drag_plane() {
                 let [_, _, normal] = self.orbit.axes();
@@ -223,18 +231,18 @@ impl Viewport {
     fn press(
         &mut self,
         lens: &Lens,
-        lane: usize,
-        frame: &Frame,
+        run: usize,
+        snapshot: &Snapshot,
         pointer: Pos2,
         holds: &mut Holds,
         grip: &Grip,
         commands: &mut Vec<Command>,
     ) {
-        let (Some(stage), Some(shown)) = (&self.stage, frame.lanes.get(lane)) else { return };
-        if stage.generation != frame.generation {
+        let (Some(setup), Some(shown)) = (&self.setup, snapshot.runs.get(run)) else { return };
+        if setup.generation != snapshot.generation {
             return;
         }
-        let near = shown.holds.iter().find(|hold| {
+        let near = shown.held.iter().find(|hold| {
             [hold.place, hold.target]
                 .iter()
                 .any(|x| lens.place(*x).is_some_and(|place| place.distance(pointer) < NEAR))
@@ -242,7 +250,7 @@ impl Viewport {
         if near.is_some_and(|hold| holds.resume(hold.id)) {
             return;
         }
-        let hit = pick(stage, shown, lens.orbit.position(), lens.ray(pointer));
+        let hit = pick(setup, shown, lens.orbit.position(), lens.ray(pointer));
         commands.extend(hit.map(|hit| holds.take(&hit, grip)));
     }
 
@@ -261,12 +269,12 @@ impl Viewport {
     fn draw(
         &mut self,
         ui: &Ui,
-        frame: &Frame,
+        snapshot: &Snapshot,
         holds: &Holds,
         preferences: &Preferences,
     ) -> Result<(), String> {
-        let Some(stage) = &self.stage else { return Ok(()) };
-        if frame.generation != stage.generation {
+        let Some(setup) = &self.setup else { return Ok(()) };
+        if snapshot.generation != setup.generation {
             return Ok(());
         }
         let scale = ui.pixels_per_point();
@@ -278,11 +286,11 @@ impl Viewport {
                 ImageSize::new(side(lens.rect.width()), side(lens.rect.height())).ok()
             })
             .collect();
-        let wanted = Drawn {
-            frame: (frame.generation, frame.number),
+        let wanted = DrawnInputs {
+            snapshot: (snapshot.generation, snapshot.number),
             orbit: self.lenses.first().map_or(self.orbit, |lens| lens.orbit),
             sizes: sizes.clone(),
-            coloring: frame.coloring,
+            coloring: snapshot.coloring,
             range: self.legend.range(),
             marks: [preferences.wireframe, preferences.shadow, preferences.fixings],
             holds: holds.list().len(),
@@ -293,30 +301,32 @@ impl Viewport {
         while self.pictures.len() < sizes.len() {
             self.pictures.push(Picture::default());
         }
-        let ghost = stage.has_ghost.then(|| self.tissues.last()).flatten();
+        let ghost = setup.has_ghost.then(|| self.surfaces.last()).flatten();
         for (number, size) in sizes.iter().enumerate() {
-            let (Some(tissue), Some(lane)) = (self.tissues.get(number), frame.lanes.get(number))
+            let (Some(surface), Some(run)) = (self.surfaces.get(number), snapshot.runs.get(number))
             else {
                 continue;
             };
-            let at = |&v: &u32| lane.positions.get(v as usize).map(|x| x.cast::<f64>());
+            let at = |&v: &u32| run.positions.get(v as usize).map(|x| x.cast::<f64>());
             let fixed: Vec<Vec3<f64>> = match preferences.fixings {
                 true => self.fixed.iter().filter_map(at).collect(),
                 false => Vec::new(),
             };
-            let pulls: Vec<_> = lane.holds.iter().map(|hold| [hold.place, hold.target]).collect();
-            let scenery = Scenery {
+            let (picked, targets): (Vec<_>, Vec<_>) =
+                run.held.iter().map(|hold| (hold.place, hold.target)).unzip();
+            let contents = PictureContents {
                 orbit: self.lenses[number].orbit,
-                tissue,
+                surface,
                 ghost,
                 range: self.legend.range(),
                 wireframe: preferences.wireframe,
                 shadow: preferences.shadow,
                 fixed: &fixed,
-                pulls: &pulls,
+                picked: &picked,
+                targets: &targets,
                 extent: self.extent,
             };
-            self.pictures[number].draw(&self.gpu, *size, &scenery)?;
+            self.pictures[number].draw(&self.gpu, *size, &contents)?;
         }
         self.drawn = Some(wanted);
         Ok(())
@@ -327,50 +337,50 @@ impl Viewport {
         ui: &Ui,
         lens: &Lens,
         number: usize,
-        frame: Option<&Frame>,
+        snapshot: Option<&Snapshot>,
         holds: &Holds,
         preferences: &Preferences,
     ) {
         let painter = ui.painter_at(lens.rect);
-        let Some((texture, frame)) =
-            self.pictures.get(number).and_then(Picture::texture).zip(frame)
+        let Some((texture, snapshot)) =
+            self.pictures.get(number).and_then(Picture::texture).zip(snapshot)
         else {
             painter.rect_filled(lens.rect, 0.0, ui.visuals().extreme_bg_color);
             return;
         };
         let whole = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
         painter.image(texture, lens.rect, whole, egui::Color32::WHITE);
-        let Some(lane) = frame.lanes.get(number) else { return };
-        overlay::tools(&painter, lens, lane);
-        overlay::forces(&painter, lens, lane, holds);
+        let Some(run) = snapshot.runs.get(number) else { return };
+        overlay::scene_patches(&painter, lens, run);
+        overlay::forces(&painter, lens, run, holds);
         if preferences.coloring != Coloring::Plain {
             self.legend.paint(&painter, lens.rect);
         }
-        let name = if self.shown_lanes() > 1 { ["A", "B"][number.min(1)] } else { "" };
-        overlay::title(&painter, lens.rect, name, &self.distances(frame, number));
+        let name = if self.shown_runs() > 1 { ["A", "B"][number.min(1)] } else { "" };
+        overlay::title(&painter, lens.rect, name, &self.distances(snapshot, number));
     }
 
-    fn distances(&self, frame: &Frame, number: usize) -> Vec<String> {
-        let stage = self.stage.as_ref();
-        stage.map_or_else(Vec::new, |stage| overlay::distances(frame, stage, number))
+    fn distances(&self, snapshot: &Snapshot, number: usize) -> Vec<String> {
+        let setup = self.setup.as_ref();
+        setup.map_or_else(Vec::new, |setup| overlay::distances(snapshot, setup, number))
     }
 
     /// The pictures as they are shown, with scale, time and forces written on them; waits for them.
-    pub fn images(&self, frame: &Frame) -> Result<Vec<Image>, String> {
+    pub fn images(&self, snapshot: &Snapshot) -> Result<Vec<Image>, String> {
         let scale = self.legend.scale();
-        let title = self.stage.as_ref().map_or("", |stage| &stage.scene.title);
-        let shown = self.pictures.iter().take(self.shown_lanes());
+        let title = self.setup.as_ref().map_or("", |setup| &setup.scene.title);
+        let shown = self.pictures.iter().take(self.shown_runs());
         let mut images = Vec::new();
-        for (number, (picture, lane)) in shown.zip(&frame.lanes).enumerate() {
+        for (number, (picture, run)) in shown.zip(&snapshot.runs).enumerate() {
             let mut image = picture.read()?;
             let height = image.size().height();
             let lens = self.lenses.get(number);
             let mut remarks = self.legend.remarks();
-            remarks.extend(self.distances(frame, number));
-            let side = if self.shown_lanes() > 1 { [": A", ": B"][number.min(1)] } else { "" };
+            remarks.extend(self.distances(snapshot, number));
+            let side = if self.shown_runs() > 1 { [": A", ": B"][number.min(1)] } else { "" };
             let overlay = Overlay {
                 title: &format!("{title}{side}"),
-                caption: &overlay::caption(frame, lane, &remarks),
+                caption: &overlay::caption(snapshot, run, &remarks),
                 color_scale: scale.as_ref(),
                 pixels_per_meter: lens.map(|lens| lens.orbit.pixels_per_meter(height)),
             };
@@ -379,9 +389,4 @@ impl Viewport {
         }
         Ok(images)
     }
-}
-
-/// The angle of a point around the origin [degrees].
-fn angle(y: f64, x: f64) -> f64 {
-    y.atan2(x).to_degrees()
 }

@@ -8,7 +8,7 @@ use viscera::units::Dimension;
 use viscera_picture::{Color, ColorScale, map_color};
 
 use super::lens::Lens;
-use crate::engine::{Coloring, Frame, Lane, Stage, inverted};
+use crate::engine::{Coloring, RunSnapshot, Setup, Snapshot, inverted};
 use crate::holds::Holds;
 
 /// A colour of the renderer's as the window has it.
@@ -197,8 +197,8 @@ pub fn newtons(force: f64) -> String {
 }
 
 /// The force of each hold, beside where it pulls to.
-pub fn forces(painter: &Painter, lens: &Lens, lane: &Lane, holds: &Holds) {
-    for hold in &lane.holds {
+pub fn forces(painter: &Painter, lens: &Lens, run: &RunSnapshot, holds: &Holds) {
+    for hold in &run.held {
         if holds.list().iter().all(|held| held.id != hold.id) {
             continue;
         }
@@ -213,48 +213,48 @@ pub fn forces(painter: &Painter, lens: &Lens, lane: &Lane, holds: &Holds) {
 }
 
 /// Names and forces of what the scene itself moves and pulls.
-pub fn tools(painter: &Painter, lens: &Lens, lane: &Lane) {
-    for tool in &lane.measures.tools {
+pub fn scene_patches(painter: &Painter, lens: &Lens, run: &RunSnapshot) {
+    for patch in &run.measures.scene_patches {
         let mut middle = Vec3::ZERO;
-        for &v in &tool.vertices {
-            let place = lane.positions.get(v as usize).map(|x| x.cast::<f64>()).unwrap_or_default();
-            middle += place * (1.0 / tool.vertices.len() as f64);
+        for &v in &patch.vertices {
+            let place = run.positions.get(v as usize).map(|x| x.cast::<f64>()).unwrap_or_default();
+            middle += place * (1.0 / patch.vertices.len() as f64);
         }
-        let Some(place) = lens.place(middle).filter(|_| tool.force.length() > 0.0) else {
+        let Some(place) = lens.place(middle).filter(|_| patch.force.length() > 0.0) else {
             continue;
         };
-        let text = format!("{} {}", tool.name, newtons(tool.force.length()));
+        let text = format!("{} {}", patch.name, newtons(patch.force.length()));
         painter.circle_filled(place, 3.5, on_screen(Color::PULLED));
         label(painter, place + vec2(10.0, 12.0), Align2::LEFT_CENTER, &text, 13.0);
     }
 }
 
 /// Time, forces and what else there is to say, as a picture without the window says them.
-pub fn caption(frame: &Frame, lane: &Lane, remarks: &[String]) -> String {
-    let mut text = format!("t = {:.2} s", frame.time);
-    for hold in &lane.holds {
+pub fn caption(snapshot: &Snapshot, run: &RunSnapshot, remarks: &[String]) -> String {
+    let mut text = format!("t = {:.2} s", snapshot.time);
+    for hold in &run.held {
         text.push_str(&format!("   pull {}", newtons(hold.force.length())));
     }
-    for tool in lane.measures.tools.iter().filter(|tool| tool.force.length() > 0.0) {
-        text.push_str(&format!("   {} {}", tool.name, newtons(tool.force.length())));
+    for patch in run.measures.scene_patches.iter().filter(|patch| patch.force.length() > 0.0) {
+        text.push_str(&format!("   {} {}", patch.name, newtons(patch.force.length())));
     }
-    for remark in inverted(lane).iter().chain(remarks) {
+    for remark in inverted(run).iter().chain(remarks) {
         text.push_str(&format!("   {remark}"));
     }
     text
 }
 
-/// How far a simulation is from the exact solution, and the second one from the first: lines of text.
-pub fn distances(frame: &Frame, stage: &Stage, number: usize) -> Vec<String> {
-    let (Some(lane), ghost) = (frame.lanes.get(number), frame.ghost(stage)) else {
+/// How far a simulation is from the reference, and the second one from the first: lines of text.
+pub fn distances(snapshot: &Snapshot, setup: &Setup, number: usize) -> Vec<String> {
+    let (Some(run), ghost) = (snapshot.runs.get(number), snapshot.ghost(setup)) else {
         return Vec::new();
     };
-    let first = frame.lanes.first().filter(|_| number > 0);
-    let to = |other: Option<&Lane>, name: &str| {
-        let distance = millimetres(lane.distance(other?));
+    let first = snapshot.runs.first().filter(|_| number > 0);
+    let to = |other: Option<&RunSnapshot>, name: &str| {
+        let distance = millimetres(run.distance(other?));
         Some(format!("at most {distance} from {name}"))
     };
-    let lines = [to(ghost, "the true solution, the ghost"), to(first, "A")];
+    let lines = [to(ghost, "the reference, the ghost"), to(first, "A")];
     lines.into_iter().flatten().collect()
 }
 

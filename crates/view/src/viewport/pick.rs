@@ -2,7 +2,7 @@
 
 use viscera::scalar::Vec3;
 
-use crate::engine::{Lane, Stage};
+use crate::engine::{RunSnapshot, Setup};
 
 /// A point on the tissue.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,11 +16,16 @@ pub struct Pick {
 }
 
 /// The first point of the surfaces that a ray meets, as they are in a frame. `direction` has length 1.
-pub fn pick(stage: &Stage, lane: &Lane, from: Vec3<f64>, direction: Vec3<f64>) -> Option<Pick> {
+pub fn pick(
+    setup: &Setup,
+    run: &RunSnapshot,
+    from: Vec3<f64>,
+    direction: Vec3<f64>,
+) -> Option<Pick> {
     let mut nearest = f64::INFINITY;
     let mut found = None;
-    for (number, body) in stage.assembly.bodies.iter().enumerate() {
-        let tissue = lane.positions.get(body.vertices.clone())?;
+    for (number, body) in setup.assembly.bodies.iter().enumerate() {
+        let tissue = run.positions.get(body.vertices.clone())?;
         let mut surface = vec![Vec3::<f32>::ZERO; body.surface.vertices.len()];
         body.embedding.apply(tissue, &mut surface).ok()?;
         for triangle in &body.surface.triangles {

@@ -8,11 +8,11 @@ use viscera::scalar::Vec3;
 use viscera::solver::gpu::{Device, GpuSurface, Skin};
 use viscera_picture::{Color, Image, ImageSize};
 use viscera_render::{
-    Arrow, BodyView, Canvas, Drawing, Markers, Orbit, Paint, Quality, RenderError, Room,
-    ValueBuffer,
+    Arrow, BodyView, BoundingSphere, Canvas, GpuDrawing, Markers, Orbit, Paint, Quality,
+    RenderError, ScaledValues, ValueBuffer,
 };
 
-use crate::engine::{Lane, Stage};
+use crate::engine::{RunSnapshot, Setup};
 
 /// The window's device.
 #[derive(Clone)]
@@ -31,12 +31,12 @@ impl Gpu {
         let name = state.adapter.get_info().name;
         let device = Device::from_wgpu(state.device.clone(), state.queue.clone(), name);
         let failed = Arc::new(OnceLock::new());
-        let told = Arc::clone(&failed);
+        let first_error = Arc::clone(&failed);
         // A device that is lost hands out things that cannot be used before it says so.
         state.device.on_uncaptured_error(Arc::new(move |error| {
             let text = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
             // What follows from the first is of no interest.
-            let _ = told.set(text);
+            let _ = first_error.set(text);
         }));
         Self { device, state, failed }
     }
@@ -49,20 +49,20 @@ impl Gpu {
     }
 }
 
-/// The surfaces of one simulation.
-pub struct Tissue {
+/// The surfaces of one simulation, on the device.
+pub struct RunSurface {
     surface: GpuSurface,
     values: ValueBuffer,
-    /// Whether the newest frame has values.
+    /// Whether the newest snapshot has values.
     has_values: bool,
-    /// Where it is.
-    room: Option<Room>,
+    /// Encloses it, for its shadow.
+    enclosing: Option<BoundingSphere>,
 }
 
-impl Tissue {
+impl RunSurface {
     /// Binds the surfaces of all bodies.
-    pub fn new(gpu: &Gpu, stage: &Stage) -> Result<Self, String> {
-        let bodies = &stage.assembly.bodies;
+    pub fn new(gpu: &Gpu, setup: &Setup) -> Result<Self, String> {
+        let bodies = &setup.assembly.bodies;
         let skins: Vec<Skin<'_>> = bodies
             .iter()
             .map(|body| Skin {
@@ -71,34 +71,34 @@ impl Tissue {
                 first_vertex: body.vertices.start,
             })
             .collect();
-        let count = stage.assembly.builder.positions().len();
+        let count = setup.assembly.builder.positions().len();
         let surface = GpuSurface::following(&gpu.device, count, &skins);
         let surface = surface.map_err(|error| error.to_string())?;
         let values = ValueBuffer::new(&gpu.device, surface.vertex_count() as usize);
-        Ok(Self { surface, values, has_values: false, room: None })
+        Ok(Self { surface, values, has_values: false, enclosing: None })
     }
 
-    /// Moves it to where a frame has it.
-    pub fn place(&mut self, lane: &Lane) -> Result<(), String> {
-        self.surface.place(&lane.positions).map_err(|error| error.to_string())?;
+    /// Moves it to its place in a snapshot.
+    pub fn place(&mut self, run: &RunSnapshot) -> Result<(), String> {
+        self.surface.place(&run.positions).map_err(|error| error.to_string())?;
         self.surface.update();
-        self.has_values = !lane.values.is_empty();
+        self.has_values = !run.values.is_empty();
         if self.has_values {
-            self.values.write(&lane.values).map_err(|error| error.to_string())?;
+            self.values.write(&run.values).map_err(|error| error.to_string())?;
         }
-        self.room = Room::around(lane.positions.iter().map(|x| x.cast()));
+        self.enclosing = BoundingSphere::around(run.positions.iter().map(|x| x.cast()));
         Ok(())
     }
 }
 
 /// What a picture shows.
-pub struct Scenery<'a> {
+pub struct PictureContents<'a> {
     /// From where.
     pub orbit: Orbit,
-    /// The tissue.
-    pub tissue: &'a Tissue,
-    /// The exact solution, which shines through.
-    pub ghost: Option<&'a Tissue>,
+    /// The simulation's surfaces.
+    pub surface: &'a RunSurface,
+    /// The reference, which shines through.
+    pub ghost: Option<&'a RunSurface>,
     /// The values that its colours begin and end at, where they show values.
     pub range: Option<[f32; 2]>,
     /// Whether the triangles are drawn.
@@ -107,51 +107,52 @@ pub struct Scenery<'a> {
     pub shadow: bool,
     /// Vertices that are held in place [m].
     pub fixed: &'a [Vec3<f64>],
-    /// Where tissue is held, and where it is pulled to [m].
-    pub pulls: &'a [[Vec3<f64>; 2]],
+    /// Where tissue is held by hand [m].
+    pub picked: &'a [Vec3<f64>],
+    /// Where each of them is pulled to [m].
+    pub targets: &'a [Vec3<f64>],
     /// The size of things [m], for markers and arrows.
     pub extent: f64,
 }
 
-impl Scenery<'_> {
+impl PictureContents<'_> {
     /// Radii as shares of the size of things: large enough to be seen, too small to cover the tissue.
     const FIXED: f64 = 0.005;
     const PICKED: f64 = 0.009;
     const SHAFT: f64 = 0.0045;
 
-    fn drawing(&self) -> Drawing<'_> {
-        let tissue = self.tissue;
-        let paint = match self.range.filter(|_| tissue.has_values) {
-            Some([low, high]) => Paint::Values { buffer: &tissue.values, low, high },
-            None => Paint::Plain(Color::TISSUE),
+    fn drawing(&self) -> GpuDrawing<'_> {
+        let surface = self.surface;
+        let paint = match self.range.filter(|_| surface.has_values) {
+            Some([low, high]) => Paint::Values(ScaledValues { buffer: &surface.values, low, high }),
+            None => Paint::Flat(Color::TISSUE),
         };
-        let body = BodyView { paint, wireframe: self.wireframe, ..BodyView::of(&tissue.surface) };
+        let body = BodyView { paint, wireframe: self.wireframe, ..BodyView::of(&surface.surface) };
         let ghost = self.ghost.map(|ghost| BodyView {
-            paint: Paint::Plain(Color::REST),
+            paint: Paint::Flat(Color::REST),
             opacity: 0.3,
             ..BodyView::of(&ghost.surface)
         });
-        let balls =
-            |positions, share, color| Markers { positions, radius: share * self.extent, color };
-        let picked = self.pulls.iter().map(|pull| pull[0]).collect();
-        let arrow = |&[from, to]: &[Vec3<f64>; 2]| Arrow {
-            from,
-            to,
-            radius: Self::SHAFT * self.extent,
-            color: Color::PULLED,
+        let balls = |positions, share, color| Markers {
+            positions,
+            radius: share * self.extent,
+            color,
+            see_through: 0.0,
         };
+        let radius = Self::SHAFT * self.extent;
+        let pulls = self.picked.iter().zip(self.targets);
+        let arrows = pulls.map(|(&from, &to)| Arrow { from, to, radius, color: Color::PULLED });
         // Shorter ones are hidden by the point they begin at.
-        let is_long =
-            |[from, to]: &&[Vec3<f64>; 2]| (*to - *from).length() > Self::PICKED * self.extent;
-        Drawing {
+        let is_long = |arrow: &Arrow| (arrow.to - arrow.from).length() > Self::PICKED * self.extent;
+        GpuDrawing {
             bodies: [Some(body), ghost].into_iter().flatten().collect(),
             markers: vec![
-                balls(self.fixed.to_vec(), Self::FIXED, Color::FIXED),
-                balls(picked, Self::PICKED, Color::PULLED),
+                balls(self.fixed, Self::FIXED, Color::FIXED),
+                balls(self.picked, Self::PICKED, Color::PULLED),
             ],
-            arrows: self.pulls.iter().filter(is_long).map(arrow).collect(),
-            shadow: tissue.room.filter(|_| self.shadow),
-            ..Drawing::from(self.orbit)
+            arrows: arrows.filter(is_long).collect(),
+            shadow: surface.enclosing.filter(|_| self.shadow),
+            ..GpuDrawing::from(self.orbit)
         }
     }
 }
@@ -173,11 +174,11 @@ impl Picture {
         &mut self,
         gpu: &Gpu,
         size: ImageSize,
-        scenery: &Scenery<'_>,
+        contents: &PictureContents<'_>,
     ) -> Result<(), String> {
         self.take_size(gpu, size).map_err(|error| error.to_string())?;
         let Some((canvas, _)) = &self.shown else { return Ok(()) };
-        canvas.draw(&scenery.drawing()).map_err(|error| error.to_string())
+        canvas.draw(&contents.drawing()).map_err(|error| error.to_string())
     }
 
     /// Makes the canvas, or one of another size, and tells the window of it.

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use viscera::scene::Scene;
 use viscera_picture::{Image, ImageSize, write_png};
 use viscera_view::choices::Side;
-use viscera_view::engine::Lane;
+use viscera_view::engine::RunSnapshot;
 use viscera_view::preferences::Preferences;
 use viscera_view::{App, Options};
 
@@ -79,7 +79,7 @@ impl Window {
 
     /// Waits until it moves.
     pub fn start(&mut self) {
-        self.wait("frames", |app| app.frame().is_some_and(|frame| frame.number >= 2));
+        self.wait("frames", |app| app.snapshot().is_some_and(|snapshot| snapshot.number >= 2));
     }
 
     /// Shows frame after frame of the window until something holds.
@@ -117,8 +117,10 @@ impl Window {
         for letter in text.chars() {
             self.harness.event(Event::Text(letter.to_string()));
             // Time for the simulation to see what it should not.
-            let number = self.harness.state().frame().map_or(0, |frame| frame.number);
-            self.wait("a frame", |app| app.frame().is_some_and(|frame| frame.number > number));
+            let number = self.harness.state().snapshot().map_or(0, |snapshot| snapshot.number);
+            self.wait("a frame", |app| {
+                app.snapshot().is_some_and(|snapshot| snapshot.number > number)
+            });
         }
         self.harness.key_press(leave);
         self.harness.step();
@@ -151,8 +153,10 @@ impl Window {
         for share in [0.25, 0.5, 0.75, 1.0] {
             self.harness.hover_at(middle + way * share);
             self.harness.step();
-            let number = self.harness.state().frame().map_or(0, |frame| frame.number);
-            self.wait("a frame", |app| app.frame().is_some_and(|frame| frame.number > number));
+            let number = self.harness.state().snapshot().map_or(0, |snapshot| snapshot.number);
+            self.wait("a frame", |app| {
+                app.snapshot().is_some_and(|snapshot| snapshot.number > number)
+            });
         }
         self.harness.drop_at(middle + way);
         self.harness.step();
@@ -191,8 +195,8 @@ impl Window {
         std::fs::write(Path::new(&folder).join(format!("{name}.png")), bytes).expect("a file");
     }
 
-    pub fn lane(&self, number: usize) -> &Lane {
-        &self.harness.state().frame().expect("a frame").lanes[number]
+    pub fn run(&self, number: usize) -> &RunSnapshot {
+        &self.harness.state().snapshot().expect("a frame").runs[number]
     }
 
     pub fn scene(&self) -> &Scene {

@@ -73,13 +73,13 @@ fn teach(context: &mut Context) {
     doc.paragraph(format!(
         "Published: the pair of constraints `J - a` and `|F|`; with the rebase: the stretch form, for stable \
          neo-Hookean tissue; Green strain has one form. Why this is an open problem as published: sweeps that ignore half of the equations have no function \
-         that they lower, so that there is nothing to judge a mixture by. A *residual guard* (drop the \
+         that they lower, so that there is nothing to judge an accelerated iterate by. A *residual guard* (drop the \
          history where `|g(q) - q|` has grown) judges how far the iteration is from standing still, not how \
          much energy it has put into the body. With the rebase the fixed point is the minimum of `Phi`, and \
-         `Phi` itself can judge: the *step guard* takes back a step that ends above, along shorter ways \
-         towards it and, if need be, by descent. What then becomes of the multipliers decides whether the body \
-         still moves: kept (the default), *recomputed* from positions, or *zeroed*. *Mixtures judged*: each \
-         mixture must not raise `Phi` either. A guard that held the body fast would be the safest of all; so \
+         `Phi` itself can judge: the *step guard* rejects a step that ends above, and searches along \
+         shorter ways towards it and, if need be, by descent. What then becomes of the multipliers decides whether the body \
+         still moves: kept (the default), *recomputed* from positions, or *zeroed*. *Iterates judged*: no \
+         accelerated iterate may raise `Phi` either. A guard that held the body fast would be the safest of all; so \
          the last column has the apparent stiffness of cantilevers (E = {} kPa, nu = {}) that settle by \
          the same way, and must be 1.",
         context.changes.young.unwrap_or(SETTLING_YOUNG) / 1e3,
@@ -214,7 +214,7 @@ fn tabulate(context: &mut Context, model: MaterialModel, summaries: &[Summary]) 
         "energy of the free body, most of its first",
         "blown up",
         "inside out at the end",
-        "steps taken back",
+        "rejected steps",
         "apparent stiffness",
     ]);
     for summary in summaries.iter().filter(|summary| summary.model == model) {
@@ -247,7 +247,7 @@ fn record(context: &mut Context, cases: &[Case], outcomes: &[Outcome]) -> Result
         "energy gain",
         "blown up",
         "inverted tets",
-        "steps taken back",
+        "rejected steps",
     ]);
     for (case, outcome) in cases.iter().zip(outcomes) {
         table.row([

@@ -1,4 +1,4 @@
-//! Who is handled roughly, by which solver, and what is seen of it from outside.
+//! Test cases (tissue, solver, rough handling) and observables.
 
 use std::fmt;
 
@@ -7,22 +7,22 @@ use viscera::material::MaterialModel;
 use viscera::settings::{AndersonGuard, AndersonOn, SolverSettings};
 
 use super::Context;
+use crate::load_cases::Size;
 use crate::reference::Reference;
-use crate::scenes::Size;
 use crate::settling::{AfterStep, compare, settle_with, truth};
 use crate::stress::{self, FRAMES, Kind, ROUND_OFF, Run, SIZE};
-use crate::study::methods::{COLORED, Method, anderson, exact, published};
+use crate::study::methods::{COLORED, NamedSettings, anderson, exact, published};
 
 /// Young's modulus [Pa] and Poisson's ratio of the bar in trouble.
 pub(super) const YOUNG: f64 = 1e4;
 const POISSON: f64 = 0.45;
-/// Of the bars that show who settles: stiff ones, of which steps are taken back.
+/// Of the bars that show which solver settles: stiff ones, of which steps are rejected.
 pub(super) const SETTLING_YOUNG: f64 = 1e5;
 const SETTLING_POISSON: [f64; 2] = [0.45, 0.49];
 /// A body this many times as long as at rest has blown up.
 const BLOWN: f64 = 10.0;
 
-/// What happens to the multipliers of a step that was taken back.
+/// What happens to the multipliers after a rejected step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum AfterRejection {
     Keep,
@@ -32,7 +32,7 @@ pub(super) enum AfterRejection {
 
 /// A way to solve.
 pub(super) struct Way {
-    pub method: Method,
+    pub method: NamedSettings,
     pub after: AfterRejection,
     /// One of those that all runs are made of; the others are compared on a few.
     pub is_main: bool,
@@ -42,26 +42,26 @@ pub(super) struct Way {
 pub(super) fn ways() -> Vec<Way> {
     use AfterRejection::{Keep, Recompute, Zero};
     use AndersonGuard::{Energy, None, Residual};
-    let mixed = |settings, anderson_guard| SolverSettings {
+    let accelerated = |settings, anderson_guard| SolverSettings {
         anderson_guard,
         iterations: 5,
         ..anderson(settings, AndersonOn::Both)
     };
     let free = || SolverSettings { step_guard: false, ..exact(COLORED) };
     let way = |name: &str, settings, after, is_main| Way {
-        method: Method::new(name, settings),
+        method: NamedSettings::new(name, settings),
         after,
         is_main,
     };
     vec![
-        way("published", mixed(published(COLORED), None), Keep, true),
-        way("published, residual guard", mixed(published(COLORED), Residual), Keep, false),
-        way("rebase", mixed(free(), None), Keep, false),
-        way("rebase, residual guard", mixed(free(), Residual), Keep, false),
-        way("step guard, zeroed", mixed(exact(COLORED), Residual), Zero, false),
-        way("step guard, recomputed", mixed(exact(COLORED), Residual), Recompute, false),
-        way("step guard, mixtures judged", mixed(exact(COLORED), Energy), Keep, false),
-        way("step guard", mixed(exact(COLORED), Residual), Keep, true),
+        way("published", accelerated(published(COLORED), None), Keep, true),
+        way("published, residual guard", accelerated(published(COLORED), Residual), Keep, false),
+        way("rebase", accelerated(free(), None), Keep, false),
+        way("rebase, residual guard", accelerated(free(), Residual), Keep, false),
+        way("step guard, zeroed", accelerated(exact(COLORED), Residual), Zero, false),
+        way("step guard, recomputed", accelerated(exact(COLORED), Residual), Recompute, false),
+        way("step guard, iterates judged", accelerated(exact(COLORED), Energy), Keep, false),
+        way("step guard", accelerated(exact(COLORED), Residual), Keep, true),
     ]
 }
 
@@ -69,8 +69,12 @@ pub(super) fn ways() -> Vec<Way> {
 pub(super) const UNGUARDED: usize = 0;
 pub(super) const SAFE: usize = 7;
 
-/// Takes back and forgets, where that is the way's rule.
-fn heed(after: AfterRejection, rejected: &mut u64, step: &mut AfterStep<'_, f64>) -> Result<()> {
+/// Treats the multipliers after a rejected step by the way's rule.
+fn treat_multipliers(
+    after: AfterRejection,
+    rejected: &mut u64,
+    step: &mut AfterStep<'_, f64>,
+) -> Result<()> {
     let so_far = step.solver.rejected_steps();
     if std::mem::replace(rejected, so_far) == so_far {
         return Ok(());
@@ -142,7 +146,7 @@ pub(super) struct Outcome {
     pub above: u32,
     /// The largest ratio of the two.
     pub factor: f64,
-    /// No numbers, or a body of many times its length.
+    /// NaN, or a body of many times its length.
     pub is_blown: bool,
     /// Tetrahedra inside out at the end.
     pub inverted: usize,
@@ -170,11 +174,11 @@ fn is_blown(run: &Run<'_>) -> bool {
 /// Watches one run. `Phi` is computed outside the solver, whatever that believes.
 pub(super) fn outcome(context: &Context, case: &Case) -> Result<Outcome> {
     let tissue = context.changes.tissue(case.model, YOUNG, POISSON)?;
-    let scene = stress::bar(tissue)?;
+    let load_case = stress::bar(tissue)?;
     let way = &ways()[case.way];
-    let mut run = Run::new(&scene, case.kind, case.seed, &way.method.settings)?;
+    let mut run = Run::new(&load_case, case.kind, case.seed, &way.method.settings)?;
     let reference = Reference::new(&run.model);
-    let mut outcome = Outcome { tets: scene.mesh.tets().len(), ..Outcome::default() };
+    let mut outcome = Outcome { tets: load_case.mesh.tets().len(), ..Outcome::default() };
     let mut rejected = 0;
     for _ in 0..FRAMES {
         if run.is_free() && outcome.energies.is_empty() {
@@ -190,7 +194,7 @@ pub(super) fn outcome(context: &Context, case: &Case) -> Result<Outcome> {
         if !run.state.is_finite() {
             break;
         }
-        heed(way.after, &mut rejected, &mut run.after_step())?;
+        treat_multipliers(way.after, &mut rejected, &mut run.after_step())?;
     }
     outcome.rejected = run.solver.rejected_steps();
     outcome.inverted = run.inverted();
@@ -210,11 +214,11 @@ pub(super) fn apparent_stiffness(context: &Context, rest: &Rest) -> Result<Vec<f
 fn settled(context: &Context, rest: &Rest, poisson: f64) -> Result<f64> {
     let size = if context.quick { Size::Tiny } else { Size::Small };
     let tissue = context.changes.tissue(rest.model, SETTLING_YOUNG, poisson)?;
-    let scene = context.changes.scene("cantilever", size, tissue)?;
+    let load_case = context.changes.load_case("cantilever", size, tissue)?;
     let way = &ways()[rest.way];
     let mut rejected = 0;
-    let settled = settle_with::<f64>(&scene, &way.method.settings, |step| {
-        heed(way.after, &mut rejected, step)
+    let settled = settle_with::<f64>(&load_case, &way.method.settings, |step| {
+        treat_multipliers(way.after, &mut rejected, step)
     })?;
-    Ok(compare(&scene, &truth(&scene)?, &settled.positions)?.stiffness)
+    Ok(compare(&load_case, &truth(&load_case)?, &settled.positions)?.stiffness)
 }

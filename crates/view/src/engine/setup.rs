@@ -1,53 +1,52 @@
-//! What is built before anything moves: meshes, and what the window has to know of them.
+//! Simulations to build, and what does not change while they run.
 
 use std::sync::Arc;
 use viscera::scene::Scene;
 use viscera::settings::SolverSettings;
 use viscera::simulation::{AssembleError, Assembly};
-use viscera_cli::files::Library;
-use viscera_cli::memory;
+use viscera_resources::{Memory, MeshFiles, memory};
 
 /// Simulations to build.
 #[derive(Debug)]
-pub struct Plan {
-    /// Told apart from those before it.
+pub struct BuildRequest {
+    /// Larger than in every request before it.
     pub generation: u64,
     /// One scene for each simulation; they differ in their solvers.
     pub scenes: Vec<Scene>,
-    /// Whether the last one is the exact solution, which is left out for large meshes.
+    /// Whether the last one is the reference, which is left out for large meshes.
     pub ends_with_ghost: bool,
     /// Where mesh files are.
-    pub library: Library,
+    pub mesh_files: MeshFiles,
 }
 
-/// The largest mesh that has an exact solution beside it [tetrahedra]: it costs twenty sweeps for
+/// The largest mesh that has a reference beside it [tetrahedra]: it costs twenty iterations for
 /// each substep.
 pub const MOST_GHOST_TETS: usize = 5000;
 
 /// What does not change while simulations run.
 #[derive(Debug)]
-pub struct Stage {
-    /// That of the plan.
+pub struct Setup {
+    /// That of the request.
     pub generation: u64,
     /// The scene of the first simulation.
     pub scene: Scene,
     /// Meshes and patches.
     pub assembly: Arc<Assembly>,
     /// How many simulations there are.
-    pub lane_count: usize,
-    /// Whether the last of them is the exact solution.
+    pub run_count: usize,
+    /// Whether the last of them is the reference.
     pub has_ghost: bool,
 }
 
-impl Stage {
+impl Setup {
     /// Number of tetrahedra of all bodies.
     pub fn tet_count(&self) -> usize {
         tet_count(&self.assembly)
     }
 
     /// Reads or makes the meshes.
-    pub fn assemble(scene: &Scene, library: &Library) -> Result<Assembly, AssembleError> {
-        Assembly::new(scene, &mut |name| library.load(name))
+    pub fn assemble(scene: &Scene, mesh_files: &MeshFiles) -> Result<Assembly, AssembleError> {
+        Assembly::new(scene, &mut |name| mesh_files.load(name))
     }
 }
 
@@ -55,7 +54,7 @@ fn tet_count(assembly: &Assembly) -> usize {
     assembly.bodies.iter().map(|body| body.tets.len()).sum()
 }
 
-/// What one sweep over a tetrahedron takes, on a slow core without vector registers [s]. A guess that only
+/// What one iteration over a tetrahedron takes, on a slow core without vector registers [s]. A guess that only
 /// has to warn in time: too small, and a window seems to hang; too large, and it asks for nothing.
 const SWEEP: f64 = 2e-7;
 
@@ -70,7 +69,7 @@ pub fn expectation(assembly: &Assembly, scenes: &[Scene]) -> Option<String> {
         bytes += memory::of_run(tets, &scene.solver).0;
         seconds += frame_seconds(tets, &scene.solver);
     }
-    let needed = viscera_report::Memory(bytes);
+    let needed = Memory(bytes);
     let free = memory::free();
     let fits = free.is_none_or(|free| needed.0 <= free.0);
     if fits && seconds <= LONG {

@@ -1,10 +1,10 @@
-//! A finished frame, and the place where it waits for the window.
+//! Snapshots of all simulations after a frame, and the place where the newest waits for the window.
 
 use std::sync::Mutex;
 use viscera::measure::Energies;
 use viscera::scalar::Vec3;
 
-use super::stage::Stage;
+use super::setup::Setup;
 
 /// The window's number for something it holds.
 pub type HoldId = u64;
@@ -23,10 +23,10 @@ pub enum Coloring {
     Stress,
 }
 
-/// What all simulations are at one time.
+/// The state of all simulations after one frame.
 #[derive(Debug, Default)]
-pub struct Frame {
-    /// Of which [`super::Stage`].
+pub struct Snapshot {
+    /// Of which [`super::Setup`].
     pub generation: u64,
     /// Frames computed so far.
     pub number: u64,
@@ -35,39 +35,39 @@ pub struct Frame {
     /// What the values are.
     pub coloring: Coloring,
     /// One for each simulation.
-    pub lanes: Vec<Lane>,
+    pub runs: Vec<RunSnapshot>,
 }
 
-impl Frame {
-    /// The exact solution, where there is one.
-    pub fn ghost(&self, stage: &Stage) -> Option<&Lane> {
-        let is_here = stage.has_ghost && self.generation == stage.generation;
-        self.lanes.last().filter(|_| is_here)
+impl Snapshot {
+    /// The reference, where there is one.
+    pub fn ghost(&self, setup: &Setup) -> Option<&RunSnapshot> {
+        let is_here = setup.has_ghost && self.generation == setup.generation;
+        self.runs.last().filter(|_| is_here)
     }
 
-    /// Whether the others wait for the exact solution: it takes longer than a frame is to last [s], or has not
+    /// Whether the others wait for the reference: it takes longer than a frame is to last [s], or has not
     /// computed one yet.
-    pub fn waits_for_ghost(&self, stage: &Stage, pace: f64) -> bool {
-        self.ghost(stage).is_some_and(|ghost| ghost.wall == 0.0 || ghost.wall > pace)
+    pub fn waits_for_ghost(&self, setup: &Setup, pace: f64) -> bool {
+        self.ghost(setup).is_some_and(|ghost| ghost.wall == 0.0 || ghost.wall > pace)
     }
 }
 
-/// What one simulation is at that time.
+/// The state of one simulation at that time.
 #[derive(Debug, Default)]
-pub struct Lane {
+pub struct RunSnapshot {
     /// Positions [m] of the tetrahedra's vertices, the user's order, shape [vertex_count].
     pub positions: Vec<Vec3<f32>>,
     /// Values of the surfaces' vertices, one body after the other; empty for plain tissue.
     pub values: Vec<f32>,
-    /// What is held.
-    pub holds: Vec<Hold>,
+    /// Patches held by hand.
+    pub held: Vec<HeldPatch>,
     /// Wall time of the last frame [s].
     pub wall: f64,
     /// What is measured now and then.
     pub measures: Measures,
 }
 
-impl Lane {
+impl RunSnapshot {
     /// The largest distance [m] of a vertex from where another simulation has it.
     pub fn distance(&self, other: &Self) -> f64 {
         let pairs = self.positions.iter().zip(&other.positions);
@@ -76,8 +76,8 @@ impl Lane {
 }
 
 /// How many tetrahedra are inverted, in words; nothing where there are none.
-pub fn inverted(lane: &Lane) -> Option<String> {
-    match lane.measures.inverted {
+pub fn inverted(run: &RunSnapshot) -> Option<String> {
+    match run.measures.inverted {
         0 => None,
         1 => Some("1 tetrahedron is inverted".to_owned()),
         count => Some(format!("{count} tetrahedra are inverted")),
@@ -91,17 +91,17 @@ pub struct Measures {
     pub residual: f64,
     /// Energies [J].
     pub energy: Energies,
-    /// Substeps that the step guard has taken back so far.
+    /// Rejected substeps so far.
     pub rejected: u64,
     /// Tetrahedra that are turned inside out.
     pub inverted: usize,
-    /// What the scene itself moves and pulls.
-    pub tools: Vec<Tool>,
+    /// Patches that the scene itself moves and pulls.
+    pub scene_patches: Vec<ScenePatch>,
 }
 
-/// Something of the scene's that moves or pulls tissue.
+/// A patch that the scene moves or pulls.
 #[derive(Clone, Debug)]
-pub struct Tool {
+pub struct ScenePatch {
     /// Its name.
     pub name: String,
     /// Its vertices, the user's order.
@@ -110,10 +110,10 @@ pub struct Tool {
     pub force: Vec3<f64>,
 }
 
-/// Something held.
+/// A patch of tissue that is held by hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hold {
-    /// Whose.
+pub struct HeldPatch {
+    /// The window's number for it.
     pub id: HoldId,
     /// The middle of the patch [m].
     pub place: Vec3<f64>,
@@ -123,35 +123,35 @@ pub struct Hold {
     pub force: Vec3<f64>,
 }
 
-/// Holds the newest finished frame, and frames whose memory can be used again.
+/// Holds the newest snapshot, and one whose memory can be used again.
 #[derive(Debug, Default)]
-pub struct Slot {
-    places: Mutex<Places>,
+pub struct SnapshotExchange {
+    places: Mutex<Exchanged>,
 }
 
 #[derive(Debug, Default)]
-struct Places {
-    fresh: Option<Box<Frame>>,
-    spare: Option<Box<Frame>>,
+struct Exchanged {
+    fresh: Option<Box<Snapshot>>,
+    spare: Option<Box<Snapshot>>,
 }
 
-impl Slot {
-    /// A frame to fill.
-    pub fn blank(&self) -> Box<Frame> {
+impl SnapshotExchange {
+    /// A snapshot to fill.
+    pub fn blank(&self) -> Box<Snapshot> {
         self.places.lock().map(|mut places| places.spare.take()).ok().flatten().unwrap_or_default()
     }
 
-    /// Puts a frame where the window finds it, in place of one it has not taken.
-    pub fn publish(&self, frame: Box<Frame>) {
+    /// Puts a snapshot where the window finds it, in place of one it has not taken.
+    pub fn publish(&self, snapshot: Box<Snapshot>) {
         if let Ok(mut places) = self.places.lock()
-            && let Some(missed) = places.fresh.replace(frame)
+            && let Some(missed) = places.fresh.replace(snapshot)
         {
             places.spare = Some(missed);
         }
     }
 
-    /// Exchanges the frame that is shown for a newer one. Held locks are short, and not waited for.
-    pub fn take(&self, shown: &mut Option<Box<Frame>>) -> bool {
+    /// Exchanges the snapshot that is shown for a newer one. Held locks are short, and not waited for.
+    pub fn take(&self, shown: &mut Option<Box<Snapshot>>) -> bool {
         let Ok(mut places) = self.places.try_lock() else { return false };
         let Some(fresh) = places.fresh.take() else { return false };
         if let Some(old) = shown.replace(fresh) {
@@ -166,19 +166,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_window_gets_the_newest_frame_and_memory_goes_around() {
-        let slot = Slot::default();
+    fn the_window_gets_the_newest_snapshot_and_memory_goes_around() {
+        let exchange = SnapshotExchange::default();
         let mut shown = None;
-        assert!(!slot.take(&mut shown));
+        assert!(!exchange.take(&mut shown));
         for number in 1..=3 {
-            let mut frame = slot.blank();
-            frame.number = number;
-            slot.publish(frame);
+            let mut snapshot = exchange.blank();
+            snapshot.number = number;
+            exchange.publish(snapshot);
         }
-        assert!(slot.take(&mut shown));
-        assert_eq!(shown.as_ref().map(|frame| frame.number), Some(3));
-        assert!(!slot.take(&mut shown));
+        assert!(exchange.take(&mut shown));
+        assert_eq!(shown.as_ref().map(|snapshot| snapshot.number), Some(3));
+        assert!(!exchange.take(&mut shown));
         // One of those that nobody took.
-        assert_eq!(slot.blank().number, 2);
+        assert_eq!(exchange.blank().number, 2);
     }
 }

@@ -1,4 +1,4 @@
-//! Files in and out: messages that name the place, and writing that leaves no half of a file.
+//! Files in and out: error messages that name the place, and atomic writes, checked up front.
 
 use anyhow::{Context, Result, bail};
 use std::fs;
@@ -52,11 +52,11 @@ pub fn print(text: &str) -> Result<()> {
 
 /// Where a scene's mesh files are looked for: beside the scene, then in the data folder.
 #[derive(Clone, Debug)]
-pub struct Library {
+pub struct MeshFiles {
     folders: Vec<PathBuf>,
 }
 
-impl Library {
+impl MeshFiles {
     /// For a scene file and the folder that `--data` names.
     pub fn new(scene: &Path, data: Option<&Path>) -> Self {
         let beside = scene.parent().unwrap_or(Path::new(".")).to_owned();
@@ -85,8 +85,8 @@ fn shown_folder(folder: &Path) -> String {
     if folder.as_os_str().is_empty() { "this folder".into() } else { folder.display().to_string() }
 }
 
-/// Writes a file aside and renames it, so that no reader ever meets a part of it.
-pub fn write_whole(target: &Path, bytes: &[u8]) -> Result<()> {
+/// Writes a file aside and renames it, so that no reader ever meets a part of it; makes its folder.
+pub fn write_atomic(target: &Path, bytes: &[u8]) -> Result<()> {
     let mut part = target.as_os_str().to_owned();
     part.push(".part");
     let part = PathBuf::from(part);
@@ -106,61 +106,33 @@ pub fn write_whole(target: &Path, bytes: &[u8]) -> Result<()> {
     })
 }
 
-/// The folder a run writes to.
-pub struct OutputFolder {
-    path: PathBuf,
+/// Makes the folder of a single file, which `option` of the program names, and makes sure that it can
+/// be written to.
+pub fn prepare_file(file: &Path, option: &str) -> Result<()> {
+    if file.is_dir() {
+        bail!("{} is a folder; name a file in it with {option}", file.display());
+    }
+    prepare_folder(folder_of(file), option)
 }
 
-impl OutputFolder {
-    /// Makes the folder and makes sure that it can be written to, before anything is computed.
-    pub fn create(path: &Path) -> Result<Self> {
-        let probe = path.join(".probe.part");
-        fs::create_dir_all(path)
-            .and_then(|()| fs::write(&probe, b""))
-            .and_then(|()| fs::remove_file(&probe))
-            .map_err(|error| {
-                anyhow::anyhow!(
-                    "cannot write to {}: {error}; choose another folder with --out",
-                    path.display()
-                )
-            })?;
-        Ok(Self { path: path.to_owned() })
+/// The folder that a file is in; `.` where its path names none.
+pub fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
     }
+}
 
-    /// The folder.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// As [`write_whole`].
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
-        write_whole(&self.path.join(name), bytes)
-    }
-
-    /// Removes a file that an earlier run may have left.
-    pub fn remove(&self, name: &str) -> Result<()> {
-        let path = self.path.join(name);
-        match fs::remove_file(&path) {
-            Err(error) if error.kind() != ErrorKind::NotFound => {
-                Err(error).with_context(|| format!("cannot remove the old {}", path.display()))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// Removes what an earlier run left in a sub-folder: files of these kinds, nothing else.
-    pub fn clear(&self, folder: &str, prefixes: &[&str], extension: &str) -> Result<()> {
-        let Ok(entries) = fs::read_dir(self.path.join(folder)) else { return Ok(()) };
-        for entry in entries.flatten() {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let is_ours = prefixes.iter().any(|prefix| name.starts_with(prefix));
-            // A run that was killed leaves the file it was writing.
-            if is_ours && name.trim_end_matches(".part").ends_with(extension) {
-                self.remove(&format!("{folder}/{name}"))?;
-            }
-        }
-        Ok(())
-    }
+/// Makes a folder of files that `option` of the program names, and makes sure that it can be written to.
+pub fn prepare_folder(folder: &Path, option: &str) -> Result<()> {
+    let probe = folder.join(".probe.part");
+    fs::create_dir_all(folder)
+        .and_then(|()| fs::write(&probe, b""))
+        .and_then(|()| fs::remove_file(&probe))
+        .map_err(|error| {
+            let place = folder.display();
+            anyhow::anyhow!("cannot write to {place}: {error}; choose another file with {option}")
+        })
 }
 
 #[cfg(test)]

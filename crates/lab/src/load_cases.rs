@@ -1,6 +1,6 @@
-//! Scenes that the studies share: a body, what holds it, what moves, for how long.
+//! Load cases that the studies share: a body, its fixings, what moves, for how long.
 //!
-//! | scene | what happens |
+//! | load case | what happens |
 //! |---|---|
 //! | cantilever | a bar fixed at one end droops under its weight |
 //! | twist | a bar's end is turned by 60 degrees and pulled by 12 % |
@@ -31,7 +31,7 @@ pub const DENSITY: f64 = 1000.0;
 
 /// Where driven vertices go.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Path {
+pub enum DrivenPath {
     /// By an offset [m].
     Shift(Vec3<f64>),
     /// Turned by an angle [rad] about an axis along x through a point, and shifted along x [m].
@@ -52,7 +52,7 @@ pub enum Path {
     },
 }
 
-impl Path {
+impl DrivenPath {
     /// Where a point is after a share of the way.
     pub fn at(&self, x: Vec3<f64>, share: f64) -> Vec3<f64> {
         match *self {
@@ -73,7 +73,7 @@ impl Path {
 
 /// An elastic hold of one vertex.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hold {
+pub struct ElasticHold {
     /// The vertex.
     pub vertex: u32,
     /// [N/m].
@@ -82,9 +82,9 @@ pub struct Hold {
     pub driven: bool,
 }
 
-/// A body, what holds it, what moves.
+/// A body with its fixings, loads and driven vertices. Reports call it a scene.
 #[derive(Clone, Debug)]
-pub struct Scene {
+pub struct LoadCase {
     /// One word.
     pub name: &'static str,
     /// The body at rest.
@@ -98,21 +98,21 @@ pub struct Scene {
     /// Pinned, and moved along the path.
     pub driven: Vec<u32>,
     /// Held elastically.
-    pub holds: Vec<Hold>,
+    pub holds: Vec<ElasticHold>,
     /// Where what is driven goes.
-    pub path: Path,
+    pub path: DrivenPath,
     /// Frames that it takes to get there.
     pub path_frames: u32,
 }
 
-impl fmt::Display for Scene {
+impl fmt::Display for LoadCase {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (young, poisson) = (self.tissue.young() / 1e3, self.tissue.poisson());
         write!(f, "{} {young} kPa, nu {poisson}, {} tets", self.name, self.mesh.tets().len())
     }
 }
 
-impl Scene {
+impl LoadCase {
     /// A body that nothing holds and nothing pulls.
     pub fn bare(name: &'static str, mesh: TetMesh, tissue: Material) -> Self {
         Self {
@@ -123,41 +123,41 @@ impl Scene {
             fixed: Vec::new(),
             driven: Vec::new(),
             holds: Vec::new(),
-            path: Path::Shift(Vec3::ZERO),
+            path: DrivenPath::Shift(Vec3::ZERO),
             path_frames: 1,
         }
     }
 
-    /// The scene of a name, with about as many tetrahedra.
+    /// The load case of a name, with about as many tetrahedra.
     pub fn new(name: &'static str, size: Size, tissue: Material) -> Result<Self> {
-        let mut scene = Self::bare(name, TetMesh::default(), tissue);
+        let mut load_case = Self::bare(name, TetMesh::default(), tissue);
         match name {
             "cantilever" => {
-                scene.mesh = bar(size)?;
-                scene.gravity = GRAVITY;
-                scene.fixed = scene.select(|x| x.x < NEAR);
+                load_case.mesh = bar(size)?;
+                load_case.gravity = GRAVITY;
+                load_case.fixed = load_case.select(|x| x.x < NEAR);
             }
             "twist" => {
-                scene.mesh = bar(size)?;
-                scene.twist_ends(NEAR);
+                load_case.mesh = bar(size)?;
+                load_case.twist_ends(NEAR);
             }
             "grab" => {
-                scene.mesh = block(size)?;
-                scene.gravity = GRAVITY;
-                scene.fixed = scene.select(|x| x.z < NEAR);
+                load_case.mesh = block(size)?;
+                load_case.gravity = GRAVITY;
+                load_case.fixed = load_case.select(|x| x.z < NEAR);
                 let in_patch = |x: f64| (x - 0.5 * BLOCK[0]).abs() < 0.2 * BLOCK[0];
-                scene.driven =
-                    scene.select(|x| x.z > BLOCK[2] - NEAR && in_patch(x.x) && in_patch(x.y));
-                scene.path = Path::Shift(vec3(0.0, 0.0, 0.032));
-                scene.path_frames = 8;
+                load_case.driven =
+                    load_case.select(|x| x.z > BLOCK[2] - NEAR && in_patch(x.x) && in_patch(x.y));
+                load_case.path = DrivenPath::Shift(vec3(0.0, 0.0, 0.032));
+                load_case.path_frames = 8;
             }
             "press" => {
-                scene.mesh = block(size)?;
-                scene.fixed = scene.select(|x| x.z < NEAR);
-                scene.driven =
-                    scene.select(|x| x.z > BLOCK[2] - NEAR && x.x < 0.5 * BLOCK[0] + NEAR);
-                scene.path = Path::Shift(vec3(0.0, 0.0, -0.012));
-                scene.path_frames = 6;
+                load_case.mesh = block(size)?;
+                load_case.fixed = load_case.select(|x| x.z < NEAR);
+                load_case.driven =
+                    load_case.select(|x| x.z > BLOCK[2] - NEAR && x.x < 0.5 * BLOCK[0] + NEAR);
+                load_case.path = DrivenPath::Shift(vec3(0.0, 0.0, -0.012));
+                load_case.path_frames = 6;
             }
             "organ" => {
                 let spacing = match size {
@@ -166,15 +166,15 @@ impl Scene {
                     Size::Large => 0.022,
                     Size::Huge => 0.0085,
                 };
-                scene.mesh = shapes::liver(spacing, 1.0)?.tets;
-                scene.gravity = GRAVITY;
-                scene.hold_organ();
-                scene.path = Path::Shift(vec3(0.0, 0.0, 0.05));
-                scene.path_frames = 12;
+                load_case.mesh = shapes::liver(spacing, 1.0)?.tets;
+                load_case.gravity = GRAVITY;
+                load_case.hold_organ();
+                load_case.path = DrivenPath::Shift(vec3(0.0, 0.0, 0.05));
+                load_case.path_frames = 12;
             }
             _ => bail!("there is no scene `{name}`; there are {}", NAMES.join(", ")),
         }
-        Ok(scene)
+        Ok(load_case)
     }
 
     /// One end held, the other turned and pulled; what lies within `depth` [m] of an end belongs to it.
@@ -184,7 +184,7 @@ impl Scene {
         self.driven = self.select(|x| x.x > extent.max.x - depth);
         let angle = std::f64::consts::PI / 3.0;
         let advance = 0.12 * extent.size().x;
-        self.path = Path::Screw { center: extent.center(), angle, advance };
+        self.path = DrivenPath::Screw { center: extent.center(), angle, advance };
         self.path_frames = 12;
     }
 
@@ -232,11 +232,15 @@ impl Scene {
         let top = self.select(|x| x.z > high - 0.25 * (high - low));
         // 2000 N/m in all: a liver of 1.5 kg sinks by some millimetres.
         let stiffness = 2000.0 / top.len() as f64;
-        self.holds.extend(top.iter().map(|&vertex| Hold { vertex, stiffness, driven: false }));
+        self.holds.extend(top.iter().map(|&vertex| ElasticHold {
+            vertex,
+            stiffness,
+            driven: false,
+        }));
         let vertices = self.mesh.vertices().iter().enumerate();
         let rightmost = vertices.max_by(|(_, a), (_, b)| a.x.total_cmp(&b.x));
         let vertex = rightmost.map_or(0, |(v, _)| v as u32);
-        self.holds.push(Hold { vertex, stiffness: 100.0, driven: true });
+        self.holds.push(ElasticHold { vertex, stiffness: 100.0, driven: true });
     }
 
     /// Vertices by where they are at rest.
@@ -263,7 +267,7 @@ impl Scene {
         let pin = |&vertex: &u32, target: Vec3<f64>| Pin { vertex, target: target.cast() };
         let mut pins: Vec<_> = self.fixed.iter().map(|v| pin(v, rest[*v as usize])).collect();
         pins.extend(self.driven.iter().map(|v| pin(v, self.path.at(rest[*v as usize], share))));
-        let anchor = |hold: &Hold| {
+        let anchor = |hold: &ElasticHold| {
             let x = rest[hold.vertex as usize];
             if hold.driven { self.path.at(x, share).cast() } else { x.cast() }
         };
@@ -293,10 +297,10 @@ fn span_a_plane(points: &[Vec3<f64>]) -> bool {
     ways().any(|way| longest.cross(way).length() > OFF_THE_LINE * longest.length_squared())
 }
 
-/// All scenes' names.
+/// The names of all load cases.
 pub const NAMES: [&str; 5] = ["cantilever", "twist", "grab", "press", "organ"];
 
-/// How fine a scene is.
+/// How fine a load case is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Size {
     /// Some 100 tetrahedra.

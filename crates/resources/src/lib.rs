@@ -1,0 +1,18 @@
+//! # viscera-resources
+//!
+//! What the programs take from their machine, once for all of them: files, built-in scenes, memory.
+//!
+//! | to | look at |
+//! |---|---|
+//! | read a file, write one atomically, print a result | [`files`] |
+//! | find the mesh files of a scene | [`MeshFiles`] |
+//! | run a scene that needs no file | [`BUILT_IN`], [`BuiltInScene`] |
+//! | refuse what does not fit into memory | [`memory`], [`Memory`] |
+
+pub mod files;
+pub mod memory;
+mod scenes;
+
+pub use files::MeshFiles;
+pub use memory::Memory;
+pub use scenes::{BUILT_IN, BuiltInScene};

@@ -1,0 +1,47 @@
+//! Scenes that are part of the programs: they need no file.
+
+use std::path::Path;
+
+/// A scene that is part of the program.
+pub struct BuiltInScene {
+    /// As `viscera run` takes it.
+    pub name: &'static str,
+    /// The scene file.
+    pub text: &'static str,
+}
+
+macro_rules! built_in {
+    ($($name:literal)*) => {
+        [$(BuiltInScene { name: $name, text: include_str!(concat!("../../../scenes/", $name, ".toml")) }),*]
+    };
+}
+
+/// All of them; `scenes/` holds no others that need no mesh file.
+pub const BUILT_IN: [BuiltInScene; 5] =
+    built_in!["cantilever" "grab" "liver_retraction" "stretch" "twist"];
+
+impl BuiltInScene {
+    /// The one that is meant where there is no such file.
+    pub fn find(path: &Path) -> Option<&'static Self> {
+        let named = |scene: &&Self| path.as_os_str() == scene.name && !path.exists();
+        BUILT_IN.iter().find(named)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scene_without_a_mesh_file_is_built_in() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+        let files = std::fs::read_dir(&folder).expect("the folder of scenes").flatten();
+        let paths = files.map(|file| file.path());
+        let mut names: Vec<String> = paths
+            .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+            .filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned()))
+            .collect();
+        names.sort();
+        assert_eq!(names, BUILT_IN.map(|scene| scene.name));
+    }
+}
