@@ -244,7 +244,7 @@ fn simulate<S: Real>(
     let tissue = Material::new(material, scene.youngs_modulus, scene.poisson_ratio, scene.density)?;
     let mut builder = ModelBuilder::new();
     builder.add_body(&mesh, &tissue)?;
-    let model = builder.build::<S>(settings)?;
+    let model = builder.build::<S>()?;
     let mut run = Run::new(&scene, &mesh, &model, settings)?;
     let mut timing = Timing {
         wall_ms: Vec::new(),

@@ -158,7 +158,7 @@ impl SampleBar {
         let mut builder = ModelBuilder::new();
         builder.add_body(&mesh, &entry.tissue()?)?;
         let inputs = hanging(&mesh);
-        Ok(Self { model: builder.build(&settings)?, settings, inputs })
+        Ok(Self { model: builder.build()?, settings, inputs })
     }
 
     /// Tetrahedra times sweeps per second, of a device that can do so many steps.

@@ -113,6 +113,7 @@ impl Frames {
 impl Summary {
     /// Before the first frame.
     pub fn new<S: Real>(simulation: &Simulation<S>, overrides: Vec<(String, String)>) -> Self {
+        let layout = simulation.layout();
         let (scene, model) = (simulation.scene(), simulation.model());
         Self {
             viscera: env!("CARGO_PKG_VERSION"),
@@ -137,9 +138,9 @@ impl Summary {
                 vertices: model.vertex_count(),
                 tets: model.tet_count(),
                 mass: model.masses.iter().map(|m| m.to_f64()).sum(),
-                colors: model.color_count,
-                largest_clique: model.largest_clique,
-                copies: model.copy_count(),
+                colors: layout.color_count,
+                largest_clique: layout.largest_clique,
+                copies: layout.copy_count(),
                 springs: model.elements.springs.len(),
                 attachments: model.elements.attachments.len(),
             },

@@ -17,7 +17,6 @@ use viscera::mesh::shapes::{self, Block, Splitting};
 use viscera::mesh::topology::BoundingBox;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
-use viscera::settings::SolverSettings;
 use viscera::solver::{Inputs, Pin};
 
 /// Acceleration of gravity [m/s^2].
@@ -249,15 +248,15 @@ impl LoadCase {
         vertices.filter(|(_, x)| inside(**x)).map(|(v, _)| v as u32).collect()
     }
 
-    /// The model for a solver of the given settings.
-    pub fn model<S: Real>(&self, settings: &SolverSettings) -> Result<Model<S>> {
+    /// Its model.
+    pub fn model<S: Real>(&self) -> Result<Model<S>> {
         let mut builder = ModelBuilder::new();
         builder.add_body(&self.mesh, &self.tissue)?;
         for hold in &self.holds {
             let anchor = self.mesh.vertices()[hold.vertex as usize];
             builder.add_attachment(hold.vertex, anchor, hold.stiffness)?;
         }
-        builder.build(settings).with_context(|| self.to_string())
+        builder.build().with_context(|| self.to_string())
     }
 
     /// What acts at the end of a frame, counted from 1; between frames at fractions.

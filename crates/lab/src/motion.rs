@@ -18,7 +18,7 @@ pub fn simulate<S: Real>(
     settings: &SolverSettings,
     frames: u32,
 ) -> Result<Motion> {
-    let model = load_case.model::<S>(settings)?;
+    let model = load_case.model::<S>()?;
     let mut solver = Solver::new(&model, settings);
     let mut state = State::at_rest(&model);
     let dt = 1.0 / FRAME_RATE / f64::from(settings.substeps);
@@ -34,7 +34,7 @@ pub fn simulate<S: Real>(
 
 /// What exact implicit Euler of the same substeps does.
 pub fn exact(load_case: &LoadCase, substeps: u32, frames: u32) -> Result<Motion> {
-    let model = load_case.model::<f64>(&SolverSettings::default())?;
+    let model = load_case.model::<f64>()?;
     let mut reference = Reference::new(&model);
     let mut state = State::at_rest(&model);
     let dt = 1.0 / FRAME_RATE / f64::from(substeps);

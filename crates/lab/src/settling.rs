@@ -68,7 +68,7 @@ pub fn settle_with<S: Real>(
     settings: &SolverSettings,
     mut after: impl FnMut(&mut AfterStep<'_, S>) -> Result<()>,
 ) -> Result<Settled> {
-    let model = load_case.model::<S>(settings)?;
+    let model = load_case.model::<S>()?;
     let mut solver = Solver::new(&model, settings);
     let mut state = State::at_rest(&model);
     let dt = 1.0 / FRAME_RATE / f64::from(settings.substeps);
@@ -136,7 +136,7 @@ pub fn truth(load_case: &LoadCase) -> Result<Truth> {
 
 /// The same with the path in so many parts, for paths that are long.
 pub fn truth_in_parts(load_case: &LoadCase, path_parts: u32) -> Result<Truth> {
-    let model = load_case.model::<f64>(&SolverSettings::default())?;
+    let model = load_case.model::<f64>()?;
     let mut reference = Reference::new(&model);
     let mut positions = model.rest_positions.clone();
     let mut minimum = false;
@@ -160,7 +160,7 @@ pub fn truth_in_parts(load_case: &LoadCase, path_parts: u32) -> Result<Truth> {
 
 /// The body's volume [m^3], and how many tetrahedra are inside out.
 pub fn volume(load_case: &LoadCase, positions: &[Vec3<f64>]) -> Result<(f64, usize)> {
-    let model = load_case.model::<f64>(&SolverSettings::default())?;
+    let model = load_case.model::<f64>()?;
     let mut tets = Vec::new();
     measure_tets(&model, positions, &mut tets);
     // The measures are in the user's order of tetrahedra.
@@ -236,7 +236,7 @@ impl Error {
 
 /// Compares.
 pub fn compare(load_case: &LoadCase, truth: &Truth, positions: &[Vec3<f64>]) -> Result<Error> {
-    let model = load_case.model::<f64>(&SolverSettings::default())?;
+    let model = load_case.model::<f64>()?;
     let reference = Reference::new(&model);
     let inputs = load_case.inputs(f64::INFINITY);
     let rest = load_case.mesh.vertices();

@@ -89,7 +89,7 @@ impl<'a> Run<'a> {
         seed: u64,
         settings: &SolverSettings,
     ) -> Result<Self> {
-        let model = load_case.model::<f64>(settings)?;
+        let model = load_case.model::<f64>()?;
         let mut solver = Solver::new(&model, settings);
         let mut state = State::at_rest(&model);
         let mut random = Random(seed);

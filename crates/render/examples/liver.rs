@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let settings = SolverSettings { substeps: 1, iterations: 20, ..SolverSettings::default() };
     let mut builder = ModelBuilder::new();
     builder.add_body(&liver.tets, &tissue)?;
-    let model = builder.build::<f32>(&settings)?;
+    let model = builder.build::<f32>()?;
 
     let device = Adapter::find(None)?.open()?;
     let mut solver = GpuSolver::new(&device, &model, &settings)?;

@@ -234,7 +234,7 @@ fn a_moved_body_is_drawn_where_the_last_step_has_brought_it() {
     let settings = SolverSettings::default();
     let mut builder = ModelBuilder::new();
     builder.add_body(&shape.tets, &tissue_of).expect("a body");
-    let model: Model<f32> = builder.build(&settings).expect("a model");
+    let model: Model<f32> = builder.build().expect("a model");
     let mut solver = GpuSolver::new(&device, &model, &settings).expect("a model that fits");
     let embedding = Embedding::new(&shape.tets, &shape.surface).expect("a bound surface");
     let triangles = &shape.surface.triangles;

@@ -122,7 +122,7 @@ pub fn curve(next_step: &NextStep, variant: SolverVariant, name: &str) -> Curve 
         let problem = Some("the explicit method has no iterations".to_owned());
         return Curve { name: name.to_owned(), residuals: Vec::new(), problem };
     }
-    let (residuals, problem) = match next_step.builder.build::<f64>(&settings) {
+    let (residuals, problem) = match next_step.builder.build::<f64>() {
         Ok(model) => match residuals(next_step, &model, &settings) {
             Ok(residuals) => (residuals, None),
             Err(error) => (Vec::new(), Some(error.to_string())),

@@ -15,7 +15,7 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = SolverSettings::default();
     let mut builder = ModelBuilder::new();
     builder.add_body(&mesh, &tissue)?;
-    let model = builder.build::<f32>(&settings)?;
+    let model = builder.build::<f32>()?;
 
     let wall = (0u32..).zip(mesh.vertices()).filter(|(_, x)| x.x < 1e-6);
     let pins = wall.map(|(vertex, x)| Pin { vertex, target: x.cast() }).collect();

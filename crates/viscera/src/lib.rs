@@ -46,6 +46,7 @@
 
 pub mod coloring;
 pub mod elements;
+pub mod layout;
 pub mod material;
 pub mod measure;
 pub mod mesh;

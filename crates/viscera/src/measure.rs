@@ -10,8 +10,7 @@
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::singular_values::signed_svd;
 use crate::elements::{deformation_gradient, law};
-use crate::material::MaterialModel;
-use crate::model::elements::{ElementSet, Moments, for_each_kind};
+use crate::model::{ElementList, for_each_kind};
 use crate::model::{Model, Tet};
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::Inputs;
@@ -70,24 +69,17 @@ pub fn measure_tets<S: Real>(
 ) {
     measures.clear();
     measures.resize(model.tet_count(), TetMeasure::default());
-    for set in &model.tet_sets {
-        for tet in model.tets(set) {
-            measures[tet.number] = measure_tet(model, set.model, positions, &tet);
-        }
+    for (tet, measure) in model.tets().zip(measures) {
+        *measure = measure_tet(model, positions, &tet);
     }
 }
 
-fn measure_tet<S: Real>(
-    model: &Model<S>,
-    model_law: MaterialModel,
-    positions: &[Vec3<S>],
-    tet: &Tet<S>,
-) -> TetMeasure {
+fn measure_tet<S: Real>(model: &Model<S>, positions: &[Vec3<S>], tet: &Tet<S>) -> TetMeasure {
     let x = tet.vertices.map(|v| positions[v as usize].cast::<f64>());
     let f = deformation_gradient(&x, &tet.inverse_rest_shape.cast());
-    let material = &model.materials[tet.material];
+    let material = &model.materials[tet.material as usize];
     let (lambda, mu) = (material.lame_lambda.to_f64(), material.lame_mu.to_f64());
-    let (energy_density, piola) = law::respond(model_law, &f, lambda, mu);
+    let (energy_density, piola) = law::respond(tet.law, &f, lambda, mu);
     let volume_ratio = f.determinant();
     let divisor = volume_ratio.abs().max(SMALLEST_VOLUME_RATIO).copysign(volume_ratio);
     let cauchy = piola * f.transpose() * (1.0 / divisor);
@@ -132,16 +124,16 @@ pub fn measure_energies<S: Real>(
 
 /// Adds the energies [J] of the elements of one kind.
 fn add_energies<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
-    set: &ElementSet<S, K, N, M>,
+    set: &ElementList<S, K, N, M>,
     model: &Model<S>,
     state: &State<S>,
     inputs: &Inputs<S>,
     sum: &mut f64,
 ) {
-    let moments = Moments::at_rest(model, inputs.anchors_of(model));
+    let anchors = inputs.anchors_of(&model.rest_anchors);
     for (i, vertices) in set.vertices.iter().enumerate() {
         let x = vertices.map(|v| state.positions[v as usize].cast::<f64>());
-        *sum += set.element::<f64>(i, &moments).energy(&x);
+        *sum += set.element::<f64>(i, anchors).energy(&x);
     }
 }
 

@@ -15,7 +15,7 @@
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::{attachment, deformation_gradient, internal_forces, law, shape_gradients};
 use crate::model::Model;
-use crate::model::elements::{ElementSet, Moments, for_each_kind};
+use crate::model::{ElementList, for_each_kind};
 use crate::scalar::{Real, Vec3};
 use crate::solver::Inputs;
 
@@ -150,16 +150,16 @@ impl<'a, S: Real> Statics<'a, S> {
     /// Of the elements of one kind.
     fn add_elements<K: Kind<N, M>, const N: usize, const M: usize>(
         &self,
-        set: &ElementSet<S, K, N, M>,
+        set: &ElementList<S, K, N, M>,
         x: &[Vec3<f64>],
         gradient: &mut [Vec3<f64>],
     ) {
-        let moments = Moments::at_rest(self.model, self.inputs.anchors_of(self.model));
+        let anchors = self.inputs.anchors_of(&self.model.rest_anchors);
         for i in 0..set.len() {
             let vertices = set.vertices[i];
             let places = vertices.map(|v| x[v as usize]);
             for (v, force) in
-                vertices.into_iter().zip(set.element::<f64>(i, &moments).forces(&places))
+                vertices.into_iter().zip(set.element::<f64>(i, anchors).forces(&places))
             {
                 gradient[v as usize] -= force;
             }
@@ -168,18 +168,16 @@ impl<'a, S: Real> Statics<'a, S> {
 
     /// Of the tetrahedra.
     fn add_tissue(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) {
-        for set in &self.model.tet_sets {
-            for tet in self.model.tets(set) {
-                let shape = tet.inverse_rest_shape.cast::<f64>();
-                let volume = tet.rest_volume.to_f64();
-                let material = &self.model.materials[tet.material];
-                let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
-                let f = deformation_gradient(&tet.vertices.map(|v| x[v as usize]), &shape);
-                let (_, piola) = law::respond(set.model, &f, lambda, mu);
-                let forces = internal_forces(&piola, &shape, volume);
-                for (v, force) in tet.vertices.into_iter().zip(forces) {
-                    gradient[v as usize] -= force;
-                }
+        for tet in self.model.tets() {
+            let shape = tet.inverse_rest_shape.cast::<f64>();
+            let volume = tet.rest_volume.to_f64();
+            let material = &self.model.materials[tet.material as usize];
+            let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
+            let f = deformation_gradient(&tet.vertices.map(|v| x[v as usize]), &shape);
+            let (_, piola) = law::respond(tet.law, &f, lambda, mu);
+            let forces = internal_forces(&piola, &shape, volume);
+            for (v, force) in tet.vertices.into_iter().zip(forces) {
+                gradient[v as usize] -= force;
             }
         }
     }
@@ -315,17 +313,15 @@ fn longest(all: &[Vec3<f64>]) -> f64 {
 fn diagonal<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> (Vec<f64>, f64) {
     let mut stiffness = vec![0.0; model.vertex_count()];
     let mut steepest = 0.0f64;
-    for set in &model.tet_sets {
-        for tet in model.tets(set) {
-            let material = &model.materials[tet.material];
-            let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
-            // `V ((lambda + mu) g g^T + mu |g|^2 I)`
-            let of_slope = tet.rest_volume.to_f64() * ((lambda + mu) / 3.0 + mu);
-            let gradients = shape_gradients(&tet.inverse_rest_shape.cast::<f64>());
-            for (v, g) in tet.vertices.into_iter().zip(gradients) {
-                stiffness[v as usize] += of_slope * g.length_squared();
-                steepest = steepest.max(g.length());
-            }
+    for tet in model.tets() {
+        let material = &model.materials[tet.material as usize];
+        let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
+        // `V ((lambda + mu) g g^T + mu |g|^2 I)`
+        let of_slope = tet.rest_volume.to_f64() * ((lambda + mu) / 3.0 + mu);
+        let gradients = shape_gradients(&tet.inverse_rest_shape.cast::<f64>());
+        for (v, g) in tet.vertices.into_iter().zip(gradients) {
+            stiffness[v as usize] += of_slope * g.length_squared();
+            steepest = steepest.max(g.length());
         }
     }
     for_each_kind!(model, set => add_stiffness(set, model, &mut stiffness));
@@ -338,13 +334,12 @@ fn diagonal<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> (Vec<f64>, f64) {
 /// Adds to each vertex the mean curvature of the elements of one kind: a third of what all of their stiffness can be
 /// where it lies along one line, all of it where an anchor holds in every direction.
 fn add_stiffness<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
-    set: &ElementSet<S, K, N, M>,
+    set: &ElementList<S, K, N, M>,
     model: &Model<S>,
     stiffness: &mut [f64],
 ) {
-    let moments = Moments::at_rest(model, &model.rest_anchors);
     for (i, vertices) in set.vertices.iter().enumerate() {
-        let curvature = set.element::<f64>(i, &moments).curvature();
+        let curvature = set.element::<f64>(i, &model.rest_anchors).curvature();
         for &v in vertices {
             stiffness[v as usize] += if M == 3 { curvature } else { curvature / 3.0 };
         }
@@ -365,10 +360,8 @@ fn held<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> Vec<bool> {
         let (a, b) = (root(&mut parent, a), root(&mut parent, b));
         parent[a.max(b) as usize] = a.min(b);
     };
-    for set in &model.tet_sets {
-        for tet in model.tets(set) {
-            tet.vertices[1..].iter().for_each(|&v| join(tet.vertices[0], v));
-        }
+    for tet in &model.tet_vertices {
+        tet[1..].iter().for_each(|&v| join(tet[0], v));
     }
     let mut anchored = Vec::new();
     for_each_kind!(model, set => {

@@ -10,7 +10,8 @@ pub struct State<S> {
     pub positions: Vec<Vec3<S>>,
     /// Velocities [m/s], shape [vertex_count].
     pub velocities: Vec<Vec3<S>>,
-    /// Multipliers [J s^2] of all constraints, in the model's layout, shape [multiplier_count].
+    /// Multipliers [J s^2] of all constraints, in the solver's layout, shape [multiplier_count]; empty before the
+    /// first step, as if all were zero.
     /// A solver that keeps them from step to step starts from the last step's forces. After
     /// changing positions by hand, start a new history: [`crate::solver::Solver::restart`].
     pub multipliers: Vec<S>,
@@ -24,7 +25,7 @@ impl<S: Real> State<S> {
         Self {
             positions: model.rest_positions.clone(),
             velocities: vec![Vec3::ZERO; model.vertex_count()],
-            multipliers: vec![S::ZERO; model.multiplier_count],
+            multipliers: Vec::new(),
             multiplier_dt: 0.0,
         }
     }

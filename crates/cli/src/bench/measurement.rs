@@ -7,8 +7,9 @@ use super::subjects::hanging;
 use anyhow::Result;
 use serde::Serialize;
 use std::time::Instant;
+use viscera::layout::{Layout, TetSet};
 use viscera::mesh::TetMesh;
-use viscera::model::{Model, ModelBuilder, TetSet};
+use viscera::model::{Model, ModelBuilder};
 use viscera::settings::Method;
 use viscera::solver::Inputs;
 
@@ -88,7 +89,7 @@ impl<'a> Bench<'a> {
     pub fn new(entry: &'a SolverEntry, mesh: &TetMesh) -> Result<Self> {
         let mut builder = ModelBuilder::new();
         builder.add_body(mesh, &entry.tissue()?)?;
-        Ok(Self { entry, model: builder.build(&entry.settings())?, inputs: hanging(mesh) })
+        Ok(Self { entry, model: builder.build()?, inputs: hanging(mesh) })
     }
 
     /// Measures for about so long [s] on what the bandwidth belongs to.
@@ -126,7 +127,8 @@ impl<'a> Bench<'a> {
         let tets = self.model.tet_count();
         let per_tet = 1e9 / tets as f64;
         let unit_seconds = unit(&few, &more);
-        let compulsory = self.compulsory_bytes() / tets as f64;
+        let layout = Layout::new(&self.model, &self.entry.settings());
+        let compulsory = self.compulsory_bytes(&layout) / tets as f64;
         let fraction = |s: f64| Some(compulsory * tets as f64 / s / bandwidth.bytes_per_second?);
         let facts = few.facts.clone();
         Ok(Measurement {
@@ -136,7 +138,7 @@ impl<'a> Bench<'a> {
             solver: self.entry.name,
             device: computer.kind(),
             threads: facts.threads,
-            colors: self.model.color_count,
+            colors: layout.color_count,
             instructions: facts.instructions,
             sweeps: self.entry.sweeps.map(|s| s[0]),
             dispatches: facts.dispatches,
@@ -158,9 +160,9 @@ impl<'a> Bench<'a> {
     /// numbers, `Dm^-1`, volume and material (60 B), each multiplier read and written, and each
     /// vertex's position and inverse mass (16 B) read and written, once. A small step has no
     /// multipliers, but forces (16 B) and velocities (12 B).
-    fn compulsory_bytes(&self) -> f64 {
+    fn compulsory_bytes(&self, layout: &Layout<f32>) -> f64 {
         let count = |set: &TetSet<f32>| set.len() * set.form.multiplier_count();
-        let multipliers: usize = self.model.tet_sets.iter().map(count).sum();
+        let multipliers: usize = layout.tet_sets.iter().map(count).sum();
         let (multipliers, vertex) =
             if self.is_explicit() { (0.0, 22.0) } else { (2.0 * multipliers as f64, 8.0) };
         let tets = 15.0 * self.model.tet_count() as f64;

@@ -68,7 +68,7 @@ fn library<S: Real>(model: MaterialModel, settings: &SolverSettings, factor: f64
     let mut builder = ModelBuilder::new();
     let tissue = Material::new(model, 5e3, 0.3, 1000.0).expect("a material");
     builder.add_body(&mesh, &tissue).expect("a body");
-    let model = builder.build::<S>(settings).expect("a model");
+    let model = builder.build::<S>().expect("a model");
     let (mut solver, mut state) = (Solver::new(&model, settings), State::at_rest(&model));
     let share = |frame: u32| {
         let s = (f64::from(frame) * DT / RAMP).min(1.0);

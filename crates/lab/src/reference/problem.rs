@@ -4,6 +4,7 @@
 //! A linear tetrahedron has 4 nodes and 1 point, a quadratic one 10 and 4. Everything after this file
 //! is the same for both.
 
+use viscera::elements::law::ALL_LAWS;
 use viscera::elements::shape_gradients;
 use viscera::material::Material;
 use viscera::mesh::TetMesh;
@@ -104,24 +105,25 @@ pub struct Problem {
 impl Problem {
     /// What the library's solver solves.
     pub fn linear(model: &Model<f64>) -> Self {
+        // A tissue for each law and material, whether or not any tetrahedron has it.
         let mut tissues = Vec::new();
-        let mut linear = TetElements::new(1);
-        for set in &model.tet_sets {
-            let first = tissues.len() as u32;
+        for law in ALL_LAWS {
             tissues.extend(model.materials.iter().map(|material| TissueLaw {
-                model: set.model,
+                model: law,
                 lame_lambda: material.lame_lambda,
                 lame_mu: material.lame_mu,
                 viscosity: material.viscosity,
             }));
-            for tet in model.tets(set) {
-                linear.nodes.push(tet.vertices);
-                linear.tissue.push(first + tet.material as u32);
-                linear.points.push(Point {
-                    gradients: shape_gradients(&tet.inverse_rest_shape),
-                    volume: tet.rest_volume,
-                });
-            }
+        }
+        let mut linear = TetElements::new(1);
+        for tet in model.tets() {
+            linear.nodes.push(tet.vertices);
+            let of_law = tet.law as usize * model.materials.len();
+            linear.tissue.push(of_law as u32 + tet.material);
+            linear.points.push(Point {
+                gradients: shape_gradients(&tet.inverse_rest_shape),
+                volume: tet.rest_volume,
+            });
         }
         let (springs, attachments) = (&model.elements.springs, &model.elements.attachments);
         Self {

@@ -80,7 +80,7 @@ fn step(context: &Context) -> Result<MeasuredStep> {
 
 /// The exact end [m] of a frame of so many small steps.
 fn exact_small_steps(step: &MeasuredStep, count: u32) -> Result<Vec<Vec3<f64>>> {
-    let model = step.load_case.model::<f64>(&SolverSettings::default())?;
+    let model = step.load_case.model::<f64>()?;
     let mut reference = Reference::new(&model);
     let mut state = State::at_rest(&model);
     for small in 1..=count {

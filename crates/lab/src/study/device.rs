@@ -59,7 +59,7 @@ pub fn follow(
     let settings = SolverSettings { iterations: most, step_guard: false, ..settings.clone() };
     let (double, single) =
         (iterates::<f64>(step, &settings, &counts)?, iterates::<f32>(step, &settings, &counts)?);
-    let model = step.load_case.model::<f32>(&settings)?;
+    let model = step.load_case.model::<f32>()?;
     let (_, start) = step.begin::<f32>(&model, &settings)?;
     let mut solver = GpuSolver::new(device, &model, &settings)?;
     let mut state = start.clone();
@@ -85,7 +85,7 @@ fn iterates<S: Real>(
     settings: &SolverSettings,
     counts: &[u32],
 ) -> Result<Vec<Vec<Vec3<f64>>>> {
-    let model = step.load_case.model::<S>(settings)?;
+    let model = step.load_case.model::<S>()?;
     let (mut solver, mut state) = step.begin(&model, settings)?;
     let mut seen = Vec::with_capacity(counts.len());
     solver.step_watched(&model, &mut state, &step.inputs(), step.dt, |iteration, x| {
@@ -102,7 +102,7 @@ pub fn end(
     step: &MeasuredStep,
     settings: &SolverSettings,
 ) -> Result<Vec<Vec3<f64>>> {
-    let model = step.load_case.model::<f32>(settings)?;
+    let model = step.load_case.model::<f32>()?;
     let (_, mut state) = step.begin::<f32>(&model, settings)?;
     let mut solver = GpuSolver::new(device, &model, settings)?;
     solver.write(&model, &state)?;

@@ -131,7 +131,7 @@ fn edge(load_case: &LoadCase) -> f64 {
 
 /// Largest principal second Piola stress [Pa], tension or pressure, at the end of a step.
 fn stress(step: &MeasuredStep) -> Result<f64> {
-    let model = step.load_case.model::<f64>(&SolverSettings::default())?;
+    let model = step.load_case.model::<f64>()?;
     let mut tets = Vec::new();
     measure_tets(&model, &step.exact, &mut tets);
     let (lambda, mu) = (step.load_case.tissue.lame_lambda(), step.load_case.tissue.lame_mu());

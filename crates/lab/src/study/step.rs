@@ -64,7 +64,7 @@ impl MeasuredStep {
 
     /// A step of `dt` [s] after so many frames of the scene.
     pub fn after(load_case: LoadCase, history: u32, dt: f64) -> Result<Self> {
-        let model = load_case.model::<f64>(&SolverSettings::default())?;
+        let model = load_case.model::<f64>()?;
         let mut reference = Reference::new(&model);
         let mut state = State::at_rest(&model);
         let mut advance = |state: &mut State<f64>, frame: f64, dt: f64| {
@@ -125,7 +125,7 @@ impl MeasuredStep {
 
     /// Root mean square Green strain over the body's volume.
     fn strain_of(&self, positions: &[Vec3<f64>]) -> Result<f64> {
-        let model = self.load_case.model::<f64>(&SolverSettings::default())?;
+        let model = self.load_case.model::<f64>()?;
         let mut tets = Vec::new();
         measure_tets(&model, positions, &mut tets);
         let squared = |stretches: [f64; 3]| -> f64 {
@@ -138,7 +138,7 @@ impl MeasuredStep {
     /// A method on this step. Steps of its own begin with its own rules, but where multipliers are kept:
     /// the exact steps before have left those that answer to the positions.
     pub fn follow<S: Real>(&self, settings: &SolverSettings) -> Result<Curve> {
-        let model = self.load_case.model::<S>(settings)?;
+        let model = self.load_case.model::<S>()?;
         let (mut solver, mut state) = self.begin(&model, settings)?;
         let mut errors = Vec::with_capacity(settings.iterations as usize + 1);
         let mut last = self.exact.clone();
@@ -165,7 +165,7 @@ impl MeasuredStep {
 
     /// Where a method has the vertices [m] after its iterations, safeguards of the step included.
     pub fn end<S: Real>(&self, settings: &SolverSettings) -> Result<Vec<Vec3<f64>>> {
-        let model = self.load_case.model::<S>(settings)?;
+        let model = self.load_case.model::<S>()?;
         let (mut solver, mut state) = self.begin(&model, settings)?;
         for (inputs, dt) in self.substeps(settings.substeps) {
             solver.step(&model, &mut state, &inputs, dt)?;
@@ -206,7 +206,7 @@ impl MeasuredStep {
             self.frame_cost(&SolverSettings { iterations, ..settings.clone() }).map(|c| c.seconds)
         };
         let seconds = ((of(1 + ITERATIONS)? - of(1)?) / f64::from(ITERATIONS)).max(0.0);
-        let model = self.load_case.model::<f32>(&settings)?;
+        let model = self.load_case.model::<f32>()?;
         Ok(Cost { passes: GpuSolver::dispatches_of(&model, &settings)[1], seconds })
     }
 
@@ -216,7 +216,7 @@ impl MeasuredStep {
         const LEAST: (usize, f64) = (3, 5e-3);
         let threads = viscera::settings::Threads::Count(1);
         let settings = SolverSettings { threads, ..settings.clone() };
-        let model = self.load_case.model::<f32>(&settings)?;
+        let model = self.load_case.model::<f32>()?;
         let (mut solver, start) = self.begin(&model, &settings)?;
         let inputs: Vec<(Inputs<f32>, f64)> = self.substeps(settings.substeps).collect();
         let (mut seconds, mut times, mut total) = (f64::INFINITY, 0, 0.0);

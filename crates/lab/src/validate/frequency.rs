@@ -345,7 +345,7 @@ impl Bar {
     }
 
     fn mode(&self, load_case: &LoadCase) -> Result<Mode> {
-        let model = load_case.model::<f64>(&SolverSettings::default())?;
+        let model = load_case.model::<f64>()?;
         let down = vec3(0.0, 0.0, -1.0);
         Ok(Reference::new(&model).lowest_mode(
             &model.rest_positions,
@@ -357,7 +357,7 @@ impl Bar {
 
 /// The bar at rest under a small load [m].
 fn bent(load_case: &LoadCase) -> Result<Vec<Vec3<f64>>> {
-    let model = load_case.model::<f64>(&SolverSettings::default())?;
+    let model = load_case.model::<f64>()?;
     let inputs = Inputs { gravity: GRAVITY * LOAD, ..load_case.inputs(1.0) };
     Ok(Reference::new(&model).settle(&model.rest_positions, &inputs)?.positions)
 }
@@ -374,7 +374,7 @@ fn release<S: Real>(
         iterations: case.iterations,
         ..SolverSettings::default()
     };
-    let model = load_case.model::<S>(&settings)?;
+    let model = load_case.model::<S>()?;
     let mut solver = Solver::new(&model, &settings);
     let mut state = State::at_rest(&model);
     for (x, start) in state.positions.iter_mut().zip(start) {

@@ -192,7 +192,7 @@ fn settled_error<S: Real>(case: &Case) -> Result<f64> {
     let mesh = block(case.quick)?;
     let mut builder = ModelBuilder::new();
     builder.add_body(&mesh, &Material::new(case.model, YOUNG, POISSON, 1000.0)?)?;
-    let model = builder.build::<S>(&settings)?;
+    let model = builder.build::<S>()?;
     let map = affine_map(case.stretch);
     let mut inputs = Inputs::default();
     for (vertex, x) in mesh.vertices().iter().enumerate() {

@@ -85,7 +85,7 @@ fn viscous_forces(
 }
 
 fn elastic_energy(fixture: &Fixture, x: &[Vec3<f64>]) -> f64 {
-    let model = fixture.model::<f64>(&SolverSettings::default());
+    let model = fixture.model::<f64>();
     let mut state = State::at_rest(&model);
     state.positions = x.to_vec();
     let mut tets = Vec::new();
@@ -94,7 +94,7 @@ fn elastic_energy(fixture: &Fixture, x: &[Vec3<f64>]) -> f64 {
 }
 
 fn masses(fixture: &Fixture) -> Vec<f64> {
-    fixture.model::<f64>(&SolverSettings::default()).masses
+    fixture.model::<f64>().masses
 }
 
 /// Weights [N] of the vertices.
@@ -216,7 +216,7 @@ fn many_sweeps_are_the_oracles_steps() {
     };
     for (name, fixture) in motions() {
         let tolerance = if fixture.value("viscosity") > 0.0 { 1e-7 } else { ROUNDING };
-        let model = fixture.model::<f64>(&settings);
+        let model = fixture.model::<f64>();
         let (mut state, mut solver) = (State::at_rest(&model), Solver::new(&model, &settings));
         for step in 1..=2 {
             solver

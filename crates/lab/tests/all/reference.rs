@@ -7,7 +7,6 @@ use viscera::mesh::shapes::Block;
 use viscera::mesh::topology::boundary_surface;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Mat3, Vec3, vec3};
-use viscera::settings::SolverSettings;
 use viscera::solver::{Inputs, Pin, Tether};
 use viscera::state::State;
 use viscera_lab::load_cases::Random;
@@ -32,7 +31,7 @@ fn material(model: MaterialModel, young: f64, poisson: f64) -> Material {
 }
 
 fn build(builder: &ModelBuilder) -> Model<f64> {
-    builder.build(&SolverSettings::default()).expect("a legal model")
+    builder.build().expect("a legal model")
 }
 
 fn body(mesh: &TetMesh, material: &Material) -> Model<f64> {

@@ -11,7 +11,6 @@ use crate::common::{
     Fixture, configurations, difference, equilibria, largest, motions, position_error,
 };
 use viscera::scalar::Vec3;
-use viscera::settings::SolverSettings;
 use viscera::state::State;
 use viscera_lab::reference::Reference;
 use viscera_lab::reference::matrix::Pattern;
@@ -23,7 +22,7 @@ const AGREEMENT: f64 = 1e-8;
 const ROUNDING: f64 = 1e-12;
 
 fn reference(fixture: &Fixture) -> Reference {
-    Reference::new(&fixture.model::<f64>(&SolverSettings::default()))
+    Reference::new(&fixture.model::<f64>())
 }
 
 #[test]
@@ -83,7 +82,7 @@ fn equilibria_are_the_oracles() {
 #[test]
 fn steps_are_the_oracles() {
     for (name, fixture) in motions() {
-        let model = fixture.model::<f64>(&SolverSettings::default());
+        let model = fixture.model::<f64>();
         let (mut reference, mut state) = (Reference::new(&model), State::at_rest(&model));
         for step in 1..=10 {
             let dt = fixture.value("step");

@@ -29,6 +29,17 @@ pub trait Law: Copy + Send + Sync {
 /// How many laws there are.
 pub const LAWS: usize = <MaterialModel as Choice>::ALL.len();
 
+/// All of them, each at the place of its number.
+pub const ALL_LAWS: [MaterialModel; LAWS] = {
+    let mut all = [MaterialModel::SaintVenantKirchhoff; LAWS];
+    let mut i = 0;
+    while i < LAWS {
+        all[i] = <MaterialModel as Choice>::ALL[i].0;
+        i += 1;
+    }
+    all
+};
+
 /// See [`green_strain`].
 #[derive(Clone, Copy, Debug)]
 pub struct SaintVenantKirchhoff;

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use std::sync::LazyLock;
 
 use super::TetForm;
-use super::law::{LAWS, Law, with_law};
+use super::law::{ALL_LAWS, Law, with_law};
 use super::list::{ARE_ANCHORED, KIND_SIZES, KIND_WGSL};
 use crate::material::MaterialModel;
 use crate::settings::Choice;
@@ -45,9 +45,8 @@ fn switch<'a>(
 /// All laws, and what chooses one: `law_energy_density`, `law_piola`, `law_curvature`. The text of the law of
 /// Saint Venant and Kirchhoff is [`GREEN_STRAIN`].
 pub static LAW_TEXT: LazyLock<String> = LazyLock::new(|| {
-    let laws: [MaterialModel; LAWS] = std::array::from_fn(|i| MaterialModel::ALL[i].0);
     let mut text = String::new();
-    for law in laws {
+    for law in ALL_LAWS {
         let of_law = with_law!(law, L => L::WGSL);
         if of_law != GREEN_STRAIN {
             text += of_law;

@@ -2,24 +2,17 @@
 
 use std::sync::Arc;
 
-use super::elements::{ElementSet, ElementSets, LayOut};
-use super::layout::{Layout, renumbered_copies};
+use super::elements::{ElementLists, Given};
 use super::numbering::Numbering;
-use super::parts::Laid;
-use super::tets::{TetBlock, TetSet};
 use super::{Body, MaterialConstants, Model, ModelError};
 use crate::coloring::ConstraintGraph;
-use crate::elements::TetForm;
 use crate::elements::attachment::Attachments;
 use crate::elements::kinds::{CONSTANTS, Constant, Kind, Legal};
-use crate::elements::law::law_form;
 use crate::elements::list::{KINDS, number_of};
 use crate::elements::spring::Springs;
-use crate::material::{Compliance, Material, MaterialModel};
+use crate::material::{Compliance, Material};
 use crate::mesh::{MAX_COORDINATE, TetMesh};
-use crate::scalar::lanes::LANES;
 use crate::scalar::{Real, Vec3};
-use crate::settings::{Choice, SolverSettings};
 
 /// Collects bodies, springs and attachments, then builds the [`Model`].
 #[derive(Clone, Debug, Default)]
@@ -33,14 +26,6 @@ pub struct ModelBuilder {
     /// By kind.
     elements: [Vec<Given>; KINDS],
     anchors: Vec<Vec3<f64>>,
-}
-
-/// An element as it was added.
-#[derive(Clone, Debug)]
-struct Given {
-    vertices: Vec<u32>,
-    constants: [f64; CONSTANTS],
-    anchor: Option<u32>,
 }
 
 impl ModelBuilder {
@@ -172,64 +157,39 @@ impl ModelBuilder {
         Ok(of_kind.len() - 1)
     }
 
-    /// Colours the constraints and lays out the arrays.
-    ///
-    /// The layout depends on the solver's colours and on the form in which it solves the stable
-    /// neo-Hookean energy: build a solver for the model with the same settings.
-    pub fn build<S: Real>(&self, settings: &SolverSettings) -> Result<Model<S>, ModelError> {
+    /// Puts everything together.
+    pub fn build<S: Real>(&self) -> Result<Model<S>, ModelError> {
         if self.bodies.is_empty() {
             return Err(ModelError::Empty);
         }
-        let mut graph = ConstraintGraph::new();
-        for tet in &self.tets {
-            graph.push(tet);
-        }
-        for element in self.elements.iter().flatten() {
-            graph.push(&element.vertices);
-        }
-        let coloring = graph.color(self.positions.len(), settings.colors);
-        debug_assert_eq!(coloring.validate(&graph), None);
-        let (part_of, part_count) = graph.parts(self.positions.len());
-        let numbering = Numbering::along_curves(&self.positions, &part_of, part_count);
-        let part_of: Vec<u32> = numbering.order.iter().map(|&v| part_of[v as usize]).collect();
-        let copy_offsets = renumbered_copies(&coloring, &numbering);
-        let mut layout = Layout {
-            graph: &graph,
-            coloring: &coloring,
-            numbering: &numbering,
-            part_of: &part_of,
-            copy_offsets: &copy_offsets,
-            multipliers: 0,
-        };
-        let tet_sets: Vec<_> = (MaterialModel::ALL.iter())
-            .map(|(law, ..)| self.lay_out_tets(&mut layout, *law, law_form(*law, settings)))
-            .collect();
-        let tet_sets = tet_sets.try_into().unwrap_or_else(|_| unreachable!("a set for each law"));
-        let elements = ElementSets::laid_out(&mut OfKinds { builder: self, layout: &mut layout });
-        let multiplier_count = layout.multipliers;
-        let parts = Laid {
-            part_of: &part_of,
-            copy_offsets: &copy_offsets,
-            sets: &tet_sets,
-            elements: elements.laid(&numbering),
-            color_count: coloring.color_count as usize,
-        }
-        .parts();
-        Ok(Model {
+        let (part_numbers, part_count) = self.parts();
+        let numbering = Numbering::along_curves(&self.positions, &part_numbers, part_count);
+        let mut model = Model {
             bodies: self.bodies.clone(),
             rest_positions: self.positions.iter().map(|p| p.cast()).collect(),
             masses: self.masses(),
             materials: self.materials.iter().map(constants).collect(),
-            tet_sets,
-            elements,
+            tet_vertices: self.tets.clone(),
+            tet_materials: self.tet_material.clone(),
+            laws: self.materials.iter().map(Material::model).collect(),
+            places: self.positions.clone(),
+            elements: ElementLists::new(&self.elements),
             rest_anchors: self.anchors.iter().map(|anchor| anchor.cast()).collect(),
-            color_count: coloring.color_count as usize,
-            largest_clique: coloring.largest_clique as usize,
-            multiplier_count,
-            parts: Arc::from(parts),
-            numbering,
-            copy_offsets,
-        })
+            revision: 0,
+            numbering: Arc::new(numbering),
+            part_numbers,
+            part_count,
+        };
+        model.revision = model.fingerprint();
+        Ok(model)
+    }
+
+    /// The connected part of each vertex, and how many there are.
+    fn parts(&self) -> (Vec<u32>, usize) {
+        let mut graph = ConstraintGraph::new();
+        self.tets.iter().for_each(|tet| graph.push(tet));
+        self.elements.iter().flatten().for_each(|element| graph.push(&element.vertices));
+        graph.parts(self.positions.len())
     }
 
     /// A quarter of each tetrahedron's [kg].
@@ -243,83 +203,6 @@ impl ModelBuilder {
             }
         }
         masses.into_iter().map(S::from_f64).collect()
-    }
-
-    fn lay_out_tets<S: Real>(
-        &self,
-        layout: &mut Layout<'_>,
-        model: MaterialModel,
-        form: TetForm,
-    ) -> TetSet<S> {
-        let of_model =
-            |&tet: &usize| self.materials[self.tet_material[tet] as usize].model() == model;
-        let chosen: Vec<usize> = (0..self.tets.len()).filter(of_model).collect();
-        let (order, colors) = layout.sort(chosen);
-        let viscous_parts = self.viscous_parts(layout, &order);
-        let is_viscous = viscous_parts.contains(&true);
-        let in_blocks = |color: &[u32]| layout.blocks(&order, color).count();
-        let count = colors.windows(2).map(in_blocks).sum();
-        let mut set = TetSet {
-            model,
-            form,
-            viscous: is_viscous,
-            blocks: Vec::with_capacity(count),
-            filled: Vec::with_capacity(count),
-            uniform: Vec::with_capacity(count),
-            viscous_blocks: Vec::with_capacity(if is_viscous { count } else { 0 }),
-            copies: Vec::with_capacity(if layout.is_split() { count } else { 0 }),
-            color_offsets: vec![0],
-            multiplier_offset: 0,
-            viscous_offset: 0,
-            bounds: [self.positions.len(), layout.copy_count()],
-            order,
-        };
-        for color in colors.windows(2) {
-            for chosen in layout.blocks(&set.order, color) {
-                set.filled.push(chosen.len() as u8);
-                let block = self.block(layout, chosen);
-                set.uniform.push(block.material.iter().all(|&m| m == block.material[0]));
-                set.blocks.push(block);
-                if is_viscous {
-                    set.viscous_blocks.push(viscous_parts[layout.part(chosen[0])]);
-                }
-                if layout.is_split() {
-                    set.copies.push(layout.block_copies(chosen));
-                }
-            }
-            set.color_offsets.push(set.blocks.len() as u32);
-        }
-        [set.multiplier_offset, set.viscous_offset] =
-            set.multiplier_counts().map(|count| layout.take_multipliers(count));
-        set
-    }
-
-    /// Whether any of some tetrahedra in each part is viscous.
-    fn viscous_parts(&self, layout: &Layout<'_>, tets: &[u32]) -> Vec<bool> {
-        let count = layout.part_of.last().map_or(0, |&last| last as usize + 1);
-        let mut viscous = vec![false; count];
-        for &tet in tets {
-            let material = self.tet_material[tet as usize] as usize;
-            viscous[layout.part(tet)] |= self.materials[material].viscosity() > 0.0;
-        }
-        viscous
-    }
-
-    /// The constants of up to eight tetrahedra.
-    fn block<S: Real>(&self, layout: &Layout<'_>, tets: &[u32]) -> TetBlock<S> {
-        let mut block = TetBlock::empty();
-        for lane in 0..LANES {
-            let tet = tets[lane.min(tets.len() - 1)] as usize;
-            let vertices = self.tets[tet];
-            let corners = vertices.map(|v| self.positions[v as usize]);
-            block.set_shape(lane, &crate::mesh::edge_matrix(corners).inverse().cast());
-            block.rest_volume[lane] = S::from_f64(crate::mesh::tet_volume(corners));
-            block.material[lane] = self.tet_material[tet];
-            for (corner, v) in vertices.into_iter().enumerate() {
-                block.vertices[corner][lane] = layout.numbering.of(v) as u32;
-            }
-        }
-        block
     }
 
     /// A body whose material is changed a thousand times still has one.
@@ -351,39 +234,6 @@ impl ModelBuilder {
             return Ok(());
         }
         Err(ModelError::UnknownVertex { what, vertex, vertex_count })
-    }
-}
-
-/// Lays out other elements behind the tetrahedra, kind by kind.
-struct OfKinds<'a, 'b> {
-    builder: &'a ModelBuilder,
-    layout: &'a mut Layout<'b>,
-}
-
-impl<S: Real> LayOut<S> for OfKinds<'_, '_> {
-    fn lay_out<K: Kind<N, M>, const N: usize, const M: usize>(
-        &mut self,
-        number: usize,
-    ) -> ElementSet<S, K, N, M> {
-        let (all, layout) = (&self.builder.elements, &mut *self.layout);
-        let before: usize = all[..number].iter().map(Vec::len).sum();
-        let first = self.builder.tets.len() + before;
-        let given = &all[number];
-        let (order, color_offsets) = layout.sort((first..first + given.len()).collect());
-        let element = |&c: &u32| &given[c as usize - first];
-        let corners = |c| std::array::from_fn(|corner| element(c).vertices[corner]);
-        let mut anchors: Vec<u32> = order.iter().filter_map(|c| element(c).anchor).collect();
-        anchors.shrink_to_fit();
-        ElementSet {
-            vertices: order.iter().map(corners).collect(),
-            copies: order.iter().map(|&c| layout.copies(c as usize)).collect(),
-            constants: order.iter().map(|c| element(c).constants.map(S::from_f64)).collect(),
-            anchors,
-            multiplier_offset: layout.take_multipliers(M * order.len()),
-            order: order.iter().map(|&c| c - first as u32).collect(),
-            color_offsets,
-            ..ElementSet::new(number)
-        }
     }
 }
 

@@ -1,35 +1,27 @@
-//! The model: everything that does not move. Meshes, rest shapes, materials, springs,
-//! attachments, colours; flat arrays, sorted by colour, ready for any backend.
+//! The model: everything that does not move, and nothing of how it is solved. Meshes, rest shapes, materials, springs,
+//! attachments; [`crate::layout`] sorts it for a solver.
 //!
-//! Vertices and tetrahedra are numbered over all bodies in the order in which the bodies were
-//! added; [`Body`] says which range belongs to which. Everything public is in that order, but for
-//! constraints, which are sorted by colour: `order` maps back to the user's numbers. Within, vertices
-//! are numbered along a curve through space, one connected part after the other; see `numbering` and
-//! `parts`.
+//! Vertices and tetrahedra are numbered over all bodies in the order in which the bodies were added; [`Body`] says
+//! which range belongs to which. Beside that order there is one along a curve through space, one connected part after
+//! the other, in which solvers number vertices; see `numbering`.
 
 mod builder;
 pub(crate) mod elements;
-mod layout;
 mod numbering;
-mod parts;
-mod tets;
 
 use std::ops::Range;
 use std::sync::Arc;
 
 pub use builder::ModelBuilder;
-pub use elements::{ElementSet, ElementSets};
+pub(crate) use elements::for_each_kind;
+pub use elements::{ElementList, ElementLists};
 pub(crate) use numbering::Numbering;
-pub(crate) use parts::Part;
-pub(crate) use tets::TetBlock;
-pub use tets::{Tet, TetSet};
 
 pub use crate::material::MaterialConstants;
 
-use crate::elements::law::LAWS;
 use crate::material::MaterialModel;
-use crate::scalar::lanes::LANES;
-use crate::scalar::{Real, Vec3};
+use crate::mesh::{edge_matrix, tet_volume};
+use crate::scalar::{Mat3, Real, Vec3};
 
 /// Why a model cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -93,6 +85,21 @@ pub struct Body {
     pub tets: Range<usize>,
 }
 
+/// One tetrahedron, as [`Model::tets`] shows it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tet<S> {
+    /// Its vertices.
+    pub vertices: [u32; 4],
+    /// `Dm^-1` [1/m].
+    pub inverse_rest_shape: Mat3<S>,
+    /// Rest volume [m^3].
+    pub rest_volume: S,
+    /// Index into [`Model::materials`].
+    pub material: u32,
+    /// Its law of tissue.
+    pub law: MaterialModel,
+}
+
 /// Everything that does not move.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model<S> {
@@ -104,23 +111,24 @@ pub struct Model<S> {
     pub masses: Vec<S>,
     /// Materials in use.
     pub materials: Vec<MaterialConstants<S>>,
-    /// Tetrahedra of each law of tissue, in the order of [`MaterialModel::ALL`].
-    pub tet_sets: [TetSet<S>; LAWS],
+    /// Vertices of the tetrahedra, and the materials of each, shape [tet_count].
+    pub(crate) tet_vertices: Vec<[u32; 4]>,
+    pub(crate) tet_materials: Vec<u32>,
+    /// The law of each material.
+    pub(crate) laws: Vec<MaterialModel>,
+    /// Rest positions [m] as they were given: shapes are computed in double precision where they are asked for.
+    pub(crate) places: Vec<Vec3<f64>>,
     /// Springs, attachments: all elements that are no tetrahedra.
-    pub elements: ElementSets<S>,
+    pub elements: ElementLists<S>,
     /// Anchors of the elements that have one where nothing moves them [m], in the order in which they were added.
     pub rest_anchors: Vec<Vec3<S>>,
-    /// Number of colours.
-    pub color_count: usize,
-    /// The most constraints at one vertex.
-    pub largest_clique: usize,
-    /// Number of multipliers of all constraints, those of padding lanes included.
-    pub multiplier_count: usize,
-    pub(crate) numbering: Numbering,
-    /// Connected parts, in the solver's numbering: the order of their first vertices in the user's.
-    pub(crate) parts: Arc<[Part]>,
-    /// Copies of vertex `v`, in the solver's numbering, are `copy_offsets[v] .. copy_offsets[v + 1]`.
-    pub(crate) copy_offsets: Vec<u32>,
+    /// Differs from model to model: whoever keeps numbers of vertices, or constants, keeps this beside them, and
+    /// compares. Of two models of the same content it is the same.
+    pub(crate) revision: u64,
+    pub(crate) numbering: Arc<Numbering>,
+    /// The connected part of each vertex, and how many there are.
+    pub(crate) part_numbers: Vec<u32>,
+    pub(crate) part_count: usize,
 }
 
 impl<S: Real> Model<S> {
@@ -131,85 +139,111 @@ impl<S: Real> Model<S> {
 
     /// Number of tetrahedra of all bodies.
     pub fn tet_count(&self) -> usize {
-        self.tet_sets.iter().map(TetSet::len).sum()
+        self.tet_vertices.len()
     }
 
-    /// Number of copies that a sweep works on.
-    pub fn copy_count(&self) -> usize {
-        self.copy_offsets.last().map_or(0, |&count| count as usize)
+    /// The tetrahedra, in the user's order.
+    pub fn tets(&self) -> impl ExactSizeIterator<Item = Tet<S>> {
+        (0..self.tet_count()).map(|i| self.tet(i))
     }
 
-    /// True where a vertex has more than one copy.
-    pub fn is_split(&self) -> bool {
-        self.copy_count() > self.vertex_count()
+    /// Number `i` of [`Model::tets`].
+    pub(crate) fn tet(&self, i: usize) -> Tet<S> {
+        let vertices = self.tet_vertices[i];
+        let corners = vertices.map(|v| self.places[v as usize]);
+        let material = self.tet_materials[i];
+        Tet {
+            vertices,
+            inverse_rest_shape: edge_matrix(corners).inverse().cast(),
+            rest_volume: S::from_f64(tet_volume(corners)),
+            material,
+            law: self.laws[material as usize],
+        }
     }
 
-    /// Number of connected parts: tetrahedra and springs connect vertices.
+    /// Number of connected parts: elements connect vertices.
     pub fn part_count(&self) -> usize {
-        self.parts.len()
+        self.part_count
     }
 
-    /// The number of the part that one of the user's vertices belongs to.
+    /// The number of the part that a vertex belongs to.
     pub fn part_of(&self, vertex: u32) -> usize {
-        self.part_at(self.numbering.of(vertex))
+        self.part_numbers[vertex as usize] as usize
     }
 
-    /// As [`Model::part_of`], of one of the solver's vertices.
-    pub(crate) fn part_at(&self, v: usize) -> usize {
-        self.parts.partition_point(|part| part.vertices.end <= v)
+    /// See [`Model::revision`]: 64 bits of FNV-1a of everything, word by word.
+    fn fingerprint(&self) -> u64 {
+        let mut hash = 0xcbf2_9ce4_8422_2325u64;
+        let mut add =
+            |number: u64| hash = (hash ^ number).wrapping_mul(0x0100_0000_01b3).rotate_left(29);
+        for count in [self.bodies.len(), self.masses.len(), self.materials.len(), self.tet_count()]
+        {
+            add(count as u64);
+        }
+        let add_all = |add: &mut dyn FnMut(u64), values: &[S]| {
+            values.iter().for_each(|value| add(value.to_f64().to_bits()));
+        };
+        for x in self.rest_positions.iter().chain(&self.rest_anchors) {
+            add_all(&mut add, &x.to_array());
+        }
+        add_all(&mut add, &self.masses);
+        for material in &self.materials {
+            let MaterialConstants { lame_lambda, lame_mu, viscosity, .. } = *material;
+            add_all(&mut add, &[lame_lambda, lame_mu, viscosity]);
+        }
+        for (vertices, &material) in self.tet_vertices.iter().zip(&self.tet_materials) {
+            add(material.into());
+            vertices.iter().for_each(|&v| add(v.into()));
+        }
+        self.laws.iter().for_each(|&law| add(law as u64));
+        for x in &self.places {
+            x.to_array().into_iter().for_each(|value| add(value.to_bits()));
+        }
+        for_each_kind!(self, list => {
+            add(list.len() as u64);
+            list.vertices.as_flattened().iter().for_each(|&v| add(v.into()));
+            list.anchors.iter().for_each(|&anchor| add(anchor.into()));
+            add_all(&mut add, list.constants.as_flattened());
+        });
+        hash
     }
 
-    /// The tetrahedra of one law.
-    pub fn tets_of(&self, law: MaterialModel) -> &TetSet<S> {
-        &self.tet_sets[law as usize]
+    /// Whether nobody has changed it since.
+    pub(crate) fn is_as_built(&self) -> bool {
+        self.fingerprint() == self.revision
     }
 
-    /// Whether any tetrahedron is viscous.
-    pub fn is_viscous(&self) -> bool {
-        self.tet_sets.iter().any(|set| set.viscous)
-    }
-
-    /// Blocks of all laws.
-    pub(crate) fn block_count(&self) -> usize {
-        self.tet_sets.iter().map(TetSet::block_count).sum()
-    }
-
-    /// The tetrahedra of a set one by one, sorted by colour, with the user's numbers.
-    pub fn tets(&self, set: &TetSet<S>) -> impl Iterator<Item = Tet<S>> {
-        set.places().zip(&set.order).map(|((block, lane), &number)| {
-            let constants = &set.blocks[block];
-            let user = |v: u32| self.numbering.order[v as usize];
-            let count = set.form.multiplier_count();
-            Tet {
-                number: number as usize,
-                vertices: constants.vertices.map(|corner| user(corner[lane])),
-                copies: set.copies_of(block).map(|corner| corner[lane]),
-                inverse_rest_shape: constants.shape(lane),
-                rest_volume: constants.rest_volume[lane],
-                material: constants.material[lane] as usize,
-                color: set.color_offsets.partition_point(|&first| first as usize <= block) - 1,
-                first_multiplier: set.multiplier_offset + LANES * count * block + lane,
-            }
-        })
-    }
-
-    /// The copies of one of the user's vertices.
-    pub fn copies_of(&self, vertex: u32) -> Range<usize> {
-        let v = self.numbering.of(vertex);
-        self.copy_offsets[v] as usize..self.copy_offsets[v + 1] as usize
+    /// A model without vertices.
+    pub(crate) fn nothing() -> Self {
+        Self {
+            bodies: Vec::new(),
+            rest_positions: Vec::new(),
+            masses: Vec::new(),
+            materials: Vec::new(),
+            tet_vertices: Vec::new(),
+            tet_materials: Vec::new(),
+            laws: Vec::new(),
+            places: Vec::new(),
+            elements: ElementLists::new(&Default::default()),
+            rest_anchors: Vec::new(),
+            revision: 0,
+            numbering: Arc::default(),
+            part_numbers: Vec::new(),
+            part_count: 0,
+        }
     }
 
     /// Bytes of the arrays that grow with meshes, springs and attachments.
     pub fn bytes(&self) -> usize {
-        let sets: usize = self.tet_sets.iter().map(TetSet::bytes).sum();
-        sets + self.elements.bytes()
+        self.elements.bytes()
+            + size_of_val(&self.tet_vertices[..])
+            + size_of_val(&self.tet_materials[..])
+            + size_of_val(&self.places[..])
             + size_of_val(&self.rest_anchors[..])
             + size_of_val(&self.rest_positions[..])
             + size_of_val(&self.masses[..])
             + size_of_val(&self.numbering.order[..])
             + size_of_val(&self.numbering.rank[..])
-            + size_of_val(&self.parts[..])
-            + self.parts.iter().map(Part::bytes).sum::<usize>()
-            + size_of_val(&self.copy_offsets[..])
+            + size_of_val(&self.part_numbers[..])
     }
 }

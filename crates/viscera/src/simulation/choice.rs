@@ -22,7 +22,7 @@ impl<S: Real> Backend<S> {
         };
         match settings.device {
             DeviceRequest::Cpu => Ok(Self::cpu("as asked for")),
-            _ => gpu::choose(model, settings, sweeps),
+            _ => gpu::choose(model, solver, sweeps),
         }
     }
 

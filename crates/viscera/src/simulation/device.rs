@@ -34,7 +34,7 @@ pub(super) trait Elsewhere<S>: Debug + Send {
     /// Puts a state that fits the model in the place of the device's.
     fn write(&mut self, model: &Model<S>, state: &State<S>);
 
-    fn write_velocities(&mut self, model: &Model<S>, velocities: &[Vec3<S>]);
+    fn write_velocities(&mut self, velocities: &[Vec3<S>]);
 
     #[cfg(feature = "gpu")]
     fn solver(&self) -> &GpuSolver;

@@ -4,12 +4,13 @@ use std::any::Any;
 
 use super::device::{Backend, Elsewhere};
 use super::error::{FrameError, SimulationError};
+use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
 use crate::settings::{DeviceRequest, SolverSettings};
-use crate::solver::Inputs;
 use crate::solver::balance::ForceBalance;
 use crate::solver::gpu::{Adapter, Device, GpuError, GpuSolver, StepCost};
+use crate::solver::{Inputs, Solver};
 use crate::state::State;
 
 impl Elsewhere<f32> for GpuSolver {
@@ -50,8 +51,8 @@ impl Elsewhere<f32> for GpuSolver {
         debug_assert!(written.is_ok(), "{written:?}");
     }
 
-    fn write_velocities(&mut self, model: &Model<f32>, velocities: &[Vec3<f32>]) {
-        GpuSolver::write_velocities(self, model, velocities);
+    fn write_velocities(&mut self, velocities: &[Vec3<f32>]) {
+        GpuSolver::write_velocities(self, velocities);
     }
 
     fn solver(&self) -> &GpuSolver {
@@ -91,11 +92,13 @@ fn of_precision<S: Real>(backend: Backend<f32>) -> Result<Backend<S>, Simulation
 /// What the settings ask for, with so many sweeps per step. They do not ask for the CPU.
 pub(super) fn choose<S: Real>(
     model: &Model<S>,
-    settings: &SolverSettings,
+    solver: &Solver<S>,
     sweeps: u32,
 ) -> Result<Backend<S>, SimulationError> {
-    let model: &dyn Any = model;
-    let Some(model) = model.downcast_ref::<Model<f32>>() else {
+    let settings = solver.settings();
+    let (model, layout): (&dyn Any, &dyn Any) = (model, solver.layout());
+    let both = (model.downcast_ref::<Model<f32>>(), layout.downcast_ref::<Layout<f32>>());
+    let (Some(model), Some(layout)) = both else {
         return match settings.device {
             DeviceRequest::Auto => Ok(Backend::cpu("double precision")),
             _ => Err(GpuError::DoublePrecision.into()),
@@ -104,7 +107,7 @@ pub(super) fn choose<S: Real>(
     let chosen = match &settings.device {
         DeviceRequest::Named(name) => asked_for(Some(name), model, settings)?,
         DeviceRequest::Gpu => asked_for(None, model, settings)?,
-        _ => faster(model, settings, sweeps),
+        _ => faster(model, settings, &StepCost::new(layout, settings, sweeps)),
     };
     of_precision(chosen)
 }
@@ -118,8 +121,7 @@ fn asked_for(
 }
 
 /// The one that is expected to be faster, and the CPU where no device can do it.
-fn faster(model: &Model<f32>, settings: &SolverSettings, sweeps: u32) -> Backend<f32> {
-    let cost = StepCost::new(model, settings, sweeps);
+fn faster(model: &Model<f32>, settings: &SolverSettings, cost: &StepCost) -> Backend<f32> {
     let tets = grouped(model.tet_count() as u64);
     // Before any driver is loaded, which takes longer than a small scene.
     if !cost.gpu_pays() {

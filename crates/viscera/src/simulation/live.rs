@@ -149,7 +149,9 @@ impl<S: Real> Simulation<S> {
         // Constraints in the same order, which settings decide, go on with the multipliers they have.
         let order = |solver: &SolverSettings| (solver.colors, solver.neo_hookean, solver.rebase);
         let same_order = order(&self.scene.solver) == order(&fork.scene.solver);
-        if same_order && self.model.multiplier_count == fork.model.multiplier_count {
+        if same_order
+            && self.solver.layout().multiplier_count == fork.solver.layout().multiplier_count
+        {
             let kept = self.whole_state().multipliers;
             let kept = kept.into_iter().map(|l| T::from_f64(l.to_f64())).collect();
             let positions = std::mem::take(&mut fork.state.positions);
@@ -228,7 +230,7 @@ impl<S: Real> Simulation<S> {
                 builder.set_region_material(index, region.label, &region.material).map_err(set)?;
             }
         }
-        let model = builder.build::<S>(&scene.solver).map_err(SimulationError::from)?;
+        let model = builder.build::<S>().map_err(SimulationError::from)?;
         let mut solver = Solver::new(&model, &scene.solver);
         solver.use_instructions(self.solver.instructions());
         let same_device = scene.solver.device == self.scene.solver.device;

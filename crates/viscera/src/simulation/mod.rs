@@ -23,6 +23,7 @@ pub use live::Live;
 pub use rest::{RestReport, Standing};
 pub use saved::ResumeError;
 
+use crate::layout::Layout;
 use crate::measure::{
     DeformationSummary, Energies, TetMeasure, measure_energies, measure_tets, summarize_deformation,
 };
@@ -141,7 +142,7 @@ impl<S: Real> Simulation<S> {
         assembly: Assembly,
         choose: impl FnOnce(&Model<S>, &Solver<S>, f64) -> Result<Backend<S>, SimulationError>,
     ) -> Result<Self, SimulationError> {
-        let model = assembly.builder.build::<S>(&scene.solver)?;
+        let model = assembly.builder.build::<S>()?;
         let solver = Solver::new(&model, &scene.solver);
         let mut simulation = Self {
             state: State::at_rest(&model),
@@ -180,6 +181,11 @@ impl<S: Real> Simulation<S> {
     /// What does not move.
     pub fn model(&self) -> &Model<S> {
         &self.model
+    }
+
+    /// The model as the solver works on it.
+    pub fn layout(&self) -> &Layout<S> {
+        self.solver.layout()
     }
 
     /// What moves. Positions and velocities stay where they are in memory, as long as the simulation lives. Where a
@@ -263,7 +269,7 @@ impl<S: Real> Simulation<S> {
                 *velocity = *velocity * S::from_f64(factor);
             }
             if let Some(elsewhere) = &mut self.backend.elsewhere {
-                elsewhere.write_velocities(&self.model, &self.state.velocities);
+                elsewhere.write_velocities(&self.state.velocities);
             }
         }
         Ok(())

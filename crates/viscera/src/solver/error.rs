@@ -47,12 +47,10 @@ pub enum StepError {
         /// The input concerned.
         what: &'static str,
     },
-    /// The solver was built for a model that hangs together otherwise.
-    #[error(
-        "the model's connected parts are not those that the solver was built for; build another solver"
-    )]
-    OtherParts,
-    /// State, model and solver do not belong together.
+    /// The solver was built for another model.
+    #[error("the model is not the one that the solver was built for; build a solver for it")]
+    OtherModel,
+    /// State and model do not belong together.
     #[error("the {what} has {given} entries; the model needs {expected}")]
     Mismatch {
         /// The array concerned.

@@ -1,6 +1,7 @@
 //! What acts on a model from outside during a step, and whether it can.
 
 use super::error::StepError;
+use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
 use crate::state::State;
@@ -72,16 +73,16 @@ impl<S: Real> Inputs<S> {
         }
     }
 
-    /// Where the anchors of a model's attachments are, the user's order.
-    pub fn anchors_of<'a>(&'a self, model: &'a Model<S>) -> &'a [Vec3<S>] {
-        if self.anchors.is_empty() { &model.rest_anchors } else { &self.anchors }
+    /// Where anchors are that are at `at_rest` [m] where nothing moves them.
+    pub fn anchors_of<'a>(&'a self, at_rest: &'a [Vec3<S>]) -> &'a [Vec3<S>] {
+        if self.anchors.is_empty() { at_rest } else { &self.anchors }
     }
 }
 
 /// A step can be made with these inputs.
 pub(crate) fn check_step<S: Real>(
     dt: f64,
-    model: &Model<S>,
+    model: &Layout<S>,
     inputs: &Inputs<S>,
 ) -> Result<(), StepError> {
     // Multipliers are forces times the squared step, so that the square must be a number too.
@@ -96,16 +97,22 @@ fn is_legal<S: Real>(tether: &Tether<S>) -> bool {
     tether.target.is_finite() && tether.stiffness >= S::ZERO && tether.stiffness.is_finite()
 }
 
-/// The state fits the model.
-pub(crate) fn check_state<S: Real>(model: &Model<S>, state: &State<S>) -> Result<(), StepError> {
+/// The model is the one that was laid out.
+pub(crate) fn check_model<S: Real>(layout: &Layout<S>, model: &Model<S>) -> Result<(), StepError> {
+    if layout.revision == model.revision { Ok(()) } else { Err(StepError::OtherModel) }
+}
+
+/// The state fits the model; at rest it has no multipliers yet.
+pub(crate) fn check_state<S: Real>(model: &Layout<S>, state: &State<S>) -> Result<(), StepError> {
     let vertex_count = model.vertex_count();
     let lengths = [
         ("list of positions", state.positions.len(), vertex_count),
         ("list of velocities", state.velocities.len(), vertex_count),
         ("list of multipliers", state.multipliers.len(), model.multiplier_count),
     ];
-    for (what, given, expected) in lengths {
-        if given != expected {
+    for (place, (what, given, expected)) in lengths.into_iter().enumerate() {
+        let is_none = place == 2 && given == 0;
+        if given != expected && !is_none {
             return Err(StepError::Mismatch { what, given, expected });
         }
     }
@@ -113,7 +120,10 @@ pub(crate) fn check_state<S: Real>(model: &Model<S>, state: &State<S>) -> Result
 }
 
 /// The inputs fit the model.
-pub(crate) fn check_inputs<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> Result<(), StepError> {
+pub(crate) fn check_inputs<S: Real>(
+    model: &Layout<S>,
+    inputs: &Inputs<S>,
+) -> Result<(), StepError> {
     let vertex_count = model.vertex_count();
     let expected = model.rest_anchors.len();
     if !inputs.anchors.is_empty() && inputs.anchors.len() != expected {

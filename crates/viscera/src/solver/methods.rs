@@ -2,13 +2,13 @@
 
 use super::plan::Plan;
 use super::{explicit, xpbd};
-use crate::model::Model;
+use crate::layout::Layout;
 use crate::scalar::Real;
 use crate::settings::{Method, SolverSettings};
 
 impl Plan {
     /// The stages that the settings ask for.
-    pub fn new<S: Real>(model: &Model<S>, settings: &SolverSettings) -> Self {
+    pub fn new<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Self {
         match settings.method {
             Method::Xpbd => xpbd::plan(model, settings),
             Method::Explicit => explicit::plan(),

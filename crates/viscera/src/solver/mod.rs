@@ -23,6 +23,9 @@ mod report;
 mod step;
 mod xpbd;
 
+use std::sync::Arc;
+
+use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
@@ -31,7 +34,7 @@ use crate::state::State;
 use cpu::precision::{Task, carry_out};
 pub use error::StepError;
 pub use inputs::{Inputs, Pin, Tether};
-use inputs::{check_inputs, check_state, check_step};
+use inputs::{check_inputs, check_model, check_state, check_step};
 use plan::Plan;
 pub use report::StepReport;
 pub use step::balance;
@@ -47,22 +50,41 @@ pub use xpbd::acceleration;
 pub struct Solver<S> {
     settings: SolverSettings,
     plan: Plan,
+    layout: Arc<Layout<S>>,
     memory: cpu::Memory<S>,
 }
 
 impl<S: Real> Solver<S> {
     /// Plans the steps and takes the memory for them.
     pub fn new(model: &Model<S>, settings: &SolverSettings) -> Self {
+        let layout = Layout::new(model, settings);
         Self {
             settings: settings.clone(),
-            plan: Plan::new(model, settings),
-            memory: cpu::Memory::new(model, settings),
+            plan: Plan::new(&layout, settings),
+            memory: cpu::Memory::new(&layout, settings),
+            layout: Arc::new(layout),
         }
     }
 
     /// The settings in force.
     pub fn settings(&self) -> &SolverSettings {
         &self.settings
+    }
+
+    /// The model as this solver works on it.
+    pub fn layout(&self) -> &Layout<S> {
+        &self.layout
+    }
+
+    /// The model at rest, with all the memory that a state needs: [`State::at_rest`] leaves room for multipliers to the
+    /// first step.
+    pub fn state_at_rest(&self) -> State<S> {
+        State {
+            positions: self.layout.rest_positions.clone(),
+            velocities: vec![Vec3::ZERO; self.layout.vertex_count()],
+            multipliers: vec![S::ZERO; self.layout.multiplier_count],
+            multiplier_dt: 0.0,
+        }
     }
 
     /// The stages of a step.
@@ -96,9 +118,10 @@ impl<S: Real> Solver<S> {
         mut watch: impl FnMut(u32, &[Vec3<f64>]) + Send,
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
-        let Self { settings, plan, memory } = self;
-        let repeat = memory.repeats(plan, model, inputs, dt)?;
-        let step = Step { model, inputs, dt, settings };
+        let Self { settings, plan, layout, memory } = self;
+        let repeat = memory.repeats(plan, layout, inputs, dt)?;
+        state.multipliers.resize(layout.multiplier_count, S::ZERO);
+        let step = Step { model: layout, inputs, dt, settings };
         carry_out(Task::Watched(plan, repeat, &mut watch), memory, &step, state);
         Ok(())
     }
@@ -119,9 +142,10 @@ impl<S: Real> Solver<S> {
         dt: f64,
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
-        let Self { settings, plan, memory } = self;
-        let repeat = memory.repeats(plan, model, inputs, dt)?;
-        let step = Step { model, inputs, dt, settings };
+        let Self { settings, plan, layout, memory } = self;
+        let repeat = memory.repeats(plan, layout, inputs, dt)?;
+        state.multipliers.resize(layout.multiplier_count, S::ZERO);
+        let step = Step { model: layout, inputs, dt, settings };
         carry_out(Task::Step(plan, repeat, count), memory, &step, state);
         Ok(())
     }
@@ -139,7 +163,8 @@ impl<S: Real> Solver<S> {
         dt: f64,
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
-        let step = Step { model, inputs, dt, settings: &self.settings };
+        state.multipliers.resize(self.layout.multiplier_count, S::ZERO);
+        let step = Step { model: &self.layout, inputs, dt, settings: &self.settings };
         carry_out(Task::Restart, &mut self.memory, &step, state);
         Ok(())
     }
@@ -151,9 +176,10 @@ impl<S: Real> Solver<S> {
         inputs: &Inputs<S>,
         dt: f64,
     ) -> Result<(), StepError> {
-        check_step(dt, model, inputs)?;
-        check_state(model, state)?;
-        self.memory.check(model)
+        check_model(&self.layout, model)?;
+        check_step(dt, &self.layout, inputs)?;
+        check_state(&self.layout, state)?;
+        Ok(())
     }
 
     /// Works with these instructions from now on, or with what the processor has of them. The bits of
@@ -175,7 +201,7 @@ impl<S: Real> Solver<S> {
 
     /// Bytes of the memory taken, model and state not included.
     pub fn bytes(&self) -> usize {
-        self.memory.bytes()
+        self.layout.bytes() + self.memory.bytes()
     }
 
     /// How many threads a step is done by.
@@ -210,10 +236,10 @@ impl<S: Real> Solver<S> {
         inputs: &Inputs<S>,
         balance: &mut balance::ForceBalance,
     ) -> Result<(), StepError> {
-        check_state(model, state)?;
-        check_inputs(model, inputs)?;
-        self.memory.check(model)?;
-        balance.measure(model, state, inputs, &self.memory.data.constants.end_of_step());
+        check_model(&self.layout, model)?;
+        check_state(&self.layout, state)?;
+        check_inputs(&self.layout, inputs)?;
+        balance.measure(&self.layout, state, inputs, &self.memory.data.constants.end_of_step());
         Ok(())
     }
 }

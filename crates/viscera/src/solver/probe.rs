@@ -4,9 +4,10 @@ use super::Inputs;
 use super::cpu::Memory;
 use super::step::data::Step;
 use super::step::stage::StepStage;
+use crate::layout::Layout;
 use crate::material::{Material, MaterialModel};
 use crate::mesh::shapes::Block;
-use crate::model::{Model, ModelBuilder};
+use crate::model::ModelBuilder;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Vec3, vec3};
 use crate::settings::{SolverSettings, Start};
@@ -17,7 +18,7 @@ pub(super) fn everything(
     settings: &SolverSettings,
     laws: [MaterialModel; 2],
     poisson: f64,
-) -> Model<f64> {
+) -> Layout<f64> {
     let mesh = Block::new(vec3(0.04, 0.02, 0.02), [2, 1, 1]).mesh().expect("a bar");
     let mut builder = ModelBuilder::new();
     for law in laws {
@@ -30,14 +31,18 @@ pub(super) fn everything(
         let anchor = mesh.vertices()[v as usize] + vec3(2e-3, 0.0, 1e-3);
         builder.add_attachment(v, anchor, 30.0).expect("an attachment");
     }
-    builder.build(settings).expect("a model")
+    Layout::new(&builder.build().expect("a model"), settings)
 }
 
 /// Memory that has begun a step from `places`, at rest there.
 pub(super) fn begun(step: &Step<'_, f64>, places: &[Vec3<f64>]) -> Memory<f64> {
     let mut memory = Memory::new(step.model, step.settings);
-    let mut state = State::at_rest(step.model);
-    state.positions.copy_from_slice(places);
+    let mut state = State {
+        positions: places.to_vec(),
+        velocities: vec![Vec3::ZERO; places.len()],
+        multipliers: vec![0.0; step.model.multiplier_count],
+        multiplier_dt: 0.0,
+    };
     for stage in
         [StepStage::ReadState, StepStage::MeasureStrain, StepStage::Predict(Start::Previous)]
     {
@@ -48,7 +53,7 @@ pub(super) fn begun(step: &Step<'_, f64>, places: &[Vec3<f64>]) -> Memory<f64> {
 
 /// A step of `dt` [s] in which nothing acts from outside.
 pub(super) fn quiet<'a>(
-    model: &'a Model<f64>,
+    model: &'a Layout<f64>,
     inputs: &'a Inputs<f64>,
     settings: &'a SolverSettings,
     dt: f64,

@@ -34,7 +34,7 @@ fn steps_of_two_threads_take_a_block_of_the_queue_now_and_then() {
     ] {
         let anderson_guard = AndersonGuard::Energy;
         let settings = SolverSettings { colors, acceleration, anderson_guard, ..base.clone() };
-        let model = single_body::<f32>(&mesh, &tissue, &settings);
+        let model = single_body::<f32>(&mesh, &tissue);
         let mut solver = Solver::new(&model, &settings);
         assert_eq!(solver.thread_count(), 2);
         let mut state = State::at_rest(&model);

@@ -5,6 +5,7 @@ use viscera::coloring::{Coloring, ConstraintGraph};
 use viscera::elements::{
     CornerLoad, TetForm, green_strain, neo_hookean_pair, neo_hookean_stretch, spring,
 };
+use viscera::layout::Layout;
 use viscera::material::MaterialModel;
 use viscera::mesh::io::read_tet_mesh;
 use viscera::mesh::shapes::{self, Block, LIVER_SPACING, Splitting};
@@ -201,10 +202,8 @@ fn twin_corners(graph: &ConstraintGraph, coloring: &Coloring) -> Option<(usize, 
 fn a_model_keeps_colors_copies_and_order() {
     for sample in samples() {
         for (wanted, tissue) in WANTED.into_iter().zip([STVK, SNH, STVK, SNH, STVK]) {
-            let model = sample
-                .builder(tissue)
-                .build::<f64>(&crate::common::colored(wanted))
-                .expect("a model");
+            let built = sample.builder(tissue).build::<f64>().expect("a model");
+            let model = Layout::new(&built, &crate::common::colored(wanted));
             let set = model.tets_of(tissue);
             let mut user = vec![None; model.copy_count()];
             let mut take = |color: usize, copies: &[u32], vertices: &[u32]| {
@@ -248,8 +247,8 @@ fn a_model_keeps_colors_copies_and_order() {
     }
 }
 
-/// One plain sweep from a shaken state: where it started, and the state after it.
-fn sweep(model: &Model<f64>, wanted: Colors) -> (Vec<Vec3<f64>>, State<f64>) {
+/// One plain sweep from a shaken state: where it started, the state after it, and the layout.
+fn sweep(model: &Model<f64>, wanted: Colors) -> (Vec<Vec3<f64>>, State<f64>, Layout<f64>) {
     let settings = SolverSettings { colors: wanted, start: Start::Previous, ..plain(1, 1) };
     let mut random = Random(3);
     let mut state = State::at_rest(model);
@@ -259,11 +258,11 @@ fn sweep(model: &Model<f64>, wanted: Colors) -> (Vec<Vec3<f64>>, State<f64>) {
     let start = state.positions.clone();
     let mut solver = Solver::new(model, &settings);
     solver.step(model, &mut state, &Inputs::default(), 1.0 / 60.0).expect("a legal step");
-    (start, state)
+    (start, state, solver.layout().clone())
 }
 
 /// `J^T l` at given positions, and the sum of the magnitudes added up, per vertex.
-fn loads(model: &Model<f64>, x: &[Vec3<f64>], l: &[f64]) -> Vec<(Vec3<f64>, f64)> {
+fn loads(model: &Layout<f64>, x: &[Vec3<f64>], l: &[f64]) -> Vec<(Vec3<f64>, f64)> {
     let mut sums = vec![(Vec3::ZERO, 0.0); x.len()];
     let mut add = |vertices: &[u32], loads: &[CornerLoad<f64>]| {
         for (&v, load) in vertices.iter().zip(loads) {
@@ -310,12 +309,9 @@ fn loads(model: &Model<f64>, x: &[Vec3<f64>], l: &[f64]) -> Vec<(Vec3<f64>, f64)
 fn the_mean_of_the_copies_answers_to_the_multipliers() {
     let sample = Sample::new("block", block([0.1, 0.05, 0.05], [4, 2, 2], 0.1));
     for tissue in [STVK, SNH] {
-        let model = sample
-            .builder(tissue)
-            .build::<f64>(&crate::common::colored(Colors::Limited(1)))
-            .expect("a model");
-        let (start, state) = sweep(&model, Colors::Limited(1));
-        let sums = loads(&model, &start, &state.multipliers);
+        let model = sample.builder(tissue).build::<f64>().expect("a model");
+        let (start, state, layout) = sweep(&model, Colors::Limited(1));
+        let sums = loads(&layout, &start, &state.multipliers);
         let (mut worst, mut largest) = (0.0f64, 0.0f64);
         for (v, (sum, magnitude)) in sums.into_iter().enumerate() {
             let mass = model.masses[v];
@@ -341,12 +337,8 @@ fn a_sweep_of_any_coloring_keeps_the_centre_of_mass() {
     let mesh = block([0.1, 0.05, 0.05], [4, 2, 2], 0.1);
     for tissue in [STVK, SNH] {
         for wanted in WANTED {
-            let model = crate::common::single_body::<f64>(
-                &mesh,
-                &material(tissue, 1e4, 0.4),
-                &crate::common::colored(wanted),
-            );
-            let (start, state) = sweep(&model, wanted);
+            let model = crate::common::single_body::<f64>(&mesh, &material(tissue, 1e4, 0.4));
+            let (start, state, _) = sweep(&model, wanted);
             let (mut shift, mut moved, mut size) = (Vec3::ZERO, 0.0, 0.0);
             for (v, &mass) in model.masses.iter().enumerate() {
                 let change = (state.positions[v] - start[v]) * mass;

@@ -2,6 +2,7 @@
 //! on every machine. What a caller sees is in the caller's order.
 
 use crate::common::{Random, SNH, STVK, block, colored, everything, material, single_body};
+use viscera::layout::Layout;
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::lanes::Instructions::{self, Avx2, Portable};
@@ -95,9 +96,10 @@ fn threads_and_instructions_leave_every_bit_of_a_large_body() {
         let mesh = block([0.08, 0.08, 0.08], [cells; 3], 0.2);
         let settings = colored(colors);
         let tissue = material(tissue, 1e4, 0.45).with_viscosity(viscosity).expect("legal");
-        let model = single_body::<f32>(&mesh, &tissue, &settings);
-        let shared = model.tet_count() / model.color_count / 8;
-        println!("{colors:?}: {} colours of about {shared} blocks", model.color_count);
+        let model = single_body::<f32>(&mesh, &tissue);
+        let count = Layout::new(&model, &settings).color_count;
+        let shared = model.tet_count() / count / 8;
+        println!("{colors:?}: {count} colours of about {shared} blocks");
         assert!(shared > 64, "{shared} blocks in a colour leave nothing to share");
         let rejected = same_bits(&model, &settings, &others, |step| wall_and_jumps(&mesh, step));
         assert!(rejected > 0, "{colors:?}: the guard has had nothing to do");
@@ -106,7 +108,7 @@ fn threads_and_instructions_leave_every_bit_of_a_large_body() {
 
 /// Both materials, viscous and not, springs, attachments, pins that move, several connected parts: the
 /// energies of single tetrahedra then count one by one.
-fn several_parts(settings: &SolverSettings) -> Model<f32> {
+fn several_parts() -> Model<f32> {
     let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
     let half = mesh.vertices().len() as u32;
     let mut builder = ModelBuilder::new();
@@ -122,7 +124,7 @@ fn several_parts(settings: &SolverSettings) -> Model<f32> {
         let anchor = mesh.vertices()[v as usize];
         builder.add_attachment(2 * half + v, anchor, 30.0).expect("an attachment");
     }
-    let model = builder.build(settings).expect("a model");
+    let model = builder.build().expect("a model");
     assert_eq!(model.part_count(), 3);
     model
 }
@@ -169,7 +171,7 @@ fn threads_and_instructions_leave_every_bit_of_several_parts() {
     ] {
         for colors in [Colors::Unlimited, Colors::Limited(4), Colors::Limited(1)] {
             let settings = SolverSettings { colors, ..settings.clone() };
-            let model = several_parts(&settings);
+            let model = several_parts();
             rejected += same_bits(&model, &settings, &others, |step| moving_pins(&model, step));
         }
     }
@@ -188,7 +190,7 @@ fn three_tetrahedra_run_with_any_number_of_threads() {
     for colors in [Colors::Unlimited, Colors::Limited(1)] {
         for tissue in [STVK, SNH] {
             let settings = colored(colors);
-            let model = single_body::<f32>(&mesh, &material(tissue, 1e4, 0.4), &settings);
+            let model = single_body::<f32>(&mesh, &material(tissue, 1e4, 0.4));
             same_bits(&model, &settings, &[(2, Avx2), (8, Avx2), (8, Portable)], |_| Inputs {
                 gravity: vec3(0.0, 0.0, -9.81),
                 pins: vec![Pin { vertex: 0, target: model.rest_positions[0] }],
@@ -268,7 +270,7 @@ fn the_order_of_vertices_changes_nothing() {
     let settings = SolverSettings::default();
     let tissue = material(SNH, 1e4, 0.45).with_viscosity(0.01).expect("legal");
     let run = |mesh: &TetMesh| {
-        let model = single_body::<f32>(mesh, &tissue, &settings);
+        let model = single_body::<f32>(mesh, &tissue);
         run(&model, &settings, (1, Avx2), &|step| {
             let mut inputs = wall_and_jumps(mesh, 0);
             inputs.pins.retain(|pin| pin.target.y > 1e-3);
@@ -301,14 +303,10 @@ fn everything_seen_is_in_the_callers_order() {
     for v in held {
         builder.add_attachment(v, mesh.vertices()[v as usize], 1e4).expect("an attachment");
     }
-    let model: Model<f32> = builder.build(&settings).expect("a model");
+    let model: Model<f32> = builder.build().expect("a model");
     let rest: Vec<Vec3<f32>> = mesh.vertices().iter().map(|x| x.cast()).collect();
     assert_eq!(model.rest_positions, rest);
-    for set in &model.tet_sets {
-        for tet in model.tets(set) {
-            assert_eq!(tet.vertices, mesh.tets()[tet.number]);
-        }
-    }
+    assert!(model.tets().map(|tet| tet.vertices).eq(mesh.tets().iter().copied()));
 
     // One short step: whatever acts has hardly reached the neighbours.
     let step = |inputs: Inputs<f32>| {
@@ -351,7 +349,7 @@ fn largest(count: usize, wanted: usize, value: impl Fn(usize) -> f64) -> Vec<usi
 
 #[test]
 fn a_new_history_has_the_same_bits() {
-    let model = everything::<f32>(Colors::Limited(4));
+    let model = everything::<f32>();
     let restarted = |threads: u32, instructions| {
         let threads = Threads::Count(threads);
         let settings = SolverSettings { threads, ..colored(Colors::Limited(4)) };

@@ -41,7 +41,7 @@ fn no_step_gains_mechanical_energy() {
         let mut grown = [0, 0];
         for step_guard in [true, false] {
             let settings = SolverSettings { colors, step_guard, ..SolverSettings::default() };
-            let model = single_body::<f64>(&mesh, &material(SNH, 4e5, 0.45), &settings);
+            let model = single_body::<f64>(&mesh, &material(SNH, 4e5, 0.45));
             let mut inputs = Inputs { gravity: GRAVITY, ..Inputs::default() };
             for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
                 inputs.pins.push(Pin { vertex: v as u32, target: *x });
@@ -72,7 +72,7 @@ fn no_step_gains_mechanical_energy() {
 fn no_step_gains_the_energy_that_tethers_store() {
     let mesh = block([0.08, 0.02, 0.02], [12, 3, 3], 0.2);
     let settings = SolverSettings::default();
-    let model = single_body::<f64>(&mesh, &material(SNH, 4e5, 0.45), &settings);
+    let model = single_body::<f64>(&mesh, &material(SNH, 4e5, 0.45));
     let mut inputs = Inputs { gravity: GRAVITY, ..Inputs::default() };
     for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
         // Stretched by a millimetre: they pull from the start.
@@ -101,7 +101,7 @@ fn the_limit_leaves_well_solved_steps_alone() {
     for retardation in [0.0, 0.01, 0.05] {
         let tissue = material(SNH, 1e4, 0.45).with_viscosity(retardation).expect("legal");
         let settings = SolverSettings { substeps: 4, iterations: 200, ..SolverSettings::default() };
-        let model = single_body::<f64>(&mesh, &tissue, &settings);
+        let model = single_body::<f64>(&mesh, &tissue);
         let mut run = Run::new(&model, &settings);
         let mut least = 1.0f64;
         for step in 1..=24 {

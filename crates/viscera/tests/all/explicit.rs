@@ -27,7 +27,7 @@ fn hanging(model: &Model<f64>) -> Inputs<f64> {
 fn a_wobbling_body_in_free_fall_keeps_its_momenta() {
     for law in [STVK, SNH] {
         let mesh = block([0.06, 0.04, 0.04], [3, 2, 2], 0.1);
-        let model = single_body::<f64>(&mesh, &material(law, 5e3, 0.4), &explicit());
+        let model = single_body::<f64>(&mesh, &material(law, 5e3, 0.4));
         let mut state = State::at_rest(&model);
         for (v, x) in state.velocities.iter_mut().zip(&model.rest_positions) {
             *v = vec3(2.0 * x.y, -3.0 * x.z, 4.0 * x.x);
@@ -61,7 +61,7 @@ fn energy_stays_in_a_band_that_narrows_with_the_step() {
     let mut bands = Vec::new();
     for explicit_safety in [0.9, 0.45] {
         let settings = SolverSettings { explicit_safety, ..explicit() };
-        let model = single_body::<f64>(&mesh, &material(SNH, 2e4, 0.4), &settings);
+        let model = single_body::<f64>(&mesh, &material(SNH, 2e4, 0.4));
         let inputs = hanging(&model);
         let mut state = State::at_rest(&model);
         let mut solver = Solver::new(&model, &settings);
@@ -88,7 +88,7 @@ fn energy_stays_in_a_band_that_narrows_with_the_step() {
 #[test]
 fn xpbd_with_small_substeps_moves_alike() {
     let mesh = block([0.06, 0.02, 0.02], [4, 1, 1], 0.0);
-    let model = single_body::<f64>(&mesh, &material(SNH, 2e4, 0.4), &explicit());
+    let model = single_body::<f64>(&mesh, &material(SNH, 2e4, 0.4));
     let inputs = hanging(&model);
     let path = |settings: &SolverSettings, substeps: u32| {
         let mut state = State::at_rest(&model);
@@ -126,7 +126,7 @@ fn viscous_tissue_comes_to_the_right_rest() {
     let mesh = block([0.06, 0.02, 0.02], [4, 1, 1], 0.0);
     for law in [STVK, SNH] {
         let tissue = material(law, 2e4, 0.4).with_viscosity(0.05).expect("a legal viscosity");
-        let model = single_body::<f64>(&mesh, &tissue, &explicit());
+        let model = single_body::<f64>(&mesh, &tissue);
         let mut inputs = hanging(&model);
         inputs.forces.push((model.vertex_count() as u32 - 1, vec3(0.0, 0.01, 0.0)));
         let rest = |settings: &SolverSettings, steps: u32, dt: f64| {
@@ -153,7 +153,7 @@ fn viscous_tissue_comes_to_the_right_rest() {
 #[test]
 fn too_many_small_steps_are_refused() {
     let mesh = block([3e-5, 1e-5, 1e-5], [3, 1, 1], 0.0);
-    let model = single_body::<f64>(&mesh, &material(SNH, 1e9, 0.4), &explicit());
+    let model = single_body::<f64>(&mesh, &material(SNH, 1e9, 0.4));
     let mut state = State::at_rest(&model);
     let before = state.clone();
     let mut solver = Solver::new(&model, &explicit());

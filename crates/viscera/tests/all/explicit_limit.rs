@@ -59,7 +59,7 @@ fn limit(viscosity: f64, spring: f64) -> f64 {
 
 fn model(law: MaterialModel, viscosity: f64) -> Model<f64> {
     let tissue = material(law, YOUNG, POISSON).with_viscosity(viscosity).expect("legal");
-    single_body(&regular(), &tissue, &settings(1.0))
+    single_body(&regular(), &tissue)
 }
 
 fn settings(explicit_safety: f64) -> SolverSettings {

@@ -39,7 +39,7 @@ fn a_dropped_body_falls_with_gravity() {
         for (colors, step_guard) in [(ANY, false), (JACOBI, false), (ANY, true), (JACOBI, true)] {
             for start in [Start::Auto, Start::Inertial] {
                 let settings = SolverSettings { neo_hookean, step_guard, start, ..colored(colors) };
-                let model = single_body::<f64>(&mesh, &material(tissue, 1e4, 0.45), &settings);
+                let model = single_body::<f64>(&mesh, &material(tissue, 1e4, 0.45));
                 let share = share_of_fall(&mut Run::new(&model, &settings), 10);
                 println!(
                     "{tissue:?} {neo_hookean:?} {colors:?} {start:?}, guard {step_guard}: falls \
@@ -62,7 +62,7 @@ fn a_dropped_body_falls_with_gravity() {
 /// Steps of 1/600 s in free fall; returns how many of them are taken back.
 fn fall<S: Real>(settings: &SolverSettings, tissue: MaterialModel, steps: u32) -> u64 {
     let mesh = block([0.04, 0.02, 0.02], [4, 2, 2], 0.2);
-    let model = single_body::<S>(&mesh, &material(tissue, 1e4, 0.45), settings);
+    let model = single_body::<S>(&mesh, &material(tissue, 1e4, 0.45));
     let mut run = Run::new(&model, settings);
     run.dt = 1.0 / 600.0;
     let inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81).cast(), ..Inputs::default() };

@@ -53,7 +53,7 @@ const LONG: Length = Length { tilts: &[0.0, 3.0, -6.0], steps: 30, moved: 1e-3 }
 /// how far things have moved.
 fn distances(device: &Device, settings: &SolverSettings, length: Length) -> [f64; 3] {
     let Length { tilts, steps, .. } = length;
-    let (model32, model64) = (everything(settings), everything(settings));
+    let (model32, model64) = (everything(), everything());
     let double = SolverSettings { precision: Precision::F64, ..settings.clone() };
     let mut cpu = Solver::<f32>::new(&model32, settings);
     let mut oracle = Solver::<f64>::new(&model64, &double);
@@ -198,7 +198,7 @@ fn accelerations_agree_with_the_cpu_at_length() {
 
 /// The bits of everything that moves after some steps.
 fn bits(model: &Model<f32>, gpu: &mut GpuSolver, steps: u32) -> Vec<u32> {
-    let double: Model<f64> = everything(gpu.settings());
+    let double: Model<f64> = everything();
     for step in 0..steps {
         gpu.step(model, &inputs_at(&double, step), DT).expect("a legal step");
     }
@@ -215,7 +215,7 @@ fn assert_same_bits_again(runs: usize, steps: u32) {
         acceleration: Acceleration::Anderson,
         ..SolverSettings::default()
     };
-    let model = everything(&settings);
+    let model = everything();
     let run = |left_over: Option<f32>, steps| {
         let gpu = match left_over {
             None => GpuSolver::new(device(), &model, &settings),
@@ -225,7 +225,7 @@ fn assert_same_bits_again(runs: usize, steps: u32) {
     };
     let first = run(None, steps);
     let other = SolverSettings::default();
-    let other_model = everything(&other);
+    let other_model = everything();
     let mut another = GpuSolver::new(device(), &other_model, &other).expect("a model that fits");
     for again in 1..runs {
         if again == runs / 2 {
@@ -261,7 +261,7 @@ fn dispatches_of_an_iteration_are_few() {
     builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
     for (acceleration, most) in [(Acceleration::None, 2), (Acceleration::Anderson, 4)] {
         let settings = SolverSettings { acceleration, ..jacobi.clone() };
-        let model = builder.build(&settings).expect("a model");
+        let model = builder.build().expect("a model");
         let gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
         let [before, iteration, after] = gpu.dispatches();
         println!("{acceleration:?}: {before} + {iteration} per iteration + {after}");
@@ -275,7 +275,7 @@ fn dispatches_of_an_iteration_are_few() {
 fn iterations_can_be_set_from_step_to_step() {
     let ends = [5, 2].map(|built_with| {
         let settings = SolverSettings { iterations: built_with, ..SolverSettings::default() };
-        let (model, double) = (everything(&settings), everything(&settings));
+        let (model, double) = (everything(), everything());
         let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
         gpu.set_iterations(5);
         gpu.step(&model, &inputs_at(&double, 0), DT).expect("a legal step");
@@ -289,7 +289,7 @@ fn iterations_can_be_set_from_step_to_step() {
 /// Frames come while steps go on; none is older than the one before it.
 fn assert_frames_arrive(steps: u32) {
     let settings = SolverSettings::default();
-    let (model, double) = (everything(&settings), everything(&settings));
+    let (model, double) = (everything(), everything());
     let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
     let (mut seen, mut refused) = (Vec::new(), 0);
     for step in 0..steps {
@@ -330,7 +330,7 @@ fn a_device_below_the_baseline_is_refused() {
     let settings = SolverSettings::default();
     let weak =
         device_within(wgpu::Limits { max_storage_buffers_per_shader_stage: 4, ..baseline() });
-    let error = GpuSolver::new(&weak, &everything(&settings), &settings).expect_err("too weak");
+    let error = GpuSolver::new(&weak, &everything(), &settings).expect_err("too weak");
     let text = error.to_string();
     assert!(text.contains("4 where 8 is needed") && text.contains("cpu"), "{text}");
 }
@@ -341,7 +341,7 @@ fn a_model_over_the_limits_is_refused() {
     let settings = SolverSettings::default();
     let limits = wgpu::Limits { max_storage_buffer_binding_size: 1 << 13, ..baseline() };
     let small = device_within(limits);
-    let error = GpuSolver::new(&small, &everything(&settings), &settings).expect_err("too large");
+    let error = GpuSolver::new(&small, &everything(), &settings).expect_err("too large");
     let text = error.to_string();
     println!("{text}");
     assert!(text.contains("binds at most 8192") && text.contains("or fewer"), "{text}");
@@ -359,7 +359,7 @@ fn assert_hands_change(iterations: u32, before: u32) {
         (Colors::Unlimited, &guarded),
     ] {
         let settings = SolverSettings { colors, ..settings.clone() };
-        let (model, double) = (everything(&settings), everything(&settings));
+        let (model, double) = (everything(), everything());
         let mut cpu = Solver::<f32>::new(&model, &settings);
         let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
         // Something is under way when the step begins.
@@ -407,12 +407,12 @@ fn a_step_changes_hands_at_any_stage_at_length() {
 #[test]
 fn another_model_is_refused() {
     let settings = SolverSettings::default();
-    let model = everything(&settings);
+    let model = everything();
     let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
     let mut builder = ModelBuilder::new();
     let mesh = block([0.06, 0.03, 0.03], [9, 5, 5], 0.1);
     builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
-    let other = builder.build::<f32>(&settings).expect("a model");
+    let other = builder.build::<f32>().expect("a model");
     let mut state = State::at_rest(&other);
     assert!(gpu.step(&other, &Inputs::default(), DT).is_err());
     assert!(gpu.restart(&other, &Inputs::default(), DT).is_err());
@@ -436,7 +436,7 @@ fn small_soft_tetrahedra_are_joined_as_any_others() {
     let models = |_: ()| {
         let mut builder = ModelBuilder::new();
         builder.add_body(&mesh, &material(STVK, 500.0, 0.3)).expect("a body");
-        (builder.build::<f32>(&settings).expect("a model"), builder.build::<f64>(&settings))
+        (builder.build::<f32>().expect("a model"), builder.build::<f64>())
     };
     let (model, double) = models(());
     let double: Model<f64> = double.expect("a model");

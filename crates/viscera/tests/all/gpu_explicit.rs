@@ -43,7 +43,7 @@ fn inputs_at<S: Real>(model: &Model<f64>, step: u32) -> Inputs<S> {
 }
 
 fn run_on(device: &Device, settings: &SolverSettings, steps: u32) -> State<f32> {
-    let (model, model64) = (everything(settings), everything(settings));
+    let (model, model64) = (everything(), everything());
     let mut gpu = GpuSolver::new(device, &model, settings).expect("a model that fits");
     for step in 0..steps {
         gpu.step(&model, &inputs_at(&model64, step), DT).expect("a legal step");
@@ -54,7 +54,7 @@ fn run_on(device: &Device, settings: &SolverSettings, steps: u32) -> State<f32> 
 }
 
 fn run<S: Real>(settings: &SolverSettings, steps: u32) -> State<S> {
-    let (model, model64) = (everything::<S>(settings), everything(settings));
+    let (model, model64) = (everything::<S>(), everything());
     let mut solver = Solver::new(&model, settings);
     let mut state = State::at_rest(&model);
     for step in 0..steps {
@@ -102,7 +102,7 @@ fn two_runs_have_the_same_bits() {
 #[test]
 fn a_small_step_is_two_dispatches() {
     let settings = explicit(Colors::Unlimited);
-    let model = everything(&settings);
+    let model = everything();
     let gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");
     assert_eq!(gpu.dispatches()[1], 2);
     let cpu = Solver::new(&model, &settings);
@@ -116,9 +116,9 @@ fn a_small_step_is_two_dispatches() {
 fn too_many_small_steps_are_refused() {
     let settings = explicit(Colors::Unlimited);
     let mesh = block([3e-5, 1e-5, 1e-5], [3, 1, 1], 0.0);
-    let model = single_body::<f32>(&mesh, &material(SNH, 1e9, 0.4), &settings);
+    let model = single_body::<f32>(&mesh, &material(SNH, 1e9, 0.4));
     let mut gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");
-    let mut before = State::at_rest(&model);
+    let mut before = Solver::new(&model, &settings).state_at_rest();
     before.velocities.fill(vec3(1.0, 2.0, 3.0));
     gpu.write(&model, &before).expect("a state of this model");
     let error = gpu.step(&model, &Inputs::default(), 1.0 / 60.0);

@@ -91,7 +91,7 @@ impl<'a> Trio<'a> {
 
 /// Two bars joined by springs, one of them viscous and in attachments; one that is pinned, of three
 /// pieces; one that nothing holds: three parts, four materials.
-fn many_parts<S: Real>(settings: &SolverSettings) -> (Model<S>, Vec<Vec3<f64>>) {
+fn many_parts<S: Real>() -> (Model<S>, Vec<Vec3<f64>>) {
     let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
     let large = block([0.06, 0.03, 0.03], [8, 5, 5], 0.1);
     let viscous = material(SNH, 1e4, 0.4).with_viscosity(0.05).expect("legal");
@@ -116,7 +116,7 @@ fn many_parts<S: Real>(settings: &SolverSettings) -> (Model<S>, Vec<Vec3<f64>>) 
         let anchor = places[(half + v) as usize];
         builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
     }
-    let model = builder.build(settings).expect("a model");
+    let model = builder.build().expect("a model");
     assert_eq!(model.part_count(), 3);
     (model, places)
 }
@@ -148,8 +148,8 @@ fn assert_quiet_motion_agrees(steps: u32) {
         ("residual", anderson.clone()),
         ("energy", SolverSettings { anderson_guard: AndersonGuard::Energy, ..anderson }),
     ] {
-        let (model32, places) = many_parts::<f32>(&settings);
-        let (model64, _) = many_parts::<f64>(&settings);
+        let (model32, places) = many_parts::<f32>();
+        let (model64, _) = many_parts::<f64>();
         let mut trio = Trio::new(device, (&model32, &model64), &settings);
         let mut slowed = [0, 0];
         for step in 0..steps {
@@ -209,8 +209,8 @@ fn assert_grabs_are_taken_back(steps: u32, comes_to_rest: bool) {
         (2, SNH, energy, false),
     ] {
         let tissue = material(law, 1e4, 0.45);
-        let model32 = single_body::<f32>(&mesh, &tissue, &settings);
-        let model64 = single_body::<f64>(&mesh, &tissue, &settings);
+        let model32 = single_body::<f32>(&mesh, &tissue);
+        let model64 = single_body::<f64>(&mesh, &tissue);
         let mut trio = Trio::new(device, (&model32, &model64), &settings);
         let mut random = Random(seed);
         let mut inputs = Inputs { gravity: GRAVITY, ..Inputs::default() };
@@ -268,8 +268,8 @@ fn portable_jumps_are_taken_back() {
     let mesh = block([0.04, 0.02, 0.02], [2, 1, 1], 0.1);
     let settings = SolverSettings::default();
     let tissue = material(STVK, 1e4, 0.45);
-    let model32 = single_body::<f32>(&mesh, &tissue, &settings);
-    let model64 = single_body::<f64>(&mesh, &tissue, &settings);
+    let model32 = single_body::<f32>(&mesh, &tissue);
+    let model64 = single_body::<f64>(&mesh, &tissue);
     // Chosen for what they lead to on the CPU.
     for seed in [0, 1] {
         let mut trio = Trio::new(device(), (&model32, &model64), &settings);
@@ -310,7 +310,7 @@ fn portable_limit_that_is_no_number_lets_nothing_pass() {
     builder.add_body(&mesh, &material(SNH, 1e4, 0.3)).expect("a body");
     // One part, whose energies are added up.
     builder.add_spring([0, count as u32], 1e-9, None).expect("a spring");
-    let model = builder.build::<f32>(&settings).expect("a model");
+    let model = builder.build::<f32>().expect("a model");
     // The first body so large that its energy overflows, also where it is going to: an infinite limit. So is
     // the second at last, and it is to be pulled apart so far that its volumes overflow, with either sign.
     let mut random = Random(1);
@@ -366,7 +366,7 @@ fn assert_no_step_gains_energy(cells: [usize; 3], steps: u32) {
     let mut noise = 0.0;
     for (grown, step_guard) in grown.iter_mut().zip([true, false]) {
         let settings = SolverSettings { step_guard, ..SolverSettings::default() };
-        let model = single_body::<f32>(&mesh, &material(SNH, 4e5, 0.45), &settings);
+        let model = single_body::<f32>(&mesh, &material(SNH, 4e5, 0.45));
         let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
         let mut state = State::at_rest(&model);
         let mut before = mechanical_energy(&model, &state, &inputs);
@@ -403,7 +403,7 @@ fn no_step_gains_mechanical_energy_at_length() {
 fn two_runs_have_the_same_bits() {
     let device = device();
     let settings = SolverSettings::default();
-    let (model, places) = many_parts::<f32>(&settings);
+    let (model, places) = many_parts::<f32>();
     let run = || {
         let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
         for step in 0..8 {

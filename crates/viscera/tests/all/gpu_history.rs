@@ -4,6 +4,7 @@
 use crate::common::Random;
 use crate::common::device;
 use crate::common::device::everything;
+use viscera::layout::Layout;
 use viscera::model::Model;
 use viscera::scalar::{Real, vec3};
 use viscera::settings::{Colors, NeoHookean, SolverSettings};
@@ -27,9 +28,14 @@ fn without_sweeps(neo_hookean: NeoHookean) -> SolverSettings {
 }
 
 /// Scrambled, moving, with multipliers of some history, but for fillings, which have none. The numbers are of single precision.
-fn scrambled(model: &Model<f32>) -> State<f32> {
+fn scrambled(model: &Layout<f32>) -> State<f32> {
     let mut random = Random(11);
-    let mut state = State::at_rest(model);
+    let mut state = State {
+        positions: model.rest_positions.clone(),
+        velocities: vec![viscera::scalar::Vec3::ZERO; model.vertex_count()],
+        multipliers: vec![0.0; model.multiplier_count],
+        multiplier_dt: 0.0,
+    };
     for (x, v) in state.positions.iter_mut().zip(&mut state.velocities) {
         *x += random.vector(0.002).cast();
         *v = random.vector(0.1).cast();
@@ -58,7 +64,7 @@ fn in_double(state: &State<f32>) -> State<f64> {
 
 /// The device's multipliers of each kind of constraint may be twice as far from double precision as the
 /// processor's, by their norm.
-fn compare(model: &Model<f32>, cpu: &State<f32>, gpu: &State<f32>, oracle: &State<f64>) {
+fn compare(model: &Layout<f32>, cpu: &State<f32>, gpu: &State<f32>, oracle: &State<f64>) {
     assert_eq!(gpu.multiplier_dt, cpu.multiplier_dt);
     let (springs, held) =
         (model.elements.springs.multiplier_offset, model.elements.attachments.multiplier_offset);
@@ -88,8 +94,9 @@ fn compare(model: &Model<f32>, cpu: &State<f32>, gpu: &State<f32>, oracle: &Stat
 
 /// A step with a multiplier that is no number: repaired as on the CPU.
 fn assert_repair(settings: &SolverSettings, broken: f32, place: usize) {
-    let (model, model64) = (everything(settings), everything(settings));
-    let mut state = scrambled(&model);
+    let (model, model64) = (everything(), everything());
+    let layout = Layout::new(&model, settings);
+    let mut state = scrambled(&layout);
     state.multipliers[place] = broken;
     let mut gpu = GpuSolver::new(device::device(), &model, settings).expect("a model that fits");
     gpu.write(&model, &state).expect("a state of this model");
@@ -102,7 +109,7 @@ fn assert_repair(settings: &SolverSettings, broken: f32, place: usize) {
     let mut read = State::at_rest(&model);
     gpu.read(&model, &mut read).expect("a device");
     assert!(read.multipliers.iter().all(|l| l.is_finite()), "{broken} at {place}");
-    compare(&model, &cpu, &read, &oracle);
+    compare(&layout, &cpu, &read, &oracle);
 }
 
 #[test]
@@ -113,7 +120,7 @@ fn multipliers_that_are_no_numbers_start_a_new_history() {
         (NeoHookean::Stretch, Colors::Limited(1)),
     ] {
         let settings = SolverSettings { colors, ..without_sweeps(neo_hookean) };
-        let last = everything::<f32>(&settings).multiplier_count - 1;
+        let last = Layout::new(&everything::<f32>(), &settings).multiplier_count - 1;
         for (broken, place) in [(f32::NAN, 0), (f32::INFINITY, last), (f32::NEG_INFINITY, last / 2)]
         {
             assert_repair(&settings, broken, place);
@@ -133,9 +140,10 @@ fn portable_repair_starts_a_new_history() {
 fn fillings_are_repaired_and_numbers_are_left_alone() {
     let device = device::device();
     let settings = without_sweeps(NeoHookean::Stretch);
-    let model = everything(&settings);
+    let model = everything();
+    let layout = Layout::new(&model, &settings);
     let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
-    let mut state = scrambled(&model);
+    let mut state = scrambled(&layout);
     state.multipliers[5] = f32::MAX;
     gpu.write(&model, &state).expect("a state of this model");
     let mut read = State::at_rest(&model);
@@ -149,7 +157,7 @@ fn fillings_are_repaired_and_numbers_are_left_alone() {
     let mut solver = Solver::new(&model, &settings);
     solver.restart(&model, &mut fresh, &inputs(&model), DT).expect("a new history");
     let filling = fresh.multipliers.iter().position(|&l| l == 0.0).expect("a filling");
-    assert!(filling < 48 * model.tet_sets[0].block_count());
+    assert!(filling < 48 * layout.tet_sets[0].block_count());
     state.multipliers[filling] = f32::NAN;
     gpu.write(&model, &state).expect("a state of this model");
     gpu.step(&model, &inputs(&model), DT).expect("a legal step");
@@ -164,8 +172,9 @@ fn a_restart_takes_the_multipliers_from_the_positions() {
     for neo_hookean in [NeoHookean::Stretch, NeoHookean::Pair] {
         let settings =
             SolverSettings { step_guard: false, neo_hookean, ..SolverSettings::default() };
-        let (model, model64) = (everything(&settings), everything(&settings));
-        let state = scrambled(&model);
+        let (model, model64) = (everything(), everything());
+        let layout = Layout::new(&model, &settings);
+        let state = scrambled(&layout);
         let (mut cpu, mut oracle) = (state.clone(), in_double(&state));
         let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
         gpu.write(&model, &state).expect("a state of this model");
@@ -178,7 +187,7 @@ fn a_restart_takes_the_multipliers_from_the_positions() {
         gpu.restart(&model, &inputs, half).expect("a new history");
         gpu.read(&model, &mut read).expect("a device");
         assert_eq!((&read.positions, &read.velocities), (&state.positions, &state.velocities));
-        compare_restart(&model, &cpu, &read, &oracle);
+        compare_restart(&layout, &cpu, &read, &oracle);
 
         // And goes on from there.
         for _ in 0..10 {
@@ -195,12 +204,12 @@ fn a_restart_takes_the_multipliers_from_the_positions() {
 }
 
 /// Where the viscous multipliers begin: in front of the springs', 48 for each block of eight.
-fn viscous_offset(model: &Model<f32>) -> usize {
+fn viscous_offset(model: &Layout<f32>) -> usize {
     model.elements.springs.multiplier_offset - 48 * model.tet_sets[1].block_count()
 }
 
 /// What is viscous has relaxed: zero in all precisions.
-fn compare_restart(model: &Model<f32>, cpu: &State<f32>, gpu: &State<f32>, oracle: &State<f64>) {
+fn compare_restart(model: &Layout<f32>, cpu: &State<f32>, gpu: &State<f32>, oracle: &State<f64>) {
     compare(model, cpu, gpu, oracle);
     let viscous = viscous_offset(model)..model.elements.springs.multiplier_offset;
     assert!(gpu.multipliers[viscous].iter().all(|&l| l == 0.0));
@@ -210,8 +219,9 @@ fn compare_restart(model: &Model<f32>, cpu: &State<f32>, gpu: &State<f32>, oracl
 fn two_repairs_have_the_same_bits() {
     let device = device::device();
     let settings = without_sweeps(NeoHookean::Stretch);
-    let model = everything(&settings);
-    let mut state = scrambled(&model);
+    let model = everything();
+    let layout = Layout::new(&model, &settings);
+    let mut state = scrambled(&layout);
     state.multipliers[3] = f32::NAN;
     let [a, b] = [0, 1].map(|_| {
         let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
@@ -228,10 +238,10 @@ fn two_repairs_have_the_same_bits() {
 /// repair starts a new history, and with time the body comes to the rest that it comes to anyway.
 fn assert_survival(rounds: u32, comes_to_rest: bool) {
     let settings = SolverSettings { iterations: 5, ..SolverSettings::default() };
-    let model = everything::<f32>(&settings);
+    let model = everything::<f32>();
     let inputs = inputs(&model);
     let mut gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");
-    let rest = State::at_rest(&model);
+    let rest = Solver::new(&model, &settings).state_at_rest();
     let ends = [false, true].map(|is_broken| {
         let mut state = rest.clone();
         if is_broken {

@@ -32,7 +32,7 @@ struct TakenBack {
 fn run(bodies: &[&Body], settings: &SolverSettings, steps: u32) -> Vec<(Vec<Moment>, TakenBack)> {
     let mut builder = ModelBuilder::new();
     bodies.iter().for_each(|body| body.add(&mut builder));
-    let model: Model<f32> = builder.build(settings).expect("a model");
+    let model: Model<f32> = builder.build().expect("a model");
     let mut gpu = GpuSolver::new(device(), &model, settings).expect("a model that fits");
     let mut cpu = Solver::new(&model, settings);
     let mut state = State::at_rest(&model);

@@ -280,7 +280,7 @@ fn the_estimate_of_a_step_counts_its_dispatches() {
         let gpu = simulation(&[overrides, &[("solver.device", "gpu")]].concat());
         let gpu = gpu.expect("a simulation");
         let settings: &SolverSettings = &gpu.scene().solver;
-        let cost = StepCost::new(gpu.model(), settings, settings.iterations);
+        let cost = StepCost::new(gpu.layout(), settings, settings.iterations);
         let solver = gpu.gpu().expect("a GPU");
         let [before, each, after] = solver.dispatches();
         let sent = before + settings.iterations as usize * each + after;
@@ -302,15 +302,15 @@ fn a_frame_reads_back_what_is_shown() {
     simulation.advance_frame().expect("a frame");
     let gpu = simulation.gpu().expect("it is there");
     let model = simulation.model();
-    let [frame, balance, whole] = gpu.bytes_read_back(model);
+    let [frame, balance, whole] = gpu.bytes_read_back();
     let vertices = model.vertex_count() as u64;
     println!("{frame} bytes a frame, {balance} for a force balance, {whole} the whole state");
     assert!((32 * vertices..32 * vertices + 256).contains(&frame), "{frame}");
-    assert!(whole > frame + 4 * model.multiplier_count as u64 - 256, "{whole}");
+    assert!(whole > frame + 4 * simulation.layout().multiplier_count as u64 - 256, "{whole}");
     // The caller may look at positions in the same place all the time.
     assert_eq!(simulation.state().positions.as_ptr(), places);
     // Those that stay are forces: they are there where they are asked for.
     let multipliers = gpu.multipliers(model).expect("a device");
-    assert_eq!(multipliers.len(), model.multiplier_count);
+    assert_eq!(multipliers.len(), simulation.layout().multiplier_count);
     assert!(multipliers.iter().any(|&l| l != 0.0) && multipliers.iter().all(|l| l.is_finite()));
 }

@@ -46,7 +46,7 @@ impl Bodies {
         for (mesh, law) in self.tets.iter().zip([STVK, SNH]) {
             builder.add_body(mesh, &material(law, 5e3, 0.3)).expect("a body");
         }
-        builder.build(&settings()).expect("a model")
+        builder.build().expect("a model")
     }
 
     fn skins<'a>(&'a self, model: &Model<f32>) -> [Skin<'a>; 2] {

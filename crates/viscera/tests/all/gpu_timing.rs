@@ -12,11 +12,11 @@ use viscera::state::State;
 
 const DT: f64 = 1.0 / 600.0;
 
-fn bar(settings: &SolverSettings) -> Model<f32> {
+fn bar() -> Model<f32> {
     let mut builder = ModelBuilder::new();
     let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
     builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
-    builder.build(settings).expect("a model")
+    builder.build().expect("a model")
 }
 
 /// The whole state, bit by bit.
@@ -43,7 +43,7 @@ fn timed_steps_are_ordinary_steps() {
     for (settings, dt) in
         [(SolverSettings::default(), DT), (anderson, DT), (one, DT), (explicit, 0.2)]
     {
-        let model = bar(&settings);
+        let model = bar();
         let inputs = Inputs { gravity: vec3(0.3, 0.0, -9.81), ..Inputs::default() };
         let make = || GpuSolver::new(device, &model, &settings).expect("a model that fits");
         let [mut plain, mut together, mut apart] = [make(), make(), make()];
@@ -80,7 +80,7 @@ fn timed_steps_are_ordinary_steps() {
 #[test]
 fn no_steps_take_no_time() {
     let settings = SolverSettings::default();
-    let model = bar(&settings);
+    let model = bar();
     let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
     let before = bits(&gpu, &model);
     assert_eq!(gpu.time_steps(&model, &Inputs::default(), DT, 0).expect("a device"), None);

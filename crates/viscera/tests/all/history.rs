@@ -2,10 +2,8 @@
 
 use crate::common::{Random, Run, everything};
 use viscera::scalar::{Real, vec3};
-use viscera::settings::{Colors, SolverSettings};
+use viscera::settings::SolverSettings;
 use viscera::solver::Inputs;
-
-const ANY: Colors = Colors::Unlimited;
 
 fn gravity<S: Real>() -> Inputs<S> {
     Inputs { gravity: vec3(0.0, 0.0, -9.81).cast(), ..Inputs::default() }
@@ -21,7 +19,7 @@ fn distance<S: Real>(a: &[S], b: &[S]) -> (f64, f64) {
 /// finds the same.
 #[test]
 fn a_new_history_of_a_settled_body_changes_nothing() {
-    let model = everything::<f64>(ANY);
+    let model = everything::<f64>();
     let settings = SolverSettings { substeps: 1, iterations: 10, ..SolverSettings::default() };
     let mut run = Run::new(&model, &settings);
     for _ in 0..120 {
@@ -42,7 +40,7 @@ fn a_new_history_of_a_settled_body_changes_nothing() {
 /// Every vertex is put somewhere else, a new history starts, and the body comes back to its rest.
 #[test]
 fn a_scrambled_body_returns_to_its_rest() {
-    let model = everything::<f32>(ANY);
+    let model = everything::<f32>();
     let mut run = Run::new(&model, &SolverSettings::default());
     let settle = |run: &mut Run<f32>| {
         for _ in 0..60 {
@@ -66,7 +64,7 @@ fn a_scrambled_body_returns_to_its_rest() {
 /// One multiplier that is no number would spread through its tetrahedra to all others.
 #[test]
 fn multipliers_that_are_no_numbers_start_a_new_history() {
-    let model = everything::<f32>(ANY);
+    let model = everything::<f32>();
     for broken in [f32::NAN, f32::INFINITY, f32::MAX] {
         let mut run = Run::new(&model, &SolverSettings::default());
         for _ in 0..60 {

@@ -10,18 +10,18 @@ use viscera::state::State;
 const FRAME: f64 = 1.0 / 60.0;
 
 /// A bar that is held at one end and starts to fall.
-fn bar(settings: &SolverSettings) -> (Model<f64>, Inputs<f64>) {
+fn bar() -> (Model<f64>, Inputs<f64>) {
     let mesh = block([0.2, 0.05, 0.05], [8, 2, 2], 0.2);
     let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81), ..Inputs::default() };
     for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
         inputs.pins.push(Pin { vertex: v as u32, target: *x });
     }
-    (single_body(&mesh, &material(STVK, 1e5, 0.45), settings), inputs)
+    (single_body(&mesh, &material(STVK, 1e5, 0.45)), inputs)
 }
 
 /// The state after one step of a frame from rest, its iterations set after the solver was built.
 fn stepped(settings: &SolverSettings, iterations: u32) -> State<f64> {
-    let (model, inputs) = bar(settings);
+    let (model, inputs) = bar();
     let (mut state, mut solver) = (State::at_rest(&model), Solver::new(&model, settings));
     solver.set_iterations(iterations);
     solver.step(&model, &mut state, &inputs, FRAME).expect("a legal step");
@@ -34,7 +34,7 @@ fn stepped(settings: &SolverSettings, iterations: u32) -> State<f64> {
 fn a_watched_step_is_a_step() {
     let mixed = SolverSettings { acceleration: Acceleration::Anderson, ..plain(1, 7) };
     for settings in [plain(1, 7), mixed, exact(7)] {
-        let (model, inputs) = bar(&settings);
+        let (model, inputs) = bar();
         let mut seen: Vec<Vec<Vec3<f64>>> = Vec::new();
         let (mut state, mut solver) = (State::at_rest(&model), Solver::new(&model, &settings));
         let watch = |iteration: u32, x: &[Vec3<f64>]| {

@@ -2,6 +2,7 @@
 //! own.
 
 use crate::common::{Random, Run, SNH, STVK, block, material, plain};
+use viscera::layout::Layout;
 use viscera::material::Material;
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
@@ -104,7 +105,7 @@ fn run<S: Real>(bodies: &[&Body], settings: &SolverSettings, workers: Workers) -
     let settings = SolverSettings { threads: Threads::Count(workers.0), ..settings.clone() };
     let mut builder = ModelBuilder::new();
     bodies.iter().for_each(|body| body.add(&mut builder));
-    let model: Model<S> = builder.build(&settings).expect("a model");
+    let model: Model<S> = builder.build().expect("a model");
     assert_eq!(model.part_count(), bodies.len());
     let mut solver = Solver::new(&model, &settings);
     solver.use_instructions(workers.1);
@@ -301,10 +302,11 @@ fn a_body_is_split_where_it_would_be_alone() {
     let mut builder = ModelBuilder::new();
     strip(Fate::Quiet).add(&mut builder);
     neighbour(Fate::Quiet).add(&mut builder);
-    let model = builder.build::<f32>(&settings).expect("a model");
+    let model = builder.build::<f32>().expect("a model");
+    let layout = Layout::new(&model, &settings);
     let most = |body: usize| {
         let vertices = model.bodies[body].vertices.clone();
-        vertices.map(|v| model.copies_of(v as u32).len()).max()
+        vertices.map(|v| layout.copies_of(v as u32).len()).max()
     };
     assert_eq!(most(0), Some(1));
     assert!(most(1) > Some(1));
@@ -333,7 +335,7 @@ fn a_thrown_body_is_led_back_by_shares_and_by_descents() {
     let body = neighbour(Fate::Thrown);
     let mut builder = ModelBuilder::new();
     body.add(&mut builder);
-    let model = builder.build::<f64>(&settings).expect("a model");
+    let model = builder.build::<f64>().expect("a model");
     let mut run = Run::new(&model, &settings);
     let (mut shares, mut descents) = (0, 0);
     for step in 0..STEPS {
@@ -382,7 +384,7 @@ fn the_report_of_a_step_speaks_for_every_part() {
     let bodies = [neighbour(Fate::Thrown), beam(Fate::Quiet), neighbour(Fate::Thrown)];
     let mut builder = ModelBuilder::new();
     bodies.iter().for_each(|body| body.add(&mut builder));
-    let model = builder.build::<f64>(&settings).expect("a model");
+    let model = builder.build::<f64>().expect("a model");
     let mut run = Run::new(&model, &settings);
     assert_eq!((run.solver.last_step(), run.solver.part_reports().len()), (None, 0));
     let mut rejected = 0;

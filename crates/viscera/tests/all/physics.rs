@@ -99,7 +99,7 @@ fn affine_states_load_no_interior_vertex_in_single_precision() {
 fn patch_error<S: Real>(stretch: f64, settings: &SolverSettings, frames: usize) -> f64 {
     let size = [0.1, 0.05, 0.05];
     let mesh = block(size, [6, 4, 4], 0.15);
-    let model = single_body::<S>(&mesh, &material(STVK, 1e4, 0.3), settings);
+    let model = single_body::<S>(&mesh, &material(STVK, 1e4, 0.3));
     let lateral = 1.0 + 0.3 * (1.0 - stretch);
     let map = Mat3::from_columns(
         vec3(stretch, 0.05, 0.0),
@@ -149,7 +149,7 @@ fn uniaxial_stretch_matches_the_closed_form() {
     for poisson in [0.3, 0.45] {
         for stretch in [0.8f64, 0.9, 1.2, 1.4, 1.6] {
             let mesh = block(size, [4, 2, 2], 0.0);
-            let model = single_body::<f64>(&mesh, &material(STVK, young, poisson), &exact(20));
+            let model = single_body::<f64>(&mesh, &material(STVK, young, poisson));
             let squared = stretch * stretch - 1.0;
             let lateral = (1.0 - poisson * squared).sqrt();
             let force = size[1] * size[2] * young * stretch * squared / 2.0;
@@ -210,7 +210,7 @@ fn momenta(masses: &[f64], state: &State<f64>) -> (Vec3<f64>, Vec3<f64>) {
 fn free_flight(model: MaterialModel, substeps: u32, colors: Colors) -> (f64, f64) {
     let mesh = block([0.1, 0.05, 0.05], [4, 2, 2], 0.1);
     let settings = SolverSettings { colors, ..plain(substeps, 10) };
-    let model = single_body::<f64>(&mesh, &material(model, 2e4, 0.4), &settings);
+    let model = single_body::<f64>(&mesh, &material(model, 2e4, 0.4));
     let mut run = Run::new(&model, &settings);
     let omega = 2.0 * std::f64::consts::PI;
     for (v, x) in run.state.velocities.iter_mut().zip(mesh.vertices()) {
@@ -259,7 +259,7 @@ fn viscosity_decays_with_the_retardation_time() {
             anderson_on: AndersonOn::Both,
             ..plain(1, 60)
         };
-        let viscous = single_body::<f64>(&mesh, &tissue, &settings);
+        let viscous = single_body::<f64>(&mesh, &tissue);
         let mut run = Run::new(&viscous, &settings);
         let (start, lateral) = (1e-3, -0.3e-3);
         for (x, rest) in run.state.positions.iter_mut().zip(mesh.vertices()) {
@@ -302,7 +302,7 @@ fn regions_have_materials_of_their_own() {
         let stiff = material(model, 3e4, 0.0);
         let count = builder.set_region_material(body, 1, &stiff).expect("a region");
         assert_eq!(2 * count, mesh.tets().len());
-        let built = builder.build::<f64>(&exact(20)).expect("a model");
+        let built = builder.build::<f64>().expect("a model");
         let stretch = 1e-4 * size[0];
         let mut inputs = Inputs::default();
         for (v, x) in mesh.vertices().iter().enumerate() {
@@ -337,7 +337,7 @@ fn attachments_and_springs_carry_the_weight() {
         builder.add_attachment(v, mesh.vertices()[v as usize], 20.0).expect("an attachment");
         builder.add_spring([v, 27 + v], 15.0, Some(0.0)).expect("a spring");
     }
-    let model = builder.build::<f64>(&exact(20)).expect("a model");
+    let model = builder.build::<f64>().expect("a model");
     let inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81), ..Inputs::default() };
     let mut run = Run::new(&model, &exact(20));
     for _ in 0..600 {
@@ -359,7 +359,7 @@ fn attachments_and_springs_carry_the_weight() {
 fn single_and_double_precision_run_the_same_scene() {
     fn tip<S: Real>(settings: &SolverSettings) -> Vec<Vec3<S>> {
         let mesh = block([0.08, 0.02, 0.02], [8, 2, 2], 0.1);
-        let model = single_body::<S>(&mesh, &material(SNH, 5e4, 0.4), settings);
+        let model = single_body::<S>(&mesh, &material(SNH, 5e4, 0.4));
         let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81).cast(), ..Inputs::default() };
         for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
             inputs.pins.push(Pin { vertex: v as u32, target: x.cast() });

@@ -1,6 +1,6 @@
 //! Pins that come and go.
 
-use crate::common::{Random, Run, SNH, STVK, block, colored, exact, material, single_body};
+use crate::common::{Random, Run, SNH, STVK, block, exact, material, single_body};
 use viscera::scalar::Vec3;
 use viscera::settings::{Colors, SolverSettings};
 use viscera::solver::balance::ForceBalance;
@@ -18,7 +18,7 @@ fn pinned_vertices_change_from_step_to_step() {
     let mut random = Random(2);
     for tissue in [STVK, SNH] {
         for colors in [Colors::Unlimited, Colors::Limited(4), Colors::Limited(1)] {
-            let model = single_body::<f64>(&mesh, &material(tissue, 2e4, 0.4), &colored(colors));
+            let model = single_body::<f64>(&mesh, &material(tissue, 2e4, 0.4));
             let settings = SolverSettings { colors, ..exact(10) };
             let mut run = Run::new(&model, &settings);
             let mut balance = ForceBalance::default();

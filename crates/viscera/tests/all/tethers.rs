@@ -28,7 +28,7 @@ fn bar() -> TetMesh {
 }
 
 /// With or without attachments at the far end.
-fn model<S: Real>(law: MaterialModel, settings: &SolverSettings, attached: bool) -> Model<S> {
+fn model<S: Real>(law: MaterialModel, attached: bool) -> Model<S> {
     let mesh = bar();
     let mut builder = ModelBuilder::new();
     builder.add_body(&mesh, &material(law, 5e3, 0.4)).expect("a body");
@@ -36,7 +36,7 @@ fn model<S: Real>(law: MaterialModel, settings: &SolverSettings, attached: bool)
         let anchor = mesh.vertices()[v as usize];
         builder.add_attachment(v, anchor, STIFFNESS).expect("an attachment");
     }
-    builder.build(settings).expect("a model")
+    builder.build().expect("a model")
 }
 
 /// The near end stands still; where the far end is pulled to goes up at first and then stays.
@@ -66,7 +66,7 @@ fn largest(a: &[Vec3<f64>], b: &[Vec3<f64>]) -> f64 {
 
 /// Places after every step.
 fn path(law: MaterialModel, settings: &SolverSettings, attached: bool) -> Vec<Vec<Vec3<f64>>> {
-    let model: Model<f64> = model(law, settings, attached);
+    let model: Model<f64> = model(law, attached);
     let mut solver = Solver::new(&model, settings);
     let mut state = State::at_rest(&model);
     let step = |step| {
@@ -102,7 +102,7 @@ fn tethers_move_tissue_as_attachments_do() {
 #[test]
 fn a_tether_pulls_with_stiffness_times_distance_and_lets_go() {
     let settings = SolverSettings::default();
-    let model: Model<f64> = model(SNH, &settings, false);
+    let model: Model<f64> = model(SNH, false);
     let mut solver = Solver::new(&model, &settings);
     let mut state = State::at_rest(&model);
     for _ in 0..3000 {
@@ -143,7 +143,7 @@ fn a_tether_pulls_with_stiffness_times_distance_and_lets_go() {
 #[test]
 fn several_tethers_add_up_whatever_their_order_and_do_nothing_on_a_pinned_vertex() {
     let settings = SolverSettings::default();
-    let model: Model<f64> = model(SNH, &settings, false);
+    let model: Model<f64> = model(SNH, false);
     let run = |order: &[usize], pinned: bool| {
         let mut inputs = inputs::<f64>(60, false);
         let Tether { vertex, target, stiffness } = inputs.tethers[0];
@@ -172,7 +172,7 @@ fn several_tethers_add_up_whatever_their_order_and_do_nothing_on_a_pinned_vertex
 #[test]
 fn a_tether_that_cannot_be_is_refused_and_nothing_moves() {
     let settings = SolverSettings::default();
-    let model: Model<f64> = model(SNH, &settings, false);
+    let model: Model<f64> = model(SNH, false);
     let mut solver = Solver::new(&model, &settings);
     let mut state = State::at_rest(&model);
     let tether = Tether { vertex: 0, target: Vec3::ZERO, stiffness: 1.0 };
@@ -206,8 +206,8 @@ fn portable_tethers_on_the_device_agree_with_the_cpu() {
         ..few.clone()
     };
     for settings in [&few, &explicit, &published] {
-        let double: Model<f64> = model(SNH, settings, false);
-        let single: Model<f32> = model(SNH, settings, false);
+        let double: Model<f64> = model(SNH, false);
+        let single: Model<f32> = model(SNH, false);
         let mut oracle = Solver::new(&double, settings);
         let mut cpu = Solver::new(&single, settings);
         let mut gpu = GpuSolver::new(device, &single, settings).expect("a model that fits");

@@ -46,6 +46,7 @@ const LAYERS: &[&[&str]] = &[
     &["elements"],
     &["coloring"],
     &["scene", "model", "state"],
+    &["layout"],
     &["contact", "tools", "cut"],
     &["solver"],
     &["measure", "rest"],

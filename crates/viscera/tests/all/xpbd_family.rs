@@ -4,7 +4,7 @@
 //! `|x - x*|_M / |x_0 - x*|_M` with `x_0` the inertial prediction. `x*` is the converged iterate of
 //! Gauss-Seidel for plain XPBD, and the zero of the force balance for the rebase.
 
-use crate::common::{Run, SNH, STVK, block, colored, exact, material, plain, single_body};
+use crate::common::{Run, SNH, STVK, block, exact, material, plain, single_body};
 use viscera::elements::{deformation_gradient, green_strain};
 use viscera::material::MaterialModel;
 use viscera::mesh::TetMesh;
@@ -40,13 +40,13 @@ impl Cantilever {
         Self { mesh, young, inputs }
     }
 
-    fn model(&self, tissue: MaterialModel, settings: &SolverSettings) -> Model<f64> {
-        single_body(&self.mesh, &material(tissue, self.young, 0.45), settings)
+    fn model(&self, tissue: MaterialModel) -> Model<f64> {
+        single_body(&self.mesh, &material(tissue, self.young, 0.45))
     }
 
     /// The state after one step of a frame from rest, and the solver's force balance.
     fn step(&self, settings: &SolverSettings) -> (State<f64>, ForceBalance) {
-        let model = self.model(STVK, settings);
+        let model = self.model(STVK);
         let (mut state, mut balance) = (State::at_rest(&model), ForceBalance::default());
         let mut solver = Solver::new(&model, settings);
         solver.step(&model, &mut state, &self.inputs, FRAME).expect("a legal step");
@@ -60,7 +60,7 @@ impl Cantilever {
 
     /// `|a - b|_M` [m kg^(1/2)].
     fn distance(&self, a: &[Vec3<f64>], b: &[Vec3<f64>]) -> f64 {
-        let masses = self.model(STVK, &colored(ANY)).masses;
+        let masses = self.model(STVK).masses;
         let squares =
             a.iter().zip(b).zip(&masses).map(|((a, b), m)| m * (*a - *b).length_squared());
         squares.sum::<f64>().sqrt()
@@ -75,9 +75,9 @@ impl Cantilever {
 
     /// Root of the volume-weighted mean of `|E|^2`.
     fn strain(&self, x: &[Vec3<f64>]) -> f64 {
-        let model = self.model(STVK, &colored(ANY));
+        let model = self.model(STVK);
         let (mut sum, mut volume) = (0.0, 0.0);
-        for tet in model.tets(&model.tet_sets[0]) {
+        for tet in model.tets() {
             let corners = tet.vertices.map(|v| x[v as usize]);
             let f = deformation_gradient(&corners, &tet.inverse_rest_shape);
             let strain = green_strain::symmetric(&green_strain::strain(&f));
@@ -292,7 +292,7 @@ fn settle(run: &mut Run<'_, f64>, bar: &Cantilever) -> (u32, f64) {
 fn stiffness_does_not_depend_on_substeps_or_iterations() {
     let bar = Cantilever::new([4, 1, 1], 1e5, 9.81);
     for tissue in [STVK, SNH] {
-        let model = bar.model(tissue, &colored(ANY));
+        let model = bar.model(tissue);
         let mut tips = Vec::new();
         for (substeps, iterations) in [(4, 5), (1, 20), (1, 2), (10, 2)] {
             let settings = SolverSettings { substeps, iterations, ..SolverSettings::default() };
@@ -316,7 +316,7 @@ fn the_step_guard_settles_stiff_tissue_where_a_large_budget_does() {
     let bar = Cantilever::new([8, 3, 3], 5e5, 9.81);
     let tissue = material(SNH, 5e5, 0.49);
     let rest = |settings: SolverSettings| {
-        let model = single_body(&bar.mesh, &tissue, &settings);
+        let model = single_body(&bar.mesh, &tissue);
         let mut run = Run::new(&model, &settings);
         let tip = settled_tip(&mut run, &bar, 180);
         (tip, run.solver.rejected_steps() as f64 / f64::from(180 * settings.substeps))
@@ -344,7 +344,7 @@ fn the_step_guard_settles_stiff_tissue_where_a_large_budget_does() {
 fn a_settled_body_stays_settled_when_the_step_is_halved() {
     let bar = Cantilever::new([6, 2, 2], 1e5, 9.81);
     for tissue in [STVK, SNH] {
-        let model = bar.model(tissue, &colored(ANY));
+        let model = bar.model(tissue);
         let mut run = Run::new(&model, &exact(20));
         let (_, tip) = settle(&mut run, &bar);
         let settled = run.state.clone();
@@ -456,7 +456,7 @@ fn a_body_at_rest_without_load_stays_to_the_bit() {
             let tissue = material(tissue, 1e4, 0.4).with_viscosity(0.1).expect("legal");
             for settings in every_setting() {
                 let settings = SolverSettings { colors, neo_hookean, ..settings };
-                let model = single_body::<S>(&mesh, &tissue, &settings);
+                let model = single_body::<S>(&mesh, &tissue);
                 let mut run = Run::new(&model, &settings);
                 for _ in 0..2 {
                     run.frame(&Inputs::default(), 1.0);

@@ -9,7 +9,6 @@ use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3};
-use viscera::settings::SolverSettings;
 use viscera::solver::{Inputs, Pin};
 
 /// Numbers computed by independent finite elements. A file that does not fit is a mistake of ours,
@@ -125,10 +124,10 @@ impl Fixture {
     }
 
     /// The body alone.
-    pub fn model<S: Real>(&self, settings: &SolverSettings) -> Model<S> {
+    pub fn model<S: Real>(&self) -> Model<S> {
         let mut builder = ModelBuilder::new();
         builder.add_body(&self.mesh(), &self.material()).expect("a legal body");
-        builder.build(settings).expect("a legal model")
+        builder.build().expect("a legal model")
     }
 
     /// Gravity and pins.

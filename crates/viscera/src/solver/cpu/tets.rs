@@ -4,8 +4,9 @@
 use std::ops::Range;
 
 use super::threads::{Shared, Workers};
+use crate::layout::{Layout, TetBlock, TetSet};
 use crate::material::Compliance;
-use crate::model::{MaterialConstants, Model, TetBlock, TetSet};
+use crate::material::MaterialConstants;
 use crate::scalar::lanes::{self, Eight, LANES, Lanes, Point};
 use crate::scalar::{Mat3, Real, Scalar, Vec3, vec3};
 
@@ -36,7 +37,7 @@ pub struct Corners<L> {
 
 impl<'a, S: Real> Block<'a, S> {
     #[inline(always)]
-    fn new(model: &'a Model<S>, set: &'a TetSet<S>, index: usize, lane: usize) -> Self {
+    fn new(model: &'a Layout<S>, set: &'a TetSet<S>, index: usize, lane: usize) -> Self {
         Self { set, index, lane, constants: &set.blocks[index], materials: &model.materials }
     }
 
@@ -273,7 +274,7 @@ unsafe fn gather<L: Lanes>(
 
 /// What a thread does at a time.
 struct Piece<'a, S, P> {
-    model: &'a Model<S>,
+    model: &'a Layout<S>,
     set: &'a TetSet<S>,
     blocks: Range<usize>,
     pass: &'a P,
@@ -296,7 +297,7 @@ impl Workers {
     /// A pass over some blocks of a set, in no particular order.
     pub fn pass<S: Real>(
         &self,
-        model: &Model<S>,
+        model: &Layout<S>,
         set: &TetSet<S>,
         blocks: Range<usize>,
         pass: &(impl TetPass<S> + Sync),
@@ -310,7 +311,7 @@ impl Workers {
     /// A pass over a piece of a set by the thread that is here.
     pub fn piece<S: Real>(
         &self,
-        model: &Model<S>,
+        model: &Layout<S>,
         set: &TetSet<S>,
         blocks: Range<usize>,
         pass: &impl TetPass<S>,

@@ -18,8 +18,8 @@ mod gpu;
 mod stability;
 pub mod stage;
 
-use crate::model::Model;
-use crate::model::elements::{Before, Moments};
+use crate::layout::Layout;
+use crate::layout::{Before, Moments};
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
 use crate::settings::SolverSettings;
@@ -58,7 +58,7 @@ pub struct Memory<S> {
 
 impl<S: Real> Memory<S> {
     /// Memory for the steps of a model.
-    pub fn new(model: &Model<S>, settings: &SolverSettings) -> Self {
+    pub fn new(model: &Layout<S>, settings: &SolverSettings) -> Self {
         Self {
             stability: Stability::new(model, settings),
             small_steps: vec![SmallSteps::default(); model.part_count()],
@@ -95,7 +95,7 @@ impl<S: Real> Memory<S> {
     /// Decides how many small steps each part takes in a step of `dt` [s]; returns the most.
     pub fn count_small_steps(
         &mut self,
-        model: &Model<S>,
+        model: &Layout<S>,
         inputs: &Inputs<S>,
         data: &mut StepData<S>,
         dt: f64,

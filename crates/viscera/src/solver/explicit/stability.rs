@@ -7,8 +7,9 @@
 
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::shape_gradients;
-use crate::model::Model;
-use crate::model::elements::{ElementSet, Moments, for_each_kind};
+use crate::layout::ElementSet;
+use crate::layout::Layout;
+use crate::model::for_each_kind;
 use crate::scalar::{Mat3, Real};
 use crate::settings::SolverSettings;
 use crate::solver::error::StepError;
@@ -56,7 +57,7 @@ impl SmallSteps {
 
 impl Stability {
     /// Of a model.
-    pub fn new<S: Real>(model: &Model<S>, settings: &SolverSettings) -> Self {
+    pub fn new<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Self {
         let (stiffness, parts) = part_stability(model);
         let safety = settings.explicit_safety;
         let mut stability = Self { step: f64::INFINITY, stiffness, parts, safety };
@@ -65,14 +66,14 @@ impl Stability {
     }
 
     /// The largest small step [s] of the stiffest part with these tethers.
-    pub fn step<S: Real>(&self, model: &Model<S>, tethers: &[Bundle<S>]) -> f64 {
+    pub fn step<S: Real>(&self, model: &Layout<S>, tethers: &[Bundle<S>]) -> f64 {
         self.steps(model, tethers).fold(f64::INFINITY, f64::min)
     }
 
     /// The largest small step [s] of each part with these tethers, sorted by vertex.
     pub fn steps<S: Real>(
         &self,
-        model: &Model<S>,
+        model: &Layout<S>,
         tethers: &[Bundle<S>],
     ) -> impl Iterator<Item = f64> {
         let mut tethers = tethers.iter().peekable();
@@ -95,13 +96,14 @@ impl Stability {
 }
 
 /// Of the elements around each vertex [N/m], and what of it decides in each part.
-fn part_stability<S: Real>(model: &Model<S>) -> (Vec<f64>, Vec<PartStability>) {
+fn part_stability<S: Real>(model: &Layout<S>) -> (Vec<f64>, Vec<PartStability>) {
     let mut stiffness = vec![0.0; model.vertex_count()];
     let mut parts = vec![PartStability::default(); model.part_count()];
     for set in &model.tet_sets {
         for tet in model.tets(set) {
             let material = &model.materials[tet.material];
-            let viscosity = &mut parts[model.part_of(tet.vertices[0])].viscosity;
+            let viscosity =
+                &mut parts[model.part_at(model.numbering.of(tet.vertices[0]))].viscosity;
             *viscosity = viscosity.max(material.viscosity.to_f64());
             let shape = tet.inverse_rest_shape.cast::<f64>();
             let lame = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
@@ -123,12 +125,11 @@ fn part_stability<S: Real>(model: &Model<S>) -> (Vec<f64>, Vec<PartStability>) {
 /// Adds the stiffness of the elements of one kind to their vertices [N/m].
 fn add_stiffness<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
     set: &ElementSet<S, K, N, M>,
-    model: &Model<S>,
+    model: &Layout<S>,
     stiffness: &mut [f64],
 ) {
-    let moments = Moments::at_rest(model, &model.rest_anchors);
     for (i, vertices) in set.vertices.iter().enumerate() {
-        let of_element = set.element::<f64>(i, &moments).stiffness();
+        let of_element = set.list.element::<f64>(i, &model.rest_anchors).stiffness();
         for &v in vertices {
             stiffness[v as usize] += of_element;
         }

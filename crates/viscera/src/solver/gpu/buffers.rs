@@ -5,10 +5,10 @@ use wgpu::BufferUsages;
 use super::control::control_size;
 use super::device::Device;
 use super::error::GpuError;
-use super::layout::{self, Layout};
+use super::layout::{self, DeviceLayout};
 use super::limits::{accelerates, window};
 use super::slots::{Place, Range, Slot, Update, multipliers_start, unknowns_size};
-use crate::model::Model;
+use crate::layout::Layout;
 use crate::scalar::lanes::LANES;
 use crate::settings::{Acceleration, SolverSettings};
 
@@ -45,9 +45,9 @@ fn check_sizes(
 impl Buffers {
     pub fn new(
         device: &Device,
-        model: &Model<f32>,
+        model: &Layout<f32>,
         settings: &SolverSettings,
-        layout: &Layout,
+        layout: &DeviceLayout,
         left_over: &[u8],
     ) -> Result<Self, GpuError> {
         let vertices = model.vertex_count() as u64;
@@ -111,7 +111,7 @@ impl Buffers {
             all.push((*slot, filled(label, bytes)));
         }
         let copies = split.then(|| {
-            let [indices, offsets] = Layout::copies(model);
+            let [indices, offsets] = DeviceLayout::copies(model);
             [filled("copies of corners", &indices), filled("copies of vertices", &offsets)]
         });
         let mut ranges = table.ranges;

@@ -7,7 +7,7 @@
 
 use super::layout::Pieces;
 use super::record::Recorder;
-use crate::model::Model;
+use crate::layout::Layout;
 use crate::settings::SolverSettings;
 use crate::solver::plan::Plan;
 
@@ -37,7 +37,7 @@ pub struct StepCost {
 
 impl StepCost {
     /// Of a model that is solved in this way, with so many sweeps.
-    pub fn new(model: &Model<f32>, settings: &SolverSettings, sweeps: u32) -> Self {
+    pub fn new(model: &Layout<f32>, settings: &SolverSettings, sweeps: u32) -> Self {
         // How many dispatches there are does not depend on the length of the long vector.
         let plan = Plan::new(model, settings);
         let pieces = Pieces { count: 1, first_of_vertices: 0, groups: 1 };

@@ -8,6 +8,7 @@ use super::device::Device;
 use super::error::GpuError;
 use super::slots::Slot;
 use super::solver::GpuSolver;
+use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::{Eight, Point};
 use crate::scalar::{Vec3, vec3};
@@ -57,9 +58,8 @@ impl GpuSolver {
     /// The newest positions that have arrived since the last call. Does not wait.
     pub fn newest(&mut self, model: &Model<f32>) -> Option<Frame> {
         self.collect();
-        if self.check_model(model).is_err() {
-            return None;
-        }
+        let layout = self.layout_of(model).ok()?;
+        let model = &*layout;
         let (number, buffer) = self.frames.arrived.take()?;
         let frame = buffer.slice(..).get_mapped_range().ok().map(|bytes| {
             let places: &[[f32; 4]] = bytemuck::cast_slice(&bytes);
@@ -90,7 +90,8 @@ impl GpuSolver {
 
     /// Waits for the device and reads its whole state. On an error the state is as it was.
     pub fn read(&self, model: &Model<f32>, state: &mut State<f32>) -> Result<(), GpuError> {
-        self.check_model(model)?;
+        let layout = self.layout_of(model)?;
+        let model = &*layout;
         self.read_buffers(&[Slot::Unknowns, Slot::Velocities], |read| {
             self.take_state(model, state, read);
         })
@@ -99,7 +100,8 @@ impl GpuSolver {
     /// Waits for the device and reads positions and velocities at the end of the last step, in place; returns how
     /// many steps were rejected so far. Multipliers stay on the device. On an error nothing is changed.
     pub fn read_frame(&self, model: &Model<f32>, state: &mut State<f32>) -> Result<u64, GpuError> {
-        self.check_model(model)?;
+        let layout = self.layout_of(model)?;
+        let model = &*layout;
         let part = |slot, size: u64| {
             let [start, _] = self.buffers.span(slot);
             (self.buffers.buffer(slot), start..start + size)
@@ -121,16 +123,17 @@ impl GpuSolver {
     }
 
     /// How many bytes [`GpuSolver::read_frame`] reads, [`GpuSolver::force_balance`], and [`GpuSolver::read`].
-    pub fn bytes_read_back(&self, model: &Model<f32>) -> [u64; 3] {
+    pub fn bytes_read_back(&self) -> [u64; 3] {
         let of_slot = |slot: &Slot| self.buffers.span(*slot)[1];
         let frame = 2 * self.buffers.points_size + PARTS_START as u64;
         let whole = [Slot::Unknowns, Slot::Velocities].iter().map(of_slot).sum();
-        [frame, balance_slots(model).iter().map(of_slot).sum(), whole]
+        [frame, balance_slots(&self.layout).iter().map(of_slot).sum(), whole]
     }
 
     /// Waits for the device and reads the multipliers [J s^2] at the end of the last step.
     pub fn multipliers(&self, model: &Model<f32>) -> Result<Vec<f32>, GpuError> {
-        self.check_model(model)?;
+        let layout = self.layout_of(model)?;
+        let model = &*layout;
         let [start, _] = self.buffers.span(Slot::Multipliers);
         let range = start..start + 4 * model.multiplier_count as u64;
         let mut multipliers = Vec::new();
@@ -152,7 +155,8 @@ impl GpuSolver {
         inputs: &Inputs<f32>,
         balance: &mut ForceBalance,
     ) -> Result<(), GpuError> {
-        self.check_model(model)?;
+        let layout = self.layout_of(model)?;
+        let model = &*layout;
         check_state(model, state)?;
         check_inputs(model, inputs)?;
         self.read_buffers(&balance_slots(model), |read| {
@@ -192,7 +196,7 @@ impl GpuSolver {
         Ok(())
     }
 
-    fn take_state(&self, model: &Model<f32>, state: &mut State<f32>, read: &[&[u8]]) {
+    fn take_state(&self, model: &Layout<f32>, state: &mut State<f32>, read: &[&[u8]]) {
         let [unknowns, velocities] = [read[0], read[1]];
         let points = |bytes: &[u8]| -> Vec<Vec3<f32>> {
             let points = &bytes[..self.buffers.points_size as usize];
@@ -230,7 +234,7 @@ impl GpuSolver {
 }
 
 /// What a force balance needs of the device.
-fn balance_slots(model: &Model<f32>) -> Vec<Slot> {
+fn balance_slots(model: &Layout<f32>) -> Vec<Slot> {
     let mut slots = vec![Slot::Predicted, Slot::Acting, Slot::Previous];
     if model.is_viscous() {
         slots.push(Slot::StartStrain);
@@ -238,7 +242,7 @@ fn balance_slots(model: &Model<f32>) -> Vec<Slot> {
     slots
 }
 
-fn put_in_user_order(model: &Model<f32>, places: &[[f32; 4]], into: &mut [Vec3<f32>]) {
+fn put_in_user_order(model: &Layout<f32>, places: &[[f32; 4]], into: &mut [Vec3<f32>]) {
     for (value, &v) in into.iter_mut().zip(&model.numbering.rank) {
         let [x, y, z, _] = places[v as usize];
         *value = vec3(x, y, z);
@@ -298,7 +302,7 @@ pub(super) fn read(
     Ok(())
 }
 
-fn in_user_order(model: &Model<f32>, places: &[[f32; 4]]) -> Vec<Vec3<f32>> {
+fn in_user_order(model: &Layout<f32>, places: &[[f32; 4]]) -> Vec<Vec3<f32>> {
     let rank = model.numbering.rank.iter();
     rank.map(|&v| places[v as usize]).map(|[x, y, z, _]| vec3(x, y, z)).collect()
 }

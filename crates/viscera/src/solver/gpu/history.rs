@@ -16,7 +16,8 @@ impl GpuSolver {
         inputs: &Inputs<f32>,
         dt: f64,
     ) -> Result<(), StepError> {
-        self.check_model(model)?;
+        let layout = self.layout_of(model)?;
+        let model = &*layout;
         crate::solver::inputs::check_step(dt, model, inputs)?;
         self.prepare_step(model, inputs, dt);
         self.submit("restart", &[&self.restart], Marks::default());

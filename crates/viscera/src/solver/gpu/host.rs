@@ -41,7 +41,7 @@ pub fn host_layouts() -> Vec<HostLayout> {
             mixture_best mixture_failures is_good is_broken
         }),
         record!("Update" Update { vertex is_pinned force place stiffness inertia }),
-        record!("TetBlock" crate::model::TetBlock<f32> {
+        record!("TetBlock" crate::layout::TetBlock<f32> {
             vertices inverse_rest_shape rest_volume material
         }),
     ]

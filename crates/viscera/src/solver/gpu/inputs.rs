@@ -4,7 +4,7 @@ use super::buffers::Buffers;
 use super::layout::copy_offsets;
 use super::slots::Update;
 use super::solver::GpuSolver;
-use crate::model::Model;
+use crate::layout::Layout;
 use crate::settings::{Acceleration, AndersonOn, Method, SolverSettings};
 use crate::solver::inputs::Inputs;
 use crate::solver::step::tethers::bundle;
@@ -12,7 +12,7 @@ use crate::solver::xpbd::iterates::fill_multiplier_weights;
 
 impl GpuSolver {
     /// What acts on vertices in this step, and the freedom of those that the last one held.
-    pub(super) fn collect_updates(&mut self, model: &Model<f32>, inputs: &Inputs<f32>, dt: f64) {
+    pub(super) fn collect_updates(&mut self, model: &Layout<f32>, inputs: &Inputs<f32>, dt: f64) {
         bundle(model, inputs, &mut self.tethers);
         self.updates.clear();
         let (updates, update_of) = (&mut self.updates, &mut self.update_of);
@@ -68,7 +68,7 @@ impl GpuSolver {
 
 /// Weights of the norm in which iterates are compared, for a step of `dt` [s].
 pub(super) fn norm_weights(
-    model: &Model<f32>,
+    model: &Layout<f32>,
     settings: &SolverSettings,
     buffers: &Buffers,
     dt: f64,
@@ -118,7 +118,7 @@ mod tests {
         let mut builder = ModelBuilder::new();
         let tissue = Material::new(law, 1e4, 0.4, 1000.0).expect("a legal material");
         builder.add_body(&mesh, &tissue).expect("a body");
-        let model = builder.build::<f32>(&settings).expect("a model");
+        let model = builder.build::<f32>().expect("a model");
         let device = Adapter::find(None).and_then(|adapter| adapter.open());
         let device = device.unwrap_or_else(|error| panic!("{error}"));
         let inputs = Inputs {

@@ -9,8 +9,10 @@ use super::slots::{ALIGNMENT, Element, Range, Slot, unknowns_size};
 use crate::elements::kinds::{Kind, MOST};
 use crate::elements::law::LAWS;
 use crate::elements::list::KIND_SIZES;
-use crate::model::elements::{ElementSet, for_each_kind};
-use crate::model::{MaterialConstants, Model};
+use crate::layout::ElementSet;
+use crate::layout::Layout;
+use crate::material::MaterialConstants;
+use crate::model::for_each_kind;
 use crate::scalar::lanes::LANES;
 use crate::settings::{Method, SolverSettings};
 
@@ -104,7 +106,7 @@ pub struct Pieces {
 
 /// Where loads go and what is summed together.
 #[derive(Clone, Debug)]
-pub(super) struct Layout {
+pub(super) struct DeviceLayout {
     /// Where each vertex's loads begin, one more at the end.
     offsets: Vec<u32>,
     /// Place of the load of each corner, per block and corner.
@@ -120,8 +122,8 @@ pub(super) struct Layout {
     pub parts: Parts,
 }
 
-impl Layout {
-    pub fn new(model: &Model<f32>, settings: &SolverSettings) -> Self {
+impl DeviceLayout {
+    pub fn new(model: &Layout<f32>, settings: &SolverSettings) -> Self {
         let mut counts = vec![0u32; model.vertex_count() + 1];
         let mut count = |vertex: u32| {
             let place = &mut counts[vertex as usize];
@@ -187,7 +189,7 @@ impl Layout {
     }
 
     /// What never changes beside the tetrahedra, and where everything stands.
-    pub fn table(&self, model: &Model<f32>, settings: &SolverSettings) -> Table {
+    pub fn table(&self, model: &Layout<f32>, settings: &SolverSettings) -> Table {
         let guarded = settings.guards_steps();
         let (mut bytes, mut ranges) = (vec![0; ALIGNMENT as usize], Vec::new());
         let mut add = |slot: Option<Slot>, new: &[u8]| {
@@ -255,7 +257,7 @@ impl Layout {
     }
 
     /// Vertices from one range of the ground to the next.
-    pub fn stride(model: &Model<f32>) -> u32 {
+    pub fn stride(model: &Layout<f32>) -> u32 {
         model.vertex_count().next_multiple_of((ALIGNMENT / 16) as usize) as u32
     }
 
@@ -269,7 +271,7 @@ impl Layout {
     }
 
     /// Copies of each corner, and where those of each vertex begin.
-    pub fn copies(model: &Model<f32>) -> [Vec<u8>; 2] {
+    pub fn copies(model: &Layout<f32>) -> [Vec<u8>; 2] {
         let sets = model.tet_sets.iter();
         let indices: Vec<u32> = sets
             .flat_map(|set| (0..set.block_count()).map(move |block| set.copies_of(block)))
@@ -284,7 +286,7 @@ impl Layout {
 pub(super) const WHOLE: u32 = 1 << 31;
 
 /// Where the copies of each vertex begin, one more at the end.
-pub(super) fn copy_offsets(model: &Model<f32>) -> Vec<u32> {
+pub(super) fn copy_offsets(model: &Layout<f32>) -> Vec<u32> {
     let mut offsets = model.copy_offsets.clone();
     for part in model.parts.iter().filter(|part| !part.is_split()) {
         offsets[part.vertices.clone()].iter_mut().for_each(|first| *first |= WHOLE);
@@ -293,7 +295,7 @@ pub(super) fn copy_offsets(model: &Model<f32>) -> Vec<u32> {
 }
 
 /// The blocks where the tetrahedra of each law end.
-fn law_ends(model: &Model<f32>) -> [u32; LAWS] {
+fn law_ends(model: &Layout<f32>) -> [u32; LAWS] {
     let mut end = 0;
     model.tet_sets.each_ref().map(|set| {
         end += set.block_count() as u32;
@@ -302,7 +304,7 @@ fn law_ends(model: &Model<f32>) -> [u32; LAWS] {
 }
 
 /// Elements that are no tetrahedra, sorted by colour, within a colour by kind; places of loads are not yet known.
-fn elements(model: &Model<f32>) -> Vec<Element> {
+fn elements(model: &Layout<f32>) -> Vec<Element> {
     let mut all: Vec<(usize, Element)> = Vec::new();
     for_each_kind!(model, set => {
         for color in 0..model.color_count {
@@ -316,7 +318,7 @@ fn elements(model: &Model<f32>) -> Vec<Element> {
 fn element<K: Kind<N, M>, const N: usize, const M: usize>(
     set: &ElementSet<f32, K, N, M>,
     i: usize,
-    model: &Model<f32>,
+    model: &Layout<f32>,
 ) -> Element {
     let corner = |corner: usize| if corner < N { corner } else { 0 };
     let vertices = set.vertices[i].map(|v| model.numbering.of(v) as u32);
@@ -340,7 +342,7 @@ fn kind_by_kind(elements: &[Element]) -> Vec<usize> {
 }
 
 /// The first of the elements of a colour, or of all, and how many there are.
-pub fn element_range(model: &Model<f32>, color: Option<usize>) -> [u32; 2] {
+pub fn element_range(model: &Layout<f32>, color: Option<usize>) -> [u32; 2] {
     let [mut first, mut count] = [0; 2];
     for_each_kind!(model, set => {
         let range = color.map_or(0..set.len(), |color| set.color(color));
@@ -351,14 +353,14 @@ pub fn element_range(model: &Model<f32>, color: Option<usize>) -> [u32; 2] {
 }
 
 /// The part of each block.
-fn block_parts(model: &Model<f32>) -> Vec<u32> {
+fn block_parts(model: &Layout<f32>) -> Vec<u32> {
     let of_block = |vertices: &[[u32; LANES]; 4]| model.part_at(vertices[0][0] as usize) as u32;
     let sets = model.tet_sets.iter();
     sets.flat_map(|set| set.blocks.iter().map(|b| of_block(&b.vertices))).collect()
 }
 
 /// Elements of each part in pieces, then vertices.
-fn pieces(model: &Model<f32>, others: &[Element], by_kind: &[usize]) -> (Vec<u32>, Vec<Piece>) {
+fn pieces(model: &Layout<f32>, others: &[Element], by_kind: &[usize]) -> (Vec<u32>, Vec<Piece>) {
     let mut elements = Vec::new();
     let mut first = 0;
     for set in &model.tet_sets {
@@ -391,7 +393,7 @@ fn pieces(model: &Model<f32>, others: &[Element], by_kind: &[usize]) -> (Vec<u32
 }
 
 /// Tetrahedra as `TetBlock` of bindings.wgsl.
-pub(super) fn tets(model: &Model<f32>) -> Vec<u8> {
+pub(super) fn tets(model: &Layout<f32>) -> Vec<u8> {
     let mut words = Vec::new();
     for set in &model.tet_sets {
         for (block, &filled) in set.blocks.iter().zip(&set.filled) {
@@ -407,7 +409,7 @@ pub(super) fn tets(model: &Model<f32>) -> Vec<u8> {
     bytemuck::cast_slice(&words).to_vec()
 }
 
-fn materials(model: &Model<f32>) -> Vec<u8> {
+fn materials(model: &Layout<f32>) -> Vec<u8> {
     let of = |m: &MaterialConstants<f32>| Material {
         lame_lambda: m.lame_lambda,
         lame_mu: m.lame_mu,

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::limits::SUM_THREADS;
 use super::slots::{Update, multipliers_start};
-use crate::model::{Model, Part};
+use crate::layout::{Layout, Part};
 use crate::scalar::{Vec3, vec3};
 use crate::settings::SolverSettings;
 use crate::solver::xpbd::rebase::{bound_share, rebase_factor};
@@ -83,7 +83,7 @@ pub(super) struct Falls {
 }
 
 impl Falls {
-    pub fn new(model: &Model<f32>) -> Self {
+    pub fn new(model: &Layout<f32>) -> Self {
         let mass = |v: usize| f64::from(model.masses[model.numbering.order[v] as usize]);
         let body = |part: &Part| (part.vertices.clone().map(mass).sum(), part.is_anchored());
         let bodies: Vec<_> = model.parts.iter().map(body).collect();
@@ -92,7 +92,7 @@ impl Falls {
     }
 
     /// Finds what nothing holds among what acts on vertices.
-    pub fn find(&mut self, model: &Model<f32>, gravity: Vec3<f32>, updates: &[Update]) {
+    pub fn find(&mut self, model: &Layout<f32>, gravity: Vec3<f32>, updates: &[Update]) {
         self.forces.fill(Vec3::ZERO);
         for (fall, (_, is_attached)) in self.all.iter_mut().zip(&self.bodies) {
             fall.is_free = u32::from(!is_attached);
@@ -126,7 +126,7 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    pub fn new(model: &Model<f32>, settings: &SolverSettings, pieces: &[Piece]) -> Self {
+    pub fn new(model: &Layout<f32>, settings: &SolverSettings, pieces: &[Piece]) -> Self {
         let mut parts = Self::default();
         let mut groups_end = 0;
         let first = (multipliers_start(model.vertex_count()) / 4) as u32;

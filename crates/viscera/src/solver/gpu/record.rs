@@ -1,12 +1,12 @@
 //! Dispatches, and how they are made: what the recorders of all stages share.
 
 use super::kernels::{Kernel, Swept, Variant};
-use super::layout::{Layout, Pieces, element_range};
+use super::layout::{DeviceLayout, Pieces, element_range};
 use super::limits::window;
 use super::slots::{Place, Slot};
 use super::uniforms::Job;
 use crate::elements::TetForm;
-use crate::model::Model;
+use crate::layout::Layout;
 use crate::scalar::lanes::LANES;
 use crate::settings::SolverSettings;
 use crate::solver::xpbd::is_jacobi;
@@ -38,7 +38,7 @@ impl Dispatch {
 
 /// Makes dispatches for a model that is solved in one way.
 pub struct Recorder<'a> {
-    pub model: &'a Model<f32>,
+    pub model: &'a Layout<f32>,
     pub settings: &'a SolverSettings,
     /// Numbers of the long vector, and where multipliers begin in it.
     pub length: u32,
@@ -53,7 +53,7 @@ impl<'a> Recorder<'a> {
     /// For a model that is solved in this way; `vector` is the length of the long vector and the place
     /// of the first multiplier in it.
     pub fn new(
-        model: &'a Model<f32>,
+        model: &'a Layout<f32>,
         settings: &'a SolverSettings,
         vector: [u32; 2],
         pieces: Pieces,
@@ -69,7 +69,7 @@ impl<'a> Recorder<'a> {
                 (true, true) => Swept::Jacobi,
                 (true, false) => Swept::Copies,
             },
-            stride: Layout::stride(model),
+            stride: DeviceLayout::stride(model),
             pieces,
         }
     }

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::elements::kinds::{CONSTANTS, MOST};
-use crate::model::Model;
+use crate::layout::Layout;
 use crate::scalar::{Vec3, vec3};
 
 /// Numbers of the storage buffers in all kernels; bindings.wgsl has the same ones.
@@ -126,6 +126,6 @@ pub fn multipliers_start(vertices: usize) -> u64 {
 }
 
 /// Bytes of all unknowns.
-pub fn unknowns_size(model: &Model<f32>) -> u64 {
+pub fn unknowns_size(model: &Layout<f32>) -> u64 {
     multipliers_start(model.vertex_count()) + 4 * (model.multiplier_count as u64).max(1)
 }

@@ -5,7 +5,7 @@ use super::control;
 use super::device::{Device, baseline, shortfall};
 use super::error::GpuError;
 use super::kernels;
-use super::layout::Layout;
+use super::layout::DeviceLayout;
 use super::limits::{JOB_STRIDE, MOST_GROUPS};
 use super::parts::{Falls, SmallSteps};
 use super::record::{Dispatch, Recorder};
@@ -13,12 +13,15 @@ use super::ring::Frames;
 use super::slots::{Slot, Update};
 use super::stages::StageRange;
 use super::uniforms::{FrameConstants, Job};
+use std::sync::Arc;
+
+use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::Vec3;
 use crate::settings::{Method, Precision, SolverSettings, Start};
-use crate::solver::cpu::memory::{SIZES, sizes};
 use crate::solver::error::StepError;
 use crate::solver::explicit::Stability;
+use crate::solver::inputs::check_model;
 use crate::solver::plan::{Plan, StepStage};
 use crate::solver::step::tethers::Bundle;
 use crate::state::State;
@@ -45,8 +48,8 @@ pub struct GpuSolver {
     pub(super) uniforms: wgpu::BindGroup,
     pub(super) frame: wgpu::Buffer,
     pub(super) jobs: wgpu::Buffer,
-    /// What the model's sizes were.
-    pub(super) sizes: [usize; SIZES],
+    /// The model as it lies on the device.
+    pub(super) layout: Arc<Layout<f32>>,
     pub(super) ready: [Vec<Ready>; 3],
     /// Which of them belong to which stage.
     pub(super) stages: [Vec<StageRange>; 3],
@@ -114,11 +117,12 @@ impl GpuSolver {
         if let Some(lacking) = shortfall(&own) {
             return Err(GpuError::BelowBaseline { name: device.name().to_owned(), lacking });
         }
-        let plan = Plan::new(model, settings);
-        let layout = Layout::new(model, settings);
-        let buffers = Buffers::new(device, model, settings, &layout, left_over)?;
+        let laid = Arc::new(Layout::new(model, settings));
+        let plan = Plan::new(&laid, settings);
+        let layout = DeviceLayout::new(&laid, settings);
+        let buffers = Buffers::new(device, &laid, settings, &layout, left_over)?;
         let vector = [buffers.length, (buffers.multipliers_start / 4) as u32];
-        let record = Recorder::new(model, settings, vector, layout.pieces()).record(&plan);
+        let record = Recorder::new(&laid, settings, vector, layout.pieces()).record(&plan);
         let lists = [record.prologue, record.body, record.epilogue, record.restart];
         let job_count = lists.iter().map(Vec::len).sum::<usize>() as u64;
         let (jobs, frame, uniforms) = make_uniforms(device, job_count);
@@ -141,12 +145,12 @@ impl GpuSolver {
             falls: plan
                 .prologue
                 .contains(&StepStage::Predict(Start::Auto).into())
-                .then(|| Falls::new(model)),
+                .then(|| Falls::new(&laid)),
             plan,
             uniforms,
             frame,
             jobs,
-            sizes: sizes(model).map(|(_, size)| size),
+            layout: Arc::clone(&laid),
             ready: [prologue, body, epilogue],
             stages: record.stages,
             stage_starts: record.stage_starts,
@@ -157,7 +161,7 @@ impl GpuSolver {
             updates: Vec::new(),
             update_of: vec![u32::MAX; model.vertex_count()],
             has_moved_anchors: true,
-            stability: is_explicit.then(|| Stability::new(model, settings)),
+            stability: is_explicit.then(|| Stability::new(&laid, settings)),
             tethers: Vec::new(),
             small_steps: vec![
                 SmallSteps::default();
@@ -165,9 +169,8 @@ impl GpuSolver {
             ],
             buffers,
         };
-        solver.upload_constants(model);
-        let rest = State::at_rest(model);
-        solver.put(model, &rest);
+        solver.upload_constants(&laid);
+        solver.put(&laid, &State::at_rest(model));
         // Its memory may have been too little.
         solver.device.check()?;
         Ok(solver)
@@ -201,11 +204,13 @@ impl GpuSolver {
     /// The same of a solver that is not built, and needs no device: how many passes over the mesh, one after
     /// the other, an iteration is.
     pub fn dispatches_of(model: &Model<f32>, settings: &SolverSettings) -> [usize; 3] {
+        let laid = Layout::new(model, settings);
+        let model = &laid;
         let plan = Plan::new(model, settings);
-        let layout = Layout::new(model, settings);
+        let layout = DeviceLayout::new(model, settings);
         let multipliers = 4 * model.vertex_count() as u32;
         let vector = [multipliers + model.multiplier_count as u32, multipliers];
-        let record = Recorder::new(model, settings, vector, layout.pieces()).record(&plan);
+        let record = Recorder::new(&laid, settings, vector, layout.pieces()).record(&plan);
         [record.prologue, record.body, record.epilogue].map(|list| list.len())
     }
 
@@ -241,23 +246,20 @@ impl GpuSolver {
 
     /// Puts a state onto the device.
     pub fn write(&mut self, model: &Model<f32>, state: &State<f32>) -> Result<(), StepError> {
-        self.check_model(model)?;
+        let layout = self.layout_of(model)?;
+        let model = &*layout;
         crate::solver::inputs::check_state(model, state)?;
         self.put(model, state);
         Ok(())
     }
 
-    /// The model is one of the same shape as that which lies on the device.
-    pub(super) fn check_model(&self, model: &Model<f32>) -> Result<(), StepError> {
-        for (given, (what, expected)) in self.sizes.into_iter().zip(sizes(model)) {
-            if given != expected {
-                return Err(StepError::Mismatch { what, given, expected });
-            }
-        }
-        Ok(())
+    /// The layout of the model that lies on the device.
+    pub(super) fn layout_of(&self, model: &Model<f32>) -> Result<Arc<Layout<f32>>, StepError> {
+        check_model(&self.layout, model)?;
+        Ok(Arc::clone(&self.layout))
     }
 
-    fn put(&mut self, model: &Model<f32>, state: &State<f32>) {
+    fn put(&mut self, model: &Layout<f32>, state: &State<f32>) {
         let places = in_solver_order(model, &state.positions);
         let mut unknowns = vec![0.0f32; self.buffers.length as usize];
         let (positions, multipliers) =
@@ -266,19 +268,19 @@ impl GpuSolver {
         multipliers[..state.multipliers.len()].copy_from_slice(&state.multipliers);
         let bytes = bytemuck::cast_slice(&unknowns);
         self.buffers.write(&self.device.queue, Slot::Unknowns, bytes);
-        self.write_velocities(model, &state.velocities);
+        self.write_velocities(&state.velocities);
         self.multiplier_dt = state.multiplier_dt;
     }
 
     /// Puts velocities [m/s], the user's order, in the place of those on the device.
-    pub(crate) fn write_velocities(&self, model: &Model<f32>, velocities: &[Vec3<f32>]) {
-        let sorted = in_solver_order(model, velocities);
+    pub(crate) fn write_velocities(&self, velocities: &[Vec3<f32>]) {
+        let sorted = in_solver_order(&self.layout, velocities);
         let bytes = bytemuck::cast_slice(&sorted);
         self.buffers.write(&self.device.queue, Slot::Velocities, bytes);
     }
 
     /// What each vertex is made of: mass, inverse mass, number of copies.
-    fn upload_constants(&self, model: &Model<f32>) {
+    fn upload_constants(&self, model: &Layout<f32>) {
         let order = &model.numbering.order;
         let masses: Vec<f32> = order.iter().map(|&v| model.masses[v as usize]).collect();
         let with_w = |w: &dyn Fn(usize) -> f32| -> Vec<[f32; 4]> {
@@ -330,7 +332,7 @@ fn make_uniforms(device: &Device, job_count: u64) -> (wgpu::Buffer, wgpu::Buffer
     (jobs, frame, uniforms)
 }
 
-fn in_solver_order(model: &Model<f32>, values: &[Vec3<f32>]) -> Vec<[f32; 4]> {
+fn in_solver_order(model: &Layout<f32>, values: &[Vec3<f32>]) -> Vec<[f32; 4]> {
     let order = model.numbering.order.iter();
     order.map(|&v| values[v as usize].to_array()).map(|[x, y, z]| [x, y, z, 0.0]).collect()
 }

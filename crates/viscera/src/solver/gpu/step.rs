@@ -7,6 +7,7 @@ use super::slots::Slot;
 use super::solver::{GpuSolver, Ready};
 use super::timing::Marks;
 use super::uniforms::FrameConstants;
+use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::Vec3;
 use crate::settings::RelaxationForm;
@@ -72,7 +73,8 @@ impl GpuSolver {
         inputs: &Inputs<f32>,
         dt: f64,
     ) -> Result<u32, StepError> {
-        self.check_model(model)?;
+        let layout = self.layout_of(model)?;
+        let model = &*layout;
         crate::solver::inputs::check_step(dt, model, inputs)?;
         let repeats = match &self.stability {
             None => self.plan.repeat,
@@ -123,7 +125,7 @@ impl GpuSolver {
     }
 
     /// Inputs and constants of a step.
-    pub(super) fn prepare_step(&mut self, model: &Model<f32>, inputs: &Inputs<f32>, dt: f64) {
+    pub(super) fn prepare_step(&mut self, model: &Layout<f32>, inputs: &Inputs<f32>, dt: f64) {
         self.collect_updates(model, inputs, dt);
         let queue = &self.device.queue;
         self.buffers.write(queue, Slot::Updates, bytemuck::cast_slice(&self.updates));
@@ -136,7 +138,8 @@ impl GpuSolver {
         if is_anchored && (!inputs.anchors.is_empty() || self.has_moved_anchors) {
             self.has_moved_anchors = !inputs.anchors.is_empty();
             let row = |anchor: &Vec3<f32>| [anchor.x, anchor.y, anchor.z, 0.0];
-            let rows: Vec<[f32; 4]> = inputs.anchors_of(model).iter().map(row).collect();
+            let rows: Vec<[f32; 4]> =
+                inputs.anchors_of(&model.rest_anchors).iter().map(row).collect();
             self.buffers.write(queue, Slot::Anchors, bytemuck::cast_slice(&rows));
         }
         let last = self.multiplier_dt;

@@ -90,7 +90,7 @@ impl GpuSurface {
         model: &Model<f32>,
         skins: &[Skin<'_>],
     ) -> Result<Self, GpuError> {
-        solver.check_model(model)?;
+        solver.layout_of(model)?;
         let order = |v: u32| model.numbering.of(v) as u32;
         let bounds = bounds(model.vertex_count(), order, skins)?;
         Self::bind(solver.device(), solver.positions(), &bounds, skins)

@@ -1,10 +1,11 @@
 //! A step that the CPU begins and the device ends: where a result is wrong, the stage from which on it
 //! is tells which twin to look at.
 
-use super::layout::Layout;
+use super::layout::DeviceLayout;
 use super::slots::Slot;
 use super::solver::{GpuSolver, Ready};
 use super::timing::Marks;
+use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::Vec3;
 use crate::scalar::lanes::{LANES, Point};
@@ -35,7 +36,7 @@ impl GpuSolver {
         let repeats = self.begin_step(model, inputs, dt)?;
         let count = first_stages(&self.plan, stage);
         solver.step_first(count, model, state, inputs, dt)?;
-        self.take_over(solver, model, state, inputs, count);
+        self.take_over(solver, &self.layout, state, inputs, count);
         let [prologue, body, _] = &self.ready;
         let (before, within) = split(&self.stage_starts, count, self.plan.prologue.len());
         let mut lists: Vec<&[Ready]> = Vec::new();
@@ -59,7 +60,7 @@ impl GpuSolver {
     fn take_over(
         &self,
         solver: &Solver<f32>,
-        model: &Model<f32>,
+        model: &Layout<f32>,
         state: &State<f32>,
         inputs: &Inputs<f32>,
         count: usize,
@@ -109,12 +110,20 @@ impl GpuSolver {
             self.put_rows(Slot::Copies, &all);
         }
         if !loads.is_empty() {
-            self.put_rows(Slot::Loads, &Layout::new(model, &self.settings).loads(model, loads));
+            self.put_rows(
+                Slot::Loads,
+                &DeviceLayout::new(model, &self.settings).loads(model, loads),
+            );
         }
     }
 
     /// What the prediction leaves: constants of the step, targets, and where steps are guarded their starts.
-    fn take_over_prediction(&self, data: &StepData<f32>, model: &Model<f32>, inputs: &Inputs<f32>) {
+    fn take_over_prediction(
+        &self,
+        data: &StepData<f32>,
+        model: &Layout<f32>,
+        inputs: &Inputs<f32>,
+    ) {
         let StepData { constants, points, .. } = data;
         let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
         self.put_rows(
@@ -140,8 +149,8 @@ impl GpuSolver {
             let free = |v: usize| constants.inverse_masses[v] != 0.0;
             let place = |v: usize, x: Vec3<f32>| if free(v) { with(x, 0.0) } else { targets[v] };
             let starts = [&constants.previous, &constants.predicted, points];
-            let mut rows = vec![[0.0; 4]; 3 * Layout::stride(model) as usize];
-            for (row, points) in rows.chunks_mut(Layout::stride(model) as usize).zip(starts) {
+            let mut rows = vec![[0.0; 4]; 3 * DeviceLayout::stride(model) as usize];
+            for (row, points) in rows.chunks_mut(DeviceLayout::stride(model) as usize).zip(starts) {
                 for (v, point) in points.iter().enumerate() {
                     row[v] = place(v, point.vec3());
                 }
@@ -157,7 +166,7 @@ impl GpuSolver {
 }
 
 /// A row for each of the solver's vertices.
-fn each(model: &Model<f32>, of: &dyn Fn(usize) -> [f32; 4]) -> Vec<[f32; 4]> {
+fn each(model: &Layout<f32>, of: &dyn Fn(usize) -> [f32; 4]) -> Vec<[f32; 4]> {
     (0..model.vertex_count()).map(of).collect()
 }
 
@@ -169,10 +178,10 @@ fn whole(point: &Point<f32>) -> [f32; 4] {
     [point.x, point.y, point.z, point.w]
 }
 
-impl Layout {
+impl DeviceLayout {
     /// The loads of copies where the device looks for those of corners: all of a vertex's in its first
     /// place.
-    fn loads(&self, model: &Model<f32>, of_copies: &[Point<f32>]) -> Vec<[f32; 4]> {
+    fn loads(&self, model: &Layout<f32>, of_copies: &[Point<f32>]) -> Vec<[f32; 4]> {
         let mut loads = vec![[0.0; 4]; self.slot_count() as usize];
         for v in 0..model.vertex_count() {
             let load = crate::solver::step::data::gather(model, of_copies, v);

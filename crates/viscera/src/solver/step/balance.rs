@@ -11,8 +11,9 @@ use super::data::EndOfStep;
 use super::tissue::Tissue;
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::{deformation_gradient, internal_forces, shape_gradients};
-use crate::model::Model;
-use crate::model::elements::{Before, ElementSet, Moments, for_each_kind};
+use crate::layout::Layout;
+use crate::layout::{Before, ElementSet, Moments};
+use crate::model::for_each_kind;
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::inputs::Inputs;
 use crate::state::State;
@@ -87,7 +88,7 @@ impl ForceBalance {
 
     pub(in crate::solver) fn measure<S: Real>(
         &mut self,
-        model: &Model<S>,
+        model: &Layout<S>,
         state: &State<S>,
         inputs: &Inputs<S>,
         step: &EndOfStep<'_, S>,
@@ -126,10 +127,9 @@ impl ForceBalance {
             }
         }
         let moments = Moments {
-            anchors: inputs.anchors_of(model),
+            anchors: inputs.anchors_of(&model.rest_anchors),
             start: Before::Places(step.previous),
             dt,
-            numbering: &model.numbering,
         };
         for_each_kind!(model, set => self.add_elements(set, state, &moments));
         for tether in step.tethers {

@@ -4,8 +4,8 @@
 
 use super::tethers::Bundle;
 use crate::elements::law::LAWS;
-use crate::model::elements::{Before, Moments};
-use crate::model::{Model, Part, TetSet};
+use crate::layout::{Before, Moments};
+use crate::layout::{Layout, Part, TetSet};
 use crate::scalar::lanes::{Eight, LANES, Point};
 use crate::scalar::{Real, Vec3};
 use crate::settings::SolverSettings;
@@ -17,7 +17,7 @@ const GRAIN: usize = 2048;
 
 /// What a stage may look at but not change.
 pub struct Step<'a, S> {
-    pub model: &'a Model<S>,
+    pub model: &'a Layout<S>,
     pub inputs: &'a Inputs<S>,
     pub dt: f64,
     pub settings: &'a SolverSettings,
@@ -80,7 +80,7 @@ pub struct StepData<S> {
 
 impl<S: Real> StepData<S> {
     /// Memory for the steps of a model, with room for loads where stages of the method need it.
-    pub fn new(model: &Model<S>, settings: &SolverSettings, needs_loads: bool) -> Self {
+    pub fn new(model: &Layout<S>, settings: &SolverSettings, needs_loads: bool) -> Self {
         let vertices = model.vertex_count();
         let points = || vec![Point::default(); vertices];
         let strains = |set: &TetSet<S>| {
@@ -117,7 +117,7 @@ impl<S: Real> StepData<S> {
     }
 
     /// Positions of the state, in the solver's numbering.
-    pub fn read_positions(&mut self, model: &Model<S>, positions: &[Vec3<S>]) {
+    pub fn read_positions(&mut self, model: &Layout<S>, positions: &[Vec3<S>]) {
         for (point, &user) in self.points.iter_mut().zip(&model.numbering.order) {
             point.set_vec3(positions[user as usize]);
         }
@@ -128,10 +128,9 @@ impl<S: Real> StepConstants<S> {
     /// What elements depend on in a step.
     pub fn moments<'a>(&'a self, step: &Step<'a, S>) -> Moments<'a, S> {
         Moments {
-            anchors: step.inputs.anchors_of(step.model),
+            anchors: step.inputs.anchors_of(&step.model.rest_anchors),
             start: Before::Places(&self.previous),
             dt: step.dt,
-            numbering: &step.model.numbering,
         }
     }
 
@@ -191,12 +190,12 @@ impl<S: Real> StepConstants<S> {
 }
 
 /// The copies of one of the solver's vertices.
-pub fn copies_of<S: Real>(model: &Model<S>, v: usize) -> std::ops::Range<usize> {
+pub fn copies_of<S: Real>(model: &Layout<S>, v: usize) -> std::ops::Range<usize> {
     model.copy_offsets[v] as usize..model.copy_offsets[v + 1] as usize
 }
 
 /// Sum of a vertex's loads, in the order of its copies.
-pub fn gather<S: Real>(model: &Model<S>, loads: &[Point<S>], v: usize) -> Point<S> {
+pub fn gather<S: Real>(model: &Layout<S>, loads: &[Point<S>], v: usize) -> Point<S> {
     let mut sum = Point::default();
     for load in &loads[copies_of(model, v)] {
         sum.add(*load);
@@ -205,6 +204,6 @@ pub fn gather<S: Real>(model: &Model<S>, loads: &[Point<S>], v: usize) -> Point<
 }
 
 /// How many copies one of the solver's vertices has.
-pub fn copy_count<S: Real>(model: &Model<S>, v: usize) -> S {
+pub fn copy_count<S: Real>(model: &Layout<S>, v: usize) -> S {
     S::from_f64(copies_of(model, v).len() as f64)
 }

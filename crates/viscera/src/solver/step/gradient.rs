@@ -6,8 +6,9 @@ use super::law::{OfLaw, respond, with_tissue};
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::law::Law;
 use crate::elements::{CornerLoad, internal_forces, shape_gradients};
-use crate::model::Part;
-use crate::model::elements::{ElementSet, Moments, for_each_kind};
+use crate::layout::Part;
+use crate::layout::{ElementSet, Moments};
+use crate::model::for_each_kind;
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::scalar::{Real, Scalar};
 use crate::solver::cpu::tets::{Block, TetPass};
@@ -52,7 +53,7 @@ fn add_forces<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
     let squared = S::from_f64(moments.dt * moments.dt);
     for i in set.of_part(part) {
         let element = set.element::<S>(i, moments);
-        let forces = element.forces(&set.places(i, moments.numbering, x));
+        let forces = element.forces(&set.places(i, x));
         let mass_bound = squared * element.curvature();
         for (copy, force) in set.copies[i].into_iter().zip(forces) {
             add_load(loads, copy, &CornerLoad { impulse: force * squared, mass_bound });

@@ -21,7 +21,7 @@ use super::data::{Step, StepConstants, StepData, gather};
 use super::energy::Energies;
 use super::gradient::load_forces;
 use super::potential::{Evaluator, Potential};
-use crate::model::Model;
+use crate::layout::Layout;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
 use crate::solver::report::StepReport;
@@ -73,7 +73,7 @@ pub struct PartGuard {
 
 impl<S: Real> Guard<S> {
     /// For the steps of a model.
-    pub fn new(model: &Model<S>) -> Self {
+    pub fn new(model: &Layout<S>) -> Self {
         let positions = vec![Point::default(); model.vertex_count()];
         let parts = model.part_count();
         let report =
@@ -278,7 +278,7 @@ fn take<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>, x: &[Point<S>], par
 
 /// Gradient of `Phi` by one vertex and the direction of descent; zero for a pinned one.
 fn descent<S: Real>(
-    model: &Model<S>,
+    model: &Layout<S>,
     data: &StepData<S>,
     x: &[Point<S>],
     v: usize,
@@ -306,7 +306,7 @@ mod tests {
 
     /// A tetrahedron that has swollen. Its corners go back together, which the bounds, one vertex at a time,
     /// know nothing of: in long steps, where inertia is small, a whole step of descent overshoots.
-    fn swollen(settings: &SolverSettings) -> (Model<f64>, Vec<Vec3<f64>>) {
+    fn swollen(settings: &SolverSettings) -> (Layout<f64>, Vec<Vec3<f64>>) {
         let corners = [[1.0; 3], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, 1.0]];
         let rest = corners.map(|x| Vec3::from_f64(x) * 0.01).to_vec();
         let mesh = TetMesh::new(rest, vec![[0, 1, 2, 3]], vec![0]).expect("a tetrahedron").0;
@@ -315,7 +315,7 @@ mod tests {
         let mut builder = ModelBuilder::new();
         builder.add_body(&mesh, &tissue).expect("a body");
         let places = mesh.vertices().iter().map(|x| *x * 1.02).collect();
-        (builder.build(settings).expect("a model"), places)
+        (Layout::new(&builder.build().expect("a model"), settings), places)
     }
 
     /// Before a descent: places, the places of a whole step of it, `Phi` at both, and the slope.

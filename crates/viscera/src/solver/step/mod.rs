@@ -17,7 +17,7 @@ pub mod strain;
 pub mod tethers;
 pub mod tissue;
 
-use crate::model::Model;
+use crate::layout::Layout;
 use crate::scalar::Real;
 use crate::state::State;
 use data::{Step, StepData};
@@ -74,7 +74,7 @@ fn update_velocities<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>) {
     }
 }
 
-fn read_state<S: Real>(model: &Model<S>, data: &mut StepData<S>, state: &State<S>) {
+fn read_state<S: Real>(model: &Layout<S>, data: &mut StepData<S>, state: &State<S>) {
     data.read_positions(model, &state.positions);
     for (velocity, &user) in data.velocities.iter_mut().zip(&model.numbering.order) {
         *velocity = state.velocities[user as usize];

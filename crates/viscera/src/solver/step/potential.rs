@@ -14,8 +14,9 @@ use super::data::{Step, StepConstants};
 use super::law::{OfLaw, respond, with_tissue};
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::law::{LAWS, Law};
-use crate::model::elements::{ElementSet, Moments, for_each_kind};
-use crate::model::{Model, Part};
+use crate::layout::{ElementSet, Moments};
+use crate::layout::{Layout, Part};
+use crate::model::for_each_kind;
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, LANES, Lanes, Point};
 use crate::solver::cpu::tets::{Block, TetPass};
@@ -67,7 +68,7 @@ enum PieceOf {
 
 impl Evaluator {
     /// For a model.
-    pub fn new<S: Real>(model: &Model<S>) -> Self {
+    pub fn new<S: Real>(model: &Layout<S>) -> Self {
         let parts = &model.parts;
         let (mut pieces, mut first) = (Vec::new(), vec![0]);
         for (number, part) in parts.iter().enumerate() {
@@ -256,7 +257,7 @@ fn add_energies<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
 ) {
     for i in set.of_part(part) {
         let element = set.element::<S>(i, moments);
-        *sum += element.energy(&set.places(i, moments.numbering, x)).to_f64();
+        *sum += element.energy(&set.places(i, x)).to_f64();
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::data::{Step, StepData, copy_count};
 use super::tethers::{Bundle, bundle};
-use crate::model::Part;
+use crate::layout::Part;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
 use crate::settings::Start;

@@ -3,7 +3,7 @@
 
 use super::data::StartStrain;
 use crate::elements::{deformation_gradient, green_strain};
-use crate::model::{Model, Part};
+use crate::layout::{Layout, Part};
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::solver::cpu::tets::{Block, TetPass};
@@ -12,7 +12,7 @@ use crate::solver::cpu::threads::{Shared, Workers};
 /// Green strain at `x` of the tetrahedra of viscous sets, of all or of one part.
 pub fn measure_strain<S: Real>(
     workers: &Workers,
-    model: &Model<S>,
+    model: &Layout<S>,
     part: Option<&Part>,
     x: &[Point<S>],
     start_strain: &mut StartStrain<S>,

@@ -10,7 +10,7 @@
 //! colour, no multiplier and no new model. Constraint formulations, guards and accelerations know nothing of it; the
 //! energy limit does, because kinetic energy is that of the mass alone.
 
-use crate::model::Model;
+use crate::layout::Layout;
 use crate::scalar::{Real, Vec3};
 use crate::solver::inputs::{Inputs, Tether};
 
@@ -41,7 +41,7 @@ impl<S: Real> Bundle<S> {
 
 /// The tethers of a step, vertex by vertex; takes no memory where `bundles` has room. One alone keeps its
 /// bits.
-pub fn bundle<S: Real>(model: &Model<S>, inputs: &Inputs<S>, bundles: &mut Vec<Bundle<S>>) {
+pub fn bundle<S: Real>(model: &Layout<S>, inputs: &Inputs<S>, bundles: &mut Vec<Bundle<S>>) {
     bundles.clear();
     let pulling = inputs.tethers.iter().filter(|tether| tether.stiffness > S::ZERO);
     bundles.extend(pulling.map(|&Tether { vertex, target, stiffness }| Bundle {

@@ -2,8 +2,8 @@
 
 use crate::elements::green_strain::{self, Voigt};
 use crate::elements::law::{Law, stretch_curvature, with_law};
+use crate::material::MaterialConstants;
 use crate::material::MaterialModel;
-use crate::model::MaterialConstants;
 use crate::scalar::{Mat3, Scalar, Vec3};
 
 /// Twin of the functions of [`Tissue`]; needs those of the Green strain and of neo-Hookean tissue.

@@ -4,7 +4,7 @@ use super::acceleration::chebyshev_update;
 use super::iterates::{Mixing, fill_multiplier_weights};
 use super::memory::Memory;
 use super::sweep::read_vec3;
-use crate::model::Part;
+use crate::layout::Part;
 use crate::scalar::Real;
 use crate::scalar::lanes::Point;
 use crate::settings::{AndersonGuard, AndersonOn};

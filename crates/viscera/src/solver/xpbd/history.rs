@@ -20,8 +20,9 @@ use std::marker::PhantomData;
 use crate::elements::forms::{Form, pass_by_form, with_form};
 use crate::elements::kinds::{Kind, XpbdBlock};
 use crate::elements::{deformation_gradient, green_strain};
-use crate::model::Part;
-use crate::model::elements::{ElementSet, Moments, for_each_kind};
+use crate::layout::Part;
+use crate::layout::{ElementSet, Moments};
+use crate::model::for_each_kind;
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::solver::cpu::tets::{Block, TetPass, load_rows};
@@ -93,7 +94,7 @@ fn constitutive_elements<S: Real, K: Kind<N, M>, const N: usize, const M: usize>
     let squared = S::from_f64(moments.dt * moments.dt);
     for i in set.of_part(part) {
         let element = set.element::<S>(i, moments);
-        let places = set.places(i, moments.numbering, x);
+        let places = set.places(i, x);
         let pulls = element.constitutive(&places, element.compliance(squared));
         l[set.multipliers(i)].copy_from_slice(&pulls);
     }

@@ -3,8 +3,9 @@
 use super::acceleration::Anderson;
 use crate::elements::forms::{Form, GreenStrain, with_form};
 use crate::elements::kinds::{Energy, Kind};
-use crate::model::elements::{ElementSet, Moments, for_each_kind};
-use crate::model::{Model, Part};
+use crate::layout::ElementSet;
+use crate::layout::{Layout, Part};
+use crate::model::for_each_kind;
 use crate::scalar::Real;
 use crate::scalar::lanes::{LANES, Point};
 use crate::settings::AndersonOn;
@@ -102,7 +103,7 @@ pub fn scatter<S: Copy>(part: &Part, from: &[S], all: &mut [S]) {
 }
 
 /// The diagonal of `a~` of every multiplier; nothing where there is no room for it.
-pub fn fill_multiplier_weights<S: Real>(model: &Model<S>, dt: f64, weights: &mut [S]) {
+pub fn fill_multiplier_weights<S: Real>(model: &Layout<S>, dt: f64, weights: &mut [S]) {
     if weights.is_empty() {
         return;
     }
@@ -133,13 +134,12 @@ pub fn fill_multiplier_weights<S: Real>(model: &Model<S>, dt: f64, weights: &mut
 /// Of the elements of one kind: constraints whose energy has the curvature `k` have `a~ = 1/(k dt^2)`.
 fn fill_weights<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
     set: &ElementSet<S, K, N, M>,
-    model: &Model<S>,
+    model: &Layout<S>,
     dt: S,
     weights: &mut [S],
 ) {
-    let moments = Moments::at_rest(model, &model.rest_anchors);
     for i in 0..set.len() {
-        let stiffness = set.element::<S>(i, &moments).curvature();
+        let stiffness = set.list.element::<S>(i, &model.rest_anchors).curvature();
         weights[set.multipliers(i)].fill(S::ONE / (stiffness * dt * dt));
     }
 }

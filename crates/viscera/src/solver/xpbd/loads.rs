@@ -10,7 +10,8 @@ use std::marker::PhantomData;
 use crate::elements::forms::{Form, pass_by_form, with_form};
 use crate::elements::green_strain;
 use crate::elements::kinds::{Kind, XpbdBlock};
-use crate::model::elements::{ElementSet, Moments, for_each_kind};
+use crate::layout::{ElementSet, Moments};
+use crate::model::for_each_kind;
 use crate::scalar::Real;
 use crate::scalar::lanes::{Lanes, Point};
 use crate::solver::cpu::tets::{Block, TetPass};
@@ -50,7 +51,7 @@ fn add_loads<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
 ) {
     let squared = S::from_f64(moments.dt * moments.dt);
     for i in 0..set.len() {
-        let (places, l) = (set.places(i, moments.numbering, x), set.read(i, multipliers));
+        let (places, l) = (set.places(i, x), set.read(i, multipliers));
         let on_vertices = set.element::<S>(i, moments).loads(&places, &l, squared);
         for (copy, load) in set.copies[i].into_iter().zip(&on_vertices) {
             add_load(loads, copy, load);

@@ -2,7 +2,7 @@
 
 use super::acceleration::Chebyshev;
 use super::iterates::{Iterate, Mixing};
-use crate::model::Model;
+use crate::layout::Layout;
 use crate::scalar::Real;
 use crate::scalar::lanes::Point;
 use crate::settings::{Acceleration, AndersonOn, SolverSettings};
@@ -26,7 +26,7 @@ pub struct Memory<S> {
 
 impl<S: Real> Memory<S> {
     /// Memory for the steps of a model.
-    pub fn new(model: &Model<S>, settings: &SolverSettings) -> Self {
+    pub fn new(model: &Layout<S>, settings: &SolverSettings) -> Self {
         let [chebyshev, anderson] = [Acceleration::Chebyshev, Acceleration::Anderson]
             .map(|acceleration| settings.acceleration == acceleration);
         let points =

@@ -13,8 +13,8 @@ pub mod rebase;
 pub mod stage;
 mod sweep;
 
-use crate::model::Model;
-use crate::model::elements::for_each_kind;
+use crate::layout::Layout;
+use crate::model::for_each_kind;
 use crate::scalar::Real;
 use crate::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Start};
 use crate::solver::plan::{Plan, Stage};
@@ -30,7 +30,7 @@ use stage::{Mix, XpbdStage};
 use sweep::solve_color;
 
 /// The stages of a step.
-pub fn plan<S: Real>(model: &Model<S>, settings: &SolverSettings) -> Plan {
+pub fn plan<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Plan {
     let mut prologue: Vec<Stage> = vec![StepStage::ReadState.into()];
     if model.is_viscous() {
         prologue.push(StepStage::MeasureStrain.into());
@@ -72,7 +72,7 @@ pub fn plan<S: Real>(model: &Model<S>, settings: &SolverSettings) -> Plan {
 }
 
 /// The stages of an iteration.
-fn body<S: Real>(model: &Model<S>, settings: &SolverSettings) -> Vec<XpbdStage> {
+fn body<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Vec<XpbdStage> {
     let mut body = Vec::new();
     if is_accelerated(settings) && !mixes_remember(settings) {
         body.push(XpbdStage::RememberIterate);
@@ -131,7 +131,7 @@ fn mixes_remember(settings: &SolverSettings) -> bool {
 }
 
 /// Whether every copy has one constraint, and all are of one colour.
-pub fn is_jacobi<S: Real>(model: &Model<S>) -> bool {
+pub fn is_jacobi<S: Real>(model: &Layout<S>) -> bool {
     let mut corners = 4 * model.tet_count();
     for_each_kind!(model, set => corners += set.vertices.as_flattened().len());
     model.color_count == 1 && model.copy_count() == corners

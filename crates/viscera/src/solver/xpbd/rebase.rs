@@ -1,7 +1,7 @@
 //! What happens to vertices between sweeps: the rebase, and copies that part and come together again.
 
 use super::memory::Memory;
-use crate::model::{Model, Part};
+use crate::layout::{Layout, Part};
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
 use crate::settings::SolverSettings;
@@ -52,7 +52,7 @@ pub fn rebase<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>) {
 }
 
 /// [`super::stage::XpbdStage::RecomputePositions`].
-pub fn recompute_positions<S: Real>(model: &Model<S>, data: &mut StepData<S>) {
+pub fn recompute_positions<S: Real>(model: &Layout<S>, data: &mut StepData<S>) {
     let StepData { constants, points, loads, .. } = data;
     for part in model.parts.iter() {
         constants.each_vertex(part, points, |v, point| {
@@ -67,7 +67,7 @@ pub fn recompute_positions<S: Real>(model: &Model<S>, data: &mut StepData<S>) {
 
 impl<S: Real> Memory<S> {
     /// [`super::stage::XpbdStage::SplitCopies`].
-    pub fn split_copies(&mut self, model: &Model<S>, data: &StepData<S>) {
+    pub fn split_copies(&mut self, model: &Layout<S>, data: &StepData<S>) {
         for (v, point) in data.points.iter().enumerate() {
             self.copies[copies_of(model, v)].fill(*point);
         }
@@ -75,7 +75,7 @@ impl<S: Real> Memory<S> {
 
     /// Averages the changes of the copies, not the copies: the mean of equal numbers is then that
     /// number, and a vertex nobody moved stays where it is to the bit.
-    pub fn join_copies(&mut self, model: &Model<S>, data: &mut StepData<S>) {
+    pub fn join_copies(&mut self, model: &Layout<S>, data: &mut StepData<S>) {
         for part in model.parts.iter() {
             if part.is_split() {
                 self.average_copies(model, part, data);
@@ -89,7 +89,7 @@ impl<S: Real> Memory<S> {
         }
     }
 
-    fn average_copies(&self, model: &Model<S>, part: &Part, data: &mut StepData<S>) {
+    fn average_copies(&self, model: &Layout<S>, part: &Part, data: &mut StepData<S>) {
         let copies = &self.copies;
         data.constants.each_vertex(part, &mut data.points, |v, point| {
             let range = copies_of(model, v);

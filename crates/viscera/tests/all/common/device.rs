@@ -6,7 +6,6 @@ use crate::common::{SNH, STVK, block, material};
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
-use viscera::settings::SolverSettings;
 use viscera::solver::gpu::{Adapter, Device};
 
 /// The first adapter there is. Without any the test fails and says what to install.
@@ -38,7 +37,7 @@ pub fn largest<S: Real>(a: &[Vec3<S>], oracle: &[Vec3<f64>]) -> f64 {
 
 /// Two bars, one above the other, joined by springs; the upper one viscous, with vertices that are attached
 /// once and twice: everything a model can have.
-pub fn everything<S: Real>(settings: &SolverSettings) -> Model<S> {
+pub fn everything<S: Real>() -> Model<S> {
     let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
     let up: Vec<_> = mesh.vertices().iter().map(|x| *x + vec3(0.0, 0.0, 0.05)).collect();
     let (above, _) =
@@ -57,5 +56,5 @@ pub fn everything<S: Real>(settings: &SolverSettings) -> Model<S> {
             builder.add_attachment(half + v, away, 10.0).expect("an attachment");
         }
     }
-    builder.build(settings).expect("a model")
+    builder.build().expect("a model")
 }

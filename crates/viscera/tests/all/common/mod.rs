@@ -57,14 +57,10 @@ pub fn material(model: MaterialModel, young: f64, poisson: f64) -> Material {
 }
 
 /// One body of one material.
-pub fn single_body<S: Real>(
-    mesh: &TetMesh,
-    material: &Material,
-    settings: &SolverSettings,
-) -> Model<S> {
+pub fn single_body<S: Real>(mesh: &TetMesh, material: &Material) -> Model<S> {
     let mut builder = ModelBuilder::new();
     builder.add_body(mesh, material).expect("a legal body");
-    builder.build(settings).expect("a legal model")
+    builder.build().expect("a legal model")
 }
 
 /// Structured block [m] of six tetrahedra per cell, its interior vertices jittered by up to
@@ -153,7 +149,7 @@ pub fn plain(substeps: u32, iterations: u32) -> SolverSettings {
 }
 
 /// Both materials, one of them viscous, springs and attachments.
-pub fn everything<S: Real>(colors: Colors) -> Model<S> {
+pub fn everything<S: Real>() -> Model<S> {
     let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
     let mut builder = ModelBuilder::new();
     let viscous = material(SNH, 1e4, 0.4).with_viscosity(0.05).expect("legal");
@@ -165,7 +161,7 @@ pub fn everything<S: Real>(colors: Colors) -> Model<S> {
         let anchor = mesh.vertices()[v as usize];
         builder.add_attachment(half + v, anchor, 30.0).expect("an attachment");
     }
-    builder.build(&colored(colors)).expect("a model")
+    builder.build().expect("a model")
 }
 
 /// Whether a test has its process to itself. Where it has not, the test of this name is run in another one,

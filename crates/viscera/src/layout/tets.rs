@@ -6,8 +6,10 @@
 
 use std::ops::Range;
 
+use super::order::Order;
 use crate::elements::TetForm;
 use crate::material::MaterialModel;
+use crate::model::Model;
 use crate::scalar::lanes::{Eight, LANES};
 use crate::scalar::{Mat3, Real, Vec3, vec3};
 
@@ -21,7 +23,7 @@ pub(crate) struct TetBlock<S> {
     pub inverse_rest_shape: [Eight<S>; 9],
     /// Rest volume [m^3].
     pub rest_volume: Eight<S>,
-    /// Index into [`super::Model::materials`].
+    /// Index into [`crate::model::Model::materials`].
     pub material: Eight<u32>,
 }
 
@@ -56,9 +58,9 @@ pub struct TetSet<S> {
     pub(crate) bounds: [usize; 2],
 }
 
-/// One tetrahedron as [`super::Model::tets`] shows it.
+/// One tetrahedron as [`super::Layout::tets`] shows it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tet<S> {
+pub struct LaidTet<S> {
     /// The user's number.
     pub number: usize,
     /// The user's vertices.
@@ -69,7 +71,7 @@ pub struct Tet<S> {
     pub inverse_rest_shape: Mat3<S>,
     /// Rest volume [m^3].
     pub rest_volume: S,
-    /// Index into [`super::Model::materials`].
+    /// Index into [`crate::model::Model::materials`].
     pub material: usize,
     /// Its colour.
     pub color: usize,
@@ -77,7 +79,7 @@ pub struct Tet<S> {
     pub(super) first_multiplier: usize,
 }
 
-impl<S> Tet<S> {
+impl<S> LaidTet<S> {
     /// Where one of its elastic multipliers stands in [`crate::state::State::multipliers`].
     pub fn multiplier(&self, p: usize) -> usize {
         self.first_multiplier + LANES * p
@@ -85,6 +87,54 @@ impl<S> Tet<S> {
 }
 
 impl<S: Real> TetSet<S> {
+    /// The tetrahedra of a law, sorted and in blocks.
+    pub(super) fn new(
+        model: &Model<S>,
+        law: MaterialModel,
+        form: TetForm,
+        sorted: &mut Order<'_>,
+    ) -> Self {
+        let of_law = |&tet: &usize| model.laws[model.tet_materials[tet] as usize] == law;
+        let (order, colors) = sorted.sort((0..model.tet_count()).filter(of_law).collect());
+        let viscous_parts = viscous_parts(model, sorted, &order);
+        let is_viscous = viscous_parts.contains(&true);
+        let in_blocks = |color: &[u32]| sorted.blocks(&order, color).count();
+        let count = colors.windows(2).map(in_blocks).sum();
+        let mut set = Self {
+            model: law,
+            form,
+            viscous: is_viscous,
+            blocks: Vec::with_capacity(count),
+            filled: Vec::with_capacity(count),
+            uniform: Vec::with_capacity(count),
+            viscous_blocks: Vec::with_capacity(if is_viscous { count } else { 0 }),
+            copies: Vec::with_capacity(if sorted.is_split() { count } else { 0 }),
+            color_offsets: vec![0],
+            multiplier_offset: 0,
+            viscous_offset: 0,
+            bounds: [model.vertex_count(), sorted.copy_count()],
+            order,
+        };
+        for color in colors.windows(2) {
+            for chosen in sorted.blocks(&set.order, color) {
+                set.filled.push(chosen.len() as u8);
+                let block = TetBlock::new(model, chosen);
+                set.uniform.push(block.material.iter().all(|&m| m == block.material[0]));
+                set.blocks.push(block);
+                if is_viscous {
+                    set.viscous_blocks.push(viscous_parts[sorted.part(chosen[0])]);
+                }
+                if sorted.is_split() {
+                    set.copies.push(sorted.block_copies(chosen));
+                }
+            }
+            set.color_offsets.push(set.blocks.len() as u32);
+        }
+        [set.multiplier_offset, set.viscous_offset] =
+            set.multiplier_counts().map(|count| sorted.take_multipliers(count));
+        set
+    }
+
     /// Number of tetrahedra.
     pub fn len(&self) -> usize {
         self.order.len()
@@ -145,14 +195,24 @@ impl<S: Real> TetSet<S> {
 }
 
 impl<S: Real> TetBlock<S> {
-    /// Nothing yet.
-    pub fn empty() -> Self {
-        Self {
+    /// Of up to eight tetrahedra; the last fills the block up.
+    fn new(model: &Model<S>, tets: &[u32]) -> Self {
+        let mut block = Self {
             vertices: [[0; LANES]; 4],
             inverse_rest_shape: [[S::ZERO; LANES]; 9],
             rest_volume: [S::ZERO; LANES],
             material: [0; LANES],
+        };
+        for lane in 0..LANES {
+            let tet = model.tet(tets[lane.min(tets.len() - 1)] as usize);
+            block.set_shape(lane, &tet.inverse_rest_shape);
+            block.rest_volume[lane] = tet.rest_volume;
+            block.material[lane] = tet.material;
+            for (corner, v) in tet.vertices.into_iter().enumerate() {
+                block.vertices[corner][lane] = model.numbering.of(v) as u32;
+            }
         }
+        block
     }
 
     /// `Dm^-1` [1/m] of one lane.
@@ -165,11 +225,21 @@ impl<S: Real> TetBlock<S> {
     }
 
     /// Sets `Dm^-1` [1/m] of one lane.
-    pub fn set_shape(&mut self, lane: usize, shape: &Mat3<S>) {
+    fn set_shape(&mut self, lane: usize, shape: &Mat3<S>) {
         for (c, column) in shape.columns.iter().enumerate() {
             for (row, value) in column.to_array().into_iter().enumerate() {
                 self.inverse_rest_shape[3 * c + row][lane] = value;
             }
         }
     }
+}
+
+/// Whether any of some tetrahedra in each part is viscous.
+fn viscous_parts<S: Real>(model: &Model<S>, sorted: &Order<'_>, tets: &[u32]) -> Vec<bool> {
+    let mut viscous = vec![false; model.part_count];
+    for &tet in tets {
+        let material = &model.materials[model.tet_materials[tet as usize] as usize];
+        viscous[sorted.part(tet)] |= material.viscosity > S::ZERO;
+    }
+    viscous
 }

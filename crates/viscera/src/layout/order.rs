@@ -1,7 +1,7 @@
 //! Constraints sorted by colour, and their places in the flat arrays.
 
-use super::numbering::Numbering;
 use crate::coloring::{Coloring, ConstraintGraph};
+use crate::model::Numbering;
 use crate::scalar::lanes::{Eight, LANES};
 
 /// First copy of each vertex in the solver's numbering.
@@ -18,7 +18,7 @@ pub(super) fn renumbered_copies(coloring: &Coloring, numbering: &Numbering) -> V
 }
 
 /// Hands out places in the flat arrays while the sets are laid out one after the other.
-pub(super) struct Layout<'a> {
+pub(super) struct Order<'a> {
     pub graph: &'a ConstraintGraph,
     pub coloring: &'a Coloring,
     pub numbering: &'a Numbering,
@@ -27,9 +27,11 @@ pub(super) struct Layout<'a> {
     /// Of the solver's vertices.
     pub copy_offsets: &'a [u32],
     pub multipliers: usize,
+    /// Constraints that have been sorted: tetrahedra first, then other elements kind by kind.
+    pub sorted: usize,
 }
 
-impl Layout<'_> {
+impl Order<'_> {
     /// Sorts constraints by colour, then by place, and so by part, then by number; returns them with the offsets of
     /// the colours.
     pub fn sort(&self, mut constraints: Vec<usize>) -> (Vec<u32>, Vec<u32>) {

@@ -188,15 +188,16 @@ fn joined(ranges: impl Iterator<Item = Range<usize>>) -> impl Iterator<Item = Ra
 
 #[cfg(test)]
 mod tests {
+    use crate::layout::Layout;
     use crate::material::{Material, MaterialModel};
     use crate::mesh::TetMesh;
     use crate::mesh::shapes::Block;
-    use crate::model::{Model, ModelBuilder};
+    use crate::model::ModelBuilder;
     use crate::scalar::{Vec3, vec3};
     use crate::settings::{Colors, SolverSettings};
 
     /// Positions by part, blocks and multipliers in their order: what a step of the part reads.
-    fn laid_out(model: &Model<f64>, part: usize) -> (Vec<Vec3<f64>>, Vec<Vec<f64>>, usize) {
+    fn laid_out(model: &Layout<f64>, part: usize) -> (Vec<Vec3<f64>>, Vec<Vec<f64>>, usize) {
         let part = &model.parts[part];
         let numbers = &model.numbering.order[part.vertices.clone()];
         let places = numbers.iter().map(|&v| model.rest_positions[v as usize]).collect();
@@ -246,7 +247,7 @@ mod tests {
                     builder.add_spring([first, first + 7], 10.0, None).expect("a spring");
                     builder.add_attachment(first, Vec3::ZERO, 10.0).expect("an attachment");
                 }
-                builder.build::<f64>(&settings).expect("a model")
+                Layout::new(&builder.build::<f64>().expect("a model"), &settings)
             };
             for order in [[0, 1], [1, 0]] {
                 let both = build(&order);
