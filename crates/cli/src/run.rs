@@ -211,7 +211,7 @@ fn heading<S: Real>(simulation: &Simulation<S>, summary: &Summary, frames: u64) 
     let work = match solver.method {
         Method::Xpbd => format!(" x {} iterations", solver.iterations),
         Method::Explicit => {
-            let small = format!("{:.2e} s", simulation.solver().stable_step());
+            let small = format!("{:.2e} s", simulation.stable_step());
             format!(", divided into small steps of at most {small}")
         }
     };

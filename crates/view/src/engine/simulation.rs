@@ -172,7 +172,7 @@ impl<S: Real> Run for SimulationRun<S> {
         self.measures.residual = report.relative_residual;
         self.measures.energy = report.energy;
         self.measures.inverted = report.deformation.inverted;
-        self.measures.rejected = self.simulation.solver().rejected_steps();
+        self.measures.rejected = self.simulation.rejected_steps();
         self.measures.scene_patches = self.scene_patches(report.patches);
         Ok(())
     }

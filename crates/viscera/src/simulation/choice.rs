@@ -6,32 +6,28 @@ use super::error::SimulationError;
 use super::gpu;
 use crate::model::Model;
 use crate::scalar::Real;
-use crate::settings::DeviceRequest;
-#[cfg(feature = "gpu")]
-use crate::settings::Method;
+use crate::settings::{DeviceRequest, SolverSettings};
 use crate::solver::Solver;
 
 impl<S: Real> Backend<S> {
     /// What the settings ask for, for steps of `dt` [s].
-    #[cfg(feature = "gpu")]
-    pub fn choose(model: &Model<S>, solver: &Solver<S>, dt: f64) -> Result<Self, SimulationError> {
-        let settings = solver.settings();
-        let sweeps = match settings.method {
-            Method::Xpbd => settings.iterations,
-            Method::Explicit => (dt / solver.stable_step()).ceil() as u32,
-        };
-        match settings.device {
-            DeviceRequest::Cpu => Ok(Self::cpu("as asked for")),
-            _ => gpu::choose(model, solver, sweeps),
+    pub fn choose(
+        model: &Model<S>,
+        settings: &SolverSettings,
+        dt: f64,
+    ) -> Result<Self, SimulationError> {
+        if settings.device == DeviceRequest::Cpu {
+            return Ok(Self::cpu(Solver::new(model, settings), "as asked for"));
         }
-    }
-
-    /// What the settings ask for.
-    #[cfg(not(feature = "gpu"))]
-    pub fn choose(_: &Model<S>, solver: &Solver<S>, _: f64) -> Result<Self, SimulationError> {
-        match &solver.settings().device {
-            DeviceRequest::Cpu => Ok(Self::cpu("as asked for")),
-            DeviceRequest::Auto => Ok(Self::cpu("the GPU backend was left out of this build")),
+        #[cfg(feature = "gpu")]
+        return gpu::choose(model, settings, dt);
+        #[cfg(not(feature = "gpu"))]
+        match &settings.device {
+            DeviceRequest::Auto => {
+                let reason = "the GPU backend was left out of this build";
+                let _ = dt;
+                Ok(Self::cpu(Solver::new(model, settings), reason))
+            }
             device => Err(SimulationError::NoGpuBackend { device: device.clone() }),
         }
     }
@@ -41,21 +37,25 @@ impl<S: Real> Backend<S> {
         &self,
         same_device: bool,
         model: &Model<S>,
-        solver: &Solver<S>,
+        settings: &SolverSettings,
         dt: f64,
     ) -> Result<Self, SimulationError> {
         #[cfg(feature = "gpu")]
-        if same_device && let Some(again) = gpu::again(self, model, solver.settings()) {
+        if same_device && let Some(again) = gpu::again(self, model, settings) {
             return again;
         }
         let warning = self.warning.clone().filter(|_| same_device);
-        match warning {
+        let mut backend = match warning {
             // A device that was lost is not tried again before somebody asks for it.
             Some(warning) => {
-                let cpu = Self::cpu(&warning);
-                Ok(Self { warning: Some(warning), ..cpu })
+                let cpu = Self::cpu(Solver::new(model, settings), &warning);
+                Self { warning: Some(warning), ..cpu }
             }
-            None => Self::choose(model, solver, dt),
+            None => Self::choose(model, settings, dt)?,
+        };
+        if let Some(instructions) = self.instructions() {
+            backend.use_instructions(instructions);
         }
+        Ok(backend)
     }
 }

@@ -1,18 +1,25 @@
-//! What computes the steps of a simulation: the CPU, or a graphics processor with the CPU behind it.
+//! What computes the steps of a simulation: the CPU, or a graphics processor.
 
 use std::fmt::Debug;
 
 use super::error::FrameError;
+use crate::layout::Layout;
 use crate::model::Model;
+use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
+use crate::settings::SolverSettings;
 use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]
 use crate::solver::gpu::GpuSolver;
-use crate::solver::{Inputs, Solver};
+use crate::solver::{Inputs, Solver, StepError};
 use crate::state::State;
 
-/// Steps elsewhere than on the CPU, told to a simulation of any precision.
-pub(super) trait Elsewhere<S>: Debug + Send {
+/// A solver on a graphics processor, as a simulation of any precision sees it.
+pub(super) trait DeviceSolver<S>: Debug + Send {
+    fn layout(&self) -> &Layout<S>;
+
+    fn stable_step(&self) -> f64;
+
     fn step(&mut self, model: &Model<S>, inputs: &Inputs<S>, dt: f64) -> Result<(), FrameError>;
 
     /// Positions and velocities after the last step; how many steps were rejected so far. On an error nothing
@@ -36,14 +43,25 @@ pub(super) trait Elsewhere<S>: Debug + Send {
 
     fn write_velocities(&mut self, velocities: &[Vec3<S>]);
 
+    /// Multipliers from the places where vertices are.
+    fn restart(&mut self, model: &Model<S>, inputs: &Inputs<S>, dt: f64) -> Result<(), StepError>;
+
     #[cfg(feature = "gpu")]
     fn solver(&self) -> &GpuSolver;
+}
+
+/// The solver: one of them.
+#[derive(Debug)]
+pub(super) enum Engine<S> {
+    Cpu(Box<Solver<S>>),
+    #[cfg_attr(not(feature = "gpu"), allow(dead_code))]
+    Device(Box<dyn DeviceSolver<S>>),
 }
 
 /// What computes the steps, and why.
 #[derive(Debug)]
 pub(super) struct Backend<S> {
-    pub elsewhere: Option<Box<dyn Elsewhere<S>>>,
+    pub engine: Engine<S>,
     pub choice: String,
     pub warning: Option<String>,
     /// Whether the CPU goes on where the device is lost.
@@ -54,34 +72,132 @@ pub(super) struct Backend<S> {
 
 impl<S: Real> Backend<S> {
     /// The CPU, for a reason.
-    pub fn cpu(reason: impl std::fmt::Display) -> Self {
+    pub fn cpu(solver: Solver<S>, reason: impl std::fmt::Display) -> Self {
         let choice = format!("CPU: {reason}");
-        Self { elsewhere: None, choice, warning: None, gives_way: false, rejected: 0 }
+        Self::new(Engine::Cpu(Box::new(solver)), choice)
+    }
+
+    /// A solver, for a reason.
+    pub fn new(engine: Engine<S>, choice: String) -> Self {
+        Self { engine, choice, warning: None, gives_way: false, rejected: 0 }
+    }
+
+    /// The solver on a graphics processor, where that computes.
+    pub fn device(&self) -> Option<&dyn DeviceSolver<S>> {
+        match &self.engine {
+            Engine::Cpu(_) => None,
+            Engine::Device(device) => Some(&**device),
+        }
+    }
+
+    /// As [`Backend::device`].
+    pub fn device_mut(&mut self) -> Option<&mut (dyn DeviceSolver<S> + 'static)> {
+        match &mut self.engine {
+            Engine::Cpu(_) => None,
+            Engine::Device(device) => Some(&mut **device),
+        }
+    }
+
+    pub fn layout(&self) -> &Layout<S> {
+        match &self.engine {
+            Engine::Cpu(solver) => solver.layout(),
+            Engine::Device(device) => device.layout(),
+        }
+    }
+
+    pub fn stable_step(&self) -> f64 {
+        match &self.engine {
+            Engine::Cpu(solver) => solver.stable_step(),
+            Engine::Device(device) => device.stable_step(),
+        }
+    }
+
+    /// The instructions that the CPU works with, where it computes.
+    pub fn instructions(&self) -> Option<Instructions> {
+        match &self.engine {
+            Engine::Cpu(solver) => Some(solver.instructions()),
+            Engine::Device(_) => None,
+        }
+    }
+
+    /// See [`Solver::use_instructions`].
+    pub fn use_instructions(&mut self, instructions: Instructions) {
+        if let Engine::Cpu(solver) = &mut self.engine {
+            solver.use_instructions(instructions);
+        }
     }
 
     /// Advances by one step of `dt` [s].
     pub fn step(
         &mut self,
-        solver: &mut Solver<S>,
         model: &Model<S>,
         state: &mut State<S>,
         inputs: &Inputs<S>,
         dt: f64,
     ) -> Result<(), FrameError> {
-        match &mut self.elsewhere {
-            Some(elsewhere) => elsewhere.step(model, inputs, dt),
-            None => Ok(solver.step(model, state, inputs, dt)?),
+        match &mut self.engine {
+            Engine::Cpu(solver) => Ok(solver.step(model, state, inputs, dt)?),
+            Engine::Device(device) => device.step(model, inputs, dt),
+        }
+    }
+
+    /// Positions and velocities after the last step, where they are not there yet.
+    pub fn read_frame(&mut self, model: &Model<S>, state: &mut State<S>) -> Result<(), FrameError> {
+        if let Engine::Device(device) = &mut self.engine {
+            self.rejected = device.read_frame(model, state)?;
+        }
+        Ok(())
+    }
+
+    /// The force balance of the last step.
+    pub fn force_balance(
+        &self,
+        model: &Model<S>,
+        state: &State<S>,
+        inputs: &Inputs<S>,
+        balance: &mut ForceBalance,
+    ) -> Result<(), FrameError> {
+        match &self.engine {
+            Engine::Cpu(solver) => Ok(solver.force_balance(model, state, inputs, balance)?),
+            Engine::Device(device) => device.force_balance(model, state, inputs, balance),
+        }
+    }
+
+    /// Goes on from a state with the tissue's answer to where it is.
+    pub fn restart(
+        &mut self,
+        model: &Model<S>,
+        state: &mut State<S>,
+        inputs: &Inputs<S>,
+        dt: f64,
+    ) -> Result<(), StepError> {
+        match &mut self.engine {
+            Engine::Cpu(solver) => solver.restart(model, state, inputs, dt),
+            Engine::Device(device) => {
+                device.write(model, state);
+                device.restart(model, inputs, dt)
+            }
         }
     }
 
     /// Steps that have been rejected so far.
-    pub fn rejected_steps(&self, solver: &Solver<S>) -> u64 {
-        if self.elsewhere.is_some() { self.rejected } else { solver.rejected_steps() }
+    pub fn rejected_steps(&self) -> u64 {
+        match &self.engine {
+            Engine::Cpu(solver) => solver.rejected_steps(),
+            Engine::Device(_) => self.rejected,
+        }
     }
 
     /// Goes on with the CPU.
-    pub fn give_way(&mut self, time: f64, reason: &FrameError) {
+    pub fn give_way(
+        &mut self,
+        model: &Model<S>,
+        settings: &SolverSettings,
+        time: f64,
+        reason: &FrameError,
+    ) {
         let warning = format!("after {time:.4} s {reason}; the CPU went on from there");
-        *self = Self { warning: Some(warning.clone()), ..Self::cpu(warning) };
+        let solver = Solver::new(model, settings);
+        *self = Self { warning: Some(warning.clone()), ..Self::cpu(solver, warning) };
     }
 }

@@ -2,18 +2,35 @@
 
 use std::any::Any;
 
-use super::device::{Backend, Elsewhere};
+use super::device::{Backend, DeviceSolver, Engine};
 use super::error::{FrameError, SimulationError};
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
-use crate::settings::{DeviceRequest, SolverSettings};
+use crate::settings::{DeviceRequest, Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::gpu::{Adapter, Device, GpuError, GpuSolver, StepCost};
-use crate::solver::{Inputs, Solver};
+use crate::solver::{Inputs, Solver, StepError};
 use crate::state::State;
 
-impl Elsewhere<f32> for GpuSolver {
+impl DeviceSolver<f32> for GpuSolver {
+    fn layout(&self) -> &Layout<f32> {
+        GpuSolver::layout(self)
+    }
+
+    fn stable_step(&self) -> f64 {
+        GpuSolver::stable_step(self)
+    }
+
+    fn restart(
+        &mut self,
+        model: &Model<f32>,
+        inputs: &Inputs<f32>,
+        dt: f64,
+    ) -> Result<(), StepError> {
+        GpuSolver::restart(self, model, inputs, dt)
+    }
+
     fn step(
         &mut self,
         model: &Model<f32>,
@@ -66,18 +83,12 @@ pub(super) fn again<S: Real>(
     model: &Model<S>,
     settings: &SolverSettings,
 ) -> Option<Result<Backend<S>, SimulationError>> {
-    let device = backend.elsewhere.as_ref()?.solver().device();
+    let device = backend.device()?.solver().device();
     let model: &dyn Any = model;
     let solver = GpuSolver::new(device, model.downcast_ref::<Model<f32>>()?, settings);
     Some(solver.map_err(Into::into).and_then(|solver| {
-        let renewed = Backend {
-            elsewhere: Some(Box::new(solver)),
-            choice: backend.choice.clone(),
-            warning: None,
-            gives_way: backend.gives_way,
-            rejected: 0,
-        };
-        of_precision(renewed)
+        let renewed = Backend::new(Engine::Device(Box::new(solver)), backend.choice.clone());
+        of_precision(Backend { gives_way: backend.gives_way, ..renewed })
     }))
 }
 
@@ -89,25 +100,25 @@ fn of_precision<S: Real>(backend: Backend<f32>) -> Result<Backend<S>, Simulation
     backend.ok_or(SimulationError::Gpu(GpuError::DoublePrecision))
 }
 
-/// What the settings ask for, with so many sweeps per step. They do not ask for the CPU.
+/// What the settings ask for, for steps of `dt` [s]. They do not ask for the CPU.
 pub(super) fn choose<S: Real>(
     model: &Model<S>,
-    solver: &Solver<S>,
-    sweeps: u32,
+    settings: &SolverSettings,
+    dt: f64,
 ) -> Result<Backend<S>, SimulationError> {
-    let settings = solver.settings();
-    let (model, layout): (&dyn Any, &dyn Any) = (model, solver.layout());
-    let both = (model.downcast_ref::<Model<f32>>(), layout.downcast_ref::<Layout<f32>>());
-    let (Some(model), Some(layout)) = both else {
+    let single: &dyn Any = model;
+    let Some(single) = single.downcast_ref::<Model<f32>>() else {
         return match settings.device {
-            DeviceRequest::Auto => Ok(Backend::cpu("double precision")),
+            DeviceRequest::Auto => {
+                Ok(Backend::cpu(Solver::new(model, settings), "double precision"))
+            }
             _ => Err(GpuError::DoublePrecision.into()),
         };
     };
     let chosen = match &settings.device {
-        DeviceRequest::Named(name) => asked_for(Some(name), model, settings)?,
-        DeviceRequest::Gpu => asked_for(None, model, settings)?,
-        _ => faster(model, settings, &StepCost::new(layout, settings, sweeps)),
+        DeviceRequest::Named(name) => asked_for(Some(name), single, settings)?,
+        DeviceRequest::Gpu => asked_for(None, single, settings)?,
+        _ => faster(single, settings, dt),
     };
     of_precision(chosen)
 }
@@ -121,14 +132,19 @@ fn asked_for(
 }
 
 /// The one that is expected to be faster, and the CPU where no device can do it.
-fn faster(model: &Model<f32>, settings: &SolverSettings, cost: &StepCost) -> Backend<f32> {
+fn faster(model: &Model<f32>, settings: &SolverSettings, dt: f64) -> Backend<f32> {
+    let solver = Solver::new(model, settings);
+    let sweeps = match settings.method {
+        Method::Xpbd => settings.iterations,
+        Method::Explicit => (dt / solver.stable_step()).ceil() as u32,
+    };
+    let cost = StepCost::new(solver.layout(), settings, sweeps);
     let tets = grouped(model.tet_count() as u64);
     // Before any driver is loaded, which takes longer than a small scene.
     if !cost.gpu_pays() {
         let from = grouped(cost.pays_from());
-        return Backend::cpu(format!(
-            "the mesh has {tets} tetrahedra; a GPU pays from about {from} on"
-        ));
+        let reason = format!("the mesh has {tets} tetrahedra; a GPU pays from about {from} on");
+        return Backend::cpu(solver, reason);
     }
     let (software, adapters): (Vec<_>, Vec<_>) =
         Adapter::all().into_iter().partition(Adapter::is_software);
@@ -145,7 +161,7 @@ fn faster(model: &Model<f32>, settings: &SolverSettings, cost: &StepCost) -> Bac
             Err(error) => reason = error.to_string(),
         }
     }
-    Backend::cpu(reason)
+    Backend::cpu(solver, reason)
 }
 
 /// A device, for a reason.
@@ -157,13 +173,7 @@ pub(super) fn on(
 ) -> Result<Backend<f32>, GpuError> {
     let solver = GpuSolver::new(device, model, settings)?;
     let choice = format!("{}: {reason}", device.name());
-    Ok(Backend {
-        elsewhere: Some(Box::new(solver)),
-        choice,
-        warning: None,
-        gives_way: false,
-        rejected: 0,
-    })
+    Ok(Backend::new(Engine::Device(Box::new(solver)), choice))
 }
 
 /// A count with its thousands apart: "1,280".

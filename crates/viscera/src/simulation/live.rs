@@ -9,7 +9,6 @@ use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
 use crate::settings::{Precision, SolverSettings};
-use crate::solver::Solver;
 use crate::solver::balance::ForceBalance;
 use crate::state::State;
 
@@ -149,9 +148,7 @@ impl<S: Real> Simulation<S> {
         // Constraints in the same order, which settings decide, go on with the multipliers they have.
         let order = |solver: &SolverSettings| (solver.colors, solver.neo_hookean, solver.rebase);
         let same_order = order(&self.scene.solver) == order(&fork.scene.solver);
-        if same_order
-            && self.solver.layout().multiplier_count == fork.solver.layout().multiplier_count
-        {
+        if same_order && self.layout().multiplier_count == fork.layout().multiplier_count {
             let kept = self.whole_state().multipliers;
             let kept = kept.into_iter().map(|l| T::from_f64(l.to_f64())).collect();
             let positions = std::mem::take(&mut fork.state.positions);
@@ -231,17 +228,15 @@ impl<S: Real> Simulation<S> {
             }
         }
         let model = builder.build::<S>().map_err(SimulationError::from)?;
-        let mut solver = Solver::new(&model, &scene.solver);
-        solver.use_instructions(self.solver.instructions());
         let same_device = scene.solver.device == self.scene.solver.device;
-        let backend = self.backend.renew(same_device, &model, &solver, substep_dt(&scene))?;
+        let backend = self.backend.renew(same_device, &model, &scene.solver, substep_dt(&scene))?;
         let rest = State::at_rest(&model);
         let state = State {
             positions: std::mem::take(&mut self.state.positions),
             velocities: std::mem::take(&mut self.state.velocities),
             ..rest
         };
-        (self.scene, self.model, self.solver, self.backend) = (scene, model, solver, backend);
+        (self.scene, self.model, self.backend) = (scene, model, backend);
         self.assembly.builder = builder;
         self.begin_at(state);
         Ok(())
@@ -251,9 +246,10 @@ impl<S: Real> Simulation<S> {
     fn begin_at(&mut self, mut state: State<S>) {
         let inputs = self.inputs_at(self.time());
         let dt = substep_dt(&self.scene);
-        let restarted = self.solver.restart(&self.model, &mut state, &inputs, dt);
+        state.multiplier_dt = dt;
+        let restarted = self.backend.restart(&self.model, &mut state, &inputs, dt);
         debug_assert!(restarted.is_ok(), "{restarted:?}");
-        self.put(state);
+        self.state = state;
         self.stepped = false;
     }
 
@@ -270,8 +266,8 @@ impl<S: Real> Simulation<S> {
 
     /// The state from now on, on whatever computes the steps.
     pub(super) fn put(&mut self, state: State<S>) {
-        if let Some(elsewhere) = &mut self.backend.elsewhere {
-            elsewhere.write(&self.model, &state);
+        if let Some(device) = self.backend.device_mut() {
+            device.write(&self.model, &state);
         }
         self.state = state;
     }

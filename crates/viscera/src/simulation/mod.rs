@@ -31,6 +31,7 @@ use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Scene};
+use crate::settings::SolverSettings;
 use crate::solver::balance::ForceBalance;
 use crate::solver::{Inputs, Solver};
 use crate::state::State;
@@ -111,7 +112,6 @@ pub struct Simulation<S> {
     assembly: Assembly,
     model: Model<S>,
     state: State<S>,
-    solver: Solver<S>,
     backend: Backend<S>,
     inputs: Inputs<S>,
     taken: Taken,
@@ -140,14 +140,12 @@ impl<S: Real> Simulation<S> {
     fn on(
         scene: Scene,
         assembly: Assembly,
-        choose: impl FnOnce(&Model<S>, &Solver<S>, f64) -> Result<Backend<S>, SimulationError>,
+        choose: impl FnOnce(&Model<S>, &SolverSettings, f64) -> Result<Backend<S>, SimulationError>,
     ) -> Result<Self, SimulationError> {
         let model = assembly.builder.build::<S>()?;
-        let solver = Solver::new(&model, &scene.solver);
         let mut simulation = Self {
             state: State::at_rest(&model),
-            backend: choose(&model, &solver, substep_dt(&scene))?,
-            solver,
+            backend: choose(&model, &scene.solver, substep_dt(&scene))?,
             inputs: Inputs::default(),
             taken: Taken::default(),
             written: scene.clone(),
@@ -185,7 +183,7 @@ impl<S: Real> Simulation<S> {
 
     /// The model as the solver works on it.
     pub fn layout(&self) -> &Layout<S> {
-        self.solver.layout()
+        self.backend.layout()
     }
 
     /// What moves. Positions and velocities stay where they are in memory, as long as the simulation lives. Where a
@@ -202,7 +200,7 @@ impl<S: Real> Simulation<S> {
 
     /// Whether something else than the CPU computes the steps.
     pub fn is_on_device(&self) -> bool {
-        self.backend.elsewhere.is_some()
+        self.backend.device().is_some()
     }
 
     /// What a person should know of the device: that it was lost and the CPU went on.
@@ -210,14 +208,19 @@ impl<S: Real> Simulation<S> {
         self.backend.warning.as_deref()
     }
 
-    /// The CPU's solver, for what it tells of itself.
-    pub fn solver(&self) -> &Solver<S> {
-        &self.solver
+    /// The largest small step [s] of the explicit method; infinite for others.
+    pub fn stable_step(&self) -> f64 {
+        self.backend.stable_step()
     }
 
-    /// See [`Solver::use_instructions`].
+    /// How many steps were rejected since the solver was built: at the last change of settings, or at the beginning.
+    pub fn rejected_steps(&self) -> u64 {
+        self.backend.rejected_steps()
+    }
+
+    /// See [`Solver::use_instructions`]; where a graphics processor computes nothing changes.
     pub fn use_instructions(&mut self, instructions: Instructions) {
-        self.solver.use_instructions(instructions);
+        self.backend.use_instructions(instructions);
     }
 
     /// Measures of the tetrahedra after the last frame, in the bodies' order.
@@ -251,9 +254,11 @@ impl<S: Real> Simulation<S> {
             // What a step refuses, the CPU would refuse as well.
             Err(lost) if self.backend.gives_way && !matches!(lost, FrameError::Step(_)) => {
                 // Positions are still those of the last frame; the multipliers are gone with the device.
-                self.backend.give_way(self.time(), &lost);
-                let (inputs, dt) = (self.inputs_at(self.time()), substep_dt(&self.scene));
-                self.solver.restart(&self.model, &mut self.state, &inputs, dt)?;
+                let (time, dt) = (self.time(), substep_dt(&self.scene));
+                self.backend.give_way(&self.model, &self.scene.solver, time, &lost);
+                let inputs = self.inputs_at(time);
+                self.state.multipliers.clear();
+                self.backend.restart(&self.model, &mut self.state, &inputs, dt)?;
                 self.rejected_substeps = self.compute_frame()?;
             }
             computed => self.rejected_substeps = computed?,
@@ -268,8 +273,8 @@ impl<S: Real> Simulation<S> {
             for velocity in &mut self.state.velocities {
                 *velocity = *velocity * S::from_f64(factor);
             }
-            if let Some(elsewhere) = &mut self.backend.elsewhere {
-                elsewhere.write_velocities(&self.state.velocities);
+            if let Some(device) = self.backend.device_mut() {
+                device.write_velocities(&self.state.velocities);
             }
         }
         Ok(())
@@ -283,11 +288,8 @@ impl<S: Real> Simulation<S> {
     /// that of a step: after a change of settings it stays as it was until the next one.
     pub fn measure(&mut self) -> Result<(), FrameError> {
         if self.stepped {
-            let Self { solver, backend, model, state, inputs, balance, .. } = self;
-            match &backend.elsewhere {
-                Some(elsewhere) => elsewhere.force_balance(model, state, inputs, balance)?,
-                None => solver.force_balance(model, state, inputs, balance)?,
-            }
+            let Self { backend, model, state, inputs, balance, .. } = self;
+            backend.force_balance(model, state, inputs, balance)?;
         }
         measure_tets(&self.model, &self.state.positions, &mut self.tets);
         // Files and pictures are in single precision: what it cannot hold has run away as well.
@@ -305,30 +307,29 @@ impl<S: Real> Simulation<S> {
         let dt = substep_dt(&self.scene);
         // The end of the frame is a time of its own: that of the keys by which holds are led.
         let (start, end) = (self.time(), (self.frame + 1) as f64 * self.scene.time.frame);
-        let Self { scene, assembly, taken, model, state, solver, inputs, backend, .. } = self;
-        let before = backend.rejected_steps(solver);
+        let Self { scene, assembly, taken, model, state, inputs, backend, .. } = self;
+        let before = backend.rejected_steps();
         for substep in 1..=scene.solver.substeps {
             let is_last = substep == scene.solver.substeps;
             let time = if is_last { end } else { start + f64::from(substep) * dt };
             taken.act(scene, assembly, time, inputs);
-            backend.step(solver, model, state, inputs, dt)?;
+            backend.step(model, state, inputs, dt)?;
         }
-        if let Some(elsewhere) = &mut backend.elsewhere {
-            backend.rejected = elsewhere.read_frame(model, state)?;
-        }
-        Ok(backend.rejected_steps(solver) - before)
+        backend.read_frame(model, state)?;
+        Ok(backend.rejected_steps() - before)
     }
 
     /// What moves, the multipliers included, wherever they are. Where a device is lost they are what the tissue
     /// answers to its places.
     pub(super) fn whole_state(&self) -> State<S> {
         let mut state = self.state.clone();
-        let Some(elsewhere) = &self.backend.elsewhere else { return state };
-        match elsewhere.multipliers(&self.model) {
+        let Some(device) = self.backend.device() else { return state };
+        match device.multipliers(&self.model) {
             Ok(multipliers) => state.multipliers = multipliers,
             Err(_) => {
                 let (inputs, dt) = (self.inputs_at(self.time()), substep_dt(&self.scene));
-                let restarted = self.solver.clone().restart(&self.model, &mut state, &inputs, dt);
+                let mut solver = Solver::new(&self.model, &self.scene.solver);
+                let restarted = solver.restart(&self.model, &mut state, &inputs, dt);
                 debug_assert!(restarted.is_ok(), "{restarted:?}");
             }
         }

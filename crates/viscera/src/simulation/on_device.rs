@@ -12,7 +12,7 @@ use crate::solver::gpu::{Device, GpuSolver};
 impl<S: Real> Simulation<S> {
     /// The solver on a graphics processor, where one computes the steps.
     pub fn gpu(&self) -> Option<&GpuSolver> {
-        self.backend.elsewhere.as_ref().map(|elsewhere| elsewhere.solver())
+        self.backend.device().map(|device| device.solver())
     }
 }
 
@@ -24,8 +24,7 @@ impl Simulation<f32> {
         assembly: Assembly,
         device: &Device,
     ) -> Result<Self, SimulationError> {
-        Self::on(scene, assembly, |model, solver, _| {
-            let settings = solver.settings();
+        Self::on(scene, assembly, |model, settings, _| {
             let backend = on(device, model, settings, "the caller's choice")?;
             Ok(Backend { gives_way: settings.device == DeviceRequest::Auto, ..backend })
         })

@@ -101,7 +101,7 @@ impl<S: Real> Simulation<S> {
         let State { positions, velocities, multipliers, multiplier_dt } = &self.whole_state();
         let saved = Saved {
             precision: size_of::<S>() as u8,
-            model: fingerprint(self.solver.layout()),
+            model: fingerprint(self.layout()),
             frame: self.frame,
             frame_duration: self.scene.time.frame,
             changes_made: self.changes_made,
@@ -139,15 +139,12 @@ impl<S: Real> Simulation<S> {
             self.make_change()?;
         }
         let vertices = self.model.vertex_count();
-        let constraints = self.solver.layout().multiplier_count;
+        let constraints = self.layout().multiplier_count;
         let lengths = [saved.positions.len(), saved.velocities.len(), saved.before.len()];
         for (what, fits) in [
             ("vertices", lengths == [vertices; 3]),
             ("constraints", [0, constraints].contains(&saved.multipliers.len())),
-            (
-                "meshes, materials or solver settings",
-                saved.model == fingerprint(self.solver.layout()),
-            ),
+            ("meshes, materials or solver settings", saved.model == fingerprint(self.layout())),
             ("motions", self.takes(&saved.taken)),
         ] {
             if !fits {

@@ -181,6 +181,11 @@ impl GpuSolver {
         &self.settings
     }
 
+    /// The model as it lies on the device.
+    pub fn layout(&self) -> &Layout<f32> {
+        &self.layout
+    }
+
     /// The stages of a step.
     pub fn plan(&self) -> &Plan {
         &self.plan
