@@ -191,8 +191,8 @@ impl<'a, S: Real> Statics<'a, S> {
         let n = x.len();
         let mut at_x = vec![Vec3::ZERO; n];
         self.gradient(x, &mut at_x);
-        // The iterates start at `d = 0`, where the residual is all of `-grad V`. It is updated from step to step and never
-        // computed anew: a fresh difference quotient would have another error in each iteration.
+        // The iterates start at `d = 0`, where the residual is all of `-grad V`. It is updated from step to step;
+        // computing it anew would be a second pass over the mesh in each iteration.
         let mut residual: Vec<Vec3<f64>> = at_x.iter().map(|&gradient| -gradient).collect();
         let mut way = vec![Vec3::ZERO; n];
         let [mut direction, mut image, mut moved] = [(); 3].map(|()| vec![Vec3::ZERO; n]);
@@ -215,8 +215,8 @@ impl<'a, S: Real> Statics<'a, S> {
             }
             self.times_stiffness(x, &at_x, &direction, &mut moved, &mut image);
             let curvature = dot(&direction, &image);
-            // Forces drive the tissue on along `direction`: `K` is not positive definite there, and a Newton step would lead
-            // to a saddle. The way up to here still descends, so it is kept as a lower bound.
+            // Forces drive the tissue on along `direction`: `K` is not positive definite, and a Newton step may lead
+            // to a saddle. The way up to here descends, so it is kept, as a part of what is left.
             if curvature.is_nan() || curvature <= 0.0 {
                 return Found { way, complete: false, stable: false };
             }
@@ -227,8 +227,8 @@ impl<'a, S: Real> Statics<'a, S> {
             }
             total += alpha * product;
             added.push(alpha * product);
-            // What the last `delay` iterations added bounds what was missing before them. One small addition proves nothing:
-            // conjugate gradients stall while information has not reached the far end of a body.
+            // What the last `delay` iterations added bounds from below what was missing before them. One small
+            // addition proves nothing: the iteration stalls until information has reached the far end of a body.
             let last: f64 = added.iter().rev().take(delay).sum();
             if added.len() > delay && last < COMPLETE * total {
                 return Found { way, complete: true, stable: true };
@@ -254,8 +254,8 @@ impl<'a, S: Real> Statics<'a, S> {
         moved: &mut [Vec3<f64>],
         image: &mut [Vec3<f64>],
     ) {
-        // Scaled by the longest vector of `p`, so that strain changes by about `DIFFERENCE` at most however large `p` is:
-        // directions shrink over many orders of magnitude from the first iteration to the last.
+        // Scaled by the longest vector of `p`, so that strain changes by about `DIFFERENCE` at most: directions
+        // shrink by orders of magnitude from the first iteration to the last.
         let step = DIFFERENCE * self.shortest / longest(p).max(f64::MIN_POSITIVE);
         for ((moved, x), p) in moved.iter_mut().zip(x).zip(p) {
             *moved = *x + *p * step;
