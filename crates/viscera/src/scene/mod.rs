@@ -103,7 +103,7 @@ pub struct Body {
     pub shape: BodyShape,
     /// From the mesh's frame to the world.
     pub placement: RigidTransform,
-    /// What it is made of, where no region says otherwise.
+    /// Its material, where no region says otherwise.
     pub material: Material,
     /// Parts made of something else; no two of a label.
     pub regions: Vec<Region>,
