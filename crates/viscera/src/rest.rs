@@ -36,7 +36,7 @@ const FEWEST_ITERATIONS: f64 = 50.0;
 /// Positions are rounded by this many units of their precision, over a run.
 const ROUNDED: f64 = 16.0;
 
-/// What is left of the way to rest.
+/// The rest of the way to the state of rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WayToRest {
     /// `d` [m], shape [vertex_count]; zero where a vertex is pinned, or its part is not held at all.
@@ -86,7 +86,7 @@ impl WayToRest {
     }
 }
 
-/// What conjugate gradients found.
+/// The result of conjugate gradients.
 struct Found {
     way: Vec<Vec3<f64>>,
     complete: bool,

@@ -12,7 +12,7 @@ pub struct State<S> {
     pub velocities: Vec<Vec3<S>>,
     /// Multipliers [J s^2] of all constraints, in the model's layout, shape [multiplier_count].
     /// A solver that keeps them from step to step starts from the last step's forces. After
-    /// changing positions by hand, start a new history: [`crate::solver::Solver::restart`].
+    /// changing positions by hand, reset the warm start: [`crate::solver::Solver::restart`].
     pub multipliers: Vec<S>,
     /// The step [s] to which the multipliers belong: they are forces times its square.
     pub multiplier_dt: f64,

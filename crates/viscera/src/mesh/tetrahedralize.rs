@@ -35,7 +35,7 @@ mod stencil_tests;
 /// for the two below.
 pub const DIHEDRAL_BOUNDS_DEG: (f64, f64) = (10.78, 164.71);
 
-/// What came of a [`tetrahedralize`] call, beside the mesh.
+/// The report of a [`tetrahedralize`] call, beside the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TetrahedralizeReport {
     /// Lattice vertices where the function was evaluated.

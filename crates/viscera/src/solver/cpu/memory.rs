@@ -1,4 +1,4 @@
-//! Memory of the CPU backend, and who carries out a stage.
+//! Memory of the CPU backend, and the dispatch of stages to their families.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::state::State;
 /// Everything that a step needs beside model and state.
 #[derive(Clone, Debug)]
 pub struct Memory<S> {
-    /// What [`sizes`] says of the model that this is for.
+    /// [`sizes`] of the model that this is for.
     sizes: [usize; SIZES],
     /// The connected parts of that model.
     parts: Arc<[Part]>,
@@ -27,7 +27,7 @@ pub struct Memory<S> {
     pub method: MethodMemory<S>,
 }
 
-/// What the method keeps.
+/// The method's own memory.
 #[derive(Clone, Debug)]
 pub enum MethodMemory<S> {
     Xpbd(xpbd::Memory<S>),

@@ -88,7 +88,7 @@ const UNGUARDED: usize = 6;
 pub(super) struct Table {
     pub bytes: Vec<u8>,
     pub ranges: Vec<Range>,
-    /// Bytes of what belongs to vertices, and of all sums.
+    /// Bytes of the ground and of all sums.
     pub ground_size: u64,
     pub sums_size: u64,
 }
@@ -191,7 +191,7 @@ impl Layout {
         self.offsets.last().copied().unwrap_or(0).into()
     }
 
-    /// What never changes beside the tetrahedra, and where everything stands.
+    /// The constants beside the tetrahedra, and where everything stands.
     pub fn table(&self, model: &Model<f32>, settings: &SolverSettings) -> Table {
         let guarded = settings.guards_steps();
         let (mut bytes, mut ranges) = (vec![0; ALIGNMENT as usize], Vec::new());
@@ -241,7 +241,7 @@ impl Layout {
             header.weights = add(Some(Slot::Weights), &weights);
         }
 
-        // What belongs to vertices lies in one buffer, range by range, because the baseline allows a kernel eight
+        // Data of vertices lie in one buffer, range by range, because the baseline allows a kernel eight
         // storage buffers. A guarded step's three starts are one binding: `predict` writes all of them.
         let each = 16 * u64::from(Self::stride(model));
         let count = if guarded { GROUND.len() } else { UNGUARDED };

@@ -24,7 +24,7 @@ pub(super) struct Piece {
     pub are_vertices: u32,
 }
 
-/// What stands in the table for a part.
+/// The table's row of a part.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct PartRow {

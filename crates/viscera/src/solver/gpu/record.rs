@@ -23,7 +23,7 @@ pub struct Dispatch {
 }
 
 impl Dispatch {
-    /// What the kernel finds at each of its bindings. Kernels that know vertices and copies find both;
+    /// The place at each of the kernel's bindings. Kernels that know vertices and copies find both;
     /// those of a sweep find copies in the place of vertices.
     pub fn places(&self) -> impl Iterator<Item = Place> {
         // One kernel text serves vertices and copies: in a sweep of split vertices the copies are bound where the
@@ -174,7 +174,7 @@ impl<'a> Recorder<'a> {
         Dispatch { groups: job.count, ..self.threads(kernel, job) }
     }
 
-    /// What sweeps of the model read and write.
+    /// The points that sweeps of the model read and write.
     pub fn swept(&self) -> Swept {
         self.swept
     }

@@ -20,7 +20,7 @@
 use super::data::{Step, StepData};
 use crate::scalar::{Real, Vec3};
 
-/// What a connected part has and is given during a step; sums over its free vertices.
+/// The energies of a connected part and the work done on it in a step; sums over its free vertices.
 #[derive(Clone, Copy, Debug, Default)]
 struct Energy {
     /// Whether a pin, an attachment or a tether holds it.

@@ -44,7 +44,7 @@ pub const SHORTENINGS: usize = 12;
 /// Of plain sweeps in a row that raise the potential this many lead to a step of descent.
 pub const TOLERATED: u32 = 2;
 
-/// What a guarded step remembers.
+/// Memory of guarded steps.
 #[derive(Clone, Debug)]
 pub struct Guard<S> {
     pub evaluator: Evaluator,
@@ -143,7 +143,7 @@ impl<S: Real> Guard<S> {
                 }
             }
         }
-        // The guard of mixtures looks for iterates better than `x_s`; without it `best` is not read again.
+        // The guard of accelerated iterates looks for some below `x_s`; without it `best` is not read again.
         for part in &mut self.parts {
             part.best = part.limit;
             part.failures = 0;

@@ -1,8 +1,8 @@
-// What the step guard and the guard of mixtures decide (solver/step/guard.rs), for one connected part, from the
-// sums of its pieces. Every workgroup that needs to know decides for itself: sums are small, and a dispatch
-// that only decides costs as much as one that does something.
+// Decisions of the step guard and the guard of accelerated iterates (solver/step/guard.rs), for one connected
+// part, from the sums of its pieces. Every workgroup that needs a decision makes it for itself: sums are small, and
+// a dispatch that only decides costs as much as one that does something.
 
-// `Phi` [J s^2] above the start of the step, and what round-off can pretend of it.
+// `Phi` [J s^2] above the start of the step, and the part of it that round-off can pretend.
 struct Potential {
     value: f32,
     noise: f32,
@@ -59,7 +59,7 @@ fn choose() -> Choice {
     return choice;
 }
 
-// What a piece leaves of a search, from here on: value, magnitude, force and reach of every share of the
+// The sums that a piece leaves in a search, from here on: value, magnitude, force and reach of every share of the
 // step; behind them the values of every length of a descent, the first of them zero, and the slope.
 fn shares_at(piece: u32) -> u32 {
     return table[LINES_AT] + 2u * LINE_SUMS * piece;

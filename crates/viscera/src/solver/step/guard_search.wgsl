@@ -153,10 +153,10 @@ fn judge_step(part: u32, keeps: bool) -> Next {
     return Next(is_rejected, choice.range, 0.0, 0u);
 }
 
-// The plain sweep that took the place of a mixture; nothing where the mixture has passed.
+// Judges the plain sweep that replaced a rejected iterate; does nothing where the accelerated iterate has passed.
 fn judge_plain(part: u32, keeps: bool) -> Next {
-    // Reads what `take` left when it judged the mixture, writes the other pair of words: a workgroup that is late
-    // must still find what the first one found.
+    // Reads the words that `take` wrote when it judged the accelerated iterate, and writes the other pair: a late
+    // workgroup must still find what the first one found.
     var best = control.parts[part].mixture_best;
     var failures = 0u;
     var is_better = false;

@@ -21,7 +21,7 @@ fn remember_iterate(
 }
 
 // The small least-squares problem, a workgroup for each of `job.count` parts. `job.mode`: whether a residual
-// that has grown starts a new history.
+// that has grown drops the history.
 @compute @workgroup_size(128)
 fn anderson_weights(
     @builtin(local_invocation_index) local: u32,
