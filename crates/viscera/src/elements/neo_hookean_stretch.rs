@@ -152,8 +152,8 @@ pub fn solve<S: Scalar>(
 ) -> TetCorrection<S, 6> {
     let f = deformation_gradient(x, inverse_rest_shape);
     let SignedSvd { u, sigma, v } = signed_svd(&f);
-    // All in principal axes: there stretches and shears have a stiffness of two blocks, and the gradients of the
-    // constraints are plain because the axes `u` are orthonormal.
+    // Everything in principal axes: there the stiffness is one block of the three stretches and a number for each
+    // shear, and products of constraint gradients need no rotation, because the axes `u` are orthonormal.
     let mut g = shape_gradients(inverse_rest_shape);
     let material_axes = v.transpose();
     for gradient in &mut g {
@@ -192,8 +192,8 @@ pub fn solve<S: Scalar>(
         [g02, zero, g02, g01, shears[1] + g00 + g22, zero],
         [g01, g01, zero, g02, g12, shears[2] + g00 + g11],
     ];
-    // XPBD's equation with the compliance, not the stiffness: for nearly incompressible tissue (large `lh`) entries
-    // of `C` become small, which the other sum bears, where those of its inverse would drown it.
+    // XPBD's equation with the compliance, not the stiffness: for nearly incompressible tissue (large `lh`) `C` gets
+    // small beside the sum over corners and does no harm, where its inverse would drown that sum.
     let right = [
         -(c[0] * residual[0] + c[1] * residual[1] + c[3] * residual[2]),
         -(c[1] * residual[0] + c[2] * residual[1] + c[4] * residual[2]),

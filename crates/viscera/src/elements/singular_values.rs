@@ -40,6 +40,8 @@ const DIRECTIONLESS: f64 = 1e-6;
 /// Decomposes any matrix; collapsed ones too, with an arbitrary rotation then.
 #[inline(always)]
 pub fn signed_svd<S: Scalar>(f: &Mat3<S>) -> SignedSvd<S> {
+    // `F^T F`, upper triangle. Its rounding is relative to the largest stretch squared: a stretch below 3e-4 of the
+    // largest is lost in single precision. The axes are then still orthonormal, and the lengths below come from `F`.
     let columns = f.columns;
     let mut a = [[S::ZERO; 3]; 3];
     for p in 0..3 {
@@ -47,14 +49,12 @@ pub fn signed_svd<S: Scalar>(f: &Mat3<S>) -> SignedSvd<S> {
             a[p][q] = columns[p].dot(columns[q]);
         }
     }
-    // `F^T F`, upper triangle. Its rounding is relative to the largest stretch squared: a stretch below 3e-4 of the
-    // largest is lost in single precision. Its axes are then still orthonormal, and the lengths below come from `F`.
     let mut v = Mat3::IDENTITY.columns;
     for _ in 0..MOST_SWEEPS {
         let largest = a[0][1].abs().max(a[0][2].abs()).max(a[1][2].abs());
         let smallest = a[0][0].min(a[1][1]).min(a[2][2]);
-        // Only when every lane is done: all lanes run the same instructions. A lane that was done before goes on with
-        // rotations by zero, so its bits do not depend on its neighbours; this threshold must not exceed `rotate`'s.
+        // Only when every lane is done. A lane that was done earlier goes on with rotations by zero, so that its bits do
+        // not depend on its neighbours. That holds as long as this threshold does not exceed the one in `rotate`.
         if S::all(largest.less(negligible(smallest, smallest))) {
             break;
         }
@@ -69,8 +69,8 @@ pub fn signed_svd<S: Scalar>(f: &Mat3<S>) -> SignedSvd<S> {
     order(&mut values, &mut v, 0, 1);
 
     let [f1, f2, f3] = [*f * v[0], *f * v[1], *f * v[2]];
-    // `F v_i` are orthogonal but for rounding, and the first is the longest: its direction is the best known. Both
-    // sides of `select` are computed, so the one not taken may be NaN; `F` has no unit, 1 is the rest.
+    // `F v_i` are orthogonal but for rounding, and the first is the longest: its direction is the best known. `F` has
+    // no unit and lengths of 1 at rest, so the bound is a number. `select` computes both sides; one may be NaN.
     let length = f1.length();
     let collapsed = length.less(S::from_f64(DIRECTIONLESS));
     let x_axis = vec3(S::ONE, S::ZERO, S::ZERO);

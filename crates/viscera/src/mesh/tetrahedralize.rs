@@ -230,7 +230,7 @@ impl Builder<'_> {
         let count = |sign| corners.iter().filter(|corner| corner.sign == sign).count();
         let [p, q, r, s] = ordered;
         match (count(Sign::Inside), count(Sign::Outside)) {
-            // Also four corners on the surface: nothing tells that there is tissue between them.
+            // Also four corners on the surface: no sign says that there is tissue between them.
             (0, _) => {}
             // Nothing outside: the tetrahedron itself, with a face on the surface where three corners are.
             (_, 0) => {
@@ -256,7 +256,8 @@ impl Builder<'_> {
                 }
             }
             // Two outside: a prism between the triangles at p and at q. Sides 0 and 2 lie in lattice faces, side 1
-            // on the surface.
+            // on the surface. Side 2 runs from the cut points at s back to p and q, the other way round than
+            // `diagonal_leaves_first` counts, so that its diagonal is the negation of that for p, q, s.
             (2, _) => {
                 let first = [self.vertex(p), self.cut(p, r), self.cut(p, s)];
                 let second = [self.vertex(q), self.cut(q, r), self.cut(q, s)];

@@ -171,6 +171,7 @@ impl Layout {
             }
         }
         for element in &mut elements {
+            // Entries beyond a kind's vertices repeat its first vertex; kernels stop before them.
             for (slot, vertex) in element.slots.iter_mut().zip(element.vertices) {
                 *slot += offsets[vertex as usize];
             }

@@ -57,7 +57,7 @@ impl Motion {
 }
 
 impl Energy {
-    /// Velocity [m/s] that is not scaled, and the share that what is beside it keeps.
+    /// Velocity [m/s] that is not scaled, and the factor for velocities relative to it.
     fn limit(&self) -> (Vec3<f64>, f64) {
         let mut given = self.start.kinetic + self.start.stored - self.end.stored + self.work;
         let mut kinetic = self.end.kinetic;
@@ -101,7 +101,7 @@ impl Energies {
             // Sums are added to in `limit`: without this they would be those of all steps so far.
             *energy = Energy::default();
             energy.start.stored = stored[number];
-            // A hold takes part in the motion: what it gives the centre of mass counts, so nothing is taken out.
+            // A hold can stop the centre of mass, so that the centre's energy counts too: `limit` takes nothing out.
             energy.held = constants.holds(part);
             // Tethers are inertia to the solver and no elements, so `stored` of the evaluator leaves them out. Their
             // targets are those of the end of the step, as the pins are.
@@ -116,8 +116,8 @@ impl Energies {
         }
     }
 
-    /// Scales velocities down; `stored` is the stored energy [J] of each part now. `kept` learns of each part
-    /// that is slowed down, and the share of its velocities that it keeps.
+    /// Scales velocities down; `stored` is the stored energy [J] of each part now. `kept` is called with
+    /// each part that is slowed down, and the factor of its velocities.
     pub fn limit<S: Real>(
         &mut self,
         step: &Step<'_, S>,

@@ -7,7 +7,7 @@ fn vector_at(sum: u32) -> vec3f {
     return vec3f(totals[sum], totals[sum + 1u], totals[sum + 2u]);
 }
 
-// The velocity [m/s] that is not scaled, and the share that what is beside it keeps.
+// The velocity [m/s] that is not scaled, and the factor for velocities relative to it.
 struct Limit {
     drift: vec3f,
     share: f32,

@@ -117,8 +117,8 @@ impl<S: Real> Guard<S> {
         for (part, potential) in self.parts.iter_mut().zip(&self.evaluator.potentials) {
             part.limit = potential.value;
         }
-        // Pins are at their new places whatever the step does. Judged with the old ones, the start of the step
-        // would store less than any place the step may end at, and pulled tissue could never keep the limit.
+        // Pins are at their new places whatever the step does. Judged with the old ones, the start of the step could
+        // store less than every place the step may end at, and pulled tissue would never keep the limit.
         for from_rest in [true, false] {
             let StepConstants { previous, predicted, .. } = constants;
             let trial = &mut self.trial;
@@ -143,7 +143,7 @@ impl<S: Real> Guard<S> {
                 }
             }
         }
-        // The guard of accelerated iterates looks for some below `x_s`; without it `best` is not read again.
+        // Only the guard of accelerated iterates lowers `best` from here on; without it nothing reads it.
         for part in &mut self.parts {
             part.best = part.limit;
             part.failures = 0;
