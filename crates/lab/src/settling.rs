@@ -31,9 +31,9 @@ const PATH_PARTS: u32 = 8;
 pub struct Settled {
     /// Positions [m], shape [vertex_count].
     pub positions: Vec<Vec3<f64>>,
-    /// Share of all steps that the guard took back.
+    /// Share of all steps that the guard rejected.
     pub rejected: f64,
-    /// Share of the steps that the guard took back in frames in which the body moved.
+    /// Share of the steps that the guard rejected in frames in which the body moved.
     pub rejected_moving: f64,
     /// Root mean square speed [m/s] in the last frame.
     pub speed: f64,

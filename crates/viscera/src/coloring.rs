@@ -86,6 +86,7 @@ impl ConstraintGraph {
         for constraint in 0..self.constraint_count() {
             for pair in self.vertices(constraint).windows(2) {
                 let (a, b) = (root(&mut parent, pair[0]), root(&mut parent, pair[1]));
+                // The smaller root wins, so that a part's root is its first vertex whatever the order of constraints.
                 parent[a.max(b) as usize] = a.min(b);
             }
         }
@@ -141,12 +142,12 @@ impl ConstraintGraph {
             let load = &mut loads[part_of[first as usize] as usize];
             let taken =
                 |v: u32, color: usize| -> u32 { used[v as usize].get(color).copied().unwrap_or(0) };
+            // A copy that no constraint of this colour uses yet is no conflict: it was made for another colour.
             let conflicts = |color: usize| {
                 vertices.iter().filter(|&&v| taken(v, color) >= copies[v as usize]).count()
             };
-            // Among free colours Gauss-Seidel takes the lowest (fewest colours); a limited number
-            // is filled evenly (equal work per colour). A new colour is opened only where every
-            // open one conflicts.
+            // Fewest conflicts first. Among equals Gauss-Seidel takes the lowest colour (fewest colours); a limited
+            // number is filled evenly (equal work). A new colour opens only where every open one conflicts.
             let mut best = (usize::MAX, u32::MAX, 0);
             for color in 0..load.len() {
                 let weight = if limit == usize::MAX { 0 } else { load[color] };
@@ -168,6 +169,7 @@ impl ConstraintGraph {
                 if used[v].len() <= color {
                     used[v].resize(color + 1, 0);
                 }
+                // The n-th constraint of a colour at `v` acts on copy n: two of one colour never on the same one.
                 local_copy[corner] = used[v][color];
                 used[v][color] += 1;
                 copies[v] = copies[v].max(used[v][color]);

@@ -1,4 +1,4 @@
-//! What a state means: strains, stresses, energies. In double precision, in the user's order.
+//! Measures of a state: strains, stresses, energies. In double precision, in the user's order.
 //!
 //! ```text
 //! J = det F                                       relative volume
@@ -16,7 +16,7 @@ use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::Inputs;
 use crate::state::State;
 
-/// What is known of one tetrahedron.
+/// The measures of one tetrahedron.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TetMeasure {
     /// Rest volume [m^3].
@@ -32,9 +32,9 @@ pub struct TetMeasure {
 }
 
 impl TetMeasure {
-    /// Whether it is turned inside out, flat, or no number.
+    /// Whether it is turned inside out, flat, or NaN.
     pub fn is_inverted(&self) -> bool {
-        // Written so that a volume that is no number counts.
+        // Written so that a volume that is NaN counts.
         !matches!(self.volume_ratio.partial_cmp(&0.0), Some(std::cmp::Ordering::Greater))
     }
 }

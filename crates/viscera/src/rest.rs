@@ -6,8 +6,8 @@
 //! K p ~ (grad V(x + e p) - grad V(x))/e,   preconditioned by the diagonal of K at small strain
 //! ```
 //!
-//! Neither the solver's own word nor its multipliers go into it, and what made a state wrong does not matter: too
-//! few sweeps, motion that has not ended, or a form that is not exact at rest. Unbalanced forces themselves say
+//! Neither the solver's residual nor its multipliers go into it, and the cause of the error does not matter: too few
+//! sweeps, motion that has not ended, or a formulation that is not exact at rest. Unbalanced forces themselves say
 //! little: small smooth ones stand for a long way, large rough ones for none. Conjugate gradients: Hestenes and
 //! Stiefel, 1952; the sum of `alpha r.z` over some iterations is what they add to `d.K d` and bounds what was
 //! missing before (Strakos and Tichy, "On error estimation in the conjugate gradient method", 2002, section 4).
@@ -36,7 +36,7 @@ const FEWEST_ITERATIONS: f64 = 50.0;
 /// Positions are rounded by this many units of their precision, over a run.
 const ROUNDED: f64 = 16.0;
 
-/// What is left of the way to rest.
+/// The rest of the way to the state of rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WayToRest {
     /// `d` [m], shape [vertex_count]; zero where a vertex is pinned, or its part is not held at all.
@@ -67,8 +67,8 @@ impl WayToRest {
     }
 
     /// Measures a state at `x` [m] that moves with `velocities` [m/s], both of shape [vertex_count], under these
-    /// inputs. Takes memory for ten vectors of that shape, and as long as some dozens to hundreds of passes over the mesh.
-    /// Nothing where no part of the model is held.
+    /// inputs. Takes memory for ten vectors of that shape, and as long as some dozens to hundreds of passes over the
+    /// mesh. Nothing where no part of the model is held.
     pub fn measure<S: Real>(
         model: &Model<S>,
         x: &[Vec3<S>],
@@ -86,7 +86,7 @@ impl WayToRest {
     }
 }
 
-/// What conjugate gradients found.
+/// The result of conjugate gradients.
 struct Found {
     way: Vec<Vec3<f64>>,
     complete: bool,
@@ -110,6 +110,8 @@ struct Statics<'a, S> {
 impl<'a, S: Real> Statics<'a, S> {
     fn new(model: &'a Model<S>, inputs: &'a Inputs<S>) -> Self {
         let (stiffness, shortest) = diagonal(model, inputs);
+        // A part that nothing holds has no state of rest: `K` has its rigid motions in the null space, and conjugate
+        // gradients would run off along them. Pins come last: a pinned vertex holds its part, but does not move.
         let mut moves = held(model, inputs);
         let is_held = moves.contains(&true);
         for pin in &inputs.pins {
@@ -154,6 +156,7 @@ impl<'a, S: Real> Statics<'a, S> {
         x: &[Vec3<f64>],
         gradient: &mut [Vec3<f64>],
     ) {
+        // At rest there is no rate of strain, so viscosity is left out.
         let anchors = self.inputs.anchors_of(&self.model.rest_anchors);
         for i in 0..set.len() {
             let vertices = set.vertices[i];
@@ -186,6 +189,8 @@ impl<'a, S: Real> Statics<'a, S> {
         let n = x.len();
         let mut at_x = vec![Vec3::ZERO; n];
         self.gradient(x, &mut at_x);
+        // The iterates start at `d = 0`, where the residual is all of `-grad V`. It is updated from step to step;
+        // computing it anew would be a second pass over the mesh in each iteration.
         let mut residual: Vec<Vec3<f64>> = at_x.iter().map(|&gradient| -gradient).collect();
         let mut way = vec![Vec3::ZERO; n];
         let [mut direction, mut image, mut moved] = [(); 3].map(|()| vec![Vec3::ZERO; n]);
@@ -194,9 +199,12 @@ impl<'a, S: Real> Statics<'a, S> {
         // A smooth error is seen once information has gone through the whole body, some cells an iteration.
         let delay = 10 + 2 * libm::cbrt(n as f64) as usize;
         let mut added = Vec::with_capacity(most);
+        // `added[k]` is `alpha r.z` of iteration k [J]: by how much `d . K d` has grown. No product with the unknown
+        // solution is needed.
         let (mut product, mut total) = (self.preconditioned(&residual), 0.0);
         let mut beta = 0.0;
         for _ in 0..most {
+            // Zero: the equations are solved. NaN or infinite: the state itself is; the way found so far is returned.
             if !(product > 0.0 && product.is_finite()) {
                 break;
             }
@@ -205,6 +213,8 @@ impl<'a, S: Real> Statics<'a, S> {
             }
             self.times_stiffness(x, &at_x, &direction, &mut moved, &mut image);
             let curvature = dot(&direction, &image);
+            // Forces drive the tissue on along `direction`: `K` is not positive definite, and a Newton step may lead
+            // to a saddle. The way up to here descends, so it is kept, as a part of what is left.
             if curvature.is_nan() || curvature <= 0.0 {
                 return Found { way, complete: false, stable: false };
             }
@@ -215,6 +225,8 @@ impl<'a, S: Real> Statics<'a, S> {
             }
             total += alpha * product;
             added.push(alpha * product);
+            // What the last `delay` iterations added bounds from below what was missing before them. One small
+            // addition proves nothing: the iteration stalls until information has reached the far end of a body.
             let last: f64 = added.iter().rev().take(delay).sum();
             if added.len() > delay && last < COMPLETE * total {
                 return Found { way, complete: true, stable: true };
@@ -240,6 +252,8 @@ impl<'a, S: Real> Statics<'a, S> {
         moved: &mut [Vec3<f64>],
         image: &mut [Vec3<f64>],
     ) {
+        // Scaled by the longest vector of `p`, so that strain changes by about `DIFFERENCE` at most: directions
+        // shrink by orders of magnitude from the first iteration to the last.
         let step = DIFFERENCE * self.shortest / longest(p).max(f64::MIN_POSITIVE);
         for ((moved, x), p) in moved.iter_mut().zip(x).zip(p) {
             *moved = *x + *p * step;
@@ -275,12 +289,15 @@ impl<'a, S: Real> Statics<'a, S> {
             square += end.length_squared();
             along += end.dot(now);
         }
-        // Rounding of positions alone is no way.
+        // Relative to the distance from the origin, not to the displacement: positions are stored in absolute numbers.
         let rounding = ROUNDED * S::EPSILON * reach;
         let distance = (longest(&found.way) - rounding).max(0.0);
+        // The least-squares factor between the displacement at rest `u*` and what there is of it: `u = u*/s` gives
+        // `u*.u* / u*.u = s` exactly.
         let stiffness = if along > 0.0 && distance > 0.0 { square / along - 1.0 } else { 0.0 };
         let mut holding = vec![Vec3::ZERO; x.len()];
         let there: Vec<_> = x.iter().zip(&found.way).map(|(x, way)| *x + *way).collect();
+        // At the end of the way, not at `x`: a holding force at `x` contains what is out of balance next to the pin.
         self.full_gradient(&there, &mut holding);
         for (holding, moves) in holding.iter_mut().zip(&self.moves) {
             if *moves {
@@ -360,6 +377,7 @@ fn held<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> Vec<bool> {
         let (a, b) = (root(&mut parent, a), root(&mut parent, b));
         parent[a.max(b) as usize] = a.min(b);
     };
+    // In the caller's numbering, as all of this file. Pins join nothing: two bodies that a hand holds stay two parts.
     for tet in &model.tet_vertices {
         tet[1..].iter().for_each(|&v| join(tet[0], v));
     }

@@ -13,7 +13,7 @@ pub struct State<S> {
     /// Multipliers [J s^2] of all constraints, in the solver's layout, shape [multiplier_count]; empty before the
     /// first step, as if all were zero.
     /// A solver that keeps them from step to step starts from the last step's forces. After
-    /// changing positions by hand, start a new history: [`crate::solver::Solver::restart`].
+    /// changing positions by hand, reset the warm start: [`crate::solver::Solver::restart`].
     pub multipliers: Vec<S>,
     /// The step [s] to which the multipliers belong: they are forces times its square.
     pub multiplier_dt: f64,

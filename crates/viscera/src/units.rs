@@ -1,11 +1,12 @@
 //! Quantities with units: `"5 kPa"`, `"32 mm"`, `"1/60 s"`, `"1060 kg/m^3"`.
 //!
 //! Everything inside the library is in SI units; this file is where units come in and go out. A
-//! quantity is a number, or a fraction of two, followed by the symbol of a unit. There is no algebra of units: the symbols people write for soft tissue fit in one table.
+//! quantity is a number, or a fraction of two, followed by the symbol of a unit. There is no algebra of
+//! units: the symbols people write for soft tissue fit in one table.
 
 use std::f64::consts::PI;
 
-/// What a number measures.
+/// The quantity that a number measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
     /// A pure number, or percent.

@@ -135,8 +135,7 @@ fn acceleration(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>)
         Acceleration::Chebyshev => "chebyshev",
         Acceleration::Anderson => "anderson",
     };
-    let help =
-        "What is done with the sequence of sweeps of a substep. Needs several iterations to pay.";
+    let help = "How the sequence of sweeps of a substep is accelerated. Pays with several iterations only.";
     let names = [("none", "none"), ("chebyshev", "Chebyshev"), ("anderson", "Anderson")];
     chooser.menu(ui, &Row::new("solver.acceleration", "acceleration", help), value, &names);
     if solver.acceleration == Acceleration::Anderson {
@@ -153,7 +152,7 @@ fn exactness(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
     let help = "With the rebase this makes the stiffness independent of the number of iterations; \
                 without it the body freezes.";
     chooser.tick(ui, "solver.keep_multipliers", "keep multipliers", help, solver.keep_multipliers);
-    let help = "Take a step back that raises the incremental potential, and slow down what would gain \
+    let help = "Reject a step that raises the incremental potential, and slow down tissue that would gain \
                 energy. Acts with the rebase.";
     chooser.tick(ui, "solver.step_guard", "step guard", help, solver.step_guard);
 }
@@ -164,7 +163,8 @@ fn where_computed(
     device: Option<&str>,
     chooser: &mut Chooser<'_>,
 ) {
-    let help = "What computes the steps: auto takes what is expected to be faster.";
+    let help =
+        "The device that computes the steps: auto takes the one that is expected to be faster.";
     let value = match &solver.device {
         DeviceRequest::Named(name) => name.clone(),
         known => known.to_string(),

@@ -18,6 +18,9 @@ use viscera_view::{App, Options};
 /// The longest that anything may take before a test fails; most take tenths of a second.
 const PATIENCE: Duration = Duration::from_secs(20);
 
+/// The test harness leaves so much black around the window [pixels].
+pub const MARGIN: u32 = 8;
+
 /// The window, driven from outside.
 pub struct Window {
     pub harness: Harness<'static, App>,
@@ -184,15 +187,27 @@ impl Window {
         pixels.map(|(_, _, pixel)| [pixel[0], pixel[1], pixel[2]]).collect()
     }
 
-    /// A picture of the whole window, for who wants to look: in the folder that VISCERA_PICTURES names.
+    /// A picture of the whole window in the folder that VISCERA_PICTURES names, for a person to look at.
     pub fn picture(&mut self, name: &str) {
         let Some(folder) = std::env::var_os("VISCERA_PICTURES") else { return };
+        self.write_picture(Path::new(&folder), name).expect("a file");
+    }
+
+    /// The same in a folder.
+    pub fn write_picture(&mut self, folder: &Path, name: &str) -> std::io::Result<()> {
         let image = self.harness.render().expect("a picture of the window");
-        let size = ImageSize::new(image.width(), image.height()).expect("a size");
-        let pixels = image.pixels().map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
-        let image = Image::from_pixels(size, pixels).expect("a picture");
+        let inside = |all: u32| MARGIN..all.saturating_sub(MARGIN);
+        let (columns, rows) = (inside(image.width()), inside(image.height()));
+        let size = ImageSize::new(columns.len() as u32, rows.len() as u32).expect("a size");
+        let colour = |x, y| {
+            let pixel = image.get_pixel(x, y);
+            [pixel[0], pixel[1], pixel[2]]
+        };
+        let pixels =
+            rows.flat_map(|y| columns.clone().map(move |x| (x, y))).map(|(x, y)| colour(x, y));
+        let image = Image::from_pixels(size, pixels.collect()).expect("a picture");
         let bytes = write_png(&image).expect("a PNG");
-        std::fs::write(Path::new(&folder).join(format!("{name}.png")), bytes).expect("a file");
+        std::fs::write(folder.join(format!("{name}.png")), bytes)
     }
 
     pub fn run(&self, number: usize) -> &RunSnapshot {

@@ -1,7 +1,7 @@
 // Attachment: a vertex held elastically at a point in space (the anchor `p`). `C = x - p`, energy
 // `k |C|^2 / 2`, compliance `1/k`. Twin of `attachment.rs`.
 
-// What one solve changes: the three multipliers and the position [m].
+// The changes by one solve: the three multipliers and the position [m].
 struct AttachmentCorrection {
     multipliers: vec3f,
     position: vec3f,

@@ -1,6 +1,6 @@
-//! What every kind of element answers; the list of kinds stands in [`super::list`]. Tetrahedra, of which a mesh has many, answer
-//! in lanes by their law ([`super::law`]) and their constraint formulation; all others, few and alike, answer
-//! here, one by one. Each kind has a file of its own, beside its twin for graphics processors.
+//! The traits of every kind of element; the list of kinds stands in [`super::list`]. Tetrahedra, of which a mesh has
+//! many, answer in lanes by their law ([`super::law`]) and their constraint formulation; all others, few and alike,
+//! answer here, one by one. Each kind has a file of its own, beside its twin for graphics processors.
 
 use super::CornerLoad;
 use crate::scalar::{Real, Scalar, Vec3};
@@ -16,11 +16,11 @@ pub const MOST: usize = 4;
 pub struct Constant {
     /// Its name, with its unit.
     pub name: &'static str,
-    /// What it may be.
+    /// The values it may have.
     pub legal: Legal,
 }
 
-/// What a constant may be, beside finite.
+/// The values that a constant may have, beside finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Legal {
     /// Above zero.
@@ -31,7 +31,7 @@ pub enum Legal {
     Any,
 }
 
-/// What an element may depend on beside its constants.
+/// Data that an element may depend on beside its constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment<T, const N: usize> {
     /// Its anchor at the end of the step [m], of kinds that have one.
@@ -44,10 +44,10 @@ pub struct Moment<T, const N: usize> {
 
 /// A kind of element: `N` vertices, `M` multipliers.
 pub trait Kind<const N: usize, const M: usize>: Send + Sync + 'static {
-    /// One of them, in the precision of whoever asks.
+    /// One of them, in the caller's precision.
     type Element<T: Real>: XpbdBlock<T, N, M>;
 
-    /// What one is called in messages.
+    /// Its name in messages.
     const NAME: &'static str;
 
     /// Whether one has an anchor, which moves with the inputs of a step.

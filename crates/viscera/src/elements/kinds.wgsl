@@ -1,7 +1,7 @@
-// What every kind of element that is no tetrahedron answers, by functions with the kind's name before them;
+// The functions of every kind of element that is no tetrahedron, with the kind's name before them;
 // twin of `kinds.rs`. `element_energy` and the others, which choose the kind, are made from its list.
 
-// What an element is given beside positions: its constants, where its anchor is at the end of the step [m], where
+// The data of an element beside positions: its constants, where its anchor is at the end of the step [m], where
 // its vertices were at the start of it [m], and the step [s].
 struct ElementMoment {
     constants: vec4f,
@@ -10,7 +10,7 @@ struct ElementMoment {
     dt: f32,
 }
 
-// What one solve changes: multipliers [J s^2/m] and positions [m].
+// The changes by one solve: multipliers [J s^2/m] and positions [m].
 struct ElementCorrection {
     multipliers: vec4f,
     positions: array<vec3f, 4>,

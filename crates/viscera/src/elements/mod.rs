@@ -28,7 +28,7 @@ pub mod wgsl;
 
 use crate::scalar::{Mat3, Scalar, Vec3};
 
-/// What a local solve of a tetrahedron changes.
+/// The changes by a local solve of a tetrahedron.
 #[derive(Clone, Copy, Debug)]
 pub struct TetCorrection<S, const N: usize> {
     /// Change of the multipliers [J s^2], one per constraint.
@@ -37,7 +37,7 @@ pub struct TetCorrection<S, const N: usize> {
     pub positions: [Vec3<S>; 4],
 }
 
-/// What a constraint with its multipliers puts on one corner.
+/// The load of a constraint with its multipliers on one corner.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CornerLoad<S> {
     /// `grad C^T lambda` [N s^2]: the force times the squared step.

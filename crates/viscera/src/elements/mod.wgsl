@@ -8,7 +8,7 @@
 
 const IDENTITY = mat3x3f(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
 
-// What a local solve of a tetrahedron with six constraints changes.
+// The changes by a local solve of a tetrahedron with six constraints.
 struct TetCorrection6 {
     // Change of the multipliers [J s^2].
     multipliers: array<f32, 6>,
@@ -16,7 +16,7 @@ struct TetCorrection6 {
     positions: array<vec3f, 4>,
 }
 
-// What a local solve of a tetrahedron with two constraints changes.
+// The changes by a local solve of a tetrahedron with two constraints.
 struct TetCorrection2 {
     // Change of the multipliers [J s^2].
     multipliers: array<f32, 2>,
@@ -24,7 +24,7 @@ struct TetCorrection2 {
     positions: array<vec3f, 4>,
 }
 
-// What a constraint with its multipliers puts on one corner.
+// The load of a constraint with its multipliers on one corner.
 struct CornerLoad {
     // `grad C^T lambda` [N s^2].
     impulse: vec3f,

@@ -111,10 +111,15 @@ fn stretch_compliance<S: Scalar>(
 ) -> Lower<S> {
     let volume_modulus = lame_lambda + lame_mu;
     let full = stretch_stiffness(sigma, volume_modulus, lame_mu, e);
+    // Far from rest the terms with `e` can make the stiffness indefinite; the solve would then move corners the
+    // wrong way, or divide by zero. What remains without them is `mu I` plus a square, so at least `mu`. By a mask,
+    // because lanes take no branches. The first minor needs no test: it is `mu` plus a square.
     let floor = S::from_f64(CLEARLY_POSITIVE) * lame_mu * lame_mu;
     let keep = S::select(minor(&full).less(floor), S::ZERO, S::ONE);
     let keep = S::select(determinant(&full).less(floor * lame_mu), S::ZERO, keep);
     let d = stretch_stiffness(sigma, volume_modulus, lame_mu, keep * e);
+    // The adjugate over the determinant: six products, no pivots. `1/(V dt^2)` makes stiffness a compliance over
+    // dt^2, in the unit of the sum that it is added to.
     let scale = S::ONE / (determinant(&d) * step_volume);
     [
         (d[2] * d[5] - d[4] * d[4]) * scale,
@@ -147,6 +152,8 @@ pub fn solve<S: Scalar>(
 ) -> TetCorrection<S, 6> {
     let f = deformation_gradient(x, inverse_rest_shape);
     let SignedSvd { u, sigma, v } = signed_svd(&f);
+    // Everything in principal axes: there the stiffness is one block of the three stretches and a number for each
+    // shear, and products of constraint gradients need no rotation, because the axes `u` are orthonormal.
     let mut g = shape_gradients(inverse_rest_shape);
     let material_axes = v.transpose();
     for gradient in &mut g {
@@ -154,6 +161,8 @@ pub fn solve<S: Scalar>(
     }
     let (stress, e) = biot_stress(&sigma, lame_lambda, lame_mu);
     let principal = turn(&v, multipliers);
+    // `L' + s t`: multipliers are forces that the stress exerts, hence the sign. The Biot stress has no shears in
+    // principal axes, so that what `L'` has there is residual.
     let residual = [
         principal[0] + step_volume * stress[0],
         principal[1] + step_volume * stress[1],
@@ -173,6 +182,8 @@ pub fn solve<S: Scalar>(
         shear_compliance(sigma[1], lame_mu, e, step_volume),
         shear_compliance(sigma[2], lame_mu, e, step_volume),
     ];
+    // Lower triangle; `solve_symmetric` works in the upper one. Example: a stretch is `g'_1 u_1`, a shear
+    // `g'_1 u_2 + g'_2 u_1`, their product `g'_1 g'_2`: entry 3,1 is `g12`.
     let matrix = [
         [c[0] + g00, zero, zero, zero, zero, zero],
         [c[1], c[2] + g11, zero, zero, zero, zero],
@@ -181,6 +192,8 @@ pub fn solve<S: Scalar>(
         [g02, zero, g02, g01, shears[1] + g00 + g22, zero],
         [g01, g01, zero, g02, g12, shears[2] + g00 + g11],
     ];
+    // XPBD's equation with the compliance, not the stiffness: for nearly incompressible tissue (large `lh`) `C` gets
+    // small beside the sum over corners and does no harm, where its inverse would drown that sum.
     let right = [
         -(c[0] * residual[0] + c[1] * residual[1] + c[3] * residual[2]),
         -(c[1] * residual[0] + c[2] * residual[1] + c[4] * residual[2]),
@@ -189,6 +202,7 @@ pub fn solve<S: Scalar>(
         -(shears[1] * residual[4]),
         -(shears[2] * residual[5]),
     ];
+    // Multipliers go back to material axes, where they are kept: principal axes turn from sweep to sweep.
     let change = solve_symmetric(matrix, right);
     let positions = weighted_images(&(u * symmetric(&change)), &g, w);
     TetCorrection { multipliers: turn(&material_axes, &change), positions }
@@ -206,14 +220,18 @@ pub fn corner_loads<S: Scalar>(
     let SignedSvd { u, sigma, v } = signed_svd(&f);
     let g = shape_gradients(inverse_rest_shape);
     let l = turn(&v, multipliers);
+    // Half way through a solve `L'` has shears as well. They turn with the axes like the rest, and without their part
+    // the bound would be too small just where the iteration is far from its end.
     let off_diagonal = S::TWO * l[3].abs().max(l[4].abs()).max(l[5].abs());
     let tau = rotation_stiffness(&l, &sigma, off_diagonal, 0, 1)
         .max(rotation_stiffness(&l, &sigma, off_diagonal, 0, 2))
         .max(rotation_stiffness(&l, &sigma, off_diagonal, 1, 2));
+    // `R L`: multipliers are those of the unrotated tissue, the rotation brings them into space.
     let stress = u * v.transpose() * symmetric(multipliers);
     let mut loads = [CornerLoad::default(); 4];
     for i in 0..4 {
         let mut reach = S::ZERO;
+        // Row sum of `|g_i . g_b|`: by it the diagonal bounds the coupled blocks of all four corners.
         for b in 0..4 {
             reach += g[i].dot(g[b]).abs();
         }

@@ -5,8 +5,8 @@
 //! ```
 //!
 //! (the convention of Irving, Teran, Fedkiw, "Invertible Finite Elements For Robust Simulation of
-//! Large Deformation", SCA 2004). `V` comes from cyclic Jacobi rotations of `F^T F`; `U` from `F V`, so that small singular values, which `F^T F` loses,
-//! are as accurate as `F`.
+//! Large Deformation", SCA 2004). `V` comes from cyclic Jacobi rotations of `F^T F`; `U` from `F V`, so that small
+//! singular values, which `F^T F` loses, are as accurate as `F`.
 
 use crate::scalar::{Mat3, Scalar, Vec3, vec3};
 
@@ -40,6 +40,8 @@ const DIRECTIONLESS: f64 = 1e-6;
 /// Decomposes any matrix; collapsed ones too, with an arbitrary rotation then.
 #[inline(always)]
 pub fn signed_svd<S: Scalar>(f: &Mat3<S>) -> SignedSvd<S> {
+    // `F^T F`, upper triangle. Its rounding is relative to the largest stretch squared: a stretch below 3e-4 of the
+    // largest is lost in single precision. The axes are then still orthonormal, and the lengths below come from `F`.
     let columns = f.columns;
     let mut a = [[S::ZERO; 3]; 3];
     for p in 0..3 {
@@ -49,9 +51,10 @@ pub fn signed_svd<S: Scalar>(f: &Mat3<S>) -> SignedSvd<S> {
     }
     let mut v = Mat3::IDENTITY.columns;
     for _ in 0..MOST_SWEEPS {
-        // A rotation of something negligible changes nothing, so leaving early is only faster.
         let largest = a[0][1].abs().max(a[0][2].abs()).max(a[1][2].abs());
         let smallest = a[0][0].min(a[1][1]).min(a[2][2]);
+        // Only when every lane is done. A lane that was done earlier goes on with rotations by zero, so that its bits do
+        // not depend on its neighbours. That holds as long as this threshold does not exceed the one in `rotate`.
         if S::all(largest.less(negligible(smallest, smallest))) {
             break;
         }
@@ -60,19 +63,25 @@ pub fn signed_svd<S: Scalar>(f: &Mat3<S>) -> SignedSvd<S> {
         rotate(&mut a, &mut v, 1, 2);
     }
     let mut values = [a[0][0], a[1][1], a[2][2]];
+    // Three exchanges sort three values. The largest has to come first, because Gram-Schmidt begins with it.
     order(&mut values, &mut v, 0, 1);
     order(&mut values, &mut v, 1, 2);
     order(&mut values, &mut v, 0, 1);
 
     let [f1, f2, f3] = [*f * v[0], *f * v[1], *f * v[2]];
+    // `F v_i` are orthogonal but for rounding, and the first is the longest: its direction is the best known. `F` has
+    // no unit and lengths of 1 at rest, so the bound is a number. `select` computes both sides; one may be NaN.
     let length = f1.length();
     let collapsed = length.less(S::from_f64(DIRECTIONLESS));
     let x_axis = vec3(S::ONE, S::ZERO, S::ZERO);
     let u1 = select(collapsed, x_axis, f1 * (S::ONE / length));
+    // Against the larger of the first length and 1: of a tetrahedron squeezed to a line no direction across it
+    // means anything, and rounding must not be scaled up to a unit vector.
     let across = f2 - u1 * u1.dot(f2);
     let width = across.length();
     let directionless = width.less(length.max(S::ONE) * S::from_f64(DIRECTIONLESS));
     let u2 = select(directionless, any_normal(u1), across * (S::ONE / width));
+    // Not from `F v_3`: a cross product makes `det U = 1`, and `sigma_3` gets the sign of `det F`.
     let u3 = u1.cross(u2);
     SignedSvd {
         u: Mat3::from_columns(u1, u2, u3),
@@ -93,12 +102,16 @@ fn negligible<S: Scalar>(app: S, aqq: S) -> S {
 fn rotate<S: Scalar>(a: &mut [[S; 3]; 3], v: &mut [Vec3<S>; 3], p: usize, q: usize) {
     let apq = a[p][q];
     // The tangent of the smaller of the two angles that do it.
+    // `t = 2 a_pq/(gap +- sqrt(gap^2 + 4 a_pq^2))` with the sign of `gap`: nothing cancels and `|t| <= 1`. The other
+    // root turns by more than 45 degrees and exchanges the axes, with which sweeps need not converge.
     let (gap, twice) = (a[q][q] - a[p][p], S::TWO * apq);
     let root = (gap * gap + twice * twice).sqrt();
     let t = twice / (gap + S::select(gap.less(S::ZERO), -root, root));
+    // Also where `gap` and `a_pq` are zero, and `t` is 0/0.
     let t = S::select(apq.abs().less(negligible(a[p][p], a[q][q])), S::ZERO, t);
     let c = S::ONE / (t * t + S::ONE).sqrt();
     let s = t * c;
+    // By `t a_pq` and not by squares of sine and cosine: what one entry loses the other gains, but for rounding.
     a[p][p] -= t * apq;
     a[q][q] += t * apq;
     a[p][q] = S::ZERO;

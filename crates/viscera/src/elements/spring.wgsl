@@ -10,7 +10,7 @@ struct SpringDirection {
     length: f32,
 }
 
-// What one solve changes: the multiplier [J s^2 / m] and the two positions [m].
+// The changes by one solve: the multiplier [J s^2 / m] and the two positions [m].
 struct SpringCorrection {
     multiplier: f32,
     positions: array<vec3f, 2>,

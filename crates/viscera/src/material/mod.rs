@@ -72,7 +72,7 @@ pub struct MaterialConstants<S> {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MaterialError {
-    /// Young's modulus is zero, negative, or no number.
+    /// Young's modulus is zero, negative, or NaN.
     #[error(
         "Young's modulus {value} Pa cannot hold a shape; it must be above 0, for example 5 kPa"
     )]
@@ -86,7 +86,7 @@ pub enum MaterialError {
         /// What was given.
         value: f64,
     },
-    /// Poisson ratio of -1 or less, or no number.
+    /// Poisson ratio of -1 or less, or NaN.
     #[error(
         "Poisson ratio {value} is unstable; it must be above -1, and about 0.45 for most tissue"
     )]
@@ -94,13 +94,13 @@ pub enum MaterialError {
         /// What was given.
         value: f64,
     },
-    /// Density is zero, negative, or no number.
+    /// Density is zero, negative, or NaN.
     #[error("density {value} kg/m^3 has no inertia; it must be above 0, for example 1060 kg/m^3")]
     Density {
         /// What was given [kg/m^3].
         value: f64,
     },
-    /// Viscosity is negative, or no number.
+    /// Viscosity is negative, or NaN.
     #[error("viscosity {value} s would add energy; it must be at least 0, for example 10 ms")]
     Viscosity {
         /// What was given [s].

@@ -8,7 +8,7 @@ use super::{Material, MaterialError, MaterialModel};
 use crate::settings::suggest;
 use crate::units::{Dimension, shorten};
 
-/// What holds for every preset.
+/// Notes that hold for every preset.
 pub const PRESET_CAUTION: &str = "A preset is a starting point, not a measurement of a patient: \
     published values for one tissue differ by a factor of 2 to 10 with method, strain and health.";
 
@@ -27,7 +27,7 @@ pub struct Preset {
     pub density: f64,
     /// Where the stiffness comes from.
     pub source: &'static str,
-    /// What to know before relying on it.
+    /// Its limits.
     pub caution: &'static str,
 }
 

@@ -161,9 +161,9 @@ impl<A: SignedDistance, B: SignedDistance> SignedDistance for SmoothUnion<A, B> 
 /// One shape less another, the rim rounded over a blend length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SmoothSubtraction<A, B> {
-    /// What is cut.
+    /// The shape that is cut.
     pub shape: A,
-    /// What is taken away.
+    /// The shape that is taken away.
     pub removed: B,
     /// Blend length `[m]`, positive: the rim is rounded with about this radius.
     pub blend: f64,

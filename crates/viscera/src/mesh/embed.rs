@@ -183,6 +183,7 @@ impl<'a> TetTree<'a> {
         if mesh.tets().is_empty() {
             return None;
         }
+        // Four times the centres: they are compared with each other only.
         let centers: Vec<Vec3<f64>> = (0..mesh.tets().len())
             .map(|tet| mesh.corners(tet).into_iter().fold(Vec3::ZERO, |sum, x| sum + x))
             .collect();
@@ -207,6 +208,7 @@ impl<'a> TetTree<'a> {
             return;
         }
         let size = upper - lower;
+        // Across the longest side, so that boxes become cubes: a point is near fewer of them.
         let axis = if size.x >= size.y && size.x >= size.z {
             0
         } else if size.y >= size.z {
@@ -214,11 +216,14 @@ impl<'a> TetTree<'a> {
         } else {
             2
         };
+        // At the median and not the middle of the box: halves are equal however unevenly tetrahedra lie, so the
+        // depth is a logarithm and the stack in `nearest` has a bound. Ties by number, for the same tree everywhere.
         let middle = (last - first) / 2;
         self.order[first..last].select_nth_unstable_by(middle, |&a, &b| {
             let (x, y) = (centers[a as usize][axis], centers[b as usize][axis]);
             x.total_cmp(&y).then(a.cmp(&b))
         });
+        // Depth first: the first child stands right behind its parent, only the second needs a place written down.
         self.split(centers, first, first + middle);
         self.branches[branch].second_child = Some(self.branches.len());
         self.split(centers, first + middle, last);
@@ -236,6 +241,8 @@ impl<'a> TetTree<'a> {
         while height > 0 {
             height -= 1;
             let (index, distance) = stack[height];
+            // With the tolerance, or boxes at the same distance would be left out by the order of the tree, and not by
+            // `is_better`: which tetrahedron a vertex on a shared face follows would depend on rounding.
             if best.is_some_and(|best| distance > best.distance + self.tolerance) {
                 continue;
             }
@@ -249,11 +256,12 @@ impl<'a> TetTree<'a> {
                 }
                 continue;
             };
+            // The nearer child is searched first: what it finds leaves out most of the other.
             let mut children = [index + 1, second].map(|c| (c, self.branches[c].distance(point)));
             if children[1].1 > children[0].1 {
                 children.swap(0, 1);
             }
-            // The nearer child on top.
+            // Last in, first out.
             stack[height..height + 2].copy_from_slice(&children);
             height += 2;
         }
@@ -270,6 +278,8 @@ impl<'a> TetTree<'a> {
 
     fn measure(&self, tet: u32, point: Vec3<f64>) -> Found {
         let corners = self.mesh.corners(tet as usize);
+        // Weights of zero and more mean inside. Outside, the distance is to the nearest of all faces: the sign of one
+        // weight does not say which face is nearest where tetrahedra are sharp.
         let weights = barycentric_weights(corners, point);
         let distance = if weights.iter().all(|&w| w >= 0.0) {
             0.0

@@ -103,7 +103,7 @@ pub enum MeshError {
     },
 }
 
-/// What part of a mesh an error speaks of, so that a reader can name the line of the file.
+/// The part of a mesh that an error is about, so that a reader can name the line of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeshPlace {
     /// The mesh as a whole.

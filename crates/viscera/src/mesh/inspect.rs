@@ -1,4 +1,4 @@
-//! What a person wants to know about a mesh before simulating with it.
+//! Measures of a mesh to look at before simulating with it.
 
 use std::fmt;
 

@@ -57,7 +57,7 @@ pub struct SurfaceMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// What had to be put right to make a mesh usable; empty for a clean mesh.
+/// Repairs that made a mesh usable; empty for a clean mesh.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MeshRepairs {
     /// Tetrahedra whose winding was reversed.

@@ -35,7 +35,7 @@ mod stencil_tests;
 /// for the two below.
 pub const DIHEDRAL_BOUNDS_DEG: (f64, f64) = (10.78, 164.71);
 
-/// What came of a [`tetrahedralize`] call, beside the mesh.
+/// The report of a [`tetrahedralize`] call, beside the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TetrahedralizeReport {
     /// Lattice vertices where the function was evaluated.
@@ -119,6 +119,8 @@ impl Filling {
         if !filling.tets.is_empty() {
             return Ok(filling);
         }
+        // Empty: the shape lies between lattice vertices. The error names a spacing that was seen to work, since a
+        // guess from the bounds would fail for thin shells. The lattice is bounded, so that this ends in seconds.
         let (lower, upper) = shape.bounds();
         let size = (upper - lower).to_array();
         let mut suggestion = spacing;
@@ -139,6 +141,8 @@ impl Filling {
         spacing: f64,
         extent: Extent,
     ) -> Result<Self, TetrahedralizeError> {
+        // Warping comes before filling: a stencil sees final signs only, so that all tetrahedra at a vertex agree on
+        // whether it is on the surface.
         let mut lattice = Lattice::sample(shape, spacing)?;
         let warped_vertices = lattice.warp();
         let mut builder = Builder {
@@ -173,6 +177,8 @@ impl Filling {
                 }
             }
         }
+        // Equal faces stand side by side then, in an order that depends on vertex numbers alone: triangles come out
+        // the same on every machine, which a hash map would not promise.
         faces.sort_unstable();
         let single = faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1);
         let mut surface_index = vec![NO_VERTEX; self.vertices.len()];
@@ -213,6 +219,8 @@ struct Builder<'a> {
 impl Builder<'_> {
     /// Fills one lattice tetrahedron according to the signs at its corners.
     fn fill(&mut self, corners: [Corner; 4]) {
+        // Inside before surface before outside: of 81 patterns of signs only their counts remain. Which of two inner
+        // corners is p does not matter, since `diagonal_leaves_first` gives the same diagonal for both orders.
         let mut ordered = corners;
         ordered.sort_by_key(|corner| match corner.sign {
             Sign::Inside => 0,
@@ -222,7 +230,9 @@ impl Builder<'_> {
         let count = |sign| corners.iter().filter(|corner| corner.sign == sign).count();
         let [p, q, r, s] = ordered;
         match (count(Sign::Inside), count(Sign::Outside)) {
+            // Also four corners on the surface: no sign says that there is tissue between them.
             (0, _) => {}
+            // Nothing outside: the tetrahedron itself, with a face on the surface where three corners are.
             (_, 0) => {
                 let tet = ordered.map(|corner| self.vertex(corner));
                 self.push(tet);
@@ -236,6 +246,8 @@ impl Builder<'_> {
                 });
                 self.push([apex, base[0], base[1], base[2]]);
             }
+            // A pyramid: the corner on the surface over the quadrilateral that is cut from the face p, q, s. Its
+            // diagonal follows from the face alone: the tetrahedron on the other side has to find the same one.
             (2, 1) => {
                 let (near, far) = ([p, q].map(|v| self.vertex(v)), [p, q].map(|v| self.cut(v, s)));
                 let apex = self.vertex(r);
@@ -243,6 +255,9 @@ impl Builder<'_> {
                     self.push([apex, a, b, c]);
                 }
             }
+            // Two outside: a prism between the triangles at p and at q. Sides 0 and 2 lie in lattice faces, side 1
+            // on the surface. Side 2 runs from the cut points at s back to p and q, the other way round than
+            // `diagonal_leaves_first` counts, so that its diagonal is the negation of that for p, q, s.
             (2, _) => {
                 let first = [self.vertex(p), self.cut(p, r), self.cut(p, s)];
                 let second = [self.vertex(q), self.cut(q, r), self.cut(q, s)];
@@ -252,6 +267,7 @@ impl Builder<'_> {
                 debug_assert_ne!(toward_r, diagonal_leaves_first(p, q, s));
                 self.push_prism(first, second, [toward_r, !toward_r, toward_r]);
             }
+            // Three inside, one outside: a prism below the triangle of cut points, all its sides in lattice faces.
             _ => {
                 let inner = [p, q, r].map(|v| self.vertex(v));
                 let outer = [p, q, r].map(|v| self.cut(v, s));
@@ -262,13 +278,14 @@ impl Builder<'_> {
         }
     }
 
-    /// Splits a triangular prism into three tetrahedra. `diagonals[i]` tells that the side between
+    /// Splits a triangular prism into three tetrahedra. Where `diagonals[i]` is true, the side between
     /// edges `i` and `i + 1` is split from `top[i]` to `bottom[i + 1]`, else from `top[i + 1]` to
     /// `bottom[i]`; they must not all agree, since such a prism has no splitting.
     fn push_prism(&mut self, top: [u32; 3], bottom: [u32; 3], diagonals: [bool; 3]) {
+        // Of diagonals that do not all agree, two end in some corner of the prism: that is the apex. It makes one
+        // tetrahedron with the triangle opposite, two with the one side that does not contain it.
         for i in 0..3 {
             let (next, last) = ((i + 1) % 3, (i + 2) % 3);
-            // A corner where two diagonals end sees the other end and the other side whole.
             let (apex, end, near, far, leaves_first) = if diagonals[i] && !diagonals[last] {
                 let near = [top[next], top[last]];
                 (top[i], bottom, near, [bottom[next], bottom[last]], diagonals[next])
@@ -330,8 +347,8 @@ fn split_quad(near: [u32; 2], far: [u32; 2], diagonal_leaves_first: bool) -> [[u
 ///
 /// Both tetrahedra at the face must agree, and must find a splitting that keeps the bounds:
 ///
-/// - one cut edge is long: the diagonal leaves the inner end of the long cut edge and ends at the
-///   cut point of the short one;
+/// - one cut edge is long: the diagonal leaves the inner end of the short cut edge and ends at the
+///   cut point of the long one;
 /// - both are short: the parity rule. The diagonal leaves the inner corner of which an even number
 ///   of coordinates exceed those of the outer corner. That singles one corner out, since `p` and
 ///   `q` lie on either side of `outside` along one axis and on the same side along the two others.

@@ -28,7 +28,7 @@ pub struct Point<S> {
     pub y: S,
     /// Third component.
     pub z: S,
-    /// What travels along.
+    /// The number that travels along.
     pub w: S,
 }
 
@@ -63,7 +63,7 @@ impl<S: Scalar> Point<S> {
 
 /// Some lanes of a group, from one on.
 pub trait Lanes: Scalar {
-    /// What each lane holds.
+    /// The number that each lane holds.
     type Real: Real;
 
     /// How many lanes; divides [`LANES`].

@@ -25,7 +25,7 @@ mod sealed {
     impl Sealed for super::avx2::F64x4 {}
 }
 
-/// What a kernel may do with a number, or with several numbers side by side.
+/// The operations of kernels on a number, or on several numbers side by side.
 pub trait Scalar:
     sealed::Sealed
     + Copy

@@ -76,7 +76,7 @@ pub(super) fn build_scene(name: &str, tree: Node) -> Result<Scene, SceneError> {
         output: tables.output,
         tree: Written(tree),
     };
-    // Every change is tried now: nobody wants to learn of a slip in the middle of a run.
+    // Every change is tried now: an error in the middle of a run comes too late.
     let mut changed = scene.clone();
     for (change, place) in scene.changes.iter().zip(places) {
         changed.change(&change.settings).map_err(|error| SceneError::Change {

@@ -1,4 +1,4 @@
-//! Scenes: what a person writes, checked and in SI units.
+//! Scenes: the content of a scene file, checked and in SI units.
 //!
 //! A scene file is TOML. [`Scene::parse`] reads it, with overrides laid over it, and either gives a
 //! scene in which every number is possible and every reference leads somewhere, or one error that
@@ -51,7 +51,7 @@ pub struct Change {
     pub settings: Vec<(String, String)>,
 }
 
-/// What a scene file says.
+/// The content of a scene file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// The name the file was given.
@@ -62,7 +62,7 @@ pub struct Scene {
     pub description: String,
     /// How long it lasts.
     pub time: TimeSettings,
-    /// What acts everywhere.
+    /// Loads on all bodies.
     pub world: WorldSettings,
     /// At least one, no two of a name.
     pub bodies: Vec<Body>,
@@ -78,7 +78,7 @@ pub struct Scene {
     pub changes: Vec<Change>,
     /// How a step is solved.
     pub solver: SolverSettings,
-    /// What a run writes.
+    /// Files that a run writes.
     pub output: OutputSettings,
     /// What was written, overrides and changes laid over it: changes to come begin with it.
     tree: Written,
@@ -94,7 +94,7 @@ impl PartialEq for Written {
     }
 }
 
-/// A body: its mesh, its place and what it is made of.
+/// A body: its mesh, its place and its material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// The name.
@@ -103,7 +103,7 @@ pub struct Body {
     pub shape: BodyShape,
     /// From the mesh's frame to the world.
     pub placement: RigidTransform,
-    /// What it is made of, where no region says otherwise.
+    /// Its material, where no region says otherwise.
     pub material: Material,
     /// Parts made of something else; no two of a label.
     pub regions: Vec<Region>,
@@ -169,7 +169,7 @@ pub enum BodyShape {
 pub struct Region {
     /// The label its tetrahedra carry.
     pub label: u32,
-    /// What it is made of.
+    /// Its material.
     pub material: Material,
 }
 
@@ -178,7 +178,7 @@ pub struct Region {
 pub struct Fixing {
     /// The name, or "fixing 0" and so on.
     pub name: String,
-    /// What is held.
+    /// The patch that is held.
     pub patch: Patch,
     /// Total stiffness [N/m] of an elastic attachment of each vertex to its rest position; a vertex
     /// has this divided by the number of vertices. `None` holds rigidly.

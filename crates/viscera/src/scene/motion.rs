@@ -68,7 +68,7 @@ pub struct MotionKey {
 pub struct Motion {
     /// The name, or "motion 0" and so on.
     pub name: String,
-    /// What is held.
+    /// The patch that is held.
     pub patch: Patch,
     /// At least one, times ascending, the first at `start`.
     pub keys: Vec<MotionKey>,
@@ -117,7 +117,7 @@ pub struct ForceKey {
 pub struct Force {
     /// The name, or "force 0" and so on.
     pub name: String,
-    /// What is pulled.
+    /// The patch that is pulled.
     pub patch: Patch,
     /// The full force on the whole patch [N].
     pub force: Vec3<f64>,

@@ -13,7 +13,7 @@ use crate::settings::{
 use crate::units::Dimension;
 
 settings_table! {
-    /// A scene: what is there, what happens to it, and how it is computed.
+    /// A scene: its bodies, the motions and loads on them, and how they are computed.
     pub(super) struct SceneTable {
         /// A title for tables and pictures.
         title: String = (String::new()), text();
@@ -21,7 +21,7 @@ settings_table! {
         description: String = (String::new()), text();
         /// How long it lasts.
         time: TimeSettings = (TimeSettings::default()), table::<TimeSettings>();
-        /// What acts everywhere.
+        /// Loads on all bodies.
         world: WorldSettings = (WorldSettings::default()), table::<WorldSettings>();
         /// The bodies; at least one.
         body: Vec<Placed<BodyTable>> = required, tables::<BodyTable>();
@@ -37,7 +37,7 @@ settings_table! {
         change: Vec<Placed<ChangeTable>> = (Vec::new()), tables::<ChangeTable>();
         /// How a step is solved.
         solver: SolverSettings = (SolverSettings::default()), table::<SolverSettings>();
-        /// What a run writes.
+        /// Files that a run writes.
         output: OutputSettings = (OutputSettings::default()), table::<OutputSettings>();
     }
 }
@@ -59,7 +59,7 @@ settings_table! {
 
 settings_table! {
     #[default]
-    /// What acts everywhere. The axes: +z is up; of a patient +x is left and -y is the front.
+    /// Loads on all bodies. The axes: +z is up; of a patient +x is left and -y is the front.
     pub struct WorldSettings {
         /// Gravity: an acceleration downwards (along -z), or its three components.
         gravity: Vec3<f64> = (vec3(0.0, 0.0, -9.81)), Gravity;
@@ -68,7 +68,7 @@ settings_table! {
 
 settings_table! {
     #[default]
-    /// What a run writes.
+    /// Files that a run writes.
     pub struct OutputSettings {
         /// Write every so many frames; the last frame is always written.
         every: u32 = 1, whole(1, 1_000_000);
@@ -116,8 +116,8 @@ const DENSITY: Range = at_least(1e-3).up_to(1e5);
 const STIFFNESS: Range = at_least(1e-6).up_to(1e12);
 
 settings_table! {
-    /// A body: a mesh from a file (`mesh`, `unit`) or a `shape`, put in place, and what it is made
-    /// of.
+    /// A body: a mesh from a file (`mesh`, `unit`) or a `shape`, its place, and its
+    /// material.
     pub(super) struct BodyTable {
         /// The name that fixings, motions and forces refer to.
         name: Placed<String> = required, placed(name());
@@ -155,7 +155,7 @@ settings_table! {
         rotation_axis: Vec3<f64> = (vec3(0.0, 0.0, 1.0)), direction();
         /// Angle it is turned by.
         rotation_angle: f64 = 0.0, quantity(Dimension::Angle, ANY);
-        /// What it is made of.
+        /// Its material.
         material: MaterialTable = required, table::<MaterialTable>();
         /// Parts made of something else.
         region: Vec<Placed<RegionTable>> = (Vec::new()), tables::<RegionTable>();

@@ -1,4 +1,4 @@
-//! What was done to a scene by hand, as text that a scene file takes.
+//! Changes by hand to a scene, as text that a scene file takes.
 
 use super::{Change, Interpolation, Motion, MotionKey, Patch, Scene, Selector};
 use crate::scalar::Vec3;

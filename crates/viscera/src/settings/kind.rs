@@ -9,19 +9,19 @@ use crate::units::{Dimension, format_number};
 
 /// A kind of value.
 pub(crate) trait Kind {
-    /// What a field of this kind holds.
+    /// The type of a field of this kind.
     type Value;
     /// Reads and checks a value.
     fn read(&self, key: &str, node: &Node) -> Result<Self::Value, SettingError>;
-    /// What one writes, in words.
+    /// The form of its values, in words.
     fn type_text(&self) -> String;
     /// The default as one would write it.
     fn value_text(&self, value: &Self::Value) -> String;
-    /// What is allowed; empty where everything is.
+    /// Its limits; empty where there are none.
     fn range_text(&self) -> String {
         String::new()
     }
-    /// What each name stands for; empty where there are none.
+    /// The meaning of each name; empty where there are none.
     fn choices_text(&self) -> String {
         String::new()
     }

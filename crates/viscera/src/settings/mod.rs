@@ -31,7 +31,7 @@ pub enum SettingError {
     Syntax {
         /// Where reading stopped.
         place: Place,
-        /// What the parser expected.
+        /// The parser's expectation.
         message: String,
     },
     /// A key that does not exist.
@@ -128,22 +128,22 @@ pub enum ValueError {
     Impossible(String),
 }
 
-/// What there is to know about one key.
+/// The description of one key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeyDescription {
     /// The key.
     pub name: &'static str,
-    /// What it takes: a type, with its unit.
+    /// Its type, with its unit.
     pub type_text: String,
     /// The allowed range; empty where everything of the type is allowed.
     pub range: String,
     /// The default as one would write it; `required` or `unset` where there is none.
     pub default: String,
-    /// What it does.
+    /// Its effect.
     pub doc: String,
 }
 
-/// What there is to know about one table.
+/// The description of one table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableDescription {
     /// The table's path, for example `body.material`.

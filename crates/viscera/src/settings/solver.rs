@@ -36,14 +36,14 @@ pub enum Threads {
 /// The most threads that can be asked for: more than any machine has processors that share memory.
 pub const MOST_THREADS: u32 = 1024;
 
-/// What a simulation computes its steps on.
+/// The device that computes a simulation's steps.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceRequest {
-    /// The faster one, as far as one can tell beforehand; the CPU where no GPU can do it.
+    /// The device that is expected to be faster; the CPU where no GPU can do it.
     Auto,
     /// The processor.
     Cpu,
-    /// The first graphics adapter, or none of the work is done.
+    /// The first graphics adapter; without one nothing is computed.
     Gpu,
     /// The first adapter whose name contains this text, whatever its case.
     Named(String),
@@ -60,7 +60,7 @@ choices! {
 }
 
 choices! {
-    /// What over-relaxation scales.
+    /// The unknowns that over-relaxation scales.
     pub enum RelaxationForm {
         /// Displacement and multiplier alike, so that they keep corresponding.
         Consistent = "consistent",
@@ -70,7 +70,7 @@ choices! {
 }
 
 choices! {
-    /// What is done with the sequence of sweeps.
+    /// How the sequence of sweeps is accelerated.
     pub enum Acceleration {
         /// Nothing.
         None = "none",
@@ -94,14 +94,15 @@ choices! {
 }
 
 choices! {
-    /// What keeps Anderson's mixtures in bounds.
+    /// How Anderson's accelerated iterates are kept in bounds.
     pub enum AndersonGuard {
         /// Nothing.
         None = "none",
         /// A grown residual restarts the history. It does not bound the energy.
         Residual = "residual",
-        /// Of mixture and plain sweep the first is taken that does not raise the incremental
-        /// potential; acts where steps are guarded, elsewhere as `residual`.
+        /// An accelerated iterate that raises the incremental potential is rejected for the plain sweep, and
+        /// at the second failure in a row for a step of descent; acts where steps are guarded, elsewhere as
+        /// `residual`.
         Energy = "energy",
     }
 }
@@ -140,7 +141,7 @@ settings_table! {
         /// Floating point format of the simulation state.
         precision: Precision = (Precision::F32), one_of::<Precision>();
         /// How positions and velocities are advanced. "explicit" divides every substep into as many
-        /// small steps as it takes to be stable; of the settings below it heeds `explicit_safety`,
+        /// small steps as it takes to be stable; of the settings below it uses `explicit_safety`,
         /// `colors`, `threads` and `device`. It loses no motion to damping, and it is the cheapest for small soft
         /// bodies; its cost grows with the square root of the stiffness, and with fineness once more.
         method: Method = (Method::Xpbd), one_of::<Method>();
@@ -161,9 +162,9 @@ settings_table! {
         /// colour, 1.5 for a few, about 1.2 for unlimited; beyond that sweeps overshoot and may
         /// diverge. With `rebase` and one colour only 1 is safe.
         relaxation: f64 = 1.0, number(at_least(1e-3).below(2.0));
-        /// What over-relaxation scales.
+        /// The unknowns that over-relaxation scales.
         relaxation_form: RelaxationForm = (RelaxationForm::Consistent), one_of::<RelaxationForm>();
-        /// What is done with the sequence of sweeps of a substep. Needs several iterations to pay.
+        /// How the sequence of sweeps of a substep is accelerated. Pays with several iterations only.
         acceleration: Acceleration = (Acceleration::None), one_of::<Acceleration>();
         /// Chebyshev's estimate rho of how much of the error a sweep leaves; 0 measures it from the
         /// ratio of successive steps. Too small gains nothing, too large blows up: with unlimited
@@ -179,12 +180,12 @@ settings_table! {
         anderson_window: u32 = 5, whole(1, 10);
         /// The unknowns that Anderson mixes.
         anderson_on: AndersonOn = (AndersonOn::Both), one_of::<AndersonOn>();
-        /// What keeps Anderson's mixtures in bounds. Without it a bad mixture can throw a strongly
-        /// deformed body. "residual" restarts on a grown residual, which bounds no energy (`step_guard`
-        /// does that for the whole step); "energy" takes no mixture that raises the incremental
-        /// potential, for one to two evaluations of it per sweep: fewer steps are rejected, but with
-        /// few colours stiff tissue may stay far from its rest. It acts with `step_guard` (without it
-        /// as "residual").
+        /// How Anderson's accelerated iterates are kept in bounds. Without a guard a bad one can throw a
+        /// strongly deformed body. "residual" restarts the history where the residual has grown, which bounds
+        /// no energy (`step_guard` does that for the whole step); "energy" rejects every accelerated iterate
+        /// that raises the incremental potential, for one to two evaluations of it per sweep: fewer steps are
+        /// rejected, but with few colours stiff tissue may stay far from its rest. It acts with `step_guard`
+        /// (without it as "residual").
         anderson_guard: AndersonGuard = (AndersonGuard::Residual), one_of::<AndersonGuard>();
         /// Stabilised rebase before each sweep: positions are pulled back onto the multipliers,
         /// so that the iteration converges to implicit Euler exactly. One more pass over the
@@ -200,10 +201,11 @@ settings_table! {
         /// Keep the multipliers from step to step. With `rebase` this makes the stiffness
         /// independent of the number of iterations; without it the body freezes.
         keep_multipliers: bool = true, truth();
-        /// Take a step back that ends at a higher incremental potential (inertia, tissue with its
-        /// viscosity, springs) than the best place it could have started from, and slow down what
-        /// would end it with more mechanical energy than it had and was given. Acts with `rebase`; XPBD as published has
-        /// no potential that it lowers. Without it stiff tissue at a small budget may never settle.
+        /// Reject a step that ends at a higher incremental potential (inertia, tissue with its
+        /// viscosity, springs) than the best of its possible starts, and slow down tissue that would end it
+        /// with more mechanical energy than it had and was given. Acts with `rebase`; XPBD as published has
+        /// no potential that it lowers. Without the guard stiff tissue with few iterations per frame may never
+        /// settle.
         step_guard: bool = true, truth();
         /// The constraints of a stable neo-Hookean tetrahedron. With `rebase` the pair comes to the
         /// right rest as well, but slowly: it moves as if it were heavier.
@@ -211,7 +213,7 @@ settings_table! {
         /// Threads: "auto" for one per processor where the mesh is large enough to gain by it (16,000
         /// tetrahedra). The result is the same to the bit for any number.
         threads: Threads = (Threads::Auto), THREADS;
-        /// What computes the steps: "auto" for a graphics processor where the mesh is large enough to
+        /// The device that computes the steps: "auto" for a graphics processor where the mesh is large enough to
         /// gain by it and `precision` is "f32", otherwise and where that fails the CPU; "cpu"; "gpu"
         /// for the first graphics adapter; or part of an adapter's name, of those that `viscera
         /// devices` lists. Devices agree to round-off, not to the bit.
@@ -227,7 +229,7 @@ impl SolverSettings {
         self.step_guard && self.rebase && self.method == Method::Xpbd
     }
 
-    /// The guard of Anderson's mixtures that is in force.
+    /// The guard of Anderson's accelerated iterates that is in force.
     pub(crate) fn guard_of_mixtures(&self) -> AndersonGuard {
         match self.anderson_guard {
             AndersonGuard::Energy if !self.guards_steps() => AndersonGuard::Residual,

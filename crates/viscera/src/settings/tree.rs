@@ -59,7 +59,7 @@ impl Node {
     }
 }
 
-/// What can stand right of an equals sign.
+/// A value: the right side of an equals sign.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {
     Text(String),

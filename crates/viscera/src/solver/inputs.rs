@@ -1,4 +1,4 @@
-//! What acts on a model from outside during a step, and whether it can.
+//! Inputs of a step: loads, pins, tethers and anchors from outside, and whether they are legal.
 
 use super::error::StepError;
 use crate::layout::Layout;
@@ -27,7 +27,7 @@ pub struct Tether<S> {
     pub stiffness: S,
 }
 
-/// What acts on the model from outside during one step.
+/// Loads and constraints that act on the model from outside during one step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inputs<S> {
     /// Acceleration of gravity [m/s^2].

@@ -10,7 +10,7 @@ pub struct StepReport {
     pub potential: f64,
     /// The lowest incremental potential [J s^2] of the places the step could have started from.
     pub limit: f64,
-    /// What round-off can pretend of `potential` [J s^2]; at most this much above `limit` passes.
+    /// The part of `potential` that round-off can pretend [J s^2]; at most this much above `limit` passes.
     pub noise: f64,
     /// Whether the sweeps ended above the limit, so that the step was rejected: the part's, or any part's.
     pub rejected: bool,
@@ -29,7 +29,7 @@ impl StepReport {
     pub(crate) fn of_all(parts: &[StepReport]) -> Option<StepReport> {
         let height = |report: &StepReport| {
             let above = report.potential - (report.limit + report.noise);
-            // Infinite at an infinite limit is at the limit; what is no number stands above everything.
+            // Infinite at an infinite limit is at the limit; NaN stands above everything.
             let unknown = if report.keeps_limit() { 0.0 } else { f64::INFINITY };
             if above.is_nan() { unknown } else { above }
         };
@@ -48,7 +48,7 @@ impl StepReport {
 mod tests {
     use super::*;
 
-    /// What is no number, or as infinite as its limit, is not hidden by other parts.
+    /// A NaN, or an infinite value at an infinite limit, is not hidden by other parts.
     #[test]
     fn the_worst_part_speaks_for_all() {
         let of = |potential, limit| StepReport {

@@ -151,6 +151,92 @@ fn libraries_leave_arguments_and_reports_to_programs() {
     }
 }
 
+/// Folders of the workspace's packages.
+fn members() -> Vec<String> {
+    let manifest = read("Cargo.toml");
+    let list = manifest.split_once("\nmembers = [").expect("the members of the workspace").1;
+    let list = list.split_once(']').expect("the end of the members").0;
+    list.split('"').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+/// A package's own name.
+fn package_name(manifest: &str) -> &str {
+    let package = manifest.split_once("[package]").expect("a package").1;
+    let line = package.lines().find(|line| line.starts_with("name = ")).expect("a name");
+    line.split('"').nth(1).expect("a name in quotes")
+}
+
+/// Packages that a manifest names in any section of dependencies: of the program, its tests, its build, of one
+/// system, renamed ones by their own names.
+fn dependencies(manifest: &str) -> Vec<&str> {
+    let mut names = Vec::new();
+    let mut is_list = false;
+    for line in manifest.lines().map(str::trim) {
+        if let Some(header) = line.strip_prefix('[') {
+            let header = header.split(']').next().unwrap_or("");
+            is_list = header.ends_with("dependencies");
+            // `[dependencies.name]`
+            let one = header.rsplit_once("dependencies.");
+            names.extend(one.map(|(_, name)| name.trim_matches('"')));
+        } else if is_list && !line.starts_with('#') {
+            let end = line.find(['.', '=', ' ']).unwrap_or(0);
+            names.push(line[..end].trim_matches('"'));
+        }
+        if !line.starts_with('#')
+            && let Some((_, renamed)) = line.split_once("package = \"")
+        {
+            names.extend(renamed.split('"').next());
+        }
+    }
+    names.retain(|name| !name.is_empty());
+    names
+}
+
+#[test]
+fn dependencies_are_found_in_every_section() {
+    let manifest = "[package]\nname = \"own\"\n\n[dependencies]\n# c = \"1\"\na.workspace = true\n\
+                    b = { path = \"x\" }\nlong = [\n    \"std\",\n]\n\n[dev-dependencies]\nd = { package = \"e\" }\n\
+                    [target.'cfg(unix)'.dependencies]\nf = \"1\"\n[build-dependencies.g]\npath = \"y\"\n[lints]\nh = 1\n";
+    assert_eq!(package_name(manifest), "own");
+    let found = dependencies(manifest);
+    for name in ["a", "b", "d", "e", "f", "g"] {
+        assert!(found.contains(&name), "{name} is missing in {found:?}");
+    }
+    for name in ["own", "c", "h"] {
+        assert!(!found.contains(&name), "{name} is no dependency: {found:?}");
+    }
+}
+
+/// A program is a package with a `main.rs` or a `[[bin]]`. What two programs need is a library of its own.
+#[test]
+fn no_program_uses_another() {
+    let manifests: Vec<(String, String)> =
+        members().into_iter().map(|m| (read(&format!("{m}/Cargo.toml")), m)).collect();
+    let is_program = |(manifest, member): &&(String, String)| {
+        root().join(member).join("src/main.rs").exists() || manifest.contains("[[bin]]")
+    };
+    let programs: Vec<_> = manifests.iter().filter(is_program).collect();
+    let names: Vec<&str> = programs.iter().map(|(manifest, _)| package_name(manifest)).collect();
+    for known in ["viscera-cli", "viscera-view", "viscera-lab"] {
+        assert!(names.contains(&known), "{known} is not among the programs {names:?}");
+    }
+    // Nor does a library use a program.
+    for (manifest, member) in &manifests {
+        let own = package_name(manifest);
+        let used = dependencies(manifest);
+        assert!(
+            own == "viscera" || own == "xtask" || used.contains(&"viscera"),
+            "{member}: {used:?}"
+        );
+        for name in names.iter().filter(|name| **name != own) {
+            assert!(
+                !used.contains(name),
+                "{member}/Cargo.toml: `{name}` is a program; put what both need into a library"
+            );
+        }
+    }
+}
+
 /// Texts between single backticks, code blocks left out.
 fn code_spans(markdown: &str) -> Vec<&str> {
     let mut spans = Vec::new();

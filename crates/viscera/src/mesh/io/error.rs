@@ -27,7 +27,7 @@ impl fmt::Display for LineSuffix {
     }
 }
 
-/// What is wrong with a file.
+/// The fault of a file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadProblem {
@@ -40,7 +40,7 @@ pub enum ReadProblem {
         /// The unit given `[m]`.
         meters: f64,
     },
-    /// Neither content nor extension tell a format.
+    /// Neither content nor extension identifies a format.
     #[error(
         "not a mesh file known here; known are Gmsh 1 and 2.2 ASCII (.msh), VTK XML (.vtu), \
         and OBJ surfaces (.obj)"

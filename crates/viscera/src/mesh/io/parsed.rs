@@ -1,4 +1,4 @@
-//! What reading a file comes to.
+//! The result of reading a file.
 
 use std::fmt;
 
@@ -57,18 +57,18 @@ impl SkippedElements {
     }
 }
 
-/// What reading a file came to, apart from the mesh. The default says "not from a file".
+/// The report of reading a file, beside the mesh. The default says "not from a file".
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadReport {
     /// The format found; `None` for a mesh that was built, not read.
     pub format: Option<Format>,
-    /// What had to be put right.
+    /// Repairs that were made.
     pub repairs: MeshRepairs,
     /// Elements that are not part of the mesh.
     pub skipped: Vec<SkippedElements>,
 }
 
-/// What a format's reader hands to the front door.
+/// The result of a format's reader, before checks that all formats share.
 pub(super) struct Parsed<Mesh> {
     pub mesh: Mesh,
     pub repairs: MeshRepairs,

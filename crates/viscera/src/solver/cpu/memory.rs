@@ -1,4 +1,4 @@
-//! Memory of the CPU backend, and who carries out a stage.
+//! Memory of the CPU backend, and the dispatch of stages to their families.
 
 use crate::layout::Layout;
 use crate::scalar::Real;
@@ -20,7 +20,7 @@ pub struct Memory<S> {
     pub method: MethodMemory<S>,
 }
 
-/// What the method keeps.
+/// The method's own memory.
 #[derive(Clone, Debug)]
 pub enum MethodMemory<S> {
     Xpbd(xpbd::Memory<S>),

@@ -10,7 +10,7 @@ use crate::solver::step::data::Step;
 use crate::solver::xpbd::history::restart;
 use crate::state::State;
 
-/// What a solver is asked to do.
+/// A request to a solver.
 pub enum Task<'a> {
     /// The stages of a step, the body of the plan so many times; of these stages the first so many.
     Step(&'a Plan, u32, usize),
@@ -23,7 +23,7 @@ pub enum Task<'a> {
 /// Observer callback: gets the number of iterations and the positions of all vertices [m], the user's order.
 pub type Watch<'a> = dyn FnMut(u32, &[Vec3<f64>]) + Send + 'a;
 
-/// Does it in the precision at hand.
+/// Carries a request out in one precision.
 pub fn carry_out<S: Real>(
     task: Task<'_>,
     memory: &mut Memory<S>,

@@ -93,7 +93,7 @@ impl<S: Real> Kernel<S> for Piece<'_, S> {
     }
 }
 
-/// The last batch is filled up with zeros.
+/// The last batch is padded with zeros.
 #[inline(always)]
 fn converted<S: Real>(values: &[S]) -> Batch {
     let mut batch = [0.0; BATCH];

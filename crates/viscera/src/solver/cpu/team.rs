@@ -1,8 +1,9 @@
-//! Threads that stay at hand for the length of a step and take pieces of one job after the other.
+//! Threads that wait for the length of a step and take pieces of one job after the other.
 //!
 //! A step has hundreds of jobs of some ten microseconds, one per colour and pass. Handing each to a
 //! thread pool costs about as much as half of it; here the thread that steps announces a job by one
-//! store, everybody at hand claims pieces, and the thread that steps goes on when all are done. It never waits for a thread that has not come: what nobody claims it does itself.
+//! store, every waiting thread claims pieces, and the thread that steps goes on when all are done.
+//! It never waits for a thread that has not come: pieces that no other claims it does itself.
 #![allow(unsafe_code)]
 
 use std::cell::UnsafeCell;
@@ -36,17 +37,17 @@ struct Job {
 #[repr(align(128))]
 struct Apart<T>(T);
 
-/// What threads at hand share.
+/// Memory that waiting threads share.
 pub struct Team {
     /// Number of the job (32 bits), first open piece (16), end of the open pieces (16).
     claims: Apart<AtomicU64>,
     /// Pieces that are done.
     done: Apart<AtomicUsize>,
-    /// Written while no piece is open, read by whoever has claimed one.
+    /// Written while no piece is open, read by the thread that has claimed one.
     job: UnsafeCell<Option<Job>>,
     /// A piece has panicked on another thread.
     failed: AtomicBool,
-    /// The step is over: threads at hand may go.
+    /// The step is over: waiting threads may go.
     over: Apart<AtomicBool>,
 }
 
@@ -74,7 +75,7 @@ impl Team {
         }
     }
 
-    /// Runs `step` with `helpers` threads of the pool at hand, if they come.
+    /// Runs `step` with `helpers` waiting threads of the pool, if they come.
     pub fn lead<R: Send>(
         &self,
         pool: &rayon::ThreadPool,
@@ -123,7 +124,7 @@ impl Team {
         }
         // SAFETY: only lengthens the life of the reference, which `Finish` outlives.
         let work: &'static (dyn Fn(Range<usize>) + Sync) = unsafe { std::mem::transmute(work) };
-        // SAFETY: no piece is open, so that nobody else reads it.
+        // SAFETY: no piece is open, so that no other thread reads it.
         unsafe { *self.job.get() = Some(Job { work, count, pieces }) };
         self.done.0.store(0, Ordering::Relaxed);
         let number = (self.claims.0.load(Ordering::Relaxed) >> 32).wrapping_add(1);
@@ -189,7 +190,7 @@ impl Drop for Done<'_> {
     }
 }
 
-/// Waits until nobody works on the job any more, even where a piece of this thread panics.
+/// Waits until no thread works on the job any more, even where a piece of this thread panics.
 struct Finish<'a> {
     team: &'a Team,
     pieces: usize,
@@ -197,7 +198,7 @@ struct Finish<'a> {
 
 impl Drop for Finish<'_> {
     fn drop(&mut self) {
-        // Pieces are left open by a panic only; nobody shall do them.
+        // Pieces are left open by a panic only; no thread shall do them.
         while self.team.claim(End::Front).is_some() {
             self.team.done.0.fetch_add(1, Ordering::Release);
         }

@@ -19,7 +19,7 @@ pub trait TetPass<S: Real> {
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>);
 }
 
-/// The block at hand.
+/// The block that is worked on.
 pub struct Block<'a, S> {
     pub set: &'a TetSet<S>,
     pub index: usize,
@@ -111,7 +111,7 @@ impl<'a, S: Real> Block<'a, S> {
     #[inline(always)]
     pub fn corners<L: Lanes<Real = S>>(&self, points: &[Point<S>]) -> Corners<L> {
         assert!(points.len() >= self.set.bounds[0]);
-        // SAFETY: `Memory::check` compares bounds and lengths, and nobody writes the slice.
+        // SAFETY: `Memory::check` compares bounds and lengths, and no thread writes the slice.
         unsafe { gather(points.as_ptr(), &self.constants.vertices, self.lane) }
     }
 
@@ -199,7 +199,7 @@ impl<'a, S: Real> Block<'a, S> {
     /// Replaces multipliers; those of padding lanes stay zero.
     ///
     /// # Safety
-    /// Nobody else is at the block's multipliers meanwhile.
+    /// No other thread uses the block's multipliers meanwhile.
     #[inline(always)]
     pub unsafe fn store_multipliers<L: Lanes<Real = S>, const N: usize>(
         &self,
@@ -272,7 +272,7 @@ unsafe fn gather<L: Lanes>(
     corners
 }
 
-/// What a thread does at a time.
+/// The blocks that a thread does at a time.
 struct Piece<'a, S, P> {
     model: &'a Layout<S>,
     set: &'a TetSet<S>,

@@ -1,4 +1,4 @@
-//! Who does the work: threads and instructions, and what they may share.
+//! Threads and instructions that do the work, and the memory that threads may share.
 //!
 //! Work is cut into pieces whose number does not depend on the threads, every place is written by one
 //! piece, and sums go over pieces in order. So the bits are the same for any number of threads.
@@ -119,7 +119,7 @@ pub struct Shared<'a, T> {
     slice: PhantomData<&'a mut [T]>,
 }
 
-// SAFETY: whoever goes through the pointer promises that no two threads meet at one place.
+// SAFETY: callers that go through the pointer promise that no two threads meet at one place.
 unsafe impl<T: Send> Sync for Shared<'_, T> {}
 // SAFETY: as above.
 unsafe impl<T: Send> Send for Shared<'_, T> {}
@@ -144,7 +144,7 @@ impl<'a, T> Shared<'a, T> {
     /// One place.
     ///
     /// # Safety
-    /// Nobody else is at this place meanwhile.
+    /// No other thread uses this place meanwhile.
     #[inline(always)]
     #[allow(clippy::mut_from_ref)]
     pub unsafe fn at(&self, i: usize) -> &mut T {
@@ -156,7 +156,7 @@ impl<'a, T> Shared<'a, T> {
     /// Several places in a row.
     ///
     /// # Safety
-    /// Nobody else is at these places meanwhile.
+    /// No other thread uses these places meanwhile.
     #[inline(always)]
     #[allow(clippy::mut_from_ref)]
     pub unsafe fn range(&self, range: Range<usize>) -> &mut [T] {

@@ -46,7 +46,7 @@ pub fn plan() -> Plan {
     }
 }
 
-/// What the explicit method keeps beside the data of a step.
+/// The memory of the explicit method beside the data of a step.
 #[derive(Clone, Debug)]
 pub struct Memory<S> {
     pub stability: Stability,

@@ -21,7 +21,7 @@ const MOST_SMALL_STEPS: f64 = 100_000.0;
 /// Rounds of the power method for an element's stiffness: 1 % is enough for a bound with a margin.
 const POWER_ROUNDS: usize = 20;
 
-/// What the largest stable small step depends on.
+/// Quantities that the largest stable small step depends on.
 #[derive(Clone, Debug)]
 pub struct Stability {
     /// The largest small step [s] of the stiffest part without tethers, with the margin of the settings.

@@ -15,7 +15,7 @@ struct TetBlock {
     material: array<u32, 8>,
 }
 
-// What acts on one vertex in this step.
+// Load and hold of one vertex in this step.
 struct Update {
     vertex: u32,
     is_pinned: u32,
@@ -23,7 +23,7 @@ struct Update {
     force: array<f32, 3>,
     // Where a pinned vertex is at the end of the step, or where springs pull it to [m].
     place: array<f32, 3>,
-    // Of springs to places outside [N/m].
+    // Of soft position constraints [N/m].
     stiffness: f32,
     // Mass, and what springs make of it [kg]; see solver/step/tethers.rs.
     inertia: f32,
@@ -41,7 +41,7 @@ struct Job {
     multiplier_offset: u32,
     viscous_offset: u32,
     is_viscous: u32,
-    // What a kernel with several uses is used for; see there.
+    // The use of a kernel that has several; see there.
     mode: u32,
     // A number that only the kernel understands.
     parameter: f32,
@@ -57,7 +57,7 @@ struct Frame {
     dt: f32,
     squared_dt: f32,
     inverse_dt: f32,
-    // What multipliers of the last step are multiplied by.
+    // The factor for multipliers of the last step.
     rescale: f32,
     relaxation_multipliers: f32,
     relaxation_positions: f32,
@@ -78,7 +78,7 @@ struct Frame {
 @group(0) @binding(5) var<storage, read_write> copies: array<vec4f>;
 // [J s^2]
 @group(0) @binding(6) var<storage, read_write> multipliers: array<f32>;
-// What each constraint puts on each of its corners: impulse [N s^2] and bound [kg].
+// The load of each constraint on each of its corners: impulse [N s^2] and bound [kg].
 @group(0) @binding(7) var<storage, read_write> loads: array<vec4f>;
 // [m/s]
 @group(0) @binding(8) var<storage, read_write> velocities: array<vec4f>;

@@ -153,7 +153,7 @@ impl Buffers {
         queue.write_buffer(found.buffer, found.offset, bytes);
     }
 
-    /// What a kernel finds at a binding.
+    /// The buffer or range at a kernel's binding.
     pub fn bound(&self, place: Place) -> wgpu::BufferBinding<'_> {
         let whole = |buffer| wgpu::BufferBinding { buffer, offset: 0, size: None };
         match (place, &self.copies) {

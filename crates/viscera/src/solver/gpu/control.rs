@@ -1,4 +1,4 @@
-//! The record of what the device decides during a step; its twin is control.wgsl.
+//! The record of the device's decisions during a step; its twin is control.wgsl.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -1,4 +1,4 @@
-// What the device decides during a step: no result comes back to the host inside one.
+// Decisions of the device during a step: no result comes back to the host inside one.
 
 struct Control {
     // Explicit method: the small step that is made, and how many are done. One is written where the other
@@ -30,7 +30,7 @@ struct PartControl {
     omega: f32,
     radius: f32,
     last_change: f32,
-    // Step guard; potentials [J s^2] are what is above the start of the step with its pins moved.
+    // Step guard; potentials [J s^2] are differences to the start of the step with its pins moved.
     limit: f32,
     // Of the last step: whether it was rejected, and to which share of it; zero for none, from which
     // descents follow.
@@ -41,8 +41,8 @@ struct PartControl {
     potential: f32,
     noise: f32,
     kept_speed: f32,
-    // Guard of mixtures: the best so far and failures in a row, after a plain sweep was judged; the same
-    // after the mixture was, and whether it passed. Two of each, because workgroups that decide the same
+    // Guard of accelerated iterates: the best so far and failures in a row, after a plain sweep was judged; the same
+    // after the accelerated one was, and whether it passed. Two of each, because workgroups that decide the same
     // must not read what one of them writes.
     best_value: f32,
     failures: u32,

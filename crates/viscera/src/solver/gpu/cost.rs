@@ -1,4 +1,4 @@
-//! What a step is likely to take on the CPU and on a graphics processor, told before there is a device.
+//! Estimates the time of a step on the CPU and on a graphics processor, before there is a device.
 //!
 //! ```text
 //! CPU   tetrahedra x sweeps x 40 ns

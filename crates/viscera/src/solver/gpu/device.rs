@@ -5,12 +5,12 @@ use std::sync::{Arc, Mutex};
 
 use super::error::GpuError;
 
-/// What programs may ask for on any device: WebGPU's defaults. Kernels need no more.
+/// Limits that every device has: WebGPU's defaults. Kernels need no more.
 pub fn baseline() -> wgpu::Limits {
     wgpu::Limits::default()
 }
 
-/// What limits lack of the baseline, as one would say it; nothing where they have all.
+/// The parts of the baseline that limits lack, in words; nothing where they have all.
 pub fn shortfall(limits: &wgpu::Limits) -> Option<String> {
     let mut lacking = Vec::new();
     baseline().check_limits_with_fail_fn(limits, false, |what, asked, given| {
@@ -48,7 +48,7 @@ impl Adapter {
         self.adapter.get_info()
     }
 
-    /// What it can do.
+    /// Its limits.
     pub fn limits(&self) -> wgpu::Limits {
         self.adapter.limits()
     }
@@ -174,7 +174,7 @@ impl Device {
         &self.name
     }
 
-    /// What meshes may use.
+    /// Limits that meshes may use.
     pub fn limits(&self) -> wgpu::Limits {
         self.device.limits()
     }

@@ -18,7 +18,7 @@ fn before_steps(v: array<u32, 4>) -> array<vec3f, 4> {
     return array<vec3f, 4>(before_step(v[0]), before_step(v[1]), before_step(v[2]), before_step(v[3]));
 }
 
-// What an element is given in a step of `dt` [s] that its vertices began at `start` [m].
+// The data of an element in a step of `dt` [s] that its vertices began at `start` [m].
 fn moment_of(row: u32, start: array<vec3f, 4>, dt: f32) -> ElementMoment {
     let at = row + ELEMENT_CONSTANTS;
     let constants = vec4f(number(at), number(at + 1u), number(at + 2u), number(at + 3u));

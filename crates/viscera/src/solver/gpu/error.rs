@@ -1,4 +1,4 @@
-//! What can go wrong with a graphics processor.
+//! Errors of a graphics processor.
 
 use crate::mesh::embed::EmbeddingError;
 use crate::solver::error::StepError;
@@ -72,7 +72,7 @@ pub enum GpuError {
     /// A surface was bound to other tetrahedra.
     #[error("a surface does not fit the model: {0}; bind it to the mesh that the model is made of")]
     Embedding(#[from] EmbeddingError),
-    /// Nobody but its solver places such a surface.
+    /// Only its solver places such a surface.
     #[error(
         "this surface is where its solver brings it; make one with `GpuSurface::following` to place it"
     )]

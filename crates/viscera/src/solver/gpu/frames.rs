@@ -1,4 +1,4 @@
-//! What comes back from the device: copies made behind a step, read when they have arrived.
+//! Results of the device: copies made behind a step, read when they have arrived.
 
 use std::ops::Range;
 use std::sync::mpsc::channel;
@@ -222,7 +222,7 @@ impl GpuSolver {
         wait(&self.device)
     }
 
-    /// Waits for the device, and lets the caller look at copies of what slots hold.
+    /// Waits for the device, and lets the caller look at copies of slots.
     fn read_buffers(&self, slots: &[Slot], take: impl FnOnce(&[&[u8]])) -> Result<(), GpuError> {
         let range = |&slot: &Slot| {
             let [start, size] = self.buffers.span(slot);
@@ -233,7 +233,7 @@ impl GpuSolver {
     }
 }
 
-/// What a force balance needs of the device.
+/// The device's values that a force balance needs.
 fn balance_slots(model: &Layout<f32>) -> Vec<Slot> {
     let mut slots = vec![Slot::Predicted, Slot::Acting, Slot::Previous];
     if model.is_viscous() {

@@ -1,4 +1,4 @@
-//! A new history on the device.
+//! The warm-start reset on the device.
 
 use super::solver::GpuSolver;
 use super::timing::Marks;
@@ -7,7 +7,7 @@ use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
 
 impl GpuSolver {
-    /// Starts a new history from where the vertices are on the device, as
+    /// Resets the warm start from where the vertices are on the device, as
     /// [`crate::solver::Solver::restart`] does: `inputs` and `dt` [s] are those of the next step, and of
     /// the inputs the anchors matter. Positions and velocities stay as they are.
     pub fn restart(

@@ -1,4 +1,4 @@
-//! What host and kernels share, as the host lays it out.
+//! Constants and records that host and kernels share, as the host lays them out.
 
 use super::control::{Control, PartControl};
 use super::layout;

@@ -1,4 +1,4 @@
-//! What a step gives to the device: what acts on vertices, and the weights of its norm.
+//! The device's inputs of a step: loads and holds of vertices, and the weights of its norm.
 
 use super::buffers::Buffers;
 use super::layout::copy_offsets;
@@ -11,7 +11,7 @@ use crate::solver::step::tethers::bundle;
 use crate::solver::xpbd::iterates::fill_multiplier_weights;
 
 impl GpuSolver {
-    /// What acts on vertices in this step, and the freedom of those that the last one held.
+    /// Loads and holds of vertices in this step, and the freedom of those that the last one held.
     pub(super) fn collect_updates(&mut self, model: &Layout<f32>, inputs: &Inputs<f32>, dt: f64) {
         bundle(model, inputs, &mut self.tethers);
         self.updates.clear();

@@ -15,7 +15,7 @@ pub struct Kernel {
     pub file: File,
     /// Threads of a workgroup.
     pub workgroup: u32,
-    /// What it is bound to.
+    /// Its bindings.
     pub slots: &'static [Slot],
 }
 
@@ -43,16 +43,16 @@ pub enum File {
     Energy,
 }
 
-/// What the text of a file depends on, beside the kernel.
+/// Choices that the text of a file depends on, beside the kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
     /// The form of the tetrahedra's constraints.
     pub form: TetForm,
-    /// What sweeps read and write.
+    /// The points that sweeps read and write.
     pub swept: Swept,
 }
 
-/// What sweeps read and write.
+/// The points that sweeps read and write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Swept {
     /// Vertices.
@@ -232,7 +232,7 @@ pub fn texts() -> Vec<(String, String)> {
     texts
 }
 
-/// What tells pipelines apart.
+/// The key of a pipeline.
 fn key(kernel: &Kernel, variant: Variant) -> String {
     if varies(kernel) {
         format!("{} {:?} {:?}", kernel.entry, variant.form, variant.swept)
@@ -302,7 +302,7 @@ fn storage_entry(slot: Slot) -> wgpu::BindGroupLayoutEntry {
     }
 }
 
-/// What a dispatch does, and the constants of the step.
+/// The job of a dispatch, and the constants of the step.
 pub(super) fn uniform_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let entry = |binding, has_dynamic_offset| wgpu::BindGroupLayoutEntry {
         binding,

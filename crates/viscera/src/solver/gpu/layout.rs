@@ -16,7 +16,7 @@ use crate::model::for_each_kind;
 use crate::scalar::lanes::LANES;
 use crate::settings::{Method, SolverSettings};
 
-/// The material of a lane that only fills a block up.
+/// The material of a padding lane.
 pub(super) const FILLING: u32 = u32::MAX;
 
 /// Sums that a workgroup of Anderson's leaves.
@@ -90,7 +90,7 @@ const UNGUARDED: usize = 6;
 pub(super) struct Table {
     pub bytes: Vec<u8>,
     pub ranges: Vec<Range>,
-    /// Bytes of what belongs to vertices, and of all sums.
+    /// Bytes of the ground and of all sums.
     pub ground_size: u64,
     pub sums_size: u64,
 }
@@ -124,13 +124,16 @@ pub(super) struct DeviceLayout {
 
 impl DeviceLayout {
     pub fn new(model: &Layout<f32>, settings: &SolverSettings) -> Self {
+        // Every corner of every element writes its load to a slot of its own, and each vertex adds up its slots in
+        // order: no atomics, and one order of sums whatever the device does. Slots are a counting sort by vertex.
         let mut counts = vec![0u32; model.vertex_count() + 1];
         let mut count = |vertex: u32| {
             let place = &mut counts[vertex as usize];
             *place += 1;
             *place - 1
         };
-        // First the rank of each load at its vertex, then places.
+        // Blocks stand part by part in each colour, so a part's loads have the order that they have in a model of the
+        // part alone. Padding lanes keep slot 0, which is another's: kernels leave them out by their material FILLING.
         let mut corners = Vec::new();
         for set in &model.tet_sets {
             for (block, &filled) in set.blocks.iter().zip(&set.filled) {
@@ -144,7 +147,7 @@ impl DeviceLayout {
             }
         }
         let mut elements = elements(model);
-        // Kind by kind, as the processor adds them up.
+        // Behind the tetrahedra, kind by kind: `load_forces` on the CPU adds them in that order.
         let by_kind = kind_by_kind(&elements);
         for &i in &by_kind {
             let element = &mut elements[i];
@@ -152,12 +155,14 @@ impl DeviceLayout {
                 element.slots[corner] = count(element.vertices[corner]);
             }
         }
+        // The entry behind the last vertex has counted nothing, so that it becomes the end of the last one's loads.
         let mut offsets = Vec::with_capacity(counts.len());
         let mut total = 0;
         for count in counts {
             offsets.push(total);
             total += count;
         }
+        // Only now are the offsets known, so the ranks get them in a second pass, in the same order of blocks.
         let mut blocks = model.tet_sets.iter().flat_map(|set| set.blocks.iter().zip(&set.filled));
         for ranks in &mut corners {
             let Some((block, &filled)) = blocks.next() else { break };
@@ -168,6 +173,7 @@ impl DeviceLayout {
             }
         }
         for element in &mut elements {
+            // Entries beyond a kind's vertices repeat its first vertex; kernels stop before them.
             for (slot, vertex) in element.slots.iter_mut().zip(element.vertices) {
                 *slot += offsets[vertex as usize];
             }
@@ -188,10 +194,12 @@ impl DeviceLayout {
         self.offsets.last().copied().unwrap_or(0).into()
     }
 
-    /// What never changes beside the tetrahedra, and where everything stands.
+    /// The constants beside the tetrahedra, and where everything stands.
     pub fn table(&self, model: &Layout<f32>, settings: &SolverSettings) -> Table {
         let guarded = settings.guards_steps();
         let (mut bytes, mut ranges) = (vec![0; ALIGNMENT as usize], Vec::new());
+        // Appends a piece and returns its first word. A piece with a slot can be bound alone as well: hence it begins
+        // where devices allow a binding to, and is padded. Without one, kernels find it by the header only.
         let mut add = |slot: Option<Slot>, new: &[u8]| {
             let start = bytes.len();
             bytes.extend(new);
@@ -203,6 +211,8 @@ impl DeviceLayout {
             (start / 4) as u32
         };
         let words = |words: &[u32]| bytemuck::cast_slice(words).to_vec();
+        // Places are known once everything before has been added, so the header is written last, into the 256 bytes
+        // that were left free at the start; it must not outgrow them. The order of the pieces means nothing.
         let mut header = Header {
             materials: add(Some(Slot::Materials), &materials(model)),
             corners: add(
@@ -221,6 +231,8 @@ impl DeviceLayout {
             part_count: model.part_count() as u32,
             ..Header::default()
         };
+        // Room only: the host writes these at the start of a step, weights when its length changes. Offsets of
+        // pieces that a method lacks stay zero, and none of its kernels reads them.
         let falls = vec![Fall::default(); model.part_count()];
         header.falls = add(Some(Slot::Falls), bytemuck::cast_slice(&falls));
         if settings.method == Method::Explicit {
@@ -232,6 +244,8 @@ impl DeviceLayout {
             header.weights = add(Some(Slot::Weights), &weights);
         }
 
+        // Data of vertices lie in one buffer, range by range, because the baseline allows a kernel eight
+        // storage buffers. A guarded step's three starts are one binding: `predict` writes all of them.
         let each = 16 * u64::from(Self::stride(model));
         let count = if guarded { GROUND.len() } else { UNGUARDED };
         for (place, (_, slot)) in GROUND[..count].iter().enumerate() {
@@ -247,6 +261,9 @@ impl DeviceLayout {
 
         // Sums of the accelerations are read before pieces leave theirs.
         let pieces = if guarded { self.pieces.len() as u64 } else { 0 };
+        // Lines of the search have places of their own, because workgroups write them while others still read the
+        // pieces' sums; two a piece, because one dispatch reads shares and writes lengths. Energies at the
+        // reference, one an element, stay for the whole step.
         let lines = (PRODUCTS * u64::from(self.parts.groups())).max(PIECE_SUMS * pieces);
         let energies = lines + 2 * LINE_SUMS * pieces;
         let elements = header.tet_lanes as usize + self.elements.len();
@@ -370,11 +387,15 @@ fn pieces(model: &Layout<f32>, others: &[Element], by_kind: &[usize]) -> (Vec<u3
         }
         first += set.block_count();
     }
+    // Elements that are no tetrahedra are numbered behind the lanes of all blocks, padding included, so that a kernel
+    // finds block and lane of a tetrahedron by division.
     let first = (LANES * first) as u32;
     elements.extend(by_kind.iter().map(|&i| (others[i].part, first + i as u32)));
     elements.sort_by_key(|&(part, _)| part);
 
     let (mut members, mut pieces) = (Vec::new(), Vec::new());
+    // A piece never reaches across parts: the sums of one must not depend on the size of the part before it. The sort
+    // above is stable, so that a part's elements keep the order of a model of their own.
     for of_part in elements.chunk_by(|a, b| a.0 == b.0) {
         for piece in of_part.chunks(PIECE) {
             let first = members.len() as u32;
@@ -383,6 +404,7 @@ fn pieces(model: &Layout<f32>, others: &[Element], by_kind: &[usize]) -> (Vec<u3
             pieces.push(Piece { part: of_part[0].0, first, end, are_vertices: 0 });
         }
     }
+    // Vertices behind all elements: `limit_velocities` is dispatched for their pieces alone, which must be a range.
     for (part, own) in (0..).zip(model.parts.iter()) {
         for first in own.vertices.clone().step_by(PIECE) {
             let end = own.vertices.end.min(first + PIECE) as u32;
@@ -430,7 +452,8 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
     let mut all = words!(Header {
         "MATERIALS_AT" materials "CORNERS_AT" corners "OFFSETS_AT" offsets "ELEMENTS_AT" elements
         "PIECES_AT" pieces "MEMBERS_AT" members "PARTS_AT" parts
-        "RUNS_AT" runs "BLOCK_PARTS_AT" block_parts "WEIGHTS_AT" weights "SMALL_STEPS_AT" small_steps "FALLS_AT" falls "STRIDE_AT" stride
+        "RUNS_AT" runs "BLOCK_PARTS_AT" block_parts "WEIGHTS_AT" weights
+        "SMALL_STEPS_AT" small_steps "FALLS_AT" falls "STRIDE_AT" stride
         "ANCHORS_AT" anchors "LINES_AT" lines "ENERGIES_AT" energies "TET_LANES_AT" tet_lanes
         "LAW_ENDS_AT" law_ends
         "PART_COUNT_AT" part_count

@@ -5,7 +5,7 @@
 //! GpuSolver::step     inputs and constants of the step, one compute pass, one submission; no waiting
 //! GpuSolver::request  copies what moves into memory that the host can read, behind the last step
 //! GpuSolver::newest   the newest copy that has arrived, if any; never waits
-//! GpuSolver::restart  a new history: multipliers from positions
+//! GpuSolver::restart  warm-start reset: multipliers from positions
 //! GpuSolver::time_step  the same, timed stage by stage by the device's clock
 //! GpuSurface::update  a fine surface behind the last step, ready to be drawn
 //! ```

@@ -24,7 +24,7 @@ pub(super) struct Piece {
     pub are_vertices: u32,
 }
 
-/// What stands in the table for a part.
+/// The table's row of a part.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct PartRow {
@@ -71,7 +71,7 @@ pub(super) struct Fall {
     pub acceleration: [f32; 3],
 }
 
-/// What parts fall by.
+/// How parts fall that nothing holds.
 #[derive(Debug)]
 pub(super) struct Falls {
     /// Of each part [kg], and whether anchors hold it.
@@ -100,6 +100,8 @@ impl Falls {
         for update in updates {
             let part = model.part_at(update.vertex as usize);
             let [x, y, z] = update.force;
+            // A pin or a tether at one vertex holds the whole part. That its force is added as well does no harm: the
+            // acceleration of a part that is held is not read.
             if update.is_pinned != 0 || update.stiffness != 0.0 {
                 self.all[part].is_free = 0;
             }
@@ -115,7 +117,7 @@ impl Falls {
 /// A run of the long vector: where it begins in that of the part, and in that of the model.
 type Run = [u32; 2];
 
-/// Numbers that only fill up.
+/// Padding: numbers of a part's vector that stand for nothing.
 const NOWHERE: u32 = u32::MAX;
 
 /// Of all parts, and their runs.
@@ -133,7 +135,10 @@ impl Parts {
         for (number, part) in model.parts.iter().enumerate() {
             let runs = parts.runs.len() as u32;
             let length = parts.add_runs(part, first);
+            // From the part's own length only, never from how many parts there are: which numbers one workgroup adds
+            // up decides the bits of a sum. Ends ascend: kernels find a workgroup's part by bisection (`part_with`).
             groups_end += length.div_ceil(SUM_THREADS).min(SUM_GROUPS);
+            // Pieces are sorted by kind, then part. A part may have none of elements; its range is then empty.
             let [elements, vertices] = [0, 1].map(|kind| {
                 let is_own = |p: &Piece| (p.are_vertices, p.part) < (kind, number as u32);
                 let first = pieces.partition_point(is_own);
@@ -167,6 +172,9 @@ impl Parts {
     /// Returns how many numbers the part's own vector has. `first`: where the model's multipliers begin.
     fn add_runs(&mut self, part: &Part, first: u32) -> u32 {
         let vertices = &part.vertices;
+        // The own vector is laid out as `slots.rs` lays out the vector of a model of this part: four numbers a vertex,
+        // padding up to where multipliers may begin, multipliers set by set. Threads stride over own numbers, so each
+        // adds up the same ones as if the part were alone; padding is stepped over.
         self.runs.push([0, 4 * vertices.start as u32]);
         self.runs.push([4 * vertices.len() as u32, NOWHERE]);
         let mut length = (multipliers_start(vertices.len()) / 4) as u32;
@@ -175,7 +183,7 @@ impl Parts {
             length += range.len() as u32;
         }
         if part.multipliers.is_empty() {
-            // A vector has room for one multiplier.
+            // A model without multipliers has room for one all the same: bindings are never empty.
             length += 1;
         }
         length

@@ -23,9 +23,11 @@ pub struct Dispatch {
 }
 
 impl Dispatch {
-    /// What the kernel finds at each of its bindings. Kernels that know vertices and copies find both;
+    /// The place at each of the kernel's bindings. Kernels that know vertices and copies find both;
     /// those of a sweep find copies in the place of vertices.
     pub fn places(&self) -> impl Iterator<Item = Place> {
+        // One kernel text serves vertices and copies: in a sweep of split vertices the copies are bound where the
+        // kernel says `points`. A kernel that moves data between the two names both, and gets each as it says.
         let knows_both = self.kernel.slots.contains(&Slot::Copies);
         let place = move |&slot| match slot {
             Slot::Points if knows_both => Place::Whole(slot),
@@ -65,6 +67,8 @@ impl<'a> Recorder<'a> {
             length,
             multipliers_first,
             swept: match (model.is_split(), is_jacobi(model)) {
+                // Without split vertices a copy is its vertex. With one colour no constraint reads what another
+                // has moved, so that splitting and solving are one kernel.
                 (false, _) => Swept::Vertices,
                 (true, true) => Swept::Jacobi,
                 (true, false) => Swept::Copies,
@@ -80,6 +84,7 @@ impl<'a> Recorder<'a> {
 
     /// As many threads as the job counts.
     pub fn threads(&self, kernel: &'static Kernel, job: Job) -> Dispatch {
+        // Most kernels do not depend on a formulation; for these any one names the same pipeline.
         let variant = self.variant(TetForm::GreenStrain);
         let groups = job.count.div_ceil(kernel.workgroup);
         Dispatch { kernel, variant, job, groups, on_copies: false }
@@ -97,6 +102,8 @@ impl<'a> Recorder<'a> {
 
     /// A thread for each number of the long vector.
     pub fn long(&self, kernel: &'static Kernel, mode: u32) -> Dispatch {
+        // Not every number has a field of its own in `Job`: on the long vector `set_first` is Anderson's window,
+        // which is also the place of the newest vector in the history, behind the differences.
         let set_first = window(self.settings);
         let first = self.multipliers_first;
         self.threads(kernel, Job { first, count: self.length, set_first, mode, ..Job::default() })
@@ -122,6 +129,8 @@ impl<'a> Recorder<'a> {
     ) -> Dispatch {
         let sets = &self.model.tet_sets;
         let set = &sets[kind];
+        // Blocks of all laws stand in one buffer, law by law, and multipliers are counted within each law: a kernel
+        // needs a block's number in the buffer and, less `set_first`, its number in the law.
         let set_first = sets[..kind].iter().map(|set| set.block_count() as u32).sum();
         let job = Job {
             first: set_first + blocks.start as u32,
@@ -143,7 +152,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Threads for all tetrahedra, lanes that only fill blocks up included.
+    /// Threads for all tetrahedra, padding lanes included.
     pub fn tet_threads(&self) -> u32 {
         (LANES * self.model.block_count()) as u32
     }
@@ -165,7 +174,7 @@ impl<'a> Recorder<'a> {
         Dispatch { groups: job.count, ..self.threads(kernel, job) }
     }
 
-    /// What sweeps of the model read and write.
+    /// The points that sweeps of the model read and write.
     pub fn swept(&self) -> Swept {
         self.swept
     }

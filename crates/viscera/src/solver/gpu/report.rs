@@ -1,4 +1,4 @@
-//! What the device has decided: read when asked for, with a wait.
+//! Decisions of the device: read when asked for, with a wait.
 
 use super::control::{PARTS_START, PartControl, rejected_steps};
 use super::error::GpuError;
@@ -14,13 +14,13 @@ impl GpuSolver {
     }
 
     /// How the last step ended, for all parts of the model together; nothing before the first, and where
-    /// steps are not guarded. Potential and limit are what is above the start of the step with its pins moved.
+    /// steps are not guarded. Potential and limit are differences to the start of the step with its pins moved.
     /// Waits for the device.
     pub fn last_step(&self) -> Result<Option<StepReport>, GpuError> {
         Ok(StepReport::of_all(&self.part_reports()?))
     }
 
-    /// What the search of the last step came to for each connected part: the share of the step that passed, and
+    /// The result of the last step's search for each connected part: the share of the step that passed, and
     /// whether descents took its place.
     #[doc(hidden)]
     pub fn last_searches(&self) -> Result<Vec<[f32; 2]>, GpuError> {

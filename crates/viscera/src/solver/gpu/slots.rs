@@ -1,4 +1,4 @@
-//! What kernels are bound to, and the records that lie there.
+//! Bindings of kernels, and the records that lie there.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -59,7 +59,7 @@ pub enum Place {
     CopiesOf(Slot),
 }
 
-/// What acts on one vertex; `Update` of bindings.wgsl.
+/// Load and hold of one vertex; `Update` of bindings.wgsl.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Update {
@@ -107,7 +107,7 @@ pub struct Element {
 /// binding.
 pub const ALIGNMENT: u64 = 256;
 
-/// What lies in another slot's buffer: kernels that need a piece or two are bound to ranges, those that
+/// A slot that lies in another slot's buffer: kernels that need a piece or two are bound to ranges, those that
 /// would need too many to the whole.
 #[derive(Clone, Copy, Debug)]
 pub struct Range {

@@ -10,7 +10,7 @@ struct Span {
     length: u32,
 }
 
-// No number, but what fills up between positions and multipliers.
+// Padding between positions and multipliers.
 const NOWHERE: u32 = 0xffffffffu;
 
 // The first of a part's workgroups.

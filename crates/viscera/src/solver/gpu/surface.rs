@@ -248,7 +248,7 @@ impl GpuSurface {
     }
 }
 
-/// What each vertex follows; `order` numbers the tetrahedra's vertices as they lie on the device.
+/// The tetrahedron that each vertex follows; `order` numbers the tetrahedra's vertices as they lie on the device.
 fn bounds(
     vertex_count: usize,
     order: impl Fn(u32) -> u32,

@@ -1,11 +1,11 @@
-//! What steps take by the device's own clock: timestamps where compute passes begin and end.
+//! Times of steps by the device's own clock: timestamps where compute passes begin and end.
 //!
 //! ```text
 //! time_steps   ordinary steps, one pass each:  |begin step|step| ... |step end|
 //! time_step    one step, a pass for each stage:  |prologue|...|first iteration|...|all later ones|epilogue|...|
 //! ```
 //!
-//! The library reads no clock of the host's: whoever wants wall time as well takes it around these calls,
+//! The library reads no clock of the host's: a caller that wants wall time as well takes it around these calls,
 //! which return when the device is done.
 
 use super::device::Device;
@@ -36,7 +36,7 @@ impl StepPart {
     }
 }
 
-/// What a stage took.
+/// The time of a stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageTime {
     /// When it ran.
@@ -56,7 +56,7 @@ impl StageTime {
     }
 }
 
-/// What a step took, stage by stage. Passes of their own cost time: the sum is more than a step takes.
+/// The time of a step, stage by stage. Passes of their own cost time: the sum is more than a step takes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepTimes {
     /// From the beginning of the first pass to the end of the last [s].
@@ -65,7 +65,7 @@ pub struct StepTimes {
     pub stages: Vec<StageTime>,
     /// Iterations after the first.
     pub later_iterations: u32,
-    /// What these took together [s].
+    /// Their time together [s].
     pub later_seconds: f64,
 }
 
@@ -154,7 +154,7 @@ impl Clock {
 }
 
 impl Device {
-    /// Whether it can tell how long its work took.
+    /// Whether it can measure the time of its work.
     pub fn has_clock(&self) -> bool {
         Clock::new(self, 2).is_some()
     }

@@ -1,4 +1,4 @@
-//! What a dispatch does, and the constants of a step: the uniforms of every kernel.
+//! The job of a dispatch and the constants of a step: the uniforms of every kernel.
 
 use bytemuck::{Pod, Zeroable};
 

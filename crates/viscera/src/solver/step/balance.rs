@@ -43,7 +43,7 @@ pub struct ForceBalance {
     pub displacement: f64,
 }
 
-/// Strain that nobody sees or feels.
+/// Strain too small to be seen or felt.
 const SMALLEST_STRAIN: f64 = 1e-5;
 
 /// Positions are off by so many units of their precision.

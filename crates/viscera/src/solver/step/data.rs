@@ -15,7 +15,7 @@ use crate::solver::inputs::Inputs;
 /// Vertices that a thread does at a time.
 const GRAIN: usize = 2048;
 
-/// What a stage may look at but not change.
+/// Data that a stage may read but not change.
 pub struct Step<'a, S> {
     pub model: &'a Layout<S>,
     pub inputs: &'a Inputs<S>,
@@ -26,7 +26,7 @@ pub struct Step<'a, S> {
 /// Green strain at the start of the step of the blocks of viscous sets, law by law.
 pub type StartStrain<S> = [Vec<[Eight<S>; 6]>; LAWS];
 
-/// What stays the same from the prediction to the end of a step, and the threads that work on it.
+/// Data that stay the same from the prediction to the end of a step, and the threads that work on it.
 #[derive(Clone, Debug)]
 pub struct StepConstants<S> {
     pub workers: Workers,
@@ -40,7 +40,7 @@ pub struct StepConstants<S> {
     pub masses: Vec<S>,
     /// Soft position constraints, one for a vertex that has any.
     pub tethers: Vec<Bundle<S>>,
-    /// `m'`: masses, and what tethers make of them [kg]; see [`super::tethers`].
+    /// `m'`: masses with the stiffness of tethers [kg]; see [`super::tethers`].
     pub inertias: Vec<S>,
     /// `1/m'`, zero where pinned [1/kg].
     pub inverse_masses: Vec<S>,
@@ -48,7 +48,7 @@ pub struct StepConstants<S> {
     pub start_strain: StartStrain<S>,
 }
 
-/// What measures of a step need after its end: values that every backend fills. Vertices in the solver's
+/// Data that measures of a step need after its end: values that every backend fills. Vertices in the solver's
 /// numbering.
 #[derive(Clone, Copy, Debug)]
 pub struct EndOfStep<'a, S> {
@@ -66,7 +66,7 @@ pub struct EndOfStep<'a, S> {
     pub start_strain: &'a StartStrain<S>,
 }
 
-/// What the stages of every method work on.
+/// Data that the stages of every method work on.
 #[derive(Clone, Debug)]
 pub struct StepData<S> {
     pub constants: StepConstants<S>,
@@ -74,7 +74,7 @@ pub struct StepData<S> {
     pub points: Vec<Point<S>>,
     /// Velocities [m/s].
     pub velocities: Vec<Vec3<S>>,
-    /// What elements put on each copy: impulse [N s^2] and bound [kg]; empty where no stage needs it.
+    /// The load of elements on each copy: impulse [N s^2] and bound [kg]; empty where no stage needs it.
     pub loads: Vec<Point<S>>,
 }
 
@@ -125,7 +125,7 @@ impl<S: Real> StepData<S> {
 }
 
 impl<S: Real> StepConstants<S> {
-    /// What elements depend on in a step.
+    /// The data that elements depend on in a step.
     pub fn moments<'a>(&'a self, step: &Step<'a, S>) -> Moments<'a, S> {
         Moments {
             anchors: step.inputs.anchors_of(&step.model.rest_anchors),

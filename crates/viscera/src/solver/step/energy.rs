@@ -20,7 +20,7 @@
 use super::data::{Step, StepData};
 use crate::scalar::{Real, Vec3};
 
-/// What a connected part has and is given during a step; sums over its free vertices.
+/// The energies of a connected part and the work done on it in a step; sums over its free vertices.
 #[derive(Clone, Copy, Debug, Default)]
 struct Energy {
     /// Whether a pin, an attachment or a tether holds it.
@@ -57,18 +57,23 @@ impl Motion {
 }
 
 impl Energy {
-    /// Velocity [m/s] that is not scaled, and the share that what is beside it keeps.
+    /// Velocity [m/s] that is not scaled, and the factor for velocities relative to it.
     fn limit(&self) -> (Vec3<f64>, f64) {
         let mut given = self.start.kinetic + self.start.stored - self.end.stored + self.work;
         let mut kinetic = self.end.kinetic;
         let mut drift = Vec3::ZERO;
         if !self.held && self.mass > 0.0 {
+            // Inner forces change no momentum, so the limit must not either: the energy of the centre of mass is
+            // taken out of both sides (`p^2/2M` of the kinetic energies, the work [J] of the total load along the
+            // way of the centre). Otherwise a body in free fall would be braked because it swings.
             let inverse = 1.0 / self.mass;
             drift = self.end.momentum * inverse;
             kinetic -= 0.5 * inverse * self.end.momentum.length_squared();
             given -= 0.5 * inverse * self.start.momentum.length_squared();
             given -= inverse * self.load.dot(self.shift);
         }
+        // `given` is below zero where more energy is stored than there was. Positions are not moved, so the most that
+        // can be taken is all motion. A comparison with NaN is false: nothing is scaled by it.
         let share = if kinetic > given { (given.max(0.0) / kinetic).sqrt() } else { 1.0 };
         (drift, share)
     }
@@ -93,9 +98,13 @@ impl Energies {
     pub fn begin<S: Real>(&mut self, step: &Step<'_, S>, data: &StepData<S>, stored: &[f64]) {
         let (model, constants) = (step.model, &data.constants);
         for (number, (energy, part)) in self.0.iter_mut().zip(model.parts.iter()).enumerate() {
+            // Sums are added to in `limit`: without this they would be those of all steps so far.
             *energy = Energy::default();
             energy.start.stored = stored[number];
+            // A hold can stop the centre of mass, so that the centre's energy counts too: `limit` takes nothing out.
             energy.held = constants.holds(part);
+            // Tethers are inertia to the solver and no elements, so `stored` of the evaluator leaves them out. Their
+            // targets are those of the end of the step, as the pins are.
             for tether in constants.tethers_of(part) {
                 energy.start.stored += tether.energy(constants.previous[tether.vertex].vec3());
             }
@@ -107,8 +116,8 @@ impl Energies {
         }
     }
 
-    /// Scales velocities down; `stored` is the stored energy [J] of each part now. `kept` learns of each part
-    /// that is slowed down, and the share of its velocities that it keeps.
+    /// Scales velocities down; `stored` is the stored energy [J] of each part now. `kept` is called with
+    /// each part that is slowed down, and the factor of its velocities.
     pub fn limit<S: Real>(
         &mut self,
         step: &Step<'_, S>,
@@ -138,6 +147,8 @@ impl Energies {
             if !(share < 1.0 && energy.mass > 0.0) {
                 continue;
             }
+            // What remains about the drift is scaled as a whole, so it keeps its direction; squares of it scale by
+            // `share^2`, which brings the kinetic energy to `given`.
             let (drift, scale) = (drift.cast::<S>(), S::from_f64(share));
             for v in part.vertices.clone().filter(free) {
                 let velocity = &mut data.velocities[v];

@@ -7,7 +7,7 @@ fn vector_at(sum: u32) -> vec3f {
     return vec3f(totals[sum], totals[sum + 1u], totals[sum + 2u]);
 }
 
-// The velocity [m/s] that is not scaled, and the share that what is beside it keeps.
+// The velocity [m/s] that is not scaled, and the factor for velocities relative to it.
 struct Limit {
     drift: vec3f,
     share: f32,
@@ -44,6 +44,8 @@ fn limit_velocities(
         if is_limited {
             break;
         }
+        // The sums of pieces are those of the place where the step ended: `evaluate` has run again where it was
+        // rejected.
         if local == 0u {
             let potential = potential_of_totals();
             control.parts[part].potential = potential.value;
@@ -71,12 +73,15 @@ fn add_motions(part: u32, local: u32, into: ptr<function, Sums>) {
     // Of elements what is stored, and whether something holds them.
     let elements_end = table[row + PART_ELEMENT_PIECES_END];
     for (var piece = table[row + PART_ELEMENT_PIECES] + local; piece < elements_end; piece += THREADS) {
+        // Without the weight dt^2 of the potential: `limit_of` needs energies [J]. Of these sums it reads
+        // SUM_TESTED, SUM_REFERENCE and SUM_HELD; what lies between does no harm.
         for (var k = SUM_TESTED; k <= SUM_HELD; k++) {
             (*into)[k] += partial_sums[SUMS * piece + k];
         }
     }
     let vertices_end = table[row + PART_VERTEX_PIECES_END];
     for (var piece = table[row + PART_VERTEX_PIECES] + local; piece < vertices_end; piece += THREADS) {
+        // From the holds on: what vertices have before that is inertia of the potential [J s^2].
         for (var k = SUM_HELD; k < SUMS; k++) {
             (*into)[k] += partial_sums[SUMS * piece + k];
         }
@@ -88,6 +93,9 @@ fn limit_of(part: u32) -> Limit {
     var given = totals[SUM_KINETIC_START] - totals[SUM_TESTED] + totals[SUM_WORK];
     var drift = vec3f();
     if totals[SUM_HELD] == 0.0 && totals[SUM_MASS] > 0.0 {
+        // Relative to the centre of mass, as on the CPU, but from sums relative to the part's first vertex: in
+        // single precision a fast common motion would swallow the rest. The centre moves at `after * inverse`
+        // against that vertex; the terms with `inverse` take this remainder out. `dt` makes a way of a velocity.
         let inverse = 1.0 / totals[SUM_MASS];
         let before = vector_at(SUM_MOMENTUM_START);
         let after = vector_at(SUM_MOMENTUM);
@@ -98,6 +106,8 @@ fn limit_of(part: u32) -> Limit {
         given -= totals[SUM_TESTED];
     }
     var share = 1.0;
+    // Energies are differences to the start of the step. Where one there is NaN its difference means nothing, and
+    // there is no limit.
     let is_known = is_finite(given) && totals[SUM_REFERENCE] == 0.0;
     if is_known && kinetic > given {
         share = sqrt(max(given, 0.0) / kinetic);

@@ -1,13 +1,13 @@
-//! Step guard, guard of mixtures and energy limit as dispatches.
+//! Step guard, guard of accelerated iterates and energy limit as dispatches.
 //!
 //! ```text
 //! end of a step    evaluate all starts and the end;  judge, try all shares of the step;  pick one, or three
 //!                  descents;  evaluate where a step that was rejected ends;  limit, velocities
-//! each mixture     evaluate;  judge, take the plain sweep where it is bad;  evaluate that;  judge, a descent at the
+//! each iterate     evaluate;  judge, take the plain sweep where it is bad;  evaluate that;  judge, a descent at the
 //!                  second failure
 //! ```
 //!
-//! Of a step that passes, the search is six dispatches that do nothing. Where no mixtures are guarded the best
+//! Of a step that passes, the search is six dispatches that do nothing. Where no iterates are guarded the best
 //! start is needed at the end only, and found there.
 
 use super::guard::DESCENTS;

@@ -7,15 +7,17 @@
 //! else three steps of descent from x_s: d_i = -grad_i Phi / (m_i + sum curvature), Armijo
 //! ```
 //!
-//! Every connected part of the model is judged, and taken back, by itself: no other is even looked at again.
+//! Every connected part of the model is judged, and rejected, by itself: parts that pass are not evaluated again.
 //!
 //! A bound by `Phi(x_n)` bounds the stored energy (the kinetic energy is left to the energy limit,
-//! `energy.rs`); a bound by `Phi(xt)` alone lets nearly everything pass. **The multipliers are kept** after a rejection: recomputing them from positions
-//! looks safer and holds stiff tissue fast, because the next sweeps start from what has just failed.
+//! `energy.rs`); a bound by `Phi(xt)` alone lets nearly everything pass. **The multipliers are kept** after a
+//! rejection: recomputing them from positions looks safer and holds stiff tissue fast, because the next sweeps
+//! start from what has just failed.
 //!
-//! With `anderson_guard = "energy"` Anderson's mixtures are guarded one by one: the mixture if `Phi` is not above the best so far,
-//! else the plain sweep if its is not, else go on from it once; at the second failure in a row one
-//! step of descent from the best. `x_s` is then the best iterate.
+//! With `anderson_guard = "energy"` Anderson's accelerated iterates are guarded one by one. An iterate is taken if its
+//! `Phi` is not above the best so far, else the plain sweep if its `Phi` is not; else the iteration goes on from the
+//! plain sweep once, and at the second failure in a row makes one step of descent from the best. `x_s` is then the
+//! best iterate.
 
 use super::data::{Step, StepConstants, StepData, gather};
 use super::energy::Energies;
@@ -42,7 +44,7 @@ pub const SHORTENINGS: usize = 12;
 /// Of plain sweeps in a row that raise the potential this many lead to a step of descent.
 pub const TOLERATED: u32 = 2;
 
-/// What a guarded step remembers.
+/// Memory of guarded steps.
 #[derive(Clone, Debug)]
 pub struct Guard<S> {
     pub evaluator: Evaluator,
@@ -108,11 +110,15 @@ impl<S: Real> Guard<S> {
     /// [`super::stage::StepStage::ChooseStart`].
     pub fn choose_start(&mut self, step: &Step<'_, S>, data: &StepData<S>) {
         let StepData { constants, points, .. } = data;
+        // First the place that the sweeps start from. The other two replace it only where they are strictly lower:
+        // at rest `x_n` is the same place, and nothing is to be exchanged.
         self.start.copy_from_slice(points);
         self.evaluator.evaluate_all(constants, step, points);
         for (part, potential) in self.parts.iter_mut().zip(&self.evaluator.potentials) {
             part.limit = potential.value;
         }
+        // Pins are at their new places whatever the step does. Judged with the old ones, the start of the step could
+        // store less than every place the step may end at, and pulled tissue would never keep the limit.
         for from_rest in [true, false] {
             let StepConstants { previous, predicted, .. } = constants;
             let trial = &mut self.trial;
@@ -121,13 +127,15 @@ impl<S: Real> Guard<S> {
                 trial[step.model.numbering.of(pin.vertex)].set_vec3(pin.target);
             }
             self.evaluator.evaluate_all(constants, step, trial);
+            // Here, because the next evaluation overwrites `stored`: the energy limit counts from the start of the
+            // step with its pins moved.
             if from_rest {
                 self.energies.begin(step, data, &self.evaluator.stored);
             }
             let Self { start, trial, parts, .. } = self;
             for (number, of) in step.model.parts.iter().enumerate() {
                 let (part, value) = (&mut parts[number], self.evaluator.potentials[number].value);
-                // Written so that a limit that is no number gives way.
+                // Written so that a limit that is NaN or infinite gives way.
                 if value < part.limit || !part.limit.is_finite() {
                     part.limit = value;
                     let vertices = of.vertices.clone();
@@ -135,6 +143,7 @@ impl<S: Real> Guard<S> {
                 }
             }
         }
+        // Only the guard of accelerated iterates lowers `best` from here on; without it nothing reads it.
         for part in &mut self.parts {
             part.best = part.limit;
             part.failures = 0;
@@ -143,6 +152,9 @@ impl<S: Real> Guard<S> {
 
     /// [`super::stage::StepStage::GuardStep`].
     pub fn guard_step(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
+        // All parts in one pass, which threads share; after it only rejected parts are evaluated, one by one.
+        // `limit_energy` takes each part's stored energy from its last evaluation, so that has to be the one of
+        // the place where the part ends.
         self.evaluator.evaluate_all(&data.constants, step, &data.points);
         let mut rejected = false;
         for part in 0..step.model.part_count() {
@@ -170,6 +182,9 @@ impl<S: Real> Guard<S> {
     /// Shortens the step of a part, or descends.
     fn take_back(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, part: usize) -> StepReport {
         let vertices = step.model.parts[part].vertices.clone();
+        // The array is taken out so that `self` can be borrowed beside it. Other parts' places in it are old, which
+        // an evaluation of this part does not read. `data.points` stays at `x_K` until a share is accepted: every
+        // share is one of the whole step, not of the share before it.
         let mut trial = std::mem::take(&mut self.trial);
         let shortened = SHARES.into_iter().find_map(|share| {
             let share = S::from_f64(share);
@@ -178,13 +193,18 @@ impl<S: Real> Guard<S> {
                 trial[v].set_vec3(start + (data.points[v].vec3() - start) * share);
             }
             self.evaluator.evaluate(&data.constants, step, &trial, part);
+            // Not the lowest but the first, which is the longest that keeps the limit: a shorter one throws away
+            // more of what the sweeps have found.
             Some(self.report(part)).filter(StepReport::keeps_limit)
         });
         let report = shortened.unwrap_or_else(|| {
             trial[vertices.clone()].copy_from_slice(&self.start[vertices.clone()]);
+            // No share is low enough, so the sweeps' direction itself is wrong. Descents need nothing of it: they
+            // begin at `x_s`, where `Phi` is the limit, and none ends higher than it began.
             for _ in 0..DESCENTS {
                 self.descend(step, data, &mut trial, part);
             }
+            // The last length that a descent tried may be one that it gave up, so the end is evaluated once more.
             self.evaluator.evaluate(&data.constants, step, &trial, part);
             self.report(part)
         });
@@ -214,6 +234,8 @@ impl<S: Real> Guard<S> {
         let Potential { value, noise } = self.evaluator.potentials[part];
         let Self { start, parts, .. } = self;
         let guard = &mut parts[part];
+        // Any decrease moves `x_s`; `noise` only decides whether the iterate passes. If every iterate that passes
+        // became `x_s`, its `Phi` could creep up by `noise` at every sweep.
         if value < guard.best {
             guard.best = value;
             let vertices = step.model.parts[part].vertices.clone();
@@ -247,12 +269,18 @@ impl<S: Real> Guard<S> {
         x: &mut [Point<S>],
         part: usize,
     ) {
+        // The loads are made once, at the start of the line, and hold force and curvature per copy. Evaluations below
+        // do not touch them, so `descent` gives the same direction at every length.
         let of = &step.model.parts[part];
         let moments = data.constants.moments(step);
         load_forces::<S, true>(&data.constants, step, &moments, of, x, &mut data.loads);
         let before = self.evaluator.evaluate(&data.constants, step, x, part).value;
+        // A whole step divides the gradient by inertia and a bound of each vertex's own curvature, as if neighbours
+        // stood still. Where they move together it overshoots, as the swollen tetrahedron of the test below does.
         let mut length = 1.0;
         for _ in 0..SHORTENINGS {
+            // One pass finds slope and places; the slope [J s^2] is negative unless the gradient vanishes. `x` has to
+            // stay where the line starts, so places are tried in `data.points`: `x_K` is given up by now.
             let mut slope = 0.0;
             for v in of.vertices.clone() {
                 let (gradient, direction) = descent(step.model, data, x, v);
@@ -260,6 +288,8 @@ impl<S: Real> Guard<S> {
                 data.points[v].set_vec3(x[v].vec3() + direction * S::from_f64(length));
             }
             let after = self.evaluator.evaluate(&data.constants, step, &data.points, part).value;
+            // A potential that is NaN compares as false: the step is shortened, as after an overshoot. There is no
+            // allowance for noise: where rounding hides the decrease, `x` stays, which is never above the limit.
             if after <= before + SUFFICIENT * length * slope {
                 x[of.vertices.clone()].copy_from_slice(&data.points[of.vertices.clone()]);
                 return;

@@ -1,8 +1,8 @@
-// What the step guard and the guard of mixtures decide (solver/step/guard.rs), for one connected part, from the
-// sums of its pieces. Every workgroup that needs to know decides for itself: sums are small, and a dispatch
-// that only decides costs as much as one that does something.
+// Decisions of the step guard and the guard of accelerated iterates (solver/step/guard.rs), for one connected
+// part, from the sums of its pieces. Every workgroup that needs a decision makes it for itself: sums are small, and
+// a dispatch that only decides costs as much as one that does something.
 
-// `Phi` [J s^2] above the start of the step, and what round-off can pretend of it.
+// `Phi` [J s^2] above the start of the step, and the part of it that round-off can pretend.
 struct Potential {
     value: f32,
     noise: f32,
@@ -20,8 +20,8 @@ fn potential_of_totals() -> Potential {
     return potential(totals[SUM_TESTED], magnitude, totals[SUM_FORCE], totals[SUM_REACH]);
 }
 
-// `value <= limit + allowance` as on the CPU, by the bits of a limit that may be no number: below an
-// infinite one is whatever is finite, below one that is none nothing.
+// `value <= limit + allowance` as on the CPU, by the bits of a limit that need not be finite: every finite value is
+// below infinity, nothing is below NaN. By bits, because WGSL lets compilers assume that there is neither.
 fn is_below(value: f32, limit: f32, allowance: f32) -> bool {
     let is_infinite = bitcast<u32>(limit) == 0x7f800000u;
     return is_finite(value) && (is_infinite || is_finite(limit) && value <= limit + allowance);
@@ -42,12 +42,16 @@ struct Choice {
     range: u32,
 }
 
-// One that is no finite number gives way to the next.
+// A start whose potential is not finite gives way to the next.
 fn choose() -> Choice {
     var choice = Choice(totals[SUM_START], START);
+    // The reference is the start of the step with its pins moved, to which all sums are differences: its own value
+    // is zero by definition. It is no candidate where the energy of one of its elements is NaN: `reference_of` then
+    // takes that energy as zero, and zero is no longer its value.
     if totals[SUM_REFERENCE] == 0.0 && (!is_finite(choice.limit) || 0.0 < choice.limit) {
         choice = Choice(0.0, REFERENCE);
     }
+    // The order is that of the CPU, and comparisons are strict: of equal places the same one is taken.
     let ahead = totals[SUM_AHEAD];
     if !is_finite(choice.limit) || is_finite(ahead) && ahead < choice.limit {
         choice = Choice(ahead, AHEAD);
@@ -55,7 +59,7 @@ fn choose() -> Choice {
     return choice;
 }
 
-// What a piece leaves of a search, from here on: value, magnitude, force and reach of every share of the
+// The sums that a piece leaves in a search, from here on: value, magnitude, force and reach of every share of the
 // step; behind them the values of every length of a descent, the first of them zero, and the slope.
 fn shares_at(piece: u32) -> u32 {
     return table[LINES_AT] + 2u * LINE_SUMS * piece;
@@ -74,6 +78,8 @@ fn add_shares(part: u32, local: u32, into: ptr<function, Sums>) {
     for (var i = local; i < count; i += THREADS) {
         let piece = piece_at(part, i);
         let weight = weight_of_piece(piece);
+        // Four numbers a share: value and magnitude, in [J] of elements and in [J s^2] of vertices, so elements are
+        // weighted by dt^2; squared forces [N^2], which `potential` multiplies by dt^2 itself; reach [m^2], a maximum.
         for (var k = 0u; k < 4u * SHARE_COUNT; k++) {
             let sum = partial_sums[shares_at(piece) + k];
             if k % 4u == 3u {
@@ -90,6 +96,7 @@ fn add_lengths(part: u32, local: u32, into: ptr<function, Sums>) {
     for (var i = local; i < count; i += THREADS) {
         let piece = piece_at(part, i);
         let weight = weight_of_piece(piece);
+        // The slope among them comes from vertices alone and is in [J s^2], so that its weight is one.
         for (var k = 0u; k < LINE_SUMS; k++) {
             (*into)[k] += weight * partial_sums[lengths_at(piece) + k];
         }
@@ -118,6 +125,8 @@ struct Length {
 fn pick_length() -> Length {
     var length = 1.0;
     for (var k = 1u; k <= SHORTENINGS; k++) {
+        // No allowance for noise, as on the CPU: where round-off hides the decrease the place stays. `totals[0]` is
+        // the same line at length zero, summed in the same order, so that equal places give equal sums.
         if is_below(totals[k], totals[0], SUFFICIENT * length * totals[SLOPE]) {
             return Length(length, totals[k]);
         }

@@ -1,5 +1,5 @@
-// Where a step, or a mixture and the plain sweep after it, raises the potential of a connected part: what takes
-// its place (solver/step/guard.rs). Each dispatch first picks what the one before it has tried, then tries the next:
+// Searches for the place of a connected part whose step, or accelerated iterate and plain sweep after it, raises the
+// potential (solver/step/guard.rs). Each dispatch first picks among what the one before it tried, then tries more:
 //
 //   judge the step, all its shares at once, forces at x_s
 //   pick a share, or all lengths of a descent at once;   pick a length, forces there;   all lengths ...
@@ -33,10 +33,12 @@ fn search(
     }
     let row = piece_row(piece);
     let part = table[row + PIECE_PART];
+    // Through `agree`, because what `control` holds is not uniform to the compiler, and barriers follow.
     if agree(is_over(part), local) {
         return;
     }
-    // First what was tried, then what is tried: whatever is long is called at one place.
+    // First what was tried, then what is tried. A loop and not two calls: compilers copy `reduce` and the energies to
+    // every place they are called from, and a long kernel takes long to build.
     for (var tries = false; ; tries = true) {
         var sums: Sums;
         if tries {
@@ -55,6 +57,7 @@ fn search(
             return;
         }
     }
+    // The first threads write one sum each; a piece has places of its own, so nothing waits for another workgroup.
     let tries_shares = (job.mode & TRIES_SHARES) != 0u;
     if local < LINE_SUMS && (job.mode & (TRIES_SHARES | TRIES_LENGTHS)) != 0u {
         let at = select(lengths_at(piece), shares_at(piece), tries_shares);
@@ -96,6 +99,8 @@ fn is_over(part: u32) -> bool {
     if (job.mode & (JUDGES_STEP | JUDGES_PLAIN)) != 0u {
         return false;
     }
+    // Each word that is read here was written by an earlier dispatch of the search: `was_rejected` when the step was
+    // judged, `descends` when no share did, or when the plain sweep failed for the second time.
     if (job.mode & PICKS_SHARE) != 0u {
         return control.parts[part].was_rejected == 0u;
     }
@@ -111,6 +116,8 @@ fn decide(part: u32, keeps: bool) -> Next {
         then = judge_plain(part, keeps);
     } else if (job.mode & PICKS_SHARE) != 0u {
         let share = pick_share(control.parts[part].limit);
+        // With a share the part is done: `TRIAL` and `DIRECTION` still hold `x_s` and the whole step, and
+        // `evaluate` moves the vertices along them at the end.
         then.goes_on = select(0u, 1u, share == 0.0);
         if keeps {
             control.parts[part].share = share;
@@ -124,6 +131,8 @@ fn decide(part: u32, keeps: bool) -> Next {
 
 fn judge_step(part: u32, keeps: bool) -> Next {
     var choice = Choice(0.0, START);
+    // Where the starts were chosen before the sweeps, START holds the best place by now and `control` its limit.
+    // Otherwise they are chosen here; the limit is written below, and read by later dispatches only.
     if (job.mode & CHOOSES) != 0u {
         choice = choose();
     } else {
@@ -135,7 +144,7 @@ fn judge_step(part: u32, keeps: bool) -> Next {
             control.parts[part].limit = choice.limit;
         }
         control.parts[part].was_rejected = is_rejected;
-        // Counted once, however many parts were rejected.
+        // Counted once for all parts: only the first to exchange the number of this step finds another one.
         if is_rejected != 0u && atomicExchange(&control.rejected_step, control.step) != control.step {
             atomicAdd(&control.rejected, 1u);
         }
@@ -144,8 +153,10 @@ fn judge_step(part: u32, keeps: bool) -> Next {
     return Next(is_rejected, choice.range, 0.0, 0u);
 }
 
-// The plain sweep that took the place of a mixture; nothing where the mixture has passed.
+// Judges the plain sweep that replaced a rejected iterate; does nothing where the accelerated iterate has passed.
 fn judge_plain(part: u32, keeps: bool) -> Next {
+    // Reads the words that `take` wrote when it judged the accelerated iterate, and writes the other pair: a late
+    // workgroup must still find what the first one found.
     var best = control.parts[part].mixture_best;
     var failures = 0u;
     var is_better = false;
@@ -161,6 +172,8 @@ fn judge_plain(part: u32, keeps: bool) -> Next {
         control.parts[part].failures = failures;
         control.parts[part].descends = select(0u, 1u, descends);
     }
+    // `is_better` means that the sweep passed, so there is either a new best place to remember or a descent to
+    // prepare, never both.
     return Next(select(0u, 1u, descends || is_better), START, 0.0, select(0u, 1u, is_better));
 }
 
@@ -174,14 +187,19 @@ fn direction_of(v: u32, origin: vec3f) -> Direction {
     if (job.mode & TRIES_SHARES) != 0u {
         return Direction(points[v].xyz - origin, 0.0);
     }
+    // A later dispatch than the one that tried lengths: the loads may be those of another place by now, so the
+    // direction comes from where that dispatch has left it.
     if (job.mode & TRIES_LENGTHS) == 0u {
         return Direction(ground_of(DIRECTION, v).xyz, 0.0);
     }
+    // A pinned vertex, whose inverse mass is zero: it is where the pin is.
     if ground_of(ACTING, v).w == 0.0 {
         return Direction();
     }
     let load = gather(v);
     let predicted = ground_of(PREDICTED, v);
+    // As `descent` on the CPU. Every element at the vertex does this again, because within a dispatch it cannot
+    // read what the workgroup of the vertex finds; the loads are those of the dispatch before.
     let gradient = (origin - predicted.xyz) * predicted.w - load.xyz;
     let descent = gradient * (-1.0 / (predicted.w + load.w));
     return Direction(descent, dot(gradient, descent));
@@ -219,6 +237,7 @@ fn try_element(element: u32, now: Next, into: ptr<function, Sums>) {
     var length = 0.0;
     for (var k = 0u; k < line_count(); k++) {
         length = line_at(k, length);
+        // Forces are needed for the noise of the share that is judged. Armijo's condition has no noise.
         let found = answer(element, on_line(origin, direction, length), with_force);
         let difference = found.x - reference_of(element);
         if with_force {
@@ -229,6 +248,8 @@ fn try_element(element: u32, now: Next, into: ptr<function, Sums>) {
             (*into)[k] += difference;
         }
     }
+    // For the descent that may follow, at its start: `x_s` after the step was judged (the length is zero there), or
+    // where the last length led. Loaded before it is known whether a share does: that would be a dispatch more.
     if (job.mode & LOADS_FORCES) != 0u && now.is_better == 0u {
         load_forces(element, on_line(origin, direction, now.length));
     }
@@ -253,6 +274,7 @@ fn try_vertex(v: u32, now: Next, into: ptr<function, Sums>) {
     for (var k = 0u; k < line_count(); k++) {
         length = line_at(k, length);
         let x = along(origin, direction, length);
+        // Pinned vertices have no inertia in `Phi`; their distance still counts for the noise of positions.
         let term = select(0.0, inertia(v, x), is_free);
         if with_force {
             (*into)[4u * k] += term;
@@ -266,13 +288,15 @@ fn try_vertex(v: u32, now: Next, into: ptr<function, Sums>) {
     if (job.mode & TRIES_LENGTHS) != 0u {
         (*into)[SLOPE] += line_of_vertex.slope;
     }
+    // Written for later dispatches. Elements of this one find the direction by themselves.
     if (job.mode & (TRIES_SHARES | TRIES_LENGTHS)) != 0u {
         ground[DIRECTION * stride + v] = vec4f(direction, 0.0);
     }
     if now.is_better != 0u {
         ground[START * stride + v] = vec4f(points[v].xyz, 0.0);
     } else if (job.mode & LOADS_FORCES) != 0u {
-        // Of a first descent this is where it starts.
+        // A line starts in the range that its elements read in this very dispatch, so where it leads goes into the
+        // other one. AHEAD is free: the prediction that it held has been judged by now.
         let to = select(TRIAL, AHEAD, (job.mode & PICKS_LENGTH) != 0u && now.origin == TRIAL);
         ground[to * stride + v] = vec4f(along(origin, direction, now.length), 0.0);
     }

@@ -1,6 +1,6 @@
-// Carries out what the guard of mixtures decides, part by part, on the long vector: the choice of the start,
-// which the best place so far starts from; a mixture that does not pass gives way to the plain sweep; a descent
-// takes the place of both. `job.first`: where multipliers begin, `job.count` the length, `job.set_first` the
+// Carries out what the guard of accelerated iterates decides, part by part, on the long vector: copies the lowest
+// start to the best place; replaces an accelerated iterate that does not pass by the plain sweep, or both by a
+// descent. `job.first`: where multipliers begin, `job.count` the length, `job.set_first` the
 // window.
 
 struct Taken {
@@ -24,6 +24,7 @@ fn take(
         return;
     }
     let is_descent = (job.mode & TAKES_DESCENT) != 0u;
+    // Most iterates need no descent; the part's workgroups then end here, all of them, before any barrier.
     if agree(is_descent && control.parts[span.part].descends == 0u, local) {
         return;
     }
@@ -49,6 +50,7 @@ fn take(
 fn decide(part: u32, keeps: bool) -> Taken {
     var now = Taken(START, 0u, 0u, 0.0);
     if (job.mode & CHOOSES) != 0u {
+        // Before the first sweep. `x_s`, its potential and the count of failures are those of a new step.
         let choice = choose();
         now.range = choice.range;
         if keeps {
@@ -57,6 +59,9 @@ fn decide(part: u32, keeps: bool) -> Taken {
             control.parts[part].failures = 0u;
         }
     } else if (job.mode & JUDGES_MIXTURE) != 0u {
+        // An iterate that lowers the potential becomes `x_s`; it passes if it is not above that by more than noise.
+        // The decision goes into words of its own (`mixture_..`, `is_good`): the part's other workgroups still read
+        // `best_value` and `failures`.
         let tested = potential_of_totals();
         let best = control.parts[part].best_value;
         let is_better = improves(tested.value, best);
@@ -70,6 +75,8 @@ fn decide(part: u32, keeps: bool) -> Taken {
             control.parts[part].mixture_failures = select(control.parts[part].failures, 0u, is_good);
         }
     } else {
+        // Length zero where no length brings enough: positions then go back to `x_s` itself, whose potential is
+        // known already.
         let found = pick_length();
         now.length = found.length;
         if keeps {
@@ -77,7 +84,8 @@ fn decide(part: u32, keeps: bool) -> Taken {
             if found.length > 0.0 {
                 control.parts[part].best_value = found.value;
             }
-            // The older sweeps started elsewhere: Anderson's history begins anew.
+            // The older sweeps started elsewhere: Anderson's history is dropped. No residual is above the largest
+            // number, so that the next one does not count as grown.
             control.parts[part].sweeps = 0u;
             control.parts[part].next = 0u;
             control.parts[part].differences = 0u;
@@ -87,7 +95,7 @@ fn decide(part: u32, keeps: bool) -> Taken {
     return now;
 }
 
-// One thread for all of a vertex: parts of a vector are no places of their own.
+// One thread for all three coordinates of a vertex: ranges of the ground are written a vector at a time.
 fn take_number(i: u32, now: Taken) {
     let is_vertex = i < job.first;
     let v = i / 4u;
@@ -105,6 +113,7 @@ fn take_number(i: u32, now: Taken) {
         }
         return;
     }
+    // The best start lies in START from here on, so that everything later has one place to begin at.
     if is_vertex && now.range != START {
         ground[best] = ground_of(now.range, v);
     }
@@ -112,6 +121,8 @@ fn take_number(i: u32, now: Taken) {
         ground[best] = vec4f(unknowns[i], unknowns[i + 1u], unknowns[i + 2u], 0.0);
     }
     if now.gives_way != 0u {
+        // The history keeps the plain sweep behind the differences, as vector number `window`. Multipliers give way
+        // with the positions: either alone would break `M (x - xt) = J^T l`.
         let plain = job.set_first * job.count + i;
         for (var k = 0u; k < select(1u, 3u, is_vertex); k++) {
             unknowns[i + k] = mapped[plain + k];

@@ -34,7 +34,7 @@ pub struct OfLaw<'a, P, W, const VISCOUS: bool> {
 }
 
 impl<'a, P, W, const VISCOUS: bool> OfLaw<'a, P, W, VISCOUS> {
-    /// What is done with each block.
+    /// The operation on each block.
     pub fn new(pass: &'a P) -> Self {
         Self { pass, law: PhantomData }
     }

@@ -22,7 +22,7 @@ use crate::scalar::lanes::{Eight, LANES, Lanes, Point};
 use crate::solver::cpu::tets::{Block, TetPass};
 use crate::solver::cpu::threads::Shared;
 
-/// The potential and what of it round-off can pretend.
+/// The potential and the part of it that round-off can pretend.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Potential {
     /// `Phi` [J s^2].
@@ -42,11 +42,11 @@ pub struct Evaluator {
     pub potentials: Vec<Potential>,
     /// Potential [J] of tissue, springs and attachments of each part, as of its last evaluation.
     pub stored: Vec<f64>,
-    /// What is summed first, part by part.
+    /// The pieces of all parts, part by part.
     pieces: Vec<Piece>,
     /// The first piece of each part, and the end of the last one's.
     first: Vec<usize>,
-    /// What the pieces sum up to.
+    /// The sums of the pieces.
     partial: Vec<[f64; 2]>,
 }
 

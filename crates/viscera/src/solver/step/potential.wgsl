@@ -1,11 +1,11 @@
 // The incremental potential (solver/step/potential.rs) in single precision: as the difference to what it is at
 // the start of the step with its pins moved. Elements and vertices give their own differences, so that
-// sums are of the size of what happens in a step and not of all that is stored,
+// sums are of the size of a step's changes and not of all that is stored,
 //
 //   Phi(x) - Phi(x_ref) = sum_e dt^2 (V W - V W_ref) + sum_i m_i/2 (x - x_ref) . ((x - xt) + (x_ref - xt))
 //
 // A piece (512 elements, or vertices, of one part of the model) is summed by one workgroup, pieces by
-// whoever needs their sum, always in the same order.
+// every workgroup that needs their sum, always in the same order.
 
 const THREADS: u32 = 256u;
 const EPSILON: f32 = 1.1920929e-7;
@@ -18,8 +18,8 @@ var<private> line: f32;
 // Where the vertices are that are tested.
 var<private> tested_at: u32 = POINTS;
 
-// What a piece leaves, or a sum of pieces: potentials above the reference, of elements in [J], of inertia in
-// [J s^2]; and of how many elements the reference is no number.
+// The sums of a piece, or of all pieces: potentials above the reference, of elements in [J], of inertia in
+// [J s^2]; and of how many elements the reference is NaN.
 const SUM_AHEAD: u32 = 0u;
 const SUM_START: u32 = 1u;
 const SUM_TESTED: u32 = 2u;
@@ -77,7 +77,7 @@ fn reduce(given: Sums, groups: u32, maxima: u32, local: u32) {
     workgroupBarrier();
 }
 
-// What the first thread says, told to all.
+// The first thread's answer, for all threads.
 fn agree(yes: bool, local: u32) -> bool {
     if local == 0u {
         decision = select(0u, 1u, yes);
@@ -104,7 +104,7 @@ fn place(source: u32, v: u32) -> vec3f {
     return ground_of(source, v).xyz;
 }
 
-// Zero times a direction may be no number.
+// Zero times a direction may be NaN.
 fn along(origin: vec3f, direction: vec3f, length: f32) -> vec3f {
     if length == 0.0 {
         return origin;
@@ -223,8 +223,7 @@ fn add_element(element: u32, mode: u32, into: ptr<function, Sums>) {
     }
 }
 
-// Energy [J] at the reference; where it is no number the reference is out, and the others are taken as
-// they are.
+// Energy [J] at the reference; where it is NaN it counts as zero, and other energies are taken as they are.
 fn reference_of(element: u32) -> f32 {
     let energy = partial_sums[table[ENERGIES_AT] + element];
     return select(0.0, energy, is_finite(energy));
@@ -265,10 +264,10 @@ fn end_velocity(v: u32) -> vec3f {
     return (place(tested_at, v) - ground_of(PREVIOUS, v).xyz) * frame.inverse_dt;
 }
 
-// What the energy limit needs (energy.wgsl). Large common motions would drown what is beside them:
+// The sums of the energy limit (energy.wgsl). A large common motion would drown the motion relative to it:
 // relative to the first vertex of the part both are kept apart.
 fn add_motion(v: u32, first: u32, into: ptr<function, Sums>) {
-    // Springs to places outside are no part of the mass: what they store is given, or taken.
+    // Tethers are taken out of the mass again: the energy that they store counts as work.
     let hold = ground_of(TARGETS, v);
     let mass = max(ground_of(PREDICTED, v).w - hold.w * frame.squared_dt, 0.0);
     let load = frame.gravity * mass + ground_of(ACTING, v).xyz;

@@ -1,7 +1,7 @@
 // The beginning of a step and the velocities at its end, vertex by vertex (step/predict.rs, step/mod.rs).
 
-// What acts on single vertices: takes over what has changed since the last step. In mode 1 a thread for each
-// part begins its accelerations and forgets what was found broken.
+// Loads and holds of single vertices: takes over those that have changed since the last step. In mode 1 a thread
+// for each part begins its accelerations and clears its mark of NaN multipliers.
 @compute @workgroup_size(64)
 fn apply_updates(
     @builtin(global_invocation_id) id: vec3u,
@@ -33,10 +33,11 @@ fn apply_updates(
     predicted[v].w = update.inertia;
 }
 
-// xt = x + dt v + dt^2 (g + M^-1 (f + k (a - y))), y without the last term: springs k to places a outside are
-// a part of the inertia (step/tethers.rs). x becomes the start of the iteration: x (mode 0), x + dt v (mode 1),
-// xt (mode 2) or, in mode 3, x + dt v, where nothing holds the part with its mean acceleration; pins move to their places; w = 1/m per copy. Where steps are guarded (mode bit 2) the places
-// that the step could start from are kept, `job.set_first` vertices apart.
+// xt = x + dt v + dt^2 (g + M^-1 (f + k (a - y))), y without the last term: soft position constraints k to
+// targets a are a part of the inertia (step/tethers.rs). x becomes the start of the iteration: x (mode 0), x + dt v
+// (mode 1), xt (mode 2) or, in mode 3, x + dt v, where nothing holds the part with its mean acceleration. Pins move
+// to their places; w = 1/m per copy. Where steps are guarded (mode bit 2) the possible starts of the step are kept,
+// `job.set_first` vertices apart.
 @compute @workgroup_size(64)
 fn predict(
     @builtin(global_invocation_id) id: vec3u,

@@ -1,4 +1,4 @@
-//! What a tetrahedron's tissue answers to a deformation: both laws, and viscosity.
+//! The response of a tetrahedron's tissue to a deformation: both laws, and viscosity.
 
 use crate::elements::green_strain::{self, Voigt};
 use crate::elements::law::{Law, stretch_curvature, with_law};
@@ -27,7 +27,7 @@ pub struct Tissue<S> {
     pub viscosity_rate: S,
 }
 
-/// What a tetrahedron answers to a deformation.
+/// The response of a tetrahedron to a deformation.
 pub struct Response<S> {
     /// Elastic energy density [Pa].
     pub elastic_energy: S,

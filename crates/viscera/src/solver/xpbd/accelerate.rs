@@ -1,4 +1,4 @@
-//! What accelerations make of the iterates of a step: of each connected part by itself.
+//! Accelerates the iterates of a step, each connected part by itself.
 
 use super::acceleration::chebyshev_update;
 use super::iterates::{Mixing, fill_multiplier_weights};

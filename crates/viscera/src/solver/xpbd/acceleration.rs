@@ -125,6 +125,7 @@ impl<S: Real> Anderson<S> {
 
     /// Enters `G = g(q)` for the iterate `q`: returns where to write `G` and `R = G - q`.
     pub fn push(&mut self) -> (&mut [S], &mut [S]) {
+        // One slot more than the window: the newest iterate and `window` older ones. The oldest is overwritten.
         self.newest = (self.newest + 1) % (self.window + 1);
         self.count = (self.count + 1).min(self.window + 1);
         (&mut self.mapped[self.newest], &mut self.residuals[self.newest])
@@ -158,6 +159,7 @@ impl<S: Real> Anderson<S> {
         guard: bool,
     ) -> ([f64; LARGEST_WINDOW], usize) {
         let mut older = self.count.saturating_sub(1);
+        // An array, because a step allocates nothing; entries beyond `older` repeat the oldest and are not read.
         let history: [&[S]; LARGEST_WINDOW] = std::array::from_fn(|j| {
             let age = (j + 1).min(older);
             let place = (self.newest + self.window + 1 - age) % (self.window + 1);
@@ -166,6 +168,8 @@ impl<S: Real> Anderson<S> {
         let newest = &self.residuals[self.newest];
         let partial = &mut self.partial;
         let mut products = products(workers, norm_weights, newest, history, older, partial);
+        // Both norms are squared. A residual that has grown says that the last extrapolation went wrong. One entry
+        // stays, so that this sweep is taken as it is (no weights) and the next is mixed with it.
         if guard && products.norm > self.last_norm {
             self.count = 1;
             older = 0;
@@ -173,6 +177,7 @@ impl<S: Real> Anderson<S> {
         self.last_norm = products.norm;
         // In single precision the residuals themselves carry round-off of that size.
         let regularisation = if S::EPSILON > 1e-10 { 1e-7 } else { 1e-13 };
+        // `|R + sum w_j d_j|` is least where `sum_k (d_j . d_k) w_k = -d_j . R`.
         for value in &mut products.right {
             *value = -*value;
         }
@@ -186,6 +191,8 @@ impl<S: Real> Anderson<S> {
 
     /// As [`Anderson::mix`], by threads.
     pub(crate) fn mix_by(&self, workers: &Workers, weights: &[f64], first: usize, into: &mut [S]) {
+        // Differences to the newest and not weights that sum to one: near the fixed point they are small, and so is
+        // what rounding makes of them. A component that no sweep has changed stays to the bit.
         let into = Shared::new(into);
         workers.each(into.len(), GRAIN, |range| {
             let places = first + range.start..first + range.end;
@@ -213,6 +220,8 @@ fn least_squares(
     n: usize,
     regularisation: f64,
 ) -> [f64; LARGEST_WINDOW] {
+    // Residuals shrink from sweep to sweep by orders of magnitude. Unscaled, a regularisation that suits the oldest
+    // differences would be far above the newest; with columns of length 1 it is relative to each.
     let mut scale = [0.0; LARGEST_WINDOW];
     for j in 0..n {
         scale[j] = if gram[j][j] > 0.0 { 1.0 / gram[j][j].sqrt() } else { 0.0 };
@@ -221,9 +230,13 @@ fn least_squares(
         for k in 0..=j {
             gram[j][k] *= scale[j] * scale[k];
         }
+        // Two differences in nearly one direction have huge weights of opposite signs, which rounding decides; the
+        // addend bounds them. A column without length becomes a row of the identity, with the answer zero.
         gram[j][j] += if scale[j] > 0.0 { regularisation } else { 1.0 };
         right[j] *= scale[j];
     }
+    // `gram = L L^T`, L over the lower triangle. Rounding can make the last pivots zero or negative: the floor keeps
+    // the root from NaN, which would reach every position.
     for j in 0..n {
         for k in 0..=j {
             let mut value = gram[j][k];
@@ -233,6 +246,7 @@ fn least_squares(
             gram[j][k] = if k < j { value / gram[k][k] } else { value.max(regularisation).sqrt() };
         }
     }
+    // L y = right, then L^T w = y; last the scales, because the weights are asked for unscaled differences.
     for j in 0..n {
         for k in 0..j {
             right[j] -= gram[j][k] * right[k];

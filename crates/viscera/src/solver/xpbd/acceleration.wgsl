@@ -21,7 +21,7 @@ fn remember_iterate(
 }
 
 // The small least-squares problem, a workgroup for each of `job.count` parts. `job.mode`: whether a residual
-// that has grown starts a new history.
+// that has grown drops the history.
 @compute @workgroup_size(128)
 fn anderson_weights(
     @builtin(local_invocation_index) local: u32,
@@ -48,6 +48,7 @@ fn anderson_weights(
         return;
     }
     var products: array<f32, 21>;
+    // One thread from here on: at most ten unknowns are fewer operations than barriers between threads would cost.
     for (var k = 0u; k < PRODUCTS; k++) {
         var total = 0.0;
         for (var t = 0u; t < 6u; t++) {
@@ -56,9 +57,12 @@ fn anderson_weights(
         products[k] = total;
     }
     let window = job.set_first;
+    // The same `n` as `anderson_push` has found: it wrote the newest difference to the slot `newest` before this. The
+    // ring is filled from slot 0, so slots in use are 0..n whatever their age; weights do not care for order.
     let has_difference = control.parts[part].sweeps > 0u;
     let newest = control.parts[part].next;
     var n = select(0u, min(control.parts[part].differences + 1u, window), has_difference);
+    // Only products with the newest difference are new: its row and column. Those of old differences stay.
     for (var j = 0u; j < n; j++) {
         control.parts[part].gram[LARGEST_WINDOW * newest + j] = products[11u + j];
         control.parts[part].gram[LARGEST_WINDOW * j + newest] = products[11u + j];
@@ -68,6 +72,8 @@ fn anderson_weights(
     if has_difference {
         control.parts[part].next = (newest + 1u) % window;
     }
+    // As on the CPU: this sweep is taken as it is. `sweeps` 1 and not 0, because its residual and mapped iterate are
+    // kept (behind the window), and the next sweep's difference is to them.
     if job.mode != 0u && products[0] > control.parts[part].last_norm {
         control.parts[part].differences = 0u;
         control.parts[part].next = 0u;
@@ -86,6 +92,7 @@ fn least_squares(part: u32, products: array<f32, 21>, n: u32) {
     var a: array<f32, 100>;
     var b: array<f32, 10>;
     for (var j = 0u; j < n; j++) {
+        // Rows are ten long, so 11 j is on the diagonal.
         let length = control.parts[part].gram[11u * j];
         scale[j] = select(0.0, inverseSqrt(length), length > 0.0);
         b[j] = all[1u + j] * scale[j];

@@ -44,7 +44,7 @@ impl Recorder<'_> {
         }
     }
 
-    /// A new history, instead of a step.
+    /// A warm-start reset, instead of a step.
     pub fn restart_stages(&self) -> Vec<Dispatch> {
         let mut dispatches = vec![self.vertices(&kernels::APPLY_UPDATES, 0)];
         if self.model.is_viscous() {

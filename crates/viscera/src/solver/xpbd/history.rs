@@ -1,10 +1,10 @@
-//! The start of a new history: multipliers from positions alone.
+//! The warm-start reset: multipliers from positions alone.
 //!
 //! ```text
 //! l_j = -C_j(x)/a~_j: the residual of every constraint is zero, and J^T l = dt^2 f(x)
 //! ```
 //!
-//! Kept multipliers tell where the body comes from. Where that means nothing any more, because the
+//! Kept multipliers carry the forces of the last step. Where those mean nothing any more, because the
 //! caller has put vertices elsewhere or multipliers of a connected part are NaN, these take their place.
 //! After a rejected step they must not: see [`crate::solver::step::guard`].
 //!
@@ -75,7 +75,7 @@ fn constitutive_multipliers<S: Real>(
     }
     let moments = data.constants.moments(step);
     for_each_kind!(model, set => constitutive_elements(set, &moments, part, x, l));
-    // Of a tetrahedron too large for the number format nothing can be told.
+    // The stress of a tetrahedron too large for the number format is unknown.
     for range in &part.multipliers {
         for l in l[range.clone()].iter_mut().filter(|l| !l.is_finite()) {
             *l = S::ZERO;
@@ -149,7 +149,7 @@ mod tests {
     use crate::solver::step::gradient::load_forces;
 
     /// In the middle of a motion, so that viscous tissue resists: `J^T l = dt^2 f(x)`, every form, springs
-    /// and attachments, where one multiplier has been no number.
+    /// and attachments, where one multiplier has been NaN.
     #[test]
     fn repaired_multipliers_are_the_forces_of_the_elements() {
         for neo_hookean in [NeoHookean::Stretch, NeoHookean::Pair] {

@@ -1,4 +1,4 @@
-// The start of a new history: multipliers from positions alone (solver/xpbd/history.rs).
+// The warm-start reset: multipliers from positions alone (solver/xpbd/history.rs).
 //
 //   l_j = -C_j(x)/a~_j
 //
@@ -15,7 +15,7 @@ fn is_repaired(part: u32) -> bool {
     return job.mode != 0u || atomicLoad(&control.parts[part].is_broken) != 0u;
 }
 
-// Of a tetrahedron too large for the number format nothing can be told.
+// The stress of a tetrahedron too large for the number format is unknown.
 fn store_multiplier(place: u32, l: f32) {
     unknowns[job.first + place] = select(0.0, l, is_finite_number(l));
 }

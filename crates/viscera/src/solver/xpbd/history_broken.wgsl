@@ -1,4 +1,4 @@
-// Parts with a multiplier that is no number (history.wgsl): what one part has broken is no other's.
+// Parts with a multiplier that is NaN (history.wgsl): the multipliers of other parts stay.
 @compute @workgroup_size(256)
 fn find_broken(
     @builtin(local_invocation_index) local: u32,

@@ -1,4 +1,4 @@
-//! What constraints put on vertices: `J^T l` and the bound of its geometric stiffness, or the forces
+//! The loads of constraints on vertices: `J^T l` and the bound of its geometric stiffness, or the forces
 //! of the elements and the bound of their curvature.
 //!
 //! Every copy of a vertex gathers what its constraints put on it, colour by colour, so that no two

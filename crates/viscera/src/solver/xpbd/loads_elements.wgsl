@@ -1,4 +1,4 @@
-// What elements that are no tetrahedra put on their vertices: J^T l and the bound of its geometric stiffness
+// The loads of elements that are no tetrahedra on their vertices: J^T l and the bound of its geometric stiffness
 // (solver/xpbd/loads.rs); see loads.wgsl.
 @compute @workgroup_size(64)
 fn load_elements(

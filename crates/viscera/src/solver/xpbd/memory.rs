@@ -1,4 +1,4 @@
-//! What XPBD keeps beside the data of a step.
+//! The memory of XPBD beside the data of a step.
 
 use super::acceleration::Chebyshev;
 use super::iterates::{Iterate, Mixing};

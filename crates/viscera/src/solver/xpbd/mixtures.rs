@@ -1,4 +1,4 @@
-//! Guards Anderson's mixtures one by one; see [`crate::solver::step::guard`].
+//! Guards Anderson's accelerated iterates one by one; see [`crate::solver::step::guard`].
 
 use super::iterates::scatter;
 use super::memory::Memory;
@@ -24,7 +24,7 @@ impl<S: Real> Memory<S> {
         }
     }
 
-    /// What becomes of a part whose iterate is above the best so far.
+    /// Replaces the iterate of a part that is above the best so far.
     fn guard_mixture(
         &mut self,
         step: &Step<'_, S>,

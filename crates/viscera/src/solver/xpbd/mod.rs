@@ -116,7 +116,7 @@ fn is_accelerated(settings: &SolverSettings) -> bool {
     settings.acceleration != Acceleration::None
 }
 
-/// Whether Anderson's mixtures are guarded one by one.
+/// Whether Anderson's accelerated iterates are guarded one by one.
 pub fn guards_mixtures(settings: &SolverSettings) -> bool {
     settings.acceleration == Acceleration::Anderson
         && settings.guard_of_mixtures() == AndersonGuard::Energy

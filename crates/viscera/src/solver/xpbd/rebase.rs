@@ -1,4 +1,4 @@
-//! What happens to vertices between sweeps: the rebase, and copies that part and come together again.
+//! Vertices between sweeps: the rebase, and copies that are split and joined.
 
 use super::memory::Memory;
 use crate::layout::{Layout, Part};
@@ -74,7 +74,7 @@ impl<S: Real> Memory<S> {
     }
 
     /// Averages the changes of the copies, not the copies: the mean of equal numbers is then that
-    /// number, and a vertex nobody moved stays where it is to the bit.
+    /// number, and a vertex that no constraint moved stays where it is to the bit.
     pub fn join_copies(&mut self, model: &Layout<S>, data: &mut StepData<S>) {
         for part in model.parts.iter() {
             if part.is_split() {

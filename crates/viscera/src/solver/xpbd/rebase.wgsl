@@ -1,4 +1,4 @@
-// What happens to vertices between sweeps (xpbd/rebase.rs).
+// Vertices between sweeps (xpbd/rebase.rs).
 
 // Stabilised rebase: r = M (x - xt) - J^T l, mh = m + share of the bounds, x -= theta r/mh, w = 1/mh per
 // copy.
@@ -51,7 +51,7 @@ fn split_copies(
     }
 }
 
-// Averages the changes of the copies: a vertex that nobody moved stays where it is to the bit. Where a part has
+// Averages the changes of the copies: a vertex that no constraint moved stays where it is to the bit. Where a part has
 // no vertex of several copies they are its vertices, as if there were none.
 @compute @workgroup_size(64)
 fn join_copies(

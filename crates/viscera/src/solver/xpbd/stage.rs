@@ -40,10 +40,10 @@ pub enum XpbdStage {
 /// One mixing, with what is done in the same pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mix {
-    /// What is mixed.
+    /// The unknowns that are mixed.
     pub on: AndersonOn,
     /// Whether `x` first becomes the mean of its copies.
     pub joins: bool,
-    /// Whether the mixture is remembered for the next sweep: not where another stage still changes it.
+    /// Whether the accelerated iterate is remembered for the next sweep: not where another stage still changes it.
     pub remembers: bool,
 }

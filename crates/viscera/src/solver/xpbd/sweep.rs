@@ -31,7 +31,7 @@ impl<S: Real> Relaxation<S> {
         }
     }
 
-    /// What is left of a correction: multipliers and positions after it.
+    /// The result of a correction: multipliers and positions after it.
     #[inline(always)]
     fn apply<L: Lanes<Real = S>, const N: usize>(
         self,
@@ -50,7 +50,7 @@ impl<S: Real> Relaxation<S> {
     }
 }
 
-/// What solves of a colour have in common.
+/// Data that all solves of a colour share.
 struct Sweep<'a, S> {
     /// Copies, or vertices where nothing is split; each carries its inverse mass.
     points: Shared<'a, Point<S>>,
@@ -176,7 +176,7 @@ impl<S: Real> Sweep<'_, S> {
         for i in set.color(color) {
             let element = set.element::<S>(i, moments);
             let copies = set.copies[i];
-            // SAFETY: nobody else works on the points now.
+            // SAFETY: no other thread works on the points now.
             let ends = copies.map(|copy| unsafe { *self.points.at(copy as usize) });
             // SAFETY: nor on the multipliers.
             let l = unsafe { self.multipliers.range(set.multipliers(i)) };
@@ -194,7 +194,7 @@ impl<S: Real> Sweep<'_, S> {
     }
 
     fn move_copy(&mut self, copy: u32, change: Vec3<S>) {
-        // SAFETY: nobody else works on the points now.
+        // SAFETY: no other thread works on the points now.
         let point = unsafe { self.points.at(copy as usize) };
         point.set_vec3(point.vec3() + change * self.relaxation.positions);
     }
