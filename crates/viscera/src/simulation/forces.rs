@@ -1,6 +1,6 @@
 //! Forces of what holds and pulls tissue.
 
-use super::acting::PinnedBy;
+use super::holding::PinnedBy;
 use super::{PatchForce, PatchKind, ResolvedPatch, Simulation};
 use crate::scalar::{Real, Vec3};
 use crate::scene::Motion;

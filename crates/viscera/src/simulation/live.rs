@@ -1,8 +1,8 @@
 //! What is done to a running simulation by hand. All of it becomes part of the scene, so that a scene file
 //! with [`Live`] behind its other tables does the same to the bit.
 
-use super::acting::{Taken, tolerance};
 use super::error::{LiveError, SimulationError};
+use super::holding::{GraspOrigins, tolerance};
 use super::{Simulation, substep_dt};
 use crate::measure::measure_tets;
 use crate::model::ModelError;
@@ -167,7 +167,7 @@ impl<S: Real> Simulation<S> {
             return Err(error);
         }
         self.assembly.motions.truncate(self.written.motions.len());
-        self.taken = Taken::default();
+        self.taken = GraspOrigins::default();
         self.by_hand.clear();
         self.changes_made = 0;
         self.rejected_substeps = 0;

@@ -1,6 +1,5 @@
 //! A scene in motion: inputs from the scene's paths, frames of substeps, and what to report.
 
-mod acting;
 pub mod advice;
 mod assemble;
 mod choice;
@@ -9,16 +8,17 @@ mod error;
 mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod holding;
 mod live;
 #[cfg(feature = "gpu")]
 mod on_device;
 mod rest;
 mod saved;
 
-use acting::Taken;
 pub use assemble::{AssembleError, AssembledBody, Assembly, ResolvedPatch};
 pub use error::{FrameError, LiveError, SimulationError};
 pub use forces::Hold;
+use holding::GraspOrigins;
 pub use live::Live;
 pub use rest::{RestReport, Standing};
 pub use saved::ResumeError;
@@ -114,7 +114,7 @@ pub struct Simulation<S> {
     state: State<S>,
     backend: Backend<S>,
     inputs: Inputs<S>,
-    taken: Taken,
+    taken: GraspOrigins,
     /// The scene without what was done to it by hand.
     written: Scene,
     /// Changes of the scene that have been made.
@@ -147,7 +147,7 @@ impl<S: Real> Simulation<S> {
             state: State::at_rest(&model),
             backend: choose(&model, &scene.solver, substep_dt(&scene))?,
             inputs: Inputs::default(),
-            taken: Taken::default(),
+            taken: GraspOrigins::default(),
             written: scene.clone(),
             changes_made: 0,
             by_hand: Vec::new(),

@@ -6,8 +6,8 @@
 //! ([`Simulation::live`]).
 
 use super::Simulation;
-use super::acting::Taken;
 use super::error::LiveError;
+use super::holding::GraspOrigins;
 use crate::layout::Layout;
 use crate::measure::measure_tets;
 use crate::model::for_each_kind;
@@ -151,7 +151,8 @@ impl<S: Real> Simulation<S> {
                 return Err(ResumeError::OtherScene { what });
             }
         }
-        self.taken = Taken::of(saved.taken.iter().map(|t| t.as_deref().map(dressed)).collect());
+        self.taken =
+            GraspOrigins::of(saved.taken.iter().map(|t| t.as_deref().map(dressed)).collect());
         self.before = dressed(&saved.before);
         self.rejected_substeps = saved.rejected_substeps;
         self.put(State {

@@ -118,7 +118,7 @@ fn load_element(row: u32) {
     var start: array<vec3f, 4>;
     for (var i = 0u; i < 4u; i++) {
         x[i] = points[vertices[i]].xyz;
-        start[i] = x[i] - ground[VELOCITIES * table[STRIDE_AT] + vertices[i]].xyz * h;
+        start[i] = x[i] - vertex_data[VELOCITIES * table[STRIDE_AT] + vertices[i]].xyz * h;
     }
     var forces = element_forces(kind, moment_of(row, start, h), x);
     for (var i = 0u; i < element_corners(kind); i++) {
@@ -143,7 +143,7 @@ fn advance_explicit(
     if control.small_step > count {
         return;
     }
-    let on_vertex = acting[v];
+    let on_vertex = external_forces[v];
     let hold = targets[v];
     if on_vertex.w == 0.0 {
         let start = previous[v].xyz;
@@ -175,7 +175,7 @@ fn end_explicit(
     }
     let mass = predicted[v].w;
     let change = velocities[v].xyz - predicted[v].xyz;
-    let load = frame.gravity + acting[v].xyz * (1.0 / mass);
+    let load = frame.gravity + external_forces[v].xyz * (1.0 / mass);
     let xt = points[v].xyz - change * frame.dt + load * frame.squared_dt;
     predicted[v] = vec4f(xt, mass);
 }

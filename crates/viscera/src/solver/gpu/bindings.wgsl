@@ -87,7 +87,7 @@ struct Frame {
 // Inertial prediction xt [m]; w: mass [kg].
 @group(0) @binding(10) var<storage, read_write> predicted: array<vec4f>;
 // External force [N] without gravity; w: inverse mass [1/kg], zero where pinned.
-@group(0) @binding(11) var<storage, read_write> acting: array<vec4f>;
+@group(0) @binding(11) var<storage, read_write> external_forces: array<vec4f>;
 // Where pinned vertices are at the end of the step [m], and in the explicit method where the attachments
 // of others pull to, with their stiffness in w [N/m].
 @group(0) @binding(12) var<storage, read_write> targets: array<vec4f>;
@@ -106,10 +106,10 @@ struct Frame {
 // Sums of pieces.
 @group(0) @binding(21) var<storage, read_write> partial_sums: array<f32>;
 @group(0) @binding(22) var<storage, read_write> control: Control;
-// Where the guard's step can start from [m]: three ranges of the ground.
+// Where the guard's step can start from [m]: three ranges of the vertex data.
 @group(0) @binding(24) var<storage, read_write> starts: array<vec4f>;
 // All that belongs to vertices, range by range; see potential.wgsl.
-@group(0) @binding(25) var<storage, read_write> ground: array<vec4f>;
+@group(0) @binding(25) var<storage, read_write> vertex_data: array<vec4f>;
 // All constants but the tetrahedra, and the weights of the norm, as words; see table.wgsl.
 @group(0) @binding(26) var<storage, read> table: array<u32>;
 

@@ -75,7 +75,7 @@ impl Buffers {
             (Mapped, "Anderson's iterates", history),
             (PartialSums, "partial sums", table.sums_size),
             (Control, "control records", control_size(model.part_count())),
-            (Ground, "vertices", table.ground_size),
+            (VertexData, "vertices", table.vertex_data_size),
         ];
         let constants = [(Tets, "tetrahedra", layout::tets(model)), (Table, "tables", table.bytes)];
         let of_constants = constants.iter().map(|(_, what, bytes)| (*what, bytes.len() as u64));

@@ -1,5 +1,5 @@
 // Elements that are no tetrahedra, as they stand in the table: names with `ELEMENT_` are places in a row
-// (layout.rs). Anchors, and where vertices were at the start of the step, stand in the ground.
+// (layout.rs). Anchors, and where vertices were at the start of the step, stand in the vertex data.
 
 fn element_row(i: u32) -> u32 {
     return table[ELEMENTS_AT] + ELEMENT_WORDS * i;
@@ -11,7 +11,7 @@ fn four_of(at: u32) -> array<u32, 4> {
 }
 
 fn before_step(v: u32) -> vec3f {
-    return ground[PREVIOUS * table[STRIDE_AT] + v].xyz;
+    return vertex_data[PREVIOUS * table[STRIDE_AT] + v].xyz;
 }
 
 fn before_steps(v: array<u32, 4>) -> array<vec3f, 4> {
@@ -22,6 +22,6 @@ fn before_steps(v: array<u32, 4>) -> array<vec3f, 4> {
 fn moment_of(row: u32, start: array<vec3f, 4>, dt: f32) -> ElementMoment {
     let at = row + ELEMENT_CONSTANTS;
     let constants = vec4f(number(at), number(at + 1u), number(at + 2u), number(at + 3u));
-    let anchor = ground[table[ANCHORS_AT] + table[row + ELEMENT_ANCHOR]].xyz;
+    let anchor = vertex_data[table[ANCHORS_AT] + table[row + ELEMENT_ANCHOR]].xyz;
     return ElementMoment(constants, anchor, start, dt);
 }

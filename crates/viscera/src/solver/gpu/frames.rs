@@ -235,7 +235,7 @@ impl GpuSolver {
 
 /// The device's values that a force balance needs.
 fn balance_slots(model: &Layout<f32>) -> Vec<Slot> {
-    let mut slots = vec![Slot::Predicted, Slot::Acting, Slot::Previous];
+    let mut slots = vec![Slot::Predicted, Slot::ExternalForces, Slot::Previous];
     if model.is_viscous() {
         slots.push(Slot::StartStrain);
     }

@@ -86,11 +86,11 @@ macro_rules! kernels {
 }
 
 kernels! {
-    APPLY_UPDATES = Predict "apply_updates" 64 [Predicted Acting Targets Updates Control];
+    APPLY_UPDATES = Predict "apply_updates" 64 [Predicted ExternalForces Targets Updates Control];
     PREDICT = Predict "predict" 64
-        [Points Velocities Previous Predicted Acting Targets Starts Table];
-    REBASE = Rebase "rebase" 64 [Points Loads Previous Predicted Acting Table];
-    RECOMPUTE_POSITIONS = Rebase "recompute_positions" 64 [Points Loads Predicted Acting Table];
+        [Points Velocities Previous Predicted ExternalForces Targets Starts Table];
+    REBASE = Rebase "rebase" 64 [Points Loads Previous Predicted ExternalForces Table];
+    RECOMPUTE_POSITIONS = Rebase "recompute_positions" 64 [Points Loads Predicted ExternalForces Table];
     SPLIT_COPIES = Rebase "split_copies" 64 [Offsets Points Copies];
     JOIN_COPIES = Rebase "join_copies" 64 [Offsets Points Copies];
     UPDATE_VELOCITIES = Predict "update_velocities" 64 [Points Velocities Previous];
@@ -98,10 +98,10 @@ kernels! {
     SOLVE_COPIES = Sweep "solve" 64 [Tets Materials CornerIndices Points Multipliers StartStrain];
     SOLVE_JACOBI = Sweep "solve" 64
         [Tets Materials CornerIndices Points Copies Multipliers StartStrain];
-    SOLVE_ELEMENTS = SweepElements "solve_elements" 64 [Points Multipliers Ground Table];
+    SOLVE_ELEMENTS = SweepElements "solve_elements" 64 [Points Multipliers VertexData Table];
     SOLVE_ELEMENTS_JACOBI = SweepElements "solve_elements" 64
-        [Points Copies Multipliers Ground Table];
-    LOAD_ELEMENTS = LoadsElements "load_elements" 64 [Points Multipliers Loads Ground Table];
+        [Points Copies Multipliers VertexData Table];
+    LOAD_ELEMENTS = LoadsElements "load_elements" 64 [Points Multipliers Loads VertexData Table];
     LOAD_MULTIPLIERS = Loads "load_multipliers" 64 [Tets CornerIndices Points Multipliers Loads];
     MEASURE_STRAIN = Strain "measure_strain" 64 [Tets Points StartStrain];
     RESCALE_MULTIPLIERS = Multipliers "rescale_multipliers" 256 [Multipliers];
@@ -117,20 +117,20 @@ kernels! {
     FIND_BROKEN = History "find_broken" 256 [Unknowns Control Table];
     REPAIR_MULTIPLIERS = HistoryTets "repair_multipliers" 64
         [Tets StartStrain Unknowns Control Table];
-    REPAIR_ELEMENTS = HistoryElements "repair_elements" 64 [Unknowns Control Ground Table];
+    REPAIR_ELEMENTS = HistoryElements "repair_elements" 64 [Unknowns Control VertexData Table];
     BEGIN_EXPLICIT = Explicit "begin_explicit" 64 [Points Velocities Previous Predicted Control];
     BEGIN_STRAIN = Explicit "begin_strain" 64 [Tets Points Predicted StartStrain Table];
     LOAD_FORCES = Explicit "load_forces" 64
-        [Tets CornerIndices Points Loads StartStrain Control Ground Table];
+        [Tets CornerIndices Points Loads StartStrain Control VertexData Table];
     ADVANCE_EXPLICIT = Explicit "advance_explicit" 64
-        [Points Loads Velocities Previous Acting Targets Control Table];
-    END_EXPLICIT = Explicit "end_explicit" 64 [Points Velocities Predicted Acting];
+        [Points Loads Velocities Previous ExternalForces Targets Control Table];
+    END_EXPLICIT = Explicit "end_explicit" 64 [Points Velocities Predicted ExternalForces];
     CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control Table];
-    EVALUATE = Evaluate "evaluate" 256 [Tets Points StartStrain PartialSums Control Ground Table];
+    EVALUATE = Evaluate "evaluate" 256 [Tets Points StartStrain PartialSums Control VertexData Table];
     SEARCH = Search "search" 256
-        [Tets Points Loads StartStrain PartialSums Control Ground Table];
-    TAKE = Take "take" 256 [Unknowns Mapped PartialSums Control Ground Table];
-    LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Control Ground Table];
+        [Tets Points Loads StartStrain PartialSums Control VertexData Table];
+    TAKE = Take "take" 256 [Unknowns Mapped PartialSums Control VertexData Table];
+    LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Control VertexData Table];
 }
 
 /// Records and storage, for every kernel.
@@ -209,7 +209,7 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
 
 /// The whole text that a kernel is compiled from: constants that the host shares, then whole files.
 pub fn source(kernel: &Kernel, variant: Variant) -> String {
-    let constants = super::host::constants();
+    let constants = super::shared::constants();
     let all = [&[constants.as_str()][..], &SHARED, &files(kernel, variant)].concat();
     all.join("\n")
 }

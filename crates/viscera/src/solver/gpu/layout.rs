@@ -39,7 +39,7 @@ struct Material {
     viscosity: f32,
 }
 
-/// Where everything stands in the table, the ground and the partial sums; the first words of the table.
+/// Where everything stands in the table, the vertex data and the partial sums; the first words of the table.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Header {
@@ -56,7 +56,7 @@ pub(super) struct Header {
     pub weights: u32,
     pub small_steps: u32,
     pub falls: u32,
-    /// Vertices from one range of the ground to the next, and where anchors begin.
+    /// Vertices from one range of the vertex data to the next, and where anchors begin.
     pub stride: u32,
     pub anchors: u32,
     /// Places among the partial sums.
@@ -68,13 +68,13 @@ pub(super) struct Header {
     pub part_count: u32,
 }
 
-/// The ranges of the ground, in order, with the slot that kernels know them by; `None` for one that only the
+/// The ranges of the vertex data, in order, with the slot that kernels know them by; `None` for one that only the
 /// guard knows. From the reference on there are the start of the step, the inertial prediction and the start of
 /// the iteration, pins moved in all: `Starts` are these three. Behind them a line along which places are tried.
-pub(super) const GROUND: [(&str, Option<Slot>); 10] = [
+pub(super) const VERTEX_DATA: [(&str, Option<Slot>); 10] = [
     ("PREVIOUS", Some(Slot::Previous)),
     ("PREDICTED", Some(Slot::Predicted)),
-    ("ACTING", Some(Slot::Acting)),
+    ("EXTERNAL_FORCES", Some(Slot::ExternalForces)),
     ("TARGETS", Some(Slot::Targets)),
     ("VELOCITIES", Some(Slot::Velocities)),
     ("REFERENCE", Some(Slot::Starts)),
@@ -90,8 +90,8 @@ const UNGUARDED: usize = 6;
 pub(super) struct Table {
     pub bytes: Vec<u8>,
     pub ranges: Vec<Range>,
-    /// Bytes of the ground and of all sums.
-    pub ground_size: u64,
+    /// Bytes of the vertex data and of all sums.
+    pub vertex_data_size: u64,
     pub sums_size: u64,
 }
 
@@ -247,16 +247,16 @@ impl DeviceLayout {
         // Data of vertices lie in one buffer, range by range, because the baseline allows a kernel eight
         // storage buffers. A guarded step's three starts are one binding: `predict` writes all of them.
         let each = 16 * u64::from(Self::stride(model));
-        let count = if guarded { GROUND.len() } else { UNGUARDED };
-        for (place, (_, slot)) in GROUND[..count].iter().enumerate() {
+        let count = if guarded { VERTEX_DATA.len() } else { UNGUARDED };
+        for (place, (_, slot)) in VERTEX_DATA[..count].iter().enumerate() {
             let size = if guarded && *slot == Some(Slot::Starts) { 3 * each } else { each };
             let start = each * place as u64;
-            ranges.extend(slot.map(|slot| Range { slot, owner: Slot::Ground, start, size }));
+            ranges.extend(slot.map(|slot| Range { slot, owner: Slot::VertexData, start, size }));
         }
         let start = each * count as u64;
         let size =
             (16 * model.rest_anchors.len() as u64).next_multiple_of(ALIGNMENT).max(ALIGNMENT);
-        ranges.push(Range { slot: Slot::Anchors, owner: Slot::Ground, start, size });
+        ranges.push(Range { slot: Slot::Anchors, owner: Slot::VertexData, start, size });
         (header.stride, header.anchors) = (Self::stride(model), (start / 16) as u32);
 
         // Sums of the accelerations are read before pieces leave theirs.
@@ -270,10 +270,10 @@ impl DeviceLayout {
         let sums = energies + if guarded { elements as u64 } else { 0 };
         (header.lines, header.energies) = (lines as u32, energies as u32);
         bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
-        Table { bytes, ranges, ground_size: start + size, sums_size: 4 * sums }
+        Table { bytes, ranges, vertex_data_size: start + size, sums_size: 4 * sums }
     }
 
-    /// Vertices from one range of the ground to the next.
+    /// Vertices from one range of the vertex data to the next.
     pub fn stride(model: &Layout<f32>) -> u32 {
         model.vertex_count().next_multiple_of((ALIGNMENT / 16) as usize) as u32
     }

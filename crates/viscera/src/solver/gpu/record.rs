@@ -46,7 +46,7 @@ pub struct Recorder<'a> {
     pub length: u32,
     pub multipliers_first: u32,
     swept: Swept,
-    /// Vertices from one range of the ground to the next.
+    /// Vertices from one range of the vertex data to the next.
     pub stride: u32,
     pub pieces: Pieces,
 }

@@ -296,7 +296,7 @@ impl GpuSolver {
         self.device.queue.write_buffer(self.buffers.buffer(Slot::Control), 0, &control);
         for (slot, values) in [
             (Slot::Predicted, with_w(&|v| masses[v])),
-            (Slot::Acting, with_w(&|v| 1.0 / masses[v])),
+            (Slot::ExternalForces, with_w(&|v| 1.0 / masses[v])),
             (Slot::Previous, with_w(&copies)),
             (Slot::Targets, with_w(&|_| 0.0)),
         ] {

@@ -135,7 +135,7 @@ impl GpuSolver {
             &each(model, &|v| with(constants.predicted[v].vec3(), constants.inertias[v])),
         );
         self.put_rows(
-            Slot::Acting,
+            Slot::ExternalForces,
             &each(model, &|v| with(constants.external[v], constants.inverse_masses[v])),
         );
         let mut targets = each(model, &|_| [0.0; 4]);

@@ -61,10 +61,10 @@ fn limit_velocities(
     let now = workgroupUniformLoad(&limit);
     for (var v = table[row + PIECE_FIRST] + local; v < table[row + PIECE_END]; v += THREADS) {
         var velocity = end_velocity(v);
-        if now.share < 1.0 && ground_of(ACTING, v).w != 0.0 {
+        if now.share < 1.0 && vertex_data_of(EXTERNAL_FORCES, v).w != 0.0 {
             velocity = now.drift + (velocity - now.drift) * now.share;
         }
-        ground[VELOCITIES * table[STRIDE_AT] + v] = vec4f(velocity, 0.0);
+        vertex_data[VELOCITIES * table[STRIDE_AT] + v] = vec4f(velocity, 0.0);
     }
 }
 

@@ -36,7 +36,7 @@ fn improves(value: f32, best: f32) -> bool {
     return is_below(value, best, 0.0) && value != best;
 }
 
-// The lowest of three starts, and the range of the ground that it lies in.
+// The lowest of three starts, and the range of the vertex data that it lies in.
 struct Choice {
     limit: f32,
     range: u32,

@@ -7,12 +7,12 @@
 // Parts whose step passes pay a look at their record. `job.mode` says what is picked and what is tried.
 //
 // Nothing that one workgroup reads another one writes: directions are gathered by elements and written by
-// vertices, places move from one range of the ground to another, and a record's words are written in other
+// vertices, places move from one range of the vertex data to another, and a record's words are written in other
 // dispatches than they are read in.
 
 struct Next {
     goes_on: u32,
-    // The range of the ground that lines start from, and the length that was picked.
+    // The range of the vertex data that lines start from, and the length that was picked.
     origin: u32,
     length: f32,
     // Whether the iterate becomes the best.
@@ -190,14 +190,14 @@ fn direction_of(v: u32, origin: vec3f) -> Direction {
     // A later dispatch than the one that tried lengths: the loads may be those of another place by now, so the
     // direction comes from where that dispatch has left it.
     if (job.mode & TRIES_LENGTHS) == 0u {
-        return Direction(ground_of(DIRECTION, v).xyz, 0.0);
+        return Direction(vertex_data_of(DIRECTION, v).xyz, 0.0);
     }
     // A pinned vertex, whose inverse mass is zero: it is where the pin is.
-    if ground_of(ACTING, v).w == 0.0 {
+    if vertex_data_of(EXTERNAL_FORCES, v).w == 0.0 {
         return Direction();
     }
     let load = gather(v);
-    let predicted = ground_of(PREDICTED, v);
+    let predicted = vertex_data_of(PREDICTED, v);
     // As `descent` on the CPU. Every element at the vertex does this again, because within a dispatch it cannot
     // read what the workgroup of the vertex finds; the loads are those of the dispatch before.
     let gradient = (origin - predicted.xyz) * predicted.w - load.xyz;
@@ -230,7 +230,7 @@ fn try_element(element: u32, now: Next, into: ptr<function, Sums>) {
     var origin: array<vec3f, 4>;
     var direction: array<vec3f, 4>;
     for (var i = 0u; i < 4u; i++) {
-        origin[i] = ground_of(now.origin, corners[i]).xyz;
+        origin[i] = vertex_data_of(now.origin, corners[i]).xyz;
         direction[i] = direction_of(corners[i], origin[i]).along;
     }
     let with_force = (job.mode & TRIES_SHARES) != 0u;
@@ -265,10 +265,10 @@ fn on_line(origin: array<vec3f, 4>, direction: array<vec3f, 4>, length: f32) -> 
 }
 
 fn try_vertex(v: u32, now: Next, into: ptr<function, Sums>) {
-    let origin = ground_of(now.origin, v).xyz;
+    let origin = vertex_data_of(now.origin, v).xyz;
     let line_of_vertex = direction_of(v, origin);
     let direction = line_of_vertex.along;
-    let is_free = ground_of(ACTING, v).w != 0.0;
+    let is_free = vertex_data_of(EXTERNAL_FORCES, v).w != 0.0;
     let with_force = (job.mode & TRIES_SHARES) != 0u;
     var length = 0.0;
     for (var k = 0u; k < line_count(); k++) {
@@ -290,15 +290,15 @@ fn try_vertex(v: u32, now: Next, into: ptr<function, Sums>) {
     }
     // Written for later dispatches. Elements of this one find the direction by themselves.
     if (job.mode & (TRIES_SHARES | TRIES_LENGTHS)) != 0u {
-        ground[DIRECTION * stride + v] = vec4f(direction, 0.0);
+        vertex_data[DIRECTION * stride + v] = vec4f(direction, 0.0);
     }
     if now.is_better != 0u {
-        ground[START * stride + v] = vec4f(points[v].xyz, 0.0);
+        vertex_data[START * stride + v] = vec4f(points[v].xyz, 0.0);
     } else if (job.mode & LOADS_FORCES) != 0u {
         // A line starts in the range that its elements read in this very dispatch, so where it leads goes into the
         // other one. AHEAD is free: the prediction that it held has been judged by now.
         let to = select(TRIAL, AHEAD, (job.mode & PICKS_LENGTH) != 0u && now.origin == TRIAL);
-        ground[to * stride + v] = vec4f(along(origin, direction, now.length), 0.0);
+        vertex_data[to * stride + v] = vec4f(along(origin, direction, now.length), 0.0);
     }
 }
 

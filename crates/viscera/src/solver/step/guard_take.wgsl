@@ -95,7 +95,7 @@ fn decide(part: u32, keeps: bool) -> Taken {
     return now;
 }
 
-// One thread for all three coordinates of a vertex: ranges of the ground are written a vector at a time.
+// One thread for all three coordinates of a vertex: ranges of the vertex data are written a vector at a time.
 fn take_number(i: u32, now: Taken) {
     let is_vertex = i < job.first;
     let v = i / 4u;
@@ -105,8 +105,8 @@ fn take_number(i: u32, now: Taken) {
     let best = START * table[STRIDE_AT] + v;
     if (job.mode & TAKES_DESCENT) != 0u {
         if is_vertex {
-            let x = along(ground_of(TRIAL, v).xyz, ground_of(DIRECTION, v).xyz, now.length);
-            ground[best] = vec4f(x, 0.0);
+            let x = along(vertex_data_of(TRIAL, v).xyz, vertex_data_of(DIRECTION, v).xyz, now.length);
+            vertex_data[best] = vec4f(x, 0.0);
             for (var axis = 0u; axis < 3u; axis++) {
                 unknowns[i + axis] = x[axis];
             }
@@ -115,10 +115,10 @@ fn take_number(i: u32, now: Taken) {
     }
     // The best start lies in START from here on, so that everything later has one place to begin at.
     if is_vertex && now.range != START {
-        ground[best] = ground_of(now.range, v);
+        vertex_data[best] = vertex_data_of(now.range, v);
     }
     if is_vertex && now.is_better != 0u {
-        ground[best] = vec4f(unknowns[i], unknowns[i + 1u], unknowns[i + 2u], 0.0);
+        vertex_data[best] = vec4f(unknowns[i], unknowns[i + 1u], unknowns[i + 2u], 0.0);
     }
     if now.gives_way != 0u {
         // The history keeps the plain sweep behind the differences, as vector number `window`. Multipliers give way

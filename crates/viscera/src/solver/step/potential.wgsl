@@ -10,7 +10,7 @@
 const THREADS: u32 = 256u;
 const EPSILON: f32 = 1.1920929e-7;
 
-// Places beside the ranges of the ground: the positions, and `TRIAL + line * DIRECTION`.
+// Places beside the ranges of the vertex data: the positions, and `TRIAL + line * DIRECTION`.
 const POINTS: u32 = 100u;
 const LINE: u32 = 101u;
 
@@ -90,8 +90,8 @@ fn is_finite(value: f32) -> bool {
     return (bitcast<u32>(value) & 0x7f800000u) != 0x7f800000u;
 }
 
-fn ground_of(range: u32, v: u32) -> vec4f {
-    return ground[range * table[STRIDE_AT] + v];
+fn vertex_data_of(range: u32, v: u32) -> vec4f {
+    return vertex_data[range * table[STRIDE_AT] + v];
 }
 
 fn place(source: u32, v: u32) -> vec3f {
@@ -99,9 +99,9 @@ fn place(source: u32, v: u32) -> vec3f {
         return points[v].xyz;
     }
     if source == LINE {
-        return along(ground_of(TRIAL, v).xyz, ground_of(DIRECTION, v).xyz, line);
+        return along(vertex_data_of(TRIAL, v).xyz, vertex_data_of(DIRECTION, v).xyz, line);
     }
-    return ground_of(source, v).xyz;
+    return vertex_data_of(source, v).xyz;
 }
 
 // Zero times a direction may be NaN.
@@ -188,8 +188,8 @@ fn answer(element: u32, x: array<vec3f, 4>, with_force: bool) -> vec2f {
 
 // `m/2 (|x - xt|^2 - |x_ref - xt|^2)` of a free vertex [kg m^2] without its large terms.
 fn inertia(v: u32, x: vec3f) -> f32 {
-    let predicted = ground_of(PREDICTED, v);
-    let start = ground_of(PREVIOUS, v).xyz;
+    let predicted = vertex_data_of(PREDICTED, v);
+    let start = vertex_data_of(PREVIOUS, v).xyz;
     let both = (x - predicted.xyz) + (start - predicted.xyz);
     return 0.5 * predicted.w * dot(x - start, both);
 }
@@ -243,7 +243,7 @@ fn add_tested(element: u32, tested: vec2f, into: ptr<function, Sums>) {
 fn add_vertex(v: u32, first: u32, mode: u32, into: ptr<function, Sums>) {
     let x = place(tested_at, v);
     (*into)[SUM_REACH] = max((*into)[SUM_REACH], dot(x, x));
-    if ground_of(ACTING, v).w == 0.0 {
+    if vertex_data_of(EXTERNAL_FORCES, v).w == 0.0 {
         (*into)[SUM_HELD] += 1.0;
         return;
     }
@@ -251,8 +251,8 @@ fn add_vertex(v: u32, first: u32, mode: u32, into: ptr<function, Sums>) {
     (*into)[SUM_TESTED] += tested;
     (*into)[SUM_MAGNITUDE] += abs(tested);
     if (mode & WITH_STARTS) != 0u {
-        (*into)[SUM_AHEAD] += inertia(v, ground_of(AHEAD, v).xyz);
-        (*into)[SUM_START] += inertia(v, ground_of(START, v).xyz);
+        (*into)[SUM_AHEAD] += inertia(v, vertex_data_of(AHEAD, v).xyz);
+        (*into)[SUM_START] += inertia(v, vertex_data_of(START, v).xyz);
     }
     if (mode & WITH_MOTION) != 0u {
         add_motion(v, first, into);
@@ -261,26 +261,26 @@ fn add_vertex(v: u32, first: u32, mode: u32, into: ptr<function, Sums>) {
 
 // Velocity at the end of the step [m/s].
 fn end_velocity(v: u32) -> vec3f {
-    return (place(tested_at, v) - ground_of(PREVIOUS, v).xyz) * frame.inverse_dt;
+    return (place(tested_at, v) - vertex_data_of(PREVIOUS, v).xyz) * frame.inverse_dt;
 }
 
 // The sums of the energy limit (energy.wgsl). A large common motion would drown the motion relative to it:
 // relative to the first vertex of the part both are kept apart.
 fn add_motion(v: u32, first: u32, into: ptr<function, Sums>) {
     // Tethers are taken out of the mass again: the energy that they store counts as work.
-    let hold = ground_of(TARGETS, v);
-    let mass = max(ground_of(PREDICTED, v).w - hold.w * frame.squared_dt, 0.0);
-    let load = frame.gravity * mass + ground_of(ACTING, v).xyz;
-    let before = ground_of(VELOCITIES, v).xyz;
+    let hold = vertex_data_of(TARGETS, v);
+    let mass = max(vertex_data_of(PREDICTED, v).w - hold.w * frame.squared_dt, 0.0);
+    let load = frame.gravity * mass + vertex_data_of(EXTERNAL_FORCES, v).xyz;
+    let before = vertex_data_of(VELOCITIES, v).xyz;
     let after = end_velocity(v);
-    let relative_before = before - ground_of(VELOCITIES, first).xyz;
+    let relative_before = before - vertex_data_of(VELOCITIES, first).xyz;
     let relative = after - end_velocity(first);
     (*into)[SUM_KINETIC_START] += 0.5 * mass * dot(before, before);
     (*into)[SUM_KINETIC] += 0.5 * mass * dot(after, after);
     (*into)[SUM_RELATIVE_START] += 0.5 * mass * dot(relative_before, relative_before);
     (*into)[SUM_RELATIVE] += 0.5 * mass * dot(relative, relative);
     let x = place(tested_at, v);
-    let start = ground_of(PREVIOUS, v).xyz;
+    let start = vertex_data_of(PREVIOUS, v).xyz;
     let springs = 0.5 * hold.w * dot(x - start, (x - hold.xyz) + (start - hold.xyz));
     (*into)[SUM_WORK] += dot(load, x - start) - springs;
     (*into)[SUM_HELD] += select(0.0, 1.0, hold.w > 0.0);

@@ -28,7 +28,7 @@ fn apply_updates(
     let update = updates[thread];
     let v = update.vertex;
     let inverse_mass = select(1.0 / update.inertia, 0.0, update.is_pinned != 0u);
-    acting[v] = vec4f(update.force[0], update.force[1], update.force[2], inverse_mass);
+    external_forces[v] = vec4f(update.force[0], update.force[1], update.force[2], inverse_mass);
     targets[v] = vec4f(update.place[0], update.place[1], update.place[2], update.stiffness);
     predicted[v].w = update.inertia;
 }
@@ -49,7 +49,7 @@ fn predict(
     }
     let x = points[v].xyz;
     let mass = predicted[v].w;
-    let on_vertex = acting[v];
+    let on_vertex = external_forces[v];
     let inertial = x + velocities[v].xyz * frame.dt;
     let hold = targets[v];
     let pull = (hold.xyz - (inertial + frame.gravity * frame.squared_dt)) * hold.w;

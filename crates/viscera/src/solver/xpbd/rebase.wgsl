@@ -8,7 +8,7 @@ fn rebase(
     @builtin(num_workgroups) groups: vec3u,
 ) {
     let v = thread_of(id, groups, 64u);
-    if v >= job.count || acting[v].w == 0.0 {
+    if v >= job.count || external_forces[v].w == 0.0 {
         return;
     }
     let load = gather(v);
@@ -28,11 +28,11 @@ fn recompute_positions(
     @builtin(num_workgroups) groups: vec3u,
 ) {
     let v = thread_of(id, groups, 64u);
-    if v >= job.count || acting[v].w == 0.0 {
+    if v >= job.count || external_forces[v].w == 0.0 {
         return;
     }
     let impulse = gather(v).xyz;
-    points[v] = vec4f(predicted[v].xyz + impulse * acting[v].w, points[v].w);
+    points[v] = vec4f(predicted[v].xyz + impulse * external_forces[v].w, points[v].w);
 }
 
 @compute @workgroup_size(64)

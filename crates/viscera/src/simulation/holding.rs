@@ -18,9 +18,9 @@ pub(super) fn tolerance(scene: &Scene) -> f64 {
 /// Where vertices were when patches were taken hold of, motion by motion [m]; nothing for those that have
 /// not been, or that were at rest.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Taken(Vec<Option<Vec<Vec3<f64>>>>);
+pub(super) struct GraspOrigins(Vec<Option<Vec<Vec3<f64>>>>);
 
-impl Taken {
+impl GraspOrigins {
     /// Places of the patches of all motions.
     pub fn of(all: Vec<Option<Vec<Vec3<f64>>>>) -> Self {
         Self(all)
@@ -81,7 +81,7 @@ impl Taken {
     }
 
     /// What a vertex is pinned by at a time [s]: where patches overlap, by the last of them only, in the order
-    /// in which [`Taken::act`] writes its pins.
+    /// in which [`GraspOrigins::act`] writes its pins.
     pub fn pinned_by(
         &self,
         scene: &Scene,

@@ -64,7 +64,7 @@ pub(super) fn constants() -> String {
         ("LINE_SUMS", layout::LINE_SUMS as u32),
         ("LARGEST_WINDOW", LARGEST_WINDOW as u32),
     ];
-    let ranges = (0..).zip(layout::GROUND).map(|(place, (name, _))| (name, place));
+    let ranges = (0..).zip(layout::VERTEX_DATA).map(|(place, (name, _))| (name, place));
     let numbers = layout::words().into_iter().chain(MODES.iter().copied());
     let numbers = numbers.chain(ranges).chain(guarded).chain(shared);
     let mut text: String =
