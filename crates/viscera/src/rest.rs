@@ -358,7 +358,7 @@ fn add_stiffness<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
     for (i, vertices) in set.vertices.iter().enumerate() {
         let curvature = set.element::<f64>(i, &model.rest_anchors).curvature();
         for &v in vertices {
-            stiffness[v as usize] += if M == 3 { curvature } else { curvature / 3.0 };
+            stiffness[v as usize] += if K::IS_ANCHORED { curvature } else { curvature / 3.0 };
         }
     }
 }

@@ -11,7 +11,7 @@ pub struct State<S> {
     /// Velocities [m/s], shape [vertex_count].
     pub velocities: Vec<Vec3<S>>,
     /// Multipliers [J s^2] of all constraints, in the solver's layout, shape [multiplier_count]; empty before the
-    /// first step, as if all were zero.
+    /// first step, as if all were zero. Another solver of the same model may have another layout: clear them for it.
     /// A solver that keeps them from step to step starts from the last step's forces. After
     /// changing positions by hand, reset the warm start: [`crate::solver::Solver::restart`].
     pub multipliers: Vec<S>,

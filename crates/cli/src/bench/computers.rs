@@ -114,7 +114,8 @@ impl<'a> CpuStepper<'a> {
         };
         let solver = Solver::new(&bench.model, &settings);
         let dt = step_size(bench, sweeps, solver.stable_step());
-        Self { bench, solver, state: State::at_rest(&bench.model), dt }
+        let state = solver.state_at_rest();
+        Self { bench, solver, state, dt }
     }
 }
 
@@ -126,7 +127,7 @@ pub fn step_size(bench: &Bench<'_>, sweeps: u32, stable_step: f64) -> f64 {
 
 impl Stepper for CpuStepper<'_> {
     fn run(&mut self, count: u32) -> Result<Elapsed> {
-        self.state.clone_from(&State::at_rest(&self.bench.model));
+        self.state.clone_from(&self.solver.state_at_rest());
         let start = Instant::now();
         for _ in 0..count {
             let (model, inputs) = (&self.bench.model, &self.bench.inputs);

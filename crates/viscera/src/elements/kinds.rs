@@ -1,6 +1,6 @@
-//! The traits of every kind of element; the list of kinds stands in [`super::list`]. Tetrahedra, of which a mesh has
-//! many, answer in lanes by their law ([`super::law`]) and their constraint formulation; all others, few and alike,
-//! answer here, one by one. Each kind has a file of its own, beside its twin for graphics processors.
+//! The traits of every kind of element; the list of kinds stands in `list.rs` beside this file. Tetrahedra, of which a
+//! mesh has many, answer in lanes by their law ([`super::law`]) and their constraint formulation; all others, few and
+//! alike, answer here, one by one. Each kind has a file of its own, beside its twin for graphics processors.
 
 use super::CornerLoad;
 use crate::scalar::{Real, Scalar, Vec3};
@@ -36,14 +36,25 @@ pub enum Legal {
 pub struct Moment<T, const N: usize> {
     /// Its anchor at the end of the step [m], of kinds that have one.
     pub anchor: Vec3<T>,
-    /// Its vertices at the start of the step [m]; `None` at rest, where they are what they were.
+    /// Its vertices at the start of the step [m]; `None` in no step, where nothing has moved.
     pub start: Option<[Vec3<T>; N]>,
-    /// The step [s].
+    /// The step [s]; zero in no step.
     pub dt: T,
 }
 
+/// Implemented by the list of kinds for those that stand there, and by nobody else.
+pub trait Listed: sealed::Sealed {
+    /// The place in the list.
+    const NUMBER: usize;
+}
+
+pub(super) mod sealed {
+    /// Only this module's parent can name it.
+    pub trait Sealed {}
+}
+
 /// A kind of element: `N` vertices, `M` multipliers.
-pub trait Kind<const N: usize, const M: usize>: Send + Sync + 'static {
+pub trait Kind<const N: usize, const M: usize>: Listed + Send + Sync + 'static {
     /// One of them, in the caller's precision.
     type Element<T: Real>: XpbdBlock<T, N, M>;
 
@@ -79,7 +90,8 @@ pub trait Energy<S: Scalar, const N: usize> {
 }
 
 /// An element that XPBD can solve: `M` constraints with a multiplier each. A kind that is none has no multipliers
-/// and no functions here: its forces act between sweeps, in the rebase.
+/// and no functions here: its forces act between sweeps, in the rebase. Without the rebase (`rebase = false`) they do
+/// not act in XPBD.
 pub trait XpbdBlock<S: Scalar, const N: usize, const M: usize>: Energy<S, N> {
     /// `a~ = 1/(k dt^2)` of each constraint; `squared = dt^2` [s^2].
     fn compliance(&self, squared: S) -> S {

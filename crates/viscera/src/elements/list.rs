@@ -1,7 +1,7 @@
 //! The only list of the kinds of elements that are no tetrahedra. A new kind is a file beside this one, its twin for
 //! graphics processors, and a line here.
 
-use super::kinds::Kind;
+use super::kinds::{CONSTANTS, Kind, Listed, MOST, sealed};
 
 /// Evaluates `$with! { ($arguments) ... }` with the list of kinds: the field of the model that holds them, the
 /// type, how many vertices and multipliers each has.
@@ -31,14 +31,26 @@ macro_rules! constants {
         #[cfg(feature = "gpu")]
         pub const KIND_WGSL: &[[&str; 2]] =
             &[$([stringify!($field), <$crate::elements::$file::$kind as Kind<$n, $m>>::WGSL]),*];
+
+        #[allow(non_camel_case_types)]
+        enum Place { $($field),* }
+
+        $(
+            impl sealed::Sealed for $crate::elements::$file::$kind {}
+
+            impl Listed for $crate::elements::$file::$kind {
+                const NUMBER: usize = Place::$field as usize;
+            }
+
+            // What a record on a device has room for.
+            const _: () = assert!($n <= MOST && $m <= MOST);
+            const _: () = assert!(
+                <$crate::elements::$file::$kind as Kind<$n, $m>>::CONSTANTS.len() <= CONSTANTS
+            );
+        )*
     };
 }
 all_kinds! { [constants] () }
 
 /// How many kinds there are.
 pub const KINDS: usize = KIND_NAMES.len();
-
-/// The place of a kind in the list.
-pub fn number_of<K: Kind<N, M>, const N: usize, const M: usize>() -> usize {
-    KIND_NAMES.iter().position(|name| *name == K::NAME).unwrap_or(KINDS)
-}

@@ -58,6 +58,9 @@ pub enum TetForm {
 }
 
 impl TetForm {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::GreenStrain, Self::NeoHookeanPair, Self::NeoHookeanStretch];
+
     /// Multipliers of one tetrahedron.
     pub fn multiplier_count(self) -> usize {
         match self {

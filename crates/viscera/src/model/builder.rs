@@ -8,7 +8,7 @@ use super::{Body, MaterialConstants, Model, ModelError};
 use crate::coloring::ConstraintGraph;
 use crate::elements::attachment::Attachments;
 use crate::elements::kinds::{CONSTANTS, Constant, Kind, Legal};
-use crate::elements::list::{KINDS, number_of};
+use crate::elements::list::KINDS;
 use crate::elements::spring::Springs;
 use crate::material::{Compliance, Material};
 use crate::mesh::{MAX_COORDINATE, TetMesh};
@@ -103,9 +103,6 @@ impl ModelBuilder {
         for vertex in ends {
             self.check_vertex("a spring", vertex)?;
         }
-        if ends[0] == ends[1] {
-            return Err(ModelError::SpringEnds { vertex: ends[0] });
-        }
         let [a, b] = ends.map(|v| self.positions[v as usize]);
         let rest_length = rest_length.unwrap_or((b - a).length());
         self.add_element::<Springs, 2, 1>(ends, &[rest_length, stiffness], None)
@@ -124,16 +121,28 @@ impl ModelBuilder {
     }
 
     /// Adds an element of any kind with its constants, in the order of [`Kind::CONSTANTS`], and its anchor [m]
-    /// where the kind has one; returns its number among those of its kind.
+    /// where the kind has one; returns its number among those of its kind. The number of an anchor, under which the
+    /// inputs of a step move it, is how many anchors were added before: attachments have them as well.
     pub fn add_element<K: Kind<N, M>, const N: usize, const M: usize>(
         &mut self,
         vertices: [u32; N],
         constants: &[f64],
         anchor: Option<Vec3<f64>>,
     ) -> Result<usize, ModelError> {
-        let number = number_of::<K, N, M>();
-        for vertex in vertices {
+        for (i, &vertex) in vertices.iter().enumerate() {
             self.check_vertex(K::NAME, vertex)?;
+            if vertices[..i].contains(&vertex) {
+                return Err(ModelError::SameVertex { what: K::NAME, vertex });
+            }
+        }
+        let given = [constants.len(), usize::from(anchor.is_some())];
+        let expected = [K::CONSTANTS.len(), usize::from(K::IS_ANCHORED)];
+        for (of, (given, expected)) in
+            ["constants", "anchors"].into_iter().zip(given.into_iter().zip(expected))
+        {
+            if given != expected {
+                return Err(ModelError::Count { what: K::NAME, of, given, expected });
+            }
         }
         for value in anchor.map(Vec3::to_array).into_iter().flatten() {
             if value.is_nan() || value.abs() > MAX_COORDINATE {
@@ -143,16 +152,15 @@ impl ModelBuilder {
         }
         let mut given = [0.0; CONSTANTS];
         for (i, constant) in K::CONSTANTS.iter().enumerate() {
-            let value = constants.get(i).copied().unwrap_or(f64::NAN);
-            check_constant(constant, value)?;
-            given[i] = value;
+            check_constant(constant, constants[i])?;
+            given[i] = constants[i];
         }
         let anchor = K::IS_ANCHORED.then(|| {
             self.anchors.push(anchor.unwrap_or(Vec3::ZERO));
             self.anchors.len() as u32 - 1
         });
         let element = Given { vertices: vertices.to_vec(), constants: given, anchor };
-        let of_kind = &mut self.elements[number];
+        let of_kind = &mut self.elements[K::NUMBER];
         of_kind.push(element);
         Ok(of_kind.len() - 1)
     }

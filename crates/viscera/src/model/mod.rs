@@ -19,7 +19,7 @@ pub(crate) use numbering::Numbering;
 
 pub use crate::material::MaterialConstants;
 
-use crate::material::MaterialModel;
+use crate::material::{Compliance, MaterialModel};
 use crate::mesh::{edge_matrix, tet_volume};
 use crate::scalar::{Mat3, Real, Vec3};
 
@@ -48,11 +48,25 @@ pub enum ModelError {
         /// How many vertices there are.
         vertex_count: usize,
     },
-    /// A spring that connects nothing.
-    #[error("a spring leads from vertex {vertex} to itself; give it two different ends")]
-    SpringEnds {
+    /// An element that has a vertex twice.
+    #[error("{what} has vertex {vertex} twice; give it different ones")]
+    SameVertex {
+        /// The kind of element.
+        what: &'static str,
         /// The vertex given twice.
         vertex: u32,
+    },
+    /// Not what the kind of element needs.
+    #[error("{what} has {expected} {of}, not {given}")]
+    Count {
+        /// The kind of element.
+        what: &'static str,
+        /// "constants" or "anchors".
+        of: &'static str,
+        /// How many were given.
+        given: usize,
+        /// How many it needs.
+        expected: usize,
     },
     /// A stiffness or length that no spring has.
     #[error("{what} must be {range} and finite, not {value}")]
@@ -183,13 +197,20 @@ impl<S: Real> Model<S> {
         let add_all = |add: &mut dyn FnMut(u64), values: &[S]| {
             values.iter().for_each(|value| add(value.to_f64().to_bits()));
         };
+        for body in &self.bodies {
+            let Body { vertices, tets } = body;
+            [vertices.start, vertices.end, tets.start, tets.end]
+                .iter()
+                .for_each(|&n| add(n as u64));
+        }
         for x in self.rest_positions.iter().chain(&self.rest_anchors) {
             add_all(&mut add, &x.to_array());
         }
         add_all(&mut add, &self.masses);
         for material in &self.materials {
-            let MaterialConstants { lame_lambda, lame_mu, viscosity, .. } = *material;
-            add_all(&mut add, &[lame_lambda, lame_mu, viscosity]);
+            let MaterialConstants { lame_lambda, lame_mu, compliance, viscosity } = *material;
+            let Compliance { normal, cross, shear } = compliance;
+            add_all(&mut add, &[lame_lambda, lame_mu, normal, cross, shear, viscosity]);
         }
         for (vertices, &material) in self.tet_vertices.iter().zip(&self.tet_materials) {
             add(material.into());

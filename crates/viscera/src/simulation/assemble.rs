@@ -94,7 +94,7 @@ pub struct AssembledBody {
 pub struct ResolvedPatch {
     /// The vertices, ascending.
     pub vertices: Vec<u32>,
-    /// Numbers of the attachments, for an elastic fixing.
+    /// Numbers of the attachments' anchors, for an elastic fixing.
     pub attachments: Vec<usize>,
 }
 

@@ -42,7 +42,14 @@ impl<S: Real> Backend<S> {
     ) -> Result<Self, SimulationError> {
         #[cfg(feature = "gpu")]
         if same_device && let Some(again) = gpu::again(self, model, settings) {
-            return again;
+            return match again {
+                Err(lost) if self.gives_way => {
+                    let warning = format!("{lost}; the CPU went on from there");
+                    let cpu = Self::cpu(Solver::new(model, settings), &warning);
+                    Ok(Self { warning: Some(warning), ..cpu })
+                }
+                again => again,
+            };
         }
         let warning = self.warning.clone().filter(|_| same_device);
         let mut backend = match warning {

@@ -149,11 +149,11 @@ impl<S: Real> Simulation<S> {
         let order = |solver: &SolverSettings| (solver.colors, solver.neo_hookean, solver.rebase);
         let same_order = order(&self.scene.solver) == order(&fork.scene.solver);
         if same_order && self.layout().multiplier_count == fork.layout().multiplier_count {
-            let kept = self.whole_state().multipliers;
-            let kept = kept.into_iter().map(|l| T::from_f64(l.to_f64())).collect();
+            let whole = self.whole_state();
+            let kept = whole.multipliers.into_iter().map(|l| T::from_f64(l.to_f64())).collect();
             let positions = std::mem::take(&mut fork.state.positions);
             let velocities = std::mem::take(&mut fork.state.velocities);
-            let multiplier_dt = self.state.multiplier_dt;
+            let multiplier_dt = whole.multiplier_dt;
             fork.put(State { positions, velocities, multipliers: kept, multiplier_dt });
         }
         Ok(fork)

@@ -199,8 +199,10 @@ fn fingerprint<S: Real>(layout: &Layout<S>) -> u64 {
     for set in &layout.tet_sets {
         add(set.form.multiplier_count() as u64);
         add(u64::from(set.viscous));
-        set.order.iter().for_each(|&tet| add(tet.into()));
+        set.order.iter().chain(&set.color_offsets).for_each(|&tet| add(tet.into()));
     }
-    for_each_kind!(layout, set => set.order.iter().for_each(|&i| add(i.into())));
+    for_each_kind!(layout, set => {
+        set.order.iter().chain(&set.color_offsets).for_each(|&i| add(i.into()));
+    });
     hash
 }

@@ -32,7 +32,7 @@ pub enum StepError {
         vertex_count: usize,
     },
     /// The list of anchors is neither empty nor complete.
-    #[error("{given} anchors for {expected} attachments; give all of them or none")]
+    #[error("{given} anchors were given, and the model has {expected}; give all of them or none")]
     AnchorCount {
         /// How many were given.
         given: usize,

@@ -36,8 +36,7 @@ pub struct Inputs<S> {
     pub pins: Vec<Pin<S>>,
     /// Soft position constraints to moving targets. The set may change from step to step; several on one vertex add up.
     pub tethers: Vec<Tether<S>>,
-    /// Where each attachment's anchor is at the end of the step [m], the user's order. Empty:
-    /// all anchors at rest.
+    /// Where each anchor is at the end of the step [m], in the order in which they were added. Empty: all at rest.
     pub anchors: Vec<Vec3<S>>,
     /// External forces [N] on single vertices; several on one vertex add up.
     pub forces: Vec<(u32, Vec3<S>)>,

@@ -362,6 +362,6 @@ fn a_spring_needs_two_ends() {
     let mesh = block([0.1, 0.05, 0.05], [1, 1, 1], 0.0);
     builder.add_body(&mesh, &material(SNH, 1e4, 0.4)).expect("a body");
     let error = builder.add_spring([3, 3], 10.0, Some(0.01)).expect_err("no spring");
-    assert_eq!(error, ModelError::SpringEnds { vertex: 3 });
+    assert_eq!(error, ModelError::SameVertex { what: "a spring", vertex: 3 });
     assert!(error.to_string().contains("vertex 3"), "{error}");
 }

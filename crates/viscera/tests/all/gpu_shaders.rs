@@ -10,8 +10,7 @@ use viscera::solver::gpu::kernels::{self, Kernel, Swept, Variant, source};
 use viscera::solver::gpu::{Slot, baseline, host_layouts};
 
 fn variants() -> impl Iterator<Item = Variant> {
-    let forms = [TetForm::GreenStrain, TetForm::NeoHookeanPair, TetForm::NeoHookeanStretch];
-    forms.into_iter().flat_map(|form| Swept::ALL.map(|swept| Variant { form, swept }))
+    TetForm::ALL.into_iter().flat_map(|form| Swept::ALL.map(|swept| Variant { form, swept }))
 }
 
 /// A kernel's text, parsed and validated with nothing beyond WebGPU's core.

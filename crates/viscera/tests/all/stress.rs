@@ -3,6 +3,9 @@
 
 use crate::common::potential::Outside;
 use crate::common::{Random, Run, SNH, STVK, block, exact, material, single_body};
+use viscera::elements::attachment::Attachments;
+use viscera::elements::spring::Springs;
+use viscera::layout::Layout;
 use viscera::measure::measure_tets;
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder, ModelError};
@@ -261,15 +264,18 @@ fn a_solver_made_for_another_model_is_refused() {
     }
 }
 
-/// Callers can change what they see of a model: a solver for it refuses every step then, and touches nothing.
+/// Callers can change what they see of a model: a solver that is made for it then refuses every step, and touches nothing.
 #[test]
 fn a_model_changed_behind_its_back_is_refused() {
     let (model, ..) = workbench();
     let settings = SolverSettings::default();
-    let changes: [fn(&mut Model<f32>); 4] = [
+    let changes: [fn(&mut Model<f32>); 7] = [
         |model| model.rest_positions.truncate(3),
         |model| model.masses.truncate(3),
         |model| model.materials.clear(),
+        |model| model.materials[0].compliance.shear *= 2.0,
+        |model| model.rest_anchors[0] = vec3(1.0, 0.0, 0.0),
+        |model| model.elements.attachments.constants[0][0] = 2.0,
         |model| model.masses[5] = 0.0,
     ];
     for (i, change) in changes.into_iter().enumerate() {
@@ -307,7 +313,18 @@ fn elements_that_cannot_be_are_refused() {
     assert!(builder.add_spring([0, 8], 1.0, None).is_err());
     assert!(builder.add_attachment(8, Vec3::ZERO, 1.0).is_err());
     let model = builder.build::<f64>().expect("a legal model");
-    assert_eq!(model.tet_count(), 5 + usize::from(mesh.tets().len() == 6));
+    assert_eq!(model.tet_count(), mesh.tets().len());
+    let none = SolverSettings { colors: Colors::Limited(0), ..SolverSettings::default() };
+    assert_eq!(Layout::new(&model, &none).color_count, 1, "zero colours mean one");
+    let mut add = |ends, constants: &[f64], anchor| {
+        builder.add_element::<Springs, 2, 1>(ends, constants, anchor).is_err()
+    };
+    assert!(add([2, 2], &[0.1, 1.0], None), "one vertex twice");
+    assert!(add([1, 2], &[0.1], None), "a constant too few");
+    assert!(add([1, 2], &[0.1, 1.0, 1.0], None), "one too many");
+    assert!(add([1, 2], &[0.1, 1.0], Some(Vec3::ZERO)), "an anchor too many");
+    assert!(!add([1, 2], &[0.1, 1.0], None));
+    assert!(builder.add_element::<Attachments, 1, 3>([1], &[1.0], None).is_err(), "no anchor");
 }
 
 /// A mesh of nothing is a legal default; nothing comes of it.

@@ -1,8 +1,8 @@
 // Everything that kernels share: records, storage, constants of a step.
 //
-// Storage has one number for each buffer in all kernels (`Slot` in buffers.rs); a kernel's layout holds
+// Storage has one number for each buffer in all kernels (`Slot` in slots.rs); a kernel's layout holds
 // those that it names, eight at most. Vertices are in the solver's numbering, tetrahedra in blocks of
-// eight of one colour, component by component, as on the CPU (model/tets.rs): eight neighbouring
+// eight of one colour, component by component, as on the CPU (layout/tets.rs): eight neighbouring
 // threads load one piece of 32 bytes.
 
 // The constants of eight tetrahedra.
@@ -88,8 +88,8 @@ struct Frame {
 @group(0) @binding(10) var<storage, read_write> predicted: array<vec4f>;
 // External force [N] without gravity; w: inverse mass [1/kg], zero where pinned.
 @group(0) @binding(11) var<storage, read_write> external_forces: array<vec4f>;
-// Where pinned vertices are at the end of the step [m], and in the explicit method where the attachments
-// of others pull to, with their stiffness in w [N/m].
+// Where pinned vertices are at the end of the step [m], and where tethers of others pull to, with their stiffness in
+// w [N/m].
 @group(0) @binding(12) var<storage, read_write> targets: array<vec4f>;
 @group(0) @binding(13) var<storage, read> updates: array<Update>;
 // Green strain at the start of the step, per block and component, where tissue is viscous.

@@ -216,9 +216,8 @@ pub fn source(kernel: &Kernel, variant: Variant) -> String {
 
 /// Every text that there is, with a name: the entry point, and the variant where the text depends on it.
 pub fn texts() -> Vec<(String, String)> {
-    let forms = [TetForm::GreenStrain, TetForm::NeoHookeanPair, TetForm::NeoHookeanStretch];
     let variants =
-        forms.into_iter().flat_map(|form| Swept::ALL.map(|swept| Variant { form, swept }));
+        TetForm::ALL.into_iter().flat_map(|form| Swept::ALL.map(|swept| Variant { form, swept }));
     let mut texts: Vec<(String, String)> = Vec::new();
     for kernel in ALL {
         for variant in variants.clone() {

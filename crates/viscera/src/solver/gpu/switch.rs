@@ -33,6 +33,10 @@ impl GpuSolver {
         dt: f64,
     ) -> Result<usize, StepError> {
         self.write(model, state)?;
+        let sizes = |layout: &Layout<f32>| [layout.multiplier_count, layout.copy_count()];
+        if sizes(solver.layout()) != sizes(&self.layout) {
+            return Err(StepError::OtherModel);
+        }
         let repeats = self.begin_step(model, inputs, dt)?;
         let count = first_stages(&self.plan, stage);
         solver.step_first(count, model, state, inputs, dt)?;

@@ -36,6 +36,8 @@ use crate::state::State;
 pub fn restart<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>, state: &mut State<S>) {
     data.read_positions(step.model, &state.positions);
     let constants = &mut data.constants;
+    // Tissue has long been there: nothing has moved in the step before.
+    constants.previous.copy_from_slice(&data.points);
     let (workers, strains) = (&constants.workers, &mut constants.start_strain);
     measure_strain(workers, step.model, None, &data.points, strains);
     for part in step.model.parts.iter() {

@@ -22,7 +22,12 @@ fn repair_element(row: u32) {
         position(vertices[2]),
         position(vertices[3]),
     );
-    let moment = moment_of(row, before_steps(vertices), frame.dt);
+    // In a new history the element has long been where it is.
+    var start = x;
+    if job.mode == 0u {
+        start = before_steps(vertices);
+    }
+    let moment = moment_of(row, start, frame.dt);
     let l = element_constitutive(kind, moment, x, frame.squared_dt);
     for (var p = 0u; p < element_multipliers(kind); p++) {
         store_multiplier(table[row + ELEMENT_MULTIPLIER] + p, l[p]);
