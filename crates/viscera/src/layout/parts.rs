@@ -1,4 +1,4 @@
-//! Connected parts of a model: what tetrahedra and springs connect.
+//! Connected parts of a model: what elements connect.
 //!
 //! Nothing that happens in one part may change another's bits: each has the layout that it would have in a
 //! model of its own. So a part has a range of the solver's vertices, numbered by its own extent; within a

@@ -45,7 +45,8 @@ pub use step::tissue::{TISSUE_WGSL, Tissue};
 pub use xpbd::acceleration;
 
 /// A solver for one model. All memory is taken when it is built; a step allocates nothing, but for
-/// every 63rd step of several threads, which exchanges a block of the queue that leads to them.
+/// every 63rd step of several threads, which exchanges a block of the queue that leads to them, and the first of a
+/// state from [`State::at_rest`], which makes room for its multipliers.
 #[derive(Clone, Debug)]
 pub struct Solver<S> {
     settings: SolverSettings,

@@ -62,7 +62,7 @@ struct Piece {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum PieceOf {
     Vertices,
-    /// Of one of the two sets.
+    /// Blocks of tetrahedra of one law, by its number.
     Blocks(usize),
 }
 

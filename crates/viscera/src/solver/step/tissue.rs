@@ -1,4 +1,4 @@
-//! The response of a tetrahedron's tissue to a deformation: both laws, and viscosity.
+//! The response of a tetrahedron's tissue to a deformation: its law, and viscosity.
 
 use crate::elements::green_strain::{self, Voigt};
 use crate::elements::law::{Law, stretch_curvature, with_law};
@@ -6,7 +6,7 @@ use crate::material::MaterialConstants;
 use crate::material::MaterialModel;
 use crate::scalar::{Mat3, Scalar, Vec3};
 
-/// Twin of the functions of [`Tissue`]; needs those of the Green strain and of neo-Hookean tissue.
+/// Twin of the functions of [`Tissue`]; needs those of the Green strain and of all laws.
 #[cfg(feature = "gpu")]
 pub const TISSUE_WGSL: &str =
     concat!(include_str!("tissue_viscous.wgsl"), include_str!("tissue.wgsl"));

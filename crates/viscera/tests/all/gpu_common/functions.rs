@@ -320,6 +320,7 @@ fn springs<T: Scalar>(numbers_in: &[T]) -> Results<T> {
         ("spring direction", numbers(&[n])),
         ("spring length", vec![length]),
         ("spring energy", vec![spring::energy(&x, rest_length, stiffness)]),
+        ("element curvature", vec![stiffness, stiffness]),
         ("spring forces", numbers(&spring::forces(&x, rest_length, stiffness))),
         ("spring solve: multiplier", vec![change]),
         ("spring solve: positions", numbers(&positions)),
@@ -328,6 +329,7 @@ fn springs<T: Scalar>(numbers_in: &[T]) -> Results<T> {
         ("spring corner_loads: bounds", bounds(&loads)),
         ("attachment energy", vec![attachment::energy(x0, anchor, stiffness)]),
         ("attachment force", numbers(&[attachment::force(x0, anchor, stiffness)])),
+        ("attachment loads", numbers(&[held])),
         ("attachment solve: multipliers", numbers(&[holds])),
         ("attachment solve: position", numbers(&[moves])),
         ("attachment constitutive_multipliers", numbers(&[held_at_rest])),
@@ -344,12 +346,19 @@ const SPRINGS: &str = "
     let compliance = take();
     let along = spring_direction(x);
     let solved = spring_solve(x, w, rest_length, multiplier, compliance);
-    let forces = spring_forces(x, rest_length, stiffness);
-    let loads = spring_corner_loads(x, multiplier);
+    // As the solver asks: through what chooses the kind by its place in the list.
+    let four = array<vec3f, 4>(x[0], x[1], vec3f(), vec3f());
+    let spring = ElementMoment(vec4f(rest_length, stiffness, 0.0, 0.0), vec3f(), four, 1.0);
+    let attachment = ElementMoment(vec4f(stiffness, 0.0, 0.0, 0.0), x[1], four, 1.0);
+    let forces = element_forces(0u, spring, four);
+    let loads = element_loads(0u, spring, four, vec4f(multiplier, 0.0, 0.0, 0.0), 1.0);
+    let holding = element_loads(1u, attachment, four, vec4f(held, 0.0), 1.0);
     let attached = attachment_solve(x[0], w[0], x[1], held, compliance);
     put_vec3(along.n);
     put(along.length);
-    put(spring_energy(x, rest_length, stiffness));
+    put(element_energy(0u, spring, four));
+    put(element_curvature(0u, spring));
+    put(element_curvature(1u, attachment));
     put_vec3(forces[0]);
     put_vec3(forces[1]);
     put(solved.multiplier);
@@ -360,8 +369,9 @@ const SPRINGS: &str = "
     put_vec3(loads[1].impulse);
     put(loads[0].mass_bound);
     put(loads[1].mass_bound);
-    put(attachment_energy(x[0], x[1], stiffness));
-    put_vec3(attachment_force(x[0], x[1], stiffness));
+    put(element_energy(1u, attachment, four));
+    put_vec3(element_forces(1u, attachment, four)[0]);
+    put_vec3(holding[0].impulse);
     put_vec3(attached.multipliers);
     put_vec3(attached.position);
     put_vec3(attachment_constitutive_multipliers(x[0], x[1], compliance));
