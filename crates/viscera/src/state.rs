@@ -17,6 +17,48 @@ pub struct State<S> {
     pub multipliers: Vec<S>,
     /// The step [s] to which the multipliers belong: they are forces times its square.
     pub multiplier_dt: f64,
+    /// What the quasi-Newton method has learned; empty for others.
+    pub learned: Learned<S>,
+}
+
+/// What the quasi-Newton method keeps from step to step: pairs of a step and the change of the gradient along it, which
+/// tell the curvature. Vertices are in the solver's numbering.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Learned<S> {
+    /// Steps [m] and changes of the gradient [N s^2] in turn, each of all vertices.
+    pub pairs: Vec<Vec3<S>>,
+    /// Of each connected part.
+    pub parts: Vec<LearnedPart>,
+}
+
+/// What is kept of a connected part.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct LearnedPart {
+    /// How many pairs are in use.
+    pub count: u32,
+    /// Which of them is the newest; older ones stand before it, the first after the last.
+    pub newest: u32,
+    /// Scale of the preconditioner, by the newest pair.
+    pub scale: f64,
+    /// Whether no trial of the last solve was rejected.
+    pub calm: bool,
+    /// Whether any tetrahedron was inside out at the last trial.
+    pub inverted: bool,
+}
+
+impl<S: Real> Learned<S> {
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.pairs[..]) + size_of_val(&self.parts[..])
+    }
+
+    /// Forgets everything, and makes room for so many pairs.
+    pub(crate) fn clear(&mut self, history: usize, vertices: usize, parts: usize) {
+        self.pairs.clear();
+        self.pairs.resize(2 * history * vertices, Vec3::ZERO);
+        self.parts.clear();
+        self.parts.resize(parts, LearnedPart::default());
+    }
 }
 
 impl<S: Real> State<S> {
@@ -27,6 +69,7 @@ impl<S: Real> State<S> {
             velocities: vec![Vec3::ZERO; model.vertex_count()],
             multipliers: Vec::new(),
             multiplier_dt: 0.0,
+            learned: Learned::default(),
         }
     }
 
@@ -35,6 +78,7 @@ impl<S: Real> State<S> {
         size_of_val(&self.positions[..])
             + size_of_val(&self.velocities[..])
             + size_of_val(&self.multipliers[..])
+            + self.learned.bytes()
     }
 
     /// True while every number is finite.

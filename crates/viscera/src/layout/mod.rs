@@ -7,6 +7,7 @@
 pub(crate) mod elements;
 mod order;
 mod parts;
+mod pieces;
 mod tets;
 
 use std::ops::Range;
@@ -17,6 +18,8 @@ pub use elements::{ElementSet, ElementSets};
 use order::{Order, renumbered_copies};
 use parts::Laid;
 pub(crate) use parts::Part;
+pub(crate) use pieces::PIECE_BLOCKS;
+use pieces::in_pieces;
 pub(crate) use tets::TetBlock;
 pub use tets::{LaidTet, TetSet};
 
@@ -26,7 +29,7 @@ use crate::material::{MaterialConstants, MaterialModel};
 use crate::model::{Model, Numbering, for_each_kind};
 use crate::scalar::lanes::LANES;
 use crate::scalar::{Real, Vec3};
-use crate::settings::SolverSettings;
+use crate::settings::{Method, SolverSettings};
 
 /// A model, laid out.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,9 +76,16 @@ impl<S: Real> Layout<S> {
 
     fn of(model: &Model<S>, settings: &SolverSettings) -> Self {
         let graph = constraint_graph(model);
-        let coloring = graph.color(model.vertex_count(), settings.colors);
-        debug_assert_eq!(coloring.validate(&graph), None);
         let numbering = &model.numbering;
+        // Forces are added tetrahedron by tetrahedron where no constraint is solved: no colours, but pieces.
+        let coloring = match settings.method {
+            Method::QuasiNewton => in_pieces(model, &graph, numbering),
+            Method::Xpbd | Method::Explicit => {
+                let coloring = graph.color(model.vertex_count(), settings.colors);
+                debug_assert_eq!(coloring.validate(&graph), None);
+                coloring
+            }
+        };
         let part_of: Vec<u32> =
             numbering.order.iter().map(|&v| model.part_numbers[v as usize]).collect();
         let copy_offsets = renumbered_copies(&coloring, numbering);
@@ -111,7 +121,7 @@ impl<S: Real> Layout<S> {
             elements,
             color_count,
             largest_clique: coloring.largest_clique as usize,
-            multiplier_count,
+            multiplier_count: if settings.method == Method::QuasiNewton { 0 } else { multiplier_count },
             numbering: Arc::clone(numbering),
             parts: Arc::from(parts),
             copy_offsets,

@@ -9,7 +9,7 @@ use std::ops::Range;
 use super::order::Order;
 use crate::elements::TetForm;
 use crate::material::MaterialModel;
-use crate::model::Model;
+use crate::model::{Model, Numbering};
 use crate::scalar::lanes::{Eight, LANES};
 use crate::scalar::{Mat3, Real, Vec3, vec3};
 
@@ -118,7 +118,7 @@ impl<S: Real> TetSet<S> {
         for color in colors.windows(2) {
             for chosen in sorted.blocks(&set.order, color) {
                 set.filled.push(chosen.len() as u8);
-                let block = TetBlock::new(model, chosen);
+                let block = TetBlock::new(model, sorted.numbering, chosen);
                 set.uniform.push(block.material.iter().all(|&m| m == block.material[0]));
                 set.blocks.push(block);
                 if is_viscous {
@@ -196,7 +196,7 @@ impl<S: Real> TetSet<S> {
 
 impl<S: Real> TetBlock<S> {
     /// Of up to eight tetrahedra; the last fills the block up.
-    fn new(model: &Model<S>, tets: &[u32]) -> Self {
+    fn new(model: &Model<S>, numbering: &Numbering, tets: &[u32]) -> Self {
         let mut block = Self {
             vertices: [[0; LANES]; 4],
             inverse_rest_shape: [[S::ZERO; LANES]; 9],
@@ -209,7 +209,7 @@ impl<S: Real> TetBlock<S> {
             block.rest_volume[lane] = tet.rest_volume;
             block.material[lane] = tet.material;
             for (corner, v) in tet.vertices.into_iter().enumerate() {
-                block.vertices[corner][lane] = model.numbering.of(v) as u32;
+                block.vertices[corner][lane] = numbering.of(v) as u32;
             }
         }
         block

@@ -192,6 +192,13 @@ impl<S: Scalar> Vec3<S> {
         vec3(value, value, value)
     }
 
+    /// The components of vectors, one after the other.
+    #[allow(unsafe_code)]
+    pub(crate) fn components(vectors: &[Self]) -> &[S] {
+        // SAFETY: `repr(C)` of three numbers of one type has no gaps.
+        unsafe { std::slice::from_raw_parts(vectors.as_ptr().cast(), 3 * vectors.len()) }
+    }
+
     /// A vector from an array in double precision.
     #[inline(always)]
     pub fn from_f64(v: [f64; 3]) -> Self {

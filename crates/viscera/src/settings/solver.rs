@@ -56,6 +56,19 @@ choices! {
         Xpbd = "xpbd",
         /// Forces and velocities in many small steps: no sweeps, no guards, true motion.
         Explicit = "explicit",
+        /// Large steps, solved by a quasi-Newton method with a multilevel preconditioner: the exact step in a dozen
+        /// passes, whatever the mesh.
+        QuasiNewton = "quasi_newton",
+    }
+}
+
+choices! {
+    /// How "quasi_newton" integrates over time.
+    pub enum Integrator {
+        /// Singly diagonally implicit Runge-Kutta, two stages, second order: true motion.
+        Sdirk2 = "sdirk2",
+        /// Implicit Euler, first order: loses motion, for bodies that are to settle and for comparisons.
+        ImplicitEuler = "implicit_euler",
     }
 }
 
@@ -155,6 +168,11 @@ settings_table! {
         /// Sweeps per substep. More solve a substep better. Without `rebase` they approach an
         /// answer that depends on the path, so more are not always closer to the truth.
         iterations: u32 = 2, whole(1, 10_000);
+        /// How "quasi_newton" integrates over time.
+        integrator: Integrator = (Integrator::Sdirk2), one_of::<Integrator>();
+        /// How many past steps "quasi_newton" learns the curvature from; 0 chooses by Poisson's ratio: 3 up to 0.4,
+        /// above it 10.
+        history: u32 = 0, whole(0, 10);
         /// Colours of the constraint graph: "unlimited" for Gauss-Seidel, 1 for Jacobi, a few
         /// for clique separation. Fewer run more in parallel and need more sweeps.
         colors: Colors = (Colors::Unlimited), COLORS;

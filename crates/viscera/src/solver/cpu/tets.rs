@@ -180,6 +180,36 @@ impl<'a, S: Real> Block<'a, S> {
         }
     }
 
+    /// Adds to copies tetrahedron by tetrahedron, corner by corner: the lanes may share copies, and the order does not
+    /// depend on how many are worked on at a time.
+    ///
+    /// # Safety
+    /// No other thread has copies of the block meanwhile.
+    #[inline(always)]
+    pub unsafe fn add_in_order<L: Lanes<Real = S>>(
+        &self,
+        points: &Shared<'_, Point<S>>,
+        values: &[Vec3<L>; 4],
+    ) {
+        let copies = self.set.copies_of(self.index);
+        let mut columns = [[[S::ZERO; LANES]; 3]; 4];
+        for corner in 0..4 {
+            let Vec3 { x, y, z } = values[corner];
+            x.store(&mut columns[corner][0], self.lane);
+            y.store(&mut columns[corner][1], self.lane);
+            z.store(&mut columns[corner][2], self.lane);
+        }
+        assert!(points.len() >= self.set.bounds[1]);
+        for lane in self.lane..(self.lane + L::WIDTH).min(self.filled()) {
+            for corner in 0..4 {
+                let [x, y, z] = &columns[corner];
+                let value = Point { x: x[lane], y: y[lane], z: z[lane], w: S::ZERO };
+                // SAFETY: below the bound, which is checked above; alone there by the caller's promise.
+                unsafe { (*points.pointer().add(copies[corner][lane] as usize)).add(value) };
+            }
+        }
+    }
+
     /// Where the block's `N` multipliers per tetrahedron stand.
     #[inline(always)]
     fn multipliers_at(&self, offset: usize, count: usize) -> Range<usize> {

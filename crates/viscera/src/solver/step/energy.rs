@@ -57,8 +57,9 @@ impl Motion {
 }
 
 impl Energy {
-    /// Velocity [m/s] that is not scaled, and the factor for velocities relative to it.
-    fn limit(&self) -> (Vec3<f64>, f64) {
+    /// Kinetic energy [J] that is left to the end of the step, kinetic energy that it has, and the velocity [m/s]
+    /// that neither counts.
+    fn balance(&self) -> (f64, f64, Vec3<f64>) {
         let mut given = self.start.kinetic + self.start.stored - self.end.stored + self.work;
         let mut kinetic = self.end.kinetic;
         let mut drift = Vec3::ZERO;
@@ -72,6 +73,12 @@ impl Energy {
             given -= 0.5 * inverse * self.start.momentum.length_squared();
             given -= inverse * self.load.dot(self.shift);
         }
+        (given, kinetic, drift)
+    }
+
+    /// Velocity [m/s] that is not scaled, and the factor for velocities relative to it.
+    fn limit(&self) -> (Vec3<f64>, f64) {
+        let (given, kinetic, drift) = self.balance();
         // `given` is below zero where more energy is stored than there was. Positions are not moved, so the most that
         // can be taken is all motion. A comparison with NaN is false: nothing is scaled by it.
         let share = if kinetic > given { (given.max(0.0) / kinetic).sqrt() } else { 1.0 };
@@ -116,23 +123,19 @@ impl Energies {
         }
     }
 
-    /// Scales velocities down; `stored` is the stored energy [J] of each part now. `kept` is called with
-    /// each part that is slowed down, and the factor of its velocities.
-    pub fn limit<S: Real>(
-        &mut self,
-        step: &Step<'_, S>,
-        data: &mut StepData<S>,
-        stored: &[f64],
-        mut kept: impl FnMut(usize, f64),
-    ) {
+    /// Measures the end of a step; `stored` is the stored energy [J] of each part now.
+    pub fn end<S: Real>(&mut self, step: &Step<'_, S>, data: &StepData<S>, stored: &[f64]) {
         let (model, constants) = (step.model, &data.constants);
         for (number, (energy, part)) in self.0.iter_mut().zip(model.parts.iter()).enumerate() {
+            *energy = Energy { held: energy.held, start: energy.start, ..Energy::default() };
             energy.end.stored = stored[number];
             for tether in constants.tethers_of(part) {
                 energy.end.stored += tether.energy(data.points[tether.vertex].vec3());
             }
-            let free = |v: &usize| constants.inverse_masses[*v] != S::ZERO;
-            for v in part.vertices.clone().filter(free) {
+            for v in part.vertices.clone() {
+                if constants.inverse_masses[v] == S::ZERO {
+                    continue;
+                }
                 let mass = constants.masses[v].to_f64();
                 let load = step.inputs.gravity * constants.masses[v] + constants.external[v];
                 let load = load.cast::<f64>();
@@ -143,6 +146,30 @@ impl Energies {
                 energy.work += load.dot(moved);
                 energy.shift += moved * mass;
             }
+        }
+    }
+
+    /// Whether a part stores more at its end than all energy that it had and was given, or no number: then no
+    /// velocity is small enough.
+    pub fn stores_too_much(&self, part: usize) -> bool {
+        let energy = &self.0[part];
+        let (given, _, _) = energy.balance();
+        // False of what is no number as well. Round-off of energies that nearly cancel is none of the step's.
+        let stored = energy.start.stored.abs().max(energy.end.stored.abs());
+        !(given >= -1e-6 * (stored + energy.start.kinetic + energy.work.abs()))
+    }
+
+    /// Scales velocities down after [`Energies::end`]. `kept` is called with each part that is slowed down, and the
+    /// factor of its velocities.
+    pub fn limit<S: Real>(
+        &self,
+        step: &Step<'_, S>,
+        data: &mut StepData<S>,
+        mut kept: impl FnMut(usize, f64),
+    ) {
+        let (model, constants) = (step.model, &data.constants);
+        let free = |v: &usize| constants.inverse_masses[*v] != S::ZERO;
+        for (number, (energy, part)) in self.0.iter().zip(model.parts.iter()).enumerate() {
             let (drift, share) = energy.limit();
             if !(share < 1.0 && energy.mass > 0.0) {
                 continue;

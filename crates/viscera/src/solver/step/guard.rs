@@ -174,7 +174,8 @@ impl<S: Real> Guard<S> {
     /// end.
     pub fn limit_energy(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
         let Self { energies, evaluator, reports, .. } = self;
-        energies.limit(step, data, &evaluator.stored, |part, share| {
+        energies.end(step, data, &evaluator.stored);
+        energies.limit(step, data, |part, share| {
             reports[part].kept_speed = share;
         });
     }

@@ -1,0 +1,415 @@
+//! Gradient of the incremental potential at a trial, and its change on the way there, in one pass without colours.
+//!
+//! ```text
+//! Phi(y) - Phi(x) = sum_i m_i (y - x).(x - xt + (y - x)/2) + he^2 sum_t V_t (W(F + D) - W(F)),   F + D at y
+//! grad_i Phi(y) = m_i (y_i - xt_i) - he^2 f_i(y)
+//! ```
+//!
+//! Every tetrahedron gives the change of its energy, computed from the change of its deformation: round-off is that of
+//! the change, not that of the energy. So single precision tells apart steps that lower the potential by a
+//! ten-millionth of itself. Sums are in double precision and in a fixed order.
+
+#![allow(unsafe_code)]
+
+use std::cell::Cell;
+use std::ops::Range;
+
+use crate::elements::kinds::{Energy, Kind};
+use crate::elements::law::{LAWS, Law};
+use crate::elements::{deformation_gradient, internal_forces};
+use crate::layout::{ElementSet, Layout, Moments, PIECE_BLOCKS, Part};
+use crate::model::for_each_kind;
+use crate::scalar::lanes::{Eight, LANES, Lanes, Point};
+use crate::scalar::{Real, Vec3};
+use crate::solver::cpu::tets::{Block, TetPass, load_rows};
+use crate::solver::cpu::threads::Shared;
+use crate::solver::step::data::{Step, StepConstants, gather};
+use crate::solver::step::law::{OfLaw, with_tissue};
+use crate::solver::step::tissue::Tissue;
+
+/// Vertices whose sums are taken first. Part of the result's bits.
+const VERTEX_PIECE: usize = 1024;
+
+/// A part's change of the potential.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Change {
+    /// Of the incremental potential [J s^2].
+    pub potential: f64,
+    /// Sum of the magnitudes of all terms of it [J s^2]: what its round-off is a share of.
+    pub size: f64,
+    /// Tetrahedra turned inside out at the trial.
+    pub inverted: u64,
+}
+
+impl Change {
+    fn plus(self, other: Self) -> Self {
+        Self {
+            potential: self.potential + other.potential,
+            size: self.size + other.size,
+            inverted: self.inverted + other.inverted,
+        }
+    }
+
+    fn of(term: f64) -> Self {
+        Self { potential: term, size: term.abs(), inverted: 0 }
+    }
+}
+
+/// Evaluates parts.
+#[derive(Clone, Debug)]
+pub struct Evaluation {
+    /// Of each part, as of its last evaluation.
+    pub changes: Vec<Change>,
+    /// Blocks of all parts, part by part.
+    blocks: Vec<BlockPiece>,
+    /// Vertices of all parts, part by part.
+    vertices: Vec<VertexPiece>,
+    block_sums: Vec<Change>,
+    vertex_sums: Vec<Change>,
+}
+
+#[derive(Clone, Debug)]
+struct BlockPiece {
+    part: usize,
+    law: usize,
+    blocks: Range<usize>,
+}
+
+#[derive(Clone, Debug)]
+struct VertexPiece {
+    part: usize,
+    vertices: Range<usize>,
+}
+
+/// The places between which the potential changes, and what acts there.
+pub struct Way<'a, S> {
+    /// `x` [m].
+    pub from: &'a [Point<S>],
+    /// `y` [m].
+    pub to: &'a [Point<S>],
+    /// What elements depend on.
+    pub moments: Moments<'a, S>,
+}
+
+impl Evaluation {
+    /// For a layout in pieces.
+    pub fn new<S: Real>(layout: &Layout<S>) -> Self {
+        let (mut blocks, mut vertices) = (Vec::new(), Vec::new());
+        for (number, part) in layout.parts.iter().enumerate() {
+            for law in 0..LAWS {
+                for range in part.blocks(law).flat_map(|range| cut(range, PIECE_BLOCKS)) {
+                    blocks.push(BlockPiece { part: number, law, blocks: range });
+                }
+            }
+            for range in cut(part.vertices.clone(), VERTEX_PIECE) {
+                vertices.push(VertexPiece { part: number, vertices: range });
+            }
+        }
+        blocks.shrink_to_fit();
+        vertices.shrink_to_fit();
+        Self {
+            changes: vec![Change::default(); layout.part_count()],
+            block_sums: vec![Change::default(); blocks.len()],
+            vertex_sums: vec![Change::default(); vertices.len()],
+            blocks,
+            vertices,
+        }
+    }
+
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.changes[..])
+            + size_of_val(&self.blocks[..])
+            + size_of_val(&self.vertices[..])
+            + size_of_val(&self.block_sums[..])
+            + size_of_val(&self.vertex_sums[..])
+    }
+
+    /// Changes of the parts that `acts` names, and their gradient [N s^2] at the trial; zero where pinned. `loads` has
+    /// room for what elements do to each copy.
+    pub fn evaluate<S: Real>(
+        &mut self,
+        constants: &StepConstants<S>,
+        step: &Step<'_, S>,
+        way: &Way<'_, S>,
+        acts: impl Fn(usize) -> bool + Sync,
+        loads: &mut [Point<S>],
+        gradient: &mut [Vec3<S>],
+    ) {
+        let layout = step.model;
+        self.add_tets(constants, step, way, &acts, loads);
+        let squared = step.dt * step.dt;
+        for (number, part) in layout.parts.iter().enumerate().filter(|(number, _)| acts(*number)) {
+            let change = &mut self.changes[number];
+            *change = Change::default();
+            for_each_kind!(layout, set => add_elements(set, change, squared, way, part, loads));
+        }
+        let (pieces, loads) = (&self.vertices, &*loads);
+        let (sums, into) = (Shared::new(&mut self.vertex_sums), Shared::new(gradient));
+        constants.workers.each(pieces.len(), 1, |range| {
+            for i in range.filter(|&i| acts(pieces[i].part)) {
+                let range = pieces[i].vertices.clone();
+                // SAFETY: every piece is worked on once, and has vertices of its own.
+                let gradient = unsafe { into.range(range.clone()) };
+                let sum = vertices(constants, layout, way, loads, range, gradient);
+                // SAFETY: as above.
+                unsafe { *sums.at(i) = sum };
+            }
+        });
+        for (piece, sum) in self.blocks.iter().zip(&self.block_sums).filter(|(p, _)| acts(p.part)) {
+            self.changes[piece.part] = self.changes[piece.part].plus(*sum);
+        }
+        for (piece, sum) in self.vertices.iter().zip(&self.vertex_sums).filter(|(p, _)| acts(p.part)) {
+            self.changes[piece.part] = self.changes[piece.part].plus(*sum);
+        }
+    }
+
+    /// Forces of tetrahedra, per copy, and the change of their energy.
+    fn add_tets<S: Real>(
+        &mut self,
+        constants: &StepConstants<S>,
+        step: &Step<'_, S>,
+        way: &Way<'_, S>,
+        acts: &(impl Fn(usize) -> bool + Sync),
+        loads: &mut [Point<S>],
+    ) {
+        let layout = step.model;
+        for (_, part) in layout.parts.iter().enumerate().filter(|(number, _)| acts(*number)) {
+            loads[part.copies.clone()].fill(Point::default());
+        }
+        let pieces = &self.blocks;
+        let (sums, loads) = (Shared::new(&mut self.block_sums), Shared::new(loads));
+        constants.workers.each(pieces.len(), 1, |range| {
+            for i in range.filter(|&i| acts(pieces[i].part)) {
+                let BlockPiece { law, ref blocks, .. } = pieces[i];
+                let set = &layout.tet_sets[law];
+                let tets = Tets {
+                    from: way.from,
+                    to: way.to,
+                    start_strain: &constants.start_strain[law],
+                    dt: step.dt,
+                    loads: &loads,
+                    sum: Cell::default(),
+                };
+                with_tissue!(set, L, VISCOUS => {
+                    let pass = OfLaw::<_, L, VISCOUS>::new(&tets);
+                    constants.workers.piece(layout, set, blocks.clone(), &pass);
+                });
+                // SAFETY: every piece is worked on once.
+                unsafe { *sums.at(i) = tets.sum.get() };
+            }
+        });
+    }
+}
+
+impl Evaluation {
+    /// The curvature of a part's potential along a direction [J s^2]: exactly, and without what may be negative in it.
+    /// Of elements that are no tetrahedra only the latter counts.
+    pub fn curvature<S: Real>(
+        &mut self,
+        constants: &StepConstants<S>,
+        step: &Step<'_, S>,
+        moments: &Moments<'_, S>,
+        x: &[Point<S>],
+        direction: &[Point<S>],
+        number: usize,
+    ) -> [f64; 2] {
+        let layout = step.model;
+        let part = &layout.parts[number];
+        let (mut exact, mut bound) = (0.0, 0.0);
+        let mut add = |term: f64| {
+            exact += term;
+            bound += term;
+        };
+        for v in part.vertices.clone().filter(|&v| constants.inverse_masses[v] != S::ZERO) {
+            let squared = direction[v].vec3().length_squared();
+            add(constants.inertias[v].to_f64() * squared.to_f64());
+        }
+        for_each_kind!(layout, set => element_curvature(set, part, moments, x, direction, step.dt, &mut add));
+        let pieces = &self.blocks;
+        let sums = Shared::new(&mut self.block_sums);
+        constants.workers.each(pieces.len(), 1, |range| {
+            for i in range.filter(|&i| pieces[i].part == number) {
+                let BlockPiece { law, ref blocks, .. } = pieces[i];
+                let set = &layout.tet_sets[law];
+                let start_strain = &constants.start_strain[law];
+                let along =
+                    Along { x, direction, start_strain, dt: step.dt, sums: Cell::default() };
+                with_tissue!(set, L, VISCOUS => {
+                    let pass = OfLaw::<_, L, VISCOUS>::new(&along);
+                    constants.workers.piece(layout, set, blocks.clone(), &pass);
+                });
+                let [potential, size] = along.sums.get();
+                // SAFETY: every piece is worked on once.
+                unsafe { *sums.at(i) = Change { potential, size, inverted: 0 } };
+            }
+        });
+        for (_, sum) in self.blocks.iter().zip(&self.block_sums).filter(|(p, _)| p.part == number) {
+            exact += sum.potential;
+            bound += sum.size;
+        }
+        [exact, bound]
+    }
+}
+
+/// Of a part's elements of one kind.
+fn element_curvature<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
+    set: &ElementSet<S, K, N, M>,
+    part: &Part,
+    moments: &Moments<'_, S>,
+    x: &[Point<S>],
+    direction: &[Point<S>],
+    dt: f64,
+    add: &mut impl FnMut(f64),
+) {
+    for i in set.of_part(part) {
+        let places = set.places(i, x).map(|x| x.cast::<f64>());
+        let d = set.places(i, direction).map(|d| d.cast::<f64>());
+        let blocks = set.element::<f64>(i, moments).blocks(&places);
+        for (a, row) in d.iter().zip(&blocks) {
+            for (b, block) in d.iter().zip(row) {
+                add(dt * dt * a.dot(*block * *b));
+            }
+        }
+    }
+}
+
+struct Along<'a, S> {
+    x: &'a [Point<S>],
+    direction: &'a [Point<S>],
+    start_strain: &'a [[Eight<S>; 6]],
+    dt: f64,
+    sums: Cell<[f64; 2]>,
+}
+
+impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Along<'_, S>, W, VISCOUS> {
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let Along { x, direction, start_strain, dt, sums } = self.pass;
+        let shape = tets.shape::<L>();
+        let f = deformation_gradient(&tets.corners::<L>(x).x, &shape);
+        let d = deformation_gradient(&tets.corners::<L>(direction).x, &shape);
+        let tissue = Tissue::new(W::MODEL, &tets.material(), *dt);
+        let mut start = [L::ZERO; 6];
+        let is_viscous = VISCOUS && tets.is_viscous();
+        if is_viscous {
+            start = load_rows(start_strain[tets.index].as_flattened(), tets.lane);
+        }
+        let along = tissue.curvature_along_of::<W>(&f, &d, is_viscous.then_some(&start));
+        let volume = tets.volume::<L>() * L::from_f64(dt * dt);
+        let mut both = [[S::ZERO; LANES]; 2];
+        for (lanes, value) in both.iter_mut().zip(along) {
+            (volume * value).store(lanes, tets.lane);
+        }
+        let [mut exact, mut bound] = sums.get();
+        for lane in tets.lane..(tets.lane + L::WIDTH).min(tets.filled()) {
+            exact += both[0][lane].to_f64();
+            bound += both[1][lane].to_f64();
+        }
+        sums.set([exact, bound]);
+    }
+}
+
+/// A range in pieces.
+fn cut(range: Range<usize>, size: usize) -> impl Iterator<Item = Range<usize>> {
+    let end = range.end;
+    range.step_by(size).map(move |start| start..(start + size).min(end))
+}
+
+struct Tets<'a, S> {
+    from: &'a [Point<S>],
+    to: &'a [Point<S>],
+    start_strain: &'a [[Eight<S>; 6]],
+    dt: f64,
+    loads: &'a Shared<'a, Point<S>>,
+    sum: Cell<Change>,
+}
+
+impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Tets<'_, S>, W, VISCOUS> {
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let Tets { from, to, start_strain, dt, loads, sum } = self.pass;
+        let (x, before) = (tets.corners::<L>(to).x, tets.corners::<L>(from).x);
+        // Back along the way: the change from `y` to `x`, turned round.
+        let mut back = before;
+        for corner in 0..4 {
+            back[corner] = before[corner] - x[corner];
+        }
+        let shape = tets.shape::<L>();
+        let f = deformation_gradient(&x, &shape);
+        let d = deformation_gradient(&back, &shape);
+        let tissue = Tissue::new(W::MODEL, &tets.material(), *dt);
+        let mut start = [L::ZERO; 6];
+        let is_viscous = VISCOUS && tets.is_viscous();
+        if is_viscous {
+            start = load_rows(start_strain[tets.index].as_flattened(), tets.lane);
+        }
+        let start = is_viscous.then_some(&start);
+        let response = tissue.respond_by::<W>(&f, start);
+        let volume = tets.volume::<L>() * L::from_f64(dt * dt);
+        let forces = internal_forces(&response.piola, &shape, volume);
+        // SAFETY: the piece has copies of its own, and one thread does all of it.
+        unsafe { tets.add_in_order(loads, &forces) };
+        let mut changes = [S::ZERO; LANES];
+        (volume * tissue.energy_change_of::<W>(&f, &d, start)).store(&mut changes, tets.lane);
+        let mut turned = [S::ZERO; LANES];
+        f.determinant().store(&mut turned, tets.lane);
+        let mut all = sum.get();
+        for lane in tets.lane..(tets.lane + L::WIDTH).min(tets.filled()) {
+            let change = -changes[lane].to_f64();
+            all.potential += change;
+            all.size += change.abs();
+            all.inverted += u64::from(turned[lane] <= S::ZERO);
+        }
+        sum.set(all);
+    }
+}
+
+/// Adds what a part's elements of one kind do. Their energies are computed in double precision.
+fn add_elements<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
+    set: &ElementSet<S, K, N, M>,
+    change: &mut Change,
+    squared: f64,
+    way: &Way<'_, S>,
+    part: &Part,
+    loads: &mut [Point<S>],
+) {
+    for i in set.of_part(part) {
+        let (from, to) = (set.places(i, way.from), set.places(i, way.to));
+        let forces = set.element::<S>(i, &way.moments).forces(&to);
+        for (copy, force) in set.copies[i].into_iter().zip(forces) {
+            loads[copy as usize].add(Point::new(force * S::from_f64(squared), S::ZERO));
+        }
+        let from = from.map(|x| x.cast::<f64>());
+        let moved: [Vec3<f64>; N] = std::array::from_fn(|a| to[a].cast::<f64>() - from[a]);
+        let term = set.element::<f64>(i, &way.moments).energy_change(&from, &moved);
+        *change = change.plus(Change::of(squared * term));
+    }
+}
+
+/// The gradient by some vertices, and the change of inertia's part of the potential.
+fn vertices<S: Real>(
+    constants: &StepConstants<S>,
+    layout: &Layout<S>,
+    way: &Way<'_, S>,
+    loads: &[Point<S>],
+    range: Range<usize>,
+    gradient: &mut [Vec3<S>],
+) -> Change {
+    let mut sum = Change::default();
+    for (v, into) in range.zip(gradient) {
+        if constants.inverse_masses[v] == S::ZERO {
+            *into = Vec3::ZERO;
+            continue;
+        }
+        let (mass, target) = (constants.inertias[v], constants.predicted[v].vec3());
+        let away = way.to[v].vec3() - target;
+        *into = away * mass - gather(layout, loads, v).vec3();
+        let away = away.cast::<f64>();
+        let moved = way.to[v].vec3().cast::<f64>() - way.from[v].vec3().cast::<f64>();
+        let term = mass.to_f64() * moved.dot(away - moved * 0.5);
+        sum.potential += term;
+        sum.size += term.abs();
+    }
+    sum
+}

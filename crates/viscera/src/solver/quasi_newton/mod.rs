@@ -1,0 +1,313 @@
+//! The quasi-Newton method: every step is the minimum of an incremental potential, found in a dozen passes.
+//!
+//! ```text
+//! Phi(x) = 1/2 |x - xt|_M^2 + he^2 V(x),   d = -H grad Phi,   x += a d
+//! H: limited-memory BFGS about an additive multilevel preconditioner;  a = 1 unless the potential rises
+//! ```
+//!
+//! Liu, Bouaziz, Kavan, "Quasi-Newton methods for real-time simulation of hyperelastic materials", TOG 2017, for the
+//! idea; what starts the recursion here is a preconditioner of all scales ([`preconditioner`]), so that the number of
+//! iterations does not depend on the mesh. Time is integrated by SDIRK2 (`time.rs`). Pairs of steps and gradients are
+//! kept from solve to solve, and from step to step: they are part of the state.
+//!
+//! An iteration is `Evaluate` (gradient and change of `Phi` at a trial), `Judge` (take it, or come nearer),
+//! `Precondition`, `ChooseDirection`, `Advance` (the next trial). Every connected part has its own directions, step
+//! lengths and verdicts.
+
+mod direction;
+mod evaluate;
+mod parts;
+mod preconditioner;
+pub mod stage;
+mod time;
+mod vectors;
+
+use std::ops::Range;
+
+use crate::layout::{Before, Layout, Moments};
+use crate::scalar::lanes::Point;
+use crate::scalar::{Real, Vec3};
+use crate::settings::{Integrator, SolverSettings};
+use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
+use crate::solver::step::data::{Step, StepData};
+use crate::solver::step::energy::Energies;
+use crate::solver::step::potential::Evaluator;
+use crate::solver::step::stage::StepStage;
+use crate::state::{Learned, State};
+use evaluate::{Evaluation, Way};
+use parts::{Phase, Progress};
+use preconditioner::Preconditioner;
+use stage::{QuasiNewtonStage, Solve};
+
+/// Of the decrease that the slope promises, a step must deliver this share (Armijo).
+const SUFFICIENT: f64 = 1e-4;
+
+/// Round-off of a change of the potential: so many units of the precision of the sum of its terms' magnitudes.
+const ROUNDED: f64 = 4.0;
+
+/// A step that raises the potential is shortened by this factor.
+const SHORTEN: f64 = 0.4;
+
+/// After so many rejected trials in a row the pairs are forgotten.
+const MOST_FAILURES: u32 = 2;
+
+/// A step of implicit Euler that takes the place of another has so many iterations more.
+const MORE_ITERATIONS: u32 = 4;
+
+/// The stages of a step.
+pub fn plan(settings: &SolverSettings) -> Plan {
+    let iterations = settings.iterations();
+    let solve = |solve: Solve, iterations: u32| {
+        use QuasiNewtonStage::{Advance, ChooseDirection, EndSolve, Evaluate, Judge, Precondition, StartSolve};
+        let body = [Evaluate, Judge, Precondition, ChooseDirection, Advance];
+        let body = body.map(|stage| Node::Run(stage.into())).to_vec();
+        let repeat = Repeat { most: Times::Count(iterations), until: Some(Flag::AllDone), body };
+        [Node::Run(StartSolve(solve).into()), Node::Repeat(repeat), Node::Run(EndSolve(solve).into())]
+    };
+    let mut nodes = vec![
+        Node::Run(StepStage::ReadState.into()),
+        Node::Run(QuasiNewtonStage::Begin.into()),
+    ];
+    match settings.integrator {
+        Integrator::Sdirk2 => {
+            nodes.extend(solve(Solve::First, iterations));
+            nodes.extend(solve(Solve::Second, iterations));
+            nodes.push(Node::Run(QuasiNewtonStage::CheckEnergy.into()));
+            nodes.extend(solve(Solve::Euler, iterations + MORE_ITERATIONS));
+        }
+        Integrator::ImplicitEuler => nodes.extend(solve(Solve::Euler, iterations)),
+    }
+    nodes.push(Node::Run(QuasiNewtonStage::LimitEnergy.into()));
+    nodes.push(Node::Run(StepStage::WriteState.into()));
+    Plan { nodes }
+}
+
+/// The memory of the method beside the data of a step, whose positions are the trial.
+#[derive(Clone, Debug)]
+pub struct Memory<S> {
+    evaluation: Evaluation,
+    preconditioner: Preconditioner<S>,
+    evaluator: Evaluator,
+    energies: Energies,
+    /// Pairs at most.
+    history: usize,
+    parts: Vec<Progress>,
+    /// Whether the step that was just accepted left a pair.
+    has_new_pair: Vec<bool>,
+    pinned: Vec<bool>,
+    /// `x`: the iterate [m].
+    base: Vec<Point<S>>,
+    /// Gradient [N s^2] at the iterate, and at the trial.
+    gradient: Vec<Vec3<S>>,
+    trial_gradient: Vec<Vec3<S>>,
+    /// `M` times the gradient at the iterate [m], and at the one to come.
+    z: Vec<Vec3<S>>,
+    trial_z: Vec<Vec3<S>>,
+    direction: Vec<Vec3<S>>,
+    /// The direction as points, for passes over elements.
+    direction_points: Vec<Point<S>>,
+    /// `M y` of each pair.
+    images: Vec<Vec3<S>>,
+    /// `xs` [m] and `vs` [m/s], from which a solve goes on.
+    stage_start: Vec<Point<S>>,
+    stage_velocities: Vec<Vec3<S>>,
+    /// Velocities [m/s] at the start of the step, and after the first stage.
+    start_velocities: Vec<Vec3<S>>,
+    first_velocities: Vec<Vec3<S>>,
+    /// `he` of the solve at hand [s].
+    solve_dt: f64,
+    /// Steps so far in which a part took a step of implicit Euler instead.
+    pub rejected: u64,
+}
+
+/// Where a pair of a part stands.
+struct Pair {
+    /// Of [`Learned::pairs`].
+    s: Range<usize>,
+    y: Range<usize>,
+    /// Of [`Memory::images`].
+    image: Range<usize>,
+}
+
+impl Pair {
+    fn places(slot: usize, vertices: usize, part: &Range<usize>) -> Self {
+        let from = |first: usize| first + part.start..first + part.end;
+        Self {
+            s: from(2 * slot * vertices),
+            y: from((2 * slot + 1) * vertices),
+            image: from(slot * vertices),
+        }
+    }
+}
+
+impl<S: Real> Memory<S> {
+    /// Memory for the steps of a model.
+    pub fn new(layout: &Layout<S>, settings: &SolverSettings) -> Self {
+        let (vertices, parts) = (layout.vertex_count(), layout.part_count());
+        let history = settings.history_for(&layout.materials) as usize;
+        let vectors = || vec![Vec3::ZERO; vertices];
+        let points = || vec![Point::default(); vertices];
+        Self {
+            evaluation: Evaluation::new(layout),
+            preconditioner: Preconditioner::new(layout),
+            evaluator: Evaluator::new(layout),
+            energies: Energies::new(parts),
+            history,
+            parts: vec![Progress::default(); parts],
+            has_new_pair: vec![false; parts],
+            pinned: vec![false; vertices],
+            base: points(),
+            gradient: vectors(),
+            trial_gradient: vectors(),
+            z: vectors(),
+            trial_z: vectors(),
+            direction: vectors(),
+            direction_points: points(),
+            images: vec![Vec3::ZERO; history * vertices],
+            stage_start: points(),
+            stage_velocities: vectors(),
+            start_velocities: vectors(),
+            first_velocities: vectors(),
+            solve_dt: 0.0,
+            rejected: 0,
+        }
+    }
+
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> usize {
+        let vectors = [
+            &self.gradient,
+            &self.trial_gradient,
+            &self.z,
+            &self.trial_z,
+            &self.direction,
+            &self.images,
+            &self.stage_velocities,
+            &self.start_velocities,
+            &self.first_velocities,
+        ];
+        let points = [&self.base, &self.direction_points, &self.stage_start];
+        vectors.into_iter().map(|v| size_of_val(&v[..])).sum::<usize>()
+            + points.into_iter().map(|p| size_of_val(&p[..])).sum::<usize>()
+            + size_of_val(&self.parts[..])
+            + size_of_val(&self.pinned[..])
+            + self.evaluation.bytes()
+            + self.preconditioner.bytes()
+            + self.evaluator.bytes()
+            + self.energies.bytes()
+    }
+
+    /// Whether no part has anything left to do in the solve at hand.
+    pub fn is_all_done(&self) -> bool {
+        !self.parts.iter().any(Progress::acts)
+    }
+
+    /// Carries a stage out.
+    pub fn run(
+        &mut self,
+        stage: QuasiNewtonStage,
+        step: &Step<'_, S>,
+        data: &mut StepData<S>,
+        state: &mut State<S>,
+    ) {
+        let solve = Step { dt: self.solve_dt, ..*step };
+        let learned = &mut state.learned;
+        match stage {
+            QuasiNewtonStage::Begin => self.begin(step, data, state),
+            QuasiNewtonStage::StartSolve(which) => self.start_solve(which, step, data, learned),
+            QuasiNewtonStage::Evaluate => self.evaluate(&solve, data),
+            QuasiNewtonStage::Judge => self.judge(&solve, data, learned),
+            QuasiNewtonStage::Precondition => {
+                self.precondition(&solve, &data.constants.workers, learned);
+            }
+            QuasiNewtonStage::ChooseDirection => self.choose_direction(&solve, data, learned),
+            QuasiNewtonStage::Advance => self.advance(&solve, data),
+            QuasiNewtonStage::EndSolve(which) => self.end_solve(which, step, data, state),
+            QuasiNewtonStage::CheckEnergy => self.check_energy(step, data, learned),
+            QuasiNewtonStage::LimitEnergy => self.limit_energy(step, data),
+        }
+    }
+
+    /// [`QuasiNewtonStage::Evaluate`].
+    fn evaluate(&mut self, solve: &Step<'_, S>, data: &mut StepData<S>) {
+        let Self { evaluation, parts, base, stage_start, trial_gradient, .. } = self;
+        let StepData { constants, points, loads, .. } = data;
+        let moments = moments(solve, stage_start);
+        let way = Way { from: base, to: points, moments };
+        let acts = |part: usize| parts[part].acts();
+        evaluation.evaluate(constants, solve, &way, acts, loads, trial_gradient);
+    }
+
+    /// [`QuasiNewtonStage::Judge`].
+    fn judge(&mut self, solve: &Step<'_, S>, data: &mut StepData<S>, learned: &mut Learned<S>) {
+        let vertices = solve.model.vertex_count();
+        for (number, part) in solve.model.parts.iter().enumerate() {
+            let change = self.evaluation.changes[number];
+            let progress = &mut self.parts[number];
+            self.has_new_pair[number] = false;
+            let round_off = ROUNDED * S::EPSILON * change.size;
+            progress.accepted = match progress.phase {
+                Phase::Done => continue,
+                // Where the last solve was calm its start is as good as any: it has the velocity.
+                Phase::Starting => {
+                    change.potential <= round_off
+                        || (learned.parts[number].calm && change.potential.is_finite())
+                }
+                Phase::FromReference => true,
+                Phase::Iterating => progress.suffices(change.potential, change.size, S::EPSILON),
+            };
+            let range = part.vertices.clone();
+            if !progress.accepted {
+                self.reject(number, range, data);
+                continue;
+            }
+            progress.inverted = change.inverted;
+            if progress.phase == Phase::Iterating {
+                self.offer_pair(vertices, number, part, data, learned);
+            }
+            let progress = &mut self.parts[number];
+            (progress.phase, progress.failures, progress.ahead) = (Phase::Iterating, 0, false);
+            self.base[range.clone()].copy_from_slice(&data.points[range.clone()]);
+            self.gradient[range.clone()].copy_from_slice(&self.trial_gradient[range]);
+        }
+    }
+
+    /// Comes nearer to the iterate, or back to the reference where a start was no better.
+    fn reject(&mut self, number: usize, range: Range<usize>, data: &mut StepData<S>) {
+        let progress = &mut self.parts[number];
+        if progress.phase == Phase::Starting {
+            progress.phase = Phase::FromReference;
+            data.points[range.clone()].copy_from_slice(&self.base[range]);
+            return;
+        }
+        progress.failures += 1;
+        progress.rejections += 1;
+        progress.length *= SHORTEN;
+    }
+
+    /// [`QuasiNewtonStage::Advance`].
+    fn advance(&mut self, solve: &Step<'_, S>, data: &mut StepData<S>) {
+        for (number, part) in solve.model.parts.iter().enumerate() {
+            let progress = &mut self.parts[number];
+            if progress.phase == Phase::Iterating {
+                progress.ahead = true;
+                let length = S::from_f64(progress.length);
+                for v in part.vertices.clone() {
+                    let place = self.base[v].vec3() + self.direction[v] * length;
+                    data.points[v].set_vec3(place);
+                }
+            } else if progress.phase == Phase::Done {
+                continue;
+            }
+        }
+    }
+}
+
+/// What elements depend on in a solve.
+fn moments<'a, S: Real>(solve: &Step<'a, S>, start: &'a [Point<S>]) -> Moments<'a, S> {
+    Moments {
+        anchors: solve.inputs.anchors_of(&solve.model.rest_anchors),
+        start: Before::Places(start),
+        dt: solve.dt,
+    }
+}

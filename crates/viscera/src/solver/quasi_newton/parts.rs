@@ -1,0 +1,72 @@
+//! The progress of each connected part in a solve.
+
+use crate::settings::MOST_HISTORY;
+
+/// How a part takes a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Scheme {
+    /// Two stages of SDIRK2.
+    #[default]
+    Sdirk2,
+    /// One solve of implicit Euler.
+    Euler,
+}
+
+/// Where a solve of a part stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Phase {
+    /// It is not concerned, or has converged: nothing moves.
+    #[default]
+    Done,
+    /// The trial is the start, the iterate the reference.
+    Starting,
+    /// The trial is the reference itself: the start was worse.
+    FromReference,
+    /// The trial is a step from the iterate.
+    Iterating,
+}
+
+/// Inner products of the pairs of a part, by their places.
+#[derive(Clone, Copy, Debug)]
+pub struct Products {
+    /// `s_i . y_j`.
+    pub sy: [[f64; MOST_HISTORY]; MOST_HISTORY],
+    /// `y_i . M y_j`.
+    pub yw: [[f64; MOST_HISTORY]; MOST_HISTORY],
+}
+
+impl Default for Products {
+    fn default() -> Self {
+        Self { sy: [[0.0; MOST_HISTORY]; MOST_HISTORY], yw: [[0.0; MOST_HISTORY]; MOST_HISTORY] }
+    }
+}
+
+/// A part in a step.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Progress {
+    pub scheme: Scheme,
+    pub phase: Phase,
+    /// Whether the last trial was accepted, so that a new direction is to be found.
+    pub accepted: bool,
+    /// Whether the trial is a step from the iterate that nothing has judged yet.
+    pub ahead: bool,
+    /// `a`: the share of the direction that the trial goes.
+    pub length: f64,
+    /// `g . d` [J s^2].
+    pub slope: f64,
+    /// Trials in a row that were rejected, and all in this solve.
+    pub failures: u32,
+    pub rejections: u32,
+    /// Tetrahedra inside out at the last trial that was accepted.
+    pub inverted: u64,
+    /// Steps below this [m] are round-off.
+    pub resolution: f64,
+    pub products: Products,
+}
+
+impl Progress {
+    /// Whether it has a trial to evaluate.
+    pub fn acts(&self) -> bool {
+        self.phase != Phase::Done
+    }
+}

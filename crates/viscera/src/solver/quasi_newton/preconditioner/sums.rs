@@ -1,0 +1,415 @@
+//! What a preconditioner knows of a connected part before it moves: sums over groups of tetrahedra in the rest shape.
+//!
+//! ```text
+//! q = R g,   K_ab = V (mu (q_a.q_b) I + mu q_b q_a^T + lambda q_a q_b^T)       corotated tetrahedron
+//! K_cc = sum_groups (tr A) I + R B R^T,   A = sum V mu g_c g_c^T,  B = sum V (mu + lambda) g_c g_c^T
+//! K_cd = sum_groups R (sum V (mu (g_c.g_d) I + mu g_d g_c^T + lambda g_c g_d^T)) R^T
+//! ```
+//!
+//! `g_c = sum_a w_ac g_a` is the gradient of node `c`'s shape function, in the rest shape. A *group* is a connected set
+//! of tetrahedra in one cell of the finest lattice, which turn together: the rotation `R` is all that changes, so that
+//! the blocks of every level, vertices among them, are found without a pass over the tetrahedra.
+
+use std::ops::Range;
+
+use crate::elements::shape_gradients;
+use crate::layout::Layout;
+use crate::layout::lattice::Lattice;
+use crate::scalar::{Mat3, Real, Vec3, vec3};
+
+/// A symmetric matrix: xx, yy, zz, yz, xz, xy.
+pub type Six<S> = [S; 6];
+
+/// A tetrahedron, its vertices counted from the first of the part.
+pub struct LocalTet {
+    pub vertices: [u32; 4],
+    /// Shape gradients [1/m].
+    pub gradients: [Vec3<f64>; 4],
+    /// [m^3].
+    pub volume: f64,
+    /// Lame's parameters [Pa], viscosity included.
+    pub mu: f64,
+    pub lambda: f64,
+}
+
+/// The tetrahedra of a part; `viscous` is the factor by which a retardation time of one second stiffens [1/s].
+pub fn tets_of_part<S: Real>(layout: &Layout<S>, number: usize, viscous: f64) -> Vec<LocalTet> {
+    let part = &layout.parts[number];
+    let first = part.vertices.start as u32;
+    let mut tets = Vec::new();
+    for (law, set) in layout.tet_sets.iter().enumerate() {
+        for block in part.blocks(law).flatten() {
+            let constants = &set.blocks[block];
+            for lane in 0..usize::from(set.filled[block]) {
+                let material = &layout.materials[constants.material[lane] as usize];
+                let stiffer = 1.0 + viscous * material.viscosity.to_f64();
+                tets.push(LocalTet {
+                    vertices: constants.vertices.map(|corner| corner[lane] - first),
+                    gradients: shape_gradients(&constants.shape(lane).cast()),
+                    volume: constants.rest_volume[lane].to_f64(),
+                    mu: material.lame_mu.to_f64() * stiffer,
+                    lambda: material.lame_lambda.to_f64() * stiffer,
+                });
+            }
+        }
+    }
+    tets
+}
+
+/// Groups of tetrahedra, and their deformation gradients as sums over vertices: `sum_j x_j b_j^T`.
+#[derive(Clone, Debug, Default)]
+pub struct Groups<S> {
+    pub offsets: Vec<u32>,
+    /// A vertex of the part, and `b` [m^2].
+    pub entries: Vec<(u32, Vec3<S>)>,
+}
+
+/// Tetrahedra by group, group after group.
+pub struct Grouped {
+    pub tets: Vec<u32>,
+    pub offsets: Vec<usize>,
+}
+
+impl Grouped {
+    /// The tetrahedra of one cell of the finest lattice that hang together by vertices.
+    pub fn new(tets: &[LocalTet], places: &[Vec3<f64>], lattice: &Lattice) -> Self {
+        let cell = |tet: &LocalTet| {
+            let sum = tet.vertices.iter().fold(Vec3::ZERO, |sum: Vec3<f64>, &v| sum + places[v as usize]);
+            let at = (sum * 0.25 - lattice.origin) * (1.0 / lattice.spacing);
+            [at.z, at.y, at.x].map(|x| x.floor() as i64)
+        };
+        let mut order: Vec<(_, u32)> = tets.iter().map(cell).zip(0..).collect();
+        order.sort_unstable();
+        let mut grouped = Self { tets: Vec::with_capacity(tets.len()), offsets: vec![0] };
+        let mut seen_by = vec![(u32::MAX, 0u32); places.len()];
+        for (cell, of_cell) in order.chunk_by(|a, b| a.0 == b.0).enumerate() {
+            let mut parent: Vec<u32> = (0..of_cell.len() as u32).collect();
+            for (i, &(_, tet)) in of_cell.iter().enumerate() {
+                for v in tets[tet as usize].vertices {
+                    let (seen, other) = seen_by[v as usize];
+                    if seen == cell as u32 {
+                        let (a, b) = (root(&mut parent, other), root(&mut parent, i as u32));
+                        parent[a.max(b) as usize] = a.min(b);
+                    }
+                    seen_by[v as usize] = (cell as u32, i as u32);
+                }
+            }
+            let mut members: Vec<(u32, u32)> = (0..of_cell.len())
+                .map(|i| (root(&mut parent, i as u32), of_cell[i].1))
+                .collect();
+            members.sort_unstable();
+            for group in members.chunk_by(|a, b| a.0 == b.0) {
+                grouped.tets.extend(group.iter().map(|&(_, tet)| tet));
+                grouped.offsets.push(grouped.tets.len());
+            }
+        }
+        grouped
+    }
+
+    /// How many groups.
+    pub fn len(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// The tetrahedra of one.
+    pub fn tets(&self, group: usize) -> &[u32] {
+        &self.tets[self.offsets[group]..self.offsets[group + 1]]
+    }
+}
+
+fn root(parent: &mut [u32], mut i: u32) -> u32 {
+    while parent[i as usize] != i {
+        parent[i as usize] = parent[parent[i as usize] as usize];
+        i = parent[i as usize];
+    }
+    i
+}
+
+impl<S: Real> Groups<S> {
+    pub fn new(tets: &[LocalTet], grouped: &Grouped, vertex_count: usize) -> Self {
+        let mut groups = Self { offsets: vec![0], entries: Vec::new() };
+        let mut sums = Gathered::new(vertex_count);
+        for group in 0..grouped.len() {
+            sums.begin();
+            for &tet in grouped.tets(group) {
+                let tet = &tets[tet as usize];
+                for (v, g) in tet.vertices.into_iter().zip(tet.gradients) {
+                    *sums.of(v) += g * tet.volume;
+                }
+            }
+            groups.entries.extend(sums.list.iter().map(|&(v, b)| (v, b.cast::<S>())));
+            groups.offsets.push(groups.entries.len() as u32);
+        }
+        groups
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.offsets.len() - 1
+    }
+}
+
+/// Values by node, in the order in which the nodes came.
+struct Gathered<T> {
+    list: Vec<(u32, T)>,
+    place: Vec<(u32, u32)>,
+    round: u32,
+}
+
+impl<T: Default> Gathered<T> {
+    fn new(nodes: usize) -> Self {
+        Self { list: Vec::new(), place: vec![(0, 0); nodes], round: 0 }
+    }
+
+    fn begin(&mut self) {
+        self.list.clear();
+        self.round += 1;
+    }
+
+    fn at(&mut self, node: u32) -> usize {
+        let (round, place) = &mut self.place[node as usize];
+        if *round != self.round {
+            (*round, *place) = (self.round, self.list.len() as u32);
+            self.list.push((node, T::default()));
+        }
+        *place as usize
+    }
+
+    fn of(&mut self, node: u32) -> &mut T {
+        let place = self.at(node);
+        &mut self.list[place].1
+    }
+}
+
+/// Where vertices stand on a level.
+#[derive(Clone, Copy)]
+pub enum On<'a> {
+    /// Each is a node.
+    Vertices,
+    /// On the nodes of this level of the lattice.
+    Lattice(&'a Lattice, usize),
+}
+
+impl On<'_> {
+    /// Calls with the nodes of a vertex and their weights.
+    pub fn each(self, v: u32, mut with: impl FnMut(u32, f64)) {
+        match self {
+            Self::Vertices => with(v, 1.0),
+            Self::Lattice(lattice, level) => {
+                for &(node, weight) in lattice.levels[level].of_vertices.row(v as usize) {
+                    with(node, weight);
+                }
+            }
+        }
+    }
+
+    fn node_count(self, vertices: usize) -> usize {
+        match self {
+            Self::Vertices => vertices,
+            Self::Lattice(lattice, level) => lattice.levels[level].node_count,
+        }
+    }
+
+    /// Gradients [1/m] of the shape functions of all nodes that a tetrahedron touches; vertices that are not free
+    /// count as nothing.
+    fn gradients(self, tet: &LocalTet, free: &[bool], found: &mut Vec<(u32, Vec3<f64>)>) {
+        found.clear();
+        for (v, g) in tet.vertices.into_iter().zip(tet.gradients) {
+            if free[v as usize] {
+                self.each(v, |node, weight| match found.iter_mut().find(|(other, _)| *other == node) {
+                    Some((_, sum)) => *sum += g * weight,
+                    None => found.push((node, g * weight)),
+                });
+            }
+        }
+    }
+}
+
+/// The share of a group in a node's block.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Share<S> {
+    pub group: u32,
+    /// `tr A` [N/m].
+    pub trace: S,
+    /// `B` [N/m].
+    pub b: Six<S>,
+}
+
+/// The diagonal blocks of a level.
+#[derive(Clone, Debug, Default)]
+pub struct DiagonalSums<S> {
+    /// `sum_v m_v w_v^2` of each node [kg]; empty for vertices.
+    pub masses: Vec<S>,
+    /// Shares of node `c` are `offsets[c] .. offsets[c + 1]`.
+    pub offsets: Vec<u32>,
+    pub shares: Vec<Share<S>>,
+}
+
+impl<S: Real> DiagonalSums<S> {
+    pub fn new(
+        on: On<'_>,
+        tets: &[LocalTet],
+        grouped: &Grouped,
+        masses: &[f64],
+        free: &[bool],
+    ) -> Self {
+        let nodes = on.node_count(masses.len());
+        let mut sums = Gathered::<(f64, Six<f64>)>::new(nodes);
+        let mut gradients = Vec::new();
+        let mut all: Vec<(u32, Share<S>)> = Vec::new();
+        for group in 0..grouped.len() {
+            sums.begin();
+            for &tet in grouped.tets(group) {
+                let tet = &tets[tet as usize];
+                on.gradients(tet, free, &mut gradients);
+                for &(node, g) in &gradients {
+                    let (trace, b) = sums.of(node);
+                    *trace += tet.volume * tet.mu * g.length_squared();
+                    let scale = tet.volume * (tet.mu + tet.lambda);
+                    let products = [g.x * g.x, g.y * g.y, g.z * g.z, g.y * g.z, g.x * g.z, g.x * g.y];
+                    for (b, product) in b.iter_mut().zip(products) {
+                        *b += scale * product;
+                    }
+                }
+            }
+            all.extend(sums.list.iter().map(|&(node, (trace, b))| {
+                let share =
+                    Share { group: group as u32, trace: S::from_f64(trace), b: b.map(S::from_f64) };
+                (node, share)
+            }));
+        }
+        // Stable: a node's shares stay in the order of groups.
+        all.sort_by_key(|&(node, _)| node);
+        let mut offsets = vec![0u32; nodes + 1];
+        for &(node, _) in &all {
+            offsets[node as usize + 1] += 1;
+        }
+        for node in 0..nodes {
+            offsets[node + 1] += offsets[node];
+        }
+        let mut node_masses = vec![0.0; if matches!(on, On::Vertices) { 0 } else { nodes }];
+        for v in (0..masses.len() as u32).filter(|&v| free[v as usize]) {
+            if !node_masses.is_empty() {
+                on.each(v, |node, w| node_masses[node as usize] += masses[v as usize] * w * w);
+            }
+        }
+        Self {
+            masses: node_masses.into_iter().map(S::from_f64).collect(),
+            offsets,
+            shares: all.into_iter().map(|(_, share)| share).collect(),
+        }
+    }
+}
+
+/// The whole matrix of the coarsest level.
+#[derive(Clone, Debug, Default)]
+pub struct FullSums {
+    pub node_count: usize,
+    /// Pairs of nodes with `sum_v m_v w_vc w_vd` [kg], the first not below the second.
+    pub masses: Vec<([u32; 2], f64)>,
+    /// Blocks [N/m] in the rest shape of the pairs of nodes of each group, the first not below the second.
+    pub blocks: Vec<([u32; 2], Mat3<f64>)>,
+    /// Blocks of group `g` are `offsets[g] .. offsets[g + 1]`.
+    pub offsets: Vec<usize>,
+}
+
+impl FullSums {
+    pub fn new(
+        on: On<'_>,
+        tets: &[LocalTet],
+        grouped: &Grouped,
+        masses: &[f64],
+        free: &[bool],
+    ) -> Self {
+        let node_count = on.node_count(masses.len());
+        let mut full = Self { node_count, offsets: vec![0], ..Self::default() };
+        // By pairs: a coarsest level is small.
+        let pair = |a: u32, b: u32| a.max(b) * node_count as u32 + a.min(b);
+        let nodes = |pair: u32| [pair / node_count as u32, pair % node_count as u32];
+        let mut mass = vec![0.0; node_count * node_count];
+        let mut of_vertex = Vec::new();
+        for v in (0..masses.len() as u32).filter(|&v| free[v as usize]) {
+            of_vertex.clear();
+            on.each(v, |node, w| of_vertex.push((node, w)));
+            for &(a, wa) in &of_vertex {
+                for &(b, wb) in of_vertex.iter().filter(|&&(b, _)| b <= a) {
+                    mass[pair(a, b) as usize] += masses[v as usize] * wa * wb;
+                }
+            }
+        }
+        let kept = (0..).zip(mass).filter(|&(_, mass)| mass != 0.0);
+        full.masses = kept.map(|(pair, mass)| (nodes(pair), mass)).collect();
+        let mut sums = Gathered::<Mat3<f64>>::new(node_count * node_count);
+        let mut gradients = Vec::new();
+        for group in 0..grouped.len() {
+            sums.begin();
+            for &tet in grouped.tets(group) {
+                let tet = &tets[tet as usize];
+                on.gradients(tet, free, &mut gradients);
+                for &(a, ga) in &gradients {
+                    for &(b, gb) in gradients.iter().filter(|&&(b, _)| b <= a) {
+                        let block = Mat3::IDENTITY * (tet.mu * ga.dot(gb))
+                            + Mat3::outer(gb, ga) * tet.mu
+                            + Mat3::outer(ga, gb) * tet.lambda;
+                        let sum = sums.of(pair(a, b));
+                        *sum = *sum + block * tet.volume;
+                    }
+                }
+            }
+            full.blocks.extend(sums.list.iter().map(|&(pair, block)| (nodes(pair), block)));
+            full.offsets.push(full.blocks.len());
+        }
+        full
+    }
+
+    /// Blocks of a group.
+    pub fn of_group(&self, group: usize) -> Range<usize> {
+        self.offsets[group]..self.offsets[group + 1]
+    }
+
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.masses[..]) + size_of_val(&self.blocks[..]) + size_of_val(&self.offsets[..])
+    }
+}
+
+/// `R B R^T` of a symmetric matrix.
+pub fn rotated<S: Real>(r: &Mat3<S>, b: &Six<S>) -> Six<S> {
+    let [xx, yy, zz, yz, xz, xy] = *b;
+    let half = *r * Mat3::from_columns(vec3(xx, xy, xz), vec3(xy, yy, yz), vec3(xz, yz, zz));
+    let whole = half * r.transpose();
+    let [x, y, z] = whole.columns;
+    [x.x, y.y, z.z, z.y, z.x, y.x]
+}
+
+/// The inverse of a symmetric positive definite matrix; zero of one that is not.
+pub fn inverse<S: Real>(a: &Six<S>) -> Six<S> {
+    // Scaled, because the determinant of small masses leaves the range of single precision.
+    let size = a[0] + a[1] + a[2];
+    let [xx, yy, zz, yz, xz, xy] = a.map(|entry| entry / size);
+    let (cx, cy, cz) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
+    let determinant = xx * cx + xy * cy + xz * cz;
+    if !(determinant > S::ZERO && determinant.is_finite()) {
+        return [S::ZERO; 6];
+    }
+    let scale = S::ONE / (determinant * size);
+    [
+        cx * scale,
+        (xx * zz - xz * xz) * scale,
+        (xx * yy - xy * xy) * scale,
+        (xy * xz - xx * yz) * scale,
+        cz * scale,
+        cy * scale,
+    ]
+}
+
+/// A symmetric matrix times a vector.
+#[inline(always)]
+pub fn times<S: Real>(a: &Six<S>, v: Vec3<S>) -> Vec3<S> {
+    let [xx, yy, zz, yz, xz, xy] = *a;
+    vec3(
+        xx * v.x + xy * v.y + xz * v.z,
+        xy * v.x + yy * v.y + yz * v.z,
+        xz * v.x + yz * v.y + zz * v.z,
+    )
+}

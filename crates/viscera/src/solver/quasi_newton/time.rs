@@ -1,0 +1,356 @@
+//! Integration over time: SDIRK2, implicit Euler in its stead, and the energy clamp.
+//!
+//! ```text
+//! c = 1 - 1/sqrt 2,  he = c h;   every solve:  xt = xs + he vs + he^2 M^-1 f_ext,  v = (x - xs)/he
+//! first:   xs = x_n, vs = v_n                                             start  xs + he vs
+//! second:  xs = x_n + d v_1, vs = v_n + d a_1, d = (1 - c) h, a_1 = (v_1 - v_n)/he   start  x_1 + d v_1 + d^2/2 a_1
+//! ```
+//!
+//! Alexander, "Diagonally implicit Runge-Kutta methods for stiff ODE's", SIAM J. Numer. Anal. 14, 1977: two stages,
+//! second order, L-stable; both stages have the same step, hence the same curvature and preconditioner. A truncated
+//! solve may store more energy than there was: then the part takes the step again by implicit Euler from `x_n`, and
+//! in the end no part keeps more kinetic energy than is left to it.
+
+use super::parts::{Phase, Scheme};
+use super::preconditioner::Curvature;
+use super::stage::Solve;
+use super::{Memory, moments};
+use crate::scalar::{Real, Vec3};
+use crate::settings::Integrator;
+use crate::solver::step::data::{Step, StepData};
+use crate::solver::step::predict::Tethers;
+use crate::solver::step::strain::measure_strain;
+use crate::state::{Learned, State};
+
+/// `c`.
+const SHARE: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
+
+/// A vertex moves by less than so many units of the precision of the largest coordinate: round-off.
+const RESOLUTION: f64 = 1.0;
+
+impl<S: Real> Memory<S> {
+    /// The step of a solve [s] in a step of `dt`.
+    fn solve_dt(which: Solve, dt: f64) -> f64 {
+        match which {
+            Solve::First | Solve::Second => SHARE * dt,
+            Solve::Euler => dt,
+        }
+    }
+
+    /// [`super::stage::QuasiNewtonStage::Begin`].
+    pub(super) fn begin(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, state: &mut State<S>) {
+        let layout = step.model;
+        let first = match step.settings.integrator {
+            Integrator::Sdirk2 => Solve::First,
+            Integrator::ImplicitEuler => Solve::Euler,
+        };
+        let dt = Self::solve_dt(first, step.dt);
+        let solve = Step { dt, ..*step };
+        data.prepare(&solve, Tethers::AsInertia);
+        self.start_velocities.copy_from_slice(&data.velocities);
+        data.constants.previous.copy_from_slice(&data.points);
+        for (pinned, inverse) in self.pinned.iter_mut().zip(&data.constants.inverse_masses) {
+            *pinned = *inverse == S::ZERO;
+        }
+        self.fit_learned(step, data, state, dt);
+        for (number, part) in layout.parts.iter().enumerate() {
+            let reach = part.vertices.clone().fold(S::ZERO, |reach, v| {
+                let x = data.points[v];
+                reach.max(x.x.abs()).max(x.y.abs()).max(x.z.abs())
+            });
+            let kept = &state.learned.parts[number];
+            let progress = &mut self.parts[number];
+            progress.phase = Phase::Done;
+            progress.resolution = RESOLUTION * S::EPSILON * reach.to_f64();
+            progress.scheme = match step.settings.integrator {
+                Integrator::Sdirk2 if !kept.inverted => Scheme::Sdirk2,
+                _ => Scheme::Euler,
+            };
+        }
+        self.begin_energy(step, data);
+        // Where pins are to be, so that the preconditioner sees the tissue they leave behind.
+        self.base.copy_from_slice(&data.constants.previous);
+        self.refresh(&solve, data, &state.learned);
+        state.multiplier_dt = dt;
+    }
+
+    /// Makes the pairs those of a solve of `dt` [s]: the change of a gradient is that of inertia and, times the squared
+    /// step, of forces.
+    fn fit_learned(&self, step: &Step<'_, S>, data: &StepData<S>, state: &mut State<S>, dt: f64) {
+        let layout = step.model;
+        let (vertices, before) = (layout.vertex_count(), state.multiplier_dt);
+        let learned = &mut state.learned;
+        let room = 2 * self.history * vertices;
+        if learned.pairs.len() != room || learned.parts.len() != layout.part_count() {
+            learned.clear(self.history, vertices, layout.part_count());
+        }
+        if before > 0.0 && before != dt {
+            let ratio = S::from_f64((dt / before) * (dt / before));
+            for pair in learned.pairs.chunks_exact_mut(2 * vertices) {
+                let (s, y) = pair.split_at_mut(vertices);
+                for ((s, y), &mass) in s.iter().zip(y).zip(&data.constants.masses) {
+                    let inertia = *s * mass;
+                    *y = inertia + (*y - inertia) * ratio;
+                }
+            }
+        }
+    }
+
+    /// Turns the preconditioner to `base`, and the images of the pairs with it.
+    fn refresh(&mut self, solve: &Step<'_, S>, data: &StepData<S>, learned: &Learned<S>) {
+        let (layout, constants) = (solve.model, &data.constants);
+        self.preconditioner.fit(layout, constants, solve.dt);
+        let curvature = Curvature {
+            dt: solve.dt,
+            x: &self.base,
+            moments: moments(solve, &constants.previous),
+        };
+        for number in 0..layout.part_count() {
+            self.preconditioner.refresh(layout, constants, &curvature, number);
+        }
+        for number in 0..layout.part_count() {
+            self.renew_pairs(layout, &constants.workers, number, learned);
+        }
+    }
+
+    /// [`super::stage::QuasiNewtonStage::StartSolve`].
+    pub(super) fn start_solve(
+        &mut self,
+        which: Solve,
+        step: &Step<'_, S>,
+        data: &mut StepData<S>,
+        learned: &mut Learned<S>,
+    ) {
+        let dt = Self::solve_dt(which, step.dt);
+        self.solve_dt = dt;
+        let solve = Step { dt, ..*step };
+        let is_first_of_step = which != Solve::Second
+            && (which == Solve::First || step.settings.integrator == Integrator::ImplicitEuler);
+        let wanted = if which == Solve::Euler { Scheme::Euler } else { Scheme::Sdirk2 };
+        if !self.parts.iter().any(|part| part.scheme == wanted) {
+            return;
+        }
+        if which == Solve::Euler && step.settings.integrator == Integrator::Sdirk2 {
+            // Another step, other curvature. Parts that are done keep their positions, but not what follows from their
+            // inertia; `end_solve` gives it back.
+            data.prepare(&solve, Tethers::AsInertia);
+            self.base.copy_from_slice(&data.constants.previous);
+            self.refresh(&solve, data, learned);
+        }
+        for number in 0..step.model.part_count() {
+            if self.parts[number].scheme == wanted {
+                self.start_part(which, &solve, data, number, is_first_of_step);
+            }
+        }
+        if step.model.is_viscous() {
+            let constants = &mut data.constants;
+            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
+            measure_strain(workers, step.model, None, &self.stage_start, strains);
+        }
+    }
+
+    /// The start of a part's solve: `xs`, `vs`, `xt`, the reference and the first trial.
+    fn start_part(
+        &mut self,
+        which: Solve,
+        solve: &Step<'_, S>,
+        data: &mut StepData<S>,
+        number: usize,
+        is_first_of_step: bool,
+    ) {
+        let part = &solve.model.parts[number];
+        let step_dt = solve.dt / if which == Solve::Euler { 1.0 } else { SHARE };
+        let (he, d) = (S::from_f64(solve.dt), S::from_f64((1.0 - SHARE) * step_dt));
+        let squared = he * he;
+        let falls = !data.constants.holds(part);
+        let acceleration = if falls { self.mean_acceleration(solve, data, number) } else { Vec3::ZERO };
+        for v in part.vertices.clone() {
+            let x = data.constants.previous[v].vec3();
+            let (start, velocity, first) = match which {
+                Solve::First | Solve::Euler => {
+                    let velocity = self.start_velocities[v];
+                    let first = x + velocity * he + acceleration * squared;
+                    // A step that is taken again begins where nothing has moved: its start is the reference.
+                    (x, velocity, if is_first_of_step { first } else { x })
+                }
+                Solve::Second => {
+                    let (before, after) = (self.start_velocities[v], self.first_velocities[v]);
+                    let change = (after - before) * (S::ONE / he);
+                    let begun = self.base[v].vec3();
+                    let first = begun + after * d + change * (S::HALF * d * d);
+                    (x + after * d, before + change * d, first)
+                }
+            };
+            self.stage_start[v].set_vec3(start);
+            self.stage_velocities[v] = velocity;
+            let constants = &mut data.constants;
+            let load = constants.external[v] * (S::ONE / constants.inertias[v]);
+            let inertial = start + velocity * he;
+            let predicted = inertial + (solve.inputs.gravity + load) * squared;
+            constants.predicted[v].set_vec3(predicted);
+            if which != Solve::Second {
+                self.base[v].set_vec3(x);
+            }
+            data.points[v].set_vec3(first);
+        }
+        let constants = &mut data.constants;
+        let range = part.vertices.clone();
+        let first = constants.tethers.partition_point(|tether| tether.vertex < range.start);
+        for i in first..constants.tethers.len() {
+            let tether = constants.tethers[i];
+            let v = tether.vertex;
+            if v >= range.end {
+                break;
+            }
+            let inertial = self.stage_start[v].vec3() + self.stage_velocities[v] * he;
+            let pull = tether.force(inertial + solve.inputs.gravity * squared);
+            let moved = pull * (S::ONE / constants.inertias[v]) * squared;
+            let predicted = constants.predicted[v].vec3() + moved;
+            constants.predicted[v].set_vec3(predicted);
+        }
+        let share = S::from_f64(if which == Solve::First { SHARE } else { 1.0 });
+        for pin in &solve.inputs.pins {
+            let v = solve.model.numbering.of(pin.vertex);
+            if range.contains(&v) {
+                let x = constants.previous[v].vec3();
+                let target = if which == Solve::First { x + (pin.target - x) * share } else { pin.target };
+                data.points[v].set_vec3(target);
+                self.base[v].set_vec3(target);
+            }
+        }
+        let progress = &mut self.parts[number];
+        progress.phase = Phase::Starting;
+        (progress.failures, progress.rejections) = (0, 0);
+        (progress.accepted, progress.ahead) = (false, false);
+    }
+
+    /// How a part's center of mass is accelerated [m/s^2] by what acts on it from outside.
+    fn mean_acceleration(&self, solve: &Step<'_, S>, data: &StepData<S>, number: usize) -> Vec3<S> {
+        let constants = &data.constants;
+        let (mut mass, mut force) = (0.0, Vec3::<f64>::ZERO);
+        for v in solve.model.parts[number].vertices.clone() {
+            mass += constants.masses[v].to_f64();
+            force += constants.external[v].cast();
+        }
+        solve.inputs.gravity + (force * (1.0 / mass)).cast()
+    }
+
+    /// [`super::stage::QuasiNewtonStage::EndSolve`].
+    pub(super) fn end_solve(
+        &mut self,
+        which: Solve,
+        step: &Step<'_, S>,
+        data: &mut StepData<S>,
+        state: &mut State<S>,
+    ) {
+        let wanted = if which == Solve::Euler { Scheme::Euler } else { Scheme::Sdirk2 };
+        let rate = S::from_f64(1.0 / Self::solve_dt(which, step.dt));
+        for (number, part) in step.model.parts.iter().enumerate() {
+            let progress = &mut self.parts[number];
+            if progress.scheme != wanted {
+                continue;
+            }
+            let kept = &mut state.learned.parts[number];
+            let is_calm = progress.rejections == 0;
+            // The last direction is taken unchecked where nothing was rejected, in this solve or the one before.
+            let goes_on = progress.ahead && progress.accepted && is_calm && kept.calm;
+            (kept.calm, kept.inverted) = (is_calm, progress.inverted > 0);
+            progress.phase = Phase::Done;
+            let range = part.vertices.clone();
+            let (from, to) = if goes_on {
+                (&data.points, &mut self.base)
+            } else {
+                (&self.base, &mut data.points)
+            };
+            to[range.clone()].copy_from_slice(&from[range.clone()]);
+            for v in range {
+                let moved = data.points[v].vec3() - self.stage_start[v].vec3();
+                match which {
+                    Solve::First => self.first_velocities[v] = moved * rate,
+                    Solve::Second | Solve::Euler => data.velocities[v] = moved * rate,
+                }
+            }
+        }
+        let again = which == Solve::Euler && step.settings.integrator == Integrator::Sdirk2;
+        if again && self.parts.iter().any(|part| part.scheme == Scheme::Euler) {
+            self.end_again(step, data);
+        }
+    }
+
+    /// After steps of implicit Euler beside SDIRK2: what measures of forces read is in terms of SDIRK2's `he`.
+    fn end_again(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
+        let he = SHARE * step.dt;
+        for (place, &inertia) in self.base.iter_mut().zip(&data.constants.inertias) {
+            place.w = inertia;
+        }
+        data.prepare(&Step { dt: he, ..*step }, Tethers::AsInertia);
+        let shrink = S::from_f64(SHARE * SHARE);
+        for (number, part) in step.model.parts.iter().enumerate() {
+            if self.parts[number].scheme == Scheme::Euler {
+                for v in part.vertices.clone() {
+                    let x = data.points[v].vec3();
+                    let away = x - data.constants.predicted[v].vec3();
+                    data.constants.predicted[v].set_vec3(x - away * shrink);
+                    data.constants.inertias[v] = self.base[v].w;
+                }
+            }
+        }
+        self.solve_dt = he;
+    }
+
+    /// Energies before the step, pins moved.
+    fn begin_energy(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
+        self.base.copy_from_slice(&data.points);
+        for pin in &step.inputs.pins {
+            self.base[step.model.numbering.of(pin.vertex)].set_vec3(pin.target);
+        }
+        self.measure_start_strain(step, data);
+        self.evaluator.evaluate_all(&data.constants, step, &self.base);
+        self.energies.begin(step, data, &self.evaluator.stored);
+    }
+
+    /// Green strain at the start of the step, which the energies are counted from.
+    fn measure_start_strain(&self, step: &Step<'_, S>, data: &mut StepData<S>) {
+        if step.model.is_viscous() {
+            let constants = &mut data.constants;
+            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
+            measure_strain(workers, step.model, None, &constants.previous, strains);
+        }
+    }
+
+    /// [`super::stage::QuasiNewtonStage::CheckEnergy`].
+    pub(super) fn check_energy(
+        &mut self,
+        step: &Step<'_, S>,
+        data: &mut StepData<S>,
+        learned: &mut Learned<S>,
+    ) {
+        self.measure_start_strain(step, data);
+        self.evaluator.evaluate_all(&data.constants, step, &data.points);
+        let Self { energies, evaluator, parts, .. } = self;
+        let mut any = false;
+        energies.end(step, data, &evaluator.stored);
+        for (number, progress) in parts.iter_mut().enumerate() {
+            if progress.scheme == Scheme::Sdirk2 && energies.stores_too_much(number) {
+                progress.scheme = Scheme::Euler;
+                learned.parts[number].count = 0;
+                learned.parts[number].calm = false;
+                any = true;
+            }
+        }
+        self.rejected += u64::from(any);
+    }
+
+    /// [`super::stage::QuasiNewtonStage::LimitEnergy`].
+    pub(super) fn limit_energy(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
+        self.measure_start_strain(step, data);
+        self.evaluator.evaluate_all(&data.constants, step, &data.points);
+        self.energies.end(step, data, &self.evaluator.stored);
+        self.energies.limit(step, data, |_, _| {});
+        if step.model.is_viscous() {
+            let constants = &mut data.constants;
+            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
+            measure_strain(workers, step.model, None, &self.stage_start, strains);
+        }
+    }
+}
