@@ -4,7 +4,7 @@
 
 use super::CornerLoad;
 use super::kinds::{CONSTANTS, Constant, Energy, Kind, Legal, Moment, XpbdBlock};
-use crate::scalar::{Real, Scalar, Vec3, vec3};
+use crate::scalar::{Mat3, Real, Scalar, Vec3, vec3};
 
 /// The kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,6 +51,10 @@ impl<S: Real> Energy<S, 1> for Attachment<S> {
 
     fn stiffness(&self) -> S {
         self.stiffness
+    }
+
+    fn blocks(&self, _: &[Vec3<S>; 1]) -> [[Mat3<S>; 1]; 1] {
+        [[Mat3::IDENTITY * self.stiffness]]
     }
 }
 

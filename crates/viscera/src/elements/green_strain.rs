@@ -11,6 +11,14 @@
 //! XPBD: Macklin, Mueller, Chentanez, "XPBD", MIG 2016, eq. 18; here with all six components of
 //! the Green strain as one block, so that the compliance is the material's full 6 x 6.
 //!
+//! From `F` to `F + D` the strain changes by a quadratic polynomial, and the energy without a difference of energies:
+//!
+//! ```text
+//! dE = E(F + D) - E(F) = sym((F + D/2)^T D)
+//! dW = dE : C : (E + dE/2),     C the isotropic stiffness
+//! D : d2W/dF2 : D = sym(F^T D) : C : sym(F^T D) + S : D^T D,   S = C E
+//! ```
+//!
 //! The strain cannot see inversion (`E(RF) = E(F)` for reflections `R` too): prefer the stable
 //! neo-Hookean element where tissue may turn inside out.
 
@@ -41,6 +49,20 @@ pub fn strain<S: Scalar>(deformation_gradient: &Mat3<S>) -> Voigt<S> {
         (a.z + c.x) + a.dot(c),
         (a.y + b.x) + a.dot(b),
     ]
+}
+
+/// Components of `sym(F^T D)`, the derivative of the strain along `d`. The second derivative, `D^T D`, is this with `d`
+/// in the place of `f`.
+#[inline(always)]
+fn strain_along<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>) -> Voigt<S> {
+    let ([a, b, c], [u, v, w]) = (f.columns, d.columns);
+    [a.dot(u), b.dot(v), c.dot(w), b.dot(w) + c.dot(v), a.dot(w) + c.dot(u), a.dot(v) + b.dot(u)]
+}
+
+/// `E(F + D) - E(F)`, in the components of [`strain`]: with the digits of `d` however small it is.
+#[inline(always)]
+pub fn strain_change<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>) -> Voigt<S> {
+    strain_along(&(*f + *d * S::HALF), d)
 }
 
 /// The symmetric 3 x 3 matrix whose components are `v` (without halving the shear).
@@ -80,6 +102,46 @@ fn second_piola<S: Scalar>(c: &Voigt<S>, lame_lambda: S, lame_mu: S) -> Voigt<S>
         lame_mu * c[4],
         lame_mu * c[5],
     ]
+}
+
+/// Stress times strain [Pa]: `S : E`; the strain's shear is engineering shear, so every component counts once.
+#[inline(always)]
+fn work<S: Scalar>(stress: &Voigt<S>, strain: &Voigt<S>) -> S {
+    let direct = stress[0] * strain[0] + stress[1] * strain[1] + stress[2] * strain[2];
+    direct + (stress[3] * strain[3] + stress[4] * strain[4] + stress[5] * strain[5])
+}
+
+/// `W(c + change) - W(c)` [Pa] of the quadratic form [`energy_density`]: `change^T D (c + change/2)`. Its round-off
+/// is that of its terms, which vanish with the change; that of a difference of two energies does not.
+#[inline(always)]
+pub fn energy_density_change<S: Scalar>(
+    c: &Voigt<S>,
+    change: &Voigt<S>,
+    lame_lambda: S,
+    lame_mu: S,
+) -> S {
+    let mut middle = *c;
+    for p in 0..6 {
+        middle[p] += S::HALF * change[p];
+    }
+    work(&second_piola(&middle, lame_lambda, lame_mu), change)
+}
+
+/// Second derivative [Pa] along `d` of the energy density of the strain `c` at `f`, where `c` is the Green strain less
+/// any constant: exact, and its positive semidefinite part `sym(F^T D) : C : sym(F^T D)`, without the stress's
+/// `S : D^T D`, which is negative under pressure.
+#[inline(always)]
+pub fn curvature_along<S: Scalar>(
+    f: &Mat3<S>,
+    d: &Mat3<S>,
+    c: &Voigt<S>,
+    lame_lambda: S,
+    lame_mu: S,
+) -> [S; 2] {
+    let along = strain_along(f, d);
+    let bound = work(&second_piola(&along, lame_lambda, lame_mu), &along);
+    let stress = second_piola(c, lame_lambda, lame_mu);
+    [bound + work(&stress, &strain_along(d, d)), bound]
 }
 
 /// First Piola stress [Pa]: `P = F S`.

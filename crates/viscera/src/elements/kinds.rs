@@ -3,7 +3,7 @@
 //! alike, answer here, one by one. Each kind has a file of its own, beside its twin for graphics processors.
 
 use super::CornerLoad;
-use crate::scalar::{Real, Scalar, Vec3};
+use crate::scalar::{Mat3, Real, Scalar, Vec3};
 
 /// Constants of an element, at most: those that it does not use are zero.
 pub const CONSTANTS: usize = 4;
@@ -87,6 +87,26 @@ pub trait Energy<S: Scalar, const N: usize> {
 
     /// The largest eigenvalue [N/m] of its stiffness: of all vertices together.
     fn stiffness(&self) -> S;
+
+    /// Change of the energy [J] as the vertices move by `d` [m]. Where no kind has a better way this is a difference,
+    /// good to the round-off of the energy: ask in double precision.
+    fn energy_change(&self, x: &[Vec3<S>; N], d: &[Vec3<S>; N]) -> S {
+        let mut moved = *x;
+        for i in 0..N {
+            moved[i] += d[i];
+        }
+        self.energy(&moved) - self.energy(x)
+    }
+
+    /// Second derivative [N/m] of the energy by the vertices of row and column, or a positive semidefinite
+    /// approximation of it. Without a better one: [`Energy::curvature`] in every direction of each vertex by itself.
+    fn blocks(&self, _x: &[Vec3<S>; N]) -> [[Mat3<S>; N]; N] {
+        let mut blocks = [[Mat3::ZERO; N]; N];
+        for i in 0..N {
+            blocks[i][i] = Mat3::IDENTITY * self.curvature();
+        }
+        blocks
+    }
 }
 
 /// An element that XPBD can solve: `M` constraints with a multiplier each. A kind that is none has no multipliers

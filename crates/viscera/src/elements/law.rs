@@ -24,6 +24,14 @@ pub trait Law: Copy + Send + Sync {
     /// Bound [Pa/m^2] of the curvature of the energy density by one corner, for the corner's shape gradient
     /// `g` [1/m]: the vertex's diagonal block without its negative part.
     fn curvature<S: Scalar>(f: &Mat3<S>, g: Vec3<S>, lambda: S, mu: S) -> S;
+
+    /// `W(F + D) - W(F)` [Pa] without the cancellation of a difference: its round-off is that of its terms, which
+    /// vanish with `d`.
+    fn energy_change<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lambda: S, mu: S) -> S;
+
+    /// Second derivative `D : d2W/dF2 : D` [Pa] of the energy density along `d`: exact, and a positive semidefinite
+    /// one that drops what may be negative.
+    fn curvature_along<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lambda: S, mu: S) -> [S; 2];
 }
 
 /// How many laws there are.
@@ -106,6 +114,17 @@ impl Law for SaintVenantKirchhoff {
         stretch_curvature(f, g, lambda, mu)
             + (S::TWO * mu * along + pressure * g.length_squared()).max(S::ZERO)
     }
+
+    #[inline(always)]
+    fn energy_change<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lambda: S, mu: S) -> S {
+        let (strain, change) = (green_strain::strain(f), green_strain::strain_change(f, d));
+        green_strain::energy_density_change(&strain, &change, lambda, mu)
+    }
+
+    #[inline(always)]
+    fn curvature_along<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lambda: S, mu: S) -> [S; 2] {
+        green_strain::curvature_along(f, d, &green_strain::strain(f), lambda, mu)
+    }
 }
 
 impl Law for StableNeoHookean {
@@ -127,6 +146,16 @@ impl Law for StableNeoHookean {
     fn curvature<S: Scalar>(f: &Mat3<S>, g: Vec3<S>, lambda: S, mu: S) -> S {
         let volume = (f.cofactor() * g).length_squared();
         mu * g.length_squared() + (lambda + mu) * volume
+    }
+
+    #[inline(always)]
+    fn energy_change<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lambda: S, mu: S) -> S {
+        neo_hookean::energy_change(f, d, lambda, mu)
+    }
+
+    #[inline(always)]
+    fn curvature_along<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lambda: S, mu: S) -> [S; 2] {
+        neo_hookean::curvature_along(f, d, lambda, mu)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::CornerLoad;
 use super::kinds::{CONSTANTS, Constant, Energy, Kind, Legal, Moment, XpbdBlock};
-use crate::scalar::{Real, Scalar, Vec3};
+use crate::scalar::{Mat3, Real, Scalar, Vec3};
 
 /// The kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -55,6 +55,10 @@ impl<S: Real> Energy<S, 2> for Spring<S> {
     fn stiffness(&self) -> S {
         S::TWO * self.stiffness
     }
+
+    fn blocks(&self, x: &[Vec3<S>; 2]) -> [[Mat3<S>; 2]; 2] {
+        blocks(x, self.rest_length, self.stiffness)
+    }
 }
 
 impl<S: Real> XpbdBlock<S, 2, 1> for Spring<S> {
@@ -106,6 +110,19 @@ pub fn forces<S: Scalar>(x: &[Vec3<S>; 2], rest_length: S, stiffness: S) -> [Vec
     let (n, length) = direction(x);
     let pull = n * (stiffness * (length - rest_length));
     [pull, -pull]
+}
+
+/// Second derivative [N/m] of the energy by the two ends without its negative part, which a spring shorter than at
+/// rest has across: `B = k n n^T + k max(0, 1 - L/l) (I - n n^T)`, with `-B` between the ends. Exact where the spring is
+/// stretched.
+#[inline(always)]
+pub fn blocks<S: Scalar>(x: &[Vec3<S>; 2], rest_length: S, stiffness: S) -> [[Mat3<S>; 2]; 2] {
+    let (n, length) = direction(x);
+    let slack = rest_length / length.max(S::from_f64(SHORTEST));
+    let across = stiffness * (S::ONE - slack).max(S::ZERO);
+    let block = Mat3::outer(n, n) * (stiffness - across) + Mat3::IDENTITY * across;
+    let other = block * -S::ONE;
+    [[block, other], [other, block]]
 }
 
 /// One solve: change of the multiplier [J s^2 / m] and of the two positions [m].

@@ -410,6 +410,13 @@ impl<S: Scalar> Mat3<S> {
         a.dot(a) + b.dot(b) + c.dot(c)
     }
 
+    /// Inner product `A : B`: the sum of the products of entries at the same place.
+    #[inline(always)]
+    pub fn dot(self, other: Self) -> S {
+        let ([a, b, c], [d, e, f]) = (self.columns, other.columns);
+        a.dot(d) + b.dot(e) + c.dot(f)
+    }
+
     /// The outer product `a b^T`.
     #[inline(always)]
     pub fn outer(a: Vec3<S>, b: Vec3<S>) -> Self {

@@ -41,7 +41,9 @@ pub use step::balance;
 use step::data::Step;
 #[cfg(feature = "gpu")]
 #[doc(hidden)]
-pub use step::tissue::{TISSUE_WGSL, Tissue};
+pub use step::tissue::TISSUE_WGSL;
+#[doc(hidden)]
+pub use step::tissue::Tissue;
 pub use xpbd::acceleration;
 
 /// A solver for one model. All memory is taken when it is built; a step allocates nothing, but for

@@ -5,6 +5,8 @@
 #![allow(unsafe_code)]
 
 use crate::common::Random;
+use crate::common::tets::{DEFORMATIONS, deformation};
+use viscera::elements::law::{Law, SaintVenantKirchhoff, StableNeoHookean};
 use viscera::elements::singular_values::signed_svd;
 use viscera::elements::{CornerLoad, TetCorrection, deformation_gradient};
 use viscera::elements::{green_strain, neo_hookean, neo_hookean_pair, neo_hookean_stretch};
@@ -284,6 +286,15 @@ impl<T: Scalar> Tet<T> {
     }
 }
 
+/// Of a law, along a change of `F` made of the numbers at hand.
+#[inline(always)]
+fn change_and_curvatures<W: Law, T: Scalar>(t: &Tet<T>) -> Vec<T> {
+    let [a, b, c, d, e, f] = t.target;
+    let along = Mat3::from_columns(vec3(a, b, c), vec3(d, e, f), vec3(b, d, f));
+    let [exact, bound] = W::curvature_along(&t.f, &along, t.lambda, t.mu);
+    vec![W::energy_change(&t.f, &along, t.lambda, t.mu), exact, bound]
+}
+
 /// Functions of a tetrahedron, each compiled by itself: all in one would take minutes.
 macro_rules! of_a_tetrahedron {
     ($($name:ident: $tet:ident => $results:expr;)*) => {
@@ -336,6 +347,8 @@ of_a_tetrahedron! {
         results.extend(numbers(&neo_hookean::piola(&t.f, t.lambda, t.mu)));
         results
     };
+    GreenChange: t => change_and_curvatures::<SaintVenantKirchhoff, T>(&t);
+    NeoHookeanChange: t => change_and_curvatures::<StableNeoHookean, T>(&t);
     PairSolve: t => {
         let (l, s) = ([t.l[0], t.l[1]], t.step_volume);
         correction(&neo_hookean_pair::solve(&t.x, &t.w, &t.shape, &l, t.lambda, t.mu, s))
@@ -355,30 +368,6 @@ of_a_tetrahedron! {
     };
 }
 
-/// Deformations of every kind: at rest to the bit, small, large, turned, flat, a line, a point, inside
-/// out. Their singular values take from none to all of the sweeps, so that lanes leave at different
-/// times.
-fn deformation(random: &mut Random, kind: u64) -> Mat3<f64> {
-    let mut any = |size: f64| {
-        Mat3::from_columns(random.vector(size), random.vector(size), random.vector(size))
-    };
-    let diagonal = |a: f64, b: f64, c: f64| {
-        Mat3::from_columns(vec3(a, 0.0, 0.0), vec3(0.0, b, 0.0), vec3(0.0, 0.0, c))
-    };
-    match kind {
-        0 => Mat3::IDENTITY,
-        1 => Mat3::IDENTITY + any(1e-3),
-        2 => any(2.0),
-        3 => random.rotation() * diagonal(1.3, 1.0, 0.7),
-        4 => random.rotation() * diagonal(1.0, 1.0, 0.0) * random.rotation(),
-        5 => random.rotation() * diagonal(3.0, 0.0, 0.0) * random.rotation(),
-        6 => Mat3::ZERO,
-        7 => random.rotation() * diagonal(1.0, 0.9, -0.2) * random.rotation(),
-        8 => diagonal(0.5, -2.0, 1.0),
-        _ => any(1e3),
-    }
-}
-
 fn tetrahedron<R: Real>(random: &mut Random) -> [R; TET] {
     let rest = loop {
         let edges =
@@ -387,7 +376,7 @@ fn tetrahedron<R: Real>(random: &mut Random) -> [R; TET] {
             break edges;
         }
     };
-    let kind = random.next() % 10;
+    let kind = random.next() % DEFORMATIONS;
     let edges = deformation(random, kind) * rest;
     let first = random.vector(0.1);
     let mut values: Vec<f64> = first.to_array().to_vec();

@@ -13,6 +13,7 @@ mod element_solves;
 mod elements;
 mod embed;
 mod energy;
+mod energy_changes;
 mod example;
 mod explicit;
 mod explicit_limit;

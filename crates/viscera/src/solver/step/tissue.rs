@@ -90,6 +90,46 @@ impl<S: Scalar> Tissue<S> {
         let (lambda, mu) = (self.lame_lambda, self.lame_mu);
         L::curvature(f, g, lambda, mu) + self.viscosity_rate * stretch_curvature(f, g, lambda, mu)
     }
+
+    /// Change [Pa] of the elastic and the viscous density from `F` to `F + D`, by a law that is known when this is
+    /// compiled; see [`Law::energy_change`]. `start` is the Green strain at the start of the step, where the tissue is
+    /// viscous.
+    #[inline(always)]
+    pub fn energy_change_of<L: Law>(
+        &self,
+        f: &Mat3<S>,
+        d: &Mat3<S>,
+        start: Option<&Voigt<S>>,
+    ) -> S {
+        let (lambda, mu) = (self.lame_lambda, self.lame_mu);
+        let mut energy = L::energy_change(f, d, lambda, mu);
+        if let Some(start) = start {
+            let (before, change) = (change_since(f, start), green_strain::strain_change(f, d));
+            let viscous = green_strain::energy_density_change(&before, &change, lambda, mu);
+            energy += self.viscosity_rate * viscous;
+        }
+        energy
+    }
+
+    /// Second derivative [Pa] of the elastic and the viscous density along `d`: exact, and a positive semidefinite
+    /// one; see [`Law::curvature_along`]. `start` as in [`Tissue::energy_change_of`].
+    #[inline(always)]
+    pub fn curvature_along_of<L: Law>(
+        &self,
+        f: &Mat3<S>,
+        d: &Mat3<S>,
+        start: Option<&Voigt<S>>,
+    ) -> [S; 2] {
+        let (lambda, mu) = (self.lame_lambda, self.lame_mu);
+        let [mut exact, mut bound] = L::curvature_along(f, d, lambda, mu);
+        if let Some(start) = start {
+            let change = change_since(f, start);
+            let viscous = green_strain::curvature_along(f, d, &change, lambda, mu);
+            exact += self.viscosity_rate * viscous[0];
+            bound += self.viscosity_rate * viscous[1];
+        }
+        [exact, bound]
+    }
 }
 
 /// Change of the Green strain since the start of the step.

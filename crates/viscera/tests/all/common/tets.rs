@@ -70,3 +70,30 @@ pub fn cases() -> Vec<Case> {
     }
     cases
 }
+
+/// Kinds of [`deformation`].
+pub const DEFORMATIONS: u64 = 10;
+
+/// Deformations of every kind: at rest to the bit, small, large, turned, flat, a line, a point, inside
+/// out. Their singular values take from none to all of the sweeps, so that lanes leave at different
+/// times.
+pub fn deformation(random: &mut Random, kind: u64) -> Mat3<f64> {
+    let mut any = |size: f64| {
+        Mat3::from_columns(random.vector(size), random.vector(size), random.vector(size))
+    };
+    let diagonal = |a: f64, b: f64, c: f64| {
+        Mat3::from_columns(vec3(a, 0.0, 0.0), vec3(0.0, b, 0.0), vec3(0.0, 0.0, c))
+    };
+    match kind {
+        0 => Mat3::IDENTITY,
+        1 => Mat3::IDENTITY + any(1e-3),
+        2 => any(2.0),
+        3 => random.rotation() * diagonal(1.3, 1.0, 0.7),
+        4 => random.rotation() * diagonal(1.0, 1.0, 0.0) * random.rotation(),
+        5 => random.rotation() * diagonal(3.0, 0.0, 0.0) * random.rotation(),
+        6 => Mat3::ZERO,
+        7 => random.rotation() * diagonal(1.0, 0.9, -0.2) * random.rotation(),
+        8 => diagonal(0.5, -2.0, 1.0),
+        _ => any(1e3),
+    }
+}
