@@ -11,7 +11,7 @@ mod methods;
 mod multipliers;
 mod panels;
 mod stability;
-mod step;
+pub mod step;
 mod stiffness;
 
 use crate::sections::{Context, Program, Section};

@@ -5,6 +5,9 @@ use super::{
     settings_table, truth, value_error, whole, wrong_type,
 };
 
+use crate::material::MaterialConstants;
+use crate::scalar::Real;
+
 choices! {
     /// Floating point format of the simulation state.
     pub enum Precision {
@@ -35,6 +38,9 @@ pub enum Threads {
 
 /// The most threads that can be asked for: more than any machine has processors that share memory.
 pub const MOST_THREADS: u32 = 1024;
+
+/// The most pairs that the quasi-Newton method keeps.
+pub const MOST_HISTORY: usize = 10;
 
 /// The device that computes a simulation's steps.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -172,7 +178,7 @@ settings_table! {
         integrator: Integrator = (Integrator::Sdirk2), one_of::<Integrator>();
         /// How many past steps "quasi_newton" learns the curvature from; 0 chooses by Poisson's ratio: 3 up to 0.4,
         /// above it 10.
-        history: u32 = 0, whole(0, 10);
+        history: u32 = 0, whole(0, MOST_HISTORY as u32);
         /// Colours of the constraint graph: "unlimited" for Gauss-Seidel, 1 for Jacobi, a few
         /// for clique separation. Fewer run more in parallel and need more sweeps.
         colors: Colors = (Colors::Unlimited), COLORS;
@@ -242,6 +248,21 @@ settings_table! {
 }
 
 impl SolverSettings {
+    /// Pairs that "quasi_newton" keeps, for these materials.
+    pub(crate) fn history_for<S: Real>(&self, materials: &[MaterialConstants<S>]) -> u32 {
+        match self.history {
+            0 if largest_poisson(materials) > 0.41 => MOST_HISTORY as u32,
+            0 => 3,
+            chosen => chosen,
+        }
+    }
+
+    /// Passes per solve of "quasi_newton", for these materials.
+    pub(crate) fn passes_for<S: Real>(&self, materials: &[MaterialConstants<S>]) -> u32 {
+        let _ = materials;
+        self.iterations
+    }
+
     /// Whether steps are guarded: published XPBD is shown as it is.
     pub(crate) fn guards_steps(&self) -> bool {
         self.step_guard && self.rebase && self.method == Method::Xpbd
@@ -261,6 +282,15 @@ impl SolverSettings {
         Table::values(self, &mut values);
         values
     }
+}
+
+/// Poisson's ratio of the least compressible material.
+fn largest_poisson<S: Real>(materials: &[MaterialConstants<S>]) -> f64 {
+    let ratio = |material: &MaterialConstants<S>| {
+        let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(S::to_f64);
+        0.5 * lambda / (lambda + mu)
+    };
+    materials.iter().map(ratio).fold(0.0, f64::max)
 }
 
 /// Reads a count, or the word that stands for none.

@@ -21,6 +21,9 @@ pub fn diverged(scene: &Scene) -> String {
         return either(&[&lower, "choose solver.method = \"xpbd\""]);
     }
     let mut choices = vec!["raise solver.substeps"];
+    if solver.method == Method::QuasiNewton {
+        return either(&choices);
+    }
     if solver.relaxation > 1.0 {
         choices.push("lower solver.relaxation to 1");
     }
@@ -41,6 +44,9 @@ pub fn budget(scene: &Scene) -> String {
     let solver = &scene.solver;
     if solver.method == Method::Explicit {
         return "raise time.duration".into();
+    }
+    if solver.method == Method::QuasiNewton {
+        return "raise solver.iterations or solver.substeps".into();
     }
     let off: Vec<&str> = [
         ("solver.rebase = true", solver.rebase),
@@ -70,7 +76,7 @@ pub fn inverted(scene: &Scene) -> String {
     if has(MaterialModel::SaintVenantKirchhoff) {
         choices.push("use model = \"stable_neo_hookean\", which resists it");
     }
-    if scene.solver.method == Method::Xpbd {
+    if scene.solver.method != Method::Explicit {
         choices.push("raise solver.iterations");
     }
     if choices.is_empty() {

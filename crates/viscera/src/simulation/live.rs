@@ -10,7 +10,7 @@ use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
 use crate::settings::{Precision, SolverSettings};
 use crate::solver::balance::ForceBalance;
-use crate::state::State;
+use crate::state::{Learned, State};
 
 /// What was done by hand since the beginning or the last [`Simulation::reset`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -146,7 +146,9 @@ impl<S: Real> Simulation<S> {
         let state = State { positions, velocities, ..State::at_rest(&fork.model) };
         fork.begin_at(state);
         // Constraints in the same order, which settings decide, go on with the multipliers they have.
-        let order = |solver: &SolverSettings| (solver.colors, solver.neo_hookean, solver.rebase);
+        let order = |solver: &SolverSettings| {
+            (solver.method, solver.colors, solver.neo_hookean, solver.rebase)
+        };
         let same_order = order(&self.scene.solver) == order(&fork.scene.solver);
         if same_order && self.layout().multiplier_count == fork.layout().multiplier_count {
             let whole = self.whole_state();
@@ -154,7 +156,9 @@ impl<S: Real> Simulation<S> {
             let positions = std::mem::take(&mut fork.state.positions);
             let velocities = std::mem::take(&mut fork.state.velocities);
             let multiplier_dt = whole.multiplier_dt;
-            fork.put(State { positions, velocities, multipliers: kept, multiplier_dt });
+            let Learned { pairs, parts } = whole.learned;
+            let learned = Learned { pairs: double(&pairs), parts };
+            fork.put(State { positions, velocities, multipliers: kept, multiplier_dt, learned });
         }
         Ok(fork)
     }

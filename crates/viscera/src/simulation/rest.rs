@@ -111,7 +111,7 @@ impl RestReport {
                 (time + self.time_left()).ceil(),
                 match scene.solver.method {
                     Method::Xpbd => ", or solver.iterations, which brings it there faster",
-                    Method::Explicit => "",
+                    Method::Explicit | Method::QuasiNewton => "",
                 },
             ),
             Standing::Elsewhere if !self.stable => format!(

@@ -12,10 +12,10 @@ use crate::layout::Layout;
 use crate::measure::measure_tets;
 use crate::model::for_each_kind;
 use crate::scalar::{Real, Vec3};
-use crate::state::State;
+use crate::state::{Learned, LearnedPart, State};
 
 /// Raised whenever the bytes mean something else.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// What the bytes begin with.
 const MAGIC: &[u8; 8] = b"viscera\x1a";
@@ -83,6 +83,9 @@ struct Saved {
     before: Vectors,
     multipliers: Vec<f64>,
     multiplier_dt: f64,
+    /// See [`Learned`].
+    pairs: Vectors,
+    learned: Vec<LearnedPart>,
     taken: Vec<Option<Vectors>>,
 }
 
@@ -98,7 +101,8 @@ impl<S: Real> Simulation<S> {
     /// The simulation as it is after the last frame. [`Simulation::resume`] of one of the same scene goes on
     /// from there.
     pub fn save(&self) -> Vec<u8> {
-        let State { positions, velocities, multipliers, multiplier_dt } = &self.whole_state();
+        let state = self.whole_state();
+        let State { positions, velocities, multipliers, multiplier_dt, learned } = &state;
         let saved = Saved {
             precision: size_of::<S>() as u8,
             model: fingerprint(self.layout()),
@@ -111,6 +115,8 @@ impl<S: Real> Simulation<S> {
             before: bare(&self.before),
             multipliers: multipliers.iter().map(|l| l.to_f64()).collect(),
             multiplier_dt: *multiplier_dt,
+            pairs: bare(&learned.pairs),
+            learned: learned.parts.clone(),
             taken: self.taken.all().iter().map(|taken| taken.as_deref().map(bare)).collect(),
         };
         let mut bytes = MAGIC.to_vec();
@@ -160,6 +166,7 @@ impl<S: Real> Simulation<S> {
             velocities: dressed(&saved.velocities),
             multipliers: saved.multipliers.iter().map(|&l| S::from_f64(l)).collect(),
             multiplier_dt: saved.multiplier_dt,
+            learned: Learned { pairs: dressed(&saved.pairs), parts: saved.learned },
         });
         self.inputs = self.inputs_at(self.time());
         measure_tets(&self.model, &self.state.positions, &mut self.tets);

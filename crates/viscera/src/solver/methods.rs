@@ -1,7 +1,7 @@
 //! The methods of solution: one arm for each.
 
-use super::plan::Plan;
-use super::{explicit, xpbd};
+use super::plan::{Plan, Times};
+use super::{explicit, quasi_newton, xpbd};
 use crate::layout::Layout;
 use crate::scalar::Real;
 use crate::settings::{Method, SolverSettings};
@@ -12,15 +12,21 @@ impl Plan {
         match settings.method {
             Method::Xpbd => xpbd::plan(model, settings),
             Method::Explicit => explicit::plan(),
+            Method::QuasiNewton => quasi_newton::plan(settings, &model.materials),
         }
     }
 
     /// Iterations of the steps to come, where the method has iterations.
-    pub fn set_iterations(&mut self, settings: &SolverSettings) {
+    pub fn set_iterations<S: Real>(&mut self, layout: &Layout<S>, settings: &SolverSettings) {
         match settings.method {
-            Method::Xpbd => self.repeat = settings.iterations,
+            Method::Xpbd => {
+                if let Some(iteration) = self.iteration_mut() {
+                    iteration.most = Times::Count(settings.iterations);
+                }
+            }
             // Small steps are counted by the step.
             Method::Explicit => {}
+            Method::QuasiNewton => *self = quasi_newton::plan(settings, &layout.materials),
         }
     }
 }

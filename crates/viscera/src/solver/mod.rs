@@ -5,7 +5,7 @@
 //! XPBD: sweep over constraints, [J M^-1 J^T + a~] dl = -C - a~ l,  x += M^-1 J^T dl,  l += dl
 //! ```
 //!
-//! What one step does is a list of stages ([`plan`]): those that all methods share are in `step`, those of one
+//! What one step does is a tree of stages ([`plan`]): those that all methods share are in `step`, those of one
 //! method in a folder of its name. `cpu` and `gpu` are the two backends: threads and passes, buffers and
 //! dispatches.
 
@@ -17,6 +17,7 @@ pub mod gpu;
 mod inputs;
 mod methods;
 pub mod plan;
+mod quasi_newton;
 #[cfg(test)]
 mod probe;
 mod report;
@@ -30,7 +31,7 @@ use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::settings::SolverSettings;
-use crate::state::State;
+use crate::state::{Learned, State};
 use cpu::precision::{Task, carry_out};
 pub use error::StepError;
 pub use inputs::{Inputs, Pin, Tether};
@@ -87,6 +88,7 @@ impl<S: Real> Solver<S> {
             velocities: vec![Vec3::ZERO; self.layout.vertex_count()],
             multipliers: vec![S::ZERO; self.layout.multiplier_count],
             multiplier_dt: 0.0,
+            learned: Learned::default(),
         }
     }
 
@@ -122,17 +124,17 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         let Self { settings, plan, layout, memory } = self;
-        let repeat = memory.repeats(plan, layout, inputs, dt)?;
+        let small_steps = memory.repeats(layout, inputs, dt)?;
         state.multipliers.resize(layout.multiplier_count, S::ZERO);
         let step = Step { model: layout, inputs, dt, settings };
-        carry_out(Task::Watched(plan, repeat, &mut watch), memory, &step, state);
+        carry_out(Task::Watched(plan, small_steps, &mut watch), memory, &step, state);
         Ok(())
     }
 
     /// Iterations of the steps to come, at least one; neither stages nor memory depend on them.
     pub fn set_iterations(&mut self, count: u32) {
         self.settings.iterations = count.max(1);
-        self.plan.set_iterations(&self.settings);
+        self.plan.set_iterations(&self.layout, &self.settings);
     }
 
     /// As [`Solver::step`], the first so many stages of it.
@@ -146,10 +148,10 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         let Self { settings, plan, layout, memory } = self;
-        let repeat = memory.repeats(plan, layout, inputs, dt)?;
+        let small_steps = memory.repeats(layout, inputs, dt)?;
         state.multipliers.resize(layout.multiplier_count, S::ZERO);
         let step = Step { model: layout, inputs, dt, settings };
-        carry_out(Task::Step(plan, repeat, count), memory, &step, state);
+        carry_out(Task::Step(plan, small_steps, count), memory, &step, state);
         Ok(())
     }
 
@@ -215,7 +217,7 @@ impl<S: Real> Solver<S> {
     /// How many steps have been rejected for at least one connected part of the model since the solver was
     /// built.
     pub fn rejected_steps(&self) -> u64 {
-        self.memory.guard.as_ref().map_or(0, |guard| guard.rejected)
+        self.memory.rejected_steps()
     }
 
     /// How the last step ended, for all parts of the model together; nothing before the first, and where

@@ -5,11 +5,11 @@ use crate::scalar::Real;
 use crate::settings::{Method, SolverSettings};
 use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
-use crate::solver::plan::{Plan, Stage};
+use crate::solver::plan::{Flag, Stage};
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::guard::Guard;
-use crate::solver::{explicit, step, xpbd};
-use crate::state::State;
+use crate::solver::{explicit, quasi_newton, step, xpbd};
+use crate::state::{Learned, State};
 
 /// Everything that a step needs beside model and state.
 #[derive(Clone, Debug)]
@@ -25,6 +25,7 @@ pub struct Memory<S> {
 pub enum MethodMemory<S> {
     Xpbd(xpbd::Memory<S>),
     Explicit(explicit::Memory<S>),
+    QuasiNewton(Box<quasi_newton::Memory<S>>),
 }
 
 impl<S: Real> Memory<S> {
@@ -37,6 +38,10 @@ impl<S: Real> Memory<S> {
             }
             Method::Explicit => {
                 (MethodMemory::Explicit(explicit::Memory::new(model, settings)), true)
+            }
+            Method::QuasiNewton => {
+                let memory = quasi_newton::Memory::new(model, settings);
+                (MethodMemory::QuasiNewton(Box::new(memory)), true)
             }
         };
         Self {
@@ -51,31 +56,59 @@ impl<S: Real> Memory<S> {
         let of_method = match &self.method {
             MethodMemory::Xpbd(memory) => memory.bytes(),
             MethodMemory::Explicit(memory) => memory.bytes(),
+            MethodMemory::QuasiNewton(memory) => memory.bytes(),
         };
         self.data.bytes() + self.guard.as_ref().map_or(0, Guard::bytes) + of_method
+    }
+
+    /// Steps that were rejected for at least one part.
+    pub fn rejected_steps(&self) -> u64 {
+        match &self.method {
+            MethodMemory::QuasiNewton(memory) => memory.rejected,
+            _ => self.guard.as_ref().map_or(0, |guard| guard.rejected),
+        }
     }
 
     /// The largest small step [s] of the explicit method; infinite for others.
     pub fn stable_step(&self) -> f64 {
         match &self.method {
             MethodMemory::Explicit(memory) => memory.stability.step,
-            MethodMemory::Xpbd(_) => f64::INFINITY,
+            MethodMemory::Xpbd(_) | MethodMemory::QuasiNewton(_) => f64::INFINITY,
         }
     }
 
-    /// How often the body of the plan is run in a step of `dt` [s].
+    /// How many small steps a step of `dt` [s] has: what [`Times::SmallSteps`] stands for. One where the method
+    /// has none.
+    ///
+    /// [`Times::SmallSteps`]: crate::solver::plan::Times::SmallSteps
     pub fn repeats(
         &mut self,
-        plan: &Plan,
         model: &Layout<S>,
         inputs: &Inputs<S>,
         dt: f64,
     ) -> Result<u32, StepError> {
         match &mut self.method {
-            MethodMemory::Xpbd(_) => Ok(plan.repeat),
+            MethodMemory::Xpbd(_) | MethodMemory::QuasiNewton(_) => Ok(1),
             MethodMemory::Explicit(memory) => {
                 memory.count_small_steps(model, inputs, &mut self.data, dt)
             }
+        }
+    }
+
+    /// Whether a loop that waits for the flag ends.
+    pub fn is_set(&self, flag: Flag) -> bool {
+        match (flag, &self.method) {
+            // Both make all the passes that they are given.
+            (Flag::AllDone, MethodMemory::Xpbd(_) | MethodMemory::Explicit(_)) => false,
+            (Flag::AllDone, MethodMemory::QuasiNewton(memory)) => memory.is_all_done(),
+        }
+    }
+
+    /// Starts a new history: what was learned is forgotten, multipliers follow from positions.
+    pub fn restart(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
+        state.learned = Learned::default();
+        if !matches!(self.method, MethodMemory::QuasiNewton(_)) {
+            xpbd::history::restart(step, &mut self.data, state);
         }
     }
 
@@ -91,6 +124,9 @@ impl<S: Real> Memory<S> {
                 memory.run(stage, step, data, guard.as_mut(), state);
             }
             (Stage::Explicit(stage), MethodMemory::Explicit(memory)) => {
+                memory.run(stage, step, data, state);
+            }
+            (Stage::QuasiNewton(stage), MethodMemory::QuasiNewton(memory)) => {
                 memory.run(stage, step, data, state);
             }
             (stage, _) => unreachable!("{stage:?} is not of the method that the memory is for"),

@@ -53,7 +53,7 @@ impl GpuSolver {
         // Small explicit steps take springs as forces.
         let squared_dt = match self.settings.method {
             Method::Xpbd => (dt * dt) as f32,
-            Method::Explicit => 0.0,
+            Method::Explicit | Method::QuasiNewton => 0.0,
         };
         for update in &mut self.updates {
             self.update_of[update.vertex as usize] = u32::MAX;

@@ -109,6 +109,9 @@ impl GpuSolver {
         if settings.precision == Precision::F64 {
             return Err(GpuError::DoublePrecision);
         }
+        if settings.method == Method::QuasiNewton {
+            return Err(GpuError::OnlyOnCpu);
+        }
         device.check()?;
         // Sizes are compared array by array, below.
         let wgpu::Limits { max_storage_buffer_binding_size, max_buffer_size, .. } = baseline();
@@ -143,6 +146,7 @@ impl GpuSolver {
             device: device.clone(),
             settings: settings.clone(),
             falls: plan
+                .split()
                 .prologue
                 .contains(&StepStage::Predict(Start::Auto).into())
                 .then(|| Falls::new(&laid)),
@@ -222,7 +226,7 @@ impl GpuSolver {
     /// Iterations of the steps to come, at least one; neither stages nor memory depend on them.
     pub fn set_iterations(&mut self, count: u32) {
         self.settings.iterations = count.max(1);
-        self.plan.set_iterations(&self.settings);
+        self.plan.set_iterations(&self.layout, &self.settings);
     }
 
     /// About how many tetrahedra of meshes like this one, solved like this, a device with these limits

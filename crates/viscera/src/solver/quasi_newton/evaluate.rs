@@ -285,11 +285,11 @@ struct Along<'a, S> {
 impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Along<'_, S>, W, VISCOUS> {
     #[inline(always)]
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
-        let Along { x, direction, start_strain, dt, sums } = self.pass;
+        let Along { x, direction, start_strain, dt, ref sums } = *self.pass;
         let shape = tets.shape::<L>();
         let f = deformation_gradient(&tets.corners::<L>(x).x, &shape);
         let d = deformation_gradient(&tets.corners::<L>(direction).x, &shape);
-        let tissue = Tissue::new(W::MODEL, &tets.material(), *dt);
+        let tissue = Tissue::new(W::MODEL, &tets.material(), dt);
         let mut start = [L::ZERO; 6];
         let is_viscous = VISCOUS && tets.is_viscous();
         if is_viscous {
@@ -328,7 +328,7 @@ struct Tets<'a, S> {
 impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Tets<'_, S>, W, VISCOUS> {
     #[inline(always)]
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
-        let Tets { from, to, start_strain, dt, loads, sum } = self.pass;
+        let Tets { from, to, start_strain, dt, loads, ref sum } = *self.pass;
         let (x, before) = (tets.corners::<L>(to).x, tets.corners::<L>(from).x);
         // Back along the way: the change from `y` to `x`, turned round.
         let mut back = before;
@@ -338,7 +338,7 @@ impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Tets<'_, S>,
         let shape = tets.shape::<L>();
         let f = deformation_gradient(&x, &shape);
         let d = deformation_gradient(&back, &shape);
-        let tissue = Tissue::new(W::MODEL, &tets.material(), *dt);
+        let tissue = Tissue::new(W::MODEL, &tets.material(), dt);
         let mut start = [L::ZERO; 6];
         let is_viscous = VISCOUS && tets.is_viscous();
         if is_viscous {

@@ -27,6 +27,7 @@ use std::ops::Range;
 use crate::layout::{Before, Layout, Moments};
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
+use crate::material::MaterialConstants;
 use crate::settings::{Integrator, SolverSettings};
 use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
 use crate::solver::step::data::{Step, StepData};
@@ -55,8 +56,8 @@ const MOST_FAILURES: u32 = 2;
 const MORE_ITERATIONS: u32 = 4;
 
 /// The stages of a step.
-pub fn plan(settings: &SolverSettings) -> Plan {
-    let iterations = settings.iterations();
+pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S>]) -> Plan {
+    let iterations = settings.passes_for(materials);
     let solve = |solve: Solve, iterations: u32| {
         use QuasiNewtonStage::{Advance, ChooseDirection, EndSolve, Evaluate, Judge, Precondition, StartSolve};
         let body = [Evaluate, Judge, Precondition, ChooseDirection, Advance];

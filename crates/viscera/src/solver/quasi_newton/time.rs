@@ -68,8 +68,12 @@ impl<S: Real> Memory<S> {
             };
         }
         self.begin_energy(step, data);
-        // Where pins are to be, so that the preconditioner sees the tissue they leave behind.
-        self.base.copy_from_slice(&data.constants.previous);
+        // Where the tissue turns to in this step.
+        let share = if first == Solve::Euler { 1.0 } else { 0.5 };
+        let ahead = S::from_f64(share * step.dt);
+        for (v, place) in self.base.iter_mut().enumerate() {
+            place.set_vec3(data.points[v].vec3() + data.velocities[v] * ahead);
+        }
         self.refresh(&solve, data, &state.learned);
         state.multiplier_dt = dt;
     }

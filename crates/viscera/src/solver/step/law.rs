@@ -25,7 +25,7 @@ macro_rules! with_tissue {
         })
     };
 }
-pub(super) use with_tissue;
+pub(in crate::solver) use with_tissue;
 
 /// A pass over tetrahedra of one law.
 pub struct OfLaw<'a, P, W, const VISCOUS: bool> {

@@ -2,15 +2,15 @@
 
 pub mod balance;
 pub mod data;
-mod energy;
+pub mod energy;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod gradient;
 pub mod guard;
-mod law;
+pub mod law;
 #[cfg(feature = "gpu")]
 pub mod modes;
-mod potential;
+pub mod potential;
 pub mod predict;
 pub mod stage;
 pub mod strain;

@@ -30,7 +30,7 @@ use rotation::rotation_of;
 use sums::{DiagonalSums, FullSums, Grouped, Groups, On, Six, inverse, rotated, tets_of_part, times};
 
 /// Nodes of the coarsest level at most, where the levels can be made so: a dense system of three times as many.
-const MOST_COARSE: usize = 32;
+const MOST_COARSE: usize = 64;
 
 /// Of all parts.
 #[derive(Clone, Debug)]
@@ -156,7 +156,7 @@ impl<S: Real> OfPart<S> {
             }
         });
         let lattice = Lattice::new(&places, &tets, &links, MOST_COARSE);
-        let count = |level: usize| if level == 0 { places.len() } else { lattice.levels[level - 1].node_count };
+        let count = |level: usize| if level == 0 { places.len() } else { lattice.levels[level - 1].node_count() };
         let ways_up = lattice.levels.iter().enumerate().map(|(level, of)| {
             let weights = if level == 0 { &of.of_vertices } else { &of.of_finer };
             Prolongation {

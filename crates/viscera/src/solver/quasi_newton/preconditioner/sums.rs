@@ -75,7 +75,7 @@ impl Grouped {
     pub fn new(tets: &[LocalTet], places: &[Vec3<f64>], lattice: &Lattice) -> Self {
         let cell = |tet: &LocalTet| {
             let sum = tet.vertices.iter().fold(Vec3::ZERO, |sum: Vec3<f64>, &v| sum + places[v as usize]);
-            let at = (sum * 0.25 - lattice.origin) * (1.0 / lattice.spacing);
+            let at = (sum * 0.25 - lattice.origin) * (GROUPS / lattice.spacing);
             [at.z, at.y, at.x].map(|x| x.floor() as i64)
         };
         let mut order: Vec<(_, u32)> = tets.iter().map(cell).zip(0..).collect();
@@ -128,7 +128,7 @@ fn root(parent: &mut [u32], mut i: u32) -> u32 {
 impl<S: Real> Groups<S> {
     pub fn new(tets: &[LocalTet], grouped: &Grouped, vertex_count: usize) -> Self {
         let mut groups = Self { offsets: vec![0], entries: Vec::new() };
-        let mut sums = Gathered::new(vertex_count);
+        let mut sums = Gathered::<Vec3<f64>>::new(vertex_count);
         for group in 0..grouped.len() {
             sums.begin();
             for &tet in grouped.tets(group) {
@@ -196,7 +196,7 @@ impl On<'_> {
         match self {
             Self::Vertices => with(v, 1.0),
             Self::Lattice(lattice, level) => {
-                for &(node, weight) in lattice.levels[level].of_vertices.row(v as usize) {
+                for &(node, weight) in lattice.levels[level].of_vertices.of(v as usize) {
                     with(node, weight);
                 }
             }
@@ -206,7 +206,7 @@ impl On<'_> {
     fn node_count(self, vertices: usize) -> usize {
         match self {
             Self::Vertices => vertices,
-            Self::Lattice(lattice, level) => lattice.levels[level].node_count,
+            Self::Lattice(lattice, level) => lattice.levels[level].node_count(),
         }
     }
 
@@ -413,3 +413,6 @@ pub fn times<S: Real>(a: &Six<S>, v: Vec3<S>) -> Vec3<S> {
         xz * v.x + yz * v.y + zz * v.z,
     )
 }
+
+/// Groups along a side of a cell.
+const GROUPS: f64 = 1.0;
