@@ -11,7 +11,7 @@ mod solver;
 mod tree;
 
 pub use solver::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, DeviceRequest, MOST_THREADS, Method,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, DeviceRequest, MOST_THREADS, Method,
     NeoHookean, Precision, RelaxationForm, SolverSettings, Start, Threads,
 };
 pub use tree::Place;

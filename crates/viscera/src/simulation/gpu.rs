@@ -135,7 +135,7 @@ fn asked_for(
 fn faster(model: &Model<f32>, settings: &SolverSettings, dt: f64) -> Backend<f32> {
     let solver = Solver::new(model, settings);
     let sweeps = match settings.method {
-        Method::Xpbd => settings.iterations,
+        Method::Xpbd => settings.iterations(),
         Method::Explicit => (dt / solver.stable_step()).ceil() as u32,
     };
     let cost = StepCost::new(solver.layout(), settings, sweeps);

@@ -18,7 +18,7 @@ impl Plan {
     /// Iterations of the steps to come, where the method has iterations.
     pub fn set_iterations(&mut self, settings: &SolverSettings) {
         match settings.method {
-            Method::Xpbd => self.repeat = settings.iterations,
+            Method::Xpbd => self.repeat = settings.iterations(),
             // Small steps are counted by the step.
             Method::Explicit => {}
         }

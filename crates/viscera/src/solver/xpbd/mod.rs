@@ -68,7 +68,7 @@ pub fn plan<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Plan {
         false => StepStage::UpdateVelocities.into(),
     });
     epilogue.push(StepStage::WriteState.into());
-    Plan { prologue, repeat: settings.iterations, body, epilogue }
+    Plan { prologue, repeat: settings.iterations(), body, epilogue }
 }
 
 /// The stages of an iteration.
