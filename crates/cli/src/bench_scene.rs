@@ -193,7 +193,7 @@ impl<'a, S: Real> Run<'a, S> {
 
     /// One frame, counted from 1; without what slows it down afterwards.
     fn advance(&mut self, frame: u32) -> Result<()> {
-        let substeps = self.solver.settings().substeps;
+        let substeps = self.solver.settings().substeps();
         let dt = self.scene.dt / f64::from(substeps);
         let ends = [frame - 1, frame].map(|end| self.scene.share(end));
         for substep in 1..=substeps {

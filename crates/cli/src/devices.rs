@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use viscera::model::{Model, ModelBuilder};
-use viscera::settings::SolverSettings;
+use viscera::settings::{Count, SolverSettings};
 #[cfg(feature = "gpu")]
 use viscera::solver::gpu::{Adapter, GpuError, GpuSolver};
 use viscera::solver::{Inputs, Solver};
@@ -152,7 +152,8 @@ impl SampleBar {
         let entry = SOLVERS.iter().find(|entry| entry.name == "jacobi");
         let entry = entry.context("`jacobi` is no longer among the solvers")?;
         // Sweeps alone: guards would be measured with them.
-        let settings = SolverSettings { iterations: SWEEPS, step_guard: false, ..entry.settings() };
+        let settings =
+            SolverSettings { iterations: Count::Of(SWEEPS), step_guard: false, ..entry.settings() };
         let subject = Subject::Bar(Size(TETS));
         let mesh = subject.mesh()?;
         let mut builder = ModelBuilder::new();

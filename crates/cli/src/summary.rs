@@ -4,6 +4,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
+use viscera::settings::SolverSettings;
 use viscera::simulation::{FrameReport, RestReport, Simulation, advice};
 
 /// The numbers of one frame and what it took.
@@ -49,7 +50,7 @@ pub struct Summary {
     pub overrides: BTreeMap<String, String>,
     /// What computed the steps, and why.
     pub device: String,
-    /// Solver settings, as a scene file would have them.
+    /// Solver settings, as a scene file would have them; automatic counts are the numbers they came to.
     pub solver: BTreeMap<&'static str, serde_json::Value>,
     /// Material of each body and region.
     pub materials: BTreeMap<String, String>,
@@ -126,12 +127,7 @@ impl Summary {
             gravity: scene.world.gravity.to_array(),
             overrides: overrides.into_iter().collect(),
             device: simulation.device_choice().to_owned(),
-            solver: scene
-                .solver
-                .values()
-                .into_iter()
-                .map(|(key, text)| (key, json(text)))
-                .collect(),
+            solver: solver_record(&scene.solver),
             materials: materials(scene),
             model: ModelSummary {
                 bodies: model.bodies.len(),
@@ -218,6 +214,14 @@ fn materials(scene: &Scene) -> BTreeMap<String, String> {
 }
 
 /// A setting as a scene file writes it is JSON as well: a number, a truth value or a quoted word.
+fn solver_record(solver: &SolverSettings) -> BTreeMap<&'static str, serde_json::Value> {
+    let values = solver.values().into_iter();
+    let mut record: BTreeMap<_, _> = values.map(|(key, text)| (key, json(text))).collect();
+    record.insert("substeps", solver.substeps().into());
+    record.insert("iterations", solver.iterations().into());
+    record
+}
+
 fn json(text: String) -> serde_json::Value {
     serde_json::from_str(&text).unwrap_or(serde_json::Value::String(text))
 }

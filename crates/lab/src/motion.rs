@@ -21,10 +21,10 @@ pub fn simulate<S: Real>(
     let model = load_case.model::<S>()?;
     let mut solver = Solver::new(&model, settings);
     let mut state = State::at_rest(&model);
-    let dt = 1.0 / FRAME_RATE / f64::from(settings.substeps);
+    let dt = 1.0 / FRAME_RATE / f64::from(settings.substeps());
     (0..frames)
         .map(|frame| {
-            for time in times(frame, settings.substeps) {
+            for time in times(frame, settings.substeps()) {
                 solver.step(&model, &mut state, &load_case.inputs(time), dt)?;
             }
             Ok(state.positions.iter().map(|x| x.cast()).collect())

@@ -71,13 +71,13 @@ pub fn settle_with<S: Real>(
     let model = load_case.model::<S>()?;
     let mut solver = Solver::new(&model, settings);
     let mut state = State::at_rest(&model);
-    let dt = 1.0 / FRAME_RATE / f64::from(settings.substeps);
+    let dt = 1.0 / FRAME_RATE / f64::from(settings.substeps());
     let (mut moving, mut rejected_moving) = (0u64, 0u64);
     let (mut fastest, mut speed) = (0.0f64, 0.0);
     for frame in 0..FRAMES {
         let before = solver.rejected_steps();
-        for substep in 1..=settings.substeps {
-            let share = f64::from(substep) / f64::from(settings.substeps);
+        for substep in 1..=settings.substeps() {
+            let share = f64::from(substep) / f64::from(settings.substeps());
             let inputs = load_case.inputs(f64::from(frame) + share);
             solver.step(&model, &mut state, &inputs, dt)?;
             let (solver, state) = (&mut solver, &mut state);
@@ -86,14 +86,14 @@ pub fn settle_with<S: Real>(
         speed = root_mean_square(&state.velocities);
         fastest = fastest.max(speed);
         if speed > STILL * fastest {
-            moving += u64::from(settings.substeps);
+            moving += u64::from(settings.substeps());
             rejected_moving += solver.rejected_steps() - before;
         }
         for velocity in &mut state.velocities {
             *velocity = *velocity * S::from_f64(KEPT_VELOCITY);
         }
     }
-    let steps = u64::from(FRAMES) * u64::from(settings.substeps);
+    let steps = u64::from(FRAMES) * u64::from(settings.substeps());
     let inputs = load_case.inputs(f64::from(FRAMES));
     let mut balance = ForceBalance::default();
     solver.force_balance(&model, &state, &inputs, &mut balance)?;

@@ -14,7 +14,7 @@ use viscera::mesh::embed::Embedding;
 use viscera::mesh::shapes;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Vec3, vec3};
-use viscera::settings::SolverSettings;
+use viscera::settings::{Count, SolverSettings};
 use viscera::solver::gpu::{Adapter, Device, GpuSolver, GpuSurface, Skin};
 use viscera::solver::{Inputs, Pin};
 use viscera_picture::{Color, ColorScale, ImageSize, Overlay, write_png};
@@ -37,7 +37,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let file = files.first().map_or("liver.png", String::as_str);
     let liver = shapes::liver(SPACING, 1.0)?;
     let tissue = Material::new(MaterialModel::StableNeoHookean, 5e3, 0.45, 1060.0)?;
-    let settings = SolverSettings { substeps: 1, iterations: 20, ..SolverSettings::default() };
+    let settings = SolverSettings {
+        substeps: Count::Of(1),
+        iterations: Count::Of(20),
+        ..SolverSettings::default()
+    };
     let mut builder = ModelBuilder::new();
     builder.add_body(&liver.tets, &tissue)?;
     let model = builder.build::<f32>()?;

@@ -246,6 +246,8 @@ mod tests {
         let expected = [("solver.iterations", "7"), ("body.bar.material.young", "100 Pa")];
         let expected = expected.map(|(key, value)| (key.to_owned(), value.to_owned()));
         assert_eq!(changes, expected);
+        let back = difference(&scene(&settings[1..]), &scene(&[])).expect("a live change");
+        assert_eq!(back, [("solver.iterations".to_owned(), "\"auto\"".to_owned())]);
         assert_eq!(difference(&scene(&settings), &scene(&settings)), Some(Vec::new()));
         assert_eq!(difference(&scene(&[]), &scene(&[("body.bar.length", "0.3 m")])), None);
         assert_eq!(difference(&scene(&[]), &scene(&[("solver.precision", "f64")])), None);

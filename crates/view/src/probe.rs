@@ -7,8 +7,8 @@ use std::sync::mpsc::{Sender, channel};
 use viscera::model::ModelBuilder;
 use viscera::scalar::Vec3;
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, Method, NeoHookean, Precision, SolverSettings,
-    Start, Threads,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, Method, NeoHookean, Precision,
+    SolverSettings, Start, Threads,
 };
 use viscera::solver::balance::ForceBalance;
 use viscera::solver::{Inputs, Solver, StepError};
@@ -64,7 +64,7 @@ impl SolverVariant {
         let base = SolverSettings {
             precision: Precision::F64,
             threads: Threads::Count(1),
-            iterations: ITERATIONS,
+            iterations: Count::Of(ITERATIONS),
             ..set.clone()
         };
         let Self::Xpbd { exact, jacobi, anderson } = self else { return base };
@@ -209,7 +209,7 @@ mod tests {
         for _ in 0..12 {
             simulation.advance().expect("a frame");
         }
-        let dt = simulation.scene().time.frame / f64::from(simulation.scene().solver.substeps);
+        let dt = simulation.scene().time.frame / f64::from(simulation.scene().solver.substeps());
         NextStep {
             solver: simulation.scene().solver.clone(),
             builder: simulation.assembly().builder.clone(),

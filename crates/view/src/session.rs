@@ -244,7 +244,7 @@ mod tests {
         let mut session = session();
         let loaded = session.compare(true, false);
         assert!(matches!(loaded.expect("a comparison")[..], [Command::Accompany(_)]));
-        let was = session.scene(Side::First).solver.iterations;
+        let was = session.scene(Side::First).solver.iterations();
         let mut change = |value| {
             let commands = session.choose(Side::First, &pair("solver.iterations", value), false);
             let runs = commands.expect("a legal change").into_iter().map(|command| match command {
@@ -257,8 +257,8 @@ mod tests {
         assert_eq!(change("7"), [(0, pair("solver.iterations", "7"))]);
         assert!(change("7").is_empty());
         let undone = session.undo().expect("the change before");
-        assert_eq!(session.scene(Side::First).solver.iterations, was);
-        assert_eq!(session.scene(Side::Second).solver.iterations, was);
+        assert_eq!(session.scene(Side::First).solver.iterations(), was);
+        assert_eq!(session.scene(Side::Second).solver.iterations(), was);
         assert!(was != 7 && undone.len() == 1);
     }
 }

@@ -104,7 +104,7 @@ fn a_typed_number_is_one_change_when_it_is_finished() {
     window.type_number("stiffness E", "12.5", Key::Enter);
     assert_eq!(young(&window), 12.5e3);
     window.type_number("iterations", "7", Key::Tab);
-    assert_eq!(window.scene().solver.iterations, 7);
+    assert_eq!(window.scene().solver.iterations(), 7);
     assert_eq!(window.texts(), [""; 0]);
     // What the simulation saw is what it was changed to.
     let path = window.folder.path().join("typed.toml");
@@ -252,7 +252,7 @@ fn a_saved_scene_is_what_was_chosen() {
     // The file that is open may vanish.
     std::fs::remove_file(&path).expect("the file");
     let scene = window.save(&folder.path().join("mine_changed.toml"));
-    assert_eq!((scene.solver.iterations, scene.solver.substeps), (7, 3));
+    assert_eq!((scene.solver.iterations(), scene.solver.substeps()), (7, 3));
     assert!(scene.changes.is_empty() && !path.exists());
 }
 
@@ -281,7 +281,7 @@ fn a_first_visit_ends_in_a_scene_that_repeats_it() {
     assert_eq!(young(&window), 20e3);
     window.press("Jacobi 40");
     assert_eq!(
-        (window.scene().solver.colors, window.scene().solver.iterations),
+        (window.scene().solver.colors, window.scene().solver.iterations()),
         (Colors::Limited(1), 40)
     );
     let number = window.harness.state().snapshot().expect("a frame").number;

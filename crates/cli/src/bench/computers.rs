@@ -5,7 +5,7 @@ use super::measurement::{Bench, DT};
 use anyhow::{Result, ensure};
 use serde::Serialize;
 use std::time::Instant;
-use viscera::settings::{SolverSettings, Threads};
+use viscera::settings::{Count, SolverSettings, Threads};
 use viscera::solver::Solver;
 use viscera::state::State;
 
@@ -108,7 +108,7 @@ pub struct CpuStepper<'a> {
 impl<'a> CpuStepper<'a> {
     pub fn new(bench: &'a Bench<'_>, threads: u32, sweeps: u32) -> Self {
         let settings = SolverSettings {
-            iterations: sweeps,
+            iterations: Count::Of(sweeps),
             threads: Threads::Count(threads),
             ..bench.entry.settings()
         };

@@ -6,7 +6,7 @@ use super::results::AdapterFacts;
 use anyhow::Result;
 use std::cell::RefCell;
 use std::time::Instant;
-use viscera::settings::SolverSettings;
+use viscera::settings::{Count, SolverSettings};
 use viscera::solver::gpu::{Adapter, Device, GpuSolver, MemoryCopy, StepTimes};
 use viscera::state::State;
 
@@ -86,7 +86,7 @@ impl Computer for Gpu {
     }
 
     fn stepper<'a>(&self, bench: &'a Bench<'_>, sweeps: u32) -> Result<Box<dyn Stepper + 'a>> {
-        let settings = SolverSettings { iterations: sweeps, ..bench.entry.settings() };
+        let settings = SolverSettings { iterations: Count::Of(sweeps), ..bench.entry.settings() };
         let solver = GpuSolver::new(&self.device()?, &bench.model, &settings)?;
         let dt = step_size(bench, sweeps, solver.stable_step());
         let rest = State::at_rest(&bench.model);

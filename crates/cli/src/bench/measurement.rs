@@ -100,7 +100,7 @@ impl<'a> Bench<'a> {
         bandwidth: Bandwidth,
         seconds: f64,
     ) -> Result<Measurement> {
-        let counts = self.entry.sweeps.unwrap_or_else(|| [self.entry.settings().iterations; 2]);
+        let counts = self.entry.sweeps.unwrap_or_else(|| [self.entry.settings().iterations(); 2]);
         let runner = |sweeps| computer.stepper(self, sweeps).map(Runner::new);
         let mut few = runner(counts[0])?;
         let mut more = self.entry.sweeps.map(|sweeps| runner(sweeps[1])).transpose()?;

@@ -6,7 +6,7 @@ use viscera::material::{Material, MaterialModel};
 use viscera::mesh::{TetMesh, io, shapes};
 use viscera::model::ModelBuilder;
 use viscera::scalar::{Real, Vec3, vec3};
-use viscera::settings::SolverSettings;
+use viscera::settings::{Count, SolverSettings};
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
@@ -77,8 +77,8 @@ fn library<S: Real>(model: MaterialModel, settings: &SolverSettings, factor: f64
     let (held, moving) = (on_face(&mesh, 0.0), on_face(&mesh, LENGTH));
     let mut frames = Vec::new();
     for frame in 0..FRAMES {
-        for substep in 1..=settings.substeps {
-            let part = f64::from(substep) / f64::from(settings.substeps);
+        for substep in 1..=settings.substeps() {
+            let part = f64::from(substep) / f64::from(settings.substeps());
             let now = share(frame) + (share(frame + 1) - share(frame)) * part;
             let pin = |v: &u32, by: Vec3<f64>| {
                 let target = mesh.vertices()[*v as usize] + by;
@@ -89,7 +89,7 @@ fn library<S: Real>(model: MaterialModel, settings: &SolverSettings, factor: f64
             let gravity = Vec3::from_f64([0.0, 0.0, -9.81]);
             let inputs = Inputs { gravity, pins, ..Inputs::default() };
             solver
-                .step(&model, &mut state, &inputs, DT / f64::from(settings.substeps))
+                .step(&model, &mut state, &inputs, DT / f64::from(settings.substeps()))
                 .expect("a step");
         }
         frames.push(state.positions.iter().flat_map(|x| x.cast::<f64>().to_array()).collect());
@@ -124,7 +124,11 @@ fn settings_are_those_of_the_library_and_the_last_of_a_key_counts() {
     let lists = ["substeps=3,iterations=9,material=snh", "iterations=4, precision=f64", ""];
     let end = run(&bench, &["--cfg", lists[0], "--cfg", lists[1], "--cfg", lists[2]]);
     assert_eq!(end.code, Some(0), "{}", end.stderr);
-    let settings = SolverSettings { substeps: 3, iterations: 4, ..SolverSettings::default() };
+    let settings = SolverSettings {
+        substeps: Count::Of(3),
+        iterations: Count::Of(4),
+        ..SolverSettings::default()
+    };
     let expected = library::<f64>(MaterialModel::StableNeoHookean, &settings, FACTOR);
     assert_eq!(positions(&bench), expected[FRAMES as usize - 1]);
     assert_eq!(timing(&bench)["material"], "snh");

@@ -148,7 +148,7 @@ fn judge(context: &mut Context, followed: &[Followed]) {
         context.document.paragraph(format!(
             "An acceleration goes where its sweep goes, only faster: after {} iterations Anderson on both \
              ends at an error of {} over published coloured sweeps, at {} over those of the exact form.",
-            exact.method.settings.iterations,
+            exact.method.settings.iterations(),
             in_words(published.curve.last()),
             in_words(exact.curve.last())
         ));

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use std::fmt;
 use viscera::material::MaterialModel;
-use viscera::settings::{AndersonOn, SolverSettings};
+use viscera::settings::{AndersonOn, Count, SolverSettings};
 use viscera_report::{Axis, Plot, Series, Style, Table};
 
 use super::Context;
@@ -55,7 +55,7 @@ impl Case<'_> {
 
 impl fmt::Display for Case<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, Anderson, {}, {}", self.load_case(), self.mix, self.settings.iterations)
+        write!(f, "{}, Anderson, {}, {}", self.load_case(), self.mix, self.settings.iterations())
     }
 }
 
@@ -85,7 +85,8 @@ pub(super) fn run(context: &mut Context) -> Result<()> {
     for step in &steps {
         for (mix, settings) in mixes() {
             cases.extend(iteration_counts(context.quick).iter().map(|&iterations| {
-                let settings = SolverSettings { iterations, ..settings.clone() };
+                let settings =
+                    SolverSettings { iterations: Count::Of(iterations), ..settings.clone() };
                 Case { step, mix, settings }
             }));
         }
@@ -134,7 +135,7 @@ fn figure(context: &mut Context, cases: &[Case], curves: &[Curve]) -> Result<()>
         let (load_case, mix) = (cases[0].load_case(), cases[0].mix);
         let mut points = Vec::new();
         for (case, curve) in cases.iter().zip(curves) {
-            let (iterations, ratio) = (case.settings.iterations, curve.strain_ratio);
+            let (iterations, ratio) = (case.settings.iterations(), curve.strain_ratio);
             points.push([f64::from(iterations), ratio]);
             let (iterations, ratio) = (iterations.to_string(), format!("{ratio:.6}"));
             data.row([&load_case, mix, &iterations, &ratio, &in_data(curve.last())]);

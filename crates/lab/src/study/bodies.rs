@@ -3,7 +3,7 @@
 use anyhow::{Context as _, Result};
 use viscera::material::MaterialModel;
 use viscera::scalar::Vec3;
-use viscera::settings::{AndersonOn, Colors, RelaxationForm, SolverSettings};
+use viscera::settings::{AndersonOn, Colors, Count, RelaxationForm, SolverSettings};
 use viscera::state::State;
 
 use super::convergence::in_data;
@@ -61,13 +61,16 @@ fn accelerations(order: Colors) -> Vec<NamedSettings> {
         NamedSettings::new("over-relaxed, consistent", relaxed(RelaxationForm::Consistent)),
         NamedSettings::new("Chebyshev", chebyshev(plain.clone(), 0.0)),
         NamedSettings::new("Anderson", anderson(plain.clone(), AndersonOn::Both)),
-        NamedSettings::new(SMALL_STEPS, SolverSettings { substeps: ITERATIONS, ..plain.clone() }),
+        NamedSettings::new(
+            SMALL_STEPS,
+            SolverSettings { substeps: Count::Of(ITERATIONS), ..plain.clone() },
+        ),
     ]
 }
 
 /// All have as many sweeps: small steps have one each.
 fn scheduled(mut method: NamedSettings) -> NamedSettings {
-    method.settings.iterations = ITERATIONS / method.settings.substeps;
+    method.settings.iterations = Count::Of(ITERATIONS / method.settings.substeps());
     method
 }
 

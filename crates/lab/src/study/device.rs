@@ -3,7 +3,7 @@
 use anyhow::Result;
 use std::sync::OnceLock;
 use viscera::scalar::{Real, Vec3};
-use viscera::settings::SolverSettings;
+use viscera::settings::{Count, SolverSettings};
 use viscera::solver::gpu::{Adapter, Device, GpuSolver};
 
 use super::step::MeasuredStep;
@@ -41,7 +41,7 @@ const MOST_DISPATCHES: usize = 6000;
 
 /// Iterations after which the device is asked where it stands: every sample is a run of its own.
 fn counts(settings: &SolverSettings, passes: usize) -> impl Iterator<Item = u32> {
-    let most = settings.iterations.min((MOST_DISPATCHES / passes.max(1)) as u32);
+    let most = settings.iterations().min((MOST_DISPATCHES / passes.max(1)) as u32);
     let decades = (0..6).flat_map(|decade| [1, 2, 5].map(|k| k * 10u32.pow(decade)));
     decades.take_while(move |k| *k <= most)
 }
@@ -56,7 +56,8 @@ pub fn follow(
     let counts: Vec<u32> = counts(settings, passes).collect();
     let most = counts.last().copied().unwrap_or(1);
     // Iterates are compared as they are, before a guard judges the end of the step.
-    let settings = SolverSettings { iterations: most, step_guard: false, ..settings.clone() };
+    let settings =
+        SolverSettings { iterations: Count::Of(most), step_guard: false, ..settings.clone() };
     let (double, single) =
         (iterates::<f64>(step, &settings, &counts)?, iterates::<f32>(step, &settings, &counts)?);
     let model = step.load_case.model::<f32>()?;
@@ -106,7 +107,7 @@ pub fn end(
     let (_, mut state) = step.begin::<f32>(&model, settings)?;
     let mut solver = GpuSolver::new(device, &model, settings)?;
     solver.write(&model, &state)?;
-    for (inputs, dt) in step.substeps(settings.substeps) {
+    for (inputs, dt) in step.substeps(settings.substeps()) {
         solver.step(&model, &inputs, dt)?;
     }
     solver.read(&model, &mut state)?;

@@ -2,7 +2,7 @@
 
 use viscera::material::MaterialModel;
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, RelaxationForm, SolverSettings, Threads,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, RelaxationForm, SolverSettings, Threads,
 };
 
 /// Settings with the name that tables and legends give them.
@@ -22,7 +22,7 @@ impl NamedSettings {
 
     /// With so many iterations.
     pub fn with_iterations(mut self, iterations: u32) -> Self {
-        self.settings.iterations = iterations;
+        self.settings.iterations = Count::Of(iterations);
         self
     }
 }
@@ -36,7 +36,7 @@ impl std::fmt::Display for NamedSettings {
 /// XPBD as published: multipliers from zero in every step, no rebase, no safeguards.
 pub fn published(colors: Colors) -> SolverSettings {
     SolverSettings {
-        substeps: 1,
+        substeps: Count::Of(1),
         colors,
         threads: Threads::Count(1),
         rebase: false,
@@ -49,7 +49,12 @@ pub fn published(colors: Colors) -> SolverSettings {
 
 /// XPBD, exact at rest: rebase, kept multipliers, safeguards.
 pub fn exact(colors: Colors) -> SolverSettings {
-    SolverSettings { substeps: 1, colors, threads: Threads::Count(1), ..SolverSettings::default() }
+    SolverSettings {
+        substeps: Count::Of(1),
+        colors,
+        threads: Threads::Count(1),
+        ..SolverSettings::default()
+    }
 }
 
 /// With over-relaxation by `omega`.

@@ -4,7 +4,7 @@ use anyhow::Result;
 use std::fmt;
 use viscera::material::MaterialModel;
 use viscera::measure::measure_tets;
-use viscera::settings::{AndersonOn, Colors, SolverSettings};
+use viscera::settings::{AndersonOn, Colors, Count, SolverSettings};
 use viscera_report::{Axis, Plot, Series, Style, Table, scientific};
 
 use super::Context;
@@ -109,7 +109,7 @@ fn answer(case: &Case, load_case: LoadCase) -> Result<Answer> {
     let stress = stress(&step)?;
     let end = |colors: Colors, on| -> Result<f64> {
         let settings = anderson(published(colors), on);
-        let settings = SolverSettings { iterations: ITERATIONS, ..settings };
+        let settings = SolverSettings { iterations: Count::Of(ITERATIONS), ..settings };
         Ok(step.follow::<f64>(&settings)?.last())
     };
     let ends = [

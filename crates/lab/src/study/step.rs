@@ -8,7 +8,7 @@ use std::time::Instant;
 use viscera::measure::measure_tets;
 use viscera::model::Model;
 use viscera::scalar::{Real, Vec3};
-use viscera::settings::SolverSettings;
+use viscera::settings::{Count, SolverSettings};
 use viscera::solver::gpu::GpuSolver;
 use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
@@ -140,7 +140,7 @@ impl MeasuredStep {
     pub fn follow<S: Real>(&self, settings: &SolverSettings) -> Result<Curve> {
         let model = self.load_case.model::<S>()?;
         let (mut solver, mut state) = self.begin(&model, settings)?;
-        let mut errors = Vec::with_capacity(settings.iterations as usize + 1);
+        let mut errors = Vec::with_capacity(settings.iterations() as usize + 1);
         let mut last = self.exact.clone();
         solver.step_watched(&model, &mut state, &self.inputs(), self.dt, |_, x| {
             let error = self.error(x);
@@ -167,7 +167,7 @@ impl MeasuredStep {
     pub fn end<S: Real>(&self, settings: &SolverSettings) -> Result<Vec<Vec3<f64>>> {
         let model = self.load_case.model::<S>()?;
         let (mut solver, mut state) = self.begin(&model, settings)?;
-        for (inputs, dt) in self.substeps(settings.substeps) {
+        for (inputs, dt) in self.substeps(settings.substeps()) {
             solver.step(&model, &mut state, &inputs, dt)?;
         }
         Ok(state.positions.iter().map(|x| x.cast()).collect())
@@ -192,7 +192,7 @@ impl MeasuredStep {
         state.positions = self.state.positions.iter().map(|x| x.cast()).collect();
         state.velocities = self.state.velocities.iter().map(|v| v.cast()).collect();
         let before: Inputs<S> = self.load_case.inputs(self.time(0.0));
-        let dt = self.dt / f64::from(settings.substeps);
+        let dt = self.dt / f64::from(settings.substeps());
         solver.restart(model, &mut state, &before, dt)?;
         Ok((solver, state))
     }
@@ -200,10 +200,15 @@ impl MeasuredStep {
     /// What an iteration of a method costs, in single precision on one thread.
     pub fn cost(&self, settings: &SolverSettings) -> Result<Cost> {
         const ITERATIONS: u32 = 20;
-        let settings = SolverSettings { substeps: 1, step_guard: false, ..settings.clone() };
+        let settings =
+            SolverSettings { substeps: Count::Of(1), step_guard: false, ..settings.clone() };
         // A step of so many iterations less one of a single one: what surrounds iterations goes out.
         let of = |iterations| {
-            self.frame_cost(&SolverSettings { iterations, ..settings.clone() }).map(|c| c.seconds)
+            self.frame_cost(&SolverSettings {
+                iterations: Count::Of(iterations),
+                ..settings.clone()
+            })
+            .map(|c| c.seconds)
         };
         let seconds = ((of(1 + ITERATIONS)? - of(1)?) / f64::from(ITERATIONS)).max(0.0);
         let model = self.load_case.model::<f32>()?;
@@ -218,7 +223,7 @@ impl MeasuredStep {
         let settings = SolverSettings { threads, ..settings.clone() };
         let model = self.load_case.model::<f32>()?;
         let (mut solver, start) = self.begin(&model, &settings)?;
-        let inputs: Vec<(Inputs<f32>, f64)> = self.substeps(settings.substeps).collect();
+        let inputs: Vec<(Inputs<f32>, f64)> = self.substeps(settings.substeps()).collect();
         let (mut seconds, mut times, mut total) = (f64::INFINITY, 0, 0.0);
         while times < LEAST.0 || total < LEAST.1 {
             let mut state = start.clone();
@@ -230,8 +235,8 @@ impl MeasuredStep {
             (seconds, times, total) = (seconds.min(taken), times + 1, total + taken);
         }
         let [before, each, after] = GpuSolver::dispatches_of(&model, &settings);
-        let step = before + settings.iterations as usize * each + after;
-        Ok(Cost { passes: settings.substeps as usize * step, seconds })
+        let step = before + settings.iterations() as usize * each + after;
+        Ok(Cost { passes: settings.substeps() as usize * step, seconds })
     }
 }
 

@@ -25,7 +25,7 @@ use anyhow::{Context as _, Result, bail};
 use viscera::material::MaterialModel;
 use viscera::mesh::shapes::Block;
 use viscera::scalar::{Real, Vec3, vec3};
-use viscera::settings::SolverSettings;
+use viscera::settings::{Count, SolverSettings};
 use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
 
@@ -98,7 +98,8 @@ fn cases(quick: bool) -> Vec<Case> {
             (1, 5),
         ],
     };
-    let SolverSettings { substeps, iterations, .. } = SolverSettings::default();
+    let defaults = SolverSettings::default();
+    let (substeps, iterations) = (defaults.substeps(), defaults.iterations());
     let case = |substeps, iterations, single| Case { substeps, iterations, single, quick };
     let mut cases: Vec<_> = schedules.iter().map(|&(n, k)| case(n, k, false)).collect();
     cases.extend([false, true].map(|single| case(substeps, iterations, single)));
@@ -245,7 +246,7 @@ fn motions(context: &mut Context) -> Result<()> {
     let defaults = SolverSettings::default();
     let mut worst = 0.0;
     for (case, motion) in cases.iter().zip(&motions) {
-        if (case.substeps, case.iterations) == (defaults.substeps, defaults.iterations) {
+        if (case.substeps, case.iterations) == (defaults.substeps(), defaults.iterations()) {
             let euler = implicit_euler(mode.omega, case.substeps);
             worst = worse(worst, (motion.frequency / euler.frequency - 1.0).abs());
         }
@@ -299,7 +300,8 @@ fn plot(context: &mut Context, cases: &[Case], motions: &[Motion], omega: f64) -
 /// How stiff tissue may be before the defaults' two iterations fall behind the motion.
 fn stiffer(context: &mut Context) -> Result<()> {
     let bars = stiffer_bars(context.quick);
-    let SolverSettings { substeps, iterations, .. } = SolverSettings::default();
+    let defaults = SolverSettings::default();
+    let (substeps, iterations) = (defaults.substeps(), defaults.iterations());
     let case = Case { substeps, iterations, single: false, quick: context.quick };
     let motions = context.run_cases(&bars, |bar| {
         let load_case = bar.load_case()?;
@@ -370,8 +372,8 @@ fn release<S: Real>(
     start: &[Vec3<f64>],
 ) -> Result<Motion> {
     let settings = SolverSettings {
-        substeps: case.substeps,
-        iterations: case.iterations,
+        substeps: Count::Of(case.substeps),
+        iterations: Count::Of(case.iterations),
         ..SolverSettings::default()
     };
     let model = load_case.model::<S>()?;

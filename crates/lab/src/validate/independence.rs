@@ -4,7 +4,7 @@ use std::fmt;
 
 use anyhow::Result;
 use viscera::material::MaterialModel;
-use viscera::settings::{Colors, SolverSettings};
+use viscera::settings::{Colors, Count, SolverSettings};
 
 use super::methods::worse;
 use super::{Context, Section};
@@ -123,8 +123,8 @@ fn answer(case: &Case) -> Result<Answer> {
     let exact = case.method == Formulation::Exact;
     let settings = SolverSettings {
         colors: case.colors,
-        substeps: case.substeps,
-        iterations: case.iterations,
+        substeps: Count::Of(case.substeps),
+        iterations: Count::Of(case.iterations),
         rebase: exact,
         keep_multipliers: exact,
         ..SolverSettings::default()

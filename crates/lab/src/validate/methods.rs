@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use viscera::material::MaterialModel;
-use viscera::settings::{Colors, SolverSettings};
+use viscera::settings::{Colors, Count, SolverSettings};
 
 use crate::load_cases::LoadCase;
 use crate::settling::{Settled, settle};
@@ -113,5 +113,10 @@ impl Form {
 
 /// The defaults with other colours, substeps and iterations.
 pub(super) fn scheduled(form: Form, substeps: u32, iterations: u32) -> SolverSettings {
-    SolverSettings { colors: form.colors(), substeps, iterations, ..SolverSettings::default() }
+    SolverSettings {
+        colors: form.colors(),
+        substeps: Count::Of(substeps),
+        iterations: Count::Of(iterations),
+        ..SolverSettings::default()
+    }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use anyhow::Result;
 use viscera::material::MaterialModel;
-use viscera::settings::SolverSettings;
+use viscera::settings::{Count, SolverSettings};
 
 use super::methods::{LibrarySolver, METHODS, floored, floored_percent, worse};
 use super::{Context, Section};
@@ -41,7 +41,7 @@ impl fmt::Display for Case {
 /// In the order of the table.
 fn table_cases(quick: bool) -> Vec<Case> {
     let size = if quick { Size::Tiny } else { Size::Large };
-    let iterations = SolverSettings::default().iterations;
+    let iterations = SolverSettings::default().iterations();
     let of = |poisson| METHODS.map(|method| Case { poisson, method, iterations, size });
     POISSONS.into_iter().flat_map(of).collect()
 }
@@ -112,7 +112,8 @@ fn table(context: &mut Context) -> Result<()> {
     let volumes = volumes.map(|(case, answer)| {
         format!("{} at nu {}", percent(answer.true_volume - 1.0), case.poisson)
     });
-    let SolverSettings { substeps, iterations, .. } = SolverSettings::default();
+    let defaults = SolverSettings::default();
+    let (substeps, iterations) = (defaults.substeps(), defaults.iterations());
     context.document.paragraph(format!(
         "At rest, {substeps} substeps of {iterations} iterations, against the reference: places over \
          the displacement, the volume (which the reference changes by {}), the true displacement over \
@@ -169,7 +170,8 @@ fn answer(case: &Case) -> Result<Answer> {
     let tissue = tissue(MaterialModel::StableNeoHookean, YOUNG, case.poisson)?;
     let load_case = LoadCase::new("organ", case.size, tissue)?;
     let truth = truth(&load_case)?;
-    let settings = SolverSettings { iterations: case.iterations, ..case.method.settings() };
+    let settings =
+        SolverSettings { iterations: Count::Of(case.iterations), ..case.method.settings() };
     let settled = case.method.settle_with(&load_case, &settings)?;
     let moved = truth.positions.iter().zip(load_case.mesh.vertices());
     Ok(Answer {

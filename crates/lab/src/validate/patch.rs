@@ -13,7 +13,7 @@ use viscera::mesh::TetMesh;
 use viscera::mesh::shapes::Block;
 use viscera::model::ModelBuilder;
 use viscera::scalar::{Mat3, Real, Vec3, vec3};
-use viscera::settings::SolverSettings;
+use viscera::settings::{Count, SolverSettings};
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, scientific};
@@ -55,7 +55,8 @@ impl fmt::Display for Case {
 /// The defaults under several stretches: in the order of the table's cells.
 fn stretch_cases(quick: bool) -> Vec<Case> {
     let stretches: &[f64] = if quick { &[0.8, 1.4] } else { &[0.8, 0.9, 1.1, 1.2, 1.4] };
-    let SolverSettings { substeps, iterations, .. } = SolverSettings::default();
+    let defaults = SolverSettings::default();
+    let (substeps, iterations) = (defaults.substeps(), defaults.iterations());
     let mut cases = Vec::new();
     for model in MODELS {
         for &stretch in stretches {
@@ -126,7 +127,8 @@ fn stretches(context: &mut Context) -> Result<()> {
         let names = [model_name(case.model).to_owned(), case.stretch.to_string()];
         table.row(names.into_iter().chain(row));
     }
-    let SolverSettings { substeps, iterations, .. } = SolverSettings::default();
+    let defaults = SolverSettings::default();
+    let (substeps, iterations) = (defaults.substeps(), defaults.iterations());
     context.document.paragraph(format!(
         "With the default settings ({substeps} substeps of {iterations} iterations), and with as \
          many of XPBD as published:"
@@ -185,8 +187,8 @@ fn error_of(case: &Case) -> Result<f64> {
 
 fn settled_error<S: Real>(case: &Case) -> Result<f64> {
     let settings = SolverSettings {
-        substeps: case.substeps,
-        iterations: case.iterations,
+        substeps: Count::Of(case.substeps),
+        iterations: Count::Of(case.iterations),
         ..case.method.settings()
     };
     let mesh = block(case.quick)?;

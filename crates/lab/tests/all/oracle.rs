@@ -17,7 +17,7 @@ use viscera::material::{Material, MaterialModel};
 use viscera::measure::{measure_energies, measure_tets};
 use viscera::mesh::TetMesh;
 use viscera::scalar::{Mat3, Vec3};
-use viscera::settings::{Acceleration, SolverSettings};
+use viscera::settings::{Acceleration, Count, SolverSettings};
 use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
 
@@ -209,8 +209,8 @@ fn the_oracles_steps_satisfy_implicit_euler() {
 #[test]
 fn many_sweeps_are_the_oracles_steps() {
     let settings = SolverSettings {
-        substeps: 1,
-        iterations: 2000,
+        substeps: Count::Of(1),
+        iterations: Count::Of(2000),
         acceleration: Acceleration::Anderson,
         ..SolverSettings::default()
     };

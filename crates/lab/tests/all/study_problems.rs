@@ -1,7 +1,7 @@
 //! What settles the open problems, each by a test that turns red without it.
 
 use viscera::material::{Material, MaterialModel};
-use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Threads};
+use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, Count, SolverSettings, Threads};
 use viscera_lab::load_cases::{LoadCase, Size, tissue};
 use viscera_lab::reference::Reference;
 use viscera_lab::settling::{Error, compare, settle, truth};
@@ -9,8 +9,8 @@ use viscera_lab::stress::{self, FRAMES, Kind, Run};
 
 fn one_thread(iterations: u32) -> SolverSettings {
     SolverSettings {
-        substeps: 1,
-        iterations,
+        substeps: Count::Of(1),
+        iterations: Count::Of(iterations),
         threads: Threads::Count(1),
         ..SolverSettings::default()
     }
@@ -40,7 +40,7 @@ fn anderson_mixes_multipliers_with_positions() {
         stiffness(&SolverSettings { acceleration, anderson_on, ..published.clone() })
     };
     let [both, positions] = [AndersonOn::Both, AndersonOn::Positions].map(mixed);
-    let plain = stiffness(&SolverSettings { iterations: 400, ..published.clone() });
+    let plain = stiffness(&SolverSettings { iterations: Count::Of(400), ..published.clone() });
     println!("apparent stiffness: plain {plain:.4}, both {both:.4}, positions {positions:.4}");
     assert!((both / plain - 1.0).abs() < 0.1, "on both: {both}, plain: {plain}");
     assert!(positions > 1.5 * plain, "on positions alone: {positions}, plain: {plain}");

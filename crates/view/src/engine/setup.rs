@@ -87,5 +87,5 @@ pub fn expectation(assembly: &Assembly, scenes: &[Scene]) -> Option<String> {
 }
 
 fn frame_seconds(tets: usize, solver: &SolverSettings) -> f64 {
-    tets as f64 * f64::from(solver.substeps) * f64::from(solver.iterations) * SWEEP
+    tets as f64 * f64::from(solver.substeps()) * f64::from(solver.iterations()) * SWEEP
 }

@@ -98,13 +98,13 @@ fn method(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
     let help =
         "Divide every frame. More lose less motion to numerical damping; the cost grows alike.";
     let row = Row::new("solver.substeps", "substeps", help).rail(1.0..=100.0).whole().logarithmic();
-    chooser.number(ui, &row, f64::from(solver.substeps));
+    chooser.number(ui, &row, f64::from(solver.substeps()));
 }
 
 fn sweeps(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
     let help = "Sweeps over all constraints in each substep.";
     let row = Row::new("solver.iterations", "iterations", help).rail(1.0..=200.0);
-    chooser.number(ui, &row.whole().logarithmic(), f64::from(solver.iterations));
+    chooser.number(ui, &row.whole().logarithmic(), f64::from(solver.iterations()));
     let help = "Colours of the constraint graph: unlimited for Gauss-Seidel, 1 for Jacobi, a few for \
                 clique separation. Fewer run more in parallel and need more sweeps.";
     let shown = match solver.colors {

@@ -116,7 +116,7 @@ pub fn show_status(ui: &mut Ui, clock: &Clock, setup: &Setup, snapshot: &Snapsho
         ui.label(text.trim()).on_hover_text(format!(
             "Substeps take {:.2} ms each. Energy: elastic {:.3e} J, kinetic {:.3e} J. Rejected substeps so \
              far: {}.",
-            1e3 * run.wall / f64::from(setup.scene.solver.substeps),
+            1e3 * run.wall / f64::from(setup.scene.solver.substeps()),
             run.measures.energy.elastic,
             run.measures.energy.kinetic,
             run.measures.rejected,

@@ -11,8 +11,9 @@ mod solver;
 mod tree;
 
 pub use solver::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, DeviceRequest, Integrator, MOST_HISTORY,
-    MOST_THREADS, Method, NeoHookean, Precision, RelaxationForm, SolverSettings, Start, Threads,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, DeviceRequest, Integrator,
+    MOST_HISTORY, MOST_THREADS, Method, NeoHookean, Precision, RelaxationForm, SolverSettings,
+    Start, Threads,
 };
 pub use tree::Place;
 

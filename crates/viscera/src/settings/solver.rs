@@ -27,6 +27,15 @@ pub enum Colors {
     Limited(u32),
 }
 
+/// A count that a method can choose by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count {
+    /// What suits the method and the scene.
+    Auto,
+    /// This many.
+    Of(u32),
+}
+
 /// How many threads a solver works with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Threads {
@@ -167,13 +176,15 @@ settings_table! {
         /// The share of the largest stable step of the body at rest that "explicit" takes. Tissue
         /// stiffens under strong deformation: lower this where a run diverges.
         explicit_safety: f64 = 0.5, number(at_least(1e-3).up_to(1.0));
-        /// Substeps per frame. More lose less motion to numerical damping and follow it more
-        /// closely; the cost grows alike. With `rebase` and `keep_multipliers` the shape at rest
-        /// does not depend on them; plain XPBD needs about 50 for an error near 1 %.
-        substeps: u32 = 10, whole(1, 1000);
-        /// Sweeps per substep. More solve a substep better. Without `rebase` they approach an
-        /// answer that depends on the path, so more are not always closer to the truth.
-        iterations: u32 = 2, whole(1, 10_000);
+        /// Substeps per frame: "auto" for what suits the method, 10 for "xpbd" and "explicit". More lose
+        /// less motion to numerical damping and follow it more closely; the cost grows alike. With `rebase`
+        /// and `keep_multipliers` the shape at rest does not depend on them; plain XPBD needs about 50 for
+        /// an error near 1 %.
+        substeps: Count = (Count::Auto), SUBSTEPS;
+        /// Sweeps per substep: "auto" for what suits the method, 2 for "xpbd". More solve a substep better.
+        /// Without `rebase` they approach an answer that depends on the path, so more are not always closer
+        /// to the truth.
+        iterations: Count = (Count::Auto), ITERATIONS;
         /// How "quasi_newton" integrates over time.
         integrator: Integrator = (Integrator::Sdirk2), one_of::<Integrator>();
         /// How many past steps "quasi_newton" learns the curvature from; 0 chooses by Poisson's ratio: 3 up to 0.4,
@@ -247,6 +258,19 @@ settings_table! {
     }
 }
 
+/// What "auto" stands for in `substeps` and `iterations`.
+struct AutomaticCounts {
+    substeps: u32,
+    iterations: u32,
+}
+
+/// Those of XPBD; the explicit method takes the substeps. With fewer substeps numerical damping takes visibly more of a
+/// motion; with a single sweep in each, multipliers trail behind it.
+const SHORT_STEPS: AutomaticCounts = AutomaticCounts { substeps: 10, iterations: 2 };
+
+/// Those of large steps that are solved well: a stiff body takes more, as its slowest oscillation asks.
+const LONG_STEPS: AutomaticCounts = AutomaticCounts { substeps: 1, iterations: 6 };
+
 impl SolverSettings {
     /// Pairs that "quasi_newton" keeps, for these materials.
     pub(crate) fn history_for<S: Real>(&self, materials: &[MaterialConstants<S>]) -> u32 {
@@ -259,8 +283,38 @@ impl SolverSettings {
 
     /// Passes per solve of "quasi_newton", for these materials.
     pub(crate) fn passes_for<S: Real>(&self, materials: &[MaterialConstants<S>]) -> u32 {
-        let _ = materials;
-        self.iterations
+        match self.iterations {
+            Count::Of(count) => count,
+            Count::Auto => match largest_poisson(materials) {
+                ..=0.41 => 6,
+                ..=0.46 => 10,
+                _ => 16,
+            },
+        }
+    }
+
+    /// Substeps per frame; what "auto" stands for where it is chosen.
+    pub fn substeps(&self) -> u32 {
+        match self.substeps {
+            Count::Auto => self.automatic_counts().substeps,
+            Count::Of(count) => count,
+        }
+    }
+
+    /// Iterations per substep; what "auto" stands for where it is chosen. The explicit method has none.
+    pub fn iterations(&self) -> u32 {
+        match self.iterations {
+            Count::Auto => self.automatic_counts().iterations,
+            Count::Of(count) => count,
+        }
+    }
+
+    /// What "auto" stands for with this method.
+    fn automatic_counts(&self) -> AutomaticCounts {
+        match self.method {
+            Method::Xpbd | Method::Explicit => SHORT_STEPS,
+            Method::QuasiNewton => LONG_STEPS,
+        }
     }
 
     /// Whether steps are guarded: published XPBD is shown as it is.
@@ -310,6 +364,23 @@ const COLORS: CountOr<Colors> = CountOr {
         Colors::Limited(count) => Some(*count),
     },
 };
+
+/// "auto" or a whole number within limits.
+const fn count(limits: Whole) -> CountOr<Count> {
+    CountOr {
+        word: "auto",
+        limits,
+        make: |count| count.map_or(Count::Auto, Count::Of),
+        count: |count| match count {
+            Count::Auto => None,
+            Count::Of(count) => Some(*count),
+        },
+    }
+}
+
+const SUBSTEPS: CountOr<Count> = count(whole(1, 1000));
+
+const ITERATIONS: CountOr<Count> = count(whole(1, 10_000));
 
 const THREADS: CountOr<Threads> = CountOr {
     word: "auto",

@@ -138,7 +138,7 @@ fn faster(model: &Model<f32>, settings: &SolverSettings, dt: f64) -> Backend<f32
         Method::QuasiNewton => {
             return Backend::cpu(solver, "the quasi-Newton method is computed by the CPU");
         }
-        Method::Xpbd => settings.iterations,
+        Method::Xpbd => settings.iterations(),
         Method::Explicit => (dt / solver.stable_step()).ceil() as u32,
     };
     let cost = StepCost::new(solver.layout(), settings, sweeps);

@@ -313,8 +313,8 @@ impl<S: Real> Simulation<S> {
         let (start, end) = (self.time(), (self.frame + 1) as f64 * self.scene.time.frame);
         let Self { scene, assembly, taken, model, state, inputs, backend, .. } = self;
         let before = backend.rejected_steps();
-        for substep in 1..=scene.solver.substeps {
-            let is_last = substep == scene.solver.substeps;
+        for substep in 1..=scene.solver.substeps() {
+            let is_last = substep == scene.solver.substeps();
             let time = if is_last { end } else { start + f64::from(substep) * dt };
             taken.act(scene, assembly, time, inputs);
             backend.step(model, state, inputs, dt)?;
@@ -357,5 +357,5 @@ impl<S: Real> Simulation<S> {
 
 /// A substep of a scene [s].
 fn substep_dt(scene: &Scene) -> f64 {
-    scene.time.frame / f64::from(scene.solver.substeps)
+    scene.time.frame / f64::from(scene.solver.substeps())
 }

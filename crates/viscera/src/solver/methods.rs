@@ -21,7 +21,7 @@ impl Plan {
         match settings.method {
             Method::Xpbd => {
                 if let Some(iteration) = self.iteration_mut() {
-                    iteration.most = Times::Count(settings.iterations);
+                    iteration.most = Times::Count(settings.iterations());
                 }
             }
             // Small steps are counted by the step.

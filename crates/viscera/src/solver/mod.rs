@@ -30,7 +30,7 @@ use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
-use crate::settings::SolverSettings;
+use crate::settings::{Count, SolverSettings};
 use crate::state::{Learned, State};
 use cpu::precision::{Task, carry_out};
 pub use error::StepError;
@@ -133,7 +133,7 @@ impl<S: Real> Solver<S> {
 
     /// Iterations of the steps to come, at least one; neither stages nor memory depend on them.
     pub fn set_iterations(&mut self, count: u32) {
-        self.settings.iterations = count.max(1);
+        self.settings.iterations = Count::Of(count.max(1));
         self.plan.set_iterations(&self.layout, &self.settings);
     }
 

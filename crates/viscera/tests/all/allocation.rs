@@ -7,7 +7,7 @@ use viscera::layout::Layout;
 use viscera::model::ModelBuilder;
 use viscera::scalar::{Real, vec3};
 use viscera::scene::Scene;
-use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, Colors, SolverSettings};
+use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, Colors, Count, SolverSettings};
 use viscera::simulation::{Assembly, Simulation};
 use viscera::solver::balance::ForceBalance;
 use viscera::solver::{Inputs, Pin, Solver};
@@ -35,7 +35,7 @@ fn accelerations() -> Vec<SolverSettings> {
     }
     // Enough sweeps for mixtures that raise the potential.
     let (acceleration, anderson_guard) = (Acceleration::Anderson, AndersonGuard::Energy);
-    all.push(SolverSettings { acceleration, anderson_guard, iterations: 8, ..plain });
+    all.push(SolverSettings { acceleration, anderson_guard, iterations: Count::Of(8), ..plain });
     all
 }
 
@@ -54,7 +54,7 @@ fn steps_allocate_nothing<S: Real>() {
                     colors,
                     rebase,
                     keep_multipliers,
-                    iterations: 6,
+                    iterations: Count::Of(6),
                     ..settings.clone()
                 };
                 let mut solver = Solver::new(&model, &settings);

@@ -9,7 +9,7 @@ use viscera::scalar::lanes::Instructions::{self, Avx2, Portable};
 use viscera::scalar::{Vec3, vec3};
 use viscera::scene::Scene;
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, NeoHookean, SolverSettings, Threads,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, NeoHookean, SolverSettings, Threads,
 };
 use viscera::simulation::{Assembly, Simulation};
 use viscera::solver::balance::ForceBalance;
@@ -149,14 +149,14 @@ fn threads_and_instructions_leave_every_bit_of_several_parts() {
         acceleration: Acceleration::Anderson,
         anderson_on,
         anderson_guard,
-        iterations: 8,
+        iterations: Count::Of(8),
         ..plain.clone()
     };
     let chebyshev = SolverSettings {
         acceleration: Acceleration::Chebyshev,
         chebyshev_delay: 2,
         chebyshev_damping: 0.8,
-        iterations: 6,
+        iterations: Count::Of(6),
         ..plain.clone()
     };
     let mut rejected = 0;

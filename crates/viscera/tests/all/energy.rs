@@ -4,7 +4,7 @@ use crate::common::{Run, SNH, block, material, single_body};
 use viscera::measure::measure_tets;
 use viscera::model::Model;
 use viscera::scalar::{Vec3, vec3};
-use viscera::settings::{Colors, SolverSettings};
+use viscera::settings::{Colors, Count, SolverSettings};
 use viscera::solver::{Inputs, Pin, Tether};
 use viscera::state::State;
 
@@ -100,7 +100,11 @@ fn the_limit_leaves_well_solved_steps_alone() {
     let mesh = block([0.04, 0.02, 0.02], [4, 2, 2], 0.2);
     for retardation in [0.0, 0.01, 0.05] {
         let tissue = material(SNH, 1e4, 0.45).with_viscosity(retardation).expect("legal");
-        let settings = SolverSettings { substeps: 4, iterations: 200, ..SolverSettings::default() };
+        let settings = SolverSettings {
+            substeps: Count::Of(4),
+            iterations: Count::Of(200),
+            ..SolverSettings::default()
+        };
         let model = single_body::<f64>(&mesh, &tissue);
         let mut run = Run::new(&model, &settings);
         let mut least = 1.0f64;

@@ -4,7 +4,7 @@ use crate::common::{SNH, STVK, block, material, single_body};
 use viscera::measure::{measure_energies, measure_tets};
 use viscera::model::Model;
 use viscera::scalar::{Vec3, vec3};
-use viscera::settings::{Method, SolverSettings};
+use viscera::settings::{Count, Method, SolverSettings};
 use viscera::solver::{Inputs, Pin, Solver, StepError};
 use viscera::state::State;
 
@@ -108,7 +108,7 @@ fn xpbd_with_small_substeps_moves_alike() {
     let norm = |path: &[Vec3<f64>]| path.iter().map(|u| u.length_squared()).sum::<f64>().sqrt();
     let truth = path(&explicit(), 1);
     let error = |substeps: u32| {
-        let settings = SolverSettings { iterations: 8, ..SolverSettings::default() };
+        let settings = SolverSettings { iterations: Count::Of(8), ..SolverSettings::default() };
         let path = path(&settings, substeps);
         let away: Vec<_> = path.iter().zip(&truth).map(|(a, b)| *a - *b).collect();
         norm(&away) / norm(&truth)
@@ -138,8 +138,11 @@ fn viscous_tissue_comes_to_the_right_rest() {
             state.positions
         };
         let explicit_rest = rest(&explicit(), 100, 1.0 / 60.0);
-        let exact =
-            rest(&SolverSettings { iterations: 20, ..SolverSettings::default() }, 100, 1.0 / 60.0);
+        let exact = rest(
+            &SolverSettings { iterations: Count::Of(20), ..SolverSettings::default() },
+            100,
+            1.0 / 60.0,
+        );
         let pairs = explicit_rest.iter().zip(&exact);
         let away = pairs.map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
         let moved = exact.iter().zip(&model.rest_positions);

@@ -3,7 +3,7 @@
 use crate::common::{Run, SNH, STVK, block, colored, material, single_body};
 use viscera::material::MaterialModel;
 use viscera::scalar::{Real, vec3};
-use viscera::settings::{Acceleration, Colors, NeoHookean, SolverSettings, Start};
+use viscera::settings::{Acceleration, Colors, Count, NeoHookean, SolverSettings, Start};
 use viscera::solver::Inputs;
 
 const JACOBI: Colors = Colors::Limited(1);
@@ -22,7 +22,7 @@ fn share_of_fall(run: &mut Run<'_, f64>, frames: u32) -> f64 {
     for _ in 0..frames {
         run.frame(&Inputs { gravity, ..Inputs::default() }, 1.0);
     }
-    let steps = f64::from(frames * run.solver.settings().substeps);
+    let steps = f64::from(frames * run.solver.settings().substeps());
     (before - height(run)) / (9.81 * run.dt * run.dt * steps * (steps + 1.0) / 2.0)
 }
 
@@ -48,7 +48,7 @@ fn a_dropped_body_falls_with_gravity() {
                 // Only round-off strains the body.
                 let is_part = colors == JACOBI && !step_guard && start == Start::Inertial;
                 let theta: f64 = if is_part { 0.25 } else { 1.0 };
-                let expected = 1.0 - (1.0 - theta).powi(settings.iterations as i32);
+                let expected = 1.0 - (1.0 - theta).powi(settings.iterations() as i32);
                 // The published pair balances two stresses at rest, and their geometric stiffness makes the
                 // rebase move a vertex as if it were heavier.
                 let is_heavier = neo_hookean == NeoHookean::Pair && start == Start::Inertial;
@@ -88,7 +88,7 @@ fn a_falling_body_is_hardly_ever_taken_back() {
     let accelerated = |acceleration, colors| SolverSettings {
         acceleration,
         chebyshev_delay: 1,
-        iterations: 6,
+        iterations: Count::Of(6),
         ..colored(colors)
     };
     let steps = 150;

@@ -6,7 +6,7 @@ use crate::common::{STVK, block, material};
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, NeoHookean, Precision, RelaxationForm,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, NeoHookean, Precision, RelaxationForm,
     SolverSettings,
 };
 use viscera::solver::gpu::{Device, GpuSolver, baseline};
@@ -99,7 +99,8 @@ fn assert_agreement(name: &str, settings: &SolverSettings, length: Length) {
 
 /// Exact at rest, as published, every form, over-relaxed; coloured, cliques, Jacobi.
 fn assert_sweeps_agree(length: impl Fn(&str) -> Length) {
-    let plain = SolverSettings { step_guard: false, iterations: 3, ..SolverSettings::default() };
+    let plain =
+        SolverSettings { step_guard: false, iterations: Count::Of(3), ..SolverSettings::default() };
     let published = SolverSettings { rebase: false, keep_multipliers: false, ..plain.clone() };
     let pair = SolverSettings { neo_hookean: NeoHookean::Pair, ..plain.clone() };
     let relaxed = SolverSettings {
@@ -135,7 +136,7 @@ fn sweeps_agree_with_the_cpu_at_length() {
 fn portable_steps_agree_with_the_cpu() {
     let settings = SolverSettings {
         step_guard: false,
-        iterations: 2,
+        iterations: Count::Of(2),
         acceleration: Acceleration::Anderson,
         ..SolverSettings::default()
     };
@@ -150,7 +151,8 @@ fn portable_steps_agree_with_the_cpu() {
 
 /// Every acceleration by itself, as long as told by its name, with one colour and with many.
 fn assert_accelerations_agree(length: impl Fn(&str, Colors) -> Option<Length>) {
-    let plain = SolverSettings { step_guard: false, iterations: 8, ..SolverSettings::default() };
+    let plain =
+        SolverSettings { step_guard: false, iterations: Count::Of(8), ..SolverSettings::default() };
     let anderson = SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() };
     let chebyshev = SolverSettings {
         acceleration: Acceleration::Chebyshev,
@@ -161,7 +163,7 @@ fn assert_accelerations_agree(length: impl Fn(&str, Colors) -> Option<Length>) {
     // Until the window is full.
     let long = SolverSettings {
         anderson_window: 10,
-        iterations: 12,
+        iterations: Count::Of(12),
         anderson_guard: AndersonGuard::None,
         ..anderson.clone()
     };
@@ -274,7 +276,8 @@ fn dispatches_of_an_iteration_are_few() {
 #[test]
 fn iterations_can_be_set_from_step_to_step() {
     let ends = [5, 2].map(|built_with| {
-        let settings = SolverSettings { iterations: built_with, ..SolverSettings::default() };
+        let settings =
+            SolverSettings { iterations: Count::Of(built_with), ..SolverSettings::default() };
         let (model, double) = (everything(), everything());
         let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
         gpu.set_iterations(5);
@@ -349,7 +352,7 @@ fn a_model_over_the_limits_is_refused() {
 
 /// A step begun by the CPU and ended by the device, for every stage that it may change hands at.
 fn assert_hands_change(iterations: u32, before: u32) {
-    let guarded = SolverSettings { iterations, ..SolverSettings::default() };
+    let guarded = SolverSettings { iterations: Count::Of(iterations), ..SolverSettings::default() };
     let plain = SolverSettings { step_guard: false, ..guarded.clone() };
     let anderson = SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() };
     let mut hands = 0;
@@ -428,7 +431,7 @@ fn small_soft_tetrahedra_are_joined_as_any_others() {
     let settings = SolverSettings {
         colors: Colors::Limited(1),
         acceleration: Acceleration::Anderson,
-        iterations: 4,
+        iterations: Count::Of(4),
         step_guard: false,
         ..SolverSettings::default()
     };

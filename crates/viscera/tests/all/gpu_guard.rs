@@ -9,7 +9,9 @@ use viscera::measure::measure_tets;
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
-use viscera::settings::{Acceleration, AndersonGuard, Colors, Precision, SolverSettings, Start};
+use viscera::settings::{
+    Acceleration, AndersonGuard, Colors, Count, Precision, SolverSettings, Start,
+};
 use viscera::solver::gpu::{Device, GpuSolver};
 use viscera::solver::{Inputs, Pin, Solver, StepReport};
 use viscera::state::State;
@@ -140,11 +142,17 @@ fn walls(places: &[Vec3<f64>], step: u32) -> Inputs<f64> {
 fn assert_quiet_motion_agrees(steps: u32) {
     let device = device();
     let plain = SolverSettings::default();
-    let anderson =
-        SolverSettings { acceleration: Acceleration::Anderson, iterations: 6, ..plain.clone() };
+    let anderson = SolverSettings {
+        acceleration: Acceleration::Anderson,
+        iterations: Count::Of(6),
+        ..plain.clone()
+    };
     for (name, settings) in [
         ("default", plain.clone()),
-        ("Jacobi", SolverSettings { colors: Colors::Limited(1), iterations: 4, ..plain }),
+        (
+            "Jacobi",
+            SolverSettings { colors: Colors::Limited(1), iterations: Count::Of(4), ..plain },
+        ),
         ("residual", anderson.clone()),
         ("energy", SolverSettings { anderson_guard: AndersonGuard::Energy, ..anderson }),
     ] {
@@ -198,7 +206,7 @@ fn assert_grabs_are_taken_back(steps: u32, comes_to_rest: bool) {
     let energy = SolverSettings {
         acceleration: Acceleration::Anderson,
         anderson_guard: AndersonGuard::Energy,
-        iterations: 6,
+        iterations: Count::Of(6),
         ..plain.clone()
     };
     // Chosen for what they lead to on the CPU: shares, descents, and mixtures in favour of which a
@@ -300,7 +308,7 @@ fn portable_limit_that_is_no_number_lets_nothing_pass() {
     let settings = SolverSettings {
         rebase_factor: 1e-30,
         start: Start::Previous,
-        iterations: 20,
+        iterations: Count::Of(20),
         ..SolverSettings::default()
     };
     let mesh = block([0.02, 0.01, 0.01], [2, 1, 1], 0.1);

@@ -7,7 +7,7 @@ use crate::common::device::everything;
 use viscera::layout::Layout;
 use viscera::model::Model;
 use viscera::scalar::{Real, vec3};
-use viscera::settings::{Colors, NeoHookean, SolverSettings};
+use viscera::settings::{Colors, Count, NeoHookean, SolverSettings};
 use viscera::solver::gpu::GpuSolver;
 use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
@@ -24,7 +24,12 @@ fn inputs<S: Real>(model: &Model<S>) -> Inputs<S> {
 /// No sweep carries a broken multiplier into positions: of a step remain its prediction, repair and
 /// velocities.
 fn without_sweeps(neo_hookean: NeoHookean) -> SolverSettings {
-    SolverSettings { iterations: 0, step_guard: false, neo_hookean, ..SolverSettings::default() }
+    SolverSettings {
+        iterations: Count::Of(0),
+        step_guard: false,
+        neo_hookean,
+        ..SolverSettings::default()
+    }
 }
 
 /// Scrambled, moving, with multipliers of some history, but for fillings, which have none. The numbers are of single precision.
@@ -237,7 +242,7 @@ fn two_repairs_have_the_same_bits() {
 /// A history of no numbers goes through all sweeps into all positions: the guard takes the step back, the
 /// repair starts a new history, and with time the body comes to the rest that it comes to anyway.
 fn assert_survival(rounds: u32, comes_to_rest: bool) {
-    let settings = SolverSettings { iterations: 5, ..SolverSettings::default() };
+    let settings = SolverSettings { iterations: Count::Of(5), ..SolverSettings::default() };
     let model = everything::<f32>();
     let inputs = inputs(&model);
     let mut gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");

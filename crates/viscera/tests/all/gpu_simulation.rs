@@ -280,10 +280,10 @@ fn the_estimate_of_a_step_counts_its_dispatches() {
         let gpu = simulation(&[overrides, &[("solver.device", "gpu")]].concat());
         let gpu = gpu.expect("a simulation");
         let settings: &SolverSettings = &gpu.scene().solver;
-        let cost = StepCost::new(gpu.layout(), settings, settings.iterations);
+        let cost = StepCost::new(gpu.layout(), settings, settings.iterations());
         let solver = gpu.gpu().expect("a GPU");
         let [before, each, after] = solver.dispatches();
-        let sent = before + settings.iterations as usize * each + after;
+        let sent = before + settings.iterations() as usize * each + after;
         assert_eq!(cost.dispatches, sent as u64);
         let per_tet = cost.cpu / gpu.model().tet_count() as f64;
         assert!((cost.pays_from() as f64 * per_tet / cost.gpu - 1.0).abs() < 1e-2);

@@ -5,7 +5,7 @@ use crate::common::device::device;
 use crate::common::{STVK, block, material};
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::vec3;
-use viscera::settings::{Acceleration, Colors, Method, SolverSettings};
+use viscera::settings::{Acceleration, Colors, Count, Method, SolverSettings};
 use viscera::solver::Inputs;
 use viscera::solver::gpu::{GpuSolver, MemoryCopy, StepPart};
 use viscera::state::State;
@@ -35,11 +35,11 @@ fn timed_steps_are_ordinary_steps() {
     let anderson = SolverSettings {
         colors: Colors::Limited(1),
         acceleration: Acceleration::Anderson,
-        iterations: 5,
+        iterations: Count::Of(5),
         ..SolverSettings::default()
     };
     let explicit = SolverSettings { method: Method::Explicit, ..SolverSettings::default() };
-    let one = SolverSettings { iterations: 1, ..SolverSettings::default() };
+    let one = SolverSettings { iterations: Count::Of(1), ..SolverSettings::default() };
     for (settings, dt) in
         [(SolverSettings::default(), DT), (anderson, DT), (one, DT), (explicit, 0.2)]
     {

@@ -2,7 +2,7 @@
 
 use crate::common::{Random, Run, everything};
 use viscera::scalar::{Real, vec3};
-use viscera::settings::SolverSettings;
+use viscera::settings::{Count, SolverSettings};
 use viscera::solver::Inputs;
 
 fn gravity<S: Real>() -> Inputs<S> {
@@ -20,7 +20,11 @@ fn distance<S: Real>(a: &[S], b: &[S]) -> (f64, f64) {
 #[test]
 fn a_new_history_of_a_settled_body_changes_nothing() {
     let model = everything::<f64>();
-    let settings = SolverSettings { substeps: 1, iterations: 10, ..SolverSettings::default() };
+    let settings = SolverSettings {
+        substeps: Count::Of(1),
+        iterations: Count::Of(10),
+        ..SolverSettings::default()
+    };
     let mut run = Run::new(&model, &settings);
     for _ in 0..120 {
         run.frame(&gravity(), 0.8);

@@ -3,7 +3,7 @@
 use crate::common::{STVK, block, exact, material, plain, single_body};
 use viscera::model::Model;
 use viscera::scalar::{Vec3, vec3};
-use viscera::settings::{Acceleration, SolverSettings};
+use viscera::settings::{Acceleration, Count, SolverSettings};
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
@@ -44,7 +44,7 @@ fn a_watched_step_is_a_step() {
         solver.step_watched(&model, &mut state, &inputs, FRAME, watch).expect("a legal step");
         assert_eq!(state, stepped(&settings, 7));
         assert_eq!(seen.len(), 8);
-        let fewer = SolverSettings { iterations: 3, ..settings.clone() };
+        let fewer = SolverSettings { iterations: Count::Of(3), ..settings.clone() };
         assert_eq!(stepped(&settings, 3), stepped(&fewer, 3));
         if !settings.rebase {
             // Nothing comes after the last iteration; multipliers start from zero.

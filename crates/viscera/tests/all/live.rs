@@ -3,7 +3,7 @@
 use crate::common::device;
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::scene::{Patch, Scene, Selector};
-use viscera::settings::Place;
+use viscera::settings::{Place, SolverSettings};
 use viscera::simulation::{Assembly, LiveError, PatchKind, Simulation};
 
 const BAR: &str = r#"
@@ -194,6 +194,25 @@ fn reset_is_a_new_run_with_the_settings_of_the_hand() {
     frames(&mut by_hand, 25);
     frames(&mut fresh, 25);
     assert_eq!(by_hand.state().positions, fresh.state().positions);
+}
+
+/// As undo in a window has it: they are the numbers that they stand for.
+#[test]
+fn counts_go_back_to_automatic_ones() {
+    let there_and_back = |iterations: &str, substeps: &str| {
+        let mut changed: Simulation<f32> = simulation(BAR, &[]);
+        for counts in [["7", "3"], [iterations, substeps]] {
+            let [iterations, substeps] = counts;
+            let counts = [("solver.iterations", iterations), ("solver.substeps", substeps)];
+            changed.change(&pairs(&counts)).expect("other counts");
+            frames(&mut changed, 2);
+        }
+        changed
+    };
+    let automatic = there_and_back("\"auto\"", "auto");
+    assert_eq!(automatic.scene().solver, SolverSettings::default());
+    let numbers = there_and_back("2", "10");
+    assert_eq!(automatic.state().positions, numbers.state().positions);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::lanes::Instructions;
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, Method, SolverSettings, Threads,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, Method, SolverSettings, Threads,
 };
 use viscera::solver::{Inputs, Pin, Solver, StepReport, Tether};
 use viscera::state::State;
@@ -184,14 +184,14 @@ pub fn methods() -> Vec<(&'static str, SolverSettings)> {
         acceleration: Acceleration::Anderson,
         anderson_on,
         anderson_guard,
-        iterations: 6,
+        iterations: Count::Of(6),
         ..SolverSettings::default()
     };
     let chebyshev = |chebyshev_delay, chebyshev_damping| SolverSettings {
         acceleration: Acceleration::Chebyshev,
         chebyshev_delay,
         chebyshev_damping,
-        iterations: 5,
+        iterations: Count::Of(5),
         ..SolverSettings::default()
     };
     vec![

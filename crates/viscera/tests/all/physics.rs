@@ -6,7 +6,7 @@ use viscera::material::MaterialModel;
 use viscera::mesh::TetMesh;
 use viscera::model::ModelBuilder;
 use viscera::scalar::{Mat3, Real, Vec3, vec3};
-use viscera::settings::{Acceleration, AndersonOn, Colors, SolverSettings};
+use viscera::settings::{Acceleration, AndersonOn, Colors, Count, SolverSettings};
 use viscera::solver::balance::ForceBalance;
 use viscera::solver::{Inputs, Pin};
 use viscera::state::State;
@@ -371,7 +371,7 @@ fn single_and_double_precision_run_the_same_scene() {
         run.state.positions
     }
     for colors in [Colors::Unlimited, Colors::Limited(4), Colors::Limited(1)] {
-        let settings = SolverSettings { colors, substeps: 10, ..exact(2) };
+        let settings = SolverSettings { colors, substeps: Count::Of(10), ..exact(2) };
         let (single, double) = (tip::<f32>(&settings), tip::<f64>(&settings));
         assert_eq!(single, tip::<f32>(&settings), "two runs differ");
         let fell = double.iter().fold(0.0f64, |a, x| a.min(x.z));

@@ -151,6 +151,22 @@ fn another_bad_value_says_why_and_what_to_write() {
              number",
         ),
         (
+            "[[fixing]]",
+            "[solver]\nsubsteps = 0\n[[fixing]]",
+            "s.toml, line 13, column 1: substeps = 0: out of range; it must be 1 to 1000",
+        ),
+        (
+            "[[fixing]]",
+            "[solver]\nsubsteps = \"fuor\"\n[[fixing]]",
+            "s.toml, line 13, column 1: substeps = \"fuor\": did you mean \"auto\"? Or write a whole \
+             number",
+        ),
+        (
+            "[[fixing]]",
+            "[solver]\niterations = 10001\n[[fixing]]",
+            "s.toml, line 13, column 1: iterations = 10001: out of range; it must be 1 to 10000",
+        ),
+        (
             "0.45",
             "nan",
             "s.toml, line 10, column 31: poisson = NaN: Poisson ratio NaN is unstable; it must be \

@@ -5,7 +5,7 @@ use viscera::mesh::{TetMesh, shapes};
 use viscera::scalar::{Vec3, vec3};
 use viscera::scene::{BodyShape, Scene, SceneError, Selector, describe_markdown, describe_text};
 use viscera::settings::{
-    Acceleration, AndersonGuard, Colors, DeviceRequest, Precision, SolverSettings, Start,
+    Acceleration, AndersonGuard, Colors, Count, DeviceRequest, Precision, SolverSettings, Start,
 };
 
 const SHIPPED: [(&str, &str); 5] = [
@@ -179,7 +179,7 @@ fn every_key_arrives_in_si_units() {
 #[test]
 fn defaults_are_those_declared() {
     let solver = SolverSettings::default();
-    assert_eq!((solver.substeps, solver.iterations), (10, 2));
+    assert_eq!((solver.substeps, solver.iterations), (Count::Auto, Count::Auto));
     assert_eq!((solver.precision, solver.colors), (Precision::F32, Colors::Unlimited));
     assert_eq!((solver.start, solver.anderson_guard), (Start::Auto, AndersonGuard::Residual));
     assert_eq!(solver.device, DeviceRequest::Auto);
@@ -189,6 +189,30 @@ fn defaults_are_those_declared() {
     assert_eq!(scene.time.frame, 1.0 / 60.0);
     assert_eq!(scene.world.gravity, vec3(0.0, 0.0, -9.81));
     assert_eq!(scene.title, "small.toml");
+}
+
+/// Other numbers would change the results of every scene that does not name its own.
+#[test]
+fn automatic_counts_are_those_of_the_method() {
+    let text = "[[body]]\nname = \"a\"\nshape = \"liver\"\nmaterial = { preset = \"liver\" }";
+    let solver = |overrides: &[(&str, &str)]| {
+        Scene::parse("small.toml", text, overrides).expect("a legal scene").solver
+    };
+    let numbers = |solver: SolverSettings| (solver.substeps(), solver.iterations());
+    for method in ["xpbd", "explicit"] {
+        let method = ("solver.method", method);
+        assert_eq!(numbers(solver(&[method])), (10, 2));
+        let (substeps, iterations) = (("solver.substeps", "auto"), ("solver.iterations", "auto"));
+        let written = solver(&[method, substeps, iterations]);
+        assert_eq!(written, solver(&[method]));
+        assert_eq!(numbers(written), (10, 2));
+        assert_eq!(numbers(solver(&[method, ("solver.substeps", "4")])), (4, 2));
+        assert_eq!(numbers(solver(&[method, ("solver.iterations", "7")])), (10, 7));
+    }
+    let values = solver(&[("solver.iterations", "7")]).values();
+    for recorded in [("substeps", "\"auto\""), ("iterations", "7")] {
+        assert!(values.iter().any(|(key, value)| (*key, value.as_str()) == recorded), "{values:?}");
+    }
 }
 
 #[test]
@@ -205,7 +229,7 @@ fn an_override_counts_as_if_it_were_in_the_file() {
         ("output", "{ every = 7 }"),
     ])
     .unwrap();
-    assert_eq!(scene.solver.iterations, 20);
+    assert_eq!(scene.solver.iterations, Count::Of(20));
     assert_eq!(scene.solver.colors, Colors::Unlimited);
     assert!(scene.solver.rebase);
     assert_eq!(scene.bodies[0].material.young(), 8000.0);
@@ -227,7 +251,8 @@ fn a_bad_override_is_named() {
         (
             "solver.iterations",
             "none",
-            "override of solver.iterations: iterations = \"none\": this must be a whole number",
+            "override of solver.iterations: iterations = \"none\": did you mean \"auto\"? Or write a whole \
+             number",
         ),
         (
             "solver.iterations",

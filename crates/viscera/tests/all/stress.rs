@@ -10,7 +10,7 @@ use viscera::measure::measure_tets;
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder, ModelError};
 use viscera::scalar::{Real, Vec3, vec3};
-use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, Colors, SolverSettings};
+use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, Colors, Count, SolverSettings};
 use viscera::solver::balance::ForceBalance;
 use viscera::solver::{Inputs, Pin, Solver, StepError};
 use viscera::state::State;
@@ -64,7 +64,7 @@ fn violent_grabs_end_in_numbers() {
                     grabbed += damage(&model, &run.state).0;
                     inputs.pins.clear();
                 }
-                for _ in 0..settings.substeps {
+                for _ in 0..settings.substeps() {
                     let before = run.state.clone();
                     run.step(&inputs);
                     let seen = run.solver.rejected_steps();
@@ -92,7 +92,7 @@ fn violent_grabs_end_in_numbers() {
              at the end (at most {worst_end} in one run); farthest vertex {farthest:.2} m; \
              {rejected} of {} steps taken back",
             mesh.tets().len(),
-            seeds * frames * u64::from(settings.substeps)
+            seeds * frames * u64::from(settings.substeps())
         );
         assert_eq!(above, 0, "{colors:?}, {acceleration:?}: steps that raise the potential");
         assert_eq!(gained, 0, "{colors:?}, {acceleration:?}: energy above that at release");
@@ -346,12 +346,18 @@ fn one_tet() -> TetMesh {
 /// Settings at the ends of their ranges, and beyond where the type allows it.
 fn odd_settings() -> Vec<SolverSettings> {
     let default = SolverSettings::default();
-    let anderson =
-        SolverSettings { acceleration: Acceleration::Anderson, iterations: 30, ..default.clone() };
-    let chebyshev =
-        SolverSettings { acceleration: Acceleration::Chebyshev, iterations: 30, ..default.clone() };
+    let anderson = SolverSettings {
+        acceleration: Acceleration::Anderson,
+        iterations: Count::Of(30),
+        ..default.clone()
+    };
+    let chebyshev = SolverSettings {
+        acceleration: Acceleration::Chebyshev,
+        iterations: Count::Of(30),
+        ..default.clone()
+    };
     vec![
-        SolverSettings { iterations: 0, ..default.clone() },
+        SolverSettings { iterations: Count::Of(0), ..default.clone() },
         SolverSettings { relaxation: 0.0, ..default.clone() },
         SolverSettings { rebase_factor: 1.0, ..default.clone() },
         SolverSettings { anderson_window: 0, ..anderson.clone() },

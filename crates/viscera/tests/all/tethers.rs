@@ -7,7 +7,7 @@ use viscera::material::MaterialModel;
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
-use viscera::settings::{Acceleration, Colors, Method, SolverSettings};
+use viscera::settings::{Acceleration, Colors, Count, Method, SolverSettings};
 use viscera::solver::balance::ForceBalance;
 use viscera::solver::gpu::GpuSolver;
 use viscera::solver::{Inputs, Pin, Solver, StepError, Tether};
@@ -81,7 +81,7 @@ fn path(law: MaterialModel, settings: &SolverSettings, attached: bool) -> Vec<Ve
 fn tethers_move_tissue_as_attachments_do() {
     // Converged steps: both are implicit Euler, with the same energies. What is left is what 300 iterations
     // leave, far below the millimetres of the motion; the explicit method has no iterations at all.
-    let many = SolverSettings { iterations: 300, ..SolverSettings::default() };
+    let many = SolverSettings { iterations: Count::Of(300), ..SolverSettings::default() };
     let anderson = SolverSettings {
         acceleration: Acceleration::Anderson,
         colors: Colors::Limited(1),
@@ -197,7 +197,7 @@ fn a_tether_that_cannot_be_is_refused_and_nothing_moves() {
 #[test]
 fn portable_tethers_on_the_device_agree_with_the_cpu() {
     let device = device();
-    let few = SolverSettings { iterations: 4, ..SolverSettings::default() };
+    let few = SolverSettings { iterations: Count::Of(4), ..SolverSettings::default() };
     let explicit = SolverSettings { method: Method::Explicit, ..SolverSettings::default() };
     let published = SolverSettings {
         rebase: false,

@@ -11,8 +11,8 @@ use viscera::mesh::TetMesh;
 use viscera::model::Model;
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, NeoHookean, RelaxationForm, SolverSettings,
-    Start,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, NeoHookean, RelaxationForm,
+    SolverSettings, Start,
 };
 use viscera::solver::acceleration::Anderson;
 use viscera::solver::balance::ForceBalance;
@@ -103,7 +103,8 @@ impl Cantilever {
     ) -> Option<u32> {
         let start = self.distance(&self.predicted(), reference);
         let is_there = |iterations: u32| {
-            let x = self.solve(&SolverSettings { iterations, ..settings.clone() });
+            let x = self
+                .solve(&SolverSettings { iterations: Count::Of(iterations), ..settings.clone() });
             self.distance(&x, reference) < tolerance * start
         };
         let mut high = 1;
@@ -192,7 +193,8 @@ fn anderson_on_positions_alone_stiffens_the_tissue() {
     let jacobi = SolverSettings { colors: JACOBI, ..plain(1, 1) };
     let strain = bar.strain(&reference);
     let share = |on, iterations| {
-        let settings = SolverSettings { iterations, ..anderson(5, on, jacobi.clone()) };
+        let settings =
+            SolverSettings { iterations: Count::Of(iterations), ..anderson(5, on, jacobi.clone()) };
         bar.strain(&bar.solve(&settings)) / strain
     };
     for iterations in [100, 400] {
@@ -295,7 +297,11 @@ fn stiffness_does_not_depend_on_substeps_or_iterations() {
         let model = bar.model(tissue);
         let mut tips = Vec::new();
         for (substeps, iterations) in [(4, 5), (1, 20), (1, 2), (10, 2)] {
-            let settings = SolverSettings { substeps, iterations, ..SolverSettings::default() };
+            let settings = SolverSettings {
+                substeps: Count::Of(substeps),
+                iterations: Count::Of(iterations),
+                ..SolverSettings::default()
+            };
             let mut run = Run::new(&model, &settings);
             let (frames, tip) = settle(&mut run, &bar);
             println!("{tissue:?} {substeps} x {iterations}: tip {tip:.9} m after {frames} frames");
@@ -319,9 +325,9 @@ fn the_step_guard_settles_stiff_tissue_where_a_large_budget_does() {
         let model = single_body(&bar.mesh, &tissue);
         let mut run = Run::new(&model, &settings);
         let tip = settled_tip(&mut run, &bar, 180);
-        (tip, run.solver.rejected_steps() as f64 / f64::from(180 * settings.substeps))
+        (tip, run.solver.rejected_steps() as f64 / f64::from(180 * settings.substeps()))
     };
-    let few = SolverSettings { substeps: 4, ..exact(5) };
+    let few = SolverSettings { substeps: Count::Of(4), ..exact(5) };
     let ((truth, _), (guarded, rejected)) = (rest(exact(20)), rest(few.clone()));
     let (free, _) = rest(SolverSettings { step_guard: false, ..few });
     println!(
@@ -424,8 +430,8 @@ fn every_setting() -> Vec<SolverSettings> {
                     start,
                     relaxation,
                     relaxation_form,
-                    substeps: 2,
-                    iterations: 8,
+                    substeps: Count::Of(2),
+                    iterations: Count::Of(8),
                     chebyshev_delay: 2,
                     chebyshev_damping: 0.8,
                     ..SolverSettings::default()

@@ -4,7 +4,7 @@ use std::fmt;
 
 use anyhow::Result;
 use viscera::material::MaterialModel;
-use viscera::settings::{AndersonGuard, AndersonOn, SolverSettings};
+use viscera::settings::{AndersonGuard, AndersonOn, Count, SolverSettings};
 
 use super::Context;
 use crate::load_cases::Size;
@@ -44,7 +44,7 @@ pub(super) fn ways() -> Vec<Way> {
     use AndersonGuard::{Energy, None, Residual};
     let accelerated = |settings, anderson_guard| SolverSettings {
         anderson_guard,
-        iterations: 5,
+        iterations: Count::Of(5),
         ..anderson(settings, AndersonOn::Both)
     };
     let free = || SolverSettings { step_guard: false, ..exact(COLORED) };

@@ -18,7 +18,7 @@ use std::sync::Arc;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::Vec3;
-use crate::settings::{Method, Precision, SolverSettings, Start};
+use crate::settings::{Count, Method, Precision, SolverSettings, Start};
 use crate::solver::error::StepError;
 use crate::solver::explicit::Stability;
 use crate::solver::inputs::check_model;
@@ -225,7 +225,7 @@ impl GpuSolver {
 
     /// Iterations of the steps to come, at least one; neither stages nor memory depend on them.
     pub fn set_iterations(&mut self, count: u32) {
-        self.settings.iterations = count.max(1);
+        self.settings.iterations = Count::Of(count.max(1));
         self.plan.set_iterations(&self.layout, &self.settings);
     }
 

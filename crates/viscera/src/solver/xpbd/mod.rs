@@ -56,7 +56,7 @@ pub fn plan<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Plan {
     }
 
     let body = body(model, settings).into_iter().map(Node::from).collect();
-    let most = Times::Count(settings.iterations);
+    let most = Times::Count(settings.iterations());
     nodes.push(Node::Repeat(Repeat { most, until: None, body }));
 
     if settings.guards_steps() {

@@ -10,7 +10,7 @@ use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Mat3, Real, Vec3, vec3};
-use viscera::settings::{Colors, SolverSettings};
+use viscera::settings::{Colors, Count, SolverSettings};
 use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
 
@@ -110,7 +110,7 @@ impl<'a, S: Real> Run<'a, S> {
     pub fn new(model: &'a Model<S>, settings: &SolverSettings) -> Self {
         let state = State::at_rest(model);
         let solver = Solver::new(model, settings);
-        Self { model, state, solver, dt: 1.0 / 60.0 / f64::from(settings.substeps) }
+        Self { model, state, solver, dt: 1.0 / 60.0 / f64::from(settings.substeps()) }
     }
 
     pub fn step(&mut self, inputs: &Inputs<S>) {
@@ -118,7 +118,7 @@ impl<'a, S: Real> Run<'a, S> {
     }
 
     pub fn frame(&mut self, inputs: &Inputs<S>, keep: f64) {
-        for _ in 0..self.solver.settings().substeps {
+        for _ in 0..self.solver.settings().substeps() {
             self.step(inputs);
         }
         for v in &mut self.state.velocities {
@@ -129,7 +129,11 @@ impl<'a, S: Real> Run<'a, S> {
 
 /// The rebase with kept multipliers, one substep per frame: exact at rest.
 pub fn exact(iterations: u32) -> SolverSettings {
-    SolverSettings { substeps: 1, iterations, ..SolverSettings::default() }
+    SolverSettings {
+        substeps: Count::Of(1),
+        iterations: Count::Of(iterations),
+        ..SolverSettings::default()
+    }
 }
 
 /// The defaults with other colours.
@@ -140,8 +144,8 @@ pub fn colored(colors: Colors) -> SolverSettings {
 /// XPBD as published: multipliers from zero, no rebase.
 pub fn plain(substeps: u32, iterations: u32) -> SolverSettings {
     SolverSettings {
-        substeps,
-        iterations,
+        substeps: Count::Of(substeps),
+        iterations: Count::Of(iterations),
         rebase: false,
         keep_multipliers: false,
         ..SolverSettings::default()
