@@ -1,6 +1,6 @@
 //! The methods of solution: one arm for each.
 
-use super::plan::Plan;
+use super::plan::{Plan, Times};
 use super::{explicit, xpbd};
 use crate::layout::Layout;
 use crate::scalar::Real;
@@ -18,7 +18,11 @@ impl Plan {
     /// Iterations of the steps to come, where the method has iterations.
     pub fn set_iterations(&mut self, settings: &SolverSettings) {
         match settings.method {
-            Method::Xpbd => self.repeat = settings.iterations,
+            Method::Xpbd => {
+                if let Some(iteration) = self.iteration_mut() {
+                    iteration.most = Times::Count(settings.iterations);
+                }
+            }
             // Small steps are counted by the step.
             Method::Explicit => {}
         }

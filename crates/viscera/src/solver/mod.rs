@@ -5,7 +5,7 @@
 //! XPBD: sweep over constraints, [J M^-1 J^T + a~] dl = -C - a~ l,  x += M^-1 J^T dl,  l += dl
 //! ```
 //!
-//! What one step does is a list of stages ([`plan`]): those that all methods share are in `step`, those of one
+//! What one step does is a tree of stages ([`plan`]): those that all methods share are in `step`, those of one
 //! method in a folder of its name. `cpu` and `gpu` are the two backends: threads and passes, buffers and
 //! dispatches.
 
@@ -120,10 +120,10 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         let Self { settings, plan, layout, memory } = self;
-        let repeat = memory.repeats(plan, layout, inputs, dt)?;
+        let small_steps = memory.repeats(layout, inputs, dt)?;
         state.multipliers.resize(layout.multiplier_count, S::ZERO);
         let step = Step { model: layout, inputs, dt, settings };
-        carry_out(Task::Watched(plan, repeat, &mut watch), memory, &step, state);
+        carry_out(Task::Watched(plan, small_steps, &mut watch), memory, &step, state);
         Ok(())
     }
 
@@ -144,10 +144,10 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         let Self { settings, plan, layout, memory } = self;
-        let repeat = memory.repeats(plan, layout, inputs, dt)?;
+        let small_steps = memory.repeats(layout, inputs, dt)?;
         state.multipliers.resize(layout.multiplier_count, S::ZERO);
         let step = Step { model: layout, inputs, dt, settings };
-        carry_out(Task::Step(plan, repeat, count), memory, &step, state);
+        carry_out(Task::Step(plan, small_steps, count), memory, &step, state);
         Ok(())
     }
 

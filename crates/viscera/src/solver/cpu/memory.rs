@@ -5,7 +5,7 @@ use crate::scalar::Real;
 use crate::settings::{Method, SolverSettings};
 use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
-use crate::solver::plan::{Plan, Stage};
+use crate::solver::plan::{Flag, Stage};
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::guard::Guard;
 use crate::solver::{explicit, step, xpbd};
@@ -63,19 +63,29 @@ impl<S: Real> Memory<S> {
         }
     }
 
-    /// How often the body of the plan is run in a step of `dt` [s].
+    /// How many small steps a step of `dt` [s] has: what [`Times::SmallSteps`] stands for. One where the method
+    /// has none.
+    ///
+    /// [`Times::SmallSteps`]: crate::solver::plan::Times::SmallSteps
     pub fn repeats(
         &mut self,
-        plan: &Plan,
         model: &Layout<S>,
         inputs: &Inputs<S>,
         dt: f64,
     ) -> Result<u32, StepError> {
         match &mut self.method {
-            MethodMemory::Xpbd(_) => Ok(plan.repeat),
+            MethodMemory::Xpbd(_) => Ok(1),
             MethodMemory::Explicit(memory) => {
                 memory.count_small_steps(model, inputs, &mut self.data, dt)
             }
+        }
+    }
+
+    /// Whether a loop that waits for the flag ends.
+    pub fn is_set(&self, flag: Flag) -> bool {
+        match (flag, &self.method) {
+            // Both make all the passes that they are given.
+            (Flag::AllDone, MethodMemory::Xpbd(_) | MethodMemory::Explicit(_)) => false,
         }
     }
 

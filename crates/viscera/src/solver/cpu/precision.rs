@@ -2,25 +2,27 @@
 //! uses the generic solver would compile them all again.
 
 use std::any::Any;
+use std::ops::ControlFlow;
 
 use super::memory::Memory;
 use crate::scalar::{Real, Vec3};
-use crate::solver::plan::Plan;
+use crate::solver::plan::{Flag, Plan, Stage, Visitor};
 use crate::solver::step::data::Step;
 use crate::solver::xpbd::history::restart;
 use crate::state::State;
 
 /// A request to a solver.
 pub enum Task<'a> {
-    /// The stages of a step, the body of the plan so many times; of these stages the first so many.
+    /// The stages of a step of so many small steps; of these stages the first so many.
     Step(&'a Plan, u32, usize),
-    /// The stages of a step, the body of the plan so many times, with an observer callback.
+    /// The stages of a step of so many small steps, with an observer callback.
     Watched(&'a Plan, u32, &'a mut Watch<'a>),
     /// Multipliers from positions.
     Restart,
 }
 
-/// Observer callback: gets the number of iterations and the positions of all vertices [m], the user's order.
+/// Observer callback: gets the number of passes through loops so far, 0 where the first loop begins, and the
+/// positions of all vertices [m], the user's order.
 pub type Watch<'a> = dyn FnMut(u32, &[Vec3<f64>]) + Send + 'a;
 
 /// Carries a request out in one precision.
@@ -79,27 +81,137 @@ fn generic<S: Real>(
 ) {
     let entrance = memory.data.constants.workers.entrance();
     entrance.enter(|| match task {
-        Task::Step(plan, repeat, count) => {
-            for stage in plan.stages(repeat).take(count) {
-                memory.run(stage, step, state);
-            }
+        Task::Step(plan, small_steps, count) => {
+            let observer = None;
+            plan.walk(small_steps, &mut Execution { memory, step, state, left: count, observer });
         }
-        Task::Watched(plan, repeat, watch) => {
-            let mut places = vec![Vec3::ZERO; step.model.vertex_count()];
-            let mut show = |memory: &Memory<S>, iteration| {
-                for (point, &user) in memory.data.points.iter().zip(&step.model.numbering.order) {
-                    places[user as usize] = point.vec3().cast();
-                }
-                watch(iteration, &places);
-            };
-            plan.prologue.iter().for_each(|stage| memory.run(stage, step, state));
-            show(memory, 0);
-            for iteration in 1..=repeat {
-                plan.body.iter().for_each(|stage| memory.run(stage, step, state));
-                show(memory, iteration);
-            }
-            plan.epilogue.iter().for_each(|stage| memory.run(stage, step, state));
+        Task::Watched(plan, small_steps, watch) => {
+            let places = vec![Vec3::ZERO; step.model.vertex_count()];
+            let observer = Some(Observer { watch, places, next: 0 });
+            let left = usize::MAX;
+            plan.walk(small_steps, &mut Execution { memory, step, state, left, observer });
         }
         Task::Restart => restart(step, &mut memory.data, state),
     });
+}
+
+/// A step under way.
+struct Execution<'a, 'm, 'w, S> {
+    memory: &'a mut Memory<S>,
+    step: &'a Step<'m, S>,
+    state: &'a mut State<S>,
+    /// Stages that are still to be run.
+    left: usize,
+    observer: Option<Observer<'w>>,
+}
+
+/// The observer of a step.
+struct Observer<'w> {
+    watch: &'w mut Watch<'w>,
+    /// Memory for what it is shown: positions [m], the user's order.
+    places: Vec<Vec3<f64>>,
+    /// The number of passes that it is told next.
+    next: u32,
+}
+
+impl<S: Real> Execution<'_, '_, '_, S> {
+    /// Shows the observer the positions.
+    fn show(&mut self) {
+        let Some(Observer { watch, places, next }) = &mut self.observer else { return };
+        for (point, &user) in self.memory.data.points.iter().zip(&self.step.model.numbering.order) {
+            places[user as usize] = point.vec3().cast();
+        }
+        watch(*next, places);
+        *next += 1;
+    }
+}
+
+impl<S: Real> Visitor for Execution<'_, '_, '_, S> {
+    fn run(&mut self, stage: &Stage) -> ControlFlow<()> {
+        if self.left == 0 {
+            return ControlFlow::Break(());
+        }
+        self.left -= 1;
+        self.memory.run(stage, self.step, self.state);
+        ControlFlow::Continue(())
+    }
+
+    fn is_set(&self, flag: Flag) -> bool {
+        self.memory.is_set(flag)
+    }
+
+    fn begin_repeat(&mut self) {
+        // Where later loops begin has been shown: once is enough.
+        if self.observer.as_ref().is_some_and(|observer| observer.next == 0) {
+            self.show();
+        }
+    }
+
+    fn end_pass(&mut self) {
+        self.show();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::Layout;
+    use crate::material::MaterialModel;
+    use crate::settings::SolverSettings;
+    use crate::solver::Inputs;
+    use crate::solver::plan::{Node, Repeat, Times};
+    use crate::solver::probe::{everything, quiet};
+
+    /// A step of a plan from rest with initial velocities; the positions where it ends, and all that is shown.
+    fn watched(
+        plan: &Plan,
+        model: &Layout<f64>,
+        settings: &SolverSettings,
+    ) -> (Vec<Vec3<f64>>, Vec<Vec<Vec3<f64>>>) {
+        let inputs = Inputs::default();
+        let step = quiet(model, &inputs, settings, 1e-2);
+        let places = &model.rest_positions;
+        let mut state = State {
+            positions: places.clone(),
+            velocities: places.iter().map(|x| Vec3 { x: -x.y, y: x.z, z: x.x } * 20.0).collect(),
+            multipliers: vec![0.0; model.multiplier_count],
+            multiplier_dt: 0.0,
+        };
+        let mut seen = Vec::new();
+        let mut watch = |passes: u32, x: &[Vec3<f64>]| {
+            assert_eq!(passes as usize, seen.len());
+            seen.push(x.to_vec());
+        };
+        let task = Task::Watched(plan, 1, &mut watch);
+        carry_out(task, &mut Memory::new(model, settings), &step, &mut state);
+        (state.positions, seen)
+    }
+
+    /// Loops one after the other and within each other are iterations like those of one loop, to the bit. Passes are
+    /// counted on from loop to loop.
+    #[test]
+    fn loops_of_loops_are_iterations() {
+        let settings = SolverSettings { iterations: 4, ..SolverSettings::default() };
+        let law = MaterialModel::SaintVenantKirchhoff;
+        let model = everything(&settings, [law, law], 0.3);
+        let plan = Plan::new(&model, &settings);
+        let (expected, iterates) = watched(&plan, &model, &settings);
+        assert_eq!(iterates.len(), 5);
+        assert!(iterates.windows(2).all(|pair| pair[0] != pair[1]));
+
+        let is_loop = |node: &Node| matches!(node, Node::Repeat(_));
+        let place = plan.nodes.iter().position(is_loop).expect("an iteration");
+        let body = plan.iteration().expect("an iteration").body.clone();
+        let twice = |body| Node::Repeat(Repeat { most: Times::Count(2), until: None, body });
+        let with = |loops: Vec<Node>| {
+            let mut plan = plan.clone();
+            plan.nodes.splice(place..=place, loops);
+            watched(&plan, &model, &settings)
+        };
+        let one_by_one = with(vec![twice(body.clone()), twice(body.clone())]);
+        assert_eq!(one_by_one, (expected.clone(), iterates.clone()));
+        // Where an inner loop ends with a pass of the outer one, both are shown.
+        let both = [0, 1, 2, 2, 3, 4, 4].map(|i: usize| iterates[i].clone());
+        assert_eq!(with(vec![twice(vec![twice(body)])]), (expected, both.to_vec()));
+    }
 }

@@ -25,7 +25,7 @@ use crate::scalar::{Real, Vec3};
 use crate::settings::SolverSettings;
 use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
-use crate::solver::plan::Plan;
+use crate::solver::plan::{Node, Plan, Repeat, Times};
 use crate::solver::step::data::{Step, StepConstants, StepData, gather};
 use crate::solver::step::gradient::load_forces;
 use crate::solver::step::predict::{Tethers, load_tethers};
@@ -38,11 +38,15 @@ use stage::ExplicitStage;
 
 /// The stages of a step.
 pub fn plan() -> Plan {
+    let small_step = vec![ExplicitStage::LoadForces.into(), ExplicitStage::Advance.into()];
     Plan {
-        prologue: vec![StepStage::ReadState.into(), ExplicitStage::Begin.into()],
-        repeat: 1,
-        body: vec![ExplicitStage::LoadForces.into(), ExplicitStage::Advance.into()],
-        epilogue: vec![ExplicitStage::End.into(), StepStage::WriteState.into()],
+        nodes: vec![
+            StepStage::ReadState.into(),
+            ExplicitStage::Begin.into(),
+            Node::Repeat(Repeat { most: Times::SmallSteps, until: None, body: small_step }),
+            ExplicitStage::End.into(),
+            StepStage::WriteState.into(),
+        ],
     }
 }
 

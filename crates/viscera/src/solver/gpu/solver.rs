@@ -143,6 +143,7 @@ impl GpuSolver {
             device: device.clone(),
             settings: settings.clone(),
             falls: plan
+                .split()
                 .prologue
                 .contains(&StepStage::Predict(Start::Auto).into())
                 .then(|| Falls::new(&laid)),

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::record::{Dispatch, Recorder};
-use crate::solver::plan::{Plan, Stage, XpbdStage};
+use crate::solver::plan::{Plan, Split, Stage, XpbdStage};
 
 /// The dispatches of one stage among those of its part of the step.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,7 +12,7 @@ pub struct StageRange {
     pub dispatches: Range<usize>,
 }
 
-/// The dispatches of a step: once, so many times, once.
+/// The dispatches of a step: once, in each pass through the iteration, once.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
     pub prologue: Vec<Dispatch>,
@@ -29,8 +29,9 @@ pub struct Record {
 
 impl Recorder<'_> {
     pub fn record(&self, plan: &Plan) -> Record {
+        let Split { prologue, body, epilogue } = plan.split();
         let [prologue, body, epilogue] =
-            [&plan.prologue, &plan.body, &plan.epilogue].map(|stages| self.list(stages));
+            [prologue, body, epilogue].map(|stages| self.list(&stages));
         Record {
             prologue: prologue.0,
             body: body.0,

@@ -76,8 +76,9 @@ impl GpuSolver {
         let layout = self.layout_of(model)?;
         let model = &*layout;
         crate::solver::inputs::check_step(dt, model, inputs)?;
-        let repeats = match &self.stability {
-            None => self.plan.repeat,
+        let count = match &self.stability {
+            // One small step: the step itself.
+            None => 1,
             Some(stability) => {
                 bundle(model, inputs, &mut self.tethers);
                 let most = small_steps(dt, stability.step(model, &self.tethers))?;
@@ -92,7 +93,7 @@ impl GpuSolver {
             }
         };
         self.prepare_step(model, inputs, dt);
-        Ok(repeats)
+        Ok(self.plan.passes(count))
     }
 
     /// One submission of one compute pass.

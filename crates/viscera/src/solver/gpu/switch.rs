@@ -13,7 +13,7 @@ use crate::solver::Solver;
 use crate::solver::cpu::memory::MethodMemory;
 use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
-use crate::solver::plan::{Plan, Stage, StepStage, XpbdStage};
+use crate::solver::plan::{Split, Stage, StepStage, XpbdStage};
 use crate::solver::step::data::StepData;
 use crate::state::State;
 
@@ -38,11 +38,12 @@ impl GpuSolver {
             return Err(StepError::OtherModel);
         }
         let repeats = self.begin_step(model, inputs, dt)?;
-        let count = first_stages(&self.plan, stage);
+        let stages = self.plan.split();
+        let count = first_stages(&stages, stage);
         solver.step_first(count, model, state, inputs, dt)?;
         self.take_over(solver, &self.layout, state, inputs, count);
         let [prologue, body, _] = &self.ready;
-        let (before, within) = split(&self.stage_starts, count, self.plan.prologue.len());
+        let (before, within) = split(&self.stage_starts, count, stages.prologue.len());
         let mut lists: Vec<&[Ready]> = Vec::new();
         // What a prologue prepares for the device's own way through the body.
         let starts_acceleration = prologue.iter().filter(|ready| ready.starts_acceleration);
@@ -81,7 +82,8 @@ impl GpuSolver {
         let write = |slot, values: &[f32]| {
             self.buffers.write(&self.device.queue, slot, bytemuck::cast_slice(values));
         };
-        let has = |wanted: fn(&Stage) -> bool| self.plan.stages(1).take(count).any(wanted);
+        let stages = self.plan.split();
+        let has = |wanted: fn(&Stage) -> bool| stages.first_pass().take(count).any(wanted);
         if count == 0 {
             return;
         }
@@ -198,11 +200,10 @@ impl DeviceLayout {
 }
 
 /// How many stages come before the first of that name, of those that the CPU may compute.
-fn first_stages(plan: &Plan, stage: Stage) -> usize {
-    let stages = || plan.prologue.iter().chain(&plan.body);
+fn first_stages(stages: &Split, stage: Stage) -> usize {
     let decides = |other: &Stage| *other == StepStage::ChooseStart.into();
-    let most = stages().position(decides).unwrap_or(plan.prologue.len() + plan.body.len());
-    stages().position(|other| *other == stage).unwrap_or(most).min(most)
+    let most = stages.first_pass().position(decides).unwrap_or(stages.first_pass().count());
+    stages.first_pass().position(|other| *other == stage).unwrap_or(most).min(most)
 }
 
 /// How many dispatches of prologue and body belong to the first `count` stages.

@@ -17,7 +17,7 @@ use crate::layout::Layout;
 use crate::model::for_each_kind;
 use crate::scalar::Real;
 use crate::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Start};
-use crate::solver::plan::{Plan, Stage};
+use crate::solver::plan::{Node, Plan, Repeat, Times};
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::guard::Guard;
 use crate::solver::step::stage::StepStage;
@@ -31,9 +31,9 @@ use sweep::solve_color;
 
 /// The stages of a step.
 pub fn plan<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Plan {
-    let mut prologue: Vec<Stage> = vec![StepStage::ReadState.into()];
+    let mut nodes: Vec<Node> = vec![StepStage::ReadState.into()];
     if model.is_viscous() {
-        prologue.push(StepStage::MeasureStrain.into());
+        nodes.push(StepStage::MeasureStrain.into());
     }
     // A kept multiplier already carries gravity: adding it to the start counts it twice, where anything holds
     // the part.
@@ -42,33 +42,35 @@ pub fn plan<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Plan {
         (Start::Auto, false) => Start::Predicted,
         (chosen, _) => chosen,
     };
-    prologue.push(StepStage::Predict(start).into());
-    prologue.push(match settings.keep_multipliers {
+    nodes.push(StepStage::Predict(start).into());
+    nodes.push(match settings.keep_multipliers {
         true => XpbdStage::RescaleMultipliers.into(),
         false => XpbdStage::ResetMultipliers.into(),
     });
 
     if settings.guards_steps() {
-        prologue.push(StepStage::ChooseStart.into());
+        nodes.push(StepStage::ChooseStart.into());
     }
     if is_accelerated(settings) && mixes_remember(settings) {
-        prologue.push(XpbdStage::RememberIterate.into());
+        nodes.push(XpbdStage::RememberIterate.into());
     }
 
-    let body = body(model, settings).into_iter().map(Stage::Xpbd).collect();
-    let mut epilogue: Vec<Stage> = Vec::new();
+    let body = body(model, settings).into_iter().map(Node::from).collect();
+    let most = Times::Count(settings.iterations);
+    nodes.push(Node::Repeat(Repeat { most, until: None, body }));
+
     if settings.guards_steps() {
-        epilogue.push(StepStage::GuardStep.into());
+        nodes.push(StepStage::GuardStep.into());
     }
     if settings.keep_multipliers {
-        epilogue.push(XpbdStage::RepairMultipliers.into());
+        nodes.push(XpbdStage::RepairMultipliers.into());
     }
-    epilogue.push(match settings.guards_steps() {
+    nodes.push(match settings.guards_steps() {
         true => StepStage::LimitEnergy.into(),
         false => StepStage::UpdateVelocities.into(),
     });
-    epilogue.push(StepStage::WriteState.into());
-    Plan { prologue, repeat: settings.iterations, body, epilogue }
+    nodes.push(StepStage::WriteState.into());
+    Plan { nodes }
 }
 
 /// The stages of an iteration.
