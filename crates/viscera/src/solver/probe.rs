@@ -42,6 +42,7 @@ pub(super) fn begun(step: &Step<'_, f64>, places: &[Vec3<f64>]) -> Memory<f64> {
         velocities: vec![Vec3::ZERO; places.len()],
         multipliers: vec![0.0; step.model.multiplier_count],
         multiplier_dt: 0.0,
+        learned: Default::default(),
     };
     for stage in
         [StepStage::ReadState, StepStage::MeasureStrain, StepStage::Predict(Start::Previous)]

@@ -375,7 +375,7 @@ fn assert_hands_change(iterations: u32, before: u32) {
         cpu.step(&model, &mut whole, &inputs, DT).expect("a legal step");
         let moved = whole.positions.iter().zip(&start.positions);
         let moved = moved.map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
-        let mut stages = [&gpu.plan().prologue[..], &gpu.plan().body[..]].concat();
+        let mut stages: Vec<Stage> = gpu.plan().split().first_pass().copied().collect();
         let is_color = |stage: &Stage| matches!(stage, Stage::Xpbd(XpbdStage::SolveColor(_)));
         stages.dedup_by(|a, b| is_color(a) && is_color(b));
         for stage in stages {

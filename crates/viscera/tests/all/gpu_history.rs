@@ -40,6 +40,7 @@ fn scrambled(model: &Layout<f32>) -> State<f32> {
         velocities: vec![viscera::scalar::Vec3::ZERO; model.vertex_count()],
         multipliers: vec![0.0; model.multiplier_count],
         multiplier_dt: 0.0,
+        learned: Default::default(),
     };
     for (x, v) in state.positions.iter_mut().zip(&mut state.velocities) {
         *x += random.vector(0.002).cast();
@@ -64,6 +65,7 @@ fn in_double(state: &State<f32>) -> State<f64> {
         velocities: state.velocities.iter().map(|v| v.cast()).collect(),
         multipliers: state.multipliers.iter().map(|&l| l.into()).collect(),
         multiplier_dt: state.multiplier_dt,
+        learned: Default::default(),
     }
 }
 

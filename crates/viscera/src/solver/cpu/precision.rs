@@ -150,3 +150,68 @@ impl<S: Real> Visitor for Execution<'_, '_, '_, S> {
         self.show();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::Layout;
+    use crate::material::MaterialModel;
+    use crate::settings::{Count, SolverSettings};
+    use crate::solver::Inputs;
+    use crate::solver::plan::{Node, Repeat, Times};
+    use crate::solver::probe::{everything, quiet};
+
+    /// A step of a plan from rest with initial velocities; the positions where it ends, and all that is shown.
+    fn watched(
+        plan: &Plan,
+        model: &Layout<f64>,
+        settings: &SolverSettings,
+    ) -> (Vec<Vec3<f64>>, Vec<Vec<Vec3<f64>>>) {
+        let inputs = Inputs::default();
+        let step = quiet(model, &inputs, settings, 1e-2);
+        let places = &model.rest_positions;
+        let mut state = State {
+            positions: places.clone(),
+            velocities: places.iter().map(|x| Vec3 { x: -x.y, y: x.z, z: x.x } * 20.0).collect(),
+            multipliers: vec![0.0; model.multiplier_count],
+            multiplier_dt: 0.0,
+            learned: Default::default(),
+        };
+        let mut seen = Vec::new();
+        let mut watch = |passes: u32, x: &[Vec3<f64>]| {
+            assert_eq!(passes as usize, seen.len());
+            seen.push(x.to_vec());
+        };
+        let task = Task::Watched(plan, 1, &mut watch);
+        carry_out(task, &mut Memory::new(model, settings), &step, &mut state);
+        (state.positions, seen)
+    }
+
+    /// Loops one after the other and within each other are iterations like those of one loop, to the bit. Passes are
+    /// counted on from loop to loop.
+    #[test]
+    fn loops_of_loops_are_iterations() {
+        let settings = SolverSettings { iterations: Count::Of(4), ..SolverSettings::default() };
+        let law = MaterialModel::SaintVenantKirchhoff;
+        let model = everything(&settings, [law, law], 0.3);
+        let plan = Plan::new(&model, &settings);
+        let (expected, iterates) = watched(&plan, &model, &settings);
+        assert_eq!(iterates.len(), 5);
+        assert!(iterates.windows(2).all(|pair| pair[0] != pair[1]));
+
+        let is_loop = |node: &Node| matches!(node, Node::Repeat(_));
+        let place = plan.nodes.iter().position(is_loop).expect("an iteration");
+        let body = plan.iteration().expect("an iteration").body.clone();
+        let twice = |body| Node::Repeat(Repeat { most: Times::Count(2), until: None, body });
+        let with = |loops: Vec<Node>| {
+            let mut plan = plan.clone();
+            plan.nodes.splice(place..=place, loops);
+            watched(&plan, &model, &settings)
+        };
+        let one_by_one = with(vec![twice(body.clone()), twice(body.clone())]);
+        assert_eq!(one_by_one, (expected.clone(), iterates.clone()));
+        // Where an inner loop ends with a pass of the outer one, both are shown.
+        let both = [0, 1, 2, 2, 3, 4, 4].map(|i: usize| iterates[i].clone());
+        assert_eq!(with(vec![twice(vec![twice(body)])]), (expected, both.to_vec()));
+    }
+}
