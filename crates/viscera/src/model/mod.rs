@@ -15,7 +15,7 @@ use std::sync::Arc;
 pub use builder::ModelBuilder;
 pub(crate) use elements::for_each_kind;
 pub use elements::{ElementList, ElementLists};
-pub(crate) use numbering::Numbering;
+pub(crate) use numbering::{Numbering, Z_ORDER_BITS, z_order};
 
 pub use crate::material::MaterialConstants;
 
