@@ -210,6 +210,7 @@ fn heading<S: Real>(simulation: &Simulation<S>, summary: &Summary, frames: u64) 
     let solver = &simulation.scene().solver;
     let work = match solver.method {
         Method::Xpbd => format!(" x {} iterations", solver.iterations()),
+        Method::QuasiNewton => format!(" x {} passes per solve", simulation.iterations()),
         Method::Explicit => {
             let small = format!("{:.2e} s", simulation.stable_step());
             format!(", divided into small steps of at most {small}")
@@ -227,7 +228,7 @@ fn heading<S: Real>(simulation: &Simulation<S>, summary: &Summary, frames: u64) 
         model.vertices,
         model.mass,
         model.colors,
-        solver.substeps(),
+        simulation.substeps(),
         summary.device,
     )
 }

@@ -209,7 +209,7 @@ mod tests {
         for _ in 0..12 {
             simulation.advance().expect("a frame");
         }
-        let dt = simulation.scene().time.frame / f64::from(simulation.scene().solver.substeps());
+        let dt = simulation.scene().time.frame / f64::from(simulation.substeps());
         NextStep {
             solver: simulation.scene().solver.clone(),
             builder: simulation.assembly().builder.clone(),

@@ -208,7 +208,7 @@ impl<S: Real> Run for SimulationRun<S> {
     fn next_step(&self) -> NextStep {
         let simulation = &self.simulation;
         let scene = simulation.scene();
-        let dt = scene.time.frame / f64::from(scene.solver.substeps());
+        let dt = scene.time.frame / f64::from(simulation.substeps());
         let inputs = simulation.inputs_at(simulation.time() + dt);
         let double = |all: &[Vec3<S>]| all.iter().map(|x| x.cast()).collect();
         NextStep {

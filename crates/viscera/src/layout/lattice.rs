@@ -12,12 +12,18 @@
 //! nested     w_(l+1)(x, K) = sum over k of w_l(x, k) hat(k_1 / 2 - K_1) hat(k_2 / 2 - K_2) hat(k_3 / 2 - K_3)
 //! ```
 //!
-//! Points follow connectivity: the vertices with a weight at a point are its support, and each connected component of
-//! it, by the elements between its own vertices, has its own copy of the point, a node. So the two sides of a cut or of
-//! a gap move apart at every level that is fine enough to go around its end. (The same is done for embedding cells by
-//! Nesme, Kry, Jerabkova and Faure, "Preserving topology and elasticity for embedded deformable models", SIGGRAPH 2009.)
-//! Copies keep the spaces nested: a support lies within the supports of its point's parents, and a component, being
-//! connected, within one component of each.
+//! Points follow connectivity. The vertices with a weight at a point are its support; two of them hang together if an
+//! element ties them, or ties both to some third vertex. Each component of the support that this makes has its own copy
+//! of the point, a node. So the two sides of a cut or of a gap move apart at every level that is fine enough to go
+//! around its end. (Nesme, Kry, Jerabkova and Faure, "Preserving topology and elasticity for embedded deformable models",
+//! SIGGRAPH 2009, do the same with the cells that they embed a body in.)
+//!
+//! - Copies keep the spaces nested: a support lies within the supports of its point's parents, and what hangs together
+//!   in it does so in theirs, so that each component lies within one component of each parent.
+//! - Without third vertices, one at the corner of a support, all of whose neighbours happen to lie outside, would have a
+//!   node to itself: where the planes of the lattice run through jittered vertices, a quarter more nodes at the finest
+//!   level and twice as many at coarse ones, none of which separates anything. Third vertices do not cross a cut, but
+//!   they go around its end, one edge further out.
 
 mod nodes;
 #[cfg(test)]
@@ -185,7 +191,7 @@ impl Grid {
         let (origin, high) = places.iter().fold(nothing, extent);
         let size = high - origin;
         let side = size.x.max(size.y).max(size.z).max(0.0);
-        Self { origin, side, spacing: if side > 0.0 { side } else { 1.0 } }
+        Self { origin, side, spacing: side.max(f64::MIN_POSITIVE) }
     }
 
     /// Places `[m]` in spacings from the origin, none below zero.

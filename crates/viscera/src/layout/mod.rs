@@ -5,10 +5,6 @@
 //! Vertices are in the solver's numbering (`Model::numbering`); `order` of each set maps back to the user's numbers.
 
 pub(crate) mod elements;
-#[cfg_attr(
-    not(test),
-    expect(dead_code, reason = "no solver has a preconditioner of several levels yet")
-)]
 pub(crate) mod lattice;
 mod order;
 mod parts;
@@ -20,7 +16,7 @@ use std::sync::Arc;
 
 pub(crate) use elements::{Before, Moments};
 pub use elements::{ElementSet, ElementSets};
-use order::{Order, renumbered_copies};
+use order::{Order, cell_by_cell, renumbered_copies};
 use parts::Laid;
 pub(crate) use parts::Part;
 pub(crate) use pieces::PIECE_BLOCKS;
@@ -81,7 +77,10 @@ impl<S: Real> Layout<S> {
 
     fn of(model: &Model<S>, settings: &SolverSettings) -> Self {
         let graph = constraint_graph(model);
-        let numbering = &model.numbering;
+        let numbering = &match settings.method {
+            Method::QuasiNewton => Arc::new(cell_by_cell(model)),
+            Method::Xpbd | Method::Explicit => Arc::clone(&model.numbering),
+        };
         // Forces are added tetrahedron by tetrahedron where no constraint is solved: no colours, but pieces.
         let coloring = match settings.method {
             Method::QuasiNewton => in_pieces(model, &graph, numbering),

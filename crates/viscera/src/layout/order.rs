@@ -1,8 +1,36 @@
 //! Constraints sorted by colour, and their places in the flat arrays.
 
 use crate::coloring::{Coloring, ConstraintGraph};
-use crate::model::Numbering;
+use super::lattice::cell_order;
+use crate::model::{Model, Numbering};
+use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, LANES};
+
+/// Vertices cell by cell of the finest lattice of their part, for what gathers them cell by cell; parts stand in the
+/// order that they have in the model's numbering.
+pub(super) fn cell_by_cell<S: Real>(model: &Model<S>) -> Numbering {
+    let parts = &model.part_numbers;
+    let mut tets = vec![Vec::new(); model.part_count];
+    for tet in &model.tet_vertices {
+        tets[parts[tet[0] as usize] as usize].push(*tet);
+    }
+    let mut order = Vec::with_capacity(parts.len());
+    let mut local = vec![0; parts.len()];
+    for of_part in model.numbering.order.chunk_by(|&a, &b| parts[a as usize] == parts[b as usize]) {
+        of_part.iter().zip(0..).for_each(|(&v, place)| local[v as usize] = place);
+        let places: Vec<_> = of_part.iter().map(|&v| model.places[v as usize]).collect();
+        let tets = &mut tets[parts[of_part[0] as usize] as usize];
+        tets.iter_mut().for_each(|tet| *tet = tet.map(|v| local[v as usize]));
+        let mut sorted: Vec<_> = cell_order(&places, tets).into_iter().zip(of_part).collect();
+        sorted.sort_unstable();
+        order.extend(sorted.into_iter().map(|(_, &v)| v));
+    }
+    let mut rank = vec![0; order.len()];
+    for (place, &v) in order.iter().enumerate() {
+        rank[v as usize] = place as u32;
+    }
+    Numbering { order, rank }
+}
 
 /// First copy of each vertex in the solver's numbering.
 pub(super) fn renumbered_copies(coloring: &Coloring, numbering: &Numbering) -> Vec<u32> {

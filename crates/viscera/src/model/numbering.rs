@@ -59,10 +59,9 @@ pub(crate) fn z_order(cell: [u64; 3]) -> u64 {
     spread(cell[0]) | spread(cell[1]) << 1 | spread(cell[2]) << 2
 }
 
-/// Two zero bits between any two of the lowest [`Z_ORDER_BITS`]; higher bits are dropped.
+/// Two zero bits between any two of a value of [`Z_ORDER_BITS`].
 fn spread(value: u64) -> u64 {
-    // Groups of bits are halved and moved apart: 32, 16, 8, 4, 2, 1.
-    let value = value & ((1 << Z_ORDER_BITS) - 1);
+    // Groups of 16 bits move apart, then of 8, 4, 2 and 1.
     let value = (value | value << 32) & 0x001F_0000_0000_FFFF;
     let value = (value | value << 16) & 0x001F_0000_FF00_00FF;
     let value = (value | value << 8) & 0x100F_00F0_0F00_F00F;

@@ -112,6 +112,14 @@ impl<S: Real> Backend<S> {
         }
     }
 
+    /// See [`Solver::slowest_period`]; methods that need to know it are computed by the CPU.
+    pub fn slowest_period(&mut self, inputs: &Inputs<S>) -> f64 {
+        match &mut self.engine {
+            Engine::Cpu(solver) => solver.slowest_period(inputs),
+            Engine::Device(_) => f64::INFINITY,
+        }
+    }
+
     /// The instructions that the CPU works with, where it computes.
     pub fn instructions(&self) -> Option<Instructions> {
         match &self.engine {

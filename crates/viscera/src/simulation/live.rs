@@ -233,7 +233,7 @@ impl<S: Real> Simulation<S> {
         }
         let model = builder.build::<S>().map_err(SimulationError::from)?;
         let same_device = scene.solver.device == self.scene.solver.device;
-        let backend = self.backend.renew(same_device, &model, &scene.solver, substep_dt(&scene))?;
+        let backend = self.backend.renew(same_device, &model, &scene.solver, substep_dt(&scene, scene.solver.substeps()))?;
         let rest = State::at_rest(&model);
         let state = State {
             positions: std::mem::take(&mut self.state.positions),
@@ -242,6 +242,7 @@ impl<S: Real> Simulation<S> {
         };
         (self.scene, self.model, self.backend) = (scene, model, backend);
         self.assembly.builder = builder;
+        self.choose_substeps();
         self.begin_at(state);
         Ok(())
     }
@@ -249,7 +250,7 @@ impl<S: Real> Simulation<S> {
     /// A state of this model, with the tissue's answer to where it is.
     fn begin_at(&mut self, mut state: State<S>) {
         let inputs = self.inputs_at(self.time());
-        let dt = substep_dt(&self.scene);
+        let dt = self.substep_dt();
         state.multiplier_dt = dt;
         let restarted = self.backend.restart(&self.model, &mut state, &inputs, dt);
         debug_assert!(restarted.is_ok(), "{restarted:?}");

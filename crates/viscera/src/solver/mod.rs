@@ -204,6 +204,14 @@ impl<S: Real> Solver<S> {
         self.memory.stable_step()
     }
 
+    /// The period [s] of the slowest oscillation of what is held about the rest shape, of the part that oscillates
+    /// fastest; infinite where nothing is held, and for methods that need not know it. Forgets the last step.
+    pub fn slowest_period(&mut self, inputs: &Inputs<S>) -> f64 {
+        let Self { settings, layout, memory, .. } = self;
+        let step = Step { model: layout, inputs, dt: 1.0, settings };
+        cpu::precision::slowest_period(memory, &step)
+    }
+
     /// Bytes of the memory taken, model and state not included.
     pub fn bytes(&self) -> usize {
         self.layout.bytes() + self.memory.bytes()

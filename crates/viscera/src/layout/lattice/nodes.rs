@@ -1,4 +1,4 @@
-//! The nodes of one level: lattice points, a copy for each connected piece of what they move.
+//! The nodes of one level: lattice points, a copy for each component of their supports.
 
 use crate::model::z_order;
 use crate::scalar::Vec3;
@@ -105,38 +105,16 @@ impl Nodes {
         let mut next = offsets.clone();
         let mut entries = vec![(0, 0.0); reached.len()];
         let (mut points, mut first_vertices) = (Vec::new(), Vec::new());
-        // The last support that has the vertex; `FOUND` once a component has it. A support's number is that of its
-        // first node, below `FOUND`.
-        const FOUND: u32 = u32::MAX;
-        let mut supports = vec![FOUND; coordinates.len()];
-        let mut component: Vec<u32> = Vec::new();
+        let mut search = Search::new(neighbors, coordinates.len());
         for support in reached.chunk_by(|a, b| a.order == b.order) {
-            let number = points.len() as u32;
-            support.iter().for_each(|r| supports[r.vertex as usize] = number);
             let point = point_at(coordinates[support[0].vertex as usize], support[0].corner);
-            let mut left = support.len();
+            search.begin(support);
             for first in support.iter().map(|r| r.vertex) {
-                if supports[first as usize] == FOUND {
+                if !search.is_left[first as usize] {
                     continue;
                 }
-                supports[first as usize] = FOUND;
-                component.clear();
-                component.push(first);
-                left -= 1;
-                let mut at = 0;
-                // Nobody is left in most supports long before all have been asked for their neighbours.
-                while at < component.len() && left > 0 {
-                    for &v in neighbors.of(component[at]) {
-                        if supports[v as usize] == number {
-                            supports[v as usize] = FOUND;
-                            component.push(v);
-                            left -= 1;
-                        }
-                    }
-                    at += 1;
-                }
                 let node = points.len() as u32;
-                for &v in &component {
+                for &v in search.component(first, node) {
                     let entry = &mut next[v as usize];
                     entries[*entry as usize] = (node, weight(coordinates[v as usize], point));
                     *entry += 1;
@@ -146,6 +124,71 @@ impl Nodes {
             }
         }
         Self { points, first_vertices, of_vertices: Weights { offsets, entries } }
+    }
+}
+
+/// Finds the components of one support after the other.
+struct Search<'a> {
+    neighbors: &'a Neighbors,
+    /// Whether each vertex is in the present support and in no component yet, shape `[vertex_count]`.
+    is_left: Vec<bool>,
+    /// How many vertices that is.
+    left: usize,
+    /// The last node for which each vertex was the third that others hang together by, shape `[vertex_count]`.
+    crossed_for: Vec<u32>,
+    /// Vertices of the last component that was found.
+    component: Vec<u32>,
+}
+
+impl<'a> Search<'a> {
+    fn new(neighbors: &'a Neighbors, vertex_count: usize) -> Self {
+        Self {
+            neighbors,
+            is_left: vec![false; vertex_count],
+            left: 0,
+            // No node's number.
+            crossed_for: vec![u32::MAX; vertex_count],
+            component: Vec::new(),
+        }
+    }
+
+    /// Takes up the next support; nothing is left of the one before.
+    fn begin(&mut self, support: &[Reached]) {
+        support.iter().for_each(|r| self.is_left[r.vertex as usize] = true);
+        self.left = support.len();
+    }
+
+    /// What hangs together with `first`, which is left; `node` is the number of the component's own node.
+    fn component(&mut self, first: u32, node: u32) -> &[u32] {
+        self.component.clear();
+        self.take(first);
+        let neighbors = self.neighbors;
+        let (mut asked, mut crossed) = (0, 0);
+        // Nothing is left of most supports long before all have been asked for their neighbours, so the search across
+        // third vertices, which is the long one, is rare.
+        while self.left > 0 && crossed < self.component.len() {
+            if let Some(&v) = self.component.get(asked) {
+                asked += 1;
+                neighbors.of(v).iter().for_each(|&other| self.take(other));
+                continue;
+            }
+            for &third in neighbors.of(self.component[crossed]) {
+                if self.crossed_for[third as usize] != node {
+                    self.crossed_for[third as usize] = node;
+                    neighbors.of(third).iter().for_each(|&other| self.take(other));
+                }
+            }
+            crossed += 1;
+        }
+        &self.component
+    }
+
+    /// Adds a vertex to the component if it is left.
+    fn take(&mut self, vertex: u32) {
+        if std::mem::take(&mut self.is_left[vertex as usize]) {
+            self.component.push(vertex);
+            self.left -= 1;
+        }
     }
 }
 
@@ -175,7 +218,7 @@ fn point_at(x: Vec3<f64>, corner: u8) -> [u32; 3] {
 /// Trilinear weight at this coordinate of a corner of its cell: the product of `1 - |x - k|` over the axes.
 fn weight(x: Vec3<f64>, point: [u32; 3]) -> f64 {
     let along = |axis: usize| {
-        // From the fraction itself, so that no weight vanishes by round-off: 1e-17 from a point it is 1e-17.
+        // The fraction is exact, and `x - k` would not be: no weight vanishes by round-off.
         let fraction = x[axis].fract();
         if x[axis] as u32 == point[axis] { 1.0 - fraction } else { fraction }
     };

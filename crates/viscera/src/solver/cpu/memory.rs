@@ -104,6 +104,14 @@ impl<S: Real> Memory<S> {
         }
     }
 
+    /// See [`crate::solver::Solver::slowest_period`].
+    pub fn slowest_period(&mut self, step: &Step<'_, S>) -> f64 {
+        match &mut self.method {
+            MethodMemory::QuasiNewton(memory) => memory.slowest_period(step, &mut self.data),
+            _ => f64::INFINITY,
+        }
+    }
+
     /// Starts a new history: what was learned is forgotten, multipliers follow from positions.
     pub fn restart(&mut self, step: &Step<'_, S>, state: &mut State<S>) {
         state.learned = Learned::default();

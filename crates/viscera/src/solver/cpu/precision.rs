@@ -8,7 +8,7 @@ use super::memory::Memory;
 use crate::scalar::{Real, Vec3};
 use crate::solver::plan::{Flag, Plan, Stage, Visitor};
 use crate::solver::step::data::Step;
-use crate::state::State;
+use crate::state::{Learned, State};
 
 /// A request to a solver.
 pub enum Task<'a> {
@@ -18,11 +18,27 @@ pub enum Task<'a> {
     Watched(&'a Plan, u32, &'a mut Watch<'a>),
     /// Multipliers from positions.
     Restart,
+    /// The slowest period [s].
+    Period(&'a mut f64),
 }
 
 /// Observer callback: gets the number of passes through loops so far, 0 where the first loop begins, and the
 /// positions of all vertices [m], the user's order.
 pub type Watch<'a> = dyn FnMut(u32, &[Vec3<f64>]) + Send + 'a;
+
+/// See [`crate::solver::Solver::slowest_period`].
+pub fn slowest_period<S: Real>(memory: &mut Memory<S>, step: &Step<'_, S>) -> f64 {
+    let mut period = f64::INFINITY;
+    let mut nothing = State {
+        positions: Vec::new(),
+        velocities: Vec::new(),
+        multipliers: Vec::new(),
+        multiplier_dt: 0.0,
+        learned: Learned::default(),
+    };
+    carry_out(Task::Period(&mut period), memory, step, &mut nothing);
+    period
+}
 
 /// Carries a request out in one precision.
 pub fn carry_out<S: Real>(
@@ -91,6 +107,7 @@ fn generic<S: Real>(
             plan.walk(small_steps, &mut Execution { memory, step, state, left, observer });
         }
         Task::Restart => memory.restart(step, state),
+        Task::Period(period) => *period = memory.slowest_period(step),
     });
 }
 

@@ -17,6 +17,7 @@
 mod direction;
 mod evaluate;
 mod parts;
+mod period;
 mod preconditioner;
 pub mod stage;
 mod time;

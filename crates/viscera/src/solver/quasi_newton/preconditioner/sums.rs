@@ -75,8 +75,10 @@ impl Grouped {
     pub fn new(tets: &[LocalTet], places: &[Vec3<f64>], lattice: &Lattice) -> Self {
         let cell = |tet: &LocalTet| {
             let sum = tet.vertices.iter().fold(Vec3::ZERO, |sum: Vec3<f64>, &v| sum + places[v as usize]);
-            let at = (sum * 0.25 - lattice.origin) * (GROUPS / lattice.spacing);
-            [at.z, at.y, at.x].map(|x| x.floor() as i64)
+            let at = (sum * 0.25 - lattice.origin) * (1.0 / lattice.spacing);
+            // A part without levels is one cell.
+            let cell = |x: f64| if x.is_finite() { x.floor() as i64 } else { 0 };
+            [at.z, at.y, at.x].map(cell)
         };
         let mut order: Vec<(_, u32)> = tets.iter().map(cell).zip(0..).collect();
         order.sort_unstable();
@@ -304,7 +306,6 @@ impl<S: Real> DiagonalSums<S> {
 /// The whole matrix of the coarsest level.
 #[derive(Clone, Debug, Default)]
 pub struct FullSums {
-    pub node_count: usize,
     /// Pairs of nodes with `sum_v m_v w_vc w_vd` [kg], the first not below the second.
     pub masses: Vec<([u32; 2], f64)>,
     /// Blocks [N/m] in the rest shape of the pairs of nodes of each group, the first not below the second.
@@ -322,7 +323,7 @@ impl FullSums {
         free: &[bool],
     ) -> Self {
         let node_count = on.node_count(masses.len());
-        let mut full = Self { node_count, offsets: vec![0], ..Self::default() };
+        let mut full = Self { offsets: vec![0], ..Self::default() };
         // By pairs: a coarsest level is small.
         let pair = |a: u32, b: u32| a.max(b) * node_count as u32 + a.min(b);
         let nodes = |pair: u32| [pair / node_count as u32, pair % node_count as u32];
@@ -414,5 +415,3 @@ pub fn times<S: Real>(a: &Six<S>, v: Vec3<S>) -> Vec3<S> {
     )
 }
 
-/// Groups along a side of a cell.
-const GROUPS: f64 = 1.0;

@@ -1,0 +1,140 @@
+//! The period of the slowest oscillation about the rest shape, which tells how many steps follow the motion.
+//!
+//! ```text
+//! (M + K) d = M e  for each axis e;   omega^2 = d.K d/d.M d
+//! ```
+//!
+//! The shape in which a body gives way to its own weight is close to that of its slowest oscillation, and Rayleigh's
+//! quotient forgives what is missing: it is off by the square. Conjugate gradients with the preconditioner at hand;
+//! products with `K` are differences of the gradient.
+
+use super::preconditioner::Curvature;
+use super::{Memory, Way, moments, vectors};
+use crate::scalar::{Real, Vec3, vec3};
+use crate::solver::step::data::{Step, StepData};
+use crate::solver::step::predict::Tethers;
+use crate::solver::step::strain::measure_strain;
+
+/// Iterations at most; a residual this much smaller than the load is small enough.
+const ITERATIONS: usize = 15;
+const RESIDUAL: f64 = 0.03;
+
+/// Displacement of a difference, as a share of the body's extent.
+const DIFFERENCE: f64 = 1e-4;
+
+impl<S: Real> Memory<S> {
+    /// The longest period [s] of each part, and of all those that something holds the shortest of these; infinite
+    /// where nothing is held. Positions and velocities of `data` are lost.
+    pub fn slowest_period(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) -> f64 {
+        let layout = step.model;
+        // One second: far longer than any period, so that stiffness decides.
+        let step = Step { dt: 1.0, ..*step };
+        data.read_positions(layout, &layout.rest_positions);
+        data.prepare(&step, Tethers::AsInertia);
+        data.constants.previous.copy_from_slice(&data.points);
+        data.constants.predicted.copy_from_slice(&data.points);
+        self.base.copy_from_slice(&data.points);
+        self.stage_start.copy_from_slice(&data.points);
+        let constants = &mut data.constants;
+        let (workers, strains) = (&constants.workers, &mut constants.start_strain);
+        measure_strain(workers, layout, None, &data.points, strains);
+        self.preconditioner.fit(layout, &data.constants, step.dt);
+        let curvature =
+            Curvature { dt: step.dt, x: &self.base, moments: moments(&step, &self.stage_start) };
+        for number in 0..layout.part_count() {
+            self.preconditioner.refresh(layout, &data.constants, &curvature, number);
+        }
+        self.gradient_at(&step, data);
+        self.start_velocities.copy_from_slice(&self.trial_gradient);
+        let mut slowest = vec![0.0f64; layout.part_count()];
+        for axis in [vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0)] {
+            for (number, longest) in slowest.iter_mut().enumerate() {
+                if data.constants.holds(&layout.parts[number]) {
+                    *longest = longest.max(self.period_along(axis, &step, data, number));
+                }
+            }
+        }
+        slowest.into_iter().filter(|period| *period > 0.0).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The gradient at the trial, of all parts.
+    fn gradient_at(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
+        let Self { evaluation, base, stage_start, trial_gradient, .. } = self;
+        let StepData { constants, points, loads, .. } = data;
+        let way = Way { from: base, to: points, moments: moments(step, stage_start) };
+        evaluation.evaluate(constants, step, &way, |_| true, loads, trial_gradient);
+    }
+
+    /// Of a part, in the shape in which it gives way to a load along an axis; zero where that tells nothing.
+    fn period_along(
+        &mut self,
+        axis: Vec3<f64>,
+        step: &Step<'_, S>,
+        data: &mut StepData<S>,
+        number: usize,
+    ) -> f64 {
+        let range = step.model.parts[number].vertices.clone();
+        let extent = range.clone().fold((data.points[range.start].vec3(), data.points[range.start].vec3()), |(low, high), v| {
+            (low.min(self.base[v].vec3()), high.max(self.base[v].vec3()))
+        });
+        let extent = (extent.1 - extent.0).length().to_f64();
+        // `gradient` is the residual, `trial_z` the solution, `direction` that of conjugate gradients.
+        for v in range.clone() {
+            let is_free = data.constants.inverse_masses[v] != S::ZERO;
+            let load = axis.cast::<S>() * data.constants.masses[v];
+            self.gradient[v] = if is_free { load } else { Vec3::ZERO };
+            self.first_velocities[v] = self.gradient[v];
+            self.trial_z[v] = Vec3::ZERO;
+        }
+        let workers = data.constants.workers.clone();
+        let dot = |a: &[Vec3<S>], b: &[Vec3<S>]| vectors::dot(&workers, &a[range.clone()], &b[range.clone()]);
+        let enough = RESIDUAL * RESIDUAL * dot(&self.gradient, &self.gradient);
+        let mut rz = 0.0;
+        for iteration in 0..ITERATIONS {
+            self.preconditioner.apply(number, &self.gradient[range.clone()], &mut self.z[range.clone()]);
+            let before = std::mem::replace(&mut rz, dot(&self.gradient, &self.z));
+            let share = S::from_f64(if iteration == 0 { 0.0 } else { rz / before });
+            for v in range.clone() {
+                self.direction[v] = self.z[v] + self.direction[v] * share;
+            }
+            let largest = range.clone().fold(0.0, |most: f64, v| most.max(self.direction[v].length().to_f64()));
+            if !(largest > 0.0 && largest.is_finite() && extent > 0.0) {
+                return 0.0;
+            }
+            let small = S::from_f64(DIFFERENCE * extent / largest);
+            for v in range.clone() {
+                data.points[v].set_vec3(self.base[v].vec3() + self.direction[v] * small);
+            }
+            self.gradient_at(step, data);
+            data.points[range.clone()].copy_from_slice(&self.base[range.clone()]);
+            let inverse = S::ONE / small;
+            for v in range.clone() {
+                self.trial_gradient[v] = (self.trial_gradient[v] - self.start_velocities[v]) * inverse;
+            }
+            let length = rz / dot(&self.direction, &self.trial_gradient);
+            if !(length > 0.0 && length.is_finite()) {
+                break;
+            }
+            let length = S::from_f64(length);
+            for v in range.clone() {
+                self.trial_z[v] += self.direction[v] * length;
+                self.gradient[v] = self.gradient[v] - self.trial_gradient[v] * length;
+            }
+            if dot(&self.gradient, &self.gradient) < enough {
+                break;
+            }
+        }
+        let mut inertia = 0.0;
+        for v in range.clone() {
+            let mass = data.constants.masses[v].to_f64();
+            inertia += mass * self.trial_z[v].length_squared().to_f64();
+        }
+        let work = dot(&self.trial_z, &self.first_velocities) - dot(&self.trial_z, &self.gradient);
+        let squared = work / inertia - 1.0;
+        if squared > 0.0 && squared.is_finite() {
+            2.0 * std::f64::consts::PI / squared.sqrt()
+        } else {
+            0.0
+        }
+    }
+}
