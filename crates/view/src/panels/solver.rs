@@ -95,8 +95,7 @@ fn method(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
     let help = "XPBD sweeps over constraints in large steps. Quasi-Newton solves each step in a dozen \
                 passes, whatever the mesh. Explicit takes many small steps: no sweeps, no guards, cheap for small \
                 soft bodies.";
-    let names =
-        [("quasi_newton", "quasi-Newton"), ("xpbd", "XPBD"), ("explicit", "explicit")];
+    let names = [("quasi_newton", "quasi-Newton"), ("xpbd", "XPBD"), ("explicit", "explicit")];
     chooser.menu(ui, &Row::new("solver.method", "method", help), value, &names);
     let help =
         "Divide every frame. More lose less motion to numerical damping; the cost grows alike.";

@@ -125,7 +125,11 @@ impl<S: Real> Layout<S> {
             elements,
             color_count,
             largest_clique: coloring.largest_clique as usize,
-            multiplier_count: if settings.method == Method::QuasiNewton { 0 } else { multiplier_count },
+            multiplier_count: if settings.method == Method::QuasiNewton {
+                0
+            } else {
+                multiplier_count
+            },
             numbering: Arc::clone(numbering),
             parts: Arc::from(parts),
             copy_offsets,

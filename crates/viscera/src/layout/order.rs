@@ -1,7 +1,7 @@
 //! Constraints sorted by colour, and their places in the flat arrays.
 
-use crate::coloring::{Coloring, ConstraintGraph};
 use super::lattice::cell_order;
+use crate::coloring::{Coloring, ConstraintGraph};
 use crate::model::{Model, Numbering};
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, LANES};

@@ -30,7 +30,8 @@ pub(super) fn in_pieces<S: Real>(
     for law in ALL_LAWS {
         let of_law = |&tet: &usize| model.laws[model.tet_materials[tet] as usize] == law;
         let mut tets: Vec<usize> = (0..model.tet_count()).filter(of_law).collect();
-        let lowest = |tet: usize| model.tet_vertices[tet].map(|v| numbering.of(v)).into_iter().min();
+        let lowest =
+            |tet: usize| model.tet_vertices[tet].map(|v| numbering.of(v)).into_iter().min();
         tets.sort_by_cached_key(|&tet| (lowest(tet), tet));
         let part = |tet: usize| model.part_of(model.tet_vertices[tet][0]);
         for of_part in tets.chunk_by(|&a, &b| part(a) == part(b)) {

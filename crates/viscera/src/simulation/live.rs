@@ -233,7 +233,12 @@ impl<S: Real> Simulation<S> {
         }
         let model = builder.build::<S>().map_err(SimulationError::from)?;
         let same_device = scene.solver.device == self.scene.solver.device;
-        let backend = self.backend.renew(same_device, &model, &scene.solver, substep_dt(&scene, scene.solver.substeps()))?;
+        let backend = self.backend.renew(
+            same_device,
+            &model,
+            &scene.solver,
+            substep_dt(&scene, scene.solver.substeps()),
+        )?;
         let rest = State::at_rest(&model);
         let state = State {
             positions: std::mem::take(&mut self.state.positions),

@@ -17,9 +17,9 @@ pub mod gpu;
 mod inputs;
 mod methods;
 pub mod plan;
-mod quasi_newton;
 #[cfg(test)]
 mod probe;
+mod quasi_newton;
 mod report;
 mod step;
 mod xpbd;

@@ -94,6 +94,8 @@ pub enum GpuError {
     )]
     DoublePrecision,
     /// The method has no kernels yet.
-    #[error("the quasi-Newton method is computed by the CPU only; use `device = \"cpu\"` or \"auto\", or `method = \"xpbd\"`")]
+    #[error(
+        "the quasi-Newton method is computed by the CPU only; use `device = \"cpu\"` or \"auto\", or `method = \"xpbd\"`"
+    )]
     OnlyOnCpu,
 }

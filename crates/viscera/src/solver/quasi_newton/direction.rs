@@ -168,20 +168,20 @@ impl<S: Real> Memory<S> {
     }
 
     /// The length of a direction that no pair has scaled: to the minimum along it, as curvature tells.
-    fn first_length(&mut self, step: &Step<'_, S>, data: &StepData<S>, number: usize, slope: f64) -> f64 {
+    fn first_length(
+        &mut self,
+        step: &Step<'_, S>,
+        data: &StepData<S>,
+        number: usize,
+        slope: f64,
+    ) -> f64 {
         let Self { evaluation, direction, direction_points, base, stage_start, .. } = self;
         for v in step.model.parts[number].vertices.clone() {
             direction_points[v].set_vec3(direction[v]);
         }
         let moments = super::moments(step, stage_start);
-        let [exact, bound] = evaluation.curvature(
-            &data.constants,
-            step,
-            &moments,
-            base,
-            direction_points,
-            number,
-        );
+        let [exact, bound] =
+            evaluation.curvature(&data.constants, step, &moments, base, direction_points, number);
         let length = -slope / exact.max(LEAST_CURVATURE * bound);
         if length.is_finite() && length > 0.0 { length } else { 0.0 }
     }
@@ -201,8 +201,10 @@ impl<S: Real> Memory<S> {
         for slot in slots(self.history, kept.count, kept.newest) {
             let Pair { s, image, .. } = Pair::places(slot, vertices, &range);
             let g = &self.gradient[range.clone()];
-            with_gradient[slot] =
-                [vectors::dot(workers, &learned.pairs[s], g), vectors::dot(workers, &self.images[image], g)];
+            with_gradient[slot] = [
+                vectors::dot(workers, &learned.pairs[s], g),
+                vectors::dot(workers, &self.images[image], g),
+            ];
         }
         let products = &self.parts[number].products;
         let order = || slots(self.history, kept.count, kept.newest);
@@ -216,8 +218,7 @@ impl<S: Real> Memory<S> {
         for k in oldest_first() {
             let i = order().nth(k).unwrap_or(0);
             let images: f64 = order().map(|j| a[j] * products.yw[i][j]).sum();
-            let older: f64 =
-                order().skip(k + 1).map(|j| c[j] * products.sy[j][i]).sum();
+            let older: f64 = order().skip(k + 1).map(|j| c[j] * products.sy[j][i]).sum();
             let yr = scale * (with_gradient[i][1] - images) + older;
             c[i] = a[i] - yr / products.sy[i][i];
         }

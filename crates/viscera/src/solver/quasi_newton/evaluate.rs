@@ -159,7 +159,9 @@ impl Evaluation {
         for (piece, sum) in self.blocks.iter().zip(&self.block_sums).filter(|(p, _)| acts(p.part)) {
             self.changes[piece.part] = self.changes[piece.part].plus(*sum);
         }
-        for (piece, sum) in self.vertices.iter().zip(&self.vertex_sums).filter(|(p, _)| acts(p.part)) {
+        for (piece, sum) in
+            self.vertices.iter().zip(&self.vertex_sums).filter(|(p, _)| acts(p.part))
+        {
             self.changes[piece.part] = self.changes[piece.part].plus(*sum);
         }
     }

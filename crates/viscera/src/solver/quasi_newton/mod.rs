@@ -26,9 +26,9 @@ mod vectors;
 use std::ops::Range;
 
 use crate::layout::{Before, Layout, Moments};
+use crate::material::MaterialConstants;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
-use crate::material::MaterialConstants;
 use crate::settings::{Integrator, SolverSettings};
 use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
 use crate::solver::step::data::{Step, StepData};
@@ -60,16 +60,20 @@ const MORE_ITERATIONS: u32 = 4;
 pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S>]) -> Plan {
     let iterations = settings.passes_for(materials);
     let solve = |solve: Solve, iterations: u32| {
-        use QuasiNewtonStage::{Advance, ChooseDirection, EndSolve, Evaluate, Judge, Precondition, StartSolve};
+        use QuasiNewtonStage::{
+            Advance, ChooseDirection, EndSolve, Evaluate, Judge, Precondition, StartSolve,
+        };
         let body = [Evaluate, Judge, Precondition, ChooseDirection, Advance];
         let body = body.map(|stage| Node::Run(stage.into())).to_vec();
         let repeat = Repeat { most: Times::Count(iterations), until: Some(Flag::AllDone), body };
-        [Node::Run(StartSolve(solve).into()), Node::Repeat(repeat), Node::Run(EndSolve(solve).into())]
+        [
+            Node::Run(StartSolve(solve).into()),
+            Node::Repeat(repeat),
+            Node::Run(EndSolve(solve).into()),
+        ]
     };
-    let mut nodes = vec![
-        Node::Run(StepStage::ReadState.into()),
-        Node::Run(QuasiNewtonStage::Begin.into()),
-    ];
+    let mut nodes =
+        vec![Node::Run(StepStage::ReadState.into()), Node::Run(QuasiNewtonStage::Begin.into())];
     match settings.integrator {
         Integrator::Sdirk2 => {
             nodes.extend(solve(Solve::First, iterations));

@@ -74,9 +74,10 @@ impl<S: Real> Memory<S> {
         number: usize,
     ) -> f64 {
         let range = step.model.parts[number].vertices.clone();
-        let extent = range.clone().fold((data.points[range.start].vec3(), data.points[range.start].vec3()), |(low, high), v| {
-            (low.min(self.base[v].vec3()), high.max(self.base[v].vec3()))
-        });
+        let extent = range.clone().fold(
+            (data.points[range.start].vec3(), data.points[range.start].vec3()),
+            |(low, high), v| (low.min(self.base[v].vec3()), high.max(self.base[v].vec3())),
+        );
         let extent = (extent.1 - extent.0).length().to_f64();
         // `gradient` is the residual, `trial_z` the solution, `direction` that of conjugate gradients.
         for v in range.clone() {
@@ -87,17 +88,25 @@ impl<S: Real> Memory<S> {
             self.trial_z[v] = Vec3::ZERO;
         }
         let workers = data.constants.workers.clone();
-        let dot = |a: &[Vec3<S>], b: &[Vec3<S>]| vectors::dot(&workers, &a[range.clone()], &b[range.clone()]);
+        let dot = |a: &[Vec3<S>], b: &[Vec3<S>]| {
+            vectors::dot(&workers, &a[range.clone()], &b[range.clone()])
+        };
         let enough = RESIDUAL * RESIDUAL * dot(&self.gradient, &self.gradient);
         let mut rz = 0.0;
         for iteration in 0..ITERATIONS {
-            self.preconditioner.apply(number, &self.gradient[range.clone()], &mut self.z[range.clone()]);
+            self.preconditioner.apply(
+                number,
+                &self.gradient[range.clone()],
+                &mut self.z[range.clone()],
+            );
             let before = std::mem::replace(&mut rz, dot(&self.gradient, &self.z));
             let share = S::from_f64(if iteration == 0 { 0.0 } else { rz / before });
             for v in range.clone() {
                 self.direction[v] = self.z[v] + self.direction[v] * share;
             }
-            let largest = range.clone().fold(0.0, |most: f64, v| most.max(self.direction[v].length().to_f64()));
+            let largest = range
+                .clone()
+                .fold(0.0, |most: f64, v| most.max(self.direction[v].length().to_f64()));
             if !(largest > 0.0 && largest.is_finite() && extent > 0.0) {
                 return 0.0;
             }
@@ -109,7 +118,8 @@ impl<S: Real> Memory<S> {
             data.points[range.clone()].copy_from_slice(&self.base[range.clone()]);
             let inverse = S::ONE / small;
             for v in range.clone() {
-                self.trial_gradient[v] = (self.trial_gradient[v] - self.start_velocities[v]) * inverse;
+                self.trial_gradient[v] =
+                    (self.trial_gradient[v] - self.start_velocities[v]) * inverse;
             }
             let length = rz / dot(&self.direction, &self.trial_gradient);
             if !(length > 0.0 && length.is_finite()) {

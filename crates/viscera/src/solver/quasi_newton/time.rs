@@ -38,7 +38,12 @@ impl<S: Real> Memory<S> {
     }
 
     /// [`super::stage::QuasiNewtonStage::Begin`].
-    pub(super) fn begin(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, state: &mut State<S>) {
+    pub(super) fn begin(
+        &mut self,
+        step: &Step<'_, S>,
+        data: &mut StepData<S>,
+        state: &mut State<S>,
+    ) {
         let layout = step.model;
         let first = match step.settings.integrator {
             Integrator::Sdirk2 => Solve::First,
@@ -104,11 +109,8 @@ impl<S: Real> Memory<S> {
     fn refresh(&mut self, solve: &Step<'_, S>, data: &StepData<S>, learned: &Learned<S>) {
         let (layout, constants) = (solve.model, &data.constants);
         self.preconditioner.fit(layout, constants, solve.dt);
-        let curvature = Curvature {
-            dt: solve.dt,
-            x: &self.base,
-            moments: moments(solve, &constants.previous),
-        };
+        let curvature =
+            Curvature { dt: solve.dt, x: &self.base, moments: moments(solve, &constants.previous) };
         for number in 0..layout.part_count() {
             self.preconditioner.refresh(layout, constants, &curvature, number);
         }
@@ -167,7 +169,8 @@ impl<S: Real> Memory<S> {
         let (he, d) = (S::from_f64(solve.dt), S::from_f64((1.0 - SHARE) * step_dt));
         let squared = he * he;
         let falls = !data.constants.holds(part);
-        let acceleration = if falls { self.mean_acceleration(solve, data, number) } else { Vec3::ZERO };
+        let acceleration =
+            if falls { self.mean_acceleration(solve, data, number) } else { Vec3::ZERO };
         for v in part.vertices.clone() {
             let x = data.constants.previous[v].vec3();
             let (start, velocity, first) = match which {
@@ -217,7 +220,8 @@ impl<S: Real> Memory<S> {
             let v = solve.model.numbering.of(pin.vertex);
             if range.contains(&v) {
                 let x = constants.previous[v].vec3();
-                let target = if which == Solve::First { x + (pin.target - x) * share } else { pin.target };
+                let target =
+                    if which == Solve::First { x + (pin.target - x) * share } else { pin.target };
                 data.points[v].set_vec3(target);
                 self.base[v].set_vec3(target);
             }

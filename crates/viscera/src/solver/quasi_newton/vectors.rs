@@ -42,8 +42,8 @@ impl<S: Real> Kernel<S> for Dot<'_, S> {
         for (lane, (a, b)) in a.1.iter().zip(b.1).enumerate() {
             sums[lane] += a.to_f64() * b.to_f64();
         }
-        *self.sum =
-            ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]));
+        *self.sum = ((sums[0] + sums[4]) + (sums[2] + sums[6]))
+            + ((sums[1] + sums[5]) + (sums[3] + sums[7]));
     }
 }
 

@@ -154,9 +154,10 @@ impl Energies {
     pub fn stores_too_much(&self, part: usize) -> bool {
         let energy = &self.0[part];
         let (given, _, _) = energy.balance();
-        // False of what is no number as well. Round-off of energies that nearly cancel is none of the step's.
+        // Round-off of energies that nearly cancel is none of the step's.
         let stored = energy.start.stored.abs().max(energy.end.stored.abs());
-        !(given >= -1e-6 * (stored + energy.start.kinetic + energy.work.abs()))
+        let round_off = 1e-6 * (stored + energy.start.kinetic + energy.work.abs());
+        given < -round_off || !given.is_finite()
     }
 
     /// Scales velocities down after [`Energies::end`]. `kept` is called with each part that is slowed down, and the

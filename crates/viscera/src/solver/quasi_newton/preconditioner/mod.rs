@@ -27,7 +27,9 @@ use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::step::data::StepConstants;
 use dense::Dense;
 use rotation::rotation_of;
-use sums::{DiagonalSums, FullSums, Grouped, Groups, On, Six, inverse, rotated, tets_of_part, times};
+use sums::{
+    DiagonalSums, FullSums, Grouped, Groups, On, Six, inverse, rotated, tets_of_part, times,
+};
 
 /// Nodes of the coarsest level at most, where the levels can be made so: a dense system of three times as many.
 const MOST_COARSE: usize = 64;
@@ -156,7 +158,9 @@ impl<S: Real> OfPart<S> {
             }
         });
         let lattice = Lattice::new(&places, &tets, &links, MOST_COARSE);
-        let count = |level: usize| if level == 0 { places.len() } else { lattice.levels[level - 1].node_count() };
+        let count = |level: usize| {
+            if level == 0 { places.len() } else { lattice.levels[level - 1].node_count() }
+        };
         let ways_up = lattice.levels.iter().enumerate().map(|(level, of)| {
             let weights = if level == 0 { &of.of_vertices } else { &of.of_finer };
             Prolongation {
@@ -183,9 +187,10 @@ impl<S: Real> OfPart<S> {
             size_of_val(&level.of_vertices.entries[..]) + size_of_val(&level.of_finer.entries[..])
         });
         let ways = self.ways_up.iter().map(|way| size_of_val(&way.entries[..]));
-        let sums = self.levels.iter().map(|sums| {
-            size_of_val(&sums.shares[..]) + size_of_val(&sums.offsets[..])
-        });
+        let sums = self
+            .levels
+            .iter()
+            .map(|sums| size_of_val(&sums.shares[..]) + size_of_val(&sums.offsets[..]));
         let vectors = self.vectors.iter().map(|vector| size_of_val(&vector[..]));
         let inverses = self.inverses.iter().map(|blocks| size_of_val(&blocks[..]));
         levels.sum::<usize>()
@@ -239,7 +244,8 @@ impl<S: Real> OfPart<S> {
         let x = &curvature.x[self.vertices.clone()];
         let squared = curvature.dt * curvature.dt;
         for (group, rotation) in rotations[..self.groups.len()].iter_mut().enumerate() {
-            let range = self.groups.offsets[group] as usize..self.groups.offsets[group + 1] as usize;
+            let range =
+                self.groups.offsets[group] as usize..self.groups.offsets[group + 1] as usize;
             let mut f = Mat3::<f64>::from_columns(Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
             for &(v, b) in &self.groups.entries[range] {
                 f = f + Mat3::outer(x[v as usize].vec3().cast::<f64>(), b.cast());

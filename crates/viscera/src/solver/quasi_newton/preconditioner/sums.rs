@@ -74,7 +74,8 @@ impl Grouped {
     /// The tetrahedra of one cell of the finest lattice that hang together by vertices.
     pub fn new(tets: &[LocalTet], places: &[Vec3<f64>], lattice: &Lattice) -> Self {
         let cell = |tet: &LocalTet| {
-            let sum = tet.vertices.iter().fold(Vec3::ZERO, |sum: Vec3<f64>, &v| sum + places[v as usize]);
+            let sum =
+                tet.vertices.iter().fold(Vec3::ZERO, |sum: Vec3<f64>, &v| sum + places[v as usize]);
             let at = (sum * 0.25 - lattice.origin) * (1.0 / lattice.spacing);
             // A part without levels is one cell.
             let cell = |x: f64| if x.is_finite() { x.floor() as i64 } else { 0 };
@@ -96,9 +97,8 @@ impl Grouped {
                     seen_by[v as usize] = (cell as u32, i as u32);
                 }
             }
-            let mut members: Vec<(u32, u32)> = (0..of_cell.len())
-                .map(|i| (root(&mut parent, i as u32), of_cell[i].1))
-                .collect();
+            let mut members: Vec<(u32, u32)> =
+                (0..of_cell.len()).map(|i| (root(&mut parent, i as u32), of_cell[i].1)).collect();
             members.sort_unstable();
             for group in members.chunk_by(|a, b| a.0 == b.0) {
                 grouped.tets.extend(group.iter().map(|&(_, tet)| tet));
@@ -218,9 +218,11 @@ impl On<'_> {
         found.clear();
         for (v, g) in tet.vertices.into_iter().zip(tet.gradients) {
             if free[v as usize] {
-                self.each(v, |node, weight| match found.iter_mut().find(|(other, _)| *other == node) {
-                    Some((_, sum)) => *sum += g * weight,
-                    None => found.push((node, g * weight)),
+                self.each(v, |node, weight| {
+                    match found.iter_mut().find(|(other, _)| *other == node) {
+                        Some((_, sum)) => *sum += g * weight,
+                        None => found.push((node, g * weight)),
+                    }
                 });
             }
         }
@@ -268,7 +270,8 @@ impl<S: Real> DiagonalSums<S> {
                     let (trace, b) = sums.of(node);
                     *trace += tet.volume * tet.mu * g.length_squared();
                     let scale = tet.volume * (tet.mu + tet.lambda);
-                    let products = [g.x * g.x, g.y * g.y, g.z * g.z, g.y * g.z, g.x * g.z, g.x * g.y];
+                    let products =
+                        [g.x * g.x, g.y * g.y, g.z * g.z, g.y * g.z, g.x * g.z, g.x * g.y];
                     for (b, product) in b.iter_mut().zip(products) {
                         *b += scale * product;
                     }
@@ -370,7 +373,9 @@ impl FullSums {
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.masses[..]) + size_of_val(&self.blocks[..]) + size_of_val(&self.offsets[..])
+        size_of_val(&self.masses[..])
+            + size_of_val(&self.blocks[..])
+            + size_of_val(&self.offsets[..])
     }
 }
 
@@ -414,4 +419,3 @@ pub fn times<S: Real>(a: &Six<S>, v: Vec3<S>) -> Vec3<S> {
         xz * v.x + yz * v.y + zz * v.z,
     )
 }
-
