@@ -216,18 +216,22 @@ fn heading<S: Real>(simulation: &Simulation<S>, summary: &Summary, frames: u64) 
             format!(", divided into small steps of at most {small}")
         }
     };
+    // Quasi-Newton steps need no colours.
+    let colors = match solver.method {
+        Method::QuasiNewton => String::new(),
+        Method::Xpbd | Method::Explicit => format!(" colours: {},", model.colors),
+    };
     let from = match simulation.frame() {
         0 => String::new(),
         frame => format!(" from {} on", frame + 1),
     };
     format!(
-        "{}: {} tetrahedra, {} vertices, {:.3} kg, colours: {}, frames: {frames}{from} of {} substeps{work}\n\
+        "{}: {} tetrahedra, {} vertices, {:.3} kg,{colors} frames: {frames}{from} of {} substeps{work}\n\
          device: {}\n",
         summary.title,
         model.tets,
         model.vertices,
         model.mass,
-        model.colors,
         simulation.substeps(),
         summary.device,
     )

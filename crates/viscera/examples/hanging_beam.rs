@@ -10,7 +10,7 @@ use viscera::state::State;
 
 /// Builds the beam, runs a second and says how far it hangs.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mesh = shapes::beam(0.08, 0.03, 0.03, 3)?; // length, width, height [m]; cells across
+    let mesh = shapes::beam(0.08, 0.03, 0.03, 3, 0.0)?; // length, width, height [m]; cells across; no cut
     let tissue = Material::new(MaterialModel::StableNeoHookean, 5e3, 0.45, 1060.0)?;
     let settings = SolverSettings::default();
     let mut builder = ModelBuilder::new();

@@ -18,7 +18,7 @@ const FACTOR: f64 = 0.9;
 const FRAMES: u32 = 5;
 
 fn mesh() -> TetMesh {
-    shapes::beam(LENGTH, 0.02, 0.02, 1).expect("a beam")
+    shapes::beam(LENGTH, 0.02, 0.02, 1, 0.0).expect("a beam")
 }
 
 fn on_face(mesh: &TetMesh, x: f64) -> Vec<u32> {

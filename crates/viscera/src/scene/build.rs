@@ -289,6 +289,7 @@ fn build_shape(body: &BodyTable) -> Result<BodyShape, String> {
             width: need(body.width, "width")?,
             height: need(body.height, "height")?,
             cells_across: body.cells_across.unwrap_or(4),
+            cut: body.cut.unwrap_or(0.0),
         },
         Some(ShapeName::Block) => BodyShape::Block {
             size: body.size.ok_or(
@@ -322,7 +323,7 @@ fn build_shape(body: &BodyTable) -> Result<BodyShape, String> {
 fn refuse_foreign_keys(body: &BodyTable, shape: Option<ShapeName>) -> Result<(), String> {
     let taken: &[&str] = match shape {
         None => &["unit", "surface", "scale"],
-        Some(ShapeName::Beam) => &["length", "width", "height", "cells_across"],
+        Some(ShapeName::Beam) => &["length", "width", "height", "cells_across", "cut"],
         Some(ShapeName::Block) => &["size", "cells"],
         Some(ShapeName::Sphere) => &["radius", "spacing"],
         Some(ShapeName::Capsule) => &["radius", "length", "spacing"],
@@ -335,6 +336,7 @@ fn refuse_foreign_keys(body: &BodyTable, shape: Option<ShapeName>) -> Result<(),
         ("width", body.width.is_some()),
         ("height", body.height.is_some()),
         ("cells_across", body.cells_across.is_some()),
+        ("cut", body.cut.is_some()),
         ("size", body.size.is_some()),
         ("cells", body.cells.is_some()),
         ("radius", body.radius.is_some()),
@@ -358,7 +360,7 @@ fn refuse_foreign_keys(body: &BodyTable, shape: Option<ShapeName>) -> Result<(),
 fn cell_count(shape: &BodyShape) -> f64 {
     match *shape {
         BodyShape::File { .. } => 0.0,
-        BodyShape::Beam { length, width, height, cells_across } => {
+        BodyShape::Beam { length, width, height, cells_across, .. } => {
             let cell = width.min(height) / f64::from(cells_across);
             [length, width, height].iter().map(|edge| (edge / cell).max(1.0)).product()
         }

@@ -131,6 +131,8 @@ pub enum BodyShape {
         height: f64,
         /// Cells across the smaller of width and height.
         cells_across: u32,
+        /// Depth of a cut across the middle, as a share of the height.
+        cut: f64,
     },
     /// From the origin along +x, +y and +z.
     Block {

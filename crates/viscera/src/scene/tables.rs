@@ -138,6 +138,9 @@ settings_table! {
         height: Option<f64> = None, optional(quantity(Dimension::Length, SIZE));
         /// Cells across the smaller of a beam's width and height; 4 where unset.
         cells_across: Option<u32> = None, optional(whole(1, 200));
+        /// Depth of a cut across the middle of a beam, from its upper side down, as a share of the height; rounded
+        /// to whole cells. Its sides touch and are not connected.
+        cut: Option<f64> = None, optional(number(at_least(0.0).below(1.0)));
         /// Edge lengths of a block.
         size: Option<[f64; 3]> = None, optional(several::<3, _>(quantity(Dimension::Length, SIZE)));
         /// Cells of a block along its edges.

@@ -357,8 +357,8 @@ fn make_mesh(
             };
             return Ok((tets, surface, report));
         }
-        &BodyShape::Beam { length, width, height, cells_across } => {
-            shapes::beam(length, width, height, cells_across as usize).map(built)
+        &BodyShape::Beam { length, width, height, cells_across, cut } => {
+            shapes::beam(length, width, height, cells_across as usize, cut).map(built)
         }
         BodyShape::Block { size, cells } => {
             shapes::block(Vec3::from_f64(*size), cells.map(|c| c as usize)).map(built)

@@ -101,8 +101,8 @@ fn every_shipped_scene_is_valid_and_needs_no_file() {
 
 fn mesh_of(shape: &BodyShape) -> TetMesh {
     match *shape {
-        BodyShape::Beam { length, width, height, cells_across } => {
-            shapes::beam(length, width, height, cells_across as usize).unwrap()
+        BodyShape::Beam { length, width, height, cells_across, cut } => {
+            shapes::beam(length, width, height, cells_across as usize, cut).unwrap()
         }
         BodyShape::Block { size, cells } => {
             shapes::block(Vec3::from_f64(size), cells.map(|count| count as usize)).unwrap()

@@ -9,6 +9,7 @@ use viscera::mesh::shapes::{
     Block, LIVER_SPACING, ShapeError, Splitting, beam, block, capsule, liver, sphere,
 };
 use viscera::mesh::tetrahedralize::surface;
+use viscera::mesh::topology::connected_components;
 use viscera::mesh::{TetMesh, tet_volume};
 use viscera::scalar::{Vec3, vec3};
 
@@ -62,7 +63,7 @@ fn jitter_moves_interior_vertices_only_and_never_inverts() {
 
 #[test]
 fn a_beam_has_cubic_cells_and_a_centred_cross_section() {
-    let mesh = beam(0.2, 0.04, 0.02, 2).unwrap();
+    let mesh = beam(0.2, 0.04, 0.02, 2, 0.0).unwrap();
     assert_eq!(mesh.tets().len(), 5 * 20 * 4 * 2);
     let (lower, upper) = mesh
         .vertices()
@@ -167,13 +168,40 @@ fn impossible_arguments_say_why() {
     assert!(message(block(vec3(1.0, f64::NAN, 1.0), [1; 3])).contains("y size is NaN"));
     assert!(message(block(unit, [1000; 3])).contains("5.000e9 tetrahedra"));
     assert!(message(block(unit, [usize::MAX; 3])).contains("tetrahedra, more than"));
-    assert!(message(beam(1.0, 0.1, 0.0, 2)).contains("height is 0"));
-    assert!(message(beam(1.0, 0.1, 0.1, 0)).contains("empty"));
-    assert!(message(beam(1e300, 1e-300, 1.0, 5)).contains("tetrahedra, more than"));
+    assert!(message(beam(1.0, 0.1, 0.0, 2, 0.0)).contains("height is 0"));
+    assert!(message(beam(1.0, 0.1, 0.1, 0, 0.0)).contains("empty"));
+    assert!(message(beam(1e300, 1e-300, 1.0, 5, 0.0)).contains("tetrahedra, more than"));
     assert!(message(Block { jitter: 1.5, ..Block::new(unit, [2; 3]) }.mesh()).contains("jitter"));
     assert!(sphere(-1.0, 0.1).unwrap_err().to_string().contains("radius is -1"));
     assert!(capsule(0.1, f64::INFINITY, 0.1).is_err());
     assert!(liver(0.02, 0.0).unwrap_err().to_string().contains("scale is 0"));
     assert!(liver(1e-6, 1.0).unwrap_err().to_string().contains("use at least"));
     assert!(liver(0.5, 1.0).unwrap_err().to_string().contains("use at most"));
+}
+
+/// A cut leaves two sides that touch and are connected below its tip only: as many tetrahedra and the same volume, the
+/// vertices of the cut twice, and no tetrahedron of one side with a vertex of the other.
+#[test]
+fn a_cut_beam_is_connected_below_the_cut() {
+    let whole = beam(0.2, 0.04, 0.04, 4, 0.0).unwrap();
+    let cut = beam(0.2, 0.04, 0.04, 4, 0.6).unwrap();
+    // Two of four layers, rounded: two rows of five vertices above the tip.
+    assert_eq!(cut.vertices().len(), whole.vertices().len() + 2 * 5);
+    assert_eq!(cut.tets().len(), whole.tets().len());
+    let on_cut = |x: &Vec3<f64>| (x.x - 0.1).abs() < 1e-12 && x.z > 1e-12;
+    for tet in cut.tets() {
+        let x = tet.map(|v| cut.vertices()[v as usize]);
+        let is_left = x.iter().any(|x| x.x < 0.1 - 1e-12);
+        for (v, x) in tet.iter().zip(&x).filter(|(_, x)| on_cut(x)) {
+            let is_copy = *v as usize >= whole.vertices().len();
+            assert_eq!(is_copy, !is_left, "vertex {v} at {x:?}");
+        }
+    }
+    assert_eq!(connected_components(&cut).count, 1);
+    // Always a layer is left, and the refused say what is allowed.
+    assert!(beam(0.2, 0.04, 0.04, 4, 0.99).is_ok());
+    for wrong in [-0.1, 1.0, f64::NAN] {
+        let error = beam(0.2, 0.04, 0.04, 4, wrong).unwrap_err().to_string();
+        assert!(error.contains("cut") && error.contains("0 to below 1"), "{error}");
+    }
 }

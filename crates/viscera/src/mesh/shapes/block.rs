@@ -63,13 +63,16 @@ pub struct Block {
     pub jitter: f64,
     /// Which random displacement.
     pub seed: u64,
+    /// Depth of a cut across x in the middle, from the upper side down, as a share of the height; rounded to whole
+    /// boxes, of which the lowest is never cut. Its two sides touch, and are not connected.
+    pub cut: f64,
 }
 
 impl Block {
     /// A regular block from the origin.
     pub fn new(size: Vec3<f64>, cells: [usize; 3]) -> Self {
         let splitting = Splitting::default();
-        Self { corner: Vec3::ZERO, size, cells, splitting, jitter: 0.0, seed: 0 }
+        Self { corner: Vec3::ZERO, size, cells, splitting, jitter: 0.0, seed: 0, cut: 0.0 }
     }
 
     /// Builds the mesh, all in region 0. Vertices are numbered along x first, then y, then z.
@@ -97,11 +100,24 @@ impl Block {
             }
         }
         let index = |i: usize, j: usize, k: usize| (i + (nx + 1) * (j + (ny + 1) * k)) as u32;
+        // Behind the cut its vertices stand once more, where they are.
+        let (middle, uncut) = (nx / 2, self.uncut_layers());
+        let first_copy = vertices.len() as u32;
+        for k in uncut + 1..=nz {
+            for j in 0..=ny {
+                vertices.push(vertices[index(middle, j, k) as usize]);
+            }
+        }
+        let index = |cell: usize, i: usize, j: usize, k: usize| {
+            let is_copy = i == middle && cell >= middle && k > uncut;
+            let copy = || first_copy + (j + (ny + 1) * (k - uncut - 1)) as u32;
+            if is_copy { copy() } else { index(i, j, k) }
+        };
         let mut tets = Vec::with_capacity(nx * ny * nz * self.splitting.tets_per_cell());
         for k in 0..nz {
             for j in 0..ny {
                 for i in 0..nx {
-                    let corner = |c: usize| index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
+                    let corner = |c: usize| index(i, i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
                     for tet in self.splitting.tets([i, j, k]) {
                         let mut tet = tet.map(corner);
                         // Mirrored boxes turn the winding round.
@@ -133,12 +149,22 @@ impl Block {
         if !(0.0..=0.9).contains(&self.jitter) {
             return Err(ShapeError::Jitter { jitter: self.jitter });
         }
+        if !(0.0..1.0).contains(&self.cut) {
+            return Err(ShapeError::Cut { cut: self.cut });
+        }
         let per_cell = self.splitting.tets_per_cell();
         let tets = self.cells.iter().map(|&n| n as f64).product::<f64>() * per_cell as f64;
         if tets > MAX_TETS as f64 {
             return Err(ShapeError::TooManyTets { tets });
         }
         Ok(())
+    }
+
+    /// Layers of boxes below the cut; all of them where there is none, or no box on one side of it.
+    fn uncut_layers(&self) -> usize {
+        let [nx, _, nz] = self.cells;
+        let cut = (self.cut * nz as f64).round() as usize;
+        if nx < 2 { nz } else { nz - cut.min(nz - 1) }
     }
 
     fn cell_size(&self) -> Vec3<f64> {

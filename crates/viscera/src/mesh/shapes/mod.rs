@@ -70,6 +70,14 @@ pub enum ShapeError {
         /// What was asked for.
         jitter: f64,
     },
+    /// A cut that is none, or leaves nothing together.
+    #[error(
+        "a cut of {cut} of the height is outside 0 to below 1; give the share of the height that is cut, such as 0.6"
+    )]
+    Cut {
+        /// What was asked for.
+        cut: f64,
+    },
     /// The filling failed.
     #[error(transparent)]
     Tetrahedralize(#[from] TetrahedralizeError),
@@ -91,12 +99,13 @@ pub fn block(size: Vec3<f64>, cells: [usize; 3]) -> Result<TetMesh, ShapeError> 
 /// `width` (along y) by `height` (along z) `[m]`.
 ///
 /// `cells_across` counts boxes over the thinner side of the cross-section; the other counts follow
-/// so that boxes are as cubic as can be.
+/// so that boxes are as cubic as can be. `cut` is the depth of a cut across its middle, see [`Block::cut`].
 pub fn beam(
     length: f64,
     width: f64,
     height: f64,
     cells_across: usize,
+    cut: f64,
 ) -> Result<TetMesh, ShapeError> {
     check_length("beam's length", length)?;
     check_length("beam's width", width)?;
@@ -107,6 +116,7 @@ pub fn beam(
     let cells = if cells_across == 0 { [0; 3] } else { cells };
     let mut block = Block::new(vec3(length, width, height), cells);
     block.corner = vec3(0.0, -0.5 * width, -0.5 * height);
+    block.cut = cut;
     block.mesh()
 }
 
