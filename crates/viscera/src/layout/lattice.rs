@@ -12,18 +12,18 @@
 //! nested     w_(l+1)(x, K) = sum over k of w_l(x, k) hat(k_1 / 2 - K_1) hat(k_2 / 2 - K_2) hat(k_3 / 2 - K_3)
 //! ```
 //!
-//! Points follow connectivity. The vertices with a weight at a point are its support; two of them hang together if an
-//! element ties them, or ties both to some third vertex. Each component of the support that this makes has its own copy
-//! of the point, a node. So the two sides of a cut or of a gap move apart at every level that is fine enough to go
-//! around its end. (Nesme, Kry, Jerabkova and Faure, "Preserving topology and elasticity for embedded deformable models",
-//! SIGGRAPH 2009, do the same with the cells that they embed a body in.)
+//! Points follow connectivity. The vertices with a weight at a point are its support; those that elements tie to each
+//! other within it are a component. Each component has its own copy of the point, a node. So the two sides of a cut or
+//! of a gap move apart at every level that is fine enough to go around its end. (Nesme, Kry, Jerabkova and Faure,
+//! "Preserving topology and elasticity for embedded deformable models", SIGGRAPH 2009, do the same with the cells that
+//! they embed a body in.)
 //!
 //! - Copies keep the spaces nested: a support lies within the supports of its point's parents, and what hangs together
 //!   in it does so in theirs, so that each component lies within one component of each parent.
-//! - Without third vertices, one at the corner of a support, all of whose neighbours happen to lie outside, would have a
-//!   node to itself: where the planes of the lattice run through jittered vertices, a quarter more nodes at the finest
-//!   level and twice as many at coarse ones, none of which separates anything. Third vertices do not cross a cut, but
-//!   they go around its end, one edge further out.
+//! - A vertex at the corner of a support, all of whose neighbours happen to lie outside, has a node to itself, which
+//!   separates nothing: up to a quarter more nodes where the planes of the lattice run through jittered vertices. To join
+//!   what a vertex outside of the support ties together would save them, and join the sides of a cut at its end as well:
+//!   a bar of 50,000 tetrahedra cut by 60 % needed half as many iterations more.
 
 mod nodes;
 #[cfg(test)]

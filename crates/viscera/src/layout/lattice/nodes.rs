@@ -114,7 +114,7 @@ impl Nodes {
                     continue;
                 }
                 let node = points.len() as u32;
-                for &v in search.component(first, node) {
+                for &v in search.component(first) {
                     let entry = &mut next[v as usize];
                     entries[*entry as usize] = (node, weight(coordinates[v as usize], point));
                     *entry += 1;
@@ -134,22 +134,13 @@ struct Search<'a> {
     is_left: Vec<bool>,
     /// How many vertices that is.
     left: usize,
-    /// The last node for which each vertex was the third that others hang together by, shape `[vertex_count]`.
-    crossed_for: Vec<u32>,
     /// Vertices of the last component that was found.
     component: Vec<u32>,
 }
 
 impl<'a> Search<'a> {
     fn new(neighbors: &'a Neighbors, vertex_count: usize) -> Self {
-        Self {
-            neighbors,
-            is_left: vec![false; vertex_count],
-            left: 0,
-            // No node's number.
-            crossed_for: vec![u32::MAX; vertex_count],
-            component: Vec::new(),
-        }
+        Self { neighbors, is_left: vec![false; vertex_count], left: 0, component: Vec::new() }
     }
 
     /// Takes up the next support; nothing is left of the one before.
@@ -158,27 +149,17 @@ impl<'a> Search<'a> {
         self.left = support.len();
     }
 
-    /// What hangs together with `first`, which is left; `node` is the number of the component's own node.
-    fn component(&mut self, first: u32, node: u32) -> &[u32] {
+    /// What hangs together with `first`, which is left.
+    fn component(&mut self, first: u32) -> &[u32] {
         self.component.clear();
         self.take(first);
         let neighbors = self.neighbors;
-        let (mut asked, mut crossed) = (0, 0);
-        // Nothing is left of most supports long before all have been asked for their neighbours, so the search across
-        // third vertices, which is the long one, is rare.
-        while self.left > 0 && crossed < self.component.len() {
-            if let Some(&v) = self.component.get(asked) {
-                asked += 1;
-                neighbors.of(v).iter().for_each(|&other| self.take(other));
-                continue;
-            }
-            for &third in neighbors.of(self.component[crossed]) {
-                if self.crossed_for[third as usize] != node {
-                    self.crossed_for[third as usize] = node;
-                    neighbors.of(third).iter().for_each(|&other| self.take(other));
-                }
-            }
-            crossed += 1;
+        let mut asked = 0;
+        // Nothing is left of most supports long before all have been asked for their neighbours.
+        while self.left > 0 && asked < self.component.len() {
+            let v = self.component[asked];
+            asked += 1;
+            neighbors.of(v).iter().for_each(|&other| self.take(other));
         }
         &self.component
     }
