@@ -9,6 +9,7 @@ use crate::probe::{Curve, VARIANTS};
 /// Colours that colour-blind people tell apart (Okabe and Ito 2008), one for each solver.
 const COLORS: [Color32; VARIANTS.len()] = [
     Color32::from_rgb(240, 240, 240),
+    Color32::from_rgb(0, 200, 200),
     Color32::from_rgb(213, 94, 0),
     Color32::from_rgb(230, 159, 0),
     Color32::from_rgb(204, 121, 167),

@@ -21,6 +21,9 @@ pub fn show(
             let mut chooser = Chooser { side, actions };
             known(ui, &mut chooser);
             method(ui, solver, &mut chooser);
+            if solver.method == Method::QuasiNewton {
+                passes(ui, solver, &mut chooser);
+            }
             if solver.method == Method::Xpbd {
                 sweeps(ui, solver, &mut chooser);
                 acceleration(ui, solver, &mut chooser);
@@ -32,33 +35,39 @@ pub fn show(
 }
 
 /// Solvers worth comparing, by one click. Each says everything that another may have changed.
-const KNOWN: [(&str, &str, KnownSettings); 4] = [
+const KNOWN: [(&str, &str, KnownSettings); 5] = [
+    (
+        "quasi-Newton",
+        "Every step solved in a dozen passes, whatever the mesh; substeps and passes chosen by the method.",
+        known_settings("quasi_newton", "unlimited", "auto", "auto", "none", "true"),
+    ),
     (
         "default (exact at rest)",
         "Rebase and kept multipliers: in balance when it comes to rest. Coloured Gauss-Seidel, two iterations per \
          substep.",
-        known_settings("unlimited", "10", "2", "none", "true"),
+        known_settings("xpbd", "unlimited", "10", "2", "none", "true"),
     ),
     (
         "Jacobi 40",
         "One colour, 40 iterations of one step per frame.",
-        known_settings("1", "1", "40", "none", "true"),
+        known_settings("xpbd", "1", "1", "40", "none", "true"),
     ),
     (
         "Anderson 40",
         "The same with Anderson acceleration.",
-        known_settings("1", "1", "40", "anderson", "true"),
+        known_settings("xpbd", "1", "1", "40", "anderson", "true"),
     ),
     (
         "as published",
         "XPBD as published: its stiffness depends on substeps and iterations.",
-        known_settings("unlimited", "10", "2", "none", "false"),
+        known_settings("xpbd", "unlimited", "10", "2", "none", "false"),
     ),
 ];
 
 type KnownSettings = [(&'static str, &'static str); 7];
 
 const fn known_settings(
+    method: &'static str,
     colors: &'static str,
     substeps: &'static str,
     iterations: &'static str,
@@ -66,7 +75,7 @@ const fn known_settings(
     exact: &'static str,
 ) -> KnownSettings {
     [
-        ("solver.method", "xpbd"),
+        ("solver.method", method),
         ("solver.colors", colors),
         ("solver.substeps", substeps),
         ("solver.iterations", iterations),
@@ -101,6 +110,13 @@ fn method(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
         "Divide every frame. More lose less motion to numerical damping; the cost grows alike.";
     let row = Row::new("solver.substeps", "substeps", help).rail(1.0..=100.0).whole().logarithmic();
     chooser.number(ui, &row, f64::from(solver.substeps()));
+}
+
+fn passes(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
+    let help = "Passes over the mesh in each of the two solves of a substep. A dozen solve it; fewer still end in \
+                balance at rest.";
+    let row = Row::new("solver.iterations", "passes", help).rail(1.0..=60.0);
+    chooser.number(ui, &row.whole().logarithmic(), f64::from(solver.iterations()));
 }
 
 fn sweeps(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
