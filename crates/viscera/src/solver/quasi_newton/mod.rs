@@ -250,10 +250,11 @@ impl<S: Real> Memory<S> {
             let round_off = ROUNDED * S::EPSILON * change.size;
             progress.accepted = match progress.phase {
                 Phase::Done => continue,
-                // Where the last solve was calm its start is as good as any: it has the velocity.
+                // Where the last solve was calm its start is as good as any: it has the velocity. A step that nothing
+                // checks afterwards may end no higher than its reference.
                 Phase::Starting => {
-                    change.potential <= round_off
-                        || (learned.parts[number].calm && change.potential.is_finite())
+                    let is_trusted = learned.parts[number].calm && progress.scheme.is_checked();
+                    change.potential <= round_off || (is_trusted && change.potential.is_finite())
                 }
                 Phase::FromReference => true,
                 Phase::Iterating => progress.suffices(change.potential, change.size, S::EPSILON),

@@ -181,7 +181,9 @@ impl<S: Real> Memory<S> {
                     let (before, after) = (self.start_velocities[v], self.first_velocities[v]);
                     let change = (after - before) * (S::ONE / he);
                     let begun = self.base[v].vec3();
-                    let first = begun + after * d + change * (S::HALF * d * d);
+                    // Nothing inside changes the way of what nothing holds: there its middle goes all the way.
+                    let fall = acceleration * (d * (he - S::HALF * d));
+                    let first = begun + after * d + change * (S::HALF * d * d) + fall;
                     (x + after * d, before + change * d, first)
                 }
             };
@@ -256,8 +258,10 @@ impl<S: Real> Memory<S> {
             }
             let kept = &mut state.learned.parts[number];
             let is_calm = progress.rejections == 0;
-            // The last direction is taken unchecked where nothing was rejected, in this solve or the one before.
-            let goes_on = progress.ahead && progress.accepted && is_calm && kept.calm;
+            // The last direction is taken unchecked where nothing was rejected, in this solve or the one before, and
+            // where the energy of the step is checked in the end.
+            let is_trusted = is_calm && kept.calm && progress.scheme.is_checked();
+            let goes_on = progress.ahead && progress.accepted && is_trusted;
             (kept.calm, kept.inverted) = (is_calm, progress.inverted > 0);
             progress.phase = Phase::Done;
             let range = part.vertices.clone();
