@@ -159,10 +159,11 @@ fn bar() -> TetMesh {
 }
 
 /// Up to seven vertices jump by up to a body length, twice, and are let go; or all vertices are put anywhere. The
-/// greatest share of tetrahedra that is inside out a second later.
+/// share of tetrahedra that is inside out a second later is a thousandth at most.
 fn handled<S: Real>(seeds: std::ops::Range<u64>, scrambles: bool) {
     let mesh = bar();
     let (mut rejected, mut inverted, mut gained) = (0, Vec::new(), 0.0f64);
+    let mut bodies = 0;
     for seed in seeds {
         for (poisson, integrator) in [(0.3, BOTH[0]), (0.45, BOTH[0]), (0.3, BOTH[1])] {
             let what = format!("seed {seed}, nu {poisson}, {integrator:?}, {}", S::NAME);
@@ -193,6 +194,7 @@ fn handled<S: Real>(seeds: std::ops::Range<u64>, scrambles: bool) {
             for _ in 0..60 {
                 body.frame(&inputs, &what);
             }
+            bodies += 1;
             rejected += body.solver.rejected_steps();
             gained = gained.max(body.gained);
             if body.inverted() > 0 {
@@ -204,8 +206,9 @@ fn handled<S: Real>(seeds: std::ops::Range<u64>, scrambles: bool) {
         "{rejected} taken again, gained {gained:e}, of {}: inverted {inverted:?}",
         mesh.tets().len()
     );
-    let most = inverted.iter().map(|last| last.3).max().unwrap_or(0);
-    assert!(most * 1000 <= mesh.tets().len(), "{inverted:?} of {}", mesh.tets().len());
+    // Of all bodies together: the law has minima with a tetrahedron inside out, where a body may stay.
+    let sum: usize = inverted.iter().map(|last| last.3).sum();
+    assert!(sum * 1000 <= bodies * mesh.tets().len(), "{inverted:?} of {bodies} bodies");
 }
 
 #[test]

@@ -254,7 +254,7 @@ impl<S: Real> Memory<S> {
                 // checks afterwards may end no higher than its reference.
                 Phase::Starting => {
                     let is_trusted = learned.parts[number].calm && progress.scheme.is_checked();
-                    change.potential <= round_off || (is_trusted && change.potential.is_finite())
+                    change.potential.is_finite() && (is_trusted || change.potential <= round_off)
                 }
                 Phase::FromReference => true,
                 Phase::Iterating => progress.suffices(change.potential, change.size, S::EPSILON),

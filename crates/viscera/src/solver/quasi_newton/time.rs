@@ -28,6 +28,11 @@ const SHARE: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 /// A vertex moves by less than so many units of the precision of the largest coordinate: round-off.
 const RESOLUTION: f64 = 1.0;
 
+/// Round-off of a tetrahedron's energy, in units of the precision; and of sums of all of them, which are in double
+/// precision.
+const ENERGY_ROUNDED: f64 = 8.0;
+const SUM_ROUNDED: f64 = 1e-12;
+
 impl<S: Real> Memory<S> {
     /// The step of a solve [s] in a step of `dt`.
     fn solve_dt(which: Solve, dt: f64) -> f64 {
@@ -337,9 +342,10 @@ impl<S: Real> Memory<S> {
         self.evaluator.evaluate_all(&data.constants, step, &data.points);
         let Self { energies, evaluator, parts, .. } = self;
         let mut any = false;
+        let round_off = (ENERGY_ROUNDED * S::EPSILON).max(SUM_ROUNDED);
         energies.end(step, data, &evaluator.stored);
         for (number, progress) in parts.iter_mut().enumerate() {
-            if progress.scheme == Scheme::Sdirk2 && energies.stores_too_much(number) {
+            if progress.scheme == Scheme::Sdirk2 && energies.stores_too_much(number, round_off) {
                 progress.scheme = Scheme::Euler;
                 learned.parts[number].count = 0;
                 learned.parts[number].calm = false;
