@@ -214,6 +214,8 @@ fn handled<S: Real>(seeds: std::ops::Range<u64>, scrambles: bool) {
 #[test]
 fn violent_grabs_make_no_energy() {
     handled::<f32>(0..2, false);
+    // Forces overflow in a trial.
+    handled::<f32>(28..29, false);
 }
 
 #[test]
