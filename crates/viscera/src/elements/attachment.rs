@@ -53,6 +53,10 @@ impl<S: Real> Energy<S, 1> for Attachment<S> {
         self.stiffness
     }
 
+    fn energy_change(&self, &[x]: &[Vec3<S>; 1], &[d]: &[Vec3<S>; 1]) -> S {
+        energy_change(x, d, self.anchor, self.stiffness)
+    }
+
     fn blocks(&self, _: &[Vec3<S>; 1]) -> [[Mat3<S>; 1]; 1] {
         [[Mat3::IDENTITY * self.stiffness]]
     }
@@ -84,6 +88,12 @@ impl<S: Real> XpbdBlock<S, 1, 3> for Attachment<S> {
 #[inline(always)]
 pub fn energy<S: Scalar>(x: Vec3<S>, anchor: Vec3<S>, stiffness: S) -> S {
     S::HALF * stiffness * (x - anchor).length_squared()
+}
+
+/// Change of the energy [J] as the vertex moves by `d` [m], with the round-off of the change.
+#[inline(always)]
+pub fn energy_change<S: Scalar>(x: Vec3<S>, d: Vec3<S>, anchor: Vec3<S>, stiffness: S) -> S {
+    stiffness * d.dot(x - anchor + d * S::HALF)
 }
 
 /// Force [N] on the vertex.

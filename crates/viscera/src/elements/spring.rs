@@ -56,6 +56,10 @@ impl<S: Real> Energy<S, 2> for Spring<S> {
         S::TWO * self.stiffness
     }
 
+    fn energy_change(&self, x: &[Vec3<S>; 2], d: &[Vec3<S>; 2]) -> S {
+        energy_change(x, d, self.rest_length, self.stiffness)
+    }
+
     fn blocks(&self, x: &[Vec3<S>; 2]) -> [[Mat3<S>; 2]; 2] {
         blocks(x, self.rest_length, self.stiffness)
     }
@@ -102,6 +106,22 @@ pub fn energy<S: Scalar>(x: &[Vec3<S>; 2], rest_length: S, stiffness: S) -> S {
     let (_, length) = direction(x);
     let c = length - rest_length;
     S::HALF * stiffness * c * c
+}
+
+/// Change of the energy [J] as the ends move by `d`: `k (l1 - l0) ((l0 + l1)/2 - L)` with
+/// `l1 - l0 = d01 . (2 e + d01)/(l0 + l1)`. Its round-off is that of the change, not that of the energy.
+#[inline(always)]
+pub fn energy_change<S: Scalar>(
+    x: &[Vec3<S>; 2],
+    d: &[Vec3<S>; 2],
+    rest_length: S,
+    stiffness: S,
+) -> S {
+    let (edge, change) = (x[1] - x[0], d[1] - d[0]);
+    let sum = edge.length() + (edge + change).length();
+    let inverse = S::ONE / sum.max(S::from_f64(SHORTEST));
+    let longer = change.dot(edge + edge + change) * inverse;
+    stiffness * longer * (S::HALF * sum - rest_length)
 }
 
 /// Forces [N] on the two ends.

@@ -5,9 +5,6 @@ use super::{
     settings_table, truth, value_error, whole, wrong_type,
 };
 
-use crate::material::MaterialConstants;
-use crate::scalar::Real;
-
 choices! {
     /// Floating point format of the simulation state.
     pub enum Precision {
@@ -184,7 +181,7 @@ settings_table! {
         /// an error near 1 %.
         substeps: Count = (Count::Auto), SUBSTEPS;
         /// Sweeps per substep: "auto" for what suits the method, 2 for "xpbd". Of "quasi_newton" passes for each of
-        /// its two solves per substep, "auto" by Poisson's ratio: 6 up to 0.41, 10 up to 0.46, above it 16.
+        /// its two solves per substep, "auto" by Poisson's ratio: 8 up to 0.41, 10 up to 0.46, above it 16.
         /// More solve a substep better.
         /// Without `rebase` they approach an answer that depends on the path, so more are not always closer
         /// to the truth.
@@ -274,30 +271,9 @@ struct AutomaticCounts {
 const SHORT_STEPS: AutomaticCounts = AutomaticCounts { substeps: 10, iterations: 2 };
 
 /// Those of large steps that are solved well: a stiff body takes more, as its slowest oscillation asks.
-const LONG_STEPS: AutomaticCounts = AutomaticCounts { substeps: 1, iterations: 6 };
+const LONG_STEPS: AutomaticCounts = AutomaticCounts { substeps: 1, iterations: 8 };
 
 impl SolverSettings {
-    /// Pairs that "quasi_newton" keeps, for these materials.
-    pub(crate) fn history_for<S: Real>(&self, materials: &[MaterialConstants<S>]) -> u32 {
-        match self.history {
-            0 if largest_poisson(materials) > 0.41 => MOST_HISTORY as u32,
-            0 => 3,
-            chosen => chosen,
-        }
-    }
-
-    /// Passes per solve of "quasi_newton", for these materials.
-    pub(crate) fn passes_for<S: Real>(&self, materials: &[MaterialConstants<S>]) -> u32 {
-        match self.iterations {
-            Count::Of(count) => count,
-            Count::Auto => match largest_poisson(materials) {
-                ..=0.41 => 6,
-                ..=0.46 => 10,
-                _ => 16,
-            },
-        }
-    }
-
     /// Substeps per frame; what "auto" stands for where it is chosen.
     pub fn substeps(&self) -> u32 {
         match self.substeps {
@@ -341,15 +317,6 @@ impl SolverSettings {
         Table::values(self, &mut values);
         values
     }
-}
-
-/// Poisson's ratio of the least compressible material.
-fn largest_poisson<S: Real>(materials: &[MaterialConstants<S>]) -> f64 {
-    let ratio = |material: &MaterialConstants<S>| {
-        let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(S::to_f64);
-        0.5 * lambda / (lambda + mu)
-    };
-    materials.iter().map(ratio).fold(0.0, f64::max)
 }
 
 /// Reads a count, or the word that stands for none.

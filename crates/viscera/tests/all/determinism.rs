@@ -9,7 +9,8 @@ use viscera::scalar::lanes::Instructions::{self, Avx2, Portable};
 use viscera::scalar::{Vec3, vec3};
 use viscera::scene::Scene;
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, Count, NeoHookean, SolverSettings, Threads,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, Method, NeoHookean, SolverSettings,
+    Threads,
 };
 use viscera::simulation::{Assembly, Simulation};
 use viscera::solver::balance::ForceBalance;
@@ -88,13 +89,14 @@ fn wall_and_jumps(mesh: &TetMesh, step: u32) -> Inputs<f32> {
 #[test]
 fn threads_and_instructions_leave_every_bit_of_a_large_body() {
     let others = [(2, Avx2), (8, Avx2), (2, Portable)];
-    for (colors, cells, tissue, viscosity) in [
-        (Colors::Unlimited, 14, SNH, 0.01),
-        (Colors::Limited(4), 10, STVK, 0.01),
-        (Colors::Limited(1), 10, SNH, 0.0),
+    for (method, colors, cells, tissue, viscosity) in [
+        (Method::Xpbd, Colors::Unlimited, 14, SNH, 0.01),
+        (Method::Xpbd, Colors::Limited(4), 10, STVK, 0.01),
+        (Method::Xpbd, Colors::Limited(1), 10, SNH, 0.0),
+        (Method::QuasiNewton, Colors::Limited(1), 10, SNH, 0.01),
     ] {
         let mesh = block([0.08, 0.08, 0.08], [cells; 3], 0.2);
-        let settings = colored(colors);
+        let settings = SolverSettings { method, ..colored(colors) };
         let tissue = material(tissue, 1e4, 0.45).with_viscosity(viscosity).expect("legal");
         let model = single_body::<f32>(&mesh, &tissue);
         let count = Layout::new(&model, &settings).color_count;
@@ -102,7 +104,10 @@ fn threads_and_instructions_leave_every_bit_of_a_large_body() {
         println!("{colors:?}: {count} colours of about {shared} blocks");
         assert!(shared > 64, "{shared} blocks in a colour leave nothing to share");
         let rejected = same_bits(&model, &settings, &others, |step| wall_and_jumps(&mesh, step));
-        assert!(rejected > 0, "{colors:?}: the guard has had nothing to do");
+        assert!(
+            rejected > 0 || method != Method::Xpbd,
+            "{colors:?}: the guard has had nothing to do"
+        );
     }
 }
 
@@ -168,6 +173,7 @@ fn threads_and_instructions_leave_every_bit_of_several_parts() {
         anderson(AndersonOn::Both, AndersonGuard::Residual),
         anderson(AndersonOn::Both, AndersonGuard::Energy),
         anderson(AndersonOn::Multipliers, AndersonGuard::Residual),
+        SolverSettings { method: Method::QuasiNewton, ..plain.clone() },
     ] {
         for colors in [Colors::Unlimited, Colors::Limited(4), Colors::Limited(1)] {
             let settings = SolverSettings { colors, ..settings.clone() };

@@ -397,3 +397,37 @@ fn attachments_and_plain_elements_have_blocks_and_changes() {
         assert!((change - expected[0] - expected[1]).abs() < ROUNDINGS * f64::EPSILON * size);
     }
 }
+
+/// Against the difference of energies; and of changes so small that a difference has no digit left, in single precision
+/// against double.
+#[test]
+fn changes_of_springs_and_attachments_keep_their_digits() {
+    let mut random = Random(27);
+    for i in 0..3000 {
+        let scale = [1.0, 1e-3, 1e-6][i % 3];
+        let x: [Vec3<f32>; 2] = std::array::from_fn(|_| random.vector(0.01).cast());
+        let d: [Vec3<f32>; 2] = std::array::from_fn(|_| random.vector(0.01 * scale).cast());
+        let (single, double) = (
+            Spring { rest_length: 0.006f32, stiffness: 80.0f32 },
+            Spring { rest_length: f64::from(0.006f32), stiffness: 80.0 },
+        );
+        let [wide, along] = [x, d].map(|pair| pair.map(|v| v.cast::<f64>()));
+        let change = double.energy_change(&wide, &along);
+        let length = (wide[1] - wide[0]).length() + along[0].length() + along[1].length();
+        // All lengths, and that of the spring itself.
+        let size = 80.0 * (along[0].length() + along[1].length()) * (length + 0.006);
+        let moved = [wide[0] + along[0], wide[1] + along[1]];
+        let difference = double.energy(&moved) - double.energy(&wide);
+        let whole = 80.0 * (length + 0.006) * (length + 0.006);
+        assert!((change - difference).abs() < ROUNDINGS * f64::EPSILON * whole, "{change:e}");
+        let error = f64::from(single.energy_change(&x, &d)) - change;
+        assert!(error.abs() < ROUNDINGS * f64::from(f32::EPSILON) * size, "{change:e}: {error:e}");
+
+        let attachment = Attachment { anchor: x[1], stiffness: 80.0f32 };
+        let exact = Attachment { anchor: wide[1], stiffness: 80.0 };
+        let error = f64::from(attachment.energy_change(&[x[0]], &[d[0]]))
+            - exact.energy_change(&[wide[0]], &[along[0]]);
+        let size = 80.0 * along[0].length() * ((wide[0] - wide[1]).length() + along[0].length());
+        assert!(error.abs() < ROUNDINGS * f64::from(f32::EPSILON) * size, "{error:e}");
+    }
+}

@@ -40,6 +40,8 @@ mod mesh_io;
 mod parts;
 mod physics;
 mod pins;
+mod quasi_newton;
+mod quasi_newton_robust;
 mod readme;
 mod saved;
 mod scene_errors;

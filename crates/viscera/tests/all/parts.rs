@@ -9,7 +9,8 @@ use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::lanes::Instructions;
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, Count, Method, SolverSettings, Threads,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, Integrator, Method, SolverSettings,
+    Threads,
 };
 use viscera::solver::{Inputs, Pin, Solver, StepReport, Tether};
 use viscera::state::State;
@@ -187,6 +188,14 @@ pub fn methods() -> Vec<(&'static str, SolverSettings)> {
         iterations: Count::Of(6),
         ..SolverSettings::default()
     };
+    // What is chosen by Poisson's ratio is chosen for all bodies of a model together.
+    let quasi_newton = |integrator| SolverSettings {
+        method: Method::QuasiNewton,
+        integrator,
+        iterations: Count::Of(8),
+        history: 5,
+        ..SolverSettings::default()
+    };
     let chebyshev = |chebyshev_delay, chebyshev_damping| SolverSettings {
         acceleration: Acceleration::Chebyshev,
         chebyshev_delay,
@@ -208,7 +217,9 @@ pub fn methods() -> Vec<(&'static str, SolverSettings)> {
         ("Anderson on positions", anderson(AndersonOn::Positions, AndersonGuard::Residual)),
         ("Anderson on multipliers", anderson(AndersonOn::Multipliers, AndersonGuard::Residual)),
         ("published", plain(1, 6)),
-        ("explicit", SolverSettings { method: Method::Explicit, ..plain_steps }),
+        ("explicit", SolverSettings { method: Method::Explicit, ..plain_steps.clone() }),
+        ("quasi-Newton", quasi_newton(Integrator::Sdirk2)),
+        ("quasi-Newton, Euler", quasi_newton(Integrator::ImplicitEuler)),
     ]
 }
 
@@ -281,7 +292,8 @@ fn assert_kinds_stay_apart((name, settings): &(&str, SolverSettings)) {
 /// What a law, a viscosity, more colours or copies of one body make of the model is not seen by another.
 #[test]
 fn a_body_beside_another_kind_has_the_bits_it_has_alone() {
-    let chosen = ["coloured", "5 colours", "Chebyshev, 4 colours", "Anderson", "explicit"];
+    let chosen =
+        ["coloured", "5 colours", "Chebyshev, 4 colours", "Anderson", "explicit", "quasi-Newton"];
     for method in methods().iter().filter(|(name, _)| chosen.contains(name)) {
         assert_kinds_stay_apart(method);
     }

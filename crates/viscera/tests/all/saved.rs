@@ -125,6 +125,11 @@ fn a_resumed_simulation_goes_on_to_the_bit() {
     ];
     resumes_to_the_bit::<f32>(&chebyshev, &["1"]);
     resumes_to_the_bit::<f32>(&[("solver.method", "explicit")], &["1"]);
+    let quasi_newton = ("solver.method", "quasi_newton");
+    resumes_to_the_bit::<f32>(&[quasi_newton, ("solver.history", "5")], &["3"]);
+    let double =
+        [quasi_newton, ("solver.integrator", "implicit_euler"), ("solver.precision", "f64")];
+    resumes_to_the_bit::<f64>(&double, &["1"]);
     resumes_to_the_bit::<f64>(&[("solver.precision", "f64"), ("solver.colors", "1")], &["1"]);
 }
 

@@ -213,7 +213,7 @@ fn keys_that_do_not_go_together_are_refused() {
             "height =",
             "radius = \"1 mm\"\nheight =",
             "s.toml, line 4, column 1: body `bar`: `radius` means nothing for a beam, which takes \
-             length, width, height, cells_across",
+             length, width, height, cells_across, cut",
         ),
         (
             "shape = \"beam\"",

@@ -296,6 +296,9 @@ impl Progress {
     /// Whether a trial that changed the potential by so much [J s^2] is good enough: Armijo's condition, with
     /// what round-off can pretend.
     pub fn suffices(&self, change: f64, size: f64, epsilon: f64) -> bool {
-        change <= super::SUFFICIENT * self.length * self.slope + super::ROUNDED * epsilon * size
+        // Where terms overflow, so does what round-off could be.
+        change.is_finite()
+            && change
+                <= super::SUFFICIENT * self.length * self.slope + super::ROUNDED * epsilon * size
     }
 }

@@ -14,6 +14,7 @@
 //! `Precondition`, `ChooseDirection`, `Advance` (the next trial). Every connected part has its own directions, step
 //! lengths and verdicts.
 
+mod choice;
 mod direction;
 mod evaluate;
 mod parts;
@@ -36,6 +37,8 @@ use crate::solver::step::energy::Energies;
 use crate::solver::step::potential::Evaluator;
 use crate::solver::step::stage::StepStage;
 use crate::state::{Learned, State};
+use choice::history;
+pub use choice::passes;
 use evaluate::{Evaluation, Way};
 use parts::{Phase, Progress};
 use preconditioner::Preconditioner;
@@ -58,7 +61,7 @@ const MORE_ITERATIONS: u32 = 4;
 
 /// The stages of a step.
 pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S>]) -> Plan {
-    let iterations = settings.passes_for(materials);
+    let iterations = passes(settings, materials);
     let solve = |solve: Solve, iterations: u32| {
         use QuasiNewtonStage::{
             Advance, ChooseDirection, EndSolve, Evaluate, Judge, Precondition, StartSolve,
@@ -150,7 +153,7 @@ impl<S: Real> Memory<S> {
     /// Memory for the steps of a model.
     pub fn new(layout: &Layout<S>, settings: &SolverSettings) -> Self {
         let (vertices, parts) = (layout.vertex_count(), layout.part_count());
-        let history = settings.history_for(&layout.materials) as usize;
+        let history = history(settings, &layout.materials);
         let vectors = || vec![Vec3::ZERO; vertices];
         let points = || vec![Point::default(); vertices];
         Self {
@@ -254,10 +257,11 @@ impl<S: Real> Memory<S> {
             let round_off = ROUNDED * S::EPSILON * change.size;
             progress.accepted = match progress.phase {
                 Phase::Done => continue,
-                // Where the last solve was calm its start is as good as any: it has the velocity.
+                // Where the last solve was calm its start is as good as any: it has the velocity. A step that nothing
+                // checks afterwards may end no higher than its reference.
                 Phase::Starting => {
-                    change.potential <= round_off
-                        || (learned.parts[number].calm && change.potential.is_finite())
+                    let is_trusted = learned.parts[number].calm && progress.scheme.is_checked();
+                    change.potential.is_finite() && (is_trusted || change.potential <= round_off)
                 }
                 Phase::FromReference => true,
                 Phase::Iterating => progress.suffices(change.potential, change.size, S::EPSILON),

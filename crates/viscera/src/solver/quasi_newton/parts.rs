@@ -12,6 +12,15 @@ pub enum Scheme {
     Euler,
 }
 
+impl Scheme {
+    /// Whether the energy of such a step is compared with what there was, and the step taken again where it is too
+    /// high. A step of implicit Euler needs none of that: it stores no more than there was where its potential ends
+    /// no higher than at its reference.
+    pub fn is_checked(self) -> bool {
+        self == Scheme::Sdirk2
+    }
+}
+
 /// Where a solve of a part stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Phase {

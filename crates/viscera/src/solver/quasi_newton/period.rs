@@ -74,11 +74,6 @@ impl<S: Real> Memory<S> {
         number: usize,
     ) -> f64 {
         let range = step.model.parts[number].vertices.clone();
-        let extent = range.clone().fold(
-            (data.points[range.start].vec3(), data.points[range.start].vec3()),
-            |(low, high), v| (low.min(self.base[v].vec3()), high.max(self.base[v].vec3())),
-        );
-        let extent = (extent.1 - extent.0).length().to_f64();
         // `gradient` is the residual, `trial_z` the solution, `direction` that of conjugate gradients.
         for v in range.clone() {
             let is_free = data.constants.inverse_masses[v] != S::ZERO;
@@ -86,42 +81,23 @@ impl<S: Real> Memory<S> {
             self.gradient[v] = if is_free { load } else { Vec3::ZERO };
             self.first_velocities[v] = self.gradient[v];
             self.trial_z[v] = Vec3::ZERO;
+            self.direction[v] = Vec3::ZERO;
         }
-        let workers = data.constants.workers.clone();
-        let dot = |a: &[Vec3<S>], b: &[Vec3<S>]| {
-            vectors::dot(&workers, &a[range.clone()], &b[range.clone()])
-        };
-        let enough = RESIDUAL * RESIDUAL * dot(&self.gradient, &self.gradient);
-        let mut rz = 0.0;
-        for iteration in 0..ITERATIONS {
-            self.preconditioner.apply(
-                number,
-                &self.gradient[range.clone()],
-                &mut self.z[range.clone()],
-            );
-            let before = std::mem::replace(&mut rz, dot(&self.gradient, &self.z));
-            let share = S::from_f64(if iteration == 0 { 0.0 } else { rz / before });
+        let enough = RESIDUAL * RESIDUAL * self.along(data, number, |m| [&m.gradient, &m.gradient]);
+        let mut rz = f64::INFINITY;
+        for _ in 0..ITERATIONS {
+            let Self { preconditioner, gradient, z, .. } = self;
+            preconditioner.apply(number, &gradient[range.clone()], &mut z[range.clone()]);
+            let before = rz;
+            rz = self.along(data, number, |m| [&m.gradient, &m.z]);
+            let share = S::from_f64(rz / before);
             for v in range.clone() {
                 self.direction[v] = self.z[v] + self.direction[v] * share;
             }
-            let largest = range
-                .clone()
-                .fold(0.0, |most: f64, v| most.max(self.direction[v].length().to_f64()));
-            if !(largest > 0.0 && largest.is_finite() && extent > 0.0) {
-                return 0.0;
+            if !self.stiffen(step, data, number) {
+                break;
             }
-            let small = S::from_f64(DIFFERENCE * extent / largest);
-            for v in range.clone() {
-                data.points[v].set_vec3(self.base[v].vec3() + self.direction[v] * small);
-            }
-            self.gradient_at(step, data);
-            data.points[range.clone()].copy_from_slice(&self.base[range.clone()]);
-            let inverse = S::ONE / small;
-            for v in range.clone() {
-                self.trial_gradient[v] =
-                    (self.trial_gradient[v] - self.start_velocities[v]) * inverse;
-            }
-            let length = rz / dot(&self.direction, &self.trial_gradient);
+            let length = rz / self.along(data, number, |m| [&m.direction, &m.trial_gradient]);
             if !(length > 0.0 && length.is_finite()) {
                 break;
             }
@@ -130,21 +106,56 @@ impl<S: Real> Memory<S> {
                 self.trial_z[v] += self.direction[v] * length;
                 self.gradient[v] = self.gradient[v] - self.trial_gradient[v] * length;
             }
-            if dot(&self.gradient, &self.gradient) < enough {
+            if self.along(data, number, |m| [&m.gradient, &m.gradient]) < enough {
                 break;
             }
         }
-        let mut inertia = 0.0;
-        for v in range.clone() {
-            let mass = data.constants.masses[v].to_f64();
-            inertia += mass * self.trial_z[v].length_squared().to_f64();
-        }
-        let work = dot(&self.trial_z, &self.first_velocities) - dot(&self.trial_z, &self.gradient);
+        let mass = |v: usize| data.constants.masses[v].to_f64();
+        let term = |v: usize| mass(v) * self.trial_z[v].length_squared().to_f64();
+        let inertia: f64 = range.map(term).sum();
+        let work = self.along(data, number, |m| [&m.trial_z, &m.first_velocities])
+            - self.along(data, number, |m| [&m.trial_z, &m.gradient]);
         let squared = work / inertia - 1.0;
-        if squared > 0.0 && squared.is_finite() {
-            2.0 * std::f64::consts::PI / squared.sqrt()
-        } else {
-            0.0
+        let is_oscillation = squared > 0.0 && squared.is_finite();
+        if is_oscillation { 2.0 * std::f64::consts::PI / squared.sqrt() } else { 0.0 }
+    }
+
+    /// The product of two vectors of a part.
+    fn along<'a>(
+        &'a self,
+        data: &StepData<S>,
+        number: usize,
+        vectors: impl FnOnce(&'a Self) -> [&'a Vec<Vec3<S>>; 2],
+    ) -> f64 {
+        let [a, b] = vectors(self);
+        let range = self.preconditioner.vertices(number);
+        vectors::dot(&data.constants.workers, &a[range.clone()], &b[range])
+    }
+
+    /// `(M + K) d` of a part into `trial_gradient`, by a difference; false of a direction that is none.
+    fn stiffen(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, number: usize) -> bool {
+        let range = step.model.parts[number].vertices.clone();
+        let first = self.base[range.start].vec3();
+        let (low, high) = range.clone().fold((first, first), |(low, high), v| {
+            (low.min(self.base[v].vec3()), high.max(self.base[v].vec3()))
+        });
+        let extent = (high - low).length().to_f64();
+        let largest =
+            range.clone().fold(0.0, |most: f64, v| most.max(self.direction[v].length().to_f64()));
+        if !(largest > 0.0 && largest.is_finite() && extent > 0.0) {
+            return false;
         }
+        let small = S::from_f64(DIFFERENCE * extent / largest);
+        for v in range.clone() {
+            data.points[v].set_vec3(self.base[v].vec3() + self.direction[v] * small);
+        }
+        self.gradient_at(step, data);
+        data.points[range.clone()].copy_from_slice(&self.base[range.clone()]);
+        let inverse = S::ONE / small;
+        for v in range {
+            let change = self.trial_gradient[v] - self.start_velocities[v];
+            self.trial_gradient[v] = change * inverse;
+        }
+        true
     }
 }

@@ -28,6 +28,11 @@ const SHARE: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 /// A vertex moves by less than so many units of the precision of the largest coordinate: round-off.
 const RESOLUTION: f64 = 1.0;
 
+/// Round-off of a tetrahedron's energy, in units of the precision; and of sums of all of them, which are in double
+/// precision.
+const ENERGY_ROUNDED: f64 = 8.0;
+const SUM_ROUNDED: f64 = 1e-12;
+
 impl<S: Real> Memory<S> {
     /// The step of a solve [s] in a step of `dt`.
     fn solve_dt(which: Solve, dt: f64) -> f64 {
@@ -184,7 +189,9 @@ impl<S: Real> Memory<S> {
                     let (before, after) = (self.start_velocities[v], self.first_velocities[v]);
                     let change = (after - before) * (S::ONE / he);
                     let begun = self.base[v].vec3();
-                    let first = begun + after * d + change * (S::HALF * d * d);
+                    // Nothing inside changes the way of what nothing holds: there its middle goes all the way.
+                    let fall = acceleration * (d * (he - S::HALF * d));
+                    let first = begun + after * d + change * (S::HALF * d * d) + fall;
                     (x + after * d, before + change * d, first)
                 }
             };
@@ -260,9 +267,15 @@ impl<S: Real> Memory<S> {
             }
             let kept = &mut state.learned.parts[number];
             let is_calm = progress.rejections == 0;
-            // The last direction is taken unchecked where nothing was rejected, in this solve or the one before.
-            let goes_on = progress.ahead && progress.accepted && is_calm && kept.calm;
+            // The last direction is taken unchecked where nothing was rejected, in this solve or the one before, and
+            // where the energy of the step is checked in the end.
+            let is_trusted = is_calm && kept.calm && progress.scheme.is_checked();
+            let goes_on = progress.ahead && progress.accepted && is_trusted;
             (kept.calm, kept.inverted) = (is_calm, progress.inverted > 0);
+            if which == Solve::Euler && step.settings.integrator == Integrator::Sdirk2 {
+                // Its pairs are of a longer step than those of the next.
+                kept.count = 0;
+            }
             progress.phase = Phase::Done;
             let range = part.vertices.clone();
             let (from, to) = if goes_on {
@@ -337,9 +350,10 @@ impl<S: Real> Memory<S> {
         self.evaluator.evaluate_all(&data.constants, step, &data.points);
         let Self { energies, evaluator, parts, .. } = self;
         let mut any = false;
+        let round_off = (ENERGY_ROUNDED * S::EPSILON).max(SUM_ROUNDED);
         energies.end(step, data, &evaluator.stored);
         for (number, progress) in parts.iter_mut().enumerate() {
-            if progress.scheme == Scheme::Sdirk2 && energies.stores_too_much(number) {
+            if progress.scheme == Scheme::Sdirk2 && energies.stores_too_much(number, round_off) {
                 progress.scheme = Scheme::Euler;
                 learned.parts[number].count = 0;
                 learned.parts[number].calm = false;

@@ -150,13 +150,13 @@ impl Energies {
     }
 
     /// Whether a part stores more at its end than all energy that it had and was given, or no number: then no
-    /// velocity is small enough.
-    pub fn stores_too_much(&self, part: usize) -> bool {
+    /// velocity is small enough. `round_off` is that of energies, relative.
+    pub fn stores_too_much(&self, part: usize, round_off: f64) -> bool {
         let energy = &self.0[part];
         let (given, _, _) = energy.balance();
         // Round-off of energies that nearly cancel is none of the step's.
         let stored = energy.start.stored.abs().max(energy.end.stored.abs());
-        let round_off = 1e-6 * (stored + energy.start.kinetic + energy.work.abs());
+        let round_off = round_off * (stored + energy.start.kinetic + energy.work.abs());
         given < -round_off || !given.is_finite()
     }
 

@@ -131,9 +131,21 @@ impl<S: Real> Preconditioner<S> {
         parts[number].refresh(layout, constants, curvature, &layout.parts[number], rotations, free);
     }
 
+    /// The vertices of a part.
+    pub fn vertices(&self, number: usize) -> Range<usize> {
+        self.parts[number].vertices.clone()
+    }
+
     /// `z = M r` of a part; both are of its vertices.
     pub fn apply(&mut self, number: usize, r: &[Vec3<S>], z: &mut [Vec3<S>]) {
-        self.parts[number].apply(r, z);
+        let part = &mut self.parts[number];
+        part.apply(r, z);
+        // Coarser levels move pinned vertices along.
+        for (z, free) in z.iter_mut().zip(&self.free[part.vertices.clone()]) {
+            if !free {
+                *z = Vec3::ZERO;
+            }
+        }
     }
 }
 
