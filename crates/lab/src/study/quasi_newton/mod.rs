@@ -34,7 +34,7 @@ const COMPRESSIBLE: f64 = 0.45;
 /// Asked of the passes to the lower level on the finer mesh, over those on the coarser one.
 const GROWTH: f64 = 1.3;
 /// Asked of the gradient that is left at exact ends, over that at the inertial prediction.
-const GRADIENT: f64 = 1e-8;
+const GRADIENT: f64 = 1e-7;
 
 /// What was found of a step.
 struct Answer {
