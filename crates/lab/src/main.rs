@@ -72,7 +72,7 @@ Examples:
 /// Writes one Markdown file, and plots (SVG), pictures (PNG) and all numbers (CSV) to a folder beside
 /// it that has the file's name. The CSV files are the same in every run on one machine; milliseconds
 /// stand in the text only. On two cores the quick run takes less than a minute, the full run less than
-/// fifteen; build with --release.
+/// twenty; build with --release.
 #[derive(Args)]
 #[command(after_help = STUDY_EXAMPLES)]
 struct StudyArguments {

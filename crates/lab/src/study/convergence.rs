@@ -310,7 +310,7 @@ fn treats_alike(settings: &SolverSettings) -> bool {
 }
 
 /// Which of so many points are shown: equally far apart on a logarithmic axis, the last in any case.
-fn thinned(count: usize) -> Vec<usize> {
+pub(super) fn thinned(count: usize) -> Vec<usize> {
     let step = 1.0 / POINTS_PER_DECADE;
     let mut kept = vec![0];
     let mut exponent = 0.0;

@@ -2,7 +2,8 @@
 
 use viscera::material::MaterialModel;
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, Count, RelaxationForm, SolverSettings, Threads,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, Integrator, Method, RelaxationForm,
+    SolverSettings, Threads,
 };
 
 /// Settings with the name that tables and legends give them.
@@ -52,6 +53,17 @@ pub fn exact(colors: Colors) -> SolverSettings {
     SolverSettings {
         substeps: Count::Of(1),
         colors,
+        threads: Threads::Count(1),
+        ..SolverSettings::default()
+    }
+}
+
+/// The quasi-Newton method, a step of implicit Euler: what the others solve, too.
+pub fn quasi_newton() -> SolverSettings {
+    SolverSettings {
+        method: Method::QuasiNewton,
+        integrator: Integrator::ImplicitEuler,
+        substeps: Count::Of(1),
         threads: Threads::Count(1),
         ..SolverSettings::default()
     }

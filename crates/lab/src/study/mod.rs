@@ -10,6 +10,7 @@ mod device;
 mod methods;
 mod multipliers;
 mod panels;
+mod quasi_newton;
 mod stability;
 pub mod step;
 mod stiffness;
@@ -28,5 +29,6 @@ pub const PROGRAM: Program = Program {
         stiffness::SECTION,
         stability::SECTION,
         cost::SECTION,
+        quasi_newton::SECTION,
     ],
 };

@@ -78,27 +78,38 @@ impl MeasuredStep {
         }
         let mut end = state.clone();
         advance(&mut end, f64::from(history) + dt * FRAME_RATE, dt)?;
-        let mut step = Self {
-            state,
-            dt,
-            exact: end.positions,
-            history,
-            masses: model.masses.clone(),
-            start_error: 1.0,
-            strain: 1.0,
-            load_case,
-        };
-        let mut predicted = step.state.positions.clone();
-        let inputs = step.inputs::<f64>();
-        for (x, v) in predicted.iter_mut().zip(&step.state.velocities) {
+        Self::between(load_case, history, dt, state, end.positions)
+    }
+
+    /// A step of `dt` [s] from a state that stands after so many frames of the scene, however it came there,
+    /// and where all vertices are [m] at its exact end.
+    pub fn between(
+        load_case: LoadCase,
+        history: u32,
+        dt: f64,
+        state: State<f64>,
+        exact: Vec<Vec3<f64>>,
+    ) -> Result<Self> {
+        let masses = load_case.model::<f64>()?.masses.clone();
+        let (start_error, strain) = (1.0, 1.0);
+        let mut step = Self { load_case, state, dt, exact, history, masses, start_error, strain };
+        let predicted = step.predicted();
+        step.start_error = step.error(&predicted);
+        step.strain = step.strain_of(&step.exact)?;
+        Ok(step)
+    }
+
+    /// Where inertia and gravity alone would lead [m], pins moved.
+    pub fn predicted(&self) -> Vec<Vec3<f64>> {
+        let mut predicted = self.state.positions.clone();
+        let (inputs, dt) = (self.inputs::<f64>(), self.dt);
+        for (x, v) in predicted.iter_mut().zip(&self.state.velocities) {
             *x += *v * dt + inputs.gravity * (dt * dt);
         }
         for pin in &inputs.pins {
             predicted[pin.vertex as usize] = pin.target;
         }
-        step.start_error = step.error(&predicted);
-        step.strain = step.strain_of(&step.exact)?;
-        Ok(step)
+        predicted
     }
 
     /// What acts during the step.

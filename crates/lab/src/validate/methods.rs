@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use viscera::material::MaterialModel;
-use viscera::settings::{Colors, Count, SolverSettings};
+use viscera::settings::{Colors, Count, Method, SolverSettings};
 
 use crate::load_cases::LoadCase;
 use crate::settling::{Settled, settle};
@@ -21,11 +21,23 @@ pub(super) enum LibrarySolver {
     Single,
     /// Multipliers from zero and no rebase, in double precision.
     Published,
+    /// The quasi-Newton method with its defaults, one substep, in double precision.
+    QuasiNewton,
+    /// The same in single precision.
+    QuasiNewtonSingle,
 }
 
-/// All of them.
+/// Those of the XPBD family.
 pub(super) const METHODS: [LibrarySolver; 3] =
     [LibrarySolver::Double, LibrarySolver::Single, LibrarySolver::Published];
+
+/// Those that are right at rest.
+pub(super) const RIGHT_AT_REST: [LibrarySolver; 4] = [
+    LibrarySolver::Double,
+    LibrarySolver::Single,
+    LibrarySolver::QuasiNewton,
+    LibrarySolver::QuasiNewtonSingle,
+];
 
 impl LibrarySolver {
     /// As tables and legends call it.
@@ -34,13 +46,29 @@ impl LibrarySolver {
             Self::Double => "exact at rest, double precision",
             Self::Single => "exact at rest, single precision",
             Self::Published => "XPBD as published",
+            Self::QuasiNewton => "quasi-Newton, double precision",
+            Self::QuasiNewtonSingle => "quasi-Newton, single precision",
         }
+    }
+
+    /// Whether it works in single precision.
+    pub fn is_single(self) -> bool {
+        matches!(self, Self::Single | Self::QuasiNewtonSingle)
     }
 
     /// The defaults, but for what makes the method.
     pub fn settings(self) -> SolverSettings {
         let exact = self != Self::Published;
-        SolverSettings { rebase: exact, keep_multipliers: exact, ..SolverSettings::default() }
+        let method = match self {
+            Self::QuasiNewton | Self::QuasiNewtonSingle => Method::QuasiNewton,
+            Self::Double | Self::Single | Self::Published => Method::Xpbd,
+        };
+        SolverSettings {
+            method,
+            rebase: exact,
+            keep_multipliers: exact,
+            ..SolverSettings::default()
+        }
     }
 
     /// Brings a scene to rest.
@@ -50,9 +78,9 @@ impl LibrarySolver {
 
     /// The same with other settings, in the method's precision.
     pub fn settle_with(self, load_case: &LoadCase, settings: &SolverSettings) -> Result<Settled> {
-        match self {
-            Self::Double | Self::Published => settle::<f64>(load_case, settings),
-            Self::Single => settle::<f32>(load_case, settings),
+        match self.is_single() {
+            false => settle::<f64>(load_case, settings),
+            true => settle::<f32>(load_case, settings),
         }
     }
 }

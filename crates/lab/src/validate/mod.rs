@@ -8,6 +8,7 @@ mod methods;
 mod motion;
 mod organ;
 mod patch;
+mod path;
 mod rest;
 mod stress;
 mod twist;

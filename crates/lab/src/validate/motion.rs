@@ -7,7 +7,7 @@ use viscera::material::MaterialModel;
 use viscera::settings::{Acceleration, AndersonGuard, SolverSettings};
 
 use super::methods::{Form, scheduled, worse};
-use super::{Context, Section};
+use super::{Context, Section, path};
 use crate::load_cases::{FRAME_RATE, LoadCase, Size, tissue};
 use crate::motion::{errors, exact, simulate};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent};
@@ -92,7 +92,7 @@ fn cases(quick: bool) -> Vec<Case> {
 }
 
 fn case_count(quick: bool) -> usize {
-    cases(quick).len()
+    cases(quick).len() + path::case_count()
 }
 
 fn answer(case: &Case) -> Result<Vec<f64>> {
@@ -150,5 +150,6 @@ fn run(context: &mut Context) -> Result<()> {
         }
     }
     context.document.table(&table);
-    context.document.figure("motion-drop", &plot)
+    context.document.figure("motion-drop", &plot)?;
+    path::run(context)
 }

@@ -113,15 +113,13 @@ fn stretches(context: &mut Context) -> Result<()> {
     for (cases, errors) in cases.chunks(count).zip(errors.chunks(count)) {
         let mut row = Vec::new();
         for (case, &error) in cases.iter().zip(errors) {
-            row.push(match case.method {
-                LibrarySolver::Published => percent(error),
-                LibrarySolver::Double | LibrarySolver::Single => scientific(error),
-            });
-            match case.method {
-                LibrarySolver::Double => double = worse(double, error),
-                LibrarySolver::Single => single = worse(single, error),
-                LibrarySolver::Published => {}
+            if case.method == LibrarySolver::Published {
+                row.push(percent(error));
+                continue;
             }
+            row.push(scientific(error));
+            let worst = if case.method.is_single() { &mut single } else { &mut double };
+            *worst = worse(*worst, error);
         }
         let case = cases[0];
         let names = [model_name(case.model).to_owned(), case.stretch.to_string()];
@@ -179,9 +177,9 @@ fn frames(quick: bool) -> u32 {
 }
 
 fn error_of(case: &Case) -> Result<f64> {
-    match case.method {
-        LibrarySolver::Double | LibrarySolver::Published => settled_error::<f64>(case),
-        LibrarySolver::Single => settled_error::<f32>(case),
+    match case.method.is_single() {
+        false => settled_error::<f64>(case),
+        true => settled_error::<f32>(case),
     }
 }
 

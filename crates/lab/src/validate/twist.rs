@@ -8,7 +8,7 @@ use anyhow::Result;
 use viscera::material::MaterialModel;
 use viscera::scalar::{Vec3, vec3};
 
-use super::methods::{LibrarySolver, floored, floored_percent, worse};
+use super::methods::{RIGHT_AT_REST, floored, floored_percent, worse};
 use super::{Context, Section};
 use crate::load_cases::{BAR, DrivenPath, LoadCase, Size, tissue};
 use crate::settling::{Error, Truth, compare, truth_in_parts};
@@ -32,8 +32,6 @@ const INCREMENT: u32 = 10;
 const FLOOR: f64 = 1e-9;
 /// Asked of the library.
 const LIMIT: f64 = 1e-3;
-/// The library's answers, in the order of the table's columns.
-const METHODS: [LibrarySolver; 2] = [LibrarySolver::Double, LibrarySolver::Single];
 
 #[derive(Clone, Copy, Debug)]
 struct Case {
@@ -69,8 +67,8 @@ struct Answer {
     true_torque: f64,
     /// Volume now over volume at rest.
     true_volume: f64,
-    /// Torque [N m] and error by each of the methods.
-    library: [(f64, Error); 2],
+    /// Torque [N m] and error by each method of [`RIGHT_AT_REST`].
+    library: Vec<(f64, Error)>,
 }
 
 fn run(context: &mut Context) -> Result<()> {
@@ -121,14 +119,14 @@ fn table(context: &mut Context, cases: &[Case], answers: &[Answer]) {
 }
 
 fn errors(context: &mut Context, cases: &[Case], answers: &[Answer]) {
-    let heads = ["angle", "tets", "precision", "rms", "largest", "torque", "volume", "energy"];
+    let heads = ["angle", "tets", "method", "rms", "largest", "torque", "volume", "energy"];
     let mut table = Table::new(heads.into_iter().chain(["|grad|", "inverted", ""]));
     for (case, answer) in cases.iter().zip(answers) {
-        for (method, (torque, error)) in METHODS.iter().zip(&answer.library) {
+        for (method, (torque, error)) in RIGHT_AT_REST.iter().zip(&answer.library) {
             table.row([
                 format!("{}°", case.angle),
                 answer.tet_count.to_string(),
-                if *method == LibrarySolver::Single { "single" } else { "double" }.to_owned(),
+                method.name().to_owned(),
                 floored_percent(error.rms, FLOOR),
                 floored_percent(error.largest, FLOOR),
                 floored_percent((torque / answer.true_torque - 1.0).abs(), FLOOR),
@@ -160,7 +158,7 @@ fn plot(context: &mut Context, cases: &[Case], answers: &[Answer]) -> Result<()>
     let truth = coarse().map(|(case, answer)| point(case, answer.true_torque));
     let from_rest = std::iter::once([0.0, 0.0]).chain(truth);
     plot.series(Series::new("reference", from_rest).with_style(Style::Line));
-    for (at, method) in METHODS.iter().enumerate() {
+    for (at, method) in RIGHT_AT_REST.iter().enumerate() {
         let points = coarse().map(|(case, answer)| point(case, answer.library[at].0));
         plot.series(Series::new(method.name(), points).with_style(Style::Markers));
     }
@@ -168,7 +166,7 @@ fn plot(context: &mut Context, cases: &[Case], answers: &[Answer]) -> Result<()>
 }
 
 fn verdict(context: &mut Context, answers: &[Answer]) {
-    for (at, method) in METHODS.iter().enumerate() {
+    for (at, method) in RIGHT_AT_REST.iter().enumerate() {
         let (mut worst, mut others) = (0.0, 0);
         for Answer { library, true_torque, .. } in answers {
             let (torque, error) = &library[at];
@@ -216,17 +214,17 @@ fn torque(load_case: &LoadCase, positions: &[Vec3<f64>], pin_forces: &[Vec3<f64>
 fn answer(case: &Case) -> Result<Answer> {
     let load_case = load_case(case)?;
     let truth = truth_in_parts(&load_case, case.angle.div_ceil(INCREMENT))?;
-    let library = METHODS.map(|method| -> Result<_> {
+    let library = RIGHT_AT_REST.iter().map(|method| -> Result<_> {
         let settled = method.settle(&load_case)?;
         let error = compare(&load_case, &truth, &settled.positions)?;
         Ok((torque(&load_case, &settled.positions, &settled.pin_forces), error))
     });
-    let [double, single] = library;
+    let library = library.collect::<Result<_>>()?;
     Ok(Answer {
         tet_count: load_case.mesh.tets().len(),
         true_torque: torque(&load_case, &truth.positions, &truth.pin_forces),
         true_volume: truth.volume / load_case.mesh.volume(),
         truth,
-        library: [double?, single?],
+        library,
     })
 }

@@ -5,6 +5,7 @@ mod common;
 
 mod holds;
 mod oracle;
+mod quasi_newton;
 mod reference;
 mod reference_oracle;
 mod rest_command;

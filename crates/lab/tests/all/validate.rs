@@ -85,13 +85,17 @@ fn stiffness_does_not_depend_on_the_iterations() {
 #[test]
 #[ignore = "slow: many bodies come to rest, and a drop is followed by Newton's method"]
 fn stiffness_does_not_depend_on_the_iterations_at_length() {
-    let figures = ["rest-bodies", "independence-iterations", "motion-drop"];
+    let figures = ["rest-bodies", "independence-iterations", "motion-drop", "motion-path"];
     assert_sections_hold("rest,independence,motion,stress", &figures);
 }
 
-/// Known failures: five sweeps of one colour do not unscramble a bar, and Anderson's
-/// default guard follows a drop a little less closely than is asked.
-const KNOWN_FAILURES: [&str; 2] = ["scrambles, Jacobi", "Anderson guarded by residual"];
+/// Known failures: five sweeps of one colour do not unscramble a bar, Anderson's default guard follows a drop a
+/// little less closely than is asked, and so does the one substep that the quasi-Newton method chooses for a bar.
+const KNOWN_FAILURES: [&str; 3] = [
+    "scrambles, Jacobi",
+    "Anderson guarded by residual",
+    "path of a bar's end over 0.5 s, quasi-Newton, nu 0.3",
+];
 
 fn all_are_met(printed: &str) {
     assert!(printed.contains("claims are met"), "{printed}");

@@ -1,0 +1,138 @@
+//! The steps that the quasi-Newton method is counted on, and their exact ends.
+
+use anyhow::Result;
+use std::fmt;
+use viscera::material::MaterialModel;
+use viscera::scalar::Vec3;
+use viscera::settings::{Count, SolverSettings};
+use viscera::solver::Solver;
+use viscera::state::State;
+
+use super::super::methods::quasi_newton;
+use super::super::step::MeasuredStep;
+use crate::load_cases::{FRAME_RATE, LoadCase, Size};
+use crate::reference::Reference;
+use crate::reference::objective::{Load, Objective, creep_at};
+use crate::reference::problem::Problem;
+use crate::sections::Changes;
+
+/// Scenes and the frames before the measured step, which lies in the middle of the motion.
+const MOMENTS: [(&str, u32); 3] = [("cantilever", 10), ("twist", 11), ("grab", 7)];
+/// Young's moduli [Pa].
+const YOUNGS: [f64; 3] = [1e3, 1e4, 1e5];
+const POISSONS: [f64; 3] = [0.3, 0.45, 0.49];
+
+/// Passes of each frame that leads to the measured step: where that begins need not be exact, and a hundred
+/// come close enough for it to lie in the middle of the motion.
+const LEADING: u32 = 100;
+/// Passes to an exact end: rounding ends them before.
+const CONVERGED: u32 = 600;
+
+/// A step of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct StepProblem {
+    pub scene: &'static str,
+    /// Frames before it.
+    pub frames: u32,
+    /// [Pa].
+    pub young: f64,
+    pub poisson: f64,
+    pub size: Size,
+    /// Whether the mesh is the finer one of two.
+    pub is_fine: bool,
+}
+
+impl fmt::Display for StepProblem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { scene, young, poisson, size, .. } = self;
+        write!(f, "{scene}, {} kPa, nu {poisson}, {size:?} mesh", young / 1e3)
+    }
+}
+
+/// The coarser and the finer mesh; a mesh of the user's has one size.
+fn sizes(quick: bool, changes: &Changes) -> Vec<(Size, bool)> {
+    let [coarse, fine] = if quick { [Size::Tiny, Size::Small] } else { [Size::Large, Size::Huge] };
+    let mut sizes = vec![(coarse, false)];
+    // First what takes longest, so that no core waits for it in the end.
+    if changes.mesh.is_none() {
+        sizes.insert(0, (fine, true));
+    }
+    sizes
+}
+
+/// All steps, those on finer meshes first.
+pub(super) fn problems(quick: bool, changes: &Changes) -> Vec<StepProblem> {
+    let youngs = match changes.young {
+        Some(young) => vec![young],
+        None if quick => vec![1e4],
+        None => YOUNGS.to_vec(),
+    };
+    let poissons = changes.poisson.map_or(POISSONS.to_vec(), |poisson| vec![poisson]);
+    let mut problems = Vec::new();
+    for (size, is_fine) in sizes(quick, changes) {
+        for (scene, frames) in MOMENTS {
+            for &poisson in &poissons {
+                let of = |&young| StepProblem { scene, frames, young, poisson, size, is_fine };
+                problems.extend(youngs.iter().map(of));
+            }
+        }
+    }
+    problems
+}
+
+impl StepProblem {
+    /// The step with its exact end: by Newton's method on the coarser mesh, on the finer one by the method
+    /// itself.
+    pub fn step(&self, changes: &Changes) -> Result<MeasuredStep> {
+        let tissue = changes.tissue(MaterialModel::StableNeoHookean, self.young, self.poisson)?;
+        let load_case = changes.load_case(self.scene, self.size, tissue)?;
+        let model = load_case.model::<f64>()?;
+        let dt = 1.0 / FRAME_RATE;
+        let start = lead(&load_case, self.frames)?;
+        let inputs = load_case.inputs(f64::from(self.frames) + 1.0);
+        let mut end = State { learned: Default::default(), ..start.clone() };
+        if self.is_fine {
+            Solver::new(&model, &converging(CONVERGED)).step(&model, &mut end, &inputs, dt)?;
+        } else {
+            Reference::new(&model).step(&mut end, &inputs, dt)?;
+        }
+        MeasuredStep::between(load_case, self.frames, dt, start, end.positions)
+    }
+}
+
+fn converging(iterations: u32) -> SolverSettings {
+    SolverSettings { iterations: Count::Of(iterations), history: 10, ..quasi_newton() }
+}
+
+/// The state after so many frames of a scene.
+fn lead(load_case: &LoadCase, frames: u32) -> Result<State<f64>> {
+    let model = load_case.model::<f64>()?;
+    let mut solver = Solver::new(&model, &converging(LEADING));
+    let mut state = State::at_rest(&model);
+    for frame in 1..=frames {
+        solver.step(&model, &mut state, &load_case.inputs(f64::from(frame)), 1.0 / FRAME_RATE)?;
+    }
+    Ok(state)
+}
+
+/// What is left of the gradient at the step's exact end, over that at the inertial prediction.
+pub(super) fn gradient_left(step: &MeasuredStep) -> Result<f64> {
+    let model = step.load_case.model::<f64>()?;
+    let problem = Problem::linear(&model);
+    let inputs = step.inputs::<f64>();
+    let (dt, state) = (step.dt, &step.state);
+    let mut inertial = state.positions.clone();
+    for (x, v) in inertial.iter_mut().zip(&state.velocities) {
+        *x += *v * dt + inputs.gravity * (dt * dt);
+    }
+    let creep = creep_at(&problem, &state.positions, dt);
+    let load = Load::Inertia { dt, predicted: inertial, creep };
+    let (anchors, tethers) = (&inputs.anchors, &inputs.tethers);
+    let objective = Objective { problem: &problem, anchors, tethers, load };
+    let free = step.load_case.free();
+    let norm = |x: &[Vec3<f64>]| -> f64 {
+        let gradient = objective.gradient(x);
+        free.iter().map(|&v| gradient[v as usize].length_squared()).sum::<f64>().sqrt()
+    };
+    Ok(norm(&step.exact) / norm(&step.predicted()))
+}
