@@ -84,6 +84,9 @@ impl<S: Real> Memory<S> {
         for (v, place) in self.base.iter_mut().enumerate() {
             place.set_vec3(data.points[v].vec3() + data.velocities[v] * ahead);
         }
+        // Not for a step that is taken again by implicit Euler, where it would take memory: viscosity counts a little too
+        // much then, which costs a pass or two.
+        self.preconditioner.fit(layout, &data.constants, dt);
         self.refresh(&solve, data, &state.learned);
         state.multiplier_dt = dt;
     }
@@ -113,7 +116,6 @@ impl<S: Real> Memory<S> {
     /// Turns the preconditioner to `base`, and the images of the pairs with it.
     fn refresh(&mut self, solve: &Step<'_, S>, data: &StepData<S>, learned: &Learned<S>) {
         let (layout, constants) = (solve.model, &data.constants);
-        self.preconditioner.fit(layout, constants, solve.dt);
         let curvature =
             Curvature { dt: solve.dt, x: &self.base, moments: moments(solve, &constants.previous) };
         for number in 0..layout.part_count() {
