@@ -4,7 +4,6 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
-use viscera::settings::SolverSettings;
 use viscera::simulation::{FrameReport, RestReport, Simulation, advice};
 
 /// The numbers of one frame and what it took.
@@ -127,7 +126,7 @@ impl Summary {
             gravity: scene.world.gravity.to_array(),
             overrides: overrides.into_iter().collect(),
             device: simulation.device_choice().to_owned(),
-            solver: solver_record(&scene.solver),
+            solver: solver_record(simulation),
             materials: materials(scene),
             model: ModelSummary {
                 bodies: model.bodies.len(),
@@ -214,11 +213,12 @@ fn materials(scene: &Scene) -> BTreeMap<String, String> {
 }
 
 /// A setting as a scene file writes it is JSON as well: a number, a truth value or a quoted word.
-fn solver_record(solver: &SolverSettings) -> BTreeMap<&'static str, serde_json::Value> {
-    let values = solver.values().into_iter();
+/// Counts are those that are in force.
+fn solver_record<S: Real>(simulation: &Simulation<S>) -> BTreeMap<&'static str, serde_json::Value> {
+    let values = simulation.scene().solver.values().into_iter();
     let mut record: BTreeMap<_, _> = values.map(|(key, text)| (key, json(text))).collect();
-    record.insert("substeps", solver.substeps().into());
-    record.insert("iterations", solver.iterations().into());
+    record.insert("substeps", simulation.substeps().into());
+    record.insert("iterations", simulation.iterations().into());
     record
 }
 

@@ -40,6 +40,8 @@ pub struct LearnedPart {
     pub newest: u32,
     /// Scale of the preconditioner, by the newest pair.
     pub scale: f64,
+    /// The step of the solves that the pairs are of [s]; zero before the first.
+    pub dt: f64,
     /// Whether no trial of the last solve was rejected.
     pub calm: bool,
     /// Whether any tetrahedron was inside out at the last trial.

@@ -48,6 +48,26 @@ fn a_run_writes_what_it_promises() {
     assert!(deformation["volume_ratio"].as_f64().is_some_and(|v| v > 1.0 && v < 1.5));
 }
 
+/// What a method chooses by itself is written as it was chosen: a stiff bar swings fast and takes several substeps.
+#[test]
+fn counts_that_the_method_chooses_are_told() {
+    let bench = Bench::new(TINY);
+    let run = |young: &str, more: &[&str]| {
+        let young = format!("body.bar.material.young={young}");
+        let mut arguments =
+            vec!["--set", "solver.method=quasi_newton", "--set", &young, "--frames", "1"];
+        arguments.extend(more);
+        let solver = &bench.summary_of(&arguments)["solver"];
+        (solver["substeps"].as_u64(), solver["iterations"].as_u64())
+    };
+    let (soft, passes) = run("100 Pa", &[]);
+    let (stiff, _) = run("1 MPa", &[]);
+    assert!(soft < stiff && stiff <= Some(10), "{soft:?} {stiff:?}");
+    assert!(passes >= Some(8), "{passes:?}");
+    let set = ["--set", "solver.substeps=3", "--set", "solver.iterations=5"];
+    assert_eq!(run("1 MPa", &set), (Some(3), Some(5)));
+}
+
 #[test]
 fn frames_and_every_are_honoured() {
     let bench = Bench::new(TINY);

@@ -167,10 +167,10 @@ struct Grid {
     spacing: f64,
 }
 
-/// A coordinate so close to a whole number, in spacings, is that number. Coordinates of a structured mesh are off by
-/// some 1e-15 of the part's side, which may be a million spacings; without this a vertex in a plane of the lattice would
-/// get nodes beside the plane, with weights of nothing.
-const SNAP: f64 = 1e-9;
+/// A coordinate so close to a whole number, in spacings, is that number. Coordinates of a structured mesh in single
+/// precision are off by some 1e-7 of the part's side, which is tens of spacings; without this a vertex in a plane of the
+/// lattice would get nodes beside the plane, with weights of nothing.
+const SNAP: f64 = 1e-5;
 
 impl Grid {
     /// Nothing for a part that has no lattice: no tetrahedra, or more cells along an axis than [`z_order`] tells apart.

@@ -176,7 +176,7 @@ settings_table! {
         /// stiffens under strong deformation: lower this where a run diverges.
         explicit_safety: f64 = 0.5, number(at_least(1e-3).up_to(1.0));
         /// Substeps per frame: "auto" for what suits the method, 10 for "xpbd" and "explicit", for "quasi_newton"
-        /// as many as the slowest oscillation of what the scene holds asks for, from 1 to 10. More lose less motion to numerical damping and follow it more closely; the cost grows alike. With `rebase`
+        /// as many as the slowest oscillation of what the scene's fixings hold asks for, from 1 to 10. More lose less motion to numerical damping and follow it more closely; the cost grows alike. With `rebase`
         /// and `keep_multipliers` the shape at rest does not depend on them; plain XPBD needs about 50 for
         /// an error near 1 %.
         substeps: Count = (Count::Auto), SUBSTEPS;

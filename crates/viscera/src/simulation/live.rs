@@ -156,7 +156,11 @@ impl<S: Real> Simulation<S> {
             let positions = std::mem::take(&mut fork.state.positions);
             let velocities = std::mem::take(&mut fork.state.velocities);
             let multiplier_dt = whole.multiplier_dt;
-            let Learned { pairs, parts } = whole.learned;
+            // What was learned of other tissue misleads.
+            let Learned { pairs, parts } = match self.scene.bodies == fork.scene.bodies {
+                true => whole.learned,
+                false => Learned::default(),
+            };
             let learned = Learned { pairs: double(&pairs), parts };
             fork.put(State { positions, velocities, multipliers: kept, multiplier_dt, learned });
         }

@@ -170,13 +170,17 @@ impl<S: Real> Simulation<S> {
         Ok(simulation)
     }
 
-    /// As many substeps as the settings ask for, or as the slowest oscillation of what the scene holds asks for.
+    /// As many substeps as the settings ask for, or as the slowest oscillation of what the scene's fixings hold asks for.
     fn choose_substeps(&mut self) {
         let solver = &self.scene.solver;
         self.substeps = solver.substeps();
         if solver.substeps == Count::Auto && solver.method == Method::QuasiNewton {
-            // At the beginning, so that a run that is resumed chooses the same.
-            let inputs = self.inputs_at(0.0);
+            // Of the fixings alone, which are always the same: what a hand holds comes and goes, and a run that is
+            // resumed or repeated has to choose the same.
+            let mut fixed = self.scene.clone();
+            fixed.motions.clear();
+            let mut inputs = Inputs::default();
+            GraspOrigins::default().act(&fixed, &self.assembly, 0.0, &mut inputs);
             let period = self.backend.slowest_period(&inputs);
             self.substeps = substeps_for(period, self.scene.time.frame);
         }

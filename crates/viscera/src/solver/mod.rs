@@ -31,7 +31,7 @@ use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::settings::{Count, SolverSettings};
-use crate::state::{Learned, State};
+use crate::state::State;
 use cpu::precision::{Task, carry_out};
 pub use error::StepError;
 pub use inputs::{Inputs, Pin, Tether};
@@ -49,8 +49,9 @@ pub use step::tissue::Tissue;
 pub use xpbd::acceleration;
 
 /// A solver for one model. All memory is taken when it is built; a step allocates nothing, but for
-/// every 63rd step of several threads, which exchanges a block of the queue that leads to them, and the first of a
-/// state from [`State::at_rest`], which makes room for its multipliers.
+/// every 63rd step of several threads, which exchanges a block of the queue that leads to them, for steps of the
+/// quasi-Newton method in which other vertices are pinned or, where tissue is viscous, the step is another, and for the
+/// first of a state from [`State::at_rest`], which makes room for its multipliers.
 #[derive(Clone, Debug)]
 pub struct Solver<S> {
     settings: SolverSettings,
@@ -89,7 +90,7 @@ impl<S: Real> Solver<S> {
             velocities: vec![Vec3::ZERO; self.layout.vertex_count()],
             multipliers: vec![S::ZERO; self.layout.multiplier_count],
             multiplier_dt: 0.0,
-            learned: Learned::default(),
+            learned: self.memory.nothing_learned(&self.layout),
         }
     }
 

@@ -104,6 +104,15 @@ impl<S: Real> Memory<S> {
         }
     }
 
+    /// Room for what the method learns.
+    pub fn nothing_learned(&self, layout: &Layout<S>) -> Learned<S> {
+        let mut learned = Learned::default();
+        if let MethodMemory::QuasiNewton(memory) = &self.method {
+            learned.clear(memory.history(), layout.vertex_count(), layout.part_count());
+        }
+        learned
+    }
+
     /// See [`crate::solver::Solver::slowest_period`].
     pub fn slowest_period(&mut self, step: &Step<'_, S>) -> f64 {
         match &mut self.method {

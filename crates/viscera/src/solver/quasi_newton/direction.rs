@@ -134,7 +134,9 @@ impl<S: Real> Memory<S> {
         let workers = &data.constants.workers;
         for (number, part) in step.model.parts.iter().enumerate() {
             let progress = self.parts[number];
-            let forgets = progress.failures >= super::MOST_FAILURES;
+            // Without pairs there is nothing to forget: the length goes on shrinking.
+            let forgets =
+                progress.failures >= super::MOST_FAILURES && learned.parts[number].count > 0;
             if progress.phase != Phase::Iterating || !(progress.accepted || forgets) {
                 continue;
             }

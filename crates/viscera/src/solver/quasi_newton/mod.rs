@@ -84,7 +84,8 @@ pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S
             nodes.push(Node::Run(QuasiNewtonStage::CheckEnergy.into()));
             nodes.extend(solve(Solve::Euler, iterations + MORE_ITERATIONS));
         }
-        Integrator::ImplicitEuler => nodes.extend(solve(Solve::Euler, iterations)),
+        // Its last direction is never taken unchecked, so that the first pass alone would move nothing.
+        Integrator::ImplicitEuler => nodes.extend(solve(Solve::Euler, iterations + 1)),
     }
     nodes.push(Node::Run(QuasiNewtonStage::LimitEnergy.into()));
     nodes.push(Node::Run(StepStage::WriteState.into()));
@@ -199,11 +200,17 @@ impl<S: Real> Memory<S> {
         vectors.into_iter().map(|v| size_of_val(&v[..])).sum::<usize>()
             + points.into_iter().map(|p| size_of_val(&p[..])).sum::<usize>()
             + size_of_val(&self.parts[..])
+            + size_of_val(&self.has_new_pair[..])
             + size_of_val(&self.pinned[..])
             + self.evaluation.bytes()
             + self.preconditioner.bytes()
             + self.evaluator.bytes()
             + self.energies.bytes()
+    }
+
+    /// Pairs at most.
+    pub fn history(&self) -> usize {
+        self.history
     }
 
     /// Whether no part has anything left to do in the solve at hand.

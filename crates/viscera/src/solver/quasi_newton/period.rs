@@ -1,7 +1,7 @@
 //! The period of the slowest oscillation about the rest shape, which tells how many steps follow the motion.
 //!
 //! ```text
-//! (M + K) d = M e  for each axis e;   omega^2 = d.K d/d.M d
+//! (M + h^2 K) d = M e  for each axis e, h long;   omega^2 = d.K d/d.M d
 //! ```
 //!
 //! The shape in which a body gives way to its own weight is close to that of its slowest oscillation, and Rayleigh's
@@ -19,6 +19,9 @@ use crate::solver::step::strain::measure_strain;
 const ITERATIONS: usize = 15;
 const RESIDUAL: f64 = 0.03;
 
+/// A step [s] that is far longer than any period, so that stiffness decides and viscosity does not.
+const LONG: f64 = 100.0;
+
 /// Displacement of a difference, as a share of the body's extent.
 const DIFFERENCE: f64 = 1e-4;
 
@@ -27,8 +30,7 @@ impl<S: Real> Memory<S> {
     /// where nothing is held. Positions and velocities of `data` are lost.
     pub fn slowest_period(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) -> f64 {
         let layout = step.model;
-        // One second: far longer than any period, so that stiffness decides.
-        let step = Step { dt: 1.0, ..*step };
+        let step = Step { dt: LONG, ..*step };
         data.read_positions(layout, &layout.rest_positions);
         data.prepare(&step, Tethers::AsInertia);
         data.constants.previous.copy_from_slice(&data.points);
@@ -44,7 +46,7 @@ impl<S: Real> Memory<S> {
         for number in 0..layout.part_count() {
             self.preconditioner.refresh(layout, &data.constants, &curvature, number);
         }
-        self.gradient_at(&step, data);
+        self.gradient_at(&step, data, |_| true);
         self.start_velocities.copy_from_slice(&self.trial_gradient);
         let mut slowest = vec![0.0f64; layout.part_count()];
         for axis in [vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0)] {
@@ -57,12 +59,17 @@ impl<S: Real> Memory<S> {
         slowest.into_iter().filter(|period| *period > 0.0).fold(f64::INFINITY, f64::min)
     }
 
-    /// The gradient at the trial, of all parts.
-    fn gradient_at(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
+    /// The gradient at the trial, of some parts.
+    fn gradient_at(
+        &mut self,
+        step: &Step<'_, S>,
+        data: &mut StepData<S>,
+        acts: impl Fn(usize) -> bool + Sync,
+    ) {
         let Self { evaluation, base, stage_start, trial_gradient, .. } = self;
         let StepData { constants, points, loads, .. } = data;
         let way = Way { from: base, to: points, moments: moments(step, stage_start) };
-        evaluation.evaluate(constants, step, &way, |_| true, loads, trial_gradient);
+        evaluation.evaluate(constants, step, &way, acts, loads, trial_gradient);
     }
 
     /// Of a part, in the shape in which it gives way to a load along an axis; zero where that tells nothing.
@@ -115,7 +122,7 @@ impl<S: Real> Memory<S> {
         let inertia: f64 = range.map(term).sum();
         let work = self.along(data, number, |m| [&m.trial_z, &m.first_velocities])
             - self.along(data, number, |m| [&m.trial_z, &m.gradient]);
-        let squared = work / inertia - 1.0;
+        let squared = (work / inertia - 1.0) / (LONG * LONG);
         let is_oscillation = squared > 0.0 && squared.is_finite();
         if is_oscillation { 2.0 * std::f64::consts::PI / squared.sqrt() } else { 0.0 }
     }
@@ -132,7 +139,7 @@ impl<S: Real> Memory<S> {
         vectors::dot(&data.constants.workers, &a[range.clone()], &b[range])
     }
 
-    /// `(M + K) d` of a part into `trial_gradient`, by a difference; false of a direction that is none.
+    /// `(M + h^2 K) d` of a part into `trial_gradient`, by a difference; false of a direction that is none.
     fn stiffen(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, number: usize) -> bool {
         let range = step.model.parts[number].vertices.clone();
         let first = self.base[range.start].vec3();
@@ -149,7 +156,7 @@ impl<S: Real> Memory<S> {
         for v in range.clone() {
             data.points[v].set_vec3(self.base[v].vec3() + self.direction[v] * small);
         }
-        self.gradient_at(step, data);
+        self.gradient_at(step, data, |part| part == number);
         data.points[range.clone()].copy_from_slice(&self.base[range.clone()]);
         let inverse = S::ONE / small;
         for v in range {

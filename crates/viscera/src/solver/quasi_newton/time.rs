@@ -14,7 +14,7 @@
 use super::parts::{Phase, Scheme};
 use super::preconditioner::Curvature;
 use super::stage::Solve;
-use super::{Memory, moments};
+use super::{Memory, Pair, moments};
 use crate::scalar::{Real, Vec3};
 use crate::settings::Integrator;
 use crate::solver::step::data::{Step, StepData};
@@ -62,13 +62,16 @@ impl<S: Real> Memory<S> {
         for (pinned, inverse) in self.pinned.iter_mut().zip(&data.constants.inverse_masses) {
             *pinned = *inverse == S::ZERO;
         }
-        self.fit_learned(step, data, state, dt);
+        let room = 2 * self.history * layout.vertex_count();
+        if state.learned.pairs.len() != room || state.learned.parts.len() != layout.part_count() {
+            state.learned.clear(self.history, layout.vertex_count(), layout.part_count());
+        }
         for (number, part) in layout.parts.iter().enumerate() {
             let reach = part.vertices.clone().fold(S::ZERO, |reach, v| {
                 let x = data.points[v];
                 reach.max(x.x.abs()).max(x.y.abs()).max(x.z.abs())
             });
-            let kept = &state.learned.parts[number];
+            let kept = &mut state.learned.parts[number];
             let progress = &mut self.parts[number];
             progress.phase = Phase::Done;
             progress.resolution = RESOLUTION * S::EPSILON * reach.to_f64();
@@ -84,6 +87,11 @@ impl<S: Real> Memory<S> {
         for (v, place) in self.base.iter_mut().enumerate() {
             place.set_vec3(data.points[v].vec3() + data.velocities[v] * ahead);
         }
+        for number in 0..layout.part_count() {
+            if self.parts[number].scheme == Scheme::Sdirk2 || first == Solve::Euler {
+                self.fit_pairs(step, data, &mut state.learned, number, dt);
+            }
+        }
         // Not for a step that is taken again by implicit Euler, where it would take memory: viscosity counts a little too
         // much then, which costs a pass or two.
         self.preconditioner.fit(layout, &data.constants, dt);
@@ -91,24 +99,27 @@ impl<S: Real> Memory<S> {
         state.multiplier_dt = dt;
     }
 
-    /// Makes the pairs those of a solve of `dt` [s]: the change of a gradient is that of inertia and, times the squared
-    /// step, of forces.
-    fn fit_learned(&self, step: &Step<'_, S>, data: &StepData<S>, state: &mut State<S>, dt: f64) {
-        let layout = step.model;
-        let (vertices, before) = (layout.vertex_count(), state.multiplier_dt);
-        let learned = &mut state.learned;
-        let room = 2 * self.history * vertices;
-        if learned.pairs.len() != room || learned.parts.len() != layout.part_count() {
-            learned.clear(self.history, vertices, layout.part_count());
+    /// Makes the pairs of a part those of a solve of `dt` [s]: the change of a gradient is that of inertia and, times the
+    /// squared step, of forces.
+    fn fit_pairs(
+        &self,
+        step: &Step<'_, S>,
+        data: &StepData<S>,
+        learned: &mut Learned<S>,
+        number: usize,
+        dt: f64,
+    ) {
+        let before = std::mem::replace(&mut learned.parts[number].dt, dt);
+        if before == 0.0 || before == dt {
+            return;
         }
-        if before > 0.0 && before != dt {
-            let ratio = S::from_f64((dt / before) * (dt / before));
-            for pair in learned.pairs.chunks_exact_mut(2 * vertices) {
-                let (s, y) = pair.split_at_mut(vertices);
-                for ((s, y), &mass) in s.iter().zip(y).zip(&data.constants.masses) {
-                    let inertia = *s * mass;
-                    *y = inertia + (*y - inertia) * ratio;
-                }
+        let ratio = S::from_f64((dt / before) * (dt / before));
+        let range = &step.model.parts[number].vertices;
+        for slot in 0..self.history {
+            let Pair { s, y, .. } = Pair::places(slot, step.model.vertex_count(), range);
+            for ((s, y), v) in s.zip(y).zip(range.clone()) {
+                let inertia = learned.pairs[s] * data.constants.masses[v];
+                learned.pairs[y] = inertia + (learned.pairs[y] - inertia) * ratio;
             }
         }
     }
@@ -147,6 +158,11 @@ impl<S: Real> Memory<S> {
             // Another step, other curvature. Parts that are done keep their positions, but not what follows from their
             // inertia; `end_solve` gives it back.
             data.prepare(&solve, Tethers::AsInertia);
+            for number in 0..step.model.part_count() {
+                if self.parts[number].scheme == Scheme::Euler {
+                    self.fit_pairs(step, data, learned, number, dt);
+                }
+            }
             self.base.copy_from_slice(&data.constants.previous);
             self.refresh(&solve, data, learned);
         }
@@ -274,10 +290,6 @@ impl<S: Real> Memory<S> {
             let is_trusted = is_calm && kept.calm && progress.scheme.is_checked();
             let goes_on = progress.ahead && progress.accepted && is_trusted;
             (kept.calm, kept.inverted) = (is_calm, progress.inverted > 0);
-            if which == Solve::Euler && step.settings.integrator == Integrator::Sdirk2 {
-                // Its pairs are of a longer step than those of the next.
-                kept.count = 0;
-            }
             progress.phase = Phase::Done;
             let range = part.vertices.clone();
             let (from, to) = if goes_on {

@@ -42,7 +42,7 @@ pub struct Preconditioner<S> {
     free: Vec<bool>,
     /// The inverse of the step [1/s] that viscosity was counted with; zero where nothing is viscous.
     viscous: f64,
-    /// Largest number of nodes of any lattice level: room that all parts share.
+    /// Of each group of the part at hand: room that all parts share.
     rotations: Vec<Mat3<S>>,
 }
 
@@ -60,6 +60,8 @@ struct OfPart<S> {
     dense: Dense,
     /// Residuals, and then corrections, of the lattice levels.
     vectors: Vec<Vec<Vec3<S>>>,
+    /// The residual of free vertices.
+    masked: Vec<Vec3<S>>,
 }
 
 /// Weights of the nodes of a coarser level in each node of a finer one.
@@ -139,12 +141,17 @@ impl<S: Real> Preconditioner<S> {
     /// `z = M r` of a part; both are of its vertices.
     pub fn apply(&mut self, number: usize, r: &[Vec3<S>], z: &mut [Vec3<S>]) {
         let part = &mut self.parts[number];
-        part.apply(r, z);
+        let free = &self.free[part.vertices.clone()];
+        // What was learned before a vertex was pinned may have something there.
+        let mut masked = std::mem::take(&mut part.masked);
+        for ((masked, r), &free) in masked.iter_mut().zip(r).zip(free) {
+            *masked = if free { *r } else { Vec3::ZERO };
+        }
+        part.apply(&masked, z);
+        part.masked = masked;
         // Coarser levels move pinned vertices along.
-        for (z, free) in z.iter_mut().zip(&self.free[part.vertices.clone()]) {
-            if !free {
-                *z = Vec3::ZERO;
-            }
+        for (z, _) in z.iter_mut().zip(free).filter(|(_, free)| !**free) {
+            *z = Vec3::ZERO;
         }
     }
 }
@@ -190,6 +197,7 @@ impl<S: Real> OfPart<S> {
             full: FullSums::default(),
             dense: Dense::new(3 * if has_dense(count(levels)) { count(levels) } else { 0 }),
             vectors: (1..=levels).map(|level| vec![Vec3::ZERO; count(level)]).collect(),
+            masked: vec![Vec3::ZERO; places.len()],
             lattice,
         }
     }
@@ -211,6 +219,7 @@ impl<S: Real> OfPart<S> {
             + vectors.sum::<usize>()
             + inverses.sum::<usize>()
             + size_of_val(&self.groups.entries[..])
+            + size_of_val(&self.masked[..])
             + self.full.bytes()
             + self.dense.bytes()
     }
@@ -270,9 +279,9 @@ impl<S: Real> OfPart<S> {
         for tether in constants.tethers_of(part) {
             let stiffness = squared * tether.stiffness.to_f64();
             let v = (tether.vertex - self.vertices.start) as u32;
-            // The finest level has them in the inertia of its vertices.
+            // The finest level has them in the inertia of its vertices, unless it is the dense one.
             let block = Mat3::IDENTITY * stiffness;
-            self.add_element(&[v], &[[block]], 1, free);
+            self.add_element(&[v], &[[block]], usize::from(!self.inverses.is_empty()), free);
         }
         for_each_kind!(layout, set => self.add_elements(set, part, curvature, squared, free));
         for blocks in &mut self.inverses {
