@@ -182,6 +182,7 @@ impl<S: Real> Run for SimulationRun<S> {
         snapshot.positions.clear();
         snapshot.positions.extend(positions.iter().map(|x| x.cast::<f32>()));
         snapshot.measures.clone_from(&self.measures);
+        snapshot.counts = [self.simulation.substeps(), self.simulation.iterations()];
         snapshot.held.clear();
         for &(id, motion) in &self.held {
             if let Some(hold) = self.simulation.hold(motion) {

@@ -63,6 +63,8 @@ pub struct RunSnapshot {
     pub held: Vec<HeldPatch>,
     /// Wall time of the last frame [s].
     pub wall: f64,
+    /// Substeps per frame and iterations of each in force: what the method has chosen where it chooses.
+    pub counts: [u32; 2],
     /// What is measured now and then.
     pub measures: Measures,
 }

@@ -114,9 +114,11 @@ pub fn show_status(ui: &mut Ui, clock: &Clock, setup: &Setup, snapshot: &Snapsho
         };
         let text = format!("{name} {:.1} ms per frame of {:.1} ms", 1e3 * run.wall, 1e3 * dt);
         ui.label(text.trim()).on_hover_text(format!(
-            "Substeps take {:.2} ms each. Energy: elastic {:.3e} J, kinetic {:.3e} J. Rejected substeps so \
-             far: {}.",
-            1e3 * run.wall / f64::from(setup.scene.solver.substeps()),
+            "Substeps: {} of {} iterations, {:.2} ms each. Energy: elastic {:.3e} J, kinetic {:.3e} J. Rejected \
+             substeps so far: {}.",
+            run.counts[0],
+            run.counts[1],
+            1e3 * run.wall / f64::from(run.counts[0].max(1)),
             run.measures.energy.elastic,
             run.measures.energy.kinetic,
             run.measures.rejected,
