@@ -128,7 +128,7 @@ impl<'a, S: Real> Handled<'a, S> {
     fn frame(&mut self, inputs: &Inputs<S>, what: &str) {
         let before = self.state.clone();
         self.solver.step(&self.model, &mut self.state, inputs, FRAME).expect("a legal step");
-        assert!(self.state.is_finite(), "{what}: no numbers");
+        assert!(self.state.is_finite(), "{what}: not finite");
         let [mut before, mut after] = [before, self.state.clone()];
         for pin in &inputs.pins {
             before.positions[pin.vertex as usize] = pin.target;
@@ -324,7 +324,7 @@ fn treat<S: Real>(hard: Hard, law: viscera::material::MaterialModel, integrator:
         };
         let what = format!("{hard:?}, {law:?}, {integrator:?}, {}, step {step}", S::NAME);
         result.unwrap_or_else(|error| panic!("{what}: {error}"));
-        assert!(state.is_finite(), "{what}: no numbers");
+        assert!(state.is_finite(), "{what}: not finite");
         let reach = state.positions.iter().map(|x| x.length().to_f64()).fold(0.0, f64::max);
         // The farthest that flight, fall or a force leads.
         let far = match hard {

@@ -126,7 +126,7 @@ struct Observer<'w> {
     watch: &'w mut Watch<'w>,
     /// Memory for what it is shown: positions [m], the user's order.
     places: Vec<Vec3<f64>>,
-    /// The number of passes that it is told next.
+    /// The number of passes that the callback gets next.
     next: u32,
 }
 

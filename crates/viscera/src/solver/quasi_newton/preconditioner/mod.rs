@@ -355,41 +355,27 @@ impl<S: Real> OfPart<S> {
         free: &[bool],
     ) {
         for level in first..self.inverses.len() {
-            let on = Self::on(&self.lattice, level);
-            for (a, row) in vertices.iter().zip(blocks) {
-                for (b, block) in vertices.iter().zip(row) {
-                    if !(free[*a as usize] && free[*b as usize]) {
-                        continue;
+            let inverses = &mut self.inverses[level];
+            Self::on(&self.lattice, level).each_pair(
+                vertices,
+                free,
+                |[a, b], [node, other], weight| {
+                    if node == other {
+                        add_six(&mut inverses[node as usize], &blocks[a][b], weight);
                     }
-                    on.each(*a, |node, wa| {
-                        on.each(*b, |other, wb| {
-                            if node == other {
-                                add_six(&mut self.inverses[level][node as usize], block, wa * wb);
-                            }
-                        });
-                    });
-                }
-            }
+                },
+            );
         }
         let coarsest = self.lattice.levels.len();
         if self.dense.size() == 0 || coarsest < first {
             return;
         }
-        let on = Self::on(&self.lattice, coarsest);
-        for (a, row) in vertices.iter().zip(blocks) {
-            for (b, block) in vertices.iter().zip(row) {
-                if !(free[*a as usize] && free[*b as usize]) {
-                    continue;
-                }
-                on.each(*a, |node, wa| {
-                    on.each(*b, |other, wb| {
-                        if other <= node {
-                            add_block(&mut self.dense, [node, other], &(*block * (wa * wb)));
-                        }
-                    });
-                });
+        let dense = &mut self.dense;
+        Self::on(&self.lattice, coarsest).each_pair(vertices, free, |[a, b], nodes, weight| {
+            if nodes[1] <= nodes[0] {
+                add_block(dense, nodes, &(blocks[a][b] * weight));
             }
-        }
+        });
     }
 
     fn apply(&mut self, r: &[Vec3<S>], z: &mut [Vec3<S>]) {

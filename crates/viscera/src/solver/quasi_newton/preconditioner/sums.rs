@@ -205,6 +205,23 @@ impl On<'_> {
         }
     }
 
+    /// Calls with all pairs of an element's corners that are free, the nodes of each, and the product of their weights.
+    pub fn each_pair<const N: usize>(
+        self,
+        vertices: &[u32; N],
+        free: &[bool],
+        mut with: impl FnMut([usize; 2], [u32; 2], f64),
+    ) {
+        let is_free = |corner: &usize| free[vertices[*corner] as usize];
+        for a in (0..N).filter(is_free) {
+            for b in (0..N).filter(is_free) {
+                self.each(vertices[a], |node, wa| {
+                    self.each(vertices[b], |other, wb| with([a, b], [node, other], wa * wb));
+                });
+            }
+        }
+    }
+
     fn node_count(self, vertices: usize) -> usize {
         match self {
             Self::Vertices => vertices,
