@@ -110,7 +110,7 @@ kernels! {
         [Unknowns Iterate Residuals Mapped PartialSums Control Table];
     ANDERSON_JOIN = AndersonPush "anderson_push" 128
         [Copies Unknowns Iterate Residuals Mapped PartialSums Control Table];
-    ANDERSON_WEIGHTS = Acceleration "anderson_weights" 128 [PartialSums Control Table];
+    ANDERSON_WEIGHTS = Acceleration "anderson_weights" 256 [PartialSums Control Table];
     ANDERSON_MIX = Acceleration "anderson_mix" 256 [Unknowns Iterate Mapped Control Table];
     CHEBYSHEV_CHANGE = Acceleration "chebyshev_change" 128 [Unknowns Iterate PartialSums Table];
     CHEBYSHEV_WEIGHT = Acceleration "chebyshev_weight" 128 [PartialSums Control Table];

@@ -31,11 +31,19 @@ fn span_of(workgroup: vec3u, groups: vec3u) -> Span {
     return Span(part, number - first, select(0u, end - first, number < end), table[row + PART_LENGTH]);
 }
 
-// Where number `j` of a part's vector stands in that of all.
-fn number_at(part: u32, j: u32) -> u32 {
+// A run of a part's vector: its numbers `begin..end` stand in that of all from `at` on.
+struct Run {
+    begin: u32,
+    end: u32,
+    at: u32,
+}
+
+// The run that holds number `j` of a part.
+fn run_with(part: u32, j: u32) -> Run {
     let row = part_row(part);
+    let last = table[row + PART_RUNS_END] - 1u;
     var low = table[row + PART_RUNS];
-    var high = table[row + PART_RUNS_END] - 1u;
+    var high = last;
     while low < high {
         let middle = (low + high + 1u) / 2u;
         if table[table[RUNS_AT] + 2u * middle] <= j {
@@ -45,5 +53,18 @@ fn number_at(part: u32, j: u32) -> u32 {
         }
     }
     let run = table[RUNS_AT] + 2u * low;
-    return select(table[run + 1u] + (j - table[run]), NOWHERE, table[run + 1u] == NOWHERE);
+    var end = table[row + PART_LENGTH];
+    if low < last {
+        end = table[run + 2u];
+    }
+    return Run(table[run], end, table[run + 1u]);
+}
+
+// Where number `j` of a part's vector stands in that of all. A thread's numbers ascend and runs are long, so that it
+// searches rarely; it begins with `Run()`.
+fn number_at(run: ptr<function, Run>, part: u32, j: u32) -> u32 {
+    if j >= (*run).end {
+        *run = run_with(part, j);
+    }
+    return select((*run).at + (j - (*run).begin), NOWHERE, (*run).at == NOWHERE);
 }

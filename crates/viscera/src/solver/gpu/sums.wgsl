@@ -4,7 +4,11 @@
 // Numbers side by side whose sums are added up at the end. Part of the result's bits.
 const THREADS: u32 = 128u;
 
-var<workgroup> shared_sums: array<f32, 2688>;
+// Sums of different products lie one number farther apart than they are long: threads that read the same place of
+// different sums meet different banks of the memory.
+const SUM_STRIDE: u32 = THREADS + 1u;
+
+var<workgroup> shared_sums: array<f32, 2709>;
 
 // The last of a vertex's four numbers is no unknown.
 fn counts(i: u32) -> bool {

@@ -39,8 +39,9 @@ fn take(
         taken = decide(span.part, span.group == 0u);
     }
     let now = workgroupUniformLoad(&taken);
+    var run = Run();
     for (var j = span.group * THREADS + local; j < span.length; j += span.groups * THREADS) {
-        let i = number_at(span.part, j);
+        let i = number_at(&run, span.part, j);
         if i != NOWHERE {
             take_number(i, now);
         }

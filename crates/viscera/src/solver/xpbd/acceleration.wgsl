@@ -20,9 +20,20 @@ fn remember_iterate(
     }
 }
 
+// Threads that add up one product, and a workgroup's: a product is a column of what they read.
+const ADDERS: u32 = 12u;
+
+// The products of this sweep, those of all differences with each other, and what solves them: here and not in a
+// thread's own memory, which lies as far away as storage where it is indexed at run time.
+var<workgroup> products: array<f32, PRODUCTS>;
+var<workgroup> gram: array<f32, 100>;
+var<workgroup> factor: array<f32, 100>;
+var<workgroup> scale: array<f32, 10>;
+var<workgroup> right: array<f32, 10>;
+
 // The small least-squares problem, a workgroup for each of `job.count` parts. `job.mode`: whether a residual
 // that has grown drops the history.
-@compute @workgroup_size(128)
+@compute @workgroup_size(256)
 fn anderson_weights(
     @builtin(local_invocation_index) local: u32,
     @builtin(workgroup_id) workgroup: vec3u,
@@ -34,28 +45,30 @@ fn anderson_weights(
     }
     let first = first_group(part);
     let end = table[part_row(part) + PART_GROUPS_END];
-    // Six threads for each sum.
-    let product = local / 6u;
+    let adder = local / PRODUCTS;
     var sum = 0.0;
-    if product < PRODUCTS {
-        for (var piece = first + local % 6u; piece < end; piece += 6u) {
-            sum += partial_sums[PRODUCTS * piece + product];
+    if adder < ADDERS {
+        for (var piece = first + adder; piece < end; piece += ADDERS) {
+            sum += partial_sums[PRODUCTS * piece + local % PRODUCTS];
         }
     }
     shared_sums[local] = sum;
+    if local < 100u {
+        gram[local] = control.parts[part].gram[local];
+    }
+    workgroupBarrier();
+    if local < PRODUCTS {
+        var total = 0.0;
+        for (var t = 0u; t < ADDERS; t++) {
+            total += shared_sums[PRODUCTS * t + local];
+        }
+        products[local] = total;
+    }
     workgroupBarrier();
     if local != 0u {
         return;
     }
-    var products: array<f32, 21>;
     // One thread from here on: at most ten unknowns are fewer operations than barriers between threads would cost.
-    for (var k = 0u; k < PRODUCTS; k++) {
-        var total = 0.0;
-        for (var t = 0u; t < 6u; t++) {
-            total += shared_sums[6u * k + t];
-        }
-        products[k] = total;
-    }
     let window = job.set_first;
     // The same `n` as `anderson_push` has found: it wrote the newest difference to the slot `newest` before this. The
     // ring is filled from slot 0, so slots in use are 0..n whatever their age; weights do not care for order.
@@ -64,73 +77,72 @@ fn anderson_weights(
     var n = select(0u, min(control.parts[part].differences + 1u, window), has_difference);
     // Only products with the newest difference are new: its row and column. Those of old differences stay.
     for (var j = 0u; j < n; j++) {
-        control.parts[part].gram[LARGEST_WINDOW * newest + j] = products[11u + j];
-        control.parts[part].gram[LARGEST_WINDOW * j + newest] = products[11u + j];
-    }
-    control.parts[part].sweeps += 1u;
-    control.parts[part].differences = n;
-    if has_difference {
-        control.parts[part].next = (newest + 1u) % window;
+        let product = products[11u + j];
+        gram[LARGEST_WINDOW * newest + j] = product;
+        gram[LARGEST_WINDOW * j + newest] = product;
+        control.parts[part].gram[LARGEST_WINDOW * newest + j] = product;
+        control.parts[part].gram[LARGEST_WINDOW * j + newest] = product;
     }
     // As on the CPU: this sweep is taken as it is. `sweeps` 1 and not 0, because its residual and mapped iterate are
     // kept (behind the window), and the next sweep's difference is to them.
     if job.mode != 0u && products[0] > control.parts[part].last_norm {
-        control.parts[part].differences = 0u;
-        control.parts[part].next = 0u;
         control.parts[part].sweeps = 1u;
+        control.parts[part].next = 0u;
         n = 0u;
+    } else {
+        control.parts[part].sweeps += 1u;
+        control.parts[part].next = select(newest, (newest + 1u) % window, has_difference);
     }
+    control.parts[part].differences = n;
     control.parts[part].last_norm = products[0];
-    least_squares(part, products, n);
+    least_squares(n);
+    for (var j = 0u; j < LARGEST_WINDOW; j++) {
+        control.parts[part].shares[j] = select(0.0, right[j] * scale[j], j < n);
+    }
 }
 
-// Solves gram g = right with columns scaled to unit length and a small multiple of the identity added, by
-// Cholesky. Columns without length get no share.
-fn least_squares(part: u32, products: array<f32, 21>, n: u32) {
-    var all = products;
-    var scale: array<f32, 10>;
-    var a: array<f32, 100>;
-    var b: array<f32, 10>;
+// Solves gram g = right, the products with the residual, with columns scaled to unit length and a small multiple of
+// the identity added, by Cholesky; leaves g / scale in `right`. Columns without length get no share.
+fn least_squares(n: u32) {
     for (var j = 0u; j < n; j++) {
         // Rows are ten long, so 11 j is on the diagonal.
-        let length = control.parts[part].gram[11u * j];
+        let length = gram[11u * j];
         scale[j] = select(0.0, inverseSqrt(length), length > 0.0);
-        b[j] = all[1u + j] * scale[j];
+        right[j] = products[1u + j] * scale[j];
     }
     for (var j = 0u; j < n; j++) {
         for (var k = 0u; k <= j; k++) {
-            a[10u * j + k] = control.parts[part].gram[10u * j + k] * (scale[j] * scale[k]);
+            factor[10u * j + k] = gram[10u * j + k] * (scale[j] * scale[k]);
         }
-        a[11u * j] += select(1.0, REGULARISATION, scale[j] > 0.0);
+        factor[11u * j] += select(1.0, REGULARISATION, scale[j] > 0.0);
     }
     for (var j = 0u; j < n; j++) {
         for (var k = 0u; k <= j; k++) {
-            var value = a[10u * j + k];
+            var value = factor[10u * j + k];
             for (var i = 0u; i < k; i++) {
-                value -= a[10u * j + i] * a[10u * k + i];
+                value -= factor[10u * j + i] * factor[10u * k + i];
             }
             if k < j {
-                a[10u * j + k] = value / a[11u * k];
+                factor[10u * j + k] = value / factor[11u * k];
             } else {
-                a[11u * j] = sqrt(max(value, REGULARISATION));
+                factor[11u * j] = sqrt(max(value, REGULARISATION));
             }
         }
     }
     for (var j = 0u; j < n; j++) {
+        var value = right[j];
         for (var k = 0u; k < j; k++) {
-            b[j] -= a[10u * j + k] * b[k];
+            value -= factor[10u * j + k] * right[k];
         }
-        b[j] /= a[11u * j];
+        right[j] = value / factor[11u * j];
     }
     for (var step = 0u; step < n; step++) {
         let j = n - 1u - step;
+        var value = right[j];
         for (var k = j + 1u; k < n; k++) {
-            b[j] -= a[10u * k + j] * b[k];
+            value -= factor[10u * k + j] * right[k];
         }
-        b[j] /= a[11u * j];
-    }
-    for (var j = 0u; j < LARGEST_WINDOW; j++) {
-        control.parts[part].shares[j] = select(0.0, b[j] * scale[j], j < n);
+        right[j] = value / factor[11u * j];
     }
 }
 
@@ -146,8 +158,9 @@ fn anderson_mix(
     if span.groups == 0u {
         return;
     }
+    var run = Run();
     for (var j = span.group * 256u + local; j < span.length; j += span.groups * 256u) {
-        let i = number_at(span.part, j);
+        let i = number_at(&run, span.part, j);
         if counts(i) {
             mix_number(span.part, i);
         }
@@ -180,8 +193,9 @@ fn chebyshev_change(
         return;
     }
     var sum = 0.0;
+    var run = Run();
     for (var j = span.group * THREADS + local; j < span.length; j += span.groups * THREADS) {
-        let i = number_at(span.part, j);
+        let i = number_at(&run, span.part, j);
         if counts(i) {
             let change = unknowns[i] - iterate[i];
             sum += weight_of(i) * change * change;
@@ -255,8 +269,9 @@ fn chebyshev_mix(
         return;
     }
     let omega = control.parts[span.part].omega;
+    var run = Run();
     for (var j = span.group * 256u + local; j < span.length; j += span.groups * 256u) {
-        let i = number_at(span.part, j);
+        let i = number_at(&run, span.part, j);
         if counts(i) {
             extrapolate_number(i, omega);
         }

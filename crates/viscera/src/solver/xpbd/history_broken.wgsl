@@ -9,8 +9,9 @@ fn find_broken(
     if span.groups == 0u {
         return;
     }
+    var run = Run();
     for (var j = span.group * 256u + local; j < span.length; j += span.groups * 256u) {
-        let i = number_at(span.part, j);
+        let i = number_at(&run, span.part, j);
         if i != NOWHERE && i >= job.first && !is_finite_number(unknowns[i]) {
             atomicOr(&control.parts[span.part].is_broken, 1u);
         }

@@ -35,6 +35,9 @@ pub fn largest<S: Real>(a: &[Vec3<S>], oracle: &[Vec3<f64>]) -> f64 {
     pairs.map(|(a, b)| (a.cast::<f64>() - *b).length()).fold(0.0, f64::max)
 }
 
+/// Of the viscous tissue [s].
+pub const RETARDATION: f64 = 0.02;
+
 /// Two bars, one above the other, joined by springs; the upper one viscous, with vertices that are attached
 /// once and twice: everything a model can have.
 pub fn everything<S: Real>() -> Model<S> {
@@ -42,7 +45,7 @@ pub fn everything<S: Real>() -> Model<S> {
     let up: Vec<_> = mesh.vertices().iter().map(|x| *x + vec3(0.0, 0.0, 0.05)).collect();
     let (above, _) =
         TetMesh::new(up, mesh.tets().to_vec(), mesh.regions().to_vec()).expect("a mesh");
-    let viscous = material(SNH, 1e4, 0.4).with_viscosity(0.02).expect("legal");
+    let viscous = material(SNH, 1e4, 0.4).with_viscosity(RETARDATION).expect("legal");
     let mut builder = ModelBuilder::new();
     builder.add_body(&mesh, &material(STVK, 2e4, 0.3)).expect("a body");
     builder.add_body(&above, &viscous).expect("a body");
