@@ -32,6 +32,10 @@ pub trait Law: Copy + Send + Sync {
     /// Second derivative `D : d2W/dF2 : D` [Pa] of the energy density along `d`: exact, and a positive semidefinite
     /// one that drops what may be negative.
     fn curvature_along<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lambda: S, mu: S) -> [S; 2];
+
+    /// `A` of the largest part of the second derivative by a corner with the shape gradient `g`:
+    /// `lambda (A g) (A g)^T`. A rotation where nothing is stretched.
+    fn gradient_map<S: Scalar>(f: &Mat3<S>) -> Mat3<S>;
 }
 
 /// How many laws there are.
@@ -125,6 +129,12 @@ impl Law for SaintVenantKirchhoff {
     fn curvature_along<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lambda: S, mu: S) -> [S; 2] {
         green_strain::curvature_along(f, d, &green_strain::strain(f), lambda, mu)
     }
+
+    /// Of the derivative of `tr E`: `F`.
+    #[inline(always)]
+    fn gradient_map<S: Scalar>(f: &Mat3<S>) -> Mat3<S> {
+        *f
+    }
 }
 
 impl Law for StableNeoHookean {
@@ -156,6 +166,12 @@ impl Law for StableNeoHookean {
     #[inline(always)]
     fn curvature_along<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lambda: S, mu: S) -> [S; 2] {
         neo_hookean::curvature_along(f, d, lambda, mu)
+    }
+
+    /// Of the derivative of `det F`: its cofactors.
+    #[inline(always)]
+    fn gradient_map<S: Scalar>(f: &Mat3<S>) -> Mat3<S> {
+        f.cofactor()
     }
 }
 

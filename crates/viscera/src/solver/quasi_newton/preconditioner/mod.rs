@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! M r = D_0^-1 r + P_1 (D_1^-1 r_1 + P_2 (D_2^-1 r_2 + ... P_L H_L^-1 r_L)),   r_l = P_l^T r_(l-1)
-//! D_l: 3 x 3 diagonal blocks of P^T (m' + he^2 K) P,   H_L: all of it,   K: corotated tetrahedra, other elements
+//! D_l: 3 x 3 diagonal blocks of P^T (m' + he^2 K) P,   H_L: all of it,   K: turned and stretched tetrahedra, other elements
 //! ```
 //!
 //! Additive multilevel: Bramble, Pasciak, Xu, "Parallel multilevel preconditioners", Math. Comp. 55, 1990. Level 0 is
@@ -19,8 +19,10 @@ mod sums;
 use std::ops::Range;
 
 use crate::elements::kinds::{Energy, Kind};
+use crate::elements::law::{Law, with_law};
 use crate::layout::lattice::Lattice;
 use crate::layout::{ElementSet, Layout, Moments, Part};
+use crate::material::MaterialModel;
 use crate::model::for_each_kind;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Mat3, Real, Vec3};
@@ -28,7 +30,8 @@ use crate::solver::step::data::StepConstants;
 use dense::Dense;
 use rotation::rotation_of;
 use sums::{
-    DiagonalSums, FullSums, Grouped, Groups, On, Six, inverse, rotated, tets_of_part, times,
+    DiagonalSums, FullBlock, FullSums, Grouped, Groups, On, Six, inverse, mapped, tets_of_part,
+    times,
 };
 
 /// Nodes of the coarsest level at most, where the levels can be made so: a dense system of three times as many.
@@ -43,7 +46,28 @@ pub struct Preconditioner<S> {
     /// The inverse of the step [1/s] that viscosity was counted with; zero where nothing is viscous.
     viscous: f64,
     /// Of each group of the part at hand: room that all parts share.
-    rotations: Vec<Mat3<S>>,
+    turns: Vec<Turn<S>>,
+}
+
+/// How a group has turned and stretched.
+#[derive(Clone, Copy, Debug)]
+struct Turn<S> {
+    /// `R`.
+    rotation: Mat3<S>,
+    /// `A`.
+    map: Mat3<S>,
+}
+
+impl<S: Real> Turn<S> {
+    const NONE: Self = Self { rotation: Mat3::IDENTITY, map: Mat3::IDENTITY };
+
+    fn new(law: MaterialModel, f: &Mat3<f64>) -> Self {
+        let rotation = rotation_of(f).cast();
+        let map: Mat3<S> = with_law!(law, W => W::gradient_map(f)).cast();
+        // Also where a number is none.
+        let is_finite = map.norm_squared().is_finite();
+        Self { rotation, map: if is_finite { map } else { rotation } }
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -88,11 +112,11 @@ impl<S: Real> Preconditioner<S> {
             parts: layout.parts.iter().map(|part| OfPart::new(layout, part)).collect(),
             free: Vec::new(),
             viscous: 0.0,
-            rotations: Vec::new(),
+            turns: Vec::new(),
         };
         all.rebuild(layout, vec![true; layout.vertex_count()]);
         let most = all.parts.iter().map(|part| part.groups.len()).max().unwrap_or(0);
-        all.rotations = vec![Mat3::IDENTITY; most];
+        all.turns = vec![Turn::NONE; most];
         all
     }
 
@@ -100,7 +124,7 @@ impl<S: Real> Preconditioner<S> {
     pub fn bytes(&self) -> usize {
         self.parts.iter().map(OfPart::bytes).sum::<usize>()
             + size_of_val(&self.free[..])
-            + size_of_val(&self.rotations[..])
+            + size_of_val(&self.turns[..])
     }
 
     /// Takes the sums of the rest shape anew where other vertices are free, or the step is another one and tissue
@@ -129,8 +153,8 @@ impl<S: Real> Preconditioner<S> {
         curvature: &Curvature<'_, S>,
         number: usize,
     ) {
-        let Self { parts, rotations, free, .. } = self;
-        parts[number].refresh(layout, constants, curvature, &layout.parts[number], rotations, free);
+        let Self { parts, turns, free, .. } = self;
+        parts[number].refresh(layout, constants, curvature, &layout.parts[number], turns, free);
     }
 
     /// The vertices of a part.
@@ -259,22 +283,22 @@ impl<S: Real> OfPart<S> {
         constants: &StepConstants<S>,
         curvature: &Curvature<'_, S>,
         part: &Part,
-        rotations: &mut [Mat3<S>],
+        turns: &mut [Turn<S>],
         free: &[bool],
     ) {
         let x = &curvature.x[self.vertices.clone()];
         let squared = curvature.dt * curvature.dt;
-        for (group, rotation) in rotations[..self.groups.len()].iter_mut().enumerate() {
+        for (group, turn) in turns[..self.groups.len()].iter_mut().enumerate() {
             let range =
                 self.groups.offsets[group] as usize..self.groups.offsets[group + 1] as usize;
             let mut f = Mat3::<f64>::from_columns(Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
             for &(v, b) in &self.groups.entries[range] {
                 f = f + Mat3::outer(x[v as usize].vec3().cast::<f64>(), b.cast());
             }
-            *rotation = rotation_of(&f).cast();
+            *turn = Turn::new(self.groups.laws[group], &f);
         }
-        self.sum_blocks(constants, squared, rotations);
-        self.sum_full(squared, rotations);
+        self.sum_blocks(constants, squared, turns);
+        self.sum_full(squared, turns);
         let free = &free[self.vertices.clone()];
         for tether in constants.tethers_of(part) {
             let stiffness = squared * tether.stiffness.to_f64();
@@ -291,7 +315,7 @@ impl<S: Real> OfPart<S> {
     }
 
     /// The blocks of all levels but a dense one, of inertia and tetrahedra.
-    fn sum_blocks(&mut self, constants: &StepConstants<S>, squared: f64, rotations: &[Mat3<S>]) {
+    fn sum_blocks(&mut self, constants: &StepConstants<S>, squared: f64, turns: &[Turn<S>]) {
         let inertias = &constants.inertias[self.vertices.clone()];
         let squared = S::from_f64(squared);
         for (sums, blocks) in self.levels.iter().zip(&mut self.inverses) {
@@ -301,8 +325,8 @@ impl<S: Real> OfPart<S> {
                 let shares = sums.offsets[node] as usize..sums.offsets[node + 1] as usize;
                 for share in &sums.shares[shares] {
                     diagonal += share.trace;
-                    let turned = rotated(&rotations[share.group as usize], &share.b);
-                    sum.iter_mut().zip(turned).for_each(|(sum, entry)| *sum += entry);
+                    let block = mapped(&turns[share.group as usize].map, &share.b);
+                    sum.iter_mut().zip(block).for_each(|(sum, entry)| *sum += entry);
                 }
                 let diagonal = masses[node] + squared * diagonal;
                 *block = sum.map(|entry| entry * squared);
@@ -312,7 +336,7 @@ impl<S: Real> OfPart<S> {
     }
 
     /// The matrix of a dense coarsest level, of inertia and tetrahedra.
-    fn sum_full(&mut self, squared: f64, rotations: &[Mat3<S>]) {
+    fn sum_full(&mut self, squared: f64, turns: &[Turn<S>]) {
         if self.dense.size() == 0 {
             return;
         }
@@ -320,10 +344,12 @@ impl<S: Real> OfPart<S> {
         for &(nodes, mass) in &self.full.masses {
             add_block(&mut self.dense, nodes, &(Mat3::IDENTITY * mass));
         }
-        for (group, rotation) in rotations[..self.groups.len()].iter().enumerate() {
-            let r = rotation.cast::<f64>();
-            for &(nodes, block) in &self.full.blocks[self.full.of_group(group)] {
-                add_block(&mut self.dense, nodes, &(r * block * r.transpose() * squared));
+        for (group, turn) in turns[..self.groups.len()].iter().enumerate() {
+            let (r, a) = (turn.rotation.cast::<f64>(), turn.map.cast::<f64>());
+            for &FullBlock { nodes, shear, volume } in &self.full.blocks[self.full.of_group(group)]
+            {
+                let block = r * shear * r.transpose() + a * volume * a.transpose();
+                add_block(&mut self.dense, nodes, &(block * squared));
             }
         }
     }

@@ -1,20 +1,24 @@
 //! What a preconditioner knows of a connected part before it moves: sums over groups of tetrahedra in the rest shape.
 //!
 //! ```text
-//! q = R g,   K_ab = V (mu (q_a.q_b) I + mu q_b q_a^T + lambda q_a q_b^T)       corotated tetrahedron
-//! K_cc = sum_groups (tr A) I + R B R^T,   A = sum V mu g_c g_c^T,  B = sum V (mu + lambda) g_c g_c^T
-//! K_cd = sum_groups R (sum V (mu (g_c.g_d) I + mu g_d g_c^T + lambda g_c g_d^T)) R^T
+//! K_ab = V (mu (g_a.g_b) I + mu (R g_b)(R g_a)^T + lambda (A g_a)(A g_b)^T)               tetrahedron
+//! K_cc = sum_groups t I + A B A^T,   t = sum V mu |g_c|^2,  B = sum V (mu + lambda) g_c g_c^T
+//! K_cd = sum_groups R (sum V (mu (g_c.g_d) I + mu g_d g_c^T)) R^T + A (sum V lambda g_c g_d^T) A^T
 //! ```
 //!
-//! `g_c = sum_a w_ac g_a` is the gradient of node `c`'s shape function, in the rest shape. A *group* is a connected set
-//! of tetrahedra in one cell of the finest lattice, which turn together: the rotation `R` is all that changes, so that
-//! the blocks of every level, vertices among them, are found without a pass over the tetrahedra.
+//! `g_c = sum_a w_ac g_a` is the gradient of node `c`'s shape function, in the rest shape; `R` the rotation, `A` the
+//! law's gradient map ([`crate::elements::law::Law::gradient_map`]): cofactors of `F`, by which the neo-Hookean volume
+//! term grows where tissue is stretched. A *group* is a connected set of tetrahedra of one law in one cell of the finest
+//! lattice, which turn and stretch together: `R` and `A` are all that changes, so that the blocks of every level,
+//! vertices among them, are found without a pass over the tetrahedra. Diagonal blocks of neo-Hookean tetrahedra are
+//! exact but for that.
 
 use std::ops::Range;
 
 use crate::elements::shape_gradients;
 use crate::layout::Layout;
 use crate::layout::lattice::Lattice;
+use crate::material::MaterialModel;
 use crate::scalar::{Mat3, Real, Vec3, vec3};
 
 /// A symmetric matrix: xx, yy, zz, yz, xz, xy.
@@ -22,6 +26,7 @@ pub type Six<S> = [S; 6];
 
 /// A tetrahedron, its vertices counted from the first of the part.
 pub struct LocalTet {
+    pub law: MaterialModel,
     pub vertices: [u32; 4],
     /// Shape gradients [1/m].
     pub gradients: [Vec3<f64>; 4],
@@ -39,11 +44,13 @@ pub fn tets_of_part<S: Real>(layout: &Layout<S>, number: usize, viscous: f64) ->
     let mut tets = Vec::new();
     for (law, set) in layout.tet_sets.iter().enumerate() {
         for block in part.blocks(law).flatten() {
+            let law = set.model;
             let constants = &set.blocks[block];
             for lane in 0..usize::from(set.filled[block]) {
                 let material = &layout.materials[constants.material[lane] as usize];
                 let stiffer = 1.0 + viscous * material.viscosity.to_f64();
                 tets.push(LocalTet {
+                    law,
                     vertices: constants.vertices.map(|corner| corner[lane] - first),
                     gradients: shape_gradients(&constants.shape(lane).cast()),
                     volume: constants.rest_volume[lane].to_f64(),
@@ -56,11 +63,12 @@ pub fn tets_of_part<S: Real>(layout: &Layout<S>, number: usize, viscous: f64) ->
     tets
 }
 
-/// Groups of tetrahedra, and their deformation gradients as sums over vertices: `sum_j x_j b_j^T`.
+/// Groups of tetrahedra, and their mean deformation gradients as sums over vertices: `sum_j x_j b_j^T`.
 #[derive(Clone, Debug, Default)]
 pub struct Groups<S> {
+    pub laws: Vec<MaterialModel>,
     pub offsets: Vec<u32>,
-    /// A vertex of the part, and `b` [m^2].
+    /// A vertex of the part, and `b` [1/m].
     pub entries: Vec<(u32, Vec3<S>)>,
 }
 
@@ -71,7 +79,7 @@ pub struct Grouped {
 }
 
 impl Grouped {
-    /// The tetrahedra of one cell of the finest lattice that hang together by vertices.
+    /// The tetrahedra of one law in one cell of the finest lattice that hang together by vertices.
     pub fn new(tets: &[LocalTet], places: &[Vec3<f64>], lattice: &Lattice) -> Self {
         let cell = |tet: &LocalTet| {
             let sum =
@@ -79,7 +87,7 @@ impl Grouped {
             let at = (sum * 0.25 - lattice.origin) * (1.0 / lattice.spacing);
             // A part without levels is one cell.
             let cell = |x: f64| if x.is_finite() { x.floor() as i64 } else { 0 };
-            [at.z, at.y, at.x].map(cell)
+            (tet.law as usize, [at.z, at.y, at.x].map(cell))
         };
         let mut order: Vec<(_, u32)> = tets.iter().map(cell).zip(0..).collect();
         order.sort_unstable();
@@ -129,17 +137,21 @@ fn root(parent: &mut [u32], mut i: u32) -> u32 {
 
 impl<S: Real> Groups<S> {
     pub fn new(tets: &[LocalTet], grouped: &Grouped, vertex_count: usize) -> Self {
-        let mut groups = Self { offsets: vec![0], entries: Vec::new() };
+        let mut groups = Self { laws: Vec::new(), offsets: vec![0], entries: Vec::new() };
         let mut sums = Gathered::<Vec3<f64>>::new(vertex_count);
         for group in 0..grouped.len() {
             sums.begin();
+            let mut volume = 0.0;
             for &tet in grouped.tets(group) {
                 let tet = &tets[tet as usize];
                 for (v, g) in tet.vertices.into_iter().zip(tet.gradients) {
                     *sums.of(v) += g * tet.volume;
                 }
+                volume += tet.volume;
             }
-            groups.entries.extend(sums.list.iter().map(|&(v, b)| (v, b.cast::<S>())));
+            let mean = |&(v, b): &(u32, Vec3<f64>)| (v, (b * (1.0 / volume)).cast::<S>());
+            groups.entries.extend(sums.list.iter().map(mean));
+            groups.laws.push(tets[grouped.tets(group)[0] as usize].law);
             groups.offsets.push(groups.entries.len() as u32);
         }
         groups
@@ -250,7 +262,7 @@ impl On<'_> {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Share<S> {
     pub group: u32,
-    /// `tr A` [N/m].
+    /// `t` [N/m].
     pub trace: S,
     /// `B` [N/m].
     pub b: Six<S>,
@@ -323,13 +335,22 @@ impl<S: Real> DiagonalSums<S> {
     }
 }
 
+/// Of a pair of nodes, the first not below the second, in the rest shape.
+#[derive(Clone, Copy, Debug)]
+pub struct FullBlock {
+    pub nodes: [u32; 2],
+    /// What turns with `R`, and what goes with `A` [N/m].
+    pub shear: Mat3<f64>,
+    pub volume: Mat3<f64>,
+}
+
 /// The whole matrix of the coarsest level.
 #[derive(Clone, Debug, Default)]
 pub struct FullSums {
     /// Pairs of nodes with `sum_v m_v w_vc w_vd` [kg], the first not below the second.
     pub masses: Vec<([u32; 2], f64)>,
-    /// Blocks [N/m] in the rest shape of the pairs of nodes of each group, the first not below the second.
-    pub blocks: Vec<([u32; 2], Mat3<f64>)>,
+    /// Of each group.
+    pub blocks: Vec<FullBlock>,
     /// Blocks of group `g` are `offsets[g] .. offsets[g + 1]`.
     pub offsets: Vec<usize>,
 }
@@ -360,7 +381,7 @@ impl FullSums {
         }
         let kept = (0..).zip(mass).filter(|&(_, mass)| mass != 0.0);
         full.masses = kept.map(|(pair, mass)| (nodes(pair), mass)).collect();
-        let mut sums = Gathered::<Mat3<f64>>::new(node_count * node_count);
+        let mut sums = Gathered::<[Mat3<f64>; 2]>::new(node_count * node_count);
         let mut gradients = Vec::new();
         for group in 0..grouped.len() {
             sums.begin();
@@ -369,15 +390,19 @@ impl FullSums {
                 on.gradients(tet, free, &mut gradients);
                 for &(a, ga) in &gradients {
                     for &(b, gb) in gradients.iter().filter(|&&(b, _)| b <= a) {
-                        let block = Mat3::IDENTITY * (tet.mu * ga.dot(gb))
-                            + Mat3::outer(gb, ga) * tet.mu
-                            + Mat3::outer(ga, gb) * tet.lambda;
-                        let sum = sums.of(pair(a, b));
-                        *sum = *sum + block * tet.volume;
+                        let [shear, volume] = sums.of(pair(a, b));
+                        let turns = Mat3::IDENTITY * ga.dot(gb) + Mat3::outer(gb, ga);
+                        *shear = *shear + turns * (tet.volume * tet.mu);
+                        *volume = *volume + Mat3::outer(ga, gb) * (tet.volume * tet.lambda);
                     }
                 }
             }
-            full.blocks.extend(sums.list.iter().map(|&(pair, block)| (nodes(pair), block)));
+            let block = |&(pair, [shear, volume]): &(u32, [Mat3<f64>; 2])| FullBlock {
+                nodes: nodes(pair),
+                shear,
+                volume,
+            };
+            full.blocks.extend(sums.list.iter().map(block));
             full.offsets.push(full.blocks.len());
         }
         full
@@ -396,11 +421,11 @@ impl FullSums {
     }
 }
 
-/// `R B R^T` of a symmetric matrix.
-pub fn rotated<S: Real>(r: &Mat3<S>, b: &Six<S>) -> Six<S> {
+/// `A B A^T` of a symmetric matrix.
+pub fn mapped<S: Real>(a: &Mat3<S>, b: &Six<S>) -> Six<S> {
     let [xx, yy, zz, yz, xz, xy] = *b;
-    let half = *r * Mat3::from_columns(vec3(xx, xy, xz), vec3(xy, yy, yz), vec3(xz, yz, zz));
-    let whole = half * r.transpose();
+    let half = *a * Mat3::from_columns(vec3(xx, xy, xz), vec3(xy, yy, yz), vec3(xz, yz, zz));
+    let whole = half * a.transpose();
     let [x, y, z] = whole.columns;
     [x.x, y.y, z.z, z.y, z.x, y.x]
 }
