@@ -33,7 +33,7 @@ use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Scene};
 use crate::settings::{Count, Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
-use crate::solver::{Inputs, Solver, passes};
+use crate::solver::{Inputs, Solver, choose};
 use crate::state::State;
 use device::Backend;
 use std::fmt;
@@ -195,7 +195,7 @@ impl<S: Real> Simulation<S> {
     pub fn iterations(&self) -> u32 {
         let solver = &self.scene.solver;
         match solver.method {
-            Method::QuasiNewton => passes(solver, &self.model.materials),
+            Method::QuasiNewton => choose(solver, &self.model.materials).passes,
             Method::Xpbd | Method::Explicit => solver.iterations(),
         }
     }

@@ -37,7 +37,7 @@ pub use error::StepError;
 pub use inputs::{Inputs, Pin, Tether};
 use inputs::{check_inputs, check_model, check_state, check_step};
 use plan::Plan;
-pub(crate) use quasi_newton::passes;
+pub(crate) use quasi_newton::choose;
 pub use report::StepReport;
 pub use step::balance;
 use step::data::Step;

@@ -1,5 +1,6 @@
 //! What the method chooses by itself where the settings do not.
 
+use crate::layout::{Layout, Part};
 use crate::material::MaterialConstants;
 use crate::scalar::Real;
 use crate::settings::{Count, MOST_HISTORY, SolverSettings};
@@ -8,30 +9,52 @@ use crate::settings::{Count, MOST_HISTORY, SolverSettings};
 /// within about 4 %, with one step per frame (5 % at 0.49). What is nearly incompressible converges more slowly.
 const BY_POISSON: [(f64, u32, u32); 3] = [(0.41, 8, 3), (0.46, 10, 10), (0.5, 16, 10)];
 
-/// Passes per solve, for these materials.
-pub fn passes<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S>]) -> u32 {
-    match settings.iterations {
+/// Passes per solve, and pairs that are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Choice {
+    pub passes: u32,
+    pub history: usize,
+}
+
+/// For the tissue of these materials: the least compressible decides.
+pub fn choose<'a, S: Real>(
+    settings: &SolverSettings,
+    materials: impl IntoIterator<Item = &'a MaterialConstants<S>>,
+) -> Choice {
+    let (passes, pairs) = by_poisson(materials);
+    let passes = match settings.iterations {
         Count::Of(count) => count,
-        Count::Auto => by_poisson(materials).0,
-    }
-}
-
-/// Pairs that are kept, for these materials.
-pub fn history<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S>]) -> usize {
-    let count = match settings.history {
-        0 => by_poisson(materials).1,
-        chosen => chosen,
+        Count::Auto => passes,
     };
-    (count as usize).min(MOST_HISTORY)
+    let history = if settings.history == 0 { pairs } else { settings.history };
+    Choice { passes, history: (history as usize).min(MOST_HISTORY) }
 }
 
-/// Of the least compressible material.
-fn by_poisson<S: Real>(materials: &[MaterialConstants<S>]) -> (u32, u32) {
+/// For each connected part.
+pub fn choose_by_part<S: Real>(settings: &SolverSettings, layout: &Layout<S>) -> Vec<Choice> {
+    let of_part = |part: &Part| {
+        let mut has = vec![false; layout.materials.len()];
+        for (law, set) in layout.tet_sets.iter().enumerate() {
+            for block in part.blocks(law).flatten() {
+                for &material in &set.blocks[block].material[..usize::from(set.filled[block])] {
+                    has[material as usize] = true;
+                }
+            }
+        }
+        let own = layout.materials.iter().zip(has).filter(|(_, has)| *has);
+        choose(settings, own.map(|(material, _)| material))
+    };
+    layout.parts.iter().map(of_part).collect()
+}
+
+fn by_poisson<'a, S: Real>(
+    materials: impl IntoIterator<Item = &'a MaterialConstants<S>>,
+) -> (u32, u32) {
     let ratio = |material: &MaterialConstants<S>| {
         let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(S::to_f64);
         0.5 * lambda / (lambda + mu)
     };
-    let largest = materials.iter().map(ratio).fold(0.0, f64::max);
+    let largest = materials.into_iter().map(ratio).fold(0.0, f64::max);
     let fits = |&&(limit, ..): &&(f64, u32, u32)| largest <= limit;
     let last = BY_POISSON[BY_POISSON.len() - 1];
     let (_, passes, pairs) = *BY_POISSON.iter().find(fits).unwrap_or(&last);
@@ -45,7 +68,7 @@ mod tests {
     use crate::mesh::shapes;
     use crate::model::ModelBuilder;
 
-    /// The least compressible of several materials decides; what is set is taken as it is.
+    /// The least compressible of several materials decides, of each part for itself; what is set is taken as it is.
     #[test]
     fn the_least_compressible_material_decides() {
         let mut builder = ModelBuilder::new();
@@ -55,13 +78,15 @@ mod tests {
             let mesh = shapes::beam(0.04, 0.02, 0.02, 1, 0.0).expect("a beam");
             builder.add_body(&mesh, &tissue).expect("a body");
         }
-        let materials = builder.build::<f32>().expect("a model").materials;
+        let model = builder.build::<f32>().expect("a model");
         let automatic = SolverSettings::default();
-        assert_eq!((passes(&automatic, &materials), history(&automatic, &materials)), (10, 10));
-        let soft = &materials[..1];
-        assert_eq!((passes(&automatic, soft), history(&automatic, soft)), (8, 3));
+        let few = Choice { passes: 8, history: 3 };
+        let many = Choice { passes: 10, history: 10 };
+        assert_eq!(choose(&automatic, &model.materials), many);
+        let by_part = choose_by_part(&automatic, &Layout::new(&model, &automatic));
+        assert_eq!(by_part, [few, many, few]);
         let set =
             SolverSettings { iterations: Count::Of(5), history: 2, ..SolverSettings::default() };
-        assert_eq!((passes(&set, &materials), history(&set, &materials)), (5, 2));
+        assert_eq!(choose(&set, &model.materials), Choice { passes: 5, history: 2 });
     }
 }

@@ -58,13 +58,13 @@ impl<S: Real> Memory<S> {
         learned: &mut Learned<S>,
     ) {
         let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
-        let slot = next_slot(self.history, &learned.parts[number]);
+        let slot = next_slot(self.choices[number].history, &learned.parts[number]);
         let Pair { image, .. } = Pair::places(slot, vertices, &part.vertices);
         for (v, place) in part.vertices.clone().zip(image) {
             self.images[place] = self.trial_z[v] - self.z[v];
         }
         let kept = &mut learned.parts[number];
-        let count = (kept.count as usize + 1).min(self.history);
+        let count = (kept.count as usize + 1).min(self.choices[number].history);
         let before = *kept;
         (kept.count, kept.newest) = (count as u32, slot as u32);
         self.multiply_pair(layout, workers, number, learned, slot);
@@ -74,7 +74,7 @@ impl<S: Real> Memory<S> {
             learned.parts[number].scale = sy / yw;
         } else {
             // Negative curvature says nothing of the way to the minimum. An older pair may be gone: it was overwritten.
-            let lost = before.count as usize == self.history;
+            let lost = before.count as usize == self.choices[number].history;
             let count = before.count - u32::from(lost);
             learned.parts[number] = crate::state::LearnedPart { count, ..before };
         }
@@ -92,7 +92,7 @@ impl<S: Real> Memory<S> {
         let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
         let kept = learned.parts[number];
         let this = Pair::places(slot, vertices, &part.vertices);
-        for other in slots(self.history, kept.count, kept.newest) {
+        for other in slots(self.choices[number].history, kept.count, kept.newest) {
             let that = Pair::places(other, vertices, &part.vertices);
             let (s, y) = (&learned.pairs[this.s.clone()], &learned.pairs[this.y.clone()]);
             let (other_s, other_y) = (&learned.pairs[that.s], &learned.pairs[that.y]);
@@ -115,11 +115,11 @@ impl<S: Real> Memory<S> {
     ) {
         let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
         let kept = learned.parts[number];
-        for slot in slots(self.history, kept.count, kept.newest) {
+        for slot in slots(self.choices[number].history, kept.count, kept.newest) {
             let Pair { y, image, .. } = Pair::places(slot, vertices, &part.vertices);
             self.preconditioner.apply(number, &learned.pairs[y], &mut self.images[image]);
         }
-        for slot in slots(self.history, kept.count, kept.newest) {
+        for slot in slots(self.choices[number].history, kept.count, kept.newest) {
             self.multiply_pair(layout, workers, number, learned, slot);
         }
     }
@@ -137,7 +137,8 @@ impl<S: Real> Memory<S> {
             // Without pairs there is nothing to forget: the length goes on shrinking.
             let forgets =
                 progress.failures >= super::MOST_FAILURES && learned.parts[number].count > 0;
-            if progress.phase != Phase::Iterating || !(progress.accepted || forgets) {
+            let is_iterating = progress.acts() && progress.phase == Phase::Iterating;
+            if !(is_iterating && (progress.accepted || forgets)) {
                 continue;
             }
             if forgets {
@@ -200,7 +201,7 @@ impl<S: Real> Memory<S> {
         let kept = learned.parts[number];
         let range = part.vertices.clone();
         let mut with_gradient = [[0.0; 2]; MOST_HISTORY];
-        for slot in slots(self.history, kept.count, kept.newest) {
+        for slot in slots(self.choices[number].history, kept.count, kept.newest) {
             let Pair { s, image, .. } = Pair::places(slot, vertices, &range);
             let g = &self.gradient[range.clone()];
             with_gradient[slot] = [
@@ -209,7 +210,7 @@ impl<S: Real> Memory<S> {
             ];
         }
         let products = &self.parts[number].products;
-        let order = || slots(self.history, kept.count, kept.newest);
+        let order = || slots(self.choices[number].history, kept.count, kept.newest);
         let (mut a, mut c) = ([0.0; MOST_HISTORY], [0.0; MOST_HISTORY]);
         for (k, i) in order().enumerate() {
             let newer: f64 = order().take(k).map(|j| a[j] * products.sy[i][j]).sum();
@@ -265,7 +266,7 @@ impl<S: Real> Memory<S> {
         data: &StepData<S>,
         learned: &mut Learned<S>,
     ) {
-        let slot = next_slot(self.history, &learned.parts[number]);
+        let slot = next_slot(self.choices[number].history, &learned.parts[number]);
         let Pair { s, y, .. } = Pair::places(slot, vertices, &part.vertices);
         let mut longest = S::ZERO;
         for v in part.vertices.clone() {

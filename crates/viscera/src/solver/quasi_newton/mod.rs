@@ -37,8 +37,8 @@ use crate::solver::step::energy::Energies;
 use crate::solver::step::potential::Evaluator;
 use crate::solver::step::stage::StepStage;
 use crate::state::{Learned, State};
-use choice::history;
-pub use choice::passes;
+pub use choice::choose;
+use choice::{Choice, choose_by_part};
 use evaluate::{Evaluation, Way};
 use parts::{Phase, Progress};
 use preconditioner::Preconditioner;
@@ -59,16 +59,28 @@ const MOST_FAILURES: u32 = 2;
 /// A step of implicit Euler that takes the place of another has so many iterations more.
 const MORE_ITERATIONS: u32 = 4;
 
+/// The passes of a solve, of the number that was chosen.
+fn passes_of(solve: Solve, integrator: Integrator, chosen: u32) -> u32 {
+    match (solve, integrator) {
+        (Solve::First | Solve::Second, _) => chosen,
+        (Solve::Euler, Integrator::Sdirk2) => chosen + MORE_ITERATIONS,
+        // Its last direction is never taken unchecked, so that the first pass alone would move nothing.
+        (Solve::Euler, Integrator::ImplicitEuler) => chosen + 1,
+    }
+}
+
 /// The stages of a step.
 pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S>]) -> Plan {
-    let iterations = passes(settings, materials);
-    let solve = |solve: Solve, iterations: u32| {
+    // Of the part that has most: every part stops by itself after its own.
+    let chosen = choose(settings, materials).passes;
+    let solve = |solve: Solve| {
         use QuasiNewtonStage::{
             Advance, ChooseDirection, EndSolve, Evaluate, Judge, Precondition, StartSolve,
         };
         let body = [Evaluate, Judge, Precondition, ChooseDirection, Advance];
         let body = body.map(|stage| Node::Run(stage.into())).to_vec();
-        let repeat = Repeat { most: Times::Count(iterations), until: Some(Flag::AllDone), body };
+        let most = passes_of(solve, settings.integrator, chosen);
+        let repeat = Repeat { most: Times::Count(most), until: Some(Flag::AllDone), body };
         [
             Node::Run(StartSolve(solve).into()),
             Node::Repeat(repeat),
@@ -79,13 +91,12 @@ pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S
         vec![Node::Run(StepStage::ReadState.into()), Node::Run(QuasiNewtonStage::Begin.into())];
     match settings.integrator {
         Integrator::Sdirk2 => {
-            nodes.extend(solve(Solve::First, iterations));
-            nodes.extend(solve(Solve::Second, iterations));
+            nodes.extend(solve(Solve::First));
+            nodes.extend(solve(Solve::Second));
             nodes.push(Node::Run(QuasiNewtonStage::CheckEnergy.into()));
-            nodes.extend(solve(Solve::Euler, iterations + MORE_ITERATIONS));
+            nodes.extend(solve(Solve::Euler));
         }
-        // Its last direction is never taken unchecked, so that the first pass alone would move nothing.
-        Integrator::ImplicitEuler => nodes.extend(solve(Solve::Euler, iterations + 1)),
+        Integrator::ImplicitEuler => nodes.extend(solve(Solve::Euler)),
     }
     nodes.push(Node::Run(QuasiNewtonStage::LimitEnergy.into()));
     nodes.push(Node::Run(StepStage::WriteState.into()));
@@ -99,8 +110,8 @@ pub struct Memory<S> {
     preconditioner: Preconditioner<S>,
     evaluator: Evaluator,
     energies: Energies,
-    /// Pairs at most.
-    history: usize,
+    /// Of each part.
+    choices: Vec<Choice>,
     parts: Vec<Progress>,
     /// Whether the step that was just accepted left a pair.
     has_new_pair: Vec<bool>,
@@ -154,7 +165,8 @@ impl<S: Real> Memory<S> {
     /// Memory for the steps of a model.
     pub fn new(layout: &Layout<S>, settings: &SolverSettings) -> Self {
         let (vertices, parts) = (layout.vertex_count(), layout.part_count());
-        let history = history(settings, &layout.materials);
+        let choices = choose_by_part(settings, layout);
+        let history = most_pairs(&choices);
         let vectors = || vec![Vec3::ZERO; vertices];
         let points = || vec![Point::default(); vertices];
         Self {
@@ -162,7 +174,7 @@ impl<S: Real> Memory<S> {
             preconditioner: Preconditioner::new(layout),
             evaluator: Evaluator::new(layout),
             energies: Energies::new(parts),
-            history,
+            choices,
             parts: vec![Progress::default(); parts],
             has_new_pair: vec![false; parts],
             pinned: vec![false; vertices],
@@ -208,9 +220,9 @@ impl<S: Real> Memory<S> {
             + self.energies.bytes()
     }
 
-    /// Pairs at most.
+    /// Pairs of a part at most.
     pub fn history(&self) -> usize {
-        self.history
+        most_pairs(&self.choices)
     }
 
     /// Whether no part has anything left to do in the solve at hand.
@@ -261,6 +273,9 @@ impl<S: Real> Memory<S> {
             let change = self.evaluation.changes[number];
             let progress = &mut self.parts[number];
             self.has_new_pair[number] = false;
+            if !progress.acts() {
+                continue;
+            }
             let round_off = ROUNDED * S::EPSILON * change.size;
             progress.accepted = match progress.phase {
                 Phase::Done => continue,
@@ -306,6 +321,10 @@ impl<S: Real> Memory<S> {
     fn advance(&mut self, solve: &Step<'_, S>, data: &mut StepData<S>) {
         for (number, part) in solve.model.parts.iter().enumerate() {
             let progress = &mut self.parts[number];
+            if !progress.acts() {
+                continue;
+            }
+            progress.passes_left -= 1;
             if progress.phase == Phase::Iterating {
                 progress.ahead = true;
                 let length = S::from_f64(progress.length);
@@ -313,11 +332,13 @@ impl<S: Real> Memory<S> {
                     let place = self.base[v].vec3() + self.direction[v] * length;
                     data.points[v].set_vec3(place);
                 }
-            } else if progress.phase == Phase::Done {
-                continue;
             }
         }
     }
+}
+
+fn most_pairs(choices: &[Choice]) -> usize {
+    choices.iter().map(|choice| choice.history).max().unwrap_or(0)
 }
 
 /// What elements depend on in a solve.

@@ -55,6 +55,8 @@ impl Default for Products {
 pub struct Progress {
     pub scheme: Scheme,
     pub phase: Phase,
+    /// Passes that are left to it in this solve.
+    pub passes_left: u32,
     /// Whether the last trial was accepted, so that a new direction is to be found.
     pub accepted: bool,
     /// Whether the trial is a step from the iterate that nothing has judged yet.
@@ -74,8 +76,8 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Whether it has a trial to evaluate.
+    /// Whether it has a trial to evaluate, and a pass left for that.
     pub fn acts(&self) -> bool {
-        self.phase != Phase::Done
+        self.phase != Phase::Done && self.passes_left > 0
     }
 }

@@ -14,7 +14,7 @@
 use super::parts::{Phase, Scheme};
 use super::preconditioner::Curvature;
 use super::stage::Solve;
-use super::{Memory, Pair, moments};
+use super::{Memory, Pair, moments, passes_of};
 use crate::scalar::{Real, Vec3};
 use crate::settings::Integrator;
 use crate::solver::step::data::{Step, StepData};
@@ -62,9 +62,9 @@ impl<S: Real> Memory<S> {
         for (pinned, inverse) in self.pinned.iter_mut().zip(&data.constants.inverse_masses) {
             *pinned = *inverse == S::ZERO;
         }
-        let room = 2 * self.history * layout.vertex_count();
+        let room = 2 * self.history() * layout.vertex_count();
         if state.learned.pairs.len() != room || state.learned.parts.len() != layout.part_count() {
-            state.learned.clear(self.history, layout.vertex_count(), layout.part_count());
+            state.learned.clear(self.history(), layout.vertex_count(), layout.part_count());
         }
         for (number, part) in layout.parts.iter().enumerate() {
             let reach = part.vertices.clone().fold(S::ZERO, |reach, v| {
@@ -115,7 +115,7 @@ impl<S: Real> Memory<S> {
         }
         let ratio = S::from_f64((dt / before) * (dt / before));
         let range = &step.model.parts[number].vertices;
-        for slot in 0..self.history {
+        for slot in 0..self.choices[number].history {
             let Pair { s, y, .. } = Pair::places(slot, step.model.vertex_count(), range);
             for ((s, y), v) in s.zip(y).zip(range.clone()) {
                 let inertia = learned.pairs[s] * data.constants.masses[v];
@@ -253,6 +253,8 @@ impl<S: Real> Memory<S> {
         }
         let progress = &mut self.parts[number];
         progress.phase = Phase::Starting;
+        let chosen = self.choices[number].passes;
+        progress.passes_left = passes_of(which, solve.settings.integrator, chosen);
         (progress.failures, progress.rejections) = (0, 0);
         (progress.accepted, progress.ahead) = (false, false);
     }

@@ -110,11 +110,13 @@ impl<S: Real> Preconditioner<S> {
     pub fn new(layout: &Layout<S>) -> Self {
         let mut all = Self {
             parts: layout.parts.iter().map(|part| OfPart::new(layout, part)).collect(),
-            free: Vec::new(),
+            free: vec![true; layout.vertex_count()],
             viscous: 0.0,
             turns: Vec::new(),
         };
-        all.rebuild(layout, vec![true; layout.vertex_count()]);
+        for (number, part) in all.parts.iter_mut().enumerate() {
+            part.rebuild(layout, number, &all.free[part.vertices.clone()], all.viscous);
+        }
         let most = all.parts.iter().map(|part| part.groups.len()).max().unwrap_or(0);
         all.turns = vec![Turn::NONE; most];
         all
@@ -127,22 +129,25 @@ impl<S: Real> Preconditioner<S> {
             + size_of_val(&self.turns[..])
     }
 
-    /// Takes the sums of the rest shape anew where other vertices are free, or the step is another one and tissue
-    /// viscous; takes memory then.
+    /// Takes the sums of the rest shape of a part anew where other vertices are free, or the step is another one and
+    /// tissue viscous; takes memory then.
     pub fn fit(&mut self, layout: &Layout<S>, constants: &StepConstants<S>, dt: f64) {
         let viscous = if layout.is_viscous() { 1.0 / dt } else { 0.0 };
-        let is_free = |v: usize| constants.inverse_masses[v] != S::ZERO;
-        if self.viscous != viscous || (0..self.free.len()).any(|v| self.free[v] != is_free(v)) {
-            self.viscous = viscous;
-            self.rebuild(layout, (0..layout.vertex_count()).map(is_free).collect());
-        }
-    }
-
-    fn rebuild(&mut self, layout: &Layout<S>, free: Vec<bool>) {
+        let is_other_step = self.viscous != viscous;
+        self.viscous = viscous;
         for (number, part) in self.parts.iter_mut().enumerate() {
-            part.rebuild(layout, number, &free[part.vertices.clone()], self.viscous);
+            let free = &mut self.free[part.vertices.clone()];
+            let masses = &constants.inverse_masses[part.vertices.clone()];
+            let mut is_other = is_other_step;
+            for (free, mass) in free.iter_mut().zip(masses) {
+                let is_free = *mass != S::ZERO;
+                is_other |= *free != is_free;
+                *free = is_free;
+            }
+            if is_other {
+                part.rebuild(layout, number, free, viscous);
+            }
         }
-        self.free = free;
     }
 
     /// Turns a part's sums to where it is now, and inverts its blocks.
