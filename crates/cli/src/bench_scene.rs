@@ -151,6 +151,8 @@ struct Run<'a, S> {
     /// Of each pinned vertex, how far it goes [m].
     travels: Vec<Vec3<f64>>,
     is_free: Vec<bool>,
+    /// Per frame.
+    substeps: u32,
 }
 
 impl<'a, S: Real> Run<'a, S> {
@@ -179,10 +181,12 @@ impl<'a, S: Real> Run<'a, S> {
             pins: pinned.iter().map(pin).collect(),
             ..Inputs::default()
         };
+        let mut solver = Solver::new(model, settings);
         Ok(Self {
             scene,
             model,
-            solver: Solver::new(model, settings),
+            substeps: solver.substeps(&inputs, scene.dt),
+            solver,
             state: State::at_rest(model),
             inputs,
             rest,
@@ -193,7 +197,7 @@ impl<'a, S: Real> Run<'a, S> {
 
     /// One frame, counted from 1; without what slows it down afterwards.
     fn advance(&mut self, frame: u32) -> Result<()> {
-        let substeps = self.solver.settings().substeps();
+        let substeps = self.substeps;
         let dt = self.scene.dt / f64::from(substeps);
         let ends = [frame - 1, frame].map(|end| self.scene.share(end));
         for substep in 1..=substeps {

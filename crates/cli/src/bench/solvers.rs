@@ -30,7 +30,7 @@ const GREEN: MaterialModel = MaterialModel::SaintVenantKirchhoff;
 const NEO: MaterialModel = MaterialModel::StableNeoHookean;
 
 /// All of them, in the order of the results.
-pub const SOLVERS: [SolverEntry; 12] = [
+pub const SOLVERS: [SolverEntry; 14] = [
     entry("green", "XPBD as published, Saint Venant-Kirchhoff", GREEN, FEW, publish),
     entry("pair", "XPBD as published, stable neo-Hookean pair", NEO, FEW, publish),
     entry("green-exact", "the default, Saint Venant-Kirchhoff", GREEN, FEW, |_| {}),
@@ -60,6 +60,16 @@ pub const SOLVERS: [SolverEntry; 12] = [
     }),
     entry("explicit-green", "explicit, Saint Venant-Kirchhoff", GREEN, SMALL_STEPS, explicit),
     entry("explicit", "explicit, stable neo-Hookean", NEO, SMALL_STEPS, explicit),
+    entry(
+        "quasi-newton-green",
+        "quasi-Newton with the passes that it chooses, Saint Venant-Kirchhoff",
+        GREEN,
+        None,
+        |s| s.method = Method::QuasiNewton,
+    ),
+    entry("quasi-newton", "the same, stable neo-Hookean", NEO, None, |s| {
+        s.method = Method::QuasiNewton;
+    }),
 ];
 
 const fn entry(

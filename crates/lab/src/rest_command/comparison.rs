@@ -46,11 +46,12 @@ fn settle_in<S: Real>(simulation: &Simulation<f64>, progress: &Progress) -> Resu
     let simulation = Simulation::<S>::new(scene, assembly)?;
     let model = simulation.model();
     let (mut solver, mut state) = (Solver::new(model, &settings), State::at_rest(model));
-    let dt = time.frame / f64::from(settings.substeps());
+    let substeps = simulation.substeps();
+    let dt = time.frame / f64::from(substeps);
     for frame in 0..all {
         let _case = progress.case(&format!("frame {} of {all}", frame + 1));
         let start = frame as f64 * time.frame;
-        for substep in 1..=settings.substeps() {
+        for substep in 1..=substeps {
             // The scene ends as the reference sees it: nothing is let go while it settles.
             let now = (start + f64::from(substep) * dt).min(end);
             solver.step(model, &mut state, &simulation.inputs_at(now), dt)?;

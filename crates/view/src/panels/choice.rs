@@ -45,6 +45,16 @@ impl Chooser<'_> {
         }
     }
 
+    /// A box that leaves a number to the method; `usual` where it is unticked.
+    pub fn automatic(&mut self, ui: &mut Ui, row: &Row<'_>, is_automatic: bool, usual: u32) {
+        let mut shown = is_automatic;
+        let name = format!("automatic {}", row.name);
+        if ui.checkbox(&mut shown, name).on_hover_text(row.help).changed() {
+            let value = if shown { "auto".to_owned() } else { usual.to_string() };
+            self.one(row.key, value, false);
+        }
+    }
+
     /// A menu of names: each as a scene file has it, and in words.
     pub fn menu(&mut self, ui: &mut Ui, row: &Row<'_>, value: &str, names: &[(&str, &str)]) {
         let shown = names.iter().find(|(name, _)| *name == value).map_or(value, |(_, words)| words);

@@ -1,7 +1,9 @@
 //! How steps are solved: all of it can be changed while the simulation runs.
 
 use eframe::egui::Ui;
-use viscera::settings::{Acceleration, Colors, DeviceRequest, Method, Precision, SolverSettings};
+use viscera::settings::{
+    Acceleration, Colors, Count, DeviceRequest, Method, Precision, SolverSettings,
+};
 
 use super::choice::{Chooser, Row};
 use super::{Action, section};
@@ -109,14 +111,32 @@ fn method(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
     let help =
         "Divide every frame. More lose less motion to numerical damping; the cost grows alike.";
     let row = Row::new("solver.substeps", "substeps", help).rail(1.0..=100.0).whole().logarithmic();
-    chooser.number(ui, &row, f64::from(solver.substeps()));
+    count(ui, solver, chooser, &row, solver.substeps, solver.substeps());
 }
 
 fn passes(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
     let help = "Passes over the mesh in each of the two solves of a substep. A dozen solve it; fewer still end in \
                 balance at rest.";
     let row = Row::new("solver.iterations", "passes", help).rail(1.0..=60.0);
-    chooser.number(ui, &row.whole().logarithmic(), f64::from(solver.iterations()));
+    count(ui, solver, chooser, &row.whole().logarithmic(), solver.iterations, solver.iterations());
+}
+
+/// A number that the quasi-Newton method can choose by itself: a box for that, and a slider where it is not ticked.
+/// `usual` is what the slider begins with.
+fn count(
+    ui: &mut Ui,
+    solver: &SolverSettings,
+    chooser: &mut Chooser<'_>,
+    row: &Row<'_>,
+    chosen: Count,
+    usual: u32,
+) {
+    if solver.method == Method::QuasiNewton {
+        chooser.automatic(ui, row, chosen == Count::Auto, usual);
+    }
+    if solver.method != Method::QuasiNewton || chosen != Count::Auto {
+        chooser.number(ui, row, f64::from(usual));
+    }
 }
 
 fn sweeps(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {

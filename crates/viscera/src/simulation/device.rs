@@ -7,6 +7,7 @@ use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
+use crate::scene::Scene;
 use crate::settings::SolverSettings;
 use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]
@@ -112,11 +113,11 @@ impl<S: Real> Backend<S> {
         }
     }
 
-    /// See [`Solver::slowest_period`]; methods that need to know it are computed by the CPU.
-    pub fn slowest_period(&mut self, inputs: &Inputs<S>) -> f64 {
+    /// See [`Solver::substeps`]; methods that choose by themselves are computed by the CPU.
+    pub fn substeps(&mut self, inputs: &Inputs<S>, scene: &Scene) -> u32 {
         match &mut self.engine {
-            Engine::Cpu(solver) => solver.slowest_period(inputs),
-            Engine::Device(_) => f64::INFINITY,
+            Engine::Cpu(solver) => solver.substeps(inputs, scene.time.frame),
+            Engine::Device(_) => scene.solver.substeps(),
         }
     }
 

@@ -31,7 +31,7 @@ use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Scene};
-use crate::settings::{Count, Method, SolverSettings};
+use crate::settings::{Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::{Inputs, Solver, choose};
 use crate::state::State;
@@ -172,18 +172,13 @@ impl<S: Real> Simulation<S> {
 
     /// As many substeps as the settings ask for, or as the slowest oscillation of what the scene's fixings hold asks for.
     fn choose_substeps(&mut self) {
-        let solver = &self.scene.solver;
-        self.substeps = solver.substeps();
-        if solver.substeps == Count::Auto && solver.method == Method::QuasiNewton {
-            // Of the fixings alone, which are always the same: what a hand holds comes and goes, and a run that is
-            // resumed or repeated has to choose the same.
-            let mut fixed = self.scene.clone();
-            fixed.motions.clear();
-            let mut inputs = Inputs::default();
-            GraspOrigins::default().act(&fixed, &self.assembly, 0.0, &mut inputs);
-            let period = self.backend.slowest_period(&inputs);
-            self.substeps = substeps_for(period, self.scene.time.frame);
-        }
+        // Of the fixings alone, which are always the same: what a hand holds comes and goes, and a run that is resumed or
+        // repeated has to choose the same.
+        let mut fixed = self.scene.clone();
+        fixed.motions.clear();
+        let mut inputs = Inputs::default();
+        GraspOrigins::default().act(&fixed, &self.assembly, 0.0, &mut inputs);
+        self.substeps = self.backend.substeps(&inputs, &self.scene);
     }
 
     /// Substeps per frame.
@@ -399,23 +394,3 @@ impl<S: Real> Simulation<S> {
 fn substep_dt(scene: &Scene, substeps: u32) -> f64 {
     scene.time.frame / f64::from(substeps)
 }
-
-/// Substeps of SDIRK2 that follow an oscillation of a period [s] to within about 4 % over half a second: its phase is
-/// off by a share of the squared step that was measured on bars, and the more so the more periods there are. Stiffer
-/// bodies swing less than one sees; they take no more than [`MOST_SUBSTEPS`].
-fn substeps_for(period: f64, frame: f64) -> u32 {
-    let periods = 0.5 / period;
-    let steps_per_period = (PHASE_ERROR * periods / 0.04).sqrt().max(FEWEST_STEPS);
-    let substeps = (frame * steps_per_period / period).ceil();
-    // Also of a period that is infinite.
-    if substeps.is_finite() { (substeps as u32).clamp(1, MOST_SUBSTEPS) } else { 1 }
-}
-
-/// Error of a path after one period, times the square of the number of steps in it.
-const PHASE_ERROR: f64 = 5.6;
-
-/// Steps in a period at least.
-const FEWEST_STEPS: f64 = 13.0;
-
-/// Substeps that are chosen at most.
-const MOST_SUBSTEPS: u32 = 10;

@@ -30,7 +30,7 @@ use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
-use crate::settings::{Count, SolverSettings};
+use crate::settings::{Count, Method, SolverSettings};
 use crate::state::State;
 use cpu::precision::{Task, carry_out};
 pub use error::StepError;
@@ -212,6 +212,17 @@ impl<S: Real> Solver<S> {
         let Self { settings, layout, memory, .. } = self;
         let step = Step { model: layout, inputs, dt: 1.0, settings };
         cpu::precision::slowest_period(memory, &step)
+    }
+
+    /// Substeps of a frame [s] in which these inputs hold the model: as many as the settings ask for; where they leave it
+    /// to the quasi-Newton method, as the slowest oscillation asks for. Forgets the last step.
+    pub fn substeps(&mut self, inputs: &Inputs<S>, frame: f64) -> u32 {
+        match (self.settings.substeps, self.settings.method) {
+            (Count::Auto, Method::QuasiNewton) => {
+                quasi_newton::substeps_for(self.slowest_period(inputs), frame)
+            }
+            _ => self.settings.substeps(),
+        }
     }
 
     /// Bytes of the memory taken, model and state not included.
