@@ -19,7 +19,7 @@ use crate::scalar::{Real, Vec3};
 use crate::settings::Integrator;
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::predict::Tethers;
-use crate::solver::step::strain::measure_strain;
+use crate::solver::step::strain::{keep_share, measure_strain};
 use crate::state::{Learned, State};
 
 /// `c`.
@@ -389,6 +389,16 @@ impl<S: Real> Memory<S> {
             let constants = &mut data.constants;
             let (workers, strains) = (&constants.workers, &mut constants.start_strain);
             measure_strain(workers, step.model, None, &self.stage_start, strains);
+            // Beside SDIRK2, measures of forces take steps of implicit Euler for solves of `he` (`end_again`): the change of
+            // strain over `he` has to be that over the whole step.
+            if step.settings.integrator == Integrator::Sdirk2 {
+                for (progress, part) in self.parts.iter().zip(step.model.parts.iter()) {
+                    if progress.scheme == Scheme::Euler {
+                        let share = S::from_f64(SHARE);
+                        keep_share(workers, step.model, part, &data.points, share, strains);
+                    }
+                }
+            }
         }
     }
 }

@@ -17,8 +17,31 @@ pub fn measure_strain<S: Real>(
     x: &[Point<S>],
     start_strain: &mut StartStrain<S>,
 ) {
+    pass_over(workers, model, part, x, S::ZERO, start_strain);
+}
+
+/// Brings the start strain of a part nearer to that at `x`: a share of the change between both is left.
+pub fn keep_share<S: Real>(
+    workers: &Workers,
+    model: &Layout<S>,
+    part: &Part,
+    x: &[Point<S>],
+    share: S,
+    start_strain: &mut StartStrain<S>,
+) {
+    pass_over(workers, model, Some(part), x, share, start_strain);
+}
+
+fn pass_over<S: Real>(
+    workers: &Workers,
+    model: &Layout<S>,
+    part: Option<&Part>,
+    x: &[Point<S>],
+    share: S,
+    start_strain: &mut StartStrain<S>,
+) {
     for (kind, (set, strains)) in model.tet_sets.iter().zip(start_strain).enumerate() {
-        let pass = Strain { x, strains: Shared::new(strains) };
+        let pass = Strain { x, share, strains: Shared::new(strains) };
         match part {
             _ if !set.viscous => {}
             None => workers.pass(model, set, 0..set.block_count(), &pass),
@@ -29,8 +52,10 @@ pub fn measure_strain<S: Real>(
     }
 }
 
+/// `E(x) + share (E - E(x))` in the place of `E`.
 struct Strain<'a, S> {
     x: &'a [Point<S>],
+    share: S,
     strains: Shared<'a, [Eight<S>; 6]>,
 }
 
@@ -41,7 +66,12 @@ impl<S: Real> TetPass<S> for Strain<'_, S> {
         // SAFETY: every block has a place of its own and is worked on once.
         let place = unsafe { self.strains.at(tets.index) };
         for (p, component) in green_strain::strain(&f).into_iter().enumerate() {
-            component.store(&mut place[p], tets.lane);
+            let mut strain = component;
+            if self.share != S::ZERO {
+                let before = L::load(&place[p], tets.lane);
+                strain = component + (before - component) * L::splat(self.share);
+            }
+            strain.store(&mut place[p], tets.lane);
         }
     }
 }
