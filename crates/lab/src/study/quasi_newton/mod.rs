@@ -3,6 +3,7 @@
 mod figure;
 mod other_forms;
 mod problems;
+mod vast;
 
 use anyhow::Result;
 use viscera::settings::{AndersonOn, Count, SolverSettings};
@@ -21,6 +22,8 @@ pub(super) const SECTION: Section = Section {
     cases: |quick, changes| problems(quick, changes).len() + figure::case_count(quick),
     run,
 };
+
+pub(super) use vast::SECTION as VAST;
 
 const LEVELS: [f64; 2] = [1e-2, 1e-3];
 /// Passes that are followed.

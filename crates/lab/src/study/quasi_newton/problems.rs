@@ -72,6 +72,27 @@ fn sizes(quick: bool, changes: &Changes) -> Vec<(Size, bool)> {
     sizes
 }
 
+/// Steps on half a million tetrahedra and the same on a tenth of that, which come second: all scenes as usual, and one
+/// on an unstructured mesh.
+pub(super) fn vast_problems() -> Vec<StepProblem> {
+    let (young, poisson, is_fine) = (YOUNGS[1], POISSONS[1], true);
+    let mut problems = Vec::new();
+    for size in [Size::Vast, Size::Huge] {
+        let of = |form, (scene, frames)| StepProblem {
+            scene,
+            form,
+            frames,
+            young,
+            poisson,
+            size,
+            is_fine,
+        };
+        problems.extend(MOMENTS.map(|moment| of(Form::Usual, moment)));
+        problems.push(of(Form::Unstructured, MOMENTS[1]));
+    }
+    problems
+}
+
 /// All steps, those on finer meshes first.
 pub(super) fn problems(quick: bool, changes: &Changes) -> Vec<StepProblem> {
     let mut problems = Vec::new();
