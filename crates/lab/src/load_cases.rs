@@ -13,11 +13,13 @@ use std::fmt;
 use anyhow::{Context as _, Result, bail, ensure};
 use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
-use viscera::mesh::shapes::{self, Block, Splitting};
+use viscera::mesh::shapes;
 use viscera::mesh::topology::BoundingBox;
 use viscera::model::{Model, ModelBuilder};
-use viscera::scalar::{Real, Vec3, vec3};
+use viscera::scalar::{Mat3, Real, Vec3, vec3};
 use viscera::solver::{Inputs, Pin};
+
+use crate::forms::Form;
 
 /// Acceleration of gravity [m/s^2].
 pub const GRAVITY: Vec3<f64> = vec3(0.0, 0.0, -9.81);
@@ -102,6 +104,10 @@ pub struct LoadCase {
     pub path: DrivenPath,
     /// Frames that it takes to get there.
     pub path_frames: u32,
+    /// How the whole scene is turned about the origin; the path is that of the scene before.
+    pub turned: Mat3<f64>,
+    /// What region 1 of the mesh is made of, where that is something else.
+    pub inclusion: Option<Material>,
 }
 
 impl fmt::Display for LoadCase {
@@ -124,24 +130,31 @@ impl LoadCase {
             holds: Vec::new(),
             path: DrivenPath::Shift(Vec3::ZERO),
             path_frames: 1,
+            turned: Mat3::IDENTITY,
+            inclusion: None,
         }
     }
 
     /// The load case of a name, with about as many tetrahedra.
     pub fn new(name: &'static str, size: Size, tissue: Material) -> Result<Self> {
+        Self::of_form(name, Form::Usual, size, tissue)
+    }
+
+    /// The same with the bar or the block in another form.
+    pub fn of_form(name: &'static str, form: Form, size: Size, tissue: Material) -> Result<Self> {
         let mut load_case = Self::bare(name, TetMesh::default(), tissue);
         match name {
             "cantilever" => {
-                load_case.mesh = bar(size)?;
+                load_case.mesh = form.bar(size)?;
                 load_case.gravity = GRAVITY;
                 load_case.fixed = load_case.select(|x| x.x < NEAR);
             }
             "twist" => {
-                load_case.mesh = bar(size)?;
+                load_case.mesh = form.bar(size)?;
                 load_case.twist_ends(NEAR);
             }
             "grab" => {
-                load_case.mesh = block(size)?;
+                load_case.mesh = form.block(size)?;
                 load_case.gravity = GRAVITY;
                 load_case.fixed = load_case.select(|x| x.z < NEAR);
                 let in_patch = |x: f64| (x - 0.5 * BLOCK[0]).abs() < 0.2 * BLOCK[0];
@@ -151,7 +164,7 @@ impl LoadCase {
                 load_case.path_frames = 8;
             }
             "press" => {
-                load_case.mesh = block(size)?;
+                load_case.mesh = form.block(size)?;
                 load_case.fixed = load_case.select(|x| x.z < NEAR);
                 load_case.driven =
                     load_case.select(|x| x.z > BLOCK[2] - NEAR && x.x < 0.5 * BLOCK[0] + NEAR);
@@ -164,6 +177,7 @@ impl LoadCase {
                     Size::Small => 0.04,
                     Size::Large => 0.022,
                     Size::Huge => 0.0085,
+                    Size::Vast => 0.00395,
                 };
                 load_case.mesh = shapes::liver(spacing, 1.0)?.tets;
                 load_case.gravity = GRAVITY;
@@ -173,6 +187,7 @@ impl LoadCase {
             }
             _ => bail!("there is no scene `{name}`; there are {}", NAMES.join(", ")),
         }
+        form.finish(&mut load_case)?;
         Ok(load_case)
     }
 
@@ -251,7 +266,10 @@ impl LoadCase {
     /// Its model.
     pub fn model<S: Real>(&self) -> Result<Model<S>> {
         let mut builder = ModelBuilder::new();
-        builder.add_body(&self.mesh, &self.tissue)?;
+        let body = builder.add_body(&self.mesh, &self.tissue)?;
+        if let Some(inclusion) = &self.inclusion {
+            builder.set_region_material(body, 1, inclusion)?;
+        }
         for hold in &self.holds {
             let anchor = self.mesh.vertices()[hold.vertex as usize];
             builder.add_attachment(hold.vertex, anchor, hold.stiffness)?;
@@ -265,10 +283,11 @@ impl LoadCase {
         let rest = self.mesh.vertices();
         let pin = |&vertex: &u32, target: Vec3<f64>| Pin { vertex, target: target.cast() };
         let mut pins: Vec<_> = self.fixed.iter().map(|v| pin(v, rest[*v as usize])).collect();
-        pins.extend(self.driven.iter().map(|v| pin(v, self.path.at(rest[*v as usize], share))));
+        let led = |x| self.turned * self.path.at(self.turned.transpose() * x, share);
+        pins.extend(self.driven.iter().map(|v| pin(v, led(rest[*v as usize]))));
         let anchor = |hold: &ElasticHold| {
             let x = rest[hold.vertex as usize];
-            if hold.driven { self.path.at(x, share).cast() } else { x.cast() }
+            if hold.driven { led(x).cast() } else { x.cast() }
         };
         let anchors = self.holds.iter().map(anchor).collect();
         Inputs { gravity: self.gravity.cast(), pins, anchors, ..Inputs::default() }
@@ -310,6 +329,8 @@ pub enum Size {
     Large,
     /// About 50,000 tetrahedra.
     Huge,
+    /// About 500,000 tetrahedra.
+    Vast,
 }
 
 /// Distance [m] within which a vertex counts as lying on a face.
@@ -320,25 +341,6 @@ pub const BAR: [f64; 3] = [0.2, 0.05, 0.05];
 
 /// Edge lengths of the block [m].
 pub const BLOCK: [f64; 3] = [0.1, 0.1, 0.05];
-
-fn bar(size: Size) -> Result<TetMesh> {
-    irregular(BAR, [[4, 2, 2], [10, 3, 3], [20, 5, 5], [52, 13, 13]], size)
-}
-
-fn block(size: Size) -> Result<TetMesh> {
-    irregular(BLOCK, [[4, 4, 2], [6, 6, 3], [10, 10, 5], [26, 26, 13]], size)
-}
-
-/// No two tetrahedra are alike.
-fn irregular(edges: [f64; 3], cells: [[usize; 3]; 4], size: Size) -> Result<TetMesh> {
-    let block = Block {
-        splitting: Splitting::Six,
-        jitter: 0.6,
-        seed: 1,
-        ..Block::new(Vec3::from_f64(edges), cells[size as usize])
-    };
-    block.mesh().context("a block of the studies")
-}
 
 /// Tissue of the studies.
 pub fn tissue(model: MaterialModel, young: f64, poisson: f64) -> Result<Material> {

@@ -99,6 +99,7 @@ const STUDY_EXAMPLES: &str = "\
 Examples:
   viscera-lab study                                       everything, to docs/study.md
   viscera-lab study --quick                               a first look, to out/study.md
+  viscera-lab study --only vast                           left out otherwise: it takes minutes
   viscera-lab study --only coloring --set young=\"20 kPa\"  one section, of softer tissue
   viscera-lab study --list                                the names of all sections";
 

@@ -36,6 +36,8 @@ pub struct Program {
     pub command: &'static str,
     /// In the order of the report.
     pub sections: &'static [Section],
+    /// Names of those that take too long for every run: with `--only` alone.
+    pub extra: &'static [&'static str],
 }
 
 /// What a section works with.
@@ -170,8 +172,9 @@ impl Program {
     /// written; a claim that is missed is a finding, no error.
     pub fn run(&self, options: &Options) -> Result<Outcome> {
         let mut document = Document::prepare(&options.out, self.title)?;
-        let is_chosen = |section: &&Section| {
-            options.only.is_empty() || options.only.iter().any(|name| name == section.name)
+        let is_chosen = |section: &&Section| match options.only.is_empty() {
+            true => !self.extra.contains(&section.name),
+            false => options.only.iter().any(|name| name == section.name),
         };
         let chosen: Vec<&Section> = self.sections.iter().filter(is_chosen).collect();
         let cases_of = |section: &Section| (section.cases)(options.quick, &options.changes);
@@ -230,12 +233,13 @@ impl Program {
                 options.changes.to_string().trim()
             ));
         }
-        if chosen.len() < self.sections.len() {
-            let names = self.sections.iter().map(|section| section.name);
-            let left_out: Vec<&str> =
-                names.filter(|name| chosen.iter().all(|section| section.name != *name)).collect();
-            document
-                .open_with_paragraph(format!("Left out with `--only`: {}.", left_out.join(", ")));
+        let names = self.sections.iter().map(|section| section.name);
+        let left_out: Vec<&str> =
+            names.filter(|name| chosen.iter().all(|section| section.name != *name)).collect();
+        if !left_out.is_empty() {
+            let why = if options.only.is_empty() { "but for" } else { "with" };
+            let left_out = left_out.join(", ");
+            document.open_with_paragraph(format!("Left out {why} `--only`: {left_out}."));
         }
         let (met, all) = (outcome.met_count(), outcome.verdicts.len());
         document.open_with_paragraph(format!("**{met} of {all} claims are met.**"));

@@ -30,5 +30,7 @@ pub const PROGRAM: Program = Program {
         stability::SECTION,
         cost::SECTION,
         quasi_newton::SECTION,
+        quasi_newton::VAST,
     ],
+    extra: &["vast"],
 };

@@ -1,12 +1,15 @@
 //! `viscera-lab validate`: sections that compare the library with what must come out.
 
 mod cantilever;
+mod course;
+mod decay;
 mod frequency;
 mod indentation;
 mod independence;
 mod methods;
 mod motion;
 mod organ;
+mod organs;
 mod patch;
 mod path;
 mod rest;
@@ -31,6 +34,9 @@ pub const PROGRAM: Program = Program {
         rest::SECTION,
         independence::SECTION,
         motion::SECTION,
+        decay::SECTION,
+        organs::SECTION,
         stress::SECTION,
     ],
+    extra: &[],
 };

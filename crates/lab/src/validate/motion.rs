@@ -92,7 +92,7 @@ fn cases(quick: bool) -> Vec<Case> {
 }
 
 fn case_count(quick: bool) -> usize {
-    cases(quick).len() + path::case_count()
+    cases(quick).len() + path::case_count(quick)
 }
 
 fn answer(case: &Case) -> Result<Vec<f64>> {

@@ -89,9 +89,20 @@ fn stiffness_does_not_depend_on_the_iterations_at_length() {
     assert_sections_hold("rest,independence,motion,stress", &figures);
 }
 
+#[test]
+fn organs_move_and_rest_as_they_should_and_viscous_bars_die_down() {
+    assert_sections_hold("decay,organs", &["decay"]);
+}
+
 /// Known failures: five sweeps of one colour do not unscramble a bar, Anderson's default guard follows a drop a
-/// little less closely than is asked, and so does the one substep that the quasi-Newton method chooses for a bar.
-const KNOWN_FAILURES: [&str; 2] = ["scrambles, Jacobi", "Anderson guarded by residual"];
+/// little less closely than is asked, and so do two substeps of the quasi-Newton method; XPBD's default leaves much of
+/// the viscous stress unsolved.
+const KNOWN_FAILURES: [&str; 4] = [
+    "scrambles, Jacobi",
+    "Anderson guarded by residual",
+    "quasi-Newton, 2 substeps",
+    "viscous bar, XPBD, beside",
+];
 
 fn all_are_met(printed: &str) {
     assert!(printed.contains("claims are met"), "{printed}");

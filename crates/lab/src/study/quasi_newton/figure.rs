@@ -10,8 +10,9 @@ use super::super::methods::{
     COLORED, JACOBI, NamedSettings, anderson, exact, published, quasi_newton,
 };
 use super::super::step::Curve;
-use super::problems::StepProblem;
+use super::problems::{StepProblem, on_mesh};
 use super::{Answer, ITERATIONS};
+use crate::forms::Form;
 
 /// What is followed on the step that is shown.
 fn methods(quick: bool) -> Vec<NamedSettings> {
@@ -41,7 +42,8 @@ pub(super) fn case_count(quick: bool) -> usize {
 fn shown(problems: &[StepProblem]) -> Option<usize> {
     let twists = || {
         let all = problems.iter().enumerate();
-        all.filter(|(_, problem)| problem.scene == "twist" && !problem.is_fine)
+        let is_usual = |problem: &StepProblem| problem.form == Form::Usual && !problem.is_fine;
+        all.filter(move |(_, problem)| problem.scene == "twist" && is_usual(problem))
     };
     let count = twists().count();
     twists().nth(count / 2).map(|(index, _)| index)
@@ -68,11 +70,8 @@ pub(super) fn show(
     plot.reference(1e-2, "1e-2");
     plot.reference(1e-3, "1e-3");
     let mut data = Table::new(["curve", "passes", "error"]);
-    let [coarse, fine] = [false, true].map(|is_fine| {
-        let like =
-            |other: &StepProblem| StepProblem { is_fine, size: other.size, ..problem } == *other;
-        problems.iter().position(like).map(|index| &answers[index])
-    });
+    let [coarse, fine] = [false, true]
+        .map(|is_fine| on_mesh(problems, &problem, is_fine).map(|index| &answers[index]));
     for (method, curve) in methods.iter().zip(&curves) {
         let style = if method.name == "quasi-Newton" { Style::MarkedLine } else { Style::Line };
         add(&mut plot, &mut data, &method.name, curve, style);

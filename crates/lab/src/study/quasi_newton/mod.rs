@@ -1,7 +1,9 @@
 //! Section 8: how many passes the quasi-Newton method takes to the end of a step.
 
 mod figure;
+mod other_forms;
 mod problems;
+mod vast;
 
 use anyhow::Result;
 use viscera::settings::{AndersonOn, Count, SolverSettings};
@@ -11,7 +13,8 @@ use super::convergence::{Reach, level_name};
 use super::methods::{COLORED, JACOBI, NamedSettings, anderson, exact, published, quasi_newton};
 use super::step::Curve;
 use super::{Context, Section};
-use problems::{StepProblem, gradient_left, problems};
+use crate::forms::Form;
+use problems::{StepProblem, gradient_left, on_mesh, problems};
 
 pub(super) const SECTION: Section = Section {
     name: "quasi-newton",
@@ -19,6 +22,8 @@ pub(super) const SECTION: Section = Section {
     cases: |quick, changes| problems(quick, changes).len() + figure::case_count(quick),
     run,
 };
+
+pub(super) use vast::SECTION as VAST;
 
 const LEVELS: [f64; 2] = [1e-2, 1e-3];
 /// Passes that are followed.
@@ -73,7 +78,8 @@ fn run(context: &mut Context) -> Result<()> {
     let answers = context.run_cases(&problems, |problem| {
         let step = problem.step(changes)?;
         let ours = SolverSettings { iterations: Count::Of(ITERATIONS), ..quasi_newton() };
-        let rivals = if problem.is_fine { Vec::new() } else { rivals(quick) };
+        let with_rivals = problem.form == Form::Usual && !problem.is_fine;
+        let rivals = if with_rivals { rivals(quick) } else { Vec::new() };
         Ok(Answer {
             tets: step.load_case.mesh.tets().len(),
             curve: step.follow::<f64>(&ours)?,
@@ -87,7 +93,7 @@ fn run(context: &mut Context) -> Result<()> {
     figure::show(context, &problems, &answers)?;
     table(context, &problems, &answers)?;
     judge(context, &problems, &answers);
-    Ok(())
+    other_forms::show(context, &problems, &answers)
 }
 
 fn introduce(context: &mut Context) {
@@ -113,7 +119,8 @@ fn table(context: &mut Context, problems: &[StepProblem], answers: &[Answer]) ->
     heads.extend(rivals.iter().map(|rival| format!("{rival}: {levels}")));
     let mut table = Table::new(heads);
     let mut data = Table::new(["scene", "E [Pa]", "nu", "tets", "method", "level", "passes"]);
-    for (index, problem) in problems.iter().enumerate().filter(|(_, problem)| !problem.is_fine) {
+    let is_shown = |problem: &StepProblem| problem.form == Form::Usual && !problem.is_fine;
+    for (index, problem) in problems.iter().enumerate().filter(|(_, problem)| is_shown(problem)) {
         let StepProblem { scene, young, poisson, .. } = *problem;
         let mut row = vec![scene.to_owned(), format!("{} kPa", young / 1e3), poisson.to_string()];
         let mut add = |method: &str, tets: usize, curve: &Curve| {
@@ -126,12 +133,8 @@ fn table(context: &mut Context, problems: &[StepProblem], answers: &[Answer]) ->
             }
             row.push(reached.join(", "));
         };
-        let on = |is_fine: bool| {
-            let like = StepProblem { is_fine, ..*problem };
-            let same = |other: &StepProblem| StepProblem { size: like.size, ..*other } == like;
-            problems.iter().position(same).map(|place| &answers[place])
-        };
-        for answer in sizes.iter().filter_map(|(is_fine, _)| on(*is_fine)) {
+        let on = |(is_fine, _): &(bool, usize)| on_mesh(problems, problem, *is_fine);
+        for answer in sizes.iter().filter_map(on).map(|place| &answers[place]) {
             add("quasi-Newton", answer.tets, &answer.curve);
         }
         for (rival, curve) in rivals.iter().zip(&answers[index].rivals) {
@@ -156,33 +159,10 @@ fn sizes(problems: &[StepProblem], answers: &[Answer]) -> Vec<(bool, usize)> {
     [false, true].into_iter().filter_map(of).collect()
 }
 
-/// What is asked of the counts.
+/// What is asked of the counts on the usual meshes.
 fn judge(context: &mut Context, problems: &[StepProblem], answers: &[Answer]) {
-    let passes = |of: &dyn Fn(&StepProblem) -> bool| {
-        LEVELS.map(|level| -> Vec<f64> {
-            let chosen = problems.iter().zip(answers).filter(|(problem, _)| of(problem));
-            chosen.map(|(_, answer)| answer.passes_to(level)).collect()
-        })
-    };
-    let compressible = passes(&|problem| problem.poisson <= COMPRESSIBLE);
-    let incompressible = passes(&|problem| problem.poisson > COMPRESSIBLE);
-    let mut claim = |what: &str, asked: [f64; 2], counts: &[Vec<f64>; 2], of: fn(&[f64]) -> f64| {
-        let measured = [of(&counts[0]), of(&counts[1])];
-        context.verdict_of(
-            counts[0].len(),
-            format!("quasi-Newton, passes to 1e-2, 1e-3, {what}"),
-            format!("at most {}, {}", asked[0], asked[1]),
-            measured.map(count_text).join(", "),
-            measured[0] <= asked[0] && measured[1] <= asked[1],
-        );
-    };
-    if !compressible[0].is_empty() {
-        claim("nu at most 0.45, median", MEDIAN, &compressible, median);
-        claim("nu at most 0.45, worst", WORST, &compressible, worst);
-    }
-    if !incompressible[0].is_empty() {
-        claim("nu above 0.45, worst", WORST_INCOMPRESSIBLE, &incompressible, worst);
-    }
+    let of_form = counts_of(problems, answers, |problem| problem.form == Form::Usual);
+    judge_counts(context, "", &of_form, WORST_INCOMPRESSIBLE);
     let gradient = worst(&answers.iter().map(|answer| answer.gradient).collect::<Vec<_>>());
     context.verdict(
         "quasi-Newton, gradient left at the exact ends over that at the prediction",
@@ -190,28 +170,76 @@ fn judge(context: &mut Context, problems: &[StepProblem], answers: &[Answer]) {
         format!("{gradient:.1e}"),
         gradient < GRADIENT,
     );
-    judge_growth(context, problems, answers);
+    judge_growth(context, Form::Usual, problems, answers);
+}
+
+/// Passes of some steps to both levels.
+type Counts = Vec<(StepProblem, [f64; 2])>;
+
+fn counts_of(
+    problems: &[StepProblem],
+    answers: &[Answer],
+    of: impl Fn(&StepProblem) -> bool,
+) -> Counts {
+    let chosen = problems.iter().zip(answers).filter(|(problem, _)| of(problem));
+    chosen
+        .map(|(problem, answer)| (*problem, LEVELS.map(|level| answer.passes_to(level))))
+        .collect()
+}
+
+/// What is asked of compressible tissue, and of the worst step of nearly incompressible tissue.
+fn judge_counts(context: &mut Context, form: &str, counts: &Counts, asked: [f64; 2]) {
+    let (soft, hard): (Counts, Counts) =
+        counts.iter().partition(|(problem, _)| problem.poisson <= COMPRESSIBLE);
+    if !soft.is_empty() {
+        claim(context, &format!("{form}nu at most 0.45, median"), MEDIAN, &soft, median);
+        claim(context, &format!("{form}nu at most 0.45, worst"), WORST, &soft, worst);
+    }
+    if !hard.is_empty() {
+        claim(context, &format!("{form}nu above 0.45, worst"), asked, &hard, worst);
+    }
+}
+
+/// A verdict on the median or the worst of passes to both levels.
+fn claim(
+    context: &mut Context,
+    what: &str,
+    asked: [f64; 2],
+    counts: &Counts,
+    of: fn(&[f64]) -> f64,
+) {
+    let measured =
+        [0, 1].map(|level| of(&counts.iter().map(|(_, both)| both[level]).collect::<Vec<_>>()));
+    context.verdict_of(
+        counts.len(),
+        format!("quasi-Newton, passes to 1e-2, 1e-3, {what}"),
+        format!("at most {}, {}", asked[0], asked[1]),
+        measured.map(count_text).join(", "),
+        measured[0] <= asked[0] && measured[1] <= asked[1],
+    );
 }
 
 /// Whether a finer mesh takes more passes.
-fn judge_growth(context: &mut Context, problems: &[StepProblem], answers: &[Answer]) {
+fn judge_growth(context: &mut Context, form: Form, problems: &[StepProblem], answers: &[Answer]) {
     let mut growths = Vec::new();
-    for (problem, coarse) in problems.iter().zip(answers).filter(|(problem, _)| !problem.is_fine) {
-        let like = StepProblem { is_fine: true, ..*problem };
-        let same = |other: &StepProblem| StepProblem { size: like.size, ..*other } == like;
-        if let Some(place) = problems.iter().position(same) {
+    let mut sizes = [0, 0];
+    let of_form = problems.iter().zip(answers).filter(|(problem, _)| problem.form == form);
+    for (problem, coarse) in of_form.filter(|(problem, _)| !problem.is_fine) {
+        if let Some(place) = on_mesh(problems, problem, true) {
             growths.push(answers[place].passes_to(LEVELS[1]) / coarse.passes_to(LEVELS[1]));
+            sizes = [coarse.tets, answers[place].tets];
         }
     }
     // Meshes of some hundred tetrahedra have too few levels to tell.
     if context.quick || growths.is_empty() {
         return;
     }
-    let sizes = sizes(problems, answers);
-    let tets = sizes.iter().map(|(_, tets)| tets.to_string()).collect::<Vec<_>>().join(" to ");
     let [middle, most] = [median(&growths), worst(&growths)];
     context.verdict(
-        format!("quasi-Newton, passes to 1e-3 from {tets} tets grow by, median"),
+        format!(
+            "quasi-Newton, {form}, passes to 1e-3 from {} to {} tets grow by, median",
+            sizes[0], sizes[1]
+        ),
         format!("< {GROWTH}"),
         if most.is_finite() {
             format!("{middle:.2}, at most {most:.2}")

@@ -1,7 +1,7 @@
 //! The steps that the quasi-Newton method is counted on, and their exact ends.
 
 use anyhow::Result;
-use std::fmt;
+use std::{fmt, slice};
 use viscera::material::MaterialModel;
 use viscera::scalar::Vec3;
 use viscera::settings::{Count, SolverSettings};
@@ -10,6 +10,7 @@ use viscera::state::State;
 
 use super::super::methods::quasi_newton;
 use super::super::step::MeasuredStep;
+use crate::forms::Form;
 use crate::load_cases::{FRAME_RATE, LoadCase, Size};
 use crate::reference::Reference;
 use crate::reference::objective::{Load, Objective, creep_at};
@@ -21,6 +22,16 @@ const MOMENTS: [(&str, u32); 3] = [("cantilever", 10), ("twist", 11), ("grab", 7
 /// Young's moduli [Pa].
 const YOUNGS: [f64; 3] = [1e3, 1e4, 1e5];
 const POISSONS: [f64; 3] = [0.3, 0.45, 0.49];
+/// Forms of the bar that are looked at beside the usual and the unstructured one, the first to compare others with.
+pub(super) const OTHERS: [Form; 7] = [
+    Form::Aligned,
+    Form::Turned,
+    Form::Jittered,
+    Form::Slender,
+    Form::Touching,
+    Form::Cut,
+    Form::Inclusion,
+];
 
 /// Passes of each frame that leads to the measured step: where that begins need not be exact, and a hundred
 /// come close enough for it to lie in the middle of the motion.
@@ -32,6 +43,7 @@ const CONVERGED: u32 = 600;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StepProblem {
     pub scene: &'static str,
+    pub form: Form,
     /// Frames before it.
     pub frames: u32,
     /// [Pa].
@@ -44,8 +56,8 @@ pub(super) struct StepProblem {
 
 impl fmt::Display for StepProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { scene, young, poisson, size, .. } = self;
-        write!(f, "{scene}, {} kPa, nu {poisson}, {size:?} mesh", young / 1e3)
+        let Self { scene, form, young, poisson, size, .. } = self;
+        write!(f, "{scene}, {form}, {} kPa, nu {poisson}, {size:?} mesh", young / 1e3)
     }
 }
 
@@ -60,24 +72,64 @@ fn sizes(quick: bool, changes: &Changes) -> Vec<(Size, bool)> {
     sizes
 }
 
+/// Steps on half a million tetrahedra and the same on a tenth of that, which come second: all scenes as usual, and one
+/// on an unstructured mesh.
+pub(super) fn vast_problems() -> Vec<StepProblem> {
+    let (young, poisson, is_fine) = (YOUNGS[1], POISSONS[1], true);
+    let mut problems = Vec::new();
+    for size in [Size::Vast, Size::Huge] {
+        let of = |form, (scene, frames)| StepProblem {
+            scene,
+            form,
+            frames,
+            young,
+            poisson,
+            size,
+            is_fine,
+        };
+        problems.extend(MOMENTS.map(|moment| of(Form::Usual, moment)));
+        problems.push(of(Form::Unstructured, MOMENTS[1]));
+    }
+    problems
+}
+
 /// All steps, those on finer meshes first.
 pub(super) fn problems(quick: bool, changes: &Changes) -> Vec<StepProblem> {
-    let youngs = match changes.young {
-        Some(young) => vec![young],
-        None if quick => vec![1e4],
-        None => YOUNGS.to_vec(),
-    };
-    let poissons = changes.poisson.map_or(POISSONS.to_vec(), |poisson| vec![poisson]);
     let mut problems = Vec::new();
     for (size, is_fine) in sizes(quick, changes) {
-        for (scene, frames) in MOMENTS {
-            for &poisson in &poissons {
-                let of = |&young| StepProblem { scene, frames, young, poisson, size, is_fine };
-                problems.extend(youngs.iter().map(of));
+        let grid = |form: Form, scenes: usize, youngs: &[f64], poissons: &[f64]| {
+            let mut grid = Vec::new();
+            for (scene, frames) in MOMENTS.into_iter().take(scenes) {
+                for &poisson in changes.poisson.as_ref().map_or(poissons, slice::from_ref) {
+                    let youngs = changes.young.as_ref().map_or(youngs, slice::from_ref);
+                    let of =
+                        |&young| StepProblem { scene, form, frames, young, poisson, size, is_fine };
+                    grid.extend(youngs.iter().map(of));
+                }
             }
+            grid
+        };
+        let middle = &YOUNGS[1..2];
+        problems.extend(grid(Form::Usual, 3, if quick { middle } else { &YOUNGS }, &POISSONS));
+        // A mesh of the user's has one form.
+        if changes.mesh.is_some() {
+            continue;
+        }
+        let youngs = if quick || is_fine { middle } else { &YOUNGS };
+        problems.extend(grid(Form::Unstructured, 3, youngs, &POISSONS));
+        let poissons = if quick { &POISSONS[1..2] } else { &POISSONS[..2] };
+        for form in OTHERS {
+            // The first two scenes are those of the bar.
+            problems.extend(grid(form, 2, middle, poissons));
         }
     }
     problems
+}
+
+/// Where the same step on the coarser or the finer mesh is in a list.
+pub(super) fn on_mesh(problems: &[StepProblem], of: &StepProblem, is_fine: bool) -> Option<usize> {
+    let is_same = |other: &StepProblem| StepProblem { is_fine, size: other.size, ..*of } == *other;
+    problems.iter().position(is_same)
 }
 
 impl StepProblem {
@@ -85,7 +137,10 @@ impl StepProblem {
     /// itself.
     pub fn step(&self, changes: &Changes) -> Result<MeasuredStep> {
         let tissue = changes.tissue(MaterialModel::StableNeoHookean, self.young, self.poisson)?;
-        let load_case = changes.load_case(self.scene, self.size, tissue)?;
+        let load_case = match self.form {
+            Form::Usual => changes.load_case(self.scene, self.size, tissue)?,
+            form => LoadCase::of_form(self.scene, form, self.size, tissue)?,
+        };
         let model = load_case.model::<f64>()?;
         let dt = 1.0 / FRAME_RATE;
         let start = lead(&load_case, self.frames)?;
