@@ -7,7 +7,7 @@
 //! ```text
 //! cell       c = (6 V)^(1/3)                V mean volume of a tetrahedron; a cube of a structured mesh has six
 //! spacing    s_0 = 2 c,  s_l = 2^l s_0
-//! points     origin + s_l k                 k >= 0, three whole numbers
+//! points     R^T (origin + s_l k)           k >= 0, three whole numbers; R x along the axes of the smallest box
 //! weight     w_l(x, k) = hat(x_1 / s_l - k_1) hat(x_2 / s_l - k_2) hat(x_3 / s_l - k_3),   hat(t) = max(0, 1 - |t|)
 //! nested     w_(l+1)(x, K) = sum over k of w_l(x, k) hat(k_1 / 2 - K_1) hat(k_2 / 2 - K_2) hat(k_3 / 2 - K_3)
 //! ```
@@ -25,6 +25,7 @@
 //!   what a vertex outside of the support ties together would save them, and join the sides of a cut at its end as well:
 //!   a bar of 50,000 tetrahedra cut by 60 % needed half as many iterations more.
 
+mod frame;
 mod nodes;
 #[cfg(test)]
 mod tests;
@@ -34,15 +35,17 @@ use nodes::{Neighbors, Nodes};
 
 use crate::mesh::tet_volume;
 use crate::model::{Z_ORDER_BITS, z_order};
-use crate::scalar::Vec3;
+use crate::scalar::{Mat3, Vec3};
 
 /// Nested lattices over a connected part. It depends on nothing but the part's own data.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Lattice {
     /// Spacing `[m]` of the finest level; each next one has twice that of the one before. Zero without levels.
     pub spacing: f64,
-    /// Where the points `[0, 0, 0]` of all levels are `[m]`: the corner of the part's smallest coordinates.
-    pub origin: Vec3<f64>,
+    /// `R`: its rows are the axes of the lattices.
+    axes: Mat3<f64>,
+    /// Where the points `[0, 0, 0]` of all levels are along the axes `[m]`: the part's smallest coordinates.
+    origin: Vec3<f64>,
     /// From fine to coarse; none for small parts.
     pub levels: Vec<Level>,
 }
@@ -110,7 +113,12 @@ impl Lattice {
             }
             of_finer = parents(&finer.points, &first_vertices, &coarsest);
         }
-        Self { spacing: grid.spacing, origin: grid.origin, levels }
+        Self { spacing: grid.spacing, axes: grid.axes, origin: grid.origin, levels }
+    }
+
+    /// A place `[m]` along the axes from the origin `[m]`.
+    pub fn along_axes(&self, place: Vec3<f64>) -> Vec3<f64> {
+        self.axes * place - self.origin
     }
 }
 
@@ -159,7 +167,9 @@ pub(crate) fn cell_order(places: &[Vec3<f64>], tets: &[[u32; 4]]) -> Vec<u64> {
 
 /// Where the points of the finest lattice lie.
 struct Grid {
-    /// The smallest coordinates of the vertices `[m]`.
+    /// See [`Lattice::axes`].
+    axes: Mat3<f64>,
+    /// The smallest coordinates of the vertices along the axes `[m]`.
     origin: Vec3<f64>,
     /// The largest side of the part `[m]`.
     side: f64,
@@ -185,20 +195,20 @@ impl Grid {
 
     /// One cell for the whole part.
     fn one_cell(places: &[Vec3<f64>]) -> Self {
+        let axes = frame::axes(places);
         let nothing = (Vec3::splat(f64::INFINITY), Vec3::splat(f64::NEG_INFINITY));
-        let extent =
-            |(low, high): (Vec3<f64>, Vec3<f64>), p: &Vec3<f64>| (low.min(*p), high.max(*p));
-        let (origin, high) = places.iter().fold(nothing, extent);
+        let extent = |(low, high): (Vec3<f64>, Vec3<f64>), p: Vec3<f64>| (low.min(p), high.max(p));
+        let (origin, high) = places.iter().map(|p| axes * *p).fold(nothing, extent);
         let size = high - origin;
         let side = size.x.max(size.y).max(size.z).max(0.0);
-        Self { origin, side, spacing: side.max(f64::MIN_POSITIVE) }
+        Self { axes, origin, side, spacing: side.max(f64::MIN_POSITIVE) }
     }
 
     /// Places `[m]` in spacings from the origin, none below zero.
     fn coordinates(&self, places: &[Vec3<f64>]) -> Vec<Vec3<f64>> {
         let snapped = |x: f64| if (x - x.round()).abs() < SNAP { x.round() } else { x };
         let coordinate = |p: &Vec3<f64>| {
-            let x = *p - self.origin;
+            let x = self.axes * *p - self.origin;
             Vec3::from_f64(x.to_array().map(|x| snapped(x / self.spacing)))
         };
         places.iter().map(coordinate).collect()

@@ -147,7 +147,7 @@ fn spacing_of(lattice: &Lattice, level: usize) -> f64 {
 /// Where a node lies `[m]`.
 fn place_of(lattice: &Lattice, level: usize, node: u32) -> Vec3<f64> {
     let k = lattice.levels[level].points[node as usize].map(f64::from);
-    lattice.origin + Vec3::from_f64(k) * spacing_of(lattice, level)
+    lattice.axes.transpose() * (lattice.origin + Vec3::from_f64(k) * spacing_of(lattice, level))
 }
 
 fn nodes_of(level: &Level, vertex: usize) -> BTreeSet<u32> {
@@ -435,7 +435,10 @@ fn numbers_of_vertices_do_not_matter() {
         let links = part.links.iter().map(|link| link.map(number)).collect();
         let permuted = Part { places, tets, links };
         let (a, b) = (part.lattice(10), permuted.lattice(10));
-        assert_eq!((a.spacing, a.origin, a.levels.len()), (b.spacing, b.origin, b.levels.len()));
+        assert_eq!(
+            (a.spacing, a.axes, a.origin, a.levels.len()),
+            (b.spacing, b.axes, b.origin, b.levels.len())
+        );
         for (a, b) in a.levels.iter().zip(&b.levels) {
             assert_eq!(a.points, b.points);
             let mut renamed = BTreeMap::new();
@@ -470,7 +473,7 @@ fn vertices_stand_cell_by_cell() {
         // Blocks of cells, cells, and halves and quarters of cells: each stands in one row.
         for size in [4.0, 2.0, 1.0, 0.5, 0.25] {
             let cell = |v: usize| {
-                let x = part.places[v] - lattice.origin;
+                let x = lattice.along_axes(part.places[v]);
                 x.to_array().map(|x| (x / (size * lattice.spacing) + 1e-9).floor() as u64)
             };
             let mut cells: Vec<[u64; 3]> = order.iter().map(|&v| cell(v)).collect();

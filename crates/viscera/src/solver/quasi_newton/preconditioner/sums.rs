@@ -8,7 +8,7 @@
 //!
 //! `g_c = sum_a w_ac g_a` is the gradient of node `c`'s shape function, in the rest shape; `R` the rotation, `A` the
 //! law's gradient map ([`crate::elements::law::Law::gradient_map`]): cofactors of `F`, by which the neo-Hookean volume
-//! term grows where tissue is stretched. A *group* is a connected set of tetrahedra of one law in one cell of the finest
+//! term grows where tissue is stretched. A *group* is a connected set of tetrahedra of one material in one cell of the finest
 //! lattice, which turn and stretch together: `R` and `A` are all that changes, so that the blocks of every level,
 //! vertices among them, are found without a pass over the tetrahedra. Diagonal blocks of neo-Hookean tetrahedra are
 //! exact but for that.
@@ -27,6 +27,7 @@ pub type Six<S> = [S; 6];
 /// A tetrahedron, its vertices counted from the first of the part.
 pub struct LocalTet {
     pub law: MaterialModel,
+    pub material: u32,
     pub vertices: [u32; 4],
     /// Shape gradients [1/m].
     pub gradients: [Vec3<f64>; 4],
@@ -51,6 +52,7 @@ pub fn tets_of_part<S: Real>(layout: &Layout<S>, number: usize, viscous: f64) ->
                 let stiffer = 1.0 + viscous * material.viscosity.to_f64();
                 tets.push(LocalTet {
                     law,
+                    material: constants.material[lane],
                     vertices: constants.vertices.map(|corner| corner[lane] - first),
                     gradients: shape_gradients(&constants.shape(lane).cast()),
                     volume: constants.rest_volume[lane].to_f64(),
@@ -79,15 +81,15 @@ pub struct Grouped {
 }
 
 impl Grouped {
-    /// The tetrahedra of one law in one cell of the finest lattice that hang together by vertices.
+    /// The tetrahedra of one material in one cell of the finest lattice that hang together by vertices.
     pub fn new(tets: &[LocalTet], places: &[Vec3<f64>], lattice: &Lattice) -> Self {
         let cell = |tet: &LocalTet| {
             let sum =
                 tet.vertices.iter().fold(Vec3::ZERO, |sum: Vec3<f64>, &v| sum + places[v as usize]);
-            let at = (sum * 0.25 - lattice.origin) * (1.0 / lattice.spacing);
+            let at = lattice.along_axes(sum * 0.25) * (1.0 / lattice.spacing);
             // A part without levels is one cell.
             let cell = |x: f64| if x.is_finite() { x.floor() as i64 } else { 0 };
-            (tet.law as usize, [at.z, at.y, at.x].map(cell))
+            (tet.material, [at.z, at.y, at.x].map(cell))
         };
         let mut order: Vec<(_, u32)> = tets.iter().map(cell).zip(0..).collect();
         order.sort_unstable();
