@@ -62,7 +62,7 @@ fn by_poisson<'a, S: Real>(
 }
 
 /// Substeps of SDIRK2 that follow an oscillation of a period [s] to within about 4 % over half a second: its phase is
-/// off by a share of the squared step that was measured on bars, and the more so the more periods there are. Stiffer
+/// off by a share of the squared step that was measured on bars and organs, and the more so the more periods there are. Stiffer
 /// bodies swing less than one sees; they take no more than [`MOST_SUBSTEPS`].
 pub fn substeps_for(period: f64, frame: f64) -> u32 {
     let periods = 0.5 / period;
@@ -72,8 +72,9 @@ pub fn substeps_for(period: f64, frame: f64) -> u32 {
     if substeps.is_finite() { (substeps as u32).clamp(1, MOST_SUBSTEPS) } else { 1 }
 }
 
-/// Error of a path after one period, times the square of the number of steps in it.
-const PHASE_ERROR: f64 = 5.6;
+/// Error of a path after one period, times the square of the number of steps in it: 5.6 on bars, up to 9 on organs, whose
+/// faster oscillations take part.
+const PHASE_ERROR: f64 = 9.0;
 
 /// Steps in a period at least.
 const FEWEST_STEPS: f64 = 13.0;
