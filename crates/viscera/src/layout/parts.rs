@@ -41,13 +41,13 @@ impl Part {
     }
 
     /// Its blocks of one set, in order; ranges that touch are one.
-    pub fn blocks(&self, kind: usize) -> impl Iterator<Item = Range<usize>> {
-        joined(self.colors.iter().map(move |color| widened(&color.blocks[kind])))
+    pub fn blocks(&self, law: usize) -> impl Iterator<Item = Range<usize>> {
+        joined(self.colors.iter().map(move |color| widened(&color.blocks[law])))
     }
 
     /// How many blocks of one set it has.
-    pub fn block_count(&self, kind: usize) -> usize {
-        self.colors.iter().map(|color| color.blocks[kind].len()).sum()
+    pub fn block_count(&self, law: usize) -> usize {
+        self.colors.iter().map(|color| color.blocks[law].len()).sum()
     }
 
     /// Its elements of one kind, in order.
@@ -110,10 +110,10 @@ impl<S: Real> Laid<'_, S> {
         }
         let of = |vertex: u32| self.part_of[vertex as usize] as usize;
         for color in 0..self.color_count {
-            for (kind, set) in self.sets.iter().enumerate() {
+            for (law, set) in self.sets.iter().enumerate() {
                 for block in set.color(color) {
                     let part = &mut parts[of(set.blocks[block].vertices[0][0])];
-                    extend(&mut part.color(color).blocks[kind], block);
+                    extend(&mut part.color(color).blocks[law], block);
                 }
             }
             for (kind, set) in self.elements.iter().enumerate() {
@@ -133,16 +133,16 @@ impl<S: Real> Laid<'_, S> {
     /// Ranges of the multipliers of a part.
     fn multipliers(&self, part: &Part) -> Vec<Range<usize>> {
         let mut ranges = Vec::new();
-        for (kind, set) in self.sets.iter().enumerate() {
+        for (law, set) in self.sets.iter().enumerate() {
             let [elastic, viscous] = set.multipliers_per_block();
             let mut add = |offset: usize, count: usize| {
                 let of = |blocks: Range<usize>| {
                     offset + count * blocks.start..offset + count * blocks.end
                 };
-                ranges.extend(part.blocks(kind).map(of));
+                ranges.extend(part.blocks(law).map(of));
             };
             add(set.multiplier_offset, elastic);
-            if part.blocks(kind).next().is_some_and(|blocks| set.is_viscous(blocks.start)) {
+            if part.blocks(law).next().is_some_and(|blocks| set.is_viscous(blocks.start)) {
                 add(set.viscous_offset, viscous);
             }
         }
@@ -197,13 +197,13 @@ mod tests {
     use crate::settings::{Colors, SolverSettings};
 
     /// Positions by part, blocks and multipliers in their order: what a step of the part reads.
-    fn laid_out(model: &Layout<f64>, part: usize) -> (Vec<Vec3<f64>>, Vec<Vec<f64>>, usize) {
-        let part = &model.parts[part];
-        let numbers = &model.numbering.order[part.vertices.clone()];
-        let places = numbers.iter().map(|&v| model.rest_positions[v as usize]).collect();
+    fn laid_out(layout: &Layout<f64>, part: usize) -> (Vec<Vec3<f64>>, Vec<Vec<f64>>, usize) {
+        let part = &layout.parts[part];
+        let numbers = &layout.numbering.order[part.vertices.clone()];
+        let places = numbers.iter().map(|&v| layout.rest_positions[v as usize]).collect();
         let mut blocks = Vec::new();
-        for (kind, set) in model.tet_sets.iter().enumerate() {
-            for block in part.blocks(kind).flatten() {
+        for (law, set) in layout.tet_sets.iter().enumerate() {
+            for block in part.blocks(law).flatten() {
                 let constants = &set.blocks[block];
                 let vertices = constants.vertices.as_flattened().iter();
                 let mut numbers = vec![f64::from(set.filled[block])];
@@ -260,8 +260,8 @@ mod tests {
                 }
                 let counted = both.parts.iter().map(|part| part.multiplier_count()).sum::<usize>();
                 assert!(counted <= both.multiplier_count);
-                for (kind, set) in both.tet_sets.iter().enumerate() {
-                    let count: usize = both.parts.iter().map(|part| part.block_count(kind)).sum();
+                for (law, set) in both.tet_sets.iter().enumerate() {
+                    let count: usize = both.parts.iter().map(|part| part.block_count(law)).sum();
                     assert_eq!(count, set.block_count());
                 }
             }

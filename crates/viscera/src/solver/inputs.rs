@@ -81,7 +81,7 @@ impl<S: Real> Inputs<S> {
 /// A step can be made with these inputs.
 pub(crate) fn check_step<S: Real>(
     dt: f64,
-    model: &Layout<S>,
+    layout: &Layout<S>,
     inputs: &Inputs<S>,
 ) -> Result<(), StepError> {
     // Multipliers are forces times the squared step, so that the square must be a number too.
@@ -89,7 +89,7 @@ pub(crate) fn check_step<S: Real>(
     if !(dt > 0.0 && squared > S::ZERO && squared.is_finite()) {
         return Err(StepError::BadStep { dt });
     }
-    check_inputs(model, inputs)
+    check_inputs(layout, inputs)
 }
 
 fn is_legal<S: Real>(tether: &Tether<S>) -> bool {
@@ -102,12 +102,12 @@ pub(crate) fn check_model<S: Real>(layout: &Layout<S>, model: &Model<S>) -> Resu
 }
 
 /// The state fits the model; at rest it has no multipliers yet.
-pub(crate) fn check_state<S: Real>(model: &Layout<S>, state: &State<S>) -> Result<(), StepError> {
-    let vertex_count = model.vertex_count();
+pub(crate) fn check_state<S: Real>(layout: &Layout<S>, state: &State<S>) -> Result<(), StepError> {
+    let vertex_count = layout.vertex_count();
     let lengths = [
         ("list of positions", state.positions.len(), vertex_count),
         ("list of velocities", state.velocities.len(), vertex_count),
-        ("list of multipliers", state.multipliers.len(), model.multiplier_count),
+        ("list of multipliers", state.multipliers.len(), layout.multiplier_count),
     ];
     for (place, (what, given, expected)) in lengths.into_iter().enumerate() {
         let is_none = place == 2 && given == 0;
@@ -120,11 +120,11 @@ pub(crate) fn check_state<S: Real>(model: &Layout<S>, state: &State<S>) -> Resul
 
 /// The inputs fit the model.
 pub(crate) fn check_inputs<S: Real>(
-    model: &Layout<S>,
+    layout: &Layout<S>,
     inputs: &Inputs<S>,
 ) -> Result<(), StepError> {
-    let vertex_count = model.vertex_count();
-    let expected = model.rest_anchors.len();
+    let vertex_count = layout.vertex_count();
+    let expected = layout.rest_anchors.len();
     if !inputs.anchors.is_empty() && inputs.anchors.len() != expected {
         return Err(StepError::AnchorCount { given: inputs.anchors.len(), expected });
     }

@@ -8,11 +8,11 @@ use crate::settings::{Method, SolverSettings};
 
 impl Plan {
     /// The stages that the settings ask for.
-    pub fn new<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Self {
+    pub fn new<S: Real>(layout: &Layout<S>, settings: &SolverSettings) -> Self {
         match settings.method {
-            Method::Xpbd => xpbd::plan(model, settings),
+            Method::Xpbd => xpbd::plan(layout, settings),
             Method::Explicit => explicit::plan(),
-            Method::QuasiNewton => quasi_newton::plan(settings, &model.materials),
+            Method::QuasiNewton => quasi_newton::plan(settings, &layout.materials),
         }
     }
 

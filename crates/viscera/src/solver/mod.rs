@@ -128,7 +128,7 @@ impl<S: Real> Solver<S> {
         let Self { settings, plan, layout, memory } = self;
         let small_steps = memory.repeats(layout, inputs, dt)?;
         state.multipliers.resize(layout.multiplier_count, S::ZERO);
-        let step = Step { model: layout, inputs, dt, settings };
+        let step = Step { layout, inputs, dt, settings };
         carry_out(Task::Watched(plan, small_steps, &mut watch), memory, &step, state);
         Ok(())
     }
@@ -152,7 +152,7 @@ impl<S: Real> Solver<S> {
         let Self { settings, plan, layout, memory } = self;
         let small_steps = memory.repeats(layout, inputs, dt)?;
         state.multipliers.resize(layout.multiplier_count, S::ZERO);
-        let step = Step { model: layout, inputs, dt, settings };
+        let step = Step { layout, inputs, dt, settings };
         carry_out(Task::Step(plan, small_steps, count), memory, &step, state);
         Ok(())
     }
@@ -171,7 +171,7 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         self.check(model, state, inputs, dt)?;
         state.multipliers.resize(self.layout.multiplier_count, S::ZERO);
-        let step = Step { model: &self.layout, inputs, dt, settings: &self.settings };
+        let step = Step { layout: &self.layout, inputs, dt, settings: &self.settings };
         carry_out(Task::Restart, &mut self.memory, &step, state);
         Ok(())
     }
@@ -210,7 +210,7 @@ impl<S: Real> Solver<S> {
     /// fastest; infinite where nothing is held, and for methods that need not know it. Forgets the last step.
     pub fn slowest_period(&mut self, inputs: &Inputs<S>) -> f64 {
         let Self { settings, layout, memory, .. } = self;
-        let step = Step { model: layout, inputs, dt: 1.0, settings };
+        let step = Step { layout, inputs, dt: 1.0, settings };
         cpu::precision::slowest_period(memory, &step)
     }
 

@@ -36,11 +36,11 @@ pub(super) fn everything(
 
 /// Memory that has begun a step from `places`, at rest there.
 pub(super) fn begun(step: &Step<'_, f64>, places: &[Vec3<f64>]) -> Memory<f64> {
-    let mut memory = Memory::new(step.model, step.settings);
+    let mut memory = Memory::new(step.layout, step.settings);
     let mut state = State {
         positions: places.to_vec(),
         velocities: vec![Vec3::ZERO; places.len()],
-        multipliers: vec![0.0; step.model.multiplier_count],
+        multipliers: vec![0.0; step.layout.multiplier_count],
         multiplier_dt: 0.0,
         learned: Default::default(),
     };
@@ -54,12 +54,12 @@ pub(super) fn begun(step: &Step<'_, f64>, places: &[Vec3<f64>]) -> Memory<f64> {
 
 /// A step of `dt` [s] in which nothing acts from outside.
 pub(super) fn quiet<'a>(
-    model: &'a Layout<f64>,
+    layout: &'a Layout<f64>,
     inputs: &'a Inputs<f64>,
     settings: &'a SolverSettings,
     dt: f64,
 ) -> Step<'a, f64> {
-    Step { model, inputs, dt, settings }
+    Step { layout, inputs, dt, settings }
 }
 
 /// Moves every point by some tenths of a millimetre.

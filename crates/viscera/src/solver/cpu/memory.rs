@@ -30,23 +30,23 @@ pub enum MethodMemory<S> {
 
 impl<S: Real> Memory<S> {
     /// Memory for the steps of a model.
-    pub fn new(model: &Layout<S>, settings: &SolverSettings) -> Self {
+    pub fn new(layout: &Layout<S>, settings: &SolverSettings) -> Self {
         let (method, needs_loads) = match settings.method {
             Method::Xpbd => {
-                let memory = xpbd::Memory::new(model, settings);
+                let memory = xpbd::Memory::new(layout, settings);
                 (MethodMemory::Xpbd(memory), xpbd::needs_loads(settings))
             }
             Method::Explicit => {
-                (MethodMemory::Explicit(explicit::Memory::new(model, settings)), true)
+                (MethodMemory::Explicit(explicit::Memory::new(layout, settings)), true)
             }
             Method::QuasiNewton => {
-                let memory = quasi_newton::Memory::new(model, settings);
+                let memory = quasi_newton::Memory::new(layout, settings);
                 (MethodMemory::QuasiNewton(Box::new(memory)), true)
             }
         };
         Self {
-            data: StepData::new(model, settings, needs_loads),
-            guard: settings.guards_steps().then(|| Guard::new(model)),
+            data: StepData::new(layout, settings, needs_loads),
+            guard: settings.guards_steps().then(|| Guard::new(layout)),
             method,
         }
     }
@@ -83,14 +83,14 @@ impl<S: Real> Memory<S> {
     /// [`Times::SmallSteps`]: crate::solver::plan::Times::SmallSteps
     pub fn repeats(
         &mut self,
-        model: &Layout<S>,
+        layout: &Layout<S>,
         inputs: &Inputs<S>,
         dt: f64,
     ) -> Result<u32, StepError> {
         match &mut self.method {
             MethodMemory::Xpbd(_) | MethodMemory::QuasiNewton(_) => Ok(1),
             MethodMemory::Explicit(memory) => {
-                memory.count_small_steps(model, inputs, &mut self.data, dt)
+                memory.count_small_steps(layout, inputs, &mut self.data, dt)
             }
         }
     }

@@ -48,7 +48,7 @@ pub fn carry_out<S: Real>(
     state: &mut State<S>,
 ) {
     let (memory, state): (&mut dyn Any, &mut dyn Any) = (memory, state);
-    let (model, inputs): (&dyn Any, &dyn Any) = (step.model, step.inputs);
+    let (model, inputs): (&dyn Any, &dyn Any) = (step.layout, step.inputs);
     macro_rules! in_precision {
         ($real:ty, $carry_out:ident) => {
             if let (Some(memory), Some(state), Some(model), Some(inputs)) = (
@@ -58,7 +58,7 @@ pub fn carry_out<S: Real>(
                 inputs.downcast_ref(),
             ) {
                 let Step { dt, settings, .. } = *step;
-                let step = Step { model, inputs, dt, settings };
+                let step = Step { layout: model, inputs, dt, settings };
                 return $carry_out(task, memory, &step, state);
             }
         };
@@ -101,7 +101,7 @@ fn generic<S: Real>(
             plan.walk(small_steps, &mut Execution { memory, step, state, left: count, observer });
         }
         Task::Watched(plan, small_steps, watch) => {
-            let places = vec![Vec3::ZERO; step.model.vertex_count()];
+            let places = vec![Vec3::ZERO; step.layout.vertex_count()];
             let observer = Some(Observer { watch, places, next: 0 });
             let left = usize::MAX;
             plan.walk(small_steps, &mut Execution { memory, step, state, left, observer });
@@ -134,7 +134,8 @@ impl<S: Real> Execution<'_, '_, '_, S> {
     /// Shows the observer the positions.
     fn show(&mut self) {
         let Some(Observer { watch, places, next }) = &mut self.observer else { return };
-        for (point, &user) in self.memory.data.points.iter().zip(&self.step.model.numbering.order) {
+        for (point, &user) in self.memory.data.points.iter().zip(&self.step.layout.numbering.order)
+        {
             places[user as usize] = point.vec3().cast();
         }
         watch(*next, places);
@@ -181,16 +182,16 @@ mod tests {
     /// A step of a plan from rest with initial velocities; the positions where it ends, and all that is shown.
     fn watched(
         plan: &Plan,
-        model: &Layout<f64>,
+        layout: &Layout<f64>,
         settings: &SolverSettings,
     ) -> (Vec<Vec3<f64>>, Vec<Vec<Vec3<f64>>>) {
         let inputs = Inputs::default();
-        let step = quiet(model, &inputs, settings, 1e-2);
-        let places = &model.rest_positions;
+        let step = quiet(layout, &inputs, settings, 1e-2);
+        let places = &layout.rest_positions;
         let mut state = State {
             positions: places.clone(),
             velocities: places.iter().map(|x| Vec3 { x: -x.y, y: x.z, z: x.x } * 20.0).collect(),
-            multipliers: vec![0.0; model.multiplier_count],
+            multipliers: vec![0.0; layout.multiplier_count],
             multiplier_dt: 0.0,
             learned: Default::default(),
         };
@@ -200,7 +201,7 @@ mod tests {
             seen.push(x.to_vec());
         };
         let task = Task::Watched(plan, 1, &mut watch);
-        carry_out(task, &mut Memory::new(model, settings), &step, &mut state);
+        carry_out(task, &mut Memory::new(layout, settings), &step, &mut state);
         (state.positions, seen)
     }
 

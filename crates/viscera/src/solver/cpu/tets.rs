@@ -37,8 +37,8 @@ pub struct Corners<L> {
 
 impl<'a, S: Real> Block<'a, S> {
     #[inline(always)]
-    fn new(model: &'a Layout<S>, set: &'a TetSet<S>, index: usize, lane: usize) -> Self {
-        Self { set, index, lane, constants: &set.blocks[index], materials: &model.materials }
+    fn new(layout: &'a Layout<S>, set: &'a TetSet<S>, index: usize, lane: usize) -> Self {
+        Self { set, index, lane, constants: &set.blocks[index], materials: &layout.materials }
     }
 
     /// How many tetrahedra of the block count.
@@ -305,7 +305,7 @@ unsafe fn gather<L: Lanes>(
 
 /// The blocks that a thread does at a time.
 struct Piece<'a, S, P> {
-    model: &'a Layout<S>,
+    layout: &'a Layout<S>,
     set: &'a TetSet<S>,
     blocks: Range<usize>,
     pass: &'a P,
@@ -317,7 +317,7 @@ impl<S: Real, P: TetPass<S>> lanes::Kernel<S> for Piece<'_, S, P> {
         for index in self.blocks {
             let (mut lane, filled) = (0, self.set.filled[index] as usize);
             while lane < filled {
-                self.pass.block::<L>(&Block::new(self.model, self.set, index, lane));
+                self.pass.block::<L>(&Block::new(self.layout, self.set, index, lane));
                 lane += L::WIDTH;
             }
         }
@@ -328,25 +328,25 @@ impl Workers {
     /// A pass over some blocks of a set, in no particular order.
     pub fn pass<S: Real>(
         &self,
-        model: &Layout<S>,
+        layout: &Layout<S>,
         set: &TetSet<S>,
         blocks: Range<usize>,
         pass: &(impl TetPass<S> + Sync),
     ) {
         self.each(blocks.len(), GRAIN, |piece| {
             let blocks = blocks.start + piece.start..blocks.start + piece.end;
-            lanes::run(self.instructions, Piece { model, set, blocks, pass });
+            lanes::run(self.instructions, Piece { layout, set, blocks, pass });
         });
     }
 
     /// A pass over a piece of a set by the thread that is here.
     pub fn piece<S: Real>(
         &self,
-        model: &Layout<S>,
+        layout: &Layout<S>,
         set: &TetSet<S>,
         blocks: Range<usize>,
         pass: &impl TetPass<S>,
     ) {
-        lanes::run(self.instructions, Piece { model, set, blocks, pass });
+        lanes::run(self.instructions, Piece { layout, set, blocks, pass });
     }
 }

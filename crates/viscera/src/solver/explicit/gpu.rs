@@ -19,7 +19,7 @@ impl Recorder<'_> {
     fn begin_explicit(&self, into: &mut Vec<Dispatch>) {
         into.push(self.vertices(&kernels::APPLY_UPDATES, 0));
         into.push(self.vertices(&kernels::BEGIN_EXPLICIT, 0));
-        if self.model.is_viscous() {
+        if self.layout.is_viscous() {
             let job = Job { count: self.tet_threads(), ..Job::default() };
             into.push(self.threads(&kernels::BEGIN_STRAIN, job));
         }

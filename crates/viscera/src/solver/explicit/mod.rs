@@ -62,11 +62,11 @@ pub struct Memory<S> {
 
 impl<S: Real> Memory<S> {
     /// Memory for the steps of a model.
-    pub fn new(model: &Layout<S>, settings: &SolverSettings) -> Self {
+    pub fn new(layout: &Layout<S>, settings: &SolverSettings) -> Self {
         Self {
-            stability: Stability::new(model, settings),
-            small_steps: vec![SmallSteps::default(); model.part_count()],
-            start_velocities: vec![Vec3::ZERO; model.vertex_count()],
+            stability: Stability::new(layout, settings),
+            small_steps: vec![SmallSteps::default(); layout.part_count()],
+            start_velocities: vec![Vec3::ZERO; layout.vertex_count()],
         }
     }
 
@@ -99,15 +99,16 @@ impl<S: Real> Memory<S> {
     /// Decides how many small steps each part takes in a step of `dt` [s]; returns the most.
     pub fn count_small_steps(
         &mut self,
-        model: &Layout<S>,
+        layout: &Layout<S>,
         inputs: &Inputs<S>,
         data: &mut StepData<S>,
         dt: f64,
     ) -> Result<u32, StepError> {
         let tethers = &mut data.constants.tethers;
-        bundle(model, inputs, tethers);
-        let most = small_steps(dt, self.stability.step(model, tethers))?;
-        for (small, stable) in self.small_steps.iter_mut().zip(self.stability.steps(model, tethers))
+        bundle(layout, inputs, tethers);
+        let most = small_steps(dt, self.stability.step(layout, tethers))?;
+        for (small, stable) in
+            self.small_steps.iter_mut().zip(self.stability.steps(layout, tethers))
         {
             *small = SmallSteps { count: small_steps(dt, stable)?, done: 0 };
         }
@@ -116,7 +117,7 @@ impl<S: Real> Memory<S> {
 
     /// [`ExplicitStage::Begin`].
     fn begin(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
-        let model = step.model;
+        let model = step.layout;
         data.prepare(step, Tethers::AsForces);
         data.constants.previous.copy_from_slice(&data.points);
         self.start_velocities.copy_from_slice(&data.velocities);
@@ -143,7 +144,7 @@ impl<S: Real> Memory<S> {
     /// [`ExplicitStage::LoadForces`].
     fn load_forces(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
         let StepData { constants, points, velocities, loads } = data;
-        for (part, small) in step.model.parts.iter().zip(&self.small_steps) {
+        for (part, small) in step.layout.parts.iter().zip(&self.small_steps) {
             if small.done == small.count {
                 continue;
             }
@@ -154,17 +155,17 @@ impl<S: Real> Memory<S> {
             let squared = S::from_f64(small.dt * small.dt);
             for tether in constants.tethers_of(part) {
                 let force = tether.force(points[tether.vertex].vec3());
-                let copy = step.model.copy_offsets[tether.vertex] as usize;
+                let copy = step.layout.copy_offsets[tether.vertex] as usize;
                 loads[copy].add(Point::new(force * squared, S::ZERO));
             }
             let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-            measure_strain(workers, step.model, Some(part), points, strains);
+            measure_strain(workers, step.layout, Some(part), points, strains);
         }
     }
 
     /// [`ExplicitStage::Advance`].
     fn advance(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
-        let model = step.model;
+        let model = step.layout;
         let StepData { constants, points, velocities, loads } = data;
         let small_steps = &mut self.small_steps;
         for (part, small) in model.parts.iter().zip(small_steps.iter_mut()) {

@@ -57,32 +57,32 @@ impl SmallSteps {
 
 impl Stability {
     /// Of a model.
-    pub fn new<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Self {
-        let (stiffness, parts) = part_stability(model);
+    pub fn new<S: Real>(layout: &Layout<S>, settings: &SolverSettings) -> Self {
+        let (stiffness, parts) = part_stability(layout);
         let safety = settings.explicit_safety;
         let mut stability = Self { step: f64::INFINITY, stiffness, parts, safety };
-        stability.step = stability.step(model, &[]);
+        stability.step = stability.step(layout, &[]);
         stability
     }
 
     /// The largest small step [s] of the stiffest part with these tethers.
-    pub fn step<S: Real>(&self, model: &Layout<S>, tethers: &[Bundle<S>]) -> f64 {
-        self.steps(model, tethers).fold(f64::INFINITY, f64::min)
+    pub fn step<S: Real>(&self, layout: &Layout<S>, tethers: &[Bundle<S>]) -> f64 {
+        self.steps(layout, tethers).fold(f64::INFINITY, f64::min)
     }
 
     /// The largest small step [s] of each part with these tethers, sorted by vertex.
     pub fn steps<S: Real>(
         &self,
-        model: &Layout<S>,
+        layout: &Layout<S>,
         tethers: &[Bundle<S>],
     ) -> impl Iterator<Item = f64> {
         let mut tethers = tethers.iter().peekable();
-        self.parts.iter().zip(model.parts.iter()).map(move |(stability, part)| {
+        self.parts.iter().zip(layout.parts.iter()).map(move |(stability, part)| {
             let mut frequency = stability.frequency;
             while let Some(tether) = tethers.next_if(|t| t.vertex < part.vertices.end) {
-                let v = model.numbering.order[tether.vertex] as usize;
+                let v = layout.numbering.order[tether.vertex] as usize;
                 let stiffness = self.stiffness[v] + tether.stiffness.to_f64();
-                frequency = frequency.max((stiffness / model.masses[v].to_f64()).sqrt());
+                frequency = frequency.max((stiffness / layout.masses[v].to_f64()).sqrt());
             }
             let xi = 0.5 * stability.viscosity * frequency;
             self.safety * (2.0 / frequency) * ((1.0 + xi * xi).sqrt() - xi)
@@ -96,14 +96,14 @@ impl Stability {
 }
 
 /// Of the elements around each vertex [N/m], and what of it decides in each part.
-fn part_stability<S: Real>(model: &Layout<S>) -> (Vec<f64>, Vec<PartStability>) {
-    let mut stiffness = vec![0.0; model.vertex_count()];
-    let mut parts = vec![PartStability::default(); model.part_count()];
-    for set in &model.tet_sets {
-        for tet in model.tets(set) {
-            let material = &model.materials[tet.material];
+fn part_stability<S: Real>(layout: &Layout<S>) -> (Vec<f64>, Vec<PartStability>) {
+    let mut stiffness = vec![0.0; layout.vertex_count()];
+    let mut parts = vec![PartStability::default(); layout.part_count()];
+    for set in &layout.tet_sets {
+        for tet in layout.tets(set) {
+            let material = &layout.materials[tet.material];
             let viscosity =
-                &mut parts[model.part_at(model.numbering.of(tet.vertices[0]))].viscosity;
+                &mut parts[layout.part_at(layout.numbering.of(tet.vertices[0]))].viscosity;
             *viscosity = viscosity.max(material.viscosity.to_f64());
             let shape = tet.inverse_rest_shape.cast::<f64>();
             let lame = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
@@ -113,10 +113,10 @@ fn part_stability<S: Real>(model: &Layout<S>) -> (Vec<f64>, Vec<PartStability>) 
             }
         }
     }
-    for_each_kind!(model, set => add_stiffness(set, model, &mut stiffness));
-    for (stability, part) in parts.iter_mut().zip(model.parts.iter()) {
-        let vertices = model.numbering.order[part.vertices.clone()].iter().map(|&v| v as usize);
-        let ratios = vertices.map(|v| stiffness[v] / model.masses[v].to_f64());
+    for_each_kind!(layout, set => add_stiffness(set, layout, &mut stiffness));
+    for (stability, part) in parts.iter_mut().zip(layout.parts.iter()) {
+        let vertices = layout.numbering.order[part.vertices.clone()].iter().map(|&v| v as usize);
+        let ratios = vertices.map(|v| stiffness[v] / layout.masses[v].to_f64());
         stability.frequency = ratios.fold(0.0, f64::max).sqrt();
     }
     (stiffness, parts)
@@ -125,11 +125,11 @@ fn part_stability<S: Real>(model: &Layout<S>) -> (Vec<f64>, Vec<PartStability>) 
 /// Adds the stiffness of the elements of one kind to their vertices [N/m].
 fn add_stiffness<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
     set: &ElementSet<S, K, N, M>,
-    model: &Layout<S>,
+    layout: &Layout<S>,
     stiffness: &mut [f64],
 ) {
     for (i, vertices) in set.vertices.iter().enumerate() {
-        let of_element = set.list.element::<f64>(i, &model.rest_anchors).stiffness();
+        let of_element = set.list.element::<f64>(i, &layout.rest_anchors).stiffness();
         for &v in vertices {
             stiffness[v as usize] += of_element;
         }

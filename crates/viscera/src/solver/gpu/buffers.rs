@@ -5,7 +5,7 @@ use wgpu::BufferUsages;
 use super::control::control_size;
 use super::device::Device;
 use super::error::GpuError;
-use super::layout::{self, DeviceLayout};
+use super::layout::{DeviceLayout, tets};
 use super::limits::{accelerates, window};
 use super::slots::{Place, Range, Slot, Update, multipliers_start, unknowns_size};
 use crate::layout::Layout;
@@ -45,27 +45,27 @@ fn check_sizes(
 impl Buffers {
     pub fn new(
         device: &Device,
-        model: &Layout<f32>,
+        layout: &Layout<f32>,
         settings: &SolverSettings,
-        layout: &DeviceLayout,
+        on_device: &DeviceLayout,
         left_over: &[u8],
     ) -> Result<Self, GpuError> {
-        let vertices = model.vertex_count() as u64;
+        let vertices = layout.vertex_count() as u64;
         let points_size = 16 * vertices;
-        let multipliers_start = multipliers_start(model.vertex_count());
-        let unknowns = unknowns_size(model);
+        let multipliers_start = multipliers_start(layout.vertex_count());
+        let unknowns = unknowns_size(layout);
         let accelerated = accelerates(settings);
         let anderson = accelerated && settings.acceleration == Acceleration::Anderson;
         let history = if anderson { unknowns * (u64::from(window(settings)) + 1) } else { 0 };
-        let viscous = model.is_viscous();
-        let blocks = model.block_count() as u64;
+        let viscous = layout.is_viscous();
+        let blocks = layout.block_count() as u64;
         let when = |wanted: bool, size: u64| if wanted { size } else { 0 };
-        let table = layout.table(model, settings);
-        let split = model.is_split();
+        let table = on_device.table(layout, settings);
+        let split = layout.is_split();
         use Slot::*;
         let sizes = [
-            (Copies, "copies of vertices", when(split, 16 * model.copy_count() as u64)),
-            (Loads, "loads", 16 * layout.slot_count()),
+            (Copies, "copies of vertices", when(split, 16 * layout.copy_count() as u64)),
+            (Loads, "loads", 16 * on_device.slot_count()),
             (Updates, "inputs", size_of::<Update>() as u64 * vertices),
             (StartStrain, "strains", when(viscous, 6 * 4 * LANES as u64 * blocks)),
             (Unknowns, "unknowns", unknowns),
@@ -74,13 +74,13 @@ impl Buffers {
             (Residuals, "Anderson's residuals", history),
             (Mapped, "Anderson's iterates", history),
             (PartialSums, "partial sums", table.sums_size),
-            (Control, "control records", control_size(model.part_count())),
+            (Control, "control records", control_size(layout.part_count())),
             (VertexData, "vertices", table.vertex_data_size),
         ];
-        let constants = [(Tets, "tetrahedra", layout::tets(model)), (Table, "tables", table.bytes)];
+        let constants = [(Tets, "tetrahedra", tets(layout)), (Table, "tables", table.bytes)];
         let of_constants = constants.iter().map(|(_, what, bytes)| (*what, bytes.len() as u64));
         let arrays = sizes.iter().map(|&(_, what, size)| (what, size)).chain(of_constants);
-        check_sizes(device, model.tet_count() as u64, arrays)?;
+        check_sizes(device, layout.tet_count() as u64, arrays)?;
 
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let make = |label: &str, size: u64, usage: BufferUsages| {
@@ -111,7 +111,7 @@ impl Buffers {
             all.push((*slot, filled(label, bytes)));
         }
         let copies = split.then(|| {
-            let [indices, offsets] = DeviceLayout::copies(model);
+            let [indices, offsets] = DeviceLayout::copies(layout);
             [filled("copies of corners", &indices), filled("copies of vertices", &offsets)]
         });
         let mut ranges = table.ranges;

@@ -37,15 +37,15 @@ pub struct StepCost {
 
 impl StepCost {
     /// Of a model that is solved in this way, with so many sweeps.
-    pub fn new(model: &Layout<f32>, settings: &SolverSettings, sweeps: u32) -> Self {
+    pub fn new(layout: &Layout<f32>, settings: &SolverSettings, sweeps: u32) -> Self {
         // How many dispatches there are does not depend on the length of the long vector.
-        let plan = Plan::new(model, settings);
+        let plan = Plan::new(layout, settings);
         let pieces = Pieces { count: 1, first_of_vertices: 0, groups: 1 };
-        let record = Recorder::new(model, settings, [0; 2], pieces).record(&plan);
+        let record = Recorder::new(layout, settings, [0; 2], pieces).record(&plan);
         let [prologue, body, epilogue] =
             [record.prologue, record.body, record.epilogue].map(|list| list.len() as u64);
         let dispatches = prologue + u64::from(sweeps) * body + epilogue;
-        let cpu = model.tet_count() as f64 * f64::from(sweeps) * TET_AND_SWEEP;
+        let cpu = layout.tet_count() as f64 * f64::from(sweeps) * TET_AND_SWEEP;
         Self { sweeps, dispatches, cpu, gpu: dispatches as f64 * DISPATCH }
     }
 

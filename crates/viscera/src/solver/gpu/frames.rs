@@ -196,16 +196,16 @@ impl GpuSolver {
         Ok(())
     }
 
-    fn take_state(&self, model: &Layout<f32>, state: &mut State<f32>, read: &[&[u8]]) {
+    fn take_state(&self, layout: &Layout<f32>, state: &mut State<f32>, read: &[&[u8]]) {
         let [unknowns, velocities] = [read[0], read[1]];
         let points = |bytes: &[u8]| -> Vec<Vec3<f32>> {
             let points = &bytes[..self.buffers.points_size as usize];
-            in_user_order(model, bytemuck::cast_slice(points))
+            in_user_order(layout, bytemuck::cast_slice(points))
         };
         state.positions = points(unknowns);
         state.velocities = points(velocities);
         let start = self.buffers.multipliers_start as usize;
-        let multipliers = &unknowns[start..start + 4 * model.multiplier_count];
+        let multipliers = &unknowns[start..start + 4 * layout.multiplier_count];
         state.multipliers = bytemuck::cast_slice(multipliers).to_vec();
         state.multiplier_dt = self.multiplier_dt;
     }
@@ -234,16 +234,16 @@ impl GpuSolver {
 }
 
 /// The device's values that a force balance needs.
-fn balance_slots(model: &Layout<f32>) -> Vec<Slot> {
+fn balance_slots(layout: &Layout<f32>) -> Vec<Slot> {
     let mut slots = vec![Slot::Predicted, Slot::ExternalForces, Slot::Previous];
-    if model.is_viscous() {
+    if layout.is_viscous() {
         slots.push(Slot::StartStrain);
     }
     slots
 }
 
-fn put_in_user_order(model: &Layout<f32>, places: &[[f32; 4]], into: &mut [Vec3<f32>]) {
-    for (value, &v) in into.iter_mut().zip(&model.numbering.rank) {
+fn put_in_user_order(layout: &Layout<f32>, places: &[[f32; 4]], into: &mut [Vec3<f32>]) {
+    for (value, &v) in into.iter_mut().zip(&layout.numbering.rank) {
         let [x, y, z, _] = places[v as usize];
         *value = vec3(x, y, z);
     }
@@ -302,7 +302,7 @@ pub(super) fn read(
     Ok(())
 }
 
-fn in_user_order(model: &Layout<f32>, places: &[[f32; 4]]) -> Vec<Vec3<f32>> {
-    let rank = model.numbering.rank.iter();
+fn in_user_order(layout: &Layout<f32>, places: &[[f32; 4]]) -> Vec<Vec3<f32>> {
+    let rank = layout.numbering.rank.iter();
     rank.map(|&v| places[v as usize]).map(|[x, y, z, _]| vec3(x, y, z)).collect()
 }

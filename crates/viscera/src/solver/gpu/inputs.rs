@@ -12,8 +12,8 @@ use crate::solver::xpbd::iterates::fill_multiplier_weights;
 
 impl GpuSolver {
     /// Loads and holds of vertices in this step, and the freedom of those that the last one held.
-    pub(super) fn collect_updates(&mut self, model: &Layout<f32>, inputs: &Inputs<f32>, dt: f64) {
-        bundle(model, inputs, &mut self.tethers);
+    pub(super) fn collect_updates(&mut self, layout: &Layout<f32>, inputs: &Inputs<f32>, dt: f64) {
+        bundle(layout, inputs, &mut self.tethers);
         self.updates.clear();
         let (updates, update_of) = (&mut self.updates, &mut self.update_of);
         let mut update = |vertex: u32| {
@@ -27,7 +27,7 @@ impl GpuSolver {
         for vertex in self.touched.drain(..) {
             update(vertex);
         }
-        let of = |vertex: u32| model.numbering.of(vertex) as u32;
+        let of = |vertex: u32| layout.numbering.of(vertex) as u32;
         let forces: Vec<(usize, [f32; 3])> = (inputs.forces.iter())
             .map(|&(vertex, force)| (update(of(vertex)), force.to_array()))
             .collect();
@@ -57,7 +57,7 @@ impl GpuSolver {
         };
         for update in &mut self.updates {
             self.update_of[update.vertex as usize] = u32::MAX;
-            let mass = model.masses[model.numbering.order[update.vertex as usize] as usize];
+            let mass = layout.masses[layout.numbering.order[update.vertex as usize] as usize];
             update.inertia = mass + update.stiffness * squared_dt;
             if update.is_pinned != 0 || update.force != [0.0; 3] || update.stiffness != 0.0 {
                 self.touched.push(update.vertex);
@@ -68,18 +68,18 @@ impl GpuSolver {
 
 /// Weights of the norm in which iterates are compared, for a step of `dt` [s].
 pub(super) fn norm_weights(
-    model: &Layout<f32>,
+    layout: &Layout<f32>,
     settings: &SolverSettings,
     buffers: &Buffers,
     dt: f64,
 ) -> Vec<f32> {
     let mut weights = vec![0.0; buffers.length as usize];
     let (positions, multipliers) = weights.split_at_mut((buffers.multipliers_start / 4) as usize);
-    for (four, &v) in positions.as_chunks_mut::<4>().0.iter_mut().zip(&model.numbering.order) {
-        let mass = model.masses[v as usize];
+    for (four, &v) in positions.as_chunks_mut::<4>().0.iter_mut().zip(&layout.numbering.order) {
+        let mass = layout.masses[v as usize];
         *four = [mass, mass, mass, 0.0];
     }
-    fill_multiplier_weights(model, dt, multipliers);
+    fill_multiplier_weights(layout, dt, multipliers);
     if settings.acceleration == Acceleration::Anderson {
         match settings.anderson_on {
             AndersonOn::Positions => multipliers.fill(0.0),
@@ -90,8 +90,8 @@ pub(super) fn norm_weights(
     // No weight, but the number of a vertex's first copy: Anderson joins them. What fills up behind the vertices
     // has none.
     let (positions, _) = weights.split_at_mut((buffers.multipliers_start / 4) as usize);
-    let mut copies = copy_offsets(model);
-    copies.resize(positions.len() / 4, model.copy_count() as u32);
+    let mut copies = copy_offsets(layout);
+    copies.resize(positions.len() / 4, layout.copy_count() as u32);
     for (four, first) in positions.as_chunks_mut::<4>().0.iter_mut().zip(copies) {
         four[3] = f32::from_bits(first);
     }

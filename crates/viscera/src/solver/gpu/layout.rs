@@ -123,10 +123,10 @@ pub(super) struct DeviceLayout {
 }
 
 impl DeviceLayout {
-    pub fn new(model: &Layout<f32>, settings: &SolverSettings) -> Self {
+    pub fn new(layout: &Layout<f32>, settings: &SolverSettings) -> Self {
         // Every corner of every element writes its load to a slot of its own, and each vertex adds up its slots in
         // order: no atomics, and one order of sums whatever the device does. Slots are a counting sort by vertex.
-        let mut counts = vec![0u32; model.vertex_count() + 1];
+        let mut counts = vec![0u32; layout.vertex_count() + 1];
         let mut count = |vertex: u32| {
             let place = &mut counts[vertex as usize];
             *place += 1;
@@ -135,7 +135,7 @@ impl DeviceLayout {
         // Blocks stand part by part in each colour, so a part's loads have the order that they have in a model of the
         // part alone. Padding lanes keep slot 0, which is another's: kernels leave them out by their material FILLING.
         let mut corners = Vec::new();
-        for set in &model.tet_sets {
+        for set in &layout.tet_sets {
             for (block, &filled) in set.blocks.iter().zip(&set.filled) {
                 let mut ranks = [[0; LANES]; 4];
                 for lane in 0..filled as usize {
@@ -146,7 +146,7 @@ impl DeviceLayout {
                 corners.push(ranks);
             }
         }
-        let mut elements = elements(model);
+        let mut elements = elements(layout);
         // Behind the tetrahedra, kind by kind: `load_forces` on the CPU adds them in that order.
         let by_kind = kind_by_kind(&elements);
         for &i in &by_kind {
@@ -163,7 +163,7 @@ impl DeviceLayout {
             total += count;
         }
         // Only now are the offsets known, so the ranks get them in a second pass, in the same order of blocks.
-        let mut blocks = model.tet_sets.iter().flat_map(|set| set.blocks.iter().zip(&set.filled));
+        let mut blocks = layout.tet_sets.iter().flat_map(|set| set.blocks.iter().zip(&set.filled));
         for ranks in &mut corners {
             let Some((block, &filled)) = blocks.next() else { break };
             for corner in 0..4 {
@@ -178,9 +178,9 @@ impl DeviceLayout {
                 *slot += offsets[vertex as usize];
             }
         }
-        let (members, pieces) = pieces(model, &elements, &by_kind);
-        let parts = Parts::new(model, settings, &pieces);
-        let block_parts = block_parts(model);
+        let (members, pieces) = pieces(layout, &elements, &by_kind);
+        let parts = Parts::new(layout, settings, &pieces);
+        let block_parts = block_parts(layout);
         Self { offsets, corners, elements, members, pieces, block_parts, parts }
     }
 
@@ -195,7 +195,7 @@ impl DeviceLayout {
     }
 
     /// The constants beside the tetrahedra, and where everything stands.
-    pub fn table(&self, model: &Layout<f32>, settings: &SolverSettings) -> Table {
+    pub fn table(&self, layout: &Layout<f32>, settings: &SolverSettings) -> Table {
         let guarded = settings.guards_steps();
         let (mut bytes, mut ranges) = (vec![0; ALIGNMENT as usize], Vec::new());
         // Appends a piece and returns its first word. A piece with a slot can be bound alone as well: hence it begins
@@ -214,7 +214,7 @@ impl DeviceLayout {
         // Places are known once everything before has been added, so the header is written last, into the 256 bytes
         // that were left free at the start; it must not outgrow them. The order of the pieces means nothing.
         let mut header = Header {
-            materials: add(Some(Slot::Materials), &materials(model)),
+            materials: add(Some(Slot::Materials), &materials(layout)),
             corners: add(
                 Some(Slot::CornerIndices),
                 &words(self.corners.as_flattened().as_flattened()),
@@ -227,26 +227,26 @@ impl DeviceLayout {
             runs: add(None, &words(self.parts.runs.as_flattened())),
             block_parts: add(None, &words(&self.block_parts)),
             tet_lanes: (LANES * self.corners.len()) as u32,
-            law_ends: law_ends(model),
-            part_count: model.part_count() as u32,
+            law_ends: law_ends(layout),
+            part_count: layout.part_count() as u32,
             ..Header::default()
         };
         // Room only: the host writes these at the start of a step, weights when its length changes. Offsets of
         // pieces that a method lacks stay zero, and none of its kernels reads them.
-        let falls = vec![Fall::default(); model.part_count()];
+        let falls = vec![Fall::default(); layout.part_count()];
         header.falls = add(Some(Slot::Falls), bytemuck::cast_slice(&falls));
         if settings.method == Method::Explicit {
-            let small = vec![SmallSteps::default(); model.part_count()];
+            let small = vec![SmallSteps::default(); layout.part_count()];
             header.small_steps = add(Some(Slot::SmallSteps), bytemuck::cast_slice(&small));
         }
         if accelerates(settings) {
-            let weights = vec![0; unknowns_size(model) as usize];
+            let weights = vec![0; unknowns_size(layout) as usize];
             header.weights = add(Some(Slot::Weights), &weights);
         }
 
         // Data of vertices lie in one buffer, range by range, because the baseline allows a kernel eight
         // storage buffers. A guarded step's three starts are one binding: `predict` writes all of them.
-        let each = 16 * u64::from(Self::stride(model));
+        let each = 16 * u64::from(Self::stride(layout));
         let count = if guarded { VERTEX_DATA.len() } else { UNGUARDED };
         for (place, (_, slot)) in VERTEX_DATA[..count].iter().enumerate() {
             let size = if guarded && *slot == Some(Slot::Starts) { 3 * each } else { each };
@@ -255,9 +255,9 @@ impl DeviceLayout {
         }
         let start = each * count as u64;
         let size =
-            (16 * model.rest_anchors.len() as u64).next_multiple_of(ALIGNMENT).max(ALIGNMENT);
+            (16 * layout.rest_anchors.len() as u64).next_multiple_of(ALIGNMENT).max(ALIGNMENT);
         ranges.push(Range { slot: Slot::Anchors, owner: Slot::VertexData, start, size });
-        (header.stride, header.anchors) = (Self::stride(model), (start / 16) as u32);
+        (header.stride, header.anchors) = (Self::stride(layout), (start / 16) as u32);
 
         // Sums of the accelerations are read before pieces leave theirs.
         let pieces = if guarded { self.pieces.len() as u64 } else { 0 };
@@ -274,8 +274,8 @@ impl DeviceLayout {
     }
 
     /// Vertices from one range of the vertex data to the next.
-    pub fn stride(model: &Layout<f32>) -> u32 {
-        model.vertex_count().next_multiple_of((ALIGNMENT / 16) as usize) as u32
+    pub fn stride(layout: &Layout<f32>) -> u32 {
+        layout.vertex_count().next_multiple_of((ALIGNMENT / 16) as usize) as u32
     }
 
     /// How the work is divided.
@@ -288,13 +288,13 @@ impl DeviceLayout {
     }
 
     /// Copies of each corner, and where those of each vertex begin.
-    pub fn copies(model: &Layout<f32>) -> [Vec<u8>; 2] {
-        let sets = model.tet_sets.iter();
+    pub fn copies(layout: &Layout<f32>) -> [Vec<u8>; 2] {
+        let sets = layout.tet_sets.iter();
         let indices: Vec<u32> = sets
             .flat_map(|set| (0..set.block_count()).map(move |block| set.copies_of(block)))
             .flat_map(|corners| corners.as_flattened().iter().copied())
             .collect();
-        [indices, copy_offsets(model)].map(|words| bytemuck::cast_slice(&words).to_vec())
+        [indices, copy_offsets(layout)].map(|words| bytemuck::cast_slice(&words).to_vec())
     }
 }
 
@@ -303,29 +303,29 @@ impl DeviceLayout {
 pub(super) const WHOLE: u32 = 1 << 31;
 
 /// Where the copies of each vertex begin, one more at the end.
-pub(super) fn copy_offsets(model: &Layout<f32>) -> Vec<u32> {
-    let mut offsets = model.copy_offsets.clone();
-    for part in model.parts.iter().filter(|part| !part.is_split()) {
+pub(super) fn copy_offsets(layout: &Layout<f32>) -> Vec<u32> {
+    let mut offsets = layout.copy_offsets.clone();
+    for part in layout.parts.iter().filter(|part| !part.is_split()) {
         offsets[part.vertices.clone()].iter_mut().for_each(|first| *first |= WHOLE);
     }
     offsets
 }
 
 /// The blocks where the tetrahedra of each law end.
-fn law_ends(model: &Layout<f32>) -> [u32; LAWS] {
+fn law_ends(layout: &Layout<f32>) -> [u32; LAWS] {
     let mut end = 0;
-    model.tet_sets.each_ref().map(|set| {
+    layout.tet_sets.each_ref().map(|set| {
         end += set.block_count() as u32;
         end
     })
 }
 
 /// Elements that are no tetrahedra, sorted by colour, within a colour by kind; places of loads are not yet known.
-fn elements(model: &Layout<f32>) -> Vec<Element> {
+fn elements(layout: &Layout<f32>) -> Vec<Element> {
     let mut all: Vec<(usize, Element)> = Vec::new();
-    for_each_kind!(model, set => {
-        for color in 0..model.color_count {
-            all.extend(set.color(color).map(|i| (color, element(set, i, model))));
+    for_each_kind!(layout, set => {
+        for color in 0..layout.color_count {
+            all.extend(set.color(color).map(|i| (color, element(set, i, layout))));
         }
     });
     all.sort_by_key(|(color, _)| *color);
@@ -335,13 +335,13 @@ fn elements(model: &Layout<f32>) -> Vec<Element> {
 fn element<K: Kind<N, M>, const N: usize, const M: usize>(
     set: &ElementSet<f32, K, N, M>,
     i: usize,
-    model: &Layout<f32>,
+    layout: &Layout<f32>,
 ) -> Element {
     let corner = |corner: usize| if corner < N { corner } else { 0 };
-    let vertices = set.vertices[i].map(|v| model.numbering.of(v) as u32);
+    let vertices = set.vertices[i].map(|v| layout.numbering.of(v) as u32);
     Element {
         kind: set.number as u32,
-        part: model.part_at(vertices[0] as usize) as u32,
+        part: layout.part_at(vertices[0] as usize) as u32,
         multiplier: set.multipliers(i).start as u32,
         anchor: set.anchors.get(i).copied().unwrap_or(0),
         vertices: std::array::from_fn(|c| vertices[corner(c)]),
@@ -359,9 +359,9 @@ fn kind_by_kind(elements: &[Element]) -> Vec<usize> {
 }
 
 /// The first of the elements of a colour, or of all, and how many there are.
-pub fn element_range(model: &Layout<f32>, color: Option<usize>) -> [u32; 2] {
+pub fn element_range(layout: &Layout<f32>, color: Option<usize>) -> [u32; 2] {
     let [mut first, mut count] = [0; 2];
-    for_each_kind!(model, set => {
+    for_each_kind!(layout, set => {
         let range = color.map_or(0..set.len(), |color| set.color(color));
         first += range.start as u32;
         count += range.len() as u32;
@@ -370,19 +370,19 @@ pub fn element_range(model: &Layout<f32>, color: Option<usize>) -> [u32; 2] {
 }
 
 /// The part of each block.
-fn block_parts(model: &Layout<f32>) -> Vec<u32> {
-    let of_block = |vertices: &[[u32; LANES]; 4]| model.part_at(vertices[0][0] as usize) as u32;
-    let sets = model.tet_sets.iter();
+fn block_parts(layout: &Layout<f32>) -> Vec<u32> {
+    let of_block = |vertices: &[[u32; LANES]; 4]| layout.part_at(vertices[0][0] as usize) as u32;
+    let sets = layout.tet_sets.iter();
     sets.flat_map(|set| set.blocks.iter().map(|b| of_block(&b.vertices))).collect()
 }
 
 /// Elements of each part in pieces, then vertices.
-fn pieces(model: &Layout<f32>, others: &[Element], by_kind: &[usize]) -> (Vec<u32>, Vec<Piece>) {
+fn pieces(layout: &Layout<f32>, others: &[Element], by_kind: &[usize]) -> (Vec<u32>, Vec<Piece>) {
     let mut elements = Vec::new();
     let mut first = 0;
-    for set in &model.tet_sets {
+    for set in &layout.tet_sets {
         for (block, lane) in set.places() {
-            let part = model.part_at(set.blocks[block].vertices[0][lane] as usize) as u32;
+            let part = layout.part_at(set.blocks[block].vertices[0][lane] as usize) as u32;
             elements.push((part, (LANES * (first + block) + lane) as u32));
         }
         first += set.block_count();
@@ -405,7 +405,7 @@ fn pieces(model: &Layout<f32>, others: &[Element], by_kind: &[usize]) -> (Vec<u3
         }
     }
     // Vertices behind all elements: `limit_velocities` is dispatched for their pieces alone, which must be a range.
-    for (part, own) in (0..).zip(model.parts.iter()) {
+    for (part, own) in (0..).zip(layout.parts.iter()) {
         for first in own.vertices.clone().step_by(PIECE) {
             let end = own.vertices.end.min(first + PIECE) as u32;
             pieces.push(Piece { part, first: first as u32, end, are_vertices: 1 });
@@ -415,9 +415,9 @@ fn pieces(model: &Layout<f32>, others: &[Element], by_kind: &[usize]) -> (Vec<u3
 }
 
 /// Tetrahedra as `TetBlock` of bindings.wgsl.
-pub(super) fn tets(model: &Layout<f32>) -> Vec<u8> {
+pub(super) fn tets(layout: &Layout<f32>) -> Vec<u8> {
     let mut words = Vec::new();
-    for set in &model.tet_sets {
+    for set in &layout.tet_sets {
         for (block, &filled) in set.blocks.iter().zip(&set.filled) {
             words.extend(block.vertices.as_flattened());
             words.extend(block.inverse_rest_shape.as_flattened().iter().map(|x| x.to_bits()));
@@ -431,14 +431,14 @@ pub(super) fn tets(model: &Layout<f32>) -> Vec<u8> {
     bytemuck::cast_slice(&words).to_vec()
 }
 
-fn materials(model: &Layout<f32>) -> Vec<u8> {
+fn materials(layout: &Layout<f32>) -> Vec<u8> {
     let of = |m: &MaterialConstants<f32>| Material {
         lame_lambda: m.lame_lambda,
         lame_mu: m.lame_mu,
         compliance: [m.compliance.normal, m.compliance.cross, m.compliance.shear],
         viscosity: m.viscosity,
     };
-    let constants: Vec<Material> = model.materials.iter().map(of).collect();
+    let constants: Vec<Material> = layout.materials.iter().map(of).collect();
     bytemuck::cast_slice(&constants).to_vec()
 }
 

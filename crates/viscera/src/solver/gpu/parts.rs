@@ -83,22 +83,22 @@ pub(super) struct Falls {
 }
 
 impl Falls {
-    pub fn new(model: &Layout<f32>) -> Self {
-        let mass = |v: usize| f64::from(model.masses[model.numbering.order[v] as usize]);
+    pub fn new(layout: &Layout<f32>) -> Self {
+        let mass = |v: usize| f64::from(layout.masses[layout.numbering.order[v] as usize]);
         let body = |part: &Part| (part.vertices.clone().map(mass).sum(), part.is_anchored());
-        let bodies: Vec<_> = model.parts.iter().map(body).collect();
+        let bodies: Vec<_> = layout.parts.iter().map(body).collect();
         let count = bodies.len();
         Self { bodies, forces: vec![Vec3::ZERO; count], all: vec![Fall::default(); count] }
     }
 
     /// Finds what nothing holds among what acts on vertices.
-    pub fn find(&mut self, model: &Layout<f32>, gravity: Vec3<f32>, updates: &[Update]) {
+    pub fn find(&mut self, layout: &Layout<f32>, gravity: Vec3<f32>, updates: &[Update]) {
         self.forces.fill(Vec3::ZERO);
         for (fall, (_, is_attached)) in self.all.iter_mut().zip(&self.bodies) {
             fall.is_free = u32::from(!is_attached);
         }
         for update in updates {
-            let part = model.part_at(update.vertex as usize);
+            let part = layout.part_at(update.vertex as usize);
             let [x, y, z] = update.force;
             // A pin or a tether at one vertex holds the whole part. That its force is added as well does no harm: the
             // acceleration of a part that is held is not read.
@@ -128,11 +128,11 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    pub fn new(model: &Layout<f32>, settings: &SolverSettings, pieces: &[Piece]) -> Self {
+    pub fn new(layout: &Layout<f32>, settings: &SolverSettings, pieces: &[Piece]) -> Self {
         let mut parts = Self::default();
         let mut groups_end = 0;
-        let first = (multipliers_start(model.vertex_count()) / 4) as u32;
-        for (number, part) in model.parts.iter().enumerate() {
+        let first = (multipliers_start(layout.vertex_count()) / 4) as u32;
+        for (number, part) in layout.parts.iter().enumerate() {
             let runs = parts.runs.len() as u32;
             let length = parts.add_runs(part, first);
             // From the part's own length only, never from how many parts there are: which numbers one workgroup adds

@@ -40,7 +40,7 @@ impl Dispatch {
 
 /// Makes dispatches for a model that is solved in one way.
 pub struct Recorder<'a> {
-    pub model: &'a Layout<f32>,
+    pub layout: &'a Layout<f32>,
     pub settings: &'a SolverSettings,
     /// Numbers of the long vector, and where multipliers begin in it.
     pub length: u32,
@@ -55,25 +55,25 @@ impl<'a> Recorder<'a> {
     /// For a model that is solved in this way; `vector` is the length of the long vector and the place
     /// of the first multiplier in it.
     pub fn new(
-        model: &'a Layout<f32>,
+        layout: &'a Layout<f32>,
         settings: &'a SolverSettings,
         vector: [u32; 2],
         pieces: Pieces,
     ) -> Self {
         let [length, multipliers_first] = vector;
         Self {
-            model,
+            layout,
             settings,
             length,
             multipliers_first,
-            swept: match (model.is_split(), is_jacobi(model)) {
+            swept: match (layout.is_split(), is_jacobi(layout)) {
                 // Without split vertices a copy is its vertex. With one colour no constraint reads what another
                 // has moved, so that splitting and solving are one kernel.
                 (false, _) => Swept::Vertices,
                 (true, true) => Swept::Jacobi,
                 (true, false) => Swept::Copies,
             },
-            stride: DeviceLayout::stride(model),
+            stride: DeviceLayout::stride(layout),
             pieces,
         }
     }
@@ -96,7 +96,7 @@ impl<'a> Recorder<'a> {
 
     /// A thread for each vertex.
     pub fn vertices(&self, kernel: &'static Kernel, mode: u32) -> Dispatch {
-        let count = self.model.vertex_count() as u32;
+        let count = self.layout.vertex_count() as u32;
         self.threads(kernel, Job { count, mode, ..Job::default() })
     }
 
@@ -116,7 +116,7 @@ impl<'a> Recorder<'a> {
 
     /// A workgroup for each part.
     pub fn each_part(&self, kernel: &'static Kernel, job: Job) -> Dispatch {
-        let count = self.model.part_count() as u32;
+        let count = self.layout.part_count() as u32;
         Dispatch { groups: count, ..self.threads(kernel, Job { count, ..job }) }
     }
 
@@ -124,14 +124,14 @@ impl<'a> Recorder<'a> {
     pub fn blocks(
         &self,
         kernel: &'static Kernel,
-        kind: usize,
+        law: usize,
         blocks: std::ops::Range<usize>,
     ) -> Dispatch {
-        let sets = &self.model.tet_sets;
-        let set = &sets[kind];
+        let sets = &self.layout.tet_sets;
+        let set = &sets[law];
         // Blocks of all laws stand in one buffer, law by law, and multipliers are counted within each law: a kernel
         // needs a block's number in the buffer and, less `set_first`, its number in the law.
-        let set_first = sets[..kind].iter().map(|set| set.block_count() as u32).sum();
+        let set_first = sets[..law].iter().map(|set| set.block_count() as u32).sum();
         let job = Job {
             first: set_first + blocks.start as u32,
             count: (LANES * blocks.len()) as u32,
@@ -145,26 +145,26 @@ impl<'a> Recorder<'a> {
     }
 
     pub fn each_set(&self, kernel: &'static Kernel, into: &mut Vec<Dispatch>) {
-        for (kind, set) in self.model.tet_sets.iter().enumerate() {
+        for (law, set) in self.layout.tet_sets.iter().enumerate() {
             if !set.is_empty() {
-                into.push(self.blocks(kernel, kind, 0..set.block_count()));
+                into.push(self.blocks(kernel, law, 0..set.block_count()));
             }
         }
     }
 
     /// Threads for all tetrahedra, padding lanes included.
     pub fn tet_threads(&self) -> u32 {
-        (LANES * self.model.block_count()) as u32
+        (LANES * self.layout.block_count()) as u32
     }
 
     /// How many elements are no tetrahedra.
     pub fn element_count(&self) -> u32 {
-        element_range(self.model, None)[1]
+        element_range(self.layout, None)[1]
     }
 
     /// A thread for each element that is no tetrahedron: of one colour, or of all; nothing where there is none.
     pub fn elements(&self, kernel: &'static Kernel, color: Option<usize>) -> Option<Dispatch> {
-        let [first, count] = element_range(self.model, color);
+        let [first, count] = element_range(self.layout, color);
         let job = Job { first, count, ..Job::default() };
         (count > 0).then(|| self.threads(kernel, job))
     }

@@ -126,6 +126,6 @@ pub fn multipliers_start(vertices: usize) -> u64 {
 }
 
 /// Bytes of all unknowns.
-pub fn unknowns_size(model: &Layout<f32>) -> u64 {
-    multipliers_start(model.vertex_count()) + 4 * (model.multiplier_count as u64).max(1)
+pub fn unknowns_size(layout: &Layout<f32>) -> u64 {
+    multipliers_start(layout.vertex_count()) + 4 * (layout.multiplier_count as u64).max(1)
 }

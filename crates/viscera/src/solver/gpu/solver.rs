@@ -268,8 +268,8 @@ impl GpuSolver {
         Ok(Arc::clone(&self.layout))
     }
 
-    fn put(&mut self, model: &Layout<f32>, state: &State<f32>) {
-        let places = in_solver_order(model, &state.positions);
+    fn put(&mut self, layout: &Layout<f32>, state: &State<f32>) {
+        let places = in_solver_order(layout, &state.positions);
         let mut unknowns = vec![0.0f32; self.buffers.length as usize];
         let (positions, multipliers) =
             unknowns.split_at_mut((self.buffers.multipliers_start / 4) as usize);
@@ -289,14 +289,14 @@ impl GpuSolver {
     }
 
     /// What each vertex is made of: mass, inverse mass, number of copies.
-    fn upload_constants(&self, model: &Layout<f32>) {
-        let order = &model.numbering.order;
-        let masses: Vec<f32> = order.iter().map(|&v| model.masses[v as usize]).collect();
+    fn upload_constants(&self, layout: &Layout<f32>) {
+        let order = &layout.numbering.order;
+        let masses: Vec<f32> = order.iter().map(|&v| layout.masses[v as usize]).collect();
         let with_w = |w: &dyn Fn(usize) -> f32| -> Vec<[f32; 4]> {
             (0..order.len()).map(|v| [0.0, 0.0, 0.0, w(v)]).collect()
         };
-        let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
-        let control = vec![0u8; control::control_size(model.part_count()) as usize];
+        let copies = |v: usize| (layout.copy_offsets[v + 1] - layout.copy_offsets[v]) as f32;
+        let control = vec![0u8; control::control_size(layout.part_count()) as usize];
         self.device.queue.write_buffer(self.buffers.buffer(Slot::Control), 0, &control);
         for (slot, values) in [
             (Slot::Predicted, with_w(&|v| masses[v])),
@@ -341,8 +341,8 @@ fn make_uniforms(device: &Device, job_count: u64) -> (wgpu::Buffer, wgpu::Buffer
     (jobs, frame, uniforms)
 }
 
-fn in_solver_order(model: &Layout<f32>, values: &[Vec3<f32>]) -> Vec<[f32; 4]> {
-    let order = model.numbering.order.iter();
+fn in_solver_order(layout: &Layout<f32>, values: &[Vec3<f32>]) -> Vec<[f32; 4]> {
+    let order = layout.numbering.order.iter();
     order.map(|&v| values[v as usize].to_array()).map(|[x, y, z]| [x, y, z, 0.0]).collect()
 }
 

@@ -126,21 +126,21 @@ impl GpuSolver {
     }
 
     /// Inputs and constants of a step.
-    pub(super) fn prepare_step(&mut self, model: &Layout<f32>, inputs: &Inputs<f32>, dt: f64) {
-        self.collect_updates(model, inputs, dt);
+    pub(super) fn prepare_step(&mut self, layout: &Layout<f32>, inputs: &Inputs<f32>, dt: f64) {
+        self.collect_updates(layout, inputs, dt);
         let queue = &self.device.queue;
         self.buffers.write(queue, Slot::Updates, bytemuck::cast_slice(&self.updates));
         if let Some(falls) = &mut self.falls {
-            falls.find(model, inputs.gravity, &self.updates);
+            falls.find(layout, inputs.gravity, &self.updates);
             self.buffers.write(queue, Slot::Falls, bytemuck::cast_slice(&falls.all));
         }
         let settings = &self.settings;
-        let is_anchored = !model.rest_anchors.is_empty();
+        let is_anchored = !layout.rest_anchors.is_empty();
         if is_anchored && (!inputs.anchors.is_empty() || self.has_moved_anchors) {
             self.has_moved_anchors = !inputs.anchors.is_empty();
             let row = |anchor: &Vec3<f32>| [anchor.x, anchor.y, anchor.z, 0.0];
             let rows: Vec<[f32; 4]> =
-                inputs.anchors_of(&model.rest_anchors).iter().map(row).collect();
+                inputs.anchors_of(&layout.rest_anchors).iter().map(row).collect();
             self.buffers.write(queue, Slot::Anchors, bytemuck::cast_slice(&rows));
         }
         let last = self.multiplier_dt;
@@ -151,7 +151,7 @@ impl GpuSolver {
         };
         if accelerates(settings) && dt != self.weights_dt {
             self.weights_dt = dt;
-            let weights = norm_weights(model, settings, &self.buffers, dt);
+            let weights = norm_weights(layout, settings, &self.buffers, dt);
             self.buffers.write(queue, Slot::Weights, bytemuck::cast_slice(&weights));
         }
         let omega = settings.relaxation as f32;

@@ -65,7 +65,7 @@ impl GpuSolver {
     fn take_over(
         &self,
         solver: &Solver<f32>,
-        model: &Layout<f32>,
+        layout: &Layout<f32>,
         state: &State<f32>,
         inputs: &Inputs<f32>,
         count: usize,
@@ -88,10 +88,10 @@ impl GpuSolver {
             return;
         }
         write(Slot::Unknowns, &vector(points, &state.multipliers));
-        self.put_rows(Slot::Velocities, &each(model, &|v| with(velocities[v], 0.0)));
-        if model.is_viscous() {
+        self.put_rows(Slot::Velocities, &each(layout, &|v| with(velocities[v], 0.0)));
+        if layout.is_viscous() {
             let mut rows: Vec<f32> = Vec::new();
-            for (own, set) in constants.start_strain.iter().zip(&model.tet_sets) {
+            for (own, set) in constants.start_strain.iter().zip(&layout.tet_sets) {
                 rows.extend(own.as_flattened().as_flattened());
                 rows.resize(rows.len() + 6 * LANES * (set.block_count() - own.len()), 0.0);
             }
@@ -110,15 +110,15 @@ impl GpuSolver {
                 if is_valid { (&remembered.positions, &remembered.multipliers) } else { now };
             write(Slot::Iterate, &vector(points, multipliers));
         }
-        self.take_over_prediction(&solver.memory.data, model, inputs);
-        if model.is_split() {
+        self.take_over_prediction(&solver.memory.data, layout, inputs);
+        if layout.is_split() {
             let all: Vec<[f32; 4]> = memory.copies.iter().map(whole).collect();
             self.put_rows(Slot::Copies, &all);
         }
         if !loads.is_empty() {
             self.put_rows(
                 Slot::Loads,
-                &DeviceLayout::new(model, &self.settings).loads(model, loads),
+                &DeviceLayout::new(layout, &self.settings).loads(layout, loads),
             );
         }
     }
@@ -127,36 +127,37 @@ impl GpuSolver {
     fn take_over_prediction(
         &self,
         data: &StepData<f32>,
-        model: &Layout<f32>,
+        layout: &Layout<f32>,
         inputs: &Inputs<f32>,
     ) {
         let StepData { constants, points, .. } = data;
-        let copies = |v: usize| (model.copy_offsets[v + 1] - model.copy_offsets[v]) as f32;
+        let copies = |v: usize| (layout.copy_offsets[v + 1] - layout.copy_offsets[v]) as f32;
         self.put_rows(
             Slot::Previous,
-            &each(model, &|v| with(constants.previous[v].vec3(), copies(v))),
+            &each(layout, &|v| with(constants.previous[v].vec3(), copies(v))),
         );
         self.put_rows(
             Slot::Predicted,
-            &each(model, &|v| with(constants.predicted[v].vec3(), constants.inertias[v])),
+            &each(layout, &|v| with(constants.predicted[v].vec3(), constants.inertias[v])),
         );
         self.put_rows(
             Slot::ExternalForces,
-            &each(model, &|v| with(constants.external[v], constants.inverse_masses[v])),
+            &each(layout, &|v| with(constants.external[v], constants.inverse_masses[v])),
         );
-        let mut targets = each(model, &|_| [0.0; 4]);
+        let mut targets = each(layout, &|_| [0.0; 4]);
         for tether in &constants.tethers {
             targets[tether.vertex] = with(tether.target, tether.stiffness);
         }
         for pin in &inputs.pins {
-            targets[model.numbering.of(pin.vertex)] = with(pin.target, 0.0);
+            targets[layout.numbering.of(pin.vertex)] = with(pin.target, 0.0);
         }
         if self.settings.guards_steps() {
             let free = |v: usize| constants.inverse_masses[v] != 0.0;
             let place = |v: usize, x: Vec3<f32>| if free(v) { with(x, 0.0) } else { targets[v] };
             let starts = [&constants.previous, &constants.predicted, points];
-            let mut rows = vec![[0.0; 4]; 3 * DeviceLayout::stride(model) as usize];
-            for (row, points) in rows.chunks_mut(DeviceLayout::stride(model) as usize).zip(starts) {
+            let mut rows = vec![[0.0; 4]; 3 * DeviceLayout::stride(layout) as usize];
+            for (row, points) in rows.chunks_mut(DeviceLayout::stride(layout) as usize).zip(starts)
+            {
                 for (v, point) in points.iter().enumerate() {
                     row[v] = place(v, point.vec3());
                 }
@@ -172,8 +173,8 @@ impl GpuSolver {
 }
 
 /// A row for each of the solver's vertices.
-fn each(model: &Layout<f32>, of: &dyn Fn(usize) -> [f32; 4]) -> Vec<[f32; 4]> {
-    (0..model.vertex_count()).map(of).collect()
+fn each(layout: &Layout<f32>, of: &dyn Fn(usize) -> [f32; 4]) -> Vec<[f32; 4]> {
+    (0..layout.vertex_count()).map(of).collect()
 }
 
 fn with(v: Vec3<f32>, w: f32) -> [f32; 4] {
@@ -187,10 +188,10 @@ fn whole(point: &Point<f32>) -> [f32; 4] {
 impl DeviceLayout {
     /// The loads of copies where the device looks for those of corners: all of a vertex's in its first
     /// place.
-    fn loads(&self, model: &Layout<f32>, of_copies: &[Point<f32>]) -> Vec<[f32; 4]> {
+    fn loads(&self, layout: &Layout<f32>, of_copies: &[Point<f32>]) -> Vec<[f32; 4]> {
         let mut loads = vec![[0.0; 4]; self.slot_count() as usize];
-        for v in 0..model.vertex_count() {
-            let load = crate::solver::step::data::gather(model, of_copies, v);
+        for v in 0..layout.vertex_count() {
+            let load = crate::solver::step::data::gather(layout, of_copies, v);
             if let Some(place) = loads.get_mut(self.first_load(v)) {
                 *place = whole(&load);
             }

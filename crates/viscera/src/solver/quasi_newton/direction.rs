@@ -33,7 +33,7 @@ impl<S: Real> Memory<S> {
         workers: &Workers,
         learned: &mut Learned<S>,
     ) {
-        for (number, part) in step.model.parts.iter().enumerate() {
+        for (number, part) in step.layout.parts.iter().enumerate() {
             let progress = self.parts[number];
             if !(progress.acts() && progress.accepted) {
                 continue;
@@ -42,7 +42,7 @@ impl<S: Real> Memory<S> {
             let Self { preconditioner, trial_z, gradient, .. } = self;
             preconditioner.apply(number, &gradient[range.clone()], &mut trial_z[range.clone()]);
             if self.has_new_pair[number] {
-                self.keep_pair(step.model, workers, number, learned);
+                self.keep_pair(step.layout, workers, number, learned);
             }
             let Self { trial_z, z, .. } = self;
             z[range.clone()].copy_from_slice(&trial_z[range]);
@@ -132,7 +132,7 @@ impl<S: Real> Memory<S> {
         learned: &mut Learned<S>,
     ) {
         let workers = &data.constants.workers;
-        for (number, part) in step.model.parts.iter().enumerate() {
+        for (number, part) in step.layout.parts.iter().enumerate() {
             let progress = self.parts[number];
             // Without pairs there is nothing to forget: the length goes on shrinking.
             let forgets =
@@ -147,7 +147,7 @@ impl<S: Real> Memory<S> {
             }
             let mut slope = f64::NAN;
             if learned.parts[number].count > 0 {
-                self.recur(step.model, workers, number, learned);
+                self.recur(step.layout, workers, number, learned);
                 slope = self.slope(workers, part);
                 self.parts[number].length = 1.0;
             }
@@ -179,7 +179,7 @@ impl<S: Real> Memory<S> {
         slope: f64,
     ) -> f64 {
         let Self { evaluation, direction, direction_points, base, stage_start, .. } = self;
-        for v in step.model.parts[number].vertices.clone() {
+        for v in step.layout.parts[number].vertices.clone() {
             direction_points[v].set_vec3(direction[v]);
         }
         let moments = super::moments(step, stage_start);

@@ -136,7 +136,7 @@ impl Evaluation {
         loads: &mut [Point<S>],
         gradient: &mut [Vec3<S>],
     ) {
-        let layout = step.model;
+        let layout = step.layout;
         self.add_tets(constants, step, way, &acts, loads);
         let squared = step.dt * step.dt;
         for (number, part) in layout.parts.iter().enumerate().filter(|(number, _)| acts(*number)) {
@@ -175,7 +175,7 @@ impl Evaluation {
         acts: &(impl Fn(usize) -> bool + Sync),
         loads: &mut [Point<S>],
     ) {
-        let layout = step.model;
+        let layout = step.layout;
         for (_, part) in layout.parts.iter().enumerate().filter(|(number, _)| acts(*number)) {
             loads[part.copies.clone()].fill(Point::default());
         }
@@ -216,7 +216,7 @@ impl Evaluation {
         direction: &[Point<S>],
         number: usize,
     ) -> [f64; 2] {
-        let layout = step.model;
+        let layout = step.layout;
         let part = &layout.parts[number];
         let (mut exact, mut bound) = (0.0, 0.0);
         let mut add = |term: f64| {

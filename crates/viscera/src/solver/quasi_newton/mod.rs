@@ -268,8 +268,8 @@ impl<S: Real> Memory<S> {
 
     /// [`QuasiNewtonStage::Judge`].
     fn judge(&mut self, solve: &Step<'_, S>, data: &mut StepData<S>, learned: &mut Learned<S>) {
-        let vertices = solve.model.vertex_count();
-        for (number, part) in solve.model.parts.iter().enumerate() {
+        let vertices = solve.layout.vertex_count();
+        for (number, part) in solve.layout.parts.iter().enumerate() {
             let change = self.evaluation.changes[number];
             let progress = &mut self.parts[number];
             self.has_new_pair[number] = false;
@@ -319,7 +319,7 @@ impl<S: Real> Memory<S> {
 
     /// [`QuasiNewtonStage::Advance`].
     fn advance(&mut self, solve: &Step<'_, S>, data: &mut StepData<S>) {
-        for (number, part) in solve.model.parts.iter().enumerate() {
+        for (number, part) in solve.layout.parts.iter().enumerate() {
             let progress = &mut self.parts[number];
             if !progress.acts() {
                 continue;
@@ -344,7 +344,7 @@ fn most_pairs(choices: &[Choice]) -> usize {
 /// What elements depend on in a solve.
 fn moments<'a, S: Real>(solve: &Step<'a, S>, start: &'a [Point<S>]) -> Moments<'a, S> {
     Moments {
-        anchors: solve.inputs.anchors_of(&solve.model.rest_anchors),
+        anchors: solve.inputs.anchors_of(&solve.layout.rest_anchors),
         start: Before::Places(start),
         dt: solve.dt,
     }

@@ -29,7 +29,7 @@ impl<S: Real> Memory<S> {
     /// The longest period [s] of each part, and of all those that something holds the shortest of these; infinite
     /// where nothing is held. Positions and velocities of `data` are lost.
     pub fn slowest_period(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) -> f64 {
-        let layout = step.model;
+        let layout = step.layout;
         let step = Step { dt: LONG, ..*step };
         data.read_positions(layout, &layout.rest_positions);
         data.prepare(&step, Tethers::AsInertia);
@@ -80,7 +80,7 @@ impl<S: Real> Memory<S> {
         data: &mut StepData<S>,
         number: usize,
     ) -> f64 {
-        let range = step.model.parts[number].vertices.clone();
+        let range = step.layout.parts[number].vertices.clone();
         // `gradient` is the residual, `trial_z` the solution, `direction` that of conjugate gradients.
         for v in range.clone() {
             let is_free = data.constants.inverse_masses[v] != S::ZERO;
@@ -141,7 +141,7 @@ impl<S: Real> Memory<S> {
 
     /// `(M + h^2 K) d` of a part into `trial_gradient`, by a difference; false of a direction that is none.
     fn stiffen(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, number: usize) -> bool {
-        let range = step.model.parts[number].vertices.clone();
+        let range = step.layout.parts[number].vertices.clone();
         let first = self.base[range.start].vec3();
         let (low, high) = range.clone().fold((first, first), |(low, high), v| {
             (low.min(self.base[v].vec3()), high.max(self.base[v].vec3()))

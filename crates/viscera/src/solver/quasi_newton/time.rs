@@ -49,7 +49,7 @@ impl<S: Real> Memory<S> {
         data: &mut StepData<S>,
         state: &mut State<S>,
     ) {
-        let layout = step.model;
+        let layout = step.layout;
         let first = match step.settings.integrator {
             Integrator::Sdirk2 => Solve::First,
             Integrator::ImplicitEuler => Solve::Euler,
@@ -114,9 +114,9 @@ impl<S: Real> Memory<S> {
             return;
         }
         let ratio = S::from_f64((dt / before) * (dt / before));
-        let range = &step.model.parts[number].vertices;
+        let range = &step.layout.parts[number].vertices;
         for slot in 0..self.choices[number].history {
-            let Pair { s, y, .. } = Pair::places(slot, step.model.vertex_count(), range);
+            let Pair { s, y, .. } = Pair::places(slot, step.layout.vertex_count(), range);
             for ((s, y), v) in s.zip(y).zip(range.clone()) {
                 let inertia = learned.pairs[s] * data.constants.masses[v];
                 learned.pairs[y] = inertia + (learned.pairs[y] - inertia) * ratio;
@@ -126,7 +126,7 @@ impl<S: Real> Memory<S> {
 
     /// Turns the preconditioner to `base`, and the images of the pairs with it.
     fn refresh(&mut self, solve: &Step<'_, S>, data: &StepData<S>, learned: &Learned<S>) {
-        let (layout, constants) = (solve.model, &data.constants);
+        let (layout, constants) = (solve.layout, &data.constants);
         let curvature =
             Curvature { dt: solve.dt, x: &self.base, moments: moments(solve, &constants.previous) };
         for number in 0..layout.part_count() {
@@ -158,7 +158,7 @@ impl<S: Real> Memory<S> {
             // Another step, other curvature. Parts that are done keep their positions, but not what follows from their
             // inertia; `end_solve` gives it back.
             data.prepare(&solve, Tethers::AsInertia);
-            for number in 0..step.model.part_count() {
+            for number in 0..step.layout.part_count() {
                 if self.parts[number].scheme == Scheme::Euler {
                     self.fit_pairs(step, data, learned, number, dt);
                 }
@@ -166,15 +166,15 @@ impl<S: Real> Memory<S> {
             self.base.copy_from_slice(&data.constants.previous);
             self.refresh(&solve, data, learned);
         }
-        for number in 0..step.model.part_count() {
+        for number in 0..step.layout.part_count() {
             if self.parts[number].scheme == wanted {
                 self.start_part(which, &solve, data, number, is_first_of_step);
             }
         }
-        if step.model.is_viscous() {
+        if step.layout.is_viscous() {
             let constants = &mut data.constants;
             let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-            measure_strain(workers, step.model, None, &self.stage_start, strains);
+            measure_strain(workers, step.layout, None, &self.stage_start, strains);
         }
     }
 
@@ -187,7 +187,7 @@ impl<S: Real> Memory<S> {
         number: usize,
         is_first_of_step: bool,
     ) {
-        let part = &solve.model.parts[number];
+        let part = &solve.layout.parts[number];
         let step_dt = solve.dt / if which == Solve::Euler { 1.0 } else { SHARE };
         let (he, d) = (S::from_f64(solve.dt), S::from_f64((1.0 - SHARE) * step_dt));
         let squared = he * he;
@@ -242,7 +242,7 @@ impl<S: Real> Memory<S> {
         }
         let share = S::from_f64(if which == Solve::First { SHARE } else { 1.0 });
         for pin in &solve.inputs.pins {
-            let v = solve.model.numbering.of(pin.vertex);
+            let v = solve.layout.numbering.of(pin.vertex);
             if range.contains(&v) {
                 let x = constants.previous[v].vec3();
                 let target =
@@ -263,7 +263,7 @@ impl<S: Real> Memory<S> {
     fn mean_acceleration(&self, solve: &Step<'_, S>, data: &StepData<S>, number: usize) -> Vec3<S> {
         let constants = &data.constants;
         let (mut mass, mut force) = (0.0, Vec3::<f64>::ZERO);
-        for v in solve.model.parts[number].vertices.clone() {
+        for v in solve.layout.parts[number].vertices.clone() {
             mass += constants.masses[v].to_f64();
             force += constants.external[v].cast();
         }
@@ -280,7 +280,7 @@ impl<S: Real> Memory<S> {
     ) {
         let wanted = if which == Solve::Euler { Scheme::Euler } else { Scheme::Sdirk2 };
         let rate = S::from_f64(1.0 / Self::solve_dt(which, step.dt));
-        for (number, part) in step.model.parts.iter().enumerate() {
+        for (number, part) in step.layout.parts.iter().enumerate() {
             let progress = &mut self.parts[number];
             if progress.scheme != wanted {
                 continue;
@@ -322,7 +322,7 @@ impl<S: Real> Memory<S> {
         }
         data.prepare(&Step { dt: he, ..*step }, Tethers::AsInertia);
         let shrink = S::from_f64(SHARE * SHARE);
-        for (number, part) in step.model.parts.iter().enumerate() {
+        for (number, part) in step.layout.parts.iter().enumerate() {
             if self.parts[number].scheme == Scheme::Euler {
                 for v in part.vertices.clone() {
                     let x = data.points[v].vec3();
@@ -339,7 +339,7 @@ impl<S: Real> Memory<S> {
     fn begin_energy(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
         self.base.copy_from_slice(&data.points);
         for pin in &step.inputs.pins {
-            self.base[step.model.numbering.of(pin.vertex)].set_vec3(pin.target);
+            self.base[step.layout.numbering.of(pin.vertex)].set_vec3(pin.target);
         }
         self.measure_start_strain(step, data);
         self.evaluator.evaluate_all(&data.constants, step, &self.base);
@@ -348,10 +348,10 @@ impl<S: Real> Memory<S> {
 
     /// Green strain at the start of the step, which the energies are counted from.
     fn measure_start_strain(&self, step: &Step<'_, S>, data: &mut StepData<S>) {
-        if step.model.is_viscous() {
+        if step.layout.is_viscous() {
             let constants = &mut data.constants;
             let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-            measure_strain(workers, step.model, None, &constants.previous, strains);
+            measure_strain(workers, step.layout, None, &constants.previous, strains);
         }
     }
 
@@ -385,17 +385,17 @@ impl<S: Real> Memory<S> {
         self.evaluator.evaluate_all(&data.constants, step, &data.points);
         self.energies.end(step, data, &self.evaluator.stored);
         self.energies.limit(step, data, |_, _| {});
-        if step.model.is_viscous() {
+        if step.layout.is_viscous() {
             let constants = &mut data.constants;
             let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-            measure_strain(workers, step.model, None, &self.stage_start, strains);
+            measure_strain(workers, step.layout, None, &self.stage_start, strains);
             // Beside SDIRK2, measures of forces take steps of implicit Euler for solves of `he` (`end_again`): the change of
             // strain over `he` has to be that over the whole step.
             if step.settings.integrator == Integrator::Sdirk2 {
-                for (progress, part) in self.parts.iter().zip(step.model.parts.iter()) {
+                for (progress, part) in self.parts.iter().zip(step.layout.parts.iter()) {
                     if progress.scheme == Scheme::Euler {
                         let share = S::from_f64(SHARE);
-                        keep_share(workers, step.model, part, &data.points, share, strains);
+                        keep_share(workers, step.layout, part, &data.points, share, strains);
                     }
                 }
             }

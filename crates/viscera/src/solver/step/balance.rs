@@ -88,7 +88,7 @@ impl ForceBalance {
 
     pub(in crate::solver) fn measure<S: Real>(
         &mut self,
-        model: &Layout<S>,
+        layout: &Layout<S>,
         state: &State<S>,
         inputs: &Inputs<S>,
         step: &EndOfStep<'_, S>,
@@ -96,16 +96,16 @@ impl ForceBalance {
         let dt = state.multiplier_dt;
         *self = Self { residual: std::mem::take(&mut self.residual), ..Self::default() };
         self.residual.clear();
-        self.residual.resize(model.vertex_count(), Vec3::ZERO);
+        self.residual.resize(layout.vertex_count(), Vec3::ZERO);
         if dt <= 0.0 {
             return;
         }
-        for (set, strains) in model.tet_sets.iter().zip(step.start_strain) {
-            for (tet, (block, lane)) in model.tets(set).zip(set.places()) {
+        for (set, strains) in layout.tet_sets.iter().zip(step.start_strain) {
+            for (tet, (block, lane)) in layout.tets(set).zip(set.places()) {
                 let x = tet.vertices.map(|v| state.positions[v as usize].cast::<f64>());
                 let shape = tet.inverse_rest_shape.cast::<f64>();
                 let volume = tet.rest_volume.to_f64();
-                let material = &model.materials[tet.material];
+                let material = &layout.materials[tet.material];
                 let start = set.is_viscous(block).then(|| strains[block].map(|c| c[lane].to_f64()));
                 let tissue = Tissue {
                     model: set.model,
@@ -127,13 +127,13 @@ impl ForceBalance {
             }
         }
         let moments = Moments {
-            anchors: inputs.anchors_of(&model.rest_anchors),
+            anchors: inputs.anchors_of(&layout.rest_anchors),
             start: Before::Places(step.previous),
             dt,
         };
-        for_each_kind!(model, set => self.add_elements(set, state, &moments));
+        for_each_kind!(layout, set => self.add_elements(set, state, &moments));
         for tether in step.tethers {
-            let v = model.numbering.order[tether.vertex];
+            let v = layout.numbering.order[tether.vertex];
             self.load += tether.force(state.positions[v as usize]).cast::<f64>().length();
         }
         let gravity = inputs.gravity.cast::<f64>();
@@ -141,14 +141,14 @@ impl ForceBalance {
             self.load += force.cast::<f64>().length();
         }
         let displacement =
-            |v: usize| state.positions[v].cast::<f64>() - model.rest_positions[v].cast::<f64>();
+            |v: usize| state.positions[v].cast::<f64>() - layout.rest_positions[v].cast::<f64>();
         let pins = inputs.pins.iter().map(|pin| displacement(pin.vertex as usize));
         let led = pins.fold(Vec3::ZERO, |sum: Vec3<f64>, moved| sum + moved);
         let led = led * (1.0 / inputs.pins.len().max(1) as f64);
-        for v in 0..model.vertex_count() {
-            let mass = model.masses[v].to_f64();
+        for v in 0..layout.vertex_count() {
+            let mass = layout.masses[v].to_f64();
             let x = state.positions[v].cast::<f64>();
-            let place = model.numbering.of(v as u32);
+            let place = layout.numbering.of(v as u32);
             let predicted = step.predicted[place].vec3().cast();
             let inertia = step.inertias[place].to_f64();
             self.residual[v] += (x - predicted) * (inertia / (dt * dt));

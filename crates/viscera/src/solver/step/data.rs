@@ -17,7 +17,7 @@ const GRAIN: usize = 2048;
 
 /// Data that a stage may read but not change.
 pub struct Step<'a, S> {
-    pub model: &'a Layout<S>,
+    pub layout: &'a Layout<S>,
     pub inputs: &'a Inputs<S>,
     pub dt: f64,
     pub settings: &'a SolverSettings,
@@ -80,27 +80,27 @@ pub struct StepData<S> {
 
 impl<S: Real> StepData<S> {
     /// Memory for the steps of a model, with room for loads where stages of the method need it.
-    pub fn new(model: &Layout<S>, settings: &SolverSettings, needs_loads: bool) -> Self {
-        let vertices = model.vertex_count();
+    pub fn new(layout: &Layout<S>, settings: &SolverSettings, needs_loads: bool) -> Self {
+        let vertices = layout.vertex_count();
         let points = || vec![Point::default(); vertices];
         let strains = |set: &TetSet<S>| {
             vec![[[S::ZERO; LANES]; 6]; if set.viscous { set.block_count() } else { 0 }]
         };
         Self {
             constants: StepConstants {
-                workers: Workers::new(settings.threads, model.tet_count()),
+                workers: Workers::new(settings.threads, layout.tet_count()),
                 previous: points(),
                 predicted: points(),
                 external: vec![Vec3::ZERO; vertices],
-                masses: model.numbering.order.iter().map(|&v| model.masses[v as usize]).collect(),
+                masses: layout.numbering.order.iter().map(|&v| layout.masses[v as usize]).collect(),
                 tethers: Vec::new(),
                 inertias: vec![S::ZERO; vertices],
                 inverse_masses: vec![S::ZERO; vertices],
-                start_strain: model.tet_sets.each_ref().map(strains),
+                start_strain: layout.tet_sets.each_ref().map(strains),
             },
             points: points(),
             velocities: vec![Vec3::ZERO; vertices],
-            loads: vec![Point::default(); if needs_loads { model.copy_count() } else { 0 }],
+            loads: vec![Point::default(); if needs_loads { layout.copy_count() } else { 0 }],
         }
     }
 
@@ -117,8 +117,8 @@ impl<S: Real> StepData<S> {
     }
 
     /// Positions of the state, in the solver's numbering.
-    pub fn read_positions(&mut self, model: &Layout<S>, positions: &[Vec3<S>]) {
-        for (point, &user) in self.points.iter_mut().zip(&model.numbering.order) {
+    pub fn read_positions(&mut self, layout: &Layout<S>, positions: &[Vec3<S>]) {
+        for (point, &user) in self.points.iter_mut().zip(&layout.numbering.order) {
             point.set_vec3(positions[user as usize]);
         }
     }
@@ -128,7 +128,7 @@ impl<S: Real> StepConstants<S> {
     /// The data that elements depend on in a step.
     pub fn moments<'a>(&'a self, step: &Step<'a, S>) -> Moments<'a, S> {
         Moments {
-            anchors: step.inputs.anchors_of(&step.model.rest_anchors),
+            anchors: step.inputs.anchors_of(&step.layout.rest_anchors),
             start: Before::Places(&self.previous),
             dt: step.dt,
         }
@@ -190,20 +190,20 @@ impl<S: Real> StepConstants<S> {
 }
 
 /// The copies of one of the solver's vertices.
-pub fn copies_of<S: Real>(model: &Layout<S>, v: usize) -> std::ops::Range<usize> {
-    model.copy_offsets[v] as usize..model.copy_offsets[v + 1] as usize
+pub fn copies_of<S: Real>(layout: &Layout<S>, v: usize) -> std::ops::Range<usize> {
+    layout.copy_offsets[v] as usize..layout.copy_offsets[v + 1] as usize
 }
 
 /// Sum of a vertex's loads, in the order of its copies.
-pub fn gather<S: Real>(model: &Layout<S>, loads: &[Point<S>], v: usize) -> Point<S> {
+pub fn gather<S: Real>(layout: &Layout<S>, loads: &[Point<S>], v: usize) -> Point<S> {
     let mut sum = Point::default();
-    for load in &loads[copies_of(model, v)] {
+    for load in &loads[copies_of(layout, v)] {
         sum.add(*load);
     }
     sum
 }
 
 /// How many copies one of the solver's vertices has.
-pub fn copy_count<S: Real>(model: &Layout<S>, v: usize) -> S {
-    S::from_f64(copies_of(model, v).len() as f64)
+pub fn copy_count<S: Real>(layout: &Layout<S>, v: usize) -> S {
+    S::from_f64(copies_of(layout, v).len() as f64)
 }

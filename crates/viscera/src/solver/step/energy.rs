@@ -103,7 +103,7 @@ impl Energies {
 
     /// Remembers energy and momentum before the step; `stored` is the stored energy [J] of each part there.
     pub fn begin<S: Real>(&mut self, step: &Step<'_, S>, data: &StepData<S>, stored: &[f64]) {
-        let (model, constants) = (step.model, &data.constants);
+        let (model, constants) = (step.layout, &data.constants);
         for (number, (energy, part)) in self.0.iter_mut().zip(model.parts.iter()).enumerate() {
             // Sums are added to in `limit`: without this they would be those of all steps so far.
             *energy = Energy::default();
@@ -125,7 +125,7 @@ impl Energies {
 
     /// Measures the end of a step; `stored` is the stored energy [J] of each part now.
     pub fn end<S: Real>(&mut self, step: &Step<'_, S>, data: &StepData<S>, stored: &[f64]) {
-        let (model, constants) = (step.model, &data.constants);
+        let (model, constants) = (step.layout, &data.constants);
         for (number, (energy, part)) in self.0.iter_mut().zip(model.parts.iter()).enumerate() {
             *energy = Energy { held: energy.held, start: energy.start, ..Energy::default() };
             energy.end.stored = stored[number];
@@ -168,7 +168,7 @@ impl Energies {
         data: &mut StepData<S>,
         mut kept: impl FnMut(usize, f64),
     ) {
-        let (model, constants) = (step.model, &data.constants);
+        let (model, constants) = (step.layout, &data.constants);
         let free = |v: &usize| constants.inverse_masses[*v] != S::ZERO;
         for (number, (energy, part)) in self.0.iter().zip(model.parts.iter()).enumerate() {
             let (drift, share) = energy.limit();

@@ -25,7 +25,7 @@ pub fn load_forces<S: Real, const BOUND: bool>(
     x: &[Point<S>],
     loads: &mut [Point<S>],
 ) {
-    let model = step.model;
+    let model = step.layout;
     loads[part.copies.clone()].fill(Point::default());
     for color in &part.colors {
         let shared = Shared::new(loads);

@@ -75,13 +75,13 @@ pub struct PartGuard {
 
 impl<S: Real> Guard<S> {
     /// For the steps of a model.
-    pub fn new(model: &Layout<S>) -> Self {
-        let positions = vec![Point::default(); model.vertex_count()];
-        let parts = model.part_count();
+    pub fn new(layout: &Layout<S>) -> Self {
+        let positions = vec![Point::default(); layout.vertex_count()];
+        let parts = layout.part_count();
         let report =
             StepReport { potential: 0.0, limit: 0.0, noise: 0.0, rejected: false, kept_speed: 1.0 };
         Self {
-            evaluator: Evaluator::new(model),
+            evaluator: Evaluator::new(layout),
             start: positions.clone(),
             trial: positions,
             parts: vec![PartGuard::default(); parts],
@@ -124,7 +124,7 @@ impl<S: Real> Guard<S> {
             let trial = &mut self.trial;
             trial.copy_from_slice(if from_rest { previous } else { predicted });
             for pin in &step.inputs.pins {
-                trial[step.model.numbering.of(pin.vertex)].set_vec3(pin.target);
+                trial[step.layout.numbering.of(pin.vertex)].set_vec3(pin.target);
             }
             self.evaluator.evaluate_all(constants, step, trial);
             // Here, because the next evaluation overwrites `stored`: the energy limit counts from the start of the
@@ -133,7 +133,7 @@ impl<S: Real> Guard<S> {
                 self.energies.begin(step, data, &self.evaluator.stored);
             }
             let Self { start, trial, parts, .. } = self;
-            for (number, of) in step.model.parts.iter().enumerate() {
+            for (number, of) in step.layout.parts.iter().enumerate() {
                 let (part, value) = (&mut parts[number], self.evaluator.potentials[number].value);
                 // Written so that a limit that is NaN or infinite gives way.
                 if value < part.limit || !part.limit.is_finite() {
@@ -157,7 +157,7 @@ impl<S: Real> Guard<S> {
         // the place where the part ends.
         self.evaluator.evaluate_all(&data.constants, step, &data.points);
         let mut rejected = false;
-        for part in 0..step.model.part_count() {
+        for part in 0..step.layout.part_count() {
             let swept = self.report(part);
             self.reports[part] = if swept.keeps_limit() {
                 swept
@@ -182,7 +182,7 @@ impl<S: Real> Guard<S> {
 
     /// Shortens the step of a part, or descends.
     fn take_back(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, part: usize) -> StepReport {
-        let vertices = step.model.parts[part].vertices.clone();
+        let vertices = step.layout.parts[part].vertices.clone();
         // The array is taken out so that `self` can be borrowed beside it. Other parts' places in it are old, which
         // an evaluation of this part does not read. `data.points` stays at `x_K` until a share is accepted: every
         // share is one of the whole step, not of the share before it.
@@ -222,7 +222,7 @@ impl<S: Real> Guard<S> {
         part: usize,
     ) {
         let mut trial = std::mem::take(&mut self.trial);
-        let vertices = step.model.parts[part].vertices.clone();
+        let vertices = step.layout.parts[part].vertices.clone();
         trial[vertices.clone()].copy_from_slice(&self.start[vertices]);
         self.descend(step, data, &mut trial, part);
         take(step, data, &trial, part);
@@ -239,7 +239,7 @@ impl<S: Real> Guard<S> {
         // became `x_s`, its `Phi` could creep up by `noise` at every sweep.
         if value < guard.best {
             guard.best = value;
-            let vertices = step.model.parts[part].vertices.clone();
+            let vertices = step.layout.parts[part].vertices.clone();
             start[vertices.clone()].copy_from_slice(&points[vertices]);
         }
         let good = value <= guard.best + noise;
@@ -272,7 +272,7 @@ impl<S: Real> Guard<S> {
     ) {
         // The loads are made once, at the start of the line, and hold force and curvature per copy. Evaluations below
         // do not touch them, so `descent` gives the same direction at every length.
-        let of = &step.model.parts[part];
+        let of = &step.layout.parts[part];
         let moments = data.constants.moments(step);
         load_forces::<S, true>(&data.constants, step, &moments, of, x, &mut data.loads);
         let before = self.evaluator.evaluate(&data.constants, step, x, part).value;
@@ -284,7 +284,7 @@ impl<S: Real> Guard<S> {
             // stay where the line starts, so places are tried in `data.points`: `x_K` is given up by now.
             let mut slope = 0.0;
             for v in of.vertices.clone() {
-                let (gradient, direction) = descent(step.model, data, x, v);
+                let (gradient, direction) = descent(step.layout, data, x, v);
                 slope += gradient.dot(direction).to_f64();
                 data.points[v].set_vec3(x[v].vec3() + direction * S::from_f64(length));
             }
@@ -302,14 +302,14 @@ impl<S: Real> Guard<S> {
 
 /// Takes positions of a part over; weights stay.
 fn take<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>, x: &[Point<S>], part: usize) {
-    for v in step.model.parts[part].vertices.clone() {
+    for v in step.layout.parts[part].vertices.clone() {
         data.points[v].set_vec3(x[v].vec3());
     }
 }
 
 /// Gradient of `Phi` by one vertex and the direction of descent; zero for a pinned one.
 fn descent<S: Real>(
-    model: &Layout<S>,
+    layout: &Layout<S>,
     data: &StepData<S>,
     x: &[Point<S>],
     v: usize,
@@ -318,7 +318,7 @@ fn descent<S: Real>(
     if constants.inverse_masses[v] == S::ZERO {
         return (Vec3::ZERO, Vec3::ZERO);
     }
-    let load = gather(model, loads, v);
+    let load = gather(layout, loads, v);
     let mass = constants.inertias[v];
     let gradient = (x[v].vec3() - constants.predicted[v].vec3()) * mass - load.vec3();
     (gradient, gradient * (-S::ONE / (mass + load.w)))
@@ -360,12 +360,12 @@ mod tests {
     fn whole_descent(memory: &mut Memory<f64>, step: &Step<'_, f64>) -> Descent {
         let data = &mut memory.data;
         let before = data.points.clone();
-        let part = &step.model.parts[0];
+        let part = &step.layout.parts[0];
         let moments = data.constants.moments(step);
         load_forces::<_, true>(&data.constants, step, &moments, part, &before, &mut data.loads);
         let (mut whole, mut slope) = (before.clone(), 0.0);
         for v in 0..before.len() {
-            let (gradient, direction) = descent(step.model, data, &before, v);
+            let (gradient, direction) = descent(step.layout, data, &before, v);
             slope += gradient.dot(direction);
             whole[v].set_vec3(before[v].vec3() + direction);
         }

@@ -34,11 +34,11 @@ pub fn run<S: Real>(
     state: &mut State<S>,
 ) {
     match stage {
-        StepStage::ReadState => read_state(step.model, data, state),
+        StepStage::ReadState => read_state(step.layout, data, state),
         StepStage::MeasureStrain => {
             let constants = &mut data.constants;
             let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-            measure_strain(workers, step.model, None, &data.points, strains);
+            measure_strain(workers, step.layout, None, &data.points, strains);
         }
         StepStage::Predict(start) => data.predict(step, start),
         StepStage::ChooseStart => {
@@ -59,7 +59,7 @@ pub fn run<S: Real>(
             }
         }
         StepStage::WriteState => {
-            for (v, &user) in step.model.numbering.order.iter().enumerate() {
+            for (v, &user) in step.layout.numbering.order.iter().enumerate() {
                 state.positions[user as usize] = data.points[v].vec3();
                 state.velocities[user as usize] = data.velocities[v];
             }
@@ -74,9 +74,9 @@ fn update_velocities<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>) {
     }
 }
 
-fn read_state<S: Real>(model: &Layout<S>, data: &mut StepData<S>, state: &State<S>) {
-    data.read_positions(model, &state.positions);
-    for (velocity, &user) in data.velocities.iter_mut().zip(&model.numbering.order) {
+fn read_state<S: Real>(layout: &Layout<S>, data: &mut StepData<S>, state: &State<S>) {
+    data.read_positions(layout, &state.positions);
+    for (velocity, &user) in data.velocities.iter_mut().zip(&layout.numbering.order) {
         *velocity = state.velocities[user as usize];
     }
 }

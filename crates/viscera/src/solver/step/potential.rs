@@ -68,8 +68,8 @@ enum PieceOf {
 
 impl Evaluator {
     /// For a model.
-    pub fn new<S: Real>(model: &Layout<S>) -> Self {
-        let parts = &model.parts;
+    pub fn new<S: Real>(layout: &Layout<S>) -> Self {
+        let parts = &layout.parts;
         let (mut pieces, mut first) = (Vec::new(), vec![0]);
         for (number, part) in parts.iter().enumerate() {
             let mut cut = |of, count: usize, size: usize| {
@@ -110,7 +110,7 @@ impl Evaluator {
         step: &Step<'_, S>,
         x: &[Point<S>],
     ) {
-        let parts = 0..step.model.parts.len();
+        let parts = 0..step.layout.parts.len();
         self.sum_pieces(constants, step, x, parts.clone());
         for part in parts {
             self.combine(constants, step, x, part);
@@ -172,9 +172,9 @@ impl Evaluator {
             stored += energy;
             squared_noise += squared_force;
         }
-        let of = &step.model.parts[part];
+        let of = &step.layout.parts[part];
         let moments = constants.moments(step);
-        for_each_kind!(step.model, set => add_energies(set, &mut stored, &moments, x, of));
+        for_each_kind!(step.layout, set => add_energies(set, &mut stored, &moments, x, of));
         let squared = step.dt * step.dt;
         let value = 0.5 * inertia + squared * stored;
         let noise = squared * S::EPSILON * (reach * squared_noise).sqrt();
@@ -195,7 +195,7 @@ impl Piece {
         step: &Step<'_, S>,
         x: &[Point<S>],
     ) -> [f64; 2] {
-        let part = &step.model.parts[self.part];
+        let part = &step.layout.parts[self.part];
         let Range { start, end } = self.range;
         match self.of {
             PieceOf::Vertices => {
@@ -203,7 +203,7 @@ impl Piece {
                 inertia(constants, x, first + start..first + end)
             }
             PieceOf::Blocks(kind) => {
-                let set = &step.model.tet_sets[kind];
+                let set = &step.layout.tet_sets[kind];
                 let sums = Sums {
                     x,
                     start_strain: &constants.start_strain[kind],
@@ -219,7 +219,7 @@ impl Piece {
                         let blocks = first + chosen.start..first + chosen.end;
                         with_tissue!(set, L, VISCOUS => {
                             let pass = OfLaw::<_, L, VISCOUS>::new(&sums);
-                            constants.workers.piece(step.model, set, blocks, &pass);
+                            constants.workers.piece(step.layout, set, blocks, &pass);
                         });
                     }
                     before += blocks.len();

@@ -21,7 +21,7 @@ pub enum Tethers {
 impl<S: Real> StepData<S> {
     /// External forces, inertias, and their inverses, which pins have none of.
     pub fn prepare(&mut self, step: &Step<'_, S>, tethers: Tethers) {
-        let (model, constants) = (step.model, &mut self.constants);
+        let (model, constants) = (step.layout, &mut self.constants);
         constants.external.fill(Vec3::ZERO);
         for &(vertex, force) in &step.inputs.forces {
             constants.external[model.numbering.of(vertex)] += force;
@@ -51,7 +51,7 @@ impl<S: Real> StepData<S> {
     /// [`super::stage::StepStage::Predict`].
     pub fn predict(&mut self, step: &Step<'_, S>, start: Start) {
         self.prepare(step, Tethers::AsInertia);
-        let (model, constants) = (step.model, &mut self.constants);
+        let (model, constants) = (step.layout, &mut self.constants);
         let dt = S::from_f64(step.dt);
         for v in 0..model.vertex_count() {
             let x = self.points[v].vec3();

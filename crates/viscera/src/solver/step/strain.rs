@@ -12,41 +12,41 @@ use crate::solver::cpu::threads::{Shared, Workers};
 /// Green strain at `x` of the tetrahedra of viscous sets, of all or of one part.
 pub fn measure_strain<S: Real>(
     workers: &Workers,
-    model: &Layout<S>,
+    layout: &Layout<S>,
     part: Option<&Part>,
     x: &[Point<S>],
     start_strain: &mut StartStrain<S>,
 ) {
-    pass_over(workers, model, part, x, S::ZERO, start_strain);
+    pass_over(workers, layout, part, x, S::ZERO, start_strain);
 }
 
 /// Brings the start strain of a part nearer to that at `x`: a share of the change between both is left.
 pub fn keep_share<S: Real>(
     workers: &Workers,
-    model: &Layout<S>,
+    layout: &Layout<S>,
     part: &Part,
     x: &[Point<S>],
     share: S,
     start_strain: &mut StartStrain<S>,
 ) {
-    pass_over(workers, model, Some(part), x, share, start_strain);
+    pass_over(workers, layout, Some(part), x, share, start_strain);
 }
 
 fn pass_over<S: Real>(
     workers: &Workers,
-    model: &Layout<S>,
+    layout: &Layout<S>,
     part: Option<&Part>,
     x: &[Point<S>],
     share: S,
     start_strain: &mut StartStrain<S>,
 ) {
-    for (kind, (set, strains)) in model.tet_sets.iter().zip(start_strain).enumerate() {
+    for (law, (set, strains)) in layout.tet_sets.iter().zip(start_strain).enumerate() {
         let pass = Strain { x, share, strains: Shared::new(strains) };
         match part {
             _ if !set.viscous => {}
-            None => workers.pass(model, set, 0..set.block_count(), &pass),
+            None => workers.pass(layout, set, 0..set.block_count(), &pass),
             Some(part) => {
-                part.blocks(kind).for_each(|blocks| workers.pass(model, set, blocks, &pass));
+                part.blocks(law).for_each(|blocks| workers.pass(layout, set, blocks, &pass));
             }
         }
     }

@@ -41,11 +41,11 @@ impl<S: Real> Bundle<S> {
 
 /// The tethers of a step, vertex by vertex; takes no memory where `bundles` has room. One alone keeps its
 /// bits.
-pub fn bundle<S: Real>(model: &Layout<S>, inputs: &Inputs<S>, bundles: &mut Vec<Bundle<S>>) {
+pub fn bundle<S: Real>(layout: &Layout<S>, inputs: &Inputs<S>, bundles: &mut Vec<Bundle<S>>) {
     bundles.clear();
     let pulling = inputs.tethers.iter().filter(|tether| tether.stiffness > S::ZERO);
     bundles.extend(pulling.map(|&Tether { vertex, target, stiffness }| Bundle {
-        vertex: model.numbering.of(vertex),
+        vertex: layout.numbering.of(vertex),
         stiffness,
         target,
     }));

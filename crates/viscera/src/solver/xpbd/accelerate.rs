@@ -16,13 +16,13 @@ impl<S: Real> Memory<S> {
         for chebyshev in &mut self.chebyshev {
             chebyshev.start(step.settings.chebyshev_radius);
         }
-        fill_multiplier_weights(step.model, step.dt, &mut self.multiplier_weights);
+        fill_multiplier_weights(step.layout, step.dt, &mut self.multiplier_weights);
         if !self.mixings.is_empty() {
             // Nothing remembers an iterate before the first sweep.
             let weights = &mut self.iterate[0].multipliers;
             weights.fill(S::ZERO);
-            fill_multiplier_weights(step.model, step.dt, weights);
-            for (mixing, part) in self.mixings.iter_mut().zip(step.model.parts.iter()) {
+            fill_multiplier_weights(step.layout, step.dt, weights);
+            for (mixing, part) in self.mixings.iter_mut().zip(step.layout.parts.iter()) {
                 mixing.start(part, masses, weights, step.settings.anderson_on);
             }
         }
@@ -39,7 +39,7 @@ impl<S: Real> Memory<S> {
         let settings = step.settings;
         let measured = settings.chebyshev_radius == 0.0;
         let gamma = S::from_f64(settings.chebyshev_damping);
-        for (number, part) in step.model.parts.iter().enumerate() {
+        for (number, part) in step.layout.parts.iter().enumerate() {
             let change = self.change_norm(part, data, multipliers).sqrt();
             let omega = self.chebyshev[number].weight(change, settings.chebyshev_delay, measured);
             if omega == 1.0 && settings.chebyshev_damping == 1.0 {
@@ -90,7 +90,7 @@ impl<S: Real> Memory<S> {
     ) {
         let guard = step.settings.guard_of_mixtures() == AndersonGuard::Residual;
         let workers = &data.constants.workers;
-        for (mixing, part) in self.mixings.iter_mut().zip(step.model.parts.iter()) {
+        for (mixing, part) in self.mixings.iter_mut().zip(step.layout.parts.iter()) {
             let points = &mut data.points[part.vertices.clone()];
             mixing.enter(part, points, multipliers, &self.iterate[0]);
             let Mixing { anderson, weights } = mixing;

@@ -16,7 +16,7 @@ impl Recorder<'_> {
     pub fn xpbd_stage(&self, stage: XpbdStage, into: &mut Vec<Dispatch>) {
         match stage {
             XpbdStage::ResetMultipliers | XpbdStage::RescaleMultipliers => {
-                let count = self.model.multiplier_count as u32;
+                let count = self.layout.multiplier_count as u32;
                 let job = Job { count, ..Job::default() };
                 into.push(self.threads(&kernels::RESCALE_MULTIPLIERS, job));
             }
@@ -47,7 +47,7 @@ impl Recorder<'_> {
     /// A warm-start reset, instead of a step.
     pub fn restart_stages(&self) -> Vec<Dispatch> {
         let mut dispatches = vec![self.vertices(&kernels::APPLY_UPDATES, 0)];
-        if self.model.is_viscous() {
+        if self.layout.is_viscous() {
             self.each_set(&kernels::MEASURE_STRAIN, &mut dispatches);
         }
         self.constitutive_multipliers(1, &mut dispatches);
@@ -65,7 +65,7 @@ impl Recorder<'_> {
             Swept::Copies => [&kernels::SOLVE_COPIES, &kernels::SOLVE_ELEMENTS],
             Swept::Jacobi => [&kernels::SOLVE_JACOBI, &kernels::SOLVE_ELEMENTS_JACOBI],
         };
-        for (law, set) in self.model.tet_sets.iter().enumerate() {
+        for (law, set) in self.layout.tet_sets.iter().enumerate() {
             let blocks = set.color(color);
             if !blocks.is_empty() {
                 into.push(self.on_copies(self.blocks(tets, law, blocks)));

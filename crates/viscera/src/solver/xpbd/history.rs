@@ -34,13 +34,13 @@ use crate::state::State;
 /// Takes the multipliers from the positions, as if the tissue had long been there: what is
 /// viscous has relaxed.
 pub fn restart<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>, state: &mut State<S>) {
-    data.read_positions(step.model, &state.positions);
+    data.read_positions(step.layout, &state.positions);
     let constants = &mut data.constants;
     // Tissue has long been there: nothing has moved in the step before.
     constants.previous.copy_from_slice(&data.points);
     let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-    measure_strain(workers, step.model, None, &data.points, strains);
-    for part in step.model.parts.iter() {
+    measure_strain(workers, step.layout, None, &data.points, strains);
+    for part in step.layout.parts.iter() {
         constitutive_multipliers(step, data, part, &mut state.multipliers);
     }
     state.multiplier_dt = step.dt;
@@ -48,7 +48,7 @@ pub fn restart<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>, state: &mut 
 
 /// [`super::stage::XpbdStage::RepairMultipliers`].
 pub fn repair_multipliers<S: Real>(step: &Step<'_, S>, data: &StepData<S>, multipliers: &mut [S]) {
-    for part in step.model.parts.iter() {
+    for part in step.layout.parts.iter() {
         let mut of_part = part.multipliers.iter().map(|range| &multipliers[range.clone()]);
         if !of_part.all(|range| range.iter().all(|l| l.is_finite())) {
             constitutive_multipliers(step, data, part, multipliers);
@@ -62,7 +62,7 @@ fn constitutive_multipliers<S: Real>(
     part: &Part,
     l: &mut [S],
 ) {
-    let model = step.model;
+    let model = step.layout;
     let x = &data.points;
     let shared = Shared::new(l);
     for (kind, set) in model.tet_sets.iter().enumerate() {

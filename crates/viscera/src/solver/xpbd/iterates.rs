@@ -103,14 +103,14 @@ pub fn scatter<S: Copy>(part: &Part, from: &[S], all: &mut [S]) {
 }
 
 /// The diagonal of `a~` of every multiplier; nothing where there is no room for it.
-pub fn fill_multiplier_weights<S: Real>(model: &Layout<S>, dt: f64, weights: &mut [S]) {
+pub fn fill_multiplier_weights<S: Real>(layout: &Layout<S>, dt: f64, weights: &mut [S]) {
     if weights.is_empty() {
         return;
     }
     let dt = S::from_f64(dt);
-    for set in &model.tet_sets {
+    for set in &layout.tet_sets {
         for (block, lane) in set.places() {
-            let material = &model.materials[set.blocks[block].material[lane] as usize];
+            let material = &layout.materials[set.blocks[block].material[lane] as usize];
             let volume = set.blocks[block].rest_volume[lane];
             let step_volume = volume * dt * dt;
             let mut store = |offset: usize, values: &[S]| {
@@ -128,18 +128,18 @@ pub fn fill_multiplier_weights<S: Real>(model: &Layout<S>, dt: f64, weights: &mu
             }
         }
     }
-    for_each_kind!(model, set => fill_weights(set, model, dt, weights));
+    for_each_kind!(layout, set => fill_weights(set, layout, dt, weights));
 }
 
 /// Of the elements of one kind: constraints whose energy has the curvature `k` have `a~ = 1/(k dt^2)`.
 fn fill_weights<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
     set: &ElementSet<S, K, N, M>,
-    model: &Layout<S>,
+    layout: &Layout<S>,
     dt: S,
     weights: &mut [S],
 ) {
     for i in 0..set.len() {
-        let stiffness = set.list.element::<S>(i, &model.rest_anchors).curvature();
+        let stiffness = set.list.element::<S>(i, &layout.rest_anchors).curvature();
         weights[set.multipliers(i)].fill(S::ONE / (stiffness * dt * dt));
     }
 }

@@ -27,7 +27,7 @@ pub fn load_multipliers<S: Real>(
     multipliers: &[S],
     loads: &mut [Point<S>],
 ) {
-    let model = step.model;
+    let model = step.layout;
     loads.fill(Point::default());
     for color in 0..model.color_count {
         let shared = Shared::new(loads);

@@ -26,22 +26,22 @@ pub struct Memory<S> {
 
 impl<S: Real> Memory<S> {
     /// Memory for the steps of a model.
-    pub fn new(model: &Layout<S>, settings: &SolverSettings) -> Self {
+    pub fn new(layout: &Layout<S>, settings: &SolverSettings) -> Self {
         let [chebyshev, anderson] = [Acceleration::Chebyshev, Acceleration::Anderson]
             .map(|acceleration| settings.acceleration == acceleration);
         let points =
-            |wanted: bool| vec![Point::default(); if wanted { model.vertex_count() } else { 0 }];
+            |wanted: bool| vec![Point::default(); if wanted { layout.vertex_count() } else { 0 }];
         let iterate = |wanted: bool| Iterate {
             positions: points(wanted),
-            multipliers: vec![S::ZERO; if wanted { model.multiplier_count } else { 0 }],
+            multipliers: vec![S::ZERO; if wanted { layout.multiplier_count } else { 0 }],
         };
         let window = settings.anderson_window as usize;
-        let parts = |wanted: bool| if wanted { &model.parts[..] } else { &[] };
+        let parts = |wanted: bool| if wanted { &layout.parts[..] } else { &[] };
         let largest = parts(anderson).iter().map(|part| part.vertices.len()).max().unwrap_or(0);
         Self {
-            copies: vec![Point::default(); if model.is_split() { model.copy_count() } else { 0 }],
+            copies: vec![Point::default(); if layout.is_split() { layout.copy_count() } else { 0 }],
             iterate: [iterate(chebyshev || anderson), iterate(chebyshev)],
-            multiplier_weights: vec![S::ZERO; if chebyshev { model.multiplier_count } else { 0 }],
+            multiplier_weights: vec![S::ZERO; if chebyshev { layout.multiplier_count } else { 0 }],
             chebyshev: vec![Chebyshev::default(); parts(chebyshev).len()],
             mixings: parts(anderson).iter().map(|part| Mixing::new(part, window)).collect(),
             mixed: vec![S::ZERO; 3 * largest],

@@ -17,7 +17,7 @@ impl<S: Real> Memory<S> {
         multipliers: &mut [S],
     ) {
         guard.evaluator.evaluate_all(&data.constants, step, &data.points);
-        for part in 0..step.model.part_count() {
+        for part in 0..step.layout.part_count() {
             if !guard.is_best(step, &data.points, part) {
                 self.guard_mixture(step, data, guard, multipliers, part);
             }
@@ -33,7 +33,7 @@ impl<S: Real> Memory<S> {
         multipliers: &mut [S],
         part: usize,
     ) {
-        let of = &step.model.parts[part];
+        let of = &step.layout.parts[part];
         let (positions, plain_multipliers, is_mixed) = self.mixings[part].plain(of);
         if is_mixed {
             for (v, point) in data.points[of.vertices.clone()].iter_mut().enumerate() {

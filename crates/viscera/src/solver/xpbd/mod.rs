@@ -30,9 +30,9 @@ use stage::{Mix, XpbdStage};
 use sweep::solve_color;
 
 /// The stages of a step.
-pub fn plan<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Plan {
+pub fn plan<S: Real>(layout: &Layout<S>, settings: &SolverSettings) -> Plan {
     let mut nodes: Vec<Node> = vec![StepStage::ReadState.into()];
-    if model.is_viscous() {
+    if layout.is_viscous() {
         nodes.push(StepStage::MeasureStrain.into());
     }
     // A kept multiplier already carries gravity: adding it to the start counts it twice, where anything holds
@@ -55,7 +55,7 @@ pub fn plan<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Plan {
         nodes.push(XpbdStage::RememberIterate.into());
     }
 
-    let body = body(model, settings).into_iter().map(Node::from).collect();
+    let body = body(layout, settings).into_iter().map(Node::from).collect();
     let most = Times::Count(settings.iterations());
     nodes.push(Node::Repeat(Repeat { most, until: None, body }));
 
@@ -74,7 +74,7 @@ pub fn plan<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Plan {
 }
 
 /// The stages of an iteration.
-fn body<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Vec<XpbdStage> {
+fn body<S: Real>(layout: &Layout<S>, settings: &SolverSettings) -> Vec<XpbdStage> {
     let mut body = Vec::new();
     if is_accelerated(settings) && !mixes_remember(settings) {
         body.push(XpbdStage::RememberIterate);
@@ -82,14 +82,14 @@ fn body<S: Real>(model: &Layout<S>, settings: &SolverSettings) -> Vec<XpbdStage>
     if settings.rebase {
         body.extend([XpbdStage::LoadCorners, XpbdStage::Rebase]);
     }
-    let is_split = model.is_split();
-    if is_split && is_jacobi(model) {
+    let is_split = layout.is_split();
+    if is_split && is_jacobi(layout) {
         body.push(XpbdStage::SplitAndSolve);
     } else {
         if is_split {
             body.push(XpbdStage::SplitCopies);
         }
-        body.extend((0..model.color_count as u32).map(XpbdStage::SolveColor));
+        body.extend((0..layout.color_count as u32).map(XpbdStage::SolveColor));
     }
     match settings.acceleration {
         Acceleration::None if is_split => body.push(XpbdStage::JoinCopies),
@@ -133,10 +133,10 @@ fn mixes_remember(settings: &SolverSettings) -> bool {
 }
 
 /// Whether every copy has one constraint, and all are of one colour.
-pub fn is_jacobi<S: Real>(model: &Layout<S>) -> bool {
-    let mut corners = 4 * model.tet_count();
-    for_each_kind!(model, set => corners += set.vertices.as_flattened().len());
-    model.color_count == 1 && model.copy_count() == corners
+pub fn is_jacobi<S: Real>(layout: &Layout<S>) -> bool {
+    let mut corners = 4 * layout.tet_count();
+    for_each_kind!(layout, set => corners += set.vertices.as_flattened().len());
+    layout.color_count == 1 && layout.copy_count() == corners
 }
 
 impl<S: Real> Memory<S> {
@@ -149,7 +149,7 @@ impl<S: Real> Memory<S> {
         guard: Option<&mut Guard<S>>,
         state: &mut State<S>,
     ) {
-        let model = step.model;
+        let model = step.layout;
         match stage {
             XpbdStage::ResetMultipliers => {
                 state.multipliers.fill(S::ZERO);
@@ -211,7 +211,7 @@ impl<S: Real> Memory<S> {
         data: &mut StepData<S>,
         state: &mut State<S>,
     ) {
-        let split = step.model.is_split();
+        let split = step.layout.is_split();
         let points = if split { &mut self.copies } else { &mut data.points };
         let constants = &data.constants;
         solve_color(constants, step, points, &mut state.multipliers, color);

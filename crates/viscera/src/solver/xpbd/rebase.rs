@@ -31,7 +31,7 @@ pub fn rebase_factor(is_split: bool, colors: usize, settings: &SolverSettings) -
 /// dependence drives them, by one damped step in the metric `mh`, a share of the bound of the
 /// geometric stiffness above the mass.
 pub fn rebase<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>) {
-    let model = step.model;
+    let model = step.layout;
     let StepData { constants, points, loads, .. } = data;
     for part in model.parts.iter() {
         let factor = rebase_factor(part.is_split(), part.colors.len(), step.settings);
@@ -52,13 +52,13 @@ pub fn rebase<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>) {
 }
 
 /// [`super::stage::XpbdStage::RecomputePositions`].
-pub fn recompute_positions<S: Real>(model: &Layout<S>, data: &mut StepData<S>) {
+pub fn recompute_positions<S: Real>(layout: &Layout<S>, data: &mut StepData<S>) {
     let StepData { constants, points, loads, .. } = data;
-    for part in model.parts.iter() {
+    for part in layout.parts.iter() {
         constants.each_vertex(part, points, |v, point| {
             let inverse_mass = constants.inverse_masses[v];
             if inverse_mass != S::ZERO {
-                let impulse = gather(model, loads, v).vec3();
+                let impulse = gather(layout, loads, v).vec3();
                 point.set_vec3(constants.predicted[v].vec3() + impulse * inverse_mass);
             }
         });
@@ -67,18 +67,18 @@ pub fn recompute_positions<S: Real>(model: &Layout<S>, data: &mut StepData<S>) {
 
 impl<S: Real> Memory<S> {
     /// [`super::stage::XpbdStage::SplitCopies`].
-    pub fn split_copies(&mut self, model: &Layout<S>, data: &StepData<S>) {
+    pub fn split_copies(&mut self, layout: &Layout<S>, data: &StepData<S>) {
         for (v, point) in data.points.iter().enumerate() {
-            self.copies[copies_of(model, v)].fill(*point);
+            self.copies[copies_of(layout, v)].fill(*point);
         }
     }
 
     /// Averages the changes of the copies, not the copies: the mean of equal numbers is then that
     /// number, and a vertex that no constraint moved stays where it is to the bit.
-    pub fn join_copies(&mut self, model: &Layout<S>, data: &mut StepData<S>) {
-        for part in model.parts.iter() {
+    pub fn join_copies(&mut self, layout: &Layout<S>, data: &mut StepData<S>) {
+        for part in layout.parts.iter() {
             if part.is_split() {
-                self.average_copies(model, part, data);
+                self.average_copies(layout, part, data);
             } else {
                 // As in a model in which nothing is split: the copy is the vertex.
                 let copies = &self.copies[part.copies.clone()];
@@ -89,10 +89,10 @@ impl<S: Real> Memory<S> {
         }
     }
 
-    fn average_copies(&self, model: &Layout<S>, part: &Part, data: &mut StepData<S>) {
+    fn average_copies(&self, layout: &Layout<S>, part: &Part, data: &mut StepData<S>) {
         let copies = &self.copies;
         data.constants.each_vertex(part, &mut data.points, |v, point| {
-            let range = copies_of(model, v);
+            let range = copies_of(layout, v);
             let share = S::ONE / S::from_f64(range.len() as f64);
             let x = point.vec3();
             let mut sum = Vec3::ZERO;

@@ -67,7 +67,7 @@ pub fn solve_color<S: Real>(
     multipliers: &mut [S],
     color: usize,
 ) {
-    let model = step.model;
+    let model = step.layout;
     let mut sweep = Sweep {
         points: Shared::new(points),
         multipliers: Shared::new(multipliers),

@@ -13,22 +13,22 @@
 //! Each connected part has its own. Vertices that are pinned have no place in any level.
 
 mod dense;
+mod prolongation;
 mod rotation;
 mod sums;
 
 use std::ops::Range;
 
 use crate::elements::kinds::{Energy, Kind};
-use crate::elements::law::{Law, with_law};
 use crate::layout::lattice::Lattice;
 use crate::layout::{ElementSet, Layout, Moments, Part};
-use crate::material::MaterialModel;
 use crate::model::for_each_kind;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::step::data::StepConstants;
 use dense::Dense;
-use rotation::rotation_of;
+use prolongation::Prolongation;
+use rotation::Turn;
 use sums::{
     DiagonalSums, FullBlock, FullSums, Grouped, Groups, On, Six, inverse, mapped, tets_of_part,
     times,
@@ -49,27 +49,6 @@ pub struct Preconditioner<S> {
     turns: Vec<Turn<S>>,
 }
 
-/// How a group has turned and stretched.
-#[derive(Clone, Copy, Debug)]
-struct Turn<S> {
-    /// `R`.
-    rotation: Mat3<S>,
-    /// `A`.
-    map: Mat3<S>,
-}
-
-impl<S: Real> Turn<S> {
-    const NONE: Self = Self { rotation: Mat3::IDENTITY, map: Mat3::IDENTITY };
-
-    fn new(law: MaterialModel, f: &Mat3<f64>) -> Self {
-        let rotation = rotation_of(f).cast();
-        let map: Mat3<S> = with_law!(law, W => W::gradient_map(f)).cast();
-        // Also where a number is none.
-        let is_finite = map.norm_squared().is_finite();
-        Self { rotation, map: if is_finite { map } else { rotation } }
-    }
-}
-
 #[derive(Clone, Debug)]
 struct OfPart<S> {
     vertices: Range<usize>,
@@ -86,13 +65,6 @@ struct OfPart<S> {
     vectors: Vec<Vec<Vec3<S>>>,
     /// The residual of free vertices.
     masked: Vec<Vec3<S>>,
-}
-
-/// Weights of the nodes of a coarser level in each node of a finer one.
-#[derive(Clone, Debug, Default)]
-struct Prolongation<S> {
-    offsets: Vec<u32>,
-    entries: Vec<(u32, S)>,
 }
 
 /// What the curvature of a step is made of.
@@ -210,11 +182,7 @@ impl<S: Real> OfPart<S> {
             if level == 0 { places.len() } else { lattice.levels[level - 1].node_count() }
         };
         let ways_up = lattice.levels.iter().enumerate().map(|(level, of)| {
-            let weights = if level == 0 { &of.of_vertices } else { &of.of_finer };
-            Prolongation {
-                offsets: weights.offsets.clone(),
-                entries: weights.entries.iter().map(|&(node, w)| (node, S::from_f64(w))).collect(),
-            }
+            Prolongation::new(if level == 0 { &of.of_vertices } else { &of.of_finer })
         });
         let levels = lattice.levels.len();
         Self {
@@ -235,7 +203,7 @@ impl<S: Real> OfPart<S> {
         let levels = self.lattice.levels.iter().map(|level| {
             size_of_val(&level.of_vertices.entries[..]) + size_of_val(&level.of_finer.entries[..])
         });
-        let ways = self.ways_up.iter().map(|way| size_of_val(&way.entries[..]));
+        let ways = self.ways_up.iter().map(Prolongation::bytes);
         let sums = self
             .levels
             .iter()
@@ -484,31 +452,6 @@ fn add_block(dense: &mut Dense, [node, other]: [u32; 2], block: &Mat3<f64>) {
             let (row, column) = (3 * node as usize + row, 3 * other as usize + column);
             if column <= row {
                 dense.add(row, column, entry);
-            }
-        }
-    }
-}
-
-impl<S: Real> Prolongation<S> {
-    fn row(&self, node: usize) -> &[(u32, S)] {
-        &self.entries[self.offsets[node] as usize..self.offsets[node + 1] as usize]
-    }
-
-    /// `P^T` of a finer level's values.
-    fn restrict(&self, finer: &[Vec3<S>], coarser: &mut [Vec3<S>]) {
-        coarser.fill(Vec3::ZERO);
-        for (node, &value) in finer.iter().enumerate() {
-            for &(parent, weight) in self.row(node) {
-                coarser[parent as usize] += value * weight;
-            }
-        }
-    }
-
-    /// Adds `P` times a coarser level's values.
-    fn add(&self, coarser: &[Vec3<S>], finer: &mut [Vec3<S>]) {
-        for (node, value) in finer.iter_mut().enumerate() {
-            for &(parent, weight) in self.row(node) {
-                *value += coarser[parent as usize] * weight;
             }
         }
     }

@@ -1,6 +1,31 @@
-//! The rotation nearest to a deformation, for any deformation: turned inside out and flat ones too.
+//! How tissue has turned and stretched, by any deformation: turned inside out and flat ones too.
 
-use crate::scalar::{Mat3, Vec3, vec3};
+use crate::elements::law::{Law, with_law};
+use crate::material::MaterialModel;
+use crate::scalar::{Mat3, Real, Vec3, vec3};
+
+/// How a group has turned and stretched.
+#[derive(Clone, Copy, Debug)]
+pub struct Turn<S> {
+    /// `R`.
+    pub rotation: Mat3<S>,
+    /// `A`.
+    pub map: Mat3<S>,
+}
+
+impl<S: Real> Turn<S> {
+    /// Of the rest shape.
+    pub const NONE: Self = Self { rotation: Mat3::IDENTITY, map: Mat3::IDENTITY };
+
+    /// Of a mean deformation gradient.
+    pub fn new(law: MaterialModel, f: &Mat3<f64>) -> Self {
+        let rotation = rotation_of(f).cast();
+        let map: Mat3<S> = with_law!(law, W => W::gradient_map(f)).cast();
+        // Also where a number is none.
+        let is_finite = map.norm_squared().is_finite();
+        Self { rotation, map: if is_finite { map } else { rotation } }
+    }
+}
 
 /// Turns at most: quadratic convergence needs a handful.
 const MOST_TURNS: usize = 20;
@@ -10,7 +35,7 @@ const NEAR: f64 = 1e-5;
 
 /// The rotation `R` that maximises `R : F`: Mueller, Bender, Chentanez, Macklin, "A robust method to extract the
 /// rotational part of deformations", MIG 2016. It starts from the first two columns of `F`, made orthonormal.
-pub fn rotation_of(f: &Mat3<f64>) -> Mat3<f64> {
+fn rotation_of(f: &Mat3<f64>) -> Mat3<f64> {
     let mut r = start(f);
     for _ in 0..MOST_TURNS {
         let mut turn = Vec3::<f64>::ZERO;
