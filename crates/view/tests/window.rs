@@ -10,7 +10,7 @@ use std::time::Duration;
 use viscera::material::PRESETS;
 use viscera::scalar::Vec3;
 use viscera::scene::Scene;
-use viscera::settings::{Acceleration, Colors};
+use viscera::settings::{Acceleration, Colors, Count, Method};
 use viscera::simulation::{Assembly, Simulation};
 use viscera_view::choices::Side;
 
@@ -113,6 +113,29 @@ fn a_typed_number_is_one_change_when_it_is_finished() {
     let values: Vec<_> = changes.iter().map(|(_, value)| value.as_str()).collect();
     assert_eq!(values, ["12500 Pa", "7"], "{changes:?}");
     assert_eq!(window.undo_steps(), 2);
+}
+
+#[test]
+fn the_quasi_newton_method_chooses_its_counts_until_a_box_is_unticked() {
+    let mut window = Window::running("liver_retraction", &[]);
+    window.press("quasi-Newton");
+    let solver = |window: &Window| window.scene().solver.clone();
+    assert_eq!(solver(&window).method, Method::QuasiNewton);
+    assert_eq!((solver(&window).substeps, solver(&window).iterations), (Count::Auto, Count::Auto));
+    let number = window.harness.state().snapshot().expect("a frame").number;
+    window.wait("frames of the new method", |app| {
+        app.snapshot().is_some_and(|snapshot| snapshot.number > number + 20)
+    });
+    window.picture("quasi-newton");
+    window.press("automatic passes");
+    assert_eq!(solver(&window).iterations, Count::Of(8));
+    window.slide("passes", 12.0);
+    assert_eq!(solver(&window).iterations, Count::Of(12));
+    window.press("automatic passes");
+    assert_eq!(solver(&window).iterations, Count::Auto);
+    window.press("automatic substeps");
+    assert_eq!(solver(&window).substeps, Count::Of(1));
+    assert_eq!(window.texts(), [""; 0]);
 }
 
 #[test]

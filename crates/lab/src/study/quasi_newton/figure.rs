@@ -5,7 +5,7 @@ use viscera::settings::AndersonOn;
 use viscera_report::{Axis, Plot, Series, Style, Table};
 
 use super::super::Context;
-use super::super::convergence::{CEILING, FLOOR, in_data, thinned};
+use super::super::convergence::{FLOOR, in_data, thinned};
 use super::super::methods::{
     COLORED, JACOBI, NamedSettings, anderson, exact, published, quasi_newton,
 };
@@ -38,6 +38,9 @@ pub(super) fn case_count(quick: bool) -> usize {
     1 + methods(quick).len()
 }
 
+/// Errors from here on are not shown: sweeps as published begin with some forty times that of the prediction.
+const CEILING: f64 = 100.0;
+
 /// The step that is shown: a bar under torsion in the middle of its motion, of the middle of all tissues.
 fn shown(problems: &[StepProblem]) -> Option<usize> {
     let twists = || {
@@ -67,7 +70,6 @@ pub(super) fn show(
         Axis::logarithmic("passes"),
         Axis::logarithmic("error, 1 = inertial prediction"),
     );
-    plot.reference(1e-2, "1e-2");
     plot.reference(1e-3, "1e-3");
     let mut data = Table::new(["curve", "passes", "error"]);
     let [coarse, fine] = [false, true]
@@ -86,8 +88,9 @@ pub(super) fn show(
         &plot,
         &format!(
             "A step of the twisted bar, {tets} tetrahedra, stable neo-Hookean. Compare where curves cross the \
-             two levels, and how steep they are there: quasi-Newton keeps its slope and, on the finer mesh \
-             (dashed), its place; sweeps of XPBD as published bend towards an answer of their own."
+             level, and how steep they are there: quasi-Newton keeps its slope and, on the finer mesh \
+             (dashed), its place; XPBD as published, here with the neo-Hookean pair, leaves the step at once and \
+             comes to an answer of its own."
         ),
     )?;
     context.document.data("quasi-newton-curves", "All points", &data)
