@@ -3,7 +3,7 @@
 use crate::common::{STVK, block, exact, material, plain, single_body};
 use viscera::model::Model;
 use viscera::scalar::{Vec3, vec3};
-use viscera::settings::{Acceleration, Count, SolverSettings};
+use viscera::settings::{Acceleration, Count, Method, SolverSettings};
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
@@ -32,6 +32,14 @@ fn stepped(settings: &SolverSettings, iterations: u32) -> State<f64> {
 /// to the bit, and so is one whose number of iterations is set later.
 #[test]
 fn a_watched_step_is_a_step() {
+    // With one that leaves its number to the method as well.
+    let quasi_newton =
+        |iterations| SolverSettings { method: Method::QuasiNewton, iterations, ..plain(1, 7) };
+    for few in [Count::Of(3), Count::Auto] {
+        let [few, many] = [few, Count::Of(12)].map(quasi_newton);
+        assert_eq!(stepped(&few, 12), stepped(&many, 12));
+        assert_ne!(stepped(&few, 12).positions, stepped(&few, 3).positions);
+    }
     let mixed = SolverSettings { acceleration: Acceleration::Anderson, ..plain(1, 7) };
     for settings in [plain(1, 7), mixed, exact(7)] {
         let (model, inputs) = bar();
@@ -46,6 +54,7 @@ fn a_watched_step_is_a_step() {
         assert_eq!(seen.len(), 8);
         let fewer = SolverSettings { iterations: Count::Of(3), ..settings.clone() };
         assert_eq!(stepped(&settings, 3), stepped(&fewer, 3));
+        assert_eq!(stepped(&fewer, 7), stepped(&settings, 7));
         if !settings.rebase {
             // Nothing comes after the last iteration; multipliers start from zero.
             assert_eq!(seen[7], state.positions);

@@ -250,6 +250,40 @@ fn assert_trouble_stays<S: Real>((name, settings): &(&str, SolverSettings), fate
     }
 }
 
+/// A body of two materials behind one that is of its second: the model numbers materials in another order then, and the
+/// body has the bits that it has alone.
+#[test]
+fn the_order_of_materials_in_a_model_does_not_matter_to_a_part() {
+    let mesh = block([0.12, 0.04, 0.04], [8, 3, 3], 0.2);
+    let is_far = |tet: &[u32; 4]| tet.iter().all(|&v| mesh.vertices()[v as usize].x > 0.05);
+    let regions = mesh.tets().iter().map(|tet| u32::from(is_far(tet))).collect();
+    let (mesh, _) = TetMesh::new(mesh.vertices().to_vec(), mesh.tets().to_vec(), regions)
+        .expect("a mesh of two regions");
+    let [near, far] = [1e4, 3e4].map(|young| material(SNH, young, 0.45));
+    let end = |is_behind: bool| {
+        let mut builder = ModelBuilder::new();
+        if is_behind {
+            builder.add_body(&block([0.02; 3], [2; 3], 0.0), &far).expect("a body");
+        }
+        let body = builder.add_body(&mesh, &near).expect("a body");
+        builder.set_region_material(body, 1, &far).expect("its second region");
+        let model: Model<f32> = builder.build().expect("a model");
+        let own = model.bodies[body].vertices.clone();
+        let mut inputs = Inputs { gravity: GRAVITY.cast(), ..Inputs::default() };
+        for (v, x) in own.clone().zip(mesh.vertices()).filter(|(_, x)| x.x < 1e-9) {
+            inputs.pins.push(Pin { vertex: v as u32, target: x.cast() });
+        }
+        let settings = SolverSettings { method: Method::QuasiNewton, ..SolverSettings::default() };
+        let mut solver = Solver::new(&model, &settings);
+        let mut state = State::at_rest(&model);
+        for _ in 0..4 {
+            solver.step(&model, &mut state, &inputs, 1.0 / 60.0).expect("a legal step");
+        }
+        state.positions[own].to_vec()
+    };
+    assert!(end(false) == end(true));
+}
+
 /// Both bodies have the bits of a model of their own, by every method and in either order: the quiet one, and
 /// the one in trouble as well.
 #[test]

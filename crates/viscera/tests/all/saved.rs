@@ -133,6 +133,33 @@ fn a_resumed_simulation_goes_on_to_the_bit() {
     resumes_to_the_bit::<f64>(&[("solver.precision", "f64"), ("solver.colors", "1")], &["1"]);
 }
 
+/// Pairs that were kept with another number of them are found where they stand, and no more of them are used than asked
+/// for; a part that has fewer than another has its own.
+#[test]
+fn a_simulation_goes_on_with_another_number_of_pairs() {
+    let method = [
+        ("solver.method", "quasi_newton"),
+        ("body.bar.material.poisson", "0.3"),
+        ("body.weight.material.poisson", "0.45"),
+    ];
+    let with = |history: Option<&'static str>| {
+        let more = history.map(|history| ("solver.history", history));
+        method.into_iter().chain(more).collect::<Vec<_>>()
+    };
+    for [kept, now] in [[Some("10"), None], [None, Some("10")], [Some("10"), Some("2")]] {
+        let mut before = cpu::<f32>(&with(kept));
+        advance(&mut before, SAVED);
+        let mut usual = cpu::<f32>(&with(kept)).resume(&before.save()).expect("the same scene");
+        let mut resumed = cpu::<f32>(&with(now)).resume(&before.save()).expect("the same scene");
+        advance(&mut usual, FRAMES);
+        advance(&mut resumed, FRAMES);
+        let places = |simulation: &Simulation<f32>| simulation.state().positions.clone();
+        let pairs = places(&usual).into_iter().zip(places(&resumed));
+        let far = pairs.map(|(a, b)| (a - b).length()).fold(0.0, f32::max);
+        assert!(far < 1e-3, "{kept:?} and then {now:?}: {far} m apart");
+    }
+}
+
 #[test]
 fn a_simulation_on_a_device_resumes_to_the_bit() {
     for settings in [&[][..], &[("solver.method", "explicit")]] {

@@ -2,6 +2,8 @@
 //! depend on how it lies in the scene: the twist of a bar that is turned by 37 degrees needs half as many iterations more
 //! where its lattice is not turned with it.
 
+use std::cmp::Ordering;
+
 use crate::scalar::{Mat3, Vec3, vec3};
 
 /// A box has to be smaller than that along the axes of the scene by this factor: bodies without directions keep those.
@@ -10,11 +12,23 @@ const SMALLER: f64 = 0.9;
 /// Turns [rad] are refined to about what round-off leaves of them.
 const FINEST: f64 = 1e-13;
 
+/// A turn [rad] after which a box that is to be smaller is.
+const CLEAR: f64 = 2e-3;
+
+/// Parts of fewer vertices keep the axes of the scene: they have hardly a lattice.
+const FEWEST: usize = 64;
+
+/// Rounds over all turns by one step, at most.
+const ROUNDS: u32 = 4;
+
 /// The largest component of the directions in which the hull of a part is looked for.
 const REACH: i32 = 2;
 
 /// A rotation whose rows are the axes.
 pub(super) fn axes(places: &[Vec3<f64>]) -> Mat3<f64> {
+    if places.len() < FEWEST {
+        return Mat3::IDENTITY;
+    }
     let hull = extremes(places);
     let volume = |axes: &Mat3<f64>| box_volume(&hull, axes);
     let angles = (-3..3).map(|k| (15.0 * f64::from(k)).to_radians());
@@ -30,45 +44,62 @@ pub(super) fn axes(places: &[Vec3<f64>]) -> Mat3<f64> {
             }
         }
     }
+    // By all places: the hull of something round has corners of its own. False for what is no number.
+    let is_smaller =
+        |axes: &Mat3<f64>| box_volume(places, axes) < SMALLER * box_volume(places, &Mat3::IDENTITY);
     let mut step = 7.5_f64.to_radians();
     while step > FINEST {
-        let mut has_improved = false;
-        for axis in 0..3 {
-            for angle in [step, -step] {
-                let axes = turn(axis, angle) * best;
-                let found = volume(&axes);
-                if found < least {
-                    (best, least, has_improved) = (axes, found, true);
+        // Not until nothing improves: along a skew valley that takes any number of rounds.
+        for _ in 0..ROUNDS {
+            let before = least;
+            for axis in 0..3 {
+                for angle in [step, -step] {
+                    let axes = turn(axis, angle) * best;
+                    let found = volume(&axes);
+                    if found < least {
+                        (best, least) = (axes, found);
+                    }
                 }
             }
+            if least == before {
+                break;
+            }
         }
-        if !has_improved {
-            step *= 0.5;
+        // What has no directions of its own needs no finer turns.
+        if step > CLEAR && 0.5 * step <= CLEAR && !is_smaller(&best) {
+            return Mat3::IDENTITY;
         }
+        step *= 0.5;
     }
-    // By all places: the hull of something round has corners of its own. False for what is no number.
-    let is_smaller = box_volume(places, &best) < SMALLER * box_volume(places, &Mat3::IDENTITY);
-    if is_smaller { best } else { Mat3::IDENTITY }
+    if is_smaller(&best) { best } else { Mat3::IDENTITY }
 }
 
 /// The farthest places in many directions. It does not depend on the order of places.
 fn extremes(places: &[Vec3<f64>]) -> Vec<Vec3<f64>> {
-    let mut found = Vec::new();
-    let range = || -REACH..=REACH;
-    for direction in
-        range().flat_map(|x| range().flat_map(move |y| range().map(move |z| [x, y, z])))
-    {
-        if direction == [0; 3] {
-            continue;
+    let lexical = |a: &[f64], b: &[f64]| {
+        let different = a.iter().zip(b).map(|(a, b)| a.total_cmp(b));
+        different.fold(Ordering::Equal, Ordering::then)
+    };
+    let numbers = || (-REACH..=REACH).map(f64::from);
+    let with = |x: f64| numbers().flat_map(move |y| numbers().map(move |z| vec3(x, y, z)));
+    let mut found: Vec<Vec3<f64>> = Vec::new();
+    for direction in numbers().flat_map(with).filter(|d| *d != Vec3::ZERO) {
+        let mut farthest: Option<(f64, Vec3<f64>)> = None;
+        for &place in places {
+            let along = direction.dot(place);
+            let is_farther = farthest.is_none_or(|(most, other)| {
+                let is_later = || lexical(&place.to_array(), &other.to_array()).is_gt();
+                along > most || (along == most && is_later())
+            });
+            if is_farther {
+                farthest = Some((along, place));
+            }
         }
-        let along = Vec3::from_f64(direction.map(f64::from));
-        let key = |x: &Vec3<f64>| [along.dot(*x), x.x, x.y, x.z];
-        let compare = |a: &[f64; 4], b: &[f64; 4]| {
-            let different = a.iter().zip(b).map(|(a, b)| a.total_cmp(b));
-            different.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
-        };
-        found.extend(places.iter().max_by(|a, b| compare(&key(a), &key(b))));
+        found.extend(farthest.map(|(_, place)| place));
     }
+    // A box has eight.
+    found.sort_by(|a, b| lexical(&a.to_array(), &b.to_array()));
+    found.dedup();
     found
 }
 
@@ -101,7 +132,7 @@ mod tests {
     /// A box that lies anyhow is found; one that lies along the axes, and a ball, keep them.
     #[test]
     fn a_turned_box_is_found() {
-        let mesh = Block::new(vec3(0.2, 0.05, 0.05), [8, 2, 2]).mesh().expect("a block");
+        let mesh = Block::new(vec3(0.2, 0.05, 0.05), [8, 3, 3]).mesh().expect("a block");
         let turned = |angles: [f64; 3]| {
             let r = turn(2, angles[0]) * turn(1, angles[1]) * turn(0, angles[2]);
             (r, mesh.vertices().iter().map(|x| r * *x).collect::<Vec<_>>())
@@ -125,6 +156,8 @@ mod tests {
             .collect();
         assert_eq!(axes(&ball), Mat3::IDENTITY);
         assert_eq!(axes(&[]), Mat3::IDENTITY);
-        assert_eq!(axes(&[vec3(f64::NAN, 0.0, 1.0)]), Mat3::IDENTITY);
+        let mut odd = mesh.vertices().to_vec();
+        (odd[5].x, odd[7].z) = (f64::NAN, f64::INFINITY);
+        assert_eq!(axes(&odd), Mat3::IDENTITY);
     }
 }

@@ -58,7 +58,7 @@ impl<S: Real> Memory<S> {
         learned: &mut Learned<S>,
     ) {
         let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
-        let slot = next_slot(self.choices[number].history, &learned.parts[number]);
+        let slot = next_slot(self.history(), &learned.parts[number]);
         let Pair { image, .. } = Pair::places(slot, vertices, &part.vertices);
         for (v, place) in part.vertices.clone().zip(image) {
             self.images[place] = self.trial_z[v] - self.z[v];
@@ -92,7 +92,7 @@ impl<S: Real> Memory<S> {
         let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
         let kept = learned.parts[number];
         let this = Pair::places(slot, vertices, &part.vertices);
-        for other in slots(self.choices[number].history, kept.count, kept.newest) {
+        for other in slots(self.history(), kept.count, kept.newest) {
             let that = Pair::places(other, vertices, &part.vertices);
             let (s, y) = (&learned.pairs[this.s.clone()], &learned.pairs[this.y.clone()]);
             let (other_s, other_y) = (&learned.pairs[that.s], &learned.pairs[that.y]);
@@ -115,11 +115,11 @@ impl<S: Real> Memory<S> {
     ) {
         let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
         let kept = learned.parts[number];
-        for slot in slots(self.choices[number].history, kept.count, kept.newest) {
+        for slot in slots(self.history(), kept.count, kept.newest) {
             let Pair { y, image, .. } = Pair::places(slot, vertices, &part.vertices);
             self.preconditioner.apply(number, &learned.pairs[y], &mut self.images[image]);
         }
-        for slot in slots(self.choices[number].history, kept.count, kept.newest) {
+        for slot in slots(self.history(), kept.count, kept.newest) {
             self.multiply_pair(layout, workers, number, learned, slot);
         }
     }
@@ -200,8 +200,9 @@ impl<S: Real> Memory<S> {
         let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
         let kept = learned.parts[number];
         let range = part.vertices.clone();
+        let ring = self.history();
         let mut with_gradient = [[0.0; 2]; MOST_HISTORY];
-        for slot in slots(self.choices[number].history, kept.count, kept.newest) {
+        for slot in slots(ring, kept.count, kept.newest) {
             let Pair { s, image, .. } = Pair::places(slot, vertices, &range);
             let g = &self.gradient[range.clone()];
             with_gradient[slot] = [
@@ -210,7 +211,7 @@ impl<S: Real> Memory<S> {
             ];
         }
         let products = &self.parts[number].products;
-        let order = || slots(self.choices[number].history, kept.count, kept.newest);
+        let order = || slots(ring, kept.count, kept.newest);
         let (mut a, mut c) = ([0.0; MOST_HISTORY], [0.0; MOST_HISTORY]);
         for (k, i) in order().enumerate() {
             let newer: f64 = order().take(k).map(|j| a[j] * products.sy[i][j]).sum();
@@ -266,7 +267,7 @@ impl<S: Real> Memory<S> {
         data: &StepData<S>,
         learned: &mut Learned<S>,
     ) {
-        let slot = next_slot(self.choices[number].history, &learned.parts[number]);
+        let slot = next_slot(self.history(), &learned.parts[number]);
         let Pair { s, y, .. } = Pair::places(slot, vertices, &part.vertices);
         let mut longest = S::ZERO;
         for v in part.vertices.clone() {
@@ -285,7 +286,8 @@ impl<S: Real> Memory<S> {
     }
 }
 
-/// The place of the next pair.
+/// The place of the next pair. All parts have places for as many, whatever number of them they use: what was kept with
+/// other settings stands where it is looked for.
 fn next_slot(history: usize, kept: &crate::state::LearnedPart) -> usize {
     if kept.count == 0 { 0 } else { (kept.newest as usize + 1) % history }
 }

@@ -212,6 +212,7 @@ impl<S: Real> Memory<S> {
         vectors.into_iter().map(|v| size_of_val(&v[..])).sum::<usize>()
             + points.into_iter().map(|p| size_of_val(&p[..])).sum::<usize>()
             + size_of_val(&self.parts[..])
+            + size_of_val(&self.choices[..])
             + size_of_val(&self.has_new_pair[..])
             + size_of_val(&self.pinned[..])
             + self.evaluation.bytes()

@@ -16,7 +16,7 @@ use super::preconditioner::Curvature;
 use super::stage::Solve;
 use super::{Memory, Pair, moments, passes_of};
 use crate::scalar::{Real, Vec3};
-use crate::settings::Integrator;
+use crate::settings::{Count, Integrator};
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::predict::Tethers;
 use crate::solver::step::strain::{keep_share, measure_strain};
@@ -72,6 +72,8 @@ impl<S: Real> Memory<S> {
                 reach.max(x.x.abs()).max(x.y.abs()).max(x.z.abs())
             });
             let kept = &mut state.learned.parts[number];
+            // Other settings may have kept more.
+            kept.count = kept.count.min(self.choices[number].history as u32);
             let progress = &mut self.parts[number];
             progress.phase = Phase::Done;
             progress.resolution = RESOLUTION * S::EPSILON * reach.to_f64();
@@ -115,7 +117,7 @@ impl<S: Real> Memory<S> {
         }
         let ratio = S::from_f64((dt / before) * (dt / before));
         let range = &step.layout.parts[number].vertices;
-        for slot in 0..self.choices[number].history {
+        for slot in 0..self.history() {
             let Pair { s, y, .. } = Pair::places(slot, step.layout.vertex_count(), range);
             for ((s, y), v) in s.zip(y).zip(range.clone()) {
                 let inertia = learned.pairs[s] * data.constants.masses[v];
@@ -253,7 +255,10 @@ impl<S: Real> Memory<S> {
         }
         let progress = &mut self.parts[number];
         progress.phase = Phase::Starting;
-        let chosen = self.choices[number].passes;
+        let chosen = match solve.settings.iterations {
+            Count::Of(count) => count,
+            Count::Auto => self.choices[number].passes,
+        };
         progress.passes_left = passes_of(which, solve.settings.integrator, chosen);
         (progress.failures, progress.rejections) = (0, 0);
         (progress.accepted, progress.ahead) = (false, false);

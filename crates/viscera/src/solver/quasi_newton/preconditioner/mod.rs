@@ -216,6 +216,8 @@ impl<S: Real> OfPart<S> {
             + vectors.sum::<usize>()
             + inverses.sum::<usize>()
             + size_of_val(&self.groups.entries[..])
+            + size_of_val(&self.groups.offsets[..])
+            + size_of_val(&self.groups.laws[..])
             + size_of_val(&self.masked[..])
             + self.full.bytes()
             + self.dense.bytes()
@@ -235,7 +237,7 @@ impl<S: Real> OfPart<S> {
         let grouped = Grouped::new(&tets, &places, &self.lattice);
         self.groups = Groups::new(&tets, &grouped, places.len());
         let coarsest = self.lattice.levels.len();
-        for (level, sums) in self.levels.iter_mut().enumerate() {
+        for (level, sums) in self.levels.iter_mut().take(coarsest).enumerate() {
             let on = Self::on(&self.lattice, level);
             *sums = DiagonalSums::new(on, &tets, &grouped, &masses, free);
         }

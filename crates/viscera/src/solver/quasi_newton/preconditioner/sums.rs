@@ -10,8 +10,9 @@
 //! law's gradient map ([`crate::elements::law::Law::gradient_map`]): cofactors of `F`, by which the neo-Hookean volume
 //! term grows where tissue is stretched. A *group* is a connected set of tetrahedra of one material in one cell of the finest
 //! lattice, which turn and stretch together: `R` and `A` are all that changes, so that the blocks of every level,
-//! vertices among them, are found without a pass over the tetrahedra. Diagonal blocks of neo-Hookean tetrahedra are
-//! exact but for that.
+//! vertices among them, are found without a pass over the tetrahedra. `K_cc` is exact for neo-Hookean tetrahedra but for
+//! that: their volume term has `lambda + mu` before it, and no other than these. Between nodes, in the dense level, `mu`
+//! goes with `R`: the sum over all nodes is then positive semidefinite.
 
 use std::ops::Range;
 
@@ -27,6 +28,7 @@ pub type Six<S> = [S; 6];
 /// A tetrahedron, its vertices counted from the first of the part.
 pub struct LocalTet {
     pub law: MaterialModel,
+    /// By the part's own count.
     pub material: u32,
     pub vertices: [u32; 4],
     /// Shape gradients [1/m].
@@ -43,16 +45,23 @@ pub fn tets_of_part<S: Real>(layout: &Layout<S>, number: usize, viscous: f64) ->
     let part = &layout.parts[number];
     let first = part.vertices.start as u32;
     let mut tets = Vec::new();
+    // The part's own numbers of its materials, by their first tetrahedra: those of a model depend on other parts.
+    let mut materials = Vec::new();
     for (law, set) in layout.tet_sets.iter().enumerate() {
         for block in part.blocks(law).flatten() {
             let law = set.model;
             let constants = &set.blocks[block];
             for lane in 0..usize::from(set.filled[block]) {
                 let material = &layout.materials[constants.material[lane] as usize];
+                let known = materials.iter().position(|&known| known == constants.material[lane]);
+                let number = known.unwrap_or(materials.len());
+                if known.is_none() {
+                    materials.push(constants.material[lane]);
+                }
                 let stiffer = 1.0 + viscous * material.viscosity.to_f64();
                 tets.push(LocalTet {
                     law,
-                    material: constants.material[lane],
+                    material: number as u32,
                     vertices: constants.vertices.map(|corner| corner[lane] - first),
                     gradients: shape_gradients(&constants.shape(lane).cast()),
                     volume: constants.rest_volume[lane].to_f64(),
