@@ -30,7 +30,7 @@ use crate::layout::{Before, Layout, Moments};
 use crate::material::MaterialConstants;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
-use crate::settings::{Integrator, SolverSettings};
+use crate::settings::{Count, Integrator, SolverSettings};
 use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::energy::Energies;
@@ -59,9 +59,13 @@ const MOST_FAILURES: u32 = 2;
 /// A step of implicit Euler that takes the place of another has so many iterations more.
 const MORE_ITERATIONS: u32 = 4;
 
-/// The passes of a solve, of the number that was chosen.
-fn passes_of(solve: Solve, integrator: Integrator, chosen: u32) -> u32 {
-    match (solve, integrator) {
+/// The passes of a solve; `automatic` where the settings leave their number to the method.
+fn passes_of(solve: Solve, settings: &SolverSettings, automatic: u32) -> u32 {
+    let chosen = match settings.iterations {
+        Count::Of(count) => count,
+        Count::Auto => automatic,
+    };
+    match (solve, settings.integrator) {
         (Solve::First | Solve::Second, _) => chosen,
         (Solve::Euler, Integrator::Sdirk2) => chosen + MORE_ITERATIONS,
         // Its last direction is never taken unchecked, so that the first pass alone would move nothing.
@@ -79,7 +83,7 @@ pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S
         };
         let body = [Evaluate, Judge, Precondition, ChooseDirection, Advance];
         let body = body.map(|stage| Node::Run(stage.into())).to_vec();
-        let most = passes_of(solve, settings.integrator, chosen);
+        let most = passes_of(solve, settings, chosen);
         let repeat = Repeat { most: Times::Count(most), until: Some(Flag::AllDone), body };
         [
             Node::Run(StartSolve(solve).into()),

@@ -16,7 +16,7 @@ use super::preconditioner::Curvature;
 use super::stage::Solve;
 use super::{Memory, Pair, moments, passes_of};
 use crate::scalar::{Real, Vec3};
-use crate::settings::{Count, Integrator};
+use crate::settings::Integrator;
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::predict::Tethers;
 use crate::solver::step::strain::{keep_share, measure_strain};
@@ -255,11 +255,7 @@ impl<S: Real> Memory<S> {
         }
         let progress = &mut self.parts[number];
         progress.phase = Phase::Starting;
-        let chosen = match solve.settings.iterations {
-            Count::Of(count) => count,
-            Count::Auto => self.choices[number].passes,
-        };
-        progress.passes_left = passes_of(which, solve.settings.integrator, chosen);
+        progress.passes_left = passes_of(which, solve.settings, self.choices[number].passes);
         (progress.failures, progress.rejections) = (0, 0);
         (progress.accepted, progress.ahead) = (false, false);
     }
