@@ -58,9 +58,9 @@ const RUNNING: f64 = 490.0;
 const KEPT: f64 = 170.0;
 /// Copies of four corners, their loads, their numbers.
 const COPIES: f64 = 150.0;
-/// Of the quasi-Newton method: pairs, vectors and the levels of its preconditioner. Measured 440 to 590 more than XPBD
-/// on bars from 1,000 to 100,000 tetrahedra, the most on the smallest.
-const LEVELS: f64 = 600.0;
+/// Of the quasi-Newton method: pairs, vectors and the levels of its preconditioner. Measured 440 to 690 more than XPBD
+/// on bars from 1,000 to 100,000 tetrahedra, the most where the coarsest level is largest.
+const LEVELS: f64 = 800.0;
 /// Two iterates and the weights of multipliers.
 const ITERATES: f64 = 90.0;
 /// Six multipliers and a vertex's share in one entry of Anderson's two histories.
