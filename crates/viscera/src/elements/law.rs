@@ -183,12 +183,38 @@ pub fn respond<S: Scalar>(model: MaterialModel, f: &Mat3<S>, lambda: S, mu: S) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scalar::vec3;
 
     /// The list has every law, under its own name.
     #[test]
     fn every_law_is_on_the_list_under_its_name() {
         for (model, ..) in MaterialModel::ALL {
             assert_eq!(with_law!(model, L => L::MODEL), *model);
+        }
+    }
+
+    /// Along a move `u` of one corner: `D = u g^T`. The second derivative of the neo-Hookean density is then
+    /// `mu |u|^2 |g|^2 + (lambda + mu) (A g . u)^2` for any `F`; that of the Green strain's, without `mu` and where
+    /// `tr E` is zero, `lambda (A g . u)^2`.
+    #[test]
+    fn the_gradient_map_is_that_of_the_second_derivative() {
+        let (lambda, mu) = (7.0, 2.0);
+        for seed in 0..50 {
+            let number = |k: usize| libm::sin((seed * 17 + k) as f64 * 12.9898);
+            let vector = |k: usize| vec3(number(k), number(k + 1), number(k + 2));
+            let f = Mat3::from_columns(vector(0), vector(3), vector(6));
+            let (u, g) = (vector(9), vector(12));
+            let d = Mat3::outer(u, g);
+            let along = (StableNeoHookean::gradient_map(&f) * g).dot(u);
+            let expected =
+                mu * u.length_squared() * g.length_squared() + (lambda + mu) * along * along;
+            let [exact, _] = StableNeoHookean::curvature_along(&f, &d, lambda, mu);
+            assert!((exact - expected).abs() < 1e-12 * (1.0 + expected), "{exact} {expected}");
+            let f = f * (3.0 / f.norm_squared()).sqrt();
+            let along = (SaintVenantKirchhoff::gradient_map(&f) * g).dot(u);
+            let [exact, _] = SaintVenantKirchhoff::curvature_along(&f, &d, lambda, 0.0);
+            let expected = lambda * along * along;
+            assert!((exact - expected).abs() < 1e-12 * (1.0 + expected), "{exact} {expected}");
         }
     }
 }
