@@ -197,6 +197,16 @@ impl<S: Real> Backend<S> {
         }
     }
 
+    /// Whether the last step met energies that are no numbers, which a device tells by its positions only.
+    pub fn is_beyond_numbers(&self) -> bool {
+        match &self.engine {
+            Engine::Cpu(solver) => {
+                solver.last_step().is_some_and(|report| !report.potential.is_finite())
+            }
+            Engine::Device(_) => false,
+        }
+    }
+
     /// Goes on with the CPU.
     pub fn give_way(
         &mut self,

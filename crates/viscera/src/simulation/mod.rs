@@ -299,7 +299,7 @@ impl<S: Real> Simulation<S> {
         }
         self.frame += 1;
         self.stepped = true;
-        if !self.state.is_finite() {
+        if !self.state.is_finite() || self.backend.is_beyond_numbers() {
             return Err(self.diverged());
         }
         let factor = self.scene.time.velocity_factor;

@@ -250,7 +250,7 @@ impl<S: Real> Solver<S> {
     /// How the last step ended for each connected part of the model, see [`Model::part_of`]; empty before the
     /// first, and where steps are not guarded.
     pub fn part_reports(&self) -> &[StepReport] {
-        self.memory.guard.as_ref().map_or(&[], |guard| guard.part_reports())
+        self.memory.part_reports()
     }
 
     /// The force balance at the end of the last step, see [`balance::ForceBalance`]. `inputs` are

@@ -4,6 +4,10 @@
 ///
 /// Of all parts together, potential, limit and noise are those of the part that ended highest above its limit,
 /// or least below it; so that [`StepReport::keeps_limit`] speaks for every part.
+///
+/// The quasi-Newton method judges every trial by a change of the potential, and the step by its energies: there
+/// `potential` is the mechanical energy at the end of the step, `limit` what the part had and was given, both times the
+/// squared step. A potential that is not finite says that energies are beyond the precision's range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReport {
     /// Incremental potential [J s^2] at the end of the step.
@@ -20,6 +24,10 @@ pub struct StepReport {
 }
 
 impl StepReport {
+    /// Of a step in which nothing had to be done.
+    pub(crate) const QUIET: StepReport =
+        StepReport { potential: 0.0, limit: 0.0, noise: 0.0, rejected: false, kept_speed: 1.0 };
+
     /// Whether the step holds what the guard promises: it ends no higher than its limit.
     pub fn keeps_limit(&self) -> bool {
         self.potential <= self.limit + self.noise

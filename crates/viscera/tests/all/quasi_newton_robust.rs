@@ -350,6 +350,27 @@ fn hard_inputs_leave_numbers() {
 
 /// After the first step, with the same vertices pinned and the same step, and where nothing is viscous in any case: jumps,
 /// steps that are taken again, other loads.
+/// Tissue whose energy single precision cannot hold is told of, and the run ends there; double precision goes on.
+#[test]
+fn energies_beyond_numbers_are_told() {
+    let mesh = block([LENGTH, 0.02, 0.02], [4, 1, 1], 0.0);
+    let tissue = material(viscera::material::MaterialModel::StableNeoHookean, 1e4, 0.45);
+    fn report<S: Real>(mesh: &TetMesh, tissue: &Material) -> (bool, bool) {
+        let model = single_body::<S>(mesh, tissue);
+        let mut solver = Solver::new(&model, &settings(Integrator::Sdirk2));
+        let mut state = State::at_rest(&model);
+        for x in &mut state.positions {
+            *x = *x * S::from_f64(1e18);
+        }
+        assert!(solver.part_reports().is_empty());
+        solver.step(&model, &mut state, &Inputs::default(), FRAME).expect("a legal step");
+        let report = solver.last_step().expect("a step that was judged");
+        (report.potential.is_finite(), report.keeps_limit())
+    }
+    assert_eq!(report::<f32>(&mesh, &tissue), (false, false));
+    assert_eq!(report::<f64>(&mesh, &tissue), (true, true));
+}
+
 #[test]
 fn steps_after_the_first_allocate_nothing() {
     for integrator in BOTH {

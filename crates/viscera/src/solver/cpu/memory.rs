@@ -6,6 +6,7 @@ use crate::settings::{Method, SolverSettings};
 use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
 use crate::solver::plan::{Flag, Stage};
+use crate::solver::report::StepReport;
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::guard::Guard;
 use crate::solver::{explicit, quasi_newton, step, xpbd};
@@ -66,6 +67,14 @@ impl<S: Real> Memory<S> {
         match &self.method {
             MethodMemory::QuasiNewton(memory) => memory.rejected,
             _ => self.guard.as_ref().map_or(0, |guard| guard.rejected),
+        }
+    }
+
+    /// How the last step ended for each part; empty before the first, and where steps are not judged.
+    pub fn part_reports(&self) -> &[StepReport] {
+        match &self.method {
+            MethodMemory::QuasiNewton(memory) => &memory.reports,
+            _ => self.guard.as_ref().map_or(&[], |guard| guard.part_reports()),
         }
     }
 

@@ -32,6 +32,7 @@ use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
 use crate::settings::{Count, Integrator, SolverSettings};
 use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
+use crate::solver::report::StepReport;
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::energy::Energies;
 use crate::solver::step::potential::Evaluator;
@@ -143,6 +144,8 @@ pub struct Memory<S> {
     solve_dt: f64,
     /// Steps so far in which a part took a step of implicit Euler instead.
     pub rejected: u64,
+    /// How the last step ended, of each part; empty before the first.
+    pub reports: Vec<StepReport>,
 }
 
 /// Where a pair of a part stands.
@@ -196,6 +199,7 @@ impl<S: Real> Memory<S> {
             first_velocities: vectors(),
             solve_dt: 0.0,
             rejected: 0,
+            reports: Vec::with_capacity(parts),
         }
     }
 
@@ -218,6 +222,7 @@ impl<S: Real> Memory<S> {
             + size_of_val(&self.parts[..])
             + size_of_val(&self.choices[..])
             + size_of_val(&self.has_new_pair[..])
+            + self.reports.capacity() * size_of::<StepReport>()
             + size_of_val(&self.pinned[..])
             + self.evaluation.bytes()
             + self.preconditioner.bytes()

@@ -17,6 +17,7 @@ use super::stage::Solve;
 use super::{Memory, Pair, moments, passes_of};
 use crate::scalar::{Real, Vec3};
 use crate::settings::Integrator;
+use crate::solver::report::StepReport;
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::predict::Tethers;
 use crate::solver::step::strain::{keep_share, measure_strain};
@@ -83,6 +84,8 @@ impl<S: Real> Memory<S> {
             };
         }
         self.begin_energy(step, data);
+        self.reports.clear();
+        self.reports.resize(layout.part_count(), StepReport::QUIET);
         // Where the tissue turns to in this step.
         let share = if first == Solve::Euler { 1.0 } else { 0.5 };
         let ahead = S::from_f64(share * step.dt);
@@ -365,12 +368,14 @@ impl<S: Real> Memory<S> {
     ) {
         self.measure_start_strain(step, data);
         self.evaluator.evaluate_all(&data.constants, step, &data.points);
-        let Self { energies, evaluator, parts, .. } = self;
+        let Self { energies, evaluator, parts, reports, .. } = self;
         let mut any = false;
         let round_off = (ENERGY_ROUNDED * S::EPSILON).max(SUM_ROUNDED);
         energies.end(step, data, &evaluator.stored);
         for (number, progress) in parts.iter_mut().enumerate() {
-            if progress.scheme == Scheme::Sdirk2 && energies.stores_too_much(number, round_off) {
+            reports[number].rejected =
+                progress.scheme == Scheme::Sdirk2 && energies.stores_too_much(number, round_off);
+            if reports[number].rejected {
                 progress.scheme = Scheme::Euler;
                 learned.parts[number].count = 0;
                 learned.parts[number].calm = false;
@@ -386,6 +391,11 @@ impl<S: Real> Memory<S> {
         self.evaluator.evaluate_all(&data.constants, step, &data.points);
         self.energies.end(step, data, &self.evaluator.stored);
         self.energies.limit(step, data, |_, _| {});
+        let round_off = (ENERGY_ROUNDED * S::EPSILON).max(SUM_ROUNDED);
+        for (number, report) in self.reports.iter_mut().enumerate() {
+            let energies = self.energies.report(number, step.dt, round_off);
+            *report = StepReport { rejected: report.rejected, ..energies };
+        }
         if step.layout.is_viscous() {
             let constants = &mut data.constants;
             let (workers, strains) = (&constants.workers, &mut constants.start_strain);

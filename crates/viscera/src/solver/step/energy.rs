@@ -19,6 +19,7 @@
 
 use super::data::{Step, StepData};
 use crate::scalar::{Real, Vec3};
+use crate::solver::report::StepReport;
 
 /// The energies of a connected part and the work done on it in a step; sums over its free vertices.
 #[derive(Clone, Copy, Debug, Default)]
@@ -158,6 +159,23 @@ impl Energies {
         let stored = energy.start.stored.abs().max(energy.end.stored.abs());
         let round_off = round_off * (stored + energy.start.kinetic + energy.work.abs());
         given < -round_off || !given.is_finite()
+    }
+
+    /// How a part's step of `dt` [s] ended, told by its energies: what it stores and moves with after
+    /// [`Energies::limit`], and what it had and was given, times the squared step.
+    pub fn report(&self, part: usize, dt: f64, round_off: f64) -> StepReport {
+        let energy = &self.0[part];
+        let (given, kinetic, _) = energy.balance();
+        let (_, share) = energy.limit();
+        let stored = energy.start.stored.abs().max(energy.end.stored.abs());
+        let squared = dt * dt;
+        StepReport {
+            potential: squared * (energy.end.stored + share * share * kinetic),
+            limit: squared * (energy.end.stored + given),
+            noise: squared * round_off * (stored + energy.start.kinetic + energy.work.abs()),
+            rejected: false,
+            kept_speed: share,
+        }
     }
 
     /// Scales velocities down after [`Energies::end`]. `kept` is called with each part that is slowed down, and the

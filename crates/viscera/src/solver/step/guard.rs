@@ -78,8 +78,6 @@ impl<S: Real> Guard<S> {
     pub fn new(layout: &Layout<S>) -> Self {
         let positions = vec![Point::default(); layout.vertex_count()];
         let parts = layout.part_count();
-        let report =
-            StepReport { potential: 0.0, limit: 0.0, noise: 0.0, rejected: false, kept_speed: 1.0 };
         Self {
             evaluator: Evaluator::new(layout),
             start: positions.clone(),
@@ -87,7 +85,7 @@ impl<S: Real> Guard<S> {
             parts: vec![PartGuard::default(); parts],
             energies: Energies::new(parts),
             rejected: 0,
-            reports: vec![report; parts],
+            reports: vec![StepReport::QUIET; parts],
             is_over: false,
         }
     }
