@@ -219,6 +219,36 @@ impl Lanes for F32x8 {
             }
         }
     }
+
+    #[inline(always)]
+    unsafe fn add_in_order(
+        points: *mut Point<f32>,
+        indices: &[Eight<u32>; 4],
+        _: usize,
+        values: [Point<Self>; 4],
+    ) {
+        unsafe {
+            let mut rows = [[_mm256_setzero_ps(); 4]; 4];
+            for corner in 0..4 {
+                let Point { x, y, z, w } = values[corner];
+                rows[corner] = transpose([x.0, y.0, z.0, w.0]);
+            }
+            for lane in 0..4 {
+                for corner in 0..4 {
+                    let point = points.add(indices[corner][lane] as usize).cast();
+                    let value = _mm256_castps256_ps128(rows[corner][lane]);
+                    _mm_store_ps(point, _mm_add_ps(_mm_load_ps(point), value));
+                }
+            }
+            for lane in 0..4 {
+                for corner in 0..4 {
+                    let point = points.add(indices[corner][lane + 4] as usize).cast();
+                    let value = _mm256_extractf128_ps::<1>(rows[corner][lane]);
+                    _mm_store_ps(point, _mm_add_ps(_mm_load_ps(point), value));
+                }
+            }
+        }
+    }
 }
 
 /// Transposes the 4 x 4 matrices in both halves.
@@ -283,6 +313,29 @@ impl Lanes for F64x4 {
             for lane in 0..4 {
                 let point = points.add(indices[first + lane] as usize).cast();
                 _mm256_storeu_pd(point, _mm256_add_pd(_mm256_loadu_pd(point), rows[lane]));
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn add_in_order(
+        points: *mut Point<f64>,
+        indices: &[Eight<u32>; 4],
+        first: usize,
+        values: [Point<Self>; 4],
+    ) {
+        unsafe {
+            let mut rows = [[_mm256_setzero_pd(); 4]; 4];
+            for corner in 0..4 {
+                let Point { x, y, z, w } = values[corner];
+                rows[corner] = transpose_doubles([x.0, y.0, z.0, w.0]);
+            }
+            for lane in 0..4 {
+                for corner in 0..4 {
+                    let point = points.add(indices[corner][first + lane] as usize).cast();
+                    let sum = _mm256_add_pd(_mm256_loadu_pd(point), rows[corner][lane]);
+                    _mm256_storeu_pd(point, sum);
+                }
             }
         }
     }

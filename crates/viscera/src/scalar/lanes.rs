@@ -109,6 +109,17 @@ pub trait Lanes: Scalar {
         first: usize,
         values: Point<Self>,
     );
+
+    /// As [`Lanes::scatter_add`] of four points for each lane, lane by lane: points may be the same.
+    ///
+    /// # Safety
+    /// As [`Lanes::scatter`], but for points that are the same.
+    unsafe fn add_in_order(
+        points: *mut Point<Self::Real>,
+        indices: &[Eight<u32>; 4],
+        first: usize,
+        values: [Point<Self>; 4],
+    );
 }
 
 /// One lane: the number itself.
@@ -152,6 +163,19 @@ impl<R: Real> Lanes for R {
     ) {
         // SAFETY: the caller's promise.
         unsafe { (*points.add(indices[first] as usize)).add(values) };
+    }
+
+    #[inline(always)]
+    unsafe fn add_in_order(
+        points: *mut Point<R>,
+        indices: &[Eight<u32>; 4],
+        first: usize,
+        values: [Point<R>; 4],
+    ) {
+        for (corner, value) in values.into_iter().enumerate() {
+            // SAFETY: the caller's promise.
+            unsafe { (*points.add(indices[corner][first] as usize)).add(value) };
+        }
     }
 }
 

@@ -192,21 +192,18 @@ impl<'a, S: Real> Block<'a, S> {
         values: &[Vec3<L>; 4],
     ) {
         let copies = self.set.copies_of(self.index);
-        let mut columns = [[[S::ZERO; LANES]; 3]; 4];
-        for corner in 0..4 {
-            let Vec3 { x, y, z } = values[corner];
-            x.store(&mut columns[corner][0], self.lane);
-            y.store(&mut columns[corner][1], self.lane);
-            z.store(&mut columns[corner][2], self.lane);
-        }
         assert!(points.len() >= self.set.bounds[1]);
-        for lane in self.lane..(self.lane + L::WIDTH).min(self.filled()) {
-            for corner in 0..4 {
-                let [x, y, z] = &columns[corner];
-                let value = Point { x: x[lane], y: y[lane], z: z[lane], w: S::ZERO };
-                // SAFETY: below the bound, which is checked above; alone there by the caller's promise.
-                unsafe { (*points.pointer().add(copies[corner][lane] as usize)).add(value) };
-            }
+        let values = values.map(|value| Point::new(value, L::ZERO));
+        if self.whole::<L>() {
+            // SAFETY: below the bound, which is checked above; alone there by the caller's promise.
+            unsafe { L::add_in_order(points.pointer(), copies, self.lane, values) };
+            return;
+        }
+        let values = values.map(|value| rows(value, self.lane));
+        for lane in self.lane..self.filled() {
+            let values = values.map(|rows| rows[lane]);
+            // SAFETY: as above.
+            unsafe { S::add_in_order(points.pointer(), copies, lane, values) };
         }
     }
 
