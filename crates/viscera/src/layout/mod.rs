@@ -78,13 +78,13 @@ impl<S: Real> Layout<S> {
     fn of(model: &Model<S>, settings: &SolverSettings) -> Self {
         let graph = constraint_graph(model);
         let numbering = &match settings.method {
-            Method::QuasiNewton => Arc::new(cell_by_cell(model)),
-            Method::Xpbd | Method::Explicit => Arc::clone(&model.numbering),
+            Method::QuasiNewton | Method::Explicit => Arc::new(cell_by_cell(model)),
+            Method::Xpbd => Arc::clone(&model.numbering),
         };
         // Forces are added tetrahedron by tetrahedron where no constraint is solved: no colours, but pieces.
         let coloring = match settings.method {
-            Method::QuasiNewton => in_pieces(model, &graph, numbering),
-            Method::Xpbd | Method::Explicit => {
+            Method::QuasiNewton | Method::Explicit => in_pieces(model, &graph, numbering),
+            Method::Xpbd => {
                 let coloring = graph.color(model.vertex_count(), settings.colors);
                 debug_assert_eq!(coloring.validate(&graph), None);
                 coloring

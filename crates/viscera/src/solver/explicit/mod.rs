@@ -13,6 +13,7 @@
 //! because `K_e <= rho(K_e) I` on the vertices of every element `e`. Every connected part of the model takes
 //! as many small steps as it needs itself.
 
+mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod stability;
@@ -27,12 +28,12 @@ use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
 use crate::solver::plan::{Node, Plan, Repeat, Times};
 use crate::solver::step::data::{Step, StepConstants, StepData, gather};
-use crate::solver::step::gradient::load_forces;
 use crate::solver::step::predict::{Tethers, load_tethers};
 use crate::solver::step::stage::StepStage;
 use crate::solver::step::strain::measure_strain;
 use crate::solver::step::tethers::bundle;
 use crate::state::State;
+use forces::Pieces;
 pub use stability::{SmallSteps, Stability, small_steps};
 use stage::ExplicitStage;
 
@@ -54,6 +55,7 @@ pub fn plan() -> Plan {
 #[derive(Clone, Debug)]
 pub struct Memory<S> {
     pub stability: Stability,
+    pieces: Pieces,
     /// Of each part.
     small_steps: Vec<SmallSteps>,
     /// Velocities at the start of the step [m/s].
@@ -65,6 +67,7 @@ impl<S: Real> Memory<S> {
     pub fn new(layout: &Layout<S>, settings: &SolverSettings) -> Self {
         Self {
             stability: Stability::new(layout, settings),
+            pieces: Pieces::new(layout),
             small_steps: vec![SmallSteps::default(); layout.part_count()],
             start_velocities: vec![Vec3::ZERO; layout.vertex_count()],
         }
@@ -75,6 +78,7 @@ impl<S: Real> Memory<S> {
         size_of_val(&self.start_velocities[..])
             + size_of_val(&self.small_steps[..])
             + self.stability.bytes()
+            + self.pieces.bytes()
     }
 
     /// Carries a stage out.
@@ -144,22 +148,23 @@ impl<S: Real> Memory<S> {
     /// [`ExplicitStage::LoadForces`].
     fn load_forces(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
         let StepData { constants, points, velocities, loads } = data;
-        for (part, small) in step.layout.parts.iter().zip(&self.small_steps) {
+        for (number, small) in self.small_steps.iter().enumerate() {
             if small.done == small.count {
                 continue;
             }
             let small = Step { dt: small.dt(step.dt), ..*step };
-            let start = Before::Moving(points, velocities);
-            let moments = Moments { start, ..constants.moments(&small) };
-            load_forces::<S, false>(constants, &small, &moments, part, points, loads);
+            let moments = Moments {
+                anchors: step.inputs.anchors_of(&step.layout.rest_anchors),
+                start: Before::Moving(points, velocities),
+                dt: small.dt,
+            };
+            self.pieces.load(constants, &small, &moments, number, points, loads);
             let squared = S::from_f64(small.dt * small.dt);
-            for tether in constants.tethers_of(part) {
+            for tether in constants.tethers_of(&step.layout.parts[number]) {
                 let force = tether.force(points[tether.vertex].vec3());
                 let copy = step.layout.copy_offsets[tether.vertex] as usize;
                 loads[copy].add(Point::new(force * squared, S::ZERO));
             }
-            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-            measure_strain(workers, step.layout, Some(part), points, strains);
         }
     }
 

@@ -7,7 +7,7 @@ use crate::elements::kinds::{Energy, Kind};
 use crate::elements::law::Law;
 use crate::elements::{CornerLoad, internal_forces, shape_gradients};
 use crate::layout::Part;
-use crate::layout::{ElementSet, Moments};
+use crate::layout::{ElementSet, Layout, Moments};
 use crate::model::for_each_kind;
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::scalar::{Real, Scalar};
@@ -39,7 +39,18 @@ pub fn load_forces<S: Real, const BOUND: bool>(
             });
         }
     }
-    for_each_kind!(model, set => add_forces(set, moments, part, x, loads));
+    add_elements(model, moments, part, x, loads);
+}
+
+/// Of a part's elements that are no tetrahedra.
+pub fn add_elements<S: Real>(
+    layout: &Layout<S>,
+    moments: &Moments<'_, S>,
+    part: &Part,
+    x: &[Point<S>],
+    loads: &mut [Point<S>],
+) {
+    for_each_kind!(layout, set => add_forces(set, moments, part, x, loads));
 }
 
 /// Of a part's elements of one kind.
