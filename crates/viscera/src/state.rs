@@ -44,8 +44,6 @@ pub struct LearnedPart {
     pub dt: f64,
     /// Whether no trial of the last solve was rejected.
     pub calm: bool,
-    /// Whether any tetrahedron was inside out at the last trial.
-    pub inverted: bool,
 }
 
 impl<S: Real> Learned<S> {

@@ -15,7 +15,7 @@ use crate::scalar::{Real, Vec3};
 use crate::state::{Learned, LearnedPart, State};
 
 /// Raised whenever the bytes mean something else.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 
 /// What the bytes begin with.
 const MAGIC: &[u8; 8] = b"viscera\x1a";

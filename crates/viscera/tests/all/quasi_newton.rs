@@ -116,31 +116,6 @@ fn the_equations_of_a_converged_step_hold() {
     }
 }
 
-/// The same of a step that is taken again by implicit Euler, viscous forces included.
-#[test]
-fn the_equations_of_a_step_taken_again_hold() {
-    let model = bodies::<f64>();
-    let mut solver = Solver::new(&model, &settings(Integrator::Sdirk2, 200));
-    let mut state = solver.state_at_rest();
-    for step in 1..=6 {
-        // As if the last step had left tetrahedra inside out: in both parts, in one, in the other.
-        for (number, part) in state.learned.parts.iter_mut().enumerate() {
-            part.inverted = step % 3 != number as u32;
-        }
-        let inputs = acting(&model, step);
-        solver.step(&model, &mut state, &inputs, DT).expect("a legal step");
-        for (number, part) in state.learned.parts.iter().enumerate() {
-            let dt = if step % 3 != number as u32 { DT } else { SHARE * DT };
-            assert_eq!(part.dt, dt, "step {step}, part {number}: the step of its solve");
-        }
-        let mut balance = ForceBalance::default();
-        solver.force_balance(&model, &state, &inputs, &mut balance).expect("a balance");
-        assert!(balance.load > 1.0, "{} N of loads", balance.load);
-        let of_loads = balance.unbalanced / balance.load;
-        assert!(of_loads < 1e-8, "step {step}: {of_loads:e} of the loads");
-    }
-}
-
 fn largest(a: &[Vec3<f64>], b: &[Vec3<f64>]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max)
 }

@@ -74,9 +74,9 @@ pub fn substeps_for(period: f64, frame: f64) -> u32 {
     if substeps.is_finite() { (substeps as u32).clamp(1, MOST_SUBSTEPS) } else { 1 }
 }
 
-/// Error of a path after one period, times the square of the number of steps in it: 5.6 on bars, up to 9 on organs, whose
+/// Error of a path after one period, times the square of the number of steps in it: 5.6 on bars, up to 12 on organs, whose
 /// faster oscillations take part.
-const PHASE_ERROR: f64 = 9.0;
+const PHASE_ERROR: f64 = 12.0;
 
 /// Steps in a period at least.
 const FEWEST_STEPS: f64 = 13.0;

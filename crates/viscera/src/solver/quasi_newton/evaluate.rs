@@ -37,21 +37,15 @@ pub struct Change {
     pub potential: f64,
     /// Sum of the magnitudes of all terms of it [J s^2]: what its round-off is a share of.
     pub size: f64,
-    /// Tetrahedra turned inside out at the trial.
-    pub inverted: u64,
 }
 
 impl Change {
     fn plus(self, other: Self) -> Self {
-        Self {
-            potential: self.potential + other.potential,
-            size: self.size + other.size,
-            inverted: self.inverted + other.inverted,
-        }
+        Self { potential: self.potential + other.potential, size: self.size + other.size }
     }
 
     fn of(term: f64) -> Self {
-        Self { potential: term, size: term.abs(), inverted: 0 }
+        Self { potential: term, size: term.abs() }
     }
 }
 
@@ -243,7 +237,7 @@ impl Evaluation {
                 });
                 let [potential, size] = along.sums.get();
                 // SAFETY: every piece is worked on once.
-                unsafe { *sums.at(i) = Change { potential, size, inverted: 0 } };
+                unsafe { *sums.at(i) = Change { potential, size } };
             }
         });
         for (_, sum) in self.blocks.iter().zip(&self.block_sums).filter(|(p, _)| p.part == number) {
@@ -354,14 +348,11 @@ impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Tets<'_, S>,
         unsafe { tets.add_in_order(loads, &forces) };
         let mut changes = [S::ZERO; LANES];
         (volume * tissue.energy_change_of::<W>(&f, &d, start)).store(&mut changes, tets.lane);
-        let mut turned = [S::ZERO; LANES];
-        f.determinant().store(&mut turned, tets.lane);
         let mut all = sum.get();
         for lane in tets.lane..(tets.lane + L::WIDTH).min(tets.filled()) {
             let change = -changes[lane].to_f64();
             all.potential += change;
             all.size += change.abs();
-            all.inverted += u64::from(turned[lane] <= S::ZERO);
         }
         sum.set(all);
     }

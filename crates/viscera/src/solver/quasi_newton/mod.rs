@@ -303,7 +303,6 @@ impl<S: Real> Memory<S> {
                 self.reject(number, range, data);
                 continue;
             }
-            progress.inverted = change.inverted;
             if progress.phase == Phase::Iterating {
                 self.offer_pair(vertices, number, part, data, learned);
             }

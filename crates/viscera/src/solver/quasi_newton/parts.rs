@@ -68,8 +68,6 @@ pub struct Progress {
     /// Trials in a row that were rejected, and all in this solve.
     pub failures: u32,
     pub rejections: u32,
-    /// Tetrahedra inside out at the last trial that was accepted.
-    pub inverted: u64,
     /// Steps below this [m] are round-off.
     pub resolution: f64,
     pub products: Products,

@@ -40,7 +40,7 @@ impl<S: Real> Memory<S> {
         let constants = &mut data.constants;
         let (workers, strains) = (&constants.workers, &mut constants.start_strain);
         measure_strain(workers, layout, None, &data.points, strains);
-        self.preconditioner.fit(layout, &data.constants, step.dt);
+        self.preconditioner.fit(layout, &data.constants);
         let curvature =
             Curvature { dt: step.dt, x: &self.base, moments: moments(&step, &self.stage_start) };
         for number in 0..layout.part_count() {

@@ -43,8 +43,6 @@ pub struct Preconditioner<S> {
     parts: Vec<OfPart<S>>,
     /// The free vertices that the sums are of.
     free: Vec<bool>,
-    /// The inverse of the step [1/s] that viscosity was counted with; zero where nothing is viscous.
-    viscous: f64,
     /// Of each group of the part at hand: room that all parts share.
     turns: Vec<Turn<S>>,
 }
@@ -83,11 +81,10 @@ impl<S: Real> Preconditioner<S> {
         let mut all = Self {
             parts: layout.parts.iter().map(|part| OfPart::new(layout, part)).collect(),
             free: vec![true; layout.vertex_count()],
-            viscous: 0.0,
             turns: Vec::new(),
         };
         for (number, part) in all.parts.iter_mut().enumerate() {
-            part.rebuild(layout, number, &all.free[part.vertices.clone()], all.viscous);
+            part.rebuild(layout, number, &all.free[part.vertices.clone()]);
         }
         let most = all.parts.iter().map(|part| part.groups.len()).max().unwrap_or(0);
         all.turns = vec![Turn::NONE; most];
@@ -101,23 +98,19 @@ impl<S: Real> Preconditioner<S> {
             + size_of_val(&self.turns[..])
     }
 
-    /// Takes the sums of the rest shape of a part anew where other vertices are free, or the step is another one and
-    /// tissue viscous; takes memory then.
-    pub fn fit(&mut self, layout: &Layout<S>, constants: &StepConstants<S>, dt: f64) {
-        let viscous = if layout.is_viscous() { 1.0 / dt } else { 0.0 };
-        let is_other_step = self.viscous != viscous;
-        self.viscous = viscous;
+    /// Takes the sums of the rest shape of a part anew where other vertices are free; takes memory then.
+    pub fn fit(&mut self, layout: &Layout<S>, constants: &StepConstants<S>) {
         for (number, part) in self.parts.iter_mut().enumerate() {
             let free = &mut self.free[part.vertices.clone()];
             let masses = &constants.inverse_masses[part.vertices.clone()];
-            let mut is_other = is_other_step;
+            let mut is_other = false;
             for (free, mass) in free.iter_mut().zip(masses) {
                 let is_free = *mass != S::ZERO;
                 is_other |= *free != is_free;
                 *free = is_free;
             }
             if is_other {
-                part.rebuild(layout, number, free, viscous);
+                part.rebuild(layout, number, free);
             }
         }
     }
@@ -218,6 +211,7 @@ impl<S: Real> OfPart<S> {
             + size_of_val(&self.groups.entries[..])
             + size_of_val(&self.groups.offsets[..])
             + size_of_val(&self.groups.laws[..])
+            + size_of_val(&self.groups.viscosities[..])
             + size_of_val(&self.masked[..])
             + self.full.bytes()
             + self.dense.bytes()
@@ -228,9 +222,9 @@ impl<S: Real> OfPart<S> {
         if level == 0 { On::Vertices } else { On::Lattice(lattice, level - 1) }
     }
 
-    fn rebuild(&mut self, layout: &Layout<S>, number: usize, free: &[bool], viscous: f64) {
+    fn rebuild(&mut self, layout: &Layout<S>, number: usize, free: &[bool]) {
         let part = &layout.parts[number];
-        let tets = tets_of_part(layout, number, viscous);
+        let tets = tets_of_part(layout, number);
         let places = places_of(layout, part);
         let user = &layout.numbering.order[part.vertices.clone()];
         let masses: Vec<f64> = user.iter().map(|&v| layout.masses[v as usize].to_f64()).collect();
@@ -270,7 +264,8 @@ impl<S: Real> OfPart<S> {
             for &(v, b) in &self.groups.entries[range] {
                 f = f + Mat3::outer(x[v as usize].vec3().cast::<f64>(), b.cast());
             }
-            *turn = Turn::new(self.groups.laws[group], &f);
+            let rate = self.groups.viscosities[group] / curvature.dt;
+            *turn = Turn::new(self.groups.laws[group], &f, rate);
         }
         self.sum_blocks(constants, squared, turns);
         self.sum_full(squared, turns);
@@ -299,9 +294,10 @@ impl<S: Real> OfPart<S> {
                 let (mut diagonal, mut sum) = (S::ZERO, [S::ZERO; 6]);
                 let shares = sums.offsets[node] as usize..sums.offsets[node + 1] as usize;
                 for share in &sums.shares[shares] {
-                    diagonal += share.trace;
-                    let block = mapped(&turns[share.group as usize].map, &share.b);
-                    sum.iter_mut().zip(block).for_each(|(sum, entry)| *sum += entry);
+                    let turn = &turns[share.group as usize];
+                    diagonal += share.trace * turn.stiffer;
+                    let block = mapped(&turn.map, &share.b);
+                    sum.iter_mut().zip(block).for_each(|(sum, b)| *sum += b * turn.stiffer);
                 }
                 let diagonal = masses[node] + squared * diagonal;
                 *block = sum.map(|entry| entry * squared);
@@ -321,6 +317,7 @@ impl<S: Real> OfPart<S> {
         }
         for (group, turn) in turns[..self.groups.len()].iter().enumerate() {
             let (r, a) = (turn.rotation.cast::<f64>(), turn.map.cast::<f64>());
+            let squared = squared * turn.stiffer.to_f64();
             for &FullBlock { nodes, shear, volume } in &self.full.blocks[self.full.of_group(group)]
             {
                 let block = r * shear * r.transpose() + a * volume * a.transpose();

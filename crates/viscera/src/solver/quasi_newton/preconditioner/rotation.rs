@@ -11,19 +11,22 @@ pub struct Turn<S> {
     pub rotation: Mat3<S>,
     /// `A`.
     pub map: Mat3<S>,
+    /// The factor by which viscosity stiffens it: `1 + eta/he`.
+    pub stiffer: S,
 }
 
 impl<S: Real> Turn<S> {
     /// Of the rest shape.
-    pub const NONE: Self = Self { rotation: Mat3::IDENTITY, map: Mat3::IDENTITY };
+    pub const NONE: Self = Self { rotation: Mat3::IDENTITY, map: Mat3::IDENTITY, stiffer: S::ONE };
 
-    /// Of a mean deformation gradient.
-    pub fn new(law: MaterialModel, f: &Mat3<f64>) -> Self {
+    /// Of a mean deformation gradient; `rate` is the retardation time over the step.
+    pub fn new(law: MaterialModel, f: &Mat3<f64>, rate: f64) -> Self {
         let rotation = rotation_of(f).cast();
         let map: Mat3<S> = with_law!(law, W => W::gradient_map(f)).cast();
         // Also where a number is none.
         let is_finite = map.norm_squared().is_finite();
-        Self { rotation, map: if is_finite { map } else { rotation } }
+        let map = if is_finite { map } else { rotation };
+        Self { rotation, map, stiffer: S::from_f64(1.0 + rate) }
     }
 }
 

@@ -8,7 +8,7 @@
 //!
 //! `g_c = sum_a w_ac g_a` is the gradient of node `c`'s shape function, in the rest shape; `R` the rotation, `A` the
 //! law's gradient map ([`crate::elements::law::Law::gradient_map`]): cofactors of `F`, by which the neo-Hookean volume
-//! term grows where tissue is stretched. A *group* is a connected set of tetrahedra of one material in one cell of the finest
+//! term grows where tissue is stretched. Viscosity stiffens all terms of a group alike, by `1 + eta/he`. A *group* is a connected set of tetrahedra of one material in one cell of the finest
 //! lattice, which turn and stretch together: `R` and `A` are all that changes, so that the blocks of every level,
 //! vertices among them, are found without a pass over the tetrahedra. `K_cc` is exact for neo-Hookean tetrahedra but for
 //! that: their volume term has `lambda + mu` before it, and no other than these. Between nodes, in the dense level, `mu`
@@ -35,13 +35,15 @@ pub struct LocalTet {
     pub gradients: [Vec3<f64>; 4],
     /// [m^3].
     pub volume: f64,
-    /// Lame's parameters [Pa], viscosity included.
+    /// Lame's parameters [Pa].
     pub mu: f64,
     pub lambda: f64,
+    /// Retardation time [s].
+    pub viscosity: f64,
 }
 
-/// The tetrahedra of a part; `viscous` is the factor by which a retardation time of one second stiffens [1/s].
-pub fn tets_of_part<S: Real>(layout: &Layout<S>, number: usize, viscous: f64) -> Vec<LocalTet> {
+/// The tetrahedra of a part.
+pub fn tets_of_part<S: Real>(layout: &Layout<S>, number: usize) -> Vec<LocalTet> {
     let part = &layout.parts[number];
     let first = part.vertices.start as u32;
     let mut tets = Vec::new();
@@ -58,15 +60,15 @@ pub fn tets_of_part<S: Real>(layout: &Layout<S>, number: usize, viscous: f64) ->
                 if known.is_none() {
                     materials.push(constants.material[lane]);
                 }
-                let stiffer = 1.0 + viscous * material.viscosity.to_f64();
                 tets.push(LocalTet {
                     law,
                     material: number as u32,
                     vertices: constants.vertices.map(|corner| corner[lane] - first),
                     gradients: shape_gradients(&constants.shape(lane).cast()),
                     volume: constants.rest_volume[lane].to_f64(),
-                    mu: material.lame_mu.to_f64() * stiffer,
-                    lambda: material.lame_lambda.to_f64() * stiffer,
+                    mu: material.lame_mu.to_f64(),
+                    lambda: material.lame_lambda.to_f64(),
+                    viscosity: material.viscosity.to_f64(),
                 });
             }
         }
@@ -78,6 +80,8 @@ pub fn tets_of_part<S: Real>(layout: &Layout<S>, number: usize, viscous: f64) ->
 #[derive(Clone, Debug, Default)]
 pub struct Groups<S> {
     pub laws: Vec<MaterialModel>,
+    /// Retardation times [s].
+    pub viscosities: Vec<f64>,
     pub offsets: Vec<u32>,
     /// A vertex of the part, and `b` [1/m].
     pub entries: Vec<(u32, Vec3<S>)>,
@@ -148,7 +152,7 @@ fn root(parent: &mut [u32], mut i: u32) -> u32 {
 
 impl<S: Real> Groups<S> {
     pub fn new(tets: &[LocalTet], grouped: &Grouped, vertex_count: usize) -> Self {
-        let mut groups = Self { laws: Vec::new(), offsets: vec![0], entries: Vec::new() };
+        let mut groups = Self { offsets: vec![0], ..Self::default() };
         let mut sums = Gathered::<Vec3<f64>>::new(vertex_count);
         for group in 0..grouped.len() {
             sums.begin();
@@ -162,7 +166,9 @@ impl<S: Real> Groups<S> {
             }
             let mean = |&(v, b): &(u32, Vec3<f64>)| (v, (b * (1.0 / volume)).cast::<S>());
             groups.entries.extend(sums.list.iter().map(mean));
-            groups.laws.push(tets[grouped.tets(group)[0] as usize].law);
+            let first = &tets[grouped.tets(group)[0] as usize];
+            groups.laws.push(first.law);
+            groups.viscosities.push(first.viscosity);
             groups.offsets.push(groups.entries.len() as u32);
         }
         groups
