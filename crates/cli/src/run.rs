@@ -16,7 +16,7 @@ use std::time::Instant;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
 use viscera::settings::{DeviceRequest, Method, Precision};
-use viscera::simulation::{Assembly, Simulation};
+use viscera::simulation::{Assembly, ExpectedErrors, Simulation};
 use viscera_resources::{BuiltInScene, Memory, MeshFiles, files, memory};
 
 /// Simulate a scene; write meshes, a picture, an animation and the numbers
@@ -207,10 +207,12 @@ fn simulate<S: Real>(
 /// What is computed, and by what.
 fn heading<S: Real>(simulation: &Simulation<S>, summary: &Summary, frames: u64) -> String {
     let model = &summary.model;
-    let solver = &simulation.scene().solver;
+    let solver = simulation.solver();
     let work = match solver.method {
         Method::Xpbd => format!(" x {} iterations", solver.iterations()),
-        Method::QuasiNewton => format!(" x {} passes per solve", simulation.iterations()),
+        Method::Auto | Method::QuasiNewton => {
+            format!(" x {} passes per solve", simulation.iterations())
+        }
         Method::Explicit => {
             let small = format!("{:.2e} s", simulation.stable_step());
             format!(", divided into small steps of at most {small}")
@@ -218,7 +220,7 @@ fn heading<S: Real>(simulation: &Simulation<S>, summary: &Summary, frames: u64) 
     };
     // Quasi-Newton steps need no colours.
     let colors = match solver.method {
-        Method::QuasiNewton => String::new(),
+        Method::Auto | Method::QuasiNewton => String::new(),
         Method::Xpbd | Method::Explicit => format!(" colours: {},", model.colors),
     };
     let from = match simulation.frame() {
@@ -227,14 +229,39 @@ fn heading<S: Real>(simulation: &Simulation<S>, summary: &Summary, frames: u64) 
     };
     format!(
         "{}: {} tetrahedra, {} vertices, {:.3} kg,{colors} frames: {frames}{from} of {} substeps{work}\n\
-         device: {}\n",
+         {}device: {}\n",
         summary.title,
         model.tets,
         model.vertices,
         model.mass,
         simulation.substeps(),
+        method_line(simulation),
         summary.device,
     )
+}
+
+/// The method, and the errors that it leads one to expect.
+fn method_line<S: Real>(simulation: &Simulation<S>) -> String {
+    let (solver, asked) = (simulation.solver(), &simulation.scene().solver);
+    let how = match (asked.method, solver.method) {
+        (Method::Auto, _) => format!(", chosen for accuracy {}", asked.accuracy),
+        _ => String::new(),
+    };
+    let ExpectedErrors { motion, at_rest } = simulation.expected_errors();
+    let motion = match motion {
+        Some(share) => format!("motion within about {} %", rounded(100.0 * share)),
+        None => "motion damped by an amount that is not foretold".to_owned(),
+    };
+    let at_rest = rounded(100.0 * at_rest);
+    format!(
+        "method: {}{how}; expected errors: {motion}, at rest within {at_rest} %\n",
+        solver.method
+    )
+}
+
+/// Two digits at most.
+fn rounded(percent: f64) -> String {
+    if percent < 10.0 { format!("{percent:.1}") } else { format!("{percent:.0}") }
 }
 
 /// Some drivers compile kernels for seconds, here or with the first frame.

@@ -217,6 +217,7 @@ fn materials(scene: &Scene) -> BTreeMap<String, String> {
 fn solver_record<S: Real>(simulation: &Simulation<S>) -> BTreeMap<&'static str, serde_json::Value> {
     let values = simulation.scene().solver.values().into_iter();
     let mut record: BTreeMap<_, _> = values.map(|(key, text)| (key, json(text))).collect();
+    record.insert("method", simulation.solver().method.to_string().into());
     record.insert("substeps", simulation.substeps().into());
     record.insert("iterations", simulation.iterations().into());
     record

@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let settings = SolverSettings {
         substeps: Count::Of(1),
         iterations: Count::Of(20),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     let mut builder = ModelBuilder::new();
     builder.add_body(&liver.tets, &tissue)?;

@@ -231,7 +231,7 @@ fn a_moved_body_is_drawn_where_the_last_step_has_brought_it() {
     let shape = sphere(RADIUS, 0.02).expect("a ball");
     let tissue_of =
         Material::new(MaterialModel::StableNeoHookean, 5e3, 0.4, 1000.0).expect("a tissue");
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let mut builder = ModelBuilder::new();
     builder.add_body(&shape.tets, &tissue_of).expect("a body");
     let model: Model<f32> = builder.build().expect("a model");

@@ -75,7 +75,7 @@ pub fn kept(settings: &SolverSettings) -> f64 {
     if settings.acceleration != Acceleration::None {
         kept += ITERATES;
     }
-    if settings.method == Method::QuasiNewton {
+    if matches!(settings.method, Method::Auto | Method::QuasiNewton) {
         kept += LEVELS;
     }
     if settings.acceleration == Acceleration::Anderson {

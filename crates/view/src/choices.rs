@@ -26,7 +26,7 @@ pub enum Side {
     Second,
 }
 
-/// The reference: the default method, with so many iterations that round-off is what is left. In double
+/// The reference: XPBD that is exact at rest, with so many iterations that round-off is what is left. In double
 /// precision it would cost twice as much, and look the same.
 const REFERENCE: [(&str, &str); 11] = [
     ("solver.method", "xpbd"),

@@ -220,7 +220,7 @@ mod tests {
         }
         let dt = simulation.scene().time.frame / f64::from(simulation.substeps());
         NextStep {
-            solver: simulation.scene().solver.clone(),
+            solver: simulation.solver().clone(),
             builder: simulation.assembly().builder.clone(),
             positions: simulation.state().positions.clone(),
             velocities: simulation.state().velocities.clone(),

@@ -17,20 +17,25 @@ pub struct Ours {
 }
 
 /// Another configuration is another line here.
-pub const OURS: [Ours; 4] = [
+pub const OURS: [Ours; 5] = [
     Ours {
         label: "viscera",
-        settings: "material=stvk",
-        words: "defaults: 10 substeps x 2 iterations, coloured, rebase and guards; Green strain",
+        settings: "material=stvk,method=xpbd",
+        words: "XPBD: 10 substeps x 2 iterations, coloured, rebase and guards; Green strain",
     },
     Ours {
         label: "viscera, neo-Hookean",
-        settings: "material=snh",
+        settings: "material=snh,method=xpbd",
         words: "the same in the stretch form of stable neo-Hookean tissue",
     },
     Ours {
+        label: "viscera, automatic",
+        settings: "material=snh",
+        words: "the default method, quasi-Newton; stable neo-Hookean tissue",
+    },
+    Ours {
         label: "viscera, 20 x 5",
-        settings: "material=stvk,substeps=20,iterations=5",
+        settings: "material=stvk,method=xpbd,substeps=20,iterations=5",
         words: "20 substeps x 5 iterations; Green strain",
     },
     Ours {

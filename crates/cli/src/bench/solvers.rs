@@ -92,7 +92,7 @@ fn publish(settings: &mut SolverSettings) {
 impl SolverEntry {
     /// The default settings with its changes.
     pub fn settings(&self) -> SolverSettings {
-        let mut settings = SolverSettings::default();
+        let mut settings = SolverSettings::xpbd();
         (self.change)(&mut settings);
         settings
     }

@@ -107,7 +107,7 @@ fn a_scene_moves_as_the_library_moves_it_to_the_last_bit() {
     let end = run(&bench, &["--cfg", ""]);
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     let stvk = MaterialModel::SaintVenantKirchhoff;
-    let expected = library::<f32>(stvk, &SolverSettings::default(), FACTOR);
+    let expected = library::<f32>(stvk, &SolverSettings::xpbd(), FACTOR);
     assert_eq!(positions(&bench), expected[FRAMES as usize - 1]);
     let timing = timing(&bench);
     assert_eq!(numbers(&timing["wall_ms"]).len(), FRAMES as usize);
@@ -127,7 +127,7 @@ fn settings_are_those_of_the_library_and_the_last_of_a_key_counts() {
     let settings = SolverSettings {
         substeps: Count::Of(3),
         iterations: Count::Of(4),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     let expected = library::<f64>(MaterialModel::StableNeoHookean, &settings, FACTOR);
     assert_eq!(positions(&bench), expected[FRAMES as usize - 1]);
@@ -144,7 +144,7 @@ fn a_transient_run_keeps_its_speed_and_writes_every_frame() {
     let number = |bytes: &[u8]| f64::from_le_bytes(bytes.try_into().expect("eight bytes"));
     let written: Vec<f64> = bytes.chunks(8).map(number).collect();
     let stvk = MaterialModel::SaintVenantKirchhoff;
-    let expected = library::<f64>(stvk, &SolverSettings::default(), 1.0);
+    let expected = library::<f64>(stvk, &SolverSettings::xpbd(), 1.0);
     assert_eq!(written, expected[..4].concat());
     assert_eq!(positions(&bench), expected[3]);
 }

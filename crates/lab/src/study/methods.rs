@@ -44,7 +44,7 @@ pub fn published(colors: Colors) -> SolverSettings {
         keep_multipliers: false,
         step_guard: false,
         anderson_guard: AndersonGuard::None,
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     }
 }
 
@@ -54,7 +54,7 @@ pub fn exact(colors: Colors) -> SolverSettings {
         substeps: Count::Of(1),
         colors,
         threads: Threads::Count(1),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     }
 }
 
@@ -65,7 +65,7 @@ pub fn quasi_newton() -> SolverSettings {
         integrator: Integrator::ImplicitEuler,
         substeps: Count::Of(1),
         threads: Threads::Count(1),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     }
 }
 

@@ -15,7 +15,7 @@ pub(super) const SAFETY: f64 = 0.25;
 /// The truth about motion: small explicit steps.
 pub(super) fn small_steps() -> SolverSettings {
     let method = Method::Explicit;
-    SolverSettings { method, explicit_safety: SAFETY, ..SolverSettings::default() }
+    SolverSettings { method, explicit_safety: SAFETY, ..SolverSettings::xpbd() }
 }
 
 /// A scene, ready to run. Where it names a mesh file, that is the mesh given.

@@ -72,7 +72,7 @@ impl fmt::Display for Case {
 
 /// Small explicit steps first.
 fn cases(quick: bool) -> Vec<Case> {
-    let of = |method, substeps| SolverSettings { method, substeps, ..SolverSettings::default() };
+    let of = |method, substeps| SolverSettings { method, substeps, ..SolverSettings::xpbd() };
     let cells = if quick { 1 } else { 4 };
     let case = |name, settings| Case { name, settings, single: true, cells };
     let mut cases = vec![

@@ -98,7 +98,7 @@ fn cases(quick: bool) -> Vec<Case> {
             (1, 5),
         ],
     };
-    let defaults = SolverSettings::default();
+    let defaults = SolverSettings::xpbd();
     let (substeps, iterations) = (defaults.substeps(), defaults.iterations());
     let case = |substeps, iterations, single| Case { substeps, iterations, single, quick };
     let mut cases: Vec<_> = schedules.iter().map(|&(n, k)| case(n, k, false)).collect();
@@ -243,7 +243,7 @@ fn motions(context: &mut Context) -> Result<()> {
     }
     context.document.table(&table);
     plot(context, &cases, &motions, mode.omega)?;
-    let defaults = SolverSettings::default();
+    let defaults = SolverSettings::xpbd();
     let mut worst = 0.0;
     for (case, motion) in cases.iter().zip(&motions) {
         if (case.substeps, case.iterations) == (defaults.substeps(), defaults.iterations()) {
@@ -300,7 +300,7 @@ fn plot(context: &mut Context, cases: &[Case], motions: &[Motion], omega: f64) -
 /// How stiff tissue may be before the defaults' two iterations fall behind the motion.
 fn stiffer(context: &mut Context) -> Result<()> {
     let bars = stiffer_bars(context.quick);
-    let defaults = SolverSettings::default();
+    let defaults = SolverSettings::xpbd();
     let (substeps, iterations) = (defaults.substeps(), defaults.iterations());
     let case = Case { substeps, iterations, single: false, quick: context.quick };
     let motions = context.run_cases(&bars, |bar| {
@@ -374,7 +374,7 @@ fn release<S: Real>(
     let settings = SolverSettings {
         substeps: Count::Of(case.substeps),
         iterations: Count::Of(case.iterations),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     let model = load_case.model::<S>()?;
     let mut solver = Solver::new(&model, &settings);

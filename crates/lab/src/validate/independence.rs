@@ -127,7 +127,7 @@ fn answer(case: &Case) -> Result<Answer> {
         iterations: Count::Of(case.iterations),
         rebase: exact,
         keep_multipliers: exact,
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     let settled = if case.single {
         settle::<f32>(&load_case, &settings)?

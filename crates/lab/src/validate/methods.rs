@@ -63,12 +63,7 @@ impl LibrarySolver {
             Self::QuasiNewton | Self::QuasiNewtonSingle => Method::QuasiNewton,
             Self::Double | Self::Single | Self::Published => Method::Xpbd,
         };
-        SolverSettings {
-            method,
-            rebase: exact,
-            keep_multipliers: exact,
-            ..SolverSettings::default()
-        }
+        SolverSettings { method, rebase: exact, keep_multipliers: exact, ..SolverSettings::xpbd() }
     }
 
     /// Brings a scene to rest.
@@ -145,6 +140,6 @@ pub(super) fn scheduled(form: Form, substeps: u32, iterations: u32) -> SolverSet
         colors: form.colors(),
         substeps: Count::Of(substeps),
         iterations: Count::Of(iterations),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     }
 }

@@ -115,7 +115,7 @@ fn table(context: &mut Context) -> Result<()> {
     let volumes = volumes.map(|(case, answer)| {
         format!("{} at nu {}", percent(answer.true_volume - 1.0), case.poisson)
     });
-    let defaults = SolverSettings::default();
+    let defaults = SolverSettings::xpbd();
     let (substeps, iterations) = (defaults.substeps(), defaults.iterations());
     context.document.paragraph(format!(
         "At rest, {substeps} substeps of {iterations} iterations, quasi-Newton 1 substep, against the reference: \

@@ -183,7 +183,7 @@ fn answer(case: &Case) -> Result<Answer> {
     let mesh = case.organ.mesh(case.quick)?;
     let mut scene = case.organ.scene(case.young, case.poisson)?;
     scene.time.duration = MOTION;
-    let ours = SolverSettings { method: Method::QuasiNewton, ..SolverSettings::default() };
+    let ours = SolverSettings { method: Method::QuasiNewton, ..SolverSettings::xpbd() };
     let with = |solver: &SolverSettings| {
         let mut scene = scene.clone();
         scene.solver = solver.clone();

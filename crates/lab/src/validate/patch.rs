@@ -55,7 +55,7 @@ impl fmt::Display for Case {
 /// The defaults under several stretches: in the order of the table's cells.
 fn stretch_cases(quick: bool) -> Vec<Case> {
     let stretches: &[f64] = if quick { &[0.8, 1.4] } else { &[0.8, 0.9, 1.1, 1.2, 1.4] };
-    let defaults = SolverSettings::default();
+    let defaults = SolverSettings::xpbd();
     let (substeps, iterations) = (defaults.substeps(), defaults.iterations());
     let mut cases = Vec::new();
     for model in MODELS {
@@ -125,7 +125,7 @@ fn stretches(context: &mut Context) -> Result<()> {
         let names = [model_name(case.model).to_owned(), case.stretch.to_string()];
         table.row(names.into_iter().chain(row));
     }
-    let defaults = SolverSettings::default();
+    let defaults = SolverSettings::xpbd();
     let (substeps, iterations) = (defaults.substeps(), defaults.iterations());
     context.document.paragraph(format!(
         "With the default settings ({substeps} substeps of {iterations} iterations), and with as \

@@ -186,7 +186,7 @@ fn answer(case: &Case) -> Result<Path> {
     scene.solver = match case.mover {
         None => small_steps(),
         Some(Mover { method, integrator, substeps, iterations, .. }) => {
-            let defaults = SolverSettings::default();
+            let defaults = SolverSettings::xpbd();
             SolverSettings { method, integrator, substeps, iterations, ..defaults }
         }
     };

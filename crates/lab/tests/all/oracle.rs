@@ -212,7 +212,7 @@ fn many_sweeps_are_the_oracles_steps() {
         substeps: Count::Of(1),
         iterations: Count::Of(2000),
         acceleration: Acceleration::Anderson,
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     for (name, fixture) in motions() {
         let tolerance = if fixture.value("viscosity") > 0.0 { 1e-7 } else { ROUNDING };

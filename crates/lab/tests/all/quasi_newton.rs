@@ -22,7 +22,7 @@ fn converged() -> SolverSettings {
         iterations: Count::Of(600),
         history: 10,
         threads: Threads::Count(1),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     }
 }
 

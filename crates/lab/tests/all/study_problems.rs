@@ -12,7 +12,7 @@ fn one_thread(iterations: u32) -> SolverSettings {
         substeps: Count::Of(1),
         iterations: Count::Of(iterations),
         threads: Threads::Count(1),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     }
 }
 

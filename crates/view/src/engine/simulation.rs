@@ -213,7 +213,7 @@ impl<S: Real> Run for SimulationRun<S> {
         let inputs = simulation.inputs_at(simulation.time() + dt);
         let double = |all: &[Vec3<S>]| all.iter().map(|x| x.cast()).collect();
         NextStep {
-            solver: scene.solver.clone(),
+            solver: simulation.solver().clone(),
             builder: simulation.assembly().builder.clone(),
             positions: double(&simulation.state().positions),
             velocities: double(&simulation.state().velocities),

@@ -23,7 +23,7 @@ pub fn show(
             let mut chooser = Chooser { side, actions };
             known(ui, &mut chooser);
             method(ui, solver, &mut chooser);
-            if solver.method == Method::QuasiNewton {
+            if chooses_counts(solver) {
                 passes(ui, solver, &mut chooser);
             }
             if solver.method == Method::Xpbd {
@@ -39,12 +39,12 @@ pub fn show(
 /// Solvers worth comparing, by one click. Each says everything that another may have changed.
 const KNOWN: [(&str, &str, KnownSettings); 5] = [
     (
-        "quasi-Newton",
-        "Every step solved in a dozen passes, whatever the mesh; substeps and passes chosen by the method.",
-        known_settings("quasi_newton", "unlimited", "auto", "auto", "none", "true"),
+        "default",
+        "What is cheapest at the accuracy below: every step solved in a dozen passes, whatever the mesh.",
+        known_settings("auto", "unlimited", "auto", "auto", "none", "true"),
     ),
     (
-        "default (exact at rest)",
+        "XPBD (exact at rest)",
         "Rebase and kept multipliers: in balance when it comes to rest. Coloured Gauss-Seidel, two iterations per \
          substep.",
         known_settings("xpbd", "unlimited", "10", "2", "none", "true"),
@@ -97,17 +97,36 @@ fn known(ui: &mut Ui, chooser: &mut Chooser<'_>) {
     });
 }
 
+/// Whether substeps and passes can be left to the method.
+fn chooses_counts(solver: &SolverSettings) -> bool {
+    matches!(solver.method, Method::Auto | Method::QuasiNewton)
+}
+
 fn method(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
     let value = match solver.method {
+        Method::Auto => "auto",
         Method::Xpbd => "xpbd",
         Method::Explicit => "explicit",
         Method::QuasiNewton => "quasi_newton",
     };
-    let help = "XPBD sweeps over constraints in large steps. Quasi-Newton solves each step in a dozen \
+    let help = "Automatic takes the cheapest at the accuracy below. XPBD sweeps over constraints in large steps. Quasi-Newton solves each step in a dozen \
                 passes, whatever the mesh. Explicit takes many small steps: no sweeps, no guards, cheap for small \
                 soft bodies.";
-    let names = [("quasi_newton", "quasi-Newton"), ("xpbd", "XPBD"), ("explicit", "explicit")];
+    let names = [
+        ("auto", "automatic"),
+        ("quasi_newton", "quasi-Newton"),
+        ("xpbd", "XPBD"),
+        ("explicit", "explicit"),
+    ];
     chooser.menu(ui, &Row::new("solver.method", "method", help), value, &names);
+    if chooses_counts(solver) {
+        let help = "The error of motion for which substeps and passes are chosen: about 15 % for a draft, 5 %, or \
+                    0.5 %. Where tissue comes to rest does not depend on it.";
+        let names = [("draft", "draft"), ("standard", "standard"), ("fine", "fine")];
+        let value = solver.accuracy.to_string();
+        let row = Row::new("solver.accuracy", "accuracy", help);
+        chooser.menu(ui, &row, value.trim_matches('"'), &names);
+    }
     let help =
         "Divide every frame. More lose less motion to numerical damping; the cost grows alike.";
     let row = Row::new("solver.substeps", "substeps", help).rail(1.0..=100.0).whole().logarithmic();
@@ -131,10 +150,10 @@ fn count(
     chosen: Count,
     usual: u32,
 ) {
-    if solver.method == Method::QuasiNewton {
+    if chooses_counts(solver) {
         chooser.automatic(ui, row, chosen == Count::Auto, usual);
     }
-    if solver.method != Method::QuasiNewton || chosen != Count::Auto {
+    if !chooses_counts(solver) || chosen != Count::Auto {
         chooser.number(ui, row, f64::from(usual));
     }
 }

@@ -78,12 +78,14 @@ impl<S: Real> Layout<S> {
     fn of(model: &Model<S>, settings: &SolverSettings) -> Self {
         let graph = constraint_graph(model);
         let numbering = &match settings.method {
-            Method::QuasiNewton | Method::Explicit => Arc::new(cell_by_cell(model)),
+            Method::Auto | Method::QuasiNewton | Method::Explicit => Arc::new(cell_by_cell(model)),
             Method::Xpbd => Arc::clone(&model.numbering),
         };
         // Forces are added tetrahedron by tetrahedron where no constraint is solved: no colours, but pieces.
         let coloring = match settings.method {
-            Method::QuasiNewton | Method::Explicit => in_pieces(model, &graph, numbering),
+            Method::Auto | Method::QuasiNewton | Method::Explicit => {
+                in_pieces(model, &graph, numbering)
+            }
             Method::Xpbd => {
                 let coloring = graph.color(model.vertex_count(), settings.colors);
                 debug_assert_eq!(coloring.validate(&graph), None);
@@ -125,10 +127,9 @@ impl<S: Real> Layout<S> {
             elements,
             color_count,
             largest_clique: coloring.largest_clique as usize,
-            multiplier_count: if settings.method == Method::QuasiNewton {
-                0
-            } else {
-                multiplier_count
+            multiplier_count: match settings.method {
+                Method::Auto | Method::QuasiNewton => 0,
+                Method::Xpbd | Method::Explicit => multiplier_count,
             },
             numbering: Arc::clone(numbering),
             parts: Arc::from(parts),

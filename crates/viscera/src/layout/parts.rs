@@ -234,7 +234,7 @@ mod tests {
             (MaterialModel::StableNeoHookean, Colors::Limited(5)),
             (MaterialModel::StableNeoHookean, Colors::Limited(1)),
         ] {
-            let settings = SolverSettings { colors, ..SolverSettings::default() };
+            let settings = SolverSettings { colors, ..SolverSettings::xpbd() };
             let viscous =
                 tissue(MaterialModel::StableNeoHookean).with_viscosity(0.1).expect("legal");
             let bodies = [(&bar, tissue(law)), (&cube, viscous)];

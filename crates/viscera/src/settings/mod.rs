@@ -5,11 +5,13 @@
 //! `Default`, reading it from TOML with errors that name line, column and the nearest valid name,
 //! overrides, and the descriptions that `viscera scene describe` prints.
 
+mod accuracy;
 mod compound;
 mod kind;
 mod solver;
 mod tree;
 
+pub use accuracy::{Accuracy, FINEST, ROUGHEST};
 pub use solver::{
     Acceleration, AndersonGuard, AndersonOn, Colors, Count, DeviceRequest, Integrator,
     MOST_HISTORY, MOST_THREADS, Method, NeoHookean, Precision, RelaxationForm, SolverSettings,

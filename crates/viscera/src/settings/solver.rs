@@ -1,5 +1,6 @@
 //! The solver's settings.
 
+use super::accuracy::{Accuracies, Accuracy};
 use super::{
     Kind, Node, SettingError, Table, Value, ValueError, Whole, at_least, choices, number, one_of,
     settings_table, truth, value_error, whole, wrong_type,
@@ -64,6 +65,8 @@ pub enum DeviceRequest {
 choices! {
     /// How positions and velocities are advanced.
     pub enum Method {
+        /// What is cheapest at the accuracy that is asked for.
+        Auto = "auto",
         /// Sweeps over constraints: large steps, stable.
         Xpbd = "xpbd",
         /// Forces and velocities in many small steps: no sweeps, no guards, true motion.
@@ -165,13 +168,19 @@ settings_table! {
     pub struct SolverSettings {
         /// Floating point format of the simulation state.
         precision: Precision = (Precision::F32), one_of::<Precision>();
-        /// How positions and velocities are advanced. "xpbd" sweeps over constraints. "quasi_newton" solves
+        /// How positions and velocities are advanced. "auto" chooses by `accuracy`: "quasi_newton", or, where errors of
+        /// less than a hundredth are asked for and it is cheaper, "explicit"; on a `device` that is asked for by name,
+        /// "xpbd". "xpbd" sweeps over constraints. "quasi_newton" solves
         /// every substep to its end in a dozen passes over the mesh, whatever its size; of the settings below it uses
         /// `substeps`, `iterations`, `integrator`, `history`, `threads`, and it is computed by the CPU. "explicit"
         /// divides every substep into as many small steps as it takes to be stable; it uses `explicit_safety`,
         /// `colors`, `threads` and `device`. It loses no motion to damping, and it is the cheapest for small soft
         /// bodies; its cost grows with the square root of the stiffness, and with fineness once more.
-        method: Method = (Method::Xpbd), one_of::<Method>();
+        method: Method = (Method::Auto), one_of::<Method>();
+        /// The error of motion that "auto" and "quasi_newton" choose substeps and passes for, as a share of the
+        /// displacement, over half a second: "draft" for 0.15, "standard" for 0.05, "fine" for 0.005, or a number.
+        /// Where tissue comes to rest does not depend on it.
+        accuracy: Accuracy = (Accuracy::Standard), Accuracies;
         /// The share of the largest stable step of the body at rest that "explicit" takes. Tissue
         /// stiffens under strong deformation: lower this where a run diverges.
         explicit_safety: f64 = 0.5, number(at_least(1e-3).up_to(1.0));
@@ -274,6 +283,22 @@ const SHORT_STEPS: AutomaticCounts = AutomaticCounts { substeps: 10, iterations:
 const LONG_STEPS: AutomaticCounts = AutomaticCounts { substeps: 1, iterations: 8 };
 
 impl SolverSettings {
+    /// The defaults of the published method and what became of it.
+    pub fn xpbd() -> Self {
+        Self { method: Method::Xpbd, ..Self::default() }
+    }
+
+    /// For a solver that has nothing but a model to choose by: "auto" is the quasi-Newton method.
+    pub fn of_solver(&self) -> Self {
+        self.chosen(Method::QuasiNewton)
+    }
+
+    /// With this method in the place of "auto".
+    pub(crate) fn chosen(&self, method: Method) -> Self {
+        let method = if self.method == Method::Auto { method } else { self.method };
+        Self { method, ..self.clone() }
+    }
+
     /// Substeps per frame; what "auto" stands for where it is chosen.
     pub fn substeps(&self) -> u32 {
         match self.substeps {
@@ -294,7 +319,7 @@ impl SolverSettings {
     fn automatic_counts(&self) -> AutomaticCounts {
         match self.method {
             Method::Xpbd | Method::Explicit => SHORT_STEPS,
-            Method::QuasiNewton => LONG_STEPS,
+            Method::Auto | Method::QuasiNewton => LONG_STEPS,
         }
     }
 

@@ -21,7 +21,7 @@ pub fn diverged(scene: &Scene) -> String {
         return either(&[&lower, "choose solver.method = \"xpbd\""]);
     }
     let mut choices = vec!["raise solver.substeps"];
-    if solver.method == Method::QuasiNewton {
+    if matches!(solver.method, Method::Auto | Method::QuasiNewton) {
         return either(&choices);
     }
     if solver.relaxation > 1.0 {
@@ -45,7 +45,7 @@ pub fn budget(scene: &Scene) -> String {
     if solver.method == Method::Explicit {
         return "raise time.duration".into();
     }
-    if solver.method == Method::QuasiNewton {
+    if matches!(solver.method, Method::Auto | Method::QuasiNewton) {
         return "raise solver.iterations or solver.substeps".into();
     }
     let off: Vec<&str> = [

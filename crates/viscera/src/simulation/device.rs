@@ -7,7 +7,6 @@ use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
-use crate::scene::Scene;
 use crate::settings::SolverSettings;
 use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]
@@ -113,11 +112,20 @@ impl<S: Real> Backend<S> {
         }
     }
 
-    /// See [`Solver::substeps`]; methods that choose by themselves are computed by the CPU.
-    pub fn substeps(&mut self, inputs: &Inputs<S>, scene: &Scene) -> u32 {
+    /// The slowest period [s], and the substeps of a frame [s]: see [`Solver::slowest_period`] and [`Solver::substeps`].
+    /// Methods that choose by themselves are computed by the CPU.
+    pub fn substeps(
+        &mut self,
+        inputs: &Inputs<S>,
+        settings: &SolverSettings,
+        frame: f64,
+    ) -> (f64, u32) {
         match &mut self.engine {
-            Engine::Cpu(solver) => solver.substeps(inputs, scene.time.frame),
-            Engine::Device(_) => scene.solver.substeps(),
+            Engine::Cpu(solver) => {
+                let period = solver.slowest_period(inputs);
+                (period, solver.substeps_for(period, frame))
+            }
+            Engine::Device(_) => (f64::INFINITY, settings.substeps()),
         }
     }
 

@@ -135,7 +135,7 @@ fn asked_for(
 fn faster(model: &Model<f32>, settings: &SolverSettings, dt: f64) -> Backend<f32> {
     let solver = Solver::new(model, settings);
     let sweeps = match settings.method {
-        Method::QuasiNewton => {
+        Method::Auto | Method::QuasiNewton => {
             return Backend::cpu(solver, "the quasi-Newton method is computed by the CPU");
         }
         Method::Xpbd => settings.iterations(),

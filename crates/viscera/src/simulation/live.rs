@@ -3,7 +3,7 @@
 
 use super::error::{LiveError, SimulationError};
 use super::holding::{GraspOrigins, tolerance};
-use super::{Simulation, substep_dt};
+use super::{Simulation, automatic, substep_dt};
 use crate::measure::measure_tets;
 use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
@@ -149,7 +149,7 @@ impl<S: Real> Simulation<S> {
         let order = |solver: &SolverSettings| {
             (solver.method, solver.colors, solver.neo_hookean, solver.rebase)
         };
-        let same_order = order(&self.scene.solver) == order(&fork.scene.solver);
+        let same_order = order(&self.solver) == order(&fork.solver);
         if same_order && self.layout().multiplier_count == fork.layout().multiplier_count {
             let whole = self.whole_state();
             let kept = whole.multipliers.into_iter().map(|l| T::from_f64(l.to_f64())).collect();
@@ -237,12 +237,10 @@ impl<S: Real> Simulation<S> {
         }
         let model = builder.build::<S>().map_err(SimulationError::from)?;
         let same_device = scene.solver.device == self.scene.solver.device;
-        let backend = self.backend.renew(
-            same_device,
-            &model,
-            &scene.solver,
-            substep_dt(&scene, scene.solver.substeps()),
-        )?;
+        let on_device = same_device && self.backend.device().is_some();
+        let solver = automatic::settings_of(&scene, &self.assembly, &model, on_device);
+        let dt = substep_dt(&scene, solver.substeps());
+        let backend = self.backend.renew(same_device, &model, &solver, dt)?;
         let rest = State::at_rest(&model);
         let state = State {
             positions: std::mem::take(&mut self.state.positions),
@@ -250,6 +248,7 @@ impl<S: Real> Simulation<S> {
             ..rest
         };
         (self.scene, self.model, self.backend) = (scene, model, backend);
+        self.solver = solver;
         self.assembly.builder = builder;
         self.choose_substeps();
         self.begin_at(state);

@@ -2,6 +2,7 @@
 
 pub mod advice;
 mod assemble;
+mod automatic;
 mod choice;
 mod device;
 mod error;
@@ -16,6 +17,7 @@ mod rest;
 mod saved;
 
 pub use assemble::{AssembleError, AssembledBody, Assembly, ResolvedPatch};
+pub use automatic::ExpectedErrors;
 pub use error::{FrameError, LiveError, SimulationError};
 pub use forces::Hold;
 use holding::GraspOrigins;
@@ -109,12 +111,16 @@ pub struct FrameReport {
 #[derive(Debug)]
 pub struct Simulation<S> {
     scene: Scene,
+    /// The scene's, with a method in the place of "auto".
+    solver: SolverSettings,
     assembly: Assembly,
     model: Model<S>,
     state: State<S>,
     backend: Backend<S>,
     /// Per frame.
     substeps: u32,
+    /// Of the slowest oscillation of what the scene's fixings hold [s]; infinite where nothing is held.
+    period: f64,
     inputs: Inputs<S>,
     taken: GraspOrigins,
     /// The scene without what was done to it by hand.
@@ -136,19 +142,23 @@ pub struct Simulation<S> {
 impl<S: Real> Simulation<S> {
     /// Builds the model, chooses what computes its steps and takes the memory for them.
     pub fn new(scene: Scene, assembly: Assembly) -> Result<Self, SimulationError> {
-        Self::on(scene, assembly, Backend::choose)
+        Self::on(scene, assembly, false, Backend::choose)
     }
 
     fn on(
         scene: Scene,
         assembly: Assembly,
+        on_device: bool,
         choose: impl FnOnce(&Model<S>, &SolverSettings, f64) -> Result<Backend<S>, SimulationError>,
     ) -> Result<Self, SimulationError> {
         let model = assembly.builder.build::<S>()?;
+        let solver = automatic::settings_of(&scene, &assembly, &model, on_device);
         let mut simulation = Self {
             state: State::at_rest(&model),
-            substeps: scene.solver.substeps(),
-            backend: choose(&model, &scene.solver, substep_dt(&scene, scene.solver.substeps()))?,
+            substeps: solver.substeps(),
+            backend: choose(&model, &solver, substep_dt(&scene, solver.substeps()))?,
+            solver,
+            period: f64::INFINITY,
             inputs: Inputs::default(),
             taken: GraspOrigins::default(),
             written: scene.clone(),
@@ -172,13 +182,19 @@ impl<S: Real> Simulation<S> {
 
     /// As many substeps as the settings ask for, or as the slowest oscillation of what the scene's fixings hold asks for.
     fn choose_substeps(&mut self) {
-        // Of the fixings alone, which are always the same: what a hand holds comes and goes, and a run that is resumed or
-        // repeated has to choose the same.
-        let mut fixed = self.scene.clone();
-        fixed.motions.clear();
-        let mut inputs = Inputs::default();
-        GraspOrigins::default().act(&fixed, &self.assembly, 0.0, &mut inputs);
-        self.substeps = self.backend.substeps(&inputs, &self.scene);
+        let inputs = automatic::fixings(&self.scene, &self.assembly);
+        (self.period, self.substeps) =
+            self.backend.substeps(&inputs, &self.solver, self.scene.time.frame);
+    }
+
+    /// The settings in force: the scene's, with the method that "auto" stands for.
+    pub fn solver(&self) -> &SolverSettings {
+        &self.solver
+    }
+
+    /// The errors that the settings in force lead one to expect, before anything has moved.
+    pub fn expected_errors(&self) -> ExpectedErrors {
+        automatic::expected_errors(&self.solver, self.period, self.scene.time.frame, self.substeps)
     }
 
     /// Substeps per frame.
@@ -188,9 +204,9 @@ impl<S: Real> Simulation<S> {
 
     /// Iterations per substep, or per solve of a substep where it has several.
     pub fn iterations(&self) -> u32 {
-        let solver = &self.scene.solver;
+        let solver = &self.solver;
         match solver.method {
-            Method::QuasiNewton => choose(solver, &self.model.materials).passes,
+            Method::Auto | Method::QuasiNewton => choose(solver, &self.model.materials).passes,
             Method::Xpbd | Method::Explicit => solver.iterations(),
         }
     }
@@ -289,7 +305,7 @@ impl<S: Real> Simulation<S> {
             Err(lost) if self.backend.gives_way && !matches!(lost, FrameError::Step(_)) => {
                 // Positions are still those of the last frame; the multipliers are gone with the device.
                 let (time, dt) = (self.time(), self.substep_dt());
-                self.backend.give_way(&self.model, &self.scene.solver, time, &lost);
+                self.backend.give_way(&self.model, &self.solver, time, &lost);
                 let inputs = self.inputs_at(time);
                 self.state.multipliers.clear();
                 self.backend.restart(&self.model, &mut self.state, &inputs, dt)?;

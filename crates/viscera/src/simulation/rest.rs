@@ -11,6 +11,10 @@ use crate::solver::balance::ForceBalance;
 /// be warned of, one of a fifth of a percent must not.
 const AWAY: f64 = 0.005;
 
+/// Differences of forces below this share of the forces of unseen strains count as nothing. The latter are a sum over all
+/// tetrahedra; a patch carries a small part of it.
+const UNSEEN: f64 = 0.05;
+
 /// The share of the displacement that a run which goes on longer is to come to.
 const NEAR: f64 = 0.001;
 
@@ -111,7 +115,7 @@ impl RestReport {
                 (time + self.time_left()).ceil(),
                 match scene.solver.method {
                     Method::Xpbd => ", or solver.iterations, which brings it there faster",
-                    Method::Explicit | Method::QuasiNewton => "",
+                    Method::Auto | Method::Explicit | Method::QuasiNewton => "",
                 },
             ),
             Standing::Elsewhere if !self.stable => format!(
@@ -181,7 +185,8 @@ impl<S: Real> Simulation<S> {
             apart.map(|(a, b)| (Vec3::from_f64(a.force) - Vec3::from_f64(b.force)).length());
         // What rounding makes is no difference, and the forces of strains that nobody sees are no measure.
         let ForceBalance { rounding, force_floor, .. } = self.balance;
-        let apart = (apart.fold(0.0, f64::max) - rounding).max(0.0);
+        let unseen = rounding.max(UNSEEN * force_floor);
+        let apart = (apart.fold(0.0, f64::max) - unseen).max(0.0);
         if apart > 0.0 { apart / (largest + force_floor) } else { 0.0 }
     }
 }

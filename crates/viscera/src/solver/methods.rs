@@ -12,7 +12,7 @@ impl Plan {
         match settings.method {
             Method::Xpbd => xpbd::plan(layout, settings),
             Method::Explicit => explicit::plan(),
-            Method::QuasiNewton => quasi_newton::plan(settings, &layout.materials),
+            Method::Auto | Method::QuasiNewton => quasi_newton::plan(settings, &layout.materials),
         }
     }
 
@@ -26,7 +26,9 @@ impl Plan {
             }
             // Small steps are counted by the step.
             Method::Explicit => {}
-            Method::QuasiNewton => *self = quasi_newton::plan(settings, &layout.materials),
+            Method::Auto | Method::QuasiNewton => {
+                *self = quasi_newton::plan(settings, &layout.materials)
+            }
         }
     }
 }

@@ -37,7 +37,7 @@ pub use error::StepError;
 pub use inputs::{Inputs, Pin, Tether};
 use inputs::{check_inputs, check_model, check_state, check_step};
 use plan::Plan;
-pub(crate) use quasi_newton::choose;
+pub(crate) use quasi_newton::{choose, expected_motion_error};
 pub use report::StepReport;
 pub use step::balance;
 use step::data::Step;
@@ -61,14 +61,16 @@ pub struct Solver<S> {
 }
 
 impl<S: Real> Solver<S> {
-    /// Plans the steps and takes the memory for them.
+    /// Plans the steps and takes the memory for them. `method = "auto"` is the quasi-Newton method here: a solver alone
+    /// knows neither frame nor fixings.
     pub fn new(model: &Model<S>, settings: &SolverSettings) -> Self {
-        let layout = Layout::new(model, settings);
+        let settings = settings.of_solver();
+        let layout = Layout::new(model, &settings);
         Self {
-            settings: settings.clone(),
-            plan: Plan::new(&layout, settings),
-            memory: cpu::Memory::new(&layout, settings),
+            plan: Plan::new(&layout, &settings),
+            memory: cpu::Memory::new(&layout, &settings),
             layout: Arc::new(layout),
+            settings,
         }
     }
 
@@ -217,9 +219,15 @@ impl<S: Real> Solver<S> {
     /// Substeps of a frame [s] in which these inputs hold the model: as many as the settings ask for; where they leave it
     /// to the quasi-Newton method, as the slowest oscillation asks for. Forgets the last step.
     pub fn substeps(&mut self, inputs: &Inputs<S>, frame: f64) -> u32 {
+        let period = self.slowest_period(inputs);
+        self.substeps_for(period, frame)
+    }
+
+    /// As [`Solver::substeps`], of a slowest period [s] that is known.
+    pub fn substeps_for(&self, period: f64, frame: f64) -> u32 {
         match (self.settings.substeps, self.settings.method) {
             (Count::Auto, Method::QuasiNewton) => {
-                quasi_newton::substeps_for(self.slowest_period(inputs), frame)
+                quasi_newton::substeps_for(period, frame, self.settings.accuracy.share())
             }
             _ => self.settings.substeps(),
         }

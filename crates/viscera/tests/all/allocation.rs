@@ -21,7 +21,7 @@ fn the_counter_counts() {
 }
 
 fn accelerations() -> Vec<SolverSettings> {
-    let plain = SolverSettings::default();
+    let plain = SolverSettings::xpbd();
     let chebyshev = SolverSettings {
         acceleration: Acceleration::Chebyshev,
         chebyshev_delay: 2,
@@ -152,6 +152,7 @@ fn a_frame_of_a_scene_allocates_nothing_after_the_first() {
             let overrides = [
                 ("solver.acceleration", acceleration),
                 ("solver.colors", colors),
+                ("solver.method", "xpbd"),
                 ("solver.device", "cpu"),
             ];
             let scene = Scene::parse("everything.toml", SCENE, &overrides);
@@ -176,7 +177,7 @@ fn a_frame_of_a_scene_allocates_nothing_after_the_first() {
 #[test]
 fn memory_is_small_and_as_large_as_is_said() {
     let mesh = block([0.2, 0.05, 0.05], [50, 10, 10], 0.2);
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     for (viscosity, most) in [(0.0, 170), (0.01, 230)] {
         let tissue = material(SNH, 1e4, 0.45).with_viscosity(viscosity).expect("legal");
         let (model, of_model) = bytes_of(|| single_body::<f32>(&mesh, &tissue));

@@ -24,7 +24,7 @@ fn steps_of_two_threads_take_a_block_of_the_queue_now_and_then() {
     // More than 64 blocks of each colour and several pieces of every sum, so that work is shared in all
     // stages that share it: strain, loads, sweep, rebase, joining copies, potential, forces.
     let mesh = block([0.08, 0.04, 0.04], [16, 12, 12], 0.2);
-    let base = SolverSettings { threads: Threads::Count(2), ..SolverSettings::default() };
+    let base = SolverSettings { threads: Threads::Count(2), ..SolverSettings::xpbd() };
     let tissue = material(SNH, 1e4, 0.45).with_viscosity(0.01).expect("legal");
     let mut rejected = 0;
     for (colors, acceleration) in [

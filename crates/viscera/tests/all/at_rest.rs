@@ -99,7 +99,9 @@ fn advice_can_be_followed() {
     assert!(!diverged.contains("relaxation") && !diverged.contains("acceleration"), "{diverged}");
     let diverged = advice::diverged(&with(&[]));
     assert_eq!(diverged, "raise solver.substeps");
+    let xpbd = ("solver.method", "xpbd");
     let diverged = advice::diverged(&with(&[
+        xpbd,
         ("solver.relaxation", "1.5"),
         ("solver.acceleration", "chebyshev"),
         ("solver.step_guard", "false"),
@@ -109,7 +111,7 @@ fn advice_can_be_followed() {
     }
 
     assert_eq!(advice::budget(&with(&[])), "raise solver.iterations or solver.substeps");
-    let published = [("solver.rebase", "false"), ("solver.keep_multipliers", "false")];
+    let published = [xpbd, ("solver.rebase", "false"), ("solver.keep_multipliers", "false")];
     let budget = advice::budget(&with(&published));
     assert!(budget.contains("solver.rebase = true and solver.keep_multipliers = true"), "{budget}");
     // Every setting that is named is one.

@@ -40,7 +40,7 @@ fn no_step_gains_mechanical_energy() {
     for colors in [Colors::Unlimited, Colors::Limited(4), Colors::Limited(1)] {
         let mut grown = [0, 0];
         for step_guard in [true, false] {
-            let settings = SolverSettings { colors, step_guard, ..SolverSettings::default() };
+            let settings = SolverSettings { colors, step_guard, ..SolverSettings::xpbd() };
             let model = single_body::<f64>(&mesh, &material(SNH, 4e5, 0.45));
             let mut inputs = Inputs { gravity: GRAVITY, ..Inputs::default() };
             for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
@@ -71,7 +71,7 @@ fn no_step_gains_mechanical_energy() {
 #[test]
 fn no_step_gains_the_energy_that_tethers_store() {
     let mesh = block([0.08, 0.02, 0.02], [12, 3, 3], 0.2);
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let model = single_body::<f64>(&mesh, &material(SNH, 4e5, 0.45));
     let mut inputs = Inputs { gravity: GRAVITY, ..Inputs::default() };
     for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x < 1e-9) {
@@ -103,7 +103,7 @@ fn the_limit_leaves_well_solved_steps_alone() {
         let settings = SolverSettings {
             substeps: Count::Of(4),
             iterations: Count::Of(200),
-            ..SolverSettings::default()
+            ..SolverSettings::xpbd()
         };
         let model = single_body::<f64>(&mesh, &tissue);
         let mut run = Run::new(&model, &settings);

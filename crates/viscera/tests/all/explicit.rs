@@ -11,7 +11,7 @@ use viscera::state::State;
 const GRAVITY: Vec3<f64> = vec3(0.0, 0.0, -9.81);
 
 fn explicit() -> SolverSettings {
-    SolverSettings { method: Method::Explicit, ..SolverSettings::default() }
+    SolverSettings { method: Method::Explicit, ..SolverSettings::xpbd() }
 }
 
 /// Held where `x = 0`.
@@ -108,7 +108,7 @@ fn xpbd_with_small_substeps_moves_alike() {
     let norm = |path: &[Vec3<f64>]| path.iter().map(|u| u.length_squared()).sum::<f64>().sqrt();
     let truth = path(&explicit(), 1);
     let error = |substeps: u32| {
-        let settings = SolverSettings { iterations: Count::Of(8), ..SolverSettings::default() };
+        let settings = SolverSettings { iterations: Count::Of(8), ..SolverSettings::xpbd() };
         let path = path(&settings, substeps);
         let away: Vec<_> = path.iter().zip(&truth).map(|(a, b)| *a - *b).collect();
         norm(&away) / norm(&truth)
@@ -139,7 +139,7 @@ fn viscous_tissue_comes_to_the_right_rest() {
         };
         let explicit_rest = rest(&explicit(), 100, 1.0 / 60.0);
         let exact = rest(
-            &SolverSettings { iterations: Count::Of(20), ..SolverSettings::default() },
+            &SolverSettings { iterations: Count::Of(20), ..SolverSettings::xpbd() },
             100,
             1.0 / 60.0,
         );

@@ -63,7 +63,7 @@ fn model(law: MaterialModel, viscosity: f64) -> Model<f64> {
 }
 
 fn settings(explicit_safety: f64) -> SolverSettings {
-    SolverSettings { method: Method::Explicit, explicit_safety, ..SolverSettings::default() }
+    SolverSettings { method: Method::Explicit, explicit_safety, ..SolverSettings::xpbd() }
 }
 
 /// Viscosities [s] and springs [N/m]: none, either, both; each of them halves the step or more.

@@ -100,7 +100,7 @@ fn assert_agreement(name: &str, settings: &SolverSettings, length: Length) {
 /// Exact at rest, as published, every form, over-relaxed; coloured, cliques, Jacobi.
 fn assert_sweeps_agree(length: impl Fn(&str) -> Length) {
     let plain =
-        SolverSettings { step_guard: false, iterations: Count::Of(3), ..SolverSettings::default() };
+        SolverSettings { step_guard: false, iterations: Count::Of(3), ..SolverSettings::xpbd() };
     let published = SolverSettings { rebase: false, keep_multipliers: false, ..plain.clone() };
     let pair = SolverSettings { neo_hookean: NeoHookean::Pair, ..plain.clone() };
     let relaxed = SolverSettings {
@@ -138,7 +138,7 @@ fn portable_steps_agree_with_the_cpu() {
         step_guard: false,
         iterations: Count::Of(2),
         acceleration: Acceleration::Anderson,
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     let length = Length { tilts: LONG.tilts, ..BRIEF };
     for colors in [Colors::Limited(4), Colors::Limited(1)] {
@@ -152,7 +152,7 @@ fn portable_steps_agree_with_the_cpu() {
 /// Every acceleration by itself, as long as told by its name, with one colour and with many.
 fn assert_accelerations_agree(length: impl Fn(&str, Colors) -> Option<Length>) {
     let plain =
-        SolverSettings { step_guard: false, iterations: Count::Of(8), ..SolverSettings::default() };
+        SolverSettings { step_guard: false, iterations: Count::Of(8), ..SolverSettings::xpbd() };
     let anderson = SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() };
     let chebyshev = SolverSettings {
         acceleration: Acceleration::Chebyshev,
@@ -215,7 +215,7 @@ fn assert_same_bits_again(runs: usize, steps: u32) {
     let settings = SolverSettings {
         colors: Colors::Limited(4),
         acceleration: Acceleration::Anderson,
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     let model = everything();
     let run = |left_over: Option<f32>, steps| {
@@ -226,7 +226,7 @@ fn assert_same_bits_again(runs: usize, steps: u32) {
         bits(&model, &mut gpu.expect("a model that fits"), steps)
     };
     let first = run(None, steps);
-    let other = SolverSettings::default();
+    let other = SolverSettings::xpbd();
     let other_model = everything();
     let mut another = GpuSolver::new(device(), &other_model, &other).expect("a model that fits");
     for again in 1..runs {
@@ -256,7 +256,7 @@ fn dispatches_of_an_iteration_are_few() {
         colors: Colors::Limited(1),
         rebase: false,
         keep_multipliers: false,
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     let mut builder = ModelBuilder::new();
     let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
@@ -277,7 +277,7 @@ fn dispatches_of_an_iteration_are_few() {
 fn iterations_can_be_set_from_step_to_step() {
     let ends = [5, 2].map(|built_with| {
         let settings =
-            SolverSettings { iterations: Count::Of(built_with), ..SolverSettings::default() };
+            SolverSettings { iterations: Count::Of(built_with), ..SolverSettings::xpbd() };
         let (model, double) = (everything(), everything());
         let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
         gpu.set_iterations(5);
@@ -291,7 +291,7 @@ fn iterations_can_be_set_from_step_to_step() {
 
 /// Frames come while steps go on; none is older than the one before it.
 fn assert_frames_arrive(steps: u32) {
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let (model, double) = (everything(), everything());
     let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
     let (mut seen, mut refused) = (Vec::new(), 0);
@@ -330,7 +330,7 @@ fn frames_arrive_without_waiting_at_length() {
 /// A window's device that was opened with less than the baseline is refused, not met with a panic.
 #[test]
 fn a_device_below_the_baseline_is_refused() {
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let weak =
         device_within(wgpu::Limits { max_storage_buffers_per_shader_stage: 4, ..baseline() });
     let error = GpuSolver::new(&weak, &everything(), &settings).expect_err("too weak");
@@ -341,7 +341,7 @@ fn a_device_below_the_baseline_is_refused() {
 /// A model over the limits is refused before anything is allocated, with the numbers.
 #[test]
 fn a_model_over_the_limits_is_refused() {
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let limits = wgpu::Limits { max_storage_buffer_binding_size: 1 << 13, ..baseline() };
     let small = device_within(limits);
     let error = GpuSolver::new(&small, &everything(), &settings).expect_err("too large");
@@ -352,7 +352,7 @@ fn a_model_over_the_limits_is_refused() {
 
 /// A step begun by the CPU and ended by the device, for every stage that it may change hands at.
 fn assert_hands_change(iterations: u32, before: u32) {
-    let guarded = SolverSettings { iterations: Count::Of(iterations), ..SolverSettings::default() };
+    let guarded = SolverSettings { iterations: Count::Of(iterations), ..SolverSettings::xpbd() };
     let plain = SolverSettings { step_guard: false, ..guarded.clone() };
     let anderson = SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() };
     let mut hands = 0;
@@ -409,7 +409,7 @@ fn a_step_changes_hands_at_any_stage_at_length() {
 /// Another model than the solver's is an error, whatever is asked, and nothing panics.
 #[test]
 fn another_model_is_refused() {
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let model = everything();
     let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
     let mut builder = ModelBuilder::new();
@@ -433,7 +433,7 @@ fn small_soft_tetrahedra_are_joined_as_any_others() {
         acceleration: Acceleration::Anderson,
         iterations: Count::Of(4),
         step_guard: false,
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     let mesh = block([0.006, 0.003, 0.003], [6, 3, 3], 0.1);
     let models = |_: ()| {

@@ -18,7 +18,7 @@ const STEPS: u32 = 6;
 fn explicit(colors: Colors) -> SolverSettings {
     // Accelerations are for sweeps: the explicit method leaves them alone.
     let acceleration = Acceleration::Anderson;
-    SolverSettings { method: Method::Explicit, acceleration, colors, ..SolverSettings::default() }
+    SolverSettings { method: Method::Explicit, acceleration, colors, ..SolverSettings::xpbd() }
 }
 
 /// A wall that moves and is let go, one attached vertex held for a while, a force, anchors that drift and

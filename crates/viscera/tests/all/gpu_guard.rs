@@ -141,7 +141,7 @@ fn walls(places: &[Vec3<f64>], step: u32) -> Inputs<f64> {
 /// In quiet motion the device strays from double precision by round-off alone, as the CPU does.
 fn assert_quiet_motion_agrees(steps: u32) {
     let device = device();
-    let plain = SolverSettings::default();
+    let plain = SolverSettings::xpbd();
     let anderson = SolverSettings {
         acceleration: Acceleration::Anderson,
         iterations: Count::Of(6),
@@ -206,7 +206,7 @@ fn assert_grabs_are_taken_back(steps: u32, comes_to_rest: bool) {
     let device = device();
     let size = [0.06, 0.03, 0.03];
     let mesh = block(size, [3, 2, 2], 0.2);
-    let plain = SolverSettings::default();
+    let plain = SolverSettings::xpbd();
     let energy = SolverSettings {
         acceleration: Acceleration::Anderson,
         anderson_guard: AndersonGuard::Energy,
@@ -278,7 +278,7 @@ fn violent_grabs_are_taken_back_at_length() {
 #[test]
 fn portable_jumps_are_taken_back() {
     let mesh = block([0.04, 0.02, 0.02], [2, 1, 1], 0.1);
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let tissue = material(STVK, 1e4, 0.45);
     let model32 = single_body::<f32>(&mesh, &tissue);
     let model64 = single_body::<f64>(&mesh, &tissue);
@@ -313,7 +313,7 @@ fn portable_limit_that_is_no_number_lets_nothing_pass() {
         rebase_factor: 1e-30,
         start: Start::Previous,
         iterations: Count::Of(20),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     let mesh = block([0.02, 0.01, 0.01], [2, 1, 1], 0.1);
     let count = mesh.vertices().len();
@@ -377,7 +377,7 @@ fn assert_no_step_gains_energy(cells: [usize; 3], steps: u32) {
     let mut grown = [0, 0];
     let mut noise = 0.0;
     for (grown, step_guard) in grown.iter_mut().zip([true, false]) {
-        let settings = SolverSettings { step_guard, ..SolverSettings::default() };
+        let settings = SolverSettings { step_guard, ..SolverSettings::xpbd() };
         let model = single_body::<f32>(&mesh, &material(SNH, 4e5, 0.45));
         let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");
         let mut state = State::at_rest(&model);
@@ -414,7 +414,7 @@ fn no_step_gains_mechanical_energy_at_length() {
 #[test]
 fn two_runs_have_the_same_bits() {
     let device = device();
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let (model, places) = many_parts::<f32>();
     let run = || {
         let mut gpu = GpuSolver::new(device, &model, &settings).expect("a model that fits");

@@ -30,7 +30,7 @@ fn without_sweeps(neo_hookean: NeoHookean) -> SolverSettings {
         iterations: Count::Of(0),
         step_guard: false,
         neo_hookean,
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     }
 }
 
@@ -181,8 +181,7 @@ fn fillings_are_repaired_and_numbers_are_left_alone() {
 fn a_restart_takes_the_multipliers_from_the_positions() {
     let device = device::device();
     for neo_hookean in [NeoHookean::Stretch, NeoHookean::Pair] {
-        let settings =
-            SolverSettings { step_guard: false, neo_hookean, ..SolverSettings::default() };
+        let settings = SolverSettings { step_guard: false, neo_hookean, ..SolverSettings::xpbd() };
         let (model, model64) = (everything(), everything());
         let layout = Layout::new(&model, &settings);
         let state = scrambled(&layout);
@@ -249,7 +248,7 @@ fn two_repairs_have_the_same_bits() {
 /// A history of no numbers goes through all sweeps into all positions: the guard takes the step back, the
 /// repair starts a new history, and with time the body comes to the rest that it comes to anyway.
 fn assert_survival(rounds: u32, comes_to_rest: bool) {
-    let settings = SolverSettings { iterations: Count::Of(5), ..SolverSettings::default() };
+    let settings = SolverSettings { iterations: Count::Of(5), ..SolverSettings::xpbd() };
     let model = everything::<f32>();
     let inputs = inputs(&model);
     let mut gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");

@@ -112,7 +112,7 @@ fn assert_quiet_is_left_alone(
 /// By shares and by descents, and where the CPU does.
 #[test]
 fn a_body_beside_one_in_trouble_has_the_bits_it_has_alone_on_a_device() {
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let taken_back = assert_quiet_is_left_alone("coloured", &settings, &TROUBLES, 11);
     assert!(taken_back.iter().all(|body| body.device > 0 && body.device == body.cpu));
     assert!(taken_back[0].shares > 0 && taken_back[0].descents > 0, "{taken_back:?}");

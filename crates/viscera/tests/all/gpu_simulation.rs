@@ -63,7 +63,9 @@ step_guard = false
 "#;
 
 fn assembled(overrides: &[(&str, &str)]) -> (Scene, Assembly) {
-    let scene = Scene::parse("scene.toml", SCENE, overrides);
+    // Both backends compute it.
+    let overrides = [&[("solver.method", "xpbd")], overrides].concat();
+    let scene = Scene::parse("scene.toml", SCENE, &overrides);
     let scene = scene.unwrap_or_else(|error| panic!("{error}"));
     let assembly = Assembly::new(&scene, &mut |name| Err(format!("no file {name}")));
     (scene, assembly.unwrap_or_else(|error| panic!("{error}")))

@@ -93,7 +93,7 @@ impl Bodies {
 }
 
 fn settings() -> SolverSettings {
-    SolverSettings { step_guard: false, ..SolverSettings::default() }
+    SolverSettings { step_guard: false, ..SolverSettings::xpbd() }
 }
 
 /// Falls for some steps, held at a few vertices of both bodies.

@@ -36,12 +36,11 @@ fn timed_steps_are_ordinary_steps() {
         colors: Colors::Limited(1),
         acceleration: Acceleration::Anderson,
         iterations: Count::Of(5),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
-    let explicit = SolverSettings { method: Method::Explicit, ..SolverSettings::default() };
-    let one = SolverSettings { iterations: Count::Of(1), ..SolverSettings::default() };
-    for (settings, dt) in
-        [(SolverSettings::default(), DT), (anderson, DT), (one, DT), (explicit, 0.2)]
+    let explicit = SolverSettings { method: Method::Explicit, ..SolverSettings::xpbd() };
+    let one = SolverSettings { iterations: Count::Of(1), ..SolverSettings::xpbd() };
+    for (settings, dt) in [(SolverSettings::xpbd(), DT), (anderson, DT), (one, DT), (explicit, 0.2)]
     {
         let model = bar();
         let inputs = Inputs { gravity: vec3(0.3, 0.0, -9.81), ..Inputs::default() };
@@ -79,7 +78,7 @@ fn timed_steps_are_ordinary_steps() {
 
 #[test]
 fn no_steps_take_no_time() {
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let model = bar();
     let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
     let before = bits(&gpu, &model);

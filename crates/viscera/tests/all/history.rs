@@ -23,7 +23,7 @@ fn a_new_history_of_a_settled_body_changes_nothing() {
     let settings = SolverSettings {
         substeps: Count::Of(1),
         iterations: Count::Of(10),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     let mut run = Run::new(&model, &settings);
     for _ in 0..120 {
@@ -45,7 +45,7 @@ fn a_new_history_of_a_settled_body_changes_nothing() {
 #[test]
 fn a_scrambled_body_returns_to_its_rest() {
     let model = everything::<f32>();
-    let mut run = Run::new(&model, &SolverSettings::default());
+    let mut run = Run::new(&model, &SolverSettings::xpbd());
     let settle = |run: &mut Run<f32>| {
         for _ in 0..60 {
             run.frame(&gravity(), 0.8);
@@ -70,7 +70,7 @@ fn a_scrambled_body_returns_to_its_rest() {
 fn multipliers_that_are_no_numbers_start_a_new_history() {
     let model = everything::<f32>();
     for broken in [f32::NAN, f32::INFINITY, f32::MAX] {
-        let mut run = Run::new(&model, &SolverSettings::default());
+        let mut run = Run::new(&model, &SolverSettings::xpbd());
         for _ in 0..60 {
             run.frame(&gravity(), 0.8);
         }

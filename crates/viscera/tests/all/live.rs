@@ -150,7 +150,8 @@ fn a_hold_pulls_and_its_force_is_reported() {
         sum + (target - simulation.state().positions[v as usize]) * (1.0 / patch.len() as f64)
     });
     let expected = mean * 150.0;
-    assert!((Vec3::from_f64(force.force) - expected).length() < 1e-12 && expected.z > 0.1);
+    let off = (Vec3::from_f64(force.force) - expected).length();
+    assert!(off < 1e-12 && expected.length() > 0.05, "{off} N, {expected:?}");
     let shown = simulation.hold(hold).expect("it holds");
     assert!((shown.force - expected).length() < 1e-12);
     assert!((shown.target - shown.place - mean).length() < 1e-15);
@@ -200,7 +201,7 @@ fn reset_is_a_new_run_with_the_settings_of_the_hand() {
 #[test]
 fn counts_go_back_to_automatic_ones() {
     let there_and_back = |iterations: &str, substeps: &str| {
-        let mut changed: Simulation<f32> = simulation(BAR, &[]);
+        let mut changed: Simulation<f32> = simulation(BAR, &[("solver.method", "xpbd")]);
         for counts in [["7", "3"], [iterations, substeps]] {
             let [iterations, substeps] = counts;
             let counts = [("solver.iterations", iterations), ("solver.substeps", substeps)];
@@ -210,7 +211,7 @@ fn counts_go_back_to_automatic_ones() {
         changed
     };
     let automatic = there_and_back("\"auto\"", "auto");
-    assert_eq!(automatic.scene().solver, SolverSettings::default());
+    assert_eq!(automatic.scene().solver, SolverSettings::xpbd());
     let numbers = there_and_back("2", "10");
     assert_eq!(automatic.state().positions, numbers.state().positions);
 }

@@ -82,7 +82,7 @@ fn a_bar_displaced_by_a_share_of_its_solution_is_said_to_be_softer_by_that_share
     const LONG: f64 = 1e4;
     const DT: f64 = 1.0 / 60.0;
     let mesh = block([0.06, 0.02, 0.02], [3, 1, 1], 0.1);
-    let settings = SolverSettings { iterations: Count::Of(20), ..SolverSettings::default() };
+    let settings = SolverSettings { iterations: Count::Of(20), ..SolverSettings::xpbd() };
     for law in [STVK, SNH] {
         let model: Model<f64> = single_body(&mesh, &material(law, YOUNG, POISSON));
         let wall = (0u32..).zip(mesh.vertices()).filter(|(_, x)| x.x < 1e-9);

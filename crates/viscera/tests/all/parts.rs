@@ -179,27 +179,27 @@ fn viscous(body: Body) -> Body {
 }
 
 pub fn methods() -> Vec<(&'static str, SolverSettings)> {
-    let plain_steps = SolverSettings::default();
-    let colored = |colors| SolverSettings { colors, ..SolverSettings::default() };
+    let plain_steps = SolverSettings::xpbd();
+    let colored = |colors| SolverSettings { colors, ..SolverSettings::xpbd() };
     let anderson = |anderson_on, anderson_guard| SolverSettings {
         acceleration: Acceleration::Anderson,
         anderson_on,
         anderson_guard,
         iterations: Count::Of(6),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     // Passes and pairs are chosen by Poisson's ratio: the two bodies have others.
     let quasi_newton = |integrator| SolverSettings {
         method: Method::QuasiNewton,
         integrator,
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     let chebyshev = |chebyshev_delay, chebyshev_damping| SolverSettings {
         acceleration: Acceleration::Chebyshev,
         chebyshev_delay,
         chebyshev_damping,
         iterations: Count::Of(5),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     };
     vec![
         ("coloured", plain_steps.clone()),
@@ -245,7 +245,7 @@ fn assert_trouble_stays<S: Real>((name, settings): &(&str, SolverSettings), fate
     let tracks = same_as_alone::<S>([&beam(Fate::Quiet), &neighbour(fate)], name, settings);
     let [quiet, troubled] = tracks.map(|track| rejected(&track));
     println!("{name}, {fate:?}, {}: {quiet} and {troubled} of {STEPS} taken back", S::NAME);
-    if *settings == SolverSettings::default() {
+    if *settings == SolverSettings::xpbd() {
         assert!(quiet == 0 && troubled > 0, "{fate:?}: {quiet} and {troubled} taken back");
     }
 }
@@ -273,7 +273,7 @@ fn the_order_of_materials_in_a_model_does_not_matter_to_a_part() {
         for (v, x) in own.clone().zip(mesh.vertices()).filter(|(_, x)| x.x < 1e-9) {
             inputs.pins.push(Pin { vertex: v as u32, target: x.cast() });
         }
-        let settings = SolverSettings { method: Method::QuasiNewton, ..SolverSettings::default() };
+        let settings = SolverSettings { method: Method::QuasiNewton, ..SolverSettings::xpbd() };
         let mut solver = Solver::new(&model, &settings);
         let mut state = State::at_rest(&model);
         for _ in 0..4 {
@@ -342,7 +342,7 @@ fn a_body_beside_another_kind_has_the_bits_it_has_alone_at_length() {
 /// The strip has no copies where its neighbour has some: the one lies in a split model, and is not.
 #[test]
 fn a_body_is_split_where_it_would_be_alone() {
-    let settings = SolverSettings { colors: Colors::Limited(5), ..SolverSettings::default() };
+    let settings = SolverSettings { colors: Colors::Limited(5), ..SolverSettings::xpbd() };
     let mut builder = ModelBuilder::new();
     strip(Fate::Quiet).add(&mut builder);
     neighbour(Fate::Quiet).add(&mut builder);
@@ -375,7 +375,7 @@ fn threads_and_instructions_leave_every_bit_of_bodies_in_trouble() {
 /// elsewhere, where descents led.
 #[test]
 fn a_thrown_body_is_led_back_by_shares_and_by_descents() {
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let body = neighbour(Fate::Thrown);
     let mut builder = ModelBuilder::new();
     body.add(&mut builder);
@@ -424,7 +424,7 @@ fn a_thrown_body_is_led_back_by_shares_and_by_descents() {
 /// The report of a step is that of its worst part; a step counts as taken back once, for however many parts.
 #[test]
 fn the_report_of_a_step_speaks_for_every_part() {
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let bodies = [neighbour(Fate::Thrown), beam(Fate::Quiet), neighbour(Fate::Thrown)];
     let mut builder = ModelBuilder::new();
     bodies.iter().for_each(|body| body.add(&mut builder));

@@ -22,7 +22,7 @@ fn settings(integrator: Integrator, iterations: u32) -> SolverSettings {
         integrator,
         iterations: Count::Of(iterations),
         substeps: Count::Of(1),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     }
 }
 
@@ -303,7 +303,7 @@ fn swung(model: &Model<f64>, settings: &SolverSettings, steps: u32) -> Vec<Vec3<
 
 /// Twice the steps, a fourth of the error for SDIRK2, and half of it for implicit Euler.
 fn follows_motion(tissues: &[(MaterialModel, f64)], steps: &[u32]) {
-    let explicit = SolverSettings { method: Method::Explicit, ..SolverSettings::default() };
+    let explicit = SolverSettings { method: Method::Explicit, ..SolverSettings::xpbd() };
     for &(law, poisson) in tissues {
         let model = bar::<f64>(law, 2e4, poisson, [3, 1, 1]);
         // One small step each. Of first order: what is left of it after extrapolation is of second, in steps a

@@ -19,7 +19,7 @@ const BOTH: [Integrator; 2] = [Integrator::Sdirk2, Integrator::ImplicitEuler];
 const FRAME: f64 = 1.0 / 60.0;
 
 fn settings(integrator: Integrator) -> SolverSettings {
-    SolverSettings { method: Method::QuasiNewton, integrator, ..SolverSettings::default() }
+    SolverSettings { method: Method::QuasiNewton, integrator, ..SolverSettings::xpbd() }
 }
 
 /// Three bodies in two parts, springs and attachments between two of them, some viscous.

@@ -17,18 +17,19 @@ struct Row {
 
 /// The lines of the table; one that lists several budgets has as many forces.
 fn rows() -> Vec<Row> {
-    let start = README.find("| substeps x iterations |").expect("the table");
+    let start = README.find("| method, substeps x iterations |").expect("the table");
     let lines = README[start..].lines().skip(2).take_while(|line| line.starts_with('|'));
     let mut rows = Vec::new();
     for line in lines {
         let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
         let [budgets, colors, forces] = cells[..] else { panic!("{line}") };
-        let (published, budgets) = match budgets.strip_prefix("as published: ") {
+        let budgets = budgets.trim_start_matches("XPBD, ");
+        let (published, budgets) = match budgets.strip_prefix("XPBD as published, ") {
             Some(budgets) => (true, budgets),
             None => (false, budgets),
         };
         let colors = match colors.split(' ').next() {
-            Some("unlimited") => "unlimited",
+            Some("unlimited" | "-") => "unlimited",
             Some("4") => "4",
             Some("1") => "1",
             _ => panic!("{line}"),
@@ -44,9 +45,12 @@ fn rows() -> Vec<Row> {
 
 /// The force [N] at the end of a run.
 fn retractor<S: Real>(row: &Row) -> f64 {
-    let (substeps, iterations) = row.budget.split_once(" x ").expect("a budget");
+    let automatic = ("\"auto\"", "\"auto\"");
+    let (substeps, iterations) = row.budget.split_once(" x ").unwrap_or(automatic);
+    let method = if row.budget == "automatic" { "auto" } else { "xpbd" };
     let form = if row.published { "false" } else { "true" };
     let settings = [
+        ("solver.method", method),
         ("solver.substeps", substeps),
         ("solver.iterations", iterations),
         ("solver.colors", row.colors),
@@ -85,8 +89,8 @@ fn check(rows: &[Row]) {
 #[test]
 fn the_force_in_the_readme_is_that_of_a_run() {
     let rows = rows();
-    assert_eq!(rows.len(), 8);
-    check(&rows[..1]);
+    assert_eq!(rows.len(), 9);
+    check(&rows[..2]);
 }
 
 #[test]

@@ -5,7 +5,8 @@ use viscera::mesh::{TetMesh, shapes};
 use viscera::scalar::{Vec3, vec3};
 use viscera::scene::{BodyShape, Scene, SceneError, Selector, describe_markdown, describe_text};
 use viscera::settings::{
-    Acceleration, AndersonGuard, Colors, Count, DeviceRequest, Precision, SolverSettings, Start,
+    Acceleration, Accuracy, AndersonGuard, Colors, Count, DeviceRequest, Method, Precision,
+    SolverSettings, Start,
 };
 
 const SHIPPED: [(&str, &str); 5] = [
@@ -179,6 +180,7 @@ fn every_key_arrives_in_si_units() {
 #[test]
 fn defaults_are_those_declared() {
     let solver = SolverSettings::default();
+    assert_eq!((solver.method, solver.accuracy), (Method::Auto, Accuracy::Standard));
     assert_eq!((solver.substeps, solver.iterations), (Count::Auto, Count::Auto));
     assert_eq!((solver.precision, solver.colors), (Precision::F32, Colors::Unlimited));
     assert_eq!((solver.start, solver.anderson_guard), (Start::Auto, AndersonGuard::Residual));
@@ -315,8 +317,8 @@ fn describe_lists_every_key_and_documents_it() {
     let (text, markdown) = (describe_text(), describe_markdown());
     let written = EVERYTHING.split(['\n', '{', ',']).filter_map(|part| part.split_once('='));
     let keys: Vec<_> = written.map(|(key, _)| key.trim()).collect();
-    let solver = SolverSettings::default().values();
-    assert!(keys.len() > 60 && solver.len() == 25);
+    let solver = SolverSettings::xpbd().values();
+    assert!(keys.len() > 60 && solver.len() == 26);
     for key in keys.into_iter().chain(solver.iter().map(|(key, _)| *key)) {
         assert!(text.contains(&format!("\n    {key}\n")), "{key}");
         assert!(markdown.contains(&format!("| `{key}` |")), "{key}");

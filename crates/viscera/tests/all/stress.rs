@@ -44,7 +44,7 @@ fn violent_grabs_end_in_numbers() {
         (5, Colors::Limited(1), Acceleration::None),
         (5, Colors::Unlimited, Acceleration::Anderson),
     ] {
-        let settings = SolverSettings { colors, acceleration, ..SolverSettings::default() };
+        let settings = SolverSettings { colors, acceleration, ..SolverSettings::xpbd() };
         let model = single_body::<f32>(&mesh, &material(SNH, 1e4, 0.45));
         let (mut grabbed, mut ended, mut worst_end, mut farthest) = (0, 0, 0, 0.0f64);
         let outside = Outside::new::<f32>(&mesh, 1e4, 0.45, 1000.0);
@@ -143,7 +143,7 @@ fn workbench() -> (Model<f32>, State<f32>, Solver<f32>) {
     builder.add_attachment(0, mesh.vertices()[0], 10.0).expect("an attachment");
     builder.add_attachment(1, mesh.vertices()[1], 10.0).expect("an attachment");
     let model = builder.build().expect("a model");
-    let solver = Solver::new(&model, &SolverSettings::default());
+    let solver = Solver::new(&model, &SolverSettings::xpbd());
     let state = solver.state_at_rest();
     (model, state, solver)
 }
@@ -243,7 +243,7 @@ fn a_solver_made_for_another_model_is_refused() {
         build(SNH, 0.0, &[[0, 2]]),
     ];
     for acceleration in [Acceleration::None, Acceleration::Chebyshev, Acceleration::Anderson] {
-        let settings = SolverSettings { acceleration, ..SolverSettings::default() };
+        let settings = SolverSettings { acceleration, ..SolverSettings::xpbd() };
         for (i, made_for) in models.iter().enumerate() {
             let mut solver = Solver::new(made_for, &settings);
             for (j, model) in models.iter().enumerate() {
@@ -268,7 +268,7 @@ fn a_solver_made_for_another_model_is_refused() {
 #[test]
 fn a_model_changed_behind_its_back_is_refused() {
     let (model, ..) = workbench();
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let changes: [fn(&mut Model<f32>); 7] = [
         |model| model.rest_positions.truncate(3),
         |model| model.masses.truncate(3),
@@ -314,7 +314,7 @@ fn elements_that_cannot_be_are_refused() {
     assert!(builder.add_attachment(8, Vec3::ZERO, 1.0).is_err());
     let model = builder.build::<f64>().expect("a legal model");
     assert_eq!(model.tet_count(), mesh.tets().len());
-    let none = SolverSettings { colors: Colors::Limited(0), ..SolverSettings::default() };
+    let none = SolverSettings { colors: Colors::Limited(0), ..SolverSettings::xpbd() };
     assert_eq!(Layout::new(&model, &none).color_count, 1, "zero colours mean one");
     let mut add = |ends, constants: &[f64], anchor| {
         builder.add_element::<Springs, 2, 1>(ends, constants, anchor).is_err()
@@ -332,7 +332,7 @@ fn elements_that_cannot_be_are_refused() {
 fn a_body_without_vertices_does_nothing() {
     let model = single_body::<f32>(&TetMesh::default(), &material(SNH, 1e4, 0.4));
     for acceleration in [Acceleration::None, Acceleration::Chebyshev, Acceleration::Anderson] {
-        let settings = SolverSettings { acceleration, ..SolverSettings::default() };
+        let settings = SolverSettings { acceleration, ..SolverSettings::xpbd() };
         Run::new(&model, &settings).frame(&Inputs::default(), 1.0);
     }
 }
@@ -345,7 +345,7 @@ fn one_tet() -> TetMesh {
 
 /// Settings at the ends of their ranges, and beyond where the type allows it.
 fn odd_settings() -> Vec<SolverSettings> {
-    let default = SolverSettings::default();
+    let default = SolverSettings::xpbd();
     let anderson = SolverSettings {
         acceleration: Acceleration::Anderson,
         iterations: Count::Of(30),
@@ -476,7 +476,7 @@ fn a_tissue_of_any_size_stays_finite() {
             for (v, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x.x == 0.0) {
                 inputs.pins.push(Pin { vertex: v as u32, target: x.cast() });
             }
-            let mut run = Run::new(&model, &SolverSettings::default());
+            let mut run = Run::new(&model, &SolverSettings::xpbd());
             for _ in 0..30 {
                 run.frame(&inputs, 1.0);
             }

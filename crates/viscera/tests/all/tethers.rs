@@ -81,13 +81,13 @@ fn path(law: MaterialModel, settings: &SolverSettings, attached: bool) -> Vec<Ve
 fn tethers_move_tissue_as_attachments_do() {
     // Converged steps: both are implicit Euler, with the same energies. What is left is what 300 iterations
     // leave, far below the millimetres of the motion; the explicit method has no iterations at all.
-    let many = SolverSettings { iterations: Count::Of(300), ..SolverSettings::default() };
+    let many = SolverSettings { iterations: Count::Of(300), ..SolverSettings::xpbd() };
     let anderson = SolverSettings {
         acceleration: Acceleration::Anderson,
         colors: Colors::Limited(1),
         ..many.clone()
     };
-    let explicit = SolverSettings { method: Method::Explicit, ..SolverSettings::default() };
+    let explicit = SolverSettings { method: Method::Explicit, ..SolverSettings::xpbd() };
     for law in [SNH, STVK] {
         for (settings, allowed) in [(&many, 1e-8), (&anderson, 1e-6), (&explicit, 1e-9)] {
             let [tethers, attachments] = [false, true].map(|kind| path(law, settings, kind));
@@ -101,7 +101,7 @@ fn tethers_move_tissue_as_attachments_do() {
 
 #[test]
 fn a_tether_pulls_with_stiffness_times_distance_and_lets_go() {
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let model: Model<f64> = model(SNH, false);
     let mut solver = Solver::new(&model, &settings);
     let mut state = State::at_rest(&model);
@@ -142,7 +142,7 @@ fn a_tether_pulls_with_stiffness_times_distance_and_lets_go() {
 
 #[test]
 fn several_tethers_add_up_whatever_their_order_and_do_nothing_on_a_pinned_vertex() {
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let model: Model<f64> = model(SNH, false);
     let run = |order: &[usize], pinned: bool| {
         let mut inputs = inputs::<f64>(60, false);
@@ -171,7 +171,7 @@ fn several_tethers_add_up_whatever_their_order_and_do_nothing_on_a_pinned_vertex
 
 #[test]
 fn a_tether_that_cannot_be_is_refused_and_nothing_moves() {
-    let settings = SolverSettings::default();
+    let settings = SolverSettings::xpbd();
     let model: Model<f64> = model(SNH, false);
     let mut solver = Solver::new(&model, &settings);
     let mut state = State::at_rest(&model);
@@ -197,8 +197,8 @@ fn a_tether_that_cannot_be_is_refused_and_nothing_moves() {
 #[test]
 fn portable_tethers_on_the_device_agree_with_the_cpu() {
     let device = device();
-    let few = SolverSettings { iterations: Count::Of(4), ..SolverSettings::default() };
-    let explicit = SolverSettings { method: Method::Explicit, ..SolverSettings::default() };
+    let few = SolverSettings { iterations: Count::Of(4), ..SolverSettings::xpbd() };
+    let explicit = SolverSettings { method: Method::Explicit, ..SolverSettings::xpbd() };
     let published = SolverSettings {
         rebase: false,
         keep_multipliers: false,

@@ -300,7 +300,7 @@ fn stiffness_does_not_depend_on_substeps_or_iterations() {
             let settings = SolverSettings {
                 substeps: Count::Of(substeps),
                 iterations: Count::Of(iterations),
-                ..SolverSettings::default()
+                ..SolverSettings::xpbd()
             };
             let mut run = Run::new(&model, &settings);
             let (frames, tip) = settle(&mut run, &bar);
@@ -434,7 +434,7 @@ fn every_setting() -> Vec<SolverSettings> {
                     iterations: Count::Of(8),
                     chebyshev_delay: 2,
                     chebyshev_damping: 0.8,
-                    ..SolverSettings::default()
+                    ..SolverSettings::xpbd()
                 };
                 for on in [AndersonOn::Positions, AndersonOn::Multipliers, AndersonOn::Both] {
                     all.push(anderson(3, on, base.clone()));

@@ -40,7 +40,7 @@ impl<S: Real> Memory<S> {
             Method::Explicit => {
                 (MethodMemory::Explicit(explicit::Memory::new(layout, settings)), true)
             }
-            Method::QuasiNewton => {
+            Method::Auto | Method::QuasiNewton => {
                 let memory = quasi_newton::Memory::new(layout, settings);
                 (MethodMemory::QuasiNewton(Box::new(memory)), true)
             }

@@ -209,7 +209,7 @@ mod tests {
     /// counted on from loop to loop.
     #[test]
     fn loops_of_loops_are_iterations() {
-        let settings = SolverSettings { iterations: Count::Of(4), ..SolverSettings::default() };
+        let settings = SolverSettings { iterations: Count::Of(4), ..SolverSettings::xpbd() };
         let law = MaterialModel::SaintVenantKirchhoff;
         let model = everything(&settings, [law, law], 0.3);
         let plan = Plan::new(&model, &settings);

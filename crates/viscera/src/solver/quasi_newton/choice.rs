@@ -5,9 +5,17 @@ use crate::material::MaterialConstants;
 use crate::scalar::Real;
 use crate::settings::{Count, MOST_HISTORY, SolverSettings};
 
-/// Passes and pairs up to a Poisson's ratio: the fewest that follow a swinging bar of 1,280 and of 10,240 tetrahedra to
+/// Passes and pairs up to a Poisson's ratio, for [`STANDARD`]: the fewest that follow a swinging bar of 1,280 and of 10,240 tetrahedra to
 /// within about 4 %, with one step per frame (5 % at 0.49). What is nearly incompressible converges more slowly.
 const BY_POISSON: [(f64, u32, u32); 3] = [(0.41, 8, 3), (0.46, 10, 10), (0.5, 16, 10)];
+
+/// The error of motion that [`BY_POISSON`] is for.
+const STANDARD: f64 = 0.05;
+
+/// From an error of motion on: the passes, as a share of those of [`BY_POISSON`], and what solves that are cut short so leave
+/// of motion's error. Measured on bars and organs, as the rest here.
+const BY_ACCURACY: [(f64, f64, f64); 4] =
+    [(0.1, 0.6, 0.1), (0.03, 1.0, 0.03), (0.01, 1.25, 0.01), (0.0, 1.6, 0.005)];
 
 /// Passes per solve, and pairs that are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +32,7 @@ pub fn choose<'a, S: Real>(
     let (passes, pairs) = by_poisson(materials);
     let passes = match settings.iterations {
         Count::Of(count) => count,
-        Count::Auto => passes,
+        Count::Auto => (f64::from(passes) * by_accuracy(settings).0).ceil() as u32,
     };
     let history = if settings.history == 0 { pairs } else { settings.history };
     Choice { passes, history: (history as usize).min(MOST_HISTORY) }
@@ -63,25 +71,54 @@ fn by_poisson<'a, S: Real>(
     (passes, pairs)
 }
 
-/// Substeps of SDIRK2 that follow an oscillation of a period [s] to within about 4 % over half a second: its phase is
-/// off by a share of the squared step that was measured on bars and organs, and the more so the more periods there are. Stiffer
-/// bodies swing less than one sees; they take no more than [`MOST_SUBSTEPS`].
-pub fn substeps_for(period: f64, frame: f64) -> u32 {
-    let periods = 0.5 / period;
-    let steps_per_period = (PHASE_ERROR * periods / 0.04).sqrt().max(FEWEST_STEPS);
-    let substeps = (frame * steps_per_period / period).ceil();
-    // Also of a period that is infinite.
-    if substeps.is_finite() { (substeps as u32).clamp(1, MOST_SUBSTEPS) } else { 1 }
+/// The share of the passes, and what they leave of motion's error.
+fn by_accuracy(settings: &SolverSettings) -> (f64, f64) {
+    let share = settings.accuracy.share();
+    let last = BY_ACCURACY[BY_ACCURACY.len() - 1];
+    let (_, passes, left) = *BY_ACCURACY.iter().find(|(from, ..)| share >= *from).unwrap_or(&last);
+    (passes, left)
 }
+
+/// Substeps of SDIRK2 that follow an oscillation of a period [s] to within a share of its path over half a second. Stiffer
+/// bodies swing less than one sees; they take no more than [`MOST_SUBSTEPS`].
+pub fn substeps_for(period: f64, frame: f64, share: f64) -> u32 {
+    let periods = SECONDS / period;
+    let fewest = FEWEST_STEPS * (STANDARD / share).sqrt();
+    let steps_per_period = (PHASE_ERROR * periods / (PART_OF_PHASE * share)).sqrt().max(fewest);
+    let substeps = (frame * steps_per_period / period).ceil();
+    let most = f64::from(MOST_SUBSTEPS) * (STANDARD / share).sqrt().max(1.0);
+    // Also of a period that is infinite.
+    if substeps.is_finite() { (substeps.min(most) as u32).max(1) } else { 1 }
+}
+
+/// The error of motion over half a second that a run with so many substeps may be expected to have, as a share of its path,
+/// where its slowest oscillation has the period [s]: of its phase, or of solves that are cut short, whichever is larger.
+pub fn expected_motion_error(
+    settings: &SolverSettings,
+    period: f64,
+    frame: f64,
+    substeps: u32,
+) -> f64 {
+    let steps_per_period = period * f64::from(substeps) / frame;
+    let phase = PHASE_ERROR * (SECONDS / period) / (steps_per_period * steps_per_period);
+    let (_, left) = by_accuracy(settings);
+    phase.max(left).min(1.0)
+}
+
+/// Duration [s] of the motion whose error is asked for.
+const SECONDS: f64 = 0.5;
 
 /// Error of a path after one period, times the square of the number of steps in it: 5.6 on bars, up to 12 on organs, whose
 /// faster oscillations take part.
 const PHASE_ERROR: f64 = 12.0;
 
-/// Steps in a period at least.
+/// The part of the error that is the phase's; the rest is left to solves.
+const PART_OF_PHASE: f64 = 0.8;
+
+/// Steps in a period at least, for [`STANDARD`].
 const FEWEST_STEPS: f64 = 13.0;
 
-/// Substeps that are chosen at most.
+/// Substeps that are chosen at most, for [`STANDARD`]; more where less error is asked for.
 const MOST_SUBSTEPS: u32 = 10;
 
 #[cfg(test)]

@@ -39,7 +39,7 @@ use crate::solver::step::potential::Evaluator;
 use crate::solver::step::stage::StepStage;
 use crate::state::{Learned, State};
 use choice::{Choice, choose_by_part};
-pub use choice::{choose, substeps_for};
+pub use choice::{choose, expected_motion_error, substeps_for};
 use evaluate::{Evaluation, Way};
 use parts::{Phase, Progress};
 use preconditioner::Preconditioner;

@@ -376,7 +376,7 @@ mod tests {
     /// Armijo's condition decides where `Phi` changes by less than 1e-4 of what the slope promises.
     #[test]
     fn a_descent_delivers_its_share_of_what_the_slope_promises() {
-        let (settings, inputs) = (SolverSettings::default(), Inputs::default());
+        let (settings, inputs) = (SolverSettings::xpbd(), Inputs::default());
         let (model, places) = swollen(&settings);
         // What a whole step changes, of what its slope promises: -1/2 in short steps.
         let change = |dt: f64| {

@@ -155,7 +155,7 @@ mod tests {
     #[test]
     fn repaired_multipliers_are_the_forces_of_the_elements() {
         for neo_hookean in [NeoHookean::Stretch, NeoHookean::Pair] {
-            let settings = SolverSettings { neo_hookean, ..SolverSettings::default() };
+            let settings = SolverSettings { neo_hookean, ..SolverSettings::xpbd() };
             let model = everything(&settings, [SaintVenantKirchhoff, StableNeoHookean], 0.4);
             let inputs = Inputs::default();
             let step = quiet(&model, &inputs, &settings, 1e-2);

@@ -157,7 +157,7 @@ mod tests {
     /// the potential. Without a Poisson's ratio `a~` is its diagonal.
     #[test]
     fn the_norm_of_multipliers_is_the_energy_of_their_elements() {
-        let settings = SolverSettings::default();
+        let settings = SolverSettings::xpbd();
         let model = everything(&settings, [SaintVenantKirchhoff; 2], 0.0);
         let inputs = Inputs::default();
         let step = quiet(&model, &inputs, &settings, 1e-2);

@@ -132,13 +132,13 @@ pub fn exact(iterations: u32) -> SolverSettings {
     SolverSettings {
         substeps: Count::Of(1),
         iterations: Count::Of(iterations),
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     }
 }
 
 /// The defaults with other colours.
 pub fn colored(colors: Colors) -> SolverSettings {
-    SolverSettings { colors, ..SolverSettings::default() }
+    SolverSettings { colors, ..SolverSettings::xpbd() }
 }
 
 /// XPBD as published: multipliers from zero, no rebase.
@@ -148,7 +148,7 @@ pub fn plain(substeps: u32, iterations: u32) -> SolverSettings {
         iterations: Count::Of(iterations),
         rebase: false,
         keep_multipliers: false,
-        ..SolverSettings::default()
+        ..SolverSettings::xpbd()
     }
 }
 

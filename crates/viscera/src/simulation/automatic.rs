@@ -1,0 +1,84 @@
+//! What `method = "auto"` stands for in a scene, and the errors that the chosen settings lead one to expect.
+
+use super::Assembly;
+use super::holding::GraspOrigins;
+use crate::model::Model;
+use crate::scalar::Real;
+use crate::scene::Scene;
+use crate::settings::{DeviceRequest, Integrator, Method, SolverSettings};
+use crate::solver::{Inputs, Solver, choose, expected_motion_error};
+
+/// From this error of motion on, steps of the quasi-Newton method are the only choice: they are guarded, and the explicit
+/// method's are no more than stable.
+const GUARDED_FROM: f64 = 0.01;
+
+/// Cost of a pass of the quasi-Newton method over that of a small explicit step: measured with 1,000 to 100,000
+/// tetrahedra, AVX2.
+const PASS_OVER_SMALL_STEP: f64 = 2.0;
+
+/// Passes that a step of the quasi-Newton method costs besides those of its solves.
+const BESIDES: f64 = 3.0;
+
+/// The errors that a run's settings lead one to expect, as shares of the displacement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExpectedErrors {
+    /// Of motion over half a second; nothing where the method tells none.
+    pub motion: Option<f64>,
+    /// Where the tissue comes to rest.
+    pub at_rest: f64,
+}
+
+/// Inputs of a scene's fixings alone, which are always the same: what a hand holds comes and goes, and a run that is
+/// resumed or repeated has to choose the same.
+pub fn fixings<S: Real>(scene: &Scene, assembly: &Assembly) -> Inputs<S> {
+    let mut fixed = scene.clone();
+    fixed.motions.clear();
+    let mut inputs = Inputs::default();
+    GraspOrigins::default().act(&fixed, assembly, 0.0, &mut inputs);
+    inputs
+}
+
+/// The settings of a scene with a method in the place of "auto"; `on_device` where the caller has chosen a device.
+pub fn settings_of<S: Real>(
+    scene: &Scene,
+    assembly: &Assembly,
+    model: &Model<S>,
+    on_device: bool,
+) -> SolverSettings {
+    let asked = &scene.solver;
+    let named = !matches!(asked.device, DeviceRequest::Auto | DeviceRequest::Cpu);
+    if on_device || named {
+        return asked.chosen(Method::Xpbd);
+    }
+    let large = asked.chosen(Method::QuasiNewton);
+    if asked.method != Method::Auto || asked.accuracy.share() >= GUARDED_FROM {
+        return large;
+    }
+    let small = asked.chosen(Method::Explicit);
+    let inputs = fixings(scene, assembly);
+    let frame = scene.time.frame;
+    let substeps = Solver::new(model, &large).substeps(&inputs, frame);
+    let passes = f64::from(2 * choose(&large, &model.materials).passes) + BESIDES;
+    let small_steps = (frame / Solver::new(model, &small).stable_step()).ceil();
+    let cheaper = small_steps < PASS_OVER_SMALL_STEP * passes * f64::from(substeps);
+    if cheaper { small } else { large }
+}
+
+/// What a run with `substeps` per frame may be expected to be off by, where its slowest oscillation has the period [s].
+pub fn expected_errors(
+    settings: &SolverSettings,
+    period: f64,
+    frame: f64,
+    substeps: u32,
+) -> ExpectedErrors {
+    match settings.method {
+        Method::Auto | Method::QuasiNewton => {
+            let follows = settings.integrator == Integrator::Sdirk2;
+            let motion = expected_motion_error(settings, period, frame, substeps);
+            ExpectedErrors { motion: follows.then_some(motion), at_rest: 2e-3 }
+        }
+        Method::Explicit => ExpectedErrors { motion: Some(5e-3), at_rest: 2e-3 },
+        // Sweeps that are cut short lose motion by an amount that depends on tissue and mesh.
+        Method::Xpbd => ExpectedErrors { motion: None, at_rest: 1e-2 },
+    }
+}
