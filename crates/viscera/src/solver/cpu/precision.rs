@@ -220,7 +220,10 @@ mod tests {
         let is_loop = |node: &Node| matches!(node, Node::Repeat(_));
         let place = plan.nodes.iter().position(is_loop).expect("an iteration");
         let body = plan.iteration().expect("an iteration").body.clone();
-        let twice = |body| Node::Repeat(Repeat { most: Times::Count(2), until: None, body });
+        let twice = |body| {
+            let most = Times::Count(2);
+            Node::Repeat(Repeat { most, until: None, is_watched: true, body })
+        };
         let with = |loops: Vec<Node>| {
             let mut plan = plan.clone();
             plan.nodes.splice(place..=place, loops);
