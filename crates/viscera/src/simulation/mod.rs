@@ -144,6 +144,7 @@ impl<S: Real> Simulation<S> {
         assembly: Assembly,
         choose: impl FnOnce(&Model<S>, &SolverSettings, f64) -> Result<Backend<S>, SimulationError>,
     ) -> Result<Self, SimulationError> {
+        check_patches(&scene, &assembly)?;
         let model = assembly.builder.build::<S>()?;
         let mut simulation = Self {
             state: State::at_rest(&model),
@@ -387,6 +388,28 @@ impl<S: Real> Simulation<S> {
             deformation: summarize_deformation(&self.tets),
             patches: self.patch_forces(),
         }
+    }
+}
+
+/// Whether the patches are those of the scene and name vertices that there are. Numbers of vertices stay what they are as
+/// materials change and bodies are added, so that patches do not depend on the model's revision.
+fn check_patches(scene: &Scene, assembly: &Assembly) -> Result<(), SimulationError> {
+    for (what, found, expected) in [
+        ("bodies", assembly.bodies.len(), scene.bodies.len()),
+        ("fixings", assembly.fixings.len(), scene.fixings.len()),
+        ("motions", assembly.motions.len(), scene.motions.len()),
+        ("forces", assembly.forces.len(), scene.forces.len()),
+    ] {
+        if found != expected {
+            return Err(SimulationError::OtherScene { what, found, expected });
+        }
+    }
+    let vertex_count = assembly.builder.positions().len();
+    let patches = assembly.fixings.iter().chain(&assembly.motions).chain(&assembly.forces);
+    let mut vertices = patches.flat_map(|patch| patch.vertices.iter().copied());
+    match vertices.find(|&vertex| vertex as usize >= vertex_count) {
+        Some(vertex) => Err(SimulationError::Patch { vertex, vertex_count }),
+        None => Ok(()),
     }
 }
 
