@@ -22,6 +22,8 @@ mod probe;
 mod quasi_newton;
 mod report;
 mod step;
+#[cfg(test)]
+mod trial;
 mod xpbd;
 
 use std::sync::Arc;
