@@ -349,12 +349,11 @@ impl<S: Real> Simulation<S> {
         let substeps = self.substeps;
         let Self { scene, assembly, taken, model, state, inputs, backend, .. } = self;
         let before = backend.rejected_steps();
-        for substep in 1..=substeps {
+        backend.steps(model, state, inputs, dt, substeps, |substep, inputs| {
             let is_last = substep == substeps;
             let time = if is_last { end } else { start + f64::from(substep) * dt };
             taken.act(scene, assembly, time, inputs);
-            backend.step(model, state, inputs, dt)?;
-        }
+        })?;
         backend.read_frame(model, state)?;
         Ok(backend.rejected_steps() - before)
     }
