@@ -26,7 +26,7 @@ pub enum StepStage {
 }
 
 /// A stage of the step guard. `x_s` is the place that rejected steps are counted from, `Phi` the incremental potential.
-/// Every connected part is judged by itself; what is decided is in its record ([`super::control::PartGuard`]).
+/// Every connected part is judged by itself; what is decided is in its record, `PartGuard`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GuardStage {
     /// `x_s`: the best of three starts, whose incremental potential bounds the step; remembers the mechanical energy.
