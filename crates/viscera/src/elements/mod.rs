@@ -23,6 +23,8 @@ pub mod neo_hookean_pair;
 pub mod neo_hookean_stretch;
 pub mod singular_values;
 pub mod spring;
+#[cfg(test)]
+pub mod trial;
 #[cfg(feature = "gpu")]
 pub mod wgsl;
 

@@ -47,6 +47,12 @@ pub enum EmbeddingError {
         /// The length it must have.
         expected: usize,
     },
+    /// Other tetrahedra than those that it was made for, as many though their vertices are.
+    #[error("surface vertex {vertex} follows a tetrahedron that the body does not have")]
+    OtherTets {
+        /// The vertex, counted from 0.
+        vertex: usize,
+    },
 }
 
 impl Embedding {

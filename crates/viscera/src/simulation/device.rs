@@ -144,17 +144,22 @@ impl<S: Real> Backend<S> {
         }
     }
 
-    /// Advances by one step of `dt` [s].
-    pub fn step(
+    /// See [`Solver::steps`].
+    pub fn steps(
         &mut self,
         model: &Model<S>,
         state: &mut State<S>,
-        inputs: &Inputs<S>,
+        inputs: &mut Inputs<S>,
         dt: f64,
+        count: u32,
+        mut act: impl FnMut(u32, &mut Inputs<S>),
     ) -> Result<(), FrameError> {
         match &mut self.engine {
-            Engine::Cpu(solver) => Ok(solver.step(model, state, inputs, dt)?),
-            Engine::Device(device) => device.step(model, inputs, dt),
+            Engine::Cpu(solver) => Ok(solver.steps(model, state, inputs, dt, count, act)?),
+            Engine::Device(device) => (1..=count).try_for_each(|number| {
+                act(number, inputs);
+                device.step(model, inputs, dt)
+            }),
         }
     }
 

@@ -15,6 +15,26 @@ pub enum SimulationError {
     /// Its bodies make no model.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// Scene and assembly do not belong together.
+    #[error(
+        "the scene has {expected} {what} and the assembly {found}; assemble the scene that is simulated"
+    )]
+    OtherScene {
+        /// "bodies", "fixings", "motions" or "forces".
+        what: &'static str,
+        /// How many the assembly has.
+        found: usize,
+        /// How many the scene has.
+        expected: usize,
+    },
+    /// A patch of another assembly.
+    #[error("a patch names vertex {vertex}; the bodies have {vertex_count}")]
+    Patch {
+        /// The vertex.
+        vertex: u32,
+        /// How many vertices there are.
+        vertex_count: usize,
+    },
     /// A device was asked for that this build knows nothing of.
     #[error(
         "`device = \"{device}\"` needs the GPU backend, which was left out of this build; build with \

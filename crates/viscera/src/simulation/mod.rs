@@ -151,6 +151,7 @@ impl<S: Real> Simulation<S> {
         on_device: bool,
         choose: impl FnOnce(&Model<S>, &SolverSettings, f64) -> Result<Backend<S>, SimulationError>,
     ) -> Result<Self, SimulationError> {
+        check_patches(&scene, &assembly)?;
         let model = assembly.builder.build::<S>()?;
         let solver = automatic::settings_of(&scene, &assembly, &model, on_device);
         let mut simulation = Self {
@@ -364,12 +365,11 @@ impl<S: Real> Simulation<S> {
         let substeps = self.substeps;
         let Self { scene, assembly, taken, model, state, inputs, backend, .. } = self;
         let before = backend.rejected_steps();
-        for substep in 1..=substeps {
+        backend.steps(model, state, inputs, dt, substeps, |substep, inputs| {
             let is_last = substep == substeps;
             let time = if is_last { end } else { start + f64::from(substep) * dt };
             taken.act(scene, assembly, time, inputs);
-            backend.step(model, state, inputs, dt)?;
-        }
+        })?;
         backend.read_frame(model, state)?;
         Ok(backend.rejected_steps() - before)
     }
@@ -403,6 +403,28 @@ impl<S: Real> Simulation<S> {
             deformation: summarize_deformation(&self.tets),
             patches: self.patch_forces(),
         }
+    }
+}
+
+/// Whether the patches are those of the scene and name vertices that there are. Numbers of vertices stay what they are as
+/// materials change and bodies are added, so that patches do not depend on the model's revision.
+fn check_patches(scene: &Scene, assembly: &Assembly) -> Result<(), SimulationError> {
+    for (what, found, expected) in [
+        ("bodies", assembly.bodies.len(), scene.bodies.len()),
+        ("fixings", assembly.fixings.len(), scene.fixings.len()),
+        ("motions", assembly.motions.len(), scene.motions.len()),
+        ("forces", assembly.forces.len(), scene.forces.len()),
+    ] {
+        if found != expected {
+            return Err(SimulationError::OtherScene { what, found, expected });
+        }
+    }
+    let vertex_count = assembly.builder.positions().len();
+    let patches = assembly.fixings.iter().chain(&assembly.motions).chain(&assembly.forces);
+    let mut vertices = patches.flat_map(|patch| patch.vertices.iter().copied());
+    match vertices.find(|&vertex| vertex as usize >= vertex_count) {
+        Some(vertex) => Err(SimulationError::Patch { vertex, vertex_count }),
+        None => Ok(()),
     }
 }
 

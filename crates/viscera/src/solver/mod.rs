@@ -22,6 +22,8 @@ mod probe;
 mod quasi_newton;
 mod report;
 mod step;
+#[cfg(test)]
+mod trial;
 mod xpbd;
 
 use std::sync::Arc;
@@ -32,7 +34,7 @@ use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::settings::{Count, Method, SolverSettings};
 use crate::state::State;
-use cpu::precision::{Task, carry_out};
+use cpu::precision::{Task, Within, carry_out};
 pub use error::StepError;
 pub use inputs::{Inputs, Pin, Tether};
 use inputs::{check_inputs, check_model, check_state, check_step};
@@ -112,6 +114,41 @@ impl<S: Real> Solver<S> {
         dt: f64,
     ) -> Result<(), StepError> {
         self.step_first(usize::MAX, model, state, inputs, dt)
+    }
+
+    /// As `count` calls of [`Solver::step`], to the bit; `act` gets the number of each step, from 1 on, and puts what acts
+    /// in it into the inputs. The state is brought into the solver's order and back once. Where a step fails the state is
+    /// that of the step before it.
+    pub fn steps(
+        &mut self,
+        model: &Model<S>,
+        state: &mut State<S>,
+        inputs: &mut Inputs<S>,
+        dt: f64,
+        count: u32,
+        mut act: impl FnMut(u32, &mut Inputs<S>),
+    ) -> Result<(), StepError> {
+        for number in 1..=count {
+            act(number, inputs);
+            let checked = self.check(model, state, inputs, dt);
+            let Self { settings, plan, layout, memory } = self;
+            let small_steps = checked.and_then(|()| memory.repeats(layout, inputs, dt));
+            let step = Step { layout, inputs, dt, settings };
+            let small_steps = match small_steps {
+                Ok(small_steps) => small_steps,
+                Err(error) => {
+                    // Before the first there is nothing to give back.
+                    if number > 1 {
+                        carry_out(Task::Write, memory, &step, state);
+                    }
+                    return Err(error);
+                }
+            };
+            state.multipliers.resize(layout.multiplier_count, S::ZERO);
+            let within = Within { is_first: number == 1, is_last: number == count };
+            carry_out(Task::Within(plan, small_steps, within), memory, &step, state);
+        }
+        Ok(())
     }
 
     /// As [`Solver::step`]; shows the positions [m] of all vertices, the user's order, where the iteration

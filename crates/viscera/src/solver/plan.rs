@@ -7,14 +7,16 @@ use std::ops::ControlFlow;
 
 pub use super::explicit::stage::ExplicitStage;
 pub use super::quasi_newton::stage::{QuasiNewtonStage, Solve};
-pub use super::step::stage::StepStage;
-pub use super::xpbd::stage::XpbdStage;
+pub use super::step::stage::{GuardStage, StepStage};
+pub use super::xpbd::stage::{IterateStage, XpbdStage};
 
 /// One stage of a step, by the family that it belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Shared by all methods.
     Step(StepStage),
+    /// Of the step guard.
+    Guard(GuardStage),
     /// Of XPBD.
     Xpbd(XpbdStage),
     /// Of the explicit method.
@@ -28,6 +30,7 @@ impl Stage {
     pub fn name(&self) -> String {
         let text = match self {
             Self::Step(stage) => format!("{stage:?}"),
+            Self::Guard(stage) => format!("{stage:?}"),
             Self::Xpbd(stage) => format!("{stage:?}"),
             Self::Explicit(stage) => format!("{stage:?}"),
             Self::QuasiNewton(stage) => format!("{stage:?}"),
@@ -39,6 +42,12 @@ impl Stage {
 impl From<StepStage> for Stage {
     fn from(stage: StepStage) -> Self {
         Self::Step(stage)
+    }
+}
+
+impl From<GuardStage> for Stage {
+    fn from(stage: GuardStage) -> Self {
+        Self::Guard(stage)
     }
 }
 
@@ -89,6 +98,8 @@ pub struct Repeat {
     pub most: Times,
     /// Ends the loop before the first pass that finds it set.
     pub until: Option<Flag>,
+    /// Whether its passes are iterations or small steps, which an observer of the step is shown.
+    pub is_watched: bool,
     /// One pass.
     pub body: Vec<Node>,
 }
@@ -117,6 +128,8 @@ impl Times {
 pub enum Flag {
     /// Every part of the model has converged.
     AllDone,
+    /// The step guard lets no part descend.
+    NothingDescends,
 }
 
 /// Carries the stages of a plan out.
@@ -127,10 +140,10 @@ pub trait Visitor {
     /// Whether the flag is set. Asked before each pass through a body that has a flag.
     fn is_set(&self, flag: Flag) -> bool;
 
-    /// A loop begins.
+    /// A loop that is watched begins.
     fn begin_repeat(&mut self) {}
 
-    /// A pass through the body of a loop has ended.
+    /// A pass through the body of a loop that is watched has ended.
     fn end_pass(&mut self) {}
 }
 
@@ -203,14 +216,18 @@ fn walk(nodes: &[Node], small_steps: u32, visitor: &mut impl Visitor) -> Control
     for node in nodes {
         match node {
             Node::Run(stage) => visitor.run(stage)?,
-            Node::Repeat(Repeat { most, until, body }) => {
-                visitor.begin_repeat();
+            Node::Repeat(Repeat { most, until, is_watched, body }) => {
+                if *is_watched {
+                    visitor.begin_repeat();
+                }
                 for _ in 0..most.count(small_steps) {
                     if until.is_some_and(|flag| visitor.is_set(flag)) {
                         break;
                     }
                     walk(body, small_steps, visitor)?;
-                    visitor.end_pass();
+                    if *is_watched {
+                        visitor.end_pass();
+                    }
                 }
             }
         }
@@ -290,7 +307,7 @@ mod tests {
     }
 
     fn repeat(most: Times, until: Option<Flag>, body: Vec<Node>) -> Node {
-        Node::Repeat(Repeat { most, until, body })
+        Node::Repeat(Repeat { most, until, is_watched: true, body })
     }
 
     /// Loops one after the other and within each other.
@@ -329,6 +346,15 @@ mod tests {
         assert_eq!(Log::of(&plan, usize::MAX, 3), "0[1[23)4)5[6)6)7");
         // Before the inner loop of the second outer pass.
         assert_eq!(Log::of(&plan, usize::MAX, 8), "0[1[23)23)4)1[4)5[6)6)7");
+    }
+
+    #[test]
+    fn only_loops_that_are_watched_are_shown() {
+        let mut plan = nested(None);
+        let Node::Repeat(outer) = &mut plan.nodes[1] else { panic!("a loop") };
+        let Node::Repeat(inner) = &mut outer.body[1] else { panic!("a loop") };
+        inner.is_watched = false;
+        assert_eq!(Log::of(&plan, usize::MAX, 0), "0[123234)123234)123234)5[6)6)7");
     }
 
     #[test]

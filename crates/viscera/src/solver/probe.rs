@@ -44,9 +44,11 @@ pub(super) fn begun(step: &Step<'_, f64>, places: &[Vec3<f64>]) -> Memory<f64> {
         multiplier_dt: 0.0,
         learned: Default::default(),
     };
-    for stage in
-        [StepStage::ReadState, StepStage::MeasureStrain, StepStage::Predict(Start::Previous)]
-    {
+    for stage in [
+        StepStage::ReadState,
+        StepStage::MeasureStrain,
+        StepStage::Predict { start: Start::Previous, is_kept: true },
+    ] {
         memory.run(&stage.into(), step, &mut state);
     }
     memory

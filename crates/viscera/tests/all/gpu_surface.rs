@@ -163,6 +163,17 @@ fn surfaces_of_other_meshes_are_refused_and_bad_triangles_passed_over() {
     assert!(matches!(error, GpuError::Embedding(_)), "{error}");
     assert!(error.to_string().contains("tetrahedron vertices"), "{error}");
 
+    // As many vertices, but in tetrahedra of another order.
+    let mesh = &bodies.tets[0];
+    let turned: Vec<_> = mesh.tets().iter().rev().copied().collect();
+    let (other, _) = TetMesh::new(mesh.vertices().to_vec(), turned, mesh.regions().to_vec())
+        .expect("the same bar");
+    let embedding = Embedding::new(&other, &bodies.surfaces[0]).expect("a bound surface");
+    let stale = Skin { embedding: &embedding, ..bar };
+    let error = GpuSurface::new(&solver, &model, &[stale, ball]).expect_err("another mesh");
+    assert!(matches!(error, GpuError::Embedding(_)), "{error}");
+    assert!(error.to_string().contains("follows a tetrahedron"), "{error}");
+
     let count = bodies.surfaces[0].vertices.len() as u32;
     let mut triangles = bodies.surfaces[0].triangles.clone();
     triangles.push([0, 1, count]);

@@ -28,6 +28,42 @@ fn stepped(settings: &SolverSettings, iterations: u32) -> State<f64> {
     state
 }
 
+/// Steps in a row are steps one by one, to the bit, whatever acts in each; where one fails the state is that of the step
+/// before it.
+#[test]
+fn steps_in_a_row_are_steps() {
+    let of = |method| SolverSettings { method, ..exact(3) };
+    let anderson = SolverSettings { acceleration: Acceleration::Anderson, ..exact(3) };
+    let (explicit, quasi_newton) = (of(Method::Explicit), of(Method::QuasiNewton));
+    for settings in [plain(1, 3), exact(3), anderson, explicit, quasi_newton] {
+        let (model, calm) = bar();
+        let act = |number: u32, inputs: &mut Inputs<f64>| {
+            for (pin, moved) in inputs.pins.iter_mut().zip(&calm.pins) {
+                pin.target = moved.target + vec3(0.0, 0.0, 1e-4 * f64::from(number));
+            }
+            // A force that no step takes.
+            let force = if number == 4 { f64::NAN } else { 0.1 };
+            inputs.forces = vec![(0, vec3(force, 0.0, 0.0))];
+        };
+        let one_by_one = |count: u32| {
+            let (mut state, mut solver) = (State::at_rest(&model), Solver::new(&model, &settings));
+            let mut inputs = calm.clone();
+            for number in 1..=count {
+                act(number, &mut inputs);
+                solver.step(&model, &mut state, &inputs, 0.1 * FRAME).expect("a legal step");
+            }
+            state
+        };
+        for count in [1, 3, 5] {
+            let (mut state, mut solver) = (State::at_rest(&model), Solver::new(&model, &settings));
+            let mut inputs = calm.clone();
+            let done = solver.steps(&model, &mut state, &mut inputs, 0.1 * FRAME, count, act);
+            assert_eq!(done.is_ok(), count < 4, "{count}: {done:?}");
+            assert_eq!(state, one_by_one(count.min(3)), "{count} of {:?}", settings.method);
+        }
+    }
+}
+
 /// Who watches sees the start, every iterate, and at last what the step leaves; the step itself is the same
 /// to the bit, and so is one whose number of iterations is set later.
 #[test]

@@ -4,7 +4,7 @@ use crate::common::device;
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::scene::{Patch, Scene, Selector};
 use viscera::settings::{Place, SolverSettings};
-use viscera::simulation::{Assembly, LiveError, PatchKind, Simulation};
+use viscera::simulation::{Assembly, LiveError, PatchKind, Simulation, SimulationError};
 
 const BAR: &str = r#"
 [time]
@@ -35,6 +35,34 @@ fn simulation<S: Real>(text: &str, overrides: &[(&str, &str)]) -> Simulation<S> 
     let scene = Scene::parse("bar.toml", text, overrides).unwrap_or_else(|e| panic!("{e}"));
     let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned())).expect("an assembly");
     Simulation::new(scene, assembly).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// An assembly of another scene, and patches of another assembly, are refused.
+#[test]
+fn patches_of_other_meshes_are_refused() {
+    let scene = |text: &str| Scene::parse("bar.toml", text, &[]).unwrap_or_else(|e| panic!("{e}"));
+    let assemble = |scene: &Scene| {
+        Assembly::new(scene, &mut |file| Err(file.to_owned())).expect("an assembly")
+    };
+    let short = scene(BAR);
+    let fixing = "[[fixing]]\nname = \"end\"\nbody = \"bar\"\n\
+                  half_space = { point = [\"60 mm\", 0, 0], normal = [1, 0, 0] }\n";
+    let held_twice = scene(&format!("{BAR}\n{fixing}"));
+    let error = Simulation::<f32>::new(held_twice, assemble(&short)).expect_err("another scene");
+    let (what, found, expected) = ("fixings", 1, 2);
+    assert_eq!(error, SimulationError::OtherScene { what, found, expected });
+
+    let long = scene(&BAR.replace("60 mm", "120 mm"));
+    let mut of_long = Simulation::<f32>::new(long.clone(), assemble(&long)).expect("a bar");
+    let far = Selector::Nearest { point: vec3(0.12, 0.01, 0.01), count: 1 };
+    let hold = of_long.take_hold("hand", Patch { selector: far, ..tip() }, None).expect("a hold");
+    let foreign = of_long.assembly().motions[hold].clone();
+    let vertex = foreign.vertices[0];
+    let mut mixed = assemble(&short);
+    let vertex_count = mixed.builder.positions().len();
+    mixed.fixings[0] = foreign;
+    let error = Simulation::<f32>::new(short, mixed).expect_err("a patch of another assembly");
+    assert_eq!(error, SimulationError::Patch { vertex, vertex_count });
 }
 
 fn tip() -> Patch {

@@ -110,6 +110,7 @@ impl<S: Real> Memory<S> {
             // Both make all the passes that they are given.
             (Flag::AllDone, MethodMemory::Xpbd(_) | MethodMemory::Explicit(_)) => false,
             (Flag::AllDone, MethodMemory::QuasiNewton(memory)) => memory.is_all_done(),
+            (Flag::NothingDescends, _) => self.guard.as_ref().is_none_or(Guard::nothing_descends),
         }
     }
 
@@ -146,6 +147,11 @@ impl<S: Real> Memory<S> {
         let Self { data, guard, method, .. } = self;
         match (*stage, method) {
             (Stage::Step(stage), _) => step::run(stage, step, data, guard.as_mut(), state),
+            (Stage::Guard(stage), _) => {
+                if let Some(guard) = guard {
+                    guard.run(stage, step, data);
+                }
+            }
             (Stage::Xpbd(stage), MethodMemory::Xpbd(memory)) => {
                 memory.run(stage, step, data, guard.as_mut(), state);
             }

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use super::memory::Memory;
 use crate::scalar::{Real, Vec3};
-use crate::solver::plan::{Flag, Plan, Stage, Visitor};
+use crate::solver::plan::{Flag, Plan, Stage, StepStage, Visitor};
 use crate::solver::step::data::Step;
 use crate::state::{Learned, State};
 
@@ -14,12 +14,37 @@ use crate::state::{Learned, State};
 pub enum Task<'a> {
     /// The stages of a step of so many small steps; of these stages the first so many.
     Step(&'a Plan, u32, usize),
+    /// The stages of a step of so many small steps, one of several in a row.
+    Within(&'a Plan, u32, Within),
+    /// Gives positions and velocities back after one of several steps.
+    Write,
     /// The stages of a step of so many small steps, with an observer callback.
     Watched(&'a Plan, u32, &'a mut Watch<'a>),
     /// Multipliers from positions.
     Restart,
     /// The slowest period [s].
     Period(&'a mut f64),
+}
+
+/// Where a step stands among steps in a row: between them positions and velocities stay in the solver's order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Within {
+    pub is_first: bool,
+    pub is_last: bool,
+}
+
+impl Within {
+    /// A step by itself.
+    const ALONE: Self = Self { is_first: true, is_last: true };
+
+    /// Whether a stage is left out: what it would read or write is where it is needed.
+    fn leaves_out(self, stage: &Stage) -> bool {
+        match stage {
+            Stage::Step(StepStage::ReadState) => !self.is_first,
+            Stage::Step(StepStage::WriteState) => !self.is_last,
+            _ => false,
+        }
+    }
 }
 
 /// Observer callback: gets the number of passes through loops so far, 0 where the first loop begins, and the
@@ -97,14 +122,20 @@ fn generic<S: Real>(
     let entrance = memory.data.constants.workers.entrance();
     entrance.enter(|| match task {
         Task::Step(plan, small_steps, count) => {
-            let observer = None;
-            plan.walk(small_steps, &mut Execution { memory, step, state, left: count, observer });
+            let (within, observer) = (Within::ALONE, None);
+            let left = count;
+            plan.walk(small_steps, &mut Execution { memory, step, state, within, left, observer });
         }
+        Task::Within(plan, small_steps, within) => {
+            let (left, observer) = (usize::MAX, None);
+            plan.walk(small_steps, &mut Execution { memory, step, state, within, left, observer });
+        }
+        Task::Write => memory.run(&StepStage::WriteState.into(), step, state),
         Task::Watched(plan, small_steps, watch) => {
             let places = vec![Vec3::ZERO; step.layout.vertex_count()];
             let observer = Some(Observer { watch, places, next: 0 });
-            let left = usize::MAX;
-            plan.walk(small_steps, &mut Execution { memory, step, state, left, observer });
+            let (within, left) = (Within::ALONE, usize::MAX);
+            plan.walk(small_steps, &mut Execution { memory, step, state, within, left, observer });
         }
         Task::Restart => memory.restart(step, state),
         Task::Period(period) => *period = memory.slowest_period(step),
@@ -116,6 +147,7 @@ struct Execution<'a, 'm, 'w, S> {
     memory: &'a mut Memory<S>,
     step: &'a Step<'m, S>,
     state: &'a mut State<S>,
+    within: Within,
     /// Stages that are still to be run.
     left: usize,
     observer: Option<Observer<'w>>,
@@ -149,7 +181,9 @@ impl<S: Real> Visitor for Execution<'_, '_, '_, S> {
             return ControlFlow::Break(());
         }
         self.left -= 1;
-        self.memory.run(stage, self.step, self.state);
+        if !self.within.leaves_out(stage) {
+            self.memory.run(stage, self.step, self.state);
+        }
         ControlFlow::Continue(())
     }
 
@@ -220,7 +254,10 @@ mod tests {
         let is_loop = |node: &Node| matches!(node, Node::Repeat(_));
         let place = plan.nodes.iter().position(is_loop).expect("an iteration");
         let body = plan.iteration().expect("an iteration").body.clone();
-        let twice = |body| Node::Repeat(Repeat { most: Times::Count(2), until: None, body });
+        let twice = |body| {
+            let most = Times::Count(2);
+            Node::Repeat(Repeat { most, until: None, is_watched: true, body })
+        };
         let with = |loops: Vec<Node>| {
             let mut plan = plan.clone();
             plan.nodes.splice(place..=place, loops);

@@ -44,7 +44,12 @@ pub fn plan() -> Plan {
         nodes: vec![
             StepStage::ReadState.into(),
             ExplicitStage::Begin.into(),
-            Node::Repeat(Repeat { most: Times::SmallSteps, until: None, body: small_step }),
+            Node::Repeat(Repeat {
+                most: Times::SmallSteps,
+                until: None,
+                is_watched: true,
+                body: small_step,
+            }),
             ExplicitStage::End.into(),
             StepStage::WriteState.into(),
         ],

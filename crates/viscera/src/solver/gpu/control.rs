@@ -1,9 +1,11 @@
 //! The record of the device's decisions during a step; its twin is control.wgsl.
 
+#![allow(unsafe_code)]
+
 use bytemuck::{Pod, Zeroable};
 
 use crate::solver::cpu::products::LARGEST_WINDOW;
-use crate::solver::report::StepReport;
+use crate::solver::step::control::PartGuard;
 
 /// `Control` of control.wgsl, with as many parts as there are in place of one.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -34,20 +36,14 @@ pub struct PartControl {
     pub omega: f32,
     pub radius: f32,
     pub last_change: f32,
-    pub limit: f32,
-    pub was_rejected: u32,
-    pub share: f32,
-    pub descends: u32,
-    pub potential: f32,
-    pub noise: f32,
-    pub kept_speed: f32,
-    pub best_value: f32,
-    pub failures: u32,
-    pub mixture_best: f32,
-    pub mixture_failures: u32,
-    pub is_good: u32,
+    pub guard: PartGuard<f32>,
     pub is_broken: u32,
 }
+
+// SAFETY: twelve fields of four bytes each, none of which leaves a gap, and any bits are a value of each.
+unsafe impl Zeroable for PartGuard<f32> {}
+// SAFETY: as above.
+unsafe impl Pod for PartGuard<f32> {}
 
 /// Bytes of `Control` for so many parts.
 pub fn control_size(parts: usize) -> u64 {
@@ -58,17 +54,4 @@ pub fn control_size(parts: usize) -> u64 {
 pub fn rejected_steps(control: &[u8]) -> u64 {
     let at = std::mem::offset_of!(Control, rejected);
     bytemuck::pod_read_unaligned::<u32>(&control[at..at + 4]).into()
-}
-
-impl PartControl {
-    /// How the step ended for the part.
-    pub fn report(&self) -> StepReport {
-        StepReport {
-            potential: self.potential.into(),
-            limit: self.limit.into(),
-            noise: self.noise.into(),
-            rejected: self.was_rejected != 0,
-            kept_speed: self.kept_speed.into(),
-        }
-    }
 }

@@ -13,7 +13,7 @@ struct Control {
     parts: array<PartControl>,
 }
 
-// `PartControl` of report.rs.
+// `PartControl` of control.rs.
 struct PartControl {
     // Anderson: sweeps in the history, the place of the next difference, how many there are.
     sweeps: u32,
@@ -30,25 +30,8 @@ struct PartControl {
     omega: f32,
     radius: f32,
     last_change: f32,
-    // Step guard; potentials [J s^2] are differences to the start of the step with its pins moved.
-    limit: f32,
-    // Of the last step: whether it was rejected, and to which share of it; zero for none, from which
-    // descents follow.
-    was_rejected: u32,
-    share: f32,
-    descends: u32,
-    // How the last step ended.
-    potential: f32,
-    noise: f32,
-    kept_speed: f32,
-    // Guard of accelerated iterates: the best so far and failures in a row, after a plain sweep was judged; the same
-    // after the accelerated one was, and whether it passed. Two of each, because workgroups that decide the same
-    // must not read what one of them writes.
-    best_value: f32,
-    failures: u32,
-    mixture_best: f32,
-    mixture_failures: u32,
-    is_good: u32,
+    // The guards, see step/control.wgsl.
+    guard: PartGuard,
     // NaN multipliers were found.
     is_broken: atomic<u32>,
 }

@@ -134,9 +134,10 @@ kernels! {
 }
 
 /// Records and storage, for every kernel.
-const SHARED: [&str; 5] = [
+const SHARED: [&str; 6] = [
     wgsl::KINEMATICS,
     wgsl::GREEN_STRAIN,
+    include_str!("../step/control.wgsl"),
     include_str!("control.wgsl"),
     include_str!("bindings.wgsl"),
     include_str!("table.wgsl"),

@@ -25,7 +25,7 @@ impl GpuSolver {
     #[doc(hidden)]
     pub fn last_searches(&self) -> Result<Vec<[f32; 2]>, GpuError> {
         let records = self.part_records()?;
-        Ok(records.iter().map(|part| [part.share, part.descends as f32]).collect())
+        Ok(records.iter().map(|part| [part.guard.share, part.guard.descends as f32]).collect())
     }
 
     /// How the last step ended for each connected part of the model, see [`crate::model::Model::part_of`];
@@ -34,7 +34,7 @@ impl GpuSolver {
         if !self.settings.guards_steps() || self.multiplier_dt == 0.0 {
             return Ok(Vec::new());
         }
-        Ok(self.part_records()?.iter().map(PartControl::report).collect())
+        Ok(self.part_records()?.iter().map(|part| part.guard.report()).collect())
     }
 
     fn part_records(&self) -> Result<Vec<PartControl>, GpuError> {

@@ -7,8 +7,9 @@ use super::uniforms::{FrameConstants, Job};
 use crate::elements::law::LAWS;
 use crate::scalar::lanes::LANES;
 use crate::solver::cpu::products::LARGEST_WINDOW;
-use crate::solver::step::guard;
+use crate::solver::step::control::PartGuard;
 use crate::solver::step::modes::MODES;
+use crate::solver::step::{descent, guard};
 
 /// Name, bytes, and the name and place [bytes] of every field.
 pub type HostLayout = (&'static str, usize, Vec<(&'static str, usize)>);
@@ -36,9 +37,12 @@ pub fn host_layouts() -> Vec<HostLayout> {
         }),
         record!("Control" Control { small_step small_steps_done step rejected_step rejected parts }),
         record!("PartControl" PartControl {
-            sweeps next differences last_norm shares gram iteration omega radius last_change limit
-            was_rejected share descends potential noise kept_speed best_value failures
-            mixture_best mixture_failures is_good is_broken
+            sweeps next differences last_norm shares gram iteration omega radius last_change guard
+            is_broken
+        }),
+        record!("PartGuard" PartGuard<f32> {
+            limit was_rejected share descends potential noise kept_speed best_value failures
+            mixture_best mixture_failures is_good
         }),
         record!("Update" Update { vertex is_pinned force place stiffness inertia }),
         record!("TetBlock" crate::layout::TetBlock<f32> {
@@ -51,7 +55,7 @@ pub fn host_layouts() -> Vec<HostLayout> {
 pub(super) fn constants() -> String {
     let guarded = [
         ("SHARE_COUNT", guard::SHARES.len() as u32),
-        ("SHORTENINGS", guard::SHORTENINGS as u32),
+        ("SHORTENINGS", descent::SHORTENINGS as u32),
         ("TOLERATED", guard::TOLERATED),
     ];
     let shared = [
@@ -69,7 +73,7 @@ pub(super) fn constants() -> String {
     let numbers = numbers.chain(ranges).chain(guarded).chain(shared);
     let mut text: String =
         numbers.map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect();
-    for (name, value) in [("SUFFICIENT", guard::SUFFICIENT), ("SHORTEN", guard::SHORTEN)] {
+    for (name, value) in [("SUFFICIENT", descent::SUFFICIENT), ("SHORTEN", descent::SHORTEN)] {
         text += &format!("const {name}: f32 = {value:?};\n");
     }
     let shares = guard::SHARES.map(|share| format!("{share:?}")).join(", ");

@@ -22,7 +22,7 @@ use crate::settings::{Count, Method, Precision, SolverSettings, Start};
 use crate::solver::error::StepError;
 use crate::solver::explicit::Stability;
 use crate::solver::inputs::check_model;
-use crate::solver::plan::{Plan, StepStage};
+use crate::solver::plan::{Plan, Stage, StepStage};
 use crate::solver::step::tethers::Bundle;
 use crate::state::State;
 
@@ -146,11 +146,7 @@ impl GpuSolver {
             weights_dt: 0.0,
             device: device.clone(),
             settings: settings.clone(),
-            falls: plan
-                .split()
-                .prologue
-                .contains(&StepStage::Predict(Start::Auto).into())
-                .then(|| Falls::new(&laid)),
+            falls: starts_falling(&plan).then(|| Falls::new(&laid)),
             plan,
             uniforms,
             frame,
@@ -309,6 +305,13 @@ impl GpuSolver {
             self.buffers.write(&self.device.queue, slot, bytemuck::cast_slice(&values));
         }
     }
+}
+
+/// Whether parts that nothing holds start where their centre of mass will be.
+fn starts_falling(plan: &Plan) -> bool {
+    let falls =
+        |stage: &Stage| matches!(stage, Stage::Step(StepStage::Predict { start: Start::Auto, .. }));
+    plan.split().prologue.iter().any(falls)
 }
 
 /// Buffers for so many jobs and for the constants of a step, and how kernels are bound to them.

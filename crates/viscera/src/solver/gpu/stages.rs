@@ -50,6 +50,7 @@ impl Recorder<'_> {
             let first = dispatches.len();
             match *stage {
                 Stage::Step(stage) => self.step_stage(stage, &mut dispatches),
+                Stage::Guard(stage) => self.guard_stage(stage, &mut dispatches),
                 Stage::Xpbd(stage) => self.xpbd_stage(stage, &mut dispatches),
                 Stage::Explicit(stage) => self.explicit_stage(stage, &mut dispatches),
                 Stage::QuasiNewton(stage) => {

@@ -93,6 +93,7 @@ impl GpuSurface {
         solver.layout_of(model)?;
         let order = |v: u32| model.numbering.of(v) as u32;
         let bounds = bounds(model.vertex_count(), order, skins)?;
+        check_tets(model, skins)?;
         Self::bind(solver.device(), solver.positions(), &bounds, skins)
     }
 
@@ -271,6 +272,24 @@ fn bounds(
         }));
     }
     Ok(bounds)
+}
+
+/// Whether every surface follows tetrahedra of the body whose first vertex it names.
+fn check_tets(model: &Model<f32>, skins: &[Skin<'_>]) -> Result<(), EmbeddingError> {
+    for skin in skins {
+        let embedding = skin.embedding;
+        let body = model.bodies.iter().find(|body| body.vertices.start == skin.first_vertex);
+        let followed = embedding.tets().iter().zip(embedding.corners());
+        for (vertex, (&tet, corners)) in followed.enumerate() {
+            let corners = corners.map(|v| v + skin.first_vertex as u32);
+            let of_body =
+                body.and_then(|body| model.tet_vertices.get(body.tets.start + tet as usize));
+            if of_body != Some(&corners) {
+                return Err(EmbeddingError::OtherTets { vertex });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The triangles of all bodies among all vertices, without those that name what there is not.

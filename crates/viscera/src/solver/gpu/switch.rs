@@ -13,15 +13,15 @@ use crate::solver::Solver;
 use crate::solver::cpu::memory::MethodMemory;
 use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
-use crate::solver::plan::{Split, Stage, StepStage, XpbdStage};
+use crate::solver::plan::{GuardStage, Split, Stage, StepStage, XpbdStage};
 use crate::solver::step::data::StepData;
 use crate::state::State;
 
 impl GpuSolver {
     /// Advances a state on the host by one step of `dt` [s], whose first stages `solver` computes, up to
     /// and without the first of `stage`, and this solver the others. Both are of one model and the same
-    /// settings; of the iterations the CPU computes stages of the first only, and where steps are
-    /// guarded none after [`StepStage::ChooseStart`]. Returns how many stages the CPU has computed. The
+    /// settings; of the iterations the CPU computes stages of the first only, and where iterates are
+    /// guarded none after [`GuardStage::ChooseStart`]. Returns how many stages the CPU has computed. The
     /// state ends on the device: [`GpuSolver::read`] fetches it.
     pub fn step_from(
         &mut self,
@@ -98,7 +98,7 @@ impl GpuSolver {
             write(Slot::StartStrain, &rows);
         }
         // Before the prediction the rest is of the last step.
-        if !has(|stage| matches!(stage, Stage::Step(StepStage::Predict(_)))) {
+        if !has(|stage| matches!(stage, Stage::Step(StepStage::Predict { .. }))) {
             return;
         }
         let MethodMemory::Xpbd(memory) = &solver.memory.method else { return };
@@ -110,7 +110,7 @@ impl GpuSolver {
                 if is_valid { (&remembered.positions, &remembered.multipliers) } else { now };
             write(Slot::Iterate, &vector(points, multipliers));
         }
-        self.take_over_prediction(&solver.memory.data, layout, inputs);
+        self.take_over_prediction(solver, layout, inputs);
         if layout.is_split() {
             let all: Vec<[f32; 4]> = memory.copies.iter().map(whole).collect();
             self.put_rows(Slot::Copies, &all);
@@ -126,11 +126,11 @@ impl GpuSolver {
     /// What the prediction leaves: constants of the step, targets, and where steps are guarded their starts.
     fn take_over_prediction(
         &self,
-        data: &StepData<f32>,
+        solver: &Solver<f32>,
         layout: &Layout<f32>,
         inputs: &Inputs<f32>,
     ) {
-        let StepData { constants, points, .. } = data;
+        let constants = &solver.memory.data.constants;
         let copies = |v: usize| (layout.copy_offsets[v + 1] - layout.copy_offsets[v]) as f32;
         self.put_rows(
             Slot::Previous,
@@ -151,10 +151,10 @@ impl GpuSolver {
         for pin in &inputs.pins {
             targets[layout.numbering.of(pin.vertex)] = with(pin.target, 0.0);
         }
-        if self.settings.guards_steps() {
+        if let Some(start) = solver.memory.guard.as_ref().map(|guard| &guard.start) {
             let free = |v: usize| constants.inverse_masses[v] != 0.0;
             let place = |v: usize, x: Vec3<f32>| if free(v) { with(x, 0.0) } else { targets[v] };
-            let starts = [&constants.previous, &constants.predicted, points];
+            let starts = [&constants.previous, &constants.predicted, start];
             let mut rows = vec![[0.0; 4]; 3 * DeviceLayout::stride(layout) as usize];
             for (row, points) in rows.chunks_mut(DeviceLayout::stride(layout) as usize).zip(starts)
             {
@@ -202,7 +202,7 @@ impl DeviceLayout {
 
 /// How many stages come before the first of that name, of those that the CPU may compute.
 fn first_stages(stages: &Split, stage: Stage) -> usize {
-    let decides = |other: &Stage| *other == StepStage::ChooseStart.into();
+    let decides = |other: &Stage| *other == GuardStage::ChooseStart.into();
     let most = stages.first_pass().position(decides).unwrap_or(stages.first_pass().count());
     stages.first_pass().position(|other| *other == stage).unwrap_or(most).min(most)
 }

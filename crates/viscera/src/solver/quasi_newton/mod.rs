@@ -34,6 +34,7 @@ use crate::settings::{Count, Integrator, SolverSettings};
 use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
 use crate::solver::report::StepReport;
 use crate::solver::step::data::{Step, StepData};
+use crate::solver::step::descent::{SHORTEN, SUFFICIENT};
 use crate::solver::step::energy::Energies;
 use crate::solver::step::potential::Evaluator;
 use crate::solver::step::stage::StepStage;
@@ -45,14 +46,8 @@ use parts::{Phase, Progress};
 use preconditioner::Preconditioner;
 use stage::{QuasiNewtonStage, Solve};
 
-/// Of the decrease that the slope promises, a step must deliver this share (Armijo).
-const SUFFICIENT: f64 = 1e-4;
-
 /// Round-off of a change of the potential: so many units of the precision of the sum of its terms' magnitudes.
 const ROUNDED: f64 = 4.0;
-
-/// A step that raises the potential is shortened by this factor.
-const SHORTEN: f64 = 0.4;
 
 /// After so many rejected trials in a row the pairs are forgotten.
 const MOST_FAILURES: u32 = 2;
@@ -85,7 +80,8 @@ pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S
         let body = [Evaluate, Judge, Precondition, ChooseDirection, Advance];
         let body = body.map(|stage| Node::Run(stage.into())).to_vec();
         let most = passes_of(solve, settings, chosen);
-        let repeat = Repeat { most: Times::Count(most), until: Some(Flag::AllDone), body };
+        let until = Some(Flag::AllDone);
+        let repeat = Repeat { most: Times::Count(most), until, is_watched: true, body };
         [
             Node::Run(StartSolve(solve).into()),
             Node::Repeat(repeat),

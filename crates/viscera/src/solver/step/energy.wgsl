@@ -48,14 +48,14 @@ fn limit_velocities(
         // rejected.
         if local == 0u {
             let potential = potential_of_totals();
-            control.parts[part].potential = potential.value;
-            control.parts[part].noise = potential.noise;
+            control.parts[part].guard.potential = potential.value;
+            control.parts[part].guard.noise = potential.noise;
         }
     }
     if local == 0u {
         limit = limit_of(part);
         if reports {
-            control.parts[part].kept_speed = limit.share;
+            control.parts[part].guard.kept_speed = limit.share;
         }
     }
     let now = workgroupUniformLoad(&limit);

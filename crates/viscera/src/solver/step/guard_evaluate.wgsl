@@ -16,8 +16,8 @@ fn evaluate(
     }
     let row = piece_row(piece);
     let part = table[row + PIECE_PART];
-    let is_spared = (job.mode & UNLESS_GOOD) != 0u && control.parts[part].is_good != 0u
-        || (job.mode & IF_REJECTED) != 0u && control.parts[part].was_rejected == 0u;
+    let is_spared = (job.mode & UNLESS_GOOD) != 0u && control.parts[part].guard.is_good != 0u
+        || (job.mode & IF_REJECTED) != 0u && control.parts[part].guard.was_rejected == 0u;
     if agree(is_spared, local) {
         return;
     }
@@ -37,8 +37,8 @@ fn evaluate(
             break;
         }
         if local == 0u {
-            let descends = control.parts[part].descends != 0u;
-            found_line = select(control.parts[part].share, pick_length().length, descends);
+            let descends = control.parts[part].guard.descends != 0u;
+            found_line = select(control.parts[part].guard.share, pick_length().length, descends);
         }
         line = workgroupUniformLoad(&found_line);
         tested_at = LINE;

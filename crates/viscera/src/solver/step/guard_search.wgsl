@@ -1,8 +1,10 @@
 // Searches for the place of a connected part whose step, or accelerated iterate and plain sweep after it, raises the
 // potential (solver/step/guard.rs). Each dispatch first picks among what the one before it tried, then tries more:
 //
-//   judge the step, all its shares at once, forces at x_s
-//   pick a share, or all lengths of a descent at once;   pick a length, forces there;   all lengths ...
+//   JudgeStep    judge the step; all its shares at once, forces at x_s
+//   TryLengths   pick a share, or all lengths of a descent at once
+//   TakeLength   pick a length, forces where it leads
+//   JudgePlain   judge the plain sweep, forces at x_s
 //
 // Parts whose step passes pay a look at their record. `job.mode` says what is picked and what is tried.
 //
@@ -102,26 +104,26 @@ fn is_over(part: u32) -> bool {
     // Each word that is read here was written by an earlier dispatch of the search: `was_rejected` when the step was
     // judged, `descends` when no share did, or when the plain sweep failed for the second time.
     if (job.mode & PICKS_SHARE) != 0u {
-        return control.parts[part].was_rejected == 0u;
+        return control.parts[part].guard.was_rejected == 0u;
     }
-    return control.parts[part].descends == 0u;
+    return control.parts[part].guard.descends == 0u;
 }
 
 // From the sums of what was tried; one workgroup of a part keeps the decision.
 fn decide(part: u32, keeps: bool) -> Next {
-    var then = Next(1u, select(TRIAL, AHEAD, (job.mode & FROM_AHEAD) != 0u), 0.0, 0u);
+    var then = Next(1u, select(TRIAL, AHEAD, (job.mode & TRIES_LENGTHS) != 0u), 0.0, 0u);
     if (job.mode & JUDGES_STEP) != 0u {
         then = judge_step(part, keeps);
     } else if (job.mode & JUDGES_PLAIN) != 0u {
         then = judge_plain(part, keeps);
     } else if (job.mode & PICKS_SHARE) != 0u {
-        let share = pick_share(control.parts[part].limit);
+        let share = pick_share(control.parts[part].guard.limit);
         // With a share the part is done: `TRIAL` and `DIRECTION` still hold `x_s` and the whole step, and
         // `evaluate` moves the vertices along them at the end.
         then.goes_on = select(0u, 1u, share == 0.0);
         if keeps {
-            control.parts[part].share = share;
-            control.parts[part].descends = then.goes_on;
+            control.parts[part].guard.share = share;
+            control.parts[part].guard.descends = then.goes_on;
         }
     } else if (job.mode & PICKS_LENGTH) != 0u {
         then.length = pick_length().length;
@@ -136,19 +138,19 @@ fn judge_step(part: u32, keeps: bool) -> Next {
     if (job.mode & CHOOSES) != 0u {
         choice = choose();
     } else {
-        choice.limit = control.parts[part].limit;
+        choice.limit = control.parts[part].guard.limit;
     }
     let is_rejected = select(1u, 0u, passes(potential_of_totals(), choice.limit));
     if keeps {
         if (job.mode & CHOOSES) != 0u {
-            control.parts[part].limit = choice.limit;
+            control.parts[part].guard.limit = choice.limit;
         }
-        control.parts[part].was_rejected = is_rejected;
+        control.parts[part].guard.was_rejected = is_rejected;
         // Counted once for all parts: only the first to exchange the number of this step finds another one.
         if is_rejected != 0u && atomicExchange(&control.rejected_step, control.step) != control.step {
             atomicAdd(&control.rejected, 1u);
         }
-        control.parts[part].descends = 0u;
+        control.parts[part].guard.descends = 0u;
     }
     return Next(is_rejected, choice.range, 0.0, 0u);
 }
@@ -157,20 +159,20 @@ fn judge_step(part: u32, keeps: bool) -> Next {
 fn judge_plain(part: u32, keeps: bool) -> Next {
     // Reads the words that `take` wrote when it judged the accelerated iterate, and writes the other pair: a late
     // workgroup must still find what the first one found.
-    var best = control.parts[part].mixture_best;
+    var best = control.parts[part].guard.mixture_best;
     var failures = 0u;
     var is_better = false;
-    if control.parts[part].is_good == 0u {
+    if control.parts[part].guard.is_good == 0u {
         let tested = potential_of_totals();
         is_better = improves(tested.value, best);
         best = select(best, tested.value, is_better);
-        failures = select(control.parts[part].mixture_failures + 1u, 0u, passes(tested, best));
+        failures = select(control.parts[part].guard.mixture_failures + 1u, 0u, passes(tested, best));
     }
     let descends = failures >= TOLERATED;
     if keeps {
-        control.parts[part].best_value = best;
-        control.parts[part].failures = failures;
-        control.parts[part].descends = select(0u, 1u, descends);
+        control.parts[part].guard.best_value = best;
+        control.parts[part].guard.failures = failures;
+        control.parts[part].guard.descends = select(0u, 1u, descends);
     }
     // `is_better` means that the sweep passed, so there is either a new best place to remember or a descent to
     // prepare, never both.
@@ -287,6 +289,9 @@ fn try_vertex(v: u32, now: Next, into: ptr<function, Sums>) {
     let stride = table[STRIDE_AT];
     if (job.mode & TRIES_LENGTHS) != 0u {
         (*into)[SLOPE] += line_of_vertex.slope;
+        // Where the line starts, for the dispatch that picks a length: its elements read TRIAL, and AHEAD is then free
+        // for where that length leads.
+        vertex_data[TRIAL * stride + v] = vec4f(origin, 0.0);
     }
     // Written for later dispatches. Elements of this one find the direction by themselves.
     if (job.mode & (TRIES_SHARES | TRIES_LENGTHS)) != 0u {
@@ -295,10 +300,16 @@ fn try_vertex(v: u32, now: Next, into: ptr<function, Sums>) {
     if now.is_better != 0u {
         vertex_data[START * stride + v] = vec4f(points[v].xyz, 0.0);
     } else if (job.mode & LOADS_FORCES) != 0u {
-        // A line starts in the range that its elements read in this very dispatch, so where it leads goes into the
-        // other one. AHEAD is free: the prediction that it held has been judged by now.
-        let to = select(TRIAL, AHEAD, (job.mode & PICKS_LENGTH) != 0u && now.origin == TRIAL);
-        vertex_data[to * stride + v] = vec4f(along(origin, direction, now.length), 0.0);
+        // Where the next line starts. It is tried from AHEAD, which nothing here reads: the prediction that it held has
+        // been judged by now. Where that is the best start it stays.
+        let x = vec4f(along(origin, direction, now.length), 0.0);
+        if now.origin != AHEAD {
+            vertex_data[AHEAD * stride + v] = x;
+        }
+        // Shares are counted from TRIAL.
+        if (job.mode & PICKS_LENGTH) == 0u {
+            vertex_data[TRIAL * stride + v] = x;
+        }
     }
 }
 

@@ -25,7 +25,7 @@ fn take(
     }
     let is_descent = (job.mode & TAKES_DESCENT) != 0u;
     // Most iterates need no descent; the part's workgroups then end here, all of them, before any barrier.
-    if agree(is_descent && control.parts[span.part].descends == 0u, local) {
+    if agree(is_descent && control.parts[span.part].guard.descends == 0u, local) {
         return;
     }
     var sums: Sums;
@@ -55,25 +55,25 @@ fn decide(part: u32, keeps: bool) -> Taken {
         let choice = choose();
         now.range = choice.range;
         if keeps {
-            control.parts[part].limit = choice.limit;
-            control.parts[part].best_value = choice.limit;
-            control.parts[part].failures = 0u;
+            control.parts[part].guard.limit = choice.limit;
+            control.parts[part].guard.best_value = choice.limit;
+            control.parts[part].guard.failures = 0u;
         }
     } else if (job.mode & JUDGES_MIXTURE) != 0u {
         // An iterate that lowers the potential becomes `x_s`; it passes if it is not above that by more than noise.
         // The decision goes into words of its own (`mixture_..`, `is_good`): the part's other workgroups still read
         // `best_value` and `failures`.
         let tested = potential_of_totals();
-        let best = control.parts[part].best_value;
+        let best = control.parts[part].guard.best_value;
         let is_better = improves(tested.value, best);
         let new_best = select(best, tested.value, is_better);
         let is_good = passes(tested, new_best);
         now.is_better = select(0u, 1u, is_better);
         now.gives_way = select(1u, 0u, is_good);
         if keeps {
-            control.parts[part].is_good = 1u - now.gives_way;
-            control.parts[part].mixture_best = new_best;
-            control.parts[part].mixture_failures = select(control.parts[part].failures, 0u, is_good);
+            control.parts[part].guard.is_good = 1u - now.gives_way;
+            control.parts[part].guard.mixture_best = new_best;
+            control.parts[part].guard.mixture_failures = select(control.parts[part].guard.failures, 0u, is_good);
         }
     } else {
         // Length zero where no length brings enough: positions then go back to `x_s` itself, whose potential is
@@ -81,9 +81,9 @@ fn decide(part: u32, keeps: bool) -> Taken {
         let found = pick_length();
         now.length = found.length;
         if keeps {
-            control.parts[part].failures = 0u;
+            control.parts[part].guard.failures = 0u;
             if found.length > 0.0 {
-                control.parts[part].best_value = found.value;
+                control.parts[part].guard.best_value = found.value;
             }
             // The older sweeps started elsewhere: Anderson's history is dropped. No residual is above the largest
             // number, so that the next one does not count as grown.

@@ -1,7 +1,9 @@
 //! A step: its data, and the stages that all methods share.
 
 pub mod balance;
+pub mod control;
 pub mod data;
+pub mod descent;
 pub mod energy;
 #[cfg(feature = "gpu")]
 pub mod gpu;
@@ -25,7 +27,7 @@ use guard::Guard;
 use stage::StepStage;
 use strain::measure_strain;
 
-/// Carries a stage out. Stages of the guard do nothing where there is none.
+/// Carries a stage out. What it does for the guard is left out where there is none.
 pub fn run<S: Real>(
     stage: StepStage,
     step: &Step<'_, S>,
@@ -40,15 +42,10 @@ pub fn run<S: Real>(
             let (workers, strains) = (&constants.workers, &mut constants.start_strain);
             measure_strain(workers, step.layout, None, &data.points, strains);
         }
-        StepStage::Predict(start) => data.predict(step, start),
-        StepStage::ChooseStart => {
-            if let Some(guard) = guard {
-                guard.choose_start(step, data);
-            }
-        }
-        StepStage::GuardStep => {
-            if let Some(guard) = guard {
-                guard.guard_step(step, data);
+        StepStage::Predict { start, is_kept } => {
+            data.predict(step, start);
+            if let (true, Some(guard)) = (is_kept, guard) {
+                guard.keep_start(&data.points);
             }
         }
         StepStage::UpdateVelocities => update_velocities(step, data),

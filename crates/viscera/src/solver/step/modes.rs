@@ -23,9 +23,8 @@ modes! {
     PICKS_SHARE = 16;
     PICKS_LENGTH = 32;
     TAKES_DESCENT = 64;
-    // and what is done: descents start from one range of the vertex data and the other in turn.
+    // and what is done.
     TRIES_SHARES = 128;
     LOADS_FORCES = 256;
     TRIES_LENGTHS = 512;
-    FROM_AHEAD = 1024;
 }

@@ -31,6 +31,13 @@ pub struct Potential {
     pub noise: f64,
 }
 
+impl Potential {
+    /// Whether it is at most round-off above the limit.
+    pub fn keeps(&self, limit: f64) -> bool {
+        self.value <= limit + self.noise
+    }
+}
+
 /// Blocks, and vertices, of a part whose sum is taken first. Part of the result's bits.
 const PIECE: usize = 64;
 const VERTEX_PIECE: usize = 1024;

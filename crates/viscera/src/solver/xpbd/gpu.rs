@@ -1,11 +1,12 @@
 //! The stages of XPBD as dispatches.
 
-use super::stage::{Mix, XpbdStage};
+use super::stage::{IterateStage, Mix, XpbdStage};
 use crate::settings::{AndersonGuard, AndersonOn};
 use crate::solver::gpu::kernels::{self, Swept};
 use crate::solver::gpu::limits::window;
 use crate::solver::gpu::record::{Dispatch, Recorder};
 use crate::solver::gpu::uniforms::Job;
+use crate::solver::step::modes;
 
 /// Workgroups of a repair: enough for a device to be busy when there is something to repair, few enough to
 /// cost little in all other steps.
@@ -40,7 +41,20 @@ impl Recorder<'_> {
             }
             XpbdStage::Chebyshev => self.chebyshev(into),
             XpbdStage::Anderson(mix) => self.anderson(mix, into),
-            XpbdStage::GuardIterate => self.guard_iterate(into),
+            XpbdStage::GuardIterate(stage) => into.push(self.guard_iterate(stage)),
+        }
+    }
+
+    fn guard_iterate(&self, stage: IterateStage) -> Dispatch {
+        let (evaluate, take) = (&kernels::EVALUATE, &kernels::TAKE);
+        match stage {
+            IterateStage::Evaluate => self.all_pieces(evaluate, 0),
+            IterateStage::Judge => self.parts_of_long(take, modes::JUDGES_MIXTURE),
+            IterateStage::EvaluatePlain => self.all_pieces(evaluate, modes::UNLESS_GOOD),
+            IterateStage::JudgePlain => {
+                self.all_pieces(&kernels::SEARCH, modes::JUDGES_PLAIN | modes::LOADS_FORCES)
+            }
+            IterateStage::TakeDescent => self.parts_of_long(take, modes::TAKES_DESCENT),
         }
     }
 

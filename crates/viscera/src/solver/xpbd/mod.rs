@@ -17,16 +17,16 @@ use crate::layout::Layout;
 use crate::model::for_each_kind;
 use crate::scalar::Real;
 use crate::settings::{Acceleration, AndersonGuard, AndersonOn, SolverSettings, Start};
-use crate::solver::plan::{Node, Plan, Repeat, Times};
+use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
 use crate::solver::step::data::{Step, StepData};
-use crate::solver::step::guard::Guard;
-use crate::solver::step::stage::StepStage;
+use crate::solver::step::guard::{DESCENTS, Guard};
+use crate::solver::step::stage::{GuardStage, StepStage};
 use crate::state::State;
 use history::repair_multipliers;
 use loads::load_multipliers;
 pub use memory::{Memory, needs_loads};
 use rebase::{rebase, recompute_positions};
-use stage::{Mix, XpbdStage};
+use stage::{IterateStage, Mix, XpbdStage};
 use sweep::solve_color;
 
 /// The stages of a step.
@@ -42,30 +42,33 @@ pub fn plan<S: Real>(layout: &Layout<S>, settings: &SolverSettings) -> Plan {
         (Start::Auto, false) => Start::Predicted,
         (chosen, _) => chosen,
     };
-    nodes.push(StepStage::Predict(start).into());
+    let is_guarded = settings.guards_steps();
+    nodes.push(StepStage::Predict { start, is_kept: is_guarded }.into());
     nodes.push(match settings.keep_multipliers {
         true => XpbdStage::RescaleMultipliers.into(),
         false => XpbdStage::ResetMultipliers.into(),
     });
 
-    if settings.guards_steps() {
-        nodes.push(StepStage::ChooseStart.into());
+    // Where no iterates are guarded the best start is needed at the end only, and found there.
+    let chooses_first = is_guarded && guards_mixtures(settings);
+    if chooses_first {
+        nodes.push(GuardStage::ChooseStart.into());
     }
     if is_accelerated(settings) && mixes_remember(settings) {
         nodes.push(XpbdStage::RememberIterate.into());
     }
 
-    let body = body(layout, settings).into_iter().map(Node::from).collect();
+    let body = body(layout, settings);
     let most = Times::Count(settings.iterations());
-    nodes.push(Node::Repeat(Repeat { most, until: None, body }));
+    nodes.push(Node::Repeat(Repeat { most, until: None, is_watched: true, body }));
 
-    if settings.guards_steps() {
-        nodes.push(StepStage::GuardStep.into());
+    if is_guarded {
+        nodes.extend(judged(!chooses_first));
     }
     if settings.keep_multipliers {
         nodes.push(XpbdStage::RepairMultipliers.into());
     }
-    nodes.push(match settings.guards_steps() {
+    nodes.push(match is_guarded {
         true => StepStage::LimitEnergy.into(),
         false => StepStage::UpdateVelocities.into(),
     });
@@ -73,8 +76,39 @@ pub fn plan<S: Real>(layout: &Layout<S>, settings: &SolverSettings) -> Plan {
     Plan { nodes }
 }
 
+/// The stages by which the guard ends a step; `chooses`: `x_s` is still to be chosen.
+fn judged(chooses: bool) -> Vec<Node> {
+    let again =
+        vec![GuardStage::TakeLength.into(), GuardStage::TryLengths { after_shares: false }.into()];
+    vec![
+        GuardStage::EvaluateStep { with_starts: chooses }.into(),
+        GuardStage::JudgeStep { chooses }.into(),
+        GuardStage::TryLengths { after_shares: true }.into(),
+        Node::Repeat(Repeat {
+            most: Times::Count(DESCENTS - 1),
+            until: Some(Flag::NothingDescends),
+            is_watched: false,
+            body: again,
+        }),
+        GuardStage::MoveRejected.into(),
+    ]
+}
+
 /// The stages of an iteration.
-fn body<S: Real>(layout: &Layout<S>, settings: &SolverSettings) -> Vec<XpbdStage> {
+fn body<S: Real>(layout: &Layout<S>, settings: &SolverSettings) -> Vec<Node> {
+    let mut body = sweep(layout, settings);
+    if guards_mixtures(settings) {
+        use IterateStage::{Evaluate, EvaluatePlain, Judge, JudgePlain, TakeDescent};
+        let judged = [Evaluate, Judge, EvaluatePlain, JudgePlain];
+        body.extend(judged.map(|stage| XpbdStage::GuardIterate(stage).into()));
+        body.push(GuardStage::TryLengths { after_shares: false }.into());
+        body.push(XpbdStage::GuardIterate(TakeDescent).into());
+    }
+    body
+}
+
+/// A sweep, and its acceleration.
+fn sweep<S: Real>(layout: &Layout<S>, settings: &SolverSettings) -> Vec<Node> {
     let mut body = Vec::new();
     if is_accelerated(settings) && !mixes_remember(settings) {
         body.push(XpbdStage::RememberIterate);
@@ -106,12 +140,9 @@ fn body<S: Real>(layout: &Layout<S>, settings: &SolverSettings) -> Vec<XpbdStage
             if on == AndersonOn::Multipliers {
                 body.extend([XpbdStage::LoadCorners, XpbdStage::RecomputePositions]);
             }
-            if guards_mixtures(settings) {
-                body.push(XpbdStage::GuardIterate);
-            }
         }
     }
-    body
+    body.into_iter().map(Node::from).collect()
 }
 
 fn is_accelerated(settings: &SolverSettings) -> bool {
@@ -196,9 +227,9 @@ impl<S: Real> Memory<S> {
                     self.remember_iterate(&data.points, &state.multipliers);
                 }
             }
-            XpbdStage::GuardIterate => {
+            XpbdStage::GuardIterate(stage) => {
                 if let Some(guard) = guard {
-                    self.guard_iterate(step, data, guard, &mut state.multipliers);
+                    self.guard_iterate(stage, step, data, guard, &mut state.multipliers);
                 }
             }
         }

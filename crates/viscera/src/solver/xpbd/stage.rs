@@ -32,9 +32,25 @@ pub enum XpbdStage {
     Chebyshev,
     /// Anderson mixing.
     Anderson(Mix),
-    /// Takes an accelerated iterate back that raises the incremental potential, in favour of the plain sweep;
+    /// Guards the accelerated iterate: takes one back that raises the incremental potential, in favour of the plain sweep;
     /// where that fails twice in a row as well, goes on from a step of descent.
-    GuardIterate,
+    GuardIterate(IterateStage),
+}
+
+/// A stage of the guard of accelerated iterates; between the last two `GuardStage::TryLengths` is run. `Phi` is the
+/// incremental potential, `x_s` the best iterate so far, or the best start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IterateStage {
+    /// `Phi` of the accelerated iterate.
+    Evaluate,
+    /// Remembers an iterate that lowers `Phi` as `x_s`; replaces one that does not pass by the plain sweep.
+    Judge,
+    /// `Phi` of the plain sweeps that have replaced an iterate.
+    EvaluatePlain,
+    /// Judges these alike; of a part that fails for the second time finds the forces at `x_s`, from which it descends.
+    JudgePlain,
+    /// Goes on from where the descent has led, without the history of the acceleration.
+    TakeDescent,
 }
 
 /// One mixing, with what is done in the same pass.
