@@ -1,8 +1,9 @@
 //! The film of a run: frames are remembered while the scene runs and drawn afterwards, when it is
 //! known how far everything moves, so that camera and colours stay the same throughout.
 
+use crate::in_order::make_in_order;
 use crate::output::OutputFolder;
-use crate::series::{deformed_surface, rest_surface};
+use crate::series::{deformed_vertices, rest_surface};
 use anyhow::Result;
 use indicatif::ProgressBar;
 use std::collections::BTreeSet;
@@ -12,8 +13,8 @@ use viscera::mesh::topology::boundary_surface;
 use viscera::scalar::{Real, Vec3};
 use viscera::simulation::{FrameReport, PatchKind, Simulation};
 use viscera_picture::{
-    Animation, Arrow, Bounds, Camera, Color, ColorScale, Drawing, ImageSize, Markers, Outline,
-    Paint, Surface, ViewDirection, write_png,
+    Animation, Arrow, Bounds, Camera, Color, ColorScale, Drawing, Image, ImageSize, Markers,
+    Outline, Paint, PictureError, Surface, TracedOutline, ViewDirection, write_png,
 };
 
 /// Frames of the animated image. More make the file large, fewer make it jerky.
@@ -21,6 +22,9 @@ const MOST_FRAMES: u64 = 75;
 
 /// Width of the animated image [pixels]: a web page's column.
 const ANIMATION_WIDTH: u32 = 640;
+
+/// Pictures from which the animation takes its colours, evenly through its time: a motion shows new colours slowly.
+const SAMPLES: usize = 4;
 
 /// How long the last frame stays before the animation begins again [s].
 const LAST_FRAME_HELD: f64 = 1.5;
@@ -78,7 +82,7 @@ impl Film {
             title: simulation.scene().title.clone(),
             view: ViewDirection::from_vector(output.view_from),
             size: ImageSize::new(width, height)?,
-            rest: rest_surface(simulation),
+            rest: rest_surface(&assembly.bodies),
             marked: fixed.into_iter().chain(moved).collect(),
             fixed_count,
             every: frames.div_ceil(MOST_FRAMES).max(1),
@@ -104,10 +108,11 @@ impl Film {
             let middle = middle * (1.0 / patch.vertices.len().max(1) as f64);
             (report.name.clone(), middle, Vec3::from_f64(report.force))
         });
+        let surface = deformed_vertices(&assembly.bodies, positions);
         self.shots.push(Shot {
             time: report.time,
             pulls: pulls.collect(),
-            surface: deformed_surface(simulation).vertices.iter().map(|x| x.cast()).collect(),
+            surface: surface.iter().map(|x| x.cast()).collect(),
             markers: self.marked.iter().map(|&v| positions[v as usize].cast()).collect(),
         });
     }
@@ -117,7 +122,8 @@ impl Film {
         self.shots.len() as u64 + 1
     }
 
-    /// Draws `picture.png` and `motion.gif`, which takes as long as the simulated time. Returns false where an interruption left the animation undone.
+    /// Draws `picture.png` and `motion.gif` on all processors. Returns false where an interruption left the animation
+    /// undone.
     pub fn develop(
         &self,
         out: &OutputFolder,
@@ -125,92 +131,63 @@ impl Film {
         interrupted: &AtomicBool,
     ) -> Result<bool> {
         let Some(last) = self.shots.last() else { return Ok(true) };
-        let mut largest = 0.0f64;
-        let mut strongest = 0.0f64;
-        let mut bounds = Bounds::of(&self.rest.vertices);
-        for shot in &self.shots {
-            let surface: Vec<Vec3<f64>> = shot.surface.iter().map(|x| x.cast()).collect();
-            largest = self.displacements(&surface).iter().fold(largest, |a, b| a.max(*b));
-            bounds.include(&surface);
-            strongest = shot.pulls.iter().fold(strongest, |a, (_, _, force)| a.max(force.length()));
-        }
-        let diagonal = bounds.diagonal();
-        for shot in &self.shots {
-            for arrow in self.arrows(shot, diagonal, strongest) {
-                bounds.include(&[arrow.to]);
-            }
-        }
-        let scale = ColorScale::rounded("displacement [mm]", 0.0, largest)?;
-        let draw = |shot: &Shot, camera: &Camera| {
-            let surface: Vec<Vec3<f64>> = shot.surface.iter().map(|x| x.cast()).collect();
-            let values = self.displacements(&surface);
-            let markers: Vec<Vec3<f64>> = shot.markers.iter().map(|x| x.cast()).collect();
-            let (fixed, moved) = markers.split_at(self.fixed_count);
-            let radius = MARKER_RADIUS * diagonal;
-            // What pulls is the point of the picture: it shines through where tissue hides it.
-            let marks =
-                |positions, color, see_through| Markers { positions, radius, color, see_through };
-            let drawing = Drawing {
-                title: &self.title,
-                caption: &caption(shot),
-                surfaces: vec![Surface {
-                    positions: &surface,
-                    triangles: &self.rest.triangles,
-                    paint: Paint::Values(&values),
-                }],
-                outlines: vec![Outline {
-                    positions: &self.rest.vertices,
-                    triangles: &self.rest.triangles,
-                    color: Color::REST,
-                }],
-                markers: vec![marks(fixed, Color::FIXED, 0.0), marks(moved, Color::PULLED, 0.4)],
-                arrows: in_front(self.arrows(shot, diagonal, strongest), camera),
-                color_scale: Some(scale.clone()),
-                length_scale: true,
-                ..Drawing::default()
-            };
-            let drawn = drawing.draw(camera).map(|drawn| drawn.image);
-            progress.inc(1);
-            drawn
-        };
-
         let distance = |shot: &Shot| self.still.map_or(0.0, |time| (shot.time - time).abs());
         // Without a wish all are equally near, and the last stays.
         let shown = self
             .shots
             .iter()
             .fold(last, |best, shot| if distance(shot) < distance(best) { shot } else { best });
-        let still = draw(shown, &Camera::framing(&bounds, self.view, self.size))?;
-        out.write("picture.png", &write_png(&still)?)?;
-        let small = self.small_size()?;
-        let camera = Camera::framing(&bounds, self.view, small);
-        let mut animation = Animation::new(small)?;
-        for shot in &self.shots {
-            if interrupted.load(Ordering::Relaxed) {
-                return Ok(false);
+        let look = Look::of(self, progress)?;
+        let (large, small) = (look.seen_at(self.size)?, look.seen_at(self.small_size()?)?);
+        let goes_on = || !interrupted.load(Ordering::Relaxed);
+        // The still picture, and those from which the animation takes its colours.
+        let samples = self.samples();
+        let mut drawn = Vec::new();
+        let first = |number: usize| match number.checked_sub(1) {
+            Some(sample) => Ok((look.draw(&self.shots[samples[sample]], &small)?, None)),
+            None => {
+                let still = look.draw(shown, &large)?;
+                let png = write_png(&still)?;
+                Ok((still, Some(png)))
             }
-            animation.push(&draw(shot, &camera)?, shot.time)?;
+        };
+        let is_whole = make_in_order(1 + samples.len(), first, |made: Result<_, PictureError>| {
+            match made? {
+                (_, Some(png)) => out.write("picture.png", &png)?,
+                (sample, None) => drawn.push(sample),
+            }
+            Ok(goes_on())
+        })?;
+        if !is_whole {
+            return Ok(false);
         }
-        out.write("motion.gif", &animation.finish(LAST_FRAME_HELD)?)?;
-        Ok(true)
+        let mut animation = Animation::in_colors_of(&drawn, small.camera.size())?;
+        let picture = |number: usize| match samples.binary_search(&number) {
+            Ok(sample) => Ok(drawn[sample].clone()),
+            Err(_) => look.draw(&self.shots[number], &small),
+        };
+        let mut times = self.shots.iter().map(|shot| shot.time);
+        let pictures = self.shots.len();
+        let is_whole = make_in_order(pictures, picture, |image: Result<_, PictureError>| {
+            animation.push(&image?, times.next().unwrap_or_default())?;
+            Ok(goes_on())
+        })?;
+        if is_whole {
+            out.write("motion.gif", &animation.finish(LAST_FRAME_HELD)?)?;
+        }
+        Ok(is_whole)
+    }
+
+    /// The shots from which the animation takes its colours, ascending; the last is one.
+    fn samples(&self) -> Vec<usize> {
+        let (shots, count) = (self.shots.len(), SAMPLES.min(self.shots.len()));
+        (1..=count).map(|k| k * shots / count - 1).collect()
     }
 
     /// Displacement of each surface vertex [mm].
     fn displacements(&self, surface: &[Vec3<f64>]) -> Vec<f64> {
         let pairs = surface.iter().zip(&self.rest.vertices);
         pairs.map(|(x, rest)| 1e3 * (*x - *rest).length()).collect()
-    }
-
-    fn arrows(&self, shot: &Shot, diagonal: f64, strongest: f64) -> Vec<Arrow> {
-        let visible = |force: &Vec3<f64>| force.length() > 0.02 * strongest;
-        let pulls = shot.pulls.iter().filter(|(_, _, force)| visible(force));
-        let arrow = |(_, from, force): &(String, Vec3<f64>, Vec3<f64>)| Arrow {
-            from: *from,
-            to: *from + *force * (LONGEST_ARROW * diagonal / strongest),
-            radius: 0.6 * MARKER_RADIUS * diagonal,
-            color: Color::PULLED,
-        };
-        pulls.map(arrow).collect()
     }
 
     fn small_size(&self) -> Result<ImageSize> {
@@ -221,6 +198,97 @@ impl Film {
         // Both sizes are a few thousand pixels at most.
         let height = (height * ANIMATION_WIDTH).div_ceil(width).max(16);
         Ok(ImageSize::new(ANIMATION_WIDTH, height)?)
+    }
+}
+
+/// What all pictures of one size have in common.
+struct Seen {
+    camera: Camera,
+    /// The shape at rest.
+    rest: TracedOutline,
+}
+
+/// What all pictures of a film have in common.
+struct Look<'a> {
+    film: &'a Film,
+    bounds: Bounds,
+    diagonal: f64,
+    /// The largest force [N].
+    strongest: f64,
+    scale: ColorScale,
+    progress: &'a ProgressBar,
+}
+
+impl<'a> Look<'a> {
+    fn of(film: &'a Film, progress: &'a ProgressBar) -> Result<Self> {
+        let mut largest = 0.0f64;
+        let mut strongest = 0.0f64;
+        let mut bounds = Bounds::of(&film.rest.vertices);
+        for shot in &film.shots {
+            let surface: Vec<Vec3<f64>> = shot.surface.iter().map(|x| x.cast()).collect();
+            largest = film.displacements(&surface).iter().fold(largest, |a, b| a.max(*b));
+            bounds.include(&surface);
+            strongest = shot.pulls.iter().fold(strongest, |a, (_, _, force)| a.max(force.length()));
+        }
+        let scale = ColorScale::rounded("displacement [mm]", 0.0, largest)?;
+        let diagonal = bounds.diagonal();
+        let mut look = Self { film, bounds, diagonal, strongest, scale, progress };
+        for shot in &film.shots {
+            for arrow in look.arrows(shot) {
+                look.bounds.include(&[arrow.to]);
+            }
+        }
+        Ok(look)
+    }
+
+    fn seen_at(&self, size: ImageSize) -> Result<Seen> {
+        let camera = Camera::framing(&self.bounds, self.film.view, size);
+        let SurfaceMesh { vertices, triangles } = &self.film.rest;
+        let rest = Outline { positions: vertices, triangles, color: Color::REST };
+        Ok(Seen { rest: rest.trace(&camera)?, camera })
+    }
+
+    fn draw(&self, shot: &Shot, Seen { camera, rest }: &Seen) -> Result<Image, PictureError> {
+        let film = self.film;
+        let surface: Vec<Vec3<f64>> = shot.surface.iter().map(|x| x.cast()).collect();
+        let values = film.displacements(&surface);
+        let markers: Vec<Vec3<f64>> = shot.markers.iter().map(|x| x.cast()).collect();
+        let (fixed, moved) = markers.split_at(film.fixed_count);
+        let radius = MARKER_RADIUS * self.diagonal;
+        // What pulls is the point of the picture: it shines through where tissue hides it.
+        let marks =
+            |positions, color, see_through| Markers { positions, radius, color, see_through };
+        let drawing = Drawing {
+            title: &film.title,
+            caption: &caption(shot),
+            surfaces: vec![Surface {
+                positions: &surface,
+                triangles: &film.rest.triangles,
+                paint: Paint::Values(&values),
+            }],
+            traced: vec![rest],
+            markers: vec![marks(fixed, Color::FIXED, 0.0), marks(moved, Color::PULLED, 0.4)],
+            arrows: in_front(self.arrows(shot), camera),
+            color_scale: Some(self.scale.clone()),
+            length_scale: true,
+            ..Drawing::default()
+        };
+        let drawn = drawing.draw(camera).map(|drawn| drawn.image);
+        self.progress.inc(1);
+        drawn
+    }
+
+    fn arrows(&self, shot: &Shot) -> Vec<Arrow> {
+        let Self { diagonal, strongest, .. } = *self;
+        let visible = |force: &Vec3<f64>| force.length() > 0.02 * strongest;
+        let pulls = shot.pulls.iter().filter(|(_, _, force)| visible(force));
+        let arrow = |(_, from, force): &(String, Vec3<f64>, Vec3<f64>)| Arrow {
+            from: *from,
+            to: *from + *force * (LONGEST_ARROW * diagonal / strongest),
+            radius: 0.6 * MARKER_RADIUS * diagonal,
+            color: Color::PULLED,
+        };
+        pulls.map(arrow).collect()
     }
 }
 

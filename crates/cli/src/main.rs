@@ -4,6 +4,7 @@ mod bench;
 mod bench_scene;
 mod devices;
 mod film;
+mod in_order;
 mod mesh;
 mod output;
 mod progress;

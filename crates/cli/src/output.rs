@@ -1,12 +1,14 @@
 //! The folder that a run writes to.
 
 use anyhow::{Context, Result};
+use std::borrow::Cow;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use viscera_resources::files::write_atomic;
+use viscera_resources::files::{write_atomic, write_parts_atomic};
 
 /// The folder a run writes to.
+#[derive(Clone)]
 pub struct OutputFolder {
     path: PathBuf,
 }
@@ -35,6 +37,11 @@ impl OutputFolder {
     /// As [`write_atomic`].
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         write_atomic(&self.path.join(name), bytes)
+    }
+
+    /// As [`write_parts_atomic`].
+    pub fn write_parts(&self, name: &str, parts: &[Cow<[u8]>]) -> Result<()> {
+        write_parts_atomic(&self.path.join(name), parts)
     }
 
     /// Removes a file that an earlier run may have left.

@@ -152,11 +152,13 @@ fn simulate<S: Real>(
     let draws = simulation.scene().output.picture;
     let mut recording = Recording {
         film: draws.then(|| Film::new(&simulation, frames)).transpose()?,
-        series: Series::create(out)?,
+        series: Series::create(out, &simulation)?,
         summary,
     };
-    let ended = recording.compute(&mut simulation, out, frames, interrupted);
+    let ended = recording.compute(&mut simulation, frames, interrupted);
     let Recording { film, series, mut summary } = recording;
+    let (mut series, written) = series.end();
+    let ended = ended.and(written);
     let complete = simulation.frame() == frames;
     summary.finished = complete && ended.is_ok();
     summary.stopped = match &ended {
@@ -176,8 +178,8 @@ fn simulate<S: Real>(
     write_summary(out, &summary)?;
     // Positions that are NaN are no mesh; the frames before them are.
     match &ended {
-        Ok(()) => series.finish(out, &simulation)?,
-        Err(_) => series.write_lists(out)?,
+        Ok(()) => series.finish(&simulation)?,
+        Err(_) => series.write_lists()?,
     }
     let mut drawn = true;
     if let Some(film) = &film {
@@ -293,23 +295,22 @@ fn build<S: Real>(
 }
 
 /// What a run keeps of its frames.
-struct Recording {
+struct Recording<S: Real> {
     film: Option<Film>,
-    series: Series,
+    series: Series<S>,
     summary: Summary,
 }
 
-impl Recording {
+impl<S: Real> Recording<S> {
     /// Computes frames and records them until they are all there, Ctrl-C is pressed, or something
-    /// fails.
-    fn compute<S: Real>(
+    /// fails. What fails to be written says so at the end of the series.
+    fn compute(
         &mut self,
         simulation: &mut Simulation<S>,
-        out: &OutputFolder,
         frames: u64,
         interrupted: &AtomicBool,
     ) -> Result<()> {
-        self.series.push(out, simulation)?;
+        let mut is_written = self.series.push(simulation);
         let every = u64::from(simulation.scene().output.every);
         let bar = progress::bar(frames, "simulating", "{msg}");
         let (mut wall_total, begin) = (0.0, simulation.time());
@@ -317,7 +318,7 @@ impl Recording {
         if simulation.is_on_device() {
             bar.set_message("the driver may still be compiling kernels");
         }
-        while simulation.frame() < frames && !stop {
+        while simulation.frame() < frames && !stop && is_written {
             let start = Instant::now();
             simulation.advance_frame()?;
             let wall_seconds = start.elapsed().as_secs_f64();
@@ -327,7 +328,7 @@ impl Recording {
             stop = interrupted.load(Ordering::Relaxed);
             let last = stop || simulation.frame() == frames;
             if last || simulation.frame().is_multiple_of(every) {
-                self.series.push(out, simulation)?;
+                is_written = self.series.push(simulation);
             }
             if let Some(film) = &mut self.film {
                 film.push(simulation, &report, last);

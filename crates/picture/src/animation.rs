@@ -4,9 +4,10 @@
 //! take what is shorter than two of them for a tenth of a second: times are rounded from the beginning, so that
 //! no rounding adds up, and a frame whose successor comes too soon gives way to it.
 //!
-//! A GIF frame has 255 colours and may leave pixels as they were. Each frame therefore gets a
-//! palette of its own, trained only on the pixels that changed, and everything that already looks
-//! right stays: backgrounds, scales and letters cost nothing after the first frame.
+//! A GIF frame has 255 colours and may leave pixels as they were. Everything that already looks
+//! right stays: backgrounds, scales and letters cost nothing after the first frame. Where pictures of the whole film are
+//! known before ([`Animation::in_colors_of`]), one palette is trained on them; where frames come one by one
+//! ([`Animation::new`]), each has a palette of its own, trained only on the pixels that changed.
 
 use std::borrow::Cow;
 
@@ -22,6 +23,10 @@ const UNCHANGED: u8 = 255;
 /// A channel may be this far [levels of 255] from the truth before a pixel is drawn again. Larger
 /// leaves trails behind moving edges, smaller doubles the file for differences nobody sees.
 const TOLERANCE: u8 = 3;
+
+/// How often a colour of a film counts at most in the training of its palette. More, and the network forgets rare
+/// colours, highlights among them, over even ones; less, and even ones show steps.
+const COUNTED: usize = 4;
 
 /// Every how many pixels one is looked at to train a palette. 1 is best and slowest.
 const TRAINING_STRIDE: i32 = 3;
@@ -47,8 +52,10 @@ pub struct Animation {
     clock: f64,
     /// Delays written so far [1/100 s].
     written: u64,
-    /// What a viewer shows after the last frame.
+    /// What a viewer shows after the last frame. With one palette for all frames, the colours for which that stands.
     shown: Option<Vec<[u8; 3]>>,
+    /// That of all frames, where they share one.
+    palette: Option<Palette>,
 }
 
 fn failed(error: gif::EncodingError) -> PictureError {
@@ -56,13 +63,24 @@ fn failed(error: gif::EncodingError) -> PictureError {
 }
 
 impl Animation {
-    /// An endless animation.
+    /// An endless animation of frames that nobody knows before.
     pub fn new(size: ImageSize) -> Result<Self, PictureError> {
+        Self::with(size, None)
+    }
+
+    /// An endless animation in the colours of some of its pictures.
+    pub fn in_colors_of(pictures: &[Image], size: ImageSize) -> Result<Self, PictureError> {
+        let pixels = pictures.iter().flat_map(|picture| picture.pixels().iter().copied());
+        Self::with(size, Some(Palette::of(pixels, COUNTED)))
+    }
+
+    fn with(size: ImageSize, palette: Option<Palette>) -> Result<Self, PictureError> {
         let (width, height) = (size.width() as u16, size.height() as u16);
-        let mut encoder = gif::Encoder::new(Vec::new(), width, height, &[]).map_err(failed)?;
+        let colors = palette.as_ref().map(Palette::bytes).unwrap_or_default();
+        let mut encoder = gif::Encoder::new(Vec::new(), width, height, &colors).map_err(failed)?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(failed)?;
         let (waiting, shown) = (None, None);
-        Ok(Self { size, encoder, waiting, last_time: 0.0, clock: 0.0, written: 0, shown })
+        Ok(Self { size, encoder, waiting, last_time: 0.0, clock: 0.0, written: 0, shown, palette })
     }
 
     /// Adds a frame that is shown from a time [s] on, by any clock. Where that goes back, a motion has begun again
@@ -131,14 +149,25 @@ impl Animation {
             (left, right, top, bottom) = (0, 0, 0, 0);
         }
 
-        let mut palette = Palette::of(pixels.iter().zip(&stale).filter(|p| *p.1).map(|p| *p.0));
+        let (mut own, is_shared) = (None, self.palette.is_some());
+        let palette = match &mut self.palette {
+            Some(palette) => palette,
+            None => {
+                let changed = pixels.iter().zip(&stale).filter(|p| *p.1).map(|p| *p.0);
+                own.insert(Palette::of(changed, usize::MAX))
+            }
+        };
         let shown = self.shown.get_or_insert_with(|| vec![[0; 3]; pixels.len()]);
         let mut buffer = Vec::with_capacity((right - left + 1) * (bottom - top + 1));
         for y in top..=bottom {
             for i in y * width + left..=y * width + right {
                 if stale[i] {
                     let index = palette.index_of(pixels[i], dithered(pixels[i], i % width, y));
-                    shown[i] = palette.colors[usize::from(index)];
+                    // With one palette a colour is shown alike in all frames, and what is off by dithering stays.
+                    shown[i] = match is_shared {
+                        true => pixels[i],
+                        false => palette.colors[usize::from(index)],
+                    };
                     buffer.push(index);
                 } else {
                     buffer.push(UNCHANGED);
@@ -153,7 +182,7 @@ impl Animation {
             top: top as u16,
             width: (right - left + 1) as u16,
             height: (bottom - top + 1) as u16,
-            palette: Some(palette.bytes()),
+            palette: own.map(|palette| palette.bytes()),
             buffer: Cow::Owned(buffer),
             ..gif::Frame::default()
         }
@@ -169,8 +198,9 @@ fn dithered(color: [u8; 3], x: usize, y: usize) -> [u8; 3] {
 }
 
 /// Colours of a frame that are taken over exactly, the most frequent ones: backgrounds and scales,
-/// where the eye sees the slightest trail. More would leave too few for the shading.
-const EXACT: usize = 40;
+/// where the eye sees the slightest trail. The background has 45 of them: fewer, and it shows bands; more would leave too
+/// few for the shading.
+const EXACT: usize = 48;
 
 /// Few colours that stand for many.
 struct Palette {
@@ -185,14 +215,19 @@ struct Palette {
 }
 
 impl Palette {
-    fn of(pixels: impl Iterator<Item = [u8; 3]>) -> Self {
-        let pixels: Vec<[u8; 3]> = pixels.collect();
+    /// Of pixels, of which each colour counts so often at most.
+    fn of(pixels: impl Iterator<Item = [u8; 3]>, counted: usize) -> Self {
+        let mut pixels: Vec<[u8; 3]> = pixels.collect();
         let mut sorted = pixels.clone();
         sorted.sort_unstable();
         let mut counts: Vec<(usize, [u8; 3])> =
             sorted.chunk_by(|a, b| a == b).map(|same| (same.len(), same[0])).collect();
         let all_fit = counts.len() <= COLORS;
         if !all_fit {
+            if counted < usize::MAX {
+                let often = |&(count, color)| std::iter::repeat_n(color, counted.min(count));
+                pixels = counts.iter().flat_map(often).collect();
+            }
             counts.sort_unstable_by(|a, b| b.cmp(a));
             counts.truncate(EXACT);
         }

@@ -3,11 +3,11 @@
 use viscera::mesh::SurfaceMesh;
 use viscera::scalar::{Vec3, vec3};
 
-use crate::camera::{Camera, is_drawable, unit};
+use crate::camera::{Camera, Projected, is_drawable, unit};
 use crate::color::Color;
 use crate::error::PictureError;
-use crate::image::Image;
-use crate::lines::{DepthMap, LineMask, feature_edges, project_line};
+use crate::image::{Image, ImageSize};
+use crate::lines::{ContourPixel, DepthMap, LineMask, contour_of, feature_edges, project_line};
 use crate::marks::{Arrow, Background, Markers, Paint};
 use crate::normals::corner_normals;
 use crate::overlay::{ColorScale, Overlay};
@@ -44,6 +44,18 @@ pub struct Outline<'a> {
     pub color: Color,
 }
 
+/// An outline as one camera sees it: most of the work of drawing it, done once for all pictures by that camera.
+pub struct TracedOutline {
+    size: ImageSize,
+    color: Color,
+    depth: DepthMap,
+    contour: Vec<ContourPixel>,
+    /// Sharp edges and open borders.
+    edges: Vec<[Projected; 2]>,
+    /// Triangles that cannot be drawn.
+    skipped: usize,
+}
+
 /// A thin line, hidden where tissue is before it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
@@ -58,7 +70,7 @@ pub struct Line {
 }
 
 /// Everything on one picture.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub struct Drawing<'a> {
     /// Upper left, usually the scene's name.
     pub title: &'a str,
@@ -68,6 +80,8 @@ pub struct Drawing<'a> {
     pub surfaces: Vec<Surface<'a>>,
     /// Shapes at rest.
     pub outlines: Vec<Outline<'a>>,
+    /// The same, traced before. Those for pictures of another size are skipped.
+    pub traced: Vec<&'a TracedOutline>,
     /// Vertices that are held or pulled.
     pub markers: Vec<Markers<'a>>,
     /// Pulls.
@@ -128,7 +142,10 @@ impl Drawing<'_> {
         image.pixels_mut().copy_from_slice(&resolve(camera, &shapes, &seen, self.background));
         let tissue = DepthMap::of(&seen);
         for outline in &self.outlines {
-            skipped += draw_outline(&mut image, camera, &tissue, outline);
+            skipped += outline.traced(camera).draw(&mut image, &tissue);
+        }
+        for traced in &self.traced {
+            skipped += traced.draw(&mut image, &tissue);
         }
         for line in &self.lines {
             skipped += draw_line(&mut image, camera, &tissue, line);
@@ -160,10 +177,8 @@ impl Drawing<'_> {
                 }
             }
         }
-        for (index, outline) in self.outlines.iter().enumerate() {
-            check_indices("outline", index, outline.triangles, outline.positions.len())?;
-        }
-        Ok(())
+        let mut outlines = self.outlines.iter().enumerate();
+        outlines.try_for_each(|(index, outline)| outline.check(index))
     }
 
     /// Adds a surface's triangles; the number of those that cannot be drawn.
@@ -279,42 +294,70 @@ fn add_markers(shapes: &mut Shapes, camera: &Camera, markers: &Markers) -> usize
 }
 
 /// Centre and radius [pixels] of a sphere; none if it cannot be drawn or would fill the picture.
-fn project_ball(
-    camera: &Camera,
-    center: Vec3<f64>,
-    radius: f64,
-) -> Option<(crate::camera::Projected, f64)> {
+fn project_ball(camera: &Camera, center: Vec3<f64>, radius: f64) -> Option<(Projected, f64)> {
     let at = camera.project(center)?;
     let pixels = radius * camera.pixels_per_meter() * at.inverse_depth;
     let largest = f64::from(camera.size().width().max(camera.size().height()));
     (pixels > 0.0 && pixels < largest).then_some((at, pixels))
 }
 
-/// Draws contour and sharp edges of a shape; the number of triangles that cannot be drawn.
-fn draw_outline(image: &mut Image, camera: &Camera, tissue: &DepthMap, outline: &Outline) -> usize {
-    let projected: Vec<_> = outline.positions.iter().map(|&p| camera.project(p)).collect();
-    let mut own = Visibility::new(camera.size());
-    let mut skipped = 0;
-    for triangle in outline.triangles {
-        let drawn = match triangle.map(|v| projected[v as usize]) {
-            [Some(a), Some(b), Some(c)] => own.draw_triangle([a, b, c], 0),
-            _ => false,
+impl Outline<'_> {
+    /// As this camera sees it, for [`Drawing::traced`].
+    pub fn trace(&self, camera: &Camera) -> Result<TracedOutline, PictureError> {
+        self.check(0)?;
+        Ok(self.traced(camera))
+    }
+
+    fn check(&self, index: usize) -> Result<(), PictureError> {
+        check_indices("outline", index, self.triangles, self.positions.len())
+    }
+
+    fn traced(&self, camera: &Camera) -> TracedOutline {
+        let projected: Vec<_> = self.positions.iter().map(|&p| camera.project(p)).collect();
+        let mut seen = Visibility::new(camera.size());
+        let mut skipped = 0;
+        for triangle in self.triangles {
+            let drawn = match triangle.map(|v| projected[v as usize]) {
+                [Some(a), Some(b), Some(c)] => seen.draw_triangle([a, b, c], 0),
+                _ => false,
+            };
+            skipped += usize::from(!drawn);
+        }
+        let depth = DepthMap::of(&seen);
+        let ends = |edge: [u32; 2]| match edge.map(|v| projected[v as usize]) {
+            [Some(a), Some(b)] => Some([a, b]),
+            _ => None,
         };
-        skipped += usize::from(!drawn);
+        let edges = feature_edges(self.positions, self.triangles).into_iter().filter_map(ends);
+        TracedOutline {
+            size: camera.size(),
+            color: self.color,
+            contour: contour_of(&seen, &depth),
+            edges: edges.collect(),
+            depth,
+            skipped,
+        }
     }
-    let mut mask = LineMask::new(tissue.width, tissue.height);
-    let own_depth = DepthMap::of(&own);
-    mask.add_contour(&own, &own_depth, tissue, HIDDEN_CONTOUR);
-    let width = f64::from(camera.size().height()) / 600.0;
-    for edge in feature_edges(outline.positions, outline.triangles) {
-        let [Some(a), Some(b)] = edge.map(|v| projected[v as usize]) else { continue };
-        mask.add_segment([a, b], width.clamp(0.8, 3.0), |x, y, depth| {
-            let hidden = own_depth.hides(x, y, depth) || tissue.hides(x, y, depth);
-            if hidden { 0.0 } else { FEATURE_EDGE }
-        });
+}
+
+impl TracedOutline {
+    /// Draws contour and sharp edges; the number of triangles that cannot be drawn.
+    fn draw(&self, image: &mut Image, tissue: &DepthMap) -> usize {
+        if self.size != image.size() {
+            return 1;
+        }
+        let mut mask = LineMask::new(tissue.width, tissue.height);
+        mask.add_contour(&self.contour, tissue, HIDDEN_CONTOUR);
+        let width = f64::from(self.size.height()) / 600.0;
+        for &edge in &self.edges {
+            mask.add_segment(edge, width.clamp(0.8, 3.0), |x, y, depth| {
+                let hidden = self.depth.hides(x, y, depth) || tissue.hides(x, y, depth);
+                if hidden { 0.0 } else { FEATURE_EDGE }
+            });
+        }
+        mask.paint(image, self.color.to_srgb(), OUTLINE);
+        self.skipped
     }
-    mask.paint(image, outline.color.to_srgb(), OUTLINE);
-    skipped
 }
 
 /// Draws a line; one if it cannot be drawn.

@@ -44,7 +44,7 @@ mod shade;
 pub use animation::Animation;
 pub use camera::{Bounds, Camera, HALF_OPENING, STEEPEST, ViewDirection};
 pub use color::{Color, map_color};
-pub use drawing::{Drawing, Drawn, Line, Outline, Surface};
+pub use drawing::{Drawing, Drawn, Line, Outline, Surface, TracedOutline};
 pub use error::PictureError;
 pub use image::{Image, ImageSize, write_png};
 pub use marks::{Arrow, Background, Markers, Paint};

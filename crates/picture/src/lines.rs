@@ -38,6 +38,41 @@ impl DepthMap {
     }
 }
 
+/// A pixel on the border of the area that a shape covers.
+pub(crate) struct ContourPixel {
+    /// Column and row.
+    at: [u32; 2],
+    /// Strength of the line, 0 to 1.
+    line: f32,
+    /// Inverse depth of the shape.
+    inverse_depth: f32,
+}
+
+/// The border of the area that a shape covers; `depth` is that of the shape itself.
+pub(crate) fn contour_of(shape: &Visibility, depth: &DepthMap) -> Vec<ContourPixel> {
+    let DepthMap { width, height, .. } = *depth;
+    let smooth = smoothed_coverage(shape, 1 + height / 1000);
+    let mut contour = Vec::new();
+    for y in 0..height {
+        for x in 0..width {
+            let m = smooth[y * width + x];
+            let line = (4.0 * m * (1.0 - m)).clamp(0.0, 1.0);
+            if line < 0.02 {
+                continue;
+            }
+            // Half of the line lies outside the shape: its depth is a neighbour's.
+            let mut inverse_depth = 0.0f32;
+            for j in y.saturating_sub(2)..(y + 3).min(height) {
+                for i in x.saturating_sub(2)..(x + 3).min(width) {
+                    inverse_depth = inverse_depth.max(depth.values[j * width + i]);
+                }
+            }
+            contour.push(ContourPixel { at: [x as u32, y as u32], line, inverse_depth });
+        }
+    }
+    contour
+}
+
 /// How much of each pixel a drawing of lines covers.
 pub(crate) struct LineMask {
     width: usize,
@@ -90,32 +125,11 @@ impl LineMask {
     }
 
     /// Adds the border of the area that a shape covers. Fainter where `tissue` is before it.
-    /// `depth` is that of the shape itself.
-    pub fn add_contour(
-        &mut self,
-        shape: &Visibility,
-        depth: &DepthMap,
-        tissue: &DepthMap,
-        hidden_opacity: f32,
-    ) {
-        let smooth = smoothed_coverage(shape, 1 + self.height / 1000);
-        for y in 0..self.height {
-            for x in 0..self.width {
-                let m = smooth[y * self.width + x];
-                let line = (4.0 * m * (1.0 - m)).clamp(0.0, 1.0);
-                if line < 0.02 {
-                    continue;
-                }
-                // Half of the line lies outside the shape: its depth is a neighbour's.
-                let mut nearest = 0.0f32;
-                for j in y.saturating_sub(2)..(y + 3).min(self.height) {
-                    for i in x.saturating_sub(2)..(x + 3).min(self.width) {
-                        nearest = nearest.max(depth.values[j * self.width + i]);
-                    }
-                }
-                let opacity = if tissue.hides(x, y, nearest) { hidden_opacity } else { 1.0 };
-                self.raise(y * self.width + x, line * opacity);
-            }
+    pub fn add_contour(&mut self, contour: &[ContourPixel], tissue: &DepthMap, hidden: f32) {
+        for pixel in contour {
+            let [x, y] = pixel.at.map(|place| place as usize);
+            let opacity = if tissue.hides(x, y, pixel.inverse_depth) { hidden } else { 1.0 };
+            self.raise(y * self.width + x, pixel.line * opacity);
         }
     }
 

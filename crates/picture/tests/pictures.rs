@@ -3,8 +3,8 @@
 use viscera::mesh::SurfaceMesh;
 use viscera::scalar::{Vec3, vec3};
 use viscera_picture::{
-    Animation, Arrow, Background, Bounds, Camera, Color, ColorScale, Drawing, Image, ImageSize,
-    Line, Markers, Outline, Paint, PictureError, Surface, ViewDirection, write_png,
+    Animation, Arrow, Bounds, Camera, Color, ColorScale, Drawing, Image, ImageSize, Line, Markers,
+    Outline, Paint, PictureError, Surface, ViewDirection, write_png,
 };
 
 const RADIUS: f64 = 0.05;
@@ -164,7 +164,7 @@ fn full(camera: &Camera, shift: f64) -> Image {
         }],
         color_scale: Some(ColorScale::rounded("displacement [m]", 0.0, 0.03).unwrap()),
         length_scale: true,
-        background: Background::default(),
+        ..Drawing::default()
     };
     let drawn = drawing.draw(camera).unwrap();
     assert_eq!(drawn.skipped, 0);
@@ -184,6 +184,28 @@ fn same_drawing_gives_the_same_bytes() {
 }
 
 #[test]
+fn an_outline_traced_before_is_drawn_alike() {
+    let camera = camera_for_everything();
+    let rest = sphere(Vec3::ZERO, 20);
+    let mut open = rest.clone();
+    open.triangles.truncate(rest.triangles.len() / 2);
+    let positions: Vec<_> = rest.vertices.iter().map(|&p| p + vec3(0.02, 0.0, 0.01)).collect();
+    let surfaces = vec![Surface { positions: &positions, ..flat(&rest, Color::TISSUE) }];
+    let outline =
+        Outline { positions: &open.vertices, triangles: &open.triangles, color: Color::REST };
+    let drawing = Drawing { surfaces, ..Drawing::default() };
+    let plain = drawing.draw(&camera).unwrap();
+    let at_once = Drawing { outlines: vec![outline], ..drawing.clone() }.draw(&camera).unwrap();
+    let traced = outline.trace(&camera).unwrap();
+    let drawing = Drawing { traced: vec![&traced], ..drawing };
+    assert!(drawing.draw(&camera).unwrap() == at_once && at_once != plain);
+    // By another camera it is another outline.
+    let bounds = Bounds::of(&[Vec3::splat(-0.08), Vec3::splat(0.08)]);
+    let other = Camera::framing(&bounds, ViewDirection::default(), size(160, 100));
+    assert_eq!(drawing.draw(&other).unwrap().skipped, 1);
+}
+
+#[test]
 fn png_holds_every_pixel() {
     let image = full(&camera_for_everything(), 0.5);
     let bytes = write_png(&image).unwrap();
@@ -198,7 +220,14 @@ fn png_holds_every_pixel() {
 fn gif_shows_every_frame_nearly_as_drawn() {
     let camera = camera_for_everything();
     let frames: Vec<_> = (0..4).map(|k| full(&camera, 0.2 * f64::from(k))).collect();
-    let mut animation = Animation::new(camera.size()).unwrap();
+    assert_shown_nearly_as_drawn(&frames, Animation::new(camera.size()).unwrap());
+    // One palette for all, from two of them.
+    let samples = [frames[1].clone(), frames[3].clone()];
+    let animation = Animation::in_colors_of(&samples, camera.size()).unwrap();
+    assert_shown_nearly_as_drawn(&frames, animation);
+}
+
+fn assert_shown_nearly_as_drawn(frames: &[Image], mut animation: Animation) {
     for (k, frame) in frames.iter().enumerate() {
         animation.push(frame, k as f64 / 30.0).unwrap();
     }

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, bail};
 use std::fs;
-use std::io::{ErrorKind, Read, Write};
+use std::io::{BufWriter, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// No mesh that fits into memory is larger [B]: some hundred million tetrahedra.
@@ -87,6 +87,11 @@ fn shown_folder(folder: &Path) -> String {
 
 /// Writes a file aside and renames it, so that no reader ever meets a part of it; makes its folder.
 pub fn write_atomic(target: &Path, bytes: &[u8]) -> Result<()> {
+    write_parts_atomic(target, &[bytes])
+}
+
+/// As [`write_atomic`], of bytes that come in parts.
+pub fn write_parts_atomic(target: &Path, parts: &[impl AsRef<[u8]>]) -> Result<()> {
     let mut part = target.as_os_str().to_owned();
     part.push(".part");
     let part = PathBuf::from(part);
@@ -94,9 +99,10 @@ pub fn write_atomic(target: &Path, bytes: &[u8]) -> Result<()> {
         if let Some(folder) = target.parent() {
             fs::create_dir_all(folder)?;
         }
-        let mut file = fs::File::create(&part)?;
-        file.write_all(bytes)?;
-        file.sync_data()?;
+        let mut file = BufWriter::new(fs::File::create(&part)?);
+        parts.iter().try_for_each(|bytes| file.write_all(bytes.as_ref()))?;
+        file.flush()?;
+        file.get_ref().sync_data()?;
         fs::rename(&part, target)
     };
     write().map_err(|error| {

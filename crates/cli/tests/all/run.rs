@@ -248,6 +248,23 @@ fn a_diverging_scene_says_so_and_keeps_what_was_finished() {
     bench.decode_png("out/picture.png");
 }
 
+/// The disk may be full long after the run began: frames are written by a thread of their own.
+#[test]
+fn a_frame_that_cannot_be_written_ends_the_run_and_says_so_once() {
+    let bench = Bench::new(&TINY.replace("\"0.2 s\"", "\"3600 s\""));
+    std::fs::create_dir(bench.path("out")).expect("a folder");
+    bench.write("out/frames", b"in the way");
+    let message = bench.run(&[]).error().to_owned();
+    assert!(message.contains("cannot write out/frames/tets_000000.vtu: "), "{message}");
+    let summary = bench.summary("out");
+    assert_eq!(summary["finished"], false);
+    let stopped = summary["stopped"].as_str().expect("a reason");
+    assert!(message.starts_with(stopped), "{message}: {stopped}");
+    let files = bench.files("out");
+    assert!(!files.iter().any(|name| name.ends_with(".part")), "{files:?}");
+    assert!(!files.contains("tissue.pvd") && !files.contains("final.vtu"), "{files:?}");
+}
+
 #[test]
 fn a_reader_that_has_seen_enough_is_no_error() {
     let bench = Bench::new(TINY);

@@ -14,7 +14,7 @@ use viscera::elements::{
     deformation_gradient, green_strain, internal_forces, neo_hookean, shape_gradients,
 };
 use viscera::material::{Material, MaterialModel};
-use viscera::measure::{measure_energies, measure_tets};
+use viscera::measure::{measure_energies, measure_tissue};
 use viscera::mesh::TetMesh;
 use viscera::scalar::{Mat3, Vec3};
 use viscera::settings::{Acceleration, Count, SolverSettings};
@@ -88,9 +88,8 @@ fn elastic_energy(fixture: &Fixture, x: &[Vec3<f64>]) -> f64 {
     let model = fixture.model::<f64>();
     let mut state = State::at_rest(&model);
     state.positions = x.to_vec();
-    let mut tets = Vec::new();
-    measure_tets(&model, &state.positions, &mut tets);
-    measure_energies(&model, &state, &Inputs::default(), &tets).elastic
+    let tissue = measure_tissue(&model, &state.positions);
+    measure_energies(&model, &state, &Inputs::default(), &tissue).elastic
 }
 
 fn masses(fixture: &Fixture) -> Vec<f64> {

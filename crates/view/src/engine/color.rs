@@ -7,7 +7,7 @@ use viscera::simulation::Assembly;
 use super::snapshot::Coloring;
 
 /// Values of the surfaces' vertices, one body after the other; none for plain tissue. `positions` [m] of
-/// the tetrahedra's vertices, the user's order; `tets` of the same state. Strain and stress of an inverted
+/// the tetrahedra's vertices, the user's order; `tets` of the same state, where the colours need them. Strain and stress of an inverted
 /// tetrahedron mean nothing, and its stress is as large as one likes where it is nearly flat: its vertices have no
 /// value there (NaN).
 pub fn surface_values<S: Real>(

@@ -191,7 +191,11 @@ impl<S: Real> Run for SimulationRun<S> {
             }
         }
         let assembly = self.simulation.assembly();
-        surface_values(assembly, coloring, positions, self.simulation.tets(), &mut snapshot.values);
+        let tets = match coloring {
+            Coloring::Strain | Coloring::Stress => self.simulation.tets(),
+            Coloring::Plain | Coloring::Displacement => Vec::new(),
+        };
+        surface_values(assembly, coloring, positions, &tets, &mut snapshot.values);
     }
 
     fn done_by_hand(&self) -> (String, f64) {

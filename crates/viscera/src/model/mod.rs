@@ -175,6 +175,11 @@ impl<S: Real> Model<S> {
         }
     }
 
+    /// The same for models of the same content, and another for others.
+    pub fn revision(&self) -> u64 {
+        self.revision
+    }
+
     /// Number of connected parts: elements connect vertices.
     pub fn part_count(&self) -> usize {
         self.part_count

@@ -4,7 +4,6 @@
 use super::error::{LiveError, SimulationError};
 use super::holding::{GraspOrigins, tolerance};
 use super::{Simulation, automatic, substep_dt};
-use crate::measure::measure_tets;
 use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
@@ -182,7 +181,7 @@ impl<S: Real> Simulation<S> {
         self.put_at_rest();
         self.balance = ForceBalance::default();
         self.inputs = self.inputs_at(0.0);
-        measure_tets(&self.model, &self.state.positions, &mut self.tets);
+        self.measure_tissue();
         Ok(())
     }
 

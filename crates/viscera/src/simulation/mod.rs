@@ -27,7 +27,8 @@ pub use saved::ResumeError;
 
 use crate::layout::Layout;
 use crate::measure::{
-    DeformationSummary, Energies, TetMeasure, measure_energies, measure_tets, summarize_deformation,
+    DeformationSummary, Energies, TetMeasure, TissueMeasure, measure_energies, measure_tets,
+    measure_tissue,
 };
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
@@ -134,7 +135,7 @@ pub struct Simulation<S> {
     before: Vec<Vec3<S>>,
     /// Whether the solver knows of a step: a new one has nothing to measure yet.
     stepped: bool,
-    tets: Vec<TetMeasure>,
+    tissue: TissueMeasure,
     frame: u64,
     rejected_substeps: u64,
 }
@@ -168,7 +169,7 @@ impl<S: Real> Simulation<S> {
             balance: ForceBalance::default(),
             before: model.rest_positions.clone(),
             stepped: false,
-            tets: Vec::with_capacity(model.tet_count()),
+            tissue: TissueMeasure::default(),
             frame: 0,
             rejected_substeps: 0,
             model,
@@ -177,7 +178,7 @@ impl<S: Real> Simulation<S> {
         };
         simulation.inputs = simulation.inputs_at(0.0);
         simulation.choose_substeps();
-        measure_tets(&simulation.model, &simulation.state.positions, &mut simulation.tets);
+        simulation.measure_tissue();
         Ok(simulation)
     }
 
@@ -274,9 +275,12 @@ impl<S: Real> Simulation<S> {
         self.backend.use_instructions(instructions);
     }
 
-    /// Measures of the tetrahedra after the last frame, in the bodies' order.
-    pub fn tets(&self) -> &[TetMeasure] {
-        &self.tets
+    /// Measures of the tetrahedra as they are now, in the bodies' order: computed when they are asked for, which costs
+    /// several times as much as [`Simulation::measure`].
+    pub fn tets(&self) -> Vec<TetMeasure> {
+        let mut tets = Vec::new();
+        measure_tets(&self.model, &self.state.positions, &mut tets);
+        tets
     }
 
     /// Frames computed so far.
@@ -296,7 +300,7 @@ impl<S: Real> Simulation<S> {
         self.measure()
     }
 
-    /// As [`Simulation::advance_frame`], without the measures, which are of an earlier frame then: for
+    /// As [`Simulation::advance_frame`], without the numbers of the report, which are of an earlier frame then: for
     /// who needs positions, not numbers.
     pub fn advance(&mut self) -> Result<(), FrameError> {
         self.begin_frame().map_err(Box::new)?;
@@ -335,7 +339,7 @@ impl<S: Real> Simulation<S> {
         FrameError::Diverged { time: self.time(), advice: advice::diverged(&self.scene) }
     }
 
-    /// Measures the last frame, for [`Simulation::tets`] and [`Simulation::report`]. The balance of forces is
+    /// Measures the last frame, for [`Simulation::report`]. The balance of forces is
     /// that of a step: after a change of settings it stays as it was until the next one.
     pub fn measure(&mut self) -> Result<(), FrameError> {
         if self.stepped {
@@ -346,15 +350,19 @@ impl<S: Real> Simulation<S> {
                 measured => measured?,
             }
         }
-        measure_tets(&self.model, &self.state.positions, &mut self.tets);
+        self.measure_tissue();
         // Files and pictures are in single precision: what it cannot hold has run away as well.
         let is_number = |tet: &TetMeasure| {
             (tet.energy_density as f32).is_finite() && (tet.von_mises as f32).is_finite()
         };
-        if !self.tets.iter().all(is_number) {
+        if !self.tissue.is_moderate && !self.tets().iter().all(is_number) {
             return Err(self.diverged());
         }
         Ok(())
+    }
+
+    fn measure_tissue(&mut self) {
+        self.tissue = measure_tissue(&self.model, &self.state.positions);
     }
 
     /// The substeps of a frame, and the state at its end; returns how many of them were rejected.
@@ -399,8 +407,8 @@ impl<S: Real> Simulation<S> {
             relative_residual: self.balance.relative_residual(),
             stiffness_error: self.balance.stiffness_error(),
             rejected_substeps: self.rejected_substeps,
-            energy: measure_energies(&self.model, &self.state, &self.inputs, &self.tets),
-            deformation: summarize_deformation(&self.tets),
+            energy: measure_energies(&self.model, &self.state, &self.inputs, &self.tissue),
+            deformation: self.tissue.deformation,
             patches: self.patch_forces(),
         }
     }

@@ -9,7 +9,6 @@ use super::Simulation;
 use super::error::LiveError;
 use super::holding::GraspOrigins;
 use crate::layout::Layout;
-use crate::measure::measure_tets;
 use crate::model::for_each_kind;
 use crate::scalar::{Real, Vec3};
 use crate::state::{Learned, LearnedPart, State};
@@ -169,7 +168,7 @@ impl<S: Real> Simulation<S> {
             learned: Learned { pairs: dressed(&saved.pairs), parts: saved.learned },
         });
         self.inputs = self.inputs_at(self.time());
-        measure_tets(&self.model, &self.state.positions, &mut self.tets);
+        self.measure_tissue();
         Ok(self)
     }
 

@@ -245,8 +245,7 @@ fn variants_that_are_not_read_say_how_to_convert() {
     let gmsh_4 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
     let gmsh_binary = "$MeshFormat\n2.2 1 8\n\u{1}\0\0\0$EndMeshFormat\n";
     let vtu_binary = VTU.replacen("format=\"ascii\"", "format=\"binary\"", 1);
-    let vtu_appended =
-        "<VTKFile type=\"UnstructuredGrid\">\n<AppendedData encoding=\"raw\">_\u{1}<";
+    let vtu_appended = "<VTKFile type=\"UnstructuredGrid\">\n<AppendedData encoding=\"base64\">_AA</AppendedData></VTKFile>";
     let vtk_legacy = "# vtk DataFile Version 3.0\n";
     let image = VTU.replace("UnstructuredGrid", "ImageData");
     for (name, text, advice) in [
@@ -325,8 +324,80 @@ fn vtu_round_trip_keeps_single_precision() {
     let back_single: Vec<Vec3<f32>> = back.vertices().iter().map(|x| x.cast()).collect();
     assert_eq!(back_single, vertices);
     assert_eq!((back.tets(), back.regions()), (mesh.tets(), mesh.regions()));
-    let text = String::from_utf8(bytes).unwrap();
-    assert!(text.contains("1e-7 -2.5e20 0.0"), "{text}");
+    let numbers = displacement.iter().flat_map(|u| u.to_array()).flat_map(f32::to_le_bytes);
+    let numbers: Vec<u8> = numbers.collect();
+    assert!(bytes.windows(numbers.len()).any(|window| window == numbers));
+}
+
+/// As other programs write appended data: 32-bit lengths, other types of numbers, blanks around.
+#[test]
+fn appended_data_of_other_programs_is_read() {
+    let mut data = Vec::new();
+    let mut offsets = Vec::new();
+    let mut push = |bytes: Vec<u8>| {
+        offsets.push(data.len());
+        data.extend((bytes.len() as u32).to_le_bytes());
+        data.extend(bytes);
+    };
+    let points = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0f64];
+    push(points.iter().flat_map(|x| x.to_le_bytes()).collect());
+    push([0i64, 1, 2, 0, 1, 2, 3, 1, 2, 3, 4].iter().flat_map(|v| v.to_le_bytes()).collect());
+    push([3i16, 7, 11].iter().flat_map(|v| v.to_le_bytes()).collect());
+    push(vec![5, 10, 10]);
+    let [points, corners, ends, types] = offsets[..] else { panic!("four arrays") };
+    let head = |regions: &str| {
+        format!(
+            "<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\">\n<UnstructuredGrid>\
+             <Piece NumberOfPoints=\"5\" NumberOfCells=\"3\"><Points>\
+             <DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"appended\" offset=\"{points}\"/>\
+             </Points><Cells>\
+             <DataArray type=\"Int64\" Name=\"connectivity\" format=\"appended\" offset=\"{corners}\"/>\
+             <DataArray type=\"Int16\" Name=\"offsets\" format=\"appended\" offset=\"{ends}\"/>\
+             <DataArray type=\"UInt8\" Name=\"types\" format=\"appended\" offset=\"{types}\"/>\
+             </Cells><CellData>\n{regions}\n</CellData></Piece></UnstructuredGrid>\n  \
+             <AppendedData encoding=\"raw\">\n   _"
+        )
+    };
+    let file =
+        |head: String| [head.as_bytes(), &data, b"\n  </AppendedData>\n</VTKFile>\n"].concat();
+    let text = "<DataArray type=\"Int32\" Name=\"region\" format=\"ascii\">0 5 6</DataArray>";
+    let (mesh, _) = read_tet_mesh("a.vtu", &file(head(text)), 1.0).unwrap();
+    assert_eq!(mesh, read("a.vtu", VTU).unwrap().0);
+    let float = format!(
+        "<DataArray type=\"Float64\" Name=\"region\" format=\"appended\" offset=\"{points}\"/>"
+    );
+    for (bytes, expected) in [
+        (file(head(&float)), "expected a region"),
+        (file(head(text).replace("LittleEndian", "BigEndian")), "big-endian"),
+        (file(head(text).replace("byte_order", "compressor=\"z\" byte_order")), "compressed"),
+        (file(head(text).replace("Int16", "Float16")), "type `Float16`"),
+        (file(head(text).replace("Int16", "Int32")), "part of a number"),
+        (file(head(text).replace(&format!("offset=\"{ends}\""), "offset=\"9999\"")), "cut short"),
+        (file(head(text).replace(&format!("offset=\"{ends}\""), "offset=\"-1\"")), "an offset"),
+    ] {
+        let error = read_tet_mesh("a.vtu", &bytes, 1.0).unwrap_err();
+        assert!(error.to_string().contains(expected), "{expected}: {error}");
+        assert!(error.line.is_some() && error.line < Some(6), "{error}");
+    }
+}
+
+/// Frames share what stays, and are the files that are written one by one.
+#[test]
+fn frames_of_a_grid_are_whole_files() {
+    let (mesh, _) = read("a.msh", GMSH_2).unwrap();
+    let regions = vtu::Array::integers("region", mesh.regions());
+    let grid = vtu::Grid::of_tets(5, mesh.tets(), vec![regions.clone()]).unwrap();
+    for scale in [1.0, 2.0] {
+        let points: Vec<Vec3<f64>> = mesh.vertices().iter().map(|&x| x * scale).collect();
+        let volumes = vtu::Array::scalars("J", &[1.0, scale]);
+        let parts = grid.frame(&points, &[], std::slice::from_ref(&volumes)).unwrap();
+        let alone = vtu::write(&points, mesh.tets(), &[], &[volumes.clone(), regions.clone()]);
+        assert_eq!(parts.concat(), alone.unwrap());
+    }
+    let error = grid.frame(&mesh.vertices()[..4], &[], &[]).unwrap_err();
+    assert!(matches!(error, WriteError::Length { wanted: 5, found: 4, .. }), "{error}");
+    let error = vtu::Grid::of_tets(5, mesh.tets(), vec![vtu::Array::integers("region", &[1])]);
+    assert!(matches!(error, Err(WriteError::Length { wanted: 2, found: 1, .. })));
 }
 
 #[test]

@@ -19,7 +19,7 @@ use error::Fault;
 use lines::{Lines, holds};
 use parsed::Parsed;
 
-/// Reads tetrahedra from the bytes of a Gmsh (1 or 2.x ASCII) or VTU (ASCII) file.
+/// Reads tetrahedra from the bytes of a Gmsh (1 or 2.x ASCII) or VTU (ASCII or appended raw) file.
 ///
 /// `name` is the file's name, for its extension and for errors; `unit_in_meters` is the length of
 /// one unit of the file `[m]`.

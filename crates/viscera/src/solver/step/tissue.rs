@@ -55,13 +55,14 @@ impl<S: Scalar> Tissue<S> {
         self.viscosity_rate * green_strain::energy_density(change, self.lame_lambda, self.lame_mu)
     }
 
-    /// Energies and stress; `start` is the Green strain at the start of the step, where the tissue
-    /// is viscous.
+    /// As [`Tissue::respond_by`], by a law that is known at run time only.
+    #[cfg(any(test, feature = "gpu"))]
     pub fn respond(&self, f: &Mat3<S>, start: Option<&Voigt<S>>) -> Response<S> {
         with_law!(self.model, L => self.respond_by::<L>(f, start))
     }
 
-    /// As [`Tissue::respond`], by a law that is known when this is compiled.
+    /// Energies and stress, by a law that is known when this is compiled; `start` is the Green strain at the start of the
+    /// step, where the tissue is viscous.
     #[inline(always)]
     pub fn respond_by<L: Law>(&self, f: &Mat3<S>, start: Option<&Voigt<S>>) -> Response<S> {
         let (lambda, mu) = (self.lame_lambda, self.lame_mu);

@@ -1,10 +1,12 @@
-//! VTK XML unstructured grids in ASCII, see "XML file formats" in the VTK documentation.
+//! VTK XML unstructured grids, see "XML file formats" in the VTK documentation: read with numbers as text or as bytes
+//! behind the XML, written with bytes.
 
+mod arrays;
 mod read;
 mod write;
 
 pub(super) use read::read;
-pub use write::{Array, write, write_surface};
+pub use write::{Array, Grid, write, write_surface};
 
 /// Cell types as VTK numbers them.
 const VTK_TRIANGLE: u8 = 5;

@@ -1,17 +1,18 @@
 //! Reading tetrahedra. Other cells are skipped and counted; regions come from an integer cell
 //! array named `region`, 0 without it.
 
+use std::borrow::Cow;
+
 use roxmltree::{Document, Node};
 
 use super::VTK_TETRA;
+use super::arrays::{ASCII_ADVICE, Appended, DataArray, fault_at};
 use crate::mesh::io::error::{Fault, ReadProblem};
-use crate::mesh::io::lines::{bad_word, holds, parse_word};
+use crate::mesh::io::lines::bad_word;
 use crate::mesh::io::parsed::{Format, Parsed, SkippedElements};
 use crate::mesh::{MeshPlace, TetMesh};
 use crate::scalar::vec3;
 
-const ASCII_ADVICE: &str = "in ParaView save it with \"Data Mode\" set to \"Ascii\", or with \
-    meshio run `meshio ascii FILE`";
 const GRID_ADVICE: &str = "save the volume as one unstructured grid (.vtu), for example with \
     ParaView's filter \"Append Datasets\"";
 
@@ -20,25 +21,29 @@ pub(in crate::mesh::io) fn read(
     bytes: &[u8],
     unit_in_meters: f64,
 ) -> Result<Parsed<TetMesh>, Fault> {
-    let document = parse(bytes)?;
+    let Halves { text, appended } = split(bytes)?;
+    let document = parse(&text)?;
     let piece = find_piece(&document)?;
+    let appended =
+        appended.map(|bytes| Appended::of(document.root_element(), bytes)).transpose()?;
+    let array = |node| DataArray::new(node, appended);
 
-    let points = AsciiArray::new(find_points(piece)?)?;
+    let points = array(find_points(piece)?)?;
     let coordinates: Vec<f64> = points.numbers("a coordinate")?;
     let announced = announced_count(piece, "NumberOfPoints")?;
     check_count(piece, "coordinates of points", 3 * announced, coordinates.len())?;
 
     let cells = child(piece, "Cells")?;
-    let connectivity = AsciiArray::new(find_array(cells, "connectivity")?)?;
-    let offsets = AsciiArray::new(find_array(cells, "offsets")?)?;
-    let types = AsciiArray::new(find_array(cells, "types")?)?;
+    let connectivity = array(find_array(cells, "connectivity")?)?;
+    let offsets = array(find_array(cells, "offsets")?)?;
+    let types = array(find_array(cells, "types")?)?;
     let corners: Vec<u32> = connectivity.numbers("a point index, 0 or more")?;
     let ends: Vec<usize> = offsets.numbers("an offset, 0 or more")?;
     let kinds: Vec<u8> = types.numbers("a cell type, 0 to 255")?;
     let cell_count = announced_count(piece, "NumberOfCells")?;
     check_count(offsets.node, "offsets of cells", cell_count, ends.len())?;
     check_count(types.node, "types of cells", cell_count, kinds.len())?;
-    let labels = read_regions(piece, cell_count)?;
+    let labels = read_regions(piece, cell_count, array)?;
 
     let mut tets = Vec::new();
     let mut regions = Vec::new();
@@ -86,34 +91,44 @@ pub(in crate::mesh::io) fn read(
     Ok(Parsed { mesh, repairs, format: Format::Vtu, skipped })
 }
 
-fn parse(bytes: &[u8]) -> Result<Document<'_>, Fault> {
-    // Raw data breaks the XML around it, so look for it before saying that the XML is damaged.
-    let broken = |reason: String, line: Option<usize>| {
-        if holds(bytes, b"<AppendedData") {
-            unsupported("a VTU file with appended data")
-        } else {
-            Fault { line, problem: ReadProblem::Xml { reason } }
-        }
+/// The XML, and the bytes behind it where a file has any.
+struct Halves<'a> {
+    text: Cow<'a, [u8]>,
+    appended: Option<&'a [u8]>,
+}
+
+/// Appended bytes are no text, and would break the XML around them.
+fn split(bytes: &[u8]) -> Result<Halves<'_>, Fault> {
+    const ELEMENT: &[u8] = b"<AppendedData";
+    const END: &[u8] = b"</VTKFile>";
+    let Some(begin) = bytes.windows(ELEMENT.len()).position(|window| window == ELEMENT) else {
+        return Ok(Halves { text: Cow::Borrowed(bytes), appended: None });
     };
+    let cut = || {
+        let reading = "the appended data".to_owned();
+        Fault::whole_file(ReadProblem::UnexpectedEnd { reading })
+    };
+    let rest = bytes[begin..].trim_ascii_end().strip_suffix(END).ok_or_else(cut)?;
+    let tag = rest.iter().position(|&byte| byte == b'>').ok_or_else(cut)?;
+    if !rest[..tag].windows(5).any(|window| matches!(window, b"\"raw\"" | b"'raw'")) {
+        return Err(unsupported("a VTU file with encoded appended data"));
+    }
+    let data = rest[tag + 1..].trim_ascii_start().strip_prefix(b"_").ok_or_else(cut)?;
+    Ok(Halves { text: Cow::Owned([&bytes[..begin], END].concat()), appended: Some(data) })
+}
+
+fn parse(bytes: &[u8]) -> Result<Document<'_>, Fault> {
+    let broken = |reason: String, line: usize| Fault::at(line, ReadProblem::Xml { reason });
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let before = &bytes[..error.valid_up_to()];
         let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
-        broken("text that is not UTF-8".into(), Some(line))
+        broken("text that is not UTF-8".into(), line)
     })?;
-    Document::parse(text).map_err(|error| {
-        let row = error.pos().row as usize;
-        broken(error.to_string(), Some(row))
-    })
+    Document::parse(text).map_err(|error| broken(error.to_string(), error.pos().row as usize))
 }
 
 fn unsupported(found: &str) -> Fault {
     Fault::whole_file(ReadProblem::Unsupported { found: found.into(), advice: ASCII_ADVICE })
-}
-
-/// A fault at the line where an XML element begins.
-fn fault_at(node: Node, problem: ReadProblem) -> Fault {
-    let position = node.document().text_pos_at(node.range().start);
-    Fault::at(position.row as usize, problem)
 }
 
 fn missing(node: Node, what: String) -> Fault {
@@ -179,63 +194,18 @@ fn check_count(node: Node, what: &str, claimed: usize, found: usize) -> Result<(
     Err(fault_at(node, ReadProblem::CountMismatch { what: what.into(), claimed, found }))
 }
 
-fn read_regions(piece: Node, cell_count: usize) -> Result<Option<Vec<u32>>, Fault> {
+fn read_regions<'a, 'input>(
+    piece: Node<'a, 'input>,
+    cell_count: usize,
+    array: impl Fn(Node<'a, 'input>) -> Result<DataArray<'a, 'input>, Fault>,
+) -> Result<Option<Vec<u32>>, Fault> {
     let cell_data = piece.children().find(|child| child.has_tag_name("CellData"));
     let Some(node) = cell_data.and_then(|data| named_array(data, "region")) else {
         return Ok(None);
     };
-    let labels = AsciiArray::new(node)?.numbers("a region, a whole number of 0 or more")?;
+    let labels = array(node)?.numbers("a region, a whole number of 0 or more")?;
     check_count(node, "regions of cells", cell_count, labels.len())?;
     Ok(Some(labels))
-}
-
-/// The text of a data array, as it stands in the file.
-struct AsciiArray<'a, 'input> {
-    node: Node<'a, 'input>,
-}
-
-impl<'a, 'input> AsciiArray<'a, 'input> {
-    fn new(node: Node<'a, 'input>) -> Result<Self, Fault> {
-        match node.attribute("format") {
-            Some("ascii") | None => Ok(Self { node }),
-            Some(format) => {
-                let line = fault_at(node, ReadProblem::Empty).line;
-                let found = format!("VTU data in the format `{format}`");
-                let problem = ReadProblem::Unsupported { found, advice: ASCII_ADVICE };
-                Err(Fault { line, problem })
-            }
-        }
-    }
-
-    /// The words and the pieces of text they stand in; comments may split the text.
-    fn words(&self) -> impl Iterator<Item = (Node<'a, 'input>, &'a str)> {
-        self.node.children().filter(Node::is_text).flat_map(|piece| {
-            piece.text().unwrap_or_default().split_ascii_whitespace().map(move |w| (piece, w))
-        })
-    }
-
-    fn numbers<T: std::str::FromStr>(&self, expected: &'static str) -> Result<Vec<T>, Fault> {
-        let mut numbers = Vec::new();
-        for (index, (_, word)) in self.words().enumerate() {
-            let number = parse_word(word.as_bytes()).ok_or_else(|| Fault {
-                line: self.line_of(index),
-                problem: bad_word(expected, word.as_bytes()),
-            })?;
-            numbers.push(number);
-        }
-        Ok(numbers)
-    }
-
-    /// The line of the file in which a number stands.
-    fn line_of(&self, index: usize) -> Option<usize> {
-        let (piece, word) = self.words().nth(index)?;
-        let text = piece.text()?;
-        // The parser keeps every line end, so lines can be counted from the start of the text.
-        let before = (word.as_ptr() as usize).checked_sub(text.as_ptr() as usize)?;
-        let newlines = text.as_bytes().get(..before)?.iter().filter(|&&b| b == b'\n').count();
-        let start = piece.document().text_pos_at(piece.range().start);
-        Some(start.row as usize + newlines)
-    }
 }
 
 /// VTK's name of a cell type.
