@@ -53,7 +53,7 @@ fn every_adapter_is_listed_with_its_limits_and_speed() {
 #[test]
 fn a_run_says_what_computed_it() {
     let bench = Bench::new(TINY);
-    let end = bench.run(&["--frames", "2"]);
+    let end = bench.run(&["--frames", "2", "--set", "solver.method=xpbd"]);
     let printed = end.stdout.lines().find_map(|line| line.strip_prefix("device: "));
     let printed = printed.expect("a line about the device");
     assert!(
@@ -109,7 +109,9 @@ fn without_a_driver_everything_but_the_gpu_works() {
     let cells = "body.bar.cells=[40, 20, 20]";
     let large = ["run", "scene.toml", "--out", "out", "--frames", "1", "--set", cells, "--set"];
     let plain = "output.picture=false";
-    let end = without_drivers(&bench, &[&large[..], &[plain, "--set", "solver.colors=1"]].concat());
+    let colors = "solver.colors=1";
+    let more = [plain, "--set", colors, "--set", "solver.method=xpbd"];
+    let end = without_drivers(&bench, &[&large[..], &more].concat());
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     assert_eq!(bench.summary("out")["device"], "CPU: no graphics adapter");
 }

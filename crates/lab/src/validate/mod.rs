@@ -3,6 +3,7 @@
 mod cantilever;
 mod course;
 mod decay;
+mod expected;
 mod frequency;
 mod indentation;
 mod independence;
@@ -36,6 +37,7 @@ pub const PROGRAM: Program = Program {
         motion::SECTION,
         decay::SECTION,
         organs::SECTION,
+        expected::SECTION,
         stress::SECTION,
     ],
     extra: &[],

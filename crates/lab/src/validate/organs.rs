@@ -56,7 +56,7 @@ const MOST_SUBSTEPS: u32 = 16;
 const PARTS: u32 = 8;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Organ {
+pub(super) enum Organ {
     /// The procedural one, as the library fills it.
     Liver,
     /// An ellipsoid with a hilum.
@@ -92,7 +92,7 @@ impl Organ {
         }
     }
 
-    fn mesh(self, quick: bool) -> Result<TetMesh> {
+    pub(super) fn mesh(self, quick: bool) -> Result<TetMesh> {
         let coarser = if quick { 1.8 } else { 1.0 };
         let fill = |shape: &dyn SignedDistance, spacing: f64| -> Result<TetMesh> {
             Ok(tetrahedralize(shape, coarser * spacing)?.0)
@@ -122,7 +122,7 @@ impl Organ {
         shuffled(&mesh?, 1)
     }
 
-    fn scene(self, young: f64, poisson: f64) -> Result<Scene> {
+    pub(super) fn scene(self, young: f64, poisson: f64) -> Result<Scene> {
         let mut text = SCENE.to_owned();
         for half_space in self.fixings() {
             text += &format!("[[fixing]]\nbody = \"organ\"\nhalf_space = {half_space}\n");
@@ -239,7 +239,7 @@ fn motion<S: Real>(scene: Scene, mesh: &TetMesh) -> Result<Motion> {
     })
 }
 
-fn places<S: Real>(simulation: &Simulation<S>) -> Vec<Vec3<f64>> {
+pub(super) fn places<S: Real>(simulation: &Simulation<S>) -> Vec<Vec3<f64>> {
     simulation.state().positions.iter().map(|x| x.cast()).collect()
 }
 

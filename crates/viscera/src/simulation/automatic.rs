@@ -77,7 +77,7 @@ pub fn expected_errors(
             let motion = expected_motion_error(settings, period, frame, substeps);
             ExpectedErrors { motion: follows.then_some(motion), at_rest: 2e-3 }
         }
-        Method::Explicit => ExpectedErrors { motion: Some(5e-3), at_rest: 2e-3 },
+        Method::Explicit => ExpectedErrors { motion: Some(1.5e-3), at_rest: 2e-3 },
         // Sweeps that are cut short lose motion by an amount that depends on tissue and mesh.
         Method::Xpbd => ExpectedErrors { motion: None, at_rest: 1e-2 },
     }
