@@ -7,6 +7,7 @@ mod gpu_common;
 mod allocation;
 mod allocation_threads;
 mod at_rest;
+mod automatic;
 mod coloring;
 mod determinism;
 mod element_solves;

@@ -1,0 +1,100 @@
+//! The method that a scene gets where it names none, and the error that a run foretells.
+
+use viscera::scalar::{Real, Vec3};
+use viscera::scene::Scene;
+use viscera::settings::Method;
+use viscera::simulation::{Assembly, Simulation};
+
+const BAR: &str = r#"
+time = { duration = "0.5 s" }
+[[body]]
+name = "bar"
+shape = "block"
+size = ["80 mm", "20 mm", "20 mm"]
+cells = [8, 2, 2]
+material = { young = "20 kPa", poisson = 0.45, density = "1000 kg/m^3" }
+[[fixing]]
+name = "wall"
+body = "bar"
+half_space = { point = [0, 0, 0], normal = [-1, 0, 0] }
+"#;
+
+fn simulation<S: Real>(overrides: &[(&str, &str)]) -> Simulation<S> {
+    let scene = Scene::parse("bar.toml", BAR, overrides).unwrap_or_else(|e| panic!("{e}"));
+    let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned())).expect("an assembly");
+    Simulation::new(scene, assembly).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn method(overrides: &[(&str, &str)]) -> Method {
+    simulation::<f32>(overrides).solver().method
+}
+
+/// Steps that are guarded down to an error of a hundredth; below, what costs less: many small steps of soft tissue in
+/// large cells, large steps of what is stiff and nearly incompressible. What is named is taken.
+#[test]
+fn the_cheapest_method_is_chosen_that_is_as_accurate_as_asked() {
+    for accuracy in ["draft", "standard", "0.01"] {
+        assert_eq!(method(&[("solver.accuracy", accuracy)]), Method::QuasiNewton, "{accuracy}");
+    }
+    let fine = ("solver.accuracy", "fine");
+    assert_eq!(method(&[fine]), Method::Explicit);
+    let (young, poisson) = ("body.bar.material.young", "body.bar.material.poisson");
+    let cells = ("body.bar.cells", "[24, 6, 6]");
+    assert_eq!(method(&[fine, cells, (young, "200 kPa"), (poisson, "0.499")]), Method::QuasiNewton);
+    for (name, named) in [("xpbd", Method::Xpbd), ("quasi_newton", Method::QuasiNewton)] {
+        assert_eq!(method(&[fine, ("solver.method", name)]), named);
+    }
+    // The scene goes on saying what it said.
+    assert_eq!(simulation::<f32>(&[]).scene().solver.method, Method::Auto);
+}
+
+/// A changed material may ask for another method, and other substeps.
+#[test]
+fn a_changed_material_is_chosen_for_anew() {
+    let cells = ("body.bar.cells", "[24, 6, 6]");
+    let mut changed = simulation::<f32>(&[("solver.accuracy", "fine"), cells]);
+    assert_eq!(changed.solver().method, Method::Explicit);
+    let settings = [("body.bar.material.poisson", "0.499"), ("body.bar.material.young", "200 kPa")];
+    let owned = settings.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    changed.change(&owned).expect("another tissue");
+    assert_eq!(changed.solver().method, Method::QuasiNewton);
+    assert!(changed.substeps() > 5, "{}", changed.substeps());
+    changed.advance_frame().expect("a frame");
+}
+
+fn places<S: Real>(overrides: &[(&str, &str)]) -> (Vec<Vec<Vec3<f64>>>, f64, u32) {
+    let mut simulation = simulation::<S>(overrides);
+    let foretold = simulation.expected_errors().motion.unwrap_or(f64::NAN);
+    let mut places = vec![];
+    for _ in 0..simulation.scene().frame_count() {
+        simulation.advance().expect("a frame");
+        places.push(simulation.state().positions.iter().map(|x| x.cast::<f64>()).collect());
+    }
+    (places, foretold, simulation.substeps())
+}
+
+/// Of a bar that swings for half a second, beside small explicit steps: what is foretold is no less than what is found and
+/// at most four times as much, and what is found is no more than what is asked.
+#[test]
+fn the_error_of_motion_is_foretold() {
+    for (young, poisson) in [("5 kPa", "0.45"), ("20 kPa", "0.45"), ("100 kPa", "0.3")] {
+        let tissue = [("body.bar.material.young", young), ("body.bar.material.poisson", poisson)];
+        let truth = [("solver.method", "explicit"), ("solver.explicit_safety", "0.25")];
+        let precision = ("solver.precision", "f64");
+        let (exact, ..) = places::<f64>(&[&tissue[..], &truth, &[precision]].concat());
+        let (ours, foretold, substeps) = places::<f32>(&tissue);
+        let rest = simulation::<f64>(&[precision]).model().rest_positions.clone();
+        let (mut error, mut moved) = (0.0, 0.0);
+        for (ours, exact) in ours.iter().zip(&exact) {
+            for ((x, y), rest) in ours.iter().zip(exact).zip(&rest) {
+                error += (*x - *y).length_squared();
+                moved += (*y - *rest).length_squared();
+            }
+        }
+        let found = (error / moved).sqrt();
+        println!(
+            "{young}, {poisson}: {substeps} substeps, {found:.4} found, {foretold:.4} foretold"
+        );
+        assert!(found < 0.05 && found <= foretold && foretold <= 4.0 * found);
+    }
+}
