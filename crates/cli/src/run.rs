@@ -171,7 +171,7 @@ fn simulate<S: Real>(
     if let Some(file) = arguments.save.as_ref().filter(|_| ended.is_ok()) {
         files::write_atomic(file, &simulation.save())?;
     }
-    summary.judge(simulation.scene(), rest);
+    summary.judge(&simulation.scene_in_force(), rest);
     summary.device = simulation.device_choice().to_owned();
     summary.warnings.extend(simulation.device_warning().map(String::from));
     // Numbers before meshes and pictures: those take a while, and may be what failed.
@@ -220,10 +220,10 @@ fn heading<S: Real>(simulation: &Simulation<S>, summary: &Summary, frames: u64) 
             format!(", divided into small steps of at most {small}")
         }
     };
-    // Quasi-Newton steps need no colours.
+    // The others need no colours.
     let colors = match solver.method {
-        Method::Auto | Method::QuasiNewton => String::new(),
-        Method::Xpbd | Method::Explicit => format!(" colours: {},", model.colors),
+        Method::Auto | Method::QuasiNewton | Method::Explicit => String::new(),
+        Method::Xpbd => format!(" colours: {},", model.colors),
     };
     let from = match simulation.frame() {
         0 => String::new(),

@@ -40,11 +40,11 @@ pub fn settle(simulation: &Simulation<f64>, progress: &Progress) -> Result<Vec<V
 
 fn settle_in<S: Real>(simulation: &Simulation<f64>, progress: &Progress) -> Result<Vec<Vec3<f64>>> {
     let (scene, assembly) = (simulation.scene().clone(), simulation.assembly().clone());
-    let (settings, time) = (scene.solver.clone(), scene.time.clone());
+    let time = scene.time.clone();
     let (own, all) = (scene.frame_count(), frame_count(&scene));
     let end = own as f64 * time.frame;
     let simulation = Simulation::<S>::new(scene, assembly)?;
-    let model = simulation.model();
+    let (settings, model) = (simulation.solver().clone(), simulation.model());
     let (mut solver, mut state) = (Solver::new(model, &settings), State::at_rest(model));
     let substeps = simulation.substeps();
     let dt = time.frame / f64::from(substeps);

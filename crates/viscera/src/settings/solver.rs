@@ -164,7 +164,7 @@ choices! {
 
 settings_table! {
     #[default]
-    /// How a step is solved. The family is XPBD; one sweep solves every constraint once.
+    /// How a step is solved.
     pub struct SolverSettings {
         /// Floating point format of the simulation state.
         precision: Precision = (Precision::F32), one_of::<Precision>();
@@ -172,9 +172,9 @@ settings_table! {
         /// less than a hundredth are asked for and it is cheaper, "explicit"; on a `device` that is asked for by name,
         /// "xpbd". "xpbd" sweeps over constraints. "quasi_newton" solves
         /// every substep to its end in a dozen passes over the mesh, whatever its size; of the settings below it uses
-        /// `substeps`, `iterations`, `integrator`, `history`, `threads`, and it is computed by the CPU. "explicit"
+        /// `accuracy`, `substeps`, `iterations`, `integrator`, `history`, `threads`, and it is computed by the CPU. "explicit"
         /// divides every substep into as many small steps as it takes to be stable; it uses `explicit_safety`,
-        /// `colors`, `threads` and `device`. It loses no motion to damping, and it is the cheapest for small soft
+        /// `threads` and `device`. It loses no motion to damping, and it is the cheapest for small soft
         /// bodies; its cost grows with the square root of the stiffness, and with fineness once more.
         method: Method = (Method::Auto), one_of::<Method>();
         /// The error of motion that "auto" and "quasi_newton" choose substeps and passes for, as a share of the
@@ -185,12 +185,14 @@ settings_table! {
         /// stiffens under strong deformation: lower this where a run diverges.
         explicit_safety: f64 = 0.5, number(at_least(1e-3).up_to(1.0));
         /// Substeps per frame: "auto" for what suits the method, 10 for "xpbd" and "explicit", for "quasi_newton"
-        /// as many as the slowest oscillation of what the scene's fixings hold asks for, from 1 to 10. More lose less motion to numerical damping and follow it more closely; the cost grows alike. With `rebase`
+        /// as many as `accuracy` and the slowest oscillation of what the scene's fixings hold ask for, with "standard" from
+        /// 1 to 10. More lose less motion to numerical damping and follow it more closely; the cost grows alike. With `rebase`
         /// and `keep_multipliers` the shape at rest does not depend on them; plain XPBD needs about 50 for
         /// an error near 1 %.
         substeps: Count = (Count::Auto), SUBSTEPS;
         /// Sweeps per substep: "auto" for what suits the method, 2 for "xpbd". Of "quasi_newton" passes for each of
-        /// its two solves per substep, "auto" by Poisson's ratio: 8 up to 0.41, 10 up to 0.46, above it 16.
+        /// its two solves per substep, "auto" by Poisson's ratio: 8 up to 0.41, 10 up to 0.46, above it 16, and up to twice
+        /// as many where less error is asked for than with "standard".
         /// More solve a substep better.
         /// Without `rebase` they approach an answer that depends on the path, so more are not always closer
         /// to the truth.

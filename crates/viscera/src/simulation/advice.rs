@@ -18,7 +18,7 @@ pub fn diverged(scene: &Scene) -> String {
     let solver = &scene.solver;
     if solver.method == Method::Explicit {
         let lower = format!("lower solver.explicit_safety below {}", solver.explicit_safety);
-        return either(&[&lower, "choose solver.method = \"xpbd\""]);
+        return either(&[&lower, "choose solver.method = \"quasi_newton\""]);
     }
     let mut choices = vec!["raise solver.substeps"];
     if matches!(solver.method, Method::Auto | Method::QuasiNewton) {

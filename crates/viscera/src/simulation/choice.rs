@@ -6,6 +6,8 @@ use super::error::SimulationError;
 use super::gpu;
 use crate::model::Model;
 use crate::scalar::Real;
+#[cfg(feature = "gpu")]
+use crate::settings::Method;
 use crate::settings::{DeviceRequest, SolverSettings};
 use crate::solver::Solver;
 
@@ -40,8 +42,12 @@ impl<S: Real> Backend<S> {
         settings: &SolverSettings,
         dt: f64,
     ) -> Result<Self, SimulationError> {
+        // A method that only the CPU computes leaves its device.
         #[cfg(feature = "gpu")]
-        if same_device && let Some(again) = gpu::again(self, model, settings) {
+        if same_device
+            && settings.method != Method::QuasiNewton
+            && let Some(again) = gpu::again(self, model, settings)
+        {
             return match again {
                 Err(lost) if self.gives_way => {
                     let warning = format!("{lost}; the CPU went on from there");

@@ -214,7 +214,7 @@ impl<S: Real> Backend<S> {
     pub fn is_beyond_numbers(&self) -> bool {
         match &self.engine {
             Engine::Cpu(solver) => {
-                solver.last_step().is_some_and(|report| !report.potential.is_finite())
+                solver.part_reports().iter().any(|report| !report.potential.is_finite())
             }
             Engine::Device(_) => false,
         }

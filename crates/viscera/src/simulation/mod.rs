@@ -34,7 +34,7 @@ use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Scene};
-use crate::settings::{Method, SolverSettings};
+use crate::settings::{Count, Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::{Inputs, Solver, choose};
 use crate::state::State;
@@ -114,6 +114,8 @@ pub struct Simulation<S> {
     scene: Scene,
     /// The scene's, with a method in the place of "auto".
     solver: SolverSettings,
+    /// Whether the caller has chosen the device.
+    callers_device: bool,
     assembly: Assembly,
     model: Model<S>,
     state: State<S>,
@@ -149,17 +151,18 @@ impl<S: Real> Simulation<S> {
     fn on(
         scene: Scene,
         assembly: Assembly,
-        on_device: bool,
+        callers_device: bool,
         choose: impl FnOnce(&Model<S>, &SolverSettings, f64) -> Result<Backend<S>, SimulationError>,
     ) -> Result<Self, SimulationError> {
         check_patches(&scene, &assembly)?;
         let model = assembly.builder.build::<S>()?;
-        let solver = automatic::settings_of(&scene, &assembly, &model, on_device);
+        let solver = automatic::settings_of(&scene, &assembly, &model, callers_device);
         let mut simulation = Self {
             state: State::at_rest(&model),
             substeps: solver.substeps(),
             backend: choose(&model, &solver, substep_dt(&scene, solver.substeps()))?,
             solver,
+            callers_device,
             period: f64::INFINITY,
             inputs: Inputs::default(),
             taken: GraspOrigins::default(),
@@ -194,9 +197,25 @@ impl<S: Real> Simulation<S> {
         &self.solver
     }
 
+    /// The scene with the settings in force: what advice depends on.
+    pub fn scene_in_force(&self) -> Scene {
+        let mut scene = self.scene.clone();
+        scene.solver = self.solver.clone();
+        scene
+    }
+
     /// The errors that the settings in force lead one to expect, before anything has moved.
     pub fn expected_errors(&self) -> ExpectedErrors {
-        automatic::expected_errors(&self.solver, self.period, self.scene.time.frame, self.substeps)
+        let automatic = SolverSettings { iterations: Count::Auto, ..self.solver.clone() };
+        let fewest = choose(&automatic, &self.model.materials).passes;
+        let is_solved = match self.solver.iterations {
+            Count::Auto => true,
+            Count::Of(passes) => passes >= fewest,
+        };
+        let frame = self.scene.time.frame;
+        let expected = automatic::expected_errors(&self.solver, self.period, frame, self.substeps);
+        // What fewer passes leave is not known.
+        ExpectedErrors { motion: expected.motion.filter(|_| is_solved), ..expected }
     }
 
     /// Substeps per frame.
@@ -336,7 +355,7 @@ impl<S: Real> Simulation<S> {
     }
 
     fn diverged(&self) -> FrameError {
-        FrameError::Diverged { time: self.time(), advice: advice::diverged(&self.scene) }
+        FrameError::Diverged { time: self.time(), advice: advice::diverged(&self.scene_in_force()) }
     }
 
     /// Measures the last frame, for [`Simulation::report`]. The balance of forces is
@@ -391,7 +410,7 @@ impl<S: Real> Simulation<S> {
             Ok(multipliers) => state.multipliers = multipliers,
             Err(_) => {
                 let (inputs, dt) = (self.inputs_at(self.time()), self.substep_dt());
-                let mut solver = Solver::new(&self.model, &self.scene.solver);
+                let mut solver = Solver::new(&self.model, &self.solver);
                 let restarted = solver.restart(&self.model, &mut state, &inputs, dt);
                 debug_assert!(restarted.is_ok(), "{restarted:?}");
             }

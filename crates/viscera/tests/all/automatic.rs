@@ -48,6 +48,15 @@ fn the_cheapest_method_is_chosen_that_is_as_accurate_as_asked() {
     assert_eq!(simulation::<f32>(&[]).scene().solver.method, Method::Auto);
 }
 
+/// Fewer passes than the method would take leave an error that nobody foretells; as many or more do not.
+#[test]
+fn of_fewer_passes_no_error_is_foretold() {
+    let motion = |iterations: &str| {
+        simulation::<f32>(&[("solver.iterations", iterations)]).expected_errors().motion
+    };
+    assert_eq!((motion("9"), motion("10")), (None, Some(0.045)));
+}
+
 /// A changed material may ask for another method, and other substeps.
 #[test]
 fn a_changed_material_is_chosen_for_anew() {

@@ -240,7 +240,7 @@ fn shipped_scenes_have_the_same_bits_on_every_machine() {
             include_str!("../../../../scenes/cantilever.toml"),
             0xfcd1_c86f_7e65_b231,
         ),
-        ("grab.toml", include_str!("../../../../scenes/grab.toml"), 0x827f_7916_19ba_ceac),
+        ("grab.toml", include_str!("../../../../scenes/grab.toml"), 0x2e6e_01db_8717_8daf),
         (
             "liver_retraction.toml",
             include_str!("../../../../scenes/liver_retraction.toml"),

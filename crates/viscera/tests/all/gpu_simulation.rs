@@ -4,7 +4,7 @@
 use crate::common::device::{adapter, device_within, own_device};
 use viscera::scalar::Vec3;
 use viscera::scene::Scene;
-use viscera::settings::SolverSettings;
+use viscera::settings::{Method, SolverSettings};
 use viscera::simulation::{Assembly, FrameError, FrameReport, Simulation, SimulationError};
 use viscera::solver::gpu::{GpuError, StepCost, baseline, shortfall};
 
@@ -171,6 +171,23 @@ fn the_choice_is_told_with_its_reason() {
     let error = error.to_string();
     assert!(error.starts_with("no adapter is called `no such thing`; there are: "), "{error}");
     assert!(error.contains(&name), "{error}");
+}
+
+/// The quasi-Newton method has no kernels: where a device is asked for by name, "auto" is XPBD, also after a change.
+#[test]
+fn auto_is_xpbd_on_a_device_that_is_asked_for() {
+    let auto = [("solver.method", "auto"), ("solver.device", "gpu"), ("solver.accuracy", "fine")];
+    let mut on_device = simulation(&auto).expect("a simulation");
+    let change = ("body.upper.material.young".to_owned(), "9 kPa".to_owned());
+    for _ in 0..2 {
+        assert!(on_device.gpu().is_some());
+        assert_eq!(on_device.solver().method, Method::Xpbd);
+        assert_eq!(on_device.expected_errors().motion, None);
+        on_device.change(&[change.clone()]).expect("another tissue");
+    }
+    on_device.change(&[("solver.device".to_owned(), "cpu".to_owned())]).expect("another device");
+    assert!(on_device.gpu().is_none());
+    assert_ne!(on_device.solver().method, Method::Xpbd);
 }
 
 /// A software adapter is slower than the CPU backend; it must be asked for.
