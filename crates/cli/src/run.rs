@@ -284,6 +284,16 @@ fn build<S: Real>(
     if let Some(spinner) = waiting {
         spinner.finish_and_clear();
     }
+    if let Ok(simulation) = &simulation {
+        let unused: Vec<_> =
+            simulation.solver().unused().iter().map(|key| format!("solver.{key}")).collect();
+        if !unused.is_empty() {
+            let (keys, method) = (unused.join(", "), simulation.solver().method);
+            eprintln!(
+                "note: {keys}: without effect with method \"{method}\"; set solver.method = \"xpbd\" to use them"
+            );
+        }
+    }
     let Some(file) = &arguments.resume else { return Ok(simulation?) };
     let resumed = simulation?.resume(&files::read(file)?);
     let resumed = resumed.with_context(|| file.display().to_string())?;

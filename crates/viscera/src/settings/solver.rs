@@ -271,6 +271,25 @@ settings_table! {
     }
 }
 
+/// Settings that only "xpbd" uses.
+const OF_XPBD: [&str; 15] = [
+    "colors",
+    "relaxation",
+    "relaxation_form",
+    "acceleration",
+    "chebyshev_radius",
+    "chebyshev_delay",
+    "chebyshev_damping",
+    "anderson_window",
+    "anderson_on",
+    "anderson_guard",
+    "rebase",
+    "rebase_factor",
+    "keep_multipliers",
+    "step_guard",
+    "neo_hookean",
+];
+
 /// What "auto" stands for in `substeps` and `iterations`.
 struct AutomaticCounts {
     substeps: u32,
@@ -299,6 +318,18 @@ impl SolverSettings {
     pub(crate) fn chosen(&self, method: Method) -> Self {
         let method = if self.method == Method::Auto { method } else { self.method };
         Self { method, ..self.clone() }
+    }
+
+    /// Keys with a value of their own that only "xpbd" uses, where the method is another one.
+    pub fn unused(&self) -> Vec<&'static str> {
+        if self.method == Method::Xpbd {
+            return Vec::new();
+        }
+        let (own, usual) = (self.values().into_iter(), Self::default().values());
+        let is_own = |(key, value): &(&str, String)| {
+            usual.iter().any(|(name, usual)| name == key && usual != value)
+        };
+        own.filter(is_own).map(|(key, _)| key).filter(|key| OF_XPBD.contains(key)).collect()
     }
 
     /// Substeps per frame; what "auto" stands for where it is chosen.

@@ -48,6 +48,16 @@ fn the_cheapest_method_is_chosen_that_is_as_accurate_as_asked() {
     assert_eq!(simulation::<f32>(&[]).scene().solver.method, Method::Auto);
 }
 
+/// A scene that was written for XPBD and names no method is told what no longer acts.
+#[test]
+fn settings_of_another_method_are_named() {
+    let unused = |overrides: &[(&str, &str)]| simulation::<f32>(overrides).solver().unused();
+    let published = [("solver.rebase", "false"), ("solver.colors", "1"), ("solver.substeps", "3")];
+    assert_eq!(unused(&published), ["colors", "rebase"]);
+    assert_eq!(unused(&[&published[..], &[("solver.method", "xpbd")]].concat()), [""; 0]);
+    assert_eq!(unused(&[]), [""; 0]);
+}
+
 /// Fewer passes than the method would take leave an error that nobody foretells; as many or more do not.
 #[test]
 fn of_fewer_passes_no_error_is_foretold() {

@@ -183,7 +183,7 @@ fn auto_is_xpbd_on_a_device_that_is_asked_for() {
         assert!(on_device.gpu().is_some());
         assert_eq!(on_device.solver().method, Method::Xpbd);
         assert_eq!(on_device.expected_errors().motion, None);
-        on_device.change(&[change.clone()]).expect("another tissue");
+        on_device.change(std::slice::from_ref(&change)).expect("another tissue");
     }
     on_device.change(&[("solver.device".to_owned(), "cpu".to_owned())]).expect("another device");
     assert!(on_device.gpu().is_none());
