@@ -58,6 +58,24 @@ fn settings_of_another_method_are_named() {
     assert_eq!(unused(&[]), [""; 0]);
 }
 
+/// Less error takes more substeps, of soft tissue too, whose slowest oscillation asks for none: it falls far.
+#[test]
+fn less_error_takes_more_substeps() {
+    let substeps = |accuracy: &str, young: &str| {
+        let settings = [
+            ("solver.method", "quasi_newton"),
+            ("solver.accuracy", accuracy),
+            ("body.bar.material.young", young),
+        ];
+        simulation::<f32>(&settings).substeps()
+    };
+    let of =
+        |young: &str| ["draft", "standard", "0.02", "fine"].map(|share| substeps(share, young));
+    assert_eq!(of("0.5 kPa"), [1, 1, 2, 3]);
+    let stiff = of("200 kPa");
+    assert!(stiff.windows(2).all(|pair| pair[0] < pair[1]), "{stiff:?}");
+}
+
 /// Fewer passes than the method would take leave an error that nobody foretells; as many or more do not.
 #[test]
 fn of_fewer_passes_no_error_is_foretold() {
