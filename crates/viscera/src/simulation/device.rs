@@ -210,7 +210,7 @@ impl<S: Real> Backend<S> {
         }
     }
 
-    /// Whether the last step met energies that are no numbers, which a device tells by its positions only.
+    /// Whether the last step met energies that are not finite; of a device only positions tell that.
     pub fn is_beyond_numbers(&self) -> bool {
         match &self.engine {
             Engine::Cpu(solver) => {

@@ -48,7 +48,7 @@ fn the_cheapest_method_is_chosen_that_is_as_accurate_as_asked() {
     assert_eq!(simulation::<f32>(&[]).scene().solver.method, Method::Auto);
 }
 
-/// A scene that was written for XPBD and names no method is told what no longer acts.
+/// A scene that was written for XPBD and names no method hears which of its settings have no effect.
 #[test]
 fn settings_of_another_method_are_named() {
     let unused = |overrides: &[(&str, &str)]| simulation::<f32>(overrides).solver().unused();

@@ -350,7 +350,7 @@ fn hard_inputs_leave_numbers() {
 
 /// After the first step, with the same vertices pinned and the same step, and where nothing is viscous in any case: jumps,
 /// steps that are taken again, other loads.
-/// Tissue whose energy single precision cannot hold is told of, and the run ends there; double precision goes on.
+/// An energy beyond single precision is reported as not finite; double precision holds it.
 #[test]
 fn energies_beyond_numbers_are_told() {
     let mesh = block([LENGTH, 0.02, 0.02], [4, 1, 1], 0.0);
