@@ -54,6 +54,15 @@ impl<S: Scalar> Point<S> {
         self.w += other.w;
     }
 
+    /// Adds all four components of another, times a number.
+    #[inline(always)]
+    pub fn add_scaled(&mut self, other: &Self, factor: S) {
+        self.x += other.x * factor;
+        self.y += other.y * factor;
+        self.z += other.z * factor;
+        self.w += other.w * factor;
+    }
+
     /// Replaces the three components.
     #[inline(always)]
     pub fn set_vec3(&mut self, v: Vec3<S>) {

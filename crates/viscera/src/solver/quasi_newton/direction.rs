@@ -8,13 +8,15 @@
 //! Nocedal, Wright, "Numerical Optimization", 2006, algorithm 7.4, with `z = M g` and `w_i = M y_i` at hand: then
 //! `M q = z - sum a_i w_i`, and one application of the preconditioner per iteration is enough. The recursion itself
 //! works on inner products.
+#![allow(unsafe_code)]
 
-use super::parts::{Phase, Products, Progress};
+use super::parts::{Phase, Progress};
+use super::vectors::{Combination, Factors, MOST_DOTS};
 use super::{Memory, Pair, vectors};
 use crate::layout::{Layout, Part};
 use crate::scalar::{Real, Vec3};
 use crate::settings::MOST_HISTORY;
-use crate::solver::cpu::threads::Workers;
+use crate::solver::cpu::threads::{Shared, Workers};
 use crate::solver::step::data::{Step, StepData};
 use crate::state::Learned;
 
@@ -24,6 +26,9 @@ const LEAST_CURVATURE: f64 = 0.1;
 
 /// Pairs are kept of steps above this many resolutions: of shorter ones the change of the gradient is round-off.
 const CLEAR_STEP: f64 = 16.0;
+
+/// Vectors that a direction is a sum of, at most, besides that of the preconditioner.
+const MOST_TERMS: usize = 2 * MOST_HISTORY;
 
 impl<S: Real> Memory<S> {
     /// [`super::stage::QuasiNewtonStage::Precondition`].
@@ -40,16 +45,31 @@ impl<S: Real> Memory<S> {
             }
             let range = part.vertices.clone();
             let Self { preconditioner, trial_z, gradient, .. } = self;
-            preconditioner.apply(number, &gradient[range.clone()], &mut trial_z[range.clone()]);
+            let (r, into) = (&gradient[range.clone()], &mut trial_z[range.clone()]);
+            preconditioner.apply(workers, number, r, into);
             if self.has_new_pair[number] {
+                let slot = next_slot(self.history(), &learned.parts[number]);
+                let Self { trial_z, z, images, .. } = self;
+                let image = Pair::places(slot, step.layout.vertex_count(), &range).image;
+                let (new, images) = (&trial_z[range.clone()], Shared::new(&mut images[image]));
+                let z = Shared::new(&mut z[range]);
+                vectors::each_piece(workers, new.len(), |range| {
+                    // SAFETY: pieces do not overlap.
+                    let (images, z) =
+                        unsafe { (images.range(range.clone()), z.range(range.clone())) };
+                    for ((image, z), new) in images.iter_mut().zip(z).zip(&new[range]) {
+                        (*image, *z) = (*new - *z, *new);
+                    }
+                });
                 self.keep_pair(step.layout, workers, number, learned);
+            } else {
+                let Self { trial_z, z, .. } = self;
+                z[range.clone()].copy_from_slice(&trial_z[range]);
             }
-            let Self { trial_z, z, .. } = self;
-            z[range.clone()].copy_from_slice(&trial_z[range]);
         }
     }
 
-    /// Takes the pair that [`Memory::judge`] has left behind the newest one over, if it tells a curvature.
+    /// Takes over the pair that [`Memory::judge`] has left behind the newest one, and its image, if it tells a curvature.
     fn keep_pair(
         &mut self,
         layout: &Layout<S>,
@@ -57,12 +77,7 @@ impl<S: Real> Memory<S> {
         number: usize,
         learned: &mut Learned<S>,
     ) {
-        let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
         let slot = next_slot(self.history(), &learned.parts[number]);
-        let Pair { image, .. } = Pair::places(slot, vertices, &part.vertices);
-        for (v, place) in part.vertices.clone().zip(image) {
-            self.images[place] = self.trial_z[v] - self.z[v];
-        }
         let kept = &mut learned.parts[number];
         let count = (kept.count as usize + 1).min(self.choices[number].history);
         let before = *kept;
@@ -80,7 +95,7 @@ impl<S: Real> Memory<S> {
         }
     }
 
-    /// Products of one pair with all others.
+    /// Products of a pair with itself and with older ones. The recursion reads `s` of the older with `y` of the newer.
     fn multiply_pair(
         &mut self,
         layout: &Layout<S>,
@@ -92,16 +107,21 @@ impl<S: Real> Memory<S> {
         let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
         let kept = learned.parts[number];
         let this = Pair::places(slot, vertices, &part.vertices);
-        for other in slots(self.history(), kept.count, kept.newest) {
+        let (y, image) = (&learned.pairs[this.y], &self.images[this.image]);
+        let ring = self.history();
+        let others = || slots(ring, kept.count, kept.newest).skip_while(|&other| other != slot);
+        let mut factors: [Factors<'_, S>; MOST_DOTS] = [(y, y); MOST_DOTS];
+        for (factors, other) in factors.as_chunks_mut::<2>().0.iter_mut().zip(others()) {
             let that = Pair::places(other, vertices, &part.vertices);
-            let (s, y) = (&learned.pairs[this.s.clone()], &learned.pairs[this.y.clone()]);
-            let (other_s, other_y) = (&learned.pairs[that.s], &learned.pairs[that.y]);
-            let sy = vectors::dot(workers, s, other_y);
-            let ys = if other == slot { sy } else { vectors::dot(workers, other_s, y) };
-            let yw = vectors::dot(workers, other_y, &self.images[this.image.clone()]);
-            let Products { sy: all, yw: images } = &mut self.parts[number].products;
-            (all[slot][other], all[other][slot]) = (sy, ys);
-            (images[slot][other], images[other][slot]) = (yw, yw);
+            *factors = [(&learned.pairs[that.s], y), (&learned.pairs[that.y], image)];
+        }
+        let count = 2 * others().count();
+        let mut found = [0.0; MOST_DOTS];
+        vectors::dots(workers, &factors[..count], &mut found[..count]);
+        let products = &mut self.parts[number].products;
+        for (&[sy, yw], other) in found.as_chunks::<2>().0.iter().zip(others()) {
+            products.sy[other][slot] = sy;
+            (products.yw[slot][other], products.yw[other][slot]) = (yw, yw);
         }
     }
 
@@ -117,7 +137,7 @@ impl<S: Real> Memory<S> {
         let kept = learned.parts[number];
         for slot in slots(self.history(), kept.count, kept.newest) {
             let Pair { y, image, .. } = Pair::places(slot, vertices, &part.vertices);
-            self.preconditioner.apply(number, &learned.pairs[y], &mut self.images[image]);
+            self.preconditioner.apply(workers, number, &learned.pairs[y], &mut self.images[image]);
         }
         for slot in slots(self.history(), kept.count, kept.newest) {
             self.multiply_pair(layout, workers, number, learned, slot);
@@ -147,27 +167,36 @@ impl<S: Real> Memory<S> {
             }
             let mut slope = f64::NAN;
             if learned.parts[number].count > 0 {
-                self.recur(step.layout, workers, number, learned);
-                slope = self.slope(workers, part);
+                slope = self.recur(step.layout, workers, number, learned);
                 self.parts[number].length = 1.0;
             }
             // A comparison that is false of what is no number as well.
             if !(slope < 0.0 && slope.is_finite()) {
                 learned.parts[number].count = 0;
-                for v in part.vertices.clone() {
-                    self.direction[v] = -self.z[v];
-                }
-                slope = self.slope(workers, part);
+                slope = self.combine(workers, number, part, -S::ONE, &[]);
                 self.parts[number].length = self.first_length(step, data, number, slope);
             }
             self.parts[number].slope = slope;
-            self.stop_at_resolution(number, part);
+            self.stop_at_resolution(number);
         }
     }
 
-    fn slope(&self, workers: &Workers, part: &Part) -> f64 {
+    /// The direction as a sum of vectors of a part: of `z` and others, times these numbers. Returns its slope [J s^2].
+    fn combine(
+        &mut self,
+        workers: &Workers,
+        number: usize,
+        part: &Part,
+        scale: S,
+        terms: &[(S, &[Vec3<S>])],
+    ) -> f64 {
         let range = part.vertices.clone();
-        vectors::dot(workers, &self.gradient[range.clone()], &self.direction[range])
+        let Self { z, direction, gradient, pinned, parts, .. } = self;
+        let (z, pinned) = (&z[range.clone()], &pinned[range.clone()]);
+        let all = Combination { z, scale, terms, pinned };
+        let [slope, longest] = all.find(workers, &gradient[range.clone()], &mut direction[range]);
+        parts[number].longest = longest.sqrt();
+        slope
     }
 
     /// The length of a direction that no pair has scaled: to the minimum along it, as curvature tells.
@@ -189,29 +218,33 @@ impl<S: Real> Memory<S> {
         if length.is_finite() && length > 0.0 { length } else { 0.0 }
     }
 
-    /// The direction by the two loops.
+    /// The direction by the two loops; returns its slope [J s^2].
     fn recur(
         &mut self,
         layout: &Layout<S>,
         workers: &Workers,
         number: usize,
         learned: &Learned<S>,
-    ) {
+    ) -> f64 {
         let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
         let kept = learned.parts[number];
         let range = part.vertices.clone();
         let ring = self.history();
-        let mut with_gradient = [[0.0; 2]; MOST_HISTORY];
-        for slot in slots(ring, kept.count, kept.newest) {
+        let order = || slots(ring, kept.count, kept.newest);
+        let g = &self.gradient[range.clone()];
+        let mut factors: [Factors<'_, S>; MOST_DOTS] = [(g, g); MOST_DOTS];
+        for (factors, slot) in factors.as_chunks_mut::<2>().0.iter_mut().zip(order()) {
             let Pair { s, image, .. } = Pair::places(slot, vertices, &range);
-            let g = &self.gradient[range.clone()];
-            with_gradient[slot] = [
-                vectors::dot(workers, &learned.pairs[s], g),
-                vectors::dot(workers, &self.images[image], g),
-            ];
+            *factors = [(&learned.pairs[s], g), (&self.images[image], g)];
+        }
+        let count = 2 * kept.count as usize;
+        let mut found = [0.0; MOST_DOTS];
+        vectors::dots(workers, &factors[..count], &mut found[..count]);
+        let mut with_gradient = [[0.0; 2]; MOST_HISTORY];
+        for (&found, slot) in found.as_chunks::<2>().0.iter().zip(order()) {
+            with_gradient[slot] = found;
         }
         let products = &self.parts[number].products;
-        let order = || slots(ring, kept.count, kept.newest);
         let (mut a, mut c) = ([0.0; MOST_HISTORY], [0.0; MOST_HISTORY]);
         for (k, i) in order().enumerate() {
             let newer: f64 = order().take(k).map(|j| a[j] * products.sy[i][j]).sum();
@@ -226,40 +259,33 @@ impl<S: Real> Memory<S> {
             let yr = scale * (with_gradient[i][1] - images) + older;
             c[i] = a[i] - yr / products.sy[i][i];
         }
-        let Self { z, direction, images, .. } = self;
-        let minus = S::from_f64(-scale);
-        for v in range.clone() {
-            direction[v] = z[v] * minus;
-        }
-        for i in order() {
+        // Taken out, and put back: the direction is written meanwhile.
+        let images = std::mem::take(&mut self.images);
+        let mut terms: [(S, &[Vec3<S>]); MOST_TERMS] = [(S::ZERO, &[]); MOST_TERMS];
+        for (terms, i) in terms.as_chunks_mut::<2>().0.iter_mut().zip(order()) {
             let Pair { s, image, .. } = Pair::places(i, vertices, &range);
             let (of_image, of_step) = (S::from_f64(scale * a[i]), S::from_f64(-c[i]));
-            let pairs = learned.pairs[s].iter().zip(&images[image]);
-            for (d, (s, w)) in direction[range.clone()].iter_mut().zip(pairs) {
-                *d += *w * of_image + *s * of_step;
-            }
+            *terms = [(of_image, &images[image]), (of_step, &learned.pairs[s])];
         }
+        let scale = S::from_f64(-scale);
+        let slope = self.combine(workers, number, part, scale, &terms[..count]);
+        self.images = images;
+        slope
     }
 
-    /// Ends the solve of a part whose next step is round-off. Pinned vertices do not move.
-    fn stop_at_resolution(&mut self, number: usize, part: &Part) {
-        let mut longest = S::ZERO;
-        for v in part.vertices.clone() {
-            if self.pinned[v] {
-                self.direction[v] = Vec3::ZERO;
-            }
-            longest = longest.max(self.direction[v].length_squared());
-        }
+    /// Ends the solve of a part whose next step is round-off.
+    fn stop_at_resolution(&mut self, number: usize) {
         let progress = &mut self.parts[number];
-        let longest = progress.length * longest.to_f64().sqrt();
+        let longest = progress.length * progress.longest;
         if !(longest > progress.resolution && longest.is_finite()) {
             progress.phase = Phase::Done;
             progress.ahead = false;
         }
     }
 
-    /// Leaves the pair of an accepted step behind the newest one, if it tells more than round-off.
-    pub(super) fn offer_pair(
+    /// Goes over to an accepted trial, and leaves the pair of the step there behind the newest one, if it tells more than
+    /// round-off.
+    pub(super) fn take_over(
         &mut self,
         vertices: usize,
         number: usize,
@@ -267,22 +293,34 @@ impl<S: Real> Memory<S> {
         data: &StepData<S>,
         learned: &mut Learned<S>,
     ) {
-        let slot = next_slot(self.history(), &learned.parts[number]);
-        let Pair { s, y, .. } = Pair::places(slot, vertices, &part.vertices);
-        let mut longest = S::ZERO;
-        for v in part.vertices.clone() {
-            let moved = data.points[v].vec3() - self.base[v].vec3();
-            longest = longest.max(moved.length_squared());
-        }
-        let is_clear = longest.to_f64().sqrt() > CLEAR_STEP * self.parts[number].resolution;
-        self.has_new_pair[number] = is_clear;
-        if !is_clear {
+        let range = part.vertices.clone();
+        let progress = &self.parts[number];
+        let moved = progress.length * progress.longest;
+        let leaves_pair =
+            progress.phase == Phase::Iterating && moved > CLEAR_STEP * progress.resolution;
+        self.has_new_pair[number] = leaves_pair;
+        let ring = self.history();
+        let Self { base, gradient, trial_gradient, .. } = self;
+        let (x, g) = (&mut base[range.clone()], &mut gradient[range.clone()]);
+        let (y, trial) = (&data.points[range.clone()], &trial_gradient[range.clone()]);
+        if !leaves_pair {
+            x.copy_from_slice(y);
+            g.copy_from_slice(trial);
             return;
         }
-        for (v, (s, y)) in part.vertices.clone().zip(s.zip(y)) {
-            learned.pairs[s] = data.points[v].vec3() - self.base[v].vec3();
-            learned.pairs[y] = self.trial_gradient[v] - self.gradient[v];
-        }
+        let slot = next_slot(ring, &learned.parts[number]);
+        let pair = Pair::places(slot, vertices, &range);
+        let (s, change) = learned.pairs.split_at_mut(pair.y.start);
+        let (s, change) = (Shared::new(&mut s[pair.s]), Shared::new(&mut change[..range.len()]));
+        let (x, g) = (Shared::new(x), Shared::new(g));
+        vectors::each_piece(&data.constants.workers, range.len(), |range| {
+            for i in range {
+                // SAFETY: pieces do not overlap.
+                let (s, change, x, g) = unsafe { (s.at(i), change.at(i), x.at(i), g.at(i)) };
+                (*s, *change) = (y[i].vec3() - x.vec3(), trial[i] - *g);
+                (*x, *g) = (y[i], trial[i]);
+            }
+        });
     }
 }
 

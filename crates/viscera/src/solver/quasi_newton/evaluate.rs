@@ -1,11 +1,11 @@
-//! Gradient of the incremental potential at a trial, and its change on the way there, in one pass without colours.
+//! Gradient of the incremental potential at a trial, and its change on the way there, in passes without colours.
 //!
 //! ```text
+//! grad_i Phi(y) = m_i (y_i - xt_i) - he^2 f_i(y),   slope at y: grad Phi(y).(y - x)
 //! Phi(y) - Phi(x) = sum_i m_i (y - x).(x - xt + (y - x)/2) + he^2 sum_t V_t (W(F + D) - W(F)),   F + D at y
-//! grad_i Phi(y) = m_i (y_i - xt_i) - he^2 f_i(y)
 //! ```
 //!
-//! Every tetrahedron gives the change of its energy, computed from the change of its deformation: round-off is that of
+//! The change is computed only where the slope does not tell enough ([`super::parts::Progress::is_settled_by`]). Every tetrahedron gives the change of its energy, computed from the change of its deformation: round-off is that of
 //! the change, not that of the energy. So single precision tells apart steps that lower the potential by a
 //! ten-millionth of itself. Sums are in double precision and in a fixed order.
 
@@ -24,11 +24,15 @@ use crate::scalar::{Real, Vec3};
 use crate::solver::cpu::tets::{Block, TetPass, load_rows};
 use crate::solver::cpu::threads::Shared;
 use crate::solver::step::data::{Step, StepConstants, gather};
-use crate::solver::step::law::{OfLaw, with_tissue};
+use crate::solver::step::gradient::add_elements;
+use crate::solver::step::law::{OfLaw, respond, with_tissue};
 use crate::solver::step::tissue::Tissue;
 
 /// Vertices whose sums are taken first. Part of the result's bits.
 const VERTEX_PIECE: usize = 1024;
+
+/// Copies of vertices that a thread clears at a time.
+const COPY_GRAIN: usize = 4096;
 
 /// A part's change of the potential.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,7 +56,9 @@ impl Change {
 /// Evaluates parts.
 #[derive(Clone, Debug)]
 pub struct Evaluation {
-    /// Of each part, as of its last evaluation.
+    /// Of each part: the slope of the potential [J s^2] at its last trial, along the way from the iterate.
+    pub slopes: Vec<f64>,
+    /// Of each part the change on that way, as of its last evaluation.
     pub changes: Vec<Change>,
     /// Blocks of all parts, part by part.
     blocks: Vec<BlockPiece>,
@@ -102,6 +108,7 @@ impl Evaluation {
         blocks.shrink_to_fit();
         vertices.shrink_to_fit();
         Self {
+            slopes: vec![0.0; layout.part_count()],
             changes: vec![Change::default(); layout.part_count()],
             block_sums: vec![Change::default(); blocks.len()],
             vertex_sums: vec![Change::default(); vertices.len()],
@@ -112,16 +119,17 @@ impl Evaluation {
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.changes[..])
+        size_of_val(&self.slopes[..])
+            + size_of_val(&self.changes[..])
             + size_of_val(&self.blocks[..])
             + size_of_val(&self.vertices[..])
             + size_of_val(&self.block_sums[..])
             + size_of_val(&self.vertex_sums[..])
     }
 
-    /// Changes of the parts that `acts` names, and their gradient [N s^2] at the trial; zero where pinned. `loads` has
-    /// room for what elements do to each copy.
-    pub fn evaluate<S: Real>(
+    /// Gradient [N s^2] at the trial of the parts that `acts` names, zero where pinned, and its slope. `loads` has room for
+    /// what elements do to each copy.
+    pub fn gradient<S: Real>(
         &mut self,
         constants: &StepConstants<S>,
         step: &Step<'_, S>,
@@ -131,12 +139,29 @@ impl Evaluation {
         gradient: &mut [Vec3<S>],
     ) {
         let layout = step.layout;
-        self.add_tets(constants, step, way, &acts, loads);
-        let squared = step.dt * step.dt;
-        for (number, part) in layout.parts.iter().enumerate().filter(|(number, _)| acts(*number)) {
-            let change = &mut self.changes[number];
-            *change = Change::default();
-            for_each_kind!(layout, set => add_elements(set, change, squared, way, part, loads));
+        for (_, part) in layout.parts.iter().enumerate().filter(|(number, _)| acts(*number)) {
+            let copies = Shared::new(&mut loads[part.copies.clone()]);
+            constants.workers.each(part.copies.len(), COPY_GRAIN, |range| {
+                // SAFETY: pieces do not overlap.
+                unsafe { copies.range(range) }.fill(Point::default());
+            });
+        }
+        let shared = Shared::new(loads);
+        constants.workers.each(self.blocks.len(), 1, |range| {
+            for BlockPiece { law, blocks, .. } in
+                self.blocks[range].iter().filter(|piece| acts(piece.part))
+            {
+                let set = &layout.tet_sets[*law];
+                let start_strain = &constants.start_strain[*law];
+                let forces = Forces { x: way.to, start_strain, dt: step.dt, loads: &shared };
+                with_tissue!(set, L, VISCOUS => {
+                    let pass = OfLaw::<_, L, VISCOUS>::new(&forces);
+                    constants.workers.piece(layout, set, blocks.clone(), &pass);
+                });
+            }
+        });
+        for (_, part) in layout.parts.iter().enumerate().filter(|(number, _)| acts(*number)) {
+            add_elements(layout, &way.moments, part, way.to, loads);
         }
         let (pieces, loads) = (&self.vertices, &*loads);
         let (sums, into) = (Shared::new(&mut self.vertex_sums), Shared::new(gradient));
@@ -145,48 +170,34 @@ impl Evaluation {
                 let range = pieces[i].vertices.clone();
                 // SAFETY: every piece is worked on once, and has vertices of its own.
                 let gradient = unsafe { into.range(range.clone()) };
-                let sum = vertices(constants, layout, way, loads, range, gradient);
+                let slope = vertex_gradient(constants, layout, way, loads, range, gradient);
                 // SAFETY: as above.
-                unsafe { *sums.at(i) = sum };
+                unsafe { *sums.at(i) = Change::of(slope) };
             }
         });
-        for (piece, sum) in self.blocks.iter().zip(&self.block_sums).filter(|(p, _)| acts(p.part)) {
-            self.changes[piece.part] = self.changes[piece.part].plus(*sum);
-        }
-        for (piece, sum) in
-            self.vertices.iter().zip(&self.vertex_sums).filter(|(p, _)| acts(p.part))
-        {
-            self.changes[piece.part] = self.changes[piece.part].plus(*sum);
+        for (number, slope) in self.slopes.iter_mut().enumerate().filter(|(n, _)| acts(*n)) {
+            let of_part = pieces.iter().zip(&self.vertex_sums).filter(|(p, _)| p.part == number);
+            *slope = of_part.map(|(_, sum)| sum.potential).sum();
         }
     }
 
-    /// Forces of tetrahedra, per copy, and the change of their energy.
-    fn add_tets<S: Real>(
+    /// The change of a part's potential on its way.
+    pub fn change<S: Real>(
         &mut self,
         constants: &StepConstants<S>,
         step: &Step<'_, S>,
         way: &Way<'_, S>,
-        acts: &(impl Fn(usize) -> bool + Sync),
-        loads: &mut [Point<S>],
+        number: usize,
     ) {
-        let layout = step.layout;
-        for (_, part) in layout.parts.iter().enumerate().filter(|(number, _)| acts(*number)) {
-            loads[part.copies.clone()].fill(Point::default());
-        }
-        let pieces = &self.blocks;
-        let (sums, loads) = (Shared::new(&mut self.block_sums), Shared::new(loads));
+        let (layout, part) = (step.layout, &step.layout.parts[number]);
+        let (pieces, sums) = (&self.blocks, Shared::new(&mut self.block_sums));
         constants.workers.each(pieces.len(), 1, |range| {
-            for i in range.filter(|&i| acts(pieces[i].part)) {
+            for i in range.filter(|&i| pieces[i].part == number) {
                 let BlockPiece { law, ref blocks, .. } = pieces[i];
                 let set = &layout.tet_sets[law];
-                let tets = Tets {
-                    from: way.from,
-                    to: way.to,
-                    start_strain: &constants.start_strain[law],
-                    dt: step.dt,
-                    loads: &loads,
-                    sum: Cell::default(),
-                };
+                let start_strain = &constants.start_strain[law];
+                let Way { from, to, .. } = *way;
+                let tets = Changes { from, to, start_strain, dt: step.dt, sum: Cell::default() };
                 with_tissue!(set, L, VISCOUS => {
                     let pass = OfLaw::<_, L, VISCOUS>::new(&tets);
                     constants.workers.piece(layout, set, blocks.clone(), &pass);
@@ -195,6 +206,21 @@ impl Evaluation {
                 unsafe { *sums.at(i) = tets.sum.get() };
             }
         });
+        let (pieces, sums) = (&self.vertices, Shared::new(&mut self.vertex_sums));
+        constants.workers.each(pieces.len(), 1, |range| {
+            for i in range.filter(|&i| pieces[i].part == number) {
+                let sum = vertex_change(constants, way, pieces[i].vertices.clone());
+                // SAFETY: every piece is worked on once.
+                unsafe { *sums.at(i) = sum };
+            }
+        });
+        let mut change = Change::default();
+        let squared = step.dt * step.dt;
+        for_each_kind!(layout, set => element_changes(set, &mut change, squared, way, part));
+        let blocks = self.blocks.iter().zip(&self.block_sums).filter(|(p, _)| p.part == number);
+        change = blocks.fold(change, |change, (_, sum)| change.plus(*sum));
+        let vertices = pieces.iter().zip(&self.vertex_sums).filter(|(p, _)| p.part == number);
+        self.changes[number] = vertices.fold(change, |change, (_, sum)| change.plus(*sum));
     }
 }
 
@@ -312,45 +338,57 @@ fn cut(range: Range<usize>, size: usize) -> impl Iterator<Item = Range<usize>> {
     range.step_by(size).map(move |start| start..(start + size).min(end))
 }
 
-struct Tets<'a, S> {
+struct Forces<'a, S> {
+    x: &'a [Point<S>],
+    start_strain: &'a [[Eight<S>; 6]],
+    dt: f64,
+    loads: &'a Shared<'a, Point<S>>,
+}
+
+impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Forces<'_, S>, W, VISCOUS> {
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let Forces { x, start_strain, dt, loads } = *self.pass;
+        let (_, _, response) = respond::<S, L, W, VISCOUS>(tets, x, start_strain, dt);
+        let volume = tets.volume::<L>() * L::from_f64(dt * dt);
+        let forces = internal_forces(&response.piola, &tets.shape(), volume);
+        // SAFETY: the piece has copies of its own, and one thread does all of it.
+        unsafe { tets.add_in_order(loads, &forces) };
+    }
+}
+
+struct Changes<'a, S> {
     from: &'a [Point<S>],
     to: &'a [Point<S>],
     start_strain: &'a [[Eight<S>; 6]],
     dt: f64,
-    loads: &'a Shared<'a, Point<S>>,
     sum: Cell<Change>,
 }
 
-impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Tets<'_, S>, W, VISCOUS> {
+impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Changes<'_, S>, W, VISCOUS> {
     #[inline(always)]
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
-        let Tets { from, to, start_strain, dt, loads, ref sum } = *self.pass;
-        let (x, before) = (tets.corners::<L>(to).x, tets.corners::<L>(from).x);
-        // Back along the way: the change from `y` to `x`, turned round.
-        let mut back = before;
+        let Changes { from, to, start_strain, dt, ref sum } = *self.pass;
+        let (before, mut moved) = (tets.corners::<L>(from).x, tets.corners::<L>(to).x);
         for corner in 0..4 {
-            back[corner] = before[corner] - x[corner];
+            moved[corner] = moved[corner] - before[corner];
         }
         let shape = tets.shape::<L>();
-        let f = deformation_gradient(&x, &shape);
-        let d = deformation_gradient(&back, &shape);
+        let f = deformation_gradient(&before, &shape);
+        let d = deformation_gradient(&moved, &shape);
         let tissue = Tissue::new(W::MODEL, &tets.material(), dt);
         let mut start = [L::ZERO; 6];
         let is_viscous = VISCOUS && tets.is_viscous();
         if is_viscous {
             start = load_rows(start_strain[tets.index].as_flattened(), tets.lane);
         }
-        let start = is_viscous.then_some(&start);
-        let response = tissue.respond_by::<W>(&f, start);
+        let change = tissue.energy_change_of::<W>(&f, &d, is_viscous.then_some(&start));
         let volume = tets.volume::<L>() * L::from_f64(dt * dt);
-        let forces = internal_forces(&response.piola, &shape, volume);
-        // SAFETY: the piece has copies of its own, and one thread does all of it.
-        unsafe { tets.add_in_order(loads, &forces) };
         let mut changes = [S::ZERO; LANES];
-        (volume * tissue.energy_change_of::<W>(&f, &d, start)).store(&mut changes, tets.lane);
+        (volume * change).store(&mut changes, tets.lane);
         let mut all = sum.get();
         for lane in tets.lane..(tets.lane + L::WIDTH).min(tets.filled()) {
-            let change = -changes[lane].to_f64();
+            let change = changes[lane].to_f64();
             all.potential += change;
             all.size += change.abs();
         }
@@ -358,51 +396,57 @@ impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Tets<'_, S>,
     }
 }
 
-/// Adds what a part's elements of one kind do. Their energies are computed in double precision.
-fn add_elements<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
+/// Adds the change of what a part's elements of one kind store, in double precision.
+fn element_changes<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
     set: &ElementSet<S, K, N, M>,
     change: &mut Change,
     squared: f64,
     way: &Way<'_, S>,
     part: &Part,
-    loads: &mut [Point<S>],
 ) {
     for i in set.of_part(part) {
-        let (from, to) = (set.places(i, way.from), set.places(i, way.to));
-        let forces = set.element::<S>(i, &way.moments).forces(&to);
-        for (copy, force) in set.copies[i].into_iter().zip(forces) {
-            loads[copy as usize].add(Point::new(force * S::from_f64(squared), S::ZERO));
-        }
-        let from = from.map(|x| x.cast::<f64>());
+        let from = set.places(i, way.from).map(|x| x.cast::<f64>());
+        let to = set.places(i, way.to);
         let moved: [Vec3<f64>; N] = std::array::from_fn(|a| to[a].cast::<f64>() - from[a]);
         let term = set.element::<f64>(i, &way.moments).energy_change(&from, &moved);
         *change = change.plus(Change::of(squared * term));
     }
 }
 
-/// The gradient by some vertices, and the change of inertia's part of the potential.
-fn vertices<S: Real>(
+/// The gradient by some vertices, and its slope.
+fn vertex_gradient<S: Real>(
     constants: &StepConstants<S>,
     layout: &Layout<S>,
     way: &Way<'_, S>,
     loads: &[Point<S>],
     range: Range<usize>,
     gradient: &mut [Vec3<S>],
-) -> Change {
-    let mut sum = Change::default();
+) -> f64 {
+    let mut slope = 0.0;
     for (v, into) in range.zip(gradient) {
         if constants.inverse_masses[v] == S::ZERO {
             *into = Vec3::ZERO;
             continue;
         }
-        let (mass, target) = (constants.inertias[v], constants.predicted[v].vec3());
-        let away = way.to[v].vec3() - target;
-        *into = away * mass - gather(layout, loads, v).vec3();
-        let away = away.cast::<f64>();
-        let moved = way.to[v].vec3().cast::<f64>() - way.from[v].vec3().cast::<f64>();
-        let term = mass.to_f64() * moved.dot(away - moved * 0.5);
-        sum.potential += term;
-        sum.size += term.abs();
+        let place = way.to[v].vec3();
+        let away = place - constants.predicted[v].vec3();
+        *into = away * constants.inertias[v] - gather(layout, loads, v).vec3();
+        slope += into.dot(place - way.from[v].vec3()).to_f64();
     }
-    sum
+    slope
+}
+
+/// The change of inertia's part of the potential by some vertices.
+fn vertex_change<S: Real>(
+    constants: &StepConstants<S>,
+    way: &Way<'_, S>,
+    range: Range<usize>,
+) -> Change {
+    let free = range.filter(|&v| constants.inverse_masses[v] != S::ZERO);
+    free.fold(Change::default(), |sum, v| {
+        let away = (way.to[v].vec3() - constants.predicted[v].vec3()).cast::<f64>();
+        let moved = way.to[v].vec3().cast::<f64>() - way.from[v].vec3().cast::<f64>();
+        let term = constants.inertias[v].to_f64() * moved.dot(away - moved * 0.5);
+        sum.plus(Change::of(term))
+    })
 }

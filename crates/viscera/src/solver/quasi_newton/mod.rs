@@ -13,6 +13,7 @@
 //! An iteration is `Evaluate` (gradient and change of `Phi` at a trial), `Judge` (take it, or come nearer),
 //! `Precondition`, `ChooseDirection`, `Advance` (the next trial). Every connected part has its own directions, step
 //! lengths and verdicts.
+#![allow(unsafe_code)]
 
 mod choice;
 mod direction;
@@ -31,6 +32,7 @@ use crate::material::MaterialConstants;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
 use crate::settings::{Count, Integrator, SolverSettings};
+use crate::solver::cpu::threads::Shared;
 use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
 use crate::solver::report::StepReport;
 use crate::solver::step::data::{Step, StepData};
@@ -249,7 +251,7 @@ impl<S: Real> Memory<S> {
         match stage {
             QuasiNewtonStage::Begin => self.begin(step, data, state),
             QuasiNewtonStage::StartSolve(which) => self.start_solve(which, step, data, learned),
-            QuasiNewtonStage::Evaluate => self.evaluate(&solve, data),
+            QuasiNewtonStage::Evaluate => self.evaluate(&solve, data, learned),
             QuasiNewtonStage::Judge => self.judge(&solve, data, learned),
             QuasiNewtonStage::Precondition => {
                 self.precondition(&solve, &data.constants.workers, learned);
@@ -263,13 +265,20 @@ impl<S: Real> Memory<S> {
     }
 
     /// [`QuasiNewtonStage::Evaluate`].
-    fn evaluate(&mut self, solve: &Step<'_, S>, data: &mut StepData<S>) {
+    fn evaluate(&mut self, solve: &Step<'_, S>, data: &mut StepData<S>, learned: &Learned<S>) {
         let Self { evaluation, parts, base, stage_start, trial_gradient, .. } = self;
         let StepData { constants, points, loads, .. } = data;
         let moments = moments(solve, stage_start);
         let way = Way { from: base, to: points, moments };
         let acts = |part: usize| parts[part].acts();
-        evaluation.evaluate(constants, solve, &way, acts, loads, trial_gradient);
+        evaluation.gradient(constants, solve, &way, acts, loads, trial_gradient);
+        for (number, progress) in parts.iter_mut().enumerate().filter(|(_, part)| part.acts()) {
+            let slope = evaluation.slopes[number];
+            progress.settled = progress.is_settled_by(slope, learned.parts[number].calm);
+            if !progress.settled {
+                evaluation.change(constants, solve, &way, number);
+            }
+        }
     }
 
     /// [`QuasiNewtonStage::Judge`].
@@ -285,12 +294,8 @@ impl<S: Real> Memory<S> {
             let round_off = ROUNDED * S::EPSILON * change.size;
             progress.accepted = match progress.phase {
                 Phase::Done => continue,
-                // Where the last solve was calm its start is as good as any: it has the velocity. A step that nothing
-                // checks afterwards may end no higher than its reference.
-                Phase::Starting => {
-                    let is_trusted = learned.parts[number].calm && progress.scheme.is_checked();
-                    change.potential.is_finite() && (is_trusted || change.potential <= round_off)
-                }
+                _ if progress.settled => true,
+                Phase::Starting => change.potential <= round_off,
                 Phase::FromReference => true,
                 Phase::Iterating => progress.suffices(change.potential, change.size, S::EPSILON),
             };
@@ -299,13 +304,9 @@ impl<S: Real> Memory<S> {
                 self.reject(number, range, data);
                 continue;
             }
-            if progress.phase == Phase::Iterating {
-                self.offer_pair(vertices, number, part, data, learned);
-            }
+            self.take_over(vertices, number, part, data, learned);
             let progress = &mut self.parts[number];
             (progress.phase, progress.failures, progress.ahead) = (Phase::Iterating, 0, false);
-            self.base[range.clone()].copy_from_slice(&data.points[range.clone()]);
-            self.gradient[range.clone()].copy_from_slice(&self.trial_gradient[range]);
         }
     }
 
@@ -333,10 +334,15 @@ impl<S: Real> Memory<S> {
             if progress.phase == Phase::Iterating {
                 progress.ahead = true;
                 let length = S::from_f64(progress.length);
-                for v in part.vertices.clone() {
-                    let place = self.base[v].vec3() + self.direction[v] * length;
-                    data.points[v].set_vec3(place);
-                }
+                let range = part.vertices.clone();
+                let (x, d) = (&self.base[range.clone()], &self.direction[range.clone()]);
+                let points = Shared::new(&mut data.points[range.clone()]);
+                vectors::each_piece(&data.constants.workers, range.len(), |range| {
+                    for v in range {
+                        // SAFETY: pieces do not overlap.
+                        unsafe { points.at(v) }.set_vec3(x[v].vec3() + d[v] * length);
+                    }
+                });
             }
         }
     }

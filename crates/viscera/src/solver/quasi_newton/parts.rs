@@ -2,6 +2,10 @@
 
 use crate::settings::MOST_HISTORY;
 
+/// A trial is accepted without its change where the potential still falls there, no more steeply than at the start, or rises
+/// by this share of the slope at the start at most: by the trapezoid rule it has then fallen by a quarter of that slope or more.
+const SETTLED: f64 = 0.5;
+
 /// How a part takes a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scheme {
@@ -38,7 +42,7 @@ pub enum Phase {
 /// Inner products of the pairs of a part, by their places.
 #[derive(Clone, Copy, Debug)]
 pub struct Products {
-    /// `s_i . y_j`.
+    /// `s_i . y_j` of pairs `i` that are not newer than `j`.
     pub sy: [[f64; MOST_HISTORY]; MOST_HISTORY],
     /// `y_i . M y_j`.
     pub yw: [[f64; MOST_HISTORY]; MOST_HISTORY],
@@ -57,6 +61,8 @@ pub struct Progress {
     pub phase: Phase,
     /// Passes that are left to it in this solve.
     pub passes_left: u32,
+    /// Whether the slope at the trial is enough to accept it.
+    pub settled: bool,
     /// Whether the last trial was accepted, so that a new direction is to be found.
     pub accepted: bool,
     /// Whether the trial is a step from the iterate that nothing has judged yet.
@@ -65,6 +71,8 @@ pub struct Progress {
     pub length: f64,
     /// `g . d` [J s^2].
     pub slope: f64,
+    /// The longest vector of the direction [m].
+    pub longest: f64,
     /// Trials in a row that were rejected, and all in this solve.
     pub failures: u32,
     pub rejections: u32,
@@ -77,5 +85,24 @@ impl Progress {
     /// Whether it has a trial to evaluate, and a pass left for that.
     pub fn acts(&self) -> bool {
         self.phase != Phase::Done && self.passes_left > 0
+    }
+
+    /// Whether a trial is accepted for the slope of the potential [J s^2] at its end, without its change. `calm`: no trial
+    /// of the last solve was rejected.
+    ///
+    /// Where the slope has fallen to a share of what it was, the trapezoid rule says that the potential has fallen far more
+    /// than [`super::SUFFICIENT`] asks. Where the last solve was calm, the start of the next is as good as any: it has
+    /// the velocity. A step that nothing checks afterwards is judged by its change.
+    pub fn is_settled_by(&self, slope: f64, calm: bool) -> bool {
+        match self.phase {
+            Phase::Starting => self.scheme.is_checked() && calm && slope.is_finite(),
+            Phase::Iterating => {
+                let before = self.length * self.slope;
+                let is_between = slope <= -SETTLED * before && slope >= before;
+                self.scheme.is_checked() && is_between
+            }
+            Phase::FromReference => true,
+            Phase::Done => false,
+        }
     }
 }

@@ -69,7 +69,7 @@ impl<S: Real> Memory<S> {
         let Self { evaluation, base, stage_start, trial_gradient, .. } = self;
         let StepData { constants, points, loads, .. } = data;
         let way = Way { from: base, to: points, moments: moments(step, stage_start) };
-        evaluation.evaluate(constants, step, &way, acts, loads, trial_gradient);
+        evaluation.gradient(constants, step, &way, acts, loads, trial_gradient);
     }
 
     /// Of a part, in the shape in which it gives way to a load along an axis; zero where that tells nothing.
@@ -94,7 +94,8 @@ impl<S: Real> Memory<S> {
         let mut rz = f64::INFINITY;
         for _ in 0..ITERATIONS {
             let Self { preconditioner, gradient, z, .. } = self;
-            preconditioner.apply(number, &gradient[range.clone()], &mut z[range.clone()]);
+            let (r, into) = (&gradient[range.clone()], &mut z[range.clone()]);
+            preconditioner.apply(&data.constants.workers, number, r, into);
             let before = rz;
             rz = self.along(data, number, |m| [&m.gradient, &m.z]);
             let share = S::from_f64(rz / before);

@@ -385,9 +385,14 @@ impl<S: Real> Memory<S> {
 
     /// [`super::stage::QuasiNewtonStage::LimitEnergy`].
     pub(super) fn limit_energy(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
-        self.measure_start_strain(step, data);
-        self.evaluator.evaluate_all(&data.constants, step, &data.points);
-        self.energies.end(step, data, &self.evaluator.stored);
+        // Where no part took its step again, all stand where their energies were found.
+        let stand = step.settings.integrator == Integrator::Sdirk2
+            && self.parts.iter().all(|part| part.scheme == Scheme::Sdirk2);
+        if !stand {
+            self.measure_start_strain(step, data);
+            self.evaluator.evaluate_all(&data.constants, step, &data.points);
+            self.energies.end(step, data, &self.evaluator.stored);
+        }
         self.energies.limit(step, data, |_, _| {});
         let round_off = (ENERGY_ROUNDED * S::EPSILON).max(SUM_ROUNDED);
         for (number, report) in self.reports.iter_mut().enumerate() {

@@ -1,7 +1,9 @@
 //! The response of a tetrahedron's tissue to a deformation: its law, and viscosity.
 
 use crate::elements::green_strain::{self, Voigt};
-use crate::elements::law::{Law, stretch_curvature, with_law};
+#[cfg(any(test, feature = "gpu"))]
+use crate::elements::law::with_law;
+use crate::elements::law::{Law, stretch_curvature};
 use crate::material::MaterialConstants;
 use crate::material::MaterialModel;
 use crate::scalar::{Mat3, Scalar, Vec3};

@@ -1,5 +1,8 @@
 //! A small dense symmetric system: the coarsest level.
 
+use crate::scalar::lanes::{Kernel, LANES, Lanes, run};
+use crate::solver::cpu::threads::Workers;
+
 /// A pivot below this share of its diagonal entry belongs to a direction that the others can do as well.
 const SMALLEST_PIVOT: f64 = 1e-10;
 
@@ -39,22 +42,8 @@ impl Dense {
 
     /// Cholesky's factor takes the place of the matrix. Directions that have no stiffness of their own get none of the
     /// solution.
-    pub fn factorize(&mut self) {
-        let n = self.size;
-        for i in 0..n {
-            let (before, rest) = self.values.split_at_mut(i * n);
-            let row = &mut rest[..n];
-            for j in 0..i {
-                let other = &before[j * n..j * n + j + 1];
-                let sum: f64 = dot(&row[..j], &other[..j]);
-                row[j] = (row[j] - sum) * other[j];
-            }
-            let diagonal = row[i];
-            let pivot = diagonal - dot(&row[..i], &row[..i]);
-            // The inverse of the factor's diagonal; zero leaves the unknown out.
-            let keeps = pivot > SMALLEST_PIVOT * diagonal && pivot.is_finite();
-            row[i] = if keeps { 1.0 / pivot.sqrt() } else { 0.0 };
-        }
+    pub fn factorize(&mut self, workers: &Workers) {
+        run::<f64>(workers.instructions, Factorize(self));
     }
 
     /// Where the right side is written before, and the solution read after [`Dense::solve`].
@@ -63,35 +52,74 @@ impl Dense {
     }
 
     /// Solves with the factor.
-    pub fn solve(&mut self) {
-        let n = self.size;
+    pub fn solve(&mut self, workers: &Workers) {
+        run::<f64>(workers.instructions, Solve(self));
+    }
+}
+
+struct Factorize<'a>(&'a mut Dense);
+
+impl Kernel<f64> for Factorize<'_> {
+    #[inline(always)]
+    fn run<L: Lanes<Real = f64>>(self) {
+        let Dense { size, values, .. } = self.0;
+        let n = *size;
         for i in 0..n {
-            let row = &self.values[i * n..i * n + i + 1];
-            let sum = dot(&row[..i], &self.right[..i]);
-            self.right[i] = (self.right[i] - sum) * row[i];
+            let (before, rest) = values.split_at_mut(i * n);
+            let row = &mut rest[..n];
+            for j in 0..i {
+                let other = &before[j * n..j * n + j + 1];
+                let sum = dot::<L>(&row[..j], &other[..j]);
+                row[j] = (row[j] - sum) * other[j];
+            }
+            let diagonal = row[i];
+            let pivot = diagonal - dot::<L>(&row[..i], &row[..i]);
+            // The inverse of the factor's diagonal; zero leaves the unknown out.
+            let keeps = pivot > SMALLEST_PIVOT * diagonal && pivot.is_finite();
+            row[i] = if keeps { 1.0 / pivot.sqrt() } else { 0.0 };
+        }
+    }
+}
+
+struct Solve<'a>(&'a mut Dense);
+
+impl Kernel<f64> for Solve<'_> {
+    #[inline(always)]
+    fn run<L: Lanes<Real = f64>>(self) {
+        let Dense { size, values, right } = self.0;
+        let n = *size;
+        for i in 0..n {
+            let row = &values[i * n..i * n + i + 1];
+            let sum = dot::<L>(&row[..i], &right[..i]);
+            right[i] = (right[i] - sum) * row[i];
         }
         for i in (0..n).rev() {
-            let row = &self.values[i * n..i * n + i + 1];
-            let value = self.right[i] * row[i];
-            self.right[i] = value;
-            for (right, entry) in self.right[..i].iter_mut().zip(row) {
+            let row = &values[i * n..i * n + i + 1];
+            let value = right[i] * row[i];
+            right[i] = value;
+            for (right, entry) in right[..i].iter_mut().zip(row) {
                 *right -= entry * value;
             }
         }
     }
 }
 
-/// Four sums side by side.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (a, b) = (a.as_chunks::<4>(), b.as_chunks::<4>());
-    let mut sums = [0.0; 4];
+/// Eight sums side by side.
+#[inline(always)]
+fn dot<L: Lanes<Real = f64>>(a: &[f64], b: &[f64]) -> f64 {
+    let (a, b) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    let mut sums = [0.0; LANES];
     for (a, b) in a.0.iter().zip(b.0) {
-        for lane in 0..4 {
-            sums[lane] += a[lane] * b[lane];
+        let mut lane = 0;
+        while lane < LANES {
+            (L::load(&sums, lane) + L::load(a, lane) * L::load(b, lane)).store(&mut sums, lane);
+            lane += L::WIDTH;
         }
     }
-    let rest: f64 = a.1.iter().zip(b.1).map(|(a, b)| a * b).sum();
-    (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
+    for (lane, (a, b)) in a.1.iter().zip(b.1).enumerate() {
+        sums[lane] += a * b;
+    }
+    ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]))
 }
 
 #[cfg(test)]
@@ -113,13 +141,13 @@ mod tests {
                 dense.add(i, j, entry(i, j));
             }
         }
-        dense.factorize();
+        dense.factorize(&Workers::one());
         let exact: Vec<f64> = (0..n).map(|i| number(7 * i + 3)).collect();
         for i in 0..n {
             dense.vector()[i] = (0..n).map(|j| entry(i, j) * exact[j]).sum();
         }
         dense.vector()[n] = 0.0;
-        dense.solve();
+        dense.solve(&Workers::one());
         for i in 0..n {
             assert!((dense.vector()[i] - exact[i]).abs() < 1e-10, "{i}");
         }

@@ -11,8 +11,10 @@
 //! iterations does not grow with the mesh.
 //!
 //! Each connected part has its own. Vertices that are pinned have no place in any level.
+#![allow(unsafe_code)]
 
 mod dense;
+mod full;
 mod prolongation;
 mod rotation;
 mod sums;
@@ -25,17 +27,20 @@ use crate::layout::{ElementSet, Layout, Moments, Part};
 use crate::model::for_each_kind;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Mat3, Real, Vec3};
+use crate::solver::cpu::threads::{Shared, Workers};
 use crate::solver::step::data::StepConstants;
 use dense::Dense;
+use full::FullSums;
 use prolongation::Prolongation;
 use rotation::Turn;
-use sums::{
-    DiagonalSums, FullBlock, FullSums, Grouped, Groups, On, Six, inverse, mapped, tets_of_part,
-    times,
-};
+use sums::{DiagonalSums, Grouped, Groups, On, Six, inverse, mapped, tets_of_part, times};
 
 /// Nodes of the coarsest level at most, where the levels can be made so: a dense system of three times as many.
 const MOST_COARSE: usize = 64;
+
+/// Nodes, and groups, that a thread does at a time.
+const BLOCK_GRAIN: usize = 256;
+const GROUP_GRAIN: usize = 32;
 
 /// Of all parts.
 #[derive(Clone, Debug)]
@@ -58,11 +63,13 @@ struct OfPart<S> {
     levels: Vec<DiagonalSums<S>>,
     inverses: Vec<Vec<Six<S>>>,
     full: FullSums,
+    /// Of each node of a group its mean gradient [1/m] by `R`, and by `A`.
+    turned: Vec<[Vec3<f64>; 2]>,
     dense: Dense,
     /// Residuals, and then corrections, of the lattice levels.
-    vectors: Vec<Vec<Vec3<S>>>,
-    /// The residual of free vertices.
-    masked: Vec<Vec3<S>>,
+    vectors: Vec<Vec<Point<S>>>,
+    /// The residual of the vertices.
+    residual: Vec<Point<S>>,
 }
 
 /// What the curvature of a step is made of.
@@ -132,21 +139,9 @@ impl<S: Real> Preconditioner<S> {
         self.parts[number].vertices.clone()
     }
 
-    /// `z = M r` of a part; both are of its vertices.
-    pub fn apply(&mut self, number: usize, r: &[Vec3<S>], z: &mut [Vec3<S>]) {
-        let part = &mut self.parts[number];
-        let free = &self.free[part.vertices.clone()];
-        // What was learned before a vertex was pinned may have something there.
-        let mut masked = std::mem::take(&mut part.masked);
-        for ((masked, r), &free) in masked.iter_mut().zip(r).zip(free) {
-            *masked = if free { *r } else { Vec3::ZERO };
-        }
-        part.apply(&masked, z);
-        part.masked = masked;
-        // Coarser levels move pinned vertices along.
-        for (z, _) in z.iter_mut().zip(free).filter(|(_, free)| !**free) {
-            *z = Vec3::ZERO;
-        }
+    /// `z = M r` of a part; both are of its vertices. Vertices that are not free count as nothing, and get nothing.
+    pub fn apply(&mut self, workers: &Workers, number: usize, r: &[Vec3<S>], z: &mut [Vec3<S>]) {
+        self.parts[number].apply(workers, r, z);
     }
 }
 
@@ -174,20 +169,18 @@ impl<S: Real> OfPart<S> {
         let count = |level: usize| {
             if level == 0 { places.len() } else { lattice.levels[level - 1].node_count() }
         };
-        let ways_up = lattice.levels.iter().enumerate().map(|(level, of)| {
-            Prolongation::new(if level == 0 { &of.of_vertices } else { &of.of_finer })
-        });
         let levels = lattice.levels.len();
         Self {
             vertices: part.vertices.clone(),
-            ways_up: ways_up.collect(),
+            ways_up: vec![Prolongation::default(); levels],
             groups: Groups::default(),
             levels: vec![DiagonalSums::default(); levels],
             inverses: (0..levels).map(|level| vec![[S::ZERO; 6]; count(level)]).collect(),
             full: FullSums::default(),
+            turned: Vec::new(),
             dense: Dense::new(3 * if has_dense(count(levels)) { count(levels) } else { 0 }),
-            vectors: (1..=levels).map(|level| vec![Vec3::ZERO; count(level)]).collect(),
-            masked: vec![Vec3::ZERO; places.len()],
+            vectors: (1..=levels).map(|level| vec![Point::default(); count(level)]).collect(),
+            residual: vec![Point::default(); places.len()],
             lattice,
         }
     }
@@ -212,7 +205,7 @@ impl<S: Real> OfPart<S> {
             + size_of_val(&self.groups.offsets[..])
             + size_of_val(&self.groups.laws[..])
             + size_of_val(&self.groups.viscosities[..])
-            + size_of_val(&self.masked[..])
+            + size_of_val(&self.residual[..])
             + self.full.bytes()
             + self.dense.bytes()
     }
@@ -230,6 +223,10 @@ impl<S: Real> OfPart<S> {
         let masses: Vec<f64> = user.iter().map(|&v| layout.masses[v as usize].to_f64()).collect();
         let grouped = Grouped::new(&tets, &places, &self.lattice);
         self.groups = Groups::new(&tets, &grouped, places.len());
+        for (level, (way, of)) in self.ways_up.iter_mut().zip(&self.lattice.levels).enumerate() {
+            let weights = if level == 0 { &of.of_vertices } else { &of.of_finer };
+            *way = Prolongation::new(weights, of.node_count(), |node| level > 0 || free[node]);
+        }
         let coarsest = self.lattice.levels.len();
         for (level, sums) in self.levels.iter_mut().take(coarsest).enumerate() {
             let on = Self::on(&self.lattice, level);
@@ -242,7 +239,10 @@ impl<S: Real> OfPart<S> {
                 self.inverses.resize(coarsest + 1, vec![[S::ZERO; 6]; sums.offsets.len() - 1]);
                 self.levels.resize(coarsest + 1, sums);
             }
-            _ => self.full = FullSums::new(on, &tets, &grouped, &masses, free),
+            _ => {
+                self.full = FullSums::new(on, &tets, &grouped, &masses, free);
+                self.turned = vec![[Vec3::ZERO; 2]; self.full.most];
+            }
         }
     }
 
@@ -257,19 +257,19 @@ impl<S: Real> OfPart<S> {
     ) {
         let x = &curvature.x[self.vertices.clone()];
         let squared = curvature.dt * curvature.dt;
-        for (group, turn) in turns[..self.groups.len()].iter_mut().enumerate() {
-            let range =
-                self.groups.offsets[group] as usize..self.groups.offsets[group + 1] as usize;
-            let mut f = Mat3::<f64>::from_columns(Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
-            for &(v, b) in &self.groups.entries[range] {
-                f = f + Mat3::outer(x[v as usize].vec3().cast::<f64>(), b.cast());
+        let groups = &self.groups;
+        let shared = Shared::new(&mut turns[..groups.len()]);
+        constants.workers.each(groups.len(), GROUP_GRAIN, |range| {
+            // SAFETY: every group is worked on once.
+            let turns = unsafe { shared.range(range.clone()) };
+            for (group, turn) in range.zip(turns) {
+                let rate = groups.viscosities[group] / curvature.dt;
+                *turn = Turn::new(groups.laws[group], &groups.deformation(group, x), rate);
             }
-            let rate = self.groups.viscosities[group] / curvature.dt;
-            *turn = Turn::new(self.groups.laws[group], &f, rate);
-        }
-        self.sum_blocks(constants, squared, turns);
-        self.sum_full(squared, turns);
+        });
         let free = &free[self.vertices.clone()];
+        self.sum_blocks(constants, squared, turns, free);
+        self.sum_full(squared, turns);
         for tether in constants.tethers_of(part) {
             let stiffness = squared * tether.stiffness.to_f64();
             let v = (tether.vertex - self.vertices.start) as u32;
@@ -279,30 +279,50 @@ impl<S: Real> OfPart<S> {
         }
         for_each_kind!(layout, set => self.add_elements(set, part, curvature, squared, free));
         for blocks in &mut self.inverses {
-            blocks.iter_mut().for_each(|block| *block = inverse(block));
+            let shared = Shared::new(blocks);
+            constants.workers.each(shared.len(), BLOCK_GRAIN, |range| {
+                // SAFETY: every node is worked on once.
+                let blocks = unsafe { shared.range(range) };
+                blocks.iter_mut().for_each(|block| *block = inverse(block));
+            });
         }
-        self.dense.factorize();
+        self.dense.factorize(&constants.workers);
     }
 
-    /// The blocks of all levels but a dense one, of inertia and tetrahedra.
-    fn sum_blocks(&mut self, constants: &StepConstants<S>, squared: f64, turns: &[Turn<S>]) {
+    /// The blocks of all levels but a dense one, of inertia and tetrahedra; zero of vertices that are not free.
+    fn sum_blocks(
+        &mut self,
+        constants: &StepConstants<S>,
+        squared: f64,
+        turns: &[Turn<S>],
+        free: &[bool],
+    ) {
         let inertias = &constants.inertias[self.vertices.clone()];
         let squared = S::from_f64(squared);
         for (sums, blocks) in self.levels.iter().zip(&mut self.inverses) {
-            let masses = if sums.masses.is_empty() { inertias } else { &sums.masses };
-            for (node, block) in blocks.iter_mut().enumerate() {
-                let (mut diagonal, mut sum) = (S::ZERO, [S::ZERO; 6]);
-                let shares = sums.offsets[node] as usize..sums.offsets[node + 1] as usize;
-                for share in &sums.shares[shares] {
-                    let turn = &turns[share.group as usize];
-                    diagonal += share.trace * turn.stiffer;
-                    let block = mapped(&turn.map, &share.b);
-                    sum.iter_mut().zip(block).for_each(|(sum, b)| *sum += b * turn.stiffer);
+            let are_vertices = sums.masses.is_empty();
+            let masses = if are_vertices { inertias } else { &sums.masses };
+            let shared = Shared::new(blocks);
+            constants.workers.each(shared.len(), BLOCK_GRAIN, |range| {
+                // SAFETY: every node is worked on once.
+                let blocks = unsafe { shared.range(range.clone()) };
+                for (node, block) in range.zip(blocks) {
+                    *block = [S::ZERO; 6];
+                    if are_vertices && !free[node] {
+                        continue;
+                    }
+                    let mut diagonal = S::ZERO;
+                    for share in sums.of_node(node) {
+                        let turn = &turns[share.group as usize];
+                        diagonal += share.trace * turn.stiffer;
+                        let mapped = mapped(&turn.map, &share.b);
+                        block.iter_mut().zip(mapped).for_each(|(sum, b)| *sum += b * turn.stiffer);
+                    }
+                    let diagonal = masses[node] + squared * diagonal;
+                    *block = block.map(|entry| entry * squared);
+                    block[..3].iter_mut().for_each(|entry| *entry += diagonal);
                 }
-                let diagonal = masses[node] + squared * diagonal;
-                *block = sum.map(|entry| entry * squared);
-                block[..3].iter_mut().for_each(|entry| *entry += diagonal);
-            }
+            });
         }
     }
 
@@ -315,13 +335,23 @@ impl<S: Real> OfPart<S> {
         for &(nodes, mass) in &self.full.masses {
             add_block(&mut self.dense, nodes, &(Mat3::IDENTITY * mass));
         }
-        for (group, turn) in turns[..self.groups.len()].iter().enumerate() {
+        let FullSums { groups, nodes, traces, .. } = &self.full;
+        for (group, turn) in groups.iter().zip(turns) {
             let (r, a) = (turn.rotation.cast::<f64>(), turn.map.cast::<f64>());
             let squared = squared * turn.stiffer.to_f64();
-            for &FullBlock { nodes, shear, volume } in &self.full.blocks[self.full.of_group(group)]
-            {
-                let block = r * shear * r.transpose() + a * volume * a.transpose();
-                add_block(&mut self.dense, nodes, &(block * squared));
+            let (shear, volume) = (squared * group.shear, squared * group.volume);
+            let turned = &mut self.turned[..group.nodes.len()];
+            for (turned, &(_, g)) in turned.iter_mut().zip(&nodes[group.nodes.clone()]) {
+                *turned = [r * g, a * g];
+            }
+            let mut traces = traces[group.traces..].iter();
+            for (i, &(node, _)) in nodes[group.nodes.clone()].iter().enumerate() {
+                let [shears, grows] = [turned[i][0] * shear, turned[i][1] * volume];
+                for (&(other, _), before) in nodes[group.nodes.clone()].iter().zip(&turned[..=i]) {
+                    let trace = squared * traces.next().copied().unwrap_or_default();
+                    let block = Mat3::outer(before[0], shears) + Mat3::outer(grows, before[1]);
+                    add_block(&mut self.dense, [node, other], &(block + Mat3::IDENTITY * trace));
+                }
             }
         }
     }
@@ -376,43 +406,45 @@ impl<S: Real> OfPart<S> {
         });
     }
 
-    fn apply(&mut self, r: &[Vec3<S>], z: &mut [Vec3<S>]) {
+    fn apply(&mut self, workers: &Workers, r: &[Vec3<S>], z: &mut [Vec3<S>]) {
+        let Self { ways_up, inverses, dense, vectors, residual, .. } = self;
+        for (point, r) in residual.iter_mut().zip(r) {
+            point.set_vec3(*r);
+        }
         // Down: residuals of all levels.
-        for level in 0..self.ways_up.len() {
-            let (finer, coarser) = self.vectors.split_at_mut(level);
-            let from = finer.last().map_or(r, |vector| &vector[..]);
-            self.ways_up[level].restrict(from, &mut coarser[0]);
+        for (level, way) in ways_up.iter().enumerate() {
+            let (finer, coarser) = vectors.split_at_mut(level);
+            let from = finer.last().unwrap_or(residual);
+            way.restrict(workers, from, &mut coarser[0]);
         }
-        // Each level by itself. The vertices' own comes first, into `z`.
-        let mut inverses = self.inverses.iter();
-        let dense = self.dense.size() > 0;
-        if !(dense && self.vectors.is_empty()) {
-            let blocks = inverses.next().into_iter().flatten();
-            for ((z, r), block) in z.iter_mut().zip(r).zip(blocks) {
-                *z = times(block, *r);
-            }
-        }
-        for (vector, blocks) in self.vectors.iter_mut().zip(inverses) {
-            for (value, block) in vector.iter_mut().zip(blocks) {
-                *value = times(block, *value);
-            }
-        }
-        if dense {
-            match self.vectors.last_mut() {
-                Some(coarsest) => solve(&mut self.dense, coarsest),
-                None => {
-                    z.copy_from_slice(r);
-                    solve(&mut self.dense, z);
+        // The coarsest level by itself.
+        let levels = ways_up.len();
+        let coarsest = vectors.last_mut().unwrap_or(residual);
+        match inverses.get(levels) {
+            Some(blocks) => {
+                for (value, block) in coarsest.iter_mut().zip(blocks) {
+                    value.set_vec3(times(block, value.vec3()));
                 }
             }
+            None => solve(dense, workers, coarsest),
         }
-        // Up: corrections of coarser levels are added to those of finer ones.
-        for level in (0..self.ways_up.len()).rev() {
-            let (finer, coarser) = self.vectors.split_at_mut(level);
-            match finer.last_mut() {
-                Some(finer) => self.ways_up[level].add(&coarser[0], finer),
-                None => self.ways_up[level].add(&coarser[0], z),
+        // Up: to the correction of each level that of the coarser one.
+        for level in (1..levels).rev() {
+            let (finer, coarser) = vectors.split_at_mut(level);
+            let blocks = &inverses[level];
+            let way = &ways_up[level];
+            way.prolong(workers, &coarser[0], &mut finer[level - 1], |node, above, value| {
+                value.set_vec3(times(&blocks[node], value.vec3()) + above.vec3());
+            });
+        }
+        match ways_up.first() {
+            Some(way) => {
+                let blocks = &inverses[0];
+                way.prolong(workers, &vectors[0], z, |v, above, z| {
+                    *z = times(&blocks[v], r[v]) + above.vec3();
+                });
             }
+            None => z.iter_mut().zip(residual).for_each(|(z, point)| *z = point.vec3()),
         }
     }
 }
@@ -428,13 +460,13 @@ fn places_of<S: Real>(layout: &Layout<S>, part: &Part) -> Vec<Vec3<f64>> {
     user.iter().map(|&v| layout.rest_positions[v as usize].cast()).collect()
 }
 
-fn solve<S: Real>(dense: &mut Dense, values: &mut [Vec3<S>]) {
+fn solve<S: Real>(dense: &mut Dense, workers: &Workers, values: &mut [Point<S>]) {
     for (place, value) in dense.vector().as_chunks_mut::<3>().0.iter_mut().zip(&*values) {
-        *place = value.to_array().map(S::to_f64);
+        *place = value.vec3().to_array().map(S::to_f64);
     }
-    dense.solve();
+    dense.solve(workers);
     for (place, value) in dense.vector().as_chunks::<3>().0.iter().zip(values) {
-        *value = Vec3::from_f64(*place);
+        value.set_vec3(Vec3::from_f64(*place));
     }
 }
 

@@ -3,7 +3,7 @@
 //! ```text
 //! K_ab = V (mu (g_a.g_b) I + mu (R g_b)(R g_a)^T + lambda (A g_a)(A g_b)^T)               tetrahedron
 //! K_cc = sum_groups t I + A B A^T,   t = sum V mu |g_c|^2,  B = sum V (mu + lambda) g_c g_c^T
-//! K_cd = sum_groups R (sum V (mu (g_c.g_d) I + mu g_d g_c^T)) R^T + A (sum V lambda g_c g_d^T) A^T
+//! K_cd = sum_groups t_cd I + V mu (R <g_d>)(R <g_c>)^T + V lambda (A <g_c>)(A <g_d>)^T,   t_cd = sum V mu g_c.g_d
 //! ```
 //!
 //! `g_c = sum_a w_ac g_a` is the gradient of node `c`'s shape function, in the rest shape; `R` the rotation, `A` the
@@ -12,14 +12,15 @@
 //! lattice, which turn and stretch together: `R` and `A` are all that changes, so that the blocks of every level,
 //! vertices among them, are found without a pass over the tetrahedra. `K_cc` is exact for neo-Hookean tetrahedra but for
 //! that: their volume term has `lambda + mu` before it, and no other than these. Between nodes, in the dense level, `mu`
-//! goes with `R`: the sum over all nodes is then positive semidefinite.
-
-use std::ops::Range;
+//! goes with `R`, and all but `t` with the mean gradients `<g>` of the group, whose volume `V` is: then its cost is that of the
+//! nodes, and nearly incompressible tissue does not lock the level. The sum over all nodes is positive semidefinite,
+//! because a mean's square is at most the mean square.
 
 use crate::elements::shape_gradients;
 use crate::layout::Layout;
 use crate::layout::lattice::Lattice;
 use crate::material::MaterialModel;
+use crate::scalar::lanes::Point;
 use crate::scalar::{Mat3, Real, Vec3, vec3};
 
 /// A symmetric matrix: xx, yy, zz, yz, xz, xy.
@@ -178,21 +179,31 @@ impl<S: Real> Groups<S> {
     pub fn len(&self) -> usize {
         self.offsets.len() - 1
     }
+
+    /// The mean deformation gradient of a group, at positions [m] of the part's vertices.
+    pub fn deformation(&self, group: usize, x: &[Point<S>]) -> Mat3<f64> {
+        let range = self.offsets[group] as usize..self.offsets[group + 1] as usize;
+        let mut f = Mat3::<f64>::from_columns(Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        for &(v, b) in &self.entries[range] {
+            f = f + Mat3::outer(x[v as usize].vec3().cast::<f64>(), b.cast());
+        }
+        f
+    }
 }
 
 /// Values by node, in the order in which the nodes came.
-struct Gathered<T> {
-    list: Vec<(u32, T)>,
+pub struct Gathered<T> {
+    pub list: Vec<(u32, T)>,
     place: Vec<(u32, u32)>,
     round: u32,
 }
 
 impl<T: Default> Gathered<T> {
-    fn new(nodes: usize) -> Self {
+    pub fn new(nodes: usize) -> Self {
         Self { list: Vec::new(), place: vec![(0, 0); nodes], round: 0 }
     }
 
-    fn begin(&mut self) {
+    pub fn begin(&mut self) {
         self.list.clear();
         self.round += 1;
     }
@@ -206,7 +217,7 @@ impl<T: Default> Gathered<T> {
         *place as usize
     }
 
-    fn of(&mut self, node: u32) -> &mut T {
+    pub fn of(&mut self, node: u32) -> &mut T {
         let place = self.at(node);
         &mut self.list[place].1
     }
@@ -251,7 +262,7 @@ impl On<'_> {
         }
     }
 
-    fn node_count(self, vertices: usize) -> usize {
+    pub fn node_count(self, vertices: usize) -> usize {
         match self {
             Self::Vertices => vertices,
             Self::Lattice(lattice, level) => lattice.levels[level].node_count(),
@@ -260,7 +271,7 @@ impl On<'_> {
 
     /// Gradients [1/m] of the shape functions of all nodes that a tetrahedron touches; vertices that are not free
     /// count as nothing.
-    fn gradients(self, tet: &LocalTet, free: &[bool], found: &mut Vec<(u32, Vec3<f64>)>) {
+    pub fn gradients(self, tet: &LocalTet, free: &[bool], found: &mut Vec<(u32, Vec3<f64>)>) {
         found.clear();
         for (v, g) in tet.vertices.into_iter().zip(tet.gradients) {
             if free[v as usize] {
@@ -296,6 +307,11 @@ pub struct DiagonalSums<S> {
 }
 
 impl<S: Real> DiagonalSums<S> {
+    /// What groups have in a node's block.
+    pub fn of_node(&self, node: usize) -> &[Share<S>] {
+        &self.shares[self.offsets[node] as usize..self.offsets[node + 1] as usize]
+    }
+
     pub fn new(
         on: On<'_>,
         tets: &[LocalTet],
@@ -349,92 +365,6 @@ impl<S: Real> DiagonalSums<S> {
             offsets,
             shares: all.into_iter().map(|(_, share)| share).collect(),
         }
-    }
-}
-
-/// Of a pair of nodes, the first not below the second, in the rest shape.
-#[derive(Clone, Copy, Debug)]
-pub struct FullBlock {
-    pub nodes: [u32; 2],
-    /// What turns with `R`, and what goes with `A` [N/m].
-    pub shear: Mat3<f64>,
-    pub volume: Mat3<f64>,
-}
-
-/// The whole matrix of the coarsest level.
-#[derive(Clone, Debug, Default)]
-pub struct FullSums {
-    /// Pairs of nodes with `sum_v m_v w_vc w_vd` [kg], the first not below the second.
-    pub masses: Vec<([u32; 2], f64)>,
-    /// Of each group.
-    pub blocks: Vec<FullBlock>,
-    /// Blocks of group `g` are `offsets[g] .. offsets[g + 1]`.
-    pub offsets: Vec<usize>,
-}
-
-impl FullSums {
-    pub fn new(
-        on: On<'_>,
-        tets: &[LocalTet],
-        grouped: &Grouped,
-        masses: &[f64],
-        free: &[bool],
-    ) -> Self {
-        let node_count = on.node_count(masses.len());
-        let mut full = Self { offsets: vec![0], ..Self::default() };
-        // By pairs: a coarsest level is small.
-        let pair = |a: u32, b: u32| a.max(b) * node_count as u32 + a.min(b);
-        let nodes = |pair: u32| [pair / node_count as u32, pair % node_count as u32];
-        let mut mass = vec![0.0; node_count * node_count];
-        let mut of_vertex = Vec::new();
-        for v in (0..masses.len() as u32).filter(|&v| free[v as usize]) {
-            of_vertex.clear();
-            on.each(v, |node, w| of_vertex.push((node, w)));
-            for &(a, wa) in &of_vertex {
-                for &(b, wb) in of_vertex.iter().filter(|&&(b, _)| b <= a) {
-                    mass[pair(a, b) as usize] += masses[v as usize] * wa * wb;
-                }
-            }
-        }
-        let kept = (0..).zip(mass).filter(|&(_, mass)| mass != 0.0);
-        full.masses = kept.map(|(pair, mass)| (nodes(pair), mass)).collect();
-        let mut sums = Gathered::<[Mat3<f64>; 2]>::new(node_count * node_count);
-        let mut gradients = Vec::new();
-        for group in 0..grouped.len() {
-            sums.begin();
-            for &tet in grouped.tets(group) {
-                let tet = &tets[tet as usize];
-                on.gradients(tet, free, &mut gradients);
-                for &(a, ga) in &gradients {
-                    for &(b, gb) in gradients.iter().filter(|&&(b, _)| b <= a) {
-                        let [shear, volume] = sums.of(pair(a, b));
-                        let turns = Mat3::IDENTITY * ga.dot(gb) + Mat3::outer(gb, ga);
-                        *shear = *shear + turns * (tet.volume * tet.mu);
-                        *volume = *volume + Mat3::outer(ga, gb) * (tet.volume * tet.lambda);
-                    }
-                }
-            }
-            let block = |&(pair, [shear, volume]): &(u32, [Mat3<f64>; 2])| FullBlock {
-                nodes: nodes(pair),
-                shear,
-                volume,
-            };
-            full.blocks.extend(sums.list.iter().map(block));
-            full.offsets.push(full.blocks.len());
-        }
-        full
-    }
-
-    /// Blocks of a group.
-    pub fn of_group(&self, group: usize) -> Range<usize> {
-        self.offsets[group]..self.offsets[group + 1]
-    }
-
-    /// Bytes of its arrays.
-    pub fn bytes(&self) -> usize {
-        size_of_val(&self.masses[..])
-            + size_of_val(&self.blocks[..])
-            + size_of_val(&self.offsets[..])
     }
 }
 
