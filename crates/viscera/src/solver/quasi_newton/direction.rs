@@ -24,9 +24,6 @@ use crate::state::Learned;
 /// vanishes, or is negative, the step would have no end.
 const LEAST_CURVATURE: f64 = 0.1;
 
-/// Pairs are kept of steps above this many resolutions: of shorter ones the change of the gradient is round-off.
-const CLEAR_STEP: f64 = 16.0;
-
 /// Vectors that a direction is a sum of, at most, besides that of the preconditioner.
 const MOST_TERMS: usize = 2 * MOST_HISTORY;
 
@@ -277,6 +274,9 @@ impl<S: Real> Memory<S> {
     fn stop_at_resolution(&mut self, number: usize) {
         let progress = &mut self.parts[number];
         let longest = progress.length * progress.longest;
+        if progress.first == 0.0 {
+            progress.first = longest;
+        }
         if !(longest > progress.resolution && longest.is_finite()) {
             progress.phase = Phase::Done;
             progress.ahead = false;
@@ -295,9 +295,7 @@ impl<S: Real> Memory<S> {
     ) {
         let range = part.vertices.clone();
         let progress = &self.parts[number];
-        let moved = progress.length * progress.longest;
-        let leaves_pair =
-            progress.phase == Phase::Iterating && moved > CLEAR_STEP * progress.resolution;
+        let leaves_pair = progress.phase == Phase::Iterating && progress.is_clear();
         self.has_new_pair[number] = leaves_pair;
         let ring = self.history();
         let Self { base, gradient, trial_gradient, .. } = self;

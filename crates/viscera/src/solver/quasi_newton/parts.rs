@@ -6,6 +6,14 @@ use crate::settings::MOST_HISTORY;
 /// by this share of the slope at the start at most: by the trapezoid rule it has then fallen by a quarter of that slope or more.
 const SETTLED: f64 = 0.5;
 
+/// Steps above this many resolutions are clear: of shorter ones the change of the gradient is round-off.
+const CLEAR_STEP: f64 = 16.0;
+
+/// Steps above this many resolutions, and above this share of the first step of a solve, have slopes that are more than
+/// round-off: forces nearly cancel where a solve has nearly converged.
+const PLAIN_STEP: f64 = 1024.0;
+const PLAIN_SHARE: f64 = 1e-3;
+
 /// How a part takes a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scheme {
@@ -73,6 +81,8 @@ pub struct Progress {
     pub slope: f64,
     /// The longest vector of the direction [m].
     pub longest: f64,
+    /// The longest step of a vertex in the first direction of the solve, taken or not [m].
+    pub first: f64,
     /// Trials in a row that were rejected, and all in this solve.
     pub failures: u32,
     pub rejections: u32,
@@ -87,6 +97,11 @@ impl Progress {
         self.phase != Phase::Done && self.passes_left > 0
     }
 
+    /// Whether the trial is so far from the iterate that what changes on the way is more than round-off.
+    pub fn is_clear(&self) -> bool {
+        self.length * self.longest > CLEAR_STEP * self.resolution
+    }
+
     /// Whether a trial is accepted for the slope of the potential [J s^2] at its end, without its change. `calm`: no trial
     /// of the last solve was rejected.
     ///
@@ -99,7 +114,10 @@ impl Progress {
             Phase::Iterating => {
                 let before = self.length * self.slope;
                 let is_between = slope <= -SETTLED * before && slope >= before;
-                self.scheme.is_checked() && is_between
+                let moved = self.length * self.longest;
+                let is_plain =
+                    moved > PLAIN_STEP * self.resolution && moved > PLAIN_SHARE * self.first;
+                self.scheme.is_checked() && is_plain && is_between
             }
             Phase::FromReference => true,
             Phase::Done => false,

@@ -221,7 +221,7 @@ impl<S: Real> OfPart<S> {
         let places = places_of(layout, part);
         let user = &layout.numbering.order[part.vertices.clone()];
         let masses: Vec<f64> = user.iter().map(|&v| layout.masses[v as usize].to_f64()).collect();
-        let grouped = Grouped::new(&tets, &places, &self.lattice);
+        let (grouped, eighths) = Grouped::new(&tets, &places, &self.lattice);
         self.groups = Groups::new(&tets, &grouped, places.len());
         for (level, (way, of)) in self.ways_up.iter_mut().zip(&self.lattice.levels).enumerate() {
             let weights = if level == 0 { &of.of_vertices } else { &of.of_finer };
@@ -240,7 +240,7 @@ impl<S: Real> OfPart<S> {
                 self.levels.resize(coarsest + 1, sums);
             }
             _ => {
-                self.full = FullSums::new(on, &tets, &grouped, &masses, free);
+                self.full = FullSums::new(on, &tets, &grouped, &eighths, &masses, free);
                 self.turned = vec![[Vec3::ZERO; 2]; self.full.most];
             }
         }
@@ -335,19 +335,20 @@ impl<S: Real> OfPart<S> {
         for &(nodes, mass) in &self.full.masses {
             add_block(&mut self.dense, nodes, &(Mat3::IDENTITY * mass));
         }
-        let FullSums { groups, nodes, traces, .. } = &self.full;
-        for (group, turn) in groups.iter().zip(turns) {
+        let FullSums { sets, nodes, traces, .. } = &self.full;
+        for set in sets {
+            let turn = &turns[set.group as usize];
             let (r, a) = (turn.rotation.cast::<f64>(), turn.map.cast::<f64>());
             let squared = squared * turn.stiffer.to_f64();
-            let (shear, volume) = (squared * group.shear, squared * group.volume);
-            let turned = &mut self.turned[..group.nodes.len()];
-            for (turned, &(_, g)) in turned.iter_mut().zip(&nodes[group.nodes.clone()]) {
+            let (shear, volume) = (squared * set.shear, squared * set.volume);
+            let turned = &mut self.turned[..set.nodes.len()];
+            for (turned, &(_, g)) in turned.iter_mut().zip(&nodes[set.nodes.clone()]) {
                 *turned = [r * g, a * g];
             }
-            let mut traces = traces[group.traces..].iter();
-            for (i, &(node, _)) in nodes[group.nodes.clone()].iter().enumerate() {
+            let mut traces = traces[set.traces..].iter();
+            for (i, &(node, _)) in nodes[set.nodes.clone()].iter().enumerate() {
                 let [shears, grows] = [turned[i][0] * shear, turned[i][1] * volume];
-                for (&(other, _), before) in nodes[group.nodes.clone()].iter().zip(&turned[..=i]) {
+                for (&(other, _), before) in nodes[set.nodes.clone()].iter().zip(&turned[..=i]) {
                     let trace = squared * traces.next().copied().unwrap_or_default();
                     let block = Mat3::outer(before[0], shears) + Mat3::outer(grows, before[1]);
                     add_block(&mut self.dense, [node, other], &(block + Mat3::IDENTITY * trace));
