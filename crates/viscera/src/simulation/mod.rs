@@ -17,7 +17,7 @@ mod rest;
 mod saved;
 
 pub use assemble::{AssembleError, AssembledBody, Assembly, ResolvedPatch};
-pub use automatic::ExpectedErrors;
+pub use automatic::{ExpectedErrors, automatic_settings};
 pub use error::{FrameError, LiveError, SimulationError};
 pub use forces::Hold;
 use holding::GraspOrigins;
