@@ -5,7 +5,7 @@ use super::holding::GraspOrigins;
 use crate::model::Model;
 use crate::scalar::Real;
 use crate::scene::Scene;
-use crate::settings::{DeviceRequest, Integrator, Method, SolverSettings};
+use crate::settings::{Integrator, Method, SolverSettings};
 use crate::solver::{Inputs, Solver, choose, expected_motion_error};
 
 /// From this error of motion on, steps of the quasi-Newton method are the only choice: they are guarded, and the explicit
@@ -60,9 +60,7 @@ pub fn automatic_settings<S: Real>(
     frame: f64,
     fixings: impl FnOnce() -> Inputs<S>,
 ) -> SolverSettings {
-    if !matches!(asked.device, DeviceRequest::Auto | DeviceRequest::Cpu) {
-        return asked.chosen(Method::Xpbd);
-    }
+    let asked = &asked.foreseen();
     let large = asked.chosen(Method::QuasiNewton);
     if asked.method != Method::Auto || asked.accuracy.share() >= GUARDED_FROM {
         return large;
