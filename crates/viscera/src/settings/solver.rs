@@ -314,15 +314,6 @@ impl SolverSettings {
         self.chosen(Method::QuasiNewton)
     }
 
-    /// The settings in force, as far as they tell it alone: on a device that is asked for by name "auto" is "xpbd". Elsewhere
-    /// it stays what it is: a scene chooses, mostly "quasi_newton".
-    pub fn foreseen(&self) -> Self {
-        match self.device {
-            DeviceRequest::Auto | DeviceRequest::Cpu => self.clone(),
-            DeviceRequest::Gpu | DeviceRequest::Named(_) => self.chosen(Method::Xpbd),
-        }
-    }
-
     /// With this method in the place of "auto".
     pub(crate) fn chosen(&self, method: Method) -> Self {
         let method = if self.method == Method::Auto { method } else { self.method };
