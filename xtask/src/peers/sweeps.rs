@@ -1,7 +1,7 @@
 //! The cost of a sweep over the constraints: a slope over iterations.
 
 use super::environment::Environment;
-use super::runs::{COST_FRAMES, LONGEST, append};
+use super::runs::{LONGEST, append};
 use super::{Options, write_whole};
 use serde_json::{Value, json};
 use std::process::Stdio;
@@ -77,6 +77,9 @@ const SWEEP_SUBSTEPS: u32 = 10;
 
 /// Iterations per substep of the two runs whose difference is the cost of sweeps.
 const SWEEP_ITERATIONS: [u32; 2] = [2, 8];
+
+/// Frames of a run.
+const COST_FRAMES: &str = "20";
 
 /// Sweeps per frame between the two runs.
 pub const SWEEPS_BETWEEN: u32 = SWEEP_SUBSTEPS * (SWEEP_ITERATIONS[1] - SWEEP_ITERATIONS[0]);
