@@ -11,7 +11,8 @@ use viscera::mesh::{TetMesh, io};
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3};
 use viscera::scene::Scene;
-use viscera::settings::{Precision, SolverSettings};
+use viscera::settings::{Method, Precision, SolverSettings};
+use viscera::simulation::automatic_settings;
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 use viscera_resources::files;
@@ -23,7 +24,7 @@ use viscera_resources::files;
 /// scene's factor, outside the timed part.
 ///
 /// Writes positions.txt (x y z per vertex [m]) and timing.json (wall time of each frame [ms],
-/// threads, precision, material); with --transient also frames.f64 (positions of every frame [m],
+/// threads, precision, material, method, substeps); with --transient also frames.f64 (positions of every frame [m],
 /// little-endian).
 #[derive(Args)]
 #[command(after_help = EXAMPLE)]
@@ -38,7 +39,8 @@ pub struct BenchSceneArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
     /// Settings, KEY=VALUE separated by commas: material=stvk (default) or snh; every other key is
-    /// one of `solver` in `viscera scene describe`. May be repeated; the last value of a key counts
+    /// one of `solver` in `viscera scene describe`; method=auto (default) is what a scene would choose
+    /// at that accuracy, with what is pinned as its fixings. May be repeated; the last value of a key counts
     #[arg(long, value_name = "KEY=VALUE,...")]
     cfg: Vec<String>,
     /// Leave velocities as they are, and write the positions of every frame
@@ -153,6 +155,8 @@ struct Run<'a, S> {
     is_free: Vec<bool>,
     /// Per frame.
     substeps: u32,
+    /// What "auto" stands for, where that is asked for.
+    method: Method,
 }
 
 impl<'a, S: Real> Run<'a, S> {
@@ -181,11 +185,16 @@ impl<'a, S: Real> Run<'a, S> {
             pins: pinned.iter().map(pin).collect(),
             ..Inputs::default()
         };
-        let mut solver = Solver::new(model, settings);
+        // What a scene moves is not among the fixings that its simulation chooses by.
+        let mut fixings = inputs.clone();
+        fixings.pins.retain(|pin| !moves[pin.vertex as usize]);
+        let settings = automatic_settings(settings, model, scene.dt, || fixings.clone());
+        let mut solver = Solver::new(model, &settings);
         Ok(Self {
+            method: settings.method,
             scene,
             model,
-            substeps: solver.substeps(&inputs, scene.dt),
+            substeps: solver.substeps(&fixings, scene.dt),
             solver,
             state: State::at_rest(model),
             inputs,
@@ -233,6 +242,10 @@ struct Timing {
     threads: String,
     precision: &'static str,
     material: &'static str,
+    /// In force: the one that "auto" chose where that is asked for.
+    method: String,
+    /// Per frame.
+    substeps: u32,
     /// [s].
     setup_s: f64,
 }
@@ -258,6 +271,8 @@ fn simulate<S: Real>(
             MaterialModel::SaintVenantKirchhoff => "stvk",
             MaterialModel::StableNeoHookean => "snh",
         },
+        method: run.method.to_string(),
+        substeps: run.substeps,
         setup_s: start.elapsed().as_secs_f64(),
     };
     let mut motion = Vec::new();

@@ -1,6 +1,7 @@
 //! The program `viscera`.
 
 mod bench;
+mod bench_plot;
 mod bench_scene;
 mod devices;
 mod film;
@@ -53,6 +54,8 @@ enum Command {
     // For a program, not for a person.
     #[command(hide = true)]
     BenchScene(bench_scene::BenchSceneArguments),
+    #[command(hide = true)]
+    BenchPlot(bench_plot::BenchPlotArguments),
 }
 
 /// Exit code of a run that Ctrl-C ended, as shells report it.
@@ -72,6 +75,9 @@ fn main() -> ExitCode {
         }
         Command::BenchScene(arguments) => {
             bench_scene::execute(&arguments).map(|()| run::Outcome::Finished)
+        }
+        Command::BenchPlot(arguments) => {
+            bench_plot::execute(&arguments).map(|()| run::Outcome::Finished)
         }
     };
     match result {

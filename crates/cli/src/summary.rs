@@ -49,7 +49,8 @@ pub struct Summary {
     pub overrides: BTreeMap<String, String>,
     /// What computed the steps, and why.
     pub device: String,
-    /// Solver settings, as a scene file would have them; automatic counts are the numbers they came to.
+    /// Solver settings, as a scene file would have them; automatic counts are the numbers they came to. `method` is the
+    /// one in force, `asked_method` what the scene has: "auto" chose by `accuracy`.
     pub solver: BTreeMap<&'static str, serde_json::Value>,
     /// Material of each body and region.
     pub materials: BTreeMap<String, String>,
@@ -217,6 +218,7 @@ fn materials(scene: &Scene) -> BTreeMap<String, String> {
 fn solver_record<S: Real>(simulation: &Simulation<S>) -> BTreeMap<&'static str, serde_json::Value> {
     let values = simulation.scene().solver.values().into_iter();
     let mut record: BTreeMap<_, _> = values.map(|(key, text)| (key, json(text))).collect();
+    record.insert("asked_method", simulation.scene().solver.method.to_string().into());
     record.insert("method", simulation.solver().method.to_string().into());
     record.insert("substeps", simulation.substeps().into());
     record.insert("iterations", simulation.iterations().into());

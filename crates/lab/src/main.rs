@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use viscera_lab::rest_command::{self, RestArguments};
 use viscera_lab::sections::{Changes, Options, Program};
 use viscera_lab::{study, validate};
-use viscera_resources::files::print;
+use viscera_resources::files::{prepare_folder, print};
 
 /// The truth beside the solver: studies that hold its claims against references.
 #[derive(Parser)]
@@ -34,6 +34,13 @@ enum Command {
     Study(StudyArguments),
     /// Find the exact state of rest at the end of a scene with the Newton reference
     Rest(RestArguments),
+    // For `cargo xtask peers`, not for a person.
+    #[command(hide = true)]
+    Organs {
+        /// Folder for liver.txt, kidney.txt and bowel.txt
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
 }
 
 /// Compare the library with closed forms and the reference; write a report
@@ -112,6 +119,11 @@ fn main() -> ExitCode {
         Command::Validate(arguments) => validate(arguments),
         Command::Study(arguments) => study(arguments),
         Command::Rest(arguments) => rest_command::run(&arguments, &print),
+        Command::Organs { out } => prepare_folder(&out, "--out")
+            .and_then(|()| validate::write_organs(&out))
+            .and_then(|files| {
+                print(&files.iter().map(|file| format!("{}\n", file.display())).collect::<String>())
+            }),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

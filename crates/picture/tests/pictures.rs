@@ -258,6 +258,39 @@ fn assert_shown_nearly_as_drawn(frames: &[Image], mut animation: Animation) {
     assert_eq!(delays, [3, 4, 3, 100]);
 }
 
+/// Two hundred reds fill the pictures, and blues are few: both are shown as what they are. A colour that is rare over
+/// the film is not given up for steps that nobody sees between the frequent ones.
+#[test]
+fn a_film_of_two_colors_far_apart_keeps_both() {
+    let size = size(160, 100);
+    let picture = |frame: usize| {
+        let pixel = |i: usize| match i % 50 {
+            // Another blue for every pixel, in one of fifty of them.
+            7 => [(i / 50 % 16) as u8, 40 + (i / 800) as u8, 200 + (frame + i / 50 % 50) as u8],
+            _ => [150 + (i % 100) as u8, 20 + (i / 100 % 4) as u8, 30],
+        };
+        Image::from_pixels(size, (0..16_000).map(pixel).collect()).unwrap()
+    };
+    let film = [0, 1, 2, 3].map(picture);
+    let mut animation = Animation::in_colors_of(&film, size).unwrap();
+    for (frame, picture) in film.iter().enumerate() {
+        animation.push(picture, 0.1 * frame as f64).unwrap();
+    }
+    let bytes = animation.finish(1.0).unwrap();
+    let mut options = gif::DecodeOptions::new();
+    options.set_color_output(gif::ColorOutput::RGBA);
+    let mut decoder = options.read_info(std::io::Cursor::new(bytes)).unwrap();
+    let first = decoder.read_next_frame().unwrap().unwrap();
+    let mut worst = [0.0_f64; 2];
+    for (i, (shown, drawn)) in first.buffer.chunks_exact(4).zip(film[0].pixels()).enumerate() {
+        let error = drawn.iter().zip(shown).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
+        let kind = usize::from(i % 50 == 7);
+        worst[kind] = worst[kind].max(f64::from(error));
+    }
+    println!("largest error of a channel: reds {}, blues {}", worst[0], worst[1]);
+    assert!(worst[0] <= 12.0 && worst[1] <= 12.0, "{worst:?}");
+}
+
 /// Frames at these times [s], the last one held for a while [s]: their delays [1/100 s].
 fn delays(times: &[f64], held: f64) -> Vec<u16> {
     let mut animation = Animation::new(size(16, 16)).unwrap();

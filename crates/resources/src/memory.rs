@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 use std::fmt;
 use std::str::FromStr;
 use sysinfo::{MemoryRefreshKind, System};
-use viscera::settings::{Acceleration, Colors, DeviceRequest, Method, Precision, SolverSettings};
+use viscera::settings::{Acceleration, Colors, Method, Precision, SolverSettings};
 use viscera::units::format_number;
 
 /// Units, powers of a thousand.
@@ -80,9 +80,7 @@ pub fn kept(settings: &SolverSettings) -> f64 {
     if settings.acceleration != Acceleration::None {
         kept += ITERATES;
     }
-    // On a device that is asked for by name "auto" is XPBD.
-    let named = !matches!(settings.device, DeviceRequest::Auto | DeviceRequest::Cpu);
-    if settings.method == Method::QuasiNewton || (settings.method == Method::Auto && !named) {
+    if matches!(settings.foreseen().method, Method::Auto | Method::QuasiNewton) {
         kept += LEVELS;
     }
     if settings.acceleration == Acceleration::Anderson {

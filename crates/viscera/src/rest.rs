@@ -378,7 +378,7 @@ fn held<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> Vec<bool> {
         parent[a.max(b) as usize] = a.min(b);
     };
     // In the caller's numbering, as all of this file. Pins join nothing: two bodies that a hand holds stay two parts.
-    for tet in &model.tet_vertices {
+    for tet in &*model.tet_vertices {
         tet[1..].iter().for_each(|&v| join(tet[0], v));
     }
     let mut anchored = Vec::new();

@@ -1,5 +1,6 @@
 //! Where the benchmark runs: a copy of it, a Python environment, the programs that it starts.
 
+use super::plan::{METHODS, Method};
 use super::{Options, finish};
 use crate::cargo;
 use std::fs;
@@ -8,7 +9,7 @@ use std::process::Command;
 
 /// Folders and programs of a run.
 pub struct Environment {
-    /// The repository.
+    /// The repository; none there on a machine to which only programs were carried.
     pub root: PathBuf,
     /// The benchmark as it was given; none where only the document is written.
     given: Option<PathBuf>,
@@ -16,6 +17,10 @@ pub struct Environment {
     folder: PathBuf,
     /// `viscera`, in release.
     pub program: PathBuf,
+    /// Of an environment of its own, or the one that was named.
+    python: PathBuf,
+    /// Whether programs are built and installed here.
+    builds: [bool; 2],
 }
 
 /// Environment variables by which libraries are told how many threads they may use.
@@ -50,12 +55,21 @@ impl Environment {
         let this = std::env::current_exe().map_err(|error| format!("where am I? {error}"))?;
         let target = this.ancestors().nth(2).ok_or("no target folder above this program")?;
         let name = format!("viscera{}", std::env::consts::EXE_SUFFIX);
-        Ok(Self {
-            root: root.to_owned(),
-            given,
-            folder: target.join("peers"),
-            program: target.join("release").join(name),
-        })
+        let folder = options.folder.clone().unwrap_or_else(|| target.join("peers"));
+        let whole = |path: &Path| {
+            std::path::absolute(path).map_err(|error| format!("{}: {error}", path.display()))
+        };
+        let folder = whole(&folder)?;
+        let builds = [options.viscera.is_none(), options.python.is_none()];
+        let program = options.viscera.clone().unwrap_or_else(|| target.join("release").join(name));
+        // A bare name is looked for by the system.
+        let python = match &options.python {
+            None => folder.join("venv/bin/python"),
+            Some(python) if python.components().count() == 1 => python.clone(),
+            Some(python) => whole(python)?,
+        };
+        let program = whole(&program)?;
+        Ok(Self { root: root.to_owned(), given, folder, program, python, builds })
     }
 
     /// The copy of the benchmark: its programs write beside themselves, and the original stays
@@ -69,17 +83,59 @@ impl Environment {
         self.folder.join("results")
     }
 
-    fn rapier(&self) -> PathBuf {
+    /// Rapier's peer.
+    pub fn rapier(&self) -> PathBuf {
         self.bench().join("peers/rapier/target/release/rapier_peer")
+    }
+
+    /// What starts a program of the benchmark with more sizes than it has.
+    pub fn runner(&self) -> PathBuf {
+        self.folder.join("runner.py")
+    }
+
+    /// References and meshes, which are kept.
+    pub fn cache(&self) -> PathBuf {
+        self.folder.join("cache")
+    }
+
+    /// Simulators that were asked for and are not installed, by the names that `--peers` has for them.
+    pub fn missing(&self, options: &Options) -> Result<Vec<String>, String> {
+        let mut missing = Vec::new();
+        for name in METHODS.iter().map(|method| method.program.name()) {
+            let is_asked =
+                options.peers.as_ref().is_none_or(|peers| peers.iter().any(|p| p == name));
+            if name == "viscera" || missing.iter().any(|known| known == name) {
+                continue;
+            }
+            let code = format!("import importlib.util as u; exit(u.find_spec('{name}') is None)");
+            let is_there = match name {
+                _ if !is_asked => false,
+                "rapier" => self.rapier().is_file(),
+                _ => {
+                    self.python().args(["-c", &code]).status().is_ok_and(|status| status.success())
+                }
+            };
+            if !is_there {
+                missing.push(name.to_owned());
+            }
+        }
+        Ok(missing)
+    }
+
+    /// Methods that can be run here, ours among them.
+    pub fn installed(&self, options: &Options) -> Result<Vec<&'static Method>, String> {
+        let missing = self.missing(options)?;
+        let is_there = |method: &&Method| missing.iter().all(|name| name != method.program.name());
+        Ok(METHODS.iter().filter(is_there).collect())
     }
 
     /// The environment's Python, in the benchmark's folder.
     pub fn python(&self) -> Command {
-        let mut command = Command::new(self.folder.join("venv/bin/python"));
+        let mut command = Command::new(&self.python);
         command
             .current_dir(self.bench())
-            .env("SOFTBENCH_CACHE", self.folder.join("cache"))
-            .env("RAPIER_PEER", self.rapier())
+            .env("SOFTBENCH_CACHE", self.cache())
+            .env("VISCERA", &self.program)
             .env("PYTHONUNBUFFERED", "1");
         command
     }
@@ -101,16 +157,30 @@ impl Environment {
     pub fn prepare(&self) -> Result<(), String> {
         let Some(given) = &self.given else { return Ok(()) };
         copy_folder(given, &self.bench())?;
-        fs::create_dir_all(self.results()).map_err(|e| format!("cannot make a folder: {e}"))?;
-        self.install()?;
+        for folder in [self.results(), self.cache()] {
+            fs::create_dir_all(folder).map_err(|error| format!("cannot make a folder: {error}"))?;
+        }
+        super::write_whole(&self.runner(), include_str!("runner.py"))?;
+        let [builds, installs] = self.builds;
+        if installs {
+            self.install()?;
+            finish(
+                "build Rapier's peer",
+                cargo(&["build", "--release"]).current_dir(self.bench().join("peers/rapier")),
+                "its first build needs the network",
+            )?;
+        }
+        if !builds {
+            return Ok(());
+        }
+        const PACKAGES: [&str; 6] =
+            ["build", "--release", "--package", "viscera-cli", "--package", "viscera-lab"];
+        finish("build viscera", cargo(&PACKAGES).current_dir(&self.root), "mend the errors above")?;
+        let lab =
+            self.program.with_file_name(format!("viscera-lab{}", std::env::consts::EXE_SUFFIX));
         finish(
-            "build Rapier's peer",
-            cargo(&["build", "--release"]).current_dir(self.bench().join("peers/rapier")),
-            "its first build needs the network",
-        )?;
-        finish(
-            "build viscera",
-            cargo(&["build", "--release", "--package", "viscera-cli"]).current_dir(&self.root),
+            "write the organs",
+            Command::new(lab).args(["organs", "--out"]).arg(self.cache()),
             "mend the errors above",
         )
     }

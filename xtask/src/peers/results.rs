@@ -101,11 +101,45 @@ impl<'a> Entry<'a> {
         median_of(&self.motion, &format!("dyn_{energy}"))
     }
 
+    /// Against its own energy; where that has no state of rest, against StVK.
+    pub fn judged_rest(&self) -> Option<f64> {
+        self.rest_error("own").or_else(|| self.rest_error("stvk"))
+    }
+
+    /// Likewise.
+    pub fn judged_motion(&self) -> Option<f64> {
+        self.motion_error("own").or_else(|| self.motion_error("stvk"))
+    }
+
+    /// Tetrahedra inside out at rest, of the positions that it returned: the most of all rounds.
+    pub fn inverted(&self) -> Option<u64> {
+        self.settled.iter().filter_map(|row| row["inverted"].as_u64()).max()
+    }
+
+    /// Whether it stands in tables, not only in plots.
+    pub fn is_main(&self) -> bool {
+        self.settled.iter().any(|row| row["is_main"] == true)
+    }
+
     /// Of the first run that did not end well.
     pub fn trouble(&self) -> Option<&'a str> {
         let rows = self.settled.iter().chain(&self.motion);
         rows.filter_map(|row| row["status"].as_str()).find(|status| *status != "ok")
     }
+}
+
+/// The sizes that ran, from coarse to fine, organs last.
+pub fn sizes(rows: &[Value]) -> Vec<String> {
+    let mut sizes: Vec<String> =
+        rows.iter().filter_map(|row| row["size"].as_str()).map(str::to_owned).collect();
+    sizes.sort_by_key(|size| (super::plan::cells(size).unwrap_or(u32::MAX), size.clone()));
+    sizes.dedup();
+    sizes
+}
+
+/// Whether it is a method of this project.
+pub fn is_ours(entry: &Entry<'_>) -> bool {
+    entry.peer.starts_with("viscera")
 }
 
 fn median_of(rows: &[&Value], key: &str) -> Option<f64> {

@@ -1,270 +1,215 @@
-//! What is run: rounds of the benchmark, and the cost of a sweep.
+//! What is run: rounds of every method, each run a process of its own.
 
 use super::environment::Environment;
-use super::{Options, finish, write_whole};
+use super::plan::{self, Method, Point, Program};
+use super::results::{cost, number, read_line};
+use super::{Options, finish, largest, sweeps, write_whole};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::io::Write;
+use std::path::Path;
 use std::process::Stdio;
-
-/// One of our configurations, which runs in every round beside the peers.
-pub struct Ours {
-    /// Its name in tables; the first is what peers are compared with.
-    pub label: &'static str,
-    /// What `viscera bench-scene --cfg` is given.
-    pub settings: &'static str,
-    /// In words.
-    pub words: &'static str,
-}
-
-/// Another configuration is another line here.
-pub const OURS: [Ours; 5] = [
-    Ours {
-        label: "viscera",
-        settings: "material=stvk,method=xpbd",
-        words: "XPBD: 10 substeps x 2 iterations, coloured, rebase and guards; Green strain",
-    },
-    Ours {
-        label: "viscera, neo-Hookean",
-        settings: "material=snh,method=xpbd",
-        words: "the same in the stretch form of stable neo-Hookean tissue",
-    },
-    Ours {
-        label: "viscera, automatic",
-        settings: "material=snh",
-        words: "the default method, quasi-Newton; stable neo-Hookean tissue",
-    },
-    Ours {
-        label: "viscera, 20 x 5",
-        settings: "material=stvk,method=xpbd,substeps=20,iterations=5",
-        words: "20 substeps x 5 iterations; Green strain",
-    },
-    Ours {
-        label: "viscera, explicit",
-        settings: "material=stvk,method=explicit,substeps=1",
-        words: "explicit small steps at half of the stable step; Green strain",
-    },
-];
-
-/// A tetrahedral solver whose cost of one sweep is measured.
-pub struct Sweeper {
-    /// Its name in tables.
-    pub label: &'static str,
-    /// What it sweeps over.
-    pub words: &'static str,
-    /// File and class of a peer; none for ours.
-    peer: Option<[&'static str; 2]>,
-    /// Besides substeps and iterations.
-    settings: &'static [(&'static str, &'static str)],
-}
-
-/// XPBD as published: no rebase, no kept multipliers, no guard.
-const PLAIN: [(&str, &str); 3] =
-    [("rebase", "false"), ("keep_multipliers", "false"), ("step_guard", "false")];
-
-/// The first is what the others are compared with.
-pub const SWEEPERS: [Sweeper; 7] = [
-    Sweeper {
-        label: "PyPBD_XPBD",
-        words: "XPBD, one energy constraint per tetrahedron, coloured Gauss-Seidel",
-        peer: Some(["pypbd_peer.py", "PyPBD_XPBD"]),
-        settings: &[],
-    },
-    Sweeper {
-        label: "NewtonXPBD",
-        words: "XPBD, two constraints per tetrahedron, Jacobi",
-        peer: Some(["newton_peer.py", "NewtonXPBD"]),
-        settings: &[],
-    },
-    Sweeper {
-        label: "PbatXPBD",
-        words: "XPBD, block of two neo-Hookean constraints, coloured Gauss-Seidel",
-        peer: Some(["pbat_peer.py", "PbatXPBD"]),
-        settings: &[],
-    },
-    Sweeper {
-        label: "viscera, plain",
-        words: "XPBD, block of six Green strains, coloured; no rebase, no guards",
-        peer: None,
-        settings: &[PLAIN[0], PLAIN[1], PLAIN[2]],
-    },
-    Sweeper {
-        label: "viscera, plain, f64",
-        words: "the same in double precision",
-        peer: None,
-        settings: &[PLAIN[0], PLAIN[1], PLAIN[2], ("precision", "f64")],
-    },
-    Sweeper {
-        label: "viscera, plain pair",
-        words: "XPBD, published pair of neo-Hookean constraints, coloured; no rebase, no guards",
-        peer: None,
-        settings: &[PLAIN[0], PLAIN[1], PLAIN[2], ("material", "snh")],
-    },
-    Sweeper {
-        label: "viscera",
-        words: "defaults: block of six Green strains with rebase and guards",
-        peer: None,
-        settings: &[],
-    },
-];
-
-/// The gentle scene. In A, under as few sweeps, a sweep of PyPBD took up to four times as long as in
-/// B: its cost depends on how the body is thrown about.
-const SWEEP_SCENE: &str = "B";
-
-/// Substeps per frame while sweeps are counted: few sweeps of one long step throw a body about.
-const SWEEP_SUBSTEPS: u32 = 10;
-
-/// Iterations per substep of the two runs whose difference is the cost of sweeps.
-const SWEEP_ITERATIONS: [u32; 2] = [2, 8];
-
-/// Sweeps per frame between the two runs.
-pub const SWEEPS_BETWEEN: u32 = SWEEP_SUBSTEPS * (SWEEP_ITERATIONS[1] - SWEEP_ITERATIONS[0]);
-
-/// Frames of a run that only tells a cost.
-const COST_FRAMES: &str = "20";
 
 /// CPU time [s] that a Python peer may take for one run. Less cuts the slow ones short on a loaded
 /// machine; the slowest take a minute at size m.
-const LONGEST: &str = "600";
+pub const LONGEST: &str = "600";
 
-/// References and rounds, then sweeps, all into files of result lines.
+/// What a run is for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Damped, to the state of rest; this one tells the cost.
+    Settled,
+    /// From rest, undamped.
+    Motion,
+    /// As the first, for the cost alone: its state of rest need not be known.
+    Cost,
+}
+
+/// One run of one method.
+pub struct Run<'a> {
+    /// What is run.
+    pub method: &'a Method,
+    /// Over its defaults.
+    pub settings: Value,
+    /// A or B.
+    pub scene: &'a str,
+    /// Of the mesh.
+    pub size: &'a str,
+    /// What for.
+    pub kind: Kind,
+}
+
+impl Run<'_> {
+    /// The result line, whatever becomes of the run: what fails says so in it.
+    pub fn result(&self, environment: &Environment) -> Result<Value, String> {
+        let mut command = environment.pinned_python();
+        command.arg(environment.runner());
+        match self.method.program {
+            Program::Module { file, class, .. } => {
+                command.arg(format!("peers/{file}")).args(["--peer", class]);
+            }
+            Program::Rapier => {
+                command.args(["peers/external_peer.py", "--peer", "Rapier", "--material", "snh"]);
+                command.arg("--program").arg(environment.rapier());
+            }
+            Program::Ours => {
+                command.args(["peers/external_peer.py", "--peer", "viscera", "--program"]);
+                command.arg(format!("'{}' bench-scene", environment.program.display()));
+            }
+        }
+        command.args(["--scene", self.scene, "--size", self.size, "--max-seconds", LONGEST]);
+        command.args(["--cfg", &self.settings.to_string()]);
+        match self.kind {
+            Kind::Settled => {}
+            Kind::Motion => {
+                command.arg("--transient");
+            }
+            Kind::Cost => {
+                command.arg("--timing-only");
+            }
+        }
+        let output = command.stderr(Stdio::piped()).output();
+        let output = output.map_err(|error| format!("Python could not be started: {error}"))?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        let line = text.lines().find_map(|line| line.strip_prefix("RESULT "));
+        let mut row = line.and_then(read_line).unwrap_or_else(|| {
+            let errors = String::from_utf8_lossy(&output.stderr);
+            let last = errors.lines().last().unwrap_or("nothing was said").to_owned();
+            json!({ "status": format!("failed: {last}") })
+        });
+        row["peer"] = json!(self.method.label);
+        row["cfg_asked"] = self.settings.clone();
+        row["scene"] = json!(self.scene);
+        row["size"] = json!(self.size);
+        Ok(row)
+    }
+}
+
+/// References and rounds, then bars in real time and sweeps, all into files of result lines.
 pub fn run_all(environment: &Environment, options: &Options) -> Result<(), String> {
     let results = environment.results();
     if options.only_sweeps {
-        return sweeps(environment, options);
+        return sweeps::run(environment, options);
     }
-    for name in ["settled", "motion"] {
-        write_whole(&results.join(format!("{name}.jsonl")), "")?;
+    let files = ["settled", "motion", "largest"].map(|name| results.join(format!("{name}.jsonl")));
+    if !options.keep {
+        files.iter().try_for_each(|file| write_whole(file, ""))?;
     }
-    let about = json!({ "command": options.command, "cpu": cpu_model(), "rounds": options.rounds });
-    write_whole(&results.join("about.json"), &about.to_string())?;
-
-    let small: Vec<&String> = options.sizes.iter().filter(|size| *size != "l").collect();
-    if !small.is_empty() {
-        let mut command = environment.python();
-        command.args(["scenes.py", "--materials", "stvk", "snh", "--scenes"]).args(&options.scenes);
-        finish("solve for the states of rest", command.arg("--sizes").args(&small), BROKEN)?;
+    let about = results.join("about.json");
+    let before = if options.keep { super::results::read(&about)?.into_iter().next() } else { None };
+    let before = before.as_ref().and_then(|about| about["command"].as_str());
+    let command =
+        before.map_or_else(String::new, |before| format!("{before}`, `")) + &options.command;
+    let words = json!({ "command": command, "cpu": cpu_model(), "rounds": options.rounds,
+                        "missing": environment.missing(options)? });
+    write_whole(&about, &words.to_string())?;
+    for (scene, size) in places(options) {
+        references(environment, scene, &[size.to_owned()])?;
+        rounds(environment, options, scene, size, &files)?;
     }
-    for size in &options.sizes {
-        rounds(environment, options, size, "settled")?;
-        // The reference motion of size l would take hours.
-        if size != "l" {
-            rounds(environment, options, size, "motion")?;
-        }
+    if options.largest {
+        largest::run(environment, options, &files[2])?;
     }
-    sweeps(environment, options)
+    if options.sweeps { sweeps::run(environment, options) } else { Ok(()) }
 }
 
-const BROKEN: &str = "look at the lines above; target/peers can be deleted and made again";
+/// Scenes and sizes, in the order of the report; organs hang, and nothing pulls them.
+fn places(options: &Options) -> Vec<(&str, &str)> {
+    let mut places = Vec::new();
+    for size in &options.sizes {
+        let scenes = options.scenes.iter().map(String::as_str);
+        let fits = |scene: &&str| *scene == "A" || plan::cells(size).is_some();
+        places.extend(scenes.filter(fits).map(|scene| (scene, size.as_str())));
+    }
+    places
+}
 
-/// Rounds of everything at one size.
+/// States of rest and motions that errors are measured to; those that are known are kept.
+pub fn references(environment: &Environment, scene: &str, sizes: &[String]) -> Result<(), String> {
+    const BROKEN: &str = "look at the lines above; target/peers can be deleted and made again";
+    let mut command = environment.python();
+    command.arg(environment.runner()).args(["references", scene]).args(sizes);
+    finish(&format!("references of scene {scene}, size {}", sizes.join(", ")), &mut command, BROKEN)
+}
+
+/// Rounds of everything at one place; every other round in reverse order.
 fn rounds(
     environment: &Environment,
     options: &Options,
+    scene: &str,
     size: &str,
-    kind: &str,
+    files: &[std::path::PathBuf],
 ) -> Result<(), String> {
-    // The benchmark's dearer defaults are no longer affordable on fine meshes.
-    let plan = if ["xs", "s"].contains(&size) { "default" } else { "medium" };
-    let program = environment.program.display();
-    let command_of =
-        |ours: &Ours| format!("{}='{program}' bench-scene --cfg {}", ours.label, ours.settings);
-    let ours: Vec<String> = OURS.iter().map(command_of).collect();
-    let rounds = options.rounds.to_string();
-    let mut command = environment.python();
-    command.env("SOFTBENCH_EXTERNAL", ours.join(";"));
-    command.args(["run_bench.py", "--plan", plan, "--sizes", size, "--rounds", &rounds]);
-    command.args(["--max-seconds", LONGEST, "--scenes"]).args(&options.scenes);
-    command.arg("--out").arg(environment.results().join(format!("{kind}.jsonl")));
-    if kind == "motion" {
-        command.arg("--transient");
-    } else if size == "l" {
-        command.args(["--timing-only", "--frames", COST_FRAMES]);
+    println!("\n== scene {scene}, size {size}, rounds: {}", options.rounds);
+    let methods = environment.installed(options)?;
+    let mut fewest = BTreeMap::new();
+    let mut jobs: Vec<(&Method, &Point)> = Vec::new();
+    for method in methods {
+        let points = method.points.iter().filter(|point| plan::is_affordable(point, size));
+        let mut points = points.peekable();
+        if points.peek().is_some_and(|point| point.settings.contains("fewest")) {
+            fewest
+                .insert(method.label, largest::fewest_substeps(environment, method, scene, size)?);
+        }
+        jobs.extend(points.map(|point| (method, point)));
     }
-    finish(&format!("{kind}, size {size}, rounds: {rounds}"), &mut command, BROKEN)
-}
-
-/// The cost of a sweep at every size above s, or at s where it is alone.
-fn sweeps(environment: &Environment, options: &Options) -> Result<(), String> {
-    let fine = |size: &&String| !["xs", "s"].contains(&size.as_str());
-    let mut sizes: Vec<&String> = options.sizes.iter().filter(fine).collect();
-    if sizes.is_empty() {
-        sizes.extend(options.sizes.last());
-    }
-    let path = environment.results().join("sweeps.jsonl");
-    write_whole(&path, "")?;
-    let mut file = std::fs::File::options().append(true).open(&path);
-    println!("\n== cost of a sweep, rounds: {}", options.rounds);
     for round in 0..options.rounds {
-        for size in &sizes {
-            for (sweeper, iterations) in
-                SWEEPERS.iter().flat_map(|s| SWEEP_ITERATIONS.map(|i| (s, i)))
-            {
-                let mut row = sweep(environment, sweeper, size, iterations)?;
-                let cost = super::results::cost(&row).unwrap_or(f64::NAN);
-                let label = sweeper.label;
-                println!("{size} {label:20} iterations {iterations}: {cost:8.1} ms per frame");
+        let mut order: Vec<_> = jobs.iter().filter(|(_, p)| p.is_main || round == 0).collect();
+        if round % 2 == 1 {
+            order.reverse();
+        }
+        for (method, point) in order {
+            let stable = fewest.get(method.label).copied().unwrap_or(1);
+            let settings = plan::settings(point.settings, stable);
+            for (kind, file) in [(Kind::Settled, &files[0]), (Kind::Motion, &files[1])] {
+                let run = Run { method, settings: settings.clone(), scene, size, kind };
+                let mut row = run.result(environment)?;
                 row["round"] = json!(round);
-                row["iterations"] = json!(iterations);
-                row["sweeper"] = json!(sweeper.label);
-                row["command"] = json!(options.command);
-                let written = match &mut file {
-                    Ok(file) => writeln!(file, "{row}"),
-                    Err(error) => Err(std::io::Error::from(error.kind())),
-                };
-                written.map_err(|error| format!("{}: {error}", path.display()))?;
+                row["is_main"] = json!(point.is_main);
+                println!("{}", told(&row));
+                append(file, &row)?;
             }
         }
     }
     Ok(())
 }
 
-/// One run of one solver; its result line.
-fn sweep(
-    environment: &Environment,
-    sweeper: &Sweeper,
-    size: &str,
-    iterations: u32,
-) -> Result<Value, String> {
-    let mut settings = json!({ "substeps": SWEEP_SUBSTEPS, "iterations": iterations });
-    for (key, value) in sweeper.settings {
-        settings[*key] = json!(value);
-    }
-    let mut command = environment.pinned_python();
-    match sweeper.peer {
-        Some([file, class]) => command.arg(format!("peers/{file}")).args(["--peer", class]),
-        None => command
-            .args(["peers/external_peer.py", "--peer", sweeper.label, "--program"])
-            .arg(format!("'{}' bench-scene", environment.program.display())),
+/// A line of progress.
+pub fn told(row: &Value) -> String {
+    let shown = |value: Option<f64>, digits: usize| {
+        value.map_or_else(|| "-".into(), |value| format!("{value:.digits$}"))
     };
-    command.args([
-        "--scene",
-        SWEEP_SCENE,
-        "--size",
-        size,
-        "--timing-only",
-        "--frames",
-        COST_FRAMES,
-    ]);
-    command.args(["--max-seconds", LONGEST, "--cfg", &settings.to_string()]);
-    let output = command.stderr(Stdio::piped()).output();
-    let output = output.map_err(|error| format!("Python could not be started: {error}"))?;
-    let text = String::from_utf8_lossy(&output.stdout);
-    let line = text.lines().find_map(|line| line.strip_prefix("RESULT "));
-    let row = line.and_then(super::results::read_line);
-    row.map_or_else(
-        || {
-            let errors = String::from_utf8_lossy(&output.stderr);
-            let last = errors.lines().last().unwrap_or("nothing was said").to_owned();
-            Err(format!("{} at size {size}: {last}", sweeper.label))
-        },
-        Ok,
+    let percent = |key: &str| shown(number(row, key).map(|share| 100.0 * share), 3);
+    format!(
+        "{} {:5} {:32} {:60} {:8} ms  rest {:>8} %  motion {:>8} %  {}",
+        row["scene"].as_str().unwrap_or("?"),
+        row["size"].as_str().unwrap_or("?"),
+        row["peer"].as_str().unwrap_or("?"),
+        row["cfg_asked"].to_string().replace('"', ""),
+        shown(cost(row), 3),
+        percent("err_own_rms"),
+        percent("dyn_own"),
+        row["status"].as_str().unwrap_or("?"),
     )
+}
+
+/// Adds a line to a file of result lines.
+pub fn append(path: &Path, row: &Value) -> Result<(), String> {
+    let file = std::fs::File::options().append(true).create(true).open(path);
+    let written = file.and_then(|mut file| writeln!(file, "{row}"));
+    written.map_err(|error| format!("{}: {error}", path.display()))
 }
 
 fn cpu_model() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let line = text.lines().find(|line| line.starts_with("model name"));
-    let name = line.and_then(|line| line.split_once(':')).map(|(_, name)| name.trim().to_owned());
-    name.unwrap_or_else(|| "unknown".into())
+    let value = |key: &str| {
+        let line = text.lines().find(|line| line.starts_with(key))?;
+        line.split_once(':').map(|(_, value)| value.trim().to_owned())
+    };
+    let name = value("model name").unwrap_or_else(|| "unknown".into());
+    // Virtual machines hide the name of the kind; family and model tell it.
+    match (value("cpu family"), value("model\t")) {
+        (Some(family), Some(model)) => format!("{name} (family {family}, model {model})"),
+        _ => name,
+    }
 }

@@ -136,6 +136,24 @@ fn settings_are_those_of_the_library_and_the_last_of_a_key_counts() {
 }
 
 #[test]
+fn automatic_is_the_method_that_a_scene_would_take_at_the_asked_accuracy() {
+    let bench = bench_with(&scene());
+    let methods = ["standard", "fine"].map(|accuracy| {
+        let end = run(&bench, &["--cfg", &format!("material=snh,accuracy={accuracy}")]);
+        assert_eq!(end.code, Some(0), "{}", end.stderr);
+        timing(&bench)["method"].clone()
+    });
+    assert_eq!(methods, ["quasi_newton", "explicit"]);
+    assert_eq!(timing(&bench)["substeps"], 10);
+    let settings = SolverSettings {
+        method: viscera::settings::Method::Explicit,
+        ..SolverSettings::default()
+    };
+    let expected = library::<f32>(MaterialModel::StableNeoHookean, &settings, FACTOR);
+    assert_eq!(positions(&bench), expected[FRAMES as usize - 1]);
+}
+
+#[test]
 fn a_transient_run_keeps_its_speed_and_writes_every_frame() {
     let bench = bench_with(&scene());
     let end = run(&bench, &["--transient", "--frames", "4", "--cfg", "precision=f64,method=xpbd"]);

@@ -7,6 +7,7 @@ mod data;
 mod anatomy;
 mod bad_input;
 mod bench;
+mod bench_plot;
 mod bench_scene;
 #[cfg(feature = "gpu")]
 mod devices;

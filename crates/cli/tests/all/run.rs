@@ -29,6 +29,8 @@ fn a_run_writes_what_it_promises() {
     assert_eq!(summary["title"], "Tiny");
     assert_eq!(summary["model"]["tets"], 10);
     assert_eq!(summary["solver"]["method"], "quasi_newton");
+    assert_eq!(summary["solver"]["asked_method"], "auto");
+    assert_eq!(summary["solver"]["accuracy"], "standard");
     // As many as the bar's slowest oscillation asks for.
     let substeps = summary["solver"]["substeps"].as_u64().expect("a count");
     assert!((2..=10).contains(&substeps), "{substeps}");

@@ -145,7 +145,7 @@ fn run(context: &mut Context) -> Result<()> {
     context.document.paragraph(format!(
         "A bar of {length} x {width} x {height}, stable neo-Hookean, E {}, is fixed at one end and \
          sinks under its weight. `tip` is how far the corners of its end sink. Four answers: the \
-         library at rest with the default settings, the reference on the same linear tetrahedra, \
+         library at rest with XPBD's default settings, the reference on the same linear tetrahedra, \
          quadratic tetrahedra as the fine solution, and for the small load beam theory,",
         si(YOUNG, "Pa"),
     ));

@@ -251,7 +251,7 @@ fn motions(context: &mut Context) -> Result<()> {
             worst = worse(worst, (motion.frequency / euler.frequency - 1.0).abs());
         }
     }
-    let what = "first bending frequency, defaults, against implicit Euler of the same step";
+    let what = "first bending frequency, XPBD's defaults, against implicit Euler of the same step";
     context.verdict(what, format!("< {}", percent(LIMIT)), percent(worst), worst < LIMIT);
     Ok(())
 }
@@ -324,7 +324,7 @@ fn stiffer(context: &mut Context) -> Result<()> {
             format!("{:.3}", euler.left),
         ]);
     }
-    context.document.subheading("Stiffer tissue with the default settings");
+    context.document.subheading("Stiffer tissue with XPBD's default settings");
     context.document.paragraph(format!(
         "The same release with {substeps} substeps of {iterations} iterations and other stiffnesses. \
          `(E/rho) (h/edge)^2`, with the edge of a cell, is the square of how many cells a wave along \

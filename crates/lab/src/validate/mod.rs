@@ -18,6 +18,8 @@ mod stress;
 mod twist;
 mod uniaxial;
 
+pub use organs::write_organs;
+
 use crate::sections::{Context, Program, Section};
 
 /// All sections, in the order of the report.

@@ -2,6 +2,7 @@
 //! method.
 
 use std::fmt;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
 use viscera::mesh::TetMesh;
@@ -20,6 +21,7 @@ use crate::reference::Reference;
 use crate::settling::{Distance, KEPT_VELOCITY};
 use crate::unstructured::shuffled;
 use viscera_report::{Table, percent};
+use viscera_resources::files::write_atomic;
 
 pub(super) const SECTION: Section = Section {
     name: "organs",
@@ -132,6 +134,28 @@ impl Organ {
             [("body.organ.material.young", &young), ("body.organ.material.poisson", &poisson)];
         Ok(Scene::parse("an organ", &text, &overrides.map(|(key, value)| (key, value.as_str())))?)
     }
+}
+
+/// Writes the organs for the benchmark of peers, a text file each: counts of vertices and tetrahedra, then `x y z held`
+/// per vertex, places in metres, then four vertices per tetrahedron. Returns the files.
+pub fn write_organs(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for organ in ORGANS {
+        let (mesh, scene) = (organ.mesh(false)?, organ.scene(YOUNGS[1], POISSONS[1])?);
+        let held = begin::<f64>(scene, Some(&mesh))?.inputs_at(0.0).pins;
+        let mut is_held = vec![0; mesh.vertices().len()];
+        held.iter().for_each(|pin| is_held[pin.vertex as usize] = 1);
+        let mut text = format!("{} {}\n", mesh.vertices().len(), mesh.tets().len());
+        for (place, held) in mesh.vertices().iter().zip(is_held) {
+            let [x, y, z] = place.to_array();
+            text += &format!("{x:e} {y:e} {z:e} {held}\n");
+        }
+        mesh.tets().iter().for_each(|[a, b, c, d]| text += &format!("{a} {b} {c} {d}\n"));
+        let file = folder.join(format!("{organ}.txt"));
+        write_atomic(&file, text.as_bytes())?;
+        files.push(file);
+    }
+    Ok(files)
 }
 
 #[derive(Clone, Copy, Debug)]

@@ -128,7 +128,7 @@ fn stretches(context: &mut Context) -> Result<()> {
     let defaults = SolverSettings::xpbd();
     let (substeps, iterations) = (defaults.substeps(), defaults.iterations());
     context.document.paragraph(format!(
-        "With the default settings ({substeps} substeps of {iterations} iterations), and with as \
+        "With XPBD's default settings ({substeps} substeps of {iterations} iterations), and with as \
          many of XPBD as published:"
     ));
     context.document.table(&table);
@@ -136,7 +136,7 @@ fn stretches(context: &mut Context) -> Result<()> {
         [("double", double, DOUBLE_LIMIT), ("single", single, SINGLE_LIMIT)]
     {
         context.verdict(
-            format!("patch test, largest error, defaults in {precision} precision"),
+            format!("patch test, largest error, XPBD's defaults in {precision} precision"),
             format!("< {}", scientific(limit)),
             scientific(worst),
             worst < limit,

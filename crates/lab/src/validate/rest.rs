@@ -131,7 +131,7 @@ fn groups(quick: bool) -> Vec<Group> {
         groups.push(Group { title: form.name(), cases });
     }
     let cases = grid(Form::Colored, size, SNH, all, false, DEFAULT);
-    groups.push(Group { title: "coloured, default iterations", cases });
+    groups.push(Group { title: "coloured, XPBD's default iterations", cases });
     if !quick {
         let stiff = &[(1e5, 0.45), (1e5, 0.49)];
         let mut cases = grid(Form::Colored, Size::Large, SNH, stiff, false, PER_FRAME);

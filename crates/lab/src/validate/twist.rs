@@ -139,7 +139,7 @@ fn errors(context: &mut Context, cases: &[Case], answers: &[Answer]) {
         }
     }
     context.document.paragraph(
-        "The library at rest against it, default settings. `rms` and `largest` are errors of places \
+        "The library at rest against it, XPBD's default settings. `rms` and `largest` are errors of places \
          over the displacement, `torque` and `volume` relative errors; `energy` is what the potential \
          is away from the reference's, over the elastic energy; `|grad|` is the unbalanced force over \
          the pins' force. Far away and yet in balance would be another minimum.",

@@ -234,9 +234,9 @@ fn verdicts(context: &mut Context, cases: &[Case], answers: &[Answer]) {
         let (who, limit) = match solver {
             ComparedSolver::Reference => ("the reference", REFERENCE_LIMIT),
             ComparedSolver::Library(LibrarySolver::Single) => {
-                ("defaults in single precision", LIMIT)
+                ("XPBD's defaults in single precision", LIMIT)
             }
-            ComparedSolver::Library(_) => ("defaults in double precision", LIMIT),
+            ComparedSolver::Library(_) => ("XPBD's defaults in double precision", LIMIT),
         };
         let figure = |error| {
             if solver == ComparedSolver::Reference { scientific(error) } else { percent(error) }

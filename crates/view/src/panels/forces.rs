@@ -22,6 +22,7 @@ pub fn show(ui: &mut Ui, holds: &Holds, now: f64, is_comparison: bool) {
         Color32::from_rgb(176, 106, 190),
     ];
     let mut plot = Plot::new("forces")
+        .x_axis_label("time in s")
         .y_axis_label("force [N]")
         .allow_drag(false)
         .allow_zoom(false)

@@ -22,14 +22,16 @@ pub fn show(
         ui.push_id(title, |ui| {
             let mut chooser = Chooser { side, actions };
             known(ui, &mut chooser);
-            method(ui, solver, &mut chooser);
-            if chooses_counts(solver) {
-                passes(ui, solver, &mut chooser);
+            // On a device that is named "automatic" is XPBD, and has its rows.
+            let in_force = &solver.foreseen();
+            method(ui, solver.method, in_force, &mut chooser);
+            if chooses_counts(in_force) {
+                passes(ui, in_force, &mut chooser);
             }
-            if solver.method == Method::Xpbd {
-                sweeps(ui, solver, &mut chooser);
-                acceleration(ui, solver, &mut chooser);
-                exactness(ui, solver, &mut chooser);
+            if in_force.method == Method::Xpbd {
+                sweeps(ui, in_force, &mut chooser);
+                acceleration(ui, in_force, &mut chooser);
+                exactness(ui, in_force, &mut chooser);
             }
             where_computed(ui, solver, device, &mut chooser);
         });
@@ -102,15 +104,15 @@ fn chooses_counts(solver: &SolverSettings) -> bool {
     matches!(solver.method, Method::Auto | Method::QuasiNewton)
 }
 
-fn method(ui: &mut Ui, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
-    let value = match solver.method {
+fn method(ui: &mut Ui, asked: Method, solver: &SolverSettings, chooser: &mut Chooser<'_>) {
+    let value = match asked {
         Method::Auto => "auto",
         Method::Xpbd => "xpbd",
         Method::Explicit => "explicit",
         Method::QuasiNewton => "quasi_newton",
     };
-    let help = "Automatic takes the cheapest at the accuracy below. XPBD sweeps over constraints in large steps. Quasi-Newton solves each step in a dozen \
-                passes, whatever the mesh. Explicit takes many small steps: no sweeps, no guards, cheap for small \
+    let help = "Automatic takes the cheapest at the accuracy below, and XPBD on a device that is named. XPBD sweeps \
+                over constraints in large steps. Quasi-Newton solves each step in a dozen passes, whatever the mesh. Explicit takes many small steps: no sweeps, no guards, cheap for small \
                 soft bodies.";
     let names = [
         ("auto", "automatic"),

@@ -11,7 +11,7 @@ use crate::scalar::lanes::{Eight, LANES};
 pub(super) fn cell_by_cell<S: Real>(model: &Model<S>) -> Numbering {
     let parts = &model.part_numbers;
     let mut tets = vec![Vec::new(); model.part_count];
-    for tet in &model.tet_vertices {
+    for tet in &*model.tet_vertices {
         tets[parts[tet[0] as usize] as usize].push(*tet);
     }
     let mut order = Vec::with_capacity(parts.len());

@@ -15,14 +15,17 @@ use crate::mesh::{MAX_COORDINATE, TetMesh};
 use crate::scalar::{Real, Vec3};
 
 /// Collects bodies, springs and attachments, then builds the [`Model`].
+///
+/// What is as long as the mesh is shared with the models that are built and with clones: a simulation keeps its builder, and
+/// clones it whenever a material changes.
 #[derive(Clone, Debug, Default)]
 pub struct ModelBuilder {
     bodies: Vec<Body>,
-    positions: Vec<Vec3<f64>>,
-    tets: Vec<[u32; 4]>,
-    regions: Vec<u32>,
+    positions: Arc<Vec<Vec3<f64>>>,
+    tets: Arc<Vec<[u32; 4]>>,
+    regions: Arc<Vec<u32>>,
     materials: Vec<Material>,
-    tet_material: Vec<u32>,
+    tet_material: Arc<Vec<u32>>,
     /// By kind.
     elements: [Vec<Given>; KINDS],
     anchors: Vec<Vec3<f64>>,
@@ -43,11 +46,11 @@ impl ModelBuilder {
         check_count("vertices", vertex_count, u32::MAX as usize / 8)?;
         check_count("tetrahedra", first_tet + mesh.tets().len(), u32::MAX as usize / 16)?;
         let material = self.intern(material);
-        self.positions.extend_from_slice(mesh.vertices());
+        Arc::make_mut(&mut self.positions).extend_from_slice(mesh.vertices());
         let shift = first_vertex as u32;
-        self.tets.extend(mesh.tets().iter().map(|tet| tet.map(|v| v + shift)));
-        self.regions.extend_from_slice(mesh.regions());
-        self.tet_material.resize(self.tets.len(), material);
+        Arc::make_mut(&mut self.tets).extend(mesh.tets().iter().map(|tet| tet.map(|v| v + shift)));
+        Arc::make_mut(&mut self.regions).extend_from_slice(mesh.regions());
+        Arc::make_mut(&mut self.tet_material).resize(self.tets.len(), material);
         let tets = first_tet..self.tets.len();
         self.bodies.push(Body { vertices: first_vertex..vertex_count, tets });
         Ok(self.bodies.len() - 1)
@@ -57,7 +60,7 @@ impl ModelBuilder {
     pub fn set_material(&mut self, body: usize, material: &Material) -> Result<(), ModelError> {
         let range = self.body(body)?.tets.clone();
         let material = self.intern(material);
-        self.tet_material[range].fill(material);
+        Arc::make_mut(&mut self.tet_material)[range].fill(material);
         self.forget_unused_materials();
         Ok(())
     }
@@ -72,9 +75,10 @@ impl ModelBuilder {
         let range = self.body(body)?.tets.clone();
         let material = self.intern(material);
         let mut count = 0;
+        let tet_material = Arc::make_mut(&mut self.tet_material);
         for tet in range {
             if self.regions[tet] == region {
-                self.tet_material[tet] = material;
+                tet_material[tet] = material;
                 count += 1;
             }
         }
@@ -177,10 +181,10 @@ impl ModelBuilder {
             rest_positions: self.positions.iter().map(|p| p.cast()).collect(),
             masses: self.masses(),
             materials: self.materials.iter().map(constants).collect(),
-            tet_vertices: self.tets.clone(),
-            tet_materials: self.tet_material.clone(),
+            tet_vertices: Arc::clone(&self.tets),
+            tet_materials: Arc::clone(&self.tet_material),
             laws: self.materials.iter().map(Material::model).collect(),
-            places: self.positions.clone(),
+            places: Arc::clone(&self.positions),
             elements: ElementLists::new(&self.elements),
             rest_anchors: self.anchors.iter().map(|anchor| anchor.cast()).collect(),
             revision: 0,
@@ -203,7 +207,7 @@ impl ModelBuilder {
     /// A quarter of each tetrahedron's [kg].
     fn masses<S: Real>(&self) -> Vec<S> {
         let mut masses = vec![0.0; self.positions.len()];
-        for (tet, &material) in self.tets.iter().zip(&self.tet_material) {
+        for (tet, &material) in self.tets.iter().zip(&*self.tet_material) {
             let volume = crate::mesh::tet_volume(tet.map(|v| self.positions[v as usize]));
             let share = 0.25 * volume * self.materials[material as usize].density();
             for &v in tet {
@@ -217,7 +221,7 @@ impl ModelBuilder {
     fn forget_unused_materials(&mut self) {
         let mut new_number = vec![None; self.materials.len()];
         let mut kept = Vec::new();
-        for number in &mut self.tet_material {
+        for number in Arc::make_mut(&mut self.tet_material) {
             let old = *number as usize;
             *number = *new_number[old].get_or_insert_with(|| {
                 kept.push(self.materials[old]);

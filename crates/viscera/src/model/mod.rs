@@ -125,13 +125,13 @@ pub struct Model<S> {
     pub masses: Vec<S>,
     /// Materials in use.
     pub materials: Vec<MaterialConstants<S>>,
-    /// Vertices of the tetrahedra, and the materials of each, shape [tet_count].
-    pub(crate) tet_vertices: Vec<[u32; 4]>,
-    pub(crate) tet_materials: Vec<u32>,
+    /// Vertices of the tetrahedra, and the materials of each, shape [tet_count]. The builder has the same arrays.
+    pub(crate) tet_vertices: Arc<Vec<[u32; 4]>>,
+    pub(crate) tet_materials: Arc<Vec<u32>>,
     /// The law of each material.
     pub(crate) laws: Vec<MaterialModel>,
     /// Rest positions [m] as they were given: shapes are computed in double precision where they are asked for.
-    pub(crate) places: Vec<Vec3<f64>>,
+    pub(crate) places: Arc<Vec<Vec3<f64>>>,
     /// Springs, attachments: all elements that are no tetrahedra.
     pub elements: ElementLists<S>,
     /// Anchors of the elements that have one where nothing moves them [m], in the order in which they were added.
@@ -217,12 +217,12 @@ impl<S: Real> Model<S> {
             let Compliance { normal, cross, shear } = compliance;
             add_all(&mut add, &[lame_lambda, lame_mu, normal, cross, shear, viscosity]);
         }
-        for (vertices, &material) in self.tet_vertices.iter().zip(&self.tet_materials) {
+        for (vertices, &material) in self.tet_vertices.iter().zip(&*self.tet_materials) {
             add(material.into());
             vertices.iter().for_each(|&v| add(v.into()));
         }
         self.laws.iter().for_each(|&law| add(law as u64));
-        for x in &self.places {
+        for x in &*self.places {
             x.to_array().into_iter().for_each(|value| add(value.to_bits()));
         }
         for_each_kind!(self, list => {
@@ -246,10 +246,10 @@ impl<S: Real> Model<S> {
             rest_positions: Vec::new(),
             masses: Vec::new(),
             materials: Vec::new(),
-            tet_vertices: Vec::new(),
-            tet_materials: Vec::new(),
+            tet_vertices: Arc::default(),
+            tet_materials: Arc::default(),
             laws: Vec::new(),
-            places: Vec::new(),
+            places: Arc::default(),
             elements: ElementLists::new(&Default::default()),
             rest_anchors: Vec::new(),
             revision: 0,

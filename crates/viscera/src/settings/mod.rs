@@ -7,6 +7,7 @@
 
 mod accuracy;
 mod compound;
+mod foreseen;
 mod kind;
 mod solver;
 mod tree;

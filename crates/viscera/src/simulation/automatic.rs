@@ -5,7 +5,7 @@ use super::holding::GraspOrigins;
 use crate::model::Model;
 use crate::scalar::Real;
 use crate::scene::Scene;
-use crate::settings::{DeviceRequest, Integrator, Method, SolverSettings};
+use crate::settings::{Integrator, Method, SolverSettings};
 use crate::solver::{Inputs, Solver, choose, expected_motion_error};
 
 /// From this error of motion on, steps of the quasi-Newton method are the only choice: they are guarded, and the explicit
@@ -45,19 +45,28 @@ pub fn settings_of<S: Real>(
     model: &Model<S>,
     on_device: bool,
 ) -> SolverSettings {
-    let asked = &scene.solver;
-    let named = !matches!(asked.device, DeviceRequest::Auto | DeviceRequest::Cpu);
-    if on_device || named {
-        return asked.chosen(Method::Xpbd);
+    if on_device {
+        return scene.solver.chosen(Method::Xpbd);
     }
+    automatic_settings(&scene.solver, model, scene.time.frame, || fixings(scene, assembly))
+}
+
+/// These settings with the method in the place of "auto" that a scene's simulation would put there: for who steps a
+/// [`Solver`] of a model by hand. `fixings` are the inputs by which the model is always held, asked for where the choice
+/// depends on them; `frame` is the duration of a frame [s].
+pub fn automatic_settings<S: Real>(
+    asked: &SolverSettings,
+    model: &Model<S>,
+    frame: f64,
+    fixings: impl FnOnce() -> Inputs<S>,
+) -> SolverSettings {
+    let asked = &asked.foreseen();
     let large = asked.chosen(Method::QuasiNewton);
     if asked.method != Method::Auto || asked.accuracy.share() >= GUARDED_FROM {
         return large;
     }
     let small = asked.chosen(Method::Explicit);
-    let inputs = fixings(scene, assembly);
-    let frame = scene.time.frame;
-    let substeps = Solver::new(model, &large).substeps(&inputs, frame);
+    let substeps = Solver::new(model, &large).substeps(&fixings(), frame);
     let passes = f64::from(2 * choose(&large, &model.materials).passes) + BESIDES;
     let small_steps = (frame / Solver::new(model, &small).stable_step()).ceil();
     let cheaper = small_steps < PASS_OVER_SMALL_STEP * passes * f64::from(substeps);

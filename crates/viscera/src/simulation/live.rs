@@ -237,7 +237,11 @@ impl<S: Real> Simulation<S> {
         let model = builder.build::<S>().map_err(SimulationError::from)?;
         let same_device = scene.solver.device == self.scene.solver.device;
         let on_device = same_device && self.callers_device;
-        let solver = automatic::settings_of(&scene, &self.assembly, &model, on_device);
+        self.resumed_method = self.resumed_method.filter(|_| same_device);
+        let solver = match self.resumed_method {
+            Some(method) => scene.solver.chosen(method),
+            None => automatic::settings_of(&scene, &self.assembly, &model, on_device),
+        };
         let dt = substep_dt(&scene, solver.substeps());
         let backend = self.backend.renew(same_device, &model, &solver, dt)?;
         let rest = State::at_rest(&model);

@@ -17,7 +17,7 @@ mod rest;
 mod saved;
 
 pub use assemble::{AssembleError, AssembledBody, Assembly, ResolvedPatch};
-pub use automatic::ExpectedErrors;
+pub use automatic::{ExpectedErrors, automatic_settings};
 pub use error::{FrameError, LiveError, SimulationError};
 pub use forces::Hold;
 use holding::GraspOrigins;
@@ -116,6 +116,8 @@ pub struct Simulation<S> {
     solver: SolverSettings,
     /// Whether the caller has chosen the device.
     callers_device: bool,
+    /// The method that stands in the place of "auto" because a simulation was resumed that had it.
+    resumed_method: Option<Method>,
     assembly: Assembly,
     model: Model<S>,
     state: State<S>,
@@ -163,6 +165,7 @@ impl<S: Real> Simulation<S> {
             backend: choose(&model, &solver, substep_dt(&scene, solver.substeps()))?,
             solver,
             callers_device,
+            resumed_method: None,
             period: f64::INFINITY,
             inputs: Inputs::default(),
             taken: GraspOrigins::default(),

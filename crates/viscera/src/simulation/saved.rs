@@ -5,16 +5,21 @@
 //! acts may be others; meshes, materials and the duration of a frame may not. What was done by hand belongs into the scene file
 //! ([`Simulation::live`]).
 
-use super::Simulation;
+use super::device::Backend;
 use super::error::LiveError;
 use super::holding::GraspOrigins;
+use super::{Simulation, substep_dt};
 use crate::layout::Layout;
 use crate::model::for_each_kind;
 use crate::scalar::{Real, Vec3};
+use crate::settings::Method;
 use crate::state::{Learned, LearnedPart, State};
 
 /// Raised whenever the bytes mean something else.
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
+
+/// Methods by the number that stands for them; a new one is added at the end.
+const METHODS: [Method; 4] = [Method::Auto, Method::Xpbd, Method::Explicit, Method::QuasiNewton];
 
 /// What the bytes begin with.
 const MAGIC: &[u8; 8] = b"viscera\x1a";
@@ -48,6 +53,18 @@ pub enum ResumeError {
         /// What it was saved with.
         saved: &'static str,
     },
+    /// Another method computed it, and this one cannot go on.
+    #[error(
+        "the simulation was saved with method \"{saved}\", and what computes it here does it with \"{here}\"; set \
+         `solver.method = \"{saved}\"`{}",
+        if *.saved == Method::QuasiNewton { " and `solver.device = \"cpu\"`" } else { "" }
+    )]
+    Method {
+        /// What it was saved with.
+        saved: Method,
+        /// What is in force here.
+        here: Method,
+    },
     /// It is of another scene.
     #[error(
         "the saved simulation has other {what} than the scene; resume it with the scene, meshes and solver \
@@ -69,6 +86,8 @@ type Vectors = Vec<[f64; 3]>;
 struct Saved {
     /// Bytes of a number of the solver.
     precision: u8,
+    /// See [`METHODS`].
+    method: u8,
     /// See [`fingerprint`].
     model: u64,
     frame: u64,
@@ -104,6 +123,7 @@ impl<S: Real> Simulation<S> {
         let State { positions, velocities, multipliers, multiplier_dt, learned } = &state;
         let saved = Saved {
             precision: size_of::<S>() as u8,
+            method: METHODS.iter().position(|m| *m == self.solver.method).unwrap_or(0) as u8,
             model: fingerprint(self.layout()),
             frame: self.frame,
             frame_duration: self.scene.time.frame,
@@ -143,6 +163,8 @@ impl<S: Real> Simulation<S> {
             }
             self.make_change()?;
         }
+        let method = METHODS.get(usize::from(saved.method)).ok_or(ResumeError::Damaged)?;
+        self.take_method(*method)?;
         let vertices = self.model.vertex_count();
         let constraints = self.layout().multiplier_count;
         let lengths = [saved.positions.len(), saved.velocities.len(), saved.before.len()];
@@ -170,6 +192,26 @@ impl<S: Real> Simulation<S> {
         self.inputs = self.inputs_at(self.time());
         self.measure_tissue();
         Ok(self)
+    }
+
+    /// Goes on with the method that a simulation was saved with, where "auto" has chosen another one: a device has XPBD
+    /// where the CPU has the quasi-Newton method.
+    fn take_method(&mut self, saved: Method) -> Result<(), ResumeError> {
+        let here = self.solver.method;
+        if saved == here {
+            return Ok(());
+        }
+        let refused = ResumeError::Method { saved, here };
+        if self.scene.solver.method != Method::Auto || self.callers_device {
+            return Err(refused);
+        }
+        let solver = self.scene.solver.chosen(saved);
+        let dt = substep_dt(&self.scene, solver.substeps());
+        self.backend = Backend::choose(&self.model, &solver, dt).map_err(|_| refused)?;
+        self.solver = solver;
+        self.resumed_method = Some(saved);
+        self.choose_substeps();
+        Ok(())
     }
 
     /// Whether each motion has as many vertices as were taken hold of.

@@ -144,31 +144,61 @@ from = { body = "upper", half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
 to = { body = "lower", half_space = { point = [0, 0, "-10 mm"], normal = [0, 0, 1] } }
 "#;
 
-/// The motion ends within these frames, and with it the set of pinned vertices changes.
+/// Frames after `first` ones. The motion ends with the sixth, and with it the set of pinned vertices changes.
+fn frames_allocate_nothing<S: Real>(first: u64, overrides: &[(&str, &str)]) {
+    let overrides = [&[("solver.device", "cpu")], overrides].concat();
+    let scene = Scene::parse("everything.toml", SCENE, &overrides);
+    let scene = scene.unwrap_or_else(|error| panic!("{error}"));
+    let assembly = Assembly::new(&scene, &mut |name| Err(format!("no file {name}")));
+    let assembly = assembly.unwrap_or_else(|error| panic!("{error}"));
+    let mut simulation = Simulation::<S>::new(scene, assembly).expect("a model");
+    for _ in 0..first {
+        simulation.advance_frame().expect("a frame");
+    }
+    let requests = requests_of(|| {
+        for _ in first..12 {
+            simulation.advance_frame().expect("a frame");
+        }
+    });
+    assert_eq!(requests, 0, "{overrides:?}");
+}
+
 #[test]
 fn a_frame_of_a_scene_allocates_nothing_after_the_first() {
     for acceleration in ["none", "chebyshev", "anderson"] {
         for colors in ["1", "4", "unlimited"] {
-            let overrides = [
+            let settings = [
                 ("solver.acceleration", acceleration),
                 ("solver.colors", colors),
                 ("solver.method", "xpbd"),
-                ("solver.device", "cpu"),
             ];
-            let scene = Scene::parse("everything.toml", SCENE, &overrides);
-            let scene = scene.unwrap_or_else(|error| panic!("{error}"));
-            let assembly = Assembly::new(&scene, &mut |name| Err(format!("no file {name}")));
-            let assembly = assembly.unwrap_or_else(|error| panic!("{error}"));
-            let mut simulation = Simulation::<f32>::new(scene, assembly).expect("a model");
-            simulation.advance_frame().expect("a frame");
-            let requests = requests_of(|| {
-                for _ in 1..12 {
-                    simulation.advance_frame().expect("a frame");
-                }
-            });
-            assert_eq!(requests, 0, "{acceleration}, {colors} colours");
+            frames_allocate_nothing::<f32>(1, &settings);
         }
     }
+}
+
+/// Where other vertices are held than before, the preconditioner is built anew.
+#[test]
+fn a_frame_of_the_quasi_newton_method_allocates_nothing_while_the_same_is_held() {
+    frames_allocate_nothing::<f32>(7, &[]);
+    for integrator in ["sdirk2", "implicit_euler"] {
+        for history in ["0", "2", "10"] {
+            let settings = [
+                ("solver.method", "quasi_newton"),
+                ("solver.integrator", integrator),
+                ("solver.history", history),
+                ("solver.substeps", "3"),
+            ];
+            frames_allocate_nothing::<f32>(7, &settings);
+        }
+    }
+    frames_allocate_nothing::<f64>(7, &[("solver.method", "quasi_newton")]);
+}
+
+#[test]
+fn a_frame_of_the_explicit_method_allocates_nothing_after_the_first() {
+    frames_allocate_nothing::<f32>(1, &[("solver.method", "explicit")]);
+    frames_allocate_nothing::<f64>(1, &[("solver.method", "explicit"), ("solver.substeps", "1")]);
 }
 
 /// A bar of 30 000 tetrahedra at the defaults, single precision. A tetrahedron has 20 bytes in the model, 64 in the
@@ -202,15 +232,18 @@ fn memory_is_small_and_as_large_as_is_said() {
 #[test]
 fn memory_of_springs_and_attachments_is_said() {
     let mesh = block([0.06, 0.03, 0.03], [3, 2, 2], 0.1);
-    let mut builder = ModelBuilder::new();
-    builder.add_body(&mesh, &material(SNH, 1e4, 0.4)).expect("a body");
-    for (v, &x) in mesh.vertices().iter().enumerate().cycle().take(5000) {
-        builder.add_attachment(v as u32, x, 10.0).expect("an attachment");
-        let other = (v + 1) % mesh.vertices().len();
-        builder.add_spring([v as u32, other as u32], 10.0, None).expect("a spring");
-    }
     let settings = crate::common::colored(Colors::Limited(4));
-    let (model, taken) = bytes_of(|| builder.build::<f32>().expect("a model"));
+    // The builder goes within: what the model shares with it is the model's alone then.
+    let (model, taken) = bytes_of(|| {
+        let mut builder = ModelBuilder::new();
+        builder.add_body(&mesh, &material(SNH, 1e4, 0.4)).expect("a body");
+        for (v, &x) in mesh.vertices().iter().enumerate().cycle().take(5000) {
+            builder.add_attachment(v as u32, x, 10.0).expect("an attachment");
+            let other = (v + 1) % mesh.vertices().len();
+            builder.add_spring([v as u32, other as u32], 10.0, None).expect("a spring");
+        }
+        builder.build::<f32>().expect("a model")
+    });
     let (layout, laid) = bytes_of(|| Layout::new(&model, &settings));
     for (said, taken) in [(model.bytes(), taken), (layout.bytes(), laid)] {
         assert!(said <= taken && taken * 100 <= said * 103, "{said} bytes said, {taken} taken");

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use viscera::scalar::Real;
 use viscera::scalar::lanes::Instructions::{Avx2, Portable};
 use viscera::scene::Scene;
+use viscera::settings::Method;
 use viscera::simulation::{Assembly, ResumeError, Simulation};
 
 /// A bar in an elastic bed, beside another that hangs from it; one is taken hold of on the way by springs, and
@@ -158,6 +159,37 @@ fn a_simulation_goes_on_with_another_number_of_pairs() {
         let far = pairs.map(|(a, b)| (a - b).length()).fold(0.0, f32::max);
         assert!(far < 1e-3, "{kept:?} and then {now:?}: {far} m apart");
     }
+}
+
+/// Where "auto" was another method, as on a device, the CPU goes on with that one.
+#[test]
+fn automatic_goes_on_with_the_method_that_was_saved() {
+    for method in ["xpbd", "explicit"] {
+        let mut whole = cpu::<f32>(&[("solver.method", method)]);
+        advance(&mut whole, SAVED);
+        let saved = whole.save();
+        advance(&mut whole, FRAMES);
+        let here = cpu::<f32>(&[("solver.method", "auto")]);
+        assert_eq!(here.solver().method, Method::QuasiNewton);
+        let mut resumed = here.resume(&saved).expect("the same scene");
+        assert_eq!((resumed.solver().method, resumed.substeps()), (whole.solver().method, 3));
+        advance(&mut resumed, FRAMES);
+        assert!(bits(&resumed) == bits(&whole), "{method}");
+    }
+}
+
+#[test]
+fn a_method_that_cannot_go_on_says_which_can() {
+    let error = |saved: &'static str, here: &'static str| {
+        let saved = cpu::<f32>(&[("solver.method", saved)]).save();
+        let resumed = cpu::<f32>(&[("solver.method", here)]).resume(&saved);
+        resumed.expect_err("another method").to_string()
+    };
+    let text = error("quasi_newton", "xpbd");
+    let cure = "set `solver.method = \"quasi_newton\"` and `solver.device = \"cpu\"`";
+    assert!(text.contains(cure), "{text}");
+    let text = error("explicit", "quasi_newton");
+    assert!(text.ends_with("set `solver.method = \"explicit\"`"), "{text}");
 }
 
 #[test]
