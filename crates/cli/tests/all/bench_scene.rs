@@ -145,10 +145,8 @@ fn automatic_is_the_method_that_a_scene_would_take_at_the_asked_accuracy() {
     });
     assert_eq!(methods, ["quasi_newton", "explicit"]);
     assert_eq!(timing(&bench)["substeps"], 10);
-    let settings = SolverSettings {
-        method: viscera::settings::Method::Explicit,
-        ..SolverSettings::default()
-    };
+    let settings =
+        SolverSettings { method: viscera::settings::Method::Explicit, ..SolverSettings::default() };
     let expected = library::<f32>(MaterialModel::StableNeoHookean, &settings, FACTOR);
     assert_eq!(positions(&bench), expected[FRAMES as usize - 1]);
 }

@@ -30,7 +30,7 @@ use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::cpu::threads::{Shared, Workers};
 use crate::solver::step::data::StepConstants;
 use dense::Dense;
-use full::FullSums;
+use full::{FullBlock, FullSums};
 use prolongation::Prolongation;
 use rotation::Turn;
 use sums::{DiagonalSums, Grouped, Groups, On, Six, inverse, mapped, tets_of_part, times};
@@ -63,8 +63,6 @@ struct OfPart<S> {
     levels: Vec<DiagonalSums<S>>,
     inverses: Vec<Vec<Six<S>>>,
     full: FullSums,
-    /// Of each node of a group its mean gradient [1/m] by `R`, and by `A`.
-    turned: Vec<[Vec3<f64>; 2]>,
     dense: Dense,
     /// Residuals, and then corrections, of the lattice levels.
     vectors: Vec<Vec<Point<S>>>,
@@ -177,7 +175,6 @@ impl<S: Real> OfPart<S> {
             levels: vec![DiagonalSums::default(); levels],
             inverses: (0..levels).map(|level| vec![[S::ZERO; 6]; count(level)]).collect(),
             full: FullSums::default(),
-            turned: Vec::new(),
             dense: Dense::new(3 * if has_dense(count(levels)) { count(levels) } else { 0 }),
             vectors: (1..=levels).map(|level| vec![Point::default(); count(level)]).collect(),
             residual: vec![Point::default(); places.len()],
@@ -221,7 +218,7 @@ impl<S: Real> OfPart<S> {
         let places = places_of(layout, part);
         let user = &layout.numbering.order[part.vertices.clone()];
         let masses: Vec<f64> = user.iter().map(|&v| layout.masses[v as usize].to_f64()).collect();
-        let (grouped, eighths) = Grouped::new(&tets, &places, &self.lattice);
+        let grouped = Grouped::new(&tets, &places, &self.lattice);
         self.groups = Groups::new(&tets, &grouped, places.len());
         for (level, (way, of)) in self.ways_up.iter_mut().zip(&self.lattice.levels).enumerate() {
             let weights = if level == 0 { &of.of_vertices } else { &of.of_finer };
@@ -240,8 +237,9 @@ impl<S: Real> OfPart<S> {
                 self.levels.resize(coarsest + 1, sums);
             }
             _ => {
-                self.full = FullSums::new(on, &tets, &grouped, &eighths, &masses, free);
-                self.turned = vec![[Vec3::ZERO; 2]; self.full.most];
+                // Not both at a time: they are large.
+                self.full = FullSums::default();
+                self.full = FullSums::new(on, &tets, &grouped, &masses, free);
             }
         }
     }
@@ -335,24 +333,14 @@ impl<S: Real> OfPart<S> {
         for &(nodes, mass) in &self.full.masses {
             add_block(&mut self.dense, nodes, &(Mat3::IDENTITY * mass));
         }
-        let FullSums { sets, nodes, traces, .. } = &self.full;
-        for set in sets {
-            let turn = &turns[set.group as usize];
+        for (group, turn) in turns[..self.groups.len()].iter().enumerate() {
             let (r, a) = (turn.rotation.cast::<f64>(), turn.map.cast::<f64>());
             let squared = squared * turn.stiffer.to_f64();
-            let (shear, volume) = (squared * set.shear, squared * set.volume);
-            let turned = &mut self.turned[..set.nodes.len()];
-            for (turned, &(_, g)) in turned.iter_mut().zip(&nodes[set.nodes.clone()]) {
-                *turned = [r * g, a * g];
-            }
-            let mut traces = traces[set.traces..].iter();
-            for (i, &(node, _)) in nodes[set.nodes.clone()].iter().enumerate() {
-                let [shears, grows] = [turned[i][0] * shear, turned[i][1] * volume];
-                for (&(other, _), before) in nodes[set.nodes.clone()].iter().zip(&turned[..=i]) {
-                    let trace = squared * traces.next().copied().unwrap_or_default();
-                    let block = Mat3::outer(before[0], shears) + Mat3::outer(grows, before[1]);
-                    add_block(&mut self.dense, [node, other], &(block + Mat3::IDENTITY * trace));
-                }
+            let [mu, lambda] = self.full.lame[group].map(|parameter| parameter * squared);
+            for &FullBlock { nodes, b } in &self.full.blocks[self.full.of_group(group)] {
+                let shear = Mat3::IDENTITY * b.trace() + r * b.transpose() * r.transpose();
+                let block = shear * mu + a * b * a.transpose() * lambda;
+                add_block(&mut self.dense, nodes, &block);
             }
         }
     }

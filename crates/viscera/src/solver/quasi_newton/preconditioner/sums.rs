@@ -3,7 +3,7 @@
 //! ```text
 //! K_ab = V (mu (g_a.g_b) I + mu (R g_b)(R g_a)^T + lambda (A g_a)(A g_b)^T)               tetrahedron
 //! K_cc = sum_groups t I + A B A^T,   t = sum V mu |g_c|^2,  B = sum V (mu + lambda) g_c g_c^T
-//! K_cd = sum_sets t_cd I + V mu (R <g_d>)(R <g_c>)^T + V lambda (A <g_c>)(A <g_d>)^T,   t_cd = sum V mu g_c.g_d
+//! K_cd = sum_groups mu (t_cd I + R B_cd^T R^T) + lambda A B_cd A^T,   B_cd = sum V g_c g_d^T,  t_cd = tr B_cd
 //! ```
 //!
 //! `g_c = sum_a w_ac g_a` is the gradient of node `c`'s shape function, in the rest shape; `R` the rotation, `A` the
@@ -12,9 +12,7 @@
 //! lattice, which turn and stretch together: `R` and `A` are all that changes, so that the blocks of every level,
 //! vertices among them, are found without a pass over the tetrahedra. `K_cc` is exact for neo-Hookean tetrahedra but for
 //! that: their volume term has `lambda + mu` before it, and no other than these. Between nodes, in the dense level, `mu`
-//! goes with `R`, and all but `t` with the mean gradients `<g>` of a *set* of tetrahedra, whose volume `V` is: those of a group
-//! within half the spacing of the level, or a quarter where tissue is nearly incompressible: there gradients hardly differ. The cost is then that of the nodes, and the sum over
-//! all of them positive semidefinite, because a mean's square is at most the mean square.
+//! goes with `R`: the sum over all nodes is then positive semidefinite.
 
 use crate::elements::shape_gradients;
 use crate::layout::Layout;
@@ -95,21 +93,12 @@ pub struct Grouped {
 }
 
 impl Grouped {
-    /// The tetrahedra of one material in one cell of the finest lattice that hang together by vertices; and for each
-    /// tetrahedron the eighth of its cell that it is in.
-    pub fn new(tets: &[LocalTet], places: &[Vec3<f64>], lattice: &Lattice) -> (Self, Vec<u8>) {
-        let at = |tet: &LocalTet| {
+    /// The tetrahedra of one material in one cell of the finest lattice that hang together by vertices.
+    pub fn new(tets: &[LocalTet], places: &[Vec3<f64>], lattice: &Lattice) -> Self {
+        let cell = |tet: &LocalTet| {
             let sum =
                 tet.vertices.iter().fold(Vec3::ZERO, |sum: Vec3<f64>, &v| sum + places[v as usize]);
-            lattice.along_axes(sum * 0.25) * (1.0 / lattice.spacing)
-        };
-        let eighth = |tet: &LocalTet| {
-            let at = at(tet).to_array().map(|x| u8::from(x - x.floor() >= 0.5));
-            at[0] + 2 * at[1] + 4 * at[2]
-        };
-        let eighths = tets.iter().map(eighth).collect();
-        let cell = |tet: &LocalTet| {
-            let at = at(tet);
+            let at = lattice.along_axes(sum * 0.25) * (1.0 / lattice.spacing);
             // A part without levels is one cell.
             let cell = |x: f64| if x.is_finite() { x.floor() as i64 } else { 0 };
             (tet.material, [at.z, at.y, at.x].map(cell))
@@ -138,7 +127,7 @@ impl Grouped {
                 grouped.offsets.push(grouped.tets.len());
             }
         }
-        (grouped, eighths)
+        grouped
     }
 
     /// How many groups.
