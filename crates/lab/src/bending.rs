@@ -22,7 +22,7 @@ use viscera::model::ModelBuilder;
 use viscera::scalar::{Vec3, vec3};
 use viscera::solver::{Inputs, Pin};
 
-use crate::load_cases::{DrivenPath, GRAVITY, Random, tissue};
+use crate::load_cases::{DrivenPath, GRAVITY, tissue};
 use crate::reference::Reference;
 use crate::unstructured::{relaxed, shuffled};
 
@@ -286,27 +286,4 @@ pub fn response(mesh: &TetMesh, element: Element, load: Load, poisson: f64) -> R
 pub fn extrapolated(cells: [usize; 2], responses: [f64; 2]) -> f64 {
     let finer = (cells[1] as f64 / cells[0] as f64).powi(2);
     responses[1] + (responses[1] - responses[0]) / (finer - 1.0)
-}
-
-/// How many tetrahedra of a coarse bar are inverted at the minimum of the last element's energy, reached through those
-/// of the ones before, from vertices that are scattered by 0.4 to 0.8 of an edge.
-pub fn tets_left_inverted(phases: &[Element], seed: u64) -> Result<usize> {
-    let tissue = tissue(MaterialModel::StableNeoHookean, YOUNG, 0.45)?;
-    let mesh = Load::Sag(0.0).mesh(Filling::Relaxed(1), 2)?;
-    let mut random = Random(seed + 1);
-    let edge = BAR[1] / 2.0;
-    let scatter = |x: &Vec3<f64>| {
-        let way = random.vector(1.0);
-        let reach = random.uniform(0.4, 0.8) * edge;
-        let direction = way * (1.0 / way.length().max(f64::MIN_POSITIVE));
-        if x.x < NEAR { *x } else { *x + direction * reach }
-    };
-    let mut x: Vec<Vec3<f64>> = mesh.vertices().iter().map(scatter).collect();
-    for &element in phases {
-        let mut body = Body::new(&mesh, element, &tissue)?;
-        let inputs = Inputs { pins: body.pins(|x| x.x < NEAR), ..Inputs::default() };
-        x = body.reference.settle(&x, &inputs)?.positions;
-    }
-    let volume = |tet: &[u32; 4]| viscera::mesh::tet_volume(tet.map(|v| x[v as usize]));
-    Ok(mesh.tets().iter().filter(|tet| volume(tet) <= 0.0).count())
 }

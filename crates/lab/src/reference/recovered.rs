@@ -209,7 +209,15 @@ impl Recovered {
             value.add(place.volume * tissue.energy_density(&self.gradient_at(i, x), creep));
         }
         for (q, volume) in self.volumes.iter().enumerate() {
-            value.add(self.bulk(q, self.change(volume, x), start)[2]);
+            let [pressure, _, energy] = self.bulk(q, self.change(volume, x), start);
+            value.add(energy);
+            // Where bodies have turned, a volume is the small difference of products of three entries of `F`, and that
+            // is what rounds.
+            let product = |&(t, weight): &(u32, f64)| {
+                let squared = self.gradient_at(t as usize, x).norm_squared();
+                weight * squared * squared.sqrt()
+            };
+            value.size += pressure.abs() * volume.tets.iter().map(product).sum::<f64>();
         }
     }
 
@@ -360,7 +368,7 @@ fn average(domains: &Domains<f64>, n: usize) -> Gradient {
     gradient
 }
 
-/// `Fh_t` as a sum over vertices: through the middles of the edges, less those of faces with nothing on the other side.
+/// `Fh_t` as a sum over vertices: through the middles of the edges, each on two faces.
 fn mean_gradient(
     domains: &Domains<f64>,
     rest: &[Vec3<f64>],
@@ -373,17 +381,18 @@ fn mean_gradient(
         *gradient.entry(*vertex).or_default() += g;
     }
     for [a, b] in TET_EDGES {
-        let mut sides = frame.gradients[a] + frame.gradients[b];
+        // Of the two faces that the edge lies on, as far as each counts: `g_a + g_b` where both do.
+        let mut sides = Vec3::ZERO;
         for (o, face) in TET_FACES.iter().enumerate() {
-            if frame.face_weights[o] == 0.0 && face.contains(&a) && face.contains(&b) {
-                sides = sides + frame.gradients[o];
+            if face.contains(&a) && face.contains(&b) {
+                sides += frame.gradients[o] * (-8.0 / 3.0 * frame.face_weights[o]);
             }
         }
         let edge = rest[vertices[b] as usize] - rest[vertices[a] as usize];
         for (corner, sign) in [(a, 1.0), (b, -1.0)] {
             // The middle moves by an eighth of G_a (X_b - X_a), less the same of b.
             for (&vertex, slope) in &averages[domains.tet_domains[t][corner] as usize] {
-                let moved = sign * domains.smoothing.recovery * slope.dot(edge) / 8.0;
+                let moved = sign * slope.dot(edge) / 8.0;
                 *gradient.entry(vertex).or_default() += sides * moved;
             }
         }

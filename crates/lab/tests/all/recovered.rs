@@ -19,7 +19,7 @@ use viscera_lab::unstructured::shuffled;
 
 const SNH: MaterialModel = MaterialModel::StableNeoHookean;
 const STVK: MaterialModel = MaterialModel::SaintVenantKirchhoff;
-const SMOOTHINGS: [Smoothing; 2] = [Smoothing::RECOVERED, Smoothing::AVERAGED];
+const SMOOTHINGS: [Smoothing; 3] = [Smoothing::RECOVERED, Smoothing::FITTED, Smoothing::AVERAGED];
 
 fn material(young: f64, poisson: f64) -> Material {
     Material::new(SNH, young, poisson, 1000.0).expect("a legal material")
@@ -357,5 +357,34 @@ fn layers_in_series_stretch_by_their_stiffness() {
             println!("nu {poisson}: off by {error:.1e}");
             assert!(error < 1e-9, "{error:e}");
         }
+    }
+}
+
+/// What is fitted to all quadratic fields does not depend on the axes they are written in, nor on the size.
+#[test]
+fn fitted_faces_do_not_know_axes_and_units() {
+    let mesh = bar([4, 3, 2]);
+    let (sin, cos) = (0.6, 0.8);
+    let turned: Vec<_> = mesh
+        .vertices()
+        .iter()
+        .map(|x| vec3(cos * x.x - sin * x.y, x.z, -sin * x.x - cos * x.y) * 7.0)
+        .collect();
+    let tets = mesh.tets().to_vec();
+    let turned = TetMesh::new(turned, tets, mesh.regions().to_vec()).expect("the same mesh").0;
+    let weights = |mesh: &TetMesh| -> Vec<f64> {
+        let domains = Domains::new(&body(mesh, &material(1e4, 0.3)), Smoothing::FITTED);
+        domains.frames.iter().flat_map(|frame| frame.face_weights).collect()
+    };
+    let (before, after) = (weights(&mesh), weights(&turned));
+    assert_eq!(mesh.tets(), turned.tets(), "turned, not mirrored");
+    let (least, most) = before
+        .iter()
+        .filter(|w| **w > 0.0)
+        .fold((9.0f64, 0.0f64), |(a, b), w| (a.min(*w), b.max(*w)));
+    println!("weights of inner faces: {least} to {most}");
+    assert!(most > 1.2 * least, "nothing was fitted");
+    for (a, b) in before.iter().zip(&after) {
+        assert!((a - b).abs() < 1e-10, "{a} {b}");
     }
 }

@@ -192,7 +192,7 @@ mod tests {
                         left_out.filter(|&o| TET_FACES[o].contains(&a) && TET_FACES[o].contains(&b))
                     {
                         rest.face_weights[o] = 0.0;
-                        sides = sides + rest.gradients[o];
+                        sides += rest.gradients[o];
                     }
                     expected = expected + Mat3::outer(middle, sides) * beta;
                 }

@@ -14,6 +14,9 @@ use crate::scalar::{Mat3, Real, Vec3};
 /// Domains of a cluster, at most. More lose what volume does within; fewer lock.
 const CLUSTER: usize = 4;
 
+/// A recovered bend counts at most so many times.
+const LARGEST_FIT: f64 = 3.0;
+
 /// The constants of the energy, for comparisons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoothing {
@@ -23,15 +26,23 @@ pub struct Smoothing {
     pub recovery: f64,
     /// Whether bulk stiffness above [`crate::elements::recovered::CLUSTERED_ABOVE`] counts per cluster.
     pub clustered: bool,
+    /// Whether the recovered bend is fitted to quadratic fields, face by face: averages stand for the middle of a
+    /// vertex's tetrahedra, which at the surface and in poor meshes is far from the vertex. Each face keeps one weight
+    /// for both sides, so that the patch test is kept.
+    pub fitted: bool,
 }
 
 impl Smoothing {
     /// The recovered-gradient tetrahedron.
     pub const RECOVERED: Self =
-        Self { vertex_share: VERTEX_SHARE, recovery: RECOVERY, clustered: true };
+        Self { vertex_share: VERTEX_SHARE, recovery: RECOVERY, clustered: true, fitted: false };
+
+    /// The same with fitted faces: the same stiffness on meshes of any shape, and stiffer where sound ones are turned.
+    pub const FITTED: Self = Self { recovery: 0.6, fitted: true, ..Self::RECOVERED };
 
     /// Averages alone: cheaper, stiffer where thick bodies bend, softer in short waves.
-    pub const AVERAGED: Self = Self { vertex_share: 0.6, recovery: 0.0, clustered: false };
+    pub const AVERAGED: Self =
+        Self { vertex_share: 0.6, recovery: 0.0, clustered: false, fitted: false };
 }
 
 /// Domains of the stable neo-Hookean tetrahedra of a model, with the model's numbers of vertices and tetrahedra.
@@ -86,10 +97,6 @@ impl<S: Real> Domains<S> {
         let weight = smoothing.recovery * 3.0 / 8.0;
         let shapes: Vec<Shape> =
             corners.iter().map(|tet| Shape::new(tet.map(|v| model.places[v as usize]))).collect();
-        let mut face_weights = vec![[0.0; 4]; corners.len()];
-        for [tet, face] in inner.iter().flat_map(|sides| sides.iter()) {
-            face_weights[*tet as usize][*face as usize] = weight;
-        }
         let mut domain_volumes = vec![0.0; vertices.len()];
         let mut domain_materials = vec![0; vertices.len()];
         for (t, domains) in tet_domains.iter().enumerate() {
@@ -99,6 +106,16 @@ impl<S: Real> Domains<S> {
             }
         }
         let rings = Rings::new(&corners, &tet_domains, &shapes, &domain_volumes);
+        let mut face_weights = vec![[0.0; 4]; corners.len()];
+        for sides in &inner {
+            let fit = match smoothing.fitted {
+                true => rings.fit(sides[0], &corners, &tet_domains, &model.places),
+                false => 1.0,
+            };
+            for [tet, face] in sides {
+                face_weights[*tet as usize][*face as usize] = fit * weight;
+            }
+        }
         let places: Vec<Vec3<f64>> = vertices.iter().map(|&v| model.places[v as usize]).collect();
         let (clusters, cluster_volumes) = cluster(&tet_domains, &places, &domain_volumes);
         let cast = |v: Vec3<f64>| v.cast();
@@ -290,6 +307,42 @@ impl Rings {
             rings.offsets.push(rings.vertices.len() as u32);
         }
         rings
+    }
+
+    /// By what the recovered bend of a face must be multiplied to be, in the least squares over all quadratic fields,
+    /// the field's own: `k_o` with the recovered gradients of `x_j x_k` at the face's corners, and with the exact ones.
+    fn fit(
+        &self,
+        [tet, face]: [u32; 2],
+        tets: &[[u32; 4]],
+        tet_domains: &[[u32; 4]],
+        places: &[Vec3<f64>],
+    ) -> f64 {
+        let face = TET_FACES[face as usize];
+        let at = |vertex: u32| places[vertex as usize];
+        let [a, b, c] = face.map(|corner| at(tets[tet as usize][corner]));
+        let center = (a + b + c) * (1.0 / 3.0);
+        let (mut product, mut square) = (0.0, 0.0);
+        for (j, k) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)] {
+            let field = |x: Vec3<f64>| (x - center)[j] * (x - center)[k];
+            let (mut recovered, mut exact) = (0.0, 0.0);
+            for corner in face {
+                let arm = at(tets[tet as usize][corner]) - center;
+                let n = tet_domains[tet as usize][corner] as usize;
+                let ring = self.offsets[n] as usize..self.offsets[n + 1] as usize;
+                let mut gradient = Vec3::ZERO;
+                for i in ring {
+                    gradient += self.gradients[i] * field(at(self.vertices[i]));
+                }
+                recovered += gradient.dot(arm);
+                exact += 2.0 * arm[j] * arm[k];
+            }
+            // Fields of two axes stand for two: the sum does not depend on the axes.
+            let weight = if j == k { 1.0 } else { 2.0 };
+            product += weight * recovered * exact;
+            square += weight * recovered * recovered;
+        }
+        if square > 0.0 { (product / square).clamp(0.0, LARGEST_FIT) } else { 1.0 }
     }
 }
 
