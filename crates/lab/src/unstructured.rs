@@ -29,22 +29,19 @@ const SAME_VOLUME: f64 = 1e-9;
 /// The same body, filled by other tetrahedra in no order. The same seed gives the same bits.
 pub fn shuffled(mesh: &TetMesh, seed: u64) -> Result<TetMesh> {
     let mut filling = Filling::new(mesh);
+    filling.rounds(&mut Random(seed));
+    filling.finish()
+}
+
+/// As [`shuffled`], and then everything that makes the worst tetrahedra better, as meshes from a mesh generator are:
+/// in no order, and of sound shapes.
+pub fn relaxed(mesh: &TetMesh, seed: u64) -> Result<TetMesh> {
+    let mut filling = Filling::new(mesh);
     let mut random = Random(seed);
-    for _ in 0..ROUNDS {
-        for vertex in 0..filling.vertices.len() {
-            filling.push(vertex, &mut random);
-        }
-        // Their number changes on the way.
-        let mut tet = 0;
-        while tet < filling.tets.len() {
-            filling.exchange(tet, &mut random);
-            tet += 1;
-        }
-    }
-    let regions = vec![0; filling.tets.len()];
-    let (mesh, _) = TetMesh::new(filling.vertices, filling.tets, regions)
-        .context("an unstructured mesh of the studies")?;
-    Ok(mesh)
+    filling.rounds(&mut random);
+    filling.improves = true;
+    filling.rounds(&mut random);
+    filling.finish()
 }
 
 struct Filling {
@@ -56,9 +53,33 @@ struct Filling {
     around: Vec<Vec<u32>>,
     /// Vertices that may be pushed, shape [vertex_count].
     is_inner: Vec<bool>,
+    /// Whether only what makes the worst better is done.
+    improves: bool,
 }
 
 impl Filling {
+    fn rounds(&mut self, random: &mut Random) {
+        for _ in 0..ROUNDS {
+            for vertex in 0..self.vertices.len() {
+                self.push(vertex, random);
+            }
+            // Their number changes on the way.
+            let mut tet = 0;
+            while tet < self.tets.len() {
+                self.exchange(tet, random);
+                tet += 1;
+            }
+        }
+    }
+
+    fn finish(self) -> Result<TetMesh> {
+        let filling = self;
+        let regions = vec![0; filling.tets.len()];
+        let (mesh, _) = TetMesh::new(filling.vertices, filling.tets, regions)
+            .context("an unstructured mesh of the studies")?;
+        Ok(mesh)
+    }
+
     fn new(mesh: &TetMesh) -> Self {
         let mut is_inner = vec![true; mesh.vertices().len()];
         for v in boundary_surface(mesh).mesh_vertices {
@@ -68,7 +89,8 @@ impl Filling {
         for (number, tet) in (0..).zip(mesh.tets()) {
             tet.iter().for_each(|&v| around[v as usize].push(number));
         }
-        Self { vertices: mesh.vertices().to_vec(), tets: mesh.tets().to_vec(), around, is_inner }
+        let (vertices, tets) = (mesh.vertices().to_vec(), mesh.tets().to_vec());
+        Self { vertices, tets, around, is_inner, improves: false }
     }
 
     fn corners(&self, tet: [u32; 4]) -> [Vec3<f64>; 4] {
@@ -103,7 +125,8 @@ impl Filling {
         }
         let before = self.worst_around(vertex);
         self.vertices[vertex] = place + way * (PUSH * sum / count);
-        if self.worst_around(vertex) < before.min(LEAST_QUALITY) {
+        let least = if self.improves { before } else { before.min(LEAST_QUALITY) };
+        if self.worst_around(vertex) < least {
             self.vertices[vertex] = place;
         }
     }
@@ -151,7 +174,12 @@ impl Filling {
         }
         let before: f64 = old.iter().map(|&t| self.volume(self.tets[t as usize])).sum();
         let after: f64 = new.iter().map(|tet| self.volume(*tet)).sum();
-        let is_sound = new.iter().all(|tet| self.quality(*tet) >= LEAST_QUALITY);
+        let qualities = old.iter().map(|&t| self.quality(self.tets[t as usize]));
+        let least = match self.improves {
+            true => qualities.fold(f64::INFINITY, f64::min),
+            false => LEAST_QUALITY,
+        };
+        let is_sound = new.iter().all(|tet| self.quality(*tet) >= least);
         if !is_sound || (after - before).abs() > SAME_VOLUME * before {
             return;
         }

@@ -27,7 +27,8 @@ pub fn find_loose(
     let (mut tissue, mut all) = (Groups::new(count), Groups::new(count));
     let linear = problem.linear.nodes.iter().map(|nodes| nodes.as_slice());
     let quadratic = problem.quadratic.nodes.iter().map(|nodes| nodes.as_slice());
-    for nodes in linear.chain(quadratic) {
+    let recovered = problem.recovered.nodes.iter().map(|nodes| nodes.as_slice());
+    for nodes in linear.chain(quadratic).chain(recovered) {
         for &node in &nodes[1..] {
             tissue.join(nodes[0], node);
             all.join(nodes[0], node);

@@ -66,26 +66,33 @@ impl Pattern {
                 })
             })
             .collect();
-        let mut pairs: Vec<[u32; 2]> = (0..free.len() as u32).map(|i| [i, i]).collect();
-        for group in problem.connections() {
-            for a in group.iter().filter_map(|&v| free_index[v as usize]) {
-                for b in group.iter().filter_map(|&v| free_index[v as usize]) {
-                    if b > a {
-                        pairs.push([a, b]);
+        // Groups may be large and overlap much: by vertex, so that no pair is listed twice.
+        let groups: Vec<&[u32]> = problem.connections().collect();
+        let mut groups_of = vec![Vec::new(); free.len()];
+        for (number, group) in (0u32..).zip(&groups) {
+            for j in group.iter().filter_map(|&v| free_index[v as usize]) {
+                groups_of[j as usize].push(number);
+            }
+        }
+        let mut block_offsets = vec![0];
+        let mut block_rows: Vec<u32> = Vec::new();
+        let mut last_column = vec![u32::MAX; free.len()];
+        for (column, of_column) in (0u32..).zip(&groups_of) {
+            last_column[column as usize] = column;
+            block_rows.push(column);
+            for &group in of_column {
+                let members = groups[group as usize].iter();
+                for row in members.filter_map(|&v| free_index[v as usize]) {
+                    if row > column && last_column[row as usize] != column {
+                        last_column[row as usize] = column;
+                        block_rows.push(row);
                     }
                 }
             }
+            let first = block_offsets[column as usize];
+            block_rows[first..].sort_unstable();
+            block_offsets.push(block_rows.len());
         }
-        pairs.sort_unstable();
-        pairs.dedup();
-        let mut block_offsets = vec![0; free.len() + 1];
-        for [column, _] in &pairs {
-            block_offsets[*column as usize + 1] += 1;
-        }
-        for j in 0..free.len() {
-            block_offsets[j + 1] += block_offsets[j];
-        }
-        let block_rows: Vec<u32> = pairs.into_iter().map(|[_, row]| row).collect();
         let (mut column_offsets, mut rows) = (vec![0], Vec::new());
         for j in 0..free.len() {
             let blocks = &block_rows[block_offsets[j]..block_offsets[j + 1]];
@@ -146,6 +153,22 @@ impl MatrixValues {
                 if place > 0 || b >= axis {
                     self.values[first + 3 * place + b - axis] += block[b][axis];
                 }
+            }
+        }
+    }
+
+    /// Adds a multiple of another matrix of the same pattern.
+    pub fn add_scaled(&mut self, other: &Self, factor: f64) {
+        for (value, other) in self.values.iter_mut().zip(&other.values) {
+            *value += factor * other;
+        }
+    }
+
+    /// Calls back with row, column and value of every stored entry: of the lower triangle.
+    pub fn entries(&self, pattern: &Pattern, mut with: impl FnMut(usize, usize, f64)) {
+        for column in 0..pattern.unknowns() {
+            for at in pattern.column_offsets[column]..pattern.column_offsets[column + 1] {
+                with(pattern.rows[at], column, self.values[at]);
             }
         }
     }

@@ -9,10 +9,12 @@
 //! |---|---|
 //! | `tissue` | second derivative of the energy |
 //! | `problem` | tetrahedra, linear or quadratic, springs, attachments |
+//! | `recovered` | recovered-gradient tetrahedra |
 //! | `objective` | potential, gradient, Hessian |
 //! | `matrix` | sparse matrix, factor, cost |
 //! | `newton` | the iteration |
 //! | `frequency` | the slowest oscillation |
+//! | `spectrum` | many oscillations of a free body |
 //! | `fixing` | whether a body can be at rest |
 
 pub mod fixing;
@@ -21,8 +23,11 @@ pub mod matrix;
 pub mod newton;
 pub mod objective;
 pub mod problem;
+pub mod recovered;
+pub mod spectrum;
 pub mod tissue;
 
+use viscera::layout::Smoothing;
 use viscera::material::Material;
 use viscera::mesh::TetMesh;
 use viscera::model::Model;
@@ -36,6 +41,7 @@ pub use newton::{Convergence, Tolerance};
 
 use matrix::{FactorError, Factorization, Pattern};
 use objective::{Load, Objective, creep_at};
+
 use problem::Problem;
 
 /// Memory [B] that a reference takes at most unless stated otherwise.
@@ -178,6 +184,11 @@ impl Reference {
         Self::of(Problem::linear(model), true)
     }
 
+    /// For the library's model with stable neo-Hookean tissue as recovered-gradient tetrahedra.
+    pub fn recovered(model: &Model<f64>, smoothing: Smoothing) -> Self {
+        Self::of(Problem::recovered(model, smoothing), true)
+    }
+
     /// For one body of quadratic tetrahedra, with a node on every edge of the mesh; the mesh's
     /// vertices keep their numbers.
     pub fn quadratic(mesh: &TetMesh, material: &Material) -> Self {
@@ -244,7 +255,8 @@ impl Reference {
         let predicted = self.predict(state, inputs, dt);
         let x = with_pins(&predicted, inputs);
         let creep = creep_at(&self.problem, &state.positions, dt);
-        let load = Load::Inertia { dt, predicted, creep };
+        let start = self.problem.recovered.start(&state.positions, dt);
+        let load = Load::Inertia { dt, predicted, creep, start };
         let solution = self.minimise(pinned, x, inputs, load)?;
         for (v, x) in solution.positions.into_iter().enumerate() {
             state.velocities[v] = (x - state.positions[v]) * (1.0 / dt);
@@ -275,7 +287,8 @@ impl Reference {
         self.check(&state.positions, inputs)?;
         let predicted = with_pins(&self.predict(state, inputs, dt), inputs);
         let creep = creep_at(&self.problem, &state.positions, dt);
-        let load = Load::Inertia { dt, predicted, creep };
+        let start = self.problem.recovered.start(&state.positions, dt);
+        let load = Load::Inertia { dt, predicted, creep, start };
         let objective = objective(&self.problem, inputs, load);
         let value = |x: &[Vec3<f64>]| {
             let sum = objective.value(x).sum;

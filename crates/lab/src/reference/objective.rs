@@ -7,12 +7,13 @@
 //!
 //! `V` holds tissue, springs, attachments and tethers [J]; viscosity takes part in a step only.
 
-use viscera::elements::{green_strain, spring};
+use viscera::elements::spring;
 use viscera::scalar::{Mat3, Vec3};
 use viscera::solver::Tether;
 
 use super::matrix::{MatrixValues, Pattern};
 use super::problem::{Problem, TetElements};
+use super::recovered::Start;
 use super::tissue::{Creep, block, project};
 
 /// What acts from outside, and what resists beside the tissue.
@@ -41,6 +42,8 @@ pub enum Load {
         predicted: Vec<Vec3<f64>>,
         /// Green strain at the start, per point of the linear tetrahedra where tissue is viscous.
         creep: Vec<Option<Creep>>,
+        /// The same of recovered-gradient tetrahedra.
+        start: Start,
     },
 }
 
@@ -54,7 +57,8 @@ pub struct Value {
 }
 
 impl Value {
-    fn add(&mut self, term: f64) {
+    /// Adds a term [J].
+    pub fn add(&mut self, term: f64) {
         self.sum += term;
         self.size += term.abs();
     }
@@ -65,6 +69,15 @@ impl Objective<'_> {
         match &self.load {
             Load::Inertia { creep, .. } => creep.get(point).and_then(Option::as_ref),
             Load::Forces(_) => None,
+        }
+    }
+
+    /// Recovered-gradient tetrahedra at the start of the step; without viscosity in statics.
+    fn start(&self, viscous: bool) -> &Start {
+        const REST: &Start = &Start::NONE;
+        match &self.load {
+            Load::Inertia { start, .. } if viscous => start,
+            _ => REST,
         }
     }
 
@@ -108,6 +121,7 @@ impl Objective<'_> {
         let creep = |point| if viscous { self.creep(point) } else { None };
         add_energies(problem, &problem.linear, x, creep, value);
         add_energies(problem, &problem.quadratic, x, |_| None, value);
+        problem.recovered.add_energy(x, self.start(viscous), value);
         for s in &problem.springs {
             let ends = s.ends.map(|v| x[v as usize]);
             value.add(spring::energy(&ends, s.rest_length, s.stiffness));
@@ -123,6 +137,7 @@ impl Objective<'_> {
         let mut gradient = vec![Vec3::ZERO; x.len()];
         add_gradients(problem, &problem.linear, x, |point| self.creep(point), &mut gradient);
         add_gradients(problem, &problem.quadratic, x, |_| None, &mut gradient);
+        problem.recovered.add_gradient(x, self.start(true), &mut gradient);
         for s in &problem.springs {
             let ends = s.ends.map(|v| x[v as usize]);
             let forces = spring::forces(&ends, s.rest_length, s.stiffness);
@@ -156,6 +171,7 @@ impl Objective<'_> {
         let creep = |point| self.creep(point);
         add_stiffness(problem, &problem.linear, x, creep, positive, pattern, &mut matrix);
         add_stiffness(problem, &problem.quadratic, x, |_| None, positive, pattern, &mut matrix);
+        problem.recovered.add_hessian(x, self.start(true), positive, pattern, &mut matrix);
         for s in &problem.springs {
             let block = spring_block(s.ends.map(|v| x[v as usize]), s, positive);
             let [a, b] = s.ends;
@@ -264,9 +280,8 @@ pub fn creep_at(problem: &Problem, x: &[Vec3<f64>], dt: f64) -> Vec<Option<Creep
     let elements = &problem.linear;
     let of_point = |point: usize| {
         let tissue = &problem.tissues[elements.tissue[elements.tet_of(point)] as usize];
-        let start = green_strain::strain(&elements.deformation_gradient(point, x));
         let rate = tissue.viscosity / dt;
-        (rate > 0.0).then_some(Creep { start, rate })
+        (rate > 0.0).then(|| Creep::new(&elements.deformation_gradient(point, x), rate))
     };
     (0..elements.points.len()).map(of_point).collect()
 }

@@ -6,11 +6,13 @@
 
 use viscera::elements::law::ALL_LAWS;
 use viscera::elements::shape_gradients;
-use viscera::material::Material;
+use viscera::layout::Smoothing;
+use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
 use viscera::model::Model;
 use viscera::scalar::{Mat3, Vec3};
 
+use super::recovered::Recovered;
 use super::tissue::TissueLaw;
 
 /// One quadrature point of a tetrahedron.
@@ -88,12 +90,16 @@ pub struct Problem {
     /// What gravity acts on [kg], shape [vertex_count]: the integral of density times shape
     /// function. Negative at the corners of quadratic tetrahedra, as it must be.
     pub masses: Vec<f64>,
+    /// Of quadratic tetrahedra [kg/m^3].
+    pub density: f64,
     /// Materials in use.
     pub tissues: Vec<TissueLaw>,
     /// Linear tetrahedra.
     pub linear: TetElements<4>,
     /// Quadratic tetrahedra.
     pub quadratic: TetElements<10>,
+    /// Recovered-gradient tetrahedra.
+    pub recovered: Recovered,
     /// Springs.
     pub springs: Vec<Spring>,
     /// Attachments.
@@ -129,9 +135,11 @@ impl Problem {
         Self {
             rest_positions: model.rest_positions.clone(),
             masses: model.masses.clone(),
+            density: 0.0,
             tissues,
             linear,
             quadratic: TetElements::new(QUADRATURE.len()),
+            recovered: Recovered::default(),
             springs: (0..springs.vertices.len())
                 .map(|i| Spring {
                     ends: springs.vertices[i],
@@ -148,6 +156,22 @@ impl Problem {
                 .collect(),
             rest_anchors: model.rest_anchors.clone(),
         }
+    }
+
+    /// The same with its stable neo-Hookean tetrahedra as recovered-gradient ones.
+    pub fn recovered(model: &Model<f64>, smoothing: Smoothing) -> Self {
+        let mut problem = Self::linear(model);
+        problem.recovered = Recovered::new(model, smoothing);
+        let linear = &mut problem.linear;
+        let is_linear: Vec<bool> =
+            model.tets().map(|tet| tet.law != MaterialModel::StableNeoHookean).collect();
+        let mut kept = is_linear.iter();
+        linear.nodes.retain(|_| kept.next() == Some(&true));
+        let mut kept = is_linear.iter();
+        linear.tissue.retain(|_| kept.next() == Some(&true));
+        let mut kept = is_linear.iter();
+        linear.points.retain(|_| kept.next() == Some(&true));
+        problem
     }
 
     /// The same mesh with a node on every edge: ten-node tetrahedra, straight at rest, which do not
@@ -191,6 +215,7 @@ impl Problem {
         Self {
             rest_positions,
             masses,
+            density: material.density(),
             tissues: vec![TissueLaw {
                 model: material.model(),
                 lame_lambda: material.lame_lambda(),
@@ -199,6 +224,7 @@ impl Problem {
             }],
             linear: TetElements::new(1),
             quadratic,
+            recovered: Recovered::default(),
             springs: Vec::new(),
             attachments: Vec::new(),
             rest_anchors: Vec::new(),
@@ -214,7 +240,9 @@ impl Problem {
     pub fn connections(&self) -> impl Iterator<Item = &[u32]> {
         let linear = self.linear.nodes.iter().map(|nodes| nodes.as_slice());
         let quadratic = self.quadratic.nodes.iter().map(|nodes| nodes.as_slice());
-        linear.chain(quadratic).chain(self.springs.iter().map(|spring| spring.ends.as_slice()))
+        let recovered = self.recovered.connections();
+        let springs = self.springs.iter().map(|spring| spring.ends.as_slice());
+        linear.chain(quadratic).chain(recovered).chain(springs)
     }
 }
 

@@ -39,6 +39,13 @@ pub struct Creep {
     pub rate: f64,
 }
 
+impl Creep {
+    /// At a deformation gradient.
+    pub fn new(f: &Mat3<f64>, rate: f64) -> Self {
+        Self { start: green_strain::strain(f), rate }
+    }
+}
+
 impl TissueLaw {
     /// Energy density [Pa].
     pub fn energy_density(&self, f: &Mat3<f64>, creep: Option<&Creep>) -> f64 {
@@ -131,7 +138,7 @@ fn tensor(c: &Voigt<f64>) -> Mat3<f64> {
 }
 
 /// `d(cof F)` along a direction; `cof F = [f1 x f2, f2 x f0, f0 x f1]`.
-fn cofactor_change(f: &Mat3<f64>, direction: &Mat3<f64>) -> Mat3<f64> {
+pub fn cofactor_change(f: &Mat3<f64>, direction: &Mat3<f64>) -> Mat3<f64> {
     let ([a, b, c], [da, db, dc]) = (f.columns, direction.columns);
     Mat3::from_columns(
         db.cross(c) + b.cross(dc),

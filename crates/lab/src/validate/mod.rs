@@ -7,6 +7,7 @@ mod expected;
 mod frequency;
 mod indentation;
 mod independence;
+mod locking;
 mod methods;
 mod motion;
 mod organ;
@@ -30,6 +31,7 @@ pub const PROGRAM: Program = Program {
         patch::SECTION,
         uniaxial::SECTION,
         cantilever::SECTION,
+        locking::SECTION,
         twist::SECTION,
         frequency::SECTION,
         indentation::SECTION,

@@ -6,6 +6,8 @@ mod common;
 mod holds;
 mod oracle;
 mod quasi_newton;
+mod recovered;
+mod recovered_meshes;
 mod reference;
 mod reference_oracle;
 mod rest_command;

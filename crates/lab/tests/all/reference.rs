@@ -73,7 +73,8 @@ fn gradient_and_hessian_match_differences() {
     let dt = 0.01;
     let creep = creep_at(&problem, &start, dt);
     assert!(creep.iter().all(Option::is_some), "all tissue here is viscous");
-    let step = Load::Inertia { dt, predicted: start, creep };
+    let start_shapes = problem.recovered.start(&start, dt);
+    let step = Load::Inertia { dt, predicted: start, creep, start: start_shapes };
     let statics = Load::Forces(problem.masses.iter().map(|&m| GRAVITY * m).collect());
     for (name, load) in [("step", step), ("statics", statics)] {
         let tethers = &[Tether { vertex: 7, target: vec3(0.01, -0.02, 0.03), stiffness: 40.0 }];

@@ -21,6 +21,7 @@ pub(crate) mod list;
 pub mod neo_hookean;
 pub mod neo_hookean_pair;
 pub mod neo_hookean_stretch;
+pub mod recovered;
 pub mod singular_values;
 pub mod spring;
 #[cfg(test)]

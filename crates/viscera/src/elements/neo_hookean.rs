@@ -70,6 +70,14 @@ fn first_derivatives<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>) -> (S, S) {
     (h.dot(*d) - rest, trace + rest)
 }
 
+/// The volume change from `F` to `F + D` by powers of `D`: `cof F : D`, `F : cof D` and `det D`; they add up to
+/// `det(F + D) - det F` without its cancellation, and the second derivative along `D` is twice the second.
+#[inline(always)]
+pub fn volume_variation<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>) -> [S; 3] {
+    let (_, first) = first_derivatives(f, d);
+    [first, f.dot(d.cofactor()), d.determinant()]
+}
+
 /// `W(F + D) - W(F)` [Pa]. Its round-off is that of its terms, which vanish with `d`; that of a difference of two
 /// energies does not.
 #[inline(always)]

@@ -23,6 +23,8 @@ const NEO_HOOKEAN_PAIR: &str = include_str!("neo_hookean_pair.wgsl");
 const SINGULAR_VALUES: &str = include_str!("singular_values.wgsl");
 /// Twin of [`super::neo_hookean_stretch`]; needs [`SINGULAR_VALUES`].
 const NEO_HOOKEAN_STRETCH: &str = include_str!("neo_hookean_stretch.wgsl");
+/// Twin of [`super::recovered`]; needs [`NEO_HOOKEAN`].
+const RECOVERED: &str = include_str!("recovered.wgsl");
 /// Twin of [`super::kinds`], without the kinds.
 const KINDS_SHARED: &str = include_str!("kinds.wgsl");
 
@@ -143,5 +145,5 @@ pub fn form_texts(form: TetForm) -> Vec<&'static str> {
 /// Every function of every file, once.
 pub fn everything() -> String {
     let files = [KINEMATICS, GREEN_STRAIN, &LAW_TEXT, NEO_HOOKEAN_PAIR, SINGULAR_VALUES];
-    files.concat() + NEO_HOOKEAN_STRETCH + &KIND_TEXT
+    files.concat() + NEO_HOOKEAN_STRETCH + RECOVERED + &KIND_TEXT
 }

@@ -4,6 +4,7 @@
 //!
 //! Vertices are in the solver's numbering (`Model::numbering`); `order` of each set maps back to the user's numbers.
 
+mod domains;
 pub(crate) mod elements;
 pub(crate) mod lattice;
 mod order;
@@ -14,6 +15,7 @@ mod tets;
 use std::ops::Range;
 use std::sync::Arc;
 
+pub use domains::{Domains, Smoothing};
 pub(crate) use elements::{Before, Moments};
 pub use elements::{ElementSet, ElementSets};
 use order::{Order, cell_by_cell, renumbered_copies};

@@ -41,13 +41,13 @@ use inputs::{check_inputs, check_model, check_state, check_step};
 use plan::Plan;
 pub(crate) use quasi_newton::{choose, expected_motion_error};
 pub use report::StepReport;
-pub use step::balance;
 use step::data::Step;
 #[cfg(feature = "gpu")]
 #[doc(hidden)]
 pub use step::tissue::TISSUE_WGSL;
 #[doc(hidden)]
 pub use step::tissue::Tissue;
+pub use step::{balance, recovered};
 pub use xpbd::acceleration;
 
 /// A solver for one model. All memory is taken when it is built; a step allocates nothing, but for

@@ -5,7 +5,7 @@
 
 use crate::common::device::device;
 use crate::gpu_common::comparison::{check_nasty, check_percentiles, compare};
-use crate::gpu_common::functions::{of_springs, of_tets};
+use crate::gpu_common::functions::{of_recovered, of_springs, of_tets};
 use crate::gpu_common::{Gpu, inputs};
 use viscera::elements::wgsl;
 use viscera::solver::TISSUE_WGSL;
@@ -35,6 +35,7 @@ fn device_errs_at_most_twice_as_much_as_processor() {
         ("rotated", of_tets(), inputs::tets(COUNT, true)),
         ("unrotated", of_tets(), inputs::tets(COUNT, false)),
         ("any", of_springs(), inputs::springs(COUNT)),
+        ("bent", of_recovered(), inputs::recovered_tets(COUNT)),
     ];
     let (gpu, library) = (Gpu(device()), library());
     println!("{}: relative errors, processor and device", gpu.0.name());
@@ -55,7 +56,11 @@ fn device_errs_at_most_twice_as_much_as_processor() {
 
 #[test]
 fn nasty_inputs_stay_finite_and_close() {
-    let kinds = [(of_tets(), inputs::nasty_tets()), (of_springs(), inputs::nasty_springs())];
+    let kinds = [
+        (of_tets(), inputs::nasty_tets()),
+        (of_springs(), inputs::nasty_springs()),
+        (of_recovered(), inputs::nasty_recovered_tets()),
+    ];
     let (gpu, library) = (Gpu(device()), library());
     let mut wrong = Vec::new();
     for (twins, records) in &kinds {

@@ -181,7 +181,8 @@ pub(super) fn gradient_left(step: &MeasuredStep) -> Result<f64> {
         *x += *v * dt + inputs.gravity * (dt * dt);
     }
     let creep = creep_at(&problem, &state.positions, dt);
-    let load = Load::Inertia { dt, predicted: inertial, creep };
+    let start = problem.recovered.start(&state.positions, dt);
+    let load = Load::Inertia { dt, predicted: inertial, creep, start };
     let (anchors, tethers) = (&inputs.anchors, &inputs.tethers);
     let objective = Objective { problem: &problem, anchors, tethers, load };
     let free = step.load_case.free();

@@ -14,6 +14,7 @@ pub mod law;
 pub mod modes;
 pub mod potential;
 pub mod predict;
+pub mod recovered;
 pub mod stage;
 pub mod strain;
 pub mod tethers;

@@ -4,7 +4,7 @@
 use viscera::elements::singular_values::signed_svd;
 use viscera::elements::{
     CornerLoad, TetCorrection, attachment, deformation_gradient, green_strain, internal_forces,
-    neo_hookean, neo_hookean_pair, neo_hookean_stretch, shape_gradients, spring,
+    neo_hookean, neo_hookean_pair, neo_hookean_stretch, recovered, shape_gradients, spring,
 };
 use viscera::material::{Compliance, MaterialModel};
 use viscera::scalar::{Mat3, Scalar, Vec3, vec3};
@@ -51,6 +51,11 @@ pub fn of_springs() -> Vec<Twin> {
     vec![twin!(springs, SPRINGS)]
 }
 
+/// Maps of records of recovered-gradient tetrahedra.
+pub fn of_recovered() -> Vec<Twin> {
+    vec![twin!(recovered_tets, RECOVERED_TETS)]
+}
+
 /// What is left of a record.
 struct Record<'a, T>(&'a [T]);
 
@@ -68,6 +73,10 @@ impl<T: Scalar> Record<'_, T> {
     fn vector(&mut self) -> Vec3<T> {
         let [x, y, z] = self.array();
         vec3(x, y, z)
+    }
+
+    fn matrix(&mut self) -> Mat3<T> {
+        Mat3 { columns: std::array::from_fn(|_| self.vector()) }
     }
 }
 
@@ -375,4 +384,55 @@ const SPRINGS: &str = "
     put_vec3(attached.multipliers);
     put_vec3(attached.position);
     put_vec3(attachment_constitutive_multipliers(x[0], x[1], compliance));
+";
+
+fn recovered_tets<T: Scalar>(numbers_in: &[T]) -> Results<T> {
+    let mut record = Record(numbers_in);
+    let f = record.matrix();
+    let gradients = std::array::from_fn(|_| record.matrix());
+    let rest = recovered::RestFrame {
+        gradients: std::array::from_fn(|_| record.vector()),
+        arms: std::array::from_fn(|_| record.vector()),
+        face_weights: record.array(),
+    };
+    let [lambda, mu, pressure] = record.array();
+    let shares = recovered::bulk_shares(lambda, mu);
+    let bent = recovered::recovered_gradient(&f, &gradients, &rest);
+    let share = T::from_f64(1.0 - recovered::VERTEX_SHARE);
+    let stress = recovered::tet_stress(&bent, shares.local, mu, share, pressure);
+    let stresses = recovered::vertex_stresses(&stress, &rest);
+    let change = neo_hookean::volume_change(&bent);
+    vec![
+        ("bulk_shares", vec![shares.local, shares.domain, shares.cluster]),
+        ("recovered_gradient", numbers(&bent.columns)),
+        ("tet_stress", numbers(&stress.columns)),
+        ("vertex_stresses", stresses.iter().flat_map(|n| numbers(&n.columns)).collect()),
+        ("bulk_energy", vec![recovered::bulk_energy(change, shares.domain)]),
+    ]
+}
+
+const RECOVERED_TETS: &str = "
+    let f = take_mat3();
+    let gradients = array<mat3x3f, 4>(take_mat3(), take_mat3(), take_mat3(), take_mat3());
+    let g = array<vec3f, 4>(take_vec3(), take_vec3(), take_vec3(), take_vec3());
+    let arms = array<vec3f, 4>(take_vec3(), take_vec3(), take_vec3(), take_vec3());
+    let weights = vec4f(take(), take(), take(), take());
+    let rest = RecoveredRestFrame(g, arms, weights);
+    let lambda = take();
+    let mu = take();
+    let pressure = take();
+    let shares = recovered_bulk_shares(lambda, mu);
+    let bent = recovered_gradient(f, gradients, rest);
+    let stress = recovered_tet_stress(bent, shares.local, mu, 0.7, pressure);
+    let stresses = recovered_vertex_stresses(stress, rest);
+    put(shares.local);
+    put(shares.domain);
+    put(shares.cluster);
+    put_mat3(bent);
+    put_mat3(stress);
+    put_mat3(stresses[0]);
+    put_mat3(stresses[1]);
+    put_mat3(stresses[2]);
+    put_mat3(stresses[3]);
+    put(recovered_bulk_energy(neo_hookean_volume_change(bent), shares.domain));
 ";

@@ -2,6 +2,7 @@
 
 use viscera::elements::{
     deformation_gradient, edge_matrix, green_strain, neo_hookean_pair, neo_hookean_stretch,
+    shape_gradients,
 };
 use viscera::material::Compliance;
 use viscera::mesh::tet_volume;
@@ -28,6 +29,10 @@ impl Records {
 
     fn of_springs(numbers: Vec<f32>) -> Self {
         Self { numbers, size: 15, coordinates: 6 }
+    }
+
+    fn of_recovered(numbers: Vec<f32>) -> Self {
+        Self { numbers, size: 76, coordinates: 0 }
     }
 
     /// One after the other.
@@ -257,4 +262,52 @@ pub fn nasty_springs() -> Records {
         }
     }
     Records::of_springs(records)
+}
+
+/// A record of a recovered-gradient tetrahedron: deformed by `f`, its corners' gradients by that and a bend.
+fn recovered(random: &mut Random, rest: [Vec3<f64>; 4], f: Mat3<f64>, bend: f64) -> Vec<f32> {
+    let tissue = material(STVK, 10f64.powf(random.uniform(3.0, 5.0)), random.uniform(0.2, 0.49));
+    let (lambda, mu) = (tissue.lame_lambda(), tissue.lame_mu());
+    let centroid = (rest[0] + rest[1] + rest[2] + rest[3]) * 0.25;
+    let mut numbers: Vec<f64> = f.columns.map(Vec3::to_array).concat();
+    for _ in 0..4 {
+        let other = Mat3 { columns: std::array::from_fn(|_| random.vector(bend)) };
+        numbers.extend((f + other).columns.map(Vec3::to_array).concat());
+    }
+    let gradients = shape_gradients(&edge_matrix(&rest).inverse());
+    numbers.extend(gradients.map(Vec3::to_array).concat());
+    numbers.extend(rest.map(|x| (x - centroid).to_array()).concat());
+    // Faces within the body, and at its surface.
+    let inner = 0.375 * 0.9;
+    numbers.extend([0; 4].map(|_| if random.uniform(0.0, 1.0) < 0.7 { inner } else { 0.0 }));
+    numbers.extend([lambda, mu, random.uniform(-0.1, 0.1) * lambda]);
+    numbers.into_iter().map(|value| value as f32).collect()
+}
+
+/// Deformations of every size from 1e-4 to 1/2, bent by as much.
+pub fn recovered_tets(count: usize) -> Records {
+    let mut random = Random(6);
+    let record = |_| {
+        let size = 10f64.powf(random.uniform(-4.0, -0.3));
+        let change = Mat3 { columns: std::array::from_fn(|_| random.vector(size)) };
+        let f = random.rotation() * (Mat3::IDENTITY + change);
+        let rest = rest_shape(&mut random);
+        recovered(&mut random, rest, f, size)
+    };
+    Records::of_recovered((0..count).flat_map(record).collect())
+}
+
+/// Every nasty stretch, straight and bent.
+pub fn nasty_recovered_tets() -> Records {
+    let mut random = Random(7);
+    let mut records = Vec::new();
+    for [a, b, c] in NASTY_STRETCHES {
+        for bend in [0.0, 1e-7, 1e-3, 1.0, 10.0] {
+            let (rest, before) = (rest_shape(&mut random), random.rotation());
+            let f = random.rotation() * diagonal(a, b, c) * before;
+            records.extend(recovered(&mut random, rest, f, bend));
+            records.extend(recovered(&mut random, exact_shape(), diagonal(a, b, c), bend));
+        }
+    }
+    Records::of_recovered(records)
 }

@@ -1,0 +1,102 @@
+// Recovered-gradient tetrahedron; `recovered.rs` holds the derivation.
+//
+//   Fh   = F + sum_o c_o k_o g_o^T,  k_o = sum_{p in face o} G_p (X_p - X_o)
+//   E    = sum_t V_t (1 - alpha) W(Fh_t; l, mu) + sum_n V_n alpha W(G_n; l, mu)
+//        + sum_n V_n k_n/2 (Jh_n - 1)^2 + sum_c V_c k_c/2 (Jh_c - 1)^2,   lambda = l + k_n + k_c
+
+const RECOVERED_CLUSTERED_ABOVE: f32 = 4.0;
+
+// Where the parts of Lame's first parameter count [Pa].
+struct RecoveredBulkShares {
+    local: f32,
+    domain: f32,
+    cluster: f32,
+}
+
+// A tetrahedron at rest.
+struct RecoveredRestFrame {
+    // Gradients [1/m] of the linear shape functions.
+    gradients: array<vec3f, 4>,
+    // The corners from the centroid [m].
+    arms: array<vec3f, 4>,
+    // `c_o` of the face opposite each corner.
+    face_weights: vec4f,
+}
+
+// `a b^T`.
+fn recovered_outer(a: vec3f, b: vec3f) -> mat3x3f {
+    return mat3x3f(a * b.x, a * b.y, a * b.z);
+}
+
+fn recovered_bulk_shares(lame_lambda: f32, lame_mu: f32) -> RecoveredBulkShares {
+    let local = min(lame_lambda, lame_mu);
+    let averaged = min(lame_lambda, lame_mu * RECOVERED_CLUSTERED_ABOVE);
+    return RecoveredBulkShares(local, averaged - local, lame_lambda - averaged);
+}
+
+// What face `o` adds to the mean gradient; `image` is `G_o r_o`, `sum` of all four.
+fn recovered_face(
+    sum: vec3f,
+    image: vec3f,
+    mean: mat3x3f,
+    arm: vec3f,
+    weight: f32,
+    gradient: vec3f,
+) -> mat3x3f {
+    let apart = (image - mean * arm) * (4.0 / 3.0);
+    return recovered_outer((sum - apart) * weight, gradient);
+}
+
+fn recovered_gradient(
+    f: mat3x3f,
+    vertex_gradients: array<mat3x3f, 4>,
+    rest: RecoveredRestFrame,
+) -> mat3x3f {
+    let g = vertex_gradients;
+    let r = rest.arms;
+    let c = rest.face_weights;
+    let mean = ((g[0] + g[1]) + (g[2] + g[3])) * 0.25;
+    let y0 = g[0] * r[0];
+    let y1 = g[1] * r[1];
+    let y2 = g[2] * r[2];
+    let y3 = g[3] * r[3];
+    let sum = (y0 + y1) + (y2 + y3);
+    var recovered = f;
+    recovered += recovered_face(sum, y0, mean, r[0], c.x, rest.gradients[0]);
+    recovered += recovered_face(sum, y1, mean, r[1], c.y, rest.gradients[1]);
+    recovered += recovered_face(sum, y2, mean, r[2], c.z, rest.gradients[2]);
+    recovered += recovered_face(sum, y3, mean, r[3], c.w, rest.gradients[3]);
+    return recovered;
+}
+
+fn recovered_vertex_stresses(stress: mat3x3f, rest: RecoveredRestFrame) -> array<mat3x3f, 4> {
+    let r = rest.arms;
+    let s0 = stress * rest.gradients[0] * rest.face_weights.x;
+    let s1 = stress * rest.gradients[1] * rest.face_weights.y;
+    let s2 = stress * rest.gradients[2] * rest.face_weights.z;
+    let s3 = stress * rest.gradients[3] * rest.face_weights.w;
+    let sum = s0 + s1 + s2 + s3;
+    let moment = (recovered_outer(s0, r[0]) + recovered_outer(s1, r[1]) + recovered_outer(s2, r[2])
+        + recovered_outer(s3, r[3])) * (1.0 / 3.0);
+    let apart = 4.0 / 3.0;
+    return array<mat3x3f, 4>(
+        moment + recovered_outer(sum - s0 * apart, r[0]),
+        moment + recovered_outer(sum - s1 * apart, r[1]),
+        moment + recovered_outer(sum - s2 * apart, r[2]),
+        moment + recovered_outer(sum - s3 * apart, r[3]),
+    );
+}
+
+fn recovered_tet_stress(
+    recovered: mat3x3f,
+    local: f32,
+    lame_mu: f32,
+    share: f32,
+    pressure: f32,
+) -> mat3x3f {
+    return neo_hookean_piola(recovered, local, lame_mu) * share + cofactor(recovered) * pressure;
+}
+
+fn recovered_bulk_energy(change: f32, stiffness: f32) -> f32 {
+    return 0.5 * stiffness * (change * change);
+}
