@@ -6,6 +6,9 @@ use crate::settings::MOST_HISTORY;
 /// by this share of the slope at the start at most: by the trapezoid rule it has then fallen by a quarter of that slope or more.
 const SETTLED: f64 = 0.5;
 
+/// Steps above this many resolutions are taken unchecked: a few units of the precision are round-off of the forces at rest.
+const UNCHECKED_STEP: f64 = 4.0;
+
 /// Steps above this many resolutions are clear: of shorter ones the change of the gradient is round-off.
 const CLEAR_STEP: f64 = 16.0;
 
@@ -100,6 +103,11 @@ impl Progress {
     /// Whether the trial is so far from the iterate that what changes on the way is more than round-off.
     pub fn is_clear(&self) -> bool {
         self.length * self.longest > CLEAR_STEP * self.resolution
+    }
+
+    /// Whether the trial is further from the iterate than round-off of a direction takes it, so that it may be taken unchecked.
+    pub fn is_more_than_round_off(&self) -> bool {
+        self.length * self.longest > UNCHECKED_STEP * self.resolution
     }
 
     /// Whether a trial is accepted for the slope of the potential [J s^2] at its end, without its change. `calm`: no trial

@@ -291,7 +291,7 @@ impl<S: Real> Memory<S> {
             let is_calm = progress.rejections == 0;
             // The last direction is taken unchecked where nothing was rejected, in this solve or the one before, where
             // the energy of the step is checked in the end, and where it is no round-off: that would add up.
-            let is_checked = progress.scheme.is_checked() && progress.is_clear();
+            let is_checked = progress.scheme.is_checked() && progress.is_more_than_round_off();
             let is_trusted = is_calm && kept.calm && is_checked;
             let goes_on = progress.ahead && progress.accepted && is_trusted;
             kept.calm = is_calm;
