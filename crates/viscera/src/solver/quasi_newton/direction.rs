@@ -274,9 +274,6 @@ impl<S: Real> Memory<S> {
     fn stop_at_resolution(&mut self, number: usize) {
         let progress = &mut self.parts[number];
         let longest = progress.length * progress.longest;
-        if progress.first == 0.0 {
-            progress.first = longest;
-        }
         if !(longest > progress.resolution && longest.is_finite()) {
             progress.phase = Phase::Done;
             progress.ahead = false;

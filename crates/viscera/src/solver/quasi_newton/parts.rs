@@ -12,11 +12,6 @@ const UNCHECKED_STEP: f64 = 4.0;
 /// Steps above this many resolutions are clear: of shorter ones the change of the gradient is round-off.
 const CLEAR_STEP: f64 = 16.0;
 
-/// Steps above this many resolutions, and above this share of the first step of a solve, have slopes that are more than
-/// round-off: forces nearly cancel where a solve has nearly converged.
-const PLAIN_STEP: f64 = 1024.0;
-const PLAIN_SHARE: f64 = 1e-3;
-
 /// How a part takes a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scheme {
@@ -84,8 +79,6 @@ pub struct Progress {
     pub slope: f64,
     /// The longest vector of the direction [m].
     pub longest: f64,
-    /// The longest step of a vertex in the first direction of the solve, taken or not [m].
-    pub first: f64,
     /// Trials in a row that were rejected, and all in this solve.
     pub failures: u32,
     pub rejections: u32,
@@ -122,10 +115,7 @@ impl Progress {
             Phase::Iterating => {
                 let before = self.length * self.slope;
                 let is_between = slope <= -SETTLED * before && slope >= before;
-                let moved = self.length * self.longest;
-                let is_plain =
-                    moved > PLAIN_STEP * self.resolution && moved > PLAIN_SHARE * self.first;
-                self.scheme.is_checked() && is_plain && is_between
+                self.scheme.is_checked() && self.is_clear() && is_between
             }
             Phase::FromReference => true,
             Phase::Done => false,

@@ -257,7 +257,7 @@ impl<S: Real> Memory<S> {
         let progress = &mut self.parts[number];
         progress.phase = Phase::Starting;
         progress.passes_left = passes_of(which, solve.settings, self.choices[number].passes);
-        (progress.failures, progress.rejections, progress.first) = (0, 0, 0.0);
+        (progress.failures, progress.rejections) = (0, 0);
         (progress.accepted, progress.ahead) = (false, false);
     }
 

@@ -1,16 +1,19 @@
 //! The whole matrix of a coarsest level, as sums over groups; the formulas are in [`super::sums`].
 
-use std::ops::Range;
-
+use super::rotation::Turn;
 use super::sums::{Gathered, Grouped, LocalTet, On};
-use crate::scalar::{Mat3, Vec3};
+use crate::scalar::lanes::{Eight, Kernel, LANES, Lanes, run};
+use crate::scalar::{Mat3, Real, Vec3, vec3};
+use crate::solver::cpu::threads::Workers;
 
-/// Of a pair of nodes, the first not below the second, in the rest shape.
-#[derive(Clone, Copy, Debug)]
-pub struct FullBlock {
-    pub nodes: [u32; 2],
-    /// `sum V g_c g_d^T` [m].
-    pub b: Mat3<f64>,
+/// Of eight pairs of nodes, the first not below the second, in the rest shape.
+#[derive(Clone, Debug)]
+pub struct FullBlocks {
+    pub nodes: [[u32; 2]; LANES],
+    /// How many of the eight there are.
+    pub filled: u8,
+    /// `sum V g_c g_d^T` [m], column by column.
+    b: [Eight<f64>; 9],
 }
 
 /// The whole matrix of the coarsest level.
@@ -19,11 +22,11 @@ pub struct FullSums {
     /// Pairs of nodes with `sum_v m_v w_vc w_vd` [kg], the first not below the second.
     pub masses: Vec<([u32; 2], f64)>,
     /// Of each group.
-    pub blocks: Vec<FullBlock>,
+    blocks: Vec<FullBlocks>,
     /// Blocks of group `g` are `offsets[g] .. offsets[g + 1]`.
     offsets: Vec<usize>,
     /// Lame's parameters of each group [Pa]: mu and lambda.
-    pub lame: Vec<[f64; 2]>,
+    lame: Vec<[f64; 2]>,
 }
 
 impl FullSums {
@@ -66,8 +69,21 @@ impl FullSums {
                     }
                 }
             }
-            let block = |&(pair, b): &(u32, Mat3<f64>)| FullBlock { nodes: nodes(pair), b };
-            full.blocks.extend(sums.list.iter().map(block));
+            for pairs in sums.list.chunks(LANES) {
+                let mut eight = FullBlocks {
+                    nodes: [[0; 2]; LANES],
+                    filled: pairs.len() as u8,
+                    b: [[0.0; LANES]; 9],
+                };
+                for (lane, &(pair, b)) in pairs.iter().enumerate() {
+                    eight.nodes[lane] = nodes(pair);
+                    let entries = b.columns.map(Vec3::to_array);
+                    for (row, entry) in eight.b.iter_mut().zip(entries.as_flattened()) {
+                        row[lane] = *entry;
+                    }
+                }
+                full.blocks.push(eight);
+            }
             full.offsets.push(full.blocks.len());
             let first = &tets[grouped.tets(group)[0] as usize];
             full.lame.push([first.mu, first.lambda]);
@@ -76,9 +92,20 @@ impl FullSums {
         full
     }
 
-    /// Blocks of a group.
-    pub fn of_group(&self, group: usize) -> Range<usize> {
-        self.offsets[group]..self.offsets[group + 1]
+    /// Calls with each pair of nodes and its block [kg] in a group that has turned, `squared` being `he^2` [s^2].
+    pub fn each_block<S: Real>(
+        &self,
+        workers: &Workers,
+        group: usize,
+        turn: &Turn<S>,
+        squared: f64,
+        add: impl FnMut([u32; 2], &Mat3<f64>),
+    ) {
+        let blocks = &self.blocks[self.offsets[group]..self.offsets[group + 1]];
+        let squared = squared * turn.stiffer.to_f64();
+        let lame = self.lame[group].map(|parameter| parameter * squared);
+        let (r, a) = (turn.rotation.cast::<f64>(), turn.map.cast::<f64>());
+        run(workers.instructions, EachBlock { blocks, lame, r, a, add });
     }
 
     /// Bytes of its arrays.
@@ -88,4 +115,60 @@ impl FullSums {
             + size_of_val(&self.offsets[..])
             + size_of_val(&self.lame[..])
     }
+}
+
+struct EachBlock<'a, F> {
+    blocks: &'a [FullBlocks],
+    lame: [f64; 2],
+    r: Mat3<f64>,
+    a: Mat3<f64>,
+    add: F,
+}
+
+impl<F: FnMut([u32; 2], &Mat3<f64>)> Kernel<f64> for EachBlock<'_, F> {
+    #[inline(always)]
+    fn run<L: Lanes<Real = f64>>(mut self) {
+        let [mu, lambda] = [L::splat(self.lame[0]), L::splat(self.lame[1])];
+        let (r, a) = (splat::<L>(&self.r), splat::<L>(&self.a));
+        for eight in self.blocks {
+            let mut found = [[0.0; LANES]; 9];
+            let mut lane = 0;
+            while lane < usize::from(eight.filled) {
+                let e = |row: usize| L::load(&eight.b[row], lane);
+                let b = Mat3::from_columns(
+                    vec3(e(0), e(1), e(2)),
+                    vec3(e(3), e(4), e(5)),
+                    vec3(e(6), e(7), e(8)),
+                );
+                let shear = Mat3::IDENTITY * b.trace() + r * b.transpose() * r.transpose();
+                let block = shear * mu + a * b * a.transpose() * lambda;
+                for column in 0..3 {
+                    let Vec3 { x, y, z } = block.columns[column];
+                    x.store(&mut found[3 * column], lane);
+                    y.store(&mut found[3 * column + 1], lane);
+                    z.store(&mut found[3 * column + 2], lane);
+                }
+                lane += L::WIDTH;
+            }
+            for lane in 0..usize::from(eight.filled) {
+                let e = |row: usize| found[row][lane];
+                let block = Mat3::from_columns(
+                    vec3(e(0), e(1), e(2)),
+                    vec3(e(3), e(4), e(5)),
+                    vec3(e(6), e(7), e(8)),
+                );
+                (self.add)(eight.nodes[lane], &block);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn splat<L: Lanes<Real = f64>>(a: &Mat3<f64>) -> Mat3<L> {
+    let [x, y, z] = a.columns;
+    Mat3::from_columns(
+        vec3(L::splat(x.x), L::splat(x.y), L::splat(x.z)),
+        vec3(L::splat(y.x), L::splat(y.y), L::splat(y.z)),
+        vec3(L::splat(z.x), L::splat(z.y), L::splat(z.z)),
+    )
 }

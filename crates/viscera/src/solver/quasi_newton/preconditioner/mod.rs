@@ -30,7 +30,7 @@ use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::cpu::threads::{Shared, Workers};
 use crate::solver::step::data::StepConstants;
 use dense::Dense;
-use full::{FullBlock, FullSums};
+use full::FullSums;
 use prolongation::Prolongation;
 use rotation::Turn;
 use sums::{DiagonalSums, Grouped, Groups, On, Six, inverse, mapped, tets_of_part, times};
@@ -267,7 +267,7 @@ impl<S: Real> OfPart<S> {
         });
         let free = &free[self.vertices.clone()];
         self.sum_blocks(constants, squared, turns, free);
-        self.sum_full(squared, turns);
+        self.sum_full(&constants.workers, squared, turns);
         for tether in constants.tethers_of(part) {
             let stiffness = squared * tether.stiffness.to_f64();
             let v = (tether.vertex - self.vertices.start) as u32;
@@ -325,7 +325,7 @@ impl<S: Real> OfPart<S> {
     }
 
     /// The matrix of a dense coarsest level, of inertia and tetrahedra.
-    fn sum_full(&mut self, squared: f64, turns: &[Turn<S>]) {
+    fn sum_full(&mut self, workers: &Workers, squared: f64, turns: &[Turn<S>]) {
         if self.dense.size() == 0 {
             return;
         }
@@ -333,15 +333,11 @@ impl<S: Real> OfPart<S> {
         for &(nodes, mass) in &self.full.masses {
             add_block(&mut self.dense, nodes, &(Mat3::IDENTITY * mass));
         }
+        let Self { full, dense, .. } = self;
         for (group, turn) in turns[..self.groups.len()].iter().enumerate() {
-            let (r, a) = (turn.rotation.cast::<f64>(), turn.map.cast::<f64>());
-            let squared = squared * turn.stiffer.to_f64();
-            let [mu, lambda] = self.full.lame[group].map(|parameter| parameter * squared);
-            for &FullBlock { nodes, b } in &self.full.blocks[self.full.of_group(group)] {
-                let shear = Mat3::IDENTITY * b.trace() + r * b.transpose() * r.transpose();
-                let block = shear * mu + a * b * a.transpose() * lambda;
-                add_block(&mut self.dense, nodes, &block);
-            }
+            full.each_block(workers, group, turn, squared, |nodes, block| {
+                add_block(dense, nodes, block);
+            });
         }
     }
 
