@@ -371,7 +371,7 @@ impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Changes<'_, 
         let Changes { from, to, start_strain, dt, ref sum } = *self.pass;
         let (before, mut moved) = (tets.corners::<L>(from).x, tets.corners::<L>(to).x);
         for corner in 0..4 {
-            moved[corner] = moved[corner] - before[corner];
+            moved[corner] -= before[corner];
         }
         let shape = tets.shape::<L>();
         let f = deformation_gradient(&before, &shape);
