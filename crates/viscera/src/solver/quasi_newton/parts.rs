@@ -122,3 +122,40 @@ impl Progress {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A slope decides only where it lies between that at the start and half of it the other way, where the step is more than
+    /// round-off, and where the energy is checked in the end.
+    #[test]
+    fn a_slope_decides_only_where_the_potential_has_fallen() {
+        let clear = Progress {
+            phase: Phase::Iterating,
+            length: 0.5,
+            slope: -2.0,
+            longest: 1.0,
+            ..Progress::default()
+        };
+        for (slope, decides) in [
+            (-1.0, true),
+            (0.0, true),
+            (0.5, true),
+            (0.51, false),
+            (-1.01, false),
+            (f64::NAN, false),
+            (f64::INFINITY, false),
+        ] {
+            assert_eq!(clear.is_settled_by(slope, true), decides, "{slope}");
+        }
+        let unchecked = Progress { scheme: Scheme::Euler, ..clear };
+        let round_off = Progress { resolution: 0.5 / CLEAR_STEP, ..clear };
+        for other in [unchecked, round_off] {
+            assert!(!other.is_settled_by(0.0, true), "{other:?}");
+        }
+        let starting = Progress { phase: Phase::Starting, ..clear };
+        assert!(starting.is_settled_by(7.0, true) && !starting.is_settled_by(7.0, false));
+        assert!(!starting.is_settled_by(f64::NAN, true));
+    }
+}

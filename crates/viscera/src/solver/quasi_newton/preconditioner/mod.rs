@@ -18,6 +18,8 @@ mod full;
 mod prolongation;
 mod rotation;
 mod sums;
+#[cfg(test)]
+mod tests;
 
 use std::ops::Range;
 

@@ -1,0 +1,90 @@
+//! The preconditioner against the curvature that it is made of.
+
+use super::full::FullSums;
+use super::prolongation::Prolongation;
+use super::rotation::Turn;
+use super::sums::{Grouped, On, tets_of_part};
+use crate::elements::law::{Law, StableNeoHookean};
+use crate::layout::Layout;
+use crate::layout::lattice::{Lattice, Weights};
+use crate::material::{Material, MaterialModel};
+use crate::mesh::shapes;
+use crate::model::ModelBuilder;
+use crate::scalar::lanes::{Instructions, Point};
+use crate::scalar::{Mat3, Vec3, vec3};
+use crate::settings::SolverSettings;
+use crate::solver::cpu::threads::Workers;
+
+/// Without a lattice the coarsest level is the stiffness of the tetrahedra themselves, turned as their groups are: each block
+/// against the formula of a single tetrahedron, in lanes and one by one.
+#[test]
+fn the_whole_matrix_is_the_sum_of_its_tetrahedra() {
+    let mut builder = ModelBuilder::new();
+    let tissue = Material::new(MaterialModel::StableNeoHookean, 1e4, 0.4, 1000.0).expect("legal");
+    let mesh = shapes::beam(0.03, 0.02, 0.02, 2, 0.0).expect("a beam");
+    builder.add_body(&mesh, &tissue).expect("a body");
+    let model = builder.build::<f64>().expect("a model");
+    let layout = Layout::new(&model, &SolverSettings::default());
+    let tets = tets_of_part(&layout, 0);
+    let count = model.vertex_count();
+    let grouped = Grouped::new(&tets, &model.rest_positions, &Lattice::default());
+    assert_eq!(grouped.len(), 1);
+    let mut free = vec![true; count];
+    free[3] = false;
+    let full = FullSums::new(On::Vertices, &tets, &grouped, &vec![1.0; count], &free);
+    let f = Mat3::from_columns(vec3(0.2, 1.1, 0.1), vec3(-0.9, 0.3, 0.0), vec3(0.1, -0.2, 1.2));
+    let turn = Turn::<f64>::new(MaterialModel::StableNeoHookean, &f, 0.5);
+    let (r, a, squared) = (turn.rotation, StableNeoHookean::gradient_map(&f), 1e-4);
+    let mut expected = vec![Mat3::default(); count * count];
+    for tet in &tets {
+        let (mu, lambda) = (tet.mu * tet.volume, tet.lambda * tet.volume);
+        for (&v, gv) in tet.vertices.iter().zip(tet.gradients) {
+            for (&w, gw) in tet.vertices.iter().zip(tet.gradients).filter(|(w, _)| **w <= v) {
+                let shear = Mat3::IDENTITY * gv.dot(gw) + Mat3::outer(r * gw, r * gv);
+                let block = shear * mu + Mat3::outer(a * gv, a * gw) * lambda;
+                let sum = &mut expected[v as usize * count + w as usize];
+                *sum = *sum + block * (1.5 * squared);
+            }
+        }
+    }
+    let largest = expected.iter().map(|block| block.norm_squared().sqrt()).fold(0.0, f64::max);
+    for instructions in [Instructions::Portable, Instructions::detect()] {
+        let mut workers = Workers::one();
+        workers.instructions = instructions;
+        let mut seen = 0;
+        full.each_block(&workers, 0, &turn, squared, |[v, w], block| {
+            let difference = *block - expected[v as usize * count + w as usize];
+            assert!(difference.norm_squared().sqrt() < 1e-13 * largest, "{v}, {w}: {block:?}");
+            assert!(free[v as usize] && free[w as usize]);
+            seen += 1;
+        });
+        let any = |(pair, block): (usize, &Mat3<f64>)| {
+            block.norm_squared() > 0.0 && free[pair / count] && free[pair % count]
+        };
+        assert!(seen >= expected.iter().enumerate().filter(|pair| any(*pair)).count());
+    }
+}
+
+/// `P^T` is the transpose of `P`, and a node that is not free takes no part in either.
+#[test]
+fn a_restriction_is_the_transpose_of_its_prolongation() {
+    let entries = vec![(0, 0.25), (1, 0.75), (1, 1.0), (2, 0.5), (0, 0.5), (2, 1.0)];
+    let weights = Weights { offsets: vec![0, 2, 3, 5, 6], entries };
+    let is_free = |node: usize| node != 1;
+    let way = Prolongation::<f64>::new(&weights, 3, is_free);
+    let workers = Workers::one();
+    let point = |i: usize| Point::new(vec3(1.0 + i as f64, 0.5 * i as f64, -2.0), 0.0);
+    let finer: Vec<Point<f64>> = (0..4).map(point).collect();
+    let coarser: Vec<Point<f64>> = (5..8).map(point).collect();
+    let (mut down, mut up) = (vec![Point::default(); 3], vec![Vec3::ZERO; 4]);
+    way.restrict(&workers, &finer, &mut down);
+    way.prolong(&workers, &coarser, &mut up, |_, above, value| *value = above.vec3());
+    assert_eq!(down[1].vec3(), finer[0].vec3() * 0.75);
+    assert_eq!((up[1], up[3]), (Vec3::ZERO, coarser[2].vec3()));
+    let dot =
+        |a: &[Vec3<f64>], b: &[Vec3<f64>]| -> f64 { a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum() };
+    let places = |points: &[Point<f64>]| points.iter().map(|p| p.vec3()).collect::<Vec<_>>();
+    let [of_coarser, of_finer] =
+        [dot(&places(&down), &places(&coarser)), dot(&up, &places(&finer))];
+    assert!((of_coarser - of_finer).abs() < 1e-14 * of_coarser.abs());
+}
