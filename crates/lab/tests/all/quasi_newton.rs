@@ -26,9 +26,9 @@ fn converged() -> SolverSettings {
     }
 }
 
-/// Units of single precision, of the body's extent, that rounding may leave of a place: the gradient's round-off
-/// through the inverse of the curvature.
-const ROUNDING: f64 = 16.0;
+/// Units of single precision, of the body's extent, that rounding may leave of a place: the gradient's round-off, which is that
+/// of its stiffest term, through the inverse of the least curvature: so many times `(lambda + 2 mu)/mu`.
+const ROUNDING: f64 = 4.0;
 
 /// Distance from Newton's end of a step, over that of the inertial prediction, in double and single precision, and
 /// what rounding may leave in single precision.
@@ -58,7 +58,9 @@ fn errors(
         moved += (*x - *y).length_squared() / step.exact.len() as f64;
         extent = extent.max(y.length());
     }
-    [errors[0], errors[1], ROUNDING * f64::from(f32::EPSILON) * extent / moved.sqrt()]
+    let stiffness = (2.0 - 2.0 * poisson) / (1.0 - 2.0 * poisson);
+    let rounding = ROUNDING * stiffness * f64::from(f32::EPSILON);
+    [errors[0], errors[1], rounding * extent / moved.sqrt()]
 }
 
 fn assert_exact(size: Size, tissues: &[(MaterialModel, f64, f64)]) {
