@@ -26,12 +26,9 @@ fn converged() -> SolverSettings {
     }
 }
 
-/// Units of single precision, of the body's extent, that rounding may leave of a place: the gradient's round-off, which is that
-/// of its stiffest term, through the inverse of the least curvature: so many times `(lambda + 2 mu)/mu`.
-const ROUNDING: f64 = 4.0;
-
 /// Distance from Newton's end of a step, over that of the inertial prediction, in double and single precision, and
-/// what rounding may leave in single precision.
+/// what rounding may leave in single precision: of the body's extent a unit of the precision, which is the round-off of the
+/// gradient's stiffest term, through the inverse of the least curvature: `(lambda + 2 mu)/mu` times.
 fn errors(
     name: &'static str,
     size: Size,
@@ -59,7 +56,7 @@ fn errors(
         extent = extent.max(y.length());
     }
     let stiffness = (2.0 - 2.0 * poisson) / (1.0 - 2.0 * poisson);
-    let rounding = ROUNDING * stiffness * f64::from(f32::EPSILON);
+    let rounding = stiffness * f64::from(f32::EPSILON);
     [errors[0], errors[1], rounding * extent / moved.sqrt()]
 }
 
