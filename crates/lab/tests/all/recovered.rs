@@ -1,6 +1,7 @@
 //! Recovered-gradient tetrahedra: the library's formulas against the reference's definition, and both against what
 //! must come out.
 
+use crate::common::{body, build};
 use viscera::layout::{Domains, Smoothing};
 use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
@@ -23,16 +24,6 @@ const SMOOTHINGS: [Smoothing; 3] = [Smoothing::RECOVERED, Smoothing::FITTED, Smo
 
 fn material(young: f64, poisson: f64) -> Material {
     Material::new(SNH, young, poisson, 1000.0).expect("a legal material")
-}
-
-fn build(builder: &ModelBuilder) -> Model<f64> {
-    builder.build().expect("a legal model")
-}
-
-fn body(mesh: &TetMesh, material: &Material) -> Model<f64> {
-    let mut builder = ModelBuilder::new();
-    builder.add_body(mesh, material).expect("a legal body");
-    build(&builder)
 }
 
 /// A bar of boxes of 1 cm whose inner vertices lie anywhere.

@@ -1,5 +1,6 @@
 //! The reference against closed forms and against differences of its own potential.
 
+use crate::common::{body, build};
 use viscera::elements::green_strain;
 use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;
@@ -28,16 +29,6 @@ fn block(cells: [usize; 3]) -> TetMesh {
 
 fn material(model: MaterialModel, young: f64, poisson: f64) -> Material {
     Material::new(model, young, poisson, 1000.0).expect("a legal material")
-}
-
-fn build(builder: &ModelBuilder) -> Model<f64> {
-    builder.build().expect("a legal model")
-}
-
-fn body(mesh: &TetMesh, material: &Material) -> Model<f64> {
-    let mut builder = ModelBuilder::new();
-    builder.add_body(mesh, material).expect("a legal body");
-    build(&builder)
 }
 
 fn norm(values: &[Vec3<f64>]) -> f64 {

@@ -193,3 +193,15 @@ pub fn lab(arguments: &[&str]) -> Output {
 pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
+
+/// What a builder has, as a model.
+pub fn build(builder: &ModelBuilder) -> Model<f64> {
+    builder.build().expect("a legal model")
+}
+
+/// One body of one material.
+pub fn body(mesh: &TetMesh, material: &Material) -> Model<f64> {
+    let mut builder = ModelBuilder::new();
+    builder.add_body(mesh, material).expect("a legal body");
+    build(&builder)
+}
