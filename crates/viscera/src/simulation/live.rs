@@ -3,7 +3,7 @@
 
 use super::error::{LiveError, SimulationError};
 use super::holding::{GraspOrigins, tolerance};
-use super::{Simulation, automatic, substep_dt};
+use super::{Simulation, automatic};
 use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
@@ -237,9 +237,9 @@ impl<S: Real> Simulation<S> {
         let model = builder.build::<S>().map_err(SimulationError::from)?;
         let same_device = scene.solver.device == self.scene.solver.device;
         let on_device = same_device && self.callers_device;
-        let solver = automatic::settings_of(&scene, &self.assembly, &model, on_device);
-        let dt = substep_dt(&scene, solver.substeps());
-        let backend = self.backend.renew(same_device, &model, &solver, dt)?;
+        let automatic::Chosen { settings: solver, period } =
+            automatic::choose_method(&scene, &self.assembly, &model, on_device);
+        let backend = self.backend.renew(same_device, &model, &solver)?;
         let rest = State::at_rest(&model);
         let state = State {
             positions: std::mem::take(&mut self.state.positions),
@@ -247,7 +247,7 @@ impl<S: Real> Simulation<S> {
             ..rest
         };
         (self.scene, self.model, self.backend) = (scene, model, backend);
-        self.solver = solver;
+        (self.solver, self.period) = (solver, period);
         self.assembly.builder = builder;
         self.choose_substeps();
         self.begin_at(state);
