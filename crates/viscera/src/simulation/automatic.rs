@@ -8,10 +8,10 @@ use crate::scene::Scene;
 use crate::settings::{DeviceRequest, Integrator, Method, SolverSettings};
 use crate::solver::{Inputs, Solver, choose, expected_motion_error};
 
-/// Cost of a pass of the quasi-Newton method over that of a small explicit step: 38 over 9.7 ns per tetrahedron, measured
-/// with 1,000 to 100,000 of them by `viscera bench` (AVX2, one thread). Too large, and explicit steps are taken where they cost
+/// Cost of a pass of the quasi-Newton method over that of a small explicit step: 21 over 11.6 ns per tetrahedron, measured
+/// with 1,000 to 10,000 of them by `viscera bench` (AVX2, one thread). Too large, and explicit steps are taken where they cost
 /// more; too small, and the quasi-Newton method is.
-const PASS_OVER_SMALL_STEP: f64 = 3.9;
+const PASS_OVER_SMALL_STEP: f64 = 1.8;
 
 /// Passes that a step of the quasi-Newton method costs besides those of its solves.
 const BESIDES: f64 = 3.0;

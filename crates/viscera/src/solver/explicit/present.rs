@@ -33,7 +33,8 @@ const LARGEST_SHARE: f64 = 0.7;
 /// half as many half as many tetrahedra again stay inside out after violent grabs.
 const SHORTEST: f64 = 16.0;
 
-/// A vertex gives up its speed where `omega^2` times kick and drift is larger: four is unstable.
+/// A vertex gives up its speed where `omega^2` times kick and drift is larger: four is unstable. More where the settings' own
+/// small steps have more than that at rest.
 const STIFFEST: f64 = 3.0;
 
 /// A part is in violent motion where a tetrahedron is inside out, or where it has stiffened so much that small steps have to
@@ -220,8 +221,8 @@ impl SmallSteps {
         let drift = if self.left == 0 { 0.5 * self.dt } else { self.dt };
         let kick = 0.5 * (before + self.dt);
         // `omega^2 kick drift (1 + 2 eta/drift) <= 3`, in terms of the loads' small step.
-        // Who asks for more than what is stable gets it.
-        let most = STIFFEST * stability.safety.max(1.0).powi(2);
+        // Small steps that are asked for to be longer than usual are no reason, nor those that are longer than is stable.
+        let most = STIFFEST.max(4.2 * stability.safety.powi(2));
         let stiffest = most * before * before / (kick * (self.dt + 2.0 * (viscosity + was_ahead)));
         let remains = self.dt * (f64::from(self.left) - 0.5).max(0.0);
         if self.left == 0 {
