@@ -152,7 +152,7 @@ impl<S: Real> Memory<S> {
             small.begin(stability, stiffest);
         }
         if model.is_viscous() {
-            drift(model, constants, points, velocities, |number| -0.5 * small_steps[number].dt);
+            retrace(model, constants, points, velocities, small_steps);
             let (workers, strains) = (&constants.workers, &mut constants.start_strain);
             measure_strain(workers, model, None, points, strains);
             points.copy_from_slice(&constants.previous);
@@ -252,6 +252,22 @@ fn drift<S: Real>(
             if constants.inverse_masses[v] != S::ZERO {
                 point.set_vec3(point.vec3() + velocities[v] * time);
             }
+        });
+    }
+}
+
+/// Moves every vertex, pinned ones too, to where it was in the middle of the small step before.
+fn retrace<S: Real>(
+    layout: &Layout<S>,
+    constants: &StepConstants<S>,
+    points: &mut [Point<S>],
+    velocities: &[Vec3<S>],
+    small_steps: &[SmallSteps],
+) {
+    for (part, small) in layout.parts.iter().zip(small_steps) {
+        let time = S::from_f64(0.5 * small.dt);
+        constants.each_vertex(part, points, |v, point| {
+            point.set_vec3(point.vec3() - velocities[v] * time);
         });
     }
 }
