@@ -7,9 +7,9 @@ use viscera::mesh::TetMesh;
 use viscera::mesh::shapes::Block;
 use viscera::scalar::{Real, vec3};
 use viscera::scene::Scene;
-use viscera::settings::{Accuracy, SolverSettings};
+use viscera::settings::{Accuracy, Method, SolverSettings};
 
-use super::course::{Places, begin, distance, follow, small_steps};
+use super::course::{Places, SAFETY, begin, distance, follow, small_steps};
 use super::organs::{Organ, places};
 use super::{Context, Section};
 use crate::unstructured::shuffled;
@@ -41,6 +41,9 @@ const ACCURACIES: [Accuracy; 3] = [Accuracy::Draft, Accuracy::Standard, Accuracy
 /// What is foretold may be so many times the truth, and never less than it, in all scenes but so many.
 const LARGEST_RATIO: f64 = 4.0;
 const EXCEPTIONS: usize = 1;
+
+/// What is chosen may cost so many times what the cheapest method does that is as accurate as asked.
+const LARGEST_COST: f64 = 1.3;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Body {
@@ -121,22 +124,54 @@ impl Tissue {
     }
 }
 
-/// At one accuracy.
+/// One method at one accuracy.
+#[derive(Clone, Copy, Debug)]
 struct Told {
-    method: String,
+    method: Method,
     substeps: u32,
+    /// In passes that add up the forces of all tetrahedra once.
+    cost: f64,
     foretold: f64,
     found: f64,
 }
 
-fn answer(case: &Tissue) -> Result<Vec<Told>> {
+/// What is chosen, and what else there is.
+struct Answer {
+    chosen: Told,
+    other: Told,
+}
+
+impl Answer {
+    /// What the choice costs, over the cheapest that is as accurate as asked; nothing where none is.
+    fn over_cheapest(&self, accuracy: Accuracy) -> Option<f64> {
+        let meets = |told: &&Told| told.found <= accuracy.share();
+        let costs = [&self.chosen, &self.other].into_iter().filter(meets).map(|told| told.cost);
+        costs.min_by(f64::total_cmp).map(|cheapest| self.chosen.cost / cheapest)
+    }
+}
+
+fn answer(case: &Tissue) -> Result<Vec<Answer>> {
     let (scene, mesh) = case.problem()?;
-    let exact = moved::<f64>(&scene, small_steps(), &mesh)?.0;
+    // Half as long as elsewhere, beside the explicit steps that are judged.
+    let truth = SolverSettings { explicit_safety: 0.5 * SAFETY, ..small_steps() };
+    let (exact, _) = moved::<f64>(&scene, truth, &mesh)?;
+    let of = |method, accuracy| -> Result<Told> {
+        let solver = SolverSettings { method, accuracy, ..SolverSettings::default() };
+        let (ours, told) = moved::<f32>(&scene, solver, &mesh)?;
+        Ok(Told { found: distance(&ours, &exact), ..told })
+    };
+    let explicit = of(Method::Explicit, Accuracy::Standard)?;
     let mut all = Vec::new();
     for accuracy in ACCURACIES {
+        let quasi_newton = of(Method::QuasiNewton, accuracy)?;
         let solver = SolverSettings { accuracy, ..SolverSettings::default() };
-        let (ours, told) = moved::<f32>(&scene, solver, &mesh)?;
-        all.push(Told { found: distance(&ours, &exact), ..told });
+        let mut scene = scene.clone();
+        scene.solver = solver;
+        let chosen = begin::<f32>(scene, Some(&mesh))?.solver().method;
+        all.push(match chosen == Method::Explicit {
+            true => Answer { chosen: explicit, other: quasi_newton },
+            false => Answer { chosen: quasi_newton, other: explicit },
+        });
     }
     Ok(all)
 }
@@ -146,8 +181,9 @@ fn moved<S: Real>(scene: &Scene, solver: SolverSettings, mesh: &TetMesh) -> Resu
     scene.solver = solver;
     let mut simulation = begin::<S>(scene, Some(mesh))?;
     let told = Told {
-        method: simulation.solver().method.to_string(),
+        method: simulation.solver().method,
         substeps: simulation.substeps(),
+        cost: simulation.expected_cost(),
         foretold: simulation.expected_errors().motion.unwrap_or(f64::NAN),
         found: f64::NAN,
     };
@@ -177,16 +213,18 @@ fn run(context: &mut Context) -> Result<()> {
     let mut table = Table::new(head);
     for (case, answer) in cases.iter().zip(&answers) {
         let mut row = vec![case.to_string()];
-        for told in answer {
+        for Answer { chosen: told, .. } in answer {
             let [foretold, found] = [told.foretold, told.found].map(percent);
-            row.extend([told.method.clone(), told.substeps.to_string(), foretold, found]);
+            row.extend([told.method.to_string(), told.substeps.to_string(), foretold, found]);
         }
         table.row(row);
     }
     context.document.table(&table);
+    costs(context, &cases, &answers);
     for (index, accuracy) in ACCURACIES.into_iter().enumerate() {
-        let of =
-            |is: &dyn Fn(&Told) -> bool| answers.iter().filter(|told| is(&told[index])).count();
+        let of = |is: &dyn Fn(&Told) -> bool| {
+            answers.iter().filter(|all| is(&all[index].chosen)).count()
+        };
         let honest =
             of(&|told| told.found <= told.foretold && told.foretold <= LARGEST_RATIO * told.found);
         let kept = of(&|told| told.found <= accuracy.share());
@@ -205,6 +243,52 @@ fn run(context: &mut Context) -> Result<()> {
             kept.to_string(),
             kept == count,
         );
+        let cheap = |answer: &&Vec<Answer>| {
+            answer[index].over_cheapest(accuracy).is_some_and(|over| over <= LARGEST_COST)
+        };
+        let cheap = answers.iter().filter(cheap).count();
+        context.verdict(
+            format!("{name}: scenes that cost at most {LARGEST_COST} times the cheapest method"),
+            count.to_string(),
+            cheap.to_string(),
+            cheap == count,
+        );
     }
     Ok(())
+}
+
+/// What the choice costs, beside the other method.
+fn costs(context: &mut Context, cases: &[Tissue], answers: &[Vec<Answer>]) {
+    context.document.paragraph(
+        "What a frame costs, counted in passes that add up the forces of all tetrahedra once: small steps, and one more \
+         in each substep; a pass of the quasi-Newton method, which does more, counts as so many of them as it takes as \
+         long. *Over the cheapest*: of the two methods, those whose error found is at most what is asked.",
+    );
+    let mut head = vec!["tissue".to_owned()];
+    for accuracy in ACCURACIES {
+        let name = accuracy.to_string().replace('"', "");
+        head.extend([
+            format!("{name}: chosen"),
+            "passes".into(),
+            "the other's".into(),
+            "its error".into(),
+            "over the cheapest".into(),
+        ]);
+    }
+    let mut table = Table::new(head);
+    for (case, answer) in cases.iter().zip(answers) {
+        let mut row = vec![case.to_string()];
+        for (Answer { chosen, other }, accuracy) in answer.iter().zip(ACCURACIES) {
+            let over = Answer { chosen: *chosen, other: *other }.over_cheapest(accuracy);
+            row.extend([
+                chosen.method.to_string(),
+                format!("{:.0}", chosen.cost),
+                format!("{:.0}", other.cost),
+                percent(other.found),
+                over.map_or("-".to_owned(), |over| format!("{over:.2}")),
+            ]);
+        }
+        table.row(row);
+    }
+    context.document.table(&table);
 }

@@ -33,6 +33,10 @@ pub trait Law: Copy + Send + Sync {
     /// one that drops what may be negative.
     fn curvature_along<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lambda: S, mu: S) -> [S; 2];
 
+    /// Bound [Pa] of the second derivative, `D : d2W/dF2 : D <= bound |D|^2` for every `D`: never negative, inside out
+    /// neither.
+    fn stiffness<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> S;
+
     /// `A` of the largest part of the second derivative by a corner with the shape gradient `g`:
     /// `lambda (A g) (A g)^T`. A rotation where nothing is stretched.
     fn gradient_map<S: Scalar>(f: &Mat3<S>) -> Mat3<S>;
@@ -130,6 +134,19 @@ impl Law for SaintVenantKirchhoff {
         green_strain::curvature_along(f, d, &green_strain::strain(f), lambda, mu)
     }
 
+    /// `lambda |F|^2 + 2 mu |C| + |lambda tr E| + 2 mu |E|`, `C = F^T F`: of the stress by strain, and of the stress itself.
+    #[inline(always)]
+    fn stiffness<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> S {
+        let [a, b, c, yz, xz, xy] = green_strain::strain(f);
+        let shears = S::HALF * (yz * yz + xz * xz + xy * xy);
+        let norm = |x: S, y: S, z: S, shears: S| (x * x + y * y + z * z + shears).sqrt();
+        let [x, y, z] = [a, b, c].map(|strain| S::TWO * strain + S::ONE);
+        let c_norm = norm(x, y, z, S::TWO * S::TWO * shears);
+        let pressure = lambda * (a + b + c);
+        let of_stress = pressure.abs() + S::TWO * mu * norm(a, b, c, shears);
+        lambda * f.norm_squared() + S::TWO * mu * c_norm + of_stress
+    }
+
     /// Of the derivative of `tr E`: `F`.
     #[inline(always)]
     fn gradient_map<S: Scalar>(f: &Mat3<S>) -> Mat3<S> {
@@ -166,6 +183,15 @@ impl Law for StableNeoHookean {
     #[inline(always)]
     fn curvature_along<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lambda: S, mu: S) -> [S; 2] {
         neo_hookean::curvature_along(f, d, lambda, mu)
+    }
+
+    /// `mu + lh |cof F|^2 + |lh (J - 1) - mu| 2/sqrt 3 |F|`: of shape, of volume, and of the curvature of the volume, whose
+    /// eigenvalues `e` solve `e^3 - |F|^2 e = 2 J` or are stretches.
+    #[inline(always)]
+    fn stiffness<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> S {
+        let pressure = (lambda + mu) * neo_hookean::volume_change(f) - mu;
+        let bent = S::from_f64(4.0 / 3.0) * f.norm_squared();
+        mu + (lambda + mu) * f.cofactor().norm_squared() + pressure.abs() * bent.sqrt()
     }
 
     /// Of the derivative of `det F`: its cofactors.

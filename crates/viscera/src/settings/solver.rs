@@ -168,8 +168,8 @@ settings_table! {
     pub struct SolverSettings {
         /// Floating point format of the simulation state.
         precision: Precision = (Precision::F32), one_of::<Precision>();
-        /// How positions and velocities are advanced. "auto" chooses by `accuracy`: "quasi_newton", or, where errors of
-        /// less than a hundredth are asked for and it is cheaper, "explicit"; on a `device` that is asked for by name,
+        /// How positions and velocities are advanced. "auto" takes the cheaper one of
+        /// "quasi_newton" and "explicit" that is as accurate as `accuracy` asks; on a `device` that is asked for by name,
         /// "xpbd". "xpbd" sweeps over constraints. "quasi_newton" solves
         /// every substep to its end in a dozen passes over the mesh, whatever its size; of the settings below it uses
         /// `accuracy`, `substeps`, `iterations`, `integrator`, `history`, `threads`, and it is computed by the CPU. "explicit"
@@ -181,11 +181,11 @@ settings_table! {
         /// displacement, over half a second: "draft" for 0.15, "standard" for 0.05, "fine" for 0.005, or a number.
         /// Where tissue comes to rest does not depend on it.
         accuracy: Accuracy = (Accuracy::Standard), Accuracies;
-        /// The share of the largest stable step of the body at rest that "explicit" takes. Tissue
-        /// stiffens under strong deformation: lower this where a run diverges.
+        /// The share of the largest stable step of the body at rest that "explicit" takes. On the CPU smaller ones are taken
+        /// by themselves where tissue stiffens under strong deformation; on a device lower this where a run diverges.
         explicit_safety: f64 = 0.5, number(at_least(1e-3).up_to(1.0));
-        /// Substeps per frame: "auto" for what suits the method, 10 for "xpbd" and "explicit", for "quasi_newton"
-        /// as many as `accuracy` and the slowest oscillation of what the scene's fixings hold ask for, with "standard" from
+        /// Substeps per frame: "auto" for what suits the method, 10 for "xpbd", for "explicit" one for
+        /// every 16 small steps and 10 at most, for "quasi_newton" as many as `accuracy` and the slowest oscillation of what the scene's fixings hold ask for, with "standard" from
         /// 1 to 10. More lose less motion to numerical damping and follow it more closely; the cost grows alike. With `rebase`
         /// and `keep_multipliers` the shape at rest does not depend on them; plain XPBD needs about 50 for
         /// an error near 1 %.

@@ -12,22 +12,17 @@ use crate::settings::{DeviceRequest, SolverSettings};
 use crate::solver::Solver;
 
 impl<S: Real> Backend<S> {
-    /// What the settings ask for, for steps of `dt` [s].
-    pub fn choose(
-        model: &Model<S>,
-        settings: &SolverSettings,
-        dt: f64,
-    ) -> Result<Self, SimulationError> {
+    /// What the settings ask for.
+    pub fn choose(model: &Model<S>, settings: &SolverSettings) -> Result<Self, SimulationError> {
         if settings.device == DeviceRequest::Cpu {
             return Ok(Self::cpu(Solver::new(model, settings), "as asked for"));
         }
         #[cfg(feature = "gpu")]
-        return gpu::choose(model, settings, dt);
+        return gpu::choose(model, settings);
         #[cfg(not(feature = "gpu"))]
         match &settings.device {
             DeviceRequest::Auto => {
                 let reason = "the GPU backend was left out of this build";
-                let _ = dt;
                 Ok(Self::cpu(Solver::new(model, settings), reason))
             }
             device => Err(SimulationError::NoGpuBackend { device: device.clone() }),
@@ -40,7 +35,6 @@ impl<S: Real> Backend<S> {
         same_device: bool,
         model: &Model<S>,
         settings: &SolverSettings,
-        dt: f64,
     ) -> Result<Self, SimulationError> {
         // A method that only the CPU computes leaves its device.
         #[cfg(feature = "gpu")]
@@ -64,7 +58,7 @@ impl<S: Real> Backend<S> {
                 let cpu = Self::cpu(Solver::new(model, settings), &warning);
                 Self { warning: Some(warning), ..cpu }
             }
-            None => Self::choose(model, settings, dt)?,
+            None => Self::choose(model, settings)?,
         };
         if let Some(instructions) = self.instructions() {
             backend.use_instructions(instructions);

@@ -7,7 +7,7 @@ use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
-use crate::settings::SolverSettings;
+use crate::settings::{Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]
 use crate::solver::gpu::GpuSolver;
@@ -112,20 +112,22 @@ impl<S: Real> Backend<S> {
         }
     }
 
-    /// The slowest period [s], and the substeps of a frame [s]: see [`Solver::slowest_period`] and [`Solver::substeps`].
-    /// Methods that choose by themselves are computed by the CPU.
+    /// The slowest period [s], where it had to be known, and the substeps of a frame [s]: see [`Solver::slowest_period`] and
+    /// [`Solver::substeps`]. Methods that choose by themselves are computed by the CPU.
     pub fn substeps(
         &mut self,
         inputs: &Inputs<S>,
         settings: &SolverSettings,
+        period: Option<f64>,
         frame: f64,
-    ) -> (f64, u32) {
+    ) -> (Option<f64>, u32) {
         match &mut self.engine {
-            Engine::Cpu(solver) => {
-                let period = solver.slowest_period(inputs);
-                (period, solver.substeps_for(period, frame))
+            Engine::Cpu(solver) if settings.method == Method::QuasiNewton => {
+                let period = period.unwrap_or_else(|| solver.slowest_period(inputs));
+                (Some(period), solver.substeps_for(period, frame))
             }
-            Engine::Device(_) => (f64::INFINITY, settings.substeps()),
+            Engine::Cpu(solver) => (period, solver.substeps_for(f64::INFINITY, frame)),
+            Engine::Device(_) => (period, settings.substeps()),
         }
     }
 

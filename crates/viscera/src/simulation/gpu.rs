@@ -100,11 +100,10 @@ fn of_precision<S: Real>(backend: Backend<f32>) -> Result<Backend<S>, Simulation
     backend.ok_or(SimulationError::Gpu(GpuError::DoublePrecision))
 }
 
-/// What the settings ask for, for steps of `dt` [s]. They do not ask for the CPU.
+/// What the settings ask for. They do not ask for the CPU.
 pub(super) fn choose<S: Real>(
     model: &Model<S>,
     settings: &SolverSettings,
-    dt: f64,
 ) -> Result<Backend<S>, SimulationError> {
     let single: &dyn Any = model;
     let Some(single) = single.downcast_ref::<Model<f32>>() else {
@@ -118,7 +117,7 @@ pub(super) fn choose<S: Real>(
     let chosen = match &settings.device {
         DeviceRequest::Named(name) => asked_for(Some(name), single, settings)?,
         DeviceRequest::Gpu => asked_for(None, single, settings)?,
-        _ => faster(single, settings, dt),
+        _ => faster(single, settings),
     };
     of_precision(chosen)
 }
@@ -132,14 +131,17 @@ fn asked_for(
 }
 
 /// The one that is expected to be faster, and the CPU where no device can do it.
-fn faster(model: &Model<f32>, settings: &SolverSettings, dt: f64) -> Backend<f32> {
+fn faster(model: &Model<f32>, settings: &SolverSettings) -> Backend<f32> {
     let solver = Solver::new(model, settings);
     let sweeps = match settings.method {
         Method::Auto | Method::QuasiNewton => {
             return Backend::cpu(solver, "the quasi-Newton method is computed by the CPU");
         }
+        // A device knows no stiffness but that of the shape at rest.
+        Method::Explicit => {
+            return Backend::cpu(solver, "explicit steps that suit the present shape");
+        }
         Method::Xpbd => settings.iterations(),
-        Method::Explicit => (dt / solver.stable_step()).ceil() as u32,
     };
     let cost = StepCost::new(solver.layout(), settings, sweeps);
     let tets = grouped(model.tet_count() as u64);

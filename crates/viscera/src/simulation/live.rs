@@ -1,9 +1,10 @@
 //! What is done to a running simulation by hand. All of it becomes part of the scene, so that a scene file
 //! with [`Live`] behind its other tables does the same to the bit.
 
+use super::Simulation;
+use super::automatic::{self, Chosen};
 use super::error::{LiveError, SimulationError};
 use super::holding::{GraspOrigins, tolerance};
-use super::{Simulation, automatic, substep_dt};
 use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
@@ -238,12 +239,11 @@ impl<S: Real> Simulation<S> {
         let same_device = scene.solver.device == self.scene.solver.device;
         let on_device = same_device && self.callers_device;
         self.resumed_method = self.resumed_method.filter(|_| same_device);
-        let solver = match self.resumed_method {
-            Some(method) => scene.solver.chosen(method),
-            None => automatic::settings_of(&scene, &self.assembly, &model, on_device),
+        let Chosen { settings: solver, period } = match self.resumed_method {
+            Some(method) => Chosen { settings: scene.solver.chosen(method), period: None },
+            None => automatic::choose_method(&scene, &self.assembly, &model, on_device),
         };
-        let dt = substep_dt(&scene, solver.substeps());
-        let backend = self.backend.renew(same_device, &model, &solver, dt)?;
+        let backend = self.backend.renew(same_device, &model, &solver)?;
         let rest = State::at_rest(&model);
         let state = State {
             positions: std::mem::take(&mut self.state.positions),
@@ -251,7 +251,7 @@ impl<S: Real> Simulation<S> {
             ..rest
         };
         (self.scene, self.model, self.backend) = (scene, model, backend);
-        self.solver = solver;
+        (self.solver, self.period) = (solver, period);
         self.assembly.builder = builder;
         self.choose_substeps();
         self.begin_at(state);

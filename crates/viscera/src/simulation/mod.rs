@@ -124,8 +124,9 @@ pub struct Simulation<S> {
     backend: Backend<S>,
     /// Per frame.
     substeps: u32,
-    /// Of the slowest oscillation of what the scene's fixings hold [s]; infinite where nothing is held.
-    period: f64,
+    /// Of the slowest oscillation of what the scene's fixings hold [s]; infinite where nothing is held. Nothing where
+    /// nobody had to know it yet.
+    period: Option<f64>,
     inputs: Inputs<S>,
     taken: GraspOrigins,
     /// The scene without what was done to it by hand.
@@ -154,19 +155,20 @@ impl<S: Real> Simulation<S> {
         scene: Scene,
         assembly: Assembly,
         callers_device: bool,
-        choose: impl FnOnce(&Model<S>, &SolverSettings, f64) -> Result<Backend<S>, SimulationError>,
+        choose: impl FnOnce(&Model<S>, &SolverSettings) -> Result<Backend<S>, SimulationError>,
     ) -> Result<Self, SimulationError> {
         check_patches(&scene, &assembly)?;
         let model = assembly.builder.build::<S>()?;
-        let solver = automatic::settings_of(&scene, &assembly, &model, callers_device);
+        let automatic::Chosen { settings: solver, period } =
+            automatic::choose_method(&scene, &assembly, &model, callers_device);
         let mut simulation = Self {
             state: State::at_rest(&model),
             substeps: solver.substeps(),
-            backend: choose(&model, &solver, substep_dt(&scene, solver.substeps()))?,
+            backend: choose(&model, &solver)?,
             solver,
             callers_device,
             resumed_method: None,
-            period: f64::INFINITY,
+            period,
             inputs: Inputs::default(),
             taken: GraspOrigins::default(),
             written: scene.clone(),
@@ -191,8 +193,9 @@ impl<S: Real> Simulation<S> {
     /// As many substeps as the settings ask for, or as the slowest oscillation of what the scene's fixings hold asks for.
     fn choose_substeps(&mut self) {
         let inputs = automatic::fixings(&self.scene, &self.assembly);
+        let frame = self.scene.time.frame;
         (self.period, self.substeps) =
-            self.backend.substeps(&inputs, &self.solver, self.scene.time.frame);
+            self.backend.substeps(&inputs, &self.solver, self.period, frame);
     }
 
     /// The settings in force: the scene's, with the method that "auto" stands for.
@@ -211,12 +214,17 @@ impl<S: Real> Simulation<S> {
     pub fn expected_errors(&self) -> ExpectedErrors {
         let automatic = SolverSettings { iterations: Count::Auto, ..self.solver.clone() };
         let fewest = choose(&automatic, &self.model.materials).passes;
-        let is_solved = match self.solver.iterations {
-            Count::Auto => true,
-            Count::Of(passes) => passes >= fewest,
+        let is_solved = match (self.solver.method, self.solver.iterations) {
+            (Method::Explicit, _) | (_, Count::Auto) => true,
+            (_, Count::Of(passes)) => passes >= fewest,
         };
         let frame = self.scene.time.frame;
-        let expected = automatic::expected_errors(&self.solver, self.period, frame, self.substeps);
+        let period = self.period.unwrap_or_else(|| match self.solver.method {
+            Method::Explicit => automatic::slowest_period(&self.scene, &self.assembly, &self.model),
+            _ => f64::INFINITY,
+        });
+        let (substeps, small) = (self.substeps, self.stable_step());
+        let expected = automatic::expected_errors(&self.solver, period, frame, substeps, small);
         // What fewer passes leave is not known.
         ExpectedErrors { motion: expected.motion.filter(|_| is_solved), ..expected }
     }
@@ -224,6 +232,13 @@ impl<S: Real> Simulation<S> {
     /// Substeps per frame.
     pub fn substeps(&self) -> u32 {
         self.substeps
+    }
+
+    /// What a frame is expected to cost, in passes that add up the forces of all tetrahedra once: what "auto" chooses the
+    /// method by. Not a number for XPBD.
+    pub fn expected_cost(&self) -> f64 {
+        let frame = self.scene.time.frame;
+        automatic::cost(&self.solver, &self.model, frame, self.substeps, self.stable_step())
     }
 
     /// Iterations per substep, or per solve of a substep where it has several.

@@ -5,10 +5,10 @@
 //! acts may be others; meshes, materials and the duration of a frame may not. What was done by hand belongs into the scene file
 //! ([`Simulation::live`]).
 
+use super::Simulation;
 use super::device::Backend;
 use super::error::LiveError;
 use super::holding::GraspOrigins;
-use super::{Simulation, substep_dt};
 use crate::layout::Layout;
 use crate::model::for_each_kind;
 use crate::scalar::{Real, Vec3};
@@ -206,8 +206,7 @@ impl<S: Real> Simulation<S> {
             return Err(refused);
         }
         let solver = self.scene.solver.chosen(saved);
-        let dt = substep_dt(&self.scene, solver.substeps());
-        self.backend = Backend::choose(&self.model, &solver, dt).map_err(|_| refused)?;
+        self.backend = Backend::choose(&self.model, &solver).map_err(|_| refused)?;
         self.solver = solver;
         self.resumed_method = Some(saved);
         self.choose_substeps();

@@ -266,6 +266,7 @@ impl<S: Real> Solver<S> {
             (Count::Auto, Method::QuasiNewton) => {
                 quasi_newton::substeps_for(period, frame, self.settings.accuracy.share())
             }
+            (Count::Auto, Method::Explicit) => explicit::substeps_for(self.stable_step(), frame),
             _ => self.settings.substeps(),
         }
     }

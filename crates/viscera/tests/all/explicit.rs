@@ -164,3 +164,34 @@ fn too_many_small_steps_are_refused() {
     assert!(stable < 1e-7, "{stable}");
     assert_eq!(state, before);
 }
+
+/// Places and velocities at the ends of steps of changing length are of the second order: half of the small steps, a
+/// quarter of the error, at the first step as at the last.
+#[test]
+fn places_and_velocities_are_of_the_second_order() {
+    let mesh = block([0.06, 0.02, 0.02], [4, 1, 1], 0.0);
+    let model = single_body::<f64>(&mesh, &material(SNH, 2e4, 0.4));
+    let inputs = hanging(&model);
+    let ends = |explicit_safety: f64| {
+        let settings = SolverSettings { explicit_safety, ..explicit() };
+        let (mut solver, mut state) = (Solver::new(&model, &settings), State::at_rest(&model));
+        let mut ends = Vec::new();
+        for dt in [1.0 / 60.0, 1.0 / 150.0, 1.0 / 100.0] {
+            solver.step(&model, &mut state, &inputs, dt).expect("a legal step");
+            ends.extend([state.positions.clone(), state.velocities.clone()]);
+        }
+        ends
+    };
+    let exact = ends(0.01);
+    let [coarse, fine] = [0.2, 0.1].map(|safety| {
+        let away = |(ours, exact): (&Vec<Vec3<f64>>, &Vec<Vec3<f64>>)| {
+            let pairs = ours.iter().zip(exact);
+            pairs.map(|(a, b)| (*a - *b).length_squared()).sum::<f64>().sqrt()
+        };
+        ends(safety).iter().zip(&exact).map(away).collect::<Vec<_>>()
+    });
+    let orders: Vec<f64> = coarse.iter().zip(&fine).map(|(a, b)| a / b).collect();
+    println!("errors {coarse:?} shrink by {orders:?}");
+    // Small steps are rounded to whole numbers of them, by a fiftieth at most; the exact one is a twentieth of the coarse.
+    assert!(orders.iter().all(|order| (3.7..4.3).contains(order)), "{orders:?}");
+}

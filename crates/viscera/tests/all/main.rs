@@ -18,6 +18,7 @@ mod energy_changes;
 mod example;
 mod explicit;
 mod explicit_limit;
+mod explicit_robust;
 mod forces;
 mod free_fall;
 mod gpu;

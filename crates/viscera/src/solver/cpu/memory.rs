@@ -86,7 +86,7 @@ impl<S: Real> Memory<S> {
         }
     }
 
-    /// How many small steps a step of `dt` [s] has: what [`Times::SmallSteps`] stands for. One where the method
+    /// The most small steps that a step of `dt` [s] has: what [`Times::SmallSteps`] stands for. One where the method
     /// has none.
     ///
     /// [`Times::SmallSteps`]: crate::solver::plan::Times::SmallSteps
@@ -107,8 +107,9 @@ impl<S: Real> Memory<S> {
     /// Whether a loop that waits for the flag ends.
     pub fn is_set(&self, flag: Flag) -> bool {
         match (flag, &self.method) {
-            // Both make all the passes that they are given.
-            (Flag::AllDone, MethodMemory::Xpbd(_) | MethodMemory::Explicit(_)) => false,
+            // It makes all the passes that it is given.
+            (Flag::AllDone, MethodMemory::Xpbd(_)) => false,
+            (Flag::AllDone, MethodMemory::Explicit(memory)) => memory.is_all_done(),
             (Flag::AllDone, MethodMemory::QuasiNewton(memory)) => memory.is_all_done(),
             (Flag::NothingDescends, _) => self.guard.as_ref().is_none_or(Guard::nothing_descends),
         }

@@ -191,9 +191,24 @@ impl<'a, S: Real> Block<'a, S> {
         points: &Shared<'_, Point<S>>,
         values: &[Vec3<L>; 4],
     ) {
+        // SAFETY: the caller's promise.
+        unsafe { self.add_bound_in_order(points, values, L::ZERO) };
+    }
+
+    /// As [`Block::add_in_order`], and the same bound to each corner.
+    ///
+    /// # Safety
+    /// As [`Block::add_in_order`].
+    #[inline(always)]
+    pub unsafe fn add_bound_in_order<L: Lanes<Real = S>>(
+        &self,
+        points: &Shared<'_, Point<S>>,
+        values: &[Vec3<L>; 4],
+        bound: L,
+    ) {
         let copies = self.set.copies_of(self.index);
         assert!(points.len() >= self.set.bounds[1]);
-        let values = values.map(|value| Point::new(value, L::ZERO));
+        let values = values.map(|value| Point::new(value, bound));
         if self.whole::<L>() {
             // SAFETY: below the bound, which is checked above; alone there by the caller's promise.
             unsafe { L::add_in_order(points.pointer(), copies, self.lane, values) };

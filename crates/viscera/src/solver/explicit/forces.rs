@@ -2,10 +2,12 @@
 //!
 //! ```text
 //! load_i += h^2 f_i(x),   E_start = E(x)      viscosity acts against the change of the Green strain E since the last pass
+//! bound_i += h^2 rho(K_e) B(F)/B(I)           of the stiffness, see `present`
 //! ```
 #![allow(unsafe_code)]
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use crate::elements::law::{LAWS, Law};
 use crate::elements::{deformation_gradient, green_strain, internal_forces};
@@ -18,6 +20,8 @@ use crate::solver::step::data::{Step, StepConstants};
 use crate::solver::step::gradient::add_elements;
 use crate::solver::step::law::{OfLaw, with_tissue};
 use crate::solver::step::tissue::Tissue;
+
+use super::present::AtRest;
 
 /// The blocks of each part, law by law, in the pieces of the layout: a thread does all of a piece.
 #[derive(Clone, Debug)]
@@ -45,26 +49,30 @@ impl Pieces {
         self.0.iter().map(|pieces| size_of_val(&pieces[..]) + size_of_val(pieces)).sum()
     }
 
-    /// Per copy of a part `h^2` times the force of its elements, `h` the step's; viscous tissue goes on from `x`.
+    /// Per copy of a part `h^2` times the force of its elements and the bound of their stiffness, `h` the step's; viscous
+    /// tissue goes on from `x`. Returns whether a tetrahedron is inside out.
     pub fn load<S: Real>(
         &self,
         constants: &mut StepConstants<S>,
         step: &Step<'_, S>,
         moments: &Moments<'_, S>,
         number: usize,
-        x: &[Point<S>],
+        (x, at_rest): (&[Point<S>], &AtRest<S>),
         loads: &mut [Point<S>],
-    ) {
+    ) -> bool {
         let (layout, pieces) = (step.layout, &self.0[number]);
         let part = &layout.parts[number];
         loads[part.copies.clone()].fill(Point::default());
         let workers = &constants.workers;
+        let inverted = &AtomicBool::new(false);
         let shared = Shared::new(loads);
         let strains = constants.start_strain.each_mut().map(|strains| Shared::new(strains));
         workers.each(pieces.len(), 1, |range| {
             for (law, blocks) in &pieces[range] {
                 let set = &layout.tet_sets[*law];
-                let forces = Forces { x, strains: strains[*law], dt: step.dt, loads: &shared };
+                let at_rest = &at_rest.tets[*law];
+                let (strains, loads, dt) = (strains[*law], &shared, step.dt);
+                let forces = Forces { x, at_rest, strains, dt, loads, inverted };
                 with_tissue!(set, L, VISCOUS => {
                     let pass = OfLaw::<_, L, VISCOUS>::new(&forces);
                     workers.piece(layout, set, blocks.clone(), &pass);
@@ -72,20 +80,23 @@ impl Pieces {
             }
         });
         add_elements(layout, moments, part, x, loads);
+        inverted.load(Relaxed)
     }
 }
 
 struct Forces<'a, S> {
     x: &'a [Point<S>],
+    at_rest: &'a [Eight<S>],
     strains: Shared<'a, [Eight<S>; 6]>,
     dt: f64,
     loads: &'a Shared<'a, Point<S>>,
+    inverted: &'a AtomicBool,
 }
 
 impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Forces<'_, S>, W, VISCOUS> {
     #[inline(always)]
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
-        let Forces { x, strains, dt, loads } = *self.pass;
+        let Forces { x, at_rest, strains, dt, loads, inverted } = *self.pass;
         let shape = tets.shape::<L>();
         let f = deformation_gradient(&tets.corners::<L>(x).x, &shape);
         let tissue = Tissue::new(W::MODEL, &tets.material(), dt);
@@ -100,9 +111,14 @@ impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Forces<'_, S
         } else {
             tissue.respond_by::<W>(&f, None).piola
         };
-        let volume = tets.volume::<L>() * L::from_f64(dt * dt);
-        let forces = internal_forces(&piola, &shape, volume);
+        let squared = L::from_f64(dt * dt);
+        let forces = internal_forces(&piola, &shape, tets.volume::<L>() * squared);
+        if !L::all(L::ZERO.less(f.determinant())) {
+            inverted.store(true, Relaxed);
+        }
+        let stiffness = W::stiffness(&f, tissue.lame_lambda, tissue.lame_mu);
+        let bound = L::load(&at_rest[tets.index], tets.lane) * stiffness * squared;
         // SAFETY: the piece has copies of its own, and one thread does all of it.
-        unsafe { tets.add_in_order(loads, &forces) };
+        unsafe { tets.add_bound_in_order(loads, &forces, bound) };
     }
 }

@@ -16,6 +16,7 @@
 mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod present;
 mod stability;
 pub mod stage;
 
@@ -26,15 +27,16 @@ use crate::scalar::{Real, Vec3};
 use crate::settings::SolverSettings;
 use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
-use crate::solver::plan::{Node, Plan, Repeat, Times};
-use crate::solver::step::data::{Step, StepConstants, StepData, gather};
+use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
+use crate::solver::step::data::{Step, StepConstants, StepData, copies_of};
 use crate::solver::step::predict::{Tethers, load_tethers};
 use crate::solver::step::stage::StepStage;
 use crate::solver::step::strain::measure_strain;
 use crate::solver::step::tethers::bundle;
 use crate::state::State;
 use forces::Pieces;
-pub use stability::{SmallSteps, Stability, small_steps};
+use present::{AtRest, SmallSteps};
+pub use stability::{Stability, small_steps, substeps_for};
 use stage::ExplicitStage;
 
 /// The stages of a step.
@@ -46,7 +48,7 @@ pub fn plan() -> Plan {
             ExplicitStage::Begin.into(),
             Node::Repeat(Repeat {
                 most: Times::SmallSteps,
-                until: None,
+                until: Some(Flag::AllDone),
                 is_watched: true,
                 body: small_step,
             }),
@@ -61,8 +63,11 @@ pub fn plan() -> Plan {
 pub struct Memory<S> {
     pub stability: Stability,
     pieces: Pieces,
+    at_rest: AtRest<S>,
     /// Of each part.
     small_steps: Vec<SmallSteps>,
+    /// What remains of the step, for each part [s].
+    remains: Vec<f64>,
     /// Velocities at the start of the step [m/s].
     start_velocities: Vec<Vec3<S>>,
 }
@@ -73,7 +78,9 @@ impl<S: Real> Memory<S> {
         Self {
             stability: Stability::new(layout, settings),
             pieces: Pieces::new(layout),
+            at_rest: AtRest::new(layout),
             small_steps: vec![SmallSteps::default(); layout.part_count()],
+            remains: vec![0.0; layout.part_count()],
             start_velocities: vec![Vec3::ZERO; layout.vertex_count()],
         }
     }
@@ -84,6 +91,8 @@ impl<S: Real> Memory<S> {
             + size_of_val(&self.small_steps[..])
             + self.stability.bytes()
             + self.pieces.bytes()
+            + self.at_rest.bytes()
+            + size_of_val(&self.remains[..])
     }
 
     /// Carries a stage out.
@@ -105,7 +114,7 @@ impl<S: Real> Memory<S> {
         }
     }
 
-    /// Decides how many small steps each part takes in a step of `dt` [s]; returns the most.
+    /// Decides how many small steps each part takes in a step of `dt` [s] at rest; returns the most that they may become.
     pub fn count_small_steps(
         &mut self,
         layout: &Layout<S>,
@@ -116,12 +125,16 @@ impl<S: Real> Memory<S> {
         let tethers = &mut data.constants.tethers;
         bundle(layout, inputs, tethers);
         let most = small_steps(dt, self.stability.step(layout, tethers))?;
-        for (small, stable) in
-            self.small_steps.iter_mut().zip(self.stability.steps(layout, tethers))
-        {
-            *small = SmallSteps { count: small_steps(dt, stable)?, done: 0 };
+        let stable = self.stability.steps(layout, tethers);
+        for (part, (small, stable)) in self.small_steps.iter_mut().zip(stable).enumerate() {
+            *small = SmallSteps::new(part, small_steps(dt, stable)?, dt);
         }
-        Ok(most)
+        Ok(SmallSteps::most(most))
+    }
+
+    /// Whether the last small step of every part is done.
+    pub fn is_all_done(&self) -> bool {
+        self.small_steps.iter().all(|small| small.left == 0)
     }
 
     /// [`ExplicitStage::Begin`].
@@ -130,45 +143,51 @@ impl<S: Real> Memory<S> {
         data.prepare(step, Tethers::AsForces);
         data.constants.previous.copy_from_slice(&data.points);
         self.start_velocities.copy_from_slice(&data.velocities);
+        // Of the forces only the bounds count: of viscous tissue no strain is known yet.
+        self.load_forces(step, data);
+        let Self { stability, at_rest, small_steps, .. } = self;
+        let StepData { constants, points, velocities, loads } = data;
+        for (part, small) in model.parts.iter().zip(small_steps.iter_mut()) {
+            let stiffest = at_rest.gather(constants, model, part, small.dt, loads);
+            small.begin(stability, stiffest);
+        }
         if model.is_viscous() {
-            let velocities = &data.velocities;
-            for (part, small) in model.parts.iter().zip(&self.small_steps) {
-                let back = S::from_f64(-small.dt(step.dt));
-                data.constants.each_vertex(part, &mut data.points, |v, point| {
-                    point.set_vec3(point.vec3() + velocities[v] * back);
-                });
-            }
-            let constants = &mut data.constants;
-            measure_strain(
-                &constants.workers,
-                model,
-                None,
-                &data.points,
-                &mut constants.start_strain,
-            );
-            data.points.copy_from_slice(&data.constants.previous);
+            retrace(model, constants, points, velocities, small_steps);
+            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
+            measure_strain(workers, model, None, points, strains);
+            points.copy_from_slice(&constants.previous);
+        }
+        let forwards = |number: usize| 0.5 * small_steps[number].dt + small_steps[number].ahead;
+        drift(model, constants, points, velocities, forwards);
+        for pin in &step.inputs.pins {
+            let v = model.numbering.of(pin.vertex);
+            let half = 0.5 * small_steps[model.part_at(v)].dt;
+            lead(points, velocities, &constants.previous, (v, pin.target), half, step.dt);
         }
     }
 
     /// [`ExplicitStage::LoadForces`].
     fn load_forces(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
         let StepData { constants, points, velocities, loads } = data;
-        for (number, small) in self.small_steps.iter().enumerate() {
-            if small.done == small.count {
+        for (number, small_steps) in self.small_steps.iter_mut().enumerate() {
+            let small = *small_steps;
+            if small.left == 0 {
                 continue;
             }
-            let small = Step { dt: small.dt(step.dt), ..*step };
+            let small = Step { dt: small.dt, ..*step };
             let moments = Moments {
                 anchors: step.inputs.anchors_of(&step.layout.rest_anchors),
                 start: Before::Moving(points, velocities),
                 dt: small.dt,
             };
-            self.pieces.load(constants, &small, &moments, number, points, loads);
+            let places = (&points[..], &self.at_rest);
+            small_steps.is_inverted =
+                self.pieces.load(constants, &small, &moments, number, places, loads);
             let squared = S::from_f64(small.dt * small.dt);
             for tether in constants.tethers_of(&step.layout.parts[number]) {
                 let force = tether.force(points[tether.vertex].vec3());
                 let copy = step.layout.copy_offsets[tether.vertex] as usize;
-                loads[copy].add(Point::new(force * squared, S::ZERO));
+                loads[copy].add(Point::new(force * squared, tether.stiffness * squared));
             }
         }
     }
@@ -177,35 +196,95 @@ impl<S: Real> Memory<S> {
     fn advance(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
         let model = step.layout;
         let StepData { constants, points, velocities, loads } = data;
-        let small_steps = &mut self.small_steps;
-        for (part, small) in model.parts.iter().zip(small_steps.iter_mut()) {
-            if small.done == small.count {
+        let Self { stability, at_rest, small_steps, remains, .. } = self;
+        for (number, part) in model.parts.iter().enumerate() {
+            let small = &mut small_steps[number];
+            if small.left == 0 {
                 continue;
             }
-            small.done += 1;
-            let h = small.dt(step.dt);
-            let (small, rate) = (S::from_f64(h), S::from_f64(1.0 / h));
+            let h = small.dt;
+            let largest = at_rest.gather(constants, model, part, h, loads);
+            let now = small.advance(stability, largest);
+            remains[number] = now.remains;
+            let (kick, rate) = (S::from_f64(now.kick), S::from_f64(now.kick / (h * h)));
+            let [back, ahead] = now.ahead;
+            let (back, drift) = (S::from_f64(back), S::from_f64(now.drift + ahead));
+            let stiffest = S::from_f64(now.stiffest);
+            // `f/k` of what is kicked by `f kick/m`, with `k h^2/m` at hand.
+            let relaxes = S::from_f64(h * h / now.kick);
             constants.each_vertex_with(part, points, velocities, |v, point, velocity| {
                 let inverse_mass = constants.inverse_masses[v];
                 if inverse_mass == S::ZERO {
                     return;
                 }
-                let force = gather(model, loads, v).vec3() * rate + constants.external[v] * small;
-                *velocity += force * inverse_mass + step.inputs.gravity * small;
-                point.set_vec3(point.vec3() + *velocity * small);
+                let load = loads[copies_of(model, v).start];
+                let impulse = load.vec3() * rate + constants.external[v] * kick;
+                let change = impulse * inverse_mass + step.inputs.gravity * kick;
+                let place = point.vec3() - *velocity * back;
+                if load.w <= stiffest {
+                    *velocity += change;
+                    point.set_vec3(place + *velocity * drift);
+                } else {
+                    *velocity = Vec3::ZERO;
+                    point.set_vec3(place + change * (relaxes / load.w));
+                }
             });
         }
-        let rate = S::from_f64(1.0 / step.dt);
         for pin in &step.inputs.pins {
             let v = model.numbering.of(pin.vertex);
-            let SmallSteps { count, done } = small_steps[model.part_at(v)];
-            let share = S::from_f64(f64::from(done) / f64::from(count));
-            let start = constants.previous[v].vec3();
-            let moved = start + (pin.target - start) * share;
-            points[v].set_vec3(if done == count { pin.target } else { moved });
-            velocities[v] = (pin.target - start) * rate;
+            let time = step.dt - remains[model.part_at(v)];
+            lead(points, velocities, &constants.previous, (v, pin.target), time, step.dt);
         }
     }
+}
+
+/// Moves every vertex that is not pinned for a time [s], which depends on its part.
+fn drift<S: Real>(
+    layout: &Layout<S>,
+    constants: &StepConstants<S>,
+    points: &mut [Point<S>],
+    velocities: &[Vec3<S>],
+    time: impl Fn(usize) -> f64,
+) {
+    for (number, part) in layout.parts.iter().enumerate() {
+        let time = S::from_f64(time(number));
+        constants.each_vertex(part, points, |v, point| {
+            if constants.inverse_masses[v] != S::ZERO {
+                point.set_vec3(point.vec3() + velocities[v] * time);
+            }
+        });
+    }
+}
+
+/// Moves every vertex, pinned ones too, to where it was in the middle of the small step before.
+fn retrace<S: Real>(
+    layout: &Layout<S>,
+    constants: &StepConstants<S>,
+    points: &mut [Point<S>],
+    velocities: &[Vec3<S>],
+    small_steps: &[SmallSteps],
+) {
+    for (part, small) in layout.parts.iter().zip(small_steps) {
+        let time = S::from_f64(0.5 * small.dt);
+        constants.each_vertex(part, points, |v, point| {
+            point.set_vec3(point.vec3() - velocities[v] * time);
+        });
+    }
+}
+
+/// Leads a pinned vertex to where it is at a time [s] of a step of `dt` [s]: on a straight line.
+fn lead<S: Real>(
+    points: &mut [Point<S>],
+    velocities: &mut [Vec3<S>],
+    previous: &[Point<S>],
+    (v, target): (usize, Vec3<S>),
+    time: f64,
+    dt: f64,
+) {
+    let start = previous[v].vec3();
+    let moved = start + (target - start) * S::from_f64(time / dt);
+    points[v].set_vec3(if time == dt { target } else { moved });
+    velocities[v] = (target - start) * S::from_f64(1.0 / dt);
 }
 
 /// [`ExplicitStage::End`]: `xt = x - dt (v - v_n) + dt^2 (g + M^-1 f_ext)`, tethers

@@ -1,6 +1,6 @@
 // Stages of the explicit method (solver/explicit/mod.rs): two dispatches for a small step h.
 //
-//   v += h (g + M^-1 f),   x += h v
+//   x += h/2 v once,   v += h (g + M^-1 f),   x += h v, in the last one h/2
 //
 // Tethers of a vertex stand in `targets`: w is their stiffness [N/m]. Pinned vertices have their places there. Each connected part
 // takes as many small steps as it needs, and then waits for the others.
@@ -13,7 +13,13 @@ fn part_of_block(block: u32) -> u32 {
     return table[table[BLOCK_PARTS_AT] + block];
 }
 
-// Remembers positions and, in `predicted` until the end of the step, velocities.
+// Where a pinned vertex is after a share of the step.
+fn led(v: u32, share: f32) -> vec3f {
+    let start = previous[v].xyz;
+    return start + (targets[v].xyz - start) * share;
+}
+
+// Remembers positions and, in `predicted` until the end of the step, velocities. Moves to the middle of the first small step.
 @compute @workgroup_size(64)
 fn begin_explicit(
     @builtin(global_invocation_id) id: vec3u,
@@ -28,9 +34,17 @@ fn begin_explicit(
     }
     previous[v] = vec4f(points[v].xyz, previous[v].w);
     predicted[v] = vec4f(velocities[v].xyz, predicted[v].w);
+    let small = small_row(part_with(PART_VERTICES_END, v));
+    if external_forces[v].w == 0.0 {
+        let way = targets[v].xyz - points[v].xyz;
+        points[v] = vec4f(led(v, 0.5 / f32(table[small + SMALL_COUNT])), 0.0);
+        velocities[v] = vec4f(way * frame.inverse_dt, 0.0);
+        return;
+    }
+    points[v] = vec4f(points[v].xyz + velocities[v].xyz * (0.5 * number(small + SMALL_DT)), 0.0);
 }
 
-// Green strain one small step ago, at x - h v.
+// Green strain one small step before the middle of the first, at x_n - h/2 v_n.
 @compute @workgroup_size(64)
 fn begin_strain(
     @builtin(global_invocation_id) id: vec3u,
@@ -49,7 +63,7 @@ fn begin_strain(
     let small_dt = number(small_row(part_of_block(block)) + SMALL_DT);
     var x: array<vec3f, 4>;
     for (var i = 0u; i < 4u; i++) {
-        x[i] = points[vertices[i]].xyz - predicted[vertices[i]].xyz * small_dt;
+        x[i] = previous[vertices[i]].xyz - predicted[vertices[i]].xyz * (0.5 * small_dt);
     }
     store_start_strain(block, lane, green_strain_strain(deformation_gradient(x, shape_of(block, lane))));
 }
@@ -145,13 +159,10 @@ fn advance_explicit(
     }
     let on_vertex = external_forces[v];
     let hold = targets[v];
+    let is_last = control.small_step == count;
     if on_vertex.w == 0.0 {
-        let start = previous[v].xyz;
-        let way = hold.xyz - start;
-        let share = f32(control.small_step) / f32(count);
-        let is_last = control.small_step == count;
-        points[v] = vec4f(select(start + way * share, hold.xyz, is_last), 0.0);
-        velocities[v] = vec4f(way * frame.inverse_dt, 0.0);
+        let share = (f32(control.small_step) + 0.5) / f32(count);
+        points[v] = vec4f(select(led(v, share), hold.xyz, is_last), 0.0);
         return;
     }
     let h = number(small + SMALL_DT);
@@ -160,7 +171,7 @@ fn advance_explicit(
     let impulse = gather(v).xyz * number(small + SMALL_INVERSE_DT) + pull * h;
     let velocity = velocities[v].xyz + (impulse * on_vertex.w + frame.gravity * h);
     velocities[v] = vec4f(velocity, 0.0);
-    points[v] = vec4f(x + velocity * h, 0.0);
+    points[v] = vec4f(x + velocity * select(h, 0.5 * h, is_last), 0.0);
 }
 
 // xt = x - dt (v - v_n) + dt^2 (g + M^-1 f_ext).

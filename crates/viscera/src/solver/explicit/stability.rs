@@ -29,7 +29,8 @@ pub struct Stability {
     /// Of the elements around each vertex, the user's order [N/m].
     stiffness: Vec<f64>,
     parts: Vec<PartStability>,
-    safety: f64,
+    /// The share of the limit that small steps take.
+    pub safety: f64,
 }
 
 /// Of one connected part of the model.
@@ -41,17 +42,11 @@ struct PartStability {
     viscosity: f64,
 }
 
-/// The small steps of a part in one step: as many as it needs, whatever others do.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct SmallSteps {
-    pub count: u32,
-    pub done: u32,
-}
-
-impl SmallSteps {
-    /// [s]; `dt` is the whole step.
-    pub fn dt(self, dt: f64) -> f64 {
-        dt / f64::from(self.count)
+impl PartStability {
+    /// The largest small step [s] with this largest frequency [1/s].
+    fn limit(&self, frequency: f64) -> f64 {
+        let xi = 0.5 * self.viscosity * frequency;
+        (2.0 / frequency) * ((1.0 + xi * xi).sqrt() - xi)
     }
 }
 
@@ -84,9 +79,18 @@ impl Stability {
                 let stiffness = self.stiffness[v] + tether.stiffness.to_f64();
                 frequency = frequency.max((stiffness / layout.masses[v].to_f64()).sqrt());
             }
-            let xi = 0.5 * stability.viscosity * frequency;
-            self.safety * (2.0 / frequency) * ((1.0 + xi * xi).sqrt() - xi)
+            self.safety * stability.limit(frequency)
         })
+    }
+
+    /// The largest small step [s] of a part where its largest frequency is this one [1/s], without margin.
+    pub fn limit(&self, part: usize, frequency: f64) -> f64 {
+        self.parts[part].limit(frequency)
+    }
+
+    /// The largest viscosity [s] in a part.
+    pub fn viscosity(&self, part: usize) -> f64 {
+        self.parts[part].viscosity
     }
 
     /// Bytes of its arrays.
@@ -138,7 +142,7 @@ fn add_stiffness<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
 
 /// The largest eigenvalue of a tetrahedron's stiffness at rest, per volume [Pa/m^2]. Both laws have the
 /// same stiffness at rest: that of linear elasticity.
-fn element_stiffness(shape: &Mat3<f64>, [lambda, mu]: [f64; 2]) -> f64 {
+pub(super) fn element_stiffness(shape: &Mat3<f64>, [lambda, mu]: [f64; 2]) -> f64 {
     let g = shape_gradients(shape);
     // Any displacement but a rigid one will do; swelling and shear together meet every eigenvector.
     let mut u = [g[1] + g[2] * 0.3, g[2] - g[0] * 0.2, g[3] + g[0] * 0.7, g[1] * -0.4 + g[0]];
@@ -158,6 +162,18 @@ fn element_stiffness(shape: &Mat3<f64>, [lambda, mu]: [f64; 2]) -> f64 {
     }
     value
 }
+
+/// Substeps of a frame [s] in which every substep has some [`FEWEST`] small steps, of `stable` [s] at most: what moves or
+/// loads the body is followed as often as costs next to nothing.
+pub fn substeps_for(stable: f64, frame: f64) -> u32 {
+    (frame / stable / FEWEST).clamp(1.0, MOST_SUBSTEPS) as u32
+}
+
+/// A substep costs one pass besides those of its small steps.
+const FEWEST: f64 = 16.0;
+
+/// As many as settings ask for that leave substeps to the explicit method on a device.
+const MOST_SUBSTEPS: f64 = 10.0;
 
 /// How many small steps, of `stable` [s] at most, make a step of `dt` [s].
 pub fn small_steps(dt: f64, stable: f64) -> Result<u32, StepError> {

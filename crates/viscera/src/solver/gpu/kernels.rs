@@ -118,8 +118,9 @@ kernels! {
     REPAIR_MULTIPLIERS = HistoryTets "repair_multipliers" 64
         [Tets StartStrain Unknowns Control Table];
     REPAIR_ELEMENTS = HistoryElements "repair_elements" 64 [Unknowns Control VertexData Table];
-    BEGIN_EXPLICIT = Explicit "begin_explicit" 64 [Points Velocities Previous Predicted Control];
-    BEGIN_STRAIN = Explicit "begin_strain" 64 [Tets Points Predicted StartStrain Table];
+    BEGIN_EXPLICIT = Explicit "begin_explicit" 64
+        [Points Velocities Previous Predicted ExternalForces Targets Control Table];
+    BEGIN_STRAIN = Explicit "begin_strain" 64 [Tets Previous Predicted StartStrain Table];
     LOAD_FORCES = Explicit "load_forces" 64
         [Tets CornerIndices Points Loads StartStrain Control VertexData Table];
     ADVANCE_EXPLICIT = Explicit "advance_explicit" 64
