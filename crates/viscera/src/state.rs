@@ -17,12 +17,13 @@ pub struct State<S> {
     pub multipliers: Vec<S>,
     /// The step [s] to which the multipliers belong: they are forces times its square.
     pub multiplier_dt: f64,
-    /// What the quasi-Newton method has learned; empty for others.
+    /// What the quasi-Newton and the explicit method have learned; empty for others.
     pub learned: Learned<S>,
 }
 
-/// What the quasi-Newton method keeps from step to step: pairs of a step and the change of the gradient along it, which
-/// tell the curvature. Vertices are in the solver's numbering.
+/// What methods keep from step to step. The quasi-Newton method: pairs of a step and the change of the gradient along it,
+/// which tell the curvature. The explicit method: how much energy has gone that comes back. Vertices are in the solver's
+/// numbering.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Learned<S> {
     /// Steps [m] and changes of the gradient [N s^2] in turn, each of all vertices.
@@ -44,6 +45,8 @@ pub struct LearnedPart {
     pub dt: f64,
     /// Whether no trial of the last solve was rejected.
     pub calm: bool,
+    /// Energy [J] that explicit steps have lost for a while: it swings about its mean.
+    pub owed: f64,
 }
 
 impl<S: Real> Learned<S> {

@@ -40,6 +40,9 @@ const ACCURACIES: [Accuracy; 3] = [Accuracy::Draft, Accuracy::Standard, Accuracy
 
 /// What is foretold may be so many times the truth, and never less than it, in all scenes but so many.
 const LARGEST_RATIO: f64 = 4.0;
+
+/// Of errors as small as this it is enough to know that they are: half a millimetre of a way of 12 cm.
+const UNSEEN: f64 = 4e-3;
 const EXCEPTIONS: usize = 1;
 
 /// What is chosen may cost so many times what the cheapest method does that is as accurate as asked.
@@ -225,13 +228,16 @@ fn run(context: &mut Context) -> Result<()> {
         let of = |is: &dyn Fn(&Told) -> bool| {
             answers.iter().filter(|all| is(&all[index].chosen)).count()
         };
-        let honest =
-            of(&|told| told.found <= told.foretold && told.foretold <= LARGEST_RATIO * told.found);
+        let honest = of(&|told| {
+            let most = (LARGEST_RATIO * told.found).max(UNSEEN);
+            told.found <= told.foretold && told.foretold <= most
+        });
         let kept = of(&|told| told.found <= accuracy.share());
         let (count, name) = (answers.len(), accuracy.to_string());
         context.verdict(
             format!(
-                "{name}: scenes whose error is foretold, at most {LARGEST_RATIO} times too large"
+                "{name}: scenes whose error is foretold, at most {LARGEST_RATIO} times too large or {}",
+                percent(UNSEEN)
             ),
             format!(">= {}", count - EXCEPTIONS),
             honest.to_string(),
@@ -260,8 +266,8 @@ fn run(context: &mut Context) -> Result<()> {
 /// What the choice costs, beside the other method.
 fn costs(context: &mut Context, cases: &[Tissue], answers: &[Vec<Answer>]) {
     context.document.paragraph(
-        "What a frame costs, counted in passes that add up the forces of all tetrahedra once: small steps, and one more \
-         in each substep; a pass of the quasi-Newton method, which does more, counts as so many of them as it takes as \
+        "What a frame costs, counted in passes that add up the forces of all tetrahedra once: small steps, and in each \
+         substep as much as 2.6 of them; a pass of the quasi-Newton method, which does more, counts as so many of them as it takes as \
          long. *Over the cheapest*: of the two methods, those whose error found is at most what is asked.",
     );
     let mut head = vec!["tissue".to_owned()];

@@ -182,16 +182,17 @@ settings_table! {
         /// Where tissue comes to rest does not depend on it.
         accuracy: Accuracy = (Accuracy::Standard), Accuracies;
         /// The share of the largest stable step of the body at rest that "explicit" takes. On the CPU smaller ones are taken
-        /// by themselves where tissue stiffens under strong deformation; on a device lower this where a run diverges.
-        explicit_safety: f64 = 0.5, number(at_least(1e-3).up_to(1.0));
+        /// by themselves where tissue stiffens under strong deformation; a device, which keeps to it, takes half of the
+        /// stable step at most: lower this where a run diverges there.
+        explicit_safety: f64 = 0.8, number(at_least(1e-3).up_to(1.0));
         /// Substeps per frame: "auto" for what suits the method, 10 for "xpbd", for "explicit" one for
-        /// every 16 small steps and 10 at most, for "quasi_newton" as many as `accuracy` and the slowest oscillation of what the scene's fixings hold ask for, with "standard" from
+        /// every 32 small steps and 10 at most, for "quasi_newton" as many as `accuracy` and the slowest oscillation of what the scene's fixings hold ask for, with "standard" from
         /// 1 to 10. More lose less motion to numerical damping and follow it more closely; the cost grows alike. With `rebase`
         /// and `keep_multipliers` the shape at rest does not depend on them; plain XPBD needs about 50 for
         /// an error near 1 %.
         substeps: Count = (Count::Auto), SUBSTEPS;
         /// Sweeps per substep: "auto" for what suits the method, 2 for "xpbd". Of "quasi_newton" passes for each of
-        /// its two solves per substep, "auto" by Poisson's ratio: 8 up to 0.41, 10 up to 0.46, above it 16, and up to twice
+        /// its two solves per substep, "auto" by Poisson's ratio: 8 up to 0.38, 10 up to 0.46, above it 20, and up to twice
         /// as many where less error is asked for than with "standard".
         /// More solve a substep better.
         /// Without `rebase` they approach an answer that depends on the path, so more are not always closer
@@ -200,7 +201,7 @@ settings_table! {
         /// How "quasi_newton" integrates over time: "sdirk2" follows the motion to the second order of the step,
         /// "implicit_euler" damps it. Both come to the same rest.
         integrator: Integrator = (Integrator::Sdirk2), one_of::<Integrator>();
-        /// How many past steps "quasi_newton" learns the curvature from; 0 chooses by Poisson's ratio: 3 up to 0.41,
+        /// How many past steps "quasi_newton" learns the curvature from; 0 chooses by Poisson's ratio: 3 up to 0.38,
         /// above it 10.
         history: u32 = 0, whole(0, MOST_HISTORY as u32);
         /// Colours of the constraint graph: "unlimited" for Gauss-Seidel, 1 for Jacobi, a few

@@ -8,10 +8,14 @@ use crate::scene::Scene;
 use crate::settings::{Integrator, Method, SolverSettings};
 use crate::solver::{Inputs, Solver, choose, expected_motion_error};
 
-/// Cost of a pass of the quasi-Newton method over that of a small explicit step: 23 over 9.6 ns per tetrahedron, measured with
-/// 1,000 to 100,000 of them by `viscera bench` (AVX2, one thread). Too large, and explicit steps are taken where they cost
-/// more; too small, and the quasi-Newton method is.
-const PASS_OVER_SMALL_STEP: f64 = 2.4;
+/// Cost of a pass of the quasi-Newton method over that of a small explicit step: 23 over 10.8 ns per tetrahedron, measured
+/// with 1,000 to 100,000 of them by `viscera bench` (AVX2, one thread). Too large, and explicit steps are taken where they
+/// cost more; too small, and the quasi-Newton method is.
+const PASS_OVER_SMALL_STEP: f64 = 2.1;
+
+/// Small steps that an explicit step costs besides: it finds the stiffness of the shape at its beginning, and energies there
+/// and at its end.
+const BESIDE_SMALL_STEPS: f64 = 2.6;
 
 /// Passes that a step of the quasi-Newton method costs besides those of its solves.
 const BESIDES: f64 = 3.0;
@@ -89,7 +93,7 @@ fn choose_by_cost<S: Real>(
     let substeps = quasi_newton.substeps_for(period, frame);
     let of_large = cost(&large, model, frame, substeps, f64::INFINITY);
     let error = explicit_error(period, explicit.stable_step());
-    let is_explicit = of_explicit < of_large && error <= asked.accuracy.share();
+    let is_explicit = of_explicit < of_large && error <= asked.accuracy.share().max(EXPLICIT_LEAST);
     let settings = if is_explicit { explicit.settings().clone() } else { large };
     Chosen { settings, period: Some(period) }
 }
@@ -111,8 +115,7 @@ pub fn cost<S: Real>(
 ) -> f64 {
     let substeps = f64::from(substeps);
     let of_substep = match settings.method {
-        // One more finds the stiffness of the shape at its beginning.
-        Method::Explicit => (frame / substeps / stable_step).ceil() + 1.0,
+        Method::Explicit => (frame / substeps / stable_step).ceil() + BESIDE_SMALL_STEPS,
         Method::Auto | Method::QuasiNewton => {
             let solves = if settings.integrator == Integrator::Sdirk2 { 2.0 } else { 1.0 };
             let passes = f64::from(choose(settings, &model.materials).passes);
@@ -124,27 +127,20 @@ pub fn cost<S: Real>(
 }
 
 /// The error of motion over half a second of small explicit steps [s], where the slowest oscillation has the period [s]: of
-/// its phase, of large motion where that is slow, or of rounding in single precision, whichever is largest.
+/// its phase, unless that is less than what is told of any.
 fn explicit_error(period: f64, small_step: f64) -> f64 {
     let steps_per_period = period / small_step;
     let phase = EXPLICIT_PHASE * (0.5 / period) / (steps_per_period * steps_per_period);
-    let large = if period > SOFT { EXPLICIT_LARGE } else { 0.0 };
-    let rounding = EXPLICIT_ROUNDING / (period * period * small_step.sqrt());
-    phase.max(large).max(rounding).min(1.0)
+    phase.clamp(EXPLICIT_LEAST, 1.0)
 }
 
 /// Error of a path after one period, times the square of the number of small steps in it: 42 to 66 on bars, 100 on a liver,
 /// a tenth of that on a bowel, which hangs from more than one side.
 const EXPLICIT_PHASE: f64 = 110.0;
 
-/// The period [s] of what falls far, and the error of its path: tissue that turns inside out at the wall is damped until it
-/// has turned back. On bars of 1 and 5 kPa up to 0.28 %, of others less.
-const SOFT: f64 = 0.6;
-const EXPLICIT_LARGE: f64 = 3e-3;
-
-/// Rounding of places, `sqrt(n)` of it after `n` small steps, over what moves under its own weight, which goes with the squared
-/// period [s^2.5].
-const EXPLICIT_ROUNDING: f64 = 5e-9;
+/// As little error as is told. Tissue that falls far and turns inside out at the wall is damped until it has turned back: on
+/// bars of 1 and 5 kPa that makes up to 0.31 %. Of others rounding makes a thousandth of that.
+const EXPLICIT_LEAST: f64 = 4e-3;
 
 /// What a run with `substeps` per frame may be expected to be off by, where its slowest oscillation has the period [s]; the
 /// explicit method's steps at rest are as long as is stable, `stable_step` [s].

@@ -44,7 +44,7 @@ fn run<S: Real>(scene: &Scene, seconds: f64) -> (Simulation<S>, Vec<FrameReport>
 /// Once it stands, all strain is what rounding makes of places half a metre away; work of rounding through half a
 /// metre is a thousand times the energy of it.
 fn is_quiet_when_led_away<S: Real>(precision: &str) {
-    let scene = scene(LED, &[("solver.precision", precision)]);
+    let scene = scene(LED, &[("solver.precision", precision), ("solver.method", "quasi_newton")]);
     let (simulation, reports) = run::<S>(&scene, 3.0);
     if let Some(report) = reports.last() {
         assert_eq!(report.stiffness_error, 0.0, "{precision}: {report:?}");
@@ -95,7 +95,7 @@ fn advice_can_be_followed() {
     assert!(!advice::inverted(&with(&[])).contains("stable_neo_hookean"));
 
     let diverged = advice::diverged(&with(&[explicit]));
-    assert!(diverged.contains("solver.explicit_safety below 0.5"), "{diverged}");
+    assert!(diverged.contains("solver.explicit_safety below 0.8"), "{diverged}");
     assert!(!diverged.contains("relaxation") && !diverged.contains("acceleration"), "{diverged}");
     let diverged = advice::diverged(&with(&[]));
     assert_eq!(diverged, "raise solver.substeps");

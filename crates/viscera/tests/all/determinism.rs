@@ -238,9 +238,9 @@ fn shipped_scenes_have_the_same_bits_on_every_machine() {
         (
             "cantilever.toml",
             include_str!("../../../../scenes/cantilever.toml"),
-            0xb331_5b62_40db_2ca3,
+            0x2b08_a00a_66c3_4d06,
         ),
-        ("grab.toml", include_str!("../../../../scenes/grab.toml"), 0xc614_e263_05e3_e393),
+        ("grab.toml", include_str!("../../../../scenes/grab.toml"), 0xea3c_3259_b956_5002),
         (
             "liver_retraction.toml",
             include_str!("../../../../scenes/liver_retraction.toml"),

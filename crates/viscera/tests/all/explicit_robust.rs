@@ -122,9 +122,8 @@ fn handled<S: Real>(seeds: std::ops::Range<u64>, scrambles: bool) {
         }
     }
     println!("gained {gained}, inverted {inverted} of {bodies} bodies");
-    // Of the oscillation of energy within a small step, as wide as the squared share of the stable step that is taken, the
-    // slow part counts little.
-    assert!(gained < 1.05, "{gained}");
+    // No step ends with more than it began with, but for rounding of sums.
+    assert!(gained < 1.0 + 8.0 * S::EPSILON.max(1e-12), "{gained}");
     // Of all bodies together: the law has minima with a tetrahedron inside out, where a body may stay.
     assert!(inverted * 100 <= bodies * mesh.tets().len(), "{inverted} of {bodies} bodies");
 }

@@ -12,6 +12,7 @@ fn bar(patches: &str) -> Simulation<f64> {
 [time]
 velocity_factor = 0.7
 [solver]
+method = "quasi_newton"
 precision = "f64"
 substeps = 2
 iterations = 8

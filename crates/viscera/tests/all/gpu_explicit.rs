@@ -7,8 +7,8 @@ use viscera::model::Model;
 use viscera::scalar::{Real, vec3};
 use viscera::settings::{Acceleration, Colors, Method, Precision, SolverSettings};
 use viscera::solver::gpu::{Device, GpuSolver};
-use viscera::solver::{Inputs, Pin, Solver, StepError};
-use viscera::state::State;
+use viscera::solver::{Inputs, Pin, Solver, StepError, Tether};
+use viscera::state::{Learned, State};
 
 /// Some 400 small steps of `everything`: more than one submission.
 const DT: f64 = 1.0 / 100.0;
@@ -18,11 +18,18 @@ const STEPS: u32 = 6;
 fn explicit(colors: Colors) -> SolverSettings {
     // Accelerations are for sweeps: the explicit method leaves them alone.
     let acceleration = Acceleration::Anderson;
-    SolverSettings { method: Method::Explicit, acceleration, colors, ..SolverSettings::xpbd() }
+    // Small steps of the same length on both.
+    SolverSettings {
+        method: Method::Explicit,
+        explicit_safety: 0.5,
+        acceleration,
+        colors,
+        ..SolverSettings::xpbd()
+    }
 }
 
-/// A wall that moves and is let go, one attached vertex held for a while, a force, anchors that drift and
-/// come back.
+/// A wall that moves and is let go, one attached vertex held for a while, another led by a spring, a force, anchors that drift
+/// and come back.
 fn inputs_at<S: Real>(model: &Model<f64>, step: u32) -> Inputs<S> {
     // So little that the small steps are those of the shape at rest, which is all that a device knows.
     let away = vec3(0.0, 2e-5 * f64::from(step), 3e-5 * f64::from(step));
@@ -36,6 +43,11 @@ fn inputs_at<S: Real>(model: &Model<f64>, step: u32) -> Inputs<S> {
         let target = (model.rest_positions[half as usize] + away).cast();
         inputs.pins.push(Pin { vertex: half, target });
         inputs.forces.extend([(7, vec3(0.01, 0.02, 0.0).cast()), (7, vec3(0.0, 0.01, 0.0).cast())]);
+    }
+    if (1..4).contains(&step) {
+        let vertex = model.vertex_count() as u32 - 1;
+        let target = (model.rest_positions[vertex as usize] + away).cast();
+        inputs.tethers.push(Tether { vertex, target, stiffness: S::from_f64(30.0) });
     }
     if step < 4 {
         inputs.anchors = model.rest_anchors.iter().map(|a| (*a + away).cast()).collect();
@@ -102,7 +114,7 @@ fn two_runs_have_the_same_bits() {
 
 #[test]
 fn a_small_step_is_two_dispatches() {
-    let settings = explicit(Colors::Unlimited);
+    let settings = SolverSettings { explicit_safety: 0.25, ..explicit(Colors::Unlimited) };
     let model = everything();
     let gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");
     assert_eq!(gpu.dispatches()[1], 2);
@@ -120,6 +132,7 @@ fn too_many_small_steps_are_refused() {
     let model = single_body::<f32>(&mesh, &material(SNH, 1e9, 0.4));
     let mut gpu = GpuSolver::new(device::device(), &model, &settings).expect("a model that fits");
     let mut before = Solver::new(&model, &settings).state_at_rest();
+    before.learned = Learned::default();
     before.velocities.fill(vec3(1.0, 2.0, 3.0));
     gpu.write(&model, &before).expect("a state of this model");
     let error = gpu.step(&model, &Inputs::default(), 1.0 / 60.0);

@@ -198,14 +198,13 @@ fn a_tether_that_cannot_be_is_refused_and_nothing_moves() {
 fn portable_tethers_on_the_device_agree_with_the_cpu() {
     let device = device();
     let few = SolverSettings { iterations: Count::Of(4), ..SolverSettings::xpbd() };
-    let explicit = SolverSettings { method: Method::Explicit, ..SolverSettings::xpbd() };
     let published = SolverSettings {
         rebase: false,
         keep_multipliers: false,
         colors: Colors::Limited(2),
         ..few.clone()
     };
-    for settings in [&few, &explicit, &published] {
+    for settings in [&few, &published] {
         let double: Model<f64> = model(SNH, false);
         let single: Model<f32> = model(SNH, false);
         let mut oracle = Solver::new(&double, settings);

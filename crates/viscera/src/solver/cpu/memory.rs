@@ -24,8 +24,8 @@ pub struct Memory<S> {
 /// The method's own memory.
 #[derive(Clone, Debug)]
 pub enum MethodMemory<S> {
-    Xpbd(xpbd::Memory<S>),
-    Explicit(explicit::Memory<S>),
+    Xpbd(Box<xpbd::Memory<S>>),
+    Explicit(Box<explicit::Memory<S>>),
     QuasiNewton(Box<quasi_newton::Memory<S>>),
 }
 
@@ -35,10 +35,10 @@ impl<S: Real> Memory<S> {
         let (method, needs_loads) = match settings.method {
             Method::Xpbd => {
                 let memory = xpbd::Memory::new(layout, settings);
-                (MethodMemory::Xpbd(memory), xpbd::needs_loads(settings))
+                (MethodMemory::Xpbd(Box::new(memory)), xpbd::needs_loads(settings))
             }
             Method::Explicit => {
-                (MethodMemory::Explicit(explicit::Memory::new(layout, settings)), true)
+                (MethodMemory::Explicit(Box::new(explicit::Memory::new(layout, settings))), true)
             }
             Method::Auto | Method::QuasiNewton => {
                 let memory = quasi_newton::Memory::new(layout, settings);
@@ -118,9 +118,12 @@ impl<S: Real> Memory<S> {
     /// Room for what the method learns.
     pub fn nothing_learned(&self, layout: &Layout<S>) -> Learned<S> {
         let mut learned = Learned::default();
-        if let MethodMemory::QuasiNewton(memory) = &self.method {
-            learned.clear(memory.history(), layout.vertex_count(), layout.part_count());
-        }
+        let history = match &self.method {
+            MethodMemory::Xpbd(_) => return learned,
+            MethodMemory::Explicit(_) => 0,
+            MethodMemory::QuasiNewton(memory) => memory.history(),
+        };
+        learned.clear(history, layout.vertex_count(), layout.part_count());
         learned
     }
 

@@ -3,7 +3,7 @@
 //! ```text
 //! v_(k+1/2) = v_(k-1/2) + h M^-1 (f_ext + f(x_k)),   x_(k+1) = x_k + h v_(k+1/2)      symplectic Euler
 //! h <= (2/omega) (sqrt(1 + xi^2) - xi),   xi = eta omega/2       with viscosity eta
-//! omega^2 <= max_i sum_(e at i) rho(K_e)/m_i
+//! omega^2 <= max_i sum_(e at i) c rho(K_e)/m_i        with c from the largest frequency at rest, see `spectrum`
 //! ```
 //!
 //! Energy stays within a band that narrows with `h`, for any number of steps, because the method is
@@ -17,6 +17,7 @@ mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod present;
+mod spectrum;
 mod stability;
 pub mod stage;
 
@@ -29,15 +30,22 @@ use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
 use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
 use crate::solver::step::data::{Step, StepConstants, StepData, copies_of};
+use crate::solver::step::energy::Energies;
+use crate::solver::step::potential::Evaluator;
 use crate::solver::step::predict::{Tethers, load_tethers};
 use crate::solver::step::stage::StepStage;
-use crate::solver::step::strain::measure_strain;
+use crate::solver::step::strain::{keep_share, measure_strain};
 use crate::solver::step::tethers::bundle;
-use crate::state::State;
+use crate::state::{Learned, State};
 use forces::Pieces;
+#[cfg(feature = "gpu")]
+pub use present::calm_ahead;
 use present::{AtRest, SmallSteps};
 pub use stability::{Stability, small_steps, substeps_for};
 use stage::ExplicitStage;
+
+/// The share of all energy that may come back after it has gone.
+const SWING: f64 = 0.1;
 
 /// The stages of a step.
 pub fn plan() -> Plan {
@@ -68,20 +76,28 @@ pub struct Memory<S> {
     small_steps: Vec<SmallSteps>,
     /// What remains of the step, for each part [s].
     remains: Vec<f64>,
+    /// The small step that the loads of each part are for [s].
+    of_loads: Vec<f64>,
     /// Velocities at the start of the step [m/s].
     start_velocities: Vec<Vec3<S>>,
+    evaluator: Evaluator,
+    energies: Energies,
 }
 
 impl<S: Real> Memory<S> {
     /// Memory for the steps of a model.
     pub fn new(layout: &Layout<S>, settings: &SolverSettings) -> Self {
+        let stability = Stability::new(layout, settings);
         Self {
-            stability: Stability::new(layout, settings),
             pieces: Pieces::new(layout),
-            at_rest: AtRest::new(layout),
+            at_rest: AtRest::new(layout, &stability),
+            stability,
             small_steps: vec![SmallSteps::default(); layout.part_count()],
             remains: vec![0.0; layout.part_count()],
+            of_loads: vec![0.0; layout.part_count()],
             start_velocities: vec![Vec3::ZERO; layout.vertex_count()],
+            evaluator: Evaluator::new(layout),
+            energies: Energies::new(layout.part_count()),
         }
     }
 
@@ -93,6 +109,9 @@ impl<S: Real> Memory<S> {
             + self.pieces.bytes()
             + self.at_rest.bytes()
             + size_of_val(&self.remains[..])
+            + size_of_val(&self.of_loads[..])
+            + self.evaluator.bytes()
+            + self.energies.bytes()
     }
 
     /// Carries a stage out.
@@ -106,11 +125,14 @@ impl<S: Real> Memory<S> {
         match stage {
             ExplicitStage::Begin => {
                 state.multiplier_dt = step.dt;
-                self.begin(step, data);
+                self.begin(step, data, state);
             }
             ExplicitStage::LoadForces => self.load_forces(step, data),
             ExplicitStage::Advance => self.advance(step, data),
-            ExplicitStage::End => end(step, data, &self.start_velocities),
+            ExplicitStage::End => {
+                self.limit_energy(step, data, state);
+                self.end(step, data);
+            }
         }
     }
 
@@ -138,18 +160,22 @@ impl<S: Real> Memory<S> {
     }
 
     /// [`ExplicitStage::Begin`].
-    fn begin(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
+    fn begin(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, state: &mut State<S>) {
         let model = step.layout;
         data.prepare(step, Tethers::AsForces);
         data.constants.previous.copy_from_slice(&data.points);
         self.start_velocities.copy_from_slice(&data.velocities);
+        if state.learned.parts.len() != model.part_count() {
+            state.learned.clear(0, model.vertex_count(), model.part_count());
+        }
+        self.begin_energy(step, data, &state.learned);
         // Of the forces only the bounds count: of viscous tissue no strain is known yet.
         self.load_forces(step, data);
         let Self { stability, at_rest, small_steps, .. } = self;
         let StepData { constants, points, velocities, loads } = data;
         for (part, small) in model.parts.iter().zip(small_steps.iter_mut()) {
             let stiffest = at_rest.gather(constants, model, part, small.dt, loads);
-            small.begin(stability, stiffest);
+            small.begin(stability, stiffest, constants.holds(part));
         }
         if model.is_viscous() {
             retrace(model, constants, points, velocities, small_steps);
@@ -163,6 +189,101 @@ impl<S: Real> Memory<S> {
             let v = model.numbering.of(pin.vertex);
             let half = 0.5 * small_steps[model.part_at(v)].dt;
             lead(points, velocities, &constants.previous, (v, pin.target), half, step.dt);
+        }
+    }
+
+    /// Energies before the step, pins moved.
+    fn begin_energy(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, learned: &Learned<S>) {
+        let model = step.layout;
+        let StepData { constants, points, .. } = data;
+        if model.is_viscous() {
+            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
+            measure_strain(workers, model, None, points, strains);
+        }
+        for pin in &step.inputs.pins {
+            points[model.numbering.of(pin.vertex)].set_vec3(pin.target);
+        }
+        self.evaluate(step, data);
+        self.energies.begin(step, data, &self.evaluator.stored);
+        for (number, part) in learned.parts.iter().enumerate() {
+            self.energies.give(number, part.owed);
+        }
+        let StepData { constants, points, .. } = data;
+        for pin in &step.inputs.pins {
+            let v = model.numbering.of(pin.vertex);
+            points[v] = constants.previous[v];
+        }
+    }
+
+    /// No part ends a step with more energy than it had and was given. The energy of symplectic steps swings about its mean
+    /// by a share of that of fast oscillations: what has gone may come back, or every swing would brake the body, until a
+    /// hand moves it. A part that nothing holds is left alone until its motion is violent: the limit would brake its spin.
+    fn limit_energy(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, state: &mut State<S>) {
+        self.evaluate(step, data);
+        self.energies.end(step, data, &self.evaluator.stored);
+        let (model, small_steps) = (step.layout, &self.small_steps);
+        let limits = |number: usize, constants: &StepConstants<S>| {
+            small_steps[number].was_violent || constants.holds(&model.parts[number])
+        };
+        self.energies.limit(step, data, limits, |_, _| {});
+        for (number, part) in state.learned.parts.iter_mut().enumerate() {
+            part.owed = self.energies.left(number, SWING);
+        }
+        for pin in &step.inputs.pins {
+            let v = model.numbering.of(pin.vertex);
+            if data.constants.previous[v].vec3() != pin.target {
+                state.learned.parts[model.part_at(v)].owed = 0.0;
+            }
+        }
+    }
+
+    /// [`ExplicitStage::End`]: `xt = x - dt^2 a + dt^2 (g + M^-1 f_ext)`, tethers among the loads, so that `M (x - xt)/dt^2`
+    /// is mass times acceleration, that in the middle of the last small step, less the loads. Of a pinned vertex it is the
+    /// mean of the step. Viscous strain goes on for all of the step as it does at its end.
+    fn end(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
+        let (model, dt) = (step.layout, S::from_f64(step.dt));
+        let StepData { constants, points, velocities, loads, .. } = data;
+        for (part, h) in model.parts.iter().zip(&self.of_loads) {
+            let times = S::from_f64((step.dt / h) * (step.dt / h));
+            for v in part.vertices.clone() {
+                let inverse_mass = constants.inverse_masses[v];
+                let back = if inverse_mass == S::ZERO {
+                    let change: Vec3<S> = velocities[v] - self.start_velocities[v];
+                    let load = constants.external[v] * (S::ONE / constants.masses[v]);
+                    change * dt - (step.inputs.gravity + load) * (dt * dt)
+                } else {
+                    loads[copies_of(model, v).start].vec3() * (inverse_mass * times)
+                };
+                constants.predicted[v].set_vec3(points[v].vec3() - back);
+            }
+        }
+        let StepConstants { tethers, predicted, masses, .. } = constants;
+        load_tethers(tethers, predicted, step.dt, |v| masses[v], |v| points[v].vec3());
+        if model.is_viscous() {
+            self.strain_at_the_end(step, data);
+        }
+    }
+
+    /// The strain at the start of a step in which it changes all the time as it does at its end.
+    fn strain_at_the_end(&self, step: &Step<'_, S>, data: &mut StepData<S>) {
+        let model = step.layout;
+        let StepData { constants, points, velocities, .. } = data;
+        constants.previous.copy_from_slice(points);
+        retrace(model, constants, points, velocities, &self.small_steps);
+        let (workers, strains) = (&constants.workers, &mut constants.start_strain);
+        measure_strain(workers, model, None, points, strains);
+        points.copy_from_slice(&constants.previous);
+        for (part, small) in model.parts.iter().zip(&self.small_steps) {
+            let share = S::from_f64(2.0 * step.dt / small.dt);
+            keep_share(workers, model, part, points, share, strains);
+        }
+    }
+
+    /// What every part stores where it is [J].
+    fn evaluate(&mut self, step: &Step<'_, S>, data: &StepData<S>) {
+        for (number, small) in self.small_steps.iter().enumerate() {
+            let step = Step { dt: small.dt, ..*step };
+            self.evaluator.evaluate(&data.constants, &step, &data.points, number);
         }
     }
 
@@ -196,13 +317,14 @@ impl<S: Real> Memory<S> {
     fn advance(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
         let model = step.layout;
         let StepData { constants, points, velocities, loads } = data;
-        let Self { stability, at_rest, small_steps, remains, .. } = self;
+        let Self { stability, at_rest, small_steps, remains, of_loads, .. } = self;
         for (number, part) in model.parts.iter().enumerate() {
             let small = &mut small_steps[number];
             if small.left == 0 {
                 continue;
             }
             let h = small.dt;
+            of_loads[number] = h;
             let largest = at_rest.gather(constants, model, part, h, loads);
             let now = small.advance(stability, largest);
             remains[number] = now.remains;
@@ -210,8 +332,9 @@ impl<S: Real> Memory<S> {
             let [back, ahead] = now.ahead;
             let (back, drift) = (S::from_f64(back), S::from_f64(now.drift + ahead));
             let stiffest = S::from_f64(now.stiffest);
-            // `f/k` of what is kicked by `f kick/m`, with `k h^2/m` at hand.
-            let relaxes = S::from_f64(h * h / now.kick);
+            // `f/k` of what is kicked by `f kick/m`, with `k h^2/m` at hand; viscosity makes `k` stiffer.
+            let viscous = 1.0 + 2.0 * stability.viscosity(number) / h;
+            let relaxes = S::from_f64(h * h / (now.kick * viscous));
             constants.each_vertex_with(part, points, velocities, |v, point, velocity| {
                 let inverse_mass = constants.inverse_masses[v];
                 if inverse_mass == S::ZERO {
@@ -285,20 +408,4 @@ fn lead<S: Real>(
     let moved = start + (target - start) * S::from_f64(time / dt);
     points[v].set_vec3(if time == dt { target } else { moved });
     velocities[v] = (target - start) * S::from_f64(1.0 / dt);
-}
-
-/// [`ExplicitStage::End`]: `xt = x - dt (v - v_n) + dt^2 (g + M^-1 f_ext)`, tethers
-/// among the loads, so that `M (x - xt)/dt^2` is mass times mean acceleration, less the loads.
-fn end<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>, start_velocities: &[Vec3<S>]) {
-    let dt = S::from_f64(step.dt);
-    for v in 0..data.points.len() {
-        let constants = &mut data.constants;
-        let load = step.inputs.gravity + constants.external[v] * (S::ONE / constants.masses[v]);
-        let change: Vec3<S> = data.velocities[v] - start_velocities[v];
-        let x = data.points[v].vec3();
-        constants.predicted[v].set_vec3(x - change * dt + load * (dt * dt));
-    }
-    let StepData { constants, points, .. } = data;
-    let StepConstants { tethers, predicted, masses, .. } = constants;
-    load_tethers(tethers, predicted, step.dt, |v| masses[v], |v| points[v].vec3());
 }

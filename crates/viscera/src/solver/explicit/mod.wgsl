@@ -1,6 +1,6 @@
 // Stages of the explicit method (solver/explicit/mod.rs): two dispatches for a small step h.
 //
-//   x += h/2 v once,   v += h (g + M^-1 f),   x += h v, in the last one h/2
+//   x += h/2 v once,   v += h (g + M^-1 f(x + tau v)),   x += h v, in the last one h/2
 //
 // Tethers of a vertex stand in `targets`: w is their stiffness [N/m]. Pinned vertices have their places there. Each connected part
 // takes as many small steps as it needs, and then waits for the others.
@@ -41,7 +41,8 @@ fn begin_explicit(
         velocities[v] = vec4f(way * frame.inverse_dt, 0.0);
         return;
     }
-    points[v] = vec4f(points[v].xyz + velocities[v].xyz * (0.5 * number(small + SMALL_DT)), 0.0);
+    let time = 0.5 * number(small + SMALL_DT) + number(small + SMALL_AHEAD);
+    points[v] = vec4f(points[v].xyz + velocities[v].xyz * time, 0.0);
 }
 
 // Green strain one small step before the middle of the first, at x_n - h/2 v_n.
@@ -170,10 +171,13 @@ fn advance_explicit(
     let pull = on_vertex.xyz + (hold.xyz - x) * hold.w;
     let impulse = gather(v).xyz * number(small + SMALL_INVERSE_DT) + pull * h;
     let velocity = velocities[v].xyz + (impulse * on_vertex.w + frame.gravity * h);
+    let ahead = number(small + SMALL_AHEAD);
+    let place = x - velocities[v].xyz * ahead;
     velocities[v] = vec4f(velocity, 0.0);
-    points[v] = vec4f(x + velocity * select(h, 0.5 * h, is_last), 0.0);
+    points[v] = vec4f(place + velocity * select(h + ahead, 0.5 * h, is_last), 0.0);
 }
 
+// xt = x - dt^2 a + dt^2 (g + M^-1 f_ext), a the acceleration in the middle of the last small step; of a pinned vertex
 // xt = x - dt (v - v_n) + dt^2 (g + M^-1 f_ext).
 @compute @workgroup_size(64)
 fn end_explicit(
@@ -185,8 +189,20 @@ fn end_explicit(
         return;
     }
     let mass = predicted[v].w;
-    let change = velocities[v].xyz - predicted[v].xyz;
-    let load = frame.gravity + external_forces[v].xyz * (1.0 / mass);
-    let xt = points[v].xyz - change * frame.dt + load * frame.squared_dt;
-    predicted[v] = vec4f(xt, mass);
+    let x = points[v].xyz;
+    let on_vertex = external_forces[v];
+    var back: vec3f;
+    if on_vertex.w == 0.0 {
+        let change = velocities[v].xyz - predicted[v].xyz;
+        let load = frame.gravity + on_vertex.xyz * (1.0 / mass);
+        back = change * frame.dt - load * frame.squared_dt;
+    } else {
+        let small = small_row(part_with(PART_VERTICES_END, v));
+        let time = 0.5 * number(small + SMALL_DT) - number(small + SMALL_AHEAD);
+        let middle = x - velocities[v].xyz * time;
+        let pull = (targets[v].xyz - middle) * targets[v].w * frame.squared_dt;
+        let steps = frame.dt * number(small + SMALL_INVERSE_DT);
+        back = (gather(v).xyz * (steps * steps) + pull) * on_vertex.w;
+    }
+    predicted[v] = vec4f(x - back, mass);
 }

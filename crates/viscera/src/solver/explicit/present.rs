@@ -1,7 +1,7 @@
 //! The stiffness of the present shape, and the small steps that follow from it.
 //!
 //! ```text
-//! k_i = sum_(e at i) rho(K_e) B(F_e)/B(I),   d2W/dF2 <= B(F)      omega^2 <= max_i k_i/m_i
+//! k_i = sum_(e at i) c rho(K_e) B(F_e)/B(I),   d2W/dF2 <= B(F)      omega^2 <= max_i k_i/m_i
 //! ```
 //!
 //! The pass that adds up forces adds up `k_i` beside them, so that every small step knows the frequencies of the shape it is
@@ -41,9 +41,22 @@ const STIFFEST: f64 = 3.0;
 /// be so many times shorter than at rest: tissue that falls far stays below.
 const VIOLENT: f64 = 3.0;
 
+/// The share of the stable step that parts in violent motion take at most.
+const VIOLENT_SHARE: f64 = 0.5;
+
 /// Parts in violent motion take forces so many small steps ahead of their places: as much as is stable with twice the small
 /// steps, `1/4 + 0.5/2 < 1`.
 const AHEAD: f64 = 0.5;
+
+/// Parts in calm motion that something holds take forces so many small steps ahead: the fastest oscillations are gone within
+/// 50 small steps, and half a second of the slowest loses less than a thousandth of its way.
+const CALM: f64 = 0.02;
+
+/// How many small steps ahead of its place a part takes forces in calm motion: none where nothing holds it, because that would
+/// brake its spin.
+pub fn calm_ahead(is_held: bool) -> f64 {
+    if is_held { CALM } else { 0.0 }
+}
 
 /// Vertices whose stiffest is found first.
 const PIECE: usize = 1024;
@@ -61,12 +74,12 @@ pub struct AtRest<S> {
 
 impl<S: Real> AtRest<S> {
     /// Of a model.
-    pub fn new(layout: &Layout<S>) -> Self {
+    pub fn new(layout: &Layout<S>, stability: &Stability) -> Self {
         let mut others = vec![0.0; layout.vertex_count()];
         for_each_kind!(layout, set => add_others(set, layout, &mut others));
         let most = layout.parts.iter().map(|part| part.vertices.len().div_ceil(PIECE)).max();
         Self {
-            tets: std::array::from_fn(|law| of_tets(layout, &layout.tet_sets[law])),
+            tets: std::array::from_fn(|law| of_tets(layout, stability, &layout.tet_sets[law])),
             others: others.into_iter().map(S::from_f64).collect(),
             partial: vec![0.0; most.unwrap_or(0)],
         }
@@ -109,8 +122,8 @@ impl<S: Real> AtRest<S> {
     }
 }
 
-/// `rho(K_e)/B(I)` [m] of a set.
-fn of_tets<S: Real>(layout: &Layout<S>, set: &TetSet<S>) -> Vec<Eight<S>> {
+/// `c rho(K_e)/B(I)` [m] of a set.
+fn of_tets<S: Real>(layout: &Layout<S>, stability: &Stability, set: &TetSet<S>) -> Vec<Eight<S>> {
     let mut blocks = vec![[S::ZERO; LANES]; set.block_count()];
     for ((block, lane), tet) in set.places().zip(layout.tets(set)) {
         let material = &layout.materials[tet.material];
@@ -118,7 +131,9 @@ fn of_tets<S: Real>(layout: &Layout<S>, set: &TetSet<S>) -> Vec<Eight<S>> {
         let largest = element_stiffness(&tet.inverse_rest_shape.cast::<f64>(), lame);
         let at_rest =
             with_law!(set.model, L => L::stiffness(&Mat3::<f64>::IDENTITY, lame[0], lame[1]));
-        blocks[block][lane] = S::from_f64(tet.rest_volume.to_f64() * largest / at_rest);
+        let share = stability.share(layout.part_at(layout.numbering.of(tet.vertices[0])));
+        let volume = tet.rest_volume.to_f64();
+        blocks[block][lane] = S::from_f64(share * volume * largest / at_rest);
     }
     blocks
 }
@@ -153,6 +168,10 @@ pub struct SmallSteps {
     pub is_inverted: bool,
     /// How far ahead of its place [s] forces are taken.
     pub ahead: f64,
+    /// How many small steps ahead of its place forces are taken in calm motion.
+    calm: f64,
+    /// Whether the part was in violent motion at any time in the step.
+    pub was_violent: bool,
 }
 
 /// What a part does in the middle of a small step.
@@ -175,7 +194,7 @@ impl SmallSteps {
     pub fn new(part: usize, count: u32, dt: f64) -> Self {
         let small = dt / f64::from(count);
         let shortest = small / SHORTEST;
-        Self { part, dt: small, left: count, shortest, is_inverted: false, ahead: 0.0 }
+        Self { part, dt: small, left: count, shortest, ..Self::default() }
     }
 
     /// No step has more that would have so many at rest: divisions are rounded up, some a little below the shortest.
@@ -191,25 +210,27 @@ impl SmallSteps {
         let rest = self.shortest * SHORTEST;
         let is_stiff = limit.is_nan() || rest > VIOLENT * stability.safety * limit;
         let is_violent = self.is_inverted || is_stiff;
-        let largest = match is_violent {
-            true => stability.safety,
-            false => LARGEST_SHARE.max(stability.safety),
+        self.was_violent |= is_violent;
+        let [share, largest] = match is_violent {
+            true => [stability.safety.min(VIOLENT_SHARE); 2],
+            false => [stability.safety, LARGEST_SHARE.max(stability.safety)],
         };
-        self.ahead = if is_violent { AHEAD * self.dt } else { 0.0 };
+        self.ahead = self.dt * if is_violent { AHEAD } else { self.calm };
         // Not where the limit is no number.
         if self.dt <= largest * limit {
             return;
         }
-        let small = (stability.safety * limit).max(self.shortest);
+        let small = (share * limit).max(self.shortest);
         let left = self.dt * (f64::from(self.left) - done);
         let count = (left / small + done).ceil().max(1.0);
         self.dt = left / (count - done);
-        self.ahead = if is_violent { AHEAD * self.dt } else { 0.0 };
+        self.ahead = self.dt * if is_violent { AHEAD } else { self.calm };
         self.left = count as u32;
     }
 
-    /// Before the first small step.
-    pub fn begin(&mut self, stability: &Stability, squared: f64) {
+    /// Before the first small step of a part that something holds or nothing.
+    pub fn begin(&mut self, stability: &Stability, squared: f64, is_held: bool) {
+        self.calm = calm_ahead(is_held);
         self.divide(stability, squared, 0.0);
     }
 
@@ -223,7 +244,8 @@ impl SmallSteps {
         let kick = 0.5 * (before + self.dt);
         // `omega^2 kick drift (1 + 2 eta/drift) <= 3`, in terms of the loads' small step.
         // Small steps that are asked for to be longer than usual are no reason, nor those that are longer than is stable.
-        let most = STIFFEST.max(4.2 * stability.safety.powi(2));
+        let share = stability.safety;
+        let most = STIFFEST.max(4.2 * if viscosity > 0.0 { share } else { share * share });
         let stiffest = most * before * before / (kick * (self.dt + 2.0 * (viscosity + was_ahead)));
         let remains = self.dt * (f64::from(self.left) - 0.5).max(0.0);
         if self.left == 0 {

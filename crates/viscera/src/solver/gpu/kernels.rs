@@ -125,7 +125,8 @@ kernels! {
         [Tets CornerIndices Points Loads StartStrain Control VertexData Table];
     ADVANCE_EXPLICIT = Explicit "advance_explicit" 64
         [Points Loads Velocities Previous ExternalForces Targets Control Table];
-    END_EXPLICIT = Explicit "end_explicit" 64 [Points Velocities Predicted ExternalForces];
+    END_EXPLICIT = Explicit "end_explicit" 64
+        [Points Loads Velocities Predicted ExternalForces Targets Table];
     CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control Table];
     EVALUATE = Evaluate "evaluate" 256 [Tets Points StartStrain PartialSums Control VertexData Table];
     SEARCH = Search "search" 256

@@ -478,7 +478,7 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
     }));
     let size = |bytes: usize| (bytes / 4) as u32;
     all.extend(words!(SmallSteps {
-        "SMALL_COUNT" count "SMALL_DT" dt "SMALL_INVERSE_DT" inverse_dt
+        "SMALL_COUNT" count "SMALL_DT" dt "SMALL_INVERSE_DT" inverse_dt "SMALL_AHEAD" ahead
     }));
     all.extend(words!(Fall { "FALL_IS_FREE" is_free "FALL_ACCELERATION" acceleration }));
     all.extend([

@@ -46,20 +46,23 @@ pub(super) struct PartRow {
     pub bound_share: f32,
 }
 
-/// The small steps of a part in a step of an explicit method: how many, of what length [s], and one over it.
+/// The small steps of a part in a step of an explicit method: how many, of what length [s], one over it, and how far ahead
+/// of its place [s] forces are taken.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct SmallSteps {
     pub count: u32,
     pub dt: f32,
     pub inverse_dt: f32,
+    pub ahead: f32,
 }
 
 impl SmallSteps {
-    /// So many in a step of `dt` [s].
-    pub fn new(count: u32, dt: f64) -> Self {
+    /// So many in a step of `dt` [s], with forces so many of them ahead.
+    pub fn new(count: u32, dt: f64, ahead: f64) -> Self {
         let small = dt / f64::from(count);
-        Self { count, dt: small as f32, inverse_dt: (1.0 / small) as f32 }
+        let [dt, inverse_dt, ahead] = [small, 1.0 / small, ahead * small].map(|x| x as f32);
+        Self { count, dt, inverse_dt, ahead }
     }
 }
 

@@ -162,7 +162,7 @@ impl GpuSolver {
             updates: Vec::new(),
             update_of: vec![u32::MAX; model.vertex_count()],
             has_moved_anchors: true,
-            stability: is_explicit.then(|| Stability::new(&laid, settings)),
+            stability: is_explicit.then(|| Stability::for_a_device(&laid, settings)),
             tethers: Vec::new(),
             small_steps: vec![
                 SmallSteps::default();

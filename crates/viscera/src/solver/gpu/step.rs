@@ -7,12 +7,12 @@ use super::slots::Slot;
 use super::solver::{GpuSolver, Ready};
 use super::timing::Marks;
 use super::uniforms::FrameConstants;
-use crate::layout::Layout;
+use crate::layout::{Layout, Part};
 use crate::model::Model;
 use crate::scalar::Vec3;
 use crate::settings::RelaxationForm;
 use crate::solver::error::StepError;
-use crate::solver::explicit::small_steps;
+use crate::solver::explicit::{calm_ahead, small_steps};
 use crate::solver::inputs::Inputs;
 use crate::solver::step::tethers::bundle;
 
@@ -82,10 +82,15 @@ impl GpuSolver {
             Some(stability) => {
                 bundle(model, inputs, &mut self.tethers);
                 let most = small_steps(dt, stability.step(model, &self.tethers))?;
-                for (small, stable) in
-                    self.small_steps.iter_mut().zip(stability.steps(model, &self.tethers))
+                let mut held: Vec<bool> = model.parts.iter().map(Part::is_anchored).collect();
+                let pins = inputs.pins.iter().map(|pin| model.numbering.of(pin.vertex));
+                let holding = pins.chain(self.tethers.iter().map(|tether| tether.vertex));
+                holding.for_each(|v| held[model.part_at(v)] = true);
+                let stable = stability.steps(model, &self.tethers);
+                for ((small, stable), is_held) in self.small_steps.iter_mut().zip(stable).zip(held)
                 {
-                    *small = SmallSteps::new(small_steps(dt, stable)?, dt);
+                    let ahead = calm_ahead(is_held);
+                    *small = SmallSteps::new(small_steps(dt, stable)?, dt, ahead);
                 }
                 let bytes = bytemuck::cast_slice(&self.small_steps);
                 self.buffers.write(&self.device.queue, Slot::SmallSteps, bytes);

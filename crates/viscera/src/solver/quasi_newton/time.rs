@@ -394,7 +394,7 @@ impl<S: Real> Memory<S> {
             self.evaluator.evaluate_all(&data.constants, step, &data.points);
             self.energies.end(step, data, &self.evaluator.stored);
         }
-        self.energies.limit(step, data, |_, _| {});
+        self.energies.limit(step, data, |_, _| true, |_, _| {});
         let round_off = (ENERGY_ROUNDED * S::EPSILON).max(SUM_ROUNDED);
         for (number, report) in self.reports.iter_mut().enumerate() {
             let energies = self.energies.report(number, step.dt, round_off);

@@ -17,7 +17,7 @@
 //! Every connected part of the model has a limit of its own, so that one body does not slow another. A
 //! part that nothing holds keeps its momentum: there everything is relative to its center of mass.
 
-use super::data::{Step, StepData};
+use super::data::{Step, StepConstants, StepData};
 use crate::scalar::{Real, Vec3};
 use crate::solver::report::StepReport;
 
@@ -124,6 +124,20 @@ impl Energies {
         }
     }
 
+    /// Gives a part a little [J] more than it had, after [`Energies::begin`].
+    pub fn give(&mut self, part: usize, energy: f64) {
+        self.0[part].start.stored += energy;
+    }
+
+    /// What is left [J] of what a part had and was given, after [`Energies::end`]; of all that it has a share at most.
+    pub fn left(&self, part: usize, share: f64) -> f64 {
+        let energy = &self.0[part];
+        let (given, kinetic, _) = energy.balance();
+        let left = (given - kinetic).min(share * (energy.end.kinetic + energy.end.stored));
+        // Nothing also where that is no number.
+        left.max(0.0)
+    }
+
     /// Measures the end of a step; `stored` is the stored energy [J] of each part now.
     pub fn end<S: Real>(&mut self, step: &Step<'_, S>, data: &StepData<S>, stored: &[f64]) {
         let (model, constants) = (step.layout, &data.constants);
@@ -178,19 +192,20 @@ impl Energies {
         }
     }
 
-    /// Scales velocities down after [`Energies::end`]. `kept` is called with each part that is slowed down, and the
-    /// factor of its velocities.
+    /// Scales velocities down after [`Energies::end`], of parts that `limits`. `kept` is called with each part that is slowed
+    /// down, and the factor of its velocities.
     pub fn limit<S: Real>(
         &self,
         step: &Step<'_, S>,
         data: &mut StepData<S>,
+        limits: impl Fn(usize, &StepConstants<S>) -> bool,
         mut kept: impl FnMut(usize, f64),
     ) {
         let (model, constants) = (step.layout, &data.constants);
         let free = |v: &usize| constants.inverse_masses[*v] != S::ZERO;
         for (number, (energy, part)) in self.0.iter().zip(model.parts.iter()).enumerate() {
             let (drift, share) = energy.limit();
-            if !(share < 1.0 && energy.mass > 0.0) {
+            if !(share < 1.0 && energy.mass > 0.0 && limits(number, constants)) {
                 continue;
             }
             // What remains about the drift is scaled as a whole, so it keeps its direction; squares of it scale by

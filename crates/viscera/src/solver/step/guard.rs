@@ -205,9 +205,14 @@ impl<S: Real> Guard<S> {
             (part.potential, part.noise, part.kept_speed) = (value, noise, 1.0);
         }
         energies.end(step, data, &evaluator.stored);
-        energies.limit(step, data, |part, share| {
-            parts[part].kept_speed = share;
-        });
+        energies.limit(
+            step,
+            data,
+            |_, _| true,
+            |part, share| {
+                parts[part].kept_speed = share;
+            },
+        );
         for (report, part) in reports.iter_mut().zip(parts) {
             *report = part.report();
         }
