@@ -212,7 +212,8 @@ mod tests {
 
     fn next_step() -> NextStep {
         let text = include_str!("../../../scenes/grab.toml");
-        let scene = Scene::parse("grab.toml", text, &[]).expect("a scene");
+        let scene =
+            Scene::parse("grab.toml", text, &[("solver.method", "quasi_newton")]).expect("a scene");
         let assembly = Assembly::new(&scene, &mut |f| Err(f.to_owned())).expect("an assembly");
         let mut simulation = Simulation::<f64>::new(scene, assembly).expect("a simulation");
         for _ in 0..12 {

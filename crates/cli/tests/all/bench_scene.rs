@@ -121,7 +121,11 @@ fn a_scene_moves_as_the_library_moves_it_to_the_last_bit() {
 #[test]
 fn settings_are_those_of_the_library_and_the_last_of_a_key_counts() {
     let bench = bench_with(&scene());
-    let lists = ["substeps=3,iterations=9,material=snh", "iterations=4, precision=f64", ""];
+    let lists = [
+        "method=quasi_newton,substeps=3,iterations=9,material=snh",
+        "iterations=4, precision=f64",
+        "",
+    ];
     let end = run(&bench, &["--cfg", lists[0], "--cfg", lists[1], "--cfg", lists[2]]);
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     let settings = SolverSettings {
@@ -137,18 +141,26 @@ fn settings_are_those_of_the_library_and_the_last_of_a_key_counts() {
 
 #[test]
 fn automatic_is_the_method_that_a_scene_would_take_at_the_asked_accuracy() {
-    let bench = bench_with(&scene());
-    let methods = ["standard", "fine"].map(|accuracy| {
+    let mut stiff = scene();
+    stiff["youngs_modulus"] = json!(5e7);
+    stiff["poisson_ratio"] = json!(0.49);
+    let bench = bench_with(&stiff);
+    let methods = ["draft", "fine"].map(|accuracy| {
         let end = run(&bench, &["--cfg", &format!("material=snh,accuracy={accuracy}")]);
         assert_eq!(end.code, Some(0), "{}", end.stderr);
         timing(&bench)["method"].clone()
     });
-    assert_eq!(methods, ["quasi_newton", "explicit"]);
-    assert_eq!(timing(&bench)["substeps"], 10);
+    assert_eq!(methods, ["quasi_newton", "quasi_newton"]);
+    let bench = bench_with(&scene());
+    let end = run(&bench, &["--cfg", "material=snh,accuracy=fine"]);
+    assert_eq!((end.code, &timing(&bench)["method"]), (Some(0), &json!("explicit")));
+    // It is the explicit method's own motion, but for smaller steps.
     let settings =
         SolverSettings { method: viscera::settings::Method::Explicit, ..SolverSettings::default() };
     let expected = library::<f32>(MaterialModel::StableNeoHookean, &settings, FACTOR);
-    assert_eq!(positions(&bench), expected[FRAMES as usize - 1]);
+    let pairs = positions(&bench).into_iter().zip(&expected[FRAMES as usize - 1]);
+    let away = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(away < 0.02 * LENGTH && away > 0.0, "{away}");
 }
 
 #[test]

@@ -183,7 +183,7 @@ settings_table! {
         accuracy: Accuracy = (Accuracy::Standard), Accuracies;
         /// The share of the largest stable step of the body at rest that "explicit" takes. On the CPU smaller ones are taken
         /// by themselves where tissue stiffens under strong deformation; a device, which keeps to it, takes half of the
-        /// stable step at most: lower this where a run diverges there.
+        /// stable step at most: lower this where a run diverges there. "auto" takes smaller ones where `accuracy` asks for them.
         explicit_safety: f64 = 0.8, number(at_least(1e-3).up_to(1.0));
         /// Substeps per frame: "auto" for what suits the method, 10 for "xpbd", for "explicit" one for
         /// every 32 small steps and 10 at most, for "quasi_newton" as many as `accuracy` and the slowest oscillation of what the scene's fixings hold ask for, with "standard" from
