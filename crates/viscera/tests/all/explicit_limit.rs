@@ -110,20 +110,19 @@ fn growth(law: MaterialModel, case: (f64, f64), share: f64, safety: f64) -> f64 
 
 /// At `h = s 2/omega` a step multiplies by the roots of `z^2 - (2 - 4 s^2) z + 1`: on the unit circle below the
 /// limit, where the amplitude is at most `1/sqrt(1 - s^2)` times the first; 2.4 at a tenth above it. Beyond it a
-/// margin of the test's own makes the step as long as it likes; below, the solver divides long steps itself. Springs hold a
-/// body, and its energy is limited: there it may stand still instead,
-/// and near the limit below it as well, where all its energy comes and goes in a step.
+/// margin of the test's own makes the step as long as it likes; below, the solver divides long steps itself. Steps that end
+/// with more energy than they had are taken again in shorter ones: nothing blows up.
 #[test]
-fn a_run_above_the_stable_step_blows_up_and_one_below_does_not() {
+fn a_run_above_the_stable_step_stays_in_bounds_and_one_below_goes_on() {
     let bound = 1.01 / (1.0f64 - 0.95 * 0.95).sqrt();
     for law in [STVK, SNH] {
         for case @ (viscosity, spring) in cases() {
             let above = growth(law, case, 1.1, 100.0);
-            let stands = spring > 0.0 && above < 1e-3;
-            assert!(above > 1e3 || stands, "{law:?} {case:?}: grows by {above:e} only");
+            assert!(above < 100.0, "{law:?} {case:?}: grows by {above:e}");
             for share in [0.94, 40.0] {
                 let below = growth(law, case, share, 0.95);
                 assert!(below < bound, "{law:?} {case:?}, {share}: grows by {below:e}");
+                // Held bodies lose what comes and goes within a step near the limit.
                 let goes_on = viscosity > 0.0 || spring > 0.0 || below > 0.5;
                 assert!(goes_on, "{law:?} {case:?}, {share}: {below:e} is left");
             }

@@ -131,6 +131,9 @@ fn handled<S: Real>(seeds: std::ops::Range<u64>, scrambles: bool) {
 /// Leads vertices away.
 fn grab<S: Real>(body: &mut Handled<'_, S>, random: &mut Random, what: &str) {
     let rest = body.mesh.vertices();
+    // The wall would give energy to what was led away from it.
+    let free: Vec<u32> =
+        (0..).zip(rest).filter(|(_, x)| x.x > 1e-9).map(|(vertex, _)| vertex).collect();
     let count = 1 + random.next() as usize % 7;
     let frames = 1 + random.next() % 5;
     let way = |random: &mut Random| {
@@ -138,7 +141,7 @@ fn grab<S: Real>(body: &mut Handled<'_, S>, random: &mut Random, what: &str) {
         way * (random.uniform(0.0, 3.0 * LENGTH) / way.length())
     };
     let ways: Vec<(u32, Vec3<f64>)> =
-        (0..count).map(|_| (random.next() as u32 % rest.len() as u32, way(random))).collect();
+        (0..count).map(|_| (free[random.next() as usize % free.len()], way(random))).collect();
     for frame in 0..frames {
         let part = |number: u64| number as f64 / frames as f64;
         let lead = |&(v, way): &(u32, Vec3<f64>)| {

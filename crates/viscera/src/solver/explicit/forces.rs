@@ -49,14 +49,14 @@ impl Pieces {
         self.0.iter().map(|pieces| size_of_val(&pieces[..]) + size_of_val(pieces)).sum()
     }
 
-    /// Per copy of a part `h^2` times the force of its elements and the bound of their stiffness, `h` the step's; viscous
-    /// tissue goes on from `x`. Returns whether a tetrahedron is inside out.
+    /// Per copy of a part `h^2` times the force of its elements, `h` the step's, and the bound of their stiffness where
+    /// `looks`; viscous tissue goes on from `x`. Returns whether a tetrahedron is inside out.
     pub fn load<S: Real>(
         &self,
         constants: &mut StepConstants<S>,
         step: &Step<'_, S>,
         moments: &Moments<'_, S>,
-        number: usize,
+        (number, looks): (usize, bool),
         (x, at_rest): (&[Point<S>], &AtRest<S>),
         loads: &mut [Point<S>],
     ) -> bool {
@@ -72,7 +72,7 @@ impl Pieces {
                 let set = &layout.tet_sets[*law];
                 let at_rest = &at_rest.tets[*law];
                 let (strains, loads, dt) = (strains[*law], &shared, step.dt);
-                let forces = Forces { x, at_rest, strains, dt, loads, inverted };
+                let forces = Forces { x, at_rest, strains, dt, loads, inverted, looks };
                 with_tissue!(set, L, VISCOUS => {
                     let pass = OfLaw::<_, L, VISCOUS>::new(&forces);
                     workers.piece(layout, set, blocks.clone(), &pass);
@@ -91,12 +91,13 @@ struct Forces<'a, S> {
     dt: f64,
     loads: &'a Shared<'a, Point<S>>,
     inverted: &'a AtomicBool,
+    looks: bool,
 }
 
 impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Forces<'_, S>, W, VISCOUS> {
     #[inline(always)]
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
-        let Forces { x, at_rest, strains, dt, loads, inverted } = *self.pass;
+        let Forces { x, at_rest, strains, dt, loads, inverted, looks } = *self.pass;
         let shape = tets.shape::<L>();
         let f = deformation_gradient(&tets.corners::<L>(x).x, &shape);
         let tissue = Tissue::new(W::MODEL, &tets.material(), dt);
@@ -116,8 +117,11 @@ impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Forces<'_, S
         if !L::all(L::ZERO.less(f.determinant())) {
             inverted.store(true, Relaxed);
         }
-        let stiffness = W::stiffness(&f, tissue.lame_lambda, tissue.lame_mu);
-        let bound = L::load(&at_rest[tets.index], tets.lane) * stiffness * squared;
+        let mut bound = L::ZERO;
+        if looks {
+            let stiffness = W::stiffness(&f, tissue.lame_lambda, tissue.lame_mu);
+            bound = L::load(&at_rest[tets.index], tets.lane) * stiffness * squared;
+        }
         // SAFETY: the piece has copies of its own, and one thread does all of it.
         unsafe { tets.add_bound_in_order(loads, &forces, bound) };
     }

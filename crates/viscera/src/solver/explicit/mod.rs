@@ -16,13 +16,13 @@
 mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod guard;
 mod present;
 mod spectrum;
 mod stability;
 pub mod stage;
 
-use crate::layout::Layout;
-use crate::layout::{Before, Moments};
+use crate::layout::{Before, Layout, Moments, Part};
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
 use crate::settings::SolverSettings;
@@ -36,16 +36,13 @@ use crate::solver::step::predict::{Tethers, load_tethers};
 use crate::solver::step::stage::StepStage;
 use crate::solver::step::strain::{keep_share, measure_strain};
 use crate::solver::step::tethers::bundle;
-use crate::state::{Learned, State};
+use crate::state::State;
 use forces::Pieces;
 #[cfg(feature = "gpu")]
 pub use present::calm_ahead;
 use present::{AtRest, SmallSteps};
 pub use stability::{Stability, small_steps, substeps_for};
 use stage::ExplicitStage;
-
-/// The share of all energy that may come back after it has gone.
-const SWING: f64 = 0.1;
 
 /// The stages of a step.
 pub fn plan() -> Plan {
@@ -80,6 +77,8 @@ pub struct Memory<S> {
     of_loads: Vec<f64>,
     /// Velocities at the start of the step [m/s].
     start_velocities: Vec<Vec3<S>>,
+    /// Where vertices end [m], of viscous tissue.
+    ends: Vec<Point<S>>,
     evaluator: Evaluator,
     energies: Energies,
 }
@@ -96,6 +95,10 @@ impl<S: Real> Memory<S> {
             remains: vec![0.0; layout.part_count()],
             of_loads: vec![0.0; layout.part_count()],
             start_velocities: vec![Vec3::ZERO; layout.vertex_count()],
+            ends: vec![
+                Point::default();
+                if layout.is_viscous() { layout.vertex_count() } else { 0 }
+            ],
             evaluator: Evaluator::new(layout),
             energies: Energies::new(layout.part_count()),
         }
@@ -110,6 +113,7 @@ impl<S: Real> Memory<S> {
             + self.at_rest.bytes()
             + size_of_val(&self.remains[..])
             + size_of_val(&self.of_loads[..])
+            + size_of_val(&self.ends[..])
             + self.evaluator.bytes()
             + self.energies.bytes()
     }
@@ -169,70 +173,36 @@ impl<S: Real> Memory<S> {
             state.learned.clear(0, model.vertex_count(), model.part_count());
         }
         self.begin_energy(step, data, &state.learned);
+        self.start(step, data);
+    }
+
+    /// Finds the stiffness of the parts whose small steps are to come, and moves them to the middle of the first.
+    fn start(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
+        let model = step.layout;
         // Of the forces only the bounds count: of viscous tissue no strain is known yet.
         self.load_forces(step, data);
         let Self { stability, at_rest, small_steps, .. } = self;
         let StepData { constants, points, velocities, loads } = data;
-        for (part, small) in model.parts.iter().zip(small_steps.iter_mut()) {
+        let to_come = model.parts.iter().zip(small_steps).filter(|(_, small)| small.left > 0);
+        for (part, small) in to_come {
             let stiffest = at_rest.gather(constants, model, part, small.dt, loads);
             small.begin(stability, stiffest, constants.holds(part));
-        }
-        if model.is_viscous() {
-            retrace(model, constants, points, velocities, small_steps);
-            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-            measure_strain(workers, model, None, points, strains);
-            points.copy_from_slice(&constants.previous);
-        }
-        let forwards = |number: usize| 0.5 * small_steps[number].dt + small_steps[number].ahead;
-        drift(model, constants, points, velocities, forwards);
-        for pin in &step.inputs.pins {
-            let v = model.numbering.of(pin.vertex);
-            let half = 0.5 * small_steps[model.part_at(v)].dt;
-            lead(points, velocities, &constants.previous, (v, pin.target), half, step.dt);
-        }
-    }
-
-    /// Energies before the step, pins moved.
-    fn begin_energy(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, learned: &Learned<S>) {
-        let model = step.layout;
-        let StepData { constants, points, .. } = data;
-        if model.is_viscous() {
-            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-            measure_strain(workers, model, None, points, strains);
-        }
-        for pin in &step.inputs.pins {
-            points[model.numbering.of(pin.vertex)].set_vec3(pin.target);
-        }
-        self.evaluate(step, data);
-        self.energies.begin(step, data, &self.evaluator.stored);
-        for (number, part) in learned.parts.iter().enumerate() {
-            self.energies.give(number, part.owed);
-        }
-        let StepData { constants, points, .. } = data;
-        for pin in &step.inputs.pins {
-            let v = model.numbering.of(pin.vertex);
-            points[v] = constants.previous[v];
-        }
-    }
-
-    /// No part ends a step with more energy than it had and was given. The energy of symplectic steps swings about its mean
-    /// by a share of that of fast oscillations: what has gone may come back, or every swing would brake the body, until a
-    /// hand moves it. A part that nothing holds is left alone until its motion is violent: the limit would brake its spin.
-    fn limit_energy(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, state: &mut State<S>) {
-        self.evaluate(step, data);
-        self.energies.end(step, data, &self.evaluator.stored);
-        let (model, small_steps) = (step.layout, &self.small_steps);
-        let limits = |number: usize, constants: &StepConstants<S>| {
-            small_steps[number].was_violent || constants.holds(&model.parts[number])
-        };
-        self.energies.limit(step, data, limits, |_, _| {});
-        for (number, part) in state.learned.parts.iter_mut().enumerate() {
-            part.owed = self.energies.left(number, SWING);
+            if model.is_viscous() {
+                drift(constants, part, points, velocities, -0.5 * small.dt, true);
+                let (workers, strains) = (&constants.workers, &mut constants.start_strain);
+                measure_strain(workers, model, Some(part), points, strains);
+                let range = part.vertices.clone();
+                points[range.clone()].copy_from_slice(&constants.previous[range]);
+            }
+            let time = 0.5 * small.dt + small.ahead;
+            drift(constants, part, points, velocities, time, false);
         }
         for pin in &step.inputs.pins {
             let v = model.numbering.of(pin.vertex);
-            if data.constants.previous[v].vec3() != pin.target {
-                state.learned.parts[model.part_at(v)].owed = 0.0;
+            let small = &self.small_steps[model.part_at(v)];
+            if small.left > 0 {
+                let half = 0.5 * small.dt;
+                lead(points, velocities, &constants.previous, (v, pin.target), half, step.dt);
             }
         }
     }
@@ -265,25 +235,18 @@ impl<S: Real> Memory<S> {
     }
 
     /// The strain at the start of a step in which it changes all the time as it does at its end.
-    fn strain_at_the_end(&self, step: &Step<'_, S>, data: &mut StepData<S>) {
+    fn strain_at_the_end(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
         let model = step.layout;
         let StepData { constants, points, velocities, .. } = data;
-        constants.previous.copy_from_slice(points);
-        retrace(model, constants, points, velocities, &self.small_steps);
-        let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-        measure_strain(workers, model, None, points, strains);
-        points.copy_from_slice(&constants.previous);
+        self.ends.copy_from_slice(points);
         for (part, small) in model.parts.iter().zip(&self.small_steps) {
+            drift(constants, part, points, velocities, -0.5 * small.dt, true);
+            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
+            measure_strain(workers, model, Some(part), points, strains);
+            let range = part.vertices.clone();
+            points[range.clone()].copy_from_slice(&self.ends[range]);
             let share = S::from_f64(2.0 * step.dt / small.dt);
             keep_share(workers, model, part, points, share, strains);
-        }
-    }
-
-    /// What every part stores where it is [J].
-    fn evaluate(&mut self, step: &Step<'_, S>, data: &StepData<S>) {
-        for (number, small) in self.small_steps.iter().enumerate() {
-            let step = Step { dt: small.dt, ..*step };
-            self.evaluator.evaluate(&data.constants, &step, &data.points, number);
         }
     }
 
@@ -295,6 +258,7 @@ impl<S: Real> Memory<S> {
             if small.left == 0 {
                 continue;
             }
+            let looks = small.looks();
             let small = Step { dt: small.dt, ..*step };
             let moments = Moments {
                 anchors: step.inputs.anchors_of(&step.layout.rest_anchors),
@@ -303,7 +267,7 @@ impl<S: Real> Memory<S> {
             };
             let places = (&points[..], &self.at_rest);
             small_steps.is_inverted =
-                self.pieces.load(constants, &small, &moments, number, places, loads);
+                self.pieces.load(constants, &small, &moments, (number, looks), places, loads);
             let squared = S::from_f64(small.dt * small.dt);
             for tether in constants.tethers_of(&step.layout.parts[number]) {
                 let force = tether.force(points[tether.vertex].vec3());
@@ -361,38 +325,21 @@ impl<S: Real> Memory<S> {
     }
 }
 
-/// Moves every vertex that is not pinned for a time [s], which depends on its part.
+/// Moves the vertices of a part for a time [s], pinned ones if `all`.
 fn drift<S: Real>(
-    layout: &Layout<S>,
     constants: &StepConstants<S>,
+    part: &Part,
     points: &mut [Point<S>],
     velocities: &[Vec3<S>],
-    time: impl Fn(usize) -> f64,
+    time: f64,
+    all: bool,
 ) {
-    for (number, part) in layout.parts.iter().enumerate() {
-        let time = S::from_f64(time(number));
-        constants.each_vertex(part, points, |v, point| {
-            if constants.inverse_masses[v] != S::ZERO {
-                point.set_vec3(point.vec3() + velocities[v] * time);
-            }
-        });
-    }
-}
-
-/// Moves every vertex, pinned ones too, to where it was in the middle of the small step before.
-fn retrace<S: Real>(
-    layout: &Layout<S>,
-    constants: &StepConstants<S>,
-    points: &mut [Point<S>],
-    velocities: &[Vec3<S>],
-    small_steps: &[SmallSteps],
-) {
-    for (part, small) in layout.parts.iter().zip(small_steps) {
-        let time = S::from_f64(0.5 * small.dt);
-        constants.each_vertex(part, points, |v, point| {
-            point.set_vec3(point.vec3() - velocities[v] * time);
-        });
-    }
+    let time = S::from_f64(time);
+    constants.each_vertex(part, points, |v, point| {
+        if all || constants.inverse_masses[v] != S::ZERO {
+            point.set_vec3(point.vec3() + velocities[v] * time);
+        }
+    });
 }
 
 /// Leads a pinned vertex to where it is at a time [s] of a step of `dt` [s]: on a straight line.

@@ -4,8 +4,8 @@
 //! k_i = sum_(e at i) c rho(K_e) B(F_e)/B(I),   d2W/dF2 <= B(F)      omega^2 <= max_i k_i/m_i
 //! ```
 //!
-//! The pass that adds up forces adds up `k_i` beside them, so that every small step knows the frequencies of the shape it is
-//! in. What ends in the middle between two places where forces are taken can be of any length: small steps are divided
+//! The pass that adds up forces adds up `k_i` beside them, in every second small step, and in each where motion is
+//! violent. What ends in the middle between two places where forces are taken can be of any length: small steps are divided
 //! anew as soon as they come too close to the limit.
 //!
 //! Two remedies for violent motion, which explicit steps would follow for ever, since they lose no energy. A part of which
@@ -47,6 +47,10 @@ const VIOLENT_SHARE: f64 = 0.5;
 /// Parts in violent motion take forces so many small steps ahead of their places: as much as is stable with twice the small
 /// steps, `1/4 + 0.5/2 < 1`.
 const AHEAD: f64 = 0.5;
+
+/// Parts in calm motion look for the stiffness of their shape in every second small step: it changes little in between, and
+/// finding it costs a fifth of a pass.
+const LOOKS: u32 = 2;
 
 /// Parts in calm motion that something holds take forces so many small steps ahead: the fastest oscillations are gone within
 /// 50 small steps, and half a second of the slowest loses less than a thousandth of its way.
@@ -170,6 +174,9 @@ pub struct SmallSteps {
     pub ahead: f64,
     /// How many small steps ahead of its place forces are taken in calm motion.
     calm: f64,
+    /// Small steps since the stiffness of the shape was found, of [`LOOKS`].
+    pub since: u32,
+    is_violent: bool,
     /// Whether the part was in violent motion at any time in the step.
     pub was_violent: bool,
 }
@@ -210,6 +217,7 @@ impl SmallSteps {
         let rest = self.shortest * SHORTEST;
         let is_stiff = limit.is_nan() || rest > VIOLENT * stability.safety * limit;
         let is_violent = self.is_inverted || is_stiff;
+        self.is_violent = is_violent;
         self.was_violent |= is_violent;
         let [share, largest] = match is_violent {
             true => [stability.safety.min(VIOLENT_SHARE); 2],
@@ -232,12 +240,22 @@ impl SmallSteps {
     pub fn begin(&mut self, stability: &Stability, squared: f64, is_held: bool) {
         self.calm = calm_ahead(is_held);
         self.divide(stability, squared, 0.0);
+        self.since = if self.is_violent { 0 } else { 1 };
     }
 
-    /// In the middle of a small step, at places where `(omega h)^2` is known.
+    /// Whether the stiffness of the present shape is found with the next forces.
+    pub fn looks(&self) -> bool {
+        self.since == 0
+    }
+
+    /// In the middle of a small step, at places where `(omega h)^2` is known if the part looked for it.
     pub fn advance(&mut self, stability: &Stability, squared: f64) -> Move {
         let (before, was_ahead) = (self.dt, self.ahead);
-        self.divide(stability, squared, 0.5);
+        let looked = self.looks();
+        if looked {
+            self.divide(stability, squared, 0.5);
+        }
+        self.since = if self.is_violent || self.is_inverted { 0 } else { (self.since + 1) % LOOKS };
         let viscosity = stability.viscosity(self.part);
         self.left -= 1;
         let drift = if self.left == 0 { 0.5 * self.dt } else { self.dt };
@@ -246,7 +264,10 @@ impl SmallSteps {
         // Small steps that are asked for to be longer than usual are no reason, nor those that are longer than is stable.
         let share = stability.safety;
         let most = STIFFEST.max(4.2 * if viscosity > 0.0 { share } else { share * share });
-        let stiffest = most * before * before / (kick * (self.dt + 2.0 * (viscosity + was_ahead)));
+        let stiffest = match looked {
+            true => most * before * before / (kick * (self.dt + 2.0 * (viscosity + was_ahead))),
+            false => f64::INFINITY,
+        };
         let remains = self.dt * (f64::from(self.left) - 0.5).max(0.0);
         if self.left == 0 {
             self.ahead = 0.0;
