@@ -28,12 +28,12 @@ fn a_run_writes_what_it_promises() {
     assert_eq!(summary["finished"], true);
     assert_eq!(summary["title"], "Tiny");
     assert_eq!(summary["model"]["tets"], 10);
-    assert_eq!(summary["solver"]["method"], "quasi_newton");
+    // Few small steps do in a coarse bar.
+    assert_eq!(summary["solver"]["method"], "explicit");
     assert_eq!(summary["solver"]["asked_method"], "auto");
     assert_eq!(summary["solver"]["accuracy"], "standard");
-    // As many as the bar's slowest oscillation asks for.
     let substeps = summary["solver"]["substeps"].as_u64().expect("a count");
-    assert!((2..=10).contains(&substeps), "{substeps}");
+    assert!((1..=10).contains(&substeps), "{substeps}");
     let frames = summary["frames"].as_array().expect("frames");
     assert_eq!(frames.len(), 12);
     for (index, frame) in frames.iter().enumerate() {
@@ -247,7 +247,7 @@ fn diverging() -> String {
 #[test]
 fn a_diverging_scene_says_so_and_keeps_what_was_finished() {
     let bench = Bench::new(&diverging());
-    let end = bench.run(&[]);
+    let end = bench.run(&["--set", "solver.method=quasi_newton"]);
     let message = end.error();
     assert!(message.contains("diverged at 0.1"), "{message}");
     assert!(message.contains("raise solver.substeps"), "{message}");

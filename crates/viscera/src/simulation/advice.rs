@@ -17,7 +17,8 @@ fn either(choices: &[&str]) -> String {
 pub fn diverged(scene: &Scene) -> String {
     let solver = &scene.solver;
     if solver.method == Method::Explicit {
-        let lower = format!("lower solver.explicit_safety below {}", solver.explicit_safety);
+        let two_digits = (100.0 * solver.explicit_safety).round() / 100.0;
+        let lower = format!("lower solver.explicit_safety below {two_digits}");
         return either(&[&lower, "choose solver.method = \"quasi_newton\""]);
     }
     let mut choices = vec!["raise solver.substeps"];
