@@ -146,7 +146,7 @@ fn explicit_error(period: f64, small_step: f64) -> f64 {
 const EXPLICIT_PHASE: f64 = 110.0;
 
 /// As little error as is told. Tissue that falls far and turns inside out at the wall is damped until it has turned back: on
-/// bars of 1 and 5 kPa that makes up to 0.31 %. Of others rounding makes a thousandth of that.
+/// bars of 1 and 5 kPa that makes up to 0.34 %. Of others rounding makes a thousandth of that.
 const EXPLICIT_LEAST: f64 = 4e-3;
 
 /// What a run with `substeps` per frame may be expected to be off by, where its slowest oscillation has the period [s]; the
