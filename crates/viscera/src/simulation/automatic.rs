@@ -133,8 +133,8 @@ pub fn cost<S: Real>(
     substeps * of_substep
 }
 
-/// The error of motion over half a second of small explicit steps [s], where the slowest oscillation has the period [s]: of
-/// its phase, unless that is less than what is told of any.
+/// The error of motion over half a second of small explicit steps [s], where the slowest oscillation has the period [s]: the
+/// error of its phase, and never less than [`EXPLICIT_LEAST`].
 fn explicit_error(period: f64, small_step: f64) -> f64 {
     let steps_per_period = period / small_step;
     let phase = EXPLICIT_PHASE * (0.5 / period) / (steps_per_period * steps_per_period);
@@ -145,8 +145,8 @@ fn explicit_error(period: f64, small_step: f64) -> f64 {
 /// a tenth of that on a bowel, which hangs from more than one side.
 const EXPLICIT_PHASE: f64 = 110.0;
 
-/// As little error as is told. Tissue that falls far and turns inside out at the wall is damped until it has turned back: on
-/// bars of 1 and 5 kPa that makes up to 0.34 %. Of others rounding makes a thousandth of that.
+/// The smallest error that is foretold. Soft tissue that falls far turns inside out at the wall, and is damped until it has
+/// turned back: on bars of 1 and 5 kPa that makes up to 0.34 %. Other bodies are off by less than half of it.
 const EXPLICIT_LEAST: f64 = 4e-3;
 
 /// What a run with `substeps` per frame may be expected to be off by, where its slowest oscillation has the period [s]; the
