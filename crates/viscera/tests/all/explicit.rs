@@ -257,3 +257,37 @@ fn a_viscous_body_in_motion_is_in_balance() {
         }
     }
 }
+
+/// The energy of small steps swings about its mean: what has gone is remembered, up to a tenth of all, and may come back
+/// until a hand moves the body. The sum never grows.
+#[test]
+fn energy_that_has_gone_may_come_back_until_a_hand_moves_the_body() {
+    let mesh = block([0.04, 0.02, 0.02], [2, 1, 1], 0.0);
+    let model = single_body::<f64>(&mesh, &material(SNH, 2e4, 0.3));
+    let mut inputs = Inputs { gravity: Vec3::ZERO, ..hanging(&model) };
+    let settings = SolverSettings { explicit_safety: 0.5, ..explicit() };
+    let (mut solver, mut state) = (Solver::new(&model, &settings), State::at_rest(&model));
+    for (v, x) in state.velocities.iter_mut().zip(&model.rest_positions) {
+        *v = vec3(2.0 * x.x, 0.0, 0.0);
+    }
+    let energy = |state: &State<f64>, inputs: &Inputs<f64>| {
+        let tissue = measure_tissue(&model, &state.positions);
+        let energy = measure_energies(&model, state, inputs, &tissue);
+        energy.kinetic + energy.elastic
+    };
+    let dt = 2.0 * solver.stable_step();
+    let (mut had, mut owed, mut came_back) = (energy(&state, &inputs), 0.0, 0);
+    for _ in 0..100 {
+        solver.step(&model, &mut state, &inputs, dt).expect("a legal step");
+        let (has, before) = (energy(&state, &inputs), owed);
+        owed = state.learned.parts[0].owed;
+        let expected = (had + before - has).clamp(0.0, 0.1 * has);
+        assert!((owed - expected).abs() < 1e-9 * has, "{owed:e} J, {expected:e} J expected");
+        came_back += u32::from(has > had);
+        had = has;
+    }
+    assert!(owed > 0.0 && came_back > 5, "{owed:e} J, {came_back} times");
+    inputs.pins.iter_mut().for_each(|pin| pin.target += vec3(1e-5, 0.0, 0.0));
+    solver.step(&model, &mut state, &inputs, dt).expect("a legal step");
+    assert_eq!(state.learned.parts[0].owed, 0.0);
+}
