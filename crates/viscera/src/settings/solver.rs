@@ -186,7 +186,7 @@ settings_table! {
         /// stable step at most: lower this where a run diverges there. "auto" takes smaller ones where `accuracy` asks for them.
         explicit_safety: f64 = 0.8, number(at_least(1e-3).up_to(1.0));
         /// Substeps per frame: "auto" for what suits the method, 10 for "xpbd", for "explicit" one for
-        /// every 32 small steps and 10 at most, for "quasi_newton" as many as `accuracy` and the slowest oscillation of what the scene's fixings hold ask for, with "standard" from
+        /// every 32 small steps and 10 at most, for "quasi_newton" as many as `accuracy` and the oscillations of what the scene's fixings hold ask for, with "standard" from
         /// 1 to 10. More lose less motion to numerical damping and follow it more closely; the cost grows alike. With `rebase`
         /// and `keep_multipliers` the shape at rest does not depend on them; plain XPBD needs about 50 for
         /// an error near 1 %.
@@ -301,7 +301,7 @@ struct AutomaticCounts {
 /// motion; with a single sweep in each, multipliers trail behind it.
 const SHORT_STEPS: AutomaticCounts = AutomaticCounts { substeps: 10, iterations: 2 };
 
-/// Those of large steps that are solved well: a stiff body takes more, as its slowest oscillation asks.
+/// Those of large steps that are solved well: a stiff body takes more, as its oscillations ask.
 const LONG_STEPS: AutomaticCounts = AutomaticCounts { substeps: 1, iterations: 8 };
 
 impl SolverSettings {

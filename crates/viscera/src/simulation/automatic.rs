@@ -6,7 +6,8 @@ use crate::model::Model;
 use crate::scalar::Real;
 use crate::scene::Scene;
 use crate::settings::{Integrator, Method, SolverSettings};
-use crate::solver::{Inputs, Solver, choose, expected_motion_error};
+use crate::solver::oscillations::Oscillations;
+use crate::solver::{Inputs, Solver, choose, expected_motion_error, explicit_growth};
 
 /// Cost of a pass of the quasi-Newton method over that of a small explicit step: 23 over 10.8 ns per tetrahedron, measured
 /// with 1,000 to 100,000 of them by `viscera bench` (AVX2, one thread). Too large, and explicit steps are taken where they
@@ -43,8 +44,8 @@ pub fn fixings<S: Real>(scene: &Scene, assembly: &Assembly) -> Inputs<S> {
 pub struct Chosen {
     /// The scene's settings, with a method in the place of "auto".
     pub settings: SolverSettings,
-    /// The slowest period [s], where the choice had to know it.
-    pub period: Option<f64>,
+    /// How the bodies swing, where the choice had to know it.
+    pub oscillations: Option<Oscillations>,
 }
 
 /// The method of a scene: the cheaper one of those that are as accurate as asked; `on_device` where the caller has chosen a
@@ -56,7 +57,7 @@ pub fn choose_method<S: Real>(
     on_device: bool,
 ) -> Chosen {
     if on_device {
-        return Chosen { settings: scene.solver.chosen(Method::Xpbd), period: None };
+        return Chosen { settings: scene.solver.chosen(Method::Xpbd), oscillations: None };
     }
     choose_by_cost(&scene.solver, model, scene.time.frame, || fixings(scene, assembly))
 }
@@ -83,32 +84,32 @@ fn choose_by_cost<S: Real>(
     let asked = &asked.foreseen();
     let large = asked.chosen(Method::QuasiNewton);
     if asked.method != Method::Auto {
-        return Chosen { settings: large, period: None };
+        return Chosen { settings: large, oscillations: None };
     }
     let mut quasi_newton = Solver::new(model, &large);
-    let period = quasi_newton.slowest_period(&fixings());
-    let substeps = quasi_newton.substeps_for(period, frame);
+    let oscillations = quasi_newton.oscillations(&fixings());
+    let substeps = quasi_newton.substeps_for(&oscillations, frame);
     let of_large = cost(&large, model, frame, substeps, f64::INFINITY);
     let small = asked.chosen(Method::Explicit);
     let mut explicit = Solver::new(model, &small);
     let most = asked.accuracy.share().max(EXPLICIT_LEAST);
-    let error = explicit_error(period, explicit.stable_step());
+    let error = explicit_error(&oscillations, explicit.stable_step());
     if error > most {
         // Of the second order.
         let explicit_safety = small.explicit_safety * (most / error).sqrt();
         explicit = Solver::new(model, &SolverSettings { explicit_safety, ..small });
     }
-    let small_steps = explicit.substeps_for(f64::INFINITY, frame);
+    let small_steps = explicit.substeps_for(&oscillations, frame);
     let of_explicit = cost(explicit.settings(), model, frame, small_steps, explicit.stable_step());
     let is_explicit = of_explicit < of_large;
     let settings = if is_explicit { explicit.settings().clone() } else { large };
-    Chosen { settings, period: Some(period) }
+    Chosen { settings, oscillations: Some(oscillations) }
 }
 
-/// The slowest period [s] of what the fixings of a scene hold.
-pub fn slowest_period<S: Real>(scene: &Scene, assembly: &Assembly, model: &Model<S>) -> f64 {
+/// How that swings which the fixings of a scene hold.
+pub fn oscillations<S: Real>(scene: &Scene, assembly: &Assembly, model: &Model<S>) -> Oscillations {
     let settings = SolverSettings { method: Method::QuasiNewton, ..scene.solver.clone() };
-    Solver::new(model, &settings).slowest_period(&fixings(scene, assembly))
+    Solver::new(model, &settings).oscillations(&fixings(scene, assembly))
 }
 
 /// What a frame [s] costs, in passes that add up the forces of all tetrahedra once; `stable_step` [s] is that of the
@@ -133,27 +134,24 @@ pub fn cost<S: Real>(
     substeps * of_substep
 }
 
-/// The error of motion over half a second of small explicit steps [s], where the slowest oscillation has the period [s]: the
-/// error of its phase, and never less than [`EXPLICIT_LEAST`].
-fn explicit_error(period: f64, small_step: f64) -> f64 {
-    let steps_per_period = period / small_step;
-    let phase = EXPLICIT_PHASE * (0.5 / period) / (steps_per_period * steps_per_period);
-    phase.max(EXPLICIT_LEAST)
+/// The error of motion of small explicit steps [s]: of oscillations, and never less than [`EXPLICIT_LEAST`].
+fn explicit_error(oscillations: &Oscillations, small_step: f64) -> f64 {
+    (EXPLICIT_MARGIN * oscillations.error(small_step, explicit_growth)).max(EXPLICIT_LEAST)
 }
 
-/// Error of a path after one period, times the square of the number of small steps in it: 42 to 66 on bars, 100 on a liver,
-/// a tenth of that on a bowel, which hangs from more than one side.
-const EXPLICIT_PHASE: f64 = 110.0;
+/// Errors found over those of linear oscillations, with room: those of bodies that explicit steps lead further astray than by
+/// [`EXPLICIT_LEAST`] have not been seen.
+const EXPLICIT_MARGIN: f64 = 1.5;
 
 /// The smallest error that is foretold. Soft tissue that falls far turns inside out at the wall, and is damped until it has
 /// turned back: on bars of 1 and 5 kPa that makes up to 0.34 %. Other bodies are off by less than half of it.
 const EXPLICIT_LEAST: f64 = 4e-3;
 
-/// What a run with `substeps` per frame may be expected to be off by, where its slowest oscillation has the period [s]; the
+/// What a run with `substeps` per frame may be expected to be off by, where bodies swing so; the
 /// explicit method's steps at rest are as long as is stable, `stable_step` [s].
 pub fn expected_errors(
     settings: &SolverSettings,
-    period: f64,
+    oscillations: &Oscillations,
     frame: f64,
     substeps: u32,
     stable_step: f64,
@@ -161,13 +159,13 @@ pub fn expected_errors(
     match settings.method {
         Method::Auto | Method::QuasiNewton => {
             let follows = settings.integrator == Integrator::Sdirk2;
-            let motion = expected_motion_error(settings, period, frame, substeps);
+            let motion = expected_motion_error(settings, oscillations, frame, substeps);
             ExpectedErrors { motion: follows.then_some(motion), at_rest: 2e-3 }
         }
         Method::Explicit => {
             let substep = frame / f64::from(substeps);
             let small_step = substep / (substep / stable_step).ceil();
-            let motion = explicit_error(period, small_step).min(1.0);
+            let motion = explicit_error(oscillations, small_step).min(1.0);
             ExpectedErrors { motion: Some(motion), at_rest: 2e-3 }
         }
         // Sweeps that are cut short lose motion by an amount that depends on tissue and mesh.

@@ -11,6 +11,7 @@ use crate::settings::{Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]
 use crate::solver::gpu::GpuSolver;
+use crate::solver::oscillations::Oscillations;
 use crate::solver::{Inputs, Solver, StepError};
 use crate::state::State;
 
@@ -112,22 +113,23 @@ impl<S: Real> Backend<S> {
         }
     }
 
-    /// The slowest period [s], where it had to be known, and the substeps of a frame [s]: see [`Solver::slowest_period`] and
+    /// The oscillations, where they had to be known, and the substeps of a frame [s]: see [`Solver::oscillations`] and
     /// [`Solver::substeps`]. Methods that choose by themselves are computed by the CPU.
     pub fn substeps(
         &mut self,
         inputs: &Inputs<S>,
         settings: &SolverSettings,
-        period: Option<f64>,
+        known: Option<Oscillations>,
         frame: f64,
-    ) -> (Option<f64>, u32) {
+    ) -> (Option<Oscillations>, u32) {
         match &mut self.engine {
             Engine::Cpu(solver) if settings.method == Method::QuasiNewton => {
-                let period = period.unwrap_or_else(|| solver.slowest_period(inputs));
-                (Some(period), solver.substeps_for(period, frame))
+                let oscillations = known.unwrap_or_else(|| solver.oscillations(inputs));
+                let substeps = solver.substeps_for(&oscillations, frame);
+                (Some(oscillations), substeps)
             }
-            Engine::Cpu(solver) => (period, solver.substeps_for(f64::INFINITY, frame)),
-            Engine::Device(_) => (period, settings.substeps()),
+            Engine::Cpu(solver) => (known, solver.substeps_for(&Oscillations::default(), frame)),
+            Engine::Device(_) => (known, settings.substeps()),
         }
     }
 

@@ -239,8 +239,8 @@ impl<S: Real> Simulation<S> {
         let same_device = scene.solver.device == self.scene.solver.device;
         let on_device = same_device && self.callers_device;
         self.resumed_method = self.resumed_method.filter(|_| same_device);
-        let Chosen { settings: solver, period } = match self.resumed_method {
-            Some(method) => Chosen { settings: scene.solver.chosen(method), period: None },
+        let Chosen { settings: solver, oscillations } = match self.resumed_method {
+            Some(method) => Chosen { settings: scene.solver.chosen(method), oscillations: None },
             None => automatic::choose_method(&scene, &self.assembly, &model, on_device),
         };
         let backend = self.backend.renew(same_device, &model, &solver)?;
@@ -251,7 +251,7 @@ impl<S: Real> Simulation<S> {
             ..rest
         };
         (self.scene, self.model, self.backend) = (scene, model, backend);
-        (self.solver, self.period) = (solver, period);
+        (self.solver, self.oscillations) = (solver, oscillations);
         self.assembly.builder = builder;
         self.choose_substeps();
         self.begin_at(state);

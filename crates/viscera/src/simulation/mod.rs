@@ -36,6 +36,7 @@ use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Scene};
 use crate::settings::{Count, Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
+use crate::solver::oscillations::Oscillations;
 use crate::solver::{Inputs, Solver, choose};
 use crate::state::State;
 use device::Backend;
@@ -126,7 +127,7 @@ pub struct Simulation<S> {
     substeps: u32,
     /// Of the slowest oscillation of what the scene's fixings hold [s]; infinite where nothing is held. Nothing where
     /// nobody had to know it yet.
-    period: Option<f64>,
+    oscillations: Option<Oscillations>,
     inputs: Inputs<S>,
     taken: GraspOrigins,
     /// The scene without what was done to it by hand.
@@ -159,7 +160,7 @@ impl<S: Real> Simulation<S> {
     ) -> Result<Self, SimulationError> {
         check_patches(&scene, &assembly)?;
         let model = assembly.builder.build::<S>()?;
-        let automatic::Chosen { settings: solver, period } =
+        let automatic::Chosen { settings: solver, oscillations } =
             automatic::choose_method(&scene, &assembly, &model, callers_device);
         let mut simulation = Self {
             state: State::at_rest(&model),
@@ -168,7 +169,7 @@ impl<S: Real> Simulation<S> {
             solver,
             callers_device,
             resumed_method: None,
-            period,
+            oscillations,
             inputs: Inputs::default(),
             taken: GraspOrigins::default(),
             written: scene.clone(),
@@ -194,8 +195,9 @@ impl<S: Real> Simulation<S> {
     fn choose_substeps(&mut self) {
         let inputs = automatic::fixings(&self.scene, &self.assembly);
         let frame = self.scene.time.frame;
-        (self.period, self.substeps) =
-            self.backend.substeps(&inputs, &self.solver, self.period, frame);
+        let known = self.oscillations.take();
+        (self.oscillations, self.substeps) =
+            self.backend.substeps(&inputs, &self.solver, known, frame);
     }
 
     /// The settings in force: the scene's, with the method that "auto" stands for.
@@ -219,12 +221,13 @@ impl<S: Real> Simulation<S> {
             (_, Count::Of(passes)) => passes >= fewest,
         };
         let frame = self.scene.time.frame;
-        let period = self.period.unwrap_or_else(|| match self.solver.method {
-            Method::Explicit => automatic::slowest_period(&self.scene, &self.assembly, &self.model),
-            _ => f64::INFINITY,
+        let oscillations = self.oscillations.clone().unwrap_or_else(|| match self.solver.method {
+            Method::Explicit => automatic::oscillations(&self.scene, &self.assembly, &self.model),
+            _ => Oscillations::default(),
         });
         let (substeps, small) = (self.substeps, self.stable_step());
-        let expected = automatic::expected_errors(&self.solver, period, frame, substeps, small);
+        let expected =
+            automatic::expected_errors(&self.solver, &oscillations, frame, substeps, small);
         // What fewer passes leave is not known.
         ExpectedErrors { motion: expected.motion.filter(|_| is_solved), ..expected }
     }

@@ -16,6 +16,7 @@ mod explicit;
 pub mod gpu;
 mod inputs;
 mod methods;
+pub mod oscillations;
 pub mod plan;
 #[cfg(test)]
 mod probe;
@@ -36,8 +37,10 @@ use crate::settings::{Count, Method, SolverSettings};
 use crate::state::State;
 use cpu::precision::{Task, Within, carry_out};
 pub use error::StepError;
+pub(crate) use explicit::growth as explicit_growth;
 pub use inputs::{Inputs, Pin, Tether};
 use inputs::{check_inputs, check_model, check_state, check_step};
+use oscillations::Oscillations;
 use plan::Plan;
 pub(crate) use quasi_newton::{choose, expected_motion_error};
 pub use report::StepReport;
@@ -245,26 +248,26 @@ impl<S: Real> Solver<S> {
         self.memory.stable_step()
     }
 
-    /// The period [s] of the slowest oscillation of what is held about the rest shape, of the part that oscillates
-    /// fastest; infinite where nothing is held, and for methods that need not know it. Forgets the last step.
-    pub fn slowest_period(&mut self, inputs: &Inputs<S>) -> f64 {
+    /// The oscillations about the rest shape of what these inputs hold, as far as a load in proportion to mass excites
+    /// them; none for methods that need not know them. Forgets the last step.
+    pub fn oscillations(&mut self, inputs: &Inputs<S>) -> Oscillations {
         let Self { settings, layout, memory, .. } = self;
         let step = Step { layout, inputs, dt: 1.0, settings };
-        cpu::precision::slowest_period(memory, &step)
+        cpu::precision::oscillations(memory, &step)
     }
 
     /// Substeps of a frame [s] in which these inputs hold the model: as many as the settings ask for; where they leave it
-    /// to the quasi-Newton method, as the slowest oscillation asks for. Forgets the last step.
+    /// to the quasi-Newton method, as oscillations ask for. Forgets the last step.
     pub fn substeps(&mut self, inputs: &Inputs<S>, frame: f64) -> u32 {
-        let period = self.slowest_period(inputs);
-        self.substeps_for(period, frame)
+        let oscillations = self.oscillations(inputs);
+        self.substeps_for(&oscillations, frame)
     }
 
-    /// As [`Solver::substeps`], of a slowest period [s] that is known.
-    pub fn substeps_for(&self, period: f64, frame: f64) -> u32 {
+    /// As [`Solver::substeps`], of oscillations that are known.
+    pub fn substeps_for(&self, oscillations: &Oscillations, frame: f64) -> u32 {
         match (self.settings.substeps, self.settings.method) {
             (Count::Auto, Method::QuasiNewton) => {
-                quasi_newton::substeps_for(period, frame, self.settings.accuracy.share())
+                quasi_newton::substeps_for(oscillations, frame, self.settings.accuracy.share())
             }
             (Count::Auto, Method::Explicit) => explicit::substeps_for(self.stable_step(), frame),
             _ => self.settings.substeps(),

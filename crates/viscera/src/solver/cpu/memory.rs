@@ -5,6 +5,7 @@ use crate::scalar::Real;
 use crate::settings::{Method, SolverSettings};
 use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
+use crate::solver::oscillations::Oscillations;
 use crate::solver::plan::{Flag, Stage};
 use crate::solver::report::StepReport;
 use crate::solver::step::data::{Step, StepData};
@@ -127,11 +128,11 @@ impl<S: Real> Memory<S> {
         learned
     }
 
-    /// See [`crate::solver::Solver::slowest_period`].
-    pub fn slowest_period(&mut self, step: &Step<'_, S>) -> f64 {
+    /// See [`crate::solver::Solver::oscillations`].
+    pub fn oscillations(&mut self, step: &Step<'_, S>) -> Oscillations {
         match &mut self.method {
-            MethodMemory::QuasiNewton(memory) => memory.slowest_period(step, &mut self.data),
-            _ => f64::INFINITY,
+            MethodMemory::QuasiNewton(memory) => memory.oscillations(step, &mut self.data),
+            _ => Oscillations::default(),
         }
     }
 

@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 
 use super::memory::Memory;
 use crate::scalar::{Real, Vec3};
+use crate::solver::oscillations::Oscillations;
 use crate::solver::plan::{Flag, Plan, Stage, StepStage, Visitor};
 use crate::solver::step::data::Step;
 use crate::state::{Learned, State};
@@ -22,8 +23,8 @@ pub enum Task<'a> {
     Watched(&'a Plan, u32, &'a mut Watch<'a>),
     /// Multipliers from positions.
     Restart,
-    /// The slowest period [s].
-    Period(&'a mut f64),
+    /// The oscillations of what is held.
+    Oscillations(&'a mut Oscillations),
 }
 
 /// Where a step stands among steps in a row: between them positions and velocities stay in the solver's order.
@@ -51,9 +52,9 @@ impl Within {
 /// positions of all vertices [m], the user's order.
 pub type Watch<'a> = dyn FnMut(u32, &[Vec3<f64>]) + Send + 'a;
 
-/// See [`crate::solver::Solver::slowest_period`].
-pub fn slowest_period<S: Real>(memory: &mut Memory<S>, step: &Step<'_, S>) -> f64 {
-    let mut period = f64::INFINITY;
+/// See [`crate::solver::Solver::oscillations`].
+pub fn oscillations<S: Real>(memory: &mut Memory<S>, step: &Step<'_, S>) -> Oscillations {
+    let mut oscillations = Oscillations::default();
     let mut nothing = State {
         positions: Vec::new(),
         velocities: Vec::new(),
@@ -61,8 +62,8 @@ pub fn slowest_period<S: Real>(memory: &mut Memory<S>, step: &Step<'_, S>) -> f6
         multiplier_dt: 0.0,
         learned: Learned::default(),
     };
-    carry_out(Task::Period(&mut period), memory, step, &mut nothing);
-    period
+    carry_out(Task::Oscillations(&mut oscillations), memory, step, &mut nothing);
+    oscillations
 }
 
 /// Carries a request out in one precision.
@@ -138,7 +139,7 @@ fn generic<S: Real>(
             plan.walk(small_steps, &mut Execution { memory, step, state, within, left, observer });
         }
         Task::Restart => memory.restart(step, state),
-        Task::Period(period) => *period = memory.slowest_period(step),
+        Task::Oscillations(all) => *all = memory.oscillations(step),
     });
 }
 

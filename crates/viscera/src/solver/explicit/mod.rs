@@ -41,7 +41,7 @@ use forces::Pieces;
 #[cfg(feature = "gpu")]
 pub use present::calm_ahead;
 use present::{AtRest, SmallSteps};
-pub use stability::{Stability, small_steps, substeps_for};
+pub use stability::{Stability, growth, small_steps, substeps_for};
 use stage::ExplicitStage;
 
 /// The stages of a step.

@@ -17,6 +17,7 @@ use crate::model::for_each_kind;
 use crate::scalar::{Mat3, Real};
 use crate::settings::SolverSettings;
 use crate::solver::error::StepError;
+use crate::solver::oscillations::Growth;
 use crate::solver::step::tethers::Bundle;
 
 /// More small steps than this in one step are a mistake of units rather than patience.
@@ -207,6 +208,12 @@ pub(super) fn element_stiffness(shape: &Mat3<f64>, [lambda, mu]: [f64; 2]) -> f6
     value
 }
 
+/// What a small step makes of an oscillation that turns by an angle in it: drift, kick, drift turns it by `phi`,
+/// `cos phi = 1 - angle^2/2`, and neither damps it nor lets it grow while `angle < 2`.
+pub fn growth(angle: f64) -> Growth {
+    Growth { logarithm: 0.0, angle: 2.0 * libm::asin((0.5 * angle).min(1.0)) }
+}
+
 /// Substeps of a frame [s] in which every substep has some [`FEWEST`] small steps, of `stable` [s] at most: what moves or
 /// loads the body is followed as often as costs next to nothing.
 pub fn substeps_for(stable: f64, frame: f64) -> u32 {
@@ -226,4 +233,26 @@ pub fn small_steps(dt: f64, stable: f64) -> Result<u32, StepError> {
         return Ok(count as u32);
     }
     Err(StepError::TooStiff { dt, stable })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Drift, kick, drift on `x'' = -x` from rest, step after step.
+    #[test]
+    fn growth_is_that_of_small_steps() {
+        for h in [0.01, 0.3, 1.9] {
+            let found = growth(h);
+            let (mut x, mut v) = (1.0, 0.0);
+            for step in 1..=7 {
+                x += 0.5 * h * v;
+                v -= h * x;
+                x += 0.5 * h * v;
+                let expected = libm::cos(f64::from(step) * found.angle);
+                assert!((x - expected).abs() < 1e-13, "{h}: {x} of {expected}");
+            }
+            assert_eq!(found.logarithm, 0.0);
+        }
+    }
 }

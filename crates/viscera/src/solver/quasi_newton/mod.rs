@@ -18,8 +18,8 @@
 mod choice;
 mod direction;
 mod evaluate;
+mod oscillations;
 mod parts;
-mod period;
 mod preconditioner;
 pub mod stage;
 mod time;

@@ -24,7 +24,7 @@ use crate::solver::step::strain::{keep_share, measure_strain};
 use crate::state::{Learned, State};
 
 /// `c`.
-const SHARE: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
+pub(super) const SHARE: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 
 /// A vertex moves by less than so many units of the precision of the largest coordinate: round-off.
 const RESOLUTION: f64 = 1.0;
