@@ -90,19 +90,45 @@ fn choose_by_cost<S: Real>(
     let oscillations = quasi_newton.oscillations(&fixings());
     let substeps = quasi_newton.substeps_for(&oscillations, frame);
     let of_large = cost(&large, model, frame, substeps, f64::INFINITY);
-    let small = asked.chosen(Method::Explicit);
-    let mut explicit = Solver::new(model, &small);
-    let most = asked.accuracy.share().max(EXPLICIT_LEAST);
-    let error = explicit_error(&oscillations, explicit.stable_step());
-    if error > most {
-        // Of the second order.
-        let explicit_safety = small.explicit_safety * (most / error).sqrt();
-        explicit = Solver::new(model, &SolverSettings { explicit_safety, ..small });
-    }
+    let explicit = explicit_solver(asked, model, &oscillations);
     let small_steps = explicit.substeps_for(&oscillations, frame);
     let of_explicit = cost(explicit.settings(), model, frame, small_steps, explicit.stable_step());
     let is_explicit = of_explicit < of_large;
     let settings = if is_explicit { explicit.settings().clone() } else { large };
+    Chosen { settings, oscillations: Some(oscillations) }
+}
+
+/// The explicit method with steps as short as the accuracy asks for.
+fn explicit_solver<S: Real>(
+    asked: &SolverSettings,
+    model: &Model<S>,
+    oscillations: &Oscillations,
+) -> Solver<S> {
+    let settings = asked.chosen(Method::Explicit);
+    let solver = Solver::new(model, &settings);
+    let most = asked.accuracy.share().max(EXPLICIT_LEAST);
+    let error = explicit_error(oscillations, solver.stable_step());
+    if error <= most {
+        return solver;
+    }
+    // Of the second order.
+    let explicit_safety = settings.explicit_safety * (most / error).sqrt();
+    Solver::new(model, &SolverSettings { explicit_safety, ..settings })
+}
+
+/// As [`choose_method`] of a scene whose method is "auto", where the choice fell upon this one before.
+pub fn keep_method<S: Real>(
+    scene: &Scene,
+    assembly: &Assembly,
+    model: &Model<S>,
+    method: Method,
+) -> Chosen {
+    let asked = &scene.solver.foreseen();
+    if method != Method::Explicit {
+        return Chosen { settings: asked.chosen(method), oscillations: None };
+    }
+    let oscillations = oscillations(scene, assembly, model);
+    let settings = explicit_solver(asked, model, &oscillations).settings().clone();
     Chosen { settings, oscillations: Some(oscillations) }
 }
 

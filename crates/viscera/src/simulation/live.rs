@@ -240,7 +240,7 @@ impl<S: Real> Simulation<S> {
         let on_device = same_device && self.callers_device;
         self.resumed_method = self.resumed_method.filter(|_| same_device);
         let Chosen { settings: solver, oscillations } = match self.resumed_method {
-            Some(method) => Chosen { settings: scene.solver.chosen(method), oscillations: None },
+            Some(method) => automatic::keep_method(&scene, &self.assembly, &model, method),
             None => automatic::choose_method(&scene, &self.assembly, &model, on_device),
         };
         let backend = self.backend.renew(same_device, &model, &solver)?;

@@ -6,6 +6,7 @@
 //! ([`Simulation::live`]).
 
 use super::Simulation;
+use super::automatic::{self, Chosen};
 use super::device::Backend;
 use super::error::LiveError;
 use super::holding::GraspOrigins;
@@ -205,9 +206,10 @@ impl<S: Real> Simulation<S> {
         if self.scene.solver.method != Method::Auto || self.callers_device {
             return Err(refused);
         }
-        let solver = self.scene.solver.chosen(saved);
-        self.backend = Backend::choose(&self.model, &solver).map_err(|_| refused)?;
-        self.solver = solver;
+        let Chosen { settings, oscillations } =
+            automatic::keep_method(&self.scene, &self.assembly, &self.model, saved);
+        self.backend = Backend::choose(&self.model, &settings).map_err(|_| refused)?;
+        (self.solver, self.oscillations) = (settings, oscillations);
         self.resumed_method = Some(saved);
         self.choose_substeps();
         Ok(())

@@ -112,7 +112,9 @@ impl<S: Real> Memory<S> {
                 new.add(before, -inertia(&new.vector, &before.vector));
             }
             let left = inertia(&new.vector, &new.vector);
-            if !(left > NOTHING * NOTHING * whole) {
+            // What is no number is nothing either.
+            let is_new = left > NOTHING * NOTHING * whole;
+            if !is_new {
                 break;
             }
             if round == 0 {
