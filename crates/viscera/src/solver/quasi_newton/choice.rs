@@ -1,11 +1,11 @@
 //! What the method chooses by itself where the settings do not.
 
-use super::time::SHARE;
+use super::sdirk2::growth;
 use crate::layout::{Layout, Part};
 use crate::material::MaterialConstants;
 use crate::scalar::Real;
 use crate::settings::{Count, MOST_HISTORY, SolverSettings};
-use crate::solver::oscillations::{Growth, Oscillations};
+use crate::solver::oscillations::Oscillations;
 
 /// Passes and pairs up to a Poisson's ratio, for [`STANDARD`]: the fewest that follow a swinging bar of 1,280 and of 10,240 tetrahedra to
 /// within about 4 %, with one step per frame (5 % at 0.49). What is nearly incompressible converges more slowly.
@@ -115,14 +115,6 @@ fn error_of_large_motion(step: f64) -> f64 {
     LARGE_MOTION * of_step * of_step
 }
 
-/// What a step of SDIRK2 makes of an oscillation that turns by an angle in it: `R(z) = (1 + (1 - 2 c) z)/(1 - c z)^2`,
-/// `z` imaginary.
-fn growth(angle: f64) -> Growth {
-    let [above, below] = [(1.0 - 2.0 * SHARE) * angle, SHARE * angle];
-    let logarithm = 0.5 * libm::log1p(above * above) - libm::log1p(below * below);
-    Growth { logarithm, angle: libm::atan(above) + 2.0 * libm::atan(below) }
-}
-
 /// Errors found over those of linear oscillations: 0.8 to 1.5 on bars and organs, whose motion is large and whose solves
 /// are cut short.
 const MARGIN: f64 = 1.7;
@@ -145,28 +137,6 @@ mod tests {
     use crate::mesh::shapes;
     use crate::model::ModelBuilder;
     use crate::solver::oscillations::Oscillation;
-
-    /// One step of the scheme of `time.rs` on `x'' = -x`, both of its solves exact, multiplies `x - i v` by `R`.
-    #[test]
-    fn growth_is_that_of_the_scheme() {
-        for h in [0.01, 0.3, 1.7] {
-            let he = SHARE * h;
-            // Of (1 + he^2) x = xs + he vs, v = (x - xs)/he.
-            let solve = |xs: f64, vs: f64| {
-                let x = (xs + he * vs) / (1.0 + he * he);
-                (x, (x - xs) / he)
-            };
-            let d = (1.0 - SHARE) * h;
-            let (_, v1) = solve(1.0, 0.0);
-            let a1 = v1 / he;
-            let (x, v) = solve(1.0 + d * v1, d * a1);
-            let found = growth(h);
-            let length = libm::exp(found.logarithm);
-            let [along, beside] = [libm::cos(found.angle), libm::sin(found.angle)];
-            assert!((x - length * along).abs() < 1e-12, "{h}: {x}");
-            assert!((v + length * beside).abs() < 1e-12, "{h}: {v}");
-        }
-    }
 
     /// Half the error asks for about 1.4 times as many substeps; a body that swings faster for more, up to a limit.
     #[test]

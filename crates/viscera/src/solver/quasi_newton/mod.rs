@@ -21,6 +21,7 @@ mod evaluate;
 mod oscillations;
 mod parts;
 mod preconditioner;
+mod sdirk2;
 pub mod stage;
 mod time;
 mod vectors;

@@ -13,6 +13,7 @@
 
 use super::parts::{Phase, Scheme};
 use super::preconditioner::Curvature;
+use super::sdirk2::SHARE;
 use super::stage::Solve;
 use super::{Memory, Pair, moments, passes_of};
 use crate::scalar::{Real, Vec3};
@@ -22,9 +23,6 @@ use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::predict::Tethers;
 use crate::solver::step::strain::{keep_share, measure_strain};
 use crate::state::{Learned, State};
-
-/// `c`.
-pub(super) const SHARE: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 
 /// A vertex moves by less than so many units of the precision of the largest coordinate: round-off.
 const RESOLUTION: f64 = 1.0;
