@@ -14,10 +14,14 @@
 
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::{attachment, deformation_gradient, internal_forces, law, shape_gradients};
+use crate::layout::{Domains, Smoothing};
+use crate::material::{MaterialConstants, MaterialModel};
 use crate::model::Model;
 use crate::model::{ElementList, for_each_kind};
 use crate::scalar::{Real, Vec3};
+use crate::settings::Elements;
 use crate::solver::Inputs;
+use crate::solver::recovered::Recovered;
 
 /// The difference quotient's step, as a share of the shortest distance over which strain changes by one: far
 /// above the square root of round-off, far below where curvature changes.
@@ -74,9 +78,10 @@ impl WayToRest {
         x: &[Vec3<S>],
         velocities: &[Vec3<f64>],
         inputs: &Inputs<S>,
+        elements: Elements,
     ) -> Option<Self> {
         let x: Vec<Vec3<f64>> = x.iter().map(|x| x.cast()).collect();
-        let statics = Statics::new(model, inputs);
+        let statics = Statics::new(model, inputs, elements);
         if !statics.is_held {
             return None;
         }
@@ -105,10 +110,12 @@ struct Statics<'a, S> {
     softness: Vec<f64>,
     /// The length [m] over which strain changes by one, the smallest of the mesh.
     shortest: f64,
+    /// Where stable neo-Hookean tetrahedra are recovered-gradient tetrahedra.
+    recovered: Option<(Domains<f64>, Vec<MaterialConstants<f64>>)>,
 }
 
 impl<'a, S: Real> Statics<'a, S> {
-    fn new(model: &'a Model<S>, inputs: &'a Inputs<S>) -> Self {
+    fn new(model: &'a Model<S>, inputs: &'a Inputs<S>, elements: Elements) -> Self {
         let (stiffness, shortest) = diagonal(model, inputs);
         // A part that nothing holds has no state of rest: `K` has its rigid motions in the null space, and conjugate
         // gradients would run off along them. Pins come last: a pinned vertex holds its part, but does not move.
@@ -118,7 +125,11 @@ impl<'a, S: Real> Statics<'a, S> {
             moves[pin.vertex as usize] = false;
         }
         let softness = stiffness.iter().map(|&k| if k > 0.0 { 1.0 / k } else { 0.0 }).collect();
-        Self { model, inputs, is_held, moves, softness, shortest }
+        let recovered = (elements == Elements::Recovered).then(|| {
+            let materials = model.materials.iter().map(MaterialConstants::cast).collect();
+            (Domains::cast_from(model, Smoothing::RECOVERED), materials)
+        });
+        Self { model, inputs, is_held, moves, softness, shortest, recovered }
     }
 
     /// `grad V` [N] of vertices that move, zero for others.
@@ -171,7 +182,13 @@ impl<'a, S: Real> Statics<'a, S> {
 
     /// Of the tetrahedra.
     fn add_tissue(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) {
-        for tet in self.model.tets() {
+        if let Some((domains, materials)) = &self.recovered {
+            let mut tets = Recovered::new(domains);
+            tets.evaluate(domains, materials, x);
+            tets.add_gradient(domains, materials, gradient);
+        }
+        let is_plain = |law| self.recovered.is_none() || law != MaterialModel::StableNeoHookean;
+        for tet in self.model.tets().filter(|tet| is_plain(tet.law)) {
             let shape = tet.inverse_rest_shape.cast::<f64>();
             let volume = tet.rest_volume.to_f64();
             let material = &self.model.materials[tet.material as usize];

@@ -1,7 +1,7 @@
 //! The solvers that `viscera bench` measures.
 
 use viscera::material::{Material, MaterialError, MaterialModel};
-use viscera::settings::{Acceleration, Colors, Method, SolverSettings};
+use viscera::settings::{Acceleration, Colors, Elements, Method, SolverSettings};
 
 /// One of them.
 #[derive(Clone)]
@@ -30,7 +30,7 @@ const GREEN: MaterialModel = MaterialModel::SaintVenantKirchhoff;
 const NEO: MaterialModel = MaterialModel::StableNeoHookean;
 
 /// All of them, in the order of the results.
-pub const SOLVERS: [SolverEntry; 14] = [
+pub const SOLVERS: [SolverEntry; 15] = [
     entry("green", "XPBD as published, Saint Venant-Kirchhoff", GREEN, FEW, publish),
     entry("pair", "XPBD as published, stable neo-Hookean pair", NEO, FEW, publish),
     entry("green-exact", "the default, Saint Venant-Kirchhoff", GREEN, FEW, |_| {}),
@@ -60,6 +60,10 @@ pub const SOLVERS: [SolverEntry; 14] = [
     }),
     entry("explicit-green", "explicit, Saint Venant-Kirchhoff", GREEN, SMALL_STEPS, explicit),
     entry("explicit", "explicit, stable neo-Hookean", NEO, SMALL_STEPS, explicit),
+    entry("explicit-recovered", "the same, recovered-gradient tetrahedra", NEO, SMALL_STEPS, |s| {
+        explicit(s);
+        s.elements = Elements::Recovered;
+    }),
     entry(
         "quasi-newton-green",
         "quasi-Newton with the passes that it chooses, Saint Venant-Kirchhoff",

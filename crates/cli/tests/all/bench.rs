@@ -78,6 +78,7 @@ fn every_solver_is_measured_at_every_size_with_every_number_of_threads() {
         "anderson",
         "explicit-green",
         "explicit",
+        "explicit-recovered",
         "quasi-newton-green",
         "quasi-newton",
     ];

@@ -9,8 +9,10 @@ use viscera::mesh::shapes::{Block, Splitting};
 use viscera::mesh::topology::boundary_surface;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Mat3, Vec3, vec3};
+use viscera::settings::{Elements, Method, SolverSettings};
 use viscera::solver::recovered::Recovered;
-use viscera::solver::{Inputs, Pin};
+use viscera::solver::{Inputs, Pin, Solver};
+use viscera::state::State;
 use viscera_lab::load_cases::Random;
 use viscera_lab::reference::Reference;
 use viscera_lab::reference::matrix::Pattern;
@@ -378,4 +380,33 @@ fn fitted_faces_do_not_know_axes_and_units() {
     for (a, b) in before.iter().zip(&after) {
         assert!((a - b).abs() < 1e-10, "{a} {b}");
     }
+}
+
+/// Viscous explicit steps come to the rest that the reference finds from the definition, on a mesh of two materials.
+#[test]
+fn explicit_steps_come_to_the_rest_of_the_definition() {
+    let mesh = with_regions(&bar([4, 2, 2]), |_, x| u32::from(x.x > 0.02));
+    let viscous = |young, poisson| material(young, poisson).with_viscosity(0.05).expect("legal");
+    let mut builder = ModelBuilder::new();
+    let body = builder.add_body(&mesh, &viscous(1e4, 0.3)).expect("a body");
+    builder.set_region_material(body, 1, &viscous(5e3, 0.45)).expect("a region");
+    let model: Model<f64> = build(&builder);
+    let at_wall = (0u32..).zip(&model.rest_positions).filter(|(_, x)| x.x < 1e-9);
+    let pins = at_wall.map(|(vertex, &target)| Pin { vertex, target }).collect();
+    let inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81), pins, ..Inputs::default() };
+    let (method, elements) = (Method::Explicit, Elements::Recovered);
+    let settings = SolverSettings { method, elements, ..SolverSettings::default() };
+    let mut solver = Solver::new(&model, &settings);
+    let mut state = State::at_rest(&model);
+    for _ in 0..180 {
+        solver.step(&model, &mut state, &inputs, 1.0 / 60.0).expect("a legal step");
+    }
+    let mut reference = Reference::recovered(&model, Smoothing::RECOVERED);
+    let start = &model.rest_positions;
+    let rest = reference.settle(start, &inputs).expect("a state of rest").positions;
+    let error = distance(&state.positions, &rest) / distance(&rest, &model.rest_positions);
+    let linear = Reference::new(&model).settle(&rest, &inputs).expect("a state of rest").positions;
+    let locked = distance(&linear, &rest) / distance(&rest, &model.rest_positions);
+    println!("{error:.1e} from the reference, which linear tetrahedra are {locked:.2} from");
+    assert!(error < 1e-6 && locked > 0.1, "{error:e}, {locked}");
 }

@@ -83,6 +83,11 @@ pub struct Domains<S> {
 impl<S: Real> Domains<S> {
     /// Of the model's stable neo-Hookean tetrahedra; those of other laws have none.
     pub fn new(model: &Model<S>, smoothing: Smoothing) -> Self {
+        Self::cast_from(model, smoothing)
+    }
+
+    /// As [`Domains::new`], of a model in any precision.
+    pub fn cast_from<M: Real>(model: &Model<M>, smoothing: Smoothing) -> Self {
         let is_of_law = |&tet: &u32| {
             let material = model.tet_materials[tet as usize] as usize;
             model.laws[material] == MaterialModel::StableNeoHookean

@@ -10,6 +10,7 @@ pub(crate) mod lattice;
 mod order;
 mod parts;
 mod pieces;
+mod recovered;
 mod tets;
 
 use std::ops::Range;
@@ -23,6 +24,7 @@ use parts::Laid;
 pub(crate) use parts::Part;
 pub(crate) use pieces::PIECE_BLOCKS;
 use pieces::in_pieces;
+pub(crate) use recovered::{Entry, Frames, PartRanges, RecoveredTables};
 pub(crate) use tets::TetBlock;
 pub use tets::{LaidTet, TetSet};
 
@@ -32,7 +34,7 @@ use crate::material::{MaterialConstants, MaterialModel};
 use crate::model::{Model, Numbering, for_each_kind};
 use crate::scalar::lanes::LANES;
 use crate::scalar::{Real, Vec3};
-use crate::settings::{Method, SolverSettings};
+use crate::settings::{Elements, Method, SolverSettings};
 
 /// A model, laid out.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,6 +64,8 @@ pub struct Layout<S> {
     pub(crate) parts: Arc<[Part]>,
     /// Copies of vertex `v`, in the solver's numbering, are `copy_offsets[v] .. copy_offsets[v + 1]`.
     pub(crate) copy_offsets: Vec<u32>,
+    /// Where the tetrahedra of the stable neo-Hookean law are recovered-gradient tetrahedra.
+    pub(crate) recovered: Option<RecoveredTables<S>>,
 }
 
 impl<S: Real> Layout<S> {
@@ -119,7 +123,7 @@ impl<S: Real> Layout<S> {
             color_count,
         }
         .parts();
-        Self {
+        let mut layout = Self {
             revision: model.revision,
             rest_positions: model.rest_positions.clone(),
             masses: model.masses.clone(),
@@ -136,7 +140,14 @@ impl<S: Real> Layout<S> {
             numbering: Arc::clone(numbering),
             parts: Arc::from(parts),
             copy_offsets,
+            recovered: None,
+        };
+        // The other methods have linear tetrahedra; the solver refuses settings that ask them for more.
+        if settings.elements == Elements::Recovered && settings.method == Method::Explicit {
+            let domains = Domains::new(model, Smoothing::RECOVERED);
+            layout.recovered = Some(RecoveredTables::new(&layout, &domains));
         }
+        layout
     }
 
     /// Number of vertices of all bodies.
@@ -220,6 +231,7 @@ impl<S: Real> Layout<S> {
             + size_of_val(&self.parts[..])
             + self.parts.iter().map(Part::bytes).sum::<usize>()
             + size_of_val(&self.copy_offsets[..])
+            + self.recovered.as_ref().map_or(0, RecoveredTables::bytes)
     }
 }
 

@@ -23,7 +23,7 @@ mod presets;
 
 pub use presets::{PRESET_CAUTION, PRESETS, Preset, UnknownPreset, preset};
 
-use crate::scalar::Scalar;
+use crate::scalar::{Real, Scalar};
 use crate::settings::choices;
 use crate::units::Dimension;
 
@@ -66,6 +66,20 @@ pub struct MaterialConstants<S> {
     pub compliance: Compliance<S>,
     /// Retardation time [s] of the viscous stress; zero for none.
     pub viscosity: S,
+}
+
+impl<S: Real> MaterialConstants<S> {
+    /// The same in another precision.
+    pub fn cast<T: Real>(&self) -> MaterialConstants<T> {
+        let of = |number: S| T::from_f64(number.to_f64());
+        let Compliance { normal, cross, shear } = self.compliance;
+        MaterialConstants {
+            lame_lambda: of(self.lame_lambda),
+            lame_mu: of(self.lame_mu),
+            compliance: Compliance { normal: of(normal), cross: of(cross), shear: of(shear) },
+            viscosity: of(self.viscosity),
+        }
+    }
 }
 
 /// Why numbers are not a material.

@@ -7,12 +7,14 @@
 
 mod accuracy;
 mod compound;
+mod elements;
 mod foreseen;
 mod kind;
 mod solver;
 mod tree;
 
 pub use accuracy::{Accuracy, FINEST, ROUGHEST};
+pub use elements::Elements;
 pub use solver::{
     Acceleration, AndersonGuard, AndersonOn, Colors, Count, DeviceRequest, Integrator,
     MOST_HISTORY, MOST_THREADS, Method, NeoHookean, Precision, RelaxationForm, SolverSettings,

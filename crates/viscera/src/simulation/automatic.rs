@@ -5,7 +5,7 @@ use super::holding::GraspOrigins;
 use crate::model::Model;
 use crate::scalar::Real;
 use crate::scene::Scene;
-use crate::settings::{Integrator, Method, SolverSettings};
+use crate::settings::{Elements, Integrator, Method, SolverSettings};
 use crate::solver::oscillations::Oscillations;
 use crate::solver::{Inputs, Solver, choose, expected_motion_error, explicit_growth};
 
@@ -85,6 +85,11 @@ fn choose_by_cost<S: Real>(
     let large = asked.chosen(Method::QuasiNewton);
     if asked.method != Method::Auto {
         return Chosen { settings: large, oscillations: None };
+    }
+    if asked.elements == Elements::Recovered {
+        let oscillations = Solver::new(model, &large).oscillations(&fixings());
+        let settings = explicit_solver(asked, model, &oscillations).settings().clone();
+        return Chosen { settings, oscillations: Some(oscillations) };
     }
     let mut quasi_newton = Solver::new(model, &large);
     let oscillations = quasi_newton.oscillations(&fixings());

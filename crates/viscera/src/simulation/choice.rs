@@ -6,9 +6,9 @@ use super::error::SimulationError;
 use super::gpu;
 use crate::model::Model;
 use crate::scalar::Real;
-#[cfg(feature = "gpu")]
-use crate::settings::Method;
 use crate::settings::{DeviceRequest, SolverSettings};
+#[cfg(feature = "gpu")]
+use crate::settings::{Elements, Method};
 use crate::solver::Solver;
 
 impl<S: Real> Backend<S> {
@@ -40,6 +40,7 @@ impl<S: Real> Backend<S> {
         #[cfg(feature = "gpu")]
         if same_device
             && settings.method != Method::QuasiNewton
+            && settings.elements == Elements::Plain
             && let Some(again) = gpu::again(self, model, settings)
         {
             return match again {

@@ -44,6 +44,9 @@ pub enum SimulationError {
         /// What was asked for.
         device: DeviceRequest,
     },
+    /// The method cannot do it.
+    #[error(transparent)]
+    Step(#[from] StepError),
     /// The device cannot do it.
     #[cfg(feature = "gpu")]
     #[error(transparent)]

@@ -10,6 +10,7 @@ use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
 use crate::settings::{Precision, SolverSettings};
 use crate::solver::balance::ForceBalance;
+use crate::solver::check_elements;
 use crate::state::{Learned, State};
 
 /// What was done by hand since the beginning or the last [`Simulation::reset`].
@@ -243,6 +244,7 @@ impl<S: Real> Simulation<S> {
             Some(method) => automatic::keep_method(&scene, &self.assembly, &model, method),
             None => automatic::choose_method(&scene, &self.assembly, &model, on_device),
         };
+        check_elements(&solver).map_err(SimulationError::from)?;
         let backend = self.backend.renew(same_device, &model, &solver)?;
         let rest = State::at_rest(&model);
         let state = State {

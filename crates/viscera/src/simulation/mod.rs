@@ -34,10 +34,10 @@ use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Scene};
-use crate::settings::{Count, Method, SolverSettings};
+use crate::settings::{Count, Elements, Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::oscillations::Oscillations;
-use crate::solver::{Inputs, Solver, choose};
+use crate::solver::{Inputs, Solver, check_elements, choose};
 use crate::state::State;
 use device::Backend;
 use std::fmt;
@@ -162,6 +162,7 @@ impl<S: Real> Simulation<S> {
         let model = assembly.builder.build::<S>()?;
         let automatic::Chosen { settings: solver, oscillations } =
             automatic::choose_method(&scene, &assembly, &model, callers_device);
+        check_elements(&solver)?;
         let mut simulation = Self {
             state: State::at_rest(&model),
             substeps: solver.substeps(),
@@ -439,6 +440,15 @@ impl<S: Real> Simulation<S> {
         state
     }
 
+    /// Energies; of recovered-gradient tetrahedra with their own, once a step has found it.
+    fn energies(&self) -> Energies {
+        let mut all = measure_energies(&self.model, &self.state, &self.inputs, &self.tissue);
+        if self.solver.elements == Elements::Recovered && self.stepped {
+            all.elastic += self.balance.elastic_energy - self.tissue.elastic_energy;
+        }
+        all
+    }
+
     /// The numbers of the last frame.
     pub fn report(&self) -> FrameReport {
         FrameReport {
@@ -447,7 +457,7 @@ impl<S: Real> Simulation<S> {
             relative_residual: self.balance.relative_residual(),
             stiffness_error: self.balance.stiffness_error(),
             rejected_substeps: self.rejected_substeps,
-            energy: measure_energies(&self.model, &self.state, &self.inputs, &self.tissue),
+            energy: self.energies(),
             deformation: self.tissue.deformation,
             patches: self.patch_forces(),
         }

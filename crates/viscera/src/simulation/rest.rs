@@ -154,7 +154,8 @@ impl<S: Real> Simulation<S> {
         let positions = &self.state.positions;
         let steps = positions.iter().zip(&self.before).map(|(x, y)| x.cast::<f64>() - y.cast());
         let velocities: Vec<Vec3<f64>> = steps.map(|step| step * (1.0 / frame)).collect();
-        let measured = WayToRest::measure(&self.model, positions, &velocities, &inputs)?;
+        let measured =
+            WayToRest::measure(&self.model, positions, &velocities, &inputs, self.solver.elements)?;
         let speed = velocities.iter().map(|v| v.length()).fold(0.0, f64::max);
         let gone: f64 = velocities.iter().zip(&measured.way).map(|(v, way)| v.dot(*way)).sum();
         let length: f64 = measured.way.iter().map(|way| way.length_squared()).sum();

@@ -1,5 +1,7 @@
 //! Why a step cannot be made.
 
+use crate::settings::Method;
+
 /// Why a step cannot be made. The state is unchanged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -20,6 +22,15 @@ pub enum StepError {
         dt: f64,
         /// The largest stable one [s].
         stable: f64,
+    },
+    /// The method has linear tetrahedra only.
+    #[error(
+        "`elements = \"recovered\"` is computed by `method = \"explicit\"` on the CPU only, and not by \"{method}\"; use that \
+         method, or `elements = \"plain\"`"
+    )]
+    Elements {
+        /// The method of the settings.
+        method: Method,
     },
     /// An input names no vertex.
     #[error("a {what} names vertex {vertex}; the model has {vertex_count}")]

@@ -4,6 +4,7 @@ use super::error::StepError;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
+use crate::settings::{Elements, Method, SolverSettings};
 use crate::state::State;
 
 /// A vertex that is moved, not simulated, during a step.
@@ -94,6 +95,15 @@ pub(crate) fn check_step<S: Real>(
 
 fn is_legal<S: Real>(tether: &Tether<S>) -> bool {
     tether.target.is_finite() && tether.stiffness >= S::ZERO && tether.stiffness.is_finite()
+}
+
+/// The method has the elements.
+pub(crate) fn check_elements(settings: &SolverSettings) -> Result<(), StepError> {
+    let method = settings.method;
+    match settings.elements {
+        Elements::Recovered if method != Method::Explicit => Err(StepError::Elements { method }),
+        _ => Ok(()),
+    }
 }
 
 /// The model is the one that was laid out.

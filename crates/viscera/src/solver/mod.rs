@@ -38,6 +38,7 @@ use crate::state::State;
 use cpu::precision::{Task, Within, carry_out};
 pub use error::StepError;
 pub(crate) use explicit::growth as explicit_growth;
+pub(crate) use inputs::check_elements;
 pub use inputs::{Inputs, Pin, Tether};
 use inputs::{check_inputs, check_model, check_state, check_step};
 use oscillations::Oscillations;
@@ -225,6 +226,7 @@ impl<S: Real> Solver<S> {
         inputs: &Inputs<S>,
         dt: f64,
     ) -> Result<(), StepError> {
+        check_elements(&self.settings)?;
         check_model(&self.layout, model)?;
         check_step(dt, &self.layout, inputs)?;
         check_state(&self.layout, state)?;

@@ -5,7 +5,7 @@ use crate::common::device::{everything, largest};
 use crate::common::{SNH, block, material, single_body};
 use viscera::model::Model;
 use viscera::scalar::{Real, vec3};
-use viscera::settings::{Acceleration, Colors, Method, Precision, SolverSettings};
+use viscera::settings::{Acceleration, Colors, Elements, Method, Precision, SolverSettings};
 use viscera::solver::gpu::{Device, GpuSolver};
 use viscera::solver::{Inputs, Pin, Solver, StepError, Tether};
 use viscera::state::{Learned, State};
@@ -141,4 +141,14 @@ fn too_many_small_steps_are_refused() {
     let mut after = State::at_rest(&model);
     gpu.read(&model, &mut after).expect("a device");
     assert_eq!(after, before);
+}
+
+#[test]
+fn recovered_gradient_tetrahedra_are_refused() {
+    let elements = Elements::Recovered;
+    let settings = SolverSettings { elements, ..explicit(Colors::Unlimited) };
+    let model = single_body::<f32>(&block([0.02; 3], [1; 3], 0.0), &material(SNH, 1e4, 0.4));
+    let error = GpuSolver::new(device::device(), &model, &settings).map(|_| ());
+    let error = error.expect_err("kernels of linear ones only").to_string();
+    assert!(error.contains("`elements = \"plain\"`"), "{error}");
 }

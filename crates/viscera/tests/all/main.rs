@@ -45,6 +45,7 @@ mod pins;
 mod quasi_newton;
 mod quasi_newton_robust;
 mod readme;
+mod recovered;
 mod saved;
 mod scene_errors;
 mod scene_files;

@@ -37,7 +37,7 @@ pub struct Corners<L> {
 
 impl<'a, S: Real> Block<'a, S> {
     #[inline(always)]
-    fn new(layout: &'a Layout<S>, set: &'a TetSet<S>, index: usize, lane: usize) -> Self {
+    pub fn new(layout: &'a Layout<S>, set: &'a TetSet<S>, index: usize, lane: usize) -> Self {
         Self { set, index, lane, constants: &set.blocks[index], materials: &layout.materials }
     }
 
@@ -209,16 +209,34 @@ impl<'a, S: Real> Block<'a, S> {
         let copies = self.set.copies_of(self.index);
         assert!(points.len() >= self.set.bounds[1]);
         let values = values.map(|value| Point::new(value, bound));
+        // SAFETY: below the bound, which is checked above; alone there by the caller's promise.
+        unsafe { self.add_rows_in_order(points, 0, copies, values) };
+    }
+
+    /// As [`Block::add_bound_in_order`], to points of other indices, each so many further on.
+    ///
+    /// # Safety
+    /// There are points of all these indices, and no other thread uses them meanwhile.
+    #[inline(always)]
+    pub unsafe fn add_rows_in_order<L: Lanes<Real = S>>(
+        &self,
+        points: &Shared<'_, Point<S>>,
+        further: usize,
+        indices: &[Eight<u32>; 4],
+        values: [Point<L>; 4],
+    ) {
+        // SAFETY: the caller's promise.
+        let points = unsafe { points.pointer().add(further) };
         if self.whole::<L>() {
-            // SAFETY: below the bound, which is checked above; alone there by the caller's promise.
-            unsafe { L::add_in_order(points.pointer(), copies, self.lane, values) };
+            // SAFETY: the caller's promise.
+            unsafe { L::add_in_order(points, indices, self.lane, values) };
             return;
         }
         let values = values.map(|value| rows(value, self.lane));
         for lane in self.lane..self.filled() {
             let values = values.map(|rows| rows[lane]);
-            // SAFETY: as above.
-            unsafe { S::add_in_order(points.pointer(), copies, lane, values) };
+            // SAFETY: the caller's promise.
+            unsafe { S::add_in_order(points, indices, lane, values) };
         }
     }
 

@@ -12,6 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use crate::elements::law::{LAWS, Law};
 use crate::elements::{deformation_gradient, green_strain, internal_forces};
 use crate::layout::{Layout, Moments, PIECE_BLOCKS, Part};
+use crate::material::MaterialModel;
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::solver::cpu::tets::{Block, TetPass, load_rows};
@@ -19,6 +20,8 @@ use crate::solver::cpu::threads::Shared;
 use crate::solver::step::data::{Step, StepConstants};
 use crate::solver::step::gradient::add_elements;
 use crate::solver::step::law::{OfLaw, with_tissue};
+use crate::solver::step::recovered::Load;
+use crate::solver::step::strain::{is_recovered, keep_share};
 use crate::solver::step::tissue::Tissue;
 
 use super::present::AtRest;
@@ -70,6 +73,9 @@ impl Pieces {
         workers.each(pieces.len(), 1, |range| {
             for (law, blocks) in &pieces[range] {
                 let set = &layout.tet_sets[*law];
+                if is_recovered(layout, set) {
+                    continue;
+                }
                 let at_rest = &at_rest.tets[*law];
                 let (strains, loads, dt) = (strains[*law], &shared, step.dt);
                 let forces = Forces { x, at_rest, strains, dt, loads, inverted, looks };
@@ -79,8 +85,51 @@ impl Pieces {
                 });
             }
         });
+        let of_recovered = load_recovered(constants, step, (number, looks), (x, at_rest), loads);
         add_elements(layout, moments, part, x, loads);
-        inverted.load(Relaxed)
+        of_recovered || inverted.load(Relaxed)
+    }
+}
+
+/// Those of recovered-gradient tetrahedra.
+fn load_recovered<S: Real>(
+    constants: &mut StepConstants<S>,
+    step: &Step<'_, S>,
+    (number, looks): (usize, bool),
+    (x, at_rest): (&[Point<S>], &AtRest<S>),
+    loads: &mut [Point<S>],
+) -> bool {
+    let StepConstants { workers, recovered: Some(tets), start_strain, .. } = constants else {
+        return false;
+    };
+    let law = MaterialModel::StableNeoHookean as usize;
+    let inverted = tets.evaluate(workers, step.layout, number, x);
+    let is_viscous = step.layout.tet_sets[law].viscous;
+    let strains = Shared::new(&mut start_strain[law]);
+    let load = Load {
+        scale: S::from_f64(step.dt * step.dt),
+        viscous: is_viscous.then_some((strains, S::from_f64(1.0 / step.dt))),
+        at_rest: looks.then_some(&at_rest.tets[law]),
+    };
+    tets.add_forces(workers, step.layout, number, &load, loads);
+    inverted
+}
+
+/// The Green strain of all tetrahedra of a part at `x` in the place of that at the start, of which a share of the change
+/// since then is left.
+pub fn put_strains<S: Real>(
+    constants: &mut StepConstants<S>,
+    layout: &Layout<S>,
+    number: usize,
+    x: &[Point<S>],
+    share: S,
+) {
+    let StepConstants { workers, recovered, start_strain, .. } = constants;
+    keep_share(workers, layout, &layout.parts[number], x, share, start_strain);
+    if let Some(tets) = recovered {
+        let law = MaterialModel::StableNeoHookean as usize;
+        tets.evaluate(workers, layout, number, x);
+        tets.put_strains(workers, layout, number, share, &mut start_strain[law]);
     }
 }
 

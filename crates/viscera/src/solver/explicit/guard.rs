@@ -4,10 +4,10 @@
 //! takes its step again in shorter small steps, and in the end goes downhill from where it began.
 
 use super::Memory;
+use super::forces::put_strains;
 use super::present::SmallSteps;
 use crate::scalar::{Real, Vec3};
 use crate::solver::step::data::{Step, StepConstants, StepData, copies_of};
-use crate::solver::step::strain::measure_strain;
 use crate::state::{Learned, State};
 
 /// Small steps of a step that is taken again, at most.
@@ -102,8 +102,9 @@ impl<S: Real> Memory<S> {
         let model = step.layout;
         let StepData { constants, points, .. } = data;
         if model.is_viscous() {
-            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-            measure_strain(workers, model, None, points, strains);
+            for number in 0..model.part_count() {
+                put_strains(constants, model, number, points, S::ZERO);
+            }
         }
         for pin in &step.inputs.pins {
             points[model.numbering.of(pin.vertex)].set_vec3(pin.target);
@@ -159,10 +160,16 @@ impl<S: Real> Memory<S> {
     }
 
     /// What every part stores where it is [J].
-    fn evaluate(&mut self, step: &Step<'_, S>, data: &StepData<S>) {
+    fn evaluate(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
+        let StepData { constants, points, .. } = data;
         for (number, small) in self.small_steps.iter().enumerate() {
             let step = Step { dt: small.dt, ..*step };
-            self.evaluator.evaluate(&data.constants, &step, &data.points, number);
+            self.evaluator.evaluate(constants, &step, points, number);
+            if let StepConstants { workers, recovered: Some(tets), .. } = constants {
+                tets.evaluate(workers, step.layout, number, points);
+                let energy = tets.energy(workers, step.layout, number);
+                self.evaluator.stored[number] += energy;
+            }
         }
     }
 }

@@ -34,10 +34,9 @@ use crate::solver::step::energy::Energies;
 use crate::solver::step::potential::Evaluator;
 use crate::solver::step::predict::{Tethers, load_tethers};
 use crate::solver::step::stage::StepStage;
-use crate::solver::step::strain::{keep_share, measure_strain};
 use crate::solver::step::tethers::bundle;
 use crate::state::State;
-use forces::Pieces;
+use forces::{Pieces, put_strains};
 #[cfg(feature = "gpu")]
 pub use present::calm_ahead;
 use present::{AtRest, SmallSteps};
@@ -183,14 +182,16 @@ impl<S: Real> Memory<S> {
         self.load_forces(step, data);
         let Self { stability, at_rest, small_steps, .. } = self;
         let StepData { constants, points, velocities, loads } = data;
-        let to_come = model.parts.iter().zip(small_steps).filter(|(_, small)| small.left > 0);
-        for (part, small) in to_come {
+        for (number, small) in small_steps.iter_mut().enumerate() {
+            if small.left == 0 {
+                continue;
+            }
+            let part = &model.parts[number];
             let stiffest = at_rest.gather(constants, model, part, small.dt, loads);
             small.begin(stability, stiffest, constants.holds(part));
             if model.is_viscous() {
                 drift(constants, part, points, velocities, -0.5 * small.dt, true);
-                let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-                measure_strain(workers, model, Some(part), points, strains);
+                put_strains(constants, model, number, points, S::ZERO);
                 let range = part.vertices.clone();
                 points[range.clone()].copy_from_slice(&constants.previous[range]);
             }
@@ -239,14 +240,13 @@ impl<S: Real> Memory<S> {
         let model = step.layout;
         let StepData { constants, points, velocities, .. } = data;
         self.ends.copy_from_slice(points);
-        for (part, small) in model.parts.iter().zip(&self.small_steps) {
+        for (number, (part, small)) in model.parts.iter().zip(&self.small_steps).enumerate() {
             drift(constants, part, points, velocities, -0.5 * small.dt, true);
-            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-            measure_strain(workers, model, Some(part), points, strains);
+            put_strains(constants, model, number, points, S::ZERO);
             let range = part.vertices.clone();
             points[range.clone()].copy_from_slice(&self.ends[range]);
             let share = S::from_f64(2.0 * step.dt / small.dt);
-            keep_share(workers, model, part, points, share, strains);
+            put_strains(constants, model, number, points, share);
         }
     }
 

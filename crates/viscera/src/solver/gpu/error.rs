@@ -98,4 +98,9 @@ pub enum GpuError {
         "the quasi-Newton method is computed by the CPU only; use `device = \"cpu\"` or \"auto\", or `method = \"xpbd\"`"
     )]
     OnlyOnCpu,
+    /// The elements have no kernels yet.
+    #[error(
+        "`elements = \"recovered\"` is computed by the CPU only; use `device = \"cpu\"` or \"auto\", or `elements = \"plain\"`"
+    )]
+    PlainElements,
 }

@@ -190,6 +190,7 @@ impl GpuSolver {
                 inverse_masses: &fourth(acting),
                 tethers: &self.tethers,
                 start_strain: &start_strain,
+                recovered: None,
             };
             balance.measure(model, state, inputs, &end);
         })?;

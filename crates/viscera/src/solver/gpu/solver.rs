@@ -18,7 +18,7 @@ use std::sync::Arc;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::Vec3;
-use crate::settings::{Count, Method, Precision, SolverSettings, Start};
+use crate::settings::{Count, Elements, Method, Precision, SolverSettings, Start};
 use crate::solver::error::StepError;
 use crate::solver::explicit::Stability;
 use crate::solver::inputs::check_model;
@@ -112,6 +112,9 @@ impl GpuSolver {
         }
         if settings.method == Method::QuasiNewton {
             return Err(GpuError::OnlyOnCpu);
+        }
+        if settings.elements == Elements::Recovered {
+            return Err(GpuError::PlainElements);
         }
         device.check()?;
         // Sizes are compared array by array, below.

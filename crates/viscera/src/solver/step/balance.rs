@@ -7,15 +7,19 @@
 //! `f` are the forces of all elements. On free vertices `r` is the solver's error as a force
 //! [N]; on pinned ones it is what holds them: the force of the fixing or the tool on the tissue.
 
-use super::data::EndOfStep;
+use super::data::{EndOfStep, gather};
+use super::recovered::Load;
+use super::strain::is_recovered;
 use super::tissue::Tissue;
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::law::{Law, with_law};
 use crate::elements::{deformation_gradient, internal_forces, shape_gradients};
 use crate::layout::{Before, ElementSet, Layout, Moments, TetSet};
+use crate::material::MaterialModel;
 use crate::model::for_each_kind;
-use crate::scalar::lanes::{Eight, Instructions, Kernel, LANES, Lanes, run};
+use crate::scalar::lanes::{Eight, Instructions, Kernel, LANES, Lanes, Point, run};
 use crate::scalar::{Mat3, Real, Scalar, Vec3, vec3};
+use crate::solver::cpu::threads::{Shared, Workers};
 use crate::solver::inputs::Inputs;
 use crate::state::State;
 
@@ -87,6 +91,37 @@ impl ForceBalance {
         }
     }
 
+    /// Of recovered-gradient tetrahedra, in the precision of the state.
+    fn add_recovered<S: Real>(
+        &mut self,
+        layout: &Layout<S>,
+        state: &State<S>,
+        step: &EndOfStep<'_, S>,
+    ) {
+        let Some(mut tets) = step.recovered.cloned() else { return };
+        let law = MaterialModel::StableNeoHookean as usize;
+        let mut strains = step.start_strain[law].clone();
+        let rate = S::from_f64(1.0 / state.multiplier_dt);
+        let is_viscous = layout.tet_sets[law].viscous;
+        let viscous = is_viscous.then(|| (Shared::new(&mut strains), rate));
+        let load = Load { scale: S::ONE, viscous, at_rest: None };
+        let mut points = vec![Point::default(); layout.vertex_count()];
+        for (point, &user) in points.iter_mut().zip(&layout.numbering.order) {
+            point.set_vec3(state.positions[user as usize]);
+        }
+        let mut forces = vec![Point::default(); layout.copy_count()];
+        let workers = Workers::one();
+        for part in 0..layout.part_count() {
+            tets.evaluate(&workers, layout, part, &points);
+            self.elastic_energy += tets.energy(&workers, layout, part);
+            tets.add_forces(&workers, layout, part, &load, &mut forces);
+        }
+        for (place, &user) in layout.numbering.order.iter().enumerate() {
+            let force = gather(layout, &forces, place).vec3();
+            self.residual[user as usize] -= force.cast::<f64>();
+        }
+    }
+
     pub(in crate::solver) fn measure<S: Real>(
         &mut self,
         layout: &Layout<S>,
@@ -103,8 +138,10 @@ impl ForceBalance {
         }
         for (set, strains) in layout.tet_sets.iter().zip(step.start_strain) {
             let tets = Tets { layout, set, positions: &state.positions, strains, dt };
-            run(Instructions::detect(), OfTets { tets, balance: self });
+            let only_floors = is_recovered(layout, set);
+            run(Instructions::detect(), OfTets { tets, balance: self, only_floors });
         }
+        self.add_recovered(layout, state, step);
         let moments = Moments {
             anchors: inputs.anchors_of(&layout.rest_anchors),
             start: Before::Places(step.previous),
@@ -161,21 +198,26 @@ struct Tets<'a, S> {
 struct OfTets<'a, S> {
     tets: Tets<'a, S>,
     balance: &'a mut ForceBalance,
+    /// Neither forces nor energies: what rounding makes of linear tetrahedra it makes of others as well.
+    only_floors: bool,
 }
 
 impl<S: Real> Kernel<f64> for OfTets<'_, S> {
     #[inline(always)]
     fn run<L: Lanes<Real = f64>>(self) {
-        let Self { tets, balance } = self;
+        let Self { tets, balance, only_floors } = self;
         for index in 0..tets.set.blocks.len() {
             let block = tets.block(index);
             let answers = with_law!(tets.set.model, W => block.answers::<S, L, W>());
             // One by one and in order: forces meet at vertices, and sums are the same bits for any number of lanes.
             for lane in 0..block.filled {
-                balance.elastic_energy += answers.elastic_energy[lane];
                 balance.energy_floor += answers.floors[0][lane];
                 balance.force_floor += answers.floors[1][lane];
                 balance.rounding += answers.floors[2][lane];
+                if only_floors {
+                    continue;
+                }
+                balance.elastic_energy += answers.elastic_energy[lane];
                 for corner in 0..4 {
                     let [x, y, z] = &answers.forces[corner];
                     let v = block.vertices[corner][lane] as usize;
@@ -387,7 +429,7 @@ mod tests {
                 };
                 let tets =
                     Tets { layout: &layout, set, positions: &positions, strains: &strains, dt };
-                run(instructions, OfTets { tets, balance: &mut balance });
+                run(instructions, OfTets { tets, balance: &mut balance, only_floors: false });
                 balance
             };
             let balance = balance_by(Instructions::detect());

@@ -2,6 +2,7 @@
 //! all methods change.
 #![allow(unsafe_code)]
 
+use super::recovered::RecoveredTets;
 use super::tethers::Bundle;
 use crate::elements::law::LAWS;
 use crate::layout::{Before, Moments};
@@ -46,6 +47,8 @@ pub struct StepConstants<S> {
     pub inverse_masses: Vec<S>,
     /// See [`StartStrain`].
     pub start_strain: StartStrain<S>,
+    /// Where the layout has recovered-gradient tetrahedra.
+    pub recovered: Option<RecoveredTets<S>>,
 }
 
 /// Data that measures of a step need after its end: values that every backend fills. Vertices in the solver's
@@ -64,6 +67,8 @@ pub struct EndOfStep<'a, S> {
     pub tethers: &'a [Bundle<S>],
     /// See [`StartStrain`].
     pub start_strain: &'a StartStrain<S>,
+    /// See [`StepConstants::recovered`].
+    pub recovered: Option<&'a RecoveredTets<S>>,
 }
 
 /// Data that the stages of every method work on.
@@ -97,6 +102,10 @@ impl<S: Real> StepData<S> {
                 inertias: vec![S::ZERO; vertices],
                 inverse_masses: vec![S::ZERO; vertices],
                 start_strain: layout.tet_sets.each_ref().map(strains),
+                recovered: layout
+                    .recovered
+                    .as_ref()
+                    .map(|tables| RecoveredTets::new(layout, tables)),
             },
             points: points(),
             velocities: vec![Vec3::ZERO; vertices],
@@ -114,6 +123,7 @@ impl<S: Real> StepData<S> {
             + [external, &self.velocities].map(|v| size_of_val(&v[..])).iter().sum::<usize>()
             + [masses, inertias, inverse_masses].map(|m| size_of_val(&m[..])).iter().sum::<usize>()
             + self.constants.start_strain.iter().map(|s| size_of_val(&s[..])).sum::<usize>()
+            + self.constants.recovered.as_ref().map_or(0, RecoveredTets::bytes)
     }
 
     /// Positions of the state, in the solver's numbering.
@@ -138,7 +148,16 @@ impl<S: Real> StepConstants<S> {
     pub fn end_of_step(&self) -> EndOfStep<'_, S> {
         let Self { previous, predicted, inertias, inverse_masses, tethers, start_strain, .. } =
             self;
-        EndOfStep { previous, predicted, inertias, inverse_masses, tethers, start_strain }
+        let recovered = self.recovered.as_ref();
+        EndOfStep {
+            previous,
+            predicted,
+            inertias,
+            inverse_masses,
+            tethers,
+            start_strain,
+            recovered,
+        }
     }
 
     /// Whether a pin, an attachment or a tether holds a part.

@@ -12,6 +12,7 @@ use std::ops::Range;
 
 use super::data::{Step, StepConstants};
 use super::law::{OfLaw, respond, with_tissue};
+use super::strain::is_recovered;
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::law::{LAWS, Law};
 use crate::layout::{ElementSet, Moments};
@@ -85,8 +86,11 @@ impl Evaluator {
                 pieces.extend(ranges.map(|range| Piece { part: number, of, range }));
             };
             cut(PieceOf::Vertices, part.vertices.len(), VERTEX_PIECE);
-            for kind in 0..LAWS {
-                cut(PieceOf::Blocks(kind), part.block_count(kind), PIECE);
+            for (kind, set) in layout.tet_sets.iter().enumerate() {
+                // Whoever has recovered-gradient tetrahedra adds their energy.
+                if !is_recovered(layout, set) {
+                    cut(PieceOf::Blocks(kind), part.block_count(kind), PIECE);
+                }
             }
             first.push(pieces.len());
         }

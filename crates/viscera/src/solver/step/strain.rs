@@ -3,7 +3,8 @@
 
 use super::data::StartStrain;
 use crate::elements::{deformation_gradient, green_strain};
-use crate::layout::{Layout, Part};
+use crate::layout::{Layout, Part, TetSet};
+use crate::material::MaterialModel;
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, Lanes, Point};
 use crate::solver::cpu::tets::{Block, TetPass};
@@ -43,13 +44,19 @@ fn pass_over<S: Real>(
     for (law, (set, strains)) in layout.tet_sets.iter().zip(start_strain).enumerate() {
         let pass = Strain { x, share, strains: Shared::new(strains) };
         match part {
-            _ if !set.viscous => {}
+            // Those of recovered-gradient tetrahedra are other strains.
+            _ if !set.viscous || is_recovered(layout, set) => {}
             None => workers.pass(layout, set, 0..set.block_count(), &pass),
             Some(part) => {
                 part.blocks(law).for_each(|blocks| workers.pass(layout, set, blocks, &pass));
             }
         }
     }
+}
+
+/// Whether the tetrahedra of a set are recovered-gradient tetrahedra.
+pub fn is_recovered<S: Real>(layout: &Layout<S>, set: &TetSet<S>) -> bool {
+    layout.recovered.is_some() && set.model == MaterialModel::StableNeoHookean
 }
 
 /// `E(x) + share (E - E(x))` in the place of `E`.

@@ -9,8 +9,16 @@
 //! 6  domains    N_n b_nj to the vertices j that they see
 //! ```
 //!
-//! The equations stand in [`crate::elements::recovered`]. One at a time and in the caller's numbering: the truth that
-//! passes in lanes are tested against.
+//! The equations stand in [`crate::elements::recovered`]. One at a time and in the caller's numbering here: the
+//! truth that the passes in lanes ([`RecoveredTets`]) are tested against.
+
+mod kernels;
+mod passes;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use kernels::Load;
+pub(crate) use passes::RecoveredTets;
 
 use crate::elements::neo_hookean::{self, volume_change, volume_variation};
 use crate::elements::recovered::{

@@ -1,0 +1,13 @@
+//! What tetrahedra are.
+
+use super::choices;
+
+choices! {
+    /// How tetrahedra feel that they are deformed.
+    pub enum Elements {
+        /// Each by its corners alone, linear tetrahedra: coarse meshes are too stiff where they bend.
+        Plain = "plain",
+        /// Each also by how its neighbours are deformed, recovered-gradient tetrahedra: coarse meshes bend as fine ones do.
+        Recovered = "recovered",
+    }
+}

@@ -1,0 +1,490 @@
+//! What the stages of [`super`] do to eight tetrahedra, eight domains, eight vertices.
+#![allow(unsafe_code)]
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use crate::elements::green_strain::{self, Voigt};
+use crate::elements::law::{Law, StableNeoHookean};
+use crate::elements::neo_hookean::{self, volume_change};
+use crate::elements::recovered::{
+    RestFrame, bulk_energy, bulk_shares, recovered_gradient, tet_stress, vertex_stresses,
+};
+use crate::elements::{deformation_gradient, shape_gradients};
+use crate::layout::{Entry, Frames, Layout, RecoveredTables, TetSet};
+use crate::scalar::lanes::{Eight, Kernel, LANES, Lanes, Point};
+use crate::scalar::{Mat3, Real, Vec3, vec3};
+use crate::solver::cpu::tets::{Block, TetPass};
+use crate::solver::cpu::threads::Shared;
+
+/// Three points that stand one after the other, as the columns of matrices.
+///
+/// # Safety
+/// As [`Lanes::gather`], of all three.
+#[inline(always)]
+unsafe fn gather_matrix<L: Lanes>(
+    points: *const Point<L::Real>,
+    rows: &Eight<u32>,
+    lane: usize,
+) -> Mat3<L> {
+    let mut matrix = Mat3::ZERO;
+    for column in 0..3 {
+        // SAFETY: the caller's promise.
+        matrix.columns[column] = unsafe { L::gather(points.add(column), rows, lane) }.vec3();
+    }
+    matrix
+}
+
+/// Where the rows of a group of places stand.
+#[inline(always)]
+fn rows_of(group: usize) -> Eight<u32> {
+    std::array::from_fn(|lane| (3 * (LANES * group + lane)) as u32)
+}
+
+/// Eight numbers that stand one after the other.
+#[inline(always)]
+fn eight<S: Copy>(all: &[S], group: usize) -> &Eight<S> {
+    &all.as_chunks().0[group]
+}
+
+/// `G_n = sum_j (x_j - x_n) b_nj^T`: differences to the domain's own vertex keep the digits.
+pub struct VertexGradients<'a, S> {
+    pub tables: &'a RecoveredTables<S>,
+    pub x: &'a [Point<S>],
+    pub groups: Range<usize>,
+    pub into: Shared<'a, Point<S>>,
+}
+
+impl<S: Real> Kernel<S> for VertexGradients<'_, S> {
+    #[inline(always)]
+    fn run<L: Lanes<Real = S>>(self) {
+        let x = self.x.as_ptr();
+        for group in self.groups {
+            let own = eight(&self.tables.vertices, group);
+            for lane in (0..LANES).step_by(L::WIDTH) {
+                // SAFETY: indices are those of vertices of the layout, and `evaluate` has checked that they are there.
+                let origin = unsafe { L::gather(x, own, lane) }.vec3();
+                let mut gradient = Mat3::<L>::ZERO;
+                for Entry { index, gradient: b } in self.tables.domain_rings.of(group) {
+                    // SAFETY: as above.
+                    let edge = unsafe { L::gather(x, index, lane) }.vec3() - origin;
+                    let [u, v, w] = [0, 1, 2].map(|axis| L::load(&b[axis], lane));
+                    gradient = gradient + Mat3::outer(edge, vec3(u, v, w));
+                }
+                for column in 0..3 {
+                    let value = Point::new(gradient.columns[column], L::ZERO);
+                    // SAFETY: every group has places of its own and is worked on once.
+                    unsafe {
+                        L::scatter(self.into.pointer().add(column), &rows_of(group), lane, value);
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl<S: Real> Frames<S> {
+    /// At rest, some lanes of it.
+    #[inline(always)]
+    fn rest<L: Lanes<Real = S>>(&self, shape: &Mat3<L>, lane: usize) -> RestFrame<L> {
+        let at = |i: usize| L::load(&self.arms[i], lane);
+        let [b, c, d] = [0, 3, 6].map(|i| vec3(at(i), at(i + 1), at(i + 2)));
+        let mut face_weights = [L::ZERO; 4];
+        for o in 0..4 {
+            face_weights[o] = L::load(&self.face_weights[o], lane);
+        }
+        RestFrame {
+            gradients: shape_gradients(shape),
+            arms: [-((b + c) + d), b, c, d],
+            face_weights,
+        }
+    }
+}
+
+/// `Fh_t`, and its volume to the corners' places.
+pub struct TetGradients<'a, S> {
+    pub frames: &'a [Frames<S>],
+    pub x: &'a [Point<S>],
+    pub gradients: &'a [Point<S>],
+    pub recovered: Shared<'a, [Eight<S>; 9]>,
+    pub changes: Shared<'a, S>,
+    pub inverted: &'a AtomicBool,
+}
+
+impl<S: Real> TetPass<S> for TetGradients<'_, S> {
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let (frame, lane) = (&self.frames[tets.index], tets.lane);
+        let shape = tets.shape::<L>();
+        let f = deformation_gradient(&tets.corners::<L>(self.x).x, &shape);
+        if !L::all(L::ZERO.less(f.determinant())) {
+            self.inverted.store(true, Relaxed);
+        }
+        let mut of_corners = [Mat3::ZERO; 4];
+        for corner in 0..4 {
+            let places = &frame.places[corner];
+            let rows = std::array::from_fn(|lane| 3 * places[lane]);
+            // SAFETY: places of the tables, whose gradients there are.
+            of_corners[corner] = unsafe { gather_matrix(self.gradients.as_ptr(), &rows, lane) };
+        }
+        let recovered = recovered_gradient(&f, &of_corners, &frame.rest(&shape, lane));
+        // SAFETY: every block is worked on once.
+        let into = unsafe { self.recovered.at(tets.index) };
+        for column in 0..3 {
+            let Vec3 { x, y, z } = recovered.columns[column];
+            x.store(&mut into[3 * column], lane);
+            y.store(&mut into[3 * column + 1], lane);
+            z.store(&mut into[3 * column + 2], lane);
+        }
+        let quarter = tets.volume::<L>() * L::from_f64(0.25);
+        let mut changes = [S::ZERO; LANES];
+        (volume_change(&recovered) * quarter).store(&mut changes, lane);
+        for lane in lane..(lane + L::WIDTH).min(tets.filled()) {
+            for rows in &frame.rows {
+                // SAFETY: the piece has copies of its own, and one thread does all of it.
+                unsafe { *self.changes.at(rows[lane] as usize / 3) += changes[lane] };
+            }
+        }
+    }
+}
+
+/// `Fh_t` of some lanes of a block.
+#[inline(always)]
+fn load_matrix<L: Lanes>(of: &[Eight<L::Real>; 9], lane: usize) -> Mat3<L> {
+    let at = |i: usize| L::load(&of[i], lane);
+    let [a, b, c] = [0, 3, 6].map(|i| vec3(at(i), at(i + 1), at(i + 2)));
+    Mat3::from_columns(a, b, c)
+}
+
+/// What forces are wanted.
+pub struct Load<'a, S> {
+    /// They are multiplied by it.
+    pub scale: S,
+    /// Where viscosity acts, the Green strains of tetrahedra since which it does, and one over the time since then [1/s].
+    /// The strains of now take their place.
+    pub viscous: Option<(Shared<'a, [Eight<S>; 6]>, S)>,
+    /// Where the bound of stiffness is wanted beside forces, also times `scale`: what of it does not depend on the shape
+    /// [m], block by block.
+    pub at_rest: Option<&'a [Eight<S>]>,
+}
+
+/// The Green strain in the place of another, of which a share of the change since then is left.
+#[inline(always)]
+fn put_strain<S: Real, L: Lanes<Real = S>>(
+    f: &Mat3<L>,
+    place: &mut [Eight<S>; 6],
+    lane: usize,
+    share: S,
+) {
+    for (component, place) in green_strain::strain(f).into_iter().zip(place) {
+        let mut strain = component;
+        if share != S::ZERO {
+            strain += (L::load(place, lane) - component) * L::splat(share);
+        }
+        strain.store(place, lane);
+    }
+}
+
+/// Stress [Pa] by the change of the Green strain since the start, in the place of which it is put. Volume counts by the part
+/// of Lame's first parameter that counts here: what is averaged over clusters has no viscosity.
+#[inline(always)]
+fn viscous_stress<S: Real, L: Lanes<Real = S>>(
+    f: &Mat3<L>,
+    (local, mu): (L, L),
+    start: &mut [Eight<S>; 6],
+    lane: usize,
+) -> Mat3<L> {
+    let mut change: Voigt<L> = green_strain::strain(f);
+    for p in 0..6 {
+        change[p] -= L::load(&start[p], lane);
+    }
+    put_strain(f, start, lane, S::ZERO);
+    green_strain::piola(f, &change, local, mu)
+}
+
+/// The Green strain of blocks where they are, see [`put_strain`].
+pub struct TetStrains<'a, S> {
+    pub recovered: &'a [[Eight<S>; 9]],
+    pub share: S,
+    pub strains: Shared<'a, [Eight<S>; 6]>,
+}
+
+impl<S: Real> TetPass<S> for TetStrains<'_, S> {
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let recovered = load_matrix::<L>(&self.recovered[tets.index], tets.lane);
+        // SAFETY: every block has a place of its own and is worked on once.
+        put_strain(&recovered, unsafe { self.strains.at(tets.index) }, tets.lane, self.share);
+    }
+}
+
+/// The same of groups of places.
+pub struct PlaceStrains<'a, S> {
+    pub gradients: &'a [Point<S>],
+    pub groups: Range<usize>,
+    pub share: S,
+    pub strains: Shared<'a, [Eight<S>; 6]>,
+}
+
+impl<S: Real> Kernel<S> for PlaceStrains<'_, S> {
+    #[inline(always)]
+    fn run<L: Lanes<Real = S>>(self) {
+        for group in self.groups {
+            for lane in (0..LANES).step_by(L::WIDTH) {
+                // SAFETY: the group's places.
+                let gradient: Mat3<L> =
+                    unsafe { gather_matrix(self.gradients.as_ptr(), &rows_of(group), lane) };
+                // SAFETY: every group has a place of its own and is worked on once.
+                put_strain(&gradient, unsafe { self.strains.at(group) }, lane, self.share);
+            }
+        }
+    }
+}
+
+/// `S_t = V_t dE/dFh_t`: to the corners `-S_t g_a`, to their places what it is by `G_n`.
+pub struct TetForces<'a, S> {
+    pub frames: &'a [Frames<S>],
+    pub recovered: &'a [[Eight<S>; 9]],
+    pub pressures: &'a [S],
+    pub share: S,
+    pub load: &'a Load<'a, S>,
+    pub of_tets: Shared<'a, Point<S>>,
+    pub loads: Shared<'a, Point<S>>,
+}
+
+impl<S: Real> TetPass<S> for TetForces<'_, S> {
+    #[inline(always)]
+    fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
+        let (frame, lane) = (&self.frames[tets.index], tets.lane);
+        let shape = tets.shape::<L>();
+        let rest = frame.rest(&shape, lane);
+        let mut mean = [S::ZERO; LANES];
+        for lane in lane..lane + L::WIDTH {
+            let [a, b, c, d] =
+                [0, 1, 2, 3].map(|corner| self.pressures[frame.places[corner][lane] as usize]);
+            mean[lane] = ((a + b) + (c + d)) * S::from_f64(0.25);
+        }
+        let material = tets.material::<L>();
+        let local = bulk_shares(material.lame_lambda, material.lame_mu).local;
+        let recovered = load_matrix::<L>(&self.recovered[tets.index], lane);
+        let (share, mean) = (L::splat(self.share), L::load(&mean, lane));
+        let volume = tets.volume::<L>() * L::splat(self.load.scale);
+        let mut stress = tet_stress(&recovered, local, material.lame_mu, share, mean);
+        if let Some((strains, rate)) = self.load.viscous.as_ref().filter(|_| tets.is_viscous()) {
+            // SAFETY: every block has a place of its own and is worked on once.
+            let start = unsafe { strains.at(tets.index) };
+            let rate = material.viscosity * L::splat(*rate) * share;
+            let viscous = viscous_stress(&recovered, (local, material.lame_mu), start, lane);
+            stress = stress + viscous * rate;
+        }
+        let stress = stress * volume;
+        let mut bound = L::ZERO;
+        if let Some(at_rest) = self.load.at_rest {
+            let stiffness =
+                StableNeoHookean::stiffness(&recovered, material.lame_lambda, material.lame_mu);
+            bound = L::load(&at_rest[tets.index], lane) * stiffness * L::splat(self.load.scale);
+        }
+        let mut forces = [Vec3::ZERO; 4];
+        for corner in 1..4 {
+            forces[corner] = -(stress * rest.gradients[corner]);
+        }
+        forces[0] = -((forces[1] + forces[2]) + forces[3]);
+        // SAFETY: the piece has copies of its own, and one thread does all of it.
+        unsafe { tets.add_bound_in_order(&self.loads, &forces, bound) };
+        let of_corners = vertex_stresses(&stress, &rest);
+        for column in 0..3 {
+            let mut values = [Point::new(Vec3::ZERO, L::ZERO); 4];
+            for corner in 0..4 {
+                values[corner] = Point::new(of_corners[corner].columns[column], L::ZERO);
+            }
+            // SAFETY: as above; three points to a copy.
+            unsafe { tets.add_rows_in_order(&self.of_tets, column, &frame.rows, values) };
+        }
+    }
+}
+
+/// `N_n`: what tetrahedra do to `G_n`, piece by piece, and `V_n alpha P(G_n)`.
+pub struct PlaceStresses<'a, S> {
+    pub tables: &'a RecoveredTables<S>,
+    pub gradients: &'a [Point<S>],
+    pub of_tets: &'a [Point<S>],
+    pub load: &'a Load<'a, S>,
+    /// Of groups, as those of tetrahedra.
+    pub strains: Shared<'a, [Eight<S>; 6]>,
+    pub groups: Range<usize>,
+    pub into: Shared<'a, Point<S>>,
+}
+
+impl<S: Real> Kernel<S> for PlaceStresses<'_, S> {
+    #[inline(always)]
+    fn run<L: Lanes<Real = S>>(self) {
+        let tables = self.tables;
+        for group in self.groups {
+            let rows = rows_of(group);
+            for lane in (0..LANES).step_by(L::WIDTH) {
+                // SAFETY: the group's places.
+                let gradient: Mat3<L> =
+                    unsafe { gather_matrix(self.gradients.as_ptr(), &rows, lane) };
+                let [local, mu, viscosity] = local_of(tables, group, lane);
+                let scale = L::splat(tables.shares[1] * self.load.scale);
+                let volume = L::load(eight(&tables.volumes, group), lane) * scale;
+                let mut stress = neo_hookean::piola(&gradient, local, mu);
+                if let Some((_, rate)) = &self.load.viscous {
+                    // SAFETY: every group has a place of its own and is worked on once.
+                    let start = unsafe { self.strains.at(group) };
+                    let viscous = viscous_stress(&gradient, (local, mu), start, lane);
+                    stress = stress + viscous * (viscosity * L::splat(*rate));
+                }
+                let stress = stress * volume;
+                for column in 0..3 {
+                    let value = Point::new(stress.columns[column], L::ZERO);
+                    // SAFETY: every group has places of its own and is worked on once.
+                    unsafe {
+                        L::scatter(self.into.pointer().add(column), &rows, lane, value);
+                    }
+                }
+            }
+            for n in LANES * group..LANES * (group + 1) {
+                // SAFETY: as above.
+                let into = unsafe { self.into.range(3 * n..3 * n + 3) };
+                for copy in tables.copy_offsets[n] as usize..tables.copy_offsets[n + 1] as usize {
+                    let of_piece = &self.of_tets[3 * copy..3 * copy + 3];
+                    into.iter_mut().zip(of_piece).for_each(|(sum, more)| sum.add(*more));
+                }
+            }
+        }
+    }
+}
+
+/// `l` and `mu` [Pa] and the retardation time [s] of some places of a group.
+#[inline(always)]
+fn local_of<S: Real, L: Lanes<Real = S>>(
+    tables: &RecoveredTables<S>,
+    group: usize,
+    lane: usize,
+) -> [L; 3] {
+    let own = eight(&tables.local, group);
+    [0, 1, 2].map(|i| L::load(&std::array::from_fn(|lane| own[lane][i]), lane))
+}
+
+/// `-sum_n N_n b_ni` to the vertices' first copies.
+pub struct VertexForces<'a, S> {
+    pub tables: &'a RecoveredTables<S>,
+    pub layout: &'a Layout<S>,
+    pub stresses: &'a [Point<S>],
+    pub groups: Range<usize>,
+    pub loads: Shared<'a, Point<S>>,
+}
+
+impl<S: Real> Kernel<S> for VertexForces<'_, S> {
+    #[inline(always)]
+    fn run<L: Lanes<Real = S>>(self) {
+        let points = self.stresses.as_ptr();
+        for group in self.groups {
+            let mut sums = [[S::ZERO; LANES]; 3];
+            for lane in (0..LANES).step_by(L::WIDTH) {
+                let mut sum = Vec3::<L>::ZERO;
+                for Entry { index, gradient: b } in self.tables.vertex_rings.of(group) {
+                    // SAFETY: rows of places of the tables.
+                    let stress: Mat3<L> = unsafe { gather_matrix(points, index, lane) };
+                    let [u, v, w] = [0, 1, 2].map(|axis| L::load(&b[axis], lane));
+                    sum += stress * vec3(u, v, w);
+                }
+                sum.x.store(&mut sums[0], lane);
+                sum.y.store(&mut sums[1], lane);
+                sum.z.store(&mut sums[2], lane);
+            }
+            for lane in 0..LANES {
+                if self.tables.counts[LANES * group + lane] {
+                    let v = self.tables.ring_vertices[LANES * group + lane] as usize;
+                    let force = -vec3(sums[0][lane], sums[1][lane], sums[2][lane]);
+                    let copy = self.layout.copy_offsets[v] as usize;
+                    // SAFETY: a vertex stands in one group once where it counts.
+                    unsafe { self.loads.at(copy) }.add(Point::new(force, S::ZERO));
+                }
+            }
+        }
+    }
+}
+
+/// What adds up energies [J], in an order that lanes do not change.
+pub trait Sum<S: Real> {
+    /// `#[inline(always)]`.
+    fn sum<L: Lanes<Real = S>>(self) -> f64;
+}
+
+pub struct Summed<'a, K> {
+    pub of: K,
+    pub into: &'a mut f64,
+}
+
+impl<S: Real, K: Sum<S>> Kernel<S> for Summed<'_, K> {
+    #[inline(always)]
+    fn run<L: Lanes<Real = S>>(self) {
+        *self.into = self.of.sum::<L>();
+    }
+}
+
+/// `sum_t V_t (1 - alpha) W(Fh_t)` of some blocks.
+pub struct TetEnergy<'a, S> {
+    pub layout: &'a Layout<S>,
+    pub set: &'a TetSet<S>,
+    pub recovered: &'a [[Eight<S>; 9]],
+    pub share: S,
+    pub blocks: Range<usize>,
+}
+
+impl<S: Real> Sum<S> for TetEnergy<'_, S> {
+    #[inline(always)]
+    fn sum<L: Lanes<Real = S>>(self) -> f64 {
+        let mut sum = 0.0;
+        for index in self.blocks {
+            let mut energies = [S::ZERO; LANES];
+            for lane in (0..LANES).step_by(L::WIDTH) {
+                let block = Block::new(self.layout, self.set, index, lane);
+                let material = block.material::<L>();
+                let local = bulk_shares(material.lame_lambda, material.lame_mu).local;
+                let recovered = load_matrix::<L>(&self.recovered[index], lane);
+                let density = neo_hookean::energy_density(&recovered, local, material.lame_mu);
+                (density * block.volume::<L>() * L::splat(self.share)).store(&mut energies, lane);
+            }
+            let filled = usize::from(self.set.filled[index]);
+            energies[..filled].iter().for_each(|energy| sum += energy.to_f64());
+        }
+        sum
+    }
+}
+
+/// `V_n (alpha W(G_n) + k_n/2 (Jh_n - 1)^2 + k_c/2 (Jh_c - 1)^2)` of a group: a cluster's volume is the sum of its
+/// domains', each counts its part.
+pub struct PlaceEnergy<'a, S> {
+    pub tables: &'a RecoveredTables<S>,
+    pub gradients: &'a [Point<S>],
+    pub means: &'a [[S; 2]],
+    pub group: usize,
+}
+
+impl<S: Real> Sum<S> for PlaceEnergy<'_, S> {
+    #[inline(always)]
+    fn sum<L: Lanes<Real = S>>(self) -> f64 {
+        let Self { tables, gradients, means, group } = self;
+        let share = tables.shares[1];
+        let rows = rows_of(group);
+        let mut energies = [S::ZERO; LANES];
+        let (means, bulk) = (eight(means, group), eight(&tables.bulk, group));
+        let of = |pairs: &Eight<[S; 2]>, i: usize| std::array::from_fn(|lane| pairs[lane][i]);
+        let [domain, cluster] = [0, 1].map(|i| (of(means, i), of(bulk, i)));
+        for lane in (0..LANES).step_by(L::WIDTH) {
+            // SAFETY: the group's places.
+            let gradient: Mat3<L> = unsafe { gather_matrix(gradients.as_ptr(), &rows, lane) };
+            let [local, mu, _] = local_of(tables, group, lane);
+            let mut density = neo_hookean::energy_density(&gradient, local, mu) * L::splat(share);
+            for (change, stiffness) in [&domain, &cluster] {
+                density = density + bulk_energy(L::load(change, lane), L::load(stiffness, lane));
+            }
+            let volume = L::load(eight(&tables.volumes, group), lane);
+            (density * volume).store(&mut energies, lane);
+        }
+        energies.iter().map(|energy| energy.to_f64()).sum()
+    }
+}

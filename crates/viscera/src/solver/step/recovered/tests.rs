@@ -1,0 +1,133 @@
+//! Passes in lanes beside the truth, one tetrahedron at a time.
+
+use super::{Load, Recovered, RecoveredTets};
+use crate::layout::{Domains, Layout, RecoveredTables, Smoothing};
+use crate::material::{Material, MaterialModel};
+use crate::mesh::TetMesh;
+use crate::mesh::shapes::Block;
+use crate::model::{Model, ModelBuilder};
+use crate::scalar::lanes::{Instructions, Point};
+use crate::scalar::{Real, Vec3, vec3};
+use crate::settings::{Elements, Method, SolverSettings, Threads};
+use crate::solver::cpu::threads::Workers;
+
+const ALL: [Smoothing; 3] = [Smoothing::RECOVERED, Smoothing::FITTED, Smoothing::AVERAGED];
+
+/// Three bodies: one of two materials that touch and of more than one piece, one of another law, one that is small.
+fn model<S: Real>() -> Model<S> {
+    let mut builder = ModelBuilder::new();
+    let soft = |law, poisson| Material::new(law, 5e3, poisson, 1000.0).expect("legal");
+    let snh = MaterialModel::StableNeoHookean;
+    let large = Block::new(vec3(0.08, 0.04, 0.04), [18, 8, 8]).mesh().expect("a block");
+    let label = |tet: &[u32; 4]| {
+        let middle = tet.iter().fold(Vec3::ZERO, |sum, &v| sum + large.vertices()[v as usize]);
+        u32::from(middle.x > 0.2) + 1
+    };
+    let regions = large.tets().iter().map(label).collect();
+    let large = TetMesh::new(large.vertices().to_vec(), large.tets().to_vec(), regions);
+    let large = large.expect("a mesh").0;
+    let body = builder.add_body(&large, &soft(snh, 0.45)).expect("a body");
+    builder.set_region_material(body, 2, &soft(snh, 0.3)).expect("a region");
+    let small = Block::new(vec3(0.02, 0.02, 0.02), [2, 1, 1]).mesh().expect("a block");
+    let other = MaterialModel::SaintVenantKirchhoff;
+    builder.add_body(&small, &soft(other, 0.3)).expect("a body");
+    builder.add_body(&small, &soft(snh, 0.49)).expect("a body");
+    builder.build().expect("a model")
+}
+
+/// Places of the layout, pushed about.
+fn moved<S: Real>(model: &Model<S>, layout: &Layout<S>) -> (Vec<Vec3<S>>, Vec<Point<S>>) {
+    let noise = |k: usize| libm::sin(k as f64 * 78.233) * 4e-4;
+    let place = |(v, x): (usize, &Vec3<S>)| {
+        *x + vec3(noise(3 * v), noise(3 * v + 1), noise(3 * v + 2)).cast()
+    };
+    let places: Vec<Vec3<S>> = model.rest_positions.iter().enumerate().map(place).collect();
+    let mut points = vec![Point::default(); places.len()];
+    for (v, x) in places.iter().enumerate() {
+        points[layout.numbering.of(v as u32)].set_vec3(*x);
+    }
+    (places, points)
+}
+
+/// Forces [N] of all parts by vertices in the caller's numbering, and energies [J].
+fn by_passes<S: Real>(
+    model: &Model<S>,
+    smoothing: Smoothing,
+    instructions: Instructions,
+    threads: u32,
+) -> (Vec<Vec3<S>>, Vec<f64>) {
+    let settings = SolverSettings { method: Method::Explicit, ..SolverSettings::default() };
+    let mut layout = Layout::new(model, &settings);
+    let mut workers = Workers::new(Threads::Count(threads), model.tet_count());
+    workers.instructions = instructions;
+    let domains = Domains::new(model, smoothing);
+    layout.recovered = Some(RecoveredTables::new(&layout, &domains));
+    let mut passes = RecoveredTets::new(&layout, layout.recovered.as_ref().expect("tables"));
+    assert!(passes.bytes() > 0);
+    let (_, points) = moved(model, &layout);
+    let mut loads = vec![Point::default(); layout.copy_count()];
+    let mut energies = Vec::new();
+    workers.entrance().enter(|| {
+        for part in 0..layout.part_count() {
+            let inverted = passes.evaluate(&workers, &layout, part, &points);
+            assert!(!inverted);
+            energies.push(passes.energy(&workers, &layout, part));
+            let load = Load { scale: S::TWO, viscous: None, at_rest: None };
+            passes.add_forces(&workers, &layout, part, &load, &mut loads);
+        }
+    });
+    let force = |v: u32| {
+        let copies = &loads[layout.copies_of(v)];
+        copies.iter().fold(Vec3::ZERO, |sum, copy| sum + copy.vec3()) * S::HALF
+    };
+    ((0..model.vertex_count() as u32).map(force).collect(), energies)
+}
+
+fn as_the_truth<S: Real>(tolerance: f64) {
+    let model = model::<S>();
+    let settings = SolverSettings { method: Method::Explicit, ..SolverSettings::default() };
+    let (places, _) = moved(&model, &Layout::new(&model, &settings));
+    for smoothing in ALL {
+        let domains = Domains::new(&model, smoothing);
+        let mut truth = Recovered::new(&domains);
+        truth.evaluate(&domains, &model.materials, &places);
+        let mut gradient = vec![Vec3::ZERO; places.len()];
+        truth.add_gradient(&domains, &model.materials, &mut gradient);
+        let expected = truth.energy(&domains, &model.materials);
+        let (forces, energies) = by_passes(&model, smoothing, Instructions::detect(), 1);
+        let largest = gradient.iter().fold(0.0f64, |most, g| most.max(g.length().to_f64()));
+        for (force, gradient) in forces.iter().zip(&gradient) {
+            let off = (*force + *gradient).length().to_f64() / largest;
+            assert!(off < tolerance, "{smoothing:?}: {off:e}");
+        }
+        let energy: f64 = energies.iter().sum();
+        assert!((energy / expected - 1.0).abs() < tolerance, "{energy:e} of {expected:e} J");
+        for (instructions, threads) in [(Instructions::Portable, 1), (Instructions::detect(), 3)] {
+            let again = by_passes(&model, smoothing, instructions, threads);
+            assert!(again == (forces.clone(), energies.clone()), "{instructions:?}, {threads}");
+        }
+    }
+}
+
+#[test]
+fn passes_in_lanes_are_the_truth() {
+    as_the_truth::<f64>(1e-13);
+    as_the_truth::<f32>(1e-5);
+}
+
+/// A tetrahedron that is inside out is told, of its own part only.
+#[test]
+fn an_inverted_tetrahedron_is_told() {
+    let model = model::<f64>();
+    let (method, elements) = (Method::Explicit, Elements::Recovered);
+    let settings = SolverSettings { method, elements, ..SolverSettings::default() };
+    let layout = Layout::new(&model, &settings);
+    let mut passes = RecoveredTets::new(&layout, layout.recovered.as_ref().expect("tables"));
+    let (_, mut points) = moved(&model, &layout);
+    let v = layout.parts[2].vertices.start;
+    let away = points[v].vec3() + vec3(0.1, 0.1, 0.1);
+    points[v].set_vec3(away);
+    let workers = Workers::one();
+    let told = [0, 1, 2].map(|part| passes.evaluate(&workers, &layout, part, &points));
+    assert_eq!(told, [false, false, true]);
+}
