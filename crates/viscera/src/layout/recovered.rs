@@ -23,7 +23,7 @@ pub struct Frames<S> {
     pub arms: [Eight<S>; 9],
     /// `c_o`.
     pub face_weights: [Eight<S>; 4],
-    /// Places of the corners.
+    /// Three times the places of the corners: where matrices stand by columns.
     pub places: [Eight<u32>; 4],
     /// The copies of these that the block adds to, three times: where rows of three points stand.
     pub rows: [Eight<u32>; 4],
@@ -81,8 +81,8 @@ pub struct RecoveredTables<S> {
     pub volumes: Vec<S>,
     /// `1/V_n`, zero where there is no domain.
     pub inverse_volumes: Vec<S>,
-    /// `l` and `mu` [Pa] and the retardation time [s] of each place.
-    pub local: Vec<[S; 3]>,
+    /// `l` and `mu` [Pa] and the retardation time [s] of each group of places.
+    pub local: Vec<[Eight<S>; 3]>,
     /// `k_n` and `k_c` [Pa] of each place.
     pub bulk: Vec<[S; 2]>,
     /// The cluster of each place.
@@ -221,7 +221,10 @@ impl<S: Real> RecoveredTables<S> {
             let bulk = if clustered { [domain, cluster] } else { [domain + cluster, S::ZERO] };
             ([shares.local, material.lame_mu, material.viscosity], bulk)
         };
-        let (local, bulk) = places.domains.iter().map(shares).unzip();
+        let (of_places, bulk): (Vec<[S; 3]>, Vec<[S; 2]>) =
+            places.domains.iter().map(shares).unzip();
+        let local = of_places.as_chunks::<LANES>().0.iter();
+        let local = local.map(|of| [0, 1, 2].map(|i| of.map(|of| of[i]))).collect();
         let share = domains.smoothing.vertex_share;
         let mut tables = Self {
             shares: [1.0 - share, share].map(S::from_f64),
@@ -387,7 +390,7 @@ fn frames<S: Real>(
         for lane in lanes {
             for corner in 0..4 {
                 let n = domains.tet_domains[t][corner] as usize;
-                frame.places[corner][lane] = places.of[n];
+                frame.places[corner][lane] = 3 * places.of[n];
                 frame.face_weights[corner][lane] = rest.face_weights[corner];
             }
             for (i, component) in rest.arms[1..].iter().flat_map(|arm| arm.to_array()).enumerate() {
@@ -401,7 +404,7 @@ fn frames<S: Real>(
         for frame in &mut frames[piece.clone()] {
             for (corner, row) in frame.places.iter().zip(&mut frame.rows) {
                 for (&place, row) in corner.iter().zip(row) {
-                    let place = place as usize;
+                    let place = place as usize / 3;
                     if last[place] != number {
                         last[place] = number;
                         counts[place] += 1;
@@ -421,7 +424,7 @@ fn frames<S: Real>(
     for frame in &mut frames {
         for (corner, row) in frame.places.iter().zip(&mut frame.rows) {
             for (&place, row) in corner.iter().zip(row) {
-                *row = 3 * (copy_offsets[place as usize] + *row);
+                *row = 3 * (copy_offsets[place as usize / 3] + *row);
             }
         }
     }

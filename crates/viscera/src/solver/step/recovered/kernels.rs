@@ -68,8 +68,7 @@ impl<S: Real> Kernel<S> for VertexGradients<'_, S> {
                 for Entry { index, gradient: b } in self.tables.domain_rings.of(group) {
                     // SAFETY: as above.
                     let edge = unsafe { L::gather(x, index, lane) }.vec3() - origin;
-                    let [u, v, w] = [0, 1, 2].map(|axis| L::load(&b[axis], lane));
-                    gradient = gradient + Mat3::outer(edge, vec3(u, v, w));
+                    gradient = gradient + Mat3::outer(edge, load_vector(b, lane));
                 }
                 for column in 0..3 {
                     let value = Point::new(gradient.columns[column], L::ZERO);
@@ -87,8 +86,8 @@ impl<S: Real> Frames<S> {
     /// At rest, some lanes of it.
     #[inline(always)]
     fn rest<L: Lanes<Real = S>>(&self, shape: &Mat3<L>, lane: usize) -> RestFrame<L> {
-        let at = |i: usize| L::load(&self.arms[i], lane);
-        let [b, c, d] = [0, 3, 6].map(|i| vec3(at(i), at(i + 1), at(i + 2)));
+        let arms = load_matrix::<L>(&self.arms, lane);
+        let [b, c, d] = arms.columns;
         let mut face_weights = [L::ZERO; 4];
         for o in 0..4 {
             face_weights[o] = L::load(&self.face_weights[o], lane);
@@ -122,10 +121,9 @@ impl<S: Real> TetPass<S> for TetGradients<'_, S> {
         }
         let mut of_corners = [Mat3::ZERO; 4];
         for corner in 0..4 {
-            let places = &frame.places[corner];
-            let rows = std::array::from_fn(|lane| 3 * places[lane]);
             // SAFETY: places of the tables, whose gradients there are.
-            of_corners[corner] = unsafe { gather_matrix(self.gradients.as_ptr(), &rows, lane) };
+            of_corners[corner] =
+                unsafe { gather_matrix(self.gradients.as_ptr(), &frame.places[corner], lane) };
         }
         let recovered = recovered_gradient(&f, &of_corners, &frame.rest(&shape, lane));
         // SAFETY: every block is worked on once.
@@ -151,9 +149,16 @@ impl<S: Real> TetPass<S> for TetGradients<'_, S> {
 /// `Fh_t` of some lanes of a block.
 #[inline(always)]
 fn load_matrix<L: Lanes>(of: &[Eight<L::Real>; 9], lane: usize) -> Mat3<L> {
-    let at = |i: usize| L::load(&of[i], lane);
-    let [a, b, c] = [0, 3, 6].map(|i| vec3(at(i), at(i + 1), at(i + 2)));
-    Mat3::from_columns(a, b, c)
+    let mut matrix = Mat3::ZERO;
+    for (column, of) in matrix.columns.iter_mut().zip(of.as_chunks().0) {
+        *column = load_vector(of, lane);
+    }
+    matrix
+}
+
+#[inline(always)]
+fn load_vector<L: Lanes>([x, y, z]: &[Eight<L::Real>; 3], lane: usize) -> Vec3<L> {
+    vec3(L::load(x, lane), L::load(y, lane), L::load(z, lane))
 }
 
 /// What forces are wanted.
@@ -260,9 +265,9 @@ impl<S: Real> TetPass<S> for TetForces<'_, S> {
         let rest = frame.rest(&shape, lane);
         let mut mean = [S::ZERO; LANES];
         for lane in lane..lane + L::WIDTH {
-            let [a, b, c, d] =
-                [0, 1, 2, 3].map(|corner| self.pressures[frame.places[corner][lane] as usize]);
-            mean[lane] = ((a + b) + (c + d)) * S::from_f64(0.25);
+            let pressure = |corner: usize| self.pressures[frame.places[corner][lane] as usize / 3];
+            let sums = [pressure(0) + pressure(1), pressure(2) + pressure(3)];
+            mean[lane] = (sums[0] + sums[1]) * S::from_f64(0.25);
         }
         let material = tets.material::<L>();
         let local = bulk_shares(material.lame_lambda, material.lame_mu).local;
@@ -363,8 +368,11 @@ fn local_of<S: Real, L: Lanes<Real = S>>(
     group: usize,
     lane: usize,
 ) -> [L; 3] {
-    let own = eight(&tables.local, group);
-    [0, 1, 2].map(|i| L::load(&std::array::from_fn(|lane| own[lane][i]), lane))
+    let mut of = [L::ZERO; 3];
+    for (of, group_of) in of.iter_mut().zip(&tables.local[group]) {
+        *of = L::load(group_of, lane);
+    }
+    of
 }
 
 /// `-sum_n N_n b_ni` to the vertices' first copies.
@@ -387,8 +395,7 @@ impl<S: Real> Kernel<S> for VertexForces<'_, S> {
                 for Entry { index, gradient: b } in self.tables.vertex_rings.of(group) {
                     // SAFETY: rows of places of the tables.
                     let stress: Mat3<L> = unsafe { gather_matrix(points, index, lane) };
-                    let [u, v, w] = [0, 1, 2].map(|axis| L::load(&b[axis], lane));
-                    sum += stress * vec3(u, v, w);
+                    sum += stress * load_vector(b, lane);
                 }
                 sum.x.store(&mut sums[0], lane);
                 sum.y.store(&mut sums[1], lane);
