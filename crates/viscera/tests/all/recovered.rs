@@ -215,6 +215,13 @@ fn methods_without_them_say_which_has() {
     let mut automatic = simulation(&[]).expect("a simulation");
     assert_eq!(automatic.solver().method, Method::Explicit);
     automatic.advance_frame().expect("a frame");
+    // Also where linear ones are cheaper by another method.
+    let stiff = [("body.bar.material.young", "5 MPa"), ("body.bar.material.poisson", "0.499")];
+    let method = |elements: &'static str| {
+        let overrides = [&stiff[..], &[("solver.elements", elements)]].concat();
+        simulation(&overrides).expect("a simulation").solver().method
+    };
+    assert_eq!([method("plain"), method("recovered")], [Method::QuasiNewton, Method::Explicit]);
     let changed = |elements: &str| [("solver.elements".to_owned(), elements.to_owned())];
     automatic.change(&changed("plain")).expect("other elements");
     automatic.advance_frame().expect("a frame");
