@@ -487,7 +487,7 @@ impl<S: Real> Sum<S> for PlaceEnergy<'_, S> {
             let [local, mu, _] = local_of(tables, group, lane);
             let mut density = neo_hookean::energy_density(&gradient, local, mu) * L::splat(share);
             for (change, stiffness) in [&domain, &cluster] {
-                density = density + bulk_energy(L::load(change, lane), L::load(stiffness, lane));
+                density += bulk_energy(L::load(change, lane), L::load(stiffness, lane));
             }
             let volume = L::load(eight(&tables.volumes, group), lane);
             (density * volume).store(&mut energies, lane);
