@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 use std::fmt;
 use std::str::FromStr;
 use sysinfo::{MemoryRefreshKind, System};
-use viscera::settings::{Acceleration, Colors, Method, Precision, SolverSettings};
+use viscera::settings::{Acceleration, Colors, Elements, Method, Precision, SolverSettings};
 use viscera::units::format_number;
 
 /// Units, powers of a thousand.
@@ -60,6 +60,8 @@ const KEPT: f64 = 170.0;
 const COPIES: f64 = 150.0;
 /// Numbers of the copies where pieces of the explicit method's pass meet. Measured 15 to 22 on bars.
 const PIECES: f64 = 30.0;
+/// Frames and rings of recovered-gradient tetrahedra, and what passes over them keep. Measured 265 to 315 on bars.
+const RECOVERED: f64 = 350.0;
 /// Of the quasi-Newton method: pairs, vectors and the levels of its preconditioner. Measured 440 to 690 more than XPBD
 /// on bars from 1,000 to 100,000 tetrahedra, the most where the coarsest level is largest.
 const LEVELS: f64 = 800.0;
@@ -76,6 +78,9 @@ pub fn kept(settings: &SolverSettings) -> f64 {
     }
     if settings.method == Method::Explicit {
         kept += PIECES;
+    }
+    if settings.elements == Elements::Recovered {
+        kept += RECOVERED;
     }
     if settings.acceleration != Acceleration::None {
         kept += ITERATES;

@@ -147,7 +147,7 @@ fn a_mesh_of_three_tetrahedra_is_measured() {
         bench(&folder, &["--mesh", "three.msh", "--threads", "1,3", "--json", "deep/three.json"]);
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     let cases = cases(&folder, "deep/three.json");
-    assert_eq!(cases.len(), 2 * 14, "every solver with one and with three threads");
+    assert_eq!(cases.len(), 2 * 15, "every solver with one and with three threads");
     for case in &cases {
         assert_is_measured(case);
         assert_eq!((&case["tets"], &case["mesh"]), (&3.into(), &"three".into()));

@@ -188,18 +188,7 @@ impl<S: Real> RecoveredTables<S> {
         let law = MaterialModel::StableNeoHookean as usize;
         let set = &layout.tet_sets[law];
         let places = Places::new(layout, domains);
-        let pieces: Vec<Vec<Range<usize>>> = layout
-            .parts
-            .iter()
-            .map(|part| {
-                let cut = |blocks: Range<usize>| {
-                    let end = blocks.end;
-                    let starts = blocks.step_by(PIECE_BLOCKS);
-                    starts.map(move |start| start..(start + PIECE_BLOCKS).min(end))
-                };
-                part.blocks(law).flat_map(cut).collect()
-            })
-            .collect();
+        let pieces = pieces(layout, law);
         let (frames, copy_offsets) = frames(set, domains, &places, &pieces);
         let volume = |n: &Option<u32>| n.map_or(S::ZERO, |n| domains.volumes[n as usize]);
         let vertices: Vec<u32> = place_vertices(layout, domains, &places);
@@ -350,6 +339,16 @@ impl<S: Real> RecoveredTables<S> {
             + size_of_val(&self.ring_vertices[..])
             + size_of_val(&self.counts[..])
     }
+}
+
+/// Blocks of a law in pieces, of each part.
+fn pieces<S: Real>(layout: &Layout<S>, law: usize) -> Vec<Vec<Range<usize>>> {
+    let cut = |blocks: Range<usize>| {
+        let end = blocks.end;
+        let starts = blocks.step_by(PIECE_BLOCKS);
+        starts.map(move |start| start..(start + PIECE_BLOCKS).min(end))
+    };
+    layout.parts.iter().map(|part| part.blocks(law).flat_map(cut).collect()).collect()
 }
 
 /// The vertex of each place; of one without a domain that of the place before.
