@@ -10,7 +10,7 @@
 //! ```
 //!
 //! The equations stand in [`crate::elements::recovered`]. One at a time and in the caller's numbering here: the
-//! truth that the passes in lanes ([`RecoveredTets`]) are tested against.
+//! truth that the passes in lanes (`passes.rs`) are tested against.
 
 mod kernels;
 mod passes;
