@@ -28,8 +28,9 @@ pub enum Side {
 
 /// The reference: XPBD that is exact at rest, with so many iterations that round-off is what is left. In double
 /// precision it would cost twice as much, and look the same.
-const REFERENCE: [(&str, &str); 11] = [
+const REFERENCE: [(&str, &str); 12] = [
     ("solver.method", "xpbd"),
+    ("solver.elements", "plain"),
     ("solver.colors", "unlimited"),
     ("solver.iterations", "20"),
     ("solver.acceleration", "none"),

@@ -2,7 +2,7 @@
 
 use eframe::egui::Ui;
 use viscera::settings::{
-    Acceleration, Colors, Count, DeviceRequest, Method, Precision, SolverSettings,
+    Acceleration, Colors, Count, DeviceRequest, Elements, Method, Precision, SolverSettings,
 };
 
 use super::choice::{Chooser, Row};
@@ -68,7 +68,7 @@ const KNOWN: [(&str, &str, KnownSettings); 5] = [
     ),
 ];
 
-type KnownSettings = [(&'static str, &'static str); 7];
+type KnownSettings = [(&'static str, &'static str); 8];
 
 const fn known_settings(
     method: &'static str,
@@ -86,6 +86,8 @@ const fn known_settings(
         ("solver.acceleration", acceleration),
         ("solver.rebase", exact),
         ("solver.keep_multipliers", exact),
+        // Most of them have linear ones only.
+        ("solver.elements", "plain"),
     ]
 }
 
@@ -128,6 +130,16 @@ fn method(ui: &mut Ui, asked: Method, solver: &SolverSettings, chooser: &mut Cho
         let value = solver.accuracy.to_string();
         let row = Row::new("solver.accuracy", "accuracy", help);
         chooser.menu(ui, &row, value.trim_matches('"'), &names);
+    }
+    if matches!(asked, Method::Auto | Method::Explicit) && solver.method != Method::Xpbd {
+        let help = "Linear tetrahedra bend too little where the mesh is coarse. Recovered-gradient ones also see how their \
+                    neighbours are deformed; explicit steps have them, which automatic then is.";
+        let names = [("plain", "linear"), ("recovered", "recovered-gradient")];
+        let value = match solver.elements {
+            Elements::Plain => "plain",
+            Elements::Recovered => "recovered",
+        };
+        chooser.menu(ui, &Row::new("solver.elements", "tetrahedra", help), value, &names);
     }
     let help =
         "Divide every frame. More lose less motion to numerical damping; the cost grows alike.";

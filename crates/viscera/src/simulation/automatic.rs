@@ -2,6 +2,7 @@
 
 use super::Assembly;
 use super::holding::GraspOrigins;
+use crate::elements::shape_gradients;
 use crate::model::Model;
 use crate::scalar::Real;
 use crate::scene::Scene;
@@ -94,13 +95,36 @@ fn choose_by_cost<S: Real>(
     let mut quasi_newton = Solver::new(model, &large);
     let oscillations = quasi_newton.oscillations(&fixings());
     let substeps = quasi_newton.substeps_for(&oscillations, frame);
+    // Of a large mesh two solvers at a time are the most memory that a run takes.
+    drop(quasi_newton);
     let of_large = cost(&large, model, frame, substeps, f64::INFINITY);
+    // A large mesh would take memory and seconds for what is known without.
+    if fewest_small_steps(model, frame) > of_large {
+        return Chosen { settings: large, oscillations: Some(oscillations) };
+    }
     let explicit = explicit_solver(asked, model, &oscillations);
     let small_steps = explicit.substeps_for(&oscillations, frame);
     let of_explicit = cost(explicit.settings(), model, frame, small_steps, explicit.stable_step());
     let is_explicit = of_explicit < of_large;
     let settings = if is_explicit { explicit.settings().clone() } else { large };
     Chosen { settings, oscillations: Some(oscillations) }
+}
+
+/// Small steps in a frame [s] at least, whatever the settings: the largest frequency is not below that of a vertex alone,
+/// `w^2 >= tr K_vv/(3 m)`, `tr K_vv = sum_t V (lambda + 4 mu) |g|^2`, and steps of more than `2/w` are unstable.
+fn fewest_small_steps<S: Real>(model: &Model<S>, frame: f64) -> f64 {
+    let mut traces = vec![0.0; model.vertex_count()];
+    for tet in model.tets() {
+        let material = &model.materials[tet.material as usize];
+        let stiffness = material.lame_lambda.to_f64() + 4.0 * material.lame_mu.to_f64();
+        let gradients = shape_gradients(&tet.inverse_rest_shape.cast::<f64>());
+        for (v, g) in tet.vertices.into_iter().zip(gradients) {
+            traces[v as usize] += tet.rest_volume.to_f64() * stiffness * g.length_squared();
+        }
+    }
+    let squares =
+        traces.iter().zip(&model.masses).map(|(trace, mass)| trace / (3.0 * mass.to_f64()));
+    0.5 * frame * squares.fold(0.0, f64::max).sqrt()
 }
 
 /// The explicit method with steps as short as the accuracy asks for.
@@ -116,6 +140,7 @@ fn explicit_solver<S: Real>(
     if error <= most {
         return solver;
     }
+    drop(solver);
     // Of the second order.
     let explicit_safety = settings.explicit_safety * (most / error).sqrt();
     Solver::new(model, &SolverSettings { explicit_safety, ..settings })
@@ -201,5 +226,30 @@ pub fn expected_errors(
         }
         // Sweeps that are cut short lose motion by an amount that depends on tissue and mesh.
         Method::Xpbd => ExpectedErrors { motion: None, at_rest: 1e-2 },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::{Material, MaterialModel};
+    use crate::mesh::shapes;
+    use crate::model::ModelBuilder;
+
+    /// Of any tissue, on meshes of any shape: no more than the largest stable steps make, and no less than a third of these.
+    #[test]
+    fn the_fewest_small_steps_are_a_bound() {
+        for (poisson, jitter) in [(0.0, 0.0), (0.3, 0.2), (0.45, 0.0), (0.499, 0.2)] {
+            let law = MaterialModel::StableNeoHookean;
+            let tissue = Material::new(law, 2e4, poisson, 1000.0).expect("legal");
+            let mesh = shapes::beam(0.08, 0.02, 0.02, 4, jitter).expect("a beam");
+            let mut builder = ModelBuilder::new();
+            builder.add_body(&mesh, &tissue).expect("a body");
+            let model = builder.build::<f32>().expect("a model");
+            let settings = SolverSettings { explicit_safety: 1.0, ..SolverSettings::default() };
+            let stable = Solver::new(&model, &settings.chosen(Method::Explicit)).stable_step();
+            let share = fewest_small_steps(&model, 1.0) * stable;
+            assert!((0.33..1.0).contains(&share), "{poisson}: {share}");
+        }
     }
 }

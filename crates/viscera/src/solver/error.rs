@@ -26,7 +26,7 @@ pub enum StepError {
     /// The method has linear tetrahedra only.
     #[error(
         "`elements = \"recovered\"` is computed by `method = \"explicit\"` on the CPU only, and not by \"{method}\"; use that \
-         method, or `elements = \"plain\"`"
+         method with `device = \"cpu\"`, or `elements = \"plain\"`"
     )]
     Elements {
         /// The method of the settings.

@@ -116,7 +116,7 @@ fn error_of_large_motion(step: f64) -> f64 {
 
 /// Errors found over those of linear oscillations: 0.8 to 1.5 on bars and organs, whose motion is large and whose solves
 /// are cut short.
-const MARGIN: f64 = 1.55;
+const MARGIN: f64 = 1.7;
 
 /// Error of the path of soft tissue that falls far, whatever its period, with steps of [`LARGE_MOTION_STEP`] [s]; of the second
 /// order of the step.
