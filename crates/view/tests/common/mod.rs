@@ -101,6 +101,8 @@ impl Window {
     }
 
     pub fn press(&mut self, name: &str) {
+        self.harness.get_by_label(name).scroll_to_me();
+        self.harness.step();
         self.harness.get_by_label(name).click();
         self.harness.step();
         self.harness.step();

@@ -115,9 +115,9 @@ fn passes_in_lanes_are_the_truth() {
     as_the_truth::<f32>(1e-5);
 }
 
-/// A tetrahedron that is inside out is told, of its own part only.
+/// An inverted tetrahedron is reported, of its own part only.
 #[test]
-fn an_inverted_tetrahedron_is_told() {
+fn an_inverted_tetrahedron_is_reported() {
     let model = model::<f64>();
     let (method, elements) = (Method::Explicit, Elements::Recovered);
     let settings = SolverSettings { method, elements, ..SolverSettings::default() };
