@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
-use viscera::measure::{TetMeasure, measure_tets};
+use viscera::measure::measure_tets_by_pieces;
 use viscera::mesh::SurfaceMesh;
 use viscera::mesh::io::vtu::{Array, Grid};
 use viscera::mesh::io::{obj, pvd};
@@ -93,7 +93,6 @@ pub struct Written<S> {
     /// Nothing where none are asked for.
     surface: Option<Surfaces>,
     rest_positions: Vec<Vec3<S>>,
-    measures: Vec<TetMeasure>,
 }
 
 /// The surfaces of all bodies.
@@ -117,7 +116,6 @@ impl<S: Real> Written<S> {
             writes_tets: output.tets,
             surface: has_surface.then(|| Surfaces::of(bodies)).transpose()?,
             rest_positions: model.rest_positions.clone(),
-            measures: Vec::new(),
         })
     }
 
@@ -183,22 +181,25 @@ impl<S: Real> Written<S> {
         positions: &[Vec3<S>],
         velocities: &[Vec3<S>],
     ) -> Result<()> {
-        measure_tets(model, positions, &mut self.measures);
-        let scalars = |name: &str, value: fn(&TetMeasure) -> f64| {
-            Array::scalars(name, &self.measures.iter().map(value).collect::<Vec<f64>>())
-        };
-        let stretches = self.measures.iter().map(|tet| Vec3::from_f64(tet.stretches));
-        let stretches: Vec<Vec3<f64>> = stretches.collect();
+        let count = model.tet_count();
+        let scalars = |name| Array::with_room::<1>(name, count);
+        let mut ratios = scalars("J");
+        let mut stretches = Array::with_room::<3>("principal stretches", count);
+        let mut stresses = scalars("von Mises Cauchy stress [Pa]");
+        let mut energies = scalars("energy density [J/m^3]");
+        measure_tets_by_pieces(model, positions, |tets| {
+            for tet in tets {
+                ratios.push([tet.volume_ratio as f32]);
+                stretches.push(tet.stretches.map(|stretch| stretch as f32));
+                stresses.push([tet.von_mises as f32]);
+                energies.push([tet.energy_density as f32]);
+            }
+        });
+        let cell_data = [ratios, stretches, stresses, energies];
         let displacements = displacements(positions, &self.rest_positions);
         let point_data = [
             Array::vectors("displacement [m]", &displacements),
             Array::vectors("velocity [m/s]", velocities),
-        ];
-        let cell_data = [
-            scalars("J", |tet| tet.volume_ratio),
-            Array::vectors("principal stretches", &stretches),
-            scalars("von Mises Cauchy stress [Pa]", |tet| tet.von_mises),
-            scalars("energy density [J/m^3]", |tet| tet.energy_density),
         ];
         self.out.write_parts(name, &self.grid.frame(positions, &point_data, &cell_data)?)
     }

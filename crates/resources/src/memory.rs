@@ -49,8 +49,8 @@ impl fmt::Display for Memory {
 /// program; too large, and it is not used in full.
 const BUILDING: f64 = 240.0;
 
-/// What `viscera run` takes beside model, state and solver: meshes, surfaces, measures, a frame as VTU
-/// [B per tetrahedron]; 464 to 481 on a bar of 300,000, likewise.
+/// What `viscera run` takes beside model, state and solver: meshes, surfaces, a frame as VTU [B per tetrahedron]; 390 on a
+/// bar of 300,000, 225 on one of a million, likewise; pictures take 60 MB besides, however large the mesh.
 const RUNNING: f64 = 490.0;
 
 /// What model, state and solver keep, at most [B per tetrahedron]; without viscosity. Measured 130 to
@@ -62,9 +62,9 @@ const COPIES: f64 = 150.0;
 const PIECES: f64 = 30.0;
 /// Frames and rings of recovered-gradient tetrahedra, and what passes over them keep. Measured 265 to 315 on bars.
 const RECOVERED: f64 = 350.0;
-/// Of the quasi-Newton method: pairs, vectors and the levels of its preconditioner. Measured 440 to 690 more than XPBD
+/// Of the quasi-Newton method: pairs, vectors and the levels of its preconditioner. Measured 310 to 620 more than XPBD
 /// on bars from 1,000 to 100,000 tetrahedra, the most where the coarsest level is largest.
-const LEVELS: f64 = 800.0;
+const LEVELS: f64 = 650.0;
 /// Two iterates and the weights of multipliers.
 const ITERATES: f64 = 90.0;
 /// Six multipliers and a vertex's share in one entry of Anderson's two histories.

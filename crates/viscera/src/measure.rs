@@ -9,7 +9,10 @@
 
 mod tissue;
 
-pub use tissue::{DeformationSummary, TetMeasure, TissueMeasure, measure_tets, measure_tissue};
+pub use tissue::{
+    DeformationSummary, TetMeasure, TissueMeasure, measure_tets, measure_tets_by_pieces,
+    measure_tissue,
+};
 
 use crate::elements::kinds::{Energy, Kind};
 use crate::model::Model;

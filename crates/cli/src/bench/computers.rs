@@ -190,6 +190,8 @@ impl<'a> Runner<'a> {
     /// Meets memory and kernels for the first time, and finds how many steps are worth a look at the clock.
     pub fn warm_up(&mut self) -> Result<()> {
         self.stepper.run(1)?;
+        // The first step takes memory as well.
+        self.facts = self.stepper.facts();
         // A step of a large mesh takes seconds; no more of them than it takes.
         while self.stepper.run(self.batch)?.wall < self.facts.least
             && self.batch < self.facts.most_steps

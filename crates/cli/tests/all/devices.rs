@@ -89,7 +89,7 @@ fn double_precision_is_refused_by_graphics_processors() {
     let end = bench.run(&["--set", "solver.device=gpu", "--set", "solver.precision=f64"]);
     assert!(end.error().starts_with("graphics processors compute in single precision"));
     let cpu = bench.summary_of(&["--frames", "1", "--set", "solver.precision=f64"]);
-    assert_eq!(cpu["device"], "CPU: double precision");
+    assert_eq!(cpu["device"], "CPU: explicit steps that suit the present shape");
 }
 
 #[test]

@@ -130,7 +130,7 @@ fn parents(points: &[[u32; 3]], first_vertices: &[u32], coarser: &Nodes) -> Weig
         // point is.
         for &(parent, _) in coarser.of_vertices.of(first as usize) {
             let at = coarser.points[parent as usize];
-            let weight: f64 = (0..3).map(|axis| weight_of_parent(point[axis], at[axis])).product();
+            let weight: f32 = (0..3).map(|axis| weight_of_parent(point[axis], at[axis])).product();
             if weight > 0.0 {
                 weights.entries.push((parent, weight));
             }
@@ -141,7 +141,7 @@ fn parents(points: &[[u32; 3]], first_vertices: &[u32], coarser: &Nodes) -> Weig
 }
 
 /// `hat(k / 2 - K)`: 1 at the parent's own place, 1/2 beside it.
-fn weight_of_parent(k: u32, parent: u32) -> f64 {
+fn weight_of_parent(k: u32, parent: u32) -> f32 {
     match k.abs_diff(2 * parent) {
         0 => 1.0,
         1 => 0.5,

@@ -89,8 +89,26 @@ pub fn measure_tets<S: Real>(
 ) {
     measures.clear();
     measures.resize(model.tet_count(), TetMeasure::default());
-    run(Instructions::detect(), Each { tets: Tets { model, positions }, measures });
+    run(Instructions::detect(), Each { tets: Tets { model, positions }, first: 0, measures });
 }
+
+/// As [`measure_tets`], a piece after the other in the user's order: for who need not have them all at a time.
+pub fn measure_tets_by_pieces<S: Real>(
+    model: &Model<S>,
+    positions: &[Vec3<S>],
+    mut with: impl FnMut(&[TetMeasure]),
+) {
+    let count = model.tet_count();
+    let mut measures = vec![TetMeasure::default(); count.min(LANES * PIECE)];
+    for first in (0..count.div_ceil(LANES)).step_by(PIECE) {
+        let measures = &mut measures[..(LANES * PIECE).min(count - LANES * first)];
+        run(Instructions::detect(), Each { tets: Tets { model, positions }, first, measures });
+        with(measures);
+    }
+}
+
+/// Groups of a piece.
+const PIECE: usize = 1024;
 
 /// Measures the tissue as a whole: what sums and extremes of [`measure_tets`] would be, to the bit.
 pub fn measure_tissue<S: Real>(model: &Model<S>, positions: &[Vec3<S>]) -> TissueMeasure {
@@ -294,16 +312,16 @@ fn von_mises<S: Scalar>(cauchy: &Mat3<S>) -> S {
 /// All measures of each tetrahedron.
 struct Each<'a, S> {
     tets: Tets<'a, S>,
+    /// The group that the first of `measures` is of.
+    first: usize,
     measures: &'a mut [TetMeasure],
 }
 
 impl<S: Real> Kernel<f64> for Each<'_, S> {
     #[inline(always)]
     fn run<L: Lanes<Real = f64>>(self) {
-        for index in 0..self.tets.group_count() {
+        for (index, measures) in (self.first..).zip(self.measures.chunks_mut(LANES)) {
             let group = self.tets.group::<L>(index);
-            let first = LANES * index;
-            let measures = &mut self.measures[first..first + group.filled];
             for lane in (0..group.filled).step_by(L::WIDTH) {
                 let f = group.deformation_gradient::<L>(lane);
                 let stretches = signed_svd(&f).sigma;

@@ -42,11 +42,24 @@ pub fn fixings<S: Real>(scene: &Scene, assembly: &Assembly) -> Inputs<S> {
 }
 
 /// What a scene is computed by.
-pub struct Chosen {
+pub struct Chosen<S> {
     /// The scene's settings, with a method in the place of "auto".
     pub settings: SolverSettings,
     /// How the bodies swing, where the choice had to know it.
     pub oscillations: Option<Oscillations>,
+    /// The solver of these settings, where the choice has built it: of a large mesh a second one takes seconds.
+    pub solver: Option<Solver<S>>,
+}
+
+impl<S: Real> Chosen<S> {
+    fn without_solver(settings: SolverSettings) -> Self {
+        Self { settings, oscillations: None, solver: None }
+    }
+
+    fn with_solver(solver: Solver<S>, oscillations: Oscillations) -> Self {
+        let (settings, oscillations) = (solver.settings().clone(), Some(oscillations));
+        Self { settings, oscillations, solver: Some(solver) }
+    }
 }
 
 /// The method of a scene: the cheaper one of those that are as accurate as asked; `on_device` where the caller has chosen a
@@ -56,9 +69,9 @@ pub fn choose_method<S: Real>(
     assembly: &Assembly,
     model: &Model<S>,
     on_device: bool,
-) -> Chosen {
+) -> Chosen<S> {
     if on_device {
-        return Chosen { settings: scene.solver.chosen(Method::Xpbd), oscillations: None };
+        return Chosen::without_solver(scene.solver.chosen(Method::Xpbd));
     }
     choose_by_cost(&scene.solver, model, scene.time.frame, || fixings(scene, assembly))
 }
@@ -81,33 +94,29 @@ fn choose_by_cost<S: Real>(
     model: &Model<S>,
     frame: f64,
     fixings: impl FnOnce() -> Inputs<S>,
-) -> Chosen {
+) -> Chosen<S> {
     let asked = &asked.foreseen();
     let large = asked.chosen(Method::QuasiNewton);
     if asked.method != Method::Auto {
-        return Chosen { settings: large, oscillations: None };
+        return Chosen::without_solver(large);
     }
     if asked.elements == Elements::Recovered {
         let oscillations = Solver::new(model, &large).oscillations(&fixings());
-        let settings = explicit_solver(asked, model, &oscillations).settings().clone();
-        return Chosen { settings, oscillations: Some(oscillations) };
+        return Chosen::with_solver(explicit_solver(asked, model, &oscillations), oscillations);
     }
     let mut quasi_newton = Solver::new(model, &large);
     let oscillations = quasi_newton.oscillations(&fixings());
     let substeps = quasi_newton.substeps_for(&oscillations, frame);
-    // Of a large mesh two solvers at a time are the most memory that a run takes.
-    drop(quasi_newton);
     let of_large = cost(&large, model, frame, substeps, f64::INFINITY);
     // A large mesh would take memory and seconds for what is known without.
     if fewest_small_steps(model, frame) > of_large {
-        return Chosen { settings: large, oscillations: Some(oscillations) };
+        return Chosen::with_solver(quasi_newton, oscillations);
     }
     let explicit = explicit_solver(asked, model, &oscillations);
     let small_steps = explicit.substeps_for(&oscillations, frame);
     let of_explicit = cost(explicit.settings(), model, frame, small_steps, explicit.stable_step());
-    let is_explicit = of_explicit < of_large;
-    let settings = if is_explicit { explicit.settings().clone() } else { large };
-    Chosen { settings, oscillations: Some(oscillations) }
+    let solver = if of_explicit < of_large { explicit } else { quasi_newton };
+    Chosen::with_solver(solver, oscillations)
 }
 
 /// Small steps in a frame [s] at least, whatever the settings: the largest frequency is not below that of a vertex alone,
@@ -152,14 +161,13 @@ pub fn keep_method<S: Real>(
     assembly: &Assembly,
     model: &Model<S>,
     method: Method,
-) -> Chosen {
+) -> Chosen<S> {
     let asked = &scene.solver.foreseen();
     if method != Method::Explicit {
-        return Chosen { settings: asked.chosen(method), oscillations: None };
+        return Chosen::without_solver(asked.chosen(method));
     }
     let oscillations = oscillations(scene, assembly, model);
-    let settings = explicit_solver(asked, model, &oscillations).settings().clone();
-    Chosen { settings, oscillations: Some(oscillations) }
+    Chosen::with_solver(explicit_solver(asked, model, &oscillations), oscillations)
 }
 
 /// How that swings which the fixings of a scene hold.

@@ -6,26 +6,37 @@ use super::error::SimulationError;
 use super::gpu;
 use crate::model::Model;
 use crate::scalar::Real;
-use crate::settings::{DeviceRequest, SolverSettings};
 #[cfg(feature = "gpu")]
-use crate::settings::{Elements, Method};
+use crate::settings::Elements;
+use crate::settings::{DeviceRequest, Method, SolverSettings};
 use crate::solver::Solver;
 
 impl<S: Real> Backend<S> {
-    /// What the settings ask for.
-    pub fn choose(model: &Model<S>, settings: &SolverSettings) -> Result<Self, SimulationError> {
-        if settings.device == DeviceRequest::Cpu {
-            return Ok(Self::cpu(Solver::new(model, settings), "as asked for"));
-        }
-        #[cfg(feature = "gpu")]
-        return gpu::choose(model, settings);
-        #[cfg(not(feature = "gpu"))]
-        match &settings.device {
-            DeviceRequest::Auto => {
-                let reason = "the GPU backend was left out of this build";
-                Ok(Self::cpu(Solver::new(model, settings), reason))
+    /// What the settings ask for; `ready` is a solver of the CPU of these settings, where there is one already.
+    pub fn choose(
+        model: &Model<S>,
+        settings: &SolverSettings,
+        ready: Option<Solver<S>>,
+    ) -> Result<Self, SimulationError> {
+        let cpu =
+            |reason| Ok(Self::cpu(ready.unwrap_or_else(|| Solver::new(model, settings)), reason));
+        match (&settings.device, settings.method) {
+            (DeviceRequest::Cpu, _) => cpu("as asked for"),
+            (DeviceRequest::Auto, Method::Auto | Method::QuasiNewton) => {
+                cpu("the quasi-Newton method is computed by the CPU")
             }
-            device => Err(SimulationError::NoGpuBackend { device: device.clone() }),
+            // A device knows no stiffness but that of the shape at rest.
+            (DeviceRequest::Auto, Method::Explicit) => {
+                cpu("explicit steps that suit the present shape")
+            }
+            #[cfg(feature = "gpu")]
+            _ => gpu::choose(model, settings),
+            #[cfg(not(feature = "gpu"))]
+            (DeviceRequest::Auto, Method::Xpbd) => {
+                cpu("the GPU backend was left out of this build")
+            }
+            #[cfg(not(feature = "gpu"))]
+            (device, _) => Err(SimulationError::NoGpuBackend { device: device.clone() }),
         }
     }
 
@@ -35,6 +46,7 @@ impl<S: Real> Backend<S> {
         same_device: bool,
         model: &Model<S>,
         settings: &SolverSettings,
+        ready: Option<Solver<S>>,
     ) -> Result<Self, SimulationError> {
         // A method that only the CPU computes leaves its device.
         #[cfg(feature = "gpu")]
@@ -56,10 +68,10 @@ impl<S: Real> Backend<S> {
         let mut backend = match warning {
             // A device that was lost is not tried again before somebody asks for it.
             Some(warning) => {
-                let cpu = Self::cpu(Solver::new(model, settings), &warning);
-                Self { warning: Some(warning), ..cpu }
+                let solver = ready.unwrap_or_else(|| Solver::new(model, settings));
+                Self { warning: Some(warning.clone()), ..Self::cpu(solver, warning) }
             }
-            None => Self::choose(model, settings)?,
+            None => Self::choose(model, settings, ready)?,
         };
         if let Some(instructions) = self.instructions() {
             backend.use_instructions(instructions);

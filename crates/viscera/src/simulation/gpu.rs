@@ -7,7 +7,7 @@ use super::error::{FrameError, SimulationError};
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
-use crate::settings::{DeviceRequest, Method, SolverSettings};
+use crate::settings::{DeviceRequest, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::gpu::{Adapter, Device, GpuError, GpuSolver, StepCost};
 use crate::solver::{Inputs, Solver, StepError};
@@ -100,7 +100,7 @@ fn of_precision<S: Real>(backend: Backend<f32>) -> Result<Backend<S>, Simulation
     backend.ok_or(SimulationError::Gpu(GpuError::DoublePrecision))
 }
 
-/// What the settings ask for. They do not ask for the CPU.
+/// What the settings ask for. They do not ask for the CPU, and leave only XPBD to be chosen for.
 pub(super) fn choose<S: Real>(
     model: &Model<S>,
     settings: &SolverSettings,
@@ -133,17 +133,7 @@ fn asked_for(
 /// The one that is expected to be faster, and the CPU where no device can do it.
 fn faster(model: &Model<f32>, settings: &SolverSettings) -> Backend<f32> {
     let solver = Solver::new(model, settings);
-    let sweeps = match settings.method {
-        Method::Auto | Method::QuasiNewton => {
-            return Backend::cpu(solver, "the quasi-Newton method is computed by the CPU");
-        }
-        // A device knows no stiffness but that of the shape at rest.
-        Method::Explicit => {
-            return Backend::cpu(solver, "explicit steps that suit the present shape");
-        }
-        Method::Xpbd => settings.iterations(),
-    };
-    let cost = StepCost::new(solver.layout(), settings, sweeps);
+    let cost = StepCost::new(solver.layout(), settings, settings.iterations());
     let tets = grouped(model.tet_count() as u64);
     // Before any driver is loaded, which takes longer than a small scene.
     if !cost.gpu_pays() {

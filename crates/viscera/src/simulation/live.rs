@@ -240,12 +240,12 @@ impl<S: Real> Simulation<S> {
         let same_device = scene.solver.device == self.scene.solver.device;
         let on_device = same_device && self.callers_device;
         self.resumed_method = self.resumed_method.filter(|_| same_device);
-        let Chosen { settings: solver, oscillations } = match self.resumed_method {
+        let Chosen { settings: solver, oscillations, solver: ready } = match self.resumed_method {
             Some(method) => automatic::keep_method(&scene, &self.assembly, &model, method),
             None => automatic::choose_method(&scene, &self.assembly, &model, on_device),
         };
         check_elements(&solver).map_err(SimulationError::from)?;
-        let backend = self.backend.renew(same_device, &model, &solver)?;
+        let backend = self.backend.renew(same_device, &model, &solver, ready)?;
         let rest = State::at_rest(&model);
         let state = State {
             positions: std::mem::take(&mut self.state.positions),

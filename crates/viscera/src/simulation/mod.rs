@@ -156,17 +156,21 @@ impl<S: Real> Simulation<S> {
         scene: Scene,
         assembly: Assembly,
         callers_device: bool,
-        choose: impl FnOnce(&Model<S>, &SolverSettings) -> Result<Backend<S>, SimulationError>,
+        choose: impl FnOnce(
+            &Model<S>,
+            &SolverSettings,
+            Option<Solver<S>>,
+        ) -> Result<Backend<S>, SimulationError>,
     ) -> Result<Self, SimulationError> {
         check_patches(&scene, &assembly)?;
         let model = assembly.builder.build::<S>()?;
-        let automatic::Chosen { settings: solver, oscillations } =
+        let automatic::Chosen { settings: solver, oscillations, solver: ready } =
             automatic::choose_method(&scene, &assembly, &model, callers_device);
         check_elements(&solver)?;
         let mut simulation = Self {
             state: State::at_rest(&model),
             substeps: solver.substeps(),
-            backend: choose(&model, &solver)?,
+            backend: choose(&model, &solver, ready)?,
             solver,
             callers_device,
             resumed_method: None,

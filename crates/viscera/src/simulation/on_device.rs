@@ -24,7 +24,7 @@ impl Simulation<f32> {
         assembly: Assembly,
         device: &Device,
     ) -> Result<Self, SimulationError> {
-        Self::on(scene, assembly, true, |model, settings| {
+        Self::on(scene, assembly, true, |model, settings, _| {
             let backend = on(device, model, settings, "the caller's choice")?;
             Ok(Backend { gives_way: settings.device == DeviceRequest::Auto, ..backend })
         })

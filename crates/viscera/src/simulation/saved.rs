@@ -206,9 +206,9 @@ impl<S: Real> Simulation<S> {
         if self.scene.solver.method != Method::Auto || self.callers_device {
             return Err(refused);
         }
-        let Chosen { settings, oscillations } =
+        let Chosen { settings, oscillations, solver } =
             automatic::keep_method(&self.scene, &self.assembly, &self.model, saved);
-        self.backend = Backend::choose(&self.model, &settings).map_err(|_| refused)?;
+        self.backend = Backend::choose(&self.model, &settings, solver).map_err(|_| refused)?;
         (self.solver, self.oscillations) = (settings, oscillations);
         self.resumed_method = Some(saved);
         self.choose_substeps();

@@ -8,13 +8,14 @@ use crate::scalar::Vec3;
 pub(crate) struct Weights {
     /// Row `i` is `offsets[i] .. offsets[i + 1]` of `entries`, shape `[row_count + 1]`; empty where there are no rows.
     pub offsets: Vec<u32>,
-    /// Nodes, ascending in each row, with their weights `[1]`, none of them zero.
-    pub entries: Vec<(u32, f64)>,
+    /// Nodes, ascending in each row, with their weights `[1]`, none of them zero. In single precision: any weights are those
+    /// of some coarse space, and there are eight of each vertex on each level.
+    pub entries: Vec<(u32, f32)>,
 }
 
 impl Weights {
     /// Nodes and weights of one row.
-    pub fn of(&self, row: usize) -> &[(u32, f64)] {
+    pub fn of(&self, row: usize) -> &[(u32, f32)] {
         &self.entries[self.offsets[row] as usize..self.offsets[row + 1] as usize]
     }
 }
@@ -116,7 +117,8 @@ impl Nodes {
                 let node = points.len() as u32;
                 for &v in search.component(first) {
                     let entry = &mut next[v as usize];
-                    entries[*entry as usize] = (node, weight(coordinates[v as usize], point));
+                    entries[*entry as usize] =
+                        (node, weight(coordinates[v as usize], point) as f32);
                     *entry += 1;
                 }
                 points.push(point);

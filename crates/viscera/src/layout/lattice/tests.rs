@@ -5,8 +5,8 @@ use crate::mesh::shapes::{Block, Splitting};
 use crate::mesh::topology::TET_EDGES;
 use crate::scalar::{Mat3, vec3};
 
-/// Weights are at most 1, products of three and sums of eight: some ten roundings.
-const ROUND_OFF: f64 = 1e-14;
+/// Weights are rounded to single precision, by half a unit of the last place; their sums are at most 1, and compared in pairs.
+const ROUND_OFF: f64 = f32::EPSILON as f64;
 
 /// Places `[m]`, tetrahedra, links.
 #[derive(Clone)]
@@ -176,10 +176,10 @@ fn weights_add_up_to_one_and_carry_linear_functions() {
                 assert!((1..=8).contains(&entries.len()));
                 assert!(entries.iter().all(|&(_, w)| w > 0.0 && w <= 1.0));
                 assert!(entries.windows(2).all(|pair| pair[0].0 < pair[1].0), "{name}: order");
-                let sum: f64 = entries.iter().map(|&(_, w)| w).sum();
+                let sum: f64 = entries.iter().map(|&(_, w)| f64::from(w)).sum();
                 assert!((sum - 1.0).abs() < ROUND_OFF, "{name} {l} {v}: {sum}");
                 let carried = entries.iter().fold(Vec3::ZERO, |sum, &(node, w)| {
-                    sum + slope * place_of(&lattice, l, node) * w
+                    sum + slope * place_of(&lattice, l, node) * f64::from(w)
                 });
                 let error = (carried - slope * *x).length();
                 assert!(error < tolerance, "{name} {l} {v}: {error}");
@@ -197,21 +197,25 @@ fn each_level_is_within_the_next_finer() {
             let (finer, coarser) = (&pair[0], &pair[1]);
             assert_eq!(coarser.of_finer.offsets.len(), finer.node_count() + 1);
             for node in 0..finer.node_count() {
-                let sum: f64 = coarser.of_finer.of(node).iter().map(|&(_, w)| w).sum();
+                let sum: f32 = coarser.of_finer.of(node).iter().map(|&(_, w)| w).sum();
                 assert_eq!(sum, 1.0, "{name}: parents of {node}");
             }
             for v in 0..part.places.len() {
                 let mut composed = BTreeMap::new();
                 for &(node, weight) in finer.of_vertices.of(v) {
                     for &(parent, share) in coarser.of_finer.of(node as usize) {
-                        *composed.entry(parent).or_insert(0.0) += weight * share;
+                        *composed.entry(parent).or_insert(0.0) +=
+                            f64::from(weight) * f64::from(share);
                     }
                 }
                 let direct = coarser.of_vertices.of(v);
                 assert_eq!(composed.len(), direct.len(), "{name}: {v}");
                 for (&(node, weight), (other, sum)) in direct.iter().zip(composed) {
                     assert_eq!(node, other, "{name}: {v}");
-                    assert!((weight - sum).abs() < ROUND_OFF, "{name}: {v}: {weight} {sum}");
+                    assert!(
+                        (f64::from(weight) - sum).abs() < ROUND_OFF,
+                        "{name}: {v}: {weight} {sum}"
+                    );
                 }
             }
         }
@@ -346,7 +350,7 @@ fn the_sides_of_a_slit_move_apart() {
         for v in upper.iter().chain(&lower) {
             let value: f64 = (level.of_vertices.of(*v).iter())
                 .filter(|(node, _)| above.contains(node))
-                .map(|&(_, w)| w)
+                .map(|&(_, w)| f64::from(w))
                 .sum();
             let expected = f64::from(u8::from(upper.contains(v)));
             assert!((value - expected).abs() < ROUND_OFF);

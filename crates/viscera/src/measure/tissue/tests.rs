@@ -64,7 +64,7 @@ fn measures_in_lanes_are_those_of_one_tet_at_a_time() {
     let positions = deformed(&model, 20.0, 2e-3);
     let mut measures = vec![TetMeasure::default(); model.tet_count()];
     let tets = Tets { model: &model, positions: &positions };
-    run(Instructions::Portable, Each { tets, measures: &mut measures });
+    run(Instructions::Portable, Each { tets, first: 0, measures: &mut measures });
     let mut in_lanes = Vec::new();
     measure_tets(&model, &positions, &mut in_lanes);
     assert_eq!(measures, in_lanes);

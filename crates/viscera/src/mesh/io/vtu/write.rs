@@ -34,12 +34,12 @@ pub struct Array {
 impl Array {
     /// One number for each entry.
     pub fn scalars<R: Real>(name: &str, values: &[R]) -> Self {
-        Self::floats(name, 1, values.iter().map(|value| [value.to_f64() as f32]))
+        Self::floats(name, values.iter().map(|value| [value.to_f64() as f32]))
     }
 
     /// Three components for each entry.
     pub fn vectors<R: Real>(name: &str, values: &[Vec3<R>]) -> Self {
-        Self::floats(name, 3, values.iter().map(|value| value.cast::<f32>().to_array()))
+        Self::floats(name, values.iter().map(|value| value.cast::<f32>().to_array()))
     }
 
     /// One whole number for each entry, such as a region.
@@ -50,29 +50,36 @@ impl Array {
         Self { name, vtk_type: "UInt32", components: 1, len, bytes, not_finite: None }
     }
 
-    fn floats<const N: usize>(
-        name: &str,
-        components: usize,
-        values: impl ExactSizeIterator<Item = [f32; N]>,
-    ) -> Self {
-        let (len, mut not_finite) = (values.len(), None);
-        let mut bytes = Vec::with_capacity(4 * N * len);
-        for (entry, numbers) in values.enumerate() {
-            for number in numbers {
-                bytes.extend_from_slice(&number.to_le_bytes());
-                if !number.is_finite() {
-                    not_finite = not_finite.or(Some(entry));
-                }
+    /// An array of entries of `N` numbers, with room for so many: for values that need not all be known at a time.
+    pub fn with_room<const N: usize>(name: &str, entries: usize) -> Self {
+        let bytes = Vec::with_capacity(4 * N * entries);
+        let (name, vtk_type) = (name.into(), "Float32");
+        Self { name, vtk_type, components: N, len: 0, bytes, not_finite: None }
+    }
+
+    /// Adds an entry, which has as many numbers as the others: an array of other entries is refused when it is written.
+    pub fn push<const N: usize>(&mut self, numbers: [f32; N]) {
+        for number in numbers {
+            self.bytes.extend_from_slice(&number.to_le_bytes());
+            if !number.is_finite() {
+                self.not_finite = self.not_finite.or(Some(self.len));
             }
         }
-        Self { name: name.into(), vtk_type: "Float32", components, len, bytes, not_finite }
+        self.len += 1;
+    }
+
+    fn floats<const N: usize>(name: &str, values: impl ExactSizeIterator<Item = [f32; N]>) -> Self {
+        let mut array = Self::with_room::<N>(name, values.len());
+        values.for_each(|numbers| array.push(numbers));
+        array
     }
 
     /// Refuses what other programs refuse to read.
     fn check(&self, what: &'static str, wanted: usize) -> Result<(), WriteError> {
         let array = || self.name.clone();
-        if self.len != wanted {
-            return Err(WriteError::Length { array: array(), what, wanted, found: self.len });
+        let found = self.bytes.len() / (4 * self.components);
+        if self.len != wanted || found != wanted {
+            return Err(WriteError::Length { array: array(), what, wanted, found });
         }
         match self.not_finite {
             Some(entry) => Err(WriteError::NonFinite { array: array(), entry }),

@@ -1,38 +1,38 @@
 //! The whole matrix of a coarsest level, as sums over groups; the formulas are in [`super::sums`].
 
 use super::rotation::Turn;
-use super::sums::{Gathered, Grouped, LocalTet, On};
+use super::sums::{Gathered, Grouped, LocalTets, On};
 use crate::scalar::lanes::{Eight, Kernel, LANES, Lanes, run};
 use crate::scalar::{Mat3, Real, Vec3, vec3};
 use crate::solver::cpu::threads::Workers;
 
 /// Of eight pairs of nodes, the first not below the second, in the rest shape.
 #[derive(Clone, Debug)]
-pub struct FullBlocks {
+pub struct FullBlocks<S> {
     pub nodes: [[u32; 2]; LANES],
     /// How many of the eight there are.
     pub filled: u8,
     /// `sum V g_c g_d^T` [m], column by column.
-    b: [Eight<f64>; 9],
+    b: [Eight<S>; 9],
 }
 
 /// The whole matrix of the coarsest level.
 #[derive(Clone, Debug, Default)]
-pub struct FullSums {
+pub struct FullSums<S> {
     /// Pairs of nodes with `sum_v m_v w_vc w_vd` [kg], the first not below the second.
     pub masses: Vec<([u32; 2], f64)>,
     /// Of each group.
-    blocks: Vec<FullBlocks>,
+    blocks: Vec<FullBlocks<S>>,
     /// Blocks of group `g` are `offsets[g] .. offsets[g + 1]`.
     offsets: Vec<usize>,
     /// Lame's parameters of each group [Pa]: mu and lambda.
-    lame: Vec<[f64; 2]>,
+    lame: Vec<[S; 2]>,
 }
 
-impl FullSums {
+impl<S: Real> FullSums<S> {
     pub fn new(
         on: On<'_>,
-        tets: &[LocalTet],
+        tets: &LocalTets<'_, S>,
         grouped: &Grouped,
         masses: &[f64],
         free: &[bool],
@@ -60,7 +60,7 @@ impl FullSums {
         for group in 0..grouped.len() {
             sums.begin();
             for &tet in grouped.tets(group) {
-                let tet = &tets[tet as usize];
+                let tet = &tets.get(tet);
                 on.gradients(tet, free, &mut gradients);
                 for &(a, ga) in &gradients {
                     for &(b, gb) in gradients.iter().filter(|&&(b, _)| b <= a) {
@@ -73,38 +73,38 @@ impl FullSums {
                 let mut eight = FullBlocks {
                     nodes: [[0; 2]; LANES],
                     filled: pairs.len() as u8,
-                    b: [[0.0; LANES]; 9],
+                    b: [[S::ZERO; LANES]; 9],
                 };
                 for (lane, &(pair, b)) in pairs.iter().enumerate() {
                     eight.nodes[lane] = nodes(pair);
                     let entries = b.columns.map(Vec3::to_array);
                     for (row, entry) in eight.b.iter_mut().zip(entries.as_flattened()) {
-                        row[lane] = *entry;
+                        row[lane] = S::from_f64(*entry);
                     }
                 }
                 full.blocks.push(eight);
             }
             full.offsets.push(full.blocks.len());
-            let first = &tets[grouped.tets(group)[0] as usize];
-            full.lame.push([first.mu, first.lambda]);
+            let first = tets.get(grouped.tets(group)[0]);
+            full.lame.push([first.mu, first.lambda].map(S::from_f64));
         }
         full.blocks.shrink_to_fit();
         full
     }
 
     /// Calls with each pair of nodes and its block [kg] in a group that has turned, `squared` being `he^2` [s^2].
-    pub fn each_block<S: Real>(
+    pub fn each_block(
         &self,
         workers: &Workers,
         group: usize,
         turn: &Turn<S>,
         squared: f64,
-        add: impl FnMut([u32; 2], &Mat3<f64>),
+        add: impl FnMut([u32; 2], &Mat3<S>),
     ) {
         let blocks = &self.blocks[self.offsets[group]..self.offsets[group + 1]];
-        let squared = squared * turn.stiffer.to_f64();
+        let squared = S::from_f64(squared) * turn.stiffer;
         let lame = self.lame[group].map(|parameter| parameter * squared);
-        let (r, a) = (turn.rotation.cast::<f64>(), turn.map.cast::<f64>());
+        let (r, a) = (turn.rotation, turn.map);
         run(workers.instructions, EachBlock { blocks, lame, r, a, add });
     }
 
@@ -117,21 +117,21 @@ impl FullSums {
     }
 }
 
-struct EachBlock<'a, F> {
-    blocks: &'a [FullBlocks],
-    lame: [f64; 2],
-    r: Mat3<f64>,
-    a: Mat3<f64>,
+struct EachBlock<'a, S, F> {
+    blocks: &'a [FullBlocks<S>],
+    lame: [S; 2],
+    r: Mat3<S>,
+    a: Mat3<S>,
     add: F,
 }
 
-impl<F: FnMut([u32; 2], &Mat3<f64>)> Kernel<f64> for EachBlock<'_, F> {
+impl<S: Real, F: FnMut([u32; 2], &Mat3<S>)> Kernel<S> for EachBlock<'_, S, F> {
     #[inline(always)]
-    fn run<L: Lanes<Real = f64>>(mut self) {
+    fn run<L: Lanes<Real = S>>(mut self) {
         let [mu, lambda] = [L::splat(self.lame[0]), L::splat(self.lame[1])];
         let (r, a) = (splat::<L>(&self.r), splat::<L>(&self.a));
         for eight in self.blocks {
-            let mut found = [[0.0; LANES]; 9];
+            let mut found = [[S::ZERO; LANES]; 9];
             let mut lane = 0;
             while lane < usize::from(eight.filled) {
                 let e = |row: usize| L::load(&eight.b[row], lane);
@@ -164,7 +164,7 @@ impl<F: FnMut([u32; 2], &Mat3<f64>)> Kernel<f64> for EachBlock<'_, F> {
 }
 
 #[inline(always)]
-fn splat<L: Lanes<Real = f64>>(a: &Mat3<f64>) -> Mat3<L> {
+fn splat<L: Lanes>(a: &Mat3<L::Real>) -> Mat3<L> {
     let [x, y, z] = a.columns;
     Mat3::from_columns(
         vec3(L::splat(x.x), L::splat(x.y), L::splat(x.z)),

@@ -35,7 +35,7 @@ use dense::Dense;
 use full::FullSums;
 use prolongation::Prolongation;
 use rotation::Turn;
-use sums::{DiagonalSums, Grouped, Groups, On, Six, inverse, mapped, tets_of_part, times};
+use sums::{DiagonalSums, Grouped, Groups, LocalTets, On, Six, inverse, mapped, times};
 
 /// Nodes of the coarsest level at most, where the levels can be made so: a dense system of three times as many.
 const MOST_COARSE: usize = 64;
@@ -64,7 +64,7 @@ struct OfPart<S> {
     /// Of all levels but the coarsest, and inverses of their blocks.
     levels: Vec<DiagonalSums<S>>,
     inverses: Vec<Vec<Six<S>>>,
-    full: FullSums,
+    full: FullSums<S>,
     dense: Dense,
     /// Residuals, and then corrections, of the lattice levels.
     vectors: Vec<Vec<Point<S>>>,
@@ -83,19 +83,13 @@ pub struct Curvature<'a, S> {
 }
 
 impl<S: Real> Preconditioner<S> {
-    /// For a layout, all of whose vertices are free.
+    /// For a layout. Without the sums, which depend on what is free: [`Preconditioner::fit`] takes them.
     pub fn new(layout: &Layout<S>) -> Self {
-        let mut all = Self {
+        Self {
             parts: layout.parts.iter().map(|part| OfPart::new(layout, part)).collect(),
             free: vec![true; layout.vertex_count()],
             turns: Vec::new(),
-        };
-        for (number, part) in all.parts.iter_mut().enumerate() {
-            part.rebuild(layout, number, &all.free[part.vertices.clone()]);
         }
-        let most = all.parts.iter().map(|part| part.groups.len()).max().unwrap_or(0);
-        all.turns = vec![Turn::NONE; most];
-        all
     }
 
     /// Bytes of its arrays.
@@ -105,12 +99,12 @@ impl<S: Real> Preconditioner<S> {
             + size_of_val(&self.turns[..])
     }
 
-    /// Takes the sums of the rest shape of a part anew where other vertices are free; takes memory then.
+    /// Takes the sums of the rest shape of a part, at first and where other vertices are free; takes memory then.
     pub fn fit(&mut self, layout: &Layout<S>, constants: &StepConstants<S>) {
         for (number, part) in self.parts.iter_mut().enumerate() {
             let free = &mut self.free[part.vertices.clone()];
             let masses = &constants.inverse_masses[part.vertices.clone()];
-            let mut is_other = false;
+            let mut is_other = !part.has_sums();
             for (free, mass) in free.iter_mut().zip(masses) {
                 let is_free = *mass != S::ZERO;
                 is_other |= *free != is_free;
@@ -118,6 +112,8 @@ impl<S: Real> Preconditioner<S> {
             }
             if is_other {
                 part.rebuild(layout, number, free);
+                let groups = part.groups.len();
+                self.turns.resize(groups.max(self.turns.len()), Turn::NONE);
             }
         }
     }
@@ -214,9 +210,18 @@ impl<S: Real> OfPart<S> {
         if level == 0 { On::Vertices } else { On::Lattice(lattice, level - 1) }
     }
 
+    fn has_sums(&self) -> bool {
+        !self.groups.offsets.is_empty()
+    }
+
     fn rebuild(&mut self, layout: &Layout<S>, number: usize, free: &[bool]) {
+        // Old and new ones are never there at a time: they are large.
+        self.groups = Groups::default();
+        self.ways_up.fill_with(Prolongation::default);
+        self.levels.fill_with(DiagonalSums::default);
+        self.full = FullSums::default();
         let part = &layout.parts[number];
-        let tets = tets_of_part(layout, number);
+        let tets = LocalTets::new(layout, number);
         let places = places_of(layout, part);
         let user = &layout.numbering.order[part.vertices.clone()];
         let masses: Vec<f64> = user.iter().map(|&v| layout.masses[v as usize].to_f64()).collect();
@@ -236,13 +241,10 @@ impl<S: Real> OfPart<S> {
             0 => {
                 let sums = DiagonalSums::new(on, &tets, &grouped, &masses, free);
                 self.inverses.resize(coarsest + 1, vec![[S::ZERO; 6]; sums.offsets.len() - 1]);
-                self.levels.resize(coarsest + 1, sums);
+                self.levels.truncate(coarsest);
+                self.levels.push(sums);
             }
-            _ => {
-                // Not both at a time: they are large.
-                self.full = FullSums::default();
-                self.full = FullSums::new(on, &tets, &grouped, &masses, free);
-            }
+            _ => self.full = FullSums::new(on, &tets, &grouped, &masses, free),
         }
     }
 
@@ -338,7 +340,7 @@ impl<S: Real> OfPart<S> {
         let Self { full, dense, .. } = self;
         for (group, turn) in turns[..self.groups.len()].iter().enumerate() {
             full.each_block(workers, group, turn, squared, |nodes, block| {
-                add_block(dense, nodes, block);
+                add_block(dense, nodes, &block.cast());
             });
         }
     }

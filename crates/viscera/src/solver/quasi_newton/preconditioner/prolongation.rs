@@ -70,7 +70,7 @@ impl<S: Real> Prolongation<S> {
         for node in 0..weights.offsets.len() - 1 {
             if is_free(node) {
                 let row = weights.of(node).iter();
-                parents.entries.extend(row.map(|&(parent, w)| (parent, S::from_f64(w))));
+                parents.entries.extend(row.map(|&(parent, w)| (parent, S::from_f64(w.into()))));
             }
             parents.offsets.push(parents.entries.len() as u32);
         }

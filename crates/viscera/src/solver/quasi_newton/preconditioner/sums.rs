@@ -15,8 +15,8 @@
 //! goes with `R`: the sum over all nodes is then positive semidefinite.
 
 use crate::elements::shape_gradients;
-use crate::layout::Layout;
 use crate::layout::lattice::Lattice;
+use crate::layout::{Layout, TetBlock};
 use crate::material::MaterialModel;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Mat3, Real, Vec3, vec3};
@@ -27,8 +27,6 @@ pub type Six<S> = [S; 6];
 /// A tetrahedron, its vertices counted from the first of the part.
 pub struct LocalTet {
     pub law: MaterialModel,
-    /// By the part's own count.
-    pub material: u32,
     pub vertices: [u32; 4],
     /// Shape gradients [1/m].
     pub gradients: [Vec3<f64>; 4],
@@ -41,38 +39,75 @@ pub struct LocalTet {
     pub viscosity: f64,
 }
 
-/// The tetrahedra of a part.
-pub fn tets_of_part<S: Real>(layout: &Layout<S>, number: usize) -> Vec<LocalTet> {
-    let part = &layout.parts[number];
-    let first = part.vertices.start as u32;
-    let mut tets = Vec::new();
-    // The part's own numbers of its materials, by their first tetrahedra: those of a model depend on other parts.
-    let mut materials = Vec::new();
-    for (law, set) in layout.tet_sets.iter().enumerate() {
-        for block in part.blocks(law).flatten() {
-            let law = set.model;
-            let constants = &set.blocks[block];
-            for lane in 0..usize::from(set.filled[block]) {
-                let material = &layout.materials[constants.material[lane] as usize];
-                let known = materials.iter().position(|&known| known == constants.material[lane]);
-                let number = known.unwrap_or(materials.len());
-                if known.is_none() {
-                    materials.push(constants.material[lane]);
+/// The tetrahedra of a part, read where the layout has them: of a large mesh a copy would be the most memory there is.
+pub struct LocalTets<'a, S> {
+    layout: &'a Layout<S>,
+    /// The part's first vertex.
+    first: u32,
+    places: Vec<LocalPlace>,
+    /// The part's own numbers of its materials, by their first tetrahedra: those of a model depend on other parts.
+    materials: Vec<u32>,
+}
+
+#[derive(Clone, Copy)]
+struct LocalPlace {
+    block: u32,
+    law: u8,
+    lane: u8,
+}
+
+impl<'a, S: Real> LocalTets<'a, S> {
+    pub fn new(layout: &'a Layout<S>, number: usize) -> Self {
+        let part = &layout.parts[number];
+        let (mut places, mut materials) = (Vec::new(), Vec::new());
+        for (law, set) in layout.tet_sets.iter().enumerate() {
+            for block in part.blocks(law).flatten() {
+                for lane in 0..set.filled[block] {
+                    let material = set.blocks[block].material[usize::from(lane)];
+                    if !materials.contains(&material) {
+                        materials.push(material);
+                    }
+                    places.push(LocalPlace { block: block as u32, law: law as u8, lane });
                 }
-                tets.push(LocalTet {
-                    law,
-                    material: number as u32,
-                    vertices: constants.vertices.map(|corner| corner[lane] - first),
-                    gradients: shape_gradients(&constants.shape(lane).cast()),
-                    volume: constants.rest_volume[lane].to_f64(),
-                    mu: material.lame_mu.to_f64(),
-                    lambda: material.lame_lambda.to_f64(),
-                    viscosity: material.viscosity.to_f64(),
-                });
             }
         }
+        Self { layout, first: part.vertices.start as u32, places, materials }
     }
-    tets
+
+    pub fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    fn constants(&self, tet: u32) -> (&'a TetBlock<S>, usize) {
+        let LocalPlace { block, law, lane } = self.places[tet as usize];
+        (&self.layout.tet_sets[usize::from(law)].blocks[block as usize], usize::from(lane))
+    }
+
+    pub fn vertices(&self, tet: u32) -> [u32; 4] {
+        let (constants, lane) = self.constants(tet);
+        constants.vertices.map(|corner| corner[lane] - self.first)
+    }
+
+    /// By the part's own count.
+    fn material(&self, tet: u32) -> usize {
+        let (constants, lane) = self.constants(tet);
+        let known = self.materials.iter().position(|&known| known == constants.material[lane]);
+        known.unwrap_or(self.materials.len())
+    }
+
+    pub fn get(&self, tet: u32) -> LocalTet {
+        let (constants, lane) = self.constants(tet);
+        let material = &self.layout.materials[constants.material[lane] as usize];
+        LocalTet {
+            law: self.layout.tet_sets[usize::from(self.places[tet as usize].law)].model,
+            vertices: self.vertices(tet),
+            gradients: shape_gradients(&constants.shape(lane).cast()),
+            volume: constants.rest_volume[lane].to_f64(),
+            mu: material.lame_mu.to_f64(),
+            lambda: material.lame_lambda.to_f64(),
+            viscosity: material.viscosity.to_f64(),
+        }
+    }
 }
 
 /// Groups of tetrahedra, and their mean deformation gradients as sums over vertices: `sum_j x_j b_j^T`.
@@ -94,23 +129,24 @@ pub struct Grouped {
 
 impl Grouped {
     /// The tetrahedra of one material in one cell of the finest lattice that hang together by vertices.
-    pub fn new(tets: &[LocalTet], places: &[Vec3<f64>], lattice: &Lattice) -> Self {
-        let cell = |tet: &LocalTet| {
+    pub fn new<S: Real>(tets: &LocalTets<'_, S>, places: &[Vec3<f64>], lattice: &Lattice) -> Self {
+        let cell = |tet: u32| {
+            let vertices = tets.vertices(tet);
             let sum =
-                tet.vertices.iter().fold(Vec3::ZERO, |sum: Vec3<f64>, &v| sum + places[v as usize]);
+                vertices.iter().fold(Vec3::ZERO, |sum: Vec3<f64>, &v| sum + places[v as usize]);
             let at = lattice.along_axes(sum * 0.25) * (1.0 / lattice.spacing);
             // A part without levels is one cell.
             let cell = |x: f64| if x.is_finite() { x.floor() as i64 } else { 0 };
-            (tet.material, [at.z, at.y, at.x].map(cell))
+            ((tets.material(tet), [at.z, at.y, at.x].map(cell)), tet)
         };
-        let mut order: Vec<(_, u32)> = tets.iter().map(cell).zip(0..).collect();
+        let mut order: Vec<(_, u32)> = (0..tets.len() as u32).map(cell).collect();
         order.sort_unstable();
         let mut grouped = Self { tets: Vec::with_capacity(tets.len()), offsets: vec![0] };
         let mut seen_by = vec![(u32::MAX, 0u32); places.len()];
         for (cell, of_cell) in order.chunk_by(|a, b| a.0 == b.0).enumerate() {
             let mut parent: Vec<u32> = (0..of_cell.len() as u32).collect();
             for (i, &(_, tet)) in of_cell.iter().enumerate() {
-                for v in tets[tet as usize].vertices {
+                for v in tets.vertices(tet) {
                     let (seen, other) = seen_by[v as usize];
                     if seen == cell as u32 {
                         let (a, b) = (root(&mut parent, other), root(&mut parent, i as u32));
@@ -150,14 +186,14 @@ fn root(parent: &mut [u32], mut i: u32) -> u32 {
 }
 
 impl<S: Real> Groups<S> {
-    pub fn new(tets: &[LocalTet], grouped: &Grouped, vertex_count: usize) -> Self {
+    pub fn new(tets: &LocalTets<'_, S>, grouped: &Grouped, vertex_count: usize) -> Self {
         let mut groups = Self { offsets: vec![0], ..Self::default() };
         let mut sums = Gathered::<Vec3<f64>>::new(vertex_count);
         for group in 0..grouped.len() {
             sums.begin();
             let mut volume = 0.0;
             for &tet in grouped.tets(group) {
-                let tet = &tets[tet as usize];
+                let tet = &tets.get(tet);
                 for (v, g) in tet.vertices.into_iter().zip(tet.gradients) {
                     *sums.of(v) += g * tet.volume;
                 }
@@ -165,7 +201,7 @@ impl<S: Real> Groups<S> {
             }
             let mean = |&(v, b): &(u32, Vec3<f64>)| (v, (b * (1.0 / volume)).cast::<S>());
             groups.entries.extend(sums.list.iter().map(mean));
-            let first = &tets[grouped.tets(group)[0] as usize];
+            let first = tets.get(grouped.tets(group)[0]);
             groups.laws.push(first.law);
             groups.viscosities.push(first.viscosity);
             groups.offsets.push(groups.entries.len() as u32);
@@ -237,7 +273,7 @@ impl On<'_> {
             Self::Vertices => with(v, 1.0),
             Self::Lattice(lattice, level) => {
                 for &(node, weight) in lattice.levels[level].of_vertices.of(v as usize) {
-                    with(node, weight);
+                    with(node, f64::from(weight));
                 }
             }
         }
@@ -312,19 +348,21 @@ impl<S: Real> DiagonalSums<S> {
 
     pub fn new(
         on: On<'_>,
-        tets: &[LocalTet],
+        tets: &LocalTets<'_, S>,
         grouped: &Grouped,
         masses: &[f64],
         free: &[bool],
     ) -> Self {
         let nodes = on.node_count(masses.len());
         let mut sums = Gathered::<(f64, Six<f64>)>::new(nodes);
+        let offsets = Self::count(on, tets, grouped, free, nodes);
+        let mut next = offsets.clone();
+        let mut shares = vec![Share::default(); offsets[nodes] as usize];
         let mut gradients = Vec::new();
-        let mut all: Vec<(u32, Share<S>)> = Vec::new();
         for group in 0..grouped.len() {
             sums.begin();
             for &tet in grouped.tets(group) {
-                let tet = &tets[tet as usize];
+                let tet = &tets.get(tet);
                 on.gradients(tet, free, &mut gradients);
                 for &(node, g) in &gradients {
                     let (trace, b) = sums.of(node);
@@ -337,20 +375,12 @@ impl<S: Real> DiagonalSums<S> {
                     }
                 }
             }
-            all.extend(sums.list.iter().map(|&(node, (trace, b))| {
-                let share =
+            for &(node, (trace, b)) in &sums.list {
+                let place = &mut next[node as usize];
+                shares[*place as usize] =
                     Share { group: group as u32, trace: S::from_f64(trace), b: b.map(S::from_f64) };
-                (node, share)
-            }));
-        }
-        // Stable: a node's shares stay in the order of groups.
-        all.sort_by_key(|&(node, _)| node);
-        let mut offsets = vec![0u32; nodes + 1];
-        for &(node, _) in &all {
-            offsets[node as usize + 1] += 1;
-        }
-        for node in 0..nodes {
-            offsets[node + 1] += offsets[node];
+                *place += 1;
+            }
         }
         let mut node_masses = vec![0.0; if matches!(on, On::Vertices) { 0 } else { nodes }];
         for v in (0..masses.len() as u32).filter(|&v| free[v as usize]) {
@@ -358,11 +388,34 @@ impl<S: Real> DiagonalSums<S> {
                 on.each(v, |node, w| node_masses[node as usize] += masses[v as usize] * w * w);
             }
         }
-        Self {
-            masses: node_masses.into_iter().map(S::from_f64).collect(),
-            offsets,
-            shares: all.into_iter().map(|(_, share)| share).collect(),
+        Self { masses: node_masses.into_iter().map(S::from_f64).collect(), offsets, shares }
+    }
+
+    /// Where the shares of each node begin: one of each group that touches it.
+    fn count(
+        on: On<'_>,
+        tets: &LocalTets<'_, S>,
+        grouped: &Grouped,
+        free: &[bool],
+        nodes: usize,
+    ) -> Vec<u32> {
+        let mut offsets = vec![0; nodes + 1];
+        let mut counted = vec![u32::MAX; nodes];
+        for group in 0..grouped.len() as u32 {
+            for &tet in grouped.tets(group as usize) {
+                for v in tets.vertices(tet).into_iter().filter(|&v| free[v as usize]) {
+                    on.each(v, |node, _| {
+                        if std::mem::replace(&mut counted[node as usize], group) != group {
+                            offsets[node as usize + 1] += 1;
+                        }
+                    });
+                }
+            }
         }
+        for node in 0..nodes {
+            offsets[node + 1] += offsets[node];
+        }
+        offsets
     }
 }
 

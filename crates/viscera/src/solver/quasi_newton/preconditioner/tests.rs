@@ -3,7 +3,7 @@
 use super::full::FullSums;
 use super::prolongation::Prolongation;
 use super::rotation::Turn;
-use super::sums::{Grouped, On, tets_of_part};
+use super::sums::{Grouped, LocalTets, On};
 use crate::elements::law::{Law, StableNeoHookean};
 use crate::layout::Layout;
 use crate::layout::lattice::{Lattice, Weights};
@@ -25,7 +25,7 @@ fn the_whole_matrix_is_the_sum_of_its_tetrahedra() {
     builder.add_body(&mesh, &tissue).expect("a body");
     let model = builder.build::<f64>().expect("a model");
     let layout = Layout::new(&model, &SolverSettings::default());
-    let tets = tets_of_part(&layout, 0);
+    let tets = LocalTets::new(&layout, 0);
     let count = model.vertex_count();
     let grouped = Grouped::new(&tets, &model.rest_positions, &Lattice::default());
     assert_eq!(grouped.len(), 1);
@@ -36,7 +36,7 @@ fn the_whole_matrix_is_the_sum_of_its_tetrahedra() {
     let turn = Turn::<f64>::new(MaterialModel::StableNeoHookean, &f, 0.5);
     let (r, a, squared) = (turn.rotation, StableNeoHookean::gradient_map(&f), 1e-4);
     let mut expected = vec![Mat3::default(); count * count];
-    for tet in &tets {
+    for tet in (0..tets.len() as u32).map(|tet| tets.get(tet)) {
         let (mu, lambda) = (tet.mu * tet.volume, tet.lambda * tet.volume);
         for (&v, gv) in tet.vertices.iter().zip(tet.gradients) {
             for (&w, gw) in tet.vertices.iter().zip(tet.gradients).filter(|(w, _)| **w <= v) {
