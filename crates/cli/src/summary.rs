@@ -249,6 +249,7 @@ fn warnings(frames: &Frames, scene: &Scene, rest: Option<RestReport>) -> Vec<Str
         Some(rest) => warnings.extend(rest.warning(scene, time)),
         None => warnings.extend(warning_in_motion(frames, scene)),
     }
+    warnings.extend(advice::plain_elements(scene));
     let left = frames.last().map_or(0, |frame| frame.report.deformation.inverted);
     if inverted > 0 {
         let what = if inverted == 1 { "tetrahedron was" } else { "tetrahedra were" };

@@ -108,7 +108,7 @@ pub fn measure_tets_by_pieces<S: Real>(
 }
 
 /// Groups of a piece.
-const PIECE: usize = 1024;
+const PIECE: usize = 128;
 
 /// Measures the tissue as a whole: what sums and extremes of [`measure_tets`] would be, to the bit.
 pub fn measure_tissue<S: Real>(model: &Model<S>, positions: &[Vec3<S>]) -> TissueMeasure {

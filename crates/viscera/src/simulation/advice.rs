@@ -1,8 +1,8 @@
 //! Next moves that a scene still has: advice that is already followed, or that the method does not heed, is none.
 
 use crate::material::MaterialModel;
-use crate::scene::Scene;
-use crate::settings::{Acceleration, Method};
+use crate::scene::{Body, Scene};
+use crate::settings::{Acceleration, Elements, Method};
 
 /// Choices in a row, "a, b or c".
 fn either(choices: &[&str]) -> String {
@@ -63,18 +63,31 @@ pub fn budget(scene: &Scene) -> String {
     }
 }
 
+/// Whether a body has tissue of this law.
+fn has(body: &Body, law: MaterialModel) -> bool {
+    let regions = body.regions.iter().map(|region| &region.material);
+    regions.chain([&body.material]).any(|material| material.model() == law)
+}
+
+/// What is left of linear tetrahedra where recovered-gradient ones are asked for.
+pub fn plain_elements(scene: &Scene) -> Option<String> {
+    let law = MaterialModel::SaintVenantKirchhoff;
+    let is_asked = scene.solver.elements == Elements::Recovered;
+    let body = scene.bodies.iter().find(|body| is_asked && has(body, law))?;
+    Some(format!(
+        "body \"{}\" keeps linear tetrahedra: recovered-gradient ones are of stable neo-Hookean tissue; use model = \
+         \"stable_neo_hookean\", or solver.elements = \"plain\"",
+        body.name
+    ))
+}
+
 /// Against tetrahedra that are turned inside out.
 pub fn inverted(scene: &Scene) -> String {
-    let has = |law: MaterialModel| {
-        let regions = scene.bodies.iter().flat_map(|body| &body.regions);
-        let materials = scene.bodies.iter().map(|body| &body.material);
-        materials.chain(regions.map(|region| &region.material)).any(|m| m.model() == law)
-    };
     let mut choices = Vec::new();
     if !scene.motions.is_empty() || !scene.forces.is_empty() {
         choices.extend(["pull less", "spread the pull over more vertices"]);
     }
-    if has(MaterialModel::SaintVenantKirchhoff) {
+    if scene.bodies.iter().any(|body| has(body, MaterialModel::SaintVenantKirchhoff)) {
         choices.push("use model = \"stable_neo_hookean\", which resists it");
     }
     if scene.solver.method != Method::Explicit {

@@ -94,6 +94,12 @@ fn advice_can_be_followed() {
     assert!(advice::inverted(&with(&[green])).contains("stable_neo_hookean"));
     assert!(!advice::inverted(&with(&[])).contains("stable_neo_hookean"));
 
+    let recovered = ("solver.elements", "recovered");
+    let plain = advice::plain_elements(&with(&[recovered, green])).expect("advice");
+    assert!(plain.contains("bar") && plain.contains("stable_neo_hookean"), "{plain}");
+    assert_eq!(advice::plain_elements(&with(&[recovered])), None);
+    assert_eq!(advice::plain_elements(&with(&[green])), None);
+
     let diverged = advice::diverged(&with(&[explicit]));
     assert!(diverged.contains("solver.explicit_safety below 0.8"), "{diverged}");
     assert!(!diverged.contains("relaxation") && !diverged.contains("acceleration"), "{diverged}");

@@ -415,6 +415,11 @@ fn arrays_that_do_not_fit_are_not_written() {
     let write = |array| vtu::write(mesh.vertices(), mesh.tets(), &[array], &[]).unwrap_err();
     let error = write(vtu::Array::scalars("speed", &[1.0f32]));
     assert!(matches!(error, WriteError::Length { wanted: 5, found: 1, .. }), "{error}");
+    let mut mixed = vtu::Array::with_room::<1>("speed", 5);
+    (0..4).for_each(|_| mixed.push([1.0]));
+    mixed.push([1.0, 2.0, 3.0]);
+    let error = write(mixed);
+    assert!(matches!(error, WriteError::Length { wanted: 5, found: 7, .. }), "{error}");
     for bad in [f64::NAN, 1e300] {
         let error = write(vtu::Array::scalars("speed", &[0.0, 0.0, bad, 0.0, 0.0]));
         assert_eq!(error, WriteError::NonFinite { array: "speed".into(), entry: 2 });

@@ -57,6 +57,19 @@ fn sums_and_extremes_are_those_of_all_tets_to_the_bit() {
     sums_are_those_of_all_tets::<f64>();
 }
 
+/// Pieces join where they meet, and the last one is as long as what is left.
+#[test]
+fn pieces_are_all_tets_in_their_order() {
+    let model = two_bars::<f32>();
+    let count = model.tet_count();
+    assert!(count > LANES * PIECE && !count.is_multiple_of(LANES * PIECE), "{count}");
+    let positions = deformed(&model, 20.0, 2e-3);
+    let (mut whole, mut pieces) = (Vec::new(), Vec::new());
+    measure_tets(&model, &positions, &mut whole);
+    measure_tets_by_pieces(&model, &positions, |tets| pieces.extend_from_slice(tets));
+    assert_eq!(pieces, whole);
+}
+
 /// The oracle has the shape and the singular values of every tetrahedron one by one.
 #[test]
 fn measures_in_lanes_are_those_of_one_tet_at_a_time() {

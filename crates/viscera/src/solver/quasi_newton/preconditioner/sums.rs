@@ -321,7 +321,7 @@ impl On<'_> {
 }
 
 /// The share of a group in a node's block.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Share<S> {
     pub group: u32,
     /// `t` [N/m].
@@ -331,7 +331,7 @@ pub struct Share<S> {
 }
 
 /// The diagonal blocks of a level.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct DiagonalSums<S> {
     /// `sum_v m_v w_v^2` of each node [kg]; empty for vertices.
     pub masses: Vec<S>,

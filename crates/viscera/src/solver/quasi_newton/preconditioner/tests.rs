@@ -1,5 +1,6 @@
 //! The preconditioner against the curvature that it is made of.
 
+use super::OfPart;
 use super::full::FullSums;
 use super::prolongation::Prolongation;
 use super::rotation::Turn;
@@ -8,7 +9,7 @@ use crate::elements::law::{Law, StableNeoHookean};
 use crate::layout::Layout;
 use crate::layout::lattice::{Lattice, Weights};
 use crate::material::{Material, MaterialModel};
-use crate::mesh::shapes;
+use crate::mesh::shapes::{self, Block, Splitting};
 use crate::model::ModelBuilder;
 use crate::scalar::lanes::{Instructions, Point};
 use crate::scalar::{Mat3, Vec3, vec3};
@@ -62,6 +63,38 @@ fn the_whole_matrix_is_the_sum_of_its_tetrahedra() {
             block.norm_squared() > 0.0 && free[pair / count] && free[pair % count]
         };
         assert!(seen >= expected.iter().enumerate().filter(|pair| any(*pair)).count());
+    }
+}
+
+/// A bar of cells in a row has no coarser level, and too many vertices to be solved as a whole.
+#[test]
+fn sums_are_those_of_what_is_free_now() {
+    let tissue = Material::new(MaterialModel::StableNeoHookean, 1e4, 0.4, 1000.0).expect("legal");
+    for (width, cells, levels) in [(0.002, [50, 1, 1], 0), (0.03, [20, 6, 6], 1)] {
+        let block = Block::new(vec3(0.1, width, width), cells);
+        let mesh = Block { splitting: Splitting::Six, ..block }.mesh().expect("a bar");
+        let mut builder = ModelBuilder::new();
+        builder.add_body(&mesh, &tissue).expect("a body");
+        let model = builder.build::<f32>().expect("a model");
+        let layout = Layout::new(&model, &SolverSettings::default());
+        let count = model.vertex_count();
+        let free: Vec<bool> = (0..count).map(|v| v % 5 != 0).collect();
+        let part = || OfPart::new(&layout, &layout.parts[0]);
+        let (mut before, mut fresh) = (part(), part());
+        assert_eq!(fresh.lattice.levels.len().min(1), levels);
+        assert_eq!(fresh.dense.size() == 0, levels == 0);
+        for free in [&vec![true; count], &free] {
+            before.rebuild(&layout, 0, free);
+        }
+        fresh.rebuild(&layout, 0, &free);
+        assert_eq!(before.levels, fresh.levels);
+        assert_eq!(before.inverses.len(), fresh.inverses.len());
+        // The levels know what is free: fewer vertices have fewer shares.
+        let mut whole = part();
+        whole.rebuild(&layout, 0, &vec![true; count]);
+        assert!(whole.levels[0].shares.len() > fresh.levels[0].shares.len());
+        assert_eq!(fresh.levels[0].shares.len(), fresh.levels[0].offsets[count] as usize);
+        assert!(fresh.levels[0].shares.iter().all(|share| share.trace > 0.0));
     }
 }
 
