@@ -8,8 +8,9 @@ use crate::settings::{Count, MOST_HISTORY, SolverSettings};
 use crate::solver::oscillations::Oscillations;
 
 /// Passes and pairs up to a Poisson's ratio, for [`STANDARD`]: the fewest that follow a swinging bar of 1,280 and of 10,240 tetrahedra to
-/// within about 4 %, with one step per frame (5 % at 0.49). What is nearly incompressible converges more slowly.
-const BY_POISSON: [(f64, u32, u32); 3] = [(0.38, 8, 3), (0.46, 10, 10), (0.5, 20, 10)];
+/// within about 4 %, with one step per frame (5 % at 0.49). What is nearly incompressible converges more slowly. With 3 pairs
+/// instead of 5, eight passes leave 2.8 to 4.9 % of the same bars, as sums are rounded; 4, 5, 6 and 8 pairs leave at most 3.7 %.
+const BY_POISSON: [(f64, u32, u32); 3] = [(0.38, 8, 5), (0.46, 10, 10), (0.5, 20, 10)];
 
 /// The error of motion that [`BY_POISSON`] is for.
 const STANDARD: f64 = 0.05;
@@ -166,7 +167,7 @@ mod tests {
         }
         let model = builder.build::<f32>().expect("a model");
         let automatic = SolverSettings::default();
-        let few = Choice { passes: 8, history: 3 };
+        let few = Choice { passes: 8, history: 5 };
         let many = Choice { passes: 10, history: 10 };
         assert_eq!(choose(&automatic, &model.materials), many);
         let by_part = choose_by_part(&automatic, &Layout::new(&model, &automatic));
