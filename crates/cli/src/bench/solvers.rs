@@ -30,7 +30,7 @@ const GREEN: MaterialModel = MaterialModel::SaintVenantKirchhoff;
 const NEO: MaterialModel = MaterialModel::StableNeoHookean;
 
 /// All of them, in the order of the results.
-pub const SOLVERS: [SolverEntry; 15] = [
+pub const SOLVERS: [SolverEntry; 16] = [
     entry("green", "XPBD as published, Saint Venant-Kirchhoff", GREEN, FEW, publish),
     entry("pair", "XPBD as published, stable neo-Hookean pair", NEO, FEW, publish),
     entry("green-exact", "the default, Saint Venant-Kirchhoff", GREEN, FEW, |_| {}),
@@ -73,6 +73,10 @@ pub const SOLVERS: [SolverEntry; 15] = [
     ),
     entry("quasi-newton", "the same, stable neo-Hookean", NEO, None, |s| {
         s.method = Method::QuasiNewton;
+    }),
+    entry("quasi-newton-recovered", "the same, recovered-gradient tetrahedra", NEO, None, |s| {
+        s.method = Method::QuasiNewton;
+        s.elements = Elements::Recovered;
     }),
 ];
 

@@ -142,8 +142,8 @@ impl<S: Real> Layout<S> {
             copy_offsets,
             recovered: None,
         };
-        // The other methods have linear tetrahedra; the solver refuses settings that ask them for more.
-        if settings.elements == Elements::Recovered && settings.method == Method::Explicit {
+        // XPBD has linear tetrahedra; the solver refuses settings that ask it for more.
+        if settings.elements == Elements::Recovered && settings.method != Method::Xpbd {
             let domains = Domains::new(model, Smoothing::RECOVERED);
             layout.recovered = Some(RecoveredTables::new(&layout, &domains));
         }

@@ -64,6 +64,13 @@ pub struct PartRanges {
     pub pieces: Vec<Range<usize>>,
 }
 
+impl PartRanges {
+    /// Places of its domains.
+    pub fn places(&self) -> Range<usize> {
+        LANES * self.groups.start..LANES * self.groups.end
+    }
+}
+
 /// See the head of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecoveredTables<S> {

@@ -183,7 +183,7 @@ settings_table! {
         accuracy: Accuracy = (Accuracy::Standard), Accuracies;
         /// What tetrahedra of stable neo-Hookean tissue are. "plain": linear ones, with which coarse meshes bend too little, four cells
         /// across by 16 % at a Poisson's ratio of 0.3, by half at 0.49. "recovered": on the same vertices, each also sees how its
-        /// neighbours are deformed; coarse meshes bend as fine ones do. "explicit" has them, on the CPU; "auto" then is that.
+        /// neighbours are deformed; coarse meshes bend as fine ones do. "quasi_newton" and "explicit" have them, on the CPU.
         elements: Elements = (Elements::Plain), one_of::<Elements>();
         /// The share of the largest stable step of the body at rest that "explicit" takes. On the CPU smaller ones are taken
         /// by themselves where tissue stiffens under strong deformation; a device, which keeps to it, takes half of the

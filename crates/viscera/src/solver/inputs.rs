@@ -101,7 +101,7 @@ fn is_legal<S: Real>(tether: &Tether<S>) -> bool {
 pub(crate) fn check_elements(settings: &SolverSettings) -> Result<(), StepError> {
     let method = settings.method;
     match settings.elements {
-        Elements::Recovered if method != Method::Explicit => Err(StepError::Elements { method }),
+        Elements::Recovered if method == Method::Xpbd => Err(StepError::Elements { method }),
         _ => Ok(()),
     }
 }

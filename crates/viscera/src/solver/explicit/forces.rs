@@ -21,7 +21,7 @@ use crate::solver::step::data::{Step, StepConstants};
 use crate::solver::step::gradient::add_elements;
 use crate::solver::step::law::{OfLaw, with_tissue};
 use crate::solver::step::recovered::Load;
-use crate::solver::step::strain::{is_recovered, keep_share};
+use crate::solver::step::strain::is_recovered;
 use crate::solver::step::tissue::Tissue;
 
 use super::present::AtRest;
@@ -109,28 +109,11 @@ fn load_recovered<S: Real>(
     let load = Load {
         scale: S::from_f64(step.dt * step.dt),
         viscous: is_viscous.then_some((strains, S::from_f64(1.0 / step.dt))),
+        goes_on: true,
         at_rest: looks.then_some(&at_rest.tets[law]),
     };
     tets.add_forces(workers, step.layout, number, &load, loads);
     inverted
-}
-
-/// The Green strain of all tetrahedra of a part at `x` in the place of that at the start, of which a share of the change
-/// since then is left.
-pub fn put_strains<S: Real>(
-    constants: &mut StepConstants<S>,
-    layout: &Layout<S>,
-    number: usize,
-    x: &[Point<S>],
-    share: S,
-) {
-    let StepConstants { workers, recovered, start_strain, .. } = constants;
-    keep_share(workers, layout, &layout.parts[number], x, share, start_strain);
-    if let Some(tets) = recovered {
-        let law = MaterialModel::StableNeoHookean as usize;
-        tets.evaluate(workers, layout, number, x);
-        tets.put_strains(workers, layout, number, share, &mut start_strain[law]);
-    }
 }
 
 struct Forces<'a, S> {

@@ -4,10 +4,10 @@
 //! takes its step again in shorter small steps, and in the end goes downhill from where it began.
 
 use super::Memory;
-use super::forces::put_strains;
 use super::present::SmallSteps;
 use crate::scalar::{Real, Vec3};
 use crate::solver::step::data::{Step, StepConstants, StepData, copies_of};
+use crate::solver::step::strain::put_strains;
 use crate::state::{Learned, State};
 
 /// Small steps of a step that is taken again, at most.
@@ -165,11 +165,7 @@ impl<S: Real> Memory<S> {
         for (number, small) in self.small_steps.iter().enumerate() {
             let step = Step { dt: small.dt, ..*step };
             self.evaluator.evaluate(constants, &step, points, number);
-            if let StepConstants { workers, recovered: Some(tets), .. } = constants {
-                tets.evaluate(workers, step.layout, number, points);
-                let energy = tets.energy(workers, step.layout, number);
-                self.evaluator.stored[number] += energy;
-            }
+            self.evaluator.add_recovered(constants, step.layout, points, number);
         }
     }
 }

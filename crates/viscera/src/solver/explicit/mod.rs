@@ -34,9 +34,10 @@ use crate::solver::step::energy::Energies;
 use crate::solver::step::potential::Evaluator;
 use crate::solver::step::predict::{Tethers, load_tethers};
 use crate::solver::step::stage::StepStage;
+use crate::solver::step::strain::put_strains;
 use crate::solver::step::tethers::bundle;
 use crate::state::State;
-use forces::{Pieces, put_strains};
+use forces::Pieces;
 #[cfg(feature = "gpu")]
 pub use present::calm_ahead;
 use present::{AtRest, SmallSteps};

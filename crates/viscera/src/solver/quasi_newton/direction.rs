@@ -145,10 +145,9 @@ impl<S: Real> Memory<S> {
     pub(super) fn choose_direction(
         &mut self,
         step: &Step<'_, S>,
-        data: &StepData<S>,
+        data: &mut StepData<S>,
         learned: &mut Learned<S>,
     ) {
-        let workers = &data.constants.workers;
         for (number, part) in step.layout.parts.iter().enumerate() {
             let progress = self.parts[number];
             // Without pairs there is nothing to forget: the length goes on shrinking.
@@ -164,13 +163,13 @@ impl<S: Real> Memory<S> {
             }
             let mut slope = f64::NAN;
             if learned.parts[number].count > 0 {
-                slope = self.recur(step.layout, workers, number, learned);
+                slope = self.recur(step.layout, &data.constants.workers, number, learned);
                 self.parts[number].length = 1.0;
             }
             // A comparison that is false of what is no number as well.
             if !(slope < 0.0 && slope.is_finite()) {
                 learned.parts[number].count = 0;
-                slope = self.combine(workers, number, part, -S::ONE, &[]);
+                slope = self.combine(&data.constants.workers, number, part, -S::ONE, &[]);
                 self.parts[number].length = self.first_length(step, data, number, slope);
             }
             self.parts[number].slope = slope;
@@ -200,7 +199,7 @@ impl<S: Real> Memory<S> {
     fn first_length(
         &mut self,
         step: &Step<'_, S>,
-        data: &StepData<S>,
+        data: &mut StepData<S>,
         number: usize,
         slope: f64,
     ) -> f64 {
@@ -209,8 +208,14 @@ impl<S: Real> Memory<S> {
             direction_points[v].set_vec3(direction[v]);
         }
         let moments = super::moments(step, stage_start);
-        let [exact, bound] =
-            evaluation.curvature(&data.constants, step, &moments, base, direction_points, number);
+        let [exact, bound] = evaluation.curvature(
+            &mut data.constants,
+            step,
+            &moments,
+            base,
+            direction_points,
+            number,
+        );
         let length = -slope / exact.max(LEAST_CURVATURE * bound);
         if length.is_finite() && length > 0.0 { length } else { 0.0 }
     }

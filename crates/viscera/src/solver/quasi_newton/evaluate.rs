@@ -14,6 +14,7 @@
 use std::cell::Cell;
 use std::ops::Range;
 
+use super::recovered::{along_recovered, load_recovered};
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::law::{LAWS, Law};
 use crate::elements::{deformation_gradient, internal_forces};
@@ -26,6 +27,8 @@ use crate::solver::cpu::threads::Shared;
 use crate::solver::step::data::{Step, StepConstants, gather};
 use crate::solver::step::gradient::add_elements;
 use crate::solver::step::law::{OfLaw, respond, with_tissue};
+use crate::solver::step::recovered::{Along, Found};
+use crate::solver::step::strain::is_recovered;
 use crate::solver::step::tissue::Tissue;
 
 /// Vertices whose sums are taken first. Part of the result's bits.
@@ -55,7 +58,7 @@ impl Change {
 
 /// Evaluates parts.
 #[derive(Clone, Debug)]
-pub struct Evaluation {
+pub struct Evaluation<S> {
     /// Of each part: the slope of the potential [J s^2] at its last trial, along the way from the iterate.
     pub slopes: Vec<f64>,
     /// Of each part the change on that way, as of its last evaluation.
@@ -66,6 +69,8 @@ pub struct Evaluation {
     vertices: Vec<VertexPiece>,
     block_sums: Vec<Change>,
     vertex_sums: Vec<Change>,
+    /// Where the layout has recovered-gradient tetrahedra.
+    along: Option<Along<S>>,
 }
 
 #[derive(Clone, Debug)]
@@ -91,12 +96,13 @@ pub struct Way<'a, S> {
     pub moments: Moments<'a, S>,
 }
 
-impl Evaluation {
+impl<S: Real> Evaluation<S> {
     /// For a layout in pieces.
-    pub fn new<S: Real>(layout: &Layout<S>) -> Self {
+    pub fn new(layout: &Layout<S>) -> Self {
         let (mut blocks, mut vertices) = (Vec::new(), Vec::new());
         for (number, part) in layout.parts.iter().enumerate() {
-            for law in 0..LAWS {
+            let is_plain = |law: &usize| !is_recovered(layout, &layout.tet_sets[*law]);
+            for law in (0..LAWS).filter(is_plain) {
                 for range in part.blocks(law).flat_map(|range| cut(range, PIECE_BLOCKS)) {
                     blocks.push(BlockPiece { part: number, law, blocks: range });
                 }
@@ -114,6 +120,7 @@ impl Evaluation {
             vertex_sums: vec![Change::default(); vertices.len()],
             blocks,
             vertices,
+            along: layout.recovered.as_ref().map(|tables| Along::new(layout, tables)),
         }
     }
 
@@ -125,13 +132,14 @@ impl Evaluation {
             + size_of_val(&self.vertices[..])
             + size_of_val(&self.block_sums[..])
             + size_of_val(&self.vertex_sums[..])
+            + self.along.as_ref().map_or(0, Along::bytes)
     }
 
     /// Gradient [N s^2] at the trial of the parts that `acts` names, zero where pinned, and its slope. `loads` has room for
     /// what elements do to each copy.
-    pub fn gradient<S: Real>(
+    pub fn gradient(
         &mut self,
-        constants: &StepConstants<S>,
+        constants: &mut StepConstants<S>,
         step: &Step<'_, S>,
         way: &Way<'_, S>,
         acts: impl Fn(usize) -> bool + Sync,
@@ -160,9 +168,11 @@ impl Evaluation {
                 });
             }
         });
-        for (_, part) in layout.parts.iter().enumerate().filter(|(number, _)| acts(*number)) {
+        for (number, part) in layout.parts.iter().enumerate().filter(|(n, _)| acts(*n)) {
+            load_recovered(constants, step, number, way.to, loads);
             add_elements(layout, &way.moments, part, way.to, loads);
         }
+        let constants = &*constants;
         let (pieces, loads) = (&self.vertices, &*loads);
         let (sums, into) = (Shared::new(&mut self.vertex_sums), Shared::new(gradient));
         constants.workers.each(pieces.len(), 1, |range| {
@@ -181,8 +191,8 @@ impl Evaluation {
         }
     }
 
-    /// The change of a part's potential on its way.
-    pub fn change<S: Real>(
+    /// The change of a part's potential on its way, to the last trial of [`Self::gradient`].
+    pub fn change(
         &mut self,
         constants: &StepConstants<S>,
         step: &Step<'_, S>,
@@ -217,6 +227,17 @@ impl Evaluation {
         let mut change = Change::default();
         let squared = step.dt * step.dt;
         for_each_kind!(layout, set => element_changes(set, &mut change, squared, way, part));
+        if let Some(along) = &mut self.along {
+            // From the trial, where gradients are known, back.
+            let vertices = &mut along.moved[part.vertices.clone()];
+            let places = way.from[part.vertices.clone()].iter().zip(&way.to[part.vertices.clone()]);
+            for (moved, (from, to)) in vertices.iter_mut().zip(places) {
+                moved.set_vec3(from.vec3() - to.vec3());
+            }
+            let [potential, size] = along_recovered(constants, step, number, along, Found::Change);
+            let of_recovered = Change { potential: -squared * potential, size: squared * size };
+            change = change.plus(of_recovered);
+        }
         let blocks = self.blocks.iter().zip(&self.block_sums).filter(|(p, _)| p.part == number);
         change = blocks.fold(change, |change, (_, sum)| change.plus(*sum));
         let vertices = pieces.iter().zip(&self.vertex_sums).filter(|(p, _)| p.part == number);
@@ -224,12 +245,12 @@ impl Evaluation {
     }
 }
 
-impl Evaluation {
+impl<S: Real> Evaluation<S> {
     /// The curvature of a part's potential along a direction [J s^2]: exactly, and without what may be negative in it.
     /// Of elements that are no tetrahedra only the latter counts.
-    pub fn curvature<S: Real>(
+    pub fn curvature(
         &mut self,
-        constants: &StepConstants<S>,
+        constants: &mut StepConstants<S>,
         step: &Step<'_, S>,
         moments: &Moments<'_, S>,
         x: &[Point<S>],
@@ -256,7 +277,7 @@ impl Evaluation {
                 let set = &layout.tet_sets[law];
                 let start_strain = &constants.start_strain[law];
                 let along =
-                    Along { x, direction, start_strain, dt: step.dt, sums: Cell::default() };
+                    Curvatures { x, direction, start_strain, dt: step.dt, sums: Cell::default() };
                 with_tissue!(set, L, VISCOUS => {
                     let pass = OfLaw::<_, L, VISCOUS>::new(&along);
                     constants.workers.piece(layout, set, blocks.clone(), &pass);
@@ -269,6 +290,16 @@ impl Evaluation {
         for (_, sum) in self.blocks.iter().zip(&self.block_sums).filter(|(p, _)| p.part == number) {
             exact += sum.potential;
             bound += sum.size;
+        }
+        if let Some(along) = &mut self.along {
+            let vertices = part.vertices.clone();
+            along.moved[vertices.clone()].copy_from_slice(&direction[vertices]);
+            if let StepConstants { workers, recovered: Some(tets), .. } = constants {
+                tets.evaluate(workers, layout, number, x);
+            }
+            let found = along_recovered(constants, step, number, along, Found::Curvature);
+            exact += step.dt * step.dt * found[0];
+            bound += step.dt * step.dt * found[1];
         }
         [exact, bound]
     }
@@ -296,7 +327,7 @@ fn element_curvature<S: Real, K: Kind<N, M>, const N: usize, const M: usize>(
     }
 }
 
-struct Along<'a, S> {
+struct Curvatures<'a, S> {
     x: &'a [Point<S>],
     direction: &'a [Point<S>],
     start_strain: &'a [[Eight<S>; 6]],
@@ -304,10 +335,10 @@ struct Along<'a, S> {
     sums: Cell<[f64; 2]>,
 }
 
-impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Along<'_, S>, W, VISCOUS> {
+impl<S: Real, W: Law, const VISCOUS: bool> TetPass<S> for OfLaw<'_, Curvatures<'_, S>, W, VISCOUS> {
     #[inline(always)]
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
-        let Along { x, direction, start_strain, dt, ref sums } = *self.pass;
+        let Curvatures { x, direction, start_strain, dt, ref sums } = *self.pass;
         let shape = tets.shape::<L>();
         let f = deformation_gradient(&tets.corners::<L>(x).x, &shape);
         let d = deformation_gradient(&tets.corners::<L>(direction).x, &shape);

@@ -21,6 +21,7 @@ mod evaluate;
 mod oscillations;
 mod parts;
 mod preconditioner;
+mod recovered;
 mod sdirk2;
 pub mod stage;
 mod time;
@@ -110,7 +111,7 @@ pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S
 /// The memory of the method beside the data of a step, whose positions are the trial.
 #[derive(Clone, Debug)]
 pub struct Memory<S> {
-    evaluation: Evaluation,
+    evaluation: Evaluation<S>,
     preconditioner: Preconditioner<S>,
     evaluator: Evaluator,
     energies: Energies,

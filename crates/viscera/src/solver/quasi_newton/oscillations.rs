@@ -16,7 +16,7 @@ use crate::scalar::{Real, Vec3, vec3};
 use crate::solver::oscillations::{Oscillation, Oscillations};
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::predict::Tethers;
-use crate::solver::step::strain::measure_strain;
+use crate::solver::step::strain::put_strains;
 
 /// Iterations at most; a residual this much smaller than the load is small enough.
 const ITERATIONS: usize = 15;
@@ -51,9 +51,9 @@ impl<S: Real> Memory<S> {
         data.constants.predicted.copy_from_slice(&data.points);
         self.base.copy_from_slice(&data.points);
         self.stage_start.copy_from_slice(&data.points);
-        let constants = &mut data.constants;
-        let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-        measure_strain(workers, layout, None, &data.points, strains);
+        for number in 0..layout.part_count() {
+            put_strains(&mut data.constants, layout, number, &data.points, S::ZERO);
+        }
         self.preconditioner.fit(layout, &data.constants);
         let curvature =
             Curvature { dt: step.dt, x: &self.base, moments: moments(&step, &self.stage_start) };

@@ -21,7 +21,7 @@ use crate::settings::Integrator;
 use crate::solver::report::StepReport;
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::predict::Tethers;
-use crate::solver::step::strain::{keep_share, measure_strain};
+use crate::solver::step::strain::{measure_strain, put_strains};
 use crate::state::{Learned, State};
 
 /// A vertex moves by less than so many units of the precision of the largest coordinate: round-off.
@@ -172,10 +172,13 @@ impl<S: Real> Memory<S> {
                 self.start_part(which, &solve, data, number, is_first_of_step);
             }
         }
-        if step.layout.is_viscous() {
-            let constants = &mut data.constants;
-            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-            measure_strain(workers, step.layout, None, &self.stage_start, strains);
+        self.start_from_strains(step, data);
+    }
+
+    /// Viscosity acts against the change of strain since the start of the solve.
+    fn start_from_strains(&self, step: &Step<'_, S>, data: &mut StepData<S>) {
+        for number in 0..step.layout.part_count() {
+            put_strains(&mut data.constants, step.layout, number, &self.stage_start, S::ZERO);
         }
     }
 
@@ -344,6 +347,7 @@ impl<S: Real> Memory<S> {
         }
         self.measure_start_strain(step, data);
         self.evaluator.evaluate_all(&data.constants, step, &self.base);
+        self.evaluator.add_recovered_of_all(&mut data.constants, step.layout, &self.base);
         self.energies.begin(step, data, &self.evaluator.stored);
     }
 
@@ -365,6 +369,7 @@ impl<S: Real> Memory<S> {
     ) {
         self.measure_start_strain(step, data);
         self.evaluator.evaluate_all(&data.constants, step, &data.points);
+        self.evaluator.add_recovered_of_all(&mut data.constants, step.layout, &data.points);
         let Self { energies, evaluator, parts, reports, .. } = self;
         let mut any = false;
         let round_off = (ENERGY_ROUNDED * S::EPSILON).max(SUM_ROUNDED);
@@ -390,6 +395,7 @@ impl<S: Real> Memory<S> {
         if !stand {
             self.measure_start_strain(step, data);
             self.evaluator.evaluate_all(&data.constants, step, &data.points);
+            self.evaluator.add_recovered_of_all(&mut data.constants, step.layout, &data.points);
             self.energies.end(step, data, &self.evaluator.stored);
         }
         self.energies.limit(step, data, |_, _| true, |_, _| {});
@@ -398,18 +404,14 @@ impl<S: Real> Memory<S> {
             let energies = self.energies.report(number, step.dt, round_off);
             *report = StepReport { rejected: report.rejected, ..energies };
         }
-        if step.layout.is_viscous() {
-            let constants = &mut data.constants;
-            let (workers, strains) = (&constants.workers, &mut constants.start_strain);
-            measure_strain(workers, step.layout, None, &self.stage_start, strains);
-            // Beside SDIRK2, measures of forces take steps of implicit Euler for solves of `he` (`end_again`): the change of
-            // strain over `he` has to be that over the whole step.
-            if step.settings.integrator == Integrator::Sdirk2 {
-                for (progress, part) in self.parts.iter().zip(step.layout.parts.iter()) {
-                    if progress.scheme == Scheme::Euler {
-                        let share = S::from_f64(SHARE);
-                        keep_share(workers, step.layout, part, &data.points, share, strains);
-                    }
+        self.start_from_strains(step, data);
+        // Beside SDIRK2, measures of forces take steps of implicit Euler for solves of `he` (`end_again`): the change of
+        // strain over `he` has to be that over the whole step.
+        if step.settings.integrator == Integrator::Sdirk2 {
+            for (number, progress) in self.parts.iter().enumerate() {
+                if progress.scheme == Scheme::Euler {
+                    let share = S::from_f64(SHARE);
+                    put_strains(&mut data.constants, step.layout, number, &data.points, share);
                 }
             }
         }

@@ -104,7 +104,7 @@ impl ForceBalance {
         let rate = S::from_f64(1.0 / state.multiplier_dt);
         let is_viscous = layout.tet_sets[law].viscous;
         let viscous = is_viscous.then(|| (Shared::new(&mut strains), rate));
-        let load = Load { scale: S::ONE, viscous, at_rest: None };
+        let load = Load { scale: S::ONE, viscous, goes_on: false, at_rest: None };
         let mut points = vec![Point::default(); layout.vertex_count()];
         for (point, &user) in points.iter_mut().zip(&layout.numbering.order) {
             point.set_vec3(state.positions[user as usize]);

@@ -87,7 +87,7 @@ impl Evaluator {
             };
             cut(PieceOf::Vertices, part.vertices.len(), VERTEX_PIECE);
             for (kind, set) in layout.tet_sets.iter().enumerate() {
-                // Whoever has recovered-gradient tetrahedra adds their energy.
+                // Their energy is added where it is wanted: see `add_recovered`.
                 if !is_recovered(layout, set) {
                     cut(PieceOf::Blocks(kind), part.block_count(kind), PIECE);
                 }
@@ -139,6 +139,32 @@ impl Evaluator {
         self.sum_pieces(constants, step, x, part..part + 1);
         self.combine(constants, step, x, part);
         self.potentials[part]
+    }
+
+    /// Adds to `stored` what recovered-gradient tetrahedra of every part store at `x`.
+    pub fn add_recovered_of_all<S: Real>(
+        &mut self,
+        constants: &mut StepConstants<S>,
+        layout: &Layout<S>,
+        x: &[Point<S>],
+    ) {
+        for number in 0..layout.part_count() {
+            self.add_recovered(constants, layout, x, number);
+        }
+    }
+
+    /// The same of one part.
+    pub fn add_recovered<S: Real>(
+        &mut self,
+        constants: &mut StepConstants<S>,
+        layout: &Layout<S>,
+        x: &[Point<S>],
+        number: usize,
+    ) {
+        if let StepConstants { workers, recovered: Some(tets), .. } = constants {
+            tets.evaluate(workers, layout, number, x);
+            self.stored[number] += tets.energy(workers, layout, number);
+        }
     }
 
     /// Pieces of parts in a row.

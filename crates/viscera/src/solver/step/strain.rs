@@ -1,7 +1,7 @@
 //! Green strain of viscous tetrahedra, against which viscosity acts.
 #![allow(unsafe_code)]
 
-use super::data::StartStrain;
+use super::data::{StartStrain, StepConstants};
 use crate::elements::{deformation_gradient, green_strain};
 use crate::layout::{Layout, Part, TetSet};
 use crate::material::MaterialModel;
@@ -22,7 +22,7 @@ pub fn measure_strain<S: Real>(
 }
 
 /// Brings the start strain of a part nearer to that at `x`: a share of the change between both is left.
-pub fn keep_share<S: Real>(
+fn keep_share<S: Real>(
     workers: &Workers,
     layout: &Layout<S>,
     part: &Part,
@@ -31,6 +31,23 @@ pub fn keep_share<S: Real>(
     start_strain: &mut StartStrain<S>,
 ) {
     pass_over(workers, layout, Some(part), x, share, start_strain);
+}
+
+/// The same of all tetrahedra of a part, recovered-gradient ones among them.
+pub fn put_strains<S: Real>(
+    constants: &mut StepConstants<S>,
+    layout: &Layout<S>,
+    number: usize,
+    x: &[Point<S>],
+    share: S,
+) {
+    let StepConstants { workers, recovered, start_strain, .. } = constants;
+    keep_share(workers, layout, &layout.parts[number], x, share, start_strain);
+    let law = MaterialModel::StableNeoHookean as usize;
+    if let Some(tets) = recovered.as_mut().filter(|_| layout.tet_sets[law].viscous) {
+        tets.evaluate(workers, layout, number, x);
+        tets.put_strains(workers, layout, number, share, &mut start_strain[law]);
+    }
 }
 
 fn pass_over<S: Real>(

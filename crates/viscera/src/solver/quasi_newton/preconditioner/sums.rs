@@ -20,9 +20,14 @@ use crate::layout::{Layout, TetBlock};
 use crate::material::MaterialModel;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Mat3, Real, Vec3, vec3};
+use crate::solver::step::strain::is_recovered;
 
 /// A symmetric matrix: xx, yy, zz, yz, xz, xy.
 pub type Six<S> = [S; 6];
+
+/// Of Lame's first parameter recovered-gradient tetrahedra have this multiple of the shear modulus here at most: their volume
+/// counts for groups of vertices, so that most of what a tetrahedron's changes by costs them little.
+const RECOVERED_BULK: f64 = 16.0;
 
 /// A tetrahedron, its vertices counted from the first of the part.
 pub struct LocalTet {
@@ -98,13 +103,16 @@ impl<'a, S: Real> LocalTets<'a, S> {
     pub fn get(&self, tet: u32) -> LocalTet {
         let (constants, lane) = self.constants(tet);
         let material = &self.layout.materials[constants.material[lane] as usize];
+        let set = &self.layout.tet_sets[usize::from(self.places[tet as usize].law)];
+        let (mu, lambda) = (material.lame_mu.to_f64(), material.lame_lambda.to_f64());
+        let most = if is_recovered(self.layout, set) { RECOVERED_BULK * mu } else { f64::INFINITY };
         LocalTet {
-            law: self.layout.tet_sets[usize::from(self.places[tet as usize].law)].model,
+            law: set.model,
             vertices: self.vertices(tet),
             gradients: shape_gradients(&constants.shape(lane).cast()),
             volume: constants.rest_volume[lane].to_f64(),
-            mu: material.lame_mu.to_f64(),
-            lambda: material.lame_lambda.to_f64(),
+            mu,
+            lambda: lambda.min(most),
             viscosity: material.viscosity.to_f64(),
         }
     }

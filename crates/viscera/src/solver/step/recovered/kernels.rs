@@ -8,10 +8,10 @@ use crate::elements::green_strain::{self, Voigt};
 use crate::elements::law::{Law, StableNeoHookean};
 use crate::elements::neo_hookean::{self, volume_change};
 use crate::elements::recovered::{
-    RestFrame, bulk_energy, bulk_shares, recovered_gradient, tet_stress, vertex_stresses,
+    RestFrame, bulk_shares, recovered_gradient, tet_stress, vertex_stresses,
 };
 use crate::elements::{deformation_gradient, shape_gradients};
-use crate::layout::{Entry, Frames, Layout, RecoveredTables, TetSet};
+use crate::layout::{Entry, Frames, Layout, RecoveredTables};
 use crate::scalar::lanes::{Eight, Kernel, LANES, Lanes, Point};
 use crate::scalar::{Mat3, Real, Vec3, vec3};
 use crate::solver::cpu::tets::{Block, TetPass};
@@ -22,7 +22,7 @@ use crate::solver::cpu::threads::Shared;
 /// # Safety
 /// As [`Lanes::gather`], of all three.
 #[inline(always)]
-unsafe fn gather_matrix<L: Lanes>(
+pub unsafe fn gather_matrix<L: Lanes>(
     points: *const Point<L::Real>,
     rows: &Eight<u32>,
     lane: usize,
@@ -37,13 +37,13 @@ unsafe fn gather_matrix<L: Lanes>(
 
 /// Where the rows of a group of places stand.
 #[inline(always)]
-fn rows_of(group: usize) -> Eight<u32> {
+pub fn rows_of(group: usize) -> Eight<u32> {
     std::array::from_fn(|lane| (3 * (LANES * group + lane)) as u32)
 }
 
 /// Eight numbers that stand one after the other.
 #[inline(always)]
-fn eight<S: Copy>(all: &[S], group: usize) -> &Eight<S> {
+pub fn eight<S: Copy>(all: &[S], group: usize) -> &Eight<S> {
     &all.as_chunks().0[group]
 }
 
@@ -85,7 +85,7 @@ impl<S: Real> Kernel<S> for VertexGradients<'_, S> {
 impl<S: Real> Frames<S> {
     /// At rest, some lanes of it.
     #[inline(always)]
-    fn rest<L: Lanes<Real = S>>(&self, shape: &Mat3<L>, lane: usize) -> RestFrame<L> {
+    pub fn rest<L: Lanes<Real = S>>(&self, shape: &Mat3<L>, lane: usize) -> RestFrame<L> {
         let arms = load_matrix::<L>(&self.arms, lane);
         let [b, c, d] = arms.columns;
         let mut face_weights = [L::ZERO; 4];
@@ -134,21 +134,36 @@ impl<S: Real> TetPass<S> for TetGradients<'_, S> {
             y.store(&mut into[3 * column + 1], lane);
             z.store(&mut into[3 * column + 2], lane);
         }
-        let quarter = tets.volume::<L>() * L::from_f64(0.25);
-        let mut changes = [S::ZERO; LANES];
-        (volume_change(&recovered) * quarter).store(&mut changes, lane);
-        for lane in lane..(lane + L::WIDTH).min(tets.filled()) {
-            for rows in &frame.rows {
-                // SAFETY: the piece has copies of its own, and one thread does all of it.
-                unsafe { *self.changes.at(rows[lane] as usize / 3) += changes[lane] };
-            }
+        // SAFETY: the piece has copies of its own, and one thread does all of it.
+        unsafe { scatter_changes(tets, frame, volume_change(&recovered), &self.changes) };
+    }
+}
+
+/// Adds a change of volume, of so much of each tetrahedron, to the copies of its corners' places.
+///
+/// # Safety
+/// No one else works on the copies of the block's piece.
+#[inline(always)]
+pub unsafe fn scatter_changes<S: Real, L: Lanes<Real = S>>(
+    tets: &Block<'_, S>,
+    frame: &Frames<S>,
+    change: L,
+    into: &Shared<'_, S>,
+) {
+    let quarter = tets.volume::<L>() * L::from_f64(0.25);
+    let mut changes = [S::ZERO; LANES];
+    (change * quarter).store(&mut changes, tets.lane);
+    for lane in tets.lane..(tets.lane + L::WIDTH).min(tets.filled()) {
+        for rows in &frame.rows {
+            // SAFETY: the caller's promise.
+            unsafe { *into.at(rows[lane] as usize / 3) += changes[lane] };
         }
     }
 }
 
 /// `Fh_t` of some lanes of a block.
 #[inline(always)]
-fn load_matrix<L: Lanes>(of: &[Eight<L::Real>; 9], lane: usize) -> Mat3<L> {
+pub fn load_matrix<L: Lanes>(of: &[Eight<L::Real>; 9], lane: usize) -> Mat3<L> {
     let mut matrix = Mat3::ZERO;
     for (column, of) in matrix.columns.iter_mut().zip(of.as_chunks().0) {
         *column = load_vector(of, lane);
@@ -166,8 +181,9 @@ pub struct Load<'a, S> {
     /// They are multiplied by it.
     pub scale: S,
     /// Where viscosity acts, the Green strains of tetrahedra since which it does, and one over the time since then [1/s].
-    /// The strains of now take their place.
     pub viscous: Option<(Shared<'a, [Eight<S>; 6]>, S)>,
+    /// Whether the strains of now take the place of those.
+    pub goes_on: bool,
     /// Where the bound of stiffness is wanted beside forces, also times `scale`: what of it does not depend on the shape
     /// [m], block by block.
     pub at_rest: Option<&'a [Eight<S>]>,
@@ -190,20 +206,22 @@ fn put_strain<S: Real, L: Lanes<Real = S>>(
     }
 }
 
-/// Stress [Pa] by the change of the Green strain since the start, in the place of which it is put. Volume counts by the part
+/// Stress [Pa] by the change of the Green strain since the start, in the place of which it is put where it `goes_on`. Volume counts by the part
 /// of Lame's first parameter that counts here: what is averaged over clusters has no viscosity.
 #[inline(always)]
 fn viscous_stress<S: Real, L: Lanes<Real = S>>(
     f: &Mat3<L>,
     (local, mu): (L, L),
-    start: &mut [Eight<S>; 6],
+    (start, goes_on): (&mut [Eight<S>; 6], bool),
     lane: usize,
 ) -> Mat3<L> {
     let mut change: Voigt<L> = green_strain::strain(f);
     for p in 0..6 {
         change[p] -= L::load(&start[p], lane);
     }
-    put_strain(f, start, lane, S::ZERO);
+    if goes_on {
+        put_strain(f, start, lane, S::ZERO);
+    }
     green_strain::piola(f, &change, local, mu)
 }
 
@@ -277,7 +295,7 @@ impl<S: Real> TetPass<S> for TetForces<'_, S> {
         let mut stress = tet_stress(&recovered, local, material.lame_mu, share, mean);
         if let Some((strains, rate)) = self.load.viscous.as_ref().filter(|_| tets.is_viscous()) {
             // SAFETY: every block has a place of its own and is worked on once.
-            let start = unsafe { strains.at(tets.index) };
+            let start = (unsafe { strains.at(tets.index) }, self.load.goes_on);
             let rate = material.viscosity * L::splat(*rate) * share;
             let viscous = viscous_stress(&recovered, (local, material.lame_mu), start, lane);
             stress = stress + viscous * rate;
@@ -336,7 +354,7 @@ impl<S: Real> Kernel<S> for PlaceStresses<'_, S> {
                 let mut stress = neo_hookean::piola(&gradient, local, mu);
                 if let Some((_, rate)) = &self.load.viscous {
                     // SAFETY: every group has a place of its own and is worked on once.
-                    let start = unsafe { self.strains.at(group) };
+                    let start = (unsafe { self.strains.at(group) }, self.load.goes_on);
                     let viscous = viscous_stress(&gradient, (local, mu), start, lane);
                     stress = stress + viscous * (viscosity * L::splat(*rate));
                 }
@@ -363,7 +381,7 @@ impl<S: Real> Kernel<S> for PlaceStresses<'_, S> {
 
 /// `l` and `mu` [Pa] and the retardation time [s] of some places of a group.
 #[inline(always)]
-fn local_of<S: Real, L: Lanes<Real = S>>(
+pub fn local_of<S: Real, L: Lanes<Real = S>>(
     tables: &RecoveredTables<S>,
     group: usize,
     lane: usize,
@@ -411,87 +429,5 @@ impl<S: Real> Kernel<S> for VertexForces<'_, S> {
                 }
             }
         }
-    }
-}
-
-/// What adds up energies [J], in an order that lanes do not change.
-pub trait Sum<S: Real> {
-    /// `#[inline(always)]`.
-    fn sum<L: Lanes<Real = S>>(self) -> f64;
-}
-
-pub struct Summed<'a, K> {
-    pub of: K,
-    pub into: &'a mut f64,
-}
-
-impl<S: Real, K: Sum<S>> Kernel<S> for Summed<'_, K> {
-    #[inline(always)]
-    fn run<L: Lanes<Real = S>>(self) {
-        *self.into = self.of.sum::<L>();
-    }
-}
-
-/// `sum_t V_t (1 - alpha) W(Fh_t)` of some blocks.
-pub struct TetEnergy<'a, S> {
-    pub layout: &'a Layout<S>,
-    pub set: &'a TetSet<S>,
-    pub recovered: &'a [[Eight<S>; 9]],
-    pub share: S,
-    pub blocks: Range<usize>,
-}
-
-impl<S: Real> Sum<S> for TetEnergy<'_, S> {
-    #[inline(always)]
-    fn sum<L: Lanes<Real = S>>(self) -> f64 {
-        let mut sum = 0.0;
-        for index in self.blocks {
-            let mut energies = [S::ZERO; LANES];
-            for lane in (0..LANES).step_by(L::WIDTH) {
-                let block = Block::new(self.layout, self.set, index, lane);
-                let material = block.material::<L>();
-                let local = bulk_shares(material.lame_lambda, material.lame_mu).local;
-                let recovered = load_matrix::<L>(&self.recovered[index], lane);
-                let density = neo_hookean::energy_density(&recovered, local, material.lame_mu);
-                (density * block.volume::<L>() * L::splat(self.share)).store(&mut energies, lane);
-            }
-            let filled = usize::from(self.set.filled[index]);
-            energies[..filled].iter().for_each(|energy| sum += energy.to_f64());
-        }
-        sum
-    }
-}
-
-/// `V_n (alpha W(G_n) + k_n/2 (Jh_n - 1)^2 + k_c/2 (Jh_c - 1)^2)` of a group: a cluster's volume is the sum of its
-/// domains', each counts its part.
-pub struct PlaceEnergy<'a, S> {
-    pub tables: &'a RecoveredTables<S>,
-    pub gradients: &'a [Point<S>],
-    pub means: &'a [[S; 2]],
-    pub group: usize,
-}
-
-impl<S: Real> Sum<S> for PlaceEnergy<'_, S> {
-    #[inline(always)]
-    fn sum<L: Lanes<Real = S>>(self) -> f64 {
-        let Self { tables, gradients, means, group } = self;
-        let share = tables.shares[1];
-        let rows = rows_of(group);
-        let mut energies = [S::ZERO; LANES];
-        let (means, bulk) = (eight(means, group), eight(&tables.bulk, group));
-        let of = |pairs: &Eight<[S; 2]>, i: usize| std::array::from_fn(|lane| pairs[lane][i]);
-        let [domain, cluster] = [0, 1].map(|i| (of(means, i), of(bulk, i)));
-        for lane in (0..LANES).step_by(L::WIDTH) {
-            // SAFETY: the group's places.
-            let gradient: Mat3<L> = unsafe { gather_matrix(gradients.as_ptr(), &rows, lane) };
-            let [local, mu, _] = local_of(tables, group, lane);
-            let mut density = neo_hookean::energy_density(&gradient, local, mu) * L::splat(share);
-            for (change, stiffness) in [&domain, &cluster] {
-                density += bulk_energy(L::load(change, lane), L::load(stiffness, lane));
-            }
-            let volume = L::load(eight(&tables.volumes, group), lane);
-            (density * volume).store(&mut energies, lane);
-        }
-        energies.iter().map(|energy| energy.to_f64()).sum()
     }
 }

@@ -12,11 +12,14 @@
 //! The equations stand in [`crate::elements::recovered`]. One at a time and in the caller's numbering here: the
 //! truth that the passes in lanes (`passes.rs`) are tested against.
 
+mod along;
+mod energies;
 mod kernels;
 mod passes;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use along::{Along, Found, Since};
 pub(crate) use kernels::Load;
 pub(crate) use passes::RecoveredTets;
 

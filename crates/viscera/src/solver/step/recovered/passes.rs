@@ -6,9 +6,10 @@
 
 use std::sync::atomic::AtomicBool;
 
+use super::energies::{PlaceEnergy, Summed, TetEnergy};
 use super::kernels::{
-    Load, PlaceEnergy, PlaceStrains, PlaceStresses, Summed, TetEnergy, TetForces, TetGradients,
-    TetStrains, VertexForces, VertexGradients,
+    Load, PlaceStrains, PlaceStresses, TetForces, TetGradients, TetStrains, VertexForces,
+    VertexGradients,
 };
 use crate::layout::{Layout, PartRanges, RecoveredTables, TetSet};
 use crate::material::MaterialModel;
@@ -17,19 +18,19 @@ use crate::scalar::lanes::{self, Eight, LANES, Point};
 use crate::solver::cpu::threads::{Shared, Workers};
 
 /// Groups that a thread does at a time.
-const GROUPS: usize = 64;
+pub const GROUPS: usize = 64;
 
 /// What passes over the recovered-gradient tetrahedra of a layout keep.
 #[derive(Clone, Debug)]
 pub struct RecoveredTets<S> {
     /// `G_n` of each place by columns.
-    gradients: Vec<Point<S>>,
+    pub(super) gradients: Vec<Point<S>>,
     /// `Fh_t` by columns, of each block.
-    recovered: Vec<[Eight<S>; 9]>,
+    pub(super) recovered: Vec<[Eight<S>; 9]>,
     /// `V_t/4 (det Fh_t - 1)` [m^3], of each copy of a place.
     changes: Vec<S>,
     /// `Jh_n - 1` and `Jh_c - 1` of each place.
-    means: Vec<[S; 2]>,
+    pub(super) means: Vec<[S; 2]>,
     /// `Jh_c - 1` of each cluster.
     cluster_means: Vec<S>,
     /// `p_n` [Pa] of each place.
@@ -39,7 +40,7 @@ pub struct RecoveredTets<S> {
     /// `N_n` by columns, of each place.
     stresses: Vec<Point<S>>,
     /// The Green strain at the start of the step of groups of places, where any tissue is viscous.
-    strains: Vec<[Eight<S>; 6]>,
+    pub(super) strains: Vec<[Eight<S>; 6]>,
     /// Energies of pieces and of groups [J].
     partial: Vec<f64>,
 }
@@ -120,40 +121,14 @@ impl<S: Real> RecoveredTets<S> {
     /// Mean volumes and pressures of a part.
     fn average(&mut self, workers: &Workers, tables: &RecoveredTables<S>, number: usize) {
         let Self { changes, means, cluster_means, pressures, .. } = self;
-        let part = &tables.parts[number];
-        let places = LANES * part.groups.start..LANES * part.groups.end;
-        let grain = LANES * GROUPS;
-        let shared = Shared::new(means);
-        workers.each(places.len(), grain, |range| {
-            for n in places.start + range.start..places.start + range.end {
-                let copies = tables.copy_offsets[n] as usize..tables.copy_offsets[n + 1] as usize;
-                let sum = changes[copies].iter().fold(S::ZERO, |sum, &change| sum + change);
-                // SAFETY: every place is worked on once.
-                unsafe { shared.at(n)[0] = sum * tables.inverse_volumes[n] };
-            }
-        });
-        let clusters = part.clusters.clone();
-        let shared = Shared::new(cluster_means);
-        workers.each(clusters.len(), grain, |range| {
-            for c in clusters.start + range.start..clusters.start + range.end {
-                let [first, end] = [c, c + 1].map(|c| tables.cluster_offsets[c] as usize);
-                let change = |&n: &u32| tables.volumes[n as usize] * means[n as usize][0];
-                let all = tables.cluster_places[first..end].iter().map(change);
-                let sum = all.fold(S::ZERO, |sum, change| sum + change);
-                // SAFETY: every cluster is worked on once.
-                unsafe { *shared.at(c) = sum * tables.inverse_cluster_volumes[c] };
-            }
-        });
+        mean_volumes(workers, tables, number, changes, means, cluster_means);
+        let places = tables.parts[number].places();
         let shared = Shared::new(pressures);
-        let means = Shared::new(means);
-        workers.each(places.len(), grain, |range| {
+        workers.each(places.len(), LANES * GROUPS, |range| {
             for n in places.start + range.start..places.start + range.end {
-                let of_cluster = cluster_means[tables.clusters[n] as usize];
-                let [domain, cluster] = tables.bulk[n];
+                let ([domain, cluster], [of_place, of_cluster]) = (tables.bulk[n], means[n]);
                 // SAFETY: every place is worked on once.
-                let (mean, pressure) = unsafe { (means.at(n), shared.at(n)) };
-                mean[1] = of_cluster;
-                *pressure = domain * mean[0] + cluster * of_cluster;
+                unsafe { *shared.at(n) = domain * of_place + cluster * of_cluster };
             }
         });
     }
@@ -267,6 +242,47 @@ impl<S: Real> RecoveredTets<S> {
     }
 }
 
-fn set_of<S>(layout: &Layout<S>) -> &TetSet<S> {
+pub fn set_of<S>(layout: &Layout<S>) -> &TetSet<S> {
     &layout.tet_sets[MaterialModel::StableNeoHookean as usize]
+}
+
+/// Means over places and over clusters, of both at each place, of what is given per copy of a place [m^3].
+pub fn mean_volumes<S: Real>(
+    workers: &Workers,
+    tables: &RecoveredTables<S>,
+    number: usize,
+    changes: &[S],
+    means: &mut [[S; 2]],
+    cluster_means: &mut [S],
+) {
+    let part = &tables.parts[number];
+    let (places, clusters) = (part.places(), part.clusters.clone());
+    let grain = LANES * GROUPS;
+    let shared = Shared::new(means);
+    workers.each(places.len(), grain, |range| {
+        for n in places.start + range.start..places.start + range.end {
+            let copies = tables.copy_offsets[n] as usize..tables.copy_offsets[n + 1] as usize;
+            let sum = changes[copies].iter().fold(S::ZERO, |sum, &change| sum + change);
+            // SAFETY: every place is worked on once.
+            unsafe { shared.at(n)[0] = sum * tables.inverse_volumes[n] };
+        }
+    });
+    let of_clusters = Shared::new(cluster_means);
+    workers.each(clusters.len(), grain, |range| {
+        for c in clusters.start + range.start..clusters.start + range.end {
+            let [first, end] = [c, c + 1].map(|c| tables.cluster_offsets[c] as usize);
+            let change = |&n: &u32| tables.volumes[n as usize] * means[n as usize][0];
+            let all = tables.cluster_places[first..end].iter().map(change);
+            let sum = all.fold(S::ZERO, |sum, change| sum + change);
+            // SAFETY: every cluster is worked on once.
+            unsafe { *of_clusters.at(c) = sum * tables.inverse_cluster_volumes[c] };
+        }
+    });
+    let shared = Shared::new(means);
+    workers.each(places.len(), grain, |range| {
+        for n in places.start + range.start..places.start + range.end {
+            // SAFETY: every place is worked on once.
+            unsafe { shared.at(n)[1] = cluster_means[tables.clusters[n] as usize] };
+        }
+    });
 }

@@ -1,6 +1,6 @@
 //! Passes in lanes beside the truth, one tetrahedron at a time.
 
-use super::{Load, Recovered, RecoveredTets};
+use super::{Along, Found, Load, Recovered, RecoveredTets, Since};
 use crate::layout::{Domains, Layout, RecoveredTables, Smoothing};
 use crate::material::{Material, MaterialModel};
 use crate::mesh::TetMesh;
@@ -72,7 +72,7 @@ fn by_passes<S: Real>(
             let inverted = passes.evaluate(&workers, &layout, part, &points);
             assert!(!inverted);
             energies.push(passes.energy(&workers, &layout, part));
-            let load = Load { scale: S::TWO, viscous: None, at_rest: None };
+            let load = Load { scale: S::TWO, viscous: None, goes_on: false, at_rest: None };
             passes.add_forces(&workers, &layout, part, &load, &mut loads);
         }
     });
@@ -113,6 +113,64 @@ fn as_the_truth<S: Real>(tolerance: f64) {
 fn passes_in_lanes_are_the_truth() {
     as_the_truth::<f64>(1e-13);
     as_the_truth::<f32>(1e-5);
+}
+
+/// Along displacements that are half as long as the places are off: the change of the energy and its second derivative are
+/// the truth's, by any instructions and threads.
+fn along_as_the_truth<S: Real>(tolerance: f64) {
+    let model = model::<S>();
+    let (method, elements) = (Method::QuasiNewton, Elements::Recovered);
+    let settings = SolverSettings { method, elements, ..SolverSettings::default() };
+    let layout = Layout::new(&model, &settings);
+    let (places, points) = moved(&model, &layout);
+    let back: Vec<Vec3<S>> =
+        places.iter().zip(&model.rest_positions).map(|(x, rest)| (*rest - *x) * S::HALF).collect();
+    let domains = Domains::new(&model, Smoothing::RECOVERED);
+    let (mut truth, mut along) = (Recovered::new(&domains), Recovered::new(&domains));
+    truth.evaluate(&domains, &model.materials, &places);
+    along.take_gradients(&domains, &back);
+    let expected = truth.variation(&domains, &model.materials, &mut along);
+    let tables = layout.recovered.as_ref().expect("tables");
+    let found = |instructions: Instructions, threads: u32| {
+        let mut workers = Workers::new(Threads::Count(threads), model.tet_count());
+        workers.instructions = instructions;
+        let mut passes = RecoveredTets::new(&layout, tables);
+        let mut along = Along::new(&layout, tables);
+        assert!(along.bytes() > 0);
+        for (v, d) in back.iter().enumerate() {
+            along.moved[layout.numbering.of(v as u32)].set_vec3(*d);
+        }
+        let mut sums = [[0.0; 2]; 2];
+        workers.entrance().enter(|| {
+            for part in 0..layout.part_count() {
+                passes.evaluate(&workers, &layout, part, &points);
+                for (sum, found) in sums.iter_mut().zip([Found::Change, Found::Curvature]) {
+                    let since = Since { strains: &[], dt: 1.0 };
+                    let of_part = passes.along(&workers, &layout, part, (&mut along, found), since);
+                    sum.iter_mut().zip(of_part).for_each(|(sum, more)| *sum += more);
+                }
+            }
+        });
+        sums
+    };
+    let sums = found(Instructions::detect(), 1);
+    let [[change, size], [curvature, bound]] = sums;
+    assert!((change / expected.change - 1.0).abs() < tolerance, "{change} of {}", expected.change);
+    assert!(
+        (curvature / expected.second - 1.0).abs() < tolerance,
+        "{curvature} of {}",
+        expected.second
+    );
+    assert!(size >= change.abs() && bound > 0.0, "{size} J, {bound} J");
+    for (instructions, threads) in [(Instructions::Portable, 1), (Instructions::detect(), 3)] {
+        assert!(found(instructions, threads) == sums, "{instructions:?}, {threads}");
+    }
+}
+
+#[test]
+fn change_and_curvature_in_lanes_are_the_truth() {
+    along_as_the_truth::<f64>(1e-12);
+    along_as_the_truth::<f32>(1e-4);
 }
 
 /// An inverted tetrahedron is reported, of its own part only.
