@@ -81,6 +81,7 @@ fn every_solver_is_measured_at_every_size_with_every_number_of_threads() {
         "explicit-recovered",
         "quasi-newton-green",
         "quasi-newton",
+        "quasi-newton-recovered",
     ];
     assert_eq!(solvers, [one_size, one_size].concat());
     let threads: Vec<_> = cases.iter().map(|case| case["threads"].as_u64()).collect();
@@ -147,7 +148,7 @@ fn a_mesh_of_three_tetrahedra_is_measured() {
         bench(&folder, &["--mesh", "three.msh", "--threads", "1,3", "--json", "deep/three.json"]);
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     let cases = cases(&folder, "deep/three.json");
-    assert_eq!(cases.len(), 2 * 15, "every solver with one and with three threads");
+    assert_eq!(cases.len(), 2 * 16, "every solver with one and with three threads");
     for case in &cases {
         assert_is_measured(case);
         assert_eq!((&case["tets"], &case["mesh"]), (&3.into(), &"three".into()));
