@@ -20,7 +20,7 @@ use crate::solver::cpu::threads::Shared;
 use crate::solver::step::data::{Step, StepConstants};
 use crate::solver::step::gradient::add_elements;
 use crate::solver::step::law::{OfLaw, with_tissue};
-use crate::solver::step::recovered::Load;
+use crate::solver::step::recovered::load_recovered;
 use crate::solver::step::strain::is_recovered;
 use crate::solver::step::tissue::Tissue;
 
@@ -85,35 +85,11 @@ impl Pieces {
                 });
             }
         });
-        let of_recovered = load_recovered(constants, step, (number, looks), (x, at_rest), loads);
+        let at_rest = looks.then_some(&at_rest.tets[MaterialModel::StableNeoHookean as usize][..]);
+        let of_recovered = load_recovered(constants, step, number, x, (true, at_rest), loads);
         add_elements(layout, moments, part, x, loads);
         of_recovered || inverted.load(Relaxed)
     }
-}
-
-/// Those of recovered-gradient tetrahedra.
-fn load_recovered<S: Real>(
-    constants: &mut StepConstants<S>,
-    step: &Step<'_, S>,
-    (number, looks): (usize, bool),
-    (x, at_rest): (&[Point<S>], &AtRest<S>),
-    loads: &mut [Point<S>],
-) -> bool {
-    let StepConstants { workers, recovered: Some(tets), start_strain, .. } = constants else {
-        return false;
-    };
-    let law = MaterialModel::StableNeoHookean as usize;
-    let inverted = tets.evaluate(workers, step.layout, number, x);
-    let is_viscous = step.layout.tet_sets[law].viscous;
-    let strains = Shared::new(&mut start_strain[law]);
-    let load = Load {
-        scale: S::from_f64(step.dt * step.dt),
-        viscous: is_viscous.then_some((strains, S::from_f64(1.0 / step.dt))),
-        goes_on: true,
-        at_rest: looks.then_some(&at_rest.tets[law]),
-    };
-    tets.add_forces(workers, step.layout, number, &load, loads);
-    inverted
 }
 
 struct Forces<'a, S> {

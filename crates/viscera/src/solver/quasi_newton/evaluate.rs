@@ -14,7 +14,6 @@
 use std::cell::Cell;
 use std::ops::Range;
 
-use super::recovered::{along_recovered, load_recovered};
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::law::{LAWS, Law};
 use crate::elements::{deformation_gradient, internal_forces};
@@ -27,7 +26,7 @@ use crate::solver::cpu::threads::Shared;
 use crate::solver::step::data::{Step, StepConstants, gather};
 use crate::solver::step::gradient::add_elements;
 use crate::solver::step::law::{OfLaw, respond, with_tissue};
-use crate::solver::step::recovered::{Along, Found};
+use crate::solver::step::recovered::{Along, Found, along_recovered, load_recovered};
 use crate::solver::step::strain::is_recovered;
 use crate::solver::step::tissue::Tissue;
 
@@ -169,7 +168,7 @@ impl<S: Real> Evaluation<S> {
             }
         });
         for (number, part) in layout.parts.iter().enumerate().filter(|(n, _)| acts(*n)) {
-            load_recovered(constants, step, number, way.to, loads);
+            load_recovered(constants, step, number, way.to, (false, None), loads);
             add_elements(layout, &way.moments, part, way.to, loads);
         }
         let constants = &*constants;

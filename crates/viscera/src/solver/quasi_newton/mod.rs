@@ -21,7 +21,6 @@ mod evaluate;
 mod oscillations;
 mod parts;
 mod preconditioner;
-mod recovered;
 mod sdirk2;
 pub mod stage;
 mod time;

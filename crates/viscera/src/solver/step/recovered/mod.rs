@@ -15,12 +15,14 @@
 mod along;
 mod energies;
 mod kernels;
+mod of_step;
 mod passes;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use along::{Along, Found, Since};
 pub(crate) use kernels::Load;
+pub(crate) use of_step::{along_recovered, load_recovered};
 pub(crate) use passes::RecoveredTets;
 
 use crate::elements::neo_hookean::{self, volume_change, volume_variation};

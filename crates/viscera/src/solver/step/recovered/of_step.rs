@@ -1,40 +1,40 @@
-//! Recovered-gradient tetrahedra in a solve: viscosity acts against the strain at its start, which stays.
+//! What the methods ask of recovered-gradient tetrahedra in a step.
 #![allow(unsafe_code)]
 
+use super::{Along, Found, Load, Since};
 use crate::material::MaterialModel;
 use crate::scalar::Real;
-use crate::scalar::lanes::Point;
+use crate::scalar::lanes::{Eight, Point};
 use crate::solver::cpu::threads::Shared;
 use crate::solver::step::data::{Step, StepConstants};
-use crate::solver::step::recovered::{Along, Found, Load, Since};
 
-/// The law that recovered-gradient tetrahedra have, by its number.
+/// The law that they have, by its number.
 const NEO_HOOKEAN: usize = MaterialModel::StableNeoHookean as usize;
 
-/// Adds `he^2` times the forces of a part's recovered-gradient tetrahedra.
+/// Adds `h^2` times the forces of those of a part, and the bound of their stiffness where `at_rest` has what of it does not
+/// depend on the shape. Viscosity acts against the change of strain since the start, which is `x` from now on where it
+/// `goes_on`. Returns whether one is inside out.
 pub fn load_recovered<S: Real>(
     constants: &mut StepConstants<S>,
     step: &Step<'_, S>,
     number: usize,
     x: &[Point<S>],
+    (goes_on, at_rest): (bool, Option<&[Eight<S>]>),
     loads: &mut [Point<S>],
-) {
+) -> bool {
     let StepConstants { workers, recovered: Some(tets), start_strain, .. } = constants else {
-        return;
+        return false;
     };
-    tets.evaluate(workers, step.layout, number, x);
+    let inverted = tets.evaluate(workers, step.layout, number, x);
     let is_viscous = step.layout.tet_sets[NEO_HOOKEAN].viscous;
     let strains = Shared::new(&mut start_strain[NEO_HOOKEAN]);
-    let load = Load {
-        scale: S::from_f64(step.dt * step.dt),
-        viscous: is_viscous.then_some((strains, S::from_f64(1.0 / step.dt))),
-        goes_on: false,
-        at_rest: None,
-    };
+    let viscous = is_viscous.then_some((strains, S::from_f64(1.0 / step.dt)));
+    let load = Load { scale: S::from_f64(step.dt * step.dt), viscous, goes_on, at_rest };
     tets.add_forces(workers, step.layout, number, &load, loads);
+    inverted
 }
 
-/// Of a part's recovered-gradient tetrahedra along displacements, from where they were evaluated.
+/// Those of a part along displacements, from where they were evaluated.
 pub fn along_recovered<S: Real>(
     constants: &StepConstants<S>,
     step: &Step<'_, S>,
