@@ -98,8 +98,7 @@ pub fn run_all(environment: &Environment, options: &Options) -> Result<(), Strin
     let about = results.join("about.json");
     let before = if options.keep { super::results::read(&about)?.into_iter().next() } else { None };
     let before = before.as_ref().and_then(|about| about["command"].as_str());
-    let command =
-        before.map_or_else(String::new, |before| format!("{before}`, `")) + &options.command;
+    let command = and_then(before, &options.command);
     let words = json!({ "command": command, "cpu": cpu_model(), "rounds": options.rounds,
                         "missing": environment.missing(options)? });
     write_whole(&about, &words.to_string())?;
@@ -211,5 +210,27 @@ fn cpu_model() -> String {
     match (value("cpu family"), value("model\t")) {
         (Some(family), Some(model)) => format!("{name} (family {family}, model {model})"),
         _ => name,
+    }
+}
+
+/// The commands of a document that several wrote, each once, the last at the end.
+fn and_then(before: Option<&str>, command: &str) -> String {
+    const AND: &str = "`, `";
+    let earlier = before.into_iter().flat_map(|before| before.split(AND));
+    let all: Vec<&str> = earlier.filter(|earlier| *earlier != command).chain([command]).collect();
+    all.join(AND)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::and_then;
+
+    /// A command that is given again is named once.
+    #[test]
+    fn commands_are_named_once() {
+        let first = and_then(None, "a --keep");
+        let both = and_then(Some(&first), "b");
+        assert_eq!(both, "a --keep`, `b");
+        assert_eq!(and_then(Some(&both), "a --keep"), "b`, `a --keep");
     }
 }
