@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use viscera::elements::neo_hookean::volume_change;
-use viscera::elements::recovered::bulk_shares;
+use viscera::elements::recovered::{FLOOR_STIFFNESS, VOLUME_FLOOR, bulk_shares};
 use viscera::layout::{Domains, Smoothing};
 use viscera::material::MaterialModel;
 use viscera::mesh::topology::{TET_EDGES, TET_FACES};
@@ -53,6 +53,15 @@ struct Volume {
     viscosity: f64,
 }
 
+/// A linear tetrahedron that is pushed back below a fifth of its volume.
+#[derive(Clone, Copy, Debug)]
+struct Floor {
+    nodes: [u32; 4],
+    gradients: [Vec3<f64>; 4],
+    /// Rest volume times the floor's stiffness [J].
+    stiffness: f64,
+}
+
 /// All such tetrahedra of a problem.
 #[derive(Clone, Debug, Default)]
 pub struct Recovered {
@@ -65,6 +74,7 @@ pub struct Recovered {
     vertices: Vec<u32>,
     gradients: Vec<Vec3<f64>>,
     volumes: Vec<Volume>,
+    floors: Vec<Floor>,
 }
 
 /// Shapes and volumes at the start of a step.
@@ -101,6 +111,13 @@ impl Recovered {
             let material = domains.materials[domains.tet_domains[t][0] as usize];
             let volume = (1.0 - smoothing.vertex_share) * domains.tet_volumes[t];
             recovered.push(&gradient, volume, material);
+            recovered.floors.push(Floor {
+                nodes: domains.tet_vertices[t],
+                gradients: domains.frames[t].gradients,
+                stiffness: FLOOR_STIFFNESS
+                    * model.materials[material as usize].lame_mu
+                    * domains.tet_volumes[t],
+            });
         }
         for (n, gradient) in averages.iter().enumerate() {
             let volume = smoothing.vertex_share * domains.volumes[n];
@@ -208,6 +225,10 @@ impl Recovered {
             let tissue = &self.tissues[place.tissue as usize];
             value.add(place.volume * tissue.energy_density(&self.gradient_at(i, x), creep));
         }
+        for floor in &self.floors {
+            let (_, below) = floor.at(x);
+            value.add(0.5 * floor.stiffness * below * below);
+        }
         for (q, volume) in self.volumes.iter().enumerate() {
             let [pressure, _, energy] = self.bulk(q, self.change(volume, x), start);
             value.add(energy);
@@ -248,6 +269,13 @@ impl Recovered {
                 gradient[self.vertices[k] as usize] += stress * self.gradients[k];
             }
         }
+        for floor in &self.floors {
+            let (f, below) = floor.at(x);
+            let stress = f.cofactor() * (floor.stiffness * below);
+            for (node, g) in floor.nodes.iter().zip(floor.gradients) {
+                gradient[*node as usize] += stress * g;
+            }
+        }
     }
 
     /// Adds the Hessian [N/m]; `positive` without the negative curvature of every place.
@@ -282,6 +310,29 @@ impl Recovered {
                 }
             }
         }
+        for floor in &self.floors {
+            let (f, below) = floor.at(x);
+            if below == 0.0 {
+                continue;
+            }
+            let slope = f.cofactor().columns.map(|column| column.to_array());
+            let slope = slope.as_flattened();
+            let row = |a: usize| [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|b| slope[a] * slope[b]);
+            let mut stiffness =
+                [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|a| row(a).map(|entry| entry * floor.stiffness));
+            add_volume_curvature(&mut stiffness, &f, floor.stiffness * below);
+            if positive {
+                project(&mut stiffness);
+            }
+            for (&column, b) in floor.nodes.iter().zip(floor.gradients) {
+                let images = images(&stiffness, b);
+                for (&row, a) in floor.nodes.iter().zip(floor.gradients) {
+                    if pattern.holds(row, column) {
+                        matrix.add(pattern, row, column, &block_of(&images, a));
+                    }
+                }
+            }
+        }
         for (q, volume) in self.volumes.iter().enumerate() {
             let curvature = self.bulk(q, 0.0, start)[1];
             let slopes = self.slopes(volume, x);
@@ -309,6 +360,18 @@ impl Recovered {
             }
         }
         slopes
+    }
+}
+
+impl Floor {
+    /// `F` of the linear tetrahedron, and by how much its volume is below the floor.
+    fn at(&self, x: &[Vec3<f64>]) -> (Mat3<f64>, f64) {
+        let mut f = Mat3::ZERO;
+        for a in 1..4 {
+            let edge = x[self.nodes[a] as usize] - x[self.nodes[0] as usize];
+            f = f + Mat3::outer(edge, self.gradients[a]);
+        }
+        (f, (f.determinant() - VOLUME_FLOOR).min(0.0))
     }
 }
 

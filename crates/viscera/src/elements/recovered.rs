@@ -12,7 +12,8 @@
 //!      = F + sum_o c_o k_o g_o^T,  k_o = sum_{p in face o} G_p (X_p - X_o),  c_o = 3 beta/8 or 0
 //! Jh_n = (1/V_n) sum_t V_t/4 det Fh_t,   Jh_c likewise over the domains n of a cluster c
 //! E    = sum_t V_t (1 - alpha) W(Fh_t; l, mu) + sum_n V_n alpha W(G_n; l, mu)
-//!      + sum_n V_n k_n/2 (Jh_n - 1)^2 + sum_c V_c k_c/2 (Jh_c - 1)^2,   lambda = l + k_n + k_c
+//!      + sum_n V_n k_n/2 (Jh_n - 1)^2 + sum_c V_c k_c/2 (Jh_c - 1)^2 + sum_t V_t 16 mu/2 min(det F_t - 1/5, 0)^2
+//! lambda = l + k_n + k_c
 //! ```
 //!
 //! `e_ab` is exact where the field is quadratic and `G` its gradient; the second line of `Fh` gathers the middles by
@@ -28,11 +29,15 @@
 //! averaged, so that nearly incompressible tissue has one volume to keep per vertex rather than per tetrahedron, and
 //! above four times the shear modulus, which is above a Poisson ratio of 0.4, per group of vertices ([`BulkShares`]).
 //!
+//! The last term is the **volume floor**. Averages of volumes do not see one tetrahedron that is inside out between
+//! others: `E` without the floor has minima there, in which a body that was crushed stays. The floor is zero for every
+//! tetrahedron that keeps a fifth of its volume, so for all of sound tissue.
+//!
 //! After node-based uniform strain elements with a stabilising share of the linear tetrahedron (Puso, Solberg, "A
 //! stabilized nodally integrated tetrahedral", IJNME 67, 2006) and superconvergent recovery of gradients (Zienkiewicz,
 //! Zhu, "The superconvergent patch recovery and a posteriori error estimates", IJNME 33, 1992).
 
-use super::neo_hookean;
+use super::neo_hookean::{self, volume_variation};
 use crate::scalar::{Mat3, Scalar, Vec3};
 
 /// `alpha`: the share of the energy that counts at vertices. Less stiffens what bends; more leaves short waves too
@@ -46,6 +51,15 @@ pub const RECOVERY: f64 = 0.9;
 /// The bulk stiffness that counts at vertices, and per tetrahedron, ends at this multiple of the shear modulus: the
 /// rest counts per cluster. Lower loses volume within clusters that soft tissue can keep; higher locks.
 pub const CLUSTERED_ABOVE: f64 = 4.0;
+
+/// The share of its rest volume below which the volume floor pushes a linear tetrahedron back. Of 200 bodies of 120
+/// tetrahedra, crushed by violent grabs or scattered, the explicit method leaves 240 tetrahedra inside out without a
+/// floor and 63 with it. A floor at zero leaves 174; 0.3 and 0.4 do no better than 0.2.
+pub const VOLUME_FLOOR: f64 = 0.2;
+
+/// Stiffness of the volume floor over the shear modulus. At 4 it leaves 172 of the tetrahedra above; at 32 no fewer than
+/// at 16.
+pub const FLOOR_STIFFNESS: f64 = 16.0;
 
 /// Where the parts of Lame's first parameter count [Pa]; they add up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,6 +157,47 @@ pub fn bulk_energy<S: Scalar>(change: S, stiffness: S) -> S {
     S::HALF * stiffness * (change * change)
 }
 
+/// `min(det F - 1/5, 0)` of a linear tetrahedron.
+#[inline(always)]
+pub fn below_floor<S: Scalar>(f: &Mat3<S>) -> S {
+    (f.determinant() - S::from_f64(VOLUME_FLOOR)).min(S::ZERO)
+}
+
+/// Energy density [Pa] of the volume floor.
+#[inline(always)]
+pub fn floor_energy<S: Scalar>(f: &Mat3<S>, lame_mu: S) -> S {
+    let below = below_floor(f);
+    S::HALF * S::from_f64(FLOOR_STIFFNESS) * lame_mu * (below * below)
+}
+
+/// Derivative [Pa] of [`floor_energy`] by `F`.
+#[inline(always)]
+pub fn floor_piola<S: Scalar>(f: &Mat3<S>, lame_mu: S) -> Mat3<S> {
+    f.cofactor() * (S::from_f64(FLOOR_STIFFNESS) * lame_mu * below_floor(f))
+}
+
+/// `floor_energy(F + D) - floor_energy(F)`, with the round-off of the change.
+#[inline(always)]
+pub fn floor_energy_change<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lame_mu: S) -> S {
+    let volume = f.determinant() - S::from_f64(VOLUME_FLOOR);
+    let below = volume.min(S::ZERO);
+    let above = volume - below;
+    let [first, second, third] = volume_variation(f, d);
+    // What goes up ends at the floor, what comes down starts there.
+    let change = (((first + second) + third) + above).min(-below);
+    S::from_f64(FLOOR_STIFFNESS) * lame_mu * change * (below + S::HALF * change)
+}
+
+/// Second derivative [Pa] of [`floor_energy`] along `D`, and without the curvature of the volume, which may be negative.
+#[inline(always)]
+pub fn floor_curvature_along<S: Scalar>(f: &Mat3<S>, d: &Mat3<S>, lame_mu: S) -> [S; 2] {
+    let below = below_floor(f);
+    let [first, second, _] = volume_variation(f, d);
+    let stiffness = S::from_f64(FLOOR_STIFFNESS) * lame_mu;
+    let bound = S::select(below.less(S::ZERO), stiffness * first * first, S::ZERO);
+    [bound + S::TWO * stiffness * below * second, bound]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -233,6 +288,43 @@ mod tests {
             let sum: f64 = stresses.iter().zip(&changes).map(|(n, d)| n.dot(*d)).sum();
             assert!((along - sum).abs() < 1e-13 * scale(&rest), "{seed}: {along} {sum}");
         }
+    }
+
+    /// Change, stress, curvature and bound of the floor against its energy: below it, above it, and from one to the other.
+    #[test]
+    fn the_floor_pushes_back_what_is_crushed() {
+        let mu = 3.0;
+        let (mut below, mut crossed) = (0, 0);
+        for seed in 0..200 {
+            // Of squares: nine sines in a row have no volume.
+            let part = |k: usize| number((seed * seed + 31 * k * k + 17 * k * seed) % 1009);
+            let column = |k: usize| vec3(part(3 * k), part(3 * k + 1), part(3 * k + 2));
+            let f = Mat3::IDENTITY * 0.5 + Mat3 { columns: [0, 1, 2].map(column) };
+            let d = Mat3 { columns: [3, 4, 5].map(column) };
+            let at = |s: f64| f + d * s;
+            let energy = |s: f64| floor_energy(&at(s), mu);
+            let sides = [f, at(1.0)].map(|f| f.determinant() < VOLUME_FLOOR);
+            below += usize::from(sides[0]);
+            crossed += usize::from(sides[0] != sides[1]);
+            assert_eq!(energy(0.0) > 0.0, sides[0], "{seed}");
+            let change = floor_energy_change(&f, &d, mu);
+            let expected = energy(1.0) - energy(0.0);
+            assert!((change - expected).abs() < 1e-12 * (1.0 + expected.abs()), "{seed}");
+            if (f.determinant() - VOLUME_FLOOR).abs() < 1e-2 {
+                continue;
+            }
+            let h = 1e-4;
+            let first = (energy(h) - energy(-h)) / (2.0 * h);
+            assert!((floor_piola(&f, mu).dot(d) - first).abs() < 1e-4, "{seed}: {first}");
+            let second = (energy(h) - 2.0 * energy(0.0) + energy(-h)) / (h * h);
+            let [exact, bound] = floor_curvature_along(&f, &d, mu);
+            assert!(
+                (exact - second).abs() < 1e-3 * (1.0 + second.abs()),
+                "{seed}: {exact} {second}"
+            );
+            assert!(bound >= 0.0);
+        }
+        assert!(below > 50 && crossed > 20, "{below} {crossed}");
     }
 
     #[test]

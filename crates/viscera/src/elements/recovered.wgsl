@@ -2,9 +2,12 @@
 //
 //   Fh   = F + sum_o c_o k_o g_o^T,  k_o = sum_{p in face o} G_p (X_p - X_o)
 //   E    = sum_t V_t (1 - alpha) W(Fh_t; l, mu) + sum_n V_n alpha W(G_n; l, mu)
-//        + sum_n V_n k_n/2 (Jh_n - 1)^2 + sum_c V_c k_c/2 (Jh_c - 1)^2,   lambda = l + k_n + k_c
+//        + sum_n V_n k_n/2 (Jh_n - 1)^2 + sum_c V_c k_c/2 (Jh_c - 1)^2 + sum_t V_t 16 mu/2 min(det F_t - 1/5, 0)^2
+//   lambda = l + k_n + k_c
 
 const RECOVERED_CLUSTERED_ABOVE: f32 = 4.0;
+const RECOVERED_VOLUME_FLOOR: f32 = 0.2;
+const RECOVERED_FLOOR_STIFFNESS: f32 = 16.0;
 
 // Where the parts of Lame's first parameter count [Pa].
 struct RecoveredBulkShares {
@@ -99,4 +102,17 @@ fn recovered_tet_stress(
 
 fn recovered_bulk_energy(change: f32, stiffness: f32) -> f32 {
     return 0.5 * stiffness * (change * change);
+}
+
+fn recovered_below_floor(f: mat3x3f) -> f32 {
+    return min(determinant(f) - RECOVERED_VOLUME_FLOOR, 0.0);
+}
+
+fn recovered_floor_energy(f: mat3x3f, lame_mu: f32) -> f32 {
+    let below = recovered_below_floor(f);
+    return 0.5 * RECOVERED_FLOOR_STIFFNESS * lame_mu * (below * below);
+}
+
+fn recovered_floor_piola(f: mat3x3f, lame_mu: f32) -> mat3x3f {
+    return cofactor(f) * (RECOVERED_FLOOR_STIFFNESS * lame_mu * recovered_below_floor(f));
 }

@@ -376,7 +376,7 @@ fn let_go(method: Method, poisson: f64, seed: u64, scrambles: bool) -> (f64, usi
 }
 
 /// No step gains energy but for the rounding of single precision, which is that of strains: places over a cell; and at
-/// most one tetrahedron in a hundred ends inside out.
+/// most one tetrahedron in 300 ends inside out.
 fn all_let_go(seeds: std::ops::Range<u64>, scrambles: bool) {
     for method in METHODS {
         let (mut gained, mut inverted, mut bodies) = (0.0f64, 0, 0);
@@ -390,8 +390,8 @@ fn all_let_go(seeds: std::ops::Range<u64>, scrambles: bool) {
         }
         println!("{method}: at most {gained}, {inverted} inside out of {bodies} bodies");
         assert!(gained < 1.0 + 64.0 * f64::from(f32::EPSILON), "{method}: {gained}");
-        // The law has minima with a tetrahedron inside out, where a body may stay; a bar has 120 tetrahedra.
-        assert!(inverted * 100 <= bodies * 120, "{method}: {inverted} of {bodies} bodies");
+        // Without the volume floor one in 120, by the explicit method. A bar has 120 tetrahedra.
+        assert!(inverted * 300 <= bodies * 120, "{method}: {inverted} of {bodies} bodies");
     }
 }
 

@@ -408,6 +408,8 @@ fn recovered_tets<T: Scalar>(numbers_in: &[T]) -> Results<T> {
         ("tet_stress", numbers(&stress.columns)),
         ("vertex_stresses", stresses.iter().flat_map(|n| numbers(&n.columns)).collect()),
         ("bulk_energy", vec![recovered::bulk_energy(change, shares.domain)]),
+        ("floor_energy", vec![recovered::floor_energy(&f, mu)]),
+        ("floor_piola", numbers(&recovered::floor_piola(&f, mu).columns)),
     ]
 }
 
@@ -435,4 +437,6 @@ const RECOVERED_TETS: &str = "
     put_mat3(stresses[2]);
     put_mat3(stresses[3]);
     put(recovered_bulk_energy(neo_hookean_volume_change(bent), shares.domain));
+    put(recovered_floor_energy(f, mu));
+    put_mat3(recovered_floor_piola(f, mu));
 ";

@@ -19,7 +19,9 @@ use super::passes::{GROUPS, mean_volumes, set_of};
 use crate::elements::deformation_gradient;
 use crate::elements::law::StableNeoHookean;
 use crate::elements::neo_hookean::volume_variation;
-use crate::elements::recovered::{bulk_shares, recovered_gradient};
+use crate::elements::recovered::{
+    bulk_shares, floor_curvature_along, floor_energy_change, recovered_gradient,
+};
 use crate::layout::{Frames, Layout, RecoveredTables};
 use crate::material::MaterialModel;
 use crate::scalar::lanes::{self, Eight, Kernel, LANES, Lanes, Point};
@@ -132,6 +134,7 @@ impl<S: Real> RecoveredTets<S> {
                 let pass = TetsAlong::<S, CURVED> {
                     frames: &tables.frames,
                     recovered: &self.recovered,
+                    crushed: self.crushed_at(number),
                     moved,
                     gradients,
                     changes: [&first, &second],
@@ -186,6 +189,12 @@ fn densities<L: Lanes, const CURVED: bool>(
     }
 }
 
+/// The same of the volume floor.
+#[inline(always)]
+fn of_floor<L: Lanes, const CURVED: bool>(f: &Mat3<L>, d: &Mat3<L>, mu: L) -> [L; 2] {
+    if CURVED { floor_curvature_along(f, d, mu) } else { [floor_energy_change(f, d, mu); 2] }
+}
+
 /// Adds densities, of some lanes, to a sum: both of a curvature, or a change and its magnitude.
 #[inline(always)]
 fn add<const CURVED: bool>(sum: &mut [f64; 2], [first, second]: [f64; 2]) {
@@ -197,6 +206,7 @@ fn add<const CURVED: bool>(sum: &mut [f64; 2], [first, second]: [f64; 2]) {
 struct TetsAlong<'a, S, const CURVED: bool> {
     frames: &'a [Frames<S>],
     recovered: &'a [[Eight<S>; 9]],
+    crushed: Option<&'a [Point<S>]>,
     moved: &'a [Point<S>],
     gradients: &'a [Point<S>],
     changes: [&'a Shared<'a, S>; 2],
@@ -210,14 +220,14 @@ impl<S: Real, const CURVED: bool> TetPass<S> for TetsAlong<'_, S, CURVED> {
     fn block<L: Lanes<Real = S>>(&self, tets: &Block<'_, S>) {
         let (frame, lane) = (&self.frames[tets.index], tets.lane);
         let shape = tets.shape::<L>();
-        let d = deformation_gradient(&tets.corners::<L>(self.moved).x, &shape);
+        let linear = deformation_gradient(&tets.corners::<L>(self.moved).x, &shape);
         let mut of_corners = [Mat3::ZERO; 4];
         for corner in 0..4 {
             // SAFETY: places of the tables, whose gradients there are.
             of_corners[corner] =
                 unsafe { gather_matrix(self.gradients.as_ptr(), &frame.places[corner], lane) };
         }
-        let d = recovered_gradient(&d, &of_corners, &frame.rest(&shape, lane));
+        let d = recovered_gradient(&linear, &of_corners, &frame.rest(&shape, lane));
         let f = load_matrix::<L>(&self.recovered[tets.index], lane);
         let material = tets.material::<L>();
         let mut tissue = Tissue::new(MaterialModel::StableNeoHookean, &material, self.since.dt);
@@ -228,10 +238,16 @@ impl<S: Real, const CURVED: bool> TetPass<S> for TetsAlong<'_, S, CURVED> {
             start = load_rows(self.since.strains[tets.index].as_flattened(), lane);
         }
         let of_tissue = densities::<L, CURVED>(&tissue, &f, &d, is_viscous.then_some(&start));
+        let mut densities = of_tissue.map(|density| density * L::splat(self.share));
+        if let Some(x) = self.crushed {
+            let f = deformation_gradient(&tets.corners::<L>(x).x, &shape);
+            let of_floor = of_floor::<L, CURVED>(&f, &linear, material.lame_mu);
+            densities = [densities[0] + of_floor[0], densities[1] + of_floor[1]];
+        }
         let volume = tets.volume::<L>();
         let mut both = [[S::ZERO; LANES]; 2];
-        for (lanes, value) in both.iter_mut().zip(of_tissue) {
-            (value * volume * L::splat(self.share)).store(lanes, lane);
+        for (lanes, density) in both.iter_mut().zip(densities) {
+            (density * volume).store(lanes, lane);
         }
         let mut sum = self.sum.get();
         for lane in lane..(lane + L::WIDTH).min(tets.filled()) {

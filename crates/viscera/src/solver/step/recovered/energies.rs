@@ -4,8 +4,8 @@
 use std::ops::Range;
 
 use super::kernels::{eight, gather_matrix, load_matrix, local_of, rows_of};
-use crate::elements::neo_hookean;
-use crate::elements::recovered::{bulk_energy, bulk_shares};
+use crate::elements::recovered::{bulk_energy, bulk_shares, floor_energy};
+use crate::elements::{deformation_gradient, neo_hookean};
 use crate::layout::{Layout, RecoveredTables, TetSet};
 use crate::scalar::lanes::{Eight, Kernel, LANES, Lanes, Point};
 use crate::scalar::{Mat3, Real};
@@ -29,11 +29,13 @@ impl<S: Real, K: Sum<S>> Kernel<S> for Summed<'_, K> {
     }
 }
 
-/// `sum_t V_t (1 - alpha) W(Fh_t)` of some blocks.
+/// `sum_t V_t (1 - alpha) W(Fh_t)` of some blocks, and their volume floor.
 pub struct TetEnergy<'a, S> {
     pub layout: &'a Layout<S>,
     pub set: &'a TetSet<S>,
     pub recovered: &'a [[Eight<S>; 9]],
+    /// Where vertices are, if one is below the volume floor.
+    pub crushed: Option<&'a [Point<S>]>,
     pub share: S,
     pub blocks: Range<usize>,
 }
@@ -50,7 +52,12 @@ impl<S: Real> Sum<S> for TetEnergy<'_, S> {
                 let local = bulk_shares(material.lame_lambda, material.lame_mu).local;
                 let recovered = load_matrix::<L>(&self.recovered[index], lane);
                 let density = neo_hookean::energy_density(&recovered, local, material.lame_mu);
-                (density * block.volume::<L>() * L::splat(self.share)).store(&mut energies, lane);
+                let mut density = density * L::splat(self.share);
+                if let Some(x) = self.crushed {
+                    let f = deformation_gradient(&block.corners::<L>(x).x, &block.shape());
+                    density += floor_energy(&f, material.lame_mu);
+                }
+                (density * block.volume::<L>()).store(&mut energies, lane);
             }
             let filled = usize::from(self.set.filled[index]);
             energies[..filled].iter().for_each(|energy| sum += energy.to_f64());

@@ -8,7 +8,8 @@ use crate::elements::green_strain::{self, Voigt};
 use crate::elements::law::{Law, StableNeoHookean};
 use crate::elements::neo_hookean::{self, volume_change};
 use crate::elements::recovered::{
-    RestFrame, bulk_shares, recovered_gradient, tet_stress, vertex_stresses,
+    RestFrame, VOLUME_FLOOR, bulk_shares, floor_piola, recovered_gradient, tet_stress,
+    vertex_stresses,
 };
 use crate::elements::{deformation_gradient, shape_gradients};
 use crate::layout::{Entry, Frames, Layout, RecoveredTables};
@@ -108,6 +109,8 @@ pub struct TetGradients<'a, S> {
     pub recovered: Shared<'a, [Eight<S>; 9]>,
     pub changes: Shared<'a, S>,
     pub inverted: &'a AtomicBool,
+    /// Whether one is below the volume floor.
+    pub crushed: &'a AtomicBool,
 }
 
 impl<S: Real> TetPass<S> for TetGradients<'_, S> {
@@ -116,8 +119,12 @@ impl<S: Real> TetPass<S> for TetGradients<'_, S> {
         let (frame, lane) = (&self.frames[tets.index], tets.lane);
         let shape = tets.shape::<L>();
         let f = deformation_gradient(&tets.corners::<L>(self.x).x, &shape);
-        if !L::all(L::ZERO.less(f.determinant())) {
+        let volume = f.determinant();
+        if !L::all(L::ZERO.less(volume)) {
             self.inverted.store(true, Relaxed);
+        }
+        if !L::all(L::from_f64(VOLUME_FLOOR).less(volume)) {
+            self.crushed.store(true, Relaxed);
         }
         let mut of_corners = [Mat3::ZERO; 4];
         for corner in 0..4 {
@@ -268,6 +275,8 @@ impl<S: Real> Kernel<S> for PlaceStrains<'_, S> {
 pub struct TetForces<'a, S> {
     pub frames: &'a [Frames<S>],
     pub recovered: &'a [[Eight<S>; 9]],
+    /// Where vertices are, if one is below the volume floor.
+    pub crushed: Option<&'a [Point<S>]>,
     pub pressures: &'a [S],
     pub share: S,
     pub load: &'a Load<'a, S>,
@@ -307,9 +316,14 @@ impl<S: Real> TetPass<S> for TetForces<'_, S> {
                 StableNeoHookean::stiffness(&recovered, material.lame_lambda, material.lame_mu);
             bound = L::load(&at_rest[tets.index], lane) * stiffness * L::splat(self.load.scale);
         }
+        let mut of_linear = stress;
+        if let Some(x) = self.crushed {
+            let f = deformation_gradient(&tets.corners::<L>(x).x, &shape);
+            of_linear = of_linear + floor_piola(&f, material.lame_mu) * volume;
+        }
         let mut forces = [Vec3::ZERO; 4];
         for corner in 1..4 {
-            forces[corner] = -(stress * rest.gradients[corner]);
+            forces[corner] = -(of_linear * rest.gradients[corner]);
         }
         forces[0] = -((forces[1] + forces[2]) + forces[3]);
         // SAFETY: the piece has copies of its own, and one thread does all of it.

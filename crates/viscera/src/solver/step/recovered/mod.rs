@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! 1  domains    G_n from the places of their vertices
-//! 2  tets       Fh_t from F_t and the G_n of their corners; their volumes to domains and clusters
+//! 2  tets       Fh_t from F_t and the G_n of their corners; their volumes to domains and clusters; any det F_t < 1/5?
 //! 3  domains    pressures p_n = k_n (Jh_n - 1) + k_c (Jh_c - 1)
-//! 4  tets       S_t = V_t dE/dFh_t; to their corners S_t g_a, to the domains what it is by G_n
+//! 4  tets       S_t = V_t dE/dFh_t; to their corners S_t g_a and the volume floor, to the domains what it is by G_n
 //! 5  domains    N_n = what came from the tetrahedra + V_n alpha P(G_n)
 //! 6  domains    N_n b_nj to the vertices j that they see
 //! ```
@@ -27,7 +27,8 @@ pub(crate) use passes::RecoveredTets;
 
 use crate::elements::neo_hookean::{self, volume_change, volume_variation};
 use crate::elements::recovered::{
-    BulkShares, bulk_energy, bulk_shares, recovered_gradient, tet_stress, vertex_stresses,
+    BulkShares, bulk_energy, bulk_shares, floor_curvature_along, floor_energy, floor_energy_change,
+    floor_piola, recovered_gradient, tet_stress, vertex_stresses,
 };
 use crate::layout::Domains;
 use crate::material::MaterialConstants;
@@ -38,6 +39,8 @@ use crate::scalar::{Mat3, Real, Vec3};
 pub struct Recovered<S> {
     /// `G_n`, shape [domain_count].
     pub vertex_gradients: Vec<Mat3<S>>,
+    /// `F_t`, shape [tet_count].
+    pub linear_gradients: Vec<Mat3<S>>,
     /// `Fh_t`, shape [tet_count].
     pub gradients: Vec<Mat3<S>>,
     /// `Jh_n - 1`, shape [domain_count].
@@ -66,6 +69,7 @@ impl<S: Real> Recovered<S> {
     pub fn new(domains: &Domains<S>) -> Self {
         Self {
             vertex_gradients: vec![Mat3::ZERO; domains.len()],
+            linear_gradients: vec![Mat3::ZERO; domains.tets.len()],
             gradients: vec![Mat3::ZERO; domains.tets.len()],
             volume_changes: vec![S::ZERO; domains.len()],
             cluster_changes: vec![S::ZERO; domains.cluster_volumes.len()],
@@ -90,6 +94,7 @@ impl<S: Real> Recovered<S> {
             }
             let of_corners = domains.tet_domains[t].map(|n| self.vertex_gradients[n as usize]);
             *gradient = recovered_gradient(&f, &of_corners, frame);
+            self.linear_gradients[t] = f;
         }
     }
 
@@ -134,7 +139,8 @@ impl<S: Real> Recovered<S> {
             let mu = materials[domains.materials[n] as usize].lame_mu;
             let local = self.shares(domains, materials, n).local;
             let density = neo_hookean::energy_density(gradient, local, mu);
-            sum += (of_tets * domains.tet_volumes[t] * density).to_f64();
+            let density = of_tets * density + floor_energy(&self.linear_gradients[t], mu);
+            sum += (domains.tet_volumes[t] * density).to_f64();
         }
         for (n, gradient) in self.vertex_gradients.iter().enumerate() {
             let BulkShares { local, domain, cluster } = self.shares(domains, materials, n);
@@ -173,9 +179,10 @@ impl<S: Real> Recovered<S> {
             let stress =
                 tet_stress(recovered, local, mu, of_tets, pressure) * domains.tet_volumes[t];
             let of_corners = vertex_stresses(&stress, frame);
+            let floor = floor_piola(&self.linear_gradients[t], mu) * domains.tet_volumes[t];
             for corner in 0..4 {
                 gradient[domains.tet_vertices[t][corner] as usize] +=
-                    stress * frame.gradients[corner];
+                    (stress + floor) * frame.gradients[corner];
                 let sum = &mut self.stresses[of_tet[corner] as usize];
                 *sum = *sum + of_corners[corner];
             }
@@ -215,6 +222,14 @@ impl<S: Real> Recovered<S> {
             let mu = materials[domains.materials[n] as usize].lame_mu;
             let local = self.shares(domains, materials, n).local;
             add(of_domains * domains.volumes[n], &self.vertex_gradients[n], d, local, mu);
+        }
+        for (t, d) in along.linear_gradients.iter().enumerate() {
+            let n = domains.tet_domains[t][0] as usize;
+            let mu = materials[domains.materials[n] as usize].lame_mu;
+            let (f, volume) = (&self.linear_gradients[t], domains.tet_volumes[t].to_f64());
+            sum.change += volume * floor_energy_change(f, d, mu).to_f64();
+            sum.first += volume * floor_piola(f, mu).dot(*d).to_f64();
+            sum.second += volume * floor_curvature_along(f, d, mu)[0].to_f64();
         }
         // Of the mean volumes' changes by powers of the displacements.
         for power in 0..3 {

@@ -27,6 +27,10 @@ pub struct RecoveredTets<S> {
     pub(super) gradients: Vec<Point<S>>,
     /// `Fh_t` by columns, of each block.
     pub(super) recovered: Vec<[Eight<S>; 9]>,
+    /// Where vertices were [m] when a tetrahedron was below the volume floor last.
+    x: Vec<Point<S>>,
+    /// Whether one is, of each part.
+    crushed: Vec<bool>,
     /// `V_t/4 (det Fh_t - 1)` [m^3], of each copy of a place.
     changes: Vec<S>,
     /// `Jh_n - 1` and `Jh_c - 1` of each place.
@@ -55,6 +59,8 @@ impl<S: Real> RecoveredTets<S> {
         Self {
             gradients: vec![Point::default(); 3 * places],
             recovered: vec![[[S::ZERO; LANES]; 9]; tables.frames.len()],
+            x: vec![Point::default(); layout.vertex_count()],
+            crushed: vec![false; tables.parts.len()],
             changes: vec![S::ZERO; copies],
             means: vec![[S::ZERO; 2]; places],
             cluster_means: vec![S::ZERO; tables.inverse_cluster_volumes.len()],
@@ -70,6 +76,8 @@ impl<S: Real> RecoveredTets<S> {
     pub fn bytes(&self) -> usize {
         size_of_val(&self.gradients[..])
             + size_of_val(&self.recovered[..])
+            + size_of_val(&self.x[..])
+            + size_of_val(&self.crushed[..])
             + size_of_val(&self.changes[..])
             + size_of_val(&self.means[..])
             + size_of_val(&self.cluster_means[..])
@@ -100,7 +108,7 @@ impl<S: Real> RecoveredTets<S> {
             lanes::run(workers.instructions, VertexGradients { tables, x, groups, into: shared });
         });
         changes[part.copies.clone()].fill(S::ZERO);
-        let inverted = AtomicBool::new(false);
+        let [inverted, crushed] = [false; 2].map(AtomicBool::new);
         let pass = TetGradients {
             frames: &tables.frames,
             x,
@@ -108,12 +116,17 @@ impl<S: Real> RecoveredTets<S> {
             recovered: Shared::new(recovered),
             changes: Shared::new(changes),
             inverted: &inverted,
+            crushed: &crushed,
         };
         workers.each(part.pieces.len(), 1, |range| {
             for blocks in &part.pieces[range] {
                 workers.piece(layout, set, blocks.clone(), &pass);
             }
         });
+        self.crushed[number] = crushed.into_inner();
+        if self.crushed[number] {
+            self.x.copy_from_slice(&x[..layout.vertex_count()]);
+        }
         self.average(workers, tables, number);
         inverted.into_inner()
     }
@@ -136,7 +149,8 @@ impl<S: Real> RecoveredTets<S> {
     /// Elastic energy [J] of a part where [`Self::evaluate`] has left it.
     pub fn energy(&mut self, workers: &Workers, layout: &Layout<S>, number: usize) -> f64 {
         let Some(tables) = &layout.recovered else { return 0.0 };
-        let Self { recovered, gradients, means, partial, .. } = self;
+        let Self { recovered, gradients, means, partial, x, .. } = self;
+        let crushed = self.crushed[number].then_some(&x[..]);
         let part = &tables.parts[number];
         let set = set_of(layout);
         let (of_pieces, of_groups) = partial.split_at_mut(part.pieces.len());
@@ -146,7 +160,8 @@ impl<S: Real> RecoveredTets<S> {
             for i in range {
                 let mut energy = 0.0;
                 let blocks = part.pieces[i].clone();
-                let sum = TetEnergy { set, recovered, share: tables.shares[0], blocks, layout };
+                let share = tables.shares[0];
+                let sum = TetEnergy { set, recovered, crushed, share, blocks, layout };
                 lanes::run(workers.instructions, Summed { of: sum, into: &mut energy });
                 // SAFETY: every piece is worked on once.
                 unsafe { *shared.at(i) = energy };
@@ -177,7 +192,7 @@ impl<S: Real> RecoveredTets<S> {
         loads: &mut [Point<S>],
     ) {
         let Some(tables) = &layout.recovered else { return };
-        let Self { gradients, recovered, pressures, of_tets, stresses, strains, .. } = self;
+        let Self { gradients, recovered, pressures, of_tets, stresses, strains, x, .. } = self;
         let part = &tables.parts[number];
         let set = set_of(layout);
         assert!(loads.len() >= layout.copy_count());
@@ -186,6 +201,7 @@ impl<S: Real> RecoveredTets<S> {
         let pass = TetForces {
             frames: &tables.frames,
             recovered,
+            crushed: self.crushed[number].then_some(&x[..]),
             pressures,
             share: tables.shares[0],
             load,
@@ -210,6 +226,11 @@ impl<S: Real> RecoveredTets<S> {
             let pass = VertexForces { tables, layout, stresses, groups, loads };
             lanes::run(workers.instructions, pass);
         });
+    }
+
+    /// Where vertices are, if a tetrahedron of a part is below the volume floor.
+    pub(super) fn crushed_at(&self, number: usize) -> Option<&[Point<S>]> {
+        self.crushed[number].then_some(&self.x)
     }
 
     /// The Green strain of a part where [`Self::evaluate`] has left it in the place of another, of which a share of the
