@@ -15,8 +15,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
-use viscera::settings::{DeviceRequest, Method, Precision};
-use viscera::simulation::{Assembly, ExpectedErrors, Simulation};
+use viscera::settings::{DeviceRequest, Elements, Method, Precision};
+use viscera::simulation::{Assembly, ExpectedErrors, MeshReport, RestReport, Simulation};
 use viscera_resources::{BuiltInScene, Memory, MeshFiles, files, memory};
 
 /// Simulate a scene; write meshes, a picture, an animation and the numbers
@@ -167,11 +167,11 @@ fn simulate<S: Real>(
         Ok(()) => Some("interrupted".into()),
     };
     // What failed has no state to judge.
-    let rest = if ended.is_ok() { simulation.rest() } else { None };
+    let (rest, mesh) = if ended.is_ok() { judged(&simulation) } else { (None, None) };
     if let Some(file) = arguments.save.as_ref().filter(|_| ended.is_ok()) {
         files::write_atomic(file, &simulation.save())?;
     }
-    summary.judge(&simulation.scene_in_force(), rest);
+    summary.judge(&simulation, rest, mesh);
     summary.device = simulation.device_choice().to_owned();
     summary.warnings.extend(simulation.device_warning().map(String::from));
     // Numbers before meshes and pictures: those take a while, and may be what failed.
@@ -204,6 +204,14 @@ fn simulate<S: Real>(
         (false, _) => eprintln!("interrupted after {} of {frames} frames", simulation.frame()),
     }
     Ok(Outcome::Interrupted)
+}
+
+/// How far the end is from rest, and the mesh from the body.
+fn judged<S: Real>(simulation: &Simulation<S>) -> (Option<RestReport>, Option<MeshReport>) {
+    let spinner = progress::spinner("estimating the errors of the end and of the mesh".to_owned());
+    let found = (simulation.rest(), simulation.mesh_error());
+    spinner.finish_and_clear();
+    found
 }
 
 /// What is computed, and by what.
@@ -255,8 +263,13 @@ fn method_line<S: Real>(simulation: &Simulation<S>) -> String {
         None => "motion damped by an amount that is not foretold".to_owned(),
     };
     let at_rest = rounded(100.0 * at_rest);
+    let tetrahedra = match solver.elements {
+        Elements::Recovered => "recovered-gradient",
+        Elements::Auto | Elements::Plain => "linear, which bend too little where a mesh is coarse",
+    };
     format!(
-        "method: {}{how}; expected errors: {motion}, at rest within {at_rest} %\n",
+        "method: {}{how}; expected errors of the solver: {motion}, at rest within {at_rest} %\n\
+         tetrahedra: {tetrahedra}\n",
         solver.method
     )
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
-use viscera::simulation::{FrameReport, RestReport, Simulation, advice};
+use viscera::simulation::{FrameReport, MeshReport, RestReport, Simulation, advice};
 
 /// The numbers of one frame and what it took.
 #[derive(Serialize)]
@@ -49,8 +49,8 @@ pub struct Summary {
     pub overrides: BTreeMap<String, String>,
     /// What computed the steps, and why.
     pub device: String,
-    /// Solver settings, as a scene file would have them; automatic counts are the numbers they came to. `method` is the
-    /// one in force, `asked_method` what the scene has: "auto" chose by `accuracy`.
+    /// Solver settings, as a scene file would have them; automatic counts are the numbers they came to. `method` and
+    /// `elements` are those in force, `asked_method` and `asked_elements` what the scene has: "auto" chose.
     pub solver: BTreeMap<&'static str, serde_json::Value>,
     /// Material of each body and region.
     pub materials: BTreeMap<String, String>,
@@ -61,6 +61,8 @@ pub struct Summary {
     pub warnings: Vec<String>,
     /// How far the end is from the state of rest; nothing where the loads still change.
     pub rest: Option<RestReport>,
+    /// How far the mesh is from the body that it stands for; nothing of large meshes, and where nothing is held.
+    pub mesh: Option<MeshReport>,
     #[serde(flatten)]
     pub frames: Frames,
 }
@@ -143,14 +145,21 @@ impl Summary {
             notes: simulation.assembly().notes.clone(),
             warnings: Vec::new(),
             rest: None,
+            mesh: None,
             frames: Frames::default(),
         }
     }
 
     /// Looks for what a person must know before believing the result.
-    pub fn judge(&mut self, scene: &Scene, rest: Option<RestReport>) {
-        self.rest = rest;
-        self.warnings = warnings(&self.frames, scene, rest);
+    pub fn judge<S: Real>(
+        &mut self,
+        simulation: &Simulation<S>,
+        rest: Option<RestReport>,
+        mesh: Option<MeshReport>,
+    ) {
+        (self.rest, self.mesh) = (rest, mesh);
+        self.warnings = warnings(&self.frames, &simulation.scene_in_force(), rest);
+        self.warnings.extend(advice::plain_elements(simulation.scene()));
     }
 
     /// Wall time of all frames [s].
@@ -197,6 +206,9 @@ impl Summary {
                 1e3 * wall / last.report.frame as f64
             ));
         }
+        if let Some(mesh) = &self.mesh {
+            text.push_str(&format!("{mesh}\n"));
+        }
         text
     }
 }
@@ -220,6 +232,8 @@ fn solver_record<S: Real>(simulation: &Simulation<S>) -> BTreeMap<&'static str, 
     let mut record: BTreeMap<_, _> = values.map(|(key, text)| (key, json(text))).collect();
     record.insert("asked_method", simulation.scene().solver.method.to_string().into());
     record.insert("method", simulation.solver().method.to_string().into());
+    record.insert("asked_elements", simulation.scene().solver.elements.to_string().into());
+    record.insert("elements", simulation.solver().elements.to_string().into());
     record.insert("substeps", simulation.substeps().into());
     record.insert("iterations", simulation.iterations().into());
     record
@@ -249,7 +263,6 @@ fn warnings(frames: &Frames, scene: &Scene, rest: Option<RestReport>) -> Vec<Str
         Some(rest) => warnings.extend(rest.warning(scene, time)),
         None => warnings.extend(warning_in_motion(frames, scene)),
     }
-    warnings.extend(advice::plain_elements(scene));
     let left = frames.last().map_or(0, |frame| frame.report.deformation.inverted);
     if inverted > 0 {
         let what = if inverted == 1 { "tetrahedron was" } else { "tetrahedra were" };

@@ -13,6 +13,7 @@
 //! | write reports with tables and plots | [`viscera_report`] |
 
 pub mod bending;
+pub mod converge;
 pub mod forms;
 pub mod load_cases;
 pub mod motion;

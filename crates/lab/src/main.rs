@@ -5,6 +5,7 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use viscera_lab::converge::{self, ConvergeArguments};
 use viscera_lab::rest_command::{self, RestArguments};
 use viscera_lab::sections::{Changes, Options, Program};
 use viscera_lab::{study, validate};
@@ -24,7 +25,8 @@ Examples:
   viscera-lab validate --quick
   viscera-lab validate --list
   viscera-lab study
-  viscera-lab rest scenes/cantilever.toml --compare";
+  viscera-lab rest scenes/cantilever.toml --compare
+  viscera-lab converge scenes/cantilever.toml";
 
 #[derive(Subcommand)]
 enum Command {
@@ -34,6 +36,8 @@ enum Command {
     Study(StudyArguments),
     /// Find the exact state of rest at the end of a scene with the Newton reference
     Rest(RestArguments),
+    /// Show how a scene's state of rest depends on its mesh, and what the body itself would do
+    Converge(ConvergeArguments),
     // For `cargo xtask peers`, not for a person.
     #[command(hide = true)]
     Organs {
@@ -119,6 +123,7 @@ fn main() -> ExitCode {
         Command::Validate(arguments) => validate(arguments),
         Command::Study(arguments) => study(arguments),
         Command::Rest(arguments) => rest_command::run(&arguments, &print),
+        Command::Converge(arguments) => converge::run(&arguments, &print),
         Command::Organs { out } => prepare_folder(&out, "--out")
             .and_then(|()| validate::write_organs(&out))
             .and_then(|files| {

@@ -79,7 +79,7 @@ pub fn kept(settings: &SolverSettings) -> f64 {
     if settings.method == Method::Explicit {
         kept += PIECES;
     }
-    if settings.elements == Elements::Recovered {
+    if settings.foreseen().of_solver().elements == Elements::Recovered {
         kept += RECOVERED;
     }
     if settings.acceleration != Acceleration::None {

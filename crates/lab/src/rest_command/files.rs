@@ -9,6 +9,14 @@ use viscera_resources::{MeshFiles, files};
 /// Reads a scene with settings (`KEY=VALUE`) laid over it, and puts it together with its meshes:
 /// those beside the scene, then those in the data folder.
 pub fn load(path: &Path, settings: &[String], data: Option<&Path>) -> Result<(Scene, Assembly)> {
+    let scene = read_scene(path, settings)?;
+    let meshes = MeshFiles::new(path, data);
+    let assembly = Assembly::new(&scene, &mut |name| meshes.load(name))?;
+    Ok((scene, assembly))
+}
+
+/// Reads a scene with settings (`KEY=VALUE`) laid over it.
+pub fn read_scene(path: &Path, settings: &[String]) -> Result<Scene> {
     let name = path.display().to_string();
     let Ok(text) = String::from_utf8(files::read(path)?) else {
         bail!("{name} is not a text file; a scene is TOML in UTF-8");
@@ -20,8 +28,5 @@ pub fn load(path: &Path, settings: &[String], data: Option<&Path>) -> Result<(Sc
         };
         overrides.push((key.trim(), value.trim()));
     }
-    let scene = Scene::parse(&name, &text, &overrides)?;
-    let meshes = MeshFiles::new(path, data);
-    let assembly = Assembly::new(&scene, &mut |name| meshes.load(name))?;
-    Ok((scene, assembly))
+    Ok(Scene::parse(&name, &text, &overrides)?)
 }

@@ -9,9 +9,11 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use viscera::measure::{TetMeasure, measure_displacements, measure_tets, summarize_deformation};
 use viscera::mesh::io::vtu::{self, Array};
+use viscera::scene::Scene;
 use viscera::simulation::Simulation;
 
 use crate::sections::Progress;
+pub use files::read_scene;
 use path::{LoadPath, Rest};
 use viscera_report::{percent, scientific, si};
 use viscera_resources::Memory;
@@ -69,25 +71,7 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
     }
     let (scene, assembly) =
         files::load(&arguments.scene, &arguments.settings, arguments.data.as_deref())?;
-    // Where tissue was when it was taken hold of is a matter of its motion.
-    let taken = scene.motions.iter().find(|motion| motion.start > 0.0);
-    if let Some(motion) = taken {
-        bail!(
-            "{}: motion `{}` takes hold of moving tissue at {} s, which a state of rest does not determine; let it start \
-             at 0 s",
-            scene.name,
-            motion.name,
-            motion.start
-        );
-    }
-    if let Some(change) = scene.changes.first() {
-        bail!(
-            "{}: settings change at {} s; write those of the end where the bodies and the solver are, and \
-             leave [[change]] out",
-            scene.name,
-            change.time
-        );
-    }
+    refuse_what_rest_does_not_determine(&scene)?;
     let simulation = Simulation::<f64>::new(scene, assembly)?;
     let mut path = LoadPath::new(&simulation, arguments.parts, arguments.memory)?;
     for note in &simulation.assembly().notes {
@@ -136,6 +120,30 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
         let rows = comparison::compare(&simulation, &rest, &settled?, arguments.memory)?;
         print(&format!("the library's solver after {frames} frames, against the reference:\n"))?;
         print(&lines(&rows))?;
+    }
+    Ok(())
+}
+
+/// Refuses scenes whose end depends on more than what acts there.
+pub fn refuse_what_rest_does_not_determine(scene: &Scene) -> Result<()> {
+    // Where tissue was when it was taken hold of is a matter of its motion.
+    let taken = scene.motions.iter().find(|motion| motion.start > 0.0);
+    if let Some(motion) = taken {
+        bail!(
+            "{}: motion `{}` takes hold of moving tissue at {} s, which a state of rest does not determine; let it start \
+             at 0 s",
+            scene.name,
+            motion.name,
+            motion.start
+        );
+    }
+    if let Some(change) = scene.changes.first() {
+        bail!(
+            "{}: settings change at {} s; write those of the end where the bodies and the solver are, and \
+             leave [[change]] out",
+            scene.name,
+            change.time
+        );
     }
     Ok(())
 }

@@ -86,8 +86,7 @@ const fn known_settings(
         ("solver.acceleration", acceleration),
         ("solver.rebase", exact),
         ("solver.keep_multipliers", exact),
-        // Most of them have linear ones only.
-        ("solver.elements", "plain"),
+        ("solver.elements", "auto"),
     ]
 }
 
@@ -131,11 +130,13 @@ fn method(ui: &mut Ui, asked: Method, solver: &SolverSettings, chooser: &mut Cho
         let row = Row::new("solver.accuracy", "accuracy", help);
         chooser.menu(ui, &row, value.trim_matches('"'), &names);
     }
-    if matches!(asked, Method::Auto | Method::Explicit) && solver.method != Method::Xpbd {
+    if solver.method != Method::Xpbd {
         let help = "Linear tetrahedra bend too little where the mesh is coarse. Recovered-gradient ones also see how their \
-                    neighbours are deformed; explicit steps have them, which automatic then is.";
-        let names = [("plain", "linear"), ("recovered", "recovered-gradient")];
+                    neighbours are deformed. Automatic takes these, except on a device that is named.";
+        let names =
+            [("auto", "automatic"), ("recovered", "recovered-gradient"), ("plain", "linear")];
         let value = match solver.elements {
+            Elements::Auto => "auto",
             Elements::Plain => "plain",
             Elements::Recovered => "recovered",
         };

@@ -9,6 +9,7 @@ mod error;
 mod inspect;
 pub mod io;
 pub mod quality;
+pub mod refine;
 pub mod topology;
 
 pub use corners::{edge_matrix, tet_volume};

@@ -67,14 +67,20 @@ pub fn count_folded_faces(mesh: &TetMesh) -> usize {
 
 /// Every edge once, as ascending vertices, in ascending order.
 pub fn edges(mesh: &TetMesh) -> Vec<[u32; 2]> {
-    let mut edges: Vec<[u32; 2]> = mesh
-        .tets()
-        .iter()
-        .flat_map(|tet| TET_EDGES.map(|[a, b]| [tet[a].min(tet[b]), tet[a].max(tet[b])]))
-        .collect();
+    edges_of(mesh.tets())
+}
+
+/// The same of tetrahedra that are no mesh of their own.
+pub fn edges_of(tets: &[[u32; 4]]) -> Vec<[u32; 2]> {
+    let mut edges: Vec<[u32; 2]> = tets.iter().flat_map(ends_of).collect();
     edges.sort_unstable();
     edges.dedup();
     edges
+}
+
+/// The six edges of a tetrahedron in the order of [`TET_EDGES`], each with its ends ascending.
+pub fn ends_of(tet: &[u32; 4]) -> [[u32; 2]; 6] {
+    TET_EDGES.map(|[a, b]| [tet[a].min(tet[b]), tet[a].max(tet[b])])
 }
 
 /// Counts the edges of a surface that do not have exactly two triangles.

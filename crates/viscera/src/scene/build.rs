@@ -225,7 +225,7 @@ fn build_body(table: &Placed<BodyTable>) -> Result<Body, SceneError> {
         problem,
     })?;
     let placement = RigidTransform::about(Vec3::ZERO, rotation, body.position);
-    Ok(Body { name, shape, placement, material, regions })
+    Ok(Body { name, shape, refine: body.refine, placement, material, regions })
 }
 
 /// Numbers that are written win over the preset's, those over the body's, those over defaults.

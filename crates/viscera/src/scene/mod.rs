@@ -101,6 +101,8 @@ pub struct Body {
     pub name: String,
     /// Where its mesh comes from.
     pub shape: BodyShape,
+    /// How often every tetrahedron is divided into eight.
+    pub refine: u32,
     /// From the mesh's frame to the world.
     pub placement: RigidTransform,
     /// Its material, where no region says otherwise.

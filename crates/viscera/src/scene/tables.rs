@@ -150,6 +150,9 @@ settings_table! {
         /// Distance of the lattice points that a sphere, capsule or liver is filled with. Where
         /// unset, a quarter of the radius, or 18.6 mm times the scale for a liver.
         spacing: Option<f64> = None, optional(quantity(Dimension::Length, SIZE));
+        /// How often every tetrahedron is divided into eight: 1 halves the length of edges. Patches are those of the undivided mesh,
+        /// with the middles of edges between two of their vertices.
+        refine: u32 = 0, whole(0, 3);
         /// Size of a mesh or a liver relative to the file or to the standard liver; 1 where unset.
         scale: Option<f64> = None, optional(number(at_least(1e-3).up_to(1e3)));
         /// Where the body's origin is put.

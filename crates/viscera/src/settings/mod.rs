@@ -7,6 +7,7 @@
 
 mod accuracy;
 mod compound;
+mod device;
 mod elements;
 mod foreseen;
 mod kind;
@@ -14,11 +15,11 @@ mod solver;
 mod tree;
 
 pub use accuracy::{Accuracy, FINEST, ROUGHEST};
+pub use device::DeviceRequest;
 pub use elements::Elements;
 pub use solver::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, Count, DeviceRequest, Integrator,
-    MOST_HISTORY, MOST_THREADS, Method, NeoHookean, Precision, RelaxationForm, SolverSettings,
-    Start, Threads,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, Integrator, MOST_HISTORY, MOST_THREADS,
+    Method, NeoHookean, Precision, RelaxationForm, SolverSettings, Start, Threads,
 };
 pub use tree::Place;
 

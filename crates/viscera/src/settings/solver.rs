@@ -1,10 +1,11 @@
 //! The solver's settings.
 
 use super::accuracy::{Accuracies, Accuracy};
+use super::device::{DeviceNames, DeviceRequest};
 use super::elements::Elements;
 use super::{
     Kind, Node, SettingError, Table, Value, ValueError, Whole, at_least, choices, number, one_of,
-    settings_table, truth, value_error, whole, wrong_type,
+    settings_table, truth, value_error, whole,
 };
 
 choices! {
@@ -49,19 +50,6 @@ pub const MOST_THREADS: u32 = 1024;
 
 /// The most pairs that the quasi-Newton method keeps.
 pub const MOST_HISTORY: usize = 10;
-
-/// The device that computes a simulation's steps.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum DeviceRequest {
-    /// The device that is expected to be faster; the CPU where no GPU can do it.
-    Auto,
-    /// The processor.
-    Cpu,
-    /// The first graphics adapter; without one nothing is computed.
-    Gpu,
-    /// The first adapter whose name contains this text, whatever its case.
-    Named(String),
-}
 
 choices! {
     /// How positions and velocities are advanced.
@@ -181,10 +169,11 @@ settings_table! {
         /// The error of motion that "auto" and "quasi_newton" choose substeps and passes for, as a share of the displacement, over
         /// half a second: "draft" for 0.15, "standard" for 0.05, "fine" for 0.005, or a number. Rest does not depend on it.
         accuracy: Accuracy = (Accuracy::Standard), Accuracies;
-        /// What tetrahedra of stable neo-Hookean tissue are. "plain": linear ones, with which coarse meshes bend too little, four cells
-        /// across by 16 % at a Poisson's ratio of 0.3, by half at 0.49. "recovered": on the same vertices, each also sees how its
+        /// What tetrahedra of stable neo-Hookean tissue are. "recovered": on the same vertices, each also sees how its
         /// neighbours are deformed; coarse meshes bend as fine ones do. "quasi_newton" and "explicit" have them, on the CPU.
-        elements: Elements = (Elements::Plain), one_of::<Elements>();
+        /// "plain": linear ones, with which coarse meshes bend too little, four cells across by 16 % at a Poisson's ratio
+        /// of 0.3, by half at 0.49; a step costs a third. "auto": "recovered" where method and device have it, otherwise "plain".
+        elements: Elements = (Elements::Auto), one_of::<Elements>();
         /// The share of the largest stable step of the body at rest that "explicit" takes. On the CPU smaller ones are taken
         /// by themselves where tissue stiffens under strong deformation; a device, which keeps to it, takes half of the
         /// stable step at most: lower this where a run diverges there. "auto" takes smaller ones where `accuracy` asks for them.
@@ -308,9 +297,10 @@ const SHORT_STEPS: AutomaticCounts = AutomaticCounts { substeps: 10, iterations:
 const LONG_STEPS: AutomaticCounts = AutomaticCounts { substeps: 1, iterations: 8 };
 
 impl SolverSettings {
-    /// The defaults of the published method and what became of it.
+    /// The defaults of the published method and what became of it, on linear tetrahedra: another method put in its place has
+    /// these as well, so that the two can be compared.
     pub fn xpbd() -> Self {
-        Self { method: Method::Xpbd, ..Self::default() }
+        Self { method: Method::Xpbd, elements: Elements::Plain, ..Self::default() }
     }
 
     /// For a solver that has nothing but a model to choose by: "auto" is the quasi-Newton method.
@@ -318,10 +308,23 @@ impl SolverSettings {
         self.chosen(Method::QuasiNewton)
     }
 
-    /// With this method in the place of "auto".
+    /// With this method in the place of "auto", and the elements that it has.
     pub(crate) fn chosen(&self, method: Method) -> Self {
         let method = if self.method == Method::Auto { method } else { self.method };
-        Self { method, ..self.clone() }
+        let is_on_device = matches!(self.device, DeviceRequest::Gpu | DeviceRequest::Named(_));
+        let elements = match self.elements {
+            Elements::Auto if method == Method::Xpbd || is_on_device => Elements::Plain,
+            Elements::Auto => Elements::Recovered,
+            asked => asked,
+        };
+        Self { method, elements, ..self.clone() }
+    }
+
+    /// As [`SolverSettings::chosen`], where a device computes, whatever its name.
+    pub(crate) fn chosen_on_device(&self) -> Self {
+        let is_open = self.elements == Elements::Auto;
+        let elements = if is_open { Elements::Plain } else { self.elements };
+        Self { elements, ..self.clone() }.chosen(Method::Xpbd)
     }
 
     /// Keys with a value of their own that only "xpbd" uses, where the method is another one.
@@ -450,50 +453,5 @@ impl<T> Kind for CountOr<T> {
 
     fn range_text(&self) -> String {
         self.limits.range_text()
-    }
-}
-
-/// Reads what computes the steps.
-struct DeviceNames;
-
-impl Kind for DeviceNames {
-    type Value = DeviceRequest;
-
-    fn read(&self, key: &str, node: &Node) -> Result<DeviceRequest, SettingError> {
-        let Value::Text(text) = &node.value else { return Err(wrong_type(self, key, node)) };
-        // No adapter has these letters, and without them a name is recorded as it was written.
-        let is_strange = |letter: char| letter.is_control() || "\"\\".contains(letter);
-        if text.trim().is_empty() || text.contains(is_strange) {
-            return Err(value_error(key, node, ValueError::Range { range: self.range_text() }));
-        }
-        Ok(match text.as_str() {
-            "auto" => DeviceRequest::Auto,
-            "cpu" => DeviceRequest::Cpu,
-            "gpu" => DeviceRequest::Gpu,
-            name => DeviceRequest::Named(name.to_owned()),
-        })
-    }
-
-    fn type_text(&self) -> String {
-        "\"auto\", \"cpu\", \"gpu\" or part of an adapter's name".to_owned()
-    }
-
-    fn value_text(&self, value: &DeviceRequest) -> String {
-        format!("\"{value}\"")
-    }
-
-    fn range_text(&self) -> String {
-        "a name without quotes and backslashes".to_owned()
-    }
-}
-
-impl std::fmt::Display for DeviceRequest {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Auto => "auto",
-            Self::Cpu => "cpu",
-            Self::Gpu => "gpu",
-            Self::Named(name) => name,
-        })
     }
 }

@@ -69,7 +69,7 @@ fn has(body: &Body, law: MaterialModel) -> bool {
     regions.chain([&body.material]).any(|material| material.model() == law)
 }
 
-/// What is left of linear tetrahedra where recovered-gradient ones are asked for.
+/// What is left of linear tetrahedra where a scene asks for recovered-gradient ones.
 pub fn plain_elements(scene: &Scene) -> Option<String> {
     let law = MaterialModel::SaintVenantKirchhoff;
     let is_asked = scene.solver.elements == Elements::Recovered;

@@ -2,12 +2,16 @@
 
 use crate::mesh::embed::{Embedding, EmbeddingError};
 use crate::mesh::io::{self, ReadError, ReadReport};
+use crate::mesh::refine::{self, Middles};
 use crate::mesh::shapes::{self, ShapeError};
 use crate::mesh::topology::{boundary_surface, connected_components};
 use crate::mesh::{MeshError, SurfaceMesh, TetMesh};
 use crate::model::{ModelBuilder, ModelError};
 use crate::scalar::Vec3;
 use crate::scene::{Body, BodyShape, Scene, SceneError, nearest_pair};
+
+/// Tetrahedra that refinement makes at most: some gigabytes. Finer meshes are read from files.
+const MOST_REFINED: usize = 10_000_000;
 
 /// Why a scene cannot be put together.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -37,6 +41,20 @@ pub enum AssembleError {
         body: String,
         /// Why not.
         error: MeshError,
+    },
+    /// A refinement with more tetrahedra than a machine has memory for.
+    #[error(
+        "body `{body}`: `refine = {refine}` makes {count} tetrahedra of {before}, more than {MOST_REFINED}; lower it"
+    )]
+    TooFine {
+        /// The body.
+        body: String,
+        /// How often it was to be refined.
+        refine: u32,
+        /// Tetrahedra before.
+        before: usize,
+        /// And after.
+        count: usize,
     },
     /// A surface that cannot be bound to its tetrahedra.
     #[error("body `{body}`: {error}")]
@@ -70,6 +88,15 @@ pub enum AssembleError {
     Model(#[from] ModelError),
 }
 
+/// A mesh before it was refined.
+#[derive(Clone, Debug)]
+pub struct Refinement {
+    /// The mesh that patches are chosen on.
+    pub coarse: TetMesh,
+    /// What each refinement has added.
+    pub middles: Vec<Middles>,
+}
+
 /// One body in the world.
 #[derive(Clone, Debug)]
 pub struct AssembledBody {
@@ -77,6 +104,8 @@ pub struct AssembledBody {
     pub name: String,
     /// Its tetrahedra at rest, world coordinates.
     pub mesh: TetMesh,
+    /// What `mesh` was refined from, where the scene asks for that.
+    pub refinement: Option<Refinement>,
     /// The surface to show, at rest.
     pub surface: SurfaceMesh,
     /// Binds the surface to the tetrahedra.
@@ -183,6 +212,7 @@ impl Assembly {
         let (mesh, _) =
             placed.map_err(|error| AssembleError::Placement { body: body.name.clone(), error })?;
         self.note_report(&body.name, &report);
+        let (mesh, refinement) = refined(body, mesh)?;
         let has_fine_surface = surface.is_some();
         let surface = match surface {
             Some(surface) => SurfaceMesh { vertices: place(&surface.vertices), ..surface },
@@ -219,6 +249,7 @@ impl Assembly {
         self.bodies.push(AssembledBody {
             name: body.name.clone(),
             mesh,
+            refinement,
             surface,
             embedding,
             has_fine_surface,
@@ -234,8 +265,11 @@ impl Assembly {
         patch: &crate::scene::Patch,
     ) -> Result<ResolvedPatch, AssembleError> {
         let body = &self.bodies[patch.body];
-        let mesh = &body.mesh;
-        let local = patch.select(mesh.vertices(), mesh.tets(), mesh.regions())?;
+        let mesh = body.refinement.as_ref().map_or(&body.mesh, |from| &from.coarse);
+        let mut local = patch.select(mesh.vertices(), mesh.tets(), mesh.regions())?;
+        for middles in body.refinement.iter().flat_map(|from| &from.middles) {
+            local = middles.patch(&local);
+        }
         let first = body.vertices.start as u32;
         let vertices = local.into_iter().map(|v| v + first).collect();
         Ok(ResolvedPatch { vertices, attachments: Vec::new() })
@@ -332,6 +366,27 @@ impl Assembly {
             }
         }
     }
+}
+
+/// The mesh of a body as fine as it is asked for, and what it comes from.
+fn refined(body: &Body, mesh: TetMesh) -> Result<(TetMesh, Option<Refinement>), AssembleError> {
+    let (refine, before) = (body.refine, mesh.tets().len());
+    if refine == 0 {
+        return Ok((mesh, None));
+    }
+    let count = before.saturating_mul(8usize.saturating_pow(refine));
+    let name = || body.name.clone();
+    if count > MOST_REFINED {
+        return Err(AssembleError::TooFine { body: name(), refine, before, count });
+    }
+    let (mut fine, mut all) = (mesh.clone(), Vec::new());
+    for _ in 0..refine {
+        let (finer, middles) = refine::refine(&fine)
+            .map_err(|error| AssembleError::Placement { body: name(), error })?;
+        all.push(middles);
+        fine = finer;
+    }
+    Ok((fine, Some(Refinement { coarse: mesh, middles: all })))
 }
 
 /// A body's tetrahedra, its fine surface where it has one, and what reading said; before placing.

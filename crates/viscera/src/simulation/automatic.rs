@@ -78,7 +78,7 @@ pub fn choose_method<S: Real>(
     on_device: bool,
 ) -> Chosen<S> {
     if on_device {
-        return Chosen::without_solver(scene.solver.chosen(Method::Xpbd));
+        return Chosen::without_solver(scene.solver.chosen_on_device());
     }
     choose_by_cost(&scene.solver, model, scene.time.frame, || fixings(scene, assembly))
 }
@@ -112,7 +112,7 @@ fn choose_by_cost<S: Real>(
     let substeps = quasi_newton.substeps_for(&oscillations, frame);
     let of_large = cost(&large, model, frame, substeps, f64::INFINITY);
     // A large mesh would take memory and seconds for what is known without.
-    if fewest_small_steps(model, asked.elements, frame) > of_large {
+    if fewest_small_steps(model, large.elements, frame) > of_large {
         return Chosen::with_solver(quasi_newton, oscillations);
     }
     let explicit = explicit_solver(asked, model, &oscillations);
@@ -130,10 +130,8 @@ fn fewest_small_steps<S: Real>(model: &Model<S>, elements: Elements, frame: f64)
     for tet in model.tets() {
         let material = &model.materials[tet.material as usize];
         let (lambda, mu) = (material.lame_lambda.to_f64(), material.lame_mu.to_f64());
-        let stiffness = match elements {
-            Elements::Plain => lambda + 4.0 * mu,
-            Elements::Recovered => LEAST_SHEAR * 4.0 * mu,
-        };
+        let is_recovered = elements == Elements::Recovered;
+        let stiffness = if is_recovered { LEAST_SHEAR * 4.0 * mu } else { lambda + 4.0 * mu };
         let gradients = shape_gradients(&tet.inverse_rest_shape.cast::<f64>());
         for (v, g) in tet.vertices.into_iter().zip(gradients) {
             traces[v as usize] += tet.rest_volume.to_f64() * stiffness * g.length_squared();
@@ -199,10 +197,9 @@ pub fn cost<S: Real>(
         Method::Auto | Method::QuasiNewton => {
             let solves = if settings.integrator == Integrator::Sdirk2 { 2.0 } else { 1.0 };
             let passes = f64::from(choose(settings, &model.materials).passes);
-            let pass = match settings.elements {
-                Elements::Plain => PASS_OVER_SMALL_STEP,
-                Elements::Recovered => PASS_OVER_SMALL_STEP_RECOVERED,
-            };
+            let is_recovered = settings.elements == Elements::Recovered;
+            let pass =
+                if is_recovered { PASS_OVER_SMALL_STEP_RECOVERED } else { PASS_OVER_SMALL_STEP };
             pass * (solves * passes + BESIDES)
         }
         Method::Xpbd => f64::NAN,

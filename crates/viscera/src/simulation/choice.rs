@@ -52,7 +52,7 @@ impl<S: Real> Backend<S> {
         #[cfg(feature = "gpu")]
         if same_device
             && settings.method != Method::QuasiNewton
-            && settings.elements == Elements::Plain
+            && settings.elements != Elements::Recovered
             && let Some(again) = gpu::again(self, model, settings)
         {
             return match again {

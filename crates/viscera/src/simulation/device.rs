@@ -177,13 +177,13 @@ impl<S: Real> Backend<S> {
 
     /// The force balance of the last step.
     pub fn force_balance(
-        &self,
+        &mut self,
         model: &Model<S>,
         state: &State<S>,
         inputs: &Inputs<S>,
         balance: &mut ForceBalance,
     ) -> Result<(), FrameError> {
-        match &self.engine {
+        match &mut self.engine {
             Engine::Cpu(solver) => Ok(solver.force_balance(model, state, inputs, balance)?),
             Engine::Device(device) => device.force_balance(model, state, inputs, balance),
         }

@@ -16,13 +16,13 @@ mod on_device;
 mod rest;
 mod saved;
 
-pub use assemble::{AssembleError, AssembledBody, Assembly, ResolvedPatch};
+pub use assemble::{AssembleError, AssembledBody, Assembly, Refinement, ResolvedPatch};
 pub use automatic::{ExpectedErrors, automatic_settings};
 pub use error::{FrameError, LiveError, SimulationError};
 pub use forces::Hold;
 use holding::GraspOrigins;
 pub use live::Live;
-pub use rest::{RestReport, Standing};
+pub use rest::{MESH_ERROR_TETS, MeshReport, RestReport, Standing};
 pub use saved::ResumeError;
 
 use crate::layout::Layout;

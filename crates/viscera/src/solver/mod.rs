@@ -307,7 +307,7 @@ impl<S: Real> Solver<S> {
     /// The force balance at the end of the last step, see [`balance::ForceBalance`]. `inputs` are
     /// those of that step.
     pub fn force_balance(
-        &self,
+        &mut self,
         model: &Model<S>,
         state: &State<S>,
         inputs: &Inputs<S>,
@@ -316,7 +316,7 @@ impl<S: Real> Solver<S> {
         check_model(&self.layout, model)?;
         check_state(&self.layout, state)?;
         check_inputs(&self.layout, inputs)?;
-        balance.measure(&self.layout, state, inputs, &self.memory.data.constants.end_of_step());
+        balance.measure(&self.layout, state, inputs, &mut self.memory.data.end_of_step());
         Ok(())
     }
 }

@@ -15,7 +15,7 @@ velocity_factor = 0.7
 method = "quasi_newton"
 precision = "f64"
 substeps = 2
-iterations = 8
+iterations = 20
 [[body]]
 name = "bar"
 shape = "beam"
@@ -24,7 +24,7 @@ width = "20 mm"
 height = "20 mm"
 cells_across = 2
 position = ["0.3 m", "-0.2 m", "0.5 m"]
-material = {{ young = "20 kPa", poisson = 0.4 }}
+material = {{ young = "200 kPa", poisson = 0.4 }}
 [[fixing]]
 name = "wall"
 body = "bar"

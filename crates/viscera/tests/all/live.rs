@@ -3,7 +3,7 @@
 use crate::common::device;
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::scene::{Patch, Scene, Selector};
-use viscera::settings::{Place, SolverSettings};
+use viscera::settings::{Method, Place, SolverSettings};
 use viscera::simulation::{Assembly, LiveError, PatchKind, Simulation, SimulationError};
 
 const BAR: &str = r#"
@@ -239,7 +239,8 @@ fn counts_go_back_to_automatic_ones() {
         changed
     };
     let automatic = there_and_back("\"auto\"", "auto");
-    assert_eq!(automatic.scene().solver, SolverSettings::xpbd());
+    let method = Method::Xpbd;
+    assert_eq!(automatic.scene().solver, SolverSettings { method, ..SolverSettings::default() });
     let numbers = there_and_back("2", "10");
     assert_eq!(automatic.state().positions, numbers.state().positions);
 }

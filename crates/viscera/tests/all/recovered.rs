@@ -155,7 +155,7 @@ fn settled<S: Real>(method: Method) -> (Model<S>, State<S>, Inputs<S>, Solver<S>
 #[test]
 fn what_is_at_rest_is_known_to_be() {
     for method in METHODS {
-        let (model, state, inputs, solver) = settled::<f64>(method);
+        let (model, state, inputs, mut solver) = settled::<f64>(method);
         let mut balance = ForceBalance::default();
         solver.force_balance(&model, &state, &inputs, &mut balance).expect("a balance");
         let residual = balance.relative_residual();

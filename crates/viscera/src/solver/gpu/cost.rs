@@ -8,7 +8,7 @@
 use super::layout::Pieces;
 use super::record::Recorder;
 use crate::layout::Layout;
-use crate::settings::{Method, SolverSettings};
+use crate::settings::SolverSettings;
 use crate::solver::plan::Plan;
 
 /// A tetrahedron's share of a sweep on the CPU [s]: between 27 ns without and 57 ns with rebase and
@@ -38,7 +38,7 @@ pub struct StepCost {
 impl StepCost {
     /// Of a model that is solved in this way, with so many sweeps.
     pub fn new(layout: &Layout<f32>, settings: &SolverSettings, sweeps: u32) -> Self {
-        let settings = &settings.chosen(Method::Xpbd);
+        let settings = &settings.chosen_on_device();
         // How many dispatches there are does not depend on the length of the long vector.
         let plan = Plan::new(layout, settings);
         let pieces = Pieces { count: 1, first_of_vertices: 0, groups: 1 };

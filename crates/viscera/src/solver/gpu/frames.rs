@@ -176,23 +176,23 @@ impl GpuSolver {
                 load_tethers(&self.tethers, &mut places, self.multiplier_dt, mass, place);
             }
             let mut strains: &[Eight<f32>] = read.get(3).map_or(&[], |s| bytemuck::cast_slice(s));
-            let start_strain = model.tet_sets.each_ref().map(|set| {
+            let mut start_strain = model.tet_sets.each_ref().map(|set| {
                 // The device has room for all blocks, measures ask for those of viscous sets.
                 let blocks = if strains.is_empty() { 0 } else { set.block_count() };
                 let (of_set, rest) = strains.split_at(6 * blocks);
                 strains = rest;
                 if set.viscous { of_set.as_chunks::<6>().0.to_vec() } else { Vec::new() }
             });
-            let end = EndOfStep {
+            let mut end = EndOfStep {
                 previous: &before,
                 predicted: &places,
                 inertias: &fourth(predicted),
                 inverse_masses: &fourth(acting),
                 tethers: &self.tethers,
-                start_strain: &start_strain,
+                start_strain: &mut start_strain,
                 recovered: None,
             };
-            balance.measure(model, state, inputs, &end);
+            balance.measure(model, state, inputs, &mut end);
         })?;
         Ok(())
     }

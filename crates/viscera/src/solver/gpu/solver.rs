@@ -85,7 +85,7 @@ impl GpuSolver {
         model: &Model<f32>,
         settings: &SolverSettings,
     ) -> Result<Self, GpuError> {
-        Self::with_memory(device, model, &settings.chosen(Method::Xpbd), &[])
+        Self::with_memory(device, model, &settings.chosen_on_device(), &[])
     }
 
     /// As [`GpuSolver::new`], with memory that held something before, for a test that nothing of it is
@@ -97,7 +97,7 @@ impl GpuSolver {
         settings: &SolverSettings,
         left_over: f32,
     ) -> Result<Self, GpuError> {
-        let settings = &settings.chosen(Method::Xpbd);
+        let settings = &settings.chosen_on_device();
         Self::with_memory(device, model, settings, &left_over.to_ne_bytes())
     }
 
@@ -213,7 +213,7 @@ impl GpuSolver {
     /// The same of a solver that is not built, and needs no device: how many passes over the mesh, one after
     /// the other, an iteration is.
     pub fn dispatches_of(model: &Model<f32>, settings: &SolverSettings) -> [usize; 3] {
-        let settings = &settings.chosen(Method::Xpbd);
+        let settings = &settings.chosen_on_device();
         let laid = Layout::new(model, settings);
         let model = &laid;
         let plan = Plan::new(model, settings);

@@ -7,7 +7,7 @@
 //! `f` are the forces of all elements. On free vertices `r` is the solver's error as a force
 //! [N]; on pinned ones it is what holds them: the force of the fixing or the tool on the tissue.
 
-use super::data::{EndOfStep, gather};
+use super::data::{EndOfStep, OfRecovered, gather};
 use super::recovered::Load;
 use super::strain::is_recovered;
 use super::tissue::Tissue;
@@ -19,7 +19,7 @@ use crate::material::MaterialModel;
 use crate::model::for_each_kind;
 use crate::scalar::lanes::{Eight, Instructions, Kernel, LANES, Lanes, Point, run};
 use crate::scalar::{Mat3, Real, Scalar, Vec3, vec3};
-use crate::solver::cpu::threads::{Shared, Workers};
+use crate::solver::cpu::threads::Shared;
 use crate::solver::inputs::Inputs;
 use crate::state::State;
 
@@ -96,28 +96,26 @@ impl ForceBalance {
         &mut self,
         layout: &Layout<S>,
         state: &State<S>,
-        step: &EndOfStep<'_, S>,
+        step: &mut EndOfStep<'_, S>,
     ) {
-        let Some(mut tets) = step.recovered.cloned() else { return };
+        let EndOfStep { recovered: Some(recovered), start_strain, .. } = step else { return };
+        let OfRecovered { workers, tets, points, loads } = recovered;
         let law = MaterialModel::StableNeoHookean as usize;
-        let mut strains = step.start_strain[law].clone();
         let rate = S::from_f64(1.0 / state.multiplier_dt);
         let is_viscous = layout.tet_sets[law].viscous;
-        let viscous = is_viscous.then(|| (Shared::new(&mut strains), rate));
+        let viscous = is_viscous.then(|| (Shared::new(&mut start_strain[law]), rate));
         let load = Load { scale: S::ONE, viscous, goes_on: false, at_rest: None };
-        let mut points = vec![Point::default(); layout.vertex_count()];
         for (point, &user) in points.iter_mut().zip(&layout.numbering.order) {
             point.set_vec3(state.positions[user as usize]);
         }
-        let mut forces = vec![Point::default(); layout.copy_count()];
-        let workers = Workers::one();
+        loads.fill(Point::default());
         for part in 0..layout.part_count() {
-            tets.evaluate(&workers, layout, part, &points);
-            self.elastic_energy += tets.energy(&workers, layout, part);
-            tets.add_forces(&workers, layout, part, &load, &mut forces);
+            tets.evaluate(workers, layout, part, points);
+            self.elastic_energy += tets.energy(workers, layout, part);
+            tets.add_forces(workers, layout, part, &load, loads);
         }
         for (place, &user) in layout.numbering.order.iter().enumerate() {
-            let force = gather(layout, &forces, place).vec3();
+            let force = gather(layout, loads, place).vec3();
             self.residual[user as usize] -= force.cast::<f64>();
         }
     }
@@ -127,7 +125,7 @@ impl ForceBalance {
         layout: &Layout<S>,
         state: &State<S>,
         inputs: &Inputs<S>,
-        step: &EndOfStep<'_, S>,
+        step: &mut EndOfStep<'_, S>,
     ) {
         let dt = state.multiplier_dt;
         *self = Self { residual: std::mem::take(&mut self.residual), ..Self::default() };
@@ -136,7 +134,7 @@ impl ForceBalance {
         if dt <= 0.0 {
             return;
         }
-        for (set, strains) in layout.tet_sets.iter().zip(step.start_strain) {
+        for (set, strains) in layout.tet_sets.iter().zip(&*step.start_strain) {
             let tets = Tets { layout, set, positions: &state.positions, strains, dt };
             let only_floors = is_recovered(layout, set);
             run(Instructions::detect(), OfTets { tets, balance: self, only_floors });

@@ -53,7 +53,6 @@ pub struct StepConstants<S> {
 
 /// Data that measures of a step need after its end: values that every backend fills. Vertices in the solver's
 /// numbering.
-#[derive(Clone, Copy, Debug)]
 pub struct EndOfStep<'a, S> {
     /// See [`StepConstants::previous`].
     pub previous: &'a [Point<S>],
@@ -66,9 +65,19 @@ pub struct EndOfStep<'a, S> {
     /// See [`StepConstants::tethers`].
     pub tethers: &'a [Bundle<S>],
     /// See [`StartStrain`].
-    pub start_strain: &'a StartStrain<S>,
-    /// See [`StepConstants::recovered`].
-    pub recovered: Option<&'a RecoveredTets<S>>,
+    pub start_strain: &'a mut StartStrain<S>,
+    /// Where tetrahedra are recovered-gradient tetrahedra.
+    pub recovered: Option<OfRecovered<'a, S>>,
+}
+
+/// What measures of recovered-gradient tetrahedra work with: the step's own, which every step fills anew.
+pub struct OfRecovered<'a, S> {
+    pub workers: &'a Workers,
+    pub tets: &'a mut RecoveredTets<S>,
+    /// Places [m], shape [vertex_count].
+    pub points: &'a mut [Point<S>],
+    /// Shape [copy_count].
+    pub loads: &'a mut [Point<S>],
 }
 
 /// Data that the stages of every method work on.
@@ -126,6 +135,24 @@ impl<S: Real> StepData<S> {
             + self.constants.recovered.as_ref().map_or(0, RecoveredTets::bytes)
     }
 
+    /// For measures of the step.
+    pub fn end_of_step(&mut self) -> EndOfStep<'_, S> {
+        let Self { constants, points, loads, .. } = self;
+        let StepConstants { previous, predicted, inertias, inverse_masses, tethers, .. } =
+            constants;
+        let (workers, start_strain) = (&constants.workers, &mut constants.start_strain);
+        let recovered = constants.recovered.as_mut();
+        EndOfStep {
+            previous,
+            predicted,
+            inertias,
+            inverse_masses,
+            tethers,
+            start_strain,
+            recovered: recovered.map(|tets| OfRecovered { workers, tets, points, loads }),
+        }
+    }
+
     /// Positions of the state, in the solver's numbering.
     pub fn read_positions(&mut self, layout: &Layout<S>, positions: &[Vec3<S>]) {
         for (point, &user) in self.points.iter_mut().zip(&layout.numbering.order) {
@@ -141,22 +168,6 @@ impl<S: Real> StepConstants<S> {
             anchors: step.inputs.anchors_of(&step.layout.rest_anchors),
             start: Before::Places(&self.previous),
             dt: step.dt,
-        }
-    }
-
-    /// For measures of the step.
-    pub fn end_of_step(&self) -> EndOfStep<'_, S> {
-        let Self { previous, predicted, inertias, inverse_masses, tethers, start_strain, .. } =
-            self;
-        let recovered = self.recovered.as_ref();
-        EndOfStep {
-            previous,
-            predicted,
-            inertias,
-            inverse_masses,
-            tethers,
-            start_strain,
-            recovered,
         }
     }
 

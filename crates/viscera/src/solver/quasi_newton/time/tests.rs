@@ -92,8 +92,8 @@ fn the_equations_of_a_step_taken_again_hold() {
             assert_eq!(state.learned.parts[part].dt, solve, "step {number}, part {part}");
         }
         let mut balance = ForceBalance::default();
-        let end = memory.data.constants.end_of_step();
-        balance.measure(&layout, state, &inputs, &end);
+        let mut end = memory.data.end_of_step();
+        balance.measure(&layout, state, &inputs, &mut end);
         assert!(balance.load > 1.0, "{} N of loads", balance.load);
         let of_loads = balance.unbalanced / balance.load;
         assert!(of_loads < 1e-8, "step {number}: {of_loads:e} of the loads");
