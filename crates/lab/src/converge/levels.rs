@@ -5,11 +5,11 @@
 
 use anyhow::{Result, bail};
 use viscera::mesh::topology::edges;
-use viscera::rest::{MeshError, WayToRest};
+use viscera::rest::WayToRest;
 use viscera::scalar::Vec3;
 use viscera::scene::Scene;
 use viscera::settings::{Count, DeviceRequest, Elements, Integrator, Method, SolverSettings};
-use viscera::simulation::{Assembly, PatchForce, Simulation};
+use viscera::simulation::{Assembly, MeshReport, PatchForce, Simulation};
 use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
 
@@ -54,16 +54,7 @@ pub struct AtRest {
     /// Whether Newton's step became small; where it did not, how large it is, of the displacement.
     pub left: f64,
     /// What a run would say of this mesh's error, where it was asked for.
-    pub estimate: Option<Estimate>,
-}
-
-/// What a mesh says of itself.
-#[derive(Clone, Debug)]
-pub struct Estimate {
-    /// Error of places over displacement.
-    pub displacement: f64,
-    /// False where it ended early.
-    pub complete: bool,
+    pub estimate: Option<MeshReport>,
 }
 
 /// The scene with its bodies refined so often, more than it asks for.
@@ -97,7 +88,7 @@ pub fn at_rest(
     elements: Elements,
     kept: &[usize],
     estimates: bool,
-    progress: &Progress,
+    progress: Option<&Progress>,
 ) -> Result<AtRest> {
     let scene = statics(scene, elements);
     let end = scene.frame_count() as f64 * scene.time.frame;
@@ -114,13 +105,13 @@ pub fn at_rest(
         Ok(())
     };
     for part in 1..PARTS {
-        let _case = progress.case(&format!("part {part} of {PARTS}"));
+        let _case = progress.map(|bar| bar.case(&format!("part {part} of {PARTS}")));
         let inputs = simulation.inputs_at(end * f64::from(part) / f64::from(PARTS));
         for _ in 0..STEPS {
             step(&mut state, &inputs)?;
         }
     }
-    let _case = progress.case("coming to rest");
+    let _case = progress.map(|bar| bar.case("coming to rest"));
     let inputs = simulation.inputs_at(end);
     let still = vec![Vec3::ZERO; model.vertex_count()];
     let mut way = None;
@@ -142,11 +133,9 @@ pub fn at_rest(
     };
     let rest: Vec<_> = state.positions.iter().zip(&way.way).map(|(x, d)| *x + *d).collect();
     let estimate = match estimates {
-        true => MeshError::measure(model, &rest, &inputs),
+        true => simulation.mesh_error_at(end, &rest, &way.holding),
         false => None,
     };
-    let estimate = estimate
-        .map(|MeshError { displacement, complete, .. }| Estimate { displacement, complete });
     let bodies = assembly.bodies.iter().zip(kept);
     let places = bodies.flat_map(|(body, &count)| &rest[body.vertices.start..][..count]);
     let mut tets = Vec::new();

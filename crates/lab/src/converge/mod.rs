@@ -86,7 +86,7 @@ pub fn compute(
     scene: &Scene,
     load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
     meshes: u32,
-    progress: &Progress,
+    progress: Option<&Progress>,
 ) -> Result<Found> {
     let coarse = Assembly::new(scene, load)?;
     let kept: Vec<usize> = coarse.bodies.iter().map(|body| body.vertices.len()).collect();
@@ -135,7 +135,7 @@ pub fn run(arguments: &ConvergeArguments, print: &dyn Fn(&str) -> Result<()>) ->
     // Bodies that nothing holds are found before anything is computed.
     Simulation::<f64>::new(scene.clone(), coarse)?;
     let progress = Progress::new(cases(arguments.meshes));
-    let found = compute(&scene, &mut load, arguments.meshes, &progress);
+    let found = compute(&scene, &mut load, arguments.meshes, Some(&progress));
     // The bar goes before anything is printed, an error included.
     progress.finish();
     let found = found?;

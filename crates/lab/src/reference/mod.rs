@@ -32,6 +32,7 @@ use viscera::material::Material;
 use viscera::mesh::TetMesh;
 use viscera::model::Model;
 use viscera::scalar::Vec3;
+use viscera::settings::Elements;
 use viscera::solver::{Inputs, Tether};
 use viscera::state::State;
 
@@ -187,6 +188,14 @@ impl Reference {
     /// For the library's model with stable neo-Hookean tissue as recovered-gradient tetrahedra.
     pub fn recovered(model: &Model<f64>, smoothing: Smoothing) -> Self {
         Self::of(Problem::recovered(model, smoothing), true)
+    }
+
+    /// For the library's model with the elements that a solver of it has.
+    pub fn with_elements(model: &Model<f64>, elements: Elements) -> Self {
+        match elements {
+            Elements::Recovered => Self::recovered(model, Smoothing::RECOVERED),
+            Elements::Auto | Elements::Plain => Self::new(model),
+        }
     }
 
     /// For one body of quadratic tetrahedra, with a node on every edge of the mesh; the mesh's

@@ -8,7 +8,8 @@ use viscera::simulation::Simulation;
 use viscera::solver::Solver;
 use viscera::state::State;
 
-use super::path::{Rest, reference_of};
+use super::path::Rest;
+use crate::reference::Reference;
 use crate::sections::Progress;
 use crate::settling::{Distance, KEPT_VELOCITY};
 use viscera_report::{percent, scientific};
@@ -79,7 +80,8 @@ pub fn compare(
     memory: Memory,
 ) -> Result<Vec<(&'static str, String)>> {
     let model = simulation.model();
-    let mut reference = reference_of(simulation).allow_memory(memory.0);
+    let elements = simulation.solver().elements;
+    let mut reference = Reference::with_elements(model, elements).allow_memory(memory.0);
     let pinned = reference.check_held(ours, &rest.inputs)?;
     let free: Vec<u32> = (0u32..).zip(&pinned).filter(|(_, p)| !**p).map(|(v, _)| v).collect();
     let distance =

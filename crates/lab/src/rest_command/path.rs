@@ -4,9 +4,7 @@
 //! minimum that the motions lead to, not in any other.
 
 use anyhow::{Result, anyhow};
-use viscera::layout::Smoothing;
 use viscera::scalar::Vec3;
-use viscera::settings::Elements;
 use viscera::simulation::Simulation;
 use viscera::solver::Inputs;
 use viscera_resources::Memory;
@@ -19,14 +17,6 @@ struct Stop {
     /// [s].
     time: f64,
     inputs: Inputs<f64>,
-}
-
-/// The reference with the elements that the scene has.
-pub fn reference_of(simulation: &Simulation<f64>) -> Reference {
-    match simulation.solver().elements {
-        Elements::Recovered => Reference::recovered(simulation.model(), Smoothing::RECOVERED),
-        Elements::Auto | Elements::Plain => Reference::new(simulation.model()),
-    }
 }
 
 /// The way to the end of a scene.
@@ -77,7 +67,8 @@ impl<'a> LoadPath<'a> {
     pub fn new(simulation: &'a Simulation<f64>, parts: u32, memory: Memory) -> Result<Self> {
         let scene = simulation.scene();
         let end = scene.frame_count() as f64 * scene.time.frame;
-        let reference = reference_of(simulation).allow_memory(memory.0);
+        let (model, elements) = (simulation.model(), simulation.solver().elements);
+        let reference = Reference::with_elements(model, elements).allow_memory(memory.0);
         let mut path = Self { simulation, reference, memory, parts, stops: Vec::new() };
         for part in 1..=parts {
             // The last is the end itself, whatever the parts are.

@@ -7,7 +7,7 @@ use viscera::mesh::TetMesh;
 use viscera::mesh::shapes::Block;
 use viscera::scalar::{Real, vec3};
 use viscera::scene::Scene;
-use viscera::settings::{Accuracy, Method, SolverSettings};
+use viscera::settings::{Accuracy, Elements, Method, SolverSettings};
 
 use super::course::{Places, SAFETY, begin, distance, follow, small_steps};
 use super::organs::{Organ, places};
@@ -156,7 +156,8 @@ impl Answer {
 fn answer(case: &Tissue) -> Result<Vec<Answer>> {
     let (scene, mesh) = case.problem()?;
     // Half as long as elsewhere, beside the explicit steps that are judged.
-    let truth = SolverSettings { explicit_safety: 0.5 * SAFETY, ..small_steps() };
+    let elements = Elements::Recovered;
+    let truth = SolverSettings { explicit_safety: 0.5 * SAFETY, elements, ..small_steps() };
     let (exact, _) = moved::<f64>(&scene, truth, &mesh)?;
     let of = |method, accuracy| -> Result<Told> {
         let solver = SolverSettings { method, accuracy, ..SolverSettings::default() };

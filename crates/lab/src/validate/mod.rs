@@ -8,6 +8,7 @@ mod frequency;
 mod indentation;
 mod independence;
 mod locking;
+mod mesh_error;
 mod methods;
 mod motion;
 mod organ;
@@ -32,6 +33,7 @@ pub const PROGRAM: Program = Program {
         uniaxial::SECTION,
         cantilever::SECTION,
         locking::SECTION,
+        mesh_error::SECTION,
         twist::SECTION,
         frequency::SECTION,
         indentation::SECTION,

@@ -50,7 +50,7 @@ fn a_held_point_pulls_with_the_force_of_the_reference() {
     let exact = Simulation::<f64>::new(scene, assembly).expect("a model");
     let time = simulation.time();
     let inputs = exact.inputs_at(time);
-    let mut reference = Reference::new(exact.model());
+    let mut reference = Reference::with_elements(exact.model(), exact.solver().elements);
     let near: Vec<Vec3<f64>> = simulation.state().positions.iter().map(|x| x.cast()).collect();
     let rest = reference.settle(&near, &inputs).expect("a state of rest").positions;
     let none = vec![Vec3::ZERO; rest.len()];

@@ -4,6 +4,7 @@ mod at_rest;
 mod common;
 
 mod holds;
+mod mesh_error;
 mod oracle;
 mod quasi_newton;
 mod recovered;

@@ -151,17 +151,50 @@ impl Assembly {
         scene: &Scene,
         load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
     ) -> Result<Self, AssembleError> {
-        let mut assembly = Self {
+        let mut assembly = Self::empty();
+        for body in &scene.bodies {
+            assembly.add_body(body, load)?;
+        }
+        assembly.add_patches(scene)?;
+        assembly.note_overlaps(scene);
+        assembly.note_loose_parts(scene);
+        Ok(assembly)
+    }
+
+    /// The scene that this was made from with every tetrahedron divided into eight. The vertices of each body keep their
+    /// places in it, the middles of edges follow.
+    pub fn refined(&self, scene: &Scene) -> Result<Self, AssembleError> {
+        let mut finer = Self::empty();
+        for (assembled, body) in self.bodies.iter().zip(&scene.bodies) {
+            let refined = refine::refine(&assembled.mesh);
+            let (mesh, middles) = refined
+                .map_err(|error| AssembleError::Placement { body: body.name.clone(), error })?;
+            let mut refinement = match &assembled.refinement {
+                Some(refinement) => refinement.clone(),
+                None => Refinement { coarse: assembled.mesh.clone(), middles: Vec::new() },
+            };
+            refinement.middles.push(middles);
+            let fine = assembled.has_fine_surface.then(|| assembled.surface.clone());
+            finer.put(body, mesh, Some(refinement), fine)?;
+        }
+        finer.add_patches(scene)?;
+        Ok(finer)
+    }
+
+    fn empty() -> Self {
+        Self {
             bodies: Vec::new(),
             builder: ModelBuilder::new(),
             fixings: Vec::new(),
             motions: Vec::new(),
             forces: Vec::new(),
             notes: Vec::new(),
-        };
-        for body in &scene.bodies {
-            assembly.add_body(body, load)?;
         }
+    }
+
+    /// What acts on the bodies that are there.
+    fn add_patches(&mut self, scene: &Scene) -> Result<(), AssembleError> {
+        let assembly = self;
         for fixing in &scene.fixings {
             let mut patch = assembly.resolve(&fixing.patch)?;
             if let Some(stiffness) = fixing.stiffness {
@@ -193,9 +226,7 @@ impl Assembly {
             let ends = [from[a], to[b]];
             assembly.builder.add_spring(ends, spring.stiffness, spring.rest_length)?;
         }
-        assembly.note_overlaps(scene);
-        assembly.note_loose_parts(scene);
-        Ok(assembly)
+        Ok(())
     }
 
     fn add_body(
@@ -213,11 +244,21 @@ impl Assembly {
             placed.map_err(|error| AssembleError::Placement { body: body.name.clone(), error })?;
         self.note_report(&body.name, &report);
         let (mesh, refinement) = refined(body, mesh)?;
+        let surface =
+            surface.map(|surface| SurfaceMesh { vertices: place(&surface.vertices), ..surface });
+        self.put(body, mesh, refinement, surface)
+    }
+
+    /// Adds a body whose mesh is where it is to be, with a surface that is finer than its boundary where it has one.
+    fn put(
+        &mut self,
+        body: &Body,
+        mesh: TetMesh,
+        refinement: Option<Refinement>,
+        surface: Option<SurfaceMesh>,
+    ) -> Result<(), AssembleError> {
         let has_fine_surface = surface.is_some();
-        let surface = match surface {
-            Some(surface) => SurfaceMesh { vertices: place(&surface.vertices), ..surface },
-            None => boundary_surface(&mesh).surface,
-        };
+        let surface = surface.unwrap_or_else(|| boundary_surface(&mesh).surface);
         let embedding = Embedding::new(&mesh, &surface)
             .map_err(|error| AssembleError::Embedding { body: body.name.clone(), error })?;
         let typical = libm::cbrt(mesh.volume() / mesh.tets().len() as f64);

@@ -1,7 +1,7 @@
 //! Forces of what holds and pulls tissue.
 
 use super::holding::PinnedBy;
-use super::{PatchForce, PatchKind, ResolvedPatch, Simulation};
+use super::{Assembly, PatchForce, PatchKind, ResolvedPatch, Simulation};
 use crate::scalar::{Real, Vec3};
 use crate::scene::Motion;
 use crate::solver::Inputs;
@@ -59,7 +59,18 @@ impl<S: Real> Simulation<S> {
         positions: &[Vec3<f64>],
         holding: &[Vec3<f64>],
     ) -> Vec<PatchForce> {
-        let (scene, assembly) = (&self.scene, &self.assembly);
+        self.patch_forces_of(&self.assembly, time, positions, holding)
+    }
+
+    /// The same on other meshes of the scene's bodies.
+    pub(super) fn patch_forces_of(
+        &self,
+        assembly: &Assembly,
+        time: f64,
+        positions: &[Vec3<f64>],
+        holding: &[Vec3<f64>],
+    ) -> Vec<PatchForce> {
+        let scene = &self.scene;
         let rest = assembly.builder.positions();
         let position = |v: u32| positions.get(v as usize).copied().unwrap_or(rest[v as usize]);
         let held = |v: u32| holding.get(v as usize).copied().unwrap_or_default();

@@ -11,6 +11,7 @@ mod forces;
 mod gpu;
 mod holding;
 mod live;
+mod mesh_error;
 #[cfg(feature = "gpu")]
 mod on_device;
 mod rest;
@@ -22,7 +23,8 @@ pub use error::{FrameError, LiveError, SimulationError};
 pub use forces::Hold;
 use holding::GraspOrigins;
 pub use live::Live;
-pub use rest::{MESH_ERROR_TETS, MeshReport, RestReport, Standing};
+pub use mesh_error::{MESH_ERROR_TETS, MeshReport};
+pub use rest::{RestReport, Standing};
 pub use saved::ResumeError;
 
 use crate::layout::Layout;

@@ -1,7 +1,7 @@
 //! Whether a run has come to rest, and what to do where it has not.
 
 use super::{PatchForce, Simulation};
-use crate::rest::{MeshError, WayToRest};
+use crate::rest::WayToRest;
 use crate::scalar::{Real, Vec3};
 use crate::scene::Scene;
 use crate::settings::Method;
@@ -47,61 +47,6 @@ pub struct RestReport {
     pub complete: bool,
     /// False where the forces push tissue on rather than back along some way.
     pub stable: bool,
-}
-
-/// The error of a mesh that is enough: what one does not see.
-const ENOUGH: f64 = 0.05;
-
-/// Tetrahedra of the largest mesh whose own error is estimated: that takes some seconds.
-pub const MESH_ERROR_TETS: usize = 20_000;
-
-/// A mesh beside the body that it stands for, at rest.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct MeshReport {
-    /// Estimate of the root mean square distance of vertices from where those of the body are, over their displacement.
-    pub displacement: f64,
-    /// Apparent stiffness of the mesh over that of the body, minus one: above zero it gives way too little.
-    pub stiffness: f64,
-    /// The largest difference between the force on a patch and that of the body, over the largest such force.
-    pub force: f64,
-    /// Root mean square length of edges [m].
-    pub edge: f64,
-    /// The length of edges [m] with which displacement and forces would be within 5 %: errors fall with its square.
-    pub edge_for_five_percent: f64,
-    /// False where the estimate ended early: the errors are at least so large.
-    pub complete: bool,
-}
-
-impl MeshReport {
-    /// Of displacement and forces.
-    pub fn largest_error(&self) -> f64 {
-        self.displacement.max(self.force)
-    }
-
-    /// What a person should know, and do, where the mesh is too coarse.
-    pub fn advice(&self) -> Option<String> {
-        (self.largest_error() > ENOUGH).then(|| {
-            format!(
-                "for 5 % take edges of about {:.2} mm, now {:.2} mm",
-                1e3 * self.edge_for_five_percent,
-                1e3 * self.edge
-            )
-        })
-    }
-}
-
-impl std::fmt::Display for MeshReport {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let how = if self.stiffness > 0.0 { "too stiff" } else { "too soft" };
-        let least = if self.complete { "about" } else { "at least" };
-        write!(
-            f,
-            "mesh: its own error is {least} {:.1} % of the displacement ({how}) and {:.1} % of the forces",
-            100.0 * self.displacement,
-            100.0 * self.force
-        )?;
-        self.advice().map_or(Ok(()), |advice| write!(f, "; {advice}"))
-    }
 }
 
 /// Where a run stands.
@@ -228,36 +173,6 @@ impl<S: Real> Simulation<S> {
         })
     }
 
-    /// How far the mesh is from the body that it stands for, at rest under what acts at the end of the last frame; nothing
-    /// before the first frame, where nothing is held or displaced, and of more than [`MESH_ERROR_TETS`]. Takes
-    /// about a second for thousands of tetrahedra: for the end of a run.
-    pub fn mesh_error(&self) -> Option<MeshReport> {
-        if !self.stepped || self.model.tet_count() > MESH_ERROR_TETS {
-            return None;
-        }
-        let (inputs, positions) = (self.inputs_at(self.time()), &self.state.positions);
-        let still = vec![Vec3::ZERO; positions.len()];
-        let way =
-            WayToRest::measure(&self.model, positions, &still, &inputs, self.solver.elements)?;
-        let at_rest: Vec<Vec3<f64>> =
-            positions.iter().zip(&way.way).map(|(x, way)| x.cast::<f64>() + *way).collect();
-        let error = MeshError::measure(&self.model, &at_rest, &inputs)?;
-        let forces = |places: &[Vec3<f64>], holding: &[Vec3<f64>]| {
-            self.patch_forces_at(self.time(), places, holding)
-        };
-        let ours = forces(&at_rest, &way.holding);
-        let of_body = forces(&error.places, &error.holding);
-        let force = self.apart(&ours, &of_body);
-        Some(MeshReport {
-            displacement: error.displacement,
-            stiffness: error.stiffness,
-            force,
-            edge: error.edge,
-            edge_for_five_percent: error.edge * (ENOUGH / error.displacement.max(force)).sqrt(),
-            complete: error.complete && way.complete,
-        })
-    }
-
     /// How far the forces on patches are from those at rest, over the largest of those.
     fn force_error(&self, measured: &WayToRest) -> f64 {
         let positions = self.state.positions.iter().zip(&measured.way);
@@ -267,7 +182,7 @@ impl<S: Real> Simulation<S> {
     }
 
     /// The largest difference between forces on patches and the true ones, over the largest of those.
-    fn apart(&self, ours: &[PatchForce], true_ones: &[PatchForce]) -> f64 {
+    pub(super) fn apart(&self, ours: &[PatchForce], true_ones: &[PatchForce]) -> f64 {
         let length = |force: [f64; 3]| Vec3::from_f64(force).length();
         let largest = true_ones.iter().map(|patch| length(patch.force)).fold(0.0, f64::max);
         let apart = ours.iter().zip(true_ones);

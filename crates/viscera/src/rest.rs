@@ -8,19 +8,9 @@
 //!
 //! Neither the solver's residual nor its multipliers go into it, and the cause of the error does not matter: too few
 //! sweeps, motion that has not ended, or a formulation that is not exact at rest. Unbalanced forces themselves say
-//! little: small smooth ones stand for a long way, large rough ones for none.
-//!
-//! | file | what |
-//! |---|---|
-//! | `newton` | the step, for any equations |
-//! | `quadratic` | the same body's equations on ten-node tetrahedra |
-//! | `mesh_error` | how far the mesh is from the body that it stands for |
-
-mod mesh_error;
-mod newton;
-mod quadratic;
-
-pub use mesh_error::MeshError;
+//! little: small smooth ones stand for a long way, large rough ones for none. Conjugate gradients: Hestenes and
+//! Stiefel, 1952; the sum of `alpha r.z` over some iterations is what they add to `d.K d` and bounds what was
+//! missing before (Strakos and Tichy, "On error estimation in the conjugate gradient method", 2002, section 4).
 
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::{attachment, deformation_gradient, internal_forces, law, shape_gradients};
@@ -32,10 +22,20 @@ use crate::scalar::{Real, Vec3};
 use crate::settings::Elements;
 use crate::solver::Inputs;
 use crate::solver::recovered::Recovered;
-use newton::{Effort, Equations, Found, dot, longest, times_stiffness};
 
-/// Seconds at most.
-const EFFORT: Effort = Effort { complete: 0.01, most_work: 1e7, shift: 0.0 };
+/// The difference quotient's step, as a share of the shortest distance over which strain changes by one: far
+/// above the square root of round-off, far below where curvature changes.
+const DIFFERENCE: f64 = 1e-6;
+
+/// Conjugate gradients end where the last of their iterations add less than this share of `d.K d`.
+const COMPLETE: f64 = 0.01;
+
+/// Passes over single tetrahedra that an estimate takes at most: seconds.
+const MOST_WORK: f64 = 1e7;
+
+/// Iterations at most, and at least where the mesh is large.
+const MOST_ITERATIONS: f64 = 1000.0;
+const FEWEST_ITERATIONS: f64 = 50.0;
 
 /// Positions are rounded by this many units of their precision, over a run.
 const ROUNDED: f64 = 16.0;
@@ -85,10 +85,17 @@ impl WayToRest {
         if !statics.is_held {
             return None;
         }
-        let found = newton::solve(&statics, &x, EFFORT);
+        let found = statics.solve(&x);
         let excursion = statics.excursion(&x, velocities);
         Some(WayToRest { excursion, ..statics.judge(&x, found) })
     }
+}
+
+/// The result of conjugate gradients.
+struct Found {
+    way: Vec<Vec3<f64>>,
+    complete: bool,
+    stable: bool,
 }
 
 /// The static equations of a model under inputs.
@@ -105,34 +112,6 @@ struct Statics<'a, S> {
     shortest: f64,
     /// Where stable neo-Hookean tetrahedra are recovered-gradient tetrahedra.
     recovered: Option<(Domains<f64>, Vec<MaterialConstants<f64>>)>,
-}
-
-impl<S: Real> Equations for Statics<'_, S> {
-    fn gradient(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) {
-        self.full_gradient(x, gradient);
-        still(gradient, &self.moves);
-    }
-
-    fn softness(&self) -> &[f64] {
-        &self.softness
-    }
-
-    fn shortest(&self) -> f64 {
-        self.shortest
-    }
-
-    fn pass(&self) -> f64 {
-        self.model.tet_count() as f64
-    }
-}
-
-/// Nothing acts on what does not move.
-fn still(gradient: &mut [Vec3<f64>], moves: &[bool]) {
-    for (gradient, moves) in gradient.iter_mut().zip(moves) {
-        if !moves {
-            *gradient = Vec3::ZERO;
-        }
-    }
 }
 
 impl<'a, S: Real> Statics<'a, S> {
@@ -153,19 +132,23 @@ impl<'a, S: Real> Statics<'a, S> {
         Self { model, inputs, is_held, moves, softness, shortest, recovered }
     }
 
-    /// `grad V` [N] of all vertices.
-    fn full_gradient(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) {
-        let gravity = self.inputs.gravity.cast::<f64>();
-        for (load, mass) in gradient.iter_mut().zip(&self.model.masses) {
-            *load = gravity * -mass.to_f64();
+    /// `grad V` [N] of vertices that move, zero for others.
+    fn gradient(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) {
+        self.full_gradient(x, gradient);
+        for (gradient, moves) in gradient.iter_mut().zip(&self.moves) {
+            if !moves {
+                *gradient = Vec3::ZERO;
+            }
         }
-        self.add_loads(x, gradient);
-        self.add_tissue(x, gradient);
     }
 
-    /// Of all that acts at vertices beside gravity and tetrahedra; `x` and `gradient` may be longer than the vertices.
-    fn add_loads(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) {
+    /// `grad V` [N] of all vertices.
+    fn full_gradient(&self, x: &[Vec3<f64>], gradient: &mut [Vec3<f64>]) {
         let Self { model, inputs, .. } = self;
+        let gravity = inputs.gravity.cast::<f64>();
+        for (load, mass) in gradient.iter_mut().zip(&model.masses) {
+            *load = gravity * -mass.to_f64();
+        }
         for &(v, force) in &inputs.forces {
             gradient[v as usize] -= force.cast::<f64>();
         }
@@ -174,6 +157,7 @@ impl<'a, S: Real> Statics<'a, S> {
             gradient[v] -= attachment::force(x[v], target, tether.stiffness.to_f64());
         }
         for_each_kind!(model, set => self.add_elements(set, x, gradient));
+        self.add_tissue(x, gradient);
     }
 
     /// Of the elements of one kind.
@@ -218,13 +202,92 @@ impl<'a, S: Real> Statics<'a, S> {
         }
     }
 
+    fn solve(&self, x: &[Vec3<f64>]) -> Found {
+        let n = x.len();
+        let mut at_x = vec![Vec3::ZERO; n];
+        self.gradient(x, &mut at_x);
+        // The iterates start at `d = 0`, where the residual is all of `-grad V`. It is updated from step to step;
+        // computing it anew would be a second pass over the mesh in each iteration.
+        let mut residual: Vec<Vec3<f64>> = at_x.iter().map(|&gradient| -gradient).collect();
+        let mut way = vec![Vec3::ZERO; n];
+        let [mut direction, mut image, mut moved] = [(); 3].map(|()| vec![Vec3::ZERO; n]);
+        let tets = self.model.tet_count().max(1) as f64;
+        let most = (MOST_WORK / tets).clamp(FEWEST_ITERATIONS, MOST_ITERATIONS) as usize;
+        // A smooth error is seen once information has gone through the whole body, some cells an iteration.
+        let delay = 10 + 2 * libm::cbrt(n as f64) as usize;
+        let mut added = Vec::with_capacity(most);
+        // `added[k]` is `alpha r.z` of iteration k [J]: by how much `d . K d` has grown. No product with the unknown
+        // solution is needed.
+        let (mut product, mut total) = (self.preconditioned(&residual), 0.0);
+        let mut beta = 0.0;
+        for _ in 0..most {
+            // Zero: the equations are solved. NaN or infinite: the state itself is; the way found so far is returned.
+            if !(product > 0.0 && product.is_finite()) {
+                break;
+            }
+            for v in 0..n {
+                direction[v] = residual[v] * self.softness[v] + direction[v] * beta;
+            }
+            self.times_stiffness(x, &at_x, &direction, &mut moved, &mut image);
+            let curvature = dot(&direction, &image);
+            // Forces drive the tissue on along `direction`: `K` is not positive definite, and a Newton step may lead
+            // to a saddle. The way up to here descends, so it is kept, as a part of what is left.
+            if curvature.is_nan() || curvature <= 0.0 {
+                return Found { way, complete: false, stable: false };
+            }
+            let alpha = product / curvature;
+            for v in 0..n {
+                way[v] += direction[v] * alpha;
+                residual[v] -= image[v] * alpha;
+            }
+            total += alpha * product;
+            added.push(alpha * product);
+            // What the last `delay` iterations added bounds from below what was missing before them. One small
+            // addition proves nothing: the iteration stalls until information has reached the far end of a body.
+            let last: f64 = added.iter().rev().take(delay).sum();
+            if added.len() > delay && last < COMPLETE * total {
+                return Found { way, complete: true, stable: true };
+            }
+            let next = self.preconditioned(&residual);
+            beta = next / product;
+            product = next;
+        }
+        Found { way, complete: added.len() < most, stable: true }
+    }
+
+    /// `r.z` with `z` the preconditioned `r`.
+    fn preconditioned(&self, residual: &[Vec3<f64>]) -> f64 {
+        residual.iter().zip(&self.softness).map(|(r, c)| r.length_squared() * c).sum()
+    }
+
+    /// `K p`.
+    fn times_stiffness(
+        &self,
+        x: &[Vec3<f64>],
+        at_x: &[Vec3<f64>],
+        p: &[Vec3<f64>],
+        moved: &mut [Vec3<f64>],
+        image: &mut [Vec3<f64>],
+    ) {
+        // Scaled by the longest vector of `p`, so that strain changes by about `DIFFERENCE` at most: directions
+        // shrink by orders of magnitude from the first iteration to the last.
+        let step = DIFFERENCE * self.shortest / longest(p).max(f64::MIN_POSITIVE);
+        for ((moved, x), p) in moved.iter_mut().zip(x).zip(p) {
+            *moved = *x + *p * step;
+        }
+        self.gradient(moved, image);
+        for (image, at_x) in image.iter_mut().zip(at_x) {
+            *image = (*image - *at_x) * (1.0 / step);
+        }
+    }
+
     /// See [`WayToRest::excursion`].
     fn excursion(&self, x: &[Vec3<f64>], velocities: &[Vec3<f64>]) -> f64 {
         let moving = velocities.iter().zip(&self.moves);
         let v: Vec<_> = moving.map(|(&v, &moves)| if moves { v } else { Vec3::ZERO }).collect();
         let [mut at_x, mut moved, mut image] = [(); 3].map(|()| vec![Vec3::ZERO; x.len()]);
         self.gradient(x, &mut at_x);
-        times_stiffness(self, x, &at_x, &v, &mut moved, &mut image);
+        self.times_stiffness(x, &at_x, &v, &mut moved, &mut image);
         let masses = v.iter().zip(&self.model.masses);
         let inertia: f64 = masses.map(|(v, mass)| mass.to_f64() * v.length_squared()).sum();
         let curvature = dot(&v, &image);
@@ -271,36 +334,35 @@ impl<'a, S: Real> Statics<'a, S> {
     }
 }
 
+fn dot(a: &[Vec3<f64>], b: &[Vec3<f64>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
+}
+
+fn longest(all: &[Vec3<f64>]) -> f64 {
+    all.iter().fold(0.0, |longest: f64, v| longest.max(v.length()))
+}
+
 /// The mean of the three diagonal entries of `K` at small strain, of each vertex [N/m], and the smallest height of
 /// a tetrahedron [m].
 fn diagonal<S: Real>(model: &Model<S>, inputs: &Inputs<S>) -> (Vec<f64>, f64) {
     let mut stiffness = vec![0.0; model.vertex_count()];
     let mut steepest = 0.0f64;
     for tet in model.tets() {
+        let material = &model.materials[tet.material as usize];
+        let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
+        // `V ((lambda + mu) g g^T + mu |g|^2 I)`
+        let of_slope = tet.rest_volume.to_f64() * ((lambda + mu) / 3.0 + mu);
         let gradients = shape_gradients(&tet.inverse_rest_shape.cast::<f64>());
-        let of_slope = tet.rest_volume.to_f64() * slope_stiffness(model, tet.material);
         for (v, g) in tet.vertices.into_iter().zip(gradients) {
             stiffness[v as usize] += of_slope * g.length_squared();
             steepest = steepest.max(g.length());
         }
     }
-    add_stiffness_of_holds(model, inputs, &mut stiffness);
-    (stiffness, if steepest > 0.0 { 1.0 / steepest } else { 1.0 })
-}
-
-/// A third of the trace of `(lambda + mu) g g^T + mu |g|^2 I` over `|g|^2` [Pa].
-fn slope_stiffness<S: Real>(model: &Model<S>, material: u32) -> f64 {
-    let material = &model.materials[material as usize];
-    let [lambda, mu] = [material.lame_lambda, material.lame_mu].map(Real::to_f64);
-    (lambda + mu) / 3.0 + mu
-}
-
-/// Of all that holds vertices beside tetrahedra.
-fn add_stiffness_of_holds<S: Real>(model: &Model<S>, inputs: &Inputs<S>, stiffness: &mut [f64]) {
-    for_each_kind!(model, set => add_stiffness(set, model, stiffness));
+    for_each_kind!(model, set => add_stiffness(set, model, &mut stiffness));
     for tether in &inputs.tethers {
         stiffness[tether.vertex as usize] += tether.stiffness.to_f64();
     }
+    (stiffness, if steepest > 0.0 { 1.0 / steepest } else { 1.0 })
 }
 
 /// Adds to each vertex the mean curvature of the elements of one kind: a third of what all of their stiffness can be
