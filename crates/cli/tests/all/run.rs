@@ -31,6 +31,11 @@ fn a_run_writes_what_it_promises() {
     // Few small steps do in a coarse bar.
     assert_eq!(summary["solver"]["method"], "explicit");
     assert_eq!(summary["solver"]["asked_method"], "auto");
+    assert_eq!(summary["solver"]["asked_elements"], "auto");
+    assert_eq!(summary["solver"]["elements"], "recovered");
+    let mesh = &summary["mesh"];
+    assert!(mesh["edge"].as_f64().is_some_and(|edge| (0.01..0.05).contains(&edge)), "{mesh}");
+    assert!(mesh["force"].as_f64().is_some_and(|error| (0.0..0.5).contains(&error)), "{mesh}");
     assert_eq!(summary["solver"]["accuracy"], "standard");
     let substeps = summary["solver"]["substeps"].as_u64().expect("a count");
     assert!((1..=10).contains(&substeps), "{substeps}");
@@ -385,4 +390,36 @@ fn a_file_goes_before_a_built_in_scene_of_its_name() {
     let end = bench.end_of(&[&["run", "twist"], &plain[..]].concat());
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     assert_eq!(bench.summary("out")["title"], "Tiny");
+}
+
+/// A run says what its tetrahedra are, how far the mesh is off, and which edges would do; XPBD has linear ones.
+#[test]
+fn a_run_says_how_far_its_mesh_is_off() {
+    let bench = Bench::new(TINY);
+    let said = |more: &[&str]| {
+        let end = bench.run(more);
+        assert_eq!(end.code, Some(0), "{}", end.stderr);
+        (end.stdout, bench.summary("out"))
+    };
+    let (text, summary) = said(&["--set", "solver.method=xpbd", "--set", "solver.device=cpu"]);
+    assert!(text.contains("tetrahedra: linear, which bend too little"), "{text}");
+    assert_eq!(summary["solver"]["elements"], "plain");
+    let (text, _) = said(&[]);
+    assert!(text.contains("tetrahedra: recovered-gradient"), "{text}");
+    let line =
+        text.lines().find(|line| line.starts_with("mesh: its own error is")).expect("a line");
+    assert!(line.contains("of the displacement") && line.contains("of the forces"), "{line}");
+    let (_, finer) = said(&["--set", "body.bar.refine=1"]);
+    assert_eq!(finer["model"]["tets"], 80);
+}
+
+#[test]
+fn a_refinement_that_is_too_fine_is_refused() {
+    let bench = Bench::new(TINY);
+    let end = bench.run(&["--set", "body.bar.refine=4"]);
+    assert!(end.code != Some(0) && end.stderr.contains("0 to 3"), "{}", end.stderr);
+    let fine = ["--set", "body.bar.refine=3", "--set", "body.bar.cells=[40, 40, 40]"];
+    let end = bench.run(&fine);
+    let names = end.stderr.contains("`bar`") && end.stderr.contains("lower it");
+    assert!(end.code != Some(0) && names, "{}", end.stderr);
 }
