@@ -17,8 +17,8 @@ macro_rules! built_in {
 }
 
 /// All of them; `scenes/` holds no others that need no mesh file.
-pub const BUILT_IN: [BuiltInScene; 5] =
-    built_in!["cantilever" "grab" "liver_retraction" "stretch" "twist"];
+pub const BUILT_IN: [BuiltInScene; 6] =
+    built_in!["cantilever" "coarse_bar" "grab" "liver_retraction" "stretch" "twist"];
 
 impl BuiltInScene {
     /// The one that is meant where there is no such file.

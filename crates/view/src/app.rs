@@ -29,6 +29,8 @@ pub struct Options {
     pub scene: PathBuf,
     /// Settings laid over it.
     pub settings: Settings,
+    /// Settings of a second solver beside the first; none without one.
+    pub beside: Settings,
     /// Where mesh files are looked for that are not beside the scene.
     pub data: Option<PathBuf>,
     /// Where pictures and recordings go.
@@ -81,7 +83,7 @@ impl App {
         let data = options.data.as_deref();
         let opened = Document::open(&options.scene, data)
             .map_err(|error| format!("{error:#}"))
-            .and_then(|document| Session::new(document, options.settings));
+            .and_then(|document| Session::new(document, options.settings)?.beside(&options.beside));
         let session = match opened {
             Ok(session) => session,
             Err(error) => {

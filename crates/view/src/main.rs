@@ -22,6 +22,10 @@ struct Arguments {
     /// `body.liver.material.young="8 kPa"`; may be repeated. `viscera scene describe` lists keys
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = read_setting)]
     settings: Vec<(String, String)>,
+    /// Begin with A | B: a second solver beside the first one, with this setting changed: KEY=VALUE, as in
+    /// `solver.elements=plain`; may be repeated
+    #[arg(long = "beside", value_name = "KEY=VALUE", value_parser = read_setting)]
+    beside: Vec<(String, String)>,
     /// Folder where mesh files are looked for that are not beside the scene
     #[arg(long, value_name = "DIR", env = "VISCERA_DATA")]
     data: Option<PathBuf>,
@@ -35,6 +39,7 @@ Examples:
   viscera-view
   viscera-view grab
   viscera-view scenes/cantilever.toml --set body.bar.material.young=\"10 kPa\"
+  viscera-view coarse_bar --beside solver.elements=plain
 
 Without a display, `viscera run SCENE` computes the same and writes pictures.";
 
@@ -45,9 +50,9 @@ fn read_setting(text: &str) -> Result<(String, String), String> {
 }
 
 fn main() -> ExitCode {
-    let Arguments { scene, settings, data, pictures } = Arguments::parse();
+    let Arguments { scene, settings, beside, data, pictures } = Arguments::parse();
     let settings: Settings = settings;
-    let options = Options { scene, settings, data, pictures, ..Options::default() };
+    let options = Options { scene, settings, beside, data, pictures, ..Options::default() };
     match window::open(options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

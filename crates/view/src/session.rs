@@ -2,7 +2,7 @@
 
 use viscera::scene::Scene;
 
-use crate::choices::{Choices, History, Settings, Side, difference};
+use crate::choices::{Choices, History, Settings, Side, difference, put};
 use crate::document::Document;
 use crate::engine::{BuildRequest, Command};
 
@@ -26,6 +26,25 @@ impl Session {
         let scenes = scenes_of(&document, &choices)?;
         let (begun, history) = (choices.clone(), History::default());
         Ok(Self { document, choices, begun, history, scenes, generation: 0 })
+    }
+
+    /// With a second solver beside the first from the beginning, with these settings of its own; alone where there are none.
+    pub fn beside(mut self, settings: &Settings) -> Result<Self, String> {
+        if settings.is_empty() {
+            return Ok(self);
+        }
+        let mut second = self.solver_settings();
+        settings.iter().for_each(|(key, value)| put(&mut second, key, value));
+        let choices = Choices { second: Some(second), ..self.choices };
+        self.scenes = scenes_of(&self.document, &choices)?;
+        (self.choices, self.begun) = (choices.clone(), choices);
+        Ok(self)
+    }
+
+    /// What the first solver has.
+    fn solver_settings(&self) -> Settings {
+        let values = self.scene(Side::First).solver.values();
+        values.into_iter().map(|(key, value)| (format!("solver.{key}"), value)).collect()
     }
 
     /// The scene file.
@@ -108,10 +127,7 @@ impl Session {
     /// Begins or ends a comparison, or the reference beside it. The second solver begins as the first
     /// is, and has settings of its own from then on.
     pub fn compare(&mut self, on: bool, ghost: bool) -> Result<Vec<Command>, String> {
-        let copy = || {
-            let values = self.scene(Side::First).solver.values();
-            values.into_iter().map(|(key, value)| (format!("solver.{key}"), value)).collect()
-        };
+        let copy = || self.solver_settings();
         let second = on.then(|| self.choices.second.clone().unwrap_or_else(copy));
         let next = Choices { second, ghost, ..self.choices.clone() };
         self.change_to(next, "compare", false)
@@ -226,6 +242,19 @@ mod tests {
 
     fn pair(key: &str, value: &str) -> Vec<(String, String)> {
         vec![(key.to_owned(), value.to_owned())]
+    }
+
+    #[test]
+    fn a_second_solver_stands_beside_the_first_from_the_beginning() {
+        let plain = pair("solver.elements", "plain");
+        let session = session().beside(&plain).expect("a comparison");
+        assert!(session.is_comparison() && session.choices() == session.begun());
+        let elements = [Side::First, Side::Second].map(|side| session.scene(side).solver.elements);
+        assert_eq!(elements.map(|it| it.to_string()), ["auto", "plain"]);
+        let error = self::session().beside(&pair("solver.elements", "square"));
+        assert!(error.is_err_and(|error| error.contains("recovered")));
+        let alone = self::session().beside(&Settings::new()).expect("one solver");
+        assert!(!alone.is_comparison());
     }
 
     #[test]

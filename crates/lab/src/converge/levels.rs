@@ -47,6 +47,8 @@ pub struct AtRest {
     pub edge: f64,
     /// Places [m] of the vertices that every mesh has, those of the coarsest one, in its order.
     pub places: Vec<Vec3<f64>>,
+    /// Places [m] of all vertices of this mesh.
+    pub all: Vec<Vec3<f64>>,
     /// Forces on patches.
     pub forces: Vec<PatchForce>,
     /// Tetrahedra inside out.
@@ -145,6 +147,7 @@ pub fn at_rest(
         edge: length_of_edges(assembly),
         places: places.copied().collect(),
         forces: simulation.patch_forces_at(end, &rest, &way.holding),
+        all: rest.clone(),
         inverted: tets.iter().filter(|tet| tet.is_inverted()).count(),
         left: way.error(),
         estimate,

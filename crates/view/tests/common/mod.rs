@@ -32,6 +32,10 @@ pub struct Window {
     pub farewell: Arc<OnceLock<String>>,
 }
 
+fn owned(settings: &[(&str, &str)]) -> Vec<(String, String)> {
+    settings.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect()
+}
+
 impl Window {
     /// Opens a scene in a folder of its own, drawn by a software driver where there is one: it gives the same
     /// pictures everywhere.
@@ -49,13 +53,24 @@ impl Window {
     }
 
     fn open_on(setup: WgpuSetup, scene: &str, settings: &[(&str, &str)]) -> Self {
+        Self::open_beside(setup, scene, settings, &[])
+    }
+
+    /// With a second solver that has these settings of its own.
+    pub fn open_beside(
+        setup: WgpuSetup,
+        scene: &str,
+        settings: &[(&str, &str)],
+        beside: &[(&str, &str)],
+    ) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let state =
             wgpu::create_render_state(setup, eframe::egui_wgpu::RendererOptions::PREDICTABLE);
         let farewell = Arc::default();
         let options = Options {
             scene: scene.into(),
-            settings: settings.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect(),
+            settings: owned(settings),
+            beside: owned(beside),
             data: None,
             pictures: folder.path().join("pictures"),
             farewell: Arc::clone(&farewell),

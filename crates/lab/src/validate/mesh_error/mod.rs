@@ -1,5 +1,7 @@
 //! What a run says of its mesh's own error, beside the error that finer meshes show.
 
+mod bars;
+
 use std::fmt;
 
 use anyhow::{Result, anyhow};
@@ -214,6 +216,12 @@ fn run(context: &mut Context) -> Result<()> {
         "mesh-error",
         &plot,
         "Marks between the outer lines are told within a factor of two.",
+    )?;
+    context.picture(
+        "coarse-bars",
+        "Three bars at rest under their weight, of linear tetrahedra, of recovered-gradient ones, and fine",
+        &bars::draw(&CASES[1].scene()?)?,
+        "A bar two cells thick at a Poisson ratio of 0.45. The line is the fine bar: linear tetrahedra hold the coarse one up.",
     )?;
     for (kind, name) in ["linear", "recovered-gradient"].into_iter().enumerate() {
         let told = answers.iter().filter(|it| is_told(it.errors[kind], it.estimates[kind])).count();
