@@ -6,13 +6,14 @@
 //! | to | look at |
 //! |---|---|
 //! | solve a step or a state of rest exactly | [`reference::Reference`] |
-//! | set up what the studies share | [`load_cases`], [`forms`], [`bending`], [`unstructured`], [`settling`], [`motion`], [`stress`] |
+//! | set up what the studies share | [`load_cases`], [`forms`], [`bending`], [`unstructured`], [`delaunay`], [`split`], [`settling`], [`motion`], [`stress`] |
 //! | compare the library with what must come out | [`validate`] |
 //! | see what the published method does, and what became of its open problems | [`study`] |
 //! | ask the reference about a scene file | [`rest_command`] |
 //! | write reports with tables and plots | [`viscera_report`] |
 
 pub mod bending;
+pub mod delaunay;
 pub mod forms;
 pub mod load_cases;
 pub mod motion;
@@ -20,6 +21,7 @@ pub mod reference;
 pub mod rest_command;
 pub mod sections;
 pub mod settling;
+pub mod split;
 pub mod stress;
 pub mod study;
 pub mod unstructured;

@@ -1,0 +1,256 @@
+//! Bodies that bend, and the meshes they are filled with.
+
+use std::fmt;
+
+use anyhow::{Context as _, Result};
+use viscera::mesh::TetMesh;
+use viscera::mesh::distance::{Cuboid, Placed, rotation_about};
+use viscera::mesh::shapes::{self, Block, Splitting};
+use viscera::mesh::tetrahedralize::tetrahedralize;
+use viscera::mesh::topology::BoundingBox;
+use viscera::scalar::{Vec3, vec3};
+
+use crate::delaunay::delaunay;
+use crate::split::split;
+use crate::unstructured::{relaxed, shuffled};
+
+/// Edge lengths of the bar [m]. Of 50 kPa it sinks by a third of its length.
+pub const BAR: [f64; 3] = [0.08, 0.02, 0.02];
+
+/// Edge lengths of the block [m].
+pub const BLOCK: [f64; 3] = [0.06, 0.06, 0.03];
+
+/// Edge lengths of the box around the angle [m]: a post and an arm, both as thick as the bar.
+const ANGLE: [f64; 3] = [0.06, 0.02, 0.06];
+
+/// Thickness of the tapered bar at its free end over that at the clamped one.
+const TAPERED: f64 = 0.5;
+
+/// Largest distance [m] from a plane of what lies in it.
+pub(super) const NEAR: f64 = 1e-9;
+
+/// By how much the stuffed bar is turned about its length against the lattice [rad]: faces cut it everywhere.
+const TURNED: f64 = 0.35;
+
+/// Share of the liver's longest axis along which it is held.
+const HELD: f64 = 0.2;
+
+/// Lattice spacing [m] of the procedural liver of some 180 vertices.
+const LIVER_SPACING: f64 = 0.04;
+
+/// What is filled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// Clamped at its low end along x.
+    Bar,
+    /// Held below.
+    Block,
+    /// A bar that thins to a half.
+    Tapered,
+    /// A post with an arm at its top, clamped below.
+    Angle,
+    /// A bar whose lower half is of the second material.
+    Layers,
+    /// A bar whose clamped half is of the second material.
+    Halves,
+    /// A bar as isosurface stuffing makes it: flat ends, edges along it cut off.
+    Stuffed,
+    /// The procedural liver, held where its longest axis begins.
+    Liver,
+}
+
+/// How a body is filled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Filling {
+    /// Boxes of five tetrahedra.
+    Five,
+    /// Boxes of six.
+    Six,
+    /// Boxes of six whose inner vertices are pushed about.
+    Jittered,
+    /// In no order, and of sound shapes; with a seed.
+    Relaxed(u64),
+    /// In no order, and of poor shapes.
+    Shuffled(u64),
+    /// Delaunay's, slivers and all.
+    Delaunay(u64),
+    /// By isosurface stuffing, where the shape is made by it.
+    Lattice,
+    /// The same, each tetrahedron split into eight.
+    Split,
+}
+
+impl fmt::Display for Shape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Bar => "bar",
+            Self::Block => "block",
+            Self::Tapered => "tapered bar",
+            Self::Angle => "L-shaped bar",
+            Self::Layers => "bar on a stiff layer",
+            Self::Halves => "half-stiff bar",
+            Self::Stuffed => "stuffed bar",
+            Self::Liver => "liver",
+        })
+    }
+}
+
+impl fmt::Display for Filling {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Five => f.write_str("boxes of five"),
+            Self::Six => f.write_str("boxes of six"),
+            Self::Jittered => f.write_str("boxes of six, jittered"),
+            Self::Relaxed(seed) => write!(f, "unstructured {seed}"),
+            Self::Shuffled(seed) => write!(f, "unstructured {seed}, poor shapes"),
+            Self::Delaunay(seed) => write!(f, "Delaunay {seed}, with slivers"),
+            Self::Lattice => f.write_str("isosurface stuffing"),
+            Self::Split => f.write_str("isosurface stuffing, split 1:8"),
+        }
+    }
+}
+
+/// A mesh that is held and pulled.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// What it is filled with; region 1 is of the second material.
+    pub mesh: TetMesh,
+    /// What it is.
+    pub shape: Shape,
+    /// Whether a vertex is held, shape [vertex_count]. So is every point between held ones of a tetrahedron.
+    pub held: Vec<bool>,
+    /// The way that weight pulls.
+    pub down: Vec3<f64>,
+}
+
+impl Body {
+    /// A shape with so many cells across.
+    pub fn new(shape: Shape, filling: Filling, across: usize) -> Result<Self> {
+        let down = vec3(0.0, 0.0, -1.0);
+        let of = |mesh: TetMesh, is_held: fn(Vec3<f64>) -> bool| {
+            let held = mesh.vertices().iter().map(|&x| is_held(x)).collect();
+            Self { mesh, shape, held, down }
+        };
+        let at_wall = |x: Vec3<f64>| x.x < NEAR;
+        let body = match shape {
+            Shape::Stuffed => of(stuffed(across)?, at_wall),
+            Shape::Liver => Self::organ(shapes::liver(LIVER_SPACING / across as f64, 1.0)?.tets),
+            Shape::Block | Shape::Angle => of(filled(shape, filling, across)?, |x| x.z < NEAR),
+            _ => of(filled(shape, filling, across)?, at_wall),
+        };
+        if filling == Filling::Split { body.split() } else { Ok(body) }
+    }
+
+    /// An organ that is held where its longest axis begins and sags along its shortest, whatever its axes are.
+    pub fn organ(mesh: TetMesh) -> Self {
+        let extent = BoundingBox::around(mesh.vertices());
+        let size = extent.size().to_array();
+        let mut axes = [0, 1, 2];
+        axes.sort_by(|&a, &b| size[a].total_cmp(&size[b]));
+        let [shortest, _, longest] = axes;
+        let limit = extent.min[longest] + HELD * size[longest];
+        let held = mesh.vertices().iter().map(|x| x[longest] < limit).collect();
+        let mut down = Vec3::ZERO;
+        down[shortest] = -1.0;
+        Self { mesh, shape: Shape::Liver, held, down }
+    }
+
+    /// The same in eight times as many tetrahedra, held where it was.
+    pub fn split(&self) -> Result<Self> {
+        let ends = viscera::mesh::topology::edges(&self.mesh);
+        let between = ends.iter().map(|ends| ends.iter().all(|&v| self.held[v as usize]));
+        let held = self.held.iter().copied().chain(between).collect();
+        Ok(Self { mesh: split(&self.mesh)?, held, ..self.clone() })
+    }
+
+    /// Whether a point belongs to the face whose movement is read.
+    pub(super) fn is_read(&self, x: Vec3<f64>) -> bool {
+        match self.shape {
+            Shape::Block => is_pressed(x),
+            Shape::Angle => x.x > ANGLE[0] - NEAR,
+            _ => x.x > BAR[0] - NEAR,
+        }
+    }
+}
+
+/// The quarter of the block's top in its middle.
+fn is_pressed(x: Vec3<f64>) -> bool {
+    let in_middle = |x: f64, edge: f64| (x - 0.5 * edge).abs() < 0.25 * edge + NEAR;
+    x.z > BLOCK[2] - NEAR && in_middle(x.x, BLOCK[0]) && in_middle(x.y, BLOCK[1])
+}
+
+/// Shapes made of boxes. Blocks have an even number across.
+fn filled(shape: Shape, filling: Filling, across: usize) -> Result<TetMesh> {
+    let (size, boxes) = match shape {
+        Shape::Block => (BLOCK, [2 * across, 2 * across, across]),
+        Shape::Angle => (ANGLE, [3 * across, across, 3 * across]),
+        _ => (BAR, [4 * across, across, across]),
+    };
+    if let Filling::Delaunay(seed) = filling {
+        return shaped(shape, &delaunay(Vec3::from_f64(size), boxes, seed)?);
+    }
+    let block = Block {
+        splitting: if filling == Filling::Five { Splitting::Five } else { Splitting::Six },
+        jitter: if matches!(filling, Filling::Five | Filling::Six) { 0.0 } else { 0.6 },
+        seed: 1,
+        ..Block::new(Vec3::from_f64(size), boxes)
+    };
+    // Of two materials vertices stay where these meet.
+    let block = match shape {
+        Shape::Layers | Shape::Halves => Block { jitter: 0.0, ..block },
+        _ => block,
+    };
+    let mesh = shaped(shape, &block.mesh().context("a body that bends")?)?;
+    match filling {
+        Filling::Relaxed(seed) => relaxed(&mesh, seed),
+        Filling::Shuffled(seed) => shuffled(&mesh, seed),
+        _ => Ok(mesh),
+    }
+}
+
+/// What a shape leaves of a box, moves and marks.
+fn shaped(shape: Shape, mesh: &TetMesh) -> Result<TetMesh> {
+    let middle = |&tet: &usize| mesh.corners(tet).iter().fold(Vec3::ZERO, |sum, x| sum + *x) * 0.25;
+    let thickness = BAR[1];
+    let is_kept = |tet: &usize| {
+        let x = middle(tet);
+        shape != Shape::Angle || x.x < thickness || x.z > ANGLE[2] - thickness
+    };
+    let kept: Vec<usize> = (0..mesh.tets().len()).filter(is_kept).collect();
+    let region = |tet: &usize| {
+        let x = middle(tet);
+        u32::from(match shape {
+            Shape::Layers => x.z < 0.5 * BAR[2],
+            Shape::Halves => x.x < 0.5 * BAR[0],
+            _ => false,
+        })
+    };
+    let moved = |x: &Vec3<f64>| {
+        let slimmer = 1.0 - (1.0 - TAPERED) * x.x / BAR[0];
+        let middle = vec3(x.x, 0.5 * BAR[1], 0.5 * BAR[2]);
+        if shape == Shape::Tapered { middle + (*x - middle) * slimmer } else { *x }
+    };
+    let vertices = mesh.vertices().iter().map(moved).collect();
+    let regions = kept.iter().map(region).collect();
+    let tets = kept.iter().map(|&tet| mesh.tets()[tet]).collect();
+    Ok(TetMesh::new(vertices, tets, regions).context("a body that bends")?.0)
+}
+
+/// The bar by isosurface stuffing. Ends lie in planes of the lattice and are flat; all other faces are cut anywhere,
+/// as the bar is turned about its length.
+fn stuffed(across: usize) -> Result<TetMesh> {
+    let half_size = Vec3::from_f64(BAR) * 0.5;
+    let bar = Placed {
+        shape: Cuboid { center: Vec3::ZERO, half_size, rounding: 0.0 },
+        rotation: rotation_about(vec3(1.0, 0.0, 0.0), TURNED),
+        scale: 1.0,
+        translation: Vec3::ZERO,
+    };
+    // As many vertices as boxes of this number across have: a cube of the lattice has two.
+    let spacing = BAR[0] / (3 * across + 1) as f64;
+    let (mesh, _) = tetrahedralize(&bar, spacing).context("a stuffed bar")?;
+    let place = |x: &Vec3<f64>| bar.rotation.transpose() * *x + half_size;
+    let vertices = mesh.vertices().iter().map(place).collect();
+    let (tets, regions) = (mesh.tets().to_vec(), mesh.regions().to_vec());
+    Ok(TetMesh::new(vertices, tets, regions).context("a stuffed bar")?.0)
+}
