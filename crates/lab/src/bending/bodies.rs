@@ -36,7 +36,7 @@ const TURNED: f64 = 0.35;
 const HELD: f64 = 0.2;
 
 /// Lattice spacing [m] of the procedural liver of some 180 vertices.
-const LIVER_SPACING: f64 = 0.04;
+const LIVER_SPACING: f64 = 0.033;
 
 /// What is filled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,15 +134,18 @@ impl Body {
         let at_wall = |x: Vec3<f64>| x.x < NEAR;
         let body = match shape {
             Shape::Stuffed => of(stuffed(across)?, at_wall),
-            Shape::Liver => Self::organ(shapes::liver(LIVER_SPACING / across as f64, 1.0)?.tets),
+            Shape::Liver => Self::organ(&shapes::liver(LIVER_SPACING / across as f64, 1.0)?.tets)?,
             Shape::Block | Shape::Angle => of(filled(shape, filling, across)?, |x| x.z < NEAR),
             _ => of(filled(shape, filling, across)?, at_wall),
         };
         if filling == Filling::Split { body.split() } else { Ok(body) }
     }
 
-    /// An organ that is held where its longest axis begins and sags along its shortest, whatever its axes are.
-    pub fn organ(mesh: TetMesh) -> Self {
+    /// An organ of one material that is held where its longest axis begins and sags along its shortest, whatever its
+    /// axes and regions are.
+    pub fn organ(mesh: &TetMesh) -> Result<Self> {
+        let regions = vec![0; mesh.tets().len()];
+        let (mesh, _) = TetMesh::new(mesh.vertices().to_vec(), mesh.tets().to_vec(), regions)?;
         let extent = BoundingBox::around(mesh.vertices());
         let size = extent.size().to_array();
         let mut axes = [0, 1, 2];
@@ -152,7 +155,7 @@ impl Body {
         let held = mesh.vertices().iter().map(|x| x[longest] < limit).collect();
         let mut down = Vec3::ZERO;
         down[shortest] = -1.0;
-        Self { mesh, shape: Shape::Liver, held, down }
+        Ok(Self { mesh, shape: Shape::Liver, held, down })
     }
 
     /// The same in eight times as many tetrahedra, held where it was.
@@ -195,9 +198,9 @@ fn filled(shape: Shape, filling: Filling, across: usize) -> Result<TetMesh> {
         seed: 1,
         ..Block::new(Vec3::from_f64(size), boxes)
     };
-    // Of two materials vertices stay where these meet.
+    // What two materials meet in, and what is cut out of a box, stays where it is.
     let block = match shape {
-        Shape::Layers | Shape::Halves => Block { jitter: 0.0, ..block },
+        Shape::Layers | Shape::Halves | Shape::Angle => Block { jitter: 0.0, ..block },
         _ => block,
     };
     let mesh = shaped(shape, &block.mesh().context("a body that bends")?)?;
@@ -253,4 +256,98 @@ fn stuffed(across: usize) -> Result<TetMesh> {
     let vertices = mesh.vertices().iter().map(place).collect();
     let (tets, regions) = (mesh.tets().to_vec(), mesh.regions().to_vec());
     Ok(TetMesh::new(vertices, tets, regions).context("a stuffed bar")?.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viscera::mesh::quality::shape_quality;
+    use viscera::mesh::tet_volume;
+
+    fn volume(mesh: &TetMesh, region: u32) -> f64 {
+        let of = (0..mesh.tets().len()).filter(|&tet| mesh.regions()[tet] == region);
+        of.map(|tet| tet_volume(mesh.corners(tet))).sum()
+    }
+
+    /// Whatever fills them: tapers as a truncated pyramid, an angle of five cubes, halves of two materials.
+    #[test]
+    fn bodies_have_their_volumes() {
+        let bar = BAR.iter().product::<f64>();
+        let cube = BAR[1].powi(3);
+        let tapered = bar * (1.0 + TAPERED + TAPERED * TAPERED) / 3.0;
+        for filling in [Filling::Five, Filling::Relaxed(1), Filling::Delaunay(1)] {
+            for (shape, volumes) in [
+                (Shape::Bar, [bar, 0.0]),
+                (Shape::Tapered, [tapered, 0.0]),
+                (Shape::Angle, [5.0 * cube, 0.0]),
+                (Shape::Layers, [0.5 * bar; 2]),
+                (Shape::Halves, [0.5 * bar; 2]),
+            ] {
+                // Points of Delaunay's lie where they like: nothing ends where a shape does.
+                let is_anywhere = matches!(filling, Filling::Delaunay(_));
+                if is_anywhere && !matches!(shape, Shape::Bar | Shape::Tapered) {
+                    continue;
+                }
+                let mesh = Body::new(shape, filling, 2).expect("a body").mesh;
+                for (region, expected) in (0..).zip(volumes) {
+                    let error = (volume(&mesh, region) - expected).abs() / bar;
+                    assert!(error < 1e-9, "{shape}, {filling}, region {region}: {error:e}");
+                }
+            }
+        }
+    }
+
+    /// Ends of the stuffed bar are whole and flat but for edges that are cut off, and so is what lies between.
+    #[test]
+    fn the_stuffed_bar_is_a_bar() {
+        let body = Body::new(Shape::Stuffed, Filling::Lattice, 4).expect("a body");
+        let filled = volume(&body.mesh, 0) / BAR.iter().product::<f64>();
+        let boundary = viscera::mesh::boundary_surface(&body.mesh);
+        let end = |is_end: &dyn Fn(Vec3<f64>) -> bool| -> f64 {
+            let corners =
+                |triangle: &[u32; 3]| triangle.map(|v| boundary.surface.vertices[v as usize]);
+            let triangles = boundary.surface.triangles.iter().map(corners);
+            let at_end = triangles.filter(|triangle| triangle.iter().all(|x| is_end(*x)));
+            at_end.map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length()).sum()
+        };
+        let areas = [end(&|x| x.x < NEAR), end(&|x| body.is_read(x))];
+        println!("{filled} of the bar, ends {areas:?}, {} vertices", body.mesh.vertices().len());
+        // Edges of the lattice are a thirteenth of the length. Along each edge of the bar a corner is cut off that is no
+        // larger than half of one: of the section, and of the rim of its ends.
+        let edge = BAR[0] / 13.0;
+        let section = BAR[1] * BAR[2];
+        assert!((1.0 - 0.5 * edge * edge / section..1.0).contains(&filled), "{filled}");
+        for area in areas {
+            let least = (1.0 - edge / BAR[1]) * (1.0 - edge / BAR[2]);
+            assert!((least..1.0).contains(&(area / section)), "{area}");
+        }
+        let held = body.held.iter().filter(|held| **held).count();
+        assert!(held > 20 && held < body.held.len() / 5, "{held}");
+    }
+
+    #[test]
+    fn slivers_are_kept() {
+        let mesh = Body::new(Shape::Bar, Filling::Delaunay(1), 4).expect("a body").mesh;
+        let shapes = || (0..mesh.tets().len()).map(|tet| shape_quality(mesh.corners(tet)));
+        let worst = shapes().fold(1.0, f64::min);
+        let poor = shapes().filter(|shape| *shape < 0.1).count();
+        println!("{} tetrahedra, {poor} below 0.1, the worst {worst}", mesh.tets().len());
+        assert!(worst < 0.05 && poor > 5, "{worst}, {poor}");
+    }
+
+    /// What is split is held where it was: at points between held ones.
+    #[test]
+    fn a_split_organ_is_held_where_it_was() {
+        let body =
+            Body::organ(&shapes::liver(LIVER_SPACING, 1.0).expect("a liver").tets).expect("a body");
+        let fine = body.split().expect("a body");
+        assert_eq!(fine.held.len(), fine.mesh.vertices().len());
+        let held_volume = |body: &Body| -> f64 {
+            let held = |tet: &[u32; 4]| tet.iter().all(|&v| body.held[v as usize]);
+            let tets = body.mesh.tets().iter().enumerate().filter(|(_, tet)| held(tet));
+            tets.map(|(tet, _)| tet_volume(body.mesh.corners(tet))).sum()
+        };
+        let [coarse, fine] = [&body, &fine].map(held_volume);
+        assert!(coarse > 0.0 && (fine / coarse - 1.0).abs() < 1e-12, "{coarse} {fine}");
+    }
 }

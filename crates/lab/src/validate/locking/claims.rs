@@ -66,7 +66,7 @@ const CLAIMS: &[Claim] = &[
 /// Small loads on small meshes.
 const QUICK_CLAIMS: &[Claim] = &[
     Claim::bar(SMALL_SAG, Filling::Five, 2, &[0.05; 2]),
-    Claim::bar(SMALL_SAG, Filling::Relaxed(1), 3, &[0.05; 2]),
+    Claim::bar(SMALL_SAG, Filling::Relaxed(1), 4, &[0.04; 2]),
 ];
 
 fn claims(quick: bool) -> &'static [Claim] {
