@@ -239,6 +239,12 @@ fn shaped(shape: Shape, mesh: &TetMesh) -> Result<TetMesh> {
     Ok(TetMesh::new(vertices, tets, regions).context("a body that bends")?.0)
 }
 
+/// Spacing of the lattice [m], of which half is a whole number of times in the bar's half length. A cube has two vertices:
+/// there are about as many as in boxes of this number across.
+fn stuffed_spacing(across: usize) -> f64 {
+    BAR[0] / (2 * across + 2) as f64
+}
+
 /// The bar by isosurface stuffing. Ends lie in planes of the lattice and are flat; all other faces are cut anywhere,
 /// as the bar is turned about its length.
 fn stuffed(across: usize) -> Result<TetMesh> {
@@ -249,8 +255,7 @@ fn stuffed(across: usize) -> Result<TetMesh> {
         scale: 1.0,
         translation: Vec3::ZERO,
     };
-    // As many vertices as boxes of this number across have: a cube of the lattice has two.
-    let spacing = BAR[0] / (3 * across + 1) as f64;
+    let spacing = stuffed_spacing(across);
     let (mesh, _) = tetrahedralize(&bar, spacing).context("a stuffed bar")?;
     let place = |x: &Vec3<f64>| bar.rotation.transpose() * *x + half_size;
     let vertices = mesh.vertices().iter().map(place).collect();
@@ -312,9 +317,9 @@ mod tests {
         };
         let areas = [end(&|x| x.x < NEAR), end(&|x| body.is_read(x))];
         println!("{filled} of the bar, ends {areas:?}, {} vertices", body.mesh.vertices().len());
-        // Edges of the lattice are a thirteenth of the length. Along each edge of the bar a corner is cut off that is no
-        // larger than half of one: of the section, and of the rim of its ends.
-        let edge = BAR[0] / 13.0;
+        // Along each edge of the bar a corner is cut off that is no larger than half an edge of the lattice: of the
+        // section, and of the rim of its ends.
+        let edge = stuffed_spacing(4);
         let section = BAR[1] * BAR[2];
         assert!((1.0 - 0.5 * edge * edge / section..1.0).contains(&filled), "{filled}");
         for area in areas {
