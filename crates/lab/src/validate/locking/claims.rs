@@ -126,8 +126,8 @@ fn truths(context: &mut Context, answers: &Answers) {
         "The truths: how far the free end or the pressed face moves, how far a torque turns; what extrapolation has \
          added to the finest mesh; and the order of the error by the cells' size, which is taken to be 2 at clamped \
          edges and found from three meshes where a corner points inwards. The stuffed bar's edges are cut off: its \
-         body is that of its own mesh, the truth that of the mesh and of the mesh split 1:8. Its flat end is clamped, \
-         in all meshes alike. Shape is 1 of a regular tetrahedron and 0 of a flat one.",
+         body is that of its own mesh, the truth that of the mesh and of the mesh split 1:8, and all of them are held \
+         over half a spacing of the lattice. Shape is 1 of a regular tetrahedron and 0 of a flat one.",
     );
     let mut table =
         Table::new(["load", "body", "nu", "the body gives", "extrapolation adds", "order"]);
