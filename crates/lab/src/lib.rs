@@ -6,7 +6,7 @@
 //! | to | look at |
 //! |---|---|
 //! | solve a step or a state of rest exactly | [`reference::Reference`] |
-//! | set up what the studies share | [`load_cases`], [`forms`], [`bending`], [`unstructured`], [`settling`], [`motion`], [`stress`] |
+//! | set up what the studies share | [`load_cases`], [`forms`], [`bending`], [`unstructured`], [`delaunay`], [`settling`], [`motion`], [`stress`] |
 //! | compare the library with what must come out | [`validate`] |
 //! | see what the published method does, and what became of its open problems | [`study`] |
 //! | ask the reference about a scene file | [`rest_command`] |
@@ -14,6 +14,7 @@
 
 pub mod bending;
 pub mod converge;
+pub mod delaunay;
 pub mod forms;
 pub mod load_cases;
 pub mod motion;

@@ -2,7 +2,8 @@
 //!
 //! Two tetrahedra with a common face give way to three around the edge between the corners opposite it, and three
 //! around an edge to two (B. Joe, "Three-dimensional triangulations from local transformations", SIAM Journal on
-//! Scientific and Statistical Computing 10, 1989). The boundary stays as it is, so that what is pinned does.
+//! Scientific and Statistical Computing 10, 1989). The boundary stays as it is, so that what is pinned does, and so do
+//! the faces between regions.
 
 use anyhow::{Context as _, Result};
 use viscera::mesh::TetMesh;
@@ -49,6 +50,8 @@ struct Filling {
     vertices: Vec<Vec3<f64>>,
     /// Positively wound, shape [tet_count].
     tets: Vec<[u32; 4]>,
+    /// Regions of the tetrahedra, shape [tet_count].
+    regions: Vec<u32>,
     /// Tetrahedra of each vertex, shape [vertex_count].
     around: Vec<Vec<u32>>,
     /// Vertices that may be pushed, shape [vertex_count].
@@ -73,9 +76,7 @@ impl Filling {
     }
 
     fn finish(self) -> Result<TetMesh> {
-        let filling = self;
-        let regions = vec![0; filling.tets.len()];
-        let (mesh, _) = TetMesh::new(filling.vertices, filling.tets, regions)
+        let (mesh, _) = TetMesh::new(self.vertices, self.tets, self.regions)
             .context("an unstructured mesh of the studies")?;
         Ok(mesh)
     }
@@ -90,7 +91,12 @@ impl Filling {
             tet.iter().for_each(|&v| around[v as usize].push(number));
         }
         let (vertices, tets) = (mesh.vertices().to_vec(), mesh.tets().to_vec());
-        Self { vertices, tets, around, is_inner, improves: false }
+        let regions = mesh.regions().to_vec();
+        for (is_inner, around) in is_inner.iter_mut().zip(&around) {
+            let region = |tet: &u32| regions[*tet as usize];
+            *is_inner &= around.iter().all(|tet| region(tet) == region(&around[0]));
+        }
+        Self { vertices, tets, regions, around, is_inner, improves: false }
     }
 
     fn corners(&self, tet: [u32; 4]) -> [Vec3<f64>; 4] {
@@ -146,7 +152,8 @@ impl Filling {
         let [apex, a, b, c] = tet;
         let (shared, count): (&[u32], _) = if kind == 0 { (&[a, b, c], 2) } else { (&[a, b], 3) };
         let old = self.with(shared);
-        if old.len() != count {
+        let region = |tet: u32| self.regions[tet as usize];
+        if old.len() != count || old.iter().any(|&tet| region(tet) != region(old[0])) {
             return;
         }
         let corners = old.iter().flat_map(|&t| self.tets[t as usize]);
@@ -193,6 +200,7 @@ impl Filling {
         if new.len() > old.len() {
             places.push(self.tets.len() as u32);
             self.tets.push([0; 4]);
+            self.regions.push(self.regions[old[0] as usize]);
         }
         for (&place, tet) in places.iter().zip(&new) {
             self.tets[place as usize] = *tet;
@@ -206,11 +214,12 @@ impl Filling {
     /// Moves the last tetrahedron to a place that is free.
     fn close(&mut self, free: u32) {
         let last = self.tets.len() as u32 - 1;
-        let Some(tet) = self.tets.pop() else { return };
+        let (Some(tet), Some(region)) = (self.tets.pop(), self.regions.pop()) else { return };
         if free == last {
             return;
         }
         self.tets[free as usize] = tet;
+        self.regions[free as usize] = region;
         for v in tet {
             for number in &mut self.around[v as usize] {
                 if *number == last {
@@ -261,6 +270,41 @@ mod tests {
             after.tets().len()
         );
         assert!(low <= 22 && high >= 28, "{counts:?}");
+    }
+
+    /// What lies on either side of a plane stays there, to the bit of its faces.
+    #[test]
+    fn regions_keep_their_faces() {
+        let mesh = boxes();
+        let is_low = |x: Vec3<f64>| x.z < 0.02;
+        let regions = |mesh: &TetMesh| -> Vec<u32> {
+            let middle = |tet| mesh.corners(tet).iter().fold(Vec3::ZERO, |sum, x| sum + *x) * 0.25;
+            (0..mesh.tets().len()).map(|tet| u32::from(is_low(middle(tet)))).collect()
+        };
+        let (vertices, tets) = (mesh.vertices().to_vec(), mesh.tets().to_vec());
+        let mesh = TetMesh::new(vertices, tets, regions(&mesh)).expect("the same mesh").0;
+        let after = shuffled(&mesh, 2).expect("a mesh");
+        let volume = |mesh: &TetMesh, region: u32| -> f64 {
+            let of = (0..mesh.tets().len()).filter(|&tet| mesh.regions()[tet] == region);
+            of.map(|tet| viscera::mesh::tet_volume(mesh.corners(tet))).sum()
+        };
+        assert_ne!(mesh.tets().len(), after.tets().len());
+        for region in [0, 1] {
+            let [before, after] = [&mesh, &after].map(|mesh| volume(mesh, region));
+            assert!((after / before - 1.0).abs() < 1e-9, "{before} {after}");
+        }
+        let outside = |mesh: &TetMesh, region: u32| {
+            let tets = mesh.tets().iter().zip(mesh.regions());
+            let tets: Vec<_> = tets.filter(|(_, of)| **of == region).map(|(tet, _)| *tet).collect();
+            let (regions, vertices) = (vec![0; tets.len()], mesh.vertices().to_vec());
+            let part = TetMesh::new(vertices, tets, regions).expect("a part").0;
+            let mut places = boundary_surface(&part).surface.vertices;
+            places.sort_unstable_by(|a, b| {
+                a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z))
+            });
+            places
+        };
+        assert_eq!(outside(&mesh, 1), outside(&after, 1));
     }
 
     #[test]

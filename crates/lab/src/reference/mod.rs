@@ -201,7 +201,12 @@ impl Reference {
     /// For one body of quadratic tetrahedra, with a node on every edge of the mesh; the mesh's
     /// vertices keep their numbers.
     pub fn quadratic(mesh: &TetMesh, material: &Material) -> Self {
-        Self::of(Problem::quadratic(mesh, material), false)
+        Self::of(Problem::quadratic(mesh, material, None), false)
+    }
+
+    /// The same with all regions of the mesh but region 0 of a second material of the same density.
+    pub fn quadratic_of_two(mesh: &TetMesh, material: &Material, second: &Material) -> Self {
+        Self::of(Problem::quadratic(mesh, material, Some(second)), false)
     }
 
     fn of(problem: Problem, lumped: bool) -> Self {

@@ -86,7 +86,8 @@ pub fn minimise(
         // `step` is H^-1 grad: the direction is its negative.
         let slope: f64 = step.iter().zip(&gradient).map(|(s, g)| -s.dot(*g)).sum();
         let before = objective.value(x);
-        let noise = 16.0 * f64::EPSILON * before.size;
+        // Terms round by themselves, and sums of many by the root of their number.
+        let noise = (16.0 + (x.len() as f64).sqrt()) * f64::EPSILON * before.size;
         let mut accepted = None;
         let mut length = 1.0;
         for _ in 0..HALVINGS {

@@ -175,8 +175,10 @@ impl Problem {
     }
 
     /// The same mesh with a node on every edge: ten-node tetrahedra, straight at rest, which do not
-    /// lock. The mesh's vertices keep their numbers; the edges' follow.
-    pub fn quadratic(mesh: &TetMesh, material: &Material) -> Self {
+    /// lock. The mesh's vertices keep their numbers; the edges' follow. Region 0 is of the first material, the others
+    /// are of the second, if there is one; both have the first one's density.
+    pub fn quadratic(mesh: &TetMesh, material: &Material, second: Option<&Material>) -> Self {
+        let density = material.density();
         let mut edges: Vec<[u32; 2]> = mesh.tets().iter().flat_map(edges_of).collect();
         edges.sort_unstable();
         edges.dedup();
@@ -186,9 +188,15 @@ impl Problem {
             let [a, b] = edge.map(|v| mesh.vertices()[v as usize]);
             rest_positions.push((a + b) * 0.5);
         }
+        let tissue = |material: &Material| TissueLaw {
+            model: material.model(),
+            lame_lambda: material.lame_lambda(),
+            lame_mu: material.lame_mu(),
+            viscosity: 0.0,
+        };
         let mut masses = vec![0.0; rest_positions.len()];
         let mut quadratic = TetElements::new(QUADRATURE.len());
-        for tet in mesh.tets() {
+        for (tet, &region) in mesh.tets().iter().zip(mesh.regions()) {
             let corners = tet.map(|v| mesh.vertices()[v as usize]);
             let shape = viscera::elements::edge_matrix(&corners);
             let volume = shape.determinant() / 6.0;
@@ -202,10 +210,10 @@ impl Problem {
             }
             for (i, &node) in nodes.iter().enumerate() {
                 let share = if i < 4 { -1.0 / 20.0 } else { 1.0 / 5.0 };
-                masses[node as usize] += share * material.density() * volume;
+                masses[node as usize] += share * density * volume;
             }
             quadratic.nodes.push(nodes);
-            quadratic.tissue.push(0);
+            quadratic.tissue.push(u32::from(region > 0 && second.is_some()));
             for barycentric in QUADRATURE {
                 let gradients = quadratic_gradients(&barycentric, &g);
                 let volume = volume / QUADRATURE.len() as f64;
@@ -215,13 +223,8 @@ impl Problem {
         Self {
             rest_positions,
             masses,
-            density: material.density(),
-            tissues: vec![TissueLaw {
-                model: material.model(),
-                lame_lambda: material.lame_lambda(),
-                lame_mu: material.lame_mu(),
-                viscosity: 0.0,
-            }],
+            density,
+            tissues: std::iter::once(material).chain(second).map(tissue).collect(),
             linear: TetElements::new(1),
             quadratic,
             recovered: Recovered::default(),

@@ -254,6 +254,18 @@ impl Recovered {
         pressures
     }
 
+    /// Pressures of the tetrahedra [Pa], of rest volumes `volumes` [m^3]: of their own gradients, and of all volumes they
+    /// are part of.
+    pub fn pressures_at(&self, x: &[Vec3<f64>], volumes: &[f64]) -> Vec<f64> {
+        let mut pressures = self.pressures(x, &Start::NONE);
+        for (t, (pressure, volume)) in pressures.iter_mut().zip(volumes).enumerate() {
+            let f = self.gradient_at(t, x);
+            let piola = self.tissues[self.places[t].tissue as usize].piola(&f, None);
+            *pressure = crate::bending::pressure::pressure(&piola, &f) - *pressure / volume;
+        }
+        pressures
+    }
+
     /// Adds the gradient [N].
     pub fn add_gradient(&self, x: &[Vec3<f64>], start: &Start, gradient: &mut [Vec3<f64>]) {
         let pressures = self.pressures(x, start);

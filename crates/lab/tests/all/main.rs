@@ -2,10 +2,13 @@
 
 mod at_rest;
 mod common;
+#[path = "../../../viscera/tests/all/common/data.rs"]
+mod data;
 
 mod holds;
 mod mesh_error;
 mod oracle;
+mod organs;
 mod quasi_newton;
 mod recovered;
 mod recovered_meshes;

@@ -46,6 +46,7 @@ mod quasi_newton;
 mod quasi_newton_robust;
 mod readme;
 mod recovered;
+mod recovered_robust;
 mod saved;
 mod scene_errors;
 mod scene_files;
