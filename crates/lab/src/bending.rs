@@ -278,8 +278,12 @@ fn is_pressed(x: Vec3<f64>) -> bool {
 
 /// How far a mesh gives under a load, of stable neo-Hookean tissue.
 pub fn response(mesh: &TetMesh, element: Element, load: Load, poisson: f64) -> Result<f64> {
-    let tissue = tissue(MaterialModel::StableNeoHookean, YOUNG, poisson)?;
-    Body::new(mesh, element, &tissue)?.response(load)
+    response_of(mesh, element, load, &tissue(MaterialModel::StableNeoHookean, YOUNG, poisson)?)
+}
+
+/// How far a mesh gives under a load, of any tissue; pressures and twists are those of [`YOUNG`].
+pub fn response_of(mesh: &TetMesh, element: Element, load: Load, tissue: &Material) -> Result<f64> {
+    Body::new(mesh, element, tissue)?.response(load)
 }
 
 /// The response of the body itself, from those of quadratic tetrahedra with so many boxes across, fewer first.
