@@ -23,15 +23,21 @@ pub const LIMIT: f64 = 0.05;
 /// CPU time [s] that a run of 180 frames may take: half a second a frame, thirty times real time.
 pub const LONGEST: f64 = 100.0;
 
-/// How many times as dear as the cheapest peer that is within the limit another may be: one that costs more on some bar
-/// cannot be the best on a finer one.
-pub const HOW_DEAR: f64 = 4.0;
+/// Frames of a run, and of a module's on the finest bars, where it takes minutes: what is implicit has come to rest to a
+/// thousandth by then.
+const FRAMES: [u32; 2] = [180, 60];
 
-/// Frames of a run.
-const FRAMES: f64 = 180.0;
+/// Cells across, from which a bar is one of the finest.
+const FINE: u32 = 15;
+
+/// Frames of a method's run on a bar of so many cells across.
+pub fn frames(method: &Method, cells: Option<u32>) -> u32 {
+    let is_module = matches!(method.program, Program::Module { .. });
+    FRAMES[usize::from(is_module && cells.is_some_and(|cells| cells >= FINE))]
+}
 
 /// Bars that are tried one after the other, by cells across; those between are tried once one is fine enough.
-const LADDER: [u32; 11] = [2, 3, 4, 5, 6, 8, 10, 12, 14, 17, 20];
+const LADDER: [u32; 11] = [2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20];
 
 /// Costs grow with the cells to this power at least.
 const GROWTH: f64 = 3.0;
@@ -44,12 +50,15 @@ pub struct Filling {
     letter: char,
     /// How many times dearer the best peer is asked to be.
     pub goal: f64,
+    /// How many times as dear as the cheapest peer that is within the limit another may be: one that costs more on some
+    /// bar cannot be the best on a finer one. What is unstructured needs bars on which that takes an hour.
+    pub how_dear: f64,
 }
 
 /// Boxes of five tetrahedra as the benchmark makes them, and tetrahedra in no order.
 pub const FILLINGS: [Filling; 2] = [
-    Filling { name: "structured", letter: 'n', goal: 40.0 },
-    Filling { name: "unstructured", letter: 'u', goal: 150.0 },
+    Filling { name: "structured", letter: 'n', goal: 40.0, how_dear: 4.0 },
+    Filling { name: "unstructured", letter: 'u', goal: 150.0, how_dear: 2.0 },
 ];
 
 /// Ours; ratios are taken to the first.
@@ -123,7 +132,7 @@ impl Course {
     /// CPU time [s] of a run on a bar, at least.
     fn foretold(&self, cells: u32) -> f64 {
         let growth = |last: u32| (f64::from(cells) / f64::from(last)).powf(GROWTH);
-        self.last.map_or(0.0, |(last, cost)| 1e-3 * FRAMES * cost * growth(last))
+        self.last.map_or(0.0, |(last, cost)| 1e-3 * f64::from(FRAMES[0]) * cost * growth(last))
     }
 
     /// What a row says, and whether the way goes on.
@@ -164,7 +173,7 @@ struct Bars<'a> {
 }
 
 impl Bars<'_> {
-    /// One run. One of the search that is known is not run again.
+    /// One run, of the search or of a round. What is known is not run again.
     fn run(
         &mut self,
         method: &Method,
@@ -179,9 +188,9 @@ impl Bars<'_> {
                 && row["cfg_asked"] == *settings
                 && row["filling"] == filling.name
                 && row["cells"] == cells
-                && row["round"].is_null()
+                && row["round"] == json!(round)
         };
-        if let (None, Some(known)) = (round, self.rows.iter().find(is_same)) {
+        if let Some(known) = self.rows.iter().find(is_same) {
             return Ok(known.clone());
         }
         let run =
@@ -223,7 +232,8 @@ impl Bars<'_> {
         cells: u32,
         course: &mut Course,
     ) -> Result<Attempt, String> {
-        if course.foretold(cells) > longest(&self.rows, filling.name) {
+        let needed = cells.max(least_cells(&self.rows, filling));
+        if course.foretold(needed) > longest(&self.rows, filling) {
             return Ok(Attempt::Dear);
         }
         let is_explicit = text.contains("fewest");
@@ -316,11 +326,24 @@ pub fn chosen<'a>(rows: &'a [Value], filling: &str) -> Vec<&'a Value> {
 }
 
 /// CPU time [s] that a peer's run may take, by the best that is known.
-fn longest(rows: &[Value], filling: &str) -> f64 {
-    let is_within_here =
-        |row: &&Value| row["filling"] == filling && !is_ours(row) && is_within(row);
-    let costs = rows.iter().filter(is_within_here).filter_map(cost);
-    costs.fold(LONGEST, |least, cost| least.min(1e-3 * FRAMES * HOW_DEAR * cost))
+fn longest(rows: &[Value], filling: &Filling) -> f64 {
+    let fits = |row: &&Value| row["filling"] == filling.name && !is_ours(row) && is_within(row);
+    let costs = rows.iter().filter(fits).filter_map(cost);
+    costs.fold(LONGEST, |least, cost| {
+        least.min(1e-3 * f64::from(FRAMES[0]) * filling.how_dear * cost)
+    })
+}
+
+/// Cells across, below which no peer can be within, as far as is known: where
+/// exact answers are off by more than twice the limit, a solver would have to be off by more than the limit to hide it.
+fn least_cells(rows: &[Value], filling: &Filling) -> u32 {
+    let exact = plan::settings(OURS[2], 1);
+    let fits = |row: &&Value| {
+        let is_exact = row["filling"] == filling.name && row["cfg_asked"] == exact;
+        is_exact && number(row, "error").is_some_and(|error| error.abs() <= 2.0 * LIMIT)
+    };
+    let cells = rows.iter().filter(fits).filter_map(|row| row["cells"].as_u64());
+    cells.min().map_or(LADDER[0], |cells| cells as u32)
 }
 
 /// Whether a row is of this project.
@@ -357,9 +380,7 @@ pub fn carry_out(options: &Options) -> Result<PathBuf, String> {
     if !options.again {
         environment.prepare()?;
         let truths = environment.bars()?;
-        let mut rows = if options.keep { results::read(&file)? } else { Vec::new() };
-        // Rounds are run anew: what is compared has run in the same hour.
-        rows.retain(|row| row["round"].is_null());
+        let rows = if options.keep { results::read(&file)? } else { Vec::new() };
         let text: String = rows.iter().map(|row| format!("{row}\n")).collect();
         write_whole(&file, &text)?;
         let about = json!({ "command": options.command, "cpu": runs::cpu_model(), "rounds": options.rounds,
@@ -442,8 +463,16 @@ mod tests {
         let best = row("MuJoCo, implicit", 9, 50.0, -0.04, Some(0.0));
         let rows =
             [row(AUTOMATIC, 2, 0.1, 0.0, None), row("Pbat, XPBD", 4, 1.0, 0.0, Some(0.2)), best];
-        assert!((longest(&rows, "structured") - 36.0).abs() < 1e-9);
-        assert!((longest(&rows, "unstructured") - LONGEST).abs() < 1e-9);
+        assert!((longest(&rows, &FILLINGS[0]) - 36.0).abs() < 1e-9);
+        assert!((longest(&rows, &FILLINGS[1]) - LONGEST).abs() < 1e-9);
+        let exact = |cells: u32, error: f64| {
+            let mut row = row(AUTOMATIC, cells, 1.0, error, None);
+            row["cfg_asked"] = plan::settings(OURS[2], 1);
+            row
+        };
+        let rows =
+            [exact(6, -0.08), exact(8, -0.05), exact(5, -0.11), row(AUTOMATIC, 2, 0.1, 0.0, None)];
+        assert_eq!(FILLINGS.map(|filling| least_cells(&rows, &filling)), [6, 2]);
         let slow = json!({ "status": "timeout", "cpu_ms": 900.0 });
         assert_eq!(Course::default().judge(&slow, 8), Attempt::Dear);
     }

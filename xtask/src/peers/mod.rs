@@ -43,8 +43,8 @@ Options:
   --no-largest      Leave out the largest bar in real time
   --only-sweeps     Run only the cost of a sweep; the rest is from the last run
   --continuum       Run only bars against the continuum: the coarsest on which each simulator's tip sinks as far
-                    as that of the body itself, and what a frame costs there; with --keep what was searched before
-                    is not searched again [document: docs/peers-continuum.md]
+                    as that of the body itself, and what a frame costs there; with --keep what ran before is not
+                    run again [document: docs/peers-continuum.md]
   --again           Run nothing; write the document from the last run's results
   --out FILE        The document; figures go to the folder of its name beside it [default: docs/peers.md]
 

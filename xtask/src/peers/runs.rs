@@ -47,7 +47,8 @@ impl Run<'_> {
         let mut command = environment.pinned_python();
         command.arg(environment.runner());
         if self.kind == Kind::Sunk {
-            command.arg("unjudged");
+            let frames = continuum::frames(self.method, plan::cells(&self.size.replace('u', "n")));
+            command.args(["unjudged", &frames.to_string()]);
         }
         match self.method.program {
             Program::Module { file, class, .. } => {
