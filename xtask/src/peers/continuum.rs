@@ -23,18 +23,8 @@ pub const LIMIT: f64 = 0.05;
 /// CPU time [s] that a run of 180 frames may take: half a second a frame, thirty times real time.
 pub const LONGEST: f64 = 100.0;
 
-/// Frames of a run, and of a module's on the finest bars, where it takes minutes: what is implicit has come to rest to a
-/// thousandth by then.
-const FRAMES: [u32; 2] = [180, 60];
-
-/// Cells across, from which a bar is one of the finest.
-const FINE: u32 = 15;
-
-/// Frames of a method's run on a bar of so many cells across.
-pub fn frames(method: &Method, cells: Option<u32>) -> u32 {
-    let is_module = matches!(method.program, Program::Module { .. });
-    FRAMES[usize::from(is_module && cells.is_some_and(|cells| cells >= FINE))]
-}
+/// Frames of a run.
+const FRAMES: f64 = 180.0;
 
 /// Bars that are tried one after the other, by cells across; those between are tried once one is fine enough.
 const LADDER: [u32; 11] = [2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20];
@@ -132,7 +122,7 @@ impl Course {
     /// CPU time [s] of a run on a bar, at least.
     fn foretold(&self, cells: u32) -> f64 {
         let growth = |last: u32| (f64::from(cells) / f64::from(last)).powf(GROWTH);
-        self.last.map_or(0.0, |(last, cost)| 1e-3 * f64::from(FRAMES[0]) * cost * growth(last))
+        self.last.map_or(0.0, |(last, cost)| 1e-3 * FRAMES * cost * growth(last))
     }
 
     /// What a row says, and whether the way goes on.
@@ -329,9 +319,7 @@ pub fn chosen<'a>(rows: &'a [Value], filling: &str) -> Vec<&'a Value> {
 fn longest(rows: &[Value], filling: &Filling) -> f64 {
     let fits = |row: &&Value| row["filling"] == filling.name && !is_ours(row) && is_within(row);
     let costs = rows.iter().filter(fits).filter_map(cost);
-    costs.fold(LONGEST, |least, cost| {
-        least.min(1e-3 * f64::from(FRAMES[0]) * filling.how_dear * cost)
-    })
+    costs.fold(LONGEST, |least, cost| least.min(1e-3 * FRAMES * filling.how_dear * cost))
 }
 
 /// Cells across, below which no peer can be within, as far as is known: where

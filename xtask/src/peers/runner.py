@@ -1,11 +1,10 @@
 """Starts a program of the benchmark with more sizes than it has, and references for them.
 
     python runner.py peers/mujoco_peer.py --peer MujocoFlex --scene A --size n12 ...
-    python runner.py unjudged 180 peers/mujoco_peer.py --peer MujocoFlex --scene A --size u12 ...
+    python runner.py unjudged peers/mujoco_peer.py --peer MujocoFlex --scene A --size u12 ...
     python runner.py references A n12 liver ...
 
-In the benchmark's folder; `unjudged` looks for no state of rest of the same mesh, so that errors are NaN, and a
-scene has so many frames. Besides its
+In the benchmark's folder; `unjudged` looks for no state of rest of the same mesh, so that errors are NaN. Besides its
 own sizes there are
 
   n12      a bar of 12 cells across
@@ -139,8 +138,6 @@ if sys.argv[1] == "references":
 else:
     sys.argv = sys.argv[1:]
     if sys.argv[0] == "unjudged":
-        frames = int(sys.argv[1])
-        sys.argv = sys.argv[2:]
-        scenes.build = lambda *a, **k: scenes.Scene(build(*a, **k), frames=frames)
+        sys.argv = sys.argv[1:]
         scenes.reference = lambda scene, material: (np.full_like(scene.X, np.nan), dict(converged=True))
     runpy.run_path(sys.argv[0], run_name="__main__")
