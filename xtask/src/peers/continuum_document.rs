@@ -257,12 +257,28 @@ fn section(filling: &Filling, rows: &[Value]) -> String {
         }
         table.row(line(row, format!("{}, not within", name(row)), shown(cost(row)), "-".into()));
     }
+    let rounds = bars.iter().map(|bar| bar.rounds.len()).min().unwrap_or(0);
     format!(
-        "## {} bars\n\nEach simulator on its coarsest bar within the limit. *not within*: on no bar that was tried; this \
-         is the best of them, which ran once, its own error counted where the mesh's does not hide it.\n\n{}",
+        "## {} bars\n\nEach simulator on its coarsest bar within the limit; rounds: {rounds}. *not within*: on no bar that \
+         was tried; this is the best of them, which ran once, its own error counted where the mesh's does not hide \
+         it.{}\n\n{}",
         filling.name[..1].to_uppercase() + &filling.name[1..],
+        not_run(filling, rows),
         table.to_markdown()
     )
+}
+
+/// Peers of which there is no row: a search that was broken off has not come to them.
+fn not_run(filling: &Filling, rows: &[Value]) -> String {
+    let has_run =
+        |label: &str| rows.iter().any(|row| row["filling"] == filling.name && row["peer"] == label);
+    let peers = METHODS.iter().filter(|method| method.program != Program::Ours);
+    let names: Vec<&str> =
+        peers.map(|method| method.label).filter(|label| !has_run(label)).collect();
+    match names.as_slice() {
+        [] => String::new(),
+        names => format!(" Not run on these bars: {}.", names.join("; ")),
+    }
 }
 
 /// Of each peer that is nowhere within the limit, the bar on which the larger of its two errors is least.
@@ -375,6 +391,10 @@ mod tests {
         ];
         let places = names.map(|name| text.find(name));
         assert!(places.is_sorted() && places[0].is_some(), "{text}");
+        assert!(
+            text.contains("Not run on these bars: MuJoCo, explicit; Pbat, VBD; Newton, XPBD;"),
+            "{text}"
+        );
         assert!(text.contains("| 2 | 5 | -20.0 | +40.0 | 3.00 | - |"), "{text}");
         assert_eq!(text.matches("Pbat, XPBD").count(), 1, "{text}");
         assert!(text.contains("| 9 | 5 | -4.9 | +0.0 | 30.0 | 60.0 |"), "{text}");
