@@ -191,17 +191,18 @@ fn summary(rows: &[Value]) -> String {
         let cells = |bar: &Bar<'_>| bar.found["cells"].to_string();
         let milliseconds = |bar: &Bar<'_>| shown(bar.cost());
         let over = |bar: &Bar<'_>| shown(ours.as_ref().and_then(|ours| bar.cost_over(ours)));
+        let those = if not_run(filling, rows).is_empty() { "" } else { ", of those that ran" };
         table.row(vec![
             filling.name.to_owned(),
             of(ours.as_ref(), &|bar| name(bar.found)),
             of(ours.as_ref(), &cells),
             of(ours.as_ref(), &milliseconds),
-            of(best, &|bar| name(bar.found)),
+            of(best, &|bar| name(bar.found)) + those,
             of(best, &cells),
             of(best, &milliseconds),
             format!("**{}**", of(best, &over)),
             filling.goal.to_string(),
-            of(lucky, &|bar| format!("{}, {} cells", name(bar.found), cells(bar))),
+            of(lucky, &|bar| format!("{}, {} cells", name(bar.found), cells(bar))) + those,
             of(lucky, &over),
         ]);
     }
@@ -375,7 +376,7 @@ mod tests {
     #[test]
     fn the_best_peer_is_told_apart_from_the_luckiest() {
         let text = summary(&rows());
-        let line = "| 0.500 | MuJoCo, implicit | 9 | 30.0 | **60.0** | 40 | Pbat, XPBD (substeps=20), 4 cells | 10.0 |";
+        let line = "| 0.500 | MuJoCo, implicit, of those that ran | 9 | 30.0 | **60.0** | 40 | Pbat, XPBD (substeps=20), 4 cells, of those that ran | 10.0 |";
         assert!(text.contains(line), "{text}");
         assert!(text.contains("| unstructured | none | none |"), "{text}");
     }
