@@ -6,12 +6,13 @@
 //! | to | look at |
 //! |---|---|
 //! | solve a step or a state of rest exactly | [`reference::Reference`] |
-//! | set up what the studies share | [`load_cases`], [`forms`], [`bending`], [`unstructured`], [`delaunay`], [`settling`], [`motion`], [`stress`] |
+//! | set up what the studies share | [`load_cases`], [`forms`], [`bending`], [`bars`], [`unstructured`], [`delaunay`], [`settling`], [`motion`], [`stress`] |
 //! | compare the library with what must come out | [`validate`] |
 //! | see what the published method does, and what became of its open problems | [`study`] |
 //! | ask the reference about a scene file | [`rest_command`] |
 //! | write reports with tables and plots | [`viscera_report`] |
 
+pub mod bars;
 pub mod bending;
 pub mod converge;
 pub mod delaunay;

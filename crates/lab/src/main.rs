@@ -3,12 +3,12 @@
 use anyhow::Result;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use viscera_lab::converge::{self, ConvergeArguments};
 use viscera_lab::rest_command::{self, RestArguments};
 use viscera_lab::sections::{Changes, Options, Program};
-use viscera_lab::{study, validate};
+use viscera_lab::{bars, study, validate};
 use viscera_resources::files::{prepare_folder, print};
 
 /// The truth beside the solver: studies that hold its claims against references.
@@ -42,6 +42,13 @@ enum Command {
     #[command(hide = true)]
     Organs {
         /// Folder for liver.txt, kidney.txt and bowel.txt
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+    // Likewise.
+    #[command(hide = true)]
+    Bars {
+        /// Folder for u2.txt and so on, and continuum.json
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
@@ -124,11 +131,8 @@ fn main() -> ExitCode {
         Command::Study(arguments) => study(arguments),
         Command::Rest(arguments) => rest_command::run(&arguments, &print),
         Command::Converge(arguments) => converge::run(&arguments, &print),
-        Command::Organs { out } => prepare_folder(&out, "--out")
-            .and_then(|()| validate::write_organs(&out))
-            .and_then(|files| {
-                print(&files.iter().map(|file| format!("{}\n", file.display())).collect::<String>())
-            }),
+        Command::Organs { out } => write(&out, validate::write_organs),
+        Command::Bars { out } => write(&out, bars::write_bars),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -137,6 +141,12 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Writes files to a folder and prints their names.
+fn write(out: &Path, files: fn(&Path) -> Result<Vec<PathBuf>>) -> Result<()> {
+    prepare_folder(out, "--out")?;
+    print(&files(out)?.iter().map(|file| format!("{}\n", file.display())).collect::<String>())
 }
 
 fn validate(ValidateArguments { quick, out, only, list }: ValidateArguments) -> Result<()> {

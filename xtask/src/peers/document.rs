@@ -75,7 +75,7 @@ fn opening(about: &Value, rows: &[Value]) -> String {
 }
 
 /// The range of the yardstick's times.
-fn load(rows: &[Value]) -> String {
+pub fn load(rows: &[Value]) -> String {
     let times = rows.iter().filter_map(|row| row["yardstick_ms"].as_array()).flatten();
     let times: Vec<f64> = times.filter_map(Value::as_f64).collect();
     let (low, high) = times.iter().fold((f64::MAX, 0.0_f64), |(a, b), t| (a.min(*t), b.max(*t)));
@@ -118,7 +118,7 @@ const LIMITS: &str = "\
 Two scenes of one bar with one Poisson ratio are not surgery: there is no contact, no cutting, no nearly
 incompressible tissue here. Several peers are made for many threads or for a GPU, and rigid bodies, robots or cloth
 beside tissue; one thread shows none of that. The mesh is the same for all, so that its own error, large for coarse
-linear tetrahedra, is in no column.";
+linear tetrahedra, is in no column: [Peers against the continuum](peers-continuum.md) has it.";
 
 /// What the names of our methods say already.
 const SAID: [&str; 5] = ["material", "method", "rebase", "keep_multipliers", "step_guard"];
@@ -134,7 +134,7 @@ fn name_of(entry: &Entry<'_>) -> String {
 }
 
 /// `key=value, ...`
-fn list(settings: &Value) -> String {
+pub fn list(settings: &Value) -> String {
     let Some(entries) = settings.as_object() else { return String::new() };
     let shown = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
     let texts: Vec<String> = entries.iter().map(|(k, v)| format!("{k}={}", shown(v))).collect();

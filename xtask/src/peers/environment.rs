@@ -3,6 +3,7 @@
 use super::plan::{METHODS, Method};
 use super::{Options, finish};
 use crate::cargo;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -183,6 +184,24 @@ impl Environment {
             Command::new(lab).args(["organs", "--out"]).arg(self.cache()),
             "mend the errors above",
         )
+    }
+
+    /// Makes the unstructured bars and what is known of the continuum, unless they are there: of each law the tip's sag
+    /// and its error [m].
+    pub fn bars(&self) -> Result<BTreeMap<String, [f64; 2]>, String> {
+        let file = self.cache().join("continuum.json");
+        if !file.is_file() && self.builds[0] {
+            let lab =
+                self.program.with_file_name(format!("viscera-lab{}", std::env::consts::EXE_SUFFIX));
+            finish(
+                "write the bars and find the continuum's sag, some minutes, once",
+                Command::new(lab).args(["bars", "--out"]).arg(self.cache()),
+                "mend the errors above",
+            )?;
+        }
+        let text = fs::read_to_string(&file)
+            .map_err(|error| format!("{}: {error}; carry the folder cache here", file.display()))?;
+        serde_json::from_str(&text).map_err(|error| format!("{}: {error}", file.display()))
     }
 
     /// A Python environment with the benchmark's requirements; a mark tells that it is complete.

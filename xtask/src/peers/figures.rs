@@ -83,7 +83,8 @@ fn data(scene: &str, size: &str, name: &str, entries: &[Entry<'_>]) -> Value {
     })
 }
 
-fn draw(environment: &Environment, data: &Value, file: &Path) -> Result<(), String> {
+/// Draws curves to a file.
+pub fn draw(environment: &Environment, data: &Value, file: &Path) -> Result<(), String> {
     let source = environment.results().join("figure.json");
     super::write_whole(&source, &data.to_string())?;
     let mut command = Command::new(&environment.program);

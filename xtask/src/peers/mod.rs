@@ -3,6 +3,8 @@
 //! The benchmark is a folder of Python programs that stays outside the project. This chore gives it
 //! an environment, runs it, and writes the report from its result lines.
 
+mod continuum;
+mod continuum_document;
 mod document;
 mod environment;
 mod figures;
@@ -40,6 +42,9 @@ Options:
   --no-sweeps       Leave out the cost of a sweep
   --no-largest      Leave out the largest bar in real time
   --only-sweeps     Run only the cost of a sweep; the rest is from the last run
+  --continuum       Run only bars against the continuum: the coarsest on which each simulator's tip sinks as far
+                    as that of the body itself, and what a frame costs there; with --keep what ran before is not
+                    run again [document: docs/peers-continuum.md]
   --again           Run nothing; write the document from the last run's results
   --out FILE        The document; figures go to the folder of its name beside it [default: docs/peers.md]
 
@@ -68,6 +73,7 @@ pub struct Options {
     sweeps: bool,
     largest: bool,
     only_sweeps: bool,
+    continuum: bool,
     /// As one would type it; without folders, which differ from machine to machine.
     command: String,
 }
@@ -102,8 +108,10 @@ impl Options {
                     }
                     command += &format!(" {flag} {value}");
                 }
-                "--only-sweeps" | "--quick" | "--large" | "--no-sweeps" | "--no-largest" => {
+                "--only-sweeps" | "--quick" | "--large" | "--no-sweeps" | "--no-largest"
+                | "--continuum" => {
                     options.only_sweeps |= flag == "--only-sweeps";
+                    options.continuum |= flag == "--continuum";
                     quick |= flag == "--quick";
                     large |= flag == "--large";
                     options.sweeps &= !["--no-sweeps", "--quick"].contains(&flag);
@@ -172,6 +180,9 @@ pub fn peers(arguments: &[&str]) -> ExitCode {
 }
 
 fn carry_out(options: &Options) -> Result<PathBuf, String> {
+    if options.continuum {
+        return continuum::carry_out(options);
+    }
     let environment = Environment::find(options)?;
     let out = options.out.clone().unwrap_or_else(|| environment.root.join("docs/peers.md"));
     if !options.again {

@@ -3,7 +3,7 @@
 use super::environment::Environment;
 use super::plan::{self, Method, Point, Program};
 use super::results::{cost, number, read_line};
-use super::{Options, finish, largest, sweeps, write_whole};
+use super::{Options, continuum, finish, largest, sweeps, write_whole};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -23,6 +23,8 @@ pub enum Kind {
     Motion,
     /// As the first, for the cost alone: its state of rest need not be known.
     Cost,
+    /// As the first, of nearly incompressible tissue: how far the tip sinks is judged elsewhere.
+    Sunk,
 }
 
 /// One run of one method.
@@ -44,6 +46,9 @@ impl Run<'_> {
     pub fn result(&self, environment: &Environment) -> Result<Value, String> {
         let mut command = environment.pinned_python();
         command.arg(environment.runner());
+        if self.kind == Kind::Sunk {
+            command.arg("unjudged");
+        }
         match self.method.program {
             Program::Module { file, class, .. } => {
                 command.arg(format!("peers/{file}")).args(["--peer", class]);
@@ -57,7 +62,11 @@ impl Run<'_> {
                 command.arg(format!("'{}' bench-scene", environment.program.display()));
             }
         }
-        command.args(["--scene", self.scene, "--size", self.size, "--max-seconds", LONGEST]);
+        let longest = match self.kind {
+            Kind::Sunk => continuum::LONGEST.to_string(),
+            _ => LONGEST.to_owned(),
+        };
+        command.args(["--scene", self.scene, "--size", self.size, "--max-seconds", &longest]);
         command.args(["--cfg", &self.settings.to_string()]);
         match self.kind {
             Kind::Settled => {}
@@ -66,6 +75,9 @@ impl Run<'_> {
             }
             Kind::Cost => {
                 command.arg("--timing-only");
+            }
+            Kind::Sunk => {
+                command.args(["--nu", continuum::POISSON]);
             }
         }
         let output = command.stderr(Stdio::piped()).output();
@@ -199,7 +211,8 @@ pub fn append(path: &Path, row: &Value) -> Result<(), String> {
     written.map_err(|error| format!("{}: {error}", path.display()))
 }
 
-fn cpu_model() -> String {
+/// The processor's name.
+pub fn cpu_model() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let value = |key: &str| {
         let line = text.lines().find(|line| line.starts_with(key))?;

@@ -234,3 +234,10 @@ pub fn response(body: &Body, element: Element, load: Load, poisson: f64) -> Resu
     let x = loaded.settle(load, None)?;
     loaded.response(load, &x)
 }
+
+/// The same of one tissue of any law; pressures and twists are those of [`YOUNG`].
+pub fn response_of(body: &Body, element: Element, load: Load, tissue: &Material) -> Result<f64> {
+    let mut loaded = Loaded::of_tissues(body, element, tissue, tissue)?;
+    let x = loaded.settle(load, None)?;
+    loaded.response(load, &x)
+}

@@ -17,6 +17,7 @@ use viscera::simulation::Simulation;
 use super::course::{Places, begin, distance, follow, small_steps};
 use super::methods::worse;
 use super::{Context, Section};
+use crate::bars::text;
 use crate::reference::Reference;
 use crate::settling::{Distance, KEPT_VELOCITY};
 use crate::unstructured::shuffled;
@@ -143,14 +144,9 @@ pub fn write_organs(folder: &Path) -> Result<Vec<PathBuf>> {
     for organ in ORGANS {
         let (mesh, scene) = (organ.mesh(false)?, organ.scene(YOUNGS[1], POISSONS[1])?);
         let held = begin::<f64>(scene, Some(&mesh))?.inputs_at(0.0).pins;
-        let mut is_held = vec![0; mesh.vertices().len()];
-        held.iter().for_each(|pin| is_held[pin.vertex as usize] = 1);
-        let mut text = format!("{} {}\n", mesh.vertices().len(), mesh.tets().len());
-        for (place, held) in mesh.vertices().iter().zip(is_held) {
-            let [x, y, z] = place.to_array();
-            text += &format!("{x:e} {y:e} {z:e} {held}\n");
-        }
-        mesh.tets().iter().for_each(|[a, b, c, d]| text += &format!("{a} {b} {c} {d}\n"));
+        let mut is_held = vec![false; mesh.vertices().len()];
+        held.iter().for_each(|pin| is_held[pin.vertex as usize] = true);
+        let text = text(&mesh, |vertex| is_held[vertex]);
         let file = folder.join(format!("{organ}.txt"));
         write_atomic(&file, text.as_bytes())?;
         files.push(file);
