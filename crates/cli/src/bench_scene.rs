@@ -39,7 +39,7 @@ pub struct BenchSceneArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
     /// Settings, KEY=VALUE separated by commas: material=stvk (default) or snh; every other key is
-    /// one of `solver` in `viscera scene describe`; method=auto (default) is what a scene would choose
+    /// one of `solver` in `viscera scene describe`, elements=plain unless given; method=auto (default) is what a scene would choose
     /// at that accuracy, with what is pinned as its fixings. May be repeated; the last value of a key counts
     #[arg(long, value_name = "KEY=VALUE,...")]
     cfg: Vec<String>,
@@ -98,7 +98,8 @@ material = { young = \"1 kPa\" }";
 
 fn read_settings(lists: &[String]) -> Result<(MaterialModel, SolverSettings)> {
     let mut material = MaterialModel::SaintVenantKirchhoff;
-    let mut overrides = Vec::new();
+    // The benchmark's references are of linear tetrahedra.
+    let mut overrides = vec![("solver.elements".to_owned(), "plain")];
     for setting in lists.iter().flat_map(|list| list.split(',')).map(str::trim) {
         match setting.split_once('=') {
             _ if setting.is_empty() => {}
