@@ -7,8 +7,8 @@ use std::sync::mpsc::{Sender, channel};
 use viscera::model::ModelBuilder;
 use viscera::scalar::Vec3;
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, Count, Integrator, Method, NeoHookean,
-    Precision, SolverSettings, Start, Threads,
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, Elements, Integrator, Method,
+    NeoHookean, Precision, SolverSettings, Start, Threads,
 };
 use viscera::solver::balance::ForceBalance;
 use viscera::solver::{Inputs, Solver, StepError};
@@ -72,13 +72,18 @@ impl SolverVariant {
             integrator: Integrator::ImplicitEuler,
             ..set.clone()
         };
+        // Those that all methods have: with others they would approach another place.
+        let elements = Elements::Plain;
         let (exact, jacobi, anderson) = match self {
             Self::AsSet => return base,
-            Self::QuasiNewton => return SolverSettings { method: Method::QuasiNewton, ..base },
+            Self::QuasiNewton => {
+                return SolverSettings { method: Method::QuasiNewton, elements, ..base };
+            }
             Self::Xpbd { exact, jacobi, anderson } => (exact, jacobi, anderson),
         };
         SolverSettings {
             method: Method::Xpbd,
+            elements,
             relaxation: 1.0,
             colors: if jacobi { Colors::Limited(1) } else { Colors::Unlimited },
             acceleration: if anderson { Acceleration::Anderson } else { Acceleration::None },

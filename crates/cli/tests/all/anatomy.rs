@@ -8,13 +8,14 @@ fn scene(name: &str) -> PathBuf {
 }
 
 /// Runs a scene with its pull done by `pull`, for so many frames.
-fn pull(name: &str, motion: &str, pull: &str, frames: &str) {
+fn pull(name: &str, motion: &str, pull: &str, frames: &str, elements: &str) {
     let Some(folder) = crate::data::data_folder() else { return };
     // The program runs in a folder of its own.
     let folder = std::path::absolute(folder).expect("a path");
     let bench = Bench::new("");
     let (scene, folder) = (scene(name).display().to_string(), folder.display().to_string());
     let time = format!("motion.{motion}.keys.0.time=\"{pull}\"");
+    let elements = format!("solver.elements={elements}");
     let end = bench.end_of(&[
         "run",
         &scene,
@@ -27,6 +28,8 @@ fn pull(name: &str, motion: &str, pull: &str, frames: &str) {
         "--set",
         &time,
         "--set",
+        &elements,
+        "--set",
         "output.picture_size=[320, 240]",
         "--every",
         "100",
@@ -35,8 +38,12 @@ fn pull(name: &str, motion: &str, pull: &str, frames: &str) {
     println!("{}{}", end.stderr, end.stdout);
     let summary = bench.summary("out");
     assert_eq!(summary["finished"], true);
+    // Recovered-gradient tetrahedra may leave one in a thousand inside out: their energy is that of averages.
+    let tets = summary["model"]["tets"].as_u64().expect("a count");
+    let most = if elements.ends_with("plain") { 0 } else { tets / 1000 };
     for frame in summary["frames"].as_array().expect("frames") {
-        assert_eq!(frame["deformation"]["inverted"], 0, "at {} s", frame["time"]);
+        let inverted = frame["deformation"]["inverted"].as_u64();
+        assert!(inverted.is_some_and(|inverted| inverted <= most), "at {} s", frame["time"]);
     }
     // Pulled by centimetres, so stretched, and not torn apart.
     let stretch = last_frame(&summary)["deformation"]["largest_stretch"].as_f64();
@@ -47,12 +54,12 @@ fn pull(name: &str, motion: &str, pull: &str, frames: &str) {
 
 #[test]
 fn a_liver_from_a_scan_is_lifted_without_inverting() {
-    pull("liver.toml", "retractor", "0.4 s", "36");
+    ["plain", "auto"].map(|elements| pull("liver.toml", "retractor", "0.4 s", "36", elements));
 }
 
 #[test]
 fn a_tongue_with_poor_tets_is_drawn_out_without_inverting() {
-    pull("tongue.toml", "forceps", "0.2 s", "14");
+    ["plain", "auto"].map(|elements| pull("tongue.toml", "forceps", "0.2 s", "14", elements));
 }
 
 /// The meshes are not part of the project: where they are not at hand, that is what is said.
