@@ -54,12 +54,16 @@ fn pull(name: &str, motion: &str, pull: &str, frames: &str, elements: &str) {
 
 #[test]
 fn a_liver_from_a_scan_is_lifted_without_inverting() {
-    ["plain", "auto"].map(|elements| pull("liver.toml", "retractor", "0.4 s", "36", elements));
+    for elements in ["plain", "auto"] {
+        pull("liver.toml", "retractor", "0.4 s", "36", elements);
+    }
 }
 
 #[test]
 fn a_tongue_with_poor_tets_is_drawn_out_without_inverting() {
-    ["plain", "auto"].map(|elements| pull("tongue.toml", "forceps", "0.2 s", "14", elements));
+    for elements in ["plain", "auto"] {
+        pull("tongue.toml", "forceps", "0.2 s", "14", elements);
+    }
 }
 
 /// The meshes are not part of the project: where they are not at hand, that is what is said.
