@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::time::Instant;
 use viscera::settings::DeviceRequest;
 use viscera::simulation::Assembly;
+use viscera_stage::build;
 
 use super::{Cure, Event, Running, Worker};
 use crate::engine::setup::{BuildRequest, MOST_GHOST_TETS, Setup, expectation};
-use crate::engine::simulation::build;
 
 impl Worker {
     pub(super) fn load(&mut self, request: BuildRequest) {

@@ -1,18 +1,19 @@
-//! A simulation in either precision, with the window's numbers for the patches that it holds.
+//! A simulation in either precision, with the caller's numbers for the patches that it holds.
 
+use viscera::model::ModelBuilder;
 use viscera::scalar::{Real, Vec3};
 use viscera::scene::{Patch, Scene, Selector};
-use viscera::settings::{Place, Precision};
-use viscera::simulation::{
-    Assembly, FrameError, Live, PatchForce, PatchKind, ResolvedPatch, Simulation,
-};
+use viscera::settings::{Place, Precision, SolverSettings};
+use viscera::simulation::{Assembly, Live, PatchForce, PatchKind, ResolvedPatch, Simulation};
+use viscera::solver::Inputs;
 
-use super::color::surface_values;
-use super::snapshot::{Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch};
-use crate::choices::Settings;
-use crate::probe::NextStep;
+use crate::color::surface_values;
+use crate::snapshot::{Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch};
 
-/// One of the simulations that the thread computes, in whichever precision.
+/// Settings to change: keys and values as one writes them.
+pub type Settings = Vec<(String, String)>;
+
+/// One simulation, in whichever precision.
 pub trait Run: Send {
     /// What computes it, and why; what a person should know of that.
     fn device(&self) -> (String, Option<String>);
@@ -53,6 +54,23 @@ pub struct GripTarget {
     pub count: u32,
     /// Total stiffness [N/m] of the springs; rigidly where there is none.
     pub stiffness: Option<f64>,
+}
+
+/// The step that comes next: the state before it, and what acts in it.
+#[derive(Clone, Debug)]
+pub struct NextStep {
+    /// Settings in force.
+    pub solver: SolverSettings,
+    /// Meshes with their materials.
+    pub builder: ModelBuilder,
+    /// [m], shape [vertex_count].
+    pub positions: Vec<Vec3<f64>>,
+    /// [m/s], shape [vertex_count].
+    pub velocities: Vec<Vec3<f64>>,
+    /// What acts in the step.
+    pub inputs: Inputs<f64>,
+    /// The step [s].
+    pub dt: f64,
 }
 
 /// Builds a simulation in the precision that its scene asks for.
@@ -160,14 +178,14 @@ impl<S: Real> Run for SimulationRun<S> {
     }
 
     fn advance(&mut self) -> Result<(), String> {
-        self.simulation.advance().map_err(explained)
+        self.simulation.advance().map_err(text)
     }
 
     fn measure(&mut self) -> Result<(), String> {
         if self.simulation.frame() == 0 {
             return Ok(());
         }
-        self.simulation.measure().map_err(explained)?;
+        self.simulation.measure().map_err(text)?;
         let report = self.simulation.report();
         self.measures.residual = report.relative_residual;
         self.measures.energy = report.energy;
@@ -228,10 +246,5 @@ impl<S: Real> Run for SimulationRun<S> {
 }
 
 fn text(error: impl std::fmt::Display) -> String {
-    error.to_string()
-}
-
-/// What failed, with the window's next moves.
-fn explained(error: FrameError) -> String {
     error.to_string()
 }
