@@ -3,8 +3,7 @@
 //! Every operation is the one that `f32` and `f64` do themselves, so that results are the same bits. Relaxed
 //! instructions, whose results differ between machines, are not used.
 #![allow(unsafe_code)]
-// SAFETY, of every intrinsic here: a module that holds these instructions is refused where they are unknown, so that
-// nothing of it runs.
+// SAFETY, of loads and stores here: their callers' promises, see [`Lanes`].
 #![allow(clippy::undocumented_unsafe_blocks)]
 
 use std::arch::wasm32::*;
@@ -53,7 +52,7 @@ macro_rules! simd128_lanes {
             type Output = Self;
             #[inline(always)]
             fn neg(self) -> Self {
-                Self(unsafe { $neg(self.0) })
+                Self($neg(self.0))
             }
         }
 
@@ -84,36 +83,36 @@ macro_rules! simd128_lanes {
             const EPSILON: f64 = <$real as Scalar>::EPSILON;
             #[inline(always)]
             fn from_f64(value: f64) -> Self {
-                Self(unsafe { $set(value as $real) })
+                Self($set(value as $real))
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
-                Self(unsafe { $sqrt(self.0) })
+                Self($sqrt(self.0))
             }
             #[inline(always)]
             fn abs(self) -> Self {
-                Self(unsafe { $abs(self.0) })
+                Self($abs(self.0))
             }
             // "Pseudo" minimum and maximum: a comparison and a choice, the first where it is false.
             #[inline(always)]
             fn min(self, other: Self) -> Self {
-                Self(unsafe { $min(self.0, other.0) })
+                Self($min(self.0, other.0))
             }
             #[inline(always)]
             fn max(self, other: Self) -> Self {
-                Self(unsafe { $max(self.0, other.0) })
+                Self($max(self.0, other.0))
             }
             #[inline(always)]
             fn less(self, other: Self) -> v128 {
-                unsafe { $less(self.0, other.0) }
+                $less(self.0, other.0)
             }
             #[inline(always)]
             fn all(mask: v128) -> bool {
-                unsafe { $all(mask) }
+                $all(mask)
             }
             #[inline(always)]
             fn select(mask: v128, if_true: Self, if_false: Self) -> Self {
-                Self(unsafe { v128_bitselect(if_true.0, if_false.0, mask) })
+                Self(v128_bitselect(if_true.0, if_false.0, mask))
             }
         }
     };
@@ -132,7 +131,7 @@ macro_rules! simd128_lanes {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                Self(unsafe { $intrinsic(self.0, other.0) })
+                Self($intrinsic(self.0, other.0))
             }
         }
     };
@@ -141,7 +140,7 @@ macro_rules! simd128_lanes {
         const WIDTH: usize = $width;
         #[inline(always)]
         fn splat(value: $real) -> Self {
-            Self(unsafe { $set(value) })
+            Self($set(value))
         }
         #[inline(always)]
         fn load(group: &Eight<$real>, first: usize) -> Self {
@@ -234,19 +233,15 @@ impl Lanes for F32x4 {
 
 /// Transposes a 4 x 4 matrix.
 #[inline(always)]
-unsafe fn transpose([a, b, c, d]: [v128; 4]) -> [v128; 4] {
-    unsafe {
-        let (ab_low, ab_high) =
-            (i32x4_shuffle::<0, 4, 1, 5>(a, b), i32x4_shuffle::<2, 6, 3, 7>(a, b));
-        let (cd_low, cd_high) =
-            (i32x4_shuffle::<0, 4, 1, 5>(c, d), i32x4_shuffle::<2, 6, 3, 7>(c, d));
-        [
-            i64x2_shuffle::<0, 2>(ab_low, cd_low),
-            i64x2_shuffle::<1, 3>(ab_low, cd_low),
-            i64x2_shuffle::<0, 2>(ab_high, cd_high),
-            i64x2_shuffle::<1, 3>(ab_high, cd_high),
-        ]
-    }
+fn transpose([a, b, c, d]: [v128; 4]) -> [v128; 4] {
+    let (ab_low, ab_high) = (i32x4_shuffle::<0, 4, 1, 5>(a, b), i32x4_shuffle::<2, 6, 3, 7>(a, b));
+    let (cd_low, cd_high) = (i32x4_shuffle::<0, 4, 1, 5>(c, d), i32x4_shuffle::<2, 6, 3, 7>(c, d));
+    [
+        i64x2_shuffle::<0, 2>(ab_low, cd_low),
+        i64x2_shuffle::<1, 3>(ab_low, cd_low),
+        i64x2_shuffle::<0, 2>(ab_high, cd_high),
+        i64x2_shuffle::<1, 3>(ab_high, cd_high),
+    ]
 }
 
 /// A point of two registers: x and y, z and w.
@@ -257,13 +252,11 @@ unsafe fn halves(point: *const Point<f64>) -> [v128; 2] {
 
 /// Both registers of the points of two lanes.
 #[inline(always)]
-unsafe fn of_lanes(Point { x, y, z, w }: Point<F64x2>) -> [[v128; 2]; 2] {
-    unsafe {
-        [
-            [i64x2_shuffle::<0, 2>(x.0, y.0), i64x2_shuffle::<0, 2>(z.0, w.0)],
-            [i64x2_shuffle::<1, 3>(x.0, y.0), i64x2_shuffle::<1, 3>(z.0, w.0)],
-        ]
-    }
+fn of_lanes(Point { x, y, z, w }: Point<F64x2>) -> [[v128; 2]; 2] {
+    [
+        [i64x2_shuffle::<0, 2>(x.0, y.0), i64x2_shuffle::<0, 2>(z.0, w.0)],
+        [i64x2_shuffle::<1, 3>(x.0, y.0), i64x2_shuffle::<1, 3>(z.0, w.0)],
+    ]
 }
 
 /// Adds to a point.
