@@ -4,8 +4,11 @@ use viscera::model::ModelBuilder;
 use viscera::scalar::{Real, Vec3};
 use viscera::scene::{Patch, Scene, Selector};
 use viscera::settings::{Place, Precision, SolverSettings};
-use viscera::simulation::{Assembly, Live, PatchForce, PatchKind, ResolvedPatch, Simulation};
+use viscera::simulation::{
+    Assembly, Live, PatchForce, PatchKind, ResolvedPatch, Simulation, SimulationError,
+};
 use viscera::solver::Inputs;
+use viscera::solver::gpu::Device;
 
 use crate::color::surface_values;
 use crate::snapshot::{Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch};
@@ -31,6 +34,18 @@ pub trait Run: Send {
     fn reset(&mut self) -> Result<(), String>;
     /// Computes a frame.
     fn advance(&mut self) -> Result<(), String>;
+    /// Begins a frame without waiting for what computes it; `measured` where [`Run::measure`] follows.
+    fn send(&mut self, measured: bool) -> Result<(), String>;
+    /// Takes over the frame that was sent; false while it is under way.
+    fn receive(&mut self) -> Result<bool, String>;
+    /// Whether a frame was sent that was not taken over.
+    fn is_under_way(&self) -> bool;
+    /// Another device for settings that ask for one, or none; it goes on from the last frame.
+    fn offer(&mut self, device: Option<&Device>) -> Result<(), String>;
+    /// The scene as it is now.
+    fn scene(&self) -> &Scene;
+    /// The solver's settings in force, with a method in the place of "auto".
+    fn solver(&self) -> &SolverSettings;
     /// Measures what it is now: residual, energies, stresses.
     fn measure(&mut self) -> Result<(), String>;
     /// Fills a snapshot with its state now and what was measured last.
@@ -73,11 +88,24 @@ pub struct NextStep {
     pub dt: f64,
 }
 
-/// Builds a simulation in the precision that its scene asks for.
-pub fn build(scene: Scene, assembly: Assembly) -> Result<Box<dyn Run>, String> {
-    Ok(match scene.solver.precision {
-        Precision::F32 => Box::new(SimulationRun::<f32>::new(scene, assembly)?),
-        Precision::F64 => Box::new(SimulationRun::<f64>::new(scene, assembly)?),
+/// Builds a simulation in the precision that its scene asks for; on the caller's device, where it has one and the
+/// settings ask for one.
+pub fn build(
+    scene: Scene,
+    assembly: Assembly,
+    device: Option<&Device>,
+) -> Result<Box<dyn Run>, String> {
+    Ok(match (scene.solver.precision, device) {
+        (Precision::F32, Some(device)) => {
+            let simulation = Simulation::with_device(scene, assembly, device.clone());
+            Box::new(SimulationRun::new(simulation)?)
+        }
+        (Precision::F32, None) => {
+            Box::new(SimulationRun::new(Simulation::<f32>::new(scene, assembly))?)
+        }
+        (Precision::F64, _) => {
+            Box::new(SimulationRun::new(Simulation::<f64>::new(scene, assembly))?)
+        }
     })
 }
 
@@ -89,8 +117,8 @@ struct SimulationRun<S> {
 }
 
 impl<S: Real> SimulationRun<S> {
-    fn new(scene: Scene, assembly: Assembly) -> Result<Self, String> {
-        let simulation = Simulation::new(scene, assembly).map_err(text)?;
+    fn new(simulation: Result<Simulation<S>, SimulationError>) -> Result<Self, String> {
+        let simulation = simulation.map_err(text)?;
         Ok(Self { simulation, held: Vec::new(), measures: Measures::default() })
     }
 
@@ -179,6 +207,30 @@ impl<S: Real> Run for SimulationRun<S> {
 
     fn advance(&mut self) -> Result<(), String> {
         self.simulation.advance().map_err(text)
+    }
+
+    fn send(&mut self, measured: bool) -> Result<(), String> {
+        self.simulation.send_frame(measured).map_err(text)
+    }
+
+    fn receive(&mut self) -> Result<bool, String> {
+        self.simulation.take_frame().map_err(text)
+    }
+
+    fn is_under_way(&self) -> bool {
+        self.simulation.is_under_way()
+    }
+
+    fn offer(&mut self, device: Option<&Device>) -> Result<(), String> {
+        self.simulation.offer_device(device.cloned()).map_err(text)
+    }
+
+    fn scene(&self) -> &Scene {
+        self.simulation.scene()
+    }
+
+    fn solver(&self) -> &SolverSettings {
+        self.simulation.solver()
     }
 
     fn measure(&mut self) -> Result<(), String> {

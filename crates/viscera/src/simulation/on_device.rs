@@ -14,6 +14,12 @@ impl<S: Real> Simulation<S> {
     pub fn gpu(&self) -> Option<&GpuSolver> {
         self.backend.device().map(|device| device.solver())
     }
+
+    /// Another device for settings that ask for one, or none: the old one may be lost. It goes on from the last frame.
+    pub fn offer_device(&mut self, device: Option<Device>) -> Result<(), LiveError> {
+        self.offered = Offered { device };
+        self.rebuild_on_device(self.scene().clone(), false)
+    }
 }
 
 impl Simulation<f32> {
@@ -25,12 +31,6 @@ impl Simulation<f32> {
         device: Device,
     ) -> Result<Self, SimulationError> {
         Self::offered(scene, assembly, Offered { device: Some(device) })
-    }
-
-    /// Another device for settings that ask for one, or none: the old one may be lost. It goes on from the last frame.
-    pub fn offer_device(&mut self, device: Option<Device>) -> Result<(), LiveError> {
-        self.offered = Offered { device };
-        self.rebuild_on_device(self.scene().clone(), false)
     }
 
     /// A simulation on a device of the caller's, a window's for example, however small the mesh. The
