@@ -29,7 +29,7 @@ export function ticks(low, high, most) {
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((factor) => factor * power).find((step) => step >= rough * (1 - 1e-9)) ?? rough;
   const marks = [];
-  for (let mark = Math.ceil(low / step - 1e-9); mark * step <= high + 1e-9 * step; mark += 1) marks.push(mark * step);
+  for (let mark = Math.ceil(low / step - 1e-9); mark * step <= high + 1e-9 * step; mark += 1) marks.push(mark * step + 0);
   return marks;
 }
 
@@ -110,7 +110,7 @@ export class Plot {
     const { least, logarithmic } = this.#look;
     if (!logarithmic) {
       const high = 1.08 * Math.max(least, ...values);
-      return { marks: ticks(0, high, 3), share: (/** @type {number} */ value) => value / high, text: (/** @type {number} */ v) => String(Number(v.toPrecision(3))) };
+      return { marks: ticks(0, high, 4), share: (/** @type {number} */ value) => value / high, text: (/** @type {number} */ v) => String(Number(v.toPrecision(3))) };
     }
     const high = Math.ceil(Math.log10(Math.max(least, ...values)) + 1e-9);
     const low = Math.min(high - 2, Math.floor(Math.log10(Math.min(least, ...values)) + 1e-9));

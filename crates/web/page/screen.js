@@ -9,7 +9,7 @@
 const SHARPEST = 2;
 /** The same without a graphics device, and the coarsest picture that is still one. */
 const SHARPEST_2D = 1.5;
-const COARSEST_2D = 0.2;
+const COARSEST_2D = 0.35;
 /** What a picture may cost without a graphics device [ms]: half of a frame at 60 per second, the other half simulates. */
 const PICTURE_2D = 8;
 /** Pictures between two changes of their size, so that it does not flicker. */
@@ -110,7 +110,8 @@ export class Screen {
     this.#drawn += 1;
     if (this.#drawn < SETTLE) return;
     // The cost goes with the number of pixels.
-    const wanted = this.#scale * Math.sqrt(PICTURE_2D / Math.max(this.#cost, 0.1));
+    const share = Math.sqrt(PICTURE_2D / Math.max(this.#cost, 0.1));
+    const wanted = this.#scale * Math.min(Math.max(share, 0.7), 1.3);
     const scale = Math.min(Math.max(wanted, COARSEST_2D), Math.min(this.#ratio, SHARPEST_2D));
     if (Math.abs(scale / this.#scale - 1) < 0.15) return;
     this.#scale = scale;

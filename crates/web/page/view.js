@@ -48,6 +48,11 @@ export function size(vector) {
   return Math.hypot(...vector);
 }
 
+/** @param {number | null | undefined} cost */
+function milliseconds(cost) {
+  return cost === null || cost === undefined ? "…" : `${cost.toFixed(1)} ms`;
+}
+
 /** @param {number} value */
 function scientific(value) {
   return Number.isFinite(value) ? value.toExponential(1).replace("e+", "e") : "…";
@@ -114,7 +119,7 @@ export class View {
     report.runs.forEach((run, side) => {
       const suffix = report.runs.length > 1 ? `, ${"AB"[side]}` : "";
       const cost = costs[side];
-      lines.push([`frame${suffix}`, cost === null || cost === undefined ? "…" : `${cost.toFixed(1)} ms of ${(1e3 * this.frame).toFixed(1)} ms`]);
+      lines.push([`frame${suffix}`, `${milliseconds(cost)} of ${(1e3 * this.frame).toFixed(1)} ms`]);
       lines.push([`residual${suffix}`, scientific(run.residual)]);
       if (run.inverted > 0) lines.push([`inverted tetrahedra${suffix}`, String(run.inverted)]);
       if (run.rejected > 0) lines.push([`rejected substeps${suffix}`, String(run.rejected)]);
@@ -149,22 +154,15 @@ export class View {
 
   /** The line below, and who computes what. @param {Report} report */
   #showStatus({ report, costs, clock, screen }) {
-    const parts = [make("span", {}, `t = ${report.time.toFixed(2)} s`)];
-    report.runs.forEach((run, side) => {
-      const cost = costs[side];
-      const name = report.runs.length > 1 ? `${"AB"[side]} ` : "";
-      const time = cost === null || cost === undefined ? "…" : `${cost.toFixed(1)} ms`;
-      parts.push(make("span", {}, name, make("b", {}, time), ` per frame of ${(1e3 * this.frame).toFixed(1)} ms`));
-      parts.push(make("span", { title: "Unbalanced forces over loads; at rest, how well the equations hold" }, `residual ${scientific(run.residual)}`));
-    });
-    if (clock.stopped) parts.push(make("span", {}, "stopped"));
-    else if (!clock.playing) parts.push(make("span", {}, "paused"));
-    else parts.push(make("span", {}, `${(clock.rate * this.frame).toFixed(2)} x real time, ${clock.drawn.toFixed(0)} drawn/s`));
-    report.runs.forEach((run, side) => {
-      const name = report.runs.length > 1 ? `${"AB"[side]}: ` : "";
-      parts.push(make("span", { title: run.device }, `${name}${METHODS[run.method] ?? run.method}, ${run.device}`));
-    });
-    this.#status.replaceChildren(...parts);
+    const names = report.runs.map((_, side) => (report.runs.length > 1 ? `${"AB"[side]} ` : ""));
+    const times = report.runs.map((_, side) => `${names[side]}${milliseconds(costs[side])}`).join(", ");
+    const pace = clock.stopped ? "stopped" : clock.playing ? `${(clock.rate * this.frame).toFixed(2)} x real time` : "paused";
+    const drawn = clock.playing ? ` · ${clock.drawn.toFixed(0)} drawn/s` : "";
+    const residuals = report.runs.map((run, side) => `${names[side]}${scientific(run.residual)}`).join(", ");
+    const numbers = make("p", {}, `t = ${report.time.toFixed(2)} s · `, make("b", {}, times),
+      ` per frame of ${(1e3 * this.frame).toFixed(1)} ms · ${pace} · residual ${residuals}${drawn}`);
+    const who = report.runs.map((run, side) => make("p", { class: "who", title: run.device }, `${names[side]}${METHODS[run.method] ?? run.method}. ${run.device}`));
+    this.#status.replaceChildren(numbers, ...who);
     const lines = report.runs.map((run, side) => computes(run, report.runs.length > 1 ? `${"AB"[side]}: ` : ""));
     if (screen.plain) lines.push(`The picture is drawn by the processor, ${screen.size.join(" x ")} pixels.`);
     const text = lines.join("\n");
