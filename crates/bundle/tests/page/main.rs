@@ -3,4 +3,5 @@
 mod browser;
 mod driver;
 mod offline;
+mod page;
 mod setup;
