@@ -159,10 +159,9 @@ export class App {
    */
   async #set(run, pairs, choice = false) {
     const runs = run === "all" ? this.values.map((_, at) => at) : [run];
-    const settings = pairs.flatMap(([key, value]) => runs.map((at) => [at, key, value]));
     try {
       const before = this.values;
-      const answer = await this.#host.call("set", { settings, choice });
+      const answer = await this.#host.call("set", { runs, settings: pairs, choice });
       for (const [key, value] of pairs) this.#note(run, key, value, before);
       if (!choice && pairs.some(([key]) => key.startsWith("solver."))) this.link.mesh ??= this.loaded.mesh;
       this.#take(answer);
@@ -236,8 +235,15 @@ export class App {
       for (const [key, value] of pairs) put(this.link.settings, key, value);
       this.write();
     }
-    this.#messages.tell(`Chosen for this device: ${choice.why}`);
+    this.#messages.tell(this.choiceText);
     this.#changed();
+  }
+
+  /** What was chosen, and why. */
+  get choiceText() {
+    const { device, accuracy, mesh, why } = this.chosen;
+    const cells = mesh === 1 ? "the scene’s own mesh" : `cells ${mesh} times as large`;
+    return `Chosen for 60 frames per second on this device: ${device.toUpperCase()}, accuracy “${accuracy}”, ${cells}; ${why}.`;
   }
 
   /** Measures once more, and chooses anew. */
@@ -279,7 +285,7 @@ export class App {
   /** A file that repeats everything. */
   async save() {
     try {
-      const scene = await this.#host.call("replay", { run: 0 });
+      const scene = await this.#host.call("replay");
       const stem = String(this.loaded.name).replace(/\.[a-z]+$/i, "").replace(/[^\w-]+/g, "_");
       download(`${stem}_changed.toml`, scene);
     } catch (error) {
