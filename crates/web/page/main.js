@@ -121,7 +121,6 @@ function refresh() {
   if (!loaded) return;
   controls.show({ loaded, values, link, own });
   view.frame = loaded.frame;
-  view.color = link.color;
   byId("beside").setAttribute("aria-pressed", String(link.beside !== null));
   document.title = `${loaded.title || loaded.name} · viscera`;
   const lines = [];
