@@ -1,8 +1,9 @@
-//! Project chores: `cargo xtask test`, `cargo xtask setup`, `cargo xtask peers`.
+//! Project chores: `cargo xtask test`, `cargo xtask setup`, `cargo xtask web`, `cargo xtask peers`.
 
 mod peers;
 mod setup;
 mod test;
+mod web;
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
@@ -17,6 +18,8 @@ Commands:
   test --all    What must hold before a change is merged: all tests with real data, a second graphics
                 driver, documentation, the main job in a release build
   setup         Install what the tests lack: a software graphics driver, rustfmt, clippy
+  web           Build the page, the same simulation in a browser, as a folder of static files
+  web --serve   And serve it on this machine
   peers         Compare with other simulators and write docs/peers.md; `cargo xtask peers --help`
   help          Print this text
 
@@ -35,6 +38,8 @@ fn main() -> ExitCode {
         ["test", options @ ..] => return test::test(options),
         ["setup", ..] if wants_help => println!("{}", setup::HELP),
         ["setup", options @ ..] => return setup::setup(options),
+        ["web", ..] if wants_help => println!("{}", web::HELP),
+        ["web", options @ ..] => return web::web(options),
         _ if wants_help => println!("{HELP}"),
         [other, ..] => {
             eprintln!("unknown command `{other}`; `cargo xtask help` lists what there is");

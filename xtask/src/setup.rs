@@ -89,7 +89,7 @@ pub fn setup(options: &[&str]) -> ExitCode {
 pub fn provide(all: bool) -> Vec<String> {
     for need in needs(all).filter(|need| !(need.is_there)()) {
         match need.source.command() {
-            Some(commands) => need.install(commands),
+            Some(commands) => install(need.name, commands),
             None => println!("No {}, and no way to install it from here.", need.name),
         }
     }
@@ -111,21 +111,19 @@ fn needs(all: bool) -> impl Iterator<Item = &'static Need> {
     FAST.iter().chain(second).filter(move |need| linux || !is_driver(need))
 }
 
-impl Need {
-    /// Says what it is about to do; asks where somebody can answer.
-    fn install(&self, commands: Vec<Vec<String>>) {
-        let lines: Vec<String> = commands.iter().map(|words| words.join(" ")).collect();
-        println!("There is no {}. To install it:\n    {}", self.name, lines.join("\n    "));
-        if std::env::var_os("CI").is_none() && std::io::stdin().is_terminal() && !agreed() {
+/// Says what it is about to do; asks where somebody can answer.
+pub fn install(name: &str, commands: Vec<Vec<String>>) {
+    let lines: Vec<String> = commands.iter().map(|words| words.join(" ")).collect();
+    println!("There is no {name}. To install it:\n    {}", lines.join("\n    "));
+    if std::env::var_os("CI").is_none() && std::io::stdin().is_terminal() && !agreed() {
+        return;
+    }
+    for words in commands {
+        let mut command = Command::new(&words[0]);
+        command.args(&words[1..]).env("DEBIAN_FRONTEND", "noninteractive");
+        if !command.status().is_ok_and(|status| status.success()) {
+            println!("`{}` failed.", words.join(" "));
             return;
-        }
-        for words in commands {
-            let mut command = Command::new(&words[0]);
-            command.args(&words[1..]).env("DEBIAN_FRONTEND", "noninteractive");
-            if !command.status().is_ok_and(|status| status.success()) {
-                println!("`{}` failed.", words.join(" "));
-                return;
-            }
         }
     }
 }
@@ -143,24 +141,11 @@ fn agreed() -> bool {
 impl Source {
     /// The commands that install it, in order; nothing where none would succeed.
     fn command(&self) -> Option<Vec<Vec<String>>> {
-        let words = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect();
         match self {
             Self::Component(name) => {
-                let has_rustup = Command::new("rustup").arg("--version").output().is_ok();
-                has_rustup.then(|| vec![words(&["rustup", "component", "add", name])])
+                has_rustup().then(|| vec![words(&["rustup", "component", "add", name])])
             }
-            Self::Packages(packages) => {
-                let before: &[&str] = match (is_root(), std::io::stdin().is_terminal()) {
-                    (true, _) => &[],
-                    // A password may be asked for.
-                    (false, true) if Path::new("/usr/bin/sudo").exists() => &["sudo"],
-                    (false, _) => return None,
-                };
-                let with = |rest: &[&str]| words(&[before, &["apt-get"], rest].concat());
-                let install = [&["install", "-y", "--no-install-recommends"], *packages].concat();
-                let has_apt = Path::new("/usr/bin/apt-get").exists();
-                has_apt.then(|| vec![with(&["update"]), with(&install)])
-            }
+            Self::Packages(names) => packages(names),
         }
     }
 
@@ -177,6 +162,30 @@ impl Source {
             ),
         }
     }
+}
+
+/// The commands that install Debian's packages; nothing where they would not succeed.
+pub fn packages(names: &[&str]) -> Option<Vec<Vec<String>>> {
+    let before: &[&str] = match (is_root(), std::io::stdin().is_terminal()) {
+        (true, _) => &[],
+        // A password may be asked for.
+        (false, true) if Path::new("/usr/bin/sudo").exists() => &["sudo"],
+        (false, _) => return None,
+    };
+    let with = |rest: &[&str]| words(&[before, &["apt-get"], rest].concat());
+    let install = [&["install", "-y", "--no-install-recommends"], names].concat();
+    let has_apt = Path::new("/usr/bin/apt-get").exists();
+    has_apt.then(|| vec![with(&["update"]), with(&install)])
+}
+
+/// A command by its words.
+pub fn words(words: &[&str]) -> Vec<String> {
+    words.iter().map(|word| (*word).to_owned()).collect()
+}
+
+/// Rust came by rustup.
+pub fn has_rustup() -> bool {
+    Command::new("rustup").arg("--version").output().is_ok()
 }
 
 fn is_root() -> bool {

@@ -209,6 +209,23 @@ impl Camera {
         Self { size, position, right, up, backward, center, focal, distance, radius: half.length() }
     }
 
+    /// A camera that looks at a point [m] from a direction and a distance [m], with the point in the middle of the picture.
+    pub fn at(target: Vec3<f64>, direction: ViewDirection, distance: f64, size: ImageSize) -> Self {
+        let [right, up, backward] = direction.axes();
+        let (width, height) = (f64::from(size.width()), f64::from(size.height()));
+        Self {
+            size,
+            position: target + backward * distance,
+            right,
+            up,
+            backward,
+            center: [0.5 * width, 0.5 * height],
+            focal: 0.5 * height / HALF_OPENING,
+            distance,
+            radius: distance * HALF_OPENING,
+        }
+    }
+
     /// Width and height of the pictures it takes.
     pub fn size(&self) -> ImageSize {
         self.size

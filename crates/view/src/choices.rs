@@ -4,7 +4,7 @@ use viscera::material::Material;
 use viscera::scene::Scene;
 
 /// Keys and values as `--set` of `viscera run` takes them; the later of two equal keys holds.
-pub type Settings = Vec<(String, String)>;
+pub use viscera_stage::Settings;
 
 /// All choices that undo restores.
 #[derive(Clone, Debug, Default, PartialEq)]

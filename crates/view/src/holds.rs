@@ -3,8 +3,9 @@
 use std::collections::VecDeque;
 use viscera::scalar::Vec3;
 
-use crate::engine::{Command, HoldId, Snapshot};
-use crate::viewport::Pick;
+use viscera_stage::{HoldId, Pick};
+
+use crate::engine::{Command, Snapshot};
 
 /// How one takes hold.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -188,13 +189,13 @@ mod tests {
         let mut holds = Holds::default();
         holds.take(&pick(), &Grip::default());
         let at = |time: f64| {
-            let hold = crate::engine::HeldPatch {
+            let hold = viscera_stage::HeldPatch {
                 id: 1,
                 place: Vec3::ZERO,
                 target: Vec3::ZERO,
                 force: vec3(0.0, 3.0, 4.0),
             };
-            let run = crate::engine::RunSnapshot { held: vec![hold], ..Default::default() };
+            let run = viscera_stage::RunSnapshot { held: vec![hold], ..Default::default() };
             Snapshot { time, runs: vec![run], ..Snapshot::default() }
         };
         for time in [1.0, 2.0, 1.5 + REMEMBERED] {

@@ -2,9 +2,9 @@
 
 use eframe::wgpu;
 
-use crate::engine::Coloring;
 use crate::holds::Grip;
 use crate::probe::{SolverVariant, VARIANTS};
+use viscera_stage::Coloring;
 
 /// How things are shown and how one takes hold; no part of a scene.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

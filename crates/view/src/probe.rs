@@ -4,15 +4,15 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
-use viscera::model::ModelBuilder;
 use viscera::scalar::Vec3;
 use viscera::settings::{
     Acceleration, AndersonGuard, AndersonOn, Colors, Count, Elements, Integrator, Method,
     NeoHookean, Precision, SolverSettings, Start, Threads,
 };
 use viscera::solver::balance::ForceBalance;
-use viscera::solver::{Inputs, Solver, StepError};
+use viscera::solver::{Solver, StepError};
 use viscera::state::State;
+use viscera_stage::NextStep;
 
 /// A solver whose convergence can be shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -98,23 +98,6 @@ impl SolverVariant {
             ..base
         }
     }
-}
-
-/// The step that comes next: the state before it, and what acts in it.
-#[derive(Clone, Debug)]
-pub struct NextStep {
-    /// Settings in force.
-    pub solver: SolverSettings,
-    /// Meshes with their materials.
-    pub builder: ModelBuilder,
-    /// [m], shape [vertex_count].
-    pub positions: Vec<Vec3<f64>>,
-    /// [m/s], shape [vertex_count].
-    pub velocities: Vec<Vec3<f64>>,
-    /// What acts in the step.
-    pub inputs: Inputs<f64>,
-    /// The step [s].
-    pub dt: f64,
 }
 
 /// The curve of one solver.

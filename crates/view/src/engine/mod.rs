@@ -1,17 +1,12 @@
 //! The simulation on a thread of its own. The window sends [`Command`]s, hears [`Event`]s, and takes the
 //! newest [`Snapshot`] when it likes; it never waits.
 
-mod color;
 mod setup;
-mod simulation;
 mod snapshot;
 mod worker;
 
 pub use setup::{BuildRequest, Setup};
-pub use snapshot::{
-    Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch, Snapshot, SnapshotExchange,
-    inverted,
-};
+pub use snapshot::{Snapshot, SnapshotExchange};
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,6 +14,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use viscera::scalar::Vec3;
+use viscera_stage::{Coloring, HoldId};
 
 use crate::choices::Settings;
 use crate::probe::{Curve, SolverVariant};

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 use viscera::simulation::Assembly;
+use viscera_stage::{Coloring, GripTarget, Run};
 
 use super::setup::{BuildRequest, Setup};
-use super::simulation::{GripTarget, Run};
-use super::snapshot::{Coloring, SnapshotExchange};
+use super::snapshot::SnapshotExchange;
 use super::{Command, Cure, Event, Failure};
 use crate::choices::{Settings, put};
 use crate::probe::{MOST_TETS, Prober, SolverVariant};

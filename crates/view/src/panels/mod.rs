@@ -14,8 +14,8 @@ use eframe::egui::{self, Ui};
 use std::path::PathBuf;
 
 use crate::choices::{Settings, Side};
-use crate::engine::HoldId;
 use crate::help::Request;
+use viscera_stage::HoldId;
 
 /// What a person wants.
 #[derive(Clone, Debug)]

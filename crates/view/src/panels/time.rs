@@ -4,7 +4,9 @@ use eframe::egui::{self, Ui};
 
 use super::Action;
 use super::number::Number;
-use crate::engine::{Setup, Snapshot, inverted};
+use viscera_stage::inverted;
+
+use crate::engine::{Setup, Snapshot};
 use crate::help::Request;
 use crate::preferences::Preferences;
 use crate::session::Session;

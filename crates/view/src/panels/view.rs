@@ -2,14 +2,13 @@
 
 use eframe::egui::{self, Ui};
 use std::ops::RangeInclusive;
+use viscera_stage::{Coloring, newtons};
 
 use super::number::{Number, named};
 use super::{Action, section};
-use crate::engine::Coloring;
 use crate::help::Request;
 use crate::holds::Holds;
 use crate::preferences::Preferences;
-use crate::viewport::newtons;
 
 const COLORINGS: [(Coloring, &str, &str); 4] = [
     (Coloring::Plain, "tissue", "The tissue's own colour"),

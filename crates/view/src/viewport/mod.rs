@@ -2,24 +2,22 @@
 
 mod lens;
 mod overlay;
-mod pick;
 mod picture;
 
 pub use lens::Lens;
-pub use overlay::{Legend, newtons, on_screen};
-pub use pick::Pick;
-pub use picture::{Gpu, Picture, PictureContents, RunSurface};
+pub use overlay::on_screen;
+pub use picture::{Gpu, Picture};
 
 use eframe::egui::{self, PointerButton, Pos2, Rect, Sense, Ui, vec2};
 use std::sync::Arc;
 use viscera::scalar::Vec3;
 use viscera_picture::{HALF_OPENING, Image, ImageSize, Overlay, ViewDirection};
 use viscera_render::Orbit;
+use viscera_stage::{Coloring, Legend, PictureContents, RunSurface, meet_plane, pick};
 
-use crate::engine::{Coloring, Command, Setup, Snapshot};
+use crate::engine::{Command, Setup, Snapshot};
 use crate::holds::{Grip, Holds};
 use crate::preferences::Preferences;
-use pick::{meet_plane, pick};
 
 /// A press so near to where something is held takes that up again [points].
 const NEAR: f32 = 14.0;
@@ -77,7 +75,7 @@ impl Viewport {
         let rest = |setup: &Setup| setup.assembly.builder.positions().to_vec();
         let known = self.setup.as_ref().is_some_and(|old| rest(old) == rest(setup));
         self.surfaces = (0..setup.run_count)
-            .map(|_| RunSurface::new(&self.gpu, setup))
+            .map(|_| RunSurface::new(&self.gpu.device, &setup.assembly))
             .collect::<Result<_, _>>()?;
         self.setup = Some(Arc::clone(setup));
         self.fixed = setup.assembly.fixings.iter().flat_map(|p| p.vertices.clone()).collect();
@@ -144,7 +142,7 @@ impl Viewport {
                 Rect::from_min_size(egui::pos2(left, area.top()), vec2(width, area.height()))
             })
             .collect();
-        let taken = self.legend.width();
+        let taken = overlay::legend_width(&self.legend);
         self.lenses = rects.iter().map(|rect| Lens::new(&self.orbit, *rect, taken)).collect();
         for (number, rect) in rects.iter().enumerate() {
             let id = ui.scope_id().with(("viewport", number));
@@ -206,7 +204,7 @@ impl Viewport {
             }
             if let Some(plane) = holds.drag_plane() {
                 let [_, _, normal] = self.orbit.axes();
-                let (from, direction) = (lens.orbit.position(), lens.ray(pointer));
+                let (from, direction) = (lens.orbit().position(), lens.ray(pointer));
                 if response.drag_delta() != vec2(0.0, 0.0)
                     && let Some(point) = meet_plane(from, direction, plane, normal)
                 {
@@ -250,7 +248,7 @@ impl Viewport {
         if near.is_some_and(|hold| holds.resume(hold.id)) {
             return;
         }
-        let hit = pick(setup, shown, lens.orbit.position(), lens.ray(pointer));
+        let hit = pick(&setup.assembly, shown, lens.orbit().position(), lens.ray(pointer));
         commands.extend(hit.map(|hit| holds.take(&hit, grip)));
     }
 
@@ -288,7 +286,7 @@ impl Viewport {
             .collect();
         let wanted = DrawnInputs {
             snapshot: (snapshot.generation, snapshot.number),
-            orbit: self.lenses.first().map_or(self.orbit, |lens| lens.orbit),
+            orbit: self.lenses.first().map_or(self.orbit, |lens| *lens.orbit()),
             sizes: sizes.clone(),
             coloring: snapshot.coloring,
             range: self.legend.range(),
@@ -315,7 +313,7 @@ impl Viewport {
             let (picked, targets): (Vec<_>, Vec<_>) =
                 run.held.iter().map(|hold| (hold.place, hold.target)).unzip();
             let contents = PictureContents {
-                orbit: self.lenses[number].orbit,
+                orbit: *self.lenses[number].orbit(),
                 surface,
                 ghost,
                 range: self.legend.range(),
@@ -354,7 +352,7 @@ impl Viewport {
         overlay::scene_patches(&painter, lens, run);
         overlay::forces(&painter, lens, run, holds);
         if preferences.coloring != Coloring::Plain {
-            self.legend.paint(&painter, lens.rect);
+            overlay::paint_legend(&self.legend, &painter, lens.rect);
         }
         let name = if self.shown_runs() > 1 { ["A", "B"][number.min(1)] } else { "" };
         overlay::title(&painter, lens.rect, name, &self.distances(snapshot, number));
@@ -382,7 +380,7 @@ impl Viewport {
                 title: &format!("{title}{side}"),
                 caption: &overlay::caption(snapshot, run, &remarks),
                 color_scale: scale.as_ref(),
-                pixels_per_meter: lens.map(|lens| lens.orbit.pixels_per_meter(height)),
+                pixels_per_meter: lens.map(|lens| lens.orbit().pixels_per_meter(height)),
             };
             overlay.draw(&mut image);
             images.push(image);

@@ -10,8 +10,8 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use viscera::scene::Scene;
 use viscera_picture::{Image, ImageSize, write_png};
+use viscera_stage::RunSnapshot;
 use viscera_view::choices::Side;
-use viscera_view::engine::RunSnapshot;
 use viscera_view::preferences::Preferences;
 use viscera_view::{App, Options};
 

@@ -1,7 +1,7 @@
 //! Numbers side by side: what kernels compute with when speed matters.
 //!
 //! Storage holds numbers in groups of eight. A kernel generic over [`Lanes`] takes as many of a group at
-//! a time as its type has lanes: one (`f32`, `f64`: any processor), or a register of AVX2, chosen once
+//! a time as its type has lanes: one (`f32`, `f64`: any processor), or a register of AVX2 or of WebAssembly, chosen once
 //! at run time ([`Instructions::detect`]). The bits are the same: no build flag decides, nothing is
 //! fused, and sums keep the lanes of the group apart. A function is compiled for AVX2 by being inlined
 //! into one that carries `#[target_feature]` ([`run`]), so everything a kernel calls is
@@ -195,6 +195,8 @@ pub enum Instructions {
     Portable,
     /// 256-bit registers of x86-64.
     Avx2,
+    /// 128-bit registers of WebAssembly, without its relaxed instructions.
+    Simd128,
 }
 
 impl Instructions {
@@ -204,12 +206,16 @@ impl Instructions {
         if std::arch::is_x86_feature_detected!("avx2") {
             return Self::Avx2;
         }
-        Self::Portable
+        match cfg!(target_arch = "wasm32") {
+            // Whatever loads the module knows them.
+            true => Self::Simd128,
+            false => Self::Portable,
+        }
     }
 
     /// This choice where the processor has it, else what it has.
     pub fn or_detect(self) -> Self {
-        if self == Self::Avx2 { Self::detect() } else { self }
+        if self == Self::Portable { self } else { Self::detect() }
     }
 }
 
@@ -223,10 +229,10 @@ pub trait Kernel<R: Real> {
 #[inline]
 pub fn run<R: Real>(instructions: Instructions, kernel: impl Kernel<R>) {
     match instructions.or_detect() {
-        // SAFETY: `or_detect` answers `Avx2` only where the processor has it.
-        #[cfg(target_arch = "x86_64")]
+        // SAFETY: `or_detect` answers registers only where the processor has them.
+        #[cfg(any(target_arch = "x86_64", target_arch = "wasm32"))]
         #[allow(unsafe_code)]
-        Instructions::Avx2 => unsafe { R::run_avx2(kernel) },
+        Instructions::Avx2 | Instructions::Simd128 => unsafe { R::run_in_registers(kernel) },
         _ => kernel.run::<R>(),
     }
 }

@@ -11,6 +11,8 @@
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 pub mod lanes;
+#[cfg(target_arch = "wasm32")]
+mod simd128;
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Index, IndexMut, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -23,6 +25,10 @@ mod sealed {
     impl Sealed for super::avx2::F32x8 {}
     #[cfg(target_arch = "x86_64")]
     impl Sealed for super::avx2::F64x4 {}
+    #[cfg(target_arch = "wasm32")]
+    impl Sealed for super::simd128::F32x4 {}
+    #[cfg(target_arch = "wasm32")]
+    impl Sealed for super::simd128::F64x2 {}
 }
 
 /// The operations of kernels on a number, or on several numbers side by side.
@@ -78,14 +84,14 @@ pub trait Scalar:
 pub trait Real: Scalar<Mask = bool> + PartialOrd {
     /// "f32" or "f64".
     const NAME: &'static str;
-    /// Runs a kernel in lanes of AVX2; [`lanes::run`] chooses.
+    /// Runs a kernel in the target's registers of several lanes; [`lanes::run`] chooses.
     ///
     /// # Safety
-    /// The processor has AVX2.
-    #[cfg(target_arch = "x86_64")]
+    /// The processor has them: AVX2, or SIMD128 of WebAssembly.
+    #[cfg(any(target_arch = "x86_64", target_arch = "wasm32"))]
     #[doc(hidden)]
     #[allow(unsafe_code)]
-    unsafe fn run_avx2(kernel: impl lanes::Kernel<Self>);
+    unsafe fn run_in_registers(kernel: impl lanes::Kernel<Self>);
     /// The same value in double precision.
     fn to_f64(self) -> f64;
     /// True unless infinite or not a number.
@@ -93,7 +99,7 @@ pub trait Real: Scalar<Mask = bool> + PartialOrd {
 }
 
 macro_rules! implement_real {
-    ($type:ident $fast:ident) => {
+    ($type:ident $avx2:ident $simd128:ident) => {
         impl Scalar for $type {
             type Mask = bool;
             const ZERO: Self = 0.0;
@@ -140,9 +146,16 @@ macro_rules! implement_real {
             #[cfg(target_arch = "x86_64")]
             #[allow(unsafe_code)]
             #[inline]
-            unsafe fn run_avx2(kernel: impl lanes::Kernel<Self>) {
+            unsafe fn run_in_registers(kernel: impl lanes::Kernel<Self>) {
                 // SAFETY: the caller's promise.
-                unsafe { avx2::run::<avx2::$fast>(kernel) }
+                unsafe { avx2::run::<avx2::$avx2>(kernel) }
+            }
+            #[cfg(target_arch = "wasm32")]
+            #[allow(unsafe_code)]
+            #[inline]
+            unsafe fn run_in_registers(kernel: impl lanes::Kernel<Self>) {
+                // SAFETY: the caller's promise.
+                unsafe { simd128::run::<simd128::$simd128>(kernel) }
             }
             #[inline(always)]
             fn to_f64(self) -> f64 {
@@ -155,8 +168,8 @@ macro_rules! implement_real {
         }
     };
 }
-implement_real!(f32 F32x8);
-implement_real!(f64 F64x4);
+implement_real!(f32 F32x8 F32x4);
+implement_real!(f64 F64x4 F64x2);
 
 /// A vector of three components.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -2,10 +2,39 @@
 
 use super::{Change, Interpolation, Motion, MotionKey, Patch, Scene, Selector};
 use crate::scalar::Vec3;
-use crate::settings::Choice;
+use crate::settings::{Choice, Node, Value};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 impl Scene {
+    /// The scene as a file: what was written, with all overrides and changes laid over it. Comments and the order of keys
+    /// are gone; [`Scene::write`] may follow.
+    pub fn text(&self) -> String {
+        let Value::Table(entries) = &self.tree.0.value else { return String::new() };
+        let mut text = String::new();
+        let (tables, values): (Vec<_>, Vec<_>) =
+            entries.iter().partition(|(_, node)| table_entries(node).is_some());
+        for (key, node) in values {
+            put(&mut text, format_args!("{} = {}\n", key_name(key), value_text(&node.value)));
+        }
+        for (key, node) in tables {
+            let of_list = matches!(node.value, Value::List(_));
+            let header = if of_list {
+                format!("[[{}]]", key_name(key))
+            } else {
+                format!("[{}]", key_name(key))
+            };
+            for table in table_entries(node).unwrap_or_default() {
+                put(&mut text, format_args!("\n{header}\n"));
+                for (key, node) in table {
+                    let value = value_text(&node.value);
+                    put(&mut text, format_args!("{} = {value}\n", key_name(key)));
+                }
+            }
+        }
+        text
+    }
+
     /// Motions and changes as a scene file has them, to be put behind its other tables; every number but
     /// rotations comes back with the same bits. The bodies are those of this scene.
     pub fn write(&self, motions: &[Motion], changes: &[Change]) -> String {
@@ -49,6 +78,48 @@ impl Scene {
         }
         put(text, format_args!("]\n"));
     }
+}
+
+/// A table, or a list of tables, as tables with a header each; nothing of another value.
+fn table_entries(node: &Node) -> Option<Vec<&BTreeMap<String, Node>>> {
+    match &node.value {
+        Value::Table(entries) => Some(vec![entries]),
+        Value::List(nodes) if !nodes.is_empty() => nodes
+            .iter()
+            .map(|node| match &node.value {
+                Value::Table(entries) => Some(entries),
+                _ => None,
+            })
+            .collect(),
+        _ => None,
+    }
+}
+
+/// A value on one line.
+fn value_text(value: &Value) -> String {
+    match value {
+        Value::Text(text) => quote(text),
+        Value::Whole(number) => number.to_string(),
+        Value::Number(number) => format!("{number:?}"),
+        Value::Truth(truth) => truth.to_string(),
+        Value::Date(text) => text.clone(),
+        Value::List(nodes) => {
+            let items: Vec<String> = nodes.iter().map(|node| value_text(&node.value)).collect();
+            format!("[{}]", items.join(", "))
+        }
+        Value::Table(entries) => {
+            let entry = |(key, node): (&String, &Node)| {
+                format!("{} = {}", key_name(key), value_text(&node.value))
+            };
+            format!("{{ {} }}", entries.iter().map(entry).collect::<Vec<_>>().join(", "))
+        }
+    }
+}
+
+/// A key, in quotes where it needs them.
+fn key_name(key: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if !key.is_empty() && key.chars().all(plain) { key.to_owned() } else { quote(key) }
 }
 
 fn key_text(key: &MotionKey) -> String {

@@ -1,6 +1,6 @@
 //! The choice of what computes the steps.
 
-use super::device::Backend;
+use super::device::{Backend, Offered};
 use super::error::SimulationError;
 #[cfg(feature = "gpu")]
 use super::gpu;
@@ -17,7 +17,10 @@ impl<S: Real> Backend<S> {
         model: &Model<S>,
         settings: &SolverSettings,
         ready: Option<Solver<S>>,
+        offered: &Offered,
     ) -> Result<Self, SimulationError> {
+        #[cfg(not(feature = "gpu"))]
+        let _ = offered;
         let cpu =
             |reason| Ok(Self::cpu(ready.unwrap_or_else(|| Solver::new(model, settings)), reason));
         match (&settings.device, settings.method) {
@@ -30,7 +33,7 @@ impl<S: Real> Backend<S> {
                 cpu("explicit steps that suit the present shape")
             }
             #[cfg(feature = "gpu")]
-            _ => gpu::choose(model, settings),
+            _ => gpu::choose(model, settings, offered.device.as_ref()),
             #[cfg(not(feature = "gpu"))]
             (DeviceRequest::Auto, Method::Xpbd) => {
                 cpu("the GPU backend was left out of this build")
@@ -47,6 +50,7 @@ impl<S: Real> Backend<S> {
         model: &Model<S>,
         settings: &SolverSettings,
         ready: Option<Solver<S>>,
+        offered: &Offered,
     ) -> Result<Self, SimulationError> {
         // A method that only the CPU computes leaves its device.
         #[cfg(feature = "gpu")]
@@ -71,7 +75,7 @@ impl<S: Real> Backend<S> {
                 let solver = ready.unwrap_or_else(|| Solver::new(model, settings));
                 Self { warning: Some(warning.clone()), ..Self::cpu(solver, warning) }
             }
-            None => Self::choose(model, settings, ready)?,
+            None => Self::choose(model, settings, ready, offered)?,
         };
         if let Some(instructions) = self.instructions() {
             backend.use_instructions(instructions);

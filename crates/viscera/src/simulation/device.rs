@@ -10,7 +10,7 @@ use crate::scalar::{Real, Vec3};
 use crate::settings::{Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]
-use crate::solver::gpu::GpuSolver;
+use crate::solver::gpu::{Device, GpuSolver};
 use crate::solver::oscillations::Oscillations;
 use crate::solver::{Inputs, Solver, StepError};
 use crate::state::State;
@@ -26,6 +26,16 @@ pub(super) trait DeviceSolver<S>: Debug + Send {
     /// Positions and velocities after the last step; how many steps were rejected so far. On an error nothing
     /// is changed.
     fn read_frame(&mut self, model: &Model<S>, state: &mut State<S>) -> Result<u64, FrameError>;
+
+    /// Asks for all that [`DeviceSolver::take_frame`] needs behind the last step, and for the force balance. Does not wait.
+    fn ask_for_frame(&mut self, with_balance: bool) -> Result<(), FrameError>;
+
+    /// As [`DeviceSolver::read_frame`] of what was asked for; nothing while it is under way.
+    fn take_frame(
+        &mut self,
+        model: &Model<S>,
+        state: &mut State<S>,
+    ) -> Result<Option<u64>, FrameError>;
 
     /// Multipliers after the last step.
     fn multipliers(&self, model: &Model<S>) -> Result<Vec<S>, FrameError>;
@@ -49,6 +59,13 @@ pub(super) trait DeviceSolver<S>: Debug + Send {
 
     #[cfg(feature = "gpu")]
     fn solver(&self) -> &GpuSolver;
+}
+
+/// A device that the caller has at hand for settings that ask for one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Offered {
+    #[cfg(feature = "gpu")]
+    pub device: Option<Device>,
 }
 
 /// The solver: one of them.
@@ -173,6 +190,23 @@ impl<S: Real> Backend<S> {
             self.rejected = device.read_frame(model, state)?;
         }
         Ok(())
+    }
+
+    /// Asks for the results of the last step, without waiting; where the CPU computes they are there.
+    pub fn ask_for_frame(&mut self, with_balance: bool) -> Result<(), FrameError> {
+        self.device_mut().map_or(Ok(()), |device| device.ask_for_frame(with_balance))
+    }
+
+    /// Takes over what was asked for; false while it is under way.
+    pub fn take_frame(
+        &mut self,
+        model: &Model<S>,
+        state: &mut State<S>,
+    ) -> Result<bool, FrameError> {
+        let Engine::Device(device) = &mut self.engine else { return Ok(true) };
+        let taken = device.take_frame(model, state)?;
+        self.rejected = taken.unwrap_or(self.rejected);
+        Ok(taken.is_some())
     }
 
     /// The force balance of the last step.

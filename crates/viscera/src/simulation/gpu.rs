@@ -49,6 +49,18 @@ impl DeviceSolver<f32> for GpuSolver {
         Ok(GpuSolver::read_frame(self, model, state)?)
     }
 
+    fn ask_for_frame(&mut self, with_balance: bool) -> Result<(), FrameError> {
+        Ok(GpuSolver::ask_for_frame(self, with_balance)?)
+    }
+
+    fn take_frame(
+        &mut self,
+        model: &Model<f32>,
+        state: &mut State<f32>,
+    ) -> Result<Option<u64>, FrameError> {
+        Ok(GpuSolver::take_frame(self, model, state)?)
+    }
+
     fn multipliers(&self, model: &Model<f32>) -> Result<Vec<f32>, FrameError> {
         Ok(GpuSolver::multipliers(self, model)?)
     }
@@ -104,6 +116,7 @@ fn of_precision<S: Real>(backend: Backend<f32>) -> Result<Backend<S>, Simulation
 pub(super) fn choose<S: Real>(
     model: &Model<S>,
     settings: &SolverSettings,
+    offered: Option<&Device>,
 ) -> Result<Backend<S>, SimulationError> {
     let single: &dyn Any = model;
     let Some(single) = single.downcast_ref::<Model<f32>>() else {
@@ -114,10 +127,13 @@ pub(super) fn choose<S: Real>(
             _ => Err(GpuError::DoublePrecision.into()),
         };
     };
-    let chosen = match &settings.device {
-        DeviceRequest::Named(name) => asked_for(Some(name), single, settings)?,
-        DeviceRequest::Gpu => asked_for(None, single, settings)?,
-        _ => faster(single, settings),
+    let chosen = match (&settings.device, offered) {
+        (DeviceRequest::Named(_) | DeviceRequest::Gpu, Some(device)) => {
+            on(device, single, settings, "as asked for")?
+        }
+        (DeviceRequest::Named(name), None) => asked_for(Some(name), single, settings)?,
+        (DeviceRequest::Gpu, None) => asked_for(None, single, settings)?,
+        _ => faster(single, settings, offered),
     };
     of_precision(chosen)
 }
@@ -131,7 +147,7 @@ fn asked_for(
 }
 
 /// The one that is expected to be faster, and the CPU where no device can do it.
-fn faster(model: &Model<f32>, settings: &SolverSettings) -> Backend<f32> {
+fn faster(model: &Model<f32>, settings: &SolverSettings, offered: Option<&Device>) -> Backend<f32> {
     let solver = Solver::new(model, settings);
     let cost = StepCost::new(solver.layout(), settings, settings.iterations());
     let tets = grouped(model.tet_count() as u64);
@@ -141,14 +157,22 @@ fn faster(model: &Model<f32>, settings: &SolverSettings) -> Backend<f32> {
         let reason = format!("the mesh has {tets} tetrahedra; a GPU pays from about {from} on");
         return Backend::cpu(solver, reason);
     }
-    let (software, adapters): (Vec<_>, Vec<_>) =
-        Adapter::all().into_iter().partition(Adapter::is_software);
+    let (software, devices): (Vec<String>, Vec<Found>) = match offered {
+        Some(device) if device.is_software() => (vec![device.name().to_owned()], Vec::new()),
+        Some(device) => (Vec::new(), vec![Found::Device(device.clone())]),
+        None => {
+            let (software, others): (Vec<_>, Vec<_>) =
+                Adapter::all().into_iter().partition(Adapter::is_software);
+            let names = software.iter().map(Adapter::name).collect();
+            (names, others.into_iter().map(Found::Adapter).collect())
+        }
+    };
     let mut reason = match software.first() {
-        Some(adapter) => format!("no graphics adapter but software ({})", adapter.name()),
+        Some(name) => format!("no graphics adapter but software ({name})"),
         None => "no graphics adapter".to_owned(),
     };
-    for adapter in adapters {
-        let tried = adapter
+    for found in devices {
+        let tried = found
             .open()
             .and_then(|device| on(&device, model, settings, &format!("{tets} tetrahedra")));
         match tried {
@@ -157,6 +181,21 @@ fn faster(model: &Model<f32>, settings: &SolverSettings) -> Backend<f32> {
         }
     }
     Backend::cpu(solver, reason)
+}
+
+/// What may compute.
+enum Found {
+    Device(Device),
+    Adapter(Adapter),
+}
+
+impl Found {
+    fn open(self) -> Result<Device, GpuError> {
+        match self {
+            Self::Device(device) => Ok(device),
+            Self::Adapter(adapter) => adapter.open(),
+        }
+    }
 }
 
 /// A device, for a reason.

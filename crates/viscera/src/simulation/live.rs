@@ -134,7 +134,9 @@ impl<S: Real> Simulation<S> {
             scene.change(settings)?;
             Ok(scene)
         };
-        let mut fork = Simulation::<T>::new(of_fork(&self.scene)?, self.assembly.clone())?;
+        let scene = of_fork(&self.scene)?;
+        let mut fork =
+            Simulation::<T>::offered(scene, self.assembly.clone(), self.offered.clone())?;
         fork.written = of_fork(&self.written)?;
         fork.frame = self.frame;
         fork.taken = self.taken.clone();
@@ -228,6 +230,16 @@ impl<S: Real> Simulation<S> {
 
     /// Goes on with another scene of the same bodies.
     fn rebuild(&mut self, scene: Scene) -> Result<(), LiveError> {
+        let same_device = scene.solver.device == self.scene.solver.device;
+        self.rebuild_on_device(scene, same_device)
+    }
+
+    /// The same, on the device that computes now or on one that is chosen anew.
+    pub(super) fn rebuild_on_device(
+        &mut self,
+        scene: Scene,
+        same_device: bool,
+    ) -> Result<(), LiveError> {
         let mut builder = self.assembly.builder.clone();
         for (index, body) in scene.bodies.iter().enumerate() {
             let set = |problem: ModelError| LiveError::Simulation(problem.into());
@@ -237,7 +249,6 @@ impl<S: Real> Simulation<S> {
             }
         }
         let model = builder.build::<S>().map_err(SimulationError::from)?;
-        let same_device = scene.solver.device == self.scene.solver.device;
         let on_device = same_device && self.callers_device;
         self.resumed_method = self.resumed_method.filter(|_| same_device);
         let Chosen { settings: solver, oscillations, solver: ready } = match self.resumed_method {
@@ -245,7 +256,8 @@ impl<S: Real> Simulation<S> {
             None => automatic::choose_method(&scene, &self.assembly, &model, on_device),
         };
         check_elements(&solver).map_err(SimulationError::from)?;
-        let backend = self.backend.renew(same_device, &model, &solver, ready)?;
+        let backend = self.backend.renew(same_device, &model, &solver, ready, &self.offered)?;
+        self.under_way = false;
         let rest = State::at_rest(&model);
         let state = State {
             positions: std::mem::take(&mut self.state.positions),

@@ -16,6 +16,7 @@ mod mesh_error;
 mod on_device;
 mod rest;
 mod saved;
+mod sent;
 
 pub use assemble::{AssembleError, AssembledBody, Assembly, Refinement, ResolvedPatch};
 pub use automatic::{ExpectedErrors, automatic_settings};
@@ -41,7 +42,7 @@ use crate::solver::balance::ForceBalance;
 use crate::solver::oscillations::Oscillations;
 use crate::solver::{Inputs, Solver, check_elements, choose};
 use crate::state::State;
-use device::Backend;
+use device::{Backend, Offered};
 use std::fmt;
 
 /// What holds or pulls a patch.
@@ -119,6 +120,10 @@ pub struct Simulation<S> {
     solver: SolverSettings,
     /// Whether the caller has chosen the device.
     callers_device: bool,
+    /// What the caller has at hand for settings that ask for a device.
+    offered: Offered,
+    /// Whether a frame was sent that has not arrived.
+    under_way: bool,
     /// The method that stands in the place of "auto" because a simulation was resumed that had it.
     resumed_method: Option<Method>,
     assembly: Assembly,
@@ -146,12 +151,26 @@ pub struct Simulation<S> {
     tissue: TissueMeasure,
     frame: u64,
     rejected_substeps: u64,
+    /// Steps that the solver had rejected before the last frame.
+    rejected_before: u64,
 }
 
 impl<S: Real> Simulation<S> {
     /// Builds the model, chooses what computes its steps and takes the memory for them.
     pub fn new(scene: Scene, assembly: Assembly) -> Result<Self, SimulationError> {
-        Self::on(scene, assembly, false, Backend::choose)
+        Self::offered(scene, assembly, Offered::default())
+    }
+
+    fn offered(
+        scene: Scene,
+        assembly: Assembly,
+        offered: Offered,
+    ) -> Result<Self, SimulationError> {
+        let at_hand = offered.clone();
+        let choose = |model: &Model<S>, settings: &SolverSettings, ready| {
+            Backend::choose(model, settings, ready, &at_hand)
+        };
+        Ok(Self { offered, ..Self::on(scene, assembly, false, choose)? })
     }
 
     fn on(
@@ -175,6 +194,8 @@ impl<S: Real> Simulation<S> {
             backend: choose(&model, &solver, ready)?,
             solver,
             callers_device,
+            offered: Offered::default(),
+            under_way: false,
             resumed_method: None,
             oscillations,
             inputs: Inputs::default(),
@@ -188,6 +209,7 @@ impl<S: Real> Simulation<S> {
             tissue: TissueMeasure::default(),
             frame: 0,
             rejected_substeps: 0,
+            rejected_before: 0,
             model,
             scene,
             assembly,
@@ -350,36 +372,12 @@ impl<S: Real> Simulation<S> {
     /// As [`Simulation::advance_frame`], without the numbers of the report, which are of an earlier frame then: for
     /// who needs positions, not numbers.
     pub fn advance(&mut self) -> Result<(), FrameError> {
-        self.begin_frame().map_err(Box::new)?;
-        self.before.copy_from_slice(&self.state.positions);
-        match self.compute_frame() {
-            // What a step refuses, the CPU would refuse as well.
-            Err(lost) if self.backend.gives_way && !matches!(lost, FrameError::Step(_)) => {
-                // Positions are still those of the last frame; the multipliers are gone with the device.
-                let (time, dt) = (self.time(), self.substep_dt());
-                self.backend.give_way(&self.model, &self.solver, time, &lost);
-                let inputs = self.inputs_at(time);
-                self.state.multipliers.clear();
-                self.backend.restart(&self.model, &mut self.state, &inputs, dt)?;
-                self.rejected_substeps = self.compute_frame()?;
-            }
-            computed => self.rejected_substeps = computed?,
-        }
-        self.frame += 1;
-        self.stepped = true;
-        if !self.state.is_finite() || self.backend.is_beyond_numbers() {
-            return Err(self.diverged());
-        }
-        let factor = self.scene.time.velocity_factor;
-        if factor != 1.0 {
-            for velocity in &mut self.state.velocities {
-                *velocity = *velocity * S::from_f64(factor);
-            }
-            if let Some(device) = self.backend.device_mut() {
-                device.write_velocities(&self.state.velocities);
-            }
-        }
-        Ok(())
+        self.submit_frame()?;
+        let wait = |simulation: &mut Self| {
+            let Self { backend, model, state, .. } = simulation;
+            backend.read_frame(model, state).map(|()| true)
+        };
+        self.finish_frame(wait).map(|_| ())
     }
 
     fn diverged(&self) -> FrameError {
@@ -410,23 +408,6 @@ impl<S: Real> Simulation<S> {
 
     fn measure_tissue(&mut self) {
         self.tissue = measure_tissue(&self.model, &self.state.positions);
-    }
-
-    /// The substeps of a frame, and the state at its end; returns how many of them were rejected.
-    fn compute_frame(&mut self) -> Result<u64, FrameError> {
-        let dt = self.substep_dt();
-        // The end of the frame is a time of its own: that of the keys by which holds are led.
-        let (start, end) = (self.time(), (self.frame + 1) as f64 * self.scene.time.frame);
-        let substeps = self.substeps;
-        let Self { scene, assembly, taken, model, state, inputs, backend, .. } = self;
-        let before = backend.rejected_steps();
-        backend.steps(model, state, inputs, dt, substeps, |substep, inputs| {
-            let is_last = substep == substeps;
-            let time = if is_last { end } else { start + f64::from(substep) * dt };
-            taken.act(scene, assembly, time, inputs);
-        })?;
-        backend.read_frame(model, state)?;
-        Ok(backend.rejected_steps() - before)
     }
 
     /// What moves, the multipliers included, wherever they are. Where a device is lost they are what the tissue

@@ -208,7 +208,8 @@ impl<S: Real> Simulation<S> {
         }
         let Chosen { settings, oscillations, solver } =
             automatic::keep_method(&self.scene, &self.assembly, &self.model, saved);
-        self.backend = Backend::choose(&self.model, &settings, solver).map_err(|_| refused)?;
+        self.backend =
+            Backend::choose(&self.model, &settings, solver, &self.offered).map_err(|_| refused)?;
         (self.solver, self.oscillations) = (settings, oscillations);
         self.resumed_method = Some(saved);
         self.choose_substeps();

@@ -173,7 +173,7 @@ impl Library {
 
 /// Numbers and lanes of numbers are defined by each other: a number knows how to run a kernel in lanes, and a
 /// lane is a number.
-const ONE_DEFINITION: [&str; 3] = ["", "avx2", "lanes"];
+const ONE_DEFINITION: [&str; 4] = ["", "avx2", "lanes", "simd128"];
 
 #[test]
 fn imports_make_no_circle() {

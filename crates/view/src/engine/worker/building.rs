@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::time::Instant;
 use viscera::settings::DeviceRequest;
 use viscera::simulation::Assembly;
+use viscera_stage::build;
 
 use super::{Cure, Event, Running, Worker};
 use crate::engine::setup::{BuildRequest, MOST_GHOST_TETS, Setup, expectation};
-use crate::engine::simulation::build;
 
 impl Worker {
     pub(super) fn load(&mut self, request: BuildRequest) {
@@ -108,7 +108,7 @@ impl Worker {
             self.tell(Event::Busy(what));
             let wants_gpu =
                 !matches!(scene.solver.device, DeviceRequest::Cpu | DeviceRequest::Auto);
-            match build(scene, Assembly::clone(&setup.assembly)) {
+            match build(scene, Assembly::clone(&setup.assembly), None) {
                 Ok(run) => runs.push(run),
                 Err(message) => {
                     return self.fail(message, if wants_gpu { Cure::Cpu } else { Cure::Open });

@@ -4,8 +4,8 @@ use wgpu::BufferUsages;
 
 use super::device::Device;
 use super::error::GpuError;
-use super::frames;
 use super::limits::MOST_GROUPS;
+use super::reading;
 use super::timing::Clock;
 
 /// Source and target [B each]: beyond the caches of most devices, and what every device can bind.
@@ -88,7 +88,7 @@ impl MemoryCopy {
         self.device.queue.submit([encoder.finish()]);
         match clock {
             Some(clock) => Ok(Some(clock.read(2)?[1])),
-            None => frames::wait(&self.device).map(|()| None),
+            None => reading::wait(&self.device).map(|()| None),
         }
     }
 }

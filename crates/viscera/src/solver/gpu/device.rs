@@ -5,9 +5,12 @@ use std::sync::{Arc, Mutex};
 
 use super::error::GpuError;
 
-/// Limits that every device has: WebGPU's defaults. Kernels need no more.
+/// Values that go from a vertex to a fragment: pictures need three, and some phones offer one fewer than the default.
+const INTER_STAGE: u32 = 8;
+
+/// Limits that every device has: WebGPU's defaults, or fewer where nothing needs them. Kernels need no more.
 pub fn baseline() -> wgpu::Limits {
-    wgpu::Limits::default()
+    wgpu::Limits { max_inter_stage_shader_variables: INTER_STAGE, ..wgpu::Limits::default() }
 }
 
 /// The parts of the baseline that limits lack, in words; nothing where they have all.
@@ -26,8 +29,12 @@ pub struct Adapter {
 }
 
 impl Adapter {
-    /// All adapters: discrete ones first, software last.
+    /// All adapters: discrete ones first, software last. A browser names none before it was waited for:
+    /// [`Adapter::of_browser`].
     pub fn all() -> Vec<Self> {
+        if cfg!(target_arch = "wasm32") {
+            return Vec::new();
+        }
         let backends = wgpu::Backends::PRIMARY;
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
             backends,
@@ -38,9 +45,22 @@ impl Adapter {
         adapters.into_iter().map(|adapter| Self { adapter }).collect()
     }
 
-    /// The maker's name for it.
+    /// The adapter that a browser offers, the faster one where it can choose.
+    pub async fn of_browser(instance: &wgpu::Instance) -> Result<Self, GpuError> {
+        let options = wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            ..wgpu::RequestAdapterOptions::default()
+        };
+        let found = instance.request_adapter(&options).await;
+        found.map(|adapter| Self { adapter }).map_err(|_| GpuError::NoAdapter)
+    }
+
+    /// The maker's name for it; browsers may keep that for themselves.
     pub fn name(&self) -> String {
-        self.adapter.get_info().name
+        match self.adapter.get_info().name {
+            name if name.is_empty() => "the graphics processor".to_owned(),
+            name => name,
+        }
     }
 
     /// Name, kind, interface and driver.
@@ -97,6 +117,11 @@ impl Adapter {
 
     /// A device on it, with limits raised where meshes gain by it, and timestamps where it has them.
     pub fn open(&self) -> Result<Device, GpuError> {
+        pollster::block_on(self.opening())
+    }
+
+    /// As [`Adapter::open`], for who cannot wait.
+    pub async fn opening(&self) -> Result<Device, GpuError> {
         if let Some(lacking) = self.shortfall() {
             return Err(GpuError::BelowBaseline { name: self.name(), lacking });
         }
@@ -106,11 +131,15 @@ impl Adapter {
             max_buffer_size: has.max_buffer_size,
             ..baseline()
         };
-        self.open_with(limits)
+        self.opening_with(limits).await
     }
 
     /// A device within limits of the caller's choice, baseline or above.
     pub fn open_with(&self, limits: wgpu::Limits) -> Result<Device, GpuError> {
+        pollster::block_on(self.opening_with(limits))
+    }
+
+    async fn opening_with(&self, limits: wgpu::Limits) -> Result<Device, GpuError> {
         let timestamps = wgpu::Features::TIMESTAMP_QUERY;
         let request = wgpu::DeviceDescriptor {
             label: Some("viscera"),
@@ -118,7 +147,7 @@ impl Adapter {
             required_limits: limits,
             ..wgpu::DeviceDescriptor::default()
         };
-        let opened = pollster::block_on(self.adapter.request_device(&request));
+        let opened = self.adapter.request_device(&request).await;
         let (device, queue) = opened
             .map_err(|error| GpuError::Refused { name: self.name(), reason: error.to_string() })?;
         let device = Device::from_wgpu(device, queue, self.name());
@@ -172,6 +201,11 @@ impl Device {
     /// The adapter's name.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Whether a processor does its work: right, but slower than the CPU backend.
+    pub fn is_software(&self) -> bool {
+        self.device.adapter_info().device_type == wgpu::DeviceType::Cpu
     }
 
     /// Limits that meshes may use.

@@ -1,11 +1,10 @@
 //! Results of the device: copies made behind a step, read when they have arrived.
 
 use std::ops::Range;
-use std::sync::mpsc::channel;
 
 use super::control::{PARTS_START, rejected_steps};
-use super::device::Device;
 use super::error::GpuError;
+use super::reading::{read, staging, wait};
 use super::slots::Slot;
 use super::solver::GpuSolver;
 use crate::layout::Layout;
@@ -101,25 +100,38 @@ impl GpuSolver {
     /// many steps were rejected so far. Multipliers stay on the device. On an error nothing is changed.
     pub fn read_frame(&self, model: &Model<f32>, state: &mut State<f32>) -> Result<u64, GpuError> {
         let layout = self.layout_of(model)?;
-        let model = &*layout;
+        let mut rejected = 0;
+        read(&self.device, &self.frame_ranges(), |read| {
+            rejected = self.take_frame_parts(&layout, state, read);
+        })?;
+        Ok(rejected)
+    }
+
+    /// What [`GpuSolver::read_frame`] reads.
+    pub(super) fn frame_ranges(&self) -> [(&wgpu::Buffer, Range<u64>); 3] {
         let part = |slot, size: u64| {
             let [start, _] = self.buffers.span(slot);
             (self.buffers.buffer(slot), start..start + size)
         };
         let points = self.buffers.points_size;
-        let ranges = [
+        [
             part(Slot::Unknowns, points),
             part(Slot::Velocities, points),
             part(Slot::Control, PARTS_START as u64),
-        ];
-        let mut rejected = 0;
-        read(&self.device, &ranges, |read| {
-            put_in_user_order(model, bytemuck::cast_slice(read[0]), &mut state.positions);
-            put_in_user_order(model, bytemuck::cast_slice(read[1]), &mut state.velocities);
-            rejected = rejected_steps(read[2]);
-        })?;
+        ]
+    }
+
+    /// Takes over copies of those ranges; returns how many steps were rejected so far.
+    pub(super) fn take_frame_parts(
+        &self,
+        layout: &Layout<f32>,
+        state: &mut State<f32>,
+        read: &[&[u8]],
+    ) -> u64 {
+        put_in_user_order(layout, bytemuck::cast_slice(read[0]), &mut state.positions);
+        put_in_user_order(layout, bytemuck::cast_slice(read[1]), &mut state.velocities);
         state.multiplier_dt = self.multiplier_dt;
-        Ok(rejected)
+        rejected_steps(read[2])
     }
 
     /// How many bytes [`GpuSolver::read_frame`] reads, [`GpuSolver::force_balance`], and [`GpuSolver::read`].
@@ -159,42 +171,57 @@ impl GpuSolver {
         let model = &*layout;
         check_state(model, state)?;
         check_inputs(model, inputs)?;
+        if let Some(kept) = &self.sent.balance {
+            let read: Vec<&[u8]> = kept.iter().map(Vec::as_slice).collect();
+            self.balance_from(model, state, inputs, &read, balance);
+            return Ok(());
+        }
         self.read_buffers(&balance_slots(model), |read| {
-            let [predicted, acting, before] =
-                [read[0], read[1], read[2]].map(bytemuck::cast_slice::<u8, [f32; 4]>);
-            let count = model.vertex_count();
-            let point = |&[x, y, z, _]: &[f32; 4]| Point::new(vec3(x, y, z), 0.0);
-            let before: Vec<Point<f32>> = before[..count].iter().map(point).collect();
-            let mut places: Vec<Point<f32>> = predicted[..count].iter().map(point).collect();
-            let fourth = |rows: &[[f32; 4]]| -> Vec<f32> {
-                rows[..count].iter().map(|row| row[3]).collect()
-            };
-            if self.settings.method == Method::Explicit {
-                let user = |v: usize| model.numbering.order[v] as usize;
-                let mass = |v: usize| model.masses[user(v)];
-                let place = |v: usize| state.positions[user(v)];
-                load_tethers(&self.tethers, &mut places, self.multiplier_dt, mass, place);
-            }
-            let mut strains: &[Eight<f32>] = read.get(3).map_or(&[], |s| bytemuck::cast_slice(s));
-            let mut start_strain = model.tet_sets.each_ref().map(|set| {
-                // The device has room for all blocks, measures ask for those of viscous sets.
-                let blocks = if strains.is_empty() { 0 } else { set.block_count() };
-                let (of_set, rest) = strains.split_at(6 * blocks);
-                strains = rest;
-                if set.viscous { of_set.as_chunks::<6>().0.to_vec() } else { Vec::new() }
-            });
-            let mut end = EndOfStep {
-                previous: &before,
-                predicted: &places,
-                inertias: &fourth(predicted),
-                inverse_masses: &fourth(acting),
-                tethers: &self.tethers,
-                start_strain: &mut start_strain,
-                recovered: None,
-            };
-            balance.measure(model, state, inputs, &mut end);
-        })?;
-        Ok(())
+            self.balance_from(model, state, inputs, read, balance);
+        })
+    }
+
+    /// The force balance from copies of the slots that it needs.
+    fn balance_from(
+        &self,
+        model: &Layout<f32>,
+        state: &State<f32>,
+        inputs: &Inputs<f32>,
+        read: &[&[u8]],
+        balance: &mut ForceBalance,
+    ) {
+        let [predicted, acting, before] =
+            [read[0], read[1], read[2]].map(bytemuck::cast_slice::<u8, [f32; 4]>);
+        let count = model.vertex_count();
+        let point = |&[x, y, z, _]: &[f32; 4]| Point::new(vec3(x, y, z), 0.0);
+        let before: Vec<Point<f32>> = before[..count].iter().map(point).collect();
+        let mut places: Vec<Point<f32>> = predicted[..count].iter().map(point).collect();
+        let fourth =
+            |rows: &[[f32; 4]]| -> Vec<f32> { rows[..count].iter().map(|row| row[3]).collect() };
+        if self.settings.method == Method::Explicit {
+            let user = |v: usize| model.numbering.order[v] as usize;
+            let mass = |v: usize| model.masses[user(v)];
+            let place = |v: usize| state.positions[user(v)];
+            load_tethers(&self.tethers, &mut places, self.multiplier_dt, mass, place);
+        }
+        let mut strains: &[Eight<f32>] = read.get(3).map_or(&[], |s| bytemuck::cast_slice(s));
+        let mut start_strain = model.tet_sets.each_ref().map(|set| {
+            // The device has room for all blocks, measures ask for those of viscous sets.
+            let blocks = if strains.is_empty() { 0 } else { set.block_count() };
+            let (of_set, rest) = strains.split_at(6 * blocks);
+            strains = rest;
+            if set.viscous { of_set.as_chunks::<6>().0.to_vec() } else { Vec::new() }
+        });
+        let mut end = EndOfStep {
+            previous: &before,
+            predicted: &places,
+            inertias: &fourth(predicted),
+            inverse_masses: &fourth(acting),
+            tethers: &self.tethers,
+            start_strain: &mut start_strain,
+            recovered: None,
+        };
+        balance.measure(model, state, inputs, &mut end);
     }
 
     fn take_state(&self, layout: &Layout<f32>, state: &mut State<f32>, read: &[&[u8]]) {
@@ -225,17 +252,19 @@ impl GpuSolver {
 
     /// Waits for the device, and lets the caller look at copies of slots.
     fn read_buffers(&self, slots: &[Slot], take: impl FnOnce(&[&[u8]])) -> Result<(), GpuError> {
-        let range = |&slot: &Slot| {
-            let [start, size] = self.buffers.span(slot);
-            (self.buffers.buffer(slot), start..start + size)
-        };
-        let ranges: Vec<_> = slots.iter().map(range).collect();
+        let ranges: Vec<_> = slots.iter().map(|slot| self.whole(*slot)).collect();
         read(&self.device, &ranges, take)
+    }
+
+    /// All that a slot holds.
+    pub(super) fn whole(&self, slot: Slot) -> (&wgpu::Buffer, Range<u64>) {
+        let [start, size] = self.buffers.span(slot);
+        (self.buffers.buffer(slot), start..start + size)
     }
 }
 
 /// The device's values that a force balance needs.
-fn balance_slots(layout: &Layout<f32>) -> Vec<Slot> {
+pub(super) fn balance_slots(layout: &Layout<f32>) -> Vec<Slot> {
     let mut slots = vec![Slot::Predicted, Slot::ExternalForces, Slot::Previous];
     if layout.is_viscous() {
         slots.push(Slot::StartStrain);
@@ -248,59 +277,6 @@ fn put_in_user_order(layout: &Layout<f32>, places: &[[f32; 4]], into: &mut [Vec3
         let [x, y, z, _] = places[v as usize];
         *value = vec3(x, y, z);
     }
-}
-
-fn staging(device: &Device, size: u64) -> wgpu::Buffer {
-    device.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("frame"),
-        size,
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
-}
-
-pub(super) fn wait(device: &Device) -> Result<(), GpuError> {
-    let polled = device.device.poll(wgpu::PollType::wait_indefinitely());
-    polled.map_err(|error| device.lost(error.to_string()))?;
-    device.check()
-}
-
-/// Waits for the device, and lets the caller look at copies of ranges [bytes] of buffers.
-pub(super) fn read(
-    device: &Device,
-    ranges: &[(&wgpu::Buffer, Range<u64>)],
-    take: impl FnOnce(&[&[u8]]),
-) -> Result<(), GpuError> {
-    device.check()?;
-    let size = |range: &Range<u64>| range.end - range.start;
-    let staging = staging(device, ranges.iter().map(|(_, range)| size(range)).sum());
-    let descriptor = wgpu::CommandEncoderDescriptor { label: Some("read") };
-    let mut encoder = device.device.create_command_encoder(&descriptor);
-    let mut place = 0;
-    for (buffer, range) in ranges {
-        encoder.copy_buffer_to_buffer(buffer, range.start, &staging, place, size(range));
-        place += size(range);
-    }
-    device.queue.submit([encoder.finish()]);
-    let (told, heard) = channel();
-    staging.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-        let _ = told.send(result.is_ok());
-    });
-    wait(device)?;
-    if heard.recv() != Ok(true) {
-        return Err(device.lost("its memory could not be read".into()));
-    }
-    let bytes = staging.slice(..).get_mapped_range();
-    let bytes = bytes.map_err(|error| device.lost(error.to_string()))?;
-    let mut rest: &[u8] = &bytes;
-    let mut copies = Vec::with_capacity(ranges.len());
-    for (_, range) in ranges {
-        let (copy, after) = rest.split_at(size(range) as usize);
-        copies.push(copy);
-        rest = after;
-    }
-    take(&copies);
-    Ok(())
 }
 
 fn in_user_order(layout: &Layout<f32>, places: &[[f32; 4]]) -> Vec<Vec3<f32>> {

@@ -5,6 +5,7 @@
 //! GpuSolver::step     inputs and constants of the step, one compute pass, one submission; no waiting
 //! GpuSolver::request  copies what moves into memory that the host can read, behind the last step
 //! GpuSolver::newest   the newest copy that has arrived, if any; never waits
+//! GpuSolver::ask_for_frame, take_frame   all that a simulation needs of a frame, without waiting
 //! GpuSolver::restart  warm-start reset: multipliers from positions
 //! GpuSolver::time_step  the same, timed stage by stage by the device's clock
 //! GpuSurface::update  a fine surface behind the last step, ready to be drawn
@@ -26,9 +27,11 @@ pub mod kernels;
 mod layout;
 pub(in crate::solver) mod limits;
 mod parts;
+mod reading;
 pub(in crate::solver) mod record;
 mod report;
 mod ring;
+mod sent;
 mod shared;
 mod slots;
 mod solver;

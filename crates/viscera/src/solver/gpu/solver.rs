@@ -10,6 +10,7 @@ use super::limits::{JOB_STRIDE, MOST_GROUPS};
 use super::parts::{Falls, SmallSteps};
 use super::record::{Dispatch, Recorder};
 use super::ring::Frames;
+use super::sent::Sent;
 use super::slots::{Slot, Update};
 use super::stages::StageRange;
 use super::uniforms::{FrameConstants, Job};
@@ -56,6 +57,7 @@ pub struct GpuSolver {
     pub(super) stage_starts: [Vec<usize>; 2],
     pub(super) restart: Vec<Ready>,
     pub(super) frames: Frames,
+    pub(super) sent: Sent,
     /// What the device's multipliers belong to [s]; zero before the first step.
     pub(super) multiplier_dt: f64,
     /// Vertices that the last step pulled or held, the solver's numbers.
@@ -146,6 +148,7 @@ impl GpuSolver {
         let is_explicit = settings.method == Method::Explicit;
         let mut solver = Self {
             frames: Frames::new(&buffers),
+            sent: Sent::default(),
             weights_dt: 0.0,
             device: device.clone(),
             settings: settings.clone(),
@@ -270,6 +273,7 @@ impl GpuSolver {
     }
 
     fn put(&mut self, layout: &Layout<f32>, state: &State<f32>) {
+        self.forget_sent();
         let places = in_solver_order(layout, &state.positions);
         let mut unknowns = vec![0.0f32; self.buffers.length as usize];
         let (positions, multipliers) =

@@ -12,8 +12,8 @@ use wgpu::BufferUsages;
 
 use super::device::{Device, Pipeline};
 use super::error::GpuError;
-use super::frames;
 use super::limits::MOST_GROUPS;
+use super::reading;
 use super::solver::GpuSolver;
 use crate::mesh::embed::{Embedding, EmbeddingError};
 use crate::model::Model;
@@ -239,7 +239,7 @@ impl GpuSurface {
     pub fn read(&self) -> Result<[Vec<Vec3<f32>>; 2], GpuError> {
         let mut numbers: Vec<[f32; 4]> = Vec::new();
         let whole = (&self.vertices, 0..self.vertices.size());
-        frames::read(&self.device, &[whole], |read| {
+        reading::read(&self.device, &[whole], |read| {
             numbers.extend_from_slice(bytemuck::cast_slice(read[0]));
         })?;
         let pairs = &numbers.as_chunks::<2>().0[..self.vertex_count as usize];

@@ -10,7 +10,7 @@
 
 use super::device::Device;
 use super::error::GpuError;
-use super::frames;
+use super::reading;
 use super::solver::GpuSolver;
 use crate::model::Model;
 use crate::solver::inputs::Inputs;
@@ -144,7 +144,7 @@ impl Clock {
         encoder.resolve_query_set(&self.queries, 0..count, &resolved, 0);
         self.device.queue.submit([encoder.finish()]);
         let mut readings = Vec::new();
-        frames::read(&self.device, &[(&resolved, 0..size)], |read| {
+        reading::read(&self.device, &[(&resolved, 0..size)], |read| {
             let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(read[0]);
             let since = |t: &u64| t.wrapping_sub(ticks[0]) as i64 as f64 * self.tick;
             readings = ticks.iter().map(since).collect();

@@ -1,18 +1,22 @@
-//! A simulation in either precision, with the window's numbers for the patches that it holds.
+//! A simulation in either precision, with the caller's numbers for the patches that it holds.
 
+use viscera::model::ModelBuilder;
 use viscera::scalar::{Real, Vec3};
 use viscera::scene::{Patch, Scene, Selector};
-use viscera::settings::{Place, Precision};
+use viscera::settings::{Place, Precision, SolverSettings};
 use viscera::simulation::{
-    Assembly, FrameError, Live, PatchForce, PatchKind, ResolvedPatch, Simulation,
+    Assembly, Live, PatchForce, PatchKind, ResolvedPatch, Simulation, SimulationError,
 };
+use viscera::solver::Inputs;
+use viscera::solver::gpu::Device;
 
-use super::color::surface_values;
-use super::snapshot::{Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch};
-use crate::choices::Settings;
-use crate::probe::NextStep;
+use crate::color::surface_values;
+use crate::snapshot::{Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch};
 
-/// One of the simulations that the thread computes, in whichever precision.
+/// Settings to change: keys and values as one writes them.
+pub type Settings = Vec<(String, String)>;
+
+/// One simulation, in whichever precision.
 pub trait Run: Send {
     /// What computes it, and why; what a person should know of that.
     fn device(&self) -> (String, Option<String>);
@@ -30,6 +34,18 @@ pub trait Run: Send {
     fn reset(&mut self) -> Result<(), String>;
     /// Computes a frame.
     fn advance(&mut self) -> Result<(), String>;
+    /// Begins a frame without waiting for what computes it; `measured` where [`Run::measure`] follows.
+    fn send(&mut self, measured: bool) -> Result<(), String>;
+    /// Takes over the frame that was sent; false while it is under way.
+    fn receive(&mut self) -> Result<bool, String>;
+    /// Whether a frame was sent that was not taken over.
+    fn is_under_way(&self) -> bool;
+    /// Another device for settings that ask for one, or none; it goes on from the last frame.
+    fn offer(&mut self, device: Option<&Device>) -> Result<(), String>;
+    /// The scene as it is now.
+    fn scene(&self) -> &Scene;
+    /// The solver's settings in force, with a method in the place of "auto".
+    fn solver(&self) -> &SolverSettings;
     /// Measures what it is now: residual, energies, stresses.
     fn measure(&mut self) -> Result<(), String>;
     /// Fills a snapshot with its state now and what was measured last.
@@ -55,13 +71,50 @@ pub struct GripTarget {
     pub stiffness: Option<f64>,
 }
 
-/// Builds a simulation in the precision that its scene asks for.
-pub fn build(scene: Scene, assembly: Assembly) -> Result<Box<dyn Run>, String> {
-    Ok(match scene.solver.precision {
-        Precision::F32 => Box::new(SimulationRun::<f32>::new(scene, assembly)?),
-        Precision::F64 => Box::new(SimulationRun::<f64>::new(scene, assembly)?),
+/// The step that comes next: the state before it, and what acts in it.
+#[derive(Clone, Debug)]
+pub struct NextStep {
+    /// Settings in force.
+    pub solver: SolverSettings,
+    /// Meshes with their materials.
+    pub builder: ModelBuilder,
+    /// [m], shape [vertex_count].
+    pub positions: Vec<Vec3<f64>>,
+    /// [m/s], shape [vertex_count].
+    pub velocities: Vec<Vec3<f64>>,
+    /// What acts in the step.
+    pub inputs: Inputs<f64>,
+    /// The step [s].
+    pub dt: f64,
+}
+
+/// Builds a simulation in the precision that its scene asks for; on the caller's device, where it has one and the
+/// settings ask for one.
+pub fn build(
+    scene: Scene,
+    assembly: Assembly,
+    device: Option<&Device>,
+) -> Result<Box<dyn Run>, String> {
+    Ok(match (scene.solver.precision, device) {
+        (Precision::F32, Some(device)) => {
+            let simulation = Simulation::with_device(scene, assembly, device.clone());
+            Box::new(SimulationRun::new(simulation)?)
+        }
+        (Precision::F32, None) => {
+            Box::new(SimulationRun::new(Simulation::<f32>::new(scene, assembly))?)
+        }
+        #[cfg(feature = "double")]
+        (Precision::F64, _) => {
+            Box::new(SimulationRun::new(Simulation::<f64>::new(scene, assembly))?)
+        }
+        #[cfg(not(feature = "double"))]
+        (Precision::F64, _) => return Err(ONLY_SINGLE.to_owned()),
     })
 }
+
+#[cfg(not(feature = "double"))]
+const ONLY_SINGLE: &str = "this program computes in single precision; leave solver.precision out, or run the scene with \
+                           `viscera run`";
 
 struct SimulationRun<S> {
     simulation: Simulation<S>,
@@ -71,8 +124,8 @@ struct SimulationRun<S> {
 }
 
 impl<S: Real> SimulationRun<S> {
-    fn new(scene: Scene, assembly: Assembly) -> Result<Self, String> {
-        let simulation = Simulation::new(scene, assembly).map_err(text)?;
+    fn new(simulation: Result<Simulation<S>, SimulationError>) -> Result<Self, String> {
+        let simulation = simulation.map_err(text)?;
         Ok(Self { simulation, held: Vec::new(), measures: Measures::default() })
     }
 
@@ -160,14 +213,38 @@ impl<S: Real> Run for SimulationRun<S> {
     }
 
     fn advance(&mut self) -> Result<(), String> {
-        self.simulation.advance().map_err(explained)
+        self.simulation.advance().map_err(text)
+    }
+
+    fn send(&mut self, measured: bool) -> Result<(), String> {
+        self.simulation.send_frame(measured).map_err(text)
+    }
+
+    fn receive(&mut self) -> Result<bool, String> {
+        self.simulation.take_frame().map_err(text)
+    }
+
+    fn is_under_way(&self) -> bool {
+        self.simulation.is_under_way()
+    }
+
+    fn offer(&mut self, device: Option<&Device>) -> Result<(), String> {
+        self.simulation.offer_device(device.cloned()).map_err(text)
+    }
+
+    fn scene(&self) -> &Scene {
+        self.simulation.scene()
+    }
+
+    fn solver(&self) -> &SolverSettings {
+        self.simulation.solver()
     }
 
     fn measure(&mut self) -> Result<(), String> {
         if self.simulation.frame() == 0 {
             return Ok(());
         }
-        self.simulation.measure().map_err(explained)?;
+        self.simulation.measure().map_err(text)?;
         let report = self.simulation.report();
         self.measures.residual = report.relative_residual;
         self.measures.energy = report.energy;
@@ -206,7 +283,10 @@ impl<S: Real> Run for SimulationRun<S> {
     fn fork(&self, scene: &Scene) -> Result<Box<dyn Run>, String> {
         Ok(match scene.solver.precision {
             Precision::F32 => Box::new(self.fork_as::<f32>(scene)?),
+            #[cfg(feature = "double")]
             Precision::F64 => Box::new(self.fork_as::<f64>(scene)?),
+            #[cfg(not(feature = "double"))]
+            Precision::F64 => return Err(ONLY_SINGLE.to_owned()),
         })
     }
 
@@ -228,10 +308,5 @@ impl<S: Real> Run for SimulationRun<S> {
 }
 
 fn text(error: impl std::fmt::Display) -> String {
-    error.to_string()
-}
-
-/// What failed, with the window's next moves.
-fn explained(error: FrameError) -> String {
     error.to_string()
 }

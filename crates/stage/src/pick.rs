@@ -1,8 +1,9 @@
 //! What lies under the pointer.
 
 use viscera::scalar::Vec3;
+use viscera::simulation::Assembly;
 
-use crate::engine::{RunSnapshot, Setup};
+use crate::snapshot::RunSnapshot;
 
 /// A point on the tissue.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,14 +18,14 @@ pub struct Pick {
 
 /// The first point of the surfaces that a ray meets, as they are in a frame. `direction` has length 1.
 pub fn pick(
-    setup: &Setup,
+    assembly: &Assembly,
     run: &RunSnapshot,
     from: Vec3<f64>,
     direction: Vec3<f64>,
 ) -> Option<Pick> {
     let mut nearest = f64::INFINITY;
     let mut found = None;
-    for (number, body) in setup.assembly.bodies.iter().enumerate() {
+    for (number, body) in assembly.bodies.iter().enumerate() {
         let tissue = run.positions.get(body.vertices.clone())?;
         let mut surface = vec![Vec3::<f32>::ZERO; body.surface.vertices.len()];
         body.embedding.apply(tissue, &mut surface).ok()?;

@@ -4,7 +4,7 @@ use viscera::measure::TetMeasure;
 use viscera::scalar::{Real, Vec3};
 use viscera::simulation::Assembly;
 
-use super::snapshot::Coloring;
+use crate::snapshot::Coloring;
 
 /// Values of the surfaces' vertices, one body after the other; none for plain tissue. `positions` [m] of
 /// the tetrahedra's vertices, the user's order; `tets` of the same state, where the colours need them. Strain and stress of an inverted

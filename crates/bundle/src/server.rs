@@ -1,0 +1,262 @@
+//! A server of static files for one's own machine: what plain hosting does, with the headers that the page likes
+//! best. It serves what is in the folder at that moment.
+
+use std::collections::HashMap;
+use std::io::Cursor;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::{Component, Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+use anyhow::{Context, Result, anyhow, bail};
+use tiny_http::{Header, Method, Request, Response};
+
+use crate::site::is_named_after_content;
+use crate::sizes::gzip;
+
+/// Requests that are answered at the same time.
+const THREADS: usize = 4;
+
+/// A running server; it ends when this is dropped.
+pub struct Server {
+    http: Arc<tiny_http::Server>,
+    threads: Vec<JoinHandle<()>>,
+    address: SocketAddr,
+}
+
+/// What is sent back.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// 200, 301, 403, 404 or 405.
+    pub status: u16,
+    /// Names and values.
+    pub headers: Vec<(&'static str, String)>,
+    /// Left out where only the head is asked for.
+    pub body: Vec<u8>,
+}
+
+/// A folder, and the smaller forms of its files, made once.
+struct Folder {
+    root: PathBuf,
+    small: Mutex<HashMap<PathBuf, Vec<u8>>>,
+}
+
+impl Server {
+    /// Serves a folder on this machine alone. Port 0 is any that is free.
+    pub fn start(folder: &Path, port: u16) -> Result<Self> {
+        if !folder.join("index.html").exists() {
+            let place = folder.display();
+            bail!(
+                "{place}: there is no index.html in it; `cargo xtask web` makes a folder that has one"
+            );
+        }
+        let http = tiny_http::Server::http((Ipv4Addr::LOCALHOST, port));
+        let http = http.map_err(|e| {
+            anyhow!("port {port} cannot be used ({e}); name another, or 0 for any that is free")
+        })?;
+        let address = http.server_addr().to_ip().context("the server has no address")?;
+        let http = Arc::new(http);
+        let folder = Arc::new(Folder::new(folder));
+        let threads = (0..THREADS).map(|_| {
+            let (http, folder) = (http.clone(), folder.clone());
+            std::thread::spawn(move || {
+                while let Ok(request) = http.recv() {
+                    answer(request, &folder);
+                }
+            })
+        });
+        Ok(Self { threads: threads.collect(), http, address })
+    }
+
+    /// `http://127.0.0.1:PORT/`. A browser takes that for a safe place: it allows WebGPU and service workers.
+    pub fn url(&self) -> String {
+        format!("http://{}/", self.address)
+    }
+
+    /// Serves until the program is ended.
+    pub fn wait(mut self) {
+        for thread in std::mem::take(&mut self.threads) {
+            // A thread that panicked serves no more; the others do.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        for _ in &self.threads {
+            self.http.unblock();
+        }
+        for thread in std::mem::take(&mut self.threads) {
+            // Nothing is left to be done for a thread that panicked.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn answer(request: Request, folder: &Folder) {
+    let takes_gzip = request.headers().iter().any(|header| {
+        header.field.equiv("Accept-Encoding") && header.value.as_str().contains("gzip")
+    });
+    let is_allowed = matches!(request.method(), Method::Get | Method::Head);
+    let answer = match is_allowed {
+        true => folder.answer(request.url(), takes_gzip),
+        false => {
+            let mut answer = Answer::text(405, "405: this server only reads.\n".into());
+            answer.headers.push(("Allow", "GET, HEAD".into()));
+            answer
+        }
+    };
+    let headers = answer
+        .headers
+        .iter()
+        .filter_map(|(name, value)| Header::from_bytes(name.as_bytes(), value.as_bytes()).ok());
+    let length = answer.body.len();
+    let response = Response::new(
+        answer.status.into(),
+        headers.collect(),
+        Cursor::new(answer.body),
+        Some(length),
+        None,
+    );
+    // Whoever asked has gone; others may come.
+    let _ = request.respond(response.with_chunked_threshold(usize::MAX));
+}
+
+impl Answer {
+    fn text(status: u16, text: String) -> Self {
+        let headers = vec![
+            ("Content-Type", "text/plain; charset=utf-8".to_owned()),
+            ("Cache-Control", "no-store".to_owned()),
+        ];
+        Self { status, headers, body: text.into_bytes() }
+    }
+
+    /// A header's value.
+    pub fn header(&self, name: &str) -> Option<&str> {
+        let found = self.headers.iter().find(|(own, _)| *own == name);
+        found.map(|(_, value)| value.as_str())
+    }
+}
+
+impl Folder {
+    fn new(root: &Path) -> Self {
+        Self { root: root.to_owned(), small: Mutex::default() }
+    }
+
+    fn answer(&self, url: &str, takes_gzip: bool) -> Answer {
+        let asked = url.split(['?', '#']).next().unwrap_or("");
+        let Some(path) = path_of(asked) else {
+            return Answer::text(
+                403,
+                "403: there is nothing for you outside the page's folder.\n".into(),
+            );
+        };
+        let mut file = self.root.join(&path);
+        if file.is_dir() {
+            if !asked.ends_with('/') {
+                // Else the page's relative references would lead beside it.
+                let mut answer = Answer::text(301, "301: with a / at the end.\n".into());
+                answer.headers.push(("Location", format!("{asked}/")));
+                return answer;
+            }
+            file.push("index.html");
+        }
+        if !self.is_inside(&file) {
+            let text = format!("404: there is no {asked} here. The page is at /.\n");
+            return Answer::text(404, text);
+        }
+        let Ok(content) = std::fs::read(&file) else {
+            return Answer::text(404, format!("404: {asked} cannot be read.\n"));
+        };
+        self.found(&file, content, takes_gzip)
+    }
+
+    fn found(&self, file: &Path, content: Vec<u8>, takes_gzip: bool) -> Answer {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let (kind, is_worth) = kind_of(&name);
+        let is_lasting = is_named_after_content(&name);
+        let cache = if is_lasting { "public, max-age=31536000, immutable" } else { "no-cache" };
+        let mut headers = vec![
+            ("Content-Type", kind.to_owned()),
+            ("Cache-Control", cache.to_owned()),
+            ("X-Content-Type-Options", "nosniff".to_owned()),
+        ];
+        let mut body = content;
+        if is_worth {
+            headers.push(("Vary", "Accept-Encoding".to_owned()));
+            if takes_gzip {
+                headers.push(("Content-Encoding", "gzip".to_owned()));
+                body = if is_lasting { self.small_once(file, &body) } else { gzip(&body) };
+            }
+        }
+        Answer { status: 200, headers, body }
+    }
+
+    /// The smaller form of a file whose name says its content.
+    fn small_once(&self, file: &Path, content: &[u8]) -> Vec<u8> {
+        let mut small = self.small.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        small.entry(file.to_owned()).or_insert_with(|| gzip(content)).clone()
+    }
+
+    /// It is a file, and no link leads out of the folder.
+    fn is_inside(&self, file: &Path) -> bool {
+        let (Ok(file), Ok(root)) = (file.canonicalize(), self.root.canonicalize()) else {
+            return false;
+        };
+        file.starts_with(root) && file.is_file()
+    }
+}
+
+/// The path inside the folder; nothing where it would lead out, or to what is hidden.
+fn path_of(asked: &str) -> Option<PathBuf> {
+    let decoded = decoded(asked)?;
+    if decoded.contains(['\\', '\0', ':']) {
+        return None;
+    }
+    let path = PathBuf::from(decoded.trim_start_matches('/'));
+    let is_plain = path.components().all(|part| match part {
+        Component::Normal(name) => !name.to_string_lossy().starts_with('.'),
+        _ => false,
+    });
+    is_plain.then_some(path)
+}
+
+/// `%20` and the like as what they mean.
+fn decoded(text: &str) -> Option<String> {
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text.as_bytes();
+    while let [first, after @ ..] = rest {
+        rest = after;
+        if *first != b'%' {
+            bytes.push(*first);
+            continue;
+        }
+        let (digits, after) = rest.split_at_checked(2)?;
+        let is_hex = digits.iter().all(u8::is_ascii_hexdigit);
+        let digits = std::str::from_utf8(digits).ok().filter(|_| is_hex)?;
+        bytes.push(u8::from_str_radix(digits, 16).ok()?);
+        rest = after;
+    }
+    String::from_utf8(bytes).ok()
+}
+
+/// What a browser must be told, and whether gzip is worth it.
+fn kind_of(name: &str) -> (&'static str, bool) {
+    match name.rsplit_once('.').map_or("", |(_, extension)| extension) {
+        "html" => ("text/html; charset=utf-8", true),
+        "css" => ("text/css; charset=utf-8", true),
+        "js" | "mjs" => ("text/javascript; charset=utf-8", true),
+        "wasm" => ("application/wasm", true),
+        "json" | "map" => ("application/json", true),
+        "webmanifest" => ("application/manifest+json", true),
+        "svg" => ("image/svg+xml", true),
+        "ts" | "txt" | "md" | "toml" | "obj" | "vtk" | "msh" => ("text/plain; charset=utf-8", true),
+        "png" => ("image/png", false),
+        "jpg" | "jpeg" => ("image/jpeg", false),
+        "ico" => ("image/x-icon", false),
+        "woff2" => ("font/woff2", false),
+        "gif" => ("image/gif", false),
+        _ => ("application/octet-stream", false),
+    }
+}

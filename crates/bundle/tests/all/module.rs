@@ -1,0 +1,34 @@
+//! wasm-bindgen on a module of a few bytes.
+
+use viscera_bundle::module;
+
+/// A module with one empty function, exported as `f`.
+const MODULE: [u8; 36] = [
+    0, b'a', b's', b'm', 1, 0, 0, 0, // version 1
+    1, 4, 1, 0x60, 0, 0, // a type: nothing in, nothing out
+    3, 2, 1, 0, // a function of it
+    5, 3, 1, 0, 1, // a page of memory
+    7, 5, 1, 1, b'f', 0, 0, // its name outside
+    10, 4, 1, 2, 0, 0x0b, // its body
+];
+
+#[test]
+fn a_module_gets_a_script_that_finds_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("m.wasm");
+    std::fs::write(&file, MODULE).expect("written");
+    let module = module::build(&file).expect("a module");
+    let script = String::from_utf8(module.files[module::SCRIPT].clone()).expect("text");
+    assert!(script.contains("new URL('viscera_bg.wasm', import.meta.url)"), "{script}");
+    assert!(module.files[module::WASM].starts_with(b"\0asm"));
+    assert!(module.files.contains_key(module::TYPES));
+}
+
+#[test]
+fn what_is_no_module_is_refused_with_its_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("m.wasm");
+    std::fs::write(&file, "no module").expect("written");
+    let error = format!("{:#}", module::build(&file).err().expect("refused"));
+    assert!(error.contains("m.wasm") && error.contains("wasm-bindgen refuses it"), "{error}");
+}

@@ -1,0 +1,6 @@
+//! The page in a real browser, without a display and, where a test says so, without WebGPU.
+
+mod browser;
+mod driver;
+mod offline;
+mod setup;

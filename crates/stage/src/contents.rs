@@ -1,0 +1,120 @@
+//! What a picture shows of a simulation: its surfaces on the device, marks and pulls.
+
+use viscera::scalar::Vec3;
+use viscera::simulation::Assembly;
+use viscera::solver::gpu::{Device, GpuSurface, Skin};
+use viscera_picture::Color;
+use viscera_render::{
+    Arrow, BodyView, BoundingSphere, GpuDrawing, Markers, Orbit, Paint, ScaledValues, ValueBuffer,
+};
+
+use crate::snapshot::RunSnapshot;
+
+/// The surfaces of one simulation, on the device.
+pub struct RunSurface {
+    surface: GpuSurface,
+    values: ValueBuffer,
+    /// Whether the newest snapshot has values.
+    has_values: bool,
+    /// Encloses it, for its shadow.
+    enclosing: Option<BoundingSphere>,
+}
+
+impl RunSurface {
+    /// Binds the surfaces of all bodies.
+    pub fn new(device: &Device, assembly: &Assembly) -> Result<Self, String> {
+        let bodies = &assembly.bodies;
+        let skins: Vec<Skin<'_>> = bodies
+            .iter()
+            .map(|body| Skin {
+                embedding: &body.embedding,
+                triangles: &body.surface.triangles,
+                first_vertex: body.vertices.start,
+            })
+            .collect();
+        let count = assembly.builder.positions().len();
+        let surface = GpuSurface::following(device, count, &skins);
+        let surface = surface.map_err(|error| error.to_string())?;
+        let values = ValueBuffer::new(device, surface.vertex_count() as usize);
+        Ok(Self { surface, values, has_values: false, enclosing: None })
+    }
+
+    /// Moves it to its place in a snapshot.
+    pub fn place(&mut self, run: &RunSnapshot) -> Result<(), String> {
+        self.surface.place(&run.positions).map_err(|error| error.to_string())?;
+        self.surface.update();
+        self.has_values = !run.values.is_empty();
+        if self.has_values {
+            self.values.write(&run.values).map_err(|error| error.to_string())?;
+        }
+        self.enclosing = BoundingSphere::around(run.positions.iter().map(|x| x.cast()));
+        Ok(())
+    }
+}
+
+/// What a picture shows.
+pub struct PictureContents<'a> {
+    /// From where.
+    pub orbit: Orbit,
+    /// The simulation's surfaces.
+    pub surface: &'a RunSurface,
+    /// The reference, which shines through.
+    pub ghost: Option<&'a RunSurface>,
+    /// The values that its colours begin and end at, where they show values.
+    pub range: Option<[f32; 2]>,
+    /// Whether the triangles are drawn.
+    pub wireframe: bool,
+    /// Whether it throws a shadow.
+    pub shadow: bool,
+    /// Vertices that are held in place [m].
+    pub fixed: &'a [Vec3<f64>],
+    /// Where tissue is held by hand [m].
+    pub picked: &'a [Vec3<f64>],
+    /// Where each of them is pulled to [m].
+    pub targets: &'a [Vec3<f64>],
+    /// The size of things [m], for markers and arrows.
+    pub extent: f64,
+}
+
+impl PictureContents<'_> {
+    /// Radii as shares of the size of things: large enough to be seen, too small to cover the tissue.
+    const FIXED: f64 = 0.005;
+    const PICKED: f64 = 0.009;
+    const SHAFT: f64 = 0.0045;
+
+    /// As the renderer takes it.
+    pub fn drawing(&self) -> GpuDrawing<'_> {
+        let surface = self.surface;
+        let paint = match self.range.filter(|_| surface.has_values) {
+            Some([low, high]) => Paint::Values(ScaledValues { buffer: &surface.values, low, high }),
+            None => Paint::Flat(Color::TISSUE),
+        };
+        let body = BodyView { paint, wireframe: self.wireframe, ..BodyView::of(&surface.surface) };
+        let ghost = self.ghost.map(|ghost| BodyView {
+            paint: Paint::Flat(Color::REST),
+            opacity: 0.3,
+            ..BodyView::of(&ghost.surface)
+        });
+        let balls = |positions, share, color| Markers {
+            positions,
+            radius: share * self.extent,
+            color,
+            see_through: 0.0,
+        };
+        let radius = Self::SHAFT * self.extent;
+        let pulls = self.picked.iter().zip(self.targets);
+        let arrows = pulls.map(|(&from, &to)| Arrow { from, to, radius, color: Color::PULLED });
+        // Shorter ones are hidden by the point they begin at.
+        let is_long = |arrow: &Arrow| (arrow.to - arrow.from).length() > Self::PICKED * self.extent;
+        GpuDrawing {
+            bodies: [Some(body), ghost].into_iter().flatten().collect(),
+            markers: vec![
+                balls(self.fixed, Self::FIXED, Color::FIXED),
+                balls(self.picked, Self::PICKED, Color::PULLED),
+            ],
+            arrows: arrows.filter(is_long).collect(),
+            shadow: surface.enclosing.filter(|_| self.shadow),
+            ..GpuDrawing::from(self.orbit)
+        }
+    }
+}

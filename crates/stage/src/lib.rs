@@ -1,0 +1,27 @@
+//! # viscera-stage
+//!
+//! What the window and the page share, without a user interface: simulations that are held by hand, what lies under
+//! a pointer, what a picture shows.
+//!
+//! | to | look at |
+//! |---|---|
+//! | step a simulation in either precision, hold it, change it | [`Run`], [`build`] |
+//! | see what it looks like after a frame | [`RunSnapshot`], [`Coloring`] |
+//! | find what lies under a pointer | [`Lens`], [`pick`], [`meet_plane`] |
+//! | draw it | [`RunSurface`], [`PictureContents`], [`Legend`] |
+
+mod color;
+mod contents;
+mod legend;
+mod lens;
+mod pick;
+mod run;
+mod snapshot;
+
+pub use color::surface_values;
+pub use contents::{PictureContents, RunSurface};
+pub use legend::{Legend, millimetres, newtons};
+pub use lens::{Area, Lens};
+pub use pick::{Pick, meet_plane, pick};
+pub use run::{GripTarget, NextStep, Run, Settings, build};
+pub use snapshot::{Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch, inverted};

@@ -1,0 +1,113 @@
+//! Frames: sent to what computes them, and taken over when they are there. Between the two nobody has to wait, which
+//! browsers forbid.
+
+use super::Simulation;
+use super::error::FrameError;
+use crate::scalar::Real;
+
+impl<S: Real> Simulation<S> {
+    /// Begins a frame: a device is sent all of it, the CPU computes it at once. [`Simulation::take_frame`] takes it over.
+    /// `measured` where [`Simulation::measure`] will be asked for after it. What is done by hand in between takes the frame
+    /// back: it is best done before.
+    ///
+    /// ```text
+    /// advance()                        send, wait, take over
+    /// send_frame(); take_frame()?      the same without waiting: false while the frame is under way
+    /// ```
+    pub fn send_frame(&mut self, measured: bool) -> Result<(), FrameError> {
+        self.submit_frame()?;
+        let asked = self.backend.ask_for_frame(measured);
+        self.or_on_the_cpu(asked)
+    }
+
+    /// Takes over the frame that was sent; false while it is under way, or where none was.
+    pub fn take_frame(&mut self) -> Result<bool, FrameError> {
+        let take = |simulation: &mut Self| {
+            let Self { backend, model, state, .. } = simulation;
+            backend.take_frame(model, state)
+        };
+        self.finish_frame(take)
+    }
+
+    /// Whether a frame was sent and not taken over yet.
+    pub fn is_under_way(&self) -> bool {
+        self.under_way
+    }
+
+    /// Sends the steps of a frame.
+    pub(super) fn submit_frame(&mut self) -> Result<(), FrameError> {
+        self.begin_frame().map_err(Box::new)?;
+        self.before.copy_from_slice(&self.state.positions);
+        self.under_way = true;
+        let sent = self.send_steps();
+        self.or_on_the_cpu(sent)
+    }
+
+    /// The CPU computes the frame where the device was lost in it, and that is wanted.
+    fn or_on_the_cpu(&mut self, computed: Result<(), FrameError>) -> Result<(), FrameError> {
+        match computed {
+            // What a step refuses, the CPU would refuse as well.
+            Err(lost) if self.backend.gives_way && !matches!(lost, FrameError::Step(_)) => {
+                // Positions are still those of the last frame; the multipliers are gone with the device.
+                let (time, dt) = (self.time(), self.substep_dt());
+                self.backend.give_way(&self.model, &self.solver, time, &lost);
+                let inputs = self.inputs_at(time);
+                self.state.multipliers.clear();
+                self.backend.restart(&self.model, &mut self.state, &inputs, dt)?;
+                self.send_steps()
+            }
+            Err(error) => {
+                self.under_way = false;
+                Err(error)
+            }
+            Ok(()) => Ok(()),
+        }
+    }
+
+    /// The substeps of a frame.
+    fn send_steps(&mut self) -> Result<(), FrameError> {
+        let dt = self.substep_dt();
+        // The end of the frame is a time of its own: that of the keys by which holds are led.
+        let (start, end) = (self.time(), (self.frame + 1) as f64 * self.scene.time.frame);
+        let substeps = self.substeps;
+        let Self { scene, assembly, taken, model, state, inputs, backend, .. } = self;
+        self.rejected_before = backend.rejected_steps();
+        backend.steps(model, state, inputs, dt, substeps, |substep, inputs| {
+            let is_last = substep == substeps;
+            let time = if is_last { end } else { start + f64::from(substep) * dt };
+            taken.act(scene, assembly, time, inputs);
+        })
+    }
+
+    /// What is left of a frame once its state is there: `take` gets it, or says that it is under way.
+    pub(super) fn finish_frame(
+        &mut self,
+        take: impl FnOnce(&mut Self) -> Result<bool, FrameError>,
+    ) -> Result<bool, FrameError> {
+        if !self.under_way {
+            return Ok(false);
+        }
+        let taken = take(self);
+        match taken {
+            Ok(false) => return Ok(false),
+            taken => self.or_on_the_cpu(taken.map(|_| ()))?,
+        }
+        self.under_way = false;
+        self.rejected_substeps = self.backend.rejected_steps() - self.rejected_before;
+        self.frame += 1;
+        self.stepped = true;
+        if !self.state.is_finite() || self.backend.is_beyond_numbers() {
+            return Err(self.diverged());
+        }
+        let factor = self.scene.time.velocity_factor;
+        if factor != 1.0 {
+            for velocity in &mut self.state.velocities {
+                *velocity = *velocity * S::from_f64(factor);
+            }
+            if let Some(device) = self.backend.device_mut() {
+                device.write_velocities(&self.state.velocities);
+            }
+        }
+        Ok(true)
+    }
+}

@@ -1,0 +1,52 @@
+//! A frame whose results are on their way: nobody waits for the device, which browsers forbid.
+
+use super::error::GpuError;
+use super::frames::balance_slots;
+use super::reading::Reading;
+use super::solver::GpuSolver;
+use crate::model::Model;
+use crate::state::State;
+
+/// What was asked for behind the last step.
+#[derive(Debug, Default)]
+pub(super) struct Sent {
+    awaited: Option<Reading>,
+    /// What the force balance of the last step is made of, once it is there.
+    pub balance: Option<Vec<Vec<u8>>>,
+}
+
+impl GpuSolver {
+    /// Asks for what [`GpuSolver::read_frame`] reads of the state behind the last step and, where `with_balance`, for
+    /// what [`GpuSolver::force_balance`] needs. Does not wait.
+    pub fn ask_for_frame(&mut self, with_balance: bool) -> Result<(), GpuError> {
+        let slots = if with_balance { balance_slots(&self.layout) } else { Vec::new() };
+        let mut ranges = self.frame_ranges().to_vec();
+        ranges.extend(slots.into_iter().map(|slot| self.whole(slot)));
+        self.sent = Sent { awaited: Some(Reading::start(&self.device, &ranges)?), balance: None };
+        Ok(())
+    }
+
+    /// Takes over what was asked for, as [`GpuSolver::read_frame`] does; nothing while it is under way. A force balance is
+    /// measured without waiting then. Does not wait.
+    pub fn take_frame(
+        &mut self,
+        model: &Model<f32>,
+        state: &mut State<f32>,
+    ) -> Result<Option<u64>, GpuError> {
+        let layout = self.layout_of(model)?;
+        let Some(reading) = &self.sent.awaited else { return Ok(None) };
+        let Some(arrived) = reading.has_arrived(&self.device)? else { return Ok(None) };
+        let (rejected, balance) = arrived.look(&self.device, |read| {
+            let (frame, balance) = read.split_at(self.frame_ranges().len());
+            let balance: Vec<Vec<u8>> = balance.iter().map(|bytes| bytes.to_vec()).collect();
+            (self.take_frame_parts(&layout, state, frame), balance)
+        })?;
+        self.sent = Sent { awaited: None, balance: Some(balance).filter(|all| !all.is_empty()) };
+        Ok(Some(rejected))
+    }
+
+    /// What was asked for belongs to an earlier step now.
+    pub(super) fn forget_sent(&mut self) {
+        self.sent = Sent::default();
+    }
+}

@@ -1,0 +1,568 @@
+//! One scene in motion, or two beside each other, with the hands on it.
+
+use viscera::material::PRESETS;
+use viscera::scalar::Vec3;
+use viscera::scene::{BodyShape, Scene};
+use viscera::solver::gpu::Device;
+use viscera_picture::{HALF_OPENING, ViewDirection};
+use viscera_render::Orbit;
+use viscera_stage::{
+    Area, Coloring, GripTarget, HoldId, Legend, Lens, Run, RunSnapshot, Settings, build, pick,
+};
+
+use crate::catalog::law_name;
+use crate::holds::Hand;
+use crate::loaded::{LoadRequest, Loaded};
+use crate::report::{BodyReport, LoadedReport, Report, RunReport};
+
+/// The largest mesh that a page takes [tetrahedra].
+pub const MOST_TETS: usize = 100_000;
+
+/// The largest file that a page takes [bytes]: text of a mesh of some hundred thousand tetrahedra.
+pub const MOST_FILE_BYTES: u64 = 64 << 20;
+
+/// Angle that the view turns by for a drag across its height [degrees].
+const TURN: f64 = 200.0;
+
+/// How hands take hold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grip {
+    /// How many vertices.
+    pub count: u32,
+    /// Total stiffness [N/m] of the springs between hand and tissue; rigidly where there is none.
+    pub stiffness: Option<f64>,
+}
+
+impl Default for Grip {
+    /// So stiff that the tissue stays within 2 mm of the finger up to 10 N.
+    fn default() -> Self {
+        Self { count: 8, stiffness: Some(5000.0) }
+    }
+}
+
+/// Something that a hand does.
+#[derive(Clone, Copy, Debug)]
+enum Act {
+    Take(HoldId, GripTarget),
+    Lead(HoldId, Vec3<f64>),
+    LetGo(HoldId),
+}
+
+/// A simulation, what it looks like, and what waits for its frame under way.
+pub(crate) struct RunState {
+    run: Box<dyn Run>,
+    pub snapshot: RunSnapshot,
+    /// Of the snapshot: each has another number.
+    pub moved: u64,
+    frame: u64,
+    waiting: Vec<Act>,
+    /// Whether the next frame is to be measured, the one under way is, and any was.
+    measures: [bool; 3],
+}
+
+/// See the module.
+pub struct Session {
+    device: Option<Device>,
+    pub(crate) loaded: Option<Loaded>,
+    pub(crate) runs: Vec<RunState>,
+    hands: Vec<Hand>,
+    grip: Grip,
+    pub(crate) coloring: Coloring,
+    pub(crate) legend: Legend,
+    pub(crate) wireframe: bool,
+    pub(crate) dark: bool,
+    orbit: Orbit,
+    pub(crate) extent: f64,
+    /// Width and height [pixels].
+    pub(crate) size: [u32; 2],
+    count: u64,
+    /// Scenes loaded so far.
+    pub(crate) generation: u64,
+}
+
+impl Session {
+    /// Without a scene; on a device, where there is one, for pictures and for settings that ask for it.
+    pub fn new(device: Option<Device>) -> Self {
+        Self {
+            device,
+            loaded: None,
+            runs: Vec::new(),
+            hands: Vec::new(),
+            grip: Grip::default(),
+            coloring: Coloring::Plain,
+            legend: Legend::default(),
+            wireframe: false,
+            dark: false,
+            orbit: Orbit::framing(&[]),
+            extent: 0.1,
+            size: [640, 480],
+            count: 0,
+            generation: 0,
+        }
+    }
+
+    /// The device, where there is one.
+    pub fn device(&self) -> Option<&Device> {
+        self.device.as_ref()
+    }
+
+    /// Another device, or none, in the place of one that was lost: every simulation goes on from its last frame.
+    pub fn put_device(&mut self, device: Option<Device>) -> Result<(), String> {
+        self.device = device;
+        for state in &mut self.runs {
+            state.run.offer(self.device.as_ref())?;
+            state.act_out()?;
+        }
+        self.look()
+    }
+
+    /// Loads a scene and begins from rest; `load` gives the bytes of its files. On an error what ran before goes on.
+    pub fn load(
+        &mut self,
+        request: &LoadRequest,
+        load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+    ) -> Result<(), String> {
+        let loaded = Loaded::new(request, load)?;
+        let run = self.build(&loaded.scene, &loaded)?;
+        let known = self.loaded.as_ref().is_some_and(|old| same_place(old, &loaded));
+        self.runs = vec![RunState::new(run)];
+        self.hands.clear();
+        self.generation += 1;
+        self.loaded = Some(loaded);
+        if !known {
+            self.home();
+        }
+        self.look()
+    }
+
+    fn build(&self, scene: &Scene, loaded: &Loaded) -> Result<Box<dyn Run>, String> {
+        build(scene.clone(), loaded.assembly.clone(), self.device.as_ref())
+    }
+
+    /// What was loaded; nothing before that.
+    pub fn loaded(&self) -> Option<LoadedReport> {
+        let (loaded, run) = (self.loaded.as_ref()?, self.runs.first()?);
+        let [tets, vertices] = loaded.counts();
+        let scene = run.run.scene();
+        let body = |body: &viscera::scene::Body| {
+            let material = &body.material;
+            let (young, poisson, density) =
+                (material.young(), material.poisson(), material.density());
+            let is_it = |preset: &&viscera::material::Preset| {
+                (preset.young, preset.poisson, preset.density) == (young, poisson, density)
+            };
+            let preset = PRESETS.iter().find(is_it).map(|preset| preset.name);
+            BodyReport { name: body.name.clone(), young, poisson, density, preset }
+        };
+        Some(LoadedReport {
+            name: scene.name.clone(),
+            title: scene.title.clone(),
+            tets,
+            vertices,
+            frame: scene.time.frame,
+            bodies: scene.bodies.iter().map(body).collect(),
+            mesh: loaded.mesh,
+            can_change_mesh: loaded.can_change_mesh,
+        })
+    }
+
+    fn state(&mut self, run: usize) -> Result<&mut RunState, String> {
+        let count = self.runs.len();
+        self.runs.get_mut(run).ok_or_else(|| match count {
+            0 => "no scene is loaded; call load first".to_owned(),
+            _ => format!("there is no run {run}; there are {count}, numbered from 0"),
+        })
+    }
+
+    /// Changes settings of a simulation, as `--set` of `viscera run`; where one is wrong, none.
+    pub fn set(&mut self, run: usize, settings: &Settings) -> Result<(), String> {
+        let state = self.state(run)?;
+        state.run.change(settings)?;
+        state.act_out()?;
+        self.look()
+    }
+
+    /// A setting as it stands: of the solver, or a material's.
+    pub fn setting(&mut self, run: usize, key: &str) -> Result<String, String> {
+        let state = self.state(run)?;
+        if let Some(value) = state.run.setting(key) {
+            return Ok(value.trim_matches('"').to_owned());
+        }
+        let unknown = || {
+            format!(
+                "{key} is no setting that can be asked for; solver.KEY and body.NAME.material.KEY can"
+            )
+        };
+        let steps: Vec<&str> = key.split('.').collect();
+        let ["body", name, "material", key] = steps.as_slice() else { return Err(unknown()) };
+        let bodies = &state.run.scene().bodies;
+        let body = bodies.iter().find(|body| body.name == *name).ok_or_else(unknown)?;
+        let material = &body.material;
+        Ok(match *key {
+            "young" => format!("{} Pa", material.young()),
+            "poisson" => material.poisson().to_string(),
+            "density" => format!("{} kg/m^3", material.density()),
+            "viscosity" => format!("{} s", material.viscosity()),
+            "model" => law_name(material.model()).to_owned(),
+            _ => return Err(unknown()),
+        })
+    }
+
+    /// Begins from rest again, with the settings as they are now.
+    pub fn reset(&mut self) -> Result<(), String> {
+        self.hands.clear();
+        for state in &mut self.runs {
+            state.run.reset()?;
+            state.waiting.clear();
+            state.frame = 0;
+            state.measures = [false; 3];
+        }
+        // What was set since is how it begins now.
+        if let (Some(loaded), Some(state)) = (&mut self.loaded, self.runs.first()) {
+            loaded.scene = state.run.scene().clone();
+        }
+        self.look()
+    }
+
+    /// Puts a second simulation beside the first, which begins where that is, with settings of its own; nothing leaves the
+    /// first alone.
+    pub fn beside(&mut self, settings: Option<&Settings>) -> Result<(), String> {
+        self.runs.truncate(1);
+        self.hands.retain(|hand| hand.run == 0);
+        if let Some(settings) = settings {
+            let first = self.state(0)?;
+            let mut scene = first.run.scene().clone();
+            scene.change(settings).map_err(|error| error.to_string())?;
+            let fork = first.run.fork(&scene)?;
+            let frame = first.frame;
+            self.runs.push(RunState { frame, ..RunState::new(fork) });
+        }
+        self.look()
+    }
+
+    /// How many simulations there are.
+    pub fn run_count(&self) -> usize {
+        self.runs.len()
+    }
+
+    /// Takes over frames that have arrived; false while any is under way.
+    pub fn ready(&mut self) -> Result<bool, String> {
+        // Until there is another device nothing arrives.
+        if self.lost().is_some() {
+            return Ok(!self.runs.iter().any(|state| state.run.is_under_way()));
+        }
+        let mut ready = true;
+        for number in 0..self.runs.len() {
+            ready &= self.take_over(number)?;
+        }
+        Ok(ready)
+    }
+
+    /// Why the device is lost; nothing while it is there.
+    pub fn lost(&self) -> Option<String> {
+        self.device.as_ref().and_then(|device| device.check().err()).map(|lost| lost.to_string())
+    }
+
+    /// Begins a frame of one simulation. The CPU has computed it then; a device is asked by [`Session::ready`]. Nothing
+    /// happens while one is under way.
+    pub fn advance(&mut self, run: usize) -> Result<(), String> {
+        let state = self.state(run)?;
+        if state.run.is_under_way() {
+            return Ok(());
+        }
+        let [wanted, ..] = state.measures;
+        state.measures = [false, wanted, state.measures[2]];
+        state.run.send(wanted)?;
+        self.take_over(run).map(|_| ())
+    }
+
+    /// Takes over the frame of one simulation; false while it is under way.
+    fn take_over(&mut self, run: usize) -> Result<bool, String> {
+        let state = self.state(run)?;
+        if !state.run.is_under_way() {
+            return Ok(true);
+        }
+        if !state.run.receive()? {
+            return Ok(false);
+        }
+        state.frame += 1;
+        if std::mem::take(&mut state.measures[1]) {
+            state.run.measure()?;
+            state.measures[2] = true;
+        }
+        state.act_out()?;
+        self.look_at(run);
+        Ok(true)
+    }
+
+    /// Brings measures up to date: those of the next frame.
+    pub fn measure(&mut self) {
+        for state in &mut self.runs {
+            state.measures[0] = true;
+        }
+    }
+
+    /// Numbers of now.
+    pub fn report(&self) -> Report {
+        let frame = self.runs.first().map_or(0, |state| state.frame);
+        let duration = self.loaded.as_ref().map_or(0.0, |loaded| loaded.scene.time.frame);
+        let of = |state: &RunState| RunReport::new(&*state.run, &state.snapshot, state.measures[2]);
+        Report { time: frame as f64 * duration, frame, runs: self.runs.iter().map(of).collect() }
+    }
+
+    /// How hands take hold from now on.
+    pub fn set_grip(&mut self, grip: Grip) {
+        self.grip = grip;
+    }
+
+    /// Takes hold of what is seen at a place [pixels]; false where nothing is.
+    pub fn grab(&mut self, id: HoldId, place: [f64; 2]) -> Result<bool, String> {
+        let lenses = self.lenses();
+        let found = lenses.iter().position(|lens| lens.area.contains(place));
+        let Some((run, loaded)) = found.zip(self.loaded.as_ref()) else { return Ok(false) };
+        let Some(state) = self.runs.get(run) else { return Ok(false) };
+        let (from, direction) = (lenses[run].orbit.position(), lenses[run].ray(place));
+        match pick(&loaded.assembly, &state.snapshot, from, direction) {
+            Some(hit) => self.take(id, run, &hit).map(|()| true),
+            None => Ok(false),
+        }
+    }
+
+    /// Takes hold of the first simulation's tissue nearest to a point [m]; false where it is a centimetre and more away.
+    pub fn grab_at(&mut self, id: HoldId, point: Vec3<f64>) -> Result<bool, String> {
+        const NEAR: f64 = 0.01;
+        let Some((loaded, state)) = self.loaded.as_ref().zip(self.runs.first()) else {
+            return Ok(false);
+        };
+        let mut nearest = (NEAR, None);
+        for (number, body) in loaded.assembly.bodies.iter().enumerate() {
+            let places = state.snapshot.positions.get(body.vertices.clone()).unwrap_or_default();
+            for (place, rest) in places.iter().zip(body.mesh.vertices()) {
+                let place = place.cast::<f64>();
+                let distance = (place - point).length();
+                if distance < nearest.0 {
+                    nearest = (distance, Some((number, place, *rest)));
+                }
+            }
+        }
+        let Some((body, _, rest)) = nearest.1 else { return Ok(false) };
+        self.take(id, 0, &viscera_stage::Pick { body, point, rest }).map(|()| true)
+    }
+
+    fn take(&mut self, id: HoldId, run: usize, hit: &viscera_stage::Pick) -> Result<(), String> {
+        self.release(id)?;
+        let Grip { count, stiffness } = self.grip;
+        let target = GripTarget { body: hit.body, rest: hit.rest, count, stiffness };
+        self.act(Act::Take(id, target))?;
+        self.hands.push(Hand { id, run, taken: hit.point });
+        self.look()
+    }
+
+    /// Leads a hand to a place [pixels] in the plane of the picture.
+    pub fn lead(&mut self, id: HoldId, place: [f64; 2]) -> Result<(), String> {
+        let Some(hand) = self.hands.iter().find(|hand| hand.id == id).copied() else {
+            return Ok(());
+        };
+        let way = self.lenses().get(hand.run).and_then(|lens| hand.way_to(lens, place));
+        way.map_or(Ok(()), |way| self.act(Act::Lead(id, way)))
+    }
+
+    /// Leads a hand so far from where it took hold [m].
+    pub fn lead_by(&mut self, id: HoldId, way: Vec3<f64>) -> Result<(), String> {
+        self.act(Act::Lead(id, way))
+    }
+
+    /// Lets go; nothing happens where there is no such hand.
+    pub fn release(&mut self, id: HoldId) -> Result<(), String> {
+        let before = self.hands.len();
+        self.hands.retain(|hand| hand.id != id);
+        if self.hands.len() == before { Ok(()) } else { self.act(Act::LetGo(id)) }
+    }
+
+    /// The force [N] with which a hand pulls at the first simulation.
+    pub fn force(&self, id: HoldId) -> Vec3<f64> {
+        let held = self.runs.first().into_iter().flat_map(|state| &state.snapshot.held);
+        held.filter(|hold| hold.id == id).map(|hold| hold.force).next().unwrap_or_default()
+    }
+
+    fn act(&mut self, act: Act) -> Result<(), String> {
+        for state in &mut self.runs {
+            state.waiting.push(act);
+            state.act_out()?;
+        }
+        Ok(())
+    }
+
+    /// The first simulation as a scene file that repeats everything done by hand since it began.
+    pub fn replay(&self) -> Result<String, String> {
+        let (Some(loaded), Some(state)) = (&self.loaded, self.runs.first()) else {
+            return Err("no scene is loaded; call load first".to_owned());
+        };
+        Ok(loaded.scene.text() + &state.run.done_by_hand().0)
+    }
+
+    /// Turns the view for a drag [pixels].
+    pub fn turn(&mut self, dx: f64, dy: f64) {
+        let height = f64::from(self.size[1].max(1));
+        self.orbit.turn(-TURN * dx / height, TURN * dy / height);
+    }
+
+    /// Moves what is looked at with a drag [pixels].
+    pub fn pan(&mut self, dx: f64, dy: f64) {
+        let height = f64::from(self.size[1].max(1));
+        self.orbit.pan(dx / height, -dy / height);
+    }
+
+    /// Goes nearer (a factor below 1) or farther.
+    pub fn zoom(&mut self, factor: f64) {
+        self.orbit.zoom(factor);
+    }
+
+    /// Looks at everything from where the scene wants to be seen.
+    pub fn home(&mut self) {
+        let Some(loaded) = &self.loaded else { return };
+        self.orbit = Orbit::framing(loaded.assembly.builder.positions());
+        self.extent = 2.0 * self.orbit.distance * HALF_OPENING;
+        let direction = ViewDirection::from_vector(loaded.scene.output.view_from);
+        (self.orbit.azimuth, self.orbit.elevation) = (direction.azimuth, direction.elevation);
+    }
+
+    /// The size of the picture [pixels].
+    pub fn resize(&mut self, width: u32, height: u32) {
+        self.size = [width, height].map(|side| side.clamp(1, 8192));
+    }
+
+    /// What colours show.
+    pub fn color(&mut self, kind: &str) -> Result<(), String> {
+        self.coloring = match kind {
+            "tissue" => Coloring::Plain,
+            "displacement" => Coloring::Displacement,
+            "strain" => Coloring::Strain,
+            "stress" => Coloring::Stress,
+            other => {
+                return Err(format!(
+                    "colours show tissue, displacement, strain or stress, not `{other}`"
+                ));
+            }
+        };
+        self.look()
+    }
+
+    /// The scale of the colours: the upper end and its text; nothing for plain tissue.
+    pub fn legend(&self) -> Option<(String, f32, String)> {
+        let [_, high] = self.legend.range()?;
+        Some((self.legend.title().to_owned(), high, self.legend.text(high)))
+    }
+
+    /// Whether the triangles' edges are drawn.
+    pub fn show_wireframe(&mut self, on: bool) {
+        self.wireframe = on;
+    }
+
+    /// Whether the ground behind is dark.
+    pub fn set_dark(&mut self, dark: bool) {
+        self.dark = dark;
+    }
+
+    /// The surface's vertices [m] of one simulation.
+    pub fn surface(&self, run: usize) -> Result<Vec<Vec3<f32>>, String> {
+        let mut surface = Vec::new();
+        if let Some(loaded) = &self.loaded {
+            loaded.surfaces(self.vertices(run)?, &mut surface);
+        }
+        Ok(surface)
+    }
+
+    /// The tetrahedra's vertices [m] of one simulation, the mesh's order.
+    pub fn vertices(&self, run: usize) -> Result<&[Vec3<f32>], String> {
+        let state = self.runs.get(run).ok_or_else(|| format!("there is no run {run}"))?;
+        Ok(&state.snapshot.positions)
+    }
+
+    /// Triangles of the surface.
+    pub fn triangles(&self) -> Vec<[u32; 3]> {
+        self.loaded.as_ref().map_or_else(Vec::new, Loaded::triangles)
+    }
+
+    /// From where [m] and in which direction the viewer looks through a place [pixels].
+    pub fn ray(&self, place: [f64; 2]) -> (Vec3<f64>, Vec3<f64>) {
+        let lenses = self.lenses();
+        let lens = lenses.iter().find(|lens| lens.area.contains(place)).or(lenses.first());
+        lens.map_or_else(Default::default, |lens| (lens.orbit.position(), lens.ray(place)))
+    }
+
+    /// Where a point [m] is seen in the picture of a simulation [pixels]; nothing where it is behind the viewer.
+    pub fn seen(&self, run: usize, point: Vec3<f64>) -> Option<[f64; 2]> {
+        self.lenses().get(run)?.place(point)
+    }
+
+    /// The part of the picture, and the camera, of each simulation: beside each other where it is wide, else one above the
+    /// other.
+    pub(crate) fn lenses(&self) -> Vec<Lens> {
+        let [width, height] = self.size.map(f64::from);
+        let count = self.runs.len().max(1);
+        let share = 1.0 / count as f64;
+        let area = |number: usize| match width >= height {
+            true => {
+                Area { left: number as f64 * share * width, top: 0.0, width: share * width, height }
+            }
+            false => Area {
+                left: 0.0,
+                top: number as f64 * share * height,
+                width,
+                height: share * height,
+            },
+        };
+        (0..count).map(|number| Lens::new(&self.orbit, area(number), 0.0)).collect()
+    }
+
+    /// Looks at all simulations as they are now.
+    fn look(&mut self) -> Result<(), String> {
+        (0..self.runs.len()).for_each(|number| self.look_at(number));
+        Ok(())
+    }
+
+    fn look_at(&mut self, number: usize) {
+        self.count += 1;
+        if let Some(state) = self.runs.get_mut(number) {
+            state.run.fill(self.coloring, &mut state.snapshot);
+            state.moved = self.count;
+        }
+        let values = self.runs.iter().flat_map(|state| state.snapshot.values.iter().copied());
+        self.legend.follow(self.coloring, values);
+    }
+}
+
+impl RunState {
+    fn new(run: Box<dyn Run>) -> Self {
+        let snapshot = RunSnapshot::default();
+        Self { run, snapshot, moved: 0, frame: 0, waiting: Vec::new(), measures: [false; 3] }
+    }
+
+    /// Does what hands wanted while a frame was under way: between frames, as a replay will.
+    fn act_out(&mut self) -> Result<(), String> {
+        if self.run.is_under_way() {
+            return Ok(());
+        }
+        for act in self.waiting.drain(..) {
+            match act {
+                Act::Take(id, target) => self.run.take(id, &target)?,
+                Act::Lead(id, way) => self.run.lead(id, way)?,
+                Act::LetGo(id) => self.run.let_go(id)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether both fill the same place: the camera stays where it is then.
+fn same_place(old: &Loaded, new: &Loaded) -> bool {
+    let shapes = |scene: &Scene| -> Vec<(String, Option<BodyShape>)> {
+        let of_file = |shape: &BodyShape| matches!(shape, BodyShape::File { .. });
+        let shape = |body: &viscera::scene::Body| {
+            (body.name.clone(), Some(body.shape.clone()).filter(of_file))
+        };
+        scene.bodies.iter().map(shape).collect()
+    };
+    old.scene.name == new.scene.name && shapes(&old.scene) == shapes(&new.scene)
+}
