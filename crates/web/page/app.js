@@ -216,13 +216,13 @@ export class App {
   /**
    * The first second was measured: what suits this device is set, and noted in the link. What the link came with stays.
    *
-   * @param {{choice: {device: string, method?: string, accuracy: string, mesh: number, why: string}, measured: any}} word
+   * @param {{choice: {device: string, method?: string | null, accuracy: string, mesh: number, why: string}, measured: any}} word
    */
   async choose({ choice, measured }) {
     this.chosen = { ...choice, measured };
-    /** @type {[string, string | undefined][]} */
+    /** @type {[string, string | null | undefined][]} */
     const wanted = [["solver.method", choice.method], ["solver.accuracy", choice.accuracy], ["solver.device", choice.device]];
-    const pairs = /** @type {Pair[]} */ (wanted.filter(([key, value]) => value !== undefined && !this.#given.has(key)));
+    const pairs = /** @type {Pair[]} */ (wanted.filter(([key, value]) => value && !this.#given.has(key)));
     const mesh = this.loaded.canChangeMesh ? choice.mesh : this.loaded.mesh;
     const link = { ...this.link, mesh, settings: this.link.settings.map((pair) => /** @type {Pair} */ ([...pair])) };
     if (mesh !== this.loaded.mesh) {
