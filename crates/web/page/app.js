@@ -243,7 +243,7 @@ export class App {
   get choiceText() {
     const { device, accuracy, mesh, why } = this.chosen;
     const cells = mesh === 1 ? "the scene’s own mesh" : `cells ${mesh} times as large`;
-    return `Chosen for 60 frames per second on this device: ${device.toUpperCase()}, accuracy “${accuracy}”, ${cells}; ${why}.`;
+    return `Chosen for 60 frames per second on this device: ${device.toUpperCase()}, accuracy “${accuracy}”, ${cells}; ${why.replace(/\.$/, "")}.`;
   }
 
   /** Measures once more, and chooses anew. */
