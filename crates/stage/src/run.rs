@@ -103,11 +103,18 @@ pub fn build(
         (Precision::F32, None) => {
             Box::new(SimulationRun::new(Simulation::<f32>::new(scene, assembly))?)
         }
+        #[cfg(feature = "double")]
         (Precision::F64, _) => {
             Box::new(SimulationRun::new(Simulation::<f64>::new(scene, assembly))?)
         }
+        #[cfg(not(feature = "double"))]
+        (Precision::F64, _) => return Err(ONLY_SINGLE.to_owned()),
     })
 }
+
+#[cfg(not(feature = "double"))]
+const ONLY_SINGLE: &str = "this program computes in single precision; leave solver.precision out, or run the scene with \
+                           `viscera run`";
 
 struct SimulationRun<S> {
     simulation: Simulation<S>,
@@ -276,7 +283,10 @@ impl<S: Real> Run for SimulationRun<S> {
     fn fork(&self, scene: &Scene) -> Result<Box<dyn Run>, String> {
         Ok(match scene.solver.precision {
             Precision::F32 => Box::new(self.fork_as::<f32>(scene)?),
+            #[cfg(feature = "double")]
             Precision::F64 => Box::new(self.fork_as::<f64>(scene)?),
+            #[cfg(not(feature = "double"))]
+            Precision::F64 => return Err(ONLY_SINGLE.to_owned()),
         })
     }
 

@@ -46,7 +46,7 @@ export class Hands {
 
   /** @param {number} factor above 1: nearer */
   zoom(factor) {
-    this.#session.zoom(factor);
+    this.#session.zoom(1 / factor);
   }
 
   /** Nothing is held any more: the scene begins anew. */

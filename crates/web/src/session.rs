@@ -188,9 +188,13 @@ impl Session {
         if let Some(value) = state.run.setting(key) {
             return Ok(value.trim_matches('"').to_owned());
         }
+        if key == "world.gravity" {
+            let [x, y, z] = state.run.scene().world.gravity.to_array();
+            return Ok(format!("[\"{x} m/s^2\", \"{y} m/s^2\", \"{z} m/s^2\"]"));
+        }
         let unknown = || {
             format!(
-                "{key} is no setting that can be asked for; solver.KEY and body.NAME.material.KEY can"
+                "{key} is no setting that can be asked for; solver.KEY, body.NAME.material.KEY and world.gravity can"
             )
         };
         let steps: Vec<&str> = key.split('.').collect();
