@@ -66,11 +66,11 @@ export interface Report {
   substeps: number;
   /** Iterations per step. */
   iterations: number;
-  /** Unbalanced forces over loads; at rest, how well the equations hold. Null before the first frame. */
+  /** Unbalanced forces over loads, measured ten times a second; at rest, how well the equations hold. Null before the first frame. */
   residual: number | null;
   /** Tetrahedra turned inside out: their stress means nothing. */
   inverted: number;
-  /** What the scene itself moves or pulls, with its force on the tissue [N]. */
+  /** What the scene itself moves or pulls, with its force on the tissue [N], measured ten times a second. */
   patches: { name: string; force: Vector }[];
 }
 

@@ -67,7 +67,7 @@ export async function load(options = {}) {
   const onCpu = pairs.some(([key]) => key === "solver.device") ? pairs : [...pairs, ["solver.device", "cpu"]];
   const device = onCpu.find(([key]) => key === "solver.device")?.[1];
   if (device !== "cpu") throw new Error(`solver.device: this package computes on the CPU; leave it out, or say "cpu", not "${device}"`);
-  const session = await Session.open();
+  const session = Session.onCpu();
   try {
     session.load(JSON.stringify({ name, text, settings: onCpu, mesh: options.cells ?? 1 }), files);
     return new Tissue(session);

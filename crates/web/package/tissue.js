@@ -7,6 +7,8 @@
 
 /** Frames computed at once, at most: more would let a slow machine fall ever further behind. */
 const MOST_FRAMES = 2;
+/** Between two measurements of the residual and of the scene's own patches [ms]. */
+const MEASURED = 100;
 
 /** @implements {TissueInterface} */
 export class Tissue {
@@ -21,6 +23,7 @@ export class Tissue {
   #running = false;
   #owed = 0;
   #last = 0;
+  #measured = -Infinity;
   #disposed = false;
 
   /** @param {Session} session */
@@ -84,8 +87,15 @@ export class Tissue {
   step(frames = 1) {
     if (!Number.isInteger(frames) || frames < 0) throw new Error(`step: ${frames} is no number of frames`);
     const session = this.#open();
-    for (let frame = 0; frame < frames; frame += 1) session.advance(0);
     if (frames === 0) return;
+    for (let frame = 1; frame < frames; frame += 1) session.advance(0);
+    // What report() says is of now and then: it costs some of a frame.
+    const now = performance.now();
+    if (frames > 1 || now - this.#measured >= MEASURED) {
+      this.#measured = now;
+      session.measure();
+    }
+    session.advance(0);
     for (const callback of [...this.#callbacks]) callback(this);
   }
 
@@ -177,9 +187,7 @@ export class Tissue {
   }
 
   report() {
-    const session = this.#open();
-    session.measure();
-    const { time, runs } = JSON.parse(session.report());
+    const { time, runs } = JSON.parse(this.#open().report());
     const { device, method, substeps, iterations, residual, inverted, patches } = runs[0];
     return { time, device, method, substeps, iterations, residual, inverted, patches };
   }

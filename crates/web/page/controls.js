@@ -32,7 +32,7 @@ const SIZES = [0.5, 0.65, 0.8, 1, 1.25, 1.6, 2, 2.5];
 /** @param {number} factor */
 function meshWords(factor) {
   if (factor === 1) return "as the scene says";
-  return `cells ${digits(factor)} times as large: ${factor < 1 ? "finer" : "coarser"}`;
+  return `${factor < 1 ? "finer" : "coarser"}: cells x ${digits(factor)}`;
 }
 
 export class Controls {
@@ -150,7 +150,7 @@ export class Controls {
     scene.update(own ? "" : loaded.name);
     const about = this.#hello.scenes.find((known) => known.name === loaded.name && !own)?.description ?? loaded.title;
     const sizes = SIZES.filter((size) => size >= MESH.finest && size <= MESH.coarsest);
-    this.#mesh = menuRow({ name: "mesh size", help: "Size of the cells; another one begins from rest", options: sizes.map((size) => [String(size), meshWords(size)]) }, (size) => this.#wishes.mesh(Number(size)));
+    this.#mesh = menuRow({ name: "mesh size", help: "Size of the cells; another one begins from rest", options: sizes.map((size) => [String(size), meshWords(size)]), words: (size) => meshWords(Number(size)) }, (size) => this.#wishes.mesh(Number(size)));
     this.#mesh.element.hidden = true;
     const input = /** @type {HTMLInputElement} */ (make("input", { type: "file", multiple: "", accept: ".toml,.msh,.vtu,.obj,.node,.ele,*/*", "aria-label": "Open a mesh or a scene file" }));
     input.addEventListener("change", () => {

@@ -105,7 +105,7 @@ export class Engine {
       this.#advance(now);
       if (this.#dirty) {
         this.#dirty = false;
-        this.screen.draw();
+        this.screen.draw(!this.#onGpu.includes(true));
         this.#drawn += 1;
       }
       if (now - this.#reported.at >= REPORT) this.report(now);
@@ -193,6 +193,7 @@ export class Engine {
       this.#say({ about: "device", device });
       if (device.missing) this.#say({ about: "canvas" });
       else this.#say({ about: "tell", text: `The simulation goes on where it was, on ${device.name}.` });
+      this.screen.renew();
       this.#seeDevices();
     });
   }

@@ -69,7 +69,7 @@ function hear(word) {
       messages.stop("The simulation has stopped", word.text, [["Begin again from rest", () => host.send("reset")]]);
       break;
     case "fatal":
-      messages.stop("Something broke", `${word.text} The scene and its settings are kept.`, [["Start again", () => restart()]]);
+      messages.stop("Something broke", `${word.text}. The scene and its settings are kept.`, [["Start again", () => restart()]]);
       break;
   }
 }

@@ -35,6 +35,10 @@ const METHODS = /** @type {Record<string, string>} */ ({ auto: "automatic", quas
 const ELEMENTS = /** @type {Record<string, string>} */ ({ plain: "linear", recovered: "recovered-gradient" });
 const ACCELERATIONS = /** @type {Record<string, string>} */ ({ chebyshev: "Chebyshev", anderson: "Anderson" });
 
+/** Colours of curves: a point that a hand pulls has that of its arrow; a patch keeps its own, whatever else is pulled. */
+const POINTS = [0, 3, 2, 1];
+const PATCHES = [1, 2, 3];
+
 /** A force as it is written everywhere: "1.25 N". @param {number} force */
 export function newtons(force) {
   if (!Number.isFinite(force)) return "…";
@@ -104,10 +108,10 @@ export class View {
     report.runs.forEach((run, side) => {
       const suffix = report.runs.length > 1 ? `, ${"AB"[side]}` : "";
       const forces = [
-        ...run.held.map((held, number) => ({ name: `point ${number + 1}`, force: held.force })),
-        ...run.patches.filter((patch) => size(patch.force) > 0),
+        ...run.held.map((held, number) => ({ name: `point ${number + 1}`, force: held.force, color: POINTS[number % POINTS.length] })),
+        ...run.patches.map((patch, number) => ({ ...patch, color: PATCHES[number % PATCHES.length] })),
       ];
-      forces.forEach(({ name, force }, color) => {
+      forces.filter(({ force }) => size(force) > 0).forEach(({ name, force, color }) => {
         const value = size(force);
         curves.push({ name: name + suffix, color, dashed: side === 1, value });
         lines.push([name + suffix, newtons(value)]);

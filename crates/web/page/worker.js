@@ -38,7 +38,7 @@ function fail(error) {
   if (error instanceof WebAssembly.RuntimeError) {
     hasFailed = true;
     engine?.stop();
-    say({ about: "fatal", text: lastError.split("\n")[0] || text });
+    say({ about: "fatal", text: lastError.split("\n").slice(0, 2).join(" ") || text });
   } else say({ about: "stopped", text });
 }
 
@@ -231,7 +231,7 @@ function obey(engine, order) {
 function look(engine, order) {
   const { session, hands, screen } = engine;
   const { gestures } = hands;
-  const pointer = { ...order, id: order.pointer, x: order.x * screen.scale, y: order.y * screen.scale };
+  const pointer = { id: order.pointer, x: order.x, y: order.y, button: order.button, shift: order.shift };
   switch (order.do) {
     case "down":
       return gestures.down(pointer);

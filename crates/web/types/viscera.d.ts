@@ -14,6 +14,7 @@ export function choose(measured: string): string;
 export class Session {
   private constructor();
   static open(canvas?: OffscreenCanvas): Promise<Session>;
+  static onCpu(): Session;
   device(): string;
   lost(): string | undefined;
   reopen(): Promise<void>;
