@@ -22,6 +22,6 @@ pub use color::surface_values;
 pub use contents::{PictureContents, RunSurface};
 pub use legend::{Legend, millimetres, newtons};
 pub use lens::{Area, Lens};
-pub use pick::{Pick, meet_plane, pick};
+pub use pick::{Pick, meet_plane, pick, pick_near};
 pub use run::{GripTarget, NextStep, Run, Settings, build};
 pub use snapshot::{Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch, inverted};

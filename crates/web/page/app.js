@@ -159,10 +159,9 @@ export class App {
    */
   async #set(run, pairs, choice = false) {
     const runs = run === "all" ? this.values.map((_, at) => at) : [run];
-    const settings = pairs.flatMap(([key, value]) => runs.map((at) => [at, key, value]));
     try {
       const before = this.values;
-      const answer = await this.#host.call("set", { settings, choice });
+      const answer = await this.#host.call("set", { runs, settings: pairs, choice });
       for (const [key, value] of pairs) this.#note(run, key, value, before);
       if (!choice && pairs.some(([key]) => key.startsWith("solver."))) this.link.mesh ??= this.loaded.mesh;
       this.#take(answer);
@@ -217,13 +216,13 @@ export class App {
   /**
    * The first second was measured: what suits this device is set, and noted in the link. What the link came with stays.
    *
-   * @param {{choice: {device: string, method?: string, accuracy: string, mesh: number, why: string}, measured: any}} word
+   * @param {{choice: {device: string, method?: string | null, accuracy: string, mesh: number, why: string}, measured: any}} word
    */
   async choose({ choice, measured }) {
     this.chosen = { ...choice, measured };
-    /** @type {[string, string | undefined][]} */
+    /** @type {[string, string | null | undefined][]} */
     const wanted = [["solver.method", choice.method], ["solver.accuracy", choice.accuracy], ["solver.device", choice.device]];
-    const pairs = /** @type {Pair[]} */ (wanted.filter(([key, value]) => value !== undefined && !this.#given.has(key)));
+    const pairs = /** @type {Pair[]} */ (wanted.filter(([key, value]) => value && !this.#given.has(key)));
     const mesh = this.loaded.canChangeMesh ? choice.mesh : this.loaded.mesh;
     const link = { ...this.link, mesh, settings: this.link.settings.map((pair) => /** @type {Pair} */ ([...pair])) };
     if (mesh !== this.loaded.mesh) {
@@ -236,8 +235,15 @@ export class App {
       for (const [key, value] of pairs) put(this.link.settings, key, value);
       this.write();
     }
-    this.#messages.tell(`Chosen for this device: ${choice.why}`);
+    this.#messages.tell(this.choiceText);
     this.#changed();
+  }
+
+  /** What was chosen, and why. */
+  get choiceText() {
+    const { device, accuracy, mesh, why } = this.chosen;
+    const cells = mesh === 1 ? "the scene’s own mesh" : `cells ${mesh} times as large`;
+    return `Chosen for 60 frames per second on this device: ${device.toUpperCase()}, accuracy “${accuracy}”, ${cells}; ${why.replace(/\.$/, "")}.`;
   }
 
   /** Measures once more, and chooses anew. */
@@ -279,7 +285,7 @@ export class App {
   /** A file that repeats everything. */
   async save() {
     try {
-      const scene = await this.#host.call("replay", { run: 0 });
+      const scene = await this.#host.call("replay");
       const stem = String(this.loaded.name).replace(/\.[a-z]+$/i, "").replace(/[^\w-]+/g, "_");
       download(`${stem}_changed.toml`, scene);
     } catch (error) {

@@ -27,12 +27,12 @@ import { solverRows } from "./solver.js";
 const LAWS = /** @type {[string, string][]} */ ([["stable_neo_hookean", "stable neo-Hookean"], ["saint_venant_kirchhoff", "Saint Venant-Kirchhoff"]]);
 const PRESET_CAUTION = "A preset is a starting point, not a measurement of a patient: published values for one tissue differ by a factor of 2 to 10.";
 /** Sizes of a mesh's cells that are offered, as factors. */
-const SIZES = [0.5, 0.6, 0.7, 0.85, 1, 1.2, 1.4, 1.7, 2, 2.5];
+const SIZES = [0.5, 0.65, 0.8, 1, 1.25, 1.6, 2, 2.5];
 
 /** @param {number} factor */
 function meshWords(factor) {
   if (factor === 1) return "as the scene says";
-  return `cells ${digits(factor)} times as large: ${factor < 1 ? "finer" : "coarser"}`;
+  return `${factor < 1 ? "finer" : "coarser"}: cells x ${digits(factor)}`;
 }
 
 export class Controls {
@@ -47,7 +47,7 @@ export class Controls {
   /** @type {string[]} */
   #methods = [];
   #shape = "";
-  #grip = { count: 8, stiffness: 200, rigid: false, keep: false };
+  #grip = { count: 8, stiffness: 5000, rigid: false, keep: false };
   /** Which parts are open: as a person left them. @type {Map<string, boolean>} */
   #open = new Map();
   force = new Plot(/** @type {HTMLCanvasElement} */ (make("canvas", { class: "plot", role: "img", "aria-label": "Forces over time; the numbers stand below" })), { title: "force [N]", logarithmic: false, least: 0.1 });
@@ -150,7 +150,7 @@ export class Controls {
     scene.update(own ? "" : loaded.name);
     const about = this.#hello.scenes.find((known) => known.name === loaded.name && !own)?.description ?? loaded.title;
     const sizes = SIZES.filter((size) => size >= MESH.finest && size <= MESH.coarsest);
-    this.#mesh = menuRow({ name: "mesh size", help: "Size of the cells; another one begins from rest", options: sizes.map((size) => [String(size), meshWords(size)]) }, (size) => this.#wishes.mesh(Number(size)));
+    this.#mesh = menuRow({ name: "mesh size", help: "Size of the cells; another one begins from rest", options: sizes.map((size) => [String(size), meshWords(size)]), words: (size) => meshWords(Number(size)) }, (size) => this.#wishes.mesh(Number(size)));
     this.#mesh.element.hidden = true;
     const input = /** @type {HTMLInputElement} */ (make("input", { type: "file", multiple: "", accept: ".toml,.msh,.vtu,.obj,.node,.ele,*/*", "aria-label": "Open a mesh or a scene file" }));
     input.addEventListener("change", () => {
@@ -207,7 +207,7 @@ export class Controls {
       this.#grip.count = Math.max(1, Math.round(Number(text)) || 8);
       say();
     });
-    const spring = numberRow({ name: "spring", help: "Stiffness of the spring between hand and tissue, all vertices together", unit: "N/m", rail: [10, 5000], logarithmic: true }, (text) => {
+    const spring = numberRow({ name: "spring", help: "Stiffness of the spring between hand and tissue, all vertices together", unit: "N/m", rail: [10, 20000], logarithmic: true }, (text) => {
       const value = parseFloat(text);
       if (value > 0 && value <= 1e6) this.#grip.stiffness = value;
       say();

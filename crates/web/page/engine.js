@@ -105,7 +105,7 @@ export class Engine {
       this.#advance(now);
       if (this.#dirty) {
         this.#dirty = false;
-        this.screen.draw();
+        this.screen.draw(!this.#onGpu.includes(true));
         this.#drawn += 1;
       }
       if (now - this.#reported.at >= REPORT) this.report(now);
@@ -115,10 +115,11 @@ export class Engine {
 
   /** @param {number} now */
   #advance(now) {
+    // A step is done when its last frame has arrived: then only it is seen from outside.
+    while (this.#steps[0]?.count === 0) this.#steps.shift()?.done();
     const due = this.playing ? this.pace.due(now) : 0;
-    let wanted = due;
     const step = this.#steps[0];
-    if (step) wanted = step.count;
+    const wanted = step ? step.count : due;
     const began = performance.now();
     for (let frame = 0; frame < wanted; frame += 1) {
       if (frame > 0 && (performance.now() - began > LONG || !this.session.ready())) break;
@@ -126,10 +127,6 @@ export class Engine {
       this.#frames += 1;
       this.#dirty = true;
       if (step) step.count -= 1;
-    }
-    if (step && step.count === 0) {
-      this.#steps.shift();
-      step.done();
     }
     if (this.#trial?.isDone(now) && this.hands.gestures.hold === 0) void this.#choose();
   }
@@ -161,7 +158,8 @@ export class Engine {
     this.#trial = null;
     await this.alone(async () => {
       const gpuMs = await measureGpu(this.session);
-      const measured = { cpuMs: cost, gpuMs, budgetMs: BUDGET };
+      const { canChangeMesh } = JSON.parse(this.session.loaded());
+      const measured = { cpuMs: cost, gpuMs, budgetMs: BUDGET, canChangeMesh };
       this.#say({ about: "chosen", measured, choice: JSON.parse(choose(JSON.stringify(measured))) });
     });
   }
@@ -195,6 +193,7 @@ export class Engine {
       this.#say({ about: "device", device });
       if (device.missing) this.#say({ about: "canvas" });
       else this.#say({ about: "tell", text: `The simulation goes on where it was, on ${device.name}.` });
+      this.screen.renew();
       this.#seeDevices();
     });
   }
@@ -219,6 +218,7 @@ export class Engine {
 
   #seeDevices() {
     const { runs } = JSON.parse(this.session.report());
+    this.#timing = [false, false];
     this.#onGpu = runs.map((/** @type {{device: string}} */ run) => run.device.startsWith("GPU"));
   }
 

@@ -18,7 +18,7 @@
 /**
  * @typedef {object} Pointer
  * @property {number} id the browser's
- * @property {number} x pixels of the canvas
+ * @property {number} x CSS pixels of the canvas
  * @property {number} y
  * @property {number} [button] 0 left, 1 middle, 2 right
  * @property {boolean} [shift]

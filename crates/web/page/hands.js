@@ -15,7 +15,7 @@ export class Hands {
   #screen;
   /** Holds that stay when the finger has gone. @type {Set<number>} */
   #kept = new Set();
-  /** What the keyboard holds, and where it pulls to [pixels]. */
+  /** What the keyboard holds, and where it pulls to [CSS pixels]. */
   #key = { id: 0, x: 0, y: 0 };
   gestures;
 
@@ -27,26 +27,29 @@ export class Hands {
     this.#session = session;
     this.#screen = screen;
     this.gestures = new Gestures({
-      grab: (id, x, y) => session.grab(id, x, y),
-      lead: (id, x, y) => session.lead(id, x, y),
+      grab: (id, x, y) => session.grab(id, this.#pixels(x), this.#pixels(y)),
+      lead: (id, x, y) => session.lead(id, this.#pixels(x), this.#pixels(y)),
       release: (id, keep) => this.#release(id, keep),
-      orbit: (dx, dy) => session.orbit(dx, dy),
-      pan: (dx, dy) => session.pan(dx, dy),
+      orbit: (dx, dy) => session.orbit(this.#pixels(dx), this.#pixels(dy)),
+      pan: (dx, dy) => session.pan(this.#pixels(dx), this.#pixels(dy)),
       zoom: (factor) => this.zoom(factor),
     });
+  }
+
+  /** Fingers count in CSS pixels: those of the picture may change in the middle of a gesture. @param {number} length */
+  #pixels(length) {
+    return length * this.#screen.scale;
   }
 
   /** The hold that is being pulled, whether by key and where to [CSS pixels], and those that stay. */
   get held() {
     const { id, x, y } = this.#key;
-    const scale = this.#screen.scale;
-    const key = id > 0 ? { x: x / scale, y: y / scale } : null;
-    return { hold: this.gestures.hold || id, key, kept: [...this.#kept] };
+    return { hold: this.gestures.hold || id, key: id > 0 ? { x, y } : null, kept: [...this.#kept] };
   }
 
   /** @param {number} factor above 1: nearer */
   zoom(factor) {
-    this.#session.zoom(factor);
+    this.#session.zoom(1 / factor);
   }
 
   /** Nothing is held any more: the scene begins anew. */
@@ -88,9 +91,9 @@ export class Hands {
       this.letGo(this.#key.id);
       return "released";
     }
-    const [width, height] = this.#screen.size;
+    const [width, height] = this.#screen.size.map((length) => length / this.#screen.scale);
     const [id, x, y] = [this.gestures.number(), width / 2, height / 2];
-    if (!this.#session.grab(id, x, y)) return "nothing there";
+    if (!this.#session.grab(id, this.#pixels(x), this.#pixels(y))) return "nothing there";
     this.#key = { id, x, y };
     return "held";
   }
@@ -103,12 +106,12 @@ export class Hands {
    * @param {boolean} pan
    */
   keyMove(dx, dy, pan) {
-    const step = KEY_STEP * this.#screen.scale;
+    const step = this.#pixels(KEY_STEP);
     const key = this.#key;
     if (key.id > 0) {
-      key.x += (dx * step) / 3;
-      key.y += (dy * step) / 3;
-      this.#session.lead(key.id, key.x, key.y);
+      key.x += (dx * KEY_STEP) / 3;
+      key.y += (dy * KEY_STEP) / 3;
+      this.#session.lead(key.id, this.#pixels(key.x), this.#pixels(key.y));
     } else if (pan) this.#session.pan(dx * step, dy * step);
     else this.#session.orbit(dx * step, dy * step);
   }

@@ -8,7 +8,7 @@
  *     await viscera.pause(), viscera.run()
  *     await viscera.vertices(run)              Float32Array [m], three numbers each, of the tetrahedra
  *     await viscera.positions(run)             the same of the surface
- *     await viscera.replay(run)                text of a scene that repeats everything
+ *     await viscera.replay()                   text of a scene that repeats everything
  *     await viscera.isTissue(x, y)             whether a press there, in CSS pixels of the window, would take hold
  *     viscera.pointAt(u, v)                    CSS pixels of the window of a place of the canvas: 0, 0 left above; 1, 1 right below
  *     viscera.scale                            pixels of the picture per CSS pixel
@@ -84,7 +84,7 @@ export function offerHook(host, app, messages) {
     run: () => host.call("play", { on: true }),
     vertices: (run = 0) => host.call("vertices", { run }),
     positions: (run = 0) => host.call("positions", { run }),
-    replay: (run = 0) => host.call("replay", { run }),
+    replay: () => host.call("replay"),
     isTissue: (/** @type {number} */ x, /** @type {number} */ y) => host.call("isTissue", within(x, y)),
     pointAt: (/** @type {number} */ u, /** @type {number} */ v) => {
       const area = byId("canvas-frame").getBoundingClientRect();

@@ -26,8 +26,8 @@
 /** The scene that a link without one shows. */
 export const FIRST_SCENE = "liver_retraction";
 export const COLORS = ["tissue", "displacement", "strain", "stress"];
-/** Finest and coarsest mesh: with a third of the edges a mesh has 27 times the tetrahedra. */
-export const MESH = { finest: 0.33, coarsest: 4 };
+/** Finest and coarsest mesh that the module takes: with half the edges a mesh has eight times the tetrahedra. */
+export const MESH = { finest: 0.25, coarsest: 4 };
 
 /** The longest link that is read: addresses beyond it were not written here. */
 const LONGEST = 8000;
@@ -138,7 +138,8 @@ function wrongValue(value, setting) {
   if (setting?.kind === "choice" && setting.values && !setting.values.includes(bare)) {
     return `${shown(value)} is none of ${setting.values.join(", ")}`;
   }
-  if (setting?.kind === "number" && bare !== "auto" && !/^[-+.\d[]/.test(bare)) return `${shown(value)} is no number`;
+  const isName = bare === "auto" || setting?.values?.includes(bare);
+  if (setting?.kind === "number" && !isName && !/^[-+.\d]/.test(bare)) return `${shown(value)} is no number`;
   return null;
 }
 

@@ -69,7 +69,7 @@ function hear(word) {
       messages.stop("The simulation has stopped", word.text, [["Begin again from rest", () => host.send("reset")]]);
       break;
     case "fatal":
-      messages.stop("Something broke", `${word.text} The scene and its settings are kept.`, [["Start again", () => restart()]]);
+      messages.stop("Something broke", `${word.text}. The scene and its settings are kept.`, [["Start again", () => restart()]]);
       break;
   }
 }
@@ -112,7 +112,7 @@ function tellDevice(now) {
   device = now;
   if (!now.missing) return;
   const http = window.isSecureContext ? "" : " This page came over plain http, where browsers offer no WebGPU: open it with https://.";
-  messages.warn(`${now.missing}${http} The processor (CPU) computes and draws meanwhile.`);
+  messages.warn(`${now.missing}${http}`);
 }
 
 /** What is loaded or set has changed. */
@@ -121,13 +121,12 @@ function refresh() {
   if (!loaded) return;
   controls.show({ loaded, values, link, own });
   view.frame = loaded.frame;
-  view.color = link.color;
   byId("beside").setAttribute("aria-pressed", String(link.beside !== null));
   document.title = `${loaded.title || loaded.name} · viscera`;
   const lines = [];
   if (device?.missing) lines.push(device.missing);
   else if (device) lines.push(`Drawn by ${device.name}${device.software ? ", which is software" : ""}.`);
-  if (app.chosen) lines.push(`Chosen for this device: ${app.chosen.why}`);
+  if (app.chosen) lines.push(app.choiceText);
   controls.devices.querySelectorAll(".about").forEach((line) => line.remove());
   controls.devices.append(...lines.map((line) => make("p", { class: "about" }, line)));
 }

@@ -106,11 +106,12 @@ export function numberRow({ name, help, unit = "", rail, logarithmic = false, wh
 /**
  * A menu of names: each as a scene file has it, and in words.
  *
- * @param {{name: string, help: string, options: [string, string][]}} look
+ * @param {{name: string, help: string, options: [string, string][], words?: (value: string) => string}} look `words` for what is not
+ *   in the menu
  * @param {(value: string) => void} set
  * @returns {Row}
  */
-export function menuRow({ name, help, options }, set) {
+export function menuRow({ name, help, options, words = (value) => value }, set) {
   const id = freshId();
   const menu = /** @type {HTMLSelectElement} */ (make("select", { id }));
   menu.append(...options.map(([value, words]) => make("option", { value }, words)));
@@ -121,7 +122,7 @@ export function menuRow({ name, help, options }, set) {
     if (value === undefined) return;
     const now = bare(value);
     // A scene may have a value that no menu offers.
-    if (![...menu.options].some((option) => option.value === now)) menu.append(make("option", { value: now }, now));
+    if (![...menu.options].some((option) => option.value === now)) menu.append(make("option", { value: now }, words(now)));
     menu.value = now;
   };
   return { element, update };

@@ -5,15 +5,15 @@
 
 /** @typedef {import("./viscera.js").Session} Session */
 
-/** Device pixels per CSS pixel, at most: beyond it a phone's battery pays for what no eye sees. */
-const SHARPEST = 2;
-/** The same without a graphics device, and the coarsest picture that is still one. */
-const SHARPEST_2D = 1.5;
-const COARSEST_2D = 0.35;
-/** What a picture may cost without a graphics device [ms]: half of a frame at 60 per second, the other half simulates. */
-const PICTURE_2D = 8;
-/** Pictures between two changes of their size, so that it does not flicker. */
+/**
+ * Pixels of the picture per CSS pixel, drawn by a device or by the processor: at most (beyond it a phone's battery pays for what
+ * no eye sees), at least (a coarser picture is none), and what a picture may cost [ms]. The processor simulates as well.
+ */
+const DEVICE = { sharpest: 2, coarsest: 0.5, cost: 12 };
+const PROCESSOR = { sharpest: 1.5, coarsest: 0.35, cost: 8 };
+/** Pictures between two changes of their size, so that it does not flicker; fewer where it is far too slow. */
 const SETTLE = 12;
+const HURRY = 3;
 
 export class Screen {
   /** @type {OffscreenCanvas} */
@@ -25,11 +25,12 @@ export class Screen {
   /** CSS pixels. */
   #width = 1;
   #height = 1;
-  #ratio = 1;
+  #ratio = 0;
   /** Pixels of the picture per CSS pixel. */
   #scale = 1;
   #cost = 0;
   #drawn = 0;
+  #timing = false;
 
   /**
    * @param {OffscreenCanvas} canvas
@@ -78,8 +79,10 @@ export class Screen {
   resize(width, height, ratio) {
     this.#width = Math.max(1, width);
     this.#height = Math.max(1, height);
-    this.#ratio = ratio;
-    if (!this.#context) this.#scale = Math.min(ratio, SHARPEST);
+    if (ratio !== this.#ratio) {
+      this.#ratio = ratio;
+      this.#scale = Math.min(ratio, this.#context ? PROCESSOR.sharpest : DEVICE.sharpest);
+    }
     this.#apply();
   }
 
@@ -92,27 +95,47 @@ export class Screen {
     }
   }
 
-  draw() {
+  /** @param {boolean} alone whether the device does nothing else: only then is it known what the picture costs */
+  draw(alone) {
+    const began = performance.now();
     if (!this.#context) {
       this.#session.draw();
+      if (alone && !this.#timing) this.#time(began);
       return;
     }
-    const began = performance.now();
     const [width, height] = this.size;
     const pixels = this.#session.pixels();
     if (pixels.length === 4 * width * height) this.#context.putImageData(new ImageData(pixels, width, height), 0, 0);
     this.#adapt(performance.now() - began);
   }
 
+  /** The device draws on its own: when it is done is heard later. @param {number} began */
+  #time(began) {
+    this.#timing = true;
+    const over = () => {
+      this.#timing = false;
+    };
+    this.#session.settled().then(() => {
+      over();
+      if (!this.#context) this.#adapt(performance.now() - began);
+    }, over);
+  }
+
+  /** Another device: what the last one was sent never ends. */
+  renew() {
+    this.#timing = false;
+  }
+
   /** @param {number} cost of one picture [ms] */
   #adapt(cost) {
+    const { sharpest, coarsest, cost: allowed } = this.#context ? PROCESSOR : DEVICE;
     this.#cost = this.#drawn === 0 ? cost : 0.8 * this.#cost + 0.2 * cost;
     this.#drawn += 1;
-    if (this.#drawn < SETTLE) return;
+    if (this.#drawn < (this.#cost > 4 * allowed ? HURRY : SETTLE)) return;
     // The cost goes with the number of pixels.
-    const share = Math.sqrt(PICTURE_2D / Math.max(this.#cost, 0.1));
-    const wanted = this.#scale * Math.min(Math.max(share, 0.7), 1.3);
-    const scale = Math.min(Math.max(wanted, COARSEST_2D), Math.min(this.#ratio, SHARPEST_2D));
+    const share = Math.sqrt(allowed / Math.max(this.#cost, 0.1));
+    const wanted = this.#scale * Math.min(Math.max(share, 0.6), 1.3);
+    const scale = Math.max(Math.min(wanted, this.#ratio, sharpest), Math.min(coarsest, this.#ratio));
     if (Math.abs(scale / this.#scale - 1) < 0.15) return;
     this.#scale = scale;
     this.#drawn = 0;

@@ -14,7 +14,7 @@ import { byId, button, make } from "./messages.js";
  * @property {number} substeps
  * @property {number} iterations
  * @property {string} elements
- * @property {number} residual
+ * @property {number | null} residual
  * @property {number} rejected
  * @property {number} inverted
  * @property {{id: number, place: Vector, target: Vector, force: Vector}[]} held
@@ -23,7 +23,7 @@ import { byId, button, make } from "./messages.js";
 /**
  * @typedef {object} Report
  * @property {{time: number, frame: number, runs: Run[]}} report
- * @property {{low: number, high: number, unit: string} | null} legend
+ * @property {{title: string, low: number, high: number, text: string} | null} legend
  * @property {(number | null)[]} costs
  * @property {{playing: boolean, stopped: boolean, rate: number, drawn: number, frames: number}} clock
  * @property {{scale: number, size: [number, number], plain: boolean}} screen
@@ -34,7 +34,10 @@ import { byId, button, make } from "./messages.js";
 const METHODS = /** @type {Record<string, string>} */ ({ auto: "automatic", quasi_newton: "quasi-Newton", xpbd: "XPBD", explicit: "explicit" });
 const ELEMENTS = /** @type {Record<string, string>} */ ({ plain: "linear", recovered: "recovered-gradient" });
 const ACCELERATIONS = /** @type {Record<string, string>} */ ({ chebyshev: "Chebyshev", anderson: "Anderson" });
-const TITLES = /** @type {Record<string, string>} */ ({ displacement: "displacement", strain: "largest strain", stress: "von Mises stress" });
+
+/** Colours of curves: a point that a hand pulls has that of its arrow; a patch keeps its own, whatever else is pulled. */
+const POINTS = [0, 3, 2, 1];
+const PATCHES = [1, 2, 3];
 
 /** A force as it is written everywhere: "1.25 N". @param {number} force */
 export function newtons(force) {
@@ -53,9 +56,9 @@ function milliseconds(cost) {
   return cost === null || cost === undefined ? "…" : `${cost.toFixed(1)} ms`;
 }
 
-/** @param {number} value */
+/** @param {number | null} value */
 function scientific(value) {
-  return Number.isFinite(value) ? value.toExponential(1).replace("e+", "e") : "…";
+  return value !== null && Number.isFinite(value) ? value.toExponential(1).replace("e+", "e") : "…";
 }
 
 export class View {
@@ -67,7 +70,6 @@ export class View {
   #letGo;
   #lines = "";
   frame = 1 / 60;
-  color = "tissue";
 
   /**
    * @param {Controls} controls
@@ -106,16 +108,16 @@ export class View {
     report.runs.forEach((run, side) => {
       const suffix = report.runs.length > 1 ? `, ${"AB"[side]}` : "";
       const forces = [
-        ...run.held.map((held, number) => ({ name: `point ${number + 1}`, force: held.force })),
-        ...run.patches.filter((patch) => size(patch.force) > 0),
+        ...run.held.map((held, number) => ({ name: `point ${number + 1}`, force: held.force, color: POINTS[number % POINTS.length] })),
+        ...run.patches.map((patch, number) => ({ ...patch, color: PATCHES[number % PATCHES.length] })),
       ];
-      forces.forEach(({ name, force }, color) => {
+      forces.filter(({ force }) => size(force) > 0).forEach(({ name, force, color }) => {
         const value = size(force);
         curves.push({ name: name + suffix, color, dashed: side === 1, value });
         lines.push([name + suffix, newtons(value)]);
       });
     });
-    const residuals = report.runs.map((run, side) => ({ name: "AB"[side], color: side, dashed: side === 1, value: run.residual }));
+    const residuals = report.runs.map((run, side) => ({ name: "AB"[side], color: side, dashed: side === 1, value: run.residual ?? NaN }));
     report.runs.forEach((run, side) => {
       const suffix = report.runs.length > 1 ? `, ${"AB"[side]}` : "";
       const cost = costs[side];
@@ -203,11 +205,11 @@ export class View {
   #showLegend({ legend }) {
     byId("legend").hidden = legend === null;
     if (!legend) return;
-    const text = (/** @type {number} */ value) => `${Number(value.toPrecision(3))} ${legend.unit}`;
-    byId("legend-title").textContent = TITLES[this.color] ?? this.color;
-    byId("legend-high").textContent = text(legend.high);
-    byId("legend-middle").textContent = text((legend.low + legend.high) / 2);
-    byId("legend-low").textContent = text(legend.low);
+    const [, high, unit] = /^([\d.]+)\s*(.*)$/.exec(legend.text) ?? ["", "", legend.text];
+    byId("legend-title").textContent = legend.title;
+    byId("legend-high").textContent = legend.text;
+    byId("legend-middle").textContent = high ? `${Number(high) / 2} ${unit}` : "";
+    byId("legend-low").textContent = `0 ${unit}`;
   }
 }
 

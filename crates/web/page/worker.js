@@ -17,9 +17,6 @@ const waiting = [];
 let lastError = "";
 /** What was loaded last, for another mesh size. @type {{name: string, text: string, files: Record<string, Uint8Array>} | null} */
 let source = null;
-/** Open graphics devices, so that a test can take one away. @type {{destroy(): void}[]} */
-const devices = [];
-
 /**
  * @param {{about: string, [key: string]: any}} word
  * @param {Transferable[]} [transfer]
@@ -41,7 +38,7 @@ function fail(error) {
   if (error instanceof WebAssembly.RuntimeError) {
     hasFailed = true;
     engine?.stop();
-    say({ about: "fatal", text: lastError.split("\n")[0] || text });
+    say({ about: "fatal", text: lastError.split("\n").slice(0, 2).join(" ") || text });
   } else say({ about: "stopped", text });
 }
 
@@ -51,19 +48,6 @@ console.error = (/** @type {unknown[]} */ ...words) => {
   log(...words);
 };
 
-/** Keeps hold of graphics devices as they are opened. */
-function noteDevices() {
-  const adapter = /** @type {any} */ (globalThis).GPUAdapter?.prototype;
-  if (!adapter?.requestDevice) return;
-  const open = adapter.requestDevice;
-  adapter.requestDevice = async function (/** @type {unknown[]} */ ...options) {
-    const device = await open.apply(this, options);
-    devices.splice(0, devices.length, device);
-    return device;
-  };
-}
-
-noteDevices();
 const loaded = init({ module_or_path: new URL("./viscera_bg.wasm", import.meta.url) });
 loaded.then(() => {
   say({
@@ -187,7 +171,7 @@ function obey(engine, order) {
     case "load":
       return load(engine, order);
     case "set":
-      for (const [run, key, value] of order.settings) session.set(run, key, value);
+      for (const run of order.runs) session.setAll(run, JSON.stringify(order.settings));
       if (!order.choice) engine.doNotChoose();
       engine.changed();
       return state(engine);
@@ -218,9 +202,9 @@ function obey(engine, order) {
     case "plain":
       return screen.plain(order.canvas);
     case "lose":
-      return devices[0]?.destroy();
+      return session.loseDevice();
     case "replay":
-      return session.replay(order.run ?? 0);
+      return session.replay();
     case "vertices":
       return session.vertices(order.run ?? 0);
     case "positions":
@@ -247,7 +231,7 @@ function obey(engine, order) {
 function look(engine, order) {
   const { session, hands, screen } = engine;
   const { gestures } = hands;
-  const pointer = { ...order, id: order.pointer, x: order.x * screen.scale, y: order.y * screen.scale };
+  const pointer = { id: order.pointer, x: order.x, y: order.y, button: order.button, shift: order.shift };
   switch (order.do) {
     case "down":
       return gestures.down(pointer);

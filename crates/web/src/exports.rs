@@ -101,6 +101,15 @@ impl Session {
         Ok(opened)
     }
 
+    /// Opens without a device, at once: the CPU computes. For places that have none, and pages that draw by themselves.
+    #[wasm_bindgen(js_name = onCpu)]
+    pub fn on_cpu() -> Session {
+        explain_panics();
+        let missing = Some("This session was opened without a graphics processor.".to_owned());
+        let session = session::Session::new(None);
+        Self { session, screen: None, canvas: None, missing, positions: Vec::new() }
+    }
+
     async fn connect(&mut self) -> Result<(), JsError> {
         self.screen = None;
         match open_device().await {

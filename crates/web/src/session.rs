@@ -188,9 +188,13 @@ impl Session {
         if let Some(value) = state.run.setting(key) {
             return Ok(value.trim_matches('"').to_owned());
         }
+        if key == "world.gravity" {
+            let [x, y, z] = state.run.scene().world.gravity.to_array();
+            return Ok(format!("[\"{x} m/s^2\", \"{y} m/s^2\", \"{z} m/s^2\"]"));
+        }
         let unknown = || {
             format!(
-                "{key} is no setting that can be asked for; solver.KEY and body.NAME.material.KEY can"
+                "{key} is no setting that can be asked for; solver.KEY, body.NAME.material.KEY and world.gravity can"
             )
         };
         let steps: Vec<&str> = key.split('.').collect();
@@ -334,19 +338,10 @@ impl Session {
         let Some((loaded, state)) = self.loaded.as_ref().zip(self.runs.first()) else {
             return Ok(false);
         };
-        let mut nearest = (NEAR, None);
-        for (number, body) in loaded.assembly.bodies.iter().enumerate() {
-            let places = state.snapshot.positions.get(body.vertices.clone()).unwrap_or_default();
-            for (place, rest) in places.iter().zip(body.mesh.vertices()) {
-                let place = place.cast::<f64>();
-                let distance = (place - point).length();
-                if distance < nearest.0 {
-                    nearest = (distance, Some((number, place, *rest)));
-                }
-            }
-        }
-        let Some((body, _, rest)) = nearest.1 else { return Ok(false) };
-        self.take(id, 0, &viscera_stage::Pick { body, point, rest }).map(|()| true)
+        let found = viscera_stage::pick_near(&loaded.assembly, &state.snapshot, point, NEAR);
+        let Some(hit) = found else { return Ok(false) };
+        // Led from where it was asked for, not from the tissue's nearest point.
+        self.take(id, 0, &viscera_stage::Pick { point, ..hit }).map(|()| true)
     }
 
     fn take(&mut self, id: HoldId, run: usize, hit: &viscera_stage::Pick) -> Result<(), String> {

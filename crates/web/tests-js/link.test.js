@@ -7,7 +7,7 @@ const KNOWN = {
   settings: [
     { key: "solver.method", kind: "choice", values: ["auto", "xpbd", "explicit", "quasi_newton"] },
     { key: "solver.iterations", kind: "number", values: null },
-    { key: "solver.accuracy", kind: "text", values: null },
+    { key: "solver.accuracy", kind: "number", values: ["draft", "standard", "fine"] },
     { key: "world.gravity", kind: "text", values: null },
   ],
 };

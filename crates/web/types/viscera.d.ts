@@ -14,12 +14,15 @@ export function choose(measured: string): string;
 export class Session {
   private constructor();
   static open(canvas?: OffscreenCanvas): Promise<Session>;
+  static onCpu(): Session;
   device(): string;
   lost(): string | undefined;
   reopen(): Promise<void>;
   load(request: string, files: Record<string, Uint8Array>): void;
   loaded(): string;
+  loseDevice(): void;
   set(run: number, key: string, value: string): void;
+  setAll(run: number, settings: string): void;
   setting(run: number, key: string): string;
   reset(): void;
   beside(settings?: string): void;
@@ -50,6 +53,8 @@ export class Session {
   positions(run: number): Float32Array;
   triangles(): Uint32Array;
   vertices(run: number): Float32Array;
-  replay(run: number): string;
+  replay(): string;
+  ray(x: number, y: number): Float64Array;
+  seen(run: number, x: number, y: number, z: number): Float64Array;
   free(): void;
 }
