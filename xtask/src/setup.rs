@@ -17,7 +17,7 @@ Usage: cargo xtask setup [--all]
                          graphics processor. Without one the tests of the GPU backend are left out
   rustfmt, clippy        by rustup
   --all                  what `cargo xtask test --all` needs as well: a second, stricter software driver,
-                         which Debian's chromium brings along
+                         which Debian's chromium brings along, and that browser for the page
 
 Packages come by apt-get, as root or by sudo; other systems are told what to install.";
 
@@ -35,6 +35,9 @@ const PACKAGES: [&str; 2] = ["mesa-vulkan-drivers", "libvulkan1"];
 /// browser.
 const SECOND: &str = "/usr/lib/chromium/vk_swiftshader_icd.json";
 const SECOND_PACKAGE: &str = "chromium";
+
+/// The browser itself, in which the page is tried.
+const BROWSER: &str = "/usr/bin/chromium";
 
 /// One thing that a test command may need.
 struct Need {
@@ -220,6 +223,12 @@ pub fn use_driver(command: &mut Command, file: &Path) {
 
 fn has_second_driver() -> bool {
     cfg!(target_os = "linux") && Path::new(SECOND).exists()
+}
+
+/// A browser for the page's tests is there.
+pub fn has_browser() -> bool {
+    let named = std::env::var_os("VISCERA_BROWSER").map(PathBuf::from);
+    named.unwrap_or_else(|| BROWSER.into()).exists()
 }
 
 fn has_rustfmt() -> bool {

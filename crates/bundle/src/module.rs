@@ -42,6 +42,8 @@ pub fn build(wasm: &Path) -> Result<Module> {
         .out_name("viscera")
         .web(true)
         .map(|bindgen| bindgen.typescript(true).omit_default_module_path(false))
+        // Names of functions are an eighth of what travels, and only a debugger reads them.
+        .map(|bindgen| bindgen.remove_name_section(true).remove_producers_section(true))
         .and_then(|bindgen| bindgen.generate(folder.path()));
     generated.with_context(|| format!("{}: wasm-bindgen refuses it", wasm.display()))?;
     let remark = optimize(&folder.path().join(WASM))?;

@@ -195,8 +195,14 @@ impl Folder {
 
     /// The smaller form of a file whose name says its content.
     fn small_once(&self, file: &Path, content: &[u8]) -> Vec<u8> {
-        let mut small = self.small.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        small.entry(file.to_owned()).or_insert_with(|| gzip(content)).clone()
+        let known = || self.small.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(small) = known().get(file) {
+            return small.clone();
+        }
+        // Nobody waits for another file's.
+        let small = gzip(content);
+        known().insert(file.to_owned(), small.clone());
+        small
     }
 
     /// It is a file, and no link leads out of the folder.

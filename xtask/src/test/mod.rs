@@ -1,15 +1,15 @@
 //! `cargo xtask test`: format, lints and tests, in two tiers.
 
+mod changed;
 mod programs;
 mod summary;
-mod window;
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
-use crate::{cargo, setup};
-use programs::{Outcome, Selection};
+use crate::{cargo, setup, web};
+use programs::{Outcome, Program, Selection};
 
 /// What `cargo xtask test --help` prints.
 pub const HELP: &str = "\
@@ -17,7 +17,8 @@ Run what must pass, in this order, stopping at the first failure:
 
   format          cargo fmt --all --check
   lints           cargo clippy --all-targets -- -D warnings
-  tests           the tests that are not marked as slow; the window's where it was changed
+  tests           the tests that are not marked as slow; the window's and the page's where they were changed
+  page            a short look at it in a browser, where `cargo xtask web` has built it
 
 and with --all, which is what decides whether a change is merged, everything:
 
@@ -25,6 +26,7 @@ and with --all, which is what decides whether a change is merged, everything:
   documentation   cargo doc, warnings are errors; the examples in it
   second driver   the portable tests of the GPU backend once more, on a stricter software driver
   main job        the release build of `viscera` runs a scene for two frames and draws it
+  page            it is built and tried in a browser
 
 Usage: cargo xtask test [OPTIONS]
 
@@ -43,6 +45,13 @@ const MAIN_JOB_SCENE: &str = "scenes/liver_retraction.toml";
 
 /// The package whose tests need a window's libraries.
 const WINDOW: &str = "viscera-view";
+
+/// The package that makes the page's files, and its test program that needs a browser.
+const BUNDLE: &str = "viscera-bundle";
+const IN_BROWSER: &str = "page";
+
+/// Part of the name of the one test of the page that the fast tier runs.
+const SHORT: &str = "short";
 
 /// Parts of names of the tests that also run on the second driver: few steps, nothing beyond the baseline.
 const SECOND_DRIVER_TESTS: [&str; 3] = ["device_errs", "nasty", "portable"];
@@ -107,26 +116,61 @@ pub fn test(options: &[&str]) -> ExitCode {
 }
 
 fn fast(run: &mut Run) -> Result<(), Failure> {
-    let with_window = window::is_changed();
-    if !with_window {
-        run.left_out.push(format!("{WINDOW}, lints and tests: nothing of the window has changed."));
+    let can_look = web::is_built() && setup::has_browser();
+    let with_window = changed::concerns(&changed::WINDOW);
+    let with_page = can_look || changed::concerns(&changed::PAGE);
+    let mut packages = vec!["--workspace"];
+    for (package, name, is_in) in [(WINDOW, "window", with_window), (BUNDLE, "page", with_page)] {
+        if !is_in {
+            let sentence =
+                format!("{package}, lints and tests: nothing of the {name} has changed.");
+            run.left_out.push(sentence);
+            packages.extend(["--exclude", package]);
+        }
     }
-    let packages: &[&str] =
-        if with_window { &["--workspace"] } else { &["--workspace", "--exclude", WINDOW] };
+    if !can_look {
+        let sentence = "the page in a browser: it takes Debian's chromium, and `cargo xtask web`.";
+        run.left_out.push(sentence.into());
+    }
     format(run)?;
-    lints(run, packages)?;
-    let selection = Selection { packages, slow: false, required: false };
-    tests(run, &selection)
+    lints(run, &packages)?;
+    let selection = Selection { packages: &packages, slow: false, required: false };
+    let in_browser = tests(run, &selection)?;
+    if !can_look {
+        return Ok(());
+    }
+    look(run, &in_browser, &Selection { required: true, ..selection }, &[SHORT])
 }
 
 fn everything(run: &mut Run) -> Result<(), Failure> {
     let packages = &["--workspace"];
     format(run)?;
     lints(run, packages)?;
-    tests(run, &Selection { packages, slow: true, required: true })?;
+    let selection = Selection { packages, slow: true, required: true };
+    let in_browser = tests(run, &selection)?;
     documentation(run)?;
     second_driver(run)?;
-    main_job(run)
+    main_job(run)?;
+    println!("\n== page: cargo xtask web");
+    let started = Instant::now();
+    let built = web::build();
+    run.times.push(("building the page", started.elapsed()));
+    built.map_err(|next_move| Failure("page", next_move))?;
+    look(run, &in_browser, &selection, &[])
+}
+
+/// Tries the page in a browser.
+fn look(
+    run: &mut Run,
+    programs: &[Program],
+    selection: &Selection,
+    names: &[&str],
+) -> Result<(), Failure> {
+    println!("\n== page, in a browser");
+    let started = Instant::now();
+    let outcome = programs::run(programs, selection, names);
+    run.times.push(("page", started.elapsed()));
+    run.end_of_tests(outcome)
 }
 
 fn format(run: &mut Run) -> Result<(), Failure> {
@@ -150,16 +194,20 @@ fn leaves_out(run: &Run, name: &str) -> bool {
     run.left_out.iter().any(|sentence| sentence.contains(&format!("no {name}.")))
 }
 
-fn tests(run: &mut Run, selection: &Selection) -> Result<(), Failure> {
+/// All tests but those that need a browser: their programs are left for later.
+fn tests(run: &mut Run, selection: &Selection) -> Result<Vec<Program>, Failure> {
     println!("\n== tests");
     let started = Instant::now();
     let programs = programs::build(selection);
     run.times.push(("building tests", started.elapsed()));
     let programs = programs.map_err(|next_move| Failure("tests", next_move))?;
+    let (in_browser, programs): (Vec<_>, Vec<_>) =
+        programs.into_iter().partition(|program| program.is_target(BUNDLE, IN_BROWSER));
     let started = Instant::now();
     let outcome = programs::run(&programs, selection, &[]);
     run.times.push(("tests", started.elapsed()));
-    run.end_of_tests(outcome)
+    run.end_of_tests(outcome)?;
+    Ok(in_browser)
 }
 
 fn documentation(run: &mut Run) -> Result<(), Failure> {

@@ -85,6 +85,10 @@ impl Program {
         self.package == package && self.kind == "test"
     }
 
+    pub fn is_target(&self, package: &str, target: &str) -> bool {
+        self.package == package && self.target == target
+    }
+
     /// The same with one driver only.
     pub fn on_driver(mut self, file: &Path) -> Self {
         self.driver = Some(file.to_owned());

@@ -2,5 +2,8 @@
 
 mod browser;
 mod driver;
+mod hands;
 mod offline;
+mod page;
 mod setup;
+mod trouble;

@@ -5,7 +5,7 @@ use crate::driver::Probe;
 use crate::setup;
 
 /// Everything has been kept.
-const IS_KEPT: &str = "navigator.serviceWorker.ready.then(() => \
+pub const IS_KEPT: &str = "navigator.serviceWorker.ready.then(() => \
                        navigator.serviceWorker.controller !== null)";
 
 fn version(tab: &Tab) -> String {

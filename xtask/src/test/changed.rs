@@ -1,17 +1,20 @@
-//! Whether the window is concerned by what was changed: its libraries are most of what there is to build.
+//! Which parts are concerned by what was changed: some have libraries that take long to build.
 
 use std::process::Command;
 
 use crate::root;
 
 /// What the window is made of, and what decides how it is built.
-const PLACES: [&str; 4] = ["crates/view/", "crates/render/", "Cargo.lock", "Cargo.toml"];
+pub const WINDOW: [&str; 4] = ["crates/view/", "crates/render/", "Cargo.lock", "Cargo.toml"];
 
-/// Whether one of its files differs from the branch that the work started from, or is new. True where git
-/// does not answer.
-pub fn is_changed() -> bool {
+/// What the page's files are made of.
+pub const PAGE: [&str; 2] = ["crates/bundle/", "crates/web/"];
+
+/// Whether a file in one of these places differs from the branch that the work started from, or is new. True
+/// where git does not answer.
+pub fn concerns(places: &[&str]) -> bool {
     changed_files().is_none_or(|files| {
-        files.lines().any(|file| PLACES.iter().any(|place| file.starts_with(place)))
+        files.lines().any(|file| places.iter().any(|place| file.starts_with(place)))
     })
 }
 

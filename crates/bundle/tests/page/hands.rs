@@ -1,0 +1,156 @@
+//! Hands on the tissue: mouse, fingers, keys.
+
+use crate::browser::{Kind, Tab, View};
+use crate::page::{BAR, assert_tissue, farthest, number, numbers, open, open_in};
+
+/// A place of the window where tissue is, near the bar's free end.
+fn place_of_tissue(tab: &Tab) -> [f64; 2] {
+    let search = "(async () => { let last = null; for (let u = 0.05; u < 0.96; u += 0.05) \
+                  for (let v = 0.05; v < 0.96; v += 0.05) { const { x, y } = viscera.pointAt(u, v); \
+                  if (await viscera.isTissue(x, y)) last = [x, y]; } return last; })()";
+    let place = tab.evaluate(search);
+    let place = place.as_array().expect("tissue is somewhere in the picture");
+    [number(&place[0]), number(&place[1])]
+}
+
+/// Steps until it hardly moves.
+fn rest(tab: &Tab) -> Vec<f64> {
+    tab.evaluate("viscera.step(150)");
+    numbers(tab, "viscera.vertices(0)")
+}
+
+fn bar_at_rest(kind: Kind, view: View) -> Option<(Tab, Vec<f64>)> {
+    let tab = open_in(kind, view, BAR)?;
+    tab.evaluate("viscera.pause()");
+    let vertices = rest(&tab);
+    Some((tab, vertices))
+}
+
+#[test]
+fn a_drag_pulls_the_tissue_and_it_comes_back() {
+    let Some((tab, before)) = bar_at_rest(Kind::Gpu, View::DESK) else { return };
+    let [x, y] = place_of_tissue(&tab);
+    tab.mouse("mouseMoved", [x, y], "none");
+    tab.mouse("mousePressed", [x, y], "left");
+    for part in 1..=8 {
+        tab.mouse("mouseMoved", [x, y - 15.0 * f64::from(part)], "left");
+    }
+    tab.evaluate("viscera.step(30)");
+    let held = tab.evaluate("viscera.state().report.runs[0].held");
+    let force: f64 =
+        held[0]["force"].as_array().expect("a hold").iter().map(number).map(|f| f * f).sum();
+    let pulled = farthest(&before, &numbers(&tab, "viscera.vertices(0)"));
+    tab.look().save("pulled");
+    assert!(force.sqrt() > 0.05, "it takes {} N", force.sqrt());
+    assert!(pulled > 5e-3, "it moves by {pulled} m");
+    assert!(tab.evaluate("document.querySelector('#tag').textContent").to_string().contains('N'));
+    tab.mouse("mouseReleased", [x, y - 120.0], "left");
+    let after = farthest(&before, &rest(&tab));
+    assert_eq!(tab.evaluate("viscera.state().report.runs[0].held.length"), 0);
+    assert!(after < 0.05 * pulled, "{after} m of {pulled} m are left");
+}
+
+#[test]
+fn a_drag_beside_the_tissue_turns_the_view() {
+    let Some((tab, before)) = bar_at_rest(Kind::Plain, View::DESK) else { return };
+    let picture = tab.look();
+    let corner =
+        tab.evaluate("(() => { const { x, y } = viscera.pointAt(0.03, 0.9); return [x, y]; })()");
+    let [x, y] = [number(&corner[0]), number(&corner[1])];
+    tab.mouse("mousePressed", [x, y], "left");
+    tab.mouse("mouseMoved", [x + 200.0, y - 60.0], "left");
+    tab.mouse("mouseReleased", [x + 200.0, y - 60.0], "left");
+    tab.wait("new Promise((done) => setTimeout(() => done(true), 300))", 5.0);
+    let area = crate::page::stage(&tab);
+    let turned = tab.look();
+    assert!(turned.difference(&picture, area) > 0.02, "{}", turned.difference(&picture, area));
+    assert_tissue(&tab, &turned);
+    let vertices = numbers(&tab, "viscera.vertices(0)");
+    assert!(farthest(&before, &vertices) < 1e-9, "the tissue itself stays");
+}
+
+#[test]
+fn a_finger_pulls_on_a_phone() {
+    let Some((tab, before)) = bar_at_rest(Kind::Gpu, View::PHONE) else { return };
+    let [x, y] = place_of_tissue(&tab);
+    tab.touch("touchStart", &[[x, y]]);
+    for part in 1..=8 {
+        tab.touch("touchMove", &[[x, y - 8.0 * f64::from(part)]]);
+    }
+    tab.evaluate("viscera.step(30)");
+    let pulled = farthest(&before, &numbers(&tab, "viscera.vertices(0)"));
+    tab.look().save("phone");
+    assert!(pulled > 5e-3, "it moves by {pulled} m");
+    tab.touch("touchEnd", &[]);
+    let after = farthest(&before, &rest(&tab));
+    assert!(after < 0.05 * pulled, "{after} m of {pulled} m are left");
+    let scroll = "[document.documentElement.scrollWidth - innerWidth, scrollX, scrollY, \
+                  visualViewport.scale].join()";
+    assert_eq!(tab.evaluate(scroll), "0,0,0,1", "the page itself stays where it is");
+}
+
+#[test]
+fn two_fingers_zoom_the_view_and_not_the_page() {
+    let Some((tab, before)) = bar_at_rest(Kind::Plain, View::PHONE) else { return };
+    let share = |tab: &Tab| tab.look().share([0, 0, 780, 1688], crate::page::is_flesh);
+    let small = share(&tab);
+    let [left, top, width, height] = tab.area("#canvas");
+    let (x, y) = (left + width / 2.0, top + height / 2.0);
+    tab.touch("touchStart", &[[x - 30.0, y], [x + 30.0, y]]);
+    for part in 1..=6 {
+        let spread = 30.0 + 8.0 * f64::from(part);
+        tab.touch("touchMove", &[[x - spread, y], [x + spread, y]]);
+    }
+    tab.touch("touchEnd", &[]);
+    tab.wait("new Promise((done) => setTimeout(() => done(true), 300))", 5.0);
+    let large = share(&tab);
+    assert!(large > 1.5 * small, "{small} of the screen before, {large} after");
+    assert_eq!(tab.evaluate("visualViewport.scale"), 1);
+    assert!(farthest(&before, &numbers(&tab, "viscera.vertices(0)")) < 1e-9);
+}
+
+#[test]
+fn keys_hold_and_pull() {
+    let Some((tab, before)) = bar_at_rest(Kind::Plain, View::DESK) else { return };
+    tab.evaluate("document.getElementById('canvas-frame').focus()");
+    tab.key("Enter", 0);
+    tab.wait("viscera.worker.post('report').then(() => viscera.state().pull.hold > 0)", 5.0);
+    for _ in 0..12 {
+        tab.key("ArrowUp", 0);
+    }
+    tab.evaluate("viscera.step(30)");
+    let pulled = farthest(&before, &numbers(&tab, "viscera.vertices(0)"));
+    assert!(pulled > 2e-3, "it moves by {pulled} m");
+    tab.key("Enter", 0);
+    let after = farthest(&before, &rest(&tab));
+    assert!(after < 0.05 * pulled, "{after} m of {pulled} m are left");
+}
+
+#[test]
+fn everything_can_be_reached_at_three_times_the_size() {
+    let Some(tab) = open_in(Kind::Plain, View::ZOOMED, BAR) else { return };
+    tab.look().save("zoomed");
+    let wide = tab.evaluate("document.documentElement.scrollWidth - innerWidth");
+    assert_eq!(wide, 0, "nothing has to be scrolled sideways");
+    for id in ["play", "reset", "settings", "help", "canvas"] {
+        let [left, top, width, height] = tab.area(&format!("#{id}"));
+        let is_seen = left >= 0.0 && top >= 0.0 && left + width <= 480.5 && top + height <= 300.5;
+        assert!(is_seen && width >= 24.0 && height >= 24.0, "{id}: {left} {top} {width} {height}");
+    }
+}
+
+#[test]
+fn the_keyboard_reaches_every_control() {
+    let Some(tab) = open(Kind::Plain, BAR) else { return };
+    let mut reached = std::collections::BTreeSet::new();
+    for _ in 0..12 {
+        tab.key("Tab", 0);
+        let id = tab.evaluate("document.activeElement.id");
+        reached.insert(id.as_str().unwrap_or_default().to_owned());
+    }
+    for id in
+        ["skip", "play", "step", "reset", "beside", "settings", "share", "save", "canvas-frame"]
+    {
+        assert!(reached.contains(id), "{id} is not among {reached:?}");
+    }
+}

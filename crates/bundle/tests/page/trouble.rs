@@ -1,0 +1,134 @@
+//! What goes wrong is said, and leaves something that works.
+
+use std::path::PathBuf;
+
+use crate::browser::{Kind, Tab};
+use crate::page::{BAR, assert_tissue, begin, farthest, number, numbers, open};
+use crate::setup;
+
+/// Everything that the page has said.
+fn said(tab: &Tab) -> String {
+    let log = tab.evaluate("viscera.state().log.map((message) => message.text).join('\\n')");
+    log.as_str().expect("a text").to_owned()
+}
+
+fn wait_for(tab: &Tab, words: &str) {
+    tab.wait(&format!("viscera.state().log.some((m) => m.text.includes({words:?}))"), 15.0);
+}
+
+#[test]
+fn a_link_of_nonsense_is_told_part_by_part() {
+    let link = "#scene=nothing&mesh=99&solver.method=magic&frobnicate=1&solver.iterations=many\
+                &%3Cscript%3E=1&color=stress";
+    let Some(tab) = open(Kind::Plain, link) else { return };
+    let said = said(&tab);
+    for part in ["nothing", "99", "magic", "frobnicate"] {
+        assert!(said.contains(part), "{part} is not told of: {said}");
+    }
+    assert_eq!(tab.evaluate("viscera.state().loaded.name"), "liver_retraction");
+    assert_eq!(tab.evaluate("viscera.state().link.color"), "stress", "what is right in it holds");
+    assert_eq!(tab.evaluate("document.querySelectorAll('#messages script').length"), 0);
+}
+
+#[test]
+fn the_simulation_goes_on_when_the_device_is_lost() {
+    let Some(tab) = open(Kind::Gpu, BAR) else { return };
+    tab.evaluate("viscera.pause()");
+    tab.evaluate("viscera.step(20)");
+    let before = numbers(&tab, "viscera.vertices(0)");
+    tab.evaluate("viscera.lose()");
+    wait_for(&tab, "The simulation goes on where it was");
+    assert!(said(&tab).contains("The graphics device is gone"), "{}", said(&tab));
+    assert!(farthest(&before, &numbers(&tab, "viscera.vertices(0)")) < 1e-9, "where it was");
+    tab.evaluate("viscera.step(3)");
+    assert!(farthest(&before, &numbers(&tab, "viscera.vertices(0)")) > 1e-6, "and goes on");
+    assert_tissue(&tab, &tab.look());
+}
+
+#[test]
+fn a_simulation_on_a_lost_device_goes_on() {
+    let link = "#scene=cantilever&mesh=1.6&solver.method=xpbd&solver.device=gpu";
+    let Some(tab) = open(Kind::Gpu, link) else { return };
+    tab.evaluate("viscera.lose()");
+    wait_for(&tab, "The simulation goes on where it was");
+    let time = number(&tab.evaluate("viscera.state().time"));
+    tab.evaluate("viscera.frame(3)");
+    let later = number(&tab.evaluate("viscera.state().time"));
+    assert!(later > time, "{time} s, then {later} s");
+    assert_tissue(&tab, &tab.look());
+}
+
+#[test]
+fn a_module_that_died_can_be_started_again() {
+    let Some(tab) = open(Kind::Plain, BAR) else { return };
+    tab.expect("panic");
+    tab.expect("unreachable");
+    tab.evaluate("viscera.panic()");
+    tab.wait("viscera.state().card", 10.0);
+    tab.look().save("card");
+    tab.click_on("#card-buttons button");
+    tab.wait(
+        "!viscera.state().card && viscera.state().frames > 0 && viscera.state().playing",
+        15.0,
+    );
+    assert_eq!(tab.evaluate("viscera.state().loaded.name"), "cantilever");
+    assert_tissue(&tab, &tab.look());
+}
+
+fn dropped(name: &str, content: &[u8]) -> Option<(Tab, tempfile::TempDir)> {
+    let tab = open(Kind::Plain, BAR)?;
+    let folder = tempfile::tempdir().expect("a folder");
+    let file: PathBuf = folder.path().join(name);
+    std::fs::write(&file, content).expect("written");
+    tab.drop_files([500.0, 500.0], &[&file]);
+    Some((tab, folder))
+}
+
+/// A cube of 8 cm as surface.
+const CUBE: &str = "v 0 0 0\nv 0.08 0 0\nv 0.08 0.08 0\nv 0 0.08 0\nv 0 0 0.08\nv 0.08 0 0.08\nv 0.08 0.08 0.08\n\
+                    v 0 0.08 0.08\nf 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\n\
+                    f 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n";
+
+#[test]
+fn a_mesh_that_is_dropped_moves() {
+    let Some((tab, _folder)) = dropped("cube.obj", CUBE.as_bytes()) else { return };
+    tab.wait("viscera.state().own === 'cube.obj'", 15.0);
+    assert!(number(&tab.evaluate("viscera.state().loaded.tets")) > 50.0);
+    tab.evaluate("viscera.frame(3)");
+    let picture = tab.look();
+    picture.save("own_mesh");
+    assert_tissue(&tab, &picture);
+}
+
+#[test]
+fn a_file_that_is_no_mesh_is_told_and_the_scene_goes_on() {
+    for (name, content, words) in [
+        ("letter.txt", &b"Dear reader"[..], "letter.txt"),
+        ("broken.msh", &b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\nthree\n"[..], "broken.msh"),
+        ("broken.toml", &b"title = \n"[..], "broken.toml"),
+        ("empty.obj", &b""[..], "empty.obj"),
+    ] {
+        let Some((tab, _folder)) = dropped(name, content) else { return };
+        wait_for(&tab, words);
+        assert_eq!(tab.evaluate("viscera.state().loaded.name"), "cantilever");
+        tab.evaluate("viscera.frame(2)");
+    }
+}
+
+#[test]
+fn the_page_works_without_its_server_after_the_first_visit() {
+    use viscera_bundle::server::Server;
+    let (Some(site), Some(browser)) = (setup::site(), setup::browser(Kind::Plain)) else { return };
+    let server = Server::start(&site, 0).expect("a server");
+    let tab = browser.tab();
+    let url = server.url();
+    tab.go(&format!("{url}{BAR}"));
+    begin(&tab);
+    tab.wait(crate::offline::IS_KEPT, 15.0);
+    drop(server);
+    tab.expect("ERR_CONNECTION_REFUSED");
+    tab.reload();
+    begin(&tab);
+    assert_eq!(tab.evaluate("viscera.state().loaded.name"), "cantilever");
+    assert_tissue(&tab, &tab.look());
+}
