@@ -42,6 +42,8 @@ export class Engine {
   hands;
   /** @type {(error: unknown) => void} */
   #fail;
+  /** Takes the canvas that was asked for. @type {(canvas: OffscreenCanvas) => void} */
+  give = () => {};
 
   /**
    * @param {Session} session
@@ -187,11 +189,16 @@ export class Engine {
   async #recover(why) {
     this.hands.gestures.cancelAll();
     await this.alone(async () => {
-      this.#say({ about: "warn", text: `The graphics device is gone (${why}). Another one is being opened.` });
-      await this.session.reopen();
+      this.#say({ about: "warn", text: `The graphics device is gone: ${why}. Another one is being opened.` });
+      // What the lost device drew on may be lost with it: a canvas of its own for the next one.
+      const canvas = await new Promise((/** @type {(canvas: OffscreenCanvas) => void} */ give) => {
+        this.give = give;
+        this.#say({ about: "canvas" });
+      });
+      await this.session.reopen(canvas);
       const device = JSON.parse(this.session.device());
       this.#say({ about: "device", device });
-      if (device.missing) this.#say({ about: "canvas" });
+      if (device.missing) this.screen.plain(canvas);
       else this.#say({ about: "tell", text: `The simulation goes on where it was, on ${device.name}.` });
       this.screen.renew();
       this.#seeDevices();

@@ -52,9 +52,10 @@ export class Host {
    *
    * @param {string} what
    * @param {Record<string, unknown>} [fields]
+   * @param {Transferable[]} [transfer]
    */
-  send(what, fields = {}) {
-    this.#worker?.postMessage({ ...fields, do: what });
+  send(what, fields = {}, transfer = []) {
+    this.#worker?.postMessage({ ...fields, do: what }, transfer);
   }
 
   /**

@@ -63,7 +63,7 @@ function hear(word) {
       messages.warn(word.text);
       break;
     case "canvas":
-      host.call("plain", ...freshCanvas());
+      host.send("canvas", ...freshCanvas());
       break;
     case "stopped":
       messages.stop("The simulation has stopped", word.text, [["Begin again from rest", () => host.send("reset")]]);

@@ -31,6 +31,8 @@ export class Screen {
   #cost = 0;
   #drawn = 0;
   #timing = false;
+  /** The scale of the next picture; 0: as it is. */
+  #wanted = 0;
 
   /**
    * @param {OffscreenCanvas} canvas
@@ -81,6 +83,7 @@ export class Screen {
     this.#height = Math.max(1, height);
     if (ratio !== this.#ratio) {
       this.#ratio = ratio;
+      this.#wanted = 0;
       this.#scale = Math.min(ratio, this.#context ? PROCESSOR.sharpest : DEVICE.sharpest);
     }
     this.#apply();
@@ -97,6 +100,13 @@ export class Screen {
 
   /** @param {boolean} alone whether the device does nothing else: only then is it known what the picture costs */
   draw(alone) {
+    // Not where it was found out: the session may have been busy at that moment.
+    if (this.#wanted > 0) {
+      this.#scale = this.#wanted;
+      this.#wanted = 0;
+      this.#drawn = 0;
+      this.#apply();
+    }
     const began = performance.now();
     if (!this.#context) {
       this.#session.draw();
@@ -136,9 +146,6 @@ export class Screen {
     const share = Math.sqrt(allowed / Math.max(this.#cost, 0.1));
     const wanted = this.#scale * Math.min(Math.max(share, 0.6), 1.3);
     const scale = Math.max(Math.min(wanted, this.#ratio, sharpest), Math.min(coarsest, this.#ratio));
-    if (Math.abs(scale / this.#scale - 1) < 0.15) return;
-    this.#scale = scale;
-    this.#drawn = 0;
-    this.#apply();
+    if (Math.abs(scale / this.#scale - 1) >= 0.15) this.#wanted = scale;
   }
 }

@@ -199,8 +199,6 @@ function obey(engine, order) {
       return session.grip(order.count, order.stiffness, order.rigid);
     case "letGo":
       return hands.letGo(order.hold);
-    case "plain":
-      return screen.plain(order.canvas);
     case "lose":
       return session.loseDevice();
     case "replay":
@@ -267,6 +265,7 @@ async function take(order) {
   if (hasFailed) return;
   try {
     if (order.do === "start") await start(order);
+    else if (order.do === "canvas") return void engine?.give(order.canvas);
     else if (!engine || engine.isBusy) return void waiting.push(order);
     const value = order.do === "start" ? true : await obey(/** @type {Engine} */ (engine), order);
     engine?.touch();

@@ -143,8 +143,10 @@ impl Session {
         self.session.lost()
     }
 
-    /// Another device in its place; every simulation goes on where it was.
-    pub async fn reopen(&mut self) -> Result<(), JsError> {
+    /// Another device in its place; every simulation goes on where it was. A canvas in place of the last one, where one is
+    /// given: browsers whose graphics process died give pictures of theirs to new canvases only.
+    pub async fn reopen(&mut self, canvas: Option<OffscreenCanvas>) -> Result<(), JsError> {
+        self.canvas = canvas.or(self.canvas.take());
         self.connect().await
     }
 

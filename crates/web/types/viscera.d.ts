@@ -17,7 +17,7 @@ export class Session {
   static onCpu(): Session;
   device(): string;
   lost(): string | undefined;
-  reopen(): Promise<void>;
+  reopen(canvas?: OffscreenCanvas): Promise<void>;
   load(request: string, files: Record<string, Uint8Array>): void;
   loaded(): string;
   loseDevice(): void;
