@@ -226,7 +226,7 @@ export class Engine {
   #seeDevices() {
     const { runs } = JSON.parse(this.session.report());
     this.#timing = [false, false];
-    this.#onGpu = runs.map((/** @type {{device: string}} */ run) => run.device.startsWith("GPU"));
+    this.#onGpu = runs.map((/** @type {{onGpu: boolean}} */ run) => run.onGpu);
   }
 
   reset() {
