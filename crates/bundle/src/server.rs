@@ -95,12 +95,10 @@ impl Drop for Server {
 }
 
 fn answer(request: Request, folder: &Folder) {
-    let takes_gzip = request.headers().iter().any(|header| {
-        header.field.equiv("Accept-Encoding") && header.value.as_str().contains("gzip")
-    });
+    let accepts = Accepts::of(&request);
     let is_allowed = matches!(request.method(), Method::Get | Method::Head);
     let answer = match is_allowed {
-        true => folder.answer(request.url(), takes_gzip),
+        true => folder.answer(request.url(), accepts),
         false => {
             let mut answer = Answer::text(405, "405: this server only reads.\n".into());
             answer.headers.push(("Allow", "GET, HEAD".into()));
@@ -139,12 +137,32 @@ impl Answer {
     }
 }
 
+/// What a browser unpacks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Accepts {
+    brotli: bool,
+    gzip: bool,
+}
+
+impl Accepts {
+    fn of(request: &Request) -> Self {
+        let headers = request.headers().iter();
+        let named = headers.filter(|header| header.field.equiv("Accept-Encoding"));
+        let lists: Vec<&str> = named.map(|header| header.value.as_str()).collect();
+        let has = |word: &str| {
+            let words = lists.iter().flat_map(|list| list.split([',', ';']));
+            words.into_iter().any(|found| found.trim() == word)
+        };
+        Self { brotli: has("br"), gzip: has("gzip") }
+    }
+}
+
 impl Folder {
     fn new(root: &Path) -> Self {
         Self { root: root.to_owned(), small: Mutex::default() }
     }
 
-    fn answer(&self, url: &str, takes_gzip: bool) -> Answer {
+    fn answer(&self, url: &str, accepts: Accepts) -> Answer {
         let asked = url.split(['?', '#']).next().unwrap_or("");
         let Some(path) = path_of(asked) else {
             return Answer::text(
@@ -169,10 +187,10 @@ impl Folder {
         let Ok(content) = std::fs::read(&file) else {
             return Answer::text(404, format!("404: {asked} cannot be read.\n"));
         };
-        self.found(&file, content, takes_gzip)
+        self.found(&file, content, accepts)
     }
 
-    fn found(&self, file: &Path, content: Vec<u8>, takes_gzip: bool) -> Answer {
+    fn found(&self, file: &Path, content: Vec<u8>, accepts: Accepts) -> Answer {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let (kind, is_worth) = kind_of(&name);
         let is_lasting = is_named_after_content(&name);
@@ -185,7 +203,13 @@ impl Folder {
         let mut body = content;
         if is_worth {
             headers.push(("Vary", "Accept-Encoding".to_owned()));
-            if takes_gzip {
+            let mut copy = file.as_os_str().to_owned();
+            copy.push(".br");
+            let ready = accepts.brotli.then(|| PathBuf::from(copy)).filter(|c| self.is_inside(c));
+            if let Some(small) = ready.and_then(|copy| std::fs::read(copy).ok()) {
+                headers.push(("Content-Encoding", "br".to_owned()));
+                body = small;
+            } else if accepts.gzip {
                 headers.push(("Content-Encoding", "gzip".to_owned()));
                 body = if is_lasting { self.small_once(file, &body) } else { gzip(&body) };
             }
