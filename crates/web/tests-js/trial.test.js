@@ -40,7 +40,7 @@ function session(device, runs, costs = 5) {
   return { done, says };
 }
 const DEVICE = { name: "a card", software: false, missing: null };
-const RUNS = [{ device: "CPU: as asked for" }, { device: "GPU: a card" }];
+const RUNS = [{ device: "CPU: as asked for" }, { device: "a card: as asked for" }];
 
 test("a graphics device is measured beside the scene, which is left as it was", async () => {
   const { done, says } = session(DEVICE, RUNS);
