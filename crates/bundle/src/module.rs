@@ -16,8 +16,9 @@ pub const WASM: &str = "viscera_bg.wasm";
 pub const TYPES: &str = "viscera.d.ts";
 
 /// Proposals that every browser with WebGPU has; wasm-opt must be told, since it assumes none.
-const FEATURES: [&str; 6] = [
+const FEATURES: [&str; 7] = [
     "--enable-bulk-memory",
+    "--enable-simd",
     "--enable-nontrapping-float-to-int",
     "--enable-sign-ext",
     "--enable-mutable-globals",
@@ -40,6 +41,9 @@ pub fn build(wasm: &Path) -> Result<Module> {
     let generated = bindgen
         .input_path(wasm)
         .out_name("viscera")
+        // Names of functions are half a megabyte, and no page shows them.
+        .remove_name_section(true)
+        .remove_producers_section(true)
         .web(true)
         .map(|bindgen| bindgen.typescript(true).omit_default_module_path(false))
         // Names of functions are an eighth of what travels, and only a debugger reads them.

@@ -20,6 +20,8 @@ pub type Settings = Vec<(String, String)>;
 pub trait Run: Send {
     /// What computes it, and why; what a person should know of that.
     fn device(&self) -> (String, Option<String>);
+    /// Whether something else than the CPU computes it.
+    fn is_on_device(&self) -> bool;
     /// Takes hold of the vertices of a body nearest to a point at rest [m].
     fn take(&mut self, hold: HoldId, grip: &GripTarget) -> Result<(), String>;
     /// Where what is held is to be at the end of the next frame, from where it was taken [m].
@@ -166,6 +168,10 @@ impl<S: Real> Run for SimulationRun<S> {
     fn device(&self) -> (String, Option<String>) {
         let warning = self.simulation.device_warning();
         (self.simulation.device_choice().to_owned(), warning.map(str::to_owned))
+    }
+
+    fn is_on_device(&self) -> bool {
+        self.simulation.is_on_device()
     }
 
     fn take(&mut self, hold: HoldId, grip: &GripTarget) -> Result<(), String> {

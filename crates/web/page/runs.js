@@ -28,7 +28,7 @@ export class Runs {
   seeDevices() {
     const { runs } = JSON.parse(this.#session.report());
     this.#waits = [false, false];
-    this.#onDevice = runs.map((/** @type {{device: string}} */ run) => !run.device.startsWith("CPU"));
+    this.#onDevice = runs.map((/** @type {{onGpu: boolean}} */ run) => run.onGpu);
   }
 
   /** Milliseconds of a frame since this was last asked; null: not yet known. */

@@ -54,9 +54,12 @@ pub struct Report {
 
 /// Numbers of one simulation.
 #[derive(Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
 pub struct RunReport {
     /// What computes it, and why.
     pub device: String,
+    /// Whether that is a graphics processor.
+    pub on_gpu: bool,
     /// What a person should know of that.
     pub warning: Option<String>,
     /// The method in force.
@@ -121,6 +124,7 @@ impl RunReport {
             .map(|patch| PatchReport { name: patch.name.clone(), force: patch.force.to_array() });
         Self {
             device,
+            on_gpu: run.is_on_device(),
             warning,
             method: method_name(method),
             acceleration: match (method, acceleration) {

@@ -1,16 +1,24 @@
 //! The page's canvas, drawn by the device: each simulation's picture in its part.
 
+use js_sys::Reflect;
 use viscera::scalar::Vec3;
 use viscera::solver::gpu::{Adapter, Device, GpuError};
 use viscera_picture::ImageSize;
 use viscera_render::{Canvas, Quality};
 use viscera_stage::{Area, PictureContents, RunSurface};
+use wasm_bindgen::JsValue;
 
 use crate::pictures::{background, fixed};
 use crate::session::Session;
 
 /// Opens the browser's device: the instance and the device.
 pub async fn open_device() -> Result<(wgpu::Instance, Device), GpuError> {
+    // Without this entry the graphics interface would not answer, but panic: under plain http, outside browsers.
+    let entry = |of: &JsValue, name: &str| Reflect::get(of, &name.into()).unwrap_or_default();
+    let navigator = entry(&js_sys::global(), "navigator");
+    if navigator.is_undefined() || entry(&navigator, "gpu").is_undefined() {
+        return Err(GpuError::NoAdapter);
+    }
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends: wgpu::Backends::BROWSER_WEBGPU,
         ..wgpu::InstanceDescriptor::new_without_display_handle()

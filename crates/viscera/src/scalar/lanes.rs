@@ -213,9 +213,14 @@ impl Instructions {
         }
     }
 
-    /// This choice where the processor has it, else what it has.
+    /// This choice where the processor has it, else what it has. A module of WebAssembly has one copy of every kernel, that
+    /// in registers: a page is to be small.
     pub fn or_detect(self) -> Self {
-        if self == Self::Portable { self } else { Self::detect() }
+        if self == Self::Portable && cfg!(not(target_arch = "wasm32")) {
+            self
+        } else {
+            Self::detect()
+        }
     }
 }
 
@@ -233,6 +238,9 @@ pub fn run<R: Real>(instructions: Instructions, kernel: impl Kernel<R>) {
         #[cfg(any(target_arch = "x86_64", target_arch = "wasm32"))]
         #[allow(unsafe_code)]
         Instructions::Avx2 | Instructions::Simd128 => unsafe { R::run_in_registers(kernel) },
+        #[cfg(not(target_arch = "wasm32"))]
         _ => kernel.run::<R>(),
+        #[cfg(target_arch = "wasm32")]
+        _ => unreachable!("every engine that loads the module has its registers"),
     }
 }

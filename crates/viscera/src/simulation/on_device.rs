@@ -18,7 +18,11 @@ impl<S: Real> Simulation<S> {
     /// Another device for settings that ask for one, or none: the old one may be lost. It goes on from the last frame.
     pub fn offer_device(&mut self, device: Option<Device>) -> Result<(), LiveError> {
         self.offered = Offered { device };
-        self.rebuild_on_device(self.scene().clone(), false)
+        // What the CPU computes by choice goes on undisturbed.
+        if self.is_on_device() || self.device_warning().is_some() {
+            self.rebuild_on_device(self.scene().clone(), false)?;
+        }
+        Ok(())
     }
 }
 
