@@ -8,6 +8,10 @@ import { Gestures } from "./gestures.js";
 /** Turning by one press of a key [CSS pixels]; pulling by a third of it. */
 const KEY_STEP = 24;
 
+/** Places in a picture, as shares of its sides from the middle outwards. @type {[number, number][]} */
+const AROUND = Array.from({ length: 169 }, (_, at) => /** @type {[number, number]} */ ([((at % 13) - 6) / 13, (Math.floor(at / 13) - 6) / 13]))
+  .sort((a, b) => Math.hypot(...a) - Math.hypot(...b));
+
 export class Hands {
   /** @type {Session} */
   #session;
@@ -95,7 +99,7 @@ export class Hands {
   }
 
   /**
-   * Takes hold in the middle of the picture, without a pointer, or lets go of it again.
+   * Takes hold of the tissue nearest to the middle of the picture, without a pointer, or lets go of it again.
    *
    * @returns {"held" | "released" | "nothing there"}
    */
@@ -105,10 +109,14 @@ export class Hands {
       return "released";
     }
     const [width, height] = this.#screen.size.map((length) => length / this.#screen.scale);
-    const [id, x, y] = [this.gestures.number(), width / 2, height / 2];
-    if (!this.#session.grab(id, this.#pixels(x), this.#pixels(y))) return "nothing there";
-    this.#key = { id, x, y };
-    return "held";
+    const id = this.gestures.number();
+    for (const [right, below] of AROUND) {
+      const [x, y] = [(0.5 + right) * width, (0.5 + below) * height];
+      if (!this.#session.grab(id, this.#pixels(x), this.#pixels(y))) continue;
+      this.#key = { id, x, y };
+      return "held";
+    }
+    return "nothing there";
   }
 
   /**

@@ -28,7 +28,7 @@ const LISTS = [
   ["Keys on the tissue (reach it with Tab)", [
     ["arrow keys", "turn the view; with Shift move it"],
     ["+ and -", "nearer, farther"],
-    ["Enter", "take hold in the middle of the picture; then arrow keys pull; Enter lets go"],
+    ["Enter", "take hold of the tissue nearest to the middle; then arrow keys pull; Enter lets go"],
   ]],
 ];
 

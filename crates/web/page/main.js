@@ -228,7 +228,7 @@ input.onGrabKey = () => {
   const said = /** @type {Record<string, string>} */ ({
     held: "The tissue is held: arrow keys pull, Enter lets go.",
     released: "Let go.",
-    "nothing there": "No tissue in the middle of the picture: turn or move the view, then press Enter.",
+    "nothing there": "There is no tissue in the picture: press F to see all of it, then Enter.",
   });
   host.call("keyGrab").then((what) => messages.tell(said[what]), () => {});
 };

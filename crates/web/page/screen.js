@@ -14,6 +14,8 @@ const PROCESSOR = { sharpest: 1.5, coarsest: 0.35, cost: 8 };
 /** Pictures between two changes of their size, so that it does not flicker; fewer where it is far too slow. */
 const SETTLE = 12;
 const HURRY = 3;
+/** A sharp picture that would take longer than this is not drawn [ms]: a hand may come meanwhile. */
+const LONGEST = 80;
 
 export class Screen {
   /** @type {OffscreenCanvas} */
@@ -128,7 +130,7 @@ export class Screen {
   /** Draws once with all pixels there are; the next picture is as the ones before. */
   sharpen() {
     const sharp = Math.min(this.#ratio, this.#limits.sharpest);
-    if (this.#scale > 0.95 * sharp) return;
+    if (this.#scale > 0.95 * sharp || this.#cost * (sharp / this.#scale) ** 2 > LONGEST) return;
     this.#rough = this.#scale;
     this.#scale = sharp;
     this.#apply();

@@ -35,12 +35,13 @@ function session(device, runs, costs = 5) {
       assert.equal(run, 1);
       done.frames += 1;
     },
+    ready: () => true,
     settled: () => new Promise((over) => setTimeout(over, costs)),
   };
   return { done, says };
 }
 const DEVICE = { name: "a card", software: false, missing: null };
-const RUNS = [{ device: "CPU: as asked for" }, { device: "GPU: a card" }];
+const RUNS = [{ onGpu: false }, { onGpu: true }];
 
 test("a graphics device is measured beside the scene, which is left as it was", async () => {
   const { done, says } = session(DEVICE, RUNS);
@@ -55,7 +56,7 @@ test("no device, software, or a scene that the device cannot compute: nothing is
     assert.equal(await measureGpu(says), null);
     assert.equal(done.beside.length, 0);
   }
-  const { done, says } = session(DEVICE, [RUNS[0], { device: "CPU: the GPU failed" }]);
+  const { done, says } = session(DEVICE, [RUNS[0], { onGpu: false }]);
   assert.equal(await measureGpu(says), null);
   assert.equal(done.frames, 0);
   assert.equal(done.beside.at(-1), undefined);
