@@ -167,3 +167,20 @@ fn memory_stays_over_many_scenes() {
     assert!(last < 1.1 * fifth, "{fifth} bytes after five scenes, {last} after twenty: {memory:?}");
     assert!(fifth > 1e6, "{fifth} bytes: the module's memory counts");
 }
+
+#[test]
+fn it_is_dark_where_the_system_is() {
+    let Some(tab) = open(Kind::Plain, BAR) else { return };
+    let corner = |tab: &Tab| {
+        let picture = tab.look();
+        let [left, top, ..] = stage(tab);
+        picture.at(left + 10, top + 10).map(u32::from).iter().sum::<u32>()
+    };
+    let light = corner(&tab);
+    tab.prefers("prefers-color-scheme", "dark");
+    tab.wait("document.documentElement.dataset.theme === 'dark'", 5.0);
+    tab.evaluate("viscera.frame(2)");
+    tab.look().save("dark");
+    let dark = corner(&tab);
+    assert!(light > 600 && dark < 200, "the background is {light}, then {dark}");
+}
