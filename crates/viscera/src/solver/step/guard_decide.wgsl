@@ -24,7 +24,7 @@ fn potential_of_totals() -> Potential {
 // below infinity, nothing is below NaN. By bits, because WGSL lets compilers assume that there is neither.
 fn is_below(value: f32, limit: f32, allowance: f32) -> bool {
     let is_infinite = bitcast<u32>(limit) == 0x7f800000u;
-    return is_finite(value) && (is_infinite || is_finite(limit) && value <= limit + allowance);
+    return is_finite(value) && (is_infinite || (is_finite(limit) && value <= limit + allowance));
 }
 
 fn passes(tested: Potential, limit: f32) -> bool {
@@ -53,7 +53,7 @@ fn choose() -> Choice {
     }
     // The order is that of the CPU, and comparisons are strict: of equal places the same one is taken.
     let ahead = totals[SUM_AHEAD];
-    if !is_finite(choice.limit) || is_finite(ahead) && ahead < choice.limit {
+    if !is_finite(choice.limit) || (is_finite(ahead) && ahead < choice.limit) {
         choice = Choice(ahead, AHEAD);
     }
     return choice;
