@@ -333,3 +333,95 @@ fn a_frame_reads_back_what_is_shown() {
     assert_eq!(multipliers.len(), simulation.layout().multiplier_count);
     assert!(multipliers.iter().any(|&l| l != 0.0) && multipliers.iter().all(|l| l.is_finite()));
 }
+
+/// Takes over a frame when it is there; how often it was not yet.
+fn arrived(simulation: &mut Simulation<f32>) -> Result<u32, FrameError> {
+    let began = std::time::Instant::now();
+    let mut misses = 0;
+    while !simulation.take_frame()? {
+        assert!(began.elapsed().as_secs() < 60, "the frame never arrives");
+        misses += 1;
+        std::thread::yield_now();
+    }
+    Ok(misses)
+}
+
+#[test]
+fn frames_that_nobody_waits_for_are_those_that_are_waited_for() {
+    let on_device = || {
+        let (scene, assembly) = assembled(&[]);
+        let device = crate::common::device::device();
+        Simulation::<f32>::on_device(scene, assembly, device).expect("a device")
+    };
+    let mut waited = advanced(on_device(), 6);
+    let mut sent = on_device();
+    for frame in 0..6 {
+        assert!(!sent.take_frame().expect("nothing was sent") && !sent.is_under_way());
+        sent.send_frame(frame == 5).expect("a frame");
+        assert!(sent.is_under_way() && sent.frame() == frame);
+        arrived(&mut sent).expect("it arrives");
+        assert_eq!(sent.frame(), frame + 1);
+    }
+    // From copies that came along with the frame: the device is not asked again.
+    sent.measure().expect("measures");
+    assert_eq!(sent.report(), waited.report());
+    assert_eq!(sent.state(), waited.state());
+    // The CPU computes at once, and its frames are taken over in the same way.
+    let mut cpu = simulation(&[("solver.device", "cpu")]).expect("a simulation");
+    cpu.send_frame(true).expect("a frame");
+    assert_eq!(arrived(&mut cpu), Ok(0));
+    cpu.measure().expect("measures");
+    let other = advanced(simulation(&[("solver.device", "cpu")]).expect("a simulation"), 1);
+    assert_eq!((cpu.state(), cpu.report()), (other.state(), other.report()));
+    waited.advance_frame().expect("another frame");
+}
+
+#[test]
+fn a_frame_under_way_gives_way_to_a_change_and_to_the_cpu() {
+    let device = own_device();
+    let (scene, assembly) = assembled(&[]);
+    let mut lost = Simulation::on_device(scene, assembly, &device).expect("a simulation");
+    lost.send_frame(false).expect("a frame");
+    arrived(&mut lost).expect("it arrives");
+    // A change between sending and taking over: the frame is computed again, with what was changed.
+    lost.send_frame(false).expect("a frame");
+    lost.change(&[("world.gravity".into(), "0 m/s^2".into())]).expect("a setting");
+    assert!(!lost.is_under_way() && lost.frame() == 1);
+    lost.send_frame(false).expect("a frame");
+    device.wgpu().0.destroy();
+    arrived(&mut lost).expect("computed by the CPU");
+    assert_eq!(lost.frame(), 2);
+    let warning = lost.device_warning().expect("a warning");
+    assert!(warning.contains("the CPU went on from there"), "{warning}");
+}
+
+#[test]
+fn another_device_goes_on_where_the_lost_one_was() {
+    let device = own_device();
+    let with = |device: &viscera::solver::gpu::Device| {
+        let (scene, assembly) = assembled(&[("solver.device", "gpu")]);
+        let simulation = Simulation::<f32>::with_device(scene, assembly, device.clone());
+        simulation.expect("a simulation")
+    };
+    let mut lost = advanced(with(&device), 4);
+    assert!(lost.is_on_device() && lost.device_choice().contains("as asked for"));
+    let mut kept = advanced(with(crate::common::device::device()), 4);
+    device.wgpu().0.destroy();
+    lost.send_frame(false).expect_err("a lost device");
+    lost.offer_device(Some(crate::common::device::device().clone())).expect("another device");
+    assert!(lost.is_on_device() && lost.frame() == 4);
+    // Multipliers are gone with the device, as after a change of settings.
+    kept.change(&[("solver.threads".into(), "1".into())]).expect("a setting");
+    let (lost, kept) = (advanced(lost, 3), advanced(kept, 3));
+    let apart = lost.state().positions.iter().zip(&kept.state().positions);
+    let apart = apart.map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
+    assert!(apart <= 1e-6, "{apart} m");
+    // Without any, what asks for one is refused, and what leaves the choice goes on with the CPU.
+    let (scene, assembly) = assembled(&[]);
+    let mut free = Simulation::on_device(scene, assembly, &device);
+    assert!(free.is_err(), "a lost device takes nothing");
+    let (scene, assembly) = assembled(&[]);
+    free = Simulation::with_device(scene, assembly, crate::common::device::device().clone());
+    let free = free.expect("small meshes are for the CPU");
+    assert!(!free.is_on_device(), "{}", free.device_choice());
+}

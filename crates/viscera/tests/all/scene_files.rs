@@ -5,7 +5,7 @@ use viscera::mesh::{TetMesh, shapes};
 use viscera::scalar::{Vec3, vec3};
 use viscera::scene::{BodyShape, Scene, SceneError, Selector, describe_markdown, describe_text};
 use viscera::settings::{
-    Acceleration, Accuracy, AndersonGuard, Colors, Count, DeviceRequest, Method, Precision,
+    Acceleration, Accuracy, AndersonGuard, Colors, Count, DeviceRequest, Method, Place, Precision,
     SolverSettings, Start,
 };
 
@@ -347,4 +347,36 @@ fn a_fixing_that_selects_nothing_says_where_the_body_is() {
          (0, 0, 0) mm to (200, 50, 50) mm, and its nearest vertex (0, 0, 0) mm is 10 mm away; move \
          or enlarge the half-space"
     );
+}
+
+/// The scene, wherever its patches were written.
+fn without_places(mut scene: Scene) -> Scene {
+    let nowhere = Place::Override { key: "nowhere".into() };
+    let patches = scene.fixings.iter_mut().map(|fixing| &mut fixing.patch);
+    let patches = patches.chain(scene.motions.iter_mut().map(|motion| &mut motion.patch));
+    let patches = patches.chain(scene.forces.iter_mut().map(|force| &mut force.patch));
+    let ends = scene.springs.iter_mut().flat_map(|spring| [&mut spring.from, &mut spring.to]);
+    patches.chain(ends).for_each(|patch| patch.place = nowhere.clone());
+    scene
+}
+
+/// A scene as text says the same, with what was laid over it, and takes what was done by hand behind it.
+#[test]
+fn a_scene_as_text_says_the_same() {
+    for (name, text) in SHIPPED.into_iter().chain([("full.toml", EVERYTHING)]) {
+        let overrides = [("solver.iterations", "7"), ("world.gravity", "1.5 m/s^2")];
+        let scene = Scene::parse(name, text, &overrides).unwrap_or_else(|e| panic!("{e}"));
+        let written = scene.text();
+        let again = Scene::parse(name, &written, &[]).unwrap_or_else(|e| panic!("{e}\n{written}"));
+        assert!(without_places(again) == without_places(scene.clone()), "{written}");
+        let longer = format!("{written}{}", scene.write(&scene.motions, &[]));
+        let error = Scene::parse(name, &longer, &[]).err().map(|error| error.to_string());
+        // Motions of these names are there already, or there were none.
+        let expected = scene.motions.first().map(|motion| motion.name.clone());
+        assert_eq!(error.is_some(), expected.is_some(), "{error:?}");
+        assert!(
+            error
+                .is_none_or(|e| e.contains("already") && e.contains(&expected.unwrap_or_default()))
+        );
+    }
 }

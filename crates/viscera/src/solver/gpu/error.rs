@@ -10,7 +10,8 @@ pub enum GpuError {
     /// There is none.
     #[error(
         "no graphics adapter was found; install its Vulkan driver (without a graphics card: \
-         `apt-get install mesa-vulkan-drivers libvulkan1`), or use `device = \"cpu\"`"
+         `apt-get install mesa-vulkan-drivers libvulkan1`; for a page: a browser with WebGPU), or use \
+         `device = \"cpu\"`"
     )]
     NoAdapter,
     /// None has such a name.
