@@ -16,8 +16,8 @@ fn evaluate(
     }
     let row = piece_row(piece);
     let part = table[row + PIECE_PART];
-    let is_spared = (job.mode & UNLESS_GOOD) != 0u && control.parts[part].guard.is_good != 0u
-        || (job.mode & IF_REJECTED) != 0u && control.parts[part].guard.was_rejected == 0u;
+    let is_spared = ((job.mode & UNLESS_GOOD) != 0u && control.parts[part].guard.is_good != 0u)
+        || ((job.mode & IF_REJECTED) != 0u && control.parts[part].guard.was_rejected == 0u);
     if agree(is_spared, local) {
         return;
     }
