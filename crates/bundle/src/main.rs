@@ -81,10 +81,12 @@ impl Build {
         // For people who write programs, not for browsers.
         generated.remove(module::TYPES);
         let site = site::build(&page, &generated)?;
-        let (table, sum) = sizes::table(&site.files);
+        let copies = sizes::small_copies(&site.files);
+        let (table, sum) = sizes::table(&site.files, &copies);
         print!("\n{table}");
         let place = self.out.join("site");
-        files::write(&place, &site.files)?;
+        let all = site.files.iter().chain(&copies).map(|(path, c)| (path.clone(), c.clone()));
+        files::write(&place, &all.collect())?;
         println!("\nBuild {}: {}", site.build, place.display());
 
         let sources = files::read(&self.web.join("package"))?;

@@ -55,6 +55,25 @@ fn text(status: u16, text: String) -> Answer {
     Answer { status, headers, body: text.into_bytes() }
 }
 
+/// What a browser unpacks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Accepts {
+    brotli: bool,
+    gzip: bool,
+}
+
+impl Accepts {
+    fn of(question: &Question) -> Self {
+        let named = question.headers.iter().filter(|(name, _)| name == "accept-encoding");
+        let lists: Vec<&str> = named.map(|(_, value)| value.as_str()).collect();
+        let has = |word: &str| {
+            let words = lists.iter().flat_map(|list| list.split([',', ';']));
+            words.into_iter().any(|found| found.trim() == word)
+        };
+        Self { brotli: has("br"), gzip: has("gzip") }
+    }
+}
+
 impl Folder {
     fn new(root: &Path) -> Self {
         Self { root: root.to_owned(), small: Mutex::default() }
@@ -66,10 +85,7 @@ impl Folder {
             answer.headers.push(("Allow", "GET, HEAD".into()));
             return answer;
         }
-        let takes_gzip = question
-            .headers
-            .iter()
-            .any(|(name, value)| name == "accept-encoding" && value.contains("gzip"));
+        let accepts = Accepts::of(question);
         let asked = question.url.split(['?', '#']).next().unwrap_or("");
         let Some(path) = path_of(asked) else {
             return text(403, "403: there is nothing for you outside the page's folder.\n".into());
@@ -90,10 +106,10 @@ impl Folder {
         let Ok(content) = std::fs::read(&file) else {
             return text(404, format!("404: {asked} cannot be read.\n"));
         };
-        self.found(&file, content, takes_gzip)
+        self.found(&file, content, accepts)
     }
 
-    fn found(&self, file: &Path, content: Vec<u8>, takes_gzip: bool) -> Answer {
+    fn found(&self, file: &Path, content: Vec<u8>, accepts: Accepts) -> Answer {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let (kind, is_worth) = kind_of(&name);
         let is_lasting = is_named_after_content(&name);
@@ -106,7 +122,13 @@ impl Folder {
         let mut body = content;
         if is_worth {
             headers.push(("Vary", "Accept-Encoding".to_owned()));
-            if takes_gzip {
+            let mut copy = file.as_os_str().to_owned();
+            copy.push(".br");
+            let ready = accepts.brotli.then(|| PathBuf::from(copy)).filter(|c| self.is_inside(c));
+            if let Some(small) = ready.and_then(|copy| std::fs::read(copy).ok()) {
+                headers.push(("Content-Encoding", "br".to_owned()));
+                body = small;
+            } else if accepts.gzip {
                 headers.push(("Content-Encoding", "gzip".to_owned()));
                 body = if is_lasting { self.small_once(file, &body) } else { gzip(&body) };
             }

@@ -1,6 +1,6 @@
 /** What the page is about at the moment: the scene, its settings, and what leads from one to the next. */
 
-import { download, readFiles } from "./files.js";
+import { readFiles } from "./files.js";
 import { emptyLink, parseLink, problemText, put, writeLink } from "./link.js";
 
 /** @typedef {import("./host.js").Host} Host */
@@ -29,6 +29,8 @@ export class App {
   chosen = null;
   /** Settings whose last change is under way, and what came after it. @type {Map<string, Pair[] | null>} */
   #under = new Map();
+  /** A link to a file that is not here yet. @type {Link | null} */
+  #waiting = null;
 
   /**
    * @param {Host} host
@@ -63,8 +65,15 @@ export class App {
   async #load(link, problems) {
     const scene = this.hello.scenes.find((/** @type {{name: string}} */ scene) => scene.name === link.scene) ?? this.hello.scenes[0];
     const order = { name: scene.name, text: scene.text };
-    this.#given = new Set(link.settings.map(([key]) => key));
-    if (await this.#order({ ...link, scene: scene.name }, order, problems)) this.own = null;
+    this.#waiting = link.own === null ? null : link;
+    const { color, wireframe } = link;
+    const shown = link.own === null ? { ...link, scene: scene.name } : { ...emptyLink(), color, wireframe };
+    this.#given = new Set(shown.settings.map(([key]) => key));
+    let isOpen = await this.#order(shown, order, problems);
+    // A mesh that is too fine is no reason to show nothing.
+    if (!isOpen && shown.mesh !== null) isOpen = await this.#order({ ...shown, mesh: null }, order, problems);
+    if (isOpen) this.own = null;
+    if (link.own !== null) this.#messages.tell(`This link is of a file on its maker’s device, ${link.own}: open that file here, and its settings follow.`);
     this.#changed();
   }
 
@@ -74,12 +83,13 @@ export class App {
       const own = await readFiles(files, this.hello.limits.fileBytes);
       const names = files.map((file) => file.name).join(", ");
       const { color, wireframe } = this.link;
-      const link = { ...emptyLink(), color, wireframe };
-      this.#given = new Set();
+      const link = this.#waiting?.own === names ? this.#waiting : { ...emptyLink(), color, wireframe, own: names };
+      this.#given = new Set(link.settings.map(([key]) => key));
       const transfer = own.map((file) => /** @type {Transferable} */ (file.bytes.buffer));
       if (await this.#order(link, { own }, [], transfer)) {
         this.own = names;
-        this.#messages.tell(`${names} is open. It stays on this device; a link cannot carry it, Save scene does.`);
+        this.#waiting = null;
+        this.#messages.tell(`${names} is open. It stays on this device; the link names it and carries the settings.`);
       }
     } catch (error) {
       this.#messages.warn(text(error));
@@ -269,32 +279,9 @@ export class App {
     this.#host.send("wireframe", { on });
     this.write();
   }
-
-  /** Copies the address. */
-  async share() {
-    this.write();
-    const own = this.own ? " It carries settings, not your own file." : "";
-    try {
-      await navigator.clipboard.writeText(location.href);
-      this.#messages.tell(`The link to this scene with these settings is copied.${own}`);
-    } catch {
-      this.#messages.tell(`This browser does not let the page copy: the address of the page is the link.${own}`);
-    }
-  }
-
-  /** A file that repeats everything. */
-  async save() {
-    try {
-      const scene = await this.#host.call("replay");
-      const stem = String(this.loaded.name).replace(/\.[a-z]+$/i, "").replace(/[^\w-]+/g, "_");
-      download(`${stem}_changed.toml`, scene);
-    } catch (error) {
-      this.#messages.warn(text(error));
-    }
-  }
 }
 
-/** @param {unknown} error */
-function text(error) {
+/** What went wrong, for people. @param {unknown} error */
+export function text(error) {
   return error instanceof Error ? error.message : String(error);
 }

@@ -11,16 +11,31 @@ export function missing() {
     return "This browser runs no WebAssembly, or has it turned off: allow it, or use a current Chrome, Edge, Firefox or Safari.";
   }
   if (!WebAssembly.validate(new Uint8Array(SIMD))) {
-    return "This browser’s WebAssembly has no SIMD, without which tissue would move too slowly: update it (Chrome 91, Firefox 89, Safari 16.4 or newer).";
+    return "This browser’s WebAssembly has no SIMD, without which tissue would move too slowly: update it (Chrome 91, Firefox 114, Safari 16.4 or newer).";
   }
   if (typeof OffscreenCanvas === "undefined") {
-    return "This browser cannot draw in a worker (OffscreenCanvas): update it (Chrome 69, Firefox 105, Safari 17 or newer).";
+    return "This browser cannot draw in a worker (OffscreenCanvas): update it (Chrome 80, Firefox 114, Safari 16.4 or newer).";
   }
   return null;
 }
 
+/** The module, on its way while the worker's own files are still being fetched; a worker that is started again has it at once. */
+const compiled = missing() ? Promise.resolve(null) : compile();
+
+async function compile() {
+  try {
+    return await WebAssembly.compileStreaming(fetch(new URL("./viscera_bg.wasm", import.meta.url)));
+  } catch (error) {
+    // A server that calls it by another type: the worker reads it by itself, and says what is wrong.
+    console.info(`the module is fetched by the worker: ${error}`);
+    return null;
+  }
+}
+
 export function startWorker() {
-  return new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
+  const worker = new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
+  void compiled.then((module) => worker.postMessage({ do: "module", module }));
+  return worker;
 }
 
 /** The first worker, and what it says before anybody listens. */

@@ -1,7 +1,8 @@
 /** The simulation in the worker: it advances, draws, measures, and says ten times a second how things stand. */
 
 import { Hands } from "./hands.js";
-import { Mean, Pace, nextPicture } from "./loop.js";
+import { Pace, nextPicture } from "./loop.js";
+import { Runs } from "./runs.js";
 import { Screen } from "./screen.js";
 import { BUDGET, Trial, measureGpu } from "./trial.js";
 import { Session, choose } from "./viscera.js";
@@ -10,6 +11,8 @@ import { Session, choose } from "./viscera.js";
 
 /** Between two reports [ms]. */
 const REPORT = 100;
+/** After so long without a change the picture is still [ms]. */
+const STILL = 300;
 /** After this long no second frame is computed for the same picture [ms]. */
 const LONG = 12;
 
@@ -30,12 +33,13 @@ export class Engine {
   #stopped = false;
   /** @type {Trial | null} */
   #trial = null;
-  /** @type {Mean[]} */
-  #costs = [new Mean(), new Mean()];
-  #timing = [false, false];
-  #onGpu = [false, false];
+  #runs;
   #frames = 0;
   #drawn = 0;
+  /** When something was last drawn, whether a report is due since, and whether the picture could be sharper. */
+  #seen = 0;
+  #isNew = false;
+  #isRough = false;
   #reported = { at: 0, frames: 0, drawn: 0 };
   /** @type {{count: number, done: () => void, failed: (error: unknown) => void}[]} */
   #steps = [];
@@ -56,6 +60,7 @@ export class Engine {
     this.screen = new Screen(canvas, session);
     this.#say = say;
     this.#fail = fail;
+    this.#runs = new Runs(session);
     this.hands = new Hands(session, this.screen);
   }
 
@@ -105,14 +110,26 @@ export class Engine {
     }
     if (this.session.ready()) {
       this.#advance(now);
-      if (this.#dirty) {
-        this.#dirty = false;
-        this.screen.draw(!this.#onGpu.includes(true));
-        this.#drawn += 1;
-      }
-      if (now - this.#reported.at >= REPORT) this.report(now);
+      this.#draw(now);
+      if (this.#isNew && now - this.#reported.at >= REPORT) this.report(now);
     }
-    if (this.playing || this.#dirty || this.#steps.length > 0) this.#schedule();
+    if (this.playing || this.#dirty || this.#isNew || this.#isRough || this.#steps.length > 0) this.#schedule();
+  }
+
+  /** @param {number} now */
+  #draw(now) {
+    if (this.#dirty) {
+      this.#dirty = false;
+      this.screen.draw(!this.#runs.useDevice);
+      this.#drawn += 1;
+      this.#seen = now;
+      this.#isNew = true;
+      this.#isRough = !this.playing;
+    } else if (this.#isRough && now - this.#seen > STILL) {
+      // Nothing moves: there is time for a sharp picture.
+      this.#isRough = false;
+      this.screen.sharpen();
+    }
   }
 
   /** @param {number} now */
@@ -125,33 +142,12 @@ export class Engine {
     const began = performance.now();
     for (let frame = 0; frame < wanted; frame += 1) {
       if (frame > 0 && (performance.now() - began > LONG || !this.session.ready())) break;
-      for (let run = 0; run < this.session.runs(); run += 1) this.#advanceRun(run);
+      for (let run = 0; run < this.session.runs(); run += 1) this.#runs.advance(run, this.#trial);
       this.#frames += 1;
       this.#dirty = true;
       if (step) step.count -= 1;
     }
     if (this.#trial?.isDone(now) && this.hands.gestures.hold === 0) void this.#choose();
-  }
-
-  /** @param {number} run */
-  #advanceRun(run) {
-    const began = performance.now();
-    this.session.advance(run);
-    if (!this.#onGpu[run]) {
-      const now = performance.now();
-      this.#costs[run].add(now - began);
-      if (run === 0) this.#trial?.add(now - began, now);
-      return;
-    }
-    if (this.#timing[run]) return;
-    this.#timing[run] = true;
-    const over = () => {
-      this.#timing[run] = false;
-    };
-    this.session.settled().then(() => {
-      over();
-      this.#costs[run].add(performance.now() - began);
-    }, over);
   }
 
   /** The first second is over: what suits this device? */
@@ -201,7 +197,7 @@ export class Engine {
       if (device.missing) this.screen.plain(canvas);
       else this.#say({ about: "tell", text: `The simulation goes on where it was, on ${device.name}.` });
       this.screen.renew();
-      this.#seeDevices();
+      this.#runs.seeDevices();
     });
   }
 
@@ -217,16 +213,10 @@ export class Engine {
 
   /** Settings changed. */
   changed() {
-    this.#seeDevices();
-    for (const cost of this.#costs) cost.forget();
+    this.#runs.seeDevices();
+    this.#runs.forget();
     this.report(performance.now());
     this.touch();
-  }
-
-  #seeDevices() {
-    const { runs } = JSON.parse(this.session.report());
-    this.#timing = [false, false];
-    this.#onGpu = runs.map((/** @type {{onGpu: boolean}} */ run) => run.onGpu);
   }
 
   reset() {
@@ -273,19 +263,22 @@ export class Engine {
 
   /** How things stand. @param {number} now */
   report(now) {
+    this.#isNew = false;
     this.session.measure();
     const seconds = Math.max(1e-3, (now - this.#reported.at) / 1000);
     const rate = (this.#frames - this.#reported.frames) / seconds;
     const drawn = (this.#drawn - this.#reported.drawn) / seconds;
     this.#reported = { at: now, frames: this.#frames, drawn: this.#drawn };
+    const report = JSON.parse(this.session.report());
     this.#say({
       about: "report",
-      report: JSON.parse(this.session.report()),
+      report,
       legend: JSON.parse(this.session.legend()),
-      costs: this.#costs.map((cost) => cost.take()),
+      costs: this.#runs.costs(),
       clock: { playing: this.playing, stopped: this.#stopped, rate, drawn, frames: this.#frames },
       screen: { scale: this.screen.scale, size: this.screen.size, plain: this.screen.isPlain },
       pull: this.hands.held,
+      tags: this.hands.tags(report),
       choosing: this.#trial !== null,
     });
   }

@@ -47,6 +47,19 @@ export class Hands {
     return { hold: this.gestures.hold || id, key: id > 0 ? { x, y } : null, kept: [...this.#kept] };
   }
 
+  /**
+   * Where what is held is led to, in each picture [CSS pixels].
+   *
+   * @param {{runs: {held: {id: number, target: number[]}[]}[]}} report
+   */
+  tags(report) {
+    return report.runs.flatMap(({ held }, run) => held.flatMap(({ id, target: [x, y, z] }) => {
+      const place = this.#session.seen(run, x, y, z);
+      if (place.length < 2) return [];
+      return [{ id, run, x: place[0] / this.#screen.scale, y: place[1] / this.#screen.scale }];
+    }));
+  }
+
   /** @param {number} factor above 1: nearer */
   zoom(factor) {
     this.#session.zoom(1 / factor);

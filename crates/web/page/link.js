@@ -16,6 +16,7 @@
  * @property {number | null} mesh factor of the element size; null: the page is to choose it
  * @property {string} color
  * @property {boolean} wireframe
+ * @property {string | null} own name of a file of a person's own, which a link cannot carry; null: a built-in scene
  */
 /**
  * @typedef {object} Known what there is to choose from
@@ -38,7 +39,7 @@ const VALUE = /^[\x20-\x7e\u00b2\u00b3\u00b5]+$/;
 
 /** @returns {Link} */
 export function emptyLink() {
-  return { scene: FIRST_SCENE, settings: [], beside: null, mesh: null, color: "tissue", wireframe: false };
+  return { scene: FIRST_SCENE, settings: [], beside: null, mesh: null, color: "tissue", wireframe: false, own: null };
 }
 
 /**
@@ -94,6 +95,10 @@ function read(link, key, value, known) {
     case "color":
       if (!COLORS.includes(value)) return `there is no colouring ${shown(value)}: ${COLORS.join(", ")}`;
       link.color = value;
+      return null;
+    case "own":
+      if (value.trim() === "" || value.length > LONGEST_VALUE) return `own ${shown(value)} is no name of a file`;
+      link.own = value;
       return null;
     case "wireframe":
     case "beside":
@@ -151,7 +156,8 @@ function wrongValue(value, setting) {
  */
 export function writeLink(link) {
   const parts = new URLSearchParams();
-  parts.append("scene", link.scene);
+  if (link.own === null) parts.append("scene", link.scene);
+  else parts.append("own", link.own);
   if (link.mesh !== null) parts.append("mesh", String(link.mesh));
   for (const [key, value] of link.settings) parts.append(key, value);
   if (link.beside) {

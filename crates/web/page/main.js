@@ -9,6 +9,7 @@ import { offerHook } from "./hook.js";
 import { Host } from "./host.js";
 import { Input, onKeys } from "./input.js";
 import { Messages, byId, make } from "./messages.js";
+import { save, share } from "./share.js";
 import { View } from "./view.js";
 
 const messages = new Messages();
@@ -50,6 +51,7 @@ function hear(word) {
       break;
     case "report":
       playing = word.clock.playing;
+      byId("loading").hidden = app.loaded !== null;
       view.show(/** @type {any} */ (word), input.place);
       hook.report(word);
       break;
@@ -202,8 +204,8 @@ press("step", step);
 press("reset", reset);
 press("beside", () => void app.beside());
 press("settings", () => openPanel(byId("app").classList.contains("closed")));
-press("share", () => void app.share());
-press("save", () => void app.save());
+press("share", () => void share(app, messages));
+press("save", () => void save(app, host, messages));
 press("help", showHelp);
 press("theme", () => {
   chosenTheme = isDark() ? "light" : "dark";
@@ -221,7 +223,7 @@ onKeys({
   "?": showHelp,
   F1: showHelp,
 });
-input.onMove = () => view.placeTag(input.place);
+input.onMove = () => view.follow(input.place);
 input.onGrabKey = () => {
   const said = /** @type {Record<string, string>} */ ({
     held: "The tissue is held: arrow keys pull, Enter lets go.",

@@ -31,6 +31,8 @@ export class Screen {
   #cost = 0;
   #drawn = 0;
   #timing = false;
+  /** The scale of pictures in motion, while a sharp one is shown; 0: none is. */
+  #rough = 0;
   /** The scale of the next picture; 0: as it is. */
   #wanted = 0;
 
@@ -84,7 +86,8 @@ export class Screen {
     if (ratio !== this.#ratio) {
       this.#ratio = ratio;
       this.#wanted = 0;
-      this.#scale = Math.min(ratio, this.#context ? PROCESSOR.sharpest : DEVICE.sharpest);
+      this.#rough = 0;
+      this.#scale = Math.min(ratio, this.#limits.sharpest);
     }
     this.#apply();
   }
@@ -100,6 +103,11 @@ export class Screen {
 
   /** @param {boolean} alone whether the device does nothing else: only then is it known what the picture costs */
   draw(alone) {
+    if (this.#rough > 0) {
+      this.#scale = this.#rough;
+      this.#rough = 0;
+      this.#apply();
+    }
     // Not where it was found out: the session may have been busy at that moment.
     if (this.#wanted > 0) {
       this.#scale = this.#wanted;
@@ -113,10 +121,30 @@ export class Screen {
       if (alone && !this.#timing) this.#time(began);
       return;
     }
+    this.#paint(this.#context);
+    this.#adapt(performance.now() - began);
+  }
+
+  /** Draws once with all pixels there are; the next picture is as the ones before. */
+  sharpen() {
+    const sharp = Math.min(this.#ratio, this.#limits.sharpest);
+    if (this.#scale > 0.95 * sharp) return;
+    this.#rough = this.#scale;
+    this.#scale = sharp;
+    this.#apply();
+    if (this.#context) this.#paint(this.#context);
+    else this.#session.draw();
+  }
+
+  /** @param {OffscreenCanvasRenderingContext2D} context */
+  #paint(context) {
     const [width, height] = this.size;
     const pixels = this.#session.pixels();
-    if (pixels.length === 4 * width * height) this.#context.putImageData(new ImageData(pixels, width, height), 0, 0);
-    this.#adapt(performance.now() - began);
+    if (pixels.length === 4 * width * height) context.putImageData(new ImageData(pixels, width, height), 0, 0);
+  }
+
+  get #limits() {
+    return this.#context ? PROCESSOR : DEVICE;
   }
 
   /** The device draws on its own: when it is done is heard later. @param {number} began */
@@ -138,7 +166,7 @@ export class Screen {
 
   /** @param {number} cost of one picture [ms] */
   #adapt(cost) {
-    const { sharpest, coarsest, cost: allowed } = this.#context ? PROCESSOR : DEVICE;
+    const { sharpest, coarsest, cost: allowed } = this.#limits;
     this.#cost = this.#drawn === 0 ? cost : 0.8 * this.#cost + 0.2 * cost;
     this.#drawn += 1;
     if (this.#drawn < (this.#cost > 4 * allowed ? HURRY : SETTLE)) return;

@@ -28,6 +28,7 @@ import { byId, button, make } from "./messages.js";
  * @property {{playing: boolean, stopped: boolean, rate: number, drawn: number, frames: number}} clock
  * @property {{scale: number, size: [number, number], plain: boolean}} screen
  * @property {{hold: number, key: {x: number, y: number} | null, kept: number[]}} pull
+ * @property {{id: number, run: number, x: number, y: number}[]} tags
  * @property {boolean} choosing
  */
 
@@ -35,6 +36,8 @@ const METHODS = /** @type {Record<string, string>} */ ({ auto: "automatic", quas
 const ELEMENTS = /** @type {Record<string, string>} */ ({ plain: "linear", recovered: "recovered-gradient" });
 const ACCELERATIONS = /** @type {Record<string, string>} */ ({ chebyshev: "Chebyshev", anderson: "Anderson" });
 
+/** So near to the finger a force is the finger's own [CSS pixels]: it may be a moment behind. */
+const NEAR = 160;
 /** Colours of curves: a point that a hand pulls has that of its arrow; a patch keeps its own, whatever else is pulled. */
 const POINTS = [0, 3, 2, 1];
 const PATCHES = [1, 2, 3];
@@ -64,7 +67,9 @@ function scientific(value) {
 export class View {
   #controls;
   #stage = byId("stage");
-  #tag = byId("tag");
+  #tags = byId("tags");
+  /** What follows the finger. @type {HTMLElement | null} */
+  #finger = null;
   #status = byId("status");
   /** @type {(hold: number) => void} */
   #letGo;
@@ -88,7 +93,7 @@ export class View {
     const { runs } = report.report;
     this.#measure(report);
     this.#showStatus(report);
-    this.#showTag(report, place);
+    this.#showTags(report, place);
     this.#showLegend(report);
     const names = byId("names");
     names.hidden = runs.length < 2;
@@ -175,30 +180,44 @@ export class View {
   }
 
   /**
-   * The force, beside the finger, where it does not hide it.
+   * Forces, each beside where it pulls to.
    *
    * @param {Report} report
    * @param {import("./input.js").Place} place
    */
-  #showTag({ report, pull }, place) {
-    const forces = report.runs.map((run) => run.held.find((held) => held.id === pull.hold)?.force);
-    this.#tag.hidden = pull.hold === 0 || forces.every((force) => !force);
-    if (this.#tag.hidden) return;
-    const names = report.runs.length > 1 ? ["A ", "B "] : [""];
-    this.#tag.textContent = forces.map((force, side) => `${names[side]}${force ? newtons(size(force)) : "…"}`).join("   ");
-    this.placeTag(pull.key ? { ...pull.key, touch: false } : place);
+  #showTags({ report, pull, tags }, place) {
+    while (this.#tags.children.length > tags.length) this.#tags.lastElementChild?.remove();
+    while (this.#tags.children.length < tags.length) this.#tags.append(make("div", { class: "tag" }));
+    this.#finger = null;
+    tags.forEach((tag, at) => {
+      const element = /** @type {HTMLElement} */ (this.#tags.children[at]);
+      const held = report.runs[tag.run]?.held.find((held) => held.id === tag.id);
+      element.id = tag.id === pull.hold && tag.run === 0 ? "tag" : "";
+      element.textContent = held ? newtons(size(held.force)) : "";
+      // What the finger holds follows it at once, in the picture that the finger is in.
+      const isFinger = tag.id === pull.hold && !pull.key && Math.hypot(tag.x - place.x, tag.y - place.y) < NEAR;
+      if (isFinger) this.#finger = element;
+      this.#placeTag(element, isFinger ? place : { ...tag, touch: false });
+    });
   }
 
-  /** @param {import("./input.js").Place} place */
-  placeTag({ x, y, touch }) {
-    if (this.#tag.hidden) return;
-    const half = this.#tag.offsetWidth / 2 + 6;
-    const high = this.#tag.offsetHeight;
+  /** The finger has moved. @param {import("./input.js").Place} place */
+  follow(place) {
+    if (this.#finger) this.#placeTag(this.#finger, place);
+  }
+
+  /**
+   * @param {HTMLElement} tag
+   * @param {import("./input.js").Place} place
+   */
+  #placeTag(tag, { x, y, touch }) {
+    const half = tag.offsetWidth / 2 + 6;
+    const high = tag.offsetHeight;
     const above = touch ? 52 : 22;
     // At the upper edge it goes below the pointer.
     const top = y - above - high < 4 ? y + above + high : y - above;
-    this.#tag.style.left = `${Math.min(Math.max(x, half), this.#stage.clientWidth - half)}px`;
-    this.#tag.style.top = `${Math.min(top, this.#stage.clientHeight - 4)}px`;
+    tag.style.left = `${Math.min(Math.max(x, half), this.#stage.clientWidth - half)}px`;
+    tag.style.top = `${Math.max(high + 4, Math.min(top, this.#stage.clientHeight - 4))}px`;
   }
 
   /** @param {Report} report */

@@ -48,7 +48,13 @@ console.error = (/** @type {unknown[]} */ ...words) => {
   log(...words);
 };
 
-const loaded = init({ module_or_path: new URL("./viscera_bg.wasm", import.meta.url) });
+/** Takes the module that the page has compiled meanwhile; null: it could not. @type {(module: WebAssembly.Module | null) => void} */
+let takeModule = () => {};
+/** @type {Promise<WebAssembly.Module | null>} */
+const compiled = new Promise((take) => {
+  takeModule = take;
+});
+const loaded = compiled.then((module) => init({ module_or_path: module ?? new URL("./viscera_bg.wasm", import.meta.url) }));
 loaded.then(() => {
   say({
     about: "hello",
@@ -57,7 +63,7 @@ loaded.then(() => {
     presets: JSON.parse(presets()),
     limits: JSON.parse(limits()),
   });
-}, fail);
+}, (error) => say({ about: "fatal", text: `The simulation could not be loaded (${error}): check the connection` }));
 
 /** @param {Order} order */
 async function start(order) {
@@ -264,6 +270,7 @@ function look(engine, order) {
 async function take(order) {
   if (hasFailed) return;
   try {
+    if (order.do === "module") return void takeModule(order.module);
     if (order.do === "start") await start(order);
     else if (order.do === "canvas") return void engine?.give(order.canvas);
     else if (!engine || engine.isBusy) return void waiting.push(order);

@@ -33,6 +33,14 @@ test("two simulations with the same settings stay two", () => {
   assert.equal(parseLink("#scene=twist", KNOWN).link.beside, null);
 });
 
+test("a file of one's own is named, with its settings and no scene", () => {
+  const link = { ...emptyLink(), own: "liver.msh", settings: [["body.tissue.material.young", "8 kPa"]] };
+  const written = writeLink(link);
+  assert.ok(!written.includes("scene="));
+  assert.deepEqual(parseLink(written, KNOWN), { link, problems: [] });
+  assert.match(parseLink("#own=", KNOWN).problems[0], /no name of a file/);
+});
+
 test("an empty link is the first scene, whose mesh is still to be chosen", () => {
   for (const hash of ["", "#"]) {
     const { link, problems } = parseLink(hash, KNOWN);

@@ -24,6 +24,7 @@ fn site() -> Site {
     let page = crate::files(&[
         ("index.html", "<p>page"),
         ("m.wasm", "module"),
+        ("m.wasm.br", "module, smaller"),
         (LASTING, "let text = 'a text that repeats, a text that repeats, a text that repeats'"),
         ("deep/index.html", "<p>deep"),
     ]);
@@ -130,4 +131,17 @@ fn a_port_in_use_and_a_folder_without_a_page_are_told() {
     assert!(error.to_string().contains("cannot be used"), "{error}");
     let error = Server::start(site._folder.path(), 0).err().expect("refused");
     assert!(error.to_string().contains("no index.html"), "{error}");
+}
+
+#[test]
+fn a_copy_that_lies_ready_is_sent_to_those_who_take_it() {
+    let site = site();
+    let (head, body) = site.ask("GET", "/m.wasm", "Accept-Encoding: gzip, br\r\n");
+    assert!(head.contains("content-encoding: br") && head.contains("application/wasm"), "{head}");
+    assert_eq!(body, b"module, smaller");
+    let (head, body) = site.ask("GET", "/m.wasm", "Accept-Encoding: broken\r\n");
+    assert!(!head.contains("content-encoding") && body == b"module", "{head}");
+    // What does not lie ready goes by gzip.
+    let (head, _) = site.ask("GET", &format!("/{LASTING}"), "Accept-Encoding: br, gzip\r\n");
+    assert!(head.contains("content-encoding: gzip"), "{head}");
 }
