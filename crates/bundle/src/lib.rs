@@ -12,6 +12,7 @@
 //! | show the folder to a browser | [`server`] |
 
 pub mod files;
+mod http;
 pub mod module;
 pub mod package;
 mod references;

@@ -2,38 +2,17 @@
 //! best. It serves what is in the folder at that moment.
 
 use std::collections::HashMap;
-use std::io::Cursor;
-use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Component, Path, PathBuf};
-use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
+use std::sync::Mutex;
 
-use anyhow::{Context, Result, anyhow, bail};
-use tiny_http::{Header, Method, Request, Response};
+use anyhow::{Result, anyhow, bail};
 
+use crate::http::{Answer, Listener, Question};
 use crate::site::is_named_after_content;
 use crate::sizes::gzip;
 
-/// Requests that are answered at the same time.
-const THREADS: usize = 4;
-
 /// A running server; it ends when this is dropped.
-pub struct Server {
-    http: Arc<tiny_http::Server>,
-    threads: Vec<JoinHandle<()>>,
-    address: SocketAddr,
-}
-
-/// What is sent back.
-#[derive(Debug, PartialEq, Eq)]
-pub struct Answer {
-    /// 200, 301, 403, 404 or 405.
-    pub status: u16,
-    /// Names and values.
-    pub headers: Vec<(&'static str, String)>,
-    /// Left out where only the head is asked for.
-    pub body: Vec<u8>,
-}
+pub struct Server(Listener);
 
 /// A folder, and the smaller forms of its files, made once.
 struct Folder {
@@ -50,91 +29,30 @@ impl Server {
                 "{place}: there is no index.html in it; `cargo xtask web` makes a folder that has one"
             );
         }
-        let http = tiny_http::Server::http((Ipv4Addr::LOCALHOST, port));
-        let http = http.map_err(|e| {
+        let folder = Folder::new(folder);
+        let listener = Listener::start(port, move |question| folder.answer(question));
+        listener.map(Self).map_err(|e| {
             anyhow!("port {port} cannot be used ({e}); name another, or 0 for any that is free")
-        })?;
-        let address = http.server_addr().to_ip().context("the server has no address")?;
-        let http = Arc::new(http);
-        let folder = Arc::new(Folder::new(folder));
-        let threads = (0..THREADS).map(|_| {
-            let (http, folder) = (http.clone(), folder.clone());
-            std::thread::spawn(move || {
-                while let Ok(request) = http.recv() {
-                    answer(request, &folder);
-                }
-            })
-        });
-        Ok(Self { threads: threads.collect(), http, address })
+        })
     }
 
     /// `http://127.0.0.1:PORT/`. A browser takes that for a safe place: it allows WebGPU and service workers.
     pub fn url(&self) -> String {
-        format!("http://{}/", self.address)
+        format!("http://{}/", self.0.address())
     }
 
     /// Serves until the program is ended.
-    pub fn wait(mut self) {
-        for thread in std::mem::take(&mut self.threads) {
-            // A thread that panicked serves no more; the others do.
-            let _ = thread.join();
-        }
+    pub fn wait(self) {
+        self.0.wait();
     }
 }
 
-impl Drop for Server {
-    fn drop(&mut self) {
-        for _ in &self.threads {
-            self.http.unblock();
-        }
-        for thread in std::mem::take(&mut self.threads) {
-            // Nothing is left to be done for a thread that panicked.
-            let _ = thread.join();
-        }
-    }
-}
-
-fn answer(request: Request, folder: &Folder) {
-    let accepts = Accepts::of(&request);
-    let is_allowed = matches!(request.method(), Method::Get | Method::Head);
-    let answer = match is_allowed {
-        true => folder.answer(request.url(), accepts),
-        false => {
-            let mut answer = Answer::text(405, "405: this server only reads.\n".into());
-            answer.headers.push(("Allow", "GET, HEAD".into()));
-            answer
-        }
-    };
-    let headers = answer
-        .headers
-        .iter()
-        .filter_map(|(name, value)| Header::from_bytes(name.as_bytes(), value.as_bytes()).ok());
-    let length = answer.body.len();
-    let response = Response::new(
-        answer.status.into(),
-        headers.collect(),
-        Cursor::new(answer.body),
-        Some(length),
-        None,
-    );
-    // Whoever asked has gone; others may come.
-    let _ = request.respond(response.with_chunked_threshold(usize::MAX));
-}
-
-impl Answer {
-    fn text(status: u16, text: String) -> Self {
-        let headers = vec![
-            ("Content-Type", "text/plain; charset=utf-8".to_owned()),
-            ("Cache-Control", "no-store".to_owned()),
-        ];
-        Self { status, headers, body: text.into_bytes() }
-    }
-
-    /// A header's value.
-    pub fn header(&self, name: &str) -> Option<&str> {
-        let found = self.headers.iter().find(|(own, _)| *own == name);
-        found.map(|(_, value)| value.as_str())
-    }
+fn text(status: u16, text: String) -> Answer {
+    let headers = vec![
+        ("Content-Type", "text/plain; charset=utf-8".to_owned()),
+        ("Cache-Control", "no-store".to_owned()),
+    ];
+    Answer { status, headers, body: text.into_bytes() }
 }
 
 /// What a browser unpacks.
@@ -145,10 +63,9 @@ struct Accepts {
 }
 
 impl Accepts {
-    fn of(request: &Request) -> Self {
-        let headers = request.headers().iter();
-        let named = headers.filter(|header| header.field.equiv("Accept-Encoding"));
-        let lists: Vec<&str> = named.map(|header| header.value.as_str()).collect();
+    fn of(question: &Question) -> Self {
+        let named = question.headers.iter().filter(|(name, _)| name == "accept-encoding");
+        let lists: Vec<&str> = named.map(|(_, value)| value.as_str()).collect();
         let has = |word: &str| {
             let words = lists.iter().flat_map(|list| list.split([',', ';']));
             words.into_iter().any(|found| found.trim() == word)
@@ -162,30 +79,32 @@ impl Folder {
         Self { root: root.to_owned(), small: Mutex::default() }
     }
 
-    fn answer(&self, url: &str, accepts: Accepts) -> Answer {
-        let asked = url.split(['?', '#']).next().unwrap_or("");
+    fn answer(&self, question: &Question) -> Answer {
+        if !["GET", "HEAD"].contains(&question.method.as_str()) {
+            let mut answer = text(405, "405: this server only reads.\n".into());
+            answer.headers.push(("Allow", "GET, HEAD".into()));
+            return answer;
+        }
+        let accepts = Accepts::of(question);
+        let asked = question.url.split(['?', '#']).next().unwrap_or("");
         let Some(path) = path_of(asked) else {
-            return Answer::text(
-                403,
-                "403: there is nothing for you outside the page's folder.\n".into(),
-            );
+            return text(403, "403: there is nothing for you outside the page's folder.\n".into());
         };
         let mut file = self.root.join(&path);
         if file.is_dir() {
             if !asked.ends_with('/') {
                 // Else the page's relative references would lead beside it.
-                let mut answer = Answer::text(301, "301: with a / at the end.\n".into());
+                let mut answer = text(301, "301: with a / at the end.\n".into());
                 answer.headers.push(("Location", format!("{asked}/")));
                 return answer;
             }
             file.push("index.html");
         }
         if !self.is_inside(&file) {
-            let text = format!("404: there is no {asked} here. The page is at /.\n");
-            return Answer::text(404, text);
+            return text(404, format!("404: there is no {asked} here. The page is at /.\n"));
         }
         let Ok(content) = std::fs::read(&file) else {
-            return Answer::text(404, format!("404: {asked} cannot be read.\n"));
+            return text(404, format!("404: {asked} cannot be read.\n"));
         };
         self.found(&file, content, accepts)
     }

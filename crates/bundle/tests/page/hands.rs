@@ -1,7 +1,7 @@
 //! Hands on the tissue: mouse, fingers, keys.
 
 use crate::browser::{Kind, Tab, View};
-use crate::page::{BAR, assert_tissue, farthest, number, numbers, open, open_in};
+use crate::page::{BAR, assert_tissue, dismiss, farthest, number, numbers, open, open_in};
 
 /// A place of the window where tissue is, near the bar's free end.
 fn place_of_tissue(tab: &Tab) -> [f64; 2] {
@@ -15,13 +15,18 @@ fn place_of_tissue(tab: &Tab) -> [f64; 2] {
 
 /// Steps until it hardly moves.
 fn rest(tab: &Tab) -> Vec<f64> {
-    tab.evaluate("viscera.step(150)");
+    tab.evaluate("viscera.step(240)");
     numbers(tab, "viscera.vertices(0)")
 }
 
 fn bar_at_rest(kind: Kind, view: View) -> Option<(Tab, Vec<f64>)> {
-    let tab = open_in(kind, view, BAR)?;
+    at_rest(kind, view, BAR)
+}
+
+fn at_rest(kind: Kind, view: View, link: &str) -> Option<(Tab, Vec<f64>)> {
+    let tab = open_in(kind, view, link)?;
     tab.evaluate("viscera.pause()");
+    dismiss(&tab);
     let vertices = rest(&tab);
     Some((tab, vertices))
 }
@@ -55,7 +60,7 @@ fn a_drag_beside_the_tissue_turns_the_view() {
     let Some((tab, before)) = bar_at_rest(Kind::Plain, View::DESK) else { return };
     let picture = tab.look();
     let corner =
-        tab.evaluate("(() => { const { x, y } = viscera.pointAt(0.03, 0.9); return [x, y]; })()");
+        tab.evaluate("(() => { const { x, y } = viscera.pointAt(0.03, 0.1); return [x, y]; })()");
     let [x, y] = [number(&corner[0]), number(&corner[1])];
     tab.mouse("mousePressed", [x, y], "left");
     tab.mouse("mouseMoved", [x + 200.0, y - 60.0], "left");
@@ -111,7 +116,9 @@ fn two_fingers_zoom_the_view_and_not_the_page() {
 
 #[test]
 fn keys_hold_and_pull() {
-    let Some((tab, before)) = bar_at_rest(Kind::Plain, View::DESK) else { return };
+    // A slab on a table: it is in the middle of the picture.
+    let link = "#scene=grab&mesh=1.6&solver.device=cpu&solver.accuracy=draft";
+    let Some((tab, before)) = at_rest(Kind::Plain, View::DESK, link) else { return };
     tab.evaluate("document.getElementById('canvas-frame').focus()");
     tab.key("Enter", 0);
     tab.wait("viscera.worker.post('report').then(() => viscera.state().pull.hold > 0)", 5.0);

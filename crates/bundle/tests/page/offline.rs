@@ -81,3 +81,24 @@ fn a_build_that_is_not_whole_is_not_kept() {
     tab.reload();
     assert_eq!(version(&tab), "one");
 }
+
+#[test]
+fn a_page_of_the_older_build_keeps_its_files_beside_a_newer_one() {
+    let Some(browser) = setup::browser(Kind::Plain) else { return };
+    let probe = Probe::new();
+    let url = probe.server.url();
+    let older = browser.tab();
+    older.go(&url);
+    older.wait(IS_KEPT, 10.0);
+    let script = "[...performance.getEntriesByType('resource')].find((e) => \
+                  e.name.includes('/version.')).name";
+    let script = older.evaluate(script);
+    probe.replace("two");
+    let newer = browser.tab_in(&older.context);
+    newer.go(&url);
+    assert_eq!(version(&newer), "two");
+    newer.wait("caches.keys().then((names) => names.length === 2)", 10.0);
+    let text = older.evaluate(&format!("fetch({script}).then((r) => r.text())"));
+    assert!(text.to_string().contains("one"), "the server has it no more: {text}");
+    assert_eq!(version(&older), "one");
+}

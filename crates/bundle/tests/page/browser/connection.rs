@@ -48,7 +48,7 @@ pub struct Event {
 pub struct Child {
     page: String,
     pub session: String,
-    /// "worker", "service_worker".
+    /// "worker", "iframe".
     pub kind: String,
     pub url: String,
 }
@@ -172,7 +172,9 @@ pub const LISTEN: [(&str, &str); 4] = [
     ("Log.enable", "{}"),
     (
         "Target.setAutoAttach",
-        r#"{"autoAttach": true, "waitForDebuggerOnStart": true, "flatten": true}"#,
+        // Not service workers: they come and go, and one that waits for each tab's leave can wait for ever.
+        r#"{"autoAttach": true, "waitForDebuggerOnStart": true, "flatten": true,
+            "filter": [{"type": "service_worker", "exclude": true}, {}]}"#,
     ),
     ("Runtime.runIfWaitingForDebugger", "{}"),
 ];

@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 use serde_json::{Value, json};
 
 pub use picture::Picture;
-pub use tab::{Tab, View};
+pub use tab::{Tab, View, pause};
 
 use connection::Connection;
 

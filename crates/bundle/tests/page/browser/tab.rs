@@ -130,7 +130,7 @@ impl Tab {
                 return value.clone();
             }
             if begun.elapsed().as_secs_f64() > seconds {
-                let (value, said) = (value.unwrap_or_else(Value::from), self.said().join("\n"));
+                let (value, said) = (value.unwrap_or_else(Value::from), few(self.said()));
                 panic!("after {seconds} s `{expression}` is {value}; the page said:\n{said}");
             }
             pause(0.03);
@@ -299,15 +299,23 @@ impl Drop for Tab {
         let errors = self.errors();
         let _ = self.connection.ask("", "Target.closeTarget", json!({ "targetId": self.target }));
         if !std::thread::panicking() {
-            assert!(errors.is_empty(), "the page complained:\n{}", errors.join("\n"));
+            assert!(errors.is_empty(), "the page complained:\n{}", few(errors));
         } else if !errors.is_empty() {
-            println!("the page complained:\n{}", errors.join("\n"));
+            println!("the page complained:\n{}", few(errors));
         }
     }
 }
 
 pub fn pause(seconds: f64) {
     std::thread::sleep(Duration::from_secs_f64(seconds));
+}
+
+/// Each line once, and not all of a hundred.
+fn few(mut lines: Vec<String>) -> String {
+    let mut known = std::collections::HashSet::new();
+    lines.retain(|line| known.insert(line.clone()));
+    lines.truncate(12);
+    lines.join("\n")
 }
 
 /// As JavaScript takes it.
