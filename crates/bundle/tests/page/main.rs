@@ -3,6 +3,7 @@
 mod browser;
 mod driver;
 mod hands;
+mod native;
 mod offline;
 mod page;
 mod setup;
