@@ -1,8 +1,8 @@
 /** What the page says: short messages that go away, and cards that stand in the way. */
 
 /** How long a message stays [ms]; each character gives it a little longer, so that it can be read. */
-const SHOWN = 7000;
-const PER_CHARACTER = 45;
+const SHOWN = 5000;
+const PER_CHARACTER = 35;
 
 /** @param {string} id */
 export function byId(id) {

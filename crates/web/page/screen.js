@@ -17,6 +17,10 @@ const HURRY = 3;
 /** A sharp picture that would take longer than this is not drawn [ms]: a hand may come meanwhile. */
 const LONGEST = 80;
 
+/** Vertices that are looked at to see everything, at most, and the share of the width that they are to be in. */
+const LOOKED_AT = 2000;
+const WITHIN = 0.92;
+
 export class Screen {
   /** @type {OffscreenCanvas} */
   #canvas;
@@ -147,6 +151,24 @@ export class Screen {
 
   get #limits() {
     return this.#context ? PROCESSOR : DEVICE;
+  }
+
+  /** Looks at everything, from so far away that its width is seen as well: cameras frame by height, and phones are upright. */
+  home() {
+    this.#session.home();
+    const vertices = this.#session.vertices(0);
+    const every = 3 * Math.ceil(vertices.length / 3 / LOOKED_AT);
+    const [width, height] = this.size;
+    const across = this.#session.runs() > 1 && width >= height ? width / 2 : width;
+    // Twice: what is nearer to the viewer moves by more.
+    for (let round = 0; round < 2; round += 1) {
+      let most = 0;
+      for (let at = 0; at + 2 < vertices.length; at += every) {
+        const place = this.#session.seen(0, vertices[at], vertices[at + 1], vertices[at + 2]);
+        if (place.length > 0) most = Math.max(most, Math.abs((2 * place[0]) / across - 1));
+      }
+      if (most > WITHIN) this.#session.zoom(most / WITHIN);
+    }
   }
 
   /** The device draws on its own: when it is done is heard later. @param {number} began */

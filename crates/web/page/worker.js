@@ -113,6 +113,7 @@ function load(engine, order) {
   }
   source = next;
   if (order.beside) besides(session, order.beside, problems);
+  if (!order.again) engine.screen.home();
   const about = JSON.parse(session.loaded());
   engine.began({ frame: about.frame, measure: order.measure });
   return { ...state(engine), problems };
@@ -252,7 +253,7 @@ function look(engine, order) {
     case "zoom":
       return hands.zoom(order.factor);
     case "home":
-      return session.home();
+      return screen.home();
     case "resize":
       return screen.resize(order.width, order.height, order.ratio);
     case "theme":
