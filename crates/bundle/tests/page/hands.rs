@@ -3,6 +3,9 @@
 use crate::browser::{Kind, Tab, View};
 use crate::page::{BAR, assert_tissue, dismiss, farthest, number, numbers, open, open_in};
 
+/// A slab on a table: it is in the middle of the picture.
+const SLAB: &str = "#scene=grab&mesh=1.6&solver.device=cpu&solver.accuracy=draft";
+
 /// A place of the window where tissue is, near the bar's free end.
 fn place_of_tissue(tab: &Tab) -> [f64; 2] {
     let search = "(async () => { let last = null; for (let u = 0.05; u < 0.96; u += 0.05) \
@@ -96,7 +99,7 @@ fn a_finger_pulls_on_a_phone() {
 
 #[test]
 fn two_fingers_zoom_the_view_and_not_the_page() {
-    let Some((tab, before)) = bar_at_rest(Kind::Plain, View::PHONE) else { return };
+    let Some((tab, before)) = at_rest(Kind::Plain, View::PHONE, SLAB) else { return };
     let share = |tab: &Tab| tab.look().share([0, 0, 780, 1688], crate::page::is_flesh);
     let small = share(&tab);
     let [left, top, width, height] = tab.area("#canvas");
@@ -109,16 +112,16 @@ fn two_fingers_zoom_the_view_and_not_the_page() {
     tab.touch("touchEnd", &[]);
     tab.wait("new Promise((done) => setTimeout(() => done(true), 300))", 5.0);
     let large = share(&tab);
-    assert!(large > 1.5 * small, "{small} of the screen before, {large} after");
+    assert!(large > 1.3 * small, "{small} of the screen before, {large} after");
     assert_eq!(tab.evaluate("visualViewport.scale"), 1);
     assert!(farthest(&before, &numbers(&tab, "viscera.vertices(0)")) < 1e-9);
 }
 
 #[test]
 fn keys_hold_and_pull() {
-    // A slab on a table: it is in the middle of the picture.
-    let link = "#scene=grab&mesh=1.6&solver.device=cpu&solver.accuracy=draft";
-    let Some((tab, before)) = at_rest(Kind::Plain, View::DESK, link) else { return };
+    let Some((tab, _)) = at_rest(Kind::Plain, View::DESK, SLAB) else { return };
+    // The scene's own forceps have let go by now.
+    let before = rest(&tab);
     tab.evaluate("document.getElementById('canvas-frame').focus()");
     tab.key("Enter", 0);
     tab.wait("viscera.worker.post('report').then(() => viscera.state().pull.hold > 0)", 5.0);

@@ -9,7 +9,7 @@ pub const IS_KEPT: &str = "navigator.serviceWorker.ready.then(() => \
                        navigator.serviceWorker.controller !== null)";
 
 fn version(tab: &Tab) -> String {
-    let version = tab.wait("window.version", 10.0);
+    let version = tab.wait("window.version", 20.0);
     version.as_str().expect("a text").to_owned()
 }
 
@@ -20,7 +20,7 @@ fn the_page_opens_without_its_server() {
     let tab = browser.tab();
     let url = server.url();
     tab.go(&url);
-    tab.wait(IS_KEPT, 10.0);
+    tab.wait(IS_KEPT, 20.0);
     drop(server);
     tab.expect("ERR_CONNECTION_REFUSED");
     tab.go(&format!("{url}?scene=any"));
@@ -37,7 +37,7 @@ fn a_newer_build_is_taken_at_the_next_load_and_kept() {
     let url = probe.server.url();
     let tab = browser.tab();
     tab.go(&url);
-    tab.wait(IS_KEPT, 10.0);
+    tab.wait(IS_KEPT, 20.0);
     for newer in ["two", "three", "four"] {
         probe.replace(newer);
         tab.reload();
@@ -45,7 +45,7 @@ fn a_newer_build_is_taken_at_the_next_load_and_kept() {
         // The newest build, and at most one before it.
         let has_newest = "caches.keys().then((names) => names.length <= 2 && fetch('./index.html')\
                           .then((r) => r.text()).then((t) => names.some((n) => t.includes(n.slice(-16)))))";
-        tab.wait(has_newest, 10.0);
+        tab.wait(has_newest, 20.0);
     }
     let Probe { server, folder: _folder } = probe;
     drop(server);
@@ -61,7 +61,7 @@ fn a_build_that_is_not_whole_is_not_kept() {
     let url = probe.server.url();
     let tab = browser.tab();
     tab.go(&url);
-    tab.wait(IS_KEPT, 10.0);
+    tab.wait(IS_KEPT, 20.0);
     // A newer service worker beside the older page, as while files are copied to a server.
     let folder = probe.folder.path().join("site");
     let older = std::fs::read(folder.join("index.html")).expect("a page");
@@ -74,7 +74,7 @@ fn a_build_that_is_not_whole_is_not_kept() {
     assert_eq!(version(&tab), "one", "the older page has its older files from what was kept");
     let installs = "navigator.serviceWorker.getRegistration().then((r) => r.installing === null \
                     && r.waiting === null && caches.keys()).then((names) => names.length === 1)";
-    tab.wait(installs, 10.0);
+    tab.wait(installs, 20.0);
     let Probe { server, folder: _folder } = probe;
     drop(server);
     tab.expect("ERR_CONNECTION_REFUSED");
@@ -89,7 +89,7 @@ fn a_page_of_the_older_build_keeps_its_files_beside_a_newer_one() {
     let url = probe.server.url();
     let older = browser.tab();
     older.go(&url);
-    older.wait(IS_KEPT, 10.0);
+    older.wait(IS_KEPT, 20.0);
     let script = "[...performance.getEntriesByType('resource')].find((e) => \
                   e.name.includes('/version.')).name";
     let script = older.evaluate(script);
@@ -97,7 +97,7 @@ fn a_page_of_the_older_build_keeps_its_files_beside_a_newer_one() {
     let newer = browser.tab_in(&older.context);
     newer.go(&url);
     assert_eq!(version(&newer), "two");
-    newer.wait("caches.keys().then((names) => names.length === 2)", 10.0);
+    newer.wait("caches.keys().then((names) => names.length === 2)", 20.0);
     let text = older.evaluate(&format!("fetch({script}).then((r) => r.text())"));
     assert!(text.to_string().contains("one"), "the server has it no more: {text}");
     assert_eq!(version(&older), "one");

@@ -202,6 +202,7 @@ fn it_is_dark_where_the_system_is() {
         let [left, top, ..] = stage(tab);
         picture.at(left + 10, top + 10).map(u32::from).iter().sum::<u32>()
     };
+    wait_for_tissue(&tab);
     let light = corner(&tab);
     tab.prefers("prefers-color-scheme", "dark");
     tab.wait("document.documentElement.dataset.theme === 'dark'", 5.0);
