@@ -51,13 +51,11 @@ fn compare_bits(scenes: &[&str], mesh: f64, frames: u32) {
         let simulation = Simulation::<f32>::new(scene, assembly).expect("a simulation");
         let expected = advanced(simulation, frames);
         assert_eq!(found.len(), expected.len(), "{name}");
-        let apart = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
-        assert_eq!(
-            apart,
-            0,
-            "{name}: {apart} of {} numbers differ after {frames} frames",
-            found.len()
-        );
+        // Single precision on both sides; the last digit of a double is lost in the text between them.
+        let pairs = found.iter().map(|x| *x as f32).zip(expected.iter().map(|x| *x as f32));
+        let apart: Vec<_> = pairs.enumerate().filter(|(_, (a, b))| a != b).collect();
+        let first = &apart[..apart.len().min(3)];
+        assert!(apart.is_empty(), "{name}: {} of {} differ: {first:?}", apart.len(), found.len());
     }
 }
 
