@@ -276,8 +276,17 @@ impl Session {
         }
         let [wanted, ..] = state.measures;
         state.measures = [false, wanted, state.measures[2]];
-        state.run.send(wanted)?;
+        let sent = state.run.send(wanted);
+        self.unless_lost(sent)?;
         self.take_over(run).map(|_| ())
+    }
+
+    /// What came of a frame; nothing where the device is lost, which [`Session::lost`] says: it is computed again on the next.
+    fn unless_lost<T>(&self, result: Result<T, String>) -> Result<Option<T>, String> {
+        match result {
+            Err(_) if self.lost().is_some() => Ok(None),
+            other => other.map(Some),
+        }
     }
 
     /// Takes over the frame of one simulation; false while it is under way.
@@ -286,9 +295,11 @@ impl Session {
         if !state.run.is_under_way() {
             return Ok(true);
         }
-        if !state.run.receive()? {
+        let received = state.run.receive();
+        if self.unless_lost(received)? != Some(true) {
             return Ok(false);
         }
+        let state = self.state(run)?;
         state.frame += 1;
         if std::mem::take(&mut state.measures[1]) {
             state.run.measure()?;

@@ -228,6 +228,15 @@ impl Device {
         }
     }
 
+    /// The device is of no use any more, whatever its driver will say: word of a loss may come later than what follows
+    /// from it.
+    pub(super) fn give_up(&self, reason: String) -> GpuError {
+        if let Ok(mut lost) = self.lost.lock() {
+            lost.get_or_insert_with(|| reason.clone());
+        }
+        self.lost(reason)
+    }
+
     pub(super) fn lost(&self, reason: String) -> GpuError {
         GpuError::Lost { name: self.name.clone(), reason: reason.trim_end_matches('.').to_owned() }
     }

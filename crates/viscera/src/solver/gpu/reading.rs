@@ -53,7 +53,8 @@ impl Reading {
     /// Waits for it. Browsers forbid that: there it is an error.
     pub fn wait(&self, device: &Device) -> Result<Arrived<'_>, GpuError> {
         wait(device)?;
-        self.has_arrived(device)?.ok_or_else(|| unreadable(device))
+        let late = || device.lost("its memory cannot be waited for".into());
+        self.has_arrived(device)?.ok_or_else(late)
     }
 }
 
@@ -77,7 +78,7 @@ impl Arrived<'_> {
 }
 
 fn unreadable(device: &Device) -> GpuError {
-    device.lost("its memory could not be read".into())
+    device.give_up("its memory could not be read".into())
 }
 
 pub(super) fn staging(device: &Device, size: u64) -> wgpu::Buffer {
