@@ -15,8 +15,10 @@
 
 pub mod catalog;
 pub mod choose;
+mod hands;
 mod holds;
 mod loaded;
+mod looking;
 mod pictures;
 mod report;
 mod session;

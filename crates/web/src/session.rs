@@ -4,11 +4,8 @@ use viscera::material::PRESETS;
 use viscera::scalar::Vec3;
 use viscera::scene::{BodyShape, Scene};
 use viscera::solver::gpu::Device;
-use viscera_picture::{HALF_OPENING, ViewDirection};
 use viscera_render::Orbit;
-use viscera_stage::{
-    Area, Coloring, GripTarget, HoldId, Legend, Lens, Run, RunSnapshot, Settings, build, pick,
-};
+use viscera_stage::{Coloring, GripTarget, HoldId, Legend, Run, RunSnapshot, Settings, build};
 
 use crate::catalog::law_name;
 use crate::holds::Hand;
@@ -20,9 +17,6 @@ pub const MOST_TETS: usize = 100_000;
 
 /// The largest file that a page takes [bytes]: text of a mesh of some hundred thousand tetrahedra.
 pub const MOST_FILE_BYTES: u64 = 64 << 20;
-
-/// Angle that the view turns by for a drag across its height [degrees].
-const TURN: f64 = 200.0;
 
 /// How hands take hold.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +36,7 @@ impl Default for Grip {
 
 /// Something that a hand does.
 #[derive(Clone, Copy, Debug)]
-enum Act {
+pub(crate) enum Act {
     Take(HoldId, GripTarget),
     Lead(HoldId, Vec3<f64>),
     LetGo(HoldId),
@@ -55,7 +49,7 @@ pub(crate) struct RunState {
     /// Of the snapshot: each has another number.
     pub moved: u64,
     frame: u64,
-    waiting: Vec<Act>,
+    pub(crate) waiting: Vec<Act>,
     /// Whether the next frame is to be measured, the one under way is, and any was.
     measures: [bool; 3],
 }
@@ -65,13 +59,13 @@ pub struct Session {
     device: Option<Device>,
     pub(crate) loaded: Option<Loaded>,
     pub(crate) runs: Vec<RunState>,
-    hands: Vec<Hand>,
-    grip: Grip,
+    pub(crate) hands: Vec<Hand>,
+    pub(crate) grip: Grip,
     pub(crate) coloring: Coloring,
     pub(crate) legend: Legend,
     pub(crate) wireframe: bool,
     pub(crate) dark: bool,
-    orbit: Orbit,
+    pub(crate) orbit: Orbit,
     pub(crate) extent: f64,
     /// Width and height [pixels].
     pub(crate) size: [u32; 2],
@@ -325,80 +319,6 @@ impl Session {
         Report { time: frame as f64 * duration, frame, runs: self.runs.iter().map(of).collect() }
     }
 
-    /// How hands take hold from now on.
-    pub fn set_grip(&mut self, grip: Grip) {
-        self.grip = grip;
-    }
-
-    /// Takes hold of what is seen at a place [pixels]; false where nothing is.
-    pub fn grab(&mut self, id: HoldId, place: [f64; 2]) -> Result<bool, String> {
-        let lenses = self.lenses();
-        let found = lenses.iter().position(|lens| lens.area.contains(place));
-        let Some((run, loaded)) = found.zip(self.loaded.as_ref()) else { return Ok(false) };
-        let Some(state) = self.runs.get(run) else { return Ok(false) };
-        let (from, direction) = (lenses[run].orbit.position(), lenses[run].ray(place));
-        match pick(&loaded.assembly, &state.snapshot, from, direction) {
-            Some(hit) => self.take(id, run, &hit).map(|()| true),
-            None => Ok(false),
-        }
-    }
-
-    /// Takes hold of the first simulation's tissue nearest to a point [m]; false where it is a centimetre and more away.
-    pub fn grab_at(&mut self, id: HoldId, point: Vec3<f64>) -> Result<bool, String> {
-        const NEAR: f64 = 0.01;
-        let Some((loaded, state)) = self.loaded.as_ref().zip(self.runs.first()) else {
-            return Ok(false);
-        };
-        let found = viscera_stage::pick_near(&loaded.assembly, &state.snapshot, point, NEAR);
-        let Some(hit) = found else { return Ok(false) };
-        // Led from where it was asked for, not from the tissue's nearest point.
-        self.take(id, 0, &viscera_stage::Pick { point, ..hit }).map(|()| true)
-    }
-
-    fn take(&mut self, id: HoldId, run: usize, hit: &viscera_stage::Pick) -> Result<(), String> {
-        self.release(id)?;
-        let Grip { count, stiffness } = self.grip;
-        let target = GripTarget { body: hit.body, rest: hit.rest, count, stiffness };
-        self.act(Act::Take(id, target))?;
-        self.hands.push(Hand { id, run, taken: hit.point });
-        self.look()
-    }
-
-    /// Leads a hand to a place [pixels] in the plane of the picture.
-    pub fn lead(&mut self, id: HoldId, place: [f64; 2]) -> Result<(), String> {
-        let Some(hand) = self.hands.iter().find(|hand| hand.id == id).copied() else {
-            return Ok(());
-        };
-        let way = self.lenses().get(hand.run).and_then(|lens| hand.way_to(lens, place));
-        way.map_or(Ok(()), |way| self.act(Act::Lead(id, way)))
-    }
-
-    /// Leads a hand so far from where it took hold [m].
-    pub fn lead_by(&mut self, id: HoldId, way: Vec3<f64>) -> Result<(), String> {
-        self.act(Act::Lead(id, way))
-    }
-
-    /// Lets go; nothing happens where there is no such hand.
-    pub fn release(&mut self, id: HoldId) -> Result<(), String> {
-        let before = self.hands.len();
-        self.hands.retain(|hand| hand.id != id);
-        if self.hands.len() == before { Ok(()) } else { self.act(Act::LetGo(id)) }
-    }
-
-    /// The force [N] with which a hand pulls at the first simulation.
-    pub fn force(&self, id: HoldId) -> Vec3<f64> {
-        let held = self.runs.first().into_iter().flat_map(|state| &state.snapshot.held);
-        held.filter(|hold| hold.id == id).map(|hold| hold.force).next().unwrap_or_default()
-    }
-
-    fn act(&mut self, act: Act) -> Result<(), String> {
-        for state in &mut self.runs {
-            state.waiting.push(act);
-            state.act_out()?;
-        }
-        Ok(())
-    }
-
     /// The first simulation as a scene file that repeats everything done by hand since it began.
     pub fn replay(&self) -> Result<String, String> {
         let (Some(loaded), Some(state)) = (&self.loaded, self.runs.first()) else {
@@ -407,67 +327,21 @@ impl Session {
         Ok(loaded.scene.text() + &state.run.done_by_hand().0)
     }
 
-    /// Turns the view for a drag [pixels].
-    pub fn turn(&mut self, dx: f64, dy: f64) {
-        let height = f64::from(self.size[1].max(1));
-        self.orbit.turn(-TURN * dx / height, TURN * dy / height);
-    }
-
-    /// Moves what is looked at with a drag [pixels].
-    pub fn pan(&mut self, dx: f64, dy: f64) {
-        let height = f64::from(self.size[1].max(1));
-        self.orbit.pan(dx / height, -dy / height);
-    }
-
-    /// Goes nearer (a factor below 1) or farther.
-    pub fn zoom(&mut self, factor: f64) {
-        self.orbit.zoom(factor);
-    }
-
-    /// Looks at everything from where the scene wants to be seen.
-    pub fn home(&mut self) {
-        let Some(loaded) = &self.loaded else { return };
-        self.orbit = Orbit::framing(loaded.assembly.builder.positions());
-        self.extent = 2.0 * self.orbit.distance * HALF_OPENING;
-        let direction = ViewDirection::from_vector(loaded.scene.output.view_from);
-        (self.orbit.azimuth, self.orbit.elevation) = (direction.azimuth, direction.elevation);
-    }
-
-    /// The size of the picture [pixels].
-    pub fn resize(&mut self, width: u32, height: u32) {
-        self.size = [width, height].map(|side| side.clamp(1, 8192));
-    }
-
-    /// What colours show.
-    pub fn color(&mut self, kind: &str) -> Result<(), String> {
-        self.coloring = match kind {
-            "tissue" => Coloring::Plain,
-            "displacement" => Coloring::Displacement,
-            "strain" => Coloring::Strain,
-            "stress" => Coloring::Stress,
-            other => {
-                return Err(format!(
-                    "colours show tissue, displacement, strain or stress, not `{other}`"
-                ));
-            }
-        };
-        self.look()
-    }
-
-    /// The scale of the colours: the upper end and its text; nothing for plain tissue.
-    pub fn legend(&self) -> Option<(String, f32, String)> {
-        let [_, high] = self.legend.range()?;
-        Some((self.legend.title().to_owned(), high, self.legend.text(high)))
-    }
-
-    /// Whether the triangles' edges are drawn.
-    pub fn show_wireframe(&mut self, on: bool) {
-        self.wireframe = on;
-    }
-
-    /// Whether the ground behind is dark.
-    pub fn set_dark(&mut self, dark: bool) {
-        self.dark = dark;
+    /// Sweeps, dispatches and multipliers of a frame of the first simulation, were it on a graphics processor; nothing where
+    /// none computes its method.
+    pub fn frame_cost(&self) -> Option<[u64; 3]> {
+        let (state, loaded) = (self.runs.first()?, self.loaded.as_ref()?);
+        let settings = state.run.solver();
+        if settings.method != viscera::settings::Method::Xpbd {
+            return None;
+        }
+        let model = loaded.assembly.builder.build::<f32>().ok()?;
+        let [before, each, after] =
+            viscera::solver::gpu::GpuSolver::dispatches_of(&model, settings);
+        let (steps, sweeps) = (u64::from(settings.substeps()), u64::from(settings.iterations()));
+        let dispatches = before as u64 + sweeps * each as u64 + after as u64;
+        let layout = viscera::layout::Layout::new(&model, settings);
+        Some([steps * sweeps, steps * dispatches, layout.multiplier_count as u64])
     }
 
     /// The surface's vertices [m] of one simulation.
@@ -490,40 +364,8 @@ impl Session {
         self.loaded.as_ref().map_or_else(Vec::new, Loaded::triangles)
     }
 
-    /// From where [m] and in which direction the viewer looks through a place [pixels].
-    pub fn ray(&self, place: [f64; 2]) -> (Vec3<f64>, Vec3<f64>) {
-        let lenses = self.lenses();
-        let lens = lenses.iter().find(|lens| lens.area.contains(place)).or(lenses.first());
-        lens.map_or_else(Default::default, |lens| (lens.orbit.position(), lens.ray(place)))
-    }
-
-    /// Where a point [m] is seen in the picture of a simulation [pixels]; nothing where it is behind the viewer.
-    pub fn seen(&self, run: usize, point: Vec3<f64>) -> Option<[f64; 2]> {
-        self.lenses().get(run)?.place(point)
-    }
-
-    /// The part of the picture, and the camera, of each simulation: beside each other where it is wide, else one above the
-    /// other.
-    pub(crate) fn lenses(&self) -> Vec<Lens> {
-        let [width, height] = self.size.map(f64::from);
-        let count = self.runs.len().max(1);
-        let share = 1.0 / count as f64;
-        let area = |number: usize| match width >= height {
-            true => {
-                Area { left: number as f64 * share * width, top: 0.0, width: share * width, height }
-            }
-            false => Area {
-                left: 0.0,
-                top: number as f64 * share * height,
-                width,
-                height: share * height,
-            },
-        };
-        (0..count).map(|number| Lens::new(&self.orbit, area(number), 0.0)).collect()
-    }
-
     /// Looks at all simulations as they are now.
-    fn look(&mut self) -> Result<(), String> {
+    pub(crate) fn look(&mut self) -> Result<(), String> {
         (0..self.runs.len()).for_each(|number| self.look_at(number));
         Ok(())
     }
@@ -546,7 +388,7 @@ impl RunState {
     }
 
     /// Does what hands wanted while a frame was under way: between frames, as a replay will.
-    fn act_out(&mut self) -> Result<(), String> {
+    pub(crate) fn act_out(&mut self) -> Result<(), String> {
         if self.run.is_under_way() {
             return Ok(());
         }

@@ -200,3 +200,40 @@ fn pictures_without_a_device_show_tissue_where_it_is() {
         }
     }
 }
+
+/// The table of docs/web.md: what a frame of XPBD moves and sends on a graphics processor. Prints it anew where it is not
+/// the one that stands there.
+#[test]
+fn the_budget_of_phones_is_that_of_the_plan() {
+    let mut rows = Vec::new();
+    for mesh in [2.0, 1.6, 1.25, 1.0, 0.8, 0.65] {
+        let mut session = Session::new(None);
+        let settings = [("solver.method", "xpbd"), ("solver.device", "cpu")];
+        session
+            .load(&request("liver_retraction", &settings, mesh), &mut no_files)
+            .expect("a scene");
+        let loaded = session.loaded().expect("a scene");
+        rows.push(budget_row(&session, loaded.tets, loaded.vertices));
+    }
+    let table = rows.join("\n");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/web.md");
+    let document = std::fs::read_to_string(path).expect("docs/web.md");
+    assert!(document.contains(&table), "docs/web.md has another table than\n{table}");
+}
+
+/// Compulsory bytes of a sweep, as docs/gpu.md counts them: 60 for each tetrahedron, each multiplier and each vertex read and
+/// written once.
+fn budget_row(session: &Session, tets: usize, vertices: usize) -> String {
+    let [sweeps, dispatches, multipliers] = session.frame_cost().expect("XPBD");
+    let bytes =
+        sweeps as f64 * (60 * tets + 2 * 4 * multipliers as usize + 2 * 16 * vertices) as f64;
+    let milliseconds = |bandwidth: f64| 1e3 * bytes / bandwidth;
+    // A dispatch that waits for the one before it, as the library reckons.
+    let waiting = dispatches as f64 * 4e-3;
+    format!(
+        "| {tets} | {sweeps} | {dispatches} | {:.1} MB | {waiting:.1} ms | {:.2} ms | {:.2} ms |",
+        1e-6 * bytes,
+        milliseconds(50e9),
+        milliseconds(100e9)
+    )
+}

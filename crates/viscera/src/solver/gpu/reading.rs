@@ -58,6 +58,14 @@ impl Reading {
     }
 }
 
+/// What was asked for behind the last step of a solver.
+#[derive(Debug, Default)]
+pub(super) struct Sent {
+    pub awaited: Option<Reading>,
+    /// What the force balance of the last step is made of, once it is there.
+    pub balance: Option<Vec<Vec<u8>>>,
+}
+
 /// A copy that is there.
 pub(super) struct Arrived<'a>(&'a Reading);
 

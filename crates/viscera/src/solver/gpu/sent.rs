@@ -2,18 +2,10 @@
 
 use super::error::GpuError;
 use super::frames::balance_slots;
-use super::reading::Reading;
+use super::reading::{Reading, Sent};
 use super::solver::GpuSolver;
 use crate::model::Model;
 use crate::state::State;
-
-/// What was asked for behind the last step.
-#[derive(Debug, Default)]
-pub(super) struct Sent {
-    awaited: Option<Reading>,
-    /// What the force balance of the last step is made of, once it is there.
-    pub balance: Option<Vec<Vec<u8>>>,
-}
 
 impl GpuSolver {
     /// Asks for what [`GpuSolver::read_frame`] reads of the state behind the last step and, where `with_balance`, for
@@ -43,10 +35,5 @@ impl GpuSolver {
         })?;
         self.sent = Sent { awaited: None, balance: Some(balance).filter(|all| !all.is_empty()) };
         Ok(Some(rejected))
-    }
-
-    /// What was asked for belongs to an earlier step now.
-    pub(super) fn forget_sent(&mut self) {
-        self.sent = Sent::default();
     }
 }

@@ -8,9 +8,9 @@ use super::kernels;
 use super::layout::DeviceLayout;
 use super::limits::{JOB_STRIDE, MOST_GROUPS};
 use super::parts::{Falls, SmallSteps};
+use super::reading::Sent;
 use super::record::{Dispatch, Recorder};
 use super::ring::Frames;
-use super::sent::Sent;
 use super::slots::{Slot, Update};
 use super::stages::StageRange;
 use super::uniforms::{FrameConstants, Job};
@@ -273,7 +273,7 @@ impl GpuSolver {
     }
 
     fn put(&mut self, layout: &Layout<f32>, state: &State<f32>) {
-        self.forget_sent();
+        self.sent = Sent::default();
         let places = in_solver_order(layout, &state.positions);
         let mut unknowns = vec![0.0f32; self.buffers.length as usize];
         let (positions, multipliers) =

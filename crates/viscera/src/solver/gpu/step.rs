@@ -76,7 +76,7 @@ impl GpuSolver {
         let layout = self.layout_of(model)?;
         let model = &*layout;
         crate::solver::inputs::check_step(dt, model, inputs)?;
-        self.forget_sent();
+        self.sent = Default::default();
         let count = match &self.stability {
             // One small step: the step itself.
             None => 1,
