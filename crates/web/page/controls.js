@@ -165,7 +165,7 @@ export class Controls {
       rows.push(this.#mesh.element);
     } else this.#mesh = null;
     return [...rows, gravity.element, make("div", { class: "chips" }, make("label", { class: "file" }, "Open a mesh or scene…", input)),
-      make("p", {}, "Or drop it anywhere: Gmsh (1, 2.2), VTU, OBJ, or a scene file with its meshes. Your files stay on this device.")];
+      make("p", {}, "Or drop it anywhere: tetrahedra as Gmsh (1, 2.2) or VTU, or a scene file with its meshes and surfaces (OBJ). Your files stay on this device.")];
   }
 
   /** @param {any} body */

@@ -17,7 +17,7 @@ function megabytes(bytes) {
  * @returns {Promise<Own[]>}
  */
 export async function readFiles(files, most) {
-  if (files.length === 0) throw new Error("There was no file in what was dropped: drop a mesh (.msh, .vtu, .obj) or a scene (.toml).");
+  if (files.length === 0) throw new Error("There was no file in what was dropped: drop a mesh of tetrahedra (.msh, .vtu) or a scene (.toml).");
   const size = files.reduce((sum, file) => sum + file.size, 0);
   if (size > most) {
     const name = files.length === 1 ? `“${files[0].name}” has` : "These files have";
