@@ -114,7 +114,7 @@ fn needs(all: bool) -> impl Iterator<Item = &'static Need> {
     FAST.iter().chain(second).filter(move |need| linux || !is_driver(need))
 }
 
-/// Says what it is about to do; asks where somebody can answer.
+/// Prints the commands, and asks first in a terminal.
 pub fn install(name: &str, commands: Vec<Vec<String>>) {
     let lines: Vec<String> = commands.iter().map(|words| words.join(" ")).collect();
     println!("There is no {name}. To install it:\n    {}", lines.join("\n    "));

@@ -18,7 +18,7 @@ Usage: cargo xtask web [--serve [PORT]]
   --serve [PORT]     serve the page on this machine afterwards, until Ctrl-C [default: 8080; 0: any free port]
 
 It takes a compiler for wasm32-unknown-unknown and installs one where it is missing, as rustup's target or, where
-rustup cannot, as Debian's packages; it says so first, and asks where somebody sits at the terminal. wasm-opt
+rustup cannot, as Debian's packages; it says so first, and in a terminal it asks. wasm-opt
 makes the module smaller where it is on the PATH. docs/web.md says how to host and embed the page.";
 
 const TARGET: &str = "wasm32-unknown-unknown";

@@ -23,7 +23,17 @@ pub fn pick(
     from: Vec3<f64>,
     direction: Vec3<f64>,
 ) -> Option<Pick> {
-    let mut nearest = f64::INFINITY;
+    nearest(assembly, run, f64::INFINITY, |corners| meet(corners, from, direction))
+}
+
+/// The point of the surfaces, as they are in a frame, that is nearest and nearer than `within` [m]. `measure` says how far a
+/// triangle is, with the weights of its corners there, or nothing.
+fn nearest(
+    assembly: &Assembly,
+    run: &RunSnapshot,
+    mut within: f64,
+    measure: impl Fn([Vec3<f64>; 3]) -> Option<(f64, [f64; 3])>,
+) -> Option<Pick> {
     let mut found = None;
     for (number, body) in assembly.bodies.iter().enumerate() {
         let tissue = run.positions.get(body.vertices.clone())?;
@@ -31,15 +41,11 @@ pub fn pick(
         body.embedding.apply(tissue, &mut surface).ok()?;
         for triangle in &body.surface.triangles {
             let corners = triangle.map(|v| surface[v as usize].cast::<f64>());
-            let Some((distance, weights)) = meet(corners, from, direction) else { continue };
-            if distance < nearest {
-                nearest = distance;
-                let rest = triangle.map(|v| body.surface.vertices[v as usize]);
-                found = Some(Pick {
-                    body: number,
-                    point: from + direction * distance,
-                    rest: rest[0] * weights[0] + rest[1] * weights[1] + rest[2] * weights[2],
-                });
+            let Some((distance, weights)) = measure(corners) else { continue };
+            if distance < within {
+                within = distance;
+                let rest = weighted(triangle.map(|v| body.surface.vertices[v as usize]), weights);
+                found = Some(Pick { body: number, point: weighted(corners, weights), rest });
             }
         }
     }
@@ -68,33 +74,18 @@ fn meet(corners: [Vec3<f64>; 3], from: Vec3<f64>, d: Vec3<f64>) -> Option<(f64, 
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some((t, [1.0 - u - v, u, v]))
 }
 
-/// The point of the surfaces that is nearest to another one, as they are in a frame; nothing where it is farther than
-/// `within` [m].
+/// The point of the surfaces that is nearest to another one, as they are in a frame; nothing where it is not nearer
+/// than `within` [m].
 pub fn pick_near(
     assembly: &Assembly,
     run: &RunSnapshot,
     point: Vec3<f64>,
     within: f64,
 ) -> Option<Pick> {
-    let mut nearest = within;
-    let mut found = None;
-    for (number, body) in assembly.bodies.iter().enumerate() {
-        let tissue = run.positions.get(body.vertices.clone())?;
-        let mut surface = vec![Vec3::<f32>::ZERO; body.surface.vertices.len()];
-        body.embedding.apply(tissue, &mut surface).ok()?;
-        for triangle in &body.surface.triangles {
-            let corners = triangle.map(|v| surface[v as usize].cast::<f64>());
-            let weights = nearest_weights(corners, point);
-            let place = weighted(corners, weights);
-            let distance = (place - point).length();
-            if distance <= nearest {
-                nearest = distance;
-                let rest = weighted(triangle.map(|v| body.surface.vertices[v as usize]), weights);
-                found = Some(Pick { body: number, point: place, rest });
-            }
-        }
-    }
-    found
+    nearest(assembly, run, within, |corners| {
+        let weights = nearest_weights(corners, point);
+        Some(((weighted(corners, weights) - point).length(), weights))
+    })
 }
 
 fn weighted([a, b, c]: [Vec3<f64>; 3], weights: [f64; 3]) -> Vec3<f64> {

@@ -1,4 +1,4 @@
-//! What the page is told, as JSON.
+//! Reports for the page, as JSON.
 
 use serde::Serialize;
 use viscera::settings::{Acceleration, Elements, Method, SolverSettings};

@@ -105,6 +105,30 @@ fn a_finger_leads_what_it_has_grabbed() {
     assert!(session.report().runs[0].held.is_empty());
 }
 
+/// A pull at one edge of a slab that lies on a table reaches the other edge as theory says, and the table's side not at all: in
+/// a layer of height h that is held below, what a pull does falls with the distance d as exp(-pi d / 2 h), the lowest mode of
+/// shear; at a free edge it is reflected, which doubles it.
+#[test]
+fn the_far_side_stays_where_it_is() {
+    let mut session = session("grab", &[], 1.6);
+    // The scene's own forceps have let go by then, and the slab is calm to a thousandth of a millimetre.
+    frames(&mut session, 900);
+    let before = session.vertices(0).expect("a run").to_vec();
+    assert!(session.grab_at(2, vec3(0.0, 0.05, 0.05)).expect("a hand"), "the edge is not grabbed");
+    session.lead_by(2, vec3(0.0, 0.0, 0.015)).expect("led");
+    frames(&mut session, 60);
+    let farthest = |is_meant: fn(&Vec3<f32>) -> bool| {
+        let pairs = before.iter().zip(session.vertices(0).expect("a run"));
+        let moved = pairs.filter(|(a, _)| is_meant(a)).map(|(a, b)| (*a - *b).length());
+        f64::from(moved.fold(0.0, f32::max))
+    };
+    // The hand holds up to 35 mm from its edge, the other one is at 100 mm; the slab is 50 mm high.
+    let (near, far) = (farthest(|x| x.x < 0.035), farthest(|x| x.x > 0.09));
+    let share = 2.0 * (-std::f64::consts::PI * 0.065 / 0.1).exp();
+    assert!(near > 0.01 && far < share * near, "{near} m beside the hand, {far} m on the far side");
+    assert_eq!(farthest(|x| x.z <= 0.0), 0.0, "the table holds");
+}
+
 #[test]
 fn two_methods_beside_each_other_are_held_by_one_hand() {
     let mut session = session("cantilever", &[], 1.6);

@@ -35,7 +35,7 @@ Usage: cargo xtask test [OPTIONS]
   --no-setup    Install nothing. What cannot be tested then is left out, and said at the end
 
 A graphics driver, rustfmt and clippy are installed where they are missing and that is possible; it says so
-first, and asks where somebody sits at the terminal. `cargo xtask setup` does that alone.
+first, and in a terminal it asks. `cargo xtask setup` does that alone.
 
 At the end stand the time of every test program and the ten slowest tests. docs/testing.md says how to add a
 slow test and how to see whether a test can fail.";

@@ -15,7 +15,7 @@ pub fn open(kind: Kind, link: &str) -> Option<Tab> {
     open_in(kind, View::DESK, link)
 }
 
-/// The same for what somebody else looks through.
+/// The same in a window of another size, or on a phone's screen.
 pub fn open_in(kind: Kind, view: View, link: &str) -> Option<Tab> {
     let (tab, url) = setup::page(kind)?;
     tab.view(view);

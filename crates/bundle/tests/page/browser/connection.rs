@@ -112,7 +112,7 @@ impl Connection {
         let mut text = message.to_string().into_bytes();
         text.push(0);
         let mut pipe = self.0.pipe.lock().unwrap_or_else(PoisonError::into_inner);
-        // Where the browser has ended, whoever waits for the answer is told.
+        // Where the browser has ended, every open question gets an error.
         let _ = pipe.write_all(&text).and_then(|()| pipe.flush());
         id
     }
