@@ -56,6 +56,10 @@ fn a_replay_has_the_same_bits_and_forces() {
         }
         frames(&mut by_hand, 1);
         forces.push(by_hand.force(1).length());
+        // What the page shows is the same number.
+        let report = by_hand.report();
+        let [x, y, z] = report.runs[0].held[0].force;
+        assert_eq!(vec3(x, y, z), by_hand.force(1));
     }
     by_hand.release(1).expect("let go");
     frames(&mut by_hand, 10);
@@ -178,6 +182,20 @@ fn what_is_wrong_is_refused_and_what_runs_goes_on() {
     frames(&mut session, 1);
     assert_ne!(session.vertices(0).expect("a run"), before);
     assert!(Session::new(None).set(0, &Vec::new()).expect_err("nothing").contains("load first"));
+}
+
+/// What the solver cannot go on with is said, and does not stand still in silence.
+#[test]
+fn a_simulation_that_runs_away_says_so() {
+    let mut session = session("cantilever", &[("solver.method", "quasi_newton")], 1.6);
+    frames(&mut session, 2);
+    session.set_grip(viscera_web::Grip { count: 8, stiffness: None });
+    assert!(session.grab_at(1, vec3(0.2, 0.0, 0.025)).expect("a hand"), "the tip is not grabbed");
+    session.lead_by(1, vec3(1e30, 0.0, 0.0)).expect("led, out of the world");
+    let error = (0..10).find_map(|_| session.advance(0).err()).expect("it runs away");
+    assert!(error.contains("diverged") && error.contains("substeps"), "{error}");
+    session.reset().expect("from rest");
+    frames(&mut session, 2);
 }
 
 #[test]

@@ -364,7 +364,11 @@ fn without_places(mut scene: Scene) -> Scene {
 #[test]
 fn a_scene_as_text_says_the_same() {
     for (name, text) in SHIPPED.into_iter().chain([("full.toml", EVERYTHING)]) {
-        let overrides = [("solver.iterations", "7"), ("world.gravity", "1.5 m/s^2")];
+        let overrides = [
+            ("solver.iterations", "7"),
+            ("world.gravity", "1.5 m/s^2"),
+            ("solver.step_guard", "false"),
+        ];
         let scene = Scene::parse(name, text, &overrides).unwrap_or_else(|e| panic!("{e}"));
         let written = scene.text();
         let again = Scene::parse(name, &written, &[]).unwrap_or_else(|e| panic!("{e}\n{written}"));
