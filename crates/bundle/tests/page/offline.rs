@@ -42,9 +42,14 @@ fn a_newer_build_is_taken_at_the_next_load_and_kept() {
         probe.replace(newer);
         tab.reload();
         assert_eq!(version(&tab), newer);
-        // The newest build, and at most one before it.
-        let has_newest = "caches.keys().then((names) => names.length <= 2 && fetch('./index.html')\
-                          .then((r) => r.text()).then((t) => names.some((n) => t.includes(n.slice(-16)))))";
+        // The newest build, whole, and at most one before it. What is still being kept has a name already;
+        // a browser joins the next look for a newer build with one that still runs.
+        let has_newest = "navigator.serviceWorker.getRegistration().then(async (r) => {
+            const names = await caches.keys();
+            const page = await (await fetch('./index.html')).text();
+            const isWhole = !r.installing && !r.waiting && r.active.state === 'activated';
+            return isWhole && names.length <= 2 && names.some((n) => page.includes(n.slice(-16)));
+        })";
         tab.wait(has_newest, 20.0);
     }
     let Probe { server, folder: _folder } = probe;

@@ -35,7 +35,7 @@ pub fn dismiss(tab: &Tab) {
     tab.evaluate("document.querySelectorAll('#messages button').forEach((b) => b.click())");
 }
 
-/// Looks until there is tissue to be seen.
+/// Looks until there is tissue to be seen: a browser shows what was drawn when it comes to it.
 pub fn wait_for_tissue(tab: &Tab) -> Picture {
     let begun = Instant::now();
     loop {
@@ -64,7 +64,7 @@ pub fn number(value: &Value) -> f64 {
 }
 
 /// The page's picture has tissue, neither a trace of it nor nothing else.
-pub fn assert_tissue(tab: &Tab, picture: &Picture) {
+fn assert_tissue(tab: &Tab, picture: &Picture) {
     let share = share_of_tissue(tab, picture);
     assert!((0.03..0.7).contains(&share), "{share} of the picture is tissue");
 }
@@ -94,9 +94,7 @@ pub fn farthest(a: &[f64], b: &[f64]) -> f64 {
 fn it_shows_tissue() {
     let Some(tab) = open(Kind::Gpu, "") else { return };
     assert_eq!(tab.evaluate("viscera.state().screen.plain"), false, "drawn by the device");
-    let picture = tab.look();
-    picture.save("desk");
-    assert_tissue(&tab, &picture);
+    wait_for_tissue(&tab).save("desk");
 }
 
 /// The one that everybody can run in a few seconds.
@@ -104,9 +102,7 @@ fn it_shows_tissue() {
 fn short_look_at_it_without_webgpu() {
     let Some(tab) = open(Kind::Plain, BAR) else { return };
     assert_eq!(tab.evaluate("viscera.state().screen.plain"), true, "drawn by the processor");
-    let picture = tab.look();
-    picture.save("without_webgpu");
-    assert_tissue(&tab, &picture);
+    wait_for_tissue(&tab).save("without_webgpu");
     let said = tab.evaluate("viscera.state().log.map((message) => message.text).join()");
     let said = said.as_str().expect("a text");
     assert!(said.contains("WebGPU") && said.contains("CPU"), "people are told why: {said}");
@@ -120,7 +116,7 @@ fn it_looks_alike_with_and_without_webgpu() {
         tab.evaluate("viscera.worker.post('reset')");
         tab.evaluate("viscera.step(40)");
         dismiss(&tab);
-        let picture = tab.look();
+        let picture = wait_for_tissue(&tab);
         picture.save(if kind == Kind::Gpu { "bar_gpu" } else { "bar_cpu" });
         let area = stage(&tab);
         let flesh: Vec<[usize; 2]> =

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::browser::{Kind, Tab, pause};
-use crate::page::{BAR, assert_tissue, begin, farthest, number, numbers, open, wait_for_tissue};
+use crate::page::{BAR, begin, farthest, number, numbers, open, wait_for_tissue};
 use crate::setup;
 
 /// Everything that the page has said.
@@ -51,7 +51,7 @@ fn the_simulation_goes_on_when_the_device_is_lost() {
     assert!(farthest(&before, &numbers(&tab, "viscera.vertices(0)")) < 1e-9, "where it was");
     tab.evaluate("viscera.step(3)");
     assert!(farthest(&before, &numbers(&tab, "viscera.vertices(0)")) > 1e-6, "and goes on");
-    assert_tissue(&tab, &tab.look());
+    wait_for_tissue(&tab);
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn a_simulation_on_a_lost_device_goes_on() {
     tab.evaluate("viscera.frame(3)");
     let later = number(&tab.evaluate("viscera.state().time"));
     assert!(later > time, "{time} s, then {later} s");
-    assert_tissue(&tab, &tab.look());
+    wait_for_tissue(&tab);
 }
 
 #[test]
@@ -132,9 +132,7 @@ fn a_mesh_that_is_dropped_moves() {
     assert_eq!(tab.evaluate("viscera.state().own"), "cube.msh", "{}", said(&tab));
     assert_eq!(tab.evaluate("viscera.state().loaded.tets"), 162);
     tab.evaluate("viscera.frame(3)");
-    let picture = tab.look();
-    picture.save("own_mesh");
-    assert_tissue(&tab, &picture);
+    wait_for_tissue(&tab).save("own_mesh");
 }
 
 #[test]
@@ -167,5 +165,5 @@ fn the_page_works_without_its_server_after_the_first_visit() {
     tab.reload();
     begin(&tab);
     assert_eq!(tab.evaluate("viscera.state().loaded.name"), "cantilever");
-    assert_tissue(&tab, &tab.look());
+    wait_for_tissue(&tab);
 }
