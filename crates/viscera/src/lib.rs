@@ -45,6 +45,7 @@
 //! move.
 
 pub mod coloring;
+pub mod contact;
 pub mod elements;
 pub mod layout;
 pub mod material;

@@ -18,22 +18,25 @@ pub struct BoundarySurface {
     pub tets: Vec<u32>,
 }
 
-/// The faces that belong to one tetrahedron only.
-pub fn boundary_surface(mesh: &TetMesh) -> BoundarySurface {
-    let sides = sorted_face_sides(mesh.tets());
+/// The faces of tetrahedra that belong to one of them only, with its number, wound outwards; by tetrahedron.
+pub fn boundary_faces(tets: &[[u32; 4]]) -> Vec<(u32, [u32; 3])> {
+    let sides = sorted_face_sides(tets);
     let mut outer: Vec<(u32, u8)> = sides
         .chunk_by(|a, b| a.key == b.key)
         .filter(|sides| sides.len() == 1)
         .map(|sides| (sides[0].tet, sides[0].face))
         .collect();
     outer.sort_unstable();
+    let corners = |face: u8, tet: u32| TET_FACES[face as usize].map(|c| tets[tet as usize][c]);
+    outer.into_iter().map(|(tet, face)| (tet, corners(face, tet))).collect()
+}
 
-    let corners = |&(tet, face): &(u32, u8)| {
-        TET_FACES[face as usize].map(|corner| mesh.tets()[tet as usize][corner])
-    };
+/// The faces that belong to one tetrahedron only.
+pub fn boundary_surface(mesh: &TetMesh) -> BoundarySurface {
+    let outer = boundary_faces(mesh.tets());
     let mut on_boundary = vec![false; mesh.vertices().len()];
     for side in &outer {
-        for vertex in corners(side) {
+        for vertex in side.1 {
             on_boundary[vertex as usize] = true;
         }
     }
@@ -48,7 +51,7 @@ pub fn boundary_surface(mesh: &TetMesh) -> BoundarySurface {
             vertices: mesh_vertices.iter().map(|&v| mesh.vertices()[v as usize]).collect(),
             triangles: outer
                 .iter()
-                .map(|side| corners(side).map(|v| surface_vertex[v as usize]))
+                .map(|(_, corners)| corners.map(|v| surface_vertex[v as usize]))
                 .collect(),
         },
         mesh_vertices,

@@ -11,6 +11,7 @@
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 pub mod lanes;
+pub mod rigid;
 #[cfg(target_arch = "wasm32")]
 mod simd128;
 

@@ -1,6 +1,6 @@
 //! From the tables of a scene file to a scene: what one key alone cannot know is checked here.
 
-use super::motion::{Force, ForceKey, Motion, MotionKey, RigidTransform};
+use super::motion::{Force, ForceKey, Motion, MotionKey};
 use super::selector::{Patch, Selector};
 use super::tables::{
     BodyTable, ChangeTable, ForceTable, MaterialTable, MotionTable, PatchTable, SceneTable,
@@ -10,6 +10,7 @@ use super::{Body, BodyShape, Change, Fixing, Region, Scene, SceneError, Spring, 
 use crate::material::{Material, MaterialModel};
 use crate::mesh::shapes::LIVER_SPACING;
 use crate::scalar::Vec3;
+use crate::scalar::rigid::RigidTransform;
 use crate::settings::{
     Choice, Node, Place, Placed, apply_override, parse_tree, read_table, suggest,
 };

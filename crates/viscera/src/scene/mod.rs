@@ -35,7 +35,9 @@ mod tables;
 mod write;
 
 pub use describe::{describe, describe_markdown, describe_text};
-pub use motion::{Force, ForceKey, Motion, MotionKey, RigidTransform};
+pub use motion::{Force, ForceKey, Motion, MotionKey};
+
+pub use crate::scalar::rigid::RigidTransform;
 pub use selector::{Patch, SelectError, Selector, nearest_pair};
 pub use tables::{Interpolation, OutputSettings, TimeSettings, WorldSettings};
 

@@ -6,51 +6,8 @@
 
 use super::selector::Patch;
 use super::tables::Interpolation;
-use crate::scalar::{Mat3, Vec3, vec3};
-
-/// A rotation and a translation: `x -> rotation * x + translation`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RigidTransform {
-    /// Orthonormal, determinant 1.
-    pub rotation: Mat3<f64>,
-    /// [m].
-    pub translation: Vec3<f64>,
-}
-
-impl RigidTransform {
-    /// Leaves everything where it is.
-    pub const IDENTITY: Self = Self { rotation: Mat3::IDENTITY, translation: Vec3::ZERO };
-
-    /// Turns by a rotation vector [rad] about a point [m], then moves by `translation` [m].
-    pub fn about(point: Vec3<f64>, rotation: Vec3<f64>, translation: Vec3<f64>) -> Self {
-        let rotation = rotation_matrix(rotation);
-        // In this order a rotation by nothing is exactly the translation.
-        Self { rotation, translation: translation + (point - rotation * point) }
-    }
-
-    /// Where a point [m] goes.
-    pub fn apply(&self, point: Vec3<f64>) -> Vec3<f64> {
-        self.rotation * point + self.translation
-    }
-}
-
-/// The rotation by `|r|` radians about the axis `r`. Sine and cosine are the same bits on every
-/// machine.
-fn rotation_matrix(r: Vec3<f64>) -> Mat3<f64> {
-    let angle = r.length();
-    if angle == 0.0 || !angle.is_finite() {
-        return Mat3::IDENTITY;
-    }
-    let axis = r * (1.0 / angle);
-    let cross = Mat3::from_columns(
-        vec3(0.0, axis.z, -axis.y),
-        vec3(-axis.z, 0.0, axis.x),
-        vec3(axis.y, -axis.x, 0.0),
-    );
-    let half = libm::sin(0.5 * angle);
-    // 1 - cos(a) = 2 sin(a/2)^2, without cancellation.
-    Mat3::IDENTITY + cross * libm::sin(angle) + (cross * cross) * (2.0 * half * half)
-}
+use crate::scalar::Vec3;
+use crate::scalar::rigid::RigidTransform;
 
 /// A pose at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -165,6 +122,7 @@ fn between<K>(keys: &[K], time_of: impl Fn(&K) -> f64, time: f64) -> (Option<&K>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scalar::{Mat3, vec3};
     use crate::scene::selector::Selector;
     use crate::settings::Place;
     use std::f64::consts::PI;

@@ -1,0 +1,108 @@
+//! Contact of tissue with tools and fixed obstacles: an energy on samples of the surface.
+//!
+//! ```text
+//! E = sum_s A_s psi(phi(p_s)),   p_s = sum_a b_a x_a           phi: signed distance to the tool
+//! f_a = b_a A p n                on the vertices;  -A p n on the tool, torque (p_s - t) x (-A p n) about its origin t
+//! ```
+//!
+//! No constraint, no multiplier, no pair that could be dropped: every method adds the energy, its forces and its curvature to
+//! its own. What a step holds constant (the pose at its end, the plane that a sample touches, the anchor of friction, the
+//! normal force of the step before) is found before the step begins ([`Touching`]) and moves on after it has ended.
+//!
+//! Everything here is in double precision, whatever the state's is.
+
+pub mod law;
+pub mod shape;
+pub mod surface;
+mod touch;
+
+pub use law::{Foundation, Friction};
+pub use shape::{Distance, Shape};
+pub use surface::{Sample, sample_boundary, sample_embedded};
+pub use touch::{Felt, Moved, Side, Touch, Touching};
+
+use crate::scalar::Vec3;
+use crate::scalar::rigid::RigidTransform;
+
+/// How tissue and a tool meet. One default for all methods of solution, so that the force at a depth does not depend on
+/// them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactLaw {
+    /// Stiffness of contact in units of the tissue's modulus over its edge length, `kf` in `k = kf E/h`.
+    pub stiffness: f64,
+    /// Distance at which contact begins [m].
+    pub thickness: f64,
+    /// Coefficient of friction.
+    pub friction: f64,
+}
+
+impl Default for ContactLaw {
+    fn default() -> Self {
+        Self { stiffness: 10.0, thickness: 1e-3, friction: 0.3 }
+    }
+}
+
+impl ContactLaw {
+    /// What is wrong with it, in words; nothing where it is legal.
+    pub fn complaint(&self) -> Option<&'static str> {
+        let is_legal = |value: f64, least: f64, most: f64| (least..=most).contains(&value);
+        if !is_legal(self.stiffness, 1e-3, 1e6) {
+            return Some("a contact's stiffness is between 0.001 and 1000000 times E/h");
+        }
+        if !is_legal(self.thickness, 1e-9, 1e3) {
+            return Some("a contact's thickness is above zero; 1 mm suits organs");
+        }
+        (!is_legal(self.friction, 0.0, 5.0)).then_some(
+            "a coefficient of friction is between 0 and 5; 0.1 is slippery, 0.8 ridged jaws",
+        )
+    }
+}
+
+/// A tool or a fixed obstacle: moved from outside, whatever pushes against it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tool {
+    /// Its shape in its own frame.
+    pub shape: Shape,
+    /// Where it is at the end of the step: from its own frame to the world.
+    pub pose: RigidTransform,
+    /// How it meets tissue.
+    pub law: ContactLaw,
+    /// While it is, what the tool presses on is tied to it: jaws with a ratchet.
+    pub is_locked: bool,
+}
+
+impl Tool {
+    /// At rest at the origin, with the usual law.
+    pub fn new(shape: Shape) -> Self {
+        Self { shape, pose: RigidTransform::IDENTITY, law: ContactLaw::default(), is_locked: false }
+    }
+
+    /// Moves a point [m] of the world into the tool's frame and returns the distance there, its gradient in the world.
+    pub fn distance(&self, point: Vec3<f64>) -> Distance {
+        let distance = self.shape.distance(self.pose.undo(point));
+        Distance { normal: self.pose.turn(distance.normal), ..distance }
+    }
+}
+
+/// Force and torque between a tool and the tissue that it touches.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// On the tool [N].
+    pub force: Vec3<f64>,
+    /// On the tool, about its origin [N m].
+    pub torque: Vec3<f64>,
+    /// Samples of tissue that it presses on.
+    pub touches: u32,
+    /// Of these hang on pinned vertices only: nothing gives way there.
+    pub pinned: u32,
+    /// The deepest that tissue is inside the contact's thickness [m].
+    pub depth: f64,
+}
+
+impl Wrench {
+    /// Adds the force [N] that a sample at `place` [m] of the world exerts on a tool at `origin` [m].
+    pub fn add(&mut self, force: Vec3<f64>, place: Vec3<f64>, origin: Vec3<f64>) {
+        self.force += force;
+        self.torque += (place - origin).cross(force);
+    }
+}

@@ -1,0 +1,284 @@
+//! A sample of tissue at a tool in one step: what stays constant, what follows from places, and what is kept.
+//!
+//! ```text
+//! path in the tool's frame from R_0^T (p_n - t_0) to R_1^T (p_n + dt v - t_1); where it comes within dh/2 of the tool, or
+//! begins within dh, the tangent plane there is the tool for this step:  d = n.(R^T (p - t)) - o
+//! u = (I - n n^T)(p - world_from_tool a)                              slip from the anchor a
+//! end of step:  u *= min(1, mu min(N, N_new)/(K |u|)),  a = p - u,  N = N_new;   nothing is kept where N_new = 0
+//! ```
+//!
+//! A plane remembers the side from which the tissue has come, so that a thin tool cannot jump past it, and makes the energy
+//! convex. Samples whose path stays away keep the live distance: a plane in the air would be a wall where there is none. A
+//! plane's normal stays while its sample is deep inside, where the distance's own direction has begun to turn sideways.
+
+use super::law::{Dragged, Foundation, Friction, Squeezed, block, tangential};
+use super::shape::Shape;
+use super::{ContactLaw, Distance, Tool};
+use crate::scalar::rigid::RigidTransform;
+use crate::scalar::{Mat3, Vec3};
+
+/// Evaluations of the distance along a path at most.
+const MOST_TRACED: u32 = 24;
+
+/// Deeper than this share of the tool's thinnest radius a plane keeps its normal.
+const SHALLOW: f64 = 0.25;
+
+/// What is kept of a sample that a tool presses on, from step to step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// The sample's number.
+    pub sample: u32,
+    /// The tool's number.
+    pub tool: u32,
+    /// Where the sample would be without slip, in the tool's frame [m].
+    pub anchor: Vec3<f64>,
+    /// Of the plane, in the tool's frame.
+    pub normal: Vec3<f64>,
+    /// Normal force at the end of the last step [N].
+    pub pressed: f64,
+    /// Force on the tissue at the end of the last step, friction included [N].
+    pub force: Vec3<f64>,
+    /// Where it acts [m].
+    pub place: Vec3<f64>,
+    /// Whether it is tied to the tool.
+    pub is_tied: bool,
+}
+
+/// What a sample finds in its way in one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Side {
+    /// A plane in the tool's frame: `d = normal . x - offset`.
+    Plane {
+        /// Of length 1.
+        normal: Vec3<f64>,
+        /// [m].
+        offset: f64,
+    },
+    /// The tool itself, wherever the sample is.
+    Live,
+}
+
+/// A sample and a tool in one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touching {
+    /// The sample's number.
+    pub sample: u32,
+    /// The tool's number.
+    pub tool: u32,
+    /// The constants of contact.
+    pub foundation: Foundation,
+    /// What is in its way.
+    pub side: Side,
+    /// Friction, its anchor in the tool's frame; nothing in the first step of a contact.
+    pub friction: Option<Friction>,
+    /// Whether it is tied: then friction holds in every direction.
+    pub is_tied: bool,
+}
+
+/// A tool's shape and where it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placed<'a> {
+    /// The shape.
+    pub shape: &'a Shape,
+    /// From its frame to the world.
+    pub pose: &'a RigidTransform,
+}
+
+/// What a sample feels at a place: its energy and the derivatives of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Felt {
+    /// Distance from the tool, or from its plane [m].
+    pub distance: f64,
+    /// Of contact and friction [J].
+    pub energy: f64,
+    /// On the tissue, of both [N].
+    pub force: Vec3<f64>,
+    /// Normal force [N].
+    pub pressed: f64,
+    /// Away from the tool.
+    pub normal: Vec3<f64>,
+    /// Second derivative along the normal [N/m].
+    pub stiffness: f64,
+    /// A bound of it across the normal, friction's own [N/m].
+    pub drag: f64,
+    /// The same of friction along the normal: of what is tied [N/m].
+    pub tie: f64,
+    /// A bound of what is negative in it, because the distance's gradient turns [N/m].
+    pub turning: f64,
+}
+
+impl Felt {
+    /// The second derivative of the energy without what may be negative in it: positive semidefinite.
+    pub fn curvature(&self) -> Mat3<f64> {
+        block(self.normal, self.stiffness + self.tie, self.drag)
+    }
+}
+
+/// How a sample moves in a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moved {
+    /// Where it is at the start [m].
+    pub from: Vec3<f64>,
+    /// Where its velocity takes it [m].
+    pub to: Vec3<f64>,
+}
+
+impl Touching {
+    /// What a sample is to a tool in a step in which the tool goes from `start` to its pose; nothing where they are too far
+    /// apart to meet. `kept` is what the last step has left.
+    pub fn find(
+        (sample, foundation): (u32, Foundation),
+        (number, tool): (u32, &Tool),
+        start: &RigidTransform,
+        moved: &Moved,
+        kept: Option<&Touch>,
+    ) -> Option<Self> {
+        let (from, to) = (start.undo(moved.from), tool.pose.undo(moved.to));
+        let thickness = foundation.thickness;
+        let first = tool.shape.distance(from);
+        let way = (to - from).length();
+        // The distance changes by no more than the way; beyond it the tissue around may push as far again.
+        if first.value > 2.0 * (thickness + way) && kept.is_none() {
+            return None;
+        }
+        let side = if first.value < thickness {
+            Self::plane(&tool.shape, from, &first, kept)
+        } else {
+            trace(&tool.shape, from, to, thickness).unwrap_or(Side::Live)
+        };
+        let friction = kept.and_then(|kept| friction(&tool.law, &foundation, kept));
+        Some(Self {
+            sample,
+            tool: number,
+            foundation,
+            side,
+            friction,
+            is_tied: kept.is_some_and(|kept| kept.is_tied),
+        })
+    }
+
+    /// The plane of a sample that begins in contact, at `from` [m] in the tool's frame.
+    fn plane(shape: &Shape, from: Vec3<f64>, first: &Distance, kept: Option<&Touch>) -> Side {
+        let is_shallow = first.value > -SHALLOW * shape.thinnest();
+        match kept {
+            Some(kept) if !is_shallow && shape.support(kept.normal).is_finite() => {
+                Side::Plane { normal: kept.normal, offset: shape.support(kept.normal) }
+            }
+            _ => tangent(from, first),
+        }
+    }
+
+    /// What the sample feels at a place [m].
+    pub fn feel(&self, tool: Placed<'_>, place: Vec3<f64>) -> Felt {
+        let Placed { shape, pose } = tool;
+        let local = pose.undo(place);
+        let Distance { value, normal, curvature } = match self.side {
+            Side::Plane { normal, offset } => {
+                Distance { value: normal.dot(local) - offset, normal, curvature: 0.0 }
+            }
+            Side::Live => shape.distance(local),
+        };
+        let normal = pose.turn(normal);
+        let Squeezed { energy, force, stiffness } = self.foundation.squeeze(value);
+        let mut felt = Felt {
+            distance: value,
+            energy,
+            force: normal * force,
+            pressed: force,
+            normal,
+            stiffness,
+            drag: 0.0,
+            tie: 0.0,
+            turning: force * curvature,
+        };
+        if let Some(friction) = &self.friction {
+            let away = place - pose.apply(friction.anchor);
+            let slip = if self.is_tied { away } else { tangential(away, normal) };
+            let Dragged { energy, force, stiffness } = friction.drag(slip);
+            felt.energy += energy;
+            felt.force += force;
+            felt.drag = stiffness;
+            felt.tie = if self.is_tied { stiffness } else { 0.0 };
+        }
+        felt
+    }
+
+    /// The most that second derivatives at a place [m] add up to before the sample has moved by half the thickness [N/m]:
+    /// what explicit steps must be small enough for.
+    pub fn stiffness_near(&self, felt: &Felt) -> f64 {
+        let drag = self.friction.map_or(0.0, |friction| friction.stiffness);
+        self.foundation.stiffness_near(felt.distance).max(felt.stiffness) + drag
+    }
+
+    /// What is kept after a step that has ended with the sample at a place [m], where it feels this; nothing where it has
+    /// left the tool.
+    pub fn keep(&self, tool: &Tool, place: Vec3<f64>, felt: &Felt) -> Option<Touch> {
+        let is_tied = tool.is_locked && (self.is_tied || felt.pressed > 0.0);
+        if felt.pressed <= 0.0 && !is_tied {
+            return None;
+        }
+        let anchor = match &self.friction {
+            Some(friction) if self.is_tied && is_tied => friction.anchor,
+            Some(friction) if !self.is_tied => {
+                let slip = tangential(place - tool.pose.apply(friction.anchor), felt.normal);
+                let elastic = friction.stiffness * slip.length();
+                let most = friction.limit.min(tool.law.friction * felt.pressed);
+                let share = if elastic > most { most / elastic } else { 1.0 };
+                tool.pose.undo(place - slip * share)
+            }
+            _ => tool.pose.undo(place),
+        };
+        Some(Touch {
+            sample: self.sample,
+            tool: self.tool,
+            anchor,
+            normal: tool.pose.turn_back(felt.normal),
+            pressed: felt.pressed,
+            force: felt.force,
+            place,
+            is_tied,
+        })
+    }
+}
+
+/// The constants of friction in a step, from what the last one has left.
+fn friction(law: &ContactLaw, foundation: &Foundation, kept: &Touch) -> Option<Friction> {
+    let stiffness = foundation.area * foundation.stiffness;
+    let limit = if kept.is_tied { f64::INFINITY } else { law.friction * kept.pressed };
+    (limit > 0.0).then_some(Friction { anchor: kept.anchor, stiffness, limit })
+}
+
+/// The tangent plane at a point [m], which is as far from it as the shape.
+fn tangent(at: Vec3<f64>, distance: &Distance) -> Side {
+    let Distance { value, normal, .. } = *distance;
+    Side::Plane { normal, offset: normal.dot(at) - value }
+}
+
+/// Goes along a path [m] in the tool's frame by sphere tracing; the plane where it first comes within half the thickness.
+fn trace(shape: &Shape, from: Vec3<f64>, to: Vec3<f64>, thickness: f64) -> Option<Side> {
+    let (way, length) = (to - from, (to - from).length());
+    if length == 0.0 {
+        return None;
+    }
+    let near = 0.5 * thickness;
+    let mut share = 0.0;
+    let mut at = from;
+    for _ in 0..MOST_TRACED {
+        let distance = shape.distance(at);
+        // A hundredth of the thickness from there is there.
+        if distance.value <= near * 1.02 {
+            return Some(tangent(at, &distance));
+        }
+        share += (distance.value - near) / length;
+        if share >= 1.0 {
+            let end = shape.distance(to);
+            return (end.value <= near).then(|| tangent(to, &end));
+        }
+        at = from + way * share;
+    }
+    // Grazing: so near for so long that it counts.
+    Some(tangent(at, &shape.distance(at)))
+}
+
+#[cfg(test)]
+mod tests;
