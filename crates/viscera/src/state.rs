@@ -1,6 +1,8 @@
 //! The state: everything that moves.
 
+use crate::contact::Touch;
 use crate::model::Model;
+use crate::scalar::rigid::RigidTransform;
 use crate::scalar::{Real, Vec3};
 
 /// Positions, velocities and multipliers of a model at one moment.
@@ -19,6 +21,24 @@ pub struct State<S> {
     pub multiplier_dt: f64,
     /// What the quasi-Newton and the explicit method have learned; empty for others.
     pub learned: Learned<S>,
+    /// What tools have touched; empty where there are none.
+    pub contact: ContactState,
+}
+
+/// What is kept of contact from step to step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ContactState {
+    /// Where each tool is.
+    pub poses: Vec<RigidTransform>,
+    /// What tools press on: by connected part, sample and tool.
+    pub touches: Vec<Touch>,
+}
+
+impl ContactState {
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.poses[..]) + size_of_val(&self.touches[..])
+    }
 }
 
 /// What methods keep from step to step. The quasi-Newton method: pairs of a step and the change of the gradient along it,
@@ -73,6 +93,7 @@ impl<S: Real> State<S> {
             multipliers: Vec::new(),
             multiplier_dt: 0.0,
             learned: Learned::default(),
+            contact: ContactState::default(),
         }
     }
 
@@ -82,6 +103,7 @@ impl<S: Real> State<S> {
             + size_of_val(&self.velocities[..])
             + size_of_val(&self.multipliers[..])
             + self.learned.bytes()
+            + self.contact.bytes()
     }
 
     /// True while every number is finite.

@@ -11,6 +11,7 @@ mod order;
 mod parts;
 mod pieces;
 mod recovered;
+mod samples;
 mod tets;
 
 use std::ops::Range;
@@ -25,6 +26,7 @@ pub(crate) use parts::Part;
 pub(crate) use pieces::PIECE_BLOCKS;
 use pieces::in_pieces;
 pub(crate) use recovered::{Entry, Frames, PartRanges, RecoveredTables};
+pub(crate) use samples::LaidSample;
 pub(crate) use tets::TetBlock;
 pub use tets::{LaidTet, TetSet};
 
@@ -64,6 +66,8 @@ pub struct Layout<S> {
     pub(crate) parts: Arc<[Part]>,
     /// Copies of vertex `v`, in the solver's numbering, are `copy_offsets[v] .. copy_offsets[v + 1]`.
     pub(crate) copy_offsets: Vec<u32>,
+    /// What tools touch: part by part, in the model's order.
+    pub(crate) samples: Vec<LaidSample>,
     /// Where the tetrahedra of the stable neo-Hookean law are recovered-gradient tetrahedra.
     pub(crate) recovered: Option<RecoveredTables<S>>,
 }
@@ -139,6 +143,7 @@ impl<S: Real> Layout<S> {
             },
             numbering: Arc::clone(numbering),
             parts: Arc::from(parts),
+            samples: samples::laid(model, numbering, &part_of),
             copy_offsets,
             recovered: None,
         };
@@ -231,6 +236,7 @@ impl<S: Real> Layout<S> {
             + size_of_val(&self.parts[..])
             + self.parts.iter().map(Part::bytes).sum::<usize>()
             + size_of_val(&self.copy_offsets[..])
+            + size_of_val(&self.samples[..])
             + self.recovered.as_ref().map_or(0, RecoveredTables::bytes)
     }
 }

@@ -6,6 +6,7 @@ use super::elements::{ElementLists, Given};
 use super::numbering::Numbering;
 use super::{Body, MaterialConstants, Model, ModelError};
 use crate::coloring::ConstraintGraph;
+use crate::contact::{Sample, sample_boundary};
 use crate::elements::attachment::Attachments;
 use crate::elements::kinds::{CONSTANTS, Constant, Kind, Legal};
 use crate::elements::list::KINDS;
@@ -29,6 +30,7 @@ pub struct ModelBuilder {
     /// By kind.
     elements: [Vec<Given>; KINDS],
     anchors: Vec<Vec3<f64>>,
+    samples: Arc<Vec<Sample>>,
 }
 
 impl ModelBuilder {
@@ -94,6 +96,41 @@ impl ModelBuilder {
     /// Rest positions [m] of all vertices added so far.
     pub fn positions(&self) -> &[Vec3<f64>] {
         &self.positions
+    }
+
+    /// Takes samples of the surface of all bodies added so far, for tools to touch: `4^cuts` of each triangle. One cut
+    /// suits tools that are no larger than three edges, none suits larger ones.
+    pub fn sample_surface(&mut self, cuts: u32) {
+        let samples = sample_boundary(&self.tets, &self.positions, cuts.min(4));
+        self.samples = Arc::new(samples);
+    }
+
+    /// Takes these samples in place of others.
+    pub fn set_samples(&mut self, samples: Vec<Sample>) -> Result<(), ModelError> {
+        for sample in &samples {
+            for vertex in sample.vertices {
+                self.check_vertex("a sample of the surface", vertex)?;
+            }
+            let numbers = sample.weights.iter().chain([&sample.area, &sample.edge]);
+            let sum: f64 = sample.weights.iter().sum();
+            let is_legal = sample.area > 0.0
+                && sample.edge > 0.0
+                && numbers.copied().all(f64::is_finite)
+                && (sum - 1.0).abs() < 1e-9
+                && (sample.tet as usize) < self.tets.len();
+            if !is_legal {
+                let (what, range) =
+                    ("sum of a sample's weights", "one, its area and edge above zero");
+                return Err(ModelError::BadValue { what, range, value: sum });
+            }
+        }
+        self.samples = Arc::new(samples);
+        Ok(())
+    }
+
+    /// Samples of the surface taken so far.
+    pub fn samples(&self) -> &[Sample] {
+        &self.samples
     }
 
     /// Adds a spring of the given stiffness [N/m] between two vertices; returns its number.
@@ -187,6 +224,7 @@ impl ModelBuilder {
             places: Arc::clone(&self.positions),
             elements: ElementLists::new(&self.elements),
             rest_anchors: self.anchors.iter().map(|anchor| anchor.cast()).collect(),
+            samples: Arc::clone(&self.samples),
             revision: 0,
             numbering: Arc::new(numbering),
             part_numbers,

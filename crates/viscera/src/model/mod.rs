@@ -19,6 +19,7 @@ pub(crate) use numbering::{Numbering, Z_ORDER_BITS, z_order};
 
 pub use crate::material::MaterialConstants;
 
+use crate::contact::Sample;
 use crate::material::{Compliance, MaterialModel};
 use crate::mesh::{edge_matrix, tet_volume};
 use crate::scalar::{Mat3, Real, Vec3};
@@ -136,6 +137,8 @@ pub struct Model<S> {
     pub elements: ElementLists<S>,
     /// Anchors of the elements that have one where nothing moves them [m], in the order in which they were added.
     pub rest_anchors: Vec<Vec3<S>>,
+    /// Points of the surface that tools touch.
+    pub samples: Arc<Vec<Sample>>,
     /// Differs from model to model: whoever keeps numbers of vertices, or constants, keeps this beside them, and
     /// compares. Of two models of the same content it is the same.
     pub(crate) revision: u64,
@@ -173,6 +176,14 @@ impl<S: Real> Model<S> {
             material,
             law: self.laws[material as usize],
         }
+    }
+
+    /// Young's modulus of the tissue under a sample over the length of the edges there [Pa/m]: contact is as many times
+    /// stiffer as its law says.
+    pub fn sample_stiffness(&self, sample: &Sample) -> f64 {
+        let material = &self.materials[self.tet_materials[sample.tet as usize] as usize];
+        let (lambda, mu) = (material.lame_lambda.to_f64(), material.lame_mu.to_f64());
+        mu * (3.0 * lambda + 2.0 * mu) / (lambda + mu) / sample.edge
     }
 
     /// The same for models of the same content, and another for others.
@@ -225,6 +236,11 @@ impl<S: Real> Model<S> {
         for x in &*self.places {
             x.to_array().into_iter().for_each(|value| add(value.to_bits()));
         }
+        for Sample { vertices, weights, area, edge, tet } in &*self.samples {
+            vertices.iter().for_each(|&v| add(v.into()));
+            weights.iter().chain([area, edge]).for_each(|value| add(value.to_bits()));
+            add((*tet).into());
+        }
         for_each_kind!(self, list => {
             add(list.len() as u64);
             list.vertices.as_flattened().iter().for_each(|&v| add(v.into()));
@@ -252,6 +268,7 @@ impl<S: Real> Model<S> {
             places: Arc::default(),
             elements: ElementLists::new(&Default::default()),
             rest_anchors: Vec::new(),
+            samples: Arc::default(),
             revision: 0,
             numbering: Arc::default(),
             part_numbers: Vec::new(),
@@ -266,6 +283,7 @@ impl<S: Real> Model<S> {
             + size_of_val(&self.tet_materials[..])
             + size_of_val(&self.places[..])
             + size_of_val(&self.rest_anchors[..])
+            + size_of_val(&self.samples[..])
             + size_of_val(&self.rest_positions[..])
             + size_of_val(&self.masses[..])
             + size_of_val(&self.numbering.order[..])

@@ -146,7 +146,8 @@ impl<S: Real> Simulation<S> {
         let double = |all: &[Vec3<S>]| all.iter().map(|x| x.cast::<f64>().cast()).collect();
         let positions: Vec<Vec3<T>> = double(&self.state.positions);
         let velocities: Vec<Vec3<T>> = double(&self.state.velocities);
-        let state = State { positions, velocities, ..State::at_rest(&fork.model) };
+        let contact = self.state.contact.clone();
+        let state = State { positions, velocities, contact, ..State::at_rest(&fork.model) };
         fork.begin_at(state);
         // Constraints in the same order, which settings decide, go on with the multipliers they have.
         let order = |solver: &SolverSettings| {
@@ -165,7 +166,14 @@ impl<S: Real> Simulation<S> {
                 false => Learned::default(),
             };
             let learned = Learned { pairs: double(&pairs), parts };
-            fork.put(State { positions, velocities, multipliers: kept, multiplier_dt, learned });
+            fork.put(State {
+                positions,
+                velocities,
+                multipliers: kept,
+                multiplier_dt,
+                learned,
+                contact: whole.contact,
+            });
         }
         Ok(fork)
     }

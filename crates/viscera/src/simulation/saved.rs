@@ -10,14 +10,16 @@ use super::automatic::{self, Chosen};
 use super::device::Backend;
 use super::error::LiveError;
 use super::holding::GraspOrigins;
+use crate::contact::Touch;
 use crate::layout::Layout;
 use crate::model::for_each_kind;
-use crate::scalar::{Real, Vec3};
+use crate::scalar::rigid::RigidTransform;
+use crate::scalar::{Mat3, Real, Vec3};
 use crate::settings::Method;
-use crate::state::{Learned, LearnedPart, State};
+use crate::state::{ContactState, Learned, LearnedPart, State};
 
 /// Raised whenever the bytes mean something else.
-const FORMAT: u32 = 6;
+const FORMAT: u32 = 7;
 
 /// Methods by the number that stands for them; a new one is added at the end.
 const METHODS: [Method; 4] = [Method::Auto, Method::Xpbd, Method::Explicit, Method::QuasiNewton];
@@ -106,6 +108,60 @@ struct Saved {
     pairs: Vectors,
     learned: Vec<LearnedPart>,
     taken: Vec<Option<Vectors>>,
+    /// Of each tool the columns of its rotation, and its place.
+    tools: Vec<[[f64; 3]; 4]>,
+    touches: Vec<SavedTouch>,
+}
+
+/// A [`Touch`].
+#[derive(serde::Serialize, serde::Deserialize)]
+struct SavedTouch {
+    sample: u32,
+    tool: u32,
+    is_tied: bool,
+    pressed: f64,
+    anchor: [f64; 3],
+    normal: [f64; 3],
+    force: [f64; 3],
+    place: [f64; 3],
+}
+
+impl SavedTouch {
+    fn of(touch: &Touch) -> Self {
+        Self {
+            sample: touch.sample,
+            tool: touch.tool,
+            is_tied: touch.is_tied,
+            pressed: touch.pressed,
+            anchor: touch.anchor.to_array(),
+            normal: touch.normal.to_array(),
+            force: touch.force.to_array(),
+            place: touch.place.to_array(),
+        }
+    }
+
+    fn back(&self) -> Touch {
+        Touch {
+            sample: self.sample,
+            tool: self.tool,
+            anchor: Vec3::from_f64(self.anchor),
+            normal: Vec3::from_f64(self.normal),
+            pressed: self.pressed,
+            force: Vec3::from_f64(self.force),
+            place: Vec3::from_f64(self.place),
+            is_tied: self.is_tied,
+        }
+    }
+}
+
+fn bare_pose(pose: &RigidTransform) -> [[f64; 3]; 4] {
+    let [a, b, c] = pose.rotation.columns;
+    [a, b, c, pose.translation].map(Vec3::to_array)
+}
+
+fn dressed_pose(numbers: &[[f64; 3]; 4]) -> RigidTransform {
+    let [a, b, c, translation] = numbers.map(Vec3::from_f64);
+    RigidTransform { rotation: Mat3::from_columns(a, b, c), translation }
 }
 
 fn bare<S: Real>(vectors: &[Vec3<S>]) -> Vectors {
@@ -121,7 +177,7 @@ impl<S: Real> Simulation<S> {
     /// from there.
     pub fn save(&self) -> Vec<u8> {
         let state = self.whole_state();
-        let State { positions, velocities, multipliers, multiplier_dt, learned } = &state;
+        let State { positions, velocities, multipliers, multiplier_dt, learned, contact } = &state;
         let saved = Saved {
             precision: size_of::<S>() as u8,
             method: METHODS.iter().position(|m| *m == self.solver.method).unwrap_or(0) as u8,
@@ -138,6 +194,8 @@ impl<S: Real> Simulation<S> {
             pairs: bare(&learned.pairs),
             learned: learned.parts.clone(),
             taken: self.taken.all().iter().map(|taken| taken.as_deref().map(bare)).collect(),
+            tools: contact.poses.iter().map(bare_pose).collect(),
+            touches: contact.touches.iter().map(SavedTouch::of).collect(),
         };
         let mut bytes = MAGIC.to_vec();
         bytes.extend(FORMAT.to_le_bytes());
@@ -174,6 +232,7 @@ impl<S: Real> Simulation<S> {
             ("constraints", [0, constraints].contains(&saved.multipliers.len())),
             ("meshes, materials or solver settings", saved.model == fingerprint(self.layout())),
             ("motions", self.takes(&saved.taken)),
+            ("tools", self.knows(&saved)),
         ] {
             if !fits {
                 return Err(ResumeError::OtherScene { what });
@@ -189,6 +248,10 @@ impl<S: Real> Simulation<S> {
             multipliers: saved.multipliers.iter().map(|&l| S::from_f64(l)).collect(),
             multiplier_dt: saved.multiplier_dt,
             learned: Learned { pairs: dressed(&saved.pairs), parts: saved.learned },
+            contact: ContactState {
+                poses: saved.tools.iter().map(dressed_pose).collect(),
+                touches: saved.touches.iter().map(SavedTouch::back).collect(),
+            },
         });
         self.inputs = self.inputs_at(self.time());
         self.measure_tissue();
@@ -214,6 +277,15 @@ impl<S: Real> Simulation<S> {
         self.resumed_method = Some(saved);
         self.choose_substeps();
         Ok(())
+    }
+
+    /// Whether what was touched, and by what, is there.
+    fn knows(&self, saved: &Saved) -> bool {
+        let samples = self.model.samples.len();
+        let is_known = |touch: &SavedTouch| {
+            (touch.sample as usize) < samples && (touch.tool as usize) < saved.tools.len()
+        };
+        saved.touches.iter().all(is_known)
     }
 
     /// Whether each motion has as many vertices as were taken hold of.

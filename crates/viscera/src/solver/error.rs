@@ -58,6 +58,26 @@ pub enum StepError {
         /// The input concerned.
         what: &'static str,
     },
+    /// A tool that tissue cannot meet.
+    #[error("tool {tool}: {why}")]
+    BadTool {
+        /// Its place in the list.
+        tool: usize,
+        /// What is wrong with it.
+        why: &'static str,
+    },
+    /// Tools, and nothing that they could touch.
+    #[error(
+        "tools were given, and the model has no samples of its surface that they could touch; take some with \
+         `ModelBuilder::sample_surface`"
+    )]
+    NoSamples,
+    /// The method cannot take contact.
+    #[error(
+        "contact is part of XPBD's rebase: with `rebase = false` tools touch nothing; leave out `rebase`, or use \
+         `method = \"quasi_newton\"`"
+    )]
+    ContactNeedsRebase,
     /// The solver was built for another model.
     #[error("the model is not the one that the solver was built for; build a solver for it")]
     OtherModel,

@@ -1,6 +1,7 @@
 //! Inputs of a step: loads, pins, tethers and anchors from outside, and whether they are legal.
 
 use super::error::StepError;
+use crate::contact::Tool;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
@@ -41,6 +42,9 @@ pub struct Inputs<S> {
     pub anchors: Vec<Vec3<S>>,
     /// External forces [N] on single vertices; several on one vertex add up.
     pub forces: Vec<(u32, Vec3<S>)>,
+    /// Tools and obstacles that touch the model's samples, each at the end of the step. A tool keeps its place in the list
+    /// as long as it is there: what it has touched is remembered by that.
+    pub tools: Vec<Tool>,
 }
 
 impl<S: Real> Default for Inputs<S> {
@@ -51,6 +55,7 @@ impl<S: Real> Default for Inputs<S> {
             tethers: Vec::new(),
             anchors: Vec::new(),
             forces: Vec::new(),
+            tools: Vec::new(),
         }
     }
 }
@@ -70,6 +75,7 @@ impl<S: Real> Inputs<S> {
             tethers: self.tethers.iter().map(tether).collect(),
             anchors: self.anchors.iter().map(|anchor| anchor.cast()).collect(),
             forces: self.forces.iter().map(|&(vertex, force)| (vertex, force.cast())).collect(),
+            tools: self.tools.clone(),
         }
     }
 
@@ -153,8 +159,26 @@ pub(crate) fn check_inputs<S: Real>(
         ("anchors", inputs.anchors.iter().all(|anchor| anchor.is_finite())),
         ("forces", inputs.forces.iter().all(|(_, force)| force.is_finite())),
     ];
-    match finite.into_iter().find(|(_, finite)| !finite) {
-        Some((what, _)) => Err(StepError::NotFinite { what }),
-        None => Ok(()),
+    if let Some((what, _)) = finite.into_iter().find(|(_, finite)| !finite) {
+        return Err(StepError::NotFinite { what });
     }
+    check_tools(layout, &inputs.tools)
+}
+
+/// Tools have shapes, laws and poses that tissue can meet.
+fn check_tools<S: Real>(layout: &Layout<S>, tools: &[Tool]) -> Result<(), StepError> {
+    for (tool, given) in tools.iter().enumerate() {
+        let Tool { shape, pose, law, .. } = given;
+        if !pose.is_finite() {
+            return Err(StepError::NotFinite { what: "poses of tools" });
+        }
+        let moved = (!pose.is_rigid()).then_some("a pose keeps lengths: give a rotation matrix");
+        if let Some(why) = shape.complaint().or_else(|| law.complaint()).or(moved) {
+            return Err(StepError::BadTool { tool, why });
+        }
+    }
+    if !tools.is_empty() && layout.samples.is_empty() {
+        return Err(StepError::NoSamples);
+    }
+    Ok(())
 }

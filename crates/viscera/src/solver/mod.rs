@@ -29,12 +29,13 @@ mod xpbd;
 
 use std::sync::Arc;
 
+use crate::contact::Wrench;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::settings::{Count, Method, SolverSettings};
-use crate::state::State;
+use crate::state::{ContactState, State};
 use cpu::precision::{Task, Within, carry_out};
 pub use error::StepError;
 pub(crate) use explicit::growth as explicit_growth;
@@ -99,6 +100,7 @@ impl<S: Real> Solver<S> {
             multipliers: vec![S::ZERO; self.layout.multiplier_count],
             multiplier_dt: 0.0,
             learned: self.memory.nothing_learned(&self.layout),
+            contact: ContactState::default(),
         }
     }
 
@@ -274,6 +276,12 @@ impl<S: Real> Solver<S> {
             (Count::Auto, Method::Explicit) => explicit::substeps_for(self.stable_step(), frame),
             _ => self.settings.substeps(),
         }
+    }
+
+    /// Force and torque between each tool of the last step and what it touches, at the end of that step; in the order of
+    /// [`Inputs::tools`]. Empty before the first step.
+    pub fn wrenches(&self) -> &[Wrench] {
+        &self.memory.data.constants.contacts.wrenches
     }
 
     /// Bytes of the memory taken, model and state not included.

@@ -9,7 +9,7 @@ use crate::scalar::{Real, Vec3};
 use crate::solver::oscillations::Oscillations;
 use crate::solver::plan::{Flag, Plan, Stage, StepStage, Visitor};
 use crate::solver::step::data::Step;
-use crate::state::{Learned, State};
+use crate::state::{ContactState, Learned, State};
 
 /// A request to a solver.
 pub enum Task<'a> {
@@ -61,6 +61,7 @@ pub fn oscillations<S: Real>(memory: &mut Memory<S>, step: &Step<'_, S>) -> Osci
         multipliers: Vec::new(),
         multiplier_dt: 0.0,
         learned: Learned::default(),
+        contact: ContactState::default(),
     };
     carry_out(Task::Oscillations(&mut oscillations), memory, step, &mut nothing);
     oscillations

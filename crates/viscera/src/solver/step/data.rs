@@ -2,6 +2,7 @@
 //! all methods change.
 #![allow(unsafe_code)]
 
+use super::contacts::Contacts;
 use super::recovered::RecoveredTets;
 use super::tethers::Bundle;
 use crate::elements::law::LAWS;
@@ -49,6 +50,8 @@ pub struct StepConstants<S> {
     pub start_strain: StartStrain<S>,
     /// Where the layout has recovered-gradient tetrahedra.
     pub recovered: Option<RecoveredTets<S>>,
+    /// Of samples and tools.
+    pub contacts: Contacts,
 }
 
 /// Data that measures of a step need after its end: values that every backend fills. Vertices in the solver's
@@ -115,6 +118,7 @@ impl<S: Real> StepData<S> {
                     .recovered
                     .as_ref()
                     .map(|tables| RecoveredTets::new(layout, tables)),
+                contacts: Contacts::new(layout),
             },
             points: points(),
             velocities: vec![Vec3::ZERO; vertices],

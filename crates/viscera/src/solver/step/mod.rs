@@ -1,6 +1,7 @@
 //! A step: its data, and the stages that all methods share.
 
 pub mod balance;
+pub mod contacts;
 pub mod control;
 pub mod data;
 pub mod descent;

@@ -69,6 +69,7 @@ fn the_equations_of_a_step_taken_again_hold() {
         multipliers: Vec::new(),
         multiplier_dt: 0.0,
         learned: Learned::default(),
+        contact: Default::default(),
     };
     let half = mesh.vertices().len() as u32;
     for number in 1..=6 {
