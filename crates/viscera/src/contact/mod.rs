@@ -19,7 +19,7 @@ mod touch;
 pub use law::{Foundation, Friction};
 pub use shape::{Distance, Shape};
 pub use surface::{Sample, sample_boundary, sample_embedded};
-pub use touch::{Felt, Moved, Side, Touch, Touching};
+pub use touch::{Felt, Moved, Placed, Side, Touch, Touching};
 
 use crate::scalar::Vec3;
 use crate::scalar::rigid::RigidTransform;
@@ -97,6 +97,9 @@ pub struct Wrench {
     pub pinned: u32,
     /// The deepest that tissue is inside the contact's thickness [m].
     pub depth: f64,
+    /// Whether the tool has moved too far in the step for motion: what it touched before is forgotten, and tissue inside
+    /// it goes the shortest way out.
+    pub has_jumped: bool,
 }
 
 impl Wrench {

@@ -68,6 +68,8 @@ pub struct Layout<S> {
     pub(crate) copy_offsets: Vec<u32>,
     /// What tools touch: part by part, in the model's order.
     pub(crate) samples: Vec<LaidSample>,
+    /// The part of each sample, in the model's order.
+    pub(crate) sample_parts: Vec<u32>,
     /// Where the tetrahedra of the stable neo-Hookean law are recovered-gradient tetrahedra.
     pub(crate) recovered: Option<RecoveredTables<S>>,
 }
@@ -143,6 +145,7 @@ impl<S: Real> Layout<S> {
             },
             numbering: Arc::clone(numbering),
             parts: Arc::from(parts),
+            sample_parts: samples::parts(model),
             samples: samples::laid(model, numbering, &part_of),
             copy_offsets,
             recovered: None,
@@ -183,6 +186,17 @@ impl<S: Real> Layout<S> {
     /// The number of the part that one of the solver's vertices belongs to.
     pub(crate) fn part_at(&self, v: usize) -> usize {
         self.parts.partition_point(|part| part.vertices.end <= v)
+    }
+
+    /// The places of a part's samples.
+    pub(crate) fn samples_of(&self, part: usize) -> Range<usize> {
+        let first = |part: usize| self.samples.partition_point(|s| (s.part as usize) < part);
+        first(part)..first(part + 1)
+    }
+
+    /// The connected part of a sample of the surface, by its number in the model.
+    pub(crate) fn part_of_sample(&self, number: u32) -> usize {
+        self.sample_parts.get(number as usize).map_or(0, |&part| part as usize)
     }
 
     /// The tetrahedra of one law.
@@ -237,6 +251,7 @@ impl<S: Real> Layout<S> {
             + self.parts.iter().map(Part::bytes).sum::<usize>()
             + size_of_val(&self.copy_offsets[..])
             + size_of_val(&self.samples[..])
+            + size_of_val(&self.sample_parts[..])
             + self.recovered.as_ref().map_or(0, RecoveredTables::bytes)
     }
 }

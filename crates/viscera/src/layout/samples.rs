@@ -58,3 +58,9 @@ pub(super) fn laid<S: Real>(
     samples.sort_by_key(|sample| sample.part);
     samples
 }
+
+/// The part of each sample, in the model's order: parts have the numbers that the model gives them.
+pub(super) fn parts<S: Real>(model: &Model<S>) -> Vec<u32> {
+    let part = |sample: &crate::contact::Sample| model.part_of(sample.vertices[0]) as u32;
+    model.samples.iter().map(part).collect()
+}

@@ -368,6 +368,11 @@ impl SolverSettings {
         self.step_guard && self.rebase && self.method == Method::Xpbd
     }
 
+    /// Whether the method knows contact: in XPBD it is part of the rebase.
+    pub(crate) fn takes_contact(&self) -> bool {
+        self.rebase || self.method != Method::Xpbd
+    }
+
     /// The guard of Anderson's accelerated iterates that is in force.
     pub(crate) fn guard_of_mixtures(&self) -> AndersonGuard {
         match self.anderson_guard {

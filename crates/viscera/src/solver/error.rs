@@ -78,6 +78,9 @@ pub enum StepError {
          `method = \"quasi_newton\"`"
     )]
     ContactNeedsRebase,
+    /// Devices do not compute contact.
+    #[error("contact with tools is computed on the CPU: use `device = \"cpu\"`")]
+    ContactOnDevice,
     /// The solver was built for another model.
     #[error("the model is not the one that the solver was built for; build a solver for it")]
     OtherModel,

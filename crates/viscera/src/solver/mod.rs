@@ -229,6 +229,9 @@ impl<S: Real> Solver<S> {
         dt: f64,
     ) -> Result<(), StepError> {
         check_elements(&self.settings)?;
+        if !inputs.tools.is_empty() && !self.settings.takes_contact() {
+            return Err(StepError::ContactNeedsRebase);
+        }
         check_model(&self.layout, model)?;
         check_step(dt, &self.layout, inputs)?;
         check_state(&self.layout, state)?;

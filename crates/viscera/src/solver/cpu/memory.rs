@@ -131,7 +131,11 @@ impl<S: Real> Memory<S> {
     /// See [`crate::solver::Solver::oscillations`].
     pub fn oscillations(&mut self, step: &Step<'_, S>) -> Oscillations {
         match &mut self.method {
-            MethodMemory::QuasiNewton(memory) => memory.oscillations(step, &mut self.data),
+            MethodMemory::QuasiNewton(memory) => {
+                // Of what fixings hold: tools come and go.
+                self.data.constants.contacts.clear();
+                memory.oscillations(step, &mut self.data)
+            }
             _ => Oscillations::default(),
         }
     }

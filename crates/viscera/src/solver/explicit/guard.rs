@@ -145,7 +145,7 @@ impl<S: Real> Memory<S> {
         self.relax_the_rest(step, data, round_off);
         let (model, small_steps) = (step.layout, &self.small_steps);
         let limits = |number: usize, constants: &StepConstants<S>| {
-            small_steps[number].was_violent || constants.holds(&model.parts[number])
+            small_steps[number].was_violent || constants.holds(number, &model.parts[number])
         };
         self.energies.limit(step, data, limits, |_, _| {});
         for (number, part) in state.learned.parts.iter_mut().enumerate() {
@@ -162,6 +162,7 @@ impl<S: Real> Memory<S> {
     /// What every part stores where it is [J].
     fn evaluate(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
         let StepData { constants, points, .. } = data;
+        constants.contacts.place(step, 1.0);
         for (number, small) in self.small_steps.iter().enumerate() {
             let step = Step { dt: small.dt, ..*step };
             self.evaluator.evaluate(constants, &step, points, number);

@@ -29,6 +29,7 @@ use crate::settings::SolverSettings;
 use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
 use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
+use crate::solver::step::contacts::Bound;
 use crate::solver::step::data::{Step, StepConstants, StepData, copies_of};
 use crate::solver::step::energy::Energies;
 use crate::solver::step::potential::Evaluator;
@@ -50,6 +51,7 @@ pub fn plan() -> Plan {
     Plan {
         nodes: vec![
             StepStage::ReadState.into(),
+            StepStage::FindContacts.into(),
             ExplicitStage::Begin.into(),
             Node::Repeat(Repeat {
                 most: Times::SmallSteps,
@@ -58,6 +60,7 @@ pub fn plan() -> Plan {
                 body: small_step,
             }),
             ExplicitStage::End.into(),
+            StepStage::EndContacts.into(),
             StepStage::WriteState.into(),
         ],
     }
@@ -189,7 +192,7 @@ impl<S: Real> Memory<S> {
             }
             let part = &model.parts[number];
             let stiffest = at_rest.gather(constants, model, part, small.dt, loads);
-            small.begin(stability, stiffest, constants.holds(part));
+            small.begin(stability, stiffest, constants.holds(number, part));
             if model.is_viscous() {
                 drift(constants, part, points, velocities, -0.5 * small.dt, true);
                 put_strains(constants, model, number, points, S::ZERO);
@@ -260,6 +263,9 @@ impl<S: Real> Memory<S> {
                 continue;
             }
             let looks = small.looks();
+            // In the middle of the small step.
+            let left = small.dt * (f64::from(small.left) - 0.5);
+            constants.contacts.place(step, (1.0 - left / step.dt).clamp(0.0, 1.0));
             let small = Step { dt: small.dt, ..*step };
             let moments = Moments {
                 anchors: step.inputs.anchors_of(&step.layout.rest_anchors),
@@ -269,6 +275,9 @@ impl<S: Real> Memory<S> {
             let places = (&points[..], &self.at_rest);
             small_steps.is_inverted =
                 self.pieces.load(constants, &small, &moments, (number, looks), places, loads);
+            // Contact is not viscous: of `h^2 (w_t^2 + w_c^2)/4 + h eta w_t^2/2 <= 1` its part is less than a tissue's.
+            let share = small.dt / (small.dt + 2.0 * self.stability.viscosity(number));
+            constants.contacts.add_forces(&small, number, points, Bound::Near(share), loads);
             let squared = S::from_f64(small.dt * small.dt);
             for tether in constants.tethers_of(&step.layout.parts[number]) {
                 let force = tether.force(points[tether.vertex].vec3());

@@ -14,6 +14,7 @@ use crate::scalar::{Vec3, vec3};
 use crate::settings::Method;
 use crate::solver::inputs::{Inputs, check_inputs, check_state};
 use crate::solver::step::balance::ForceBalance;
+use crate::solver::step::contacts::Contacts;
 use crate::solver::step::data::EndOfStep;
 use crate::solver::step::predict::load_tethers;
 use crate::state::State;
@@ -220,6 +221,7 @@ impl GpuSolver {
             tethers: &self.tethers,
             start_strain: &mut start_strain,
             recovered: None,
+            contacts: &Contacts::default(),
         };
         balance.measure(model, state, inputs, &mut end);
     }

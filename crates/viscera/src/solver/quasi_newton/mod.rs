@@ -91,8 +91,11 @@ pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S
             Node::Run(EndSolve(solve).into()),
         ]
     };
-    let mut nodes =
-        vec![Node::Run(StepStage::ReadState.into()), Node::Run(QuasiNewtonStage::Begin.into())];
+    let mut nodes: Vec<Node> = vec![
+        StepStage::ReadState.into(),
+        StepStage::FindContacts.into(),
+        QuasiNewtonStage::Begin.into(),
+    ];
     match settings.integrator {
         Integrator::Sdirk2 => {
             nodes.extend(solve(Solve::First));
@@ -103,7 +106,8 @@ pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S
         Integrator::ImplicitEuler => nodes.extend(solve(Solve::Euler)),
     }
     nodes.push(Node::Run(QuasiNewtonStage::LimitEnergy.into()));
-    nodes.push(Node::Run(StepStage::WriteState.into()));
+    nodes.push(StepStage::EndContacts.into());
+    nodes.push(StepStage::WriteState.into());
     Plan { nodes }
 }
 

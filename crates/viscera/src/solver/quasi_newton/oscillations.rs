@@ -58,13 +58,13 @@ impl<S: Real> Memory<S> {
         let curvature =
             Curvature { dt: step.dt, x: &self.base, moments: moments(&step, &self.stage_start) };
         for number in 0..layout.part_count() {
-            self.preconditioner.refresh(layout, &data.constants, &curvature, number);
+            self.preconditioner.refresh(&step, &data.constants, &curvature, number);
         }
         self.gradient_at(&step, data, |_| true);
         self.start_velocities.copy_from_slice(&self.trial_gradient);
         let axes = [vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0)];
         let held = (0..layout.part_count())
-            .filter(|&number| data.constants.holds(&layout.parts[number]))
+            .filter(|&number| data.constants.holds(number, &layout.parts[number]))
             .collect::<Vec<_>>();
         Oscillations::new(held.into_iter().map(|number| {
             axes.iter().flat_map(|&axis| self.along_axis(axis, &step, data, number)).collect()

@@ -131,7 +131,7 @@ impl<S: Real> Memory<S> {
         let curvature =
             Curvature { dt: solve.dt, x: &self.base, moments: moments(solve, &constants.previous) };
         for number in 0..layout.part_count() {
-            self.preconditioner.refresh(layout, constants, &curvature, number);
+            self.preconditioner.refresh(solve, constants, &curvature, number);
         }
         for number in 0..layout.part_count() {
             self.renew_pairs(layout, &constants.workers, number, learned);
@@ -148,6 +148,7 @@ impl<S: Real> Memory<S> {
     ) {
         let dt = Self::solve_dt(which, step.dt);
         self.solve_dt = dt;
+        data.constants.contacts.place(step, if which == Solve::First { SHARE } else { 1.0 });
         let solve = Step { dt, ..*step };
         let is_first_of_step = which != Solve::Second
             && (which == Solve::First || step.settings.integrator == Integrator::ImplicitEuler);
@@ -195,7 +196,7 @@ impl<S: Real> Memory<S> {
         let step_dt = solve.dt / if which == Solve::Euler { 1.0 } else { SHARE };
         let (he, d) = (S::from_f64(solve.dt), S::from_f64((1.0 - SHARE) * step_dt));
         let squared = he * he;
-        let falls = !data.constants.holds(part);
+        let falls = !data.constants.holds(number, part);
         let acceleration =
             if falls { self.mean_acceleration(solve, data, number) } else { Vec3::ZERO };
         for v in part.vertices.clone() {

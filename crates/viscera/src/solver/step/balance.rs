@@ -91,6 +91,26 @@ impl ForceBalance {
         }
     }
 
+    /// Of contact with tools.
+    fn add_contacts<S: Real>(
+        &mut self,
+        layout: &Layout<S>,
+        state: &State<S>,
+        inputs: &Inputs<S>,
+        step: &EndOfStep<'_, S>,
+    ) {
+        let place = |v: usize| state.positions[layout.numbering.order[v] as usize];
+        for part in 0..layout.part_count() {
+            step.contacts.each_at(layout, &inputs.tools, part, place, |sample, felt| {
+                self.load += felt.force.length();
+                for (&v, &weight) in sample.vertices.iter().zip(&sample.weights) {
+                    let user = layout.numbering.order[v as usize] as usize;
+                    self.residual[user] -= felt.force * weight;
+                }
+            });
+        }
+    }
+
     /// Of recovered-gradient tetrahedra, in the precision of the state.
     fn add_recovered<S: Real>(
         &mut self,
@@ -150,6 +170,7 @@ impl ForceBalance {
             let v = layout.numbering.order[tether.vertex];
             self.load += tether.force(state.positions[v as usize]).cast::<f64>().length();
         }
+        self.add_contacts(layout, state, inputs, step);
         let gravity = inputs.gravity.cast::<f64>();
         for &(_, force) in &inputs.forces {
             self.load += force.cast::<f64>().length();

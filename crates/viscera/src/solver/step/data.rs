@@ -71,6 +71,8 @@ pub struct EndOfStep<'a, S> {
     pub start_strain: &'a mut StartStrain<S>,
     /// Where tetrahedra are recovered-gradient tetrahedra.
     pub recovered: Option<OfRecovered<'a, S>>,
+    /// Of samples and tools, where those are at the end of the step.
+    pub contacts: &'a Contacts,
 }
 
 /// What measures of recovered-gradient tetrahedra work with: the step's own, which every step fills anew.
@@ -137,13 +139,15 @@ impl<S: Real> StepData<S> {
             + [masses, inertias, inverse_masses].map(|m| size_of_val(&m[..])).iter().sum::<usize>()
             + self.constants.start_strain.iter().map(|s| size_of_val(&s[..])).sum::<usize>()
             + self.constants.recovered.as_ref().map_or(0, RecoveredTets::bytes)
+            + self.constants.contacts.bytes()
     }
 
     /// For measures of the step.
     pub fn end_of_step(&mut self) -> EndOfStep<'_, S> {
         let Self { constants, points, loads, .. } = self;
-        let StepConstants { previous, predicted, inertias, inverse_masses, tethers, .. } =
-            constants;
+        let StepConstants {
+            previous, predicted, inertias, inverse_masses, tethers, contacts, ..
+        } = constants;
         let (workers, start_strain) = (&constants.workers, &mut constants.start_strain);
         let recovered = constants.recovered.as_mut();
         EndOfStep {
@@ -154,6 +158,7 @@ impl<S: Real> StepData<S> {
             tethers,
             start_strain,
             recovered: recovered.map(|tets| OfRecovered { workers, tets, points, loads }),
+            contacts,
         }
     }
 
@@ -175,10 +180,11 @@ impl<S: Real> StepConstants<S> {
         }
     }
 
-    /// Whether a pin, an attachment or a tether holds a part.
-    pub fn holds(&self, part: &Part) -> bool {
+    /// Whether a pin, an attachment, a tether or a tool holds a part.
+    pub fn holds(&self, number: usize, part: &Part) -> bool {
         let mut inverse_masses = self.inverse_masses[part.vertices.clone()].iter();
         part.is_anchored()
+            || self.contacts.presses(number)
             || !self.tethers_of(part).is_empty()
             || inverse_masses.any(|inverse| *inverse == S::ZERO)
     }

@@ -61,8 +61,7 @@ impl<S: Real> Guard<S> {
     fn load_forces(&self, step: &Step<'_, S>, data: &mut StepData<S>, part: usize) {
         let StepData { constants, loads, .. } = data;
         let moments = constants.moments(step);
-        let of = &step.layout.parts[part];
-        load_forces::<S, true>(constants, step, &moments, of, &self.trial, loads);
+        load_forces::<S, true>(constants, step, &moments, part, &self.trial, loads);
     }
 
     /// Moves a part to the first length that brings enough, or leaves it where the line starts. `x_K`, which is given up

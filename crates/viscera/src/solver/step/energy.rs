@@ -14,9 +14,18 @@
 //! velocities takes that energy back and moves no position, so that the state of rest is untouched.
 //! Round-off gets no allowance: what a step may gain by it, step after step, would add up.
 //!
+//! Where tools move,
+//!
+//! ```text
+//! T_1 <= min(A, max(B, T_n)),  A: the above, tools moved;   B = T_n + V(x_n, tools not moved) - V(x_1) + f.(x_1 - x_n) + W
+//! ```
+//!
+//! with `W` the work of the forces that tools report (`contacts`): otherwise a tool could put in more than it says.
+//!
 //! Every connected part of the model has a limit of its own, so that one body does not slow another. A
 //! part that nothing holds keeps its momentum: there everything is relative to its center of mass.
 
+use super::contacts::Gift;
 use super::data::{Step, StepConstants, StepData};
 use crate::scalar::{Real, Vec3};
 use crate::solver::report::StepReport;
@@ -32,6 +41,8 @@ struct Energy {
     load: Vec3<f64>,
     /// Work of the load [J].
     work: f64,
+    /// Of tools.
+    tools: Gift,
     /// Mass times displacement [kg m].
     shift: Vec3<f64>,
     /// With the places and velocities of the step's start, and of its end.
@@ -74,7 +85,21 @@ impl Energy {
             given -= 0.5 * inverse * self.start.momentum.length_squared();
             given -= inverse * self.load.dot(self.shift);
         }
+        if self.tools.is_near {
+            // Tools move while the tissue stands: that bound charges the overlap that they make. The other charges what
+            // they say that they do, and only forbids to gain: it never stops a body.
+            let by_work = given - self.tools.lifted + self.tools.work();
+            given = given.min(by_work.max(self.start.kinetic));
+        }
         (given, kinetic, drift)
+    }
+
+    /// Mechanical energy [J] that the step has made of nothing: what it ends with, less what there was and what loads and
+    /// tools have given.
+    fn surplus(&self, kept_speed: f64) -> f64 {
+        let before = self.start.kinetic + self.start.stored - self.tools.lifted;
+        let after = kept_speed * kept_speed * self.end.kinetic + self.end.stored;
+        after - before - self.work - self.tools.work()
     }
 
     /// Velocity [m/s] that is not scaled, and the factor for velocities relative to it.
@@ -107,10 +132,10 @@ impl Energies {
         let (model, constants) = (step.layout, &data.constants);
         for (number, (energy, part)) in self.0.iter_mut().zip(model.parts.iter()).enumerate() {
             // Sums are added to in `limit`: without this they would be those of all steps so far.
-            *energy = Energy::default();
+            *energy = Energy { tools: constants.contacts.gift(number), ..Energy::default() };
             energy.start.stored = stored[number];
             // A hold can stop the centre of mass, so that the centre's energy counts too: `limit` takes nothing out.
-            energy.held = constants.holds(part);
+            energy.held = constants.holds(number, part);
             // Tethers are inertia to the solver and no elements, so `stored` of the evaluator leaves them out. Their
             // targets are those of the end of the step, as the pins are.
             for tether in constants.tethers_of(part) {
@@ -142,7 +167,9 @@ impl Energies {
     pub fn end<S: Real>(&mut self, step: &Step<'_, S>, data: &StepData<S>, stored: &[f64]) {
         let (model, constants) = (step.layout, &data.constants);
         for (number, (energy, part)) in self.0.iter_mut().zip(model.parts.iter()).enumerate() {
-            *energy = Energy { held: energy.held, start: energy.start, ..Energy::default() };
+            let Energy { held, start, tools, .. } = *energy;
+            *energy = Energy { held, start, tools, ..Energy::default() };
+            energy.tools.work[1] = constants.contacts.work_after(step, number, &data.points);
             energy.end.stored = stored[number];
             for tether in constants.tethers_of(part) {
                 energy.end.stored += tether.energy(data.points[tether.vertex].vec3());

@@ -18,6 +18,8 @@ impl Recorder<'_> {
         match stage {
             // The state lives on the device.
             StepStage::ReadState | StepStage::WriteState => {}
+            // Inputs with tools are refused.
+            StepStage::FindContacts | StepStage::EndContacts => {}
             StepStage::MeasureStrain => self.each_set(&kernels::MEASURE_STRAIN, into),
             StepStage::Predict { start, is_kept } => self.predict(start, is_kept, into),
             StepStage::UpdateVelocities => into.push(self.vertices(&kernels::UPDATE_VELOCITIES, 0)),

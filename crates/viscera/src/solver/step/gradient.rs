@@ -1,6 +1,7 @@
 //! The gradient of the incremental potential without inertia, and the bound of its curvature.
 #![allow(unsafe_code)]
 
+use super::contacts::Bound;
 use super::data::{Step, StepConstants};
 use super::law::{OfLaw, respond, with_tissue};
 use crate::elements::kinds::{Energy, Kind};
@@ -21,11 +22,12 @@ pub fn load_forces<S: Real, const BOUND: bool>(
     constants: &StepConstants<S>,
     step: &Step<'_, S>,
     moments: &Moments<'_, S>,
-    part: &Part,
+    number: usize,
     x: &[Point<S>],
     loads: &mut [Point<S>],
 ) {
     let model = step.layout;
+    let part = &model.parts[number];
     loads[part.copies.clone()].fill(Point::default());
     for color in &part.colors {
         let shared = Shared::new(loads);
@@ -40,6 +42,8 @@ pub fn load_forces<S: Real, const BOUND: bool>(
         }
     }
     add_elements(model, moments, part, x, loads);
+    let bound = if BOUND { Bound::Here } else { Bound::Without };
+    constants.contacts.add_forces(step, number, x, bound, loads);
 }
 
 /// Of a part's elements that are no tetrahedra.

@@ -24,7 +24,7 @@ pub mod tissue;
 use crate::layout::Layout;
 use crate::scalar::Real;
 use crate::state::State;
-use data::{Step, StepData};
+use data::{Step, StepConstants, StepData};
 use guard::Guard;
 use stage::StepStage;
 use strain::measure_strain;
@@ -39,6 +39,17 @@ pub fn run<S: Real>(
 ) {
     match stage {
         StepStage::ReadState => read_state(step.layout, data, state),
+        StepStage::FindContacts => {
+            let StepData { constants, points, velocities, .. } = data;
+            constants.contacts.find(step, points, velocities, &state.contact);
+        }
+        StepStage::EndContacts => {
+            let StepData {
+                constants: StepConstants { contacts, inverse_masses, .. }, points, ..
+            } = data;
+            let is_pinned = |v: usize| inverse_masses[v] == S::ZERO;
+            contacts.end(step, points, is_pinned, &mut state.contact);
+        }
         StepStage::MeasureStrain => {
             let constants = &mut data.constants;
             let (workers, strains) = (&constants.workers, &mut constants.start_strain);

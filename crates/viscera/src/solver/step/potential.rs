@@ -212,6 +212,9 @@ impl Evaluator {
         let of = &step.layout.parts[part];
         let moments = constants.moments(step);
         for_each_kind!(step.layout, set => add_energies(set, &mut stored, &moments, x, of));
+        let contact = constants.contacts.sums(step, part, x);
+        stored += contact.energy;
+        squared_noise += contact.squared_force;
         let squared = step.dt * step.dt;
         let value = 0.5 * inertia + squared * stored;
         let noise = squared * S::EPSILON * (reach * squared_noise).sqrt();

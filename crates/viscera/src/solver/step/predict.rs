@@ -82,8 +82,8 @@ impl<S: Real> StepData<S> {
             self.points[model.numbering.of(pin.vertex)].set_vec3(pin.target);
         }
         if start == Start::Auto {
-            for part in model.parts.iter() {
-                if !self.constants.holds(part) {
+            for (number, part) in model.parts.iter().enumerate() {
+                if !self.constants.holds(number, part) {
                     self.start_falling(step, part);
                 }
             }

@@ -7,6 +7,8 @@ use crate::settings::Start;
 pub enum StepStage {
     /// Takes positions and velocities over, in the solver's numbering.
     ReadState,
+    /// Moves tools to where they are at the end of the step, and finds what samples of tissue meet.
+    FindContacts,
     /// Remembers the Green strain of viscous tetrahedra at the start of the step.
     MeasureStrain,
     /// `xt = x + dt v + dt^2 M^-1 f_ext`; `x` becomes the start of the iteration, pins move to their targets;
@@ -21,6 +23,8 @@ pub enum StepStage {
     UpdateVelocities,
     /// `UpdateVelocities`, scaled down where the step would end with more mechanical energy than it had.
     LimitEnergy,
+    /// Forces of tools, and what is kept of their contact.
+    EndContacts,
     /// Gives positions and velocities back, in the user's numbering.
     WriteState,
 }

@@ -31,7 +31,7 @@ use sweep::solve_color;
 
 /// The stages of a step.
 pub fn plan<S: Real>(layout: &Layout<S>, settings: &SolverSettings) -> Plan {
-    let mut nodes: Vec<Node> = vec![StepStage::ReadState.into()];
+    let mut nodes: Vec<Node> = vec![StepStage::ReadState.into(), StepStage::FindContacts.into()];
     if layout.is_viscous() {
         nodes.push(StepStage::MeasureStrain.into());
     }
@@ -72,6 +72,7 @@ pub fn plan<S: Real>(layout: &Layout<S>, settings: &SolverSettings) -> Plan {
         true => StepStage::LimitEnergy.into(),
         false => StepStage::UpdateVelocities.into(),
     });
+    nodes.push(StepStage::EndContacts.into());
     nodes.push(StepStage::WriteState.into());
     Plan { nodes }
 }
@@ -203,6 +204,7 @@ impl<S: Real> Memory<S> {
             XpbdStage::LoadCorners => {
                 let StepData { constants, points, loads, .. } = data;
                 load_multipliers(constants, step, points, &state.multipliers, loads);
+                constants.contacts.load_vertices(step, points, loads);
             }
             XpbdStage::Rebase => rebase(step, data),
             XpbdStage::RecomputePositions => recompute_positions(model, data),

@@ -3,7 +3,7 @@
 use super::memory::Memory;
 use crate::layout::{Layout, Part};
 use crate::scalar::lanes::Point;
-use crate::scalar::{Real, Vec3};
+use crate::scalar::{Mat3, Real, Vec3};
 use crate::settings::SolverSettings;
 use crate::solver::step::data::{Step, StepData, copies_of, copy_count, gather};
 
@@ -45,7 +45,16 @@ pub fn rebase<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>) {
             let mass = constants.inertias[v];
             let residual = (point.vec3() - constants.predicted[v].vec3()) * mass - load.vec3();
             let inverse = S::ONE / (mass + load.w * share);
-            let x = point.vec3() - residual * (factor * inverse);
+            let moved = match constants.contacts.of_vertices.block(v) {
+                None => residual * (factor * inverse),
+                Some(contact) => {
+                    // In double precision: contact may be a thousand times stiffer than the vertex is heavy.
+                    let bound = (mass + load.w * share).to_f64();
+                    let metric = Mat3::IDENTITY * bound + *contact;
+                    (metric.inverse() * residual.cast::<f64>()).cast() * factor
+                }
+            };
+            let x = point.vec3() - moved;
             *point = Point::new(x, inverse * copy_count(model, v));
         });
     }

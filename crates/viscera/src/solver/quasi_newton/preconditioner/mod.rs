@@ -30,7 +30,7 @@ use crate::model::for_each_kind;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::cpu::threads::{Shared, Workers};
-use crate::solver::step::data::StepConstants;
+use crate::solver::step::data::{Step, StepConstants};
 use dense::Dense;
 use full::FullSums;
 use prolongation::Prolongation;
@@ -121,13 +121,13 @@ impl<S: Real> Preconditioner<S> {
     /// Turns a part's sums to where it is now, and inverts its blocks.
     pub fn refresh(
         &mut self,
-        layout: &Layout<S>,
+        step: &Step<'_, S>,
         constants: &StepConstants<S>,
         curvature: &Curvature<'_, S>,
         number: usize,
     ) {
         let Self { parts, turns, free, .. } = self;
-        parts[number].refresh(layout, constants, curvature, &layout.parts[number], turns, free);
+        parts[number].refresh(step, constants, curvature, number, turns, free);
     }
 
     /// The vertices of a part.
@@ -250,13 +250,15 @@ impl<S: Real> OfPart<S> {
 
     fn refresh(
         &mut self,
-        layout: &Layout<S>,
+        step: &Step<'_, S>,
         constants: &StepConstants<S>,
         curvature: &Curvature<'_, S>,
-        part: &Part,
+        number: usize,
         turns: &mut [Turn<S>],
         free: &[bool],
     ) {
+        let layout = step.layout;
+        let part = &layout.parts[number];
         let x = &curvature.x[self.vertices.clone()];
         let squared = curvature.dt * curvature.dt;
         let groups = &self.groups;
@@ -280,6 +282,12 @@ impl<S: Real> OfPart<S> {
             self.add_element(&[v], &[[block]], usize::from(!self.inverses.is_empty()), free);
         }
         for_each_kind!(layout, set => self.add_elements(set, part, curvature, squared, free));
+        let first = self.vertices.start as u32;
+        constants.contacts.each_block(step, number, curvature.x, |sample, block| {
+            let weights = &sample.weights;
+            let blocks = weights.map(|a| weights.map(|b| block * (squared * a * b)));
+            self.add_element(&sample.vertices.map(|v| v - first), &blocks, 0, free);
+        });
         for blocks in &mut self.inverses {
             let shared = Shared::new(blocks);
             constants.workers.each(shared.len(), BLOCK_GRAIN, |range| {
