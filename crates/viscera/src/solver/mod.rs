@@ -47,6 +47,7 @@ use plan::Plan;
 pub(crate) use quasi_newton::{choose, expected_motion_error};
 pub use report::StepReport;
 use step::data::Step;
+pub use step::energy::Ledger;
 #[cfg(feature = "gpu")]
 #[doc(hidden)]
 pub use step::tissue::TISSUE_WGSL;
@@ -285,6 +286,11 @@ impl<S: Real> Solver<S> {
     /// [`Inputs::tools`]. Empty before the first step.
     pub fn wrenches(&self) -> &[Wrench] {
         &self.memory.data.constants.contacts.wrenches
+    }
+
+    /// What tools have put into tissue since the solver was built; nothing where steps are not guarded.
+    pub fn ledger(&self) -> Ledger {
+        self.memory.ledger()
     }
 
     /// Bytes of the memory taken, model and state not included.

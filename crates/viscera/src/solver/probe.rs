@@ -43,6 +43,7 @@ pub(super) fn begun(step: &Step<'_, f64>, places: &[Vec3<f64>]) -> Memory<f64> {
         multipliers: vec![0.0; step.layout.multiplier_count],
         multiplier_dt: 0.0,
         learned: Default::default(),
+        contact: Default::default(),
     };
     for stage in [
         StepStage::ReadState,

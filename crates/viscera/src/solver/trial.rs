@@ -61,8 +61,7 @@ fn measured(has_elements: bool, d: impl Fn(usize) -> Vec3<f64>) -> (f64, Vec<(Ve
     let evaluator = &mut memory.guard.as_mut().expect("guarded steps").evaluator;
     evaluator.evaluate_all(&data.constants, &step, &data.points);
     let moments = data.constants.moments(&step);
-    let part = &layout.parts[0];
-    load_forces::<_, true>(&data.constants, &step, &moments, part, &data.points, &mut data.loads);
+    load_forces::<_, true>(&data.constants, &step, &moments, 0, &data.points, &mut data.loads);
     let mut loads = vec![(Vec3::ZERO, 0.0); layout.vertex_count()];
     for (v, &user) in layout.numbering.order.iter().enumerate() {
         let load = super::step::data::gather(&layout, &data.loads, v);

@@ -43,6 +43,7 @@ fn scrambled(model: &Layout<f32>) -> State<f32> {
         multipliers: vec![0.0; model.multiplier_count],
         multiplier_dt: 0.0,
         learned: Default::default(),
+        contact: Default::default(),
     };
     for (x, v) in state.positions.iter_mut().zip(&mut state.velocities) {
         *x += random.vector(0.002).cast();
@@ -68,6 +69,7 @@ fn in_double(state: &State<f32>) -> State<f64> {
         multipliers: state.multipliers.iter().map(|&l| l.into()).collect(),
         multiplier_dt: state.multiplier_dt,
         learned: Default::default(),
+        contact: Default::default(),
     }
 }
 

@@ -72,6 +72,7 @@ fn acting<S: Real>(model: &Model<S>, step: u32) -> Inputs<S> {
         tethers: [11, 40, 40, 90].map(tether).to_vec(),
         anchors: model.rest_anchors.iter().map(anchor).collect(),
         forces: vec![(30, vec3(0.02, 0.0, 0.01).cast()), (85, vec3(0.0, -0.01, 0.0).cast())],
+        tools: Vec::new(),
     }
 }
 

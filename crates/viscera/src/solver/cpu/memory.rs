@@ -9,6 +9,7 @@ use crate::solver::oscillations::Oscillations;
 use crate::solver::plan::{Flag, Stage};
 use crate::solver::report::StepReport;
 use crate::solver::step::data::{Step, StepData};
+use crate::solver::step::energy::Ledger;
 use crate::solver::step::guard::Guard;
 use crate::solver::{explicit, quasi_newton, step, xpbd};
 use crate::state::{Learned, State};
@@ -76,6 +77,17 @@ impl<S: Real> Memory<S> {
         match &self.method {
             MethodMemory::QuasiNewton(memory) => &memory.reports,
             _ => self.guard.as_ref().map_or(&[], |guard| guard.part_reports()),
+        }
+    }
+
+    /// See [`crate::solver::Solver::ledger`].
+    pub fn ledger(&self) -> Ledger {
+        match &self.method {
+            MethodMemory::Xpbd(_) => {
+                self.guard.as_ref().map_or(Ledger::default(), |guard| guard.ledger())
+            }
+            MethodMemory::Explicit(memory) => memory.ledger(),
+            MethodMemory::QuasiNewton(memory) => memory.ledger(),
         }
     }
 

@@ -230,6 +230,7 @@ mod tests {
             multipliers: vec![0.0; layout.multiplier_count],
             multiplier_dt: 0.0,
             learned: Default::default(),
+            contact: Default::default(),
         };
         let mut seen = Vec::new();
         let mut watch = |passes: u32, x: &[Vec3<f64>]| {

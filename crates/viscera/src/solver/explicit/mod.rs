@@ -31,7 +31,7 @@ use crate::solver::inputs::Inputs;
 use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
 use crate::solver::step::contacts::Bound;
 use crate::solver::step::data::{Step, StepConstants, StepData, copies_of};
-use crate::solver::step::energy::Energies;
+use crate::solver::step::energy::{Energies, Ledger};
 use crate::solver::step::potential::Evaluator;
 use crate::solver::step::predict::{Tethers, load_tethers};
 use crate::solver::step::stage::StepStage;
@@ -105,6 +105,11 @@ impl<S: Real> Memory<S> {
             evaluator: Evaluator::new(layout),
             energies: Energies::new(layout.part_count()),
         }
+    }
+
+    /// What tools have put into tissue.
+    pub fn ledger(&self) -> Ledger {
+        self.energies.ledger()
     }
 
     /// Bytes of all arrays.

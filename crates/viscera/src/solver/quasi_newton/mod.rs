@@ -38,7 +38,7 @@ use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
 use crate::solver::report::StepReport;
 use crate::solver::step::data::{Step, StepData};
 use crate::solver::step::descent::{SHORTEN, SUFFICIENT};
-use crate::solver::step::energy::Energies;
+use crate::solver::step::energy::{Energies, Ledger};
 use crate::solver::step::potential::Evaluator;
 use crate::solver::step::stage::StepStage;
 use crate::state::{Learned, State};
@@ -204,6 +204,11 @@ impl<S: Real> Memory<S> {
             rejected: 0,
             reports: Vec::with_capacity(parts),
         }
+    }
+
+    /// What tools have put into tissue.
+    pub fn ledger(&self) -> Ledger {
+        self.energies.ledger()
     }
 
     /// Bytes of all arrays.

@@ -145,9 +145,8 @@ mod tests {
     fn whole_descent(memory: &mut Memory<f64>, step: &Step<'_, f64>) -> Descent {
         let data = &mut memory.data;
         let before = data.points.clone();
-        let part = &step.layout.parts[0];
         let moments = data.constants.moments(step);
-        load_forces::<_, true>(&data.constants, step, &moments, part, &before, &mut data.loads);
+        load_forces::<_, true>(&data.constants, step, &moments, 0, &before, &mut data.loads);
         let (mut whole, mut slope) = (before.clone(), 0.0);
         for v in 0..before.len() {
             let (gradient, direction) = descent(step.layout, data, &before, v);

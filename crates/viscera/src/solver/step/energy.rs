@@ -112,25 +112,53 @@ impl Energy {
     }
 }
 
+impl Ledger {
+    fn add(&mut self, energy: &Energy, kept_speed: f64) {
+        self.stored += energy.end.stored;
+        self.most_stored = self.most_stored.max(self.stored);
+        if energy.tools.is_near {
+            self.work += energy.tools.mean_work();
+            self.surplus += energy.surplus(kept_speed).max(0.0);
+        }
+    }
+}
+
 /// Of each connected part of a model.
 #[derive(Clone, Debug)]
-pub struct Energies(Vec<Energy>);
+pub struct Energies {
+    parts: Vec<Energy>,
+    ledger: Ledger,
+}
+
+/// What tools have put into tissue since the solver was built.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ledger {
+    /// Work of tools on tissue [J].
+    pub work: f64,
+    /// Mechanical energy [J] that steps have made of nothing while tools touched tissue: the sum of what single steps of
+    /// connected parts gained beyond what loads and tools gave.
+    pub surplus: f64,
+    /// Energy [J] stored in tissue and contact at the end of the last step.
+    pub stored: f64,
+    /// The most that was ever stored [J].
+    pub most_stored: f64,
+}
 
 impl Energies {
     /// For so many parts.
     pub fn new(parts: usize) -> Self {
-        Self(vec![Energy::default(); parts])
+        Self { parts: vec![Energy::default(); parts], ledger: Ledger::default() }
     }
 
     /// Bytes of its array.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.0[..])
+        size_of_val(&self.parts[..])
     }
 
     /// Remembers energy and momentum before the step; `stored` is the stored energy [J] of each part there.
     pub fn begin<S: Real>(&mut self, step: &Step<'_, S>, data: &StepData<S>, stored: &[f64]) {
         let (model, constants) = (step.layout, &data.constants);
-        for (number, (energy, part)) in self.0.iter_mut().zip(model.parts.iter()).enumerate() {
+        for (number, (energy, part)) in self.parts.iter_mut().zip(model.parts.iter()).enumerate() {
             // Sums are added to in `limit`: without this they would be those of all steps so far.
             *energy = Energy { tools: constants.contacts.gift(number), ..Energy::default() };
             energy.start.stored = stored[number];
@@ -151,12 +179,12 @@ impl Energies {
 
     /// Gives a part a little [J] more than it had, after [`Energies::begin`].
     pub fn give(&mut self, part: usize, energy: f64) {
-        self.0[part].start.stored += energy;
+        self.parts[part].start.stored += energy;
     }
 
     /// What is left [J] of what a part had and was given, after [`Energies::end`]; of all that it has a share at most.
     pub fn left(&self, part: usize, share: f64) -> f64 {
-        let energy = &self.0[part];
+        let energy = &self.parts[part];
         let (given, kinetic, _) = energy.balance();
         let left = (given - kinetic).min(share * (energy.end.kinetic + energy.end.stored));
         // Nothing also where that is no number.
@@ -166,7 +194,7 @@ impl Energies {
     /// Measures the end of a step; `stored` is the stored energy [J] of each part now.
     pub fn end<S: Real>(&mut self, step: &Step<'_, S>, data: &StepData<S>, stored: &[f64]) {
         let (model, constants) = (step.layout, &data.constants);
-        for (number, (energy, part)) in self.0.iter_mut().zip(model.parts.iter()).enumerate() {
+        for (number, (energy, part)) in self.parts.iter_mut().zip(model.parts.iter()).enumerate() {
             let Energy { held, start, tools, .. } = *energy;
             *energy = Energy { held, start, tools, ..Energy::default() };
             energy.tools.work[1] = constants.contacts.work_after(step, number, &data.points);
@@ -194,7 +222,7 @@ impl Energies {
     /// Whether a part stores more at its end than all energy that it had and was given, or no number: then no
     /// velocity is small enough. `round_off` is that of energies, relative.
     pub fn stores_too_much(&self, part: usize, round_off: f64) -> bool {
-        let energy = &self.0[part];
+        let energy = &self.parts[part];
         let (given, _, _) = energy.balance();
         // Round-off of energies that nearly cancel is none of the step's.
         let stored = energy.start.stored.abs().max(energy.end.stored.abs());
@@ -205,7 +233,7 @@ impl Energies {
     /// How a part's step of `dt` [s] ended, told by its energies: what it stores and moves with after
     /// [`Energies::limit`], and what it had and was given, times the squared step.
     pub fn report(&self, part: usize, dt: f64, round_off: f64) -> StepReport {
-        let energy = &self.0[part];
+        let energy = &self.parts[part];
         let (given, kinetic, _) = energy.balance();
         let (_, share) = energy.limit();
         let stored = energy.start.stored.abs().max(energy.end.stored.abs());
@@ -219,10 +247,15 @@ impl Energies {
         }
     }
 
+    /// What tools have put into tissue.
+    pub fn ledger(&self) -> Ledger {
+        self.ledger
+    }
+
     /// Scales velocities down after [`Energies::end`], of parts that `limits`. `kept` is called with each part that is slowed
     /// down, and the factor of its velocities.
     pub fn limit<S: Real>(
-        &self,
+        &mut self,
         step: &Step<'_, S>,
         data: &mut StepData<S>,
         limits: impl Fn(usize, &StepConstants<S>) -> bool,
@@ -230,9 +263,13 @@ impl Energies {
     ) {
         let (model, constants) = (step.layout, &data.constants);
         let free = |v: &usize| constants.inverse_masses[*v] != S::ZERO;
-        for (number, (energy, part)) in self.0.iter().zip(model.parts.iter()).enumerate() {
+        let Self { parts, ledger } = self;
+        ledger.stored = 0.0;
+        for (number, (energy, part)) in parts.iter().zip(model.parts.iter()).enumerate() {
             let (drift, share) = energy.limit();
-            if !(share < 1.0 && energy.mass > 0.0 && limits(number, constants)) {
+            let is_limited = share < 1.0 && energy.mass > 0.0 && limits(number, constants);
+            ledger.add(energy, if is_limited { share } else { 1.0 });
+            if !is_limited {
                 continue;
             }
             // What remains about the drift is scaled as a whole, so it keeps its direction; squares of it scale by

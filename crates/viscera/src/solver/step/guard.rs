@@ -26,7 +26,7 @@ use std::ops::Range;
 
 use super::control::PartGuard;
 use super::data::{Step, StepConstants, StepData};
-use super::energy::Energies;
+use super::energy::{Energies, Ledger};
 use super::potential::{Evaluator, Potential};
 use super::stage::GuardStage;
 use crate::layout::Layout;
@@ -106,6 +106,11 @@ impl<S: Real> Guard<S> {
             + size_of_val(&self.reports[..])
             + self.energies.bytes()
             + self.evaluator.bytes()
+    }
+
+    /// What tools have put into tissue.
+    pub fn ledger(&self) -> Ledger {
+        self.energies.ledger()
     }
 
     /// How the last step ended for each part; nothing before the first.
