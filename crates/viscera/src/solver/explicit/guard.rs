@@ -162,7 +162,7 @@ impl<S: Real> Memory<S> {
     /// What every part stores where it is [J].
     fn evaluate(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
         let StepData { constants, points, .. } = data;
-        constants.contacts.place(step, 1.0);
+        constants.contacts.place(&step.contact(), 1.0);
         for (number, small) in self.small_steps.iter().enumerate() {
             let step = Step { dt: small.dt, ..*step };
             self.evaluator.evaluate(constants, &step, points, number);

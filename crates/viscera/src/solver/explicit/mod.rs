@@ -270,7 +270,7 @@ impl<S: Real> Memory<S> {
             let looks = small.looks();
             // In the middle of the small step.
             let left = small.dt * (f64::from(small.left) - 0.5);
-            constants.contacts.place(step, (1.0 - left / step.dt).clamp(0.0, 1.0));
+            constants.contacts.place(&step.contact(), (1.0 - left / step.dt).clamp(0.0, 1.0));
             let small = Step { dt: small.dt, ..*step };
             let moments = Moments {
                 anchors: step.inputs.anchors_of(&step.layout.rest_anchors),
@@ -282,7 +282,13 @@ impl<S: Real> Memory<S> {
                 self.pieces.load(constants, &small, &moments, (number, looks), places, loads);
             // Contact is not viscous: of `h^2 (w_t^2 + w_c^2)/4 + h eta w_t^2/2 <= 1` its part is less than a tissue's.
             let share = small.dt / (small.dt + 2.0 * self.stability.viscosity(number));
-            constants.contacts.add_forces(&small, number, points, Bound::Near(share), loads);
+            constants.contacts.add_forces(
+                &small.contact(),
+                number,
+                points,
+                Bound::Near(share),
+                loads,
+            );
             let squared = S::from_f64(small.dt * small.dt);
             for tether in constants.tethers_of(&step.layout.parts[number]) {
                 let force = tether.force(points[tether.vertex].vec3());

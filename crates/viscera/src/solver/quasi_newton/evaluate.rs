@@ -171,7 +171,7 @@ impl<S: Real> Evaluation<S> {
         for (number, part) in layout.parts.iter().enumerate().filter(|(n, _)| acts(*n)) {
             load_recovered(constants, step, number, way.to, (false, None), loads);
             add_elements(layout, &way.moments, part, way.to, loads);
-            constants.contacts.add_forces(step, number, way.to, Bound::Without, loads);
+            constants.contacts.add_forces(&step.contact(), number, way.to, Bound::Without, loads);
         }
         let constants = &*constants;
         let (pieces, loads) = (&self.vertices, &*loads);
@@ -228,7 +228,8 @@ impl<S: Real> Evaluation<S> {
         let mut change = Change::default();
         let squared = step.dt * step.dt;
         for_each_kind!(layout, set => element_changes(set, &mut change, squared, way, part));
-        let [potential, size] = constants.contacts.change(step, number, [way.from, way.to]);
+        let [potential, size] =
+            constants.contacts.change(&step.contact(), number, [way.from, way.to]);
         change = change.plus(Change { potential: squared * potential, size: squared * size });
         if let Some(along) = &mut self.along {
             // From the trial, where gradients are known, back.
@@ -272,7 +273,9 @@ impl<S: Real> Evaluation<S> {
             add(constants.inertias[v].to_f64() * squared.to_f64());
         }
         for_each_kind!(layout, set => element_curvature(set, part, moments, x, direction, step.dt, &mut add));
-        add(step.dt * step.dt * constants.contacts.curvature(step, number, x, direction));
+        add(step.dt
+            * step.dt
+            * constants.contacts.curvature(&step.contact(), number, x, direction));
         let pieces = &self.blocks;
         let sums = Shared::new(&mut self.block_sums);
         constants.workers.each(pieces.len(), 1, |range| {

@@ -148,7 +148,9 @@ impl<S: Real> Memory<S> {
     ) {
         let dt = Self::solve_dt(which, step.dt);
         self.solve_dt = dt;
-        data.constants.contacts.place(step, if which == Solve::First { SHARE } else { 1.0 });
+        data.constants
+            .contacts
+            .place(&step.contact(), if which == Solve::First { SHARE } else { 1.0 });
         let solve = Step { dt, ..*step };
         let is_first_of_step = which != Solve::Second
             && (which == Solve::First || step.settings.integrator == Integrator::ImplicitEuler);

@@ -2,7 +2,7 @@
 //! all methods change.
 #![allow(unsafe_code)]
 
-use super::contacts::Contacts;
+use super::contacts::{ContactStep, Contacts};
 use super::recovered::RecoveredTets;
 use super::tethers::Bundle;
 use crate::elements::law::LAWS;
@@ -23,6 +23,13 @@ pub struct Step<'a, S> {
     pub inputs: &'a Inputs<S>,
     pub dt: f64,
     pub settings: &'a SolverSettings,
+}
+
+impl<'a, S> Step<'a, S> {
+    /// What contact knows of it.
+    pub fn contact(&self) -> ContactStep<'a, S> {
+        ContactStep { layout: self.layout, tools: &self.inputs.tools, dt: self.dt }
+    }
 }
 
 /// Green strain at the start of the step of the blocks of viscous sets, law by law.

@@ -197,7 +197,8 @@ impl Energies {
         for (number, (energy, part)) in self.parts.iter_mut().zip(model.parts.iter()).enumerate() {
             let Energy { held, start, tools, .. } = *energy;
             *energy = Energy { held, start, tools, ..Energy::default() };
-            energy.tools.work[1] = constants.contacts.work_after(step, number, &data.points);
+            energy.tools.work[1] =
+                constants.contacts.work_after(&step.contact(), number, &data.points);
             energy.end.stored = stored[number];
             for tether in constants.tethers_of(part) {
                 energy.end.stored += tether.energy(data.points[tether.vertex].vec3());

@@ -43,7 +43,7 @@ pub fn load_forces<S: Real, const BOUND: bool>(
     }
     add_elements(model, moments, part, x, loads);
     let bound = if BOUND { Bound::Here } else { Bound::Without };
-    constants.contacts.add_forces(step, number, x, bound, loads);
+    constants.contacts.add_forces(&step.contact(), number, x, bound, loads);
 }
 
 /// Of a part's elements that are no tetrahedra.

@@ -41,14 +41,14 @@ pub fn run<S: Real>(
         StepStage::ReadState => read_state(step.layout, data, state),
         StepStage::FindContacts => {
             let StepData { constants, points, velocities, .. } = data;
-            constants.contacts.find(step, points, velocities, &state.contact);
+            constants.contacts.find(&step.contact(), points, velocities, &state.contact);
         }
         StepStage::EndContacts => {
             let StepData {
                 constants: StepConstants { contacts, inverse_masses, .. }, points, ..
             } = data;
             let is_pinned = |v: usize| inverse_masses[v] == S::ZERO;
-            contacts.end(step, points, is_pinned, &mut state.contact);
+            contacts.end(&step.contact(), points, is_pinned, &mut state.contact);
         }
         StepStage::MeasureStrain => {
             let constants = &mut data.constants;

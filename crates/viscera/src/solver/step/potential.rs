@@ -212,7 +212,7 @@ impl Evaluator {
         let of = &step.layout.parts[part];
         let moments = constants.moments(step);
         for_each_kind!(step.layout, set => add_energies(set, &mut stored, &moments, x, of));
-        let contact = constants.contacts.sums(step, part, x);
+        let contact = constants.contacts.sums(&step.contact(), part, x);
         stored += contact.energy;
         squared_noise += contact.squared_force;
         let squared = step.dt * step.dt;

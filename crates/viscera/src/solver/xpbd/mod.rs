@@ -204,7 +204,7 @@ impl<S: Real> Memory<S> {
             XpbdStage::LoadCorners => {
                 let StepData { constants, points, loads, .. } = data;
                 load_multipliers(constants, step, points, &state.multipliers, loads);
-                constants.contacts.load_vertices(step, points, loads);
+                constants.contacts.load_vertices(&step.contact(), points, loads);
             }
             XpbdStage::Rebase => rebase(step, data),
             XpbdStage::RecomputePositions => recompute_positions(model, data),

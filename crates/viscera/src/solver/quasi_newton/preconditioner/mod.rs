@@ -283,7 +283,7 @@ impl<S: Real> OfPart<S> {
         }
         for_each_kind!(layout, set => self.add_elements(set, part, curvature, squared, free));
         let first = self.vertices.start as u32;
-        constants.contacts.each_block(step, number, curvature.x, |sample, block| {
+        constants.contacts.each_block(&step.contact(), number, curvature.x, |sample, block| {
             let weights = &sample.weights;
             let blocks = weights.map(|a| weights.map(|b| block * (squared * a * b)));
             self.add_element(&sample.vertices.map(|v| v - first), &blocks, 0, free);

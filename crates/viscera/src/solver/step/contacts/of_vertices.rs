@@ -8,11 +8,8 @@
 //! Weights, not their squares: the row sums of all blocks, as for every other bound of the rebase. The sweep's inverse
 //! masses know nothing of contact: with it in them, what is sheared along a tool would freeze.
 
-use super::Contacts;
 use crate::layout::Layout;
-use crate::scalar::lanes::Point;
-use crate::scalar::{Mat3, Real, Vec3};
-use crate::solver::step::data::{Step, copies_of};
+use crate::scalar::{Mat3, Real};
 
 /// No place.
 const NONE: u32 = u32::MAX;
@@ -54,14 +51,16 @@ impl OfVertices {
         }
     }
 
-    fn clear(&mut self) {
+    /// Forgets all blocks.
+    pub fn clear(&mut self) {
         for v in self.vertices.drain(..) {
             self.places[v as usize] = NONE;
         }
         self.blocks.clear();
     }
 
-    fn add(&mut self, v: u32, block: Mat3<f64>) {
+    /// Adds a block [kg] to that of a vertex.
+    pub fn add(&mut self, v: u32, block: Mat3<f64>) {
         let place = &mut self.places[v as usize];
         if *place == NONE {
             *place = self.blocks.len() as u32;
@@ -70,38 +69,5 @@ impl OfVertices {
         }
         let sum = &mut self.blocks[*place as usize];
         *sum = *sum + block;
-    }
-}
-
-impl Contacts {
-    /// Adds `dt^2` times all forces of contact at `x` to the first copy of each vertex, and finds the blocks.
-    pub fn load_vertices<S: Real>(
-        &mut self,
-        step: &Step<'_, S>,
-        x: &[Point<S>],
-        loads: &mut [Point<S>],
-    ) {
-        let mut of_vertices = std::mem::take(&mut self.of_vertices);
-        of_vertices.clear();
-        let squared = step.dt * step.dt;
-        for part in 0..step.layout.part_count() {
-            self.each(step, part, x, |sample, _, _, felt| {
-                if felt.force == Vec3::ZERO && felt.drag == 0.0 {
-                    return;
-                }
-                let block = (felt.curvature() + Mat3::IDENTITY * felt.turning) * squared;
-                let sum: f64 = sample.weights.iter().map(|weight| weight.abs()).sum();
-                for (&v, &weight) in sample.vertices.iter().zip(&sample.weights) {
-                    if weight == 0.0 {
-                        continue;
-                    }
-                    let first = copies_of(step.layout, v as usize).start;
-                    let load = (felt.force * (squared * weight)).cast();
-                    loads[first].add(Point::new(load, S::ZERO));
-                    of_vertices.add(v, block * (weight.abs() * sum));
-                }
-            });
-        }
-        self.of_vertices = of_vertices;
     }
 }

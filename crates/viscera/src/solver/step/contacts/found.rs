@@ -1,0 +1,147 @@
+//! The beginning of a step: tools move, and samples find what is in their way.
+
+use super::{ContactStep, Contacts, Gift};
+use crate::contact::{ContactLaw, Foundation, Moved, Tool, Touch, Touching};
+use crate::layout::LaidSample;
+use crate::scalar::lanes::Point;
+use crate::scalar::rigid::RigidTransform;
+use crate::scalar::{Real, Vec3};
+use crate::state::ContactState;
+
+/// A tool that is faster than this [m/s], or than ten of its radii in a step where those are more, was put elsewhere.
+const FASTEST: f64 = 10.0;
+const FARTHEST: f64 = 10.0;
+
+impl Contacts {
+    /// Moves the tools to where they are at the end of the step, and finds what samples find in their way. `points` are
+    /// places, `velocities` those at the start of the step.
+    pub fn find<S: Real>(
+        &mut self,
+        step: &ContactStep<'_, S>,
+        points: &[Point<S>],
+        velocities: &[Vec3<S>],
+        kept_state: &ContactState,
+    ) {
+        self.clear();
+        let (layout, tools) = (step.layout, step.tools);
+        self.move_tools(step, kept_state);
+        if tools.is_empty() {
+            return;
+        }
+        let mut kept = kept_state.touches.iter().peekable();
+        for (number, part) in layout.parts.iter().enumerate() {
+            self.first[number] = self.touching.len();
+            let speeds = velocities[part.vertices.clone()].iter().map(|v| v.length_squared());
+            let squared = speeds.fold(S::ZERO, |most, speed| most.max(speed));
+            let farthest = squared.to_f64().sqrt() * step.dt;
+            for place in layout.samples_of(number) {
+                self.find_at(step, place, (points, velocities), farthest, &mut kept);
+            }
+        }
+        self.first[layout.part_count()] = self.touching.len();
+        self.weigh(step, points);
+        self.work_before(step, kept_state);
+    }
+
+    /// The tools that one sample may meet, which goes no farther than `farthest` [m]. What the last step has left is
+    /// sorted as samples are.
+    fn find_at<'k, S: Real>(
+        &mut self,
+        step: &ContactStep<'_, S>,
+        place: usize,
+        (points, velocities): (&[Point<S>], &[Vec3<S>]),
+        farthest: f64,
+        kept: &mut std::iter::Peekable<impl Iterator<Item = &'k Touch>>,
+    ) {
+        let layout = step.layout;
+        let sample = &layout.samples[place];
+        let from = sample.place(points);
+        for (number, tool) in step.tools.iter().enumerate() {
+            let key = |touch: &Touch| {
+                (layout.part_of_sample(touch.sample), touch.sample, touch.tool as usize)
+            };
+            let own = (sample.part as usize, sample.number, number);
+            // Of tools that are no longer there.
+            while kept.next_if(|touch| key(touch) < own).is_some() {}
+            let touch = kept.next_if(|touch| key(touch) == own);
+            let touch = touch.filter(|_| !self.jumped[number]);
+            let start = &self.starts[number];
+            if touch.is_none() && is_far(tool, start, from, farthest) {
+                continue;
+            }
+            let moved = Moved { from, to: from + sample.mean(|v| velocities[v]) * step.dt };
+            let own = (place as u32, foundation(&tool.law, sample));
+            let tool = (number as u32, tool);
+            self.touching.extend(Touching::find(own, tool, start, &moved, touch));
+        }
+    }
+
+    /// Where tools begin and end the step.
+    fn move_tools<S: Real>(&mut self, step: &ContactStep<'_, S>, kept: &ContactState) {
+        let tools = step.tools;
+        self.poses.clear();
+        self.poses.extend(tools.iter().map(|tool| tool.pose));
+        self.starts.clear();
+        self.jumped.clear();
+        for (number, tool) in tools.iter().enumerate() {
+            let before = kept.poses.get(number).unwrap_or(&tool.pose);
+            let way = (tool.pose.translation - before.translation).length();
+            let most = (FASTEST * step.dt).max(FARTHEST * tool.shape.thinnest().min(1.0));
+            let has_jumped = way > most;
+            self.jumped.push(has_jumped);
+            self.starts.push(if has_jumped { tool.pose } else { *before });
+        }
+    }
+
+    /// What the motion of tools gives to parts that stand still at `x`.
+    fn weigh<S: Real>(&mut self, step: &ContactStep<'_, S>, x: &[Point<S>]) {
+        for part in 0..step.layout.part_count() {
+            let after = self.sums(step, part, x);
+            self.presses[part] = after.presses;
+            self.gifts[part] = Gift {
+                is_near: !self.of_part(part).is_empty(),
+                lifted: after.energy,
+                work: [0.0; 2],
+            };
+        }
+        let ends = std::mem::replace(&mut self.poses, std::mem::take(&mut self.starts));
+        for part in 0..step.layout.part_count() {
+            let before = self.sums(step, part, x);
+            self.gifts[part].lifted -= before.energy;
+        }
+        self.starts = std::mem::replace(&mut self.poses, ends);
+    }
+
+    /// Work [J] along the way of the tools of the forces at the end of the last step, of every part.
+    fn work_before<S: Real>(&mut self, step: &ContactStep<'_, S>, kept: &ContactState) {
+        for touch in &kept.touches {
+            let tool = touch.tool as usize;
+            let is_known = (touch.sample as usize) < step.layout.samples.len();
+            if is_known && self.jumped.get(tool) == Some(&false) {
+                let arm = touch.place - self.starts[tool].translation;
+                let work = self.work_of(step, tool, touch.force, arm);
+                self.gifts[step.layout.part_of_sample(touch.sample)].work[0] += work;
+            }
+        }
+    }
+}
+
+/// The constants of contact between a tool and a sample.
+fn foundation(law: &ContactLaw, sample: &LaidSample) -> Foundation {
+    Foundation {
+        area: sample.area,
+        stiffness: law.stiffness * sample.stiffness,
+        thickness: law.thickness,
+    }
+}
+
+/// Whether a sample at `from` [m], which goes no farther than `farthest` [m], surely does not meet a tool.
+fn is_far(tool: &Tool, start: &RigidTransform, from: Vec3<f64>, farthest: f64) -> bool {
+    let distance = tool.shape.distance(start.undo(from)).value;
+    if *start == tool.pose {
+        return distance > 2.0 * (tool.law.thickness + farthest);
+    }
+    // The tool's own motion as the sample sees it.
+    let way = (tool.pose.undo(from) - start.undo(from)).length();
+    distance > 2.0 * (tool.law.thickness + farthest + way)
+}
