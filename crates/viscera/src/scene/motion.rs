@@ -4,8 +4,8 @@
 //! `x -> c + R(r) (x - c) + t`, with Rodrigues' formula `R = I + sin(a) K + (1 - cos(a)) K^2`,
 //! `a = |r|`, `K` the cross product with `r/a`. Between keys `r` and `t` are interpolated.
 
+use super::common::Interpolation;
 use super::selector::Patch;
-use super::tables::Interpolation;
 use crate::scalar::Vec3;
 use crate::scalar::rigid::RigidTransform;
 
@@ -95,7 +95,8 @@ impl Force {
 }
 
 impl Interpolation {
-    fn shape(self, share: f64) -> f64 {
+    /// How far values have passed, of how far time has (0 to 1).
+    pub(super) fn shape(self, share: f64) -> f64 {
         match self {
             Self::Linear => share,
             Self::Smooth => share * share * (3.0 - 2.0 * share),
@@ -105,12 +106,16 @@ impl Interpolation {
 
 /// Exact at both ends, and where they are the same: a hold that stood still stands still once it is read
 /// from a file, which tells of the end of that as well.
-fn mix(a: Vec3<f64>, b: Vec3<f64>, share: f64) -> Vec3<f64> {
+pub(super) fn mix(a: Vec3<f64>, b: Vec3<f64>, share: f64) -> Vec3<f64> {
     if a == b { a } else { a * (1.0 - share) + b * share }
 }
 
 /// The keys before and after a time, and how far it is from one to the other (0 to 1).
-fn between<K>(keys: &[K], time_of: impl Fn(&K) -> f64, time: f64) -> (Option<&K>, Option<&K>, f64) {
+pub(super) fn between<K>(
+    keys: &[K],
+    time_of: impl Fn(&K) -> f64,
+    time: f64,
+) -> (Option<&K>, Option<&K>, f64) {
     let next = keys.partition_point(|key| time_of(key) <= time);
     match (next.checked_sub(1).and_then(|last| keys.get(last)), keys.get(next)) {
         (Some(a), Some(b)) => (Some(a), Some(b), (time - time_of(a)) / (time_of(b) - time_of(a))),

@@ -1,6 +1,6 @@
 //! Why a simulation cannot be built, changed, or go on.
 
-use super::assemble::AssembleError;
+use super::assemble_error::AssembleError;
 use crate::model::ModelError;
 use crate::scene::SceneError;
 use crate::settings::DeviceRequest;

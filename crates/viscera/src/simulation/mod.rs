@@ -2,6 +2,7 @@
 
 pub mod advice;
 mod assemble;
+mod assemble_error;
 mod automatic;
 mod choice;
 mod device;
@@ -17,8 +18,10 @@ mod on_device;
 mod rest;
 mod saved;
 mod sent;
+mod touchable;
 
-pub use assemble::{AssembleError, AssembledBody, Assembly, Refinement, ResolvedPatch};
+pub use assemble::{AssembledBody, Assembly, Refinement, ResolvedPatch};
+pub use assemble_error::AssembleError;
 pub use automatic::{ExpectedErrors, automatic_settings};
 pub use error::{FrameError, LiveError, SimulationError};
 pub use forces::Hold;
