@@ -100,6 +100,14 @@ impl<S: Real> Backend<S> {
         Self { engine, choice, warning: None, gives_way: false, rejected: 0 }
     }
 
+    /// The solver of the CPU, where that computes.
+    pub fn cpu_solver(&self) -> Option<&Solver<S>> {
+        match &self.engine {
+            Engine::Cpu(solver) => Some(solver),
+            Engine::Device(_) => None,
+        }
+    }
+
     /// The solver on a graphics processor, where that computes.
     pub fn device(&self) -> Option<&dyn DeviceSolver<S>> {
         match &self.engine {

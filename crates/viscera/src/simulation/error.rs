@@ -20,7 +20,7 @@ pub enum SimulationError {
         "the scene has {expected} {what} and the assembly {found}; assemble the scene that is simulated"
     )]
     OtherScene {
-        /// "bodies", "fixings", "motions" or "forces".
+        /// "bodies", "fixings", "motions", "forces" or "tools".
         what: &'static str,
         /// How many the assembly has.
         found: usize,
@@ -41,6 +41,15 @@ pub enum SimulationError {
          `--features gpu`, or use `device = \"cpu\"`"
     )]
     NoGpuBackend {
+        /// What was asked for.
+        device: DeviceRequest,
+    },
+    /// A device was asked for in a scene with tools.
+    #[error(
+        "`device = \"{device}\"`: contact is computed on the CPU, and this scene has tools; use `device = \"cpu\"` or \
+         `device = \"auto\"`"
+    )]
+    ToolsOnDevice {
         /// What was asked for.
         device: DeviceRequest,
     },
