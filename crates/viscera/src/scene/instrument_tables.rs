@@ -26,15 +26,19 @@ settings_table! {
         size: Option<[f64; 3]> = None, optional(several::<3, _>(quantity(Dimension::Length, SIZE)));
         /// Radius of the edges of a box, a blade or jaws, at most half the smallest size. Where unset, half of the
         /// smallest size for a blade and a quarter for the others.
-        rounding: Option<f64> = None, optional(quantity(Dimension::Length, at_least(0.0).up_to(100.0)));
+        rounding: Option<f64> = None,
+            optional(quantity(Dimension::Length, at_least(0.0).up_to(100.0)));
         /// Length of the tip of a hook.
         tip_length: Option<f64> = None, optional(quantity(Dimension::Length, SIZE));
         /// Angle between the tip and the shaft of a hook; "90 deg" where unset.
-        tip_angle: Option<f64> = None, optional(quantity(Dimension::Angle, above(0.0).below(std::f64::consts::PI)));
+        tip_angle: Option<f64> = None,
+            optional(quantity(Dimension::Angle, above(0.0).below(std::f64::consts::PI)));
         /// Width (along x), thickness and length of each jaw of a grasper.
-        jaw_size: Option<[f64; 3]> = None, optional(several::<3, _>(quantity(Dimension::Length, SIZE)));
+        jaw_size: Option<[f64; 3]> = None,
+            optional(several::<3, _>(quantity(Dimension::Length, SIZE)));
         /// Distance between the jaws of a grasper at angle zero; none where unset.
-        jaw_gap: Option<f64> = None, optional(quantity(Dimension::Length, at_least(0.0).up_to(100.0)));
+        jaw_gap: Option<f64> = None,
+            optional(quantity(Dimension::Length, at_least(0.0).up_to(100.0)));
         /// Where the tool's origin is put.
         position: Vec3<f64> = (Vec3::ZERO), vector(Dimension::Length);
         /// Axis through the tool's origin that it is turned about before it is put in place.
@@ -57,17 +61,21 @@ settings_table! {
         /// tissue holds against the force.
         closing_force: Vec<Placed<ClosingKeyTable>> = (Vec::new()), tables::<ClosingKeyTable>();
         /// With `closing_force`, the opening angle at the beginning, which is also the widest; "60 deg" where unset.
-        jaw_open: Option<f64> = None, optional(quantity(Dimension::Angle, above(0.0).up_to(WIDEST)));
+        jaw_open: Option<f64> = None,
+            optional(quantity(Dimension::Angle, above(0.0).up_to(WIDEST)));
         /// With `closing_force`, the time in which jaws that nothing holds close from there; "0.5 s" where unset.
-        closing_time: Option<f64> = None, optional(quantity(Dimension::Time, at_least(1e-3).up_to(1e3)));
+        closing_time: Option<f64> = None,
+            optional(quantity(Dimension::Time, at_least(1e-3).up_to(1e3)));
         /// Times at which what the jaws press on is tied to them, as by a ratchet and teeth.
         lock: Vec<Placed<LockTable>> = (Vec::new()), tables::<LockTable>();
         /// Coefficient of friction against tissue; 0.1 is slippery, 0.8 ridged jaws.
-        friction: f64 = (ContactLaw::default().friction), number(at_least(0.0)).checked(check_friction);
+        friction: f64 = (ContactLaw::default().friction),
+            number(at_least(0.0)).checked(check_friction);
         /// Stiffness of the contact, in units of the tissue's Young's modulus over the length of its edges.
         stiffness: f64 = (ContactLaw::default().stiffness), number(at_least(1e-3).up_to(1e6));
         /// Distance at which contact begins: surfaces rest up to this far apart.
-        thickness: f64 = (ContactLaw::default().thickness), quantity(Dimension::Length, at_least(1e-6).up_to(1.0));
+        thickness: f64 = (ContactLaw::default().thickness),
+            quantity(Dimension::Length, at_least(1e-6).up_to(1.0));
     }
 }
 
