@@ -2,7 +2,8 @@
 
 use super::build_instrument::build_instruments;
 use super::checks::{check_name, check_times, name_or_number, purpose};
-use super::motion::{Force, ForceKey, Motion, MotionKey};
+use super::keys::MotionKey;
+use super::motion::{Force, ForceKey, Motion};
 use super::selector::{Patch, Selector};
 use super::tables::{
     BodyTable, ChangeTable, ForceTable, MaterialTable, MotionTable, PatchTable, SceneTable,

@@ -4,7 +4,7 @@ use super::SceneError;
 use super::checks::{check_name, check_times, name_or_number, purpose};
 use super::instrument::{Course, Instrument, JawDrive, JawKey, Jaws, Part, ToolKind};
 use super::instrument_tables::{ToolTable, WIDEST};
-use super::motion::MotionKey;
+use super::keys::MotionKey;
 use crate::contact::{ContactLaw, Shape};
 use crate::scalar::rigid::RigidTransform;
 use crate::scalar::{Vec3, vec3};

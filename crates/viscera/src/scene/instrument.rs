@@ -9,7 +9,7 @@
 //! along -z from a hinge at the origin, and open along y.
 
 use super::common::Interpolation;
-use super::motion::{MotionKey, between, mix};
+use super::keys::{MotionKey, between, mix};
 use crate::contact::{ContactLaw, Shape, Tool};
 use crate::scalar::Vec3;
 use crate::scalar::rigid::{RigidTransform, rotation_matrix};
@@ -282,7 +282,9 @@ mod tests {
         let keys = vec![key(0.0, 0.0, 0.0), key(1.0, 0.2, 0.5 * PI)];
         let tool = instrument(vec![ball], keys, None);
         let mut parts = Vec::new();
-        [0.0, 0.5, 1.0].map(|time| tool.parts_at(time, 0.0, &mut parts));
+        for time in [0.0, 0.5, 1.0] {
+            tool.parts_at(time, 0.0, &mut parts);
+        }
         // A quarter of a turn of its own, and another one of its keys.
         let half = 0.01 * libm::sqrt(0.5);
         let places = [vec3(0.1, 0.01, 0.0), vec3(0.2 - half, half, 0.0), vec3(0.29, 0.0, 0.0)];

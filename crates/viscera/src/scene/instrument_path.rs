@@ -1,6 +1,6 @@
 //! Paths of tools from files: rows of time [s], place [m] and rotation vector [rad], separated by commas.
 
-use super::motion::MotionKey;
+use super::keys::MotionKey;
 use crate::scalar::Vec3;
 use std::f64::consts::TAU;
 

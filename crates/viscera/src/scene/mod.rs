@@ -35,6 +35,7 @@ mod describe;
 mod instrument;
 mod instrument_path;
 mod instrument_tables;
+mod keys;
 mod motion;
 mod selector;
 mod tables;
@@ -44,7 +45,8 @@ pub use common::Interpolation;
 pub use describe::{describe, describe_markdown, describe_text};
 pub use instrument::{Course, Instrument, JawDrive, JawKey, Jaws, Part, ToolKind};
 pub use instrument_path::{PathError, read_path};
-pub use motion::{Force, ForceKey, Motion, MotionKey};
+pub use keys::MotionKey;
+pub use motion::{Force, ForceKey, Motion};
 
 pub use crate::scalar::rigid::RigidTransform;
 pub use selector::{Patch, SelectError, Selector, nearest_pair};

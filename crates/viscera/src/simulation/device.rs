@@ -3,6 +3,7 @@
 use std::fmt::Debug;
 
 use super::error::FrameError;
+use crate::contact::Wrench;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
@@ -100,11 +101,11 @@ impl<S: Real> Backend<S> {
         Self { engine, choice, warning: None, gives_way: false, rejected: 0 }
     }
 
-    /// The solver of the CPU, where that computes.
-    pub fn cpu_solver(&self) -> Option<&Solver<S>> {
+    /// What each part of the last step's tools met; nothing before the first step, and of devices, which have no contact.
+    pub fn wrenches(&self) -> &[Wrench] {
         match &self.engine {
-            Engine::Cpu(solver) => Some(solver),
-            Engine::Device(_) => None,
+            Engine::Cpu(solver) => solver.wrenches(),
+            Engine::Device(_) => &[],
         }
     }
 

@@ -8,8 +8,6 @@
 //! Force-driven jaws are quasi-static: they have no inertia, close at a limited speed, and stop where tissue holds against
 //! the force. What they met at the end of a frame decides their speed in the next one, which is part of a saved simulation.
 
-use super::Simulation;
-use super::device::Backend;
 use crate::contact::{Tool, Wrench};
 use crate::scalar::rigid::{RigidTransform, rotation_vector};
 use crate::scalar::{Real, Vec3, vec3};
@@ -110,7 +108,7 @@ impl Instruments {
     }
 
     /// The opening angle of a tool's jaws at a time [s], from the frame to come on; zero where it has none [rad].
-    fn angle(&self, index: usize, tool: &Instrument, time: f64) -> f64 {
+    pub fn angle(&self, index: usize, tool: &Instrument, time: f64) -> f64 {
         let now = match (&tool.jaws, self.jaws.get(index)) {
             (Some(jaws), Some(jaw)) => {
                 let angle = jaw.angle + jaw.speed * (time - self.since).max(0.0);
@@ -127,7 +125,8 @@ impl Instruments {
         self.parts_at(tools, time, &mut inputs.tools);
     }
 
-    fn parts_at(&self, tools: &[Instrument], time: f64, parts: &mut Vec<Tool>) {
+    /// Adds the parts of all tools, where they are at a time [s].
+    pub fn parts_at(&self, tools: &[Instrument], time: f64, parts: &mut Vec<Tool>) {
         for (index, tool) in tools.iter().enumerate() {
             tool.parts_at(time, self.angle(index, tool, time), parts);
         }
@@ -250,7 +249,7 @@ fn torque_about(point: Vec3<f64>, wrench: &Wrench, placed: &Tool) -> Vec3<f64> {
 }
 
 /// Forces on tools at a time [s]; `parts` and `wrenches` are those of the last step.
-fn forces_on(
+pub(super) fn forces_on(
     tools: &[Instrument],
     wrenches: &[Wrench],
     parts: &[Tool],
@@ -282,38 +281,4 @@ fn forces_on(
         });
     }
     forces
-}
-
-impl<S: Real> Simulation<S> {
-    /// Forces on the scene's tools at the end of the last frame; zero before the first and after a change of settings.
-    pub fn tool_forces(&self) -> Vec<ToolForce> {
-        forces_on(&self.assembly.tools, self.backend.wrenches(), &self.inputs.tools, self.time())
-    }
-
-    /// The opening angle [rad] of a tool's jaws at the end of the last frame; nothing where it has none.
-    pub fn jaw_angle(&self, tool: usize) -> Option<f64> {
-        let at = self.assembly.tools.get(tool).filter(|tool| tool.jaws.is_some())?;
-        Some(self.instruments.angle(tool, at, self.time()))
-    }
-
-    /// The parts of all tools at the end of the last frame, tool by tool.
-    pub fn tool_parts(&self) -> Vec<Tool> {
-        let mut parts = Vec::new();
-        self.instruments.parts_at(&self.assembly.tools, self.time(), &mut parts);
-        parts
-    }
-
-    /// Jaws go on by what they met in the frame that has ended.
-    pub(super) fn lead_jaws(&mut self) {
-        let (time, frame) = (self.time(), self.scene.time.frame);
-        let Self { instruments, assembly, backend, inputs, .. } = self;
-        instruments.follow(&assembly.tools, backend.wrenches(), &inputs.tools, (time, frame));
-    }
-}
-
-impl<S: Real> Backend<S> {
-    /// What each part of the last step's tools met; nothing before the first step, and of devices, which have no contact.
-    fn wrenches(&self) -> &[Wrench] {
-        self.cpu_solver().map_or(&[], |solver| solver.wrenches())
-    }
 }

@@ -20,6 +20,7 @@ mod report;
 mod rest;
 mod saved;
 mod sent;
+mod tool_forces;
 mod touchable;
 
 pub use assemble::{AssembledBody, Assembly, Refinement, ResolvedPatch};

@@ -96,8 +96,8 @@ fn numbers_that_no_tool_has_are_refused() {
     ] {
         assert_eq!(parse(&replaced(ball, new)).map(|_| ()), Err(message.to_owned()));
     }
-    let error = parse(&replaced("kind = \"sphere\"", "kind = \"spear\"")).map(|_| ());
-    let message = "t.toml, line 14, column 1: kind = \"spear\": did you mean `sphere`? Valid: half_space, sphere, capsule, \
+    let error = parse(&replaced("kind = \"sphere\"", "kind = \"sphre\"")).map(|_| ());
+    let message = "t.toml, line 14, column 1: kind = \"sphre\": did you mean `sphere`? Valid: half_space, sphere, capsule, \
                    box, probe, blade, hook, grasper";
     assert_eq!(error, Err(message.to_owned()));
 }
@@ -207,7 +207,7 @@ fn tools_that_tissue_cannot_meet_are_refused() {
             "radius = \"4 mm\"",
             "radius = \"0.5 mm\"",
             "t.toml, line 12, column 1: tool `ball` has a radius of 0.500 mm at its thinnest, and `block` is touched at \
-             points about 1.503 mm apart; take a finer mesh of `block` or a thicker tool",
+             points about 1.491 mm apart; take a finer mesh of `block` or a thicker tool",
         ),
         (
             "position = [0, 0, \"-5 mm\"]",
