@@ -13,6 +13,7 @@ mod run;
 mod scene;
 mod series;
 mod summary;
+mod tool_table;
 mod view;
 
 use clap::{Parser, Subcommand};

@@ -5,6 +5,7 @@ use crate::output::OutputFolder;
 use crate::progress;
 use crate::series::Series;
 use crate::summary::{FrameLine, Summary};
+use crate::tool_table::ToolTable;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -23,7 +24,8 @@ use viscera_resources::{BuiltInScene, Memory, MeshFiles, files, memory};
 ///
 /// Writes to the output folder: tissue.pvd (open it in ParaView: displacement, velocity, J,
 /// principal stretches, von Mises stress, energy density, region), surface.pvd, final.vtu,
-/// final_surface.obj, picture.png, motion.gif and summary.json. Ctrl-C and SIGTERM end a run cleanly: what
+/// final_surface.obj, picture.png, motion.gif and summary.json; of a scene with tools also tools.csv, the force on
+/// each tool in each frame. Ctrl-C and SIGTERM end a run cleanly: what
 /// is finished is kept, summary.json says so, and the exit code is 130. Of more than 2,000 frames
 /// summary.json has every second, fourth ... and the last.
 #[derive(Args)]
@@ -153,10 +155,11 @@ fn simulate<S: Real>(
     let mut recording = Recording {
         film: draws.then(|| Film::new(&simulation, frames)).transpose()?,
         series: Series::create(out, &simulation)?,
+        tools: ToolTable::new(&simulation.scene().tools),
         summary,
     };
     let ended = recording.compute(&mut simulation, frames, interrupted);
-    let Recording { film, series, mut summary } = recording;
+    let Recording { film, series, tools, mut summary } = recording;
     let (mut series, written) = series.end();
     let ended = ended.and(written);
     let complete = simulation.frame() == frames;
@@ -176,6 +179,7 @@ fn simulate<S: Real>(
     summary.warnings.extend(simulation.device_warning().map(String::from));
     // Numbers before meshes and pictures: those take a while, and may be what failed.
     write_summary(out, &summary)?;
+    tools.write(out)?;
     // Positions that are NaN are no mesh; the frames before them are.
     match &ended {
         Ok(()) => series.finish(&simulation)?,
@@ -321,6 +325,7 @@ fn build<S: Real>(
 struct Recording<S: Real> {
     film: Option<Film>,
     series: Series<S>,
+    tools: ToolTable,
     summary: Summary,
 }
 
@@ -356,6 +361,7 @@ impl<S: Real> Recording<S> {
             if let Some(film) = &mut self.film {
                 film.push(simulation, &report, last);
             }
+            self.tools.push(&report);
             self.summary.frames.push(FrameLine { report, wall_seconds });
             let speed = (simulation.time() - begin) / wall_total;
             bar.set_position(simulation.frame());

@@ -199,6 +199,9 @@ impl Summary {
             for patch in &last.report.patches {
                 text.push_str(&format!("{patch:.4}\n"));
             }
+            for tool in &last.report.tools {
+                text.push_str(&format!("{tool:.4}\n"));
+            }
             let (time, wall) = (last.report.time, self.wall_seconds());
             text.push_str(&format!(
                 "{time:.2} s simulated in {wall:.2} s: {:.2} x real time, {:.2} ms per frame\n",
@@ -319,6 +322,8 @@ mod tests {
             energy: Energies::default(),
             deformation,
             patches: Vec::new(),
+            divided: 1,
+            tools: Vec::new(),
         };
         FrameLine { report, wall_seconds: 0.5 }
     }

@@ -1,12 +1,15 @@
 //! From the tables of a scene file to a scene: what one key alone cannot know is checked here.
 
-use super::motion::{Force, ForceKey, Motion, MotionKey};
+use super::build_instrument::build_instruments;
+use super::checks::{check_name, check_times, name_or_number, purpose};
+use super::keys::MotionKey;
+use super::motion::{Force, ForceKey, Motion};
 use super::selector::{Patch, Selector};
 use super::tables::{
     BodyTable, ChangeTable, ForceTable, MaterialTable, MotionTable, PatchTable, SceneTable,
     ShapeName, SpringTable, TimeSettings,
 };
-use super::{Body, BodyShape, Change, Fixing, Region, Scene, SceneError, Spring, Written};
+use super::{Ball, Body, BodyShape, Change, Fixing, Region, Scene, SceneError, Spring, Written};
 use crate::material::{Material, MaterialModel};
 use crate::mesh::shapes::LIVER_SPACING;
 use crate::scalar::Vec3;
@@ -71,6 +74,7 @@ pub(super) fn build_scene(name: &str, tree: Node) -> Result<Scene, SceneError> {
         motions: build_motions(&bodies, &tables.motion)?,
         forces: build_forces(&bodies, &tables.force)?,
         springs: build_springs(&bodies, &tables.spring)?,
+        tools: build_instruments(&tables.tool)?,
         bodies,
         changes,
         solver: tables.solver,
@@ -179,30 +183,6 @@ fn check_frame_count(name: &str, time: &TimeSettings) -> Result<(), SceneError> 
     Ok(())
 }
 
-fn name_or_number(name: &Option<String>, kind: &str, index: usize) -> String {
-    name.clone().unwrap_or_else(|| format!("{kind} {index}"))
-}
-
-fn purpose(kind: &str, name: &Option<String>, index: usize) -> String {
-    match name {
-        Some(name) => format!("{kind} `{name}`"),
-        None => format!("{kind} {index}"),
-    }
-}
-
-fn check_name<T>(
-    others: &[T],
-    name_of: impl Fn(&T) -> &String,
-    name: &str,
-    kind: &'static str,
-    place: &Place,
-) -> Result<(), SceneError> {
-    if others.iter().any(|other| name_of(other) == name) {
-        return Err(SceneError::NameTaken { place: place.clone(), kind, name: shorten(name) });
-    }
-    Ok(())
-}
-
 fn build_body(table: &Placed<BodyTable>) -> Result<Body, SceneError> {
     let (place, body) = (&table.place, &table.value);
     let name = body.name.value.clone();
@@ -217,7 +197,9 @@ fn build_body(table: &Placed<BodyTable>) -> Result<Body, SceneError> {
             return Err(SceneError::NameTaken { place: place.clone(), kind: "region", name });
         }
         let material = build_material(&value.material, Some(&material), &owner, place)?;
-        regions.push(Region { label, material });
+        let ball =
+            value.sphere.as_ref().map(|ball| Ball { center: ball.center, radius: ball.radius });
+        regions.push(Region { label, ball, material });
     }
     let rotation = body.rotation_axis * body.rotation_angle;
     let shape = build_shape(body).map_err(|problem| SceneError::Shape {
@@ -449,23 +431,4 @@ fn force_keys(table: &ForceTable, purpose: &str) -> Result<Vec<ForceKey>, SceneE
         factor: key.value.factor,
     };
     Ok(table.keys.iter().map(key).collect())
-}
-
-/// Times must ascend: two keys at one time would be a jump.
-fn check_times<'a>(
-    times: impl Iterator<Item = (&'a Place, f64)>,
-    purpose: &str,
-) -> Result<(), SceneError> {
-    let mut last = f64::NEG_INFINITY;
-    for (place, time) in times {
-        if time <= last {
-            return Err(SceneError::Keys {
-                place: place.clone(),
-                purpose: purpose.to_owned(),
-                problem: format!("its key at {time} s follows one at {last} s; times must ascend"),
-            });
-        }
-        last = time;
-    }
-    Ok(())
 }

@@ -27,21 +27,33 @@
 //! ```
 
 mod build;
+mod build_instrument;
 mod change;
+mod checks;
+mod common;
 mod describe;
+mod instrument;
+mod instrument_path;
+mod instrument_tables;
+mod keys;
 mod motion;
 mod selector;
 mod tables;
 mod write;
 
+pub use common::Interpolation;
 pub use describe::{describe, describe_markdown, describe_text};
-pub use motion::{Force, ForceKey, Motion, MotionKey};
+pub use instrument::{Course, Instrument, JawDrive, JawKey, Jaws, Part, ToolKind};
+pub use instrument_path::{PathError, read_path};
+pub use keys::MotionKey;
+pub use motion::{Force, ForceKey, Motion};
 
 pub use crate::scalar::rigid::RigidTransform;
 pub use selector::{Patch, SelectError, Selector, nearest_pair};
-pub use tables::{Interpolation, OutputSettings, TimeSettings, WorldSettings};
+pub use tables::{OutputSettings, TimeSettings, WorldSettings};
 
 use crate::material::{Material, MaterialError};
+use crate::scalar::Vec3;
 use crate::settings::{Node, Place, SettingError, SolverSettings};
 
 /// Settings that change at a time; positions and velocities stay.
@@ -76,6 +88,8 @@ pub struct Scene {
     pub forces: Vec<Force>,
     /// Springs between two vertices.
     pub springs: Vec<Spring>,
+    /// Tools that touch tissue, and fixed obstacles.
+    pub tools: Vec<Instrument>,
     /// Settings that change while it runs, times ascending.
     pub changes: Vec<Change>,
     /// How a step is solved.
@@ -175,8 +189,19 @@ pub enum BodyShape {
 pub struct Region {
     /// The label its tetrahedra carry.
     pub label: u32,
+    /// The ball whose tetrahedra, by their middles, get the label; nothing where the mesh has it.
+    pub ball: Option<Ball>,
     /// Its material.
     pub material: Material,
+}
+
+/// A ball in the world, at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// [m].
+    pub center: Vec3<f64>,
+    /// [m].
+    pub radius: f64,
 }
 
 /// Where a body is held.
@@ -269,6 +294,16 @@ pub enum SceneError {
         place: Place,
         /// The body.
         body: String,
+        /// What is wrong and what to write.
+        problem: String,
+    },
+    /// A tool without sizes, or with keys that do not go together.
+    #[error("{place}: {purpose}: {problem}")]
+    Tool {
+        /// Where the tool is.
+        place: Place,
+        /// Which tool, in messages: "tool `probe`".
+        purpose: String,
         /// What is wrong and what to write.
         problem: String,
     },
@@ -368,6 +403,13 @@ impl Scene {
                         files.push(file);
                     }
                 }
+            }
+        }
+        for tool in &self.tools {
+            if let Course::File { path } = &tool.course
+                && !files.contains(&path.as_str())
+            {
+                files.push(path);
             }
         }
         files

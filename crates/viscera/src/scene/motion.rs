@@ -4,21 +4,11 @@
 //! `x -> c + R(r) (x - c) + t`, with Rodrigues' formula `R = I + sin(a) K + (1 - cos(a)) K^2`,
 //! `a = |r|`, `K` the cross product with `r/a`. Between keys `r` and `t` are interpolated.
 
+use super::common::Interpolation;
+use super::keys::{MotionKey, between, mix};
 use super::selector::Patch;
-use super::tables::Interpolation;
 use crate::scalar::Vec3;
 use crate::scalar::rigid::RigidTransform;
-
-/// A pose at a time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MotionKey {
-    /// [s].
-    pub time: f64,
-    /// Displacement from rest [m].
-    pub translation: Vec3<f64>,
-    /// Axis times angle [rad].
-    pub rotation: Vec3<f64>,
-}
 
 /// A patch that is held and moved along a path.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,31 +81,6 @@ impl Force {
         let Some((a, b)) = before.zip(after) else { return self.force };
         let share = self.interpolation.shape(share);
         self.force * (a.factor * (1.0 - share) + b.factor * share)
-    }
-}
-
-impl Interpolation {
-    fn shape(self, share: f64) -> f64 {
-        match self {
-            Self::Linear => share,
-            Self::Smooth => share * share * (3.0 - 2.0 * share),
-        }
-    }
-}
-
-/// Exact at both ends, and where they are the same: a hold that stood still stands still once it is read
-/// from a file, which tells of the end of that as well.
-fn mix(a: Vec3<f64>, b: Vec3<f64>, share: f64) -> Vec3<f64> {
-    if a == b { a } else { a * (1.0 - share) + b * share }
-}
-
-/// The keys before and after a time, and how far it is from one to the other (0 to 1).
-fn between<K>(keys: &[K], time_of: impl Fn(&K) -> f64, time: f64) -> (Option<&K>, Option<&K>, f64) {
-    let next = keys.partition_point(|key| time_of(key) <= time);
-    match (next.checked_sub(1).and_then(|last| keys.get(last)), keys.get(next)) {
-        (Some(a), Some(b)) => (Some(a), Some(b), (time - time_of(a)) / (time_of(b) - time_of(a))),
-        (Some(last), None) => (Some(last), Some(last), 0.0),
-        (None, first) => (first, first, 0.0),
     }
 }
 

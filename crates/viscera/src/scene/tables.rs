@@ -1,5 +1,7 @@
 //! The tables of a scene file as they are written; `Scene::parse` makes a `Scene` of them.
 
+use super::common::{Interpolation, SIZE};
+use super::instrument_tables::ToolTable;
 use crate::material::{LARGEST_POISSON, Preset};
 use crate::material::{
     MaterialModel, check_density, check_poisson, check_viscosity, check_young, preset,
@@ -33,6 +35,8 @@ settings_table! {
         force: Vec<Placed<ForceTable>> = (Vec::new()), tables::<ForceTable>();
         /// Springs between two vertices.
         spring: Vec<Placed<SpringTable>> = (Vec::new()), tables::<SpringTable>();
+        /// Tools that touch tissue, and fixed obstacles.
+        tool: Vec<Placed<ToolTable>> = (Vec::new()), tables::<ToolTable>();
         /// Settings that change while the scene runs.
         change: Vec<Placed<ChangeTable>> = (Vec::new()), tables::<ChangeTable>();
         /// How a step is solved.
@@ -104,9 +108,6 @@ choices! {
         Liver = "liver",
     }
 }
-
-/// Sizes from a micrometre to a hundred metres: what lies beyond is a slip of the unit.
-const SIZE: Range = at_least(1e-6).up_to(100.0);
 
 /// From far below a gel to diamond, and the same for the two below. What lies beyond is a slip of
 /// the unit, and the constants of a step would leave single precision: the run would diverge with
@@ -195,8 +196,11 @@ settings_table! {
 settings_table! {
     /// A part of a body that is made of something else: the body's material with these changes.
     pub(super) struct RegionTable {
-        /// The label that the part's tetrahedra carry in the mesh file.
+        /// The label that the part's tetrahedra carry: in the mesh file, or by `sphere`.
         label: u32 = required, whole(0, u32::MAX);
+        /// Gives the label to the tetrahedra whose middle lies in this ball, in world coordinates at rest: a lump in a
+        /// shape. The mesh's own labels where unset.
+        sphere: Option<SphereTable> = None, optional(table::<SphereTable>());
         with MaterialTable as material;
     }
 }
@@ -269,16 +273,6 @@ settings_table! {
         /// held equally firmly. Rigid where unset.
         stiffness: Option<f64> = None, optional(quantity(Dimension::Stiffness, STIFFNESS));
         with PatchTable as patch;
-    }
-}
-
-choices! {
-    /// How values pass from one key to the next.
-    pub enum Interpolation {
-        /// With zero velocity at each key (3 s^2 - 2 s^3).
-        Smooth = "smooth",
-        /// With constant velocity between keys.
-        Linear = "linear",
     }
 }
 

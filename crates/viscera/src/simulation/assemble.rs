@@ -1,92 +1,15 @@
 //! From a scene and its files to meshes in the world, vertex patches and a model builder.
 
-use crate::mesh::embed::{Embedding, EmbeddingError};
-use crate::mesh::io::{self, ReadError, ReadReport};
+use super::assemble_error::{AssembleError, MOST_REFINED};
+use crate::mesh::embed::Embedding;
+use crate::mesh::io::{self, ReadReport};
 use crate::mesh::refine::{self, Middles};
-use crate::mesh::shapes::{self, ShapeError};
+use crate::mesh::shapes;
 use crate::mesh::topology::{boundary_surface, connected_components};
-use crate::mesh::{MeshError, SurfaceMesh, TetMesh};
-use crate::model::{ModelBuilder, ModelError};
+use crate::mesh::{SurfaceMesh, TetMesh};
+use crate::model::ModelBuilder;
 use crate::scalar::Vec3;
-use crate::scene::{Body, BodyShape, Scene, SceneError, nearest_pair};
-
-/// Tetrahedra that refinement makes at most: some gigabytes. Finer meshes are read from files.
-const MOST_REFINED: usize = 10_000_000;
-
-/// Why a scene cannot be put together.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum AssembleError {
-    /// A file could not be loaded; the caller's words.
-    #[error("{message}")]
-    Load {
-        /// What the caller said.
-        message: String,
-    },
-    /// A mesh file is damaged or of another kind.
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    /// A shape cannot be made.
-    #[error("body `{body}`: {error}")]
-    Shape {
-        /// The body.
-        body: String,
-        /// Why not.
-        error: ShapeError,
-    },
-    /// A placement that takes a mesh out of the world.
-    #[error("body `{body}` where the scene puts it: {error}")]
-    Placement {
-        /// The body.
-        body: String,
-        /// Why not.
-        error: MeshError,
-    },
-    /// A refinement with more tetrahedra than a machine has memory for.
-    #[error(
-        "body `{body}`: `refine = {refine}` makes {count} tetrahedra of {before}, more than {MOST_REFINED}; lower it"
-    )]
-    TooFine {
-        /// The body.
-        body: String,
-        /// How often it was to be refined.
-        refine: u32,
-        /// Tetrahedra before.
-        before: usize,
-        /// And after.
-        count: usize,
-    },
-    /// A surface that cannot be bound to its tetrahedra.
-    #[error("body `{body}`: {error}")]
-    Embedding {
-        /// The body.
-        body: String,
-        /// Why not.
-        error: EmbeddingError,
-    },
-    /// A material for a region that the mesh does not have.
-    #[error("body `{body}` has no region {label}; its regions are {known}")]
-    UnknownRegion {
-        /// The body.
-        body: String,
-        /// The label given.
-        label: u32,
-        /// The labels there are.
-        known: String,
-    },
-    /// A patch selects nothing.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// A spring between two patches without two different points.
-    #[error("{spring} finds no two vertices apart from each other; choose other patches")]
-    Spring {
-        /// The spring.
-        spring: String,
-    },
-    /// The model cannot be built.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-}
+use crate::scene::{Body, BodyShape, Instrument, Region, Scene, nearest_pair};
 
 /// A mesh before it was refined.
 #[derive(Clone, Debug)]
@@ -140,6 +63,8 @@ pub struct Assembly {
     pub motions: Vec<ResolvedPatch>,
     /// Patches of the scene's forces.
     pub forces: Vec<ResolvedPatch>,
+    /// The scene's tools, paths from files as keys.
+    pub tools: Vec<Instrument>,
     /// What was repaired, and what a person should know before waiting for the result.
     pub notes: Vec<String>,
 }
@@ -156,6 +81,9 @@ impl Assembly {
             assembly.add_body(body, load)?;
         }
         assembly.add_patches(scene)?;
+        assembly.add_tools(scene, load)?;
+        assembly.take_samples()?;
+        assembly.check_tools_outside()?;
         assembly.note_overlaps(scene);
         assembly.note_loose_parts(scene);
         Ok(assembly)
@@ -178,6 +106,8 @@ impl Assembly {
             finer.put(body, mesh, Some(refinement), fine)?;
         }
         finer.add_patches(scene)?;
+        finer.tools.clone_from(&self.tools);
+        finer.take_samples()?;
         Ok(finer)
     }
 
@@ -188,6 +118,7 @@ impl Assembly {
             fixings: Vec::new(),
             motions: Vec::new(),
             forces: Vec::new(),
+            tools: Vec::new(),
             notes: Vec::new(),
         }
     }
@@ -243,6 +174,7 @@ impl Assembly {
         let (mesh, _) =
             placed.map_err(|error| AssembleError::Placement { body: body.name.clone(), error })?;
         self.note_report(&body.name, &report);
+        let mesh = labelled(body, mesh)?;
         let (mesh, refinement) = refined(body, mesh)?;
         let surface =
             surface.map(|surface| SurfaceMesh { vertices: place(&surface.vertices), ..surface });
@@ -407,6 +339,36 @@ impl Assembly {
             }
         }
     }
+}
+
+/// A mesh in the world with the labels of the body's balls: of several the last.
+fn labelled(body: &Body, mesh: TetMesh) -> Result<TetMesh, AssembleError> {
+    let balls = || body.regions.iter().filter_map(|region| Some((region, region.ball?)));
+    if balls().next().is_none() {
+        return Ok(mesh);
+    }
+    let middle = |tet: &[u32; 4]| {
+        tet.iter().fold(Vec3::ZERO, |sum, &v| sum + mesh.vertices()[v as usize] * 0.25)
+    };
+    let middles: Vec<Vec3<f64>> = mesh.tets().iter().map(middle).collect();
+    let mut labels = mesh.regions().to_vec();
+    for (Region { label, .. }, ball) in balls() {
+        let mut nearest = f64::INFINITY;
+        for (own, middle) in labels.iter_mut().zip(&middles) {
+            let distance = (*middle - ball.center).length() - ball.radius;
+            nearest = nearest.min(distance);
+            if distance <= 0.0 {
+                *own = *label;
+            }
+        }
+        if nearest > 0.0 {
+            let (body, label) = (body.name.clone(), *label);
+            return Err(AssembleError::EmptyBall { body, label, distance: nearest });
+        }
+    }
+    TetMesh::new(mesh.vertices().to_vec(), mesh.tets().to_vec(), labels)
+        .map(|(mesh, _)| mesh)
+        .map_err(|error| AssembleError::Placement { body: body.name.clone(), error })
 }
 
 /// The mesh of a body as fine as it is asked for, and what it comes from.

@@ -25,6 +25,13 @@ impl<S: Real> Backend<S> {
             |reason| Ok(Self::cpu(ready.unwrap_or_else(|| Solver::new(model, settings)), reason));
         match (&settings.device, settings.method) {
             (DeviceRequest::Cpu, _) => cpu("as asked for"),
+            // Only scenes with tools have samples of their surfaces.
+            (DeviceRequest::Auto, _) if !model.samples.is_empty() => {
+                cpu("contact with tools is computed on the CPU")
+            }
+            (device, _) if !model.samples.is_empty() => {
+                Err(SimulationError::ToolsOnDevice { device: device.clone() })
+            }
             (DeviceRequest::Auto, Method::Auto | Method::QuasiNewton) => {
                 cpu("the quasi-Newton method is computed by the CPU")
             }

@@ -3,6 +3,7 @@
 use std::fmt::Debug;
 
 use super::error::FrameError;
+use crate::contact::Wrench;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
@@ -98,6 +99,14 @@ impl<S: Real> Backend<S> {
     /// A solver, for a reason.
     pub fn new(engine: Engine<S>, choice: String) -> Self {
         Self { engine, choice, warning: None, gives_way: false, rejected: 0 }
+    }
+
+    /// What each part of the last step's tools met; nothing before the first step, and of devices, which have no contact.
+    pub fn wrenches(&self) -> &[Wrench] {
+        match &self.engine {
+            Engine::Cpu(solver) => solver.wrenches(),
+            Engine::Device(_) => &[],
+        }
     }
 
     /// The solver on a graphics processor, where that computes.

@@ -1,6 +1,6 @@
 //! Why a simulation cannot be built, changed, or go on.
 
-use super::assemble::AssembleError;
+use super::assemble_error::AssembleError;
 use crate::model::ModelError;
 use crate::scene::SceneError;
 use crate::settings::DeviceRequest;
@@ -20,7 +20,7 @@ pub enum SimulationError {
         "the scene has {expected} {what} and the assembly {found}; assemble the scene that is simulated"
     )]
     OtherScene {
-        /// "bodies", "fixings", "motions" or "forces".
+        /// "bodies", "fixings", "motions", "forces" or "tools".
         what: &'static str,
         /// How many the assembly has.
         found: usize,
@@ -41,6 +41,15 @@ pub enum SimulationError {
          `--features gpu`, or use `device = \"cpu\"`"
     )]
     NoGpuBackend {
+        /// What was asked for.
+        device: DeviceRequest,
+    },
+    /// A device was asked for in a scene with tools.
+    #[error(
+        "`device = \"{device}\"`: contact is computed on the CPU, and this scene has tools; use `device = \"cpu\"` or \
+         `device = \"auto\"`"
+    )]
+    ToolsOnDevice {
         /// What was asked for.
         device: DeviceRequest,
     },

@@ -42,6 +42,7 @@ impl<S: Real> Simulation<S> {
     pub fn inputs_at(&self, time: f64) -> Inputs<S> {
         let mut inputs = Inputs::default();
         self.taken.act(&self.scene, &self.assembly, time, &mut inputs);
+        self.instruments.act(&self.assembly.tools, time, &mut inputs);
         inputs
     }
 

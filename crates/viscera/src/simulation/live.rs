@@ -1,10 +1,11 @@
 //! What is done to a running simulation by hand. All of it becomes part of the scene, so that a scene file
 //! with [`Live`] behind its other tables does the same to the bit.
 
-use super::Simulation;
 use super::automatic::{self, Chosen};
 use super::error::{LiveError, SimulationError};
 use super::holding::{GraspOrigins, tolerance};
+use super::instruments::Instruments;
+use super::{Simulation, check_contact};
 use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
@@ -140,6 +141,7 @@ impl<S: Real> Simulation<S> {
         fork.written = of_fork(&self.written)?;
         fork.frame = self.frame;
         fork.taken = self.taken.clone();
+        fork.instruments = self.instruments.clone();
         fork.changes_made = self.changes_made;
         fork.by_hand.clone_from(&self.by_hand);
         fork.balance.clone_from(&self.balance);
@@ -187,6 +189,9 @@ impl<S: Real> Simulation<S> {
         }
         self.assembly.motions.truncate(self.written.motions.len());
         self.taken = GraspOrigins::default();
+        let frame = self.scene.time.frame;
+        self.instruments = Instruments::new(&self.assembly.tools, frame);
+        self.divided = self.substeps;
         self.by_hand.clear();
         self.changes_made = 0;
         self.rejected_substeps = 0;
@@ -264,12 +269,14 @@ impl<S: Real> Simulation<S> {
             None => automatic::choose_method(&scene, &self.assembly, &model, on_device),
         };
         check_elements(&solver).map_err(SimulationError::from)?;
+        check_contact(&scene, &solver).map_err(SimulationError::from)?;
         let backend = self.backend.renew(same_device, &model, &solver, ready, &self.offered)?;
         self.under_way = false;
         let rest = State::at_rest(&model);
         let state = State {
             positions: std::mem::take(&mut self.state.positions),
             velocities: std::mem::take(&mut self.state.velocities),
+            contact: std::mem::take(&mut self.state.contact),
             ..rest
         };
         (self.scene, self.model, self.backend) = (scene, model, backend);

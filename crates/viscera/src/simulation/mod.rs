@@ -2,6 +2,7 @@
 
 pub mod advice;
 mod assemble;
+mod assemble_error;
 mod automatic;
 mod choice;
 mod device;
@@ -10,107 +11,47 @@ mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod holding;
+mod instruments;
 mod live;
 mod mesh_error;
 #[cfg(feature = "gpu")]
 mod on_device;
+mod report;
 mod rest;
 mod saved;
 mod sent;
+mod tool_forces;
+mod touchable;
 
-pub use assemble::{AssembleError, AssembledBody, Assembly, Refinement, ResolvedPatch};
+pub use assemble::{AssembledBody, Assembly, Refinement, ResolvedPatch};
+pub use assemble_error::AssembleError;
 pub use automatic::{ExpectedErrors, automatic_settings};
 pub use error::{FrameError, LiveError, SimulationError};
 pub use forces::Hold;
 use holding::GraspOrigins;
+use instruments::Instruments;
+pub use instruments::ToolForce;
 pub use live::Live;
+
 pub use mesh_error::{MESH_ERROR_TETS, MeshReport};
+pub use report::{FrameReport, PatchForce, PatchKind};
 pub use rest::{RestReport, Standing};
 pub use saved::ResumeError;
 
 use crate::layout::Layout;
 use crate::measure::{
-    DeformationSummary, Energies, TetMeasure, TissueMeasure, measure_energies, measure_tets,
-    measure_tissue,
+    Energies, TetMeasure, TissueMeasure, measure_energies, measure_tets, measure_tissue,
 };
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Scene};
-use crate::settings::{Count, Elements, Method, SolverSettings};
+use crate::settings::{Count, DeviceRequest, Elements, Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::oscillations::Oscillations;
-use crate::solver::{Inputs, Solver, check_elements, choose};
+use crate::solver::{Inputs, Solver, StepError, check_elements, choose};
 use crate::state::State;
 use device::{Backend, Offered};
-use std::fmt;
-
-/// What holds or pulls a patch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PatchKind {
-    /// Held in place.
-    Fixing,
-    /// Moved along a path.
-    Motion,
-    /// Pulled with a force.
-    Force,
-}
-
-/// The force on one patch.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct PatchForce {
-    /// The patch's name in the scene.
-    pub name: String,
-    /// What holds or pulls it.
-    pub kind: PatchKind,
-    /// Force [N] of the fixing, tool or load on the tissue: minus internal forces, plus inertia,
-    /// minus gravity, summed over the patch. A vertex of several patches belongs to the one that it follows,
-    /// the last, so that the forces of all patches of a body at rest sum to minus its weight.
-    pub force: [f64; 3],
-    /// Torque [N m] of the same about the middle of the patch.
-    pub torque: [f64; 3],
-}
-
-impl fmt::Display for PatchForce {
-    /// One line of a table, to four decimals unless a precision says otherwise.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let digits = f.precision().unwrap_or(4);
-        // What rounds to zero has no sign.
-        let smallest = (0..digits).fold(0.5, |smallest, _| 0.1 * smallest);
-        let unsigned = |component: f64| if component.abs() < smallest { 0.0 } else { component };
-        let ([x, y, z], [a, b, c]) = (self.force.map(unsigned), self.torque);
-        let (force, torque) = (x.hypot(y).hypot(z), a.hypot(b).hypot(c));
-        write!(
-            f,
-            "{}: force {force:.digits$} N, as a vector ({x:.digits$}, {y:.digits$}, {z:.digits$}) N, \
-             torque {torque:.digits$} N m",
-            self.name
-        )
-    }
-}
-
-/// The numbers of one frame.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct FrameReport {
-    /// Frames computed so far.
-    pub frame: u64,
-    /// Simulated time [s].
-    pub time: f64,
-    /// Sum of unbalanced forces on free vertices over the sum of all loads, at the end of the
-    /// last substep.
-    pub relative_residual: f64,
-    /// Estimate of the error of the apparent stiffness, see [`ForceBalance::stiffness_error`].
-    pub stiffness_error: f64,
-    /// Substeps of this frame that the step guard took back.
-    pub rejected_substeps: u64,
-    /// Energies [J].
-    pub energy: Energies,
-    /// Extremes of the deformation.
-    pub deformation: DeformationSummary,
-    /// Forces on the scene's patches [N].
-    pub patches: Vec<PatchForce>,
-}
 
 /// A running scene.
 #[derive(Debug)]
@@ -137,6 +78,9 @@ pub struct Simulation<S> {
     oscillations: Option<Oscillations>,
     inputs: Inputs<S>,
     taken: GraspOrigins,
+    instruments: Instruments,
+    /// Substeps of the last frame.
+    divided: u32,
     /// The scene without what was done to it by hand.
     written: Scene,
     /// Changes of the scene that have been made.
@@ -184,10 +128,12 @@ impl<S: Real> Simulation<S> {
         ) -> Result<Backend<S>, SimulationError>,
     ) -> Result<Self, SimulationError> {
         check_patches(&scene, &assembly)?;
+        check_device(&scene, callers_device)?;
         let model = assembly.builder.build::<S>()?;
         let automatic::Chosen { settings: solver, oscillations, solver: ready } =
             automatic::choose_method(&scene, &assembly, &model, callers_device);
         check_elements(&solver)?;
+        check_contact(&scene, &solver)?;
         let mut simulation = Self {
             state: State::at_rest(&model),
             substeps: solver.substeps(),
@@ -200,6 +146,8 @@ impl<S: Real> Simulation<S> {
             oscillations,
             inputs: Inputs::default(),
             taken: GraspOrigins::default(),
+            instruments: Instruments::new(&assembly.tools, scene.time.frame),
+            divided: 0,
             written: scene.clone(),
             changes_made: 0,
             by_hand: Vec::new(),
@@ -216,6 +164,7 @@ impl<S: Real> Simulation<S> {
         };
         simulation.inputs = simulation.inputs_at(0.0);
         simulation.choose_substeps();
+        simulation.divided = simulation.substeps;
         simulation.measure_tissue();
         Ok(simulation)
     }
@@ -447,6 +396,8 @@ impl<S: Real> Simulation<S> {
             energy: self.energies(),
             deformation: self.tissue.deformation,
             patches: self.patch_forces(),
+            divided: self.divided,
+            tools: self.tool_forces(),
         }
     }
 }
@@ -459,6 +410,7 @@ fn check_patches(scene: &Scene, assembly: &Assembly) -> Result<(), SimulationErr
         ("fixings", assembly.fixings.len(), scene.fixings.len()),
         ("motions", assembly.motions.len(), scene.motions.len()),
         ("forces", assembly.forces.len(), scene.forces.len()),
+        ("tools", assembly.tools.len(), scene.tools.len()),
     ] {
         if found != expected {
             return Err(SimulationError::OtherScene { what, found, expected });
@@ -470,6 +422,28 @@ fn check_patches(scene: &Scene, assembly: &Assembly) -> Result<(), SimulationErr
     match vertices.find(|&vertex| vertex as usize >= vertex_count) {
         Some(vertex) => Err(SimulationError::Patch { vertex, vertex_count }),
         None => Ok(()),
+    }
+}
+
+/// Contact is computed where the scene asks for it to be.
+fn check_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationError> {
+    let on_device = match &scene.solver.device {
+        DeviceRequest::Cpu | DeviceRequest::Auto => None,
+        device => Some(device.clone()),
+    };
+    match on_device.or(callers_device.then_some(DeviceRequest::Gpu)) {
+        Some(device) if !scene.tools.is_empty() => Err(SimulationError::ToolsOnDevice { device }),
+        _ => Ok(()),
+    }
+}
+
+/// The method takes contact.
+fn check_contact(scene: &Scene, solver: &SolverSettings) -> Result<(), StepError> {
+    let takes_contact = solver.method != Method::Xpbd || solver.rebase;
+    if takes_contact || scene.tools.is_empty() {
+        Ok(())
+    } else {
+        Err(StepError::ContactNeedsRebase)
     }
 }
 

@@ -139,11 +139,11 @@ impl RestReport {
 
 impl<S: Real> Simulation<S> {
     /// How far the last frame is from the state of rest; nothing before the first frame, where nothing is held, and
-    /// while what the scene does changes: then there is none to come to. Takes about as long as some dozens of frames of a small mesh,
+    /// while what the scene does changes, and where there are tools, of which the way to rest knows nothing: then there is none to come to. Takes about as long as some dozens of frames of a small mesh,
     /// seconds for a large one, and memory while it lasts: for the end of a run.
     pub fn rest(&self) -> Option<RestReport> {
         let (time, frame) = (self.time(), self.scene.time.frame);
-        if !self.stepped {
+        if !self.stepped || !self.scene.tools.is_empty() {
             return None;
         }
         let inputs = self.inputs_at(time);

@@ -10,6 +10,7 @@ use super::automatic::{self, Chosen};
 use super::device::Backend;
 use super::error::LiveError;
 use super::holding::GraspOrigins;
+use super::instruments::{Instruments, Jaw};
 use crate::contact::Touch;
 use crate::layout::Layout;
 use crate::model::for_each_kind;
@@ -19,7 +20,7 @@ use crate::settings::Method;
 use crate::state::{ContactState, Learned, LearnedPart, State};
 
 /// Raised whenever the bytes mean something else.
-const FORMAT: u32 = 7;
+const FORMAT: u32 = 8;
 
 /// Methods by the number that stands for them; a new one is added at the end.
 const METHODS: [Method; 4] = [Method::Auto, Method::Xpbd, Method::Explicit, Method::QuasiNewton];
@@ -111,6 +112,8 @@ struct Saved {
     /// Of each tool the columns of its rotation, and its place.
     tools: Vec<[[f64; 3]; 4]>,
     touches: Vec<SavedTouch>,
+    /// Jaws that follow a force, tool by tool.
+    jaws: Vec<Jaw>,
 }
 
 /// A [`Touch`].
@@ -196,6 +199,7 @@ impl<S: Real> Simulation<S> {
             taken: self.taken.all().iter().map(|taken| taken.as_deref().map(bare)).collect(),
             tools: contact.poses.iter().map(bare_pose).collect(),
             touches: contact.touches.iter().map(SavedTouch::of).collect(),
+            jaws: self.instruments.jaws().to_vec(),
         };
         let mut bytes = MAGIC.to_vec();
         bytes.extend(FORMAT.to_le_bytes());
@@ -240,6 +244,7 @@ impl<S: Real> Simulation<S> {
         }
         self.taken =
             GraspOrigins::of(saved.taken.iter().map(|t| t.as_deref().map(dressed)).collect());
+        self.instruments = Instruments::of(saved.jaws, self.time());
         self.before = dressed(&saved.before);
         self.rejected_substeps = saved.rejected_substeps;
         self.put(State {
@@ -285,7 +290,7 @@ impl<S: Real> Simulation<S> {
         let is_known = |touch: &SavedTouch| {
             (touch.sample as usize) < samples && (touch.tool as usize) < saved.tools.len()
         };
-        saved.touches.iter().all(is_known)
+        saved.touches.iter().all(is_known) && saved.jaws.len() == self.scene.tools.len()
     }
 
     /// Whether each motion has as many vertices as were taken hold of.

@@ -1,8 +1,8 @@
 //! Frames: sent to what computes them, and taken over when they are there. Between the two nobody has to wait, which
 //! browsers forbid.
 
-use super::Simulation;
 use super::error::FrameError;
+use super::{Simulation, substep_dt};
 use crate::scalar::Real;
 
 impl<S: Real> Simulation<S> {
@@ -66,16 +66,19 @@ impl<S: Real> Simulation<S> {
 
     /// The substeps of a frame.
     fn send_steps(&mut self) -> Result<(), FrameError> {
-        let dt = self.substep_dt();
         // The end of the frame is a time of its own: that of the keys by which holds are led.
         let (start, end) = (self.time(), (self.frame + 1) as f64 * self.scene.time.frame);
-        let substeps = self.substeps;
-        let Self { scene, assembly, taken, model, state, inputs, backend, .. } = self;
+        let tools = &self.assembly.tools;
+        let substeps = self.instruments.substeps(tools, [start, end], self.substeps);
+        let dt = substep_dt(&self.scene, substeps);
+        self.divided = substeps;
+        let Self { scene, assembly, taken, instruments, model, state, inputs, backend, .. } = self;
         self.rejected_before = backend.rejected_steps();
         backend.steps(model, state, inputs, dt, substeps, |substep, inputs| {
             let is_last = substep == substeps;
             let time = if is_last { end } else { start + f64::from(substep) * dt };
             taken.act(scene, assembly, time, inputs);
+            instruments.act(&assembly.tools, time, inputs);
         })
     }
 
@@ -96,6 +99,7 @@ impl<S: Real> Simulation<S> {
         self.rejected_substeps = self.backend.rejected_steps() - self.rejected_before;
         self.frame += 1;
         self.stepped = true;
+        self.lead_jaws();
         if !self.state.is_finite() || self.backend.is_beyond_numbers() {
             return Err(self.diverged());
         }

@@ -56,6 +56,8 @@ mod tethers;
 mod tetrahedralize;
 mod tidy;
 mod tiers;
+mod tool_errors;
+mod tools;
 mod twins;
 mod xpbd_family;
 

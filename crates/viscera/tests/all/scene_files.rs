@@ -9,12 +9,14 @@ use viscera::settings::{
     SolverSettings, Start,
 };
 
-const SHIPPED: [(&str, &str); 5] = [
+const SHIPPED: [(&str, &str); 7] = [
     ("liver_retraction.toml", include_str!("../../../../scenes/liver_retraction.toml")),
     ("cantilever.toml", include_str!("../../../../scenes/cantilever.toml")),
     ("twist.toml", include_str!("../../../../scenes/twist.toml")),
     ("stretch.toml", include_str!("../../../../scenes/stretch.toml")),
     ("grab.toml", include_str!("../../../../scenes/grab.toml")),
+    ("palpation.toml", include_str!("../../../../scenes/palpation.toml")),
+    ("grasp.toml", include_str!("../../../../scenes/grasp.toml")),
 ];
 
 /// Nearly every key there is, in one scene.
@@ -72,6 +74,23 @@ body = "bead"
 sphere = { center = [0, 0, 0], radius = "5 mm" }
 force = [0, 0, "0.5 N"]
 keys = [{ time = "1 s", factor = 0 }, { time = "2 s", factor = "100 %" }]
+
+[[tool]]
+name = "pliers"
+kind = "grasper"
+jaw_size = ["8 mm", "4 mm", "16 mm"]
+jaw_gap = "4 mm"
+rounding = "1 mm"
+position = [0, 0, "1 m"]
+path = "pliers.csv"
+friction = "80 %"
+stiffness = 2
+thickness = "0.5 mm"
+jaw = [{ time = 0, angle = "40 deg" }, { time = "1 s", angle = "-10 deg" }]
+lock = [{ from = "1 s", to = "1.2 s" }]
+
+[[tool]]
+kind = "half_space"
 
 [[spring]]
 from = { body = "organ", box = { min = [0, 0, 0], max = ["1 m", "1 m", "1 m"] } }
@@ -140,7 +159,9 @@ fn every_key_arrives_in_si_units() {
     assert_eq!(scene.frame_count(), 75);
     assert_eq!(scene.time.velocity_factor, 0.9);
     assert_eq!(scene.world.gravity, vec3(0.0, -1.0, -9.0));
-    assert_eq!(scene.files(), ["organ.msh", "organ.obj"]);
+    assert_eq!(scene.files(), ["organ.msh", "organ.obj", "pliers.csv"]);
+    let [pliers, table] = scene.tools.as_slice() else { panic!("two tools") };
+    assert_eq!((pliers.parts.len(), pliers.law.friction, table.name.as_str()), (2, 0.8, "tool 1"));
 
     let [organ, bead] = scene.bodies.as_slice() else { panic!("two bodies") };
     let BodyShape::File { unit, .. } = organ.shape else { panic!("a file") };
@@ -357,6 +378,7 @@ fn without_places(mut scene: Scene) -> Scene {
     let patches = patches.chain(scene.forces.iter_mut().map(|force| &mut force.patch));
     let ends = scene.springs.iter_mut().flat_map(|spring| [&mut spring.from, &mut spring.to]);
     patches.chain(ends).for_each(|patch| patch.place = nowhere.clone());
+    scene.tools.iter_mut().for_each(|tool| tool.place = nowhere.clone());
     scene
 }
 

@@ -1,0 +1,267 @@
+//! From the tables of tools in a scene file to instruments: their sizes, and keys that go together.
+
+use super::SceneError;
+use super::checks::{check_name, check_times, name_or_number, purpose};
+use super::instrument::{Course, Instrument, JawDrive, JawKey, Jaws, Part, ToolKind};
+use super::instrument_tables::{ToolTable, WIDEST};
+use super::keys::MotionKey;
+use crate::contact::{ContactLaw, Shape};
+use crate::scalar::rigid::RigidTransform;
+use crate::scalar::{Vec3, vec3};
+use crate::settings::{Choice, Placed};
+use crate::units::Dimension;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
+
+/// The tools of a scene, by their order.
+pub(super) fn build_instruments(
+    tables: &[Placed<ToolTable>],
+) -> Result<Vec<Instrument>, SceneError> {
+    let mut tools: Vec<Instrument> = Vec::new();
+    for (index, table) in tables.iter().enumerate() {
+        let name = name_or_number(&table.value.name, "tool", index);
+        check_name(&tools, |tool| &tool.name, &name, "tool", &table.place)?;
+        let purpose = purpose("tool", &table.value.name, index);
+        tools.push(build_instrument(name, &purpose, table)?);
+    }
+    Ok(tools)
+}
+
+fn build_instrument(
+    name: String,
+    purpose: &str,
+    Placed { place, value }: &Placed<ToolTable>,
+) -> Result<Instrument, SceneError> {
+    let fail = |problem: String| SceneError::Tool {
+        place: place.clone(),
+        purpose: purpose.to_owned(),
+        problem,
+    };
+    refuse_foreign_keys(value).map_err(fail)?;
+    if value.path.is_some() && !value.keys.is_empty() {
+        return Err(fail("`keys` and `path` exclude each other; keep one".to_owned()));
+    }
+    let parts = build_parts(value).map_err(fail)?;
+    if let Some(words) = parts.iter().find_map(|part| part.shape.complaint()) {
+        return Err(fail(words.to_owned()));
+    }
+    let rotation = value.rotation_axis * value.rotation_angle;
+    let law = ContactLaw {
+        stiffness: value.stiffness,
+        thickness: value.thickness,
+        friction: value.friction,
+    };
+    let jaws = match value.kind {
+        ToolKind::Grasper => Some(build_jaws(value).map_err(fail)?),
+        _ => None,
+    };
+    if let Some(jaws) = &jaws {
+        check_jaws(value, jaws, purpose)?;
+    }
+    Ok(Instrument {
+        name,
+        kind: value.kind,
+        parts,
+        placement: RigidTransform::about(Vec3::ZERO, rotation, value.position),
+        course: build_course(value, purpose)?,
+        law,
+        jaws,
+        place: place.clone(),
+    })
+}
+
+fn build_course(table: &ToolTable, purpose: &str) -> Result<Course, SceneError> {
+    if let Some(path) = &table.path {
+        return Ok(Course::File { path: path.clone() });
+    }
+    let times = table.keys.iter().map(|key| (&key.place, key.value.time));
+    check_times(times, purpose)?;
+    let own = MotionKey { time: 0.0, translation: Vec3::ZERO, rotation: Vec3::ZERO };
+    let before = table.keys.first().filter(|first| first.value.time > 0.0).map(|_| own);
+    let written = table.keys.iter().map(|key| MotionKey {
+        time: key.value.time,
+        translation: key.value.translation,
+        rotation: key.value.rotation_axis * key.value.rotation_angle,
+    });
+    let keys = before.into_iter().chain(written).collect();
+    Ok(Course::Keys { keys, interpolation: table.interpolation })
+}
+
+/// Keys that each kind takes besides those of all.
+fn own_keys(kind: ToolKind) -> &'static [&'static str] {
+    match kind {
+        ToolKind::HalfSpace => &[],
+        ToolKind::Sphere => &["radius"],
+        ToolKind::Capsule | ToolKind::Probe => &["radius", "length"],
+        ToolKind::Box | ToolKind::Blade => &["size", "rounding"],
+        ToolKind::Hook => &["radius", "length", "tip_length", "tip_angle"],
+        ToolKind::Grasper => &[
+            "jaw_size",
+            "jaw_gap",
+            "rounding",
+            "jaw",
+            "closing_force",
+            "jaw_open",
+            "closing_time",
+            "lock",
+        ],
+    }
+}
+
+/// A key that the kind does not take would silently do nothing.
+fn refuse_foreign_keys(table: &ToolTable) -> Result<(), String> {
+    let taken = own_keys(table.kind);
+    let written = [
+        ("radius", table.radius.is_some()),
+        ("length", table.length.is_some()),
+        ("size", table.size.is_some()),
+        ("rounding", table.rounding.is_some()),
+        ("tip_length", table.tip_length.is_some()),
+        ("tip_angle", table.tip_angle.is_some()),
+        ("jaw_size", table.jaw_size.is_some()),
+        ("jaw_gap", table.jaw_gap.is_some()),
+        ("jaw", !table.jaw.is_empty()),
+        ("closing_force", !table.closing_force.is_empty()),
+        ("jaw_open", table.jaw_open.is_some()),
+        ("closing_time", table.closing_time.is_some()),
+        ("lock", !table.lock.is_empty()),
+    ];
+    match written.iter().find(|(key, is_written)| *is_written && !taken.contains(key)) {
+        None => Ok(()),
+        Some((key, _)) => {
+            let known = ToolKind::ALL.iter().find(|(kind, ..)| *kind == table.kind);
+            let kind = known.map_or("", |(_, name, _)| name);
+            let takes = if taken.is_empty() { "no sizes".to_owned() } else { taken.join(", ") };
+            Err(format!("`{key}` means nothing for a {kind}, which takes {takes}"))
+        }
+    }
+}
+
+fn build_parts(table: &ToolTable) -> Result<Vec<Part>, String> {
+    let need = |value: Option<f64>, key: &str| {
+        value.ok_or_else(|| format!("`{key}` is missing, for example {key} = \"5 mm\""))
+    };
+    let need_size = |size: Option<[f64; 3]>, key: &str| {
+        size.ok_or_else(|| {
+            format!("`{key}` is missing, for example {key} = [\"10 mm\", \"2 mm\", \"20 mm\"]")
+        })
+    };
+    let fixed = |shape: Shape, place: RigidTransform| Part { shape, place, opens: 0.0 };
+    let alone = |shape: Shape| Ok(vec![fixed(shape, RigidTransform::IDENTITY)]);
+    match table.kind {
+        ToolKind::HalfSpace => alone(Shape::HalfSpace),
+        ToolKind::Sphere => alone(Shape::Sphere { radius: need(table.radius, "radius")? }),
+        ToolKind::Capsule | ToolKind::Probe => alone(Shape::Capsule {
+            length: need(table.length, "length")?,
+            radius: need(table.radius, "radius")?,
+        }),
+        ToolKind::Box => alone(rounded_box(need_size(table.size, "size")?, table.rounding, 0.25)),
+        ToolKind::Blade => {
+            let size = need_size(table.size, "size")?;
+            let middle = at(vec3(0.0, 0.0, 0.5 * size[2]));
+            Ok(vec![fixed(rounded_box(size, table.rounding, 0.5), middle)])
+        }
+        ToolKind::Hook => {
+            let radius = need(table.radius, "radius")?;
+            let shaft = Shape::Capsule { length: need(table.length, "length")?, radius };
+            let tip = Shape::Capsule { length: need(table.tip_length, "tip_length")?, radius };
+            let bend = vec3(-table.tip_angle.unwrap_or(FRAC_PI_2), 0.0, 0.0);
+            let bent = RigidTransform::about(Vec3::ZERO, bend, Vec3::ZERO);
+            Ok(vec![fixed(shaft, RigidTransform::IDENTITY), fixed(tip, bent)])
+        }
+        ToolKind::Grasper => {
+            let size = need_size(table.jaw_size, "jaw_size")?;
+            let shape = rounded_box(size, table.rounding, 0.25);
+            let away = 0.5 * (table.jaw_gap.unwrap_or(0.0) + size[1]);
+            let jaw = |opens: f64| Part {
+                shape,
+                place: at(vec3(0.0, opens * away, -0.5 * size[2])),
+                opens,
+            };
+            Ok(vec![jaw(1.0), jaw(-1.0)])
+        }
+    }
+}
+
+/// A box of a size [m]; its edges are rounded by a share of the smallest, where nothing else is written.
+fn rounded_box(size: [f64; 3], rounding: Option<f64>, share: f64) -> Shape {
+    let smallest = size.into_iter().fold(f64::INFINITY, f64::min);
+    let radius = rounding.unwrap_or(share * smallest);
+    Shape::RoundedBox { half: Vec3::from_f64(size) * 0.5, radius }
+}
+
+fn at(place: Vec3<f64>) -> RigidTransform {
+    RigidTransform::about(Vec3::ZERO, Vec3::ZERO, place)
+}
+
+fn build_jaws(table: &ToolTable) -> Result<Jaws, String> {
+    let drive = match (table.jaw.is_empty(), table.closing_force.is_empty()) {
+        (false, false) => {
+            return Err("`jaw` and `closing_force` exclude each other; keep one".into());
+        }
+        (true, true) => {
+            return Err(
+                "a grasper needs `jaw` or `closing_force`, for example jaw = [{ time = 0, angle = \
+                        \"40 deg\" }]"
+                    .into(),
+            );
+        }
+        (false, true) => JawDrive::Angle,
+        (true, false) => JawDrive::Force,
+    };
+    let of_force =
+        [("jaw_open", table.jaw_open.is_some()), ("closing_time", table.closing_time.is_some())];
+    if drive == JawDrive::Angle
+        && let Some((key, _)) = of_force.iter().find(|(_, is_written)| *is_written)
+    {
+        return Err(format!("`{key}` means nothing for jaws with `jaw`; leave it out"));
+    }
+    let angles = table.jaw.iter().map(|key| (key.value.time, key.value.angle));
+    let forces = table.closing_force.iter().map(|key| (key.value.time, key.value.force));
+    let keys = angles.chain(forces).map(|(time, value)| JawKey { time, value });
+    Ok(Jaws {
+        length: table.jaw_size.map_or(0.0, |size| size[2]),
+        gap: table.jaw_gap.unwrap_or(0.0),
+        drive,
+        keys: keys.collect(),
+        interpolation: table.interpolation,
+        open: table.jaw_open.unwrap_or(FRAC_PI_3),
+        closing_time: table.closing_time.unwrap_or(0.5),
+        locks: table.lock.iter().map(|lock| [lock.value.from, lock.value.to]).collect(),
+    })
+}
+
+/// Times ascend, and no jaw is in another.
+fn check_jaws(table: &ToolTable, jaws: &Jaws, purpose: &str) -> Result<(), SceneError> {
+    let fail = |place: &crate::settings::Place, problem: String| SceneError::Keys {
+        place: place.clone(),
+        purpose: purpose.to_owned(),
+        problem,
+    };
+    check_times(table.jaw.iter().map(|key| (&key.place, key.value.time)), purpose)?;
+    check_times(table.closing_force.iter().map(|key| (&key.place, key.value.time)), purpose)?;
+    let least = jaws.least_angle();
+    let degrees = |angle: f64| Dimension::Angle.format(angle);
+    for Placed { place, value } in &table.jaw {
+        let angle = degrees(value.angle);
+        if value.angle < least {
+            let problem = format!(
+                "at {angle} its jaws overlap; close them to {} at most, or give them a larger `jaw_gap`",
+                degrees(least + 0.0)
+            );
+            return Err(fail(place, problem));
+        }
+        if value.angle > WIDEST {
+            let problem =
+                format!("{angle} is no angle of jaws; open them to {} at most", degrees(WIDEST));
+            return Err(fail(place, problem));
+        }
+    }
+    for Placed { place, value } in &table.lock {
+        if value.from >= value.to {
+            let problem =
+                format!("its lock ends at {} s, before it begins; swap the two", value.to);
+            return Err(fail(place, problem));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,141 @@
+//! Why a scene cannot be put together.
+
+use crate::mesh::MeshError;
+use crate::mesh::embed::EmbeddingError;
+use crate::mesh::io::ReadError;
+use crate::mesh::shapes::ShapeError;
+use crate::model::ModelError;
+use crate::scene::{PathError, SceneError};
+use crate::settings::Place;
+
+/// Tetrahedra that refinement makes at most: some gigabytes. Finer meshes are read from files.
+pub(super) const MOST_REFINED: usize = 10_000_000;
+
+/// Why a scene cannot be put together.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AssembleError {
+    /// A file could not be loaded; the caller's words.
+    #[error("{message}")]
+    Load {
+        /// What the caller said.
+        message: String,
+    },
+    /// A mesh file is damaged or of another kind.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A shape cannot be made.
+    #[error("body `{body}`: {error}")]
+    Shape {
+        /// The body.
+        body: String,
+        /// Why not.
+        error: ShapeError,
+    },
+    /// A placement that takes a mesh out of the world.
+    #[error("body `{body}` where the scene puts it: {error}")]
+    Placement {
+        /// The body.
+        body: String,
+        /// Why not.
+        error: MeshError,
+    },
+    /// A refinement with more tetrahedra than a machine has memory for.
+    #[error(
+        "body `{body}`: `refine = {refine}` makes {count} tetrahedra of {before}, more than {MOST_REFINED}; lower it"
+    )]
+    TooFine {
+        /// The body.
+        body: String,
+        /// How often it was to be refined.
+        refine: u32,
+        /// Tetrahedra before.
+        before: usize,
+        /// And after.
+        count: usize,
+    },
+    /// A surface that cannot be bound to its tetrahedra.
+    #[error("body `{body}`: {error}")]
+    Embedding {
+        /// The body.
+        body: String,
+        /// Why not.
+        error: EmbeddingError,
+    },
+    /// A material for a region that the mesh does not have.
+    #[error("body `{body}` has no region {label}; its regions are {known}")]
+    UnknownRegion {
+        /// The body.
+        body: String,
+        /// The label given.
+        label: u32,
+        /// The labels there are.
+        known: String,
+    },
+    /// A patch selects nothing.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A spring between two patches without two different points.
+    #[error("{spring} finds no two vertices apart from each other; choose other patches")]
+    Spring {
+        /// The spring.
+        spring: String,
+    },
+    /// A ball that gives no tetrahedron its label.
+    #[error(
+        "body `{body}`, region {label}: no tetrahedron has its middle in the ball, the nearest one is {:.3} mm outside; \
+         move or enlarge the ball, or take a finer mesh", 1e3 * .distance
+    )]
+    EmptyBall {
+        /// The body.
+        body: String,
+        /// The region's label.
+        label: u32,
+        /// From the ball to the nearest middle [m].
+        distance: f64,
+    },
+    /// A tool's path cannot be read.
+    #[error("{place}: tool `{tool}`: {error}")]
+    Path {
+        /// Where the scene has the tool.
+        place: Place,
+        /// The tool.
+        tool: String,
+        /// Why not.
+        error: PathError,
+    },
+    /// A tool that would slip between the samples of a surface.
+    #[error(
+        "{place}: tool `{tool}` has a radius of {:.3} mm at its thinnest, and `{body}` is touched at points about {:.3} \
+         mm apart; take a finer mesh of `{body}` or a thicker tool", 1e3 * .radius, 1e3 * .spacing
+    )]
+    ThinTool {
+        /// Where the scene has the tool.
+        place: Place,
+        /// The tool.
+        tool: String,
+        /// The body.
+        body: String,
+        /// Of the tool's thinnest part [m].
+        radius: f64,
+        /// Of the body's samples [m].
+        spacing: f64,
+    },
+    /// A tool that begins where tissue is.
+    #[error(
+        "{place}: tool `{tool}` begins {:.3} mm inside body `{body}`; move its position away from it", 1e3 * .depth
+    )]
+    ToolInside {
+        /// Where the scene has the tool.
+        place: Place,
+        /// The tool.
+        tool: String,
+        /// The body.
+        body: String,
+        /// The deepest sample's [m].
+        depth: f64,
+    },
+    /// The model cannot be built.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}

@@ -1,0 +1,284 @@
+//! Tools in a run: where they are in each substep, jaws that follow a force, and the forces that tools meet.
+//!
+//! ```text
+//! M_o = mean over jaws of their opening torque about the hinge [N m],   M_c = F L/2      F closing force, L jaws' length
+//! speed of the next frame = g (open/closing_time) clamp((M_o - M_c)/|M_c|, -1, 1)        g <= 1: halved where it turned back
+//! ```
+//!
+//! Force-driven jaws are quasi-static: they have no inertia, close at a limited speed, and stop where tissue holds against
+//! the force. What they met at the end of a frame decides their speed in the next one, which is part of a saved simulation.
+
+use crate::contact::{Tool, Wrench};
+use crate::scalar::rigid::{RigidTransform, rotation_vector};
+use crate::scalar::{Real, Vec3, vec3};
+use crate::scene::{Instrument, Jaws};
+use crate::solver::Inputs;
+
+/// The force and torque on one tool.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct ToolForce {
+    /// The tool's name in the scene.
+    pub name: String,
+    /// Force [N] of the tissue on the tool, all its parts together.
+    pub force: [f64; 3],
+    /// Torque [N m] of the same about the tool's origin.
+    pub torque: [f64; 3],
+    /// Samples of tissue that it presses on.
+    pub touches: u32,
+    /// Of these hang on held vertices only: nothing gives way there.
+    pub pinned: u32,
+    /// The deepest that tissue is inside the contact's thickness [m].
+    pub depth: f64,
+    /// Estimate of the error of the force [N]; nothing where there is none.
+    pub error: Option<f64>,
+}
+
+impl std::fmt::Display for ToolForce {
+    /// One line of a table, to four decimals unless a precision says otherwise.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let digits = f.precision().unwrap_or(4);
+        // What rounds to zero has no sign.
+        let smallest = (0..digits).fold(0.5, |smallest, _| 0.1 * smallest);
+        let unsigned = |component: f64| if component.abs() < smallest { 0.0 } else { component };
+        let ([x, y, z], [a, b, c]) = (self.force.map(unsigned), self.torque);
+        let (force, torque) = (x.hypot(y).hypot(z), a.hypot(b).hypot(c));
+        write!(
+            f,
+            "{}: force {force:.digits$} N, as a vector ({x:.digits$}, {y:.digits$}, {z:.digits$}) N, \
+             torque {torque:.digits$} N m, {} touches",
+            self.name, self.touches
+        )
+    }
+}
+
+/// A tool that moves further than so many of its thinnest radii in a substep has the frame divided.
+const MOST_RADII: f64 = 4.0;
+
+/// What moves further in a substep than at this speed [m/s] and by so many radii besides is put elsewhere, and no motion.
+const TELEPORT_SPEED: f64 = 10.0;
+const TELEPORT_RADII: f64 = 10.0;
+
+/// A frame is divided into so many times as many substeps at most.
+const MOST_DIVIDED: f64 = 100.0;
+
+/// Closing forces below this one [N] are approached as it is.
+const LEAST_FORCE: f64 = 1e-2;
+
+/// The share of their speed that jaws have at least, and how fast it grows again.
+const LEAST_GAIN: f64 = 1.0 / 64.0;
+const GROWTH: f64 = 1.25;
+
+/// Jaws that follow a force.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) struct Jaw {
+    /// Opening angle at the beginning of the frame to come [rad].
+    pub angle: f64,
+    /// In that frame [rad/s].
+    pub speed: f64,
+    /// The share of the largest speed that they take: less where they have swung about their rest.
+    pub gain: f64,
+}
+
+/// What is kept of a scene's tools from frame to frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Instruments {
+    /// Of each tool; without meaning where it has no jaws that follow a force.
+    jaws: Vec<Jaw>,
+    /// The beginning of the frame to come [s].
+    since: f64,
+}
+
+impl Instruments {
+    /// At the beginning of a scene whose frames have this duration [s].
+    pub fn new(tools: &[Instrument], frame: f64) -> Self {
+        let open = |tool: &Instrument| tool.jaws.as_ref().map_or(0.0, |jaws| jaws.open);
+        let jaw = |tool: &Instrument| Jaw { angle: open(tool), speed: 0.0, gain: 1.0 };
+        let mut all = Self { jaws: tools.iter().map(jaw).collect(), since: 0.0 };
+        all.choose_speeds(tools, &[], &[], frame);
+        all
+    }
+
+    /// Of jaws that were saved, at a time [s].
+    pub fn of(jaws: Vec<Jaw>, since: f64) -> Self {
+        Self { jaws, since }
+    }
+
+    pub fn jaws(&self) -> &[Jaw] {
+        &self.jaws
+    }
+
+    /// The opening angle of a tool's jaws at a time [s], from the frame to come on; zero where it has none [rad].
+    pub fn angle(&self, index: usize, tool: &Instrument, time: f64) -> f64 {
+        let now = match (&tool.jaws, self.jaws.get(index)) {
+            (Some(jaws), Some(jaw)) => {
+                let angle = jaw.angle + jaw.speed * (time - self.since).max(0.0);
+                within(jaws, angle)
+            }
+            _ => 0.0,
+        };
+        tool.jaw_angle(time, now)
+    }
+
+    /// Puts the tools of a time [s] into the inputs; takes no memory where they have room.
+    pub fn act<S: Real>(&self, tools: &[Instrument], time: f64, inputs: &mut Inputs<S>) {
+        inputs.tools.clear();
+        self.parts_at(tools, time, &mut inputs.tools);
+    }
+
+    /// Adds the parts of all tools, where they are at a time [s].
+    pub fn parts_at(&self, tools: &[Instrument], time: f64, parts: &mut Vec<Tool>) {
+        for (index, tool) in tools.iter().enumerate() {
+            tool.parts_at(time, self.angle(index, tool, time), parts);
+        }
+    }
+
+    /// Substeps of a frame from `start` to `end` [s] that is to have so many: more where a tool would jump.
+    pub fn substeps(&self, tools: &[Instrument], [start, end]: [f64; 2], substeps: u32) -> u32 {
+        if tools.iter().all(Instrument::stands_still) {
+            return substeps;
+        }
+        let dt = (end - start) / f64::from(substeps);
+        let (mut before, mut after) = (Vec::new(), Vec::new());
+        self.parts_at(tools, start, &mut before);
+        let mut most = 1.0_f64;
+        for substep in 1..=substeps {
+            after.clear();
+            self.parts_at(tools, start + f64::from(substep) * dt, &mut after);
+            for (from, to) in before.iter().zip(&after) {
+                let (radius, way) = (to.shape.thinnest(), farthest(from, to));
+                let is_teleport = way > TELEPORT_SPEED * dt + TELEPORT_RADII * radius;
+                if radius.is_finite() && !is_teleport {
+                    most = most.max(way / (MOST_RADII * radius));
+                }
+            }
+            std::mem::swap(&mut before, &mut after);
+        }
+        substeps * most.min(MOST_DIVIDED).ceil() as u32
+    }
+
+    /// What tools met at the end of a frame decides how jaws go on. `parts` are those of the frame's end, `time` [s].
+    pub fn follow(
+        &mut self,
+        tools: &[Instrument],
+        wrenches: &[Wrench],
+        parts: &[Tool],
+        (time, frame): (f64, f64),
+    ) {
+        for (index, tool) in tools.iter().enumerate() {
+            let angle = self.angle(index, tool, time);
+            if let Some(jaw) = self.jaws.get_mut(index) {
+                jaw.angle = angle;
+            }
+        }
+        self.since = time;
+        self.choose_speeds(tools, wrenches, parts, frame);
+    }
+
+    fn choose_speeds(
+        &mut self,
+        tools: &[Instrument],
+        wrenches: &[Wrench],
+        parts: &[Tool],
+        frame: f64,
+    ) {
+        let time = self.since;
+        let mut first = 0;
+        for (tool, jaw) in tools.iter().zip(&mut self.jaws) {
+            let range = first..first + tool.parts.len();
+            first = range.end;
+            let Some(jaws) = tool.jaws.as_ref().filter(|jaws| jaws.follow_force()) else {
+                continue;
+            };
+            let met = wrenches.get(range.clone()).zip(parts.get(range));
+            let opening = met.map_or(0.0, |(wrenches, parts)| {
+                opening_torque(tool, &tool.pose(time), wrenches, parts)
+            });
+            jaw.choose_speed(jaws, opening, time, frame);
+        }
+    }
+}
+
+impl Jaw {
+    /// For the frame [s] that begins at a time [s], in which tissue opens the jaws by a torque [N m].
+    fn choose_speed(&mut self, jaws: &Jaws, opening: f64, time: f64, frame: f64) {
+        if jaws.are_locked(time) {
+            self.speed = 0.0;
+            return;
+        }
+        let arm = 0.5 * jaws.length;
+        let closing = jaws.at(time) * arm;
+        let drive = ((opening - closing) / closing.abs().max(LEAST_FORCE * arm)).clamp(-1.0, 1.0);
+        let has_turned = drive * self.speed < 0.0;
+        let gain = if has_turned { 0.5 * self.gain } else { GROWTH * self.gain };
+        self.gain = gain.clamp(LEAST_GAIN, 1.0);
+        let speed = drive * self.gain * jaws.open / jaws.closing_time;
+        self.speed = (within(jaws, self.angle + speed * frame) - self.angle) / frame;
+    }
+}
+
+/// An angle [rad] that jaws which follow a force can have.
+fn within(jaws: &Jaws, angle: f64) -> f64 {
+    angle.max(jaws.least_angle()).min(jaws.open)
+}
+
+/// How far the farthest point of a part goes at most [m].
+fn farthest(from: &Tool, to: &Tool) -> f64 {
+    let turn = rotation_vector(&(to.pose.rotation * from.pose.rotation.transpose())).length();
+    let way = (to.pose.translation - from.pose.translation).length();
+    if turn > 0.0 { way + turn * to.shape.reach() } else { way }
+}
+
+/// The mean torque [N m] about the hinge of a tool at `pose` by which tissue opens each jaw.
+fn opening_torque(
+    tool: &Instrument,
+    pose: &RigidTransform,
+    wrenches: &[Wrench],
+    parts: &[Tool],
+) -> f64 {
+    let hinge = pose.turn(vec3(1.0, 0.0, 0.0));
+    let all = tool.parts.iter().zip(wrenches).zip(parts);
+    let each = all.map(|((part, wrench), placed)| {
+        0.5 * part.opens * hinge.dot(torque_about(pose.translation, wrench, placed))
+    });
+    each.sum()
+}
+
+/// The torque [N m] of what a part meets about a point [m].
+fn torque_about(point: Vec3<f64>, wrench: &Wrench, placed: &Tool) -> Vec3<f64> {
+    wrench.torque + (placed.pose.translation - point).cross(wrench.force)
+}
+
+/// Forces on tools at a time [s]; `parts` and `wrenches` are those of the last step.
+pub(super) fn forces_on(
+    tools: &[Instrument],
+    wrenches: &[Wrench],
+    parts: &[Tool],
+    time: f64,
+) -> Vec<ToolForce> {
+    let mut first = 0;
+    let mut forces = Vec::new();
+    for tool in tools {
+        let range = first..first + tool.parts.len();
+        first = range.end;
+        let origin = tool.pose(time).translation;
+        let mut sum = Wrench::default();
+        let met = wrenches.get(range.clone()).zip(parts.get(range)).unwrap_or_default();
+        for (wrench, placed) in met.0.iter().zip(met.1) {
+            sum.force += wrench.force;
+            sum.torque += torque_about(origin, wrench, placed);
+            sum.touches += wrench.touches;
+            sum.pinned += wrench.pinned;
+            sum.depth = sum.depth.max(wrench.depth);
+        }
+        forces.push(ToolForce {
+            name: tool.name.clone(),
+            force: sum.force.to_array(),
+            torque: sum.torque.to_array(),
+            touches: sum.touches,
+            pinned: sum.pinned,
+            depth: sum.depth,
+            error: None,
+        });
+    }
+    forces
+}

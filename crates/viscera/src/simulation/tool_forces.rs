@@ -1,0 +1,33 @@
+//! What a simulation says of its tools.
+
+use super::Simulation;
+use super::instruments::{ToolForce, forces_on};
+use crate::contact::Tool;
+use crate::scalar::Real;
+
+impl<S: Real> Simulation<S> {
+    /// Forces on the scene's tools at the end of the last frame; zero before the first and after a change of settings.
+    pub fn tool_forces(&self) -> Vec<ToolForce> {
+        forces_on(&self.assembly.tools, self.backend.wrenches(), &self.inputs.tools, self.time())
+    }
+
+    /// The opening angle [rad] of a tool's jaws at the end of the last frame; nothing where it has none.
+    pub fn jaw_angle(&self, tool: usize) -> Option<f64> {
+        let at = self.assembly.tools.get(tool).filter(|tool| tool.jaws.is_some())?;
+        Some(self.instruments.angle(tool, at, self.time()))
+    }
+
+    /// The parts of all tools at the end of the last frame, tool by tool.
+    pub fn tool_parts(&self) -> Vec<Tool> {
+        let mut parts = Vec::new();
+        self.instruments.parts_at(&self.assembly.tools, self.time(), &mut parts);
+        parts
+    }
+
+    /// Jaws go on by what they met in the frame that has ended.
+    pub(super) fn lead_jaws(&mut self) {
+        let (time, frame) = (self.time(), self.scene.time.frame);
+        let Self { instruments, assembly, backend, inputs, .. } = self;
+        instruments.follow(&assembly.tools, backend.wrenches(), &inputs.tools, (time, frame));
+    }
+}

@@ -1,0 +1,147 @@
+//! What tools need of an assembly: their paths, samples of the bodies' surfaces, and room between the two.
+
+use super::assemble::{AssembledBody, Assembly};
+use super::assemble_error::AssembleError;
+use crate::contact::{Sample, Tool, sample_boundary, sample_embedded};
+use crate::mesh::topology::boundary_faces;
+use crate::scalar::Vec3;
+use crate::scene::{Course, Instrument, Interpolation, Scene, read_path};
+
+/// Tools thinner than so many edges of the surface meet several samples of a triangle.
+const SEVERAL_EDGES: f64 = 3.0;
+
+/// Samples up to this share of a body's size inside a tool are on it, as far as rounding knows.
+const ROUNDING: f64 = 1e-9;
+
+impl Assembly {
+    /// Takes over a scene's tools and reads their paths.
+    pub(super) fn add_tools(
+        &mut self,
+        scene: &Scene,
+        load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+    ) -> Result<(), AssembleError> {
+        for tool in &scene.tools {
+            let mut tool = tool.clone();
+            if let Course::File { path } = &tool.course {
+                let bytes = load(path).map_err(|message| AssembleError::Load { message })?;
+                let keys = read_path(path, &bytes).map_err(|error| AssembleError::Path {
+                    place: tool.place.clone(),
+                    tool: tool.name.clone(),
+                    error,
+                })?;
+                tool.course = Course::Keys { keys, interpolation: Interpolation::Linear };
+            }
+            self.tools.push(tool);
+        }
+        Ok(())
+    }
+
+    /// Takes samples of the surfaces of all bodies, where there are tools: the vertices of a fine surface, else points of
+    /// each outer triangle. A tool that would slip between them is refused.
+    pub(super) fn take_samples(&mut self) -> Result<(), AssembleError> {
+        if self.tools.is_empty() {
+            return Ok(());
+        }
+        let thinnest = self.tools.iter().map(Instrument::thinnest).fold(f64::INFINITY, f64::min);
+        let mut samples = Vec::new();
+        for body in &self.bodies {
+            let of_body = self.samples_of(body, thinnest);
+            let area: f64 = of_body.iter().map(|sample| sample.area).sum();
+            let spacing = (area / of_body.len().max(1) as f64).sqrt();
+            if let Some(tool) = self.tools.iter().find(|tool| tool.thinnest() < spacing) {
+                return Err(AssembleError::ThinTool {
+                    place: tool.place.clone(),
+                    tool: tool.name.clone(),
+                    body: body.name.clone(),
+                    radius: tool.thinnest(),
+                    spacing,
+                });
+            }
+            samples.extend(of_body);
+        }
+        Ok(self.builder.set_samples(samples)?)
+    }
+
+    /// Samples of one body, for tools of which the thinnest has this radius [m].
+    fn samples_of(&self, body: &AssembledBody, thinnest: f64) -> Vec<Sample> {
+        let (first_vertex, first_tet) = (body.vertices.start as u32, body.tets.start as u32);
+        if body.has_fine_surface {
+            let AssembledBody { surface, embedding, .. } = body;
+            let positions = self.builder.positions();
+            return sample_embedded(surface, embedding, positions, first_vertex, first_tet);
+        }
+        let (tets, positions) = (body.mesh.tets(), body.mesh.vertices());
+        let cuts = u32::from(thinnest < SEVERAL_EDGES * mean_edge(tets, positions));
+        let mut samples = sample_boundary(tets, positions, cuts);
+        for sample in &mut samples {
+            sample.vertices = sample.vertices.map(|v| v + first_vertex);
+            sample.tet += first_tet;
+        }
+        samples
+    }
+
+    /// No tool begins inside tissue. Where a tool that stands still meets what is fixed nothing can give way, and nothing
+    /// has to.
+    pub(super) fn check_tools_outside(&self) -> Result<(), AssembleError> {
+        let positions = self.builder.positions();
+        let mut is_fixed = vec![false; positions.len()];
+        let fixed = self.fixings.iter().filter(|patch| patch.attachments.is_empty());
+        fixed.flat_map(|patch| &patch.vertices).for_each(|&v| is_fixed[v as usize] = true);
+        let corners = |sample: &Sample| {
+            let all = sample.vertices.into_iter().zip(sample.weights);
+            all.filter(|(_, weight)| *weight != 0.0)
+        };
+        for tool in &self.tools {
+            let mut parts = Vec::new();
+            let angle = tool.jaws.as_ref().map_or(0.0, |jaws| jaws.open);
+            tool.parts_at(0.0, tool.jaw_angle(0.0, angle), &mut parts);
+            for body in &self.bodies {
+                let size = size(body.mesh.vertices());
+                let mut depth = ROUNDING * size;
+                let of_body = self.builder.samples().iter();
+                let of_body = of_body.filter(|s| body.tets.contains(&(s.tet as usize)));
+                for sample in of_body {
+                    let place = corners(sample)
+                        .fold(Vec3::ZERO, |sum, (v, weight)| sum + positions[v as usize] * weight);
+                    let is_pinned = corners(sample).all(|(v, _)| is_fixed[v as usize]);
+                    if !(is_pinned && tool.stands_still()) {
+                        depth = depth.max(-distance(&parts, place));
+                    }
+                }
+                if depth > ROUNDING * size {
+                    return Err(AssembleError::ToolInside {
+                        place: tool.place.clone(),
+                        tool: tool.name.clone(),
+                        body: body.name.clone(),
+                        depth,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// From the nearest part to a point [m].
+fn distance(parts: &[Tool], point: Vec3<f64>) -> f64 {
+    parts.iter().map(|part| part.distance(point).value).fold(f64::INFINITY, f64::min)
+}
+
+/// The mean length of edges of outer triangles [m].
+fn mean_edge(tets: &[[u32; 4]], positions: &[Vec3<f64>]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (_, [a, b, c]) in boundary_faces(tets) {
+        for [from, to] in [[a, b], [b, c], [c, a]] {
+            sum += (positions[to as usize] - positions[from as usize]).length();
+            count += 1.0;
+        }
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// The diagonal of the box around points [m].
+fn size(points: &[Vec3<f64>]) -> f64 {
+    let Some(&first) = points.first() else { return 0.0 };
+    let (min, max) = points.iter().fold((first, first), |(min, max), &x| (min.min(x), max.max(x)));
+    (max - min).length()
+}
