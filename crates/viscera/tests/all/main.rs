@@ -9,6 +9,7 @@ mod allocation_threads;
 mod at_rest;
 mod automatic;
 mod coloring;
+mod contact;
 mod determinism;
 mod element_solves;
 mod elements;

@@ -1,0 +1,119 @@
+//! Jaws that squeeze, pull, twist and let go.
+
+use viscera::contact::{Shape, Tool};
+use viscera::scalar::rigid::RigidTransform;
+use viscera::scalar::{Real, Vec3, vec3};
+use viscera::solver::Inputs;
+
+use super::{Block, Scene, method, ramp};
+use crate::common::Random;
+
+/// How a grasp ended.
+struct Grasp {
+    /// How far the end between the jaws was lifted [m].
+    lifted: f64,
+    /// Samples that the jaws still touch.
+    touches: usize,
+    /// Energy stored 0.4 s and 1 s after the jaws have opened, of the most.
+    rest: [f64; 2],
+    /// Energy made of nothing, of the most that was stored.
+    surplus: f64,
+    rejected: f64,
+    is_finite: bool,
+}
+
+/// A block that is fixed below is squeezed at its top by two jaws, lifted by 3 mm or a plate by 20 mm, turned, let go.
+fn grasp<S: Real>(name: &str, seed: u64, is_plate: bool) -> Grasp {
+    let (size, cells) = match is_plate {
+        true => ([0.06, 0.02, 0.008], [12, 4, 2]),
+        false => ([0.012, 0.016, 0.02], [3, 4, 5]),
+    };
+    let block = Block::new(size, cells, [1e4, 0.45, 0.01]);
+    let mut random = Random(seed);
+    let squeeze = random.uniform(1.5e-3, 3e-3);
+    let turn = random.uniform(-0.5, 0.5);
+    let lift = if is_plate { 0.02 } else { 0.003 };
+    let mut pull = vec3(random.uniform(-1e-3, 3e-3), random.uniform(-3e-3, 3e-3), lift);
+    if !is_plate {
+        (pull.x, pull.y) = (0.3 * pull.x, 0.3 * pull.y);
+    }
+    let mut jaw = Tool::new(Shape::RoundedBox { half: vec3(0.006, 0.008, 0.002), radius: 0.001 });
+    jaw.law.friction = random.uniform(0.6, 1.0);
+    // The plate is held at one end and grasped from above and below at the other; the block is grasped at its sides.
+    let (center, aside, thick) = match is_plate {
+        true => (vec3(0.024, 0.0, 0.004), Vec3::ZERO, 0.004),
+        false => (vec3(0.0, 0.0, 0.014), vec3(0.0, 0.5 * std::f64::consts::PI, 0.0), 0.006),
+    };
+    let held = move |x: Vec3<f64>| if is_plate { x.x < -0.03 + 1e-6 } else { x.z < 1e-6 };
+    let inputs = Inputs { pins: block.pins(held), tools: vec![jaw, jaw], ..Inputs::default() };
+    let (settings, substeps) = method(name);
+    let mut scene = Scene::<S>::with(&block, &settings, substeps, inputs);
+    let across = RigidTransform::about(Vec3::ZERO, aside, Vec3::ZERO);
+    let act = |time: f64, tools: &mut [Tool]| {
+        let open = 1.2e-3 - (squeeze + 1.2e-3) * ramp(time, 0.0, 0.3)
+            + (squeeze + 0.012) * ramp(time, 1.2, 1.4);
+        let share = ramp(time, 0.3, 1.0);
+        let away = vec3(0.0, 0.0, 0.05) * ramp(time, 1.4, 1.6);
+        let about = if is_plate { vec3(turn, 0.0, 0.0) } else { vec3(0.0, 0.0, turn) };
+        let hand = RigidTransform::about(Vec3::ZERO, about * share, center + pull * share + away);
+        for (tool, side) in tools.iter_mut().zip([1.0, -1.0]) {
+            let shift = vec3(0.0, 0.0, side * (thick + 0.002 + open));
+            let beside = RigidTransform { translation: shift, ..RigidTransform::IDENTITY };
+            tool.pose = hand.after(&across).after(&beside);
+        }
+    };
+    scene.run(1.2, act);
+    let near = |x: Vec3<f64>| if is_plate { x.x > 0.03 - 1e-6 } else { x.z > 0.02 - 1e-6 };
+    let rest = block.mesh.vertices();
+    let ends: Vec<usize> = (0..rest.len()).filter(|&v| near(rest[v])).collect();
+    let risen = |v: &usize| scene.state.positions[*v].cast::<f64>().z - rest[*v].z;
+    let lifted = ends.iter().map(risen).sum::<f64>() / ends.len() as f64;
+    // Jaws are clear of the tissue from 1.4 s on.
+    scene.run(0.6, act);
+    let first = scene.solver.ledger().stored;
+    scene.run(0.6, act);
+    let ledger = scene.solver.ledger();
+    Grasp {
+        lifted: lifted / lift,
+        touches: scene.state.contact.touches.len(),
+        rest: [first, ledger.stored].map(|stored| stored / ledger.most_stored),
+        surplus: ledger.surplus / ledger.most_stored,
+        rejected: scene.solver.rejected_steps() as f64 / f64::from(scene.steps),
+        is_finite: scene.state.is_finite(),
+    }
+}
+
+fn grasps<S: Real>(name: &str, seeds: u64, is_plate: bool, most_surplus: f64) {
+    let mut slipped = 0;
+    for seed in 0..seeds {
+        let grasp = grasp::<S>(name, seed, is_plate);
+        let which = format!("{name}, seed {seed}");
+        assert!(grasp.is_finite, "{which}");
+        assert_eq!(grasp.touches, 0, "{which}");
+        slipped += u64::from(grasp.lifted < 0.8);
+        assert!(grasp.rejected < 0.2, "{which}: {}", grasp.rejected);
+        assert!(grasp.surplus < most_surplus, "{which}: {:e}", grasp.surplus);
+        if !is_plate {
+            assert!(grasp.rest[0] < 1e-4, "{which}: {:e} after 0.4 s", grasp.rest[0]);
+            assert!(grasp.rest[1] < 1e-5, "{which}: {:e} after 1 s", grasp.rest[1]);
+        }
+    }
+    assert!(slipped * 20 <= seeds, "{name}: {slipped} of {seeds} slipped");
+}
+
+#[test]
+fn jaws_lift_and_leave_nothing_behind() {
+    for is_plate in [true, false] {
+        grasps::<f32>("xpbd", 2, is_plate, 1e-4);
+        grasps::<f64>("quasi_newton", 2, is_plate, 1e-2);
+    }
+}
+
+#[test]
+#[ignore = "slow"]
+fn jaws_lift_and_leave_nothing_behind_at_length() {
+    for is_plate in [true, false] {
+        grasps::<f64>("xpbd", 50, is_plate, 1e-6);
+        grasps::<f32>("quasi_newton", 50, is_plate, 1e-2);
+    }
+}
