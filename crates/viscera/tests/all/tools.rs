@@ -103,7 +103,8 @@ fn is_close(a: [f64; 3], b: [f64; 3], most: f64) -> bool {
 #[test]
 fn what_a_tool_meets_is_what_the_table_holds() {
     for method in ["quasi_newton", "xpbd"] {
-        let settings = [("solver.method", method), ("solver.precision", "f64")];
+        let settings =
+            [("solver.method", method), ("solver.precision", "f64"), ("solver.substeps", "3")];
         let mut run = simulation::<f64>(BLOCK, &settings);
         advance(&mut run, 0.6);
         let (tool, table) = (on_tool(&run), patch(&run));
@@ -131,7 +132,8 @@ rotation_angle = "-90 deg"
 friction = 0
 "#;
     let text = BLOCK.replace("kind = \"sphere\"\nradius = \"6 mm\"\n", rod);
-    let mut run = simulation::<f64>(&text, &[("solver.precision", "f64")]);
+    let mut run =
+        simulation::<f64>(&text, &[("solver.precision", "f64"), ("solver.substeps", "3")]);
     advance(&mut run, 0.6);
     let (tool, table) = (on_tool(&run), patch(&run));
     let force = Vec3::from_f64(tool.force);
