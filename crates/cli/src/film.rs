@@ -40,7 +40,7 @@ struct Shot {
     time: f64,
     surface: Vec<Vec3<f32>>,
     markers: Vec<Vec3<f32>>,
-    /// Name, middle of the patch and force [N] of each thing that moves or pulls.
+    /// Name, middle of the patch or the tool's origin, and force [N] of each thing that moves, pulls or touches.
     pulls: Vec<(String, Vec3<f64>, Vec3<f64>)>,
 }
 
@@ -108,10 +108,15 @@ impl Film {
             let middle = middle * (1.0 / patch.vertices.len().max(1) as f64);
             (report.name.clone(), middle, Vec3::from_f64(report.force))
         });
+        // As of what pulls: the force on the tissue.
+        let tools = report.tools.iter().zip(&assembly.tools).map(|(report, tool)| {
+            let origin = tool.pose(simulation.time()).translation;
+            (report.name.clone(), origin, -Vec3::from_f64(report.force))
+        });
         let surface = deformed_vertices(&assembly.bodies, positions);
         self.shots.push(Shot {
             time: report.time,
-            pulls: pulls.collect(),
+            pulls: pulls.chain(tools).collect(),
             surface: surface.iter().map(|x| x.cast()).collect(),
             markers: self.marked.iter().map(|&v| positions[v as usize].cast()).collect(),
         });

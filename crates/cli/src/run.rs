@@ -17,7 +17,7 @@ use std::time::Instant;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
 use viscera::settings::{DeviceRequest, Elements, Method, Precision};
-use viscera::simulation::{Assembly, ExpectedErrors, MeshReport, RestReport, Simulation};
+use viscera::simulation::{Assembly, ExpectedErrors, MeshReport, RestReport, Simulation, advice};
 use viscera_resources::{BuiltInScene, Memory, MeshFiles, files, memory};
 
 /// Simulate a scene; write meshes, a picture, an animation and the numbers
@@ -302,6 +302,9 @@ fn build<S: Real>(
         spinner.finish_and_clear();
     }
     if let Ok(simulation) = &simulation {
+        if let Some(advice) = advice::stiff_contact(&simulation.scene_in_force()) {
+            eprintln!("note: {advice}");
+        }
         let unused: Vec<_> =
             simulation.solver().unused().iter().map(|key| format!("solver.{key}")).collect();
         if !unused.is_empty() {

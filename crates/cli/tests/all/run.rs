@@ -59,6 +59,72 @@ fn a_run_writes_what_it_promises() {
 }
 
 /// What a method chooses by itself is written as it was chosen: a stiff bar swings fast and takes several substeps.
+const TOOLS: &str = r#"
+time = { duration = "0.2 s" }
+world = { gravity = 0 }
+output = { every = 4, tets = false, surface = false, picture = false }
+solver = { substeps = 2 }
+
+[[body]]
+name = "block"
+shape = "block"
+size = ["20 mm", "20 mm", "10 mm"]
+cells = [5, 5, 2]
+material = { young = "10 kPa" }
+
+[[fixing]]
+name = "table"
+body = "block"
+half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
+
+[[tool]]
+name = "ball"
+kind = "sphere"
+radius = "4 mm"
+position = ["10 mm", "10 mm", "15 mm"]
+keys = [{ time = "0.15 s", translation = [0, 0, "-3 mm"] }]
+
+[[tool]]
+name = "far"
+kind = "half_space"
+position = [0, 0, "-50 mm"]
+"#;
+
+/// Forces on tools are in a table, a row per frame, in the record, and at the end of the run; without tools there is none.
+#[test]
+fn forces_on_tools_are_written() {
+    let bench = Bench::new(TOOLS);
+    let end = bench.run(&[]);
+    let printed = end.stdout.clone();
+    let summary = bench.summary("out");
+    let table = String::from_utf8(bench.read("out/tools.csv")).expect("text");
+    let rows: Vec<Vec<&str>> = table.lines().map(|row| row.split(',').collect()).collect();
+    assert_eq!(rows.len(), 1 + 12);
+    assert_eq!((rows[0][0], rows[0][3], rows[0][10]), ("time [s]", "ball fz [N]", "far fx [N]"));
+    let frames = summary["frames"].as_array().expect("frames");
+    for (row, frame) in rows[1..].iter().zip(frames) {
+        assert_eq!(row.len(), 19);
+        let tool = &frame["tools"][0];
+        assert_eq!((&tool["name"], &frame["divided"]), (&"ball".into(), &2.into()));
+        // Reading JSON rounds the last digit.
+        let force = tool["force"][2].as_f64().expect("a force");
+        let written: f64 = row[3].parse().expect("a number");
+        assert!((written - force).abs() <= 1e-12 * force.abs(), "{written}, {force}");
+        assert_eq!(row[7].parse::<u64>().ok(), tool["touches"].as_u64());
+    }
+    let force = last_frame(&summary)["tools"][0]["force"][2].as_f64().expect("a force");
+    assert!(force > 0.05, "{force}");
+    assert!(
+        printed.contains("\nball: force 0.") && printed.contains("\nfar: force 0.0000 N"),
+        "{printed}"
+    );
+    // The same folder without tools.
+    let (without, _) = TOOLS.split_once("[[tool]]").expect("tools");
+    bench.write("scene.toml", without.as_bytes());
+    bench.run(&[]);
+    assert!(!bench.files("out").contains("tools.csv"));
+}
+
 #[test]
 fn counts_that_the_method_chooses_are_told() {
     let bench = Bench::new(TINY);

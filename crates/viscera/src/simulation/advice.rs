@@ -81,6 +81,21 @@ pub fn plain_elements(scene: &Scene) -> Option<String> {
     ))
 }
 
+/// With stiffer contact, in units of E/h, XPBD moves light bodies along tools too slowly.
+const SLIDING: f64 = 2.0;
+
+/// Against stiff contact, along which XPBD's bodies hardly slide.
+pub fn stiff_contact(scene: &Scene) -> Option<String> {
+    let tool = scene.tools.iter().find(|tool| tool.law.stiffness > SLIDING)?;
+    (scene.solver.method == Method::Xpbd).then(|| {
+        format!(
+            "tool \"{}\": with method \"xpbd\" light bodies slide too slowly along contact as stiff as {}; set its \
+             `stiffness` to {SLIDING}, or solver.method = \"quasi_newton\"",
+            tool.name, tool.law.stiffness
+        )
+    })
+}
+
 /// Against tetrahedra that are turned inside out.
 pub fn inverted(scene: &Scene) -> String {
     let mut choices = Vec::new();

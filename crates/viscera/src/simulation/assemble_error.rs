@@ -102,7 +102,7 @@ pub enum AssembleError {
         /// The tool.
         tool: String,
         /// Why not.
-        error: PathError,
+        error: Box<PathError>,
     },
     /// A tool that would slip between the samples of a surface.
     #[error(

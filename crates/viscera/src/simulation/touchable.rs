@@ -27,7 +27,7 @@ impl Assembly {
                 let keys = read_path(path, &bytes).map_err(|error| AssembleError::Path {
                     place: tool.place.clone(),
                     tool: tool.name.clone(),
-                    error,
+                    error: Box::new(error),
                 })?;
                 tool.course = Course::Keys { keys, interpolation: Interpolation::Linear };
             }
