@@ -5,6 +5,7 @@ mod common;
 #[path = "../../../viscera/tests/all/common/data.rs"]
 mod data;
 
+mod contact;
 mod holds;
 mod mesh_error;
 mod oracle;

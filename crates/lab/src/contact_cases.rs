@@ -1,0 +1,159 @@
+//! What studies of contact share: a ball that is pressed into a block, by the reference and by the library.
+
+use anyhow::{Context as _, Result};
+use viscera::contact::{ContactLaw, Shape, Tool, Wrench};
+use viscera::material::Material;
+use viscera::mesh::TetMesh;
+use viscera::mesh::shapes::Block;
+use viscera::model::{Model, ModelBuilder};
+use viscera::scalar::rigid::RigidTransform;
+use viscera::scalar::{Real, Vec3, vec3};
+use viscera::settings::SolverSettings;
+use viscera::solver::{Inputs, Pin, Solver};
+use viscera::state::State;
+
+use crate::load_cases::{FRAME_RATE, NEAR};
+use crate::reference::Reference;
+use crate::settling::{FRAMES, KEPT_VELOCITY};
+
+/// Frames in which the ball goes down.
+const PATH_FRAMES: u32 = 20;
+
+/// Parts of the way that the reference takes one after the other.
+const PARTS: u32 = 4;
+
+/// A ball that is pressed from above into a body that stands on a fixed bottom.
+#[derive(Clone, Debug)]
+pub struct Pressing {
+    /// The body at rest; its bottom is the lowest plane of vertices.
+    pub mesh: TetMesh,
+    /// What it is made of.
+    pub tissue: Material,
+    /// [m/s^2].
+    pub gravity: Vec3<f64>,
+    /// Times that each triangle of the surface is cut for samples.
+    pub cuts: u32,
+    /// Of the ball [m].
+    pub radius: f64,
+    /// How it meets the tissue.
+    pub law: ContactLaw,
+    /// Over which point of the top the ball is [m].
+    pub over: Vec3<f64>,
+    /// How far its lowest point is below the top at the end [m].
+    pub depth: f64,
+}
+
+/// Where a body is at rest.
+#[derive(Clone, Debug)]
+pub struct Rest {
+    /// [m], shape [vertex_count].
+    pub positions: Vec<Vec3<f64>>,
+    /// On the ball.
+    pub wrench: Wrench,
+    /// Newton steps, or the share of the steps that the guard has rejected.
+    pub effort: f64,
+}
+
+impl Rest {
+    /// With which the tissue pushes the ball up [N].
+    pub fn force(&self) -> f64 {
+        self.wrench.force.z
+    }
+}
+
+impl Pressing {
+    /// On the middle of a block of cubes with this edge [m]; without friction, gravity or depth.
+    pub fn on_block(cells: [usize; 3], edge: f64, radius: f64, tissue: Material) -> Result<Self> {
+        let size = Vec3::from_f64(cells.map(|count| edge * count as f64));
+        Ok(Self {
+            mesh: Block::new(size, cells).mesh()?,
+            tissue,
+            gravity: Vec3::ZERO,
+            cuts: 1,
+            radius,
+            law: ContactLaw { friction: 0.0, ..ContactLaw::default() },
+            over: vec3(0.5 * size.x, 0.5 * size.y, size.z),
+            depth: 0.0,
+        })
+    }
+
+    /// Its model.
+    pub fn model<S: Real>(&self) -> Result<Model<S>> {
+        let mut builder = ModelBuilder::new();
+        builder.add_body(&self.mesh, &self.tissue)?;
+        builder.sample_surface(self.cuts);
+        Ok(builder.build()?)
+    }
+
+    /// With the ball a share of the way down; at none its lowest point is at the top.
+    pub fn inputs<S: Real>(&self, share: f64) -> Inputs<S> {
+        let low = self.mesh.vertices().iter().map(|x| x.z).fold(f64::INFINITY, f64::min);
+        let vertices = (0u32..).zip(self.mesh.vertices());
+        let fixed = vertices.filter(|(_, x)| x.z < low + NEAR);
+        let pins = fixed.map(|(vertex, x)| Pin { vertex, target: x.cast() }).collect();
+        let middle = self.over + vec3(0.0, 0.0, self.radius - share * self.depth);
+        let tool = Tool {
+            pose: RigidTransform { translation: middle, ..RigidTransform::IDENTITY },
+            law: self.law,
+            ..Tool::new(Shape::Sphere { radius: self.radius })
+        };
+        Inputs { gravity: self.gravity.cast(), pins, tools: vec![tool], ..Inputs::default() }
+    }
+
+    /// At rest by Newton's method, the way down in parts.
+    pub fn truth(&self) -> Result<Rest> {
+        let model = self.model::<f64>()?;
+        self.truth_from(&model.rest_positions, PARTS)
+    }
+
+    /// The same from places [m], with the way down in so many parts.
+    pub fn truth_from(&self, start: &[Vec3<f64>], parts: u32) -> Result<Rest> {
+        let mut reference = Reference::new(&self.model::<f64>()?);
+        let mut positions = start.to_vec();
+        let mut steps = 0;
+        for part in 1..=parts {
+            let inputs = self.inputs(f64::from(part) / f64::from(parts));
+            let what = || format!("the reference, {} mm deep", 1e3 * self.depth);
+            let solution = reference.settle(&positions, &inputs).with_context(what)?;
+            positions = solution.positions;
+            steps += solution.convergence.steps;
+        }
+        let wrench = reference.wrenches(&positions, &self.inputs(1.0), &[])?[0];
+        Ok(Rest { positions, wrench, effort: f64::from(steps) })
+    }
+
+    /// At rest by the library: the ball goes down, then velocities die down.
+    pub fn settle<S: Real>(&self, settings: &SolverSettings) -> Result<Rest> {
+        let model = self.model::<S>()?;
+        let mut solver = Solver::new(&model, settings);
+        let mut state = State::at_rest(&model);
+        let frame_time = 1.0 / FRAME_RATE;
+        let substeps = solver.substeps(&self.inputs(0.0), frame_time);
+        let dt = frame_time / f64::from(substeps);
+        for frame in 0..FRAMES {
+            for substep in 1..=substeps {
+                let time = f64::from(frame) + f64::from(substep) / f64::from(substeps);
+                let inputs = self.inputs((time / f64::from(PATH_FRAMES)).min(1.0));
+                solver.step(&model, &mut state, &inputs, dt)?;
+            }
+            for velocity in &mut state.velocities {
+                *velocity = *velocity * S::from_f64(KEPT_VELOCITY);
+            }
+        }
+        let steps = f64::from(FRAMES) * f64::from(substeps);
+        Ok(Rest {
+            positions: state.positions.iter().map(|x| x.cast()).collect(),
+            wrench: solver.wrenches().first().copied().unwrap_or_default(),
+            effort: solver.rejected_steps() as f64 / steps,
+        })
+    }
+
+    /// Largest distance of vertices from true places, over the largest true displacement.
+    pub fn shape_error(&self, truth: &Rest, ours: &Rest) -> f64 {
+        let distance = |a: &[Vec3<f64>], b: &[Vec3<f64>]| {
+            a.iter().zip(b).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max)
+        };
+        distance(&truth.positions, &ours.positions)
+            / distance(&truth.positions, self.mesh.vertices())
+    }
+}
