@@ -22,11 +22,13 @@ const PATH_FRAMES: u32 = 20;
 /// Parts of the way that the reference takes one after the other.
 const PARTS: u32 = 4;
 
-/// A ball that is pressed from above into a body that stands on a fixed bottom.
+/// A ball that is pressed from above into a body that is held below.
 #[derive(Clone, Debug)]
 pub struct Pressing {
-    /// The body at rest; its bottom is the lowest plane of vertices.
+    /// The body at rest.
     pub mesh: TetMesh,
+    /// Pinned where they are.
+    pub fixed: Vec<u32>,
     /// What it is made of.
     pub tissue: Material,
     /// [m/s^2].
@@ -65,8 +67,10 @@ impl Pressing {
     /// On the middle of a block of cubes with this edge [m]; without friction, gravity or depth.
     pub fn on_block(cells: [usize; 3], edge: f64, radius: f64, tissue: Material) -> Result<Self> {
         let size = Vec3::from_f64(cells.map(|count| edge * count as f64));
+        let mesh = Block::new(size, cells).mesh()?;
         Ok(Self {
-            mesh: Block::new(size, cells).mesh()?,
+            fixed: select(&mesh, |x| x.z < NEAR),
+            mesh,
             tissue,
             gravity: Vec3::ZERO,
             cuts: 1,
@@ -87,10 +91,9 @@ impl Pressing {
 
     /// With the ball a share of the way down; at none its lowest point is at the top.
     pub fn inputs<S: Real>(&self, share: f64) -> Inputs<S> {
-        let low = self.mesh.vertices().iter().map(|x| x.z).fold(f64::INFINITY, f64::min);
-        let vertices = (0u32..).zip(self.mesh.vertices());
-        let fixed = vertices.filter(|(_, x)| x.z < low + NEAR);
-        let pins = fixed.map(|(vertex, x)| Pin { vertex, target: x.cast() }).collect();
+        let rest = self.mesh.vertices();
+        let pin = |&vertex: &u32| Pin { vertex, target: rest[vertex as usize].cast() };
+        let pins = self.fixed.iter().map(pin).collect();
         let middle = self.over + vec3(0.0, 0.0, self.radius - share * self.depth);
         let tool = Tool {
             pose: RigidTransform { translation: middle, ..RigidTransform::IDENTITY },
@@ -156,4 +159,9 @@ impl Pressing {
         distance(&truth.positions, &ours.positions)
             / distance(&truth.positions, self.mesh.vertices())
     }
+}
+
+/// Vertices by where they are at rest [m].
+pub fn select(mesh: &TetMesh, inside: impl Fn(Vec3<f64>) -> bool) -> Vec<u32> {
+    (0u32..).zip(mesh.vertices()).filter(|(_, x)| inside(**x)).map(|(v, _)| v).collect()
 }

@@ -1,6 +1,7 @@
 //! `viscera-lab validate`: sections that compare the library with what must come out.
 
 mod cantilever;
+mod contact;
 mod course;
 mod decay;
 mod expected;
@@ -37,6 +38,7 @@ pub const PROGRAM: Program = Program {
         twist::SECTION,
         frequency::SECTION,
         indentation::SECTION,
+        contact::SECTION,
         organ::SECTION,
         rest::SECTION,
         independence::SECTION,
