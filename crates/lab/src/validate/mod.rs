@@ -6,6 +6,7 @@ mod course;
 mod decay;
 mod expected;
 mod frequency;
+mod friction;
 mod indentation;
 mod independence;
 mod locking;
@@ -39,6 +40,7 @@ pub const PROGRAM: Program = Program {
         frequency::SECTION,
         indentation::SECTION,
         contact::SECTION,
+        friction::SECTION,
         organ::SECTION,
         rest::SECTION,
         independence::SECTION,

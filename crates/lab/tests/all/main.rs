@@ -6,6 +6,7 @@ mod common;
 mod data;
 
 mod contact;
+mod contact_at_rest;
 mod holds;
 mod mesh_error;
 mod oracle;

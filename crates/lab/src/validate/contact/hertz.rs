@@ -65,7 +65,7 @@ impl fmt::Display for Case {
 }
 
 fn cases(quick: bool) -> Vec<Case> {
-    let edges: &[usize] = if quick { &[1, 2, 3] } else { &[2, 3, 4] };
+    let edges: &[usize] = if quick { &[2, 3, 4] } else { &[2, 3, 4, 5] };
     let mut cases: Vec<_> = edges.iter().map(|&edges| Case { edges, held: false }).collect();
     cases.push(Case { edges: 2, held: true });
     cases
@@ -162,9 +162,9 @@ pub(super) fn add(context: &mut Context) -> Result<()> {
     let exact = closed_form();
     context.document.subheading("Hertz");
     context.document.paragraph(format!(
-        "A rigid ball of {} mm goes {} mm deep into a layer of {} mm, E 10 kPa, nu {POISSON}, bonded to its base, without \
+        "A rigid ball of {:.0} mm goes {:.1} mm deep into a layer of {:.0} mm, E 10 kPa, nu {POISSON}, bonded to its base, without \
          friction. The closed form is Hertz's with the finite depth after Dimitriadis et al. (2002): {exact:.5} N. The \
-         layer is {} mm wide; held sides bound what that matters from above, free ones from below. States of rest are \
+         layer is {:.0} mm wide; held sides bound what that matters from above, free ones from below. States of rest are \
          the reference's, with a nearly rigid contact.",
         1e3 * RADIUS,
         1e3 * DEPTH,

@@ -1,4 +1,4 @@
-//! What studies of contact share: a ball that is pressed into a block, by the reference and by the library.
+//! A ball that is pressed into a block, by the reference and by the library.
 
 use anyhow::{Context as _, Result};
 use viscera::contact::{ContactLaw, Shape, Tool, Wrench};
@@ -8,10 +8,10 @@ use viscera::mesh::shapes::Block;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::rigid::RigidTransform;
 use viscera::scalar::{Real, Vec3, vec3};
-use viscera::settings::SolverSettings;
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
+use super::{Way, select};
 use crate::load_cases::{FRAME_RATE, NEAR};
 use crate::reference::Reference;
 use crate::settling::{FRAMES, KEPT_VELOCITY};
@@ -126,9 +126,13 @@ impl Pressing {
     }
 
     /// At rest by the library: the ball goes down, then velocities die down.
-    pub fn settle<S: Real>(&self, settings: &SolverSettings) -> Result<Rest> {
+    pub fn settle(&self, way: &Way) -> Result<Rest> {
+        if way.single { self.settle_in::<f32>(way) } else { self.settle_in::<f64>(way) }
+    }
+
+    fn settle_in<S: Real>(&self, way: &Way) -> Result<Rest> {
         let model = self.model::<S>()?;
-        let mut solver = Solver::new(&model, settings);
+        let mut solver = Solver::new(&model, &way.settings());
         let mut state = State::at_rest(&model);
         let frame_time = 1.0 / FRAME_RATE;
         let substeps = solver.substeps(&self.inputs(0.0), frame_time);
@@ -159,9 +163,4 @@ impl Pressing {
         distance(&truth.positions, &ours.positions)
             / distance(&truth.positions, self.mesh.vertices())
     }
-}
-
-/// Vertices by where they are at rest [m].
-pub fn select(mesh: &TetMesh, inside: impl Fn(Vec3<f64>) -> bool) -> Vec<u32> {
-    (0u32..).zip(mesh.vertices()).filter(|(_, x)| inside(**x)).map(|(v, _)| v).collect()
 }
