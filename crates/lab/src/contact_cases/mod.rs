@@ -9,7 +9,7 @@ use viscera::mesh::TetMesh;
 use viscera::scalar::Vec3;
 use viscera::settings::{Count, Method, SolverSettings};
 
-pub use pressing::{Pressing, Rest};
+pub use pressing::{Pressing, Rest, Sampling};
 pub use sliding::{Slide, Sliding};
 
 /// A way to solve a scene of contact.

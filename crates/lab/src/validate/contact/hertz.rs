@@ -27,7 +27,7 @@ use viscera::scalar::{Vec3, vec3};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent};
 
 use super::Context;
-use crate::contact_cases::{Pressing, select};
+use crate::contact_cases::{Pressing, Sampling, select};
 use crate::load_cases::{NEAR, tissue};
 
 const YOUNG: f64 = 1e4;
@@ -134,7 +134,7 @@ fn answer(case: &Case) -> Result<Answer> {
         fixed: select(&mesh, |x| x.z < NEAR - HEIGHT || is_side(x.x) || is_side(x.y)),
         tissue: tissue(MaterialModel::StableNeoHookean, YOUNG, POISSON)?,
         gravity: Vec3::ZERO,
-        cuts: 1,
+        samples: Sampling::Cut(1),
         radius: RADIUS - THICKNESS,
         law: ContactLaw { stiffness: STIFFNESS, thickness: THICKNESS, friction: 0.0 },
         over: Vec3::ZERO,
