@@ -19,8 +19,8 @@ use crate::settling::{FRAMES, KEPT_VELOCITY};
 /// Frames in which the ball goes down.
 const PATH_FRAMES: u32 = 20;
 
-/// A body is at rest below this root mean square speed [m/s]: what swings 30 times a second is then 0.1 micrometres from
-/// its place.
+/// A body is at rest below this root mean square speed [m/s]: what swings 30 times a second is then 0.1 micrometres
+/// from its place.
 const STILL: f64 = 1e-5;
 
 /// Frames at most: the explicit method, which has no damping of its own, swings on under deep contact.

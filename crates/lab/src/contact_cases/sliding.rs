@@ -4,8 +4,8 @@
 //! holds below atan(mu), slides above with  g (sin(angle) - mu cos(angle))
 //! ```
 //!
-//! The plane is tilted about two axes from the beginning, and the body with it. Gravity turns from the plane's normal to
-//! straight down while velocities die down, so that nothing swings; then everything is let go.
+//! The plane is tilted about two axes from the beginning, and the body with it. Gravity turns from the plane's normal
+//! to straight down while velocities die down, so that nothing swings; then everything is let go.
 
 use anyhow::Result;
 use viscera::contact::{ContactLaw, Shape, Tool};
@@ -81,7 +81,8 @@ impl Sliding {
         GRAVITY.length() * (libm::sin(self.angle) - self.law.friction * libm::cos(self.angle))
     }
 
-    fn model<S: Real>(&self) -> Result<Model<S>> {
+    /// Its model.
+    pub fn model<S: Real>(&self) -> Result<Model<S>> {
         let corner = vec3(-0.5 * self.size.x, -0.5 * self.size.y, self.law.thickness);
         let upright = Block { corner, ..Block::new(self.size, self.cells) }.mesh()?;
         let pose = self.pose();
@@ -95,7 +96,7 @@ impl Sliding {
     }
 
     /// With gravity a share of the way from the plane's normal to straight down.
-    fn inputs<S: Real>(&self, share: f64) -> Inputs<S> {
+    pub fn inputs<S: Real>(&self, share: f64) -> Inputs<S> {
         let pose = self.pose();
         let normal = pose.turn(vec3(0.0, 0.0, 1.0));
         let angle = share.min(1.0) * self.angle;

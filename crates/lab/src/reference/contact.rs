@@ -7,9 +7,9 @@
 //! E_f  = K u^2/2 up to K u = L, then L u - L^2/(2 K);   d2E_f = K Q, then L/u (Q - u u^T/u^2)
 //! ```
 //!
-//! `H` is that of the distance: `P` projects onto the directions in which the nearest point of the tool's core stays. `Q`
-//! is `I - n n^T`, or `I` where the sample is tied. A sample that was touched before the step has the tangent plane of
-//! then, in the tool's frame, in place of the distance, and friction.
+//! `H` is that of the distance: `P` projects onto the directions in which the nearest point of the tool's core stays.
+//! `Q` is `I - n n^T`, or `I` where the sample is tied. A sample that was touched before the step has the tangent plane
+//! of then, in the tool's frame, in place of the distance, and friction.
 
 use viscera::contact::{Shape, Tool};
 use viscera::model::Model;

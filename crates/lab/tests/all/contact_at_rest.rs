@@ -1,10 +1,14 @@
-//! The library at rest under a ball beside the reference, with the same law of contact; and a block on a plane.
+//! The library at rest under a ball beside the reference, with the same law of contact; and a block on a plane, at rest,
+//! sliding, and step by step.
 
 use viscera::contact::ContactLaw;
 use viscera::material::{Material, MaterialModel};
 use viscera::scalar::vec3;
-use viscera::settings::Method;
+use viscera::settings::{Count, Integrator, Method, SolverSettings};
+use viscera::solver::Solver;
+use viscera::state::State;
 use viscera_lab::contact_cases::{Pressing, Sliding, Way};
+use viscera_lab::reference::Reference;
 
 fn soft(young: f64, poisson: f64) -> Material {
     Material::new(MaterialModel::StableNeoHookean, young, poisson, 1000.0).expect("a material")
@@ -87,4 +91,60 @@ fn a_block_holds_below_the_angle_of_friction_and_slides_above() {
         assert!((slide.acceleration / sliding.exact() - 1.0).abs() < 0.01, "{way}: {slide:?}");
         assert!((slide.ratio - 0.5).abs() < 0.005, "{way}: {slide:?}");
     }
+}
+
+/// Steps of implicit Euler that are solved to the end are the reference's, with the anchors and normal forces that each
+/// step leaves to the next: while gravity turns samples stick, then slide one after the other. A plane is its own tangent
+/// plane, so that touch planes make no difference.
+#[test]
+fn converged_steps_with_friction_are_newtons() {
+    let scene = incline(8.0);
+    let model = scene.model::<f64>().expect("a model");
+    let settings = SolverSettings {
+        method: Method::QuasiNewton,
+        integrator: Integrator::ImplicitEuler,
+        substeps: Count::Of(1),
+        iterations: Count::Of(600),
+        history: 10,
+        ..SolverSettings::xpbd()
+    };
+    let mut solver = Solver::new(&model, &settings);
+    let mut reference = Reference::new(&model);
+    let (mut ours, mut exact) = (State::at_rest(&model), State::at_rest(&model));
+    let mut touched = Vec::new();
+    let dt = 1.0 / 60.0;
+    let (mut largest, mut slid) = (0.0f64, 0);
+    for step in 1..=60 {
+        let inputs = scene.inputs(f64::from(step) / 30.0);
+        solver.step(&model, &mut ours, &inputs, dt).expect("a step");
+        reference.step_touching(&mut exact, &inputs, &touched, dt).expect("a step");
+        let wrench = reference.wrenches(&exact.positions, &inputs, &touched).expect("legal")[0];
+        let after = reference.touched_after(&exact.positions, &inputs, &touched).expect("legal");
+        let error = (ours.positions.iter().zip(&exact.positions))
+            .map(|(a, b)| (*a - *b).length())
+            .fold(0.0, f64::max);
+        // Both go on from their own last step: errors add up along the way.
+        let way = (exact.positions.iter().zip(&model.rest_positions))
+            .map(|(a, b)| (*a - *b).length())
+            .fold(0.0, f64::max);
+        let difference = (solver.wrenches()[0].force - wrench.force).length();
+        let weight = 9.81 * model.masses.iter().sum::<f64>();
+        assert!(error < 3e-6 * way, "step {step}: {error:e} m of {way:e} m");
+        assert!(difference < 1e-5 * weight, "step {step}: {difference:e} N of {weight:e} N");
+        assert_eq!(ours.contact.touches.len(), after.len(), "step {step}");
+        for theirs in &after {
+            let is_same = |touch: &&viscera::contact::Touch| touch.sample == theirs.sample;
+            let touch = ours.contact.touches.iter().find(is_same).expect("the same samples");
+            assert!((touch.anchor - theirs.anchor).length() < 5e-6 * way, "step {step}");
+        }
+        let moves =
+            touched.iter().zip(&after).filter(|(a, b)| (a.anchor - b.anchor).length() > 1e-6);
+        slid = slid.max(moves.count());
+        (touched, largest) = (after, largest.max(error / way));
+    }
+    println!(
+        "off by {largest:.1e} of the way at most; up to {slid} of {} samples slide",
+        touched.len()
+    );
+    assert!(slid > 10);
 }

@@ -1,5 +1,5 @@
-//! Force and shape of a block at rest under a ball, by each of the library's methods and by the reference, with the same
-//! law of contact.
+//! Force and shape of a block at rest under a ball, by each of the library's methods and by the reference, with the
+//! same law of contact.
 
 use std::fmt;
 
@@ -100,11 +100,11 @@ pub(super) fn add(context: &mut Context) -> Result<()> {
     let answers = context.run_cases(&cases, answer)?;
     context.document.subheading("Force against depth");
     context.document.paragraph(
-        "A ball of 15 mm goes down into a block of cells of 5 mm, stable neo-Hookean, nu 0.45, on a fixed bottom, with the \
-         usual law of contact and without friction. Errors of the force are relative, those of the shape the largest \
-         distance of a vertex from the reference's place over the largest displacement. `time` is how \
-         long it took to be at rest, at least 3 s, with a tenth of the velocities taken away after each frame; `rejected` the share \
-         of all steps that the guard has rejected.",
+        "A ball of 15 mm goes down into a block of cells of 5 mm, stable neo-Hookean, nu 0.45, on a fixed bottom, \
+         with the usual law of contact and without friction. Errors of the force are relative, those of the shape \
+         the largest distance of a vertex from the reference's place over the largest displacement. `time` is how \
+         long it took to be at rest, at least 3 s, with a tenth of the velocities taken away after each frame; \
+         `rejected` the share of all steps that the guard has rejected.",
     );
     let heads = ["E", "depth", "force, reference", "method", "force, library"];
     let mut table = Table::new(heads.into_iter().chain(["force", "shape", "time", "rejected"]));

@@ -6,14 +6,14 @@
 //! a = -(1.2876 - 1.4678 nu + 1.3442 nu^2)/(1 - nu),  b = (0.6387 - 1.0277 nu + 1.5164 nu^2)/(1 - nu)
 //! ```
 //!
-//! Hertz 1881, and the finite depth `H` after Dimitriadis, Horkay, Maresca, Kachar, Chadwick, "Determination of elastic
-//! moduli of thin layers of soft material using the atomic force microscope", Biophysical Journal 82 (2002) 2798, for a
-//! bonded layer, `X` up to 1 and `d` up to a tenth of `H`. Here `X` is 0.2 and `d` a hundredth of `H`; the last term is then
-//! below 0.1 %.
+//! Hertz 1881, and the finite depth `H` after Dimitriadis, Horkay, Maresca, Kachar, Chadwick, "Determination of
+//! elastic moduli of thin layers of soft material using the atomic force microscope", Biophysical Journal 82 (2002)
+//! 2798, for a bonded layer, `X` up to 1 and `d` up to a tenth of `H`. Here `X` is 0.2 and `d` a hundredth of `H`;
+//! the last term is then below 0.1 %.
 //!
-//! The contact is nearly rigid: a thickness of a two-hundredth of the depth, by which the ball is smaller and higher, and
-//! a foundation that gives by less than a thousandth of the depth. Meshes are graded, fine under the ball, and all alike
-//! but for their number of cells; a mesh of linear tetrahedra errs by the square of its edges.
+//! The contact is nearly rigid: a thickness of a two-hundredth of the depth, by which the ball is smaller and higher,
+//! and a foundation that gives by less than a thousandth of the depth. Meshes are graded, fine under the ball, and
+//! all alike but for their number of cells; a mesh of linear tetrahedra errs by the square of its edges.
 
 use std::f64::consts::PI;
 use std::fmt;
@@ -75,22 +75,26 @@ pub(super) fn case_count(quick: bool) -> usize {
     cases(quick).len()
 }
 
-/// The force [N] of the closed form.
-fn closed_form() -> f64 {
-    let nu = POISSON;
+/// `1, c1, c2, c3, c4`.
+fn terms(nu: f64) -> [f64; 5] {
     let a = -(1.2876 - 1.4678 * nu + 1.3442 * nu * nu) / (1.0 - nu);
     let b = (0.6387 - 1.0277 * nu + 1.5164 * nu * nu) / (1.0 - nu);
-    let cube = a * a * a;
-    let terms = [
+    let (cube, square) = (a * a * a, PI * PI);
+    [
         1.0,
         -2.0 * a / PI,
-        4.0 * a * a / (PI * PI),
-        -8.0 / (PI * PI * PI) * (cube + 4.0 * PI * PI / 15.0 * b),
-        16.0 * a / (PI * PI * PI * PI) * (cube + 3.0 * PI * PI / 5.0 * b),
-    ];
+        4.0 * a * a / square,
+        -8.0 / (PI * square) * (cube + 4.0 * square / 15.0 * b),
+        16.0 * a / (square * square) * (cube + 3.0 * square / 5.0 * b),
+    ]
+}
+
+/// The force [N] of the closed form.
+fn closed_form() -> f64 {
     let share = (RADIUS * DEPTH).sqrt() / HEIGHT;
-    let depth = terms.iter().rev().fold(0.0, |sum, term| sum * share + term);
-    4.0 / 3.0 * YOUNG / (1.0 - nu * nu) * RADIUS.sqrt() * DEPTH * DEPTH.sqrt() * depth
+    let of_depth = terms(POISSON).iter().rev().fold(0.0, |sum, term| sum * share + term);
+    let modulus = YOUNG / (1.0 - POISSON * POISSON);
+    4.0 / 3.0 * modulus * RADIUS.sqrt() * DEPTH * DEPTH.sqrt() * of_depth
 }
 
 /// Distances [m] from the middle of contact: `a sinh(i y/k)/sinh(y)` with `k` cells along `a`, so that `n` cells end at
@@ -162,10 +166,10 @@ pub(super) fn add(context: &mut Context) -> Result<()> {
     let exact = closed_form();
     context.document.subheading("Hertz");
     context.document.paragraph(format!(
-        "A rigid ball of {:.0} mm goes {:.1} mm deep into a layer of {:.0} mm, E 10 kPa, nu {POISSON}, bonded to its base, without \
-         friction. The closed form is Hertz's with the finite depth after Dimitriadis et al. (2002): {exact:.5} N. The \
-         layer is {:.0} mm wide; held sides bound what that matters from above, free ones from below. States of rest are \
-         the reference's, with a nearly rigid contact.",
+        "A rigid ball of {:.0} mm goes {:.1} mm deep into a layer of {:.0} mm, E 10 kPa, nu {POISSON}, bonded to \
+         its base, without friction. The closed form is Hertz's with the finite depth after Dimitriadis et al. \
+         (2002): {exact:.5} N. The layer is {:.0} mm wide; held sides bound what that matters from above, free \
+         ones from below. States of rest are the reference's, with a nearly rigid contact.",
         1e3 * RADIUS,
         1e3 * DEPTH,
         1e3 * HEIGHT,
@@ -218,4 +222,34 @@ pub(super) fn add(context: &mut Context) -> Result<()> {
         falls,
     );
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Those of incompressible tissue as they are usually cited; the last one is cited with the other sign, which makes
+    /// less than a thousandth here.
+    #[test]
+    fn terms_are_the_cited_ones() {
+        let cited = [1.0, 1.133, 1.283, 0.769, 0.0975];
+        for (term, cited) in terms(0.5).iter().zip(cited) {
+            assert!((term.abs() - cited).abs() < 1e-3, "{term}, {cited}");
+        }
+        let share = (RADIUS * DEPTH).sqrt() / HEIGHT;
+        assert!((share - 0.2).abs() < 1e-12);
+        assert!((terms(POISSON)[4] * share.powi(4)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn graded_distances_end_where_they_should() {
+        let at = graded(3, 12, HALF_WIDTH);
+        assert!((at(3.0) - CONTACT).abs() < 1e-15 && (at(12.0) - HALF_WIDTH).abs() < 1e-12);
+    }
+
+    #[test]
+    fn values_that_err_by_the_square_are_extrapolated_exactly() {
+        let value = |edges: usize| (edges, 3.0 + 0.7 / (edges * edges) as f64);
+        assert!((extrapolated(&[2, 3, 4].map(value)) - 3.0).abs() < 1e-12);
+    }
 }

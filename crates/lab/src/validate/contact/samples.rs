@@ -54,8 +54,9 @@ pub(super) fn add(context: &mut Context) -> Result<()> {
     let answers = context.run_cases(&cases, answer)?;
     context.document.subheading("Samples per triangle");
     context.document.paragraph(
-        "The force on the same ball with one, four, nine and sixteen samples of each triangle of the surface, at rest by the \
-         reference. At -0.5 mm the ball is within the thickness of contact and does not yet reach the surface.",
+        "The force on the same ball with one, four, nine and sixteen samples of each triangle of the surface, at \
+         rest by the reference. At -0.5 mm the ball is within the thickness of contact and does not yet reach the \
+         surface.",
     );
     let heads = ["depth", "1 sample", "4 samples", "9 samples", "16 samples"];
     let heads = heads.into_iter().chain(["1 beside 16", "4 beside 9", "4 beside 16"]);
