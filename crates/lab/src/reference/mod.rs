@@ -10,13 +10,18 @@
 //! | `tissue` | second derivative of the energy |
 //! | `problem` | tetrahedra, linear or quadratic, springs, attachments |
 //! | `recovered` | recovered-gradient tetrahedra |
+//! | `contact` | contact with tools and friction, from their formulas |
+//! | `touching` | forces on tools, and what a step leaves of contact |
 //! | `objective` | potential, gradient, Hessian |
 //! | `matrix` | sparse matrix, factor, cost |
 //! | `newton` | the iteration |
 //! | `frequency` | the slowest oscillation |
 //! | `spectrum` | many oscillations of a free body |
 //! | `fixing` | whether a body can be at rest |
+//! | `error` | why there is no solution |
 
+pub mod contact;
+mod error;
 pub mod fixing;
 pub mod frequency;
 pub mod matrix;
@@ -26,6 +31,7 @@ pub mod problem;
 pub mod recovered;
 pub mod spectrum;
 pub mod tissue;
+mod touching;
 
 use viscera::layout::Smoothing;
 use viscera::material::Material;
@@ -36,10 +42,13 @@ use viscera::settings::Elements;
 use viscera::solver::{Inputs, Tether};
 use viscera::state::State;
 
+pub use contact::Touched;
+pub use error::ReferenceError;
 pub use frequency::Mode;
 pub use matrix::Cost;
 pub use newton::{Convergence, Tolerance};
 
+use contact::Contacts;
 use matrix::{FactorError, Factorization, Pattern};
 use objective::{Load, Objective, creep_at};
 
@@ -47,98 +56,6 @@ use problem::Problem;
 
 /// Memory [B] that a reference takes at most unless stated otherwise.
 pub const DEFAULT_MEMORY: u64 = 8 << 30;
-
-/// Why there is no reference solution.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ReferenceError {
-    /// More memory than allowed.
-    #[error(
-        "the reference would need {:.1} GB for {unknowns} unknowns, more than the {:.1} GB allowed; \
-         take a coarser mesh, or allow more with `Reference::allow_memory`",
-        *bytes as f64 / 1e9, *limit as f64 / 1e9
-    )]
-    TooLarge {
-        /// Three per free vertex.
-        unknowns: usize,
-        /// What it would take [B].
-        bytes: u64,
-        /// What it may take [B].
-        limit: u64,
-    },
-    /// A body can drift or turn freely.
-    #[error("{}", loose_text(*.vertex, *.turns))]
-    Loose {
-        /// A vertex of that body.
-        vertex: u32,
-        /// True where only turning is left free.
-        turns: bool,
-    },
-    /// An input names no vertex.
-    #[error("a {what} names vertex {vertex}; the model has {vertex_count}")]
-    UnknownVertex {
-        /// "pin", "tether" or "force".
-        what: &'static str,
-        /// The index given.
-        vertex: u32,
-        /// How many vertices there are.
-        vertex_count: usize,
-    },
-    /// A list has the wrong length.
-    #[error("the {what} has {given} entries; the model needs {expected}")]
-    Mismatch {
-        /// The list.
-        what: &'static str,
-        /// Its length.
-        given: usize,
-        /// The length that fits.
-        expected: usize,
-    },
-    /// A number is none, or the step is no time.
-    #[error("the {what} must be finite{}", if *.what == "step" { " and above zero" } else { "" })]
-    NotFinite {
-        /// What is not.
-        what: &'static str,
-    },
-    /// Positions that are no state of rest that returns after a push.
-    #[error("the body is not stable at these positions, so it does not oscillate; settle it first")]
-    Unstable,
-    /// Quadratic tetrahedra have no lumped masses.
-    #[error("quadratic tetrahedra have no lumped masses: only `settle` is defined for them")]
-    NoStep,
-    /// Inverse iteration came to no mode.
-    #[error(
-        "no slowest oscillation after {steps} steps: nothing is free to move, or two are equally slow; \
-         begin with another direction"
-    )]
-    NoMode {
-        /// Steps done.
-        steps: u32,
-    },
-    /// Newton's method came to no minimum.
-    #[error(
-        "Newton's method stopped after {steps} steps with a gradient of {gradient:.1e} N, {:.1e} of \
-         the first; start nearer to the solution, or load in smaller steps",
-        gradient / start_gradient
-    )]
-    NotConverged {
-        /// Newton steps done.
-        steps: u32,
-        /// Gradient at the end [N].
-        gradient: f64,
-        /// Gradient at the start [N].
-        start_gradient: f64,
-    },
-}
-
-fn loose_text(vertex: u32, turns: bool) -> String {
-    let (what, cure) = if turns {
-        ("is held but free to turn", "hold at least three of its vertices that are not in line")
-    } else {
-        ("is not held by anything", "pin or attach some of its vertices")
-    };
-    format!("the body of vertex {vertex} {what}, so it has no state of rest; {cure}")
-}
 
 /// A solution and how it was found.
 #[derive(Clone, Debug)]
@@ -152,7 +69,7 @@ pub struct Solution {
 /// What a state's potential looks like where it is, for comparing minima.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Standing {
-    /// Potential [J]: elastic energy minus the work of dead loads.
+    /// Potential [J]: elastic energy and that of contact, minus the work of dead loads.
     pub potential: f64,
     /// Elastic energy [J].
     pub elastic_energy: f64,
@@ -233,7 +150,8 @@ impl Reference {
         Ok(cost)
     }
 
-    /// Static equilibrium near `start` [m]: pins at their targets, gravity and forces as dead loads.
+    /// Static equilibrium near `start` [m]: pins at their targets, gravity and forces as dead loads, tools without
+    /// friction where they are.
     pub fn settle(
         &mut self,
         start: &[Vec3<f64>],
@@ -241,14 +159,27 @@ impl Reference {
     ) -> Result<Solution, ReferenceError> {
         let pinned = self.check_held(start, inputs)?;
         let x = with_pins(start, inputs);
-        self.minimise(pinned, x, inputs, Load::Forces(dead_loads(&self.problem, inputs)))
+        let load = Load::Forces(dead_loads(&self.problem, inputs));
+        self.minimise(pinned, x, (inputs, &[]), load)
     }
 
-    /// One step of implicit Euler; changes positions and velocities of the state.
+    /// One step of implicit Euler; changes positions and velocities of the state. Tools are at the end of the step and
+    /// have no friction.
     pub fn step(
         &mut self,
         state: &mut State<f64>,
         inputs: &Inputs<f64>,
+        dt: f64,
+    ) -> Result<Convergence, ReferenceError> {
+        self.step_touching(state, inputs, &[], dt)
+    }
+
+    /// The same with what the step before has left of contact: touched samples keep their planes and have friction.
+    pub fn step_touching(
+        &mut self,
+        state: &mut State<f64>,
+        inputs: &Inputs<f64>,
+        touched: &[Touched],
         dt: f64,
     ) -> Result<Convergence, ReferenceError> {
         if !self.lumped {
@@ -258,6 +189,7 @@ impl Reference {
             return Err(ReferenceError::NotFinite { what: "step" });
         }
         let pinned = self.check(&state.positions, inputs)?;
+        self.check_touched(inputs, touched)?;
         let expected = self.problem.vertex_count();
         if state.velocities.len() != expected {
             let (what, given) = ("list of velocities", state.velocities.len());
@@ -271,7 +203,7 @@ impl Reference {
         let creep = creep_at(&self.problem, &state.positions, dt);
         let start = self.problem.recovered.start(&state.positions, dt);
         let load = Load::Inertia { dt, predicted, creep, start };
-        let solution = self.minimise(pinned, x, inputs, load)?;
+        let solution = self.minimise(pinned, x, (inputs, touched), load)?;
         for (v, x) in solution.positions.into_iter().enumerate() {
             state.velocities[v] = (x - state.positions[v]) * (1.0 / dt);
             state.positions[v] = x;
@@ -373,13 +305,14 @@ impl Reference {
         &mut self,
         pinned: Vec<bool>,
         mut x: Vec<Vec3<f64>>,
-        inputs: &Inputs<f64>,
+        (inputs, touched): (&Inputs<f64>, &[Touched]),
         load: Load,
     ) -> Result<Solution, ReferenceError> {
         let mut analysis = self.analyse(pinned)?;
         let cost = self.check_memory(&analysis)?;
         let Analysis { pattern, factorization, .. } = &mut analysis;
-        let objective = objective(&self.problem, inputs, load);
+        let contacts = Contacts::new(&self.problem.samples, &inputs.tools, touched);
+        let objective = Objective { contacts, ..objective(&self.problem, inputs, load) };
         let solved = newton::minimise(&objective, pattern, factorization, &self.tolerance, &mut x);
         self.analysis = Some(analysis);
         let convergence = match solved {
@@ -444,6 +377,7 @@ impl Reference {
             let what = "list of anchors";
             return Err(ReferenceError::Mismatch { what, given, expected });
         }
+        self.check_tools(&inputs.tools)?;
         self.pinned(inputs)
     }
 
@@ -480,7 +414,8 @@ fn with_pins(x: &[Vec3<f64>], inputs: &Inputs<f64>) -> Vec<Vec3<f64>> {
 fn objective<'a>(problem: &'a Problem, inputs: &'a Inputs<f64>, load: Load) -> Objective<'a> {
     let at_rest = inputs.anchors.is_empty();
     let anchors = if at_rest { &problem.rest_anchors } else { &inputs.anchors };
-    Objective { problem, anchors, tethers: &inputs.tethers, load }
+    let contacts = Contacts::new(&problem.samples, &inputs.tools, &[]);
+    Objective { problem, anchors, tethers: &inputs.tethers, contacts, load }
 }
 
 /// Weight and external forces [N].

@@ -5,12 +5,13 @@
 //! statics  Phi(x) = V(x) - sum_i (m_i g + f_i) . x_i
 //! ```
 //!
-//! `V` holds tissue, springs, attachments and tethers [J]; viscosity takes part in a step only.
+//! `V` holds tissue, springs, attachments, tethers and contact [J]; viscosity takes part in a step only.
 
 use viscera::elements::spring;
 use viscera::scalar::{Mat3, Vec3};
 use viscera::solver::Tether;
 
+use super::contact::Contacts;
 use super::matrix::{MatrixValues, Pattern};
 use super::problem::{Problem, TetElements};
 use super::recovered::Start;
@@ -25,6 +26,8 @@ pub struct Objective<'a> {
     pub anchors: &'a [Vec3<f64>],
     /// Soft position constraints.
     pub tethers: &'a [Tether<f64>],
+    /// Tools that touch it.
+    pub contacts: Contacts<'a>,
     /// What pulls.
     pub load: Load,
 }
@@ -100,6 +103,7 @@ impl Objective<'_> {
     pub fn value(&self, x: &[Vec3<f64>]) -> Value {
         let mut value = Value { sum: 0.0, size: 0.0 };
         self.add_elastic(x, true, &mut value);
+        self.contacts.add_energy(x, &mut value);
         match &self.load {
             Load::Forces(forces) => {
                 for (v, force) in forces.iter().enumerate() {
@@ -148,6 +152,7 @@ impl Objective<'_> {
         for (v, stiffness, anchor) in self.anchored() {
             gradient[v as usize] += (x[v as usize] - anchor) * stiffness;
         }
+        self.contacts.add_gradient(x, &mut gradient);
         match &self.load {
             Load::Forces(forces) => {
                 for (g, force) in gradient.iter_mut().zip(forces) {
@@ -185,6 +190,7 @@ impl Objective<'_> {
         for (v, stiffness, _) in self.anchored() {
             matrix.add(pattern, v, v, &diagonal(stiffness));
         }
+        self.contacts.add_hessian(x, positive, pattern, &mut matrix);
         if let Load::Inertia { dt, .. } = &self.load {
             for (v, mass) in problem.masses.iter().enumerate() {
                 matrix.add(pattern, v as u32, v as u32, &diagonal(mass / (dt * dt)));

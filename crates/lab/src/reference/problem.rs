@@ -12,6 +12,7 @@ use viscera::mesh::TetMesh;
 use viscera::model::Model;
 use viscera::scalar::{Mat3, Vec3};
 
+use super::contact::SurfacePoint;
 use super::recovered::Recovered;
 use super::tissue::TissueLaw;
 
@@ -106,6 +107,8 @@ pub struct Problem {
     pub attachments: Vec<Attachment>,
     /// Anchors where nothing moves them [m].
     pub rest_anchors: Vec<Vec3<f64>>,
+    /// What tools touch, by the model's samples; none of quadratic tetrahedra.
+    pub samples: Vec<SurfacePoint>,
 }
 
 impl Problem {
@@ -155,6 +158,7 @@ impl Problem {
                 })
                 .collect(),
             rest_anchors: model.rest_anchors.clone(),
+            samples: SurfacePoint::of_model(model),
         }
     }
 
@@ -231,6 +235,7 @@ impl Problem {
             springs: Vec::new(),
             attachments: Vec::new(),
             rest_anchors: Vec::new(),
+            samples: Vec::new(),
         }
     }
 
@@ -239,13 +244,14 @@ impl Problem {
         self.rest_positions.len()
     }
 
-    /// Pairs and larger groups of nodes that act on each other: tetrahedra, then springs.
+    /// Pairs and larger groups of nodes that act on each other: tetrahedra, springs, then samples of the surface.
     pub fn connections(&self) -> impl Iterator<Item = &[u32]> {
         let linear = self.linear.nodes.iter().map(|nodes| nodes.as_slice());
         let quadratic = self.quadratic.nodes.iter().map(|nodes| nodes.as_slice());
         let recovered = self.recovered.connections();
         let springs = self.springs.iter().map(|spring| spring.ends.as_slice());
-        linear.chain(quadratic).chain(recovered).chain(springs)
+        let samples = self.samples.iter().map(|sample| sample.vertices.as_slice());
+        linear.chain(quadratic).chain(recovered).chain(springs).chain(samples)
     }
 }
 

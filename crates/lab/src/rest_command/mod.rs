@@ -3,6 +3,7 @@
 mod comparison;
 mod files;
 mod path;
+mod tools;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
@@ -77,6 +78,9 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
     for note in &simulation.assembly().notes {
         eprintln!("note: {note}");
     }
+    if let Some(note) = tools::note(simulation.scene()) {
+        eprintln!("note: {note}");
+    }
     print(&heading(&simulation))?;
     let (cost, seconds) = path.cost()?;
     let parts = match arguments.parts - path.len() as u32 {
@@ -145,7 +149,7 @@ pub fn refuse_what_rest_does_not_determine(scene: &Scene) -> Result<()> {
             change.time
         );
     }
-    Ok(())
+    tools::refuse(scene)
 }
 
 fn heading(simulation: &Simulation<f64>) -> String {
@@ -190,6 +194,9 @@ fn describe(simulation: &Simulation<f64>, rest: &Rest, tets: &[TetMeasure], part
     // More digits than a run has: Newton's method has them.
     for patch in simulation.patch_forces_at(rest.time, &rest.positions, &rest.holding) {
         text.push_str(&format!("{patch:.6}\n"));
+    }
+    for tool in tools::forces(simulation, rest) {
+        text.push_str(&format!("{tool:.6}\n"));
     }
     text
 }

@@ -4,6 +4,7 @@
 //! minimum that the motions lead to, not in any other.
 
 use anyhow::{Result, anyhow};
+use viscera::contact::Wrench;
 use viscera::scalar::Vec3;
 use viscera::simulation::Simulation;
 use viscera::solver::Inputs;
@@ -39,6 +40,8 @@ pub struct Rest {
     pub positions: Vec<Vec3<f64>>,
     /// Forces [N] that hold pinned vertices, zero on free ones, shape [vertex_count].
     pub holding: Vec<Vec3<f64>>,
+    /// On each of the tools that act there.
+    pub wrenches: Vec<Wrench>,
     /// Its potential and unbalanced forces.
     pub standing: Standing,
     /// Newton steps of all parts.
@@ -136,12 +139,13 @@ impl<'a> LoadPath<'a> {
             return Err(anyhow!("the scene takes no time"));
         };
         let standing = self.reference.standing(&positions, &inputs)?;
+        let wrenches = self.reference.wrenches(&positions, &inputs, &[])?;
         let mut holding = vec![Vec3::ZERO; positions.len()];
         let reactions = self.reference.reactions(&positions, &inputs)?;
         for (pin, force) in inputs.pins.iter().zip(reactions) {
             holding[pin.vertex as usize] = force;
         }
-        Ok(Rest { time, inputs, positions, holding, standing, steps, convergence })
+        Ok(Rest { time, inputs, positions, holding, wrenches, standing, steps, convergence })
     }
 
     /// An error of the reference in the words of a scene and of this program's options.

@@ -1,10 +1,12 @@
 //! `viscera-lab validate`: sections that compare the library with what must come out.
 
 mod cantilever;
+mod contact;
 mod course;
 mod decay;
 mod expected;
 mod frequency;
+mod friction;
 mod indentation;
 mod independence;
 mod locking;
@@ -37,6 +39,8 @@ pub const PROGRAM: Program = Program {
         twist::SECTION,
         frequency::SECTION,
         indentation::SECTION,
+        contact::SECTION,
+        friction::SECTION,
         organ::SECTION,
         rest::SECTION,
         independence::SECTION,

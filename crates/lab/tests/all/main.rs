@@ -5,6 +5,8 @@ mod common;
 #[path = "../../../viscera/tests/all/common/data.rs"]
 mod data;
 
+mod contact;
+mod contact_at_rest;
 mod holds;
 mod mesh_error;
 mod oracle;

@@ -16,6 +16,7 @@ use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 use viscera_lab::load_cases::Random;
 use viscera_lab::reference::Reference;
+use viscera_lab::reference::contact::Contacts;
 use viscera_lab::reference::matrix::Pattern;
 use viscera_lab::reference::objective::{Load, Objective, creep_at};
 use viscera_lab::reference::problem::Problem;
@@ -77,7 +78,13 @@ fn dot(a: &[Vec3<f64>], b: &[Vec3<f64>]) -> f64 {
 
 fn statics(problem: &Problem) -> Objective<'_> {
     let load = Load::Forces(vec![Vec3::ZERO; problem.vertex_count()]);
-    Objective { problem, anchors: &problem.rest_anchors, tethers: &[], load }
+    Objective {
+        problem,
+        anchors: &problem.rest_anchors,
+        tethers: &[],
+        contacts: Contacts::NONE,
+        load,
+    }
 }
 
 /// Energy and gradient of the library's passes.

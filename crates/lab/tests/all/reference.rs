@@ -11,6 +11,7 @@ use viscera::scalar::{Mat3, Vec3, vec3};
 use viscera::solver::{Inputs, Pin, Tether};
 use viscera::state::State;
 use viscera_lab::load_cases::Random;
+use viscera_lab::reference::contact::Contacts;
 use viscera_lab::reference::matrix::Pattern;
 use viscera_lab::reference::objective::{Load, Objective, creep_at};
 use viscera_lab::reference::problem::Problem;
@@ -70,7 +71,8 @@ fn gradient_and_hessian_match_differences() {
     for (name, load) in [("step", step), ("statics", statics)] {
         let tethers = &[Tether { vertex: 7, target: vec3(0.01, -0.02, 0.03), stiffness: 40.0 }];
         let anchors = &problem.rest_anchors;
-        let objective = Objective { problem: &problem, anchors, tethers, load };
+        let objective =
+            Objective { problem: &problem, anchors, tethers, contacts: Contacts::NONE, load };
         let at = |t: f64| x.iter().zip(&d).map(|(x, d)| *x + *d * t).collect::<Vec<_>>();
         // Fourth-order differences: with t = 1e-3 the error of the formula is about t^4 = 1e-12 of
         // the fifth derivative, that of round-off eps/t = 2e-13 of the values.

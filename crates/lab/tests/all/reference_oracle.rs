@@ -13,6 +13,7 @@ use crate::common::{
 use viscera::scalar::Vec3;
 use viscera::state::State;
 use viscera_lab::reference::Reference;
+use viscera_lab::reference::contact::Contacts;
 use viscera_lab::reference::matrix::Pattern;
 use viscera_lab::reference::objective::{Load, Objective};
 
@@ -32,7 +33,8 @@ fn gradient_and_hessian_are_the_oracles() {
         let problem = reference.problem();
         let x = fixture.vectors("positions");
         let load = Load::Forces(vec![Vec3::ZERO; x.len()]);
-        let objective = Objective { problem, anchors: &[], tethers: &[], load };
+        let objective =
+            Objective { problem, anchors: &[], tethers: &[], contacts: Contacts::NONE, load };
         let forces: Vec<_> = objective.gradient(&x).into_iter().map(|g| -g).collect();
         let expected = fixture.vectors("forces");
         let force_error = largest(&difference(&forces, &expected)) / largest(&expected);

@@ -258,3 +258,34 @@ fn help_teaches_by_examples() {
         assert!(help.contains(part), "the help lacks {part}: {help}");
     }
 }
+
+const BALL: &str = r#"
+[[tool]]
+name = "finger"
+kind = "probe"
+radius = "6 mm"
+length = "40 mm"
+position = ["20 mm", "10 mm", "26 mm"]
+friction = 0
+keys = [{ time = "0.3 s", translation = [0, 0, "-3 mm"] }]
+"#;
+
+const TABLE: &str = r#"
+[[fixing]]
+name = "table"
+body = "bar"
+half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
+"#;
+
+#[test]
+fn a_table_carries_what_a_finger_presses() {
+    let end = rest(&[BAR, TABLE, BALL].concat(), &[]);
+    let (table, finger) = (end.force("table"), end.force("finger"));
+    // What the table pushes up bears the weight and the finger, whose own force is the tissue's answer.
+    let error = (table[2] - WEIGHT - finger[2]).abs();
+    assert!(error < 2e-6 && finger[2] > 0.05, "{table:?}, {finger:?}");
+    assert!(!end.stderr.contains("friction"), "{}", end.stderr);
+    let rough = rest(&[BAR, TABLE, &BALL.replace("friction = 0", "friction = 0.4")].concat(), &[]);
+    assert!(rough.stderr.contains("tool `finger` for one"), "{}", rough.stderr);
+    assert_eq!(rough.force("finger"), finger);
+}

@@ -13,6 +13,7 @@ use super::super::step::MeasuredStep;
 use crate::forms::Form;
 use crate::load_cases::{FRAME_RATE, LoadCase, Size};
 use crate::reference::Reference;
+use crate::reference::contact::Contacts;
 use crate::reference::objective::{Load, Objective, creep_at};
 use crate::reference::problem::Problem;
 use crate::sections::Changes;
@@ -184,7 +185,8 @@ pub(super) fn gradient_left(step: &MeasuredStep) -> Result<f64> {
     let start = problem.recovered.start(&state.positions, dt);
     let load = Load::Inertia { dt, predicted: inertial, creep, start };
     let (anchors, tethers) = (&inputs.anchors, &inputs.tethers);
-    let objective = Objective { problem: &problem, anchors, tethers, load };
+    let objective =
+        Objective { problem: &problem, anchors, tethers, contacts: Contacts::NONE, load };
     let free = step.load_case.free();
     let norm = |x: &[Vec3<f64>]| -> f64 {
         let gradient = objective.gradient(x);

@@ -1,0 +1,58 @@
+//! Tools at rest: what a state of rest says of them, and what it cannot.
+
+use anyhow::{Result, bail};
+use viscera::scalar::Vec3;
+use viscera::scene::Scene;
+use viscera::simulation::{Simulation, ToolForce};
+
+use super::path::Rest;
+
+/// Refuses jaws whose place, or whose hold, depends on more than where the tool is at the end.
+pub(super) fn refuse(scene: &Scene) -> Result<()> {
+    let with_jaws = || scene.tools.iter().filter_map(|tool| Some((tool, tool.jaws.as_ref()?)));
+    if let Some((tool, _)) = with_jaws().find(|(_, jaws)| jaws.follow_force()) {
+        bail!(
+            "{}: the jaws of tool `{}` follow a force, so that a state of rest does not tell their angle; drive them by \
+             an angle",
+            scene.name,
+            tool.name
+        );
+    }
+    if let Some((tool, _)) = with_jaws().find(|(_, jaws)| !jaws.locks.is_empty()) {
+        bail!(
+            "{}: tool `{}` ties tissue to its jaws, and where it does so is a matter of motion; leave out its locks",
+            scene.name,
+            tool.name
+        );
+    }
+    Ok(())
+}
+
+/// Says that tools have no friction in a state of rest, where they have some in the scene.
+pub(super) fn note(scene: &Scene) -> Option<String> {
+    let tool = scene.tools.iter().find(|tool| tool.law.friction > 0.0)?;
+    Some(format!(
+        "tools touch without friction here, tool `{}` for one: with it a state of rest depends on the way there",
+        tool.name
+    ))
+}
+
+/// Forces on the scene's tools in a state of rest.
+pub(super) fn forces(simulation: &Simulation<f64>, rest: &Rest) -> Vec<ToolForce> {
+    let mut parts = rest.wrenches.iter().zip(&rest.inputs.tools);
+    let of_tool = |tool: &viscera::scene::Instrument| {
+        let origin = tool.pose(rest.time).translation;
+        let (mut force, mut torque) = (Vec3::ZERO, Vec3::ZERO);
+        let (mut touches, mut pinned, mut depth) = (0, 0, 0.0f64);
+        for (wrench, placed) in parts.by_ref().take(tool.parts.len()) {
+            force += wrench.force;
+            torque += wrench.torque + (placed.pose.translation - origin).cross(wrench.force);
+            touches += wrench.touches;
+            pinned += wrench.pinned;
+            depth = depth.max(wrench.depth);
+        }
+        let (force, torque) = (force.to_array(), torque.to_array());
+        ToolForce { name: tool.name.clone(), force, torque, touches, pinned, depth, error: None }
+    };
+    simulation.assembly().tools.iter().map(of_tool).collect()
+}

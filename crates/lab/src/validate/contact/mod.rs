@@ -1,0 +1,30 @@
+//! Contact without friction: a ball that is pressed into a block.
+//!
+//! | file | what must come out |
+//! |---|---|
+//! | `hertz` | the closed form of a layer of finite depth, with the reference |
+//! | `depth` | the reference's force and shape, with each of the library's methods |
+//! | `samples` | the same force with more samples of the surface |
+
+mod depth;
+mod hertz;
+mod samples;
+
+use anyhow::Result;
+
+use super::{Context, Section};
+
+pub(super) const SECTION: Section = Section {
+    name: "contact",
+    title: "Contact",
+    cases: |quick, _| {
+        hertz::case_count(quick) + depth::case_count(quick) + samples::case_count(quick)
+    },
+    run,
+};
+
+fn run(context: &mut Context) -> Result<()> {
+    hertz::add(context)?;
+    depth::add(context)?;
+    samples::add(context)
+}
