@@ -8,13 +8,14 @@ use anyhow::Result;
 use indicatif::ProgressBar;
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
+use viscera::contact::Tool;
 use viscera::mesh::SurfaceMesh;
 use viscera::mesh::topology::boundary_surface;
 use viscera::scalar::{Real, Vec3};
 use viscera::simulation::{FrameReport, PatchKind, Simulation};
 use viscera_picture::{
-    Animation, Arrow, Bounds, Camera, Color, ColorScale, Drawing, Image, ImageSize, Markers,
-    Outline, Paint, PictureError, Surface, TracedOutline, ViewDirection, write_png,
+    Animation, Arrow, Bounds, Camera, Color, ColorScale, Drawing, Facets, Image, ImageSize,
+    Markers, Outline, Paint, PictureError, Surface, TracedOutline, ViewDirection, write_png,
 };
 
 /// Frames of the animated image. More make the file large, fewer make it jerky.
@@ -42,6 +43,10 @@ struct Shot {
     markers: Vec<Vec3<f32>>,
     /// Name, middle of the patch or the tool's origin, and force [N] of each thing that moves, pulls or touches.
     pulls: Vec<(String, Vec3<f64>, Vec3<f64>)>,
+    /// Parts of tools, where they are.
+    tools: Vec<Tool>,
+    /// Name of each tool and the magnitude of the force on it [N].
+    tool_forces: Vec<(String, f64)>,
 }
 
 /// Remembered frames.
@@ -119,6 +124,12 @@ impl Film {
             pulls: pulls.chain(tools).collect(),
             surface: surface.iter().map(|x| x.cast()).collect(),
             markers: self.marked.iter().map(|&v| positions[v as usize].cast()).collect(),
+            tools: simulation.tool_parts(),
+            tool_forces: report
+                .tools
+                .iter()
+                .map(|tool| (tool.name.clone(), Vec3::from_f64(tool.force).length()))
+                .collect(),
         });
     }
 
@@ -237,6 +248,7 @@ impl<'a> Look<'a> {
         }
         let scale = ColorScale::rounded("displacement [mm]", 0.0, largest)?;
         let diagonal = bounds.diagonal();
+        include_tools(&mut bounds, &film.shots);
         let mut look = Self { film, bounds, diagonal, strongest, scale, progress };
         for shot in &film.shots {
             for arrow in look.arrows(shot) {
@@ -271,6 +283,7 @@ impl<'a> Look<'a> {
                 triangles: &film.rest.triangles,
                 paint: Paint::Values(&values),
             }],
+            tools: &shot.tools,
             traced: vec![rest],
             markers: vec![marks(fixed, Color::FIXED, 0.0), marks(moved, Color::PULLED, 0.4)],
             arrows: in_front(self.arrows(shot), camera),
@@ -297,6 +310,22 @@ impl<'a> Look<'a> {
     }
 }
 
+/// Parts of tools so near to where the tissue ever is are in the picture, as a share of its diagonal: enough to see
+/// what a tool is. A long shaft leaves the picture, and the tissue stays large.
+const TOOLS_WITHIN: f64 = 0.12;
+
+/// Makes room for tools near the tissue, of which these are the bounds.
+fn include_tools(bounds: &mut Bounds, shots: &[Shot]) {
+    let Some((low, high)) = bounds.corners() else { return };
+    let margin = Vec3::splat(TOOLS_WITHIN * bounds.diagonal());
+    let (low, high) = (low - margin, high + margin);
+    for tool in shots.iter().flat_map(|shot| &shot.tools) {
+        let mut near = Facets::of(&tool.shape).placed(&tool.pose).positions;
+        near.retain(|x| x.max(low) == *x && x.min(high) == *x);
+        bounds.include(&near);
+    }
+}
+
 /// How far arrows are moved towards the camera, as a share of the way.
 const IN_FRONT: f64 = 0.4;
 
@@ -314,10 +343,10 @@ fn in_front(mut arrows: Vec<Arrow>, camera: &Camera) -> Vec<Arrow> {
 
 fn caption(shot: &Shot) -> String {
     let mut text = format!("t = {:.2} s", shot.time);
-    for (name, _, force) in shot.pulls.iter().take(2) {
-        if force.length() > 0.0 {
-            text.push_str(&format!("   {name} {:.3} N", force.length()));
-        }
+    let pulls = shot.pulls.iter().take(2).map(|(name, _, force)| (name, force.length()));
+    let tools = shot.tool_forces.iter().take(2).map(|(name, force)| (name, *force));
+    for (name, force) in pulls.chain(tools).filter(|(_, force)| *force > 0.0) {
+        text.push_str(&format!("   {name} {force:.3} N"));
     }
     text
 }

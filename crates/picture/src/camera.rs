@@ -254,6 +254,11 @@ impl Camera {
         self.radius
     }
 
+    /// The middle of what is framed [m], as nearly as the margins let it be in the middle of the picture.
+    pub(crate) fn target(&self) -> Vec3<f64> {
+        self.position - self.backward * self.distance
+    }
+
     /// From camera axes (right, up, towards the viewer) to the world's.
     pub(crate) fn world_direction(&self, v: [f64; 3]) -> Vec3<f64> {
         self.right * v[0] + self.up * v[1] + self.backward * v[2]

@@ -24,6 +24,8 @@ impl Color {
     pub const FIXED: Self = Self::new(0.07, 0.085, 0.11);
     /// The patch that is pulled, and its arrow.
     pub const PULLED: Self = Self::new(1.0, 0.34, 0.01);
+    /// Tools.
+    pub const STEEL: Self = Self::new(0.23, 0.25, 0.275);
     /// The shape at rest.
     pub const REST: Self = Self::new(0.03, 0.09, 0.22);
     /// A value that is not a number.

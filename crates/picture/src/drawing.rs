@@ -1,11 +1,13 @@
 //! What a picture shows, as plain data.
 
+use viscera::contact::{Shape, Tool};
 use viscera::mesh::SurfaceMesh;
 use viscera::scalar::{Vec3, vec3};
 
 use crate::camera::{Camera, Projected, is_drawable, unit};
 use crate::color::Color;
 use crate::error::PictureError;
+use crate::facets::Facets;
 use crate::image::{Image, ImageSize};
 use crate::lines::{ContourPixel, DepthMap, LineMask, contour_of, feature_edges, project_line};
 use crate::marks::{Arrow, Background, Markers, Paint};
@@ -78,6 +80,8 @@ pub struct Drawing<'a> {
     pub caption: &'a str,
     /// Tissue.
     pub surfaces: Vec<Surface<'a>>,
+    /// Tools and obstacles, in steel. Of a half-space a square patch is drawn, seen from outside only.
+    pub tools: &'a [Tool],
     /// Shapes at rest.
     pub outlines: Vec<Outline<'a>>,
     /// The same, traced before. Those for pictures of another size are skipped.
@@ -121,6 +125,9 @@ impl Drawing<'_> {
         let mut skipped = 0;
         for surface in &self.surfaces {
             skipped += self.add_surface(&mut shapes, camera, surface);
+        }
+        for tool in self.tools {
+            skipped += add_tool(&mut shapes, camera, tool);
         }
         for arrow in &self.arrows {
             skipped += add_arrow(&mut shapes, camera, arrow);
@@ -222,6 +229,33 @@ fn check_indices(
         }
     }
     Ok(())
+}
+
+/// Parts of tools that are nearer to the camera than this share of the framing distance are left out.
+const NEAREST: f64 = 0.02;
+
+/// Adds a tool's triangles; one where it cannot be drawn. What is behind the camera is left out.
+fn add_tool(shapes: &mut Shapes, camera: &Camera, tool: &Tool) -> usize {
+    let facets = match tool.shape {
+        // From below it would hide everything.
+        Shape::HalfSpace if tool.distance(camera.position()).value <= 0.0 => return 0,
+        Shape::HalfSpace => Facets::patch(&tool.pose, camera.target(), camera.radius()),
+        shape => Facets::of(&shape).placed(&tool.pose),
+    };
+    if !facets.positions.iter().all(|&p| is_drawable(p)) {
+        return 1;
+    }
+    let is_seen = |at: &Projected| at.inverse_depth < 1.0 / NEAREST;
+    let project = |&p: &Vec3<f64>| camera.project(p).filter(is_seen);
+    let projected: Vec<_> = facets.positions.iter().map(project).collect();
+    let paint = FacePaint::Flat(Color::STEEL);
+    for triangle in &facets.triangles {
+        if let [Some(a), Some(b), Some(c)] = triangle.map(|v| projected[v as usize]) {
+            let normals = triangle.map(|v| facets.normals[v as usize]);
+            shapes.faces.push(Face { at: [a, b, c], normals, paint, finish: Finish::Steel });
+        }
+    }
+    0
 }
 
 /// Sides of an arrow's shaft: smooth at the size arrows are drawn.

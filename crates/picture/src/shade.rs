@@ -27,6 +27,8 @@ pub(crate) enum Finish {
     Wet,
     /// Markers and arrows: no highlight to be mistaken for tissue.
     Matte,
+    /// Tools: brushed metal, in which sky and ground are mirrored.
+    Steel,
 }
 
 /// What a shape is coloured with.
@@ -151,6 +153,9 @@ impl Lights {
         if fragment.finish == Finish::Matte {
             return diffuse;
         }
+        if fragment.finish == Finish::Steel {
+            return self.steel(fragment, to_viewer, diffuse, openness);
+        }
         let half = (n.dot(unit(self.key + to_viewer)) as f32).max(0.0);
         let broad = power_of_two(half, 4);
         let tight = power_of_two(half, 7);
@@ -160,6 +165,19 @@ impl Lights {
         let mirrored = (lit + 0.20 * fresnel * sky) * (0.3 + 0.7 * openness);
         // Towards white, never past it.
         diffuse.mix(Color::new(1.0, 0.99, 0.97), mirrored.min(1.0))
+    }
+
+    /// Light that metal sends to the viewer: in part as matte things do, in part a blurred mirror.
+    fn steel(&self, fragment: &Fragment, to_viewer: Vec3<f64>, diffuse: Color, open: f32) -> Color {
+        let n = fragment.normal;
+        let mirrored = n * (2.0 * n.dot(to_viewer)) - to_viewer;
+        let sky = 0.5 + 0.5 * mirrored.dot(self.up) as f32;
+        let around = GROUND.mix(SKY, sky * sky).scaled(1.6 * open);
+        let half = (n.dot(unit(self.key + to_viewer)) as f32).max(0.0);
+        let lit =
+            (0.30 * power_of_two(half, 4) + 0.22 * power_of_two(half, 7)) * (0.3 + 0.7 * open);
+        let metal = diffuse.scaled(0.62).plus(fragment.albedo.times(around));
+        metal.mix(Color::new(1.0, 1.0, 1.0), lit.min(1.0))
     }
 }
 

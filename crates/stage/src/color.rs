@@ -1,5 +1,6 @@
 //! Values that colours show, at the vertices of the surfaces.
 
+use viscera::contact::{Touch, VertexPressures};
 use viscera::measure::TetMeasure;
 use viscera::scalar::{Real, Vec3};
 use viscera::simulation::Assembly;
@@ -9,12 +10,13 @@ use crate::snapshot::Coloring;
 /// Values of the surfaces' vertices, one body after the other; none for plain tissue. `positions` [m] of
 /// the tetrahedra's vertices, the user's order; `tets` of the same state, where the colours need them. Strain and stress of an inverted
 /// tetrahedron mean nothing, and its stress is as large as one likes where it is nearly flat: its vertices have no
-/// value there (NaN).
+/// value there (NaN). `touches` of the same state, where colours show the pressure of tools.
 pub fn surface_values<S: Real>(
     assembly: &Assembly,
     coloring: Coloring,
     positions: &[Vec3<S>],
     tets: &[TetMeasure],
+    touches: &[Touch],
     values: &mut Vec<f32>,
 ) {
     values.clear();
@@ -23,6 +25,21 @@ pub fn surface_values<S: Real>(
         Coloring::Displacement => displacements(assembly, positions, values),
         Coloring::Strain => averages(assembly, tets, |tet| tet.stretches[0] - 1.0, values),
         Coloring::Stress => averages(assembly, tets, |tet| tet.von_mises, values),
+        Coloring::Pressure => pressures(assembly, touches, values),
+    }
+}
+
+/// Of contact, at vertices of the tetrahedra, and between them as they are.
+fn pressures(assembly: &Assembly, touches: &[Touch], values: &mut Vec<f32>) {
+    let count = assembly.builder.positions().len();
+    let found = VertexPressures::of(assembly.builder.samples(), touches, count);
+    for body in &assembly.bodies {
+        let of_body = &found.pressures[body.vertices.clone()];
+        for (corners, weights) in body.embedding.corners().iter().zip(body.embedding.weights()) {
+            let bound = corners.iter().zip(weights);
+            let value: f64 = bound.map(|(&v, weight)| weight * of_body[v as usize]).sum();
+            values.push(value as f32);
+        }
     }
 }
 
@@ -103,7 +120,7 @@ mod tests {
         let positions = assembly.builder.positions().to_vec();
         let mut values = Vec::new();
         let mut color = |tets: &[TetMeasure]| {
-            surface_values(&assembly, Coloring::Stress, &positions, tets, &mut values);
+            surface_values(&assembly, Coloring::Stress, &positions, tets, &[], &mut values);
             values.clone()
         };
         assert!(color(&tets).iter().all(|value| (value - 2e3).abs() < 1e-3));

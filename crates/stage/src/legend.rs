@@ -20,10 +20,10 @@ pub struct Legend {
 }
 
 /// The share of the coloured vertices that the scale holds. A stress concentration is at fewer than one in a
-/// hundred; those of displacement are no outliers.
+/// hundred; those of displacement are no outliers, and tools press on few vertices, of which all count.
 fn share_held(coloring: Coloring) -> f64 {
     match coloring {
-        Coloring::Plain | Coloring::Displacement => 1.0,
+        Coloring::Plain | Coloring::Displacement | Coloring::Pressure => 1.0,
         Coloring::Strain | Coloring::Stress => 0.99,
     }
 }
@@ -36,7 +36,7 @@ const LOWEST: f32 = 0.2;
 /// as colours otherwise.
 fn least(coloring: Coloring) -> f32 {
     match coloring {
-        Coloring::Plain | Coloring::Stress => 1.0,
+        Coloring::Plain | Coloring::Stress | Coloring::Pressure => 1.0,
         Coloring::Displacement => 1e-4,
         Coloring::Strain => 1e-3,
     }
@@ -85,7 +85,7 @@ impl Legend {
             Coloring::Plain => String::new(),
             Coloring::Displacement => Dimension::Length.format(value),
             Coloring::Strain => format!("{} %", viscera::units::format_number(100.0 * value)),
-            Coloring::Stress => Dimension::Pressure.format(value),
+            Coloring::Stress | Coloring::Pressure => Dimension::Pressure.format(value),
         }
     }
 
@@ -96,8 +96,8 @@ impl Legend {
             Coloring::Plain => return None,
             Coloring::Displacement => ("mm", 1e3),
             Coloring::Strain => ("%", 100.0),
-            Coloring::Stress if high < 1e3 => ("Pa", 1.0),
-            Coloring::Stress => ("kPa", 1e-3),
+            Coloring::Stress | Coloring::Pressure if high < 1e3 => ("Pa", 1.0),
+            Coloring::Stress | Coloring::Pressure => ("kPa", 1e-3),
         };
         ColorScale::new(format!("{} [{unit}]", self.title()), 0.0, factor * high).ok()
     }
@@ -109,6 +109,7 @@ impl Legend {
             Coloring::Displacement => "displacement",
             Coloring::Strain => "largest strain",
             Coloring::Stress => "von Mises stress",
+            Coloring::Pressure => "contact pressure",
         }
     }
 }

@@ -276,9 +276,10 @@ impl<S: Real> Run for SimulationRun<S> {
         let assembly = self.simulation.assembly();
         let tets = match coloring {
             Coloring::Strain | Coloring::Stress => self.simulation.tets(),
-            Coloring::Plain | Coloring::Displacement => Vec::new(),
+            Coloring::Plain | Coloring::Displacement | Coloring::Pressure => Vec::new(),
         };
-        surface_values(assembly, coloring, positions, &tets, &mut snapshot.values);
+        let touches = &self.simulation.state().contact.touches;
+        surface_values(assembly, coloring, positions, &tets, touches, &mut snapshot.values);
     }
 
     fn done_by_hand(&self) -> (String, f64) {

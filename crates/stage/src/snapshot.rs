@@ -18,6 +18,8 @@ pub enum Coloring {
     Strain,
     /// Von Mises stress [Pa].
     Stress,
+    /// Pressure of tools on the surface [Pa].
+    Pressure,
 }
 
 /// The state of one simulation at that time.

@@ -26,7 +26,7 @@
 
 /** The scene that a link without one shows. */
 export const FIRST_SCENE = "liver_retraction";
-export const COLORS = ["tissue", "displacement", "strain", "stress"];
+export const COLORS = ["tissue", "displacement", "strain", "stress", "contact"];
 /** Finest and coarsest mesh that the module takes: with half the edges a mesh has eight times the tetrahedra. */
 export const MESH = { finest: 0.25, coarsest: 4 };
 

@@ -49,9 +49,10 @@ impl Session {
             "displacement" => Coloring::Displacement,
             "strain" => Coloring::Strain,
             "stress" => Coloring::Stress,
+            "contact" => Coloring::Pressure,
             other => {
                 return Err(format!(
-                    "colours show tissue, displacement, strain or stress, not `{other}`"
+                    "colours show tissue, displacement, strain, stress or contact, not `{other}`"
                 ));
             }
         };

@@ -10,11 +10,12 @@ use crate::help::Request;
 use crate::holds::Holds;
 use crate::preferences::Preferences;
 
-const COLORINGS: [(Coloring, &str, &str); 4] = [
+const COLORINGS: [(Coloring, &str, &str); 5] = [
     (Coloring::Plain, "tissue", "The tissue's own colour"),
     (Coloring::Displacement, "displacement", "How far each point is from where it is at rest"),
     (Coloring::Strain, "strain", "By how much the most stretched direction is longer than at rest"),
     (Coloring::Stress, "stress", "Von Mises stress"),
+    (Coloring::Pressure, "contact", "How hard tools press on the surface, as a pressure"),
 ];
 
 /// Colours, marks.

@@ -12,11 +12,13 @@
 //! Everything here is in double precision, whatever the state's is.
 
 pub mod law;
+mod pressure;
 pub mod shape;
 pub mod surface;
 mod touch;
 
 pub use law::{Foundation, Friction};
+pub use pressure::VertexPressures;
 pub use shape::{Distance, Shape};
 pub use surface::{Sample, sample_boundary, sample_embedded};
 pub use touch::{Felt, Moved, Placed, Side, Touch, Touching};
