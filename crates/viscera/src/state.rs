@@ -1,6 +1,6 @@
 //! The state: everything that moves.
 
-use crate::contact::Touch;
+use crate::contact::{Tool, Touch};
 use crate::model::Model;
 use crate::scalar::rigid::RigidTransform;
 use crate::scalar::{Real, Vec3};
@@ -28,13 +28,19 @@ pub struct State<S> {
 /// What is kept of contact from step to step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactState {
-    /// Where each tool is.
+    /// Where each tool is. A tool that has no pose here begins the next step where it ends it: it has not moved, and what it
+    /// would have met on its way is not there. [`ContactState::of`] has the poses of tools at the beginning.
     pub poses: Vec<RigidTransform>,
     /// What tools press on: by connected part, sample and tool.
     pub touches: Vec<Touch>,
 }
 
 impl ContactState {
+    /// Of tools that are where they are, and have touched nothing yet.
+    pub fn of(tools: &[Tool]) -> Self {
+        Self { poses: tools.iter().map(|tool| tool.pose).collect(), touches: Vec::new() }
+    }
+
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.poses[..]) + size_of_val(&self.touches[..])

@@ -144,7 +144,11 @@ impl Touching {
         let side = if first.value < thickness {
             Self::plane(&tool.shape, from, &first, kept)
         } else {
-            trace(&tool.shape, from, to, thickness).unwrap_or(Side::Live)
+            // Tissue may be dragged along, or held back: what stands still is looked at as well.
+            let still = tool.pose.undo(moved.from);
+            trace(&tool.shape, from, to, thickness)
+                .or_else(|| trace(&tool.shape, from, still, thickness))
+                .unwrap_or(Side::Live)
         };
         let friction = kept.and_then(|kept| friction(&tool.law, &foundation, kept));
         Some(Self {

@@ -12,7 +12,7 @@ use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, Scene
 use crate::settings::{Precision, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::check_elements;
-use crate::state::{Learned, State};
+use crate::state::{ContactState, Learned, State};
 
 /// What was done by hand since the beginning or the last [`Simulation::reset`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -198,6 +198,7 @@ impl<S: Real> Simulation<S> {
         self.put_at_rest();
         self.balance = ForceBalance::default();
         self.inputs = self.inputs_at(0.0);
+        self.state.contact = ContactState::of(&self.inputs.tools);
         self.measure_tissue();
         Ok(())
     }

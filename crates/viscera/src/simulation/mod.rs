@@ -50,7 +50,7 @@ use crate::settings::{Count, DeviceRequest, Elements, Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::oscillations::Oscillations;
 use crate::solver::{Inputs, Solver, StepError, check_elements, choose};
-use crate::state::State;
+use crate::state::{ContactState, State};
 use device::{Backend, Offered};
 
 /// A running scene.
@@ -163,6 +163,7 @@ impl<S: Real> Simulation<S> {
             assembly,
         };
         simulation.inputs = simulation.inputs_at(0.0);
+        simulation.state.contact = ContactState::of(&simulation.inputs.tools);
         simulation.choose_substeps();
         simulation.divided = simulation.substeps;
         simulation.measure_tissue();

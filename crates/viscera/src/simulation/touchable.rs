@@ -71,7 +71,9 @@ impl Assembly {
             return sample_embedded(surface, embedding, positions, first_vertex, first_tet);
         }
         let (tets, positions) = (body.mesh.tets(), body.mesh.vertices());
-        let cuts = u32::from(thinnest < SEVERAL_EDGES * mean_edge(tets, positions));
+        let edge = mean_edge(tets, positions);
+        // Thinner than an edge a tool would slip between the samples of a triangle that is stretched.
+        let cuts = u32::from(thinnest < SEVERAL_EDGES * edge) + u32::from(thinnest < edge);
         let mut samples = sample_boundary(tets, positions, cuts);
         for sample in &mut samples {
             sample.vertices = sample.vertices.map(|v| v + first_vertex);

@@ -201,13 +201,13 @@ fn tools_that_tissue_cannot_meet_are_refused() {
         (
             "\"20 mm\"]\nkeys",
             "\"12 mm\"]\nkeys",
-            "t.toml, line 12, column 1: tool `ball` begins 1.789 mm inside body `block`; move its position away from it",
+            "t.toml, line 12, column 1: tool `ball` begins 1.945 mm inside body `block`; move its position away from it",
         ),
         (
             "radius = \"4 mm\"",
             "radius = \"0.5 mm\"",
             "t.toml, line 12, column 1: tool `ball` has a radius of 0.500 mm at its thinnest, and `block` is touched at \
-             points about 1.491 mm apart; take a finer mesh of `block` or a thicker tool",
+             points about 0.745 mm apart; take a finer mesh of `block` or a thicker tool",
         ),
         (
             "position = [0, 0, \"-5 mm\"]",

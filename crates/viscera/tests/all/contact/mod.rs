@@ -12,14 +12,13 @@ use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{Count, Elements, Method, SolverSettings};
 use viscera::solver::{Inputs, Pin, Solver};
-use viscera::state::State;
+use viscera::state::{ContactState, State};
 
 use crate::common::SNH;
 
 /// A block of tissue, at rest with its middle above the origin and its lower face at `z = 0`.
 pub struct Block {
     pub mesh: TetMesh,
-    pub size: Vec3<f64>,
     /// Young's modulus [Pa], Poisson's ratio, retardation time [s].
     pub tissue: [f64; 3],
     pub cuts: u32,
@@ -34,7 +33,7 @@ impl Block {
         let vertices = made.vertices().iter().map(|x| *x + shift).collect();
         let regions = made.regions().to_vec();
         let (mesh, _) = TetMesh::new(vertices, made.tets().to_vec(), regions).expect("a mesh");
-        Self { mesh, size, tissue, cuts: 1 }
+        Self { mesh, tissue, cuts: 1 }
     }
 
     pub fn model<S: Real>(&self) -> Model<S> {
@@ -112,6 +111,10 @@ impl<S: Real> Scene<S> {
 
     /// Goes on for a time [s]; `act` moves the tools to where they are at a time [s] from the beginning.
     pub fn run(&mut self, time: f64, mut act: impl FnMut(f64, &mut [Tool])) {
+        if self.steps == 0 {
+            act(0.0, &mut self.inputs.tools);
+            self.state.contact = ContactState::of(&self.inputs.tools);
+        }
         for _ in 0..(time / self.dt).round() as u32 {
             self.steps += 1;
             act(f64::from(self.steps) * self.dt, &mut self.inputs.tools);

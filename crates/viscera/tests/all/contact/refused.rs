@@ -30,7 +30,8 @@ fn tools_that_cannot_be_are_refused_by_name() {
         answer(tool)
     };
     assert_eq!(changed(&|_| ()), Ok(()));
-    let bad: [(&dyn Fn(&mut Tool), &str); 7] = [
+    type Change<'a> = &'a dyn Fn(&mut Tool);
+    let bad: [(Change<'_>, &str); 7] = [
         (&|tool| tool.law.friction = 10.0, "coefficient of friction"),
         (&|tool| tool.law.friction = f64::NAN, "coefficient of friction"),
         (&|tool| tool.law.thickness = 0.0, "thickness"),
