@@ -45,8 +45,6 @@ struct Shot {
     pulls: Vec<(String, Vec3<f64>, Vec3<f64>)>,
     /// Parts of tools, where they are.
     tools: Vec<Tool>,
-    /// Name of each tool and the magnitude of the force on it [N].
-    tool_forces: Vec<(String, f64)>,
 }
 
 /// Remembered frames.
@@ -125,11 +123,6 @@ impl Film {
             surface: surface.iter().map(|x| x.cast()).collect(),
             markers: self.marked.iter().map(|&v| positions[v as usize].cast()).collect(),
             tools: simulation.tool_parts(),
-            tool_forces: report
-                .tools
-                .iter()
-                .map(|tool| (tool.name.clone(), Vec3::from_f64(tool.force).length()))
-                .collect(),
         });
     }
 
@@ -344,8 +337,7 @@ fn in_front(mut arrows: Vec<Arrow>, camera: &Camera) -> Vec<Arrow> {
 fn caption(shot: &Shot) -> String {
     let mut text = format!("t = {:.2} s", shot.time);
     let pulls = shot.pulls.iter().take(2).map(|(name, _, force)| (name, force.length()));
-    let tools = shot.tool_forces.iter().take(2).map(|(name, force)| (name, *force));
-    for (name, force) in pulls.chain(tools).filter(|(_, force)| *force > 0.0) {
+    for (name, force) in pulls.filter(|(_, force)| *force > 0.0) {
         text.push_str(&format!("   {name} {force:.3} N"));
     }
     text
