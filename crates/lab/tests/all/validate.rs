@@ -96,6 +96,11 @@ fn organs_move_and_rest_as_they_should_and_viscous_bars_die_down() {
 }
 
 #[test]
+fn contact_is_the_references_and_friction_is_coulombs() {
+    assert_sections_hold("friction", &[]);
+}
+
+#[test]
 #[ignore = "slow: balls are pressed into blocks and blocks slide, by every method"]
 fn contact_is_the_references_and_friction_is_coulombs_at_length() {
     assert_sections_hold("contact,friction", &["contact-hertz", "contact-depth"]);

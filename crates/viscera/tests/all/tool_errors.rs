@@ -212,7 +212,7 @@ fn tools_that_tissue_cannot_meet_are_refused() {
         (
             "position = [0, 0, \"-5 mm\"]",
             "position = [0, 0, \"2 mm\"]",
-            "t.toml, line 26, column 1: tool `tool 2` begins 1.167 mm inside body `block`; move its position away from it",
+            "t.toml, line 26, column 1: tool `tool 2` begins 1.583 mm inside body `block`; move its position away from it",
         ),
     ] {
         assert_eq!(assemble(&replaced(old, new), None).map(|_| ()), Err(message.to_owned()));

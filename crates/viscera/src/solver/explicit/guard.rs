@@ -145,7 +145,9 @@ impl<S: Real> Memory<S> {
         self.relax_the_rest(step, data, round_off);
         let (model, small_steps) = (step.layout, &self.small_steps);
         let limits = |number: usize, constants: &StepConstants<S>| {
-            small_steps[number].was_violent || constants.holds(number, &model.parts[number])
+            small_steps[number].was_violent
+                || constants.contacts.gift(number).is_near
+                || constants.holds(number, &model.parts[number])
         };
         self.energies.limit(step, data, limits, |_, _| {});
         for (number, part) in state.learned.parts.iter_mut().enumerate() {

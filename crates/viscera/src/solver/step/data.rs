@@ -189,9 +189,18 @@ impl<S: Real> StepConstants<S> {
 
     /// Whether a pin, an attachment, a tether or a tool holds a part.
     pub fn holds(&self, number: usize, part: &Part) -> bool {
+        self.contacts.presses(number) || self.is_fixed(part)
+    }
+
+    /// Whether a tool presses on a part that nothing else holds.
+    pub fn lies_on_tools(&self, number: usize, part: &Part) -> bool {
+        self.contacts.presses(number) && !self.is_fixed(part)
+    }
+
+    /// Whether a pin, an attachment or a tether holds a part.
+    fn is_fixed(&self, part: &Part) -> bool {
         let mut inverse_masses = self.inverse_masses[part.vertices.clone()].iter();
         part.is_anchored()
-            || self.contacts.presses(number)
             || !self.tethers_of(part).is_empty()
             || inverse_masses.any(|inverse| *inverse == S::ZERO)
     }

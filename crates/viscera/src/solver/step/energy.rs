@@ -163,7 +163,8 @@ impl Energies {
             *energy = Energy { tools: constants.contacts.gift(number), ..Energy::default() };
             energy.start.stored = stored[number];
             // A hold can stop the centre of mass, so that the centre's energy counts too: `limit` takes nothing out.
-            energy.held = constants.holds(number, part);
+            // So can a tool that is met within the step.
+            energy.held = constants.holds(number, part) || energy.tools.is_near;
             // Tethers are inertia to the solver and no elements, so `stored` of the evaluator leaves them out. Their
             // targets are those of the end of the step, as the pins are.
             for tether in constants.tethers_of(part) {

@@ -116,7 +116,7 @@ fn jaws_lift_and_leave_nothing_behind() {
 }
 
 #[test]
-#[ignore = "slow"]
+#[ignore = "slow: many seeds"]
 fn jaws_lift_and_leave_nothing_behind_at_length() {
     for is_plate in [true, false] {
         grasps::<f32>("xpbd", 50, is_plate, 1e-3);
