@@ -9,7 +9,7 @@ use viscera::simulation::FrameReport;
 const FILE: &str = "tools.csv";
 
 /// Columns of each tool. Force and torque are those of the tissue on the tool, the torque about the tool's origin.
-const COLUMNS: [&str; 9] = [
+const COLUMNS: [&str; 12] = [
     "fx [N]",
     "fy [N]",
     "fz [N]",
@@ -19,6 +19,9 @@ const COLUMNS: [&str; 9] = [
     "touches",
     "pinned",
     "depth [m]",
+    "force error [N]",
+    "torque error [N m]",
+    "jumped",
 ];
 
 /// A row per frame, and a group of columns per tool.
@@ -47,6 +50,12 @@ impl ToolTable {
                 let _ = write!(text, ",{number}");
             }
             let _ = write!(text, ",{},{},{}", tool.touches, tool.pinned, tool.depth);
+            // Empty where nobody asked for it.
+            for error in [tool.error, tool.torque_error] {
+                let error = error.map_or(String::new(), |error| error.to_string());
+                let _ = write!(text, ",{error}");
+            }
+            let _ = write!(text, ",{}", u8::from(tool.has_jumped));
         }
         text.push('\n');
     }

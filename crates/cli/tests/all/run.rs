@@ -100,10 +100,10 @@ fn forces_on_tools_are_written() {
     let table = String::from_utf8(bench.read("out/tools.csv")).expect("text");
     let rows: Vec<Vec<&str>> = table.lines().map(|row| row.split(',').collect()).collect();
     assert_eq!(rows.len(), 1 + 12);
-    assert_eq!((rows[0][0], rows[0][3], rows[0][10]), ("time [s]", "ball fz [N]", "far fx [N]"));
+    assert_eq!((rows[0][0], rows[0][3], rows[0][13]), ("time [s]", "ball fz [N]", "far fx [N]"));
     let frames = summary["frames"].as_array().expect("frames");
     for (row, frame) in rows[1..].iter().zip(frames) {
-        assert_eq!(row.len(), 19);
+        assert_eq!(row.len(), 25);
         let tool = &frame["tools"][0];
         assert_eq!((&tool["name"], &frame["divided"]), (&"ball".into(), &2.into()));
         // Reading JSON rounds the last digit.
@@ -111,11 +111,15 @@ fn forces_on_tools_are_written() {
         let written: f64 = row[3].parse().expect("a number");
         assert!((written - force).abs() <= 1e-12 * force.abs(), "{written}, {force}");
         assert_eq!(row[7].parse::<u64>().ok(), tool["touches"].as_u64());
+        let error = tool["error"].as_f64().expect("an error");
+        let written: f64 = row[10].parse().expect("a number");
+        assert!((written - error).abs() <= 1e-12 * error, "{written}, {error}");
+        assert_eq!((row[12], tool["has_jumped"].as_bool()), ("0", Some(false)));
     }
     let force = last_frame(&summary)["tools"][0]["force"][2].as_f64().expect("a force");
     assert!(force > 0.05, "{force}");
     assert!(
-        printed.contains("\nball: force 0.") && printed.contains("\nfar: force 0.0000 N"),
+        printed.contains("\nball: force 0.") && printed.contains("\nfar: force 0.0000 +- 0.0000 N"),
         "{printed}"
     );
     // The same folder without tools.

@@ -1,5 +1,6 @@
 //! What studies of contact share: scenes, the library's ways to solve them, and what came out.
 
+mod moving;
 mod pressing;
 mod sliding;
 
@@ -9,6 +10,7 @@ use viscera::mesh::TetMesh;
 use viscera::scalar::Vec3;
 use viscera::settings::{Count, Method, SolverSettings};
 
+pub use moving::{Course, DEEDS, Deed, Moving};
 pub use pressing::{Pressing, Rest, Sampling};
 pub use sliding::{Slide, Sliding};
 

@@ -19,9 +19,9 @@ use crate::settling::{FRAMES, KEPT_VELOCITY};
 /// Frames in which the ball goes down.
 const PATH_FRAMES: u32 = 20;
 
-/// A body is at rest below this root mean square speed [m/s]: what swings 30 times a second is then 0.1 micrometres
+/// A body is at rest below this root mean square speed [m/s]: what swings ten times a second is then 0.03 micrometres
 /// from its place.
-const STILL: f64 = 1e-5;
+const STILL: f64 = 2e-6;
 
 /// Frames at most: the explicit method, which has no damping of its own, swings on under deep contact.
 const MOST_FRAMES: u32 = 5 * FRAMES;
@@ -158,19 +158,22 @@ impl Pressing {
         let frame_time = 1.0 / FRAME_RATE;
         let substeps = solver.substeps(&self.inputs(0.0), frame_time);
         let dt = frame_time / f64::from(substeps);
+        // Not all at once where the frame ends: what swings thirty times a second may stand still just there.
+        let kept = S::from_f64(KEPT_VELOCITY.powf(1.0 / f64::from(substeps)));
         let (mut frame, mut speed) = (0, f64::INFINITY);
         while frame < FRAMES || frame < MOST_FRAMES && speed > STILL {
+            let mut fastest = 0.0_f64;
             for substep in 1..=substeps {
                 let time = f64::from(frame) + f64::from(substep) / f64::from(substeps);
                 let inputs = self.inputs((time / f64::from(PATH_FRAMES)).min(1.0));
                 solver.step(&model, &mut state, &inputs, dt)?;
+                let squares: f64 =
+                    state.velocities.iter().map(|v| v.length_squared().to_f64()).sum();
+                fastest = fastest.max(squares / state.velocities.len() as f64);
+                state.velocities.iter_mut().for_each(|velocity| *velocity = *velocity * kept);
             }
             frame += 1;
-            let squares: f64 = state.velocities.iter().map(|v| v.length_squared().to_f64()).sum();
-            speed = (squares / state.velocities.len() as f64).sqrt();
-            for velocity in &mut state.velocities {
-                *velocity = *velocity * S::from_f64(KEPT_VELOCITY);
-            }
+            speed = fastest.sqrt();
         }
         let steps = f64::from(frame) * f64::from(substeps);
         Ok(Rest {

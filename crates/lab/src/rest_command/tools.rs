@@ -52,7 +52,17 @@ pub(super) fn forces(simulation: &Simulation<f64>, rest: &Rest) -> Vec<ToolForce
             depth = depth.max(wrench.depth);
         }
         let (force, torque) = (force.to_array(), torque.to_array());
-        ToolForce { name: tool.name.clone(), force, torque, touches, pinned, depth, error: None }
+        ToolForce {
+            name: tool.name.clone(),
+            force,
+            torque,
+            touches,
+            pinned,
+            depth,
+            has_jumped: false,
+            error: None,
+            torque_error: None,
+        }
     };
     simulation.assembly().tools.iter().map(of_tool).collect()
 }

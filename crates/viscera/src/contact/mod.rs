@@ -84,7 +84,17 @@ impl Tool {
         let distance = self.shape.distance(self.pose.undo(point));
         Distance { normal: self.pose.turn(distance.normal), ..distance }
     }
+
+    /// Whether a way [m] in a step of `dt` [s] is no motion: the tool was put elsewhere.
+    pub fn jumps(&self, way: f64, dt: f64) -> bool {
+        way > (FASTEST * dt).max(FARTHEST * self.shape.thinnest().min(1.0))
+    }
 }
+
+/// A tool that is faster than this [m/s], or goes further than so many of its radii in a step where those are more, was put
+/// elsewhere.
+const FASTEST: f64 = 10.0;
+const FARTHEST: f64 = 10.0;
 
 /// Force and torque between a tool and the tissue that it touches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -5,6 +5,7 @@
 //! begins within dh, the tangent plane there is the tool for this step:  d = n.(R^T (p - t)) - o
 //! u = (I - n n^T)(p - world_from_tool a)                              slip from the anchor a
 //! end of step:  u *= min(1, mu min(N, N_new)/(K |u|)),  a = p - u,  N = N_new;   nothing is kept where N_new = 0
+//! explicit:     u *= min(1, mu N_new/(K |u|)),  a = p - u   in every small step, N_new the normal force there
 //! ```
 //!
 //! A plane remembers the side from which the tissue has come, so that a thin tool cannot jump past it, and makes the energy
@@ -22,6 +23,9 @@ const MOST_TRACED: u32 = 24;
 
 /// Deeper than this share of the tool's thinnest radius a plane keeps its normal.
 const SHALLOW: f64 = 0.25;
+
+/// Cosine of the angle by which a plane turns at most from small step to small step.
+const SAME_SIDE: f64 = 0.5;
 
 /// What is kept of a sample that a tool presses on, from step to step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -196,22 +200,64 @@ impl Touching {
             turning: force * curvature,
         };
         if let Some(friction) = &self.friction {
-            let away = place - pose.apply(friction.anchor);
-            let slip = if self.is_tied { away } else { tangential(away, normal) };
-            let Dragged { energy, force, stiffness } = friction.drag(slip);
-            felt.energy += energy;
-            felt.force += force;
-            felt.drag = stiffness;
-            felt.tie = if self.is_tied { stiffness } else { 0.0 };
+            self.drag(friction, place - pose.apply(friction.anchor), &mut felt);
         }
         felt
     }
 
+    /// Adds friction to what is felt `away` [m] from the anchor.
+    fn drag(&self, friction: &Friction, away: Vec3<f64>, felt: &mut Felt) {
+        let slip = if self.is_tied { away } else { tangential(away, felt.normal) };
+        let Dragged { energy, force, stiffness } = friction.drag(slip);
+        felt.energy += energy;
+        felt.force += force;
+        felt.drag = stiffness;
+        felt.tie = if self.is_tied { stiffness } else { 0.0 };
+    }
+
+    /// What the sample feels at a place [m] of explicit motion, which asks for no potential: friction gives way at once at
+    /// `mu` times the normal force that is there, and its anchor comes after.
+    pub fn slip(&mut self, tool: &Tool, placed: Placed<'_>, place: Vec3<f64>) -> Felt {
+        if self.is_tied {
+            return self.feel(placed, place);
+        }
+        self.turn(placed, place);
+        let friction = self.friction.take();
+        let mut felt = self.feel(placed, place);
+        let limit = tool.law.friction * felt.pressed;
+        if limit > 0.0 {
+            let stiffness = self.foundation.area * self.foundation.stiffness;
+            let anchor = friction.map_or(place, |friction| placed.pose.apply(friction.anchor));
+            let slip = tangential(place - anchor, felt.normal);
+            let elastic = stiffness * slip.length();
+            let slip = slip * if elastic > limit { limit / elastic } else { 1.0 };
+            let friction = Friction { anchor: placed.pose.undo(place - slip), stiffness, limit };
+            self.drag(&friction, slip, &mut felt);
+            self.friction = Some(friction);
+        }
+        felt
+    }
+
+    /// A plane follows the tool's surface where its sample slides along it, as it would from step to step: not where the
+    /// sample is deep or not there yet.
+    fn turn(&mut self, Placed { shape, pose }: Placed<'_>, place: Vec3<f64>) {
+        let Side::Plane { normal, .. } = self.side else { return };
+        let local = pose.undo(place);
+        let distance = shape.distance(local);
+        let touches =
+            (-SHALLOW * shape.thinnest()..self.foundation.thickness).contains(&distance.value);
+        if touches && distance.normal.dot(normal) > SAME_SIDE {
+            self.side = tangent(local, &distance);
+        }
+    }
+
     /// The most that second derivatives at a place [m] add up to before the sample has moved by half the thickness [N/m]:
     /// what explicit steps must be small enough for.
-    pub fn stiffness_near(&self, felt: &Felt) -> f64 {
-        let drag = self.friction.map_or(0.0, |friction| friction.stiffness);
-        self.foundation.stiffness_near(felt.distance).max(felt.stiffness) + drag
+    pub fn stiffness_near(&self, tool: &Tool, felt: &Felt) -> f64 {
+        let near = self.foundation.stiffness_near(felt.distance).max(felt.stiffness);
+        let rubs = near > 0.0 && tool.law.friction > 0.0;
+        let drag = if rubs { self.foundation.area * self.foundation.stiffness } else { 0.0 };
+        near + drag.max(felt.drag)
     }
 
     /// What is kept after a step that has ended with the sample at a place [m], where it feels this; nothing where it has

@@ -87,6 +87,9 @@ settings_table! {
         picture_time: Option<f64> = None, optional(quantity(Dimension::Time, at_least(0.0)));
         /// Width and height of pictures in pixels.
         picture_size: [u32; 2] = ([960, 720]), several::<2, _>(whole(16, 4096));
+        /// Tell how far forces on tools may be off: the scene runs a second time beside, in half as many substeps, by a thread
+        /// of its own where `solver.threads` is not 1.
+        force_error: bool = true, truth();
         /// Direction from the body towards the camera.
         view_from: Vec3<f64> = (vec3(0.36, -0.8, 0.48)), direction();
     }

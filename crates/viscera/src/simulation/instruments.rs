@@ -29,8 +29,25 @@ pub struct ToolForce {
     pub pinned: u32,
     /// The deepest that tissue is inside the contact's thickness [m].
     pub depth: f64,
-    /// Estimate of the error of the force [N]; nothing where there is none.
+    /// Whether it was put elsewhere in the frame, further than a tool moves.
+    pub has_jumped: bool,
+    /// What the force may be off by because substeps have a length and sweeps an end [N], see
+    /// [`Shadow`](crate::solver::Shadow); nothing where that is not asked for.
     pub error: Option<f64>,
+    /// The same of the torque [N m].
+    pub torque_error: Option<f64>,
+}
+
+impl ToolForce {
+    /// Sets the errors by what another run of so many substeps says that [`Shadow`](crate::solver::Shadow) compares with.
+    pub(super) fn compare(&mut self, other: &Self, error: impl Fn(Vec3<f64>, Vec3<f64>) -> f64) {
+        let off = |a: [f64; 3], b: [f64; 3]| {
+            let off = error(Vec3::from_f64(a), Vec3::from_f64(b));
+            off.is_finite().then_some(off)
+        };
+        self.error = off(self.force, other.force);
+        self.torque_error = off(self.torque, other.torque);
+    }
 }
 
 impl std::fmt::Display for ToolForce {
@@ -42,21 +59,27 @@ impl std::fmt::Display for ToolForce {
         let unsigned = |component: f64| if component.abs() < smallest { 0.0 } else { component };
         let ([x, y, z], [a, b, c]) = (self.force.map(unsigned), self.torque);
         let (force, torque) = (x.hypot(y).hypot(z), a.hypot(b).hypot(c));
+        // Rounded up: an error is no smaller than it is said to be.
+        let scale = 10f64.powi(i32::try_from(digits).unwrap_or(4));
+        let error = |error: Option<f64>| {
+            error.map_or(String::new(), |error| {
+                format!(" +- {:.digits$}", (error * scale).ceil() / scale)
+            })
+        };
+        let (of_force, of_torque) = (error(self.error), error(self.torque_error));
         write!(
             f,
-            "{}: force {force:.digits$} N, as a vector ({x:.digits$}, {y:.digits$}, {z:.digits$}) N, \
-             torque {torque:.digits$} N m, {} touches",
+            "{}: force {force:.digits$}{of_force} N, as a vector ({x:.digits$}, {y:.digits$}, {z:.digits$}) N, \
+             torque {torque:.digits$}{of_torque} N m, {} touches",
             self.name, self.touches
-        )
+        )?;
+        let jumped = "; it was put elsewhere, further than a tool moves";
+        if self.has_jumped { f.write_str(jumped) } else { Ok(()) }
     }
 }
 
 /// A tool that moves further than so many of its thinnest radii in a substep has the frame divided.
 const MOST_RADII: f64 = 4.0;
-
-/// What moves further in a substep than at this speed [m/s] and by so many radii besides is put elsewhere, and no motion.
-const TELEPORT_SPEED: f64 = 10.0;
-const TELEPORT_RADII: f64 = 10.0;
 
 /// A frame is divided into so many times as many substeps at most.
 const MOST_DIVIDED: f64 = 100.0;
@@ -86,6 +109,8 @@ pub(super) struct Instruments {
     jaws: Vec<Jaw>,
     /// The beginning of the frame to come [s].
     since: f64,
+    /// Of each part of each tool, whether it was put elsewhere in the last frame; empty where none moves.
+    jumped: Vec<bool>,
 }
 
 impl Instruments {
@@ -93,14 +118,14 @@ impl Instruments {
     pub fn new(tools: &[Instrument], frame: f64) -> Self {
         let open = |tool: &Instrument| tool.jaws.as_ref().map_or(0.0, |jaws| jaws.open);
         let jaw = |tool: &Instrument| Jaw { angle: open(tool), speed: 0.0, gain: 1.0 };
-        let mut all = Self { jaws: tools.iter().map(jaw).collect(), since: 0.0 };
+        let mut all = Self::of(tools.iter().map(jaw).collect(), 0.0);
         all.choose_speeds(tools, &[], &[], frame);
         all
     }
 
     /// Of jaws that were saved, at a time [s].
     pub fn of(jaws: Vec<Jaw>, since: f64) -> Self {
-        Self { jaws, since }
+        Self { jaws, since, jumped: Vec::new() }
     }
 
     pub fn jaws(&self) -> &[Jaw] {
@@ -125,6 +150,17 @@ impl Instruments {
         self.parts_at(tools, time, &mut inputs.tools);
     }
 
+    /// Tells which tools were put elsewhere in the last frame.
+    pub fn tell_jumps(&self, tools: &[Instrument], forces: &mut [ToolForce]) {
+        let mut first = 0;
+        for (tool, force) in tools.iter().zip(forces) {
+            let range = first..first + tool.parts.len();
+            first = range.end;
+            let parts = self.jumped.get(range).unwrap_or_default();
+            force.has_jumped = parts.contains(&true);
+        }
+    }
+
     /// Adds the parts of all tools, where they are at a time [s].
     pub fn parts_at(&self, tools: &[Instrument], time: f64, parts: &mut Vec<Tool>) {
         for (index, tool) in tools.iter().enumerate() {
@@ -132,8 +168,10 @@ impl Instruments {
         }
     }
 
-    /// Substeps of a frame from `start` to `end` [s] that is to have so many: more where a tool would jump.
-    pub fn substeps(&self, tools: &[Instrument], [start, end]: [f64; 2], substeps: u32) -> u32 {
+    /// Substeps of a frame from `start` to `end` [s] that is to have so many: more where a tool would go far. Remembers which
+    /// are put elsewhere.
+    pub fn substeps(&mut self, tools: &[Instrument], [start, end]: [f64; 2], substeps: u32) -> u32 {
+        self.jumped.clear();
         if tools.iter().all(Instrument::stands_still) {
             return substeps;
         }
@@ -146,10 +184,17 @@ impl Instruments {
             self.parts_at(tools, start + f64::from(substep) * dt, &mut after);
             for (from, to) in before.iter().zip(&after) {
                 let (radius, way) = (to.shape.thinnest(), farthest(from, to));
-                let is_teleport = way > TELEPORT_SPEED * dt + TELEPORT_RADII * radius;
-                if radius.is_finite() && !is_teleport {
+                if radius.is_finite() && !to.jumps(way, dt) {
                     most = most.max(way / (MOST_RADII * radius));
                 }
+            }
+            let jumped = before.iter().zip(&after).map(|(from, to)| {
+                to.jumps((to.pose.translation - from.pose.translation).length(), dt)
+            });
+            if self.jumped.is_empty() {
+                self.jumped.extend(jumped);
+            } else {
+                self.jumped.iter_mut().zip(jumped).for_each(|(all, jumped)| *all |= jumped);
             }
             std::mem::swap(&mut before, &mut after);
         }
@@ -277,7 +322,9 @@ pub(super) fn forces_on(
             touches: sum.touches,
             pinned: sum.pinned,
             depth: sum.depth,
+            has_jumped: false,
             error: None,
+            torque_error: None,
         });
     }
     forces

@@ -297,6 +297,7 @@ impl<S: Real> Simulation<S> {
         debug_assert!(restarted.is_ok(), "{restarted:?}");
         self.state = state;
         self.stepped = false;
+        self.shadow = None;
     }
 
     /// At rest, in the same memory: callers look at positions where they are.
@@ -316,5 +317,6 @@ impl<S: Real> Simulation<S> {
             device.write(&self.model, &state);
         }
         self.state = state;
+        self.shadow = None;
     }
 }

@@ -20,6 +20,7 @@ mod report;
 mod rest;
 mod saved;
 mod sent;
+mod shadowed;
 mod tool_forces;
 mod touchable;
 
@@ -32,6 +33,7 @@ use holding::GraspOrigins;
 use instruments::Instruments;
 pub use instruments::ToolForce;
 pub use live::Live;
+use shadowed::Shadowed;
 
 pub use mesh_error::{MESH_ERROR_TETS, MeshReport};
 pub use report::{FrameReport, PatchForce, PatchKind};
@@ -79,6 +81,8 @@ pub struct Simulation<S> {
     inputs: Inputs<S>,
     taken: GraspOrigins,
     instruments: Instruments,
+    /// Beside the run, where the error of forces is asked for; from its first frame on.
+    shadow: Option<Shadowed<S>>,
     /// Substeps of the last frame.
     divided: u32,
     /// The scene without what was done to it by hand.
@@ -147,6 +151,7 @@ impl<S: Real> Simulation<S> {
             inputs: Inputs::default(),
             taken: GraspOrigins::default(),
             instruments: Instruments::new(&assembly.tools, scene.time.frame),
+            shadow: None,
             divided: 0,
             written: scene.clone(),
             changes_made: 0,
@@ -177,6 +182,9 @@ impl<S: Real> Simulation<S> {
         let known = self.oscillations.take();
         (self.oscillations, self.substeps) =
             self.backend.substeps(&inputs, &self.solver, known, frame);
+        if !self.assembly.tools.is_empty() && self.solver.substeps == Count::Auto {
+            self.substeps = self.substeps.max(LEAST_WITH_TOOLS);
+        }
     }
 
     /// The settings in force: the scene's, with the method that "auto" stands for.
@@ -402,6 +410,9 @@ impl<S: Real> Simulation<S> {
         }
     }
 }
+
+/// Substeps of a frame in which tools act, at least, where the method chooses: tools move steadily in each.
+const LEAST_WITH_TOOLS: u32 = 2;
 
 /// Whether the patches are those of the scene and name vertices that there are. Numbers of vertices stay what they are as
 /// materials change and bodies are added, so that patches do not depend on the model's revision.

@@ -4,6 +4,8 @@
 use super::error::FrameError;
 use super::{Simulation, substep_dt};
 use crate::scalar::Real;
+use crate::solver::Inputs;
+use crate::state::State;
 
 impl<S: Real> Simulation<S> {
     /// Begins a frame: a device is sent all of it, the CPU computes it at once. [`Simulation::take_frame`] takes it over.
@@ -68,18 +70,27 @@ impl<S: Real> Simulation<S> {
     fn send_steps(&mut self) -> Result<(), FrameError> {
         // The end of the frame is a time of its own: that of the keys by which holds are led.
         let (start, end) = (self.time(), (self.frame + 1) as f64 * self.scene.time.frame);
-        let tools = &self.assembly.tools;
-        let substeps = self.instruments.substeps(tools, [start, end], self.substeps);
+        let Self { instruments, assembly, substeps, .. } = self;
+        let substeps = instruments.substeps(&assembly.tools, [start, end], *substeps);
         let dt = substep_dt(&self.scene, substeps);
         self.divided = substeps;
+        self.call_shadow();
         let Self { scene, assembly, taken, instruments, model, state, inputs, backend, .. } = self;
         self.rejected_before = backend.rejected_steps();
-        backend.steps(model, state, inputs, dt, substeps, |substep, inputs| {
-            let is_last = substep == substeps;
-            let time = if is_last { end } else { start + f64::from(substep) * dt };
+        let act = |substep: u32, count: u32, inputs: &mut Inputs<S>| {
+            let share = f64::from(substep) * substep_dt(scene, count);
+            let time = if substep == count { end } else { start + share };
             taken.act(scene, assembly, time, inputs);
             instruments.act(&assembly.tools, time, inputs);
-        })
+        };
+        let mut run = |state: &mut State<S>| {
+            let in_run = |substep, inputs: &mut Inputs<S>| act(substep, substeps, inputs);
+            backend.steps(model, state, inputs, dt, substeps, in_run)
+        };
+        match &mut self.shadow {
+            Some(shadow) => shadow.beside(model, substeps, scene.time.frame, &act, || run(state)),
+            None => run(state),
+        }
     }
 
     /// What is left of a frame once its state is there: `take` gets it, or says that it is under way.
@@ -107,6 +118,9 @@ impl<S: Real> Simulation<S> {
         if factor != 1.0 {
             for velocity in &mut self.state.velocities {
                 *velocity = *velocity * S::from_f64(factor);
+            }
+            if let Some(shadow) = &mut self.shadow {
+                shadow.slow_down(factor);
             }
             if let Some(device) = self.backend.device_mut() {
                 device.write_velocities(&self.state.velocities);

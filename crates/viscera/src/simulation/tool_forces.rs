@@ -8,7 +8,16 @@ use crate::scalar::Real;
 impl<S: Real> Simulation<S> {
     /// Forces on the scene's tools at the end of the last frame; zero before the first and after a change of settings.
     pub fn tool_forces(&self) -> Vec<ToolForce> {
-        forces_on(&self.assembly.tools, self.backend.wrenches(), &self.inputs.tools, self.time())
+        let (tools, parts, time) = (&self.assembly.tools, &self.inputs.tools, self.time());
+        let mut forces = forces_on(tools, self.backend.wrenches(), parts, time);
+        self.instruments.tell_jumps(tools, &mut forces);
+        let shadow = self.shadow.as_ref().filter(|_| self.stepped);
+        if let Some((shadow, wrenches)) = shadow.and_then(|all| Some((all, all.wrenches()?))) {
+            for (force, other) in forces.iter_mut().zip(forces_on(tools, wrenches, parts, time)) {
+                force.compare(&other, |force, other| shadow.error(force, other));
+            }
+        }
+        forces
     }
 
     /// The opening angle [rad] of a tool's jaws at the end of the last frame; nothing where it has none.

@@ -22,6 +22,7 @@ pub mod plan;
 mod probe;
 mod quasi_newton;
 mod report;
+mod shadow;
 mod step;
 #[cfg(test)]
 mod trial;
@@ -46,6 +47,7 @@ use oscillations::Oscillations;
 use plan::Plan;
 pub(crate) use quasi_newton::{choose, expected_motion_error};
 pub use report::StepReport;
+pub use shadow::Shadow;
 use step::data::Step;
 pub use step::energy::Ledger;
 #[cfg(feature = "gpu")]

@@ -58,6 +58,7 @@ mod tetrahedralize;
 mod tidy;
 mod tiers;
 mod tool_errors;
+mod tool_force_error;
 mod tools;
 mod twins;
 mod xpbd_family;

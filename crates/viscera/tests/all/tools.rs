@@ -229,15 +229,23 @@ fn a_grasp_is_resumed_and_repeated_to_the_bit() {
     advance(&mut run, 1.0);
     let (saved, angle) = (run.save(), run.jaw_angle(0));
     advance(&mut run, 1.6);
-    let end = (run.save(), run.report());
+    // What forces are said to be off by begins anew with whoever goes on.
+    let report = |run: &Simulation<f32>| {
+        let mut report = run.report();
+        for tool in &mut report.tools {
+            (tool.error, tool.torque_error) = (None, None);
+        }
+        report
+    };
+    let end = (run.save(), report(&run));
     let mut resumed = simulation::<f32>(GRASP, &[]).resume(&saved).expect("the same scene");
     assert_eq!(resumed.jaw_angle(0), angle);
     advance(&mut resumed, 1.6);
-    assert!(resumed.save() == end.0 && resumed.report() == end.1);
+    assert!(resumed.save() == end.0 && report(&resumed) == end.1);
     run.reset().expect("the same scene");
     assert_eq!(on_tool(&run).touches, 0);
     advance(&mut run, 1.6);
-    assert!(run.save() == end.0 && run.report() == end.1);
+    assert!(run.save() == end.0 && report(&run) == end.1);
     let other = simulation::<f32>(BLOCK, &[]).resume(&saved).map(|_| ());
     assert!(other.is_err());
 }

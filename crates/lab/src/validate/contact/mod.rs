@@ -1,13 +1,15 @@
-//! Contact without friction: a ball that is pressed into a block.
+//! Contact: a ball that is pressed into a block, and tools in motion.
 //!
 //! | file | what must come out |
 //! |---|---|
 //! | `hertz` | the closed form of a layer of finite depth, with the reference |
 //! | `depth` | the reference's force and shape, with each of the library's methods |
 //! | `samples` | the same force with more samples of the surface |
+//! | `motion` | forces of tools in motion, and how far they are said to be off |
 
 mod depth;
 mod hertz;
+mod motion;
 mod samples;
 
 use anyhow::Result;
@@ -18,7 +20,10 @@ pub(super) const SECTION: Section = Section {
     name: "contact",
     title: "Contact",
     cases: |quick, _| {
-        hertz::case_count(quick) + depth::case_count(quick) + samples::case_count(quick)
+        hertz::case_count(quick)
+            + depth::case_count(quick)
+            + samples::case_count(quick)
+            + motion::case_count(quick)
     },
     run,
 };
@@ -26,5 +31,6 @@ pub(super) const SECTION: Section = Section {
 fn run(context: &mut Context) -> Result<()> {
     hertz::add(context)?;
     depth::add(context)?;
-    samples::add(context)
+    samples::add(context)?;
+    motion::add(context)
 }

@@ -152,6 +152,34 @@ fn an_anchor_follows_only_as_far_as_friction_gives_way() {
 }
 
 #[test]
+fn in_explicit_motion_friction_is_that_of_the_present_normal_force() {
+    let tool = ball(5e-3);
+    let placed = Placed { shape: &tool.shape, pose: &tool.pose };
+    let place = tool.pose.translation + vec3(0.0, 0.0, 5.5e-3);
+    let still = Moved { from: place, to: place };
+    let mut touching = find(&tool, &tool.pose, still, None).expect("in contact");
+    // A contact that has just begun holds from then on.
+    assert_eq!(touching.slip(&tool, placed, place), feel(&touching, &tool, place));
+    let stiffness = touching.friction.expect("pressed").stiffness;
+    let aside = |way: f64| place + vec3(way, 0.0, 0.0);
+    let friction = |felt: &Felt| felt.force - felt.normal * felt.pressed;
+    let held = touching.slip(&tool, placed, aside(1e-6));
+    assert!((friction(&held).length() - stiffness * 1e-6).abs() < 1e-6 * stiffness * 1e-6);
+    // It slides at mu times what presses now, and its anchor comes after.
+    let slid = touching.slip(&tool, placed, aside(1e-3));
+    assert!(slid.pressed > 0.0 && friction(&slid).x < 0.0);
+    assert!((friction(&slid).length() / (0.5 * slid.pressed) - 1.0).abs() < 1e-12);
+    // On the way back it lets go of that before it pulls the other way.
+    let back = touching.slip(&tool, placed, aside(1e-3 - 1e-6));
+    assert!(friction(&back).x < 0.0);
+    assert!((friction(&slid) - friction(&back)).length() > 0.9e-6 * stiffness);
+    // What leaves forgets where it was.
+    let away = place + vec3(0.0, 0.0, 1e-3);
+    assert_eq!(touching.slip(&tool, placed, away).force, Vec3::ZERO);
+    assert_eq!(touching.friction, None);
+}
+
+#[test]
 fn a_lock_ties_what_is_pressed_and_lets_all_go_at_once() {
     let mut tool = ball(5e-3);
     tool.is_locked = true;

@@ -57,6 +57,7 @@ impl<S: Real> Memory<S> {
             small.left = u32::from(self.energies.stores_too_much(number, round_off));
             if small.left > 0 {
                 (any, small.since) = (true, 0);
+                data.constants.contacts.begin_again(number);
                 let range = part.vertices.clone();
                 data.points[range.clone()].copy_from_slice(&data.constants.previous[range.clone()]);
                 data.velocities[range].fill(Vec3::ZERO);
@@ -88,8 +89,18 @@ impl<S: Real> Memory<S> {
                 });
             }
         }
+        self.slip(step, data);
         self.evaluate(step, data);
         self.energies.end(step, data, &self.evaluator.stored);
+    }
+
+    /// Samples slip to where the step has ended.
+    fn slip(&self, step: &Step<'_, S>, data: &mut StepData<S>) {
+        let StepData { constants, points, .. } = data;
+        constants.contacts.place(&step.contact(), 1.0);
+        for number in 0..step.layout.part_count() {
+            constants.contacts.slip(&step.contact(), number, points);
+        }
     }
 
     /// Energies before the step, pins moved.
@@ -132,6 +143,7 @@ impl<S: Real> Memory<S> {
     ) {
         let round_off = 8.0 * S::EPSILON.max(1e-12);
         for times in [4, 16, 0] {
+            self.slip(step, data);
             self.evaluate(step, data);
             self.energies.end(step, data, &self.evaluator.stored);
             // Velocities cannot give back what is stored.

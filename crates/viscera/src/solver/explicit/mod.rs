@@ -29,7 +29,6 @@ use crate::settings::SolverSettings;
 use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;
 use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
-use crate::solver::step::contacts::Bound;
 use crate::solver::step::data::{Step, StepConstants, StepData, copies_of};
 use crate::solver::step::energy::{Energies, Ledger};
 use crate::solver::step::potential::Evaluator;
@@ -196,6 +195,7 @@ impl<S: Real> Memory<S> {
                 continue;
             }
             let part = &model.parts[number];
+            constants.contacts.begin_again(number);
             let stiffest = at_rest.gather(constants, model, part, small.dt, loads);
             small.begin(stability, stiffest, constants.holds(number, part));
             if model.is_viscous() {
@@ -282,13 +282,8 @@ impl<S: Real> Memory<S> {
                 self.pieces.load(constants, &small, &moments, (number, looks), places, loads);
             // Contact is not viscous: of `h^2 (w_t^2 + w_c^2)/4 + h eta w_t^2/2 <= 1` its part is less than a tissue's.
             let share = small.dt / (small.dt + 2.0 * self.stability.viscosity(number));
-            constants.contacts.add_forces(
-                &small.contact(),
-                number,
-                points,
-                Bound::Near(share),
-                loads,
-            );
+            let of_step = (&step.contact(), small.dt);
+            constants.contacts.add_forces_in_motion(of_step, number, points, share, loads);
             let squared = S::from_f64(small.dt * small.dt);
             for tether in constants.tethers_of(&step.layout.parts[number]) {
                 let force = tether.force(points[tether.vertex].vec3());

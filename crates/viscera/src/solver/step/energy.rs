@@ -20,7 +20,8 @@
 //! T_1 <= min(A, max(B, T_n)),  A: the above, tools moved;   B = T_n + V(x_n, tools not moved) - V(x_1) + f.(x_1 - x_n) + W
 //! ```
 //!
-//! with `W` the work of the forces that tools report (`contacts`): otherwise a tool could put in more than it says.
+//! with `W` the work of the forces that tools report (`contacts`): otherwise a tool could put in more than it says. Explicit
+//! steps know the work of all forces along the way, and `T_1 <= B` with it is all that is asked.
 //!
 //! Every connected part of the model has a limit of its own, so that one body does not slow another. A
 //! part that nothing holds keeps its momentum: there everything is relative to its center of mass.
@@ -89,7 +90,10 @@ impl Energy {
             // Tools move while the tissue stands: that bound charges the overlap that they make. The other charges what
             // they say that they do, and only forbids to gain: it never stops a body.
             let by_work = given - self.tools.lifted + self.tools.work();
-            given = given.min(by_work.max(self.start.kinetic));
+            given = match self.tools.exact {
+                Some(_) => by_work,
+                None => given.min(by_work.max(self.start.kinetic)),
+            };
         }
         (given, kinetic, drift)
     }
@@ -196,7 +200,8 @@ impl Energies {
     pub fn end<S: Real>(&mut self, step: &Step<'_, S>, data: &StepData<S>, stored: &[f64]) {
         let (model, constants) = (step.layout, &data.constants);
         for (number, (energy, part)) in self.parts.iter_mut().zip(model.parts.iter()).enumerate() {
-            let Energy { held, start, tools, .. } = *energy;
+            let Energy { held, start, mut tools, .. } = *energy;
+            tools.exact = constants.contacts.gift(number).exact;
             *energy = Energy { held, start, tools, ..Energy::default() };
             energy.tools.work[1] =
                 constants.contacts.work_after(&step.contact(), number, &data.points);

@@ -97,7 +97,7 @@ fn a_block_slides_where_and_as_fast_as_it_should_by_xpbd() {
     holds_and_slides("xpbd", &settings, 4, 2.0, 0.02);
 }
 
-/// With much friction, where a lagging force would make the block flutter and hop.
+/// With much friction, where the normal force of an earlier step would make the block hop.
 #[test]
 fn a_block_slides_with_much_friction_by_explicit_steps() {
     let (settings, substeps) = method("explicit");

@@ -8,10 +8,6 @@ use crate::scalar::rigid::RigidTransform;
 use crate::scalar::{Real, Vec3};
 use crate::state::ContactState;
 
-/// A tool that is faster than this [m/s], or than ten of its radii in a step where those are more, was put elsewhere.
-const FASTEST: f64 = 10.0;
-const FARTHEST: f64 = 10.0;
-
 impl Contacts {
     /// Moves the tools to where they are at the end of the step, and finds what samples find in their way. `points` are
     /// places, `velocities` those at the start of the step.
@@ -39,6 +35,7 @@ impl Contacts {
             }
         }
         self.first[layout.part_count()] = self.touching.len();
+        self.at_start.extend_from_slice(&self.touching);
         self.weigh(step, points);
         self.work_before(step, kept_state);
     }
@@ -86,8 +83,7 @@ impl Contacts {
         for (number, tool) in tools.iter().enumerate() {
             let before = kept.poses.get(number).unwrap_or(&tool.pose);
             let way = (tool.pose.translation - before.translation).length();
-            let most = (FASTEST * step.dt).max(FARTHEST * tool.shape.thinnest().min(1.0));
-            let has_jumped = way > most;
+            let has_jumped = tool.jumps(way, step.dt);
             self.jumped.push(has_jumped);
             self.starts.push(if has_jumped { tool.pose } else { *before });
         }
@@ -101,7 +97,7 @@ impl Contacts {
             self.gifts[part] = Gift {
                 is_near: !self.of_part(part).is_empty(),
                 lifted: after.energy,
-                work: [0.0; 2],
+                ..Gift::default()
             };
         }
         let ends = std::mem::replace(&mut self.poses, std::mem::take(&mut self.starts));

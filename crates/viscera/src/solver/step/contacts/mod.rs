@@ -11,6 +11,7 @@
 //! exert on the tissue at the start and at the end of the step, as they are reported; jaws that turn with what they hold
 //! do no work, which only the mean of both says.
 
+mod explicit;
 mod found;
 mod of_vertices;
 
@@ -33,6 +34,8 @@ pub struct Contacts {
     gifts: Vec<Gift>,
     /// The samples that may meet a tool, part by part; `Touching::sample` is the place of one in the layout.
     touching: Vec<Touching>,
+    /// The same where the step begins.
+    at_start: Vec<Touching>,
     /// The first of each part, and the end of the last one's.
     first: Vec<usize>,
     /// Where tools are at the start of the step, at the moment that the step looks at, and which were put elsewhere.
@@ -63,17 +66,19 @@ pub struct Gift {
     pub lifted: f64,
     /// Work [J] along their way of the forces at the start and at the end of the step.
     pub work: [f64; 2],
+    /// Their work [J], where all forces along the way are known: in explicit motion.
+    pub exact: Option<f64>,
 }
 
 impl Gift {
     /// Work of the tools in the step [J].
     pub fn work(&self) -> f64 {
-        self.work[1].max(self.mean_work())
+        self.exact.unwrap_or_else(|| self.work[1].max(self.mean_work()))
     }
 
-    /// By the mean of the forces [J].
+    /// By the mean of the forces where it is not known exactly [J].
     pub fn mean_work(&self) -> f64 {
-        0.5 * (self.work[0] + self.work[1])
+        self.exact.unwrap_or(0.5 * (self.work[0] + self.work[1]))
     }
 }
 
@@ -84,8 +89,6 @@ pub enum Bound {
     Without,
     /// Of the curvature where the sample is.
     Here,
-    /// A share of the curvature that it may have after moving by half the thickness.
-    Near(f64),
 }
 
 impl Contacts {
@@ -99,6 +102,7 @@ impl Contacts {
             first: vec![0; layout.part_count() + 1],
             presses: vec![false; layout.part_count()],
             touching: Vec::with_capacity(layout.samples.len()),
+            at_start: Vec::with_capacity(layout.samples.len()),
             of_vertices: OfVertices::new(layout),
             ..Self::default()
         }
@@ -107,6 +111,7 @@ impl Contacts {
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
         self.touching.capacity() * size_of::<Touching>()
+            + self.at_start.capacity() * size_of::<Touching>()
             + size_of_val(&self.wrenches[..])
             + size_of_val(&self.gifts[..])
             + size_of_val(&self.first[..])
@@ -116,6 +121,7 @@ impl Contacts {
     /// Forgets all contact: nothing touches anything.
     pub fn clear(&mut self) {
         self.touching.clear();
+        self.at_start.clear();
         self.first.fill(0);
         self.presses.fill(false);
         self.gifts.fill(Gift::default());
@@ -284,20 +290,12 @@ impl Contacts {
         bound: Bound,
         loads: &mut [Point<S>],
     ) {
-        let squared = step.dt * step.dt;
-        self.each(step, part, x, |sample, touching, _, felt| {
+        self.each(step, part, x, |sample, _, _, felt| {
             let stiffness = match bound {
                 Bound::Without => 0.0,
                 Bound::Here => (felt.stiffness + felt.tie).max(felt.drag) + felt.turning,
-                Bound::Near(share) => share * (touching.stiffness_near(felt) + felt.turning),
             };
-            let sum: f64 = sample.weights.iter().map(|weight| weight.abs()).sum();
-            for (&v, &weight) in sample.vertices.iter().zip(&sample.weights) {
-                let first = step.layout.copy_offsets[v as usize] as usize;
-                let load = (felt.force * (squared * weight)).cast();
-                let bound = S::from_f64(squared * stiffness * weight.abs() * sum);
-                loads[first].add(Point::new(load, bound));
-            }
+            spread(step, sample, (felt.force, stiffness), loads);
         });
     }
 
@@ -367,6 +365,23 @@ impl Contacts {
         self.wrenches = wrenches;
         kept.poses.clear();
         kept.poses.extend(tools.iter().map(|tool| tool.pose));
+    }
+}
+
+/// Adds `dt^2` times a force [N] and a bound of stiffness [N/m] at a sample to the first copy of each of its vertices.
+fn spread<S: Real>(
+    step: &ContactStep<'_, S>,
+    sample: &LaidSample,
+    (force, stiffness): (Vec3<f64>, f64),
+    loads: &mut [Point<S>],
+) {
+    let squared = step.dt * step.dt;
+    let sum: f64 = sample.weights.iter().map(|weight| weight.abs()).sum();
+    for (&v, &weight) in sample.vertices.iter().zip(&sample.weights) {
+        let first = step.layout.copy_offsets[v as usize] as usize;
+        let load = (force * (squared * weight)).cast();
+        let bound = S::from_f64(squared * stiffness * weight.abs() * sum);
+        loads[first].add(Point::new(load, bound));
     }
 }
 
