@@ -91,12 +91,15 @@ fn grasp<S: Real>(name: &str, seed: u64, is_plate: bool) -> Grasp {
 
 fn grasps<S: Real>(name: &str, seeds: u64, is_plate: bool, most_surplus: f64) {
     let mut slipped = 0;
+    let mut worst = [0.0_f64; 4];
     for seed in 0..seeds {
         let grasp = grasp::<S>(name, seed, is_plate);
         let which = format!("{name}, seed {seed}");
         assert!(grasp.is_finite, "{which}");
         assert_eq!(grasp.touches, 0, "{which}");
         slipped += u64::from(grasp.lifted < 0.8);
+        let all = [grasp.rejected, grasp.surplus, grasp.rest[0], grasp.rest[1]];
+        worst = std::array::from_fn(|i| worst[i].max(all[i]));
         assert!(grasp.rejected < 0.2, "{which}: {}", grasp.rejected);
         assert!(grasp.surplus < most_surplus, "{which}: {:e}", grasp.surplus);
         if !is_plate {
@@ -104,6 +107,12 @@ fn grasps<S: Real>(name: &str, seeds: u64, is_plate: bool, most_surplus: f64) {
             assert!(grasp.rest[1] < 1e-5, "{which}: {:e} after 1 s", grasp.rest[1]);
         }
     }
+    let [rejected, surplus, first, second] = worst;
+    println!(
+        "{name}, {} bits, plate {is_plate}: {seeds} seeds, {slipped} slipped; at most {rejected:.3} of the steps \
+         rejected, surplus {surplus:.1e}, left {first:.1e} after 0.4 s, {second:.1e} after 1 s",
+        8 * size_of::<S>()
+    );
     assert!(slipped * 20 <= seeds, "{name}: {slipped} of {seeds} slipped");
 }
 
@@ -113,13 +122,15 @@ fn jaws_lift_and_leave_nothing_behind() {
         grasps::<f32>("xpbd", 2, is_plate, 1e-4);
         grasps::<f64>("quasi_newton", 2, is_plate, 1e-2);
     }
+    grasps::<f32>("explicit", 1, false, 1e-2);
 }
 
 #[test]
 #[ignore = "slow: many seeds"]
 fn jaws_lift_and_leave_nothing_behind_at_length() {
     for is_plate in [true, false] {
-        grasps::<f32>("xpbd", 50, is_plate, 1e-3);
-        grasps::<f32>("quasi_newton", 50, is_plate, 1e-2);
+        grasps::<f32>("xpbd", 100, is_plate, 1e-3);
+        grasps::<f32>("quasi_newton", 100, is_plate, 1e-2);
     }
+    grasps::<f32>("explicit", 20, false, 1e-2);
 }

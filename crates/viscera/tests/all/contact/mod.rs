@@ -3,6 +3,7 @@
 mod forces;
 mod grasps;
 mod motion;
+mod passes;
 mod refused;
 
 use viscera::contact::{Shape, Tool};
