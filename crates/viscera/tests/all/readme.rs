@@ -1,11 +1,11 @@
-//! What README.md says of the retractor is what runs of its scene give.
+//! The forces in README.md are those of runs of their scenes.
 
 use viscera::scalar::{Real, Vec3};
 use viscera::scene::Scene;
 use viscera::simulation::{Assembly, PatchKind, Simulation};
 
 const README: &str = include_str!("../../../../README.md");
-const SCENE: &str = include_str!("../../../../scenes/liver_retraction.toml");
+const SCENE: &str = include_str!("../../../../scenes/liver_lifted.toml");
 
 /// A budget, its colours, and the force in the table as it is written there.
 struct Row {
@@ -44,7 +44,7 @@ fn rows() -> Vec<Row> {
 }
 
 /// The force [N] at the end of a run.
-fn retractor<S: Real>(row: &Row) -> f64 {
+fn lifting<S: Real>(row: &Row) -> f64 {
     let automatic = ("\"auto\"", "\"auto\"");
     let (substeps, iterations) = row.budget.split_once(" x ").unwrap_or(automatic);
     let method = if row.budget.starts_with("automatic") { "auto" } else { "xpbd" };
@@ -69,14 +69,14 @@ fn retractor<S: Real>(row: &Row) -> f64 {
     }
     simulation.measure().expect("measures");
     let patches = simulation.report().patches;
-    let motion = patches.iter().find(|patch| patch.kind == PatchKind::Motion).expect("a retractor");
+    let motion = patches.iter().find(|patch| patch.kind == PatchKind::Motion).expect("a motion");
     Vec3::from_f64(motion.force).length()
 }
 
 fn check(rows: &[Row]) {
     let mut stale = Vec::new();
     for row in rows {
-        let found = format!("{:.4}", retractor::<f32>(row));
+        let found = format!("{:.4}", lifting::<f32>(row));
         println!("{} {} {}: {found} N", row.budget, row.colors, row.published);
         if found != row.force {
             stale.push(format!(
