@@ -251,9 +251,7 @@ fn the_budget_of_phones_is_that_of_the_plan() {
     for mesh in [2.0, 1.6, 1.25, 1.0, 0.8, 0.65] {
         let mut session = Session::new(None);
         let settings = [("solver.method", "xpbd"), ("solver.device", "cpu")];
-        session
-            .load(&request("liver_lifted", &settings, mesh), &mut no_files)
-            .expect("a scene");
+        session.load(&request("liver_lifted", &settings, mesh), &mut no_files).expect("a scene");
         let loaded = session.loaded().expect("a scene");
         rows.push(budget_row(&session, loaded.tets, loaded.vertices));
     }
