@@ -5,6 +5,7 @@ mod bench_plot;
 mod bench_scene;
 mod devices;
 mod film;
+mod hold;
 mod in_order;
 mod mesh;
 mod output;

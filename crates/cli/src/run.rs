@@ -1,6 +1,7 @@
 //! `viscera run`.
 
 use crate::film::Film;
+use crate::hold::Hold;
 use crate::output::OutputFolder;
 use crate::progress;
 use crate::series::Series;
@@ -156,10 +157,11 @@ fn simulate<S: Real>(
         film: draws.then(|| Film::new(&simulation, frames)).transpose()?,
         series: Series::create(out, &simulation)?,
         tools: ToolTable::new(&simulation.scene().tools),
+        hold: Hold::new(&simulation, frames),
         summary,
     };
     let ended = recording.compute(&mut simulation, frames, interrupted);
-    let Recording { film, series, tools, mut summary } = recording;
+    let Recording { film, series, tools, hold, mut summary } = recording;
     let (mut series, written) = series.end();
     let ended = ended.and(written);
     let complete = simulation.frame() == frames;
@@ -175,6 +177,7 @@ fn simulate<S: Real>(
         files::write_atomic(file, &simulation.save())?;
     }
     summary.judge(&simulation, rest, mesh);
+    summary.hold = hold.end(&simulation).filter(|_| summary.finished);
     summary.device = simulation.device_choice().to_owned();
     summary.warnings.extend(simulation.device_warning().map(String::from));
     // Numbers before meshes and pictures: those take a while, and may be what failed.
@@ -329,6 +332,7 @@ struct Recording<S: Real> {
     film: Option<Film>,
     series: Series<S>,
     tools: ToolTable,
+    hold: Hold<S>,
     summary: Summary,
 }
 
@@ -365,6 +369,7 @@ impl<S: Real> Recording<S> {
                 film.push(simulation, &report, last);
             }
             self.tools.push(&report);
+            self.hold.look(simulation);
             self.summary.frames.push(FrameLine { report, wall_seconds });
             let speed = (simulation.time() - begin) / wall_total;
             bar.set_position(simulation.frame());

@@ -1,5 +1,6 @@
 //! `summary.json`, and the table and advice printed at the end of a run.
 
+use crate::hold::HoldReport;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use viscera::scalar::Real;
@@ -61,6 +62,8 @@ pub struct Summary {
     pub warnings: Vec<String>,
     /// How far the end is from the state of rest; nothing where the loads still change.
     pub rest: Option<RestReport>,
+    /// Whether tissue holds still on its tools; nothing where there are none, and where one moved in the last moments.
+    pub hold: Option<HoldReport>,
     /// How far the mesh is from the body that it stands for; nothing of large meshes, and where nothing is held.
     pub mesh: Option<MeshReport>,
     #[serde(flatten)]
@@ -145,6 +148,7 @@ impl Summary {
             notes: simulation.assembly().notes.clone(),
             warnings: Vec::new(),
             rest: None,
+            hold: None,
             mesh: None,
             frames: Frames::default(),
         }
@@ -201,6 +205,9 @@ impl Summary {
             }
             for tool in &last.report.tools {
                 text.push_str(&format!("{tool:.4}\n"));
+            }
+            if let Some(hold) = &self.hold {
+                text.push_str(&format!("{hold}\n"));
             }
             let (time, wall) = (last.report.time, self.wall_seconds());
             text.push_str(&format!(

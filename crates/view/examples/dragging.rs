@@ -22,7 +22,7 @@ fn main() -> ExitCode {
     let on_hardware = settings.iter().any(|setting| setting == "--hardware");
     let settings: Vec<_> = settings.iter().filter_map(|setting| setting.split_once('=')).collect();
     let open = if on_hardware { Window::open_on_hardware } else { Window::open };
-    let mut window = open("liver_retraction", &settings);
+    let mut window = open("liver_lifted", &settings);
     window.start();
     let view = window.view();
     let begun = Instant::now();

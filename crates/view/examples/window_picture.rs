@@ -1,4 +1,4 @@
-//! Makes the picture of the window that README.md shows: the liver held by its retractor and pulled by a hand, in the
+//! Makes the picture of the window that README.md shows: the liver lifted by springs and pulled by a hand, in the
 //! real window without a display, drawn by a software driver.
 //!
 //! `cargo run --release -p viscera-view --example window_picture -- docs/images` writes `window.png` into that folder.
@@ -13,7 +13,7 @@ use std::process::ExitCode;
 /// The size that the window opens with [points].
 const SIZE: [u32; 2] = [1280, 800];
 
-/// Simulated times [s]: the retractor has lifted the liver and it has come to rest; the hand has pulled; and rests.
+/// Simulated times [s]: springs have lifted the liver and it has come to rest; the hand has pulled; and rests.
 const LIFTED: f64 = 5.5;
 const PULLED: f64 = 8.5;
 const RESTS: f64 = 12.0;
@@ -23,7 +23,7 @@ fn main() -> ExitCode {
         eprintln!("error: name the folder for window.png");
         return ExitCode::FAILURE;
     };
-    let mut window = Window::open("liver_retraction", &[]);
+    let mut window = Window::open("liver_lifted", &[]);
     let [width, height] = SIZE.map(|all| (all + 2 * MARGIN) as f32);
     window.harness.set_size(vec2(width, height));
     window.harness.set_render_cursor(false);

@@ -39,8 +39,8 @@ pub struct Options {
     pub farewell: Arc<OnceLock<String>>,
 }
 
-/// The scene that is opened where none is named.
-pub const FIRST_SCENE: &str = "liver_retraction";
+/// The scene that is opened where none is named: the retractor of `liver_retraction` is a tool, which the window does not draw.
+pub const FIRST_SCENE: &str = "liver_lifted";
 
 /// The window.
 pub struct App {

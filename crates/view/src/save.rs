@@ -103,9 +103,9 @@ mod tests {
     use viscera_resources::BUILT_IN;
 
     fn document() -> Document {
-        let scene = BUILT_IN.iter().find(|scene| scene.name == "liver_retraction");
+        let scene = BUILT_IN.iter().find(|scene| scene.name == "liver_lifted");
         let text = scene.expect("a built-in scene").text;
-        Document { path: "liver_retraction".into(), text: text.into(), data: None }
+        Document { path: "liver_lifted".into(), text: text.into(), data: None }
     }
 
     fn settings(pairs: &[(&str, &str)]) -> Settings {

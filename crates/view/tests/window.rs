@@ -20,7 +20,7 @@ fn farthest(a: &[Vec3<f32>], b: &[Vec3<f32>]) -> f32 {
 
 #[test]
 fn pressed_tissue_follows_the_pointer_and_is_let_go_cleanly() {
-    let mut window = Window::running("liver_retraction", &[("time.duration", "1 s")]);
+    let mut window = Window::running("liver_lifted", &[("time.duration", "1 s")]);
     let middle = window.view().center();
     let before = window.run(0).positions.clone();
     let still = window.pixels();
@@ -76,7 +76,7 @@ fn what_is_kept_stays_held_until_escape() {
 
 #[test]
 fn a_slider_changes_the_tissue_and_undo_takes_it_back() {
-    let mut window = Window::running("liver_retraction", &[]);
+    let mut window = Window::running("liver_lifted", &[]);
     for young in [2.0, 20.0] {
         window.slide("stiffness E", young);
         assert_eq!(window.scene().bodies[0].material.young(), 1e3 * young);
@@ -117,7 +117,7 @@ fn a_typed_number_is_one_change_when_it_is_finished() {
 
 #[test]
 fn the_quasi_newton_method_chooses_its_counts_until_a_box_is_unticked() {
-    let mut window = Window::running("liver_retraction", &[]);
+    let mut window = Window::running("liver_lifted", &[]);
     window.press("Jacobi 40");
     window.press("default");
     let solver = |window: &Window| window.scene().solver.clone();
@@ -299,7 +299,7 @@ fn run(scene: Scene) -> Simulation<f32> {
 /// without a window.
 #[test]
 fn a_first_visit_ends_in_a_scene_that_repeats_it() {
-    let mut window = Window::running("liver_retraction", &[("solver.substeps", "1")]);
+    let mut window = Window::running("liver_lifted", &[("solver.substeps", "1")]);
     let path = window.folder.path().join("visit.toml");
     window.press("keep");
     window.drag(vec2(20.0, -60.0));
@@ -325,7 +325,7 @@ fn a_first_visit_ends_in_a_scene_that_repeats_it() {
         app.session().scene(Side::Second).solver.acceleration == Acceleration::Anderson
     });
     window.press("Picture");
-    assert!(window.folder.path().join("pictures/liver_retraction-0001.png").exists());
+    assert!(window.folder.path().join("pictures/liver_lifted-0001.png").exists());
     window.harness.key_press(Key::Escape);
     window.harness.step();
     window.harness.key_press(Key::Space);
@@ -379,7 +379,7 @@ fn what_cannot_be_opened_is_said_and_the_first_scene_shown() {
     let window = Window::running("no_such_scene.toml", &[]);
     let texts: Vec<_> = window.harness.state().messages().texts().collect();
     assert!(texts.iter().any(|text| text.contains("no_such_scene.toml")), "{texts:?}");
-    assert_eq!(window.harness.state().session().document().path, Path::new("liver_retraction"));
+    assert_eq!(window.harness.state().session().document().path, Path::new("liver_lifted"));
 
     let window = Window::running("grab", &[("solver.iterations", "many")]);
     let texts: Vec<_> = window.harness.state().messages().texts().collect();

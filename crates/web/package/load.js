@@ -6,7 +6,7 @@ import init, { Session, presets as presetsOf, sceneForMesh, scenes as scenesOf, 
 /** @typedef {import("./index.js").LoadOptions} LoadOptions */
 
 /** The scene that is loaded where none is named. */
-const FIRST_SCENE = "liver_retraction";
+const FIRST_SCENE = "liver_lifted";
 
 /** @type {Promise<unknown> | null} */
 let ready = null;

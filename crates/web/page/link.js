@@ -24,8 +24,8 @@
  * @property {{key: string, kind: string, values: string[] | null}[]} settings
  */
 
-/** The scene that a link without one shows. */
-export const FIRST_SCENE = "liver_retraction";
+/** The scene that a link without one shows: the retractor of `liver_retraction` is a tool, which the page does not draw. */
+export const FIRST_SCENE = "liver_lifted";
 export const COLORS = ["tissue", "displacement", "strain", "stress", "contact"];
 /** Finest and coarsest mesh that the module takes: with half the edges a mesh has eight times the tetrahedra. */
 export const MESH = { finest: 0.25, coarsest: 4 };

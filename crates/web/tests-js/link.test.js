@@ -3,7 +3,7 @@ import { test } from "node:test";
 import { emptyLink, parseLink, problemText, put, writeLink } from "../page/link.js";
 
 const KNOWN = {
-  scenes: ["liver_retraction", "twist"],
+  scenes: ["liver_lifted", "twist"],
   settings: [
     { key: "solver.method", kind: "choice", values: ["auto", "xpbd", "explicit", "quasi_newton"] },
     { key: "solver.iterations", kind: "number", values: null },
@@ -45,7 +45,7 @@ test("an empty link is the first scene, whose mesh is still to be chosen", () =>
   for (const hash of ["", "#"]) {
     const { link, problems } = parseLink(hash, KNOWN);
     assert.deepEqual(problems, []);
-    assert.equal(link.scene, "liver_retraction");
+    assert.equal(link.scene, "liver_lifted");
     assert.equal(link.mesh, null);
   }
 });
@@ -84,7 +84,7 @@ for (const [part, message] of NONSENSE) {
 
 test("a link without end is not read", () => {
   const { link, problems } = parseLink(`#scene=twist&x=${"y".repeat(9000)}`, KNOWN);
-  assert.equal(link.scene, "liver_retraction");
+  assert.equal(link.scene, "liver_lifted");
   assert.equal(problems.length, 1);
 });
 

@@ -41,7 +41,7 @@ fn middle(session: &Session) -> [f64; 2] {
 /// and all.
 #[test]
 fn a_replay_has_the_same_bits_and_forces() {
-    let mut by_hand = session("liver_retraction", &[("solver.accuracy", "draft")], 1.6);
+    let mut by_hand = session("liver_lifted", &[("solver.accuracy", "draft")], 1.6);
     frames(&mut by_hand, 5);
     let place = middle(&by_hand);
     assert!(by_hand.grab(1, place).expect("a hand"), "the middle of the liver is not grabbed");
@@ -163,7 +163,7 @@ fn what_is_wrong_is_refused_and_what_runs_goes_on() {
     let mut session = session("cantilever", &[], 1.6);
     frames(&mut session, 2);
     let before = session.vertices(0).expect("a run").to_vec();
-    let huge = request("liver_retraction", &[("body.liver.spacing", "2 mm")], 1.0);
+    let huge = request("liver_lifted", &[("body.liver.spacing", "2 mm")], 1.0);
     let error = session.load(&huge, &mut no_files).expect_err("too large");
     assert!(error.contains("tetrahedra are more than"), "{error}");
     let mut wrong = request("cantilever", &[], 1.0);
@@ -218,7 +218,7 @@ fn a_reset_begins_again_with_the_settings_as_they_are() {
 
 #[test]
 fn pictures_without_a_device_show_tissue_where_it_is() {
-    let mut session = session("liver_retraction", &[], 1.6);
+    let mut session = session("liver_lifted", &[], 1.6);
     session.resize(240, 180);
     let pixels = session.pixels();
     assert_eq!(pixels.len(), 4 * 240 * 180);
@@ -251,9 +251,7 @@ fn the_budget_of_phones_is_that_of_the_plan() {
     for mesh in [2.0, 1.6, 1.25, 1.0, 0.8, 0.65] {
         let mut session = Session::new(None);
         let settings = [("solver.method", "xpbd"), ("solver.device", "cpu")];
-        session
-            .load(&request("liver_retraction", &settings, mesh), &mut no_files)
-            .expect("a scene");
+        session.load(&request("liver_lifted", &settings, mesh), &mut no_files).expect("a scene");
         let loaded = session.loaded().expect("a scene");
         rows.push(budget_row(&session, loaded.tets, loaded.vertices));
     }

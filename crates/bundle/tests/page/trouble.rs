@@ -34,7 +34,7 @@ fn a_link_of_nonsense_is_told_part_by_part() {
     for part in ["nothing", "99", "magic", "frobnicate"] {
         assert!(said.contains(part), "{part} is not told of: {said}");
     }
-    assert_eq!(tab.evaluate("viscera.state().loaded.name"), "liver_retraction");
+    assert_eq!(tab.evaluate("viscera.state().loaded.name"), "liver_lifted");
     assert_eq!(tab.evaluate("viscera.state().link.color"), "stress", "what is right in it holds");
     assert_eq!(tab.evaluate("document.querySelectorAll('#messages script').length"), 0);
 }

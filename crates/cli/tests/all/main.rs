@@ -12,5 +12,6 @@ mod bench_scene;
 #[cfg(feature = "gpu")]
 mod devices;
 mod documents;
+mod hold;
 mod run;
 mod saved;

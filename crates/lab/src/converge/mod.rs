@@ -13,7 +13,7 @@ use viscera_report::{Axis, Plot, Series, Style, Table, percent};
 use viscera_resources::files::{prepare_file, write_atomic};
 use viscera_resources::{Memory, MeshFiles, memory};
 
-use crate::rest_command::{read_scene, refuse_what_rest_does_not_determine};
+use crate::rest_command::{read_scene, refuse_what_rest_does_not_determine, tools};
 use crate::sections::Progress;
 use levels::{AtRest, Limit, PARTS, at_rest, error, limit, refined};
 
@@ -49,7 +49,7 @@ pub struct ConvergeArguments {
 const EXAMPLES: &str = "\
 Examples:
   viscera-lab converge scenes/cantilever.toml                  three meshes, a minute
-  viscera-lab converge scenes/liver_retraction.toml --meshes 2
+  viscera-lab converge scenes/liver_lifted.toml --meshes 2
   viscera-lab converge scenes/cantilever.toml --set body.bar.cells_across=2 --meshes 4";
 
 /// The kinds of tetrahedra that are compared.
@@ -123,7 +123,7 @@ pub fn run(arguments: &ConvergeArguments, print: &dyn Fn(&str) -> Result<()>) ->
     let files = MeshFiles::new(&arguments.scene, arguments.data.as_deref());
     let mut load = |name: &str| files.load(name);
     let coarse = Assembly::new(&scene, &mut load)?;
-    for note in &coarse.notes {
+    for note in coarse.notes.iter().cloned().chain(tools::note(&scene)) {
         eprintln!("note: {note}");
     }
     let tets: usize = coarse.bodies.iter().map(|body| body.tets.len()).sum();

@@ -3,7 +3,7 @@
 mod comparison;
 mod files;
 mod path;
-mod tools;
+pub(crate) mod tools;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;

@@ -29,7 +29,7 @@ pub(super) fn refuse(scene: &Scene) -> Result<()> {
 }
 
 /// Says that tools have no friction in a state of rest, where they have some in the scene.
-pub(super) fn note(scene: &Scene) -> Option<String> {
+pub(crate) fn note(scene: &Scene) -> Option<String> {
     let tool = scene.tools.iter().find(|tool| tool.law.friction > 0.0)?;
     Some(format!(
         "tools touch without friction here, tool `{}` for one: with it a state of rest depends on the way there",

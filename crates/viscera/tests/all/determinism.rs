@@ -242,8 +242,8 @@ fn shipped_scenes_have_the_same_bits_on_every_machine() {
         ),
         ("grab.toml", include_str!("../../../../scenes/grab.toml"), 0xc001_5a5b_9718_e279),
         (
-            "liver_retraction.toml",
-            include_str!("../../../../scenes/liver_retraction.toml"),
+            "liver_lifted.toml",
+            include_str!("../../../../scenes/liver_lifted.toml"),
             0x0ddb_49b9_5466_6dab,
         ),
     ];

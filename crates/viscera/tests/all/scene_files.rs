@@ -9,13 +9,14 @@ use viscera::settings::{
     SolverSettings, Start,
 };
 
-const SHIPPED: [(&str, &str); 7] = [
+const SHIPPED: [(&str, &str); 8] = [
     ("liver_retraction.toml", include_str!("../../../../scenes/liver_retraction.toml")),
     ("cantilever.toml", include_str!("../../../../scenes/cantilever.toml")),
     ("twist.toml", include_str!("../../../../scenes/twist.toml")),
     ("stretch.toml", include_str!("../../../../scenes/stretch.toml")),
     ("grab.toml", include_str!("../../../../scenes/grab.toml")),
     ("palpation.toml", include_str!("../../../../scenes/palpation.toml")),
+    ("liver_lifted.toml", include_str!("../../../../scenes/liver_lifted.toml")),
     ("grasp.toml", include_str!("../../../../scenes/grasp.toml")),
 ];
 
