@@ -222,8 +222,9 @@ impl Moving {
         let mut state = State::at_rest(&model);
         let mut inputs = self.inputs::<S>(0.0);
         state.contact = ContactState::of(&inputs.tools);
-        // As simulations do: tools move steadily in a substep.
-        let substeps = solver.substeps(&inputs, FRAME).max(2);
+        // As simulations do where nothing but tools holds a body.
+        let least = if self.fixed.is_empty() { 2 } else { 1 };
+        let substeps = solver.substeps(&inputs, FRAME).max(least);
         let mut shadow = with_errors.then(|| Shadow::new(&model, settings, &state));
         let mut course = Course::default();
         for frame in 0..self.frames() {

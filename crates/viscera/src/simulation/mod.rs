@@ -182,8 +182,10 @@ impl<S: Real> Simulation<S> {
         let known = self.oscillations.take();
         (self.oscillations, self.substeps) =
             self.backend.substeps(&inputs, &self.solver, known, frame);
-        if !self.assembly.tools.is_empty() && self.solver.substeps == Count::Auto {
-            self.substeps = self.substeps.max(LEAST_WITH_TOOLS);
+        let may_lie_on_tools =
+            !self.assembly.tools.is_empty() && has_loose_parts(self.layout(), &inputs);
+        if may_lie_on_tools && self.solver.substeps == Count::Auto {
+            self.substeps = self.substeps.max(LEAST_ON_TOOLS);
         }
     }
 
@@ -411,8 +413,19 @@ impl<S: Real> Simulation<S> {
     }
 }
 
-/// Substeps of a frame in which tools act, at least, where the method chooses: tools move steadily in each.
-const LEAST_WITH_TOOLS: u32 = 2;
+/// Substeps of a frame, at least, where the method chooses them by the oscillations of what fixings hold, and tools alone may
+/// hold a part: it has no such oscillations.
+const LEAST_ON_TOOLS: u32 = 2;
+
+/// Whether there is a part that neither these inputs hold nor an attachment.
+fn has_loose_parts<S: Real>(layout: &Layout<S>, inputs: &Inputs<S>) -> bool {
+    let mut held: Vec<bool> = layout.parts.iter().map(|part| part.is_anchored()).collect();
+    let pins = inputs.pins.iter().map(|pin| pin.vertex);
+    for vertex in pins.chain(inputs.tethers.iter().map(|tether| tether.vertex)) {
+        held[layout.part_at(layout.numbering.of(vertex))] = true;
+    }
+    held.contains(&false)
+}
 
 /// Whether the patches are those of the scene and name vertices that there are. Numbers of vertices stay what they are as
 /// materials change and bodies are added, so that patches do not depend on the model's revision.
