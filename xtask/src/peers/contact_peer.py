@@ -2,10 +2,11 @@
 
     python contact_peer.py press '{"size": "m", "depth": 4, "substeps": 4}'
     python contact_peer.py slide '{"angle": 26.9, "frames": 36}'
+    python contact_peer.py base '{"size": "m", "law": "snh", "positions": "positions.txt"}'
 
 In the benchmark's folder, with the meshes of `viscera-lab contact-scenes` in SOFTBENCH_CACHE. Prints one line, RESULT and
-JSON: forces at the ends of the last frames, the force that the deformed block itself leads to its base, acceleration,
-way, and the processor time of a frame.
+JSON: of MuJoCo forces at the ends of the last frames, the force that the deformed block itself leads to its base, acceleration,
+way, and the processor time of a frame; `base` only tells the force of a block that another program has deformed.
 
 The ball, a motion capture body, and the plane are rigid geometries; the block is a 3D flex of linear tetrahedra with one
 slider triple per vertex, as in mujoco_peer.py. The flex's radius counts as part of the ball, and lifts the block off the
@@ -36,8 +37,7 @@ COUNTED, UNTIMED, SKIPPED = 10, 3, 6
 LONGEST = 300.0
 
 USUAL = dict(size="s", depth=4.0, angle=0.0, frames=36, substeps=4, integrator="discrete", solref=None, solimp=None,
-             cone=None, impratio=None, noslip=0, solver="Newton", iterations=100, tolerance=1e-8, flex_radius=1e-4,
-             passive=False)
+             cone=None, impratio=None, solver="Newton", iterations=100, tolerance=1e-8, flex_radius=1e-4)
 
 
 def read_mesh(name):
@@ -59,7 +59,7 @@ def build(X, T, fixed, presses, cfg):
     o.gravity = [0, 0, 0 if presses else -GRAVITY]
     o.integrator = getattr(mujoco.mjtIntegrator, "mjINT_" + cfg["integrator"].upper())
     o.solver = getattr(mujoco.mjtSolver, "mjSOL_" + cfg["solver"].upper())
-    o.iterations, o.tolerance, o.noslip_iterations = int(cfg["iterations"]), cfg["tolerance"], int(cfg["noslip"])
+    o.iterations, o.tolerance = int(cfg["iterations"]), cfg["tolerance"]
     if cfg["cone"]:
         o.cone = getattr(mujoco.mjtCone, "mjCONE_" + cfg["cone"].upper())
     if cfg["impratio"]:
@@ -91,8 +91,6 @@ def build(X, T, fixed, presses, cfg):
         names.append(f"v{i}"); vert.extend((0.0, 0.0, 0.0))
     f = s.add_flex(name="soft", dim=3, radius=cfg["flex_radius"], young=YOUNG, poisson=POISSON, damping=0,
                    selfcollide=mujoco.mjtFlexSelf.mjFLEXSELF_NONE, **flex)
-    if cfg["passive"]:
-        f.passive = 1
     f.vertbody, f.vert, f.elem = names, vert, T.ravel().tolist()
     return s.compile(), tissue
 
@@ -184,9 +182,18 @@ def slide(cfg):
                 way=float(places[-1] - places[SKIPPED]), ratio=float(np.hypot(*force[:2]) / abs(force[2])), **run.cost())
 
 
+def base(asked):
+    X, T, fixed = read_mesh(f"block-{asked['size']}")
+    tissue = oracle.Problem(X, T, material=asked["law"], E=YOUNG, nu=POISSON, fixed=fixed, fixed_pos=X[fixed])
+    force = tissue.forces(np.loadtxt(asked["positions"]))[fixed, 2].sum()
+    print("RESULT " + json.dumps(dict(base_force=float(abs(force)))))
+
+
 def main():
     presses = sys.argv[1] == "press"
     asked = json.loads(sys.argv[2])
+    if sys.argv[1] == "base":
+        return base(asked)
     unknown = set(asked) - set(USUAL)
     if unknown:
         raise SystemExit(f"no such settings: {unknown}")
