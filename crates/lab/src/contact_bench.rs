@@ -76,7 +76,7 @@ fn sliding(law: ContactLaw, degrees: f64, frames: u32) -> Result<Sliding> {
 }
 
 /// Writes block-s.txt and so on, incline.txt, and truths.json: of each block, law and depth the force [N] with a nearly
-/// rigid contact, with more samples of the surface, and with the library's usual contact.
+/// rigid contact, with more samples of the surface, with the library's four of each triangle, and with its usual contact.
 pub fn write_scenes(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let mut write = |name: &str, text: &str| -> Result<()> {
@@ -110,7 +110,7 @@ fn lying(sliding: &Sliding) -> Result<TetMesh> {
 /// Truths of all depths, each from the one before, so that a deep ball is on the way that a motion takes.
 fn truths_of(size: &str, name: &str, model: MaterialModel) -> Result<Vec<String>> {
     let usual = ContactLaw { friction: 0.0, ..ContactLaw::default() };
-    let ways = [(RIGID, 2), (RIGID, 3), (usual, 1)];
+    let ways = [(RIGID, 2), (RIGID, 3), (RIGID, 1), (usual, 1)];
     let mut forces = vec![Vec::new(); DEPTHS.len()];
     for (law, cuts) in ways {
         let mut start: Option<Vec<Vec3<f64>>> = None;
@@ -129,8 +129,8 @@ fn truths_of(size: &str, name: &str, model: MaterialModel) -> Result<Vec<String>
     let row = |(depth, forces): (&u32, &Vec<f64>)| {
         format!(
             "{{\"size\": \"{size}\", \"law\": \"{name}\", \"depth_mm\": {depth}, \"rigid\": {:e}, \
-             \"more_samples\": {:e}, \"usual\": {:e}}}",
-            forces[0], forces[1], forces[2]
+             \"more_samples\": {:e}, \"four\": {:e}, \"usual\": {:e}}}",
+            forces[0], forces[1], forces[2], forces[3]
         )
     };
     Ok(DEPTHS.iter().zip(&forces).map(row).collect())

@@ -66,14 +66,17 @@ impl Simulator {
         match (self, presses) {
             (Self::Ours, true) => &[
                 "method=quasi_newton",
-                "method=xpbd",
+                "method=quasi_newton,schedule=1x8",
+                "method=quasi_newton,schedule=1x8,stiffness=1000,thickness=5e-5",
                 "method=quasi_newton,stiffness=100,thickness=2e-4",
+                "method=xpbd",
                 "method=xpbd,stiffness=100,thickness=2e-4",
                 "method=explicit",
                 "method=explicit,stiffness=100,thickness=2e-4",
             ],
             (Self::Ours, false) => &[
                 "method=quasi_newton",
+                "method=quasi_newton,schedule=1x8",
                 "method=xpbd",
                 "method=xpbd,schedule=4x10,stiffness=2",
                 "method=explicit",
@@ -279,7 +282,7 @@ fn chosen(simulator: Simulator, rows: &[Value], truths: &[Value]) -> Vec<&'stati
     chosen
 }
 
-/// Forces of the truths of a row's law at its size and depth [N]: `rigid`, `more_samples` or `usual`.
+/// Forces of the truths of a row's law at its size and depth [N]: `rigid`, `more_samples`, `four` or `usual`.
 pub fn truth(row: &Value, truths: &[Value], key: &str) -> Option<f64> {
     let simulator = Simulator::ALL.into_iter().find(|one| row["simulator"] == one.name())?;
     let fits = |truth: &&Value| {

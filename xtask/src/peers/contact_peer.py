@@ -112,7 +112,7 @@ class Run:
             mujoco.mj_step(self.m, self.d)
             spent += time.process_time() - begin
         self.times.append(1e3 * spent)
-        if not np.isfinite(self.d.qpos).all() or np.abs(self.d.qpos).max() > 10 or self.d.warning[
+        if not np.isfinite(self.d.qpos).all() or np.abs(self.d.qpos).max() > 1000 or self.d.warning[
                 mujoco.mjtWarning.mjWARN_BADQACC].number:
             raise ArithmeticError("diverged")
         if time.process_time() - self.begin > LONGEST:
