@@ -76,7 +76,6 @@ impl Simulator {
             ],
             (Self::Ours, false) => &[
                 "method=quasi_newton",
-                "method=quasi_newton,schedule=1x8",
                 "method=xpbd",
                 "method=xpbd,schedule=4x10,stiffness=2",
                 "method=explicit",
