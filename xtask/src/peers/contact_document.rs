@@ -76,7 +76,8 @@ simulator reports on the ball, the mean of the last ten frames.
 
 The truth is the independent Newton reference of `viscera-lab`, at rest on the same mesh, with a contact that gives by \
 micrometres at 16 points of each triangle of the surface; MuJoCo is judged by that of Saint Venant-Kirchhoff, its law, \
-viscera and Rapier by that of stable neo-Hookean tissue. Where contact begins (viscera's thickness, the radius of MuJoCo's \
+viscera and Rapier by that of stable neo-Hookean tissue. Of each peer the first settings and the best run at all depths, \
+and as far as time allows on the finer block, there at 4 mm. Where contact begins (viscera's thickness, the radius of MuJoCo's \
 flex, Rapier's skin) counts as part of the ball. *64 points* is what that number of points changes: how well the truth is \
 known. *4 points* is what viscera's number changes. *viscera's contact* is the same reference with those 4 points and \
 viscera's usual contact, an elastic foundation ten times as stiff as a cell: what of viscera's error is its contact's \
