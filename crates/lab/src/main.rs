@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use viscera_lab::converge::{self, ConvergeArguments};
 use viscera_lab::rest_command::{self, RestArguments};
 use viscera_lab::sections::{Changes, Options, Program};
-use viscera_lab::{bars, study, validate};
+use viscera_lab::{bars, contact_bench, study, validate};
 use viscera_resources::files::{prepare_folder, print};
 
 /// The truth beside the solver: studies that hold its claims against references.
@@ -51,6 +51,19 @@ enum Command {
         /// Folder for u2.txt and so on, and continuum.json
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
+    },
+    // Likewise: meshes and truths of contact.
+    #[command(hide = true)]
+    ContactScenes {
+        /// Folder for block-s.txt and so on, incline.txt and truths.json
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+    // Likewise: one run of ours.
+    #[command(hide = true)]
+    ContactRun {
+        /// press or slide, then KEY=VALUE, separated by commas
+        request: String,
     },
 }
 
@@ -133,6 +146,10 @@ fn main() -> ExitCode {
         Command::Converge(arguments) => converge::run(&arguments, &print),
         Command::Organs { out } => write(&out, validate::write_organs),
         Command::Bars { out } => write(&out, bars::write_bars),
+        Command::ContactScenes { out } => write(&out, contact_bench::write_scenes),
+        Command::ContactRun { request } => {
+            contact_bench::run(&request).and_then(|line| print(&line))
+        }
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

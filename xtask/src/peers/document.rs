@@ -118,7 +118,8 @@ const LIMITS: &str = "\
 Two scenes of one bar with one Poisson ratio are not surgery: there is no contact, no cutting, no nearly
 incompressible tissue here. Several peers are made for many threads or for a GPU, and rigid bodies, robots or cloth
 beside tissue; one thread shows none of that. The mesh is the same for all, so that its own error, large for coarse
-linear tetrahedra, is in no column: [Peers against the continuum](peers-continuum.md) has it.";
+linear tetrahedra, is in no column: [Peers against the continuum](peers-continuum.md) has it. Contact is in [Peers in
+contact](peers-contact.md).";
 
 /// What the names of our methods say already.
 const SAID: [&str; 5] = ["material", "method", "rebase", "keep_multipliers", "step_guard"];

@@ -177,11 +177,9 @@ impl Environment {
         const PACKAGES: [&str; 6] =
             ["build", "--release", "--package", "viscera-cli", "--package", "viscera-lab"];
         finish("build viscera", cargo(&PACKAGES).current_dir(&self.root), "mend the errors above")?;
-        let lab =
-            self.program.with_file_name(format!("viscera-lab{}", std::env::consts::EXE_SUFFIX));
         finish(
             "write the organs",
-            Command::new(lab).args(["organs", "--out"]).arg(self.cache()),
+            Command::new(self.lab()).args(["organs", "--out"]).arg(self.cache()),
             "mend the errors above",
         )
     }
@@ -191,17 +189,53 @@ impl Environment {
     pub fn bars(&self) -> Result<BTreeMap<String, [f64; 2]>, String> {
         let file = self.cache().join("continuum.json");
         if !file.is_file() && self.builds[0] {
-            let lab =
-                self.program.with_file_name(format!("viscera-lab{}", std::env::consts::EXE_SUFFIX));
             finish(
                 "write the bars and find the continuum's sag, some minutes, once",
-                Command::new(lab).args(["bars", "--out"]).arg(self.cache()),
+                Command::new(self.lab()).args(["bars", "--out"]).arg(self.cache()),
                 "mend the errors above",
             )?;
         }
         let text = fs::read_to_string(&file)
             .map_err(|error| format!("{}: {error}; carry the folder cache here", file.display()))?;
         serde_json::from_str(&text).map_err(|error| format!("{}: {error}", file.display()))
+    }
+
+    /// The studies' program, beside `viscera`.
+    pub fn lab(&self) -> PathBuf {
+        self.program.with_file_name(format!("viscera-lab{}", std::env::consts::EXE_SUFFIX))
+    }
+
+    /// Makes what contact needs beside the rest: meshes and truths, MuJoCo's program, and Rapier's, which is built with
+    /// the dependencies of the benchmark's. The paths of the two programs.
+    pub fn prepare_contact(&self) -> Result<[PathBuf; 2], String> {
+        let script = self.folder.join("contact_peer.py");
+        super::write_whole(&script, include_str!("contact_peer.py"))?;
+        let crate_folder = self.folder.join("rapier-contact");
+        let make = |folder: &Path| {
+            fs::create_dir_all(folder)
+                .map_err(|error| format!("cannot make {}: {error}", folder.display()))
+        };
+        make(&crate_folder.join("src"))?;
+        make(&self.cache())?;
+        let list = self.bench().join("peers/rapier/Cargo.toml");
+        let list = fs::read_to_string(&list)
+            .map_err(|error| format!("{}: {error}; is this the benchmark?", list.display()))?;
+        super::write_whole(&crate_folder.join("Cargo.toml"), &list)?;
+        let source = include_str!("rapier_contact/main.rs");
+        super::write_whole(&crate_folder.join("src/main.rs"), source)?;
+        if self.builds[0] {
+            finish(
+                "build Rapier's program for contact",
+                cargo(&["build", "--release"]).current_dir(&crate_folder),
+                "its first build needs the network",
+            )?;
+            finish(
+                "write meshes and truths of contact, a minute",
+                Command::new(self.lab()).args(["contact-scenes", "--out"]).arg(self.cache()),
+                "mend the errors above",
+            )?;
+        }
+        Ok([script, crate_folder.join("target/release/rapier_peer")])
     }
 
     /// A Python environment with the benchmark's requirements; a mark tells that it is complete.

@@ -3,6 +3,8 @@
 //! The benchmark is a folder of Python programs that stays outside the project. This chore gives it
 //! an environment, runs it, and writes the report from its result lines.
 
+mod contact;
+mod contact_document;
 mod continuum;
 mod continuum_document;
 mod document;
@@ -45,6 +47,8 @@ Options:
   --continuum       Run only bars against the continuum: the coarsest on which each simulator's tip sinks as far
                     as that of the body itself, and what a frame costs there; with --keep what ran before is not
                     run again [document: docs/peers-continuum.md]
+  --contact         Run only contact: a ball that is pressed into a block, a block on an incline; of MuJoCo, Rapier and
+                    viscera; with --keep what ran before is not run again [document: docs/peers-contact.md]
   --again           Run nothing; write the document from the last run's results
   --out FILE        The document; figures go to the folder of its name beside it [default: docs/peers.md]
 
@@ -74,6 +78,7 @@ pub struct Options {
     largest: bool,
     only_sweeps: bool,
     continuum: bool,
+    contact: bool,
     /// As one would type it; without folders, which differ from machine to machine.
     command: String,
 }
@@ -109,9 +114,10 @@ impl Options {
                     command += &format!(" {flag} {value}");
                 }
                 "--only-sweeps" | "--quick" | "--large" | "--no-sweeps" | "--no-largest"
-                | "--continuum" => {
+                | "--continuum" | "--contact" => {
                     options.only_sweeps |= flag == "--only-sweeps";
                     options.continuum |= flag == "--continuum";
+                    options.contact |= flag == "--contact";
                     quick |= flag == "--quick";
                     large |= flag == "--large";
                     options.sweeps &= !["--no-sweeps", "--quick"].contains(&flag);
@@ -182,6 +188,9 @@ pub fn peers(arguments: &[&str]) -> ExitCode {
 fn carry_out(options: &Options) -> Result<PathBuf, String> {
     if options.continuum {
         return continuum::carry_out(options);
+    }
+    if options.contact {
+        return contact::carry_out(options);
     }
     let environment = Environment::find(options)?;
     let out = options.out.clone().unwrap_or_else(|| environment.root.join("docs/peers.md"));

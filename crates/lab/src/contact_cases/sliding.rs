@@ -108,10 +108,15 @@ impl Sliding {
 
     /// By the library.
     pub fn slide(&self, way: &Way) -> Result<Slide> {
-        if way.single { self.slide_in::<f32>(way) } else { self.slide_in::<f64>(way) }
+        self.slide_watched(way, &mut || ())
     }
 
-    fn slide_in<S: Real>(&self, way: &Way) -> Result<Slide> {
+    /// The same; `after` is called after each frame.
+    pub fn slide_watched(&self, way: &Way, after: &mut dyn FnMut()) -> Result<Slide> {
+        if way.single { self.slide_in::<f32>(way, after) } else { self.slide_in::<f64>(way, after) }
+    }
+
+    fn slide_in<S: Real>(&self, way: &Way, after: &mut dyn FnMut()) -> Result<Slide> {
         let model = self.model::<S>()?;
         let mut solver = Solver::new(&model, &way.settings());
         let mut state = State::at_rest(&model);
@@ -128,6 +133,7 @@ impl Sliding {
                 let inputs = self.inputs(time / f64::from(TURNING));
                 solver.step(&model, &mut state, &inputs, dt)?;
             }
+            after();
             if is_free {
                 course.add(&state);
             } else {
