@@ -1,5 +1,6 @@
 //! Contact with tools and obstacles, by every method.
 
+mod divided;
 mod forces;
 mod grasps;
 mod motion;

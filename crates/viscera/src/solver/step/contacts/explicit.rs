@@ -29,7 +29,7 @@ impl Contacts {
             let stiffness = share * (touching.stiffness_near(tool, &felt) + felt.turning);
             spread(&step, sample, (felt.force, stiffness), loads);
             let arm = at - self.poses[number].translation;
-            work += self.work_of(whole, number, felt.force, arm);
+            work += self.work_of(whole.tools, number, felt.force, arm);
         }
         if let Some(gift) = self.gifts.get_mut(part) {
             *gift.exact.get_or_insert(0.0) += work * small / whole.dt;

@@ -115,7 +115,7 @@ impl Contacts {
             let is_known = (touch.sample as usize) < step.layout.samples.len();
             if is_known && self.jumped.get(tool) == Some(&false) {
                 let arm = touch.place - self.starts[tool].translation;
-                let work = self.work_of(step, tool, touch.force, arm);
+                let work = self.work_of(step.tools, tool, touch.force, arm);
                 self.gifts[step.layout.part_of_sample(touch.sample)].work[0] += work;
             }
         }

@@ -138,7 +138,7 @@ impl Contacts {
         self.each(step, part, x, |_, touching, place, felt| {
             let tool = touching.tool as usize;
             let arm = place - self.poses[tool].translation;
-            work += self.work_of(step, tool, felt.force, arm);
+            work += self.work_of(step.tools, tool, felt.force, arm);
         });
         work
     }
@@ -149,14 +149,8 @@ impl Contacts {
     }
 
     /// Of one force on the tissue, at `arm` [m] from the origin of a tool.
-    fn work_of<S: Real>(
-        &self,
-        step: &ContactStep<'_, S>,
-        tool: usize,
-        force: Vec3<f64>,
-        arm: Vec3<f64>,
-    ) -> f64 {
-        let (start, end) = (&self.starts[tool], &step.tools[tool].pose);
+    fn work_of(&self, tools: &[Tool], tool: usize, force: Vec3<f64>, arm: Vec3<f64>) -> f64 {
+        let (start, end) = (&self.starts[tool], &tools[tool].pose);
         let turn = axis_times_sine(&(end.rotation * start.rotation.transpose()));
         force.dot(end.translation - start.translation) + arm.cross(force).dot(turn)
     }
@@ -394,4 +388,47 @@ pub struct Sums {
     pub squared_force: f64,
     /// Whether any sample is pressed or held.
     pub presses: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::Shape;
+    use crate::scalar::rigid::rotation_matrix;
+    use crate::scalar::vec3;
+
+    /// Two jaws that turn about a hinge with what they squeeze do no work. By the forces at the end alone the chord of each
+    /// jaw's way would say so only to second order, and a step would be charged for what no tool took.
+    #[test]
+    fn jaws_that_turn_with_what_they_hold_do_no_work() {
+        let (turn, squeeze) = (rotation_matrix(vec3(0.0, 0.0, 0.035)), 2.0);
+        let at = |x: f64, rotation| RigidTransform { rotation, translation: vec3(x, 0.0, 0.0) };
+        let straight = RigidTransform::IDENTITY.rotation;
+        let ways = [0.01, -0.01];
+        let starts = ways.map(|x| at(x, straight)).to_vec();
+        let tools = ways.map(|x| {
+            let start = at(x, turn);
+            let pose = RigidTransform { translation: turn * start.translation, ..start };
+            Tool { pose, ..Tool::new(Shape::Sphere { radius: 4e-3 }) }
+        });
+        let contacts = Contacts { starts, ..Contacts::default() };
+        // Of forces on the tissue, in front of the jaws.
+        let work = |turned: &Mat3<f64>| -> f64 {
+            let each = ways.iter().enumerate().map(|(tool, x)| {
+                let force = *turned * vec3(-squeeze * x.signum(), 0.0, 0.0);
+                let arm = *turned * vec3(-4e-3 * x.signum(), 0.0, 0.0);
+                contacts.work_of(&tools, tool, force, arm)
+            });
+            each.sum()
+        };
+        let gift = Gift { work: [work(&straight), work(&turn)], ..Gift::default() };
+        // Of the squeezing forces along a way as long as that of the jaws.
+        let whole = 2.0 * squeeze * 0.01 * 0.035;
+        let ends = -gift.work[1];
+        assert!(ends > 1e-2 * whole, "{gift:?}");
+        assert!(gift.work().abs() < 1e-2 * ends, "{gift:?}");
+        assert!(gift.mean_work().abs() < 1e-2 * ends, "{gift:?}");
+        let exact = Gift { exact: Some(0.3), ..gift };
+        assert_eq!((exact.work(), exact.mean_work()), (0.3, 0.3));
+    }
 }
