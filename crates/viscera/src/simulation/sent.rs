@@ -88,7 +88,7 @@ impl<S: Real> Simulation<S> {
             backend.steps(model, state, inputs, dt, substeps, in_run)
         };
         match &mut self.shadow {
-            Some(shadow) => shadow.beside(model, substeps, scene.time.frame, &act, || run(state)),
+            Some(shadow) => shadow.beside(model, substeps, scene.time.frame, act, || run(state)),
             None => run(state),
         }
     }
