@@ -2,6 +2,7 @@
 //! browsers forbid.
 
 use super::error::FrameError;
+use super::shadowed::Shadowed;
 use super::{Simulation, substep_dt};
 use crate::scalar::Real;
 use crate::solver::Inputs;
@@ -63,6 +64,21 @@ impl<S: Real> Simulation<S> {
                 Err(error)
             }
             Ok(()) => Ok(()),
+        }
+    }
+
+    /// The run beside this one goes on from where this one is where it does not exist yet, or where nothing touched anything
+    /// in either: what the past has left is gone then.
+    fn call_shadow(&mut self) {
+        let is_wanted = self.scene.output.force_error
+            && !self.assembly.tools.is_empty()
+            && !self.is_on_device();
+        let Self { shadow, state, model, solver, inputs, .. } = self;
+        match shadow {
+            _ if !is_wanted => *shadow = None,
+            None => *shadow = Some(Shadowed::new(model, solver, state, inputs)),
+            Some(shadow) if state.contact.touches.is_empty() => shadow.follow(state),
+            Some(_) => {}
         }
     }
 

@@ -2,7 +2,6 @@
 
 use std::thread;
 
-use super::Simulation;
 use super::error::FrameError;
 use crate::contact::Wrench;
 use crate::model::Model;
@@ -24,25 +23,9 @@ pub(super) struct Shadowed<S> {
     is_lost: bool,
 }
 
-impl<S: Real> Simulation<S> {
-    /// The run beside this one goes on from where this one is where it does not exist yet, or where nothing touched anything
-    /// in either: what the past has left is gone then.
-    pub(super) fn call_shadow(&mut self) {
-        let is_wanted = self.scene.output.force_error
-            && !self.assembly.tools.is_empty()
-            && !self.is_on_device();
-        let Self { shadow, state, model, solver, inputs, .. } = self;
-        match shadow {
-            _ if !is_wanted => *shadow = None,
-            None => *shadow = Some(Shadowed::new(model, solver, state, inputs)),
-            Some(shadow) if state.contact.touches.is_empty() => shadow.follow(state),
-            Some(_) => {}
-        }
-    }
-}
-
 impl<S: Real> Shadowed<S> {
-    fn new(
+    /// Beside a run with these settings that is in this state.
+    pub fn new(
         model: &Model<S>,
         solver: &SolverSettings,
         state: &State<S>,
@@ -58,7 +41,8 @@ impl<S: Real> Shadowed<S> {
         }
     }
 
-    fn follow(&mut self, state: &State<S>) {
+    /// Goes on from where the run beside it is, where nothing touches anything in either.
+    pub fn follow(&mut self, state: &State<S>) {
         if self.is_lost || self.shadow.state_mut().contact.touches.is_empty() {
             self.shadow.follow(state);
             self.is_lost = false;
