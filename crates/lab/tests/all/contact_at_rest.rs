@@ -65,7 +65,8 @@ fn incline(degrees: f64) -> Sliding {
     Sliding {
         size: vec3(0.02, 0.02, 0.01),
         cells: [2, 2, 1],
-        tissue: soft(1e4, 0.45),
+        // Without any viscosity an elastic block flutters.
+        tissue: soft(1e4, 0.45).with_viscosity(5e-3).expect("a viscosity"),
         law,
         angle: 0.5f64.atan() + degrees.to_radians(),
         frames: 36,

@@ -109,12 +109,16 @@ fn contact_is_the_references_and_friction_is_coulombs_at_length() {
 /// Known failures: five sweeps of one colour do not unscramble a bar, Anderson's default guard follows a drop a
 /// little less closely than is asked, and so do two substeps of the quasi-Newton method; XPBD's default leaves much
 /// of the viscous stress unsolved. Where a ball begins to touch, four samples of a triangle are not enough for 1.5 %.
-const KNOWN_FAILURES: [&str; 5] = [
+/// XPBD's default follows a quick probe a little less closely than is asked. What forces are said to be off by is more than
+/// four times what they are off by where runs in half as many steps are much worse, or the run better than a thousandth.
+const KNOWN_FAILURES: [&str; 7] = [
     "scrambles, Jacobi",
     "Anderson guarded by residual",
     "quasi-Newton, 2 substeps",
     "viscous bar, XPBD, beside",
     "force with 4 samples per triangle",
+    "largest error of its force, XPBD",
+    "tools in motion, what forces are said to be off by over the truth",
 ];
 
 fn all_are_met(printed: &str) {
