@@ -374,6 +374,8 @@ fn curves(truths: &[Value], rows: &[Value]) -> Value {
         "title": "Ball on a block, 4 mm deep: cost of a frame and error of the force",
         "x": "CPU time per frame [ms]",
         "y": "error of the force [%]",
+        // Settings are no curve.
+        "joined": false,
         "series": Simulator::ALL.map(curve),
     })
 }

@@ -22,6 +22,25 @@ fn curves_become_a_figure_that_names_them_and_leaves_out_what_has_no_logarithm()
     }
 }
 
+/// Settings that are no curve: two points, and nothing between them.
+#[test]
+fn points_that_are_not_joined_have_no_line() {
+    let lines = |joined: bool| {
+        let bench = Bench::new("");
+        let data = json!({
+            "title": "Cost and error", "x": "time [ms]", "y": "error [%]", "joined": joined,
+            "series": [{ "name": "first", "points": [[1.0, 10.0], [10.0, 0.1]] }],
+        });
+        bench.write("curves.json", data.to_string().as_bytes());
+        let end = bench.end_of(&["bench-plot", "--data", "curves.json", "--out", "curves.svg"]);
+        assert_eq!(end.code, Some(0), "{}", end.stderr);
+        let svg = String::from_utf8(bench.read("curves.svg")).expect("text");
+        svg.matches("<polyline").count()
+    };
+    // The curve, and its piece in the legend.
+    assert_eq!(lines(true) - lines(false), 2);
+}
+
 #[test]
 fn what_is_no_data_is_named() {
     let bench = Bench::new("");

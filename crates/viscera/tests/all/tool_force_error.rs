@@ -104,7 +104,7 @@ fn the_run_beside_changes_nothing() {
     assert!(without.1.error.is_none() && alone.1.error.is_some());
 }
 
-/// What is no motion is told.
+/// A jump further than a tool moves in a step is reported, also where it is not in the last substep of a frame.
 #[test]
 fn a_tool_that_is_put_elsewhere_says_so() {
     let path = "[{ time = \"0.1 s\", translation = [0, 0, 0] }, \
