@@ -1,6 +1,6 @@
 //! The state: everything that moves.
 
-use crate::contact::{Tool, Touch};
+use crate::contact::{Kept, Tool, Touch};
 use crate::model::Model;
 use crate::scalar::rigid::RigidTransform;
 use crate::scalar::{Real, Vec3};
@@ -21,7 +21,7 @@ pub struct State<S> {
     pub multiplier_dt: f64,
     /// What the quasi-Newton and the explicit method have learned; empty for others.
     pub learned: Learned<S>,
-    /// What tools have touched; empty where there are none.
+    /// What tools have touched, and tissue tissue; empty where there is none.
     pub contact: ContactState,
 }
 
@@ -33,17 +33,25 @@ pub struct ContactState {
     pub poses: Vec<RigidTransform>,
     /// What tools press on: by connected part, sample and tool.
     pub touches: Vec<Touch>,
+    /// Tissue that presses on tissue: by connected part and sample.
+    pub pairs: Vec<Kept>,
+    /// Of each tie, whether it is torn.
+    pub torn: Vec<bool>,
 }
 
 impl ContactState {
     /// Of tools that are where they are, and have touched nothing yet.
     pub fn of(tools: &[Tool]) -> Self {
-        Self { poses: tools.iter().map(|tool| tool.pose).collect(), touches: Vec::new() }
+        let poses = tools.iter().map(|tool| tool.pose).collect();
+        Self { poses, ..Self::default() }
     }
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.poses[..]) + size_of_val(&self.touches[..])
+        size_of_val(&self.poses[..])
+            + size_of_val(&self.touches[..])
+            + size_of_val(&self.pairs[..])
+            + size_of_val(&self.torn[..])
     }
 }
 
@@ -71,6 +79,8 @@ pub struct LearnedPart {
     pub dt: f64,
     /// Whether no trial of the last solve was rejected.
     pub calm: bool,
+    /// The parts that it was in touch with; see [`crate::solver`].
+    pub group: u64,
     /// Energy [J] that explicit steps have lost for a while: it swings about its mean.
     pub owed: f64,
 }

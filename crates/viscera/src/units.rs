@@ -27,6 +27,8 @@ pub enum Dimension {
     Force,
     /// Newtons per metre: springs and attachments.
     Stiffness,
+    /// Pascals per metre: stiffness per area, of ties.
+    StiffnessPerArea,
     /// Radians; written in degrees.
     Angle,
 }
@@ -84,6 +86,11 @@ const UNITS: &[Unit] = &[
     unit("N/m", Dimension::Stiffness, (1.0, 1.0)),
     read_only("N/mm", Dimension::Stiffness, (1e3, 1.0)),
     unit("kN/m", Dimension::Stiffness, (1e3, 1.0)),
+    unit("Pa/mm", Dimension::StiffnessPerArea, (1e3, 1.0)),
+    unit("kPa/mm", Dimension::StiffnessPerArea, (1e6, 1.0)),
+    read_only("N/m^3", Dimension::StiffnessPerArea, (1.0, 1.0)),
+    read_only("Pa/m", Dimension::StiffnessPerArea, (1.0, 1.0)),
+    read_only("MPa/mm", Dimension::StiffnessPerArea, (1e9, 1.0)),
     unit("deg", Dimension::Angle, (PI, 180.0)),
     read_only("rad", Dimension::Angle, (1.0, 1.0)),
 ];
@@ -146,6 +153,7 @@ impl std::fmt::Display for Dimension {
             Self::Pressure => "a pressure",
             Self::Force => "a force",
             Self::Stiffness => "a stiffness",
+            Self::StiffnessPerArea => "a stiffness per area",
             Self::Angle => "an angle",
         })
     }
@@ -164,6 +172,7 @@ impl Dimension {
             Self::Pressure => "5 kPa",
             Self::Force => "0.5 N",
             Self::Stiffness => "200 N/m",
+            Self::StiffnessPerArea => "20 kPa/mm",
             Self::Angle => "30 deg",
         }
     }
@@ -382,6 +391,7 @@ mod tests {
             Dimension::Pressure,
             Dimension::Force,
             Dimension::Stiffness,
+            Dimension::StiffnessPerArea,
             Dimension::Angle,
         ] {
             assert!(dimension.parse(dimension.example()).is_ok());

@@ -11,15 +11,25 @@
 //!
 //! Everything here is in double precision, whatever the state's is.
 
+mod at_rest;
 pub mod law;
+mod meeting;
+mod pair;
 mod pressure;
+pub mod search;
 pub mod shape;
+pub mod skin;
 pub mod surface;
 mod touch;
 
+pub use at_rest::Overlap;
 pub use law::{Foundation, Friction};
+pub(crate) use meeting::{Marks, Moment, turn_normals};
+pub use pair::Kept;
+pub(crate) use pair::{Bond, Pair, from_edges};
 pub use pressure::VertexPressures;
 pub use shape::{Distance, Shape};
+pub use skin::{Skin, TissueContact};
 pub use surface::{Sample, sample_boundary, sample_embedded};
 pub use touch::{Felt, Moved, Placed, Side, Touch, Touching};
 

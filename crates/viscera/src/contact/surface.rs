@@ -70,14 +70,14 @@ pub fn sample_boundary(tets: &[[u32; 4]], positions: &[Vec3<f64>], cuts: u32) ->
 }
 
 /// Samples at the vertices of a surface that is embedded in the tetrahedra of one body, of which the first vertex and the
-/// first tetrahedron have these numbers; `positions` [m] are those of all bodies.
+/// first tetrahedron have these numbers, each with the number of its vertex; `positions` [m] are those of all bodies.
 pub fn sample_embedded(
     surface: &SurfaceMesh,
     embedding: &Embedding,
     positions: &[Vec3<f64>],
     first_vertex: u32,
     first_tet: u32,
-) -> Vec<Sample> {
+) -> Vec<(u32, Sample)> {
     let mut areas = vec![0.0; surface.vertices.len()];
     for triangle in &surface.triangles {
         let [a, b, c] = triangle.map(|v| surface.vertices[v as usize]);
@@ -85,15 +85,15 @@ pub fn sample_embedded(
         triangle.iter().for_each(|&v| areas[v as usize] += third);
     }
     let bound = embedding.corners().iter().zip(embedding.weights()).zip(embedding.tets());
-    let sampled = bound.zip(areas).filter(|(_, area)| *area > 0.0);
+    let sampled = (0..).zip(bound.zip(areas)).filter(|(_, (_, area))| *area > 0.0);
     sampled
-        .map(|(((corners, weights), tet), area)| {
+        .map(|(point, (((corners, weights), tet), area))| {
             let vertices = corners.map(|v| v + first_vertex);
             // The tissue's own edges: a finer surface makes it no stiffer.
             let places = vertices.map(|v| positions[v as usize]);
             let lengths = TET_EDGES.map(|[a, b]| (places[b] - places[a]).length());
             let edge = lengths.iter().sum::<f64>() / 6.0;
-            Sample { vertices, weights: *weights, area, edge, tet: tet + first_tet }
+            (point, Sample { vertices, weights: *weights, area, edge, tet: tet + first_tet })
         })
         .collect()
 }

@@ -12,6 +12,7 @@ mod parts;
 mod pieces;
 mod recovered;
 mod samples;
+mod skin;
 mod tets;
 
 use std::ops::Range;
@@ -27,6 +28,7 @@ pub(crate) use pieces::PIECE_BLOCKS;
 use pieces::in_pieces;
 pub(crate) use recovered::{Entry, Frames, PartRanges, RecoveredTables};
 pub(crate) use samples::LaidSample;
+pub(crate) use skin::LaidSkin;
 pub(crate) use tets::TetBlock;
 pub use tets::{LaidTet, TetSet};
 
@@ -70,6 +72,8 @@ pub struct Layout<S> {
     pub(crate) samples: Vec<LaidSample>,
     /// The part of each sample, in the model's order.
     pub(crate) sample_parts: Vec<u32>,
+    /// Where tissue meets tissue.
+    pub(crate) skin: Option<LaidSkin>,
     /// Where the tetrahedra of the stable neo-Hookean law are recovered-gradient tetrahedra.
     pub(crate) recovered: Option<RecoveredTables<S>>,
 }
@@ -146,7 +150,8 @@ impl<S: Real> Layout<S> {
             numbering: Arc::clone(numbering),
             parts: Arc::from(parts),
             sample_parts: samples::parts(model),
-            samples: samples::laid(model, numbering, &part_of),
+            samples: samples::laid(model, &model.samples, numbering, &part_of),
+            skin: LaidSkin::new(model, settings, numbering, &part_of),
             copy_offsets,
             recovered: None,
         };
@@ -252,6 +257,7 @@ impl<S: Real> Layout<S> {
             + size_of_val(&self.copy_offsets[..])
             + size_of_val(&self.samples[..])
             + size_of_val(&self.sample_parts[..])
+            + self.skin.as_ref().map_or(0, LaidSkin::bytes)
             + self.recovered.as_ref().map_or(0, RecoveredTables::bytes)
     }
 }

@@ -1,5 +1,6 @@
 //! Samples of the surface in the solver's numbering.
 
+use crate::contact::Sample;
 use crate::model::{Model, Numbering};
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
@@ -33,14 +34,14 @@ impl LaidSample {
     }
 }
 
-/// The samples of a model, part by part.
+/// Samples of a model, part by part.
 pub(super) fn laid<S: Real>(
     model: &Model<S>,
+    samples: &[Sample],
     numbering: &Numbering,
     part_of: &[u32],
 ) -> Vec<LaidSample> {
-    let mut samples: Vec<LaidSample> = model
-        .samples
+    let mut samples: Vec<LaidSample> = samples
         .iter()
         .enumerate()
         .map(|(number, sample)| {
@@ -61,6 +62,6 @@ pub(super) fn laid<S: Real>(
 
 /// The part of each sample, in the model's order: parts have the numbers that the model gives them.
 pub(super) fn parts<S: Real>(model: &Model<S>) -> Vec<u32> {
-    let part = |sample: &crate::contact::Sample| model.part_of(sample.vertices[0]) as u32;
+    let part = |sample: &Sample| model.part_of(sample.vertices[0]) as u32;
     model.samples.iter().map(part).collect()
 }

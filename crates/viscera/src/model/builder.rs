@@ -6,7 +6,8 @@ use super::elements::{ElementLists, Given};
 use super::numbering::Numbering;
 use super::{Body, MaterialConstants, Model, ModelError};
 use crate::coloring::ConstraintGraph;
-use crate::contact::{Sample, sample_boundary};
+use crate::contact::Overlap;
+use crate::contact::{Sample, Skin, TissueContact, sample_boundary};
 use crate::elements::attachment::Attachments;
 use crate::elements::kinds::{CONSTANTS, Constant, Kind, Legal};
 use crate::elements::list::KINDS;
@@ -31,6 +32,8 @@ pub struct ModelBuilder {
     elements: [Vec<Given>; KINDS],
     anchors: Vec<Vec3<f64>>,
     samples: Arc<Vec<Sample>>,
+    skin: Arc<Skin>,
+    tissue_contact: TissueContact,
 }
 
 impl ModelBuilder {
@@ -126,6 +129,30 @@ impl ModelBuilder {
         }
         self.samples = Arc::new(samples);
         Ok(())
+    }
+
+    /// Lets the surfaces of all bodies added so far meet: the outer faces of their tetrahedra. Bodies that are closer than the
+    /// thickness of contact at rest meet from there on; returns the closest two.
+    pub fn touch_tissue(&mut self, contact: &TissueContact) -> Option<Overlap> {
+        let mut skin = Skin::default();
+        for (number, body) in (0..).zip(&self.bodies) {
+            let first = body.tets.start as u32;
+            skin.add_boundary(number, (&self.tets[..body.tets.end], first), &self.positions);
+        }
+        self.set_skin(skin, contact)
+    }
+
+    /// The same with other surfaces, of bodies that have been added.
+    pub fn set_skin(&mut self, mut skin: Skin, contact: &TissueContact) -> Option<Overlap> {
+        let overlap = skin.finish(&self.tets, &self.positions, contact);
+        self.tissue_contact = *contact;
+        self.skin = Arc::new(skin);
+        overlap
+    }
+
+    /// Vertices of all tetrahedra added so far.
+    pub fn tets(&self) -> &[[u32; 4]] {
+        &self.tets
     }
 
     /// Samples of the surface taken so far.
@@ -225,6 +252,8 @@ impl ModelBuilder {
             elements: ElementLists::new(&self.elements),
             rest_anchors: self.anchors.iter().map(|anchor| anchor.cast()).collect(),
             samples: Arc::clone(&self.samples),
+            skin: Arc::clone(&self.skin),
+            tissue_contact: self.tissue_contact,
             revision: 0,
             numbering: Arc::new(numbering),
             part_numbers,

@@ -19,7 +19,8 @@ pub(crate) use numbering::{Numbering, Z_ORDER_BITS, z_order};
 
 pub use crate::material::MaterialConstants;
 
-use crate::contact::Sample;
+use crate::contact::skin::Site;
+use crate::contact::{Sample, Skin, TissueContact};
 use crate::material::{Compliance, MaterialModel};
 use crate::mesh::{edge_matrix, tet_volume};
 use crate::scalar::{Mat3, Real, Vec3};
@@ -139,6 +140,10 @@ pub struct Model<S> {
     pub rest_anchors: Vec<Vec3<S>>,
     /// Points of the surface that tools touch.
     pub samples: Arc<Vec<Sample>>,
+    /// The surface on which tissue meets tissue; empty where it does not.
+    pub skin: Arc<Skin>,
+    /// Which tissue meets which.
+    pub tissue_contact: TissueContact,
     /// Differs from model to model: whoever keeps numbers of vertices, or constants, keeps this beside them, and
     /// compares. Of two models of the same content it is the same.
     pub(crate) revision: u64,
@@ -184,6 +189,33 @@ impl<S: Real> Model<S> {
         let material = &self.materials[self.tet_materials[sample.tet as usize] as usize];
         let (lambda, mu) = (material.lame_lambda.to_f64(), material.lame_mu.to_f64());
         mu * (3.0 * lambda + 2.0 * mu) / (lambda + mu) / sample.edge
+    }
+
+    /// Whether tissue meets other tissue than its own body's, or is tied to it: what only the CPU computes.
+    pub(crate) fn ties_bodies(&self) -> bool {
+        let meets = self.tissue_contact.bodies && self.bodies.len() > 1;
+        !self.skin.ties.is_empty() || (meets && !self.skin.triangles.is_empty())
+    }
+
+    /// The same of each triangle of the skin: the mean of its samples', or of those at its corners.
+    pub(crate) fn skin_stiffness(&self) -> Vec<f64> {
+        let skin = &self.skin;
+        let mut of_points = vec![0.0; skin.points.len()];
+        let mut of_triangles = vec![0.0; skin.triangles.len()];
+        for (sample, site) in skin.samples.iter().zip(&skin.sites) {
+            let stiffness = self.sample_stiffness(sample);
+            match *site {
+                Site::Triangle(triangle) => of_triangles[triangle as usize] = stiffness,
+                Site::Point(point) => of_points[point as usize] = stiffness,
+            }
+        }
+        for (stiffness, triangle) in of_triangles.iter_mut().zip(&skin.triangles) {
+            if *stiffness == 0.0 {
+                let corners = triangle.map(|point| of_points[point as usize]);
+                *stiffness = (corners[0] + corners[1] + corners[2]) / 3.0;
+            }
+        }
+        of_triangles
     }
 
     /// The same for models of the same content, and another for others.
@@ -236,7 +268,19 @@ impl<S: Real> Model<S> {
         for x in &*self.places {
             x.to_array().into_iter().for_each(|value| add(value.to_bits()));
         }
-        for Sample { vertices, weights, area, edge, tet } in &*self.samples {
+        let TissueContact { itself, bodies, law } = self.tissue_contact;
+        [itself, bodies].iter().for_each(|&is_on| add(u64::from(is_on)));
+        [law.stiffness, law.thickness, law.friction].iter().for_each(|x| add(x.to_bits()));
+        self.skin.triangles.as_flattened().iter().for_each(|&point| add(point.into()));
+        for tie in &self.skin.ties {
+            [tie.sample, tie.triangle, tie.group].iter().for_each(|&number| add(number.into()));
+            let numbers =
+                tie.weights.iter().chain(&tie.rest).chain([&tie.stiffness, &tie.strength]);
+            numbers.for_each(|x| add(x.to_bits()));
+        }
+        for Sample { vertices, weights, area, edge, tet } in
+            self.samples.iter().chain(&self.skin.samples)
+        {
             vertices.iter().for_each(|&v| add(v.into()));
             weights.iter().chain([area, edge]).for_each(|value| add(value.to_bits()));
             add((*tet).into());
@@ -269,6 +313,8 @@ impl<S: Real> Model<S> {
             elements: ElementLists::new(&Default::default()),
             rest_anchors: Vec::new(),
             samples: Arc::default(),
+            skin: Arc::default(),
+            tissue_contact: TissueContact::NONE,
             revision: 0,
             numbering: Arc::default(),
             part_numbers: Vec::new(),
@@ -284,6 +330,7 @@ impl<S: Real> Model<S> {
             + size_of_val(&self.places[..])
             + size_of_val(&self.rest_anchors[..])
             + size_of_val(&self.samples[..])
+            + self.skin.bytes()
             + size_of_val(&self.rest_positions[..])
             + size_of_val(&self.masses[..])
             + size_of_val(&self.numbering.order[..])

@@ -7,9 +7,11 @@ use super::motion::{Force, ForceKey, Motion};
 use super::selector::{Patch, Selector};
 use super::tables::{
     BodyTable, ChangeTable, ForceTable, MaterialTable, MotionTable, PatchTable, SceneTable,
-    ShapeName, SpringTable, TimeSettings,
+    ShapeName, SpringTable, TieTable, TimeSettings,
 };
-use super::{Ball, Body, BodyShape, Change, Fixing, Region, Scene, SceneError, Spring, Written};
+use super::{
+    Ball, Body, BodyShape, Change, Fixing, Region, Scene, SceneError, Spring, Tie, Written,
+};
 use crate::material::{Material, MaterialModel};
 use crate::mesh::shapes::LIVER_SPACING;
 use crate::scalar::Vec3;
@@ -74,6 +76,8 @@ pub(super) fn build_scene(name: &str, tree: Node) -> Result<Scene, SceneError> {
         motions: build_motions(&bodies, &tables.motion)?,
         forces: build_forces(&bodies, &tables.force)?,
         springs: build_springs(&bodies, &tables.spring)?,
+        ties: build_ties(&bodies, &tables.tie)?,
+        contact: tables.contact,
         tools: build_instruments(&tables.tool)?,
         bodies,
         changes,
@@ -154,6 +158,29 @@ fn build_springs(
         });
     }
     Ok(springs)
+}
+
+fn build_ties(bodies: &[Body], tables: &[Placed<TieTable>]) -> Result<Vec<Tie>, SceneError> {
+    let mut ties: Vec<Tie> = Vec::new();
+    for (index, Placed { place, value }) in tables.iter().enumerate() {
+        let name = name_or_number(&value.name, "tie", index);
+        check_name(&ties, |tie| &tie.name, &name, "tie", place)?;
+        let end = |table: &Placed<PatchTable>, which: &str| {
+            let purpose = format!("{}, end `{which}`,", purpose("tie", &value.name, index));
+            build_patch(bodies, &table.value, purpose, &table.place)
+        };
+        let (from, to) = (end(&value.from, "from")?, end(&value.to, "to")?);
+        if from.body == to.body {
+            return Err(SceneError::TieToItself {
+                place: value.to.place.clone(),
+                purpose: purpose("tie", &value.name, index),
+                body: bodies[to.body].name.clone(),
+            });
+        }
+        let TieTable { distance, stiffness, strength, .. } = *value;
+        ties.push(Tie { name, from, to, distance, stiffness, strength, place: place.clone() });
+    }
+    Ok(ties)
 }
 
 /// In the order of their times, with their places.

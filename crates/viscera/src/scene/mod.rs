@@ -50,8 +50,9 @@ pub use motion::{Force, ForceKey, Motion};
 
 pub use crate::scalar::rigid::RigidTransform;
 pub use selector::{Patch, SelectError, Selector, nearest_pair};
-pub use tables::{OutputSettings, TimeSettings, WorldSettings};
+pub use tables::{ContactSettings, OutputSettings, TimeSettings, WorldSettings};
 
+use crate::contact::{ContactLaw, TissueContact};
 use crate::material::{Material, MaterialError};
 use crate::scalar::Vec3;
 use crate::settings::{Node, Place, SettingError, SolverSettings};
@@ -88,6 +89,10 @@ pub struct Scene {
     pub forces: Vec<Force>,
     /// Springs between two vertices.
     pub springs: Vec<Spring>,
+    /// Ties between the surfaces of two bodies.
+    pub ties: Vec<Tie>,
+    /// How tissue meets tissue.
+    pub contact: ContactSettings,
     /// Tools that touch tissue, and fixed obstacles.
     pub tools: Vec<Instrument>,
     /// Settings that change while it runs, times ascending.
@@ -231,6 +236,33 @@ pub struct Spring {
     pub rest_length: Option<f64>,
 }
 
+/// Connective tissue between the surfaces of two bodies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tie {
+    /// The name, or "tie 0" and so on.
+    pub name: String,
+    /// The patch whose points are tied.
+    pub from: Patch,
+    /// What they are tied to, of another body.
+    pub to: Patch,
+    /// Points further apart at rest are not tied [m].
+    pub distance: f64,
+    /// Stiffness per area [Pa/m].
+    pub stiffness: f64,
+    /// Stress at which a point tears off [Pa]; `None` where nothing tears it.
+    pub strength: Option<f64>,
+    /// Where the scene has it.
+    pub place: Place,
+}
+
+impl ContactSettings {
+    /// As models have it.
+    pub fn tissue(&self) -> TissueContact {
+        let Self { self_: itself, bodies, friction, stiffness, thickness } = *self;
+        TissueContact { itself, bodies, law: ContactLaw { stiffness, thickness, friction } }
+    }
+}
+
 /// Why a text is not a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -296,6 +328,16 @@ pub enum SceneError {
         body: String,
         /// What is wrong and what to write.
         problem: String,
+    },
+    /// A tie between patches of one body.
+    #[error("{place}: {purpose} ties body `{body}` to itself; name another body in `to`")]
+    TieToItself {
+        /// Where the tie is.
+        place: Place,
+        /// What it is.
+        purpose: String,
+        /// The body.
+        body: String,
     },
     /// A tool without sizes, or with keys that do not go together.
     #[error("{place}: {purpose}: {problem}")]

@@ -35,6 +35,10 @@ settings_table! {
         force: Vec<Placed<ForceTable>> = (Vec::new()), tables::<ForceTable>();
         /// Springs between two vertices.
         spring: Vec<Placed<SpringTable>> = (Vec::new()), tables::<SpringTable>();
+        /// Ties between the surfaces of two bodies.
+        tie: Vec<Placed<TieTable>> = (Vec::new()), tables::<TieTable>();
+        /// How tissue meets tissue.
+        contact: ContactSettings = (ContactSettings::default()), table::<ContactSettings>();
         /// Tools that touch tissue, and fixed obstacles.
         tool: Vec<Placed<ToolTable>> = (Vec::new()), tables::<ToolTable>();
         /// Settings that change while the scene runs.
@@ -67,6 +71,24 @@ settings_table! {
     pub struct WorldSettings {
         /// Gravity: an acceleration downwards (along -z), or its three components.
         gravity: Vec3<f64> = (vec3(0.0, 0.0, -9.81)), Gravity;
+    }
+}
+
+settings_table! {
+    #[default]
+    /// How tissue meets tissue: bodies do not enter each other, nor themselves. Tools have keys of their own. Where bodies are
+    /// closer than `thickness` at rest, contact begins at that distance.
+    pub struct ContactSettings {
+        /// Whether a body meets itself, as in a fold.
+        self_: bool = true, truth();
+        /// Whether bodies meet each other.
+        bodies: bool = true, truth();
+        /// Coefficient of friction between tissues; wet tissue is slippery.
+        friction: f64 = 0.1, number(at_least(0.0).up_to(5.0));
+        /// Stiffness of the contact, in units of each tissue's Young's modulus over the length of its edges.
+        stiffness: f64 = 10.0, number(at_least(1e-3).up_to(1e6));
+        /// Distance at which contact begins.
+        thickness: f64 = 1e-3, quantity(Dimension::Length, at_least(1e-6).up_to(1.0));
     }
 }
 
@@ -368,6 +390,26 @@ settings_table! {
         stiffness: f64 = required, quantity(Dimension::Stiffness, STIFFNESS);
         /// Length without force; the distance at rest where unset.
         rest_length: Option<f64> = None, optional(quantity(Dimension::Length, at_least(0.0)));
+    }
+}
+
+settings_table! {
+    /// Connective tissue between the surfaces of two bodies: each point of one patch is tied to the nearest point of the
+    /// other, as far as it is near enough. It pulls and pushes in every direction from where it is at rest, and tears.
+    pub(super) struct TieTable {
+        /// A name for messages and results.
+        name: Option<String> = None, optional(name());
+        /// The patch whose points are tied.
+        from: Placed<PatchTable> = required, placed(table::<PatchTable>());
+        /// The patch that they are tied to, of another body.
+        to: Placed<PatchTable> = required, placed(table::<PatchTable>());
+        /// Points that are further from the other patch at rest are not tied.
+        distance: f64 = 3e-3, quantity(Dimension::Length, SIZE);
+        /// Stiffness per area: the pull per area and distance. Loose connective tissue has about that of 5 kPa over 1 mm.
+        stiffness: f64 = 5e6,
+            quantity(Dimension::StiffnessPerArea, at_least(1.0).up_to(1e15));
+        /// Force per area at which a point tears off; never where unset.
+        strength: Option<f64> = None, optional(quantity(Dimension::Pressure, at_least(1e-3).up_to(1e12)));
     }
 }
 

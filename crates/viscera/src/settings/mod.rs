@@ -265,7 +265,8 @@ pub(crate) fn tidy_doc(doc: &str) -> String {
 
 /// `r#box` is the key `box`.
 pub(crate) fn key_name(field: &'static str) -> &'static str {
-    field.trim_start_matches("r#")
+    // Some words of the language can be no field's name: `r#move` is "move", `self_` is "self".
+    field.trim_start_matches("r#").trim_end_matches('_')
 }
 
 /// Reads a field, falling back on its declared default.

@@ -83,6 +83,7 @@ impl Assembly {
         assembly.add_patches(scene)?;
         assembly.add_tools(scene, load)?;
         assembly.take_samples()?;
+        assembly.take_skin(scene)?;
         assembly.check_tools_outside()?;
         assembly.note_overlaps(scene);
         assembly.note_loose_parts(scene);
@@ -108,6 +109,8 @@ impl Assembly {
         finer.add_patches(scene)?;
         finer.tools.clone_from(&self.tools);
         finer.take_samples()?;
+        finer.take_skin(scene)?;
+        finer.notes.clear();
         Ok(finer)
     }
 

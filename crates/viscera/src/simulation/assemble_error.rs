@@ -135,6 +135,36 @@ pub enum AssembleError {
         /// The deepest sample's [m].
         depth: f64,
     },
+    /// Bodies that are deep inside each other at rest.
+    #[error(
+        "bodies `{one}` and `{other}` overlap by {:.2} mm at rest, more than contact is thick ({:.2} mm); move one of them, \
+         or let bodies pass through each other with `contact.bodies = false`", 1e3 * .depth, 1e3 * .thickness
+    )]
+    BodiesOverlap {
+        /// One of them.
+        one: String,
+        /// The other.
+        other: String,
+        /// How deep [m].
+        depth: f64,
+        /// Of contact [m].
+        thickness: f64,
+    },
+    /// A tie between patches that are far apart.
+    #[error(
+        "{place}: tie `{tie}` ties nothing: no point of `from` is within {:.2} mm of `to`, the nearest is {:.2} mm away; raise \
+         `distance`, or choose other patches", 1e3 * .distance, 1e3 * .nearest
+    )]
+    TiesNothing {
+        /// Where the scene has it.
+        place: Place,
+        /// The tie.
+        tie: String,
+        /// Its distance [m].
+        distance: f64,
+        /// Of the nearest points [m].
+        nearest: f64,
+    },
     /// The model cannot be built.
     #[error(transparent)]
     Model(#[from] ModelError),

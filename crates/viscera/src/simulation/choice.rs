@@ -32,6 +32,12 @@ impl<S: Real> Backend<S> {
             (device, _) if !model.samples.is_empty() => {
                 Err(SimulationError::ToolsOnDevice { device: device.clone() })
             }
+            (DeviceRequest::Auto, _) if model.ties_bodies() => {
+                cpu("contact between bodies is computed on the CPU")
+            }
+            (device, _) if model.ties_bodies() => {
+                Err(SimulationError::BodiesOnDevice { device: device.clone() })
+            }
             (DeviceRequest::Auto, Method::Auto | Method::QuasiNewton) => {
                 cpu("the quasi-Newton method is computed by the CPU")
             }

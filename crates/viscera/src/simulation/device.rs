@@ -125,6 +125,20 @@ impl<S: Real> Backend<S> {
         }
     }
 
+    /// How many times as many substeps than `count` a frame [s] needs, of which these are the inputs at the end, so that
+    /// tissue does not pass through tissue.
+    pub fn times_for_contact(
+        &mut self,
+        state: &State<S>,
+        inputs: &Inputs<S>,
+        (frame, count): (f64, u32),
+    ) -> u32 {
+        match &mut self.engine {
+            Engine::Cpu(solver) => solver.times_for_contact(state, inputs, frame, count),
+            Engine::Device(_) => 1,
+        }
+    }
+
     pub fn layout(&self) -> &Layout<S> {
         match &self.engine {
             Engine::Cpu(solver) => solver.layout(),

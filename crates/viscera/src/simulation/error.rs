@@ -53,6 +53,15 @@ pub enum SimulationError {
         /// What was asked for.
         device: DeviceRequest,
     },
+    /// A device was asked for in a scene with several bodies, which meet.
+    #[error(
+        "`device = \"{device}\"`: contact between bodies is computed on the CPU; use `device = \"cpu\"` or `device = \"auto\"`, \
+         or let bodies pass through each other with `contact.bodies = false` and no ties"
+    )]
+    BodiesOnDevice {
+        /// What was asked for.
+        device: DeviceRequest,
+    },
     /// The method cannot do it.
     #[error(transparent)]
     Step(#[from] StepError),

@@ -21,6 +21,7 @@ mod rest;
 mod saved;
 mod sent;
 mod shadowed;
+mod skin;
 mod tool_forces;
 mod touchable;
 
@@ -456,16 +457,18 @@ fn check_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationErr
         DeviceRequest::Cpu | DeviceRequest::Auto => None,
         device => Some(device.clone()),
     };
+    let meets = scene.bodies.len() > 1 && scene.contact.bodies || !scene.ties.is_empty();
     match on_device.or(callers_device.then_some(DeviceRequest::Gpu)) {
         Some(device) if !scene.tools.is_empty() => Err(SimulationError::ToolsOnDevice { device }),
+        Some(device) if meets => Err(SimulationError::BodiesOnDevice { device }),
         _ => Ok(()),
     }
 }
 
 /// The method takes contact.
 fn check_contact(scene: &Scene, solver: &SolverSettings) -> Result<(), StepError> {
-    let takes_contact = solver.method != Method::Xpbd || solver.rebase;
-    if takes_contact || scene.tools.is_empty() {
+    let meets = scene.bodies.len() > 1 && scene.contact.bodies || !scene.ties.is_empty();
+    if solver.takes_contact() || (scene.tools.is_empty() && !meets) {
         Ok(())
     } else {
         Err(StepError::ContactNeedsRebase)

@@ -11,7 +11,7 @@ use super::device::Backend;
 use super::error::LiveError;
 use super::holding::GraspOrigins;
 use super::instruments::{Instruments, Jaw};
-use crate::contact::Touch;
+use crate::contact::{Kept, Touch};
 use crate::layout::Layout;
 use crate::model::for_each_kind;
 use crate::scalar::rigid::RigidTransform;
@@ -20,7 +20,7 @@ use crate::settings::Method;
 use crate::state::{ContactState, Learned, LearnedPart, State};
 
 /// Raised whenever the bytes mean something else.
-const FORMAT: u32 = 8;
+const FORMAT: u32 = 9;
 
 /// Methods by the number that stands for them; a new one is added at the end.
 const METHODS: [Method; 4] = [Method::Auto, Method::Xpbd, Method::Explicit, Method::QuasiNewton];
@@ -112,6 +112,9 @@ struct Saved {
     /// Of each tool the columns of its rotation, and its place.
     tools: Vec<[[f64; 3]; 4]>,
     touches: Vec<SavedTouch>,
+    /// Of tissue on tissue.
+    pressed: Vec<Kept>,
+    torn: Vec<bool>,
     /// Jaws that follow a force, tool by tool.
     jaws: Vec<Jaw>,
 }
@@ -198,6 +201,8 @@ impl<S: Real> Simulation<S> {
             learned: learned.parts.clone(),
             taken: self.taken.all().iter().map(|taken| taken.as_deref().map(bare)).collect(),
             tools: contact.poses.iter().map(bare_pose).collect(),
+            pressed: contact.pairs.clone(),
+            torn: contact.torn.clone(),
             touches: contact.touches.iter().map(SavedTouch::of).collect(),
             jaws: self.instruments.jaws().to_vec(),
         };
@@ -256,6 +261,8 @@ impl<S: Real> Simulation<S> {
             contact: ContactState {
                 poses: saved.tools.iter().map(dressed_pose).collect(),
                 touches: saved.touches.iter().map(SavedTouch::back).collect(),
+                pairs: saved.pressed,
+                torn: saved.torn,
             },
         });
         self.inputs = self.inputs_at(self.time());
@@ -290,7 +297,13 @@ impl<S: Real> Simulation<S> {
         let is_known = |touch: &SavedTouch| {
             (touch.sample as usize) < samples && (touch.tool as usize) < saved.tools.len()
         };
-        saved.touches.iter().all(is_known) && saved.jaws.len() == self.scene.tools.len()
+        let skin = &self.model.skin;
+        let is_there = |kept: &Kept| {
+            (kept.sample as usize) < skin.samples.len()
+                && (kept.triangle as usize) < skin.triangles.len()
+        };
+        let fits = saved.pressed.iter().all(is_there) && saved.torn.len() <= skin.ties.len();
+        fits && saved.touches.iter().all(is_known) && saved.jaws.len() == self.scene.tools.len()
     }
 
     /// Whether each motion has as many vertices as were taken hold of.

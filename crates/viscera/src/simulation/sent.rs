@@ -88,6 +88,10 @@ impl<S: Real> Simulation<S> {
         let (start, end) = (self.time(), (self.frame + 1) as f64 * self.scene.time.frame);
         let Self { instruments, assembly, substeps, .. } = self;
         let substeps = instruments.substeps(&assembly.tools, [start, end], *substeps);
+        let Self { scene, assembly, taken, state, inputs, backend, .. } = self;
+        taken.act(scene, assembly, end, inputs);
+        let of_frame = (scene.time.frame, substeps);
+        let substeps = substeps * backend.times_for_contact(state, inputs, of_frame);
         let dt = substep_dt(&self.scene, substeps);
         self.divided = substeps;
         self.call_shadow();

@@ -68,7 +68,8 @@ impl Assembly {
         if body.has_fine_surface {
             let AssembledBody { surface, embedding, .. } = body;
             let positions = self.builder.positions();
-            return sample_embedded(surface, embedding, positions, first_vertex, first_tet);
+            let samples = sample_embedded(surface, embedding, positions, first_vertex, first_tet);
+            return samples.into_iter().map(|(_, sample)| sample).collect();
         }
         let (tets, positions) = (body.mesh.tets(), body.mesh.vertices());
         let edge = mean_edge(tets, positions);

@@ -74,8 +74,8 @@ pub enum StepError {
     NoSamples,
     /// The method cannot take contact.
     #[error(
-        "contact is part of XPBD's rebase: with `rebase = false` tools touch nothing; leave out `rebase`, or use \
-         `method = \"quasi_newton\"`"
+        "contact is part of XPBD's rebase: with `rebase = false` tools and bodies touch nothing; leave out `rebase`, use \
+         `method = \"quasi_newton\"`, or leave out tools and set `contact.bodies = false`"
     )]
     ContactNeedsRebase,
     /// Devices do not compute contact.

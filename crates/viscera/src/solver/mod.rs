@@ -48,6 +48,7 @@ use plan::Plan;
 pub(crate) use quasi_newton::{choose, expected_motion_error};
 pub use report::StepReport;
 pub use shadow::Shadow;
+use step::contacts::ContactStep;
 use step::data::Step;
 pub use step::energy::Ledger;
 #[cfg(feature = "gpu")]
@@ -57,6 +58,12 @@ pub use step::tissue::TISSUE_WGSL;
 pub use step::tissue::Tissue;
 pub use step::{balance, recovered};
 pub use xpbd::acceleration;
+
+/// Surfaces come closer by so many thicknesses of contact at most in a step of a frame that is divided for it,
+const MOST_APPROACHED: f64 = 2.0;
+
+/// which has so many times as many steps at most.
+const MOST_DIVIDED: f64 = 16.0;
 
 /// A solver for one model. All memory is taken when it is built; a step allocates nothing, but for
 /// every 63rd step of several threads, which exchanges a block of the queue that leads to them, for steps of the
@@ -232,7 +239,8 @@ impl<S: Real> Solver<S> {
         dt: f64,
     ) -> Result<(), StepError> {
         check_elements(&self.settings)?;
-        if !inputs.tools.is_empty() && !self.settings.takes_contact() {
+        let meets = !inputs.tools.is_empty() || model.ties_bodies();
+        if meets && !self.settings.takes_contact() {
             return Err(StepError::ContactNeedsRebase);
         }
         check_model(&self.layout, model)?;
@@ -282,6 +290,30 @@ impl<S: Real> Solver<S> {
             (Count::Auto, Method::Explicit) => explicit::substeps_for(self.stable_step(), frame),
             _ => self.settings.substeps(),
         }
+    }
+
+    /// How many times as many steps a frame [s] needs that would have `count` of them, so that tissue does not come closer to
+    /// tissue by more than two thicknesses of contact in one. `inputs` are those of the frame's end.
+    pub(crate) fn times_for_contact(
+        &mut self,
+        state: &State<S>,
+        inputs: &Inputs<S>,
+        frame: f64,
+        count: u32,
+    ) -> u32 {
+        let Self { layout, memory, .. } = self;
+        let Some(skin) = &layout.skin else { return 1 };
+        let free = MOST_APPROACHED * skin.contact.law.thickness * f64::from(count);
+        let data = &mut memory.data;
+        data.read_positions(layout, &state.positions);
+        for (velocity, &user) in data.velocities.iter_mut().zip(&layout.numbering.order) {
+            *velocity = state.velocities[user as usize];
+        }
+        let of_frame = ContactStep { layout, tools: &[], pins: &inputs.pins, dt: frame };
+        let places = (of_frame.places(&data.points), &data.velocities[..]);
+        let pairs = &mut data.constants.contacts.pairs;
+        let way = pairs.approach(&of_frame, places, free);
+        (way / free).min(MOST_DIVIDED).ceil().max(1.0) as u32
     }
 
     /// Force and torque between each tool of the last step and what it touches, at the end of that step; in the order of

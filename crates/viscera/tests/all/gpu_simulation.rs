@@ -13,6 +13,9 @@ use viscera::solver::gpu::{GpuError, StepCost, baseline, shortfall};
 const SCENE: &str = r#"
 time = { duration = "1 s", velocity_factor = 0.9 }
 
+[contact]
+bodies = false
+
 [[body]]
 name = "upper"
 shape = "block"

@@ -14,6 +14,9 @@ use viscera::simulation::{Assembly, ResumeError, Simulation};
 const SCENE: &str = r#"
 time = { duration = "1 s", velocity_factor = 0.97 }
 
+[contact]
+bodies = false
+
 [[body]]
 name = "bar"
 shape = "block"

@@ -159,11 +159,13 @@ impl<S: Real> Memory<S> {
         let limits = |number: usize, constants: &StepConstants<S>| {
             small_steps[number].was_violent
                 || constants.contacts.gift(number).is_near
-                || constants.holds(number, &model.parts[number])
+                || constants.rests(number, &model.parts[number])
         };
         self.energies.limit(step, data, limits, |_, _| {});
         for (number, part) in state.learned.parts.iter_mut().enumerate() {
-            part.owed = self.energies.left(number, SWING);
+            // Once for a group.
+            let is_first = data.constants.groups.leads(number);
+            part.owed = if is_first { self.energies.left(number, SWING) } else { 0.0 };
         }
         for pin in &step.inputs.pins {
             let v = model.numbering.of(pin.vertex);
@@ -177,9 +179,12 @@ impl<S: Real> Memory<S> {
     fn evaluate(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
         let StepData { constants, points, .. } = data;
         constants.contacts.place(&step.contact(), 1.0);
-        for (number, small) in self.small_steps.iter().enumerate() {
-            let step = Step { dt: small.dt, ..*step };
+        let leads = |number: &usize| constants.groups.leads(*number);
+        for number in (0..self.small_steps.len()).filter(leads) {
+            let step = Step { dt: self.small_steps[number].dt, ..*step };
             self.evaluator.evaluate(constants, &step, points, number);
+        }
+        for number in 0..self.small_steps.len() {
             self.evaluator.add_recovered(constants, step.layout, points, number);
         }
     }

@@ -31,6 +31,8 @@ use crate::solver::inputs::Inputs;
 use crate::solver::plan::{Flag, Node, Plan, Repeat, Times};
 use crate::solver::step::data::{Step, StepConstants, StepData, copies_of};
 use crate::solver::step::energy::{Energies, Ledger};
+use crate::solver::step::groups::Groups;
+use crate::solver::step::momentum::keep_spin;
 use crate::solver::step::potential::Evaluator;
 use crate::solver::step::predict::{Tethers, load_tethers};
 use crate::solver::step::stage::StepStage;
@@ -40,7 +42,7 @@ use crate::state::State;
 use forces::Pieces;
 #[cfg(feature = "gpu")]
 pub use present::calm_ahead;
-use present::{AtRest, SmallSteps};
+use present::{AtRest, Move, SmallSteps};
 pub use stability::{Stability, growth, small_steps, substeps_for};
 use stage::ExplicitStage;
 
@@ -73,8 +75,9 @@ pub struct Memory<S> {
     at_rest: AtRest<S>,
     /// Of each part.
     small_steps: Vec<SmallSteps>,
-    /// What remains of the step, for each part [s].
-    remains: Vec<f64>,
+    /// The largest `(omega h)^2` of each part, and what it does in its next small step.
+    stiffest: Vec<f64>,
+    moves: Vec<Move>,
     /// The small step that the loads of each part are for [s].
     of_loads: Vec<f64>,
     /// Velocities at the start of the step [m/s].
@@ -94,7 +97,8 @@ impl<S: Real> Memory<S> {
             at_rest: AtRest::new(layout, &stability),
             stability,
             small_steps: vec![SmallSteps::default(); layout.part_count()],
-            remains: vec![0.0; layout.part_count()],
+            stiffest: vec![0.0; layout.part_count()],
+            moves: vec![Move::default(); layout.part_count()],
             of_loads: vec![0.0; layout.part_count()],
             start_velocities: vec![Vec3::ZERO; layout.vertex_count()],
             ends: vec![
@@ -118,7 +122,8 @@ impl<S: Real> Memory<S> {
             + self.stability.bytes()
             + self.pieces.bytes()
             + self.at_rest.bytes()
-            + size_of_val(&self.remains[..])
+            + size_of_val(&self.stiffest[..])
+            + size_of_val(&self.moves[..])
             + size_of_val(&self.of_loads[..])
             + size_of_val(&self.ends[..])
             + self.evaluator.bytes()
@@ -141,6 +146,8 @@ impl<S: Real> Memory<S> {
             ExplicitStage::LoadForces => self.load_forces(step, data),
             ExplicitStage::Advance => self.advance(step, data),
             ExplicitStage::End => {
+                let StepData { constants, points, velocities, .. } = data;
+                keep_spin(step, constants, points, &self.start_velocities, velocities);
                 self.limit_energy(step, data, state);
                 self.end(step, data);
             }
@@ -179,6 +186,7 @@ impl<S: Real> Memory<S> {
         if state.learned.parts.len() != model.part_count() {
             state.learned.clear(0, model.vertex_count(), model.part_count());
         }
+        SmallSteps::pool(&mut self.small_steps, &data.constants.groups);
         self.begin_energy(step, data, &state.learned);
         self.start(step, data);
     }
@@ -197,7 +205,11 @@ impl<S: Real> Memory<S> {
             let part = &model.parts[number];
             constants.contacts.begin_again(number);
             let stiffest = at_rest.gather(constants, model, part, small.dt, loads);
-            small.begin(stability, stiffest, constants.holds(number, part));
+            small.begin(stability, stiffest, constants.rests(number, part));
+        }
+        SmallSteps::pool(small_steps, &constants.groups);
+        for (number, small) in small_steps.iter().enumerate().filter(|(_, small)| small.left > 0) {
+            let part = &model.parts[number];
             if model.is_viscous() {
                 drift(constants, part, points, velocities, -0.5 * small.dt, true);
                 put_strains(constants, model, number, points, S::ZERO);
@@ -268,9 +280,6 @@ impl<S: Real> Memory<S> {
                 continue;
             }
             let looks = small.looks();
-            // In the middle of the small step.
-            let left = small.dt * (f64::from(small.left) - 0.5);
-            constants.contacts.place(&step.contact(), (1.0 - left / step.dt).clamp(0.0, 1.0));
             let small = Step { dt: small.dt, ..*step };
             let moments = Moments {
                 anchors: step.inputs.anchors_of(&step.layout.rest_anchors),
@@ -280,10 +289,6 @@ impl<S: Real> Memory<S> {
             let places = (&points[..], &self.at_rest);
             small_steps.is_inverted =
                 self.pieces.load(constants, &small, &moments, (number, looks), places, loads);
-            // Contact is not viscous: of `h^2 (w_t^2 + w_c^2)/4 + h eta w_t^2/2 <= 1` its part is less than a tissue's.
-            let share = small.dt / (small.dt + 2.0 * self.stability.viscosity(number));
-            let of_step = (&step.contact(), small.dt);
-            constants.contacts.add_forces_in_motion(of_step, number, points, share, loads);
             let squared = S::from_f64(small.dt * small.dt);
             for tether in constants.tethers_of(&step.layout.parts[number]) {
                 let force = tether.force(points[tether.vertex].vec3());
@@ -291,23 +296,37 @@ impl<S: Real> Memory<S> {
                 loads[copy].add(Point::new(force * squared, tether.stiffness * squared));
             }
         }
+        // Contact with other tissue bears on parts whose own forces are there by now.
+        for (number, small) in self.small_steps.iter().enumerate().filter(|(_, s)| s.left > 0) {
+            // In the middle of the small step.
+            let left = small.dt * (f64::from(small.left) - 0.5);
+            constants.contacts.place(&step.contact(), (1.0 - left / step.dt).clamp(0.0, 1.0));
+            // Contact is not viscous: of `h^2 (w_t^2 + w_c^2)/4 + h eta w_t^2/2 <= 1` its part is less than a tissue's.
+            let share = small.dt / (small.dt + 2.0 * self.stability.viscosity(number));
+            let of_step = (&step.contact(), small.dt);
+            constants.contacts.add_forces_in_motion(of_step, number, points, share, loads);
+        }
     }
 
     /// [`ExplicitStage::Advance`].
     fn advance(&mut self, step: &Step<'_, S>, data: &mut StepData<S>) {
         let model = step.layout;
         let StepData { constants, points, velocities, loads } = data;
-        let Self { stability, at_rest, small_steps, remains, of_loads, .. } = self;
+        let Self { stability, at_rest, small_steps, stiffest, moves, of_loads, .. } = self;
         for (number, part) in model.parts.iter().enumerate() {
-            let small = &mut small_steps[number];
-            if small.left == 0 {
+            let h = small_steps[number].dt;
+            if small_steps[number].left > 0 {
+                of_loads[number] = h;
+                stiffest[number] = at_rest.gather(constants, model, part, h, loads);
+            }
+        }
+        SmallSteps::pool(small_steps, &constants.groups);
+        advance_groups(stability, &constants.groups, stiffest, small_steps, moves);
+        for (number, part) in model.parts.iter().enumerate() {
+            if moves[number].kick == 0.0 {
                 continue;
             }
-            let h = small.dt;
-            of_loads[number] = h;
-            let largest = at_rest.gather(constants, model, part, h, loads);
-            let now = small.advance(stability, largest);
-            remains[number] = now.remains;
+            let (h, now) = (of_loads[number], moves[number]);
             let (kick, rate) = (S::from_f64(now.kick), S::from_f64(now.kick / (h * h)));
             let [back, ahead] = now.ahead;
             let (back, drift) = (S::from_f64(back), S::from_f64(now.drift + ahead));
@@ -335,8 +354,38 @@ impl<S: Real> Memory<S> {
         }
         for pin in &step.inputs.pins {
             let v = model.numbering.of(pin.vertex);
-            let time = step.dt - remains[model.part_at(v)];
+            let time = step.dt - moves[model.part_at(v)].remains;
             lead(points, velocities, &constants.previous, (v, pin.target), time, step.dt);
+        }
+    }
+}
+
+/// The next small step of all parts that have one, the same for those of a group; others do not move.
+fn advance_groups(
+    stability: &Stability,
+    groups: &Groups,
+    stiffest: &[f64],
+    small_steps: &mut [SmallSteps],
+    moves: &mut [Move],
+) {
+    for lead in (0..moves.len()).filter(|&part| groups.leads(part)) {
+        if small_steps[lead].left == 0 {
+            groups.of(lead).for_each(|part| moves[part].kick = 0.0);
+            continue;
+        }
+        let advanced = groups.of(lead).map(|part| {
+            let mut small = small_steps[part];
+            let now = small.advance(stability, stiffest[part]);
+            (small, now)
+        });
+        let shorter = |a: (SmallSteps, Move), b: (SmallSteps, Move)| {
+            let now = if b.0.left > a.0.left { b.1 } else { a.1 };
+            (a.0.together(b.0), now)
+        };
+        if let Some((small, now)) = advanced.reduce(shorter) {
+            for part in groups.of(lead) {
+                (small_steps[part], moves[part]) = (small.of(part), now);
+            }
         }
     }
 }

@@ -23,6 +23,7 @@ use crate::scalar::lanes::{Eight, LANES, Point};
 use crate::scalar::{Mat3, Real};
 use crate::solver::cpu::threads::Shared;
 use crate::solver::step::data::{StepConstants, copies_of};
+use crate::solver::step::groups::Groups;
 
 /// The share of the largest stable step of the present shape above which small steps are divided anew. Larger ones follow
 /// violent motion less well, since stiffness grows on until the next; with smaller ones more scenes leave the steps that
@@ -182,7 +183,7 @@ pub struct SmallSteps {
 }
 
 /// What a part does in the middle of a small step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Move {
     /// The time for which forces act [s].
     pub kick: f64,
@@ -202,6 +203,29 @@ impl SmallSteps {
         let small = dt / f64::from(count);
         let shortest = small / SHORTEST;
         Self { part, dt: small, left: count, shortest, ..Self::default() }
+    }
+
+    /// Of two parts that touch: the shorter small steps, and violent motion where one is in it.
+    pub fn together(self, other: Self) -> Self {
+        let chosen = if other.left > self.left { other } else { self };
+        Self {
+            is_inverted: self.is_inverted || other.is_inverted,
+            was_violent: self.was_violent || other.was_violent,
+            ..chosen
+        }
+    }
+
+    /// Parts of a group take the same small steps.
+    pub fn pool(all: &mut [Self], groups: &Groups) {
+        groups.pool(all, Self::together);
+        for (number, small) in all.iter_mut().enumerate() {
+            *small = small.of(number);
+        }
+    }
+
+    /// The same small steps, of another part.
+    pub fn of(self, part: usize) -> Self {
+        Self { part, ..self }
     }
 
     /// No step has more that would have so many at rest: divisions are rounded up, some a little below the shortest.

@@ -13,12 +13,15 @@
 use super::parts::{Phase, Progress};
 use super::vectors::{Combination, Factors, MOST_DOTS};
 use super::{Memory, Pair, vectors};
+use std::ops::Range;
+
 use crate::layout::{Layout, Part};
 use crate::scalar::{Real, Vec3};
 use crate::settings::MOST_HISTORY;
 use crate::solver::cpu::threads::{Shared, Workers};
-use crate::solver::step::data::{Step, StepData};
-use crate::state::Learned;
+use crate::solver::step::data::{Step, StepConstants, StepData};
+use crate::solver::step::groups::Groups;
+use crate::state::{Learned, LearnedPart};
 
 /// Of the bound of the curvature along a first direction this much counts at least: where the exact curvature nearly
 /// vanishes, or is negative, the step would have no end.
@@ -32,12 +35,13 @@ impl<S: Real> Memory<S> {
     pub(super) fn precondition(
         &mut self,
         step: &Step<'_, S>,
-        workers: &Workers,
+        data: &StepData<S>,
         learned: &mut Learned<S>,
     ) {
+        let StepConstants { workers, groups, .. } = &data.constants;
+        let is_new = |progress: &Progress| progress.acts() && progress.accepted;
         for (number, part) in step.layout.parts.iter().enumerate() {
-            let progress = self.parts[number];
-            if !(progress.acts() && progress.accepted) {
+            if !is_new(&self.parts[number]) {
                 continue;
             }
             let range = part.vertices.clone();
@@ -58,63 +62,79 @@ impl<S: Real> Memory<S> {
                         (*image, *z) = (*new - *z, *new);
                     }
                 });
-                self.keep_pair(step.layout, workers, number, learned);
             } else {
                 let Self { trial_z, z, .. } = self;
                 z[range.clone()].copy_from_slice(&trial_z[range]);
             }
         }
+        for number in 0..step.layout.part_count() {
+            let keeps = is_new(&self.parts[number]) && self.has_new_pair[number];
+            if keeps && groups.leads(number) {
+                self.keep_pair(step.layout, (workers, groups), number, learned);
+            }
+        }
     }
 
-    /// Takes over the pair that [`Memory::judge`] has left behind the newest one, and its image, if it tells a curvature.
+    /// Takes over the pair that [`Memory::judge`] has left behind the newest one of a part's group, and its image, if it tells
+    /// a curvature.
     fn keep_pair(
         &mut self,
         layout: &Layout<S>,
-        workers: &Workers,
+        (workers, groups): (&Workers, &Groups),
         number: usize,
         learned: &mut Learned<S>,
     ) {
         let slot = next_slot(self.history(), &learned.parts[number]);
-        let kept = &mut learned.parts[number];
-        let count = (kept.count as usize + 1).min(self.choices[number].history);
-        let before = *kept;
-        (kept.count, kept.newest) = (count as u32, slot as u32);
-        self.multiply_pair(layout, workers, number, learned, slot);
+        let most = self.history_of(groups, number);
+        let before = learned.parts[number];
+        let count = (before.count as usize + 1).min(most);
+        let mut kept = LearnedPart { count: count as u32, newest: slot as u32, ..before };
+        self.multiply_pair(layout, (workers, groups), number, &learned.pairs, (&kept, slot));
         let products = &self.parts[number].products;
         let (sy, yw) = (products.sy[slot][slot], products.yw[slot][slot]);
         if sy > 0.0 && yw > 0.0 && (sy / yw).is_finite() {
-            learned.parts[number].scale = sy / yw;
+            kept.scale = sy / yw;
         } else {
             // Negative curvature says nothing of the way to the minimum. An older pair may be gone: it was overwritten.
-            let lost = before.count as usize == self.choices[number].history;
-            let count = before.count - u32::from(lost);
-            learned.parts[number] = crate::state::LearnedPart { count, ..before };
+            let lost = before.count as usize == most;
+            kept = LearnedPart { count: before.count - u32::from(lost), ..before };
+        }
+        for part in groups.of(number) {
+            let LearnedPart { count, newest, scale, .. } = kept;
+            learned.parts[part] = LearnedPart { count, newest, scale, ..learned.parts[part] };
         }
     }
 
-    /// Products of a pair with itself and with older ones. The recursion reads `s` of the older with `y` of the newer.
+    /// Pairs that the group of a part keeps at most.
+    pub(super) fn history_of(&self, groups: &Groups, number: usize) -> usize {
+        groups.of(number).map(|part| self.choices[part].history).min().unwrap_or(0)
+    }
+
+    /// Products of a pair of a part's group, of which so much is `kept`, with itself and with older ones. The recursion reads
+    /// `s` of the older with `y` of the newer.
     fn multiply_pair(
         &mut self,
         layout: &Layout<S>,
-        workers: &Workers,
+        (workers, groups): (&Workers, &Groups),
         number: usize,
-        learned: &Learned<S>,
-        slot: usize,
+        pairs: &[Vec3<S>],
+        (kept, slot): (&LearnedPart, usize),
     ) {
-        let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
-        let kept = learned.parts[number];
-        let this = Pair::places(slot, vertices, &part.vertices);
-        let (y, image) = (&learned.pairs[this.y], &self.images[this.image]);
+        let vertices = layout.vertex_count();
         let ring = self.history();
         let others = || slots(ring, kept.count, kept.newest).skip_while(|&other| other != slot);
-        let mut factors: [Factors<'_, S>; MOST_DOTS] = [(y, y); MOST_DOTS];
-        for (factors, other) in factors.as_chunks_mut::<2>().0.iter_mut().zip(others()) {
-            let that = Pair::places(other, vertices, &part.vertices);
-            *factors = [(&learned.pairs[that.s], y), (&learned.pairs[that.y], image)];
-        }
         let count = 2 * others().count();
         let mut found = [0.0; MOST_DOTS];
-        vectors::dots(workers, &factors[..count], &mut found[..count]);
+        for part in groups.of(number).map(|part| &layout.parts[part]) {
+            let this = Pair::places(slot, vertices, &part.vertices);
+            let (y, image) = (&pairs[this.y], &self.images[this.image]);
+            let mut factors: [Factors<'_, S>; MOST_DOTS] = [(y, y); MOST_DOTS];
+            for (factors, other) in factors.as_chunks_mut::<2>().0.iter_mut().zip(others()) {
+                let that = Pair::places(other, vertices, &part.vertices);
+                *factors = [(&pairs[that.s], y), (&pairs[that.y], image)];
+            }
+            vectors::add_dots(workers, &factors[..count], &mut found[..count]);
+        }
         let products = &mut self.parts[number].products;
         for (&[sy, yw], other) in found.as_chunks::<2>().0.iter().zip(others()) {
             products.sy[other][slot] = sy;
@@ -122,80 +142,123 @@ impl<S: Real> Memory<S> {
         }
     }
 
-    /// Images of all pairs of a part under the preconditioner as it is now, and their products.
+    /// Images of all pairs of every part under the preconditioner as it is now, and their products.
     pub(super) fn renew_pairs(
         &mut self,
         layout: &Layout<S>,
-        workers: &Workers,
-        number: usize,
+        constants: &StepConstants<S>,
         learned: &Learned<S>,
     ) {
-        let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
-        let kept = learned.parts[number];
-        for slot in slots(self.history(), kept.count, kept.newest) {
-            let Pair { y, image, .. } = Pair::places(slot, vertices, &part.vertices);
-            self.preconditioner.apply(workers, number, &learned.pairs[y], &mut self.images[image]);
+        let StepConstants { workers, groups, .. } = constants;
+        let vertices = layout.vertex_count();
+        for (number, part) in layout.parts.iter().enumerate() {
+            let kept = learned.parts[number];
+            for slot in slots(self.history(), kept.count, kept.newest) {
+                let Pair { y, image, .. } = Pair::places(slot, vertices, &part.vertices);
+                let Self { preconditioner, images, .. } = self;
+                preconditioner.apply(workers, number, &learned.pairs[y], &mut images[image]);
+            }
         }
-        for slot in slots(self.history(), kept.count, kept.newest) {
-            self.multiply_pair(layout, workers, number, learned, slot);
+        for number in (0..layout.part_count()).filter(|&number| groups.leads(number)) {
+            let kept = &learned.parts[number];
+            for slot in slots(self.history(), kept.count, kept.newest) {
+                let pairs = &learned.pairs;
+                self.multiply_pair(layout, (workers, groups), number, pairs, (kept, slot));
+            }
         }
     }
 
     /// [`super::stage::QuasiNewtonStage::ChooseDirection`].
-    pub(super) fn choose_direction(
+    pub(super) fn choose_directions(
         &mut self,
         step: &Step<'_, S>,
         data: &mut StepData<S>,
         learned: &mut Learned<S>,
     ) {
-        for (number, part) in step.layout.parts.iter().enumerate() {
-            let progress = self.parts[number];
-            // Without pairs there is nothing to forget: the length goes on shrinking.
-            let forgets =
-                progress.failures >= super::MOST_FAILURES && learned.parts[number].count > 0;
-            let is_iterating = progress.acts() && progress.phase == Phase::Iterating;
-            if !(is_iterating && (progress.accepted || forgets)) {
-                continue;
+        for number in 0..step.layout.part_count() {
+            if data.constants.groups.leads(number) {
+                self.choose_direction(step, data, learned, number);
             }
-            if forgets {
-                learned.parts[number].count = 0;
-                self.parts[number].failures = 0;
-            }
-            let mut slope = f64::NAN;
-            if learned.parts[number].count > 0 {
-                slope = self.recur(step.layout, &data.constants.workers, number, learned);
-                self.parts[number].length = 1.0;
-            }
-            // A comparison that is false of what is no number as well.
-            if !(slope < 0.0 && slope.is_finite()) {
-                learned.parts[number].count = 0;
-                slope = self.combine(&data.constants.workers, number, part, -S::ONE, &[]);
-                self.parts[number].length = self.first_length(step, data, number, slope);
-            }
-            self.parts[number].slope = slope;
-            self.stop_at_resolution(number);
         }
     }
 
-    /// The direction as a sum of vectors of a part: of `z` and others, times these numbers. Returns its slope [J s^2].
+    /// Of a group, by the part that leads it.
+    fn choose_direction(
+        &mut self,
+        step: &Step<'_, S>,
+        data: &mut StepData<S>,
+        learned: &mut Learned<S>,
+        number: usize,
+    ) {
+        let progress = &mut self.parts[number];
+        // Without pairs there is nothing to forget: the length goes on shrinking.
+        let mut forgets =
+            progress.failures >= super::MOST_FAILURES && learned.parts[number].count > 0;
+        let is_iterating = progress.acts() && progress.phase == Phase::Iterating;
+        if !(is_iterating && (progress.accepted || forgets)) {
+            return;
+        }
+        if forgets {
+            progress.failures = 0;
+        }
+        let StepConstants { workers, groups, .. } = &data.constants;
+        let mut slope = f64::NAN;
+        if learned.parts[number].count > 0 && !forgets {
+            slope = self.recur(step.layout, (workers, groups), number, learned);
+            self.parts[number].length = 1.0;
+        }
+        // A comparison that is false of what is no number as well.
+        if !(slope < 0.0 && slope.is_finite()) {
+            forgets = true;
+            slope = self.combine_all(step.layout, (workers, groups), number);
+            self.parts[number].length = self.first_length(step, data, number, slope);
+        }
+        self.parts[number].slope = slope;
+        self.stop_at_resolution(number);
+        let lead = self.parts[number];
+        for part in data.constants.groups.of(number) {
+            if forgets {
+                learned.parts[part].count = 0;
+            }
+            let Progress { failures, length, slope, longest, phase, ahead, .. } = lead;
+            let own = self.parts[part];
+            self.parts[part] = Progress { failures, length, slope, longest, phase, ahead, ..own };
+        }
+    }
+
+    /// The direction of a group as the preconditioner alone has it; returns its slope [J s^2].
+    fn combine_all(
+        &mut self,
+        layout: &Layout<S>,
+        (workers, groups): (&Workers, &Groups),
+        number: usize,
+    ) -> f64 {
+        let mut all = [0.0; 2];
+        for part in groups.of(number) {
+            let vertices = layout.parts[part].vertices.clone();
+            let found = self.combine(workers, vertices, -S::ONE, &[]);
+            all = vectors::both(all, found);
+        }
+        self.parts[number].longest = all[1].sqrt();
+        all[0]
+    }
+
+    /// The direction as a sum of vectors of a part: of `z` and others, times these numbers. Returns its slope [J s^2] and the
+    /// square of its longest vector.
     fn combine(
         &mut self,
         workers: &Workers,
-        number: usize,
-        part: &Part,
+        range: Range<usize>,
         scale: S,
         terms: &[(S, &[Vec3<S>])],
-    ) -> f64 {
-        let range = part.vertices.clone();
-        let Self { z, direction, gradient, pinned, parts, .. } = self;
+    ) -> [f64; 2] {
+        let Self { z, direction, gradient, pinned, .. } = self;
         let (z, pinned) = (&z[range.clone()], &pinned[range.clone()]);
         let all = Combination { z, scale, terms, pinned };
-        let [slope, longest] = all.find(workers, &gradient[range.clone()], &mut direction[range]);
-        parts[number].longest = longest.sqrt();
-        slope
+        all.find(workers, &gradient[range.clone()], &mut direction[range])
     }
 
-    /// The length of a direction that no pair has scaled: to the minimum along it, as curvature tells.
+    /// The length of a direction of a group that no pair has scaled: to the minimum along it, as curvature tells.
     fn first_length(
         &mut self,
         step: &Step<'_, S>,
@@ -204,44 +267,48 @@ impl<S: Real> Memory<S> {
         slope: f64,
     ) -> f64 {
         let Self { evaluation, direction, direction_points, base, stage_start, .. } = self;
-        for v in step.layout.parts[number].vertices.clone() {
-            direction_points[v].set_vec3(direction[v]);
+        let members = data.constants.groups.range(number);
+        for part in data.constants.groups.of(number) {
+            for v in step.layout.parts[part].vertices.clone() {
+                direction_points[v].set_vec3(direction[v]);
+            }
         }
         let moments = super::moments(step, stage_start);
-        let [exact, bound] = evaluation.curvature(
-            &mut data.constants,
-            step,
-            &moments,
-            base,
-            direction_points,
-            number,
-        );
+        let [mut exact, mut bound] = [0.0; 2];
+        for place in members {
+            let part = data.constants.groups.member(place);
+            let constants = &mut data.constants;
+            let found =
+                evaluation.curvature(constants, step, &moments, base, direction_points, part);
+            (exact, bound) = (exact + found[0], bound + found[1]);
+        }
         let length = -slope / exact.max(LEAST_CURVATURE * bound);
         if length.is_finite() && length > 0.0 { length } else { 0.0 }
     }
 
-    /// The direction by the two loops; returns its slope [J s^2].
+    /// The direction of a group by the two loops; returns its slope [J s^2].
     fn recur(
         &mut self,
         layout: &Layout<S>,
-        workers: &Workers,
+        (workers, groups): (&Workers, &Groups),
         number: usize,
         learned: &Learned<S>,
     ) -> f64 {
-        let (vertices, part) = (layout.vertex_count(), &layout.parts[number]);
+        let vertices = layout.vertex_count();
         let kept = learned.parts[number];
-        let range = part.vertices.clone();
         let ring = self.history();
         let order = || slots(ring, kept.count, kept.newest);
-        let g = &self.gradient[range.clone()];
-        let mut factors: [Factors<'_, S>; MOST_DOTS] = [(g, g); MOST_DOTS];
-        for (factors, slot) in factors.as_chunks_mut::<2>().0.iter_mut().zip(order()) {
-            let Pair { s, image, .. } = Pair::places(slot, vertices, &range);
-            *factors = [(&learned.pairs[s], g), (&self.images[image], g)];
-        }
         let count = 2 * kept.count as usize;
         let mut found = [0.0; MOST_DOTS];
-        vectors::dots(workers, &factors[..count], &mut found[..count]);
+        for part in groups.of(number).map(|part| &layout.parts[part]) {
+            let g = &self.gradient[part.vertices.clone()];
+            let mut factors: [Factors<'_, S>; MOST_DOTS] = [(g, g); MOST_DOTS];
+            for (factors, slot) in factors.as_chunks_mut::<2>().0.iter_mut().zip(order()) {
+                let Pair { s, image, .. } = Pair::places(slot, vertices, &part.vertices);
+                *factors = [(&learned.pairs[s], g), (&self.images[image], g)];
+            }
+            vectors::add_dots(workers, &factors[..count], &mut found[..count]);
+        }
         let mut with_gradient = [[0.0; 2]; MOST_HISTORY];
         for (&found, slot) in found.as_chunks::<2>().0.iter().zip(order()) {
             with_gradient[slot] = found;
@@ -263,16 +330,21 @@ impl<S: Real> Memory<S> {
         }
         // Taken out, and put back: the direction is written meanwhile.
         let images = std::mem::take(&mut self.images);
-        let mut terms: [(S, &[Vec3<S>]); MOST_TERMS] = [(S::ZERO, &[]); MOST_TERMS];
-        for (terms, i) in terms.as_chunks_mut::<2>().0.iter_mut().zip(order()) {
-            let Pair { s, image, .. } = Pair::places(i, vertices, &range);
-            let (of_image, of_step) = (S::from_f64(scale * a[i]), S::from_f64(-c[i]));
-            *terms = [(of_image, &images[image]), (of_step, &learned.pairs[s])];
+        let mut all = [0.0; 2];
+        for part in groups.of(number) {
+            let range = layout.parts[part].vertices.clone();
+            let mut terms: [(S, &[Vec3<S>]); MOST_TERMS] = [(S::ZERO, &[]); MOST_TERMS];
+            for (terms, i) in terms.as_chunks_mut::<2>().0.iter_mut().zip(order()) {
+                let Pair { s, image, .. } = Pair::places(i, vertices, &range);
+                let (of_image, of_step) = (S::from_f64(scale * a[i]), S::from_f64(-c[i]));
+                *terms = [(of_image, &images[image]), (of_step, &learned.pairs[s])];
+            }
+            let found = self.combine(workers, range, S::from_f64(-scale), &terms[..count]);
+            all = vectors::both(all, found);
         }
-        let scale = S::from_f64(-scale);
-        let slope = self.combine(workers, number, part, scale, &terms[..count]);
         self.images = images;
-        slope
+        self.parts[number].longest = all[1].sqrt();
+        all[0]
     }
 
     /// Ends the solve of a part whose next step is round-off.
@@ -326,7 +398,7 @@ impl<S: Real> Memory<S> {
 
 /// The place of the next pair. All parts have places for as many, whatever number of them they use: what was kept with
 /// other settings stands where it is looked for.
-fn next_slot(history: usize, kept: &crate::state::LearnedPart) -> usize {
+fn next_slot(history: usize, kept: &LearnedPart) -> usize {
     if kept.count == 0 { 0 } else { (kept.newest as usize + 1) % history }
 }
 

@@ -47,7 +47,8 @@ pub struct Change {
 }
 
 impl Change {
-    fn plus(self, other: Self) -> Self {
+    /// Of two parts, or two terms.
+    pub fn plus(self, other: Self) -> Self {
         Self { potential: self.potential + other.potential, size: self.size + other.size }
     }
 
@@ -172,6 +173,10 @@ impl<S: Real> Evaluation<S> {
             load_recovered(constants, step, number, way.to, (false, None), loads);
             add_elements(layout, &way.moments, part, way.to, loads);
             constants.contacts.add_forces(&step.contact(), number, way.to, Bound::Without, loads);
+        }
+        for number in (0..layout.part_count()).filter(|&number| acts(number)) {
+            let StepConstants { contacts, .. } = &*constants;
+            contacts.add_pair_forces(&step.contact(), number, way.to, Bound::Without, loads);
         }
         let constants = &*constants;
         let (pieces, loads) = (&self.vertices, &*loads);

@@ -44,7 +44,7 @@ use crate::solver::step::stage::StepStage;
 use crate::state::{Learned, State};
 use choice::{Choice, choose_by_part};
 pub use choice::{choose, expected_motion_error, substeps_for};
-use evaluate::{Evaluation, Way};
+use evaluate::{Change, Evaluation, Way};
 use parts::{Phase, Progress};
 use preconditioner::Preconditioner;
 use stage::{QuasiNewtonStage, Solve};
@@ -263,10 +263,8 @@ impl<S: Real> Memory<S> {
             QuasiNewtonStage::StartSolve(which) => self.start_solve(which, step, data, learned),
             QuasiNewtonStage::Evaluate => self.evaluate(&solve, data, learned),
             QuasiNewtonStage::Judge => self.judge(&solve, data, learned),
-            QuasiNewtonStage::Precondition => {
-                self.precondition(&solve, &data.constants.workers, learned);
-            }
-            QuasiNewtonStage::ChooseDirection => self.choose_direction(&solve, data, learned),
+            QuasiNewtonStage::Precondition => self.precondition(&solve, data, learned),
+            QuasiNewtonStage::ChooseDirection => self.choose_directions(&solve, data, learned),
             QuasiNewtonStage::Advance => self.advance(&solve, data),
             QuasiNewtonStage::EndSolve(which) => self.end_solve(which, step, data, state),
             QuasiNewtonStage::CheckEnergy => self.check_energy(step, data, learned),
@@ -282,6 +280,8 @@ impl<S: Real> Memory<S> {
         let way = Way { from: base, to: points, moments };
         let acts = |part: usize| parts[part].acts();
         evaluation.gradient(constants, solve, &way, acts, loads, trial_gradient);
+        // Of parts that do not act nothing is read; those of a group act together.
+        constants.groups.pool(&mut evaluation.slopes, |a, b| a + b);
         for (number, progress) in parts.iter_mut().enumerate().filter(|(_, part)| part.acts()) {
             let slope = evaluation.slopes[number];
             progress.settled = progress.is_settled_by(slope, learned.parts[number].calm);
@@ -289,6 +289,7 @@ impl<S: Real> Memory<S> {
                 evaluation.change(constants, solve, &way, number);
             }
         }
+        constants.groups.pool(&mut evaluation.changes, Change::plus);
     }
 
     /// [`QuasiNewtonStage::Judge`].

@@ -11,7 +11,7 @@
 //! solve may store more energy than there was: then the part takes the step again by implicit Euler from `x_n`, and
 //! in the end no part keeps more kinetic energy than is left to it.
 
-use super::parts::{Phase, Scheme};
+use super::parts::{Phase, Progress, Scheme};
 use super::preconditioner::Curvature;
 use super::sdirk2::SHARE;
 use super::stage::Solve;
@@ -20,6 +20,8 @@ use crate::scalar::{Real, Vec3};
 use crate::settings::Integrator;
 use crate::solver::report::StepReport;
 use crate::solver::step::data::{Step, StepData};
+use crate::solver::step::groups::Groups;
+use crate::solver::step::momentum::{keep_momentum, keep_spin};
 use crate::solver::step::predict::Tethers;
 use crate::solver::step::strain::{measure_strain, put_strains};
 use crate::state::{Learned, State};
@@ -71,19 +73,23 @@ impl<S: Real> Memory<S> {
                 reach.max(x.x.abs()).max(x.y.abs()).max(x.z.abs())
             });
             let kept = &mut state.learned.parts[number];
-            // Other settings may have kept more.
-            kept.count = kept.count.min(self.choices[number].history as u32);
+            let group = data.constants.groups.name(number);
+            if std::mem::replace(&mut kept.group, group) != group {
+                // What was learned with others, or alone, is no pair of these together.
+                (kept.count, kept.calm) = (0, false);
+            }
             let progress = &mut self.parts[number];
             progress.phase = Phase::Done;
             progress.resolution = RESOLUTION * S::EPSILON * reach.to_f64();
             // A body that lies on tools alone flutters where it slides: the second stage of SDIRK2 goes on from the velocity of
             // the first, which friction has yet to answer. Implicit Euler slides as fast as it should.
-            let slides = data.constants.lies_on_tools(number, part);
+            let slides = data.constants.lies_on_others(number, part);
             progress.scheme = match step.settings.integrator {
                 Integrator::Sdirk2 if !slides => Scheme::Sdirk2,
                 _ => Scheme::Euler,
             };
         }
+        self.begin_groups(&data.constants.groups, &mut state.learned);
         self.begin_energy(step, data);
         self.reports.clear();
         self.reports.resize(layout.part_count(), StepReport::QUIET);
@@ -101,6 +107,21 @@ impl<S: Real> Memory<S> {
         self.preconditioner.fit(layout, &data.constants);
         self.refresh(&solve, data, &state.learned);
         state.multiplier_dt = dt;
+    }
+
+    /// Parts of a group go on together.
+    fn begin_groups(&mut self, groups: &Groups, learned: &mut Learned<S>) {
+        groups.pool(&mut self.parts, |a, b| {
+            let resolution = a.resolution.max(b.resolution);
+            let scheme = if a.scheme == Scheme::Euler { a.scheme } else { b.scheme };
+            Progress { scheme, resolution, ..a }
+        });
+        for number in 0..self.parts.len() {
+            // Other settings may have kept more.
+            let most = self.history_of(groups, number) as u32;
+            let kept = &mut learned.parts[number];
+            kept.count = kept.count.min(most);
+        }
     }
 
     /// Makes the pairs of a part those of a solve of `dt` [s]: the change of a gradient is that of inertia and, times the
@@ -136,9 +157,7 @@ impl<S: Real> Memory<S> {
         for number in 0..layout.part_count() {
             self.preconditioner.refresh(solve, constants, &curvature, number);
         }
-        for number in 0..layout.part_count() {
-            self.renew_pairs(layout, &constants.workers, number, learned);
-        }
+        self.renew_pairs(layout, constants, learned);
     }
 
     /// [`super::stage::QuasiNewtonStage::StartSolve`].
@@ -212,7 +231,7 @@ impl<S: Real> Memory<S> {
         let step_dt = solve.dt / if which == Solve::Euler { 1.0 } else { SHARE };
         let (he, d) = (S::from_f64(solve.dt), S::from_f64((1.0 - SHARE) * step_dt));
         let squared = he * he;
-        let falls = !data.constants.holds(number, part);
+        let falls = !data.constants.rests(number, part);
         let acceleration =
             if falls { self.mean_acceleration(solve, data, number) } else { Vec3::ZERO };
         for v in part.vertices.clone() {
@@ -272,11 +291,17 @@ impl<S: Real> Memory<S> {
                 self.base[v].set_vec3(target);
             }
         }
+        let most = self.most_passes(&data.constants.groups, number);
         let progress = &mut self.parts[number];
         progress.phase = Phase::Starting;
-        progress.passes_left = passes_of(which, solve.settings, self.choices[number].passes);
+        progress.passes_left = passes_of(which, solve.settings, most);
         (progress.failures, progress.rejections) = (0, 0);
         (progress.accepted, progress.ahead) = (false, false);
+    }
+
+    /// The passes of the part of a group that has most.
+    fn most_passes(&self, groups: &Groups, number: usize) -> u32 {
+        groups.of(number).map(|part| self.choices[part].passes).max().unwrap_or(1)
     }
 
     /// How a part's center of mass is accelerated [m/s^2] by what acts on it from outside.
@@ -321,6 +346,20 @@ impl<S: Real> Memory<S> {
                 (&self.base, &mut data.points)
             };
             to[range.clone()].copy_from_slice(&from[range.clone()]);
+        }
+        let is_last = which != Solve::First;
+        for number in 0..step.layout.part_count() {
+            if self.parts[number].scheme == wanted {
+                let solve = Step { dt: self.solve_dt, ..*step };
+                keep_momentum(&solve, &data.constants, &mut data.points, number);
+            }
+        }
+        for (number, part) in step.layout.parts.iter().enumerate() {
+            if self.parts[number].scheme != wanted {
+                continue;
+            }
+            let range = part.vertices.clone();
+            self.base[range.clone()].copy_from_slice(&data.points[range.clone()]);
             for v in range {
                 let moved = data.points[v].vec3() - self.stage_start[v].vec3();
                 match which {
@@ -328,6 +367,10 @@ impl<S: Real> Memory<S> {
                     Solve::Second | Solve::Euler => data.velocities[v] = moved * rate,
                 }
             }
+        }
+        if is_last && self.parts.iter().any(|part| part.scheme == wanted) {
+            let StepData { constants, points, velocities, .. } = data;
+            keep_spin(step, constants, points, &self.start_velocities, velocities);
         }
         let again = which == Solve::Euler && step.settings.integrator == Integrator::Sdirk2;
         if again && self.parts.iter().any(|part| part.scheme == Scheme::Euler) {

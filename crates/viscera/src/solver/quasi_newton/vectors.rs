@@ -23,12 +23,12 @@ fn piece(count: usize) -> usize {
 /// `a . b`.
 pub fn dot<S: Real>(workers: &Workers, a: &[Vec3<S>], b: &[Vec3<S>]) -> f64 {
     let mut product = [0.0];
-    dots(workers, &[(a, b)], &mut product);
+    add_dots(workers, &[(a, b)], &mut product);
     product[0]
 }
 
-/// `a . b` of several pairs of vectors of one length.
-pub fn dots<S: Real>(workers: &Workers, pairs: &[Factors<'_, S>], products: &mut [f64]) {
+/// Adds `a . b` of several pairs of vectors of one length.
+pub fn add_dots<S: Real>(workers: &Workers, pairs: &[Factors<'_, S>], products: &mut [f64]) {
     let count = pairs.first().map_or(0, |(a, _)| a.len());
     let map = |range: Range<usize>| {
         let mut sums = [0.0; MOST_DOTS];
@@ -41,7 +41,8 @@ pub fn dots<S: Real>(workers: &Workers, pairs: &[Factors<'_, S>], products: &mut
     };
     let partial = &mut [[0.0; MOST_DOTS]; MOST_PIECES];
     let sums = workers.reduce((count, piece(count)), partial, map, add);
-    products.copy_from_slice(&sums.unwrap_or([0.0; MOST_DOTS])[..products.len()]);
+    let sums = sums.unwrap_or([0.0; MOST_DOTS]);
+    products.iter_mut().zip(sums).for_each(|(product, sum)| *product += sum);
 }
 
 /// Calls with pieces of `0..count`, which threads may share.
@@ -74,9 +75,13 @@ impl<S: Real> Combination<'_, S> {
             found
         };
         let partial = &mut [[0.0; 2]; MOST_PIECES];
-        let both = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], larger(a[1], b[1])];
         workers.reduce((count, piece(count)), partial, map, both).unwrap_or([0.0; 2])
     }
+}
+
+/// What [`Combination::find`] returns, of two ranges together.
+pub fn both(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] + b[0], larger(a[1], b[1])]
 }
 
 /// The larger of two numbers; what is no number is larger than all.

@@ -109,6 +109,9 @@ impl ForceBalance {
                 }
             });
         }
+        step.contacts.pairs.each_force_at(layout, place, |v, force| {
+            self.residual[layout.numbering.order[v] as usize] -= force;
+        });
     }
 
     /// Of recovered-gradient tetrahedra, in the precision of the state.

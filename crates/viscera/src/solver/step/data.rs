@@ -3,6 +3,7 @@
 #![allow(unsafe_code)]
 
 use super::contacts::{ContactStep, Contacts};
+use super::groups::Groups;
 use super::recovered::RecoveredTets;
 use super::tethers::Bundle;
 use crate::elements::law::LAWS;
@@ -28,7 +29,12 @@ pub struct Step<'a, S> {
 impl<'a, S> Step<'a, S> {
     /// What contact knows of it.
     pub fn contact(&self) -> ContactStep<'a, S> {
-        ContactStep { layout: self.layout, tools: &self.inputs.tools, dt: self.dt }
+        ContactStep {
+            layout: self.layout,
+            tools: &self.inputs.tools,
+            pins: &self.inputs.pins,
+            dt: self.dt,
+        }
     }
 }
 
@@ -57,8 +63,12 @@ pub struct StepConstants<S> {
     pub start_strain: StartStrain<S>,
     /// Where the layout has recovered-gradient tetrahedra.
     pub recovered: Option<RecoveredTets<S>>,
+    /// Velocities at the start of the step [m/s], once they have given way to those of its end.
+    pub before: Vec<Vec3<S>>,
     /// Of samples and tools.
     pub contacts: Contacts,
+    /// Parts that touch each other.
+    pub groups: Groups,
 }
 
 /// Data that measures of a step need after its end: values that every backend fills. Vertices in the solver's
@@ -127,7 +137,9 @@ impl<S: Real> StepData<S> {
                     .recovered
                     .as_ref()
                     .map(|tables| RecoveredTets::new(layout, tables)),
+                before: vec![Vec3::ZERO; vertices],
                 contacts: Contacts::new(layout),
+                groups: Groups::alone(layout.part_count()),
             },
             points: points(),
             velocities: vec![Vec3::ZERO; vertices],
@@ -138,15 +150,26 @@ impl<S: Real> StepData<S> {
     /// Bytes of all arrays.
     pub fn bytes(&self) -> usize {
         let StepConstants {
-            previous, predicted, external, masses, inertias, inverse_masses, ..
+            previous,
+            predicted,
+            external,
+            before,
+            masses,
+            inertias,
+            inverse_masses,
+            ..
         } = &self.constants;
         let points = [&self.points, previous, predicted, &self.loads];
         points.into_iter().map(|points| size_of_val(&points[..])).sum::<usize>()
-            + [external, &self.velocities].map(|v| size_of_val(&v[..])).iter().sum::<usize>()
+            + [external, before, &self.velocities]
+                .map(|v| size_of_val(&v[..]))
+                .iter()
+                .sum::<usize>()
             + [masses, inertias, inverse_masses].map(|m| size_of_val(&m[..])).iter().sum::<usize>()
             + self.constants.start_strain.iter().map(|s| size_of_val(&s[..])).sum::<usize>()
             + self.constants.recovered.as_ref().map_or(0, RecoveredTets::bytes)
             + self.constants.contacts.bytes()
+            + self.constants.groups.bytes()
     }
 
     /// For measures of the step.
@@ -192,9 +215,15 @@ impl<S: Real> StepConstants<S> {
         self.contacts.presses(number) || self.is_fixed(part)
     }
 
-    /// Whether a tool presses on a part that nothing else holds.
-    pub fn lies_on_tools(&self, number: usize, part: &Part) -> bool {
-        self.contacts.presses(number) && !self.is_fixed(part)
+    /// Whether a part that nothing else holds lies on tools, or on other tissue.
+    pub fn lies_on_others(&self, number: usize, part: &Part) -> bool {
+        let presses = self.contacts.presses(number) || self.contacts.pairs.presses(number);
+        presses && !self.is_fixed(part)
+    }
+
+    /// Whether a part does not fall: something holds it, or tissue that may fall as well.
+    pub fn rests(&self, number: usize, part: &Part) -> bool {
+        self.contacts.pairs.presses(number) || self.holds(number, part)
     }
 
     /// Whether a pin, an attachment or a tether holds a part.

@@ -8,6 +8,7 @@
 //! A whole step divides the gradient by inertia and a bound of each vertex's own curvature, as if neighbours stood still.
 //! Where they move together it overshoots, and is shortened.
 
+use super::contacts::Bound;
 use super::data::{Step, StepData, gather};
 use super::gradient::load_forces;
 use super::guard::Guard;
@@ -25,10 +26,12 @@ pub const SHORTEN: f64 = 0.4;
 pub const SHORTENINGS: usize = 12;
 
 impl<S: Real> Guard<S> {
-    /// Lets a part begin its descent at `x_s`: finds the forces there.
+    /// Lets a part's group begin its descent at `x_s`: finds the forces there.
     pub fn start_descent(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, part: usize) {
-        let vertices = step.layout.parts[part].vertices.clone();
-        self.trial[vertices.clone()].copy_from_slice(&self.start[vertices]);
+        for part in data.constants.groups.of(part) {
+            let vertices = step.layout.parts[part].vertices.clone();
+            self.trial[vertices.clone()].copy_from_slice(&self.start[vertices]);
+        }
         self.load_forces(step, data, part);
     }
 
@@ -39,7 +42,9 @@ impl<S: Real> Guard<S> {
             if after_shares {
                 guard.descends = u32::from(guard.was_rejected != 0 && guard.share == 0.0);
             }
-            if guard.descends != 0 {
+        }
+        for part in 0..step.layout.part_count() {
+            if self.parts[part].descends != 0 && data.constants.groups.leads(part) {
                 self.search(step, data, part);
             }
         }
@@ -51,32 +56,45 @@ impl<S: Real> Guard<S> {
             if self.parts[number].descends != 0 {
                 let vertices = part.vertices.clone();
                 self.trial[vertices.clone()].copy_from_slice(&data.points[vertices]);
+            }
+        }
+        for number in 0..step.layout.part_count() {
+            if self.parts[number].descends != 0 && data.constants.groups.leads(number) {
                 self.load_forces(step, data, number);
             }
         }
     }
 
-    /// Forces and curvature of each copy where the descent of a part is. Evaluations do not touch them, so that the
+    /// Forces and curvature of each copy where the descent of a part's group is. Evaluations do not touch them, so that the
     /// direction is the same at every length.
     fn load_forces(&self, step: &Step<'_, S>, data: &mut StepData<S>, part: usize) {
         let StepData { constants, loads, .. } = data;
         let moments = constants.moments(step);
-        load_forces::<S, true>(constants, step, &moments, part, &self.trial, loads);
+        for part in constants.groups.of(part) {
+            load_forces::<S, true>(constants, step, &moments, part, &self.trial, loads);
+        }
+        for part in constants.groups.of(part) {
+            let contact = step.contact();
+            constants.contacts.add_pair_forces(&contact, part, &self.trial, Bound::Here, loads);
+        }
     }
 
-    /// Moves a part to the first length that brings enough, or leaves it where the line starts. `x_K`, which is given up
+    /// Moves a part's group to the first length that brings enough, or leaves it where the line starts. `x_K`, which is given up
     /// by now, makes room for the places that are tried.
     fn search(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, part: usize) {
-        let (x, of) = (&self.trial, &step.layout.parts[part]);
+        let (x, members) = (&self.trial, data.constants.groups.range(part));
         let before = self.evaluator.evaluate(&data.constants, step, x, part).value;
         let mut length = 1.0;
         for _ in 0..SHORTENINGS {
             // One pass finds slope and places; the slope [J s^2] is negative unless the gradient vanishes.
             let mut slope = 0.0;
-            for v in of.vertices.clone() {
-                let (gradient, direction) = descent(step.layout, data, x, v);
-                slope += gradient.dot(direction).to_f64();
-                data.points[v].set_vec3(x[v].vec3() + direction * S::from_f64(length));
+            for place in members.clone() {
+                let part = data.constants.groups.member(place);
+                for v in step.layout.parts[part].vertices.clone() {
+                    let (gradient, direction) = descent(step.layout, data, x, v);
+                    slope += gradient.dot(direction).to_f64();
+                    data.points[v].set_vec3(x[v].vec3() + direction * S::from_f64(length));
+                }
             }
             let after = self.evaluator.evaluate(&data.constants, step, &data.points, part).value;
             // A potential that is NaN compares as false: the step is shortened, as after an overshoot. There is no
@@ -86,8 +104,11 @@ impl<S: Real> Guard<S> {
             }
             length *= SHORTEN;
         }
-        for v in of.vertices.clone() {
-            data.points[v].set_vec3(x[v].vec3());
+        for place in members {
+            let part = data.constants.groups.member(place);
+            for v in step.layout.parts[part].vertices.clone() {
+                data.points[v].set_vec3(x[v].vec3());
+            }
         }
     }
 }

@@ -62,6 +62,14 @@ struct Motion {
 }
 
 impl Motion {
+    fn plus(self, other: Self) -> Self {
+        Self {
+            stored: self.stored + other.stored,
+            kinetic: self.kinetic + other.kinetic,
+            momentum: self.momentum + other.momentum,
+        }
+    }
+
     fn add<S: Real>(&mut self, mass: f64, velocity: Vec3<S>) {
         let velocity = velocity.cast::<f64>();
         self.kinetic += 0.5 * mass * velocity.length_squared();
@@ -70,6 +78,20 @@ impl Motion {
 }
 
 impl Energy {
+    /// Of two parts of a group: what holds one holds both.
+    fn plus(self, other: Self) -> Self {
+        Self {
+            held: self.held || other.held,
+            mass: self.mass + other.mass,
+            load: self.load + other.load,
+            work: self.work + other.work,
+            tools: self.tools.plus(other.tools),
+            shift: self.shift + other.shift,
+            start: self.start.plus(other.start),
+            end: self.end.plus(other.end),
+        }
+    }
+
     /// Kinetic energy [J] that is left to the end of the step, kinetic energy that it has, and the velocity [m/s]
     /// that neither counts.
     fn balance(&self) -> (f64, f64, Vec3<f64>) {
@@ -110,8 +132,10 @@ impl Energy {
     fn limit(&self) -> (Vec3<f64>, f64) {
         let (given, kinetic, drift) = self.balance();
         // `given` is below zero where more energy is stored than there was. Positions are not moved, so the most that
-        // can be taken is all motion. A comparison with NaN is false: nothing is scaled by it.
-        let share = if kinetic > given { (given.max(0.0) / kinetic).sqrt() } else { 1.0 };
+        // can be taken is all motion. A comparison with NaN is false: nothing is scaled by it. Nor is what does not move but
+        // with its centre of mass.
+        let moves_too_much = kinetic > given && kinetic > 0.0;
+        let share = if moves_too_much { (given.max(0.0) / kinetic).sqrt() } else { 1.0 };
         (drift, share)
     }
 }
@@ -131,6 +155,8 @@ impl Ledger {
 #[derive(Clone, Debug)]
 pub struct Energies {
     parts: Vec<Energy>,
+    /// Of each part that of its group, after [`Energies::end`].
+    groups: Vec<Energy>,
     ledger: Ledger,
 }
 
@@ -151,12 +177,13 @@ pub struct Ledger {
 impl Energies {
     /// For so many parts.
     pub fn new(parts: usize) -> Self {
-        Self { parts: vec![Energy::default(); parts], ledger: Ledger::default() }
+        let none = vec![Energy::default(); parts];
+        Self { parts: none.clone(), groups: none, ledger: Ledger::default() }
     }
 
-    /// Bytes of its array.
+    /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.parts[..])
+        size_of_val(&self.parts[..]) + size_of_val(&self.groups[..])
     }
 
     /// Remembers energy and momentum before the step; `stored` is the stored energy [J] of each part there.
@@ -187,9 +214,9 @@ impl Energies {
         self.parts[part].start.stored += energy;
     }
 
-    /// What is left [J] of what a part had and was given, after [`Energies::end`]; of all that it has a share at most.
+    /// What is left [J] of what a part's group had and was given, after [`Energies::end`]; of all that it has a share at most.
     pub fn left(&self, part: usize, share: f64) -> f64 {
-        let energy = &self.parts[part];
+        let energy = &self.groups[part];
         let (given, kinetic, _) = energy.balance();
         let left = (given - kinetic).min(share * (energy.end.kinetic + energy.end.stored));
         // Nothing also where that is no number.
@@ -224,12 +251,14 @@ impl Energies {
                 energy.shift += moved * mass;
             }
         }
+        self.groups.copy_from_slice(&self.parts);
+        constants.groups.pool(&mut self.groups, Energy::plus);
     }
 
-    /// Whether a part stores more at its end than all energy that it had and was given, or no number: then no
+    /// Whether a part's group stores more at its end than all energy that it had and was given, or no number: then no
     /// velocity is small enough. `round_off` is that of energies, relative.
     pub fn stores_too_much(&self, part: usize, round_off: f64) -> bool {
-        let energy = &self.parts[part];
+        let energy = &self.groups[part];
         let (given, _, _) = energy.balance();
         // Round-off of energies that nearly cancel is none of the step's.
         let stored = energy.start.stored.abs().max(energy.end.stored.abs());
@@ -237,10 +266,10 @@ impl Energies {
         given < -round_off || !given.is_finite()
     }
 
-    /// How a part's step of `dt` [s] ended, told by its energies: what it stores and moves with after
+    /// How the step of a part's group of `dt` [s] ended, told by its energies: what it stores and moves with after
     /// [`Energies::limit`], and what it had and was given, times the squared step.
     pub fn report(&self, part: usize, dt: f64, round_off: f64) -> StepReport {
-        let energy = &self.parts[part];
+        let energy = &self.groups[part];
         let (given, kinetic, _) = energy.balance();
         let (_, share) = energy.limit();
         let stored = energy.start.stored.abs().max(energy.end.stored.abs());
@@ -270,12 +299,16 @@ impl Energies {
     ) {
         let (model, constants) = (step.layout, &data.constants);
         let free = |v: &usize| constants.inverse_masses[*v] != S::ZERO;
-        let Self { parts, ledger } = self;
+        let Self { groups, ledger, .. } = self;
         ledger.stored = 0.0;
-        for (number, (energy, part)) in parts.iter().zip(model.parts.iter()).enumerate() {
+        for (number, (energy, part)) in groups.iter().zip(model.parts.iter()).enumerate() {
             let (drift, share) = energy.limit();
-            let is_limited = share < 1.0 && energy.mass > 0.0 && limits(number, constants);
-            ledger.add(energy, if is_limited { share } else { 1.0 });
+            let is_limited = share < 1.0
+                && energy.mass > 0.0
+                && constants.groups.of(number).any(|part| limits(part, constants));
+            if constants.groups.leads(number) {
+                ledger.add(energy, if is_limited { share } else { 1.0 });
+            }
             if !is_limited {
                 continue;
             }

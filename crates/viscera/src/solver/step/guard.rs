@@ -27,6 +27,7 @@ use std::ops::Range;
 use super::control::PartGuard;
 use super::data::{Step, StepConstants, StepData};
 use super::energy::{Energies, Ledger};
+use super::momentum::keep_momentum;
 use super::potential::{Evaluator, Potential};
 use super::stage::GuardStage;
 use crate::layout::Layout;
@@ -122,7 +123,13 @@ impl<S: Real> Guard<S> {
     pub fn run(&mut self, stage: GuardStage, step: &Step<'_, S>, data: &mut StepData<S>) {
         match stage {
             GuardStage::ChooseStart => self.choose_start(step, data),
-            GuardStage::EvaluateStep { with_starts } => self.evaluate_step(with_starts, step, data),
+            GuardStage::EvaluateStep { with_starts } => {
+                let StepData { constants, points, .. } = data;
+                for part in 0..step.layout.part_count() {
+                    keep_momentum(step, constants, points, part);
+                }
+                self.evaluate_step(with_starts, step, data);
+            }
             GuardStage::JudgeStep { chooses } => self.judge_step(chooses, step, data),
             GuardStage::TryLengths { after_shares } => self.try_lengths(after_shares, step, data),
             GuardStage::TakeLength => self.take_length(step, data),
@@ -178,7 +185,11 @@ impl<S: Real> Guard<S> {
             if let Some(chosen) = chosen {
                 self.move_start(step, &data.constants, part, chosen);
             }
-            self.try_shares(step, data, part);
+        }
+        for part in 0..step.layout.part_count() {
+            if self.parts[part].was_rejected != 0 && data.constants.groups.leads(part) {
+                self.try_shares(step, data, part);
+            }
         }
         self.rejected += u64::from(is_rejected);
     }
@@ -190,14 +201,20 @@ impl<S: Real> Guard<S> {
             if guard.was_rejected == 0 {
                 continue;
             }
+            // The parts of a group descend together.
             if guard.descends == 0 {
                 // The share that passes was evaluated last.
                 for v in part.vertices.clone() {
                     data.points[v].set_vec3(self.trial[v].vec3());
                 }
-            } else {
+            } else if data.constants.groups.leads(number) {
                 // The last length that a descent tried may be one that it gave up.
                 self.evaluator.evaluate(&data.constants, step, &data.points, number);
+            }
+        }
+        for part in 0..step.layout.part_count() {
+            if self.parts[part].was_rejected != 0 {
+                keep_momentum(step, &data.constants, &mut data.points, part);
             }
         }
     }
@@ -294,23 +311,25 @@ impl<S: Real> Guard<S> {
         }
     }
 
-    /// Shortens the step of a part to the first share that passes, or begins its descent at `x_s`.
+    /// Shortens the step of a part's group to the first share that passes, or begins its descent at `x_s`.
     fn try_shares(&mut self, step: &Step<'_, S>, data: &mut StepData<S>, part: usize) {
         let Self { evaluator, start, trial, parts, .. } = self;
-        let vertices = step.layout.parts[part].vertices.clone();
+        let groups = &data.constants.groups;
         // `data.points` stays at `x_K` until a share is accepted: every share is one of the whole step, not of the
         // share before it. Not the lowest but the first, which is the longest that keeps the limit: a shorter one throws
         // away more of what the sweeps have found.
         let share = SHARES.into_iter().find(|&share| {
             let share = S::from_f64(share);
-            for v in vertices.clone() {
+            for v in groups.of(part).flat_map(|part| step.layout.parts[part].vertices.clone()) {
                 let start = start[v].vec3();
                 trial[v].set_vec3(start + (data.points[v].vec3() - start) * share);
             }
-            // Other parts' places are old, which an evaluation of this part does not read.
+            // Other groups' places are old, which an evaluation of this one does not read.
             evaluator.evaluate(&data.constants, step, trial, part).keeps(parts[part].limit)
         });
-        parts[part].share = share.unwrap_or(0.0);
+        for part in groups.of(part) {
+            parts[part].share = share.unwrap_or(0.0);
+        }
         if share.is_none() {
             // No share is low enough, so the sweeps' direction itself is wrong. Descents need nothing of it: they
             // begin at `x_s`, where `Phi` is the limit, and none ends higher than it began.

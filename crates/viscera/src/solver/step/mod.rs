@@ -9,10 +9,12 @@ pub mod energy;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod gradient;
+pub mod groups;
 pub mod guard;
 pub mod law;
 #[cfg(feature = "gpu")]
 pub mod modes;
+pub mod momentum;
 pub mod potential;
 pub mod predict;
 pub mod recovered;
@@ -26,6 +28,7 @@ use crate::scalar::Real;
 use crate::state::State;
 use data::{Step, StepConstants, StepData};
 use guard::Guard;
+use momentum::keep_spin;
 use stage::StepStage;
 use strain::measure_strain;
 
@@ -41,7 +44,8 @@ pub fn run<S: Real>(
         StepStage::ReadState => read_state(step.layout, data, state),
         StepStage::FindContacts => {
             let StepData { constants, points, velocities, .. } = data;
-            constants.contacts.find(&step.contact(), points, velocities, &state.contact);
+            let StepConstants { contacts, groups, .. } = constants;
+            contacts.find(&step.contact(), points, velocities, &state.contact, groups);
         }
         StepStage::EndContacts => {
             let StepData {
@@ -79,9 +83,13 @@ pub fn run<S: Real>(
 
 fn update_velocities<S: Real>(step: &Step<'_, S>, data: &mut StepData<S>) {
     let rate = S::from_f64(1.0 / step.dt);
-    for (v, velocity) in data.velocities.iter_mut().enumerate() {
-        *velocity = (data.points[v].vec3() - data.constants.previous[v].vec3()) * rate;
+    let StepData { constants, points, velocities, .. } = data;
+    // The step has begun with the velocities that are still there; those of its end take the place of the starts.
+    for (v, velocity) in velocities.iter_mut().enumerate() {
+        let after = (points[v].vec3() - constants.previous[v].vec3()) * rate;
+        constants.before[v] = std::mem::replace(velocity, after);
     }
+    keep_spin(step, constants, points, &constants.before, velocities);
 }
 
 fn read_state<S: Real>(layout: &Layout<S>, data: &mut StepData<S>, state: &State<S>) {

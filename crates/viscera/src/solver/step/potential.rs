@@ -33,6 +33,11 @@ pub struct Potential {
 }
 
 impl Potential {
+    /// Of both together.
+    pub fn plus(self, other: Self) -> Self {
+        Self { value: self.value + other.value, noise: self.noise + other.noise }
+    }
+
     /// Whether it is at most round-off above the limit.
     pub fn keeps(&self, limit: f64) -> bool {
         self.value <= limit + self.noise
@@ -46,7 +51,7 @@ const VERTEX_PIECE: usize = 1024;
 /// Evaluates `Phi` part by part: adds up in double precision, in an order that other parts do not change.
 #[derive(Clone, Debug)]
 pub struct Evaluator {
-    /// Of each part of the model, as of its last evaluation.
+    /// Of each part of the model with all that are in its group, as of its last evaluation.
     pub potentials: Vec<Potential>,
     /// Potential [J] of tissue, springs and attachments of each part, as of its last evaluation.
     pub stored: Vec<f64>,
@@ -126,9 +131,10 @@ impl Evaluator {
         for part in parts {
             self.combine(constants, step, x, part);
         }
+        constants.groups.pool(&mut self.potentials, Potential::plus);
     }
 
-    /// `Phi` of one part at `x`, of which only its vertices count.
+    /// `Phi` of the group of one part at `x`, of which only its vertices count.
     pub fn evaluate<S: Real>(
         &mut self,
         constants: &StepConstants<S>,
@@ -136,9 +142,17 @@ impl Evaluator {
         x: &[Point<S>],
         part: usize,
     ) -> Potential {
-        self.sum_pieces(constants, step, x, part..part + 1);
-        self.combine(constants, step, x, part);
-        self.potentials[part]
+        let groups = &constants.groups;
+        let mut all = Potential::default();
+        for part in groups.of(part) {
+            self.sum_pieces(constants, step, x, part..part + 1);
+            self.combine(constants, step, x, part);
+            all = all.plus(self.potentials[part]);
+        }
+        for part in groups.of(part) {
+            self.potentials[part] = all;
+        }
+        all
     }
 
     /// Adds to `stored` what recovered-gradient tetrahedra of every part store at `x`.

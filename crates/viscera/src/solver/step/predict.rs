@@ -83,7 +83,7 @@ impl<S: Real> StepData<S> {
         }
         if start == Start::Auto {
             for (number, part) in model.parts.iter().enumerate() {
-                if !self.constants.holds(number, part) {
+                if !self.constants.rests(number, part) {
                     self.start_falling(step, part);
                 }
             }

@@ -6,6 +6,7 @@ mod grasps;
 mod motion;
 mod passes;
 mod refused;
+mod tissue;
 
 use viscera::contact::{Shape, Tool};
 use viscera::material::Material;

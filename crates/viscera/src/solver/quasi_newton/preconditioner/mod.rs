@@ -288,6 +288,14 @@ impl<S: Real> OfPart<S> {
             let blocks = weights.map(|a| weights.map(|b| block * (squared * a * b)));
             self.add_element(&sample.vertices.map(|v| v - first), &blocks, 0, free);
         });
+        let places = step.contact().places(curvature.x);
+        constants.contacts.pairs.each_block(places, |vertices, weights, block| {
+            // The other side is another part's, or comes as well.
+            if self.vertices.contains(&(vertices[0] as usize)) {
+                let blocks = weights.map(|a| weights.map(|b| block * (squared * a * b)));
+                self.add_element(&vertices.map(|v| v - first), &blocks, 0, free);
+            }
+        });
         for blocks in &mut self.inverses {
             let shared = Shared::new(blocks);
             constants.workers.each(shared.len(), BLOCK_GRAIN, |range| {

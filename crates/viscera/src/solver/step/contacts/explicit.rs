@@ -31,6 +31,7 @@ impl Contacts {
             let arm = at - self.poses[number].translation;
             work += self.work_of(whole.tools, number, felt.force, arm);
         }
+        self.pairs.add_forces_in_motion(whole.places(x), part, (small, share), loads);
         if let Some(gift) = self.gifts.get_mut(part) {
             *gift.exact.get_or_insert(0.0) += work * small / whole.dt;
         }
@@ -45,12 +46,14 @@ impl Contacts {
             let placed = Placed { shape: &tool.shape, pose: &self.poses[number] };
             touching.slip(tool, placed, step.layout.samples[touching.sample as usize].place(x));
         }
+        self.pairs.slip(step.places(x), part);
     }
 
     /// Puts a part back to where its step begins: it has not slipped, and tools have done no work.
     pub fn begin_again(&mut self, part: usize) {
         let range = self.range(part).unwrap_or_default();
         self.touching[range.clone()].copy_from_slice(&self.at_start[range]);
+        self.pairs.begin_again(part);
         if let Some(gift) = self.gifts.get_mut(part) {
             gift.exact = Some(0.0);
         }

@@ -4,8 +4,9 @@ use super::{ContactStep, Contacts, Gift};
 use crate::contact::{ContactLaw, Foundation, Moved, Tool, Touch, Touching};
 use crate::layout::LaidSample;
 use crate::scalar::lanes::Point;
-use crate::scalar::rigid::RigidTransform;
+use crate::scalar::rigid::{RigidTransform, axis_times_sine};
 use crate::scalar::{Real, Vec3};
+use crate::solver::step::groups::Groups;
 use crate::state::ContactState;
 
 impl Contacts {
@@ -17,10 +18,14 @@ impl Contacts {
         points: &[Point<S>],
         velocities: &[Vec3<S>],
         kept_state: &ContactState,
+        groups: &mut Groups,
     ) {
         self.clear();
         let (layout, tools) = (step.layout, step.tools);
         self.move_tools(step, kept_state);
+        let places = (step.places(points), velocities);
+        let farthest = self.farthest_tool(step);
+        self.pairs.find(step, places, farthest, kept_state, groups);
         if tools.is_empty() {
             return;
         }
@@ -87,6 +92,17 @@ impl Contacts {
             self.jumped.push(has_jumped);
             self.starts.push(if has_jumped { tool.pose } else { *before });
         }
+    }
+
+    /// How far the tool that goes farthest in the step goes [m].
+    fn farthest_tool<S: Real>(&self, step: &ContactStep<'_, S>) -> f64 {
+        let ways = step.tools.iter().zip(&self.starts).map(|(tool, start)| {
+            let turn = axis_times_sine(&(tool.pose.rotation * start.rotation.transpose()));
+            let reach = tool.shape.reach();
+            let turned = if reach.is_finite() { turn.length() * reach } else { 0.0 };
+            (tool.pose.translation - start.translation).length() + turned
+        });
+        ways.fold(0.0, f64::max)
     }
 
     /// What the motion of tools gives to parts that stand still at `x`.

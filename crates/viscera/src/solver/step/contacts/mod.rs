@@ -14,6 +14,7 @@
 mod explicit;
 mod found;
 mod of_vertices;
+mod pairs;
 
 use std::ops::Range;
 
@@ -22,8 +23,10 @@ use crate::layout::{LaidSample, Layout};
 use crate::scalar::lanes::Point;
 use crate::scalar::rigid::{RigidTransform, axis_times_sine};
 use crate::scalar::{Mat3, Real, Vec3};
+use crate::solver::inputs::Pin;
 use crate::state::ContactState;
 pub use of_vertices::OfVertices;
+pub use pairs::{Pairs, Places};
 
 /// What samples and tools are to each other in a step.
 #[derive(Clone, Debug, Default)]
@@ -46,6 +49,8 @@ pub struct Contacts {
     presses: Vec<bool>,
     /// Of XPBD's rebase.
     pub of_vertices: OfVertices,
+    /// Of tissue and tissue.
+    pub pairs: Pairs,
 }
 
 /// What contact knows of a step.
@@ -53,8 +58,16 @@ pub struct Contacts {
 pub struct ContactStep<'a, S> {
     pub layout: &'a Layout<S>,
     pub tools: &'a [Tool],
+    pub pins: &'a [Pin<S>],
     /// [s].
     pub dt: f64,
+}
+
+impl<'a, S> ContactStep<'a, S> {
+    /// With the places of vertices [m].
+    pub fn places(&self, x: &'a [Point<S>]) -> Places<'a, S> {
+        Places { layout: self.layout, x }
+    }
 }
 
 /// What the motion of tools gives to a part in a step.
@@ -71,6 +84,20 @@ pub struct Gift {
 }
 
 impl Gift {
+    /// Of two parts.
+    pub fn plus(self, other: Self) -> Self {
+        let exact = match (self.exact, other.exact) {
+            (None, None) => None,
+            (a, b) => Some(a.unwrap_or(0.0) + b.unwrap_or(0.0)),
+        };
+        Self {
+            is_near: self.is_near || other.is_near,
+            lifted: self.lifted + other.lifted,
+            work: [self.work[0] + other.work[0], self.work[1] + other.work[1]],
+            exact,
+        }
+    }
+
     /// Work of the tools in the step [J].
     pub fn work(&self) -> f64 {
         self.exact.unwrap_or_else(|| self.work[1].max(self.mean_work()))
@@ -94,7 +121,7 @@ pub enum Bound {
 impl Contacts {
     /// For the steps of a model.
     pub fn new<S: Real>(layout: &Layout<S>) -> Self {
-        if layout.samples.is_empty() {
+        if layout.samples.is_empty() && layout.skin.is_none() {
             return Self::default();
         }
         Self {
@@ -104,6 +131,7 @@ impl Contacts {
             touching: Vec::with_capacity(layout.samples.len()),
             at_start: Vec::with_capacity(layout.samples.len()),
             of_vertices: OfVertices::new(layout),
+            pairs: Pairs::new(layout),
             ..Self::default()
         }
     }
@@ -116,6 +144,7 @@ impl Contacts {
             + size_of_val(&self.gifts[..])
             + size_of_val(&self.first[..])
             + self.of_vertices.bytes()
+            + self.pairs.bytes()
     }
 
     /// Forgets all contact: nothing touches anything.
@@ -125,6 +154,7 @@ impl Contacts {
         self.first.fill(0);
         self.presses.fill(false);
         self.gifts.fill(Gift::default());
+        self.pairs.clear();
     }
 
     /// Work [J] along the way of the tools of the forces that they exert on a part at `x`.
@@ -223,6 +253,9 @@ impl Contacts {
             let most = felt.force.length() + felt.stiffness * touching.foundation.thickness;
             sums.squared_force += most * most;
         });
+        let of_pairs = self.pairs.sums(step.places(x), part);
+        sums.energy += of_pairs.energy;
+        sums.squared_force += of_pairs.squared_force;
         sums
     }
 
@@ -241,7 +274,8 @@ impl Contacts {
             sums[0] += after - before;
             sums[1] += (after - before).abs();
         }
-        sums
+        let of_pairs = self.pairs.change(step.layout, part, [from, to]);
+        [sums[0] + of_pairs[0], sums[1] + of_pairs[1]]
     }
 
     /// The curvature of a part's energy along a direction of vertices [J].
@@ -257,7 +291,7 @@ impl Contacts {
             let d = sample.place(direction);
             sum += d.dot(felt.curvature() * d);
         });
-        sum
+        sum + self.pairs.curvature(step.places(x), part, direction)
     }
 
     /// Calls `add` with the vertices of every sample of a part, their weights and the curvature between them [N/m].
@@ -293,6 +327,18 @@ impl Contacts {
         });
     }
 
+    /// The same of pairs of a part's samples, on vertices of whatever part: after all parts of its group have their own.
+    pub fn add_pair_forces<S: Real>(
+        &self,
+        step: &ContactStep<'_, S>,
+        part: usize,
+        x: &[Point<S>],
+        bound: Bound,
+        loads: &mut [Point<S>],
+    ) {
+        self.pairs.add_forces(step.places(x), part, (step.dt, bound), loads);
+    }
+
     /// Adds `dt^2` times all forces of contact at `x` to the first copy of each vertex, and finds the blocks.
     pub fn load_vertices<S: Real>(
         &mut self,
@@ -321,6 +367,7 @@ impl Contacts {
                 }
             });
         }
+        self.pairs.load_vertices(step.places(x), step.dt, &mut of_vertices, loads);
         self.of_vertices = of_vertices;
     }
 
@@ -357,6 +404,9 @@ impl Contacts {
             });
         }
         self.wrenches = wrenches;
+        let ties = step.layout.skin.as_ref().map_or(0, |skin| skin.ties.len());
+        kept.torn.resize(ties, false);
+        self.pairs.end(step.places(x), &mut kept.pairs, &mut kept.torn);
         kept.poses.clear();
         kept.poses.extend(tools.iter().map(|tool| tool.pose));
     }

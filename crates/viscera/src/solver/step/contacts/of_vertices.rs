@@ -29,7 +29,11 @@ impl OfVertices {
     pub fn new<S: Real>(layout: &Layout<S>) -> Self {
         let mut places = vec![NONE; layout.vertex_count()];
         let mut count = 0;
-        for &v in layout.samples.iter().flat_map(|sample| &sample.vertices) {
+        let on_skin = layout.skin.iter().flat_map(|skin| {
+            let of_points = skin.skin.points.iter().flat_map(|point| &point.vertices);
+            skin.samples.iter().flat_map(|sample| &sample.vertices).chain(of_points)
+        });
+        for &v in layout.samples.iter().flat_map(|sample| &sample.vertices).chain(on_skin) {
             count += usize::from(std::mem::replace(&mut places[v as usize], 0) == NONE);
         }
         places.fill(NONE);

@@ -1,0 +1,138 @@
+//! What contact of tissue with tissue needs of an assembly: the surfaces of all bodies, and ties between them.
+
+use super::assemble::Assembly;
+use super::assemble_error::AssembleError;
+use crate::contact::search::{Closest, Grid, May, Since, closest};
+use crate::contact::skin::{SkinPoint, Tie as SkinTie, mean};
+use crate::contact::{Overlap, Skin};
+use crate::scalar::Vec3;
+use crate::scene::{Scene, Tie};
+
+/// A point of a surface belongs to a patch of vertices where those bear this share of it.
+const BORNE: f64 = 0.5;
+
+impl Assembly {
+    /// Takes the surfaces of all bodies for tissue to meet on, and ties them: fine surfaces where bodies have them, else the
+    /// outer faces of tetrahedra.
+    pub(super) fn take_skin(&mut self, scene: &Scene) -> Result<(), AssembleError> {
+        let contact = scene.contact.tissue();
+        if !(contact.itself || contact.bodies) && scene.ties.is_empty() {
+            return Ok(());
+        }
+        let mut skin = Skin::default();
+        for (number, body) in (0..).zip(&self.bodies) {
+            let first_tet = body.tets.start as u32;
+            let positions = self.builder.positions();
+            if body.has_fine_surface {
+                let first = (body.vertices.start as u32, first_tet);
+                skin.add_embedded(number, (&body.surface, &body.embedding), first, positions);
+            } else {
+                let tets = &self.builder.tets()[..body.tets.end];
+                skin.add_boundary(number, (tets, first_tet), positions);
+            }
+        }
+        for (number, tie) in (0..).zip(&scene.ties) {
+            let ties = self.tie(&skin, tie, number)?;
+            skin.ties.extend(ties);
+        }
+        let overlap = self.builder.set_skin(skin, &contact);
+        self.check_overlap(scene, overlap)
+    }
+
+    /// Bodies may touch at rest, or overlap by as much as contact is thick; it begins there.
+    fn check_overlap(
+        &mut self,
+        scene: &Scene,
+        overlap: Option<Overlap>,
+    ) -> Result<(), AssembleError> {
+        let Some(Overlap { bodies, distance }) = overlap else { return Ok(()) };
+        let [one, other] = bodies.map(|body| self.bodies[body].name.clone());
+        let thickness = scene.contact.thickness;
+        if distance <= -thickness {
+            return Err(AssembleError::BodiesOverlap { one, other, depth: -distance, thickness });
+        }
+        self.notes.push(if distance < 0.0 {
+            format!(
+                "bodies `{one}` and `{other}` overlap by up to {:.2} mm at rest; contact begins where they are",
+                -1e3 * distance
+            )
+        } else {
+            format!(
+                "bodies `{one}` and `{other}` are {:.2} mm apart at rest, which is closer than contact is thick \
+                 ({:.2} mm); it begins where they are",
+                1e3 * distance,
+                1e3 * thickness
+            )
+        });
+        Ok(())
+    }
+
+    /// The ties of one of the scene's.
+    fn tie(&self, skin: &Skin, tie: &Tie, group: u32) -> Result<Vec<SkinTie>, AssembleError> {
+        let positions = self.builder.positions();
+        let [from, to] = [&tie.from, &tie.to].map(|patch| self.resolve(patch));
+        let (from, to) = (from?.vertices, to?.vertices);
+        let [body, other] = [tie.from.body, tie.to.body].map(|body| body as u32);
+        let at: Vec<Vec3<f64>> = skin
+            .points
+            .iter()
+            .map(|point| mean(point.vertices, point.weights, positions))
+            .collect();
+        let is_on: Vec<bool> = (0..)
+            .zip(&skin.triangles)
+            .map(|(number, triangle)| {
+                let borne = triangle.map(|point| borne(&skin.points[point as usize], &to));
+                skin.bodies[number] == other && borne.iter().all(|share| *share >= BORNE)
+            })
+            .collect();
+        let mut grid = Grid::new(skin.triangles.len());
+        grid.sort(&skin.triangles, &at, tie.distance);
+        grid.turn(&vec![Vec3::ZERO; skin.triangles.len()]);
+        let corners = |t: u32| skin.triangles[t as usize].map(|point| at[point as usize]);
+        let (mut ties, mut nearest) = (Vec::new(), f64::INFINITY);
+        for (number, sample) in (0..).zip(&skin.samples) {
+            let point = SkinPoint { vertices: sample.vertices, weights: sample.weights };
+            let is_own =
+                skin.sample_bodies[number as usize] == body && borne(&point, &from) >= BORNE;
+            if !is_own {
+                continue;
+            }
+            let p = mean(sample.vertices, sample.weights, positions);
+            let may = |t: u32, _: f64| if is_on[t as usize] { May::Now } else { May::Never };
+            let reaches = [tie.distance; 2];
+            let (found, _) =
+                grid.nearest(p, reaches, Since::NOTHING, corners, Vec3::ZERO, may, |_, _| true);
+            let Some(found) = found else {
+                let all = (0..skin.triangles.len() as u32).filter(|&t| is_on[t as usize]);
+                let far = |triangle: u32| closest(p, corners(triangle)).away.length();
+                nearest = all.map(far).fold(nearest, f64::min);
+                continue;
+            };
+            let Closest { weights, .. } = found.closest;
+            ties.push(SkinTie {
+                sample: number,
+                triangle: found.triangle,
+                weights,
+                rest: found.closest.in_triangle(corners(found.triangle)),
+                stiffness: tie.stiffness * sample.area,
+                strength: tie.strength.map_or(f64::INFINITY, |strength| strength * sample.area),
+                group,
+            });
+        }
+        if ties.is_empty() {
+            return Err(AssembleError::TiesNothing {
+                place: tie.place.clone(),
+                tie: tie.name.clone(),
+                distance: tie.distance,
+                nearest,
+            });
+        }
+        Ok(ties)
+    }
+}
+
+/// The share of a point that vertices of a patch bear, which ascend.
+fn borne(point: &SkinPoint, patch: &[u32]) -> f64 {
+    let all = point.vertices.iter().zip(&point.weights);
+    all.filter(|(v, _)| patch.binary_search(v).is_ok()).map(|(_, weight)| weight).sum()
+}

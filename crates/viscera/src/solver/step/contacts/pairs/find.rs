@@ -1,0 +1,294 @@
+//! The beginning of a step: samples of tissue look for the tissue in their way.
+//!
+//! ```text
+//! reach = 2 dh + 2 w,   w: the way of the fastest vertex or tool in the step
+//! ```
+//!
+//! A sample that had nothing within a distance looks again when vertices have travelled so far that this may have changed. It
+//! decides when to look, and never what is found.
+
+use super::{Pairs, Places, Search};
+use crate::contact::search::{Found, Since};
+use crate::contact::{Bond, Foundation, Kept, Moment, Pair, from_edges, turn_normals};
+use crate::layout::LaidSkin;
+use crate::scalar::{Real, Vec3};
+use crate::solver::step::contacts::ContactStep;
+use crate::solver::step::groups::Groups;
+use crate::state::ContactState;
+
+/// In a step nothing is looked for further than so many thicknesses.
+const FARTHEST: f64 = 40.0;
+
+/// Samples look so many thicknesses further than the step asks for, so that they need not look again soon.
+const MARGIN: f64 = 3.0;
+
+/// Larger than what rounding makes of sums of ways [m].
+const ROUNDING: f64 = 1e-9;
+
+/// The grid is sorted anew when vertices have travelled this share of its queries' reach.
+const STALE: f64 = 0.25;
+
+impl Pairs {
+    /// Finds the pairs of a step in which tools go no further than `tools` [m], and the groups that follow.
+    pub fn find<S: Real>(
+        &mut self,
+        step: &ContactStep<'_, S>,
+        (places, velocities): (Places<'_, S>, &[Vec3<S>]),
+        tools: f64,
+        state: &ContactState,
+        groups: &mut Groups,
+    ) {
+        self.clear();
+        groups.part_all();
+        let Some(skin) = &step.layout.skin else { return };
+        let thickness = skin.contact.law.thickness;
+        let fastest = self.search.go(step, places, velocities).max(tools);
+        let reach = (2.0 * thickness + 2.0 * fastest).min(FARTHEST * thickness);
+        if self.search.is_quiet(reach) && state.pairs.is_empty() && skin.ties.is_empty() {
+            return;
+        }
+        self.search.prepare(skin, places, reach);
+        let mut kept = state.pairs.iter().peekable();
+        let mut ties = skin.ties.iter().peekable();
+        for part in 0..step.layout.part_count() {
+            self.first[part] = self.pairs.len();
+            for place in skin.samples_of(part) {
+                let number = skin.samples[place].number;
+                // What the last step has left is sorted as samples are.
+                let key = |kept: &Kept| (skin.part_of(kept.sample), kept.sample);
+                while kept.next_if(|kept| key(kept) < (part, number)).is_some() {}
+                let kept = kept.next_if(|kept| key(kept) == (part, number));
+                self.meet(skin, places, place, kept, reach);
+                while let Some(&(_, tie)) = ties.next_if(|tie| tie.0 as usize == place) {
+                    if !state.torn.get(tie as usize).copied().unwrap_or(false) {
+                        self.pairs.push(tied(skin, places, place, tie));
+                    }
+                }
+            }
+            let pressed =
+                |pair: &Pair| matches!(pair.bond, Bond::Contact { friction: Some(_), .. });
+            self.presses[part] = self.pairs[self.first[part]..].iter().any(pressed);
+        }
+        self.first[step.layout.part_count()] = self.pairs.len();
+        self.at_start.extend_from_slice(&self.pairs);
+        let until = self.search.until.iter().copied();
+        self.search.first_until = until.fold(f64::INFINITY, f64::min);
+        for pair in &self.pairs {
+            let parts =
+                [skin.samples[pair.sample as usize].part, skin.parts[pair.triangle as usize]];
+            groups.join(parts[0] as usize, parts[1] as usize);
+        }
+        groups.settle();
+    }
+
+    /// How far tissue comes closer to tissue in a frame, at most, where they may meet in it and the fastest vertex goes further
+    /// than a `free` way [m]; zero elsewhere. The state alone decides, not what was found before.
+    pub fn approach<S: Real>(
+        &mut self,
+        frame: &ContactStep<'_, S>,
+        (places, velocities): (Places<'_, S>, &[Vec3<S>]),
+        free: f64,
+    ) -> f64 {
+        let Some(skin) = &frame.layout.skin else { return 0.0 };
+        let thickness = skin.contact.law.thickness;
+        let fastest = self.search.go(frame, places, velocities);
+        // Two surfaces may come towards each other.
+        let reach = (thickness + 2.0 * fastest).min(FARTHEST * thickness);
+        if 2.0 * fastest <= free || self.search.is_quiet(reach) {
+            return 0.0;
+        }
+        self.search.prepare(skin, places, reach);
+        let mut closest = 0.0f64;
+        for place in 0..skin.samples.len() {
+            if self.search.is_far(place, reach) {
+                continue;
+            }
+            let sample = &skin.samples[place];
+            let own = (sample.number as usize, sample.place(places.x));
+            let found = self.search.look(skin, (place, own), None, reach);
+            let Some(found) = found else { continue };
+            let (distance, normal) = found.closest.signed();
+            let mut way = Vec3::ZERO;
+            for (&v, &weight) in sample.vertices.iter().zip(&sample.weights) {
+                way += self.search.ways[v as usize] * weight;
+            }
+            let weights = &found.closest.weights;
+            skin.each_corner(found.triangle, weights, |v, weight| {
+                way -= self.search.ways[v] * weight;
+            });
+            let approach = -normal.dot(way);
+            if distance - approach < thickness {
+                closest = closest.max(approach);
+            }
+        }
+        closest
+    }
+
+    /// What one sample meets.
+    fn meet<S: Real>(
+        &mut self,
+        skin: &LaidSkin,
+        places: Places<'_, S>,
+        place: usize,
+        kept: Option<&Kept>,
+        reach: f64,
+    ) {
+        let search = &mut self.search;
+        if kept.is_none() && search.is_far(place, reach) {
+            return;
+        }
+        let sample = &skin.samples[place];
+        let number = sample.number as usize;
+        let own = (number, sample.place(places.x));
+        let before = kept.map(|kept| kept.triangle);
+        let Some(found) = search.look(skin, (place, own), before, reach) else { return };
+        let moment = search.moment(skin);
+        let (_, normal) = found.closest.signed();
+        let thickness = skin.contact.law.thickness;
+        let (weights, shift) = (found.closest.weights, skin.skin.shifts[number]);
+        // What friction has kept is in terms of the triangle that it was kept on.
+        let slip =
+            kept.map_or(Vec3::ZERO, |kept| from_edges(kept.slip, moment.corners(kept.triangle)));
+        let law = &skin.contact.law;
+        let [own, other] = [sample.stiffness, skin.stiffness[found.triangle as usize]];
+        // Each side is the foundation of the other, and has half of the area.
+        let foundation = Foundation {
+            area: 0.5 * sample.area * moment.facing(number, &found),
+            stiffness: law.stiffness * own * other / (own + other),
+            thickness,
+        };
+        let friction = kept.and_then(|kept| {
+            let limit = law.friction * kept.pressed;
+            (limit > 0.0).then_some((foundation.area * foundation.stiffness, limit))
+        });
+        let coefficient = law.friction;
+        self.pairs.push(Pair {
+            sample: place as u32,
+            triangle: found.triangle,
+            weights,
+            normal,
+            offset: slip - found.closest.away,
+            bond: Bond::Contact { foundation, shift, friction, coefficient },
+        });
+    }
+}
+
+/// A tie in this step.
+fn tied<S: Real>(skin: &LaidSkin, places: Places<'_, S>, place: usize, number: u32) -> Pair {
+    let tie = &skin.skin.ties[number as usize];
+    let corner = |k: usize| {
+        let mut weights = [0.0; 3];
+        weights[k] = 1.0;
+        skin.place(tie.triangle, &weights, places.x)
+    };
+    let corners = [0, 1, 2].map(corner);
+    let [a, b, c] = corners;
+    let normal = (b - a).cross(c - a);
+    let normal = normal * (1.0 / normal.length());
+    let normal = if normal.is_finite() { normal } else { Vec3::ZERO };
+    let [on_b, on_c, along] = tie.rest;
+    let rest = from_edges([on_b, on_c], corners) + normal * along;
+    Pair {
+        sample: place as u32,
+        triangle: tie.triangle,
+        weights: tie.weights,
+        normal,
+        offset: Vec3::ZERO,
+        bond: Bond::Tie { number, stiffness: tie.stiffness, rest },
+    }
+}
+
+impl Search {
+    /// Counts how far vertices have travelled since the last look, and finds where each goes in the step, apart from what all
+    /// have in common. Returns how far the fastest goes [m].
+    fn go<S: Real>(
+        &mut self,
+        step: &ContactStep<'_, S>,
+        Places { x, layout }: Places<'_, S>,
+        velocities: &[Vec3<S>],
+    ) -> f64 {
+        let (mut sum, mut shift) = (Vec3::<f64>::ZERO, Vec3::<f64>::ZERO);
+        let share = 1.0 / self.ways.len().max(1) as f64;
+        for ((x, seen), velocity) in x.iter().zip(&self.seen).zip(velocities) {
+            shift += x.vec3().cast::<f64>() - *seen;
+            sum += velocity.cast::<f64>();
+        }
+        let (common, shift) = (sum * (step.dt * share), shift * share);
+        let mut moved = 0.0f64;
+        let all = self.seen.iter_mut().zip(&mut self.ways).zip(x.iter().zip(velocities));
+        for ((seen, way), (x, velocity)) in all {
+            let x = x.vec3().cast::<f64>();
+            moved = moved.max((x - *seen - shift).length_squared());
+            (*seen, *way) = (x, velocity.cast::<f64>() * step.dt);
+        }
+        self.travelled += moved.sqrt();
+        // The grid stays where it is.
+        self.drift += shift;
+        for pin in step.pins {
+            let v = layout.numbering.of(pin.vertex);
+            self.ways[v] = pin.target.cast::<f64>() - self.seen[v];
+        }
+        let ways = self.ways.iter().map(|way| (*way - common).length_squared());
+        ways.fold(0.0, f64::max).sqrt()
+    }
+
+    /// Whether no sample meets anything within reach [m] because nothing has been deformed since it was looked for.
+    fn is_quiet(&self, reach: f64) -> bool {
+        self.travelled == self.prepared_at && self.first_until > 2.0 * self.travelled + reach
+    }
+
+    /// Whether a sample surely meets nothing within reach [m], after [`Search::prepare`].
+    fn is_far(&self, place: usize, reach: f64) -> bool {
+        self.until[place] > 2.0 * self.travelled + reach && self.until_turned[place] > self.turned
+    }
+
+    fn moment<'a>(&'a self, skin: &'a LaidSkin) -> Moment<'a> {
+        let Self { grid, at, normals, travelled, sorted_at, drift, .. } = self;
+        let (skin, contact) = (&skin.skin, &skin.contact);
+        // Rounding of sums of small ways hides no triangle.
+        let since = Since { drift: *drift, moved: travelled - sorted_at + ROUNDING };
+        Moment { skin, at, normals, grid, since, contact }
+    }
+
+    /// What a sample meets within reach [m], see [`Moment::meet`]; remembers how long it will not meet anything else.
+    fn look(
+        &mut self,
+        skin: &LaidSkin,
+        (place, sample): (usize, (usize, Vec3<f64>)),
+        kept: Option<u32>,
+        reach: f64,
+    ) -> Option<Found> {
+        let farther = reach + MARGIN * skin.contact.law.thickness;
+        let mut marks = std::mem::take(&mut self.marks);
+        let moment = self.moment(skin);
+        let (found, clearance) = moment.meet(&mut marks, sample, kept, [reach, farther]);
+        let turned = self.turned + moment.free_turn(sample.0);
+        self.marks = marks;
+        self.until[place] = clearance + 2.0 * self.travelled;
+        self.until_turned[place] = turned;
+        found
+    }
+
+    /// Places of the skin's points, and a grid that is not too old.
+    fn prepare<S: Real>(&mut self, skin: &LaidSkin, places: Places<'_, S>, reach: f64) {
+        for (at, point) in self.at.iter_mut().zip(&skin.skin.points) {
+            let all = point.vertices.iter().zip(&point.weights);
+            *at = all.fold(Vec3::ZERO, |sum, (&v, &weight)| {
+                sum + places.x[v as usize].vec3().cast::<f64>() * weight
+            });
+        }
+        self.prepared_at = self.travelled;
+        self.turned += turn_normals(&skin.skin, &self.at, &mut self.normals);
+        // The first look comes from nowhere, and numbers that have grown without bound tell nothing.
+        let is_new = self.sorted_at < 0.0 || !self.travelled.is_finite();
+        if is_new {
+            (self.travelled, self.prepared_at, self.turned) = (0.0, 0.0, 0.0);
+            self.until.fill(0.0);
+        }
+        if is_new || self.travelled - self.sorted_at > STALE * reach {
+            self.grid.sort(&skin.skin.triangles, &self.at, reach);
+            (self.sorted_at, self.drift) = (self.travelled, Vec3::ZERO);
+        }
+        self.grid.turn(&self.normals);
+    }
+}

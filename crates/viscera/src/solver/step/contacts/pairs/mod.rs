@@ -1,0 +1,402 @@
+//! Tissue that meets tissue in a step.
+//!
+//! ```text
+//! Phi += dt^2 sum_p E_p,   force on vertex i: sum_p w_pi f_p,   w: weights of the sample, less those of the triangle's point
+//! bound at a vertex: |w_i| sum_a |w_a| dt^2 (C_p)
+//! ```
+//!
+//! Every sample meets one triangle at most, and both sides of a contact have samples. Energies count as those of the sample's
+//! part; parts that share a pair are one group (`groups.rs`).
+
+mod find;
+
+use super::{Bound, Sums};
+use crate::contact::search::Grid;
+use crate::contact::{Bond, Felt, Kept, Marks, Pair};
+use crate::layout::{LaidSample, LaidSkin, Layout};
+use crate::scalar::lanes::Point;
+use crate::scalar::{Mat3, Real, Vec3};
+use crate::solver::step::contacts::OfVertices;
+
+/// Tissue and tissue in a step.
+#[derive(Clone, Debug, Default)]
+pub struct Pairs {
+    /// Part by part of their samples.
+    pairs: Vec<Pair>,
+    /// The same where the step begins.
+    at_start: Vec<Pair>,
+    /// The first of each part, and the end of the last one's.
+    first: Vec<usize>,
+    /// Of each part, whether tissue presses on one of its samples where the step begins.
+    presses: Vec<bool>,
+    search: Search,
+}
+
+/// What finding pairs keeps, none of which changes what is found.
+#[derive(Clone, Debug, Default)]
+struct Search {
+    grid: Grid,
+    marks: Marks,
+    /// Where vertices were when it looked last [m].
+    seen: Vec<Vec3<f64>>,
+    /// How far the vertex that moves most beside the mean of all has moved since the beginning, from look to look [m].
+    travelled: f64,
+    /// The same when the grid was sorted, below zero before; and when normals were found.
+    sorted_at: f64,
+    prepared_at: f64,
+    /// How far all of it has moved since then [m].
+    drift: Vec3<f64>,
+    /// Places of the skin's points [m], and normals of its triangles.
+    at: Vec<Vec3<f64>>,
+    normals: Vec<Vec3<f64>>,
+    /// Where vertices go in the step [m].
+    ways: Vec<Vec3<f64>>,
+    /// How far the normal that turns most has turned since the beginning, from look to look [rad]; and how far it may until a
+    /// sample may meet others.
+    turned: f64,
+    until_turned: Vec<f64>,
+    /// How far vertices may travel from the beginning on until a sample may meet something within reach [m], and the least.
+    until: Vec<f64>,
+    first_until: f64,
+}
+
+/// What pairs know of a step.
+#[derive(Clone, Copy)]
+pub struct Places<'a, S> {
+    pub layout: &'a Layout<S>,
+    /// Of vertices [m].
+    pub x: &'a [Point<S>],
+}
+
+impl Pairs {
+    /// For the steps of a model.
+    pub fn new<S: Real>(layout: &Layout<S>) -> Self {
+        let Some(skin) = &layout.skin else { return Self::default() };
+        let (samples, vertices) = (skin.samples.len(), layout.vertex_count());
+        let room = samples + skin.ties.len();
+        Self {
+            pairs: Vec::with_capacity(room),
+            at_start: Vec::with_capacity(room),
+            first: vec![0; layout.part_count() + 1],
+            presses: vec![false; layout.part_count()],
+            search: Search {
+                grid: Grid::new(skin.skin.triangles.len()),
+                marks: Marks::new(vertices),
+                seen: vec![Vec3::ZERO; vertices],
+                travelled: 0.0,
+                sorted_at: -1.0,
+                prepared_at: -1.0,
+                drift: Vec3::ZERO,
+                normals: Vec::with_capacity(skin.skin.triangles.len()),
+                at: vec![Vec3::ZERO; skin.skin.points.len()],
+                ways: vec![Vec3::ZERO; vertices],
+                turned: 0.0,
+                until_turned: vec![0.0; samples],
+                until: vec![0.0; samples],
+                first_until: 0.0,
+            },
+        }
+    }
+
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        let Search { grid, marks, seen, at, ways, normals, until, until_turned, .. } = &self.search;
+        (self.pairs.capacity() + self.at_start.capacity()) * size_of::<Pair>()
+            + size_of_val(&self.first[..])
+            + grid.bytes()
+            + marks.bytes()
+            + [seen, at, ways, normals].map(|all| size_of_val(&all[..])).iter().sum::<usize>()
+            + size_of_val(&until[..])
+            + size_of_val(&until_turned[..])
+    }
+
+    /// Forgets all pairs.
+    pub fn clear(&mut self) {
+        self.pairs.clear();
+        self.at_start.clear();
+        self.first.fill(0);
+        self.presses.fill(false);
+    }
+
+    /// Whether tissue presses on samples of a part where the step begins.
+    pub fn presses(&self, part: usize) -> bool {
+        self.presses.get(part).copied().unwrap_or(false)
+    }
+
+    /// Of the samples of a part.
+    fn of_part(&self, part: usize) -> &[Pair] {
+        match (self.first.get(part), self.first.get(part + 1)) {
+            (Some(&start), Some(&end)) => &self.pairs[start..end],
+            _ => &[],
+        }
+    }
+
+    /// Calls `act` with every pair of a part's samples, its sample, its way [m] and what it feels at `x`.
+    pub fn each<S: Real>(
+        &self,
+        Places { layout, x }: Places<'_, S>,
+        part: usize,
+        mut act: impl FnMut(&Pair, &LaidSample, Vec3<f64>, &Felt),
+    ) {
+        let Some(skin) = &layout.skin else { return };
+        for pair in self.of_part(part) {
+            let sample = &skin.samples[pair.sample as usize];
+            let away = away(skin, pair, sample, x);
+            act(pair, sample, away, &pair.feel(away));
+        }
+    }
+
+    /// Energy of a part's pairs at `x`, and what round-off of places makes of it.
+    pub fn sums<S: Real>(&self, places: Places<'_, S>, part: usize) -> Sums {
+        let mut sums = Sums::default();
+        self.each(places, part, |pair, _, _, felt| {
+            sums.energy += felt.energy;
+            let thickness = match pair.bond {
+                Bond::Contact { foundation, .. } => foundation.thickness,
+                Bond::Tie { .. } => 0.0,
+            };
+            let most = felt.force.length() + felt.stiffness * thickness;
+            // Both ends are rounded.
+            sums.squared_force += 2.0 * most * most;
+        });
+        sums
+    }
+
+    /// The change of the energy [J] of a part's pairs from one place to another, and the sum of the magnitudes of its terms.
+    pub fn change<S: Real>(
+        &self,
+        layout: &Layout<S>,
+        part: usize,
+        [from, to]: [&[Point<S>]; 2],
+    ) -> [f64; 2] {
+        let Some(skin) = &layout.skin else { return [0.0; 2] };
+        let mut sums = [0.0; 2];
+        for pair in self.of_part(part) {
+            let sample = &skin.samples[pair.sample as usize];
+            let [before, after] = [from, to].map(|x| pair.feel(away(skin, pair, sample, x)).energy);
+            sums[0] += after - before;
+            sums[1] += (after - before).abs();
+        }
+        sums
+    }
+
+    /// The curvature of the energy of a part's pairs along a direction of vertices [J].
+    pub fn curvature<S: Real>(
+        &self,
+        places: Places<'_, S>,
+        part: usize,
+        direction: &[Point<S>],
+    ) -> f64 {
+        let Some(skin) = &places.layout.skin else { return 0.0 };
+        let mut sum = 0.0;
+        self.each(places, part, |pair, sample, _, felt| {
+            let d = away(skin, pair, sample, direction);
+            sum += d.dot(felt.curvature() * d);
+        });
+        sum
+    }
+
+    /// Calls `add` with what bears on vertices of any part by the pairs of all parts: four vertices, their weights and a block
+    /// [N/m], blocks of one pair together being no smaller than its curvature.
+    pub fn each_block<S: Real>(
+        &self,
+        places: Places<'_, S>,
+        mut add: impl FnMut(&[u32; 4], &[f64; 4], Mat3<f64>),
+    ) {
+        let Some(skin) = &places.layout.skin else { return };
+        for part in 0..places.layout.part_count() {
+            self.each(places, part, |pair, sample, _, felt| {
+                if felt.pressed > 0.0 || felt.drag > 0.0 {
+                    // (p - q)^2 <= 2 p^2 + 2 q^2, and q^2 <= sum_k beta_k y_k^2 of the triangle's corners y_k.
+                    let block = felt.curvature() * 2.0;
+                    add(&sample.vertices, &sample.weights, block);
+                    let points = skin.skin.triangles[pair.triangle as usize]
+                        .map(|point| &skin.skin.points[point as usize]);
+                    if points.iter().all(|point| point.weights[0] == 1.0) {
+                        let [a, b, c] = points.map(|point| point.vertices[0]);
+                        let [on_a, on_b, on_c] = pair.weights;
+                        add(&[a, b, c, a], &[on_a, on_b, on_c, 0.0], block);
+                        return;
+                    }
+                    for (point, weight) in points.into_iter().zip(pair.weights) {
+                        add(&point.vertices, &point.weights, block * weight);
+                    }
+                }
+            });
+        }
+    }
+
+    /// Calls with every vertex that a pair of a part's samples bears on: its weight, the sum of their magnitudes and what the
+    /// sample feels at `x`.
+    fn each_vertex<S: Real>(
+        &self,
+        places: Places<'_, S>,
+        part: usize,
+        mut act: impl FnMut(usize, f64, f64, &Felt),
+    ) {
+        let Some(skin) = &places.layout.skin else { return };
+        self.each(places, part, |pair, sample, _, felt| {
+            if felt.force == Vec3::ZERO && felt.drag == 0.0 {
+                return;
+            }
+            each_weight(skin, pair, sample, |v, weight, sum| act(v, weight, sum, felt));
+        });
+    }
+
+    /// Calls with every vertex that pairs bear on and the force [N], places of vertices [m] being from elsewhere.
+    pub fn each_force_at<S: Real>(
+        &self,
+        layout: &Layout<S>,
+        place: impl Fn(usize) -> Vec3<S>,
+        mut act: impl FnMut(usize, Vec3<f64>),
+    ) {
+        let Some(skin) = &layout.skin else { return };
+        for pair in &self.pairs {
+            let sample = &skin.samples[pair.sample as usize];
+            let mut away = sample.mean(&place);
+            skin.each_corner(pair.triangle, &pair.weights, |v, weight| {
+                away -= place(v).cast::<f64>() * weight;
+            });
+            let force = pair.feel(away).force;
+            each_weight(skin, pair, sample, |v, weight, _| act(v, force * weight));
+        }
+    }
+
+    /// Adds `dt^2` times the forces of a part's pairs to the first copy of each vertex, of whatever part, and the bound of the
+    /// curvature.
+    pub fn add_forces<S: Real>(
+        &self,
+        places: Places<'_, S>,
+        part: usize,
+        (dt, bound): (f64, Bound),
+        loads: &mut [Point<S>],
+    ) {
+        let copies = &places.layout.copy_offsets;
+        self.each_vertex(places, part, |v, weight, sum, felt| {
+            let stiffness = match bound {
+                Bound::Without => 0.0,
+                Bound::Here => (felt.stiffness + felt.tie).max(felt.drag),
+            };
+            let load = load(dt, felt.force, (weight, sum), stiffness);
+            loads[copies[v] as usize].add(load);
+        });
+    }
+
+    /// The same of all parts, with blocks in place of bounds.
+    pub fn load_vertices<S: Real>(
+        &self,
+        places: Places<'_, S>,
+        dt: f64,
+        of_vertices: &mut OfVertices,
+        loads: &mut [Point<S>],
+    ) {
+        let copies = &places.layout.copy_offsets;
+        for part in 0..places.layout.part_count() {
+            self.each_vertex(places, part, |v, weight, sum, felt| {
+                loads[copies[v] as usize].add(load(dt, felt.force, (weight, 0.0), 0.0));
+                let block = felt.curvature() * (dt * dt * weight.abs() * sum);
+                of_vertices.add(v as u32, block);
+            });
+        }
+    }
+
+    /// As [`Pairs::add_forces`] in the middle of a small step of explicit motion: samples slip where they are, and the bound
+    /// is a `share` of the curvature that they may have after moving by half the thickness.
+    pub fn add_forces_in_motion<S: Real>(
+        &mut self,
+        Places { layout, x }: Places<'_, S>,
+        part: usize,
+        (dt, share): (f64, f64),
+        loads: &mut [Point<S>],
+    ) {
+        let Some(skin) = &layout.skin else { return };
+        let range = self.range(part);
+        for pair in &mut self.pairs[range] {
+            let sample = &skin.samples[pair.sample as usize];
+            let away = away(skin, pair, sample, x);
+            let felt = pair.slip_now(away);
+            let stiffness = share * pair.stiffness_near(&felt);
+            each_weight(skin, pair, sample, |v, weight, sum| {
+                let load = load(dt, felt.force, (weight, sum), stiffness);
+                loads[layout.copy_offsets[v] as usize].add(load);
+            });
+        }
+    }
+
+    /// Samples slip where the step has ended.
+    pub fn slip<S: Real>(&mut self, Places { layout, x }: Places<'_, S>, part: usize) {
+        let Some(skin) = &layout.skin else { return };
+        let range = self.range(part);
+        for pair in &mut self.pairs[range] {
+            let sample = &skin.samples[pair.sample as usize];
+            pair.slip_now(away(skin, pair, sample, x));
+        }
+    }
+
+    /// Puts a part back to where its step begins.
+    pub fn begin_again(&mut self, part: usize) {
+        let range = self.range(part);
+        self.pairs[range.clone()].copy_from_slice(&self.at_start[range]);
+    }
+
+    fn range(&self, part: usize) -> std::ops::Range<usize> {
+        match (self.first.get(part), self.first.get(part + 1)) {
+            (Some(&start), Some(&end)) => start..end,
+            _ => 0..0,
+        }
+    }
+
+    /// What is kept of a step that has ended at `x`.
+    pub fn end<S: Real>(&self, places: Places<'_, S>, kept: &mut Vec<Kept>, torn: &mut [bool]) {
+        kept.clear();
+        let Places { layout, x } = places;
+        let Some(skin) = &layout.skin else { return };
+        for part in 0..layout.part_count() {
+            self.each(places, part, |pair, sample, away, felt| {
+                if let Bond::Tie { number, .. } = pair.bond {
+                    let strength = skin.skin.ties[number as usize].strength;
+                    torn[number as usize] |= felt.force.length() > strength;
+                    return;
+                }
+                let corner = |point: u32| {
+                    let point = &skin.skin.points[point as usize];
+                    let all = point.vertices.iter().zip(&point.weights);
+                    all.fold(Vec3::ZERO, |sum, (&v, &weight)| {
+                        sum + x[v as usize].vec3().cast::<f64>() * weight
+                    })
+                };
+                let corners = skin.skin.triangles[pair.triangle as usize].map(corner);
+                kept.extend(pair.keep(sample.number, away, felt, corners));
+            });
+        }
+    }
+}
+
+/// From the triangle's point to the sample, at places `x` or along a direction [m].
+fn away<S: Real>(skin: &LaidSkin, pair: &Pair, sample: &LaidSample, x: &[Point<S>]) -> Vec3<f64> {
+    sample.place(x) - skin.place(pair.triangle, &pair.weights, x)
+}
+
+/// Calls with every vertex that a pair bears on, its weight, and the sum of the magnitudes of all.
+fn each_weight(
+    skin: &LaidSkin,
+    pair: &Pair,
+    sample: &LaidSample,
+    mut act: impl FnMut(usize, f64, f64),
+) {
+    let mut sum: f64 = sample.weights.iter().map(|weight| weight.abs()).sum();
+    skin.each_corner(pair.triangle, &pair.weights, |_, weight| sum += weight.abs());
+    for (&v, &weight) in sample.vertices.iter().zip(&sample.weights) {
+        if weight != 0.0 {
+            act(v as usize, weight, sum);
+        }
+    }
+    skin.each_corner(pair.triangle, &pair.weights, |v, weight| act(v, -weight, sum));
+}
+
+/// `dt^2` times a force [N] at a vertex of this weight, with a bound of stiffness [N/m].
+fn load<S: Real>(dt: f64, force: Vec3<f64>, (weight, sum): (f64, f64), stiffness: f64) -> Point<S> {
+    let squared = dt * dt;
+    let bound = S::from_f64(squared * stiffness * weight.abs() * sum);
+    Point::new((force * (squared * weight)).cast(), bound)
+}
