@@ -7,7 +7,7 @@ use super::recorder::choices;
 use crate::scalar::Real;
 use crate::scene::{Scene, SceneError};
 use crate::simulation::{
-    FrameError, LiveError, ResumeError, SavedDifference, Simulation, difference_of_saved,
+    FrameError, LiveError, ResumeError, SavedDifference, Simulation, difference_of_saved, is_saved,
 };
 
 /// Why a file is no recording that can be played.
@@ -19,6 +19,9 @@ pub enum RecordError {
         "this is no recording; give a file that `viscera run --record` or the window has written"
     )]
     NotRecording,
+    /// It is a saved simulation.
+    #[error("this is a saved simulation, no recording; go on from it with `viscera run --resume`")]
+    Saved,
     /// It was written by another version.
     #[error(
         "it was recorded by viscera {version} in format {format}, and this program, {}, reads format {FORMAT}; replay it \
@@ -153,6 +156,7 @@ impl Recording {
     /// Reads as much of a recording as is there and unchanged.
     pub fn read(bytes: &[u8]) -> Result<Self, RecordError> {
         let (version, mut chunks) = match chunk::prefix(bytes) {
+            Prefix::Foreign if is_saved(bytes) => return Err(RecordError::Saved),
             Prefix::Foreign => return Err(RecordError::NotRecording),
             Prefix::Cut => return Err(RecordError::Empty { at: bytes.len() }),
             Prefix::Other { format, version } => {

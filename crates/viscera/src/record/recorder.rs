@@ -17,7 +17,7 @@ const BETWEEN_SNAPSHOTS: f64 = 10.0;
 /// ```text
 /// let (mut recorder, bytes) = Recorder::begin(&mut simulation, files);    a file begins with these bytes
 /// simulation.advance_frame()?; file.write_all(&recorder.frame(&mut simulation))?;      after each frame, before hands act
-/// file.write_all(&recorder.end(&mut simulation))?;
+/// file.write_all(&recorder.end())?;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Recorder {
@@ -70,11 +70,9 @@ impl Recorder {
         bytes
     }
 
-    /// The last bytes.
-    pub fn end<S: Real>(mut self, simulation: &mut Simulation<S>) -> Vec<u8> {
-        simulation.take_acts();
+    /// The last bytes: of a recording that ended as it was meant to, or with the failure of a frame.
+    pub fn end(mut self) -> Vec<u8> {
         let mut bytes = self.flush();
-        bytes.extend(self.snapshot(simulation));
         bytes.extend(self.writer.chunk(Kind::End, &written(&self.count)));
         bytes
     }

@@ -44,7 +44,7 @@ pub use mesh_error::{MESH_ERROR_TETS, MeshReport};
 pub use report::{FrameReport, PatchForce, PatchKind};
 pub use rest::{RestReport, Standing};
 pub use saved::ResumeError;
-pub(crate) use saved::{SavedDifference, difference_of_saved};
+pub(crate) use saved::{SavedDifference, difference_of_saved, is_saved};
 
 use crate::layout::Layout;
 use crate::measure::{

@@ -312,6 +312,11 @@ impl<S: Real> Simulation<S> {
     }
 }
 
+/// Whether bytes begin like a saved simulation.
+pub(crate) fn is_saved(bytes: &[u8]) -> bool {
+    bytes.starts_with(MAGIC)
+}
+
 /// What is different in two saved simulations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SavedDifference {

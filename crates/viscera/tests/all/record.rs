@@ -24,7 +24,7 @@ fn record<S: Real>(
         run.advance_frame().unwrap_or_else(|e| panic!("{e}"));
         file.extend(recorder.frame(&mut run));
     }
-    file.extend(recorder.end(&mut run));
+    file.extend(recorder.end());
     (file, run)
 }
 
@@ -270,7 +270,7 @@ fn another_version_says_what_to_do() {
     assert!(error.contains(env!("CARGO_PKG_VERSION")), "{error}");
     // A saved simulation is none.
     let saved = simulation::<f32>(BLOCK, &[]).save();
-    assert_eq!(Recording::read(&saved), Err(RecordError::NotRecording));
+    assert_eq!(Recording::read(&saved), Err(RecordError::Saved));
 }
 
 /// Another start, another number of passes, another push: the first frame and quantity are told.
