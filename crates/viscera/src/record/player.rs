@@ -82,10 +82,10 @@ pub enum RecordError {
     },
     /// The state at which it begins is none of this program.
     #[error(transparent)]
-    Resume(#[from] ResumeError),
+    Resume(#[from] Box<ResumeError>),
     /// What hands had done by then cannot be.
     #[error(transparent)]
-    Live(#[from] LiveError),
+    Live(#[from] Box<LiveError>),
 }
 
 /// How a recording ends.
@@ -266,9 +266,9 @@ impl Recording {
         settings: &[(&str, &str)],
     ) -> Result<(Simulation<S>, Player<'_>), RecordError> {
         let snapshot = self.snapshot(from);
-        let mut simulation = simulation.resume(&snapshot.saved)?;
+        let mut simulation = simulation.resume(&snapshot.saved).map_err(Box::new)?;
         let written = Scene::parse(&self.header.name, &self.header.scene, settings)?;
-        simulation.came_by_hand(written, snapshot.changes())?;
+        simulation.came_by_hand(written, snapshot.changes()).map_err(Box::new)?;
         if snapshot.after == 0 {
             self.check_choices(&choices(&simulation))?;
         }

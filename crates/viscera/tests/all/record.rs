@@ -299,7 +299,8 @@ fn a_replay_with_other_bits_says_where() {
     let (frame, quantity) = differs(&[("solver.iterations", "30")]).expect("a difference");
     assert!(frame == 1 && quantity.to_string().contains("of body `block`"), "{frame}, {quantity}");
     let error = start::<f32>(&recording, 0, &[("solver.method", "explicit")]).map(|_| ());
-    assert!(matches!(error, Err(RecordError::Resume(ResumeError::Method { .. }))), "{error:?}");
+    let Err(RecordError::Resume(error)) = error else { panic!("{error:?}") };
+    assert!(matches!(*error, ResumeError::Method { .. }), "{error}");
     let error = start::<f32>(&recording, 0, &[("solver.substeps", "7")]).map(|_| ());
     let error = error.expect_err("other substeps").to_string();
     assert!(
