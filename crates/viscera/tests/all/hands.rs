@@ -234,7 +234,7 @@ fn a_thinner_tool_leaves_what_another_one_meets() {
         let probe = run.take_tool(at("probe", vec3(0.015, 0.015, 0.024))).expect("a probe");
         go(&mut run, probe, vec3(0.0, 0.0, -0.004), Vec3::ZERO, 10);
         // Friction holds it to the side.
-        go(&mut run, probe, vec3(0.0005, 0.0, 0.0), Vec3::ZERO, 5);
+        go(&mut run, probe, vec3(0.003, 0.0, 0.0), Vec3::ZERO, 8);
         frames(&mut run, 20);
         run
     };
@@ -248,7 +248,7 @@ fn a_thinner_tool_leaves_what_another_one_meets() {
     let force = Vec3::<f64>::from_f64(alone.force);
     let off = (Vec3::from_f64(joined.force) - force).length();
     let side = force.x.abs();
-    assert!(side > 0.02 * force.length(), "{alone:?}");
+    assert!(side > 0.1 * force.length(), "{alone:?}");
     assert!(off < 0.1 * force.length(), "{alone:?}, {joined:?}");
     assert!((joined.force[0] - alone.force[0]).abs() < 0.2 * side, "{alone:?}, {joined:?}");
 }
@@ -274,7 +274,9 @@ fn a_force_drives_jaws_until_a_hand_turns_them() {
         frames(run, 2);
         let clamp = run.take_tool(at("clamp", vec3(0.015, 0.015, 0.05))).expect("a clamp");
         let wide = run.tools()[clamp].jaw_angle.expect("jaws");
-        frames(run, 6);
+        frames(run, 1);
+        assert!(run.tools()[clamp].jaw_angle.expect("jaws") < wide, "it closes at once");
+        frames(run, 5);
         let closing = run.tools()[clamp].jaw_angle.expect("jaws");
         assert!(closing < wide - 0.1, "{closing} rad of {wide} rad");
         run.open_jaws(clamp, 0.9).expect("an angle");
