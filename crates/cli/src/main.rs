@@ -10,6 +10,8 @@ mod in_order;
 mod mesh;
 mod output;
 mod progress;
+mod recording_file;
+mod replay;
 mod run;
 mod scene;
 mod series;
@@ -32,6 +34,8 @@ const EXAMPLES: &str = "\
 Examples:
   viscera run liver_retraction
   viscera run scenes/cantilever.toml --set body.bar.material.young=\"10 kPa\" --out out/soft
+  viscera run palpation --record out/palpation.replay
+  viscera replay out/palpation.replay --threads 1
   viscera mesh inspect liver.msh --unit \"32 mm\"
   viscera scene describe
   viscera view grab
@@ -41,6 +45,8 @@ Examples:
 enum Command {
     /// Simulate a scene; write meshes, a picture, an animation and the numbers
     Run(run::RunArguments),
+    /// Have a recorded run once more, and see whether it has the same bits
+    Replay(replay::ReplayArguments),
     /// Look at mesh files
     #[command(subcommand)]
     Mesh(mesh::MeshCommand),
@@ -68,6 +74,7 @@ fn main() -> ExitCode {
     quiet_drivers();
     let result = match Arguments::parse().command {
         Command::Run(arguments) => run::run(&arguments),
+        Command::Replay(arguments) => replay::execute(&arguments),
         Command::Mesh(command) => mesh::execute(&command).map(|()| run::Outcome::Finished),
         Command::Scene(command) => scene::execute(&command).map(|()| run::Outcome::Finished),
         Command::Bench(arguments) => bench::execute(&arguments).map(|()| run::Outcome::Finished),

@@ -4,6 +4,7 @@ use crate::film::Film;
 use crate::hold::Hold;
 use crate::output::OutputFolder;
 use crate::progress;
+use crate::recording_file::RecordingFile;
 use crate::series::Series;
 use crate::summary::{FrameLine, Summary};
 use crate::tool_table::ToolTable;
@@ -15,6 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
+use viscera::record::RecordedFile;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
 use viscera::settings::{DeviceRequest, Elements, Method, Precision};
@@ -59,10 +61,13 @@ pub struct RunArguments {
     /// stopped. Frames count from the scene's beginning, those of the results from where it goes on
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
+    /// Record the run, to have it once more with `viscera replay`
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
 }
 
 /// Counts from one on; the error says that, not the largest number there is.
-fn from_one<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
+pub fn from_one<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
     let count = text.trim().parse::<u64>().ok().filter(|&count| count > 0);
     let count = count.and_then(|count| T::try_from(count).ok());
     count.ok_or_else(|| "write a whole number from 1 on".to_owned())
@@ -81,7 +86,14 @@ pub enum Outcome {
 pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     let (scene, overrides) = read_scene(arguments)?;
     let meshes = MeshFiles::new(&arguments.scene, arguments.data.as_deref());
-    let assembly = Assembly::new(&scene, &mut |name| meshes.load(name))?;
+    let mut loaded = Vec::new();
+    let assembly = Assembly::new(&scene, &mut |name| {
+        let bytes = meshes.load(name)?;
+        if arguments.record.is_some() {
+            loaded.push(RecordedFile::new(name, &bytes));
+        }
+        Ok(bytes)
+    })?;
     let tets = assembly.bodies.iter().map(|body| body.tets.len()).sum();
     let what = format!("{}: a simulation of {tets} tetrahedra", scene.name);
     let needed = memory::of_run(tets, &scene.solver);
@@ -92,6 +104,30 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     if let Some(file) = &arguments.save {
         files::prepare_file(file, "--save")?;
     }
+    let interrupted = listen()?;
+    let plan = Plan { overrides, folder, frames, interrupted, save: arguments.save.as_deref() };
+    match scene.solver.precision {
+        Precision::F32 => {
+            start(build::<f32>(scene, assembly, arguments, frames)?, plan, loaded, arguments)
+        }
+        Precision::F64 => {
+            start(build::<f64>(scene, assembly, arguments, frames)?, plan, loaded, arguments)
+        }
+    }
+}
+
+/// What a run is to do, and where its results go.
+pub struct Plan<'a> {
+    pub overrides: Overrides,
+    pub folder: PathBuf,
+    /// The number of the last one, of runs that nothing sets back.
+    pub frames: u64,
+    pub interrupted: Arc<AtomicBool>,
+    pub save: Option<&'a Path>,
+}
+
+/// Whether Ctrl-C or SIGTERM have come, from now on.
+pub fn listen() -> Result<Arc<AtomicBool>> {
     let interrupted = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
         // The second one ends the program at once, as one would expect of the first elsewhere: what is
@@ -100,20 +136,33 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
             .and_then(|_| register(signal, Arc::clone(&interrupted)))
             .context("cannot listen for Ctrl-C")?;
     }
-    match scene.solver.precision {
-        Precision::F32 => {
-            let simulation = build::<f32>(scene, assembly, arguments, frames)?;
-            simulate(simulation, overrides, &folder, frames, &interrupted, arguments)
-        }
-        Precision::F64 => {
-            let simulation = build::<f64>(scene, assembly, arguments, frames)?;
-            simulate(simulation, overrides, &folder, frames, &interrupted, arguments)
-        }
-    }
+    Ok(interrupted)
 }
 
+/// Runs, and records where that is asked for.
+fn start<S: Real>(
+    mut simulation: Simulation<S>,
+    plan: Plan<'_>,
+    loaded: Vec<RecordedFile>,
+    arguments: &RunArguments,
+) -> Result<Outcome> {
+    let Some(file) = &arguments.record else {
+        return simulate(simulation, plan, &mut |simulation| Ok(simulation.advance_frame()?));
+    };
+    let mut recording = RecordingFile::create(file, &mut simulation, loaded)?;
+    let outcome = simulate(simulation, plan, &mut |simulation| {
+        simulation.advance_frame()?;
+        recording.frame(simulation)
+    });
+    recording.end()?;
+    outcome
+}
+
+/// Goes on by a frame.
+pub type Step<'a, S> = &'a mut dyn FnMut(&mut Simulation<S>) -> Result<()>;
+
 /// Keys and values that the command line puts over those of the scene file.
-type Overrides = Vec<(String, String)>;
+pub type Overrides = Vec<(String, String)>;
 
 fn read_scene(arguments: &RunArguments) -> Result<(Scene, Overrides)> {
     let name = arguments.scene.display().to_string();
@@ -140,31 +189,31 @@ fn read_scene(arguments: &RunArguments) -> Result<(Scene, Overrides)> {
     Ok((scene, owned.collect()))
 }
 
-fn simulate<S: Real>(
+/// Runs a simulation to its last frame, by `step` from frame to frame, and writes what it gives.
+pub fn simulate<S: Real>(
     mut simulation: Simulation<S>,
-    overrides: Overrides,
-    folder: &Path,
-    frames: u64,
-    interrupted: &AtomicBool,
-    arguments: &RunArguments,
+    plan: Plan<'_>,
+    step: Step<'_, S>,
 ) -> Result<Outcome> {
+    let Plan { overrides, folder, frames, interrupted, save } = plan;
     // Where the device is refused no folder stays behind.
-    let out = &OutputFolder::create(folder)?;
+    let out = &OutputFolder::create(&folder)?;
     let summary = Summary::new(&simulation, overrides);
     files::print(&heading(&simulation, &summary, frames))?;
     let draws = simulation.scene().output.picture;
     let mut recording = Recording {
         film: draws.then(|| Film::new(&simulation, frames)).transpose()?,
         series: Series::create(out, &simulation)?,
-        tools: ToolTable::new(&simulation.scene().tools),
+        tools: ToolTable::default(),
         hold: Hold::new(&simulation, frames),
         summary,
     };
-    let ended = recording.compute(&mut simulation, frames, interrupted);
+    let ended = recording.compute(&mut simulation, frames, &interrupted, step);
     let Recording { film, series, tools, hold, mut summary } = recording;
     let (mut series, written) = series.end();
-    let ended = ended.and(written);
-    let complete = simulation.frame() == frames;
+    let ended = ended.and_then(|complete| written.map(|()| complete));
+    let complete = matches!(ended, Ok(true));
+    let ended = ended.map(|_| ());
     summary.finished = complete && ended.is_ok();
     summary.stopped = match &ended {
         Err(error) => Some(error.to_string()),
@@ -173,7 +222,7 @@ fn simulate<S: Real>(
     };
     // What failed has no state to judge.
     let (rest, mesh) = if ended.is_ok() { judged(&simulation) } else { (None, None) };
-    if let Some(file) = arguments.save.as_ref().filter(|_| ended.is_ok()) {
+    if let Some(file) = save.filter(|_| ended.is_ok()) {
         files::write_atomic(file, &simulation.save())?;
     }
     summary.judge(&simulation, rest, mesh);
@@ -193,7 +242,7 @@ fn simulate<S: Real>(
         let bar = progress::bar(film.picture_count(), "drawing", "{pos} of {len} pictures");
         // A run that was interrupted still shows what it has; the next Ctrl-C ends the drawing.
         interrupted.store(false, Ordering::Relaxed);
-        drawn = film.develop(out, &bar, interrupted)?;
+        drawn = film.develop(out, &bar, &interrupted)?;
         bar.finish_and_clear();
     }
     if let Err(error) = ended {
@@ -338,30 +387,35 @@ struct Recording<S: Real> {
 
 impl<S: Real> Recording<S> {
     /// Computes frames and records them until they are all there, Ctrl-C is pressed, or something
-    /// fails. What fails to be written says so at the end of the series.
+    /// fails. What fails to be written says so at the end of the series. Returns whether they are all there.
     fn compute(
         &mut self,
         simulation: &mut Simulation<S>,
         frames: u64,
         interrupted: &AtomicBool,
-    ) -> Result<()> {
+        step: Step<'_, S>,
+    ) -> Result<bool> {
         let mut is_written = self.series.push(simulation);
         let every = u64::from(simulation.scene().output.every);
         let bar = progress::bar(frames, "simulating", "{msg}");
         let (mut wall_total, begin) = (0.0, simulation.time());
+        let frame = simulation.scene().time.frame;
         let mut stop = interrupted.load(Ordering::Relaxed);
         if simulation.is_on_device() {
             bar.set_message("the driver may still be compiling kernels");
         }
-        while simulation.frame() < frames && !stop && is_written {
+        // Of a replay hands may set the simulation back.
+        let mut left = frames.saturating_sub(simulation.frame());
+        while left > 0 && !stop && is_written {
             let start = Instant::now();
-            simulation.advance_frame()?;
+            step(simulation)?;
+            left -= 1;
             let wall_seconds = start.elapsed().as_secs_f64();
             wall_total += wall_seconds;
             let report = simulation.report();
             // Asked once, so that series and film end with the same frame.
             stop = interrupted.load(Ordering::Relaxed);
-            let last = stop || simulation.frame() == frames;
+            let last = stop || left == 0;
             if last || simulation.frame().is_multiple_of(every) {
                 is_written = self.series.push(simulation);
             }
@@ -371,12 +425,12 @@ impl<S: Real> Recording<S> {
             self.tools.push(&report);
             self.hold.look(simulation);
             self.summary.frames.push(FrameLine { report, wall_seconds });
-            let speed = (simulation.time() - begin) / wall_total;
-            bar.set_position(simulation.frame());
+            let speed = ((frames - left) as f64 * frame - begin) / wall_total;
+            bar.set_position(frames - left);
             bar.set_message(format!("t = {:.2} s, {speed:.2} x real time", simulation.time()));
         }
         bar.finish_and_clear();
-        Ok(())
+        Ok(left == 0)
     }
 }
 

@@ -3,7 +3,6 @@
 use crate::output::OutputFolder;
 use anyhow::Result;
 use std::fmt::Write;
-use viscera::scene::Instrument;
 use viscera::simulation::FrameReport;
 
 const FILE: &str = "tools.csv";
@@ -24,28 +23,21 @@ const COLUMNS: [&str; 12] = [
     "jumped",
 ];
 
-/// A row per frame, and a group of columns per tool.
+/// A row per frame, and a group of columns per tool. Tools that come later have no numbers before.
+#[derive(Default)]
 pub struct ToolTable {
-    /// Nothing where the scene has no tools.
-    text: Option<String>,
+    /// Those of the last frame.
+    names: Vec<String>,
+    /// Each with the number of its tools.
+    rows: Vec<(usize, String)>,
 }
 
 impl ToolTable {
-    /// Of a scene's tools, before the first frame.
-    pub fn new(tools: &[Instrument]) -> Self {
-        let columns = tools
-            .iter()
-            .flat_map(|tool| COLUMNS.map(|column| format!(",{} {column}", tool.name)))
-            .collect::<String>();
-        Self { text: (!tools.is_empty()).then(|| format!("time [s]{columns}\n")) }
-    }
-
     /// The next frame.
     pub fn push(&mut self, report: &FrameReport) {
-        let Some(text) = &mut self.text else { return };
-        // Writing to text does not fail.
-        let _ = write!(text, "{}", report.time);
+        let mut text = report.time.to_string();
         for tool in &report.tools {
+            // Writing to text does not fail.
             for number in tool.force.iter().chain(&tool.torque) {
                 let _ = write!(text, ",{number}");
             }
@@ -57,12 +49,28 @@ impl ToolTable {
             }
             let _ = write!(text, ",{}", u8::from(tool.has_jumped));
         }
-        text.push('\n');
+        self.rows.push((report.tools.len(), text));
+        // Hands may put all away again, and begin anew.
+        if report.tools.len() >= self.names.len() {
+            self.names = report.tools.iter().map(|tool| tool.name.clone()).collect();
+        }
+    }
+
+    /// The table; nothing where there are no tools.
+    fn text(&self) -> Option<String> {
+        let columns = |name: &String| COLUMNS.map(|column| format!(",{name} {column}")).concat();
+        let columns: String = self.names.iter().map(columns).collect();
+        let row = |(tools, row): &(usize, String)| {
+            let missing = self.names.len().saturating_sub(*tools) * COLUMNS.len();
+            format!("{row}{}\n", ",".repeat(missing))
+        };
+        let rows: String = self.rows.iter().map(row).collect();
+        (!self.names.is_empty()).then(|| format!("time [s]{columns}\n{rows}"))
     }
 
     /// Writes the table; where there is none, removes the one of an earlier run.
     pub fn write(&self, out: &OutputFolder) -> Result<()> {
-        match &self.text {
+        match self.text() {
             Some(text) => out.write(FILE, text.as_bytes()),
             None => out.remove(FILE),
         }

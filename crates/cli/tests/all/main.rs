@@ -13,5 +13,6 @@ mod bench_scene;
 mod devices;
 mod documents;
 mod hold;
+mod replay;
 mod run;
 mod saved;

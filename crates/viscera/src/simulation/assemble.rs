@@ -82,9 +82,9 @@ impl Assembly {
         }
         assembly.add_patches(scene)?;
         assembly.add_tools(scene, load)?;
-        assembly.take_samples()?;
+        assembly.take_samples(scene)?;
         assembly.take_skin(scene)?;
-        assembly.check_tools_outside()?;
+        assembly.check_tools_outside(scene)?;
         assembly.note_overlaps(scene);
         assembly.note_loose_parts(scene);
         Ok(assembly)
@@ -108,7 +108,7 @@ impl Assembly {
         }
         finer.add_patches(scene)?;
         finer.tools.clone_from(&self.tools);
-        finer.take_samples()?;
+        finer.take_samples(scene)?;
         finer.take_skin(scene)?;
         finer.notes.clear();
         Ok(finer)

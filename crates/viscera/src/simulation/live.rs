@@ -1,6 +1,7 @@
 //! What is done to a running simulation by hand. All of it becomes part of the scene, so that a scene file
 //! with [`Live`] behind its other tables does the same to the bit.
 
+use super::acts::Act;
 use super::automatic::{self, Chosen};
 use super::error::{LiveError, SimulationError};
 use super::holding::{GraspOrigins, tolerance};
@@ -8,7 +9,9 @@ use super::instruments::Instruments;
 use super::{Simulation, check_contact};
 use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
-use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
+use crate::scene::{
+    Change, Hand, Instrument, Interpolation, Motion, MotionKey, Patch, Scene, SceneError,
+};
 use crate::settings::{Precision, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::check_elements;
@@ -21,14 +24,26 @@ pub struct Live {
     pub motions: Vec<Motion>,
     /// Settings.
     pub changes: Vec<Change>,
+    /// Tools that were taken into the scene.
+    pub tools: Vec<Instrument>,
+    /// Hands that took tools, with the names of these: those above among them.
+    pub hands: Vec<(String, Hand)>,
+}
+
+impl Live {
+    /// As a scene file has it, to be put behind its other tables: of this scene, whose bodies it names.
+    pub fn text(&self, scene: &Scene) -> String {
+        let Self { motions, changes, tools, hands } = self;
+        scene.write(motions, changes) + &scene.write_tools(tools, hands)
+    }
 }
 
 impl<S: Real> Simulation<S> {
     /// Takes hold of a patch where it is now: by springs of a total stiffness [N/m], or rigidly. Returns
-    /// the number of the motion that it becomes; its name is `name` with a number behind.
+    /// the number of the motion that it becomes; its name is `stem` with a number behind.
     pub fn take_hold(
         &mut self,
-        name: &str,
+        stem: &str,
         patch: Patch,
         stiffness: Option<f64>,
     ) -> Result<usize, LiveError> {
@@ -41,10 +56,12 @@ impl<S: Real> Simulation<S> {
         }
         let resolved = self.assembly.resolve(&patch)?;
         let is_taken = |name: &String| self.scene.motions.iter().any(|other| other.name == *name);
-        let names = (1..).map(|number| format!("{name}-{number}"));
+        let names = (1..).map(|number| format!("{stem}-{number}"));
         let name = names.into_iter().find(|name| !is_taken(name)).unwrap_or_default();
         let time = self.time();
         let key = MotionKey { time, translation: Vec3::ZERO, rotation: Vec3::ZERO };
+        let (body, selector) = (patch.body, patch.selector);
+        self.note(|| Act::TakeHold { name: stem.to_owned(), body, selector, stiffness });
         self.scene.motions.push(Motion {
             name,
             patch,
@@ -83,6 +100,7 @@ impl<S: Real> Simulation<S> {
             }
         }
         keys.push(at(end, translation));
+        self.note(|| Act::Lead { hold, translation });
         Ok(())
     }
 
@@ -91,6 +109,7 @@ impl<S: Real> Simulation<S> {
         // Between the end of the last substep, which it held, and that of the next.
         let release = self.time() + tolerance(&self.scene);
         self.held_motion(hold)?.release = Some(release);
+        self.note(|| Act::LetGo { hold });
         Ok(())
     }
 
@@ -119,6 +138,7 @@ impl<S: Real> Simulation<S> {
         self.written = written;
         self.by_hand.push(change);
         self.changes_made += 1;
+        self.note(|| Act::Change { settings: settings.to_vec() });
         Ok(())
     }
 
@@ -142,6 +162,7 @@ impl<S: Real> Simulation<S> {
         fork.frame = self.frame;
         fork.taken = self.taken.clone();
         fork.instruments = self.instruments.clone();
+        fork.choose_substeps();
         fork.changes_made = self.changes_made;
         fork.by_hand.clone_from(&self.by_hand);
         fork.balance.clone_from(&self.balance);
@@ -183,14 +204,24 @@ impl<S: Real> Simulation<S> {
     /// Back to the beginning, at rest: what was held is let go, settings stay as they were set by hand.
     pub fn reset(&mut self) -> Result<(), LiveError> {
         let frame = std::mem::take(&mut self.frame);
+        // Whose tools are those of the beginning.
+        let mut assembly = self.assembly.clone();
+        assembly.motions.truncate(self.written.motions.len());
+        assembly.tools.truncate(self.written.tools.len());
+        for (tool, written) in assembly.tools.iter_mut().zip(&self.written.tools) {
+            tool.hands.clone_from(&written.hands);
+        }
+        assembly.take_samples(&self.written)?;
+        let before = std::mem::replace(&mut self.assembly, assembly);
+        let instruments = Instruments::new(&self.assembly.tools, self.written.time.frame);
+        let instruments = std::mem::replace(&mut self.instruments, instruments);
+        let contact = std::mem::take(&mut self.state.contact);
         if let Err(error) = self.rebuild(self.written.clone()) {
-            self.frame = frame;
+            (self.frame, self.assembly, self.instruments) = (frame, before, instruments);
+            self.state.contact = contact;
             return Err(error);
         }
-        self.assembly.motions.truncate(self.written.motions.len());
         self.taken = GraspOrigins::default();
-        let frame = self.scene.time.frame;
-        self.instruments = Instruments::new(&self.assembly.tools, frame);
         self.divided = self.substeps;
         self.by_hand.clear();
         self.changes_made = 0;
@@ -200,6 +231,7 @@ impl<S: Real> Simulation<S> {
         self.inputs = self.inputs_at(0.0);
         self.state.contact = ContactState::of(&self.inputs.tools);
         self.measure_tissue();
+        self.note(|| Act::Reset);
         Ok(())
     }
 
@@ -211,12 +243,14 @@ impl<S: Real> Simulation<S> {
     /// What was done by hand.
     pub fn live(&self) -> Live {
         let motions = self.scene.motions[self.written.motions.len()..].to_vec();
-        Live { motions, changes: self.by_hand.clone() }
+        let tools = self.scene.tools[self.written.tools.len()..].to_vec();
+        Live { motions, changes: self.by_hand.clone(), tools, hands: self.live_hands() }
     }
 
     /// What the scene wants at the beginning of a frame.
     pub(super) fn begin_frame(&mut self) -> Result<(), LiveError> {
         self.make_changes()?;
+        self.tools_come_and_go()?;
         let time = self.time();
         self.taken.take(&self.scene, &self.assembly, time, &self.state);
         Ok(())

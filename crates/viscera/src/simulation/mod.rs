@@ -1,5 +1,6 @@
 //! A scene in motion: inputs from the scene's paths, frames of substeps, and what to report.
 
+mod acts;
 pub mod advice;
 mod assemble;
 mod assemble_error;
@@ -10,12 +11,14 @@ mod error;
 mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod hands;
 mod holding;
 mod instruments;
 mod live;
 mod mesh_error;
 #[cfg(feature = "gpu")]
 mod on_device;
+mod recorded;
 mod report;
 mod rest;
 mod saved;
@@ -25,11 +28,13 @@ mod skin;
 mod tool_forces;
 mod touchable;
 
+pub use acts::Act;
 pub use assemble::{AssembledBody, Assembly, Refinement, ResolvedPatch};
 pub use assemble_error::AssembleError;
 pub use automatic::{ExpectedErrors, automatic_settings};
 pub use error::{FrameError, LiveError, SimulationError};
 pub use forces::Hold;
+pub use hands::{Holder, ToolState};
 use holding::GraspOrigins;
 use instruments::Instruments;
 pub use instruments::ToolForce;
@@ -40,6 +45,7 @@ pub use mesh_error::{MESH_ERROR_TETS, MeshReport};
 pub use report::{FrameReport, PatchForce, PatchKind};
 pub use rest::{RestReport, Standing};
 pub use saved::ResumeError;
+pub(crate) use saved::{SavedDifference, difference_of_saved, is_saved};
 
 use crate::layout::Layout;
 use crate::measure::{
@@ -92,6 +98,8 @@ pub struct Simulation<S> {
     changes_made: usize,
     /// Those of them that came by hand.
     by_hand: Vec<Change>,
+    /// What was done by hand since it was last asked for, where somebody records that.
+    acts: Option<Vec<Act>>,
     balance: ForceBalance,
     /// Positions [m] at the beginning of the last frame, which tell how fast it moves.
     before: Vec<Vec3<S>>,
@@ -157,6 +165,7 @@ impl<S: Real> Simulation<S> {
             written: scene.clone(),
             changes_made: 0,
             by_hand: Vec::new(),
+            acts: None,
             balance: ForceBalance::default(),
             before: model.rest_positions.clone(),
             stepped: false,
@@ -184,7 +193,7 @@ impl<S: Real> Simulation<S> {
         (self.oscillations, self.substeps) =
             self.backend.substeps(&inputs, &self.solver, known, frame);
         let may_lie_on_tools =
-            !self.assembly.tools.is_empty() && has_loose_parts(self.layout(), &inputs);
+            self.instruments.there().contains(&true) && has_loose_parts(self.layout(), &inputs);
         if may_lie_on_tools && self.solver.substeps == Count::Auto {
             self.substeps = self.substeps.max(LEAST_ON_TOOLS);
         }
@@ -453,26 +462,43 @@ fn check_patches(scene: &Scene, assembly: &Assembly) -> Result<(), SimulationErr
 
 /// Contact is computed where the scene asks for it to be.
 fn check_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationError> {
-    let on_device = match &scene.solver.device {
-        DeviceRequest::Cpu | DeviceRequest::Auto => None,
-        device => Some(device.clone()),
-    };
-    let meets = scene.bodies.len() > 1 && scene.contact.bodies || !scene.ties.is_empty();
-    match on_device.or(callers_device.then_some(DeviceRequest::Gpu)) {
+    match device_of(scene, callers_device) {
         Some(device) if !scene.tools.is_empty() => Err(SimulationError::ToolsOnDevice { device }),
-        Some(device) if meets => Err(SimulationError::BodiesOnDevice { device }),
+        Some(device) if bodies_meet(scene) => Err(SimulationError::BodiesOnDevice { device }),
         _ => Ok(()),
     }
 }
 
+/// Devices compute no contact.
+fn refuse_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationError> {
+    match device_of(scene, callers_device) {
+        Some(device) => Err(SimulationError::ToolsOnDevice { device }),
+        None => Ok(()),
+    }
+}
+
+/// The device that is asked for, where one is.
+fn device_of(scene: &Scene, callers_device: bool) -> Option<DeviceRequest> {
+    let on_device = match &scene.solver.device {
+        DeviceRequest::Cpu | DeviceRequest::Auto => None,
+        device => Some(device.clone()),
+    };
+    on_device.or(callers_device.then_some(DeviceRequest::Gpu))
+}
+
+/// Whether bodies of a scene meet each other, or are tied.
+fn bodies_meet(scene: &Scene) -> bool {
+    scene.bodies.len() > 1 && scene.contact.bodies || !scene.ties.is_empty()
+}
+
 /// The method takes contact.
 fn check_contact(scene: &Scene, solver: &SolverSettings) -> Result<(), StepError> {
-    let meets = scene.bodies.len() > 1 && scene.contact.bodies || !scene.ties.is_empty();
-    if solver.takes_contact() || (scene.tools.is_empty() && !meets) {
-        Ok(())
-    } else {
-        Err(StepError::ContactNeedsRebase)
-    }
+    if scene.tools.is_empty() && !bodies_meet(scene) { Ok(()) } else { refuse_method(solver) }
+}
+
+/// Not all methods compute contact.
+fn refuse_method(solver: &SolverSettings) -> Result<(), StepError> {
+    if solver.takes_contact() { Ok(()) } else { Err(StepError::ContactNeedsRebase) }
 }
 
 /// A substep of a scene [s], of so many per frame.

@@ -9,8 +9,8 @@ use super::Simulation;
 use super::automatic::{self, Chosen};
 use super::device::Backend;
 use super::error::LiveError;
-use super::holding::GraspOrigins;
-use super::instruments::{Instruments, Jaw};
+use super::holding::{GraspOrigins, tolerance};
+use super::instruments::{Instruments, Jaw, there_at};
 use crate::contact::{Kept, Touch};
 use crate::layout::Layout;
 use crate::model::for_each_kind;
@@ -20,7 +20,7 @@ use crate::settings::Method;
 use crate::state::{ContactState, Learned, LearnedPart, State};
 
 /// Raised whenever the bytes mean something else.
-const FORMAT: u32 = 9;
+const FORMAT: u32 = 10;
 
 /// Methods by the number that stands for them; a new one is added at the end.
 const METHODS: [Method; 4] = [Method::Auto, Method::Xpbd, Method::Explicit, Method::QuasiNewton];
@@ -231,6 +231,10 @@ impl<S: Real> Simulation<S> {
             }
             self.make_change()?;
         }
+        // The last frame's tools.
+        let begun = self.frame.saturating_sub(1) as f64 * self.scene.time.frame;
+        self.sample_for(begun)?;
+        let there = there_at(&self.assembly.tools, begun, tolerance(&self.scene));
         let method = METHODS.get(usize::from(saved.method)).ok_or(ResumeError::Damaged)?;
         self.take_method(*method)?;
         let vertices = self.model.vertex_count();
@@ -241,7 +245,7 @@ impl<S: Real> Simulation<S> {
             ("constraints", [0, constraints].contains(&saved.multipliers.len())),
             ("meshes, materials or solver settings", saved.model == fingerprint(self.layout())),
             ("motions", self.takes(&saved.taken)),
-            ("tools", self.knows(&saved)),
+            ("tools", self.knows(&saved, &there)),
         ] {
             if !fits {
                 return Err(ResumeError::OtherScene { what });
@@ -249,7 +253,8 @@ impl<S: Real> Simulation<S> {
         }
         self.taken =
             GraspOrigins::of(saved.taken.iter().map(|t| t.as_deref().map(dressed)).collect());
-        self.instruments = Instruments::of(saved.jaws, self.time());
+        self.instruments = Instruments::of(saved.jaws, there, self.time());
+        self.choose_substeps();
         self.before = dressed(&saved.before);
         self.rejected_substeps = saved.rejected_substeps;
         self.put(State {
@@ -292,7 +297,7 @@ impl<S: Real> Simulation<S> {
     }
 
     /// Whether what was touched, and by what, is there.
-    fn knows(&self, saved: &Saved) -> bool {
+    fn knows(&self, saved: &Saved, there: &[bool]) -> bool {
         let samples = self.model.samples.len();
         let is_known = |touch: &SavedTouch| {
             (touch.sample as usize) < samples && (touch.tool as usize) < saved.tools.len()
@@ -303,7 +308,11 @@ impl<S: Real> Simulation<S> {
                 && (kept.triangle as usize) < skin.triangles.len()
         };
         let fits = saved.pressed.iter().all(is_there) && saved.torn.len() <= skin.ties.len();
-        fits && saved.touches.iter().all(is_known) && saved.jaws.len() == self.scene.tools.len()
+        let tools = self.assembly.tools.iter().zip(there).filter(|(_, there)| **there);
+        let parts = tools.map(|(tool, _)| tool.parts.len()).sum();
+        fits && saved.touches.iter().all(is_known)
+            && saved.jaws.len() == self.scene.tools.len()
+            && saved.tools.len() == parts
     }
 
     /// Whether each motion has as many vertices as were taken hold of.
@@ -314,6 +323,38 @@ impl<S: Real> Simulation<S> {
         };
         taken.len() <= motions.len() && taken.iter().zip(motions).all(fits)
     }
+}
+
+/// Whether bytes begin like a saved simulation.
+pub(crate) fn is_saved(bytes: &[u8]) -> bool {
+    bytes.starts_with(MAGIC)
+}
+
+/// What is different in two saved simulations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SavedDifference {
+    /// The place of a vertex.
+    Position(usize),
+    /// The velocity of a vertex.
+    Velocity(usize),
+    /// What else is kept between frames.
+    Kept,
+}
+
+/// The first difference of two simulations of one model that were saved; nothing where there is none.
+pub(crate) fn difference_of_saved(
+    a: &[u8],
+    b: &[u8],
+) -> Result<Option<SavedDifference>, ResumeError> {
+    if a == b {
+        return Ok(None);
+    }
+    let (a, b) = (read(a)?, read(b)?);
+    let bits = |v: &[f64; 3]| v.map(f64::to_bits);
+    let first = |a: &Vectors, b: &Vectors| a.iter().zip(b).position(|(a, b)| bits(a) != bits(b));
+    let position = first(&a.positions, &b.positions).map(SavedDifference::Position);
+    let velocity = first(&a.velocities, &b.velocities).map(SavedDifference::Velocity);
+    Ok(position.or(velocity).or(Some(SavedDifference::Kept)))
 }
 
 fn checksum() -> crc::Crc<u32> {

@@ -92,6 +92,24 @@ lock = [{ from = "1 s", to = "1.2 s" }]
 
 [[tool]]
 kind = "half_space"
+rotation_vector = ["0.1 rad", 0, 0]
+begin = "0.2 s"
+end = "1.4 s"
+
+[[hand]]
+tool = "pliers"
+from = "0.5 s"
+keys = [
+  { time = "0.5 s" },
+  { time = "1 s", translation = ["1 mm", 0, 0], rotation_vector = [0, "0.3 rad", 0] },
+]
+jaw = [{ time = "0.5 s", angle = "20 deg" }, { time = "0.7 s", angle = 0 }]
+lock = [{ from = "0.8 s", to = "0.9 s" }, { from = "1 s" }]
+end = "1.3 s"
+
+[[hand]]
+tool = "tool 1"
+from = "0.3 s"
 
 [[spring]]
 from = { body = "organ", box = { min = [0, 0, 0], max = ["1 m", "1 m", "1 m"] } }
@@ -163,6 +181,11 @@ fn every_key_arrives_in_si_units() {
     assert_eq!(scene.files(), ["organ.msh", "organ.obj", "pliers.csv"]);
     let [pliers, table] = scene.tools.as_slice() else { panic!("two tools") };
     assert_eq!((pliers.parts.len(), pliers.law.friction, table.name.as_str()), (2, 0.8, "tool 1"));
+    let hand = &pliers.hands[0];
+    assert_eq!((hand.from, hand.end, hand.locks[1]), (0.5, Some(1.3), [1.0, f64::INFINITY]));
+    assert_eq!((hand.keys[1].rotation.y, hand.jaw[1].time), (0.3, 0.7));
+    // A hand that takes it keeps it.
+    assert_eq!((table.begin, table.end, table.leaves()), (0.2, Some(1.4), None));
 
     let [organ, bead] = scene.bodies.as_slice() else { panic!("two bodies") };
     let BodyShape::File { unit, .. } = organ.shape else { panic!("a file") };
