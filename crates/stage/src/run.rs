@@ -12,6 +12,7 @@ use viscera::solver::gpu::Device;
 
 use crate::color::surface_values;
 use crate::snapshot::{Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch};
+use crate::tools::tools_of;
 
 /// Settings to change: keys and values as one writes them.
 pub type Settings = Vec<(String, String)>;
@@ -273,6 +274,8 @@ impl<S: Real> Run for SimulationRun<S> {
                 snapshot.held.push(HeldPatch { id, place, target, force });
             }
         }
+        tools_of(&self.simulation, &mut snapshot.tools);
+        snapshot.ledger = self.simulation.ledger();
         let assembly = self.simulation.assembly();
         let tets = match coloring {
             Coloring::Strain | Coloring::Stress => self.simulation.tets(),

@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use crate::capture::{FOLDER, Recorder};
 use crate::choices::{Settings, Side};
+use crate::curves::ForceCurves;
 use crate::document::Document;
 use crate::engine::{Command, Cure, Engine, Event, Setup, Snapshot};
 use crate::help::{self, Request};
@@ -65,6 +66,7 @@ pub struct App {
     counted: (u64, Instant),
     /// Pictures of the window since then.
     shown: u32,
+    forces: ForceCurves,
     /// How solvers converge in a step of the first simulation.
     curves: Vec<Curve>,
     /// What is being saved: where, and of what.
@@ -110,6 +112,7 @@ impl App {
             was_typing: false,
             counted: (0, Instant::now()),
             shown: 0,
+            forces: ForceCurves::default(),
             curves: Vec::new(),
             saving: Vec::new(),
             session,
@@ -152,6 +155,11 @@ impl App {
     /// What is held.
     pub fn holds(&self) -> &Holds {
         &self.holds
+    }
+
+    /// Forces over the last seconds.
+    pub fn forces(&self) -> &ForceCurves {
+        &self.forces
     }
 
     /// What the window has to say.
@@ -236,9 +244,14 @@ impl App {
             });
         }
         if self.preferences.curve_open {
-            Panel::bottom("curve").resizable(true).default_size(130.0).show(ui, |ui| {
+            Panel::bottom("curve").resizable(true).default_size(150.0).show(ui, |ui| {
                 let now = self.snapshot.as_ref().map_or(0.0, |snapshot| snapshot.time);
-                panels::forces::show(ui, &self.holds, now, self.session.is_comparison());
+                if let Some(run) = self.snapshot.as_ref().and_then(|all| all.runs.first())
+                    && !run.tools.is_empty()
+                {
+                    panels::forces::show_ledger(ui, &run.ledger);
+                }
+                panels::forces::show(ui, &self.forces, now, self.session.is_comparison());
             });
         }
     }
@@ -247,7 +260,7 @@ impl App {
         let setup = self.setup.as_deref();
         let (fields, preferences) = (&mut self.fields, &mut self.preferences);
         panels::scene::show(ui, &self.session, setup, fields, preferences, actions);
-        panels::view::show_grip(ui, &mut self.preferences, &self.holds, actions);
+        panels::view::show_grip(ui, &mut self.preferences, &self.holds, &self.forces, actions);
         panels::view::show(ui, &mut self.preferences, actions);
         panels::material::show(ui, self.session.scene(Side::First), actions);
         let sides: &[(&str, Side)] = match self.session.is_comparison() {
@@ -280,6 +293,7 @@ impl App {
                     let late = self.holds.clear();
                     self.send(late);
                     self.curves.clear();
+                    self.forces.clear();
                     if let Err(error) = self.viewport.enter(&setup) {
                         self.messages.warn(error);
                     }
@@ -322,7 +336,7 @@ impl App {
         if let Err(error) = self.viewport.place(snapshot) {
             self.messages.warn(error);
         }
-        self.holds.note(snapshot);
+        self.forces.note(snapshot);
         let (number, since) = self.counted;
         let elapsed = since.elapsed().as_secs_f64();
         if snapshot.number < number {

@@ -8,6 +8,7 @@
 //! | the window's state, and what happens to it | [`App`] |
 //! | the simulation on its own thread | [`engine`] |
 //! | looking, pressing, pulling | [`viewport`] |
+//! | forces over time | [`curves`] |
 //! | what is chosen, undo | [`choices`], [`session`] |
 //! | the panels | [`panels`] |
 //! | one step by several solvers | [`probe`] |
@@ -15,6 +16,7 @@
 pub mod app;
 pub mod capture;
 pub mod choices;
+pub mod curves;
 pub mod document;
 pub mod engine;
 pub mod help;

@@ -6,6 +6,18 @@ import { byId, button, make } from "./messages.js";
 /** @typedef {import("./plots.js").Curve} Curve */
 /** @typedef {[number, number, number]} Vector */
 /**
+ * @typedef {object} Tool
+ * @property {string} name
+ * @property {Vector} place
+ * @property {Vector} force
+ * @property {number | null} error
+ * @property {number} torque
+ * @property {number} touches
+ * @property {number | null} jawAngle
+ * @property {boolean} isLocked
+ * @property {boolean} hasJumped
+ */
+/**
  * @typedef {object} Run
  * @property {string} device
  * @property {string | null} warning
@@ -19,6 +31,8 @@ import { byId, button, make } from "./messages.js";
  * @property {number} inverted
  * @property {{id: number, place: Vector, target: Vector, force: Vector}[]} held
  * @property {{name: string, force: Vector}[]} patches
+ * @property {Tool[]} tools
+ * @property {{work: number, surplus: number, stored: number, mostStored: number} | null} ledger
  */
 /**
  * @typedef {object} Report

@@ -5,7 +5,9 @@ use viscera::scalar::Vec3;
 use viscera::scene::{BodyShape, Scene};
 use viscera::solver::gpu::Device;
 use viscera_render::Orbit;
-use viscera_stage::{Coloring, GripTarget, HoldId, Legend, Run, RunSnapshot, Settings, build};
+use viscera_stage::{
+    Coloring, ForceScale, GripTarget, HoldId, Legend, Run, RunSnapshot, Settings, build,
+};
 
 use crate::catalog::law_name;
 use crate::holds::Hand;
@@ -63,6 +65,7 @@ pub struct Session {
     pub(crate) grip: Grip,
     pub(crate) coloring: Coloring,
     pub(crate) legend: Legend,
+    pub(crate) force_scale: ForceScale,
     pub(crate) wireframe: bool,
     pub(crate) dark: bool,
     pub(crate) orbit: Orbit,
@@ -85,6 +88,7 @@ impl Session {
             grip: Grip::default(),
             coloring: Coloring::Plain,
             legend: Legend::default(),
+            force_scale: ForceScale::default(),
             wireframe: false,
             dark: false,
             orbit: Orbit::framing(&[]),
@@ -121,6 +125,7 @@ impl Session {
         let known = self.loaded.as_ref().is_some_and(|old| same_place(old, &loaded));
         self.runs = vec![RunState::new(run)];
         self.hands.clear();
+        self.force_scale = ForceScale::default();
         self.generation += 1;
         self.loaded = Some(loaded);
         if !known {
@@ -209,6 +214,7 @@ impl Session {
     /// Begins from rest again, with the settings as they are now.
     pub fn reset(&mut self) -> Result<(), String> {
         self.hands.clear();
+        self.force_scale = ForceScale::default();
         for state in &mut self.runs {
             state.run.reset()?;
             state.waiting.clear();
@@ -375,6 +381,7 @@ impl Session {
         if let Some(state) = self.runs.get_mut(number) {
             state.run.fill(self.coloring, &mut state.snapshot);
             state.moved = self.count;
+            self.force_scale.follow(&state.snapshot.tools);
         }
         let values = self.runs.iter().flat_map(|state| state.snapshot.values.iter().copied());
         self.legend.follow(self.coloring, values);

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use viscera::scalar::Vec3;
 use viscera_picture::{HALF_OPENING, Image, ImageSize, Overlay, ViewDirection};
 use viscera_render::Orbit;
-use viscera_stage::{Coloring, Legend, PictureContents, RunSurface, meet_plane, pick};
+use viscera_stage::{Coloring, ForceScale, Legend, PictureContents, RunSurface, meet_plane, pick};
 
 use crate::engine::{Command, Setup, Snapshot};
 use crate::holds::{Grip, Holds};
@@ -35,6 +35,7 @@ pub struct Viewport {
     pictures: Vec<Picture>,
     fixed: Vec<u32>,
     legend: Legend,
+    force_scale: ForceScale,
     /// What each picture was seen through last.
     lenses: Vec<Lens>,
     /// What the pictures show.
@@ -65,6 +66,7 @@ impl Viewport {
             pictures: Vec::new(),
             fixed: Vec::new(),
             legend: Legend::default(),
+            force_scale: ForceScale::default(),
             lenses: Vec::new(),
             drawn: None,
         }
@@ -119,6 +121,10 @@ impl Viewport {
         for (surface, run) in self.surfaces.iter_mut().zip(&snapshot.runs) {
             surface.place(run)?;
         }
+        if snapshot.number == 0 {
+            self.force_scale = ForceScale::default();
+        }
+        snapshot.runs.iter().for_each(|run| self.force_scale.follow(&run.tools));
         let shown = snapshot.runs.iter().take(self.shown_runs());
         self.legend.follow(snapshot.coloring, shown.flat_map(|run| run.values.iter().copied()));
         Ok(())
@@ -322,6 +328,9 @@ impl Viewport {
                 fixed: &fixed,
                 picked: &picked,
                 targets: &targets,
+                tools: &run.tools,
+                in_hand: None,
+                force_scale: self.force_scale.metres_per_newton(self.extent),
                 extent: self.extent,
             };
             self.pictures[number].draw(&self.gpu, *size, &contents)?;
@@ -351,6 +360,8 @@ impl Viewport {
         let Some(run) = snapshot.runs.get(number) else { return };
         overlay::scene_patches(&painter, lens, run);
         overlay::forces(&painter, lens, run, holds);
+        let scale = self.force_scale.metres_per_newton(self.extent);
+        overlay::tools(&painter, lens, run, scale);
         if preferences.coloring != Coloring::Plain {
             overlay::paint_legend(&self.legend, &painter, lens.rect);
         }
