@@ -52,16 +52,20 @@ export class Hands {
   }
 
   /**
-   * Where what is held is led to, in each picture [CSS pixels].
+   * Where what is held is led to, and where tools touch, in each picture [CSS pixels].
    *
-   * @param {{runs: {held: {id: number, target: number[]}[]}[]}} report
+   * @param {{runs: {held: {id: number, target: number[]}[], tools: {place: number[], touches: number}[]}[]}} report
    */
   tags(report) {
-    return report.runs.flatMap(({ held }, run) => held.flatMap(({ id, target: [x, y, z] }) => {
+    const seen = (/** @type {number} */ run, /** @type {number[]} */ [x, y, z], /** @type {{id: number, tool: number}} */ of) => {
       const place = this.#session.seen(run, x, y, z);
       if (place.length < 2) return [];
-      return [{ id, run, x: place[0] / this.#screen.scale, y: place[1] / this.#screen.scale }];
-    }));
+      return [{ ...of, run, x: place[0] / this.#screen.scale, y: place[1] / this.#screen.scale }];
+    };
+    return report.runs.flatMap(({ held, tools }, run) => [
+      ...held.flatMap(({ id, target }) => seen(run, target, { id, tool: -1 })),
+      ...tools.flatMap(({ place, touches }, tool) => (touches > 0 ? seen(run, place, { id: 0, tool }) : [])),
+    ]);
   }
 
   /** @param {number} factor above 1: nearer */
