@@ -112,9 +112,11 @@ impl Film {
             (report.name.clone(), middle, Vec3::from_f64(report.force))
         });
         // As of what pulls: the force on the tissue.
-        let tools = report.tools.iter().zip(&assembly.tools).map(|(report, tool)| {
-            let origin = tool.pose(simulation.time()).translation;
-            (report.name.clone(), origin, -Vec3::from_f64(report.force))
+        let states = simulation.tools();
+        let tools = report.tools.iter().zip(&states).filter(|(_, tool)| tool.is_there);
+        let tools = tools.map(|(report, tool)| {
+            let force: Vec3<f64> = -Vec3::from_f64(report.force);
+            (report.name.clone(), tool.pose.translation, force)
         });
         let surface = deformed_vertices(&assembly.bodies, positions);
         self.shots.push(Shot {

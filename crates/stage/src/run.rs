@@ -5,7 +5,7 @@ use viscera::scalar::{Real, Vec3};
 use viscera::scene::{Patch, Scene, Selector};
 use viscera::settings::{Place, Precision, SolverSettings};
 use viscera::simulation::{
-    Assembly, Live, PatchForce, PatchKind, ResolvedPatch, Simulation, SimulationError,
+    Assembly, PatchForce, PatchKind, ResolvedPatch, Simulation, SimulationError,
 };
 use viscera::solver::Inputs;
 use viscera::solver::gpu::Device;
@@ -286,8 +286,7 @@ impl<S: Real> Run for SimulationRun<S> {
     }
 
     fn done_by_hand(&self) -> (String, f64) {
-        let Live { motions, changes } = self.simulation.live();
-        (self.simulation.scene().write(&motions, &changes), self.simulation.time())
+        (self.simulation.live().text(self.simulation.scene()), self.simulation.time())
     }
 
     fn fork(&self, scene: &Scene) -> Result<Box<dyn Run>, String> {

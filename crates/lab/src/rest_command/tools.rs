@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 use viscera::scalar::Vec3;
 use viscera::scene::Scene;
-use viscera::simulation::{Simulation, ToolForce};
+use viscera::simulation::{Simulation, ToolForce, ToolState};
 
 use super::path::Rest;
 
@@ -40,11 +40,13 @@ pub(crate) fn note(scene: &Scene) -> Option<String> {
 /// Forces on the scene's tools in a state of rest.
 pub(super) fn forces(simulation: &Simulation<f64>, rest: &Rest) -> Vec<ToolForce> {
     let mut parts = rest.wrenches.iter().zip(&rest.inputs.tools);
-    let of_tool = |tool: &viscera::scene::Instrument| {
+    let states = simulation.tools();
+    let of_tool = |(tool, state): (&viscera::scene::Instrument, &ToolState)| {
+        let count = if state.is_there { tool.parts.len() } else { 0 };
         let origin = tool.pose(rest.time).translation;
         let (mut force, mut torque) = (Vec3::ZERO, Vec3::ZERO);
         let (mut touches, mut pinned, mut depth) = (0, 0, 0.0f64);
-        for (wrench, placed) in parts.by_ref().take(tool.parts.len()) {
+        for (wrench, placed) in parts.by_ref().take(count) {
             force += wrench.force;
             torque += wrench.torque + (placed.pose.translation - origin).cross(wrench.force);
             touches += wrench.touches;
@@ -64,5 +66,5 @@ pub(super) fn forces(simulation: &Simulation<f64>, rest: &Rest) -> Vec<ToolForce
             torque_error: None,
         }
     };
-    simulation.assembly().tools.iter().map(of_tool).collect()
+    simulation.assembly().tools.iter().zip(&states).map(of_tool).collect()
 }

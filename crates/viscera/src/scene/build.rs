@@ -1,7 +1,7 @@
 //! From the tables of a scene file to a scene: what one key alone cannot know is checked here.
 
-use super::build_instrument::build_instruments;
 use super::checks::{check_name, check_times, name_or_number, purpose};
+use super::hand_tables::hand_over;
 use super::keys::MotionKey;
 use super::motion::{Force, ForceKey, Motion};
 use super::selector::{Patch, Selector};
@@ -9,6 +9,7 @@ use super::tables::{
     BodyTable, ChangeTable, ForceTable, MaterialTable, MotionTable, PatchTable, SceneTable,
     ShapeName, SpringTable, TimeSettings,
 };
+use super::tray::build_tools;
 use super::{Ball, Body, BodyShape, Change, Fixing, Region, Scene, SceneError, Spring, Written};
 use crate::material::{Material, MaterialModel};
 use crate::mesh::shapes::LIVER_SPACING;
@@ -61,6 +62,8 @@ pub(super) fn build_scene(name: &str, tree: Node) -> Result<Scene, SceneError> {
             build_patch(&bodies, &value.patch, purpose("fixing", &value.name, index), place)?;
         fixings.push(Fixing { name, patch, stiffness: value.stiffness });
     }
+    let mut tools = build_tools(&tables.tool, &tree)?;
+    hand_over(&mut tools, &tables.hand)?;
     let title = if tables.title.is_empty() { name.to_owned() } else { tables.title };
     let (places, changes): (Vec<Place>, Vec<Change>) =
         build_changes(&tables.change)?.into_iter().unzip();
@@ -74,7 +77,7 @@ pub(super) fn build_scene(name: &str, tree: Node) -> Result<Scene, SceneError> {
         motions: build_motions(&bodies, &tables.motion)?,
         forces: build_forces(&bodies, &tables.force)?,
         springs: build_springs(&bodies, &tables.spring)?,
-        tools: build_instruments(&tables.tool)?,
+        tools,
         bodies,
         changes,
         solver: tables.solver,

@@ -1,10 +1,10 @@
 //! From the tables of tools in a scene file to instruments: their sizes, and keys that go together.
 
-use super::SceneError;
 use super::checks::{check_name, check_times, name_or_number, purpose};
-use super::instrument::{Course, Instrument, JawDrive, JawKey, Jaws, Part, ToolKind};
+use super::instrument::{Course, Instrument, JawDrive, Jaws, Part, ToolKind};
 use super::instrument_tables::{ToolTable, WIDEST};
-use super::keys::MotionKey;
+use super::keys::{JawKey, MotionKey};
+use super::{SceneError, Written};
 use crate::contact::{ContactLaw, Shape};
 use crate::scalar::rigid::RigidTransform;
 use crate::scalar::{Vec3, vec3};
@@ -44,7 +44,19 @@ fn build_instrument(
     if let Some(words) = parts.iter().find_map(|part| part.shape.complaint()) {
         return Err(fail(words.to_owned()));
     }
-    let rotation = value.rotation_axis * value.rotation_angle;
+    let rotation = match value.rotation_vector {
+        Some(_) if value.rotation_angle != 0.0 => {
+            let problem = "`rotation_vector` and `rotation_angle` exclude each other; keep one";
+            return Err(fail(problem.to_owned()));
+        }
+        Some(rotation) => rotation,
+        None => value.rotation_axis * value.rotation_angle,
+    };
+    if let Some(end) = value.end.filter(|end| *end < value.begin) {
+        let problem =
+            format!("its end at {end} s is before its begin at {} s; swap the two", value.begin);
+        return Err(fail(problem));
+    }
     let law = ContactLaw {
         stiffness: value.stiffness,
         thickness: value.thickness,
@@ -65,7 +77,11 @@ fn build_instrument(
         course: build_course(value, purpose)?,
         law,
         jaws,
+        begin: value.begin,
+        end: value.end,
+        hands: Vec::new(),
         place: place.clone(),
+        table: Written::default(),
     })
 }
 
@@ -239,22 +255,8 @@ fn check_jaws(table: &ToolTable, jaws: &Jaws, purpose: &str) -> Result<(), Scene
     };
     check_times(table.jaw.iter().map(|key| (&key.place, key.value.time)), purpose)?;
     check_times(table.closing_force.iter().map(|key| (&key.place, key.value.time)), purpose)?;
-    let least = jaws.least_angle();
-    let degrees = |angle: f64| Dimension::Angle.format(angle);
     for Placed { place, value } in &table.jaw {
-        let angle = degrees(value.angle);
-        if value.angle < least {
-            let problem = format!(
-                "at {angle} its jaws overlap; close them to {} at most, or give them a larger `jaw_gap`",
-                degrees(least + 0.0)
-            );
-            return Err(fail(place, problem));
-        }
-        if value.angle > WIDEST {
-            let problem =
-                format!("{angle} is no angle of jaws; open them to {} at most", degrees(WIDEST));
-            return Err(fail(place, problem));
-        }
+        check_angle(jaws, value.angle).map_err(|problem| fail(place, problem))?;
     }
     for Placed { place, value } in &table.lock {
         if value.from >= value.to {
@@ -262,6 +264,24 @@ fn check_jaws(table: &ToolTable, jaws: &Jaws, purpose: &str) -> Result<(), Scene
                 format!("its lock ends at {} s, before it begins; swap the two", value.to);
             return Err(fail(place, problem));
         }
+    }
+    Ok(())
+}
+
+/// Whether jaws can have an angle [rad]; otherwise what to do.
+pub(crate) fn check_angle(jaws: &Jaws, angle: f64) -> Result<(), String> {
+    let least = jaws.least_angle();
+    let degrees = |angle: f64| Dimension::Angle.format(angle);
+    if angle < least {
+        return Err(format!(
+            "at {} its jaws overlap; close them to {} at most, or give them a larger `jaw_gap`",
+            degrees(angle),
+            degrees(least + 0.0)
+        ));
+    }
+    if angle > WIDEST {
+        let (angle, widest) = (degrees(angle), degrees(WIDEST));
+        return Err(format!("{angle} is no angle of jaws; open them to {widest} at most"));
     }
     Ok(())
 }

@@ -8,8 +8,10 @@
 //! Working ends are at the origin and shafts along +z, so that a path is one of the working end. A grasper's jaws reach
 //! along -z from a hinge at the origin, and open along y.
 
+use super::Written;
 use super::common::Interpolation;
-use super::keys::{MotionKey, between, mix};
+use super::hand::Hand;
+use super::keys::{JawKey, MotionKey, between, mix};
 use crate::contact::{ContactLaw, Shape, Tool};
 use crate::scalar::Vec3;
 use crate::scalar::rigid::{RigidTransform, rotation_matrix};
@@ -56,8 +58,16 @@ pub struct Instrument {
     pub law: ContactLaw,
     /// Of a grasper.
     pub jaws: Option<Jaws>,
+    /// When it comes into the scene [s].
+    pub begin: f64,
+    /// When it leaves [s], where no hand has it.
+    pub end: Option<f64>,
+    /// Hands that take it, by their times: from each on, what was to move it before no longer does.
+    pub hands: Vec<Hand>,
     /// Where the scene has it.
     pub place: Place,
+    /// What was written.
+    pub(super) table: Written,
 }
 
 /// One shape of an instrument.
@@ -86,15 +96,6 @@ pub enum Course {
         /// As the scene names it.
         path: String,
     },
-}
-
-/// A value at a time: an opening angle [rad], a closing force [N].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JawKey {
-    /// [s].
-    pub time: f64,
-    /// [rad] or [N].
-    pub value: f64,
 }
 
 /// What moves a grasper's jaws.
@@ -153,8 +154,8 @@ impl Jaws {
 }
 
 impl Instrument {
-    /// From its frame to the world at a time [s].
-    pub fn pose(&self, time: f64) -> RigidTransform {
+    /// Where its keys have it at a time [s].
+    pub(super) fn pose_by_keys(&self, time: f64) -> RigidTransform {
         let Course::Keys { keys, interpolation } = &self.course else { return self.placement };
         let (before, after, share) = between(keys, |key| key.time, time);
         let Some((a, b)) = before.zip(after) else { return self.placement };
@@ -165,19 +166,10 @@ impl Instrument {
         }
     }
 
-    /// The opening angle of its jaws at a time [s]; `now` [rad] where they follow a force, zero where it has none.
-    pub fn jaw_angle(&self, time: f64, now: f64) -> f64 {
-        match &self.jaws {
-            Some(jaws) if jaws.follow_force() => now,
-            Some(jaws) => jaws.at(time),
-            None => 0.0,
-        }
-    }
-
     /// Adds its parts, where they are at a time [s] with its jaws at an angle [rad].
     pub fn parts_at(&self, time: f64, angle: f64, tools: &mut Vec<Tool>) {
         let pose = self.pose(time);
-        let is_locked = self.jaws.as_ref().is_some_and(|jaws| jaws.are_locked(time));
+        let is_locked = self.is_locked(time);
         tools.extend(self.parts.iter().map(|part| Tool {
             shape: part.shape,
             pose: pose.after(&part.placed(angle)),
@@ -186,7 +178,7 @@ impl Instrument {
         }));
     }
 
-    /// Whether nothing ever moves it.
+    /// Whether nothing ever moves it, but hands.
     pub fn stands_still(&self) -> bool {
         let is_held = |keys: &[MotionKey]| {
             keys.windows(2).all(|two| {
@@ -239,7 +231,11 @@ mod tests {
             course: Course::Keys { keys, interpolation: Interpolation::Linear },
             law: ContactLaw::default(),
             jaws,
+            begin: 0.0,
+            end: None,
+            hands: Vec::new(),
             place: Place::Override { key: "test".into() },
+            table: Written::default(),
         }
     }
 

@@ -45,6 +45,12 @@ settings_table! {
         rotation_axis: Vec3<f64> = (vec3(0.0, 0.0, 1.0)), direction();
         /// Angle it is turned by.
         rotation_angle: f64 = 0.0, quantity(Dimension::Angle, ANY);
+        /// In place of the two, axis times angle.
+        rotation_vector: Option<Vec3<f64>> = None, optional(vector(Dimension::Angle));
+        /// When the tool comes into the scene: at the beginning of the first frame that does not begin earlier.
+        begin: f64 = 0.0, quantity(Dimension::Time, at_least(0.0));
+        /// When it leaves the scene, in the same way; what it held is free. It stays where unset.
+        end: Option<f64> = None, optional(quantity(Dimension::Time, at_least(0.0)));
         /// Poses in the order of their times. Before the first the tool goes there from its own pose, after the last
         /// it stays; it stands still where there are none.
         keys: Vec<Placed<ToolKeyTable>> = (Vec::new()), tables::<ToolKeyTable>();

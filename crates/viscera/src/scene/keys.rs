@@ -14,6 +14,15 @@ pub struct MotionKey {
     pub rotation: Vec3<f64>,
 }
 
+/// A value at a time: an opening angle [rad], a closing force [N].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JawKey {
+    /// [s].
+    pub time: f64,
+    /// [rad] or [N].
+    pub value: f64,
+}
+
 impl Interpolation {
     /// How far values have passed, of how far time has (0 to 1).
     pub(super) fn shape(self, share: f64) -> f64 {

@@ -32,29 +32,38 @@ mod change;
 mod checks;
 mod common;
 mod describe;
+mod hand;
+mod hand_tables;
 mod instrument;
 mod instrument_path;
 mod instrument_tables;
 mod keys;
 mod motion;
+mod moved;
 mod selector;
 mod tables;
+mod tray;
 mod write;
 
+pub(crate) use build_instrument::check_angle;
 pub use common::Interpolation;
 pub use describe::{describe, describe_markdown, describe_text};
-pub use instrument::{Course, Instrument, JawDrive, JawKey, Jaws, Part, ToolKind};
+pub use hand::Hand;
+pub(crate) use hand::key_of;
+pub use instrument::{Course, Instrument, JawDrive, Jaws, Part, ToolKind};
 pub use instrument_path::{PathError, read_path};
-pub use keys::MotionKey;
+pub use keys::{JawKey, MotionKey};
 pub use motion::{Force, ForceKey, Motion};
 
 pub use crate::scalar::rigid::RigidTransform;
 pub use selector::{Patch, SelectError, Selector, nearest_pair};
 pub use tables::{OutputSettings, TimeSettings, WorldSettings};
+pub use tray::read_tray;
 
 use crate::material::{Material, MaterialError};
 use crate::scalar::Vec3;
-use crate::settings::{Node, Place, SettingError, SolverSettings};
+use crate::settings::{Node, Place, SettingError, SolverSettings, Value};
+use std::collections::BTreeMap;
 
 /// Settings that change at a time; positions and velocities stay.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,6 +112,13 @@ pub struct Scene {
 /// A text that was read. Scenes that say the same are equal, however they were written.
 #[derive(Clone, Debug)]
 struct Written(Node);
+
+impl Default for Written {
+    fn default() -> Self {
+        let place = Place::Override { key: "".into() };
+        Self(Node { place, value: Value::Table(BTreeMap::new()) })
+    }
+}
 
 impl PartialEq for Written {
     fn eq(&self, _: &Self) -> bool {
@@ -374,6 +390,16 @@ pub enum SceneError {
     FixedKey {
         /// The key.
         key: String,
+    },
+    /// A hand that takes a tool which is not there.
+    #[error("{place}: there is no tool `{tool}`; {hint}")]
+    UnknownTool {
+        /// Where the hand is.
+        place: Place,
+        /// The name.
+        tool: String,
+        /// The nearest name, or all of them.
+        hint: String,
     },
     /// A selector finds nothing.
     #[error("{place}: {purpose} selects nothing: {error}")]

@@ -1,6 +1,7 @@
 //! The tables of a scene file as they are written; `Scene::parse` makes a `Scene` of them.
 
 use super::common::{Interpolation, SIZE};
+use super::hand_tables::HandTable;
 use super::instrument_tables::ToolTable;
 use crate::material::{LARGEST_POISSON, Preset};
 use crate::material::{
@@ -37,6 +38,8 @@ settings_table! {
         spring: Vec<Placed<SpringTable>> = (Vec::new()), tables::<SpringTable>();
         /// Tools that touch tissue, and fixed obstacles.
         tool: Vec<Placed<ToolTable>> = (Vec::new()), tables::<ToolTable>();
+        /// Hands that take tools while the scene runs.
+        hand: Vec<Placed<HandTable>> = (Vec::new()), tables::<HandTable>();
         /// Settings that change while the scene runs.
         change: Vec<Placed<ChangeTable>> = (Vec::new()), tables::<ChangeTable>();
         /// How a step is solved.

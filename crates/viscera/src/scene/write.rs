@@ -1,6 +1,8 @@
 //! Changes by hand to a scene, as text that a scene file takes.
 
-use super::{Change, Interpolation, Motion, MotionKey, Patch, Scene, Selector};
+use super::{
+    Change, Hand, Instrument, Interpolation, JawKey, Motion, MotionKey, Patch, Scene, Selector,
+};
 use crate::scalar::Vec3;
 use crate::settings::{Choice, Node, Value};
 use std::collections::BTreeMap;
@@ -26,10 +28,7 @@ impl Scene {
             };
             for table in table_entries(node).unwrap_or_default() {
                 put(&mut text, format_args!("\n{header}\n"));
-                for (key, node) in table {
-                    let value = value_text(&node.value);
-                    put(&mut text, format_args!("{} = {value}\n", key_name(key)));
-                }
+                write_entries(table, &mut text);
             }
         }
         text
@@ -47,6 +46,21 @@ impl Scene {
                 settings.iter().map(|(key, value)| quote(&format!("{key} = {value}"))).collect();
             let list = quoted.join(", ");
             put(&mut text, format_args!("\n[[change]]\ntime = \"{time} s\"\nset = [{list}]\n"));
+        }
+        text
+    }
+
+    /// Tools that were taken into the scene by hand, and hands with the tools that each has, in the same way.
+    pub fn write_tools(&self, tools: &[Instrument], hands: &[(String, Hand)]) -> String {
+        let mut text = String::new();
+        for tool in tools {
+            put(&mut text, format_args!("\n[[tool]]\n"));
+            if let Value::Table(entries) = &tool.table.0.value {
+                write_entries(entries, &mut text);
+            }
+        }
+        for (tool, hand) in hands {
+            write_hand(tool, hand, &mut text);
         }
         text
     }
@@ -78,6 +92,38 @@ impl Scene {
         }
         put(text, format_args!("]\n"));
     }
+}
+
+fn write_entries(table: &BTreeMap<String, Node>, text: &mut String) {
+    for (key, node) in table {
+        put(text, format_args!("{} = {}\n", key_name(key), value_text(&node.value)));
+    }
+}
+
+fn write_hand(tool: &str, hand: &Hand, text: &mut String) {
+    let Hand { from, keys, jaw, locks, end } = hand;
+    put(text, format_args!("\n[[hand]]\ntool = {}\nfrom = \"{from} s\"\n", quote(tool)));
+    if let Some(end) = end {
+        put(text, format_args!("end = \"{end} s\"\n"));
+    }
+    let mut list = |name: &str, lines: Vec<String>| {
+        if !lines.is_empty() {
+            let lines: String = lines.iter().map(|line| format!("  {{ {line} }},\n")).collect();
+            put(text, format_args!("{name} = [\n{lines}]\n"));
+        }
+    };
+    let lock = |[from, to]: &[f64; 2]| match to.is_finite() {
+        true => format!("from = \"{from} s\", to = \"{to} s\""),
+        false => format!("from = \"{from} s\""),
+    };
+    list("lock", locks.iter().map(lock).collect());
+    let angle = |key: &JawKey| format!("time = \"{} s\", angle = \"{} rad\"", key.time, key.value);
+    list("jaw", jaw.iter().map(angle).collect());
+    let pose = |key: &MotionKey| {
+        let (place, turn) = (lengths(key.translation), radians(key.rotation));
+        format!("time = \"{} s\", translation = {place}, rotation_vector = {turn}", key.time)
+    };
+    list("keys", keys.iter().map(pose).collect());
 }
 
 /// A table, or a list of tables, as tables with a header each; nothing of another value.
@@ -153,8 +199,12 @@ fn selector_text(patch: &Patch) -> String {
     }
 }
 
-fn lengths(v: Vec3<f64>) -> String {
+pub(super) fn lengths(v: Vec3<f64>) -> String {
     format!("[\"{} m\", \"{} m\", \"{} m\"]", v.x, v.y, v.z)
+}
+
+pub(super) fn radians(v: Vec3<f64>) -> String {
+    format!("[\"{} rad\", \"{} rad\", \"{} rad\"]", v.x, v.y, v.z)
 }
 
 /// As TOML has text.

@@ -82,8 +82,8 @@ impl Assembly {
         }
         assembly.add_patches(scene)?;
         assembly.add_tools(scene, load)?;
-        assembly.take_samples()?;
-        assembly.check_tools_outside()?;
+        assembly.take_samples(scene)?;
+        assembly.check_tools_outside(scene)?;
         assembly.note_overlaps(scene);
         assembly.note_loose_parts(scene);
         Ok(assembly)
@@ -107,7 +107,7 @@ impl Assembly {
         }
         finer.add_patches(scene)?;
         finer.tools.clone_from(&self.tools);
-        finer.take_samples()?;
+        finer.take_samples(scene)?;
         Ok(finer)
     }
 

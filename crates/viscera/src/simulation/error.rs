@@ -92,6 +92,34 @@ pub enum LiveError {
     /// A place that is none.
     #[error("a hold cannot be led to a place that is no number")]
     NotFinite,
+    /// A tool that there is not, or not now.
+    #[error("there is no tool {tool} in the scene now: take one up, or wait for it to come")]
+    NoTool {
+        /// The number given.
+        tool: usize,
+    },
+    /// A pose that is none.
+    #[error(
+        "tool `{tool}` cannot go there: a pose is a rotation and a place within 1000 m of the origin, all of it numbers"
+    )]
+    Pose {
+        /// The tool.
+        tool: String,
+    },
+    /// A tool that has no jaws.
+    #[error("tool `{tool}` has no jaws; take a grasper")]
+    NoJaws {
+        /// The tool.
+        tool: String,
+    },
+    /// An angle that jaws do not have.
+    #[error("tool `{tool}`: {problem}")]
+    Jaws {
+        /// The tool.
+        tool: String,
+        /// What is wrong and what to do.
+        problem: String,
+    },
     /// A hold that there is not, or that was let go.
     #[error("there is no hold {hold}, or it was let go")]
     NoHold {

@@ -12,7 +12,12 @@ const TIME_TOLERANCE: f64 = 1.0 / 4096.0;
 
 /// How late something may be and still belong to a time of the scene [s].
 pub(super) fn tolerance(scene: &Scene) -> f64 {
-    TIME_TOLERANCE * scene.time.frame
+    tolerance_of(scene.time.frame)
+}
+
+/// The same of frames of this duration [s].
+pub(super) fn tolerance_of(frame: f64) -> f64 {
+    TIME_TOLERANCE * frame
 }
 
 /// Where vertices were when patches were taken hold of, motion by motion [m]; nothing for those that have

@@ -8,6 +8,7 @@
 //! Force-driven jaws are quasi-static: they have no inertia, close at a limited speed, and stop where tissue holds against
 //! the force. What they met at the end of a frame decides their speed in the next one, which is part of a saved simulation.
 
+use super::holding::tolerance_of;
 use crate::contact::{Tool, Wrench};
 use crate::scalar::rigid::{RigidTransform, rotation_vector};
 use crate::scalar::{Real, Vec3, vec3};
@@ -109,27 +110,75 @@ pub(super) struct Instruments {
     jaws: Vec<Jaw>,
     /// The beginning of the frame to come [s].
     since: f64,
-    /// Of each part of each tool, whether it was put elsewhere in the last frame; empty where none moves.
+    /// Of each tool, whether it is in the scene; what stands behind is not.
+    there: Vec<bool>,
+    /// Of each part of each tool that is there, whether it was put elsewhere in the last frame; empty where none moves.
     jumped: Vec<bool>,
 }
 
 impl Instruments {
     /// At the beginning of a scene whose frames have this duration [s].
     pub fn new(tools: &[Instrument], frame: f64) -> Self {
-        let open = |tool: &Instrument| tool.jaws.as_ref().map_or(0.0, |jaws| jaws.open);
-        let jaw = |tool: &Instrument| Jaw { angle: open(tool), speed: 0.0, gain: 1.0 };
-        let mut all = Self::of(tools.iter().map(jaw).collect(), 0.0);
+        let there = there_at(tools, 0.0, tolerance_of(frame));
+        let mut all = Self::of(tools.iter().map(Jaw::open).collect(), there, 0.0);
         all.choose_speeds(tools, &[], &[], frame);
         all
     }
 
-    /// Of jaws that were saved, at a time [s].
-    pub fn of(jaws: Vec<Jaw>, since: f64) -> Self {
-        Self { jaws, since, jumped: Vec::new() }
+    /// Of jaws that were saved, and of tools that were there, at a time [s].
+    pub fn of(jaws: Vec<Jaw>, there: Vec<bool>, since: f64) -> Self {
+        Self { jaws, since, there, jumped: Vec::new() }
     }
 
     pub fn jaws(&self) -> &[Jaw] {
         &self.jaws
+    }
+
+    /// Of each tool whether it is in the scene, in the frame that has ended or begins.
+    pub fn there(&self) -> &[bool] {
+        &self.there
+    }
+
+    /// Whether a tool is.
+    pub fn is_there(&self, index: usize) -> bool {
+        self.there.get(index).copied().unwrap_or(false)
+    }
+
+    /// How many parts of a tool are there.
+    fn parts_of(&self, index: usize, tool: &Instrument) -> usize {
+        if self.is_there(index) { tool.parts.len() } else { 0 }
+    }
+
+    /// Another tool, which is not there yet.
+    pub fn add(&mut self, tool: &Instrument) {
+        self.jaws.push(Jaw::open(tool));
+    }
+
+    /// From the frame [s] on that begins now these tools are there. Returns where each part that was there is now among
+    /// those that are.
+    pub fn come_and_go(
+        &mut self,
+        tools: &[Instrument],
+        there: Vec<bool>,
+        frame: f64,
+    ) -> Vec<Option<u32>> {
+        let (mut places, mut next) = (Vec::new(), 0);
+        for (index, tool) in tools.iter().enumerate() {
+            let stays = there.get(index) == Some(&true);
+            for part in 0..self.parts_of(index, tool) {
+                places.push(stays.then_some(next + part as u32));
+            }
+            next += if stays { tool.parts.len() as u32 } else { 0 };
+        }
+        let before = std::mem::replace(&mut self.there, there);
+        self.jumped.clear();
+        for (index, (tool, jaw)) in tools.iter().zip(&mut self.jaws).enumerate() {
+            let comes = self.there.get(index) == Some(&true) && before.get(index) != Some(&true);
+            if let Some(jaws) = tool.jaws.as_ref().filter(|jaws| comes && jaws.follow_force()) {
+                jaw.choose_speed((tool, jaws), 0.0, self.since, frame);
+            }
+        }
+        places
     }
 
     /// The opening angle of a tool's jaws at a time [s], from the frame to come on; zero where it has none [rad].
@@ -153,17 +202,17 @@ impl Instruments {
     /// Tells which tools were put elsewhere in the last frame.
     pub fn tell_jumps(&self, tools: &[Instrument], forces: &mut [ToolForce]) {
         let mut first = 0;
-        for (tool, force) in tools.iter().zip(forces) {
-            let range = first..first + tool.parts.len();
+        for (index, (tool, force)) in tools.iter().zip(forces).enumerate() {
+            let range = first..first + self.parts_of(index, tool);
             first = range.end;
             let parts = self.jumped.get(range).unwrap_or_default();
             force.has_jumped = parts.contains(&true);
         }
     }
 
-    /// Adds the parts of all tools, where they are at a time [s].
+    /// Adds the parts of all tools that are there, where they are at a time [s].
     pub fn parts_at(&self, tools: &[Instrument], time: f64, parts: &mut Vec<Tool>) {
-        for (index, tool) in tools.iter().enumerate() {
+        for (index, tool) in tools.iter().enumerate().filter(|(index, _)| self.is_there(*index)) {
             tool.parts_at(time, self.angle(index, tool, time), parts);
         }
     }
@@ -172,7 +221,10 @@ impl Instruments {
     /// are put elsewhere.
     pub fn substeps(&mut self, tools: &[Instrument], [start, end]: [f64; 2], substeps: u32) -> u32 {
         self.jumped.clear();
-        if tools.iter().all(Instrument::stands_still) {
+        let moves = |(index, tool): (usize, &Instrument)| {
+            self.is_there(index) && !(tool.stands_still() && tool.hands.is_empty())
+        };
+        if !tools.iter().enumerate().any(moves) {
             return substeps;
         }
         let dt = (end - start) / f64::from(substeps);
@@ -228,9 +280,12 @@ impl Instruments {
     ) {
         let time = self.since;
         let mut first = 0;
-        for (tool, jaw) in tools.iter().zip(&mut self.jaws) {
-            let range = first..first + tool.parts.len();
+        for (index, tool) in tools.iter().enumerate() {
+            let range = first..first + self.parts_of(index, tool);
             first = range.end;
+            let Some(jaw) = self.jaws.get_mut(index).filter(|_| !range.is_empty()) else {
+                continue;
+            };
             let Some(jaws) = tool.jaws.as_ref().filter(|jaws| jaws.follow_force()) else {
                 continue;
             };
@@ -238,20 +293,50 @@ impl Instruments {
             let opening = met.map_or(0.0, |(wrenches, parts)| {
                 opening_torque(tool, &tool.pose(time), wrenches, parts)
             });
-            jaw.choose_speed(jaws, opening, time, frame);
+            jaw.choose_speed((tool, jaws), opening, time, frame);
         }
+    }
+
+    /// Forces on tools at a time [s], none on those that are not there; `parts` and `wrenches` are those of the last step.
+    pub fn forces_on(
+        &self,
+        tools: &[Instrument],
+        wrenches: &[Wrench],
+        parts: &[Tool],
+        time: f64,
+    ) -> Vec<ToolForce> {
+        let mut first = 0;
+        let of_tool = |(index, tool): (usize, &Instrument)| {
+            let range = first..first + self.parts_of(index, tool);
+            first = range.end;
+            let met = wrenches.get(range.clone()).zip(parts.get(range)).unwrap_or_default();
+            force_on(tool, met, time)
+        };
+        tools.iter().enumerate().map(of_tool).collect()
     }
 }
 
 impl Jaw {
+    /// Of a tool that comes into the scene.
+    fn open(tool: &Instrument) -> Self {
+        let angle = tool.jaws.as_ref().map_or(0.0, |jaws| jaws.open);
+        Self { angle, speed: 0.0, gain: 1.0 }
+    }
+
     /// For the frame [s] that begins at a time [s], in which tissue opens the jaws by a torque [N m].
-    fn choose_speed(&mut self, jaws: &Jaws, opening: f64, time: f64, frame: f64) {
-        if jaws.are_locked(time) {
+    fn choose_speed(
+        &mut self,
+        (tool, jaws): (&Instrument, &Jaws),
+        opening: f64,
+        time: f64,
+        frame: f64,
+    ) {
+        if tool.is_locked(time) {
             self.speed = 0.0;
             return;
         }
         let arm = 0.5 * jaws.length;
-        let closing = jaws.at(time) * arm;
+        let closing = tool.closing_force(time) * arm;
         let drive = ((opening - closing) / closing.abs().max(LEAST_FORCE * arm)).clamp(-1.0, 1.0);
         let has_turned = drive * self.speed < 0.0;
         let gain = if has_turned { 0.5 * self.gain } else { GROWTH * self.gain };
@@ -293,39 +378,31 @@ fn torque_about(point: Vec3<f64>, wrench: &Wrench, placed: &Tool) -> Vec3<f64> {
     wrench.torque + (placed.pose.translation - point).cross(wrench.force)
 }
 
-/// Forces on tools at a time [s]; `parts` and `wrenches` are those of the last step.
-pub(super) fn forces_on(
-    tools: &[Instrument],
-    wrenches: &[Wrench],
-    parts: &[Tool],
-    time: f64,
-) -> Vec<ToolForce> {
-    let mut first = 0;
-    let mut forces = Vec::new();
-    for tool in tools {
-        let range = first..first + tool.parts.len();
-        first = range.end;
-        let origin = tool.pose(time).translation;
-        let mut sum = Wrench::default();
-        let met = wrenches.get(range.clone()).zip(parts.get(range)).unwrap_or_default();
-        for (wrench, placed) in met.0.iter().zip(met.1) {
-            sum.force += wrench.force;
-            sum.torque += torque_about(origin, wrench, placed);
-            sum.touches += wrench.touches;
-            sum.pinned += wrench.pinned;
-            sum.depth = sum.depth.max(wrench.depth);
-        }
-        forces.push(ToolForce {
-            name: tool.name.clone(),
-            force: sum.force.to_array(),
-            torque: sum.torque.to_array(),
-            touches: sum.touches,
-            pinned: sum.pinned,
-            depth: sum.depth,
-            has_jumped: false,
-            error: None,
-            torque_error: None,
-        });
+/// The force on a tool at a time [s] by what its parts met where they are.
+fn force_on(tool: &Instrument, (wrenches, parts): (&[Wrench], &[Tool]), time: f64) -> ToolForce {
+    let origin = tool.pose(time).translation;
+    let mut sum = Wrench::default();
+    for (wrench, placed) in wrenches.iter().zip(parts) {
+        sum.force += wrench.force;
+        sum.torque += torque_about(origin, wrench, placed);
+        sum.touches += wrench.touches;
+        sum.pinned += wrench.pinned;
+        sum.depth = sum.depth.max(wrench.depth);
     }
-    forces
+    ToolForce {
+        name: tool.name.clone(),
+        force: sum.force.to_array(),
+        torque: sum.torque.to_array(),
+        touches: sum.touches,
+        pinned: sum.pinned,
+        depth: sum.depth,
+        has_jumped: false,
+        error: None,
+        torque_error: None,
+    }
+}
+
+/// Of each tool whether it is there in a frame that begins at a time [s].
+pub(super) fn there_at(tools: &[Instrument], time: f64, tolerance: f64) -> Vec<bool> {
+    tools.iter().map(|tool| tool.is_there(time, tolerance)).collect()
 }

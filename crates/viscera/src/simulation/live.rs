@@ -8,7 +8,9 @@ use super::instruments::Instruments;
 use super::{Simulation, check_contact};
 use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
-use crate::scene::{Change, Interpolation, Motion, MotionKey, Patch, Scene, SceneError};
+use crate::scene::{
+    Change, Hand, Instrument, Interpolation, Motion, MotionKey, Patch, Scene, SceneError,
+};
 use crate::settings::{Precision, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::check_elements;
@@ -21,6 +23,18 @@ pub struct Live {
     pub motions: Vec<Motion>,
     /// Settings.
     pub changes: Vec<Change>,
+    /// Tools that were taken into the scene.
+    pub tools: Vec<Instrument>,
+    /// Hands that took tools, with the names of these: those above among them.
+    pub hands: Vec<(String, Hand)>,
+}
+
+impl Live {
+    /// As a scene file has it, to be put behind its other tables: of this scene, whose bodies it names.
+    pub fn text(&self, scene: &Scene) -> String {
+        let Self { motions, changes, tools, hands } = self;
+        scene.write(motions, changes) + &scene.write_tools(tools, hands)
+    }
 }
 
 impl<S: Real> Simulation<S> {
@@ -142,6 +156,7 @@ impl<S: Real> Simulation<S> {
         fork.frame = self.frame;
         fork.taken = self.taken.clone();
         fork.instruments = self.instruments.clone();
+        fork.choose_substeps();
         fork.changes_made = self.changes_made;
         fork.by_hand.clone_from(&self.by_hand);
         fork.balance.clone_from(&self.balance);
@@ -183,14 +198,24 @@ impl<S: Real> Simulation<S> {
     /// Back to the beginning, at rest: what was held is let go, settings stay as they were set by hand.
     pub fn reset(&mut self) -> Result<(), LiveError> {
         let frame = std::mem::take(&mut self.frame);
+        // Whose tools are those of the beginning.
+        let mut assembly = self.assembly.clone();
+        assembly.motions.truncate(self.written.motions.len());
+        assembly.tools.truncate(self.written.tools.len());
+        for (tool, written) in assembly.tools.iter_mut().zip(&self.written.tools) {
+            tool.hands.clone_from(&written.hands);
+        }
+        assembly.take_samples(&self.written)?;
+        let before = std::mem::replace(&mut self.assembly, assembly);
+        let instruments = Instruments::new(&self.assembly.tools, self.written.time.frame);
+        let instruments = std::mem::replace(&mut self.instruments, instruments);
+        let contact = std::mem::take(&mut self.state.contact);
         if let Err(error) = self.rebuild(self.written.clone()) {
-            self.frame = frame;
+            (self.frame, self.assembly, self.instruments) = (frame, before, instruments);
+            self.state.contact = contact;
             return Err(error);
         }
-        self.assembly.motions.truncate(self.written.motions.len());
         self.taken = GraspOrigins::default();
-        let frame = self.scene.time.frame;
-        self.instruments = Instruments::new(&self.assembly.tools, frame);
         self.divided = self.substeps;
         self.by_hand.clear();
         self.changes_made = 0;
@@ -211,12 +236,14 @@ impl<S: Real> Simulation<S> {
     /// What was done by hand.
     pub fn live(&self) -> Live {
         let motions = self.scene.motions[self.written.motions.len()..].to_vec();
-        Live { motions, changes: self.by_hand.clone() }
+        let tools = self.scene.tools[self.written.tools.len()..].to_vec();
+        Live { motions, changes: self.by_hand.clone(), tools, hands: self.live_hands() }
     }
 
     /// What the scene wants at the beginning of a frame.
     pub(super) fn begin_frame(&mut self) -> Result<(), LiveError> {
         self.make_changes()?;
+        self.tools_come_and_go()?;
         let time = self.time();
         self.taken.take(&self.scene, &self.assembly, time, &self.state);
         Ok(())

@@ -10,6 +10,7 @@ mod error;
 mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod hands;
 mod holding;
 mod instruments;
 mod live;
@@ -29,6 +30,7 @@ pub use assemble_error::AssembleError;
 pub use automatic::{ExpectedErrors, automatic_settings};
 pub use error::{FrameError, LiveError, SimulationError};
 pub use forces::Hold;
+pub use hands::{Holder, ToolState};
 use holding::GraspOrigins;
 use instruments::Instruments;
 pub use instruments::ToolForce;
@@ -183,7 +185,7 @@ impl<S: Real> Simulation<S> {
         (self.oscillations, self.substeps) =
             self.backend.substeps(&inputs, &self.solver, known, frame);
         let may_lie_on_tools =
-            !self.assembly.tools.is_empty() && has_loose_parts(self.layout(), &inputs);
+            self.instruments.there().contains(&true) && has_loose_parts(self.layout(), &inputs);
         if may_lie_on_tools && self.solver.substeps == Count::Auto {
             self.substeps = self.substeps.max(LEAST_ON_TOOLS);
         }
@@ -452,24 +454,30 @@ fn check_patches(scene: &Scene, assembly: &Assembly) -> Result<(), SimulationErr
 
 /// Contact is computed where the scene asks for it to be.
 fn check_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationError> {
+    if scene.tools.is_empty() { Ok(()) } else { refuse_device(scene, callers_device) }
+}
+
+/// Devices compute no contact.
+fn refuse_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationError> {
     let on_device = match &scene.solver.device {
         DeviceRequest::Cpu | DeviceRequest::Auto => None,
         device => Some(device.clone()),
     };
     match on_device.or(callers_device.then_some(DeviceRequest::Gpu)) {
-        Some(device) if !scene.tools.is_empty() => Err(SimulationError::ToolsOnDevice { device }),
-        _ => Ok(()),
+        Some(device) => Err(SimulationError::ToolsOnDevice { device }),
+        None => Ok(()),
     }
 }
 
 /// The method takes contact.
 fn check_contact(scene: &Scene, solver: &SolverSettings) -> Result<(), StepError> {
+    if scene.tools.is_empty() { Ok(()) } else { refuse_method(solver) }
+}
+
+/// Not all methods compute contact.
+fn refuse_method(solver: &SolverSettings) -> Result<(), StepError> {
     let takes_contact = solver.method != Method::Xpbd || solver.rebase;
-    if takes_contact || scene.tools.is_empty() {
-        Ok(())
-    } else {
-        Err(StepError::ContactNeedsRebase)
-    }
+    if takes_contact { Ok(()) } else { Err(StepError::ContactNeedsRebase) }
 }
 
 /// A substep of a scene [s], of so many per frame.

@@ -9,8 +9,8 @@ use super::Simulation;
 use super::automatic::{self, Chosen};
 use super::device::Backend;
 use super::error::LiveError;
-use super::holding::GraspOrigins;
-use super::instruments::{Instruments, Jaw};
+use super::holding::{GraspOrigins, tolerance};
+use super::instruments::{Instruments, Jaw, there_at};
 use crate::contact::Touch;
 use crate::layout::Layout;
 use crate::model::for_each_kind;
@@ -226,6 +226,10 @@ impl<S: Real> Simulation<S> {
             }
             self.make_change()?;
         }
+        // The last frame's tools.
+        let begun = self.frame.saturating_sub(1) as f64 * self.scene.time.frame;
+        self.sample_for(begun)?;
+        let there = there_at(&self.assembly.tools, begun, tolerance(&self.scene));
         let method = METHODS.get(usize::from(saved.method)).ok_or(ResumeError::Damaged)?;
         self.take_method(*method)?;
         let vertices = self.model.vertex_count();
@@ -236,7 +240,7 @@ impl<S: Real> Simulation<S> {
             ("constraints", [0, constraints].contains(&saved.multipliers.len())),
             ("meshes, materials or solver settings", saved.model == fingerprint(self.layout())),
             ("motions", self.takes(&saved.taken)),
-            ("tools", self.knows(&saved)),
+            ("tools", self.knows(&saved, &there)),
         ] {
             if !fits {
                 return Err(ResumeError::OtherScene { what });
@@ -244,7 +248,8 @@ impl<S: Real> Simulation<S> {
         }
         self.taken =
             GraspOrigins::of(saved.taken.iter().map(|t| t.as_deref().map(dressed)).collect());
-        self.instruments = Instruments::of(saved.jaws, self.time());
+        self.instruments = Instruments::of(saved.jaws, there, self.time());
+        self.choose_substeps();
         self.before = dressed(&saved.before);
         self.rejected_substeps = saved.rejected_substeps;
         self.put(State {
@@ -285,12 +290,16 @@ impl<S: Real> Simulation<S> {
     }
 
     /// Whether what was touched, and by what, is there.
-    fn knows(&self, saved: &Saved) -> bool {
+    fn knows(&self, saved: &Saved, there: &[bool]) -> bool {
         let samples = self.model.samples.len();
         let is_known = |touch: &SavedTouch| {
             (touch.sample as usize) < samples && (touch.tool as usize) < saved.tools.len()
         };
-        saved.touches.iter().all(is_known) && saved.jaws.len() == self.scene.tools.len()
+        let tools = self.assembly.tools.iter().zip(there).filter(|(_, there)| **there);
+        let parts = tools.map(|(tool, _)| tool.parts.len()).sum();
+        saved.touches.iter().all(is_known)
+            && saved.jaws.len() == self.scene.tools.len()
+            && saved.tools.len() == parts
     }
 
     /// Whether each motion has as many vertices as were taken hold of.

@@ -8,7 +8,7 @@ use crate::model::Model;
 use crate::scalar::{Real, Vec3};
 use crate::settings::{SolverSettings, Threads};
 use crate::solver::{Inputs, Shadow};
-use crate::state::State;
+use crate::state::{ContactState, State};
 
 /// A second run, and what it is given.
 #[derive(Debug)]
@@ -47,6 +47,11 @@ impl<S: Real> Shadowed<S> {
             self.shadow.follow(state);
             self.is_lost = false;
         }
+    }
+
+    /// What it has touched.
+    pub fn contact_mut(&mut self) -> &mut ContactState {
+        &mut self.shadow.state_mut().contact
     }
 
     /// A frame [s] of both: `run` is the other's, of so many substeps; `act` puts what acts in one of so many into inputs.

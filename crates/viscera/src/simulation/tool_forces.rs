@@ -1,7 +1,8 @@
 //! What a simulation says of its tools.
 
 use super::Simulation;
-use super::instruments::{ToolForce, forces_on};
+use super::holding::tolerance;
+use super::instruments::ToolForce;
 use crate::contact::Tool;
 use crate::scalar::Real;
 use crate::solver::Ledger;
@@ -10,11 +11,12 @@ impl<S: Real> Simulation<S> {
     /// Forces on the scene's tools at the end of the last frame; zero before the first and after a change of settings.
     pub fn tool_forces(&self) -> Vec<ToolForce> {
         let (tools, parts, time) = (&self.assembly.tools, &self.inputs.tools, self.time());
-        let mut forces = forces_on(tools, self.backend.wrenches(), parts, time);
+        let mut forces = self.instruments.forces_on(tools, self.backend.wrenches(), parts, time);
         self.instruments.tell_jumps(tools, &mut forces);
         let shadow = self.shadow.as_ref().filter(|_| self.stepped);
         if let Some((shadow, wrenches)) = shadow.and_then(|all| Some((all, all.wrenches()?))) {
-            for (force, other) in forces.iter_mut().zip(forces_on(tools, wrenches, parts, time)) {
+            let others = self.instruments.forces_on(tools, wrenches, parts, time);
+            for (force, other) in forces.iter_mut().zip(others) {
                 force.compare(&other, |force, other| shadow.error(force, other));
             }
         }
@@ -32,10 +34,15 @@ impl<S: Real> Simulation<S> {
         Some(self.instruments.angle(tool, at, self.time()))
     }
 
-    /// The parts of all tools at the end of the last frame, tool by tool.
+    /// The parts of all tools that are there in the frame to come, where they are now, tool by tool: [`Simulation::tools`]
+    /// says which.
     pub fn tool_parts(&self) -> Vec<Tool> {
-        let mut parts = Vec::new();
-        self.instruments.parts_at(&self.assembly.tools, self.time(), &mut parts);
+        let (mut parts, time) = (Vec::new(), self.time());
+        for (index, tool) in self.assembly.tools.iter().enumerate() {
+            if tool.is_there(time, tolerance(&self.scene)) {
+                tool.parts_at(time, self.instruments.angle(index, tool, time), &mut parts);
+            }
+        }
         parts
     }
 

@@ -2,6 +2,7 @@
 
 use super::assemble::{AssembledBody, Assembly};
 use super::assemble_error::AssembleError;
+use super::holding::tolerance;
 use crate::contact::{Sample, Tool, sample_boundary, sample_embedded};
 use crate::mesh::topology::boundary_faces;
 use crate::scalar::Vec3;
@@ -36,19 +37,35 @@ impl Assembly {
         Ok(())
     }
 
-    /// Takes samples of the surfaces of all bodies, where there are tools: the vertices of a fine surface, else points of
-    /// each outer triangle. A tool that would slip between them is refused.
-    pub(super) fn take_samples(&mut self) -> Result<(), AssembleError> {
-        if self.tools.is_empty() {
-            return Ok(());
+    /// Takes samples of the surfaces of all bodies, where there are tools from the beginning: the vertices of a fine surface,
+    /// else points of each outer triangle. A tool that would slip between them, then or later, is refused.
+    pub(super) fn take_samples(&mut self, scene: &Scene) -> Result<(), AssembleError> {
+        let samples = match thinnest_until(&self.tools, 0.0, tolerance(scene)) {
+            Some(thinnest) => self.samples_for(thinnest),
+            None => Vec::new(),
+        };
+        for tool in &self.tools {
+            match tool.is_there(0.0, tolerance(scene)) {
+                true => self.check_thick(tool, &samples)?,
+                false => self.check_thick(tool, &self.samples_for(tool.thinnest()))?,
+            }
         }
-        let thinnest = self.tools.iter().map(Instrument::thinnest).fold(f64::INFINITY, f64::min);
-        let mut samples = Vec::new();
+        Ok(self.builder.set_samples(samples)?)
+    }
+
+    /// Samples of the surfaces of all bodies for tools of which the thinnest has this radius [m].
+    pub(super) fn samples_for(&self, thinnest: f64) -> Vec<Sample> {
+        self.bodies.iter().flat_map(|body| self.samples_of(body, thinnest)).collect()
+    }
+
+    /// A tool does not slip between samples.
+    fn check_thick(&self, tool: &Instrument, samples: &[Sample]) -> Result<(), AssembleError> {
         for body in &self.bodies {
-            let of_body = self.samples_of(body, thinnest);
-            let area: f64 = of_body.iter().map(|sample| sample.area).sum();
-            let spacing = (area / of_body.len().max(1) as f64).sqrt();
-            if let Some(tool) = self.tools.iter().find(|tool| tool.thinnest() < spacing) {
+            let of_body = samples.iter().filter(|s| body.tets.contains(&(s.tet as usize)));
+            let (area, count) = of_body
+                .fold((0.0, 0_usize), |(area, count), sample| (area + sample.area, count + 1));
+            let spacing = (area / count.max(1) as f64).sqrt();
+            if tool.thinnest() < spacing {
                 return Err(AssembleError::ThinTool {
                     place: tool.place.clone(),
                     tool: tool.name.clone(),
@@ -57,9 +74,8 @@ impl Assembly {
                     spacing,
                 });
             }
-            samples.extend(of_body);
         }
-        Ok(self.builder.set_samples(samples)?)
+        Ok(())
     }
 
     /// Samples of one body, for tools of which the thinnest has this radius [m].
@@ -82,46 +98,86 @@ impl Assembly {
         samples
     }
 
-    /// No tool begins inside tissue. Where a tool that stands still meets what is fixed nothing can give way, and nothing
-    /// has to.
-    pub(super) fn check_tools_outside(&self) -> Result<(), AssembleError> {
+    /// No tool that is there from the beginning is inside tissue then.
+    pub(super) fn check_tools_outside(&self, scene: &Scene) -> Result<(), AssembleError> {
         let positions = self.builder.positions();
-        let mut is_fixed = vec![false; positions.len()];
+        let entry = Entry { samples: self.builder.samples(), time: 0.0, may_meet_fixed: true };
+        let mut first = self.tools.iter().filter(|tool| tool.is_there(0.0, tolerance(scene)));
+        first.try_for_each(|tool| self.check_outside(tool, &entry, |v| positions[v]))
+    }
+
+    /// A tool can come into the scene: it is thick enough, and not inside tissue whose vertices are at `place` [m].
+    pub(super) fn check_entry(
+        &self,
+        tool: &Instrument,
+        entry: &Entry<'_>,
+        place: impl Fn(usize) -> Vec3<f64>,
+    ) -> Result<(), AssembleError> {
+        self.check_thick(tool, entry.samples)?;
+        self.check_outside(tool, entry, place)
+    }
+
+    /// Where a tool that stands still meets what is fixed nothing can give way, and nothing has to.
+    fn check_outside(
+        &self,
+        tool: &Instrument,
+        entry: &Entry<'_>,
+        place: impl Fn(usize) -> Vec3<f64>,
+    ) -> Result<(), AssembleError> {
+        let &Entry { samples, time, may_meet_fixed } = entry;
+        let mut is_fixed = vec![false; self.builder.positions().len()];
         let fixed = self.fixings.iter().filter(|patch| patch.attachments.is_empty());
         fixed.flat_map(|patch| &patch.vertices).for_each(|&v| is_fixed[v as usize] = true);
         let corners = |sample: &Sample| {
             let all = sample.vertices.into_iter().zip(sample.weights);
             all.filter(|(_, weight)| *weight != 0.0)
         };
-        for tool in &self.tools {
-            let mut parts = Vec::new();
-            let angle = tool.jaws.as_ref().map_or(0.0, |jaws| jaws.open);
-            tool.parts_at(0.0, tool.jaw_angle(0.0, angle), &mut parts);
-            for body in &self.bodies {
-                let size = size(body.mesh.vertices());
-                let mut depth = ROUNDING * size;
-                let of_body = self.builder.samples().iter();
-                let of_body = of_body.filter(|s| body.tets.contains(&(s.tet as usize)));
-                for sample in of_body {
-                    let place = corners(sample)
-                        .fold(Vec3::ZERO, |sum, (v, weight)| sum + positions[v as usize] * weight);
-                    let is_pinned = corners(sample).all(|(v, _)| is_fixed[v as usize]);
-                    if !(is_pinned && tool.stands_still()) {
-                        depth = depth.max(-distance(&parts, place));
-                    }
+        let mut parts = Vec::new();
+        let angle = tool.jaws.as_ref().map_or(0.0, |jaws| jaws.open);
+        tool.parts_at(time, tool.jaw_angle(time, angle), &mut parts);
+        for body in &self.bodies {
+            let size = size(body.mesh.vertices());
+            let mut depth = ROUNDING * size;
+            for sample in samples.iter().filter(|s| body.tets.contains(&(s.tet as usize))) {
+                let at = corners(sample)
+                    .fold(Vec3::ZERO, |sum, (v, weight)| sum + place(v as usize) * weight);
+                let is_pinned = corners(sample).all(|(v, _)| is_fixed[v as usize]);
+                if !(is_pinned && may_meet_fixed && tool.stands_still()) {
+                    depth = depth.max(-distance(&parts, at));
                 }
-                if depth > ROUNDING * size {
-                    return Err(AssembleError::ToolInside {
-                        place: tool.place.clone(),
-                        tool: tool.name.clone(),
-                        body: body.name.clone(),
-                        depth,
-                    });
-                }
+            }
+            if depth > ROUNDING * size {
+                return Err(AssembleError::ToolInside {
+                    place: tool.place.clone(),
+                    tool: tool.name.clone(),
+                    body: body.name.clone(),
+                    depth,
+                });
             }
         }
         Ok(())
     }
+}
+
+/// A tool's coming into the scene.
+pub(super) struct Entry<'a> {
+    /// Of the surfaces that it may meet.
+    pub samples: &'a [Sample],
+    /// When it comes [s].
+    pub time: f64,
+    /// Whether it may be inside tissue that is fixed, where it stands still.
+    pub may_meet_fixed: bool,
+}
+
+/// The smallest radius [m] of the tools that have come into the scene by a time [s], which may be so much too early;
+/// nothing where there was none.
+pub(super) fn thinnest_until<'a>(
+    tools: impl IntoIterator<Item = &'a Instrument>,
+    time: f64,
+    tolerance: f64,
+) -> Option<f64> {
+    let come = tools.into_iter().filter(|tool| tool.begin <= time + tolerance);
+    come.map(Instrument::thinnest).reduce(f64::min)
 }
 
 /// From the nearest part to a point [m].

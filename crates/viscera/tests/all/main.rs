@@ -31,6 +31,7 @@ mod gpu_shaders;
 mod gpu_simulation;
 mod gpu_surface;
 mod gpu_timing;
+mod hands;
 mod history;
 mod imports;
 mod iterates;
