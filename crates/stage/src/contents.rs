@@ -8,6 +8,7 @@ use viscera_render::{
     Arrow, BodyView, BoundingSphere, GpuDrawing, Markers, Orbit, Paint, ScaledValues, ValueBuffer,
 };
 
+use crate::hand::HandId;
 use crate::snapshot::RunSnapshot;
 use crate::tools::{ToolSnapshot, ToolSurfaces, force_arrows};
 
@@ -89,8 +90,8 @@ pub struct PictureContents<'a> {
     pub targets: &'a [Vec3<f64>],
     /// The tools of the snapshot that the surfaces were placed by.
     pub tools: &'a [ToolSnapshot],
-    /// Which of them is in the hand.
-    pub in_hand: Option<usize>,
+    /// The hand whose tool is drawn in another shade.
+    pub in_hand: Option<HandId>,
     /// Length of arrows of their forces [m/N].
     pub force_scale: f64,
     /// The size of things [m], for markers and arrows.

@@ -141,7 +141,7 @@ pub fn newtons_within(force: f64, error: Option<f64>) -> String {
     };
     let scale = 10f64.powi(digits as i32);
     // What rounding leaves above a number of these digits is none of the error's.
-    let up = (factor * error * scale - 1e-9).ceil() / scale;
+    let up = (factor * error * scale - 1e-9).ceil().max(0.0) / scale;
     format!("{:.digits$} ± {up:.digits$} {unit}", factor * force)
 }
 

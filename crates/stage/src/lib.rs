@@ -8,11 +8,14 @@
 //! | step a simulation in either precision, hold it, change it | [`Run`], [`build`] |
 //! | see what it looks like after a frame | [`RunSnapshot`], [`Coloring`] |
 //! | find what lies under a pointer | [`Lens`], [`pick`], [`pick_tool`], [`meet_plane`] |
+//! | lead instruments by hand | [`ToolAct`], [`tray`] |
 //! | see tools and the forces that they meet | [`ToolSnapshot`], [`ForceScale`] |
 //! | draw it | [`RunSurface`], [`PictureContents`], [`Legend`] |
 
 mod color;
 mod contents;
+mod grip;
+mod hand;
 mod legend;
 mod lens;
 mod pick;
@@ -22,6 +25,8 @@ mod tools;
 
 pub use color::surface_values;
 pub use contents::{PictureContents, RunSurface};
+pub use grip::{FASTEST, first_pose, moved, turned, within_reach};
+pub use hand::{HandId, ToolAct, tray};
 pub use legend::{Legend, millimetres, newton_millimetres, newtons, newtons_within};
 pub use lens::{Area, Lens};
 pub use pick::{Pick, meet_plane, pick, pick_near};

@@ -11,6 +11,7 @@ use viscera::solver::Inputs;
 use viscera::solver::gpu::Device;
 
 use crate::color::surface_values;
+use crate::hand::{ToolAct, ToolHands};
 use crate::snapshot::{Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch};
 use crate::tools::tools_of;
 
@@ -29,6 +30,10 @@ pub trait Run: Send {
     fn lead(&mut self, hold: HoldId, translation: Vec3<f64>) -> Result<(), String>;
     /// Lets go.
     fn let_go(&mut self, hold: HoldId) -> Result<(), String>;
+    /// Does something with an instrument.
+    fn act(&mut self, act: &ToolAct) -> Result<(), String>;
+    /// What instruments would not do since it was last asked, and why.
+    fn refused(&mut self) -> Option<String>;
     /// Changes settings; where one is wrong, none.
     fn change(&mut self, settings: &Settings) -> Result<(), String>;
     /// The value of a setting of the solver, as one would write it.
@@ -123,13 +128,15 @@ struct SimulationRun<S> {
     simulation: Simulation<S>,
     /// What is held, and the motion that each is.
     held: Vec<(HoldId, usize)>,
+    hands: ToolHands,
     measures: Measures,
 }
 
 impl<S: Real> SimulationRun<S> {
     fn new(simulation: Result<Simulation<S>, SimulationError>) -> Result<Self, String> {
         let simulation = simulation.map_err(text)?;
-        Ok(Self { simulation, held: Vec::new(), measures: Measures::default() })
+        let (held, hands) = (Vec::new(), ToolHands::default());
+        Ok(Self { simulation, held, hands, measures: Measures::default() })
     }
 
     /// Forces of what the scene itself moves and pulls.
@@ -156,6 +163,7 @@ impl<S: Real> SimulationRun<S> {
         Ok(SimulationRun {
             simulation: self.simulation.fork(&settings).map_err(text)?,
             held: self.held.clone(),
+            hands: self.hands.clone(),
             measures: self.measures.clone(),
         })
     }
@@ -203,6 +211,14 @@ impl<S: Real> Run for SimulationRun<S> {
         self.simulation.let_go(motion).map_err(text)
     }
 
+    fn act(&mut self, act: &ToolAct) -> Result<(), String> {
+        self.hands.act(&mut self.simulation, act)
+    }
+
+    fn refused(&mut self) -> Option<String> {
+        self.hands.refused()
+    }
+
     fn change(&mut self, settings: &Settings) -> Result<(), String> {
         self.simulation.change(settings).map_err(text)
     }
@@ -215,15 +231,18 @@ impl<S: Real> Run for SimulationRun<S> {
 
     fn reset(&mut self) -> Result<(), String> {
         self.held.clear();
+        self.hands.clear();
         self.measures = Measures::default();
         self.simulation.reset().map_err(text)
     }
 
     fn advance(&mut self) -> Result<(), String> {
+        self.hands.lead(&mut self.simulation);
         self.simulation.advance().map_err(text)
     }
 
     fn send(&mut self, measured: bool) -> Result<(), String> {
+        self.hands.lead(&mut self.simulation);
         self.simulation.send_frame(measured).map_err(text)
     }
 
@@ -274,7 +293,7 @@ impl<S: Real> Run for SimulationRun<S> {
                 snapshot.held.push(HeldPatch { id, place, target, force });
             }
         }
-        tools_of(&self.simulation, &mut snapshot.tools);
+        tools_of(&self.simulation, &self.hands, &mut snapshot.tools);
         snapshot.ledger = self.simulation.ledger();
         let assembly = self.simulation.assembly();
         let tets = match coloring {

@@ -9,6 +9,7 @@ use viscera::solver::gpu::Device;
 use viscera_picture::{Arrow, Color, Facets};
 use viscera_render::{BoundingSphere, Orbit, ToolMesh, ToolView};
 
+use crate::hand::{HandId, ToolHands};
 use crate::legend::{newtons_within, round_up};
 
 /// A tool after a frame.
@@ -24,6 +25,10 @@ pub struct ToolSnapshot {
     pub met: ToolForce,
     /// The opening angle of its jaws [rad], where it has some.
     pub jaw_angle: Option<f64>,
+    /// Its number in the simulation.
+    pub number: usize,
+    /// The hand that has it.
+    pub hand: Option<HandId>,
 }
 
 impl ToolSnapshot {
@@ -44,21 +49,32 @@ impl ToolSnapshot {
 
     /// The force with what it may be off by, as it is written everywhere.
     pub fn force_text(&self) -> String {
+        if self.met.touches == 0 && self.force() == 0.0 {
+            return "touches nothing".to_owned();
+        }
         newtons_within(self.force(), self.met.error)
     }
 }
 
-/// All tools of a simulation, as they are now.
-pub(crate) fn tools_of<S: Real>(simulation: &Simulation<S>, tools: &mut Vec<ToolSnapshot>) {
+/// All tools that are in a simulation's scene, as they are now.
+pub(crate) fn tools_of<S: Real>(
+    simulation: &Simulation<S>,
+    hands: &ToolHands,
+    tools: &mut Vec<ToolSnapshot>,
+) {
     tools.clear();
     let mut parts = simulation.tool_parts().into_iter();
-    let all = simulation.assembly().tools.iter().zip(simulation.tool_forces());
-    tools.extend(all.enumerate().map(|(number, (tool, met))| ToolSnapshot {
+    let scene_tools = &simulation.assembly().tools;
+    let all = scene_tools.iter().zip(simulation.tools()).zip(simulation.tool_forces());
+    let there = all.enumerate().filter(|(_, ((_, state), _))| state.is_there);
+    tools.extend(there.map(|(number, ((tool, state), met))| ToolSnapshot {
         kind: tool.kind,
-        pose: tool.pose(simulation.time()),
+        pose: state.pose,
         parts: parts.by_ref().take(tool.parts.len()).collect(),
         met,
-        jaw_angle: simulation.jaw_angle(number),
+        jaw_angle: state.jaw_angle,
+        number,
+        hand: hands.of(number),
     }));
 }
 
@@ -99,10 +115,10 @@ impl ToolSurfaces {
     pub fn views<'a>(
         &'a self,
         tools: &'a [ToolSnapshot],
-        in_hand: Option<usize>,
+        in_hand: Option<HandId>,
     ) -> Vec<ToolView<'a>> {
-        let parts = tools.iter().enumerate().flat_map(|(number, tool)| {
-            let is_in_hand = in_hand == Some(number);
+        let parts = tools.iter().flat_map(|tool| {
+            let is_in_hand = tool.hand.is_some() && tool.hand == in_hand;
             tool.parts.iter().map(move |part| (is_in_hand, part))
         });
         let drawn = parts.zip(&self.meshes).filter_map(|((is_in_hand, part), (shape, mesh))| {
@@ -245,7 +261,7 @@ mod tests {
                 name: "ball".into(),
                 force,
                 torque: [0.0; 3],
-                touches: 0,
+                touches: 3,
                 pinned: 0,
                 depth: 0.0,
                 has_jumped: false,
@@ -253,6 +269,8 @@ mod tests {
                 torque_error: None,
             },
             jaw_angle: None,
+            number: 0,
+            hand: None,
         }
     }
 

@@ -1,6 +1,7 @@
 //! The window's state, and what happens to it.
 
 mod files;
+mod steering;
 
 use eframe::egui::{self, CentralPanel, Panel, ScrollArea, Ui};
 use eframe::egui_wgpu::RenderState;
@@ -9,11 +10,17 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use crate::capture::{FOLDER, Recorder};
+use viscera::scalar::Vec3;
+use viscera::scene::Instrument;
+
 use crate::choices::{Settings, Side};
+use crate::controller::Controller;
 use crate::curves::ForceCurves;
 use crate::document::Document;
 use crate::engine::{Command, Cure, Engine, Event, Setup, Snapshot};
 use crate::help::{self, Request};
+use crate::instruments::Instruments;
+use crate::hands::Hands;
 use crate::holds::Holds;
 use crate::messages::Messages;
 use crate::panels::time::Clock;
@@ -48,7 +55,12 @@ pub struct App {
     engine: Engine,
     session: Session,
     viewport: Viewport,
-    holds: Holds,
+    hands: Hands,
+    /// Instruments that can be taken.
+    tray: Vec<Instrument>,
+    controller: Controller,
+    /// When the controller was asked last.
+    controlled: Instant,
     preferences: Preferences,
     clock: Clock,
     messages: Messages,
@@ -99,7 +111,10 @@ impl App {
         let mut app = Self {
             engine,
             viewport: Viewport::new(Gpu::new(render_state)),
-            holds: Holds::default(),
+            hands: Hands::default(),
+            tray: viscera_stage::tray()?,
+            controller: Controller::open(),
+            controlled: Instant::now(),
             clock: Clock::default(),
             setup: None,
             snapshot: None,
@@ -154,7 +169,17 @@ impl App {
 
     /// What is held.
     pub fn holds(&self) -> &Holds {
-        &self.holds
+        &self.hands.holds
+    }
+
+    /// Instruments in hands.
+    pub fn instruments(&self) -> &Instruments {
+        &self.hands.instruments
+    }
+
+    /// Where in the window the first picture shows a point [m]; nothing where it is behind the viewer.
+    pub fn place(&self, point: Vec3<f64>) -> Option<egui::Pos2> {
+        self.viewport.lens()?.place(point)
     }
 
     /// Forces over the last seconds.
@@ -181,6 +206,7 @@ impl App {
         self.shown += 1;
         self.hear();
         self.take_snapshot();
+        self.steer(&context);
         let coloring = self.preferences.coloring;
         let variants = self.preferences.ticked_variants();
         let mut actions: Vec<Action> =
@@ -188,7 +214,7 @@ impl App {
         self.show_panels(ui, &mut actions);
         let central = CentralPanel::no_frame().show(ui, |ui| {
             let snapshot = self.snapshot.as_deref();
-            self.viewport.show(ui, snapshot, &mut self.holds, &self.preferences)
+            self.viewport.show(ui, snapshot, &mut self.hands, &self.preferences)
         });
         let (commands, failed) = central.inner;
         self.send(commands);
@@ -196,7 +222,7 @@ impl App {
             self.messages.warn(error);
         }
         self.messages.show(&context, central.response.rect, &mut actions);
-        help::show(&context, &mut self.help_open);
+        help::show(&context, &mut self.help_open, &self.controller);
         if self.preferences.coloring != coloring {
             self.engine.send(Command::Color(self.preferences.coloring));
         }
@@ -260,7 +286,10 @@ impl App {
         let setup = self.setup.as_deref();
         let (fields, preferences) = (&mut self.fields, &mut self.preferences);
         panels::scene::show(ui, &self.session, setup, fields, preferences, actions);
-        panels::view::show_grip(ui, &mut self.preferences, &self.holds, &self.forces, actions);
+        let run = self.snapshot.as_ref().and_then(|snapshot| snapshot.runs.first());
+        let instruments = &self.hands.instruments;
+        panels::instruments::show(ui, &self.tray, instruments, run, &self.controller, actions);
+        panels::view::show_grip(ui, &mut self.preferences, &self.hands.holds, &self.forces, actions);
         panels::view::show(ui, &mut self.preferences, actions);
         panels::material::show(ui, self.session.scene(Side::First), actions);
         let sides: &[(&str, Side)] = match self.session.is_comparison() {
@@ -290,7 +319,7 @@ impl App {
                 Event::Ready(setup) => {
                     self.messages.busy = None;
                     self.messages.failure = None;
-                    let late = self.holds.clear();
+                    let late = self.hands.clear();
                     self.send(late);
                     self.curves.clear();
                     self.forces.clear();
@@ -313,6 +342,10 @@ impl App {
                 Event::Refused(text) => self.messages.warn(text),
                 Event::Done { path, text, time } => self.write_scene(&path, &text, time),
                 Event::Kept { run, key, value } => self.session.keep(run, &key, &value),
+                Event::NotTaken(hand, text) => {
+                    self.hands.instruments.forget(hand);
+                    self.messages.warn(text);
+                }
                 Event::Alone(text) => {
                     self.messages.busy = None;
                     self.messages.warn(text);
@@ -378,9 +411,13 @@ impl App {
             }
             Action::Warn(text) => self.messages.warn(text),
             Action::LetGo(hold) => {
-                let command = self.holds.let_go(hold);
+                let command = self.hands.holds.let_go(hold);
                 self.send(command);
             }
+            of_instruments @ (Action::Activate(_)
+            | Action::OpenJaws(..)
+            | Action::Lock(_)
+            | Action::PutAway(_)) => self.act_on_instruments(&of_instruments),
             Action::Open(path) => self.open(&path),
             Action::SaveAs(path) => self.save_as(&path),
             Action::Proceed => {
@@ -442,13 +479,14 @@ impl App {
             Request::Record => self.toggle_recording(),
             Request::FitView => self.viewport.fit_view(),
             Request::LetGo => {
-                let held: Vec<_> = self.holds.list().iter().map(|held| held.id).collect();
+                let held: Vec<_> = self.hands.holds.list().iter().map(|held| held.id).collect();
                 for hold in held {
-                    let command = self.holds.let_go(hold);
+                    let command = self.hands.holds.let_go(hold);
                     self.send(command);
                 }
             }
             Request::Help => self.help_open = !self.help_open,
+            of_instruments => self.ask_instruments(of_instruments),
         }
     }
 

@@ -8,6 +8,7 @@
 //! | the window's state, and what happens to it | [`App`] |
 //! | the simulation on its own thread | [`engine`] |
 //! | looking, pressing, pulling | [`viewport`] |
+//! | instruments in hands: pointer, keys, controller | [`instruments`], [`steering`], [`controller`] |
 //! | forces over time | [`curves`] |
 //! | what is chosen, undo | [`choices`], [`session`] |
 //! | the panels | [`panels`] |
@@ -16,17 +17,21 @@
 pub mod app;
 pub mod capture;
 pub mod choices;
+pub mod controller;
 pub mod curves;
 pub mod document;
 pub mod engine;
+pub mod hands;
 pub mod help;
 pub mod holds;
+pub mod instruments;
 pub mod messages;
 pub mod panels;
 pub mod preferences;
 pub mod probe;
 pub mod save;
 pub mod session;
+pub mod steering;
 pub mod viewport;
 pub mod window;
 

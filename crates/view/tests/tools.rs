@@ -3,6 +3,8 @@
 mod common;
 
 use common::Window;
+use eframe::egui::{Key, Pos2, Vec2, vec2};
+use viscera::scalar::Vec3;
 use viscera_view::curves::Source;
 
 #[test]
@@ -25,4 +27,139 @@ fn tools_of_a_scene_are_seen_with_their_forces() {
     let last = window.harness.state().forces().last(&source).expect("a curve");
     assert!(last.forces[0] > 0.2 && last.error.is_some());
     window.picture("palpation");
+}
+
+/// The working end of the tool in a hand, in the window.
+fn end_of(window: &Window, hand: u64) -> Pos2 {
+    let run = window.run(0);
+    let tool = run.tools.iter().find(|tool| tool.hand == Some(hand)).expect("a tool in hand");
+    window.harness.state().place(tool.pose.translation).expect("in front of the viewer")
+}
+
+/// Drags an instrument by a way [points], frame by frame, and holds it there until it has arrived.
+fn lead(window: &mut Window, hand: u64, way: Vec2) {
+    let from = end_of(window, hand);
+    drag(window, from, way);
+    arrive(window, hand);
+}
+
+fn drag(window: &mut Window, from: Pos2, way: Vec2) {
+    window.harness.hover_at(from);
+    window.harness.step();
+    window.harness.drag_at(from);
+    window.harness.step();
+    for step in 1..=10 {
+        window.harness.hover_at(from + way * (step as f32 / 10.0));
+        window.harness.step();
+    }
+    window.harness.drop_at(from + way);
+    window.harness.step();
+}
+
+/// Waits until a hand's instrument is where it is led to.
+fn arrive(window: &mut Window, hand: u64) {
+    window.wait("an instrument that arrives", |app| {
+        let held = app.instruments().list().iter().find(|held| held.id == hand);
+        let run = app.snapshot().and_then(|snapshot| snapshot.runs.first());
+        let tool = run.and_then(|run| run.tools.iter().find(|tool| tool.hand == Some(hand)));
+        held.zip(tool).is_some_and(|(held, tool)| {
+            (held.pose.translation - tool.pose.translation).length() < 1e-9
+        })
+    });
+}
+
+fn take(window: &mut Window, name: &str) -> u64 {
+    window.press(name);
+    let hand = window.harness.state().instruments().active().map_or(0, |held| held.id);
+    window.wait("an instrument", |app| {
+        let run = app.snapshot().and_then(|snapshot| snapshot.runs.first());
+        run.is_some_and(|run| run.tools.iter().any(|tool| tool.hand == Some(hand)))
+    });
+    hand
+}
+
+fn force(window: &Window, hand: u64) -> f64 {
+    let tool = window.run(0).tools.iter().find(|tool| tool.hand == Some(hand));
+    tool.map_or(0.0, viscera_stage::ToolSnapshot::force)
+}
+
+/// What a debug build computes many frames of, without what the scene itself does.
+const FAST: &[(&str, &str)] = &[
+    ("solver.accuracy", "draft"),
+    ("body.slab.cells", "[9, 9, 3]"),
+    ("motion.forceps.release", "1 ms"),
+];
+
+#[test]
+fn a_probe_from_the_tray_palpates_and_is_put_away() {
+    let mut window = Window::running("grab", FAST);
+    let probe = take(&mut window, "probe");
+    window.picture("taken");
+    // Down, until it touches.
+    for _ in 0..30 {
+        if force(&window, probe) > 0.3 {
+            break;
+        }
+        lead(&mut window, probe, vec2(0.0, 12.0));
+    }
+    assert!(force(&window, probe) > 0.3, "{} N", force(&window, probe));
+    window.picture("palpated");
+    window.press("put away");
+    window.wait("an empty hand", |app| {
+        let run = app.snapshot().and_then(|snapshot| snapshot.runs.first());
+        app.instruments().list().is_empty() && run.is_some_and(|run| run.tools.is_empty())
+    });
+    // Its curve stays.
+    let source = Source::Tool("probe".into());
+    assert!(window.harness.state().forces().last(&source).is_some());
+    assert_eq!(window.texts(), [""; 0]);
+    window.picture("put_away");
+}
+
+/// Holds a key down for so many frames of the window.
+fn hold_key(window: &mut Window, key: Key, frames: usize) {
+    window.harness.key_down(key);
+    for _ in 0..frames {
+        window.harness.step();
+    }
+    window.harness.key_up(key);
+    window.harness.step();
+}
+
+fn frames(window: &mut Window, count: u64) {
+    let number = window.harness.state().snapshot().map_or(0, |snapshot| snapshot.number);
+    window.wait("frames", |app| {
+        app.snapshot().is_some_and(|snapshot| snapshot.number >= number + count)
+    });
+}
+
+fn pose_of(window: &Window, hand: u64) -> Vec3<f64> {
+    let list = window.harness.state().instruments().list();
+    list.iter().find(|held| held.id == hand).expect("in hand").pose.translation
+}
+
+#[test]
+fn a_new_users_way_at_length() {
+    let mut window = Window::running("grab", FAST);
+    let grasper = take(&mut window, "grasper");
+    window.picture("way-1-grasper");
+    for step in 0..12 {
+        lead(&mut window, grasper, vec2(0.0, 10.0));
+        println!("{step}: {} N at {:?}", force(&window, grasper), pose_of(&window, grasper));
+        if force(&window, grasper) > 0.5 {
+            break;
+        }
+    }
+    window.picture("way-2-down");
+    hold_key(&mut window, Key::C, 60);
+    frames(&mut window, 30);
+    window.picture("way-3-closed");
+    println!("closed: {:?}", window.run(0).tools);
+    lead(&mut window, grasper, vec2(0.0, -60.0));
+    window.picture("way-4-pulled");
+    println!("pulled: {} N", force(&window, grasper));
+    hold_key(&mut window, Key::V, 60);
+    frames(&mut window, 30);
+    window.picture("way-5-open");
+    println!("open: {} N {:?}", force(&window, grasper), window.texts());
 }

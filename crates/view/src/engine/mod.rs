@@ -14,7 +14,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use viscera::scalar::Vec3;
-use viscera_stage::{Coloring, HoldId};
+use viscera_stage::{Coloring, HandId, HoldId, ToolAct};
 
 use crate::choices::Settings;
 use crate::probe::{Curve, SolverVariant};
@@ -56,6 +56,8 @@ pub enum Command {
     Lead(HoldId, Vec3<f64>),
     /// Lets go.
     LetGo(HoldId),
+    /// Does something with an instrument.
+    Tool(ToolAct),
     /// Changes settings of one of the simulations.
     Change(usize, Settings),
     /// Asks for what was done by hand, to be saved there.
@@ -105,6 +107,8 @@ pub enum Event {
     Curves(Vec<Curve>),
     /// Something was refused, and nothing has changed.
     Refused(String),
+    /// A hand could not take an instrument, and why.
+    NotTaken(HandId, String),
     /// The simulation has stopped.
     Failed(Failure),
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 use viscera::simulation::Assembly;
-use viscera_stage::{Coloring, GripTarget, Run};
+use viscera_stage::{Coloring, GripTarget, Run, ToolAct};
 
 use super::setup::{BuildRequest, Setup};
 use super::snapshot::SnapshotExchange;
@@ -195,6 +195,7 @@ impl Worker {
             }
             Command::Lead(hold, translation) => self.each(|run| run.lead(hold, translation)),
             Command::LetGo(hold) => self.each(|run| run.let_go(hold)),
+            Command::Tool(act) => self.act(&act),
             Command::Save(path) => self.save(path),
             Command::Probe(variants) => {
                 self.probed = variants;
@@ -228,6 +229,23 @@ impl Worker {
         let refused = running.runs.iter_mut().find_map(|run| act(run).err());
         if let Some(message) = refused {
             self.tell(Event::Refused(message));
+        }
+    }
+
+    /// Does something with an instrument in all simulations. What one of them does not take none has.
+    fn act(&mut self, act: &ToolAct) {
+        let Some(running) = &mut self.running else { return };
+        let hand = act.hand();
+        let refused = running.runs.iter_mut().find_map(|run| run.act(act).err());
+        let Some(message) = refused else { return };
+        if act.is_taking() {
+            for run in &mut running.runs {
+                // Where it was not taken there is nothing to put away.
+                let _ = run.act(&ToolAct::PutAway { hand });
+            }
+            self.tell(Event::NotTaken(hand, message));
+        } else {
+            self.warn_once(message);
         }
     }
 
@@ -337,6 +355,7 @@ impl Worker {
             failed = failed.or(run.advance().err());
             *wall = start.elapsed().as_secs_f64();
         }
+        let refused = running.runs.iter_mut().find_map(|run| run.refused());
         running.number += 1;
         self.steps = self.steps.saturating_sub(1);
         let frame = Duration::try_from_secs_f64(running.setup.scene.time.frame / self.speed);
@@ -345,6 +364,7 @@ impl Worker {
         if let Some(earliest) = Instant::now().checked_sub(MOST_LATE) {
             self.due = self.due.max(earliest);
         }
+        refused.into_iter().for_each(|message| self.warn_once(message));
         match failed {
             None => self.publish(),
             // The last frame stays to be seen; Reset begins anew.
