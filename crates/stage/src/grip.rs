@@ -8,6 +8,7 @@
 
 use viscera::scalar::rigid::{RigidTransform, rotation_matrix, rotation_vector};
 use viscera::scalar::{Mat3, Vec3, vec3};
+use viscera::scene::{Instrument, Part};
 use viscera_render::Orbit;
 
 /// A hand moves an instrument no faster than this [m/s], as a surgeon's does: where the pointer jumps, it follows. Much
@@ -31,15 +32,22 @@ const BESIDE: f64 = 0.28;
 /// How far the shaft leans towards the viewer, per height.
 const LEAN: f64 = 0.68;
 
-/// Where an instrument that is taken from the tray begins: above the highest place of the tissue, with its shaft up and
-/// towards the viewer. `reach` is how far it goes below its working end [m], and `place` counts instruments that are in hands
-/// already, which it keeps clear of. `extent` is the size of things [m].
+/// Where an instrument of the tray begins: above the highest place of the tissue, with its shaft up and towards the viewer.
+/// `place` counts instruments that are in hands already, which it keeps clear of; `extent` is the size of things [m].
 pub fn first_pose(
+    instrument: &Instrument,
     orbit: &Orbit,
     top: Vec3<f64>,
     extent: f64,
-    (reach, place): (f64, usize),
+    place: usize,
 ) -> RigidTransform {
+    // How far it goes below its working end: jaws do so by their length.
+    let below = |part: &Part| match part.opens {
+        0.0 => 0.0,
+        _ => part.shape.reach() + part.place.translation.length(),
+    };
+    let reach = instrument.parts.iter().map(below).fold(0.0, f64::max);
+    let reach = reach + instrument.thinnest().min(extent);
     let [right, _, backward] = orbit.axes();
     // Upright in the world, whatever the viewer's height.
     let level = vec3(backward.x, backward.y, 0.0);
@@ -50,8 +58,12 @@ pub fn first_pose(
     let shaft = shaft * (1.0 / shaft.length());
     let side = [0.0, 1.0, -1.0, 2.0, -2.0].get(place).copied().unwrap_or(place as f64);
     let translation = top + up * (reach + ABOVE * extent) + right * (BESIDE * extent * side);
-    // Jaws open, and hooks point, away from the viewer; blades are seen from their flat side.
-    let rotation = Mat3::from_columns(right, shaft.cross(right), shaft);
+    let rotation = match instrument.jaws {
+        // They open where one sees it: from side to side.
+        Some(_) => Mat3::from_columns(right.cross(shaft), right, shaft),
+        // Hooks point away from the viewer; blades are seen from their flat side.
+        None => Mat3::from_columns(right, shaft.cross(right), shaft),
+    };
     RigidTransform { rotation, translation }
 }
 
@@ -111,13 +123,14 @@ mod tests {
         for _ in 0..12 {
             orbit.turn(31.0, 13.0);
             let top = vec3(0.1, 0.05, 0.1);
-            let pose = first_pose(&orbit, top, 0.2, (0.01, 0));
-            assert!(pose.translation.z > 0.12);
+            let probe = &crate::hand::tray().expect("a legal tray")[0];
+            let pose = first_pose(probe, &orbit, top, 0.2, 0);
+            assert!(pose.translation.z > 0.115 && pose.is_rigid());
             let shaft = pose.turn(vec3(0.0, 0.0, 1.0));
             assert!(shaft.z > 0.8 && shaft.dot(orbit.axes()[2]) > 0.3, "{shaft:?}");
             let turn = rotation_vector(&pose.rotation);
             assert!((rotation_matrix(turn) * vec3(0.0, 0.0, 1.0) - shaft).length() < 1e-9);
-            let second = first_pose(&orbit, top, 0.2, (0.01, 1));
+            let second = first_pose(probe, &orbit, top, 0.2, 1);
             assert!((second.translation - pose.translation).length() > 0.05);
         }
     }

@@ -3,9 +3,10 @@
 use viscera::scalar::Real;
 use viscera::scalar::rigid::RigidTransform;
 use viscera::scene::{Instrument, SceneError, read_tray};
-use viscera::simulation::Simulation;
+use viscera::simulation::{AssembleError, LiveError, Simulation};
 
 use crate::grip::{follow, opened};
+use crate::legend::millimetres;
 
 /// The caller's number for a hand with an instrument.
 pub type HandId = u64;
@@ -78,7 +79,25 @@ impl ToolAct {
 
 /// The instruments that lie ready, in the order of the tray.
 pub fn tray() -> Result<Vec<Instrument>, SceneError> {
-    read_tray("the tray", include_str!("tray.toml"))
+    read_tray("the tray", TRAY)
+}
+
+const TRAY: &str = include_str!("tray.toml");
+
+/// An instrument is made so much thicker than a coarse mesh asks for, and so many times as large at most: beyond, it is
+/// another instrument.
+const LARGER: f64 = 1.02;
+const LARGEST: f64 = 3.0;
+
+/// The same instruments, of so many times the size.
+fn larger_tray(factor: f64) -> Result<Vec<Instrument>, SceneError> {
+    let scaled = |text: &str| {
+        let length = text.strip_suffix(" mm")?.parse::<f64>().ok()?;
+        Some(format!("{} mm", factor * length))
+    };
+    // What is in quotes is every second piece.
+    let pieces = TRAY.split('"').map(|text| scaled(text).unwrap_or_else(|| text.to_owned()));
+    read_tray("the tray", &pieces.collect::<Vec<_>>().join("\""))
 }
 
 /// A hand, and where its instrument is on the way to where it is led.
@@ -97,8 +116,8 @@ struct ToolHand {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ToolHands {
     list: Vec<ToolHand>,
-    /// Why an instrument stays where it is.
-    refused: Option<String>,
+    /// Why an instrument stays where it is, or is another one.
+    told: Option<String>,
 }
 
 impl ToolHands {
@@ -114,12 +133,10 @@ impl ToolHands {
 
     /// Does what is asked for; nothing where the hand has nothing, or no longer.
     pub fn act<S: Real>(&mut self, simulation: &mut Simulation<S>, act: &ToolAct) -> Result<(), String> {
-        let text = |error: viscera::simulation::LiveError| error.to_string();
+        let text = |error: LiveError| error.to_string();
         match act {
             ToolAct::Take { hand, instrument, pose } => {
-                let mut instrument = (**instrument).clone();
-                instrument.placement = *pose;
-                let tool = simulation.take_tool(instrument).map_err(text)?;
+                let tool = self.take(simulation, instrument, pose)?;
                 self.add(*hand, tool, *pose);
             }
             ToolAct::Hold { hand, name } => {
@@ -159,6 +176,37 @@ impl ToolHands {
         Ok(())
     }
 
+    /// Takes an instrument at a pose; a larger one where the mesh is too coarse for it, which is told.
+    fn take<S: Real>(
+        &mut self,
+        simulation: &mut Simulation<S>,
+        instrument: &Instrument,
+        pose: &RigidTransform,
+    ) -> Result<usize, String> {
+        let mut placed = instrument.clone();
+        placed.placement = *pose;
+        let thin = match simulation.take_tool(placed) {
+            Ok(tool) => return Ok(tool),
+            Err(LiveError::Patch(thin @ AssembleError::ThinTool { .. })) => thin,
+            Err(error) => return Err(error.to_string()),
+        };
+        let AssembleError::ThinTool { body, radius, spacing, .. } = &thin else {
+            return Err(thin.to_string());
+        };
+        let factor = (10.0 * LARGER * spacing / radius).ceil() / 10.0;
+        let larger = larger_tray(factor).ok().filter(|_| factor <= LARGEST);
+        let larger = larger.into_iter().flatten().find(|other| other.name == instrument.name);
+        let Some(mut larger) = larger else { return Err(thin.to_string()) };
+        larger.placement = *pose;
+        let tool = simulation.take_tool(larger).map_err(|error| error.to_string())?;
+        self.told = Some(format!(
+            "the {} is {factor} times its size: the mesh of `{body}` is touched at points about {} apart",
+            instrument.name,
+            millimetres(*spacing)
+        ));
+        Ok(tool)
+    }
+
     fn add(&mut self, id: HandId, tool: usize, pose: RigidTransform) {
         self.list.retain(|hand| hand.id != id && hand.tool != tool);
         self.list.push(ToolHand { id, tool, now: pose, target: pose, jaws: None });
@@ -168,15 +216,15 @@ impl ToolHands {
         self.list.iter_mut().find(|hand| hand.id == id)
     }
 
-    /// What was refused since it was last asked.
-    pub fn refused(&mut self) -> Option<String> {
-        self.refused.take()
+    /// What a person should know since it was last asked.
+    pub fn told(&mut self) -> Option<String> {
+        self.told.take()
     }
 
     /// Before a frame: all go on to where they are led. What is refused stays where it is.
     pub fn lead<S: Real>(&mut self, simulation: &mut Simulation<S>) {
         let frame = simulation.scene().time.frame;
-        let refused = &mut self.refused;
+        let told = &mut self.told;
         for hand in &mut self.list {
             if hand.now != hand.target {
                 let next = follow(&hand.now, &hand.target, frame);
@@ -184,7 +232,7 @@ impl ToolHands {
                     Ok(()) => hand.now = next,
                     Err(error) => {
                         hand.target = hand.now;
-                        *refused = Some(error.to_string());
+                        *told = Some(error.to_string());
                     }
                 }
             }
@@ -196,7 +244,7 @@ impl ToolHands {
                     Ok(()) => *now = next,
                     Err(error) => {
                         *target = *now;
-                        *refused = Some(error.to_string());
+                        *told = Some(error.to_string());
                     }
                 }
             }
@@ -214,19 +262,20 @@ mod tests {
     use viscera::scene::Scene;
     use viscera::simulation::Assembly;
 
-    fn slab() -> Box<dyn Run> {
+    fn slab(cells: &str) -> Box<dyn Run> {
         let text = r#"
             [[body]]
             name = "slab"
             shape = "block"
             size = ["60 mm", "60 mm", "20 mm"]
-            cells = [6, 6, 2]
+            cells = CELLS
             material = { young = "10 kPa" }
             [[fixing]]
             body = "slab"
             half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
         "#;
-        let scene = Scene::parse("slab.toml", text, &[]).expect("a legal scene");
+        let text = text.replace("CELLS", cells);
+        let scene = Scene::parse("slab.toml", &text, &[]).expect("a legal scene");
         let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned())).expect("a slab");
         build(scene, assembly, None).expect("a simulation")
     }
@@ -242,8 +291,25 @@ mod tests {
     }
 
     #[test]
+    fn an_instrument_is_made_larger_where_the_mesh_is_coarse_and_that_is_told() {
+        let mut run = slab("[3, 3, 1]");
+        let all = tray().expect("a legal tray");
+        let grasper = all.iter().find(|tool| tool.name == "grasper").expect("a grasper");
+        let instrument = Box::new(grasper.clone());
+        run.act(&ToolAct::Take { hand: 1, instrument, pose: above(0.09) }).expect("a larger one");
+        let told = run.told().expect("a word");
+        assert!(told.contains("grasper") && told.contains("slab") && told.contains("times"), "{told}");
+        assert!(run.told().is_none());
+        run.advance().expect("a frame");
+        let thinnest = seen(&mut *run).tools[0].parts[0].shape.thinnest();
+        assert!(thinnest > 1.1 * grasper.thinnest() && thinnest < LARGEST * grasper.thinnest());
+        let jaws = larger_tray(2.0).expect("a legal tray")[1].jaws.clone().expect("jaws");
+        assert_eq!(jaws.length, 2.0 * grasper.jaws.as_ref().expect("jaws").length);
+    }
+
+    #[test]
     fn every_instrument_of_the_tray_is_taken_led_and_put_away() {
-        let mut run = slab();
+        let mut run = slab("[6, 6, 2]");
         for (hand, instrument) in (1..).zip(tray().expect("a legal tray")) {
             let name = instrument.name.clone();
             let pose = above(0.08);

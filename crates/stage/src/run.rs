@@ -32,8 +32,8 @@ pub trait Run: Send {
     fn let_go(&mut self, hold: HoldId) -> Result<(), String>;
     /// Does something with an instrument.
     fn act(&mut self, act: &ToolAct) -> Result<(), String>;
-    /// What instruments would not do since it was last asked, and why.
-    fn refused(&mut self) -> Option<String>;
+    /// What a person should know of instruments since it was last asked.
+    fn told(&mut self) -> Option<String>;
     /// Changes settings; where one is wrong, none.
     fn change(&mut self, settings: &Settings) -> Result<(), String>;
     /// The value of a setting of the solver, as one would write it.
@@ -215,8 +215,8 @@ impl<S: Real> Run for SimulationRun<S> {
         self.hands.act(&mut self.simulation, act)
     }
 
-    fn refused(&mut self) -> Option<String> {
-        self.hands.refused()
+    fn told(&mut self) -> Option<String> {
+        self.hands.told()
     }
 
     fn change(&mut self, settings: &Settings) -> Result<(), String> {

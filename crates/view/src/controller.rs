@@ -163,8 +163,11 @@ impl Controller {
 
 /// Nothing near the middle, fine beside it, all at the end. What is no number is nothing.
 fn respond(value: f64) -> f64 {
+    if !value.is_finite() {
+        return 0.0;
+    }
     let beyond = (value.abs() - REST).max(0.0) / (1.0 - REST);
-    value.signum() * beyond.min(1.0).powi(2) * f64::from(u8::from(value.is_finite()))
+    value.signum() * beyond.min(1.0).powi(2)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use viscera::scalar::rigid::RigidTransform;
 use viscera::scalar::{Vec3, vec3};
-use viscera::scene::{Instrument, Part};
+use viscera::scene::Instrument;
 use viscera_render::Orbit;
 use viscera_stage::{HandId, ToolAct, ToolSnapshot, first_pose, moved, turned, within_reach};
 
@@ -81,13 +81,8 @@ impl Instruments {
 
     /// Takes an instrument from the tray; it becomes the active one.
     pub fn take(&mut self, instrument: &Instrument, around: &Surroundings) -> Command {
-        let below = |part: &Part| match part.opens {
-            0.0 => 0.0,
-            _ => part.shape.reach() + part.place.translation.length(),
-        };
-        let reach = instrument.parts.iter().map(below).fold(0.0, f64::max);
-        let place = (reach + instrument.thinnest().min(around.extent), self.list.len());
-        let pose = first_pose(&around.orbit, around.top, around.extent, place);
+        let Surroundings { orbit, top, extent, .. } = around;
+        let pose = first_pose(instrument, orbit, *top, *extent, self.list.len());
         let hand = self.add(instrument.name.clone(), pose, instrument.jaws.as_ref().map(|jaws| {
             [jaws.at(0.0).clamp(jaws.least_angle(), WIDEST), jaws.least_angle(), WIDEST]
         }));
@@ -181,8 +176,11 @@ impl Instruments {
     pub fn open(&mut self, id: HandId, angle: f64) -> Option<Command> {
         let held = self.list.iter_mut().find(|held| held.id == id)?;
         let [now, least, widest] = held.jaws.as_mut()?;
+        if held.is_locked || !angle.is_finite() {
+            return None;
+        }
         let angle = angle.max(*least).min(*widest);
-        if held.is_locked || !angle.is_finite() || angle == *now {
+        if angle == *now {
             return None;
         }
         *now = angle;

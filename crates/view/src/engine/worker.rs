@@ -355,7 +355,7 @@ impl Worker {
             failed = failed.or(run.advance().err());
             *wall = start.elapsed().as_secs_f64();
         }
-        let refused = running.runs.iter_mut().find_map(|run| run.refused());
+        let told = running.runs.iter_mut().find_map(|run| run.told());
         running.number += 1;
         self.steps = self.steps.saturating_sub(1);
         let frame = Duration::try_from_secs_f64(running.setup.scene.time.frame / self.speed);
@@ -364,7 +364,7 @@ impl Worker {
         if let Some(earliest) = Instant::now().checked_sub(MOST_LATE) {
             self.due = self.due.max(earliest);
         }
-        refused.into_iter().for_each(|message| self.warn_once(message));
+        told.into_iter().for_each(|message| self.warn_once(message));
         match failed {
             None => self.publish(),
             // The last frame stays to be seen; Reset begins anew.

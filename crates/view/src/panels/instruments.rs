@@ -66,7 +66,9 @@ fn show_held(
         }
     });
     let Some([angle, least, widest]) = held.jaws else { return };
-    let [angle, least, widest] = [angle, least, widest].map(f64::to_degrees);
+    // Digits that nobody chose are left out.
+    let degrees = |angle: f64| (10.0 * angle.to_degrees()).round() / 10.0;
+    let [angle, least, widest] = [angle, least, widest].map(degrees);
     let look = Number { unit: "°", rail: least..=widest, logarithmic: false, whole: false, decimals: 0 };
     let name = format!("{} jaws", held.name);
     let edit = named(ui, &name, "How far its jaws are open: C closes, V opens", |ui, label| {
