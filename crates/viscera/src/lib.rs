@@ -52,6 +52,7 @@ pub mod material;
 pub mod measure;
 pub mod mesh;
 pub mod model;
+pub mod record;
 pub mod rest;
 pub mod scalar;
 pub mod scene;

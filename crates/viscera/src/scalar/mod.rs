@@ -173,7 +173,7 @@ implement_real!(f32 F32x8 F32x4);
 implement_real!(f64 F64x4 F64x2);
 
 /// A vector of three components.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
 pub struct Vec3<S> {
     /// First component.
@@ -356,7 +356,7 @@ impl<S: Scalar> SubAssign for Vec3<S> {
 }
 
 /// A 3 x 3 matrix, stored by columns.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
 pub struct Mat3<S> {
     /// The three columns.

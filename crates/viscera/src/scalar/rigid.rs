@@ -3,7 +3,7 @@
 use super::{Mat3, Vec3, vec3};
 
 /// A rotation and a translation: `x -> rotation * x + translation`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RigidTransform {
     /// Orthonormal, determinant 1.
     pub rotation: Mat3<f64>,

@@ -7,7 +7,7 @@ use crate::settings::Place;
 use std::fmt;
 
 /// Which vertices are meant. Coordinates are of the world, at rest [m].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Selector {
     /// In an axis-aligned box.
     Box {

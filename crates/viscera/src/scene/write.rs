@@ -52,13 +52,7 @@ impl Scene {
 
     /// Tools that were taken into the scene by hand, and hands with the tools that each has, in the same way.
     pub fn write_tools(&self, tools: &[Instrument], hands: &[(String, Hand)]) -> String {
-        let mut text = String::new();
-        for tool in tools {
-            put(&mut text, format_args!("\n[[tool]]\n"));
-            if let Value::Table(entries) = &tool.table.0.value {
-                write_entries(entries, &mut text);
-            }
-        }
+        let mut text: String = tools.iter().map(Instrument::text).collect();
         for (tool, hand) in hands {
             write_hand(tool, hand, &mut text);
         }
@@ -124,6 +118,17 @@ fn write_hand(tool: &str, hand: &Hand, text: &mut String) {
         format!("time = \"{} s\", translation = {place}, rotation_vector = {turn}", key.time)
     };
     list("keys", keys.iter().map(pose).collect());
+}
+
+impl Instrument {
+    /// What was written of it, as a scene file or a tray has it.
+    pub fn text(&self) -> String {
+        let mut text = String::from("\n[[tool]]\n");
+        if let Value::Table(entries) = &self.table.0.value {
+            write_entries(entries, &mut text);
+        }
+        text
+    }
 }
 
 /// A table, or a list of tables, as tables with a header each; nothing of another value.

@@ -8,6 +8,7 @@
 //!
 //! A scene that has tools from its beginning and one that gets them later go through the same function, at the same frame.
 
+use super::acts::Act;
 use super::error::LiveError;
 use super::holding::tolerance;
 use super::instruments::there_at;
@@ -61,6 +62,7 @@ impl<S: Real> Simulation<S> {
         refuse_device(&self.scene, self.callers_device)?;
         refuse_method(&self.solver).map_err(super::SimulationError::from)?;
         let (name, time) = (self.free_name(&instrument.name), self.time());
+        let given = self.is_recorded().then(|| instrument.clone());
         let mut tool =
             instrument.taken(name, &pose, time).map_err(crate::scene::SceneError::from)?;
         tool.hands.push(Hand::new(time));
@@ -69,6 +71,9 @@ impl<S: Real> Simulation<S> {
         let samples = self.assembly.samples_for(thinnest);
         let entry = Entry { samples: &samples, time, may_meet_fixed: false };
         self.assembly.check_entry(&tool, &entry, |v| self.state.positions[v].cast())?;
+        if let Some(given) = given {
+            self.note(|| Act::take_tool(&given));
+        }
         self.instruments.add(&tool);
         self.assembly.tools.push(tool.clone());
         self.scene.tools.push(tool);
@@ -80,14 +85,15 @@ impl<S: Real> Simulation<S> {
     pub fn move_tool(&mut self, tool: usize, pose: RigidTransform) -> Result<(), LiveError> {
         let (now, end) = self.next_frame();
         let at = self.tool_there(tool)?;
-        let pose = checked(&at.name, &pose)?;
-        let keys = [(&at.pose(now), now), (&pose, end)].map(|(p, t)| key_of(&at.placement, p, t));
+        let given = checked(&at.name, &pose)?;
+        let keys = [(&at.pose(now), now), (&given, end)].map(|(p, t)| key_of(&at.placement, p, t));
         self.with_hand(tool, |hand| {
             let same = |a: &MotionKey, b: &MotionKey| {
                 (a.translation, a.rotation) == (b.translation, b.rotation)
             };
             lead(&mut hand.keys, keys, same, |key| &mut key.time);
         });
+        self.note(|| Act::MoveTool { tool, pose: given });
         Ok(())
     }
 
@@ -107,6 +113,7 @@ impl<S: Real> Simulation<S> {
         self.with_hand(tool, |hand| {
             lead(&mut hand.jaw, keys, |a, b| a.value == b.value, |key| &mut key.time);
         });
+        self.note(|| Act::OpenJaws { tool, angle });
         Ok(())
     }
 
@@ -127,6 +134,7 @@ impl<S: Real> Simulation<S> {
             }
             hand.locks.retain(|[from, to]| from < to);
         });
+        self.note(|| Act::LockJaws { tool, locked });
         Ok(())
     }
 
@@ -135,6 +143,7 @@ impl<S: Real> Simulation<S> {
         let now = self.time();
         self.tool_there(tool)?;
         self.with_hand(tool, |hand| hand.end = Some(now));
+        self.note(|| Act::PutAway { tool });
         Ok(())
     }
 

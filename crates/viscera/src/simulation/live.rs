@@ -1,6 +1,7 @@
 //! What is done to a running simulation by hand. All of it becomes part of the scene, so that a scene file
 //! with [`Live`] behind its other tables does the same to the bit.
 
+use super::acts::Act;
 use super::automatic::{self, Chosen};
 use super::error::{LiveError, SimulationError};
 use super::holding::{GraspOrigins, tolerance};
@@ -39,10 +40,10 @@ impl Live {
 
 impl<S: Real> Simulation<S> {
     /// Takes hold of a patch where it is now: by springs of a total stiffness [N/m], or rigidly. Returns
-    /// the number of the motion that it becomes; its name is `name` with a number behind.
+    /// the number of the motion that it becomes; its name is `stem` with a number behind.
     pub fn take_hold(
         &mut self,
-        name: &str,
+        stem: &str,
         patch: Patch,
         stiffness: Option<f64>,
     ) -> Result<usize, LiveError> {
@@ -55,10 +56,12 @@ impl<S: Real> Simulation<S> {
         }
         let resolved = self.assembly.resolve(&patch)?;
         let is_taken = |name: &String| self.scene.motions.iter().any(|other| other.name == *name);
-        let names = (1..).map(|number| format!("{name}-{number}"));
+        let names = (1..).map(|number| format!("{stem}-{number}"));
         let name = names.into_iter().find(|name| !is_taken(name)).unwrap_or_default();
         let time = self.time();
         let key = MotionKey { time, translation: Vec3::ZERO, rotation: Vec3::ZERO };
+        let (body, selector) = (patch.body, patch.selector);
+        self.note(|| Act::TakeHold { name: stem.to_owned(), body, selector, stiffness });
         self.scene.motions.push(Motion {
             name,
             patch,
@@ -97,6 +100,7 @@ impl<S: Real> Simulation<S> {
             }
         }
         keys.push(at(end, translation));
+        self.note(|| Act::Lead { hold, translation });
         Ok(())
     }
 
@@ -105,6 +109,7 @@ impl<S: Real> Simulation<S> {
         // Between the end of the last substep, which it held, and that of the next.
         let release = self.time() + tolerance(&self.scene);
         self.held_motion(hold)?.release = Some(release);
+        self.note(|| Act::LetGo { hold });
         Ok(())
     }
 
@@ -133,6 +138,7 @@ impl<S: Real> Simulation<S> {
         self.written = written;
         self.by_hand.push(change);
         self.changes_made += 1;
+        self.note(|| Act::Change { settings: settings.to_vec() });
         Ok(())
     }
 
@@ -225,6 +231,7 @@ impl<S: Real> Simulation<S> {
         self.inputs = self.inputs_at(0.0);
         self.state.contact = ContactState::of(&self.inputs.tools);
         self.measure_tissue();
+        self.note(|| Act::Reset);
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! A scene in motion: inputs from the scene's paths, frames of substeps, and what to report.
 
+mod acts;
 pub mod advice;
 mod assemble;
 mod assemble_error;
@@ -17,6 +18,7 @@ mod live;
 mod mesh_error;
 #[cfg(feature = "gpu")]
 mod on_device;
+mod recorded;
 mod report;
 mod rest;
 mod saved;
@@ -25,6 +27,7 @@ mod shadowed;
 mod tool_forces;
 mod touchable;
 
+pub use acts::Act;
 pub use assemble::{AssembledBody, Assembly, Refinement, ResolvedPatch};
 pub use assemble_error::AssembleError;
 pub use automatic::{ExpectedErrors, automatic_settings};
@@ -41,6 +44,7 @@ pub use mesh_error::{MESH_ERROR_TETS, MeshReport};
 pub use report::{FrameReport, PatchForce, PatchKind};
 pub use rest::{RestReport, Standing};
 pub use saved::ResumeError;
+pub(crate) use saved::{SavedDifference, difference_of_saved};
 
 use crate::layout::Layout;
 use crate::measure::{
@@ -93,6 +97,8 @@ pub struct Simulation<S> {
     changes_made: usize,
     /// Those of them that came by hand.
     by_hand: Vec<Change>,
+    /// What was done by hand since it was last asked for, where somebody records that.
+    acts: Option<Vec<Act>>,
     balance: ForceBalance,
     /// Positions [m] at the beginning of the last frame, which tell how fast it moves.
     before: Vec<Vec3<S>>,
@@ -158,6 +164,7 @@ impl<S: Real> Simulation<S> {
             written: scene.clone(),
             changes_made: 0,
             by_hand: Vec::new(),
+            acts: None,
             balance: ForceBalance::default(),
             before: model.rest_positions.clone(),
             stepped: false,

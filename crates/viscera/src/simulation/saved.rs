@@ -312,6 +312,33 @@ impl<S: Real> Simulation<S> {
     }
 }
 
+/// What is different in two saved simulations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SavedDifference {
+    /// The place of a vertex.
+    Position(usize),
+    /// The velocity of a vertex.
+    Velocity(usize),
+    /// What else is kept between frames.
+    Kept,
+}
+
+/// The first difference of two simulations of one model that were saved; nothing where there is none.
+pub(crate) fn difference_of_saved(
+    a: &[u8],
+    b: &[u8],
+) -> Result<Option<SavedDifference>, ResumeError> {
+    if a == b {
+        return Ok(None);
+    }
+    let (a, b) = (read(a)?, read(b)?);
+    let bits = |v: &[f64; 3]| v.map(f64::to_bits);
+    let first = |a: &Vectors, b: &Vectors| a.iter().zip(b).position(|(a, b)| bits(a) != bits(b));
+    let position = first(&a.positions, &b.positions).map(SavedDifference::Position);
+    let velocity = first(&a.velocities, &b.velocities).map(SavedDifference::Velocity);
+    Ok(position.or(velocity).or(Some(SavedDifference::Kept)))
+}
+
 fn checksum() -> crc::Crc<u32> {
     crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC)
 }

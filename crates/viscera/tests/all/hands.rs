@@ -8,7 +8,7 @@ use viscera::simulation::{
 };
 
 /// A block on a table, and nothing that touches it.
-const BLOCK: &str = r#"
+pub const BLOCK: &str = r#"
 world = { gravity = 0 }
 time = { duration = "2 s", velocity_factor = 0.95 }
 
@@ -26,7 +26,7 @@ half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
 "#;
 
 /// Beside it tools of the scene's own: one moves, one comes and goes, one is squeezed by a force.
-const TOOLS: &str = r#"
+pub const TOOLS: &str = r#"
 [[tool]]
 name = "ball"
 kind = "sphere"
@@ -83,13 +83,13 @@ fn tray(name: &str) -> Instrument {
 }
 
 /// An instrument from the tray, put somewhere.
-fn at(name: &str, place: Vec3<f64>) -> Instrument {
+pub fn at(name: &str, place: Vec3<f64>) -> Instrument {
     let mut tool = tray(name);
     tool.placement.translation = place;
     tool
 }
 
-fn simulation<S: Real>(text: &str, settings: &[(&str, &str)]) -> Simulation<S> {
+pub fn simulation<S: Real>(text: &str, settings: &[(&str, &str)]) -> Simulation<S> {
     let scene =
         Scene::parse("hands.toml", text, settings).unwrap_or_else(|e| panic!("{e}\n{text}"));
     let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned()));
@@ -97,18 +97,24 @@ fn simulation<S: Real>(text: &str, settings: &[(&str, &str)]) -> Simulation<S> {
     Simulation::new(scene, assembly).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn frames<S: Real>(run: &mut Simulation<S>, count: u32) {
+pub fn frames<S: Real>(run: &mut Simulation<S>, count: u32) {
     for _ in 0..count {
         run.advance_frame().unwrap_or_else(|e| panic!("{e}"));
     }
 }
 
-fn pose<S: Real>(run: &Simulation<S>, tool: usize) -> RigidTransform {
+pub fn pose<S: Real>(run: &Simulation<S>, tool: usize) -> RigidTransform {
     run.tools()[tool].pose
 }
 
 /// Moves a tool on by a way and a turn, in so many frames.
-fn go<S: Real>(run: &mut Simulation<S>, tool: usize, way: Vec3<f64>, turn: Vec3<f64>, count: u32) {
+pub fn go<S: Real>(
+    run: &mut Simulation<S>,
+    tool: usize,
+    way: Vec3<f64>,
+    turn: Vec3<f64>,
+    count: u32,
+) {
     for _ in 0..count {
         let now = pose(run, tool);
         let share = 1.0 / f64::from(count);

@@ -47,6 +47,7 @@ mod pins;
 mod quasi_newton;
 mod quasi_newton_robust;
 mod readme;
+mod record;
 mod recovered;
 mod recovered_robust;
 mod saved;
