@@ -11,12 +11,14 @@
 //!
 //! Everything here is in double precision, whatever the state's is.
 
+pub mod distance_grid;
 pub mod law;
 mod pressure;
 pub mod shape;
 pub mod surface;
 mod touch;
 
+pub use distance_grid::{DistanceGrid, SolidError};
 pub use law::{Foundation, Friction};
 pub use pressure::VertexPressures;
 pub use shape::{Distance, Shape};
@@ -60,8 +62,8 @@ impl ContactLaw {
     }
 }
 
-/// A tool or a fixed obstacle: moved from outside, whatever pushes against it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A tool or a fixed obstacle: moved from outside, whatever pushes against it. A copy of it takes no memory.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
     /// Its shape in its own frame.
     pub shape: Shape,

@@ -20,7 +20,7 @@ use crate::settings::Method;
 use crate::state::{ContactState, Learned, LearnedPart, State};
 
 /// Raised whenever the bytes mean something else.
-const FORMAT: u32 = 8;
+const FORMAT: u32 = 9;
 
 /// Methods by the number that stands for them; a new one is added at the end.
 const METHODS: [Method; 4] = [Method::Auto, Method::Xpbd, Method::Explicit, Method::QuasiNewton];
@@ -125,6 +125,7 @@ struct SavedTouch {
     pressed: f64,
     anchor: [f64; 3],
     normal: [f64; 3],
+    offset: f64,
     force: [f64; 3],
     place: [f64; 3],
 }
@@ -138,6 +139,7 @@ impl SavedTouch {
             pressed: touch.pressed,
             anchor: touch.anchor.to_array(),
             normal: touch.normal.to_array(),
+            offset: touch.offset,
             force: touch.force.to_array(),
             place: touch.place.to_array(),
         }
@@ -149,6 +151,7 @@ impl SavedTouch {
             tool: self.tool,
             anchor: Vec3::from_f64(self.anchor),
             normal: Vec3::from_f64(self.normal),
+            offset: self.offset,
             pressed: self.pressed,
             force: Vec3::from_f64(self.force),
             place: Vec3::from_f64(self.place),
