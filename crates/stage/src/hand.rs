@@ -132,7 +132,11 @@ impl ToolHands {
     }
 
     /// Does what is asked for; nothing where the hand has nothing, or no longer.
-    pub fn act<S: Real>(&mut self, simulation: &mut Simulation<S>, act: &ToolAct) -> Result<(), String> {
+    pub fn act<S: Real>(
+        &mut self,
+        simulation: &mut Simulation<S>,
+        act: &ToolAct,
+    ) -> Result<(), String> {
         let text = |error: LiveError| error.to_string();
         match act {
             ToolAct::Take { hand, instrument, pose } => {
@@ -141,7 +145,8 @@ impl ToolHands {
             }
             ToolAct::Hold { hand, name } => {
                 let found = simulation.tools().into_iter().enumerate();
-                let found = found.filter(|(_, tool)| tool.is_there).find(|(_, tool)| tool.name == *name);
+                let found =
+                    found.filter(|(_, tool)| tool.is_there).find(|(_, tool)| tool.name == *name);
                 let Some((tool, state)) = found else {
                     return Err(format!("the {name} is no longer there to be taken"));
                 };
@@ -298,7 +303,10 @@ mod tests {
         let instrument = Box::new(grasper.clone());
         run.act(&ToolAct::Take { hand: 1, instrument, pose: above(0.09) }).expect("a larger one");
         let told = run.told().expect("a word");
-        assert!(told.contains("grasper") && told.contains("slab") && told.contains("times"), "{told}");
+        assert!(
+            told.contains("grasper") && told.contains("slab") && told.contains("times"),
+            "{told}"
+        );
         assert!(run.told().is_none());
         run.advance().expect("a frame");
         let thinnest = seen(&mut *run).tools[0].parts[0].shape.thinnest();

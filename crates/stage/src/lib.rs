@@ -8,7 +8,7 @@
 //! | step a simulation in either precision, hold it, change it | [`Run`], [`build`] |
 //! | see what it looks like after a frame | [`RunSnapshot`], [`Coloring`] |
 //! | find what lies under a pointer | [`Lens`], [`pick`], [`pick_tool`], [`meet_plane`] |
-//! | lead instruments by hand | [`ToolAct`], [`tray`] |
+//! | lead instruments by hand | [`Instruments`], [`ToolAct`], [`tray`] |
 //! | see tools and the forces that they meet | [`ToolSnapshot`], [`ForceScale`] |
 //! | draw it | [`RunSurface`], [`PictureContents`], [`Legend`] |
 
@@ -16,6 +16,7 @@ mod color;
 mod contents;
 mod grip;
 mod hand;
+mod instruments;
 mod legend;
 mod lens;
 mod pick;
@@ -25,8 +26,9 @@ mod tools;
 
 pub use color::surface_values;
 pub use contents::{PictureContents, RunSurface};
-pub use grip::{FASTEST, first_pose, moved, turned, within_reach};
+pub use grip::FASTEST;
 pub use hand::{HandId, ToolAct, tray};
+pub use instruments::{Drag, InHand, Instruments, Nudge, Surroundings};
 pub use legend::{Legend, millimetres, newton_millimetres, newtons, newtons_within};
 pub use lens::{Area, Lens};
 pub use pick::{Pick, meet_plane, pick, pick_near};

@@ -1,6 +1,7 @@
 //! A simulation in either precision, with the caller's numbers for the patches that it holds.
 
 use viscera::model::ModelBuilder;
+use viscera::record::{RecordedFile, Recorder};
 use viscera::scalar::{Real, Vec3};
 use viscera::scene::{Patch, Scene, Selector};
 use viscera::settings::{Place, Precision, SolverSettings};
@@ -34,6 +35,12 @@ pub trait Run: Send {
     fn act(&mut self, act: &ToolAct) -> Result<(), String>;
     /// What a person should know of instruments since it was last asked.
     fn told(&mut self) -> Option<String>;
+    /// Begins a recording of what happens from now on, of a scene that needed these files: its first bytes.
+    fn begin_recording(&mut self, files: Vec<RecordedFile>) -> Vec<u8>;
+    /// After each frame, before hands do anything: the next bytes of the recording.
+    fn recorded(&mut self) -> Vec<u8>;
+    /// Ends it: the last bytes.
+    fn end_recording(&mut self) -> Vec<u8>;
     /// Changes settings; where one is wrong, none.
     fn change(&mut self, settings: &Settings) -> Result<(), String>;
     /// The value of a setting of the solver, as one would write it.
@@ -129,6 +136,7 @@ struct SimulationRun<S> {
     /// What is held, and the motion that each is.
     held: Vec<(HoldId, usize)>,
     hands: ToolHands,
+    recorder: Option<Recorder>,
     measures: Measures,
 }
 
@@ -136,7 +144,8 @@ impl<S: Real> SimulationRun<S> {
     fn new(simulation: Result<Simulation<S>, SimulationError>) -> Result<Self, String> {
         let simulation = simulation.map_err(text)?;
         let (held, hands) = (Vec::new(), ToolHands::default());
-        Ok(Self { simulation, held, hands, measures: Measures::default() })
+        let measures = Measures::default();
+        Ok(Self { simulation, held, hands, recorder: None, measures })
     }
 
     /// Forces of what the scene itself moves and pulls.
@@ -164,6 +173,7 @@ impl<S: Real> SimulationRun<S> {
             simulation: self.simulation.fork(&settings).map_err(text)?,
             held: self.held.clone(),
             hands: self.hands.clone(),
+            recorder: None,
             measures: self.measures.clone(),
         })
     }
@@ -217,6 +227,22 @@ impl<S: Real> Run for SimulationRun<S> {
 
     fn told(&mut self) -> Option<String> {
         self.hands.told()
+    }
+
+    fn begin_recording(&mut self, files: Vec<RecordedFile>) -> Vec<u8> {
+        let (recorder, bytes) = Recorder::begin(&mut self.simulation, files);
+        self.recorder = Some(recorder);
+        bytes
+    }
+
+    fn recorded(&mut self) -> Vec<u8> {
+        let Self { recorder, simulation, .. } = self;
+        recorder.as_mut().map_or_else(Vec::new, |recorder| recorder.frame(simulation))
+    }
+
+    fn end_recording(&mut self) -> Vec<u8> {
+        let Self { recorder, simulation, .. } = self;
+        recorder.take().map_or_else(Vec::new, |recorder| recorder.end(simulation))
     }
 
     fn change(&mut self, settings: &Settings) -> Result<(), String> {

@@ -97,14 +97,14 @@ impl ToolSurfaces {
         for part in tools.iter().flat_map(|tool| &tool.parts) {
             if self.meshes.get(count).is_none_or(|(shape, _)| *shape != part.shape) {
                 self.meshes.truncate(count);
-                let facets = match (part.shape, around) {
+                let facets = match (&part.shape, around) {
                     (Shape::HalfSpace, Some(BoundingSphere { center, radius })) => {
                         let middle = part.pose.undo(center);
                         Facets::patch(&RigidTransform::IDENTITY, middle, TABLE * radius)
                     }
-                    (shape, _) => Facets::of(&shape),
+                    (shape, _) => Facets::of(shape),
                 };
-                self.meshes.push((part.shape, ToolMesh::new(device, &facets)));
+                self.meshes.push((part.shape.clone(), ToolMesh::new(device, &facets)));
             }
             count += 1;
         }

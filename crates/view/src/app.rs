@@ -1,6 +1,7 @@
 //! The window's state, and what happens to it.
 
 mod files;
+mod hearing;
 mod steering;
 
 use eframe::egui::{self, CentralPanel, Panel, ScrollArea, Ui};
@@ -17,10 +18,9 @@ use crate::choices::{Settings, Side};
 use crate::controller::Controller;
 use crate::curves::ForceCurves;
 use crate::document::Document;
-use crate::engine::{Command, Cure, Engine, Event, Setup, Snapshot};
-use crate::help::{self, Request};
-use crate::instruments::Instruments;
+use crate::engine::{Command, Cure, Engine, Setup, Snapshot};
 use crate::hands::Hands;
+use crate::help::{self, Request};
 use crate::holds::Holds;
 use crate::messages::Messages;
 use crate::panels::time::Clock;
@@ -29,6 +29,7 @@ use crate::preferences::Preferences;
 use crate::probe::Curve;
 use crate::session::Session;
 use crate::viewport::{Gpu, Viewport};
+use viscera_stage::Instruments;
 
 /// What the command line asks for.
 #[derive(Clone, Debug, Default)]
@@ -47,7 +48,7 @@ pub struct Options {
     pub farewell: Arc<OnceLock<String>>,
 }
 
-/// The scene that is opened where none is named: the retractor of `liver_retraction` is a tool, which the window does not draw.
+/// The scene that is opened where none is named: an organ to pull on, without instruments of its own in the way.
 pub const FIRST_SCENE: &str = "liver_lifted";
 
 /// The window.
@@ -69,6 +70,8 @@ pub struct App {
     devices: Vec<String>,
     fields: Fields,
     recorder: Option<Recorder>,
+    /// Where the run is being recorded.
+    recorded_run: Option<PathBuf>,
     pictures: PathBuf,
     farewell: Arc<OnceLock<String>>,
     help_open: bool,
@@ -121,6 +124,7 @@ impl App {
             devices: Vec::new(),
             fields: Fields::default(),
             recorder: None,
+            recorded_run: None,
             pictures: options.pictures,
             farewell: options.farewell,
             help_open: false,
@@ -242,7 +246,7 @@ impl App {
     fn show_panels(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
         Panel::top("bar").show(ui, |ui| {
             ui.add_space(3.0);
-            let recording = self.recorder.is_some();
+            let recording = [self.recorder.is_some(), self.recorded_run.is_some()];
             let preferences = &mut self.preferences;
             panels::time::show_bar(ui, &self.clock, &self.session, recording, preferences, actions);
             ui.add_space(3.0);
@@ -289,7 +293,13 @@ impl App {
         let run = self.snapshot.as_ref().and_then(|snapshot| snapshot.runs.first());
         let instruments = &self.hands.instruments;
         panels::instruments::show(ui, &self.tray, instruments, run, &self.controller, actions);
-        panels::view::show_grip(ui, &mut self.preferences, &self.hands.holds, &self.forces, actions);
+        panels::view::show_grip(
+            ui,
+            &mut self.preferences,
+            &self.hands.holds,
+            &self.forces,
+            actions,
+        );
         panels::view::show(ui, &mut self.preferences, actions);
         panels::material::show(ui, self.session.scene(Side::First), actions);
         let sides: &[(&str, Side)] = match self.session.is_comparison() {
@@ -300,85 +310,6 @@ impl App {
             let solver = &self.session.scene(*side).solver;
             let device = self.devices.get(number).map(String::as_str);
             panels::solver::show(ui, title, *side, solver, device, actions);
-        }
-    }
-
-    /// What the simulation's thread has sent.
-    fn hear(&mut self) {
-        for event in self.engine.hear() {
-            match event {
-                Event::Busy(text) => {
-                    self.messages.failure = None;
-                    self.messages.expect = None;
-                    self.messages.busy = Some(text);
-                }
-                Event::Expect(text) => {
-                    self.messages.busy = None;
-                    self.messages.expect = Some(text);
-                }
-                Event::Ready(setup) => {
-                    self.messages.busy = None;
-                    self.messages.failure = None;
-                    let late = self.hands.clear();
-                    self.send(late);
-                    self.curves.clear();
-                    self.forces.clear();
-                    if let Err(error) = self.viewport.enter(&setup) {
-                        self.messages.warn(error);
-                    }
-                    for note in &setup.assembly.notes {
-                        self.messages.tell(note.clone());
-                    }
-                    self.setup = Some(setup);
-                }
-                Event::Accompanied(setup) => {
-                    self.messages.busy = None;
-                    if let Err(error) = self.viewport.enter(&setup) {
-                        self.messages.warn(error);
-                    }
-                    self.setup = Some(setup);
-                }
-                Event::Devices(devices) => self.devices = devices,
-                Event::Refused(text) => self.messages.warn(text),
-                Event::Done { path, text, time } => self.write_scene(&path, &text, time),
-                Event::Kept { run, key, value } => self.session.keep(run, &key, &value),
-                Event::NotTaken(hand, text) => {
-                    self.hands.instruments.forget(hand);
-                    self.messages.warn(text);
-                }
-                Event::Alone(text) => {
-                    self.messages.busy = None;
-                    self.messages.warn(text);
-                    self.session.stay_alone();
-                }
-                Event::Curves(curves) => self.curves = curves,
-                Event::Failed(failure) => {
-                    self.messages.busy = None;
-                    self.clock.playing = false;
-                    self.messages.failure = Some(failure);
-                }
-            }
-        }
-    }
-
-    fn take_snapshot(&mut self) {
-        if !self.engine.newest(&mut self.snapshot) {
-            return;
-        }
-        let Some(snapshot) = &self.snapshot else { return };
-        if let Err(error) = self.viewport.place(snapshot) {
-            self.messages.warn(error);
-        }
-        self.forces.note(snapshot);
-        let (number, since) = self.counted;
-        let elapsed = since.elapsed().as_secs_f64();
-        if snapshot.number < number {
-            self.counted = (snapshot.number, Instant::now());
-            self.shown = 0;
-        } else if elapsed > 0.5 {
-            self.clock.rate = (snapshot.number - number) as f64 / elapsed;
-            self.clock.drawn = f64::from(std::mem::take(&mut self.shown)) / elapsed;
-            self.counted = (snapshot.number, Instant::now());
         }
     }
 
@@ -477,6 +408,7 @@ impl App {
             }
             Request::Screenshot => self.take_picture(),
             Request::Record => self.toggle_recording(),
+            Request::RecordRun => self.toggle_run_recording(),
             Request::FitView => self.viewport.fit_view(),
             Request::LetGo => {
                 let held: Vec<_> = self.hands.holds.list().iter().map(|held| held.id).collect();

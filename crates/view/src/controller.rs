@@ -11,7 +11,7 @@
 //!
 //! Reading one takes the feature `controller`, which needs a library of the system.
 
-use crate::instruments::Nudge;
+use viscera_stage::Nudge;
 
 /// What it does, for the list of keys.
 pub const HELP: &str = "game controller: left stick moves, right stick turns, shoulders nearer and away, triggers open and close \
@@ -119,12 +119,14 @@ impl Controller {
             EventType::ButtonPressed(Button::North, _) => Some(News::Next),
             _ => {
                 let axis = |axis| f64::from(pad.value(axis));
-                let button = |button| pad.button_data(button).map_or(0.0, |data| f64::from(data.value()));
+                let button =
+                    |button| pad.button_data(button).map_or(0.0, |data| f64::from(data.value()));
                 Some(News::Sticks(Sticks {
                     left: [axis(Axis::LeftStickX), axis(Axis::LeftStickY)],
                     right: [axis(Axis::RightStickX), axis(Axis::RightStickY)],
                     triggers: [button(Button::LeftTrigger2), button(Button::RightTrigger2)],
-                    shoulders: [Button::LeftTrigger, Button::RightTrigger].map(|b| pad.is_pressed(b)),
+                    shoulders: [Button::LeftTrigger, Button::RightTrigger]
+                        .map(|b| pad.is_pressed(b)),
                 }))
             }
         }
@@ -180,7 +182,12 @@ mod tests {
         let worn = Sticks { left: [0.1, -0.12], ..Sticks::default() };
         controller.hear(&News::Sticks(worn));
         assert!(controller.nudge(0.1, 0.2).is_none());
-        let led = Sticks { left: [1.0, 0.0], right: [0.0, 1.0], triggers: [0.0, 1.0], shoulders: [true, false] };
+        let led = Sticks {
+            left: [1.0, 0.0],
+            right: [0.0, 1.0],
+            triggers: [0.0, 1.0],
+            shoulders: [true, false],
+        };
         controller.hear(&News::Sticks(led));
         let nudge = controller.nudge(0.1, 0.2).expect("a nudge");
         let whole = SPEED * 0.2 * 0.1;

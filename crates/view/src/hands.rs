@@ -2,7 +2,7 @@
 
 use crate::engine::Command;
 use crate::holds::Holds;
-use crate::instruments::Instruments;
+use viscera_stage::Instruments;
 
 /// Both.
 #[derive(Debug, Default)]
@@ -18,7 +18,8 @@ impl Hands {
     pub fn clear(&mut self) -> Vec<Command> {
         let mut late: Vec<Command> = self.holds.clear();
         let hands: Vec<_> = self.instruments.list().iter().map(|held| held.id).collect();
-        late.extend(hands.into_iter().filter_map(|hand| self.instruments.put_away(hand)));
+        let away = hands.into_iter().filter_map(|hand| self.instruments.put_away(hand));
+        late.extend(away.map(Command::Tool));
         self.instruments.clear();
         late
     }

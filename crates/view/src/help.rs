@@ -24,6 +24,8 @@ pub enum Request {
     Screenshot,
     /// Begins or ends a recording.
     Record,
+    /// Begins or ends a recording of the run, for a replay.
+    RecordRun,
     /// Fits all tissue into the view.
     FitView,
     /// Lets go of everything.
@@ -82,6 +84,12 @@ const SHORTCUTS: &[Shortcut] = &[
         "G",
         "begin or end recording an animated image, at the pace of simulated time",
     ),
+    plain(
+        Key::T,
+        Request::RecordRun,
+        "T",
+        "begin or end recording the run with all that hands do, for viscera replay",
+    ),
     plain(Key::F1, Request::Help, "F1, ?", "this list"),
     plain(Key::Questionmark, Request::Help, "", ""),
 ];
@@ -119,8 +127,7 @@ pub fn requests(context: &egui::Context, was_typing: bool) -> Vec<Request> {
         return Vec::new();
     }
     context.input_mut(|input| {
-        let pressed =
-            all().filter(|s| input.consume_key(s.modifiers, s.key)).map(|s| s.request);
+        let pressed = all().filter(|s| input.consume_key(s.modifiers, s.key)).map(|s| s.request);
         pressed.collect()
     })
 }
@@ -138,7 +145,8 @@ pub fn show(context: &egui::Context, open: &mut bool, controller: &Controller) {
                 let keys = |all: &'static [Shortcut]| all.iter().map(|s| (s.shown, s.text));
                 let held = HELD.iter().copied();
                 let instruments = keys(OF_INSTRUMENTS).chain(held);
-                for (shown, text) in MOUSE.iter().copied().chain(keys(SHORTCUTS)).chain(instruments) {
+                for (shown, text) in MOUSE.iter().copied().chain(keys(SHORTCUTS)).chain(instruments)
+                {
                     if !shown.is_empty() {
                         ui.strong(shown);
                         ui.label(text);

@@ -8,7 +8,7 @@
 //! | the window's state, and what happens to it | [`App`] |
 //! | the simulation on its own thread | [`engine`] |
 //! | looking, pressing, pulling | [`viewport`] |
-//! | instruments in hands: pointer, keys, controller | [`instruments`], [`steering`], [`controller`] |
+//! | instruments in hands: keys, controller | [`hands`], [`steering`], [`controller`] |
 //! | forces over time | [`curves`] |
 //! | what is chosen, undo | [`choices`], [`session`] |
 //! | the panels | [`panels`] |
@@ -24,7 +24,6 @@ pub mod engine;
 pub mod hands;
 pub mod help;
 pub mod holds;
-pub mod instruments;
 pub mod messages;
 pub mod panels;
 pub mod preferences;

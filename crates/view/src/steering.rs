@@ -1,8 +1,7 @@
 //! Keys that lead instruments while they are held down.
 
 use eframe::egui::{InputState, Key};
-
-use crate::instruments::Nudge;
+use viscera_stage::Nudge;
 
 /// What they do, for the list of keys.
 pub const HELD: &[(&str, &str)] = &[

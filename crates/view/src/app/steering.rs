@@ -7,10 +7,9 @@ use super::App;
 use crate::controller::News;
 use crate::engine::Command;
 use crate::help::Request;
-use crate::instruments::Nudge;
 use crate::panels::Action;
 use crate::steering::steer;
-use viscera_stage::HandId;
+use viscera_stage::{HandId, Nudge, ToolAct};
 
 /// How often a controller is asked where nothing else moves.
 const ASKED_EVERY: Duration = Duration::from_millis(20);
@@ -47,7 +46,8 @@ impl App {
         if context.memory(|memory| memory.focused()).is_none() {
             context.memory_mut(|memory| memory.move_focus(egui::FocusDirection::None));
         }
-        let hands = [instruments.active(), instruments.other()].map(|held| held.map(|held| held.id));
+        let hands =
+            [instruments.active(), instruments.other()].map(|held| held.map(|held| held.id));
         let extent = self.viewport.surroundings().extent;
         let nudges = context.input(|input| steer(input, extent));
         for (hand, nudge) in hands.into_iter().zip(nudges) {
@@ -67,7 +67,7 @@ impl App {
         let Some(hand) = hand else { return };
         let around = self.viewport.surroundings();
         match self.hands.instruments.nudge(hand, nudge, &around) {
-            Ok(commands) => self.send(commands),
+            Ok(acts) => self.send(acts.into_iter().map(Command::Tool)),
             Err(told) => self.messages.warn(told),
         }
     }
@@ -89,7 +89,7 @@ impl App {
                     let instruments = &self.hands.instruments;
                     let led = instruments.other().or(instruments.active()).map(|held| held.id);
                     let command = led.and_then(|hand| self.hands.instruments.lock(hand));
-                    self.send(command);
+                    self.send(command.map(Command::Tool));
                 }
                 News::Next => self.hands.instruments.next(),
                 News::Sticks(_) => {}
@@ -111,7 +111,7 @@ impl App {
             Action::PutAway(hand) => instruments.put_away(hand),
             _ => None,
         };
-        self.send(command);
+        self.send(command.map(Command::Tool));
     }
 
     /// Does what a key or a button asks of instruments.
@@ -119,7 +119,7 @@ impl App {
         let instruments = &mut self.hands.instruments;
         let [active, other] =
             [instruments.active(), instruments.other()].map(|held| held.map(|held| held.id));
-        let command: Option<Command> = match request {
+        let command: Option<ToolAct> = match request {
             Request::TakeInstrument(number) => {
                 let around = self.viewport.surroundings();
                 self.tray.get(number).map(|instrument| instruments.take(instrument, &around))
@@ -133,6 +133,6 @@ impl App {
             Request::PutAway => active.and_then(|hand| instruments.put_away(hand)),
             _ => None,
         };
-        self.send(command);
+        self.send(command.map(Command::Tool));
     }
 }

@@ -16,6 +16,8 @@ use std::time::{Duration, Instant};
 use viscera::scalar::Vec3;
 use viscera_stage::{Coloring, HandId, HoldId, ToolAct};
 
+use viscera_resources::MeshFiles;
+
 use crate::choices::Settings;
 use crate::probe::{Curve, SolverVariant};
 
@@ -60,6 +62,10 @@ pub enum Command {
     Tool(ToolAct),
     /// Changes settings of one of the simulations.
     Change(usize, Settings),
+    /// Records the first simulation and all that hands do to it into a file that `viscera replay` takes.
+    Record(PathBuf, MeshFiles),
+    /// Ends that.
+    EndRecord,
     /// Asks for what was done by hand, to be saved there.
     Save(PathBuf),
     /// Repeats steps of the first simulation by these solvers, to compare how they converge.
@@ -107,6 +113,8 @@ pub enum Event {
     Curves(Vec<Curve>),
     /// Something was refused, and nothing has changed.
     Refused(String),
+    /// A recording of the first simulation has ended, and why where it was not asked to: its file, and its frames.
+    Recorded(PathBuf, u64, Option<String>),
     /// A hand could not take an instrument, and why.
     NotTaken(HandId, String),
     /// The simulation has stopped.

@@ -1,6 +1,7 @@
 //! What the thread does: builds, computes frame after frame at the pace of the clock, obeys in between.
 
 mod building;
+mod recording;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,6 +15,8 @@ use super::snapshot::SnapshotExchange;
 use super::{Command, Cure, Event, Failure};
 use crate::choices::{Settings, put};
 use crate::probe::{MOST_TETS, Prober, SolverVariant};
+use recording::RunRecording;
+use viscera_resources::MeshFiles;
 
 /// Calls the window.
 pub type Wake = Box<dyn Fn() + Send + Sync>;
@@ -42,6 +45,7 @@ pub struct Worker {
     probed_last: Option<Instant>,
     /// The last warning of something that goes on.
     last_warning: Option<String>,
+    recording: Option<RunRecording>,
 }
 
 struct Running {
@@ -102,6 +106,7 @@ impl Worker {
             prober,
             probed_last: None,
             last_warning: None,
+            recording: None,
         }
     }
 
@@ -134,7 +139,10 @@ impl Worker {
         let mut next = Some(first);
         while let Some(command) = next {
             match command {
-                Command::Quit => return Next::Quit,
+                Command::Quit => {
+                    self.end_record(None);
+                    return Next::Quit;
+                }
                 Command::Change(run, settings) => {
                     change.resize_with(change.len().max(run + 1), Settings::new);
                     for (key, value) in &settings {
@@ -142,6 +150,7 @@ impl Worker {
                     }
                 }
                 Command::Load(request) => {
+                    self.end_record(Some("another scene was opened".to_owned()));
                     change.clear();
                     self.load(*request);
                 }
@@ -196,6 +205,8 @@ impl Worker {
             Command::Lead(hold, translation) => self.each(|run| run.lead(hold, translation)),
             Command::LetGo(hold) => self.each(|run| run.let_go(hold)),
             Command::Tool(act) => self.act(&act),
+            Command::Record(path, mesh_files) => self.record(path, &mesh_files),
+            Command::EndRecord => self.end_record(None),
             Command::Save(path) => self.save(path),
             Command::Probe(variants) => {
                 self.probed = variants;
@@ -249,7 +260,39 @@ impl Worker {
         }
     }
 
+    fn record(&mut self, path: PathBuf, mesh_files: &MeshFiles) {
+        self.end_record(None);
+        let Some(run) = self.running.as_mut().and_then(|running| running.runs.first_mut()) else {
+            return self.tell(Event::Recorded(path, 0, Some("nothing is running".to_owned())));
+        };
+        match RunRecording::begin(path.clone(), mesh_files, &mut **run) {
+            Ok(recording) => self.recording = Some(recording),
+            Err(message) => self.tell(Event::Recorded(path, 0, Some(message))),
+        }
+    }
+
+    fn end_record(&mut self, why: Option<String>) {
+        let Some(recording) = self.recording.take() else { return };
+        let path = recording.path().to_owned();
+        let run = self.running.as_mut().and_then(|running| running.runs.first_mut());
+        match run.map(|run| recording.end(&mut **run)) {
+            Some(Ok((path, frames))) => self.tell(Event::Recorded(path, frames, why)),
+            Some(Err(message)) => self.tell(Event::Recorded(path, 0, Some(message))),
+            None => self.tell(Event::Recorded(path, 0, why)),
+        }
+    }
+
+    /// A frame was computed.
+    fn record_frame(&mut self) {
+        let run = self.running.as_mut().and_then(|running| running.runs.first_mut());
+        let Some((recording, run)) = self.recording.as_mut().zip(run) else { return };
+        if let Err(message) = recording.frame(&mut **run) {
+            self.end_record(Some(message));
+        }
+    }
+
     fn fail(&mut self, message: String, cure: Cure) {
+        self.end_record(Some("the simulation has stopped".to_owned()));
         self.running = None;
         self.tell(Event::Failed(Failure { message, cure }));
     }
@@ -355,6 +398,8 @@ impl Worker {
             failed = failed.or(run.advance().err());
             *wall = start.elapsed().as_secs_f64();
         }
+        self.record_frame();
+        let Some(running) = &mut self.running else { return };
         let told = running.runs.iter_mut().find_map(|run| run.told());
         running.number += 1;
         self.steps = self.steps.saturating_sub(1);
@@ -374,6 +419,7 @@ impl Worker {
 
     /// Stops where a simulation has failed.
     fn stop(&mut self, message: String) {
+        self.end_record(Some("the simulation has stopped".to_owned()));
         (self.playing, self.steps) = (false, 0);
         self.tell(Event::Failed(Failure { message, cure: Cure::Reset }));
     }

@@ -2,13 +2,12 @@
 
 use eframe::egui::{self, Ui};
 use viscera::scene::Instrument;
-use viscera_stage::RunSnapshot;
+use viscera_stage::{InHand, Instruments, RunSnapshot};
 
 use super::number::{Number, named};
 use super::{Action, section};
 use crate::controller::Controller;
 use crate::help::Request;
-use crate::instruments::{InHand, Instruments};
 
 /// Instruments to take; those in hands, each with its force; the controller.
 pub fn show(
@@ -69,7 +68,8 @@ fn show_held(
     // Digits that nobody chose are left out.
     let degrees = |angle: f64| (10.0 * angle.to_degrees()).round() / 10.0;
     let [angle, least, widest] = [angle, least, widest].map(degrees);
-    let look = Number { unit: "°", rail: least..=widest, logarithmic: false, whole: false, decimals: 0 };
+    let look =
+        Number { unit: "°", rail: least..=widest, logarithmic: false, whole: false, decimals: 0 };
     let name = format!("{} jaws", held.name);
     let edit = named(ui, &name, "How far its jaws are open: C closes, V opens", |ui, label| {
         look.show(ui, angle, label)

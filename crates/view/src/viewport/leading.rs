@@ -1,21 +1,15 @@
 //! Instruments under the pointer: which one a press takes up, and how a drag leads it.
 
 use eframe::egui::{Modifiers, Pos2, Vec2};
-use viscera::scalar::Vec3;
-use viscera_stage::{RunSnapshot, ToolSnapshot, meet_plane, pick_tool};
+use viscera_stage::{Drag, InHand, Instruments, Nudge, RunSnapshot, ToolSnapshot, pick_tool};
 
 use super::lens::Lens;
-use crate::instruments::{InHand, Instruments, Nudge};
 
 /// A press so near to a working end takes that instrument up [points].
 const NEAR: f32 = 14.0;
 
-/// Angle that an instrument turns by for a drag across the picture's height [rad].
-const TURN: f64 = 3.5;
-
-/// How far a step of the wheel, or a drag across the picture's height, leads in depth, as a share of the size of things.
+/// How far a point of the wheel leads in depth, as a share of the size of things.
 const PER_POINT: f64 = 2e-3;
-const PER_HEIGHT: f64 = 1.5;
 
 /// The tool that a press takes up, before whatever tissue is so far away [m]: the one that is seen there, or whose working
 /// end is near. The active one shines through tissue, and is taken through it.
@@ -34,9 +28,11 @@ pub fn tool_at<'a>(
     if let Some(tool) = hit.filter(|(_, way)| is_seen(*way)).and_then(|(at, _)| run.tools.get(at)) {
         return Some(tool);
     }
-    let through = run.tools.iter().find(|tool| is_active(tool)).filter(|tool| {
-        pick_tool(std::slice::from_ref(*tool), from, direction).is_some()
-    });
+    let through = run
+        .tools
+        .iter()
+        .find(|tool| is_active(tool))
+        .filter(|tool| pick_tool(std::slice::from_ref(*tool), from, direction).is_some());
     let is_near = |tool: &&ToolSnapshot| {
         let place = lens.place(tool.pose.translation);
         tool.hand.is_some() && place.is_some_and(|place| place.distance(pointer) < NEAR)
@@ -44,8 +40,7 @@ pub fn tool_at<'a>(
     through.or_else(|| run.tools.iter().find(is_near))
 }
 
-/// What a drag from one place to another asks of an instrument, and the wheel, in points. Where the picture says nothing of a
-/// place it is no number, and the instrument says so.
+/// What a drag asks of an instrument that has moved the pointer by so much, and the wheel meanwhile [points].
 pub fn nudge(
     held: &InHand,
     lens: &Lens,
@@ -54,29 +49,15 @@ pub fn nudge(
     modifiers: Modifiers,
     extent: f64,
 ) -> Nudge {
-    let height = f64::from(lens.rect.height().max(1.0));
-    let [x, y] = [f64::from(moved.x) / height, f64::from(-moved.y) / height];
-    let depth = -PER_POINT * f64::from(scroll) * extent;
-    let mut nudge = Nudge { way: [0.0, 0.0, depth], ..Nudge::default() };
-    if moved == Vec2::ZERO {
-        return nudge;
-    }
-    if modifiers.alt {
-        nudge.roll = TURN * x;
-    } else if modifiers.shift {
-        nudge.tilt = [TURN * x, TURN * y];
-    } else if modifiers.command {
-        nudge.way[2] -= PER_HEIGHT * extent * y;
-    } else {
-        let [right, up, normal] = lens.orbit().axes();
-        let eye = lens.orbit().position();
-        let at = |place: Pos2| meet_plane(eye, lens.ray(place), held.pose.translation, normal);
-        let nowhere = Vec3::splat(f64::NAN);
-        let way = match at(pointer - moved).zip(at(pointer)) {
-            Some((before, now)) => now - before,
-            None => nowhere,
-        };
-        (nudge.way[0], nudge.way[1]) = (way.dot(right), way.dot(up));
-    }
+    let drag = match modifiers {
+        Modifiers { alt: true, .. } => Drag::Roll,
+        Modifiers { shift: true, .. } => Drag::Tilt,
+        Modifiers { command: true, .. } => Drag::Depth,
+        _ => Drag::Across,
+    };
+    let place = |at: Pos2| [at.x, at.y].map(f64::from);
+    let way = [place(pointer - moved), place(pointer)];
+    let mut nudge = held.dragged(drag, lens.eye(), way, extent);
+    nudge.way[2] -= PER_POINT * f64::from(scroll) * extent;
     nudge
 }

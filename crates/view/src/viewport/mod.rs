@@ -14,12 +14,14 @@ use std::sync::Arc;
 use viscera::scalar::Vec3;
 use viscera_picture::{HALF_OPENING, Image, ImageSize, Overlay, ViewDirection};
 use viscera_render::Orbit;
-use viscera_stage::{Coloring, ForceScale, HandId, Legend, PictureContents, RunSurface, meet_plane, pick};
+use viscera_stage::{
+    Coloring, ForceScale, HandId, Legend, PictureContents, RunSurface, Surroundings, meet_plane,
+    pick,
+};
 
 use crate::engine::{Command, Setup, Snapshot};
 use crate::hands::Hands;
 use crate::holds::{Grip, Holds};
-use crate::instruments::Surroundings;
 use crate::preferences::Preferences;
 
 /// A press so near to where something is held takes that up again [points].
@@ -279,7 +281,7 @@ impl Viewport {
         let nudge = leading::nudge(held, lens, moved, scroll, modifiers, self.extent);
         let hand = held.id;
         match hands.instruments.nudge(hand, &nudge, &self.surroundings()) {
-            Ok(led) => commands.extend(led),
+            Ok(acts) => commands.extend(acts.into_iter().map(Command::Tool)),
             Err(told) => self.told = Some(told),
         }
     }
@@ -314,7 +316,7 @@ impl Viewport {
         if let Some(tool) = leading::tool_at(shown, lens, pointer, tissue, &hands.instruments) {
             let hand = tool.hand.unwrap_or_else(|| {
                 let scene_tool = setup.assembly.tools.get(tool.number);
-                commands.push(hands.instruments.hold(tool, scene_tool));
+                commands.push(Command::Tool(hands.instruments.hold(tool, scene_tool)));
                 hands.instruments.active().map_or(0, |held| held.id)
             });
             hands.instruments.drag(hand);

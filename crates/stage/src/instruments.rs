@@ -4,9 +4,12 @@ use viscera::scalar::rigid::RigidTransform;
 use viscera::scalar::{Vec3, vec3};
 use viscera::scene::Instrument;
 use viscera_render::Orbit;
-use viscera_stage::{HandId, ToolAct, ToolSnapshot, first_pose, moved, turned, within_reach};
 
-use crate::engine::Command;
+use crate::grip::{first_pose, moved, turned, within_reach};
+use crate::hand::{HandId, ToolAct};
+use crate::lens::Lens;
+use crate::pick::meet_plane;
+use crate::tools::ToolSnapshot;
 
 /// The scene as instruments see it: what they are led around.
 #[derive(Clone, Copy, Debug)]
@@ -52,6 +55,54 @@ pub struct Nudge {
 /// The widest that jaws of instruments from the scene open, where the scene does not say [rad].
 const WIDEST: f64 = std::f64::consts::FRAC_PI_3;
 
+/// What a drag does to an instrument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drag {
+    /// Moves it in the plane of the picture: what was pressed stays under the pointer.
+    Across,
+    /// Moves it away and nearer.
+    Depth,
+    /// Turns it about its working end: its handle follows.
+    Tilt,
+    /// Turns it about its shaft.
+    Roll,
+}
+
+/// Angle that an instrument turns by for a drag across the picture's height [rad].
+const TURN: f64 = 3.5;
+
+/// How far a drag across the picture's height leads in depth, as a share of the size of things.
+const DEPTH: f64 = 1.5;
+
+impl InHand {
+    /// What a drag from one place of a picture to another asks of it, where things are of this size [m]. Where the picture
+    /// says nothing of a place it is no number.
+    pub fn dragged(
+        &self,
+        drag: Drag,
+        lens: &Lens,
+        [from, to]: [[f64; 2]; 2],
+        extent: f64,
+    ) -> Nudge {
+        let height = lens.area.height.max(1.0);
+        let [x, y] = [(to[0] - from[0]) / height, (from[1] - to[1]) / height];
+        match drag {
+            _ if from == to => Nudge::default(),
+            Drag::Roll => Nudge { roll: TURN * x, ..Nudge::default() },
+            Drag::Tilt => Nudge { tilt: [TURN * x, TURN * y], ..Nudge::default() },
+            Drag::Depth => Nudge { way: [0.0, 0.0, -DEPTH * extent * y], ..Nudge::default() },
+            Drag::Across => {
+                let [right, up, normal] = lens.orbit.axes();
+                let eye = lens.orbit.position();
+                let at = |place| meet_plane(eye, lens.ray(place), self.pose.translation, normal);
+                let way =
+                    at(from).zip(at(to)).map_or(Vec3::splat(f64::NAN), |(from, to)| to - from);
+                Nudge { way: [way.dot(right), way.dot(up), 0.0], ..Nudge::default() }
+            }
+        }
+    }
+}
+
 /// All that are in hands.
 #[derive(Debug, Default)]
 pub struct Instruments {
@@ -80,24 +131,28 @@ impl Instruments {
     }
 
     /// Takes an instrument from the tray; it becomes the active one.
-    pub fn take(&mut self, instrument: &Instrument, around: &Surroundings) -> Command {
+    pub fn take(&mut self, instrument: &Instrument, around: &Surroundings) -> ToolAct {
         let Surroundings { orbit, top, extent, .. } = around;
         let pose = first_pose(instrument, orbit, *top, *extent, self.list.len());
-        let hand = self.add(instrument.name.clone(), pose, instrument.jaws.as_ref().map(|jaws| {
-            [jaws.at(0.0).clamp(jaws.least_angle(), WIDEST), jaws.least_angle(), WIDEST]
-        }));
-        Command::Tool(ToolAct::Take { hand, instrument: Box::new(instrument.clone()), pose })
+        let hand = self.add(
+            instrument.name.clone(),
+            pose,
+            instrument.jaws.as_ref().map(|jaws| {
+                [jaws.at(0.0).clamp(jaws.least_angle(), WIDEST), jaws.least_angle(), WIDEST]
+            }),
+        );
+        ToolAct::Take { hand, instrument: Box::new(instrument.clone()), pose }
     }
 
     /// Takes a tool of the scene in hand where it is; it becomes the active one.
-    pub fn hold(&mut self, tool: &ToolSnapshot, scene_tool: Option<&Instrument>) -> Command {
+    pub fn hold(&mut self, tool: &ToolSnapshot, scene_tool: Option<&Instrument>) -> ToolAct {
         let jaws = tool.jaw_angle.map(|angle| {
             let of_scene = scene_tool.and_then(|tool| tool.jaws.as_ref());
             let least = of_scene.map_or(0.0, viscera::scene::Jaws::least_angle);
             [angle, least, of_scene.map_or(WIDEST, |jaws| jaws.open.max(angle))]
         });
         let hand = self.add(tool.met.name.clone(), tool.pose, jaws);
-        Command::Tool(ToolAct::Hold { hand, name: tool.met.name.clone() })
+        ToolAct::Hold { hand, name: tool.met.name.clone() }
     }
 
     fn add(&mut self, name: String, pose: RigidTransform, jaws: Option<[f64; 3]>) -> HandId {
@@ -142,7 +197,7 @@ impl Instruments {
         id: HandId,
         nudge: &Nudge,
         around: &Surroundings,
-    ) -> Result<Vec<Command>, String> {
+    ) -> Result<Vec<ToolAct>, String> {
         let Some(held) = self.list.iter_mut().find(|held| held.id == id) else {
             return Ok(Vec::new());
         };
@@ -155,14 +210,15 @@ impl Instruments {
             .map(|pose| within_reach(&pose, around.middle, around.extent));
         let Some(next) = next.filter(RigidTransform::is_finite) else {
             return Err(format!(
-                "the {} stays where it is: seen from here, the pointer is nowhere; fit the view (F) and try again",
+                "the {} stays where it is: seen from here, the pointer is nowhere; look at everything (fit the view) and try \
+                 again",
                 held.name
             ));
         };
         let mut commands = Vec::new();
         if next != held.pose {
             held.pose = next;
-            commands.push(Command::Tool(ToolAct::Lead { hand: id, pose: next }));
+            commands.push(ToolAct::Lead { hand: id, pose: next });
         }
         if nudge.opening != 0.0
             && let Some([angle, ..]) = held.jaws
@@ -173,7 +229,7 @@ impl Instruments {
     }
 
     /// Opens or closes jaws to an angle [rad], as far as they go; locked jaws stay.
-    pub fn open(&mut self, id: HandId, angle: f64) -> Option<Command> {
+    pub fn open(&mut self, id: HandId, angle: f64) -> Option<ToolAct> {
         let held = self.list.iter_mut().find(|held| held.id == id)?;
         let [now, least, widest] = held.jaws.as_mut()?;
         if held.is_locked || !angle.is_finite() {
@@ -184,19 +240,19 @@ impl Instruments {
             return None;
         }
         *now = angle;
-        Some(Command::Tool(ToolAct::Jaws { hand: id, angle }))
+        Some(ToolAct::Jaws { hand: id, angle })
     }
 
     /// Locks jaws, or unlocks them; nothing where it has none.
-    pub fn lock(&mut self, id: HandId) -> Option<Command> {
+    pub fn lock(&mut self, id: HandId) -> Option<ToolAct> {
         let held = self.list.iter_mut().find(|held| held.id == id && held.jaws.is_some())?;
         held.is_locked = !held.is_locked;
-        Some(Command::Tool(ToolAct::Lock { hand: id, locked: held.is_locked }))
+        Some(ToolAct::Lock { hand: id, locked: held.is_locked })
     }
 
     /// Puts one away.
-    pub fn put_away(&mut self, id: HandId) -> Option<Command> {
-        self.forget(id).then_some(Command::Tool(ToolAct::PutAway { hand: id }))
+    pub fn put_away(&mut self, id: HandId) -> Option<ToolAct> {
+        self.forget(id).then_some(ToolAct::PutAway { hand: id })
     }
 
     /// One is in no hand: it was refused.
@@ -219,7 +275,7 @@ impl Instruments {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use viscera_stage::tray;
+    use crate::hand::tray;
 
     fn around() -> Surroundings {
         let orbit = Orbit::framing(&[Vec3::ZERO, vec3(0.1, 0.1, 0.1)]);
@@ -245,7 +301,7 @@ mod tests {
         hands.next();
         assert_eq!(names(&hands), [Some("probe".into()), Some("grasper".into())]);
         // The active one is put away: the other one is active.
-        assert!(matches!(hands.put_away(1), Some(Command::Tool(ToolAct::PutAway { hand: 1 }))));
+        assert!(matches!(hands.put_away(1), Some(ToolAct::PutAway { hand: 1 })));
         assert_eq!(names(&hands), [Some("grasper".into()), None]);
         assert!(hands.put_away(1).is_none());
         hands.clear();
@@ -259,7 +315,7 @@ mod tests {
         let before = hands.list()[0].pose;
         let nudge = Nudge { way: [0.01, 0.0, 0.0], ..Nudge::default() };
         let commands = hands.nudge(1, &nudge, &around()).expect("a place");
-        assert!(matches!(&commands[..], [Command::Tool(ToolAct::Lead { hand: 1, .. })]));
+        assert!(matches!(&commands[..], [ToolAct::Lead { hand: 1, .. }]));
         let moved = hands.list()[0].pose.translation - before.translation;
         let [right, ..] = around().orbit.axes();
         assert!((moved - right * 0.01).length() < 1e-12);
@@ -272,8 +328,29 @@ mod tests {
         assert_eq!(hands.list()[0].pose.translation, end);
         let lost = Nudge { way: [f64::NAN, 0.0, 0.0], ..Nudge::default() };
         let error = hands.nudge(1, &lost, &around()).expect_err("nowhere");
-        assert!(error.contains("probe") && error.contains("(F)"), "{error}");
+        assert!(error.contains("probe") && error.contains("fit the view"), "{error}");
         assert!(hands.nudge(1, &Nudge::default(), &around()).expect("here").is_empty());
+    }
+
+    #[test]
+    fn what_is_dragged_stays_under_the_pointer() {
+        let mut hands = Instruments::default();
+        hands.take(&named("probe"), &around());
+        let area = crate::lens::Area { left: 10.0, top: 20.0, width: 640.0, height: 480.0 };
+        let lens = Lens::new(&around().orbit, area, 0.0);
+        let at = |hands: &Instruments| lens.place(hands.list()[0].pose.translation).expect("seen");
+        let from = at(&hands);
+        let to = [from[0] + 37.0, from[1] - 21.0];
+        let nudge = hands.list()[0].dragged(Drag::Across, &lens, [from, to], 0.1);
+        hands.nudge(1, &nudge, &around()).expect("a place");
+        let [x, y] = at(&hands);
+        assert!((x - to[0]).abs() < 1e-6 && (y - to[1]).abs() < 1e-6, "{x} {y}");
+        // A picture without a height, or a camera that is nowhere, leads nowhere.
+        let lost = Lens::new(&around().orbit, crate::lens::Area { width: f64::NAN, ..area }, 0.0);
+        let nudge = hands.list()[0].dragged(Drag::Across, &lost, [from, to], 0.1);
+        assert!(hands.nudge(1, &nudge, &around()).is_err());
+        let depth = hands.list()[0].dragged(Drag::Depth, &lens, [from, to], 0.1);
+        assert!(depth.way[2] < 0.0 && depth.way[0] == 0.0);
     }
 
     #[test]
