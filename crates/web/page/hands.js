@@ -5,6 +5,8 @@ import { Gestures } from "./gestures.js";
 /** @typedef {import("./viscera.js").Session} Session */
 /** @typedef {import("./screen.js").Screen} Screen */
 
+/** What a wheel leads an instrument by, as a drag [CSS pixels]: ten lines of it half the size of things. */
+const WHEEL = 400;
 /** Turning by one press of a key [CSS pixels]; pulling by a third of it. */
 const KEY_STEP = 24;
 
@@ -34,10 +36,25 @@ export class Hands {
       grab: (id, x, y) => session.grab(id, this.#pixels(x), this.#pixels(y)),
       lead: (id, x, y) => session.lead(id, this.#pixels(x), this.#pixels(y)),
       release: (id, keep) => this.#release(id, keep),
+      press: (x, y, anywhere) => session.pressTool(this.#pixels(x), this.#pixels(y), anywhere),
+      drag: (from, to) => this.#drag(from, to),
       orbit: (dx, dy) => session.orbit(this.#pixels(dx), this.#pixels(dy)),
       pan: (dx, dy) => session.pan(this.#pixels(dx), this.#pixels(dy)),
       zoom: (factor) => this.zoom(factor),
     });
+  }
+
+  /** What a drag does to an instrument: "across", "depth", "tilt" or "roll". */
+  drag = "across";
+
+  /**
+   * @param {{x: number, y: number}} from
+   * @param {{x: number, y: number}} to
+   * @param {string} [drag]
+   */
+  #drag(from, to, drag = this.drag) {
+    const [x0, y0, x1, y1] = [from.x, from.y, to.x, to.y].map((length) => this.#pixels(length));
+    this.#session.dragTool(x0, y0, x1, y1, drag);
   }
 
   /** Fingers count in CSS pixels: those of the picture may change in the middle of a gesture. @param {number} length */
@@ -68,9 +85,15 @@ export class Hands {
     ]);
   }
 
-  /** @param {number} factor above 1: nearer */
+  /** Whether an instrument is in hand. */
+  get hasTool() {
+    return JSON.parse(this.#session.inHand()).length > 0;
+  }
+
+  /** The wheel: nearer and farther, or an instrument that is being led in depth. @param {number} factor above 1: nearer */
   zoom(factor) {
-    this.#session.zoom(1 / factor);
+    if (this.gestures.mode !== "lead") this.#session.zoom(1 / factor);
+    else this.#drag({ x: 0, y: 0 }, { x: 0, y: WHEEL * Math.log(factor) }, "depth");
   }
 
   /** Nothing is held any more: the scene begins anew. */
@@ -124,7 +147,7 @@ export class Hands {
   }
 
   /**
-   * An arrow key: pulls what the keyboard holds, else turns or moves the view.
+   * An arrow key: pulls what the keyboard holds, leads the instrument in hand, else turns or moves the view.
    *
    * @param {number} dx -1, 0, 1
    * @param {number} dy
@@ -137,6 +160,10 @@ export class Hands {
       key.x += (dx * KEY_STEP) / 3;
       key.y += (dy * KEY_STEP) / 3;
       this.#session.lead(key.id, this.#pixels(key.x), this.#pixels(key.y));
+    } else if (this.hasTool) {
+      const middle = { x: this.#screen.size[0] / this.#screen.scale / 2, y: this.#screen.size[1] / this.#screen.scale / 2 };
+      const to = { x: middle.x + (dx * KEY_STEP) / 3, y: middle.y + (dy * KEY_STEP) / 3 };
+      this.#drag(middle, to, pan ? "tilt" : this.drag);
     } else if (pan) this.#session.pan(dx * step, dy * step);
     else this.#session.orbit(dx * step, dy * step);
   }

@@ -135,7 +135,7 @@ impl Screen {
             picked: &picked,
             targets: &targets,
             tools: &state.snapshot.tools,
-            in_hand: None,
+            in_hand: session.instruments.active().map(|held| held.id),
             force_scale: session.force_scale.metres_per_newton(session.extent),
             extent: session.extent,
         };
