@@ -26,6 +26,8 @@ impl Color {
     pub const PULLED: Self = Self::new(1.0, 0.34, 0.01);
     /// Tools.
     pub const STEEL: Self = Self::new(0.23, 0.25, 0.275);
+    /// The tool that is in a hand.
+    pub const IN_HAND: Self = Self::new(0.16, 0.30, 0.42);
     /// The shape at rest.
     pub const REST: Self = Self::new(0.03, 0.09, 0.22);
     /// A value that is not a number.

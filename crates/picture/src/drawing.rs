@@ -236,11 +236,11 @@ const NEAREST: f64 = 0.02;
 
 /// Adds a tool's triangles; one where it cannot be drawn. What is behind the camera is left out.
 fn add_tool(shapes: &mut Shapes, camera: &Camera, tool: &Tool) -> usize {
-    let facets = match tool.shape {
+    let facets = match &tool.shape {
         // From below it would hide everything.
         Shape::HalfSpace if tool.distance(camera.position()).value <= 0.0 => return 0,
         Shape::HalfSpace => Facets::patch(&tool.pose, camera.target(), camera.radius()),
-        shape => Facets::of(&shape).placed(&tool.pose),
+        shape => Facets::of(shape).placed(&tool.pose),
     };
     if !facets.positions.iter().all(|&p| is_drawable(p)) {
         return 1;

@@ -7,9 +7,11 @@
 //! x = m + (s_x c_x, s_y c_y, s_z c_z) + r n        n: direction in the octant of signs s;  c: half extents of the core
 //! ```
 //!
-//! The direction `n` is the exact normal there, at sharp edges (`r = 0`) too: each face has corners of its own.
+//! The direction `n` is the exact normal there, at sharp edges (`r = 0`) too: each face has corners of its own. A mesh has its
+//! own triangles.
 
 use viscera::contact::Shape;
+use viscera::mesh::SurfaceMesh;
 use viscera::scalar::rigid::RigidTransform;
 use viscera::scalar::{Vec3, vec3};
 
@@ -36,6 +38,9 @@ const MOST_BANDS: f64 = 64.0;
 /// Half the side of a half-space's patch, as a share of the radius of what is around it.
 const PATCH: f64 = 0.8;
 
+/// Cosine of the angle at which triangles of a surface meet with an edge: those of a round rod of a dozen sides do not.
+const CREASE: f64 = 0.8;
+
 /// A ring of vertices: height of its core's corners [m], and the direction's parts across and along z.
 struct Row {
     height: f64,
@@ -49,6 +54,7 @@ impl Facets {
     pub fn of(shape: &Shape) -> Self {
         let (middle, core, radius) = match *shape {
             Shape::HalfSpace => return Self::default(),
+            Shape::Mesh(ref grid) => return Self::of_surface(grid.surface()),
             Shape::Sphere { radius } => (Vec3::ZERO, Vec3::ZERO, radius),
             Shape::Capsule { length, radius } => {
                 let half = vec3(0.0, 0.0, 0.5 * length);
@@ -88,6 +94,39 @@ impl Facets {
         facets.add([low[0], low[3], low[2]]);
         facets.add([high[0], high[1], high[2]]);
         facets.add([high[0], high[2], high[3]]);
+        facets
+    }
+
+    /// Of a closed surface: round where its triangles meet at less than [`CREASE`], with an edge elsewhere.
+    pub fn of_surface(surface: &SurfaceMesh) -> Self {
+        let corners = |t: usize| surface.triangles[t].map(|v| surface.vertices[v as usize]);
+        let areas: Vec<Vec3<f64>> = (0..surface.triangles.len())
+            .map(|t| {
+                let [a, b, c] = corners(t);
+                (b - a).cross(c - a)
+            })
+            .collect();
+        let mut around = vec![Vec::new(); surface.vertices.len()];
+        for (t, triangle) in surface.triangles.iter().enumerate() {
+            triangle.iter().for_each(|&v| around[v as usize].push(t));
+        }
+        let mut facets = Self::default();
+        for (t, triangle) in surface.triangles.iter().enumerate() {
+            let own = areas[t];
+            if own.length() == 0.0 {
+                continue;
+            }
+            let first = facets.positions.len() as u32;
+            for (&v, position) in triangle.iter().zip(corners(t)) {
+                let neighbours = around[v as usize].iter().map(|&other| areas[other]);
+                let is_round =
+                    |other: &Vec3<f64>| own.dot(*other) > CREASE * own.length() * other.length();
+                let sum = neighbours.filter(is_round).fold(Vec3::ZERO, |sum, other| sum + other);
+                facets.positions.push(position);
+                facets.normals.push(sum * (1.0 / sum.length()));
+            }
+            facets.triangles.push([first, first + 1, first + 2]);
+        }
         facets
     }
 

@@ -1,8 +1,8 @@
 //! The one place that draws.
 //!
 //! ```text
-//! shadow map   solid bodies as the key light sees them
-//! picture      background, solid bodies and their wires,
+//! shadow map   solid bodies and tools as the key light sees them
+//! picture      background, solid bodies and their wires, tools where tissue hides them, tools,
 //!              arrows where tissue hides them, markers and arrows,
 //!              ghosts: their nearest layer's depths, then its colours
 //! ```
@@ -19,6 +19,7 @@ use crate::quality::Quality;
 use crate::shadow::ShadowMap;
 use crate::solids::{Meshes, Solids};
 use crate::target::Target;
+use crate::tools::{PlacedTools, ToolView};
 use crate::values::palette;
 use crate::view::View;
 
@@ -130,15 +131,20 @@ impl Canvas {
         queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
         let bodies = self.bind(&drawing.bodies);
         let solids = Solids::new(&self.device, &drawing.markers, &drawing.arrows);
+        let tools = PlacedTools::new(&self.device, &drawing.tools);
 
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("picture") };
         let mut encoder = wgpu.create_command_encoder(&descriptor);
         if view.has_shadow() {
-            self.draw_shadow(&mut self.shadow.pass(&mut encoder), &drawing.bodies);
+            let pass = &mut self.shadow.pass(&mut encoder);
+            self.draw_shadow(pass, &drawing.bodies, tools.as_ref());
         }
         let mut brush = Brush { canvas: self, pass: self.target.pass(&mut encoder), bodies };
         brush.begin();
         brush.bodies(&drawing.bodies, is_solid);
+        if let Some(tools) = &tools {
+            brush.tools(tools);
+        }
         if let Some(solids) = &solids {
             brush.solids(solids);
         }
@@ -176,11 +182,20 @@ impl Canvas {
         })
     }
 
-    fn draw_shadow(&self, pass: &mut wgpu::RenderPass<'_>, bodies: &[BodyView<'_>]) {
+    fn draw_shadow(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        bodies: &[BodyView<'_>],
+        tools: Option<&PlacedTools<'_>>,
+    ) {
         pass.set_pipeline(&self.pipelines.shadow);
         pass.set_bind_group(0, &self.view_bound, &[]);
         for body in bodies.iter().filter(|body| is_solid(body)) {
             draw_triangles(pass, body);
+        }
+        if let Some(tools) = tools {
+            pass.set_pipeline(&self.pipelines.tool_shadow);
+            tools.draw(pass, |tool| tool.has_shadow);
         }
     }
 }
@@ -241,6 +256,15 @@ impl Brush<'_, '_> {
         self.pass.draw_indexed(0..indices as u32, 0, 0..1);
     }
 
+    /// Hidden parts first: later tools would hide themselves.
+    fn tools(&mut self, tools: &PlacedTools<'_>) {
+        let pipelines = &self.canvas.pipelines;
+        self.pass.set_pipeline(&pipelines.hidden_tools);
+        tools.draw(&mut self.pass, shines_through);
+        self.pass.set_pipeline(&pipelines.tools);
+        tools.draw(&mut self.pass, |_| true);
+    }
+
     /// Hidden parts first: later the arrows would hide themselves.
     fn solids(&mut self, solids: &Solids) {
         let (pipelines, meshes) = (&self.canvas.pipelines, &self.canvas.meshes);
@@ -249,6 +273,10 @@ impl Brush<'_, '_> {
         self.pass.set_pipeline(&pipelines.solids);
         solids.draw(&mut self.pass, meshes, false);
     }
+}
+
+fn shines_through(tool: &ToolView<'_>) -> bool {
+    tool.see_through > 0.0
 }
 
 fn is_solid(body: &BodyView<'_>) -> bool {

@@ -5,6 +5,7 @@ use viscera::solver::gpu::GpuSurface;
 use viscera_picture::{Arrow, Background, Color, Markers, Paint};
 
 use crate::orbit::Orbit;
+use crate::tools::ToolView;
 use crate::values::ValueBuffer;
 
 /// Everything in one picture whose surfaces are on the device.
@@ -14,6 +15,8 @@ pub struct GpuDrawing<'a> {
     pub orbit: Orbit,
     /// Tissue. See-through bodies lie over all others, in this order.
     pub bodies: Vec<BodyView<'a>>,
+    /// Parts of tools.
+    pub tools: Vec<ToolView<'a>>,
     /// Fixings, picked points.
     pub markers: Vec<Markers<'a>>,
     /// Pulls, paler where tissue hides them.
@@ -30,6 +33,7 @@ impl GpuDrawing<'_> {
         Self {
             orbit,
             bodies: Vec::new(),
+            tools: Vec::new(),
             markers: Vec::new(),
             arrows: Vec::new(),
             background: Background::default(),

@@ -5,7 +5,7 @@
 //!
 //! | to | look at |
 //! |---|---|
-//! | say what a picture shows | [`GpuDrawing`], [`BodyView`]; [`Markers`], [`Arrow`], [`Paint`], [`Background`] are those of `viscera-picture` |
+//! | say what a picture shows | [`GpuDrawing`], [`BodyView`], [`ToolView`]; [`Markers`], [`Arrow`], [`Paint`], [`Background`] are those of `viscera-picture` |
 //! | look around | [`Orbit`] |
 //! | draw it, for a window or without one | [`Canvas`] |
 //! | choose between fine and fast | [`Quality`] |
@@ -21,6 +21,7 @@ mod quality;
 mod shadow;
 mod solids;
 mod target;
+mod tools;
 mod values;
 mod view;
 
@@ -29,5 +30,6 @@ pub use drawing::{BodyView, BoundingSphere, GpuDrawing, ScaledValues};
 pub use error::RenderError;
 pub use orbit::Orbit;
 pub use quality::Quality;
+pub use tools::{ToolMesh, ToolView};
 pub use values::ValueBuffer;
 pub use viscera_picture::{Arrow, Background, Markers, Paint};

@@ -40,7 +40,10 @@ pub(crate) struct Pipelines {
     pub wire: wgpu::RenderPipeline,
     pub solids: wgpu::RenderPipeline,
     pub hidden_solids: wgpu::RenderPipeline,
+    pub tools: wgpu::RenderPipeline,
+    pub hidden_tools: wgpu::RenderPipeline,
     pub shadow: wgpu::RenderPipeline,
+    pub tool_shadow: wgpu::RenderPipeline,
 }
 
 impl Pipelines {
@@ -82,6 +85,14 @@ impl Pipelines {
             let recipe = Recipe::new("place_solid", Some(fragment));
             make(Recipe { buffers: &solid, depth, ink, cull, ..recipe })
         };
+        let shadow = |buffers, vertex| {
+            Recipe { buffers, depth: Depth::Shadow, ..Recipe::new(vertex, None) }.make(
+                device,
+                &module,
+                &without_map,
+                1,
+            )
+        };
         Self {
             background: make(Recipe {
                 depth: Depth::Ignored,
@@ -103,12 +114,10 @@ impl Pipelines {
             }),
             solids: solids("shade_solid", Depth::Nearest, Ink::Covers),
             hidden_solids: solids("shade_hidden_solid", Depth::BehindOnly, Ink::Blends),
-            shadow: Recipe {
-                buffers: &surface,
-                depth: Depth::Shadow,
-                ..Recipe::new("place_shadow", None)
-            }
-            .make(device, &module, &without_map, 1),
+            tools: solids("shade_tool", Depth::Nearest, Ink::Covers),
+            hidden_tools: solids("shade_hidden_solid", Depth::BehindOnly, Ink::Blends),
+            shadow: shadow(&surface, "place_shadow"),
+            tool_shadow: shadow(&solid, "place_solid_shadow"),
             view_layout,
             body_layout,
             shadow_layout,

@@ -26,7 +26,7 @@ const SHORTEST: f64 = 9.0;
 /// `Solid` of solid.wgsl.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-struct Solid {
+pub(crate) struct Solid {
     center: [f32; 4],
     axes: [[f32; 4]; 3],
     /// Linear light, and how strongly it shines through tissue before it.
@@ -34,7 +34,7 @@ struct Solid {
 }
 
 impl Solid {
-    fn new(center: Vec3<f64>, axes: [Vec3<f64>; 3], color: Color, see_through: f32) -> Self {
+    pub fn new(center: Vec3<f64>, axes: [Vec3<f64>; 3], color: Color, see_through: f32) -> Self {
         let four = |v: Vec3<f64>| [v.x as f32, v.y as f32, v.z as f32, 0.0];
         let color = [color.r, color.g, color.b, see_through];
         Self { center: four(center), axes: axes.map(four), color }

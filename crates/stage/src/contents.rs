@@ -8,7 +8,9 @@ use viscera_render::{
     Arrow, BodyView, BoundingSphere, GpuDrawing, Markers, Orbit, Paint, ScaledValues, ValueBuffer,
 };
 
+use crate::hand::HandId;
 use crate::snapshot::RunSnapshot;
+use crate::tools::{ToolSnapshot, ToolSurfaces, force_arrows};
 
 /// The surfaces of one simulation, on the device.
 pub struct RunSurface {
@@ -18,6 +20,10 @@ pub struct RunSurface {
     has_values: bool,
     /// Encloses it, for its shadow.
     enclosing: Option<BoundingSphere>,
+    tools: ToolSurfaces,
+    device: Device,
+    /// Encloses the tissue at rest.
+    at_rest: Option<BoundingSphere>,
 }
 
 impl RunSurface {
@@ -36,7 +42,16 @@ impl RunSurface {
         let surface = GpuSurface::following(device, count, &skins);
         let surface = surface.map_err(|error| error.to_string())?;
         let values = ValueBuffer::new(device, surface.vertex_count() as usize);
-        Ok(Self { surface, values, has_values: false, enclosing: None })
+        let rest = assembly.builder.positions().iter().copied();
+        Ok(Self {
+            surface,
+            values,
+            has_values: false,
+            enclosing: None,
+            tools: ToolSurfaces::default(),
+            device: device.clone(),
+            at_rest: BoundingSphere::around(rest),
+        })
     }
 
     /// Moves it to its place in a snapshot.
@@ -47,6 +62,7 @@ impl RunSurface {
         if self.has_values {
             self.values.write(&run.values).map_err(|error| error.to_string())?;
         }
+        self.tools.follow(&self.device, &run.tools, self.at_rest);
         self.enclosing = BoundingSphere::around(run.positions.iter().map(|x| x.cast()));
         Ok(())
     }
@@ -72,6 +88,12 @@ pub struct PictureContents<'a> {
     pub picked: &'a [Vec3<f64>],
     /// Where each of them is pulled to [m].
     pub targets: &'a [Vec3<f64>],
+    /// The tools of the snapshot that the surfaces were placed by.
+    pub tools: &'a [ToolSnapshot],
+    /// The hand whose tool is drawn in another shade.
+    pub in_hand: Option<HandId>,
+    /// Length of arrows of their forces [m/N].
+    pub force_scale: f64,
     /// The size of things [m], for markers and arrows.
     pub extent: f64,
 }
@@ -106,13 +128,15 @@ impl PictureContents<'_> {
         let arrows = pulls.map(|(&from, &to)| Arrow { from, to, radius, color: Color::PULLED });
         // Shorter ones are hidden by the point they begin at.
         let is_long = |arrow: &Arrow| (arrow.to - arrow.from).length() > Self::PICKED * self.extent;
+        let forces = force_arrows(self.tools, &self.orbit, self.force_scale, radius);
         GpuDrawing {
             bodies: [Some(body), ghost].into_iter().flatten().collect(),
             markers: vec![
                 balls(self.fixed, Self::FIXED, Color::FIXED),
                 balls(self.picked, Self::PICKED, Color::PULLED),
             ],
-            arrows: arrows.filter(is_long).collect(),
+            tools: surface.tools.views(self.tools, self.in_hand),
+            arrows: arrows.filter(is_long).chain(forces).collect(),
             shadow: surface.enclosing.filter(|_| self.shadow),
             ..GpuDrawing::from(self.orbit)
         }

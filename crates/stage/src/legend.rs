@@ -115,7 +115,7 @@ impl Legend {
 }
 
 /// The next larger of 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8 times a power of ten.
-fn round_up(value: f32) -> f32 {
+pub(crate) fn round_up(value: f32) -> f32 {
     let power = 10f64.powf(f64::from(value).log10().floor());
     let steps = [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
     let step = steps.into_iter().find(|step| f64::from(value) <= step * power * (1.0 + 1e-6));
@@ -128,6 +128,28 @@ pub fn newtons(force: f64) -> String {
         force if force < 0.1 => format!("{:.1} mN", 1e3 * force),
         force if force < 100.0 => format!("{force:.2} N"),
         force => format!("{force:.0} N"),
+    }
+}
+
+/// A force with what it may be off by [N], where that is known: "1.25 ± 0.03 N". The error is rounded up.
+pub fn newtons_within(force: f64, error: Option<f64>) -> String {
+    let Some(error) = error.filter(|error| error.is_finite()) else { return newtons(force) };
+    let (factor, digits, unit) = match force.max(error) {
+        large if large < 0.1 => (1e3, 1, "mN"),
+        large if large < 100.0 => (1.0, 2, "N"),
+        _ => (1.0, 0, "N"),
+    };
+    let scale = 10f64.powi(digits as i32);
+    // What rounding leaves above a number of these digits is none of the error's.
+    let up = (factor * error * scale - 1e-9).ceil().max(0.0) / scale;
+    format!("{:.digits$} ± {up:.digits$} {unit}", factor * force)
+}
+
+/// A torque [N m] as it is written everywhere: "12.5 N mm".
+pub fn newton_millimetres(torque: f64) -> String {
+    match 1e3 * torque {
+        torque if torque < 100.0 => format!("{torque:.1} N mm"),
+        torque => format!("{torque:.0} N mm"),
     }
 }
 
@@ -184,6 +206,10 @@ mod tests {
     #[test]
     fn forces_are_read_at_a_glance() {
         assert_eq!([0.0123, 1.254, 120.4].map(newtons), ["12.3 mN", "1.25 N", "120 N"]);
+        let within = [(0.0123, Some(1e-4)), (1.254, Some(0.0301)), (0.02, Some(0.2)), (3.0, None)];
+        let texts = within.map(|(force, error)| newtons_within(force, error));
+        assert_eq!(texts, ["12.3 ± 0.1 mN", "1.25 ± 0.04 N", "0.02 ± 0.20 N", "3.00 N"]);
+        assert_eq!(newton_millimetres(0.0125), "12.5 N mm");
         let distances = [0.0, 1.5e-6, 8.3e-4, 0.032].map(millimetres);
         assert_eq!(distances, ["0 mm", "1.50 µm", "0.83 mm", "32 mm"]);
     }

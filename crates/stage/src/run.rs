@@ -1,6 +1,7 @@
 //! A simulation in either precision, with the caller's numbers for the patches that it holds.
 
 use viscera::model::ModelBuilder;
+use viscera::record::{RecordedFile, Recorder};
 use viscera::scalar::{Real, Vec3};
 use viscera::scene::{Patch, Scene, Selector};
 use viscera::settings::{Place, Precision, SolverSettings};
@@ -11,7 +12,9 @@ use viscera::solver::Inputs;
 use viscera::solver::gpu::Device;
 
 use crate::color::surface_values;
+use crate::hand::{ToolAct, ToolHands};
 use crate::snapshot::{Coloring, HeldPatch, HoldId, Measures, RunSnapshot, ScenePatch};
+use crate::tools::tools_of;
 
 /// Settings to change: keys and values as one writes them.
 pub type Settings = Vec<(String, String)>;
@@ -28,6 +31,16 @@ pub trait Run: Send {
     fn lead(&mut self, hold: HoldId, translation: Vec3<f64>) -> Result<(), String>;
     /// Lets go.
     fn let_go(&mut self, hold: HoldId) -> Result<(), String>;
+    /// Does something with an instrument.
+    fn act(&mut self, act: &ToolAct) -> Result<(), String>;
+    /// What a person should know of instruments since it was last asked.
+    fn told(&mut self) -> Option<String>;
+    /// Begins a recording of what happens from now on, of a scene that needed these files: its first bytes.
+    fn begin_recording(&mut self, files: Vec<RecordedFile>) -> Vec<u8>;
+    /// After each frame, before hands do anything: the next bytes of the recording.
+    fn recorded(&mut self) -> Vec<u8>;
+    /// Ends it: the last bytes.
+    fn end_recording(&mut self) -> Vec<u8>;
     /// Changes settings; where one is wrong, none.
     fn change(&mut self, settings: &Settings) -> Result<(), String>;
     /// The value of a setting of the solver, as one would write it.
@@ -122,13 +135,17 @@ struct SimulationRun<S> {
     simulation: Simulation<S>,
     /// What is held, and the motion that each is.
     held: Vec<(HoldId, usize)>,
+    hands: ToolHands,
+    recorder: Option<Recorder>,
     measures: Measures,
 }
 
 impl<S: Real> SimulationRun<S> {
     fn new(simulation: Result<Simulation<S>, SimulationError>) -> Result<Self, String> {
         let simulation = simulation.map_err(text)?;
-        Ok(Self { simulation, held: Vec::new(), measures: Measures::default() })
+        let (held, hands) = (Vec::new(), ToolHands::default());
+        let measures = Measures::default();
+        Ok(Self { simulation, held, hands, recorder: None, measures })
     }
 
     /// Forces of what the scene itself moves and pulls.
@@ -155,6 +172,8 @@ impl<S: Real> SimulationRun<S> {
         Ok(SimulationRun {
             simulation: self.simulation.fork(&settings).map_err(text)?,
             held: self.held.clone(),
+            hands: self.hands.clone(),
+            recorder: None,
             measures: self.measures.clone(),
         })
     }
@@ -202,6 +221,30 @@ impl<S: Real> Run for SimulationRun<S> {
         self.simulation.let_go(motion).map_err(text)
     }
 
+    fn act(&mut self, act: &ToolAct) -> Result<(), String> {
+        self.hands.act(&mut self.simulation, act)
+    }
+
+    fn told(&mut self) -> Option<String> {
+        self.hands.told()
+    }
+
+    fn begin_recording(&mut self, files: Vec<RecordedFile>) -> Vec<u8> {
+        let (recorder, bytes) = Recorder::begin(&mut self.simulation, files);
+        self.recorder = Some(recorder);
+        bytes
+    }
+
+    fn recorded(&mut self) -> Vec<u8> {
+        let Self { recorder, simulation, .. } = self;
+        recorder.as_mut().map_or_else(Vec::new, |recorder| recorder.frame(simulation))
+    }
+
+    fn end_recording(&mut self) -> Vec<u8> {
+        let Self { recorder, simulation, .. } = self;
+        recorder.take().map_or_else(Vec::new, |recorder| recorder.end(simulation))
+    }
+
     fn change(&mut self, settings: &Settings) -> Result<(), String> {
         self.simulation.change(settings).map_err(text)
     }
@@ -214,15 +257,18 @@ impl<S: Real> Run for SimulationRun<S> {
 
     fn reset(&mut self) -> Result<(), String> {
         self.held.clear();
+        self.hands.clear();
         self.measures = Measures::default();
         self.simulation.reset().map_err(text)
     }
 
     fn advance(&mut self) -> Result<(), String> {
+        self.hands.lead(&mut self.simulation);
         self.simulation.advance().map_err(text)
     }
 
     fn send(&mut self, measured: bool) -> Result<(), String> {
+        self.hands.lead(&mut self.simulation);
         self.simulation.send_frame(measured).map_err(text)
     }
 
@@ -273,6 +319,8 @@ impl<S: Real> Run for SimulationRun<S> {
                 snapshot.held.push(HeldPatch { id, place, target, force });
             }
         }
+        tools_of(&self.simulation, &self.hands, &mut snapshot.tools);
+        snapshot.ledger = self.simulation.ledger();
         let assembly = self.simulation.assembly();
         let tets = match coloring {
             Coloring::Strain | Coloring::Stress => self.simulation.tets(),

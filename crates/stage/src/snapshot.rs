@@ -2,6 +2,9 @@
 
 use viscera::measure::Energies;
 use viscera::scalar::Vec3;
+use viscera::solver::Ledger;
+
+use crate::tools::ToolSnapshot;
 
 /// The caller's number for something it holds.
 pub type HoldId = u64;
@@ -31,6 +34,10 @@ pub struct RunSnapshot {
     pub values: Vec<f32>,
     /// Patches held by hand.
     pub held: Vec<HeldPatch>,
+    /// The scene's tools.
+    pub tools: Vec<ToolSnapshot>,
+    /// What tools have put into tissue.
+    pub ledger: Ledger,
     /// Wall time of the last frame [s].
     pub wall: f64,
     /// Substeps per frame and iterations of each in force: what the method has chosen where it chooses.

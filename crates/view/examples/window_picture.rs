@@ -1,4 +1,4 @@
-//! Makes the picture of the window that README.md shows: the liver lifted by springs and pulled by a hand, in the
+//! Makes the picture of the window that README.md shows: the liver lifted by springs, a probe that presses on it and a grasper that waits, in the
 //! real window without a display, drawn by a software driver.
 //!
 //! `cargo run --release -p viscera-view --example window_picture -- docs/images` writes `window.png` into that folder.
@@ -7,16 +7,18 @@
 mod common;
 
 use common::{MARGIN, Window};
-use eframe::egui::vec2;
+use eframe::egui::{Vec2, vec2};
 use std::process::ExitCode;
 
 /// The size that the window opens with [points].
 const SIZE: [u32; 2] = [1280, 800];
 
-/// Simulated times [s]: springs have lifted the liver and it has come to rest; the hand has pulled; and rests.
+/// Simulated time [s] at which springs have lifted the liver and it has come to rest, and how long the probe stays.
 const LIFTED: f64 = 5.5;
-const PULLED: f64 = 8.5;
-const RESTS: f64 = 12.0;
+const STAYS: f64 = 1.5;
+
+/// The force that the probe presses with [N].
+const PRESSED: f64 = 1.5;
 
 fn main() -> ExitCode {
     let Some(folder) = std::env::args().nth(1) else {
@@ -30,23 +32,18 @@ fn main() -> ExitCode {
     window.start();
     // Off at first where a processor draws; here a frame may take its time.
     window.press("shadow");
-    let view = window.view();
     advance(&mut window, LIFTED);
-    // A place on the right lobe, and the way that the hand goes.
-    let from = view.min + vec2(0.31, 0.41) * view.size();
-    let way = vec2(-76.0, -50.0);
-    window.harness.hover_at(from);
-    window.harness.step();
-    window.harness.drag_at(from);
-    window.harness.step();
-    let begun = time(&window);
-    while time(&window) < PULLED {
-        let share = ((time(&window) - begun) / (PULLED - begun)) as f32;
-        window.harness.hover_at(from + way * share.min(1.0));
-        wait_a_frame(&mut window);
+    window.press("grasper");
+    wait_a_frame(&mut window);
+    lead(&mut window, vec2(210.0, -40.0));
+    window.press("probe");
+    wait_a_frame(&mut window);
+    lead(&mut window, vec2(-150.0, 30.0));
+    while force(&window) < PRESSED && time(&window) < 4.0 * LIFTED {
+        lead(&mut window, vec2(0.0, 4.0));
     }
-    window.harness.hover_at(from + way);
-    advance(&mut window, RESTS);
+    let until = time(&window) + STAYS;
+    advance(&mut window, until);
     match window.write_picture(std::path::Path::new(&folder), "window") {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -54,6 +51,35 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// The force on the tool that is in hand [N].
+fn force(window: &Window) -> f64 {
+    let hand = window.harness.state().instruments().active().map(|held| held.id);
+    let tool = window.run(0).tools.iter().find(|tool| tool.hand == hand);
+    tool.map_or(0.0, viscera_stage::ToolSnapshot::force)
+}
+
+/// Drags the instrument in hand by a way [points] and waits until it is there.
+fn lead(window: &mut Window, way: Vec2) {
+    let app = window.harness.state();
+    let held = app.instruments().active().expect("an instrument in hand");
+    let (hand, end) = (held.id, held.pose.translation);
+    let from = app.place(end).expect("in front of the viewer");
+    window.harness.hover_at(from);
+    window.harness.step();
+    window.harness.drag_at(from);
+    window.harness.step();
+    window.harness.hover_at(from + way);
+    window.harness.step();
+    window.harness.drop_at(from + way);
+    window.harness.step();
+    window.wait("an instrument that arrives", |app| {
+        let held = app.instruments().active().map(|held| held.pose.translation);
+        let run = app.snapshot().and_then(|snapshot| snapshot.runs.first());
+        let tool = run.and_then(|run| run.tools.iter().find(|tool| tool.hand == Some(hand)));
+        held.zip(tool).is_some_and(|(to, tool)| (to - tool.pose.translation).length() < 1e-6)
+    });
 }
 
 fn time(window: &Window) -> f64 {

@@ -1,6 +1,8 @@
 //! The window's state, and what happens to it.
 
 mod files;
+mod hearing;
+mod steering;
 
 use eframe::egui::{self, CentralPanel, Panel, ScrollArea, Ui};
 use eframe::egui_wgpu::RenderState;
@@ -9,9 +11,15 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use crate::capture::{FOLDER, Recorder};
+use viscera::scalar::Vec3;
+use viscera::scene::Instrument;
+
 use crate::choices::{Settings, Side};
+use crate::controller::Controller;
+use crate::curves::ForceCurves;
 use crate::document::Document;
-use crate::engine::{Command, Cure, Engine, Event, Setup, Snapshot};
+use crate::engine::{Command, Cure, Engine, Setup, Snapshot};
+use crate::hands::Hands;
 use crate::help::{self, Request};
 use crate::holds::Holds;
 use crate::messages::Messages;
@@ -21,6 +29,7 @@ use crate::preferences::Preferences;
 use crate::probe::Curve;
 use crate::session::Session;
 use crate::viewport::{Gpu, Viewport};
+use viscera_stage::Instruments;
 
 /// What the command line asks for.
 #[derive(Clone, Debug, Default)]
@@ -39,7 +48,7 @@ pub struct Options {
     pub farewell: Arc<OnceLock<String>>,
 }
 
-/// The scene that is opened where none is named: the retractor of `liver_retraction` is a tool, which the window does not draw.
+/// The scene that is opened where none is named: an organ to pull on, without instruments of its own in the way.
 pub const FIRST_SCENE: &str = "liver_lifted";
 
 /// The window.
@@ -47,7 +56,12 @@ pub struct App {
     engine: Engine,
     session: Session,
     viewport: Viewport,
-    holds: Holds,
+    hands: Hands,
+    /// Instruments that can be taken.
+    tray: Vec<Instrument>,
+    controller: Controller,
+    /// When the controller was asked last.
+    controlled: Instant,
     preferences: Preferences,
     clock: Clock,
     messages: Messages,
@@ -56,6 +70,8 @@ pub struct App {
     devices: Vec<String>,
     fields: Fields,
     recorder: Option<Recorder>,
+    /// Where the run is being recorded.
+    recorded_run: Option<PathBuf>,
     pictures: PathBuf,
     farewell: Arc<OnceLock<String>>,
     help_open: bool,
@@ -65,6 +81,7 @@ pub struct App {
     counted: (u64, Instant),
     /// Pictures of the window since then.
     shown: u32,
+    forces: ForceCurves,
     /// How solvers converge in a step of the first simulation.
     curves: Vec<Curve>,
     /// What is being saved: where, and of what.
@@ -97,19 +114,24 @@ impl App {
         let mut app = Self {
             engine,
             viewport: Viewport::new(Gpu::new(render_state)),
-            holds: Holds::default(),
+            hands: Hands::default(),
+            tray: viscera_stage::tray()?,
+            controller: Controller::open(),
+            controlled: Instant::now(),
             clock: Clock::default(),
             setup: None,
             snapshot: None,
             devices: Vec::new(),
             fields: Fields::default(),
             recorder: None,
+            recorded_run: None,
             pictures: options.pictures,
             farewell: options.farewell,
             help_open: false,
             was_typing: false,
             counted: (0, Instant::now()),
             shown: 0,
+            forces: ForceCurves::default(),
             curves: Vec::new(),
             saving: Vec::new(),
             session,
@@ -151,7 +173,22 @@ impl App {
 
     /// What is held.
     pub fn holds(&self) -> &Holds {
-        &self.holds
+        &self.hands.holds
+    }
+
+    /// Instruments in hands.
+    pub fn instruments(&self) -> &Instruments {
+        &self.hands.instruments
+    }
+
+    /// Where in the window the first picture shows a point [m]; nothing where it is behind the viewer.
+    pub fn place(&self, point: Vec3<f64>) -> Option<egui::Pos2> {
+        self.viewport.lens()?.place(point)
+    }
+
+    /// Forces over the last seconds.
+    pub fn forces(&self) -> &ForceCurves {
+        &self.forces
     }
 
     /// What the window has to say.
@@ -173,6 +210,7 @@ impl App {
         self.shown += 1;
         self.hear();
         self.take_snapshot();
+        self.steer(&context);
         let coloring = self.preferences.coloring;
         let variants = self.preferences.ticked_variants();
         let mut actions: Vec<Action> =
@@ -180,7 +218,7 @@ impl App {
         self.show_panels(ui, &mut actions);
         let central = CentralPanel::no_frame().show(ui, |ui| {
             let snapshot = self.snapshot.as_deref();
-            self.viewport.show(ui, snapshot, &mut self.holds, &self.preferences)
+            self.viewport.show(ui, snapshot, &mut self.hands, &self.preferences)
         });
         let (commands, failed) = central.inner;
         self.send(commands);
@@ -188,7 +226,7 @@ impl App {
             self.messages.warn(error);
         }
         self.messages.show(&context, central.response.rect, &mut actions);
-        help::show(&context, &mut self.help_open);
+        help::show(&context, &mut self.help_open, &self.controller);
         if self.preferences.coloring != coloring {
             self.engine.send(Command::Color(self.preferences.coloring));
         }
@@ -208,7 +246,7 @@ impl App {
     fn show_panels(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
         Panel::top("bar").show(ui, |ui| {
             ui.add_space(3.0);
-            let recording = self.recorder.is_some();
+            let recording = [self.recorder.is_some(), self.recorded_run.is_some()];
             let preferences = &mut self.preferences;
             panels::time::show_bar(ui, &self.clock, &self.session, recording, preferences, actions);
             ui.add_space(3.0);
@@ -236,9 +274,14 @@ impl App {
             });
         }
         if self.preferences.curve_open {
-            Panel::bottom("curve").resizable(true).default_size(130.0).show(ui, |ui| {
+            Panel::bottom("curve").resizable(true).default_size(150.0).show(ui, |ui| {
                 let now = self.snapshot.as_ref().map_or(0.0, |snapshot| snapshot.time);
-                panels::forces::show(ui, &self.holds, now, self.session.is_comparison());
+                if let Some(run) = self.snapshot.as_ref().and_then(|all| all.runs.first())
+                    && !run.tools.is_empty()
+                {
+                    panels::forces::show_ledger(ui, &run.ledger);
+                }
+                panels::forces::show(ui, &self.forces, now, self.session.is_comparison());
             });
         }
     }
@@ -247,7 +290,16 @@ impl App {
         let setup = self.setup.as_deref();
         let (fields, preferences) = (&mut self.fields, &mut self.preferences);
         panels::scene::show(ui, &self.session, setup, fields, preferences, actions);
-        panels::view::show_grip(ui, &mut self.preferences, &self.holds, actions);
+        let run = self.snapshot.as_ref().and_then(|snapshot| snapshot.runs.first());
+        let instruments = &self.hands.instruments;
+        panels::instruments::show(ui, &self.tray, instruments, run, &self.controller, actions);
+        panels::view::show_grip(
+            ui,
+            &mut self.preferences,
+            &self.hands.holds,
+            &self.forces,
+            actions,
+        );
         panels::view::show(ui, &mut self.preferences, actions);
         panels::material::show(ui, self.session.scene(Side::First), actions);
         let sides: &[(&str, Side)] = match self.session.is_comparison() {
@@ -258,80 +310,6 @@ impl App {
             let solver = &self.session.scene(*side).solver;
             let device = self.devices.get(number).map(String::as_str);
             panels::solver::show(ui, title, *side, solver, device, actions);
-        }
-    }
-
-    /// What the simulation's thread has sent.
-    fn hear(&mut self) {
-        for event in self.engine.hear() {
-            match event {
-                Event::Busy(text) => {
-                    self.messages.failure = None;
-                    self.messages.expect = None;
-                    self.messages.busy = Some(text);
-                }
-                Event::Expect(text) => {
-                    self.messages.busy = None;
-                    self.messages.expect = Some(text);
-                }
-                Event::Ready(setup) => {
-                    self.messages.busy = None;
-                    self.messages.failure = None;
-                    let late = self.holds.clear();
-                    self.send(late);
-                    self.curves.clear();
-                    if let Err(error) = self.viewport.enter(&setup) {
-                        self.messages.warn(error);
-                    }
-                    for note in &setup.assembly.notes {
-                        self.messages.tell(note.clone());
-                    }
-                    self.setup = Some(setup);
-                }
-                Event::Accompanied(setup) => {
-                    self.messages.busy = None;
-                    if let Err(error) = self.viewport.enter(&setup) {
-                        self.messages.warn(error);
-                    }
-                    self.setup = Some(setup);
-                }
-                Event::Devices(devices) => self.devices = devices,
-                Event::Refused(text) => self.messages.warn(text),
-                Event::Done { path, text, time } => self.write_scene(&path, &text, time),
-                Event::Kept { run, key, value } => self.session.keep(run, &key, &value),
-                Event::Alone(text) => {
-                    self.messages.busy = None;
-                    self.messages.warn(text);
-                    self.session.stay_alone();
-                }
-                Event::Curves(curves) => self.curves = curves,
-                Event::Failed(failure) => {
-                    self.messages.busy = None;
-                    self.clock.playing = false;
-                    self.messages.failure = Some(failure);
-                }
-            }
-        }
-    }
-
-    fn take_snapshot(&mut self) {
-        if !self.engine.newest(&mut self.snapshot) {
-            return;
-        }
-        let Some(snapshot) = &self.snapshot else { return };
-        if let Err(error) = self.viewport.place(snapshot) {
-            self.messages.warn(error);
-        }
-        self.holds.note(snapshot);
-        let (number, since) = self.counted;
-        let elapsed = since.elapsed().as_secs_f64();
-        if snapshot.number < number {
-            self.counted = (snapshot.number, Instant::now());
-            self.shown = 0;
-        } else if elapsed > 0.5 {
-            self.clock.rate = (snapshot.number - number) as f64 / elapsed;
-            self.clock.drawn = f64::from(std::mem::take(&mut self.shown)) / elapsed;
-            self.counted = (snapshot.number, Instant::now());
         }
     }
 
@@ -364,9 +342,13 @@ impl App {
             }
             Action::Warn(text) => self.messages.warn(text),
             Action::LetGo(hold) => {
-                let command = self.holds.let_go(hold);
+                let command = self.hands.holds.let_go(hold);
                 self.send(command);
             }
+            of_instruments @ (Action::Activate(_)
+            | Action::OpenJaws(..)
+            | Action::Lock(_)
+            | Action::PutAway(_)) => self.act_on_instruments(&of_instruments),
             Action::Open(path) => self.open(&path),
             Action::SaveAs(path) => self.save_as(&path),
             Action::Proceed => {
@@ -426,15 +408,17 @@ impl App {
             }
             Request::Screenshot => self.take_picture(),
             Request::Record => self.toggle_recording(),
+            Request::RecordRun => self.toggle_run_recording(),
             Request::FitView => self.viewport.fit_view(),
             Request::LetGo => {
-                let held: Vec<_> = self.holds.list().iter().map(|held| held.id).collect();
+                let held: Vec<_> = self.hands.holds.list().iter().map(|held| held.id).collect();
                 for hold in held {
-                    let command = self.holds.let_go(hold);
+                    let command = self.hands.holds.let_go(hold);
                     self.send(command);
                 }
             }
             Request::Help => self.help_open = !self.help_open,
+            of_instruments => self.ask_instruments(of_instruments),
         }
     }
 

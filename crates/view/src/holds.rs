@@ -1,11 +1,10 @@
-//! What a person holds: points of the tissue, where they are pulled to, and with what force.
+//! What a person holds: points of the tissue, and where they are pulled to.
 
-use std::collections::VecDeque;
 use viscera::scalar::Vec3;
 
 use viscera_stage::{HoldId, Pick};
 
-use crate::engine::{Command, Snapshot};
+use crate::engine::Command;
 
 /// How one takes hold.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -27,9 +26,6 @@ impl Default for Grip {
     }
 }
 
-/// How much of the past a curve shows [s].
-pub const REMEMBERED: f64 = 8.0;
-
 /// One point that is held.
 #[derive(Debug)]
 pub struct Held {
@@ -39,8 +35,6 @@ pub struct Held {
     pub taken: Vec3<f64>,
     /// How far it is led from there [m].
     pub translation: Vec3<f64>,
-    /// Times [s] and forces [N] of the first and the second simulation.
-    pub curve: VecDeque<(f64, [f64; 2])>,
 }
 
 /// Everything held.
@@ -77,12 +71,7 @@ impl Holds {
         self.taken_so_far += 1;
         let id = self.taken_so_far;
         self.drag = Some(Drag { hold: id, plane: pick.point, origin: Some(pick.point) });
-        self.list.push(Held {
-            id,
-            taken: pick.point,
-            translation: Vec3::ZERO,
-            curve: VecDeque::new(),
-        });
+        self.list.push(Held { id, taken: pick.point, translation: Vec3::ZERO });
         let stiffness = (!grip.rigid).then_some(grip.stiffness);
         Command::Take { hold: id, body: pick.body, rest: pick.rest, count: grip.count, stiffness }
     }
@@ -127,33 +116,6 @@ impl Holds {
         self.drag = None;
         self.list.drain(..).map(|held| Command::LetGo(held.id)).collect()
     }
-
-    /// Notes the forces of a snapshot.
-    pub fn note(&mut self, snapshot: &Snapshot) {
-        for held in &mut self.list {
-            let mut forces = [f64::NAN; 2];
-            for (force, run) in forces.iter_mut().zip(&snapshot.runs) {
-                if let Some(hold) = run.held.iter().find(|hold| hold.id == held.id) {
-                    *force = hold.force.length();
-                }
-            }
-            if forces[0].is_nan() {
-                continue;
-            }
-            // After a reset time begins anew; a snapshot may come again.
-            match held.curve.back() {
-                Some(&(time, _)) if time > snapshot.time => held.curve.clear(),
-                Some(&(time, _)) if time == snapshot.time => {
-                    held.curve.pop_back();
-                }
-                _ => {}
-            }
-            held.curve.push_back((snapshot.time, forces));
-            while held.curve.front().is_some_and(|&(time, _)| time < snapshot.time - REMEMBERED) {
-                held.curve.pop_front();
-            }
-        }
-    }
 }
 
 #[cfg(test)]
@@ -182,33 +144,5 @@ mod tests {
         assert!(matches!(led, Some(Command::Lead(1, moved)) if moved == vec3(0.0, 0.25, 1.0)));
         assert!(matches!(holds.release(false), Some(Command::LetGo(1))));
         assert!(holds.list().is_empty() && holds.lead(Vec3::ZERO).is_none());
-    }
-
-    #[test]
-    fn a_curve_forgets_what_is_long_past_and_what_a_reset_has_undone() {
-        let mut holds = Holds::default();
-        holds.take(&pick(), &Grip::default());
-        let at = |time: f64| {
-            let hold = viscera_stage::HeldPatch {
-                id: 1,
-                place: Vec3::ZERO,
-                target: Vec3::ZERO,
-                force: vec3(0.0, 3.0, 4.0),
-            };
-            let run = viscera_stage::RunSnapshot { held: vec![hold], ..Default::default() };
-            Snapshot { time, runs: vec![run], ..Snapshot::default() }
-        };
-        for time in [1.0, 2.0, 1.5 + REMEMBERED] {
-            holds.note(&at(time));
-        }
-        let times = |holds: &Holds| -> Vec<f64> {
-            holds.list()[0].curve.iter().map(|(time, _)| *time).collect()
-        };
-        assert_eq!(times(&holds), [2.0, 1.5 + REMEMBERED]);
-        assert_eq!(holds.list()[0].curve[0].1[0], 5.0);
-        holds.note(&at(1.5 + REMEMBERED));
-        assert_eq!(times(&holds), [2.0, 1.5 + REMEMBERED]);
-        holds.note(&at(0.0));
-        assert_eq!(times(&holds), [0.0]);
     }
 }

@@ -8,6 +8,8 @@
 //! | the window's state, and what happens to it | [`App`] |
 //! | the simulation on its own thread | [`engine`] |
 //! | looking, pressing, pulling | [`viewport`] |
+//! | instruments in hands: keys, controller | [`hands`], [`steering`], [`controller`] |
+//! | forces over time | [`curves`] |
 //! | what is chosen, undo | [`choices`], [`session`] |
 //! | the panels | [`panels`] |
 //! | one step by several solvers | [`probe`] |
@@ -15,8 +17,11 @@
 pub mod app;
 pub mod capture;
 pub mod choices;
+pub mod controller;
+pub mod curves;
 pub mod document;
 pub mod engine;
+pub mod hands;
 pub mod help;
 pub mod holds;
 pub mod messages;
@@ -25,6 +30,7 @@ pub mod preferences;
 pub mod probe;
 pub mod save;
 pub mod session;
+pub mod steering;
 pub mod viewport;
 pub mod window;
 

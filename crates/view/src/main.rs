@@ -9,7 +9,7 @@ use viscera_view::{FIRST_SCENE, Options, window};
 
 /// Pull on tissue and see it answer.
 ///
-/// Press on the tissue and drag: a spring pulls it, its force is written beside the arrow. Material and
+/// Press on the tissue and drag: a spring pulls it, its force is written beside the arrow. Instruments lie on a tray. Material and
 /// solver can be changed while the tissue moves; F1 shows what keys and mouse do. "Save scene" writes a
 /// scene file that `viscera run` takes.
 #[derive(Parser)]

@@ -72,6 +72,13 @@ export interface Report {
   inverted: number;
   /** What the scene itself moves or pulls, with its force on the tissue [N], measured ten times a second. */
   patches: { name: string; force: Vector }[];
+  /**
+   * The scene's tools: working end [m], force on the tissue and what it may be off by [N], size of the torque about the working
+   * end [N m].
+   */
+  tools: { name: string; place: Vector; force: Vector; error: number | null; torque: number; touches: number }[];
+  /** Work of tools on the tissue and stored energy [J]; null where there are no tools. */
+  ledger: { work: number; surplus: number; stored: number; mostStored: number } | null;
 }
 
 /** A scene in motion. */

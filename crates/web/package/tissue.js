@@ -188,8 +188,8 @@ export class Tissue {
 
   report() {
     const { time, runs } = JSON.parse(this.#open().report());
-    const { device, method, substeps, iterations, residual, inverted, patches } = runs[0];
-    return { time, device, method, substeps, iterations, residual, inverted, patches };
+    const { device, method, substeps, iterations, residual, inverted, patches, tools, ledger } = runs[0];
+    return { time, device, method, substeps, iterations, residual, inverted, patches, tools, ledger };
   }
 
   save() {

@@ -270,6 +270,8 @@ export class Engine {
     const drawn = (this.#drawn - this.#reported.drawn) / seconds;
     this.#reported = { at: now, frames: this.#frames, drawn: this.#drawn };
     const report = JSON.parse(this.session.report());
+    const told = this.session.told();
+    if (told !== undefined) this.#say({ about: "warn", text: told });
     this.#say({
       about: "report",
       report,
@@ -278,6 +280,7 @@ export class Engine {
       clock: { playing: this.playing, stopped: this.#stopped, rate, drawn, frames: this.#frames },
       screen: { scale: this.screen.scale, size: this.screen.size, plain: this.screen.isPlain },
       pull: this.hands.held,
+      tools: { tray: JSON.parse(this.session.tray()), inHand: JSON.parse(this.session.inHand()), drag: this.hands.drag },
       tags: this.hands.tags(report),
       choosing: this.#trial !== null,
     });

@@ -4,6 +4,8 @@
  *
  * One finger (or the left button) on tissue pulls, beside it turns the view. Two fingers turn and zoom, three move the view.
  * The right and the middle button, and Shift, move it. A second finger in the middle of a pull ends the pull.
+ *
+ * With an instrument in hand one finger leads it wherever the finger is; the mouse does where it presses on one.
  */
 
 /**
@@ -11,6 +13,8 @@
  * @property {(id: number, x: number, y: number) => boolean} grab takes hold; false where there is nothing
  * @property {(id: number, x: number, y: number) => void} lead
  * @property {(id: number, keep: boolean) => void} release
+ * @property {(x: number, y: number, anywhere: boolean) => boolean} press takes an instrument up; false where the pointer leads none
+ * @property {(from: {x: number, y: number}, to: {x: number, y: number}) => void} drag leads it
  * @property {(dx: number, dy: number) => void} orbit
  * @property {(dx: number, dy: number) => void} pan
  * @property {(factor: number) => void} zoom above 1: nearer
@@ -22,8 +26,9 @@
  * @property {number} y
  * @property {number} [button] 0 left, 1 middle, 2 right
  * @property {boolean} [shift]
+ * @property {boolean} [touch] whether it is a finger
  */
-/** @typedef {"idle" | "pull" | "orbit" | "pan" | "fingers"} Mode */
+/** @typedef {"idle" | "pull" | "lead" | "orbit" | "pan" | "fingers"} Mode */
 
 export class Gestures {
   /** @type {Actions} */
@@ -67,6 +72,8 @@ export class Gestures {
       this.#mode = "fingers";
     } else if ((pointer.button ?? 0) !== 0 || pointer.shift) {
       this.#mode = "pan";
+    } else if (this.#act.press(x, y, pointer.touch === true)) {
+      this.#mode = "lead";
     } else {
       const hold = this.number();
       this.#mode = this.#act.grab(hold, x, y) ? "pull" : "orbit";
@@ -83,6 +90,7 @@ export class Gestures {
     const spread = this.#spread();
     this.#down.set(pointer.id, { x: pointer.x, y: pointer.y });
     if (this.#mode === "pull") this.#act.lead(this.#hold, pointer.x, pointer.y);
+    else if (this.#mode === "lead") this.#act.drag(before, pointer);
     else if (this.#mode === "orbit") this.#act.orbit(dx, dy);
     else if (this.#mode === "pan") this.#act.pan(dx, dy);
     else if (this.#mode === "fingers") this.#fingers(dx, dy, spread);

@@ -5,6 +5,8 @@ import { Gestures } from "./gestures.js";
 /** @typedef {import("./viscera.js").Session} Session */
 /** @typedef {import("./screen.js").Screen} Screen */
 
+/** What a wheel leads an instrument by, as a drag [CSS pixels]: ten lines of it half the size of things. */
+const WHEEL = 400;
 /** Turning by one press of a key [CSS pixels]; pulling by a third of it. */
 const KEY_STEP = 24;
 
@@ -34,10 +36,25 @@ export class Hands {
       grab: (id, x, y) => session.grab(id, this.#pixels(x), this.#pixels(y)),
       lead: (id, x, y) => session.lead(id, this.#pixels(x), this.#pixels(y)),
       release: (id, keep) => this.#release(id, keep),
+      press: (x, y, anywhere) => session.pressTool(this.#pixels(x), this.#pixels(y), anywhere),
+      drag: (from, to) => this.#drag(from, to),
       orbit: (dx, dy) => session.orbit(this.#pixels(dx), this.#pixels(dy)),
       pan: (dx, dy) => session.pan(this.#pixels(dx), this.#pixels(dy)),
       zoom: (factor) => this.zoom(factor),
     });
+  }
+
+  /** What a drag does to an instrument: "across", "depth", "tilt" or "roll". */
+  drag = "across";
+
+  /**
+   * @param {{x: number, y: number}} from
+   * @param {{x: number, y: number}} to
+   * @param {string} [drag]
+   */
+  #drag(from, to, drag = this.drag) {
+    const [x0, y0, x1, y1] = [from.x, from.y, to.x, to.y].map((length) => this.#pixels(length));
+    this.#session.dragTool(x0, y0, x1, y1, drag);
   }
 
   /** Fingers count in CSS pixels: those of the picture may change in the middle of a gesture. @param {number} length */
@@ -52,21 +69,31 @@ export class Hands {
   }
 
   /**
-   * Where what is held is led to, in each picture [CSS pixels].
+   * Where what is held is led to, and where tools touch, in each picture [CSS pixels].
    *
-   * @param {{runs: {held: {id: number, target: number[]}[]}[]}} report
+   * @param {{runs: {held: {id: number, target: number[]}[], tools: {place: number[], touches: number}[]}[]}} report
    */
   tags(report) {
-    return report.runs.flatMap(({ held }, run) => held.flatMap(({ id, target: [x, y, z] }) => {
+    const seen = (/** @type {number} */ run, /** @type {number[]} */ [x, y, z], /** @type {{id: number, tool: number}} */ of) => {
       const place = this.#session.seen(run, x, y, z);
       if (place.length < 2) return [];
-      return [{ id, run, x: place[0] / this.#screen.scale, y: place[1] / this.#screen.scale }];
-    }));
+      return [{ ...of, run, x: place[0] / this.#screen.scale, y: place[1] / this.#screen.scale }];
+    };
+    return report.runs.flatMap(({ held, tools }, run) => [
+      ...held.flatMap(({ id, target }) => seen(run, target, { id, tool: -1 })),
+      ...tools.flatMap(({ place, touches }, tool) => (touches > 0 ? seen(run, place, { id: 0, tool }) : [])),
+    ]);
   }
 
-  /** @param {number} factor above 1: nearer */
+  /** Whether an instrument is in hand. */
+  get hasTool() {
+    return JSON.parse(this.#session.inHand()).length > 0;
+  }
+
+  /** The wheel: nearer and farther, or an instrument that is being led in depth. @param {number} factor above 1: nearer */
   zoom(factor) {
-    this.#session.zoom(1 / factor);
+    if (this.gestures.mode !== "lead") this.#session.zoom(1 / factor);
+    else this.#drag({ x: 0, y: 0 }, { x: 0, y: WHEEL * Math.log(factor) }, "depth");
   }
 
   /** Nothing is held any more: the scene begins anew. */
@@ -120,7 +147,7 @@ export class Hands {
   }
 
   /**
-   * An arrow key: pulls what the keyboard holds, else turns or moves the view.
+   * An arrow key: pulls what the keyboard holds, leads the instrument in hand, else turns or moves the view.
    *
    * @param {number} dx -1, 0, 1
    * @param {number} dy
@@ -133,6 +160,10 @@ export class Hands {
       key.x += (dx * KEY_STEP) / 3;
       key.y += (dy * KEY_STEP) / 3;
       this.#session.lead(key.id, this.#pixels(key.x), this.#pixels(key.y));
+    } else if (this.hasTool) {
+      const middle = { x: this.#screen.size[0] / this.#screen.scale / 2, y: this.#screen.size[1] / this.#screen.scale / 2 };
+      const to = { x: middle.x + (dx * KEY_STEP) / 3, y: middle.y + (dy * KEY_STEP) / 3 };
+      this.#drag(middle, to, pan ? "tilt" : this.drag);
     } else if (pan) this.#session.pan(dx * step, dy * step);
     else this.#session.orbit(dx * step, dy * step);
   }

@@ -49,7 +49,7 @@ export class Input {
     const area = this.#frame.getBoundingClientRect();
     const [x, y] = [event.clientX - area.left, event.clientY - area.top];
     this.place = { x, y, touch: event.pointerType === "touch" };
-    return { pointer: event.pointerId, x, y, button: event.button, shift: event.shiftKey, keep: this.keep };
+    return { pointer: event.pointerId, x, y, button: event.button, shift: event.shiftKey, touch: event.pointerType === "touch", keep: this.keep };
   }
 
   /** @param {PointerEvent} event */

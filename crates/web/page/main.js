@@ -10,6 +10,7 @@ import { Host } from "./host.js";
 import { Input, onKeys } from "./input.js";
 import { Messages, byId, make } from "./messages.js";
 import { save, share } from "./share.js";
+import { Tray } from "./tray.js";
 import { View } from "./view.js";
 
 const messages = new Messages();
@@ -33,6 +34,7 @@ const controls = new Controls(byId("panel"), {
 });
 const view = new View(controls, (hold) => host.send("letGo", { hold }));
 const input = new Input(host);
+const tray = new Tray(host);
 const hook = offerHook(host, app, messages);
 let playing = true;
 /** @type {any} */
@@ -53,6 +55,7 @@ function hear(word) {
       playing = word.clock.playing;
       byId("loading").hidden = app.loaded !== null;
       view.show(/** @type {any} */ (word), input.place);
+      tray.show(word.tools);
       hook.report(word);
       break;
     case "chosen":
@@ -220,6 +223,9 @@ onKeys({
   r: reset,
   f: () => host.send("home"),
   Escape: () => host.send("letGo"),
+  x: () => host.send("lockJaws"),
+  n: () => host.send("activateTool"),
+  Delete: () => host.send("putAway"),
   "?": showHelp,
   F1: showHelp,
 });

@@ -13,6 +13,7 @@ const FONT = "12px system-ui, sans-serif";
  * @property {number} color which of the page's colours
  * @property {boolean} dashed
  * @property {number} value
+ * @property {number | null} [error] what the value may be off by, drawn as a band
  */
 
 /** @typedef {{marks: number[], share: (value: number) => number, text: (value: number) => string}} Axis */
@@ -155,6 +156,32 @@ export class Plot {
   }
 
   /**
+   * From the value less its error to the value and its error, where errors are known.
+   *
+   * @param {CanvasRenderingContext2D} context
+   * @param {string} name
+   * @param {string[]} colors
+   * @param {(time: number) => number} x
+   * @param {(value: number) => number} y
+   */
+  #band(context, name, colors, x, y) {
+    const known = this.#samples.flatMap(({ time, curves }) => {
+      const curve = curves.find((curve) => curve.name === name);
+      const error = curve?.error ?? NaN;
+      return curve && Number.isFinite(curve.value + error) ? [{ time, value: curve.value, error, color: curve.color }] : [];
+    });
+    if (known.length < 2) return;
+    context.beginPath();
+    for (const { time, value, error } of known) context.lineTo(x(time), y(value + error));
+    for (const { time, value, error } of known.reverse()) context.lineTo(x(time), y(Math.max(0, value - error)));
+    context.closePath();
+    context.globalAlpha = 0.25;
+    context.fillStyle = colors[known[0].color % colors.length];
+    context.fill();
+    context.globalAlpha = 1;
+  }
+
+  /**
    * @param {CanvasRenderingContext2D} context
    * @param {string} name
    * @param {string[]} colors
@@ -162,6 +189,7 @@ export class Plot {
    * @param {(value: number) => number} y
    */
   #curve(context, name, colors, x, y) {
+    this.#band(context, name, colors, x, y);
     context.beginPath();
     let isOpen = false;
     for (const { time, curves } of this.#samples) {

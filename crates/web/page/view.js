@@ -6,6 +6,18 @@ import { byId, button, make } from "./messages.js";
 /** @typedef {import("./plots.js").Curve} Curve */
 /** @typedef {[number, number, number]} Vector */
 /**
+ * @typedef {object} Tool
+ * @property {string} name
+ * @property {Vector} place
+ * @property {Vector} force
+ * @property {number | null} error
+ * @property {number} torque
+ * @property {number} touches
+ * @property {number | null} jawAngle
+ * @property {boolean} isLocked
+ * @property {boolean} hasJumped
+ */
+/**
  * @typedef {object} Run
  * @property {string} device
  * @property {string | null} warning
@@ -19,6 +31,8 @@ import { byId, button, make } from "./messages.js";
  * @property {number} inverted
  * @property {{id: number, place: Vector, target: Vector, force: Vector}[]} held
  * @property {{name: string, force: Vector}[]} patches
+ * @property {Tool[]} tools
+ * @property {{work: number, surplus: number, stored: number, mostStored: number} | null} ledger
  */
 /**
  * @typedef {object} Report
@@ -28,7 +42,7 @@ import { byId, button, make } from "./messages.js";
  * @property {{playing: boolean, stopped: boolean, rate: number, drawn: number, frames: number}} clock
  * @property {{scale: number, size: [number, number], plain: boolean}} screen
  * @property {{hold: number, key: {x: number, y: number} | null, kept: number[]}} pull
- * @property {{id: number, run: number, x: number, y: number}[]} tags
+ * @property {{id: number, tool: number, run: number, x: number, y: number}[]} tags `tool`: its number, or -1 for a hold
  * @property {boolean} choosing
  */
 
@@ -41,12 +55,33 @@ const NEAR = 160;
 /** Colours of curves: a point that a hand pulls has that of its arrow; a patch keeps its own, whatever else is pulled. */
 const POINTS = [0, 3, 2, 1];
 const PATCHES = [1, 2, 3];
+const TOOLS = [0, 1, 2, 3];
 
 /** A force as it is written everywhere: "1.25 N". @param {number} force */
 export function newtons(force) {
   if (!Number.isFinite(force)) return "…";
   if (force < 0.1) return `${(1e3 * force).toFixed(1)} mN`;
   return force < 100 ? `${force.toFixed(2)} N` : `${force.toFixed(0)} N`;
+}
+
+/**
+ * A force with what it may be off by, rounded up: "1.25 ± 0.03 N".
+ *
+ * @param {number} force
+ * @param {number | null} error
+ */
+export function newtonsWithin(force, error) {
+  if (error === null || !Number.isFinite(error) || !Number.isFinite(force)) return newtons(force);
+  const large = Math.max(force, error);
+  const [factor, digits, unit] = large < 0.1 ? [1e3, 1, "mN"] : large < 100 ? [1, 2, "N"] : [1, 0, "N"];
+  const up = Math.ceil(factor * error * 10 ** digits - 1e-9) / 10 ** digits;
+  return `${(factor * force).toFixed(digits)} ± ${up.toFixed(digits)} ${unit}`;
+}
+
+/** An energy with three digits. @param {number} energy [J] */
+export function joules(energy) {
+  const [factor, unit] = [[1, "J"], [1e3, "mJ"], [1e6, "µJ"], [1e9, "nJ"]].find(([factor]) => Math.abs(energy) * Number(factor) >= 1) ?? [1, "J"];
+  return `${Number((energy * Number(factor)).toPrecision(3))} ${unit}`;
 }
 
 /** @param {Vector} vector */
@@ -116,6 +151,12 @@ export class View {
         ...run.held.map((held, number) => ({ name: `point ${number + 1}`, force: held.force, color: POINTS[number % POINTS.length] })),
         ...run.patches.map((patch, number) => ({ ...patch, color: PATCHES[number % PATCHES.length] })),
       ];
+      // Their curves stay at zero where they touch nothing: one sees when a touch began and ended.
+      run.tools.forEach(({ name, force, error, torque }, number) => {
+        const color = TOOLS[number % TOOLS.length];
+        curves.push({ name: name + suffix, color, dashed: side === 1, value: size(force), error: side === 0 ? error : null });
+        lines.push([name + suffix, `${newtonsWithin(size(force), error)}, ${(1e3 * torque).toFixed(1)} N mm`]);
+      });
       forces.filter(({ force }) => size(force) > 0).forEach(({ name, force, color }) => {
         const value = size(force);
         curves.push({ name: name + suffix, color, dashed: side === 1, value });
@@ -128,6 +169,11 @@ export class View {
       const cost = costs[side];
       lines.push([`frame${suffix}`, `${milliseconds(cost)} of ${(1e3 * this.frame).toFixed(1)} ms`]);
       lines.push([`residual${suffix}`, scientific(run.residual)]);
+      if (run.ledger) {
+        const { work, stored, mostStored, surplus } = run.ledger;
+        lines.push([`work of tools${suffix}`, joules(work)], [`stored energy${suffix}`, `${joules(stored)}, at most ${joules(mostStored)}`]);
+        lines.push([`surplus${suffix}`, joules(surplus)]);
+      }
       if (run.inverted > 0) lines.push([`inverted tetrahedra${suffix}`, String(run.inverted)]);
       if (run.rejected > 0) lines.push([`rejected substeps${suffix}`, String(run.rejected)]);
     });
@@ -191,11 +237,12 @@ export class View {
     this.#finger = null;
     tags.forEach((tag, at) => {
       const element = /** @type {HTMLElement} */ (this.#tags.children[at]);
-      const held = report.runs[tag.run]?.held.find((held) => held.id === tag.id);
-      element.id = tag.id === pull.hold && tag.run === 0 ? "tag" : "";
-      element.textContent = held ? newtons(size(held.force)) : "";
+      const run = report.runs[tag.run];
+      const [held, tool] = [run?.held.find((held) => held.id === tag.id), run?.tools[tag.tool]];
+      element.id = held && tag.id === pull.hold && tag.run === 0 ? "tag" : "";
+      element.textContent = tool ? `${tool.name} ${newtonsWithin(size(tool.force), tool.error)}` : held ? newtons(size(held.force)) : "";
       // What the finger holds follows it at once, in the picture that the finger is in.
-      const isFinger = tag.id === pull.hold && !pull.key && Math.hypot(tag.x - place.x, tag.y - place.y) < NEAR;
+      const isFinger = held !== undefined && tag.id === pull.hold && !pull.key && Math.hypot(tag.x - place.x, tag.y - place.y) < NEAR;
       if (isFinger) this.#finger = element;
       this.#placeTag(element, isFinger ? place : { ...tag, touch: false });
     });

@@ -206,6 +206,19 @@ function obey(engine, order) {
       return session.grip(order.count, order.stiffness, order.rigid);
     case "letGo":
       return hands.letGo(order.hold);
+    case "takeTool":
+      return session.takeTool(order.number);
+    case "activateTool":
+      return session.activateTool(order.hand);
+    case "drag":
+      hands.drag = order.kind;
+      return;
+    case "jaws":
+      return session.openJaws(order.by);
+    case "lockJaws":
+      return session.lockJaws();
+    case "putAway":
+      return session.putAway();
     case "lose":
       return session.loseDevice();
     case "replay":
@@ -236,7 +249,7 @@ function obey(engine, order) {
 function look(engine, order) {
   const { session, hands, screen } = engine;
   const { gestures } = hands;
-  const pointer = { id: order.pointer, x: order.x, y: order.y, button: order.button, shift: order.shift };
+  const pointer = { id: order.pointer, x: order.x, y: order.y, button: order.button, shift: order.shift, touch: order.touch };
   switch (order.do) {
     case "down":
       return gestures.down(pointer);

@@ -8,6 +8,8 @@ use viscera::scalar::vec3;
 use wasm_bindgen::prelude::*;
 use web_sys::OffscreenCanvas;
 
+use viscera_stage::Drag;
+
 use crate::screen::{Screen, open_device};
 use crate::session::{Grip, MOST_FILE_BYTES, MOST_TETS};
 use crate::{LoadRequest, catalog, choose as choosing, session};
@@ -271,6 +273,80 @@ impl Session {
     #[wasm_bindgen(js_name = leadBy)]
     pub fn lead_by(&mut self, id: u32, dx: f64, dy: f64, dz: f64) -> Result<(), JsError> {
         self.session.lead_by(id.into(), vec3(dx, dy, dz)).map_err(error)
+    }
+
+    /// The names of the instruments on the tray.
+    pub fn tray(&self) -> Result<String, JsError> {
+        json(&self.session.tray())
+    }
+
+    /// Instruments in hands.
+    #[wasm_bindgen(js_name = inHand)]
+    pub fn in_hand(&self) -> Result<String, JsError> {
+        json(&self.session.in_hand())
+    }
+
+    /// What a person should know of instruments since this was last asked.
+    pub fn told(&mut self) -> Option<String> {
+        self.session.told()
+    }
+
+    /// Takes the instrument of this number from the tray.
+    #[wasm_bindgen(js_name = takeTool)]
+    pub fn take_tool(&mut self, number: usize) -> Result<(), JsError> {
+        self.session.take_tool(number).map_err(error)
+    }
+
+    /// Whether a pointer at a place of the canvas [pixels] leads an instrument.
+    #[wasm_bindgen(js_name = pressTool)]
+    pub fn press_tool(&mut self, x: f64, y: f64, anywhere: bool) -> Result<bool, JsError> {
+        self.session.press_tool([x, y], anywhere).map_err(error)
+    }
+
+    /// Drags the active instrument from one place of the canvas to another [pixels]: "across", "depth", "tilt" or "roll".
+    #[wasm_bindgen(js_name = dragTool)]
+    pub fn drag_tool(
+        &mut self,
+        x0: f64,
+        y0: f64,
+        x1: f64,
+        y1: f64,
+        kind: &str,
+    ) -> Result<(), JsError> {
+        let drag = match kind {
+            "across" => Drag::Across,
+            "depth" => Drag::Depth,
+            "tilt" => Drag::Tilt,
+            "roll" => Drag::Roll,
+            other => {
+                return Err(error(format!("a drag is across, depth, tilt or roll, not `{other}`")));
+            }
+        };
+        self.session.drag_tool([[x0, y0], [x1, y1]], drag).map_err(error)
+    }
+
+    /// Opens the jaws of the active instrument by so much [rad].
+    #[wasm_bindgen(js_name = openJaws)]
+    pub fn open_jaws(&mut self, by: f64) -> Result<(), JsError> {
+        self.session.open_jaws(by).map_err(error)
+    }
+
+    /// Locks its jaws, or unlocks them.
+    #[wasm_bindgen(js_name = lockJaws)]
+    pub fn lock_jaws(&mut self) -> Result<(), JsError> {
+        self.session.lock_jaws().map_err(error)
+    }
+
+    /// Makes the instrument of a hand active, or the next one.
+    #[wasm_bindgen(js_name = activateTool)]
+    pub fn activate_tool(&mut self, hand: Option<u32>) {
+        self.session.activate_tool(hand.map(u64::from));
+    }
+
+    /// Puts the active instrument away.
+    #[wasm_bindgen(js_name = putAway)]
+    pub fn put_away(&mut self) -> Result<(), JsError> {
+        self.session.put_away().map_err(error)
     }
 
     /// Lets go.

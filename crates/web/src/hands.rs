@@ -41,7 +41,7 @@ impl Session {
         self.release(id)?;
         let Grip { count, stiffness } = self.grip;
         let target = GripTarget { body: hit.body, rest: hit.rest, count, stiffness };
-        self.act(Act::Take(id, target))?;
+        self.act(&Act::Take(id, target))?;
         self.hands.push(Hand { id, run, taken: hit.point });
         self.look()
     }
@@ -52,19 +52,19 @@ impl Session {
             return Ok(());
         };
         let way = self.lenses().get(hand.run).and_then(|lens| hand.way_to(lens, place));
-        way.map_or(Ok(()), |way| self.act(Act::Lead(id, way)))
+        way.map_or(Ok(()), |way| self.act(&Act::Lead(id, way)))
     }
 
     /// Leads a hand so far from where it took hold [m].
     pub fn lead_by(&mut self, id: HoldId, way: Vec3<f64>) -> Result<(), String> {
-        self.act(Act::Lead(id, way))
+        self.act(&Act::Lead(id, way))
     }
 
     /// Lets go; nothing happens where there is no such hand.
     pub fn release(&mut self, id: HoldId) -> Result<(), String> {
         let before = self.hands.len();
         self.hands.retain(|hand| hand.id != id);
-        if self.hands.len() == before { Ok(()) } else { self.act(Act::LetGo(id)) }
+        if self.hands.len() == before { Ok(()) } else { self.act(&Act::LetGo(id)) }
     }
 
     /// The force [N] with which a hand pulls at the first simulation.
@@ -73,11 +73,12 @@ impl Session {
         held.filter(|hold| hold.id == id).map(|hold| hold.force).next().unwrap_or_default()
     }
 
-    fn act(&mut self, act: Act) -> Result<(), String> {
+    pub(crate) fn act(&mut self, act: &Act) -> Result<(), String> {
         for state in &mut self.runs {
-            state.waiting.push(act);
+            state.waiting.push(act.clone());
             state.act_out()?;
         }
+        self.drop_refused();
         Ok(())
     }
 }

@@ -22,6 +22,7 @@ mod looking;
 mod pictures;
 mod report;
 mod session;
+mod tools;
 
 #[cfg(target_arch = "wasm32")]
 mod exports;

@@ -33,6 +33,7 @@ impl Session {
         let Some(loaded) = &self.loaded else { return };
         self.orbit = Orbit::framing(loaded.assembly.builder.positions());
         self.extent = 2.0 * self.orbit.distance * HALF_OPENING;
+        self.middle = self.orbit.target;
         let direction = ViewDirection::from_vector(loaded.scene.output.view_from);
         (self.orbit.azimuth, self.orbit.elevation) = (direction.azimuth, direction.elevation);
     }

@@ -1,11 +1,12 @@
 //! Pictures without a device, and what pictures show on either way.
 
+use viscera::contact::Tool;
 use viscera::scalar::Vec3;
 use viscera_picture::{
     Arrow, Background, Camera, Color, Drawing, Image, ImageSize, Markers, Paint, Surface,
     ViewDirection,
 };
-use viscera_stage::{Area, RunSnapshot};
+use viscera_stage::{Area, RunSnapshot, force_arrows};
 
 use crate::session::Session;
 
@@ -53,14 +54,14 @@ impl Session {
         loaded.surfaces(&snapshot.positions, &mut surface);
         let positions: Vec<Vec3<f64>> = surface.iter().map(|x| x.cast()).collect();
         let triangles = loaded.triangles();
-        let scale = self.legend.scale().filter(|_| !snapshot.values.is_empty());
+        let color_scale = self.legend.scale().filter(|_| !snapshot.values.is_empty());
         // The scale counts in its own unit.
-        let factor = match (&scale, self.legend.range()) {
+        let factor = match (&color_scale, self.legend.range()) {
             (Some(scale), Some([_, high])) => scale.range()[1] / f64::from(high),
             _ => 1.0,
         };
         let values: Vec<f64> = snapshot.values.iter().map(|v| factor * f64::from(*v)).collect();
-        let paint = match scale {
+        let paint = match color_scale {
             Some(_) => Paint::Values(values.as_slice()),
             None => Paint::Flat(Color::TISSUE),
         };
@@ -80,14 +81,19 @@ impl Session {
         });
         // Shorter ones are hidden by the point they begin at.
         let is_long = |arrow: &Arrow| (arrow.to - arrow.from).length() > PICKED * self.extent;
+        let tools: Vec<Tool> =
+            snapshot.tools.iter().flat_map(|tool| tool.parts.iter().cloned()).collect();
+        let scale = self.force_scale.metres_per_newton(self.extent);
+        let forces = force_arrows(&snapshot.tools, &lens.orbit, scale, SHAFT * self.extent);
         let drawing = Drawing {
             surfaces: vec![Surface { positions: &positions, triangles: &triangles, paint }],
             markers: vec![
                 balls(&fixed, FIXED, Color::FIXED),
                 balls(&picked, PICKED, Color::PULLED),
             ],
-            arrows: arrows.filter(is_long).collect(),
-            color_scale: scale,
+            tools: &tools,
+            arrows: arrows.filter(is_long).chain(forces).collect(),
+            color_scale,
             background: background(self.dark),
             ..Drawing::default()
         };

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 use viscera::settings::{Acceleration, Elements, Method, SolverSettings};
-use viscera_stage::{Run, RunSnapshot};
+use viscera::solver::Ledger;
+use viscera_stage::{Run, RunSnapshot, ToolSnapshot};
 
 /// What was loaded.
 #[derive(Debug, Serialize)]
@@ -82,6 +83,10 @@ pub struct RunReport {
     pub held: Vec<HeldReport>,
     /// What the scene itself moves and pulls.
     pub patches: Vec<PatchReport>,
+    /// Tools.
+    pub tools: Vec<ToolReport>,
+    /// What tools have put into the tissue; nothing where there are none.
+    pub ledger: Option<LedgerReport>,
 }
 
 /// A hold.
@@ -104,6 +109,67 @@ pub struct PatchReport {
     pub name: String,
     /// Force on the tissue [N].
     pub force: [f64; 3],
+}
+
+/// A tool, and what it meets.
+#[derive(Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct ToolReport {
+    /// Its name.
+    pub name: String,
+    /// Its working end [m].
+    pub place: [f64; 3],
+    /// Force on the tissue [N].
+    pub force: [f64; 3],
+    /// What the force may be off by [N], where that is known.
+    pub error: Option<f64>,
+    /// The size of the torque about its working end [N m].
+    pub torque: f64,
+    /// Samples of tissue that it presses on.
+    pub touches: u32,
+    /// Opening angle of its jaws [rad], where it has some.
+    pub jaw_angle: Option<f64>,
+    /// Whether what it presses on is tied to it.
+    pub is_locked: bool,
+    /// Whether it was put elsewhere in the frame, further than a tool moves.
+    pub has_jumped: bool,
+}
+
+impl ToolReport {
+    fn new(tool: &ToolSnapshot) -> Self {
+        Self {
+            name: tool.met.name.clone(),
+            place: tool.pose.translation.to_array(),
+            force: tool.met.force.map(|component| -component),
+            error: tool.met.error,
+            torque: tool.torque(),
+            touches: tool.met.touches,
+            jaw_angle: tool.jaw_angle,
+            is_locked: tool.is_locked(),
+            has_jumped: tool.met.has_jumped,
+        }
+    }
+}
+
+/// Work and energy [J].
+#[derive(Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct LedgerReport {
+    /// Work of tools on tissue.
+    pub work: f64,
+    /// Energy that steps have made of nothing.
+    pub surplus: f64,
+    /// Stored now.
+    pub stored: f64,
+    /// The most that was ever stored.
+    pub most_stored: f64,
+}
+
+impl LedgerReport {
+    fn new(ledger: Ledger) -> Self {
+        let Ledger { work, surplus, stored, most_stored } = ledger;
+        Self { work, surplus, stored, most_stored }
+    }
 }
 
 impl RunReport {
@@ -143,6 +209,8 @@ impl RunReport {
             inverted: measures.inverted,
             held: held.collect(),
             patches: patches.collect(),
+            tools: snapshot.tools.iter().map(ToolReport::new).collect(),
+            ledger: (!snapshot.tools.is_empty()).then(|| LedgerReport::new(snapshot.ledger)),
         }
     }
 }

@@ -134,6 +134,9 @@ impl Screen {
             fixed: &fixed,
             picked: &picked,
             targets: &targets,
+            tools: &state.snapshot.tools,
+            in_hand: session.instruments.active().map(|held| held.id),
+            force_scale: session.force_scale.metres_per_newton(session.extent),
             extent: session.extent,
         };
         let mut drawing = contents.drawing();

@@ -2,10 +2,13 @@
 
 use viscera::material::PRESETS;
 use viscera::scalar::Vec3;
-use viscera::scene::{BodyShape, Scene};
+use viscera::scene::{BodyShape, Instrument, Scene};
 use viscera::solver::gpu::Device;
 use viscera_render::Orbit;
-use viscera_stage::{Coloring, GripTarget, HoldId, Legend, Run, RunSnapshot, Settings, build};
+use viscera_stage::{
+    Coloring, ForceScale, GripTarget, HandId, HoldId, Instruments, Legend, Run, RunSnapshot,
+    Settings, ToolAct, build,
+};
 
 use crate::catalog::law_name;
 use crate::holds::Hand;
@@ -35,21 +38,24 @@ impl Default for Grip {
 }
 
 /// Something that a hand does.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) enum Act {
     Take(HoldId, GripTarget),
     Lead(HoldId, Vec3<f64>),
     LetGo(HoldId),
+    Tool(ToolAct),
 }
 
 /// A simulation, what it looks like, and what waits for its frame under way.
 pub(crate) struct RunState {
-    run: Box<dyn Run>,
+    pub(crate) run: Box<dyn Run>,
     pub snapshot: RunSnapshot,
     /// Of the snapshot: each has another number.
     pub moved: u64,
     frame: u64,
     pub(crate) waiting: Vec<Act>,
+    /// Hands that could not take an instrument, and why.
+    pub(crate) refused: Vec<(HandId, String)>,
     /// Whether the next frame is to be measured, the one under way is, and any was.
     measures: [bool; 3],
 }
@@ -63,10 +69,17 @@ pub struct Session {
     pub(crate) grip: Grip,
     pub(crate) coloring: Coloring,
     pub(crate) legend: Legend,
+    pub(crate) force_scale: ForceScale,
     pub(crate) wireframe: bool,
     pub(crate) dark: bool,
     pub(crate) orbit: Orbit,
     pub(crate) extent: f64,
+    /// The middle of things at rest [m].
+    pub(crate) middle: Vec3<f64>,
+    /// Instruments that can be taken, and those that are in hands.
+    pub(crate) tray: Vec<Instrument>,
+    pub(crate) instruments: Instruments,
+    pub(crate) told: Option<String>,
     /// Width and height [pixels].
     pub(crate) size: [u32; 2],
     count: u64,
@@ -85,10 +98,16 @@ impl Session {
             grip: Grip::default(),
             coloring: Coloring::Plain,
             legend: Legend::default(),
+            force_scale: ForceScale::default(),
             wireframe: false,
             dark: false,
             orbit: Orbit::framing(&[]),
             extent: 0.1,
+            middle: Vec3::ZERO,
+            // The tray is part of the program, which tests read.
+            tray: viscera_stage::tray().unwrap_or_default(),
+            instruments: Instruments::default(),
+            told: None,
             size: [640, 480],
             count: 0,
             generation: 0,
@@ -121,6 +140,8 @@ impl Session {
         let known = self.loaded.as_ref().is_some_and(|old| same_place(old, &loaded));
         self.runs = vec![RunState::new(run)];
         self.hands.clear();
+        self.instruments.clear();
+        self.force_scale = ForceScale::default();
         self.generation += 1;
         self.loaded = Some(loaded);
         if !known {
@@ -209,6 +230,8 @@ impl Session {
     /// Begins from rest again, with the settings as they are now.
     pub fn reset(&mut self) -> Result<(), String> {
         self.hands.clear();
+        self.instruments.clear();
+        self.force_scale = ForceScale::default();
         for state in &mut self.runs {
             state.run.reset()?;
             state.waiting.clear();
@@ -300,6 +323,7 @@ impl Session {
             state.measures[2] = true;
         }
         state.act_out()?;
+        self.drop_refused();
         self.look_at(run);
         Ok(true)
     }
@@ -375,6 +399,7 @@ impl Session {
         if let Some(state) = self.runs.get_mut(number) {
             state.run.fill(self.coloring, &mut state.snapshot);
             state.moved = self.count;
+            self.force_scale.follow(&state.snapshot.tools);
         }
         let values = self.runs.iter().flat_map(|state| state.snapshot.values.iter().copied());
         self.legend.follow(self.coloring, values);
@@ -384,7 +409,8 @@ impl Session {
 impl RunState {
     fn new(run: Box<dyn Run>) -> Self {
         let snapshot = RunSnapshot::default();
-        Self { run, snapshot, moved: 0, frame: 0, waiting: Vec::new(), measures: [false; 3] }
+        let (waiting, refused) = (Vec::new(), Vec::new());
+        Self { run, snapshot, moved: 0, frame: 0, waiting, refused, measures: [false; 3] }
     }
 
     /// Does what hands wanted while a frame was under way: between frames, as a replay will.
@@ -397,6 +423,15 @@ impl RunState {
                 Act::Take(id, target) => self.run.take(id, &target)?,
                 Act::Lead(id, way) => self.run.lead(id, way)?,
                 Act::LetGo(id) => self.run.let_go(id)?,
+                Act::Tool(act) => {
+                    let done = self.run.act(&act);
+                    if let Err(message) = done {
+                        if !act.is_taking() {
+                            return Err(message);
+                        }
+                        self.refused.push((act.hand(), message));
+                    }
+                }
             }
         }
         Ok(())

@@ -11,8 +11,11 @@ function hands() {
     done.push(["grab", id, x, y]);
     return x < 100;
   };
-  const gestures = new Gestures({ grab, lead: note("lead"), release: note("release"), orbit: note("orbit"), pan: note("pan"), zoom: note("zoom") });
-  return { done, gestures };
+  /** What instrument is in hand, where x is above 300. */
+  const held = { instrument: false };
+  const press = (x, y, anywhere) => held.instrument && (anywhere || x > 300);
+  const gestures = new Gestures({ grab, press, drag: note("drag"), lead: note("lead"), release: note("release"), orbit: note("orbit"), pan: note("pan"), zoom: note("zoom") });
+  return { done, gestures, held };
 }
 
 test("one finger on tissue pulls and lets go", () => {
@@ -115,4 +118,33 @@ test("a hidden tab lets go of everything", () => {
   gestures.cancelAll();
   assert.deepEqual(done.at(-1), ["release", 1, false]);
   assert.equal(gestures.mode, "idle");
+});
+
+test("with an instrument in hand one finger leads it wherever it is, and two turn the view", () => {
+  const { done, gestures, held } = hands();
+  held.instrument = true;
+  gestures.down({ id: 1, x: 50, y: 50, touch: true });
+  assert.equal(gestures.mode, "lead");
+  gestures.move({ id: 1, x: 53, y: 48 });
+  assert.equal(done[0][0], "drag");
+  assert.deepEqual([done[0][1].x, done[0][1].y, done[0][2].x, done[0][2].y], [50, 50, 53, 48]);
+  gestures.down({ id: 2, x: 80, y: 50, touch: true });
+  gestures.move({ id: 2, x: 84, y: 50 });
+  assert.deepEqual(done[1], ["orbit", 2, 0]);
+  gestures.up({ id: 2, x: 84, y: 50 });
+  gestures.up({ id: 1, x: 53, y: 48 });
+  assert.equal(gestures.mode, "idle");
+});
+
+test("a mouse leads an instrument where it presses on one, and pulls tissue elsewhere", () => {
+  const { done, gestures, held } = hands();
+  held.instrument = true;
+  gestures.down({ id: 1, x: 50, y: 50 });
+  assert.equal(gestures.mode, "pull");
+  gestures.up({ id: 1, x: 50, y: 50 });
+  gestures.down({ id: 1, x: 320, y: 50 });
+  assert.equal(gestures.mode, "lead");
+  gestures.cancel(1);
+  assert.equal(gestures.mode, "idle");
+  assert.deepEqual(done.map(([what]) => what), ["grab", "release"]);
 });

@@ -277,3 +277,53 @@ fn budget_row(session: &Session, tets: usize, vertices: usize) -> String {
         milliseconds(100e9)
     )
 }
+
+/// A probe from the tray is led by a finger into the tissue, and the scene that is written does the same to the bit.
+#[test]
+fn an_instrument_of_the_tray_is_led_and_repeated() {
+    let settings = [
+        ("solver.accuracy", "draft"),
+        ("body.slab.cells", "[8, 8, 3]"),
+        ("motion.forceps.release", "1 ms"),
+    ];
+    let mut by_hand = session("grab", &settings, 1.0);
+    frames(&mut by_hand, 3);
+    assert!(!by_hand.press_tool([400.0, 300.0], true).expect("nothing in hand"));
+    assert_eq!(by_hand.tray()[0], "probe");
+    by_hand.take_tool(0).expect("a probe");
+    assert!(by_hand.take_tool(99).is_err());
+    frames(&mut by_hand, 1);
+    assert!(by_hand.press_tool([20.0, 20.0], true).expect("a finger leads it wherever it is"));
+    assert!(!by_hand.press_tool([20.0, 20.0], false).expect("a mouse does not"));
+    let mut force = 0.0;
+    for _ in 0..60 {
+        let way = [[400.0, 300.0], [400.0, 306.0]];
+        by_hand.drag_tool(way, viscera_stage::Drag::Across).expect("led");
+        frames(&mut by_hand, 1);
+        let report = by_hand.report();
+        let tool = &report.runs[0].tools[0];
+        let [x, y, z] = tool.force;
+        force = vec3(x, y, z).length();
+        if force > 0.3 {
+            assert!(z < 0.0 && tool.error.is_some() && report.runs[0].ledger.is_some());
+            break;
+        }
+    }
+    assert!(force > 0.3, "{force} N");
+    // A place that is none leads nowhere, and is told.
+    let nowhere = [[f64::NAN, 300.0], [400.0, 306.0]];
+    assert!(by_hand.drag_tool(nowhere, viscera_stage::Drag::Across).is_err());
+    by_hand.put_away().expect("put away");
+    frames(&mut by_hand, 2);
+    assert!(by_hand.report().runs[0].tools.is_empty() && by_hand.in_hand().is_empty());
+
+    let frame = by_hand.report().frame;
+    let text = by_hand.replay().expect("a scene");
+    let scene = Scene::parse("replay.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let assembly = Assembly::new(&scene, &mut |name| no_files(name)).expect("meshes");
+    let mut replay = Simulation::<f32>::new(scene, assembly).expect("a simulation");
+    for _ in 0..frame {
+        replay.advance_frame().expect("a frame");
+    }
+    assert_eq!(by_hand.vertices(0).expect("a run"), &replay.state().positions[..]);
+}

@@ -37,6 +37,16 @@ export class Session {
   lead(id: number, x: number, y: number): void;
   grabAt(id: number, x: number, y: number, z: number): boolean;
   leadBy(id: number, dx: number, dy: number, dz: number): void;
+  tray(): string;
+  inHand(): string;
+  told(): string | undefined;
+  takeTool(number: number): void;
+  pressTool(x: number, y: number, anywhere: boolean): boolean;
+  dragTool(x0: number, y0: number, x1: number, y1: number, kind: string): void;
+  openJaws(by: number): void;
+  lockJaws(): void;
+  activateTool(hand?: number): void;
+  putAway(): void;
   release(id: number): void;
   force(id: number): Float64Array;
   orbit(dx: number, dy: number): void;

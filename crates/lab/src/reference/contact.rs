@@ -11,7 +11,7 @@
 //! `Q` is `I - n n^T`, or `I` where the sample is tied. A sample that was touched before the step has the tangent plane
 //! of then, in the tool's frame, in place of the distance, and friction.
 
-use viscera::contact::{Shape, Tool};
+use viscera::contact::{DistanceGrid, Shape, Tool};
 use viscera::model::Model;
 use viscera::scalar::rigid::RigidTransform;
 use viscera::scalar::{Mat3, Vec3, vec3};
@@ -79,6 +79,8 @@ pub struct Clearance {
     pub value: f64,
     /// Of length 1.
     pub normal: Vec3<f64>,
+    /// The gradient's magnitude along it: 1, but for a mesh.
+    pub slope: f64,
     /// [1/m].
     pub hessian: Mat3<f64>,
 }
@@ -86,13 +88,14 @@ pub struct Clearance {
 impl Clearance {
     /// From a plane `n . x = o`.
     fn of_plane(x: Vec3<f64>, normal: Vec3<f64>, offset: f64) -> Self {
-        Self { value: normal.dot(x) - offset, normal, hessian: Mat3::ZERO }
+        Self { value: normal.dot(x) - offset, normal, slope: 1.0, hessian: Mat3::ZERO }
     }
 
     /// From a shape in its own frame at a point [m].
     pub fn of(shape: &Shape, x: Vec3<f64>) -> Self {
         match *shape {
             Shape::HalfSpace => Self::of_plane(x, vec3(0.0, 0.0, 1.0), 0.0),
+            Shape::Mesh(ref grid) => Self::of_grid(grid, x),
             Shape::Sphere { radius } => Self::from_core(x, Vec3::splat(1.0), radius),
             Shape::Capsule { length, radius } => {
                 let is_beside = x.z > 0.0 && x.z < length;
@@ -118,9 +121,28 @@ impl Clearance {
                     (1..3).fold(0, |best, a| if beyond(a) > beyond(best) { a } else { best });
                 let mut normal = Vec3::ZERO;
                 normal[axis] = if x[axis] < 0.0 { -1.0 } else { 1.0 };
-                Self { value: beyond(axis) - radius, normal, hessian: Mat3::ZERO }
+                Self { value: beyond(axis) - radius, normal, slope: 1.0, hessian: Mat3::ZERO }
             }
         }
+    }
+
+    /// From a grid of distances, the library's: value and gradient are of one function, which has a second derivative within
+    /// cells only, and here one of differences over a cell.
+    fn of_grid(grid: &DistanceGrid, x: Vec3<f64>) -> Self {
+        let gradient = |x: Vec3<f64>| {
+            let there = grid.distance(x);
+            there.normal * there.slope
+        };
+        let half = 0.5 * grid.cell();
+        let column = |axis: usize| {
+            let mut step = Vec3::ZERO;
+            step[axis] = half;
+            (gradient(x + step) - gradient(x - step)) * (1.0 / grid.cell())
+        };
+        let second = Mat3::from_columns(column(0), column(1), column(2));
+        let here = grid.distance(x);
+        let hessian = (second + second.transpose()) * 0.5;
+        Self { value: here.value, normal: here.normal, slope: here.slope, hessian }
     }
 
     /// `away` [m] from the nearest point of a core that is rounded; that point stays where `x` moves along `free` axes.
@@ -136,7 +158,7 @@ impl Clearance {
             projected.columns[axis][axis] = free[axis];
         }
         let hessian = (projected - Mat3::outer(normal, normal)) * (1.0 / length);
-        Self { value: length - radius, normal, hessian }
+        Self { value: length - radius, normal, slope: 1.0, hessian }
     }
 
     /// The same in the world.
@@ -262,21 +284,21 @@ impl<'a> Contacts<'a> {
             return None;
         }
         let clearance = clearance.turned(&tool.pose);
-        let Clearance { value, normal, hessian } = clearance;
+        let Clearance { value, normal, slope: steep, hessian } = clearance;
         let [psi, slope, second] = pressure_law(k, thickness, value).map(|y| y * sample.area);
         let along = Mat3::outer(normal, normal);
-        let positive = along * second;
+        let positive = along * (second * steep * steep);
         let mut felt = Felt {
             sample: number,
             tool: tool_number,
             place,
             clearance,
             energy: psi,
-            gradient: normal * slope,
+            gradient: normal * (slope * steep),
             contact: positive + hessian * slope,
             positive,
             friction: Mat3::ZERO,
-            pressed: -slope,
+            pressed: -slope * steep,
         };
         if let Some(grip) = grip {
             let is_tied = grip.limit == f64::INFINITY;
@@ -358,7 +380,11 @@ impl<'a> Contacts<'a> {
                 anchor = back(place - slip * share);
             }
         }
-        let offset = live.normal.dot(local) - live.value;
-        Touched { sample, tool: number, normal: live.normal, offset, anchor, limit }
+        let normal = match &tool.shape {
+            Shape::Mesh(grid) => grid.normal(local),
+            _ => live.normal,
+        };
+        let offset = normal.dot(local) - live.value;
+        Touched { sample, tool: number, normal, offset, anchor, limit }
     }
 }

@@ -205,6 +205,7 @@ fn anchors_move_as_the_librarys() {
             tool: before.tool,
             anchor: before.anchor,
             normal: before.normal,
+            offset: before.offset,
             pressed: before.limit / tool.law.friction,
             force: Vec3::ZERO,
             place: sample.place(&x),
@@ -305,18 +306,19 @@ fn bad_tools_are_refused() {
     let model = sampled_block([1, 1, 1], &soft(1e4, 0.3), 0);
     let rest = model.rest_positions.clone();
     let good = Tool::new(Shape::HalfSpace);
-    let with = |tool: Tool| Inputs { tools: vec![good, tool], ..Inputs::default() };
+    let with = |tool: Tool| Inputs { tools: vec![good.clone(), tool], ..Inputs::default() };
     let refused =
         |inputs: &Inputs<f64>| Reference::new(&model).wrenches(&rest, inputs, &[]).map(|_| ());
-    assert_eq!(refused(&with(good)), Ok(()));
-    let mut lost = good;
+    assert_eq!(refused(&with(good.clone())), Ok(()));
+    let mut lost = good.clone();
     lost.pose.translation.x = f64::NAN;
     let not_finite = ReferenceError::NotFinite { what: "poses of tools" };
     assert_eq!(refused(&with(lost)), Err(not_finite));
-    let mut squeezed = good;
+    let mut squeezed = good.clone();
     squeezed.pose.rotation = Mat3::IDENTITY * 0.5;
     let thick = ContactLaw { thickness: 0.0, ..ContactLaw::default() };
-    let bad = [squeezed, Tool::new(Shape::Sphere { radius: -1.0 }), Tool { law: thick, ..good }];
+    let bad =
+        [squeezed, Tool::new(Shape::Sphere { radius: -1.0 }), Tool { law: thick, ..good.clone() }];
     for tool in bad {
         assert!(matches!(refused(&with(tool)), Err(ReferenceError::BadTool { tool: 1, .. })));
     }
@@ -328,7 +330,8 @@ fn bad_tools_are_refused() {
         anchor: Vec3::ZERO,
         limit: 1.0,
     };
-    let wrenches = |touched| Reference::new(&model).wrenches(&rest, &with(good), &[touched]);
+    let wrenches =
+        |touched| Reference::new(&model).wrenches(&rest, &with(good.clone()), &[touched]);
     let unknown = wrenches(touched).map(|_| ()).expect_err("no such tool");
     assert!(matches!(unknown, ReferenceError::UnknownTouch { tool: 7, tools: 2, .. }));
     let nan = Touched { tool: 0, limit: f64::NAN, ..touched };
@@ -337,6 +340,6 @@ fn bad_tools_are_refused() {
     let mesh = Block::new(Vec3::splat(0.01), [1, 1, 1]).mesh().expect("a block");
     builder.add_body(&mesh, &soft(1e4, 0.3)).expect("a body");
     let bare = builder.build().expect("a model");
-    let none = Reference::new(&bare).wrenches(&rest, &with(good), &[]).map(|_| ());
+    let none = Reference::new(&bare).wrenches(&rest, &with(good.clone()), &[]).map(|_| ());
     assert_eq!(none, Err(ReferenceError::NoSamples));
 }

@@ -1,5 +1,5 @@
 // Markers and arrows: balls, rods and cones, put in place by three axes, in matt light so that no highlight is
-// mistaken for wet tissue.
+// mistaken for wet tissue. Tools are placed alike, and are of brushed metal, in which sky and ground are mirrored.
 
 struct Solid {
     @location(2) center: vec4f,
@@ -16,6 +16,7 @@ struct SolidFragment {
     @location(0) normal: vec3f,
     @location(1) color: vec3f,
     @location(2) @interpolate(flat) see_through: f32,
+    @location(3) to_viewer: vec3f,
 }
 
 @vertex
@@ -32,7 +33,7 @@ fn place_solid(
     let v = solid.center.xyz - view.position.xyz + offset;
     // Normals go by the inverse transpose; the axes are perpendicular.
     let n = x * (normal.x / dot(x, x)) + y * (normal.y / dot(y, y)) + z * (normal.z / dot(z, z));
-    return SolidFragment(on_screen(v), normalize(n), solid.color.rgb, solid.color.a);
+    return SolidFragment(on_screen(v), normalize(n), solid.color.rgb, solid.color.a, -v);
 }
 
 fn solid_color(fragment: SolidFragment) -> vec3f {
@@ -49,4 +50,35 @@ fn shade_solid(fragment: SolidFragment) -> @location(0) vec4f {
 @fragment
 fn shade_hidden_solid(fragment: SolidFragment) -> @location(0) vec4f {
     return vec4f(mix(solid_color(fragment), vec3f(1.0), 0.15), fragment.see_through);
+}
+
+// Light that metal sends to the viewer, as the software renderer has it: in part as matt things do, in part a blurred
+// mirror of sky and ground.
+@fragment
+fn shade_tool(fragment: SolidFragment) -> @location(0) vec4f {
+    let v = normalize(fragment.to_viewer);
+    let n = normalize(fragment.normal);
+    let lit = lit_share(-fragment.to_viewer, n);
+    let diffuse = fragment.color * diffuse_light(n, lit, vec3f(0.25));
+    let mirrored = n * (2.0 * dot(n, v)) - v;
+    let sky = 0.5 + 0.5 * dot(mirrored, view.up.xyz);
+    let around = 1.6 * mix(GROUND_LIGHT, SKY_LIGHT, sky * sky);
+    let shine = max(dot(n, normalize(view.key.xyz + v)), 0.0);
+    let broad = fourth_power(fourth_power(shine));
+    let tight = fourth_power(broad) * fourth_power(broad);
+    let white = min(lit * (0.30 * broad + 0.22 * tight), 1.0);
+    let metal = 0.62 * diffuse + fragment.color * around;
+    return vec4f(srgb(mix(metal, vec3f(1.0), white)), 1.0);
+}
+
+// What is nearer to the light than the map begins is at its beginning: a shaft throws its shadow from there as well.
+@vertex
+fn place_solid_shadow(
+    @location(0) position: vec4f,
+    @location(1) normal: vec4f,
+    solid: Solid,
+) -> @builtin(position) vec4f {
+    let offset = solid.x.xyz * position.x + solid.y.xyz * position.y + solid.z.xyz * position.z;
+    let place = in_shadow_map(solid.center.xyz - view.position.xyz + offset);
+    return vec4f(place.xy, max(place.z, 0.0), place.w);
 }

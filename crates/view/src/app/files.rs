@@ -113,6 +113,35 @@ impl App {
         }
     }
 
+    /// Begins or ends a recording of the run, with all that hands do.
+    pub(super) fn toggle_run_recording(&mut self) {
+        if self.recorded_run.take().is_some() {
+            return self.engine.send(Command::EndRecord);
+        }
+        let document = self.session.document();
+        let path = free_name(&self.pictures, &document.stem(), "viscera");
+        self.engine.send(Command::Record(path.clone(), document.mesh_files()));
+        self.recorded_run = Some(path);
+    }
+
+    /// Such a recording has ended.
+    pub(super) fn run_was_recorded(&mut self, path: &Path, frames: u64, why: Option<String>) {
+        if self.recorded_run.as_deref() == Some(path) {
+            self.recorded_run = None;
+        }
+        let shown = path.display();
+        let seconds = frames as f64 * self.session.scene(Side::First).time.frame;
+        let saved =
+            format!("saved {shown}, {seconds:.2} s; see it again with: viscera replay {shown}");
+        match why {
+            None => self.messages.tell(saved),
+            Some(why) if frames > 0 => {
+                self.messages.warn(format!("the recording has ended: {why}; {saved}"))
+            }
+            Some(why) => self.messages.warn(format!("nothing was recorded: {why}")),
+        }
+    }
+
     /// Adds what is shown to the recording, where one is going on and a picture is due.
     pub(super) fn record(&mut self) {
         let (Some(recorder), Some(snapshot)) = (&mut self.recorder, &self.snapshot) else { return };
@@ -171,6 +200,9 @@ impl App {
     pub fn close(&mut self) {
         if self.recorder.is_some() {
             self.toggle_recording();
+        }
+        if self.recorded_run.is_some() {
+            self.toggle_run_recording();
         }
     }
 }

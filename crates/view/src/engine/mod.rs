@@ -14,7 +14,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use viscera::scalar::Vec3;
-use viscera_stage::{Coloring, HoldId};
+use viscera_stage::{Coloring, HandId, HoldId, ToolAct};
+
+use viscera_resources::MeshFiles;
 
 use crate::choices::Settings;
 use crate::probe::{Curve, SolverVariant};
@@ -56,8 +58,14 @@ pub enum Command {
     Lead(HoldId, Vec3<f64>),
     /// Lets go.
     LetGo(HoldId),
+    /// Does something with an instrument.
+    Tool(ToolAct),
     /// Changes settings of one of the simulations.
     Change(usize, Settings),
+    /// Records the first simulation and all that hands do to it into a file that `viscera replay` takes.
+    Record(PathBuf, MeshFiles),
+    /// Ends that.
+    EndRecord,
     /// Asks for what was done by hand, to be saved there.
     Save(PathBuf),
     /// Repeats steps of the first simulation by these solvers, to compare how they converge.
@@ -105,6 +113,10 @@ pub enum Event {
     Curves(Vec<Curve>),
     /// Something was refused, and nothing has changed.
     Refused(String),
+    /// A recording of the first simulation has ended, and why where it was not asked to: its file, and its frames.
+    Recorded(PathBuf, u64, Option<String>),
+    /// A hand could not take an instrument, and why.
+    NotTaken(HandId, String),
     /// The simulation has stopped.
     Failed(Failure),
 }

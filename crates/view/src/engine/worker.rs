@@ -1,19 +1,22 @@
 //! What the thread does: builds, computes frame after frame at the pace of the clock, obeys in between.
 
 mod building;
+mod recording;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 use viscera::simulation::Assembly;
-use viscera_stage::{Coloring, GripTarget, Run};
+use viscera_stage::{Coloring, GripTarget, Run, ToolAct};
 
 use super::setup::{BuildRequest, Setup};
 use super::snapshot::SnapshotExchange;
 use super::{Command, Cure, Event, Failure};
 use crate::choices::{Settings, put};
 use crate::probe::{MOST_TETS, Prober, SolverVariant};
+use recording::RunRecording;
+use viscera_resources::MeshFiles;
 
 /// Calls the window.
 pub type Wake = Box<dyn Fn() + Send + Sync>;
@@ -42,6 +45,7 @@ pub struct Worker {
     probed_last: Option<Instant>,
     /// The last warning of something that goes on.
     last_warning: Option<String>,
+    recording: Option<RunRecording>,
 }
 
 struct Running {
@@ -102,6 +106,7 @@ impl Worker {
             prober,
             probed_last: None,
             last_warning: None,
+            recording: None,
         }
     }
 
@@ -134,7 +139,10 @@ impl Worker {
         let mut next = Some(first);
         while let Some(command) = next {
             match command {
-                Command::Quit => return Next::Quit,
+                Command::Quit => {
+                    self.end_record(None);
+                    return Next::Quit;
+                }
                 Command::Change(run, settings) => {
                     change.resize_with(change.len().max(run + 1), Settings::new);
                     for (key, value) in &settings {
@@ -142,6 +150,7 @@ impl Worker {
                     }
                 }
                 Command::Load(request) => {
+                    self.end_record(Some("another scene was opened".to_owned()));
                     change.clear();
                     self.load(*request);
                 }
@@ -195,6 +204,9 @@ impl Worker {
             }
             Command::Lead(hold, translation) => self.each(|run| run.lead(hold, translation)),
             Command::LetGo(hold) => self.each(|run| run.let_go(hold)),
+            Command::Tool(act) => self.act(&act),
+            Command::Record(path, mesh_files) => self.record(path, &mesh_files),
+            Command::EndRecord => self.end_record(None),
             Command::Save(path) => self.save(path),
             Command::Probe(variants) => {
                 self.probed = variants;
@@ -231,7 +243,56 @@ impl Worker {
         }
     }
 
+    /// Does something with an instrument in all simulations. What one of them does not take none has.
+    fn act(&mut self, act: &ToolAct) {
+        let Some(running) = &mut self.running else { return };
+        let hand = act.hand();
+        let refused = running.runs.iter_mut().find_map(|run| run.act(act).err());
+        let Some(message) = refused else { return };
+        if act.is_taking() {
+            for run in &mut running.runs {
+                // Where it was not taken there is nothing to put away.
+                let _ = run.act(&ToolAct::PutAway { hand });
+            }
+            self.tell(Event::NotTaken(hand, message));
+        } else {
+            self.warn_once(message);
+        }
+    }
+
+    fn record(&mut self, path: PathBuf, mesh_files: &MeshFiles) {
+        self.end_record(None);
+        let Some(run) = self.running.as_mut().and_then(|running| running.runs.first_mut()) else {
+            return self.tell(Event::Recorded(path, 0, Some("nothing is running".to_owned())));
+        };
+        match RunRecording::begin(path.clone(), mesh_files, &mut **run) {
+            Ok(recording) => self.recording = Some(recording),
+            Err(message) => self.tell(Event::Recorded(path, 0, Some(message))),
+        }
+    }
+
+    fn end_record(&mut self, why: Option<String>) {
+        let Some(recording) = self.recording.take() else { return };
+        let path = recording.path().to_owned();
+        let run = self.running.as_mut().and_then(|running| running.runs.first_mut());
+        match run.map(|run| recording.end(&mut **run)) {
+            Some(Ok((path, frames))) => self.tell(Event::Recorded(path, frames, why)),
+            Some(Err(message)) => self.tell(Event::Recorded(path, 0, Some(message))),
+            None => self.tell(Event::Recorded(path, 0, why)),
+        }
+    }
+
+    /// A frame was computed.
+    fn record_frame(&mut self) {
+        let run = self.running.as_mut().and_then(|running| running.runs.first_mut());
+        let Some((recording, run)) = self.recording.as_mut().zip(run) else { return };
+        if let Err(message) = recording.frame(&mut **run) {
+            self.end_record(Some(message));
+        }
+    }
+
     fn fail(&mut self, message: String, cure: Cure) {
+        self.end_record(Some("the simulation has stopped".to_owned()));
         self.running = None;
         self.tell(Event::Failed(Failure { message, cure }));
     }
@@ -337,6 +398,9 @@ impl Worker {
             failed = failed.or(run.advance().err());
             *wall = start.elapsed().as_secs_f64();
         }
+        self.record_frame();
+        let Some(running) = &mut self.running else { return };
+        let told = running.runs.iter_mut().find_map(|run| run.told());
         running.number += 1;
         self.steps = self.steps.saturating_sub(1);
         let frame = Duration::try_from_secs_f64(running.setup.scene.time.frame / self.speed);
@@ -345,6 +409,7 @@ impl Worker {
         if let Some(earliest) = Instant::now().checked_sub(MOST_LATE) {
             self.due = self.due.max(earliest);
         }
+        told.into_iter().for_each(|message| self.warn_once(message));
         match failed {
             None => self.publish(),
             // The last frame stays to be seen; Reset begins anew.
@@ -354,6 +419,7 @@ impl Worker {
 
     /// Stops where a simulation has failed.
     fn stop(&mut self, message: String) {
+        self.end_record(Some("the simulation has stopped".to_owned()));
         (self.playing, self.steps) = (false, 0);
         self.tell(Event::Failed(Failure { message, cure: Cure::Reset }));
     }

@@ -3,6 +3,7 @@
 mod choice;
 pub mod convergence;
 pub mod forces;
+pub mod instruments;
 pub mod material;
 mod number;
 pub mod scene;
@@ -15,7 +16,7 @@ use std::path::PathBuf;
 
 use crate::choices::{Settings, Side};
 use crate::help::Request;
-use viscera_stage::HoldId;
+use viscera_stage::{HandId, HoldId};
 
 /// What a person wants.
 #[derive(Clone, Debug)]
@@ -34,6 +35,14 @@ pub enum Action {
     Warn(String),
     /// Lets go of one point.
     LetGo(HoldId),
+    /// Makes an instrument active.
+    Activate(HandId),
+    /// Opens or closes the jaws of an instrument to an angle [rad].
+    OpenJaws(HandId, f64),
+    /// Locks its jaws, or unlocks them.
+    Lock(HandId),
+    /// Puts it away.
+    PutAway(HandId),
     /// Another scene.
     Open(PathBuf),
     /// Saves the scene there.

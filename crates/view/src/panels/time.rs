@@ -35,7 +35,7 @@ pub fn show_bar(
     ui: &mut Ui,
     clock: &Clock,
     session: &Session,
-    is_recording: bool,
+    [is_filmed, is_recorded]: [bool; 2],
     preferences: &mut Preferences,
     actions: &mut Vec<Action>,
 ) {
@@ -56,7 +56,7 @@ pub fn show_bar(
         ask(ui, "Redo", "Ctrl+Y", history.can_redo(), Request::Redo);
         ui.separator();
         ask(ui, "Picture", "Save a picture of the tissue (S)", true, Request::Screenshot);
-        let record = if is_recording { "Stop recording" } else { "Record" };
+        let record = if is_filmed { "Stop recording" } else { "Record" };
         ask(
             ui,
             record,
@@ -64,6 +64,10 @@ pub fn show_bar(
             true,
             Request::Record,
         );
+        let run = if is_recorded { "Stop recording the run" } else { "Record run" };
+        let help =
+            "The run with all that hands do, to be computed once more with viscera replay (T)";
+        ask(ui, run, help, true, Request::RecordRun);
         ask(ui, "Save scene", "Ctrl+S", true, Request::Save);
         ui.separator();
         compare(ui, session, actions);

@@ -6,6 +6,7 @@ use viscera_stage::{Coloring, newtons};
 
 use super::number::{Number, named};
 use super::{Action, section};
+use crate::curves::{ForceCurves, Source};
 use crate::help::Request;
 use crate::holds::Holds;
 use crate::preferences::Preferences;
@@ -71,6 +72,7 @@ pub fn show_grip(
     ui: &mut Ui,
     preferences: &mut Preferences,
     holds: &Holds,
+    curves: &ForceCurves,
     actions: &mut Vec<Action>,
 ) {
     section(ui, "Hand", true, |ui| {
@@ -104,7 +106,8 @@ pub fn show_grip(
         });
         for (number, held) in holds.list().iter().enumerate() {
             ui.horizontal(|ui| {
-                let force = held.curve.back().map_or(f64::NAN, |(_, forces)| forces[0]);
+                let last = curves.last(&Source::Hold(held.id));
+                let force = last.map_or(f64::NAN, |point| point.forces[0]);
                 ui.label(format!("point {}", number + 1));
                 ui.strong(if force.is_nan() { "...".to_owned() } else { newtons(force) });
                 ui.weak(format!("{:.0} mm away", 1e3 * held.translation.length()));

@@ -23,6 +23,11 @@ impl Lens {
         Self { rect, eye: viscera_stage::Lens::new(orbit, area, f64::from(taken)) }
     }
 
+    /// What the viewer sees, without the window.
+    pub fn eye(&self) -> &viscera_stage::Lens {
+        &self.eye
+    }
+
     /// Where the viewer is.
     pub fn orbit(&self) -> &Orbit {
         &self.eye.orbit

@@ -1,5 +1,6 @@
 //! The tissue in the window: looking around it, pressing on it, pulling it.
 
+mod leading;
 mod lens;
 mod overlay;
 mod picture;
@@ -13,9 +14,13 @@ use std::sync::Arc;
 use viscera::scalar::Vec3;
 use viscera_picture::{HALF_OPENING, Image, ImageSize, Overlay, ViewDirection};
 use viscera_render::Orbit;
-use viscera_stage::{Coloring, Legend, PictureContents, RunSurface, meet_plane, pick};
+use viscera_stage::{
+    Coloring, ForceScale, HandId, Legend, PictureContents, RunSurface, Surroundings, meet_plane,
+    pick,
+};
 
 use crate::engine::{Command, Setup, Snapshot};
+use crate::hands::Hands;
 use crate::holds::{Grip, Holds};
 use crate::preferences::Preferences;
 
@@ -31,14 +36,21 @@ pub struct Viewport {
     setup: Option<Arc<Setup>>,
     orbit: Orbit,
     extent: f64,
+    /// The middle of things at rest [m].
+    middle: Vec3<f64>,
+    /// Of the tissue now, along z [m].
+    highest: f64,
     surfaces: Vec<RunSurface>,
     pictures: Vec<Picture>,
     fixed: Vec<u32>,
     legend: Legend,
+    force_scale: ForceScale,
     /// What each picture was seen through last.
     lenses: Vec<Lens>,
     /// What the pictures show.
     drawn: Option<DrawnInputs>,
+    /// What the mouse asked for and cannot have.
+    told: Option<String>,
 }
 
 /// What pictures are drawn from: two equal ones give the same pictures.
@@ -51,6 +63,7 @@ struct DrawnInputs {
     range: Option<[f32; 2]>,
     marks: [bool; 3],
     holds: usize,
+    in_hand: Option<HandId>,
 }
 
 impl Viewport {
@@ -61,12 +74,16 @@ impl Viewport {
             setup: None,
             orbit: Orbit::framing(&[]),
             extent: 0.1,
+            middle: Vec3::ZERO,
+            highest: 0.0,
             surfaces: Vec::new(),
             pictures: Vec::new(),
             fixed: Vec::new(),
             legend: Legend::default(),
+            force_scale: ForceScale::default(),
             lenses: Vec::new(),
             drawn: None,
+            told: None,
         }
     }
 
@@ -92,6 +109,7 @@ impl Viewport {
         let rest = setup.assembly.builder.positions();
         self.orbit = Orbit::framing(rest);
         self.extent = 2.0 * self.orbit.distance * HALF_OPENING;
+        self.middle = self.orbit.target;
         let direction = ViewDirection::from_vector(setup.scene.output.view_from);
         (self.orbit.azimuth, self.orbit.elevation) = (direction.azimuth, direction.elevation);
     }
@@ -99,6 +117,11 @@ impl Viewport {
     /// Why nothing can be drawn any more, where the device was lost.
     pub fn lost(&self) -> Option<String> {
         self.gpu.failure()
+    }
+
+    /// What the first picture was seen through last.
+    pub fn lens(&self) -> Option<&Lens> {
+        self.lenses.first()
     }
 
     /// The camera.
@@ -119,6 +142,13 @@ impl Viewport {
         for (surface, run) in self.surfaces.iter_mut().zip(&snapshot.runs) {
             surface.place(run)?;
         }
+        if snapshot.number == 0 {
+            self.force_scale = ForceScale::default();
+        }
+        snapshot.runs.iter().for_each(|run| self.force_scale.follow(&run.tools));
+        let heights = snapshot.runs.iter().flat_map(|run| &run.positions).map(|x| x.z);
+        let highest = heights.filter(|z| z.is_finite()).reduce(f32::max);
+        self.highest = highest.map_or(self.middle.z, f64::from);
         let shown = snapshot.runs.iter().take(self.shown_runs());
         self.legend.follow(snapshot.coloring, shown.flat_map(|run| run.values.iter().copied()));
         Ok(())
@@ -129,7 +159,7 @@ impl Viewport {
         &mut self,
         ui: &mut Ui,
         snapshot: Option<&Snapshot>,
-        holds: &mut Holds,
+        hands: &mut Hands,
         preferences: &Preferences,
     ) -> (Vec<Command>, Option<String>) {
         let area = ui.available_rect_before_wrap();
@@ -159,7 +189,7 @@ impl Viewport {
                     &lens,
                     number,
                     snapshot,
-                    holds,
+                    hands,
                     preferences,
                     &mut commands,
                 );
@@ -167,11 +197,11 @@ impl Viewport {
         }
         // The mouse may have turned the view.
         self.lenses = rects.iter().map(|rect| Lens::new(&self.orbit, *rect, taken)).collect();
-        let drawn = snapshot.map(|snapshot| self.draw(ui, snapshot, holds, preferences));
+        let drawn = snapshot.map(|snapshot| self.draw(ui, snapshot, hands, preferences));
         for (number, lens) in self.lenses.iter().enumerate() {
-            self.paint(ui, lens, number, snapshot, holds, preferences);
+            self.paint(ui, lens, number, snapshot, &hands.holds, preferences);
         }
-        (commands, drawn.and_then(Result::err))
+        (commands, drawn.and_then(Result::err).or(self.told.take()))
     }
 
     /// What the mouse does in one of the pictures.
@@ -183,7 +213,7 @@ impl Viewport {
         lens: &Lens,
         run: usize,
         snapshot: &Snapshot,
-        holds: &mut Holds,
+        hands: &mut Hands,
         preferences: &Preferences,
         commands: &mut Vec<Command>,
     ) {
@@ -198,33 +228,65 @@ impl Viewport {
             (last.unwrap_or(input.modifiers), input.pointer.press_origin())
         });
         if let Some(pointer) = response.interact_pointer_pos() {
-            if response.drag_started_by(PointerButton::Primary) && !modifiers.command {
+            if response.drag_started_by(PointerButton::Primary) {
                 let pressed = pressed_at.unwrap_or(pointer);
-                self.press(lens, run, snapshot, pressed, holds, &preferences.grip, commands);
+                let only_tools = modifiers.command;
+                let grip = (!only_tools).then_some(&preferences.grip);
+                self.press(lens, run, snapshot, pressed, hands, grip, commands);
             }
-            if let Some(plane) = holds.drag_plane() {
+            if hands.instruments.dragged().is_some() {
+                self.lead(ui, lens, (pointer, response.drag_delta()), modifiers, hands, commands);
+            } else if let Some(plane) = hands.holds.drag_plane() {
                 let [_, _, normal] = self.orbit.axes();
                 let (from, direction) = (lens.orbit().position(), lens.ray(pointer));
                 if response.drag_delta() != vec2(0.0, 0.0)
                     && let Some(point) = meet_plane(from, direction, plane, normal)
                 {
-                    commands.extend(holds.lead(point));
+                    commands.extend(hands.holds.lead(point));
                 }
             } else if response.dragged() {
                 self.look_around(response, lens, modifiers);
             }
         }
         if response.drag_stopped() {
-            commands.extend(holds.release(preferences.grip.keep || modifiers.shift));
+            hands.instruments.drop_dragged();
+            commands.extend(hands.holds.release(preferences.grip.keep || modifiers.shift));
         }
-        if response.contains_pointer() {
+        if response.contains_pointer() && hands.instruments.dragged().is_none() {
             let (scroll, pinch) =
                 ui.input(|input| (input.smooth_scroll_delta.y, input.zoom_delta()));
             self.orbit.zoom(f64::from((-0.0015 * scroll).exp() / pinch));
         }
     }
 
-    /// The left button goes down: on something held, on tissue, or beside it.
+    /// Where instruments are led.
+    pub fn surroundings(&self) -> Surroundings {
+        let Self { orbit, middle, extent, .. } = *self;
+        let top = Vec3 { z: self.highest, ..middle };
+        Surroundings { orbit, middle, top, extent }
+    }
+
+    /// The pointer leads the instrument that it drags.
+    fn lead(
+        &mut self,
+        ui: &Ui,
+        lens: &Lens,
+        moved: (Pos2, egui::Vec2),
+        modifiers: egui::Modifiers,
+        hands: &mut Hands,
+        commands: &mut Vec<Command>,
+    ) {
+        let Some(held) = hands.instruments.dragged() else { return };
+        let scroll = ui.input(|input| input.smooth_scroll_delta.y);
+        let nudge = leading::nudge(held, lens, moved, scroll, modifiers, self.extent);
+        let hand = held.id;
+        match hands.instruments.nudge(hand, &nudge, &self.surroundings()) {
+            Ok(acts) => commands.extend(acts.into_iter().map(Command::Tool)),
+            Err(told) => self.told = Some(told),
+        }
+    }
+
+    /// The left button goes down: on an instrument, on something held, on tissue, or beside it. Tissue is taken with a grip.
     #[expect(clippy::too_many_arguments, reason = "the window's state, lent for one event")]
     fn press(
         &mut self,
@@ -232,8 +294,8 @@ impl Viewport {
         run: usize,
         snapshot: &Snapshot,
         pointer: Pos2,
-        holds: &mut Holds,
-        grip: &Grip,
+        hands: &mut Hands,
+        grip: Option<&Grip>,
         commands: &mut Vec<Command>,
     ) {
         let (Some(setup), Some(shown)) = (&self.setup, snapshot.runs.get(run)) else { return };
@@ -245,11 +307,23 @@ impl Viewport {
                 .iter()
                 .any(|x| lens.place(*x).is_some_and(|place| place.distance(pointer) < NEAR))
         });
-        if near.is_some_and(|hold| holds.resume(hold.id)) {
+        if near.is_some_and(|hold| hands.holds.resume(hold.id)) {
             return;
         }
-        let hit = pick(&setup.assembly, shown, lens.orbit().position(), lens.ray(pointer));
-        commands.extend(hit.map(|hit| holds.take(&hit, grip)));
+        let eye = lens.orbit().position();
+        let hit = pick(&setup.assembly, shown, eye, lens.ray(pointer));
+        let tissue = hit.map(|hit| (hit.point - eye).length());
+        if let Some(tool) = leading::tool_at(shown, lens, pointer, tissue, &hands.instruments) {
+            let hand = tool.hand.unwrap_or_else(|| {
+                let scene_tool = setup.assembly.tools.get(tool.number);
+                commands.push(Command::Tool(hands.instruments.hold(tool, scene_tool)));
+                hands.instruments.active().map_or(0, |held| held.id)
+            });
+            hands.instruments.drag(hand);
+            return;
+        }
+        let taken = hit.zip(grip).map(|(hit, grip)| hands.holds.take(&hit, grip));
+        commands.extend(taken);
     }
 
     fn look_around(&mut self, response: &egui::Response, lens: &Lens, modifiers: egui::Modifiers) {
@@ -268,7 +342,7 @@ impl Viewport {
         &mut self,
         ui: &Ui,
         snapshot: &Snapshot,
-        holds: &Holds,
+        hands: &Hands,
         preferences: &Preferences,
     ) -> Result<(), String> {
         let Some(setup) = &self.setup else { return Ok(()) };
@@ -291,7 +365,8 @@ impl Viewport {
             coloring: snapshot.coloring,
             range: self.legend.range(),
             marks: [preferences.wireframe, preferences.shadow, preferences.fixings],
-            holds: holds.list().len(),
+            holds: hands.holds.list().len(),
+            in_hand: hands.instruments.active().map(|held| held.id),
         };
         if self.drawn.as_ref() == Some(&wanted) {
             return Ok(());
@@ -322,6 +397,9 @@ impl Viewport {
                 fixed: &fixed,
                 picked: &picked,
                 targets: &targets,
+                tools: &run.tools,
+                in_hand: wanted.in_hand,
+                force_scale: self.force_scale.metres_per_newton(self.extent),
                 extent: self.extent,
             };
             self.pictures[number].draw(&self.gpu, *size, &contents)?;
@@ -351,6 +429,8 @@ impl Viewport {
         let Some(run) = snapshot.runs.get(number) else { return };
         overlay::scene_patches(&painter, lens, run);
         overlay::forces(&painter, lens, run, holds);
+        let scale = self.force_scale.metres_per_newton(self.extent);
+        overlay::tools(&painter, lens, run, scale);
         if preferences.coloring != Coloring::Plain {
             overlay::paint_legend(&self.legend, &painter, lens.rect);
         }

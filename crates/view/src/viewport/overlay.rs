@@ -5,7 +5,10 @@ use eframe::egui::{
 };
 use viscera::scalar::Vec3;
 use viscera_picture::{Color, map_color};
-use viscera_stage::{Legend, RunSnapshot, inverted, millimetres, newtons};
+use viscera_stage::{
+    Legend, RunSnapshot, ToolSnapshot, arrow_end, inverted, millimetres, newton_millimetres,
+    newtons,
+};
 
 use super::lens::Lens;
 use crate::engine::{Setup, Snapshot};
@@ -88,6 +91,46 @@ pub fn forces(painter: &Painter, lens: &Lens, run: &RunSnapshot, holds: &Holds) 
     }
 }
 
+/// The force on the tissue of each tool, beside its arrow, with a bar of what it may be off by; its torque below.
+pub fn tools(painter: &Painter, lens: &Lens, run: &RunSnapshot, metres_per_newton: f64) {
+    for tool in run.tools.iter().filter(|tool| tool.met.touches > 0) {
+        let end = arrow_end(tool, metres_per_newton);
+        let places = lens.place(tool.pose.translation).zip(lens.place(end));
+        let Some((from, to)) = places.filter(|(a, b)| a.is_finite() && b.is_finite()) else {
+            continue;
+        };
+        error_bar(painter, lens, tool, metres_per_newton);
+        let side =
+            if to.x < from.x { (Align2::RIGHT_CENTER, -12.0) } else { (Align2::LEFT_CENTER, 12.0) };
+        let text = format!("{} {}", tool.met.name, tool.force_text());
+        let place = label(painter, to + vec2(side.1, 0.0), side.0, &text, 15.0);
+        let mut remarks = newton_millimetres(tool.torque());
+        if tool.is_locked() {
+            remarks.push_str(", locked");
+        }
+        if tool.met.has_jumped {
+            remarks.push_str(", was put elsewhere");
+        }
+        label(painter, place.left_bottom() + vec2(0.0, 12.0), Align2::LEFT_CENTER, &remarks, 12.0);
+    }
+}
+
+/// Along the arrow, from the force less its error to the force and its error.
+fn error_bar(painter: &Painter, lens: &Lens, tool: &ToolSnapshot, metres_per_newton: f64) {
+    let (Some(error), force) = (tool.met.error, tool.force()) else { return };
+    let at = |force_there: f64| {
+        let along = -Vec3::from_f64(tool.met.force) * (force_there / force * metres_per_newton);
+        lens.place(tool.pose.translation + along).filter(|place| place.is_finite())
+    };
+    let (Some(low), Some(high)) = (at((force - error).max(0.0)), at(force + error)) else { return };
+    let across = (high - low).normalized().rot90() * 5.0;
+    let stroke = Stroke::new(1.5, Color32::from_rgb(24, 28, 36));
+    painter.line_segment([low, high], stroke);
+    for end in [low, high] {
+        painter.line_segment([end - across, end + across], stroke);
+    }
+}
+
 /// Names and forces of what the scene itself moves and pulls.
 pub fn scene_patches(painter: &Painter, lens: &Lens, run: &RunSnapshot) {
     for patch in &run.measures.scene_patches {
@@ -110,6 +153,9 @@ pub fn caption(snapshot: &Snapshot, run: &RunSnapshot, remarks: &[String]) -> St
     let mut text = format!("t = {:.2} s", snapshot.time);
     for hold in &run.held {
         text.push_str(&format!("   pull {}", newtons(hold.force.length())));
+    }
+    for tool in run.tools.iter().filter(|tool| tool.met.touches > 0) {
+        text.push_str(&format!("   {} {}", tool.met.name, tool.force_text()));
     }
     for patch in run.measures.scene_patches.iter().filter(|patch| patch.force.length() > 0.0) {
         text.push_str(&format!("   {} {}", patch.name, newtons(patch.force.length())));
@@ -147,8 +193,8 @@ pub fn title(painter: &Painter, area: Rect, text: &str, lines: &[String]) {
     }
 }
 
-/// Dark letters on a light ground, which stand out from tissue and from the background.
-fn label(painter: &Painter, place: Pos2, anchor: Align2, text: &str, size: f32) {
+/// Dark letters on a light ground, which stand out from tissue and from the background. Returns where they are.
+fn label(painter: &Painter, place: Pos2, anchor: Align2, text: &str, size: f32) -> Rect {
     let ink = Color32::from_rgb(24, 28, 36);
     let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(size), ink);
     let rect = anchor.anchor_size(place, galley.size());
@@ -162,4 +208,5 @@ fn label(painter: &Painter, place: Pos2, anchor: Align2, text: &str, size: f32) 
         Color32::from_white_alpha(205),
     );
     painter.galley(rect.min, galley, ink);
+    rect
 }

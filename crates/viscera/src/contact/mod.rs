@@ -12,6 +12,7 @@
 //! Everything here is in double precision, whatever the state's is.
 
 mod at_rest;
+pub mod distance_grid;
 pub mod law;
 mod meeting;
 mod pair;
@@ -23,6 +24,7 @@ pub mod surface;
 mod touch;
 
 pub use at_rest::Overlap;
+pub use distance_grid::{DistanceGrid, SolidError};
 pub use law::{Foundation, Friction};
 pub(crate) use meeting::{Marks, Moment, turn_normals};
 pub use pair::Kept;
@@ -70,8 +72,8 @@ impl ContactLaw {
     }
 }
 
-/// A tool or a fixed obstacle: moved from outside, whatever pushes against it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A tool or a fixed obstacle: moved from outside, whatever pushes against it. A copy of it takes no memory.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
     /// Its shape in its own frame.
     pub shape: Shape,

@@ -62,6 +62,7 @@ mod tests {
             tool: 0,
             anchor: Vec3::ZERO,
             normal: vec3(0.0, 0.0, 1.0),
+            offset: 0.0,
             pressed,
             force: Vec3::ZERO,
             place: Vec3::ZERO,

@@ -5,15 +5,20 @@
 //! sphere       |x| - r                             around the origin
 //! capsule      |x - (0, 0, clamp(z, 0, L))| - r    tip at the origin, shaft along +z
 //! rounded box  |x - clamp(x, -c, c)| - r,  c = half extents - r;   inside c: max_i(|x_i| - c_i) - r
+//! mesh         of a closed surface, on a grid (`distance_grid/`)
 //! ```
 //!
-//! All are convex, so a tangent plane never has more of the tool in front of it than the distance says. Where several
-//! points of the surface are the nearest (axis of a capsule, middle of a box), the lowest axis decides.
+//! All but the last are convex, so that a tangent plane never has more of the tool in front of it than the distance says. A
+//! mesh may have: no rule of contact may ask how far it reaches along a plane's normal. Where several points of the surface
+//! are the nearest (axis of a capsule, middle of a box), the lowest axis decides.
 
+use std::sync::Arc;
+
+use super::distance_grid::DistanceGrid;
 use crate::scalar::{Vec3, vec3};
 
-/// The shape of a tool or an obstacle.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The shape of a tool or an obstacle. A copy of it takes no memory.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// Solid below the plane `z = 0`: a table, a floor, a wall.
     HalfSpace,
@@ -36,6 +41,8 @@ pub enum Shape {
         /// Of the edges [m], at most the smallest half extent.
         radius: f64,
     },
+    /// Any closed surface.
+    Mesh(Arc<DistanceGrid>),
 }
 
 /// Distance to a shape at a point.
@@ -43,8 +50,10 @@ pub enum Shape {
 pub struct Distance {
     /// [m], negative inside.
     pub value: f64,
-    /// Its gradient, of length 1.
+    /// The direction of its gradient, of length 1.
     pub normal: Vec3<f64>,
+    /// The gradient's magnitude: 1, but for a mesh, whose value is interpolated.
+    pub slope: f64,
     /// The largest magnitude of its second derivative [1/m].
     pub curvature: f64,
 }
@@ -56,7 +65,10 @@ impl Shape {
     /// Distance and its gradient at a point [m] in the tool's frame.
     pub fn distance(&self, x: Vec3<f64>) -> Distance {
         match *self {
-            Self::HalfSpace => Distance { value: x.z, normal: vec3(0.0, 0.0, 1.0), curvature: 0.0 },
+            Self::HalfSpace => {
+                Distance { value: x.z, normal: vec3(0.0, 0.0, 1.0), slope: 1.0, curvature: 0.0 }
+            }
+            Self::Mesh(ref grid) => grid.distance(x),
             Self::Sphere { radius } => from_core(x, radius),
             Self::Capsule { length, radius } => {
                 from_core(x - vec3(0.0, 0.0, x.z.clamp(0.0, length)), radius)
@@ -73,18 +85,26 @@ impl Shape {
         }
     }
 
-    /// How far the shape reaches along a direction of length 1 [m]; infinite for a half-space.
-    pub fn support(&self, direction: Vec3<f64>) -> f64 {
-        match *self {
-            Self::HalfSpace if direction == vec3(0.0, 0.0, 1.0) => 0.0,
-            Self::HalfSpace => f64::INFINITY,
-            Self::Sphere { radius } => radius,
-            Self::Capsule { length, radius } => radius + (length * direction.z).max(0.0),
-            Self::RoundedBox { half, radius } => {
-                let core = half - Vec3::splat(radius);
-                let reach = core.scale(direction).to_array();
-                radius + reach.into_iter().map(f64::abs).sum::<f64>()
-            }
+    /// The tangent plane `n . x = o` at a point [m] in the tool's frame, of which the distance is known: `n` of length 1, and
+    /// `o` [m] so that point and plane are as far from each other as point and shape.
+    pub fn tangent(&self, x: Vec3<f64>, distance: &Distance) -> (Vec3<f64>, f64) {
+        let normal = match self {
+            Self::Mesh(grid) => grid.normal(x),
+            _ => distance.normal,
+        };
+        (normal, normal.dot(x) - distance.value)
+    }
+
+    /// Whether a tangent plane has all of it behind.
+    pub fn is_convex(&self) -> bool {
+        !matches!(self, Self::Mesh(_))
+    }
+
+    /// No two points have distances that differ by more than this times the way between them.
+    pub fn steepest(&self) -> f64 {
+        match self {
+            Self::Mesh(grid) => grid.steepest(),
+            _ => 1.0,
         }
     }
 
@@ -94,6 +114,7 @@ impl Shape {
             Self::HalfSpace => f64::INFINITY,
             Self::Sphere { radius } | Self::Capsule { radius, .. } => radius,
             Self::RoundedBox { half, .. } => half.x.min(half.y).min(half.z),
+            Self::Mesh(ref grid) => grid.thinnest(),
         }
     }
 
@@ -104,6 +125,7 @@ impl Shape {
             Self::Sphere { radius } => radius,
             Self::Capsule { length, radius } => length + radius,
             Self::RoundedBox { half, .. } => half.length(),
+            Self::Mesh(ref grid) => grid.reach(),
         }
     }
 
@@ -111,7 +133,8 @@ impl Shape {
     pub fn complaint(&self) -> Option<&'static str> {
         let is_length = |length: f64| length > 0.0 && length.is_finite();
         match *self {
-            Self::HalfSpace => None,
+            // What is wrong with a mesh is told where its grid is made.
+            Self::HalfSpace | Self::Mesh(_) => None,
             Self::Sphere { radius } if is_length(radius) => None,
             Self::Sphere { .. } => Some("a sphere needs a radius above zero"),
             Self::Capsule { length, radius }
@@ -137,7 +160,8 @@ impl Shape {
 fn from_core(away: Vec3<f64>, radius: f64) -> Distance {
     let length = away.length();
     let normal = if length > 0.0 { away * (1.0 / length) } else { vec3(1.0, 0.0, 0.0) };
-    Distance { value: length - radius, normal, curvature: 1.0 / length.max(INNERMOST * radius) }
+    let curvature = 1.0 / length.max(INNERMOST * radius);
+    Distance { value: length - radius, normal, slope: 1.0, curvature }
 }
 
 /// At a point inside the core of a box: its nearest face decides.
@@ -151,7 +175,7 @@ fn inside_box(x: Vec3<f64>, core: Vec3<f64>, radius: f64) -> Distance {
     }
     let mut normal = Vec3::ZERO;
     normal[nearest] = if x[nearest] < 0.0 { -1.0 } else { 1.0 };
-    Distance { value: depth(nearest) - radius, normal, curvature: 0.0 }
+    Distance { value: depth(nearest) - radius, normal, slope: 1.0, curvature: 0.0 }
 }
 
 #[cfg(test)]
@@ -217,12 +241,16 @@ mod tests {
     fn no_tangent_plane_cuts_the_shape() {
         for shape in SHAPES {
             for x in points() {
-                let Distance { value, normal, .. } = shape.distance(x);
-                // The plane through the shape's outermost point along the normal is no farther than the shape.
-                let plane = normal.dot(x) - shape.support(normal);
-                assert!(plane <= value + 1e-12, "{shape:?} at {x:?}: {plane}, {value}");
-                if value > 0.0 {
-                    assert!((plane - value).abs() < 1e-12, "{shape:?} at {x:?}");
+                let here = shape.distance(x);
+                if here.value <= 0.0 {
+                    continue;
+                }
+                let (normal, offset) = shape.tangent(x, &here);
+                assert!((normal.dot(x) - offset - here.value).abs() < 1e-12);
+                // Seen from elsewhere the plane is no farther than the shape.
+                for y in points().step_by(37) {
+                    let (plane, there) = (normal.dot(y) - offset, shape.distance(y).value);
+                    assert!(plane <= there + 1e-12, "{shape:?} at {x:?}, {y:?}: {plane}, {there}");
                 }
             }
         }

@@ -10,7 +10,11 @@
 //!
 //! A plane remembers the side from which the tissue has come, so that a thin tool cannot jump past it, and makes the energy
 //! convex. Samples whose path stays away keep the live distance: a plane in the air would be a wall where there is none. A
-//! plane's normal stays while its sample is deep inside, where the distance's own direction has begun to turn sideways.
+//! plane stays, normal and offset, while its sample is deep inside, where the distance's own direction has begun to turn
+//! sideways. It is the one that the sample has met: of a tool that is not convex no other plane of that normal will do.
+//!
+//! Where a tool's distance is interpolated its gradient is no unit vector, `grad phi = s n`, and everything of the live
+//! distance has its share of `s`: force `p s`, stiffness `c s^2`. Planes have unit normals, and are distances.
 
 use super::law::{Dragged, Foundation, Friction, Squeezed, block, tangential};
 use super::shape::Shape;
@@ -36,8 +40,10 @@ pub struct Touch {
     pub tool: u32,
     /// Where the sample would be without slip, in the tool's frame [m].
     pub anchor: Vec3<f64>,
-    /// Of the plane, in the tool's frame.
+    /// Of the plane `normal . x = offset`, in the tool's frame; of length 1.
     pub normal: Vec3<f64>,
+    /// Of the same [m].
+    pub offset: f64,
     /// Normal force at the end of the last step [N].
     pub pressed: f64,
     /// Force on the tissue at the end of the last step, friction included [N].
@@ -142,7 +148,8 @@ impl Touching {
         let first = tool.shape.distance(from);
         let way = (to - from).length();
         // The distance changes by no more than the way; beyond it the tissue around may push as far again.
-        if first.value > 2.0 * (thickness + way) && kept.is_none() {
+        let farthest = 2.0 * (thickness + way) * tool.shape.steepest();
+        if first.value > farthest && kept.is_none() {
             return None;
         }
         let side = if first.value < thickness {
@@ -169,10 +176,8 @@ impl Touching {
     fn plane(shape: &Shape, from: Vec3<f64>, first: &Distance, kept: Option<&Touch>) -> Side {
         let is_shallow = first.value > -SHALLOW * shape.thinnest();
         match kept {
-            Some(kept) if !is_shallow && shape.support(kept.normal).is_finite() => {
-                Side::Plane { normal: kept.normal, offset: shape.support(kept.normal) }
-            }
-            _ => tangent(from, first),
+            Some(kept) if !is_shallow => Side::Plane { normal: kept.normal, offset: kept.offset },
+            _ => tangent(shape, from, first),
         }
     }
 
@@ -180,21 +185,23 @@ impl Touching {
     pub fn feel(&self, tool: Placed<'_>, place: Vec3<f64>) -> Felt {
         let Placed { shape, pose } = tool;
         let local = pose.undo(place);
-        let Distance { value, normal, curvature } = match self.side {
+        let Distance { value, normal, slope, curvature } = match self.side {
             Side::Plane { normal, offset } => {
-                Distance { value: normal.dot(local) - offset, normal, curvature: 0.0 }
+                let value = normal.dot(local) - offset;
+                Distance { value, normal, slope: 1.0, curvature: 0.0 }
             }
             Side::Live => shape.distance(local),
         };
         let normal = pose.turn(normal);
         let Squeezed { energy, force, stiffness } = self.foundation.squeeze(value);
+        let pressed = force * slope;
         let mut felt = Felt {
             distance: value,
             energy,
-            force: normal * force,
-            pressed: force,
+            force: normal * pressed,
+            pressed,
             normal,
-            stiffness,
+            stiffness: stiffness * slope * slope,
             drag: 0.0,
             tie: 0.0,
             turning: force * curvature,
@@ -247,7 +254,7 @@ impl Touching {
         let touches =
             (-SHALLOW * shape.thinnest()..self.foundation.thickness).contains(&distance.value);
         if touches && distance.normal.dot(normal) > SAME_SIDE {
-            self.side = tangent(local, &distance);
+            self.side = tangent(shape, local, &distance);
         }
     }
 
@@ -278,11 +285,19 @@ impl Touching {
             }
             _ => tool.pose.undo(place),
         };
+        let (normal, offset) = match self.side {
+            Side::Plane { normal, offset } => (normal, offset),
+            Side::Live => {
+                let local = tool.pose.undo(place);
+                tool.shape.tangent(local, &tool.shape.distance(local))
+            }
+        };
         Some(Touch {
             sample: self.sample,
             tool: self.tool,
             anchor,
-            normal: tool.pose.turn_back(felt.normal),
+            normal,
+            offset,
             pressed: felt.pressed,
             force: felt.force,
             place,
@@ -299,9 +314,9 @@ fn friction(law: &ContactLaw, foundation: &Foundation, kept: &Touch) -> Option<F
 }
 
 /// The tangent plane at a point [m], which is as far from it as the shape.
-fn tangent(at: Vec3<f64>, distance: &Distance) -> Side {
-    let Distance { value, normal, .. } = *distance;
-    Side::Plane { normal, offset: normal.dot(at) - value }
+fn tangent(shape: &Shape, at: Vec3<f64>, distance: &Distance) -> Side {
+    let (normal, offset) = shape.tangent(at, distance);
+    Side::Plane { normal, offset }
 }
 
 /// Goes along a path [m] in the tool's frame by sphere tracing; the plane where it first comes within half the thickness.
@@ -311,23 +326,26 @@ fn trace(shape: &Shape, from: Vec3<f64>, to: Vec3<f64>, thickness: f64) -> Optio
         return None;
     }
     let near = 0.5 * thickness;
+    let longest = length * shape.steepest();
     let mut share = 0.0;
     let mut at = from;
     for _ in 0..MOST_TRACED {
         let distance = shape.distance(at);
         // A hundredth of the thickness from there is there.
         if distance.value <= near * 1.02 {
-            return Some(tangent(at, &distance));
+            return Some(tangent(shape, at, &distance));
         }
-        share += (distance.value - near) / length;
+        share += (distance.value - near) / longest;
         if share >= 1.0 {
             let end = shape.distance(to);
-            return (end.value <= near).then(|| tangent(to, &end));
+            return (end.value <= near).then(|| tangent(shape, to, &end));
         }
         at = from + way * share;
     }
-    // Grazing: so near for so long that it counts.
-    Some(tangent(at, &shape.distance(at)))
+    // Grazing: so near for so long that it counts. Along a gap between two sides of a tool it may be near to neither.
+    let distance = shape.distance(at);
+    let is_met = distance.value < thickness || shape.is_convex();
+    is_met.then(|| tangent(shape, at, &distance))
 }
 
 #[cfg(test)]

@@ -189,7 +189,7 @@ fn build_parts(table: &ToolTable) -> Result<Vec<Part>, String> {
             let shape = rounded_box(size, table.rounding, 0.25);
             let away = 0.5 * (table.jaw_gap.unwrap_or(0.0) + size[1]);
             let jaw = |opens: f64| Part {
-                shape,
+                shape: shape.clone(),
                 place: at(vec3(0.0, opens * away, -0.5 * size[2])),
                 opens,
             };

@@ -71,7 +71,7 @@ pub struct Instrument {
 }
 
 /// One shape of an instrument.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Part {
     /// In its own frame.
     pub shape: Shape,
@@ -171,7 +171,7 @@ impl Instrument {
         let pose = self.pose(time);
         let is_locked = self.is_locked(time);
         tools.extend(self.parts.iter().map(|part| Tool {
-            shape: part.shape,
+            shape: part.shape.clone(),
             pose: pose.after(&part.placed(angle)),
             law: self.law,
             is_locked,
@@ -276,7 +276,7 @@ mod tests {
             opens: 0.0,
         };
         let keys = vec![key(0.0, 0.0, 0.0), key(1.0, 0.2, 0.5 * PI)];
-        let tool = instrument(vec![ball], keys, None);
+        let tool = instrument(vec![ball.clone()], keys, None);
         let mut parts = Vec::new();
         for time in [0.0, 0.5, 1.0] {
             tool.parts_at(time, 0.0, &mut parts);

@@ -13,7 +13,7 @@ use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]
 use crate::solver::gpu::{Device, GpuSolver};
 use crate::solver::oscillations::Oscillations;
-use crate::solver::{Inputs, Solver, StepError};
+use crate::solver::{Inputs, Ledger, Solver, StepError};
 use crate::state::State;
 
 /// A solver on a graphics processor, as a simulation of any precision sees it.
@@ -106,6 +106,14 @@ impl<S: Real> Backend<S> {
         match &self.engine {
             Engine::Cpu(solver) => solver.wrenches(),
             Engine::Device(_) => &[],
+        }
+    }
+
+    /// See [`Solver::ledger`]; empty of devices, which have no contact.
+    pub fn ledger(&self) -> Ledger {
+        match &self.engine {
+            Engine::Cpu(solver) => solver.ledger(),
+            Engine::Device(_) => Ledger::default(),
         }
     }
 

@@ -128,6 +128,7 @@ struct SavedTouch {
     pressed: f64,
     anchor: [f64; 3],
     normal: [f64; 3],
+    offset: f64,
     force: [f64; 3],
     place: [f64; 3],
 }
@@ -141,6 +142,7 @@ impl SavedTouch {
             pressed: touch.pressed,
             anchor: touch.anchor.to_array(),
             normal: touch.normal.to_array(),
+            offset: touch.offset,
             force: touch.force.to_array(),
             place: touch.place.to_array(),
         }
@@ -152,6 +154,7 @@ impl SavedTouch {
             tool: self.tool,
             anchor: Vec3::from_f64(self.anchor),
             normal: Vec3::from_f64(self.normal),
+            offset: self.offset,
             pressed: self.pressed,
             force: Vec3::from_f64(self.force),
             place: Vec3::from_f64(self.place),

@@ -5,6 +5,7 @@ use super::holding::tolerance;
 use super::instruments::ToolForce;
 use crate::contact::Tool;
 use crate::scalar::Real;
+use crate::solver::Ledger;
 
 impl<S: Real> Simulation<S> {
     /// Forces on the scene's tools at the end of the last frame; zero before the first and after a change of settings.
@@ -20,6 +21,11 @@ impl<S: Real> Simulation<S> {
             }
         }
         forces
+    }
+
+    /// Work of tools on tissue and the energy that is stored, since the beginning or the last change of settings.
+    pub fn ledger(&self) -> Ledger {
+        self.backend.ledger()
     }
 
     /// The opening angle [rad] of a tool's jaws at the end of the last frame; nothing where it has none.

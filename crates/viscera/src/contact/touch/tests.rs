@@ -27,12 +27,14 @@ fn feel(touching: &Touching, tool: &Tool, place: Vec3<f64>) -> Felt {
 
 /// A touch of a ball that rests at a place [m] of the world and presses with 0.02 N.
 fn rested(tool: &Tool, place: Vec3<f64>) -> Touch {
-    let distance = tool.distance(place);
+    let local = tool.pose.undo(place);
+    let (normal, offset) = tool.shape.tangent(local, &tool.shape.distance(local));
     Touch {
         sample: 7,
         tool: 0,
         anchor: tool.pose.undo(place + vec3(1e-5, 2e-5, -1e-5)),
-        normal: tool.pose.turn_back(distance.normal),
+        normal,
+        offset,
         pressed: 0.02,
         force: Vec3::ZERO,
         place,
@@ -117,7 +119,7 @@ fn a_deep_sample_keeps_the_side_that_it_came_from() {
     // Just past the middle, seen from where it came.
     let place = tool.pose.translation + vec3(0.0, 0.0, -0.5e-3);
     let mut touch = rested(&tool, place);
-    touch.normal = tool.pose.turn_back(vec3(0.0, 0.0, 1.0));
+    (touch.normal, touch.offset) = (tool.pose.turn_back(vec3(0.0, 0.0, 1.0)), 4e-3);
     let still = Moved { from: place, to: place };
     let felt = feel(&find(&tool, &tool.pose, still, Some(&touch)).expect("deep"), &tool, place);
     assert!(felt.force.z > 0.0 && (felt.distance + 4.5e-3).abs() < 1e-12, "{felt:?}");

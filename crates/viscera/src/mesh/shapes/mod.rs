@@ -4,8 +4,10 @@
 //! |---|---|---|
 //! | [`block`], [`beam`] | structured: every box of a grid is split alike | the boundary itself |
 //! | [`sphere`], [`capsule`], [`liver`] | isosurface stuffing | up to three times as fine, for pictures |
+//! | [`turned`], [`lofted`] | none | a surface around an axis, or between sections |
 
 mod block;
+mod swept;
 
 use super::distance::{Capsule, SignedDistance, Sphere};
 use super::liver::Liver;
@@ -14,6 +16,7 @@ use super::{MeshError, SurfaceMesh, TetMesh};
 use crate::scalar::{Vec3, vec3};
 
 pub use block::{Block, Splitting};
+pub use swept::{lofted, turned};
 
 /// The fine surface's spacing is this fraction of the tetrahedra's: a surface triangle is then an
 /// order of magnitude smaller than a tetrahedron's face, and pictures look smooth.

@@ -42,7 +42,7 @@ fn a_ball_that_rubs_meets_the_same_force_in_frames_of_any_parts() {
         let [down, aside] = [ramp(frames, 0.0, 8.0), ramp(frames, 8.0, 24.0)];
         vec3(-0.006 + 0.0096 * aside, 0.001, 0.0195 - 0.0045 * down)
     };
-    let of = |parts| forces(&block, |x| x.z < 1e-6, ball, place, parts);
+    let of = |parts| forces(&block, |x| x.z < 1e-6, ball.clone(), place, parts);
     let (whole, divided) = (of(1), of(16));
     let apart = differ(&whole, &divided);
     // A small step is a thousandth of a frame, and forces change by up to a tenth in a frame.
@@ -58,7 +58,7 @@ fn a_blade_that_meets_a_beam_meets_the_same_force_in_frames_of_any_parts() {
     let rotation = rotation_matrix(vec3(0.0, 0.1, 0.0));
     blade.pose = RigidTransform { rotation, translation: Vec3::ZERO };
     let place = |time: f64| vec3(0.03, 0.0, -0.010 + 0.02 * ramp(60.0 * time, 0.0, 20.0));
-    let of = |parts| forces(&block, |x| x.x < -0.04 + 1e-6, blade, place, parts);
+    let of = |parts| forces(&block, |x| x.x < -0.04 + 1e-6, blade.clone(), place, parts);
     let (whole, divided) = (of(2), of(16));
     let apart = differ(&whole, &divided);
     assert!(apart < 0.01, "{apart}");

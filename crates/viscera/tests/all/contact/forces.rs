@@ -83,7 +83,7 @@ fn the_torque_is_about_the_tools_origin() {
         scene.run(1.0, |_, _| ());
         scene.solver.wrenches()[0]
     };
-    let above = run(tool);
+    let above = run(tool.clone());
     assert!(above.force.z > 0.01 && above.torque.length() < 1e-6 * above.force.z);
     // Turned about the middle of its tip it touches at the same place, and its origin is still there.
     let turn = vec3(0.3, 0.0, 0.0);

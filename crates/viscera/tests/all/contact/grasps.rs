@@ -46,7 +46,8 @@ fn grasp<S: Real>(name: &str, seed: u64, is_plate: bool) -> Grasp {
         false => (vec3(0.0, 0.0, 0.014), vec3(0.0, 0.5 * std::f64::consts::PI, 0.0), 0.006),
     };
     let held = move |x: Vec3<f64>| if is_plate { x.x < -0.03 + 1e-6 } else { x.z < 1e-6 };
-    let mut inputs = Inputs { pins: block.pins(held), tools: vec![jaw, jaw], ..Inputs::default() };
+    let mut inputs =
+        Inputs { pins: block.pins(held), tools: vec![jaw.clone(), jaw], ..Inputs::default() };
     let (mut settings, substeps) = method(name);
     if name == "xpbd" {
         // With stiffer contact its sweeps slide too slowly: many steps would be rejected.

@@ -150,10 +150,11 @@ fn foundation(law: &ContactLaw, sample: &LaidSample) -> Foundation {
 /// Whether a sample at `from` [m], which goes no farther than `farthest` [m], surely does not meet a tool.
 fn is_far(tool: &Tool, start: &RigidTransform, from: Vec3<f64>, farthest: f64) -> bool {
     let distance = tool.shape.distance(start.undo(from)).value;
+    let twice = 2.0 * tool.shape.steepest();
     if *start == tool.pose {
-        return distance > 2.0 * (tool.law.thickness + farthest);
+        return distance > twice * (tool.law.thickness + farthest);
     }
     // The tool's own motion as the sample sees it.
     let way = (tool.pose.undo(from) - start.undo(from)).length();
-    distance > 2.0 * (tool.law.thickness + farthest + way)
+    distance > twice * (tool.law.thickness + farthest + way)
 }
