@@ -28,6 +28,7 @@
 
 mod build;
 mod build_instrument;
+mod build_parts;
 mod change;
 mod checks;
 mod common;
@@ -38,6 +39,7 @@ mod instrument_tables;
 mod keys;
 mod motion;
 mod selector;
+mod solid;
 mod tables;
 mod write;
 
@@ -50,6 +52,7 @@ pub use motion::{Force, ForceKey, Motion};
 
 pub use crate::scalar::rigid::RigidTransform;
 pub use selector::{Patch, SelectError, Selector, nearest_pair};
+pub use solid::{RidgedJaw, Solid, SolidSource, Tube};
 pub use tables::{OutputSettings, TimeSettings, WorldSettings};
 
 use crate::material::{Material, MaterialError};
@@ -410,6 +413,13 @@ impl Scene {
                 && !files.contains(&path.as_str())
             {
                 files.push(path);
+            }
+            for solid in &tool.solids {
+                if let SolidSource::File { mesh, .. } = &solid.source
+                    && !files.contains(&mesh.as_str())
+                {
+                    files.push(mesh);
+                }
             }
         }
         files

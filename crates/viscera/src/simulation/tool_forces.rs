@@ -1,6 +1,7 @@
 //! What a simulation says of its tools.
 
 use super::Simulation;
+use super::crossings::crossings;
 use super::instruments::{ToolForce, forces_on};
 use crate::contact::Tool;
 use crate::scalar::Real;
@@ -11,6 +12,9 @@ impl<S: Real> Simulation<S> {
         let (tools, parts, time) = (&self.assembly.tools, &self.inputs.tools, self.time());
         let mut forces = forces_on(tools, self.backend.wrenches(), parts, time);
         self.instruments.tell_jumps(tools, &mut forces);
+        for (force, crossed) in forces.iter_mut().zip(crossings(tools, parts)) {
+            force.crossed = crossed;
+        }
         let shadow = self.shadow.as_ref().filter(|_| self.stepped);
         if let Some((shadow, wrenches)) = shadow.and_then(|all| Some((all, all.wrenches()?))) {
             for (force, other) in forces.iter_mut().zip(forces_on(tools, wrenches, parts, time)) {

@@ -2,6 +2,7 @@
 
 use super::assemble::{AssembledBody, Assembly};
 use super::assemble_error::AssembleError;
+use super::solids::Solids;
 use crate::contact::{Sample, Tool, sample_boundary, sample_embedded};
 use crate::mesh::topology::boundary_faces;
 use crate::scalar::Vec3;
@@ -14,14 +15,16 @@ const SEVERAL_EDGES: f64 = 3.0;
 const ROUNDING: f64 = 1e-9;
 
 impl Assembly {
-    /// Takes over a scene's tools and reads their paths.
+    /// Takes over a scene's tools, and reads their paths and surfaces.
     pub(super) fn add_tools(
         &mut self,
         scene: &Scene,
         load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
     ) -> Result<(), AssembleError> {
+        let mut solids = Solids::default();
         for tool in &scene.tools {
             let mut tool = tool.clone();
+            solids.make(&mut tool, load)?;
             if let Course::File { path } = &tool.course {
                 let bytes = load(path).map_err(|message| AssembleError::Load { message })?;
                 let keys = read_path(path, &bytes).map_err(|error| AssembleError::Path {
@@ -48,12 +51,12 @@ impl Assembly {
             let of_body = self.samples_of(body, thinnest);
             let area: f64 = of_body.iter().map(|sample| sample.area).sum();
             let spacing = (area / of_body.len().max(1) as f64).sqrt();
-            if let Some(tool) = self.tools.iter().find(|tool| tool.thinnest() < spacing) {
+            if let Some(tool) = self.tools.iter().find(|tool| tool.breadth() < spacing) {
                 return Err(AssembleError::ThinTool {
                     place: tool.place.clone(),
                     tool: tool.name.clone(),
                     body: body.name.clone(),
-                    radius: tool.thinnest(),
+                    radius: tool.breadth(),
                     spacing,
                 });
             }

@@ -57,7 +57,8 @@ impl DistanceGrid {
                 (low.min(*x), high.max(*x))
             });
         let brick = BRICK as f64 * cell;
-        let sizes = (high - low + Vec3::splat(2.0 * MARGIN * cell)) * (1.0 / brick);
+        let extent = high - low;
+        let sizes = (extent + Vec3::splat(2.0 * MARGIN * cell)) * (1.0 / brick);
         let counts = sizes.to_array().map(|size| size.ceil().max(1.0));
         let all: f64 = counts.iter().product();
         // Bricks along the surface, about two deep, are divided.
@@ -84,6 +85,7 @@ impl DistanceGrid {
             margin: MARGIN * cell,
             steepest: 1.0,
             thinnest,
+            breadth: 0.5 * extent.x.min(extent.y).min(extent.z),
             reach,
         };
         grid.find_corners(&maker)?;
