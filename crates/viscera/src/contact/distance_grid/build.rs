@@ -21,6 +21,9 @@ const BAND_OUTSIDE: f64 = 5.0;
 /// And so deep inside, four thicknesses: tissue is not pressed in so far, and what is, is pushed out all the same.
 const BAND_INSIDE: f64 = 8.0;
 
+/// Distances are exact up to so many cells.
+const NEAR: f64 = 6.0;
+
 /// Cells around the surface's box.
 const MARGIN: f64 = 6.0;
 
@@ -125,7 +128,7 @@ impl DistanceGrid {
                     let is_inside = corners.iter().all(|value| *value < 0.0);
                     let band = if is_inside { BAND_INSIDE } else { BAND_OUTSIDE };
                     let most = band * self.cell + around;
-                    let is_near = maker.tree.nearest(middle, most) < most;
+                    let is_near = maker.tree.nearest(middle, most, most) < most;
                     self.divided.push(if is_near { chosen.len() as u32 } else { WHOLE });
                     if is_near {
                         chosen.push([x, y, z]);
@@ -256,7 +259,7 @@ impl Maker<'_> {
                 None => known,
             };
             // A bit more, so that rounding does not make the bound the answer.
-            let distance = self.tree.nearest(place, most * (1.0 + 1e-6));
+            let distance = self.tree.nearest(place, most * (1.0 + 1e-6), NEAR * self.cell);
             before = Some((z, distance));
             match winding(line, z as f64) {
                 0 => distances.push(distance as f32),

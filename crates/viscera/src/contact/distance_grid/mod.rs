@@ -275,4 +275,4 @@ impl std::fmt::Debug for DistanceGrid {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
