@@ -241,8 +241,7 @@ impl<S: Real> Run for SimulationRun<S> {
     }
 
     fn end_recording(&mut self) -> Vec<u8> {
-        let Self { recorder, simulation, .. } = self;
-        recorder.take().map_or_else(Vec::new, |recorder| recorder.end(simulation))
+        self.recorder.take().map_or_else(Vec::new, Recorder::end)
     }
 
     fn change(&mut self, settings: &Settings) -> Result<(), String> {

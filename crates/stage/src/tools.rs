@@ -265,6 +265,7 @@ mod tests {
                 pinned: 0,
                 depth: 0.0,
                 has_jumped: false,
+                crossed: None,
                 error: Some(0.02),
                 torque_error: None,
             },

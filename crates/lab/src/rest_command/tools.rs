@@ -62,6 +62,7 @@ pub(super) fn forces(simulation: &Simulation<f64>, rest: &Rest) -> Vec<ToolForce
             pinned,
             depth,
             has_jumped: false,
+            crossed: None,
             error: None,
             torque_error: None,
         }

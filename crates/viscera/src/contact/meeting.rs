@@ -8,7 +8,7 @@
 //! Triangles near by on the same body are left out by the mesh, never by their distance at rest: the two sides of a narrow
 //! fold are as close, and meet.
 
-use super::search::{Closest, Found, Grid, May, Since, closest};
+use super::search::{Closest, Found, Grid, May, Query, Since, closest};
 use super::skin::{Site, Skin, TissueContact};
 use crate::scalar::Vec3;
 
@@ -186,8 +186,8 @@ impl Moment<'_> {
         // Whose nearest point is on its border it has slid off, and that would hold it back.
         let is_on = |near: &Closest| near.weights.iter().all(|weight| *weight > 0.0);
         let before = before.filter(|at| is_on(&at.closest) && suits(at.triangle, &at.closest));
-        let (found, clearance) =
-            self.grid.nearest(p, reaches, self.since, |t| self.corners(t), outward, may, suits);
+        let query = Query { p, outward, reaches, since: self.since };
+        let (found, clearance) = self.grid.nearest(&query, |t| self.corners(t), may, suits);
         // In a hollow two triangles may be as near, and what went from one to the other and back would never be at rest.
         let far = |found: &Found| found.closest.away.length();
         let stays = before.filter(|before| {

@@ -90,6 +90,26 @@ impl Since {
     pub const NOTHING: Self = Self { drift: Vec3 { x: 0.0, y: 0.0, z: 0.0 }, moved: 0.0 };
 }
 
+/// What is looked for around a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Query {
+    /// The point [m].
+    pub p: Vec3<f64>,
+    /// Triangles whose normal is nearly this are left out, see [`PARALLEL`]; none where it is zero.
+    pub outward: Vec3<f64>,
+    /// How far it reaches [m], and how far for what is only counted.
+    pub reaches: [f64; 2],
+    /// What has happened since the grid was sorted.
+    pub since: Since,
+}
+
+impl Query {
+    /// Around a point [m], of a grid that was just sorted.
+    pub fn around(p: Vec3<f64>, reach: f64) -> Self {
+        Self { p, outward: Vec3::ZERO, reaches: [reach; 2], since: Since::NOTHING }
+    }
+}
+
 /// Whether a triangle may be met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum May {
@@ -170,20 +190,17 @@ impl Grid {
         self.normals.extend(self.sorted.iter().map(|&(_, number)| normals[number as usize]));
     }
 
-    /// The nearest triangle to `p` [m] within `reach` [m] that `may` be met and that `suits` as it lies; and the distance [m],
-    /// at most `farther`, of the nearest that may be met now or later. Of `may` the
-    /// second argument is the product of the triangle's normal with `outward`; those where it is at least [`PARALLEL`] are
-    /// left out.
+    /// The nearest triangle within reach that `may` be met and that `suits` as it lies; and the distance [m], at most the
+    /// farther reach, of the nearest that may be met now or later. Of `may` the second argument is the product of the
+    /// triangle's normal with `outward`.
     pub fn nearest(
         &self,
-        p: Vec3<f64>,
-        [reach, farther]: [f64; 2],
-        Since { moved, drift }: Since,
+        query: &Query,
         corners: impl Fn(u32) -> [Vec3<f64>; 3],
-        outward: Vec3<f64>,
         mut may: impl FnMut(u32, f64) -> May,
         mut suits: impl FnMut(u32, &Closest) -> bool,
     ) -> (Option<Found>, f64) {
+        let Query { p, outward, reaches: [reach, farther], since: Since { moved, drift } } = *query;
         let mut best: Option<(f64, Found)> = None;
         let mut clearance = farther;
         // Where the point would have been when the grid was sorted.
@@ -210,7 +227,7 @@ impl Grid {
             let near = closest(p, corners(triangle));
             let squared = near.away.length_squared();
             // Nor where it is no number, as beside triangles without area.
-            if !(squared <= farther * farther) {
+            if squared.is_nan() || squared > farther * farther {
                 return;
             }
             clearance = clearance.min(squared.sqrt());
@@ -320,10 +337,9 @@ mod tests {
                 _ => May::Now,
             };
             let farther = 1.5 * reach;
-            let (found, clearance) =
-                grid.nearest(p, [reach, farther], since, corners, Vec3::ZERO, also, |t, _| {
-                    t % 3 != 0
-                });
+            let outward = Vec3::ZERO;
+            let query = Query { p, outward, reaches: [reach, farther], since };
+            let (found, clearance) = grid.nearest(&query, corners, also, |t, _| t % 3 != 0);
             let mut all: Vec<(f64, u32)> = (0..200)
                 .filter(|&t| may(t))
                 .map(|t| (closest(p, corners(t)).away.length(), t))

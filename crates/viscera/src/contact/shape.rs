@@ -118,6 +118,15 @@ impl Shape {
         }
     }
 
+    /// Half of how broad it is where it is narrowest [m], walls around a hollow apart: what would slip between points that are
+    /// farther from each other. Infinite for a half-space.
+    pub fn breadth(&self) -> f64 {
+        match self {
+            Self::Mesh(grid) => grid.breadth(),
+            _ => self.thinnest(),
+        }
+    }
+
     /// The radius of a ball around the origin that contains it [m]; infinite for a half-space.
     pub fn reach(&self) -> f64 {
         match *self {

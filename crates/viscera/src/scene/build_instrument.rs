@@ -1,16 +1,17 @@
 //! From the tables of tools in a scene file to instruments: their sizes, and keys that go together.
 
+use super::build_parts::{Built, build_parts, jaw_size};
 use super::checks::{check_name, check_times, name_or_number, purpose};
-use super::instrument::{Course, Instrument, JawDrive, Jaws, Part, ToolKind};
+use super::instrument::{Course, Instrument, JawDrive, Jaws, ToolKind};
 use super::instrument_tables::{ToolTable, WIDEST};
 use super::keys::{JawKey, MotionKey};
 use super::{SceneError, Written};
-use crate::contact::{ContactLaw, Shape};
+use crate::contact::ContactLaw;
+use crate::scalar::Vec3;
 use crate::scalar::rigid::RigidTransform;
-use crate::scalar::{Vec3, vec3};
 use crate::settings::{Choice, Placed};
 use crate::units::Dimension;
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
+use std::f64::consts::FRAC_PI_3;
 
 /// The tools of a scene, by their order.
 pub(super) fn build_instruments(
@@ -40,7 +41,7 @@ fn build_instrument(
     if value.path.is_some() && !value.keys.is_empty() {
         return Err(fail("`keys` and `path` exclude each other; keep one".to_owned()));
     }
-    let parts = build_parts(value).map_err(fail)?;
+    let Built { parts, solids } = build_parts(value).map_err(fail)?;
     if let Some(words) = parts.iter().find_map(|part| part.shape.complaint()) {
         return Err(fail(words.to_owned()));
     }
@@ -63,7 +64,7 @@ fn build_instrument(
         friction: value.friction,
     };
     let jaws = match value.kind {
-        ToolKind::Grasper => Some(build_jaws(value).map_err(fail)?),
+        ToolKind::Grasper | ToolKind::AtraumaticGrasper => Some(build_jaws(value).map_err(fail)?),
         _ => None,
     };
     if let Some(jaws) = &jaws {
@@ -73,6 +74,7 @@ fn build_instrument(
         name,
         kind: value.kind,
         parts,
+        solids,
         placement: RigidTransform::about(Vec3::ZERO, rotation, value.position),
         course: build_course(value, purpose)?,
         law,
@@ -112,6 +114,8 @@ fn own_keys(kind: ToolKind) -> &'static [&'static str] {
         ToolKind::Hook => &["radius", "length", "tip_length", "tip_angle"],
         ToolKind::Grasper => &[
             "jaw_size",
+            "jaw_mesh",
+            "unit",
             "jaw_gap",
             "rounding",
             "jaw",
@@ -120,6 +124,23 @@ fn own_keys(kind: ToolKind) -> &'static [&'static str] {
             "closing_time",
             "lock",
         ],
+        ToolKind::Mesh => &["mesh", "unit"],
+        ToolKind::AtraumaticGrasper => &[
+            "radius",
+            "length",
+            "jaw_size",
+            "jaw_gap",
+            "rounding",
+            "ridge_height",
+            "ridge_spacing",
+            "jaw",
+            "closing_force",
+            "jaw_open",
+            "closing_time",
+            "lock",
+        ],
+        ToolKind::FanRetractor => &["radius", "length", "size", "rounding", "fingers", "spread"],
+        ToolKind::SuctionTip => &["radius", "inner_radius", "length"],
     }
 }
 
@@ -140,6 +161,14 @@ fn refuse_foreign_keys(table: &ToolTable) -> Result<(), String> {
         ("jaw_open", table.jaw_open.is_some()),
         ("closing_time", table.closing_time.is_some()),
         ("lock", !table.lock.is_empty()),
+        ("mesh", table.mesh.is_some()),
+        ("jaw_mesh", table.jaw_mesh.is_some()),
+        ("unit", table.unit.is_some()),
+        ("ridge_height", table.ridge_height.is_some()),
+        ("ridge_spacing", table.ridge_spacing.is_some()),
+        ("fingers", table.fingers.is_some()),
+        ("spread", table.spread.is_some()),
+        ("inner_radius", table.inner_radius.is_some()),
     ];
     match written.iter().find(|(key, is_written)| *is_written && !taken.contains(key)) {
         None => Ok(()),
@@ -150,63 +179,6 @@ fn refuse_foreign_keys(table: &ToolTable) -> Result<(), String> {
             Err(format!("`{key}` means nothing for a {kind}, which takes {takes}"))
         }
     }
-}
-
-fn build_parts(table: &ToolTable) -> Result<Vec<Part>, String> {
-    let need = |value: Option<f64>, key: &str| {
-        value.ok_or_else(|| format!("`{key}` is missing, for example {key} = \"5 mm\""))
-    };
-    let need_size = |size: Option<[f64; 3]>, key: &str| {
-        size.ok_or_else(|| {
-            format!("`{key}` is missing, for example {key} = [\"10 mm\", \"2 mm\", \"20 mm\"]")
-        })
-    };
-    let fixed = |shape: Shape, place: RigidTransform| Part { shape, place, opens: 0.0 };
-    let alone = |shape: Shape| Ok(vec![fixed(shape, RigidTransform::IDENTITY)]);
-    match table.kind {
-        ToolKind::HalfSpace => alone(Shape::HalfSpace),
-        ToolKind::Sphere => alone(Shape::Sphere { radius: need(table.radius, "radius")? }),
-        ToolKind::Capsule | ToolKind::Probe => alone(Shape::Capsule {
-            length: need(table.length, "length")?,
-            radius: need(table.radius, "radius")?,
-        }),
-        ToolKind::Box => alone(rounded_box(need_size(table.size, "size")?, table.rounding, 0.25)),
-        ToolKind::Blade => {
-            let size = need_size(table.size, "size")?;
-            let middle = at(vec3(0.0, 0.0, 0.5 * size[2]));
-            Ok(vec![fixed(rounded_box(size, table.rounding, 0.5), middle)])
-        }
-        ToolKind::Hook => {
-            let radius = need(table.radius, "radius")?;
-            let shaft = Shape::Capsule { length: need(table.length, "length")?, radius };
-            let tip = Shape::Capsule { length: need(table.tip_length, "tip_length")?, radius };
-            let bend = vec3(-table.tip_angle.unwrap_or(FRAC_PI_2), 0.0, 0.0);
-            let bent = RigidTransform::about(Vec3::ZERO, bend, Vec3::ZERO);
-            Ok(vec![fixed(shaft, RigidTransform::IDENTITY), fixed(tip, bent)])
-        }
-        ToolKind::Grasper => {
-            let size = need_size(table.jaw_size, "jaw_size")?;
-            let shape = rounded_box(size, table.rounding, 0.25);
-            let away = 0.5 * (table.jaw_gap.unwrap_or(0.0) + size[1]);
-            let jaw = |opens: f64| Part {
-                shape: shape.clone(),
-                place: at(vec3(0.0, opens * away, -0.5 * size[2])),
-                opens,
-            };
-            Ok(vec![jaw(1.0), jaw(-1.0)])
-        }
-    }
-}
-
-/// A box of a size [m]; its edges are rounded by a share of the smallest, where nothing else is written.
-fn rounded_box(size: [f64; 3], rounding: Option<f64>, share: f64) -> Shape {
-    let smallest = size.into_iter().fold(f64::INFINITY, f64::min);
-    let radius = rounding.unwrap_or(share * smallest);
-    Shape::RoundedBox { half: Vec3::from_f64(size) * 0.5, radius }
-}
-
-fn at(place: Vec3<f64>) -> RigidTransform {
-    RigidTransform::about(Vec3::ZERO, Vec3::ZERO, place)
 }
 
 fn build_jaws(table: &ToolTable) -> Result<Jaws, String> {
@@ -235,7 +207,7 @@ fn build_jaws(table: &ToolTable) -> Result<Jaws, String> {
     let forces = table.closing_force.iter().map(|key| (key.value.time, key.value.force));
     let keys = angles.chain(forces).map(|(time, value)| JawKey { time, value });
     Ok(Jaws {
-        length: table.jaw_size.map_or(0.0, |size| size[2]),
+        length: jaw_size(table).map_or(0.0, |size| size[2]),
         gap: table.jaw_gap.unwrap_or(0.0),
         drive,
         keys: keys.collect(),

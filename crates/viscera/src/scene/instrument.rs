@@ -12,6 +12,7 @@ use super::Written;
 use super::common::Interpolation;
 use super::hand::Hand;
 use super::keys::{JawKey, MotionKey, between, mix};
+use super::solid::Solid;
 use crate::contact::{ContactLaw, Shape, Tool};
 use crate::scalar::Vec3;
 use crate::scalar::rigid::{RigidTransform, rotation_matrix};
@@ -36,8 +37,17 @@ choices! {
         /// shaft, towards +y.
         Hook = "hook",
         /// Two jaws of `jaw_size` = [width, thickness, length], along -z from a hinge at the origin; they open along
-        /// y.
+        /// y. In place of `jaw_size` a closed surface in a file, `jaw_mesh`.
         Grasper = "grasper",
+        /// Any closed surface, in a file: `mesh`.
+        Mesh = "mesh",
+        /// A grasper whose jaws have ridges across, on a shaft of `radius` and `length`.
+        AtraumaticGrasper = "atraumatic_grasper",
+        /// `fingers` of `size` = [width, thickness, length], spread by `spread` in the plane of x and z; the middle of
+        /// their ends is the origin, the hinge above it, and a shaft of `radius` and `length` goes on along +z.
+        FanRetractor = "fan_retractor",
+        /// A tube of `radius`, `inner_radius` and `length`, open at the origin. It draws nothing in.
+        SuctionTip = "suction_tip",
     }
 }
 
@@ -48,8 +58,10 @@ pub struct Instrument {
     pub name: String,
     /// What it is.
     pub kind: ToolKind,
-    /// What tissue meets of it, at least one part.
+    /// What tissue meets of it, but for the solids: at least one of both.
     pub parts: Vec<Part>,
+    /// Parts of which the distances are not computed yet; none in an assembly.
+    pub solids: Vec<Solid>,
     /// Its own pose: from its frame to the world, where no key moves it.
     pub placement: RigidTransform,
     /// How it moves.
@@ -110,7 +122,7 @@ pub enum JawDrive {
 /// Two jaws on a hinge.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Jaws {
-    /// Of each jaw, from the hinge [m].
+    /// Of each jaw, from the hinge [m]; zero until a file with the jaw is read.
     pub length: f64,
     /// Between the jaws at angle zero [m].
     pub gap: f64,
@@ -195,6 +207,11 @@ impl Instrument {
         keys_hold && jaws_hold
     }
 
+    /// Half of the breadth of its narrowest part [m]; infinite for a half-space.
+    pub fn breadth(&self) -> f64 {
+        self.parts.iter().map(|part| part.shape.breadth()).fold(f64::INFINITY, f64::min)
+    }
+
     /// The radius of its thinnest part [m]; infinite for a half-space.
     pub fn thinnest(&self) -> f64 {
         self.parts.iter().map(|part| part.shape.thinnest()).fold(f64::INFINITY, f64::min)
@@ -223,6 +240,7 @@ mod tests {
             name: "tool".into(),
             kind: ToolKind::Grasper,
             parts,
+            solids: Vec::new(),
             placement: RigidTransform::about(
                 Vec3::ZERO,
                 vec3(0.0, 0.0, 0.5 * PI),

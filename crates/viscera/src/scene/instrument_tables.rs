@@ -6,7 +6,7 @@ use crate::contact::ContactLaw;
 use crate::scalar::{Vec3, vec3};
 use crate::settings::{
     ANY, Placed, above, at_least, direction, name, number, one_of, optional, quantity,
-    settings_table, several, tables, text, vector,
+    settings_table, several, tables, text, vector, whole,
 };
 use crate::units::Dimension;
 
@@ -18,27 +18,50 @@ settings_table! {
         name: Option<String> = None, optional(name());
         /// What it is.
         kind: ToolKind = required, one_of::<ToolKind>();
-        /// Radius of a sphere, a capsule, a probe, or of the two rods of a hook.
+        /// Radius of a sphere, a capsule, a probe, of the two rods of a hook, of a shaft or a tube. Where unset "2.5 mm"
+        /// for instruments of 5 mm, which probe, hook, atraumatic grasper and suction tip are, and "5 mm" for a fan
+        /// retractor.
         radius: Option<f64> = None, optional(quantity(Dimension::Length, SIZE));
-        /// Length of a capsule between the middles of its round ends, of the shaft of a probe or a hook.
+        /// Length of a capsule between the middles of its round ends, of the shaft of an instrument; "300 mm" where unset
+        /// for an instrument.
         length: Option<f64> = None, optional(quantity(Dimension::Length, SIZE));
-        /// Edge lengths of a box; width, thickness and length of a blade.
+        /// Edge lengths of a box; width, thickness and length of a blade, or of each finger of a fan retractor, where
+        /// unset ["4 mm", "3 mm", "60 mm"].
         size: Option<[f64; 3]> = None, optional(several::<3, _>(quantity(Dimension::Length, SIZE)));
         /// Radius of the edges of a box, a blade or jaws, at most half the smallest size. Where unset, half of the
         /// smallest size for a blade and a quarter for the others.
         rounding: Option<f64> = None,
             optional(quantity(Dimension::Length, at_least(0.0).up_to(100.0)));
-        /// Length of the tip of a hook.
+        /// Length of the tip of a hook; "10 mm" where unset.
         tip_length: Option<f64> = None, optional(quantity(Dimension::Length, SIZE));
         /// Angle between the tip and the shaft of a hook; "90 deg" where unset.
         tip_angle: Option<f64> = None,
             optional(quantity(Dimension::Angle, above(0.0).below(std::f64::consts::PI)));
-        /// Width (along x), thickness and length of each jaw of a grasper.
+        /// Width (along x), thickness and length of each jaw of a grasper; of an atraumatic grasper, where unset,
+        /// ["5 mm", "3 mm", "20 mm"].
         jaw_size: Option<[f64; 3]> = None,
             optional(several::<3, _>(quantity(Dimension::Length, SIZE)));
         /// Distance between the jaws of a grasper at angle zero; none where unset.
         jaw_gap: Option<f64> = None,
             optional(quantity(Dimension::Length, at_least(0.0).up_to(100.0)));
+        /// File with the closed surface of a mesh, relative to the scene file: triangles wound outwards, its working end
+        /// at the origin.
+        mesh: Option<String> = None, optional(text());
+        /// File with one jaw of a grasper, in place of `jaw_size`: along -z from the hinge at the origin, its inner side
+        /// at y = 0 or above. The other jaw is the same, turned by half a turn about z.
+        jaw_mesh: Option<String> = None, optional(text());
+        /// The length that 1 in these files stands for; files rarely say.
+        unit: Option<f64> = None, optional(quantity(Dimension::Length, SIZE));
+        /// Height of the ridges of an atraumatic grasper; "0.5 mm" where unset.
+        ridge_height: Option<f64> = None, optional(quantity(Dimension::Length, SIZE));
+        /// From ridge to ridge; "2 mm" where unset.
+        ridge_spacing: Option<f64> = None, optional(quantity(Dimension::Length, SIZE));
+        /// Fingers of a fan retractor; 5 where unset.
+        fingers: Option<u32> = None, optional(whole(2, 15));
+        /// Angle from the first of them to the last; "60 deg" where unset.
+        spread: Option<f64> = None, optional(quantity(Dimension::Angle, above(0.0).up_to(WIDEST)));
+        /// Radius of the bore of a suction tip; "1.5 mm" where unset.
+        inner_radius: Option<f64> = None, optional(quantity(Dimension::Length, SIZE));
         /// Where the tool's origin is put.
         position: Vec3<f64> = (Vec3::ZERO), vector(Dimension::Length);
         /// Axis through the tool's origin that it is turned about before it is put in place.

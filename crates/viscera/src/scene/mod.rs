@@ -28,6 +28,7 @@
 
 mod build;
 mod build_instrument;
+mod build_parts;
 mod change;
 mod checks;
 mod common;
@@ -41,6 +42,7 @@ mod keys;
 mod motion;
 mod moved;
 mod selector;
+mod solid;
 mod tables;
 mod tray;
 mod write;
@@ -57,6 +59,7 @@ pub use motion::{Force, ForceKey, Motion};
 
 pub use crate::scalar::rigid::RigidTransform;
 pub use selector::{Patch, SelectError, Selector, nearest_pair};
+pub use solid::{RidgedJaw, Solid, SolidSource, Tube};
 pub use tables::{ContactSettings, OutputSettings, TimeSettings, WorldSettings};
 pub use tray::read_tray;
 
@@ -478,6 +481,13 @@ impl Scene {
                 && !files.contains(&path.as_str())
             {
                 files.push(path);
+            }
+            for solid in &tool.solids {
+                if let SolidSource::File { mesh, .. } = &solid.source
+                    && !files.contains(&mesh.as_str())
+                {
+                    files.push(mesh);
+                }
             }
         }
         files

@@ -1,5 +1,6 @@
 //! Why a scene cannot be put together.
 
+use crate::contact::SolidError;
 use crate::mesh::MeshError;
 use crate::mesh::embed::EmbeddingError;
 use crate::mesh::io::ReadError;
@@ -103,6 +104,28 @@ pub enum AssembleError {
         tool: String,
         /// Why not.
         error: Box<PathError>,
+    },
+    /// A surface that is no solid.
+    #[error("{place}: tool `{tool}`: {file}{error}")]
+    Solid {
+        /// Where the scene has the tool.
+        place: Place,
+        /// The tool.
+        tool: String,
+        /// The file and a colon, or nothing where none has the surface.
+        file: String,
+        /// Why not.
+        error: Box<SolidError>,
+    },
+    /// Jaws from a file that are none.
+    #[error("{place}: tool `{tool}`: {problem}")]
+    Jaws {
+        /// Where the scene has the tool.
+        place: Place,
+        /// The tool.
+        tool: String,
+        /// What is wrong and what to do.
+        problem: String,
     },
     /// A tool that would slip between the samples of a surface.
     #[error(

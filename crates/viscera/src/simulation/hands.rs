@@ -8,12 +8,13 @@
 //!
 //! A scene that has tools from its beginning and one that gets them later go through the same function, at the same frame.
 
+use super::Simulation;
 use super::acts::Act;
+use super::checks::{refuse_device, refuse_method};
 use super::error::LiveError;
 use super::holding::tolerance;
 use super::instruments::there_at;
 use super::touchable::{Entry, thinnest_until};
-use super::{Simulation, refuse_device, refuse_method};
 use crate::contact::{Sample, Tool, Touch};
 use crate::scalar::rigid::RigidTransform;
 use crate::scalar::{Real, Vec3};

@@ -8,6 +8,7 @@
 //! Force-driven jaws are quasi-static: they have no inertia, close at a limited speed, and stop where tissue holds against
 //! the force. What they met at the end of a frame decides their speed in the next one, which is part of a saved simulation.
 
+use super::crossings::Crossed;
 use super::holding::tolerance_of;
 use crate::contact::{Tool, Wrench};
 use crate::scalar::rigid::{RigidTransform, rotation_vector};
@@ -32,6 +33,8 @@ pub struct ToolForce {
     pub depth: f64,
     /// Whether it was put elsewhere in the frame, further than a tool moves.
     pub has_jumped: bool,
+    /// Another tool that it is inside of, or that is inside it: nothing keeps tools apart.
+    pub crossed: Option<Crossed>,
     /// What the force may be off by because substeps have a length and sweeps an end [N], see
     /// [`Shadow`](crate::solver::Shadow); nothing where that is not asked for.
     pub error: Option<f64>,
@@ -75,7 +78,19 @@ impl std::fmt::Display for ToolForce {
             self.name, self.touches
         )?;
         let jumped = "; it was put elsewhere, further than a tool moves";
-        if self.has_jumped { f.write_str(jumped) } else { Ok(()) }
+        if self.has_jumped {
+            f.write_str(jumped)?;
+        }
+        match &self.crossed {
+            Some(Crossed { tool, depth }) => {
+                write!(
+                    f,
+                    "; it is {:.3} mm inside `{tool}`, and nothing keeps tools apart",
+                    1e3 * depth
+                )
+            }
+            None => Ok(()),
+        }
     }
 }
 
@@ -145,7 +160,7 @@ impl Instruments {
     }
 
     /// How many parts of a tool are there.
-    fn parts_of(&self, index: usize, tool: &Instrument) -> usize {
+    pub fn parts_of(&self, index: usize, tool: &Instrument) -> usize {
         if self.is_there(index) { tool.parts.len() } else { 0 }
     }
 
@@ -397,6 +412,7 @@ fn force_on(tool: &Instrument, (wrenches, parts): (&[Wrench], &[Tool]), time: f6
         pinned: sum.pinned,
         depth: sum.depth,
         has_jumped: false,
+        crossed: None,
         error: None,
         torque_error: None,
     }

@@ -1,12 +1,13 @@
 //! What is done to a running simulation by hand. All of it becomes part of the scene, so that a scene file
 //! with [`Live`] behind its other tables does the same to the bit.
 
+use super::Simulation;
 use super::acts::Act;
 use super::automatic::{self, Chosen};
+use super::checks::check_contact;
 use super::error::{LiveError, SimulationError};
 use super::holding::{GraspOrigins, tolerance};
 use super::instruments::Instruments;
-use super::{Simulation, check_contact};
 use crate::model::ModelError;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{

@@ -5,7 +5,9 @@ pub mod advice;
 mod assemble;
 mod assemble_error;
 mod automatic;
+mod checks;
 mod choice;
+mod crossings;
 mod device;
 mod error;
 mod forces;
@@ -25,6 +27,7 @@ mod saved;
 mod sent;
 mod shadowed;
 mod skin;
+mod solids;
 mod tool_forces;
 mod touchable;
 
@@ -32,6 +35,8 @@ pub use acts::Act;
 pub use assemble::{AssembledBody, Assembly, Refinement, ResolvedPatch};
 pub use assemble_error::AssembleError;
 pub use automatic::{ExpectedErrors, automatic_settings};
+use checks::{check_contact, check_device};
+pub use crossings::Crossed;
 pub use error::{FrameError, LiveError, SimulationError};
 pub use forces::Hold;
 pub use hands::{Holder, ToolState};
@@ -55,10 +60,10 @@ use crate::model::Model;
 use crate::scalar::lanes::Instructions;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Change, Scene};
-use crate::settings::{Count, DeviceRequest, Elements, Method, SolverSettings};
+use crate::settings::{Count, Elements, Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::oscillations::Oscillations;
-use crate::solver::{Inputs, Solver, StepError, check_elements, choose};
+use crate::solver::{Inputs, Solver, check_elements, choose};
 use crate::state::{ContactState, State};
 use device::{Backend, Offered};
 
@@ -458,47 +463,6 @@ fn check_patches(scene: &Scene, assembly: &Assembly) -> Result<(), SimulationErr
         Some(vertex) => Err(SimulationError::Patch { vertex, vertex_count }),
         None => Ok(()),
     }
-}
-
-/// Contact is computed where the scene asks for it to be.
-fn check_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationError> {
-    match device_of(scene, callers_device) {
-        Some(device) if !scene.tools.is_empty() => Err(SimulationError::ToolsOnDevice { device }),
-        Some(device) if bodies_meet(scene) => Err(SimulationError::BodiesOnDevice { device }),
-        _ => Ok(()),
-    }
-}
-
-/// Devices compute no contact.
-fn refuse_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationError> {
-    match device_of(scene, callers_device) {
-        Some(device) => Err(SimulationError::ToolsOnDevice { device }),
-        None => Ok(()),
-    }
-}
-
-/// The device that is asked for, where one is.
-fn device_of(scene: &Scene, callers_device: bool) -> Option<DeviceRequest> {
-    let on_device = match &scene.solver.device {
-        DeviceRequest::Cpu | DeviceRequest::Auto => None,
-        device => Some(device.clone()),
-    };
-    on_device.or(callers_device.then_some(DeviceRequest::Gpu))
-}
-
-/// Whether bodies of a scene meet each other, or are tied.
-fn bodies_meet(scene: &Scene) -> bool {
-    scene.bodies.len() > 1 && scene.contact.bodies || !scene.ties.is_empty()
-}
-
-/// The method takes contact.
-fn check_contact(scene: &Scene, solver: &SolverSettings) -> Result<(), StepError> {
-    if scene.tools.is_empty() && !bodies_meet(scene) { Ok(()) } else { refuse_method(solver) }
-}
-
-/// Not all methods compute contact.
-fn refuse_method(solver: &SolverSettings) -> Result<(), StepError> {
-    if solver.takes_contact() { Ok(()) } else { Err(StepError::ContactNeedsRebase) }
 }
 
 /// A substep of a scene [s], of so many per frame.

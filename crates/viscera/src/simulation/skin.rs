@@ -2,7 +2,7 @@
 
 use super::assemble::Assembly;
 use super::assemble_error::AssembleError;
-use crate::contact::search::{Closest, Grid, May, Since, closest};
+use crate::contact::search::{Closest, Grid, May, Query, closest};
 use crate::contact::skin::{SkinPoint, Tie as SkinTie, mean};
 use crate::contact::{Overlap, Skin};
 use crate::scalar::Vec3;
@@ -99,9 +99,8 @@ impl Assembly {
             }
             let p = mean(sample.vertices, sample.weights, positions);
             let may = |t: u32, _: f64| if is_on[t as usize] { May::Now } else { May::Never };
-            let reaches = [tie.distance; 2];
-            let (found, _) =
-                grid.nearest(p, reaches, Since::NOTHING, corners, Vec3::ZERO, may, |_, _| true);
+            let query = Query::around(p, tie.distance);
+            let (found, _) = grid.nearest(&query, corners, may, |_, _| true);
             let Some(found) = found else {
                 let all = (0..skin.triangles.len() as u32).filter(|&t| is_on[t as usize]);
                 let far = |triangle: u32| closest(p, corners(triangle)).away.length();

@@ -1,6 +1,7 @@
 //! What a simulation says of its tools.
 
 use super::Simulation;
+use super::crossings::crossings;
 use super::holding::tolerance;
 use super::instruments::ToolForce;
 use crate::contact::Tool;
@@ -13,6 +14,10 @@ impl<S: Real> Simulation<S> {
         let (tools, parts, time) = (&self.assembly.tools, &self.inputs.tools, self.time());
         let mut forces = self.instruments.forces_on(tools, self.backend.wrenches(), parts, time);
         self.instruments.tell_jumps(tools, &mut forces);
+        let count_of = |index: usize, tool: &_| self.instruments.parts_of(index, tool);
+        for (force, crossed) in forces.iter_mut().zip(crossings(tools, parts, count_of)) {
+            force.crossed = crossed;
+        }
         let shadow = self.shadow.as_ref().filter(|_| self.stepped);
         if let Some((shadow, wrenches)) = shadow.and_then(|all| Some((all, all.wrenches()?))) {
             let others = self.instruments.forces_on(tools, wrenches, parts, time);

@@ -3,6 +3,7 @@
 use super::assemble::{AssembledBody, Assembly};
 use super::assemble_error::AssembleError;
 use super::holding::tolerance;
+use super::solids::Solids;
 use crate::contact::{Sample, Tool, sample_boundary, sample_embedded};
 use crate::mesh::topology::boundary_faces;
 use crate::scalar::Vec3;
@@ -15,14 +16,16 @@ const SEVERAL_EDGES: f64 = 3.0;
 const ROUNDING: f64 = 1e-9;
 
 impl Assembly {
-    /// Takes over a scene's tools and reads their paths.
+    /// Takes over a scene's tools, and reads their paths and surfaces.
     pub(super) fn add_tools(
         &mut self,
         scene: &Scene,
         load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
     ) -> Result<(), AssembleError> {
+        let mut solids = Solids::default();
         for tool in &scene.tools {
             let mut tool = tool.clone();
+            solids.make(&mut tool, load)?;
             if let Course::File { path } = &tool.course {
                 let bytes = load(path).map_err(|message| AssembleError::Load { message })?;
                 let keys = read_path(path, &bytes).map_err(|error| AssembleError::Path {
@@ -65,12 +68,12 @@ impl Assembly {
             let (area, count) = of_body
                 .fold((0.0, 0_usize), |(area, count), sample| (area + sample.area, count + 1));
             let spacing = (area / count.max(1) as f64).sqrt();
-            if tool.thinnest() < spacing {
+            if tool.breadth() < spacing {
                 return Err(AssembleError::ThinTool {
                     place: tool.place.clone(),
                     tool: tool.name.clone(),
                     body: body.name.clone(),
-                    radius: tool.thinnest(),
+                    radius: tool.breadth(),
                     spacing,
                 });
             }

@@ -41,6 +41,7 @@ mod measures;
 mod mesh;
 mod mesh_damage;
 mod mesh_io;
+mod mesh_tools;
 mod parts;
 mod physics;
 mod pins;

@@ -98,7 +98,7 @@ fn numbers_that_no_tool_has_are_refused() {
     }
     let error = parse(&replaced("kind = \"sphere\"", "kind = \"sphre\"")).map(|_| ());
     let message = "t.toml, line 14, column 1: kind = \"sphre\": did you mean `sphere`? Valid: half_space, sphere, capsule, \
-                   box, probe, blade, hook, grasper";
+                   box, probe, blade, hook, grasper, mesh, atraumatic_grasper, fan_retractor, suction_tip";
     assert_eq!(error, Err(message.to_owned()));
 }
 

@@ -21,6 +21,9 @@ const BAND_OUTSIDE: f64 = 5.0;
 /// And so deep inside, four thicknesses: tissue is not pressed in so far, and what is, is pushed out all the same.
 const BAND_INSIDE: f64 = 8.0;
 
+/// Distances are exact up to so many cells.
+const NEAR: f64 = 6.0;
+
 /// Cells around the surface's box.
 const MARGIN: f64 = 6.0;
 
@@ -57,7 +60,8 @@ impl DistanceGrid {
                 (low.min(*x), high.max(*x))
             });
         let brick = BRICK as f64 * cell;
-        let sizes = (high - low + Vec3::splat(2.0 * MARGIN * cell)) * (1.0 / brick);
+        let extent = high - low;
+        let sizes = (extent + Vec3::splat(2.0 * MARGIN * cell)) * (1.0 / brick);
         let counts = sizes.to_array().map(|size| size.ceil().max(1.0));
         let all: f64 = counts.iter().product();
         // Bricks along the surface, about two deep, are divided.
@@ -84,6 +88,7 @@ impl DistanceGrid {
             margin: MARGIN * cell,
             steepest: 1.0,
             thinnest,
+            breadth: 0.5 * extent.x.min(extent.y).min(extent.z),
             reach,
         };
         grid.find_corners(&maker)?;
@@ -123,7 +128,7 @@ impl DistanceGrid {
                     let is_inside = corners.iter().all(|value| *value < 0.0);
                     let band = if is_inside { BAND_INSIDE } else { BAND_OUTSIDE };
                     let most = band * self.cell + around;
-                    let is_near = maker.tree.nearest(middle, most) < most;
+                    let is_near = maker.tree.nearest(middle, most, most) < most;
                     self.divided.push(if is_near { chosen.len() as u32 } else { WHOLE });
                     if is_near {
                         chosen.push([x, y, z]);
@@ -254,7 +259,7 @@ impl Maker<'_> {
                 None => known,
             };
             // A bit more, so that rounding does not make the bound the answer.
-            let distance = self.tree.nearest(place, most * (1.0 + 1e-6));
+            let distance = self.tree.nearest(place, most * (1.0 + 1e-6), NEAR * self.cell);
             before = Some((z, distance));
             match winding(line, z as f64) {
                 0 => distances.push(distance as f32),

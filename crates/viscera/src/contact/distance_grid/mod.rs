@@ -61,6 +61,8 @@ pub struct DistanceGrid {
     steepest: f64,
     /// Half of the thickness of its walls at the thinnest [m].
     thinnest: f64,
+    /// Half of the smallest edge of its box [m].
+    breadth: f64,
     /// The radius of a ball around the origin that holds it [m].
     reach: f64,
 }
@@ -101,6 +103,11 @@ impl DistanceGrid {
     /// Half of the thickness of its walls where they are thinnest [m].
     pub fn thinnest(&self) -> f64 {
         self.thinnest
+    }
+
+    /// Half of the smallest edge of the box around it [m].
+    pub fn breadth(&self) -> f64 {
+        self.breadth
     }
 
     /// The radius of a ball around the origin that holds the surface [m].
@@ -268,4 +275,4 @@ impl std::fmt::Debug for DistanceGrid {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

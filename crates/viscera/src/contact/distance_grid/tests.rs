@@ -16,7 +16,7 @@ fn ball(radius: f64, sides: u32) -> SurfaceMesh {
 }
 
 /// A fork of two prongs of 4 x 4 mm along -z, 20 mm long and 8 mm apart, which are one above: a U.
-fn fork() -> SurfaceMesh {
+pub fn fork() -> SurfaceMesh {
     let turns = 12;
     let section = |middle: Vec3<f64>, out: Vec3<f64>| {
         let side = vec3(0.0, 1.0, 0.0);
@@ -219,4 +219,60 @@ fn shapes_with_a_grid_are_shapes() {
     let (normal, offset) = shape.tangent(x, &distance);
     assert!((normal - vec3(1.0, 0.0, 0.0)).length() < 1e-3 && (offset - 8e-3).abs() < 1e-5);
     assert!((normal.dot(x) - offset - distance.value).abs() < 1e-12);
+}
+
+/// Numbers of docs/algorithm.md, for the machine that this runs on.
+#[test]
+#[ignore = "slow: measures time"]
+fn samples_and_grids_take_little_time_at_length() {
+    // Of this thread [s], where the system tells it: others may be at work.
+    let now = || {
+        let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+        let first = text.split_whitespace().next().and_then(|word| word.parse::<f64>().ok());
+        first.map_or(f64::NAN, |nanoseconds| 1e-9 * nanoseconds)
+    };
+    let start = now();
+    let grid = grid(&fork());
+    let made = now() - start;
+    // Where contact is: points within a millimetre of the surface.
+    let near: Vec<_> = points(400_000)
+        .map(|x| vec3(x.x * 9e-3, x.y * 3e-3, x.z * 0.015 - 8e-3))
+        .filter(|x| grid.distance(*x).value.abs() < 1e-3)
+        .collect();
+    let rate = |sum: &dyn Fn(Vec3<f64>) -> f64| {
+        let start = now();
+        let all: f64 = near.iter().map(|x| sum(*x)).sum();
+        assert!(all.is_finite());
+        near.len() as f64 / (1e3 * (now() - start))
+    };
+    let best = |sum: &dyn Fn(Vec3<f64>) -> f64| (0..9).map(|_| rate(sum)).fold(0.0, f64::max);
+    let distances = best(&|x| {
+        let distance = grid.distance(x);
+        distance.value + distance.normal.x * distance.slope
+    });
+    let planes = best(&|x| grid.normal(x).z);
+    println!(
+        "fork of {} triangles: {:.0} ms, {} KiB, steepest {:.2}; {distances:.0} distances with gradient a millisecond, \
+         {planes:.0} normals of planes, at {} points",
+        grid.surface.triangles.len(),
+        1e3 * made,
+        grid.bytes() >> 10,
+        grid.steepest(),
+        near.len()
+    );
+    // A tenth of what a processor of 2023 does.
+    assert!(!(distances < 1000.0 || planes < 200.0));
+    for sides in [200, 1400] {
+        let large = ball(0.02, sides);
+        let start = now();
+        let grid = DistanceGrid::new(&large, THICKNESS).expect("a grid");
+        let made = now() - start;
+        println!(
+            "ball of {} triangles: {made:.1} s, {} MiB",
+            large.triangles.len(),
+            grid.bytes() >> 20
+        );
+        assert!((grid.distance(vec3(0.0, 0.0, 0.021)).value - 1e-3).abs() < 1e-5);
+        assert!(!(made > 60.0));
+    }
 }

@@ -8,6 +8,9 @@ const LEAF: usize = 4;
 /// Deeper than this no tree is: halves of 2^32 triangles.
 const DEEPEST: usize = 64;
 
+/// Far from the surface distances may be so much too large, as a share.
+const ROUGH: f64 = 2e-3;
+
 /// A box, and what is in it.
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -39,13 +42,17 @@ impl Tree {
         Self { nodes, triangles, numbers }
     }
 
-    /// The distance [m] from a point to the nearest triangle; `most` where all are farther than that.
-    pub fn nearest(&self, point: Vec3<f64>, most: f64) -> f64 {
+    /// The distance [m] from a point to the nearest triangle; `most` where all are farther than that. Exact up to `near`;
+    /// beyond, up to [`ROUGH`] more than it is: from the middle of a ball all of its triangles are equally far.
+    pub fn nearest(&self, point: Vec3<f64>, most: f64, near: f64) -> f64 {
         let mut best = most * most;
+        let near = near * near;
+        let rough = 1.0 + 2.0 * ROUGH;
         let mut stack = Stack::new();
         stack.push(0, self.nodes[0].distance_squared(point));
         while let Some((index, squared)) = stack.pop() {
-            if squared >= best {
+            let counted = if best > near { squared * rough } else { squared };
+            if counted >= best {
                 continue;
             }
             let node = &self.nodes[index as usize];
@@ -317,9 +324,11 @@ mod tests {
             let point = triangles(201)[i + 1][0] * 1.5;
             let each = all.iter().map(|triangle| distance_squared(point, triangle).sqrt());
             let nearest = each.fold(f64::INFINITY, f64::min);
-            assert_eq!(tree.nearest(point, f64::INFINITY), nearest);
+            assert_eq!(tree.nearest(point, f64::INFINITY, f64::INFINITY), nearest);
+            let rough = tree.nearest(point, f64::INFINITY, 0.0);
+            assert!((nearest..=nearest * (1.0 + 2.0 * ROUGH)).contains(&rough));
             // A bound that is too small is told as it is.
-            assert_eq!(tree.nearest(point, 0.5 * nearest), 0.5 * nearest);
+            assert_eq!(tree.nearest(point, 0.5 * nearest, nearest), 0.5 * nearest);
         }
     }
 

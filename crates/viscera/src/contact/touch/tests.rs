@@ -200,3 +200,87 @@ fn a_lock_ties_what_is_pressed_and_lets_all_go_at_once() {
     tool.is_locked = false;
     assert_eq!(held.keep(&tool, off, &felt), None);
 }
+
+/// A fork whose prongs are 4 mm thick and 8 mm apart, on both sides of the plane x = 0.
+fn fork() -> Tool {
+    let surface = crate::contact::distance_grid::tests::fork();
+    let grid = crate::contact::DistanceGrid::new(&surface, 1e-3).expect("a fork");
+    Tool::new(Shape::Mesh(std::sync::Arc::new(grid)))
+}
+
+/// The plane that a sample has met is the one that it keeps: the outermost plane of that normal is another prong's.
+#[test]
+fn a_deep_sample_of_a_fork_keeps_the_plane_that_it_has_met() {
+    let tool = fork();
+    let met = vec3(4.2e-3, 0.0, -0.01);
+    let still = Moved { from: met, to: met };
+    let touching = find(&tool, &tool.pose, still, None).expect("in contact");
+    let kept = touching.keep(&tool, met, &feel(&touching, &tool, met)).expect("pressed");
+    assert!((kept.normal - vec3(-1.0, 0.0, 0.0)).length() < 1e-3);
+    assert!((kept.offset + 4e-3).abs() < 1e-5, "{}", kept.offset);
+    let deep = vec3(4.9e-3, 0.0, -0.01);
+    let touching =
+        find(&tool, &tool.pose, Moved { from: deep, to: deep }, Some(&kept)).expect("deep");
+    let felt = feel(&touching, &tool, deep);
+    assert!((felt.distance + 0.9e-3).abs() < 1e-5 && felt.force.x < 0.0, "{felt:?}");
+}
+
+#[test]
+fn what_goes_between_the_prongs_of_a_fork_meets_nothing() {
+    let mut tool = fork();
+    let start = tool.pose;
+    for (aside, place) in [(0.0, -0.03), (2.6e-3, -0.03), (-2.6e-3, -0.04), (2.6e-3, -0.02)] {
+        // Up by 20 mm in the step, with the fork coming down by as much.
+        tool.pose.translation = vec3(0.0, 0.0, -0.01);
+        let from = vec3(aside, 0.0, place);
+        let moved = Moved { from, to: from + vec3(0.0, 0.0, 0.01) };
+        if let Some(touching) = find(&tool, &start, moved, None) {
+            assert_eq!(touching.side, Side::Live, "{aside} {place}");
+            assert_eq!(feel(&touching, &tool, moved.to).energy, 0.0);
+        }
+    }
+    // Below a prong there is one.
+    let from = vec3(6e-3, 0.0, -0.03);
+    let moved = Moved { from, to: from + vec3(0.0, 0.0, 0.01) };
+    let felt = feel(&find(&tool, &start, moved, None).expect("met"), &tool, moved.to);
+    assert!(felt.force.z < 0.0 && felt.distance < 0.0, "{felt:?}");
+}
+
+/// Of a distance that is interpolated: force and stiffness have the gradient's length.
+#[test]
+fn forces_at_a_mesh_are_slopes_of_its_energy() {
+    let tool = fork();
+    let mut bent = 0;
+    for i in 1..200 {
+        let at = |step: f64| (f64::from(i) * step) % 1.0;
+        let place = vec3(8.1e-3 + 0.7e-3 * at(0.61), 2e-3 * at(0.75) - 1e-3, 4e-3 * at(0.57));
+        let touching = Touching {
+            sample: 0,
+            tool: 0,
+            foundation: FOUNDATION,
+            side: Side::Live,
+            friction: None,
+            is_tied: false,
+        };
+        let felt = feel(&touching, &tool, place);
+        let h = 1e-9;
+        let mut slope = Vec3::ZERO;
+        let mut jumps = false;
+        for axis in 0..3 {
+            let mut step = Vec3::ZERO;
+            step[axis] = h;
+            let [a, b] = [1.0, -1.0].map(|sign| feel(&touching, &tool, place + step * sign));
+            slope[axis] = (b.energy - a.energy) / (2.0 * h);
+            jumps |= (a.normal - b.normal).length() > 1e-4;
+            let second = (b.force - a.force)[axis] / (2.0 * h);
+            let bound = felt.curvature().columns[axis][axis] + felt.turning;
+            assert!(jumps || second <= bound + 1e-3 * felt.stiffness, "{second} {bound}");
+        }
+        assert!(jumps || (slope - felt.force).length() < 1e-6, "{slope:?} {felt:?}");
+        let distance = tool.distance(place);
+        let wanted = FOUNDATION.squeeze(felt.distance).force * distance.slope;
+        assert!((felt.pressed - wanted).abs() < 1e-15);
+        bent += u32::from((distance.slope - 1.0).abs() > 1e-3 && felt.pressed > 0.0);
+    }
+    assert!(bent > 20, "{bent}");
+}

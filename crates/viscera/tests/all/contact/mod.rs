@@ -3,6 +3,7 @@
 mod divided;
 mod forces;
 mod grasps;
+mod meshes;
 mod motion;
 mod passes;
 mod refused;

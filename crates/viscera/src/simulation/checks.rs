@@ -1,0 +1,47 @@
+//! Whether what a scene asks for is what computes it: only the CPU, and not every method, computes contact.
+
+use super::error::SimulationError;
+use crate::scene::Scene;
+use crate::settings::{DeviceRequest, SolverSettings};
+use crate::solver::StepError;
+
+/// Contact is computed where the scene asks for it to be.
+pub(super) fn check_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationError> {
+    match device_of(scene, callers_device) {
+        Some(device) if !scene.tools.is_empty() => Err(SimulationError::ToolsOnDevice { device }),
+        Some(device) if bodies_meet(scene) => Err(SimulationError::BodiesOnDevice { device }),
+        _ => Ok(()),
+    }
+}
+
+/// Devices compute no contact.
+pub(super) fn refuse_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationError> {
+    match device_of(scene, callers_device) {
+        Some(device) => Err(SimulationError::ToolsOnDevice { device }),
+        None => Ok(()),
+    }
+}
+
+/// The device that is asked for, where one is.
+fn device_of(scene: &Scene, callers_device: bool) -> Option<DeviceRequest> {
+    let on_device = match &scene.solver.device {
+        DeviceRequest::Cpu | DeviceRequest::Auto => None,
+        device => Some(device.clone()),
+    };
+    on_device.or(callers_device.then_some(DeviceRequest::Gpu))
+}
+
+/// Whether bodies of a scene meet each other, or are tied.
+fn bodies_meet(scene: &Scene) -> bool {
+    scene.bodies.len() > 1 && scene.contact.bodies || !scene.ties.is_empty()
+}
+
+/// The method takes contact.
+pub(super) fn check_contact(scene: &Scene, solver: &SolverSettings) -> Result<(), StepError> {
+    if scene.tools.is_empty() && !bodies_meet(scene) { Ok(()) } else { refuse_method(solver) }
+}
+
+/// Not all methods compute contact.
+pub(super) fn refuse_method(solver: &SolverSettings) -> Result<(), StepError> {
+    if solver.takes_contact() { Ok(()) } else { Err(StepError::ContactNeedsRebase) }
+}
