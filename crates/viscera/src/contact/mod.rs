@@ -12,6 +12,7 @@
 //! Everything here is in double precision, whatever the state's is.
 
 mod at_rest;
+mod distance;
 pub mod distance_grid;
 pub mod law;
 mod meeting;
@@ -24,13 +25,14 @@ pub mod surface;
 mod touch;
 
 pub use at_rest::Overlap;
+pub use distance::Distance;
 pub use distance_grid::{DistanceGrid, SolidError};
 pub use law::{Foundation, Friction};
 pub(crate) use meeting::{Marks, Moment, turn_normals};
 pub use pair::Kept;
 pub(crate) use pair::{Bond, Pair, from_edges};
 pub use pressure::VertexPressures;
-pub use shape::{Distance, Shape};
+pub use shape::Shape;
 pub use skin::{Skin, TissueContact};
 pub use surface::{Sample, sample_boundary, sample_embedded};
 pub use touch::{Felt, Moved, Placed, Side, Touch, Touching};

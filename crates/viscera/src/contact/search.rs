@@ -330,7 +330,7 @@ mod tests {
             let p = point(i + 1000) * 0.1 + DRIFT;
             let reach = 0.004 + 0.004 * number(i, 0.3).abs() + if i % 50 == 0 { 0.2 } else { 0.0 };
             let corners = |t: u32| triangles[t as usize].map(|corner| later[corner as usize]);
-            let may = |t: u32| t % 5 != 0;
+            let may = |t: u32| !t.is_multiple_of(5);
             let also = |t: u32, _: f64| match t % 5 {
                 0 => May::Never,
                 1 => May::Later,

@@ -14,6 +14,7 @@
 
 use std::sync::Arc;
 
+use super::distance::Distance;
 use super::distance_grid::DistanceGrid;
 use crate::scalar::{Vec3, vec3};
 
@@ -43,19 +44,6 @@ pub enum Shape {
     },
     /// Any closed surface.
     Mesh(Arc<DistanceGrid>),
-}
-
-/// Distance to a shape at a point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Distance {
-    /// [m], negative inside.
-    pub value: f64,
-    /// The direction of its gradient, of length 1.
-    pub normal: Vec3<f64>,
-    /// The gradient's magnitude: 1, but for a mesh, whose value is interpolated.
-    pub slope: f64,
-    /// The largest magnitude of its second derivative [1/m].
-    pub curvature: f64,
 }
 
 /// Inside a sphere the curvature of the distance has no bound; up to this share of the radius it counts.

@@ -25,7 +25,7 @@ mod winding;
 pub use closed::MOST_TRIANGLES;
 pub use error::{SolidError, Spot};
 
-use super::shape::Distance;
+use super::distance::Distance;
 use crate::mesh::SurfaceMesh;
 use crate::scalar::{Vec3, vec3};
 
