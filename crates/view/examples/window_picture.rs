@@ -1,5 +1,5 @@
-//! Makes the picture of the window that README.md shows: the liver lifted by springs, a probe that presses on it and a grasper that waits, in the
-//! real window without a display, drawn by a software driver.
+//! Makes the picture of the window that README.md shows: the liver lifted by springs, a probe that presses on it and a
+//! grasper that waits, in the real window without a display, drawn by a software driver.
 //!
 //! `cargo run --release -p viscera-view --example window_picture -- docs/images` writes `window.png` into that folder.
 
@@ -7,7 +7,7 @@
 mod common;
 
 use common::{MARGIN, Window};
-use eframe::egui::{Vec2, vec2};
+use eframe::egui::{Key, Vec2, vec2};
 use std::process::ExitCode;
 
 /// The size that the window opens with [points].
@@ -35,12 +35,15 @@ fn main() -> ExitCode {
     advance(&mut window, LIFTED);
     window.press("grasper");
     wait_a_frame(&mut window);
-    lead(&mut window, vec2(210.0, -40.0));
+    lead(&mut window, vec2(190.0, 30.0));
     window.press("probe");
     wait_a_frame(&mut window);
-    lead(&mut window, vec2(-150.0, 30.0));
+    // Before the liver, down to its right lobe, and into it.
+    hold_key(&mut window, Key::PageDown, 70);
+    lead(&mut window, vec2(-120.0, 190.0));
     while force(&window) < PRESSED && time(&window) < 4.0 * LIFTED {
-        lead(&mut window, vec2(0.0, 4.0));
+        hold_key(&mut window, Key::PageUp, 2);
+        wait_until_there(&mut window);
     }
     let until = time(&window) + STAYS;
     advance(&mut window, until);
@@ -64,8 +67,7 @@ fn force(window: &Window) -> f64 {
 fn lead(window: &mut Window, way: Vec2) {
     let app = window.harness.state();
     let held = app.instruments().active().expect("an instrument in hand");
-    let (hand, end) = (held.id, held.pose.translation);
-    let from = app.place(end).expect("in front of the viewer");
+    let from = app.place(held.pose.translation).expect("in front of the viewer");
     window.harness.hover_at(from);
     window.harness.step();
     window.harness.drag_at(from);
@@ -74,10 +76,24 @@ fn lead(window: &mut Window, way: Vec2) {
     window.harness.step();
     window.harness.drop_at(from + way);
     window.harness.step();
+    wait_until_there(window);
+}
+
+/// Holds a key down for so many frames of the window.
+fn hold_key(window: &mut Window, key: Key, frames: usize) {
+    window.harness.key_down(key);
+    (0..frames).for_each(|_| window.harness.step());
+    window.harness.key_up(key);
+    window.harness.step();
+}
+
+/// Waits until the instrument in hand is where it is led.
+fn wait_until_there(window: &mut Window) {
+    let hand = window.harness.state().instruments().active().map(|held| held.id);
     window.wait("an instrument that arrives", |app| {
         let held = app.instruments().active().map(|held| held.pose.translation);
         let run = app.snapshot().and_then(|snapshot| snapshot.runs.first());
-        let tool = run.and_then(|run| run.tools.iter().find(|tool| tool.hand == Some(hand)));
+        let tool = run.and_then(|run| run.tools.iter().find(|tool| tool.hand == hand));
         held.zip(tool).is_some_and(|(to, tool)| (to - tool.pose.translation).length() < 1e-6)
     });
 }

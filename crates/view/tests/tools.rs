@@ -58,8 +58,8 @@ fn drag(window: &mut Window, from: Pos2, way: Vec2) {
     window.harness.step();
     window.harness.drag_at(from);
     window.harness.step();
-    for step in 1..=10 {
-        window.harness.hover_at(from + way * (step as f32 / 10.0));
+    for step in 1..=3 {
+        window.harness.hover_at(from + way * (step as f32 / 3.0));
         window.harness.step();
     }
     window.harness.drop_at(from + way);
@@ -172,7 +172,8 @@ fn press_down(window: &mut Window, hand: u64, wanted: f64) {
         if force(window, hand) > wanted {
             break;
         }
-        lead(window, hand, vec2(0.0, 8.0));
+        let way = if force(window, hand) > 0.0 { 8.0 } else { 16.0 };
+        lead(window, hand, vec2(0.0, way));
     }
     assert!(force(window, hand) > wanted, "{} N", force(window, hand));
 }
