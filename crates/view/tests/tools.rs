@@ -132,7 +132,7 @@ fn repeat(window: &mut Window, tools: usize) {
 }
 
 #[test]
-fn a_probe_palpates_and_all_is_repeated_to_the_bit() {
+fn a_new_users_way() {
     let mut window = Window::running("grab", FAST);
     window.press("Record run");
     palpate(&mut window);
@@ -353,7 +353,7 @@ fn take_all_in(names: impl Fn(&str) -> bool) {
 }
 
 #[test]
-fn every_instrument_can_be_taken() {
+fn every_instrument_can_be_taken_in_every_scene() {
     take_all_in(|name| ["cantilever", "grasp"].contains(&name));
 }
 
