@@ -3,7 +3,8 @@
 mod common;
 
 use common::Window;
-use eframe::egui::{Key, Pos2, Vec2, vec2};
+use eframe::egui::{Key, Pos2, Role, Vec2, vec2};
+use egui_kittest::kittest::Queryable;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use viscera::record::Recording;
@@ -78,8 +79,11 @@ fn arrive(window: &mut Window, hand: u64) {
     });
 }
 
+/// Takes an instrument from the tray by its button; the legend of curves may have its name as well.
 fn take(window: &mut Window, name: &str) -> u64 {
-    window.press(name);
+    window.harness.get_by_role_and_label(Role::Button, name).click();
+    window.harness.step();
+    window.harness.step();
     let hand = window.harness.state().instruments().active().map_or(0, |held| held.id);
     window.wait("an instrument", |app| {
         let run = app.snapshot().and_then(|snapshot| snapshot.runs.first());
