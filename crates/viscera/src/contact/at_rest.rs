@@ -1,9 +1,11 @@
 //! Bodies that are close to each other, or overlap, at rest.
 
-use super::meeting::{Marks, Moment, turn_normals};
+use super::meeting::{DEEPEST, Marks, Moment, turn_normals};
 use super::search::{Grid, Since};
 use super::skin::{Skin, TissueContact, Topology, mean};
+use crate::mesh::embed::barycentric_weights;
 use crate::scalar::Vec3;
+use std::ops::Range;
 
 /// Two bodies that are close at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,13 +17,15 @@ pub struct Overlap {
 }
 
 impl Skin {
-    /// After all bodies were added: what is near what on tetrahedra of vertices at these places [m] at rest, and the samples
+    /// After all bodies were added: what is near what on tetrahedra of vertices at these places [m] at rest, `bodies` being the ranges
+    /// of their tetrahedra, and the samples
     /// that are closer to others than the thickness of contact. Returns the least distance [m] between two bodies' surfaces,
     /// below zero where they overlap, with the sample and the triangle; nothing where it is more than the thickness.
     pub fn finish(
         &mut self,
         tets: &[[u32; 4]],
         positions: &[Vec3<f64>],
+        bodies: &[Range<usize>],
         contact: &TissueContact,
     ) -> Option<Overlap> {
         self.topology = Topology::new(self, tets, positions.len());
@@ -46,27 +50,79 @@ impl Skin {
         grid.turn(&normals);
         let mut nearest: Option<Overlap> = None;
         let mut shifts = std::mem::take(&mut self.shifts);
-        let (at, normals, grid) = (&at[..], &normals[..], &grid);
-        let moment = Moment { skin: self, at, normals, grid, since: Since::NOTHING, contact };
+        let (at, normals, grid, deepest) = (&at[..], &normals[..], &grid, DEEPEST);
+        let moment =
+            Moment { skin: self, at, normals, grid, since: Since::NOTHING, contact, deepest };
+        let inside = Inside::new(tets, positions, bodies);
         for (number, shift) in shifts.iter_mut().enumerate() {
             let sample = &self.samples[number];
             let p = mean(sample.vertices, sample.weights, positions);
-            let (Some(found), _) = moment.meet(&mut marks, (number, p), None, [reach; 2]) else {
-                continue;
+            let meet = |marks: &mut Marks, deepest: f64| {
+                let moment = Moment { deepest, ..moment };
+                let found = moment.meet(marks, (number, p), None, [reach; 2]).0?;
+                let distance = found.closest.signed().0;
+                Some((distance, self.bodies[found.triangle as usize] as usize))
             };
-            let (distance, _) = found.closest.signed();
-            if distance >= thickness {
-                continue;
+            let own = self.sample_bodies[number] as usize;
+            let shallow = meet(&mut marks, DEEPEST).filter(|(distance, _)| *distance < thickness);
+            if let Some((distance, _)) = shallow {
+                *shift = thickness - distance;
             }
-            *shift = thickness - distance;
-            let bodies = [self.sample_bodies[number], self.bodies[found.triangle as usize]]
-                .map(|b| b as usize);
-            let is_nearer = nearest.is_none_or(|least| distance < least.distance);
-            if bodies[0] != bodies[1] && is_nearer {
-                nearest = Some(Overlap { bodies, distance });
+            // What looks deeper may be the far side of something thin: then the sample is not inside.
+            let is_deep = |(distance, other): &(f64, usize)| {
+                *distance < -thickness && *other != own && inside.is_in(*other, p)
+            };
+            let deep = meet(&mut marks, f64::INFINITY).filter(is_deep);
+            for (distance, other) in shallow.into_iter().chain(deep) {
+                let is_nearer = nearest.is_none_or(|least| distance < least.distance);
+                if own != other && is_nearer {
+                    nearest = Some(Overlap { bodies: [own, other], distance });
+                }
             }
         }
         self.shifts = shifts;
         nearest
+    }
+}
+
+/// The tetrahedra of each body, and boxes around them.
+struct Inside {
+    bodies: Vec<Solid>,
+}
+
+struct Solid {
+    around: Box3,
+    tets: Vec<(Box3, [Vec3<f64>; 4])>,
+}
+
+/// The lower and the upper corner [m] of a box.
+type Box3 = [Vec3<f64>; 2];
+
+impl Inside {
+    fn new(tets: &[[u32; 4]], positions: &[Vec3<f64>], bodies: &[Range<usize>]) -> Self {
+        let around = |points: &mut dyn Iterator<Item = Vec3<f64>>| {
+            let none = [Vec3::splat(f64::INFINITY), Vec3::splat(f64::NEG_INFINITY)];
+            points.fold(none, |[low, high], x| [low.min(x), high.max(x)])
+        };
+        let solid = |range: &Range<usize>| {
+            let places = |tet: &[u32; 4]| tet.map(|v| positions[v as usize]);
+            let all: Vec<_> = tets[range.clone()]
+                .iter()
+                .map(|tet| (around(&mut places(tet).into_iter()), places(tet)))
+                .collect();
+            Solid { around: around(&mut all.iter().flat_map(|(around, _)| *around)), tets: all }
+        };
+        Self { bodies: bodies.iter().map(solid).collect() }
+    }
+
+    /// Whether a point [m] is in a tetrahedron of a body.
+    fn is_in(&self, body: usize, p: Vec3<f64>) -> bool {
+        let within = |[low, high]: &Box3| p.max(*low) == p && p.min(*high) == p;
+        let Some(solid) = self.bodies.get(body).filter(|solid| within(&solid.around)) else {
+            return false;
+        };
+        solid.tets.iter().any(|(around, corners)| {
+            within(around) && barycentric_weights(*corners, p).iter().all(|weight| *weight > 0.0)
+        })
     }
 }

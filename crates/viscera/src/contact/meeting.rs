@@ -26,10 +26,10 @@ const TURNED: f64 = 0.4;
 /// A sample stays with its triangle until another is nearer by this share of the thickness.
 const STAYS: f64 = 0.1;
 
-/// How deep a sample may be behind its own body's skin, or another's, in thicknesses, where it begins to touch: the far side
-/// of thin tissue looks as if it had been passed through.
+/// How deep a sample may be behind its own body's skin, in thicknesses, where it begins to touch; and behind another's in a
+/// step: the far side of thin tissue looks as if it had been passed through.
 const SHALLOW: f64 = 0.25;
-const DEEPEST: f64 = 1.0;
+pub const DEEPEST: f64 = 1.0;
 
 /// Marks of vertices near a sample.
 #[derive(Clone, Debug, Default)]
@@ -87,6 +87,8 @@ pub struct Moment<'a> {
     pub since: Since,
     /// Which tissue meets which.
     pub contact: &'a TissueContact,
+    /// How deep a sample may be behind another body's skin where it begins to touch, in thicknesses.
+    pub deepest: f64,
 }
 
 /// Puts outward normals of triangles of points at these places [m] in the place of earlier ones; returns the largest angle
@@ -177,7 +179,7 @@ impl Moment<'_> {
                 return false;
             }
             let is_own = skin.bodies[triangle as usize] == body;
-            let shallow = if is_own { SHALLOW } else { DEEPEST };
+            let shallow = if is_own { SHALLOW } else { self.deepest };
             distance > -shallow * contact.law.thickness
                 || kept.is_some_and(|kept| self.touch(kept, triangle))
         };

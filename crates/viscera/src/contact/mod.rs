@@ -28,7 +28,7 @@ pub use at_rest::Overlap;
 pub use distance::Distance;
 pub use distance_grid::{DistanceGrid, SolidError};
 pub use law::{Foundation, Friction};
-pub(crate) use meeting::{Marks, Moment, turn_normals};
+pub(crate) use meeting::{DEEPEST, Marks, Moment, turn_normals};
 pub use pair::Kept;
 pub(crate) use pair::{Bond, Pair, from_edges};
 pub use pressure::VertexPressures;

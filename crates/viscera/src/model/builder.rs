@@ -144,7 +144,8 @@ impl ModelBuilder {
 
     /// The same with other surfaces, of bodies that have been added.
     pub fn set_skin(&mut self, mut skin: Skin, contact: &TissueContact) -> Option<Overlap> {
-        let overlap = skin.finish(&self.tets, &self.positions, contact);
+        let bodies: Vec<_> = self.bodies.iter().map(|body| body.tets.clone()).collect();
+        let overlap = skin.finish(&self.tets, &self.positions, &bodies, contact);
         self.tissue_contact = *contact;
         self.skin = Arc::new(skin);
         overlap

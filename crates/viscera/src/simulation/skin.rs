@@ -89,7 +89,7 @@ impl Assembly {
         grid.sort(&skin.triangles, &at, tie.distance);
         grid.turn(&vec![Vec3::ZERO; skin.triangles.len()]);
         let corners = |t: u32| skin.triangles[t as usize].map(|point| at[point as usize]);
-        let (mut ties, mut nearest) = (Vec::new(), f64::INFINITY);
+        let (mut ties, mut untied) = (Vec::new(), Vec::new());
         for (number, sample) in (0..).zip(&skin.samples) {
             let point = SkinPoint { vertices: sample.vertices, weights: sample.weights };
             let is_own =
@@ -102,9 +102,7 @@ impl Assembly {
             let query = Query::around(p, tie.distance);
             let (found, _) = grid.nearest(&query, corners, may, |_, _| true);
             let Some(found) = found else {
-                let all = (0..skin.triangles.len() as u32).filter(|&t| is_on[t as usize]);
-                let far = |triangle: u32| closest(p, corners(triangle)).away.length();
-                nearest = all.map(far).fold(nearest, f64::min);
+                untied.push(p);
                 continue;
             };
             let Closest { weights, .. } = found.closest;
@@ -119,6 +117,10 @@ impl Assembly {
             });
         }
         if ties.is_empty() {
+            let on = (0..skin.triangles.len() as u32).filter(|&t| is_on[t as usize]);
+            let far = |triangle: u32, p: Vec3<f64>| closest(p, corners(triangle)).away.length();
+            let all = on.flat_map(|triangle| untied.iter().map(move |&p| far(triangle, p)));
+            let nearest = all.fold(f64::INFINITY, f64::min);
             return Err(AssembleError::TiesNothing {
                 place: tie.place.clone(),
                 tie: tie.name.clone(),

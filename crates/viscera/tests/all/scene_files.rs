@@ -9,7 +9,7 @@ use viscera::settings::{
     SolverSettings, Start,
 };
 
-const SHIPPED: [(&str, &str); 8] = [
+const SHIPPED: [(&str, &str); 9] = [
     ("liver_retraction.toml", include_str!("../../../../scenes/liver_retraction.toml")),
     ("cantilever.toml", include_str!("../../../../scenes/cantilever.toml")),
     ("twist.toml", include_str!("../../../../scenes/twist.toml")),
@@ -18,6 +18,7 @@ const SHIPPED: [(&str, &str); 8] = [
     ("palpation.toml", include_str!("../../../../scenes/palpation.toml")),
     ("liver_lifted.toml", include_str!("../../../../scenes/liver_lifted.toml")),
     ("grasp.toml", include_str!("../../../../scenes/grasp.toml")),
+    ("cholecystectomy.toml", include_str!("../../../../scenes/cholecystectomy.toml")),
 ];
 
 /// Nearly every key there is, in one scene.
@@ -69,6 +70,17 @@ time = "0.25 s"
 [[motion.keys]]
 time = "0.75 s"
 translation = [0, 0, "40 mm"]
+
+[contact]
+self = false
+friction = 0.2
+thickness = "0.5 mm"
+
+[[tie]]
+from = { body = "bead", region = 0 }
+to = { body = "organ", region = 3 }
+stiffness = "20 kPa/mm"
+strength = "9 kPa"
 
 [[force]]
 body = "bead"
@@ -147,6 +159,9 @@ fn mesh_of(shape: &BodyShape) -> TetMesh {
             shapes::block(Vec3::from_f64(size), cells.map(|count| count as usize)).unwrap()
         }
         BodyShape::Liver { spacing, scale } => shapes::liver(spacing, scale).unwrap().tets,
+        BodyShape::Capsule { radius, length, spacing } => {
+            shapes::capsule(radius, length, spacing).unwrap().tets
+        }
         _ => panic!("no shipped scene uses {shape:?}"),
     }
 }
@@ -401,7 +416,9 @@ fn without_places(mut scene: Scene) -> Scene {
     let patches = patches.chain(scene.motions.iter_mut().map(|motion| &mut motion.patch));
     let patches = patches.chain(scene.forces.iter_mut().map(|force| &mut force.patch));
     let ends = scene.springs.iter_mut().flat_map(|spring| [&mut spring.from, &mut spring.to]);
-    patches.chain(ends).for_each(|patch| patch.place = nowhere.clone());
+    let ties = scene.ties.iter_mut().flat_map(|tie| [&mut tie.from, &mut tie.to]);
+    patches.chain(ends).chain(ties).for_each(|patch| patch.place = nowhere.clone());
+    scene.ties.iter_mut().for_each(|tie| tie.place = nowhere.clone());
     scene.tools.iter_mut().for_each(|tool| tool.place = nowhere.clone());
     scene
 }

@@ -7,6 +7,7 @@ mod meshes;
 mod motion;
 mod passes;
 mod refused;
+mod ties;
 mod tissue;
 
 use viscera::contact::{Shape, Tool};

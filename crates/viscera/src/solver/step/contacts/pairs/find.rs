@@ -9,7 +9,7 @@
 
 use super::{Pairs, Places, Search};
 use crate::contact::search::{Found, Since};
-use crate::contact::{Bond, Foundation, Kept, Moment, Pair, from_edges, turn_normals};
+use crate::contact::{Bond, DEEPEST, Foundation, Kept, Moment, Pair, from_edges, turn_normals};
 use crate::layout::LaidSkin;
 use crate::scalar::{Real, Vec3};
 use crate::solver::step::contacts::ContactStep;
@@ -247,7 +247,7 @@ impl Search {
         let (skin, contact) = (&skin.skin, &skin.contact);
         // Rounding of sums of small ways hides no triangle.
         let since = Since { drift: *drift, moved: travelled - sorted_at + ROUNDING };
-        Moment { skin, at, normals, grid, since, contact }
+        Moment { skin, at, normals, grid, since, contact, deepest: DEEPEST }
     }
 
     /// What a sample meets within reach [m], see [`Moment::meet`]; remembers how long it will not meet anything else.
