@@ -117,7 +117,7 @@ impl RidgedJaw {
         // Closer together at the round end.
         let at_end = (0..8).map(|k| f64::from(k) / 8.0 * half.min(0.25 * length));
         let step = length / count;
-        let begin = at_end.clone().last().unwrap_or(0.0);
+        let begin = at_end.clone().next_back().unwrap_or(0.0);
         let beyond = (0..=count as u32).map(|k| step * f64::from(k));
         let places = at_end.chain(beyond.filter(|place| *place > begin + 0.5 * step));
         let section = |from_end: f64| {

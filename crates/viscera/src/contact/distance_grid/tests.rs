@@ -261,7 +261,7 @@ fn samples_and_grids_take_little_time_at_length() {
         near.len()
     );
     // A tenth of what a processor of 2023 does.
-    assert!(!(distances < 1000.0 || planes < 200.0));
+    assert!(distances.is_nan() || distances > 1000.0 && planes > 200.0);
     for sides in [200, 1400] {
         let large = ball(0.02, sides);
         let start = now();
@@ -273,6 +273,6 @@ fn samples_and_grids_take_little_time_at_length() {
             grid.bytes() >> 20
         );
         assert!((grid.distance(vec3(0.0, 0.0, 0.021)).value - 1e-3).abs() < 1e-5);
-        assert!(!(made > 60.0));
+        assert!(made.is_nan() || made < 60.0);
     }
 }

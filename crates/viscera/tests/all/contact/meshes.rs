@@ -25,7 +25,7 @@ fn surface(shape: &Shape) -> SurfaceMesh {
     match *shape {
         Shape::Sphere { radius } => surface(&Shape::Capsule { length: 0.0, radius }),
         Shape::Capsule { length, radius } => {
-            let lower = (0..=STEPS).rev().map(|k| quarter(k)).map(|[cos, sin]| [cos, -sin]);
+            let lower = (0..=STEPS).rev().map(quarter).map(|[cos, sin]| [cos, -sin]);
             let upper = (u32::from(length == 0.0)..=STEPS).map(quarter);
             let lower = lower.map(|[across, along]| [radius * across, radius * along]);
             let upper = upper.map(|[across, along]| [radius * across, length + radius * along]);
@@ -78,8 +78,10 @@ fn pressed(name: &str, shape: Shape, (turn, low): (Vec3<f64>, f64)) -> Scene<f64
     scene
 }
 
-/// Names, shapes, how they are turned, and how far their lowest point is then below the origin [m].
-fn shapes() -> [(&'static str, Shape, (Vec3<f64>, f64)); 3] {
+/// A name, a shape, how it is turned, and how far its lowest point is then below the origin [m].
+type Case = (&'static str, Shape, (Vec3<f64>, f64));
+
+fn shapes() -> [Case; 3] {
     let half = vec3(0.008, 0.006, 0.004);
     [
         ("sphere", Shape::Sphere { radius: 8e-3 }, (vec3(0.3, 0.2, 0.1), 8e-3)),
@@ -88,7 +90,7 @@ fn shapes() -> [(&'static str, Shape, (Vec3<f64>, f64)); 3] {
     ]
 }
 
-fn compare(name: &str, shapes: &[(&str, Shape, (Vec3<f64>, f64))]) {
+fn compare(name: &str, shapes: &[Case]) {
     for (what, shape, place) in shapes {
         let truth = pressed(name, shape.clone(), *place);
         let ours = pressed(name, mesh(&surface(shape)), *place);
