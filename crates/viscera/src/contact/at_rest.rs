@@ -5,6 +5,7 @@ use super::search::{Grid, Since};
 use super::skin::{Skin, TissueContact, Topology, mean};
 use crate::mesh::embed::barycentric_weights;
 use crate::scalar::Vec3;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Two bodies that are close at rest.
@@ -29,7 +30,7 @@ impl Skin {
         contact: &TissueContact,
     ) -> Option<Overlap> {
         self.topology = Topology::new(self, tets, positions.len());
-        self.shifts = vec![0.0; self.samples.len()];
+        self.shifts.clear();
         if !(contact.itself || contact.bodies) {
             return None;
         }
@@ -49,13 +50,12 @@ impl Skin {
         turn_normals(self, &at, &mut normals);
         grid.turn(&normals);
         let mut nearest: Option<Overlap> = None;
-        let mut shifts = std::mem::take(&mut self.shifts);
+        let mut shifts = BTreeMap::<[u32; 2], f64>::new();
         let (at, normals, grid, deepest) = (&at[..], &normals[..], &grid, DEEPEST);
         let moment =
             Moment { skin: self, at, normals, grid, since: Since::NOTHING, contact, deepest };
         let inside = Inside::new(tets, positions, bodies);
-        for (number, shift) in shifts.iter_mut().enumerate() {
-            let sample = &self.samples[number];
+        for (number, sample) in self.samples.iter().enumerate() {
             let p = mean(sample.vertices, sample.weights, positions);
             let meet = |marks: &mut Marks, deepest: f64| {
                 let moment = Moment { deepest, ..moment };
@@ -65,8 +65,10 @@ impl Skin {
             };
             let own = self.sample_bodies[number] as usize;
             let shallow = meet(&mut marks, DEEPEST).filter(|(distance, _)| *distance < thickness);
-            if let Some((distance, _)) = shallow {
-                *shift = thickness - distance;
+            if let Some((distance, other)) = shallow {
+                let [a, b] = [own as u32, other as u32];
+                let shift = shifts.entry([a.min(b), a.max(b)]).or_default();
+                *shift = shift.max(thickness - distance);
             }
             // What looks deeper may be the far side of something thin: then the sample is not inside.
             let is_deep = |(distance, other): &(f64, usize)| {
@@ -80,7 +82,7 @@ impl Skin {
                 }
             }
         }
-        self.shifts = shifts;
+        self.shifts = shifts.into_iter().collect();
         nearest
     }
 }

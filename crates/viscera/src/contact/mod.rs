@@ -18,9 +18,9 @@ pub mod law;
 mod meeting;
 mod pair;
 mod pressure;
-pub mod search;
+pub(crate) mod search;
 pub mod shape;
-pub mod skin;
+pub(crate) mod skin;
 pub mod surface;
 mod touch;
 
@@ -33,7 +33,8 @@ pub use pair::Kept;
 pub(crate) use pair::{Bond, Pair, from_edges};
 pub use pressure::VertexPressures;
 pub use shape::Shape;
-pub use skin::{Skin, TissueContact};
+pub(crate) use skin::Skin;
+pub use skin::TissueContact;
 pub use surface::{Sample, sample_boundary, sample_embedded};
 pub use touch::{Felt, Moved, Placed, Side, Touch, Touching};
 

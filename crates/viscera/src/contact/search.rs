@@ -8,6 +8,7 @@
 //! What is found does not depend on when the grid was sorted: all triangles within reach are looked at where they are now,
 //! the nearest one counts, of several the lowest. Cells that share a bucket cost time, and hide nothing.
 
+use crate::mesh::nearest::nearest_weights;
 use crate::scalar::Vec3;
 
 /// The point of a triangle that is nearest to another point.
@@ -30,47 +31,11 @@ pub struct Found {
     pub closest: Closest,
 }
 
-/// The point of a triangle nearest to `p` [m]: by the regions of Ericson, "Real-time collision detection", 2005, 5.1.5.
+/// The point of a triangle nearest to `p` [m].
 pub fn closest(p: Vec3<f64>, [a, b, c]: [Vec3<f64>; 3]) -> Closest {
-    let (ab, ac, ap) = (b - a, c - a, p - a);
-    let normal = ab.cross(ac);
-    let at = |weights: [f64; 3]| {
-        let near = a * weights[0] + b * weights[1] + c * weights[2];
-        Closest { weights, away: p - near, normal }
-    };
-    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return at([1.0, 0.0, 0.0]);
-    }
-    let bp = p - b;
-    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
-    if d3 >= 0.0 && d4 <= d3 {
-        return at([0.0, 1.0, 0.0]);
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        let share = d1 / (d1 - d3);
-        return at([1.0 - share, share, 0.0]);
-    }
-    let cp = p - c;
-    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
-    if d6 >= 0.0 && d5 <= d6 {
-        return at([0.0, 0.0, 1.0]);
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        let share = d2 / (d2 - d6);
-        return at([1.0 - share, 0.0, share]);
-    }
-    let va = d3 * d6 - d5 * d4;
-    let (on_b, on_c) = (d4 - d3, d5 - d6);
-    if va <= 0.0 && on_b >= 0.0 && on_c >= 0.0 {
-        let share = on_b / (on_b + on_c);
-        return at([0.0, 1.0 - share, share]);
-    }
-    let inverse = 1.0 / (va + vb + vc);
-    let (v, w) = (vb * inverse, vc * inverse);
-    at([1.0 - v - w, v, w])
+    let weights = nearest_weights(p, [a, b, c]);
+    let near = a * weights[0] + b * weights[1] + c * weights[2];
+    Closest { weights, away: p - near, normal: (b - a).cross(c - a) }
 }
 
 /// Surfaces whose outward normals have a larger product, at an angle below 37 degrees, lie beside each other.

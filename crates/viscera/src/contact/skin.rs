@@ -183,9 +183,9 @@ pub struct Skin {
     pub sites: Vec<Site>,
     /// The body of each sample.
     pub sample_bodies: Vec<u32>,
-    /// What distances of each sample are longer by [m]: where bodies are closer than the thickness of contact at rest it
-    /// begins there.
-    pub shifts: Vec<f64>,
+    /// What distances between two bodies, the lower first, or on one are longer by [m]: where they are closer than the
+    /// thickness of contact at rest it begins there. The same everywhere, or what slides would meet a step. Others have none.
+    pub shifts: Vec<([u32; 2], f64)>,
     /// Ties between bodies, by sample.
     pub ties: Vec<Tie>,
     pub(crate) topology: Topology,
@@ -258,6 +258,13 @@ impl Skin {
         let count = self.topology.vertex_count();
         other.topology = Topology::new(&other, &tets, count);
         other
+    }
+
+    /// What distances between two bodies are longer by [m].
+    pub fn shift(&self, bodies: [u32; 2]) -> f64 {
+        let [a, b] = bodies;
+        let place = self.shifts.binary_search_by_key(&[a.min(b), a.max(b)], |(bodies, _)| *bodies);
+        place.map_or(0.0, |place| self.shifts[place].1)
     }
 
     /// Bytes of its arrays.

@@ -10,6 +10,7 @@
 //! outside every tetrahedron is bound to the nearest one, its weights extrapolated: some are then
 //! negative, and how far outside it lies is recorded.
 
+pub use super::nearest::closest_point_on_triangle;
 use super::{SurfaceMesh, TetMesh, edge_matrix};
 use crate::scalar::{Real, Vec3};
 
@@ -311,31 +312,4 @@ impl Branch {
 pub fn barycentric_weights(corners: [Vec3<f64>; 4], point: Vec3<f64>) -> [f64; 4] {
     let w = edge_matrix(corners).inverse() * (point - corners[0]);
     [1.0 - w.x - w.y - w.z, w.x, w.y, w.z]
-}
-
-/// The point of a triangle nearest to a point.
-///
-/// The projection onto the plane if it falls inside; else the nearest point of the nearest edge.
-pub fn closest_point_on_triangle(triangle: [Vec3<f64>; 3], point: Vec3<f64>) -> Vec3<f64> {
-    let [a, b, c] = triangle;
-    let normal = (b - a).cross(c - a);
-    let is_inside = [(a, b), (b, c), (c, a)]
-        .iter()
-        .all(|&(from, to)| (to - from).cross(point - from).dot(normal) >= 0.0);
-    let normal_squared = normal.length_squared();
-    if is_inside && normal_squared > 0.0 {
-        return point - normal * ((point - a).dot(normal) / normal_squared);
-    }
-    let on_edge = |from: Vec3<f64>, to: Vec3<f64>| {
-        let edge = to - from;
-        let length_squared = edge.length_squared();
-        // Two corners in one place: either will do.
-        let fraction =
-            if length_squared > 0.0 { (point - from).dot(edge) / length_squared } else { 0.0 };
-        from + edge * fraction.clamp(0.0, 1.0)
-    };
-    let distance = |x: Vec3<f64>| (x - point).length_squared();
-    let (ab, bc, ca) = (on_edge(a, b), on_edge(b, c), on_edge(c, a));
-    let nearer = |x: Vec3<f64>, y: Vec3<f64>| if distance(y) < distance(x) { y } else { x };
-    nearer(nearer(ab, bc), ca)
 }

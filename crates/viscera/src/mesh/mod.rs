@@ -21,6 +21,7 @@ pub mod distance;
 pub mod embed;
 mod lattice;
 pub mod liver;
+pub(crate) mod nearest;
 pub mod normals;
 pub mod shapes;
 pub mod tetrahedralize;

@@ -132,18 +132,21 @@ impl ModelBuilder {
     }
 
     /// Lets the surfaces of all bodies added so far meet: the outer faces of their tetrahedra. Bodies that are closer than the
-    /// thickness of contact at rest meet from there on; returns the closest two.
-    pub fn touch_tissue(&mut self, contact: &TissueContact) -> Option<Overlap> {
+    /// thickness of contact at rest meet from there on; returns the closest two. An error where the law is none.
+    pub fn touch_tissue(&mut self, contact: &TissueContact) -> Result<Option<Overlap>, ModelError> {
+        if let Some(complaint) = contact.law.complaint() {
+            return Err(ModelError::Contact { complaint });
+        }
         let mut skin = Skin::default();
         for (number, body) in (0..).zip(&self.bodies) {
             let first = body.tets.start as u32;
             skin.add_boundary(number, (&self.tets[..body.tets.end], first), &self.positions);
         }
-        self.set_skin(skin, contact)
+        Ok(self.set_skin(skin, contact))
     }
 
     /// The same with other surfaces, of bodies that have been added.
-    pub fn set_skin(&mut self, mut skin: Skin, contact: &TissueContact) -> Option<Overlap> {
+    pub(crate) fn set_skin(&mut self, mut skin: Skin, contact: &TissueContact) -> Option<Overlap> {
         let bodies: Vec<_> = self.bodies.iter().map(|body| body.tets.clone()).collect();
         let overlap = skin.finish(&self.tets, &self.positions, &bodies, contact);
         self.tissue_contact = *contact;

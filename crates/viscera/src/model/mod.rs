@@ -80,6 +80,12 @@ pub enum ModelError {
         /// The value given.
         value: f64,
     },
+    /// A law of contact that is none.
+    #[error("contact between tissues: {complaint}")]
+    Contact {
+        /// What is wrong with it.
+        complaint: &'static str,
+    },
     /// More than 32-bit indices can number.
     #[error("{count} {what} are more than the {limit} that 32-bit indices can number")]
     TooLarge {
@@ -141,9 +147,9 @@ pub struct Model<S> {
     /// Points of the surface that tools touch.
     pub samples: Arc<Vec<Sample>>,
     /// The surface on which tissue meets tissue; empty where it does not.
-    pub skin: Arc<Skin>,
+    pub(crate) skin: Arc<Skin>,
     /// Which tissue meets which.
-    pub tissue_contact: TissueContact,
+    pub(crate) tissue_contact: TissueContact,
     /// Differs from model to model: whoever keeps numbers of vertices, or constants, keeps this beside them, and
     /// compares. Of two models of the same content it is the same.
     pub(crate) revision: u64,
@@ -195,6 +201,11 @@ impl<S: Real> Model<S> {
     pub(crate) fn ties_bodies(&self) -> bool {
         let meets = self.tissue_contact.bodies && self.bodies.len() > 1;
         !self.skin.ties.is_empty() || (meets && !self.skin.triangles.is_empty())
+    }
+
+    /// Whether tissue meets its own body.
+    pub(crate) fn meets_itself(&self) -> bool {
+        self.tissue_contact.itself && !self.skin.triangles.is_empty()
     }
 
     /// The same of each triangle of the skin: the mean of its samples', or of those at its corners.

@@ -19,6 +19,20 @@ impl<S: Real> Backend<S> {
         ready: Option<Solver<S>>,
         offered: &Offered,
     ) -> Result<Self, SimulationError> {
+        let mut chosen = Self::chosen(model, settings, ready, offered)?;
+        let takes_contact = chosen.device().is_none() && settings.takes_contact();
+        if model.meets_itself() && !takes_contact {
+            chosen.choice.push_str("; a body that folds passes through itself");
+        }
+        Ok(chosen)
+    }
+
+    fn chosen(
+        model: &Model<S>,
+        settings: &SolverSettings,
+        ready: Option<Solver<S>>,
+        offered: &Offered,
+    ) -> Result<Self, SimulationError> {
         #[cfg(not(feature = "gpu"))]
         let _ = offered;
         let cpu =

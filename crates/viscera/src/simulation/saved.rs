@@ -312,7 +312,7 @@ impl<S: Real> Simulation<S> {
         };
         let fits = saved.pressed.iter().all(is_there) && saved.torn.len() <= skin.ties.len();
         let tools = self.assembly.tools.iter().zip(there).filter(|(_, there)| **there);
-        let parts = tools.map(|(tool, _)| tool.parts.len()).sum();
+        let parts: usize = tools.map(|(tool, _)| tool.parts.len()).sum();
         fits && saved.touches.iter().all(is_known)
             && saved.jaws.len() == self.scene.tools.len()
             && saved.tools.len() == parts

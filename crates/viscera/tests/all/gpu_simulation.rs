@@ -14,6 +14,7 @@ const SCENE: &str = r#"
 time = { duration = "1 s", velocity_factor = 0.9 }
 
 [contact]
+self = false
 bodies = false
 
 [[body]]
@@ -206,6 +207,22 @@ fn large_meshes_go_to_hardware_and_never_to_software_by_themselves() {
         let told = large.device_choice();
         assert!(told.ends_with(": 40,080 tetrahedra") && large.gpu().is_some(), "{told}");
     }
+}
+
+/// A device computes no contact: that is said, or refused.
+#[test]
+fn contact_of_tissue_is_the_cpus() {
+    let choice =
+        |overrides: &[(&str, &str)]| simulation(overrides).map(|s| s.device_choice().to_owned());
+    let gpu = ("solver.device", "gpu");
+    let folds = choice(&[gpu, ("contact.self", "true")]).expect("a device");
+    assert!(folds.contains("passes through itself"), "{folds}");
+    let refused = choice(&[gpu, ("contact.bodies", "true")]).expect_err("several bodies");
+    assert!(refused.to_string().contains("contact.bodies = false"), "{refused}");
+    let published =
+        [("solver.device", "cpu"), ("solver.method", "xpbd"), ("solver.rebase", "false")];
+    let published = [&published[..], &[("contact.self", "true")]].concat();
+    assert!(choice(&published).expect("the CPU").contains("passes through itself"));
 }
 
 #[test]

@@ -13,12 +13,15 @@ use super::data::{Step, StepConstants};
 use crate::scalar::lanes::Point;
 use crate::scalar::{Mat3, Real, Vec3};
 
-/// Whether tissue may meet tissue in the group of a part, which nothing else holds; told once, by the part that leads it.
+/// Whether tissue may meet tissue in the group of a part and nothing else acts on it but loads; true once for a group, of the
+/// part that leads it.
 fn is_free<S: Real>(step: &Step<'_, S>, constants: &StepConstants<S>, part: usize) -> bool {
     let (groups, parts) = (&constants.groups, &step.layout.parts);
-    step.layout.skin.is_some()
-        && groups.leads(part)
-        && !groups.of(part).any(|number| constants.holds(number, &parts[number]))
+    let holds = |number: usize| {
+        // A tool that is near may push before the step is over.
+        constants.contacts.gift(number).is_near || constants.holds(number, &parts[number])
+    };
+    step.layout.skin.is_some() && groups.leads(part) && !groups.of(part).any(holds)
 }
 
 /// Moves every group to where its momentum is what it has to be. `x` are places [m]; `xt` those of the constants.

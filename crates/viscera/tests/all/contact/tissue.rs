@@ -43,7 +43,7 @@ impl<S: Real> Bodies<S> {
         for mesh in &meshes {
             builder.add_body(mesh, &tissue).expect("a body");
         }
-        assert_eq!(builder.touch_tissue(contact), None);
+        assert_eq!(builder.touch_tissue(contact), Ok(None));
         let model = builder.build::<S>().expect("a model");
         Self {
             state: State::at_rest(&model),
@@ -246,6 +246,58 @@ fn a_collision_in_free_flight_keeps_momentum() {
     }
 }
 
+/// A ball that strikes a free block: what the block has in the end is what the ball has given, in the step in which they meet.
+#[test]
+fn a_tool_that_strikes_a_free_body_moves_it() {
+    // XPBD has only begun to answer a contact as stiff as this when its sweeps end; the force at the end of an explicit step
+    // is more than its mean.
+    for (name, share) in METHODS.into_iter().zip([0.02, 0.8, 0.3]) {
+        let block = Block::new([0.02, 0.02, 0.02], [4, 4, 4], [1e4, 0.4, 2e-3]);
+        let tissue = Material::new(SNH, 1e4, 0.4, 1060.0).expect("a tissue");
+        let mut builder = ModelBuilder::new();
+        builder.add_body(&block.mesh, &tissue).expect("a body");
+        builder.sample_surface(1);
+        assert_eq!(builder.touch_tissue(&TissueContact::default()), Ok(None));
+        let model = builder.build::<f64>().expect("a model");
+        let (settings, substeps) = method(name);
+        let dt = 1.0 / 60.0 / f64::from(substeps);
+        let mut solver = Solver::new(&model, &settings);
+        let mut state = State::at_rest(&model);
+        let mut ball = super::ball(0.01);
+        let at = |time: f64| vec3(0.0, 0.0, -0.0115 + 0.2 * time);
+        ball.pose.translation = at(0.0);
+        state.contact = viscera::state::ContactState::of(&[ball.clone()]);
+        let mut given = Vec3::<f64>::ZERO;
+        let mut step = 0;
+        while given == Vec3::ZERO && step < 20 {
+            step += 1;
+            ball.pose.translation = at(f64::from(step) * dt);
+            let inputs = Inputs { tools: vec![ball.clone()], ..Inputs::default() };
+            solver.step(&model, &mut state, &inputs, dt).expect("a step");
+            given += solver.wrenches()[0].force * -dt;
+        }
+        let mut has = Vec3::<f64>::ZERO;
+        for (velocity, mass) in state.velocities.iter().zip(&model.masses) {
+            has += *velocity * *mass;
+        }
+        println!("{name}: {has:?} of {given:?}");
+        assert!(given.z > 1e-5 && has.z > share * given.z, "{name}: {has:?} of {given:?}");
+    }
+}
+
+#[test]
+fn a_law_of_contact_that_is_none_is_refused() {
+    let mut builder = ModelBuilder::new();
+    let tissue = Material::new(SNH, 1e4, 0.4, 1060.0).expect("a tissue");
+    builder.add_body(&block_at([0.02; 3], [2; 3], Vec3::ZERO), &tissue).expect("a body");
+    for (thickness, stiffness) in [(0.0, 10.0), (f64::NAN, 10.0), (1e-3, -1.0)] {
+        let mut contact = TissueContact::default();
+        (contact.law.thickness, contact.law.stiffness) = (thickness, stiffness);
+        let error = builder.touch_tissue(&contact).expect_err("no law").to_string();
+        assert!(error.starts_with("contact between tissues: a contact's"), "{error}");
+    }
+}
+
 #[test]
 fn pairs_have_the_same_bits_for_threads_and_after_a_new_beginning() {
     for name in METHODS {
@@ -300,7 +352,7 @@ fn tilted(name: &str, stiffness: f64, substeps: u32, cells: usize, degrees: f64)
     };
     builder.add_body(&lower, &tissue(2e4)).expect("a body");
     builder.add_body(&upper, &tissue(2e4)).expect("a body");
-    builder.touch_tissue(&contact);
+    builder.touch_tissue(&contact).expect("a law");
     let model = builder.build::<f64>().expect("a model");
     let mut bodies = Bodies {
         state: State::at_rest(&model),
@@ -334,31 +386,28 @@ fn tilted(name: &str, stiffness: f64, substeps: u32, cells: usize, degrees: f64)
     moved
 }
 
-/// So many degrees on either side of the angle, 26.57 degrees, with so many cells along the edge of the upper block. Samples
-/// of the lower one come under the edge row by row, which costs and gives back a little: less with finer meshes.
-fn assert_holds_and_slides(
-    (name, stiffness, substeps): (&str, f64, u32),
-    cells: usize,
-    within: f64,
-) {
+/// So many degrees on either side of the angle, 26.57 degrees: how far it moves in 0.3 s, of what it would slide freely.
+fn assert_holds_and_slides((name, stiffness, substeps): (&str, f64, u32), within: f64) {
     let exact = libm::atan(0.5).to_degrees();
-    let moved = |degrees| tilted(name, stiffness, substeps, cells, degrees);
+    let moved = |degrees| tilted(name, stiffness, substeps, 5, degrees);
     let [holds, slides] = [exact - within, exact + within].map(moved);
-    println!("{name}: {holds:.2e} m and {slides:.2e} m in 0.3 s");
-    // It slides more slowly than g (sin - mu cos), of which it has a third here: samples that come under an edge hold it back.
-    assert!(holds < 2e-5 && slides > 5e-3, "{name}: {holds} {slides}");
+    // From the tilt on, which takes 0.3 s and ends at 0.6 s, g (sin - mu cos) is g sqrt(1 + mu^2) sin(angle - exact).
+    let gains = 9.81 * 1.118 * libm::sin(within.to_radians());
+    let free = 0.5 * gains * (0.5 * 0.5 - 0.2 * 0.2);
+    println!("{name}: {holds:.2e} m and {slides:.2e} m in 0.3 s, {free:.2e} m freely");
+    assert!(holds < 2e-5 && slides > 0.5 * free, "{name}: {holds} {slides} {free}");
 }
 
 #[test]
 fn a_block_slides_on_another_at_the_angle_of_friction() {
-    assert_holds_and_slides(("quasi_newton", 10.0, 2), 5, 1.5);
+    assert_holds_and_slides(("quasi_newton", 10.0, 2), 0.5);
 }
 
 #[test]
 #[ignore = "slow: blocks on tilted blocks for a second each"]
 fn a_block_slides_on_another_at_the_angle_of_friction_at_length() {
     for method in [("quasi_newton", 10.0, 2), ("explicit", 10.0, 1), ("xpbd", 2.0, 4)] {
-        assert_holds_and_slides(method, 5, 1.5);
+        assert_holds_and_slides(method, 0.5);
     }
 }
 

@@ -58,6 +58,9 @@ impl Pairs {
                 let key = |kept: &Kept| (skin.part_of(kept.sample), kept.sample);
                 while kept.next_if(|kept| key(kept) < (part, number)).is_some() {}
                 let kept = kept.next_if(|kept| key(kept) == (part, number));
+                // A state that somebody has changed may name triangles that there are not.
+                let kept = kept.filter(|kept| (kept.triangle as usize) < skin.parts.len());
+                self.presses[part] |= kept.is_some();
                 self.meet(skin, places, place, kept, reach);
                 while let Some(&(_, tie)) = ties.next_if(|tie| tie.0 as usize == place) {
                     if !state.torn.get(tie as usize).copied().unwrap_or(false) {
@@ -65,9 +68,6 @@ impl Pairs {
                     }
                 }
             }
-            let pressed =
-                |pair: &Pair| matches!(pair.bond, Bond::Contact { friction: Some(_), .. });
-            self.presses[part] = self.pairs[self.first[part]..].iter().any(pressed);
         }
         self.first[step.layout.part_count()] = self.pairs.len();
         self.at_start.extend_from_slice(&self.pairs);
@@ -145,7 +145,9 @@ impl Pairs {
         let moment = search.moment(skin);
         let (_, normal) = found.closest.signed();
         let thickness = skin.contact.law.thickness;
-        let (weights, shift) = (found.closest.weights, skin.skin.shifts[number]);
+        let weights = found.closest.weights;
+        let bodies = [skin.skin.sample_bodies[number], skin.skin.bodies[found.triangle as usize]];
+        let shift = skin.skin.shift(bodies);
         // What friction has kept is in terms of the triangle that it was kept on.
         let slip =
             kept.map_or(Vec3::ZERO, |kept| from_edges(kept.slip, moment.corners(kept.triangle)));
