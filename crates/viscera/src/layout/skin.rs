@@ -38,9 +38,7 @@ impl LaidSkin {
         if !settings.takes_contact() {
             return None;
         }
-        let TissueContact { itself, bodies, .. } = model.tissue_contact;
-        let meets = itself || bodies || !model.skin.ties.is_empty();
-        if !meets || model.skin.triangles.is_empty() {
+        if !model.meets_itself() && !model.ties_bodies() {
             return None;
         }
         let of = |v: u32| numbering.of(v) as u32;

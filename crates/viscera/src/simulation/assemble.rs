@@ -319,7 +319,8 @@ impl Assembly {
             .collect();
         let mut is_held = vec![false; self.builder.positions().len()];
         held.iter().for_each(|&v| is_held[v as usize] = true);
-        let falls = scene.world.gravity.length() > 0.0 && scene.springs.is_empty();
+        let is_tied = !scene.springs.is_empty() || !scene.ties.is_empty();
+        let falls = scene.world.gravity.length() > 0.0 && !is_tied;
         for body in &self.bodies {
             let parts = connected_components(&body.mesh);
             let mut part_held = vec![false; parts.count];

@@ -175,7 +175,7 @@ pub enum AssembleError {
     },
     /// A tie between patches that are far apart.
     #[error(
-        "{place}: tie `{tie}` ties nothing: no point of `from` is within {:.2} mm of `to`, the nearest is {:.2} mm away; raise \
+        "{place}: tie `{tie}` ties nothing: no point of `from` is within {:.3} mm of `to`, the nearest is {:.3} mm away; raise \
          `distance`, or choose other patches", 1e3 * .distance, 1e3 * .nearest
     )]
     TiesNothing {

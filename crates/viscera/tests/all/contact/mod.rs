@@ -9,6 +9,7 @@ mod passes;
 mod refused;
 mod ties;
 mod tissue;
+mod tissue_motion;
 
 use viscera::contact::{Shape, Tool};
 use viscera::material::Material;

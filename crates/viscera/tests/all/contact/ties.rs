@@ -92,7 +92,7 @@ fn what_cannot_be_tied_or_overlaps_is_told() {
     let same = wrong("to = { body = \"block\"", "to = { body = \"plate\"");
     assert!(same.contains("ties body `plate` to itself"), "{same}");
     let far = wrong("distance = \"2 mm\"", "distance = \"0.5 mm\"");
-    assert!(far.contains("within 0.50 mm") && far.contains("1.5"), "{far}");
+    assert!(far.contains("within 0.500 mm") && far.contains("1.5"), "{far}");
     let place = "position = [0, 0, \"9.5 mm\"]";
     let deep = wrong(place, "position = [0, 0, \"6 mm\"]");
     assert!(deep.contains("overlap by 2.") && deep.contains("contact.bodies"), "{deep}");
