@@ -47,6 +47,7 @@
 pub mod coloring;
 pub mod contact;
 pub mod elements;
+pub mod haptics;
 pub mod layout;
 pub mod material;
 pub mod measure;

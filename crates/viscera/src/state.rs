@@ -1,6 +1,6 @@
 //! The state: everything that moves.
 
-use crate::contact::{Kept, Tool, Touch};
+use crate::contact::{HeldMotion, Kept, Tool, Touch};
 use crate::model::Model;
 use crate::scalar::rigid::RigidTransform;
 use crate::scalar::{Real, Vec3};
@@ -31,6 +31,8 @@ pub struct ContactState {
     /// Where each tool is. A tool that has no pose here begins the next step where it ends it: it has not moved, and what it
     /// would have met on its way is not there. [`ContactState::of`] has the poses of tools at the beginning.
     pub poses: Vec<RigidTransform>,
+    /// How tools move that springs hold, at the place of the first tool of each body; empty where there are none.
+    pub held: Vec<HeldMotion>,
     /// What tools press on: by connected part, sample and tool.
     pub touches: Vec<Touch>,
     /// Tissue that presses on tissue: by connected part and sample.
@@ -43,12 +45,22 @@ impl ContactState {
     /// Of tools that are where they are, and have touched nothing yet.
     pub fn of(tools: &[Tool]) -> Self {
         let poses = tools.iter().map(|tool| tool.pose).collect();
-        Self { poses, ..Self::default() }
+        let held = |tool: &Tool| {
+            let mut motion = HeldMotion::default();
+            if let Some(held) = &tool.held {
+                motion.put(&held.hand);
+            }
+            motion
+        };
+        let is_any = tools.iter().any(|tool| tool.held.is_some());
+        let held = if is_any { tools.iter().map(held).collect() } else { Vec::new() };
+        Self { poses, held, ..Self::default() }
     }
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.poses[..])
+            + size_of_val(&self.held[..])
             + size_of_val(&self.touches[..])
             + size_of_val(&self.pairs[..])
             + size_of_val(&self.torn[..])

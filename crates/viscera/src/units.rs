@@ -19,6 +19,8 @@ pub enum Dimension {
     Velocity,
     /// Metres per second squared.
     Acceleration,
+    /// Kilograms.
+    Mass,
     /// Kilograms per cubic metre.
     Density,
     /// Pascals: moduli, stresses and pressures.
@@ -71,6 +73,9 @@ const UNITS: &[Unit] = &[
     unit("m/s", Dimension::Velocity, (1.0, 1.0)),
     read_only("mm/s^2", Dimension::Acceleration, (1.0, 1e3)),
     unit("m/s^2", Dimension::Acceleration, (1.0, 1.0)),
+    unit("mg", Dimension::Mass, (1.0, 1e6)),
+    unit("g", Dimension::Mass, (1.0, 1e3)),
+    unit("kg", Dimension::Mass, (1.0, 1.0)),
     unit("kg/m^3", Dimension::Density, (1.0, 1.0)),
     read_only("g/cm^3", Dimension::Density, (1e3, 1.0)),
     unit("mPa", Dimension::Pressure, (1.0, 1e3)),
@@ -149,6 +154,7 @@ impl std::fmt::Display for Dimension {
             Self::Time => "a time",
             Self::Velocity => "a velocity",
             Self::Acceleration => "an acceleration",
+            Self::Mass => "a mass",
             Self::Density => "a density",
             Self::Pressure => "a pressure",
             Self::Force => "a force",
@@ -168,6 +174,7 @@ impl Dimension {
             Self::Time => "16.7 ms",
             Self::Velocity => "50 mm/s",
             Self::Acceleration => "9.81 m/s^2",
+            Self::Mass => "30 g",
             Self::Density => "1060 kg/m^3",
             Self::Pressure => "5 kPa",
             Self::Force => "0.5 N",

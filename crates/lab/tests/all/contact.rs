@@ -100,7 +100,7 @@ fn tools() -> Vec<Tool> {
     let sphere = Shape::Sphere { radius: 0.012 };
     let capsule = Shape::Capsule { length: 0.02, radius: 0.004 };
     let corner = Shape::RoundedBox { half: Vec3::splat(0.008), radius: 0.002 };
-    let pose = |shape, pose| Tool { shape, pose, law, is_locked: false };
+    let pose = |shape, pose| Tool { shape, pose, law, is_locked: false, held: None };
     vec![
         pose(sphere, at(0.015, 0.01, 0.029, Vec3::ZERO)),
         pose(capsule, at(0.02, 0.0, -0.002, vec3(2.2, 0.3, 0.1))),

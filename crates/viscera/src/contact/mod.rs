@@ -14,6 +14,7 @@
 mod at_rest;
 mod distance;
 pub mod distance_grid;
+pub mod held;
 pub mod law;
 mod meeting;
 mod pair;
@@ -27,6 +28,7 @@ mod touch;
 pub use at_rest::Overlap;
 pub use distance::Distance;
 pub use distance_grid::{DistanceGrid, SolidError};
+pub use held::{Held, HeldMotion, Spring};
 pub use law::{Foundation, Friction};
 pub(crate) use meeting::{DEEPEST, Marks, Moment, turn_normals};
 pub use pair::Kept;
@@ -75,7 +77,7 @@ impl ContactLaw {
     }
 }
 
-/// A tool or a fixed obstacle: moved from outside, whatever pushes against it. A copy of it takes no memory.
+/// A tool or a fixed obstacle: moved from outside, whatever pushes against it, or held by a spring. A copy of it takes no memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
     /// Its shape in its own frame.
@@ -86,12 +88,20 @@ pub struct Tool {
     pub law: ContactLaw,
     /// While it is, what the tool presses on is tied to it: jaws with a ratchet.
     pub is_locked: bool,
+    /// Where a spring holds it: then `pose` is where it would be without tissue, and [`crate::solver::Solver::lead`] moves it.
+    pub held: Option<Held>,
 }
 
 impl Tool {
     /// At rest at the origin, with the usual law.
     pub fn new(shape: Shape) -> Self {
-        Self { shape, pose: RigidTransform::IDENTITY, law: ContactLaw::default(), is_locked: false }
+        Self {
+            shape,
+            pose: RigidTransform::IDENTITY,
+            law: ContactLaw::default(),
+            is_locked: false,
+            held: None,
+        }
     }
 
     /// Moves a point [m] of the world into the tool's frame and returns the distance there, its gradient in the world.

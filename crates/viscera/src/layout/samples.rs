@@ -1,6 +1,6 @@
 //! Samples of the surface in the solver's numbering.
 
-use crate::contact::Sample;
+use crate::contact::{ContactLaw, Foundation, Sample};
 use crate::model::{Model, Numbering};
 use crate::scalar::lanes::Point;
 use crate::scalar::{Real, Vec3};
@@ -25,6 +25,15 @@ impl LaidSample {
     /// Where it is, `at` the places of vertices [m].
     pub fn place<S: Real>(&self, at: &[Point<S>]) -> Vec3<f64> {
         self.mean(|v| at[v].vec3())
+    }
+
+    /// The constants of contact between it and a tool.
+    pub fn foundation(&self, law: &ContactLaw) -> Foundation {
+        Foundation {
+            area: self.area,
+            stiffness: law.stiffness * self.stiffness,
+            thickness: law.thickness,
+        }
     }
 
     /// The mean of something that vertices have, by its weights.

@@ -52,6 +52,12 @@ impl RigidTransform {
         self.rotation.transpose() * (point - self.translation)
     }
 
+    /// The motion back.
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.transpose();
+        Self { rotation, translation: -(rotation * self.translation) }
+    }
+
     /// A direction, turned.
     pub fn turn(&self, direction: Vec3<f64>) -> Vec3<f64> {
         self.rotation * direction

@@ -6,7 +6,7 @@ use super::instrument::{Course, Instrument, JawDrive, Jaws, ToolKind};
 use super::instrument_tables::{ToolTable, WIDEST};
 use super::keys::{JawKey, MotionKey};
 use super::{SceneError, Written};
-use crate::contact::ContactLaw;
+use crate::contact::{ContactLaw, Spring};
 use crate::scalar::Vec3;
 use crate::scalar::rigid::RigidTransform;
 use crate::settings::{Choice, Placed};
@@ -78,6 +78,7 @@ fn build_instrument(
         placement: RigidTransform::about(Vec3::ZERO, rotation, value.position),
         course: build_course(value, purpose)?,
         law,
+        spring: build_spring(value).map_err(fail)?,
         jaws,
         begin: value.begin,
         end: value.end,
@@ -85,6 +86,21 @@ fn build_instrument(
         place: place.clone(),
         table: Written::default(),
     })
+}
+
+/// How a hand holds it.
+fn build_spring(table: &ToolTable) -> Result<Option<Spring>, String> {
+    match (table.spring, table.mass) {
+        (None, Some(_)) => Err("`mass` means nothing without `spring`: keys move the tool rigidly; leave it out, or \
+                                give `spring = \"400 N/m\"`"
+            .to_owned()),
+        (None, None) => Ok(None),
+        (Some(stiffness), mass) => {
+            let mass = mass.unwrap_or(Spring::default().mass);
+            let spring = Spring { stiffness, mass };
+            spring.complaint().map_or(Ok(Some(spring)), |words| Err(words.to_owned()))
+        }
+    }
 }
 
 fn build_course(table: &ToolTable, purpose: &str) -> Result<Course, SceneError> {

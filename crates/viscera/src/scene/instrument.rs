@@ -13,7 +13,7 @@ use super::common::Interpolation;
 use super::hand::Hand;
 use super::keys::{JawKey, MotionKey, between, mix};
 use super::solid::Solid;
-use crate::contact::{ContactLaw, Shape, Tool};
+use crate::contact::{ContactLaw, Held, Shape, Spring, Tool};
 use crate::scalar::Vec3;
 use crate::scalar::rigid::{RigidTransform, rotation_matrix};
 use crate::settings::{Place, choices};
@@ -68,6 +68,8 @@ pub struct Instrument {
     pub course: Course,
     /// How tissue meets it.
     pub law: ContactLaw,
+    /// How a spring holds it in the hand that keys stand for; rigidly where there is none.
+    pub spring: Option<Spring>,
     /// Of a grasper.
     pub jaws: Option<Jaws>,
     /// When it comes into the scene [s].
@@ -182,11 +184,14 @@ impl Instrument {
     pub fn parts_at(&self, time: f64, angle: f64, tools: &mut Vec<Tool>) {
         let pose = self.pose(time);
         let is_locked = self.is_locked(time);
+        let body = tools.len() as u32;
+        let held = self.spring.map(|spring| Held { spring, hand: pose, body });
         tools.extend(self.parts.iter().map(|part| Tool {
             shape: part.shape.clone(),
             pose: pose.after(&part.placed(angle)),
             law: self.law,
             is_locked,
+            held,
         }));
     }
 
@@ -220,7 +225,7 @@ impl Instrument {
 
 impl Part {
     /// From its own frame to the instrument's, with jaws at an angle [rad].
-    fn placed(&self, angle: f64) -> RigidTransform {
+    pub fn placed(&self, angle: f64) -> RigidTransform {
         if self.opens == 0.0 {
             return self.place;
         }
@@ -248,6 +253,7 @@ mod tests {
             ),
             course: Course::Keys { keys, interpolation: Interpolation::Linear },
             law: ContactLaw::default(),
+            spring: None,
             jaws,
             begin: 0.0,
             end: None,

@@ -97,6 +97,12 @@ settings_table! {
             optional(quantity(Dimension::Time, at_least(1e-3).up_to(1e3)));
         /// Times at which what the jaws press on is tied to them, as by a ratchet and teeth.
         lock: Vec<Placed<LockTable>> = (Vec::new()), tables::<LockTable>();
+        /// Stiffness of the spring between the tool and the hand that its keys stand for: it gives way to tissue, as a tool
+        /// that is felt by a haptic device must. Where unset the tool goes where its keys say.
+        spring: Option<f64> = None,
+            optional(quantity(Dimension::Stiffness, at_least(1e-3).up_to(1e7)));
+        /// With `spring`, the mass that moves with the tool; "30 g" where unset.
+        mass: Option<f64> = None, optional(quantity(Dimension::Mass, at_least(1e-4).up_to(1e3)));
         /// Coefficient of friction against tissue; 0.1 is slippery, 0.8 ridged jaws.
         friction: f64 = (ContactLaw::default().friction),
             number(at_least(0.0)).checked(check_friction);

@@ -15,7 +15,7 @@ use super::error::LiveError;
 use super::holding::tolerance;
 use super::instruments::there_at;
 use super::touchable::{Entry, thinnest_until};
-use crate::contact::{Sample, Tool, Touch};
+use crate::contact::{HeldMotion, Sample, Tool, Touch};
 use crate::scalar::rigid::RigidTransform;
 use crate::scalar::{Real, Vec3};
 use crate::scene::{Hand, Instrument, JawKey, MotionKey, check_angle, key_of};
@@ -332,6 +332,15 @@ fn renumber(contact: &mut ContactState, places: &[Option<u32>], parts: &[Tool]) 
         }
     }
     contact.poses = poses;
+    if !contact.held.is_empty() {
+        let mut held = vec![HeldMotion::default(); parts.len()];
+        for (motion, place) in contact.held.iter().zip(places) {
+            if let Some(kept) = place.and_then(|place| held.get_mut(place as usize)) {
+                *kept = *motion;
+            }
+        }
+        contact.held = held;
+    }
     contact.touches.retain_mut(|touch| {
         let place = places.get(touch.tool as usize).copied().flatten();
         touch.tool = place.unwrap_or(touch.tool);

@@ -306,7 +306,8 @@ impl Instruments {
             };
             let met = wrenches.get(range.clone()).zip(parts.get(range));
             let opening = met.map_or(0.0, |(wrenches, parts)| {
-                opening_torque(tool, &tool.pose(time), wrenches, parts)
+                let pose = pose_of(tool, parts, (time, within(jaws, jaw.angle)));
+                opening_torque(tool, &pose, wrenches, parts)
             });
             jaw.choose_speed((tool, jaws), opening, time, frame);
         }
@@ -325,7 +326,8 @@ impl Instruments {
             let range = first..first + self.parts_of(index, tool);
             first = range.end;
             let met = wrenches.get(range.clone()).zip(parts.get(range)).unwrap_or_default();
-            force_on(tool, met, time)
+            let pose = pose_of(tool, met.1, (time, self.angle(index, tool, time)));
+            force_on(tool, met, pose.translation)
         };
         tools.iter().enumerate().map(of_tool).collect()
     }
@@ -393,9 +395,20 @@ fn torque_about(point: Vec3<f64>, wrench: &Wrench, placed: &Tool) -> Vec3<f64> {
     wrench.torque + (placed.pose.translation - point).cross(wrench.force)
 }
 
-/// The force on a tool at a time [s] by what its parts met where they are.
-fn force_on(tool: &Instrument, (wrenches, parts): (&[Wrench], &[Tool]), time: f64) -> ToolForce {
-    let origin = tool.pose(time).translation;
+/// Where a tool is at a time [s] with its jaws at an angle [rad], its parts where they are: a spring may have given way.
+fn pose_of(tool: &Instrument, parts: &[Tool], (time, angle): (f64, f64)) -> RigidTransform {
+    match (tool.spring, parts.first().zip(tool.parts.first())) {
+        (Some(_), Some((placed, part))) => placed.pose.after(&part.placed(angle).inverse()),
+        _ => tool.pose(time),
+    }
+}
+
+/// The force on a tool whose origin is there [m] by what its parts met where they are.
+fn force_on(
+    tool: &Instrument,
+    (wrenches, parts): (&[Wrench], &[Tool]),
+    origin: Vec3<f64>,
+) -> ToolForce {
     let mut sum = Wrench::default();
     for (wrench, placed) in wrenches.iter().zip(parts) {
         sum.force += wrench.force;

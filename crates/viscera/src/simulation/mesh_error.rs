@@ -129,6 +129,7 @@ impl<S: Real> Simulation<S> {
         let mut inputs = Inputs::default();
         GraspOrigins::default().act(&self.scene, &finer, time, &mut inputs);
         self.instruments.act(&finer.tools, time, &mut inputs);
+        self.place_held(&mut inputs.tools);
         let settings = SolverSettings {
             method: Method::QuasiNewton,
             integrator: Integrator::ImplicitEuler,

@@ -11,7 +11,7 @@ use super::device::Backend;
 use super::error::LiveError;
 use super::holding::{GraspOrigins, tolerance};
 use super::instruments::{Instruments, Jaw, there_at};
-use crate::contact::{Kept, Touch};
+use crate::contact::{HeldMotion, Kept, Touch};
 use crate::layout::Layout;
 use crate::model::for_each_kind;
 use crate::scalar::rigid::RigidTransform;
@@ -20,7 +20,7 @@ use crate::settings::Method;
 use crate::state::{ContactState, Learned, LearnedPart, State};
 
 /// Raised whenever the bytes mean something else.
-const FORMAT: u32 = 10;
+const FORMAT: u32 = 11;
 
 /// Methods by the number that stands for them; a new one is added at the end.
 const METHODS: [Method; 4] = [Method::Auto, Method::Xpbd, Method::Explicit, Method::QuasiNewton];
@@ -117,6 +117,8 @@ struct Saved {
     torn: Vec<bool>,
     /// Jaws that follow a force, tool by tool.
     jaws: Vec<Jaw>,
+    /// Tools that springs hold.
+    held: Vec<HeldMotion>,
 }
 
 /// A [`Touch`].
@@ -208,6 +210,7 @@ impl<S: Real> Simulation<S> {
             torn: contact.torn.clone(),
             touches: contact.touches.iter().map(SavedTouch::of).collect(),
             jaws: self.instruments.jaws().to_vec(),
+            held: contact.held.clone(),
         };
         let mut bytes = MAGIC.to_vec();
         bytes.extend(FORMAT.to_le_bytes());
@@ -268,12 +271,15 @@ impl<S: Real> Simulation<S> {
             learned: Learned { pairs: dressed(&saved.pairs), parts: saved.learned },
             contact: ContactState {
                 poses: saved.tools.iter().map(dressed_pose).collect(),
+                held: saved.held,
                 touches: saved.touches.iter().map(SavedTouch::back).collect(),
                 pairs: saved.pressed,
                 torn: saved.torn,
             },
         });
-        self.inputs = self.inputs_at(self.time());
+        let mut inputs = self.inputs_at(self.time());
+        self.place_held(&mut inputs.tools);
+        self.inputs = inputs;
         self.measure_tissue();
         Ok(self)
     }
@@ -316,6 +322,7 @@ impl<S: Real> Simulation<S> {
         fits && saved.touches.iter().all(is_known)
             && saved.jaws.len() == self.scene.tools.len()
             && saved.tools.len() == parts
+            && [0, parts].contains(&saved.held.len())
     }
 
     /// Whether each motion has as many vertices as were taken hold of.

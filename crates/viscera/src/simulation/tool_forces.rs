@@ -4,7 +4,8 @@ use super::Simulation;
 use super::crossings::crossings;
 use super::holding::tolerance;
 use super::instruments::ToolForce;
-use crate::contact::Tool;
+use crate::contact::held::carry;
+use crate::contact::{HeldMotion, Tool};
 use crate::scalar::Real;
 use crate::solver::Ledger;
 
@@ -45,10 +46,40 @@ impl<S: Real> Simulation<S> {
         let (mut parts, time) = (Vec::new(), self.time());
         for (index, tool) in self.assembly.tools.iter().enumerate() {
             if tool.is_there(time, tolerance(&self.scene)) {
+                let first = parts.len();
                 tool.parts_at(time, self.instruments.angle(index, tool, time), &mut parts);
+                if let Some([pose, _]) = self.held(index).and_then(|held| held.poses) {
+                    carry(&mut parts[first..], &pose);
+                }
             }
         }
         parts
+    }
+
+    /// How a tool moves that a spring holds, and the force of the spring on the hand, at the end of the last frame; nothing
+    /// where none does, and before its first frame.
+    pub fn held(&self, tool: usize) -> Option<HeldMotion> {
+        let tools = self.assembly.tools.iter().enumerate();
+        let before = tools.take(tool).map(|(index, at)| self.instruments.parts_of(index, at));
+        let motion = self.state.contact.held.get(before.sum::<usize>())?;
+        let at = self.assembly.tools.get(tool)?;
+        let is_held = at.spring.is_some() && self.instruments.is_there(tool);
+        is_held.then_some(*motion).filter(|motion| motion.poses.is_some())
+    }
+
+    /// Puts tools that springs hold to where they are.
+    pub(super) fn place_held(&self, parts: &mut [Tool]) {
+        let mut first = 0;
+        while let Some(part) = parts.get(first) {
+            let body = part.held.map(|held| held.body);
+            let is_part = |tool: &&Tool| body.is_some() && tool.held.map(|held| held.body) == body;
+            let count = parts[first..].iter().take_while(is_part).count();
+            let motion = self.state.contact.held.get(first).and_then(|motion| motion.poses);
+            if let Some([pose, _]) = motion {
+                carry(&mut parts[first..first + count], &pose);
+            }
+            first += count.max(1);
+        }
     }
 
     /// Jaws go on by what they met in the frame that has ended.

@@ -168,12 +168,16 @@ pub(crate) fn check_inputs<S: Real>(
 /// Tools have shapes, laws and poses that tissue can meet.
 fn check_tools<S: Real>(layout: &Layout<S>, tools: &[Tool]) -> Result<(), StepError> {
     for (tool, given) in tools.iter().enumerate() {
-        let Tool { shape, pose, law, .. } = given;
+        let Tool { shape, pose, law, held, .. } = given;
         if !pose.is_finite() {
             return Err(StepError::NotFinite { what: "poses of tools" });
         }
         let moved = (!pose.is_rigid()).then_some("a pose keeps lengths: give a rotation matrix");
-        if let Some(why) = shape.complaint().or_else(|| law.complaint()).or(moved) {
+        let spring = held.as_ref().and_then(|held| held.spring.complaint());
+        let hand = held.as_ref().filter(|held| !held.hand.is_rigid());
+        let hand = hand.map(|_| "a hand's pose keeps lengths: give a rotation matrix");
+        let why = shape.complaint().or_else(|| law.complaint()).or(spring).or(moved).or(hand);
+        if let Some(why) = why {
             return Err(StepError::BadTool { tool, why });
         }
     }

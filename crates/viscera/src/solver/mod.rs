@@ -14,6 +14,7 @@ mod error;
 mod explicit;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+mod held;
 mod inputs;
 mod methods;
 pub mod oscillations;
@@ -132,7 +133,21 @@ impl<S: Real> Solver<S> {
         self.step_first(usize::MAX, model, state, inputs, dt)
     }
 
-    /// As `count` calls of [`Solver::step`], to the bit; `act` gets the number of each step, from 1 on, and puts what acts
+    /// Moves the tools of the inputs that springs hold for a step of `dt` [s]: before [`Solver::step`], once a step;
+    /// [`Solver::steps`] does so by itself. See [`crate::contact::held`].
+    pub fn lead(
+        &self,
+        model: &Model<S>,
+        state: &mut State<S>,
+        inputs: &mut Inputs<S>,
+        dt: f64,
+    ) -> Result<(), StepError> {
+        self.check(model, state, inputs, dt)?;
+        held::lead(&self.layout, &mut state.contact, &mut inputs.tools, dt);
+        Ok(())
+    }
+
+    /// As `count` calls of [`Solver::lead`] and [`Solver::step`], to the bit; `act` gets the number of each step, from 1 on, and puts what acts
     /// in it into the inputs. The state is brought into the solver's order and back once. Where a step fails the state is
     /// that of the step before it.
     pub fn steps(
@@ -146,7 +161,7 @@ impl<S: Real> Solver<S> {
     ) -> Result<(), StepError> {
         for number in 1..=count {
             act(number, inputs);
-            let checked = self.check(model, state, inputs, dt);
+            let checked = self.lead(model, state, inputs, dt);
             let Self { settings, plan, layout, memory } = self;
             let small_steps = checked.and_then(|()| memory.repeats(layout, inputs, dt));
             let step = Step { layout, inputs, dt, settings };

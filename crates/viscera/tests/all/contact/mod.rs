@@ -3,6 +3,7 @@
 mod divided;
 mod forces;
 mod grasps;
+mod held;
 mod meshes;
 mod motion;
 mod passes;
@@ -125,6 +126,7 @@ impl<S: Real> Scene<S> {
             self.steps += 1;
             act(f64::from(self.steps) * self.dt, &mut self.inputs.tools);
             let Self { model, state, solver, inputs, dt, .. } = self;
+            solver.lead(model, state, inputs, *dt).expect("held tools");
             solver.step(model, state, inputs, *dt).expect("a step");
         }
     }

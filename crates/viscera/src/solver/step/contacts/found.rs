@@ -1,8 +1,7 @@
 //! The beginning of a step: tools move, and samples find what is in their way.
 
 use super::{ContactStep, Contacts, Gift};
-use crate::contact::{ContactLaw, Foundation, Moved, Tool, Touch, Touching};
-use crate::layout::LaidSample;
+use crate::contact::{Moved, Tool, Touch, Touching};
 use crate::scalar::lanes::Point;
 use crate::scalar::rigid::{RigidTransform, axis_times_sine};
 use crate::scalar::{Real, Vec3};
@@ -72,7 +71,7 @@ impl Contacts {
                 continue;
             }
             let moved = Moved { from, to: from + sample.mean(|v| velocities[v]) * step.dt };
-            let own = (place as u32, foundation(&tool.law, sample));
+            let own = (place as u32, sample.foundation(&tool.law));
             let tool = (number as u32, tool);
             self.touching.extend(Touching::find(own, tool, start, &moved, touch));
         }
@@ -135,15 +134,6 @@ impl Contacts {
                 self.gifts[step.layout.part_of_sample(touch.sample)].work[0] += work;
             }
         }
-    }
-}
-
-/// The constants of contact between a tool and a sample.
-fn foundation(law: &ContactLaw, sample: &LaidSample) -> Foundation {
-    Foundation {
-        area: sample.area,
-        stiffness: law.stiffness * sample.stiffness,
-        thickness: law.thickness,
     }
 }
 
