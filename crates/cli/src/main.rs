@@ -5,6 +5,7 @@ mod bench_plot;
 mod bench_scene;
 mod devices;
 mod film;
+mod haptics;
 mod hold;
 mod in_order;
 mod mesh;
@@ -36,6 +37,7 @@ Examples:
   viscera run scenes/cantilever.toml --set body.bar.material.young=\"10 kPa\" --out out/soft
   viscera run palpation --record out/palpation.replay
   viscera replay out/palpation.replay --threads 1
+  viscera haptics haptic_palpation --seconds 10
   viscera mesh inspect liver.msh --unit \"32 mm\"
   viscera scene describe
   viscera view grab
@@ -47,6 +49,8 @@ enum Command {
     Run(run::RunArguments),
     /// Have a recorded run once more, and see whether it has the same bits
     Replay(replay::ReplayArguments),
+    /// Feel tissue with a haptic device, or with a simulated hand
+    Haptics(haptics::HapticsArguments),
     /// Look at mesh files
     #[command(subcommand)]
     Mesh(mesh::MeshCommand),
@@ -75,6 +79,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Replay(arguments) => replay::execute(&arguments),
+        Command::Haptics(arguments) => haptics::execute(&arguments),
         Command::Mesh(command) => mesh::execute(&command).map(|()| run::Outcome::Finished),
         Command::Scene(command) => scene::execute(&command).map(|()| run::Outcome::Finished),
         Command::Bench(arguments) => bench::execute(&arguments).map(|()| run::Outcome::Finished),

@@ -165,28 +165,38 @@ pub type Step<'a, S> = &'a mut dyn FnMut(&mut Simulation<S>) -> Result<()>;
 pub type Overrides = Vec<(String, String)>;
 
 fn read_scene(arguments: &RunArguments) -> Result<(Scene, Overrides)> {
-    let name = arguments.scene.display().to_string();
-    let bytes = match BuiltInScene::find(&arguments.scene) {
+    let every = arguments.every.map(|every| every.to_string());
+    let mut overrides = settings(&arguments.settings)?;
+    if let Some(every) = &every {
+        overrides.push(("output.every", every));
+    }
+    let scene = parse_scene(&arguments.scene, &overrides)?;
+    let owned = overrides.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned()));
+    Ok((scene, owned.collect()))
+}
+
+/// Keys and values of `--set`.
+pub fn settings(given: &[String]) -> Result<Vec<(&str, &str)>> {
+    let pair = |setting: &'_ String| match setting.split_once('=') {
+        Some(_) => Ok(()),
+        None => bail!("--set {setting}: write KEY=VALUE, for example --set solver.iterations=20"),
+    };
+    given.iter().try_for_each(pair)?;
+    let pairs = given.iter().filter_map(|setting| setting.split_once('='));
+    Ok(pairs.map(|(key, value)| (key.trim(), value.trim())).collect())
+}
+
+/// A scene of a file, or one that is built in, with settings over its own.
+pub fn parse_scene(scene: &Path, overrides: &[(&str, &str)]) -> Result<Scene> {
+    let name = scene.display().to_string();
+    let bytes = match BuiltInScene::find(scene) {
         Some(scene) => scene.text.as_bytes().to_vec(),
-        None => files::read(&arguments.scene)?,
+        None => files::read(scene)?,
     };
     let Ok(text) = String::from_utf8(bytes) else {
         bail!("{name} is not a text file; a scene is TOML in UTF-8");
     };
-    let every = arguments.every.map(|every| every.to_string());
-    let mut overrides = Vec::new();
-    for setting in &arguments.settings {
-        let Some((key, value)) = setting.split_once('=') else {
-            bail!("--set {setting}: write KEY=VALUE, for example --set solver.iterations=20");
-        };
-        overrides.push((key.trim(), value.trim()));
-    }
-    if let Some(every) = &every {
-        overrides.push(("output.every", every));
-    }
-    let scene = Scene::parse(&name, &text, &overrides)?;
-    let owned = overrides.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned()));
-    Ok((scene, owned.collect()))
+    Ok(Scene::parse(&name, &text, overrides)?)
 }
 
 /// Runs a simulation to its last frame, by `step` from frame to frame, and writes what it gives.

@@ -105,6 +105,8 @@ pub struct HeldMotion {
     pub force: Vec3<f64>,
     /// The same of the torque [N m].
     pub torque: Vec3<f64>,
+    /// Samples of tissue that it pressed on where the step began.
+    pub touches: u32,
     /// What it knows of the tissue's firmness.
     pub learned: Firmness,
 }
@@ -240,11 +242,14 @@ impl HeldMotion {
             goes: difference(&before, hand),
         };
         let mut felt = [Vec3::ZERO; 2];
+        let mut touches = 0;
         each(&mut |at| {
+            touches += 1;
             let force = at.normal * at.pressed + at.drag;
             felt[0] -= force;
             felt[1] -= at.arm.cross(force);
         });
+        self.touches = touches;
         self.learned.learn(&felt);
         let firm = self.learned.firm;
         let mut way = [self.velocity * dt, self.spin * dt];

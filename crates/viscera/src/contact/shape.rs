@@ -88,6 +88,15 @@ impl Shape {
         !matches!(self, Self::Mesh(_))
     }
 
+    /// Whether it is the same: of closed surfaces, whether it is the same one in memory.
+    pub(crate) fn is(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Mesh(a), Self::Mesh(b)) => Arc::ptr_eq(a, b),
+            (Self::Mesh(_), _) | (_, Self::Mesh(_)) => false,
+            _ => self == other,
+        }
+    }
+
     /// No two points have distances that differ by more than this times the way between them.
     pub fn steepest(&self) -> f64 {
         match self {

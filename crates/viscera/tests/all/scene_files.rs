@@ -9,7 +9,7 @@ use viscera::settings::{
     SolverSettings, Start,
 };
 
-const SHIPPED: [(&str, &str); 9] = [
+const SHIPPED: [(&str, &str); 10] = [
     ("liver_retraction.toml", include_str!("../../../../scenes/liver_retraction.toml")),
     ("cantilever.toml", include_str!("../../../../scenes/cantilever.toml")),
     ("twist.toml", include_str!("../../../../scenes/twist.toml")),
@@ -18,6 +18,7 @@ const SHIPPED: [(&str, &str); 9] = [
     ("palpation.toml", include_str!("../../../../scenes/palpation.toml")),
     ("liver_lifted.toml", include_str!("../../../../scenes/liver_lifted.toml")),
     ("grasp.toml", include_str!("../../../../scenes/grasp.toml")),
+    ("haptic_palpation.toml", include_str!("../../../../scenes/haptic_palpation.toml")),
     ("cholecystectomy.toml", include_str!("../../../../scenes/cholecystectomy.toml")),
 ];
 

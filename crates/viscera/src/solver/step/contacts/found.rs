@@ -28,6 +28,7 @@ impl Contacts {
         if tools.is_empty() {
             return;
         }
+        self.far.begin(step, points, &self.starts);
         let mut kept = kept_state.touches.iter().peekable();
         for (number, part) in layout.parts.iter().enumerate() {
             self.first[number] = self.touching.len();
@@ -56,7 +57,7 @@ impl Contacts {
     ) {
         let layout = step.layout;
         let sample = &layout.samples[place];
-        let from = sample.place(points);
+        let mut from = None;
         for (number, tool) in step.tools.iter().enumerate() {
             let key = |touch: &Touch| {
                 (layout.part_of_sample(touch.sample), touch.sample, touch.tool as usize)
@@ -66,8 +67,14 @@ impl Contacts {
             while kept.next_if(|touch| key(touch) < own).is_some() {}
             let touch = kept.next_if(|touch| key(touch) == own);
             let touch = touch.filter(|_| !self.jumped[number]);
+            if touch.is_none() && self.far.is_far(place, number, tool, farthest) {
+                continue;
+            }
+            let from = *from.get_or_insert_with(|| sample.place(points));
             let start = &self.starts[number];
-            if touch.is_none() && is_far(tool, start, from, farthest) {
+            let distance = tool.shape.distance(start.undo(from)).value;
+            self.far.keep(place, number, tool, distance);
+            if touch.is_none() && is_far(tool, (start, distance), from, farthest) {
                 continue;
             }
             let moved = Moved { from, to: from + sample.mean(|v| velocities[v]) * step.dt };
@@ -137,9 +144,14 @@ impl Contacts {
     }
 }
 
-/// Whether a sample at `from` [m], which goes no farther than `farthest` [m], surely does not meet a tool.
-fn is_far(tool: &Tool, start: &RigidTransform, from: Vec3<f64>, farthest: f64) -> bool {
-    let distance = tool.shape.distance(start.undo(from)).value;
+/// Whether a sample at `from` [m], at a distance [m] from a tool, which goes no farther than `farthest` [m], surely does not meet
+/// it.
+fn is_far(
+    tool: &Tool,
+    (start, distance): (&RigidTransform, f64),
+    from: Vec3<f64>,
+    farthest: f64,
+) -> bool {
     let twice = 2.0 * tool.shape.steepest();
     if *start == tool.pose {
         return distance > twice * (tool.law.thickness + farthest);

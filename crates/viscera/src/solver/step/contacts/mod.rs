@@ -12,6 +12,7 @@
 //! do no work, which only the mean of both says.
 
 mod explicit;
+mod far;
 mod found;
 mod of_vertices;
 mod pairs;
@@ -25,6 +26,7 @@ use crate::scalar::rigid::{RigidTransform, axis_times_sine};
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::inputs::Pin;
 use crate::state::ContactState;
+use far::Far;
 pub use of_vertices::OfVertices;
 pub use pairs::{Pairs, Places};
 
@@ -47,6 +49,8 @@ pub struct Contacts {
     jumped: Vec<bool>,
     /// Of each part, whether a tool presses on it where the step begins.
     presses: Vec<bool>,
+    /// Samples that need not be looked at.
+    far: Far,
     /// Of XPBD's rebase.
     pub of_vertices: OfVertices,
     /// Of tissue and tissue.
@@ -130,6 +134,7 @@ impl Contacts {
             presses: vec![false; layout.part_count()],
             touching: Vec::with_capacity(layout.samples.len()),
             at_start: Vec::with_capacity(layout.samples.len()),
+            far: Far::new(layout),
             of_vertices: OfVertices::new(layout),
             pairs: Pairs::new(layout),
             ..Self::default()
@@ -143,6 +148,7 @@ impl Contacts {
             + size_of_val(&self.wrenches[..])
             + size_of_val(&self.gifts[..])
             + size_of_val(&self.first[..])
+            + self.far.bytes()
             + self.of_vertices.bytes()
             + self.pairs.bytes()
     }
