@@ -56,6 +56,10 @@ const SHORT: &str = "short";
 /// Parts of names of the tests that also run on the second driver: few steps, nothing beyond the baseline.
 const SECOND_DRIVER_TESTS: [&str; 3] = ["device_errs", "nasty", "portable"];
 
+/// What is tested that nobody builds who does not ask for it. The window's controllers are left out: they take headers of the
+/// system.
+pub const SWITCHED_ON: [&str; 2] = ["--features", "viscera-cli/haply"];
+
 /// How a run of everything went so far.
 #[derive(Default)]
 struct Run {
@@ -184,7 +188,8 @@ fn lints(run: &mut Run, packages: &[&str]) -> Result<(), Failure> {
     if leaves_out(run, "clippy") {
         return Ok(());
     }
-    let arguments = [&["clippy"], packages, &["--all-targets", "--", "-D", "warnings"]].concat();
+    let targets = &["--all-targets", "--", "-D", "warnings"][..];
+    let arguments = [&["clippy"], packages, &SWITCHED_ON, targets].concat();
     let next_move = "Follow the first hint above; `cargo clippy --fix` can apply most of them.";
     run.step("lints", cargo(&arguments), next_move)
 }

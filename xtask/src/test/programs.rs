@@ -119,7 +119,7 @@ pub fn build(selection: &Selection<'_>) -> Result<Vec<Program>, String> {
         "--tests",
         "--message-format=json-render-diagnostics",
     ];
-    let mut command = cargo(&[before, selection.packages].concat());
+    let mut command = cargo(&[before, selection.packages, &super::SWITCHED_ON].concat());
     let child = command.stdout(Stdio::piped()).spawn();
     let mut child = child.map_err(|e| format!("cargo could not be started: {e}"))?;
     let mut programs = Vec::new();

@@ -39,7 +39,8 @@ impl<const N: usize> Latest<N> {
             if before == 0 {
                 return None;
             }
-            let numbers = self.bits.each_ref().map(|bits| f64::from_bits(bits.load(Ordering::Relaxed)));
+            let numbers =
+                self.bits.each_ref().map(|bits| f64::from_bits(bits.load(Ordering::Relaxed)));
             // What came before is read before the count.
             fence(Ordering::Acquire);
             if before.is_multiple_of(2) && self.count.load(Ordering::Relaxed) == before {

@@ -170,10 +170,14 @@ fn device(
             Ok(Box::new(VirtualDevice::new(path, TICK)))
         }
         #[cfg(feature = "haply")]
-        name if name == "haply" || name.starts_with("ws://") => Ok(Box::new(haply::Haply::connect(name)?)),
+        name if name == "haply" || name.starts_with("ws://") => {
+            Ok(Box::new(haply::Haply::connect(name)?))
+        }
         #[cfg(not(feature = "haply"))]
         name if name == "haply" || name.starts_with("ws://") => {
-            bail!("this program was built without devices of Haply; build it with `--features haply`")
+            bail!(
+                "this program was built without devices of Haply; build it with `--features haply`"
+            )
         }
         name => bail!("there is no haptic device `{name}`; there are `virtual` and `haply`"),
     }
@@ -239,7 +243,9 @@ impl Felt {
     fn csv(&self) -> String {
         let mut text = "time [s],x [m],y [m],z [m],fx [N],fy [N],fz [N]\n".to_owned();
         for [time, x, y, z, fx, fy, fz] in &self.rows {
-            text.push_str(&format!("{time:.4},{x:.6e},{y:.6e},{z:.6e},{fx:.5e},{fy:.5e},{fz:.5e}\n"));
+            text.push_str(&format!(
+                "{time:.4},{x:.6e},{y:.6e},{z:.6e},{fx:.5e},{fy:.5e},{fz:.5e}\n"
+            ));
         }
         text
     }

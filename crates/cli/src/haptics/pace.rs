@@ -150,7 +150,9 @@ mod tests {
         let values: Vec<f32> = (0..=1000).rev().map(|value| value as f32 * 1e-3).collect();
         let spread = Spread::of(&values);
         let wanted = [500.0, 990.0, 999.0, 1000.0];
-        for (found, wanted) in [spread.median, spread.p99, spread.p999, spread.most].iter().zip(wanted) {
+        for (found, wanted) in
+            [spread.median, spread.p99, spread.p999, spread.most].iter().zip(wanted)
+        {
             assert!((found - wanted).abs() < 1e-3, "{spread:?}");
         }
         assert_eq!(Spread::of(&[]).most, 0.0);

@@ -90,8 +90,7 @@ impl<'a> Ticks<'a> {
         let first = *self.first.get_or_insert(stylus.pose);
         let hand = RigidTransform {
             rotation: stylus.pose.rotation * first.rotation.transpose() * session.begin.rotation,
-            translation: session.begin.translation + stylus.pose.translation
-                - first.translation,
+            translation: session.begin.translation + stylus.pose.translation - first.translation,
         };
         let force = if self.silent > PATIENCE[0] {
             self.rendering.let_go();
@@ -238,5 +237,109 @@ fn posed([x, y, z, a, b, c]: [f64; 6]) -> RigidTransform {
     RigidTransform {
         rotation: rotation_matrix(Vec3::from_f64([a, b, c])),
         translation: Vec3::from_f64([x, y, z]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viscera::scalar::vec3;
+    use viscera::scene::Scene;
+    use viscera::simulation::Assembly;
+
+    const SCENE: &str = r#"
+time = { frame = "1 ms" }
+[world]
+gravity = 0
+[[body]]
+name = "block"
+shape = "block"
+size = ["20 mm", "20 mm", "20 mm"]
+cells = [2, 2, 2]
+material = { young = "5 kPa", poisson = 0.4 }
+[[fixing]]
+name = "table"
+body = "block"
+half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
+[[tool]]
+kind = "sphere"
+radius = "10 mm"
+position = ["10 mm", "10 mm", "31 mm"]
+spring = "400 N/m"
+"#;
+
+    /// A hand that goes down 3 mm in 30 ticks, stays, and answers only as it likes.
+    struct Whimsical {
+        ticks: u64,
+        answers: fn(u64) -> Result<(), DeviceError>,
+        forces: Vec<f64>,
+    }
+
+    impl HapticDevice for Whimsical {
+        fn name(&self) -> String {
+            "whimsical".into()
+        }
+
+        fn read(&mut self) -> Result<Stylus, DeviceError> {
+            self.ticks += 1;
+            (self.answers)(self.ticks)?;
+            let depth = 1e-4 * self.ticks.min(30) as f64;
+            let translation = vec3(0.3, -0.2, -depth);
+            Ok(Stylus {
+                pose: RigidTransform { translation, ..RigidTransform::IDENTITY },
+                is_pressed: false,
+            })
+        }
+
+        fn exert(&mut self, force: Vec3<f64>, _: Vec3<f64>) -> Result<(), DeviceError> {
+            self.forces.push(force.z);
+            Ok(())
+        }
+    }
+
+    fn session(ticks: u64, answers: fn(u64) -> Result<(), DeviceError>) -> (Felt, Vec<f64>) {
+        let scene = Scene::parse("test", SCENE, &[]).expect("a scene");
+        let begin = scene.tools[0].pose(0.0);
+        let assembly = Assembly::new(&scene, &mut |name| panic!("{name}")).expect("an assembly");
+        let simulation = Simulation::<f32>::new(scene, assembly).expect("a simulation");
+        let interrupted = Arc::new(AtomicBool::new(false));
+        let session = Session { tool: 0, begin, stiffness: 400.0, ticks, tick: 1e-3, interrupted };
+        let mut device = Whimsical { ticks: 0, answers, forces: Vec::new() };
+        let felt = session.in_ticks(simulation, &mut device).expect("a session");
+        (felt, device.forces)
+    }
+
+    fn silent() -> DeviceError {
+        DeviceError::Silent { device: "whimsical".into(), seconds: 0.1 }
+    }
+
+    #[test]
+    fn a_device_that_says_nothing_loses_its_force_and_gets_it_back() {
+        let (felt, forces) =
+            session(400, |tick| if (200..300).contains(&tick) { Err(silent()) } else { Ok(()) });
+        assert!(felt.summary.finished && felt.failed.is_none(), "{:?}", felt.failed);
+        assert!(forces[190] > 1e-3, "{}", forces[190]);
+        // The place where the device was first is that of the tool.
+        let [_, x, y, z, ..] = felt.rows[0];
+        assert!((vec3(x, y, z) - vec3(0.01, 0.01, 0.031)).length() < 1e-12);
+        // For 50 ms the hand is where it was last; then there is no force.
+        assert!(forces[240] > 1e-3 && forces[260] == 0.0 && forces[298] == 0.0, "{forces:?}");
+        assert!(forces[399] > 1e-3, "{}", forces[399]);
+        assert_eq!(forces.last(), Some(&0.0));
+    }
+
+    #[test]
+    fn a_device_that_is_gone_or_stays_silent_ends_the_session() {
+        let (felt, forces) = session(5000, |tick| if tick > 100 { Err(silent()) } else { Ok(()) });
+        let told = felt.failed.expect("it ended");
+        assert!(told.contains("has not answered for 100 ms"), "{told}");
+        assert!((2095..2105).contains(&felt.summary.ticks), "{}", felt.summary.ticks);
+        assert!(!felt.summary.finished && forces.last() == Some(&0.0));
+        let (felt, _) = session(5000, |tick| match tick {
+            0..50 => Ok(()),
+            _ => Err(DeviceError::Gone { device: "whimsical".into(), reason: "unplugged".into() }),
+        });
+        assert_eq!(felt.summary.ticks, 49);
+        assert!(felt.failed.is_some_and(|told| told.contains("is gone: unplugged")));
     }
 }

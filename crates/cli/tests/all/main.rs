@@ -12,6 +12,7 @@ mod bench_scene;
 #[cfg(feature = "gpu")]
 mod devices;
 mod documents;
+mod haptics;
 mod hold;
 mod replay;
 mod run;

@@ -74,7 +74,9 @@ impl Spring {
     /// What is wrong with it, in words; nothing where it is legal.
     pub fn complaint(&self) -> Option<&'static str> {
         if !(1e-3..=1e7).contains(&self.stiffness) {
-            return Some("the spring of a held tool is between 0.001 and 10000000 N/m; 400 N/m suits a hand");
+            return Some(
+                "the spring of a held tool is between 0.001 and 10000000 N/m; 400 N/m suits a hand",
+            );
         }
         (!(1e-4..=1e3).contains(&self.mass))
             .then_some("the mass of a held tool is between 0.1 g and 1000 kg; 30 g suits a laparoscope's grasper")
@@ -181,11 +183,13 @@ impl Pressing {
         let Foundation { area, stiffness, thickness } = self.foundation;
         let (k, kappa) = (area * stiffness, self.kappa * firm);
         let all = self.overlap + self.pressed / kappa + way;
-        let [soft, hard] = [(k, 0.0), (SECOND_STAGE * k, 0.5 * (SECOND_STAGE - 1.0) * k * thickness)]
-            .map(|(k, less)| {
-                let share = 1.0 / (1.0 + k / kappa);
-                [(k * all - less) * share, k * share]
-            });
+        let [soft, hard] =
+            [(k, 0.0), (SECOND_STAGE * k, 0.5 * (SECOND_STAGE - 1.0) * k * thickness)].map(
+                |(k, less)| {
+                    let share = 1.0 / (1.0 + k / kappa);
+                    [(k * all - less) * share, k * share]
+                },
+            );
         let most = if hard[0] > soft[0] { hard } else { soft };
         if most[0] > 0.0 { most } else { [0.0; 2] }
     }
@@ -237,10 +241,7 @@ impl HeldMotion {
         each: impl Fn(&mut dyn FnMut(&Pressing)),
     ) {
         let [pose, before] = self.poses.unwrap_or([*hand, *hand]);
-        let hands = Hands {
-            away: difference(&pose, hand),
-            goes: difference(&before, hand),
-        };
+        let hands = Hands { away: difference(&pose, hand), goes: difference(&before, hand) };
         let mut felt = [Vec3::ZERO; 2];
         let mut touches = 0;
         each(&mut |at| {
@@ -356,9 +357,8 @@ fn add_contact(
     let block = super::law::block(at.normal, along, across);
     // `J^T B J` with `J = [I, -[r]]`: the way of the tool at the sample is `u + w x r`.
     let axes = [unit(0), unit(1), unit(2)];
-    let columns: [Vec3<f64>; 6] = std::array::from_fn(|i| {
-        if i < 3 { axes[i] } else { axes[i - 3].cross(at.arm) }
-    });
+    let columns: [Vec3<f64>; 6] =
+        std::array::from_fn(|i| if i < 3 { axes[i] } else { axes[i - 3].cross(at.arm) });
     for (i, row) in matrix.iter_mut().enumerate() {
         let pulled = block * columns[i];
         for (entry, column) in row.iter_mut().zip(&columns) {

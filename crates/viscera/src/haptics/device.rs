@@ -30,7 +30,9 @@ pub trait HapticDevice {
 #[non_exhaustive]
 pub enum DeviceError {
     /// It is not there, or was taken away.
-    #[error("haptic device `{device}` is gone: {reason}; connect it again and start over, or take `--device virtual`")]
+    #[error(
+        "haptic device `{device}` is gone: {reason}; connect it again and start over, or take `--device virtual`"
+    )]
     Gone {
         /// Its name.
         device: String,

@@ -99,9 +99,7 @@ impl HapticDevice for VirtualDevice {
             let now = begin + dt * f64::from(step);
             let [wants, later] = [now, now + dt].map(|time| self.path.at(time));
             let goes = (later - wants) * (1.0 / dt);
-            let force = self.force
-                + (later - self.place) * GRIP
-                + (goes - self.velocity) * CALM
+            let force = self.force + (later - self.place) * GRIP + (goes - self.velocity) * CALM
                 - self.velocity * FRICTION;
             self.velocity += force * (dt / MASS);
             self.place += self.velocity * dt;

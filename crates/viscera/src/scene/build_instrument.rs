@@ -91,9 +91,11 @@ fn build_instrument(
 /// How a hand holds it.
 fn build_spring(table: &ToolTable) -> Result<Option<Spring>, String> {
     match (table.spring, table.mass) {
-        (None, Some(_)) => Err("`mass` means nothing without `spring`: keys move the tool rigidly; leave it out, or \
+        (None, Some(_)) => Err(
+            "`mass` means nothing without `spring`: keys move the tool rigidly; leave it out, or \
                                 give `spring = \"400 N/m\"`"
-            .to_owned()),
+                .to_owned(),
+        ),
         (None, None) => Ok(None),
         (Some(stiffness), mass) => {
             let mass = mass.unwrap_or(Spring::default().mass);

@@ -44,7 +44,7 @@ const LAYERS: &[&[&str]] = &[
     &["mesh"],
     &["material"],
     &["elements"],
-    &["coloring", "contact"],
+    &["coloring", "contact", "haptics"],
     &["scene", "model", "state"],
     &["layout"],
     &["solver"],

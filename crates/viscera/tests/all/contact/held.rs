@@ -55,7 +55,10 @@ fn a_held_tool_rests_where_spring_and_tissue_balance() {
             tools[0].pose = at(vec3(0.0, 0.0, top - lowered));
         });
         let of_rigid = rigid.force(0).z;
-        println!("{name}: {force} N, spring {stretch} N and {} N, rigid {of_rigid} N", motion.force.z);
+        println!(
+            "{name}: {force} N, spring {stretch} N and {} N, rigid {of_rigid} N",
+            motion.force.z
+        );
         assert!(force > 0.2 && (motion.force.z - stretch).abs() < 1e-4 * stretch, "{name}");
         // Single precision, and what still moves after a second.
         assert!((force / stretch - 1.0).abs() < 1e-3, "{name}: {force} {stretch}");
@@ -122,11 +125,9 @@ fn answer(block: &Block, name: &str, rate: f64, radius: f64) -> f64 {
 
 /// Tissue of 5 to 100 kPa, and a layer of 2 mm on bone, nearly incompressible: firmer than a tool expects.
 fn answers(methods: &[(&str, f64)]) {
-    for (tissue, poisson, height, cells) in [
-        (5e3, 0.45, 0.03, [8, 8, 4]),
-        (1e5, 0.45, 0.03, [8, 8, 4]),
-        (2e4, 0.49, 0.004, [8, 8, 1]),
-    ] {
+    for (tissue, poisson, height, cells) in
+        [(5e3, 0.45, 0.03, [8, 8, 4]), (1e5, 0.45, 0.03, [8, 8, 4]), (2e4, 0.49, 0.004, [8, 8, 1])]
+    {
         let block = block(tissue, poisson, height, cells);
         for &(name, rate) in methods {
             let rms = answer(&block, name, rate, 0.012);

@@ -235,14 +235,11 @@ fn what_is_far_from_tools_is_left_out_without_a_trace() {
     for name in ["quasi_newton", "explicit"] {
         let block = Block::new([0.06, 0.06, 0.02], [8, 8, 3], [8e3, 0.4, 1e-3]);
         let run = |anew: bool| {
-            let mut blade = Tool::new(Shape::RoundedBox {
-                half: vec3(0.02, 2e-3, 8e-3),
-                radius: 1e-3,
-            });
+            let mut blade =
+                Tool::new(Shape::RoundedBox { half: vec3(0.02, 2e-3, 8e-3), radius: 1e-3 });
             blade.law.friction = 0.4;
             let tools = vec![blade, ball(5e-3), Tool::new(Shape::HalfSpace)];
-            let inputs =
-                Inputs { pins: block.fixed_below(), tools, ..Inputs::default() };
+            let inputs = Inputs { pins: block.fixed_below(), tools, ..Inputs::default() };
             let mut scene = Scene::<f32>::new(&block, name, inputs);
             let settings = method(name).0;
             // A blade that turns, slides and presses; a ball that comes from afar; a plane that tips over below.

@@ -8,7 +8,6 @@
 //!
 //! It decides when a distance is computed, and never what is found: what is left out is what the distance itself would leave out.
 
-use super::ContactStep;
 use crate::contact::{Shape, Tool};
 use crate::layout::{LaidSample, Layout};
 use crate::scalar::lanes::Point;
@@ -36,6 +35,20 @@ pub struct Far {
     tools: Vec<Known>,
     /// Of each sample and tool how far both may go until they may be near [m].
     until: Vec<f64>,
+    /// The least of it of each block of samples.
+    blocks: Vec<f64>,
+    /// Of all tools what goes farthest.
+    most: Most,
+}
+
+/// Samples in a row that are looked at together.
+pub const BLOCK: usize = 64;
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Most {
+    went: f64,
+    /// Thickness and way in the step [m].
+    reach: f64,
 }
 
 /// Of one tool.
@@ -63,19 +76,20 @@ impl Far {
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.seen[..]) + size_of_val(&self.until[..]) + size_of_val(&self.tools[..])
+        size_of_val(&self.seen[..])
+            + size_of_val(&self.until[..])
+            + size_of_val(&self.blocks[..])
+            + size_of_val(&self.tools[..])
     }
 
-    /// A step begins, tools go on from `starts`.
+    /// A step begins, in which so many samples may meet tools that go on from `starts`.
     pub fn begin<S: Real>(
         &mut self,
-        step: &ContactStep<'_, S>,
-        points: &[Point<S>],
-        starts: &[RigidTransform],
+        (count, points): (usize, &[Point<S>]),
+        (tools, starts): (&[Tool], &[RigidTransform]),
     ) {
-        let count = step.layout.samples.len();
-        let is_same = self.tools.len() == step.tools.len()
-            && self.tools.iter().zip(step.tools).all(|(known, tool)| known.shape.is(&tool.shape));
+        let is_same = self.tools.len() == tools.len()
+            && self.tools.iter().zip(tools).all(|(known, tool)| known.shape.is(&tool.shape));
         let mut moved = 0.0f64;
         for (seen, point) in self.seen.iter_mut().zip(points) {
             let place = point.vec3().cast::<f64>();
@@ -86,9 +100,11 @@ impl Far {
         if !is_same || !self.travelled.is_finite() {
             self.travelled = 0.0;
             self.until.clear();
-            self.until.resize(count * step.tools.len(), f64::NEG_INFINITY);
+            self.until.resize(count * tools.len(), f64::NEG_INFINITY);
+            self.blocks.clear();
+            self.blocks.resize(count.div_ceil(BLOCK), f64::NEG_INFINITY);
             self.tools.clear();
-            self.tools.extend(step.tools.iter().zip(starts).map(|(tool, start)| Known {
+            self.tools.extend(tools.iter().zip(starts).map(|(tool, start)| Known {
                 shape: tool.shape.clone(),
                 pose: *start,
                 went: 0.0,
@@ -96,7 +112,7 @@ impl Far {
                 goes: 0.0,
             }));
         }
-        let all = self.tools.iter_mut().zip(starts).zip(step.tools);
+        let all = self.tools.iter_mut().zip(starts).zip(tools);
         for (number, ((known, start), tool)) in all.enumerate() {
             let [way, turn] = went(tool, &known.pose, start);
             let [goes, turns] = went(tool, start, &tool.pose);
@@ -106,11 +122,30 @@ impl Far {
             // Written so that what is no number is looked at again.
             if !(known.turned + turns <= MOST_TURN && known.went + goes < f64::INFINITY) {
                 (known.went, known.turned) = (0.0, 0.0);
-                self.until.iter_mut().skip(number).step_by(step.tools.len()).for_each(|until| {
+                self.until.iter_mut().skip(number).step_by(tools.len()).for_each(|until| {
                     *until = f64::NEG_INFINITY;
                 });
+                self.blocks.fill(f64::NEG_INFINITY);
             }
         }
+        let reach = |(known, tool): (&Known, &Tool)| tool.law.thickness + known.goes;
+        self.most = Most {
+            went: self.tools.iter().map(|known| known.went).fold(0.0, f64::max),
+            reach: self.tools.iter().zip(tools).map(reach).fold(0.0, f64::max),
+        };
+    }
+
+    /// Whether all samples of a block, which go `farthest` [m], surely meet no tool.
+    pub fn is_block_far(&self, block: usize, farthest: f64) -> bool {
+        let left = self.blocks[block] - self.travelled - self.most.went;
+        left > 2.0 * (farthest + self.most.reach) + ROUNDING
+    }
+
+    /// All samples of a block were looked at.
+    pub fn end_block(&mut self, block: usize) {
+        let size = BLOCK * self.tools.len();
+        let all = self.until.chunks(size).nth(block).unwrap_or_default();
+        self.blocks[block] = all.iter().copied().fold(f64::INFINITY, f64::min);
     }
 
     /// Whether a sample that goes `farthest` [m] surely does not meet a tool.
@@ -122,7 +157,8 @@ impl Far {
 
     /// Keeps a distance [m] that was computed.
     pub fn keep(&mut self, place: usize, number: usize, tool: &Tool, distance: f64) {
-        let until = LEFT * distance / tool.shape.steepest() + self.travelled + self.tools[number].went;
+        let until =
+            LEFT * distance / tool.shape.steepest() + self.travelled + self.tools[number].went;
         let count = self.tools.len();
         self.until[place * count + number] = until;
     }

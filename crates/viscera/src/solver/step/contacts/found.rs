@@ -1,5 +1,6 @@
 //! The beginning of a step: tools move, and samples find what is in their way.
 
+use super::far::BLOCK;
 use super::{ContactStep, Contacts, Gift};
 use crate::contact::{Moved, Tool, Touch, Touching};
 use crate::scalar::lanes::Point;
@@ -7,6 +8,7 @@ use crate::scalar::rigid::{RigidTransform, axis_times_sine};
 use crate::scalar::{Real, Vec3};
 use crate::solver::step::groups::Groups;
 use crate::state::ContactState;
+use std::ops::Range;
 
 impl Contacts {
     /// Moves the tools to where they are at the end of the step, and finds what samples find in their way. `points` are
@@ -28,15 +30,26 @@ impl Contacts {
         if tools.is_empty() {
             return;
         }
-        self.far.begin(step, points, &self.starts);
+        self.far.begin((layout.samples.len(), points), (tools, &self.starts));
         let mut kept = kept_state.touches.iter().peekable();
         for (number, part) in layout.parts.iter().enumerate() {
             self.first[number] = self.touching.len();
             let speeds = velocities[part.vertices.clone()].iter().map(|v| v.length_squared());
             let squared = speeds.fold(S::ZERO, |most, speed| most.max(speed));
             let farthest = squared.to_f64().sqrt() * step.dt;
-            for place in layout.samples_of(number) {
-                self.find_at(step, place, (points, velocities), farthest, &mut kept);
+            for range in blocks(layout.samples_of(number)) {
+                let last = range.end - 1;
+                let key = |touch: &Touch| (layout.part_of_sample(touch.sample), touch.sample);
+                let last_key = (number, layout.samples[last].number);
+                let is_touched = kept.peek().is_some_and(|touch| key(touch) <= last_key);
+                let block = last / BLOCK;
+                if !is_touched && self.far.is_block_far(block, farthest) {
+                    continue;
+                }
+                for place in range {
+                    self.find_at(step, place, (points, velocities), farthest, &mut kept);
+                }
+                self.far.end_block(block);
             }
         }
         self.first[layout.part_count()] = self.touching.len();
@@ -142,6 +155,17 @@ impl Contacts {
             }
         }
     }
+}
+
+/// A range cut where blocks of samples end.
+fn blocks(range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let mut start = range.start;
+    std::iter::from_fn(move || {
+        let end = ((start / BLOCK + 1) * BLOCK).min(range.end);
+        let block = start..end;
+        start = end;
+        (!block.is_empty()).then_some(block)
+    })
 }
 
 /// Whether a sample at `from` [m], at a distance [m] from a tool, which goes no farther than `farthest` [m], surely does not meet
