@@ -39,10 +39,14 @@ const DAMPING: f64 = 1.0;
 /// `kappa h/(A E)`.
 const YIELD: f64 = 4.0;
 
-/// A step that has met so many times the stiffness that was expected makes the next one expect more; at most so much more,
+/// A step that has met so many times the stiffness that was expected makes the next one expect more; at most so much more.
 const SURPRISE: f64 = 1.5;
 const FIRMEST: f64 = 1e3;
-/// and what was learned is forgotten by this factor in every step.
+
+/// Nothing is learned of less work than this [J].
+const LEAST_WORK: f64 = 1e-13;
+
+/// What was learned is forgotten by this factor in every step.
 const FORGETS: f64 = 0.9;
 
 /// Newton steps for where the tool goes. Forces are piecewise linear: two or three are enough.
@@ -322,8 +326,8 @@ impl Firmness {
     /// Compares what the last step has led to with what was expected.
     fn learn(&mut self, felt: &[Vec3<f64>; 2]) {
         let met = dot(&self.before, &self.way) - dot(felt, &self.way);
-        // Below a billionth of a joule there is nothing to learn from.
-        let is_firmer = met > SURPRISE * self.expected && met > 1e-9;
+        // Rounding of places in single precision moves samples by nanometres.
+        let is_firmer = met > SURPRISE * self.expected && met > LEAST_WORK;
         if is_firmer {
             let times = if self.expected > 0.0 { met / self.expected } else { 2.0 };
             self.firm = (self.firm * times.min(4.0)).min(FIRMEST);
@@ -405,3 +409,6 @@ fn orthonormal(rotation: Mat3<f64>) -> Mat3<f64> {
     let b = b * (1.0 / b.length());
     Mat3::from_columns(a, b, a.cross(b))
 }
+
+#[cfg(test)]
+mod tests;
