@@ -57,7 +57,7 @@ impl<S: Real> Simulation<S> {
     }
 
     /// How a tool moves that a spring holds, and the force of the spring on the hand, at the end of the last frame; nothing
-    /// where none does, and before its first frame.
+    /// where none does, and before the tool's first frame.
     pub fn held(&self, tool: usize) -> Option<HeldMotion> {
         let tools = self.assembly.tools.iter().enumerate();
         let before = tools.take(tool).map(|(index, at)| self.instruments.parts_of(index, at));

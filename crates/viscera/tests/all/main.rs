@@ -55,6 +55,7 @@ mod saved;
 mod scene_errors;
 mod scene_files;
 mod shapes;
+mod springs;
 mod stress;
 mod tethers;
 mod tetrahedralize;
