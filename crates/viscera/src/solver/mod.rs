@@ -15,6 +15,7 @@ mod explicit;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod inputs;
+mod meetings;
 mod methods;
 pub mod oscillations;
 pub mod plan;
@@ -43,6 +44,8 @@ pub(crate) use explicit::growth as explicit_growth;
 pub(crate) use inputs::check_elements;
 pub use inputs::{Inputs, Pin, Tether};
 use inputs::{check_inputs, check_model, check_state, check_step};
+#[doc(hidden)]
+pub use meetings::Meetings;
 use oscillations::Oscillations;
 use plan::Plan;
 pub(crate) use quasi_newton::{choose, expected_motion_error};

@@ -110,6 +110,11 @@ impl Pairs {
             + size_of_val(&until_turned[..])
     }
 
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.pairs.len()
+    }
+
     /// Forgets all pairs.
     pub fn clear(&mut self) {
         self.pairs.clear();
