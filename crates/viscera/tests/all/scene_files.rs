@@ -9,7 +9,7 @@ use viscera::settings::{
     SolverSettings, Start,
 };
 
-const SHIPPED: [(&str, &str); 9] = [
+const SHIPPED: [(&str, &str); 11] = [
     ("liver_retraction.toml", include_str!("../../../../scenes/liver_retraction.toml")),
     ("cantilever.toml", include_str!("../../../../scenes/cantilever.toml")),
     ("twist.toml", include_str!("../../../../scenes/twist.toml")),
@@ -19,6 +19,8 @@ const SHIPPED: [(&str, &str); 9] = [
     ("liver_lifted.toml", include_str!("../../../../scenes/liver_lifted.toml")),
     ("grasp.toml", include_str!("../../../../scenes/grasp.toml")),
     ("cholecystectomy.toml", include_str!("../../../../scenes/cholecystectomy.toml")),
+    ("organs_pressed.toml", include_str!("../../../../scenes/organs_pressed.toml")),
+    ("fold.toml", include_str!("../../../../scenes/fold.toml")),
 ];
 
 /// Nearly every key there is, in one scene.

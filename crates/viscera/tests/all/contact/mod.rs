@@ -3,10 +3,13 @@
 mod divided;
 mod forces;
 mod grasps;
+mod inside;
 mod meshes;
 mod motion;
+mod organs;
 mod passes;
 mod refused;
+mod sheets;
 mod ties;
 mod tissue;
 mod tissue_motion;
