@@ -1,6 +1,5 @@
 //! `viscera devices`: what there is to compute on, and how fast it is.
 
-use crate::bench::processor;
 use crate::bench::solvers::SOLVERS;
 use crate::bench::subjects::{Size, Subject, hanging};
 use crate::progress;
@@ -16,7 +15,7 @@ use viscera::solver::gpu::{Adapter, GpuError, GpuSolver};
 use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
 use viscera_report::Table;
-use viscera_resources::{Memory, files};
+use viscera_resources::{Memory, files, processor};
 
 /// List what there is to compute on, and how fast it is
 ///

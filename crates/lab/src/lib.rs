@@ -7,6 +7,7 @@
 //! |---|---|
 //! | solve a step or a state of rest exactly | [`reference::Reference`] |
 //! | set up what the studies share | [`load_cases`], [`contact_cases`], [`forms`], [`bending`], [`bars`], [`contact_bench`], [`unstructured`], [`delaunay`], [`settling`], [`motion`], [`stress`] |
+//! | measure what contact costs | [`contact_costs`] |
 //! | compare the library with what must come out | [`validate`] |
 //! | see what the published method does, and what became of its open problems | [`study`] |
 //! | ask the reference about a scene file | [`rest_command`] |
@@ -16,6 +17,7 @@ pub mod bars;
 pub mod bending;
 pub mod contact_bench;
 pub mod contact_cases;
+pub mod contact_costs;
 pub mod converge;
 pub mod delaunay;
 pub mod forms;

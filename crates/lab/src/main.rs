@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use viscera_lab::converge::{self, ConvergeArguments};
 use viscera_lab::rest_command::{self, RestArguments};
 use viscera_lab::sections::{Changes, Options, Program};
-use viscera_lab::{bars, contact_bench, study, validate};
+use viscera_lab::{bars, contact_bench, contact_costs, study, validate};
 use viscera_resources::files::{prepare_folder, print};
 
 /// The truth beside the solver: studies that hold its claims against references.
@@ -38,6 +38,8 @@ enum Command {
     Rest(RestArguments),
     /// Show how a scene's state of rest depends on its mesh, and what the body itself would do
     Converge(ConvergeArguments),
+    /// Measure what contact costs on this machine: distances of instruments' grids, pairs of tissue and tissue
+    ContactCosts,
     // For `cargo xtask peers`, not for a person.
     #[command(hide = true)]
     Organs {
@@ -144,6 +146,7 @@ fn main() -> ExitCode {
         Command::Study(arguments) => study(arguments),
         Command::Rest(arguments) => rest_command::run(&arguments, &print),
         Command::Converge(arguments) => converge::run(&arguments, &print),
+        Command::ContactCosts => contact_costs::measure().and_then(|text| print(&text)),
         Command::Organs { out } => write(&out, validate::write_organs),
         Command::Bars { out } => write(&out, bars::write_bars),
         Command::ContactScenes { out } => write(&out, contact_bench::write_scenes),

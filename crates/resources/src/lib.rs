@@ -8,11 +8,14 @@
 //! | find the mesh files of a scene | [`MeshFiles`] |
 //! | run a scene that needs no file | [`BUILT_IN`], [`BuiltInScene`] |
 //! | refuse what does not fit into memory | [`memory`], [`Memory`] |
+//! | name the processor beside what it was measured on | [`processor()`] |
 
 pub mod files;
 pub mod memory;
+mod processor;
 mod scenes;
 
 pub use files::MeshFiles;
 pub use memory::Memory;
+pub use processor::processor;
 pub use scenes::{BUILT_IN, BuiltInScene};

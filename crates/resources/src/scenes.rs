@@ -17,7 +17,7 @@ macro_rules! built_in {
 }
 
 /// All of them; `scenes/` holds no others that need no mesh file.
-pub const BUILT_IN: [BuiltInScene; 11] = built_in!["cantilever" "cholecystectomy" "coarse_bar" "grab" "grasp" "haptic_palpation" "liver_lifted" "liver_retraction" "palpation" "stretch" "twist"];
+pub const BUILT_IN: [BuiltInScene; 13] = built_in!["cantilever" "cholecystectomy" "coarse_bar" "fold" "grab" "grasp" "haptic_palpation" "liver_lifted" "liver_retraction" "organs_pressed" "palpation" "stretch" "twist"];
 
 impl BuiltInScene {
     /// The one that is meant where there is no such file.

@@ -22,7 +22,6 @@ use computers::{Computer, Processor};
 use gpu::Gpu;
 use measurement::Bench;
 use questions::{QUESTIONS, Question};
-pub use results::processor;
 use results::{Results, Skipped};
 use solvers::{SOLVERS, SolverEntry};
 use std::path::PathBuf;

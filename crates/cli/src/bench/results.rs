@@ -6,9 +6,8 @@ use super::questions::Answer;
 use super::solvers::SolverEntry;
 use anyhow::{Context, Result};
 use serde::Serialize;
-use sysinfo::{CpuRefreshKind, RefreshKind, System};
 use viscera_report::{Axis, Document, Plot, Series, Style, Table, percent, si};
-use viscera_resources::Memory;
+use viscera_resources::{Memory, processor};
 
 /// All of it.
 #[derive(Serialize)]
@@ -311,12 +310,4 @@ fn threads(count: u32) -> String {
 fn digits(number: f64) -> String {
     let decimals = (2 - number.abs().log10().floor() as i32).clamp(0, 6) as usize;
     format!("{number:.decimals$}")
-}
-
-/// As the processor calls itself.
-pub fn processor() -> String {
-    let wanted = RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing());
-    let system = System::new_with_specifics(wanted).ok();
-    let brand = system.as_ref().and_then(|s| s.cpus().first()).map(|cpu| cpu.brand().trim());
-    brand.filter(|name| !name.is_empty()).unwrap_or("a processor without a name").to_owned()
 }

@@ -1,6 +1,7 @@
 //! What studies of contact share: scenes, the library's ways to solve them, and what came out.
 
 mod moving;
+mod pressed;
 mod pressing;
 mod sliding;
 
@@ -11,6 +12,7 @@ use viscera::scalar::Vec3;
 use viscera::settings::{Count, Method, SolverSettings};
 
 pub use moving::{Course, DEEDS, Deed, Moving};
+pub use pressed::{Held, Pressed, Together};
 pub use pressing::{Pressing, Rest, Sampling};
 pub use sliding::{Slide, Sliding};
 

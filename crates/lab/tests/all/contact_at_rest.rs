@@ -7,7 +7,7 @@ use viscera::scalar::vec3;
 use viscera::settings::{Count, Integrator, Method, SolverSettings};
 use viscera::solver::Solver;
 use viscera::state::State;
-use viscera_lab::contact_cases::{Pressing, Sliding, Way};
+use viscera_lab::contact_cases::{Held, Pressed, Pressing, Sliding, Way};
 use viscera_lab::reference::Reference;
 
 fn soft(young: f64, poisson: f64) -> Material {
@@ -148,4 +148,38 @@ fn converged_steps_with_friction_are_newtons() {
         touched.len()
     );
     assert!(slid > 10);
+}
+
+/// A block that meets its mirror image is at rest as it is on the plane between the two, which the reference has as a tool.
+fn assert_mirrored(cells: usize, held: Held, ways: &[Way]) {
+    let pressed = Pressed::mirrored(cells, held, 1e4, 4e-3).expect("two blocks");
+    let truth = pressed.truth().expect("a state of rest");
+    for way in ways {
+        let ours = pressed.settle(way).expect("steps");
+        let shape = pressed.shape_error(&truth, &ours);
+        let [lower, upper] = ours.forces;
+        let force = lower / truth.forces[0] - 1.0;
+        println!(
+            "{held:?}, {way}: {:.4} N, off by {force:.1e}, holders by {:.1e}, shape by {shape:.1e}",
+            truth.forces[0],
+            upper / lower - 1.0
+        );
+        // Surfaces tilted by less than a tenth: half of its square.
+        assert!(force.abs() < 5e-3 && shape < 5e-3, "{held:?}, {way}: {force:e}, {shape:e}");
+        assert!((upper / lower - 1.0).abs() < 1e-4, "{held:?}, {way}: {lower} and {upper}");
+    }
+}
+
+#[test]
+fn tissue_on_tissue_rests_as_on_the_plane_between() {
+    assert_mirrored(2, Held::Middle, &[Way::of(Method::QuasiNewton)]);
+}
+
+#[test]
+#[ignore = "slow: finer blocks by every method"]
+fn tissue_on_tissue_rests_as_on_the_plane_between_at_length() {
+    let ways = [Method::Xpbd, Method::QuasiNewton, Method::Explicit].map(Way::of);
+    for held in [Held::Back, Held::Middle] {
+        assert_mirrored(4, held, &ways);
+    }
 }

@@ -59,7 +59,7 @@ impl Skin {
             let p = mean(sample.vertices, sample.weights, positions);
             let meet = |marks: &mut Marks, deepest: f64| {
                 let moment = Moment { deepest, ..moment };
-                let found = moment.meet(marks, (number, p), None, [reach; 2]).0?;
+                let found = moment.meet(marks, (number, p), [None; 2], [reach; 2]).0?;
                 let distance = found.closest.signed().0;
                 Some((distance, self.bodies[found.triangle as usize] as usize))
             };

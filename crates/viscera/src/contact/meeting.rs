@@ -146,11 +146,12 @@ impl Moment<'_> {
 
     /// What a sample at `p` [m] meets within `reach` [m], `kept` being the triangle that it was in touch with; and how far
     /// the nearest triangle is that it could meet if neither turned further than [`Moment::free_turn`], at most `farther` [m].
+    /// `near` was near lately: that saves time and changes nothing.
     pub fn meet(
         &self,
         marks: &mut Marks,
         (sample, p): (usize, Vec3<f64>),
-        kept: Option<u32>,
+        [kept, near]: [Option<u32>; 2],
         reaches: [f64; 2],
     ) -> (Option<Found>, f64) {
         let Self { skin, contact, .. } = *self;
@@ -188,7 +189,8 @@ impl Moment<'_> {
         // Whose nearest point is on its border it has slid off, and that would hold it back.
         let is_on = |near: &Closest| near.weights.iter().all(|weight| *weight > 0.0);
         let before = before.filter(|at| is_on(&at.closest) && suits(at.triangle, &at.closest));
-        let query = Query { p, outward, reaches, since: self.since };
+        let first = near.map(|near| (near, outward.dot(self.normals[near as usize])));
+        let query = Query { p, outward, reaches, since: self.since, first };
         let (found, clearance) = self.grid.nearest(&query, |t| self.corners(t), may, suits);
         // In a hollow two triangles may be as near, and what went from one to the other and back would never be at rest.
         let far = |found: &Found| found.closest.away.length();

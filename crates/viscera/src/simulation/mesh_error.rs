@@ -95,11 +95,11 @@ const MOST_STEPS: u32 = 100;
 impl<S: Real> Simulation<S> {
     /// How far the mesh is from the body that it stands for, at rest under what acts at the end of the last frame. Nothing
     /// before the first frame, where nothing is held or displaced, where tissue was in motion when it was taken hold of,
-    /// where there are tools, of which the way to rest knows nothing, and of more than [`MESH_ERROR_TETS`]. Takes about as long as a hundred frames, and the memory of a mesh eight
+    /// where there is contact, of which the way to rest knows nothing, and of more than [`MESH_ERROR_TETS`]. Takes about as long as a hundred frames, and the memory of a mesh eight
     /// times as large: for the end of a run.
     pub fn mesh_error(&self) -> Option<MeshReport> {
         let is_large = self.model.tet_count() > MESH_ERROR_TETS;
-        if !self.stepped || is_large || !self.scene.tools.is_empty() {
+        if !self.stepped || is_large || self.has_contact() {
             return None;
         }
         let (time, positions) = (self.time(), &self.state.positions);

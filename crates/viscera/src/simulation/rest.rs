@@ -139,11 +139,11 @@ impl RestReport {
 
 impl<S: Real> Simulation<S> {
     /// How far the last frame is from the state of rest; nothing before the first frame, where nothing is held, and
-    /// while what the scene does changes, and where there are tools, of which the way to rest knows nothing: then there is none to come to. Takes about as long as some dozens of frames of a small mesh,
+    /// while what the scene does changes, and where there is contact, of which the way to rest knows nothing: then there is none to come to. Takes about as long as some dozens of frames of a small mesh,
     /// seconds for a large one, and memory while it lasts: for the end of a run.
     pub fn rest(&self) -> Option<RestReport> {
         let (time, frame) = (self.time(), self.scene.time.frame);
-        if !self.stepped || !self.scene.tools.is_empty() {
+        if !self.stepped || self.has_contact() {
             return None;
         }
         let inputs = self.inputs_at(time);
@@ -171,6 +171,12 @@ impl<S: Real> Simulation<S> {
             complete: measured.complete,
             stable: measured.stable,
         })
+    }
+
+    /// Whether there are tools or ties, or tissue that presses on tissue.
+    pub(super) fn has_contact(&self) -> bool {
+        let Self { scene, state, .. } = self;
+        !scene.tools.is_empty() || !scene.ties.is_empty() || !state.contact.pairs.is_empty()
     }
 
     /// How far the forces on patches are from those at rest, over the largest of those.

@@ -16,6 +16,7 @@ mod explicit;
 pub mod gpu;
 mod held;
 mod inputs;
+mod meetings;
 mod methods;
 pub mod oscillations;
 pub mod plan;
@@ -44,6 +45,8 @@ pub(crate) use explicit::growth as explicit_growth;
 pub(crate) use inputs::check_elements;
 pub use inputs::{Inputs, Pin, Tether};
 use inputs::{check_inputs, check_model, check_state, check_step};
+#[doc(hidden)]
+pub use meetings::Meetings;
 use oscillations::Oscillations;
 use plan::Plan;
 pub(crate) use quasi_newton::{choose, expected_motion_error};

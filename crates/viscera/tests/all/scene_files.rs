@@ -9,7 +9,7 @@ use viscera::settings::{
     SolverSettings, Start,
 };
 
-const SHIPPED: [(&str, &str); 10] = [
+const SHIPPED: [(&str, &str); 12] = [
     ("liver_retraction.toml", include_str!("../../../../scenes/liver_retraction.toml")),
     ("cantilever.toml", include_str!("../../../../scenes/cantilever.toml")),
     ("twist.toml", include_str!("../../../../scenes/twist.toml")),
@@ -20,6 +20,8 @@ const SHIPPED: [(&str, &str); 10] = [
     ("grasp.toml", include_str!("../../../../scenes/grasp.toml")),
     ("haptic_palpation.toml", include_str!("../../../../scenes/haptic_palpation.toml")),
     ("cholecystectomy.toml", include_str!("../../../../scenes/cholecystectomy.toml")),
+    ("organs_pressed.toml", include_str!("../../../../scenes/organs_pressed.toml")),
+    ("fold.toml", include_str!("../../../../scenes/fold.toml")),
 ];
 
 /// Nearly every key there is, in one scene.

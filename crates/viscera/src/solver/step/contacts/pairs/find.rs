@@ -7,7 +7,7 @@
 //! A sample that had nothing within a distance looks again when vertices have travelled so far that this may have changed. It
 //! decides when to look, and never what is found.
 
-use super::{Pairs, Places, Search};
+use super::{NOWHERE, Pairs, Places, Search};
 use crate::contact::search::{Found, Since};
 use crate::contact::{Bond, DEEPEST, Foundation, Kept, Moment, Pair, from_edges, turn_normals};
 use crate::layout::LaidSkin;
@@ -263,9 +263,11 @@ impl Search {
         let farther = reach + MARGIN * skin.contact.law.thickness;
         let mut marks = std::mem::take(&mut self.marks);
         let moment = self.moment(skin);
-        let (found, clearance) = moment.meet(&mut marks, sample, kept, [reach, farther]);
+        let near = Some(self.near[place]).filter(|near| *near != NOWHERE);
+        let (found, clearance) = moment.meet(&mut marks, sample, [kept, near], [reach, farther]);
         let turned = self.turned + moment.free_turn(sample.0);
         self.marks = marks;
+        self.near[place] = found.as_ref().map_or(NOWHERE, |found| found.triangle);
         self.until[place] = clearance + 2.0 * self.travelled;
         self.until_turned[place] = turned;
         found

@@ -58,7 +58,12 @@ struct Search {
     /// How far vertices may travel from the beginning on until a sample may meet something within reach [m], and the least.
     until: Vec<f64>,
     first_until: f64,
+    /// The triangle that each sample met when it looked last, or [`NOWHERE`].
+    near: Vec<u32>,
 }
+
+/// No triangle.
+const NOWHERE: u32 = u32::MAX;
 
 /// What pairs know of a step.
 #[derive(Clone, Copy)]
@@ -94,13 +99,15 @@ impl Pairs {
                 until_turned: vec![0.0; samples],
                 until: vec![0.0; samples],
                 first_until: 0.0,
+                near: vec![NOWHERE; samples],
             },
         }
     }
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        let Search { grid, marks, seen, at, ways, normals, until, until_turned, .. } = &self.search;
+        let Search { grid, marks, seen, at, ways, normals, until, until_turned, near, .. } =
+            &self.search;
         (self.pairs.capacity() + self.at_start.capacity()) * size_of::<Pair>()
             + size_of_val(&self.first[..])
             + grid.bytes()
@@ -108,6 +115,12 @@ impl Pairs {
             + [seen, at, ways, normals].map(|all| size_of_val(&all[..])).iter().sum::<usize>()
             + size_of_val(&until[..])
             + size_of_val(&until_turned[..])
+            + size_of_val(&near[..])
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.pairs.len()
     }
 
     /// Forgets all pairs.
