@@ -107,7 +107,7 @@ pub(super) fn add(context: &mut Context) -> Result<()> {
     let answers = context.run_cases(&cases, answer)?;
     context.document.subheading("Tissue on tissue");
     context.document.paragraph(format!(
-        "Two blocks of 30 x 30 x 15 mm, E 10 kPa, nu 0.45, mirror images of each other, are pressed together by their \
+        "Two blocks of 30 x 30 x 15 mm, E 10 kPa, nu 0.45, viscosity 10 ms, mirror images of each other, are pressed together by their \
          backs, or by the middles of their backs, with the usual law of contact. A block that meets its image is at rest as it is \
          on a rigid plane between the two, with half of the thickness: so the truth is the Newton reference's, which knows \
          tools but no pairs. Columns of 20 x 20 mm, 20 and 12 mm high, of 10 and 20 kPa and without Poisson's ratio, are \
