@@ -3,14 +3,21 @@
 
 use crate::common::counting::{bytes_of, requests_of};
 use crate::common::{SNH, block, everything, material, single_body};
+use viscera::contact::{Held, Shape, Spring, TissueContact, Tool};
 use viscera::layout::Layout;
+use viscera::material::Material;
+use viscera::mesh::{TetMesh, shapes};
 use viscera::model::ModelBuilder;
-use viscera::scalar::{Real, vec3};
+use viscera::scalar::rigid::RigidTransform;
+use viscera::scalar::{Real, Vec3, vec3};
 use viscera::scene::Scene;
-use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, Colors, Count, SolverSettings};
+use viscera::settings::{
+    Acceleration, AndersonGuard, AndersonOn, Colors, Count, Elements, Method, SolverSettings,
+};
 use viscera::simulation::{Assembly, Simulation};
 use viscera::solver::balance::ForceBalance;
 use viscera::solver::{Inputs, Pin, Solver};
+use viscera::state::ContactState;
 
 #[test]
 fn the_counter_counts() {
@@ -247,5 +254,58 @@ fn memory_of_springs_and_attachments_is_said() {
     let (layout, laid) = bytes_of(|| Layout::new(&model, &settings));
     for (said, taken) in [(model.bytes(), taken), (layout.bytes(), laid)] {
         assert!(said <= taken && taken * 100 <= said * 103, "{said} bytes said, {taken} taken");
+    }
+}
+
+/// With a ball that is moved, one that a spring holds, a floor, and a block that lies on another.
+#[test]
+fn a_step_with_contact_allocates_nothing_once_all_has_touched() {
+    for method in [Method::Xpbd, Method::QuasiNewton, Method::Explicit] {
+        let tissue = Material::new(SNH, 1e4, 0.4, 1060.0);
+        let tissue = tissue.expect("legal").with_viscosity(5e-3).expect("legal");
+        let mut builder = ModelBuilder::new();
+        for height in [0.0, 0.0209] {
+            let made = shapes::block(vec3(0.04, 0.04, 0.02), [4, 4, 2]).expect("a block");
+            let at = |x: &Vec3<f64>| *x + vec3(0.0, 0.0, height);
+            let vertices = made.vertices().iter().map(at).collect();
+            let (mesh, _) = TetMesh::new(vertices, made.tets().to_vec(), made.regions().to_vec())
+                .expect("legal");
+            builder.add_body(&mesh, &tissue).expect("a body");
+        }
+        builder.sample_surface(2);
+        builder.touch_tissue(&TissueContact::default()).expect("legal");
+        let model = builder.build::<f32>().expect("a model");
+        let settings =
+            SolverSettings { method, elements: Elements::Plain, ..SolverSettings::default() };
+        let mut solver = Solver::new(&model, &settings);
+        let mut state = solver.state_at_rest();
+        let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81), ..Inputs::default() };
+        let ball = |x: f64| Tool {
+            pose: RigidTransform { translation: vec3(x, 0.02, 0.0485), ..RigidTransform::IDENTITY },
+            ..Tool::new(Shape::Sphere { radius: 8e-3 })
+        };
+        let mut held = ball(0.028);
+        held.held = Some(Held { spring: Spring::default(), hand: held.pose, body: 1 });
+        inputs.tools = vec![Tool::new(Shape::HalfSpace), ball(0.012), held];
+        inputs.tools[0].pose.translation = vec3(0.0, 0.0, -9e-4);
+        state.contact = ContactState::of(&inputs.tools);
+        let hand = inputs.tools[2].pose;
+        let mut go = |count: u32| {
+            for step in 0..count {
+                let down = 1e-3 * libm::sin(0.1 * f64::from(step));
+                inputs.tools[1].pose.translation.z = 0.0475 - down;
+                // The hand's place: where the tool is follows.
+                inputs.tools[2].pose = hand;
+                solver.lead(&model, &mut state, &mut inputs, 4e-3).expect("held tools");
+                solver.step(&model, &mut state, &inputs, 4e-3).expect("a step");
+            }
+            (state.contact.touches.len(), state.contact.pairs.len())
+        };
+        let (touches, pairs) = go(126);
+        assert!(touches > 20 && pairs > 20, "{method}: {touches} {pairs}");
+        let requests = requests_of(|| {
+            go(126);
+        });
+        assert_eq!(requests, 0, "{method}");
     }
 }
