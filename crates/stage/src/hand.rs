@@ -181,7 +181,7 @@ impl ToolHands {
         Ok(())
     }
 
-    /// Takes an instrument at a pose; a larger one where the mesh is too coarse for it, which is told.
+    /// Takes an instrument at a pose; a larger one where the mesh is too coarse for it, and a message says so.
     fn take<S: Real>(
         &mut self,
         simulation: &mut Simulation<S>,

@@ -16,7 +16,7 @@ use viscera::scalar::{Mat3, Vec3, vec3};
 /// Where the service listens.
 const SERVICE: &str = "ws://localhost:10001";
 
-/// What the service is told of who asks.
+/// The name by which the service knows this program.
 const PROFILE: &str = "viscera:haptics";
 
 /// How long it may take to answer at the beginning.

@@ -12,7 +12,7 @@ use viscera::scalar::rigid::{RigidTransform, rotation_matrix, rotation_vector};
 use viscera::scalar::{Real, Vec3};
 use viscera::simulation::Simulation;
 
-/// The most that a device is told to push with [N].
+/// The strongest force that is sent to a device [N].
 const STRONGEST: f64 = 8.0;
 
 /// How long [s] a device may say nothing until its force is taken away, and until the loop ends.

@@ -139,7 +139,7 @@ impl Shape {
     pub fn complaint(&self) -> Option<&'static str> {
         let is_length = |length: f64| length > 0.0 && length.is_finite();
         match *self {
-            // What is wrong with a mesh is told where its grid is made.
+            // A mesh is checked where its grid is made.
             Self::HalfSpace | Self::Mesh(_) => None,
             Self::Sphere { radius } if is_length(radius) => None,
             Self::Sphere { .. } => Some("a sphere needs a radius above zero"),

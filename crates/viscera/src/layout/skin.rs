@@ -34,7 +34,7 @@ impl LaidSkin {
         numbering: &Numbering,
         part_of: &[u32],
     ) -> Option<Self> {
-        // Who asks for contact between bodies of a method that takes none is refused; a fold is told of.
+        // A scene with contact between bodies is refused where the method computes none; of a fold a note says so.
         if !settings.takes_contact() {
             return None;
         }

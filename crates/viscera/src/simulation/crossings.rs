@@ -1,4 +1,4 @@
-//! Instruments inside each other: nothing keeps them apart, so it is told.
+//! Instruments inside each other: nothing keeps them apart, so reports say so.
 
 use crate::contact::{Shape, Tool};
 use crate::scalar::{Vec3, vec3};
