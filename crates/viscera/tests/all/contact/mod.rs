@@ -10,6 +10,7 @@ mod refused;
 mod ties;
 mod tissue;
 mod tissue_motion;
+mod tissue_pairs;
 
 use viscera::contact::{Shape, Tool};
 use viscera::material::Material;
