@@ -366,4 +366,26 @@ mod tests {
         }
         assert!(met > 30, "{met}");
     }
+    /// Of two triangles with a common edge the lower, whichever the grid has first; their middles are far beyond what is asked for.
+    #[test]
+    fn of_triangles_that_are_as_near_the_lowest_is_found() {
+        for i in 0..200 {
+            let place = point(i);
+            let points = [
+                vec3(0.0, 0.0, 0.0),
+                vec3(0.0, 1.0, 0.0),
+                vec3(-2.0, 0.5, 0.0),
+                vec3(2.0, 0.5, 0.0),
+            ];
+            let points = points.map(|x| place + x * 0.125);
+            let triangles = [[0, 1, 2], [1, 0, 3]];
+            let mut grid = Grid::new(2);
+            grid.sort(&triangles, &points, 1e-3);
+            grid.turn(&[Vec3::ZERO; 2]);
+            let query = Query::around(points[0] - vec3(0.0, 5e-4, 0.0), 1e-3);
+            let corners = |t: u32| triangles[t as usize].map(|v: u32| points[v as usize]);
+            let (found, _) = grid.nearest(&query, corners, |_, _| May::Now, |_, _| true);
+            assert_eq!(found.map(|found| found.triangle), Some(0), "{i}");
+        }
+    }
 }

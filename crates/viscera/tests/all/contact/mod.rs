@@ -14,6 +14,7 @@ mod sheets;
 mod ties;
 mod tissue;
 mod tissue_motion;
+mod tissue_pairs;
 
 use viscera::contact::{Shape, Tool};
 use viscera::material::Material;

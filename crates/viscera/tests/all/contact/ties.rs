@@ -48,7 +48,11 @@ fn assembled(text: &str, settings: &[(&str, &str)]) -> Result<(Scene, Assembly),
 
 /// The pull [N] on the hand after so many frames, how many ties are torn and how many there are.
 fn pulled(settings: &[(&str, &str)], frames: u32) -> (f64, usize, usize) {
-    let (scene, assembly) = assembled(TIED, settings).expect("a scene");
+    pulled_in(TIED, settings, frames)
+}
+
+fn pulled_in(text: &str, settings: &[(&str, &str)], frames: u32) -> (f64, usize, usize) {
+    let (scene, assembly) = assembled(text, settings).expect("a scene");
     let mut simulation = Simulation::<f64>::new(scene, assembly).expect("a simulation");
     (0..frames).for_each(|_| simulation.advance_frame().expect("a frame"));
     let torn = &simulation.state().contact.torn;
@@ -81,6 +85,74 @@ fn ties_tear_and_then_let_go() {
     assert!(force.abs() < 1e-4, "{force}");
     let (force, torn, _) = pulled(&[("tie.bed.strength", "1 MPa")], 50);
     assert!(torn == 0 && force > 0.3, "{force} {torn}");
+}
+
+/// Where both sides are held as a whole, ties are stretched by the way of one: they tear where `k w` is more than the strength.
+#[test]
+fn ties_tear_at_their_strength() {
+    let held = TIED
+        .replace("point = [0, 0, \"13.5 mm\"]", "point = [0, 0, \"9 mm\"]")
+        .replace("point = [0, 0, 0], normal", "point = [0, 0, \"8.5 mm\"], normal");
+    // In the end 2 mm of 2 kPa/mm.
+    for (strength, tears) in [("4.02 kPa", false), ("3.98 kPa", true)] {
+        let (force, torn, count) = pulled_in(&held, &[("tie.bed.strength", strength)], 50);
+        assert_eq!(torn, if tears { count } else { 0 }, "{strength}");
+        // On the plate's lower face of 4 cm^2.
+        let expected = if tears { 0.0 } else { 4e-4 * 4e3 };
+        assert!((force - expected).abs() < 1e-6, "{strength}: {force} of {expected}");
+    }
+}
+
+/// Samples of a plate that is wider than what it is tied to hang on its border, askew: at rest they pull nowhere.
+#[test]
+fn ties_to_a_border_do_not_pull_at_rest() {
+    let wide = TIED
+        .replace(
+            "size = [\"20 mm\", \"20 mm\", \"4 mm\"]",
+            "size = [\"24 mm\", \"22 mm\", \"4 mm\"]",
+        )
+        .replace("distance = \"2 mm\"", "distance = \"5 mm\"");
+    let (force, torn, count) = pulled_in(&wide, &[], 5);
+    assert!(count > 0 && torn == 0 && force.abs() < 1e-9, "{force} {torn} {count}");
+    let (scene, assembly) = assembled(&wide, &[]).expect("a scene");
+    let mut simulation = Simulation::<f64>::new(scene, assembly).expect("a simulation");
+    (0..5).for_each(|_| simulation.advance_frame().expect("a frame"));
+    let moved = simulation.state().positions.iter().zip(&simulation.model().rest_positions);
+    let far = moved.map(|(x, rest)| (*x - *rest).length()).fold(0.0, f64::max);
+    assert!(far < 1e-12, "{far}");
+}
+
+/// Surfaces come closer by two thicknesses of contact at most in a step: a frame in which they would meet is divided.
+#[test]
+fn frames_in_which_bodies_would_meet_are_divided() {
+    let (rest, _) = TIED.split_once("[[tie]]").expect("a tie");
+    let falls = rest
+        .replace("point = [0, 0, \"13.5 mm\"]", "point = [0, 0, \"9 mm\"]")
+        .replace("\"9.5 mm\"", "\"62.5 mm\"")
+        .replace(
+            "{ time = \"0.5 s\", translation = [0, 0, \"2 mm\"] }",
+            "{ time = \"0.2 s\", translation = [0, 0, \"-54 mm\"] }",
+        );
+    let settings = [("solver.substeps", "1"), ("contact.bodies", "true")];
+    let (scene, assembly) = assembled(&falls, &settings).expect("a scene");
+    let mut simulation = Simulation::<f64>::new(scene, assembly).expect("a simulation");
+    // The plate over the block, whose upper face is at 8 mm [m].
+    let gap = |simulation: &Simulation<f64>| {
+        let range = simulation.assembly().bodies[1].vertices.clone();
+        let heights = simulation.state().positions[range].iter().map(|x| x.z);
+        heights.fold(f64::MAX, f64::min) - 0.008
+    };
+    let mut most = 0;
+    for _ in 0..14 {
+        let before = gap(&simulation);
+        simulation.advance_frame().expect("a frame");
+        let after = gap(&simulation);
+        let way = before - after;
+        let steps = if after < 1e-3 { (way / 2e-3).ceil().max(1.0) as u32 } else { 1 };
+        assert_eq!(simulation.report().divided, steps, "from {before} to {after}");
+        most = most.max(steps);
+    }
+    assert!(most > 2, "{most}");
 }
 
 #[test]

@@ -207,12 +207,28 @@ fn bodies_that_are_pressed_together_push_back_and_part_at_length() {
 }
 
 /// Two columns of one cross-section and no Poisson's ratio that are pressed together are springs in a row: tissue, the foundation
-/// between the two, tissue. `sigma = w/(L_1/E_1 + 1/k + L_2/E_2)`, `1/k = 1/k_1 + 1/k_2`, `k_i = kf E_i/h_i`.
+/// between the two, tissue. `sigma = w/(L_1/E_1 + 1/k + L_2/E_2)`, `1/k = 1/k_1 + 1/k_2`, `k_i = kf E_i/h_i`. Contact begins at a
+/// distance of 1 mm, or where they are at rest.
 #[test]
 fn pressure_between_bodies_is_that_of_springs_in_a_row() {
+    for gap in [1.1e-3, 0.6e-3, -0.3e-3] {
+        let (young, stiffness, way) = ([1e4, 2e4], 0.5, 0.4e-3);
+        let force = columns(gap, (young, stiffness), way);
+        // The mean length of edges on a face of squares of 5 mm, each cut along a diagonal, as surfaces are sampled.
+        let edge = 5e-3 * (2.0 + 2f64.sqrt()) / 3.0;
+        let softness = edge / stiffness * (1.0 / young[0] + 1.0 / young[1]);
+        let pressed = way - (gap - 1e-3).max(0.0);
+        let expected = 4e-4 * pressed / (0.02 / young[0] + 0.012 / young[1] + softness);
+        println!("{gap} m: {force} N of {expected} N");
+        // Edges are no inner ones: their mean is a little different there.
+        assert!((force / expected - 1.0).abs() < 0.02, "{gap}: {force} of {expected}");
+    }
+}
+
+/// The force [N] between two columns with a gap [m] at rest, of which the upper's end is led down by a way [m].
+fn columns(gap: f64, (young, stiffness): ([f64; 2], f64), way: f64) -> f64 {
     let lower = block_at([0.02, 0.02, 0.02], [4, 4, 4], Vec3::ZERO);
-    let upper = block_at([0.02, 0.02, 0.012], [4, 4, 3], vec3(0.0, 0.0, 0.0211));
-    let (young, stiffness, way) = ([1e4, 2e4], 0.5, 0.4e-3);
+    let upper = block_at([0.02, 0.02, 0.012], [4, 4, 3], vec3(0.0, 0.0, 0.02 + gap));
     let mut builder = ModelBuilder::new();
     for (mesh, young) in [&lower, &upper].into_iter().zip(young) {
         let tissue = Material::new(SNH, young, 0.0, 1060.0).expect("a tissue");
@@ -224,7 +240,7 @@ fn pressure_between_bodies_is_that_of_springs_in_a_row() {
     let mut bodies =
         Bodies::<f64>::built(builder, vec![lower, upper], &contact, (&settings, substeps));
     let below = bodies.of(0, |x| x.z < 1e-6);
-    let above = bodies.of(1, |x| x.z > 0.0331 - 1e-6);
+    let above = bodies.of(1, |x| x.z > 0.032 + gap - 1e-6);
     for step in 1..=160 {
         let way = way * super::ramp(f64::from(step), 0.0, 40.0);
         let fixed = below.iter().map(|&vertex| Pin { vertex, target: bodies.rest(vertex) });
@@ -234,15 +250,34 @@ fn pressure_between_bodies_is_that_of_springs_in_a_row() {
         bodies.inputs.pins = fixed.chain(led).collect();
         bodies.step();
     }
-    let force = bodies.reaction(|v| below.contains(&v)).z;
-    // The mean length of edges on a face of squares of 5 mm, each cut along a diagonal, as surfaces are sampled.
-    let edge = 5e-3 * (2.0 + 2f64.sqrt()) / 3.0;
-    let softness = edge / stiffness * (1.0 / young[0] + 1.0 / young[1]);
-    // Contact begins at a distance of 1 mm.
-    let expected = 4e-4 * (way - 1e-4) / (0.02 / young[0] + 0.012 / young[1] + softness);
-    println!("{force} N of {expected} N");
-    // Edges are no inner ones: their mean is a little different there.
-    assert!((force / expected - 1.0).abs() < 0.02, "{force} of {expected}");
+    bodies.reaction(|v| below.contains(&v)).z
+}
+
+/// Bodies that overlap at rest by more on one side than on the other feel nothing there.
+#[test]
+fn bodies_that_are_close_at_rest_stay_as_they_are() {
+    let lower = block_at([0.02, 0.02, 0.01], [4, 4, 2], Vec3::ZERO);
+    let upper = block_at([0.02, 0.02, 0.01], [3, 3, 2], vec3(1e-3, 0.0, 0.0101));
+    let askew = |x: &Vec3<f64>| *x + vec3(0.0, 0.0, 0.04 * x.x - 0.02 * x.y);
+    let vertices = upper.vertices().iter().map(askew).collect();
+    let upper = TetMesh::new(vertices, upper.tets().to_vec(), upper.regions().to_vec());
+    for name in METHODS {
+        let (settings, substeps) = method(name);
+        let meshes = vec![lower.clone(), upper.clone().expect("a mesh").0];
+        let mut bodies =
+            Bodies::<f64>::new(meshes, [1e4, 0.4, 0.0], &rubbing(0.3), (&settings, substeps));
+        for _ in 0..4 {
+            bodies.step();
+            let pressed = bodies.state.contact.pairs.iter().map(|pair| pair.pressed);
+            let pressed = pressed.fold(0.0, f64::max);
+            // Rounding of a distance, of contact of 1e2 N/m.
+            assert!(pressed < 1e-12, "{name}: {pressed}");
+        }
+        let all = 0..bodies.model.vertex_count() as u32;
+        let far = all.map(|v| (bodies.place(v) - bodies.rest(v)).length()).fold(0.0, f64::max);
+        // Rounding of places, of which elements make forces.
+        assert!(far < 1e-12, "{name}: {far}");
+    }
 }
 
 /// Blocks that are driven into each other at 1 m/s in steps of up to 17 mm.

@@ -11,8 +11,9 @@ use super::tissue::{Bodies, block_at, rubbing};
 use super::{Block, METHODS, method};
 use crate::common::SNH;
 
-/// Two blocks in free flight collide off their middles: what momentum is lost is round-off.
-fn collide<S: Real>(name: &str) -> [f64; 2] {
+/// Two blocks in free flight collide off their middles: what momentum is lost is round-off, of what they had and what loads
+/// have given, and how far their common centre of mass is off its way without loads.
+fn collide<S: Real>(name: &str, is_loaded: bool) -> [f64; 3] {
     let (settings, substeps) = method(name);
     let one = block_at([0.02, 0.02, 0.02], [4, 4, 4], vec3(0.0, 0.0, -0.01));
     let other = block_at([0.015, 0.02, 0.02], [3, 4, 4], vec3(0.021, 5e-3, -4e-3));
@@ -22,73 +23,118 @@ fn collide<S: Real>(name: &str) -> [f64; 2] {
         let sign = if v < bodies.first(1) { 1.0 } else { -1.0 };
         bodies.state.velocities[v as usize] = vec3(0.25 * sign, 0.02, 0.0).cast();
     }
+    let mass = bodies.model.masses.iter().map(|m| m.to_f64()).sum::<f64>();
+    let (gravity, force) = (vec3(0.4, -0.3, 0.2), vec3(0.0, 1e-3, -2e-3));
+    if is_loaded {
+        bodies.inputs.gravity = gravity.cast();
+        bodies.inputs.forces = vec![(0, force.cast())];
+    }
+    // The centre of mass, and where the force acts [m].
+    let places = |bodies: &Bodies<S>| {
+        let all = bodies.state.positions.iter().zip(&bodies.model.masses);
+        let sum = all.fold(Vec3::ZERO, |sum, (x, m)| sum + x.cast::<f64>() * m.to_f64());
+        [sum * (1.0 / mass), bodies.place(0)]
+    };
     let before = bodies.momentum();
-    let size = 0.25 * bodies.model.masses.iter().map(|m| m.to_f64()).sum::<f64>();
-    let mut lost: [f64; 2] = [0.0; 2];
+    let [center, _] = places(&bodies);
+    let size = 0.25 * mass;
+    let mut lost: [f64; 3] = [0.0; 3];
     let mut touched = 0;
-    for _ in 0..(0.25 / bodies.dt) as u32 {
-        let start = bodies.momentum();
+    for step in 1..=(0.25 / bodies.dt) as u32 {
+        let (start, from) = (bodies.momentum(), places(&bodies));
         bodies.step();
-        let end = bodies.momentum();
+        let (end, to) = (bodies.momentum(), places(&bodies));
         touched += usize::from(!bodies.state.contact.pairs.is_empty());
-        lost[0] = lost[0].max((end[0] - before[0]).length() / size);
+        let time = f64::from(step) * bodies.dt;
+        let (mut gained, mut turned) = (Vec3::ZERO, Vec3::ZERO);
+        if is_loaded {
+            let middles = [0, 1].map(|i| (from[i] + to[i]) * 0.5);
+            gained = (gravity * mass + force) * time;
+            turned = (middles[0].cross(gravity * mass) + middles[1].cross(force)) * bodies.dt;
+        } else {
+            let way = before[0] * (time / mass);
+            lost[2] = lost[2].max((to[0] - center - way).length() / (0.25 * time));
+        }
+        lost[0] = lost[0].max((end[0] - before[0] - gained).length() / size);
         // Of the moment that either body has about the other.
-        lost[1] = lost[1].max((end[1] - start[1]).length() / (size * 5e-3));
+        lost[1] = lost[1].max((end[1] - start[1] - turned).length() / (size * 5e-3));
     }
     let parted = bodies.state.contact.pairs.is_empty();
     println!(
-        "{name}: lost {:.1e} of momentum, {:.1e} of angular momentum a step, touched in {touched} steps",
-        lost[0], lost[1]
+        "{name}: lost {lost:?} of momentum, angular momentum a step, way; touched in {touched} steps"
     );
-    assert!(touched > 0 && parted, "{name}: {touched}");
+    // Loads have them meet and part within one step of some methods.
+    assert!((touched > 0 || is_loaded) && parted, "{name}: {touched}");
     lost
 }
 
 #[test]
 fn a_collision_in_free_flight_keeps_momentum() {
     for name in METHODS {
-        let lost = collide::<f64>(name);
+        let lost = collide::<f64>(name, false);
         assert!(lost[0] < 1e-13 && lost[1] < 1e-5, "{name}: {lost:?}");
+        // Explicit motion gives velocities what is theirs when a step ends, and leaves places where they are.
+        assert!(lost[2] < if name == "explicit" { 1e-3 } else { 1e-13 }, "{name}: {lost:?}");
+        // A step whose end is slowed down, so that energy does not grow, keeps no more than its drift.
+        let lost = collide::<f64>(name, true);
+        assert!(lost[0] < 1e-13, "{name} with loads: {lost:?}");
     }
 }
 
-/// A ball that strikes a free block: what the block has in the end is what the ball has given, in the step in which they meet.
+/// A ball that strikes a free block, or the block a ball that stands still: what the block gains is what the ball has given, in
+/// the step in which they meet.
 #[test]
 fn a_tool_that_strikes_a_free_body_moves_it() {
     // XPBD has only begun to answer a contact as stiff as this when its sweeps end; the force at the end of an explicit step
     // is more than its mean.
     for (name, share) in METHODS.into_iter().zip([0.02, 0.8, 0.3]) {
-        let block = Block::new([0.02, 0.02, 0.02], [4, 4, 4], [1e4, 0.4, 2e-3]);
-        let tissue = Material::new(SNH, 1e4, 0.4, 1060.0).expect("a tissue");
-        let mut builder = ModelBuilder::new();
-        builder.add_body(&block.mesh, &tissue).expect("a body");
-        builder.sample_surface(1);
-        assert_eq!(builder.touch_tissue(&TissueContact::default()), Ok(None));
-        let model = builder.build::<f64>().expect("a model");
-        let (settings, substeps) = method(name);
-        let dt = 1.0 / 60.0 / f64::from(substeps);
-        let mut solver = Solver::new(&model, &settings);
-        let mut state = State::at_rest(&model);
-        let mut ball = super::ball(0.01);
-        let at = |time: f64| vec3(0.0, 0.0, -0.0115 + 0.2 * time);
-        ball.pose.translation = at(0.0);
-        state.contact = viscera::state::ContactState::of(&[ball.clone()]);
-        let mut given = Vec3::<f64>::ZERO;
-        let mut step = 0;
-        while given == Vec3::ZERO && step < 20 {
-            step += 1;
-            ball.pose.translation = at(f64::from(step) * dt);
-            let inputs = Inputs { tools: vec![ball.clone()], ..Inputs::default() };
-            solver.step(&model, &mut state, &inputs, dt).expect("a step");
-            given += solver.wrenches()[0].force * -dt;
+        for ball_moves in [true, false] {
+            // Where no tool was in its way, a step of SDIRK2 weighs the force at its end with `1 - sqrt(1/2)`.
+            let share = if ball_moves { share } else { f64::min(share, 0.29) };
+            let [gained, given] = strike(name, ball_moves);
+            println!("{name}: {gained:?} of {given:?}");
+            assert!(
+                given.z > 1e-5 && gained.z > share * given.z,
+                "{name}, {ball_moves}: {gained:?} of {given:?}"
+            );
         }
-        let mut has = Vec3::<f64>::ZERO;
-        for (velocity, mass) in state.velocities.iter().zip(&model.masses) {
-            has += *velocity * *mass;
-        }
-        println!("{name}: {has:?} of {given:?}");
-        assert!(given.z > 1e-5 && has.z > share * given.z, "{name}: {has:?} of {given:?}");
     }
+}
+
+/// Momenta [kg m/s] that a block has gained and that a ball has given when the two meet at 0.2 m/s.
+fn strike(name: &str, ball_moves: bool) -> [Vec3<f64>; 2] {
+    let block = Block::new([0.02, 0.02, 0.02], [4, 4, 4], [1e4, 0.4, 2e-3]);
+    let tissue = Material::new(SNH, 1e4, 0.4, 1060.0).expect("a tissue");
+    let mut builder = ModelBuilder::new();
+    builder.add_body(&block.mesh, &tissue).expect("a body");
+    builder.sample_surface(1);
+    assert_eq!(builder.touch_tissue(&TissueContact::default()), Ok(None));
+    let model = builder.build::<f64>().expect("a model");
+    let (settings, substeps) = method(name);
+    let dt = 1.0 / 60.0 / f64::from(substeps);
+    let mut solver = Solver::new(&model, &settings);
+    let mut state = State::at_rest(&model);
+    let (ball_speed, block_speed) = if ball_moves { (0.2, 0.0) } else { (0.0, -0.2) };
+    state.velocities.fill(vec3(0.0, 0.0, block_speed));
+    let mut ball = super::ball(0.01);
+    let at = |time: f64| vec3(0.0, 0.0, -0.0115 + ball_speed * time);
+    ball.pose.translation = at(0.0);
+    state.contact = viscera::state::ContactState::of(&[ball.clone()]);
+    let momentum = |state: &State<f64>| {
+        let all = state.velocities.iter().zip(&model.masses);
+        all.fold(Vec3::ZERO, |sum, (velocity, mass)| sum + *velocity * *mass)
+    };
+    let had = momentum(&state);
+    let mut given = Vec3::<f64>::ZERO;
+    let mut step = 0;
+    while given == Vec3::ZERO && step < 20 {
+        step += 1;
+        ball.pose.translation = at(f64::from(step) * dt);
+        let inputs = Inputs { tools: vec![ball.clone()], ..Inputs::default() };
+        solver.step(&model, &mut state, &inputs, dt).expect("a step");
+        given += solver.wrenches()[0].force * -dt;
+    }
+    [momentum(&state) - had, given]
 }
 
 /// A block of tissue on another that is tilted: it holds or slides, as friction says.
