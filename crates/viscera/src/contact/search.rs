@@ -366,7 +366,8 @@ mod tests {
         }
         assert!(met > 30, "{met}");
     }
-    /// Of two triangles with a common edge the lower, whichever the grid has first; their middles are far beyond what is asked for.
+
+    /// Of two triangles with a common edge the lower, whichever the grid has first; their middles are beyond the reach.
     #[test]
     fn of_triangles_that_are_as_near_the_lowest_is_found() {
         for i in 0..200 {
