@@ -79,9 +79,9 @@ fn organs_that_are_pressed_together_push_alike_and_open_again() {
 }
 
 #[test]
-#[ignore = "slow: the whole scene by every method"]
+#[ignore = "slow: the whole scene by two methods; explicit steps take a quarter of an hour"]
 fn organs_that_are_pressed_together_push_alike_and_open_again_at_length() {
-    for method in METHODS {
+    for method in ["quasi_newton", "xpbd"] {
         press(method, &[], [4.5, 8.0], 1e-5);
     }
 }
