@@ -68,7 +68,7 @@ fn a_run_says_what_computed_it() {
 
     let gpu = bench.summary_of(&["--frames", "2", "--set", "solver.device=gpu"]);
     let device = gpu["device"].as_str().expect("text");
-    assert!(device.ends_with(": as asked for") && !device.starts_with("CPU"), "{device}");
+    assert!(device.contains(": as asked for") && !device.starts_with("CPU"), "{device}");
     assert_eq!(gpu["frames"].as_array().map(Vec::len), Some(2));
 }
 

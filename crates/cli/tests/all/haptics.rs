@@ -24,12 +24,9 @@ fn a_simulated_hand_feels_tissue_within_ticks_and_beside_them() {
             serde_json::from_slice(&bench.read("felt/haptics.json")).expect("JSON");
         assert_eq!(summary["ticks"], 600);
         assert_eq!(summary["finished"], true);
-        // Machines are busy: a simulation beside the ticks may lose frames, one within them has all.
+        // A simulation within the ticks has all frames; one beside them as many as the machine has time for.
         let frames = summary["frames"].as_u64().expect("a count");
-        assert!(
-            if rate == "1000" { frames == 600 } else { (1..=61).contains(&frames) },
-            "{frames}"
-        );
+        assert!(if rate == "1000" { frames == 600 } else { frames > 0 }, "{frames}");
         assert!(summary["largest_change"].as_f64().is_some_and(|change| change <= 0.05 + 1e-12));
         assert!(summary["least_energy"].as_f64().is_some_and(|energy| energy > -1e-4));
         let rows = String::from_utf8(bench.read("felt/haptics.csv")).expect("text");

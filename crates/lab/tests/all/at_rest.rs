@@ -77,6 +77,7 @@ fn case(seed: u64) -> Case {
     let (substeps, iterations) = schedule.split_once(" x ").expect("a schedule");
     let text = format!(
         "[time]\nduration = \"{duration} s\"\nvelocity_factor = {kept}\n\
+         [contact]\nself = false\n\
          [solver]\nmethod = \"xpbd\"\nsubsteps = {substeps}\niterations = {iterations}\nprecision = \"{precision}\"\n\
          rebase = {is_exact}\nkeep_multipliers = {is_exact}\n\
          [[body]]\nname = \"b\"\n{shape}\n\
