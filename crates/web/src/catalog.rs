@@ -231,7 +231,7 @@ mod tests {
                 let borrowed: Vec<(&str, &str)> =
                     settings.iter().map(|(key, value)| (key.as_str(), value.as_str())).collect();
                 let mut scene = Scene::parse(scene.name, scene.text, &borrowed).expect("a scene");
-                // A coarse mesh may be too coarse for a tool, or overlap another: that is told where it is asked for.
+                // A coarse mesh may be too coarse for a tool, or overlap another: the page says so when that mesh is chosen.
                 scene.tools.clear();
                 scene.ties.clear();
                 (scene.contact.self_, scene.contact.bodies) = (false, false);

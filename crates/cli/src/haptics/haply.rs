@@ -200,7 +200,7 @@ mod tests {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let address = format!("ws://{}", listener.local_addr().expect("an address"));
         let served = spawn(move || {
-            let (stream, _) = listener.accept().expect("somebody");
+            let (stream, _) = listener.accept().expect("a client");
             let mut socket = tungstenite::accept(stream).expect("a WebSocket");
             socket.send(Message::text(first)).expect("there");
             let mut heard = Vec::new();

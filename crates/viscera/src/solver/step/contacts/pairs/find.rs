@@ -58,7 +58,7 @@ impl Pairs {
                 let key = |kept: &Kept| (skin.part_of(kept.sample), kept.sample);
                 while kept.next_if(|kept| key(kept) < (part, number)).is_some() {}
                 let kept = kept.next_if(|kept| key(kept) == (part, number));
-                // A state that somebody has changed may name triangles that there are not.
+                // A state that the caller has changed may name triangles that do not exist.
                 let kept = kept.filter(|kept| (kept.triangle as usize) < skin.parts.len());
                 self.presses[part] |= kept.is_some();
                 self.meet(skin, places, place, kept, reach);
