@@ -307,6 +307,11 @@ fn a_first_visit_ends_in_a_scene_that_repeats_it() {
     assert!(young(&window) < 10e3);
     window.slide("stiffness E", 20.0);
     assert_eq!(young(&window), 20e3);
+    // Two changes within a frame are one: the next is made when the simulation has gone on with this one.
+    let number = window.harness.state().snapshot().expect("a frame").number;
+    window.wait("frames of the stiffer liver", |app| {
+        app.snapshot().is_some_and(|snapshot| snapshot.number > number + 1)
+    });
     window.press("Jacobi 40");
     assert_eq!(
         (window.scene().solver.colors, window.scene().solver.iterations()),

@@ -28,6 +28,8 @@ pub struct Kept {
     pub slip: [f64; 2],
     /// Normal force at the end of the last step [N].
     pub pressed: f64,
+    /// Energy of contact then, without that of friction [J].
+    pub energy: f64,
 }
 
 /// How a pair holds together.
@@ -138,6 +140,16 @@ impl Pair {
         }
     }
 
+    /// Energy of contact [J] with the sample `away` [m] from the triangle's point, without that of friction; none of a tie.
+    pub fn squeezed(&self, away: Vec3<f64>) -> f64 {
+        match self.bond {
+            Bond::Contact { foundation, shift, .. } => {
+                foundation.squeeze(self.normal.dot(away) + shift).energy
+            }
+            Bond::Tie { .. } => 0.0,
+        }
+    }
+
     /// How far the sample has slipped along the triangle [m].
     fn slip(&self, away: Vec3<f64>) -> Vec3<f64> {
         tangential(away + self.offset, self.normal)
@@ -197,7 +209,8 @@ impl Pair {
             let share = if elastic > most { most / elastic } else { 1.0 };
             in_edges(slip * share, corners)
         });
-        Some(Kept { sample: number, triangle: self.triangle, slip, pressed: felt.pressed })
+        let energy = self.squeezed(away);
+        Some(Kept { sample: number, triangle: self.triangle, slip, pressed: felt.pressed, energy })
     }
 }
 

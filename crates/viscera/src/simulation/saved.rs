@@ -20,7 +20,7 @@ use crate::settings::Method;
 use crate::state::{ContactState, Learned, LearnedPart, State};
 
 /// Raised whenever the bytes mean something else.
-const FORMAT: u32 = 11;
+const FORMAT: u32 = 12;
 
 /// Methods by the number that stands for them; a new one is added at the end.
 const METHODS: [Method; 4] = [Method::Auto, Method::Xpbd, Method::Explicit, Method::QuasiNewton];

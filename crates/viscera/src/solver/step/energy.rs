@@ -24,11 +24,12 @@
 //! steps know the work of all forces along the way, and `T_1 <= B` with it is all that is asked.
 //!
 //! Every connected part of the model has a limit of its own, so that one body does not slow another. A
-//! part that nothing holds keeps its momentum: there everything is relative to its center of mass.
+//! part that nothing holds keeps its momentum: there everything is relative to its center of mass. Where tissue meets tissue
+//! it keeps its angular momentum as well, and what finding pairs anew adds to the energy of contact counts as made of nothing.
 
 use super::contacts::Gift;
 use super::data::{Step, StepConstants, StepData};
-use crate::scalar::{Real, Vec3};
+use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::report::StepReport;
 
 /// The energies of a connected part and the work done on it in a step; sums over its free vertices.
@@ -46,9 +47,64 @@ struct Energy {
     tools: Gift,
     /// Mass times displacement [kg m].
     shift: Vec3<f64>,
+    /// Of tissue that meets tissue, at the end of the step.
+    turning: Option<Turning>,
     /// With the places and velocities of the step's start, and of its end.
     start: Motion,
     end: Motion,
+}
+
+/// How a group of parts turns, about the origin.
+#[derive(Clone, Copy, Debug, Default)]
+struct Turning {
+    /// Mass times place [kg m].
+    place: Vec3<f64>,
+    /// [kg m^2].
+    inertia: Mat3<f64>,
+    /// [kg m^2/s].
+    angular: Vec3<f64>,
+}
+
+impl Turning {
+    fn add(&mut self, mass: f64, place: Vec3<f64>, velocity: Vec3<f64>) {
+        self.place += place * mass;
+        self.angular += place.cross(velocity) * mass;
+        self.inertia = self.inertia
+            + (Mat3::IDENTITY * place.length_squared() + Mat3::outer(place, place) * -1.0) * mass;
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            place: self.place + other.place,
+            inertia: self.inertia + other.inertia,
+            angular: self.angular + other.angular,
+        }
+    }
+
+    /// The centre of mass [m], the spin about it [rad/s] and the energy [J] that it has; what has no extent does not spin.
+    fn spin(&self, mass: f64, momentum: Vec3<f64>) -> (Vec3<f64>, Vec3<f64>, f64) {
+        let center = self.place * (1.0 / mass);
+        let of_center =
+            (Mat3::IDENTITY * center.length_squared() + Mat3::outer(center, center) * -1.0) * mass;
+        let angular = self.angular - center.cross(momentum);
+        let spin = (self.inertia + of_center * -1.0).inverse() * angular;
+        if spin.is_finite() {
+            (center, spin, 0.5 * angular.dot(spin))
+        } else {
+            (center, Vec3::ZERO, 0.0)
+        }
+    }
+}
+
+/// Motion as of a rigid body.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rigid {
+    /// [m/s].
+    drift: Vec3<f64>,
+    /// [m].
+    center: Vec3<f64>,
+    /// About the centre [rad/s].
+    spin: Vec3<f64>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -87,26 +143,33 @@ impl Energy {
             work: self.work + other.work,
             tools: self.tools.plus(other.tools),
             shift: self.shift + other.shift,
+            turning: self.turning.zip(other.turning).map(|(a, b)| a.plus(b)),
             start: self.start.plus(other.start),
             end: self.end.plus(other.end),
         }
     }
 
-    /// Kinetic energy [J] that is left to the end of the step, kinetic energy that it has, and the velocity [m/s]
-    /// that neither counts.
-    fn balance(&self) -> (f64, f64, Vec3<f64>) {
+    /// Kinetic energy [J] that is left to the end of the step, kinetic energy that it has, and the motion that neither counts.
+    fn balance(&self) -> (f64, f64, Rigid) {
         let mut given = self.start.kinetic + self.start.stored - self.end.stored + self.work;
         let mut kinetic = self.end.kinetic;
-        let mut drift = Vec3::ZERO;
+        let mut rigid = Rigid::default();
         if !self.held && self.mass > 0.0 {
             // Inner forces change no momentum, so the limit must not either: the energy of the centre of mass is
             // taken out of both sides (`p^2/2M` of the kinetic energies, the work [J] of the total load along the
             // way of the centre). Otherwise a body in free fall would be braked because it swings.
             let inverse = 1.0 / self.mass;
-            drift = self.end.momentum * inverse;
+            rigid.drift = self.end.momentum * inverse;
             kinetic -= 0.5 * inverse * self.end.momentum.length_squared();
             given -= 0.5 * inverse * self.start.momentum.length_squared();
             given -= inverse * self.load.dot(self.shift);
+            if let Some(turning) = &self.turning {
+                // Nor do they change how a group turns. How much energy that has is part of the balance.
+                let (center, spin, energy) = turning.spin(self.mass, self.end.momentum);
+                (rigid.center, rigid.spin) = (center, spin);
+                kinetic -= energy;
+                given -= energy;
+            }
         }
         if self.tools.is_near {
             // Tools move while the tissue stands: that bound charges the overlap that they make. The other charges what
@@ -117,7 +180,7 @@ impl Energy {
                 None => given.min(by_work.max(self.start.kinetic)),
             };
         }
-        (given, kinetic, drift)
+        (given, kinetic, rigid)
     }
 
     /// Mechanical energy [J] that the step has made of nothing: what it ends with, less what there was and what loads and
@@ -128,15 +191,15 @@ impl Energy {
         after - before - self.work - self.tools.work()
     }
 
-    /// Velocity [m/s] that is not scaled, and the factor for velocities relative to it.
-    fn limit(&self) -> (Vec3<f64>, f64) {
-        let (given, kinetic, drift) = self.balance();
+    /// Motion that is not scaled, and the factor for velocities relative to it.
+    fn limit(&self) -> (Rigid, f64) {
+        let (given, kinetic, rigid) = self.balance();
         // `given` is below zero where more energy is stored than there was. Positions are not moved, so the most that
         // can be taken is all motion. A comparison with NaN is false: nothing is scaled by it. Nor is what does not move but
         // with its centre of mass.
         let moves_too_much = kinetic > given && kinetic > 0.0;
         let share = if moves_too_much { (given.max(0.0) / kinetic).sqrt() } else { 1.0 };
-        (drift, share)
+        (rigid, share)
     }
 }
 
@@ -192,7 +255,8 @@ impl Energies {
         for (number, (energy, part)) in self.parts.iter_mut().zip(model.parts.iter()).enumerate() {
             // Sums are added to in `limit`: without this they would be those of all steps so far.
             *energy = Energy { tools: constants.contacts.gift(number), ..Energy::default() };
-            energy.start.stored = stored[number];
+            // What finding pairs anew has added is nothing that the step began with.
+            energy.start.stored = stored[number] - constants.contacts.pairs.gain(number);
             // A hold can stop the centre of mass, so that the centre's energy counts too: `limit` takes nothing out.
             // So can a tool that is met within the step.
             energy.held = constants.holds(number, part) || energy.tools.is_near;
@@ -230,6 +294,10 @@ impl Energies {
             let Energy { held, start, mut tools, .. } = *energy;
             tools.exact = constants.contacts.gift(number).exact;
             *energy = Energy { held, start, tools, ..Energy::default() };
+            let meets = |part: usize| constants.contacts.pairs.is_any(part);
+            if !held && constants.groups.of(number).any(meets) {
+                energy.turning = Some(Turning::default());
+            }
             energy.tools.work[1] =
                 constants.contacts.work_after(&step.contact(), number, &data.points);
             energy.end.stored = stored[number];
@@ -249,6 +317,9 @@ impl Energies {
                 energy.load += load;
                 energy.work += load.dot(moved);
                 energy.shift += moved * mass;
+                if let Some(turning) = &mut energy.turning {
+                    turning.add(mass, data.points[v].vec3().cast(), data.velocities[v].cast());
+                }
             }
         }
         self.groups.copy_from_slice(&self.parts);
@@ -302,7 +373,7 @@ impl Energies {
         let Self { groups, ledger, .. } = self;
         ledger.stored = 0.0;
         for (number, (energy, part)) in groups.iter().zip(model.parts.iter()).enumerate() {
-            let (drift, share) = energy.limit();
+            let (rigid, share) = energy.limit();
             let is_limited = share < 1.0
                 && energy.mass > 0.0
                 && constants.groups.of(number).any(|part| limits(part, constants));
@@ -312,12 +383,17 @@ impl Energies {
             if !is_limited {
                 continue;
             }
-            // What remains about the drift is scaled as a whole, so it keeps its direction; squares of it scale by
+            // What remains beside that is scaled as a whole, so it keeps its direction; squares of it scale by
             // `share^2`, which brings the kinetic energy to `given`.
-            let (drift, scale) = (drift.cast::<S>(), S::from_f64(share));
+            let (drift, scale) = (rigid.drift.cast::<S>(), S::from_f64(share));
             for v in part.vertices.clone().filter(free) {
+                let mut stays = drift;
+                if rigid.spin != Vec3::ZERO {
+                    let arm = data.points[v].vec3().cast::<f64>() - rigid.center;
+                    stays += rigid.spin.cross(arm).cast();
+                }
                 let velocity = &mut data.velocities[v];
-                *velocity = drift + (*velocity - drift) * scale;
+                *velocity = stays + (*velocity - stays) * scale;
             }
             kept(number, share);
         }
@@ -352,7 +428,7 @@ mod tests {
         assert!((0.1..0.9).contains(&share), "{share}");
         for train in [vec3(3.0, 0.0, 0.0), vec3(-20.0, 10.0, 5.0)] {
             let (drift, moving) = seen_from(train);
-            assert!((drift - still - train).length() < 1e-13 * train.length());
+            assert!((drift.drift - still.drift - train).length() < 1e-13 * train.length());
             // Rounding of the train's energy, of that within.
             let rounding = f64::EPSILON * train.length_squared() / 0.05;
             assert!((moving - share).abs() < 16.0 * rounding, "{moving} and {share}");

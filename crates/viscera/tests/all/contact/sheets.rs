@@ -134,10 +134,12 @@ fn sheets_do_not_pass_through_each_other() {
     assert_apart("quasi_newton", 0..3, 2.0);
 }
 
+/// Of a hundred pairs, which `VISCERA_SEEDS=100` runs, so many.
 #[test]
 #[ignore = "slow: many pairs of sheets by every method"]
 fn sheets_do_not_pass_through_each_other_at_length() {
-    for (method, seeds) in super::METHODS.into_iter().zip([20, 40, 10]) {
-        assert_apart(method, 0..seeds, 2.0);
+    let asked = std::env::var("VISCERA_SEEDS").ok().and_then(|number| number.parse().ok());
+    for (method, seeds) in super::METHODS.into_iter().zip([8, 8, 2]) {
+        assert_apart(method, 0..asked.unwrap_or(seeds), 2.0);
     }
 }

@@ -61,6 +61,7 @@ impl Pairs {
                 // A state that the caller has changed may name triangles that do not exist.
                 let kept = kept.filter(|kept| (kept.triangle as usize) < skin.parts.len());
                 self.presses[part] |= kept.is_some();
+                self.gains[part] -= kept.map_or(0.0, |kept| kept.energy);
                 self.meet(skin, places, place, kept, reach);
                 while let Some(&(_, tie)) = ties.next_if(|tie| tie.0 as usize == place) {
                     if !state.torn.get(tie as usize).copied().unwrap_or(false) {
@@ -70,6 +71,11 @@ impl Pairs {
             }
         }
         self.first[step.layout.part_count()] = self.pairs.len();
+        for part in 0..step.layout.part_count() {
+            let mut now = 0.0;
+            self.each(places, part, |pair, _, away, _| now += pair.squeezed(away));
+            self.gains[part] += now;
+        }
         self.at_start.extend_from_slice(&self.pairs);
         let until = self.search.until.iter().copied();
         self.search.first_until = until.fold(f64::INFINITY, f64::min);

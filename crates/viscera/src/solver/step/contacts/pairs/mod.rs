@@ -29,6 +29,8 @@ pub struct Pairs {
     first: Vec<usize>,
     /// Of each part, whether tissue presses on one of its samples where the step begins.
     presses: Vec<bool>,
+    /// Of each part the energy [J] that contact has gained because pairs were found anew.
+    gains: Vec<f64>,
     search: Search,
 }
 
@@ -84,6 +86,7 @@ impl Pairs {
             at_start: Vec::with_capacity(room),
             first: vec![0; layout.part_count() + 1],
             presses: vec![false; layout.part_count()],
+            gains: vec![0.0; layout.part_count()],
             search: Search {
                 grid: Grid::new(skin.skin.triangles.len()),
                 marks: Marks::new(vertices),
@@ -129,6 +132,18 @@ impl Pairs {
         self.at_start.clear();
         self.first.fill(0);
         self.presses.fill(false);
+        self.gains.fill(0.0);
+    }
+
+    /// Whether there are pairs of a part's samples.
+    pub fn is_any(&self, part: usize) -> bool {
+        !self.of_part(part).is_empty()
+    }
+
+    /// By how much the energy of contact [J] of a part's samples is larger where the step begins than where the last one has
+    /// ended, at the same places: what is nearest now is never farther than what was nearest then.
+    pub fn gain(&self, part: usize) -> f64 {
+        self.gains.get(part).copied().unwrap_or(0.0).max(0.0)
     }
 
     /// Whether tissue presses on samples of a part where the step begins.
