@@ -130,6 +130,8 @@ pub struct Tree {
     /// Leaves that each leaf's samples may meet: all where there is no room for a list.
     lists: Vec<Near>,
     near: Vec<u32>,
+    /// How many of those are in use.
+    used: usize,
     /// How far apart what was left out is at least [m]; nothing before a list was made.
     width: Option<f64>,
     since: Since,
@@ -251,7 +253,7 @@ impl Tree {
         tree.first_sample = (0..=tree.leaves.len() as u32).map(first).collect();
         tree.samples = of_samples.into_iter().map(|(_, sample)| sample).collect();
         tree.lists = vec![Near::default(); tree.leaves.len()];
-        tree.near = Vec::with_capacity(ROOM * tree.leaves.len());
+        tree.near = vec![NONE; ROOM * tree.leaves.len()];
         tree
     }
 
@@ -310,7 +312,7 @@ impl Tree {
         numbers.map(|all| size_of_val(&all[..])).iter().sum::<usize>()
             + size_of_val(&self.nodes[..])
             + size_of_val(&self.lists[..])
-            + self.near.capacity() * size_of::<u32>()
+            + size_of_val(&self.near[..])
     }
 
     /// Says what has happened since lists were made. True where they are as good for queries that reach so far [m].
@@ -328,7 +330,7 @@ impl Tree {
     /// Makes lists for queries that reach up to `width` [m], of all that has moved until then. Takes no memory.
     pub fn list(&mut self, now: SkinNow<'_>, itself: bool, bodies: bool, width: f64) {
         self.refit(now);
-        self.near.clear();
+        self.used = 0;
         for leaf in 0..self.leaves.len() {
             self.lists[leaf] = self.list_of(now, leaf, (itself, bodies), width);
         }
@@ -366,8 +368,8 @@ impl Tree {
         (itself, bodies): (bool, bool),
         width: f64,
     ) -> Near {
-        let Self { nodes, leaves, near, .. } = self;
-        let first = near.len() as u32;
+        let Self { nodes, leaves, near, used, .. } = self;
+        let first = *used as u32;
         let own =
             &self.samples[self.first_sample[leaf] as usize..self.first_sample[leaf + 1] as usize];
         if own.is_empty() {
@@ -390,15 +392,16 @@ impl Tree {
                 continue;
             }
             if node.leaf != NONE {
-                if near.len() == near.capacity() {
-                    near.truncate(first as usize);
+                let Some(place) = near.get_mut(*used) else {
+                    *used = first as usize;
                     return Near { first, end: first, is_full: true };
-                }
-                near.push(node.leaf);
+                };
+                *place = node.leaf;
+                *used += 1;
             }
             place += 1;
         }
-        Near { first, end: near.len() as u32, is_full: false }
+        Near { first, end: *used as u32, is_full: false }
     }
 
     /// The nearest triangle within reach [m] of a point that `may` be met, however it lies, where [`Tree::refit`] has been.
