@@ -221,11 +221,7 @@ fn pressed_blocks_that_shake_gain_no_energy() {
         for step in 1..=(0.8 / bodies.dt) as u32 {
             let time = f64::from(step) * bodies.dt;
             let way = 4.2e-3 * super::ramp(time, 0.0, 0.2);
-            let fixed = below.iter().map(|&vertex| Pin { vertex, target: bodies.rest(vertex) });
-            let led = above
-                .iter()
-                .map(|&vertex| Pin { vertex, target: bodies.rest(vertex) - vec3(0.0, 0.0, way) });
-            bodies.inputs.pins = fixed.chain(led).collect();
+            bodies.press([&below, &above], way);
             bodies.step();
             let moving = bodies.state.velocities.iter().zip(&bodies.model.masses);
             let kinetic: f64 = moving.map(|(v, mass)| 0.5 * mass * v.length_squared()).sum();
