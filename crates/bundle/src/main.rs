@@ -13,7 +13,7 @@ Make static files of the page and its wasm module.
 Usage: viscera-bundle build [OPTIONS]
        viscera-bundle serve FOLDER [PORT]
 
-  build              wasm-bindgen, wasm-opt where it is on the PATH, names after content; writes
+  build              wasm-bindgen, names after content; writes
                      OUT/site (the page) and OUT/npm (the package), and prints what travels
     --wasm FILE      the module         [default: target/web/wasm32-unknown-unknown/web/viscera_web.wasm]
     --web FOLDER     page/ and package/ are in it                             [default: crates/web]
@@ -75,9 +75,8 @@ impl Build {
 
     fn run(&self) -> Result<()> {
         let module = module::build(&self.wasm)?;
-        println!("{}", module.remark);
         let page = files::read(&self.web.join("page"))?;
-        let mut generated = module.files.clone();
+        let mut generated = module.clone();
         // For people who write programs, not for browsers.
         generated.remove(module::TYPES);
         let site = site::build(&page, &generated)?;
@@ -90,7 +89,7 @@ impl Build {
         println!("\nBuild {}: {}", site.build, place.display());
 
         let sources = files::read(&self.web.join("package"))?;
-        let package = package::build(&sources, &module.files, env!("CARGO_PKG_VERSION"))?;
+        let package = package::build(&sources, &module, env!("CARGO_PKG_VERSION"))?;
         let place = self.out.join("npm");
         files::write(&place, &package)?;
         println!("Package: {}", place.display());

@@ -66,7 +66,7 @@ pub fn check(sum: usize) -> Result<()> {
         let over = sum - BUDGET;
         bail!(
             "the page takes {sum} bytes with Brotli, {over} more than the {BUDGET} it may: look at the largest \
-             lines above; wasm-opt on the PATH makes the module smaller, `twiggy top` names what is in it"
+             lines above; `twiggy top` names what is in the module"
         );
     }
     Ok(())

@@ -97,7 +97,7 @@ impl Facets {
         facets
     }
 
-    /// Of a closed surface: round where its triangles meet at less than [`CREASE`], with an edge elsewhere.
+    /// Of a closed surface: round where its triangles meet at less than the angle of a crease, with an edge elsewhere.
     pub fn of_surface(surface: &SurfaceMesh) -> Self {
         let corners = |t: usize| surface.triangles[t].map(|v| surface.vertices[v as usize]);
         let areas: Vec<Vec3<f64>> = (0..surface.triangles.len())

@@ -22,6 +22,7 @@
 //! consistent (`k` times mass splitting; averaging with mass `w` would weaken the body).
 
 use crate::settings::Colors;
+use crate::sorting;
 
 /// A colour for each constraint and a copy for each of its corners.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -108,12 +109,12 @@ impl ConstraintGraph {
     /// Constraints whose vertices lie in many others come first: they have the fewest free
     /// colours left when they wait. Ties by index, so that the result is always the same.
     fn order(&self, valence: &[u32]) -> Vec<u32> {
-        let mut order: Vec<u32> = (0..self.constraint_count() as u32).collect();
         let crowding = |c: u32| -> u32 {
             self.vertices(c as usize).iter().map(|&v| valence[v as usize]).sum()
         };
-        order.sort_by_key(|&c| (std::cmp::Reverse(crowding(c)), c));
-        order
+        sorting::by_key(0..self.constraint_count() as u32, |c| {
+            [u64::from(u32::MAX - crowding(c)), 0]
+        })
     }
 
     /// Colours greedily with at most the wanted number of colours, connected parts independently.
@@ -210,10 +211,10 @@ impl Coloring {
     /// The first two constraints of one colour that share a copy, or of a corner whose copy is
     /// not its vertex's; `None` where the invariant holds.
     pub fn validate(&self, graph: &ConstraintGraph) -> Option<(usize, usize)> {
-        let mut order: Vec<usize> = (0..graph.constraint_count()).collect();
-        order.sort_by_key(|&c| self.color_of[c]);
+        let color = |c: u32| [u64::from(self.color_of[c as usize]), 0];
+        let order = sorting::by_key(0..graph.constraint_count() as u32, color);
         let mut last_user = vec![usize::MAX; self.copy_count()];
-        for &constraint in &order {
+        for constraint in order.into_iter().map(|c| c as usize) {
             for corner in graph.corner_range(constraint) {
                 let copy = self.copy_of[corner];
                 let v = graph.corners[corner] as usize;

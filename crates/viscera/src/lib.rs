@@ -60,5 +60,6 @@ pub mod scene;
 pub mod settings;
 pub mod simulation;
 pub mod solver;
+mod sorting;
 pub mod state;
 pub mod units;

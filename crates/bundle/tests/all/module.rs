@@ -18,10 +18,10 @@ fn a_module_gets_a_script_that_finds_it() {
     let file = folder.path().join("m.wasm");
     std::fs::write(&file, MODULE).expect("written");
     let module = module::build(&file).expect("a module");
-    let script = String::from_utf8(module.files[module::SCRIPT].clone()).expect("text");
+    let script = String::from_utf8(module[module::SCRIPT].clone()).expect("text");
     assert!(script.contains("new URL('viscera_bg.wasm', import.meta.url)"), "{script}");
-    assert!(module.files[module::WASM].starts_with(b"\0asm"));
-    assert!(module.files.contains_key(module::TYPES));
+    assert!(module[module::WASM].starts_with(b"\0asm"));
+    assert!(module.contains_key(module::TYPES));
 }
 
 #[test]
@@ -29,6 +29,6 @@ fn what_is_no_module_is_refused_with_its_name() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("m.wasm");
     std::fs::write(&file, "no module").expect("written");
-    let error = format!("{:#}", module::build(&file).err().expect("refused"));
+    let error = format!("{:#}", module::build(&file).expect_err("refused"));
     assert!(error.contains("m.wasm") && error.contains("wasm-bindgen refuses it"), "{error}");
 }

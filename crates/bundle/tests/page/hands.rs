@@ -6,14 +6,21 @@ use crate::page::{BAR, dismiss, farthest, number, numbers, open, open_in, wait_f
 /// A slab on a table: it is in the middle of the picture.
 const SLAB: &str = "#scene=grab&mesh=1.6&solver.device=cpu&solver.accuracy=draft";
 
-/// A place of the window where tissue is, near the bar's free end.
+/// A place of the window where tissue is, also some pixels around it, near the bar's free end.
 fn place_of_tissue(tab: &Tab) -> [f64; 2] {
     let search = "(async () => { let last = null; for (let u = 0.05; u < 0.96; u += 0.05) \
                   for (let v = 0.05; v < 0.96; v += 0.05) { const { x, y } = viscera.pointAt(u, v); \
-                  if (await viscera.isTissue(x, y)) last = [x, y]; } return last; })()";
+                  let all = true; for (const [dx, dy] of [[0, 0], [5, 0], [-5, 0], [0, 5], [0, -5]]) \
+                  all = all && await viscera.isTissue(x + dx, y + dy); if (all) last = [x, y]; } \
+                  return last; })()";
     let place = tab.evaluate(search);
     let place = place.as_array().expect("tissue is somewhere in the picture");
     [number(&place[0]), number(&place[1])]
+}
+
+/// Waits until the press has taken hold of tissue.
+fn wait_for_pull(tab: &Tab) {
+    tab.wait("viscera.worker.post('report').then(() => viscera.state().pull.hold > 0)", 5.0);
 }
 
 /// Steps until it hardly moves.
@@ -40,6 +47,7 @@ fn a_drag_pulls_the_tissue_and_it_comes_back() {
     let [x, y] = place_of_tissue(&tab);
     tab.mouse("mouseMoved", [x, y], "none");
     tab.mouse("mousePressed", [x, y], "left");
+    wait_for_pull(&tab);
     for part in 1..=8 {
         tab.mouse("mouseMoved", [x, y - 15.0 * f64::from(part)], "left");
     }
@@ -81,6 +89,7 @@ fn a_finger_pulls_on_a_phone() {
     let Some((tab, before)) = bar_at_rest(Kind::Gpu, View::PHONE) else { return };
     let [x, y] = place_of_tissue(&tab);
     tab.touch("touchStart", &[[x, y]]);
+    wait_for_pull(&tab);
     for part in 1..=8 {
         tab.touch("touchMove", &[[x, y - 8.0 * f64::from(part)]]);
     }
@@ -123,7 +132,7 @@ fn keys_hold_and_pull() {
     let before = rest(&tab);
     tab.evaluate("document.getElementById('canvas-frame').focus()");
     tab.key("Enter", 0);
-    tab.wait("viscera.worker.post('report').then(() => viscera.state().pull.hold > 0)", 5.0);
+    wait_for_pull(&tab);
     for _ in 0..12 {
         tab.key("ArrowUp", 0);
     }

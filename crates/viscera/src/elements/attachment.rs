@@ -4,6 +4,7 @@
 
 use super::CornerLoad;
 use super::kinds::{CONSTANTS, Constant, Energy, Kind, Legal, Moment, XpbdBlock};
+use super::text::kernel_text;
 use crate::scalar::{Mat3, Real, Scalar, Vec3, vec3};
 
 /// The kind.
@@ -29,7 +30,7 @@ impl Kind<1, 3> for Attachments {
     const CONSTANTS: &'static [Constant] =
         &[Constant { name: "attachment stiffness [N/m]", legal: Legal::Positive }];
 
-    const WGSL: &'static str = include_str!("attachment.wgsl");
+    const WGSL: &'static str = kernel_text!("attachment.wgsl");
 
     fn element<T: Real>([stiffness, ..]: [T; CONSTANTS], moment: &Moment<T, 1>) -> Attachment<T> {
         Attachment { anchor: moment.anchor, stiffness }

@@ -3,6 +3,7 @@
 use super::TetForm;
 use super::green_strain;
 use super::neo_hookean;
+use super::text::kernel_text;
 use crate::material::MaterialModel;
 use crate::scalar::{Mat3, Scalar, Vec3};
 use crate::settings::{Choice, NeoHookean, SolverSettings};
@@ -100,7 +101,7 @@ pub fn stretch_curvature<S: Scalar>(f: &Mat3<S>, g: Vec3<S>, lambda: S, mu: S) -
 impl Law for SaintVenantKirchhoff {
     const MODEL: MaterialModel = MaterialModel::SaintVenantKirchhoff;
 
-    const WGSL: &'static str = include_str!("green_strain.wgsl");
+    const WGSL: &'static str = kernel_text!("green_strain.wgsl");
 
     #[inline(always)]
     fn energy_density<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> S {
@@ -157,7 +158,7 @@ impl Law for SaintVenantKirchhoff {
 impl Law for StableNeoHookean {
     const MODEL: MaterialModel = MaterialModel::StableNeoHookean;
 
-    const WGSL: &'static str = include_str!("neo_hookean.wgsl");
+    const WGSL: &'static str = kernel_text!("neo_hookean.wgsl");
 
     #[inline(always)]
     fn energy_density<S: Scalar>(f: &Mat3<S>, lambda: S, mu: S) -> S {

@@ -24,6 +24,7 @@ pub mod neo_hookean_stretch;
 pub mod recovered;
 pub mod singular_values;
 pub mod spring;
+pub(crate) mod text;
 #[cfg(test)]
 pub mod trial;
 #[cfg(feature = "gpu")]

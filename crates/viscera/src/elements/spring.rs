@@ -2,6 +2,7 @@
 
 use super::CornerLoad;
 use super::kinds::{CONSTANTS, Constant, Energy, Kind, Legal, Moment, XpbdBlock};
+use super::text::kernel_text;
 use crate::scalar::{Mat3, Real, Scalar, Vec3};
 
 /// The kind.
@@ -29,7 +30,7 @@ impl Kind<2, 1> for Springs {
         Constant { name: "spring stiffness [N/m]", legal: Legal::Positive },
     ];
 
-    const WGSL: &'static str = include_str!("spring.wgsl");
+    const WGSL: &'static str = kernel_text!("spring.wgsl");
 
     fn element<T: Real>(
         [rest_length, stiffness, ..]: [T; CONSTANTS],

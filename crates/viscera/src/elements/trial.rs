@@ -8,6 +8,7 @@
 
 use super::CornerLoad;
 use super::kinds::{CONSTANTS, Constant, Energy, Kind, Legal, Moment, XpbdBlock};
+use super::text::kernel_text;
 use crate::scalar::{Real, Scalar, Vec3};
 
 /// Three vertices that like to lie evenly on a line.
@@ -44,7 +45,7 @@ impl Kind<3, 0> for Hinges {
     const CONSTANTS: &'static [Constant] =
         &[Constant { name: "hinge stiffness [N/m]", legal: Legal::Positive }];
 
-    const WGSL: &'static str = include_str!("trial.wgsl");
+    const WGSL: &'static str = kernel_text!("trial.wgsl");
 
     fn element<T: Real>([stiffness, ..]: [T; CONSTANTS], _: &Moment<T, 3>) -> Hinge<T> {
         Hinge { stiffness }

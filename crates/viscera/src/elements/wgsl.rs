@@ -2,6 +2,7 @@
 //! before a kernel. Every text needs [`KINEMATICS`] and [`GREEN_STRAIN`]; what else one needs is said. What
 //! chooses a law or a kind by its number is made from their lists.
 
+use super::text::kernel_text;
 use std::fmt::Write;
 use std::sync::LazyLock;
 
@@ -12,21 +13,21 @@ use crate::material::MaterialModel;
 use crate::settings::Choice;
 
 /// Linear tetrahedra, the 6 x 6 solve, and the records that all share; twin of [`super`].
-pub const KINEMATICS: &str = include_str!("mod.wgsl");
+pub const KINEMATICS: &str = kernel_text!("mod.wgsl");
 /// Twin of [`super::green_strain`].
-pub const GREEN_STRAIN: &str = include_str!("green_strain.wgsl");
+pub const GREEN_STRAIN: &str = kernel_text!("green_strain.wgsl");
 /// Twin of [`super::neo_hookean`].
-pub const NEO_HOOKEAN: &str = include_str!("neo_hookean.wgsl");
+pub const NEO_HOOKEAN: &str = kernel_text!("neo_hookean.wgsl");
 /// Twin of [`super::neo_hookean_pair`]; needs [`NEO_HOOKEAN`].
-const NEO_HOOKEAN_PAIR: &str = include_str!("neo_hookean_pair.wgsl");
+const NEO_HOOKEAN_PAIR: &str = kernel_text!("neo_hookean_pair.wgsl");
 /// Twin of [`super::singular_values`].
-const SINGULAR_VALUES: &str = include_str!("singular_values.wgsl");
+const SINGULAR_VALUES: &str = kernel_text!("singular_values.wgsl");
 /// Twin of [`super::neo_hookean_stretch`]; needs [`SINGULAR_VALUES`].
-const NEO_HOOKEAN_STRETCH: &str = include_str!("neo_hookean_stretch.wgsl");
+const NEO_HOOKEAN_STRETCH: &str = kernel_text!("neo_hookean_stretch.wgsl");
 /// Twin of [`super::recovered`]; needs [`NEO_HOOKEAN`].
-const RECOVERED: &str = include_str!("recovered.wgsl");
+const RECOVERED: &str = kernel_text!("recovered.wgsl");
 /// Twin of [`super::kinds`], without the kinds.
-const KINDS_SHARED: &str = include_str!("kinds.wgsl");
+const KINDS_SHARED: &str = kernel_text!("kinds.wgsl");
 
 /// A function that calls one of several by a number; `of` is the body of each.
 fn switch<'a>(
@@ -130,14 +131,14 @@ pub static KIND_TEXT: LazyLock<String> = LazyLock::new(|| {
 /// `form_constitutive`.
 pub fn form_texts(form: TetForm) -> Vec<&'static str> {
     match form {
-        TetForm::GreenStrain => vec![include_str!("forms_green_strain.wgsl")],
+        TetForm::GreenStrain => vec![kernel_text!("forms_green_strain.wgsl")],
         TetForm::NeoHookeanPair => {
-            vec![NEO_HOOKEAN, NEO_HOOKEAN_PAIR, include_str!("forms_neo_hookean_pair.wgsl")]
+            vec![NEO_HOOKEAN, NEO_HOOKEAN_PAIR, kernel_text!("forms_neo_hookean_pair.wgsl")]
         }
         TetForm::NeoHookeanStretch => vec![
             SINGULAR_VALUES,
             NEO_HOOKEAN_STRETCH,
-            include_str!("forms_neo_hookean_stretch.wgsl"),
+            kernel_text!("forms_neo_hookean_stretch.wgsl"),
         ],
     }
 }

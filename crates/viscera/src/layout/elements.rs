@@ -96,7 +96,7 @@ impl<S: Copy, K, const N: usize, const M: usize> ElementSet<S, K, N, M> {
     fn new(list: &ElementList<S, K, N, M>, number: usize, sorted: &mut Order<'_>) -> Self {
         let (first, count) = (sorted.sorted, list.len());
         sorted.sorted += count;
-        let (constraints, color_offsets) = sorted.sort((first..first + count).collect());
+        let (constraints, color_offsets) = sorted.sort(first as u32..(first + count) as u32);
         let order: Vec<u32> = constraints.iter().map(|&c| c - first as u32).collect();
         let copies = constraints.iter().map(|&c| sorted.copies(c as usize)).collect();
         let multiplier_offset = sorted.take_multipliers(M * count);

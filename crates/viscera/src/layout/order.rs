@@ -5,6 +5,7 @@ use crate::coloring::{Coloring, ConstraintGraph};
 use crate::model::{Model, Numbering};
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, LANES};
+use crate::sorting;
 
 /// Vertices cell by cell of the finest lattice of their part, for what gathers them cell by cell; parts stand in the
 /// order that they have in the model's numbering.
@@ -62,21 +63,21 @@ pub(super) struct Order<'a> {
 impl Order<'_> {
     /// Sorts constraints by colour, then by place, and so by part, then by number; returns them with the offsets of
     /// the colours.
-    pub fn sort(&self, mut constraints: Vec<usize>) -> (Vec<u32>, Vec<u32>) {
-        let place = |c: usize| {
-            let vertices = self.graph.vertices(c).iter();
-            vertices.map(|&v| self.numbering.of(v)).min()
+    pub fn sort(&self, constraints: impl Iterator<Item = u32>) -> (Vec<u32>, Vec<u32>) {
+        let key = |c: u32| {
+            let vertices = self.graph.vertices(c as usize).iter();
+            let place = vertices.map(|&v| self.numbering.of(v) as u64).fold(u64::MAX, u64::min);
+            [u64::from(self.coloring.color_of[c as usize]), place]
         };
-        constraints.sort_by_cached_key(|&c| (self.coloring.color_of[c], place(c), c));
+        let constraints = sorting::by_key(constraints, key);
         let mut offsets = vec![0u32; self.coloring.color_count as usize + 1];
         for &c in &constraints {
-            offsets[self.coloring.color_of[c] as usize + 1] += 1;
+            offsets[self.coloring.color_of[c as usize] as usize + 1] += 1;
         }
         for color in 1..offsets.len() {
             offsets[color] += offsets[color - 1];
         }
-        // By reference: collected in place, the memory of the larger numbers would be kept.
-        (constraints.iter().map(|&c| c as u32).collect(), offsets)
+        (constraints, offsets)
     }
 
     /// The part of a constraint.

@@ -10,6 +10,7 @@ use crate::elements::law::ALL_LAWS;
 use crate::model::{Model, Numbering};
 use crate::scalar::Real;
 use crate::scalar::lanes::LANES;
+use crate::sorting;
 
 /// Blocks of a piece: large enough that few vertices have copies. Part of the result's bits.
 pub(crate) const PIECE_BLOCKS: usize = 512;
@@ -28,15 +29,16 @@ pub(super) fn in_pieces<S: Real>(
     let mut last_piece = vec![u32::MAX; model.vertex_count()];
     let mut piece = 0;
     for law in ALL_LAWS {
-        let of_law = |&tet: &usize| model.laws[model.tet_materials[tet] as usize] == law;
-        let mut tets: Vec<usize> = (0..model.tet_count()).filter(of_law).collect();
-        let lowest =
-            |tet: usize| model.tet_vertices[tet].map(|v| numbering.of(v)).into_iter().min();
-        tets.sort_by_cached_key(|&tet| (lowest(tet), tet));
-        let part = |tet: usize| model.part_of(model.tet_vertices[tet][0]);
+        let of_law = |&tet: &u32| model.laws[model.tet_materials[tet as usize] as usize] == law;
+        let lowest = |tet: u32| {
+            let vertices = model.tet_vertices[tet as usize].map(|v| numbering.of(v) as u64);
+            [vertices.into_iter().fold(u64::MAX, u64::min), 0]
+        };
+        let tets = sorting::by_key((0..model.tet_count() as u32).filter(of_law), lowest);
+        let part = |tet: u32| model.part_of(model.tet_vertices[tet as usize][0]);
         for of_part in tets.chunk_by(|&a, &b| part(a) == part(b)) {
             for chosen in of_part.chunks(LANES * PIECE_BLOCKS) {
-                for &tet in chosen {
+                for tet in chosen.iter().map(|&tet| tet as usize) {
                     let corners = graph.corner_range(tet);
                     for (corner, &v) in corners.zip(graph.vertices(tet)) {
                         let v = v as usize;

@@ -11,6 +11,7 @@ use crate::elements::recovered::bulk_shares;
 use crate::material::MaterialModel;
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, LANES};
+use crate::sorting;
 
 /// Groups of rings of similar length are formed among so many domains, or vertices, in a row: what stands together in
 /// space stays together.
@@ -160,8 +161,7 @@ struct Places {
 impl Places {
     fn new<S: Real>(layout: &Layout<S>, domains: &Domains<S>) -> Self {
         let at = |n: &u32| layout.numbering.of(domains.vertices[*n as usize]);
-        let mut order: Vec<u32> = (0..domains.len() as u32).collect();
-        order.sort_by_key(|n| (at(n), *n));
+        let order = sorting::by_key(0..domains.len() as u32, |n| [at(&n) as u64, 0]);
         let mut places =
             Self { domains: Vec::new(), of: vec![0; domains.len()], groups: Vec::new() };
         let mut rest = &order[..];
@@ -184,9 +184,8 @@ impl Places {
 
 /// Sorted by length in windows: groups of eight have rows of similar length.
 fn in_windows(all: &[u32], length: impl Fn(&u32) -> usize) -> Vec<u32> {
-    let mut sorted = all.to_vec();
-    sorted.chunks_mut(WINDOW).for_each(|window| window.sort_by_key(&length));
-    sorted
+    let key = |n: u32| [length(&n) as u64, 0];
+    all.chunks(WINDOW).flat_map(|window| sorting::by_key(window.iter().copied(), key)).collect()
 }
 
 impl<S: Real> RecoveredTables<S> {

@@ -94,8 +94,8 @@ impl<S: Real> TetSet<S> {
         form: TetForm,
         sorted: &mut Order<'_>,
     ) -> Self {
-        let of_law = |&tet: &usize| model.laws[model.tet_materials[tet] as usize] == law;
-        let (order, colors) = sorted.sort((0..model.tet_count()).filter(of_law).collect());
+        let of_law = |&tet: &u32| model.laws[model.tet_materials[tet as usize] as usize] == law;
+        let (order, colors) = sorted.sort((0..model.tet_count() as u32).filter(of_law));
         let viscous_parts = viscous_parts(model, sorted, &order);
         let is_viscous = viscous_parts.contains(&true);
         let in_blocks = |color: &[u32]| sorted.blocks(&order, color).count();

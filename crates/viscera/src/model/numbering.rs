@@ -3,6 +3,7 @@
 //! through its own extent: where others are changes nothing. The user's numbering stays what it is.
 
 use crate::scalar::Vec3;
+use crate::sorting;
 
 /// Two numberings of the same vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,11 +33,10 @@ impl Numbering {
             let extent = size.x.max(size.y).max(size.z).max(f64::MIN_POSITIVE);
             let scale = f64::from((1u32 << BITS) - 1) / extent;
             let cell = (*p - low) * scale;
-            (part, z_order([cell.x as u64, cell.y as u64, cell.z as u64]))
+            [u64::from(part), z_order([cell.x as u64, cell.y as u64, cell.z as u64])]
         };
-        let keys: Vec<(u32, u64)> = positions.iter().zip(part_of).map(key).collect();
-        let mut order: Vec<u32> = (0..positions.len() as u32).collect();
-        order.sort_by_key(|&v| (keys[v as usize], v));
+        let keys: Vec<[u64; 2]> = positions.iter().zip(part_of).map(key).collect();
+        let order = sorting::by_key(0..positions.len() as u32, |v| keys[v as usize]);
         let mut rank = vec![0; order.len()];
         for (place, &v) in order.iter().enumerate() {
             rank[v as usize] = place as u32;

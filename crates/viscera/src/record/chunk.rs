@@ -94,6 +94,7 @@ pub enum Prefix<'a> {
 pub struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
+    is_first: bool,
     before: u32,
 }
 
@@ -127,13 +128,17 @@ pub fn prefix(bytes: &[u8]) -> Prefix<'_> {
         return Prefix::Other { format, version };
     }
     let at = MAGIC.len() + 5 + usize::from(bytes[MAGIC.len() + 4]);
-    Prefix::Known { version, chunks: Reader { bytes, at, before: checksum(&[&bytes[..at]]) } }
+    Prefix::Known {
+        version,
+        chunks: Reader { bytes, at, is_first: true, before: checksum(&[&bytes[..at]]) },
+    }
 }
 
 impl<'a> Reader<'a> {
-    /// The byte at which the next chunk begins.
+    /// The first byte that the next chunk's checksum alone answers for: its own first one, or of the first chunk the one behind
+    /// [`MAGIC`].
     pub fn at(&self) -> usize {
-        self.at
+        if self.is_first { MAGIC.len() } else { self.at }
     }
 
     /// Reads the next chunk.
@@ -154,7 +159,7 @@ impl<'a> Reader<'a> {
         let Some(content) = rest.get(..word(0) as usize) else { return Next::Cut };
         match Kind::of(head[4]) {
             Some(kind) if checksum(&[content]) == word(5) => {
-                self.before = before;
+                (self.before, self.is_first) = (before, false);
                 self.at += HEAD + content.len();
                 Next::Chunk(kind, content)
             }

@@ -40,7 +40,7 @@ fn code_of(source: &str) -> String {
 /// Modules of the library from the ground up. A module uses those of its own layer and of the
 /// layers below.
 const LAYERS: &[&[&str]] = &[
-    &["scalar", "settings", "units"],
+    &["scalar", "settings", "sorting", "units"],
     &["mesh"],
     &["material"],
     &["elements"],

@@ -169,6 +169,15 @@ impl Tab {
             "clickCount": i32::from(kind != "mouseMoved"), "pointerType": "mouse",
         });
         self.ask("Input.dispatchMouseEvent", parameters);
+        self.hear_moves(kind);
+    }
+
+    /// Browsers keep moves of a pointer until they draw the next picture: what is asked of the page before that
+    /// would overtake them.
+    fn hear_moves(&self, kind: &str) {
+        if matches!(kind, "mouseMoved" | "touchMove") {
+            self.evaluate("new Promise((done) => { requestAnimationFrame(() => done(1)); setTimeout(done, 2000); })");
+        }
     }
 
     pub fn click(&self, at: [f64; 2]) {
@@ -196,6 +205,7 @@ impl Tab {
         let points: Vec<Value> =
             fingers.map(|(id, [x, y])| json!({ "x": x, "y": y, "id": id, "force": 1 })).collect();
         self.ask("Input.dispatchTouchEvent", json!({ "type": kind, "touchPoints": points }));
+        self.hear_moves(kind);
     }
 
     /// A key by its name ("Tab", "Enter", "Escape", "ArrowUp") or a letter, with what it writes.

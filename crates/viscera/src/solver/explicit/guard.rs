@@ -159,7 +159,6 @@ impl<S: Real> Memory<S> {
         let limits = |number: usize, constants: &StepConstants<S>| {
             small_steps[number].was_violent
                 || constants.contacts.gift(number).is_near
-                || constants.contacts.pairs.gain(number) > 0.0
                 || constants.rests(number, &model.parts[number])
         };
         self.energies.limit(step, data, limits, |_, _| {});

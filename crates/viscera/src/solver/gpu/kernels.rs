@@ -3,6 +3,7 @@
 use super::device::{Device, Pipeline};
 use super::slots::Slot;
 use crate::elements::TetForm;
+use crate::elements::text::kernel_text;
 use crate::elements::wgsl;
 use crate::solver::step::tissue::{TISSUE_WGSL, VISCOUS_WGSL};
 
@@ -139,29 +140,29 @@ kernels! {
 const SHARED: [&str; 6] = [
     wgsl::KINEMATICS,
     wgsl::GREEN_STRAIN,
-    include_str!("../step/control.wgsl"),
-    include_str!("control.wgsl"),
-    include_str!("bindings.wgsl"),
-    include_str!("table.wgsl"),
+    kernel_text!("../step/control.wgsl"),
+    kernel_text!("control.wgsl"),
+    kernel_text!("bindings.wgsl"),
+    kernel_text!("table.wgsl"),
 ];
 
 /// Sums over parts of the long vector.
-const SPANS: &str = include_str!("spans.wgsl");
-const SUMS: &str = include_str!("sums.wgsl");
+const SPANS: &str = kernel_text!("spans.wgsl");
+const SUMS: &str = kernel_text!("sums.wgsl");
 
 /// How elements that are no tetrahedra lie in the table.
-const ELEMENTS: &str = include_str!("elements.wgsl");
+const ELEMENTS: &str = kernel_text!("elements.wgsl");
 
 /// How a sweep reads and writes, and how an acceleration finds what a sweep has left.
 fn swept(swept: Swept) -> [&'static str; 2] {
-    let copies = include_str!("../xpbd/acceleration_mapped_copies.wgsl");
+    let copies = kernel_text!("../xpbd/acceleration_mapped_copies.wgsl");
     match swept {
         Swept::Vertices => [
-            include_str!("../xpbd/sweep_vertices.wgsl"),
-            include_str!("../xpbd/acceleration_mapped_vertices.wgsl"),
+            kernel_text!("../xpbd/sweep_vertices.wgsl"),
+            kernel_text!("../xpbd/acceleration_mapped_vertices.wgsl"),
         ],
-        Swept::Copies => [include_str!("../xpbd/sweep_copies.wgsl"), copies],
-        Swept::Jacobi => [include_str!("../xpbd/sweep_jacobi.wgsl"), copies],
+        Swept::Copies => [kernel_text!("../xpbd/sweep_copies.wgsl"), copies],
+        Swept::Jacobi => [kernel_text!("../xpbd/sweep_jacobi.wgsl"), copies],
     }
 }
 
@@ -172,41 +173,41 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
     let own = |file| vec![file];
     let laws = || vec![wgsl::LAW_TEXT.as_str(), TISSUE_WGSL];
     let elements = |file| vec![wgsl::KIND_TEXT.as_str(), ELEMENTS, file];
-    let history = include_str!("../xpbd/history.wgsl");
+    let history = kernel_text!("../xpbd/history.wgsl");
     // The potential, and what the guard decides by it.
     let guard = |own: Vec<&'static str>| {
         let potential =
-            [include_str!("../step/potential.wgsl"), include_str!("../step/guard_decide.wgsl")];
+            [kernel_text!("../step/potential.wgsl"), kernel_text!("../step/guard_decide.wgsl")];
         [laws(), elements(potential[0]), vec![potential[1]], own].concat()
     };
     match kernel.file {
-        File::Predict => own(include_str!("../step/predict.wgsl")),
-        File::Rebase => own(include_str!("../xpbd/rebase.wgsl")),
-        File::Sweep => [form, vec![swept, include_str!("../xpbd/sweep.wgsl")]].concat(),
+        File::Predict => own(kernel_text!("../step/predict.wgsl")),
+        File::Rebase => own(kernel_text!("../xpbd/rebase.wgsl")),
+        File::Sweep => [form, vec![swept, kernel_text!("../xpbd/sweep.wgsl")]].concat(),
         File::SweepElements => {
-            [vec![swept], elements(include_str!("../xpbd/sweep_elements.wgsl"))].concat()
+            [vec![swept], elements(kernel_text!("../xpbd/sweep_elements.wgsl"))].concat()
         }
-        File::LoadsElements => elements(include_str!("../xpbd/loads_elements.wgsl")),
-        File::Loads => [form, own(include_str!("../xpbd/loads.wgsl"))].concat(),
-        File::Strain => own(include_str!("../step/strain.wgsl")),
-        File::Multipliers => own(include_str!("../xpbd/multipliers.wgsl")),
-        File::Acceleration => vec![SPANS, SUMS, include_str!("../xpbd/acceleration.wgsl")],
+        File::LoadsElements => elements(kernel_text!("../xpbd/loads_elements.wgsl")),
+        File::Loads => [form, own(kernel_text!("../xpbd/loads.wgsl"))].concat(),
+        File::Strain => own(kernel_text!("../step/strain.wgsl")),
+        File::Multipliers => own(kernel_text!("../xpbd/multipliers.wgsl")),
+        File::Acceleration => vec![SPANS, SUMS, kernel_text!("../xpbd/acceleration.wgsl")],
         File::AndersonPush => {
-            vec![SPANS, SUMS, mapped, include_str!("../xpbd/acceleration_push.wgsl")]
+            vec![SPANS, SUMS, mapped, kernel_text!("../xpbd/acceleration_push.wgsl")]
         }
-        File::History => vec![SPANS, history, include_str!("../xpbd/history_broken.wgsl")],
+        File::History => vec![SPANS, history, kernel_text!("../xpbd/history_broken.wgsl")],
         File::HistoryTets => {
-            let own = vec![VISCOUS_WGSL, history, include_str!("../xpbd/history_tets.wgsl")];
+            let own = vec![VISCOUS_WGSL, history, kernel_text!("../xpbd/history_tets.wgsl")];
             [form, own].concat()
         }
         File::HistoryElements => {
-            [vec![history], elements(include_str!("../xpbd/history_elements.wgsl"))].concat()
+            [vec![history], elements(kernel_text!("../xpbd/history_elements.wgsl"))].concat()
         }
-        File::Explicit => [laws(), elements(include_str!("../explicit/mod.wgsl"))].concat(),
-        File::Evaluate => guard(own(include_str!("../step/guard_evaluate.wgsl"))),
-        File::Search => guard(own(include_str!("../step/guard_search.wgsl"))),
-        File::Take => guard(vec![SPANS, include_str!("../step/guard_take.wgsl")]),
-        File::Energy => guard(own(include_str!("../step/energy.wgsl"))),
+        File::Explicit => [laws(), elements(kernel_text!("../explicit/mod.wgsl"))].concat(),
+        File::Evaluate => guard(own(kernel_text!("../step/guard_evaluate.wgsl"))),
+        File::Search => guard(own(kernel_text!("../step/guard_search.wgsl"))),
+        File::Take => guard(vec![SPANS, kernel_text!("../step/guard_take.wgsl")]),
+        File::Energy => guard(own(kernel_text!("../step/energy.wgsl"))),
     }
 }
 

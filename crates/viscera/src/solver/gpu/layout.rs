@@ -15,6 +15,7 @@ use crate::material::MaterialConstants;
 use crate::model::for_each_kind;
 use crate::scalar::lanes::LANES;
 use crate::settings::{Method, SolverSettings};
+use crate::sorting;
 
 /// The material of a padding lane.
 pub(super) const FILLING: u32 = u32::MAX;
@@ -328,8 +329,8 @@ fn elements(layout: &Layout<f32>) -> Vec<Element> {
             all.extend(set.color(color).map(|i| (color, element(set, i, layout))));
         }
     });
-    all.sort_by_key(|(color, _)| *color);
-    all.into_iter().map(|(_, element)| element).collect()
+    let order = sorting::by_key(0..all.len() as u32, |i| [all[i as usize].0 as u64, 0]);
+    order.into_iter().map(|i| all[i as usize].1).collect()
 }
 
 fn element<K: Kind<N, M>, const N: usize, const M: usize>(
@@ -353,9 +354,8 @@ fn element<K: Kind<N, M>, const N: usize, const M: usize>(
 
 /// Places of elements, kind by kind and in each in the order of its set.
 fn kind_by_kind(elements: &[Element]) -> Vec<usize> {
-    let mut places: Vec<usize> = (0..elements.len()).collect();
-    places.sort_by_key(|&i| elements[i].kind);
-    places
+    let kind = |i: u32| [u64::from(elements[i as usize].kind), 0];
+    sorting::by_key(0..elements.len() as u32, kind).into_iter().map(|i| i as usize).collect()
 }
 
 /// The first of the elements of a colour, or of all, and how many there are.
@@ -391,17 +391,18 @@ fn pieces(layout: &Layout<f32>, others: &[Element], by_kind: &[usize]) -> (Vec<u
     // finds block and lane of a tetrahedron by division.
     let first = (LANES * first) as u32;
     elements.extend(by_kind.iter().map(|&i| (others[i].part, first + i as u32)));
-    elements.sort_by_key(|&(part, _)| part);
+    // A part's elements keep the order of a model of their own.
+    let part = |i: u32| elements[i as usize].0;
+    let order = sorting::by_key(0..elements.len() as u32, |i| [u64::from(part(i)), 0]);
 
     let (mut members, mut pieces) = (Vec::new(), Vec::new());
-    // A piece never reaches across parts: the sums of one must not depend on the size of the part before it. The sort
-    // above is stable, so that a part's elements keep the order of a model of their own.
-    for of_part in elements.chunk_by(|a, b| a.0 == b.0) {
+    // A piece never reaches across parts: the sums of one must not depend on the size of the part before it.
+    for of_part in order.chunk_by(|&a, &b| part(a) == part(b)) {
         for piece in of_part.chunks(PIECE) {
             let first = members.len() as u32;
-            members.extend(piece.iter().map(|&(_, member)| member));
+            members.extend(piece.iter().map(|&i| elements[i as usize].1));
             let end = members.len() as u32;
-            pieces.push(Piece { part: of_part[0].0, first, end, are_vertices: 0 });
+            pieces.push(Piece { part: part(of_part[0]), first, end, are_vertices: 0 });
         }
     }
     // Vertices behind all elements: `limit_velocities` is dispatched for their pieces alone, which must be a range.

@@ -107,6 +107,13 @@ struct Rigid {
     spin: Vec3<f64>,
 }
 
+impl Rigid {
+    /// Velocity [m/s] of a place [m].
+    fn at(&self, place: Vec3<f64>) -> Vec3<f64> {
+        self.drift + self.spin.cross(place - self.center)
+    }
+}
+
 #[derive(Clone, Copy, Debug, Default)]
 struct Motion {
     /// Of tissue, springs and attachments [J].
@@ -385,13 +392,9 @@ impl Energies {
             }
             // What remains beside that is scaled as a whole, so it keeps its direction; squares of it scale by
             // `share^2`, which brings the kinetic energy to `given`.
-            let (drift, scale) = (rigid.drift.cast::<S>(), S::from_f64(share));
+            let scale = S::from_f64(share);
             for v in part.vertices.clone().filter(free) {
-                let mut stays = drift;
-                if rigid.spin != Vec3::ZERO {
-                    let arm = data.points[v].vec3().cast::<f64>() - rigid.center;
-                    stays += rigid.spin.cross(arm).cast();
-                }
+                let stays = rigid.at(data.points[v].vec3().cast()).cast();
                 let velocity = &mut data.velocities[v];
                 *velocity = stays + (*velocity - stays) * scale;
             }
@@ -433,5 +436,37 @@ mod tests {
             let rounding = f64::EPSILON * train.length_squared() / 0.05;
             assert!((moving - share).abs() < 16.0 * rounding, "{moving} and {share}");
         }
+    }
+
+    /// Masses that turn and fly apart end with the energy that they were given, and their momentum and angular momentum.
+    #[test]
+    fn a_group_that_is_slowed_has_what_it_was_given_and_turns_as_before() {
+        let bodies = [
+            (0.2, vec3(0.1, 0.0, 0.02), vec3(0.9, 0.8, 0.0)),
+            (0.3, vec3(-0.1, 0.05, 0.0), vec3(-1.1, 0.1, 0.3)),
+            (0.1, vec3(0.0, -0.1, 0.1), vec3(0.4, -0.9, 0.2)),
+            (0.4, vec3(0.05, 0.1, -0.1), vec3(-0.6, 0.5, -0.7)),
+        ];
+        let mut energy = Energy { turning: Some(Turning::default()), ..Energy::default() };
+        for (mass, place, velocity) in bodies {
+            energy.end.add(mass, velocity);
+            energy.mass += mass;
+            energy.turning.as_mut().expect("it turns").add(mass, place, velocity);
+        }
+        // It began with the same momentum, and less energy.
+        energy.start = energy.end;
+        energy.start.stored = -0.1 * energy.end.kinetic;
+        let (rigid, share) = energy.limit();
+        assert!((0.1..0.95).contains(&share), "{share}");
+        let (mut kinetic, mut momentum, mut angular) = (0.0, Vec3::ZERO, Vec3::ZERO);
+        for (mass, place, velocity) in bodies {
+            let stays = rigid.at(place);
+            let kept = stays + (velocity - stays) * share;
+            kinetic += 0.5 * mass * kept.length_squared();
+            momentum += (kept - velocity) * mass;
+            angular += place.cross(kept - velocity) * mass;
+        }
+        assert!((kinetic / (0.9 * energy.end.kinetic) - 1.0).abs() < 1e-13, "{kinetic}");
+        assert!(momentum.length() < 1e-15 && angular.length() < 1e-15, "{momentum:?} {angular:?}");
     }
 }

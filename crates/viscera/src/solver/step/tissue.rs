@@ -4,18 +4,19 @@ use crate::elements::green_strain::{self, Voigt};
 #[cfg(any(test, feature = "gpu"))]
 use crate::elements::law::with_law;
 use crate::elements::law::{Law, stretch_curvature};
+#[cfg(feature = "gpu")]
+use crate::elements::text::kernel_text;
 use crate::material::MaterialConstants;
 use crate::material::MaterialModel;
 use crate::scalar::{Mat3, Scalar, Vec3};
 
 /// Twin of the functions of [`Tissue`]; needs those of the Green strain and of all laws.
 #[cfg(feature = "gpu")]
-pub const TISSUE_WGSL: &str =
-    concat!(include_str!("tissue_viscous.wgsl"), include_str!("tissue.wgsl"));
+pub const TISSUE_WGSL: &str = kernel_text!("tissue_viscous.wgsl", "tissue.wgsl");
 
 /// Its viscous part, which needs no law.
 #[cfg(feature = "gpu")]
-pub const VISCOUS_WGSL: &str = include_str!("tissue_viscous.wgsl");
+pub const VISCOUS_WGSL: &str = kernel_text!("tissue_viscous.wgsl");
 
 /// The constants of a tetrahedron's tissue for one step.
 pub struct Tissue<S> {

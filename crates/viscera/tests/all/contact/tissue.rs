@@ -75,6 +75,16 @@ impl<S: Real> Bodies<S> {
         all.filter(|(_, x)| chosen(**x)).map(|(v, _)| v).collect()
     }
 
+    /// Holds vertices of one body where they are at rest, and those of the other a way [m] below that.
+    pub fn press(&mut self, [held, led]: [&[u32]; 2], way: f64) {
+        let pin = |&vertex: &u32, way: f64| Pin {
+            vertex,
+            target: (self.rest(vertex) - vec3(0.0, 0.0, way)).cast(),
+        };
+        let held = held.iter().map(|vertex| pin(vertex, 0.0));
+        self.inputs.pins = held.chain(led.iter().map(|vertex| pin(vertex, way))).collect();
+    }
+
     pub fn rest(&self, v: u32) -> Vec3<f64> {
         self.model.rest_positions[v as usize].cast()
     }
@@ -243,11 +253,7 @@ fn columns(gap: f64, (young, stiffness): ([f64; 2], f64), way: f64) -> f64 {
     let above = bodies.of(1, |x| x.z > 0.032 + gap - 1e-6);
     for step in 1..=160 {
         let way = way * super::ramp(f64::from(step), 0.0, 40.0);
-        let fixed = below.iter().map(|&vertex| Pin { vertex, target: bodies.rest(vertex) });
-        let led = above
-            .iter()
-            .map(|&vertex| Pin { vertex, target: bodies.rest(vertex) - vec3(0.0, 0.0, way) });
-        bodies.inputs.pins = fixed.chain(led).collect();
+        bodies.press([&below, &above], way);
         bodies.step();
     }
     bodies.reaction(|v| below.contains(&v)).z
