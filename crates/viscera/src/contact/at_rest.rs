@@ -1,8 +1,8 @@
 //! Bodies that are close to each other, or overlap, at rest.
 
-use super::meeting::{DEEPEST, Looking, Marks, Moment, turn_normals};
+use super::meeting::{DEEPEST, Looking, Marks, Moment, depths, turn_normals};
 use super::skin::{Skin, TissueContact, Topology, mean};
-use super::tree::{SkinNow, Tree};
+use super::tree::{SkinNow, Tree, Wanted};
 use crate::mesh::embed::barycentric_weights;
 use crate::scalar::Vec3;
 use std::collections::BTreeMap;
@@ -18,9 +18,8 @@ pub struct Overlap {
 }
 
 impl Skin {
-    /// After all bodies were added: what is near what on tetrahedra of vertices at these places [m] at rest, `bodies` being the ranges
-    /// of their tetrahedra, and the samples
-    /// that are closer to others than the thickness of contact. Returns the least distance [m] between two bodies' surfaces,
+    /// After all bodies were added: what is near what on tetrahedra of vertices at these places [m] at rest, `bodies` being the
+    /// ranges of their tetrahedra, and the samples that are closer to others than the thickness of contact. Returns the least distance [m] between two bodies' surfaces,
     /// below zero where they overlap, with the sample and the triangle; nothing where it is more than the thickness.
     pub fn finish(
         &mut self,
@@ -48,7 +47,15 @@ impl Skin {
         let mut normals = Vec::new();
         turn_normals(self, &at, &mut normals);
         let now = SkinNow { skin: self, at: &at, normals: &normals };
-        tree.list(now, contact.itself, contact.bodies, 2.0 * reach);
+        let wanted = Wanted {
+            itself: contact.itself,
+            bodies: contact.bodies,
+            reach,
+            depths: depths(contact, f64::INFINITY),
+            margin: thickness,
+            turn: 0.0,
+        };
+        tree.list(now, wanted);
         let mut nearest: Option<Overlap> = None;
         let mut shifts = BTreeMap::<[u32; 2], f64>::new();
         let moment = Moment { now, tree: &tree, contact, deepest: DEEPEST };

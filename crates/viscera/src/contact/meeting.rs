@@ -10,12 +10,12 @@
 
 use super::search::{Closest, Found, closest};
 use super::skin::{Skin, TissueContact};
-use super::tree::{Query, SkinNow, Tree};
+use super::tree::{FACES, Query, SkinNow, Tree};
 use crate::scalar::Vec3;
 
 /// A sample faces what it meets not at all and wholly where the cosine of the angle between its normal and the way there is
 /// this. Between them its pressure grows steadily: what came and went at once would never be at rest.
-const FACING: [f64; 2] = [0.2, 0.7];
+const FACING: [f64; 2] = [FACES, 0.7];
 
 /// A sample stays with its triangle until another is nearer by this share of the thickness.
 const STAYS: f64 = 0.1;
@@ -112,6 +112,11 @@ pub fn turn_normals(skin: &Skin, at: &[Vec3<f64>], normals: &mut Vec<Vec3<f64>>)
     farthest.sqrt()
 }
 
+/// How deep samples may be behind their own body's skin and others' [m], see [`Moment::deepest`].
+pub fn depths(contact: &TissueContact, deepest: f64) -> [f64; 2] {
+    [SHALLOW, deepest].map(|shallow| shallow * contact.law.thickness)
+}
+
 impl Moment<'_> {
     /// How much a sample faces what it has met, from 0 to 1.
     pub fn facing(&self, sample: u32, found: &Found) -> f64 {
@@ -131,6 +136,7 @@ impl Moment<'_> {
         let skin = now.skin;
         let body = skin.sample_bodies[sample as usize];
         let outward = self.outward(sample);
+        let depths = depths(contact, self.deepest);
         let mut is_marked = false;
         let may = |triangle: u32| {
             let is_own = skin.bodies[triangle as usize] == body;
@@ -149,8 +155,7 @@ impl Moment<'_> {
                 return false;
             }
             let is_own = skin.bodies[triangle as usize] == body;
-            let shallow = if is_own { SHALLOW } else { self.deepest };
-            distance > -shallow * contact.law.thickness
+            distance > -depths[usize::from(!is_own)]
                 || kept.is_some_and(|kept| self.touch(kept, triangle))
         };
         let before =
@@ -158,7 +163,7 @@ impl Moment<'_> {
         // Whose nearest point is on its border it has slid off, and that would hold it back.
         let is_on = |near: &Closest| near.weights.iter().all(|weight| *weight > 0.0);
         let before = before.filter(|at| is_on(&at.closest) && suits(at.triangle, &at.closest));
-        let query = Query { p, outward, reach, leaf, first: near };
+        let query = Query { p, outward, reach, depths, body, leaf, kept, first: near };
         let found = tree.nearest(now, &query, may, suits);
         // In a hollow two triangles may be as near, and what went from one to the other and back would never be at rest.
         let far = |found: &Found| found.closest.away.length();

@@ -89,7 +89,7 @@ impl Assembly {
         let (mut tree, mut normals) = (Tree::new(skin, &at), Vec::new());
         turn_normals(skin, &at, &mut normals);
         let now = SkinNow { skin, at: &at, normals: &normals };
-        tree.refit(now);
+        tree.refit(now, 0.0);
         let (mut ties, mut untied) = (Vec::new(), Vec::new());
         for (number, sample) in (0..).zip(&skin.samples) {
             let point = SkinPoint { vertices: sample.vertices, weights: sample.weights };

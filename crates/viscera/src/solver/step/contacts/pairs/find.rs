@@ -9,9 +9,10 @@
 
 use super::{NOWHERE, Pairs, Places, Search};
 use crate::contact::search::Found;
-use crate::contact::tree::{Since, SkinNow};
+use crate::contact::tree::{Since, SkinNow, Wanted};
 use crate::contact::{
-    Bond, DEEPEST, Foundation, Kept, Looking, Moment, Pair, TissueContact, from_edges, turn_normals,
+    Bond, DEEPEST, Foundation, Kept, Looking, Moment, Pair, TissueContact, depths, from_edges,
+    turn_normals,
 };
 use crate::layout::LaidSkin;
 use crate::scalar::{Real, Vec3};
@@ -22,8 +23,19 @@ use crate::state::ContactState;
 /// In a step nothing is looked for further than so many thicknesses.
 const FARTHEST: f64 = 40.0;
 
-/// Lists reach so many thicknesses further than the step asks for, so that they need not be made again soon.
-const MARGIN: f64 = 3.0;
+/// Lists of what may be near are to last for so many looks in which as much moves and turns as in the last one,
+const LASTING: f64 = 2.0;
+
+/// where that is no more than this many thicknesses and a chord of this length: what moves faster has lists of its own in
+/// every step.
+const MARGIN: f64 = 0.2;
+const TURN: f64 = 0.02;
+
+/// They are made for a reach that is this much longer.
+const REACH: f64 = 1.25;
+
+/// And for ways that rounding may make longer [m].
+const MORE: f64 = 1e-8;
 
 impl Pairs {
     /// Finds the pairs of a step in which tools go no further than `tools` [m], and the groups that follow.
@@ -275,8 +287,10 @@ impl Search {
                 sum + places.x[v as usize].vec3().cast::<f64>() * weight
             });
         }
+        let moved = self.travelled - self.prepared_at;
         self.prepared_at = self.travelled;
-        self.turned += turn_normals(&skin.skin, &self.at, &mut self.normals);
+        let turned = turn_normals(&skin.skin, &self.at, &mut self.normals);
+        self.turned += turned;
         // The first look comes from nowhere, and numbers that have grown without bound tell nothing.
         let is_new = self.listed_at < 0.0 || !self.travelled.is_finite();
         if is_new {
@@ -285,7 +299,18 @@ impl Search {
         if is_new || !self.has_lists(reach) {
             let TissueContact { itself, bodies, law } = skin.contact;
             let now = SkinNow { skin: &skin.skin, at: &self.at, normals: &self.normals };
-            self.tree.list(now, itself, bodies, reach + MARGIN * law.thickness);
+            let (margin, turn) = (2.0 * LASTING * moved, LASTING * turned);
+            let lasts = !is_new && margin <= MARGIN * law.thickness && turn <= TURN;
+            let [margin, turn] = if lasts { [margin, turn] } else { [0.0; 2] };
+            let wanted = Wanted {
+                itself,
+                bodies,
+                reach: REACH * reach,
+                depths: depths(&skin.contact, DEEPEST),
+                margin: margin + MORE,
+                turn,
+            };
+            self.tree.list(now, wanted);
             (self.listed_at, self.drift, self.turned) = (self.travelled, Vec3::ZERO, 0.0);
         }
     }

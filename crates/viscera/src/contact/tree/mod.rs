@@ -1,0 +1,590 @@
+//! Which triangles may be near which samples: a tree of boxes and of cones of normals over the skin.
+//!
+//! ```text
+//! node: the box of its triangles;  axis a and chord r of their normals:  |n - a| <= r
+//! samples of a node meet nothing in a node where
+//!   gap of boxes > reach        or        r_s + |a_s - a| + r <= 1, for then  n_s.n = 1 - |n_s - n|^2/2 >= 1/2  for all of them
+//!   or  gap > depth  and all samples behind all triangles, or turned away from them    (`bounds.rs`)
+//! candidates of a node: what is left of its parent's, as small as the node itself;  of a leaf: its list
+//! ```
+//!
+//! Cones: Volino and Magnenat-Thalmann, "Efficient self-collision detection on smoothly discretized surface animations using
+//! geometrical shape regularity", 1994. Most of a smooth organ's own skin is beside any other part of it or behind it, and is left
+//! out in a few nodes. What remains is a list of leaves for each leaf. It is good until points or normals have gone further than
+//! the margins with which it was made, and decides what is looked at, never what is found: of all triangles within reach the
+//! nearest one counts, of several the lowest, each where it is now.
+
+mod bounds;
+
+pub use bounds::FACES;
+
+use super::search::{Closest, Found, closest};
+use super::skin::{Site, Skin};
+use crate::scalar::Vec3;
+use bounds::{Cone, Patch, Span};
+use std::ops::Range;
+
+/// Triangles of a leaf, at most.
+const LEAF: usize = 8;
+
+/// Leaves that may be near a leaf, on average, before lists end and everything is looked at.
+const ROOM: usize = 24;
+
+/// Candidates on the way from the root to a leaf, for each leaf on average, before lists end.
+const STACK: usize = 4;
+
+/// Surfaces do not meet where the product of their outward normals is no less than this, at an angle of up to 60 degrees.
+pub const BESIDE: f64 = 0.5;
+
+/// More than rounding makes of sums of ways [m].
+const ROUNDING: f64 = 1e-9;
+
+/// No leaf, or no body.
+const NONE: u32 = u32::MAX;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Node {
+    /// Of its triangles.
+    patch: Patch,
+    /// Of its samples, empty where it has none.
+    samples: Patch,
+    /// Of its triangles, in the order of leaves.
+    first: u32,
+    count: u32,
+    /// The node behind all that are below it.
+    end: u32,
+    /// Which leaf it is, or [`NONE`].
+    leaf: u32,
+    /// The body of its triangles, or [`NONE`] where there are several.
+    body: u32,
+}
+
+/// What each of a skin's leaves may meet.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tree {
+    /// Triangles in the order of leaves.
+    order: Vec<u32>,
+    /// Parents before their children, the first child right behind.
+    nodes: Vec<Node>,
+    /// The node of each leaf.
+    leaves: Vec<u32>,
+    /// The leaf of each sample, or [`NONE`].
+    leaf_of: Vec<u32>,
+    /// Samples by leaf, and the first of each leaf and the end of the last.
+    samples: Vec<u32>,
+    first_sample: Vec<u32>,
+    /// Leaves that each leaf's samples may meet: all where there is no room for a list.
+    lists: Vec<Near>,
+    near: Vec<u32>,
+    /// How many of those are in use.
+    used: usize,
+    /// Nodes that the samples of a node, and of those above it, may meet.
+    stack: Vec<u32>,
+    /// For what lists were made; nothing before.
+    wanted: Option<Wanted>,
+    since: Since,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Near {
+    first: u32,
+    end: u32,
+    is_full: bool,
+}
+
+/// What lists are made for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wanted {
+    /// Whether a body meets itself.
+    pub itself: bool,
+    /// Whether bodies meet each other.
+    pub bodies: bool,
+    /// Queries reach so far [m].
+    pub reach: f64,
+    /// Samples meet nothing behind which they are farther than this [m]: of their own body, of another.
+    pub depths: [f64; 2],
+    /// Lists are good while points move by no more than half of this [m],
+    pub margin: f64,
+    /// and while no normal turns by a longer chord than this.
+    pub turn: f64,
+}
+
+impl Wanted {
+    /// Whether samples of a body, or of several, look at triangles of a body, or of several.
+    fn takes(&self, body: u32, other: u32) -> bool {
+        match (body, other) {
+            (NONE, _) | (_, NONE) => self.itself || self.bodies,
+            _ if body == other => self.itself,
+            _ => self.bodies,
+        }
+    }
+}
+
+/// How deep a sample of a body, or of several, may be behind triangles of a body, or of several.
+fn depth([own, others]: [f64; 2], body: u32, other: u32) -> f64 {
+    match (body, other) {
+        (NONE, _) | (_, NONE) => own.max(others),
+        _ if body == other => own,
+        _ => others,
+    }
+}
+
+/// What has happened since lists were made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Since {
+    /// All points have moved by this [m],
+    pub drift: Vec3<f64>,
+    /// and none further than this beside it [m].
+    pub moved: f64,
+    /// No normal has turned by a longer chord.
+    pub turned: f64,
+}
+
+impl Default for Since {
+    fn default() -> Self {
+        Self { drift: Vec3::ZERO, moved: 0.0, turned: 0.0 }
+    }
+}
+
+/// A skin's points and normals.
+#[derive(Clone, Copy)]
+pub struct SkinNow<'a> {
+    pub skin: &'a Skin,
+    /// Places of points [m].
+    pub at: &'a [Vec3<f64>],
+    /// Normals of triangles, of length 1.
+    pub normals: &'a [Vec3<f64>],
+}
+
+/// What is looked for around a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Query {
+    /// The point [m].
+    pub p: Vec3<f64>,
+    /// Outwards there, of length 1.
+    pub outward: Vec3<f64>,
+    /// [m].
+    pub reach: f64,
+    /// See [`Wanted`].
+    pub depths: [f64; 2],
+    /// The body of the sample.
+    pub body: u32,
+    /// The leaf of the sample.
+    pub leaf: u32,
+    /// A triangle that the sample was in touch with: it may be deeper behind those that have a point in common with it.
+    pub kept: Option<u32>,
+    /// A triangle that is probably near: it is looked at first, which saves time and changes nothing.
+    pub first: Option<u32>,
+}
+
+impl SkinNow<'_> {
+    /// Places of a triangle's corners [m].
+    pub fn corners(&self, triangle: u32) -> [Vec3<f64>; 3] {
+        self.skin.triangles[triangle as usize].map(|point| self.at[point as usize])
+    }
+
+    /// The mean of the normals at a sample.
+    pub fn mean_normal(&self, sample: u32) -> Vec3<f64> {
+        match self.skin.sites[sample as usize] {
+            Site::Triangle(triangle) => self.normals[triangle as usize],
+            Site::Point(point) => {
+                let around = self.skin.topology.around(point);
+                let normals = around.iter().map(|&triangle| self.normals[triangle as usize]);
+                let sum = normals.fold(Vec3::ZERO, |sum, normal| sum + normal);
+                sum * (1.0 / around.len().max(1) as f64)
+            }
+        }
+    }
+
+    /// Outwards at a sample, of length 1, with the chord by which it may turn while no normal turns by more than a chord.
+    fn outward(&self, sample: u32, turn: f64) -> (Vec3<f64>, f64) {
+        let mean = self.mean_normal(sample);
+        let steady = mean.length();
+        // |a/|a| - b/|b|| <= 2 |a - b|/(|a| + |b|), and the mean turns no further than the normals.
+        let turn = if steady > turn { 2.0 * turn / (2.0 * steady - turn) } else { 2.0 };
+        (mean * (1.0 / steady), turn)
+    }
+
+    fn triangle_span(&self, triangle: u32) -> Span {
+        self.corners(triangle).into_iter().fold(Span::NOTHING, Span::with)
+    }
+}
+
+impl Tree {
+    /// Of a skin whose points are at these places [m]. Any places will do.
+    pub fn new(skin: &Skin, at: &[Vec3<f64>]) -> Self {
+        let mut tree =
+            Self { order: (0..skin.triangles.len() as u32).collect(), ..Self::default() };
+        let middle = |triangle: u32| {
+            let corners = skin.triangles[triangle as usize].map(|point| at[point as usize]);
+            (corners[0] + corners[1] + corners[2]) * (1.0 / 3.0)
+        };
+        if !tree.order.is_empty() {
+            tree.divide(skin, &middle, 0..skin.triangles.len());
+        }
+        let mut of_triangles = vec![NONE; skin.triangles.len()];
+        let mut of_points = vec![NONE; skin.points.len()];
+        for (leaf, &node) in (0..).zip(&tree.leaves) {
+            for &triangle in &tree.order[tree.nodes[node as usize].range()] {
+                of_triangles[triangle as usize] = leaf;
+                for point in skin.triangles[triangle as usize] {
+                    of_points[point as usize] = leaf;
+                }
+            }
+        }
+        let leaf = |site: &Site| match *site {
+            Site::Triangle(triangle) => of_triangles[triangle as usize],
+            Site::Point(point) => of_points[point as usize],
+        };
+        tree.leaf_of = skin.sites.iter().map(leaf).collect();
+        let numbered = tree.leaf_of.iter().zip(0..).map(|(&leaf, sample)| (leaf, sample));
+        let mut of_samples: Vec<(u32, u32)> = numbered.filter(|(leaf, _)| *leaf != NONE).collect();
+        of_samples.sort_unstable();
+        let first = |leaf: u32| of_samples.partition_point(|(of, _)| *of < leaf) as u32;
+        tree.first_sample = (0..=tree.leaves.len() as u32).map(first).collect();
+        tree.samples = of_samples.into_iter().map(|(_, sample)| sample).collect();
+        tree.lists = vec![Near::default(); tree.leaves.len()];
+        tree.near = vec![NONE; ROOM * tree.leaves.len()];
+        tree.stack = vec![NONE; STACK * tree.leaves.len()];
+        tree
+    }
+
+    /// Divides a range of triangles in two, at the middle of the direction in which they are spread most: bodies first.
+    fn divide(&mut self, skin: &Skin, middle: &impl Fn(u32) -> Vec3<f64>, range: Range<usize>) {
+        let own = &mut self.order[range.clone()];
+        let body = |triangle: u32| skin.bodies[triangle as usize];
+        let (least, most) = own.iter().fold((NONE, 0), |(least, most), &triangle| {
+            (least.min(body(triangle)), most.max(body(triangle)))
+        });
+        let place = self.nodes.len();
+        let is_leaf = own.len() <= LEAF && least == most;
+        self.nodes.push(Node {
+            patch: Patch::NOTHING,
+            samples: Patch::NOTHING,
+            first: range.start as u32,
+            count: range.len() as u32,
+            end: 0,
+            leaf: if is_leaf { self.leaves.len() as u32 } else { NONE },
+            body: if least == most { least } else { NONE },
+        });
+        if is_leaf {
+            self.leaves.push(place as u32);
+        } else {
+            let cut = if least == most {
+                let span =
+                    own.iter().fold(Span::NOTHING, |span, &triangle| span.with(middle(triangle)));
+                let [x, y, z] = (span.high - span.low).to_array();
+                let axis = if x >= y && x >= z { 0 } else { usize::from(y < z) + 1 };
+                let half = own.len() / 2;
+                let along = |triangle: u32| middle(triangle).to_array()[axis];
+                own.select_nth_unstable_by(half, |&a, &b| {
+                    along(a).total_cmp(&along(b)).then(a.cmp(&b))
+                });
+                half
+            } else {
+                let half = least + (most - least) / 2;
+                own.sort_unstable_by_key(|&triangle| (body(triangle), triangle));
+                own.partition_point(|&triangle| body(triangle) <= half)
+            };
+            let cut = range.start + cut;
+            self.divide(skin, middle, range.start..cut);
+            self.divide(skin, middle, cut..range.end);
+        }
+        self.nodes[place].end = self.nodes.len() as u32;
+    }
+
+    /// The leaf of a sample, none where no triangle is at it.
+    pub fn leaf_of(&self, sample: u32) -> u32 {
+        self.leaf_of[sample as usize]
+    }
+
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> usize {
+        let numbers = [&self.order, &self.leaves, &self.leaf_of, &self.samples, &self.first_sample];
+        numbers.map(|all| size_of_val(&all[..])).iter().sum::<usize>()
+            + size_of_val(&self.nodes[..])
+            + size_of_val(&self.lists[..])
+            + size_of_val(&self.near[..])
+            + size_of_val(&self.stack[..])
+    }
+
+    /// Says what has happened since lists were made. True where they are as good for queries that reach so far [m].
+    pub fn has_lists(&mut self, reach: f64, since: Since) -> bool {
+        self.since = since;
+        let closer = 2.0 * (since.moved + ROUNDING);
+        self.wanted.is_some_and(|wanted| {
+            reach <= wanted.reach && closer <= wanted.margin && since.turned <= wanted.turn
+        })
+    }
+
+    /// Whether no sample may meet anything.
+    pub fn is_clear(&self) -> bool {
+        self.lists.iter().all(|near| !near.is_full && near.first == near.end)
+    }
+
+    /// Makes lists of what samples may meet. Takes no memory.
+    pub fn list(&mut self, now: SkinNow<'_>, wanted: Wanted) {
+        self.refit(now, wanted.turn);
+        self.take_samples(now, wanted.turn);
+        self.used = 0;
+        self.lists.fill(Near::default());
+        if let Some(root) = self.stack.first_mut() {
+            *root = 0;
+            self.descend(0, 0..1, &wanted);
+        }
+        self.wanted = Some(wanted);
+        self.since = Since::default();
+    }
+
+    /// Boxes and cones of where triangles are, while no normal turns by a longer chord than this.
+    pub fn refit(&mut self, now: SkinNow<'_>, turn: f64) {
+        for place in (0..self.nodes.len()).rev() {
+            let node = self.nodes[place];
+            self.nodes[place].patch = match self.children(place) {
+                Some([first, second]) => self.nodes[first].patch.join(&self.nodes[second].patch),
+                None => self.patch_of(now, &node, turn),
+            };
+        }
+    }
+
+    /// Of where samples are.
+    fn take_samples(&mut self, now: SkinNow<'_>, turn: f64) {
+        for place in (0..self.nodes.len()).rev() {
+            self.nodes[place].samples = match self.children(place) {
+                Some([first, second]) => {
+                    self.nodes[first].samples.join(&self.nodes[second].samples)
+                }
+                None => self.samples_of(now, self.nodes[place].leaf, turn),
+            };
+        }
+    }
+
+    /// The two nodes that a node consists of; a leaf has none.
+    fn children(&self, place: usize) -> Option<[usize; 2]> {
+        let first = place + 1;
+        (self.nodes[place].leaf == NONE).then(|| [first, self.nodes[first].end as usize])
+    }
+
+    /// Of a leaf's triangles.
+    fn patch_of(&self, now: SkinNow<'_>, node: &Node, turn: f64) -> Patch {
+        let own = &self.order[node.range()];
+        let spans = own.iter().map(|&triangle| now.triangle_span(triangle));
+        let normals = own.iter().map(|&triangle| (now.normals[triangle as usize], turn));
+        Patch { span: spans.fold(Span::NOTHING, Span::join), cone: Cone::around(normals) }
+    }
+
+    /// Of a leaf's samples.
+    fn samples_of(&self, now: SkinNow<'_>, leaf: u32, turn: f64) -> Patch {
+        let own = self.samples_in(leaf);
+        let span =
+            own.iter().fold(Span::NOTHING, |span, &sample| match now.skin.sites[sample as usize] {
+                Site::Triangle(triangle) => span.join(now.triangle_span(triangle)),
+                Site::Point(point) => span.with(now.at[point as usize]),
+            });
+        Patch { span, cone: Cone::around(own.iter().map(|&sample| now.outward(sample, turn))) }
+    }
+
+    fn samples_in(&self, leaf: u32) -> &[u32] {
+        let [first, end] = [0, 1].map(|k| self.first_sample[leaf as usize + k] as usize);
+        &self.samples[first..end]
+    }
+
+    /// Lists of all leaves below a node whose samples may meet no more than these places of the stack.
+    fn descend(&mut self, place: usize, candidates: Range<usize>, wanted: &Wanted) {
+        let node = self.nodes[place];
+        if node.samples.is_empty() {
+            return;
+        }
+        let mut end = candidates.end;
+        let mut has_room = true;
+        for candidate in candidates.clone() {
+            let mut other = self.stack[candidate] as usize;
+            let last = self.nodes[other].end as usize;
+            // Down the tree below the candidate, as far as nodes are larger than this one.
+            while other < last {
+                let met = &self.nodes[other];
+                if wanted.leaves_out(&node, met) {
+                    other = met.end as usize;
+                } else if met.leaf == NONE && (node.leaf != NONE || met.count > node.count) {
+                    other += 1;
+                } else {
+                    let next = met.end as usize;
+                    match self.stack.get_mut(end) {
+                        Some(free) => *free = other as u32,
+                        None => has_room = false,
+                    }
+                    end += 1;
+                    other = next;
+                }
+            }
+        }
+        has_room &= node.leaf == NONE || self.used + end - candidates.end <= self.near.len();
+        if !has_room {
+            let leaves = self.leaves.partition_point(|&leaf| (leaf as usize) < place);
+            let count = self.leaves[leaves..].partition_point(|&leaf| leaf < node.end);
+            let full = Near { is_full: true, ..Near::default() };
+            self.lists[leaves..leaves + count].fill(full);
+        } else if node.leaf != NONE {
+            let first = self.used as u32;
+            for candidate in candidates.end..end {
+                self.near[self.used] = self.nodes[self.stack[candidate] as usize].leaf;
+                self.used += 1;
+            }
+            let end = self.used as u32;
+            self.lists[node.leaf as usize] = Near { first, end, is_full: false };
+        } else if end > candidates.end {
+            for child in self.children(place).into_iter().flatten() {
+                self.descend(child, candidates.end..end, wanted);
+            }
+        }
+    }
+
+    /// The nearest triangle within reach [m] of a point that `may` be met, however it lies, where [`Tree::refit`] has been.
+    pub fn nearest_to(
+        &self,
+        now: SkinNow<'_>,
+        p: Vec3<f64>,
+        reach: f64,
+        may: impl Fn(u32) -> bool,
+    ) -> Option<Found> {
+        let mut best: Option<(f64, Found)> = None;
+        let mut place = 0;
+        while let Some(node) = self.nodes.get(place) {
+            let least = best.map_or(reach * reach, |(squared, _)| squared);
+            // Rounding hides nothing that is as near.
+            if node.patch.span.gap(&Span { low: p, high: p }) > least * (1.0 + 1e-9) {
+                place = node.end as usize;
+                continue;
+            }
+            place += 1;
+            if node.leaf == NONE {
+                continue;
+            }
+            for &triangle in self.order[node.range()].iter().filter(|&&triangle| may(triangle)) {
+                let near = closest(p, now.corners(triangle));
+                let squared = near.away.length_squared();
+                let is_nearer = best.is_none_or(|(least, found)| {
+                    squared < least || (squared == least && triangle < found.triangle)
+                });
+                if squared <= reach * reach && is_nearer {
+                    best = Some((squared, Found { triangle, closest: near }));
+                }
+            }
+        }
+        best.map(|(_, found)| found)
+    }
+
+    /// Whether samples of a leaf meet nothing.
+    pub fn meets_nothing(&self, leaf: u32) -> bool {
+        let near = self.lists.get(leaf as usize);
+        near.is_none_or(|near| !near.is_full && near.first == near.end)
+    }
+
+    /// The nearest triangle within reach, not beside the point, that `may` be met and that `suits` as it lies.
+    pub fn nearest(
+        &self,
+        now: SkinNow<'_>,
+        query: &Query,
+        mut may: impl FnMut(u32) -> bool,
+        mut suits: impl FnMut(u32, &Closest) -> bool,
+    ) -> Option<Found> {
+        let Query { p, outward, reach, leaf, first, .. } = *query;
+        let list = *self.lists.get(leaf as usize)?;
+        let mut best: Option<Found> = None;
+        let mut least = reach * reach;
+        let mut look = |triangle: u32, least: &mut f64| {
+            // False also where it is no number.
+            let is_turned = outward.dot(now.normals[triangle as usize]) < BESIDE;
+            if !is_turned || !may(triangle) {
+                return;
+            }
+            let near = closest(p, now.corners(triangle));
+            let squared = near.away.length_squared();
+            let is_nearer = best.is_none_or(|found| {
+                squared < *least || (squared == *least && triangle < found.triangle)
+            });
+            // Nothing where it is no number, as beside triangles without area.
+            if squared <= *least && is_nearer && suits(triangle, &near) {
+                *least = squared;
+                best = Some(Found { triangle, closest: near });
+            }
+        };
+        if let Some(triangle) = first {
+            look(triangle, &mut least);
+        }
+        // Those that may be deep are looked at for themselves, and the rest as if nothing had been in touch.
+        let kept = query.kept.map_or([].as_slice(), |kept| &now.skin.triangles[kept as usize]);
+        for &point in kept {
+            let around = now.skin.topology.around(point);
+            around.iter().for_each(|&triangle| look(triangle, &mut least));
+        }
+        let then = p - self.since.drift;
+        let sample = Patch {
+            span: Span { low: then, high: then },
+            cone: Cone { axis: outward, chord: 0.0 },
+        };
+        let moved = self.since.moved + ROUNDING;
+        // True where the leaf, or all below the node, was left out.
+        let mut see = |place: u32| {
+            let node = &self.nodes[place as usize];
+            let within = least.sqrt();
+            let deep = depth(query.depths, query.body, node.body);
+            let gap = node.patch.span.gap(&sample.span);
+            let (far, behind) = (within + moved, deep + moved);
+            let is_out = gap > far * far
+                || node.patch.cone.is_beside(&sample.cone)
+                || (gap > behind * behind && sample.is_averted(&node.patch, within, moved));
+            if is_out || node.leaf == NONE {
+                return is_out;
+            }
+            for &triangle in &self.order[node.range()] {
+                let [corner, ..] = now.skin.triangles[triangle as usize];
+                let normal = now.normals[triangle as usize];
+                let height = normal.dot(p - now.at[corner as usize]);
+                // No point of it is nearer than its plane.
+                if height < -(deep + ROUNDING) || height.abs() > within + ROUNDING {
+                    continue;
+                }
+                look(triangle, &mut least);
+            }
+            false
+        };
+        if list.is_full {
+            let mut place = 0;
+            while (place as usize) < self.nodes.len() {
+                let is_out = see(place);
+                place = if is_out { self.nodes[place as usize].end } else { place + 1 };
+            }
+        } else {
+            for &leaf in &self.near[list.first as usize..list.end as usize] {
+                see(self.leaves[leaf as usize]);
+            }
+        }
+        best
+    }
+}
+
+impl Wanted {
+    /// Whether samples of one node meet nothing of another.
+    fn leaves_out(&self, node: &Node, other: &Node) -> bool {
+        if !self.takes(node.body, other.body) {
+            return true;
+        }
+        let gap = other.patch.span.gap(&node.samples.span);
+        let far = self.reach + self.margin;
+        let deep = depth(self.depths, node.body, other.body) + self.margin;
+        // Not the other way round: places that are no numbers hide nothing.
+        gap > far * far
+            || other.patch.cone.is_beside(&node.samples.cone)
+            || (gap > deep * deep && node.samples.is_averted(&other.patch, self.reach, self.margin))
+    }
+}
+
+impl Node {
+    fn range(&self) -> Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests;
