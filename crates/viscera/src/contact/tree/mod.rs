@@ -15,23 +15,18 @@
 //! nearest one counts, of several the lowest, each where it is now.
 
 mod bounds;
+mod build;
+mod moment;
+mod nearest;
 
 pub use bounds::FACES;
+pub use moment::SkinNow;
+pub use nearest::Query;
 
-use super::search::{Closest, Found, closest};
-use super::skin::{Site, Skin};
+use super::skin::Site;
 use crate::scalar::Vec3;
 use bounds::{Cone, Patch, Span};
 use std::ops::Range;
-
-/// Triangles of a leaf, at most.
-const LEAF: usize = 8;
-
-/// Leaves that may be near a leaf, on average, before lists end and everything is looked at.
-const ROOM: usize = 24;
-
-/// Candidates on the way from the root to a leaf, for each leaf on average, before lists end.
-const STACK: usize = 4;
 
 /// Surfaces do not meet where the product of their outward normals is no less than this, at an angle of up to 60 degrees.
 pub const BESIDE: f64 = 0.5;
@@ -146,153 +141,7 @@ impl Default for Since {
     }
 }
 
-/// A skin's points and normals.
-#[derive(Clone, Copy)]
-pub struct SkinNow<'a> {
-    pub skin: &'a Skin,
-    /// Places of points [m].
-    pub at: &'a [Vec3<f64>],
-    /// Normals of triangles, of length 1.
-    pub normals: &'a [Vec3<f64>],
-}
-
-/// What is looked for around a point.
-#[derive(Clone, Copy, Debug)]
-pub struct Query {
-    /// The point [m].
-    pub p: Vec3<f64>,
-    /// Outwards there, of length 1.
-    pub outward: Vec3<f64>,
-    /// [m].
-    pub reach: f64,
-    /// See [`Wanted`].
-    pub depths: [f64; 2],
-    /// The body of the sample.
-    pub body: u32,
-    /// The leaf of the sample.
-    pub leaf: u32,
-    /// A triangle that the sample was in touch with: it may be deeper behind those that have a point in common with it.
-    pub kept: Option<u32>,
-    /// A triangle that is probably near: it is looked at first, which saves time and changes nothing.
-    pub first: Option<u32>,
-}
-
-impl SkinNow<'_> {
-    /// Places of a triangle's corners [m].
-    pub fn corners(&self, triangle: u32) -> [Vec3<f64>; 3] {
-        self.skin.triangles[triangle as usize].map(|point| self.at[point as usize])
-    }
-
-    /// The mean of the normals at a sample.
-    pub fn mean_normal(&self, sample: u32) -> Vec3<f64> {
-        match self.skin.sites[sample as usize] {
-            Site::Triangle(triangle) => self.normals[triangle as usize],
-            Site::Point(point) => {
-                let around = self.skin.topology.around(point);
-                let normals = around.iter().map(|&triangle| self.normals[triangle as usize]);
-                let sum = normals.fold(Vec3::ZERO, |sum, normal| sum + normal);
-                sum * (1.0 / around.len().max(1) as f64)
-            }
-        }
-    }
-
-    /// Outwards at a sample, of length 1, with the chord by which it may turn while no normal turns by more than a chord.
-    fn outward(&self, sample: u32, turn: f64) -> (Vec3<f64>, f64) {
-        let mean = self.mean_normal(sample);
-        let steady = mean.length();
-        // |a/|a| - b/|b|| <= 2 |a - b|/(|a| + |b|), and the mean turns no further than the normals.
-        let turn = if steady > turn { 2.0 * turn / (2.0 * steady - turn) } else { 2.0 };
-        (mean * (1.0 / steady), turn)
-    }
-
-    fn triangle_span(&self, triangle: u32) -> Span {
-        self.corners(triangle).into_iter().fold(Span::NOTHING, Span::with)
-    }
-}
-
 impl Tree {
-    /// Of a skin whose points are at these places [m]. Any places will do.
-    pub fn new(skin: &Skin, at: &[Vec3<f64>]) -> Self {
-        let mut tree =
-            Self { order: (0..skin.triangles.len() as u32).collect(), ..Self::default() };
-        let middle = |triangle: u32| {
-            let corners = skin.triangles[triangle as usize].map(|point| at[point as usize]);
-            (corners[0] + corners[1] + corners[2]) * (1.0 / 3.0)
-        };
-        if !tree.order.is_empty() {
-            tree.divide(skin, &middle, 0..skin.triangles.len());
-        }
-        let mut of_triangles = vec![NONE; skin.triangles.len()];
-        let mut of_points = vec![NONE; skin.points.len()];
-        for (leaf, &node) in (0..).zip(&tree.leaves) {
-            for &triangle in &tree.order[tree.nodes[node as usize].range()] {
-                of_triangles[triangle as usize] = leaf;
-                for point in skin.triangles[triangle as usize] {
-                    of_points[point as usize] = leaf;
-                }
-            }
-        }
-        let leaf = |site: &Site| match *site {
-            Site::Triangle(triangle) => of_triangles[triangle as usize],
-            Site::Point(point) => of_points[point as usize],
-        };
-        tree.leaf_of = skin.sites.iter().map(leaf).collect();
-        let numbered = tree.leaf_of.iter().zip(0..).map(|(&leaf, sample)| (leaf, sample));
-        let mut of_samples: Vec<(u32, u32)> = numbered.filter(|(leaf, _)| *leaf != NONE).collect();
-        of_samples.sort_unstable();
-        let first = |leaf: u32| of_samples.partition_point(|(of, _)| *of < leaf) as u32;
-        tree.first_sample = (0..=tree.leaves.len() as u32).map(first).collect();
-        tree.samples = of_samples.into_iter().map(|(_, sample)| sample).collect();
-        tree.lists = vec![Near::default(); tree.leaves.len()];
-        tree.near = vec![NONE; ROOM * tree.leaves.len()];
-        tree.stack = vec![NONE; STACK * tree.leaves.len()];
-        tree
-    }
-
-    /// Divides a range of triangles in two, at the middle of the direction in which they are spread most: bodies first.
-    fn divide(&mut self, skin: &Skin, middle: &impl Fn(u32) -> Vec3<f64>, range: Range<usize>) {
-        let own = &mut self.order[range.clone()];
-        let body = |triangle: u32| skin.bodies[triangle as usize];
-        let (least, most) = own.iter().fold((NONE, 0), |(least, most), &triangle| {
-            (least.min(body(triangle)), most.max(body(triangle)))
-        });
-        let place = self.nodes.len();
-        let is_leaf = own.len() <= LEAF && least == most;
-        self.nodes.push(Node {
-            patch: Patch::NOTHING,
-            samples: Patch::NOTHING,
-            first: range.start as u32,
-            count: range.len() as u32,
-            end: 0,
-            leaf: if is_leaf { self.leaves.len() as u32 } else { NONE },
-            body: if least == most { least } else { NONE },
-        });
-        if is_leaf {
-            self.leaves.push(place as u32);
-        } else {
-            let cut = if least == most {
-                let span =
-                    own.iter().fold(Span::NOTHING, |span, &triangle| span.with(middle(triangle)));
-                let [x, y, z] = (span.high - span.low).to_array();
-                let axis = if x >= y && x >= z { 0 } else { usize::from(y < z) + 1 };
-                let half = own.len() / 2;
-                let along = |triangle: u32| middle(triangle).to_array()[axis];
-                own.select_nth_unstable_by(half, |&a, &b| {
-                    along(a).total_cmp(&along(b)).then(a.cmp(&b))
-                });
-                half
-            } else {
-                let half = least + (most - least) / 2;
-                own.sort_unstable_by_key(|&triangle| (body(triangle), triangle));
-                own.partition_point(|&triangle| body(triangle) <= half)
-            };
-            let cut = range.start + cut;
-            self.divide(skin, middle, range.start..cut);
-            self.divide(skin, middle, cut..range.end);
-        }
-        self.nodes[place].end = self.nodes.len() as u32;
-    }
-
     /// The leaf of a sample, none where no triangle is at it.
     pub fn leaf_of(&self, sample: u32) -> u32 {
         self.leaf_of[sample as usize]
@@ -320,6 +169,12 @@ impl Tree {
     /// Whether no sample may meet anything.
     pub fn is_clear(&self) -> bool {
         self.lists.iter().all(|near| !near.is_full && near.first == near.end)
+    }
+
+    /// Whether samples of a leaf meet nothing.
+    pub fn meets_nothing(&self, leaf: u32) -> bool {
+        let near = self.lists.get(leaf as usize);
+        near.is_none_or(|near| !near.is_full && near.first == near.end)
     }
 
     /// Makes lists of what samples may meet. Takes no memory.
@@ -437,130 +292,6 @@ impl Tree {
                 self.descend(child, candidates.end..end, wanted);
             }
         }
-    }
-
-    /// The nearest triangle within reach [m] of a point that `may` be met, however it lies, where [`Tree::refit`] has been.
-    pub fn nearest_to(
-        &self,
-        now: SkinNow<'_>,
-        p: Vec3<f64>,
-        reach: f64,
-        may: impl Fn(u32) -> bool,
-    ) -> Option<Found> {
-        let mut best: Option<(f64, Found)> = None;
-        let mut place = 0;
-        while let Some(node) = self.nodes.get(place) {
-            let least = best.map_or(reach * reach, |(squared, _)| squared);
-            // Rounding hides nothing that is as near.
-            if node.patch.span.gap(&Span { low: p, high: p }) > least * (1.0 + 1e-9) {
-                place = node.end as usize;
-                continue;
-            }
-            place += 1;
-            if node.leaf == NONE {
-                continue;
-            }
-            for &triangle in self.order[node.range()].iter().filter(|&&triangle| may(triangle)) {
-                let near = closest(p, now.corners(triangle));
-                let squared = near.away.length_squared();
-                let is_nearer = best.is_none_or(|(least, found)| {
-                    squared < least || (squared == least && triangle < found.triangle)
-                });
-                if squared <= reach * reach && is_nearer {
-                    best = Some((squared, Found { triangle, closest: near }));
-                }
-            }
-        }
-        best.map(|(_, found)| found)
-    }
-
-    /// Whether samples of a leaf meet nothing.
-    pub fn meets_nothing(&self, leaf: u32) -> bool {
-        let near = self.lists.get(leaf as usize);
-        near.is_none_or(|near| !near.is_full && near.first == near.end)
-    }
-
-    /// The nearest triangle within reach, not beside the point, that `may` be met and that `suits` as it lies.
-    pub fn nearest(
-        &self,
-        now: SkinNow<'_>,
-        query: &Query,
-        mut may: impl FnMut(u32) -> bool,
-        mut suits: impl FnMut(u32, &Closest) -> bool,
-    ) -> Option<Found> {
-        let Query { p, outward, reach, leaf, first, .. } = *query;
-        let list = *self.lists.get(leaf as usize)?;
-        let mut best: Option<Found> = None;
-        let mut least = reach * reach;
-        let mut look = |triangle: u32, least: &mut f64| {
-            // False also where it is no number.
-            let is_turned = outward.dot(now.normals[triangle as usize]) < BESIDE;
-            if !is_turned || !may(triangle) {
-                return;
-            }
-            let near = closest(p, now.corners(triangle));
-            let squared = near.away.length_squared();
-            let is_nearer = best.is_none_or(|found| {
-                squared < *least || (squared == *least && triangle < found.triangle)
-            });
-            // Nothing where it is no number, as beside triangles without area.
-            if squared <= *least && is_nearer && suits(triangle, &near) {
-                *least = squared;
-                best = Some(Found { triangle, closest: near });
-            }
-        };
-        if let Some(triangle) = first {
-            look(triangle, &mut least);
-        }
-        // Those that may be deep are looked at for themselves, and the rest as if nothing had been in touch.
-        let kept = query.kept.map_or([].as_slice(), |kept| &now.skin.triangles[kept as usize]);
-        for &point in kept {
-            let around = now.skin.topology.around(point);
-            around.iter().for_each(|&triangle| look(triangle, &mut least));
-        }
-        let then = p - self.since.drift;
-        let sample = Patch {
-            span: Span { low: then, high: then },
-            cone: Cone { axis: outward, chord: 0.0 },
-        };
-        let moved = self.since.moved + ROUNDING;
-        // True where the leaf, or all below the node, was left out.
-        let mut see = |place: u32| {
-            let node = &self.nodes[place as usize];
-            let within = least.sqrt();
-            let deep = depth(query.depths, query.body, node.body);
-            let gap = node.patch.span.gap(&sample.span);
-            let (far, behind) = (within + moved, deep + moved);
-            let is_out = gap > far * far
-                || node.patch.cone.is_beside(&sample.cone)
-                || (gap > behind * behind && sample.is_averted(&node.patch, within, moved));
-            if is_out || node.leaf == NONE {
-                return is_out;
-            }
-            for &triangle in &self.order[node.range()] {
-                let [corner, ..] = now.skin.triangles[triangle as usize];
-                let normal = now.normals[triangle as usize];
-                let height = normal.dot(p - now.at[corner as usize]);
-                // No point of it is nearer than its plane.
-                if height < -(deep + ROUNDING) || height.abs() > within + ROUNDING {
-                    continue;
-                }
-                look(triangle, &mut least);
-            }
-            false
-        };
-        if list.is_full {
-            let mut place = 0;
-            while (place as usize) < self.nodes.len() {
-                let is_out = see(place);
-                place = if is_out { self.nodes[place as usize].end } else { place + 1 };
-            }
-        } else {
-            for &leaf in &self.near[list.first as usize..list.end as usize] {
-                see(self.leaves[leaf as usize]);
-            }
-        }
-        best
     }
 }
 

@@ -1,8 +1,9 @@
 //! Of the tree of a skin.
 
-use super::bounds::unit;
+use super::bounds::{Cone, Patch, Span, unit};
 use super::*;
-use crate::contact::skin::{SkinPoint, Topology};
+use crate::contact::search::{Closest, closest};
+use crate::contact::skin::{Skin, SkinPoint, Topology};
 use crate::contact::turn_normals;
 use crate::scalar::vec3;
 
