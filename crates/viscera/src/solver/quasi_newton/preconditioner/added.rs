@@ -6,8 +6,7 @@
 //! w_ac: weight of node c of the level in corner a
 //! ```
 
-use super::dense::Dense;
-use super::sums::Six;
+use super::sums::add_six;
 use super::{Curvature, OfPart};
 use crate::elements::kinds::{Energy, Kind};
 use crate::layout::{ElementSet, Part};
@@ -59,7 +58,7 @@ impl<S: Real> OfPart<S> {
         let dense = &mut self.dense;
         Self::on(&self.lattice, coarsest).each_pair(vertices, free, |[a, b], nodes, weight| {
             if nodes[1] <= nodes[0] {
-                add_block(dense, nodes, &(blocks[a][b] * weight));
+                dense.add_block(nodes, &(blocks[a][b] * weight));
             }
         });
     }
@@ -93,27 +92,9 @@ impl<S: Real> OfPart<S> {
             } else if dense.size() > 0 {
                 for &(node, weight) in &*nodes {
                     for &(other, share) in nodes.iter().filter(|(other, _)| *other <= node) {
-                        add_block(dense, [node, other], &(*block * (weight * share)));
+                        dense.add_block([node, other], &(*block * (weight * share)));
                     }
                 }
-            }
-        }
-    }
-}
-
-fn add_six<S: Real>(into: &mut Six<S>, block: &Mat3<f64>, weight: f64) {
-    let [x, y, z] = block.columns;
-    let entries = [x.x, y.y, z.z, z.y, z.x, y.x];
-    into.iter_mut().zip(entries).for_each(|(sum, entry)| *sum += S::from_f64(entry * weight));
-}
-
-/// Adds a block to the lower triangle.
-pub(super) fn add_block(dense: &mut Dense, [node, other]: [u32; 2], block: &Mat3<f64>) {
-    for (column, entries) in block.columns.iter().enumerate() {
-        for (row, entry) in entries.to_array().into_iter().enumerate() {
-            let (row, column) = (3 * node as usize + row, 3 * other as usize + column);
-            if column <= row {
-                dense.add(row, column, entry);
             }
         }
     }

@@ -31,7 +31,6 @@ use crate::scalar::lanes::Point;
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::cpu::threads::{Shared, Workers};
 use crate::solver::step::data::{Step, StepConstants};
-use added::add_block;
 use dense::Dense;
 use full::FullSums;
 use prolongation::Prolongation;
@@ -356,12 +355,12 @@ impl<S: Real> OfPart<S> {
         }
         self.dense.clear();
         for &(nodes, mass) in &self.full.masses {
-            add_block(&mut self.dense, nodes, &(Mat3::IDENTITY * mass));
+            self.dense.add_block(nodes, &(Mat3::IDENTITY * mass));
         }
         let Self { full, dense, .. } = self;
         for (group, turn) in turns[..self.groups.len()].iter().enumerate() {
             full.each_block(workers, group, turn, squared, |nodes, block| {
-                add_block(dense, nodes, &block.cast());
+                dense.add_block(nodes, &block.cast());
             });
         }
     }
