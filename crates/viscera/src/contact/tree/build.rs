@@ -48,6 +48,7 @@ impl Tree {
         let first = |leaf: u32| of_samples.partition_point(|(of, _)| *of < leaf) as u32;
         tree.first_sample = (0..=tree.leaves.len() as u32).map(first).collect();
         tree.samples = of_samples.into_iter().map(|(_, sample)| sample).collect();
+        tree.of_samples = vec![Patch::NOTHING; tree.nodes.len()];
         tree.lists = vec![Near::default(); tree.leaves.len()];
         tree.near = vec![NONE; ROOM * tree.leaves.len()];
         tree.stack = vec![NONE; STACK * tree.leaves.len()];
@@ -65,7 +66,6 @@ impl Tree {
         let is_leaf = own.len() <= LEAF && least == most;
         self.nodes.push(Node {
             patch: Patch::NOTHING,
-            samples: Patch::NOTHING,
             first: range.start as u32,
             count: range.len() as u32,
             end: 0,

@@ -41,8 +41,6 @@ const NONE: u32 = u32::MAX;
 struct Node {
     /// Of its triangles.
     patch: Patch,
-    /// Of its samples, empty where it has none.
-    samples: Patch,
     /// Of its triangles, in the order of leaves.
     first: u32,
     count: u32,
@@ -61,6 +59,8 @@ pub struct Tree {
     order: Vec<u32>,
     /// Parents before their children, the first child right behind.
     nodes: Vec<Node>,
+    /// Of each node's samples, empty where it has none.
+    of_samples: Vec<Patch>,
     /// The node of each leaf.
     leaves: Vec<u32>,
     /// The leaf of each sample, or [`NONE`].
@@ -68,7 +68,7 @@ pub struct Tree {
     /// Samples by leaf, and the first of each leaf and the end of the last.
     samples: Vec<u32>,
     first_sample: Vec<u32>,
-    /// Leaves that each leaf's samples may meet: all where there is no room for a list.
+    /// Nodes of leaves that each leaf's samples may meet: all where there is no room for a list.
     lists: Vec<Near>,
     near: Vec<u32>,
     /// How many of those are in use.
@@ -153,6 +153,7 @@ impl Tree {
         numbers.map(|all| size_of_val(&all[..])).iter().sum::<usize>()
             + size_of_val(&self.nodes[..])
             + size_of_val(&self.lists[..])
+            + size_of_val(&self.of_samples[..])
             + size_of_val(&self.near[..])
             + size_of_val(&self.stack[..])
     }
@@ -205,10 +206,8 @@ impl Tree {
     /// Of where samples are.
     fn take_samples(&mut self, now: SkinNow<'_>, turn: f64) {
         for place in (0..self.nodes.len()).rev() {
-            self.nodes[place].samples = match self.children(place) {
-                Some([first, second]) => {
-                    self.nodes[first].samples.join(&self.nodes[second].samples)
-                }
+            self.of_samples[place] = match self.children(place) {
+                Some([first, second]) => self.of_samples[first].join(&self.of_samples[second]),
                 None => self.samples_of(now, self.nodes[place].leaf, turn),
             };
         }
@@ -247,7 +246,8 @@ impl Tree {
     /// Lists of all leaves below a node whose samples may meet no more than these places of the stack.
     fn descend(&mut self, place: usize, candidates: Range<usize>, wanted: &Wanted) {
         let node = self.nodes[place];
-        if node.samples.is_empty() {
+        let samples = self.of_samples[place];
+        if samples.is_empty() {
             return;
         }
         let mut end = candidates.end;
@@ -258,7 +258,7 @@ impl Tree {
             // Down the tree below the candidate, as far as nodes are larger than this one.
             while other < last {
                 let met = &self.nodes[other];
-                if wanted.leaves_out(&node, met) {
+                if wanted.leaves_out((node.body, &samples), met) {
                     other = met.end as usize;
                 } else if met.leaf == NONE && (node.leaf != NONE || met.count > node.count) {
                     other += 1;
@@ -282,7 +282,7 @@ impl Tree {
         } else if node.leaf != NONE {
             let first = self.used as u32;
             for candidate in candidates.end..end {
-                self.near[self.used] = self.nodes[self.stack[candidate] as usize].leaf;
+                self.near[self.used] = self.stack[candidate];
                 self.used += 1;
             }
             let end = self.used as u32;
@@ -296,18 +296,18 @@ impl Tree {
 }
 
 impl Wanted {
-    /// Whether samples of one node meet nothing of another.
-    fn leaves_out(&self, node: &Node, other: &Node) -> bool {
-        if !self.takes(node.body, other.body) {
+    /// Whether samples of a body, or of several, meet nothing of a node.
+    fn leaves_out(&self, (body, samples): (u32, &Patch), other: &Node) -> bool {
+        if !self.takes(body, other.body) {
             return true;
         }
-        let gap = other.patch.span.gap(&node.samples.span);
+        let gap = other.patch.span.gap(&samples.span);
         let far = self.reach + self.margin;
-        let deep = depth(self.depths, node.body, other.body) + self.margin;
+        let deep = depth(self.depths, body, other.body) + self.margin;
         // Not the other way round: places that are no numbers hide nothing.
         gap > far * far
-            || other.patch.cone.is_beside(&node.samples.cone)
-            || (gap > deep * deep && node.samples.is_averted(&other.patch, self.reach, self.margin))
+            || other.patch.cone.is_beside(&samples.cone)
+            || (gap > deep * deep && samples.is_averted(&other.patch, self.reach, self.margin))
     }
 }
 

@@ -70,20 +70,32 @@ impl<M: FnMut(u32) -> bool, U: FnMut(u32, &Closest) -> bool> Looking<'_, M, U> {
         let deep = depth(query.depths, query.body, node.body);
         let gap = node.patch.span.gap(&then.span);
         let (far, behind) = (within + moved, deep + moved);
+        let point = Span { low: query.p, high: query.p };
         let is_out = gap > far * far
-            || node.patch.cone.is_beside(&then.cone)
-            || (gap > behind * behind && then.is_averted(&node.patch, within, moved));
+            || (node.leaf == NONE
+                && (node.patch.cone.is_beside(&then.cone)
+                    || (gap > behind * behind && then.is_averted(&node.patch, within, moved))));
         if is_out || node.leaf == NONE {
             return is_out;
         }
         for &triangle in &tree.order[node.range()] {
-            let [corner, ..] = now.skin.triangles[triangle as usize];
             let normal = now.normals[triangle as usize];
-            let height = normal.dot(query.p - now.at[corner as usize]);
-            // No point of it is nearer than its plane.
-            if height >= -(deep + ROUNDING) && height.abs() <= within + ROUNDING {
-                self.look(triangle);
+            // False also where it is no number.
+            let is_turned = query.outward.dot(normal) < BESIDE;
+            if !is_turned {
+                continue;
             }
+            let corners = now.corners(triangle);
+            let height = normal.dot(query.p - corners[0]);
+            // No point of it is nearer than its plane, or its box.
+            if height < -(deep + ROUNDING) || height.abs() > within + ROUNDING {
+                continue;
+            }
+            let gap = corners.into_iter().fold(Span::NOTHING, Span::with).gap(&point);
+            if gap > self.least + ROUNDING * ROUNDING {
+                continue;
+            }
+            self.look(triangle);
         }
         false
     }
@@ -157,8 +169,8 @@ impl Tree {
                 place = if is_out { self.nodes[place as usize].end } else { place + 1 };
             }
         } else {
-            for &leaf in &self.near[list.first as usize..list.end as usize] {
-                looking.see(self, self.leaves[leaf as usize]);
+            for &place in &self.near[list.first as usize..list.end as usize] {
+                looking.see(self, place);
             }
         }
         looking.best

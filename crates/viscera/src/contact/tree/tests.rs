@@ -174,10 +174,10 @@ fn lists_leave_out_what_may_not_meet() {
     tree.list(now, Wanted { bodies: false, ..wanted(0.02, 0.01) });
     assert!(!tree.is_clear());
     for leaf in 0..tree.leaves.len() {
-        let body = |leaf: u32| tree.nodes[tree.leaves[leaf as usize] as usize].body;
+        let body = |place: u32| tree.nodes[place as usize].body;
         let near = tree.lists[leaf];
         let all = &tree.near[near.first as usize..near.end as usize];
-        assert!(all.iter().all(|&other| body(other) == body(leaf as u32)));
+        assert!(all.iter().all(|&other| body(other) == body(tree.leaves[leaf])));
     }
     // A sheet that is bent a little is beside itself; a list that is older than its margins says so.
     let flat: Vec<Vec3<f64>> = (0..300)
