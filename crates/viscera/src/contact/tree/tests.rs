@@ -42,17 +42,17 @@ const TURN: f64 = 0.1;
 const DRIFT: Vec3<f64> = vec3(0.3, -0.1, 0.2);
 
 /// Samples may be this deep behind triangles of their own body and of others [m].
-const DEPTHS: [f64; 2] = [0.03, 0.06];
+const DEPTHS: [f64; 2] = [0.015, 0.03];
 
 fn wanted(reach: f64, margin: f64) -> Wanted {
     Wanted { itself: true, bodies: true, reach, depths: DEPTHS, margin, turn: TURN }
 }
 
 /// Whether a query may find a triangle that is there: some are left out, as the mesh would have it.
-fn suits(skin: &Skin, query: &Query, triangle: u32, near: &Closest) -> bool {
+fn suits(skin: &Skin, query: &Query, depths: [f64; 2], triangle: u32, near: &Closest) -> bool {
     let (distance, direction) = near.signed();
     let other = skin.bodies[triangle as usize];
-    let depth = DEPTHS[usize::from(other != query.body)];
+    let depth = depths[usize::from(other != query.body)];
     let kept = query.kept.map(|kept| skin.triangles[kept as usize]);
     let is_kept = kept.is_some_and(|kept| {
         skin.triangles[triangle as usize].iter().any(|point| kept.contains(point))
@@ -61,11 +61,16 @@ fn suits(skin: &Skin, query: &Query, triangle: u32, near: &Closest) -> bool {
 }
 
 /// What the nearest triangle is by looking at all.
-fn best_of_all(now: SkinNow<'_>, query: &Query, may: impl Fn(u32) -> bool) -> Option<u32> {
+fn best_of_all(
+    now: SkinNow<'_>,
+    query: &Query,
+    depths: [f64; 2],
+    may: impl Fn(u32) -> bool,
+) -> Option<u32> {
     let all = (0..now.skin.triangles.len() as u32)
         .filter(|&t| query.outward.dot(now.normals[t as usize]) < BESIDE && may(t))
         .map(|t| (t, closest(query.p, now.corners(t))))
-        .filter(|(t, near)| suits(now.skin, query, *t, near))
+        .filter(|(t, near)| suits(now.skin, query, depths, *t, near))
         .map(|(t, near)| (near.away.length_squared(), t))
         .filter(|(squared, _)| *squared <= query.reach * query.reach);
     all.min_by(|a, b| a.partial_cmp(b).expect("numbers")).map(|(_, t)| t)
@@ -76,7 +81,7 @@ fn best_of_all(now: SkinNow<'_>, query: &Query, may: impl Fn(u32) -> bool) -> Op
 fn the_tree_finds_what_looking_at_all_triangles_finds() {
     let (skin, at) = triangles(300);
     let mut tree = Tree::new(&skin, &at);
-    let (mut met, mut deep, mut full) = (0, 0, 0);
+    let (mut met, mut deep, mut deeper, mut full) = (0, 0, 0, 0);
     for (reach, swing) in [(0.04, 5e-5), (0.04, 5e-4), (0.08, 1e-4), (0.3, 0.0)] {
         let mut normals = Vec::new();
         turn_normals(&skin, &at, &mut normals);
@@ -96,25 +101,32 @@ fn the_tree_finds_what_looking_at_all_triangles_finds() {
         let may = |t: u32| !t.is_multiple_of(5);
         for sample in 0..300 {
             let [a, b, c] = now.corners(sample);
-            let query = Query {
+            let mut query = Query {
                 p: (a + b + c) * (1.0 / 3.0),
                 outward: now.outward(sample, 0.0).0,
                 reach,
                 depths: DEPTHS,
                 body: skin.bodies[sample as usize],
                 leaf: tree.leaf_of(sample),
-                kept: sample.is_multiple_of(4).then_some((sample + 7) % 300),
+                kept: None,
                 first: sample.is_multiple_of(3).then_some((sample + 40) % 300),
             };
-            let found = tree.nearest(now, &query, may, |t, near| suits(&skin, &query, t, near));
-            let exact = best_of_all(now, &query, may);
+            // What it was in touch with may be anything, also deeper than others may be.
+            if sample.is_multiple_of(4) {
+                query.kept = best_of_all(now, &query, [f64::INFINITY; 2], may);
+            }
+            let is_met = |t: u32, near: &Closest| suits(&skin, &query, DEPTHS, t, near);
+            let found = tree.nearest(now, &query, may, is_met);
+            let exact = best_of_all(now, &query, DEPTHS, may);
             assert_eq!(found.map(|found| found.triangle), exact, "{sample} within {reach} m");
             met += usize::from(exact.is_some());
-            deep += usize::from(found.is_some_and(|found| found.closest.signed().0 < 0.0));
+            let depth = found.map_or(0.0, |found| -found.closest.signed().0);
+            deep += usize::from(depth > 0.0);
+            deeper += usize::from(depth > DEPTHS[1]);
         }
         full += tree.lists.iter().filter(|near| near.is_full).count();
     }
-    assert!(met > 400 && deep > 10 && full > 10, "{met} {deep} {full}");
+    assert!(met > 400 && deep > 10 && deeper > 5 && full > 10, "{met} {deep} {deeper} {full}");
 }
 
 /// What a patch is behind or turned away from it never faces, whatever moves by less than the slack.
@@ -124,8 +136,9 @@ fn samples_of_an_averted_patch_face_nothing_in_front_of_them() {
     for i in 0..4000 {
         let place = |k: usize| point(13 * i + k) * 0.1;
         let cone = |k: usize| {
-            let chord = 0.5 + 0.5 * number(i, 0.3 + 0.1 * k as f64);
-            Cone { axis: unit(point(5 * i + k)), chord: 0.6 * chord }
+            let chord = 0.3 + 0.3 * number(i, 0.3 + 0.1 * k as f64);
+            let chord = if i.is_multiple_of(3) { 0.0 } else { chord };
+            Cone { axis: unit(point(5 * i + k)), chord }
         };
         let span = |k: usize| {
             let half = vec3(0.01, 0.02, 0.015) * (1.0 + number(i, 0.7));
@@ -151,9 +164,10 @@ fn samples_of_an_averted_patch_face_nothing_in_front_of_them() {
                 let angle = 2.0 * (0.5 * chord).asin();
                 axis * angle.cos() + side * angle.sin()
             };
-            let apart = corner(&one, j % 8) - corner(&other, j / 8)
-                + unit(point(29 * j + i)) * (slack * (1.0 - 1e-9));
             let (outward, normal) = (direction(&one, 3), direction(&other, 4));
+            let closer = [normal, outward * -1.0, unit(point(29 * j + i))][j % 3];
+            let apart =
+                corner(&one, j % 8) - corner(&other, j / 8) + closer * (slack * (1.0 - 1e-9));
             let faces = normal.dot(apart) >= 0.0 && -outward.dot(apart) > FACES * apart.length();
             assert!(apart.length() > reach || !faces, "{i} {j}");
         }
@@ -190,6 +204,11 @@ fn lists_leave_out_what_may_not_meet() {
     turn_normals(&skin, &flat, &mut normals);
     tree.list(SkinNow { skin: &skin, at: &flat, normals: &normals }, wanted(0.009, 1e-3));
     assert!(tree.is_clear());
+    // Not where normals may turn by 35 degrees.
+    let now = SkinNow { skin: &skin, at: &flat, normals: &normals };
+    tree.list(now, Wanted { turn: 0.6, ..wanted(0.009, 1e-3) });
+    assert!(!tree.is_clear());
+    tree.list(now, wanted(0.009, 1e-3));
     let since = Since::default();
     assert!(tree.has_lists(0.009, Since { moved: 4e-4, turned: 0.1, ..since }));
     assert!(!tree.has_lists(0.009, Since { moved: 6e-4, ..since }));
