@@ -1,8 +1,8 @@
 //! Bodies that are close to each other, or overlap, at rest.
 
-use super::meeting::{DEEPEST, Marks, Moment, turn_normals};
-use super::search::{Grid, Since};
+use super::meeting::{DEEPEST, Looking, Marks, Moment, depths, turn_normals};
 use super::skin::{Skin, TissueContact, Topology, mean};
+use super::tree::{SkinNow, Tree, Wanted};
 use crate::mesh::embed::barycentric_weights;
 use crate::scalar::Vec3;
 use std::collections::BTreeMap;
@@ -18,9 +18,8 @@ pub struct Overlap {
 }
 
 impl Skin {
-    /// After all bodies were added: what is near what on tetrahedra of vertices at these places [m] at rest, `bodies` being the ranges
-    /// of their tetrahedra, and the samples
-    /// that are closer to others than the thickness of contact. Returns the least distance [m] between two bodies' surfaces,
+    /// After all bodies were added: what is near what on tetrahedra of vertices at these places [m] at rest, `bodies` being the
+    /// ranges of their tetrahedra, and the samples that are closer to others than the thickness of contact. Returns the least distance [m] between two bodies' surfaces,
     /// below zero where they overlap, with the sample and the triangle; nothing where it is more than the thickness.
     pub fn finish(
         &mut self,
@@ -43,27 +42,35 @@ impl Skin {
         // Where bodies overlap, as deep as half of what a triangle measures.
         let size = self.samples.iter().map(|sample| sample.edge).fold(0.0, f64::max);
         let reach = (2.0 * thickness).max(size);
-        let mut grid = Grid::new(self.triangles.len());
-        grid.sort(&self.triangles, &at, reach);
+        let mut tree = Tree::new(self, &at);
         let mut marks = Marks::new(positions.len());
         let mut normals = Vec::new();
         turn_normals(self, &at, &mut normals);
-        grid.turn(&normals);
+        let now = SkinNow { skin: self, at: &at, normals: &normals };
+        let wanted = Wanted {
+            itself: contact.itself,
+            bodies: contact.bodies,
+            reach,
+            depths: depths(contact, f64::INFINITY),
+            margin: thickness,
+            turn: 0.0,
+        };
+        tree.list(now, wanted);
         let mut nearest: Option<Overlap> = None;
         let mut shifts = BTreeMap::<[u32; 2], f64>::new();
-        let (at, normals, grid, deepest) = (&at[..], &normals[..], &grid, DEEPEST);
-        let moment =
-            Moment { skin: self, at, normals, grid, since: Since::NOTHING, contact, deepest };
+        let moment = Moment { now, tree: &tree, contact, deepest: DEEPEST };
         let inside = Inside::new(tets, positions, bodies);
-        for (number, sample) in self.samples.iter().enumerate() {
+        for (number, sample) in (0..).zip(&self.samples) {
             let p = mean(sample.vertices, sample.weights, positions);
+            let leaf = tree.leaf_of(number);
+            let looking = Looking { sample: number, p, leaf, kept: None, near: None };
             let meet = |marks: &mut Marks, deepest: f64| {
                 let moment = Moment { deepest, ..moment };
-                let found = moment.meet(marks, (number, p), [None; 2], [reach; 2]).0?;
+                let found = moment.meet(marks, &looking, reach)?;
                 let distance = found.closest.signed().0;
                 Some((distance, self.bodies[found.triangle as usize] as usize))
             };
-            let own = self.sample_bodies[number] as usize;
+            let own = self.sample_bodies[number as usize] as usize;
             let shallow = meet(&mut marks, DEEPEST).filter(|(distance, _)| *distance < thickness);
             if let Some((distance, other)) = shallow {
                 let [a, b] = [own as u32, other as u32];

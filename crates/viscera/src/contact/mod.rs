@@ -24,13 +24,14 @@ pub mod shape;
 pub(crate) mod skin;
 pub mod surface;
 mod touch;
+pub(crate) mod tree;
 
 pub use at_rest::Overlap;
 pub use distance::Distance;
 pub use distance_grid::{DistanceGrid, SolidError};
 pub use held::{Held, HeldMotion, Spring};
 pub use law::{Foundation, Friction};
-pub(crate) use meeting::{DEEPEST, Marks, Moment, turn_normals};
+pub(crate) use meeting::{DEEPEST, Looking, Marks, Moment, depths, turn_normals};
 pub use pair::Kept;
 pub(crate) use pair::{Bond, Pair, from_edges};
 pub use pressure::VertexPressures;

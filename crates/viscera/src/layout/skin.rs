@@ -1,7 +1,8 @@
 //! The surface on which tissue meets tissue, in the solver's numbering.
 
 use super::samples::{LaidSample, laid};
-use crate::contact::skin::Tie;
+use crate::contact::skin::{Tie, mean};
+use crate::contact::tree::Tree;
 use crate::contact::{Skin, TissueContact};
 use crate::model::{Model, Numbering};
 use crate::scalar::lanes::Point;
@@ -24,6 +25,8 @@ pub(crate) struct LaidSkin {
     pub stiffness: Vec<f64>,
     /// Ties in the order of the samples' places, with those.
     pub ties: Vec<(u32, u32)>,
+    /// Of the skin at rest.
+    pub tree: Tree,
 }
 
 impl LaidSkin {
@@ -56,7 +59,11 @@ impl LaidSkin {
         let tie = |(number, tie): (u32, &Tie)| (places[tie.sample as usize], number);
         let mut ties: Vec<(u32, u32)> = (0..).zip(&skin.ties).map(tie).collect();
         ties.sort_unstable();
+        let points = model.skin.points.iter();
+        let at: Vec<Vec3<f64>> =
+            points.map(|point| mean(point.vertices, point.weights, &model.places)).collect();
         Some(Self {
+            tree: Tree::new(&skin, &at),
             parts: skin.triangles.iter().map(part).collect(),
             stiffness: model.skin_stiffness(),
             contact: model.tissue_contact,
@@ -106,5 +113,6 @@ impl LaidSkin {
             + size_of_val(&self.parts[..])
             + size_of_val(&self.stiffness[..])
             + size_of_val(&self.ties[..])
+            + self.tree.bytes()
     }
 }

@@ -2,9 +2,10 @@
 
 use super::assemble::Assembly;
 use super::assemble_error::AssembleError;
-use crate::contact::search::{Closest, Grid, May, Query, closest};
+use crate::contact::search::{Closest, closest};
 use crate::contact::skin::{SkinPoint, Tie as SkinTie, mean};
-use crate::contact::{Overlap, Skin};
+use crate::contact::tree::{SkinNow, Tree};
+use crate::contact::{Overlap, Skin, turn_normals};
 use crate::scalar::Vec3;
 use crate::scene::{Scene, Tie};
 
@@ -85,10 +86,10 @@ impl Assembly {
                 skin.bodies[number] == other && borne.iter().all(|share| *share >= BORNE)
             })
             .collect();
-        let mut grid = Grid::new(skin.triangles.len());
-        grid.sort(&skin.triangles, &at, tie.distance);
-        grid.turn(&vec![Vec3::ZERO; skin.triangles.len()]);
-        let corners = |t: u32| skin.triangles[t as usize].map(|point| at[point as usize]);
+        let (mut tree, mut normals) = (Tree::new(skin, &at), Vec::new());
+        turn_normals(skin, &at, &mut normals);
+        let now = SkinNow { skin, at: &at, normals: &normals };
+        tree.refit(now, 0.0);
         let (mut ties, mut untied) = (Vec::new(), Vec::new());
         for (number, sample) in (0..).zip(&skin.samples) {
             let point = SkinPoint { vertices: sample.vertices, weights: sample.weights };
@@ -98,10 +99,8 @@ impl Assembly {
                 continue;
             }
             let p = mean(sample.vertices, sample.weights, positions);
-            let may = |t: u32, _: f64| if is_on[t as usize] { May::Now } else { May::Never };
-            let query = Query::around(p, tie.distance);
-            let (found, _) = grid.nearest(&query, corners, may, |_, _| true);
-            let Some(found) = found else {
+            let is_tied = |triangle: u32| is_on[triangle as usize];
+            let Some(found) = tree.nearest_to(now, p, tie.distance, is_tied) else {
                 untied.push(p);
                 continue;
             };
@@ -110,7 +109,7 @@ impl Assembly {
                 sample: number,
                 triangle: found.triangle,
                 weights,
-                rest: found.closest.in_triangle(corners(found.triangle)),
+                rest: found.closest.in_triangle(now.corners(found.triangle)),
                 stiffness: tie.stiffness * sample.area,
                 strength: tie.strength.map_or(f64::INFINITY, |strength| strength * sample.area),
                 group,
@@ -118,7 +117,7 @@ impl Assembly {
         }
         if ties.is_empty() {
             let on = (0..skin.triangles.len() as u32).filter(|&t| is_on[t as usize]);
-            let far = |triangle: u32, p: Vec3<f64>| closest(p, corners(triangle)).away.length();
+            let far = |triangle: u32, p: Vec3<f64>| closest(p, now.corners(triangle)).away.length();
             let all = on.flat_map(|triangle| untied.iter().map(move |&p| far(triangle, p)));
             let nearest = all.fold(f64::INFINITY, f64::min);
             return Err(AssembleError::TiesNothing {

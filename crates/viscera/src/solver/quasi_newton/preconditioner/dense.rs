@@ -1,5 +1,6 @@
 //! A small dense symmetric system: the coarsest level.
 
+use crate::scalar::Mat3;
 use crate::scalar::lanes::{Kernel, LANES, Lanes, run};
 use crate::solver::cpu::threads::Workers;
 
@@ -35,9 +36,27 @@ impl Dense {
         self.values.fill(0.0);
     }
 
+    /// An entry of the lower triangle.
+    #[cfg(test)]
+    pub fn entry(&self, row: usize, column: usize) -> f64 {
+        self.values[row * self.size + column]
+    }
+
     /// Adds to an entry of the lower triangle.
     pub fn add(&mut self, row: usize, column: usize, value: f64) {
         self.values[row * self.size + column] += value;
+    }
+
+    /// Adds the block of a row's node and of one that is no later to the lower triangle.
+    pub fn add_block(&mut self, [node, other]: [u32; 2], block: &Mat3<f64>) {
+        for (column, entries) in block.columns.iter().enumerate() {
+            for (row, entry) in entries.to_array().into_iter().enumerate() {
+                let (row, column) = (3 * node as usize + row, 3 * other as usize + column);
+                if column <= row {
+                    self.add(row, column, entry);
+                }
+            }
+        }
     }
 
     /// Cholesky's factor takes the place of the matrix. Directions that have no stiffness of their own get none of the

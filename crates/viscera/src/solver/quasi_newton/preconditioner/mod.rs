@@ -13,6 +13,7 @@
 //! Each connected part has its own. Vertices that are pinned have no place in any level.
 #![allow(unsafe_code)]
 
+mod added;
 mod dense;
 mod full;
 mod prolongation;
@@ -23,9 +24,8 @@ mod tests;
 
 use std::ops::Range;
 
-use crate::elements::kinds::{Energy, Kind};
 use crate::layout::lattice::Lattice;
-use crate::layout::{ElementSet, Layout, Moments, Part};
+use crate::layout::{Layout, Moments, Part};
 use crate::model::for_each_kind;
 use crate::scalar::lanes::Point;
 use crate::scalar::{Mat3, Real, Vec3};
@@ -39,6 +39,9 @@ use sums::{DiagonalSums, Grouped, Groups, LocalTets, On, Six, inverse, mapped, t
 
 /// Nodes of the coarsest level at most, where the levels can be made so: a dense system of three times as many.
 const MOST_COARSE: usize = 64;
+
+/// Nodes of a level that a vertex hangs on, at most.
+const PARENTS: usize = 8;
 
 /// Nodes, and groups, that a thread does at a time.
 const BLOCK_GRAIN: usize = 256;
@@ -70,6 +73,8 @@ struct OfPart<S> {
     vectors: Vec<Vec<Point<S>>>,
     /// The residual of the vertices.
     residual: Vec<Point<S>>,
+    /// Nodes of a level that a point hangs on, and its weights: room.
+    nodes: Vec<(u32, f64)>,
 }
 
 /// What the curvature of a step is made of.
@@ -176,6 +181,7 @@ impl<S: Real> OfPart<S> {
             dense: Dense::new(3 * if has_dense(count(levels)) { count(levels) } else { 0 }),
             vectors: (1..=levels).map(|level| vec![Point::default(); count(level)]).collect(),
             residual: vec![Point::default(); places.len()],
+            nodes: Vec::with_capacity(4 * PARENTS),
             lattice,
         }
     }
@@ -284,16 +290,14 @@ impl<S: Real> OfPart<S> {
         for_each_kind!(layout, set => self.add_elements(set, part, curvature, squared, free));
         let first = self.vertices.start as u32;
         constants.contacts.each_block(&step.contact(), number, curvature.x, |sample, block| {
-            let weights = &sample.weights;
-            let blocks = weights.map(|a| weights.map(|b| block * (squared * a * b)));
-            self.add_element(&sample.vertices.map(|v| v - first), &blocks, 0, free);
+            let vertices = sample.vertices.map(|v| v - first);
+            self.add_point((&vertices, &sample.weights), &(block * squared), free);
         });
         let places = step.contact().places(curvature.x);
         constants.contacts.pairs.each_block(places, |vertices, weights, block| {
             // The other side is another part's, or comes as well.
             if self.vertices.contains(&(vertices[0] as usize)) {
-                let blocks = weights.map(|a| weights.map(|b| block * (squared * a * b)));
-                self.add_element(&vertices.map(|v| v - first), &blocks, 0, free);
+                self.add_point((&vertices.map(|v| v - first), weights), &(block * squared), free);
             }
         });
         for blocks in &mut self.inverses {
@@ -351,64 +355,14 @@ impl<S: Real> OfPart<S> {
         }
         self.dense.clear();
         for &(nodes, mass) in &self.full.masses {
-            add_block(&mut self.dense, nodes, &(Mat3::IDENTITY * mass));
+            self.dense.add_block(nodes, &(Mat3::IDENTITY * mass));
         }
         let Self { full, dense, .. } = self;
         for (group, turn) in turns[..self.groups.len()].iter().enumerate() {
             full.each_block(workers, group, turn, squared, |nodes, block| {
-                add_block(dense, nodes, &block.cast());
+                dense.add_block(nodes, &block.cast());
             });
         }
-    }
-
-    /// Of elements of one kind.
-    fn add_elements<K: Kind<N, M>, const N: usize, const M: usize>(
-        &mut self,
-        set: &ElementSet<S, K, N, M>,
-        part: &Part,
-        curvature: &Curvature<'_, S>,
-        squared: f64,
-        free: &[bool],
-    ) {
-        for i in set.of_part(part) {
-            let x = set.places(i, curvature.x).map(|x| x.cast::<f64>());
-            let blocks = set.element::<f64>(i, &curvature.moments).blocks(&x);
-            let blocks = blocks.map(|row| row.map(|block| block * squared));
-            let vertices = set.points[i].map(|v| v - self.vertices.start as u32);
-            self.add_element(&vertices, &blocks, 0, free);
-        }
-    }
-
-    /// Adds an element's blocks [kg] to the levels from `first` on. Vertices that are not free count as nothing.
-    fn add_element<const N: usize>(
-        &mut self,
-        vertices: &[u32; N],
-        blocks: &[[Mat3<f64>; N]; N],
-        first: usize,
-        free: &[bool],
-    ) {
-        for level in first..self.inverses.len() {
-            let inverses = &mut self.inverses[level];
-            Self::on(&self.lattice, level).each_pair(
-                vertices,
-                free,
-                |[a, b], [node, other], weight| {
-                    if node == other {
-                        add_six(&mut inverses[node as usize], &blocks[a][b], weight);
-                    }
-                },
-            );
-        }
-        let coarsest = self.lattice.levels.len();
-        if self.dense.size() == 0 || coarsest < first {
-            return;
-        }
-        let dense = &mut self.dense;
-        Self::on(&self.lattice, coarsest).each_pair(vertices, free, |[a, b], nodes, weight| {
-            if nodes[1] <= nodes[0] {
-                add_block(dense, nodes, &(blocks[a][b] * weight));
-            }
-        });
     }
 
     fn apply(&mut self, workers: &Workers, r: &[Vec3<S>], z: &mut [Vec3<S>]) {
@@ -472,23 +426,5 @@ fn solve<S: Real>(dense: &mut Dense, workers: &Workers, values: &mut [Point<S>])
     dense.solve(workers);
     for (place, value) in dense.vector().as_chunks::<3>().0.iter().zip(values) {
         value.set_vec3(Vec3::from_f64(*place));
-    }
-}
-
-fn add_six<S: Real>(into: &mut Six<S>, block: &Mat3<f64>, weight: f64) {
-    let [x, y, z] = block.columns;
-    let entries = [x.x, y.y, z.z, z.y, z.x, y.x];
-    into.iter_mut().zip(entries).for_each(|(sum, entry)| *sum += S::from_f64(entry * weight));
-}
-
-/// Adds a block to the lower triangle.
-fn add_block(dense: &mut Dense, [node, other]: [u32; 2], block: &Mat3<f64>) {
-    for (column, entries) in block.columns.iter().enumerate() {
-        for (row, entry) in entries.to_array().into_iter().enumerate() {
-            let (row, column) = (3 * node as usize + row, 3 * other as usize + column);
-            if column <= row {
-                dense.add(row, column, entry);
-            }
-        }
     }
 }

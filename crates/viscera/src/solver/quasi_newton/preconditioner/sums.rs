@@ -467,3 +467,10 @@ pub fn times<S: Real>(a: &Six<S>, v: Vec3<S>) -> Vec3<S> {
         xz * v.x + yz * v.y + zz * v.z,
     )
 }
+
+/// Adds a multiple of a symmetric block.
+pub fn add_six<S: Real>(into: &mut Six<S>, block: &Mat3<f64>, weight: f64) {
+    let [x, y, z] = block.columns;
+    let entries = [x.x, y.y, z.z, z.y, z.x, y.x];
+    into.iter_mut().zip(entries).for_each(|(sum, entry)| *sum += S::from_f64(entry * weight));
+}

@@ -98,6 +98,50 @@ fn sums_are_those_of_what_is_free_now() {
     }
 }
 
+/// On every level a point that hangs on four vertices is what an element with all products of its weights is.
+#[test]
+fn a_point_is_an_element_of_its_weights() {
+    let tissue = Material::new(MaterialModel::StableNeoHookean, 1e4, 0.4, 1000.0).expect("legal");
+    let block = Block::new(vec3(0.1, 0.03, 0.03), [20, 6, 6]);
+    let mesh = Block { splitting: Splitting::Six, ..block }.mesh().expect("a bar");
+    let mut builder = ModelBuilder::new();
+    builder.add_body(&mesh, &tissue).expect("a body");
+    let layout = Layout::new(&builder.build::<f64>().expect("a model"), &SolverSettings::default());
+    let count = layout.vertex_count();
+    let free: Vec<bool> = (0..count).map(|v| v % 5 != 0).collect();
+    let new = || {
+        let mut part = OfPart::new(&layout, &layout.parts[0]);
+        part.rebuild(&layout, 0, &free);
+        part
+    };
+    let (mut point, mut element) = (new(), new());
+    assert!(point.dense.size() > 0 && point.levels.len() > 1);
+    let (y, z) = (vec3(2.0, 5.0, -0.2), vec3(-0.2, -0.2, 3.0));
+    let block = Mat3::from_columns(vec3(1.0, 2.0, -0.2), y, z);
+    let vertices = [1, 5, 2, count as u32 - 1];
+    for weights in [[0.4, 0.3, 0.2, 0.1], [1.5, 0.0, -0.5, 0.0]] {
+        point.add_point((&vertices, &weights), &block, &free);
+        let blocks = weights.map(|a| weights.map(|b| block * (a * b)));
+        element.add_element(&vertices, &blocks, 0, &free);
+    }
+    let close = |a: f64, b: f64| (a - b).abs() < 1e-14 * (1.0 + a.abs().max(b.abs()));
+    let mut seen = 0;
+    for (of_point, of_element) in point.inverses.iter().zip(&element.inverses) {
+        for (a, b) in of_point.as_flattened().iter().zip(of_element.as_flattened()) {
+            assert!(close(*a, *b), "{a} {b}");
+            seen += usize::from(*a != 0.0);
+        }
+    }
+    for row in 0..point.dense.size() {
+        for column in 0..=row {
+            let [a, b] = [&point, &element].map(|part| part.dense.entry(row, column));
+            assert!(close(a, b), "{row} {column}: {a} {b}");
+            seen += usize::from(a != 0.0);
+        }
+    }
+    assert!(seen > 200, "{seen}");
+}
+
 /// `P^T` is the transpose of `P`, and a node that is not free takes no part in either.
 #[test]
 fn a_restriction_is_the_transpose_of_its_prolongation() {

@@ -4,12 +4,16 @@
 //! reach = 2 dh + 2 w,   w: the way of the fastest vertex or tool in the step
 //! ```
 //!
-//! A sample that had nothing within a distance looks again when vertices have travelled so far that this may have changed. It
-//! decides when to look, and never what is found.
+//! Lists of what may be near are made anew when vertices have travelled so far, or turned so far, that they may have changed.
+//! They decide where to look, and never what is found.
 
 use super::{NOWHERE, Pairs, Places, Search};
-use crate::contact::search::{Found, Since};
-use crate::contact::{Bond, DEEPEST, Foundation, Kept, Moment, Pair, from_edges, turn_normals};
+use crate::contact::search::Found;
+use crate::contact::tree::{Since, SkinNow, Wanted};
+use crate::contact::{
+    Bond, DEEPEST, Foundation, Kept, Looking, Moment, Pair, TissueContact, depths, from_edges,
+    turn_normals,
+};
 use crate::layout::LaidSkin;
 use crate::scalar::{Real, Vec3};
 use crate::solver::step::contacts::ContactStep;
@@ -19,14 +23,19 @@ use crate::state::ContactState;
 /// In a step nothing is looked for further than so many thicknesses.
 const FARTHEST: f64 = 40.0;
 
-/// Samples look so many thicknesses further than the step asks for, so that they need not look again soon.
-const MARGIN: f64 = 3.0;
+/// Lists of what may be near are to last for so many looks in which as much moves and turns as in the last one,
+const LASTING: f64 = 2.0;
 
-/// Larger than what rounding makes of sums of ways [m].
-const ROUNDING: f64 = 1e-9;
+/// where that is no more than this many thicknesses and a chord of this length: what moves faster has lists of its own in
+/// every step.
+const MARGIN: f64 = 0.2;
+const TURN: f64 = 0.02;
 
-/// The grid is sorted anew when vertices have travelled this share of its queries' reach.
-const STALE: f64 = 0.25;
+/// They are made for a reach that is this much longer.
+const REACH: f64 = 1.25;
+
+/// And for ways that rounding may make longer [m].
+const MORE: f64 = 1e-8;
 
 impl Pairs {
     /// Finds the pairs of a step in which tools go no further than `tools` [m], and the groups that follow.
@@ -77,8 +86,6 @@ impl Pairs {
             self.gains[part] += now;
         }
         self.at_start.extend_from_slice(&self.pairs);
-        let until = self.search.until.iter().copied();
-        self.search.first_until = until.fold(f64::INFINITY, f64::min);
         for pair in &self.pairs {
             let parts =
                 [skin.samples[pair.sample as usize].part, skin.parts[pair.triangle as usize]];
@@ -106,13 +113,8 @@ impl Pairs {
         self.search.prepare(skin, places, reach);
         let mut closest = 0.0f64;
         for place in 0..skin.samples.len() {
-            if self.search.is_far(place, reach) {
-                continue;
-            }
             let sample = &skin.samples[place];
-            let own = (sample.number as usize, sample.place(places.x));
-            let found = self.search.look(skin, (place, own), None, reach);
-            let Some(found) = found else { continue };
+            let Some(found) = self.search.look(skin, places, place, None, reach) else { continue };
             let (distance, normal) = found.closest.signed();
             let mut way = Vec3::ZERO;
             for (&v, &weight) in sample.vertices.iter().zip(&sample.weights) {
@@ -140,28 +142,24 @@ impl Pairs {
         reach: f64,
     ) {
         let search = &mut self.search;
-        if kept.is_none() && search.is_far(place, reach) {
-            return;
-        }
+        let before = kept.map(|kept| kept.triangle);
+        let Some(found) = search.look(skin, places, place, before, reach) else { return };
+        let moment = search.moment(skin);
         let sample = &skin.samples[place];
         let number = sample.number as usize;
-        let own = (number, sample.place(places.x));
-        let before = kept.map(|kept| kept.triangle);
-        let Some(found) = search.look(skin, (place, own), before, reach) else { return };
-        let moment = search.moment(skin);
         let (_, normal) = found.closest.signed();
         let thickness = skin.contact.law.thickness;
         let weights = found.closest.weights;
         let bodies = [skin.skin.sample_bodies[number], skin.skin.bodies[found.triangle as usize]];
         let shift = skin.skin.shift(bodies);
         // What friction has kept is in terms of the triangle that it was kept on.
-        let slip =
-            kept.map_or(Vec3::ZERO, |kept| from_edges(kept.slip, moment.corners(kept.triangle)));
+        let slip = kept
+            .map_or(Vec3::ZERO, |kept| from_edges(kept.slip, moment.now.corners(kept.triangle)));
         let law = &skin.contact.law;
         let [own, other] = [sample.stiffness, skin.stiffness[found.triangle as usize]];
         // Each side is the foundation of the other, and has half of the area.
         let foundation = Foundation {
-            area: 0.5 * sample.area * moment.facing(number, &found),
+            area: 0.5 * sample.area * moment.facing(sample.number, &found),
             stiffness: law.stiffness * own * other / (own + other),
             thickness,
         };
@@ -230,7 +228,7 @@ impl Search {
             (*seen, *way) = (x, velocity.cast::<f64>() * step.dt);
         }
         self.travelled += moved.sqrt();
-        // The grid stays where it is.
+        // The boxes stay where they are.
         self.drift += shift;
         for pin in step.pins {
             let v = layout.numbering.of(pin.vertex);
@@ -241,45 +239,47 @@ impl Search {
     }
 
     /// Whether no sample meets anything within reach [m] because nothing has been deformed since it was looked for.
-    fn is_quiet(&self, reach: f64) -> bool {
-        self.travelled == self.prepared_at && self.first_until > 2.0 * self.travelled + reach
+    fn is_quiet(&mut self, reach: f64) -> bool {
+        self.travelled == self.prepared_at && self.has_lists(reach) && self.tree.is_clear()
     }
 
-    /// Whether a sample surely meets nothing within reach [m], after [`Search::prepare`].
-    fn is_far(&self, place: usize, reach: f64) -> bool {
-        self.until[place] > 2.0 * self.travelled + reach && self.until_turned[place] > self.turned
+    /// Whether lists are as good for queries that reach so far [m].
+    fn has_lists(&mut self, reach: f64) -> bool {
+        let moved = self.travelled - self.listed_at;
+        self.tree.has_lists(reach, Since { drift: self.drift, moved, turned: self.turned })
     }
 
     fn moment<'a>(&'a self, skin: &'a LaidSkin) -> Moment<'a> {
-        let Self { grid, at, normals, travelled, sorted_at, drift, .. } = self;
-        let (skin, contact) = (&skin.skin, &skin.contact);
-        // Rounding of sums of small ways hides no triangle.
-        let since = Since { drift: *drift, moved: travelled - sorted_at + ROUNDING };
-        Moment { skin, at, normals, grid, since, contact, deepest: DEEPEST }
+        let Self { tree, at, normals, .. } = self;
+        let now = SkinNow { skin: &skin.skin, at, normals };
+        Moment { now, tree, contact: &skin.contact, deepest: DEEPEST }
     }
 
-    /// What a sample meets within reach [m], see [`Moment::meet`]; remembers how long it will not meet anything else.
-    fn look(
+    /// What a sample meets within reach [m], see [`Moment::meet`], after [`Search::prepare`].
+    fn look<S: Real>(
         &mut self,
         skin: &LaidSkin,
-        (place, sample): (usize, (usize, Vec3<f64>)),
+        places: Places<'_, S>,
+        place: usize,
         kept: Option<u32>,
         reach: f64,
     ) -> Option<Found> {
-        let farther = reach + MARGIN * skin.contact.law.thickness;
-        let mut marks = std::mem::take(&mut self.marks);
-        let moment = self.moment(skin);
+        let sample = &skin.samples[place];
+        let leaf = self.tree.leaf_of(sample.number);
+        if kept.is_none() && self.tree.meets_nothing(leaf) {
+            return None;
+        }
         let near = Some(self.near[place]).filter(|near| *near != NOWHERE);
-        let (found, clearance) = moment.meet(&mut marks, sample, [kept, near], [reach, farther]);
-        let turned = self.turned + moment.free_turn(sample.0);
+        let looking =
+            Looking { sample: sample.number, p: sample.place(places.x), leaf, kept, near };
+        let mut marks = std::mem::take(&mut self.marks);
+        let found = self.moment(skin).meet(&mut marks, &looking, reach);
         self.marks = marks;
         self.near[place] = found.as_ref().map_or(NOWHERE, |found| found.triangle);
-        self.until[place] = clearance + 2.0 * self.travelled;
-        self.until_turned[place] = turned;
         found
     }
 
-    /// Places of the skin's points, and a grid that is not too old.
+    /// Places of the skin's points and normals, and lists that are not too old.
     fn prepare<S: Real>(&mut self, skin: &LaidSkin, places: Places<'_, S>, reach: f64) {
         for (at, point) in self.at.iter_mut().zip(&skin.skin.points) {
             let all = point.vertices.iter().zip(&point.weights);
@@ -287,18 +287,31 @@ impl Search {
                 sum + places.x[v as usize].vec3().cast::<f64>() * weight
             });
         }
+        let moved = self.travelled - self.prepared_at;
         self.prepared_at = self.travelled;
-        self.turned += turn_normals(&skin.skin, &self.at, &mut self.normals);
+        let turned = turn_normals(&skin.skin, &self.at, &mut self.normals);
+        self.turned += turned;
         // The first look comes from nowhere, and numbers that have grown without bound tell nothing.
-        let is_new = self.sorted_at < 0.0 || !self.travelled.is_finite();
+        let is_new = self.listed_at < 0.0 || !self.travelled.is_finite();
         if is_new {
-            (self.travelled, self.prepared_at, self.turned) = (0.0, 0.0, 0.0);
-            self.until.fill(0.0);
+            (self.travelled, self.prepared_at) = (0.0, 0.0);
         }
-        if is_new || self.travelled - self.sorted_at > STALE * reach {
-            self.grid.sort(&skin.skin.triangles, &self.at, reach);
-            (self.sorted_at, self.drift) = (self.travelled, Vec3::ZERO);
+        if is_new || !self.has_lists(reach) {
+            let TissueContact { itself, bodies, law } = skin.contact;
+            let now = SkinNow { skin: &skin.skin, at: &self.at, normals: &self.normals };
+            let (margin, turn) = (2.0 * LASTING * moved, LASTING * turned);
+            let lasts = !is_new && margin <= MARGIN * law.thickness && turn <= TURN;
+            let [margin, turn] = if lasts { [margin, turn] } else { [0.0; 2] };
+            let wanted = Wanted {
+                itself,
+                bodies,
+                reach: REACH * reach,
+                depths: depths(&skin.contact, DEEPEST),
+                margin: margin + MORE,
+                turn,
+            };
+            self.tree.list(now, wanted);
+            (self.listed_at, self.drift, self.turned) = (self.travelled, Vec3::ZERO, 0.0);
         }
-        self.grid.turn(&self.normals);
     }
 }

@@ -11,7 +11,7 @@
 mod find;
 
 use super::{Bound, Sums};
-use crate::contact::search::Grid;
+use crate::contact::tree::Tree;
 use crate::contact::{Bond, Felt, Kept, Marks, Pair};
 use crate::layout::{LaidSample, LaidSkin, Layout};
 use crate::scalar::lanes::Point;
@@ -37,29 +37,23 @@ pub struct Pairs {
 /// What finding pairs keeps, none of which changes what is found.
 #[derive(Clone, Debug, Default)]
 struct Search {
-    grid: Grid,
+    tree: Tree,
     marks: Marks,
     /// Where vertices were when it looked last [m].
     seen: Vec<Vec3<f64>>,
     /// How far the vertex that moves most beside the mean of all has moved since the beginning, from look to look [m].
     travelled: f64,
-    /// The same when the grid was sorted, below zero before; and when normals were found.
-    sorted_at: f64,
+    /// The same when lists were made, and when normals were found; below zero before.
+    listed_at: f64,
     prepared_at: f64,
-    /// How far all of it has moved since then [m].
+    /// How far all of it has moved since lists were made [m], and by how long a chord the normal that turned most.
     drift: Vec3<f64>,
+    turned: f64,
     /// Places of the skin's points [m], and normals of its triangles.
     at: Vec<Vec3<f64>>,
     normals: Vec<Vec3<f64>>,
     /// Where vertices go in the step [m].
     ways: Vec<Vec3<f64>>,
-    /// How far the normal that turns most has turned since the beginning, from look to look [rad]; and how far it may until a
-    /// sample may meet others.
-    turned: f64,
-    until_turned: Vec<f64>,
-    /// How far vertices may travel from the beginning on until a sample may meet something within reach [m], and the least.
-    until: Vec<f64>,
-    first_until: f64,
     /// The triangle that each sample met when it looked last, or [`NOWHERE`].
     near: Vec<u32>,
 }
@@ -88,20 +82,17 @@ impl Pairs {
             presses: vec![false; layout.part_count()],
             gains: vec![0.0; layout.part_count()],
             search: Search {
-                grid: Grid::new(skin.skin.triangles.len()),
+                tree: skin.tree.clone(),
                 marks: Marks::new(vertices),
                 seen: vec![Vec3::ZERO; vertices],
                 travelled: 0.0,
-                sorted_at: -1.0,
+                listed_at: -1.0,
                 prepared_at: -1.0,
                 drift: Vec3::ZERO,
-                normals: Vec::with_capacity(skin.skin.triangles.len()),
-                at: vec![Vec3::ZERO; skin.skin.points.len()],
-                ways: vec![Vec3::ZERO; vertices],
                 turned: 0.0,
-                until_turned: vec![0.0; samples],
-                until: vec![0.0; samples],
-                first_until: 0.0,
+                at: vec![Vec3::ZERO; skin.skin.points.len()],
+                normals: Vec::with_capacity(skin.skin.triangles.len()),
+                ways: vec![Vec3::ZERO; vertices],
                 near: vec![NOWHERE; samples],
             },
         }
@@ -109,15 +100,12 @@ impl Pairs {
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        let Search { grid, marks, seen, at, ways, normals, until, until_turned, near, .. } =
-            &self.search;
+        let Search { tree, marks, seen, at, ways, normals, near, .. } = &self.search;
         (self.pairs.capacity() + self.at_start.capacity()) * size_of::<Pair>()
             + size_of_val(&self.first[..])
-            + grid.bytes()
+            + tree.bytes()
             + marks.bytes()
             + [seen, at, ways, normals].map(|all| size_of_val(&all[..])).iter().sum::<usize>()
-            + size_of_val(&until[..])
-            + size_of_val(&until_turned[..])
             + size_of_val(&near[..])
     }
 
