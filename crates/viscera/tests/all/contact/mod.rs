@@ -86,6 +86,16 @@ pub fn method(name: &str) -> (SolverSettings, u32) {
 
 pub const METHODS: [&str; 3] = ["xpbd", "quasi_newton", "explicit"];
 
+/// The methods that a long test tries: these, or those that `VISCERA_METHODS=explicit,xpbd` names.
+pub fn methods_or(usual: &[&'static str]) -> Vec<&'static str> {
+    let Ok(asked) = std::env::var("VISCERA_METHODS") else { return usual.to_vec() };
+    let known = |name: &str| METHODS.into_iter().find(|method| *method == name.trim());
+    asked
+        .split(',')
+        .map(|name| known(name).unwrap_or_else(|| panic!("no method `{name}`")))
+        .collect()
+}
+
 /// A running solver with everything it needs.
 pub struct Scene<S> {
     pub model: Model<S>,
