@@ -206,6 +206,9 @@ impl Summary {
             for tool in &last.report.tools {
                 text.push_str(&format!("{tool:.4}\n"));
             }
+            for tie in &last.report.ties {
+                text.push_str(&format!("{tie:.4}\n"));
+            }
             if let Some(hold) = &self.hold {
                 text.push_str(&format!("{hold}\n"));
             }
@@ -331,6 +334,7 @@ mod tests {
             patches: Vec::new(),
             divided: 1,
             tools: Vec::new(),
+            ties: Vec::new(),
         };
         FrameLine { report, wall_seconds: 0.5 }
     }

@@ -76,6 +76,23 @@ pub struct Tie {
     pub group: u32,
 }
 
+impl Tie {
+    /// The triangle's point [m], where its corners are at these places.
+    pub fn point(&self, corners: [Vec3<f64>; 3]) -> Vec3<f64> {
+        corners.iter().zip(self.weights).fold(Vec3::ZERO, |sum, (x, weight)| sum + *x * weight)
+    }
+
+    /// The triangle's normal, and from that point to the sample without force [m].
+    pub fn unstretched(&self, corners: [Vec3<f64>; 3]) -> [Vec3<f64>; 2] {
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a);
+        let normal = normal * (1.0 / normal.length());
+        let normal = if normal.is_finite() { normal } else { Vec3::ZERO };
+        let [on_b, on_c, along] = self.rest;
+        [normal, (b - a) * on_b + (c - a) * on_c + normal * along]
+    }
+}
+
 /// What is near what on a body, by vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Topology {

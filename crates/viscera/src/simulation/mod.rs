@@ -28,6 +28,7 @@ mod sent;
 mod shadowed;
 mod skin;
 mod solids;
+mod ties;
 mod tool_forces;
 mod touchable;
 
@@ -51,6 +52,7 @@ pub use report::{FrameReport, PatchForce, PatchKind};
 pub use rest::{RestReport, Standing};
 pub use saved::ResumeError;
 pub(crate) use saved::{SavedDifference, difference_of_saved, is_saved};
+pub use ties::TieForce;
 
 use crate::layout::Layout;
 use crate::measure::{
@@ -424,6 +426,7 @@ impl<S: Real> Simulation<S> {
             patches: self.patch_forces(),
             divided: self.divided,
             tools: self.tool_forces(),
+            ties: self.tie_forces(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The numbers of a frame.
 
 use super::instruments::ToolForce;
+use super::ties::TieForce;
 use crate::measure::{DeformationSummary, Energies};
 use std::fmt;
 
@@ -73,4 +74,6 @@ pub struct FrameReport {
     pub divided: u32,
     /// Forces on the scene's tools.
     pub tools: Vec<ToolForce>,
+    /// What the scene's ties hold.
+    pub ties: Vec<TieForce>,
 }

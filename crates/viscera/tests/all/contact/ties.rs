@@ -1,5 +1,6 @@
 //! Ties between surfaces, and what a scene may not ask of bodies that meet.
 
+use viscera::scalar::Vec3;
 use viscera::scene::Scene;
 use viscera::simulation::{Assembly, Simulation};
 
@@ -100,6 +101,34 @@ fn ties_tear_at_their_strength() {
         // On the plate's lower face of 4 cm^2.
         let expected = if tears { 0.0 } else { 4e-4 * 4e3 };
         assert!((force - expected).abs() < 1e-6, "{strength}: {force} of {expected}");
+    }
+}
+
+/// Held as a whole on both sides, ties pull with `k w A` on the plate, and a name and counts stand beside it.
+#[test]
+fn a_report_tells_what_ties_hold_and_how_many_are_torn() {
+    let held = TIED
+        .replace("point = [0, 0, \"13.5 mm\"]", "point = [0, 0, \"9 mm\"]")
+        .replace("point = [0, 0, 0], normal", "point = [0, 0, \"8.5 mm\"], normal");
+    for (strength, torn) in [("4.02 kPa", false), ("3.98 kPa", true)] {
+        let settings = [("tie.bed.strength", strength)];
+        let (scene, assembly) = assembled(&held, &settings).expect("a scene");
+        let mut simulation = Simulation::<f64>::new(scene, assembly).expect("a simulation");
+        let at_rest = Vec3::<f64>::from_f64(simulation.tie_forces()[0].force).length();
+        assert!(at_rest < 1e-12, "{at_rest} N at rest");
+        (0..50).for_each(|_| simulation.advance_frame().expect("a frame"));
+        let report = simulation.report();
+        let tie = &report.ties[0];
+        assert_eq!((tie.name.as_str(), tie.points), ("bed", simulation.state().contact.torn.len()));
+        assert_eq!(tie.torn, if torn { tie.points } else { 0 });
+        let expected = if torn { 0.0 } else { -4e-4 * 4e3 };
+        assert!((tie.force[2] - expected).abs() < 1e-6, "{strength}: {tie}");
+        let line = format!("{tie:.1}");
+        let force = if torn { "0.0" } else { "1.6" };
+        assert_eq!(
+            line,
+            format!("bed: {} of {} points torn, force {force} N", tie.torn, tie.points)
+        );
     }
 }
 

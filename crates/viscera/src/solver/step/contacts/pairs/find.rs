@@ -187,13 +187,7 @@ fn tied<S: Real>(skin: &LaidSkin, places: Places<'_, S>, place: usize, number: u
         weights[k] = 1.0;
         skin.place(tie.triangle, &weights, places.x)
     };
-    let corners = [0, 1, 2].map(corner);
-    let [a, b, c] = corners;
-    let normal = (b - a).cross(c - a);
-    let normal = normal * (1.0 / normal.length());
-    let normal = if normal.is_finite() { normal } else { Vec3::ZERO };
-    let [on_b, on_c, along] = tie.rest;
-    let rest = from_edges([on_b, on_c], corners) + normal * along;
+    let [normal, rest] = tie.unstretched([0, 1, 2].map(corner));
     Pair {
         sample: place as u32,
         triangle: tie.triangle,
