@@ -17,3 +17,4 @@ mod hold;
 mod replay;
 mod run;
 mod saved;
+mod ties;
