@@ -3,6 +3,8 @@
 mod common;
 #[path = "../../../viscera/tests/all/common/data.rs"]
 mod data;
+#[path = "../../../viscera/tests/all/common/tied.rs"]
+mod tied;
 
 mod anatomy;
 mod bad_input;

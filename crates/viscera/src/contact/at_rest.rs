@@ -19,8 +19,8 @@ pub struct Overlap {
 
 impl Skin {
     /// After all bodies were added: what is near what on tetrahedra of vertices at these places [m] at rest, `bodies` being the
-    /// ranges of their tetrahedra, and the samples that are closer to others than the thickness of contact. Returns the least distance [m] between two bodies' surfaces,
-    /// below zero where they overlap, with the sample and the triangle; nothing where it is more than the thickness.
+    /// ranges of their tetrahedra, and the samples that are closer to others than the thickness of contact. Returns the least
+    /// distance [m] between two bodies' surfaces, below zero where they overlap; nothing where it is more than the thickness.
     pub fn finish(
         &mut self,
         tets: &[[u32; 4]],

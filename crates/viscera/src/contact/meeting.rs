@@ -186,6 +186,6 @@ fn facing(outward: Vec3<f64>, direction: Vec3<f64>) -> f64 {
     let cosine = -outward.dot(direction);
     let [none, whole] = FACING;
     let share = ((cosine - none) / (whole - none)).clamp(0.0, 1.0);
-    // Nothing also where that is no number.
+    // Zero also for a NaN.
     if share > 0.0 { share * share * (3.0 - 2.0 * share) } else { 0.0 }
 }

@@ -23,7 +23,8 @@ pub(super) struct Cone {
 }
 
 impl Cone {
-    /// Around directions of length 1 with what each may turn; those that are no numbers meet nothing, and do not count.
+    /// Around directions of length 1, each with the chord by which it may turn. Directions that are not finite do not count:
+    /// what has one meets nothing.
     pub fn around(directions: impl Iterator<Item = (Vec3<f64>, f64)> + Clone) -> Self {
         let all = directions.filter(|(direction, _)| direction.is_finite());
         let sum = all.clone().fold(Vec3::ZERO, |sum, (direction, _)| sum + direction);
@@ -109,7 +110,7 @@ impl Patch {
     }
 
     /// Whether samples of this patch are behind all of another that is no farther than `reach` [m], or turned away from it,
-    /// whatever moves by no more than `slack` [m] towards each other. Not where places are no numbers.
+    /// whatever moves by no more than `slack` [m] towards each other. False where a place is NaN.
     pub fn is_averted(&self, other: &Self, reach: f64, slack: f64) -> bool {
         let between = self.span.middle() - other.span.middle();
         let half = self.span.half() + other.span.half();

@@ -46,7 +46,7 @@ struct Node {
     count: u32,
     /// The node behind all that are below it.
     end: u32,
-    /// Which leaf it is, or [`NONE`].
+    /// The number of the leaf, or [`NONE`].
     leaf: u32,
     /// The body of its triangles, or [`NONE`] where there are several.
     body: u32,
@@ -96,7 +96,7 @@ pub struct Wanted {
     pub bodies: bool,
     /// Queries reach so far [m].
     pub reach: f64,
-    /// Samples meet nothing behind which they are farther than this [m]: of their own body, of another.
+    /// No sample meets a triangle that it is deeper behind than this [m]: of its own body, of another.
     pub depths: [f64; 2],
     /// Lists are good while points move by no more than half of this [m],
     pub margin: f64,
@@ -304,7 +304,7 @@ impl Wanted {
         let gap = other.patch.span.gap(&samples.span);
         let far = self.reach + self.margin;
         let deep = depth(self.depths, body, other.body) + self.margin;
-        // Not the other way round: places that are no numbers hide nothing.
+        // Comparisons with a NaN are false: such a place leaves nothing out.
         gap > far * far
             || other.patch.cone.is_beside(&samples.cone)
             || (gap > deep * deep && samples.is_averted(&other.patch, self.reach, self.margin))

@@ -45,7 +45,7 @@ impl<M: FnMut(u32) -> bool, U: FnMut(u32, &Closest) -> bool> Looking<'_, M, U> {
     /// Takes a triangle that is nearer than the best.
     fn look(&mut self, triangle: u32) {
         let Self { now, query, .. } = *self;
-        // False also where it is no number.
+        // False also for a NaN.
         let is_turned = query.outward.dot(now.normals[triangle as usize]) < BESIDE;
         if !is_turned || !(self.may)(triangle) {
             return;
@@ -55,7 +55,7 @@ impl<M: FnMut(u32) -> bool, U: FnMut(u32, &Closest) -> bool> Looking<'_, M, U> {
         let is_nearer = self.best.is_none_or(|found| {
             squared < self.least || (squared == self.least && triangle < found.triangle)
         });
-        // Nothing where it is no number, as beside triangles without area.
+        // False also for a NaN, as beside a triangle without area.
         if squared <= self.least && is_nearer && (self.suits)(triangle, &near) {
             self.least = squared;
             self.best = Some(Found { triangle, closest: near });
@@ -80,7 +80,7 @@ impl<M: FnMut(u32) -> bool, U: FnMut(u32, &Closest) -> bool> Looking<'_, M, U> {
         }
         for &triangle in &tree.order[node.range()] {
             let normal = now.normals[triangle as usize];
-            // False also where it is no number.
+            // False also for a NaN.
             let is_turned = query.outward.dot(normal) < BESIDE;
             if !is_turned {
                 continue;

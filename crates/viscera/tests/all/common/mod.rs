@@ -5,6 +5,7 @@ pub mod data;
 pub mod device;
 pub mod potential;
 pub mod tets;
+pub mod tied;
 
 use viscera::material::{Material, MaterialModel};
 use viscera::mesh::TetMesh;

@@ -31,7 +31,7 @@ const LASTING: f64 = 2.0;
 const MARGIN: f64 = 0.2;
 const TURN: f64 = 0.02;
 
-/// They are made for a reach that is this much longer.
+/// Those that last are made for a reach that is this much longer.
 const REACH: f64 = 1.25;
 
 /// And for ways that rounding may make longer [m].
@@ -295,11 +295,12 @@ impl Search {
             let now = SkinNow { skin: &skin.skin, at: &self.at, normals: &self.normals };
             let (margin, turn) = (2.0 * LASTING * moved, LASTING * turned);
             let lasts = !is_new && margin <= MARGIN * law.thickness && turn <= TURN;
-            let [margin, turn] = if lasts { [margin, turn] } else { [0.0; 2] };
+            let (margin, turn, longer) =
+                if lasts { (margin, turn, REACH) } else { (0.0, 0.0, 1.0) };
             let wanted = Wanted {
                 itself,
                 bodies,
-                reach: REACH * reach,
+                reach: longer * reach,
                 depths: depths(&skin.contact, DEEPEST),
                 margin: margin + MORE,
                 turn,
