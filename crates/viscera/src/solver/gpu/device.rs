@@ -241,13 +241,15 @@ impl Device {
         GpuError::Lost { name: self.name.clone(), reason: reason.trim_end_matches('.').to_owned() }
     }
 
-    /// Memory that ran out and faults of the driver end the device, not the program. What is left is
-    /// misuse by this library, which should be heard of.
+    /// Memory that ran out and faults of the driver end the device, not the program; a picture that the browser could
+    /// not take costs that picture. What is left is misuse by this library, which should be heard of.
     fn take_errors(&self) {
         let told = Arc::clone(&self.lost);
         self.device.on_uncaptured_error(Arc::new(move |error| {
             let Ok(mut lost) = told.lock() else { return };
             match error {
+                wgpu::Error::Validation { ref description, .. } if is_browsers_own(description) => {
+                }
                 wgpu::Error::Validation { .. } if lost.is_none() => {
                     drop(lost);
                     panic!("{error}");
@@ -260,5 +262,25 @@ impl Device {
                 }
             }
         }));
+    }
+}
+
+/// Whether an error comes from a copy that only browsers make, of a canvas to their own picture of the page. This
+/// library asks for none; where such a picture is gone, the next one is shown.
+fn is_browsers_own(description: &str) -> bool {
+    description.contains("validating CopyTextureForBrowser")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_browsers_own;
+
+    #[test]
+    fn a_picture_that_the_browser_lost_is_no_misuse() {
+        let lost = "[Invalid Texture] is invalid due to a previous error.\n - While validating CopyTextureForBrowser \
+                    from [Texture (unlabeled 1088x796 px, TextureFormat::BGRA8Unorm)] to [Invalid Texture]";
+        let ours = "[Invalid Buffer] is invalid due to a previous error.\n - While encoding [CommandEncoder]";
+        assert!(is_browsers_own(lost));
+        assert!(!is_browsers_own(ours));
     }
 }
