@@ -1,9 +1,10 @@
-//! Project chores: `cargo xtask test`, `cargo xtask setup`, `cargo xtask web`, `cargo xtask peers`.
+//! Project chores: `cargo xtask test`, `cargo xtask setup`, `cargo xtask web`, `cargo xtask wheel`, `cargo xtask peers`.
 
 mod peers;
 mod setup;
 mod test;
 mod web;
+mod wheel;
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
@@ -20,6 +21,7 @@ Commands:
   setup         Install what the tests lack: a software graphics driver, rustfmt, clippy
   web           Build the page, the same simulation in a browser, as a folder of static files
   web --serve   And serve it on this machine
+  wheel         Build the Python package; with --test also try it
   peers         Compare with other simulators and write docs/peers.md; `cargo xtask peers --help`
   help          Print this text
 
@@ -40,6 +42,8 @@ fn main() -> ExitCode {
         ["setup", options @ ..] => return setup::setup(options),
         ["web", ..] if wants_help => println!("{}", web::HELP),
         ["web", options @ ..] => return web::web(options),
+        ["wheel", ..] if wants_help => println!("{}", wheel::HELP),
+        ["wheel", options @ ..] => return wheel::wheel(options),
         _ if wants_help => println!("{HELP}"),
         [other, ..] => {
             eprintln!("unknown command `{other}`; `cargo xtask help` lists what there is");

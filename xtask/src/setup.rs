@@ -5,7 +5,7 @@ use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-use crate::cargo;
+use crate::{cargo, wheel};
 
 /// What `cargo xtask setup --help` prints.
 pub const HELP: &str = "\
@@ -17,7 +17,8 @@ Usage: cargo xtask setup [--all]
                          graphics processor. Without one the tests of the GPU backend are left out
   rustfmt, clippy        by rustup
   --all                  what `cargo xtask test --all` needs as well: a second, stricter software driver,
-                         which Debian's chromium brings along, and that browser for the page
+                         which Debian's chromium brings along, and that browser for the page; Python from 3.10 on
+                         for the Python package
 
 Packages come by apt-get, as root or by sudo; other systems are told what to install.";
 
@@ -66,6 +67,12 @@ const SECOND_DRIVER: Need = Need {
     source: Source::Packages(&[SECOND_PACKAGE]),
 };
 
+const PYTHON: Need = Need {
+    name: "Python from 3.10 on, with venv",
+    is_there: wheel::has_python,
+    source: Source::Packages(&["python3", "python3-venv"]),
+};
+
 /// `cargo xtask setup`.
 pub fn setup(options: &[&str]) -> ExitCode {
     let all = match options {
@@ -106,7 +113,7 @@ pub fn lacking(all: bool) -> Vec<String> {
 }
 
 fn needs(all: bool) -> impl Iterator<Item = &'static Need> {
-    const ALL: &[Need] = &[SECOND_DRIVER];
+    const ALL: &[Need] = &[SECOND_DRIVER, PYTHON];
     // Elsewhere drivers come with the system.
     let linux = cfg!(target_os = "linux");
     let second = if all { ALL } else { &[] };

@@ -3,7 +3,7 @@
 //!
 //! Describe what is there in a [`Drawing`], frame it once with a [`Camera`] (over all frames of an
 //! animation), then [`Drawing::draw`] each frame into an [`Image`]. [`write_png`] makes a file of
-//! it; an [`Animation`] takes frames one by one and makes a GIF.
+//! it; an [`Animation`] takes frames one by one and makes a GIF. A [`Subject`] does all that for a running simulation.
 //!
 //! ```
 //! use viscera::mesh::SurfaceMesh;
@@ -41,6 +41,7 @@ mod normals;
 mod overlay;
 mod raster;
 mod shade;
+mod shots;
 
 pub use animation::Animation;
 pub use camera::{Bounds, Camera, HALF_OPENING, STEEPEST, ViewDirection};
@@ -51,3 +52,4 @@ pub use facets::Facets;
 pub use image::{Image, ImageSize, write_png};
 pub use marks::{Arrow, Background, Markers, Paint};
 pub use overlay::{ColorScale, Overlay};
+pub use shots::{Look, Seen, Shot, Subject};

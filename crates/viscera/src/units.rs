@@ -189,6 +189,14 @@ impl Dimension {
         UNITS.iter().filter(move |unit| unit.dimension == self).map(|unit| unit.symbol)
     }
 
+    /// The symbol of its SI unit, of which quantities are read to the last digit; empty for pure numbers.
+    pub fn si_symbol(self) -> &'static str {
+        let is_one = |unit: &&Unit| unit.dimension == self && unit.numerator == unit.denominator;
+        let units = || UNITS.iter().filter(is_one);
+        let found = units().find(|unit| unit.printed).or_else(|| units().next());
+        found.map_or("", |unit| unit.symbol)
+    }
+
     /// Reads a quantity of this dimension; the result is in SI units.
     ///
     /// ```
@@ -273,11 +281,14 @@ pub fn format_number(value: f64) -> String {
 /// At most 40 characters of something a person wrote, for an error message.
 pub(crate) fn shorten(text: &str) -> String {
     const LIMIT: usize = 40;
-    if text.chars().count() <= LIMIT {
-        text.to_owned()
-    } else {
-        text.chars().take(LIMIT).chain("...".chars()).collect()
+    // A message is one line.
+    let plain = |letter: char| if letter.is_control() { ' ' } else { letter };
+    let mut letters = text.chars().map(plain);
+    let mut short: String = letters.by_ref().take(LIMIT).collect();
+    if letters.next().is_some() {
+        short.push_str("...");
     }
+    short
 }
 
 /// The number at the front of a text (`12`, `-1.5e3`, `1/60`) and what follows it.

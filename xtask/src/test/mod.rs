@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
-use crate::{cargo, setup, web};
+use crate::{cargo, setup, web, wheel};
 use programs::{Outcome, Program, Selection};
 
 /// What `cargo xtask test --help` prints.
@@ -26,6 +26,7 @@ and with --all, which is what decides whether a change is merged, everything:
   documentation   cargo doc, warnings are errors; the examples in it
   second driver   the portable tests of the GPU backend once more, on a stricter software driver
   main job        the release build of `viscera` runs a scene for two frames and draws it
+  Python          the package is built as a wheel, installed into a fresh environment and tried
   page            it is built and tried in a browser
 
 Usage: cargo xtask test [OPTIONS]
@@ -155,6 +156,7 @@ fn everything(run: &mut Run) -> Result<(), Failure> {
     documentation(run)?;
     second_driver(run)?;
     main_job(run)?;
+    python(run)?;
     println!("\n== page: cargo xtask web");
     let started = Instant::now();
     let built = web::build();
@@ -249,6 +251,21 @@ fn main_job(run: &mut Run) -> Result<(), Failure> {
     // Nothing may be there; then there is nothing to tidy up.
     let _ = std::fs::remove_dir_all(&output);
     result
+}
+
+/// The Python package, in a fresh environment. The main job has built the program that it is compared with.
+fn python(run: &mut Run) -> Result<(), Failure> {
+    println!("\n== Python package: cargo xtask wheel --test");
+    let started = Instant::now();
+    let built = wheel::build("python3", false);
+    run.times.push(("building the wheel", started.elapsed()));
+    let started = Instant::now();
+    let tried = built.and_then(|file| wheel::try_out("python3", &file));
+    run.times.push(("tests of the wheel", started.elapsed()));
+    let counts = tried.map_err(|next_move| Failure("Python package", next_move))?;
+    run.outcome.passed += counts.passed;
+    run.outcome.slow += counts.skipped;
+    Ok(())
 }
 
 /// The main job has left its picture.

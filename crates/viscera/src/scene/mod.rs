@@ -39,6 +39,7 @@ mod instrument;
 mod instrument_path;
 mod instrument_tables;
 mod keys;
+mod lookup;
 mod motion;
 mod moved;
 mod selector;

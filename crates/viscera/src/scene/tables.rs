@@ -433,6 +433,10 @@ impl Kind for Gravity {
         }
     }
 
+    fn unit(&self) -> &'static str {
+        Dimension::Acceleration.si_symbol()
+    }
+
     fn type_text(&self) -> String {
         "an acceleration downwards such as \"9.81 m/s^2\", or a list of three".to_owned()
     }

@@ -28,6 +28,10 @@ impl<K: Kind<Value: Copy + Default>, const COUNT: usize> Kind for Several<K, COU
         Ok(values)
     }
 
+    fn unit(&self) -> &'static str {
+        self.0.unit()
+    }
+
     fn type_text(&self) -> String {
         format!("a list of {COUNT}, each {}", self.0.type_text())
     }
@@ -58,6 +62,10 @@ impl<K: Kind> Kind for Each<K> {
         items.iter().map(|item| self.0.read(key, item)).collect()
     }
 
+    fn unit(&self) -> &'static str {
+        self.0.unit()
+    }
+
     fn type_text(&self) -> String {
         format!("a list, each {}", self.0.type_text())
     }
@@ -85,6 +93,10 @@ impl<K: Kind> Kind for Optional<K> {
 
     fn read(&self, key: &str, node: &Node) -> Result<Self::Value, SettingError> {
         self.0.read(key, node).map(Some)
+    }
+
+    fn unit(&self) -> &'static str {
+        self.0.unit()
     }
 
     fn type_text(&self) -> String {
@@ -130,6 +142,10 @@ impl<K: Kind> Kind for WithPlace<K> {
 
     fn read(&self, key: &str, node: &Node) -> Result<Self::Value, SettingError> {
         Ok(Placed { place: node.place.clone(), value: self.0.read(key, node)? })
+    }
+
+    fn unit(&self) -> &'static str {
+        self.0.unit()
     }
 
     fn type_text(&self) -> String {

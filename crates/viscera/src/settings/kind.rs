@@ -25,6 +25,10 @@ pub(crate) trait Kind {
     fn choices_text(&self) -> String {
         String::new()
     }
+    /// The SI unit of its numbers; empty where they have none.
+    fn unit(&self) -> &'static str {
+        ""
+    }
     /// Adds the descriptions of the tables below.
     fn describe_tables(&self, _path: &str, _below: &mut Vec<TableDescription>) {}
 }
@@ -151,6 +155,10 @@ impl Kind for Quantity {
         Ok(value)
     }
 
+    fn unit(&self) -> &'static str {
+        self.dimension.si_symbol()
+    }
+
     fn type_text(&self) -> String {
         match self.dimension {
             Dimension::Ratio => "a number".to_owned(),
@@ -221,6 +229,10 @@ impl Kind for Vector {
         let [x, y, z] = items.as_slice() else { return Err(wrong_type(self, key, node)) };
         let component = quantity(self.0, ANY);
         Ok(vec3(component.read(key, x)?, component.read(key, y)?, component.read(key, z)?))
+    }
+
+    fn unit(&self) -> &'static str {
+        self.0.si_symbol()
     }
 
     fn type_text(&self) -> String {

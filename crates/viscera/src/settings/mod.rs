@@ -21,11 +21,13 @@ pub use solver::{
     Acceleration, AndersonGuard, AndersonOn, Colors, Count, Integrator, MOST_HISTORY, MOST_THREADS,
     Method, NeoHookean, Precision, RelaxationForm, SolverSettings, Start, Threads,
 };
-pub use tree::Place;
+pub use tree::{Place, SettingValue};
 
 pub(crate) use compound::*;
 pub(crate) use kind::*;
-pub(crate) use tree::{Node, Value, apply_override, parse_tree};
+pub(crate) use tree::{
+    Node, Value, apply_override, find_node, item_names, parse_override, parse_tree,
+};
 
 use crate::units::{UnitError, shorten};
 
@@ -142,6 +144,8 @@ pub struct KeyDescription {
     pub name: &'static str,
     /// Its type, with its unit.
     pub type_text: String,
+    /// The SI unit of its numbers; empty where they have none.
+    pub unit: &'static str,
     /// The allowed range; empty where everything of the type is allowed.
     pub range: String,
     /// The default as one would write it; `required` or `unset` where there is none.
@@ -458,7 +462,8 @@ pub(crate) fn describe_key<K: Kind>(
     if !choices.is_empty() {
         doc = format!("{doc} {choices}");
     }
-    KeyDescription { name, type_text: kind.type_text(), range: kind.range_text(), default, doc }
+    let (type_text, unit, range) = (kind.type_text(), kind.unit(), kind.range_text());
+    KeyDescription { name, type_text, unit, range, default, doc }
 }
 
 /// Describes the tables below one key of a table.

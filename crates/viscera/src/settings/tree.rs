@@ -88,6 +88,51 @@ impl Value {
     }
 }
 
+/// A value as it stands in a scene file, without its place.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SettingValue {
+    /// Text, a quantity with its unit among it.
+    Text(String),
+    /// A whole number.
+    Whole(i64),
+    /// Another number, in the SI unit of its key.
+    Number(f64),
+    /// True or false.
+    Truth(bool),
+    /// A list.
+    List(Vec<Self>),
+    /// A table by its keys.
+    Table(BTreeMap<String, Self>),
+}
+
+impl From<&Node> for SettingValue {
+    fn from(node: &Node) -> Self {
+        match &node.value {
+            Value::Text(text) | Value::Date(text) => Self::Text(text.clone()),
+            Value::Whole(number) => Self::Whole(*number),
+            Value::Number(number) => Self::Number(*number),
+            Value::Truth(truth) => Self::Truth(*truth),
+            Value::List(items) => Self::List(items.iter().map(Self::from).collect()),
+            Value::Table(entries) => {
+                let entry = |(key, node): (&String, &Node)| (key.clone(), Self::from(node));
+                Self::Table(entries.iter().map(entry).collect())
+            }
+        }
+    }
+}
+
+/// What stands at a key, which is as an override has it; nothing where nothing was written there.
+pub(crate) fn find_node<'a>(root: &'a Node, key: &str) -> Option<&'a Node> {
+    key.split('.').map(str::trim).try_fold(root, |node, step| match &node.value {
+        Value::Table(entries) => entries.get(step),
+        Value::List(items) => match step.parse::<usize>() {
+            Ok(position) => items.get(position),
+            Err(_) => items.get(item_names(items).iter().position(|name| name == step)?),
+        },
+        _ => None,
+    })
+}
+
 /// Reads TOML.
 pub(crate) fn parse_tree(name: &str, text: &str) -> Result<Node, SettingError> {
     let lines = LineIndex::new(name, text);
@@ -102,7 +147,7 @@ pub(crate) fn parse_tree(name: &str, text: &str) -> Result<Node, SettingError> {
 
 /// Reads the right-hand side of an override. What is not TOML is text, so that quotes, which a
 /// shell would eat, may be left out: `material.young=5 kPa`.
-fn parse_override(key: &str, text: &str) -> Node {
+pub(crate) fn parse_override(key: &str, text: &str) -> Node {
     let place = Place::Override { key: key.into() };
     let document = format!("value = {text}");
     let value = match DeTable::parse(&document) {
@@ -199,7 +244,7 @@ pub(crate) fn apply_override(root: &mut Node, key: &str, text: &str) -> Result<(
 }
 
 /// The names of the tables in a list, or their positions where they have none.
-fn item_names(items: &[Node]) -> Vec<String> {
+pub(crate) fn item_names(items: &[Node]) -> Vec<String> {
     let name = |(position, item): (usize, &Node)| match &item.value {
         Value::Table(entries) => match entries.get("name").map(|node| &node.value) {
             Some(Value::Text(name)) => name.clone(),

@@ -236,6 +236,18 @@ impl<S: Real> Simulation<S> {
         Ok(())
     }
 
+    /// Regards what is not in this scene, which is the simulation's own without it, as done by hand: of a simulation that
+    /// was built from a scene with [`Live::text`] behind it, and goes on where hands had left another.
+    pub fn with_hands_since(mut self, mut written: Scene) -> Result<Self, LiveError> {
+        let is_new = |change: &&Change| !written.changes.contains(*change);
+        let by_hand: Vec<Change> = self.scene.changes.iter().filter(is_new).cloned().collect();
+        for change in &by_hand {
+            written.change(&change.settings)?;
+        }
+        (self.written, self.by_hand) = (written, by_hand);
+        Ok(self)
+    }
+
     /// Motions of the scene from this number on are holds that were taken by hand.
     pub fn first_hold(&self) -> usize {
         self.written.motions.len()

@@ -18,6 +18,7 @@ mod holding;
 mod instruments;
 mod live;
 mod mesh_error;
+mod meshes;
 #[cfg(feature = "gpu")]
 mod on_device;
 mod recorded;
@@ -48,6 +49,7 @@ pub use live::Live;
 use shadowed::Shadowed;
 
 pub use mesh_error::{MESH_ERROR_TETS, MeshReport};
+pub use meshes::{SurfaceFiles, TissueFiles};
 pub use report::{FrameReport, PatchForce, PatchKind};
 pub use rest::{RestReport, Standing};
 pub use saved::ResumeError;

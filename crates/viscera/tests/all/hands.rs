@@ -193,6 +193,40 @@ fn a_scene_file_repeats_what_hands_did_to_the_bit() {
     repeats::<f32>(&both, &[("output.force_error", "false")], operate);
 }
 
+/// What hands had done stays theirs where a simulation is resumed: they go on, and a reset takes all of it back.
+#[test]
+fn hands_go_on_where_another_simulation_was_saved() {
+    let text = format!("{BLOCK}{TOOLS}");
+    let settings = [("output.force_error", "false")];
+    let mut run: Simulation<f32> = simulation(&text, &settings);
+    operate(&mut run);
+    let written = format!("{text}{}", run.live().text(run.scene()));
+    let again: Simulation<f32> = simulation(&written, &settings);
+    let base = Scene::parse("hands.toml", &text, &settings).expect("a scene");
+    let again = again.resume(&run.save()).expect("the same scene");
+    let mut again = again.with_hands_since(base).expect("its own scene");
+    let text_of = |run: &Simulation<f32>| run.live().text(run.scene());
+    assert!(text_of(&run) == text_of(&again), "{}", text_of(&again));
+    assert_eq!(run.first_taken(), again.first_taken());
+    for run in [&mut run, &mut again] {
+        let needle = run.tools().len() - 2;
+        go(run, needle, vec3(0.0, 0.0, -0.002), vec3(0.0, 0.1, 0.0), 3);
+        let settings = [("body.block.material.young".to_owned(), "9 kPa".to_owned())];
+        run.change(&settings).expect("a change");
+        frames(run, 2);
+        run.put_away(needle).expect("the needle");
+        frames(run, 2);
+    }
+    assert!(run.save() == again.save() && run.report() == again.report());
+    assert!(text_of(&run) == text_of(&again), "{}", text_of(&again));
+    for run in [&mut run, &mut again] {
+        run.reset().expect("a beginning");
+        assert_eq!((run.tools().len(), run.live()), (2, Live::default()));
+        frames(run, 3);
+    }
+    assert!(run.save() == again.save());
+}
+
 #[test]
 fn tools_of_the_scene_are_taken_over_and_the_rest_of_their_keys_is_dropped() {
     let text = format!("{BLOCK}{TOOLS}");

@@ -54,6 +54,7 @@ mod recovered_robust;
 mod saved;
 mod scene_errors;
 mod scene_files;
+mod scene_keys;
 mod shapes;
 mod springs;
 mod stress;

@@ -390,11 +390,11 @@ fn frames_of_a_grid_are_whole_files() {
     for scale in [1.0, 2.0] {
         let points: Vec<Vec3<f64>> = mesh.vertices().iter().map(|&x| x * scale).collect();
         let volumes = vtu::Array::scalars("J", &[1.0, scale]);
-        let parts = grid.frame(&points, &[], std::slice::from_ref(&volumes)).unwrap();
+        let parts = grid.frame(&points, vec![], vec![volumes.clone()]).unwrap();
         let alone = vtu::write(&points, mesh.tets(), &[], &[volumes.clone(), regions.clone()]);
         assert_eq!(parts.concat(), alone.unwrap());
     }
-    let error = grid.frame(&mesh.vertices()[..4], &[], &[]).unwrap_err();
+    let error = grid.frame(&mesh.vertices()[..4], vec![], vec![]).unwrap_err();
     assert!(matches!(error, WriteError::Length { wanted: 5, found: 4, .. }), "{error}");
     let error = vtu::Grid::of_tets(5, mesh.tets(), vec![vtu::Array::integers("region", &[1])]);
     assert!(matches!(error, Err(WriteError::Length { wanted: 2, found: 1, .. })));

@@ -99,7 +99,7 @@ pub fn write<R: Real>(
     cell_data: &[Array],
 ) -> Result<Vec<u8>, WriteError> {
     let grid = Grid::of_tets(points.len(), tets, Vec::new())?;
-    Ok(grid.frame(points, point_data, cell_data)?.concat())
+    Ok(grid.frame(points, point_data.to_vec(), cell_data.to_vec())?.concat())
 }
 
 /// A grid of triangles as the bytes of a `.vtu` file; shapes as for [`write()`].
@@ -110,7 +110,7 @@ pub fn write_surface<R: Real>(
     cell_data: &[Array],
 ) -> Result<Vec<u8>, WriteError> {
     let grid = Grid::of_triangles(points.len(), triangles, Vec::new())?;
-    Ok(grid.frame(points, point_data, cell_data)?.concat())
+    Ok(grid.frame(points, point_data.to_vec(), cell_data.to_vec())?.concat())
 }
 
 /// What stays the same from frame to frame, made into bytes once: cells, and data of theirs.
@@ -174,12 +174,12 @@ impl Grid {
 
     /// The bytes of a `.vtu` file in parts that follow one another. `points` `[m]`, shape `[point_count]`; each of
     /// `point_data` has an entry for each point, each of `cell_data`, which come before those that stay, for each cell.
-    pub fn frame<'a, R: Real>(
-        &'a self,
+    pub fn frame<R: Real>(
+        &self,
         points: &[Vec3<R>],
-        point_data: &'a [Array],
-        cell_data: &'a [Array],
-    ) -> Result<Vec<Cow<'a, [u8]>>, WriteError> {
+        point_data: Vec<Array>,
+        cell_data: Vec<Array>,
+    ) -> Result<Vec<Cow<'_, [u8]>>, WriteError> {
         let points = Array::vectors("points", points);
         points.check("point", self.point_count)?;
         point_data.iter().try_for_each(|array| array.check("point", self.point_count))?;
@@ -187,8 +187,9 @@ impl Grid {
         let mut file = File::new(self.point_count, self.cell_count);
         file.section("Points", [Cow::Owned(points)]);
         file.section("Cells", self.cells.iter().map(Cow::Borrowed));
-        file.section("PointData", point_data.iter().map(Cow::Borrowed));
-        file.section("CellData", cell_data.iter().chain(&self.cell_data).map(Cow::Borrowed));
+        file.section("PointData", point_data.into_iter().map(Cow::Owned));
+        let cell_data = cell_data.into_iter().map(Cow::Owned);
+        file.section("CellData", cell_data.chain(self.cell_data.iter().map(Cow::Borrowed)));
         Ok(file.finish())
     }
 }

@@ -1,0 +1,63 @@
+"""Real-time soft tissue for surgical applications.
+
+>>> import viscera as vi
+>>> sim = vi.Simulation(vi.Scene.builtin("twist"))
+>>> frame = sim.advance(frames=2)
+>>> sim["bar"].positions.shape[1]
+3
+
+Lengths are metres, masses kilograms, times seconds, forces newtons; +z is up.
+"""
+
+from __future__ import annotations
+
+from ._errors import (
+    BusyError,
+    Error,
+    FileError,
+    ForkedError,
+    InternalError,
+    SceneError,
+    SimulationError,
+    SnapshotError,
+    UnknownKeyError,
+)
+from ._pyvista import to_pyvista
+from ._viscera import (
+    Body,
+    Frame,
+    Hold,
+    Scene,
+    Simulation,
+    Tool,
+    built_in_scenes,
+    describe,
+    digest,
+    version,
+)
+
+__version__ = version()
+
+__all__ = [
+    "Body",
+    "BusyError",
+    "Error",
+    "FileError",
+    "ForkedError",
+    "Frame",
+    "Hold",
+    "InternalError",
+    "Scene",
+    "SceneError",
+    "Simulation",
+    "SimulationError",
+    "SnapshotError",
+    "Tool",
+    "UnknownKeyError",
+    "__version__",
+    "built_in_scenes",
+    "describe",
+    "digest",
+    "to_pyvista",
+    "version",
+]

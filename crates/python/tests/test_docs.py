@@ -1,0 +1,49 @@
+"""Examples and the Python code in the documentation do what they say."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parent.parent
+ROOT = PACKAGE.parent.parent
+
+
+def snippets(page: Path) -> list[str]:
+    """Blocks of Python code of a page."""
+    return re.findall(r"^```python\n(.*?)^```", page.read_text(), flags=re.M | re.S)
+
+
+def run(code: str, folder: Path) -> str:
+    """Runs code in a folder of its own; what it prints."""
+    environment = {**os.environ, "PYTHONWARNINGS": "error"}
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=folder, env=environment, check=False
+    )
+    assert done.returncode == 0, code + done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("example", sorted(path.name for path in (PACKAGE / "examples").iterdir()))
+def test_examples_run(example: str, tmp_path: Path) -> None:
+    assert run((PACKAGE / "examples" / example).read_text(), tmp_path)
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/python.md", "crates/python/README.md"])
+def test_code_in_the_documentation_runs(page: str, tmp_path: Path) -> None:
+    blocks = snippets(ROOT / page)
+    assert blocks
+    # Each page is read from its top: later blocks use what earlier ones made.
+    run("\n".join(blocks), tmp_path)
+
+
+def test_the_force_controller_reaches_its_force(tmp_path: Path) -> None:
+    said = run((PACKAGE / "examples" / "robot.py").read_text(), tmp_path)
+    (force,) = re.findall(r"presses with ([\d.]+) N", said)
+    assert float(force) == pytest.approx(1.0, abs=0.02)
