@@ -10,6 +10,7 @@
 //! | build something to simulate | [`model::ModelBuilder`], [`state::State`] |
 //! | simulate it | [`solver::Solver`], [`settings::SolverSettings`] |
 //! | run what a scene file says | [`scene::Scene`], [`simulation::Simulation`] |
+//! | run it many times side by side | [`worlds::Worlds`] |
 //! | learn strains, stresses, energies, forces | [`measure`], [`solver::balance`] |
 //! | look up an equation | [`elements`], [`solver`] |
 //!
@@ -63,3 +64,4 @@ pub mod solver;
 mod sorting;
 pub mod state;
 pub mod units;
+pub mod worlds;

@@ -129,6 +129,12 @@ pub enum LiveError {
         /// What is wrong and what to do.
         problem: String,
     },
+    /// A moment of something else.
+    #[error(
+        "settings have changed since this moment was kept, or tools were taken, or it is of another simulation; save it and \
+         resume a simulation of its scene"
+    )]
+    OtherModel,
     /// A hold that there is not, or that was let go.
     #[error("there is no hold {hold}, or it was let go")]
     NoHold {

@@ -279,7 +279,8 @@ impl<S: Real> Simulation<S> {
         });
         (self.model, self.backend) = (model, backend);
         self.assembly.builder = builder;
-        (self.shadow, self.stepped) = (None, false);
+        self.shadow = None;
+        (self.stepped, self.is_balanced) = (false, false);
         self.put(state);
         Ok(())
     }

@@ -227,7 +227,7 @@ impl<S: Real> Simulation<S> {
         self.by_hand.clear();
         self.changes_made = 0;
         self.rejected_substeps = 0;
-        self.put_at_rest();
+        self.put_in_place(State::at_rest(&self.model));
         self.balance = ForceBalance::default();
         self.inputs = self.inputs_at(0.0);
         self.state.contact = ContactState::of(&self.inputs.tools);
@@ -343,19 +343,19 @@ impl<S: Real> Simulation<S> {
         let restarted = self.backend.restart(&self.model, &mut state, &inputs, dt);
         debug_assert!(restarted.is_ok(), "{restarted:?}");
         self.state = state;
-        self.stepped = false;
+        (self.stepped, self.is_balanced) = (false, false);
+        self.wrenches = None;
         self.shadow = None;
     }
 
-    /// At rest, in the same memory: callers look at positions where they are.
-    fn put_at_rest(&mut self) {
-        let mut rest = State::at_rest(&self.model);
+    /// Another state in the same memory: callers look at positions and velocities where they are.
+    pub(super) fn put_in_place(&mut self, mut state: State<S>) {
         let State { positions, velocities, .. } = &mut self.state;
-        positions.clone_from(&rest.positions);
-        velocities.clone_from(&rest.velocities);
-        rest.positions = std::mem::take(positions);
-        rest.velocities = std::mem::take(velocities);
-        self.put(rest);
+        positions.clone_from(&state.positions);
+        velocities.clone_from(&state.velocities);
+        state.positions = std::mem::take(positions);
+        state.velocities = std::mem::take(velocities);
+        self.put(state);
     }
 
     /// The state from now on, on whatever computes the steps.

@@ -5,6 +5,7 @@ pub mod advice;
 mod assemble;
 mod assemble_error;
 mod automatic;
+mod checkpoint;
 mod checks;
 mod choice;
 mod crossings;
@@ -37,6 +38,7 @@ pub use acts::Act;
 pub use assemble::{AssembledBody, Assembly, Refinement, ResolvedPatch};
 pub use assemble_error::AssembleError;
 pub use automatic::{ExpectedErrors, automatic_settings};
+pub use checkpoint::Checkpoint;
 use checks::{check_contact, check_device};
 pub use crossings::Crossed;
 pub use error::{FrameError, LiveError, SimulationError};
@@ -56,6 +58,7 @@ pub use saved::ResumeError;
 pub(crate) use saved::{SavedDifference, difference_of_saved, is_saved};
 pub use ties::TieForce;
 
+use crate::contact::Wrench;
 use crate::layout::Layout;
 use crate::measure::{
     Energies, TetMeasure, TissueMeasure, measure_energies, measure_tets, measure_tissue,
@@ -114,6 +117,10 @@ pub struct Simulation<S> {
     before: Vec<Vec3<S>>,
     /// Whether the solver knows of a step: a new one has nothing to measure yet.
     stepped: bool,
+    /// Whether the balance is of a step of this model: a moment that is gone back to has its own.
+    is_balanced: bool,
+    /// Of the tools of a moment that was gone back to, until the next frame.
+    wrenches: Option<Vec<Wrench>>,
     tissue: TissueMeasure,
     frame: u64,
     rejected_substeps: u64,
@@ -178,6 +185,8 @@ impl<S: Real> Simulation<S> {
             balance: ForceBalance::default(),
             before: model.rest_positions.clone(),
             stepped: false,
+            is_balanced: false,
+            wrenches: None,
             tissue: TissueMeasure::default(),
             frame: 0,
             rejected_substeps: 0,
@@ -373,6 +382,7 @@ impl<S: Real> Simulation<S> {
                 Err(lost) if backend.gives_way && !matches!(lost, FrameError::Step(_)) => {}
                 measured => measured?,
             }
+            self.is_balanced = true;
         }
         self.measure_tissue();
         // Files and pictures are in single precision: what it cannot hold has run away as well.
@@ -409,7 +419,7 @@ impl<S: Real> Simulation<S> {
     /// Energies; of recovered-gradient tetrahedra with their own, once a step has found it.
     fn energies(&self) -> Energies {
         let mut all = measure_energies(&self.model, &self.state, &self.inputs, &self.tissue);
-        if self.solver.elements == Elements::Recovered && self.stepped {
+        if self.solver.elements == Elements::Recovered && self.is_balanced {
             all.elastic += self.balance.elastic_energy - self.tissue.elastic_energy;
         }
         all

@@ -130,6 +130,7 @@ impl<S: Real> Simulation<S> {
         self.rejected_substeps = self.backend.rejected_steps() - self.rejected_before;
         self.frame += 1;
         self.stepped = true;
+        self.wrenches = None;
         self.lead_jaws();
         if !self.state.is_finite() || self.backend.is_beyond_numbers() {
             return Err(self.diverged());

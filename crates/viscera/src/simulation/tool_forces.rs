@@ -5,7 +5,7 @@ use super::crossings::crossings;
 use super::holding::tolerance;
 use super::instruments::ToolForce;
 use crate::contact::held::carry;
-use crate::contact::{HeldMotion, Tool};
+use crate::contact::{HeldMotion, Tool, Wrench};
 use crate::scalar::Real;
 use crate::solver::Ledger;
 
@@ -13,7 +13,7 @@ impl<S: Real> Simulation<S> {
     /// Forces on the scene's tools at the end of the last frame; zero before the first and after a change of settings.
     pub fn tool_forces(&self) -> Vec<ToolForce> {
         let (tools, parts, time) = (&self.assembly.tools, &self.inputs.tools, self.time());
-        let mut forces = self.instruments.forces_on(tools, self.backend.wrenches(), parts, time);
+        let mut forces = self.instruments.forces_on(tools, self.wrenches(), parts, time);
         self.instruments.tell_jumps(tools, &mut forces);
         let count_of = |index: usize, tool: &_| self.instruments.parts_of(index, tool);
         for (force, crossed) in forces.iter_mut().zip(crossings(tools, parts, count_of)) {
@@ -27,6 +27,11 @@ impl<S: Real> Simulation<S> {
             }
         }
         forces
+    }
+
+    /// Of each part of each tool.
+    pub(super) fn wrenches(&self) -> &[Wrench] {
+        self.wrenches.as_deref().unwrap_or_else(|| self.backend.wrenches())
     }
 
     /// Work of tools on tissue and the energy that is stored, since the beginning or the last change of settings.

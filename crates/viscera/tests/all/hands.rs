@@ -2,7 +2,7 @@
 
 use viscera::scalar::rigid::{RigidTransform, rotation_matrix};
 use viscera::scalar::{Real, Vec3, vec3};
-use viscera::scene::{Instrument, Scene, read_tray};
+use viscera::scene::{Instrument, Patch, Scene, Selector, read_tray};
 use viscera::simulation::{
     AssembleError, Assembly, Holder, Live, LiveError, Simulation, SimulationError,
 };
@@ -225,6 +225,52 @@ fn hands_go_on_where_another_simulation_was_saved() {
         frames(run, 3);
     }
     assert!(run.save() == again.save());
+}
+
+/// The same simulation goes back to a moment and on from there, also where hands went on in between.
+fn goes_back<S: Real>(method: &str) {
+    let both = format!("{BLOCK}{TOOLS}");
+    let precision = if size_of::<S>() == 8 { "f64" } else { "f32" };
+    let off = ("output.force_error", "false");
+    let settings = [("solver.method", method), ("solver.precision", precision), off];
+    let mut run: Simulation<S> = simulation(&both, &settings);
+    operate(&mut run);
+    let patch = |run: &Simulation<S>| Patch { body: 0, ..run.scene().fixings[0].patch.clone() };
+    let nearest = Selector::Nearest { point: vec3(0.03, 0.0, 0.015), count: 2 };
+    let held = Patch { selector: nearest, ..patch(&run) };
+    let hold = run.take_hold("hand", held.clone(), Some(20.0)).expect("a hold");
+    run.lead(hold, vec3(0.001, 0.0, 0.002)).expect("a place");
+    frames(&mut run, 2);
+    let moment = run.checkpoint();
+    let (at, report, place) = (run.save(), run.report(), run.state().positions.as_ptr());
+    let pliers = run.tools().iter().position(|tool| tool.name == "pliers").expect("pliers");
+    let on = |run: &mut Simulation<S>| {
+        run.lead(hold, vec3(0.0, 0.001, 0.002)).expect("a place");
+        go(run, pliers, vec3(0.001, 0.0, 0.001), vec3(0.0, 0.1, 0.0), 3);
+        (run.save(), run.report(), run.live())
+    };
+    let after = on(&mut run);
+    // What comes later is forgotten: a hold that is let go, another one, jaws.
+    run.let_go(hold).expect("a hold");
+    run.take_hold("hand", held, None).expect("another");
+    run.open_jaws(pliers, 0.3).expect("an angle");
+    frames(&mut run, 2);
+    run.restore(&moment).expect("its own moment");
+    assert!(run.save() == at);
+    assert_eq!((run.report(), run.state().positions.as_ptr()), (report, place));
+    let again = on(&mut run);
+    assert!(again.0 == after.0, "{method}");
+    assert_eq!((again.1, again.2), (after.1, after.2));
+    // Of another model.
+    run.change(&[("body.block.material.young".to_owned(), "7 kPa".to_owned())]).expect("a change");
+    assert_eq!(run.restore(&moment), Err(LiveError::OtherModel));
+}
+
+#[test]
+fn a_simulation_goes_back_to_a_moment_and_on_to_the_bit() {
+    goes_back::<f32>("explicit");
+    goes_back::<f32>("quasi_newton");
+    goes_back::<f64>("xpbd");
 }
 
 #[test]

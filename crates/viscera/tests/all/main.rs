@@ -66,6 +66,7 @@ mod tool_errors;
 mod tool_force_error;
 mod tools;
 mod twins;
+mod worlds;
 mod xpbd_family;
 
 /// Counts what tests ask the system's allocator for.

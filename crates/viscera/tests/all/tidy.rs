@@ -50,7 +50,7 @@ const LAYERS: &[&[&str]] = &[
     &["solver"],
     &["measure", "rest"],
     &["simulation"],
-    &["record"],
+    &["record", "worlds"],
 ];
 
 fn layer_of(module: &str) -> Option<usize> {
