@@ -1,7 +1,9 @@
 //! Arrays of NumPy.
 
 use crate::fault::{Class, error};
-use numpy::{Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{
+    Element, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use viscera::scalar::rigid::RigidTransform;
 use viscera::scalar::{Mat3, Real, Vec3};
@@ -143,7 +145,70 @@ pub fn view<'py>(py: Python<'py>, positions: &Positions) -> PyResult<Bound<'py, 
         Positions::Single(array) => array.bind(py).as_any(),
         Positions::Double(array) => array.bind(py).as_any(),
     };
+    read_only(base)
+}
+
+fn read_only<'py>(base: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let view = base.call_method0("view")?;
     view.call_method1("setflags", (false,))?;
     Ok(view)
+}
+
+/// Numbers of an array-like with a row for each world, flattened, and how many a row has: one of these numbers.
+pub fn matrix(
+    what: &str,
+    value: &Bound<'_, PyAny>,
+    rows: usize,
+    columns: &[usize],
+) -> PyResult<(Vec<f64>, usize)> {
+    let py = value.py();
+    let shapes = columns.iter().map(|columns| match columns {
+        1 => format!("({rows},)"),
+        16 => format!("({rows}, 4, 4)"),
+        columns => format!("({rows}, {columns})"),
+    });
+    let shapes = shapes.collect::<Vec<_>>().join(" or ");
+    let refuse =
+        |found: String| error(Class::Scene, format!("{what}: give shape {shapes}; this {found}"));
+    let array = py.import("numpy")?.call_method1("asarray", (value, "float64"));
+    let array = array.map_err(|problem| refuse(format!("is none: {}", problem.value(py))))?;
+    let array = array.cast_into::<PyArrayDyn<f64>>()?;
+    let fits = columns.iter().copied().find(|&columns| match (columns, array.shape()) {
+        (1, [n]) => *n == rows,
+        (16, [n, 4, 4]) => *n == rows,
+        (columns, [n, m]) => *n == rows && *m == columns,
+        _ => false,
+    });
+    let columns = fits.ok_or_else(|| refuse(format!("has shape {:?}", array.shape())))?;
+    let numbers: Vec<f64> = array.readonly().as_array().iter().copied().collect();
+    match numbers.iter().all(|number| number.is_finite()) {
+        true => Ok((numbers, columns)),
+        false => Err(refuse("holds NaN or infinity".to_owned())),
+    }
+}
+
+/// Positions of a body in many worlds, shape (n, vertices, 3), refreshed after each step, at one place in memory.
+pub struct Frames(Py<PyArray3<f32>>);
+
+impl Frames {
+    /// Room for so many worlds and vertices.
+    pub fn new(py: Python<'_>, worlds: usize, vertices: usize) -> PyResult<Self> {
+        Ok(Self(PyArray3::zeros(py, [worlds, vertices, 3], false).unbind()))
+    }
+
+    /// Writes the positions of one world.
+    pub fn refresh(&self, py: Python<'_>, world: usize, from: &[Vec3<f32>]) -> PyResult<()> {
+        let mut array = self.0.bind(py).try_readwrite()?;
+        let all = array.as_slice_mut()?;
+        let own = all.chunks_exact_mut(3 * from.len()).nth(world);
+        for (to, from) in own.into_iter().flat_map(|own| own.chunks_exact_mut(3)).zip(from) {
+            to.copy_from_slice(&from.to_array());
+        }
+        Ok(())
+    }
+
+    /// A view of all that cannot be written to.
+    pub fn view<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        read_only(self.0.bind(py).as_any())
+    }
 }

@@ -17,6 +17,7 @@ mod simulation;
 mod snapshot;
 mod tool;
 mod values;
+mod worlds;
 
 use pyo3::pymodule;
 
@@ -37,4 +38,6 @@ mod _viscera {
     use super::simulation::Simulation;
     #[pymodule_export]
     use super::tool::Tool;
+    #[pymodule_export]
+    use super::worlds::Worlds;
 }

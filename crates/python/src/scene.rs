@@ -148,7 +148,8 @@ pub fn overrides_of(
     }
 }
 
-fn value_text(scene: &Parsed, key: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
+/// A value for a key of a scene, as a scene file has it.
+pub fn value_text(scene: &Parsed, key: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
     let unit = |key: &str| match scene.described(key) {
         Ok(Some(described)) => described.unit,
         // Whatever is wrong with the key is told where it is set.

@@ -415,7 +415,7 @@ impl Simulation {
 }
 
 /// A stiffness [N/m], from a number or a quantity with its unit.
-fn newtons_per_metre(value: &Bound<'_, PyAny>) -> PyResult<f64> {
+pub fn newtons_per_metre(value: &Bound<'_, PyAny>) -> PyResult<f64> {
     match value.extract::<f64>() {
         Ok(number) => Ok(number),
         Err(_) => {

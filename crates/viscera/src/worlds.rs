@@ -142,12 +142,12 @@ impl<S: Real> Worlds<S> {
             return Status::Failed;
         };
         let report = simulation.report();
+        let residual = report.relative_residual;
         // Explicit steps have no iterations that could end early.
         let iterates = simulation.solver().method != Method::Explicit;
         match () {
             () if report.deformation.inverted > 0 => Status::Inverted,
-            // Written so that what is no number is not fine.
-            () if iterates && !(report.relative_residual <= UNSOLVED) => Status::Unsolved,
+            () if iterates && (residual > UNSOLVED || residual.is_nan()) => Status::Unsolved,
             () => Status::Fine,
         }
     }
