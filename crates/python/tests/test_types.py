@@ -22,7 +22,7 @@ def test_types_of_the_package_its_tests_and_examples() -> None:
 
 
 def test_stubs_say_what_is_there() -> None:
-    check("mypy.stubtest", "viscera")
+    check("mypy.stubtest", "viscera._viscera")
 
 
 def test_style() -> None:

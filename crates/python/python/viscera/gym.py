@@ -98,7 +98,7 @@ class Task:
 
     def draw(self, chosen: Truths, low: Array, high: Array) -> Array:
         """Numbers at random for the worlds that are chosen, from each one's own generator; others get NaN."""
-        drawn = np.full((self.count, len(low)), np.nan)
+        drawn: Array = np.full((self.count, len(low)), np.nan)
         for number in np.flatnonzero(chosen):
             drawn[number] = self.generators[number].uniform(low, high)
         return drawn
@@ -170,7 +170,7 @@ method = "explicit"
         rest = self.worlds.positions["flap"][0].copy()
         self.end = np.flatnonzero(rest[:, 0] > rest[:, 0].max() - 1e-6)
         self.rest = rest[self.end].mean(axis=0)
-        self.grip = np.zeros((count, 3))
+        self.grip: Array = np.zeros((count, 3))
         self.goal = np.zeros((count, 3))
         self.hold = -1
 
@@ -273,8 +273,9 @@ method = "explicit"
     def __init__(self, count: int, threads: int | None, max_force: float) -> None:
         """In so many worlds."""
         super().__init__(count, threads, max_force)
-        self.probe = np.tile(self.START, (count, 1))
+        self.probe: Array = np.tile(self.START, (count, 1))
         self.lump = np.zeros(count, dtype=np.int64)
+        self.felt: Array = np.zeros((count, 4))
 
     def spaces(self) -> gymnasium.spaces.Dict:
         """Where the probe is from the middle, the force on it, how stiff it felt where it has been."""
@@ -290,8 +291,6 @@ method = "explicit"
         keys = [f"body.tissue.region.{number}.young" for number in range(4)]
         self.worlds.update({key: young[:, number] for number, key in enumerate(keys)}, mask=chosen)
         self.probe[chosen] = self.START
-        if not hasattr(self, "felt"):
-            self.felt = np.zeros((self.count, 4))
         self.felt[chosen] = 0.0
 
     def act(self, actions: Array) -> None:
@@ -379,8 +378,8 @@ method = "explicit"
         rest = self.worlds.positions["strip"][0].copy()
         self.end = np.flatnonzero(rest[:, 0] > rest[:, 0].max() - 1e-6)
         self.rest = rest[self.end].mean(axis=0)
-        self.jaws = np.tile(self.START, (count, 1))
-        self.opening = np.full(count, self.OPEN)
+        self.jaws: Array = np.tile(self.START, (count, 1))
+        self.opening: Array = np.full(count, self.OPEN)
 
     def spaces(self) -> gymnasium.spaces.Dict:
         """Where the jaws are from where they began, how far open, how the end is displaced, the force on it."""
@@ -525,7 +524,7 @@ class TissueVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Begins an episode in all worlds, or in those where `options["reset_mask"]` is true."""
-        chosen = np.ones(self.num_envs, dtype=bool)
+        chosen: Truths = np.ones(self.num_envs, dtype=bool)
         if options is not None and "reset_mask" in options:
             chosen = np.asarray(options["reset_mask"], dtype=bool)
         seeds = seed if isinstance(seed, list) else _seeds(seed, self.num_envs)

@@ -45,7 +45,7 @@ fn a_scene_tells_what_stands_at_a_key() {
 #[test]
 fn numbers_with_their_si_unit_keep_every_digit() {
     for key in ["young", "density"] {
-        for number in [1234.567_890_123_456_7, 1.0 / 3.0 * 1e4, 9_999.999_999_999_998] {
+        for number in [1_234.567_890_123_456_7, 1.0 / 3.0 * 1e4, 9_999.999_999_999_998] {
             let path = format!("body.block.material.{key}");
             let scene = Scene::parse("s.toml", hands::BLOCK, &[]).expect("a scene");
             let unit = described(&scene, &path).unit;
