@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import gc
+from typing import Any
 
 import numpy as np
 import pytest
 import viscera as vi
+from numpy.typing import NDArray
 
 
-def address(array: np.ndarray) -> int:
+def address(array: NDArray[Any]) -> int:
     """Where it is in memory."""
     return int(array.__array_interface__["data"][0])
 

@@ -10,6 +10,7 @@ import pytest
 import viscera as vi
 import viscera.gym as vig
 from gymnasium.utils.env_checker import check_env
+from numpy.typing import NDArray
 
 NAMES = sorted(vig.TASKS)
 
@@ -47,9 +48,9 @@ def test_a_vector_of_worlds_is_as_many_environments(name: str) -> None:
                 assert np.array_equal(alone[key][0], together[key][number]), (name, key)
 
 
-def retract(observation: dict[str, Any]) -> np.ndarray:
+def retract(observation: dict[str, Any]) -> NDArray[Any]:
     """Leads the grip to where the end is missing."""
-    way: np.ndarray = np.clip(300.0 * (observation["goal"] - observation["end"]), -1.0, 1.0)
+    way: NDArray[Any] = np.clip(300.0 * (observation["goal"] - observation["end"]), -1.0, 1.0)
     return way
 
 
