@@ -32,6 +32,8 @@ def run(code: str, folder: Path) -> str:
 
 @pytest.mark.parametrize("example", sorted(path.name for path in (PACKAGE / "examples").iterdir()))
 def test_examples_run(example: str, tmp_path: Path) -> None:
+    if example == "mujoco_arm.py":
+        pytest.importorskip("mujoco", reason="MuJoCo is not installed")
     assert run((PACKAGE / "examples" / example).read_text(), tmp_path)
 
 
@@ -41,6 +43,16 @@ def test_code_in_the_documentation_runs(page: str, tmp_path: Path) -> None:
     assert blocks
     # Each page is read from its top: later blocks use what earlier ones made.
     run("\n".join(blocks), tmp_path)
+
+
+def test_an_arm_and_tissue_push_alike(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed")
+    said = run((PACKAGE / "examples" / "mujoco_arm.py").read_text(), tmp_path)
+    arm, tissue, short = (float(number) for number in re.findall(r"(\d+\.\d+) (?:N|mm)", said))
+    # To the digits that it prints; and the arm's own spring of 400 N/m.
+    assert arm == pytest.approx(tissue, abs=1.5e-3)
+    assert tissue > 0.1
+    assert short == pytest.approx(1e3 * arm / 400.0, abs=0.01)
 
 
 def test_the_force_controller_reaches_its_force(tmp_path: Path) -> None:
