@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import signal
@@ -225,3 +226,22 @@ def test_tables(pressed: vi.Scene, tmp_path: Path) -> None:
 def test_what_cannot_be(pressed: vi.Scene, wrong: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=next(iter(wrong))):
         sweep.run(pressed, trials(), measure, **{"frames": 1, **wrong})
+
+
+def test_what_is_not_installed_is_named(
+    pressed: vi.Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(ImportError, match=r"viscera\[ray\]"):
+        sweep.run(pressed, trials(), measure, frames=1, on="ray")
+    rows = sweep.run(pressed, [{}], measure, frames=1)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(ImportError, match=r"viscera\[sweep\]"):
+        rows.to_parquet(tmp_path / "rows.parquet")
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(ImportError, match=r"viscera\[pyvista\]"):
+        vi.to_pyvista(vi.Simulation(pressed))
+    monkeypatch.setitem(sys.modules, "gymnasium", None)
+    monkeypatch.delitem(sys.modules, "viscera.gym", raising=False)
+    with pytest.raises(ImportError, match=r"viscera\[gym\]"):
+        importlib.import_module("viscera.gym")
