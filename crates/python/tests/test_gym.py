@@ -131,6 +131,19 @@ def test_too_much_force_ends_an_episode() -> None:
     assert np.array_equal(observation["grip"], np.zeros(3))
 
 
+def test_an_episode_is_cut_off_after_so_many_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(vig.Palpation, "max_steps", 3)
+    many: Any = vig.TissueVectorEnv("Palpation", num_envs=2, threads=1)
+    many.reset(seed=0)
+    still = np.zeros((2, 3), dtype=np.float32)
+    cuts = []
+    for _ in range(7):
+        _, _, ended, cut, _ = many.step(still)
+        assert not ended.any()
+        cuts.append(bool(cut.all()))
+    assert cuts == [False, False, True, False, False, True, False]
+
+
 def test_tasks_are_scenes() -> None:
     for task in vig.TASKS.values():
         assert vi.Scene.parse(task.scene).bodies
