@@ -171,32 +171,30 @@ impl<S: Real> Worlds<S> {
         chosen: Option<&[bool]>,
         act: impl Fn(usize, &mut Simulation<S>) -> Result<(), E> + Sync,
     ) -> Result<(), E> {
-        let is_chosen = |number: usize| {
-            chosen.is_none_or(|chosen| chosen.get(number).copied().unwrap_or(false))
-        };
-        let act = |(number, world): (usize, &mut World<S>)| match is_chosen(number) {
-            true => act(number, &mut world.simulation),
-            false => Ok(()),
-        };
-        let done: Vec<Result<(), E>> = self
-            .pool
-            .install(|| self.worlds.par_iter_mut().with_max_len(1).enumerate().map(act).collect());
-        done.into_iter().collect()
+        self.each(chosen, |number, world| act(number, &mut world.simulation))
     }
 
     /// Sets worlds, or those that are chosen, back to the beginning, at rest: holds and tools that were taken are gone, settings
     /// stay. Where only its state has changed that costs a copy of it.
     pub fn reset(&mut self, chosen: Option<&[bool]>) -> Result<(), LiveError> {
+        self.each(chosen, |_, world| world.reset())
+    }
+
+    fn each<E: Send>(
+        &mut self,
+        chosen: Option<&[bool]>,
+        act: impl Fn(usize, &mut World<S>) -> Result<(), E> + Sync,
+    ) -> Result<(), E> {
         let is_chosen = |number: usize| {
             chosen.is_none_or(|chosen| chosen.get(number).copied().unwrap_or(false))
         };
-        let reset = |(number, world): (usize, &mut World<S>)| match is_chosen(number) {
-            true => world.reset(),
+        let act = |(number, world): (usize, &mut World<S>)| match is_chosen(number) {
+            true => act(number, world),
             false => Ok(()),
         };
-        let done: Vec<Result<(), LiveError>> = self.pool.install(|| {
-            self.worlds.par_iter_mut().with_max_len(1).enumerate().map(reset).collect()
-        });
+        let done: Vec<Result<(), E>> = self
+            .pool
+            .install(|| self.worlds.par_iter_mut().with_max_len(1).enumerate().map(act).collect());
         done.into_iter().collect()
     }
 }
