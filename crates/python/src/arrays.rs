@@ -59,7 +59,11 @@ pub fn vector(what: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3<f64>> {
 
 /// A pose as a matrix of shape (4, 4): rotation and translation [m].
 pub fn pose(what: &str, value: &Bound<'_, PyAny>) -> PyResult<RigidTransform> {
-    let m = numbers(what, value, &[4, 4])?;
+    rigid(what, &numbers(what, value, &[4, 4])?)
+}
+
+/// A pose from 16 numbers, row by row.
+pub fn rigid(what: &str, m: &[f64]) -> PyResult<RigidTransform> {
     if m[12..] != [0.0, 0.0, 0.0, 1.0] {
         return Err(error(
             Class::Scene,

@@ -125,7 +125,7 @@ impl<T, E: Fault> OrRaise<T> for Result<T, E> {
     }
 }
 
-/// Does something that should not panic; where it does that is told as an error like any other, with what the panic said.
+/// Calls a function; a panic, which would be a defect, becomes an `InternalError` with the panic's message.
 pub fn guarded<T>(act: impl FnOnce() -> T) -> PyResult<T> {
     catch_unwind(AssertUnwindSafe(act)).map_err(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str);

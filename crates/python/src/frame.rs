@@ -5,7 +5,8 @@ use crate::fault::{Class, error};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use viscera::simulation::FrameReport;
+use viscera::scalar::Real;
+use viscera::simulation::{FrameReport, PatchForce, Simulation, TieForce, ToolForce};
 
 /// The numbers of one frame.
 #[pyclass(frozen, module = "viscera")]
@@ -20,14 +21,32 @@ impl Frame {
     }
 }
 
-/// The force on the tissue [N] of a patch or a tool, or where it is tied.
-pub fn force_on_tissue(report: &FrameReport, name: &str) -> PyResult<[f64; 3]> {
-    let patches = report.patches.iter().find(|patch| patch.name == name).map(|patch| patch.force);
-    let tool = report.tools.iter().find(|tool| tool.name == name);
-    // Of the tissue on the tool.
-    let tool = tool.map(|tool| tool.force.map(|f| 0.0 - f));
-    let tie = report.ties.iter().find(|tie| tie.name == name).map(|tie| tie.force);
-    patches.or(tool).or(tie).ok_or_else(|| {
+/// The force on the tissue [N] of a patch or a tool, or where it is tied, as a simulation has last measured it.
+pub fn force_now<S: Real>(simulation: &Simulation<S>, name: &str) -> PyResult<[f64; 3]> {
+    let patch = of_patch(&simulation.patch_forces(), name);
+    let tool = || of_tool(&simulation.tool_forces(), name);
+    let found = patch.or_else(tool).or_else(|| of_tie(&simulation.tie_forces(), name));
+    // All names are in the report.
+    found.map_or_else(|| force_on_tissue(&simulation.report(), name), Ok)
+}
+
+fn of_patch(patches: &[PatchForce], name: &str) -> Option<[f64; 3]> {
+    patches.iter().find(|patch| patch.name == name).map(|patch| patch.force)
+}
+
+/// Minus the force of the tissue on the tool.
+fn of_tool(tools: &[ToolForce], name: &str) -> Option<[f64; 3]> {
+    tools.iter().find(|tool| tool.name == name).map(|tool| tool.force.map(|f| 0.0 - f))
+}
+
+fn of_tie(ties: &[TieForce], name: &str) -> Option<[f64; 3]> {
+    ties.iter().find(|tie| tie.name == name).map(|tie| tie.force)
+}
+
+fn force_on_tissue(report: &FrameReport, name: &str) -> PyResult<[f64; 3]> {
+    let FrameReport { patches, tools, ties, .. } = report;
+    let found = of_patch(patches, name).or_else(|| of_tool(tools, name));
+    found.or_else(|| of_tie(ties, name)).ok_or_else(|| {
         let known = names(report).join(", ");
         let known = if known.is_empty() { "none".to_owned() } else { known };
         let what = "fixing, motion, force, tool or tie";

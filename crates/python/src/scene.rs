@@ -152,7 +152,7 @@ pub fn overrides_of(
 pub fn value_text(scene: &Parsed, key: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
     let unit = |key: &str| match scene.described(key) {
         Ok(Some(described)) => described.unit,
-        // Whatever is wrong with the key is told where it is set.
+        // An unknown key is an error where it is set, which comes next.
         _ => "",
     };
     values::to_text(key, value, &unit)

@@ -4,12 +4,12 @@ use crate::arrays::{Positions, row, vector};
 use crate::body::Body;
 use crate::engine::{Engine, either};
 use crate::fault::{Class, OrRaise, error, guarded};
-use crate::frame::{Frame, force_on_tissue};
+use crate::frame::{Frame, force_now};
 use crate::functions::digest;
 use crate::hold::Hold;
 use crate::picture;
 use crate::scene::{Content, Scene, overrides_of};
-use crate::snapshot::{pack, unpack};
+use crate::snapshot::{of, unpack};
 use crate::tool::Tool;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -108,7 +108,7 @@ impl Simulation {
     }
 
     fn saved(engine: &Engine) -> Vec<u8> {
-        either!(engine, s => pack(&s.live().text(s.scene()), &s.save()))
+        either!(engine, s => of(s))
     }
 
     fn vtu<S: Real>(simulation: &Running<S>) -> Result<Vec<u8>, WriteError> {
@@ -234,8 +234,8 @@ impl Simulation {
 
     /// The force on the tissue [N], shape (3,), of the fixing, motion, force, tool or tie of this name, as last measured.
     fn force<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let report = self.look(|engine| either!(engine, s => s.report()))?;
-        Ok(row(py, &force_on_tissue(&report, name)?))
+        let force = self.look(|engine| either!(engine, s => force_now(s, name)))??;
+        Ok(row(py, &force))
     }
 
     /// Takes hold of the `count` vertices of a body that at rest are nearest to one of its vertices, or to a `point` [m]:

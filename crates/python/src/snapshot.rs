@@ -3,14 +3,21 @@
 use crate::fault::{Class, error};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use pyo3::PyResult;
+use viscera::scalar::Real;
+use viscera::simulation::Simulation;
 
 const MAGIC: &[u8; 8] = b"viscera\x01";
 
 /// What the library saves has a checksum of its own.
 const CHECKSUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
+/// A simulation as bytes.
+pub fn of<S: Real>(simulation: &Simulation<S>) -> Vec<u8> {
+    pack(&simulation.live().text(simulation.scene()), &simulation.save())
+}
+
 /// Both parts as bytes: length and checksum of the first, then both.
-pub fn pack(hands: &str, saved: &[u8]) -> Vec<u8> {
+fn pack(hands: &str, saved: &[u8]) -> Vec<u8> {
     let length = (hands.len() as u64).to_le_bytes();
     let checksum = CHECKSUM.checksum(hands.as_bytes()).to_le_bytes();
     [MAGIC, &length[..], &checksum, hands.as_bytes(), saved].concat()

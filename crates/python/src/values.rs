@@ -72,7 +72,7 @@ fn with_unit(number: String, unit: &str) -> String {
     }
 }
 
-/// With a point or an exponent, so that it is not read as a whole number; what is none is told as TOML tells it.
+/// With a point or an exponent, so that it is not read as a whole number; NaN and infinity as TOML writes them.
 fn number_text(number: f64) -> String {
     match number {
         _ if number.is_nan() => "nan".to_owned(),

@@ -141,12 +141,11 @@ impl<S: Real> Worlds<S> {
         let Some(World { simulation, failure: None, .. }) = self.worlds.get(number) else {
             return Status::Failed;
         };
-        let report = simulation.report();
-        let residual = report.relative_residual;
+        let residual = simulation.relative_residual();
         // Explicit steps have no iterations that could end early.
         let iterates = simulation.solver().method != Method::Explicit;
         match () {
-            () if report.deformation.inverted > 0 => Status::Inverted,
+            () if simulation.deformation().inverted > 0 => Status::Inverted,
             () if iterates && (residual > UNSOLVED || residual.is_nan()) => Status::Unsolved,
             () => Status::Fine,
         }

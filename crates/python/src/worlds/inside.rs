@@ -35,7 +35,7 @@ pub struct Worlds {
     pub(super) process: u32,
 }
 
-/// The worlds while somebody is at work on them.
+/// Exclusive access to the worlds.
 pub type Guard<'a> = MutexGuard<'a, All<f32>>;
 
 impl Worlds {

@@ -2,9 +2,9 @@
 
 mod inside;
 
-use crate::arrays::{Frames, matrix};
+use crate::arrays::{Frames, matrix, rigid};
 use crate::fault::{Class, OrRaise, error, guarded};
-use crate::frame::force_on_tissue;
+use crate::frame::force_now;
 use crate::scene::Scene;
 use crate::simulation::newtons_per_metre;
 pub use inside::Worlds;
@@ -12,8 +12,8 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyMapping};
 use std::sync::Mutex;
+use viscera::scalar::Vec3;
 use viscera::scalar::rigid::RigidTransform;
-use viscera::scalar::{Mat3, Vec3};
 use viscera::scene::{Patch, Selector, read_tray};
 use viscera::settings::{Place, Precision};
 use viscera::simulation::{Simulation, ToolForce};
@@ -161,6 +161,11 @@ impl Worlds {
     ) -> PyResult<()> {
         self.check_tool(tool)?;
         let (numbers, columns) = matrix("targets", targets, self.count, &[3, 16])?;
+        let poses: PyResult<Vec<RigidTransform>> = match columns {
+            16 => numbers.chunks_exact(16).map(|all| rigid("targets", all)).collect(),
+            _ => Ok(Vec::new()),
+        };
+        let poses = poses?;
         self.each(py, mask, |number, simulation| {
             let Some(index) = Self::tool(simulation, tool) else { return Ok(()) };
             let row = &numbers[columns * number..columns * (number + 1)];
@@ -169,11 +174,7 @@ impl Worlds {
                     translation: Vec3::from_f64([row[0], row[1], row[2]]),
                     ..simulation.tools()[index].pose
                 },
-                _ => {
-                    let column = |j: usize| Vec3::from_f64([row[j], row[4 + j], row[8 + j]]);
-                    let rotation = Mat3 { columns: [column(0), column(1), column(2)] };
-                    RigidTransform { rotation, translation: column(3) }
-                }
+                _ => poses[number],
             };
             simulation.move_tool(index, pose)
         })
@@ -254,7 +255,10 @@ impl Worlds {
         let point = crate::arrays::vector("a point [m]", point)?;
         let stiffness = stiffness.map(newtons_per_metre).transpose()?;
         let place = Place::Override { key: "take_hold".into() };
-        let selector = Selector::Nearest { point, count: count.max(1) };
+        if count == 0 {
+            return Err(error(Class::Scene, "a hold needs one vertex at least: count=1"));
+        }
+        let selector = Selector::Nearest { point, count };
         let patch = Patch { body: number, selector, purpose: "hold".to_owned(), place };
         let taken = {
             let worlds = self.lock()?;
@@ -314,16 +318,17 @@ impl Worlds {
 
     /// The force on the tissue [N] in each world, shape (n, 3), of the fixing, motion, force, tool or tie of this name.
     fn force(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyArray2<f64>>> {
-        self.rows(py, |simulation| force_on_tissue(&simulation.report(), name))
+        self.rows(py, |simulation| force_now(simulation, name))
     }
 
-    /// Force [N] and torque [N m] about its origin of the tissue on a tool in each world, shape (n, 6).
+    /// Force [N] and torque [N m] about its origin of the tissue on a tool in each world, shape (n, 6); NaN in
+    /// worlds that have no such tool.
     fn wrench(&self, py: Python<'_>, tool: &str) -> PyResult<Py<PyArray2<f64>>> {
         self.check_tool(tool)?;
         self.rows(py, |simulation| {
             let all = simulation.tool_forces();
             let found = all.into_iter().find(|force| force.name == tool);
-            Ok(found.map_or([0.0; 6], |ToolForce { force, torque, .. }| {
+            Ok(found.map_or([f64::NAN; 6], |ToolForce { force, torque, .. }| {
                 let ([a, b, c], [d, e, f]) = (force, torque);
                 [a, b, c, d, e, f]
             }))
@@ -380,9 +385,7 @@ impl Worlds {
         self.check_number(number)?;
         let bytes = {
             let worlds = self.lock()?;
-            let save =
-                |s: &Simulation<f32>| crate::snapshot::pack(&s.live().text(s.scene()), &s.save());
-            guarded(|| worlds.world(number).map(save).unwrap_or_default())?
+            guarded(|| worlds.world(number).map(crate::snapshot::of).unwrap_or_default())?
         };
         crate::functions::digest(py, &bytes)
     }

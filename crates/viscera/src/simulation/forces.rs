@@ -46,7 +46,8 @@ impl<S: Real> Simulation<S> {
         inputs
     }
 
-    pub(super) fn patch_forces(&self) -> Vec<PatchForce> {
+    /// Forces on the scene's patches, as last measured: those of [`Simulation::report`] without its other numbers.
+    pub fn patch_forces(&self) -> Vec<PatchForce> {
         let positions: Vec<_> = self.state.positions.iter().map(|x| x.cast()).collect();
         self.patch_forces_at(self.time(), &positions, &self.balance.residual)
     }

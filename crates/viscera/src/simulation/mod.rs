@@ -61,7 +61,8 @@ pub use ties::TieForce;
 use crate::contact::Wrench;
 use crate::layout::Layout;
 use crate::measure::{
-    Energies, TetMeasure, TissueMeasure, measure_energies, measure_tets, measure_tissue,
+    DeformationSummary, Energies, TetMeasure, TissueMeasure, measure_energies, measure_tets,
+    measure_tissue,
 };
 use crate::model::Model;
 use crate::scalar::lanes::Instructions;
@@ -425,16 +426,26 @@ impl<S: Real> Simulation<S> {
         all
     }
 
+    /// Sum of unbalanced forces on free vertices over the sum of all loads, as last measured.
+    pub fn relative_residual(&self) -> f64 {
+        self.balance.relative_residual()
+    }
+
+    /// Extremes of the deformation, as last measured.
+    pub fn deformation(&self) -> DeformationSummary {
+        self.tissue.deformation
+    }
+
     /// The numbers of the last frame.
     pub fn report(&self) -> FrameReport {
         FrameReport {
             frame: self.frame,
             time: self.time(),
-            relative_residual: self.balance.relative_residual(),
+            relative_residual: self.relative_residual(),
             stiffness_error: self.balance.stiffness_error(),
             rejected_substeps: self.rejected_substeps,
             energy: self.energies(),
-            deformation: self.tissue.deformation,
+            deformation: self.deformation(),
             patches: self.patch_forces(),
             divided: self.divided,
             tools: self.tool_forces(),
