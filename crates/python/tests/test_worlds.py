@@ -65,6 +65,21 @@ def test_arrays_of_all_worlds(pressed: vi.Scene) -> None:
     assert worlds.picture(3).startswith(b"\x89PNG")
 
 
+def test_poses_turn_tools(pressed: vi.Scene) -> None:
+    worlds = vi.Worlds(pressed, 2)
+    simulation = vi.Simulation(pressed)
+    turned = simulation.tool("ball").pose
+    turned[:3, :3] = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    turned[0, 3] += 1e-3
+    for _ in range(2):
+        worlds.move_tool("ball", [turned, turned])
+        worlds.step()
+        simulation.tool("ball").pose = turned
+        simulation.advance()
+    assert np.array_equal(worlds.tool_position("ball"), [turned[:3, 3]] * 2)
+    assert np.array_equal(worlds.positions["block"][1], simulation["block"].positions)
+
+
 def test_chosen_worlds_go_back(pressed: vi.Scene) -> None:
     worlds = vi.Worlds(pressed, 4, threads=2)
     rest = worlds.positions["block"].copy()
@@ -99,6 +114,9 @@ def test_holds_and_tools_that_are_taken(block: vi.Scene) -> None:
     worlds.lock_jaws(name, locked=True)
     worlds.step()
     assert worlds.take_tool(PROBE) == "probe"
+    assert np.isfinite(worlds.wrench(name)).all()
+    worlds.reset(mask=[True, False, False])
+    assert np.isnan(worlds.wrench(name)).all(axis=1).tolist() == [True, False, False]
     worlds.reset()
     with pytest.raises(vi.SimulationError, match="let go"):
         worlds.hold_force(hold)
@@ -135,6 +153,8 @@ def test_a_world_that_fails_leaves_the_others(block: vi.Scene) -> None:
         (lambda w: w.set("body.block.cells", [1, 1, 1]), "cannot change"),
         (lambda w: w.move_tool("ball", np.zeros((2, 3))), "shape"),
         (lambda w: w.move_tool("ball", np.full((3, 3), np.nan)), "NaN"),
+        (lambda w: w.move_tool("ball", np.zeros((3, 4, 4))), "last row"),
+        (lambda w: w.take_hold("block", point=[0, 0, 0], count=0), "one vertex"),
         (lambda w: w.move_tool("bal", np.zeros((3, 3))), "there are: ball"),
         (lambda w: w.open_jaws("ball", np.zeros(3)), "no jaws"),
         (lambda w: w.reset(mask=[True]), "3 truths"),
