@@ -126,6 +126,27 @@ def box(low: float, high: float, *shape: int) -> gymnasium.spaces.Box:
     return gymnasium.spaces.Box(low, high, shape, dtype=np.float32)
 
 
+def rounded(seen: dict[str, Array]) -> Observation:
+    """Observations in single precision."""
+    return {key: value.astype(np.float32) for key, value in seen.items()}
+
+
+class End:
+    """The far end of a body along x, in all worlds."""
+
+    def __init__(self, worlds: Worlds, body: str) -> None:
+        """Of a body at rest."""
+        self.worlds, self.body = worlds, body
+        rest = worlds.positions[body][0]
+        self.vertices = np.flatnonzero(rest[:, 0] > rest[:, 0].max() - 1e-6)
+        self.rest: Array = rest[self.vertices].mean(axis=0)
+
+    def displacement(self) -> Array:
+        """From rest [m], shape (n, 3)."""
+        moved: Array = self.worlds.positions[self.body][:, self.vertices].mean(axis=1) - self.rest
+        return moved
+
+
 class TissueRetraction(Task):
     """A flap of tissue is held at one end and taken by a soft grip at the other: bring that end to a goal, gently."""
 
@@ -167,9 +188,7 @@ method = "explicit"
     def __init__(self, count: int, threads: int | None, max_force: float) -> None:
         """In so many worlds."""
         super().__init__(count, threads, max_force)
-        rest = self.worlds.positions["flap"][0].copy()
-        self.end = np.flatnonzero(rest[:, 0] > rest[:, 0].max() - 1e-6)
-        self.rest = rest[self.end].mean(axis=0)
+        self.end = End(self.worlds, "flap")
         self.grip: Array = np.zeros((count, 3))
         self.goal = np.zeros((count, 3))
         self.hold = -1
@@ -177,7 +196,11 @@ method = "explicit"
     def begin(self, chosen: Truths) -> None:
         """Takes hold, and draws a goal."""
         hold = self.worlds.take_hold(
-            "flap", point=self.rest, count=len(self.end), stiffness="100 N/m", mask=chosen
+            "flap",
+            point=self.end.rest,
+            count=len(self.end.vertices),
+            stiffness="100 N/m",
+            mask=chosen,
         )
         self.hold = hold
         self.grip[chosen] = 0.0
@@ -189,24 +212,19 @@ method = "explicit"
         self.grip = np.clip(self.grip, -0.1, 0.1)
         self.worlds.lead(self.hold, self.grip)
 
-    def displacement(self) -> Array:
-        """Of the end [m]."""
-        moved: Array = self.worlds.positions["flap"][:, self.end].mean(axis=1) - self.rest
-        return moved
-
     def observe(self) -> Observation:
         """See `spaces`."""
         seen = {
             "grip": self.grip,
-            "end": self.displacement(),
+            "end": self.end.displacement(),
             "goal": self.goal,
             "force": self.force(),
         }
-        return {key: value.astype(np.float32) for key, value in seen.items()}
+        return rounded(seen)
 
     def distance(self) -> Array:
         """From the goal [m]."""
-        distance: Array = np.linalg.norm(self.displacement() - self.goal, axis=1)
+        distance: Array = np.linalg.norm(self.end.displacement() - self.goal, axis=1)
         return distance
 
     def reward(self) -> Array:
@@ -311,7 +329,7 @@ method = "explicit"
             "force": force,
             "felt": np.clip(self.felt, 0.0, 1e4),
         }
-        return {key: value.astype(np.float32) for key, value in seen.items()}
+        return rounded(seen)
 
     def reward(self) -> Array:
         """Minus the distance from the lump in centimetres."""
@@ -375,9 +393,7 @@ method = "explicit"
     def __init__(self, count: int, threads: int | None, max_force: float) -> None:
         """In so many worlds."""
         super().__init__(count, threads, max_force)
-        rest = self.worlds.positions["strip"][0].copy()
-        self.end = np.flatnonzero(rest[:, 0] > rest[:, 0].max() - 1e-6)
-        self.rest = rest[self.end].mean(axis=0)
+        self.end = End(self.worlds, "strip")
         self.jaws: Array = np.tile(self.START, (count, 1))
         self.opening: Array = np.full(count, self.OPEN)
 
@@ -405,24 +421,19 @@ method = "explicit"
         self.worlds.open_jaws("jaws", self.opening)
         self.worlds.lock_jaws("jaws", self.opening < self.SHUT)
 
-    def displacement(self) -> Array:
-        """Of the strip's end [m]."""
-        moved: Array = self.worlds.positions["strip"][:, self.end].mean(axis=1) - self.rest
-        return moved
-
     def observe(self) -> Observation:
         """See `spaces`."""
         seen = {
             "jaws": self.jaws - self.START,
             "opening": self.opening[:, None],
-            "end": self.displacement(),
+            "end": self.end.displacement(),
             "force": self.force(),
         }
-        return {key: value.astype(np.float32) for key, value in seen.items()}
+        return rounded(seen)
 
     def reward(self) -> Array:
         """Minus what is missing of the lift, in centimetres."""
-        missing: Array = np.maximum(self.LIFT - self.displacement()[:, 2], 0.0)
+        missing: Array = np.maximum(self.LIFT - self.end.displacement()[:, 2], 0.0)
         return -100.0 * missing
 
     def force(self) -> Array:
@@ -431,7 +442,7 @@ method = "explicit"
 
     def has_succeeded(self) -> Truths:
         """Lifted."""
-        lifted: Truths = self.displacement()[:, 2] > self.LIFT
+        lifted: Truths = self.end.displacement()[:, 2] > self.LIFT
         return lifted
 
 
