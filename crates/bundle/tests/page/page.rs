@@ -27,7 +27,8 @@ pub fn open_in(kind: Kind, view: View, link: &str) -> Option<Tab> {
 /// Waits until the scene moves.
 pub fn begin(tab: &Tab) {
     tab.wait("window.viscera && viscera.ready", 30.0);
-    tab.evaluate("viscera.frame(2)");
+    // A device's first frame waits for its kernels, which a driver in software compiles for seconds.
+    tab.wait("viscera.state().frames >= 2", 60.0);
 }
 
 /// Takes messages away that lie over the picture.

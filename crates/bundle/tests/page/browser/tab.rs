@@ -79,7 +79,8 @@ impl Tab {
 
     /// The value of an expression; where it is a promise, what comes of it.
     pub fn evaluate(&self, expression: &str) -> Value {
-        self.try_evaluate(expression).unwrap_or_else(|e| panic!("`{expression}`: {e}"))
+        let told = |e| panic!("`{expression}`: {e}; the page said:\n{}", few(self.said()));
+        self.try_evaluate(expression).unwrap_or_else(told)
     }
 
     /// The same, or what was thrown.
