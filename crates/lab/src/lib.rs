@@ -5,7 +5,7 @@
 //!
 //! | to | look at |
 //! |---|---|
-//! | solve a step or a state of rest exactly | [`reference::Reference`] |
+//! | solve a step or a state of rest exactly | [`viscera_reference::Reference`] |
 //! | set up what the studies share | [`load_cases`], [`contact_cases`], [`forms`], [`bending`], [`bars`], [`contact_bench`], [`unstructured`], [`delaunay`], [`settling`], [`motion`], [`stress`] |
 //! | measure what contact costs | [`contact_costs`] |
 //! | compare the library with what must come out | [`validate`] |
@@ -23,7 +23,6 @@ pub mod delaunay;
 pub mod forms;
 pub mod load_cases;
 pub mod motion;
-pub mod reference;
 pub mod rest_command;
 pub mod sections;
 pub mod settling;

@@ -7,7 +7,7 @@ use viscera::solver::Solver;
 use viscera::state::State;
 
 use crate::load_cases::{FRAME_RATE, LoadCase};
-use crate::reference::Reference;
+use viscera_reference::Reference;
 
 /// Positions [m] at the end of every frame, shape [frame_count][vertex_count].
 pub type Motion = Vec<Vec<Vec3<f64>>>;

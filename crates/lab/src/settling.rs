@@ -10,7 +10,7 @@ use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
 use crate::load_cases::{FRAME_RATE, LoadCase};
-use crate::reference::{Reference, Standing};
+use viscera_reference::{Reference, Standing};
 
 /// Frames of a settling: three seconds.
 pub const FRAMES: u32 = 180;

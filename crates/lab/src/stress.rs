@@ -13,8 +13,8 @@ use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
 use crate::load_cases::{FRAME_RATE, LoadCase, Random};
-use crate::reference::{Reference, ReferenceError};
 use crate::settling::AfterStep;
+use viscera_reference::{Reference, ReferenceError};
 
 /// Edge lengths of the bar [m].
 pub const SIZE: [f64; 3] = [0.08, 0.04, 0.04];

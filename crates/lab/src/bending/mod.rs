@@ -28,8 +28,8 @@ use viscera::scalar::{Vec3, vec3};
 use viscera::solver::{Inputs, Pin};
 
 use crate::load_cases::{DrivenPath, GRAVITY, tissue};
-use crate::reference::Reference;
 use bodies::{BAR, Body, NEAR, Shape};
+use viscera_reference::Reference;
 
 /// Young's modulus [Pa].
 pub const YOUNG: f64 = 5e4;

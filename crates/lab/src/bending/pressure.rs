@@ -10,11 +10,12 @@
 use anyhow::Result;
 use viscera::mesh::tet_volume;
 use viscera::mesh::topology::TET_FACES;
-use viscera::scalar::{Mat3, Vec3};
+use viscera::scalar::Vec3;
 
 use super::bodies::Body;
 use super::{Element, Load, Loaded};
-use crate::reference::problem::{Problem, TetElements};
+use viscera_reference::problem::{Problem, TetElements};
+use viscera_reference::tissue::pressure;
 
 /// Of a body at rest under a load.
 pub fn roughness(body: &Body, element: Element, load: Load, poisson: f64) -> Result<f64> {
@@ -72,10 +73,4 @@ fn of_points<const N: usize>(
         points.map(of_point).sum::<f64>() / per_tet as f64
     };
     (0..elements.nodes.len()).map(of_tet).collect()
-}
-
-/// `-tr(P F^T)/(3 J)` [Pa].
-pub(crate) fn pressure(piola: &Mat3<f64>, f: &Mat3<f64>) -> f64 {
-    let pairs = piola.columns.iter().zip(&f.columns);
-    -pairs.map(|(p, f)| p.dot(*f)).sum::<f64>() / (3.0 * f.determinant())
 }

@@ -24,8 +24,8 @@ use viscera::state::State;
 
 use super::{Way, select};
 use crate::load_cases::{FRAME_RATE, NEAR, tissue};
-use crate::reference::Reference;
 use crate::settling::{FRAMES, KEPT_VELOCITY};
+use viscera_reference::Reference;
 
 /// Frames in which the bodies are brought together.
 const PATH_FRAMES: u32 = 40;

@@ -13,8 +13,8 @@ use viscera::state::State;
 
 use super::{Way, select};
 use crate::load_cases::{FRAME_RATE, NEAR};
-use crate::reference::Reference;
 use crate::settling::{FRAMES, KEPT_VELOCITY};
+use viscera_reference::Reference;
 
 /// Frames in which the ball goes down.
 const PATH_FRAMES: u32 = 20;

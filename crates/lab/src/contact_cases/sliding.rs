@@ -19,8 +19,8 @@ use viscera::state::State;
 
 use super::Way;
 use crate::load_cases::{FRAME_RATE, GRAVITY};
-use crate::reference::Reference;
 use crate::settling::KEPT_VELOCITY;
+use viscera_reference::Reference;
 
 /// Frames in which gravity turns, and in which the body comes to rest after that, if it does.
 const TURNING: u32 = 30;

@@ -9,9 +9,9 @@ use viscera::solver::Solver;
 use viscera::state::State;
 
 use super::path::Rest;
-use crate::reference::Reference;
 use crate::sections::Progress;
 use crate::settling::{Distance, KEPT_VELOCITY};
+use viscera_reference::Reference;
 use viscera_report::{percent, scientific};
 use viscera_resources::Memory;
 

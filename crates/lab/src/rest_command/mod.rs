@@ -130,26 +130,7 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
 
 /// Refuses scenes whose end depends on more than what acts there.
 pub fn refuse_what_rest_does_not_determine(scene: &Scene) -> Result<()> {
-    // Where tissue was when it was taken hold of is a matter of its motion.
-    let taken = scene.motions.iter().find(|motion| motion.start > 0.0);
-    if let Some(motion) = taken {
-        bail!(
-            "{}: motion `{}` takes hold of moving tissue at {} s, which a state of rest does not determine; let it start \
-             at 0 s",
-            scene.name,
-            motion.name,
-            motion.start
-        );
-    }
-    if let Some(change) = scene.changes.first() {
-        bail!(
-            "{}: settings change at {} s; write those of the end where the bodies and the solver are, and \
-             leave [[change]] out",
-            scene.name,
-            change.time
-        );
-    }
-    tools::refuse(scene)
+    viscera_reference::check_determined(scene).with_context(|| scene.name.clone())
 }
 
 fn heading(simulation: &Simulation<f64>) -> String {

@@ -10,8 +10,8 @@ use viscera::simulation::Simulation;
 use viscera::solver::Inputs;
 use viscera_resources::Memory;
 
-use crate::reference::{Convergence, Cost, Reference, ReferenceError, Standing};
 use crate::sections::Progress;
+use viscera_reference::{Convergence, Cost, Reference, ReferenceError, Standing};
 
 /// What the scene does at one time.
 struct Stop {

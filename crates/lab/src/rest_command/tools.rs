@@ -1,32 +1,10 @@
 //! Tools at rest: what a state of rest says of them, and what it cannot.
 
-use anyhow::{Result, bail};
 use viscera::scalar::Vec3;
 use viscera::scene::Scene;
 use viscera::simulation::{Simulation, ToolForce, ToolState};
 
 use super::path::Rest;
-
-/// Refuses jaws whose place, or whose hold, depends on more than where the tool is at the end.
-pub(super) fn refuse(scene: &Scene) -> Result<()> {
-    let with_jaws = || scene.tools.iter().filter_map(|tool| Some((tool, tool.jaws.as_ref()?)));
-    if let Some((tool, _)) = with_jaws().find(|(_, jaws)| jaws.follow_force()) {
-        bail!(
-            "{}: the jaws of tool `{}` follow a force, so that a state of rest does not tell their angle; drive them by \
-             an angle",
-            scene.name,
-            tool.name
-        );
-    }
-    if let Some((tool, _)) = with_jaws().find(|(_, jaws)| !jaws.locks.is_empty()) {
-        bail!(
-            "{}: tool `{}` ties tissue to its jaws, and where it does so is a matter of motion; leave out its locks",
-            scene.name,
-            tool.name
-        );
-    }
-    Ok(())
-}
 
 /// Says that tools have no friction in a state of rest, where they have some in the scene.
 pub(crate) fn note(scene: &Scene) -> Option<String> {

@@ -13,7 +13,7 @@ use super::panels::{self, Panel};
 use super::step::{Cost, MeasuredStep};
 use super::{Context, Section};
 use crate::load_cases::{LoadCase, Size};
-use crate::reference::Reference;
+use viscera_reference::Reference;
 use viscera_report::{Table, percent, si};
 
 pub(super) const COLORS: Section = Section {

@@ -14,7 +14,7 @@ use viscera::solver::{Inputs, Solver};
 use viscera::state::State;
 
 use crate::load_cases::{FRAME_RATE, LoadCase};
-use crate::reference::Reference;
+use viscera_reference::Reference;
 
 /// Beyond this a curve has left the scene: it is cut there.
 const LOST: f64 = 1e6;

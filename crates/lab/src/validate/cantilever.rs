@@ -20,8 +20,8 @@ use viscera::solver::{Inputs, Pin};
 use super::methods::{LibrarySolver, worse};
 use super::{Context, Section};
 use crate::load_cases::{BAR, DENSITY, GRAVITY, LoadCase, NEAR, tissue};
-use crate::reference::Reference;
 use crate::settling::{Error, compare, truth};
+use viscera_reference::Reference;
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, si};
 
 pub(super) const SECTION: Section =

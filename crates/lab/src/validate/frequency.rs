@@ -32,7 +32,7 @@ use viscera::state::State;
 use super::methods::worse;
 use super::{Context, Section};
 use crate::load_cases::{BAR, DENSITY, FRAME_RATE, GRAVITY, LoadCase, NEAR, tissue};
-use crate::reference::{Mode, Reference};
+use viscera_reference::{Mode, Reference};
 use viscera_report::{Axis, Plot, Series, Style, Table, percent, si};
 
 pub(super) const SECTION: Section = Section {

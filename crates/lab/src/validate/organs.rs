@@ -18,9 +18,9 @@ use super::course::{Places, begin, distance, follow, small_steps};
 use super::methods::worse;
 use super::{Context, Section};
 use crate::bars::text;
-use crate::reference::Reference;
 use crate::settling::{Distance, KEPT_VELOCITY};
 use crate::unstructured::shuffled;
+use viscera_reference::Reference;
 use viscera_report::{Table, percent};
 use viscera_resources::files::write_atomic;
 

@@ -9,8 +9,8 @@ use viscera::settings::{Acceleration, SolverSettings};
 use super::methods::{Form, scheduled};
 use super::{Context, Section};
 use crate::load_cases::tissue;
-use crate::reference::Reference;
 use crate::stress::{self, FRAMES, HELD, Kind, ROUND_OFF, Run, SIZE};
+use viscera_reference::Reference;
 use viscera_report::{Table, percent};
 
 pub(super) const SECTION: Section =

@@ -10,7 +10,7 @@ use viscera::scene::Scene;
 use viscera::settings::Precision;
 use viscera::simulation::{Assembly, PatchForce, RestReport, Simulation, Standing};
 use viscera_lab::load_cases::Random;
-use viscera_lab::reference::Reference;
+use viscera_reference::Reference;
 
 /// More than this needs a warning.
 const TOLD: f64 = 0.01;

@@ -10,11 +10,11 @@ use viscera::scalar::{Mat3, Vec3, vec3};
 use viscera::solver::Inputs;
 use viscera_lab::contact_cases::Pressing;
 use viscera_lab::load_cases::{GRAVITY, Random};
-use viscera_lab::reference::contact::{Clearance, Contacts, friction, pressure_law};
-use viscera_lab::reference::matrix::Pattern;
-use viscera_lab::reference::objective::{Load, Objective};
-use viscera_lab::reference::problem::Problem;
-use viscera_lab::reference::{Reference, ReferenceError, Touched};
+use viscera_reference::contact::{Clearance, Contacts, friction, pressure_law};
+use viscera_reference::matrix::Pattern;
+use viscera_reference::objective::{Load, Objective};
+use viscera_reference::problem::Problem;
+use viscera_reference::{Reference, ReferenceError, Touched};
 
 const SHAPES: [Shape; 5] = [
     Shape::HalfSpace,

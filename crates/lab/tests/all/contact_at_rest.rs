@@ -8,7 +8,7 @@ use viscera::settings::{Count, Integrator, Method, SolverSettings};
 use viscera::solver::Solver;
 use viscera::state::State;
 use viscera_lab::contact_cases::{Held, Pressed, Pressing, Sliding, Way};
-use viscera_lab::reference::Reference;
+use viscera_reference::Reference;
 
 fn soft(young: f64, poisson: f64) -> Material {
     Material::new(MaterialModel::StableNeoHookean, young, poisson, 1000.0).expect("a material")

@@ -3,7 +3,7 @@
 use viscera::scalar::Vec3;
 use viscera::scene::Scene;
 use viscera::simulation::{Assembly, PatchForce, PatchKind, Simulation};
-use viscera_lab::reference::Reference;
+use viscera_reference::Reference;
 
 /// A liver in its ligaments, a point of whose lower edge is lifted, as a hand in a window does.
 const LIVER: &str = r#"

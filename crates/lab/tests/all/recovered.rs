@@ -15,12 +15,12 @@ use viscera::solver::recovered::Recovered;
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 use viscera_lab::load_cases::Random;
-use viscera_lab::reference::Reference;
-use viscera_lab::reference::contact::Contacts;
-use viscera_lab::reference::matrix::Pattern;
-use viscera_lab::reference::objective::{Load, Objective, creep_at};
-use viscera_lab::reference::problem::Problem;
 use viscera_lab::unstructured::shuffled;
+use viscera_reference::Reference;
+use viscera_reference::contact::Contacts;
+use viscera_reference::matrix::Pattern;
+use viscera_reference::objective::{Load, Objective, creep_at};
+use viscera_reference::problem::Problem;
 
 const SNH: MaterialModel = MaterialModel::StableNeoHookean;
 const STVK: MaterialModel = MaterialModel::SaintVenantKirchhoff;

@@ -10,8 +10,8 @@ use viscera::scalar::{Vec3, vec3};
 use viscera::solver::recovered::Recovered;
 use viscera::solver::{Inputs, Pin};
 use viscera_lab::load_cases::{GRAVITY, Random};
-use viscera_lab::reference::Reference;
 use viscera_lab::unstructured::shuffled;
+use viscera_reference::Reference;
 
 const SNH: MaterialModel = MaterialModel::StableNeoHookean;
 

@@ -11,11 +11,11 @@ use viscera::scalar::{Mat3, Vec3, vec3};
 use viscera::solver::{Inputs, Pin, Tether};
 use viscera::state::State;
 use viscera_lab::load_cases::Random;
-use viscera_lab::reference::contact::Contacts;
-use viscera_lab::reference::matrix::Pattern;
-use viscera_lab::reference::objective::{Load, Objective, creep_at};
-use viscera_lab::reference::problem::Problem;
-use viscera_lab::reference::{Reference, ReferenceError};
+use viscera_reference::contact::Contacts;
+use viscera_reference::matrix::Pattern;
+use viscera_reference::objective::{Load, Objective, creep_at};
+use viscera_reference::problem::Problem;
+use viscera_reference::{Reference, ReferenceError};
 
 const STVK: MaterialModel = MaterialModel::SaintVenantKirchhoff;
 const SNH: MaterialModel = MaterialModel::StableNeoHookean;

@@ -12,10 +12,10 @@ use crate::common::{
 };
 use viscera::scalar::Vec3;
 use viscera::state::State;
-use viscera_lab::reference::Reference;
-use viscera_lab::reference::contact::Contacts;
-use viscera_lab::reference::matrix::Pattern;
-use viscera_lab::reference::objective::{Load, Objective};
+use viscera_reference::Reference;
+use viscera_reference::contact::Contacts;
+use viscera_reference::matrix::Pattern;
+use viscera_reference::objective::{Load, Objective};
 
 const AGREEMENT: f64 = 1e-8;
 

@@ -3,9 +3,9 @@
 use viscera::material::{Material, MaterialModel};
 use viscera::settings::{Acceleration, AndersonGuard, AndersonOn, Count, SolverSettings, Threads};
 use viscera_lab::load_cases::{LoadCase, Size, tissue};
-use viscera_lab::reference::Reference;
 use viscera_lab::settling::{Error, compare, settle, truth};
 use viscera_lab::stress::{self, FRAMES, Kind, Run};
+use viscera_reference::Reference;
 
 fn one_thread(iterations: u32) -> SolverSettings {
     SolverSettings {

@@ -12,11 +12,11 @@ use super::super::methods::quasi_newton;
 use super::super::step::MeasuredStep;
 use crate::forms::Form;
 use crate::load_cases::{FRAME_RATE, LoadCase, Size};
-use crate::reference::Reference;
-use crate::reference::contact::Contacts;
-use crate::reference::objective::{Load, Objective, creep_at};
-use crate::reference::problem::Problem;
 use crate::sections::Changes;
+use viscera_reference::Reference;
+use viscera_reference::contact::Contacts;
+use viscera_reference::objective::{Load, Objective, creep_at};
+use viscera_reference::problem::Problem;
 
 /// Scenes and the frames before the measured step, which lies in the middle of the motion.
 const MOMENTS: [(&str, u32); 3] = [("cantilever", 10), ("twist", 11), ("grab", 7)];

@@ -8,10 +8,10 @@ use viscera::settings::{AndersonGuard, AndersonOn, Count, SolverSettings};
 
 use super::Context;
 use crate::load_cases::Size;
-use crate::reference::Reference;
 use crate::settling::{AfterStep, compare, settle_with, truth};
 use crate::stress::{self, FRAMES, Kind, ROUND_OFF, Run, SIZE};
 use crate::study::methods::{COLORED, NamedSettings, anderson, exact, published};
+use viscera_reference::Reference;
 
 /// Young's modulus [Pa] and Poisson's ratio of the bar in trouble.
 pub(super) const YOUNG: f64 = 1e4;

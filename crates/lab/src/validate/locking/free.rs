@@ -13,7 +13,7 @@ use super::{Context, list};
 use crate::bending::YOUNG;
 use crate::bending::bodies::{Body, Filling, Shape};
 use crate::load_cases::tissue;
-use crate::reference::Reference;
+use viscera_reference::Reference;
 
 /// Of rigid motion.
 const RIGID: usize = 6;

@@ -17,10 +17,13 @@
 //! | `newton` | the iteration |
 //! | `frequency` | the slowest oscillation |
 //! | `spectrum` | many oscillations of a free body |
+//! | `course` | states of rest of a scene |
+//! | `sensitivity` | derivatives of a state of rest by the constants of a model |
 //! | `fixing` | whether a body can be at rest |
 //! | `error` | why there is no solution |
 
 pub mod contact;
+mod course;
 mod error;
 pub mod fixing;
 pub mod frequency;
@@ -29,6 +32,7 @@ pub mod newton;
 pub mod objective;
 pub mod problem;
 pub mod recovered;
+pub mod sensitivity;
 pub mod spectrum;
 pub mod tissue;
 mod touching;
@@ -43,6 +47,7 @@ use viscera::solver::{Inputs, Tether};
 use viscera::state::State;
 
 pub use contact::Touched;
+pub use course::{Course, RestState, Undetermined, check_determined};
 pub use error::ReferenceError;
 pub use frequency::Mode;
 pub use matrix::Cost;
@@ -134,6 +139,12 @@ impl Reference {
     /// Changes how much memory [B] may be taken.
     pub fn allow_memory(mut self, bytes: u64) -> Self {
         self.memory = bytes;
+        self
+    }
+
+    /// Changes how far Newton's method goes.
+    pub fn with_tolerance(mut self, tolerance: Tolerance) -> Self {
+        self.tolerance = tolerance;
         self
     }
 

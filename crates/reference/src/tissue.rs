@@ -147,6 +147,12 @@ pub fn cofactor_change(f: &Mat3<f64>, direction: &Mat3<f64>) -> Mat3<f64> {
     )
 }
 
+/// Mean pressure of a first Piola stress: `-tr(P F^T)/(3 J)` [Pa].
+pub fn pressure(piola: &Mat3<f64>, f: &Mat3<f64>) -> f64 {
+    let pairs = piola.columns.iter().zip(&f.columns);
+    -pairs.map(|(p, f)| p.dot(*f)).sum::<f64>() / (3.0 * f.determinant())
+}
+
 /// The nearest positive semi-definite matrix: negative eigenvalues become zero.
 pub fn project(matrix: &mut Stiffness) {
     let full = Mat::from_fn(9, 9, |i, j| 0.5 * (matrix[i][j] + matrix[j][i]));

@@ -71,10 +71,10 @@ impl Reference {
             FactorError::Indefinite => ReferenceError::Unstable,
         })?;
         let width = (count + SPARE).min(pattern.unknowns());
-        let mut random = crate::load_cases::Random(1);
         let vertices = self.problem.vertex_count();
-        let mut vectors: Vec<Vec<Vec3<f64>>> =
-            (0..width).map(|_| (0..vertices).map(|_| random.vector(1.0)).collect()).collect();
+        let mut vectors: Vec<Vec<Vec3<f64>>> = (0..width)
+            .map(|k| (0..vertices).map(|v| scattered(k * vertices + v)).collect())
+            .collect();
         let mut before = vec![0.0; count];
         for _ in 0..STEPS {
             let loads: Vec<_> = vectors.iter().map(|x| mass.multiply(pattern, x)).collect();
@@ -165,4 +165,13 @@ fn ritz(images: &Vectors, loads: &Vectors, weighted: &Vectors) -> Option<(Vec<f6
         sum
     });
     Some((values, vectors.collect()))
+}
+
+/// A vector of the `n`-th of numbers that lie evenly and without order in [-1/2, 1/2): multiples of three irrational numbers.
+fn scattered(n: usize) -> Vec3<f64> {
+    // Powers of the root of `x^4 = x + 1`: Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018.
+    Vec3::from_f64(
+        [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3]
+            .map(|step: f64| (n as f64 * step).fract() - 0.5),
+    )
 }

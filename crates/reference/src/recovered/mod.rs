@@ -10,11 +10,13 @@
 //! Which tetrahedra belong to a domain and a cluster is the library's ([`Domains`]); the formulas of
 //! `viscera::elements::recovered` are not used, so that they can be compared with these.
 
+mod shares;
+
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use viscera::elements::neo_hookean::volume_change;
-use viscera::elements::recovered::{FLOOR_STIFFNESS, VOLUME_FLOOR, bulk_shares};
+use viscera::elements::recovered::{FLOOR_STIFFNESS, VOLUME_FLOOR};
 use viscera::layout::{Domains, Smoothing};
 use viscera::material::MaterialModel;
 use viscera::mesh::topology::{TET_EDGES, TET_FACES};
@@ -24,6 +26,7 @@ use viscera::scalar::{Mat3, Vec3};
 use super::matrix::{MatrixValues, Pattern};
 use super::objective::Value;
 use super::tissue::{Creep, Stiffness, TissueLaw, cofactor_change, project};
+use shares::shares;
 
 /// A gradient as a sum over vertices: `F = sum_j x_j b_j^T`, by ascending vertex.
 type Gradient = BTreeMap<u32, Vec3<f64>>;
@@ -47,6 +50,12 @@ struct Volume {
     tets: Vec<(u32, f64)>,
     /// Vertices of these tetrahedra's gradients, ascending.
     vertices: Vec<u32>,
+    /// At rest [m^3].
+    rest: f64,
+    /// Whether it is a cluster's.
+    is_cluster: bool,
+    /// Index into [`Recovered::tissues`].
+    tissue: u32,
     /// Rest volume times bulk stiffness [J].
     stiffness: f64,
     /// Retardation time [s].
@@ -58,6 +67,10 @@ struct Volume {
 struct Floor {
     nodes: [u32; 4],
     gradients: [Vec3<f64>; 4],
+    /// Rest volume times the floor's stiffness over the shear modulus [m^3].
+    share: f64,
+    /// Index into [`Recovered::tissues`].
+    tissue: u32,
     /// Rest volume times the floor's stiffness [J].
     stiffness: f64,
 }
@@ -111,12 +124,13 @@ impl Recovered {
             let material = domains.materials[domains.tet_domains[t][0] as usize];
             let volume = (1.0 - smoothing.vertex_share) * domains.tet_volumes[t];
             recovered.push(&gradient, volume, material);
+            let share = FLOOR_STIFFNESS * domains.tet_volumes[t];
             recovered.floors.push(Floor {
                 nodes: domains.tet_vertices[t],
                 gradients: domains.frames[t].gradients,
-                stiffness: FLOOR_STIFFNESS
-                    * model.materials[material as usize].lame_mu
-                    * domains.tet_volumes[t],
+                share,
+                tissue: material,
+                stiffness: share * model.materials[material as usize].lame_mu,
             });
         }
         for (n, gradient) in averages.iter().enumerate() {
@@ -150,11 +164,11 @@ impl Recovered {
             }
         }
         let rest = domains.volumes.iter().chain(&domains.cluster_volumes);
-        for (q, ((tets, material), volume)) in tets.into_iter().zip(materials).zip(rest).enumerate()
-        {
-            let material = &model.materials[material as usize];
+        for (q, ((tets, tissue), volume)) in tets.into_iter().zip(materials).zip(rest).enumerate() {
+            let material = &model.materials[tissue as usize];
+            let is_cluster = q >= domains.len();
             let (_, domain, cluster) = shares(material, domains.smoothing);
-            let stiffness = volume * if q < domains.len() { domain } else { cluster };
+            let stiffness = volume * if is_cluster { cluster } else { domain };
             if stiffness == 0.0 {
                 continue;
             }
@@ -162,7 +176,16 @@ impl Recovered {
             let mut vertices: Vec<u32> = all.collect();
             vertices.sort_unstable();
             vertices.dedup();
-            self.volumes.push(Volume { tets, vertices, stiffness, viscosity: material.viscosity });
+            let (rest, viscosity) = (*volume, material.viscosity);
+            self.volumes.push(Volume {
+                tets,
+                vertices,
+                rest,
+                is_cluster,
+                tissue,
+                stiffness,
+                viscosity,
+            });
         }
     }
 
@@ -261,7 +284,7 @@ impl Recovered {
         for (t, (pressure, volume)) in pressures.iter_mut().zip(volumes).enumerate() {
             let f = self.gradient_at(t, x);
             let piola = self.tissues[self.places[t].tissue as usize].piola(&f, None);
-            *pressure = crate::bending::pressure::pressure(&piola, &f) - *pressure / volume;
+            *pressure = super::tissue::pressure(&piola, &f) - *pressure / volume;
         }
         pressures
     }
@@ -403,18 +426,6 @@ fn images(stiffness: &Stiffness, g: Vec3<f64>) -> [Mat3<f64>; 3] {
 fn block_of(images: &[Mat3<f64>; 3], g: Vec3<f64>) -> [[f64; 3]; 3] {
     let columns = images.map(|image| (image * g).to_array());
     [0, 1, 2].map(|a| [columns[0][a], columns[1][a], columns[2][a]])
-}
-
-/// Bulk stiffness [Pa] beside the shear, of domains and of clusters.
-fn shares(
-    material: &viscera::model::MaterialConstants<f64>,
-    smoothing: Smoothing,
-) -> (f64, f64, f64) {
-    let shares = bulk_shares(material.lame_lambda, material.lame_mu);
-    match smoothing.clustered {
-        true => (shares.local, shares.domain, shares.cluster),
-        false => (shares.local, shares.domain + shares.cluster, 0.0),
-    }
 }
 
 /// Adds `pressure` times the second derivative of the determinant.

@@ -1,0 +1,269 @@
+//! States of rest of a scene, from one to the next, so that each lies in the minimum that its motions lead to.
+
+use viscera::contact::Wrench;
+use viscera::model::Model;
+use viscera::scalar::Vec3;
+use viscera::scene::{Instrument, Scene};
+use viscera::settings::Elements;
+use viscera::simulation::{Simulation, ToolState};
+use viscera::solver::Inputs;
+
+use super::sensitivity::{Change, Tangent};
+use super::{Convergence, Reference, ReferenceError, Tolerance};
+
+/// Why a scene has no state of rest that does not depend on how it came there.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Undetermined {
+    /// A motion takes hold of tissue on its way.
+    #[error(
+        "motion `{name}` takes hold of moving tissue at {start} s, which a state of rest does not determine; let it start \
+         at 0 s"
+    )]
+    LateHold {
+        /// Of the motion.
+        name: String,
+        /// [s].
+        start: f64,
+    },
+    /// Settings change on the way.
+    #[error(
+        "settings change at {time} s; write those of the end where the bodies and the solver are, and leave [[change]] out"
+    )]
+    Change {
+        /// [s].
+        time: f64,
+    },
+    /// A tool comes on its way.
+    #[error(
+        "tool `{name}` comes at {begin} s, and states of rest know the tools of the beginning only; let it be there from 0 s, \
+         away from tissue"
+    )]
+    LateTool {
+        /// Its name.
+        name: String,
+        /// [s].
+        begin: f64,
+    },
+    /// Jaws close until they press.
+    #[error(
+        "the jaws of tool `{name}` follow a force, so that a state of rest does not tell their angle; drive them by an angle"
+    )]
+    Jaws {
+        /// Of the tool.
+        name: String,
+    },
+    /// Jaws tie tissue.
+    #[error(
+        "tool `{name}` ties tissue to its jaws, and where it does so is a matter of motion; leave out its locks"
+    )]
+    Locks {
+        /// Of the tool.
+        name: String,
+    },
+}
+
+/// Refuses scenes whose states of rest depend on more than what acts there.
+pub fn check_determined(scene: &Scene) -> Result<(), Undetermined> {
+    // Where tissue was when it was taken hold of is a matter of its motion.
+    if let Some(motion) = scene.motions.iter().find(|motion| motion.start > 0.0) {
+        return Err(Undetermined::LateHold { name: motion.name.clone(), start: motion.start });
+    }
+    if let Some(change) = scene.changes.first() {
+        return Err(Undetermined::Change { time: change.time });
+    }
+    if let Some(tool) = scene.tools.iter().find(|tool| tool.begin > 0.0) {
+        return Err(Undetermined::LateTool { name: tool.name.clone(), begin: tool.begin });
+    }
+    let with_jaws = || scene.tools.iter().filter_map(|tool| Some((tool, tool.jaws.as_ref()?)));
+    if let Some((tool, _)) = with_jaws().find(|(_, jaws)| jaws.follow_force()) {
+        return Err(Undetermined::Jaws { name: tool.name.clone() });
+    }
+    match with_jaws().find(|(_, jaws)| !jaws.locks.is_empty()) {
+        Some((tool, _)) => Err(Undetermined::Locks { name: tool.name.clone() }),
+        None => Ok(()),
+    }
+}
+
+/// Where an increment of time defeats Newton's method it is divided, at most into so many parts.
+const MOST_PARTS: u32 = 64;
+
+/// Unbalanced forces over those of the start: next to round-off, as derivatives are of what is at rest.
+const CLOSE: f64 = 1e-13;
+
+/// A scene whose states of rest are followed.
+pub struct Course<'a> {
+    simulation: &'a Simulation<f64>,
+    reference: Reference,
+}
+
+/// A state of rest of a scene.
+#[derive(Clone, Debug)]
+pub struct RestState {
+    /// [s].
+    pub time: f64,
+    /// What acts there.
+    pub inputs: Inputs<f64>,
+    /// Positions [m], shape [vertex_count].
+    pub positions: Vec<Vec3<f64>>,
+    /// Forces [N] that hold pinned vertices, zero on free ones, shape [vertex_count].
+    pub holding: Vec<Vec3<f64>>,
+    /// On each of the tools that act there.
+    pub wrenches: Vec<Wrench>,
+    /// How the last solve went.
+    pub convergence: Convergence,
+}
+
+impl<'a> Course<'a> {
+    /// Of a simulation that has just been made, with the elements that its solver has.
+    pub fn new(simulation: &'a Simulation<f64>, memory: u64) -> Self {
+        let (model, elements) = (simulation.model(), simulation.solver().elements);
+        let tolerance = Tolerance { relative: CLOSE, ..Tolerance::default() };
+        let reference = Reference::with_elements(model, elements).allow_memory(memory);
+        let reference = reference.with_tolerance(tolerance);
+        Self { simulation, reference }
+    }
+
+    /// Positions [m] where nothing acts, shape [vertex_count].
+    pub fn rest(&self) -> &[Vec3<f64>] {
+        &self.simulation.model().rest_positions
+    }
+
+    /// The state of rest at a time [s]: from `start`, positions [m] of the state at a time before, on.
+    pub fn go(
+        &mut self,
+        (before, start): (f64, &[Vec3<f64>]),
+        time: f64,
+    ) -> Result<RestState, ReferenceError> {
+        let mut parts = 1;
+        loop {
+            match self.go_in_parts((before, start), time, parts) {
+                Err(ReferenceError::NotConverged { .. }) if parts < MOST_PARTS => parts *= 4,
+                done => return done,
+            }
+        }
+    }
+
+    fn go_in_parts(
+        &mut self,
+        (before, start): (f64, &[Vec3<f64>]),
+        time: f64,
+        parts: u32,
+    ) -> Result<RestState, ReferenceError> {
+        let mut positions = start.to_vec();
+        for part in 1..parts {
+            let share = f64::from(part) / f64::from(parts);
+            let inputs = self.simulation.inputs_at(before + (time - before) * share);
+            positions = self.reference.settle(&positions, &inputs)?.positions;
+        }
+        let inputs = self.simulation.inputs_at(time);
+        let solution = self.reference.settle(&positions, &inputs)?;
+        let (positions, convergence) = (solution.positions, solution.convergence);
+        let wrenches = self.reference.wrenches(&positions, &inputs, &[])?;
+        let mut holding = vec![Vec3::ZERO; positions.len()];
+        let reactions = self.reference.reactions(&positions, &inputs)?;
+        for (pin, force) in inputs.pins.iter().zip(reactions) {
+            holding[pin.vertex as usize] = force;
+        }
+        Ok(RestState { time, inputs, positions, holding, wrenches, convergence })
+    }
+
+    fn model(&self) -> (&Model<f64>, Elements) {
+        (self.simulation.model(), self.simulation.solver().elements)
+    }
+
+    /// How a state of rest changes, by each of these changes.
+    pub fn tangents(
+        &self,
+        state: &RestState,
+        changes: &[Change],
+    ) -> Result<Vec<Tangent>, ReferenceError> {
+        let (model, elements) = self.model();
+        let mut linearized = self.reference.linearize(&state.positions, &state.inputs)?;
+        Ok(changes.iter().map(|change| linearized.tangent(model, elements, change)).collect())
+    }
+
+    /// Derivatives of a function of positions, by each of these changes, from its gradient [per m], shape [vertex_count].
+    pub fn pull_back(
+        &self,
+        state: &RestState,
+        by_positions: &[Vec3<f64>],
+        changes: &[Change],
+    ) -> Result<Vec<f64>, ReferenceError> {
+        let (model, elements) = self.model();
+        let mut linearized = self.reference.linearize(&state.positions, &state.inputs)?;
+        let adjoint = linearized.adjoint(by_positions);
+        let by_change = |change: &Change| {
+            let slope = linearized.slope(model, elements, change);
+            -adjoint.iter().zip(&slope).map(|(a, b)| a.dot(*b)).sum::<f64>()
+        };
+        Ok(changes.iter().map(by_change).collect())
+    }
+
+    /// Forces [N] on the tissue by each of the scene's fixings, motions and forces, and on each of its tools, by their names.
+    pub fn forces(&self, state: &RestState) -> Vec<(String, Vec3<f64>)> {
+        let mut forces = self.patches(state, &state.positions, &state.holding);
+        let on_parts: Vec<_> = state.wrenches.iter().map(|wrench| wrench.force).collect();
+        forces.extend(self.tools(&on_parts));
+        forces
+    }
+
+    /// Their derivatives by the number at `key`, whose change of the state is known [N per unit].
+    pub fn forces_along(
+        &self,
+        state: &RestState,
+        tangent: &Tangent,
+        key: &str,
+    ) -> Vec<(String, Vec3<f64>)> {
+        // Forces of patches are linear in positions and holding forces: any step will do, and one about as large as the body
+        // rounds least.
+        let largest = |of: &[Vec3<f64>]| of.iter().map(|x| x.length()).fold(0.0, f64::max);
+        let moved = largest(&tangent.positions);
+        let step = if moved > 0.0 { largest(&state.positions) / moved } else { 1.0 };
+        let add = |to: &[Vec3<f64>], change: &[Vec3<f64>]| -> Vec<_> {
+            to.iter().zip(change).map(|(to, change)| *to + *change * step).collect()
+        };
+        let here = self.patches(state, &state.positions, &state.holding);
+        let positions = add(&state.positions, &tangent.positions);
+        let there = self.patches(state, &positions, &add(&state.holding, &tangent.holding));
+        let mut forces: Vec<_> = (here.iter().zip(there))
+            .map(|((name, here), (_, there))| (name.clone(), (there - *here) * (1.0 / step)))
+            .collect();
+        // Springs of a fixing pull in proportion to their stiffness.
+        for fixing in &self.simulation.scene().fixings {
+            let is_it =
+                key.strip_prefix("fixing.").and_then(|rest| rest.strip_suffix(".stiffness"))
+                    == Some(&fixing.name);
+            let (Some(stiffness), true) = (fixing.stiffness, is_it) else { continue };
+            let pulls = here.iter().find(|(name, _)| *name == fixing.name);
+            let entry = forces.iter_mut().find(|(name, _)| *name == fixing.name);
+            if let (Some((_, pulls)), Some((_, force))) = (pulls, entry) {
+                *force += *pulls * (1.0 / stiffness);
+            }
+        }
+        forces.extend(self.tools(&tangent.tools));
+        forces
+    }
+
+    fn patches(
+        &self,
+        state: &RestState,
+        positions: &[Vec3<f64>],
+        holding: &[Vec3<f64>],
+    ) -> Vec<(String, Vec3<f64>)> {
+        let patches = self.simulation.patch_forces_at(state.time, positions, holding);
+        patches.into_iter().map(|patch| (patch.name, Vec3::from_f64(patch.force))).collect()
+    }
+
+    /// Sums over the parts of each tool.
+    fn tools(&self, on_parts: &[Vec3<f64>]) -> Vec<(String, Vec3<f64>)> {
+        let mut parts = on_parts.iter();
+        let states = self.simulation.tools();
+        let of_tool = |(tool, state): (&Instrument, &ToolState)| {
+            let count = if state.is_there { tool.parts.len() } else { 0 };
+            let force = parts.by_ref().take(count).fold(Vec3::ZERO, |sum, force| sum + *force);
+            (tool.name.clone(), force)
+        };
+        self.simulation.assembly().tools.iter().zip(&states).map(of_tool).collect()
+    }
+}
