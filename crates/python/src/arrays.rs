@@ -31,7 +31,7 @@ pub fn row<'py>(py: Python<'py>, numbers: &[f64]) -> Bound<'py, PyArray1<f64>> {
 }
 
 /// Numbers of any array-like of this shape.
-fn numbers(what: &str, value: &Bound<'_, PyAny>, shape: &[usize]) -> PyResult<Vec<f64>> {
+pub fn numbers(what: &str, value: &Bound<'_, PyAny>, shape: &[usize]) -> PyResult<Vec<f64>> {
     let py = value.py();
     let numpy = py.import("numpy")?;
     let refuse = |found: String| {

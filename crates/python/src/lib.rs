@@ -12,6 +12,7 @@ mod frame;
 mod functions;
 mod hold;
 mod picture;
+mod rest;
 mod scene;
 mod simulation;
 mod snapshot;
@@ -32,6 +33,8 @@ mod _viscera {
     use super::functions::{built_in_scenes, describe, digest, version};
     #[pymodule_export]
     use super::hold::Hold;
+    #[pymodule_export]
+    use super::rest::{Rest, rest};
     #[pymodule_export]
     use super::scene::Scene;
     #[pymodule_export]

@@ -45,6 +45,20 @@ pub enum Undetermined {
         /// [s].
         begin: f64,
     },
+    /// Connective tissue, which the reference has none of.
+    #[error(
+        "`{name}` ties bodies together, and states of rest know springs, fixings and tools only; leave out [[tie]]"
+    )]
+    Tie {
+        /// Of the tie.
+        name: String,
+    },
+    /// Several bodies that may touch.
+    #[error(
+        "its bodies meet each other, and states of rest know contact with tools only; where they stay apart set \
+         contact.bodies = false"
+    )]
+    Bodies,
     /// Jaws close until they press.
     #[error(
         "the jaws of tool `{name}` follow a force, so that a state of rest does not tell their angle; drive them by an angle"
@@ -71,6 +85,12 @@ pub fn check_determined(scene: &Scene) -> Result<(), Undetermined> {
     }
     if let Some(change) = scene.changes.first() {
         return Err(Undetermined::Change { time: change.time });
+    }
+    if let Some(tie) = scene.ties.first() {
+        return Err(Undetermined::Tie { name: tie.name.clone() });
+    }
+    if scene.bodies.len() > 1 && scene.contact.bodies {
+        return Err(Undetermined::Bodies);
     }
     if let Some(tool) = scene.tools.iter().find(|tool| tool.begin > 0.0) {
         return Err(Undetermined::LateTool { name: tool.name.clone(), begin: tool.begin });
@@ -200,7 +220,7 @@ impl<'a> Course<'a> {
         Ok(changes.iter().map(by_change).collect())
     }
 
-    /// Forces [N] on the tissue by each of the scene's fixings, motions and forces, and on each of its tools, by their names.
+    /// Forces [N] on the tissue by each of the scene's fixings, motions, forces and tools, by their names.
     pub fn forces(&self, state: &RestState) -> Vec<(String, Vec3<f64>)> {
         let mut forces = self.patches(state, &state.positions, &state.holding);
         let on_parts: Vec<_> = state.wrenches.iter().map(|wrench| wrench.force).collect();
@@ -255,13 +275,13 @@ impl<'a> Course<'a> {
         patches.into_iter().map(|patch| (patch.name, Vec3::from_f64(patch.force))).collect()
     }
 
-    /// Sums over the parts of each tool.
+    /// What each tool does to tissue, from the forces on its parts.
     fn tools(&self, on_parts: &[Vec3<f64>]) -> Vec<(String, Vec3<f64>)> {
         let mut parts = on_parts.iter();
         let states = self.simulation.tools();
         let of_tool = |(tool, state): (&Instrument, &ToolState)| {
             let count = if state.is_there { tool.parts.len() } else { 0 };
-            let force = parts.by_ref().take(count).fold(Vec3::ZERO, |sum, force| sum + *force);
+            let force = parts.by_ref().take(count).fold(Vec3::ZERO, |sum, force| sum - *force);
             (tool.name.clone(), force)
         };
         self.simulation.assembly().tools.iter().zip(&states).map(of_tool).collect()

@@ -27,6 +27,7 @@ from ._viscera import (
     Body,
     Frame,
     Hold,
+    Rest,
     Scene,
     Simulation,
     Tool,
@@ -34,6 +35,7 @@ from ._viscera import (
     built_in_scenes,
     describe,
     digest,
+    rest,
     version,
 )
 
@@ -48,6 +50,7 @@ __all__ = [
     "Frame",
     "Hold",
     "InternalError",
+    "Rest",
     "Scene",
     "SceneError",
     "Simulation",
@@ -60,6 +63,7 @@ __all__ = [
     "built_in_scenes",
     "describe",
     "digest",
+    "rest",
     "to_pyvista",
     "version",
 ]

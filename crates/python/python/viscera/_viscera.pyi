@@ -1,6 +1,6 @@
 """The part of viscera that is compiled. What each thing does is in its docstring; units are SI."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any, Literal, final
 
@@ -13,6 +13,7 @@ __all__ = [
     "Body",
     "Frame",
     "Hold",
+    "Rest",
     "Scene",
     "Simulation",
     "Tool",
@@ -20,6 +21,7 @@ __all__ = [
     "built_in_scenes",
     "describe",
     "digest",
+    "rest",
     "version",
 ]
 
@@ -206,6 +208,26 @@ class Tool:
     def touches(self) -> int: ...
     def put_away(self) -> None: ...
 
+@final
+class Rest:
+    @property
+    def times(self) -> Floats: ...
+    @property
+    def unknown(self) -> list[str]: ...
+    def positions(self, body: str) -> Floats: ...
+    def force(self, name: str) -> Floats: ...
+    def positions_along(self, key: str, body: str) -> Floats: ...
+    def force_along(self, key: str, name: str) -> Floats: ...
+    def pull_back(self, by_positions: Mapping[str, ArrayLike]) -> dict[str, float]: ...
+
+def rest(
+    scene: Scene,
+    times: ArrayLike | None = None,
+    *,
+    unknown: Sequence[str] = [],
+    near: Rest | None = None,
+    memory: str = "8 GB",
+) -> Rest: ...
 @final
 class Worlds:
     def __new__(
