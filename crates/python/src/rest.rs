@@ -310,12 +310,12 @@ impl Rest {
 /// `fixing.NAME.stiffness`. `near`, a `Rest` of the same bodies and times, is where the search begins. Tools touch
 /// without friction.
 #[pyfunction]
-#[pyo3(signature = (scene, times = None, *, unknown = Vec::new(), near = None, memory = "8 GB"))]
+#[pyo3(signature = (scene, times = None, *, unknown = None, near = None, memory = "8 GB"))]
 pub fn rest(
     py: Python<'_>,
     scene: &Scene,
     times: Option<&Bound<'_, PyAny>>,
-    unknown: Vec<String>,
+    unknown: Option<Vec<String>>,
     near: Option<&Rest>,
     memory: &str,
 ) -> PyResult<Rest> {
@@ -339,7 +339,8 @@ pub fn rest(
             ),
         )),
     };
-    let keys: Vec<_> = unknown.into_iter().map(dependence).collect::<PyResult<_>>()?;
+    let keys: Vec<_> =
+        unknown.unwrap_or_default().into_iter().map(dependence).collect::<PyResult<_>>()?;
     let (solved, all) = py.detach(|| {
         guarded(|| {
             let solved = Solved::new(&content, &keys, memory.0)?;

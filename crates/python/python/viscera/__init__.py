@@ -22,6 +22,8 @@ from ._errors import (
     SnapshotError,
     UnknownKeyError,
 )
+from ._fit import Fit, UndeterminedWarning, fit
+from ._measurements import Measurements
 from ._pyvista import to_pyvista
 from ._viscera import (
     Body,
@@ -46,10 +48,12 @@ __all__ = [
     "BusyError",
     "Error",
     "FileError",
+    "Fit",
     "ForkedError",
     "Frame",
     "Hold",
     "InternalError",
+    "Measurements",
     "Rest",
     "Scene",
     "SceneError",
@@ -57,12 +61,14 @@ __all__ = [
     "SimulationError",
     "SnapshotError",
     "Tool",
+    "UndeterminedWarning",
     "UnknownKeyError",
     "Worlds",
     "__version__",
     "built_in_scenes",
     "describe",
     "digest",
+    "fit",
     "rest",
     "to_pyvista",
     "version",

@@ -224,10 +224,11 @@ def rest(
     scene: Scene,
     times: ArrayLike | None = None,
     *,
-    unknown: Sequence[str] = [],
+    unknown: Sequence[str] | None = None,
     near: Rest | None = None,
     memory: str = "8 GB",
 ) -> Rest: ...
+
 @final
 class Worlds:
     def __new__(
