@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -59,3 +60,15 @@ def test_the_force_controller_reaches_its_force(tmp_path: Path) -> None:
     said = run((PACKAGE / "examples" / "robot.py").read_text(), tmp_path)
     (force,) = re.findall(r"presses with ([\d.]+) N", said)
     assert float(force) == pytest.approx(1.0, abs=0.02)
+
+
+def test_the_notebook_runs_and_finds_the_stiffness(tmp_path: Path) -> None:
+    notebook = json.loads((ROOT / "docs" / "identify.ipynb").read_text())
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    said = run("\n".join("".join(cell["source"]) for cell in cells), tmp_path)
+    (value, low, high) = re.findall(r"young = (\d+\S*), 95 % between (\S+) and (\S+)", said)[0]
+    assert float(low) < float(value) < float(high)
+    assert float(low) < 5100.0 < float(high)
+    # What it shows is what it says.
+    shown = [part["text"] for cell in cells for part in cell["outputs"] if "text" in part]
+    assert next(line for text in shown for line in text if "young" in line) in said
