@@ -1,13 +1,12 @@
 //! States of rest of a scene, from one to the next, so that each lies in the minimum that its motions lead to.
 
 use viscera::contact::Wrench;
-use viscera::model::Model;
 use viscera::scalar::Vec3;
 use viscera::scene::{Instrument, Scene};
-use viscera::settings::Elements;
 use viscera::simulation::{Simulation, ToolState};
 use viscera::solver::Inputs;
 
+use super::overlap::find_overlap;
 use super::sensitivity::{Change, Tangent};
 use super::{Convergence, Reference, ReferenceError, Tolerance};
 
@@ -111,6 +110,23 @@ const MOST_PARTS: u32 = 64;
 /// Unbalanced forces over those of the start: next to round-off, as derivatives are of what is at rest.
 const CLOSE: f64 = 1e-13;
 
+/// Of the size of all bodies, what moves from one solve to the next at most: a twelfth of a turn of a bar's end.
+const STRIDE: f64 = 0.1;
+
+/// How far [m] what holds, pulls and touches tissue moves between two times; `size` is that of the bodies.
+fn farthest(before: &Inputs<f64>, after: &Inputs<f64>, size: f64) -> f64 {
+    let pins = before.pins.iter().zip(&after.pins).map(|(a, b)| (b.target - a.target).length());
+    let pulled = before.tethers.iter().zip(&after.tethers);
+    let pulled = pulled.map(|(a, b)| (b.target - a.target).length());
+    let tools = before.tools.iter().zip(&after.tools).map(|(a, b)| {
+        let columns = a.pose.rotation.columns.iter().zip(&b.pose.rotation.columns);
+        let turned = columns.map(|(a, b)| (*b - *a).length()).fold(0.0, f64::max);
+        let moved = (b.pose.translation - a.pose.translation).length();
+        moved + turned * a.shape.reach().min(size)
+    });
+    pins.chain(pulled).chain(tools).fold(0.0, f64::max)
+}
+
 /// A scene whose states of rest are followed.
 pub struct Course<'a> {
     simulation: &'a Simulation<f64>,
@@ -149,15 +165,59 @@ impl<'a> Course<'a> {
         &self.simulation.model().rest_positions
     }
 
-    /// The state of rest at a time [s]: from `start`, positions [m] of the state at a time before, on.
+    /// The state of rest at a time [s]: from `start`, positions [m] of the state at a time before, on, in strides that are
+    /// short enough to follow what moves.
     pub fn go(
         &mut self,
         (before, start): (f64, &[Vec3<f64>]),
         time: f64,
     ) -> Result<RestState, ReferenceError> {
+        let mut here = (before, start.to_vec());
+        for stop in self.stops(before, time) {
+            let state = self.stride((here.0, &here.1), stop)?;
+            here = (stop, state.positions);
+        }
+        let state = self.stride((here.0, &here.1), time)?;
+        let meets_itself = self.simulation.scene().contact.self_;
+        match find_overlap(self.simulation.model(), &state.positions).filter(|_| meets_itself) {
+            Some(vertex) => Err(ReferenceError::Overlap { vertex }),
+            None => Ok(state),
+        }
+    }
+
+    /// Ends of frames between two times [s], from each of which to the next nothing moves further than [`STRIDE`], unless it
+    /// does so in one frame.
+    fn stops(&self, before: f64, time: f64) -> Vec<f64> {
+        let rest = self.rest();
+        let along = |axis: usize| {
+            let ends = rest.iter().map(|x| x[axis]);
+            ends.clone().fold(f64::NEG_INFINITY, f64::max) - ends.fold(f64::INFINITY, f64::min)
+        };
+        let size = Vec3::from_f64([0, 1, 2].map(along)).length();
+        let frame = self.simulation.scene().time.frame;
+        let (mut last, mut frame_before) = ((before, self.simulation.inputs_at(before)), before);
+        let mut stops = Vec::new();
+        let ends = (1..).map(|frames| before + f64::from(frames) * frame);
+        for end in ends.take_while(|end| *end < time).chain([time]) {
+            let inputs = self.simulation.inputs_at(end);
+            if farthest(&last.1, &inputs, size) > STRIDE * size && frame_before > last.0 {
+                last = (frame_before, self.simulation.inputs_at(frame_before));
+                stops.push(frame_before);
+            }
+            frame_before = end;
+        }
+        stops
+    }
+
+    /// From one time to the next, divided where Newton's method finds no way.
+    fn stride(
+        &mut self,
+        from: (f64, &[Vec3<f64>]),
+        time: f64,
+    ) -> Result<RestState, ReferenceError> {
         let mut parts = 1;
         loop {
-            match self.go_in_parts((before, start), time, parts) {
+            match self.go_in_parts(from, time, parts) {
                 Err(ReferenceError::NotConverged { .. }) if parts < MOST_PARTS => parts *= 4,
                 done => return done,
             }
@@ -188,8 +248,9 @@ impl<'a> Course<'a> {
         Ok(RestState { time, inputs, positions, holding, wrenches, convergence })
     }
 
-    fn model(&self) -> (&Model<f64>, Elements) {
-        (self.simulation.model(), self.simulation.solver().elements)
+    fn slope(&self, state: &RestState, change: &Change) -> Vec<Vec3<f64>> {
+        let of = (self.simulation.model(), self.simulation.solver().elements);
+        self.reference.slope(of, (&state.positions, &state.inputs), change)
     }
 
     /// How a state of rest changes, by each of these changes.
@@ -198,9 +259,9 @@ impl<'a> Course<'a> {
         state: &RestState,
         changes: &[Change],
     ) -> Result<Vec<Tangent>, ReferenceError> {
-        let (model, elements) = self.model();
         let mut linearized = self.reference.linearize(&state.positions, &state.inputs)?;
-        Ok(changes.iter().map(|change| linearized.tangent(model, elements, change)).collect())
+        let tangent = |change| linearized.tangent(&self.slope(state, change), change);
+        Ok(changes.iter().map(tangent).collect())
     }
 
     /// Derivatives of a function of positions, by each of these changes, from its gradient [per m], shape [vertex_count].
@@ -210,11 +271,10 @@ impl<'a> Course<'a> {
         by_positions: &[Vec3<f64>],
         changes: &[Change],
     ) -> Result<Vec<f64>, ReferenceError> {
-        let (model, elements) = self.model();
         let mut linearized = self.reference.linearize(&state.positions, &state.inputs)?;
         let adjoint = linearized.adjoint(by_positions);
         let by_change = |change: &Change| {
-            let slope = linearized.slope(model, elements, change);
+            let slope = self.slope(state, change);
             -adjoint.iter().zip(&slope).map(|(a, b)| a.dot(*b)).sum::<f64>()
         };
         Ok(changes.iter().map(by_change).collect())

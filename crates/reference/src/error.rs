@@ -80,6 +80,15 @@ pub enum ReferenceError {
         /// How many tools there are.
         tools: usize,
     },
+    /// Tissue passes through itself.
+    #[error(
+        "tissue lies in tissue at vertex {vertex}: states of rest know contact with tools only; take a load with which the \
+         body does not meet itself, or set contact.self = false where that does not matter"
+    )]
+    Overlap {
+        /// A vertex that lies in a tetrahedron of its body.
+        vertex: u32,
+    },
     /// Positions that are no state of rest that returns after a push.
     #[error("the body is not stable at these positions, so it does not oscillate; settle it first")]
     Unstable,

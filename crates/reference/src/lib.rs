@@ -18,6 +18,7 @@
 //! | `frequency` | the slowest oscillation |
 //! | `spectrum` | many oscillations of a free body |
 //! | `course` | states of rest of a scene |
+//! | `overlap` | whether tissue lies in tissue |
 //! | `sensitivity` | derivatives of a state of rest by the constants of a model |
 //! | `fixing` | whether a body can be at rest |
 //! | `error` | why there is no solution |
@@ -30,6 +31,7 @@ pub mod frequency;
 pub mod matrix;
 pub mod newton;
 pub mod objective;
+mod overlap;
 pub mod problem;
 pub mod recovered;
 pub mod sensitivity;

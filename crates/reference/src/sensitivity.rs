@@ -181,6 +181,21 @@ pub struct Tangent {
 }
 
 impl Reference {
+    /// `dg/dp` [N per unit] at `x`, shape [vertex_count]: how a number changes the gradient where nothing moves. `model` and
+    /// `elements` are those that the reference was made of.
+    pub fn slope(
+        &self,
+        (model, elements): (&Model<f64>, Elements),
+        (x, inputs): (&[Vec3<f64>], &Inputs<f64>),
+        change: &Change,
+    ) -> Vec<Vec3<f64>> {
+        let problem = self.problem.along(model, elements, change);
+        // What does not depend on constants has no derivative by them.
+        let inputs = Inputs { tethers: Vec::new(), forces: Vec::new(), ..inputs.clone() };
+        let load = Load::Forces(dead_loads(&problem, &inputs));
+        objective(&problem, &inputs, load).gradient(x)
+    }
+
     /// Prepares derivatives at a state of rest. Fails where that is no stable one.
     pub fn linearize<'a>(
         &'a self,
@@ -220,22 +235,12 @@ impl Reference {
 }
 
 impl Linearized<'_> {
-    /// `dg/dp` [N per unit], shape [vertex_count]: how a number changes the gradient where nothing moves. `model` and
-    /// `elements` are those that the reference was made of.
-    pub fn slope(&self, model: &Model<f64>, elements: Elements, change: &Change) -> Vec<Vec3<f64>> {
-        let problem = self.reference.problem.along(model, elements, change);
-        let untethered = Inputs { tethers: Vec::new(), forces: Vec::new(), ..self.inputs.clone() };
-        let load = Load::Forces(dead_loads(&problem, &untethered));
-        objective(&problem, &untethered, load).gradient(self.x)
-    }
-
-    /// `dx/dp` and what follows from it.
-    pub fn tangent(&mut self, model: &Model<f64>, elements: Elements, change: &Change) -> Tangent {
-        let slope = self.slope(model, elements, change);
-        let mut positions = self.factorization.solve(&self.pattern, &slope);
+    /// `dx/dp` and what follows from it, from `dg/dp` ([`Reference::slope`]).
+    pub fn tangent(&mut self, slope: &[Vec3<f64>], change: &Change) -> Tangent {
+        let mut positions = self.factorization.solve(&self.pattern, slope);
         positions.iter_mut().for_each(|moved| *moved = -*moved);
         let mut holding = self.stiffness.multiply(&self.all, &positions);
-        for ((force, slope), pinned) in holding.iter_mut().zip(&slope).zip(&self.pinned) {
+        for ((force, slope), pinned) in holding.iter_mut().zip(slope).zip(&self.pinned) {
             *force = if *pinned { *force + *slope } else { Vec3::ZERO };
         }
         let tools = self.on_tools(&positions, change);
