@@ -216,6 +216,12 @@ impl Rest {
         row(py, &self.times.iter().map(|time| time.state.time).collect::<Vec<_>>())
     }
 
+    /// Whether each state is a minimum of the potential; where one is none, a push leads elsewhere.
+    #[getter]
+    fn minimum(&self) -> Vec<bool> {
+        self.times.iter().map(|time| time.state.convergence.minimum).collect()
+    }
+
     /// Keys by which there are derivatives.
     #[getter]
     fn unknown(&self) -> Vec<String> {

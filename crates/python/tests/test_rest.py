@@ -101,6 +101,7 @@ def test_the_end_of_the_scene_is_the_time_where_none_is_given() -> None:
     state = vi.rest(drawn())
     assert state.times == pytest.approx([0.5])
     assert state.unknown == []
+    assert state.minimum == [True]
     assert "Block" in repr(state)
     # A search that begins at the solution ends there.
     again = vi.rest(drawn(), near=state)
@@ -136,6 +137,12 @@ def test_what_rest_does_not_determine_is_told() -> None:
     loose = vi.Scene.parse(BLOCK.split("[[fixing]]", maxsplit=1)[0])
     with pytest.raises(vi.SimulationError, match="not held"):
         vi.rest(loose)
+
+
+def test_a_whole_turn_is_followed() -> None:
+    # Its pins end where they began.
+    state = vi.rest(vi.Scene.builtin("twist", settings={"body.bar.cells_across": 2}), [1.5, 3.0])
+    assert np.linalg.norm(state.force("chuck"), axis=1).max() > 1.0
 
 
 def test_names_and_shapes_are_checked() -> None:

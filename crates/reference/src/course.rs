@@ -104,9 +104,6 @@ pub fn check_determined(scene: &Scene) -> Result<(), Undetermined> {
     }
 }
 
-/// Where an increment of time defeats Newton's method it is divided, at most into so many parts.
-const MOST_PARTS: u32 = 64;
-
 /// Unbalanced forces over those of the start: next to round-off, as derivatives are of what is at rest.
 const CLOSE: f64 = 1e-13;
 
@@ -172,12 +169,11 @@ impl<'a> Course<'a> {
         (before, start): (f64, &[Vec3<f64>]),
         time: f64,
     ) -> Result<RestState, ReferenceError> {
-        let mut here = (before, start.to_vec());
+        let mut here = start.to_vec();
         for stop in self.stops(before, time) {
-            let state = self.stride((here.0, &here.1), stop)?;
-            here = (stop, state.positions);
+            here = self.stride(&here, stop)?.positions;
         }
-        let state = self.stride((here.0, &here.1), time)?;
+        let state = self.stride(&here, time)?;
         let meets_itself = self.simulation.scene().contact.self_;
         match find_overlap(self.simulation.model(), &state.positions).filter(|_| meets_itself) {
             Some(vertex) => Err(ReferenceError::Overlap { vertex }),
@@ -209,35 +205,9 @@ impl<'a> Course<'a> {
         stops
     }
 
-    /// From one time to the next, divided where Newton's method finds no way.
-    fn stride(
-        &mut self,
-        from: (f64, &[Vec3<f64>]),
-        time: f64,
-    ) -> Result<RestState, ReferenceError> {
-        let mut parts = 1;
-        loop {
-            match self.go_in_parts(from, time, parts) {
-                Err(ReferenceError::NotConverged { .. }) if parts < MOST_PARTS => parts *= 4,
-                done => return done,
-            }
-        }
-    }
-
-    fn go_in_parts(
-        &mut self,
-        (before, start): (f64, &[Vec3<f64>]),
-        time: f64,
-        parts: u32,
-    ) -> Result<RestState, ReferenceError> {
-        let mut positions = start.to_vec();
-        for part in 1..parts {
-            let share = f64::from(part) / f64::from(parts);
-            let inputs = self.simulation.inputs_at(before + (time - before) * share);
-            positions = self.reference.settle(&positions, &inputs)?.positions;
-        }
+    fn stride(&mut self, start: &[Vec3<f64>], time: f64) -> Result<RestState, ReferenceError> {
         let inputs = self.simulation.inputs_at(time);
-        let solution = self.reference.settle(&positions, &inputs)?;
+        let solution = self.reference.settle(start, &inputs)?;
         let (positions, convergence) = (solution.positions, solution.convergence);
         let wrenches = self.reference.wrenches(&positions, &inputs, &[])?;
         let mut holding = vec![Vec3::ZERO; positions.len()];

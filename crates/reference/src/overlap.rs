@@ -20,8 +20,8 @@ pub fn find_overlap(model: &Model<f64>, x: &[Vec3<f64>]) -> Option<u32> {
         body.vertices.clone().map(|v| v as u32).find(|&v| {
             let place = x[v as usize];
             let first = sorted.partition_point(|(left, _)| *left < place.x - widest);
-            let near = sorted[first..].iter().take_while(|(left, _)| *left < place.x);
-            near.filter(|(_, tet)| !tet.contains(&v)).any(|(_, tet)| holds(&corners(tet), place))
+            let mut near = sorted[first..].iter().take_while(|(left, _)| *left < place.x);
+            near.any(|(_, tet)| holds(&corners(tet), place))
         })
     })
 }

@@ -57,9 +57,9 @@ fn motions_are_followed_on_their_way() {
     assert!(farthest(&here, &at_once.positions) < 1e-9);
 }
 
-/// A motion that is all in one frame leaves increments to Newton's method.
+/// What goes far in one frame is left to Newton's method.
 #[test]
-fn increments_that_find_no_way_are_divided() {
+fn a_motion_of_one_frame_is_followed() {
     let text = TWIST
         .replace("keys = [{ time = \"1 s\"", "keys = [{ time = \"16 ms\"")
         .replace("360 deg", "150 deg");
