@@ -136,24 +136,32 @@ def test_a_sweep_goes_on_where_it_was(pressed: vi.Scene, tmp_path: Path) -> None
     assert len(file.read_text().splitlines()) == lines + 6
 
 
-def test_a_driver_that_is_killed_is_resumed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("engine", ["threads", "ray"])
+def test_a_driver_that_is_killed_is_resumed(engine: str, tmp_path: Path) -> None:
+    if engine == "ray":
+        pytest.importorskip("ray", reason="Ray is not installed")
     file = tmp_path / "rows.jsonl"
     (tmp_path / "block.toml").write_text(BLOCK + BALL)
     program = tmp_path / "program.py"
     program.write_text(
         f"""
-import sys
-sys.path.insert(0, {str(Path(__file__).parent)!r})
+import numpy as np
 import viscera as vi
-from test_sweep import measure, trials
 from viscera import sweep
+def measure(simulation):
+    return {{"lift": float(simulation.force("table")[2])}}
+trials = sweep.grid({{{YOUNG!r}: np.geomspace(4e3, 12e3, 3), "solver.accuracy": ["draft", "fine"]}})
 scene = vi.Scene.load("block.toml")
-rows = sweep.run(scene, trials(), measure, frames=200, workers=1, resume="rows.jsonl")
+rows = sweep.run(
+    scene, trials, measure, frames=200, workers=1, resume="rows.jsonl", on={engine!r}
+)
 print(len(rows))
 """
     )
-    command = [sys.executable, str(program)]
-    begun = subprocess.Popen(command, cwd=tmp_path)
+    environment = {**os.environ, "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
+    environment.pop("PYTHONWARNINGS", None)
+    command = [sys.executable, "-W", "ignore", str(program)]
+    begun = subprocess.Popen(command, cwd=tmp_path, env=environment)
     while not file.exists() or not file.read_text().count("\n"):
         assert begun.poll() is None, "it ended too early to be killed"
         time.sleep(0.01)
@@ -161,8 +169,10 @@ print(len(rows))
     begun.wait()
     before = file.read_text().splitlines()
     assert 1 <= len(before) < 6
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "6"
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, env=environment, check=True
+    )
+    assert done.stdout.split()[-1] == "6"
     after = file.read_text().splitlines()
     assert len(after) == 6
     assert after[: len(before) - 1] == before[: len(before) - 1]

@@ -1,4 +1,4 @@
-"""Types: of the package, of its stubs beside what they describe, of these tests and of the examples."""
+"""Types: of the package, of its stubs beside what they describe, of these tests, of examples, benches and trainings."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ def check(*words: str) -> None:
 
 def test_types_of_the_package_its_tests_and_examples() -> None:
     check("mypy", "--strict", "--cache-dir", "/dev/null", "-p", "viscera")
-    check("mypy", "--strict", "--cache-dir", "/dev/null", "tests", "examples")
+    check(
+        "mypy", "--strict", "--cache-dir", "/dev/null", "tests", "examples", "benches", "training"
+    )
 
 
 def test_stubs_say_what_is_there() -> None:
