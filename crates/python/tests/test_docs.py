@@ -38,7 +38,11 @@ def test_examples_run(example: str, tmp_path: Path) -> None:
     assert run((PACKAGE / "examples" / example).read_text(), tmp_path)
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/python.md", "crates/python/README.md"])
+PAGES = ["README.md", "crates/python/README.md"]
+PAGES += [f"docs/{name}.md" for name in ("python", "robots", "learning", "measuring")]
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_code_in_the_documentation_runs(page: str, tmp_path: Path) -> None:
     blocks = snippets(ROOT / page)
     assert blocks
