@@ -211,7 +211,8 @@ fn hands_go_on_where_another_simulation_was_saved() {
     for run in [&mut run, &mut again] {
         let needle = run.tools().len() - 2;
         go(run, needle, vec3(0.0, 0.0, -0.002), vec3(0.0, 0.1, 0.0), 3);
-        let settings = [("body.block.material.young".to_owned(), "9 kPa".to_owned())];
+        // Another one than was changed before: a reset keeps both.
+        let settings = [("body.block.material.poisson".to_owned(), "0.3".to_owned())];
         run.change(&settings).expect("a change");
         frames(run, 2);
         run.put_away(needle).expect("the needle");
@@ -261,7 +262,9 @@ fn goes_back<S: Real>(method: &str) {
     let again = on(&mut run);
     assert!(again.0 == after.0, "{method}");
     assert_eq!((again.1, again.2), (after.1, after.2));
-    // Of another model.
+    // Of other settings of the same model, then of another model.
+    run.change(&[("solver.substeps".to_owned(), "3".to_owned())]).expect("a change");
+    assert_eq!(run.restore(&moment), Err(LiveError::OtherModel));
     run.change(&[("body.block.material.young".to_owned(), "7 kPa".to_owned())]).expect("a change");
     assert_eq!(run.restore(&moment), Err(LiveError::OtherModel));
 }
