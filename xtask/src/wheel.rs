@@ -125,7 +125,16 @@ pub fn try_out(python: &str, wheel: &Path) -> Result<Counts, String> {
     let environment = environment(python, &name, &[&wheel, "-r", FOR_TESTS])?;
     let report = root().join(FOLDER).join(format!("{name}.xml"));
     let mut command = Command::new(environment.join("bin/python"));
-    command.args(["-W", "error", "-m", "pytest", "-q", "-rs", "--durations=5", "crates/python/tests"]);
+    command.args([
+        "-W",
+        "error",
+        "-m",
+        "pytest",
+        "-q",
+        "-rs",
+        "--durations=5",
+        "crates/python/tests",
+    ]);
     command.args(["-c", "crates/python/pyproject.toml", "-p", "no:cacheprovider"]);
     command.arg(format!("--junitxml={}", report.display()));
     command.current_dir(root()).env("PYTHONDONTWRITEBYTECODE", "1");
