@@ -9,7 +9,9 @@ takes on one thread, turn by turn so that a busy machine slows both.
 
 from __future__ import annotations
 
+import os
 import sys
+import tempfile
 import time
 
 import mujoco
@@ -114,6 +116,8 @@ def end_of(flex: mujoco.MjModel, seconds: float) -> np.ndarray:
 def main() -> None:
     """Compares both on two meshes."""
     repetitions = int(sys.argv[1]) if len(sys.argv) > 1 else 5
+    # Where MuJoCo writes its warnings.
+    os.chdir(tempfile.mkdtemp())
     print(f"MuJoCo {mujoco.__version__}, viscera {vi.__version__}, one thread each")
     for cells in BLOCKS.values():
         block = scene(cells)

@@ -58,7 +58,12 @@ impl Solved {
             let mut content = content.clone();
             content.overrides.push((key.clone(), text_of(&scene, key, dependence.other(value))?));
             let other = content.parse("")?;
-            let model = content.assemble(&other)?.builder.build();
+            // Meshes stay where materials change; springs of fixings are part of what is assembled.
+            let builder = match key.starts_with("body.") {
+                true => simulation.assembly().with_materials(&other),
+                false => Ok(content.assemble(&other)?.builder),
+            };
+            let model = builder.and_then(|builder| builder.build());
             let model = model.map_err(|why| error(Class::Scene, why))?;
             Ok(dependence.change(simulation.model(), &model, value))
         };
@@ -107,7 +112,7 @@ impl Solved {
 
 /// The number in force at a key [SI], also where a preset says it.
 fn number_at(scene: &Parsed, key: &str) -> PyResult<f64> {
-    // A wrong key is told by who knows all of them.
+    // The table of settings reports an unknown key, and suggests the nearest.
     scene.setting(key).or_raise()?;
     let steps: Vec<&str> = key.split('.').collect();
     let body = |name: &str| find(&scene.bodies, name, |body| &body.name);
@@ -345,6 +350,7 @@ pub fn rest(
             ),
         )),
     };
+    check_end(&content.parse("")?, &times)?;
     let keys: Vec<_> =
         unknown.unwrap_or_default().into_iter().map(dependence).collect::<PyResult<_>>()?;
     let (solved, all) = py.detach(|| {
@@ -387,5 +393,20 @@ fn times_of(value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
             "times begin at 0 s or later, and each is after the one before",
         )),
         None => Err(error(Class::Scene, "give one time at least")),
+    }
+}
+
+/// Motions are followed frame by frame, and a scene has so many.
+fn check_end(scene: &Parsed, times: &[f64]) -> PyResult<()> {
+    let end = scene.frame_count() as f64 * scene.time.frame;
+    // The last frame may be cut short by rounding.
+    match times.last().filter(|last| **last > end + scene.time.frame) {
+        Some(last) => {
+            let name = &scene.name;
+            let message =
+                format!("{name} ends at {end:.4} s, before the time {last} s; set time.duration");
+            Err(error(Class::Scene, message))
+        }
+        None => Ok(()),
     }
 }

@@ -42,6 +42,9 @@ def test_what_was_put_in_comes_out(truth: vi.Rest) -> None:
     for key, value in TRUTH.items():
         assert found.value[key] == pytest.approx(value, rel=1e-7)
         assert 0.0 < found.std[key] < 0.1 * value
+    deviations = np.sqrt(np.diag(found.covariance))
+    assert found.std[YOUNG] == pytest.approx(TRUTH[YOUNG] * deviations[0])
+    assert found.std[POISSON] == pytest.approx(deviations[1])
     assert found.chi_squared < 1e-9
     assert found.degrees_of_freedom == 9 + 3 * 3 * len(truth.positions("block")[0, ::7]) - 2
     assert found.check_gradient() < 1e-6
@@ -189,6 +192,15 @@ def test_markers_that_are_nowhere_are_told(truth: vi.Rest, tmp_path: Path) -> No
     data = vi.Measurements(TIMES, markers={"block": (outside, seen[:, :1])})
     with pytest.raises(vi.SceneError, match=r"marker 0 of `block` lies \d+\.\d mm outside"):
         vi.fit(drawn(), data, BOUNDS, SIGMA)
+    # A twentieth of the block's diagonal of 45 mm is 2.2 mm: as far out a coarse mesh may leave its skin.
+    for out, is_told in ((4e-3, True), (1e-3, False)):
+        place = np.array([[-out, 11e-3, 5e-3]])
+        data = vi.Measurements(TIMES, markers={"block": (place, np.tile(place, (3, 1, 1)))})
+        if is_told:
+            with pytest.raises(vi.SceneError, match=r"lies (3\.[5-9]|4\.\d) mm outside"):
+                vi.fit(drawn(), data, BOUNDS, SIGMA)
+        else:
+            assert vi.fit(drawn(), data, {YOUNG: BOUNDS[YOUNG]}, {"markers": 1e-6}).evaluations > 0
     unknown = vi.Measurements(TIMES, markers={"liver": (outside, seen[:, :1])})
     with pytest.raises(vi.UnknownKeyError, match="liver"):
         vi.fit(drawn(), unknown, BOUNDS, SIGMA)

@@ -116,6 +116,7 @@ def test_the_end_of_the_scene_is_the_time_where_none_is_given() -> None:
         ({"times": [-1.0]}, vi.SceneError, "0 s or later"),
         ({"times": [np.nan]}, vi.SceneError, "NaN"),
         ({"times": 0.3}, vi.SceneError, "a list"),
+        ({"times": [1e9]}, vi.SceneError, r"ends at 0.5\d* s, .* set time.duration"),
         ({"unknown": ["solver.substeps"]}, vi.UnknownKeyError, "no derivative"),
         ({"unknown": ["body.blok.material.young"]}, vi.UnknownKeyError, "blok"),
         ({"unknown": ["fixing.table.stiffness"]}, vi.SceneError, "no number"),

@@ -107,7 +107,7 @@ pub fn check_determined(scene: &Scene) -> Result<(), Undetermined> {
 /// Unbalanced forces over those of the start: next to round-off, as derivatives are of what is at rest.
 const CLOSE: f64 = 1e-13;
 
-/// Of the size of all bodies, what moves from one solve to the next at most: a twelfth of a turn of a bar's end.
+/// Of the size of all bodies, what moves from one solve to the next at most: well below what turns a bar's end half about.
 const STRIDE: f64 = 0.1;
 
 /// How far [m] what holds, pulls and touches tissue moves between two times; `size` is that of the bodies.
@@ -157,6 +157,16 @@ impl<'a> Course<'a> {
         Self { simulation, reference }
     }
 
+    /// What solves.
+    pub fn reference(&self) -> &Reference {
+        &self.reference
+    }
+
+    /// The same, for what keeps its analysis.
+    pub fn reference_mut(&mut self) -> &mut Reference {
+        &mut self.reference
+    }
+
     /// Positions [m] where nothing acts, shape [vertex_count].
     pub fn rest(&self) -> &[Vec3<f64>] {
         &self.simulation.model().rest_positions
@@ -171,9 +181,9 @@ impl<'a> Course<'a> {
     ) -> Result<RestState, ReferenceError> {
         let mut here = start.to_vec();
         for stop in self.stops(before, time) {
-            here = self.stride(&here, stop)?.positions;
+            here = self.settle(&here, stop)?.positions;
         }
-        let state = self.stride(&here, time)?;
+        let state = self.settle(&here, time)?;
         let meets_itself = self.simulation.scene().contact.self_;
         match find_overlap(self.simulation.model(), &state.positions).filter(|_| meets_itself) {
             Some(vertex) => Err(ReferenceError::Overlap { vertex }),
@@ -193,8 +203,10 @@ impl<'a> Course<'a> {
         let frame = self.simulation.scene().time.frame;
         let (mut last, mut frame_before) = ((before, self.simulation.inputs_at(before)), before);
         let mut stops = Vec::new();
-        let ends = (1..).map(|frames| before + f64::from(frames) * frame);
-        for end in ends.take_while(|end| *end < time).chain([time]) {
+        // After its end a scene stands still.
+        let scene_end = self.simulation.scene().frame_count() as f64 * frame;
+        let frames = (1u32..).map(|frames| before + f64::from(frames) * frame);
+        for end in frames.take_while(|end| *end < time.min(scene_end)).chain([time]) {
             let inputs = self.simulation.inputs_at(end);
             if farthest(&last.1, &inputs, size) > STRIDE * size && frame_before > last.0 {
                 last = (frame_before, self.simulation.inputs_at(frame_before));
@@ -205,7 +217,8 @@ impl<'a> Course<'a> {
         stops
     }
 
-    fn stride(&mut self, start: &[Vec3<f64>], time: f64) -> Result<RestState, ReferenceError> {
+    /// The state of rest at a time [s] that Newton's method finds from `start` [m], whatever lies between.
+    pub fn settle(&mut self, start: &[Vec3<f64>], time: f64) -> Result<RestState, ReferenceError> {
         let inputs = self.simulation.inputs_at(time);
         let solution = self.reference.settle(start, &inputs)?;
         let (positions, convergence) = (solution.positions, solution.convergence);

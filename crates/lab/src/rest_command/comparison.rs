@@ -82,26 +82,27 @@ pub fn compare(
     let model = simulation.model();
     let elements = simulation.solver().elements;
     let mut reference = Reference::with_elements(model, elements).allow_memory(memory.0);
-    let pinned = reference.check_held(ours, &rest.inputs)?;
+    let pinned = reference.check_held(ours, &rest.state.inputs)?;
     let free: Vec<u32> = (0u32..).zip(&pinned).filter(|(_, p)| !**p).map(|(v, _)| v).collect();
-    let distance =
-        |from: &[Vec3<f64>]| Distance::new(&model.rest_positions, &rest.positions, from, &free);
+    let distance = |from: &[Vec3<f64>]| {
+        Distance::new(&model.rest_positions, &rest.state.positions, from, &free)
+    };
     let Distance { rms, largest, stiffness } = distance(ours);
-    let standing = reference.standing(ours, &rest.inputs)?;
+    let standing = reference.standing(ours, &rest.state.inputs)?;
     // Where nothing moves, a share of the displacement says nothing: within the rounding of single
     // precision two places are one.
-    let reach = rest.positions.iter().map(|x| x.length()).fold(0.0, f64::max);
+    let reach = rest.state.positions.iter().map(|x| x.length()).fold(0.0, f64::max);
     let is_near = |from: &[Vec3<f64>]| {
-        let gap = from.iter().zip(&rest.positions).map(|(x, y)| (*x - *y).length());
+        let gap = from.iter().zip(&rest.state.positions).map(|(x, y)| (*x - *y).length());
         distance(from).rms <= ELSEWHERE || gap.fold(0.0, f64::max) <= ROUNDING * reach
     };
     let verdict = if is_near(ours) {
         "the reference's state of rest".to_owned()
     } else {
         // Newton's method from there tells a state of rest of its own from one not yet reached.
-        match reference.settle(ours, &rest.inputs) {
+        match reference.settle(ours, &rest.state.inputs) {
             Ok(near) if !is_near(&near.positions) => {
-                let near = reference.standing(&near.positions, &rest.inputs)?;
+                let near = reference.standing(&near.positions, &rest.state.inputs)?;
                 let more = (near.potential - rest.standing.potential) * 1e3;
                 let how = if more > 0.0 { "above" } else { "below" };
                 format!("another minimum, {:.3e} mJ {how} the reference's", more.abs())

@@ -114,7 +114,7 @@ pub fn run(arguments: &RestArguments, print: &dyn Fn(&str) -> Result<()>) -> Res
     progress.finish();
     let (rest, settled) = done?;
     let mut tets = Vec::new();
-    measure_tets(simulation.model(), &rest.positions, &mut tets);
+    measure_tets(simulation.model(), &rest.state.positions, &mut tets);
     print(&describe(&simulation, &rest, &tets, arguments.parts))?;
     if let Some(out) = &arguments.out {
         write(&simulation, &rest, &tets, out)?;
@@ -146,10 +146,10 @@ fn heading(simulation: &Simulation<f64>) -> String {
 
 /// The state of rest in words.
 fn describe(simulation: &Simulation<f64>, rest: &Rest, tets: &[TetMeasure], parts: u32) -> String {
-    let moved = measure_displacements(simulation.model(), &rest.positions, &mut Vec::new());
+    let moved = measure_displacements(simulation.model(), &rest.state.positions, &mut Vec::new());
     let deformation = summarize_deformation(tets);
     let smallest = tets.iter().map(|tet| tet.volume_ratio).fold(f64::INFINITY, f64::min);
-    let minimum = match rest.convergence.minimum {
+    let minimum = match rest.state.convergence.minimum {
         true => "yes",
         false => "no: a saddle, from which a push leads elsewhere; try other --parts",
     };
@@ -161,7 +161,7 @@ fn describe(simulation: &Simulation<f64>, rest: &Rest, tets: &[TetMeasure], part
         ),
     };
     let gradient = rest.standing.gradient;
-    let mut text = format!("at rest at {:.3} s:\n", rest.time);
+    let mut text = format!("at rest at {:.3} s:\n", rest.state.time);
     text.push_str(&lines(&[
         ("largest displacement", si(moved, "m")),
         ("volume change", percent(deformation.volume_ratio - 1.0)),
@@ -173,7 +173,9 @@ fn describe(simulation: &Simulation<f64>, rest: &Rest, tets: &[TetMeasure], part
         ("minimum", minimum.to_owned()),
     ]));
     // More digits than a run has: Newton's method has them.
-    for patch in simulation.patch_forces_at(rest.time, &rest.positions, &rest.holding) {
+    for patch in
+        simulation.patch_forces_at(rest.state.time, &rest.state.positions, &rest.state.holding)
+    {
         text.push_str(&format!("{patch:.6}\n"));
     }
     for tool in tools::forces(simulation, rest) {
@@ -200,7 +202,7 @@ fn write(
         bodies.resize(tets.len(), index as u32);
     }
     let mut displacements = Vec::new();
-    measure_displacements(simulation.model(), &rest.positions, &mut displacements);
+    measure_displacements(simulation.model(), &rest.state.positions, &mut displacements);
     let scalars = |name: &str, value: fn(&TetMeasure) -> f64| {
         Array::scalars(name, &measures.iter().map(value).collect::<Vec<f64>>())
     };
@@ -210,6 +212,6 @@ fn write(
         scalars("von Mises Cauchy stress [Pa]", |tet| tet.von_mises),
         Array::integers("body", &bodies),
     ];
-    let bytes = vtu::write(&rest.positions, &tets, &point_data, &cell_data);
+    let bytes = vtu::write(&rest.state.positions, &tets, &point_data, &cell_data);
     write_atomic(out, &bytes.with_context(|| format!("cannot write {}", out.display()))?)
 }

@@ -4,14 +4,12 @@
 //! minimum that the motions lead to, not in any other.
 
 use anyhow::{Result, anyhow};
-use viscera::contact::Wrench;
-use viscera::scalar::Vec3;
 use viscera::simulation::Simulation;
 use viscera::solver::Inputs;
 use viscera_resources::Memory;
 
 use crate::sections::Progress;
-use viscera_reference::{Convergence, Cost, Reference, ReferenceError, Standing};
+use viscera_reference::{Cost, Course, ReferenceError, RestState, Standing};
 
 /// What the scene does at one time.
 struct Stop {
@@ -23,7 +21,7 @@ struct Stop {
 /// The way to the end of a scene.
 pub struct LoadPath<'a> {
     simulation: &'a Simulation<f64>,
-    reference: Reference,
+    course: Course<'a>,
     memory: Memory,
     parts: u32,
     /// Where something changes; at least one.
@@ -32,29 +30,19 @@ pub struct LoadPath<'a> {
 
 /// The state of rest at the end of a scene.
 pub struct Rest {
-    /// [s].
-    pub time: f64,
-    /// What acts there.
-    pub inputs: Inputs<f64>,
-    /// Positions [m], shape [vertex_count].
-    pub positions: Vec<Vec3<f64>>,
-    /// Forces [N] that hold pinned vertices, zero on free ones, shape [vertex_count].
-    pub holding: Vec<Vec3<f64>>,
-    /// On each of the tools that act there.
-    pub wrenches: Vec<Wrench>,
+    /// Places, forces and what acts.
+    pub state: RestState,
     /// Its potential and unbalanced forces.
     pub standing: Standing,
     /// Newton steps of all parts.
     pub steps: u32,
-    /// How the last part went.
-    pub convergence: Convergence,
 }
 
 impl Rest {
     /// What unbalanced forces are measured against [N]: dead loads, or the forces that hold, where
     /// these are more. One where nothing acts at all.
     pub fn load(&self) -> f64 {
-        let squares: f64 = self.holding.iter().map(|force| force.length_squared()).sum();
+        let squares: f64 = self.state.holding.iter().map(|force| force.length_squared()).sum();
         let load = self.standing.load.max(squares.sqrt());
         if load > 0.0 { load } else { 1.0 }
     }
@@ -70,9 +58,8 @@ impl<'a> LoadPath<'a> {
     pub fn new(simulation: &'a Simulation<f64>, parts: u32, memory: Memory) -> Result<Self> {
         let scene = simulation.scene();
         let end = scene.frame_count() as f64 * scene.time.frame;
-        let (model, elements) = (simulation.model(), simulation.solver().elements);
-        let reference = Reference::with_elements(model, elements).allow_memory(memory.0);
-        let mut path = Self { simulation, reference, memory, parts, stops: Vec::new() };
+        let course = Course::new(simulation, memory.0);
+        let mut path = Self { simulation, course, memory, parts, stops: Vec::new() };
         for part in 1..=parts {
             // The last is the end itself, whatever the parts are.
             let left = f64::from(parts - part) / f64::from(parts);
@@ -86,7 +73,7 @@ impl<'a> LoadPath<'a> {
         }
         let rest = &simulation.model().rest_positions;
         for stop in &path.stops {
-            let held = path.reference.check_held(rest, &stop.inputs);
+            let held = path.course.reference().check_held(rest, &stop.inputs);
             held.map_err(|error| path.explain(error, stop.time))?;
         }
         Ok(path)
@@ -104,7 +91,7 @@ impl<'a> LoadPath<'a> {
         let mut seconds = 0.0;
         for at in 0..self.stops.len() {
             let stop = &self.stops[at];
-            let cost = self.reference.cost(&stop.inputs);
+            let cost = self.course.reference_mut().cost(&stop.inputs);
             let cost = cost.map_err(|error| self.explain(error, self.stops[at].time))?;
             seconds += cost.solve_seconds;
             if most.is_none_or(|most| cost.bytes > most.bytes) {
@@ -129,23 +116,15 @@ impl<'a> LoadPath<'a> {
         let (mut steps, mut last) = (0, None);
         for (part, stop) in self.stops.iter().enumerate() {
             let _case = progress.case(&format!("part {} of {}", part + 1, self.stops.len()));
-            let solved = self.reference.settle(&positions, &stop.inputs);
-            let solution = solved.map_err(|error| self.explain(error, stop.time))?;
-            positions = solution.positions;
-            steps += solution.convergence.steps;
-            last = Some(solution.convergence);
+            let solved = self.course.settle(&positions, stop.time);
+            let state = solved.map_err(|error| self.explain(error, stop.time))?;
+            positions.clone_from(&state.positions);
+            steps += state.convergence.steps;
+            last = Some(state);
         }
-        let (Some(Stop { time, inputs }), Some(convergence)) = (self.stops.pop(), last) else {
-            return Err(anyhow!("the scene takes no time"));
-        };
-        let standing = self.reference.standing(&positions, &inputs)?;
-        let wrenches = self.reference.wrenches(&positions, &inputs, &[])?;
-        let mut holding = vec![Vec3::ZERO; positions.len()];
-        let reactions = self.reference.reactions(&positions, &inputs)?;
-        for (pin, force) in inputs.pins.iter().zip(reactions) {
-            holding[pin.vertex as usize] = force;
-        }
-        Ok(Rest { time, inputs, positions, holding, wrenches, standing, steps, convergence })
+        let state = last.ok_or_else(|| anyhow!("the scene takes no time"))?;
+        let standing = self.course.reference().standing(&state.positions, &state.inputs)?;
+        Ok(Rest { state, standing, steps })
     }
 
     /// An error of the reference in the words of a scene and of this program's options.

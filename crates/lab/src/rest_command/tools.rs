@@ -17,11 +17,11 @@ pub(crate) fn note(scene: &Scene) -> Option<String> {
 
 /// Forces on the scene's tools in a state of rest.
 pub(super) fn forces(simulation: &Simulation<f64>, rest: &Rest) -> Vec<ToolForce> {
-    let mut parts = rest.wrenches.iter().zip(&rest.inputs.tools);
+    let mut parts = rest.state.wrenches.iter().zip(&rest.state.inputs.tools);
     let states = simulation.tools();
     let of_tool = |(tool, state): (&viscera::scene::Instrument, &ToolState)| {
         let count = if state.is_there { tool.parts.len() } else { 0 };
-        let origin = tool.pose(rest.time).translation;
+        let origin = tool.pose(rest.state.time).translation;
         let (mut force, mut torque) = (Vec3::ZERO, Vec3::ZERO);
         let (mut touches, mut pinned, mut depth) = (0, 0, 0.0f64);
         for (wrench, placed) in parts.by_ref().take(count) {

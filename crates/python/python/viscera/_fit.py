@@ -362,6 +362,15 @@ def _plot(found: Fit, path: str | None) -> Any:
     return figure
 
 
+# Of what can be fitted, by the last step of its key.
+UNITS = {"young": "Pa", "density": "kg/m^3", "stiffness": "N/m"}
+
+
+def _with_unit(key: str) -> str:
+    unit = UNITS.get(key.rpartition(".")[2])
+    return key if unit is None else f"{key} [{unit}]"
+
+
 def _ellipse(found: Fit, axes: Any) -> None:
     """The region of the first two unknowns, whatever the others are."""
     keys = found.keys[:2]
@@ -375,5 +384,6 @@ def _ellipse(found: Fit, axes: Any) -> None:
         edges = np.array([_back(keys, point) for point in edge.T])
         axes.plot(*edges.T, style, color="C3", label=f"{100 * confidence:.0f} %")
     axes.plot(*middle, "o", color="C3")
-    axes.set(xlabel=keys[0], ylabel=keys[1], title=f"correlation {found.correlation[0, 1]:+.2f}")
+    across, up = (_with_unit(key) for key in keys)
+    axes.set(xlabel=across, ylabel=up, title=f"correlation {found.correlation[0, 1]:+.2f}")
     axes.legend(fontsize="small")

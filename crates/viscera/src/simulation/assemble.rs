@@ -7,7 +7,7 @@ use crate::mesh::refine::{self, Middles};
 use crate::mesh::shapes;
 use crate::mesh::topology::{boundary_surface, connected_components};
 use crate::mesh::{SurfaceMesh, TetMesh};
-use crate::model::ModelBuilder;
+use crate::model::{ModelBuilder, ModelError};
 use crate::scalar::Vec3;
 use crate::scene::{Body, BodyShape, Instrument, Region, Scene, nearest_pair};
 
@@ -88,6 +88,18 @@ impl Assembly {
         assembly.note_overlaps(scene);
         assembly.note_loose_parts(scene);
         Ok(assembly)
+    }
+
+    /// What models are built from, with the materials of another scene of the same bodies.
+    pub fn with_materials(&self, scene: &Scene) -> Result<ModelBuilder, ModelError> {
+        let mut builder = self.builder.clone();
+        for (index, body) in scene.bodies.iter().enumerate() {
+            builder.set_material(index, &body.material)?;
+            for region in &body.regions {
+                builder.set_region_material(index, region.label, &region.material)?;
+            }
+        }
+        Ok(builder)
     }
 
     /// The scene that this was made from with every tetrahedron divided into eight. The vertices of each body keep their

@@ -301,14 +301,8 @@ impl<S: Real> Simulation<S> {
         scene: Scene,
         same_device: bool,
     ) -> Result<(), LiveError> {
-        let mut builder = self.assembly.builder.clone();
-        for (index, body) in scene.bodies.iter().enumerate() {
-            let set = |problem: ModelError| LiveError::Simulation(problem.into());
-            builder.set_material(index, &body.material).map_err(set)?;
-            for region in &body.regions {
-                builder.set_region_material(index, region.label, &region.material).map_err(set)?;
-            }
-        }
+        let set = |problem: ModelError| LiveError::Simulation(problem.into());
+        let builder = self.assembly.with_materials(&scene).map_err(set)?;
         let model = builder.build::<S>().map_err(SimulationError::from)?;
         let on_device = same_device && self.callers_device;
         self.resumed_method = self.resumed_method.filter(|_| same_device);
