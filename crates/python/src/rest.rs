@@ -4,6 +4,7 @@ use crate::arrays::{numbers, row, vectors};
 use crate::fault::{Class, OrRaise, error, guarded};
 use crate::scene::{Content, Scene};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use std::ops::Range;
@@ -13,7 +14,7 @@ use viscera::scalar::Vec3;
 use viscera::scene::Scene as Parsed;
 use viscera::simulation::Simulation;
 use viscera_reference::sensitivity::{Change, Dependence, Tangent};
-use viscera_reference::{Course, RestState, check_determined};
+use viscera_reference::{Course, ReferenceError, RestState, check_determined};
 use viscera_resources::Memory;
 
 /// States of rest of a scene, by Newton's method in double precision.
@@ -71,6 +72,39 @@ impl Solved {
         Ok(Self { changes: changes?, simulation, memory })
     }
 
+    /// An error of the reference, in terms of this package.
+    fn refuse(&self, why: ReferenceError, time: f64) -> PyErr {
+        let name = &self.simulation.scene().name;
+        let message = match why {
+            ReferenceError::Stopped => return PyKeyboardInterrupt::new_err(()),
+            ReferenceError::TooLarge { unknowns, bytes, limit } => {
+                // A little more than needed, so that the advice holds.
+                let enough = Memory(bytes.saturating_add(bytes / 10));
+                let (needed, limit) = (Memory(bytes), Memory(limit));
+                format!(
+                    "{unknowns} unknowns need {needed}, more than the {limit} allowed; take a coarser mesh, or allow more \
+                     with memory=\"{enough}\""
+                )
+            }
+            other => other.to_string(),
+        };
+        error(Class::Simulation, format!("{name}, at {time:.4} s: {message}"))
+    }
+
+    /// Says that tools that touch have friction, which these states leave out.
+    fn warn_of_friction(&self, py: Python<'_>, times: &[Time]) -> PyResult<()> {
+        let touches = times.iter().any(|time| time.state.wrenches.iter().any(|w| w.touches > 0));
+        let rough = self.simulation.scene().tools.iter().find(|tool| tool.law.friction > 0.0);
+        let Some(tool) = rough.filter(|_| touches) else { return Ok(()) };
+        let message = format!(
+            "tool `{0}` has friction {1}, and states of rest have none: forces may differ by a tenth; where it slides \
+             set tool.{0}.friction = 0",
+            tool.name, tool.law.friction
+        );
+        let message = std::ffi::CString::new(message).unwrap_or_default();
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &message, 1)
+    }
+
     /// One state after another; `near` are positions to begin at, time by time.
     fn follow(
         &self,
@@ -78,18 +112,19 @@ impl Solved {
         near: Option<Vec<&[Vec3<f64>]>>,
         keys: &[(String, Dependence)],
     ) -> PyResult<Vec<Time>> {
-        let mut course = Course::new(&self.simulation, self.memory);
+        let mut course = Course::new(&self.simulation, self.memory).stop_where(goes_on);
         let mut before = (0.0, course.rest().to_vec());
         let mut all = Vec::with_capacity(times.len());
         for (number, &time) in times.iter().enumerate() {
-            let refuse = |why| {
-                let name = &self.simulation.scene().name;
-                error(Class::Simulation, format!("{name}, at {time:.4} s: {why}"))
-            };
-            let nearby = near.as_ref().and_then(|near| course.go((time, near[number]), time).ok());
+            let refuse = |why| self.refuse(why, time);
+            let nearby = near.as_ref().map(|near| course.go((time, near[number]), time));
             let state = match nearby {
-                Some(state) => state,
-                None => course.go((before.0, &before.1), time).map_err(refuse)?,
+                Some(Ok(state)) => state,
+                // From there Newton's method may find no way, and from the beginning it may.
+                Some(Err(ReferenceError::NotConverged { .. })) | None => {
+                    course.go((before.0, &before.1), time).map_err(refuse)?
+                }
+                Some(Err(why)) => return Err(refuse(why)),
             };
             let forces = course.forces(&state);
             let tangents = match self.changes.is_empty() {
@@ -110,6 +145,11 @@ impl Solved {
     }
 }
 
+/// False after Ctrl-C, which is taken note of here: who asked raises it.
+fn goes_on() -> bool {
+    Python::attach(|py| py.check_signals()).is_ok()
+}
+
 /// The number in force at a key [SI], also where a preset says it.
 fn number_at(scene: &Parsed, key: &str) -> PyResult<f64> {
     // The table of settings reports an unknown key, and suggests the nearest.
@@ -118,7 +158,7 @@ fn number_at(scene: &Parsed, key: &str) -> PyResult<f64> {
     let body = |name: &str| find(&scene.bodies, name, |body| &body.name);
     let found = match steps[..] {
         ["body", name, "material", last] => body(name).and_then(|body| of(&body.material, last)),
-        ["body", name, "region", number, "material", last] => body(name).and_then(|body| {
+        ["body", name, "region", number, last] => body(name).and_then(|body| {
             let region = body.regions.get(number.parse::<usize>().ok()?)?;
             of(&region.material, last)
         }),
@@ -290,7 +330,7 @@ impl Rest {
             let mut sums = vec![0.0; self.keys.len()];
             for (time, by_positions) in self.times.iter().zip(&all) {
                 let pulled = course.pull_back(&time.state, by_positions, &solved.changes);
-                let pulled = pulled.map_err(|why| error(Class::Simulation, why))?;
+                let pulled = pulled.map_err(|why| solved.refuse(why, time.state.time))?;
                 sums.iter_mut().zip(pulled).for_each(|(sum, pulled)| *sum += pulled);
             }
             Ok(sums)
@@ -357,16 +397,21 @@ pub fn rest(
         guarded(|| {
             let solved = Solved::new(&content, &keys, memory.0)?;
             let count = solved.simulation.model().vertex_count();
-            let near = near.filter(|near| {
+            let fits = |near: &Rest| {
                 let known = near.times.iter().map(|time| time.state.time);
                 near.vertex_count == count && known.eq(times.iter().copied())
-            });
+            };
+            if near.is_some_and(|near| !fits(near)) {
+                let message = "near has other bodies or other times than are asked for";
+                return Err(error(Class::Scene, message));
+            }
             let near =
                 near.map(|near| near.times.iter().map(|time| &time.state.positions[..]).collect());
             let all = solved.follow(&times, near, &keys)?;
             Ok::<_, PyErr>((solved, all))
         })
     })??;
+    solved.warn_of_friction(py, &all)?;
     let bodies = &solved.simulation.assembly().bodies;
     Ok(Rest {
         title: solved.simulation.scene().title.clone(),

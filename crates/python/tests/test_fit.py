@@ -129,7 +129,10 @@ def test_what_the_data_do_not_tell_is_said(truth: vi.Rest) -> None:
 
 
 def test_an_end_at_a_bound_is_said(truth: vi.Rest) -> None:
-    found = vi.fit(drawn(), measured(truth, 2), {YOUNG: (20e3, 50e3)}, SIGMA)
+    with pytest.warns(
+        vi.MisfitWarning, match=r"does not explain .* of \d+, and body.block.*at a bound"
+    ):
+        found = vi.fit(drawn(), measured(truth, 2), {YOUNG: (20e3, 50e3)}, SIGMA)
     assert found.at_bound == (YOUNG,)
     assert found.value[YOUNG] == pytest.approx(20e3, rel=1e-4)
     assert "at its bound" in repr(found)
@@ -169,8 +172,12 @@ def test_tables_are_read(truth: vi.Rest, tmp_path: Path) -> None:
         ("t,fx,fy,fz\n0.1,1,two,3\n", vi.SceneError, "line 2: fy is `two`"),
         ("t,fx,fy,fz\n0.1,1\n", vi.SceneError, "line 2: it has not as many fields"),
         ("t,fx,fy,fz\n0.1,1,2,3,4\n", vi.SceneError, "line 2: it has not as many fields"),
-        ("t,fx,fy,fz\n0.2,1,2,3\n0.1,1,2,3\n", vi.SceneError, "after the one before"),
-        ("t,fx,fy,fz\n,1,2,3\n", vi.SceneError, "times are seconds"),
+        (
+            "t,fx,fy,fz\n0.2,1,2,3\n0.1,1,2,3\n",
+            vi.SceneError,
+            "line 3: t is `0.1`; .*after the one before",
+        ),
+        ("t,fx,fy,fz\n,1,2,3\n", vi.SceneError, "line 2: t is ``; times are seconds"),
         ("t,fx,fy,fz\n", vi.SceneError, "one at least"),
         ("t,fx,fy,fz\n0.1,,,\n", vi.SceneError, "nothing was measured"),
         ("t,fx,fy,fz\n0.1,1,2,inf\n", vi.SceneError, "infinite"),
@@ -200,13 +207,21 @@ def test_markers_that_are_nowhere_are_told(truth: vi.Rest, tmp_path: Path) -> No
             with pytest.raises(vi.SceneError, match=r"lies (3\.[5-9]|4\.\d) mm outside"):
                 vi.fit(drawn(), data, BOUNDS, SIGMA)
         else:
-            assert vi.fit(drawn(), data, {YOUNG: BOUNDS[YOUNG]}, {"markers": 1e-6}).evaluations > 0
+            # It is taken, and it was not seen where the block is at these times.
+            with pytest.warns(vi.MisfitWarning, match="explain"):
+                vi.fit(drawn(), data, {YOUNG: BOUNDS[YOUNG]}, {"markers": 1e-6})
     unknown = vi.Measurements(TIMES, markers={"liver": (outside, seen[:, :1])})
     with pytest.raises(vi.UnknownKeyError, match="liver"):
         vi.fit(drawn(), unknown, BOUNDS, SIGMA)
     table, markers = tmp_path / "pull.csv", tmp_path / "markers.csv"
     table.write_text("t,fx,fy,fz\n0.1,1,2,3\n")
-    for rows, words in [("0.1,a,0,0,0\n", "unloaded"), ("rest,a,0,0,0\n0.3,a,0,0,0\n", "at 0.3 s")]:
+    twice = "rest,a,0,0,0\n0.1,a,0,0,0\n"
+    for rows, words in [
+        ("0.1,a,0,0,0\n", "line 2: .*unloaded"),
+        ("rest,a,0,0,0\n0.3,a,0,0,0\n", "line 3: at 0.3 s"),
+        (twice + "0.1, a ,0,0,0\n", "line 4: marker `a` is seen at 0.1 s for the second time"),
+        (twice + "Rest,a,0,0,0\n", "line 4: marker `a` is unloaded for the second time"),
+    ]:
         markers.write_text("t,marker,x,y,z\n" + rows)
         with pytest.raises(vi.SceneError, match=words):
             vi.Measurements.csv(
@@ -225,7 +240,13 @@ def test_markers_that_are_nowhere_are_told(truth: vi.Rest, tmp_path: Path) -> No
         ({"sigma": {"force": 0.02}}, vi.SceneError, r'sigma\["markers"\]'),
         ({"sigma": {**SIGMA, "force": -1.0}}, vi.SceneError, "above zero"),
         ({"sigma": {**SIGMA, "heat": 1.0}}, vi.UnknownKeyError, "heat"),
-        ({"start": {YOUNG: 5e3}}, vi.SceneError, "within its bounds"),
+        ({"sigma": {**SIGMA, "force": "5 mN"}}, vi.SceneError, "this is '5 mN'"),
+        ({"sigma": 0.005}, vi.SceneError, "sigma is a dictionary"),
+        ({"unknown": [YOUNG]}, vi.SceneError, "unknown is a dictionary"),
+        ({"unknown": {POISSON: (0.3, 0.5)}}, vi.SceneError, "at most 0.499"),
+        ({"start": {YOUNG: 500.0}}, vi.SceneError, "within its bounds"),
+        ({"start": {"young": 5e3}}, vi.UnknownKeyError, "not fitted"),
+        ({"memory": "1 kB"}, vi.SimulationError, "memory="),
     ],
 )
 def test_what_cannot_be_fitted_is_told(
@@ -234,6 +255,27 @@ def test_what_cannot_be_fitted_is_told(
     given: dict[str, Any] = {"unknown": BOUNDS, "sigma": SIGMA, **arguments}
     with pytest.raises(kind, match=words):
         vi.fit(drawn(), measured(truth, None), **given)
+
+
+def test_millimetres_are_told(truth: vi.Rest) -> None:
+    rest, seen = measured(truth, None).markers["block"]
+    data = vi.Measurements(TIMES, markers={"block": (rest, 1e3 * seen)})
+    with pytest.raises(vi.SceneError, match="not millimetres"):
+        vi.fit(drawn(), data, BOUNDS, SIGMA)
+
+
+def test_forces_of_the_wrong_sign_are_told(truth: vi.Rest) -> None:
+    data = vi.Measurements(TIMES, force={"grip": -truth.force("grip")})
+    with pytest.warns(vi.MisfitWarning, match="look at units, signs"):
+        vi.fit(drawn(), data, {YOUNG: BOUNDS[YOUNG]}, SIGMA)
+
+
+@pytest.mark.parametrize(
+    "given", [{"force": [[1, 2, 3]]}, {"markers": np.zeros((1, 3))}, {"markers": {"block": 1}}]
+)
+def test_measurements_that_are_no_dictionaries_are_told(given: dict[str, Any]) -> None:
+    with pytest.raises(vi.SceneError, match=r"is a dictionary|are a pair"):
+        vi.Measurements([0.1], **given)
 
 
 def test_more_unknowns_than_numbers_are_told() -> None:

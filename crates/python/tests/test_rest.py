@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -62,6 +67,7 @@ def test_derivatives_are_what_differences_say() -> None:
     ball: dict[str, Any] = {
         "tool.ball.position": [-9e-3, 15e-3, 8e-3],
         "tool.ball.keys": [{"time": "0.2 s", "translation": ["5 mm", 0, 0]}],
+        "tool.ball.friction": 0.0,
     }
     scene = vi.Scene.parse(BLOCK + GRIP + BALL, settings=ball)
     state = vi.rest(scene, unknown=[YOUNG, POISSON])
@@ -120,7 +126,7 @@ def test_the_end_of_the_scene_is_the_time_where_none_is_given() -> None:
         ({"unknown": ["solver.substeps"]}, vi.UnknownKeyError, "no derivative"),
         ({"unknown": ["body.blok.material.young"]}, vi.UnknownKeyError, "blok"),
         ({"unknown": ["fixing.table.stiffness"]}, vi.SceneError, "no number"),
-        ({"memory": "1 kB"}, vi.SimulationError, "allowed"),
+        ({"memory": "1 kB"}, vi.SimulationError, r"75 unknowns need .* memory=\""),
         ({"memory": "much"}, vi.SceneError, "memory"),
     ],
 )
@@ -156,3 +162,63 @@ def test_names_and_shapes_are_checked() -> None:
         state.positions_along(POISSON, "block")
     with pytest.raises(vi.SceneError, match="shape"):
         state.pull_back({"block": np.zeros((2, 3))})
+
+
+def test_a_ball_that_comes_at_once_presses_as_it_does_slowly() -> None:
+    ball = {
+        "tool.ball.friction": 0.0,
+        "tool.ball.keys": [{"time": "0.4 s", "translation": [0, 0, "-7 mm"]}],
+    }
+    scene = vi.Scene.parse(BLOCK + BALL, settings=ball)
+    at_once = vi.rest(scene, [0.5]).force("ball")[-1]
+    slowly = vi.rest(scene, np.linspace(0.02, 0.5, 25)).force("ball")[-1]
+    assert at_once == pytest.approx(slowly, abs=1e-8)
+    assert at_once[2] < -0.5
+
+
+def test_friction_that_is_left_out_is_said() -> None:
+    with pytest.warns(
+        UserWarning, match=r"tool `ball` has friction 0.3.*set tool.ball.friction = 0"
+    ):
+        vi.rest(vi.Scene.parse(BLOCK + BALL))
+
+
+def test_the_stiffness_of_a_region_is_an_unknown() -> None:
+    scene = vi.Scene.builtin("palpation", settings={"tool.probe.friction": 0.0})
+    keys = [f"body.tissue.{part}.young" for part in ("material", "region.0")]
+    # Nothing weighs anything there: all forces are proportional to both together.
+    state = vi.rest(scene, [0.3], unknown=keys)
+    force, shares = state.force("probe"), [state.force_along(key, "probe") for key in keys]
+    young = [8e3, 80e3]
+    assert vi.Simulation(scene)["tissue"].material["young"] == young[0]
+    whole = sum(e * share for e, share in zip(young, shares, strict=True))
+    np.testing.assert_allclose(whole, force, rtol=1e-9, atol=1e-9)
+
+
+def test_another_near_is_told() -> None:
+    state = vi.rest(drawn(), [0.2])
+    with pytest.raises(vi.SceneError, match="other times"):
+        vi.rest(drawn(), [0.3], near=state)
+
+
+def test_ctrl_c_ends_a_solve(tmp_path: Path) -> None:
+    code = """
+import viscera as vi
+scene = vi.Scene.builtin("stretch", settings={"body.bar.cells_across": 6})
+print("begins", flush=True)
+try:
+    vi.rest(scene)
+except KeyboardInterrupt:
+    print("ended")
+"""
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path) as running:
+        assert running.stdout is not None
+        assert running.stdout.readline() == "begins\n"
+        time.sleep(2.0)
+        running.send_signal(signal.SIGINT)
+        begun = time.monotonic()
+        assert running.stdout.read() == "ended\n"
+        assert running.wait() == 0
+    # A Newton step, not all of them: whole it takes a minute.
+    assert time.monotonic() - begun < 30.0

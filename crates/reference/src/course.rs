@@ -1,6 +1,6 @@
 //! States of rest of a scene, from one to the next, so that each lies in the minimum that its motions lead to.
 
-use viscera::contact::Wrench;
+use viscera::contact::{Shape, Wrench};
 use viscera::scalar::Vec3;
 use viscera::scene::{Instrument, Scene};
 use viscera::simulation::{Simulation, ToolState};
@@ -58,6 +58,24 @@ pub enum Undetermined {
          contact.bodies = false"
     )]
     Bodies,
+    /// A tool leaves on its way.
+    #[error(
+        "tool `{name}` leaves at {end} s, and states of rest know the tools of the beginning only; let it move away"
+    )]
+    LeavingTool {
+        /// Its name.
+        name: String,
+        /// [s].
+        end: f64,
+    },
+    /// A spring holds a tool.
+    #[error(
+        "a spring holds tool `{name}`, and states of rest know tools that are where they are led; leave out its spring"
+    )]
+    Spring {
+        /// Of the tool.
+        name: String,
+    },
     /// Jaws close until they press.
     #[error(
         "the jaws of tool `{name}` follow a force, so that a state of rest does not tell their angle; drive them by an angle"
@@ -94,6 +112,12 @@ pub fn check_determined(scene: &Scene) -> Result<(), Undetermined> {
     if let Some(tool) = scene.tools.iter().find(|tool| tool.begin > 0.0) {
         return Err(Undetermined::LateTool { name: tool.name.clone(), begin: tool.begin });
     }
+    if let Some((tool, end)) = scene.tools.iter().find_map(|tool| Some((tool, tool.leaves()?))) {
+        return Err(Undetermined::LeavingTool { name: tool.name.clone(), end });
+    }
+    if let Some(tool) = scene.tools.iter().find(|tool| tool.spring.is_some()) {
+        return Err(Undetermined::Spring { name: tool.name.clone() });
+    }
     let with_jaws = || scene.tools.iter().filter_map(|tool| Some((tool, tool.jaws.as_ref()?)));
     if let Some((tool, _)) = with_jaws().find(|(_, jaws)| jaws.follow_force()) {
         return Err(Undetermined::Jaws { name: tool.name.clone() });
@@ -107,27 +131,70 @@ pub fn check_determined(scene: &Scene) -> Result<(), Undetermined> {
 /// Unbalanced forces over those of the start: next to round-off, as derivatives are of what is at rest.
 const CLOSE: f64 = 1e-13;
 
-/// Of the size of all bodies, what moves from one solve to the next at most: well below what turns a bar's end half about.
+/// Of the size of all bodies, what holds and pulls moves from one solve to the next at most.
 const STRIDE: f64 = 0.1;
 
-/// How far [m] what holds, pulls and touches tissue moves between two times; `size` is that of the bodies.
-fn farthest(before: &Inputs<f64>, after: &Inputs<f64>, size: f64) -> f64 {
-    let pins = before.pins.iter().zip(&after.pins).map(|(a, b)| (b.target - a.target).length());
-    let pulled = before.tethers.iter().zip(&after.tethers);
-    let pulled = pulled.map(|(a, b)| (b.target - a.target).length());
-    let tools = before.tools.iter().zip(&after.tools).map(|(a, b)| {
-        let columns = a.pose.rotation.columns.iter().zip(&b.pose.rotation.columns);
-        let turned = columns.map(|(a, b)| (*b - *a).length()).fold(0.0, f64::max);
-        let moved = (b.pose.translation - a.pose.translation).length();
-        moved + turned * a.shape.reach().min(size)
-    });
-    pins.chain(pulled).chain(tools).fold(0.0, f64::max)
+/// Of the tool's thickness, and of the shortest edges on the tissue's surface, what a tool moves: one that goes deeper at once
+/// pushes tissue out on its other side.
+const TOOL_STRIDE: f64 = 0.25;
+
+/// A frame is divided in two so many times at most.
+const HALVINGS: u32 = 10;
+
+/// How far what acts may move at once.
+struct Strides {
+    /// [m].
+    of_holds: f64,
+    /// [m].
+    of_tools: f64,
+    /// Of all bodies [m].
+    size: f64,
+}
+
+impl Strides {
+    fn new(simulation: &Simulation<f64>) -> Self {
+        let (model, tools) = (simulation.model(), simulation.inputs_at(0.0).tools);
+        let along = |axis: usize| {
+            let ends = model.rest_positions.iter().map(|x| x[axis]);
+            ends.clone().fold(f64::NEG_INFINITY, f64::max) - ends.fold(f64::INFINITY, f64::min)
+        };
+        let size = Vec3::from_f64([0, 1, 2].map(along)).length();
+        let edges = model.samples.iter().map(|sample| sample.edge).fold(size, f64::min);
+        let thinnest = tools.iter().map(|tool| thickness(&tool.shape)).fold(edges, f64::min);
+        Self { of_holds: STRIDE * size, of_tools: TOOL_STRIDE * thinnest, size }
+    }
+
+    /// How many strides there are between what acts at two times.
+    fn between(&self, before: &Inputs<f64>, after: &Inputs<f64>) -> f64 {
+        let pins = before.pins.iter().zip(&after.pins).map(|(a, b)| (b.target - a.target).length());
+        let pulled = before.tethers.iter().zip(&after.tethers);
+        let pulled = pulled.map(|(a, b)| (b.target - a.target).length());
+        let tools = before.tools.iter().zip(&after.tools).map(|(a, b)| {
+            let columns = a.pose.rotation.columns.iter().zip(&b.pose.rotation.columns);
+            let turned = columns.map(|(a, b)| (*b - *a).length()).fold(0.0, f64::max);
+            let moved = (b.pose.translation - a.pose.translation).length();
+            moved + turned * a.shape.reach().min(self.size)
+        });
+        let holds = pins.chain(pulled).fold(0.0, f64::max) / self.of_holds;
+        holds.max(tools.fold(0.0, f64::max) / self.of_tools)
+    }
+}
+
+/// The diameter of the largest ball in a tool's shape [m].
+fn thickness(shape: &Shape) -> f64 {
+    match shape {
+        Shape::Sphere { radius } | Shape::Capsule { radius, .. } => 2.0 * radius,
+        Shape::RoundedBox { half, .. } => 2.0 * half.x.min(half.y).min(half.z),
+        // Solid without end, and nobody knows how thin.
+        Shape::HalfSpace | Shape::Mesh(_) => f64::INFINITY,
+    }
 }
 
 /// A scene whose states of rest are followed.
 pub struct Course<'a> {
     simulation: &'a Simulation<f64>,
     reference: Reference,
+    strides: Strides,
 }
 
 /// A state of rest of a scene.
@@ -143,7 +210,7 @@ pub struct RestState {
     pub holding: Vec<Vec3<f64>>,
     /// On each of the tools that act there.
     pub wrenches: Vec<Wrench>,
-    /// How the last solve went.
+    /// How the last solve went; Newton steps of all of them.
     pub convergence: Convergence,
 }
 
@@ -154,7 +221,13 @@ impl<'a> Course<'a> {
         let tolerance = Tolerance { relative: CLOSE, ..Tolerance::default() };
         let reference = Reference::with_elements(model, elements).allow_memory(memory);
         let reference = reference.with_tolerance(tolerance);
-        Self { simulation, reference }
+        Self { simulation, reference, strides: Strides::new(simulation) }
+    }
+
+    /// Solves end where this says that they shall not go on ([`Reference::stop_where`]).
+    pub fn stop_where(mut self, goes_on: fn() -> bool) -> Self {
+        self.reference = self.reference.stop_where(goes_on);
+        self
     }
 
     /// What solves.
@@ -179,11 +252,14 @@ impl<'a> Course<'a> {
         (before, start): (f64, &[Vec3<f64>]),
         time: f64,
     ) -> Result<RestState, ReferenceError> {
-        let mut here = start.to_vec();
+        let (mut here, mut steps) = (start.to_vec(), 0);
         for stop in self.stops(before, time) {
-            here = self.settle(&here, stop)?.positions;
+            let state = self.settle(&here, stop)?;
+            here = state.positions;
+            steps += state.convergence.steps;
         }
-        let state = self.settle(&here, time)?;
+        let mut state = self.settle(&here, time)?;
+        state.convergence.steps += steps;
         let meets_itself = self.simulation.scene().contact.self_;
         match find_overlap(self.simulation.model(), &state.positions).filter(|_| meets_itself) {
             Some(vertex) => Err(ReferenceError::Overlap { vertex }),
@@ -191,34 +267,48 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// Ends of frames between two times [s], from each of which to the next nothing moves further than [`STRIDE`], unless it
-    /// does so in one frame.
+    /// Times between two [s] from each of which to the next nothing moves further than its stride.
     fn stops(&self, before: f64, time: f64) -> Vec<f64> {
-        let rest = self.rest();
-        let along = |axis: usize| {
-            let ends = rest.iter().map(|x| x[axis]);
-            ends.clone().fold(f64::NEG_INFINITY, f64::max) - ends.fold(f64::INFINITY, f64::min)
-        };
-        let size = Vec3::from_f64([0, 1, 2].map(along)).length();
         let frame = self.simulation.scene().time.frame;
-        let (mut last, mut frame_before) = ((before, self.simulation.inputs_at(before)), before);
-        let mut stops = Vec::new();
         // After its end a scene stands still.
         let scene_end = self.simulation.scene().frame_count() as f64 * frame;
         let frames = (1u32..).map(|frames| before + f64::from(frames) * frame);
-        for end in frames.take_while(|end| *end < time.min(scene_end)).chain([time]) {
-            let inputs = self.simulation.inputs_at(end);
-            if farthest(&last.1, &inputs, size) > STRIDE * size && frame_before > last.0 {
-                last = (frame_before, self.simulation.inputs_at(frame_before));
-                stops.push(frame_before);
-            }
+        let ends = frames.take_while(|end| *end < time.min(scene_end)).chain([time]);
+        let mut stops = Vec::new();
+        let mut last = (before, self.simulation.inputs_at(before));
+        let mut frame_before = before;
+        for end in ends {
+            self.divide(&mut last, (frame_before, end), HALVINGS, &mut stops);
             frame_before = end;
         }
         stops
     }
 
+    /// Adds stops in a frame, so that strides since the last one and in it are short enough.
+    fn divide(
+        &self,
+        last: &mut (f64, Inputs<f64>),
+        (start, end): (f64, f64),
+        halvings: u32,
+        stops: &mut Vec<f64>,
+    ) {
+        let inputs = self.simulation.inputs_at(end);
+        if self.strides.between(&last.1, &inputs) <= 1.0 {
+            return;
+        }
+        if start > last.0 {
+            *last = (start, self.simulation.inputs_at(start));
+            stops.push(start);
+        }
+        if halvings > 0 && self.strides.between(&last.1, &inputs) > 1.0 {
+            let middle = 0.5 * (start + end);
+            self.divide(last, (start, middle), halvings - 1, stops);
+            self.divide(last, (middle, end), halvings - 1, stops);
+        }
+    }
+
     /// The state of rest at a time [s] that Newton's method finds from `start` [m], whatever lies between.
-    pub fn settle(&mut self, start: &[Vec3<f64>], time: f64) -> Result<RestState, ReferenceError> {
+    fn settle(&mut self, start: &[Vec3<f64>], time: f64) -> Result<RestState, ReferenceError> {
         let inputs = self.simulation.inputs_at(time);
         let solution = self.reference.settle(start, &inputs)?;
         let (positions, convergence) = (solution.positions, solution.convergence);

@@ -80,6 +80,9 @@ pub enum ReferenceError {
         /// How many tools there are.
         tools: usize,
     },
+    /// Somebody wanted no more of it ([`crate::Reference::stop_where`]).
+    #[error("the solve was stopped")]
+    Stopped,
     /// Tissue passes through itself.
     #[error(
         "tissue lies in tissue at vertex {vertex}: states of rest know contact with tools only; take a load with which the \

@@ -61,7 +61,7 @@ impl Reference {
         let hessian = objective.hessian(x, pattern, false);
         factorization.factorize(pattern, &hessian).map_err(|error| match error {
             FactorError::TooLarge => self.too_large(&cost),
-            FactorError::Indefinite => ReferenceError::Unstable,
+            FactorError::Indefinite | FactorError::Stopped => ReferenceError::Unstable,
         })?;
         let masses = &self.problem.masses;
         let weighted = |shape: &[Vec3<f64>]| -> Vec<Vec3<f64>> {

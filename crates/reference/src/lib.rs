@@ -92,6 +92,7 @@ pub struct Reference {
     tolerance: Tolerance,
     memory: u64,
     lumped: bool,
+    goes_on: fn() -> bool,
     /// Of the pins last used.
     analysis: Option<Analysis>,
 }
@@ -135,7 +136,14 @@ impl Reference {
 
     fn of(problem: Problem, lumped: bool) -> Self {
         let tolerance = Tolerance::default();
-        Self { problem, tolerance, memory: DEFAULT_MEMORY, lumped, analysis: None }
+        Self {
+            problem,
+            tolerance,
+            memory: DEFAULT_MEMORY,
+            lumped,
+            goes_on: || true,
+            analysis: None,
+        }
     }
 
     /// Changes how much memory [B] may be taken.
@@ -147,6 +155,12 @@ impl Reference {
     /// Changes how far Newton's method goes.
     pub fn with_tolerance(mut self, tolerance: Tolerance) -> Self {
         self.tolerance = tolerance;
+        self
+    }
+
+    /// Solves end with [`ReferenceError::Stopped`] where this says, asked before each Newton step, that they shall not go on.
+    pub fn stop_where(mut self, goes_on: fn() -> bool) -> Self {
+        self.goes_on = goes_on;
         self
     }
 
@@ -326,11 +340,18 @@ impl Reference {
         let Analysis { pattern, factorization, .. } = &mut analysis;
         let contacts = Contacts::new(&self.problem.samples, &inputs.tools, touched);
         let objective = Objective { contacts, ..objective(&self.problem, inputs, load) };
-        let solved = newton::minimise(&objective, pattern, factorization, &self.tolerance, &mut x);
+        let solved = newton::minimise(
+            &objective,
+            pattern,
+            factorization,
+            (&self.tolerance, &self.goes_on),
+            &mut x,
+        );
         self.analysis = Some(analysis);
         let convergence = match solved {
             Ok(convergence) => convergence,
             Err(FactorError::TooLarge) => return Err(self.too_large(&cost)),
+            Err(FactorError::Stopped) => return Err(ReferenceError::Stopped),
             Err(FactorError::Indefinite) => {
                 return Err(ReferenceError::NotFinite { what: "curvature of the potential" });
             }

@@ -210,6 +210,8 @@ pub enum FactorError {
     Indefinite,
     /// There is not enough memory, or the matrix has more entries than can be numbered.
     TooLarge,
+    /// Somebody wants no more of it.
+    Stopped,
 }
 
 impl From<FaerError> for FactorError {

@@ -59,12 +59,12 @@ pub struct Convergence {
     pub minimum: bool,
 }
 
-/// Minimises from `x`, whose pinned vertices stay.
+/// Minimises from `x`, whose pinned vertices stay, as long as `goes_on` says so before a step.
 pub fn minimise(
     objective: &Objective<'_>,
     pattern: &Pattern,
     factorization: &mut Factorization,
-    tolerance: &Tolerance,
+    (tolerance, goes_on): (&Tolerance, &dyn Fn() -> bool),
     x: &mut Vec<Vec3<f64>>,
 ) -> Result<Convergence, FactorError> {
     let mut gradient = objective.gradient(x);
@@ -81,6 +81,9 @@ pub fn minimise(
     while convergence.gradient > tolerance.relative * start_gradient
         && convergence.steps < tolerance.steps
     {
+        if !goes_on() {
+            return Err(FactorError::Stopped);
+        }
         let exact = factorize(objective, pattern, factorization, x)?;
         let step = factorization.solve(pattern, &gradient);
         // `step` is H^-1 grad: the direction is its negative.
@@ -142,8 +145,8 @@ fn factorize(
     let exact = objective.hessian(x, pattern, false);
     match factorization.factorize(pattern, &exact) {
         Ok(()) => return Ok(true),
-        Err(FactorError::TooLarge) => return Err(FactorError::TooLarge),
         Err(FactorError::Indefinite) => {}
+        Err(error) => return Err(error),
     }
     let mut matrix = objective.hessian(x, pattern, true);
     // The exact matrix's, because everywhere compressed tissue may have nothing positive at all.
@@ -152,7 +155,7 @@ fn factorize(
     for step in 0..SHIFTS {
         match factorization.factorize(pattern, &matrix) {
             Ok(()) => return Ok(false),
-            Err(FactorError::TooLarge) => return Err(FactorError::TooLarge),
+            Err(error @ (FactorError::TooLarge | FactorError::Stopped)) => return Err(error),
             Err(FactorError::Indefinite) => {
                 let next = scale * FIRST_SHIFT * 10f64.powi(step);
                 matrix.shift(pattern, next - shift);

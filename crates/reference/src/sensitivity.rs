@@ -47,11 +47,15 @@ pub enum Dependence {
 impl Dependence {
     /// On the number at a key of a scene; nothing where states of rest have no derivative by it.
     pub fn of_key(key: &str) -> Option<Self> {
-        let (before, last) = key.rsplit_once('.')?;
-        match last {
-            "young" | "density" if before.ends_with("material") => Some(Self::Linear),
-            "poisson" if before.ends_with("material") => Some(Self::Poisson),
-            "stiffness" if before.starts_with("fixing.") => Some(Self::Linear),
+        let steps: Vec<&str> = key.split('.').collect();
+        match steps[..] {
+            // The table of a region is that of its material.
+            ["body", _, "material", last] | ["body", _, "region", _, last] => match last {
+                "young" | "density" => Some(Self::Linear),
+                "poisson" => Some(Self::Poisson),
+                _ => None,
+            },
+            ["fixing", _, "stiffness"] => Some(Self::Linear),
             _ => None,
         }
     }
@@ -218,7 +222,7 @@ impl Reference {
         let hessian = objective.hessian(x, &pattern, false);
         factorization.factorize(&pattern, &hessian).map_err(|error| match error {
             FactorError::TooLarge => too_large(cost.bytes),
-            FactorError::Indefinite => ReferenceError::Unstable,
+            FactorError::Indefinite | FactorError::Stopped => ReferenceError::Unstable,
         })?;
         let stiffness = objective.hessian(x, &all, false);
         Ok(Linearized {

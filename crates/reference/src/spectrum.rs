@@ -68,7 +68,7 @@ impl Reference {
         shifted.add_scaled(&mass, shift);
         factorization.factorize(pattern, &shifted).map_err(|error| match error {
             FactorError::TooLarge => self.too_large(&cost),
-            FactorError::Indefinite => ReferenceError::Unstable,
+            FactorError::Indefinite | FactorError::Stopped => ReferenceError::Unstable,
         })?;
         let width = (count + SPARE).min(pattern.unknowns());
         let vertices = self.problem.vertex_count();

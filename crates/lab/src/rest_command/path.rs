@@ -113,13 +113,14 @@ impl<'a> LoadPath<'a> {
     /// Solves part after part, with a step of the bar for each.
     pub fn follow(mut self, progress: &Progress) -> Result<Rest> {
         let mut positions = self.simulation.model().rest_positions.clone();
-        let (mut steps, mut last) = (0, None);
+        let (mut steps, mut last, mut before) = (0, None, 0.0);
         for (part, stop) in self.stops.iter().enumerate() {
             let _case = progress.case(&format!("part {} of {}", part + 1, self.stops.len()));
-            let solved = self.course.settle(&positions, stop.time);
+            let solved = self.course.go((before, &positions), stop.time);
             let state = solved.map_err(|error| self.explain(error, stop.time))?;
             positions.clone_from(&state.positions);
             steps += state.convergence.steps;
+            before = stop.time;
             last = Some(state);
         }
         let state = last.ok_or_else(|| anyhow!("the scene takes no time"))?;

@@ -22,7 +22,7 @@ from ._errors import (
     SnapshotError,
     UnknownKeyError,
 )
-from ._fit import Fit, UndeterminedWarning, fit
+from ._fit import Fit, MisfitWarning, UndeterminedWarning, fit
 from ._measurements import Measurements
 from ._pyvista import to_pyvista
 from ._viscera import (
@@ -54,6 +54,7 @@ __all__ = [
     "Hold",
     "InternalError",
     "Measurements",
+    "MisfitWarning",
     "Rest",
     "Scene",
     "SceneError",

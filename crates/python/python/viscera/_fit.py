@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ._errors import SceneError, SimulationError, UnknownKeyError
-from ._measurements import Anchors, Comparison, Measurements
+from ._measurements import Anchors, Comparison, Measurements, mapping
 from ._types import Floats
 from ._viscera import Rest, Scene, Simulation, rest
 
@@ -28,6 +28,14 @@ STEP = 1e-3
 
 class UndeterminedWarning(UserWarning):
     """The data cannot tell some unknowns apart."""
+
+
+class MisfitWarning(UserWarning):
+    """The scene does not explain the data, with any values within the bounds."""
+
+
+# A chi squared that is larger by chance once in a million times says that the model, sigma or a unit is wrong.
+SURELY_NOT = 1e-6
 
 
 def _is_log(key: str) -> bool:
@@ -75,6 +83,9 @@ class Fit:
             given = np.array([float(values[key]) for key in self.keys])
         except KeyError as missing:
             raise UnknownKeyError(f"there is no value of {missing}") from None
+        for key, value in zip(self.keys, given, strict=True):
+            if _is_log(key) and not value > 0.0:
+                raise SceneError(f"{key} is above zero; this is {value}")
         return _forth(self.keys, given)
 
     def distance(self, values: Mapping[str, float]) -> float:
@@ -136,7 +147,9 @@ def _forth(keys: tuple[str, ...], values: Floats) -> Floats:
 
 def _back(keys: tuple[str, ...], fitted: Floats) -> Floats:
     logs = np.array([_is_log(key) for key in keys])
-    values: Floats = np.where(logs, np.exp(np.where(logs, fitted, 0.0)), fitted)
+    # What the data do not determine may be anything.
+    with np.errstate(over="ignore"):
+        values: Floats = np.where(logs, np.exp(np.where(logs, fitted, 0.0)), fitted)
     return values
 
 
@@ -156,10 +169,12 @@ def _rest_at(
     near: Rest | None,
     derivatives: bool,
 ) -> Rest:
+    """The scene at these numbers."""
     changed = scene.copy()
     changed.update(dict(zip(keys, _back(keys, fitted).tolist(), strict=True)))
     unknown = list(keys) if derivatives else []
-    return rest(changed, comparison.data.times, unknown=unknown, near=near)
+    times, memory = comparison.data.times, comparison.memory
+    return rest(changed, times, unknown=unknown, near=near, memory=memory)
 
 
 class _Problem:
@@ -198,30 +213,37 @@ def fit(
     sigma: Mapping[str, float],
     *,
     start: Mapping[str, float] | None = None,
+    memory: str = "8 GB",
 ) -> Fit:
     """Finds the values of unknowns at which a scene at rest explains measurements best.
 
     ``unknown`` has the least and the largest value in SI units by key: young, poisson and density of materials, the
     stiffness of fixings. ``sigma`` has the standard deviation of what was measured: "force" [N] and "markers" [m]. The
-    search begins at ``start``, or in the middle of the bounds. ``viscera[fit]`` brings SciPy, which does the search.
+    search begins at ``start``, and in the middle of the bounds of what it does not name. ``memory`` is what states of
+    rest may take. ``viscera[fit]`` brings SciPy, which does the search.
     """
     try:
         from scipy.optimize import least_squares
     except ImportError as missing:
         raise ImportError("fit needs SciPy: pip install 'viscera[fit]'") from missing
     begun = time.perf_counter()
+    bounds = _bounds(scene, unknown)
     keys = tuple(unknown)
-    bounds = _bounds(unknown)
-    comparison = _comparison(scene, data, sigma)
+    comparison = _comparison(scene, data, sigma, memory)
     known, _ = data.counts()
     if known < len(keys):
         raise SceneError(f"{known} numbers were measured, fewer than the {len(keys)} unknowns")
     low, high = _forth(keys, bounds[:, 0]), _forth(keys, bounds[:, 1])
     first = (low + high) / 2
-    if start is not None:
-        first = _forth(keys, np.array([float(start.get(key, np.nan)) for key in keys]))
-        if not np.all((low < first) & (first < high)):
-            raise SceneError(f"start has a value within its bounds for each of {', '.join(keys)}")
+    for key, value in mapping("start", start or {}, '{"body.liver.material.young": 5e3}').items():
+        if key not in keys:
+            raise UnknownKeyError(
+                f"start has `{key}`, which is not fitted; there are: {', '.join(keys)}"
+            )
+        at = keys.index(key)
+        if not bounds[at, 0] < float(value) < bounds[at, 1]:
+            raise SceneError(f"start has {value} for {key}, which is not within its bounds")
+        first[at] = _forth((key,), np.array([float(value)]))[0]
     problem = _Problem(scene, comparison, keys)
     try:
         found = least_squares(
@@ -249,8 +271,8 @@ def _result(problem: _Problem, best: Floats, bounds: tuple[Floats, Floats], begu
     undetermined = tuple(_told(keys, direction) for direction in directions[loose])
     for told in undetermined:
         warnings.warn(
-            f"the data do not determine the unknowns: along {told} they fit as well; measure something else as well, "
-            "or fix one of these",
+            f"the data do not determine the unknowns: along {told} of the ranges of the bounds (of logarithms where "
+            "they are stiffness or density) they fit as well; measure something else too, or fix one of these",
             UndeterminedWarning,
             stacklevel=3,
         )
@@ -265,7 +287,9 @@ def _result(problem: _Problem, best: Floats, bounds: tuple[Floats, Floats], begu
     ]
     margin = 1e-6 * (high - low)
     near = (best - low < margin) | (high - best < margin)
+    at_bound = tuple(key for key, is_near in zip(keys, near, strict=True) if is_near)
     parts = problem.comparison.residuals(at_rest)
+    _warn_of_misfit(parts, len(jacobian) - len(keys), at_bound)
     return Fit(
         keys=keys,
         value=dict(zip(keys, values.tolist(), strict=True)),
@@ -275,13 +299,32 @@ def _result(problem: _Problem, best: Floats, bounds: tuple[Floats, Floats], begu
         residual=dict(zip(problem.comparison.names, parts, strict=True)),
         jacobian=jacobian,
         undetermined=undetermined,
-        at_bound=tuple(key for key, is_near in zip(keys, near, strict=True) if is_near),
+        at_bound=at_bound,
         evaluations=problem.evaluations,
         seconds=time.perf_counter() - begun,
         rest=at_rest,
         _scene=problem.scene,
         _comparison=problem.comparison,
     )
+
+
+def _warn_of_misfit(parts: list[Floats], freedom: int, at_bound: tuple[str, ...]) -> None:
+    total = float(sum(np.nansum(part**2) for part in parts))
+    if freedom > 0 and total > _chi_squared_limit(1.0 - SURELY_NOT, freedom):
+        ends = f", and {', '.join(at_bound)} ended at a bound" if at_bound else ""
+        warnings.warn(
+            f"the scene does not explain the data: chi squared is {total:.3g} of {freedom}{ends}; look at units, signs "
+            "and sigma, at what holds the tissue, and at Fit.plot",
+            MisfitWarning,
+            stacklevel=4,
+        )
+    elif at_bound:
+        warnings.warn(
+            f"{', '.join(at_bound)} ended at a bound: the best value lies beyond, and deviations are not those of what "
+            "is cut off",
+            MisfitWarning,
+            stacklevel=4,
+        )
 
 
 def _told(keys: tuple[str, ...], direction: Floats) -> str:
@@ -294,8 +337,8 @@ def _told(keys: tuple[str, ...], direction: Floats) -> str:
     )
 
 
-def _bounds(unknown: Mapping[str, tuple[float, float]]) -> Floats:
-    if not unknown:
+def _bounds(scene: Scene, unknown: Mapping[str, tuple[float, float]]) -> Floats:
+    if not mapping("unknown", unknown, '{"body.liver.material.young": (1e3, 50e3)}'):
         raise SceneError("name one unknown at least, with its least and its largest value")
     rows = []
     for key, given in unknown.items():
@@ -303,34 +346,46 @@ def _bounds(unknown: Mapping[str, tuple[float, float]]) -> Floats:
             low, high = (float(bound) for bound in given)
         except (TypeError, ValueError):
             raise SceneError(
-                f"{key}: give its least and its largest value, as two numbers"
+                f"{key}: give its least and its largest value, as two numbers in SI units"
             ) from None
         least = 0.0 if _is_log(key) else -1.0
         if not (least < low < high < np.inf):
             raise SceneError(
                 f"{key}: bounds ascend from above {least:g}; these are {low} and {high}"
             )
+        # The scene knows what a key takes, and says so at once.
+        for bound in (low, high):
+            scene.copy()[key] = bound
         rows.append((low, high))
     return np.array(rows)
 
 
-def _comparison(scene: Scene, data: Measurements, sigma: Mapping[str, float]) -> Comparison:
-    needed = [what for what, given in (("force", data.force), ("markers", data.markers)) if given]
-    for what in needed:
-        value = sigma.get(what)
-        if value is None or not 0.0 < float(value) < np.inf:
-            raise SceneError(
-                f'sigma["{what}"] is the standard deviation of a measured number, above zero; this is {value}'
-            )
-    for what in sigma:
+def _comparison(
+    scene: Scene, data: Measurements, sigma: Mapping[str, float], memory: str
+) -> Comparison:
+    given = mapping("sigma", sigma, '{"force": 0.02, "markers": 0.5e-3}')
+    for what in given:
         if what not in ("force", "markers"):
-            raise UnknownKeyError(f'sigma has "force" and "markers"; "{what}" is neither')
+            raise UnknownKeyError(f'sigma has "force" [N] and "markers" [m]; "{what}" is neither')
+    needed = [what for what, known in (("force", data.force), ("markers", data.markers)) if known]
+    deviations = {}
+    for what in needed:
+        try:
+            deviations[what] = float(given[what])
+        except (KeyError, TypeError, ValueError):
+            deviations[what] = np.nan
+        if not 0.0 < deviations[what] < np.inf:
+            raise SceneError(
+                f'sigma["{what}"] is the standard deviation of a measured number in SI units, above zero; '
+                f"this is {given.get(what)!r}"
+            )
     anchors = {}
     if data.markers:
         bodies = Simulation(scene, device="cpu")
-        for name, (places, _) in data.markers.items():
+        for name, (places, seen) in data.markers.items():
             anchors[name] = Anchors(bodies, name, places)
-    return Comparison(data, anchors, {what: float(sigma[what]) for what in needed})
+            anchors[name].check(name, places, seen)
+    return Comparison(data, anchors, deviations, memory)
 
 
 def _plot(found: Fit, path: str | None) -> Any:

@@ -8,13 +8,26 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ._errors import FileError, SceneError, UnknownKeyError
 from ._types import Floats, Path
 from ._viscera import Rest, Simulation
 
-Booleans = NDArray[np.bool_]
+# Times of two tables are the same where they differ by no more [s].
+SAME_TIME = 1e-6
+
+# Tissue that has moved so many times the body's size was not measured in metres.
+FARTHEST = 10.0
+
+
+def mapping(what: str, given: Any, example: str) -> Mapping[Any, Any]:
+    """A dictionary, or an error that shows one."""
+    if not isinstance(given, Mapping):
+        raise SceneError(
+            f"{what} is a dictionary such as {example}; this is a {type(given).__name__}"
+        )
+    return given
 
 
 class Measurements:
@@ -40,12 +53,17 @@ class Measurements:
             raise SceneError(
                 "times are seconds from 0 s on, one at least, and each is after the one before"
             )
+        forces = mapping("force", {} if force is None else force, '{"grip": forces}')
         self.force: dict[str, Floats] = {
             name: _array(f"the force of `{name}`", given, (count, 3))
-            for name, given in (force or {}).items()
+            for name, given in forces.items()
         }
         self.markers: dict[str, tuple[Floats, Floats]] = {}
-        for name, (rest, seen) in (markers or {}).items():
+        pairs = mapping("markers", {} if markers is None else markers, '{"liver": (rest, seen)}')
+        for name, pair in pairs.items():
+            if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+                raise SceneError(f"markers of `{name}` are a pair: unloaded, and as they were seen")
+            rest, seen = pair
             places = _array(f"unloaded markers of `{name}`", rest, (None, 3))
             if not np.isfinite(places).all():
                 raise SceneError(f"unloaded markers of `{name}` hold NaN or infinity")
@@ -92,12 +110,15 @@ class Measurements:
         empty fields are gaps. A table of markers has the columns ``t``, ``marker``, ``x``, ``y``, ``z`` [s, a name, m];
         lines with ``rest`` in place of a time say where markers are on the unloaded body.
         """
+        forces_of = mapping("force", {} if force is None else force, '{"grip": ["fx", "fy", "fz"]}')
+        files = mapping("markers", {} if markers is None else markers, '{"liver": "markers.csv"}')
         rows = _table(
-            path, [time, *(column for columns in (force or {}).values() for column in columns)]
+            path, [time, *(column for columns in forces_of.values() for column in columns)]
         )
+        _check_times(path, time, rows)
         times = np.array([_number(path, line, time, row[time]) for line, row in rows])
         forces: dict[str, ArrayLike] = {}
-        for name, columns in (force or {}).items():
+        for name, columns in forces_of.items():
             if len(columns) != 3:
                 raise SceneError(
                     f"the force of `{name}` has three columns; these are {list(columns)}"
@@ -106,7 +127,7 @@ class Measurements:
                 [_number(path, line, column, row[column]) for column in columns]
                 for line, row in rows
             ]
-        seen = {name: _markers(file, times) for name, file in (markers or {}).items()}
+        seen = {name: _markers(file, times) for name, file in files.items()}
         return cls(times, force=forces, markers=seen)
 
 
@@ -157,27 +178,53 @@ def _number(path: Path, line: int, column: str, text: str) -> float:
         raise SceneError(f"{path}, line {line}: {column} is `{text}`, which is no number") from None
 
 
+def _check_times(path: Path, column: str, rows: list[tuple[int, dict[str, str]]]) -> None:
+    """Tells the first line whose time is not after the one before."""
+    before = -1.0
+    for line, row in rows:
+        now = _number(path, line, column, row[column])
+        if not before < now < np.inf:
+            raise SceneError(
+                f"{path}, line {line}: {column} is `{row[column]}`; times are seconds from 0 s on, "
+                "each after the one before"
+            )
+        before = now
+
+
 def _markers(path: Path, times: Floats) -> tuple[Floats, Floats]:
     rest: dict[str, list[float]] = {}
-    later: list[tuple[float, str, list[float]]] = []
+    later: list[tuple[int, str, str, list[float]]] = []
     for line, row in _table(path, ["t", "marker", "x", "y", "z"]):
         place = [_number(path, line, axis, row[axis]) for axis in "xyz"]
-        if row["t"].strip() == "rest":
-            rest[row["marker"]] = place
+        time, marker = row["t"].strip(), row["marker"].strip()
+        if time.lower() != "rest":
+            later.append((line, time, marker, place))
+        elif marker in rest:
+            raise SceneError(
+                f"{path}, line {line}: marker `{marker}` is unloaded for the second time"
+            )
         else:
-            later.append((_number(path, line, "t", row["t"]), row["marker"], place))
+            rest[marker] = place
     names = list(rest)
     seen = np.full((len(times), len(names), 3), np.nan)
-    for time, marker, place in later:
+    known = set()
+    for line, text, marker, place in later:
+        time = _number(path, line, "t", text)
         if marker not in rest:
             raise SceneError(
-                f"{path}: no line with t = rest says where marker `{marker}` is unloaded"
+                f"{path}, line {line}: no line with t = rest says where marker `{marker}` is unloaded"
             )
-        at = np.flatnonzero(np.isclose(times, time, rtol=0.0, atol=1e-9))
+        at = np.flatnonzero(np.isclose(times, time, rtol=0.0, atol=SAME_TIME))
         if at.size == 0:
             raise SceneError(
-                f"{path}: at {time} s there is a marker, and no line of the other table"
+                f"{path}, line {line}: at {text} s there is a marker, and no line of the other table"
             )
+        key = int(at[0]), marker
+        if key in known:
+            raise SceneError(
+                f"{path}, line {line}: marker `{marker}` is seen at {text} s for the second time"
+            )
+        known.add(key)
         seen[at[0], names.index(marker)] = place
     return np.array([rest[name] for name in names]).reshape(-1, 3), seen
 
@@ -190,7 +237,7 @@ class Anchors:
         rest, tets = body.rest, body.tets.astype(np.int64)
         origins = rest[tets[:, 0]]
         inverses = np.linalg.inv(np.swapaxes(rest[tets[:, 1:]] - origins[:, None], 1, 2))
-        longest = float(np.linalg.norm(np.ptp(rest, axis=0)))
+        self.size = longest = float(np.linalg.norm(np.ptp(rest, axis=0)))
         self.corners = np.empty((len(places), 4), dtype=np.int64)
         self.weights = np.empty((len(places), 4))
         for number, place in enumerate(places):
@@ -208,6 +255,15 @@ class Anchors:
                     "markers are in the scene's frame, in metres"
                 )
 
+    def check(self, name: str, places: Floats, seen: Floats) -> None:
+        """Tells what cannot be places of this body in metres."""
+        away = np.linalg.norm(seen - places, axis=-1)
+        if np.nanmax(away, initial=0.0) > FARTHEST * self.size:
+            raise SceneError(
+                f"a marker of `{name}` was seen {np.nanmax(away):.4g} m from where it is unloaded, and the body is "
+                f"{self.size:.3g} m large; places are in metres, not millimetres"
+            )
+
     def of(self, positions: Floats) -> Floats:
         """Markers from vertices, shape (..., k, 3)."""
         picked: Floats = positions[..., self.corners, :]
@@ -219,9 +275,13 @@ class Comparison:
     """Residuals of measurements, in standard deviations, and their derivatives."""
 
     def __init__(
-        self, data: Measurements, anchors: Mapping[str, Anchors], sigma: Mapping[str, float]
+        self,
+        data: Measurements,
+        anchors: Mapping[str, Anchors],
+        sigma: Mapping[str, float],
+        memory: str,
     ) -> None:
-        self.data, self.anchors, self.sigma = data, anchors, sigma
+        self.data, self.anchors, self.sigma, self.memory = data, anchors, sigma, memory
         force = [f"force of {name}" for name in data.force]
         self.names = [*force, *(f"markers of {name}" for name in data.markers)]
 

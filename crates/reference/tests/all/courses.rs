@@ -102,6 +102,61 @@ fn tissue_that_passes_through_itself_is_told() {
         .expect("a state of rest, as was asked for");
 }
 
+/// A pad that a probe is pressed into.
+const PAD: &str = r#"
+[[body]]
+name = "pad"
+shape = "block"
+size = ["60 mm", "60 mm", "20 mm"]
+cells = [6, 6, 2]
+material = { young = "5 kPa", poisson = 0.45 }
+
+[[fixing]]
+body = "pad"
+half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
+
+[[tool]]
+name = "probe"
+kind = "probe"
+radius = "6 mm"
+length = "60 mm"
+position = ["30 mm", "30 mm", "27 mm"]
+keys = [{ time = "TIME", translation = [0, 0, "-10 mm"] }]
+"#;
+
+/// At once a probe would push tissue out on its other side.
+#[test]
+fn a_tool_presses_on_its_way_however_fast_it_comes() {
+    let force = |time: &str, stops: &[f64]| {
+        let simulation = simulation(&PAD.replace("TIME", time));
+        let mut course = Course::new(&simulation, DEFAULT_MEMORY);
+        let (mut before, mut here) = (0.0, course.rest().to_vec());
+        let mut last = Vec3::ZERO;
+        for &stop in stops {
+            let state = course.go((before, &here), stop).expect("a state of rest");
+            last = state.wrenches[0].force;
+            (before, here) = (stop, state.positions);
+        }
+        last.z
+    };
+    let slowly: Vec<f64> = (1..=40).map(|part| f64::from(part) / 40.0).collect();
+    let slow = force("1 s", &slowly);
+    assert!(slow.abs() > 0.5, "{slow} N");
+    for (time, stops) in [("1 s", [1.0]), ("16 ms", [1.0])] {
+        let fast = force(time, &stops);
+        assert!((fast - slow).abs() < 1e-8, "{time}: {fast} N for {slow} N");
+    }
+}
+
+#[test]
+fn a_solve_ends_where_nobody_wants_it() {
+    let simulation = simulation(TWIST);
+    let mut course = Course::new(&simulation, DEFAULT_MEMORY).stop_where(|| false);
+    let rest = course.rest().to_vec();
+    let ended = course.go((0.0, &rest), 1.0).expect_err("nothing was computed");
+    assert_eq!(ended, ReferenceError::Stopped);
+}
+
 #[test]
 fn what_rest_does_not_determine_is_told() {
     let told = |more: &str| {
@@ -118,6 +173,9 @@ fn what_rest_does_not_determine_is_told() {
     let probe = "[[tool]]\nname = \"probe\"\nkind = \"probe\"\nradius = \"4 mm\"\nlength = \"60 mm\"\n\
                  position = [0, 0, \"0.3 m\"]\nbegin = \"0.5 s\"\n";
     assert!(told(probe).contains("probe` comes at 0.5 s"));
+    let held = |key: &str| probe.replace("begin = \"0.5 s\"", key);
+    assert!(told(&held("end = \"0.5 s\"")).contains("probe` leaves at 0.5 s"));
+    assert!(told(&held("spring = \"100 N/m\"")).contains("spring holds tool `probe`"));
     let change = "[[change]]\ntime = \"0.5 s\"\nset = [\"solver.substeps = 2\"]\n";
     assert!(told(change).contains("settings change at 0.5 s"));
 }

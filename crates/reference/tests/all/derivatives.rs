@@ -295,3 +295,9 @@ fn slopes_are_differences_of_gradients_anywhere() {
         }
     }
 }
+
+#[test]
+fn regions_have_the_derivatives_of_materials() {
+    assert_eq!(Dependence::of_key("body.bar.region.0.young"), Some(Dependence::Linear));
+    assert_eq!(Dependence::of_key("body.bar.region.lump.poisson"), Some(Dependence::Poisson));
+}
