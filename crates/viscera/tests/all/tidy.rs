@@ -139,6 +139,30 @@ fn library_touches_neither_files_nor_clocks() {
 /// Packages that programs are built from; every other package is a program.
 const LIBRARIES: &[&str] = &["crates/viscera", "crates/picture"];
 
+/// One that is not inlined is not compiled for the processor's registers: every operation in it is a call.
+#[test]
+fn all_that_kernels_call_is_inlined() {
+    let mut kernels = 0;
+    for (name, source) in library_sources() {
+        let lines: Vec<&str> = source.lines().map(str::trim).collect();
+        for (at, line) in lines.iter().enumerate() {
+            let is_kernel = line.contains("fn ") && line.contains("L: Lanes");
+            if !is_kernel || line.ends_with(';') {
+                continue;
+            }
+            kernels += 1;
+            let above = lines[..at].iter().rev().take_while(|line| line.starts_with(['#', '/']));
+            let mut attributes = above.filter(|line| line.starts_with('#'));
+            assert!(
+                attributes.any(|a| a.contains("inline(always)") || a.contains("target_feature")),
+                "{name}, line {}: {line} needs #[inline(always)]",
+                at + 1
+            );
+        }
+    }
+    assert!(kernels > 20, "{kernels} kernels");
+}
+
 #[test]
 fn libraries_leave_arguments_and_reports_to_programs() {
     for library in LIBRARIES {

@@ -232,9 +232,11 @@ impl<'a, S: Real> Block<'a, S> {
             unsafe { L::add_in_order(points, indices, self.lane, values) };
             return;
         }
-        let values = values.map(|value| rows(value, self.lane));
+        let [a, b, c, d] = values;
+        let (a, b) = (rows(a, self.lane), rows(b, self.lane));
+        let (c, d) = (rows(c, self.lane), rows(d, self.lane));
         for lane in self.lane..self.filled() {
-            let values = values.map(|rows| rows[lane]);
+            let values = [a[lane], b[lane], c[lane], d[lane]];
             // SAFETY: the caller's promise.
             unsafe { S::add_in_order(points, indices, lane, values) };
         }
@@ -308,13 +310,18 @@ pub fn load_rows<L: Lanes, const N: usize>(values: &[L::Real], lane: usize) -> [
 }
 
 /// The lanes one by one, in their places.
+#[inline(always)]
 fn rows<L: Lanes>(values: Point<L>, lane: usize) -> [Point<L::Real>; LANES] {
     let mut columns = [[L::Real::ZERO; LANES]; 4];
     for (column, value) in columns.iter_mut().zip([values.x, values.y, values.z, values.w]) {
         value.store(column, lane);
     }
     let [x, y, z, w] = columns;
-    std::array::from_fn(|lane| Point { x: x[lane], y: y[lane], z: z[lane], w: w[lane] })
+    let mut rows = [Point::default(); LANES];
+    for (lane, row) in rows.iter_mut().enumerate() {
+        *row = Point { x: x[lane], y: y[lane], z: z[lane], w: w[lane] };
+    }
+    rows
 }
 
 #[inline(always)]
