@@ -4,8 +4,9 @@ use anyhow::{Context, Result};
 use clap::Subcommand;
 use serde::Serialize;
 use std::fmt::Display;
-use std::path::PathBuf;
-use viscera::mesh::{inspect, inspect_surface, io};
+use std::path::{Path, PathBuf};
+use viscera::mesh::io::{Mesh, MeshFile};
+use viscera::mesh::{inspect, inspect_surface};
 use viscera::units::Dimension;
 use viscera_resources::files;
 
@@ -14,7 +15,8 @@ use viscera_resources::files;
 pub enum MeshCommand {
     /// Counts, size, volume, shape quality and what would be repaired
     ///
-    /// Reads tetrahedra from Gmsh 1 and 2.2 (ASCII) and VTU (ASCII), surfaces from OBJ.
+    /// Reads Gmsh (.msh, all versions), VTK (.vtk, .vtu, .vtp), TetGen (.ele with .node), Medit (.mesh), Abaqus (.inp), and
+    /// surfaces from OBJ, STL and PLY.
     Inspect {
         /// The mesh file
         file: PathBuf,
@@ -40,15 +42,13 @@ pub fn execute(command: &MeshCommand) -> Result<()> {
             );
             Ok(unit)
         })?;
-    let bytes = files::read(file)?;
     let name = file.display().to_string();
-    let is_surface = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
-    if is_surface {
-        let (surface, report) = io::read_surface(&name, &bytes, unit)?;
-        print(&name, &inspect_surface(&surface, &report), *json)
-    } else {
-        let (mesh, report) = io::read_tet_mesh(&name, &bytes, unit)?;
-        print(&name, &inspect(&mesh, &report), *json)
+    let mesh = MeshFile::load(&name, |name| files::read(Path::new(name)))?;
+    match mesh.mesh(unit)? {
+        (Mesh::Surface(surface), report) => {
+            print(&name, &inspect_surface(&surface, &report), *json)
+        }
+        (Mesh::Tets(mesh), report) => print(&name, &inspect(&mesh, &report), *json),
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::io::{Format, ReadReport, SkippedElements};
+use super::io::{CountedElements, Format, ReadReport};
 use super::quality::{self, QualitySummary};
 use super::topology::{self, BoundingBox};
 use super::{SurfaceMesh, TetMesh};
@@ -19,10 +19,12 @@ pub struct ComponentSummary {
 }
 
 /// The tetrahedra of one label.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RegionSummary {
     /// The label.
     pub region: u32,
+    /// Its name in the file, if it has one.
+    pub name: Option<String>,
     /// How many tetrahedra have it.
     pub tet_count: usize,
     /// Their volume `[m^3]`.
@@ -64,8 +66,16 @@ pub struct MeshSummary {
     pub rewound_tet_count: usize,
     /// Vertices removed because no tetrahedron uses them.
     pub removed_vertex_count: usize,
+    /// Elements of the file that were cut into tetrahedra.
+    pub split: Vec<CountedElements>,
+    /// Second-order elements that were taken by their corners.
+    pub curved_count: usize,
+    /// How far edges of those were from straight, at most [m].
+    pub bulge: f64,
+    /// Named sets of vertices, and how many each has.
+    pub patches: Vec<(String, usize)>,
     /// Elements of the file that are not part of the mesh.
-    pub skipped: Vec<SkippedElements>,
+    pub skipped: Vec<CountedElements>,
 }
 
 /// Measures a mesh.
@@ -91,7 +101,11 @@ pub fn inspect(mesh: &TetMesh, report: &ReadReport) -> MeshSummary {
         max_edge: lengths.iter().copied().fold(0.0, f64::max),
         quality: quality::summarize_quality(mesh),
         components: summarize_components(mesh),
-        regions: summarize_regions(mesh),
+        regions: summarize_regions(mesh, &report.region_names),
+        split: report.split.clone(),
+        curved_count: report.curved,
+        bulge: report.bulge,
+        patches: report.patches.iter().map(|p| (p.name.clone(), p.vertices.len())).collect(),
         folded_face_count: topology::count_folded_faces(mesh),
         rewound_tet_count: report.repairs.rewound_tets,
         removed_vertex_count: report.repairs.removed_vertices.len(),
@@ -111,11 +125,14 @@ fn summarize_components(mesh: &TetMesh) -> Vec<ComponentSummary> {
     summary
 }
 
-fn summarize_regions(mesh: &TetMesh) -> Vec<RegionSummary> {
+fn summarize_regions(mesh: &TetMesh, names: &[(u32, String)]) -> Vec<RegionSummary> {
     let mut regions = std::collections::BTreeMap::new();
     for (tet, &region) in mesh.regions().iter().enumerate() {
-        let entry =
-            regions.entry(region).or_insert(RegionSummary { region, tet_count: 0, volume: 0.0 });
+        let entry = regions.entry(region).or_insert_with(|| {
+            let name = names.iter().find(|(named, _)| *named == region);
+            let name = name.map(|(_, name)| name.clone());
+            RegionSummary { region, name, tet_count: 0, volume: 0.0 }
+        });
         entry.tet_count += 1;
         entry.volume += super::tet_volume(mesh.corners(tet));
     }
@@ -142,7 +159,7 @@ pub struct SurfaceSummary {
     /// Enclosed volume `[m^3]`, negative if wound inwards; has a meaning for closed surfaces only.
     pub volume: f64,
     /// Elements of the file that are not part of the surface.
-    pub skipped: Vec<SkippedElements>,
+    pub skipped: Vec<CountedElements>,
 }
 
 /// Measures a surface.
@@ -196,7 +213,15 @@ impl fmt::Display for MeshSummary {
         }
         write_some(f, &self.regions, |f, _, part| {
             let name = format!("  region {}", part.region);
-            row(f, &name, format!("{} tetrahedra, {}", part.tet_count, Volume(part.volume)))
+            let called = part.name.as_ref().map_or(String::new(), |name| format!(", `{name}`"));
+            let (count, volume) = (part.tet_count, Volume(part.volume));
+            row(f, &name, format!("{count} tetrahedra, {volume}{called}"))
+        })?;
+        if !self.patches.is_empty() {
+            row(f, "patches", self.patches.len())?;
+        }
+        write_some(f, &self.patches, |f, _, (name, count)| {
+            row(f, &format!("  `{name}`"), format!("{count} vertices"))
         })?;
         write_findings(f, self)
     }
@@ -231,6 +256,17 @@ fn write_findings(f: &mut fmt::Formatter<'_>, summary: &MeshSummary) -> fmt::Res
     if summary.folded_face_count > 0 {
         let text = format!("{} faces with both tetrahedra on one side", summary.folded_face_count);
         row(f, "overlaps", text)?;
+    }
+    if !summary.split.is_empty() {
+        row(f, "cut into tets", CountedElements::list(&summary.split))?;
+    }
+    if summary.curved_count > 0 {
+        let bulge = Length(summary.bulge);
+        let text = format!(
+            "{} elements by their corners, up to {bulge} from straight",
+            summary.curved_count
+        );
+        row(f, "second order", text)?;
     }
     write_skipped(f, &summary.skipped)
 }
@@ -279,11 +315,11 @@ fn in_unit_of(largest: f64, lengths: [f64; 3], separator: &str) -> String {
     format!("{} {name}", texts.join(separator))
 }
 
-fn write_skipped(f: &mut fmt::Formatter<'_>, skipped: &[SkippedElements]) -> fmt::Result {
+fn write_skipped(f: &mut fmt::Formatter<'_>, skipped: &[CountedElements]) -> fmt::Result {
     if skipped.is_empty() {
         return Ok(());
     }
-    row(f, "skipped", SkippedElements::list(skipped))
+    row(f, "skipped", CountedElements::list(skipped))
 }
 
 const LENGTH_UNITS: [(f64, &str); 4] = [(1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")];

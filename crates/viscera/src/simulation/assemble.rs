@@ -2,7 +2,7 @@
 
 use super::assemble_error::{AssembleError, MOST_REFINED};
 use crate::mesh::embed::Embedding;
-use crate::mesh::io::{self, ReadReport};
+use crate::mesh::io::{MeshFile, ReadReport};
 use crate::mesh::refine::{self, Middles};
 use crate::mesh::shapes;
 use crate::mesh::topology::{boundary_surface, connected_components};
@@ -277,6 +277,16 @@ impl Assembly {
                 repairs.removed_vertices.len()
             ));
         }
+        for split in &report.split {
+            let (count, kind) = (split.count, &split.kind);
+            self.notes.push(format!("body `{name}`: cut {count} x {kind} into tetrahedra"));
+        }
+        if report.curved > 0 {
+            self.notes.push(format!(
+                "body `{name}`: took {} second-order elements by their corners; their edges were up to {:.3} mm from straight",
+                report.curved, 1e3 * report.bulge
+            ));
+        }
         for skipped in &report.skipped {
             self.notes.push(format!(
                 "body `{name}`: left out {} elements of kind {}",
@@ -418,12 +428,14 @@ fn make_mesh(
         |shape: shapes::CurvedShape| (shape.tets, Some(shape.surface), ReadReport::default());
     let made = match &body.shape {
         BodyShape::File { mesh, unit, surface } => {
-            let mut bytes =
-                |file: &str| load(file).map_err(|message| AssembleError::Load { message });
-            let (tets, mut report) = io::read_tet_mesh(mesh, &bytes(mesh)?, *unit)?;
+            let mut file = |name: &str| {
+                MeshFile::load(name, |file| load(file))
+                    .map_err(|message| AssembleError::Load { message })
+            };
+            let (tets, mut report) = file(mesh)?.tets(*unit)?;
             let surface = match surface {
-                Some(file) => {
-                    let (surface, of_surface) = io::read_surface(file, &bytes(file)?, *unit)?;
+                Some(name) => {
+                    let (surface, of_surface) = file(name)?.surface(*unit)?;
                     report.skipped.extend(of_surface.skipped);
                     Some(surface)
                 }

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::assemble_error::AssembleError;
 use crate::contact::{DistanceGrid, Shape};
-use crate::mesh::{SurfaceMesh, io};
+use crate::mesh::SurfaceMesh;
+use crate::mesh::io::MeshFile;
 use crate::scene::{Instrument, Part, Solid, SolidSource};
 use crate::units::Dimension;
 
@@ -44,8 +45,9 @@ impl Solids {
         }
         let (file, surface) = match &solid.source {
             SolidSource::File { mesh, unit } => {
-                let bytes = load(mesh).map_err(|message| AssembleError::Load { message })?;
-                (Some(mesh.clone()), io::read_surface(mesh, &bytes, *unit)?.0)
+                let file = MeshFile::load(mesh, |file| load(file))
+                    .map_err(|message| AssembleError::Load { message })?;
+                (Some(mesh.clone()), file.surface(*unit)?.0)
             }
             made => (None, made.surface().unwrap_or_default()),
         };

@@ -40,6 +40,7 @@ mod live;
 mod measures;
 mod mesh;
 mod mesh_damage;
+mod mesh_formats;
 mod mesh_io;
 mod mesh_tools;
 mod parts;

@@ -50,7 +50,7 @@ fn read(name: &str, text: &str) -> Result<(TetMesh, ReadReport), ReadError> {
 
 fn problem(name: &str, text: &str) -> (Option<usize>, ReadProblem) {
     let error = read(name, text).unwrap_err();
-    (error.line, error.problem)
+    (error.line(), error.problem)
 }
 
 fn sample_surface() -> SurfaceMesh {
@@ -153,7 +153,7 @@ fn nan_coordinate_is_named_with_its_line() {
     assert_eq!(problem("a.msh", &GMSH_1.replace("30 0 1 0", "30 0 nan 0")).1, expected);
     assert_eq!(problem("a.vtu", &VTU.replace("  0 1 0", "  0 NaN 0")), (Some(8), expected.clone()));
     let error = read_surface("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 inf 0\nf 1 2 3\n", 1.0).unwrap_err();
-    assert_eq!((error.line, error.problem), (Some(3), expected));
+    assert_eq!((error.line(), error.problem), (Some(3), expected));
 }
 
 #[test]
@@ -206,7 +206,7 @@ fn wrong_counts_are_refused() {
         VTU.replace("0 5 6", "0 5"),
     ] {
         let error = read("a", &text).unwrap_err();
-        assert!(error.line.is_some(), "{error}");
+        assert!(error.line().is_some(), "{error}");
     }
 }
 
@@ -234,29 +234,33 @@ fn repeated_vertex_number_is_refused() {
 
 #[test]
 fn surface_elements_alone_are_refused_with_what_is_there() {
-    let text =
-        GMSH_2.replace("4 2 5 1 10 20 30 7", "2 2 5 1 10 20 30").replace("4 2 6 1", "11 2 6 1");
-    let error = read("a.msh", &text).unwrap_err();
-    assert!(error.to_string().contains("2 x triangle, 1 x second-order tetrahedron"), "{error}");
+    let lines = GMSH_2.replace("2 4 2 5 1 10 20 30 7", "2 1 2 5 1 10 20");
+    let lines = lines.replace("3 4 2 6 1 20 30 7 40", "3 15 2 6 1 20");
+    let error = read("a.msh", &lines).unwrap_err().to_string();
+    assert!(error.contains("a surface of 1 triangles") && error.contains("tetrahedralize"));
+    let error = read("a.msh", &lines.replace("1 2 2 0 0 10 20 30", "1 137 2 0 0 10")).unwrap_err();
+    let expected = "(it has 1 x element of type 137, 1 x line, 1 x point)";
+    assert!(error.to_string().contains(expected), "{error}");
 }
 
 #[test]
 fn variants_that_are_not_read_say_how_to_convert() {
-    let gmsh_4 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
-    let gmsh_binary = "$MeshFormat\n2.2 1 8\n\u{1}\0\0\0$EndMeshFormat\n";
-    let vtu_binary = VTU.replacen("format=\"ascii\"", "format=\"binary\"", 1);
-    let vtu_appended = "<VTKFile type=\"UnstructuredGrid\">\n<AppendedData encoding=\"base64\">_AA</AppendedData></VTKFile>";
-    let vtk_legacy = "# vtk DataFile Version 3.0\n";
+    let gmsh_5 = "$MeshFormat\n5.0 0 8\n$EndMeshFormat\n";
+    let kind = "type=\"UnstructuredGrid\"";
+    let lz4 = VTU.replacen(kind, &format!("{kind} compressor=\"vtkLZ4DataCompressor\""), 1);
+    let vtk_legacy = "# vtk DataFile Version 3.0\nat\nASCII\nDATASET STRUCTURED_GRID\n";
+    let elsewhere = "*HEADING\n*INCLUDE, INPUT=mesh.inp\n";
     let image = VTU.replace("UnstructuredGrid", "ImageData");
     for (name, text, advice) in [
-        ("a.msh", gmsh_4, "msh22"),
-        ("a.msh", gmsh_binary, "msh22"),
-        ("a.vtu", &vtu_binary, "Ascii"),
-        ("a.vtu", vtu_appended, "Ascii"),
-        ("a.vtk", vtk_legacy, "ParaView"),
+        ("a.msh", gmsh_5, "4.1"),
+        ("a.vtu", &lz4, "ZLib"),
+        ("a.vtk", vtk_legacy, "unstructured"),
         ("a.vti", &image, "unstructured"),
-        ("a.obj", "v 0 0 0\n", "tetrahedra"),
-        ("a.ply", "ply\nformat ascii 1.0\n", "OBJ"),
+        ("a.obj", "v 0 0 0\n", "faces"),
+        ("a.ply", "ply\nformat ascii 1.0\n", "cut short"),
+        ("a.ele", "1 4 0\n1 1 2 3 4\n", "a.node"),
+        ("a.inp", elsewhere, "one file"),
+        ("a.meshb", "\u{1}\0\0\0", "text"),
         ("a.msh.gz", "\u{1f}\u{0}", "known"),
     ] {
         let error = read(name, text).unwrap_err().to_string();
@@ -292,7 +296,7 @@ fn obj_refuses_faces_that_name_no_vertex() {
     {
         let text = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nf {face}\n");
         let error = read_surface("a.obj", text.as_bytes(), 1.0).unwrap_err();
-        assert_eq!(error.line, Some(4), "{error}");
+        assert_eq!(error.line(), Some(4), "{error}");
     }
     let error = read_surface("a.obj", b"v 0 0 0\n", 1.0).unwrap_err();
     assert!(matches!(error.problem, ReadProblem::Missing { .. }), "{error}");
@@ -364,20 +368,21 @@ fn appended_data_of_other_programs_is_read() {
     let (mesh, _) = read_tet_mesh("a.vtu", &file(head(text)), 1.0).unwrap();
     assert_eq!(mesh, read("a.vtu", VTU).unwrap().0);
     let float = format!(
-        "<DataArray type=\"Float64\" Name=\"region\" format=\"appended\" offset=\"{points}\"/>"
+        "<DataArray type=\"Float64\" Name=\"region\" format=\"appended\" offset=\"{ends}\"/>"
     );
     for (bytes, expected) in [
-        (file(head(&float)), "expected a region"),
-        (file(head(text).replace("LittleEndian", "BigEndian")), "big-endian"),
+        (file(head(&float)), "part of a number"),
+        (file(head(&text.replace("5", "5.5"))), "expected a region"),
+        (file(head(text).replace("LittleEndian", "BigEndian")), "cut short"),
         (file(head(text).replace("byte_order", "compressor=\"z\" byte_order")), "compressed"),
-        (file(head(text).replace("Int16", "Float16")), "type `Float16`"),
+        (file(head(text).replace("Int16", "Float16")), "found `Float16`"),
         (file(head(text).replace("Int16", "Int32")), "part of a number"),
         (file(head(text).replace(&format!("offset=\"{ends}\""), "offset=\"9999\"")), "cut short"),
         (file(head(text).replace(&format!("offset=\"{ends}\""), "offset=\"-1\"")), "an offset"),
     ] {
         let error = read_tet_mesh("a.vtu", &bytes, 1.0).unwrap_err();
         assert!(error.to_string().contains(expected), "{expected}: {error}");
-        assert!(error.line.is_some() && error.line < Some(6), "{error}");
+        assert!(error.line().is_some() && error.line() < Some(6), "{error}");
     }
 }
 
@@ -405,8 +410,10 @@ fn surface_grid_is_well_formed_and_holds_triangles() {
     let surface = sample_surface();
     let bytes = vtu::write_surface(&surface.vertices, &surface.triangles, &[], &[]).unwrap();
     let error = read_tet_mesh("surface.vtu", &bytes, 1.0).unwrap_err();
-    let others = format!("{} x triangle", surface.triangles.len());
-    assert_eq!(error.problem, ReadProblem::NoTets { others });
+    let triangles = surface.triangles.len();
+    assert_eq!(error.problem, ReadProblem::OnlySurface { format: Format::Vtu, triangles });
+    let (back, _) = read_surface("surface.vtu", &bytes, 1.0).unwrap();
+    assert_eq!(back, surface);
 }
 
 #[test]

@@ -2,26 +2,47 @@
 
 use std::fmt;
 
+use super::parsed::Format;
 use crate::mesh::{MeshError, MeshPlace};
 
 /// Why a file could not be read: which file, where in it, and what to do.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{file}{}: {problem}", LineSuffix(*line))]
+#[error("{file}{}: {problem}", PlaceSuffix(*place))]
 pub struct ReadError {
     /// The name under which the bytes were given.
     pub file: String,
-    /// The line, counting from 1, where the problem has one.
-    pub line: Option<usize>,
+    /// Where in it, if the problem has a place.
+    pub place: Option<Place>,
     /// What is wrong.
     pub problem: ReadProblem,
 }
 
-struct LineSuffix(Option<usize>);
+impl ReadError {
+    /// The line, counting from 1, where the problem has one.
+    pub fn line(&self) -> Option<usize> {
+        match self.place {
+            Some(Place::Line(line)) => Some(line),
+            _ => None,
+        }
+    }
+}
 
-impl fmt::Display for LineSuffix {
+/// A place in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A line of text, counting from 1.
+    Line(usize),
+    /// A byte, counting from 0, where numbers stand as they are in memory.
+    Byte(usize),
+}
+
+struct PlaceSuffix(Option<Place>);
+
+impl fmt::Display for PlaceSuffix {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
-            Some(line) => write!(f, ", line {line}"),
+            Some(Place::Line(line)) => write!(f, ", line {line}"),
+            Some(Place::Byte(byte)) => write!(f, ", byte {byte}"),
             None => Ok(()),
         }
     }
@@ -42,8 +63,8 @@ pub enum ReadProblem {
     },
     /// Neither content nor extension identifies a format.
     #[error(
-        "not a mesh file known here; known are Gmsh 1 and 2.2 ASCII (.msh), VTK XML (.vtu), \
-        and OBJ surfaces (.obj)"
+        "not a mesh file known here; known are Gmsh (.msh), VTK (.vtk, .vtu, .vtp), TetGen (.ele, .node), Medit (.mesh), \
+        Abaqus (.inp), and surfaces in OBJ, STL and PLY"
     )]
     UnknownFormat,
     /// A known format, or a variant of one, that is not read.
@@ -122,14 +143,25 @@ pub enum ReadProblem {
         /// The number.
         number: u64,
     },
-    /// No element of the file is a tetrahedron of four vertices.
+    /// No element of the file is a solid.
     #[error(
-        "the file has no tetrahedra of four vertices (it has {others}); \
-        mesh the volume with first-order tetrahedra"
+        "the file has no tetrahedra, and nothing that could be cut into some (it has {others}); \
+        export its volume elements as well"
     )]
     NoTets {
         /// What the file has instead.
         others: String,
+    },
+    /// A surface where tissue is needed.
+    #[error(
+        "this {format} file is a surface of {triangles} triangles, and tissue needs tetrahedra; fill it by \
+        `viscera mesh tetrahedralize`"
+    )]
+    OnlySurface {
+        /// The format of the file.
+        format: Format,
+        /// How many triangles it has.
+        triangles: usize,
     },
     /// The file is not well-formed XML.
     #[error("not well-formed XML ({reason}); the file is damaged or cut short, export it again")]
@@ -171,19 +203,19 @@ impl fmt::Display for CountingNote {
     }
 }
 
-/// A problem and its line; becomes a [`ReadError`] where the file's name is known.
+/// A problem and its place; becomes a [`ReadError`] where the file's name is known.
 pub(super) struct Fault {
-    pub line: Option<usize>,
+    pub place: Option<Place>,
     pub problem: ReadProblem,
 }
 
 impl Fault {
     pub fn at(line: usize, problem: ReadProblem) -> Self {
-        Self { line: Some(line), problem }
+        Self { place: Some(Place::Line(line)), problem }
     }
 
     pub fn whole_file(problem: ReadProblem) -> Self {
-        Self { line: None, problem }
+        Self { place: None, problem }
     }
 }
 

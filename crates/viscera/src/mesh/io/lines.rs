@@ -3,6 +3,7 @@
 use super::error::{Fault, ReadProblem};
 
 /// Goes through a text line by line.
+#[derive(Clone)]
 pub(super) struct Lines<'a> {
     rest: &'a [u8],
     number: usize,
@@ -23,6 +24,13 @@ impl<'a> Lines<'a> {
     /// How many bytes have not been handed out.
     pub fn bytes_left(&self) -> usize {
         self.rest.len()
+    }
+
+    /// The next bytes as they are, beginning right behind the last line handed out.
+    pub fn bytes(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.rest.split_at_checked(count)?;
+        self.rest = rest;
+        Some(taken)
     }
 
     /// The number of the last line handed out.
@@ -64,6 +72,7 @@ impl<'a> Line<'a> {
 }
 
 /// Goes through the words of a line.
+#[derive(Clone)]
 pub(super) struct Words<'a> {
     rest: &'a [u8],
     line: usize,

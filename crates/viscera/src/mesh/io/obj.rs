@@ -5,42 +5,51 @@
 
 use std::fmt::Write;
 
-use super::error::{Fault, ReadProblem, WriteError};
+use super::cells::Cells;
+use super::content::Content;
+use super::error::{Fault, Place, ReadProblem, WriteError};
 use super::lines::{Line, Lines, bad_word, parse_word, shorten};
-use super::parsed::{Format, Parsed, SkippedElements};
-use crate::mesh::{MeshRepairs, SurfaceMesh, check_vertex};
+use super::parsed::Format;
+use crate::mesh::{MeshPlace, SurfaceMesh};
 use crate::scalar::{Vec3, vec3};
 
-/// Reads a surface; positions are multiplied by the unit.
-pub(super) fn read(bytes: &[u8], unit_in_meters: f64) -> Result<Parsed<SurfaceMesh>, Fault> {
-    let mut mesh = SurfaceMesh::default();
-    let mut skipped = Vec::new();
+/// Reads a surface.
+pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
+    let (mut vertices, mut lines) = (Vec::new(), Vec::new());
+    let mut cells = Cells::default();
+    let mut faces = Vec::new();
     for line in Lines::new(bytes) {
         let mut words = line.words();
         match words.next() {
             Some(b"v") => {
                 let mut coordinate = || words.parse::<f64>("a coordinate");
-                let position = vec3(coordinate()?, coordinate()?, coordinate()?) * unit_in_meters;
-                check_vertex(mesh.vertices.len(), position)
-                    .map_err(|error| line.fault(ReadProblem::Mesh(error)))?;
-                mesh.vertices.push(position);
+                vertices.push(vec3(coordinate()?, coordinate()?, coordinate()?));
+                lines.push(line.number);
             }
             Some(b"f") => {
-                let corners = words
-                    .map(|word| read_corner(word, line, mesh.vertices.len()))
-                    .collect::<Result<Vec<u32>, Fault>>()?;
-                add_polygon(&mut mesh, &mut skipped, &corners, line)?;
+                let corners = words.map(|word| read_corner(word, line, vertices.len()));
+                let corners = corners.collect::<Result<Vec<u32>, Fault>>()?;
+                if corners.len() < 3 {
+                    return Err(line.fault(bad_word("three vertices or more", line.text)));
+                }
+                cells.add_polygon(&corners, faces.len());
+                faces.push(line.number);
             }
-            Some(b"l") => SkippedElements::count(&mut skipped, "line".into()),
-            Some(b"p") => SkippedElements::count(&mut skipped, "point".into()),
+            Some(b"l") => cells.skip("line"),
+            Some(b"p") => cells.skip("point"),
             _ => {}
         }
     }
-    if mesh.triangles.is_empty() {
+    if cells.triangles.is_empty() {
         let what = "faces (lines that begin with `f`)".into();
         return Err(Fault::whole_file(ReadProblem::Missing { what }));
     }
-    Ok(Parsed { mesh, repairs: MeshRepairs::default(), format: Format::Obj, skipped })
+    let places = Box::new(move |place| match place {
+        MeshPlace::Whole => None,
+        MeshPlace::Vertex(vertex) => lines.get(vertex).copied().map(Place::Line),
+        MeshPlace::Tet(face) => faces.get(face).copied().map(Place::Line),
+    });
+    Ok(Content::of_cells(Format::Obj, vertices, cells, places))
 }
 
 /// The vertex that a word such as `12/3/4` of a face names.
@@ -62,29 +71,6 @@ fn read_corner(word: &[u8], line: Line, vertex_count: usize) -> Result<u32, Faul
             numbers: None,
         })),
     }
-}
-
-fn add_polygon(
-    mesh: &mut SurfaceMesh,
-    skipped: &mut Vec<SkippedElements>,
-    corners: &[u32],
-    line: Line,
-) -> Result<(), Fault> {
-    let [first, rest @ ..] = corners else {
-        return Err(line.fault(bad_word("three vertices or more", b"")));
-    };
-    if rest.len() < 2 {
-        return Err(line.fault(bad_word("three vertices or more", line.text)));
-    }
-    for pair in rest.windows(2) {
-        let triangle = [*first, pair[0], pair[1]];
-        if triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0] {
-            SkippedElements::count(skipped, "triangle without area".into());
-        } else {
-            mesh.triangles.push(triangle);
-        }
-    }
-    Ok(())
 }
 
 /// A surface as OBJ, in metres, with a normal for each vertex if they are given.

@@ -12,10 +12,36 @@ pub enum Format {
     Gmsh1,
     /// Gmsh version 2.x, ASCII.
     Gmsh2,
-    /// VTK XML unstructured grid, ASCII.
+    /// Gmsh version 2.x, binary.
+    Gmsh2Binary,
+    /// Gmsh version 4.0 or 4.1, ASCII.
+    Gmsh4,
+    /// Gmsh version 4.0 or 4.1, binary.
+    Gmsh4Binary,
+    /// VTK XML unstructured grid.
     Vtu,
+    /// VTK XML polygonal data.
+    Vtp,
+    /// Legacy VTK, ASCII.
+    Vtk,
+    /// Legacy VTK, binary.
+    VtkBinary,
+    /// TetGen, two files.
+    TetGen,
+    /// Medit, ASCII.
+    Medit,
+    /// Abaqus input.
+    Abaqus,
     /// Wavefront OBJ.
     Obj,
+    /// STL, ASCII.
+    Stl,
+    /// STL, binary.
+    StlBinary,
+    /// PLY, ASCII.
+    Ply,
+    /// PLY, binary.
+    PlyBinary,
 }
 
 impl fmt::Display for Format {
@@ -23,38 +49,60 @@ impl fmt::Display for Format {
         f.write_str(match self {
             Self::Gmsh1 => "Gmsh 1 ASCII",
             Self::Gmsh2 => "Gmsh 2 ASCII",
+            Self::Gmsh2Binary => "Gmsh 2 binary",
+            Self::Gmsh4 => "Gmsh 4 ASCII",
+            Self::Gmsh4Binary => "Gmsh 4 binary",
             Self::Vtu => "VTK XML unstructured grid",
+            Self::Vtp => "VTK XML polygonal data",
+            Self::Vtk => "VTK legacy ASCII",
+            Self::VtkBinary => "VTK legacy binary",
+            Self::TetGen => "TetGen",
+            Self::Medit => "Medit",
+            Self::Abaqus => "Abaqus",
             Self::Obj => "Wavefront OBJ",
+            Self::Stl => "STL ASCII",
+            Self::StlBinary => "STL binary",
+            Self::Ply => "PLY ASCII",
+            Self::PlyBinary => "PLY binary",
         })
     }
 }
 
-/// Elements of a file that are not part of the mesh.
+/// So many elements of a kind.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct SkippedElements {
+pub struct CountedElements {
     /// What they are: "triangle", "line".
     pub kind: String,
     /// How many there are.
     pub count: usize,
 }
 
-impl SkippedElements {
+impl CountedElements {
     /// Counts one more element; kinds keep the order in which they first come.
-    pub(super) fn count(list: &mut Vec<Self>, kind: String) {
-        match list.iter_mut().find(|skipped| skipped.kind == kind) {
-            Some(skipped) => skipped.count += 1,
-            None => list.push(Self { kind, count: 1 }),
+    pub(super) fn count(list: &mut Vec<Self>, kind: &str) {
+        match list.iter_mut().find(|counted| counted.kind == kind) {
+            Some(counted) => counted.count += 1,
+            None => list.push(Self { kind: kind.into(), count: 1 }),
         }
     }
 
     /// "12 x triangle, 3 x line"
-    pub(in crate::mesh) fn list(skipped: &[Self]) -> String {
-        if skipped.is_empty() {
+    pub(in crate::mesh) fn list(counted: &[Self]) -> String {
+        if counted.is_empty() {
             return "no elements".into();
         }
-        let each = skipped.iter().map(|s| format!("{} x {}", s.count, s.kind));
+        let each = counted.iter().map(|s| format!("{} x {}", s.count, s.kind));
         each.collect::<Vec<_>>().join(", ")
     }
+}
+
+/// Vertices that a file has a name for: a physical group, a node set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Patch {
+    /// Its name in the file, or one made of the group's number.
+    pub name: String,
+    /// Vertices of the mesh, ascending.
+    pub vertices: Vec<u32>,
 }
 
 /// The report of reading a file, beside the mesh. The default says "not from a file".
@@ -65,13 +113,15 @@ pub struct ReadReport {
     /// Repairs that were made.
     pub repairs: MeshRepairs,
     /// Elements that are not part of the mesh.
-    pub skipped: Vec<SkippedElements>,
-}
-
-/// The result of a format's reader, before checks that all formats share.
-pub(super) struct Parsed<Mesh> {
-    pub mesh: Mesh,
-    pub repairs: MeshRepairs,
-    pub format: Format,
-    pub skipped: Vec<SkippedElements>,
+    pub skipped: Vec<CountedElements>,
+    /// Elements that were cut into several tetrahedra.
+    pub split: Vec<CountedElements>,
+    /// How many second-order elements were taken by their corners.
+    pub curved: usize,
+    /// How far edges of those are from straight, at most [m].
+    pub bulge: f64,
+    /// Named sets of vertices.
+    pub patches: Vec<Patch>,
+    /// Regions that have a name.
+    pub region_names: Vec<(u32, String)>,
 }

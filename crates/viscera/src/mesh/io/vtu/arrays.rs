@@ -1,65 +1,18 @@
-//! Data arrays of a file: numbers as text in their element, or as bytes behind the XML.
+//! Data arrays of a file: numbers as text or as bytes.
+
+use std::borrow::Cow;
 
 use roxmltree::Node;
 
-use crate::mesh::io::error::{Fault, ReadProblem};
-use crate::mesh::io::lines::{bad_word, parse_word};
+use super::codec::Codec;
 
-pub(super) const ASCII_ADVICE: &str = "in ParaView save it with \"Data Mode\" set to \"Ascii\", or with \
-    meshio run `meshio ascii FILE`";
+use crate::mesh::io::error::{Fault, Place, ReadProblem};
+use crate::mesh::io::lines::{bad_word, parse_word};
 
 /// A fault at the line where an XML element begins.
 pub(super) fn fault_at(node: Node, problem: ReadProblem) -> Fault {
     let position = node.document().text_pos_at(node.range().start);
     Fault::at(position.row as usize, problem)
-}
-
-fn unsupported_at(node: Node, found: String) -> Fault {
-    fault_at(node, ReadProblem::Unsupported { found, advice: ASCII_ADVICE })
-}
-
-/// The bytes behind the XML.
-#[derive(Clone, Copy)]
-pub(super) struct Appended<'a> {
-    /// From behind the underscore on.
-    pub bytes: &'a [u8],
-    /// Bytes of the number of bytes before each array.
-    pub header: usize,
-}
-
-impl<'a> Appended<'a> {
-    /// Of a document whose bytes stand as they are.
-    pub fn of(root: Node, bytes: &'a [u8]) -> Result<Self, Fault> {
-        let refuse = |found: &str| Err(unsupported_at(root, found.into()));
-        if root.attribute("compressor").is_some() {
-            return refuse("compressed VTU data");
-        }
-        if root.attribute("byte_order").is_some_and(|order| order != "LittleEndian") {
-            return refuse("VTU data in big-endian order");
-        }
-        match root.attribute("header_type") {
-            Some("UInt64") => Ok(Self { bytes, header: 8 }),
-            Some("UInt32") | None => Ok(Self { bytes, header: 4 }),
-            Some(_) => refuse("VTU data with an unknown `header_type`"),
-        }
-    }
-
-    /// The bytes of the array at an offset.
-    fn array(&self, node: Node<'_, '_>) -> Result<&'a [u8], Fault> {
-        let offset = node.attribute("offset").unwrap_or_default();
-        let Some(offset) = parse_word::<usize>(offset.trim().as_bytes()) else {
-            return Err(fault_at(node, bad_word("an offset of appended data", offset.as_bytes())));
-        };
-        let rest = self.bytes.get(offset..).unwrap_or_default();
-        let cut = || {
-            let reading = format!("array `{}`", node.attribute("Name").unwrap_or("points"));
-            fault_at(node, ReadProblem::UnexpectedEnd { reading })
-        };
-        let (header, rest) = rest.split_at_checked(self.header).ok_or_else(cut)?;
-        let length = header.iter().rev().fold(0u64, |sum, &byte| sum << 8 | u64::from(byte));
-        let length = usize::try_from(length).map_err(|_| cut())?;
-        rest.get(..length).ok_or_else(cut)
-    }
 }
 
 /// A number of a mesh.
@@ -91,26 +44,34 @@ macro_rules! whole_numbers {
         })*
     };
 }
-whole_numbers!(u8 u32 usize);
+whole_numbers!(u8 u32 i64 usize);
 
 /// A data array as it stands in the file.
 pub(super) struct DataArray<'a, 'input> {
     pub node: Node<'a, 'input>,
-    /// Its bytes, where they stand behind the XML.
-    bytes: Option<&'a [u8]>,
+    /// Its bytes, where it is not text.
+    bytes: Option<Cow<'a, [u8]>>,
+    is_big_endian: bool,
 }
 
 impl<'a, 'input> DataArray<'a, 'input> {
-    pub fn new(node: Node<'a, 'input>, appended: Option<Appended<'a>>) -> Result<Self, Fault> {
-        match (node.attribute("format"), appended) {
-            (Some("ascii") | None, _) => Ok(Self { node, bytes: None }),
-            (Some("appended"), Some(appended)) => {
-                Ok(Self { node, bytes: Some(appended.array(node)?) })
+    pub fn new(node: Node<'a, 'input>, codec: Codec<'a>) -> Result<Self, Fault> {
+        let bytes = match node.attribute("format") {
+            Some("ascii") | None => None,
+            Some("appended") => Some(codec.appended(node)?),
+            Some("binary") => Some(Cow::Owned(codec.inline(node)?)),
+            Some(other) => {
+                let expected = "a format of data: ascii, binary or appended";
+                return Err(fault_at(node, bad_word(expected, other.as_bytes())));
             }
-            (Some(format), _) => {
-                Err(unsupported_at(node, format!("VTU data in the format `{format}`")))
-            }
-        }
+        };
+        Ok(Self { node, bytes, is_big_endian: codec.is_big_endian })
+    }
+
+    /// Whether its numbers are whole by their type.
+    pub fn is_whole(&self) -> bool {
+        let kind = self.node.attribute("type").unwrap_or_default();
+        kind.starts_with("Int") || kind.starts_with("UInt")
     }
 
     /// The words and the pieces of text they stand in; comments may split the text.
@@ -121,13 +82,13 @@ impl<'a, 'input> DataArray<'a, 'input> {
     }
 
     pub fn numbers<T: Number>(&self, expected: &'static str) -> Result<Vec<T>, Fault> {
-        if let Some(bytes) = self.bytes {
+        if let Some(bytes) = &self.bytes {
             return self.decode(bytes, expected);
         }
         let mut numbers = Vec::new();
         for (index, (_, word)) in self.words().enumerate() {
             let number = parse_word(word.as_bytes()).ok_or_else(|| Fault {
-                line: self.line_of(index),
+                place: self.line_of(index),
                 problem: bad_word(expected, word.as_bytes()),
             })?;
             numbers.push(number);
@@ -146,7 +107,10 @@ impl<'a, 'input> DataArray<'a, 'input> {
                     return Err(refused(&"part of a number at the end"));
                 }
                 let number = |word: &[u8; _]| {
-                    let value = $type::from_le_bytes(*word);
+                    let value = match self.is_big_endian {
+                        true => $type::from_be_bytes(*word),
+                        false => $type::from_le_bytes(*word),
+                    };
                     T::$make($wide::from(value)).ok_or_else(|| refused(&value))
                 };
                 words.iter().map(number).collect()
@@ -163,18 +127,41 @@ impl<'a, 'input> DataArray<'a, 'input> {
             "UInt32" => numbers!(u32 from_whole i128),
             "Int64" => numbers!(i64 from_whole i128),
             "UInt64" => numbers!(u64 from_whole i128),
-            other => Err(unsupported_at(self.node, format!("VTU data of type `{other}`"))),
+            other => {
+                let expected = "a type of numbers such as Float32 or Int64";
+                Err(fault_at(self.node, bad_word(expected, other.as_bytes())))
+            }
         }
     }
 
-    /// The line of the file in which a number stands; those behind the XML have none.
-    pub fn line_of(&self, index: usize) -> Option<usize> {
-        let (piece, word) = self.words().nth(index)?;
-        let text = piece.text()?;
-        // The parser keeps every line end, so lines can be counted from the start of the text.
-        let before = (word.as_ptr() as usize).checked_sub(text.as_ptr() as usize)?;
-        let newlines = text.as_bytes().get(..before)?.iter().filter(|&&b| b == b'\n').count();
-        let start = piece.document().text_pos_at(piece.range().start);
-        Some(start.row as usize + newlines)
+    /// The line of the file in which a number stands, where it is text.
+    pub fn line_of(&self, index: usize) -> Option<Place> {
+        self.lines_of(std::iter::once(index)).pop().map(Place::Line)
+    }
+
+    /// The lines in which numbers stand, by ascending index; none where they are not text.
+    pub fn lines_of(&self, indices: impl Iterator<Item = usize>) -> Vec<usize> {
+        let mut lines = Vec::new();
+        let mut indices = indices.peekable();
+        // The parser keeps every line end, so lines can be counted from the start of a piece of text.
+        let (mut piece, mut counted, mut line) = (None, 0, 0);
+        for (index, (node, word)) in self.words().enumerate() {
+            if indices.peek().is_none() {
+                break;
+            }
+            let text = node.text().unwrap_or_default().as_bytes();
+            if piece != Some(node.id()) {
+                let start = node.document().text_pos_at(node.range().start);
+                (piece, counted, line) = (Some(node.id()), 0, start.row as usize);
+            }
+            let before = (word.as_ptr() as usize).saturating_sub(text.as_ptr() as usize);
+            let passed = text.get(counted..before).unwrap_or_default();
+            line += passed.iter().filter(|&&byte| byte == b'\n').count();
+            counted = before.max(counted);
+            while indices.next_if(|&wanted| wanted <= index).is_some() {
+                lines.push(line);
+            }
+        }
+        lines
     }
 }

@@ -1,7 +1,8 @@
-//! VTK XML unstructured grids, see "XML file formats" in the VTK documentation: read with numbers as text or as bytes
-//! behind the XML, written with bytes.
+//! VTK XML unstructured grids and polygonal data, see "XML file formats" in the VTK documentation: read as text, Base64 or
+//! bytes, plain or packed by zlib, in both byte orders; written with bytes behind the XML.
 
 mod arrays;
+mod codec;
 mod read;
 mod write;
 

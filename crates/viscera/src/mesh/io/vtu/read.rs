@@ -1,100 +1,198 @@
-//! Reading tetrahedra. Other cells are skipped and counted; regions come from an integer cell
-//! array named `region`, 0 without it.
+//! Reading unstructured grids and polygonal data, of any number of pieces. Regions come from a cell array of whole numbers
+//! that is named as such, 0 without it; sets of points from arrays of whole numbers at points.
 
 use std::borrow::Cow;
 
 use roxmltree::{Document, Node};
 
-use super::VTK_TETRA;
-use super::arrays::{ASCII_ADVICE, Appended, DataArray, fault_at};
-use crate::mesh::io::error::{Fault, ReadProblem};
+use super::arrays::{DataArray, fault_at};
+use super::codec::Codec;
+use crate::mesh::MeshPlace;
+use crate::mesh::io::cells::Cells;
+use crate::mesh::io::content::Content;
+use crate::mesh::io::error::{Fault, Place, ReadProblem};
 use crate::mesh::io::lines::bad_word;
-use crate::mesh::io::parsed::{Format, Parsed, SkippedElements};
-use crate::mesh::{MeshPlace, TetMesh};
-use crate::scalar::vec3;
+use crate::mesh::io::parsed::{Format, Patch};
+use crate::mesh::io::vtk_cells::{
+    A_REGION, CellFault, VtkCells, patches_of, rank_of_regions, regions_of,
+};
+use crate::scalar::{Vec3, vec3};
 
 const GRID_ADVICE: &str = "save the volume as one unstructured grid (.vtu), for example with \
     ParaView's filter \"Append Datasets\"";
 
-/// Reads the tetrahedra of a grid; positions are multiplied by the unit.
-pub(in crate::mesh::io) fn read(
-    bytes: &[u8],
-    unit_in_meters: f64,
-) -> Result<Parsed<TetMesh>, Fault> {
+/// Where things stand in a file whose numbers are text.
+#[derive(Default)]
+struct LinesOf {
+    vertices: Vec<usize>,
+    cells: Vec<usize>,
+}
+
+/// What has been read of all pieces.
+#[derive(Default)]
+struct Pieces {
+    vertices: Vec<Vec3<f64>>,
+    cells: Cells,
+    cell_count: usize,
+    patches: Vec<Patch>,
+    lines: LinesOf,
+}
+
+pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
     let Halves { text, appended } = split(bytes)?;
     let document = parse(&text)?;
-    let piece = find_piece(&document)?;
-    let appended =
-        appended.map(|bytes| Appended::of(document.root_element(), bytes)).transpose()?;
-    let array = |node| DataArray::new(node, appended);
-
-    let points = array(find_points(piece)?)?;
-    let coordinates: Vec<f64> = points.numbers("a coordinate")?;
-    let announced = announced_count(piece, "NumberOfPoints")?;
-    check_count(piece, "coordinates of points", 3 * announced, coordinates.len())?;
-
-    let cells = child(piece, "Cells")?;
-    let connectivity = array(find_array(cells, "connectivity")?)?;
-    let offsets = array(find_array(cells, "offsets")?)?;
-    let types = array(find_array(cells, "types")?)?;
-    let corners: Vec<u32> = connectivity.numbers("a point index, 0 or more")?;
-    let ends: Vec<usize> = offsets.numbers("an offset, 0 or more")?;
-    let kinds: Vec<u8> = types.numbers("a cell type, 0 to 255")?;
-    let cell_count = announced_count(piece, "NumberOfCells")?;
-    check_count(offsets.node, "offsets of cells", cell_count, ends.len())?;
-    check_count(types.node, "types of cells", cell_count, kinds.len())?;
-    let labels = read_regions(piece, cell_count, array)?;
-
-    let mut tets = Vec::new();
-    let mut regions = Vec::new();
-    let mut first_corner = Vec::new();
-    let mut skipped = Vec::new();
-    let mut start = 0;
-    for (cell, (&end, &kind)) in ends.iter().zip(&kinds).enumerate() {
-        let Some(cell_corners) = corners.get(start..end) else {
-            let problem = ReadProblem::BadWord {
-                expected: "offsets that ascend and stay within the connectivity",
-                found: end.to_string(),
-            };
-            return Err(Fault { line: offsets.line_of(cell), problem });
-        };
-        if kind == VTK_TETRA {
-            let tet = <[u32; 4]>::try_from(cell_corners).map_err(|_| {
-                let what = format!("points of cell {cell}, a tetrahedron");
-                let found = cell_corners.len();
-                let problem = ReadProblem::CountMismatch { what, claimed: 4, found };
-                Fault { line: offsets.line_of(cell), problem }
-            })?;
-            tets.push(tet);
-            regions.push(labels.as_ref().map_or(0, |labels| labels[cell]));
-            first_corner.push(start);
-        } else {
-            SkippedElements::count(&mut skipped, kind_name(kind));
+    let root = document.root_element();
+    let kind = root.attribute("type").unwrap_or_default();
+    let format = match kind {
+        "UnstructuredGrid" => Format::Vtu,
+        "PolyData" => Format::Vtp,
+        _ => {
+            let found = format!("a VTK file of type `{kind}`");
+            let problem = ReadProblem::Unsupported { found, advice: GRID_ADVICE };
+            return Err(fault_at(root, problem));
         }
-        start = end;
+    };
+    if !root.has_tag_name("VTKFile") {
+        let expected = "the element <VTKFile>";
+        return Err(fault_at(root, bad_word(expected, root.tag_name().name().as_bytes())));
     }
-    if tets.is_empty() {
-        let others = SkippedElements::list(&skipped);
-        return Err(fault_at(piece, ReadProblem::NoTets { others }));
+    let codec = Codec::of(root, appended)?;
+    let grid = child(root, kind)?;
+    let mut all = Pieces::default();
+    for piece in grid.children().filter(|node| node.has_tag_name("Piece")) {
+        all.read(piece, codec, format)?;
+    }
+    if all.vertices.is_empty() && child(grid, "Piece")?.attribute("NumberOfPoints") != Some("0") {
+        return Err(missing(grid, "points".into()));
+    }
+    let Pieces { vertices, cells, patches, lines, .. } = all;
+    let places = Box::new(move |place| match place {
+        MeshPlace::Whole => None,
+        MeshPlace::Vertex(vertex) => lines.vertices.get(vertex).copied().map(Place::Line),
+        MeshPlace::Tet(cell) => lines.cells.get(cell).copied().map(Place::Line),
+    });
+    Ok(Content { format, vertices, cells, patches, region_names: Vec::new(), places })
+}
+
+impl Pieces {
+    fn read(&mut self, piece: Node, codec: Codec, format: Format) -> Result<(), Fault> {
+        let point_count = announced_count(piece, "NumberOfPoints")?;
+        if point_count == 0 {
+            return Ok(());
+        }
+        let points = DataArray::new(find_points(piece)?, codec)?;
+        let coordinates: Vec<f64> = points.numbers("a coordinate")?;
+        check_count(piece, "coordinates of points", 3 * point_count, coordinates.len())?;
+        let first = (self.vertices.len() as u32, self.cell_count);
+        self.vertices.extend(coordinates.chunks_exact(3).map(|x| vec3(x[0], x[1], x[2])));
+        let lines = points.lines_of((0..point_count).map(|vertex| 3 * vertex));
+        self.lines.vertices.extend(lines);
+
+        let regions = read_regions(piece, codec)?;
+        // Data of polygons come after those of points and lines.
+        let mut before = 0;
+        let lists: &[(&str, &str, u64)] = match format {
+            Format::Vtp => &[
+                ("Verts", "NumberOfVerts", 2),
+                ("Lines", "NumberOfLines", 4),
+                ("Strips", "NumberOfStrips", 6),
+                ("Polys", "NumberOfPolys", 7),
+            ],
+            _ => &[("Cells", "NumberOfCells", 0)],
+        };
+        for &(name, count, kind) in lists {
+            let is_absent = kind != 0 && piece.attribute(count).is_none();
+            let announced = if is_absent { 0 } else { announced_count(piece, count)? };
+            if announced == 0 && kind != 0 {
+                continue;
+            }
+            let of_list = regions.as_ref().and_then(|all| all.get(before..));
+            let of_list = of_list.unwrap_or_default();
+            self.read_cells(child(piece, name)?, codec, (announced, kind), (first, of_list))?;
+            before += announced;
+        }
+        if let Some(regions) = regions {
+            check_count(piece, "regions of cells", before, regions.len())?;
+        }
+        self.read_patches(piece, codec, first.0, point_count)
     }
 
-    let vertices =
-        coordinates.chunks_exact(3).map(|x| vec3(x[0], x[1], x[2]) * unit_in_meters).collect();
-    let (mesh, repairs) = TetMesh::new(vertices, tets, regions).map_err(|error| {
-        let line = match error.place() {
-            MeshPlace::Whole => None,
-            MeshPlace::Vertex(vertex) => points.line_of(3 * vertex),
-            MeshPlace::Tet(tet) => first_corner.get(tet).and_then(|&at| connectivity.line_of(at)),
+    /// A list of cells, all of one type unless there is an array of types.
+    fn read_cells(
+        &mut self,
+        node: Node,
+        codec: Codec,
+        (count, kind): (usize, u64),
+        (first, regions): ((u32, usize), &[u32]),
+    ) -> Result<(), Fault> {
+        let array = |name| DataArray::new(find_array(node, name)?, codec);
+        let (connectivity, offsets) = (array("connectivity")?, array("offsets")?);
+        let corners: Vec<u32> = connectivity.numbers("a point index, 0 or more")?;
+        let ends: Vec<usize> = offsets.numbers("an offset, 0 or more")?;
+        check_count(offsets.node, "offsets of cells", count, ends.len())?;
+        let kinds = if kind == 0 {
+            let types = array("types")?;
+            let kinds: Vec<u8> = types.numbers("a cell type, 0 to 255")?;
+            check_count(types.node, "types of cells", count, kinds.len())?;
+            kinds.into_iter().map(u64::from).collect()
+        } else {
+            vec![kind; count]
         };
-        Fault { line, problem: ReadProblem::Mesh(error) }
-    })?;
-    Ok(Parsed { mesh, repairs, format: Format::Vtu, skipped })
+        let list = VtkCells { kinds: &kinds, ends: &ends, corners: &corners };
+        list.add_to(&mut self.cells, regions, first).map_err(|fault| match fault {
+            CellFault::Offset(cell) => {
+                let expected = "offsets that ascend and stay within the connectivity";
+                let found = ends[cell].to_string();
+                let problem = ReadProblem::BadWord { expected, found };
+                Fault { place: offsets.line_of(cell), problem }
+            }
+            CellFault::Corners { cell, shape, wanted, found } => {
+                let what = format!("points of cell {cell}, a {}", shape.name());
+                let problem = ReadProblem::CountMismatch { what, claimed: wanted, found };
+                Fault { place: offsets.line_of(cell), problem }
+            }
+        })?;
+        let starts = std::iter::once(0).chain(ends.iter().copied()).take(count);
+        self.lines.cells.extend(connectivity.lines_of(starts));
+        self.cell_count += count;
+        Ok(())
+    }
+
+    fn read_patches(
+        &mut self,
+        piece: Node,
+        codec: Codec,
+        first: u32,
+        count: usize,
+    ) -> Result<(), Fault> {
+        let data = piece.children().find(|child| child.has_tag_name("PointData"));
+        let arrays = data.into_iter().flat_map(|data| data.children());
+        for node in arrays.filter(|node| node.has_tag_name("DataArray")) {
+            let is_scalar = matches!(node.attribute("NumberOfComponents"), None | Some("1" | "0"));
+            let Some(name) = node.attribute("Name").filter(|_| is_scalar) else { continue };
+            let array = DataArray::new(node, codec)?;
+            if !array.is_whole() {
+                continue;
+            }
+            let values: Vec<i64> = array.numbers("a whole number")?;
+            check_count(node, "values at points", count, values.len())?;
+            for mut patch in patches_of(name, &values) {
+                patch.vertices.iter_mut().for_each(|vertex| *vertex += first);
+                match self.patches.iter_mut().find(|known| known.name == patch.name) {
+                    Some(known) => known.vertices.extend(patch.vertices),
+                    None => self.patches.push(patch),
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The XML, and the bytes behind it where a file has any.
 struct Halves<'a> {
     text: Cow<'a, [u8]>,
-    appended: Option<&'a [u8]>,
+    /// And whether they are Base64.
+    appended: Option<(&'a [u8], bool)>,
 }
 
 /// Appended bytes are no text, and would break the XML around them.
@@ -110,11 +208,24 @@ fn split(bytes: &[u8]) -> Result<Halves<'_>, Fault> {
     };
     let rest = bytes[begin..].trim_ascii_end().strip_suffix(END).ok_or_else(cut)?;
     let tag = rest.iter().position(|&byte| byte == b'>').ok_or_else(cut)?;
-    if !rest[..tag].windows(5).any(|window| matches!(window, b"\"raw\"" | b"'raw'")) {
-        return Err(unsupported("a VTU file with encoded appended data"));
+    let encoding = |names: [&[u8]; 2]| {
+        rest[..tag].windows(names[0].len()).any(|window| names.contains(&window))
+    };
+    let is_base64 = encoding([b"\"base64\"", b"'base64'"]);
+    if !is_base64 && !encoding([b"\"raw\"", b"'raw'"]) {
+        let found = "appended data that are neither raw nor Base64".to_owned();
+        let advice = "export the file again";
+        return Err(Fault::whole_file(ReadProblem::Unsupported { found, advice }));
     }
     let data = rest[tag + 1..].trim_ascii_start().strip_prefix(b"_").ok_or_else(cut)?;
-    Ok(Halves { text: Cow::Owned([&bytes[..begin], END].concat()), appended: Some(data) })
+    let data = if is_base64 {
+        let end = data.iter().position(|&byte| byte == b'<').ok_or_else(cut)?;
+        &data[..end]
+    } else {
+        data
+    };
+    let text = Cow::Owned([&bytes[..begin], END].concat());
+    Ok(Halves { text, appended: Some((data, is_base64)) })
 }
 
 fn parse(bytes: &[u8]) -> Result<Document<'_>, Fault> {
@@ -127,10 +238,6 @@ fn parse(bytes: &[u8]) -> Result<Document<'_>, Fault> {
     Document::parse(text).map_err(|error| broken(error.to_string(), error.pos().row as usize))
 }
 
-fn unsupported(found: &str) -> Fault {
-    Fault::whole_file(ReadProblem::Unsupported { found: found.into(), advice: ASCII_ADVICE })
-}
-
 fn missing(node: Node, what: String) -> Fault {
     fault_at(node, ReadProblem::Missing { what })
 }
@@ -139,22 +246,6 @@ fn child<'a, 'input>(node: Node<'a, 'input>, name: &str) -> Result<Node<'a, 'inp
     node.children()
         .find(|child| child.has_tag_name(name))
         .ok_or_else(|| missing(node, format!("element <{name}>")))
-}
-
-fn find_piece<'a, 'input>(document: &'a Document<'input>) -> Result<Node<'a, 'input>, Fault> {
-    let root = document.root_element();
-    let kind = root.attribute("type").unwrap_or_default();
-    if !root.has_tag_name("VTKFile") || kind != "UnstructuredGrid" {
-        let found = format!("a VTK file of type `{kind}`");
-        return Err(fault_at(root, ReadProblem::Unsupported { found, advice: GRID_ADVICE }));
-    }
-    let grid = child(root, "UnstructuredGrid")?;
-    let piece = child(grid, "Piece")?;
-    let next = piece.next_siblings().skip(1).find(|node| node.has_tag_name("Piece"));
-    match next {
-        Some(second) => Err(fault_at(second, ReadProblem::SecondPart { what: "<Piece>".into() })),
-        None => Ok(piece),
-    }
 }
 
 fn find_points<'a, 'input>(piece: Node<'a, 'input>) -> Result<Node<'a, 'input>, Fault> {
@@ -169,20 +260,17 @@ fn find_points<'a, 'input>(piece: Node<'a, 'input>) -> Result<Node<'a, 'input>, 
 }
 
 fn find_array<'a, 'input>(node: Node<'a, 'input>, name: &str) -> Result<Node<'a, 'input>, Fault> {
-    named_array(node, name).ok_or_else(|| missing(node, format!("array named `{name}`")))
-}
-
-fn named_array<'a, 'input>(node: Node<'a, 'input>, name: &str) -> Option<Node<'a, 'input>> {
     node.children()
         .find(|child| child.has_tag_name("DataArray") && child.attribute("Name") == Some(name))
+        .ok_or_else(|| missing(node, format!("array named `{name}`")))
 }
 
 fn announced_count(piece: Node, attribute: &str) -> Result<usize, Fault> {
     let text =
         piece.attribute(attribute).ok_or_else(|| missing(piece, format!("count {attribute}")))?;
-    // A third, so that three coordinates for each can be counted as well.
+    // Numbers of vertices have 32 bits.
     match text.trim().parse() {
-        Ok(count) if count <= usize::MAX / 3 => Ok(count),
+        Ok(count) if count <= u32::MAX as usize => Ok(count),
         _ => Err(fault_at(piece, bad_word("a count", text.as_bytes()))),
     }
 }
@@ -194,32 +282,15 @@ fn check_count(node: Node, what: &str, claimed: usize, found: usize) -> Result<(
     Err(fault_at(node, ReadProblem::CountMismatch { what: what.into(), claimed, found }))
 }
 
-fn read_regions<'a, 'input>(
-    piece: Node<'a, 'input>,
-    cell_count: usize,
-    array: impl Fn(Node<'a, 'input>) -> Result<DataArray<'a, 'input>, Fault>,
-) -> Result<Option<Vec<u32>>, Fault> {
-    let cell_data = piece.children().find(|child| child.has_tag_name("CellData"));
-    let Some(node) = cell_data.and_then(|data| named_array(data, "region")) else {
-        return Ok(None);
-    };
-    let labels = array(node)?.numbers("a region, a whole number of 0 or more")?;
-    check_count(node, "regions of cells", cell_count, labels.len())?;
-    Ok(Some(labels))
-}
-
-/// VTK's name of a cell type.
-fn kind_name(kind: u8) -> String {
-    let name = match kind {
-        1 => "vertex",
-        3 => "line",
-        5 => "triangle",
-        9 => "quad",
-        12 => "hexahedron",
-        13 => "wedge",
-        14 => "pyramid",
-        24 => "second-order tetrahedron",
-        other => return format!("cell of type {other}"),
-    };
-    name.into()
+/// Regions of cells, where an array is named as such.
+fn read_regions(piece: Node, codec: Codec) -> Result<Option<Vec<u32>>, Fault> {
+    let data = piece.children().find(|child| child.has_tag_name("CellData"));
+    let arrays = data.into_iter().flat_map(|data| data.children());
+    let arrays = arrays.filter(|node| node.has_tag_name("DataArray"));
+    let ranked = arrays.filter_map(|node| Some((rank_of_regions(node.attribute("Name")?)?, node)));
+    let Some((_, node)) = ranked.min_by_key(|(rank, _)| *rank) else { return Ok(None) };
+    let values: Vec<f64> = DataArray::new(node, codec)?.numbers(A_REGION)?;
+    let regions = regions_of(&values)
+        .map_err(|value| fault_at(node, bad_word(A_REGION, value.to_string().as_bytes())))?;
+    Ok(Some(regions))
 }

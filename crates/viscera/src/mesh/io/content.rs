@@ -1,0 +1,175 @@
+//! What a file holds, before it becomes tissue or a surface.
+
+use super::cells::{Cells, Curved};
+use super::error::{Fault, Place, ReadProblem};
+use super::parsed::{CountedElements, Format, Patch, ReadReport};
+use crate::mesh::{
+    MeshError, MeshPlace, MeshRepairs, SurfaceMesh, TetMesh, boundary_surface, check_vertex,
+};
+use crate::scalar::Vec3;
+
+/// Where a vertex, or a cell in the file's order, stands in the file.
+type Places<'a> = Box<dyn Fn(MeshPlace) -> Option<Place> + 'a>;
+
+/// Vertices, cells and names of a file.
+pub(super) struct Content<'a> {
+    pub format: Format,
+    /// Positions in the unit of the file.
+    pub vertices: Vec<Vec3<f64>>,
+    pub cells: Cells,
+    /// By vertices as the file lists them.
+    pub patches: Vec<Patch>,
+    pub region_names: Vec<(u32, String)>,
+    pub places: Places<'a>,
+}
+
+impl<'a> Content<'a> {
+    /// Without names.
+    pub fn of_cells(
+        format: Format,
+        vertices: Vec<Vec3<f64>>,
+        cells: Cells,
+        places: Places<'a>,
+    ) -> Self {
+        let (patches, region_names) = Default::default();
+        Self { format, vertices, cells, patches, region_names, places }
+    }
+
+    /// The tetrahedra; positions are multiplied by the unit.
+    pub fn into_tets(self, unit_in_meters: f64) -> Result<(TetMesh, ReadReport), Fault> {
+        let Self { format, mut vertices, cells, mut patches, region_names, places } = self;
+        scale(&mut vertices, unit_in_meters);
+        if cells.tets.is_empty() {
+            return Err(no_tets(format, &cells));
+        }
+        let Cells { tets, regions, of_tets, triangles, mut skipped, split, curved, nodes, .. } =
+            cells;
+        let bulge = largest_bulge(&vertices, &curved, &nodes);
+        if !triangles.is_empty() {
+            let entry = CountedElements { kind: "triangle".into(), count: triangles.len() };
+            skipped.insert(0, entry);
+        }
+        let (mesh, repairs) = TetMesh::new(vertices, tets, regions).map_err(|error| {
+            let place = match error.place() {
+                MeshPlace::Whole => None,
+                MeshPlace::Vertex(vertex) => places(MeshPlace::Vertex(vertex)),
+                MeshPlace::Tet(tet) => {
+                    of_tets.get(tet).and_then(|&cell| places(MeshPlace::Tet(cell as usize)))
+                }
+            };
+            Fault { place, problem: ReadProblem::Mesh(error) }
+        })?;
+        for patch in &mut patches {
+            patch.vertices =
+                patch.vertices.iter().filter_map(|&v| repairs.vertex_after(v)).collect();
+        }
+        patches.retain(|patch| !patch.vertices.is_empty());
+        let format = Some(format);
+        let curved = curved.len();
+        let report =
+            ReadReport { format, repairs, skipped, split, curved, bulge, patches, region_names };
+        Ok((mesh, report))
+    }
+
+    /// The surface; positions are multiplied by the unit. That of the tetrahedra where the file has no triangles.
+    pub fn into_surface(mut self, unit_in_meters: f64) -> Result<(SurfaceMesh, ReadReport), Fault> {
+        if self.cells.triangles.is_empty() && !self.cells.tets.is_empty() {
+            let (mesh, report) = self.into_tets(unit_in_meters)?;
+            return Ok((boundary_surface(&mesh).surface, report));
+        }
+        scale(&mut self.vertices, unit_in_meters);
+        let Self { format, vertices, cells, places, .. } = self;
+        let Cells { tets, mut skipped, triangles, of_triangles, curved, nodes, .. } = cells;
+        if triangles.is_empty() {
+            let what = format!("triangles (it has {})", CountedElements::list(&skipped));
+            return Err(Fault::whole_file(ReadProblem::Missing { what }));
+        }
+        for (vertex, &position) in vertices.iter().enumerate() {
+            check_vertex(vertex, position).map_err(|error: MeshError| Fault {
+                place: places(MeshPlace::Vertex(vertex)),
+                problem: ReadProblem::Mesh(error),
+            })?;
+        }
+        for (triangle, &cell) in triangles.iter().zip(&of_triangles) {
+            if let Some(vertex) = triangle.iter().find(|&&v| v as usize >= vertices.len()) {
+                let problem = ReadProblem::UnknownVertex {
+                    element: format!("face {cell}"),
+                    vertex: vertex.to_string(),
+                    vertex_count: vertices.len(),
+                    numbers: None,
+                };
+                return Err(Fault { place: places(MeshPlace::Tet(cell as usize)), problem });
+            }
+        }
+        if !tets.is_empty() {
+            skipped.push(CountedElements { kind: "tetrahedron".into(), count: tets.len() });
+        }
+        let bulge = largest_bulge(&vertices, &curved, &nodes);
+        let (mesh, removed_vertices) = without_unused(vertices, triangles);
+        let repairs = MeshRepairs { removed_vertices, ..MeshRepairs::default() };
+        let (format, curved) = (Some(format), curved.len());
+        Ok((mesh, ReadReport { format, repairs, skipped, curved, bulge, ..ReadReport::default() }))
+    }
+}
+
+fn scale(vertices: &mut [Vec3<f64>], unit_in_meters: f64) {
+    vertices.iter_mut().for_each(|x| *x = *x * unit_in_meters);
+}
+
+fn no_tets(format: Format, cells: &Cells) -> Fault {
+    Fault::whole_file(if cells.triangles.is_empty() {
+        ReadProblem::NoTets { others: CountedElements::list(&cells.skipped) }
+    } else {
+        ReadProblem::OnlySurface { format, triangles: cells.triangles.len() }
+    })
+}
+
+/// How far a node between corners is from the nearest line between two of them [m], at most: an edge, or a diagonal, on which
+/// the middles of faces and of cells lie. Zero where edges are straight, whatever order the format has the nodes in.
+fn largest_bulge(vertices: &[Vec3<f64>], curved: &[Curved], nodes: &[u32]) -> f64 {
+    let mut largest = 0.0f64;
+    for &Curved { first, count, corners } in curved {
+        let all = &nodes[first..first + count];
+        let at = |node: &u32| vertices.get(*node as usize).copied();
+        let (corners, middles) = all.split_at(corners);
+        for x in middles.iter().filter_map(at) {
+            let places: Vec<Vec3<f64>> = corners.iter().filter_map(at).collect();
+            let mut nearest = f64::INFINITY;
+            for (i, &a) in places.iter().enumerate() {
+                for &b in &places[..i] {
+                    let along = b - a;
+                    let share = (x - a).dot(along) / along.length_squared();
+                    let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
+                    nearest = nearest.min((a + along * share - x).length_squared());
+                }
+            }
+            if nearest.is_finite() {
+                largest = largest.max(nearest);
+            }
+        }
+    }
+    largest.sqrt()
+}
+
+fn without_unused(
+    vertices: Vec<Vec3<f64>>,
+    mut triangles: Vec<[u32; 3]>,
+) -> (SurfaceMesh, Vec<u32>) {
+    let mut number = vec![u32::MAX; vertices.len()];
+    for &vertex in triangles.iter().flatten() {
+        number[vertex as usize] = 0;
+    }
+    let (mut kept, mut removed) = (Vec::with_capacity(vertices.len()), Vec::new());
+    for (vertex, x) in vertices.into_iter().enumerate() {
+        if number[vertex] == u32::MAX {
+            removed.push(vertex as u32);
+        } else {
+            number[vertex] = kept.len() as u32;
+            kept.push(x);
+        }
+    }
+    for vertex in triangles.iter_mut().flatten() {
+        *vertex = number[*vertex as usize];
+    }
+    (SurfaceMesh { vertices: kept, triangles }, removed)
+}
