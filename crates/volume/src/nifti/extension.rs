@@ -48,6 +48,8 @@ pub(super) fn read(
             source.take(&mut own, &mut bytes)?;
             notes.extend(read_names(&bytes, &mut names).err());
         } else {
+            let is_passed_over = matches!(code, 0 | 30);
+            notes.extend(is_passed_over.then(|| damaged("it is larger than 1 MiB")));
             source.skip(&mut own)?;
         }
         part.found = own.found;

@@ -68,6 +68,11 @@ fn scan_is_told_from_a_label_map() {
     };
     let found = floats([1.0, 0.25, 2.0]);
     assert!(found.contains("values from 0 to 2, 0.25 at voxel (1, 0, 0)"), "{found}");
+    let mut data = [0.0_f32; 12];
+    data[6 + 2 + 1] = -0.5;
+    let data = data.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let found = message(&Nifti { datatype: 16, data, ..Nifti::default() }.file());
+    assert!(found.contains("values from -0.5 to 0, -0.5 at voxel (1, 1, 1)"), "{found}");
     let found = floats([1.0, 70000.0, 2.0]);
     assert!(found.contains("values from 0 to 70000, 70000 at voxel (1, 0, 0)"), "{found}");
     let found = floats([1.0, f32::NAN, 2.0]);
@@ -143,6 +148,13 @@ fn gzip_that_was_cut_or_damaged_is_told_apart() {
     assert!(start.contains("the gzip stream breaks off inside the header"), "{start}");
     // One bit of the checksum at the end.
     let mut changed = whole.clone();
+    let at = changed.len() - 6;
+    changed[at] ^= 1;
+    let damaged = message(&changed);
+    assert!(damaged.contains("the gzip stream is damaged inside the voxels"), "{damaged}");
+    // The same where a little more follows behind the image.
+    let longer = [file.file(), vec![7; 5000]].concat();
+    let mut changed = gzip(&longer);
     let at = changed.len() - 6;
     changed[at] ^= 1;
     let damaged = message(&changed);

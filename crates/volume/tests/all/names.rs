@@ -52,6 +52,11 @@ fn damaged_extension_is_passed_over_and_said() {
         assert!(map.names().is_empty());
         assert!(report.to_string().contains(wanted), "{report}");
     }
+    let large = table(&("<Label Key=\"5\">liver</Label>".to_owned() + &" ".repeat(1 << 20)));
+    let (map, report) =
+        read_well(&Nifti { extensions: vec![(0, large)], ..Nifti::default() }.file());
+    assert_eq!(map.labels(), (0..12).collect::<Vec<u16>>());
+    assert!(map.names().is_empty() && report.to_string().contains("larger than 1 MiB"), "{report}");
     // Sizes that leave their place.
     for size in [-5_i32, 3, 1000] {
         let extensions = vec![(0, table("<Label Key=\"5\">liver</Label>"))];

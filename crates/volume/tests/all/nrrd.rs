@@ -114,6 +114,32 @@ fn list_of_one_volume_is_read_wherever_it_stands() {
 }
 
 #[test]
+fn several_volumes_one_after_the_other_are_refused() {
+    let lines = [
+        "type: uchar",
+        "dimension: 4",
+        "sizes: 2 3 1 2",
+        "encoding: raw",
+        "space: LPS",
+        "space directions: (-3,0,0) (0,-2,0) (0,0,4) none",
+        "Segment0_Name:=liver",
+    ];
+    let message = message(&nrrd(&lines, &[1; 12]));
+    let wanted =
+        "line 5: an image of 4 dimensions (2 volumes) cannot be read here; label maps have";
+    assert!(message.contains(wanted), "{message}");
+}
+
+#[test]
+fn first_of_two_axes_of_one_voxel_is_the_list() {
+    let lines =
+        ["type: uchar", "dimension: 4", "sizes: 1 3 4 1", "encoding: raw", "spacings: 9 3 2 4"];
+    let (map, _) = read_well(&nrrd(&lines, &(0..12).collect::<Vec<u8>>()));
+    assert_eq!(map.dims(), [3, 4, 1]);
+    assert!((map.to_world().voxel_size()[0] - 3e-3).abs() < 1e-17);
+}
+
+#[test]
 fn lines_that_are_wrong_are_named_with_their_number() {
     let good = all_lines(&[&BASIC, &LPS, &["encoding: raw"]]);
     let data: Vec<u8> = (0..12).collect();
@@ -155,6 +181,7 @@ fn lines_that_are_wrong_are_named_with_their_number() {
         (6, "no colon", "line 9: header: expected `field: value`, `key:=value`"),
         (6, "data file: voxels.raw", "line 9: a header with voxels in another file cannot be read"),
         (6, "datafile: LIST", "line 9: a header with voxels in another file cannot be read"),
+        (6, "encoding: raw:=x", "line 9: encoding: expected raw, gzip or text, found `raw:=x`"),
         (6, "sizes: 1 1 1", "line 9: sizes: expected one line of this field"),
         (6, "content: x", "the header has no `encoding`"),
         (0, "content: x", "the header has no `type`"),

@@ -45,6 +45,8 @@ fn qform_turns_as_worked_out_by_hand() {
         ([0.0, half, 0.0], -1.0, [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]),
         // A half turn about z, as files from DICOM have it: a = 0.
         ([0.0, 0.0, 1.0], 1.0, [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]),
+        // A half turn about (3, 4, 0) / 5: in single precision the squares add up to more than 1.
+        ([0.6, 0.8, 0.0], 1.0, [[-0.28, 0.96, 0.0], [0.96, 0.28, 0.0], [0.0, 0.0, -1.0]]),
         // A third of a turn about (1, 1, 1) takes x to y, y to z and z to x.
         ([0.5, 0.5, 0.5], 1.0, [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
     ];
@@ -150,7 +152,11 @@ fn units_are_metres_millimetres_or_micrometres() {
     let near = |found: f64, wanted: f64| (found - wanted).abs() <= wanted * f64::EPSILON;
     let (meters, notes) = size(1);
     assert!(near(meters, 3.0), "{meters}");
-    assert!(matches!(notes[..], [Note::OddSize { .. }]), "{notes:?}");
+    // 2 x 3 x 2 voxels of 3 x 2 x 4 m.
+    assert_eq!(notes, [Note::OddSize { longest_edge: 8.0 }]);
+    let dim = [3, 12, 1, 1, 1, 1, 1, 1];
+    let (_, report) = read_nifti(&Nifti { units: 1, dim, ..Nifti::default() });
+    assert_eq!(report.notes, [Note::OddSize { longest_edge: 36.0 }]);
     // Seconds in the bits of time change nothing.
     assert!(near(size(2 | 8).0, 3e-3));
     assert!(near(size(3).0, 3e-6));
