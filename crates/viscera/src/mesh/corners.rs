@@ -98,6 +98,11 @@ impl BoundingBox {
         self.max - self.min
     }
 
+    /// How far a point is from it, squared [m^2]; zero inside.
+    pub fn distance_squared(&self, p: Vec3<f64>) -> f64 {
+        (self.min - p).max(p - self.max).max(Vec3::ZERO).length_squared()
+    }
+
     /// Centre `[m]`.
     pub fn center(&self) -> Vec3<f64> {
         (self.min + self.max) * 0.5

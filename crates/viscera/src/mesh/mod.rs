@@ -25,6 +25,7 @@ pub(crate) mod nearest;
 pub mod normals;
 pub mod shapes;
 pub mod tetrahedralize;
+pub mod winding;
 
 use crate::scalar::Vec3;
 
