@@ -43,6 +43,7 @@
 //! | `nifti`, `nrrd` | the formats |
 //! | `label_map`, `affine` | the result |
 //! | `report`, `error` | what was found, what is wrong |
+//! | `organ`, `pieces` | labels as smooth shapes, without crumbs |
 //! | `summary` | labels with their sizes and places |
 //! | `total_segmentator` | names of the labels that TotalSegmentator gives |
 
@@ -52,6 +53,8 @@ mod error;
 mod label_map;
 mod nifti;
 mod nrrd;
+mod organ;
+mod pieces;
 mod read;
 mod report;
 mod source;
@@ -62,6 +65,7 @@ mod values;
 pub use affine::{Affine, Side};
 pub use error::{VolumeError, VolumeProblem};
 pub use label_map::LabelMap;
+pub use organ::{Organ, OrganError, OrganReport, Wall};
 pub use read::{Limits, read};
 pub use report::{NamesFrom, Note, Orientation, VolumeFormat, VolumeReport, WorldSpace};
 pub use summary::{BorderFace, LabelSummary, summarize};

@@ -11,6 +11,7 @@ mod errors;
 mod names;
 mod nifti;
 mod nrrd;
+mod organs;
 mod orientation;
 mod segments;
 mod summary;
