@@ -7,6 +7,7 @@ mod devices;
 mod film;
 mod haptics;
 mod hold;
+mod import;
 mod in_order;
 mod mesh;
 mod output;
@@ -38,6 +39,8 @@ Examples:
   viscera run palpation --record out/palpation.replay
   viscera replay out/palpation.replay --threads 1
   viscera haptics haptic_palpation --seconds 10
+  viscera run liver.stl
+  viscera scene new abdomen_labels.nii.gz --labels liver,stomach --out out/abdomen
   viscera mesh inspect liver.msh --unit \"32 mm\"
   viscera scene describe
   viscera view grab
@@ -51,7 +54,7 @@ enum Command {
     Replay(replay::ReplayArguments),
     /// Feel tissue with a haptic device, or with a simulated hand
     Haptics(haptics::HapticsArguments),
-    /// Look at mesh files
+    /// Look at mesh files and segmented scans, fill surfaces, convert formats
     #[command(subcommand)]
     Mesh(mesh::MeshCommand),
     /// What a scene file can say, and which scenes need none
@@ -83,7 +86,10 @@ fn main() -> ExitCode {
         Command::Mesh(command) => mesh::execute(&command).map(|()| run::Outcome::Finished),
         Command::Scene(command) => scene::execute(&command).map(|()| run::Outcome::Finished),
         Command::Bench(arguments) => bench::execute(&arguments).map(|()| run::Outcome::Finished),
-        Command::View(arguments) => return view::execute(&arguments),
+        Command::View(arguments) => match view::execute(&arguments) {
+            Ok(code) => return code,
+            Err(error) => Err(error),
+        },
         Command::Devices(arguments) => {
             devices::execute(&arguments).map(|()| run::Outcome::Finished)
         }

@@ -2,6 +2,7 @@
 
 use crate::film::Film;
 use crate::hold::Hold;
+use crate::import;
 use crate::output::OutputFolder;
 use crate::progress;
 use crate::recording_file::RecordingFile;
@@ -31,9 +32,10 @@ use viscera_resources::{BuiltInScene, Memory, MeshFiles, files, memory};
 /// each tool in each frame. Ctrl-C and SIGTERM end a run cleanly: what
 /// is finished is kept, summary.json says so, and the exit code is 130. Of more than 2,000 frames
 /// summary.json has every second, fourth ... and the last.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub struct RunArguments {
-    /// The scene file, or the name of one that `viscera scene list` prints
+    /// The scene file, or the name of one that `viscera scene list` prints; or a mesh, a surface or a segmented scan, of which
+    /// a scene is made first (`viscera scene new`)
     scene: PathBuf,
     /// Folder for the results [default: out/NAME-OF-THE-SCENE]
     #[arg(long, value_name = "DIR")]
@@ -84,6 +86,16 @@ pub enum Outcome {
 
 /// Carries out `viscera run`.
 pub fn run(arguments: &RunArguments) -> Result<Outcome> {
+    let stem = arguments.scene.file_stem().unwrap_or(arguments.scene.as_os_str()).to_owned();
+    let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from("out").join(&stem));
+    let made;
+    let mut arguments = arguments;
+    if import::is_foreign(&arguments.scene) {
+        // A mesh or a scan: its scene is made first, and stays beside the results to be changed.
+        let scene = import::scene_of(&arguments.scene, &folder)?;
+        made = RunArguments { scene, ..arguments.clone() };
+        arguments = &made;
+    }
     let (scene, overrides) = read_scene(arguments)?;
     let meshes = MeshFiles::new(&arguments.scene, arguments.data.as_deref());
     let mut loaded = Vec::new();
@@ -98,8 +110,6 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     let what = format!("{}: a simulation of {tets} tetrahedra", scene.name);
     let needed = memory::of_run(tets, &scene.solver);
     memory::check(&what, needed, arguments.memory, "take a coarser mesh")?;
-    let stem = arguments.scene.file_stem().unwrap_or(arguments.scene.as_os_str());
-    let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from("out").join(stem));
     let frames = arguments.frames.unwrap_or_else(|| scene.frame_count());
     if let Some(file) = &arguments.save {
         files::prepare_file(file, "--save")?;

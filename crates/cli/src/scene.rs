@@ -1,7 +1,9 @@
 //! `viscera scene`.
 
+use crate::import::{self, ImportArguments};
 use anyhow::Result;
 use clap::Subcommand;
+use std::path::{Path, PathBuf};
 use viscera::scene::{Scene, describe_markdown, describe_text};
 use viscera_report::Table;
 use viscera_resources::{BUILT_IN, BuiltInScene, files};
@@ -17,6 +19,20 @@ pub enum SceneCommand {
     },
     /// List the scenes that need no file: `viscera run NAME`
     List,
+    /// Make a scene of a mesh, a surface or a segmented scan
+    ///
+    /// Reads tetrahedra and surfaces (formats: `viscera mesh inspect --help`) and label maps (NIfTI, NRRD, of TotalSegmentator or
+    /// 3D Slicer). Surfaces and labels are filled with tetrahedra; every organ gets a material, a hold and its fine surface. The scene file
+    /// is written with comments, to be changed by hand.
+    New {
+        /// The mesh, surface or label map
+        file: PathBuf,
+        /// The folder for the scene; `out/NAME/scene` where there is none
+        #[arg(long, short)]
+        out: Option<PathBuf>,
+        #[command(flatten)]
+        import: ImportArguments,
+    },
 }
 
 /// Carries out a `viscera scene` command.
@@ -25,8 +41,25 @@ pub fn execute(command: &SceneCommand) -> Result<()> {
         SceneCommand::Describe { markdown: true } => describe_markdown(),
         SceneCommand::Describe { markdown: false } => describe_text(),
         SceneCommand::List => list()?,
+        SceneCommand::New { file, out, import } => new(file, out.as_deref(), import)?,
     };
     files::print(&text)
+}
+
+/// Makes a scene, and says what it is and what to do next.
+fn new(file: &Path, out: Option<&Path>, arguments: &ImportArguments) -> Result<String> {
+    let title = import::title_of(file);
+    let folder = match out {
+        Some(folder) => folder.to_owned(),
+        None => Path::new("out").join(title.replace(' ', "_")).join("scene"),
+    };
+    let made = import::import(file, arguments)?;
+    let scene = import::write(&made, &title, &folder)?;
+    let shown = scene.display();
+    Ok(format!(
+        "{}scene: {shown}\nnext:  viscera run {shown}   or   viscera view {shown}\n",
+        import::describe(&made)
+    ))
 }
 
 fn list() -> Result<String> {

@@ -1,5 +1,7 @@
 //! `viscera view`: starts the window, which is a program of its own so that this one builds quickly.
 
+use crate::import;
+use anyhow::Result;
 use clap::Args;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -10,17 +12,24 @@ use std::process::{Command, ExitCode};
 /// Starts `viscera-view`, which lies beside this program.
 #[derive(Args)]
 pub struct ViewArguments {
-    /// A scene and options, as `viscera-view --help` lists them
+    /// A scene, or a mesh or segmented scan of which one is made, and options, as `viscera-view --help` lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "SCENE")]
     arguments: Vec<OsString>,
 }
 
 /// Starts the window and waits until it is closed; its exit code is this one's.
-pub fn execute(arguments: &ViewArguments) -> ExitCode {
+pub fn execute(arguments: &ViewArguments) -> Result<ExitCode> {
     let program = std::env::current_exe().map(|this| beside(&this));
-    let started =
-        program.and_then(|program| Command::new(program).args(&arguments.arguments).status());
-    match started {
+    let mut passed = arguments.arguments.clone();
+    for argument in &mut passed {
+        let path = Path::new(argument);
+        if import::is_foreign(path) {
+            let folder = Path::new("out").join(import::title_of(path).replace(' ', "_"));
+            *argument = import::scene_of(path, &folder)?.into_os_string();
+        }
+    }
+    let started = program.and_then(|program| Command::new(program).args(&passed).status());
+    Ok(match started {
         Ok(status) => match u8::try_from(status.code().unwrap_or(1)) {
             Ok(code) => ExitCode::from(code),
             Err(_) => ExitCode::FAILURE,
@@ -33,7 +42,7 @@ pub fn execute(arguments: &ViewArguments) -> ExitCode {
             );
             ExitCode::FAILURE
         }
-    }
+    })
 }
 
 /// The window's program in the folder of this one.

@@ -1,0 +1,152 @@
+//! Files from elsewhere as scenes: `viscera scene new`, and `viscera run` and `viscera view` of a mesh or a scan.
+
+use anyhow::{Result, bail};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use viscera::mesh::quality::summarize_quality;
+use viscera::units::Dimension;
+use viscera_import::{Fineness, Import, Options, open, parts};
+use viscera_report::Table;
+use viscera_resources::files;
+
+use crate::progress;
+
+/// How a file becomes bodies.
+#[derive(Args, Clone, Debug, Default)]
+pub struct ImportArguments {
+    /// The length of edges inside, such as "8 mm"
+    #[arg(long, value_name = "LENGTH", conflicts_with = "count")]
+    edge: Option<String>,
+    /// About how many tetrahedra in all; 20,000 where nothing is said
+    #[arg(long, value_name = "NUMBER", value_parser = crate::run::from_one::<usize>)]
+    count: Option<usize>,
+    /// The length that 1 in a mesh file stands for, such as "1 mm"; guessed and said where it is not given
+    #[arg(long, value_name = "LENGTH")]
+    unit: Option<String>,
+    /// Labels of a scan, by name or number: liver,stomach,5; all soft organs where there are none
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    labels: Vec<String>,
+    /// Leave hollow organs a wall around a cavity, in place of filling them
+    #[arg(long)]
+    hollow: bool,
+}
+
+impl ImportArguments {
+    fn options(&self) -> Result<Options> {
+        let length = |text: &Option<String>, flag: &str| match text {
+            None => Ok(None),
+            Some(text) => match Dimension::Length.parse(text) {
+                Ok(value) if value > 0.0 => Ok(Some(value)),
+                Ok(_) => bail!("{flag}: a length above zero is needed, for example \"8 mm\""),
+                Err(error) => bail!("{flag}: {error}"),
+            },
+        };
+        let defaults = Options::default();
+        let fineness = match (length(&self.edge, "--edge")?, self.count) {
+            (Some(edge), _) => Fineness::Edge(edge),
+            (None, Some(count)) => Fineness::Count(count),
+            _ => defaults.fineness,
+        };
+        let unit = length(&self.unit, "--unit")?;
+        Ok(Options { fineness, unit, labels: self.labels.clone(), hollow: self.hollow })
+    }
+}
+
+/// Makes bodies of a file, with a bar that says which.
+pub fn import(file: &Path, arguments: &ImportArguments) -> Result<Import> {
+    let options = arguments.options()?;
+    let name = file.display().to_string();
+    let bar = progress::spinner(format!("reading {name}"));
+    let load = |name: &str| files::read(Path::new(name)).map_err(|error| error.to_string());
+    let found = open(&name, load);
+    let made = found.and_then(|found| {
+        parts(&name, found, &options, &mut |part| bar.set_message(format!("filling {part}")))
+    });
+    bar.finish_and_clear();
+    Ok(made?)
+}
+
+/// Writes a scene and its meshes into a folder; returns the scene file.
+pub fn write(import: &Import, title: &str, folder: &Path) -> Result<PathBuf> {
+    files::prepare_folder(folder, "--out")?;
+    for (name, bytes) in import.scene(title).files.into_iter().rev() {
+        files::write_atomic(&folder.join(name), &bytes)?;
+    }
+    Ok(folder.join("scene.toml"))
+}
+
+/// What was made: bodies with their sizes and shapes, and what was assumed.
+pub fn describe(import: &Import) -> String {
+    let mut table =
+        Table::new(["body", "tets", "ml", "angles, degrees", "below 10", "tissue", "held at"]);
+    for part in &import.parts {
+        let quality = summarize_quality(&part.mesh);
+        let (low, high) = (quality.min_dihedral.to_degrees(), quality.max_dihedral.to_degrees());
+        let held: Vec<&str> =
+            part.holds.iter().map(|hold| hold.reason.split(':').next().unwrap_or("")).collect();
+        table.row([
+            part.name.clone(),
+            part.mesh.tets().len().to_string(),
+            format!("{:.0}", 1e6 * part.mesh.volume()),
+            format!("{low:.1} to {high:.1}"),
+            format!("{:.3} %", 100.0 * share_below(&part.mesh, 10.0)),
+            part.tissue.preset.unwrap_or("unknown").to_owned(),
+            held.join(", "),
+        ]);
+    }
+    let mut text = table.to_text();
+    for touching in &import.touching {
+        let (from, to) = (&import.parts[touching.from].name, &import.parts[touching.to].name);
+        text.push_str(&format!(
+            "tied: {from} to {to}, {:.0} % of its surface\n",
+            100.0 * touching.share
+        ));
+    }
+    for note in &import.notes {
+        text.push_str(&format!("note: {}\n", note.trim()));
+    }
+    for part in &import.parts {
+        for note in &part.notes {
+            text.push_str(&format!("note: {}: {note}\n", part.name));
+        }
+    }
+    text
+}
+
+/// The share of dihedral angles below a bound [degrees].
+fn share_below(mesh: &viscera::mesh::TetMesh, bound: f64) -> f64 {
+    let angles = (0..mesh.tets().len())
+        .flat_map(|tet| viscera::mesh::quality::dihedral_angles(mesh.corners(tet)));
+    let count = angles.filter(|angle| angle.to_degrees() < bound).count();
+    count as f64 / (6 * mesh.tets().len()).max(1) as f64
+}
+
+/// A mesh, a surface or a scan, in place of a scene file.
+pub fn is_foreign(path: &Path) -> bool {
+    let is_toml = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    !is_toml && path.is_file() && looks_like_data(path)
+}
+
+/// Not text that could be a scene without an ending of its own.
+fn looks_like_data(path: &Path) -> bool {
+    const ENDINGS: [&str; 14] = [
+        "msh", "vtk", "vtu", "vtp", "ele", "node", "mesh", "inp", "obj", "stl", "ply", "nii", "gz",
+        "nrrd",
+    ];
+    path.extension().is_some_and(|e| ENDINGS.iter().any(|known| e.eq_ignore_ascii_case(known)))
+}
+
+/// The scene of a file from elsewhere, made in a folder beside the results.
+pub fn scene_of(path: &Path, folder: &Path) -> Result<PathBuf> {
+    let import = import(path, &ImportArguments::default())?;
+    let scene = write(&import, &title_of(path), &folder.join("scene"))?;
+    files::print(&describe(&import))?;
+    files::print(&format!("scene: {}\n", scene.display()))?;
+    Ok(scene)
+}
+
+/// "liver" of `data/liver.nii.gz`.
+pub fn title_of(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    name.split('.').next().unwrap_or_default().replace('_', " ")
+}

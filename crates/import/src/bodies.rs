@@ -1,0 +1,224 @@
+//! Bodies of a file.
+
+use viscera::mesh::io::ReadReport;
+use viscera::mesh::winding::fill;
+use viscera::mesh::{SurfaceMesh, TetMesh};
+use viscera::scalar::{Vec3, vec3};
+use viscera_volume::VolumeReport;
+
+use crate::hold::{Hold, at_the_back};
+use crate::open::Found;
+use crate::organs::of_labels;
+use crate::size::Fineness;
+use crate::tissue::Tissue;
+use crate::unit::{Unit, guess};
+use crate::{ImportError, tissue};
+
+/// What is asked for.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// How fine bodies are filled.
+    pub fineness: Fineness,
+    /// The length of 1 in a mesh [m]; guessed where nobody says.
+    pub unit: Option<f64>,
+    /// Labels by name or number; all soft organs where there are none.
+    pub labels: Vec<String>,
+    /// Whether hollow organs are a wall around a cavity, in place of filled.
+    pub hollow: bool,
+}
+
+impl Default for Options {
+    /// As many tetrahedra as run in real time.
+    fn default() -> Self {
+        Self { fineness: Fineness::Count(20_000), unit: None, labels: Vec::new(), hollow: false }
+    }
+}
+
+/// A surface that is finer than the tetrahedra, and moves with them.
+pub type Skin = SurfaceMesh;
+
+/// A part of a body that is made of something else.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inner {
+    /// The label of its tetrahedra.
+    pub region: u32,
+    /// Its name.
+    pub name: String,
+    /// What it is made of.
+    pub tissue: Tissue,
+}
+
+/// A body of a scene.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// A name that scenes take.
+    pub name: String,
+    /// Its tetrahedra [m].
+    pub mesh: TetMesh,
+    /// Its fine surface [m], if it has one.
+    pub skin: Option<Skin>,
+    /// What it is made of.
+    pub tissue: Tissue,
+    /// Parts of it that are made of something else.
+    pub inner: Vec<Inner>,
+    /// Where it is held.
+    pub holds: Vec<Hold>,
+    /// What people should know of it.
+    pub notes: Vec<String>,
+}
+
+/// Two bodies that touch, and are tied.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Touching {
+    /// The smaller one, by its place in the list of parts.
+    pub from: usize,
+    /// The larger one.
+    pub to: usize,
+    /// The share of the smaller one's surface that touches.
+    pub share: f64,
+    /// Points further away are not tied [m].
+    pub distance: f64,
+}
+
+/// All of a scene that comes from a file.
+pub struct Import {
+    /// The file's name.
+    pub file: String,
+    /// Bodies.
+    pub parts: Vec<Part>,
+    /// Bodies that touch.
+    pub touching: Vec<Touching>,
+    /// Downwards, of length 1.
+    pub down: Vec3<f64>,
+    /// What was found and what was assumed, a line each.
+    pub notes: Vec<String>,
+}
+
+/// Makes bodies of a file. `observe` is told what is being made.
+pub fn parts(
+    file: &str,
+    found: Found,
+    options: &Options,
+    observe: &mut dyn FnMut(&str),
+) -> Result<Import, ImportError> {
+    let stem = file.rsplit(['/', '\\']).next().unwrap_or(file);
+    let name = name_of(stem.split('.').next().unwrap_or(stem));
+    match found {
+        Found::Labels(map, report) => of_scan(file, &map, &report, options, observe),
+        Found::Tets(mesh, report) => {
+            observe(&name);
+            let unit =
+                options.unit.map_or_else(|| guess(stem, mesh.vertices(), mesh.volume()), given);
+            let mut notes = vec![unit.reason.clone()];
+            notes.extend(notes_of(&report, unit.meters));
+            let mesh = scaled(&mesh, unit.meters);
+            Ok(alone(file, name, mesh, None, notes))
+        }
+        Found::Surface(surface, report) => {
+            observe(&name);
+            let volume = surface.enclosed_volume().abs();
+            let unit = options.unit.map_or_else(|| guess(stem, &surface.vertices, volume), given);
+            let mut notes = vec![unit.reason.clone()];
+            notes.extend(notes_of(&report, unit.meters));
+            let mut surface = surface;
+            surface.vertices.iter_mut().for_each(|x| *x = *x * unit.meters);
+            let volume = volume * unit.meters.powi(3);
+            let spacing = options.fineness.spacing(volume);
+            let filled = fill(&surface, spacing)
+                .map_err(|error| ImportError::Fill { file: file.into(), error })?;
+            if filled.invented > 0.001 {
+                let percent = 100.0 * filled.invented;
+                notes.push(format!(
+                    "the surface has holes: {percent:.1} % of the boundary closes them"
+                ));
+            }
+            if filled.report.components > 1 {
+                let count = filled.report.components;
+                notes.push(format!("{count} unconnected parts: each needs a hold of its own"));
+            }
+            Ok(alone(file, name, filled.mesh, Some(surface), notes))
+        }
+    }
+}
+
+fn given(meters: f64) -> Unit {
+    Unit { meters, reason: String::from("unit as given") }
+}
+
+/// A scene of one body that is held at its lowest part.
+fn alone(
+    file: &str,
+    name: String,
+    mesh: TetMesh,
+    skin: Option<Skin>,
+    notes: Vec<String>,
+) -> Import {
+    let down = vec3(0.0, 0.0, -1.0);
+    let hold = at_the_back(&name, mesh.vertices(), down, "lowest");
+    let tissue = tissue::of_name(&name);
+    let part =
+        Part { name, mesh, skin, tissue, inner: Vec::new(), holds: vec![hold], notes: Vec::new() };
+    Import { file: file.into(), parts: vec![part], touching: Vec::new(), down, notes }
+}
+
+fn of_scan(
+    file: &str,
+    map: &viscera_volume::LabelMap,
+    report: &VolumeReport,
+    options: &Options,
+    observe: &mut dyn FnMut(&str),
+) -> Result<Import, ImportError> {
+    let mut notes: Vec<String> = report.to_string().lines().map(str::to_owned).collect();
+    // Patients lie on their backs, and the frame's y is to the front.
+    let down = vec3(0.0, -1.0, 0.0);
+    notes.push("the patient lies on the back: gravity is along -y".into());
+    let (parts, touching, more) = of_labels(file, map, options, down, observe)?;
+    notes.extend(more);
+    Ok(Import { file: file.into(), parts, touching, down, notes })
+}
+
+fn scaled(mesh: &TetMesh, unit: f64) -> TetMesh {
+    let vertices = mesh.vertices().iter().map(|&x| x * unit).collect();
+    // What was a mesh stays one, but for one that is too small or too large to be: its own error comes later.
+    TetMesh::new(vertices, mesh.tets().to_vec(), mesh.regions().to_vec())
+        .map_or_else(|_| mesh.clone(), |(mesh, _)| mesh)
+}
+
+/// What reading did to a mesh.
+fn notes_of(report: &ReadReport, unit: f64) -> Vec<String> {
+    let mut notes = Vec::new();
+    if report.repairs.rewound_tets > 0 {
+        notes.push(format!("reversed the winding of {} tetrahedra", report.repairs.rewound_tets));
+    }
+    for split in &report.split {
+        notes.push(format!("cut {} x {} into tetrahedra", split.count, split.kind));
+    }
+    if report.curved > 0 {
+        let bulge = 1e3 * report.bulge * unit;
+        notes.push(format!(
+            "took {} second-order elements by their corners; their edges were up to {bulge:.2} mm from straight",
+            report.curved
+        ));
+    }
+    for skipped in &report.skipped {
+        notes.push(format!("left out {} x {}", skipped.count, skipped.kind));
+    }
+    notes
+}
+
+/// A name that scenes take: letters, digits, `-` and `_`, not digits alone.
+pub fn name_of(text: &str) -> String {
+    let mut name = String::new();
+    for c in text.trim().chars() {
+        let c = c.to_ascii_lowercase();
+        let kept = if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+        if !(kept == '_' && name.ends_with('_')) {
+            name.push(kept);
+        }
+    }
+    let name = name.trim_matches('_').to_owned();
+    match name.is_empty() || name.chars().all(|c| c.is_ascii_digit()) {
+        true => format!("body_{name}").trim_end_matches('_').to_owned(),
+        false => name,
+    }
+}

@@ -1,0 +1,65 @@
+//! Why a file becomes no scene.
+
+use viscera::mesh::io::ReadError;
+use viscera::mesh::tetrahedralize::TetrahedralizeError;
+use viscera::mesh::winding::FillError;
+use viscera_volume::{OrganError, VolumeError};
+
+/// Why a file becomes no scene. `E` is why a file cannot be loaded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImportError {
+    /// The file could not be loaded.
+    #[error("{0}")]
+    Load(String),
+    /// It is no mesh that can be read.
+    #[error(transparent)]
+    Mesh(#[from] ReadError),
+    /// It is no label map that can be read.
+    #[error(transparent)]
+    Volume(#[from] VolumeError),
+    /// A surface cannot be filled.
+    #[error("{file}: {error}")]
+    Fill {
+        /// The file.
+        file: String,
+        /// Why.
+        error: FillError,
+    },
+    /// A label has no shape.
+    #[error("{file}: {error}")]
+    Organ {
+        /// The file.
+        file: String,
+        /// Why.
+        error: OrganError,
+    },
+    /// An organ cannot be filled.
+    #[error("{file}: `{organ}`: {error}")]
+    Organs {
+        /// The file.
+        file: String,
+        /// The organ.
+        organ: String,
+        /// Why.
+        error: TetrahedralizeError,
+    },
+    /// A name that is no label.
+    #[error("{file}: there is no label `{wanted}`; {hint}")]
+    UnknownLabel {
+        /// The file.
+        file: String,
+        /// What was asked for.
+        wanted: String,
+        /// The nearest names, or all.
+        hint: String,
+    },
+    /// Nothing of the file is soft tissue.
+    #[error("{file}: no label is known as soft tissue; choose some by --labels: {labels}")]
+    NoTissue {
+        /// The file.
+        file: String,
+        /// Its labels.
+        labels: String,
+    },
+}

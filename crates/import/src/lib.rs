@@ -1,0 +1,23 @@
+//! From a file to a scene: a mesh, a surface or a segmented scan becomes bodies with materials, holds and gravity.
+//!
+//! [`open`] tells by its content what a file is; [`parts`] makes bodies of it; [`Import::scene`] writes the scene file
+//! that puts them together, with comments that say what was measured, what was assumed, and what to look at first.
+//! Bytes in, bytes out: programs read and write the files.
+
+mod bodies;
+mod error;
+mod hold;
+mod open;
+mod organs;
+mod scene;
+mod size;
+mod tissue;
+mod unit;
+
+pub use bodies::{Import, Inner, Options, Part, Skin, Touching, parts};
+pub use error::ImportError;
+pub use hold::Hold;
+pub use open::{Found, open};
+pub use scene::Written;
+pub use size::Fineness;
+pub use tissue::Tissue;

@@ -1,0 +1,158 @@
+//! Writing the scene.
+
+use std::fmt::Write;
+
+use viscera::mesh::io::{ply, vtu};
+use viscera::mesh::topology::BoundingBox;
+
+use crate::bodies::{Import, Part};
+use crate::hold::rounded;
+use crate::tissue::Tissue;
+
+/// Files of a scene: names, relative to the scene file, and bytes. The scene file itself comes first.
+#[derive(Clone, Debug)]
+pub struct Written {
+    /// Names and bytes.
+    pub files: Vec<(String, Vec<u8>)>,
+}
+
+impl Import {
+    /// The scene file and the meshes that it names.
+    pub fn scene(&self, title: &str) -> Written {
+        let mut files = vec![("scene.toml".to_owned(), self.text(title).into_bytes())];
+        for part in &self.parts {
+            let regions = vtu::Array::integers("region", part.mesh.regions());
+            // The arrays are as long as the mesh, and its places are finite.
+            let grid = vtu::write(part.mesh.vertices(), part.mesh.tets(), &[], &[regions]);
+            files.push((format!("{}.vtu", part.name), grid.unwrap_or_default()));
+            if let Some(skin) = &part.skin {
+                files.push((format!("{}_skin.ply", part.name), ply::write(skin)));
+            }
+        }
+        Written { files }
+    }
+
+    fn text(&self, title: &str) -> String {
+        let mut text = String::new();
+        let file = self.file.rsplit(['/', '\\']).next().unwrap_or(&self.file);
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "# Made from {file}. Lines that begin with # are comments; `viscera scene describe` lists all keys."
+        );
+        for note in &self.notes {
+            let _ = writeln!(text, "# {}", note.trim());
+        }
+        let _ = writeln!(text, "title = {:?}", plain(title));
+        text.push_str("\n# 3 s, in which tissue sags until it hangs still; 1 in place of 0.95 leaves all motion to the tissue's own viscosity.\n");
+        text.push_str("[time]\nduration = \"3 s\"\nvelocity_factor = 0.95\n");
+        let _ = writeln!(text, "\n[world]\ngravity = {}", self.gravity());
+        for part in &self.parts {
+            body(&mut text, part);
+        }
+        for part in &self.parts {
+            for hold in &part.holds {
+                let _ = writeln!(text, "\n# `{}` is held at {}.", part.name, hold.reason);
+                let _ =
+                    writeln!(text, "[[fixing]]\nname = {:?}\nbody = {:?}", hold.name, part.name);
+                let normal = hold.normal.to_array().map(|value| format!("{:.6}", value + 0.0));
+                let _ = writeln!(
+                    text,
+                    "half_space = {{ point = [{}], normal = [{}] }}",
+                    lengths(hold.point),
+                    normal.join(", ")
+                );
+            }
+        }
+        for touching in &self.touching {
+            let (from, to) = (&self.parts[touching.from], &self.parts[touching.to]);
+            let _ = writeln!(
+                text,
+                "\n# {:.0} % of the surface of `{}` lies on `{}`: they are tied there. Without a tie they slide on each other.",
+                100.0 * touching.share,
+                from.name,
+                to.name
+            );
+            let _ = writeln!(text, "[[tie]]\nname = \"{}_on_{}\"", from.name, to.name);
+            let _ = writeln!(text, "from = {}\nto = {}", whole(from), whole(to));
+            let _ = writeln!(text, "distance = \"{:.2} mm\"", 1e3 * touching.distance);
+        }
+        text.push_str("\n[output]\nevery = 6\n");
+        text
+    }
+
+    fn gravity(&self) -> String {
+        let along = self.down.to_array().map(|value| 9.81 * value + 0.0);
+        let texts = along.map(|value| match value == 0.0 {
+            true => "0".to_owned(),
+            false => format!("\"{value:.2} m/s^2\""),
+        });
+        format!("[{}]", texts.join(", "))
+    }
+}
+
+fn body(text: &mut String, part: &Part) {
+    let (count, litres) = (part.mesh.tets().len(), 1e3 * part.mesh.volume());
+    let _ = writeln!(text, "\n# {}: {count} tetrahedra, {:.0} ml.", part.name, 1e3 * litres);
+    for note in &part.notes {
+        let _ = writeln!(text, "# {note}");
+    }
+    let _ = writeln!(
+        text,
+        "[[body]]\nname = {:?}\nmesh = \"{}.vtu\"\nunit = \"1 m\"",
+        part.name, part.name
+    );
+    if part.skin.is_some() {
+        let _ = writeln!(text, "surface = \"{}_skin.ply\"", part.name);
+    }
+    material(text, "body.material", &part.tissue);
+    for inner in &part.inner {
+        let _ = writeln!(text, "\n# {}", inner.name);
+        let _ = writeln!(text, "[[body.region]]\nlabel = {}", inner.region);
+        let _ = writeln!(text, "{}", keys(&inner.tissue));
+    }
+}
+
+fn material(text: &mut String, table: &str, tissue: &Tissue) {
+    text.push('\n');
+    if !tissue.note.is_empty() {
+        let _ = writeln!(text, "# {}", tissue.note);
+    }
+    let _ = writeln!(text, "[{table}]\n{}", keys(tissue));
+}
+
+fn keys(tissue: &Tissue) -> String {
+    // Nearer to 0.5 costs more iterations and shows in volume only.
+    let rest = "poisson = 0.45\nviscosity = \"10 ms\"";
+    match tissue.preset {
+        Some(preset) => match tissue.young {
+            Some(young) => {
+                format!("preset = {preset:?}\nyoung = \"{:.2} kPa\"\n{rest}", young / 1e3)
+            }
+            None => format!("preset = {preset:?}\n{rest}"),
+        },
+        None => format!("young = \"8 kPa\"\ndensity = \"1050 kg/m^3\"\n{rest}"),
+    }
+}
+
+/// A selection of all of a body.
+fn whole(part: &Part) -> String {
+    let bounds = BoundingBox::around(part.mesh.vertices());
+    let more = viscera::scalar::Vec3::splat(1e-2);
+    format!(
+        "{{ body = {:?}, box = {{ min = [{}], max = [{}] }} }}",
+        part.name,
+        lengths(bounds.min - more),
+        lengths(bounds.max + more)
+    )
+}
+
+fn lengths(x: viscera::scalar::Vec3<f64>) -> String {
+    let texts = rounded(x).to_array().map(|value| format!("\"{:.2} mm\"", 1e3 * value + 0.0));
+    texts.join(", ")
+}
+
+/// Without what ends a line or a text.
+fn plain(title: &str) -> String {
+    title.chars().filter(|c| !c.is_control() && *c != '"' && *c != '\\').collect()
+}
