@@ -45,6 +45,7 @@
 //! | `report`, `error` | what was found, what is wrong |
 //! | `summary` | labels with their sizes and places |
 //! | `total_segmentator` | names of the labels that TotalSegmentator gives |
+//! | `tissue` | which tissue each structure is made of, by its name |
 
 mod affine;
 mod collect;
@@ -56,6 +57,7 @@ mod read;
 mod report;
 mod source;
 mod summary;
+pub mod tissue;
 pub mod total_segmentator;
 mod values;
 

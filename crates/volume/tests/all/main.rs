@@ -14,3 +14,4 @@ mod nrrd;
 mod orientation;
 mod segments;
 mod summary;
+mod tissue;
