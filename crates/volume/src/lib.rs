@@ -46,6 +46,7 @@
 //! | `organ`, `pieces` | labels as smooth shapes, without crumbs |
 //! | `summary` | labels with their sizes and places |
 //! | `total_segmentator` | names of the labels that TotalSegmentator gives |
+//! | `tissue` | which tissue each structure is made of, by its name |
 
 mod affine;
 mod collect;
@@ -59,6 +60,7 @@ mod read;
 mod report;
 mod source;
 mod summary;
+pub mod tissue;
 pub mod total_segmentator;
 mod values;
 

@@ -15,3 +15,4 @@ mod organs;
 mod orientation;
 mod segments;
 mod summary;
+mod tissue;
