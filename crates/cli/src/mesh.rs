@@ -1,16 +1,23 @@
 //! `viscera mesh`.
 
-use anyhow::{Context, Result};
-use clap::Subcommand;
+use anyhow::{Context, Result, bail, ensure};
+use clap::{Args, Subcommand};
 use serde::Serialize;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use viscera::mesh::io::{Mesh, MeshFile};
-use viscera::mesh::{inspect, inspect_surface};
+use viscera::mesh::io::{Mesh, MeshFile, gmsh, obj, ply, stl, vtu};
+use viscera::mesh::topology::connected_components;
+use viscera::mesh::{SurfaceMesh, TetMesh, boundary_surface, inspect, inspect_surface};
+use viscera::scalar::{Vec3, vec3};
 use viscera::units::Dimension;
+use viscera_import::{Found, open};
+use viscera_report::Table;
 use viscera_resources::files;
+use viscera_volume::summarize;
 
-/// Look at mesh files
+use crate::import::{self, ImportArguments};
+
+/// Look at mesh files and segmented scans, fill surfaces, convert formats
 #[derive(Subcommand)]
 pub enum MeshCommand {
     /// Counts, size, volume, shape quality and what would be repaired
@@ -27,28 +34,77 @@ pub enum MeshCommand {
         #[arg(long)]
         json: bool,
     },
+    /// The labels of a segmented scan (NIfTI, NRRD): names, voxels, millilitres, pieces, where the image cuts them
+    Labels {
+        /// The label map
+        file: PathBuf,
+    },
+    /// Fill a surface, or labels of a scan, with tetrahedra
+    ///
+    /// Surfaces may have holes, gaps and parts that cross; where inside and outside cannot be told apart it says so. Of several labels each
+    /// gets a file of its own, with its name before the ending.
+    Tetrahedralize {
+        /// The surface or the label map
+        file: PathBuf,
+        /// The mesh to write: .vtu or .msh, in metres
+        #[arg(long, short)]
+        out: PathBuf,
+        #[command(flatten)]
+        import: ImportArguments,
+    },
+    /// Write a mesh in another format, another unit, or with other axes
+    ///
+    /// Writes tetrahedra as .vtu and .msh, surfaces as .obj, .stl and .ply, in metres; the surface of tetrahedra where the format has
+    /// no others.
+    Convert(ConvertArguments),
+}
+
+/// What to change on the way.
+#[derive(Args)]
+pub struct ConvertArguments {
+    /// The mesh or surface to read
+    file: PathBuf,
+    /// The file to write
+    out: PathBuf,
+    /// The length that 1 in the file stands for
+    #[arg(long, default_value = "1 m")]
+    unit: String,
+    /// A factor on all lengths
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
+    scale: f64,
+    /// Which axis of the file becomes x, y and z: "x,z,-y" lays down what stands
+    #[arg(long, default_value = "x,y,z", allow_hyphen_values = true)]
+    axes: String,
+    /// Keep tetrahedra with these labels only
+    #[arg(long, value_delimiter = ',', value_name = "LABELS")]
+    region: Vec<u32>,
+    /// Keep one unconnected part only, as `viscera mesh inspect` counts them
+    #[arg(long, value_name = "NUMBER")]
+    component: Option<usize>,
 }
 
 /// Carries out a `viscera mesh` command.
 pub fn execute(command: &MeshCommand) -> Result<()> {
-    let MeshCommand::Inspect { file, unit, json } = command;
-    let unit = Dimension::Length
-        .parse(unit)
-        .map_err(|error| anyhow::anyhow!("--unit: {error}"))
-        .and_then(|unit| {
-            anyhow::ensure!(
-                unit > 0.0,
-                "--unit: a length above zero is needed, for example \"1 mm\""
-            );
-            Ok(unit)
-        })?;
+    match command {
+        MeshCommand::Inspect { file, unit, json } => inspect_file(file, length(unit)?, *json),
+        MeshCommand::Labels { file } => list_labels(file),
+        MeshCommand::Tetrahedralize { file, out, import } => tetrahedralize(file, out, import),
+        MeshCommand::Convert(arguments) => convert(arguments),
+    }
+}
+
+fn length(unit: &str) -> Result<f64> {
+    let unit = Dimension::Length.parse(unit).map_err(|error| anyhow::anyhow!("--unit: {error}"))?;
+    ensure!(unit > 0.0, "--unit: a length above zero is needed, for example \"1 mm\"");
+    Ok(unit)
+}
+
+fn inspect_file(file: &Path, unit: f64, json: bool) -> Result<()> {
     let name = file.display().to_string();
     let mesh = MeshFile::load(&name, |name| files::read(Path::new(name)))?;
     match mesh.mesh(unit)? {
-        (Mesh::Surface(surface), report) => {
-            print(&name, &inspect_surface(&surface, &report), *json)
-        }
-        (Mesh::Tets(mesh), report) => print(&name, &inspect(&mesh, &report), *json),
+        (Mesh::Surface(surface), report) => print(&name, &inspect_surface(&surface, &report), json),
+        (Mesh::Tets(mesh), report) => print(&name, &inspect(&mesh, &report), json),
     }
 }
 
@@ -59,4 +115,201 @@ fn print<T: Serialize + Display>(name: &str, summary: &T, json: bool) -> Result<
     } else {
         files::print(&format!("{name}\n{summary}"))
     }
+}
+
+fn load(name: &str) -> Result<Vec<u8>, String> {
+    files::read(Path::new(name)).map_err(|error| error.to_string())
+}
+
+fn list_labels(file: &Path) -> Result<()> {
+    let name = file.display().to_string();
+    let Found::Labels(map, report) = open(&name, load)? else {
+        bail!("{name} is a mesh; look at it by `viscera mesh inspect`");
+    };
+    let mut table = Table::new([
+        "label",
+        "name",
+        "voxels",
+        "ml",
+        "pieces",
+        "from, mm",
+        "to, mm",
+        "cut by the image",
+    ]);
+    for label in summarize(&map) {
+        let place = |x: Vec3<f64>| format!("{:.0} {:.0} {:.0}", x.x, x.y, x.z);
+        let [low, high] = label.world_bounds;
+        let cuts: Vec<String> = label
+            .touches_border
+            .iter()
+            .map(|face| format!("{} ({})", face.side, face.voxels))
+            .collect();
+        table.row([
+            label.label.to_string(),
+            label.name.unwrap_or_default(),
+            label.voxels.to_string(),
+            format!("{:.1}", label.milliliters),
+            label.components.to_string(),
+            place(low),
+            place(high),
+            cuts.join(", "),
+        ]);
+    }
+    files::print(&format!("{name}: {report}\n{}", table.to_text()))
+}
+
+fn tetrahedralize(file: &Path, out: &Path, arguments: &ImportArguments) -> Result<()> {
+    let ending = ending_of(out)?;
+    ensure!(
+        matches!(ending.as_str(), "vtu" | "msh"),
+        "{}: tetrahedra are written as .vtu or .msh",
+        out.display()
+    );
+    files::prepare_file(out, "--out")?;
+    let import = import::import(file, arguments)?;
+    for part in &import.parts {
+        let target = if import.parts.len() == 1 {
+            out.to_owned()
+        } else {
+            let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+            out.with_file_name(format!("{stem}_{}.{ending}", part.name))
+        };
+        files::write_atomic(&target, &write_tets(&part.mesh, &ending)?)?;
+    }
+    files::print(&import::describe(&import))
+}
+
+fn convert(arguments: &ConvertArguments) -> Result<()> {
+    let ConvertArguments { file, out, unit, scale, axes, region, component } = arguments;
+    let ending = ending_of(out)?;
+    let is_surface = matches!(ending.as_str(), "obj" | "stl" | "ply");
+    ensure!(
+        is_surface || matches!(ending.as_str(), "vtu" | "msh"),
+        "{}: cannot write this format; tetrahedra go into .vtu or .msh, surfaces into .obj, .stl or .ply",
+        out.display()
+    );
+    ensure!(scale.is_finite() && *scale > 0.0, "--scale: a number above zero is needed");
+    files::prepare_file(out, "the file to write")?;
+    let turn = turn_of(axes)?;
+    let factor = length(unit)? * scale;
+    let place = |x: Vec3<f64>| {
+        let x = x.to_array();
+        let at = turn.map(|(axis, sign)| factor * sign * x[axis]);
+        vec3(at[0], at[1], at[2])
+    };
+    let name = file.display().to_string();
+    let bytes = match open(&name, load)? {
+        Found::Labels(..) => {
+            bail!("{name} is a segmented scan; fill it by `viscera mesh tetrahedralize`")
+        }
+        Found::Surface(surface, _) => {
+            ensure!(
+                is_surface,
+                "{name} is a surface; fill it by `viscera mesh tetrahedralize {name} --out {}`",
+                out.display()
+            );
+            ensure!(
+                region.is_empty() && component.is_none(),
+                "--region and --component choose tetrahedra; {name} is a surface"
+            );
+            let vertices = surface.vertices.iter().map(|x| place(*x)).collect();
+            let mut surface = SurfaceMesh { vertices, triangles: surface.triangles };
+            // What mirrors turns triangles inside out.
+            if is_mirror(turn) {
+                surface.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+            }
+            write_surface(&surface, &ending)?
+        }
+        Found::Tets(mesh, _) => {
+            let mesh = chosen(&name, &mesh, region, *component)?;
+            let vertices = mesh.vertices().iter().map(|x| place(*x)).collect();
+            // What mirrors is rewound there.
+            let (mesh, _) = TetMesh::new(vertices, mesh.tets().to_vec(), mesh.regions().to_vec())?;
+            match is_surface {
+                true => write_surface(&boundary_surface(&mesh).surface, &ending)?,
+                false => write_tets(&mesh, &ending)?,
+            }
+        }
+    };
+    files::write_atomic(out, &bytes)
+}
+
+/// Which axis each coordinate comes from, and its sign.
+fn turn_of(text: &str) -> Result<[(usize, f64); 3]> {
+    let wrong =
+        || format!("--axes: write x, y and z once each, such as \"x,z,-y\"; found \"{text}\"");
+    let mut turn = [(0, 1.0); 3];
+    let words: Vec<&str> = text.split([',', ' ']).filter(|word| !word.is_empty()).collect();
+    ensure!(words.len() == 3, wrong());
+    for (place, word) in turn.iter_mut().zip(words) {
+        let (sign, axis) = match word.strip_prefix('-') {
+            Some(axis) => (-1.0, axis),
+            None => (1.0, word.strip_prefix('+').unwrap_or(word)),
+        };
+        let axis = ["x", "y", "z"].iter().position(|known| axis.eq_ignore_ascii_case(known));
+        *place = (axis.with_context(wrong)?, sign);
+    }
+    ensure!((0..3).all(|axis| turn.iter().any(|(from, _)| *from == axis)), wrong());
+    Ok(turn)
+}
+
+fn is_mirror(turn: [(usize, f64); 3]) -> bool {
+    let axes = turn.map(|(axis, _)| axis);
+    let is_even = matches!(axes, [0, 1, 2] | [1, 2, 0] | [2, 0, 1]);
+    let signs: f64 = turn.iter().map(|(_, sign)| sign).product();
+    is_even == (signs < 0.0)
+}
+
+/// The tetrahedra of some regions, and of one part.
+fn chosen(
+    name: &str,
+    mesh: &TetMesh,
+    regions: &[u32],
+    component: Option<usize>,
+) -> Result<TetMesh> {
+    for region in regions {
+        ensure!(
+            mesh.regions().contains(region),
+            "{name}: no tetrahedron has the label {region}; `viscera mesh inspect` lists them"
+        );
+    }
+    let parts = connected_components(mesh);
+    if let Some(number) = component {
+        ensure!(
+            number < parts.count,
+            "{name}: there is no component {number}; it has {}, counting from 0",
+            parts.count
+        );
+    }
+    let is_kept = |tet: usize| {
+        let part = parts.labels[mesh.tets()[tet][0] as usize] as usize;
+        (regions.is_empty() || regions.contains(&mesh.regions()[tet]))
+            && component.is_none_or(|number| number == part)
+    };
+    let kept: Vec<usize> = (0..mesh.tets().len()).filter(|&tet| is_kept(tet)).collect();
+    ensure!(!kept.is_empty(), "{name}: nothing is left; take other labels or another component");
+    let tets = kept.iter().map(|&tet| mesh.tets()[tet]).collect();
+    let regions = kept.iter().map(|&tet| mesh.regions()[tet]).collect();
+    Ok(TetMesh::new(mesh.vertices().to_vec(), tets, regions)?.0)
+}
+
+fn ending_of(path: &Path) -> Result<String> {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+    ending.with_context(|| format!("{}: the ending says which format to write", path.display()))
+}
+
+fn write_tets(mesh: &TetMesh, ending: &str) -> Result<Vec<u8>> {
+    if ending == "msh" {
+        return Ok(gmsh::write(mesh).into_bytes());
+    }
+    let regions = vtu::Array::integers("region", mesh.regions());
+    Ok(vtu::write(mesh.vertices(), mesh.tets(), &[], &[regions])?)
+}
+
+fn write_surface(surface: &SurfaceMesh, ending: &str) -> Result<Vec<u8>> {
+    Ok(match ending {
+        "stl" => stl::write(surface),
+        "ply" => ply::write(surface),
+        _ => obj::write(surface, None)?.into_bytes(),
+    })
 }

@@ -172,9 +172,9 @@ fn of_scan(
     // Patients lie on their backs, and the frame's y is to the front.
     let down = vec3(0.0, -1.0, 0.0);
     notes.push("the patient lies on the back: gravity is along -y".into());
-    let (parts, touching, more) = of_labels(file, map, options, down, observe)?;
-    notes.extend(more);
-    Ok(Import { file: file.into(), parts, touching, down, notes })
+    let mut import = of_labels(file, map, options, down, observe)?;
+    notes.append(&mut import.notes);
+    Ok(Import { notes, ..import })
 }
 
 fn scaled(mesh: &TetMesh, unit: f64) -> TetMesh {

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use viscera::mesh::tetrahedralize::{surface, tetrahedralize};
+use viscera::mesh::tetrahedralize::{surface, tetrahedralize, tetrahedralize_to};
 use viscera::mesh::winding::Solid;
 use viscera::mesh::{SurfaceMesh, TetMesh, boundary_surface};
 use viscera::scalar::{Vec3, vec3};
 use viscera_volume::{LabelMap, Organ, OrganReport, Wall, summarize};
 
 use crate::ImportError;
-use crate::bodies::{Inner, Options, Part, Touching, name_of};
+use crate::bodies::{Import, Inner, Options, Part, Touching, name_of};
 use crate::hold::{Hold, at_the_back};
 use crate::tissue::{self, Kind};
 
@@ -18,6 +18,9 @@ const ENCLOSED: f64 = 0.8;
 
 /// Organs are tied where this share of the smaller one's surface touches the other.
 const TIED: f64 = 0.1;
+
+/// A lattice has vertices inside of a wall everywhere where it is so many edges thick.
+const RESOLVED: f64 = 1.3;
 
 /// And need no other hold from this share on.
 const HANGS: f64 = 0.3;
@@ -42,7 +45,7 @@ pub fn of_labels(
     options: &Options,
     down: Vec3<f64>,
     observe: &mut dyn FnMut(&str),
-) -> Result<(Vec<Part>, Vec<Touching>, Vec<String>), ImportError> {
+) -> Result<Import, ImportError> {
     let mut notes = Vec::new();
     let chosen = choose(file, map, options, &mut notes)?;
     let hosts = hosts(map, &chosen);
@@ -74,7 +77,7 @@ pub fn of_labels(
         // A gallbladder hangs on its liver.
         parts[touching.from].holds.clear();
     }
-    Ok((parts, touching, notes))
+    Ok(Import { file: file.into(), parts, touching, down, notes })
 }
 
 /// Labels and their names.
@@ -192,13 +195,22 @@ fn build(
     let voxel = map.to_world().voxel_volume().cbrt();
     let mut notes = Vec::new();
     let skin = surface(organ, voxel.max(spacing / 8.0)).map_err(fail)?;
-    let mut spacing = spacing.min(COARSEST * report.volume.cbrt());
+    let spacing = spacing.min(COARSEST * report.volume.cbrt());
+    let mut wall_share = None;
     let wall = plan.kind.wall().filter(|wall| 2.5 * wall < report.volume.cbrt());
     let solid = wall.and_then(|_| Solid::new(&skin).ok());
     let made = match (wall, &solid) {
-        (Some(thickness), Some(skin)) if is_hollow => {
-            spacing = spacing.min(1.5 * thickness);
-            notes.push(format!("a wall of {:.1} mm around a cavity", 1e3 * thickness));
+        (Some(thin), Some(skin)) if is_hollow => {
+            let thickness = thin.max(RESOLVED * spacing);
+            let text = format!("{:.1} mm", 1e3 * thickness);
+            notes.push(match thickness > thin {
+                true => format!(
+                    "a wall of {text} around a cavity, as stiff along it as one of {:.1} mm: edges are too long for that",
+                    1e3 * thin
+                ),
+                false => format!("a wall of {text} around a cavity"),
+            });
+            wall_share = Some(thin / thickness);
             tetrahedralize(&Wall { organ, skin, thickness }, spacing)
         }
         (Some(thickness), _) => {
@@ -206,9 +218,9 @@ fn build(
             notes.push(format!(
                 "filled, as the scan shows it; --hollow leaves a wall of {text:.1} mm"
             ));
-            tetrahedralize(organ, spacing)
+            tetrahedralize_to(|by| organ.offset(by), spacing, report.volume)
         }
-        _ => tetrahedralize(organ, spacing),
+        _ => tetrahedralize_to(|by| organ.offset(by), spacing, report.volume),
     };
     let (mesh, made) = made.map_err(fail)?;
     if report.crumbs[0] > 0 {
@@ -227,7 +239,10 @@ fn build(
     }
     holds.push(at_the_back(&name, mesh.vertices(), down, "back"));
     let filled = wall.filter(|_| !is_hollow).map(|wall| (wall, report.volume));
-    let tissue = tissue::of_filled(&plan.name, filled);
+    let mut tissue = tissue::of_filled(&plan.name, filled);
+    if let Some(share) = wall_share {
+        tissue.soften(share);
+    }
     Ok(Part { name, mesh, skin: Some(skin), tissue, inner, holds, notes })
 }
 

@@ -1,7 +1,7 @@
 //! What a name is made of.
 
 use viscera::material::preset;
-use viscera_volume::tissue::{Kind as ClassKind, tissue_of};
+use viscera_volume::tissue::{ClassTissue, Kind as ClassKind, tissue_of};
 
 /// What a body is made of.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,6 +12,14 @@ pub struct Tissue {
     pub young: Option<f64>,
     /// Why it is a guess, or what to know.
     pub note: String,
+}
+
+impl Tissue {
+    /// A share of the stiffness.
+    pub fn soften(&mut self, share: f64) {
+        let young = self.preset.and_then(|name| preset(name).ok()).map(|preset| preset.young);
+        self.young = self.young.or(young).map(|young| young * share);
+    }
 }
 
 /// What a label is.
@@ -42,9 +50,15 @@ impl Kind {
     }
 }
 
+/// The class of a name, or of one of its words: `liver_surface` is of a liver.
+fn find(name: &str) -> Option<&'static ClassTissue> {
+    let words = || name.split(|c: char| !c.is_alphanumeric()).filter(|word| word.len() > 2);
+    tissue_of(name).or_else(|| words().find_map(tissue_of))
+}
+
 /// What a label of this name is.
 pub fn kind_of(name: &str) -> Kind {
-    match tissue_of(name).map(|class| class.kind) {
+    match find(name).map(|class| class.kind) {
         Some(ClassKind::Soft(_)) => Kind::Soft,
         Some(ClassKind::Hollow { wall, .. }) => Kind::Hollow(wall),
         Some(_) => Kind::Other,
@@ -54,7 +68,7 @@ pub fn kind_of(name: &str) -> Kind {
 
 /// What a body of this name is made of.
 pub fn of_name(name: &str) -> Tissue {
-    let class = tissue_of(name);
+    let class = find(name);
     let known = class.and_then(|class| Some((class, class.preset()?)));
     // A preset may have the name itself: "fat".
     match known.map(|(class, preset)| (preset, class.note)).or(preset(name).ok().map(|p| (p, ""))) {

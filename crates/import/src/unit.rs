@@ -89,7 +89,7 @@ fn two_digits(value: f64) -> f64 {
 }
 
 fn short(value: f64) -> String {
-    if value >= 1e4 || value < 1e-2 { format!("{value:.1e}") } else { format!("{value:.2}") }
+    if (1e-2..1e4).contains(&value) { format!("{value:.2}") } else { format!("{value:.1e}") }
 }
 
 fn litres_text(litres: f64) -> String {

@@ -141,6 +141,11 @@ impl Organ {
         Ok((organ, report))
     }
 
+    /// The same organ whose surface lies so much [m] further out, by less than a voxel; caps stay where they are.
+    pub fn offset(&self, by: f64) -> Offset<'_> {
+        Offset { organ: self, by }
+    }
+
     /// Edges of a voxel [m].
     pub fn voxel_size(&self) -> [f64; 3] {
         self.to_world.voxel_size()
@@ -220,16 +225,41 @@ impl Organ {
     }
 }
 
-impl SignedDistance for Organ {
+/// See [`Organ::offset`].
+#[derive(Clone, Copy, Debug)]
+pub struct Offset<'a> {
+    organ: &'a Organ,
+    by: f64,
+}
+
+impl SignedDistance for Offset<'_> {
     fn distance(&self, point: Vec3<f64>) -> f64 {
+        self.organ.distance_from(point, self.by)
+    }
+
+    fn bounds(&self) -> (Vec3<f64>, Vec3<f64>) {
+        self.organ.bounds()
+    }
+}
+
+impl Organ {
+    /// To the surface that lies so much [m] further out.
+    fn distance_from(&self, point: Vec3<f64>, out: f64) -> f64 {
         let voxel = self.to_voxel(point);
-        let mut distance = (self.level - self.blurred_at(self.to_box(voxel))) * self.scale;
+        let level = (self.level - out / self.scale).clamp(0.01, 0.99);
+        let mut distance = (level - self.blurred_at(self.to_box(voxel))) * self.scale;
         // The image ends half a voxel beyond the middles of its last voxels.
         for axis in 0..3 {
             let beyond = (-0.5 - voxel[axis]).max(voxel[axis] - (self.image[axis] - 0.5));
             distance = distance.max(beyond / self.normals[axis].length());
         }
         distance
+    }
+}
+
+impl SignedDistance for Organ {
+    fn distance(&self, point: Vec3<f64>) -> f64 {
+        self.distance_from(point, 0.0)
     }
 
     fn bounds(&self) -> (Vec3<f64>, Vec3<f64>) {

@@ -40,6 +40,26 @@ impl<T: SignedDistance + ?Sized> SignedDistance for Box<T> {
     }
 }
 
+/// A shape whose surface lies so much further out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Offset<A> {
+    /// The shape.
+    pub shape: A,
+    /// How much [m]; inwards below zero.
+    pub by: f64,
+}
+
+impl<A: SignedDistance> SignedDistance for Offset<A> {
+    fn distance(&self, point: Vec3<f64>) -> f64 {
+        self.shape.distance(point) - self.by
+    }
+    fn bounds(&self) -> (Vec3<f64>, Vec3<f64>) {
+        let (lower, upper) = self.shape.bounds();
+        let more = Vec3::splat(self.by.max(0.0));
+        (lower - more, upper + more)
+    }
+}
+
 /// A ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {

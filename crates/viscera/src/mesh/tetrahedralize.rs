@@ -21,7 +21,7 @@ pub(super) mod error;
 use super::distance::SignedDistance;
 use super::lattice::{Corner, Lattice, Sign};
 use super::topology::{TET_FACES, connected_components, count_open_edges};
-use super::{SurfaceMesh, TetMesh};
+use super::{SurfaceMesh, TetMesh, boundary_surface};
 use crate::scalar::Vec3;
 pub use error::{MAX_LATTICE_VERTICES, TetrahedralizeError};
 
@@ -69,6 +69,37 @@ pub fn tetrahedralize(
     let (mesh, _) = TetMesh::new(filling.vertices, filling.tets, regions)?;
     report.components = connected_components(&mesh).count;
     Ok((mesh, report))
+}
+
+/// How far from a volume [`tetrahedralize_to`] stops, and after how many fillings.
+const NEAR_ENOUGH: f64 = 2e-3;
+const MOST_FILLINGS: usize = 5;
+
+/// Fills a shape so that the tetrahedra have a volume [m^3]: on their own they lie below a convex surface, the more the
+/// coarser they are. `shape` is the shape whose surface lies so much [m] further out, of which some tenths of the
+/// spacing are asked for; vertices of the boundary lie on that. As near as it comes where the volume is not reached.
+pub fn tetrahedralize_to<Shape: SignedDistance>(
+    shape: impl Fn(f64) -> Shape,
+    spacing: f64,
+    volume: f64,
+) -> Result<(TetMesh, TetrahedralizeReport), TetrahedralizeError> {
+    let mut out = 0.0;
+    let mut best = tetrahedralize(&shape(out), spacing)?;
+    let off = |mesh: &TetMesh| (mesh.volume() / volume - 1.0).abs();
+    for _ in 1..MOST_FILLINGS {
+        if off(&best.0) <= NEAR_ENOUGH {
+            break;
+        }
+        // A layer as thick as that over all of the boundary has what is missing.
+        let area = boundary_surface(&best.0).surface.area();
+        out += (volume - best.0.volume()) / area;
+        let next = tetrahedralize(&shape(out), spacing)?;
+        if off(&next.0) >= off(&best.0) {
+            break;
+        }
+        best = next;
+    }
+    Ok(best)
 }
 
 /// A closed triangle surface of a shape: the boundary of its tetrahedra, every vertex on the zero

@@ -11,9 +11,12 @@
 //! from Van Oosterom and Strackee, 1983. Across a hole the surface goes where the number is one half.
 
 use super::corners::BoundingBox;
-use super::distance::SignedDistance;
+use super::distance::{Offset, SignedDistance};
 use super::nearest::nearest_weights;
-use super::tetrahedralize::{TetrahedralizeError, TetrahedralizeReport, tetrahedralize};
+use super::tetrahedralize::{
+    TetrahedralizeError, TetrahedralizeReport, tetrahedralize, tetrahedralize_to,
+};
+use super::topology::count_open_edges;
 use super::{SurfaceMesh, TetMesh, boundary_surface, check_vertex};
 use crate::scalar::{Vec3, vec3};
 
@@ -242,10 +245,17 @@ pub struct Filled {
     pub invented: f64,
 }
 
-/// Fills a surface with tetrahedra whose longest edges are `spacing` [m] long, see [`tetrahedralize`].
+/// Fills a surface with tetrahedra whose longest edges are `spacing` [m] long, see [`tetrahedralize`]. Of a closed surface they
+/// have the volume.
 pub fn fill(surface: &SurfaceMesh, spacing: f64) -> Result<Filled, FillError> {
     let solid = Solid::new(surface)?;
-    let (mesh, report) = tetrahedralize(&solid, spacing).map_err(|error| match error {
+    let volume = surface.enclosed_volume().abs();
+    let made = if count_open_edges(surface) == 0 && volume > 0.0 {
+        tetrahedralize_to(|by| Offset { shape: &solid, by }, spacing, volume)
+    } else {
+        tetrahedralize(&solid, spacing)
+    };
+    let (mesh, report) = made.map_err(|error| match error {
         TetrahedralizeError::Empty => NoInside::Open { highest: solid.highest_winding() }.into(),
         other => FillError::from(other),
     })?;
@@ -271,7 +281,6 @@ mod tests {
     use super::*;
     use crate::mesh::distance::Sphere;
     use crate::mesh::tetrahedralize::surface;
-    use crate::mesh::topology::count_open_edges;
     use crate::scalar::vec3;
 
     fn ball() -> SurfaceMesh {

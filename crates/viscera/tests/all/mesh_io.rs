@@ -266,8 +266,8 @@ fn variants_that_are_not_read_say_how_to_convert() {
         let error = read(name, text).unwrap_err().to_string();
         assert!(error.starts_with(name) && error.contains(advice), "{error}");
     }
-    let error = read_tet_mesh("a.msh.gz", b"\x1f\x8b\x08\0", 1.0).unwrap_err();
-    assert!(error.to_string().contains("unpack"), "{error}");
+    let error = read_tet_mesh("a.msh.gz", b"\x1f\x8b\x08\0", 1.0).unwrap_err().to_string();
+    assert!(error.contains("unpack"), "{error}");
 }
 
 #[test]
@@ -435,19 +435,6 @@ fn arrays_that_do_not_fit_are_not_written() {
     assert!(matches!(error, WriteError::IndexOutOfRange { point: 9, .. }), "{error}");
     let surface = sample_surface();
     assert!(obj::write(&surface, Some(&[])).is_err());
-}
-
-#[test]
-fn obj_round_trip_is_exact() {
-    let mut surface = sample_surface();
-    for vertex in &mut surface.vertices {
-        *vertex = *vertex * (1.0 / 3.0);
-    }
-    let normals = vec![vec3(0.0, 0.0, 1.0); surface.vertices.len()];
-    for normals in [None, Some(&normals[..])] {
-        let text = obj::write(&surface, normals).unwrap();
-        assert_eq!(read_surface("b.obj", text.as_bytes(), 1.0).unwrap().0, surface);
-    }
 }
 
 #[test]

@@ -105,14 +105,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
                 if vertices.is_some() {
                     return Err(reader.fault(ReadProblem::SecondPart { what: section }));
                 }
-                let mut list = Vec::new();
-                for _ in 0..reader.count(&section)? {
-                    let mut coordinate = || reader.parse::<f64>("a coordinate", "Vertices");
-                    list.push(vec3(coordinate()?, coordinate()?, coordinate()?));
-                    of_vertices.push(Place::Line(reader.lines.number()));
-                    reader.parse::<i64>("a reference", "Vertices")?;
-                }
-                vertices = Some(list);
+                vertices = Some(read_vertices(&mut reader, &mut of_vertices)?);
             }
             _ if section.starts_with(|c: char| c.is_ascii_alphabetic()) => {
                 let Some((shape, count)) = cells_of(&section) else {
@@ -120,15 +113,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
                     continue;
                 };
                 for _ in 0..reader.count(&section)? {
-                    let mut nodes = [0; 10];
-                    for node in &mut nodes[..count] {
-                        let number: u32 = reader.parse("a vertex number, 1 or more", &section)?;
-                        *node = number.checked_sub(1).ok_or_else(|| {
-                            reader.fault(bad_word("a vertex number, 1 or more", b"0"))
-                        })?;
-                    }
-                    let place = Place::Line(reader.lines.number());
-                    let reference: i64 = reader.parse("a reference", &section)?;
+                    let (nodes, reference, place) = read_cell(&mut reader, count, &section)?;
                     let nodes = &nodes[..count];
                     let is_solid = !matches!(shape, Shape::Line | Shape::Triangle | Shape::Quad);
                     if !is_solid && reference != 0 {
@@ -169,6 +154,34 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
     });
     let format = Format::Medit;
     Ok(Content { format, vertices, cells, patches, region_names: Vec::new(), places })
+}
+
+/// `x y z reference`.
+fn read_vertices(reader: &mut Reader, places: &mut Vec<Place>) -> Result<Vec<Vec3<f64>>, Fault> {
+    let mut list = Vec::new();
+    for _ in 0..reader.count("Vertices")? {
+        let mut coordinate = || reader.parse::<f64>("a coordinate", "Vertices");
+        list.push(vec3(coordinate()?, coordinate()?, coordinate()?));
+        places.push(Place::Line(reader.lines.number()));
+        reader.parse::<i64>("a reference", "Vertices")?;
+    }
+    Ok(list)
+}
+
+/// So many vertices, counting from 0, and a reference.
+fn read_cell(
+    reader: &mut Reader,
+    count: usize,
+    section: &str,
+) -> Result<([u32; 10], i64, Place), Fault> {
+    let expected = "a vertex number, 1 or more";
+    let mut nodes = [0; 10];
+    for node in &mut nodes[..count] {
+        let number: u32 = reader.parse(expected, section)?;
+        *node = number.checked_sub(1).ok_or_else(|| reader.fault(bad_word(expected, b"0")))?;
+    }
+    let place = Place::Line(reader.lines.number());
+    Ok((nodes, reader.parse("a reference", section)?, place))
 }
 
 /// Entries of other sections: all numbers up to the next word.

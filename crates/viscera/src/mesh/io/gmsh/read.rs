@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use super::elements::Elements;
 use super::kinds::kind_of;
 use super::numbers::{Coding, Numbers};
 use crate::mesh::MeshPlace;
-use crate::mesh::io::cells::{Cells, Shape};
+use crate::mesh::io::cells::Shape;
 use crate::mesh::io::content::Content;
-use crate::mesh::io::error::{Fault, Place, ReadProblem};
+use crate::mesh::io::error::{Fault, ReadProblem};
 use crate::mesh::io::lines::{Line, bad_word, shorten};
 use crate::mesh::io::numbered::Vertices;
 use crate::mesh::io::parsed::{Format, Patch};
@@ -39,20 +40,6 @@ struct File<'a> {
     names: BTreeMap<(u64, u64), String>,
     /// The first physical group of an entity, by dimension and tag.
     groups: BTreeMap<(u64, i64), u64>,
-}
-
-/// Elements as listed in the file.
-#[derive(Default)]
-struct Elements {
-    cells: Vec<(Shape, u64)>,
-    /// Where the nodes of each element begin, and those of the last end.
-    first: Vec<usize>,
-    nodes: Vec<u64>,
-    /// Physical groups, and numbers in the file.
-    groups: Vec<u64>,
-    places: Vec<Place>,
-    /// Elements of unknown types.
-    unknown: Cells,
 }
 
 pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
@@ -484,40 +471,5 @@ impl Numbers<'_> {
             return Ok(());
         }
         Err(self.fault(ReadProblem::CountMismatch { what: what.into(), claimed, found }))
-    }
-}
-
-impl Elements {
-    /// Adds an element whose nodes come next, as four bytes in binary files if so.
-    fn add(
-        &mut self,
-        numbers: &mut Numbers<'_>,
-        (place, number, kind, group): (Place, u64, u64, u64),
-        is_short: bool,
-    ) -> Result<(), Fault> {
-        let Some(of_kind) = kind_of(kind) else {
-            if numbers.is_binary() {
-                let found = format!("an element of type {kind} in a binary Gmsh file");
-                let advice =
-                    "its size is not known here; export the file as text, or without such elements";
-                return Err(Fault {
-                    place: Some(place),
-                    problem: ReadProblem::Unsupported { found, advice },
-                });
-            }
-            self.unknown.skip(&format!("element of type {kind}"));
-            return Ok(());
-        };
-        self.first.push(self.nodes.len());
-        for _ in 0..of_kind.nodes {
-            let expected = "a vertex number, 1 or more";
-            let node =
-                if is_short { numbers.natural(expected)? } else { numbers.size(expected)? };
-            self.nodes.push(node);
-        }
-        self.cells.push((of_kind.shape, number));
-        self.groups.push(group);
-        self.places.push(place);
-        Ok(())
     }
 }

@@ -5,15 +5,10 @@ use std::borrow::Cow;
 use roxmltree::Node;
 
 use super::codec::Codec;
+use super::xml::fault_at;
 
-use crate::mesh::io::error::{Fault, Place, ReadProblem};
+use crate::mesh::io::error::{Fault, Place};
 use crate::mesh::io::lines::{bad_word, parse_word};
-
-/// A fault at the line where an XML element begins.
-pub(super) fn fault_at(node: Node, problem: ReadProblem) -> Fault {
-    let position = node.document().text_pos_at(node.range().start);
-    Fault::at(position.row as usize, problem)
-}
 
 /// A number of a mesh.
 pub(super) trait Number: std::str::FromStr {

@@ -15,7 +15,7 @@ use base64::engine::general_purpose::STANDARD;
 use flate2::read::ZlibDecoder;
 use roxmltree::Node;
 
-use super::arrays::fault_at;
+use super::xml::fault_at;
 use crate::mesh::io::error::{Fault, ReadProblem};
 use crate::mesh::io::lines::{bad_word, parse_word};
 

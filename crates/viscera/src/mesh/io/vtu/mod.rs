@@ -5,6 +5,7 @@ mod arrays;
 mod codec;
 mod read;
 mod write;
+mod xml;
 
 pub(super) use read::read;
 pub use write::{Array, Grid, write, write_surface};

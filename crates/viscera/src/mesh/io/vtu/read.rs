@@ -5,8 +5,9 @@ use std::borrow::Cow;
 
 use roxmltree::{Document, Node};
 
-use super::arrays::{DataArray, fault_at};
+use super::arrays::DataArray;
 use super::codec::Codec;
+use super::xml::fault_at;
 use crate::mesh::MeshPlace;
 use crate::mesh::io::cells::Cells;
 use crate::mesh::io::content::Content;

@@ -1,0 +1,62 @@
+//! Real anatomy, where it is there.
+
+use std::path::PathBuf;
+
+use viscera::mesh::quality::dihedral_angles;
+use viscera_import::{Import, Options, open, parts};
+use viscera_volume::summarize;
+
+fn data(name: &str) -> Option<Vec<u8>> {
+    let Some(folder) = std::env::var_os("VISCERA_DATA").map(PathBuf::from) else {
+        println!("skipped: VISCERA_DATA is not set");
+        return None;
+    };
+    Some(std::fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}")))
+}
+
+fn import(name: &str, bytes: &[u8], options: &Options) -> Import {
+    let found = open(name, |_| Ok(bytes.to_vec())).unwrap_or_else(|error| panic!("{error}"));
+    parts(name, found, options, &mut |_| ()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn an_abdomen_keeps_its_organs_volumes() {
+    const FILE: &str = "abdomen_labels.nii.gz";
+    let Some(bytes) = data(FILE) else { return };
+    let organs = ["liver", "gallbladder", "stomach", "kidney_left", "kidney_right", "spleen"];
+    let labels = organs.map(str::to_owned).to_vec();
+    let made = import(FILE, &bytes, &Options { labels, ..Options::default() });
+    let (map, _) = viscera_volume::read(FILE, &bytes, Default::default()).expect("a map");
+    let all = summarize(&map);
+    assert_eq!(made.parts.len(), 6);
+    for part in &made.parts {
+        let label = all.iter().find(|label| label.name.as_deref() == Some(part.name.as_str()));
+        let millilitres = label.expect("a label").milliliters;
+        let skin = part.skin.as_ref().expect("a surface").enclosed_volume();
+        for volume in [1e6 * part.mesh.volume(), 1e6 * skin] {
+            assert!(
+                (volume / millilitres - 1.0).abs() < 0.02,
+                "{}: {volume} of {millilitres}",
+                part.name
+            );
+        }
+        let angles =
+            (0..part.mesh.tets().len()).flat_map(|t| dihedral_angles(part.mesh.corners(t)));
+        let least = angles.fold(f64::INFINITY, f64::min).to_degrees();
+        assert!(least > 10.7, "{}: {least}", part.name);
+    }
+    // The gallbladder hangs on the liver.
+    let gallbladder = made.parts.iter().position(|part| part.name == "gallbladder");
+    let hangs = made.touching.iter().find(|touching| Some(touching.from) == gallbladder);
+    assert_eq!(hangs.map(|touching| made.parts[touching.to].name.as_str()), Some("liver"));
+}
+
+#[test]
+fn a_surface_from_elsewhere_is_filled() {
+    let Some(bytes) = data("liver_surface.obj") else { return };
+    let made = import("liver_surface.obj", &bytes, &Options::default());
+    let part = &made.parts[0];
+    assert_eq!(part.tissue.preset, Some("liver"));
+    let ratio = part.mesh.volume() / part.skin.as_ref().expect("a surface").enclosed_volume();
+    assert!((ratio - 1.0).abs() < 0.005, "{ratio}");
+}

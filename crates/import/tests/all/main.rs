@@ -1,0 +1,5 @@
+//! From files to scenes.
+
+mod anatomy;
+mod scans;
+mod surfaces;

@@ -1,0 +1,163 @@
+//! Segmented scans as scenes.
+
+use std::collections::BTreeMap;
+
+use viscera::mesh::topology::connected_components;
+use viscera::mesh::{TetMesh, quality::summarize_quality};
+use viscera::scalar::{Mat3, Vec3, vec3};
+use viscera::scene::Scene;
+use viscera::simulation::Assembly;
+use viscera_import::{Fineness, Found, Import, Options, open, parts};
+use viscera_volume::{Affine, LabelMap};
+
+/// Voxels of 3 mm; two balls side by side, a lump in the first, a bone, and a crumb.
+fn map() -> LabelMap {
+    let dims = [40, 30, 30];
+    let to_world = Affine {
+        matrix: Mat3::from_columns(
+            vec3(3e-3, 0.0, 0.0),
+            vec3(0.0, 3e-3, 0.0),
+            vec3(0.0, 0.0, 3e-3),
+        ),
+        translation: Vec3::ZERO,
+    };
+    let mut labels = Vec::new();
+    for z in 0..30 {
+        for y in 0..30 {
+            for x in 0..40 {
+                let at = vec3(f64::from(x), f64::from(y), f64::from(z)) * 3e-3;
+                let near = |c: [f64; 3], r: f64| (at - vec3(c[0], c[1], c[2])).length() < r;
+                labels.push(match () {
+                    () if near([0.036, 0.042, 0.045], 0.008) => 9,
+                    () if near([0.036, 0.042, 0.045], 0.026) => 5,
+                    () if near([0.086, 0.042, 0.045], 0.024) => 1,
+                    () if x > 36 && y > 26 => 30,
+                    _ => 0,
+                });
+            }
+        }
+    }
+    let names = [(5, "liver"), (9, "liver_tumor"), (1, "spleen"), (30, "rib_left_1")];
+    let names: BTreeMap<u16, String> = names.map(|(l, name)| (l, name.to_owned())).into();
+    LabelMap::new(dims, labels, to_world, names).expect("a map")
+}
+
+fn report() -> viscera_volume::VolumeReport {
+    let text =
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1 1 1\nencoding: text\nspacings: 1 1 1\n\n1";
+    viscera_volume::read("a.nrrd", text.as_bytes(), viscera_volume::Limits::default())
+        .expect("a map")
+        .1
+}
+
+fn made(options: &Options) -> Import {
+    let found = Found::Labels(map(), report());
+    parts("scan.nii.gz", found, options, &mut |_| ()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn coarse() -> Options {
+    Options { fineness: Fineness::Edge(0.009), ..Options::default() }
+}
+
+fn volume_of(mesh: &TetMesh, region: u32) -> f64 {
+    let of = (0..mesh.tets().len()).filter(|&tet| mesh.regions()[tet] == region);
+    of.map(|tet| viscera::mesh::tet_volume(mesh.corners(tet))).sum()
+}
+
+#[test]
+fn soft_organs_become_bodies_with_their_volume() {
+    let import = made(&coarse());
+    let names: Vec<&str> = import.parts.iter().map(|part| part.name.as_str()).collect();
+    assert_eq!(names, ["spleen", "liver"], "bone is none, and the lump is a part of the liver");
+    let voxels = |labels: &[u16]| {
+        map().labels().iter().filter(|label| labels.contains(label)).count() as f64 * 27e-9
+    };
+    for (part, labels) in import.parts.iter().zip([&[1][..], &[5, 9]]) {
+        let ratio = part.mesh.volume() / voxels(labels);
+        assert!((ratio - 1.0).abs() < 0.01, "{}: {ratio}", part.name);
+        let skin = part.skin.as_ref().expect("a surface");
+        let ratio = skin.enclosed_volume() / voxels(labels);
+        assert!((ratio - 1.0).abs() < 0.02, "{}: {ratio}", part.name);
+        assert_eq!(connected_components(&part.mesh).count, 1);
+        assert!(summarize_quality(&part.mesh).min_dihedral.to_degrees() > 10.7);
+    }
+    let liver = &import.parts[1];
+    assert_eq!(liver.inner.len(), 1);
+    assert_eq!((liver.inner[0].region, liver.inner[0].name.as_str()), (9, "liver_tumor"));
+    // By the middles of tetrahedra: to a share of an edge over the lump's radius.
+    let lump = volume_of(&liver.mesh, 9) / voxels(&[9]);
+    assert!((0.6..1.5).contains(&lump), "{lump}");
+    assert!(import.notes.iter().any(|note| note.contains("rib_left_1")), "{:?}", import.notes);
+}
+
+#[test]
+fn a_written_scene_is_read_and_comes_to_rest() {
+    let written = made(&coarse()).scene("a \"scan\"\n");
+    let file = |name: &str| {
+        let found = written.files.iter().find(|(known, _)| known == name);
+        found.map(|(_, bytes)| bytes.clone()).ok_or_else(|| format!("no {name}"))
+    };
+    let text = String::from_utf8(file("scene.toml").expect("a scene")).expect("text");
+    for part in ["# left out, choose by --labels: rib_left_1", "preset = \"liver\"", "label = 9"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let scene = Scene::parse("scene.toml", &text, &[]).unwrap_or_else(|e| panic!("{e}\n{text}"));
+    assert_eq!(scene.title, "a scan");
+    let assembly = Assembly::new(&scene, &mut |name| file(name));
+    let assembly = assembly.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(assembly.bodies.len(), 2);
+    assert!(assembly.bodies.iter().all(|body| body.has_fine_surface));
+    // Downwards is to the patient's back.
+    assert!(scene.world.gravity.y < -9.8 && scene.world.gravity.z == 0.0);
+}
+
+#[test]
+fn labels_are_chosen_by_name_or_number() {
+    let choose = |labels: &[&str]| {
+        let labels = labels.iter().map(|&label| label.to_owned()).collect();
+        let found = Found::Labels(map(), report());
+        parts("scan.nii.gz", found, &Options { labels, ..coarse() }, &mut |_| ())
+    };
+    let names = |import: Import| -> Vec<String> {
+        import.parts.into_iter().map(|part| part.name).collect()
+    };
+    assert_eq!(names(choose(&["Liver", "9"]).expect("both")), ["liver"]);
+    assert_eq!(names(choose(&["30"]).expect("bone, if one wants")), ["rib_left_1"]);
+    let error = choose(&["kidney"]).map(names).expect_err("no kidney").to_string();
+    assert!(error.contains("no label `kidney`") && error.contains("5 liver"), "{error}");
+}
+
+#[test]
+fn hollow_organs_get_a_wall() {
+    let mut map = map();
+    let names = [(5, "stomach"), (1, "spleen")].map(|(label, name)| (label, name.to_owned()));
+    map.set_names(names.into());
+    let make = |hollow: bool| {
+        let labels = vec!["stomach".to_owned(), "9".to_owned()];
+        let fineness = Fineness::Edge(0.003);
+        let options = Options { labels, hollow, fineness, ..coarse() };
+        let found = Found::Labels(map.clone(), report());
+        let mut import = parts("scan.nrrd", found, &options, &mut |_| ()).expect("a stomach");
+        import.parts.remove(0)
+    };
+    let (filled, hollow) = (make(false), make(true));
+    // Edges of 3 mm resolve a wall of 3.9 mm around a ball of 26 mm.
+    let ball = |radius: f64| 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
+    let ratio = hollow.mesh.volume() / (ball(0.026) - ball(0.0221));
+    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+    assert!((filled.mesh.volume() / ball(0.026) - 1.0).abs() < 0.02);
+    // Along the wall it is as stiff as one of 2 mm; what is filled has the share of it that the wall is.
+    let wall =
+        viscera::material::preset(filled.tissue.preset.expect("known")).expect("known").young;
+    let young = |part: &viscera_import::Part| part.tissue.young.expect("a share") / wall;
+    assert!((young(&hollow) - 2.0 / 3.9).abs() < 1e-3);
+    assert!((young(&filled) - (1.0 - ball(0.024) / ball(0.026))).abs() < 0.01);
+}
+
+#[test]
+fn what_is_no_mesh_and_no_scan_is_told() {
+    let error = open("a.nii.gz", |_| Ok(b"\x1f\x8b\x08\0".to_vec())).err().expect("cut short");
+    assert!(error.to_string().starts_with("a.nii.gz"), "{error}");
+    let error = open("a.stl", |_| Err("a.stl: there is no such file".into())).err().expect("none");
+    assert_eq!(error.to_string(), "a.stl: there is no such file");
+}

@@ -1,0 +1,94 @@
+//! Meshes and surfaces as scenes.
+
+use viscera::mesh::distance::{SignedDistance, Sphere};
+use viscera::mesh::io::{gmsh, obj};
+use viscera::mesh::tetrahedralize::{surface, tetrahedralize};
+use viscera::mesh::topology::count_open_edges;
+use viscera::mesh::{SurfaceMesh, boundary_surface};
+use viscera::scalar::{Vec3, vec3};
+use viscera_import::{Import, Options, open, parts};
+
+const RADIUS: f64 = 50.0;
+
+/// A torus, by its distance: the tube's middle is a circle of 40 mm, the tube has 15 mm.
+struct Torus;
+
+impl SignedDistance for Torus {
+    fn distance(&self, x: Vec3<f64>) -> f64 {
+        let out = (x.x * x.x + x.y * x.y).sqrt() - 40.0;
+        (out * out + x.z * x.z).sqrt() - 15.0
+    }
+    fn bounds(&self) -> (Vec3<f64>, Vec3<f64>) {
+        (vec3(-55.0, -55.0, -15.0), vec3(55.0, 55.0, 15.0))
+    }
+}
+
+fn import(name: &str, bytes: Vec<u8>, options: &Options) -> Import {
+    let found = open(name, |_| Ok(bytes.clone())).unwrap_or_else(|error| panic!("{error}"));
+    parts(name, found, options, &mut |_| ()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn file(surface: &SurfaceMesh) -> Vec<u8> {
+    obj::write(surface, None).expect("a surface").into_bytes()
+}
+
+/// Without one triangle of twenty.
+fn holed(mut surface: SurfaceMesh) -> SurfaceMesh {
+    let mut number = 0u32;
+    surface.triangles.retain(|_| {
+        number += 1;
+        (f64::from(number) * 0.618034) % 1.0 > 0.05
+    });
+    surface
+}
+
+#[test]
+fn surfaces_with_holes_are_closed_with_their_volume() {
+    let ball = Sphere { center: Vec3::ZERO, radius: RADIUS };
+    let pi = std::f64::consts::PI;
+    let shapes: [(&dyn SignedDistance, f64); 2] =
+        [(&ball, 4.0 / 3.0 * pi * RADIUS.powi(3)), (&Torus, 2.0 * pi * pi * 40.0 * 15.0 * 15.0)];
+    for (shape, volume) in shapes {
+        let whole = surface(shape, 4.0).expect("a surface");
+        for part in [whole.clone(), holed(whole)] {
+            let is_holed = count_open_edges(&part) > 0;
+            let made = import("part.obj", file(&part), &Options::default());
+            let body = &made.parts[0];
+            let ratio = body.mesh.volume() / (volume * 1e-9);
+            assert!((ratio - 1.0).abs() < 0.02, "{ratio}, holes: {is_holed}");
+            assert_eq!(count_open_edges(&boundary_surface(&body.mesh).surface), 0);
+            assert!(made.notes[0].contains("1 mm"), "{:?}", made.notes);
+        }
+    }
+}
+
+#[test]
+fn a_mesh_is_scaled_as_its_name_and_size_suggest() {
+    let ball = Sphere { center: Vec3::ZERO, radius: 2.0 };
+    let (mesh, _) = tetrahedralize(&ball, 0.5).expect("a ball");
+    let made = import("my liver.msh", gmsh::write(&mesh).into_bytes(), &Options::default());
+    let body = &made.parts[0];
+    assert_eq!(body.name, "my_liver");
+    assert_eq!(body.tissue.preset, Some("liver"));
+    // An adult's, to the two digits of the unit: 3 times 1.5 %.
+    assert!((body.mesh.volume() / 1.5e-3 - 1.0).abs() < 0.05, "{}", body.mesh.volume());
+    assert!(made.notes[0].contains("no liver"), "{:?}", made.notes);
+    let unit = Some(0.03);
+    let made = import(
+        "my liver.msh",
+        gmsh::write(&mesh).into_bytes(),
+        &Options { unit, ..Options::default() },
+    );
+    assert!((made.parts[0].mesh.volume() / mesh.volume() / 0.03f64.powi(3) - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn an_open_sheet_is_refused() {
+    let sheet = SurfaceMesh {
+        vertices: vec![vec3(0.0, 0.0, 0.0), vec3(90.0, 0.0, 0.0), vec3(0.0, 90.0, 0.0)],
+        triangles: vec![[0, 1, 2]],
+    };
+    let found = open("sheet.obj", |_| Ok(file(&sheet))).expect("a surface");
+    let error = parts("sheet.obj", found, &Options::default(), &mut |_| ()).err().expect("open");
+    assert!(error.to_string().starts_with("sheet.obj: "), "{error}");
+}
