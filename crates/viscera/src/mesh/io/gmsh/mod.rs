@@ -7,6 +7,7 @@
 mod kinds;
 mod numbers;
 mod read;
+mod records;
 mod write;
 
 pub(super) use read::read;
