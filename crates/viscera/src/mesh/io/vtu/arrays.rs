@@ -15,6 +15,38 @@ pub(super) fn fault_at(node: Node, problem: ReadProblem) -> Fault {
     Fault::at(position.row as usize, problem)
 }
 
+/// Finds lines of a text without going through all of it each time.
+pub(super) struct LineIndex<'a> {
+    text: &'a [u8],
+    /// Line ends before each stretch of so many bytes.
+    before: Vec<usize>,
+}
+
+impl<'a> LineIndex<'a> {
+    const STRETCH: usize = 4096;
+
+    pub fn new(text: &'a [u8]) -> Self {
+        let mut count = 0;
+        let before = text.chunks(Self::STRETCH).map(|stretch| {
+            let before = count;
+            count += line_ends(stretch);
+            before
+        });
+        Self { before: before.collect(), text }
+    }
+
+    /// The line, counting from 1, in which a byte stands.
+    pub fn line_at(&self, byte: usize) -> usize {
+        let stretch = byte / Self::STRETCH;
+        let rest = self.text.get(stretch * Self::STRETCH..byte).unwrap_or_default();
+        1 + self.before.get(stretch).copied().unwrap_or(0) + line_ends(rest)
+    }
+}
+
+fn line_ends(bytes: &[u8]) -> usize {
+    bytes.iter().filter(|&&byte| byte == b'\n').count()
+}
+
 /// A number of a mesh.
 pub(super) trait Number: std::str::FromStr {
     /// Nothing where it has to be whole.
@@ -52,6 +84,13 @@ pub(super) struct DataArray<'a, 'input> {
     /// Its bytes, where it is not text.
     bytes: Option<Cow<'a, [u8]>>,
     is_big_endian: bool,
+    lines: &'a LineIndex<'a>,
+}
+
+/// Whether numbers of an array are whole by their type.
+pub(super) fn is_whole(node: Node) -> bool {
+    let kind = node.attribute("type").unwrap_or_default();
+    kind.starts_with("Int") || kind.starts_with("UInt")
 }
 
 impl<'a, 'input> DataArray<'a, 'input> {
@@ -65,13 +104,7 @@ impl<'a, 'input> DataArray<'a, 'input> {
                 return Err(fault_at(node, bad_word(expected, other.as_bytes())));
             }
         };
-        Ok(Self { node, bytes, is_big_endian: codec.is_big_endian })
-    }
-
-    /// Whether its numbers are whole by their type.
-    pub fn is_whole(&self) -> bool {
-        let kind = self.node.attribute("type").unwrap_or_default();
-        kind.starts_with("Int") || kind.starts_with("UInt")
+        Ok(Self { node, bytes, is_big_endian: codec.is_big_endian, lines: codec.lines })
     }
 
     /// The words and the pieces of text they stand in; comments may split the text.
@@ -113,7 +146,12 @@ impl<'a, 'input> DataArray<'a, 'input> {
                     };
                     T::$make($wide::from(value)).ok_or_else(|| refused(&value))
                 };
-                words.iter().map(number).collect()
+                // A collection of results has no length to begin with.
+                let mut numbers = Vec::with_capacity(words.len());
+                for word in words {
+                    numbers.push(number(word)?);
+                }
+                Ok(numbers)
             }};
         }
         match self.node.attribute("type").unwrap_or_default() {
@@ -151,8 +189,8 @@ impl<'a, 'input> DataArray<'a, 'input> {
             }
             let text = node.text().unwrap_or_default().as_bytes();
             if piece != Some(node.id()) {
-                let start = node.document().text_pos_at(node.range().start);
-                (piece, counted, line) = (Some(node.id()), 0, start.row as usize);
+                let start = self.lines.line_at(node.range().start);
+                (piece, counted, line) = (Some(node.id()), 0, start);
             }
             let before = (word.as_ptr() as usize).saturating_sub(text.as_ptr() as usize);
             let passed = text.get(counted..before).unwrap_or_default();
