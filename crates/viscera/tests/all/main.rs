@@ -41,6 +41,8 @@ mod measures;
 mod mesh;
 mod mesh_damage;
 mod mesh_formats;
+mod mesh_fuzz;
+mod mesh_hostile;
 mod mesh_io;
 mod mesh_tools;
 mod parts;

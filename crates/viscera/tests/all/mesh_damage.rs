@@ -3,7 +3,7 @@
 
 use proptest::prelude::*;
 use viscera::mesh::TetMesh;
-use viscera::mesh::io::{gmsh, obj, read_surface, read_tet_mesh, vtu};
+use viscera::mesh::io::{MeshFile, Patch, gmsh, obj, read_surface, read_tet_mesh, vtu};
 use viscera::mesh::{SurfaceMesh, boundary_surface};
 use viscera::scalar::vec3;
 
@@ -119,6 +119,123 @@ fn growing_xml_entities_are_refused() {
     }
     text.push_str("]><VTKFile type=\"UnstructuredGrid\">&e11;</VTKFile>");
     assert!(read_tet_mesh("bomb.vtu", text.as_bytes(), 1.0).is_err());
+}
+
+fn error_of(name: &str, text: &str) -> String {
+    let read = read_tet_mesh(name, text.as_bytes(), 1.0);
+    read.map(|(_, report)| report).expect_err(name).to_string()
+}
+
+/// Four letters are three bytes, and none of them are none: a reader once waited for the end of such a group.
+#[test]
+fn base64_that_goes_on_with_its_end_is_an_error() {
+    let text = "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"1\">\
+        <Points><DataArray type=\"Float32\" format=\"binary\">AAAA=</DataArray></Points></Piece>\
+        </UnstructuredGrid></VTKFile>";
+    let error = error_of("a.vtu", text);
+    assert!(error.starts_with("a.vtu, line 1: expected data in Base64"), "{error}");
+}
+
+const ABAQUS: &str = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n5, 1, 1, 1\n\
+    *ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n2, 2, 3, 4, 5\n*ELEMENT, TYPE=T3D2\n3, 1, 2\n4, 2, 3\n";
+
+#[test]
+fn abaqus_sets_take_no_more_members_than_the_file_has_room_for() {
+    for set in [
+        "*NSET, NSET=a, GENERATE\n0, 18446744073709551615\n",
+        "*ELSET, ELSET=a, GENERATE\n1, 4000000000, 2\n",
+        &format!(
+            "*ELSET, ELSET=a\n1\n{}",
+            "*ELSET, ELSET=b\na, a\n*ELSET, ELSET=a\nb, b\n".repeat(40)
+        ),
+    ] {
+        let error = error_of("a.inp", &format!("{ABAQUS}{set}"));
+        assert!(error.contains("more members than it has room for"), "{error}");
+    }
+}
+
+/// As files of programs have them: ranges over elements that are no solids, sets of sets, and one that names itself.
+#[test]
+fn abaqus_sets_name_ranges_and_other_sets() {
+    let sets = "*ELSET, ELSET=all, GENERATE\n1, 4, 1\n*NSET, NSET=odd, GENERATE\n1, 5, 2\n\
+        *NSET, NSET=more\nodd, 2\n*NSET, NSET=more\nmore\n*NSET, NSET=none, GENERATE\n5, 1\n";
+    let text = format!("{ABAQUS}{sets}");
+    let (mesh, report) = read_tet_mesh("a.inp", text.as_bytes(), 1.0).unwrap();
+    assert_eq!(mesh.regions(), [1, 1]);
+    assert_eq!(report.region_names, [(1, "all".to_owned())]);
+    let patch =
+        |name: &str, vertices: &[u32]| Patch { name: name.into(), vertices: vertices.into() };
+    assert_eq!(report.patches, [patch("more", &[0, 1, 2, 4]), patch("odd", &[0, 2, 4])]);
+}
+
+#[test]
+fn patch_of_vertices_that_are_not_there_is_an_error() {
+    let text = "MeshVersionFormatted 2\nDimension 3\nVertices 4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n\
+        Tetrahedra 1\n1 2 3 4 0\nEdges 1\n1 9 7\nEnd\n";
+    let error = error_of("a.mesh", text);
+    assert_eq!(error, "a.mesh: `curve 7` refers to vertex 9; the file has 4; export all vertices");
+}
+
+const VTK: &str = "# vtk DataFile Version 3.0\n\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n\
+    0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
+
+#[test]
+fn values_of_other_points_than_there_are_are_an_error() {
+    let error = error_of("a.vtk", &format!("{VTK}POINT_DATA 5\nSCALARS a int\n1 1 1 1 1\n"));
+    let says = "a.vtk, line 11: values at points: 5 are announced, 4 are there";
+    assert!(error.starts_with(says), "{error}");
+}
+
+#[test]
+fn sets_of_the_same_name_are_one() {
+    let sets = "POINT_DATA 4\nSCALARS a int\n0 0 1 0\nSCALARS a int\n1 0 1 0\n";
+    let report = read_tet_mesh("a.vtk", format!("{VTK}{sets}").as_bytes(), 1.0).unwrap().1;
+    assert_eq!(report.patches, [Patch { name: "a".into(), vertices: vec![0, 2] }]);
+}
+
+/// They are printed to terminals, which take these for orders.
+#[test]
+fn names_and_errors_have_no_control_characters() {
+    let name = "a\u{1b}[2J\u{9b}1A\u{202e}";
+    let text = gmsh::write(&chain());
+    let names = format!("$PhysicalNames\n1\n3 1 \"{name}\"\n$EndPhysicalNames\n$Nodes");
+    let text = text.replacen("$Nodes", &names, 1);
+    let report = read_tet_mesh("a.msh", text.as_bytes(), 1.0).unwrap().1;
+    assert_eq!(report.region_names, [(1, "a?[2J?1A?".to_owned())]);
+    let sets = format!("{ABAQUS}*NSET, NSET={name}\n1\n");
+    let report = read_tet_mesh("a.inp", sets.as_bytes(), 1.0).unwrap().1;
+    assert_eq!(report.patches[0].name, "a?[2J?1A?");
+    let error = error_of("a.vtu", "<VTKFile type=\"a&#x9b;&#10;\"/>");
+    assert!(error.contains("of type `a??`"), "{error}");
+    let error = error_of("a.vtu", "<VTKFile \u{9b}/>");
+    assert!(!error.contains(char::is_control), "{error}");
+}
+
+#[test]
+fn gmsh_says_once_how_its_numbers_stand() {
+    let head = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
+    let error = error_of("a.msh", &format!("{head}{}", gmsh::write(&chain())));
+    assert!(error.starts_with("a.msh, line 4: a second $MeshFormat"), "{error}");
+}
+
+#[test]
+fn faults_of_two_files_name_the_one_they_are_in() {
+    let nodes = "4 3 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n";
+    let elements = "1 4 0\n1 1 2 3 4\n";
+    let read = |name: &str, nodes: &str, elements: &str| {
+        let both = [nodes.as_bytes().to_vec(), elements.as_bytes().to_vec()];
+        let [bytes, beside] =
+            if name == "a.ele" { [both[1].clone(), both[0].clone()] } else { both };
+        let file = MeshFile { name: name.into(), bytes, beside: Some(beside) };
+        file.tets(1.0).map(|(mesh, _)| mesh.tets().len()).map_err(|error| error.to_string())
+    };
+    for name in ["a.node", "a.ele"] {
+        assert_eq!(read(name, nodes, elements), Ok(1));
+        let error = read(name, &nodes.replace("2 1 0 0", "2 1 x 0"), elements).unwrap_err();
+        assert!(error.starts_with("a.node, line 3: "), "{error}");
+        let error = read(name, nodes, &elements.replace("3 4", "3 5")).unwrap_err();
+        assert!(error.starts_with("a.ele, line 2: "), "{error}");
+    }
 }
 
 /// Reads bytes under every name; all that counts is that the calls return.

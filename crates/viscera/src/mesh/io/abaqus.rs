@@ -1,7 +1,8 @@
 //! Abaqus input (`.inp`): nodes, elements, sets; "Abaqus Keywords Reference Guide". Element sets of solids are regions, node sets
 //! are patches. Materials, steps and loads are passed over.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use super::cells::{Cells, Shape};
 use super::content::Content;
@@ -12,20 +13,43 @@ use super::parsed::{Format, Patch};
 use crate::mesh::MeshPlace;
 use crate::scalar::vec3;
 
-/// An element as listed.
+/// An element as listed; its nodes are a range of those of all.
 struct Element {
     number: u64,
     shape: Shape,
-    nodes: Vec<u64>,
+    nodes: Range<usize>,
     line: usize,
 }
 
-/// What the data lines below a keyword are.
+/// Sets of nodes or of elements, in the order in which they begin.
+#[derive(Default)]
+struct Sets {
+    list: Vec<(String, Vec<u64>)>,
+    by_name: BTreeMap<String, usize>,
+}
+
+impl Sets {
+    /// The place in the list of a set, which is begun where there is none.
+    fn open(&mut self, name: String) -> usize {
+        let next = self.list.len();
+        let at = *self.by_name.entry(name.clone()).or_insert(next);
+        if at == next {
+            self.list.push((name, Vec::new()));
+        }
+        at
+    }
+
+    fn add(&mut self, set: usize, member: u64) {
+        self.list[set].1.push(member);
+    }
+}
+
+/// What the data lines below a keyword are; sets by their place in the list.
 enum Block {
-    Nodes { set: Option<String> },
-    Elements { kind: Option<(Shape, usize)>, set: Option<String> },
-    NodeSet { name: String, is_range: bool },
-    ElementSet { name: String, is_range: bool },
+    Nodes { set: Option<usize> },
+    Elements { kind: Option<(Shape, usize)>, set: Option<usize> },
+    NodeSet { set: usize, is_range: bool },
+    ElementSet { set: usize, is_range: bool },
     Instance,
     Other,
 }
@@ -34,10 +58,14 @@ enum Block {
 struct File {
     vertices: Vertices,
     elements: Vec<Element>,
+    nodes: Vec<u64>,
     skipped: Cells,
-    node_sets: BTreeMap<String, Vec<u64>>,
-    element_sets: Vec<(String, Vec<u64>)>,
+    node_sets: Sets,
+    element_sets: Sets,
     instances: usize,
+    /// How many more members sets may take from ranges and from other sets: lines that double a set each, or a range up to
+    /// the largest number, ask for any amount of memory.
+    room: usize,
 }
 
 /// A parameter of a keyword's line, upper-case names before `=`.
@@ -85,13 +113,17 @@ fn block_of(line: Line, file: &mut File) -> Result<Block, Fault> {
     };
     let is_range = parameter(line, "GENERATE").is_some();
     Ok(match keyword.to_ascii_uppercase().as_slice() {
-        b"*NODE" => Block::Nodes { set: parameter(line, "NSET") },
-        b"*ELEMENT" => {
-            let kind = need("TYPE")?;
-            Block::Elements { kind: shape_of(&kind), set: parameter(line, "ELSET") }
+        b"*NODE" => {
+            let set = parameter(line, "NSET").map(|name| file.node_sets.open(name));
+            Block::Nodes { set }
         }
-        b"*NSET" => Block::NodeSet { name: need("NSET")?, is_range },
-        b"*ELSET" => Block::ElementSet { name: need("ELSET")?, is_range },
+        b"*ELEMENT" => {
+            let kind = shape_of(&need("TYPE")?);
+            let set = parameter(line, "ELSET").map(|name| file.element_sets.open(name));
+            Block::Elements { kind, set }
+        }
+        b"*NSET" => Block::NodeSet { set: file.node_sets.open(need("NSET")?), is_range },
+        b"*ELSET" => Block::ElementSet { set: file.element_sets.open(need("ELSET")?), is_range },
         b"*INSTANCE" => {
             file.instances += 1;
             if file.instances > 1 {
@@ -112,7 +144,7 @@ fn block_of(line: Line, file: &mut File) -> Result<Block, Fault> {
 
 /// Reads a mesh.
 pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
-    let mut file = File::default();
+    let mut file = File { room: bytes.len() / 2, ..File::default() };
     let mut block = Block::Other;
     let mut pending: Option<Element> = None;
     for line in Lines::new(bytes).filter(|line| !line.text.starts_with(b"**")) {
@@ -134,7 +166,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
                 file.vertices.positions.push(vec3(x, y, z));
                 file.vertices.places.push(Place::Line(line.number));
                 if let Some(set) = set {
-                    file.node_sets.entry(set.clone()).or_default().push(number);
+                    file.node_sets.add(*set, number);
                 }
             }
             Block::Elements { kind: None, .. } => file.skipped.skip("element of another type"),
@@ -142,18 +174,21 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
                 let numbers = numbers::<u64>(line, "element and node numbers")?;
                 let element = match &mut pending {
                     Some(element) => {
-                        element.nodes.extend(&numbers);
+                        file.nodes.extend(&numbers);
                         element
                     }
                     None => {
                         let [number, nodes @ ..] = &numbers[..] else { continue };
                         if let Some(set) = set {
-                            file.element_set(set).push(*number);
+                            file.element_sets.add(*set, *number);
                         }
-                        let (nodes, shape) = (nodes.to_vec(), *shape);
-                        pending.insert(Element { number: *number, shape, nodes, line: line.number })
+                        let (start, line) = (file.nodes.len(), line.number);
+                        file.nodes.extend(nodes);
+                        let (number, shape) = (*number, *shape);
+                        pending.insert(Element { number, shape, nodes: start..start, line })
                     }
                 };
+                element.nodes.end = file.nodes.len();
                 // Elements go on in further lines until they have all nodes.
                 if element.nodes.len() == *count {
                     file.elements.extend(pending.take());
@@ -164,13 +199,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
                     return Err(line.fault(problem));
                 }
             }
-            Block::NodeSet { name, is_range } => {
-                let members = file.members(line, *is_range, true)?;
-                file.node_sets.entry(name.clone()).or_default().extend(members);
+            Block::NodeSet { set, is_range } => {
+                file.node_sets.read(line, (*set, *is_range), &mut file.room)?;
             }
-            Block::ElementSet { name, is_range } => {
-                let members = file.members(line, *is_range, false)?;
-                file.element_set(name).extend(members);
+            Block::ElementSet { set, is_range } => {
+                file.element_sets.read(line, (*set, *is_range), &mut file.room)?;
             }
             Block::Instance => {
                 let found = "an instance that is moved or turned".to_owned();
@@ -198,18 +231,23 @@ fn natural(line: Line, value: f64) -> Result<u64, Fault> {
     Err(line.fault(bad_word("a number of 0 or more", value.to_string().as_bytes())))
 }
 
-impl File {
-    fn element_set(&mut self, name: &str) -> &mut Vec<u64> {
-        let at = self.element_sets.iter().position(|(known, _)| known == name);
-        let at = at.unwrap_or_else(|| {
-            self.element_sets.push((name.to_owned(), Vec::new()));
-            self.element_sets.len() - 1
-        });
-        &mut self.element_sets[at].1
-    }
-
-    /// Members of a set in a line: numbers, names of other sets, or first, last and step.
-    fn members(&self, line: Line, is_range: bool, of_nodes: bool) -> Result<Vec<u64>, Fault> {
+impl Sets {
+    /// Adds the members that a line lists: numbers, names of other sets, or first, last and step.
+    fn read(
+        &mut self,
+        line: Line,
+        (set, is_range): (usize, bool),
+        room: &mut usize,
+    ) -> Result<(), Fault> {
+        let mut take = |count: u64| -> Result<(), Fault> {
+            let left = usize::try_from(count).ok().and_then(|count| room.checked_sub(count));
+            *room = left.ok_or_else(|| {
+                let found = "a file whose sets have more members than it has room for".to_owned();
+                let advice = "export it without sets of sets and without ranges (GENERATE)";
+                line.fault(ReadProblem::Unsupported { found, advice })
+            })?;
+            Ok(())
+        };
         if is_range {
             let numbers = numbers::<u64>(line, "first, last and step")?;
             let (first, last, step) = match numbers[..] {
@@ -217,40 +255,36 @@ impl File {
                 [first, last, step] if step > 0 => (first, last, step),
                 _ => return Err(line.fault(bad_word("first, last and step", line.text))),
             };
-            // No more than there are: a range is a line, whatever it claims.
-            let known = if of_nodes { self.vertices.numbers.len() } else { self.elements.len() };
-            let claimed = last.checked_sub(first).map_or(0, |span| span / step + 1);
-            if claimed > known as u64 {
-                let (what, bytes_left) = ("members of a set", line.text.len());
-                return Err(line.fault(ReadProblem::TooManyClaimed { what, claimed, bytes_left }));
-            }
-            return Ok((0..claimed).map(|index| first + index * step).collect());
+            let Some(steps) = last.checked_sub(first).map(|span| span / step) else {
+                return Ok(());
+            };
+            take(steps.saturating_add(1))?;
+            self.list[set].1.extend((0..=steps).map(|index| first + index * step));
+            return Ok(());
         }
         let text = line.text.strip_suffix(b",").unwrap_or(line.text);
-        let mut members = Vec::new();
         for word in text.split(|&byte| byte == b',').map(<[u8]>::trim_ascii) {
             if let Some(number) = parse_word(word) {
-                members.push(number);
+                self.list[set].1.push(number);
                 continue;
             }
-            let name = String::from_utf8_lossy(word);
-            let of_elements = self.element_sets.iter().find(|(known, _)| *known == name);
-            let set = if of_nodes {
-                self.node_sets.get(&*name)
-            } else {
-                of_elements.map(|(_, members)| members)
+            let Some(&other) = self.by_name.get(&*String::from_utf8_lossy(word)) else {
+                let expected = "a number, or the name of a set above";
+                return Err(line.fault(bad_word(expected, word)));
             };
-            match set {
-                Some(set) => members.extend(set),
-                None => {
-                    let expected = "a number, or the name of a set above";
-                    return Err(line.fault(bad_word(expected, word)));
-                }
+            // A set that names itself stays what it is.
+            if other != set {
+                take(self.list[other].1.len() as u64)?;
+                let members = std::mem::take(&mut self.list[other].1);
+                self.list[set].1.extend_from_slice(&members);
+                self.list[other].1 = members;
             }
         }
-        Ok(members)
+        Ok(())
     }
+}
 
+impl File {
     /// An element must have all its nodes where the next keyword comes.
     fn finish_element(&self, pending: &mut Option<Element>) -> Result<(), Fault> {
         let Some(element) = pending.take() else { return Ok(()) };
@@ -259,44 +293,57 @@ impl File {
         Err(Fault::at(element.line, ReadProblem::CountMismatch { what, claimed, found }))
     }
 
+    /// The region of each element: the first set that it is in, since sets of all elements come last in files; 0 without any.
+    fn regions(&self) -> Vec<u32> {
+        let mut regions = vec![0; self.elements.len()];
+        let numbers = self.elements.iter().zip(0u32..).map(|(element, at)| (element.number, at));
+        let mut numbers: Vec<(u64, u32)> = numbers.collect();
+        numbers.sort_unstable();
+        for ((_, members), region) in self.element_sets.list.iter().zip(1u32..) {
+            for &member in members {
+                let start = numbers.partition_point(|(number, _)| *number < member);
+                let same = numbers[start..].iter().take_while(|(number, _)| *number == member);
+                for &(_, element) in same {
+                    let own = &mut regions[element as usize];
+                    // All elements of one number have a region as soon as the first has.
+                    if *own != 0 {
+                        break;
+                    }
+                    *own = region;
+                }
+            }
+        }
+        regions
+    }
+
     fn finish<'a>(mut self) -> Result<Content<'a>, Fault> {
         self.vertices.number()?;
         if self.vertices.positions.is_empty() {
             return Err(Fault::whole_file(ReadProblem::Missing { what: "nodes (*NODE)".into() }));
         }
-        // The first set that an element is in says which region it is of; sets of all elements come last in files.
-        let mut region_of = BTreeMap::new();
-        let mut region_names = Vec::new();
-        for ((name, members), region) in self.element_sets.iter().zip(1u32..) {
-            region_names.push((region, name.clone()));
-            for member in members {
-                region_of.entry(*member).or_insert(region);
-            }
-        }
+        let regions = self.regions();
         let mut cells = self.skipped;
-        let mut lines = Vec::new();
-        let mut used = std::collections::BTreeSet::new();
-        for Element { number, shape, nodes, line } in &self.elements {
-            let mut indices = Vec::with_capacity(nodes.len());
-            for &node in nodes {
+        let (mut used, mut indices) = (BTreeSet::new(), Vec::new());
+        for (cell, (element, &region)) in self.elements.iter().zip(&regions).enumerate() {
+            indices.clear();
+            for &node in &self.nodes[element.nodes.clone()] {
                 indices.push(self.vertices.find(node).ok_or_else(|| {
-                    let element = format!("element {number}");
-                    self.vertices.unknown(element, node, Some(Place::Line(*line)))
+                    let name = format!("element {}", element.number);
+                    self.vertices.unknown(name, node, Some(Place::Line(element.line)))
                 })?);
             }
-            let region = region_of.get(number).copied().unwrap_or(0);
             used.insert(region);
-            cells.add(*shape, &indices, region, lines.len());
-            lines.push(*line);
+            cells.add(element.shape, &indices, region, cell);
         }
-        region_names.retain(|(region, _)| used.contains(region));
+        let lines: Vec<usize> = self.elements.iter().map(|element| element.line).collect();
+        let regions = self.element_sets.list.into_iter().zip(1u32..);
+        let region_names = regions.filter(|(_, region)| used.contains(region));
+        let region_names = region_names.map(|((name, _), region)| (region, name)).collect();
         let mut patches = Vec::new();
-        for (name, members) in self.node_sets {
-            let mut vertices: Vec<u32> =
-                members.iter().filter_map(|&number| self.vertices.find(number)).collect();
-            vertices.sort_unstable();
-            vertices.dedup();
-            patches.push(Patch { name, vertices });
+        for (name, set) in self.node_sets.by_name {
+            let members = std::mem::take(&mut self.node_sets.list[set].1);
+            let vertices = members.iter().filter_map(|&number| self.vertices.find(number));
+            patches.push(Patch { name, vertices: vertices.collect() });
         }
         let Vertices { positions, places: of_vertices, .. } = self.vertices;
         let places = Box::new(move |place| match place {

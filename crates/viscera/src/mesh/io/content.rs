@@ -1,7 +1,10 @@
 //! What a file holds, before it becomes tissue or a surface.
 
+use std::collections::BTreeMap;
+
 use super::cells::{Cells, Curved};
 use super::error::{Fault, Place, ReadProblem};
+use super::lines::name_of;
 use super::parsed::{CountedElements, Format, Patch, ReadReport};
 use crate::mesh::{
     MeshError, MeshPlace, MeshRepairs, SurfaceMesh, TetMesh, boundary_surface, check_vertex,
@@ -37,7 +40,7 @@ impl<'a> Content<'a> {
 
     /// The tetrahedra; positions are multiplied by the unit.
     pub fn into_tets(self, unit_in_meters: f64) -> Result<(TetMesh, ReadReport), Fault> {
-        let Self { format, mut vertices, cells, mut patches, region_names, places } = self;
+        let Self { format, mut vertices, cells, patches, region_names, places } = self;
         scale(&mut vertices, unit_in_meters);
         if cells.tets.is_empty() {
             return Err(no_tets(format, &cells));
@@ -49,6 +52,7 @@ impl<'a> Content<'a> {
             let entry = CountedElements { kind: "triangle".into(), count: triangles.len() };
             skipped.insert(0, entry);
         }
+        let vertex_count = vertices.len();
         let (mesh, repairs) = TetMesh::new(vertices, tets, regions).map_err(|error| {
             let place = match error.place() {
                 MeshPlace::Whole => None,
@@ -59,11 +63,9 @@ impl<'a> Content<'a> {
             };
             Fault { place, problem: ReadProblem::Mesh(error) }
         })?;
-        for patch in &mut patches {
-            patch.vertices =
-                patch.vertices.iter().filter_map(|&v| repairs.vertex_after(v)).collect();
-        }
-        patches.retain(|patch| !patch.vertices.is_empty());
+        let patches = patches_of_mesh(patches, &repairs, vertex_count)?;
+        let named = region_names.into_iter().map(|(region, name)| (region, name_of(&name)));
+        let region_names = named.collect();
         let format = Some(format);
         let curved = curved.len();
         let report =
@@ -112,6 +114,42 @@ impl<'a> Content<'a> {
     }
 }
 
+/// Patches by vertices of the mesh, those of the same name as one.
+fn patches_of_mesh(
+    patches: Vec<Patch>,
+    repairs: &MeshRepairs,
+    vertex_count: usize,
+) -> Result<Vec<Patch>, Fault> {
+    let mut merged: Vec<Patch> = Vec::new();
+    let mut index: BTreeMap<String, usize> = BTreeMap::new();
+    for Patch { name, mut vertices } in patches {
+        let name = name_of(&name);
+        if let Some(vertex) = vertices.iter().find(|vertex| **vertex as usize >= vertex_count) {
+            return Err(Fault::whole_file(ReadProblem::UnknownVertex {
+                element: format!("`{name}`"),
+                // Only numbers that count from 1 get here: other readers look for numbers, or compare counts.
+                vertex: (u64::from(*vertex) + 1).to_string(),
+                vertex_count,
+                numbers: None,
+            }));
+        }
+        match index.get(&name) {
+            Some(&at) => merged[at].vertices.append(&mut vertices),
+            None => {
+                index.insert(name.clone(), merged.len());
+                merged.push(Patch { name, vertices });
+            }
+        }
+    }
+    for patch in &mut merged {
+        patch.vertices = patch.vertices.iter().filter_map(|&v| repairs.vertex_after(v)).collect();
+        patch.vertices.sort_unstable();
+        patch.vertices.dedup();
+    }
+    merged.retain(|patch| !patch.vertices.is_empty());
+    Ok(merged)
+}
+
 fn scale(vertices: &mut [Vec3<f64>], unit_in_meters: f64) {
     vertices.iter_mut().for_each(|x| *x = *x * unit_in_meters);
 }
@@ -128,12 +166,14 @@ fn no_tets(format: Format, cells: &Cells) -> Fault {
 /// the middles of faces and of cells lie. Zero where edges are straight, whatever order the format has the nodes in.
 fn largest_bulge(vertices: &[Vec3<f64>], curved: &[Curved], nodes: &[u32]) -> f64 {
     let mut largest = 0.0f64;
+    let mut places: Vec<Vec3<f64>> = Vec::new();
     for &Curved { first, count, corners } in curved {
         let all = &nodes[first..first + count];
         let at = |node: &u32| vertices.get(*node as usize).copied();
         let (corners, middles) = all.split_at(corners);
+        places.clear();
+        places.extend(corners.iter().filter_map(at));
         for x in middles.iter().filter_map(at) {
-            let places: Vec<Vec3<f64>> = corners.iter().filter_map(at).collect();
             let mut nearest = f64::INFINITY;
             for (i, &a) in places.iter().enumerate() {
                 for &b in &places[..i] {

@@ -3,11 +3,12 @@
 use std::fmt;
 
 use super::parsed::Format;
+use super::printable::printable;
 use crate::mesh::{MeshError, MeshPlace};
 
 /// Why a file could not be read: which file, where in it, and what to do.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{file}{}: {problem}", PlaceSuffix(*place))]
+#[error("{file}{}: {}", PlaceSuffix(*place), Printable(problem))]
 pub struct ReadError {
     /// The name under which the bytes were given.
     pub file: String,
@@ -45,6 +46,15 @@ impl fmt::Display for PlaceSuffix {
             Some(Place::Byte(byte)) => write!(f, ", byte {byte}"),
             None => Ok(()),
         }
+    }
+}
+
+/// A problem on one line: it tells names and words of the file.
+struct Printable<'a>(&'a ReadProblem);
+
+impl fmt::Display for Printable<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&printable(&self.0.to_string()))
     }
 }
 

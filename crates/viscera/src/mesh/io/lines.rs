@@ -1,6 +1,7 @@
 //! Text as numbered lines of words, straight from bytes: comments may be in any encoding.
 
 use super::error::{Fault, ReadProblem};
+use super::printable::printable;
 
 /// Goes through a text line by line.
 #[derive(Clone)]
@@ -113,13 +114,18 @@ pub(super) fn bad_word(expected: &'static str, found: &[u8]) -> ReadProblem {
 
 /// Enough of a word to recognise it.
 pub(super) fn shorten(word: &[u8]) -> String {
-    const SHOWN: usize = 40;
-    let mut text = String::from_utf8_lossy(&word[..word.len().min(SHOWN)]).into_owned();
-    if word.len() > SHOWN {
-        text.push_str("...");
-    }
-    // Control characters could rewrite the terminal that shows the message.
-    text.replace(char::is_control, "?")
+    cut(word, 40)
+}
+
+/// A name of a file as it is shown, and found by: whole, but for damage.
+pub(super) fn name_of(text: &str) -> String {
+    cut(text.as_bytes(), 200)
+}
+
+/// So many bytes of a text, for one line of a terminal.
+fn cut(text: &[u8], shown: usize) -> String {
+    let start = String::from_utf8_lossy(&text[..text.len().min(shown)]);
+    printable(&start) + if text.len() > shown { "..." } else { "" }
 }
 
 /// True if the bytes hold a word somewhere.

@@ -14,6 +14,7 @@ mod numbered;
 pub mod obj;
 mod parsed;
 pub mod ply;
+mod printable;
 pub mod pvd;
 pub mod stl;
 mod tetgen;
@@ -122,7 +123,8 @@ fn read<T>(
     unit_in_meters: f64,
     make: impl FnOnce(Content) -> Result<T, Fault>,
 ) -> Result<T, ReadError> {
-    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    let bytes = without_mark(bytes);
+    let mut file = name.to_owned();
     check_unit(unit_in_meters)
         .and_then(|()| find_kind(name, bytes))
         .and_then(|kind| match kind {
@@ -135,16 +137,29 @@ fn read<T>(
             Kind::Stl => stl::read(bytes),
             Kind::Ply => ply::read(bytes),
             Kind::TetGen { is_nodes } => {
+                let name_of_other = beside(name).unwrap_or_default();
                 let other = other.ok_or_else(|| {
-                    let what = format!("mesh without {}", beside(name).unwrap_or_default());
+                    let what = format!("mesh without {name_of_other}");
                     Fault::whole_file(ReadProblem::Missing { what })
                 })?;
-                let (nodes, elements) = if is_nodes { (bytes, other) } else { (other, bytes) };
+                let mut both = [(name.to_owned(), bytes), (name_of_other, without_mark(other))];
+                if !is_nodes {
+                    both.reverse();
+                }
+                let [(name_of_nodes, nodes), (name_of_elements, elements)] = both;
+                file = name_of_nodes;
+                let nodes = tetgen::read_nodes(nodes)?;
+                file = name_of_elements;
                 tetgen::read(nodes, elements)
             }
         })
         .and_then(make)
-        .map_err(|Fault { place, problem }| ReadError { file: name.into(), place, problem })
+        .map_err(|Fault { place, problem }| ReadError { file, place, problem })
+}
+
+/// Some programs begin text with a mark of its encoding.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
 }
 
 fn check_unit(meters: f64) -> Result<(), Fault> {

@@ -80,9 +80,16 @@ pub struct CountedElements {
 impl CountedElements {
     /// Counts one more element; kinds keep the order in which they first come.
     pub(super) fn count(list: &mut Vec<Self>, kind: &str) {
-        match list.iter_mut().find(|counted| counted.kind == kind) {
-            Some(counted) => counted.count += 1,
-            None => list.push(Self { kind: kind.into(), count: 1 }),
+        // A damaged file may have as many kinds as elements; each is compared with all before it, and all are listed.
+        const MOST_KINDS: usize = 20;
+        let at = list.iter().position(|counted| counted.kind == kind);
+        match at.or((list.len() == MOST_KINDS).then_some(MOST_KINDS - 1)) {
+            Some(at) => list[at].count += 1,
+            None => {
+                let is_last = list.len() + 1 == MOST_KINDS;
+                let kind = if is_last { "element of other types" } else { kind };
+                list.push(Self { kind: kind.into(), count: 1 });
+            }
         }
     }
 

@@ -157,10 +157,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
     let (mut vertices, mut of_vertices) = (Vec::new(), Vec::new());
     let (mut cells, mut of_cells) = (Cells::default(), Vec::new());
     let mut list = Vec::new();
-    for element in &elements {
+    // Without properties an entry is no bytes, however many are announced.
+    for element in elements.iter().filter(|element| !element.properties.is_empty()) {
         let smallest: usize =
             element.properties.iter().map(|p| p.count.unwrap_or(p.kind).bytes()).sum();
-        let smallest = if coding == Coding::Text { 2 } else { smallest.max(1) };
+        let smallest = if coding == Coding::Text { 2 } else { smallest };
         let bytes_left = numbers.bytes_left();
         if element.count > (bytes_left / smallest + 1) as u64 {
             let (what, claimed) = ("entries", element.count);

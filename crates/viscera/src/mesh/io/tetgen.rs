@@ -47,10 +47,15 @@ pub(super) fn looks_like(name: &str) -> Option<&'static str> {
     }
 }
 
-/// Reads a mesh from both files; lines of faults are those of the `.ele`, whose name errors begin with.
-pub(super) fn read<'a>(nodes: &'a [u8], elements: &'a [u8]) -> Result<Content<'a>, Fault> {
-    let (mut vertices, patches) = read_nodes(nodes)?;
-    vertices.number()?;
+/// Vertices, and those that have a marker.
+pub(super) struct Nodes {
+    vertices: Vertices,
+    patches: Vec<Patch>,
+}
+
+/// Reads a mesh from both files; lines of faults are those of the `.ele`.
+pub(super) fn read(nodes: Nodes, elements: &[u8]) -> Result<Content<'_>, Fault> {
+    let Nodes { vertices, patches } = nodes;
     let (mut cells, mut lines) = (Cells::default(), Vec::new());
     let mut list = entries(elements);
     let head = list.next().ok_or_else(|| cut_short("the list of tetrahedra", 1))?;
@@ -103,8 +108,8 @@ pub(super) fn read<'a>(nodes: &'a [u8], elements: &'a [u8]) -> Result<Content<'a
     Ok(Content { format, vertices: positions, cells, patches, region_names, places })
 }
 
-/// `number x y z attributes marker`.
-fn read_nodes(bytes: &[u8]) -> Result<(Vertices, Vec<Patch>), Fault> {
+/// Reads the `.node`: `number x y z attributes marker`.
+pub(super) fn read_nodes(bytes: &[u8]) -> Result<Nodes, Fault> {
     let mut list = entries(bytes);
     let head = list.next().ok_or_else(|| cut_short("the list of vertices", 1))?;
     let mut words = head.words();
@@ -140,5 +145,6 @@ fn read_nodes(bytes: &[u8]) -> Result<(Vertices, Vec<Patch>), Fault> {
         return Err(cut_short("the list of vertices", last));
     }
     let patch = |(marker, vertices)| Patch { name: format!("marker {marker}"), vertices };
-    Ok((vertices, sets.into_iter().map(patch).collect()))
+    vertices.number()?;
+    Ok(Nodes { vertices, patches: sets.into_iter().map(patch).collect() })
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::cells::{Cells, Shape};
+use super::lines::name_of;
 use super::parsed::Patch;
 
 /// Cells of a grid in one list of corners.
@@ -149,7 +150,9 @@ pub(super) fn patches_of(name: &str, values: &[i64]) -> Vec<Patch> {
             }
         }
     }
+    // Which may be longer than all values.
+    let name = name_of(name);
     let is_one = sets.len() == 1 && sets.contains_key(&1);
-    let name_of = |value| if is_one { name.to_owned() } else { format!("{name} {value}") };
-    sets.into_iter().map(|(value, vertices)| Patch { name: name_of(value), vertices }).collect()
+    let own = |value| if is_one { name.clone() } else { format!("{name} {value}") };
+    sets.into_iter().map(|(value, vertices)| Patch { name: own(value), vertices }).collect()
 }

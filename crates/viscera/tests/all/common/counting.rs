@@ -10,6 +10,8 @@ thread_local! {
     static REQUESTS: Cell<usize> = const { Cell::new(0) };
     /// Bytes taken by this thread less those it gave back.
     static BYTES: Cell<isize> = const { Cell::new(0) };
+    /// The most of those at a time, since it was last set back.
+    static PEAK: Cell<isize> = const { Cell::new(0) };
 }
 
 /// Requests of all threads.
@@ -23,7 +25,10 @@ fn count(taken: usize, given_back: usize) {
     // While a thread ends its counters may be gone already; nothing is measured then.
     let _ = REQUESTS.try_with(|requests| requests.set(requests.get() + 1));
     let change = taken as isize - given_back as isize;
-    let _ = BYTES.try_with(|bytes| bytes.set(bytes.get() + change));
+    let _ = BYTES.try_with(|bytes| {
+        bytes.set(bytes.get() + change);
+        let _ = PEAK.try_with(|peak| peak.set(peak.get().max(bytes.get())));
+    });
 }
 
 // SAFETY: every call goes to the system's allocator unchanged; the counters are constant-initialised
@@ -68,4 +73,12 @@ pub fn bytes_of<T>(action: impl FnOnce() -> T) -> (T, usize) {
     let made = action();
     let kept = BYTES.with(Cell::get) - before;
     (made, usize::try_from(kept).expect("more was given back than taken"))
+}
+
+/// What `action` makes, and the most bytes that this thread holds for it at a time.
+pub fn peak_of<T>(action: impl FnOnce() -> T) -> (T, usize) {
+    let before = BYTES.with(Cell::get);
+    PEAK.with(|peak| peak.set(before));
+    let made = action();
+    (made, (PEAK.with(Cell::get) - before) as usize)
 }

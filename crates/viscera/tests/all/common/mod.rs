@@ -1,6 +1,7 @@
 //! Helpers shared by the integration tests.
 
 pub mod counting;
+pub mod damage;
 pub mod data;
 pub mod device;
 pub mod potential;

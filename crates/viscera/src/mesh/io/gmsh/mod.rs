@@ -4,10 +4,10 @@
 //! Vertex numbers may be any, in any order. The region of a cell is its first physical group, 0 without one; physical groups
 //! of points, curves and surfaces are patches.
 
-mod elements;
 mod kinds;
 mod numbers;
 mod read;
+mod records;
 mod write;
 
 pub(super) use read::read;

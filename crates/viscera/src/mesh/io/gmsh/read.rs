@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::elements::Elements;
 use super::kinds::kind_of;
 use super::numbers::{Coding, Numbers};
+use super::records::{Elements, SHORTEST_ELEMENT, SHORTEST_ENTITY, SHORTEST_VERTEX};
 use crate::mesh::MeshPlace;
 use crate::mesh::io::cells::Shape;
 use crate::mesh::io::content::Content;
@@ -12,13 +12,6 @@ use crate::mesh::io::error::{Fault, ReadProblem};
 use crate::mesh::io::lines::{Line, bad_word, shorten};
 use crate::mesh::io::numbered::Vertices;
 use crate::mesh::io::parsed::{Format, Patch};
-use crate::scalar::{Vec3, vec3};
-
-/// Bytes of the shortest entry of a vertex or of an element, in text and in binary files: bounds what a file can hold, so
-/// that no number in it can ask for more memory than its size warrants.
-const SHORTEST_VERTEX: [usize; 2] = [6, 24];
-const SHORTEST_ELEMENT: [usize; 2] = [4, 8];
-const SHORTEST_ENTITY: [usize; 2] = [2, 4];
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Version {
@@ -58,6 +51,10 @@ pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
         };
         file.numbers.enter(section);
         match section {
+            b"MeshFormat" if file.version.is_some() => {
+                let what = "$MeshFormat".to_owned();
+                return Err(line.fault(ReadProblem::SecondPart { what }));
+            }
             b"MeshFormat" => file.read_format(section)?,
             b"PhysicalNames" => file.read_names()?,
             b"Entities" if file.is_four() => file.read_entities()?,
@@ -404,72 +401,5 @@ impl<'a> File<'a> {
         };
         let places = Box::new(places);
         Ok(Content { format, vertices: vertices.positions, cells, patches, region_names, places })
-    }
-}
-
-/// The header of a block of version 4.
-struct Block {
-    dimension: u64,
-    tag: i64,
-    /// The type of elements, or whether vertices have parameters.
-    third: u64,
-    count: u64,
-}
-
-impl Numbers<'_> {
-    fn position(&mut self) -> Result<Vec3<f64>, Fault> {
-        let mut coordinate = || self.float("a coordinate");
-        Ok(vec3(coordinate()?, coordinate()?, coordinate()?))
-    }
-
-    /// The first of so many tags, the physical one; 0 without any.
-    fn first_tag(&mut self, tags: u64) -> Result<u64, Fault> {
-        let mut first = 0;
-        for tag in 0..tags {
-            if tag == 0 {
-                first = self.natural("a physical tag, 0 or more")?;
-            } else {
-                self.whole("a tag")?;
-            }
-        }
-        Ok(first)
-    }
-
-    /// Numbers of blocks and of entries.
-    fn block_header(
-        &mut self,
-        what: &'static str,
-        shortest: [usize; 2],
-        is_new: bool,
-    ) -> Result<[usize; 2], Fault> {
-        self.record()?;
-        let blocks = self.size("a number of blocks")?;
-        let count = self.size("a count")?;
-        if is_new {
-            self.size("the lowest number")?;
-            self.size("the highest number")?;
-        }
-        let blocks = self.check_count("blocks", blocks, SHORTEST_ENTITY)?;
-        Ok([blocks, self.check_count(what, count, shortest)?])
-    }
-
-    fn entity(&mut self, is_new: bool) -> Result<Block, Fault> {
-        self.record()?;
-        let first = self.whole("a dimension or a tag")?;
-        let second = self.whole("a dimension or a tag")?;
-        let (dimension, tag) = if is_new { (first, second) } else { (second, first) };
-        let dimension = u64::try_from(dimension).ok().filter(|dimension| *dimension <= 3);
-        let Some(dimension) = dimension else {
-            return Err(self.fault(bad_word("a dimension, 0 to 3", first.to_string().as_bytes())));
-        };
-        let third = self.natural("an element type, or whether there are parameters")?;
-        Ok(Block { dimension, tag, third, count: self.size("a count")? })
-    }
-
-    fn expect_count(&self, what: &str, claimed: usize, found: usize) -> Result<(), Fault> {
-        if claimed == found {
-            return Ok(());
-        }
-        Err(self.fault(ReadProblem::CountMismatch { what: what.into(), claimed, found }))
     }
 }

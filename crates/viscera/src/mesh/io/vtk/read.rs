@@ -116,8 +116,8 @@ impl<'a> File<'a> {
                     types.push(u64::try_from(kind).unwrap_or(u64::MAX));
                 })
             }
-            b"POINT_DATA" => self.own(words, Owner::Points),
-            b"CELL_DATA" => self.own(words, Owner::Cells),
+            b"POINT_DATA" => self.own(line, words, Owner::Points),
+            b"CELL_DATA" => self.own(line, words, Owner::Cells),
             b"SCALARS" => self.read_scalars(line, words),
             b"VECTORS" | b"NORMALS" => self.skip_values(line, words, 3),
             b"TENSORS" => self.skip_values(line, words, 9),
@@ -194,7 +194,7 @@ impl<'a> File<'a> {
                 if left == 0 {
                     left = natural.unwrap_or(0);
                     places.push(place);
-                    ends.push(corners.len() + left as usize);
+                    ends.push(corners.len().saturating_add(left as usize));
                     if natural.is_err() {
                         wrong = wrong.or(Some((place, size, value)));
                     }
@@ -250,9 +250,17 @@ impl<'a> File<'a> {
         }
     }
 
-    fn own(&mut self, mut words: Words, owner: Owner) -> Result<(), Fault> {
-        let claimed: u64 = words.parse("a count")?;
-        self.entries = self.numbers.check_count("entries", claimed, Kind::BYTE)?;
+    fn own(&mut self, line: Line, mut words: Words, owner: Owner) -> Result<(), Fault> {
+        let claimed: usize = words.parse("a count")?;
+        let (what, found) = match owner {
+            Owner::Points => ("values at points", self.vertices.len()),
+            _ => ("values of cells", self.lists.iter().map(|list| list.ends.len()).sum()),
+        };
+        if claimed != found {
+            let what = what.to_owned();
+            return Err(line.fault(ReadProblem::CountMismatch { what, claimed, found }));
+        }
+        self.entries = claimed;
         self.owner = owner;
         self.numbers.reading = "values at points or cells";
         Ok(())

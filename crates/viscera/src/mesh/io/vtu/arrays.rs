@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use roxmltree::Node;
 
 use super::codec::Codec;
-use super::xml::fault_at;
+use super::xml::{LineIndex, fault_at};
 
 use crate::mesh::io::error::{Fault, Place};
 use crate::mesh::io::lines::{bad_word, parse_word};
@@ -47,6 +47,13 @@ pub(super) struct DataArray<'a, 'input> {
     /// Its bytes, where it is not text.
     bytes: Option<Cow<'a, [u8]>>,
     is_big_endian: bool,
+    lines: &'a LineIndex<'a>,
+}
+
+/// Whether numbers of an array are whole by their type.
+pub(super) fn is_whole(node: Node) -> bool {
+    let kind = node.attribute("type").unwrap_or_default();
+    kind.starts_with("Int") || kind.starts_with("UInt")
 }
 
 impl<'a, 'input> DataArray<'a, 'input> {
@@ -60,13 +67,7 @@ impl<'a, 'input> DataArray<'a, 'input> {
                 return Err(fault_at(node, bad_word(expected, other.as_bytes())));
             }
         };
-        Ok(Self { node, bytes, is_big_endian: codec.is_big_endian })
-    }
-
-    /// Whether its numbers are whole by their type.
-    pub fn is_whole(&self) -> bool {
-        let kind = self.node.attribute("type").unwrap_or_default();
-        kind.starts_with("Int") || kind.starts_with("UInt")
+        Ok(Self { node, bytes, is_big_endian: codec.is_big_endian, lines: codec.lines })
     }
 
     /// The words and the pieces of text they stand in; comments may split the text.
@@ -108,7 +109,12 @@ impl<'a, 'input> DataArray<'a, 'input> {
                     };
                     T::$make($wide::from(value)).ok_or_else(|| refused(&value))
                 };
-                words.iter().map(number).collect()
+                // A collection of results has no length to begin with.
+                let mut numbers = Vec::with_capacity(words.len());
+                for word in words {
+                    numbers.push(number(word)?);
+                }
+                Ok(numbers)
             }};
         }
         match self.node.attribute("type").unwrap_or_default() {
@@ -146,8 +152,8 @@ impl<'a, 'input> DataArray<'a, 'input> {
             }
             let text = node.text().unwrap_or_default().as_bytes();
             if piece != Some(node.id()) {
-                let start = node.document().text_pos_at(node.range().start);
-                (piece, counted, line) = (Some(node.id()), 0, start.row as usize);
+                let start = self.lines.line_at(node.range().start);
+                (piece, counted, line) = (Some(node.id()), 0, start);
             }
             let before = (word.as_ptr() as usize).saturating_sub(text.as_ptr() as usize);
             let passed = text.get(counted..before).unwrap_or_default();

@@ -8,16 +8,17 @@
 //! In Base64 some programs encode the numbers in front and the data one by one, others together: `=` may stand in the middle.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::io::Read;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use flate2::read::ZlibDecoder;
-use roxmltree::Node;
+use flate2::bufread::ZlibDecoder;
+use roxmltree::{Document, Node};
 
-use super::xml::fault_at;
+use super::xml::{LineIndex, fault_at};
 use crate::mesh::io::error::{Fault, ReadProblem};
-use crate::mesh::io::lines::{bad_word, parse_word};
+use crate::mesh::io::lines::{bad_word, parse_word, shorten};
 
 /// What a file says of the bytes of its arrays.
 #[derive(Clone, Copy)]
@@ -26,12 +27,48 @@ pub(super) struct Codec<'a> {
     header: usize,
     pub is_big_endian: bool,
     is_compressed: bool,
-    /// From behind the underscore on, and whether they are Base64.
-    appended: Option<(&'a [u8], bool)>,
+    appended: Option<&'a Appended<'a>>,
+    pub lines: &'a LineIndex<'a>,
+}
+
+/// The bytes of all arrays behind the XML.
+pub(super) struct Appended<'a> {
+    /// From behind the underscore on.
+    bytes: &'a [u8],
+    is_base64: bool,
+    /// Where arrays begin, ascending.
+    offsets: Vec<usize>,
+    /// How many bytes may still be read: arrays that begin at the same byte would be read again and again.
+    room: Cell<usize>,
+}
+
+impl<'a> Appended<'a> {
+    pub fn new((bytes, is_base64): (&'a [u8], bool), document: &Document) -> Self {
+        let arrays = document.descendants().filter(|node| node.has_tag_name("DataArray"));
+        let offsets = arrays.filter_map(|array| array.attribute("offset")?.trim().parse().ok());
+        let mut offsets: Vec<usize> = offsets.collect();
+        offsets.sort_unstable();
+        // Some arrays may be read twice.
+        Self { bytes, is_base64, offsets, room: Cell::new(2 * bytes.len()) }
+    }
+
+    fn take(&self, node: Node, bytes: usize) -> Result<(), Fault> {
+        let Some(room) = self.room.get().checked_sub(bytes) else {
+            let found = "appended data that are shared by several arrays".to_owned();
+            let advice = "export the file again";
+            return Err(fault_at(node, ReadProblem::Unsupported { found, advice }));
+        };
+        self.room.set(room);
+        Ok(())
+    }
 }
 
 impl<'a> Codec<'a> {
-    pub fn of(root: Node, appended: Option<(&'a [u8], bool)>) -> Result<Self, Fault> {
+    pub fn of(
+        root: Node,
+        appended: Option<&'a Appended<'a>>,
+        lines: &'a LineIndex<'a>,
+    ) -> Result<Self, Fault> {
         let refuse =
             |found: String, advice| Err(fault_at(root, ReadProblem::Unsupported { found, advice }));
         let is_compressed = match root.attribute("compressor") {
@@ -40,6 +77,7 @@ impl<'a> Codec<'a> {
             Some(other) => {
                 let advice =
                     "in ParaView save it with \"Compressor Type\" set to \"None\" or \"ZLib\"";
+                let other = shorten(other.as_bytes());
                 return refuse(format!("VTK data compressed by `{other}`"), advice);
             }
         };
@@ -48,16 +86,17 @@ impl<'a> Codec<'a> {
             Some("UInt32") | None => 4,
             Some(other) => {
                 let advice = "known are UInt32 and UInt64; export the file again";
+                let other = shorten(other.as_bytes());
                 return refuse(format!("VTK data with a `header_type` of `{other}`"), advice);
             }
         };
         let is_big_endian = root.attribute("byte_order") == Some("BigEndian");
-        Ok(Self { header, is_big_endian, is_compressed, appended })
+        Ok(Self { header, is_big_endian, is_compressed, appended, lines })
     }
 
     /// The bytes of an array that stand behind the XML.
     pub fn appended(&self, node: Node<'_, '_>) -> Result<Cow<'a, [u8]>, Fault> {
-        let Some((bytes, is_base64)) = self.appended else {
+        let Some(appended) = self.appended else {
             let what = "element <AppendedData>".to_owned();
             return Err(fault_at(node, ReadProblem::Missing { what }));
         };
@@ -65,50 +104,61 @@ impl<'a> Codec<'a> {
         let Some(offset) = parse_word::<usize>(offset.trim().as_bytes()) else {
             return Err(fault_at(node, bad_word("an offset of appended data", offset.as_bytes())));
         };
-        let rest = bytes.get(offset..).ok_or_else(|| cut(node))?;
-        if !is_base64 {
-            return self.unpack(node, Cow::Borrowed(rest));
+        let rest = appended.bytes.get(offset..).ok_or_else(|| cut(node))?;
+        if !appended.is_base64 {
+            let (data, length) = self.unpack(node, Cow::Borrowed(rest))?;
+            appended.take(node, length)?;
+            return Ok(data);
         }
         // The array ends where the next one begins.
-        let arrays = node.document().descendants().filter(|node| node.has_tag_name("DataArray"));
-        let offsets = arrays.filter_map(|array| array.attribute("offset")?.trim().parse().ok());
-        let end = offsets.filter(|&other: &usize| other > offset).min();
+        let next = appended.offsets.partition_point(|&other| other <= offset);
+        let end = appended.offsets.get(next);
         let rest = end.and_then(|end| rest.get(..end - offset)).unwrap_or(rest);
-        self.unpack(node, Cow::Owned(decode(node, rest)?))
+        appended.take(node, rest.len())?;
+        Ok(self.unpack(node, Cow::Owned(decode(node, rest)?))?.0)
     }
 
     /// The bytes of an array that stand in its element.
     pub fn inline(&self, node: Node<'_, '_>) -> Result<Vec<u8>, Fault> {
         let text: String = node.children().filter(Node::is_text).filter_map(|n| n.text()).collect();
         let bytes = decode(node, text.as_bytes())?;
-        Ok(self.unpack(node, Cow::Owned(bytes))?.into_owned())
+        Ok(self.unpack(node, Cow::Owned(bytes))?.0.into_owned())
     }
 
-    /// The data behind the numbers in front of them.
-    fn unpack<'b>(&self, node: Node<'_, '_>, bytes: Cow<'b, [u8]>) -> Result<Cow<'b, [u8]>, Fault> {
-        if !self.is_compressed {
-            // Programs write no bytes at all for an array without entries.
-            if bytes.is_empty() {
-                return Ok(bytes);
-            }
-            let length = self.number(node, &bytes, 0)?;
-            let end = self.header.checked_add(length).ok_or_else(|| cut(node))?;
-            return match bytes {
-                Cow::Borrowed(bytes) => bytes.get(self.header..end).map(Cow::Borrowed),
-                Cow::Owned(bytes) => {
-                    bytes.get(self.header..end).map(|data| Cow::Owned(data.to_vec()))
-                }
-            }
-            .ok_or_else(|| cut(node));
+    /// The data behind the numbers in front of them, and how many bytes both are in the file.
+    fn unpack<'b>(
+        &self,
+        node: Node<'_, '_>,
+        bytes: Cow<'b, [u8]>,
+    ) -> Result<(Cow<'b, [u8]>, usize), Fault> {
+        // Programs write no bytes at all for an array without entries.
+        if bytes.is_empty() {
+            return Ok((bytes, 0));
         }
-        let blocks = if bytes.is_empty() { 0 } else { self.number(node, &bytes, 0)? };
+        if !self.is_compressed {
+            let length = self.number(node, &bytes, 0)?;
+            let end = self.header.checked_add(length).filter(|end| *end <= bytes.len());
+            let end = end.ok_or_else(|| cut(node))?;
+            let data = match bytes {
+                Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[self.header..end]),
+                Cow::Owned(mut bytes) => {
+                    bytes.truncate(end);
+                    bytes.drain(..self.header);
+                    Cow::Owned(bytes)
+                }
+            };
+            return Ok((data, end));
+        }
+        let blocks = self.number(node, &bytes, 0)?;
         if blocks == 0 {
-            return Ok(Cow::Borrowed(&[]));
+            return Ok((Cow::Borrowed(&[]), self.header));
         }
         let (whole, last) = (self.number(node, &bytes, 1)?, self.number(node, &bytes, 2)?);
         let front = blocks.checked_add(3).and_then(|count| count.checked_mul(self.header));
         let mut rest = front.and_then(|front| bytes.get(front..)).ok_or_else(|| cut(node))?;
         let mut data = Vec::new();
+        // One for all blocks: it is large, and they may be many.
+        let mut decoder = ZlibDecoder::new(&[][..]);
         for block in 0..blocks {
             let size = self.number(node, &bytes, 3 + block)?;
             let (packed, after) = rest.split_at_checked(size).ok_or_else(|| cut(node))?;
@@ -116,14 +166,16 @@ impl<'a> Codec<'a> {
             let wanted = if block + 1 == blocks && last > 0 { last } else { whole };
             let before = data.len();
             // No more than was announced, and memory grows with what really comes.
-            let read = ZlibDecoder::new(packed).take(wanted as u64).read_to_end(&mut data);
+            decoder.reset(packed);
+            let read = decoder.by_ref().take(wanted as u64).read_to_end(&mut data);
             if read.is_err() || data.len() - before != wanted {
                 let found = format!("{} of {wanted} bytes in block {block}", data.len() - before);
                 let expected = "data that zlib can unpack";
                 return Err(fault_at(node, bad_word(expected, found.as_bytes())));
             }
         }
-        Ok(Cow::Owned(data))
+        let length = bytes.len() - rest.len();
+        Ok((Cow::Owned(data), length))
     }
 
     /// One of the numbers in front of an array.
@@ -141,7 +193,8 @@ impl<'a> Codec<'a> {
 }
 
 fn cut(node: Node) -> Fault {
-    let reading = format!("array `{}`", node.attribute("Name").unwrap_or("points"));
+    let name = shorten(node.attribute("Name").unwrap_or("points").as_bytes());
+    let reading = format!("array `{name}`");
     fault_at(node, ReadProblem::UnexpectedEnd { reading })
 }
 
@@ -152,7 +205,8 @@ fn decode(node: Node, text: &[u8]) -> Result<Vec<u8>, Fault> {
     let mut rest = &text[..];
     while !rest.is_empty() {
         let padding = rest.iter().position(|&byte| byte == b'=').unwrap_or(rest.len());
-        let end = padding.next_multiple_of(4).min(rest.len());
+        // Behind the four letters of which it is one, even where it is the first.
+        let end = (padding / 4 * 4 + 4).min(rest.len());
         let (part, after) = rest.split_at(end);
         STANDARD.decode_vec(part, &mut bytes).map_err(|error| {
             let found = error.to_string();

@@ -5,14 +5,14 @@ use std::borrow::Cow;
 
 use roxmltree::{Document, Node};
 
-use super::arrays::DataArray;
-use super::codec::Codec;
-use super::xml::fault_at;
+use super::arrays::{DataArray, is_whole};
+use super::codec::{Appended, Codec};
+use super::xml::{LineIndex, fault_at};
 use crate::mesh::MeshPlace;
 use crate::mesh::io::cells::Cells;
 use crate::mesh::io::content::Content;
 use crate::mesh::io::error::{Fault, Place, ReadProblem};
-use crate::mesh::io::lines::bad_word;
+use crate::mesh::io::lines::{bad_word, name_of, shorten};
 use crate::mesh::io::parsed::{Format, Patch};
 use crate::mesh::io::vtk_cells::{
     A_REGION, CellFault, VtkCells, patches_of, rank_of_regions, regions_of,
@@ -48,7 +48,7 @@ pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
         "UnstructuredGrid" => Format::Vtu,
         "PolyData" => Format::Vtp,
         _ => {
-            let found = format!("a VTK file of type `{kind}`");
+            let found = format!("a VTK file of type `{}`", shorten(kind.as_bytes()));
             let problem = ReadProblem::Unsupported { found, advice: GRID_ADVICE };
             return Err(fault_at(root, problem));
         }
@@ -57,7 +57,9 @@ pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
         let expected = "the element <VTKFile>";
         return Err(fault_at(root, bad_word(expected, root.tag_name().name().as_bytes())));
     }
-    let codec = Codec::of(root, appended)?;
+    let appended = appended.map(|halves| Appended::new(halves, &document));
+    let lines = LineIndex::new(&text);
+    let codec = Codec::of(root, appended.as_ref(), &lines)?;
     let grid = child(root, kind)?;
     let mut all = Pieces::default();
     for piece in grid.children().filter(|node| node.has_tag_name("Piece")) {
@@ -83,7 +85,8 @@ impl Pieces {
         }
         let points = DataArray::new(find_points(piece)?, codec)?;
         let coordinates: Vec<f64> = points.numbers("a coordinate")?;
-        check_count(piece, "coordinates of points", 3 * point_count, coordinates.len())?;
+        let wanted = point_count.saturating_mul(3);
+        check_count(piece, "coordinates of points", wanted, coordinates.len())?;
         let first = (self.vertices.len() as u32, self.cell_count);
         self.vertices.extend(coordinates.chunks_exact(3).map(|x| vec3(x[0], x[1], x[2])));
         let lines = points.lines_of((0..point_count).map(|vertex| 3 * vertex));
@@ -170,19 +173,13 @@ impl Pieces {
         let arrays = data.into_iter().flat_map(|data| data.children());
         for node in arrays.filter(|node| node.has_tag_name("DataArray")) {
             let is_scalar = matches!(node.attribute("NumberOfComponents"), None | Some("1" | "0"));
-            let Some(name) = node.attribute("Name").filter(|_| is_scalar) else { continue };
-            let array = DataArray::new(node, codec)?;
-            if !array.is_whole() {
-                continue;
-            }
-            let values: Vec<i64> = array.numbers("a whole number")?;
+            let is_set = is_scalar && is_whole(node);
+            let Some(name) = node.attribute("Name").filter(|_| is_set) else { continue };
+            let values: Vec<i64> = DataArray::new(node, codec)?.numbers("a whole number")?;
             check_count(node, "values at points", count, values.len())?;
             for mut patch in patches_of(name, &values) {
                 patch.vertices.iter_mut().for_each(|vertex| *vertex += first);
-                match self.patches.iter_mut().find(|known| known.name == patch.name) {
-                    Some(known) => known.vertices.extend(patch.vertices),
-                    None => self.patches.push(patch),
-                }
+                self.patches.push(patch);
             }
         }
         Ok(())
@@ -236,7 +233,26 @@ fn parse(bytes: &[u8]) -> Result<Document<'_>, Fault> {
         let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
         broken("text that is not UTF-8".into(), line)
     })?;
-    Document::parse(text).map_err(|error| broken(error.to_string(), error.pos().row as usize))
+    check_tags(bytes)?;
+    Document::parse(text)
+        .map_err(|error| broken(name_of(&error.to_string()), error.pos().row as usize))
+}
+
+/// The parser compares each attribute of an element with all others, and hands namespaces on to all elements inside: a file of
+/// a megabyte could keep it busy for minutes. VTK has a dozen attributes and no namespaces.
+fn check_tags(text: &[u8]) -> Result<(), Fault> {
+    const MOST_ATTRIBUTES: usize = 256;
+    let mut line = 1;
+    for tag in text.split(|&byte| byte == b'<') {
+        let attributes = tag.iter().filter(|&&byte| byte == b'=').count();
+        let has_namespaces = || tag.windows(6).any(|window| window == b"xmlns:");
+        if attributes > MOST_ATTRIBUTES || (tag.contains(&b':') && has_namespaces()) {
+            let reason = "an element with other attributes than VTK has".to_owned();
+            return Err(Fault::at(line, ReadProblem::Xml { reason }));
+        }
+        line += tag.iter().filter(|&&byte| byte == b'\n').count();
+    }
+    Ok(())
 }
 
 fn missing(node: Node, what: String) -> Fault {
