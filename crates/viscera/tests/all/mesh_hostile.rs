@@ -116,12 +116,8 @@ fn xml(size: usize) -> Vec<(&'static str, String)> {
         (
             "comments.vtu",
             grid(&format!(
-                "{}{}{CELL}</Piece>",
-                piece.replace(CELL, "").replace(POINTS, ""),
-                format!(
-                    "<Points><DataArray>{}</DataArray></Points>",
-                    repeated(size, |_| "0<!---->".to_owned())
-                )
+                "<Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><Points><DataArray>{}</DataArray></Points>{CELL}</Piece>",
+                repeated(size, |_| "0<!---->".to_owned())
             )),
         ),
         ("attributes.vtu", grid(&format!("<a {}/>", repeated(size, |n| format!("a{n}=\"\" "))))),

@@ -1,8 +1,8 @@
 //! Mesh files: what is read, what is refused and in which words, what is written.
 
 use viscera::mesh::io::{
-    Format, ReadError, ReadProblem, ReadReport, WriteError, gmsh, obj, pvd, read_surface,
-    read_tet_mesh, vtu,
+    Format, ReadError, ReadProblem, ReadReport, WriteError, gmsh, obj, read_surface, read_tet_mesh,
+    vtu,
 };
 use viscera::mesh::topology::count_open_edges;
 use viscera::mesh::{MeshError, SurfaceMesh, TetMesh, boundary_surface, inspect, inspect_surface};
@@ -448,13 +448,6 @@ fn obj_round_trip_is_exact() {
         let text = obj::write(&surface, normals).unwrap();
         assert_eq!(read_surface("b.obj", text.as_bytes(), 1.0).unwrap().0, surface);
     }
-}
-
-#[test]
-fn series_lists_every_frame_with_its_time() {
-    let text = pvd::write(&[(0.0, "frame_0.vtu"), (0.1, "a&b.vtu")]);
-    assert!(text.contains(r#"<DataSet timestep="0.1" part="0" file="a&amp;b.vtu"/>"#), "{text}");
-    assert_eq!(text.matches("<DataSet").count(), 2);
 }
 
 /// The bytes of a real mesh, or none where the data folder is not at hand.

@@ -75,13 +75,57 @@ fn cells_of(section: &str) -> Option<(Shape, usize)> {
     })
 }
 
+/// Cells of all sections.
+#[derive(Default)]
+struct Elements {
+    cells: Cells,
+    places: Vec<Place>,
+    /// Vertices by shape and reference of points, edges and faces.
+    patches: BTreeMap<(Shape, i64), Vec<u32>>,
+}
+
+impl Elements {
+    /// Adds the cells of a section: vertices and a reference each.
+    fn read(
+        &mut self,
+        reader: &mut Reader,
+        (shape, count): (Shape, usize),
+        section: &str,
+    ) -> Result<(), Fault> {
+        for _ in 0..reader.count(section)? {
+            let mut nodes = [0; 10];
+            for node in &mut nodes[..count] {
+                let expected = "a vertex number, 1 or more";
+                let number: u32 = reader.parse(expected, section)?;
+                let index = number.checked_sub(1);
+                *node = index.ok_or_else(|| reader.fault(bad_word(expected, b"0")))?;
+            }
+            let place = Place::Line(reader.lines.number());
+            let reference: i64 = reader.parse("a reference", section)?;
+            let nodes = &nodes[..count];
+            let is_solid = !matches!(shape, Shape::Line | Shape::Triangle | Shape::Quad);
+            if !is_solid && reference != 0 {
+                let shape = if shape == Shape::Quad { Shape::Triangle } else { shape };
+                self.patches.entry((shape, reference)).or_default().extend_from_slice(nodes);
+            }
+            let region = if is_solid { u32::try_from(reference) } else { Ok(0) };
+            let region = region.map_err(|_| {
+                let found = reference.to_string();
+                reader.fault(bad_word("a reference of 0 or more", found.as_bytes()))
+            })?;
+            self.cells.add(shape, nodes, region, self.places.len());
+            self.places.push(place);
+        }
+        Ok(())
+    }
+}
+
 /// Reads a mesh.
 pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
     let mut reader = Reader { lines: Lines::new(bytes), words: None };
     let mut vertices: Option<Vec<Vec3<f64>>> = None;
-    let (mut of_vertices, mut of_cells) = (Vec::new(), Vec::new());
-    let mut cells = Cells::default();
-    let mut patches: BTreeMap<(Shape, i64), Vec<u32>> = BTreeMap::new();
+    let mut of_vertices = Vec::new();
+    let mut elements = Elements::default();
     let mut is_ended = false;
     while let Some(word) = reader.word() {
         let section = shorten(word);
@@ -116,33 +160,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
             }
             _ if section.starts_with(|c: char| c.is_ascii_alphabetic()) => {
                 let Some((shape, count)) = cells_of(&section) else {
-                    pass_over(&mut reader, &mut cells, &section)?;
+                    pass_over(&mut reader, &mut elements.cells, &section)?;
                     continue;
                 };
-                for _ in 0..reader.count(&section)? {
-                    let mut nodes = [0; 10];
-                    for node in &mut nodes[..count] {
-                        let number: u32 = reader.parse("a vertex number, 1 or more", &section)?;
-                        *node = number.checked_sub(1).ok_or_else(|| {
-                            reader.fault(bad_word("a vertex number, 1 or more", b"0"))
-                        })?;
-                    }
-                    let place = Place::Line(reader.lines.number());
-                    let reference: i64 = reader.parse("a reference", &section)?;
-                    let nodes = &nodes[..count];
-                    let is_solid = !matches!(shape, Shape::Line | Shape::Triangle | Shape::Quad);
-                    if !is_solid && reference != 0 {
-                        let shape = if shape == Shape::Quad { Shape::Triangle } else { shape };
-                        patches.entry((shape, reference)).or_default().extend_from_slice(nodes);
-                    }
-                    let region = if is_solid { u32::try_from(reference) } else { Ok(0) };
-                    let region = region.map_err(|_| {
-                        let found = reference.to_string();
-                        reader.fault(bad_word("a reference of 0 or more", found.as_bytes()))
-                    })?;
-                    cells.add(shape, nodes, region, of_cells.len());
-                    of_cells.push(place);
-                }
+                elements.read(&mut reader, (shape, count), &section)?;
             }
             _ => return Err(reader.fault(bad_word("a section such as Vertices", word))),
         }
@@ -155,6 +176,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
     if vertices.is_empty() {
         return Err(Fault::whole_file(ReadProblem::Missing { what: "section Vertices".into() }));
     }
+    let Elements { cells, places: of_cells, patches } = elements;
     let patches = patches.into_iter().map(|((shape, reference), mut vertices)| {
         vertices.sort_unstable();
         vertices.dedup();

@@ -7,6 +7,7 @@ mod abaqus;
 mod cells;
 mod content;
 mod error;
+pub mod gltf;
 pub mod gmsh;
 mod lines;
 mod medit;
@@ -17,7 +18,7 @@ pub mod ply;
 pub mod pvd;
 pub mod stl;
 mod tetgen;
-mod vtk;
+pub mod vtk;
 mod vtk_cells;
 pub mod vtu;
 

@@ -223,7 +223,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
 fn read_header(lines: &mut Lines) -> Result<(Coding, Vec<Element>), Fault> {
     let mut coding = None;
     let mut elements: Vec<Element> = Vec::new();
-    while let Some(line) = lines.next() {
+    for line in lines.by_ref() {
         let mut words = line.words();
         let keyword = words.next().unwrap_or_default();
         match keyword {

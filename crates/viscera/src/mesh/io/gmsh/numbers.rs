@@ -159,7 +159,7 @@ impl<'a> Numbers<'a> {
     /// Passes over everything up to the end of the section, which its data may not hold.
     pub fn skip_section(&mut self, section: &'a [u8]) -> Result<(), Fault> {
         self.section = section;
-        while let Some(line) = self.lines.next() {
+        for line in self.lines.by_ref() {
             if is_end_of(line, section) {
                 return Ok(());
             }
