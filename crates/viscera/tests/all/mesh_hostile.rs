@@ -30,8 +30,8 @@ fn abaqus(size: usize) -> Vec<(&'static str, String)> {
         (
             "doubled.inp",
             with(repeated(size, |n| {
-                let (set, other) = (n % 2, 1 - n % 2);
-                let first = if n == 1 { "*ELSET, ELSET=0\n1\n" } else { "" };
+                let (set, other) = if n % 2 == 0 { ("p", "q") } else { ("q", "p") };
+                let first = if n == 1 { "*ELSET, ELSET=p\n1\n" } else { "" };
                 format!("{first}*ELSET, ELSET={set}\n{other}, {other}\n")
             })),
         ),

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use super::lines::printable;
-use super::parsed::Format;
+use super::parsed::{Format, Patch};
+use super::text::printable;
 use crate::mesh::{MeshError, MeshPlace};
 
 /// Why a file could not be read: which file, where in it, and what to do.
@@ -310,4 +310,15 @@ pub enum WriteError {
         /// Its time [s].
         time: f32,
     },
+}
+
+/// Refuses a patch with vertices that a mesh does not have.
+pub(super) fn check_patch(patch: &Patch, vertex_count: usize) -> Result<(), WriteError> {
+    match patch.vertices.iter().find(|&&vertex| vertex as usize >= vertex_count) {
+        Some(&vertex) => {
+            let patch = patch.name.clone();
+            Err(WriteError::UnknownVertex { patch, vertex, vertex_count })
+        }
+        None => Ok(()),
+    }
 }

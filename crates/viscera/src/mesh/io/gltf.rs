@@ -19,7 +19,7 @@
 use std::fmt::Write;
 
 use super::error::WriteError;
-use super::lines::name_of;
+use super::text::name_of;
 use crate::mesh::normals::vertex_normals;
 use crate::scalar::Vec3;
 

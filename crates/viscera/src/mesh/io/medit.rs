@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 use super::cells::{Cells, Shape};
 use super::content::Content;
 use super::error::{Fault, Place, ReadProblem};
-use super::lines::{Lines, Words, bad_word, parse_word, shorten};
+use super::lines::{Lines, Words, bad_word, parse_word};
 use super::parsed::{Format, Patch};
+use super::text::shorten;
 use crate::mesh::MeshPlace;
 use crate::scalar::{Vec3, vec3};
 

@@ -18,6 +18,7 @@ pub mod ply;
 pub mod pvd;
 pub mod stl;
 mod tetgen;
+mod text;
 pub mod vtk;
 mod vtk_cells;
 pub mod vtu;

@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use super::error::WriteError;
 use crate::mesh::MeshRepairs;
 
 /// The formats that can be read.
@@ -111,19 +110,6 @@ pub struct Patch {
     pub name: String,
     /// Vertices of the mesh, ascending.
     pub vertices: Vec<u32>,
-}
-
-impl Patch {
-    /// Refuses vertices that a mesh does not have.
-    pub(super) fn check(&self, vertex_count: usize) -> Result<(), WriteError> {
-        match self.vertices.iter().find(|&&vertex| vertex as usize >= vertex_count) {
-            Some(&vertex) => {
-                let patch = self.name.clone();
-                Err(WriteError::UnknownVertex { patch, vertex, vertex_count })
-            }
-            None => Ok(()),
-        }
-    }
 }
 
 /// The report of reading a file, beside the mesh. The default says "not from a file".

@@ -9,9 +9,9 @@
 use std::collections::BTreeMap;
 
 use crate::mesh::TetMesh;
-use crate::mesh::io::error::WriteError;
-use crate::mesh::io::lines::name_of;
+use crate::mesh::io::error::{WriteError, check_patch};
 use crate::mesh::io::parsed::Patch;
+use crate::mesh::io::text::name_of;
 use crate::mesh::topology::{BoundingBox, boundary_faces};
 
 /// Element types of Gmsh.
@@ -115,7 +115,7 @@ fn groups_of<'a>(mesh: &TetMesh, patches: &'a [Patch]) -> Result<Vec<Group<'a>>,
     let faces = if patches.is_empty() { Vec::new() } else { boundary_faces(mesh.tets()) };
     let mut groups = Vec::new();
     for patch in patches {
-        patch.check(mesh.vertices().len())?;
+        check_patch(patch, mesh.vertices().len())?;
         let mut is_member = vec![false; mesh.vertices().len()];
         patch.vertices.iter().for_each(|&vertex| is_member[vertex as usize] = true);
         let inside = |face: &[u32; 3]| face.iter().all(|&vertex| is_member[vertex as usize]);

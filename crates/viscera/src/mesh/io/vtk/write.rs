@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use crate::mesh::io::error::WriteError;
-use crate::mesh::io::lines::name_of;
+use crate::mesh::io::error::{WriteError, check_patch};
 use crate::mesh::io::parsed::Patch;
+use crate::mesh::io::text::name_of;
 use crate::mesh::{SurfaceMesh, TetMesh};
 use crate::scalar::Vec3;
 
@@ -66,7 +66,7 @@ pub fn write(mesh: &TetMesh, patches: &[Patch]) -> Result<Vec<u8>, WriteError> {
         file.line(format_args!("POINT_DATA {vertex_count}\nFIELD FieldData {}", patches.len()));
     }
     for patch in patches {
-        patch.check(vertex_count)?;
+        check_patch(patch, vertex_count)?;
         let mut is_member = vec![0u8; vertex_count];
         patch.vertices.iter().for_each(|&vertex| is_member[vertex as usize] = 1);
         file.line(format_args!("{} 1 {vertex_count} unsigned_char", escape(&patch.name)));
