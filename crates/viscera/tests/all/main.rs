@@ -45,6 +45,7 @@ mod mesh_fuzz;
 mod mesh_hostile;
 mod mesh_io;
 mod mesh_tools;
+mod mesh_writers;
 mod parts;
 mod physics;
 mod pins;

@@ -267,17 +267,3 @@ fn what_is_written_is_read_again() {
         assert_eq!(back.enclosed_volume(), shell.enclosed_volume(), "{name}");
     }
 }
-
-#[test]
-fn obj_round_trip_is_exact() {
-    let mut surface = surface("shell.obj");
-    for vertex in &mut surface.vertices {
-        *vertex = *vertex * (1.0 / 3.0);
-    }
-    let normals = vec![vec3(0.0, 0.0, 1.0); surface.vertices.len()];
-    for normals in [None, Some(&normals[..])] {
-        let text = viscera::mesh::io::obj::write(&surface, normals).expect("as many normals");
-        let back = viscera::mesh::io::read_surface("b.obj", text.as_bytes(), 1.0);
-        assert_eq!(back.expect("a surface").0, surface);
-    }
-}

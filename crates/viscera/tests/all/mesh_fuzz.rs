@@ -11,8 +11,8 @@ use crate::mesh_formats::{fixture, fixtures};
 /// So many inputs of a slow test, which ends after three minutes at the latest.
 const MANY: (u64, Duration) = (1_000_000, Duration::from_secs(180));
 
-/// Inputs of a fast test: about a second's.
-const FEW: (u64, Duration) = (4_000, Duration::from_secs(3600));
+/// Inputs of a fast test: at most about a second's.
+const FEW: (u64, Duration) = (10_000, Duration::from_secs(3600));
 
 fn gmsh_text() -> Reader {
     let words = &[

@@ -30,8 +30,8 @@ fn abaqus(size: usize) -> Vec<(&'static str, String)> {
         (
             "doubled.inp",
             with(repeated(size, |n| {
-                let (set, other) = (n % 2, 1 - n % 2);
-                let first = if n == 1 { "*ELSET, ELSET=0\n1\n" } else { "" };
+                let (set, other) = if n % 2 == 0 { ("p", "q") } else { ("q", "p") };
+                let first = if n == 1 { "*ELSET, ELSET=p\n1\n" } else { "" };
                 format!("{first}*ELSET, ELSET={set}\n{other}, {other}\n")
             })),
         ),
@@ -116,12 +116,8 @@ fn xml(size: usize) -> Vec<(&'static str, String)> {
         (
             "comments.vtu",
             grid(&format!(
-                "{}{}{CELL}</Piece>",
-                piece.replace(CELL, "").replace(POINTS, ""),
-                format!(
-                    "<Points><DataArray>{}</DataArray></Points>",
-                    repeated(size, |_| "0<!---->".to_owned())
-                )
+                "<Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><Points><DataArray>{}</DataArray></Points>{CELL}</Piece>",
+                repeated(size, |_| "0<!---->".to_owned())
             )),
         ),
         ("attributes.vtu", grid(&format!("<a {}/>", repeated(size, |n| format!("a{n}=\"\" "))))),

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::cells::{Cells, Curved};
 use super::error::{Fault, Place, ReadProblem};
-use super::lines::name_of;
 use super::parsed::{CountedElements, Format, Patch, ReadReport};
+use super::text::name_of;
 use crate::mesh::{
     MeshError, MeshPlace, MeshRepairs, SurfaceMesh, TetMesh, boundary_surface, check_vertex,
 };

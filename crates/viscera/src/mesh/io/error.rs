@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use super::parsed::Format;
-use super::printable::printable;
+use super::parsed::{Format, Patch};
+use super::text::printable;
 use crate::mesh::{MeshError, MeshPlace};
 
 /// Why a file could not be read: which file, where in it, and what to do.
@@ -230,7 +230,7 @@ impl Fault {
 }
 
 /// Why arrays could not be written.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
     /// An array does not have one entry for each point, or for each cell.
@@ -266,4 +266,59 @@ pub enum WriteError {
         /// How many points there are.
         point_count: usize,
     },
+    /// A patch has a vertex that the mesh does not have.
+    #[error("patch `{patch}` has vertex {vertex}; the mesh has {vertex_count}")]
+    UnknownVertex {
+        /// The patch's name.
+        patch: String,
+        /// The vertex, counting from 0.
+        vertex: u32,
+        /// How many vertices there are.
+        vertex_count: usize,
+    },
+    /// A number that the format has no room for.
+    #[error("{what} {value} has no room in {format}, which ends at {limit}; write another format")]
+    TooLarge {
+        /// What the number is.
+        what: &'static str,
+        /// The number.
+        value: u64,
+        /// The largest that has room.
+        limit: u64,
+        /// The format.
+        format: &'static str,
+    },
+    /// A surface without triangles, which the format cannot hold.
+    #[error("surface `{surface}` has no triangles; leave it out")]
+    NoTriangles {
+        /// The surface's name.
+        surface: String,
+    },
+    /// A colour that is none.
+    #[error("the colour of surface `{surface}` has a component outside 0 to 1")]
+    Color {
+        /// The surface's name.
+        surface: String,
+    },
+    /// Times of frames that do not go forward from 0 or later.
+    #[error(
+        "frame {frame} is at {time} s; times begin at 0 or later, and each is after the one before"
+    )]
+    Time {
+        /// The frame, counting from 0.
+        frame: usize,
+        /// Its time [s].
+        time: f32,
+    },
+}
+
+/// Refuses a patch with vertices that a mesh does not have.
+pub(super) fn check_patch(patch: &Patch, vertex_count: usize) -> Result<(), WriteError> {
+    match patch.vertices.iter().find(|&&vertex| vertex as usize >= vertex_count) {
+        Some(&vertex) => {
+            let patch = patch.name.clone();
+            Err(WriteError::UnknownVertex { patch, vertex, vertex_count })
+        }
+        None => Ok(()),
+    }
 }

@@ -1,7 +1,7 @@
 //! Text as numbered lines of words, straight from bytes: comments may be in any encoding.
 
 use super::error::{Fault, ReadProblem};
-use super::printable::printable;
+use super::text::shorten;
 
 /// Goes through a text line by line.
 #[derive(Clone)]
@@ -110,22 +110,6 @@ pub(super) fn parse_word<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
 /// The problem of a word in the wrong place.
 pub(super) fn bad_word(expected: &'static str, found: &[u8]) -> ReadProblem {
     ReadProblem::BadWord { expected, found: shorten(found) }
-}
-
-/// Enough of a word to recognise it.
-pub(super) fn shorten(word: &[u8]) -> String {
-    cut(word, 40)
-}
-
-/// A name of a file as it is shown, and found by: whole, but for damage.
-pub(super) fn name_of(text: &str) -> String {
-    cut(text.as_bytes(), 200)
-}
-
-/// So many bytes of a text, for one line of a terminal.
-fn cut(text: &[u8], shown: usize) -> String {
-    let start = String::from_utf8_lossy(&text[..text.len().min(shown)]);
-    printable(&start) + if text.len() > shown { "..." } else { "" }
 }
 
 /// True if the bytes hold a word somewhere.

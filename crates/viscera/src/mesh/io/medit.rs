@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 use super::cells::{Cells, Shape};
 use super::content::Content;
 use super::error::{Fault, Place, ReadProblem};
-use super::lines::{Lines, Words, bad_word, parse_word, shorten};
+use super::lines::{Lines, Words, bad_word, parse_word};
 use super::parsed::{Format, Patch};
+use super::text::shorten;
 use crate::mesh::MeshPlace;
 use crate::scalar::{Vec3, vec3};
 
@@ -75,13 +76,57 @@ fn cells_of(section: &str) -> Option<(Shape, usize)> {
     })
 }
 
+/// Cells of all sections.
+#[derive(Default)]
+struct Elements {
+    cells: Cells,
+    places: Vec<Place>,
+    /// Vertices by shape and reference of points, edges and faces.
+    patches: BTreeMap<(Shape, i64), Vec<u32>>,
+}
+
+impl Elements {
+    /// Adds the cells of a section: vertices and a reference each.
+    fn read(
+        &mut self,
+        reader: &mut Reader,
+        (shape, count): (Shape, usize),
+        section: &str,
+    ) -> Result<(), Fault> {
+        for _ in 0..reader.count(section)? {
+            let mut nodes = [0; 10];
+            for node in &mut nodes[..count] {
+                let expected = "a vertex number, 1 or more";
+                let number: u32 = reader.parse(expected, section)?;
+                let index = number.checked_sub(1);
+                *node = index.ok_or_else(|| reader.fault(bad_word(expected, b"0")))?;
+            }
+            let place = Place::Line(reader.lines.number());
+            let reference: i64 = reader.parse("a reference", section)?;
+            let nodes = &nodes[..count];
+            let is_solid = !matches!(shape, Shape::Line | Shape::Triangle | Shape::Quad);
+            if !is_solid && reference != 0 {
+                let shape = if shape == Shape::Quad { Shape::Triangle } else { shape };
+                self.patches.entry((shape, reference)).or_default().extend_from_slice(nodes);
+            }
+            let region = if is_solid { u32::try_from(reference) } else { Ok(0) };
+            let region = region.map_err(|_| {
+                let found = reference.to_string();
+                reader.fault(bad_word("a reference of 0 or more", found.as_bytes()))
+            })?;
+            self.cells.add(shape, nodes, region, self.places.len());
+            self.places.push(place);
+        }
+        Ok(())
+    }
+}
+
 /// Reads a mesh.
 pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
     let mut reader = Reader { lines: Lines::new(bytes), words: None };
     let mut vertices: Option<Vec<Vec3<f64>>> = None;
-    let (mut of_vertices, mut of_cells) = (Vec::new(), Vec::new());
-    let mut cells = Cells::default();
-    let mut patches: BTreeMap<(Shape, i64), Vec<u32>> = BTreeMap::new();
+    let mut of_vertices = Vec::new();
+    let mut elements = Elements::default();
     let mut is_ended = false;
     while let Some(word) = reader.word() {
         let section = shorten(word);
@@ -105,29 +150,21 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
                 if vertices.is_some() {
                     return Err(reader.fault(ReadProblem::SecondPart { what: section }));
                 }
-                vertices = Some(read_vertices(&mut reader, &mut of_vertices)?);
+                let mut list = Vec::new();
+                for _ in 0..reader.count(&section)? {
+                    let mut coordinate = || reader.parse::<f64>("a coordinate", "Vertices");
+                    list.push(vec3(coordinate()?, coordinate()?, coordinate()?));
+                    of_vertices.push(Place::Line(reader.lines.number()));
+                    reader.parse::<i64>("a reference", "Vertices")?;
+                }
+                vertices = Some(list);
             }
             _ if section.starts_with(|c: char| c.is_ascii_alphabetic()) => {
                 let Some((shape, count)) = cells_of(&section) else {
-                    pass_over(&mut reader, &mut cells, &section)?;
+                    pass_over(&mut reader, &mut elements.cells, &section)?;
                     continue;
                 };
-                for _ in 0..reader.count(&section)? {
-                    let (nodes, reference, place) = read_cell(&mut reader, count, &section)?;
-                    let nodes = &nodes[..count];
-                    let is_solid = !matches!(shape, Shape::Line | Shape::Triangle | Shape::Quad);
-                    if !is_solid && reference != 0 {
-                        let shape = if shape == Shape::Quad { Shape::Triangle } else { shape };
-                        patches.entry((shape, reference)).or_default().extend_from_slice(nodes);
-                    }
-                    let region = if is_solid { u32::try_from(reference) } else { Ok(0) };
-                    let region = region.map_err(|_| {
-                        let found = reference.to_string();
-                        reader.fault(bad_word("a reference of 0 or more", found.as_bytes()))
-                    })?;
-                    cells.add(shape, nodes, region, of_cells.len());
-                    of_cells.push(place);
-                }
+                elements.read(&mut reader, (shape, count), &section)?;
             }
             _ => return Err(reader.fault(bad_word("a section such as Vertices", word))),
         }
@@ -140,6 +177,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
     if vertices.is_empty() {
         return Err(Fault::whole_file(ReadProblem::Missing { what: "section Vertices".into() }));
     }
+    let Elements { cells, places: of_cells, patches } = elements;
     let patches = patches.into_iter().map(|((shape, reference), mut vertices)| {
         vertices.sort_unstable();
         vertices.dedup();
@@ -154,34 +192,6 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
     });
     let format = Format::Medit;
     Ok(Content { format, vertices, cells, patches, region_names: Vec::new(), places })
-}
-
-/// `x y z reference`.
-fn read_vertices(reader: &mut Reader, places: &mut Vec<Place>) -> Result<Vec<Vec3<f64>>, Fault> {
-    let mut list = Vec::new();
-    for _ in 0..reader.count("Vertices")? {
-        let mut coordinate = || reader.parse::<f64>("a coordinate", "Vertices");
-        list.push(vec3(coordinate()?, coordinate()?, coordinate()?));
-        places.push(Place::Line(reader.lines.number()));
-        reader.parse::<i64>("a reference", "Vertices")?;
-    }
-    Ok(list)
-}
-
-/// So many vertices, counting from 0, and a reference.
-fn read_cell(
-    reader: &mut Reader,
-    count: usize,
-    section: &str,
-) -> Result<([u32; 10], i64, Place), Fault> {
-    let expected = "a vertex number, 1 or more";
-    let mut nodes = [0; 10];
-    for node in &mut nodes[..count] {
-        let number: u32 = reader.parse(expected, section)?;
-        *node = number.checked_sub(1).ok_or_else(|| reader.fault(bad_word(expected, b"0")))?;
-    }
-    let place = Place::Line(reader.lines.number());
-    Ok((nodes, reader.parse("a reference", section)?, place))
 }
 
 /// Entries of other sections: all numbers up to the next word.

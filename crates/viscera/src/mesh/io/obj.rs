@@ -8,8 +8,9 @@ use std::fmt::Write;
 use super::cells::Cells;
 use super::content::Content;
 use super::error::{Fault, Place, ReadProblem, WriteError};
-use super::lines::{Line, Lines, bad_word, parse_word, shorten};
+use super::lines::{Line, Lines, bad_word, parse_word};
 use super::parsed::Format;
+use super::text::shorten;
 use crate::mesh::{MeshPlace, SurfaceMesh};
 use crate::scalar::{Vec3, vec3};
 

@@ -6,8 +6,9 @@ use std::fmt::Write;
 use super::cells::Cells;
 use super::content::Content;
 use super::error::{Fault, Place, ReadProblem};
-use super::lines::{Lines, Words, bad_word, parse_word, shorten};
+use super::lines::{Lines, Words, bad_word, parse_word};
 use super::parsed::Format;
+use super::text::shorten;
 use crate::mesh::{MeshPlace, SurfaceMesh};
 use crate::scalar::vec3;
 

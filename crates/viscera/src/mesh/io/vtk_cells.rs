@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::cells::{Cells, Shape};
-use super::lines::name_of;
 use super::parsed::Patch;
+use super::text::name_of;
 
 /// Cells of a grid in one list of corners.
 pub(super) struct VtkCells<'a> {

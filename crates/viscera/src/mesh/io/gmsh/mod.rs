@@ -9,6 +9,8 @@ mod numbers;
 mod read;
 mod records;
 mod write;
+mod write_binary;
 
 pub(super) use read::read;
 pub use write::write;
+pub use write_binary::write_binary;

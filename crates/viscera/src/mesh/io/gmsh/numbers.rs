@@ -1,7 +1,8 @@
 //! Numbers of a Gmsh file: words of lines, or bytes as they are in memory.
 
 use crate::mesh::io::error::{Fault, Place, ReadProblem};
-use crate::mesh::io::lines::{Line, Lines, Words, bad_word, shorten};
+use crate::mesh::io::lines::{Line, Lines, Words, bad_word};
+use crate::mesh::io::text::shorten;
 
 /// How numbers stand in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

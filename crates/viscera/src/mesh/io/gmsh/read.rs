@@ -9,9 +9,10 @@ use crate::mesh::MeshPlace;
 use crate::mesh::io::cells::Shape;
 use crate::mesh::io::content::Content;
 use crate::mesh::io::error::{Fault, ReadProblem};
-use crate::mesh::io::lines::{Line, bad_word, shorten};
+use crate::mesh::io::lines::{Line, bad_word};
 use crate::mesh::io::numbered::Vertices;
 use crate::mesh::io::parsed::{Format, Patch};
+use crate::mesh::io::text::shorten;
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Version {

@@ -3,5 +3,7 @@
 
 mod numbers;
 mod read;
+mod write;
 
 pub(super) use read::read;
+pub use write::{write, write_surface};

@@ -5,8 +5,9 @@ use crate::mesh::MeshPlace;
 use crate::mesh::io::cells::Cells;
 use crate::mesh::io::content::Content;
 use crate::mesh::io::error::{Fault, Place, ReadProblem};
-use crate::mesh::io::lines::{Line, Words, bad_word, parse_word, shorten};
+use crate::mesh::io::lines::{Line, Words, bad_word, parse_word};
 use crate::mesh::io::parsed::{Format, Patch};
+use crate::mesh::io::text::shorten;
 use crate::mesh::io::vtk_cells::{
     A_REGION, CellFault, VtkCells, patches_of, rank_of_regions, regions_of,
 };

@@ -18,7 +18,8 @@ use roxmltree::{Document, Node};
 
 use super::xml::{LineIndex, fault_at};
 use crate::mesh::io::error::{Fault, ReadProblem};
-use crate::mesh::io::lines::{bad_word, parse_word, shorten};
+use crate::mesh::io::lines::{bad_word, parse_word};
+use crate::mesh::io::text::shorten;
 
 /// What a file says of the bytes of its arrays.
 #[derive(Clone, Copy)]
