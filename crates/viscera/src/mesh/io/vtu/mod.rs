@@ -3,6 +3,7 @@
 
 mod arrays;
 mod codec;
+mod places;
 mod read;
 mod write;
 

@@ -5,8 +5,9 @@ use std::borrow::Cow;
 
 use roxmltree::{Document, Node};
 
-use super::arrays::{DataArray, LineIndex, fault_at, is_whole};
+use super::arrays::{DataArray, is_whole};
 use super::codec::{Appended, Codec};
+use super::places::{LineIndex, fault_at};
 use crate::mesh::MeshPlace;
 use crate::mesh::io::cells::Cells;
 use crate::mesh::io::content::Content;
