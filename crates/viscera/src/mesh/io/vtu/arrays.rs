@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use roxmltree::Node;
 
 use super::codec::Codec;
-use super::xml::{LineIndex, fault_at};
+use super::places::{LineIndex, fault_at};
 
 use crate::mesh::io::error::{Fault, Place};
 use crate::mesh::io::lines::{bad_word, parse_word};

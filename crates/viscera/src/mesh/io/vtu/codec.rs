@@ -16,7 +16,7 @@ use base64::engine::general_purpose::STANDARD;
 use flate2::bufread::ZlibDecoder;
 use roxmltree::{Document, Node};
 
-use super::xml::{LineIndex, fault_at};
+use super::places::{LineIndex, fault_at};
 use crate::mesh::io::error::{Fault, ReadProblem};
 use crate::mesh::io::lines::{bad_word, parse_word};
 use crate::mesh::io::text::shorten;

@@ -3,9 +3,9 @@
 
 mod arrays;
 mod codec;
+mod places;
 mod read;
 mod write;
-mod xml;
 
 pub(super) use read::read;
 pub use write::{Array, Grid, write, write_surface};

@@ -7,7 +7,7 @@ use roxmltree::{Document, Node};
 
 use super::arrays::{DataArray, is_whole};
 use super::codec::{Appended, Codec};
-use super::xml::{LineIndex, fault_at};
+use super::places::{LineIndex, fault_at};
 use crate::mesh::MeshPlace;
 use crate::mesh::io::cells::Cells;
 use crate::mesh::io::content::Content;

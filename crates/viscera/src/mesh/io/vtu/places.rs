@@ -1,4 +1,4 @@
-//! Places of elements.
+//! Where things stand in the XML.
 
 use roxmltree::Node;
 
