@@ -5,9 +5,11 @@ use clap::{Args, Subcommand};
 use serde::Serialize;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use viscera::mesh::io::{Mesh, MeshFile, gmsh, obj, ply, stl, vtu};
+use viscera::mesh::io::{Mesh, MeshFile, ReadReport, gmsh, obj, ply, stl, vtk, vtu};
 use viscera::mesh::topology::connected_components;
-use viscera::mesh::{SurfaceMesh, TetMesh, boundary_surface, inspect, inspect_surface};
+use viscera::mesh::{
+    MeshRepairs, SurfaceMesh, TetMesh, boundary_surface, inspect, inspect_surface,
+};
 use viscera::scalar::{Vec3, vec3};
 use viscera::units::Dimension;
 use viscera_import::{Found, open};
@@ -46,7 +48,7 @@ pub enum MeshCommand {
     Tetrahedralize {
         /// The surface or the label map
         file: PathBuf,
-        /// The mesh to write: .vtu or .msh, in metres
+        /// The mesh to write: .vtu, .vtk or .msh, in metres
         #[arg(long, short)]
         out: PathBuf,
         #[command(flatten)]
@@ -54,7 +56,7 @@ pub enum MeshCommand {
     },
     /// Write a mesh in another format, another unit, or with other axes
     ///
-    /// Writes tetrahedra as .vtu and .msh, surfaces as .obj, .stl and .ply, in metres; the surface of tetrahedra where the format has
+    /// Writes tetrahedra as .vtu, .vtk and .msh (Gmsh 4.1), surfaces as .obj, .stl and .ply, in metres; the surface of tetrahedra where the format has
     /// no others.
     Convert(ConvertArguments),
 }
@@ -161,8 +163,8 @@ fn list_labels(file: &Path) -> Result<()> {
 fn tetrahedralize(file: &Path, out: &Path, arguments: &ImportArguments) -> Result<()> {
     let ending = ending_of(out)?;
     ensure!(
-        matches!(ending.as_str(), "vtu" | "msh"),
-        "{}: tetrahedra are written as .vtu or .msh",
+        matches!(ending.as_str(), "vtu" | "vtk" | "msh"),
+        "{}: tetrahedra are written as .vtu, .vtk or .msh",
         out.display()
     );
     files::prepare_file(out, "--out")?;
@@ -174,7 +176,8 @@ fn tetrahedralize(file: &Path, out: &Path, arguments: &ImportArguments) -> Resul
             let stem = out.file_stem().unwrap_or_default().to_string_lossy();
             out.with_file_name(format!("{stem}_{}.{ending}", part.name))
         };
-        files::write_atomic(&target, &write_tets(&part.mesh, &ending)?)?;
+        let report = ReadReport::default();
+        files::write_atomic(&target, &write_tets(&part.mesh, &report, &ending)?)?;
     }
     files::print(&import::describe(&import))
 }
@@ -184,8 +187,8 @@ fn convert(arguments: &ConvertArguments) -> Result<()> {
     let ending = ending_of(out)?;
     let is_surface = matches!(ending.as_str(), "obj" | "stl" | "ply");
     ensure!(
-        is_surface || matches!(ending.as_str(), "vtu" | "msh"),
-        "{}: cannot write this format; tetrahedra go into .vtu or .msh, surfaces into .obj, .stl or .ply",
+        is_surface || matches!(ending.as_str(), "vtu" | "vtk" | "msh"),
+        "{}: cannot write this format; tetrahedra go into .vtu, .vtk or .msh, surfaces into .obj, .stl or .ply",
         out.display()
     );
     ensure!(scale.is_finite() && *scale > 0.0, "--scale: a number above zero is needed");
@@ -220,14 +223,19 @@ fn convert(arguments: &ConvertArguments) -> Result<()> {
             }
             write_surface(&surface, &ending)?
         }
-        Found::Tets(mesh, _) => {
-            let mesh = chosen(&name, &mesh, region, *component)?;
+        Found::Tets(mesh, mut report) => {
+            let (mesh, repairs) = chosen(&name, &mesh, region, *component)?;
+            for patch in &mut report.patches {
+                let kept = patch.vertices.iter().filter_map(|&v| repairs.vertex_after(v));
+                patch.vertices = kept.collect();
+            }
+            report.patches.retain(|patch| !patch.vertices.is_empty());
             let vertices = mesh.vertices().iter().map(|x| place(*x)).collect();
             // What mirrors is rewound there.
             let (mesh, _) = TetMesh::new(vertices, mesh.tets().to_vec(), mesh.regions().to_vec())?;
             match is_surface {
                 true => write_surface(&boundary_surface(&mesh).surface, &ending)?,
-                false => write_tets(&mesh, &ending)?,
+                false => write_tets(&mesh, &report, &ending)?,
             }
         }
     };
@@ -266,7 +274,7 @@ fn chosen(
     mesh: &TetMesh,
     regions: &[u32],
     component: Option<usize>,
-) -> Result<TetMesh> {
+) -> Result<(TetMesh, MeshRepairs)> {
     for region in regions {
         ensure!(
             mesh.regions().contains(region),
@@ -290,7 +298,7 @@ fn chosen(
     ensure!(!kept.is_empty(), "{name}: nothing is left; take other labels or another component");
     let tets = kept.iter().map(|&tet| mesh.tets()[tet]).collect();
     let regions = kept.iter().map(|&tet| mesh.regions()[tet]).collect();
-    Ok(TetMesh::new(mesh.vertices().to_vec(), tets, regions)?.0)
+    Ok(TetMesh::new(mesh.vertices().to_vec(), tets, regions)?)
 }
 
 fn ending_of(path: &Path) -> Result<String> {
@@ -298,9 +306,11 @@ fn ending_of(path: &Path) -> Result<String> {
     ending.with_context(|| format!("{}: the ending says which format to write", path.display()))
 }
 
-fn write_tets(mesh: &TetMesh, ending: &str) -> Result<Vec<u8>> {
-    if ending == "msh" {
-        return Ok(gmsh::write(mesh).into_bytes());
+fn write_tets(mesh: &TetMesh, report: &ReadReport, ending: &str) -> Result<Vec<u8>> {
+    match ending {
+        "msh" => return Ok(gmsh::write_binary(mesh, &report.patches, &report.region_names)?),
+        "vtk" => return Ok(vtk::write(mesh, &report.patches)?),
+        _ => {}
     }
     let regions = vtu::Array::integers("region", mesh.regions());
     Ok(vtu::write(mesh.vertices(), mesh.tets(), &[], &[regions])?)
