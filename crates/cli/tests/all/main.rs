@@ -16,6 +16,7 @@ mod devices;
 mod documents;
 mod haptics;
 mod hold;
+mod imports;
 mod replay;
 mod run;
 mod saved;
