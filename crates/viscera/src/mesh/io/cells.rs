@@ -97,6 +97,9 @@ impl Cells {
             self.nodes.extend_from_slice(nodes);
         }
         match shape {
+            Shape::Pyramid | Shape::Wedge | Shape::Hexahedron if !cfg!(feature = "formats") => {
+                self.skip(shape.name());
+            }
             Shape::Point | Shape::Line => self.skip(shape.name()),
             Shape::Triangle => self.add_triangle([corners[0], corners[1], corners[2]], cell),
             Shape::Quad => {

@@ -224,6 +224,12 @@ impl Fault {
         Self { place: Some(Place::Line(line)), problem }
     }
 
+    /// What only programs with the feature `formats` read.
+    pub fn not_built(found: &str) -> Self {
+        let advice = "convert it to .vtu by `viscera mesh convert`";
+        Self::whole_file(ReadProblem::Unsupported { found: found.into(), advice })
+    }
+
     pub fn whole_file(problem: ReadProblem) -> Self {
         Self { place: None, problem }
     }

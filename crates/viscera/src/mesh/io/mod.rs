@@ -129,12 +129,13 @@ fn read<T>(
     check_unit(unit_in_meters)
         .and_then(|()| find_kind(name, bytes))
         .and_then(|kind| match kind {
-            Kind::Gmsh => gmsh::read(bytes),
             Kind::VtkXml => vtu::read(bytes),
+            Kind::Obj => obj::read(bytes),
+            Kind::Gmsh => gmsh::read(bytes),
+            _ if !cfg!(feature = "formats") => Err(Fault::not_built("this format")),
             Kind::Vtk => vtk::read(bytes),
             Kind::Medit => medit::read(bytes),
             Kind::Abaqus => abaqus::read(bytes),
-            Kind::Obj => obj::read(bytes),
             Kind::Stl => stl::read(bytes),
             Kind::Ply => ply::read(bytes),
             Kind::TetGen { is_nodes } => {

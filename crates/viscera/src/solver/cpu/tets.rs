@@ -309,8 +309,8 @@ pub fn load_rows<L: Lanes, const N: usize>(values: &[L::Real], lane: usize) -> [
     rows
 }
 
-/// The lanes one by one, in their places.
-#[inline(always)]
+/// The lanes one by one, in their places. All of a page's module is compiled for its registers, and has no room for copies.
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn rows<L: Lanes>(values: Point<L>, lane: usize) -> [Point<L::Real>; LANES] {
     let mut columns = [[L::Real::ZERO; LANES]; 4];
     for (column, value) in columns.iter_mut().zip([values.x, values.y, values.z, values.w]) {

@@ -57,8 +57,8 @@ pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
                 return Err(line.fault(ReadProblem::SecondPart { what }));
             }
             b"MeshFormat" => file.read_format(section)?,
-            b"PhysicalNames" => file.read_names()?,
-            b"Entities" if file.is_four() => file.read_entities()?,
+            b"PhysicalNames" if cfg!(feature = "formats") => file.read_names()?,
+            b"Entities" if cfg!(feature = "formats") && file.is_four() => file.read_entities()?,
             b"NOD" | b"Nodes" => {
                 file.begin(line, file.vertices.is_some())?;
                 let mut vertices =
@@ -70,6 +70,7 @@ pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
             b"ELM" | b"Elements" => {
                 file.begin(line, file.elements.is_some())?;
                 let mut elements = match (file.is_four(), file.numbers.is_binary()) {
+                    _ if !cfg!(feature = "formats") => file.read_elements()?,
                     (true, _) => file.read_element_blocks()?,
                     (_, true) => file.read_binary_elements()?,
                     _ => file.read_elements()?,
@@ -121,6 +122,9 @@ impl<'a> File<'a> {
                 return Err(line.fault(ReadProblem::Unsupported { found, advice }));
             }
         });
+        if !cfg!(feature = "formats") && (self.is_four() || file_type != 0) {
+            return Err(Fault::not_built("this version of Gmsh"));
+        }
         if file_type == 0 {
             return self.numbers.skip_section(section);
         }
@@ -372,7 +376,7 @@ impl<'a> File<'a> {
                 Shape::Triangle | Shape::Quad => 2,
                 _ => 3,
             };
-            if dimension < 3 && group > 0 {
+            if cfg!(feature = "formats") && dimension < 3 && group > 0 {
                 patches.entry((dimension, group)).or_default().extend_from_slice(&nodes);
             }
             let region = u32::try_from(group).map_err(|_| Fault {
@@ -382,18 +386,10 @@ impl<'a> File<'a> {
             cells.add(shape, &nodes, region, cell);
         }
         let names = self.names;
-        let patches = patches.into_iter().map(|(key, mut vertices)| {
-            vertices.sort_unstable();
-            vertices.dedup();
-            let kind = ["points", "curve", "surface"][key.0 as usize];
-            let name = names.get(&key).cloned().unwrap_or_else(|| format!("{kind} {}", key.1));
-            Patch { name, vertices }
-        });
-        let patches = patches.collect();
-        let volumes = names.iter().filter(|((dimension, _), _)| *dimension == 3);
-        let region_names =
-            volumes.filter_map(|((_, tag), name)| Some((u32::try_from(*tag).ok()?, name.clone())));
-        let region_names = region_names.collect();
+        let (patches, region_names) = match cfg!(feature = "formats") {
+            true => named(&names, patches),
+            false => Default::default(),
+        };
         let (of_vertices, of_cells) = (vertices.places, elements.places);
         let places = move |place| match place {
             MeshPlace::Whole => None,
@@ -403,4 +399,22 @@ impl<'a> File<'a> {
         let places = Box::new(places);
         Ok(Content { format, vertices: vertices.positions, cells, patches, region_names, places })
     }
+}
+
+/// Patches and regions with their names.
+fn named(
+    names: &BTreeMap<(u64, u64), String>,
+    patches: BTreeMap<(u64, u64), Vec<u32>>,
+) -> (Vec<Patch>, Vec<(u32, String)>) {
+    let patches = patches.into_iter().map(|(key, mut vertices)| {
+        vertices.sort_unstable();
+        vertices.dedup();
+        let kind = ["points", "curve", "surface"][key.0 as usize];
+        let name = names.get(&key).cloned().unwrap_or_else(|| format!("{kind} {}", key.1));
+        Patch { name, vertices }
+    });
+    let volumes = names.iter().filter(|((dimension, _), _)| *dimension == 3);
+    let region_names =
+        volumes.filter_map(|((_, tag), name)| Some((u32::try_from(*tag).ok()?, name.clone())));
+    (patches.collect(), region_names.collect())
 }
