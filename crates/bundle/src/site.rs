@@ -27,6 +27,28 @@ pub struct Site {
     pub build: String,
 }
 
+/// Code without lines that are comments and without indentation, a quarter of what travels. Texts between backticks stay as
+/// they are.
+fn without_comments(code: &str) -> String {
+    let (mut lean, mut is_text, mut is_comment) = (String::new(), false, false);
+    for line in code.lines() {
+        let trimmed = line.trim();
+        if !is_text {
+            if is_comment || trimmed.starts_with("/*") {
+                is_comment = !trimmed.ends_with("*/");
+                continue;
+            }
+            if trimmed.is_empty() || trimmed.starts_with("//") {
+                continue;
+            }
+        }
+        lean.push_str(if is_text { line } else { trimmed });
+        lean.push('\n');
+        is_text ^= line.matches('`').count() % 2 == 1;
+    }
+    lean
+}
+
 /// Names, rewrites and fills in. `sources` are the page's own files, `generated` those of wasm-bindgen, which
 /// lie beside them.
 pub fn build(sources: &Files, generated: &Files) -> Result<Site> {
@@ -49,7 +71,11 @@ pub fn build(sources: &Files, generated: &Files) -> Result<Site> {
     let mut site = Files::new();
     for (path, content) in &all {
         let content = match is_text(path) {
-            true => rewritten(path, files::text(&all, path)?, &names).into_bytes(),
+            true => {
+                let text = rewritten(path, files::text(&all, path)?, &names);
+                let is_code = path.ends_with(".js") || path.ends_with(".css");
+                if is_code { without_comments(&text) } else { text }.into_bytes()
+            }
             false => content.clone(),
         };
         let content = match path.ends_with(".html") {
@@ -177,4 +203,18 @@ fn filled(text: &str, line: &str, with: &str) -> Result<String> {
         bail!("{SERVICE_WORKER}: it must have the line `{line}` once, to be filled in");
     }
     Ok(text.replace(line, with))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn code_loses_comments_and_indentation_and_keeps_texts() {
+        let code = "/** What.\n * it */\nconst a = `\n  // text\n`;\n  // Why.\n  f(a); // here\n\n/* one */\n.b {\n  top: 0;\n}\n";
+        assert_eq!(
+            without_comments(code),
+            "const a = `\n  // text\n`;\nf(a); // here\n.b {\ntop: 0;\n}\n"
+        );
+    }
 }

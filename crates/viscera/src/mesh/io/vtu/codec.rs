@@ -95,6 +95,9 @@ impl<'a> Codec<'a> {
             }
         };
         let is_big_endian = root.attribute("byte_order") == Some("BigEndian");
+        if is_big_endian && !cfg!(feature = "formats") {
+            return Err(Fault::not_built("VTK data in big-endian order"));
+        }
         Ok(Self { header, is_big_endian, is_compressed, appended, lines })
     }
 
@@ -191,7 +194,7 @@ impl<'a> Codec<'a> {
         let word = bytes.get(start..).and_then(|rest| rest.get(..self.header));
         let word = word.ok_or_else(|| cut(node))?;
         let join = |sum: u64, &byte: &u8| sum << 8 | u64::from(byte);
-        let value = match self.is_big_endian {
+        let value = match cfg!(feature = "formats") && self.is_big_endian {
             true => word.iter().fold(0, join),
             false => word.iter().rev().fold(0, join),
         };
