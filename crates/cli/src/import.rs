@@ -66,13 +66,27 @@ pub fn import(file: &Path, arguments: &ImportArguments) -> Result<Import> {
     Ok(made?)
 }
 
-/// Writes a scene and its meshes into a folder; returns the scene file.
-pub fn write(import: &Import, title: &str, folder: &Path) -> Result<PathBuf> {
+/// Writes a scene and its meshes into a folder; returns the scene file. A scene that is there and says something else, as one
+/// that a person has changed, is replaced only where `is_forced`.
+pub fn write(import: &Import, title: &str, folder: &Path, is_forced: bool) -> Result<PathBuf> {
     files::prepare_folder(folder, "--out")?;
-    for (name, bytes) in import.scene(title).files.into_iter().rev() {
-        files::write_atomic(&folder.join(name), &bytes)?;
+    let scene = folder.join("scene.toml");
+    let written = import.scene(title).files;
+    let is_other = written.iter().any(|(name, bytes)| {
+        folder.join(name) == scene && std::fs::read(&scene).is_ok_and(|known| known != *bytes)
+    });
+    if is_other && !is_forced {
+        bail!(
+            "{0}: there is another scene, perhaps changed by hand; run that one (viscera run {0}), name another folder with --out, \
+             or remove it",
+            scene.display()
+        );
     }
-    Ok(folder.join("scene.toml"))
+    // The scene comes last: where it is, its meshes are.
+    for (name, bytes) in written.iter().rev() {
+        files::write_atomic(&folder.join(name), bytes)?;
+    }
+    Ok(scene)
 }
 
 /// What was made: bodies with their sizes and shapes, and what was assumed.
@@ -139,7 +153,7 @@ fn looks_like_data(path: &Path) -> bool {
 /// The scene of a file from elsewhere, made in a folder beside the results.
 pub fn scene_of(path: &Path, folder: &Path) -> Result<PathBuf> {
     let import = import(path, &ImportArguments::default())?;
-    let scene = write(&import, &title_of(path), &folder.join("scene"))?;
+    let scene = write(&import, &title_of(path), &folder.join("scene"), false)?;
     files::print(&describe(&import))?;
     files::print(&format!("scene: {}\n", scene.display()))?;
     Ok(scene)

@@ -30,6 +30,9 @@ pub enum SceneCommand {
         /// The folder for the scene; `out/NAME/scene` where there is none
         #[arg(long, short)]
         out: Option<PathBuf>,
+        /// Replace a scene that is there and says something else
+        #[arg(long)]
+        force: bool,
         #[command(flatten)]
         import: ImportArguments,
     },
@@ -41,20 +44,27 @@ pub fn execute(command: &SceneCommand) -> Result<()> {
         SceneCommand::Describe { markdown: true } => describe_markdown(),
         SceneCommand::Describe { markdown: false } => describe_text(),
         SceneCommand::List => list()?,
-        SceneCommand::New { file, out, import } => new(file, out.as_deref(), import)?,
+        SceneCommand::New { file, out, force, import } => {
+            new(file, out.as_deref(), *force, import)?
+        }
     };
     files::print(&text)
 }
 
 /// Makes a scene, and says what it is and what to do next.
-fn new(file: &Path, out: Option<&Path>, arguments: &ImportArguments) -> Result<String> {
+fn new(
+    file: &Path,
+    out: Option<&Path>,
+    is_forced: bool,
+    arguments: &ImportArguments,
+) -> Result<String> {
     let title = import::title_of(file);
     let folder = match out {
         Some(folder) => folder.to_owned(),
         None => Path::new("out").join(title.replace(' ', "_")).join("scene"),
     };
     let made = import::import(file, arguments)?;
-    let scene = import::write(&made, &title, &folder)?;
+    let scene = import::write(&made, &title, &folder, is_forced)?;
     let shown = scene.display();
     Ok(format!(
         "{}scene: {shown}\nnext:  viscera run {shown}   or   viscera view {shown}\n",

@@ -1,8 +1,10 @@
 //! Bodies of a file.
 
+use std::collections::BTreeMap;
+
 use viscera::mesh::io::ReadReport;
 use viscera::mesh::winding::fill;
-use viscera::mesh::{SurfaceMesh, TetMesh};
+use viscera::mesh::{SurfaceMesh, TetMesh, tet_volume};
 use viscera::scalar::{Vec3, vec3};
 use viscera_volume::VolumeReport;
 
@@ -11,7 +13,7 @@ use crate::open::Found;
 use crate::organs::of_labels;
 use crate::size::Fineness;
 use crate::tissue::Tissue;
-use crate::unit::{Unit, guess};
+use crate::unit::{Unit, guess, length_text};
 use crate::{ImportError, tissue};
 
 /// What is asked for.
@@ -94,7 +96,7 @@ pub struct Import {
     pub notes: Vec<String>,
 }
 
-/// Makes bodies of a file. `observe` is told what is being made.
+/// Turns a file into bodies; calls `observe` with the name of each before it is filled.
 pub fn parts(
     file: &str,
     found: Found,
@@ -111,8 +113,9 @@ pub fn parts(
                 options.unit.map_or_else(|| guess(stem, mesh.vertices(), mesh.volume()), given);
             let mut notes = vec![unit.reason.clone()];
             notes.extend(notes_of(&report, unit.meters));
-            let mesh = scaled(&mesh, unit.meters);
-            Ok(alone(file, name, mesh, None, notes))
+            let mesh = scaled(file, &mesh, unit.meters)?;
+            let inner = inner_of(&mesh, &report, &mut notes);
+            Ok(Import { notes, ..alone(file, name, mesh, None, inner) })
         }
         Found::Surface(surface, report) => {
             observe(&name);
@@ -122,7 +125,7 @@ pub fn parts(
             notes.extend(notes_of(&report, unit.meters));
             let mut surface = surface;
             surface.vertices.iter_mut().for_each(|x| *x = *x * unit.meters);
-            let volume = volume * unit.meters.powi(3);
+            let volume = volume * unit.meters * unit.meters * unit.meters;
             let spacing = options.fineness.spacing(volume);
             let filled = fill(&surface, spacing)
                 .map_err(|error| ImportError::Fill { file: file.into(), error })?;
@@ -134,9 +137,9 @@ pub fn parts(
             }
             if filled.report.components > 1 {
                 let count = filled.report.components;
-                notes.push(format!("{count} unconnected parts: each needs a hold of its own"));
+                notes.push(format!("{count} unconnected parts, each with a hold"));
             }
-            Ok(alone(file, name, filled.mesh, Some(surface), notes))
+            Ok(Import { notes, ..alone(file, name, filled.mesh, Some(surface), Vec::new()) })
         }
     }
 }
@@ -146,19 +149,13 @@ fn given(meters: f64) -> Unit {
 }
 
 /// A scene of one body that is held at its lowest part.
-fn alone(
-    file: &str,
-    name: String,
-    mesh: TetMesh,
-    skin: Option<Skin>,
-    notes: Vec<String>,
-) -> Import {
+fn alone(file: &str, name: String, mesh: TetMesh, skin: Option<Skin>, inner: Vec<Inner>) -> Import {
     let down = vec3(0.0, 0.0, -1.0);
-    let hold = at_the_back(&name, mesh.vertices(), down, "lowest");
+    let holds = at_the_back(&name, &mesh, down, "lowest");
     let tissue = tissue::of_name(&name);
-    let part =
-        Part { name, mesh, skin, tissue, inner: Vec::new(), holds: vec![hold], notes: Vec::new() };
-    Import { file: file.into(), parts: vec![part], touching: Vec::new(), down, notes }
+    let part = Part { name, mesh, skin, tissue, inner, holds, notes: Vec::new() };
+    let (file, notes) = (file.to_owned(), Vec::new());
+    Import { file, parts: vec![part], touching: Vec::new(), down, notes }
 }
 
 fn of_scan(
@@ -177,11 +174,35 @@ fn of_scan(
     Ok(Import { notes, ..import })
 }
 
-fn scaled(mesh: &TetMesh, unit: f64) -> TetMesh {
+fn scaled(file: &str, mesh: &TetMesh, unit: f64) -> Result<TetMesh, ImportError> {
     let vertices = mesh.vertices().iter().map(|&x| x * unit).collect();
-    // What was a mesh stays one, but for one that is too small or too large to be: its own error comes later.
-    TetMesh::new(vertices, mesh.tets().to_vec(), mesh.regions().to_vec())
-        .map_or_else(|_| mesh.clone(), |(mesh, _)| mesh)
+    let scaled = TetMesh::new(vertices, mesh.tets().to_vec(), mesh.regions().to_vec());
+    let fail = |error| ImportError::Scale { file: file.into(), unit: length_text(unit), error };
+    scaled.map(|(mesh, _)| mesh).map_err(fail)
+}
+
+/// The regions of a mesh besides the largest: those whose names say what they are made of; others are told.
+fn inner_of(mesh: &TetMesh, report: &ReadReport, notes: &mut Vec<String>) -> Vec<Inner> {
+    let mut volumes = BTreeMap::new();
+    for (tet, &region) in mesh.regions().iter().enumerate() {
+        *volumes.entry(region).or_insert(0.0) += tet_volume(mesh.corners(tet));
+    }
+    let largest = volumes.iter().max_by(|a, b| a.1.total_cmp(b.1)).map(|(region, _)| *region);
+    let mut inner = Vec::new();
+    for (&region, volume) in volumes.iter().filter(|(region, _)| Some(**region) != largest) {
+        let named = report.region_names.iter().find(|(known, _)| *known == region);
+        let name = named.map_or(format!("region {region}"), |(_, name)| name.clone());
+        let tissue = tissue::of_name(&name);
+        let size = format!("`{name}` (label {region}, {:.1} ml)", 1e6 * volume);
+        if tissue.preset.is_some() {
+            inner.push(Inner { region, name: name_of(&name), tissue });
+        } else {
+            notes.push(format!(
+                "{size} is made of the same: give it a [[body.region]] where it is not"
+            ));
+        }
+    }
+    inner
 }
 
 /// What reading did to a mesh.

@@ -1,11 +1,12 @@
 //! Why a file becomes no scene.
 
+use viscera::mesh::MeshError;
 use viscera::mesh::io::ReadError;
 use viscera::mesh::tetrahedralize::TetrahedralizeError;
 use viscera::mesh::winding::FillError;
 use viscera_volume::{OrganError, VolumeError};
 
-/// Why a file becomes no scene. `E` is why a file cannot be loaded.
+/// Why a file becomes no scene.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
@@ -25,6 +26,16 @@ pub enum ImportError {
         file: String,
         /// Why.
         error: FillError,
+    },
+    /// A mesh is none in this unit: too small, or too far away.
+    #[error("{file}: with 1 in the file as {unit}, {error}; give another --unit")]
+    Scale {
+        /// The file.
+        file: String,
+        /// The unit.
+        unit: String,
+        /// Why.
+        error: MeshError,
     },
     /// A label has no shape.
     #[error("{file}: {error}")]

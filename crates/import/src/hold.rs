@@ -1,43 +1,65 @@
 //! Where a body is held.
 
-use viscera::mesh::topology::BoundingBox;
+use viscera::mesh::TetMesh;
+use viscera::mesh::topology::{BoundingBox, connected_components};
 use viscera::scalar::{Vec3, vec3};
 
-/// Vertices on the side of a plane that its normal points to.
+/// Vertices that are held.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hold {
     /// Of the fixing.
     pub name: String,
-    /// A point on the plane [m].
-    pub point: Vec3<f64>,
-    /// Of length 1.
-    pub normal: Vec3<f64>,
-    /// What it stands for, in words.
+    /// Which they are.
+    pub place: Place,
+    /// What the hold stands for, in words.
     pub reason: String,
+}
+
+/// A choice of vertices.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Place {
+    /// On the side of a plane that its normal points to.
+    Beyond {
+        /// A point on the plane [m].
+        point: Vec3<f64>,
+        /// Of length 1.
+        normal: Vec3<f64>,
+    },
+    /// In a box along the axes.
+    Within(BoundingBox),
 }
 
 /// The share of a body's extent that is its back.
 const BACK: f64 = 0.15;
 
-/// Holds a body at its lowest part: where gravity pulls it to.
-pub fn at_the_back(body: &str, vertices: &[Vec3<f64>], down: Vec3<f64>, side: &str) -> Hold {
-    let bounds = BoundingBox::around(vertices);
-    let along = |x: Vec3<f64>| x.dot(down);
-    let (low, high) =
-        vertices.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| {
-            (low.min(along(x)), high.max(along(x)))
-        });
-    let depth = high - BACK * (high - low);
-    let center = bounds.center();
-    Hold {
-        name: format!("{body}_{side}"),
-        point: center + down * (depth - along(center)),
-        normal: down,
-        reason: format!(
-            "the {side} {:.0} % of it: a guess; organs hang on ligaments and lie on their neighbours",
-            100.0 * BACK
-        ),
+/// More unconnected parts of a body get no holds of their own.
+const MOST_PARTS: usize = 12;
+
+/// Holds every unconnected part of a body at its lowest end, where gravity pulls it to. `down` is along an axis.
+pub fn at_the_back(body: &str, mesh: &TetMesh, down: Vec3<f64>, side: &str) -> Vec<Hold> {
+    let parts = connected_components(mesh);
+    let mut points = vec![Vec::new(); parts.count];
+    for (&part, &x) in parts.labels.iter().zip(mesh.vertices()) {
+        points[part as usize].push(x);
     }
+    let hold = |(number, points): (usize, &Vec<Vec3<f64>>)| {
+        let mut bounds = BoundingBox::around(points);
+        let size = bounds.size();
+        // Away from the lowest end all but a share is cut off.
+        let cut = size.scale(down) * (1.0 - BACK);
+        bounds.min += cut.max(Vec3::ZERO);
+        bounds.max += cut.min(Vec3::ZERO);
+        let name = match number {
+            0 => format!("{body}_{side}"),
+            _ => format!("{body}_{side}_{}", number + 1),
+        };
+        let percent = 100.0 * BACK;
+        let reason = format!(
+            "the {side} {percent:.0} % of it: a guess; organs hang on ligaments and lie on their neighbours"
+        );
+        Hold { name, place: Place::Within(bounds), reason }
+    };
+    points.iter().enumerate().take(MOST_PARTS).map(hold).collect()
 }
 
 /// Rounded to hundredths of a millimetre, so that a scene file stays readable.

@@ -16,7 +16,7 @@ mod unit;
 
 pub use bodies::{Import, Inner, Options, Part, Skin, Touching, parts};
 pub use error::ImportError;
-pub use hold::Hold;
+pub use hold::{Hold, Place};
 pub use open::{Found, open};
 pub use scene::Written;
 pub use size::Fineness;

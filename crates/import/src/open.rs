@@ -2,7 +2,9 @@
 
 use viscera::mesh::io::{Mesh, MeshFile, ReadReport};
 use viscera::mesh::{SurfaceMesh, TetMesh};
-use viscera_volume::{LabelMap, Limits, NamesFrom, VolumeReport, read, total_segmentator};
+use viscera_volume::{
+    LabelMap, Limits, NamesFrom, VolumeReport, read, summarize, total_segmentator,
+};
 
 use crate::ImportError;
 
@@ -39,8 +41,13 @@ pub fn open(
         });
     }
     let (mut map, mut report) = read(name, &file.bytes, Limits::default())?;
-    // Without names of its own a map of up to 117 labels is read as one of TotalSegmentator's, and that is said.
-    if report.names_from == NamesFrom::None {
+    let used = summarize(&map);
+    if let (NamesFrom::None, [only]) = (report.names_from, &used[..]) {
+        // A mask of one organ is what its file is named after.
+        let stem = name.rsplit(['/', '\\']).next().and_then(|file| file.split('.').next());
+        map.set_names([(only.label, stem.unwrap_or("organ").to_owned())].into());
+    } else if report.names_from == NamesFrom::None {
+        // Others are read as TotalSegmentator's, and that is said.
         // Labels above 117 are of another program, and stay without names.
         let _ = total_segmentator::name_labels(&mut map, &mut report);
     }

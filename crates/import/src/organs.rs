@@ -10,7 +10,7 @@ use viscera_volume::{LabelMap, Organ, OrganReport, Wall, summarize};
 
 use crate::ImportError;
 use crate::bodies::{Import, Inner, Options, Part, Touching, name_of};
-use crate::hold::{Hold, at_the_back};
+use crate::hold::{Hold, Place, at_the_back};
 use crate::tissue::{self, Kind};
 
 /// A label that is enclosed by another to this share of its faces is a part of it: a tumour in a liver.
@@ -72,7 +72,7 @@ pub fn of_labels(
         }
         parts.push(part);
     }
-    let touching = touching(&parts, map.to_world().voxel_volume().cbrt());
+    let touching = touching(&parts, libm::cbrt(map.to_world().voxel_volume()));
     for touching in touching.iter().filter(|touching| touching.share >= HANGS) {
         // A gallbladder hangs on its liver.
         parts[touching.from].holds.clear();
@@ -192,12 +192,13 @@ fn build(
 ) -> Result<Part, ImportError> {
     let Plan { organ, report, .. } = plan;
     let fail = |error| ImportError::Organs { file: file.into(), organ: plan.name.clone(), error };
-    let voxel = map.to_world().voxel_volume().cbrt();
+    let voxel = libm::cbrt(map.to_world().voxel_volume());
+    let size = libm::cbrt(report.volume);
     let mut notes = Vec::new();
     let skin = surface(organ, voxel.max(spacing / 8.0)).map_err(fail)?;
-    let spacing = spacing.min(COARSEST * report.volume.cbrt());
+    let spacing = spacing.min(COARSEST * size);
     let mut wall_share = None;
-    let wall = plan.kind.wall().filter(|wall| 2.5 * wall < report.volume.cbrt());
+    let wall = plan.kind.wall().filter(|wall| 2.5 * wall < size);
     let solid = wall.and_then(|_| Solid::new(&skin).ok());
     let made = match (wall, &solid) {
         (Some(thin), Some(skin)) if is_hollow => {
@@ -228,7 +229,7 @@ fn build(
         notes.push(format!("left out {pieces} crumbs of {voxels} voxels"));
     }
     if made.components > 1 {
-        notes.push(format!("{} unconnected parts: each needs a hold", made.components));
+        notes.push(format!("{} unconnected parts, each with a hold", made.components));
     }
     let (mesh, inner) = with_inner(map, plan, mesh, &mut notes);
     let name = name_of(&plan.name);
@@ -237,7 +238,7 @@ fn build(
         let faces: Vec<&str> = holds.iter().map(|hold| hold.reason.as_str()).collect();
         notes.push(format!("cut by the image: {}", faces.join(", ")));
     }
-    holds.push(at_the_back(&name, mesh.vertices(), down, "back"));
+    holds.extend(at_the_back(&name, &mesh, down, "back"));
     let filled = wall.filter(|_| !is_hollow).map(|wall| (wall, report.volume));
     let mut tissue = tissue::of_filled(&plan.name, filled);
     if let Some(share) = wall_share {
@@ -305,7 +306,7 @@ fn caps(map: &LabelMap, mesh: &TetMesh, body: &str) -> Vec<Hold> {
                 let side = if is_end { side } else { side.opposite() };
                 let name = format!("{body}_{side}");
                 let reason = format!("its {side} end");
-                holds.push(Hold { name, point, normal, reason });
+                holds.push(Hold { name, place: Place::Beyond { point, normal }, reason });
             }
         }
     }

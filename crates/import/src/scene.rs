@@ -4,9 +4,10 @@ use std::fmt::Write;
 
 use viscera::mesh::io::{ply, vtu};
 use viscera::mesh::topology::BoundingBox;
+use viscera::scalar::Vec3;
 
 use crate::bodies::{Import, Part};
-use crate::hold::rounded;
+use crate::hold::{Place, rounded};
 use crate::tissue::Tissue;
 
 /// Files of a scene: names, relative to the scene file, and bytes. The scene file itself comes first.
@@ -55,13 +56,7 @@ impl Import {
                 let _ = writeln!(text, "\n# `{}` is held at {}.", part.name, hold.reason);
                 let _ =
                     writeln!(text, "[[fixing]]\nname = {:?}\nbody = {:?}", hold.name, part.name);
-                let normal = hold.normal.to_array().map(|value| format!("{:.6}", value + 0.0));
-                let _ = writeln!(
-                    text,
-                    "half_space = {{ point = [{}], normal = [{}] }}",
-                    lengths(hold.point),
-                    normal.join(", ")
-                );
+                let _ = writeln!(text, "{}", selector(&hold.place));
             }
         }
         for touching in &self.touching {
@@ -139,19 +134,29 @@ fn keys(tissue: &Tissue) -> String {
     }
 }
 
-/// A selection of all of a body.
-fn whole(part: &Part) -> String {
-    let bounds = BoundingBox::around(part.mesh.vertices());
-    let more = viscera::scalar::Vec3::splat(1e-2);
-    format!(
-        "{{ body = {:?}, box = {{ min = [{}], max = [{}] }} }}",
-        part.name,
-        lengths(bounds.min - more),
-        lengths(bounds.max + more)
-    )
+fn selector(place: &Place) -> String {
+    match place {
+        Place::Beyond { point, normal } => {
+            let normal = normal.to_array().map(|value| format!("{:.6}", value + 0.0));
+            let normal = normal.join(", ");
+            format!("half_space = {{ point = [{}], normal = [{normal}] }}", lengths(*point))
+        }
+        Place::Within(bounds) => {
+            // A tenth of a millimetre more, for rounding here and in files of single precision.
+            let more = Vec3::splat(1e-4);
+            let (min, max) = (lengths(bounds.min - more), lengths(bounds.max + more));
+            format!("box = {{ min = [{min}], max = [{max}] }}")
+        }
+    }
 }
 
-fn lengths(x: viscera::scalar::Vec3<f64>) -> String {
+/// A selection of all of a body.
+fn whole(part: &Part) -> String {
+    let place = Place::Within(BoundingBox::around(part.mesh.vertices()));
+    format!("{{ body = {:?}, {} }}", part.name, selector(&place))
+}
+
+fn lengths(x: Vec3<f64>) -> String {
     let texts = rounded(x).to_array().map(|value| format!("\"{:.2} mm\"", 1e3 * value + 0.0));
     texts.join(", ")
 }

@@ -45,13 +45,14 @@ pub fn guess(name: &str, vertices: &[Vec3<f64>], volume: f64) -> Unit {
     let size = BoundingBox::around(vertices).size();
     let longest = size.x.max(size.y).max(size.z);
     let name = name.to_ascii_lowercase();
-    let organ = ORGANS.iter().find(|(word, _)| name.contains(word));
+    // An open sheet encloses nothing.
+    let organ = ORGANS.iter().find(|(word, _)| name.contains(word) && volume > 0.0);
     if let Some(&(word, litres)) = organ {
         let wanted = 1e-3 * litres;
         for (meters, text) in COMMON {
-            let ratio = volume * meters.powi(3) / wanted;
+            let ratio = volume * cube(meters) / wanted;
             if ratio > 1.0 / PLAUSIBLE && ratio < PLAUSIBLE {
-                let has = 1e3 * volume * meters.powi(3);
+                let has = 1e3 * volume * cube(meters);
                 let reason = format!("1 in the file as 1 {text}: a {word} of {}", litres_text(has));
                 return Unit { meters, reason };
             }
@@ -62,7 +63,7 @@ pub fn guess(name: &str, vertices: &[Vec3<f64>], volume: f64) -> Unit {
             "1 in the file as {}: as {} m^3 it would be no {word}, so it has an adult's {}",
             length_text(meters),
             short(volume),
-            litres_text(1e3 * volume * meters.powi(3))
+            litres_text(1e3 * volume * cube(meters))
         );
         return Unit { meters, reason };
     }
@@ -82,8 +83,12 @@ pub fn guess(name: &str, vertices: &[Vec3<f64>], volume: f64) -> Unit {
     Unit { meters, reason }
 }
 
+fn cube(x: f64) -> f64 {
+    x * x * x
+}
+
 fn two_digits(value: f64) -> f64 {
-    let tens = 10f64.powi(1 - value.log10().floor() as i32);
+    let tens = libm::pow(10.0, 1.0 - libm::log10(value).floor());
     let rounded = (value * tens).round() / tens;
     if rounded.is_finite() && rounded > 0.0 { rounded } else { value }
 }
@@ -135,5 +140,10 @@ mod tests {
         assert_eq!(guess("part.obj", &points(120.0), 1e5).meters, 1e-3);
         assert_eq!(guess("part.obj", &points(0.2), 1e-3).meters, 1.0);
         assert_eq!(guess("part.obj", &points(1e5), 1e12).meters, 1.5e-6);
+        assert_eq!(
+            guess("liver.obj", &points(120.0), 0.0).meters,
+            1e-3,
+            "a sheet encloses nothing"
+        );
     }
 }

@@ -39,7 +39,7 @@
 //! | `read` | the format of a file, by its content |
 //! | `source` | bytes as they are, or inflated as far as they are needed |
 //! | `values` | types of numbers, in both byte orders |
-//! | `collect` | numbers to labels: what is no label map is told here |
+//! | `collect` | numbers to labels; refuses scans that are no label maps |
 //! | `nifti`, `nrrd` | the formats |
 //! | `label_map`, `affine` | the result |
 //! | `report`, `error` | what was found, what is wrong |

@@ -125,7 +125,7 @@ impl Organ {
             normals: inverse.columns,
             image: size.map(|size| size as f64),
             // A plane's blurred mask falls by this much for each voxel.
-            scale: BLUR * (2.0 * std::f64::consts::PI).sqrt() * to_world.voxel_volume().cbrt(),
+            scale: BLUR * (2.0 * std::f64::consts::PI).sqrt() * libm::cbrt(to_world.voxel_volume()),
         };
         organ.level = organ.level_of(pieces.voxels as f64);
         let report = OrganReport {
@@ -303,7 +303,7 @@ impl SignedDistance for Wall<'_> {
 
 /// A Gaussian along each axis; what lies beyond the box is as its border.
 fn blurred(mut field: Vec<f32>, dims: [usize; 3]) -> Vec<f32> {
-    let weight = |k: i32| libm::exp(-0.5 * (f64::from(k) / BLUR).powi(2));
+    let weight = |k: i32| libm::exp(-0.5 * f64::from(k * k) / (BLUR * BLUR));
     let sum: f64 = (-(REACH as i32)..=REACH as i32).map(weight).sum();
     let weights: Vec<f32> =
         (-(REACH as i32)..=REACH as i32).map(|k| (weight(k) / sum) as f32).collect();

@@ -46,7 +46,7 @@ impl<'a> Source<'a> {
     /// The next bytes of a part, all that the buffer holds.
     pub fn take(&mut self, part: &mut Part, buffer: &mut [u8]) -> Result<(), VolumeProblem> {
         let Part { reading, needed, .. } = *part;
-        // What is not there is told before any of it is read.
+        // Missing data is an error before any of it is read.
         if let Self::Plain(bytes) = self
             && (bytes.len() as u64) < needed - part.found.min(needed)
         {

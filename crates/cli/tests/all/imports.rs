@@ -37,6 +37,17 @@ fn a_surface_is_run_at_once() {
     // And again, as anybody would who has changed it.
     let again = ["run", "out/scene/scene.toml", "--frames", "1", "--out", "again"];
     assert_eq!(bench.end_of(&again).code, Some(0));
+    // What a person has changed is not overwritten.
+    let changed = scene.replace("velocity_factor = 0.95", "velocity_factor = 0.9");
+    bench.write("out/scene/scene.toml", changed.as_bytes());
+    let end = bench.end_of(&["run", "spleen.obj", "--frames", "2", "--out", "out"]);
+    assert_eq!(end.code, Some(1));
+    assert!(end.stderr.contains("viscera run out/scene/scene.toml"), "{}", end.stderr);
+    let new = ["scene", "new", "spleen.obj", "--out", "out/scene"];
+    assert_eq!(bench.end_of(&new).code, Some(1));
+    assert_eq!(bench.read("out/scene/scene.toml"), changed.as_bytes());
+    assert_eq!(bench.end_of(&[&new[..], &["--force"]].concat()).code, Some(0));
+    assert_eq!(bench.read("out/scene/scene.toml"), scene.as_bytes());
 }
 
 #[test]

@@ -161,3 +161,18 @@ fn what_is_no_mesh_and_no_scan_is_told() {
     let error = open("a.stl", |_| Err("a.stl: there is no such file".into())).err().expect("none");
     assert_eq!(error.to_string(), "a.stl: there is no such file");
 }
+
+#[test]
+fn a_mask_of_one_organ_is_named_after_its_file() {
+    let mut text = String::from(
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: text\nspacings: 5 5 5\n\n",
+    );
+    for n in 0..512 {
+        let is_inside = [n % 8, n / 8 % 8, n / 64].iter().all(|at| (1..7).contains(at));
+        text.push_str(if is_inside { "1 " } else { "0 " });
+    }
+    // Label 1 of TotalSegmentator is a spleen.
+    let found = open("data/liver.nrrd", |_| Ok(text.clone().into_bytes())).expect("a map");
+    let import = parts("data/liver.nrrd", found, &coarse(), &mut |_| ()).expect("a liver");
+    assert_eq!(import.parts[0].name, "liver");
+}

@@ -4,9 +4,9 @@ use viscera::mesh::distance::{SignedDistance, Sphere};
 use viscera::mesh::io::{gmsh, obj};
 use viscera::mesh::tetrahedralize::{surface, tetrahedralize};
 use viscera::mesh::topology::count_open_edges;
-use viscera::mesh::{SurfaceMesh, boundary_surface};
+use viscera::mesh::{SurfaceMesh, TetMesh, boundary_surface};
 use viscera::scalar::{Vec3, vec3};
-use viscera_import::{Import, Options, open, parts};
+use viscera_import::{Import, Options, Place, open, parts};
 
 const RADIUS: f64 = 50.0;
 
@@ -91,4 +91,43 @@ fn an_open_sheet_is_refused() {
     let found = open("sheet.obj", |_| Ok(file(&sheet))).expect("a surface");
     let error = parts("sheet.obj", found, &Options::default(), &mut |_| ()).err().expect("open");
     assert!(error.to_string().starts_with("sheet.obj: "), "{error}");
+}
+
+/// Two balls apart, one with a lump of another region that has a name, one without.
+#[test]
+fn every_part_is_held_and_regions_with_names_are_kept() {
+    let ball = |x: f64, z: f64| {
+        let ball = Sphere { center: vec3(x, 0.0, z), radius: 0.03 };
+        tetrahedralize(&ball, 0.01).expect("a ball").0
+    };
+    let (low, high) = (ball(0.0, 0.0), ball(0.1, 0.2));
+    let first = low.vertices().len() as u32;
+    let vertices = [low.vertices(), high.vertices()].concat();
+    let mut tets = low.tets().to_vec();
+    tets.extend(high.tets().iter().map(|tet| tet.map(|v| v + first)));
+    let middle = |tet: &[u32; 4]| {
+        tet.iter().map(|&v| vertices[v as usize]).fold(Vec3::ZERO, |sum, x| sum + x) * 0.25
+    };
+    let region = |tet: &[u32; 4]| match middle(tet) {
+        x if x.length() < 0.015 => 7,
+        x if (x - vec3(0.1, 0.0, 0.2)).length() < 0.015 => 8,
+        _ => 3,
+    };
+    let regions = tets.iter().map(region).collect();
+    let (mesh, _) = TetMesh::new(vertices, tets, regions).expect("a mesh");
+    let names = [(3, "liver".to_owned()), (7, "Tumor".to_owned())];
+    let bytes = gmsh::write_binary(&mesh, &[], &names).expect("a file");
+    let made = import("organs.msh", bytes, &Options { unit: Some(1.0), ..Options::default() });
+    let part = &made.parts[0];
+    assert_eq!(part.inner.len(), 1);
+    assert_eq!((part.inner[0].region, part.inner[0].name.as_str()), (7, "tumor"));
+    assert!(made.notes.iter().any(|note| note.contains("label 8")), "{:?}", made.notes);
+    assert_eq!(part.holds.len(), 2);
+    for (hold, [x, z]) in part.holds.iter().zip([[0.0, 0.0], [0.1, 0.2]]) {
+        let Place::Within(bounds) = &hold.place else { panic!("{hold:?}") };
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        assert!(near(bounds.center().x, x) && near(bounds.min.z, z - 0.03), "{hold:?}");
+        // The lowest 15 % of 60 mm.
+        assert!(near(bounds.size().z, 0.009), "{hold:?}");
+    }
 }

@@ -71,9 +71,10 @@ pub fn tetrahedralize(
     Ok((mesh, report))
 }
 
-/// How far from a volume [`tetrahedralize_to`] stops, and after how many fillings.
+/// [`tetrahedralize_to`] stops at this relative error of the volume,
 const NEAR_ENOUGH: f64 = 2e-3;
-const MOST_FILLINGS: usize = 5;
+/// or after this number of meshes.
+const MOST_MESHES: usize = 5;
 
 /// Fills a shape so that the tetrahedra have a volume [m^3]: on their own they lie below a convex surface, the more the
 /// coarser they are. `shape` is the shape whose surface lies so much [m] further out, of which some tenths of the
@@ -86,7 +87,7 @@ pub fn tetrahedralize_to<Shape: SignedDistance>(
     let mut out = 0.0;
     let mut best = tetrahedralize(&shape(out), spacing)?;
     let off = |mesh: &TetMesh| (mesh.volume() / volume - 1.0).abs();
-    for _ in 1..MOST_FILLINGS {
+    for _ in 1..MOST_MESHES {
         if off(&best.0) <= NEAR_ENOUGH {
             break;
         }

@@ -61,7 +61,7 @@ fn every_coding_of_every_format_gives_the_same_mesh() {
         let (mesh, report) = tets(&name);
         assert_eq!(mesh.vertices(), expected.vertices(), "{name}");
         assert_eq!(mesh.tets(), expected.tets(), "{name}");
-        // Sets have names in Abaqus, no numbers.
+        // Abaqus names its sets and does not number them: regions count from 1.
         let first = if name.ends_with(".inp") { 1 } else { 5 };
         let regions: Vec<u32> = expected.regions().iter().map(|r| r - 5 + first).collect();
         assert_eq!(mesh.regions(), regions, "{name}");

@@ -1,4 +1,4 @@
-//! What is told of labels: sizes, places, pieces, the border.
+//! Sizes, places, pieces and borders of labels.
 
 use std::collections::{BTreeMap, BTreeSet};
 
