@@ -1,7 +1,7 @@
 //! Mesh files, one module for each format: bytes in, bytes out.
 //!
 //! The content tells the format; the extension counts only where the content says nothing. Every reader makes a
-//! [`content::Content`] of a file: vertices, cells, names. Tissue and surfaces are made of it in one place.
+//! `content::Content` of a file: vertices, cells, names. Tissue and surfaces are made of it in one place.
 
 mod abaqus;
 mod cells;
