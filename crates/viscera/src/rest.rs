@@ -12,6 +12,11 @@
 //! Stiefel, 1952; the sum of `alpha r.z` over some iterations is what they add to `d.K d` and bounds what was
 //! missing before (Strakos and Tichy, "On error estimation in the conjugate gradient method", 2002, section 4).
 
+mod linear;
+mod unloaded;
+
+pub use unloaded::{TooSoft, Unloaded};
+
 use crate::elements::kinds::{Energy, Kind};
 use crate::elements::{attachment, deformation_gradient, internal_forces, law, shape_gradients};
 use crate::layout::{Domains, Smoothing};
@@ -125,10 +130,9 @@ impl<'a, S: Real> Statics<'a, S> {
             moves[pin.vertex as usize] = false;
         }
         let softness = stiffness.iter().map(|&k| if k > 0.0 { 1.0 / k } else { 0.0 }).collect();
-        let recovered = (elements == Elements::Recovered).then(|| {
-            let materials = model.materials.iter().map(MaterialConstants::cast).collect();
-            (Domains::cast_from(model, Smoothing::RECOVERED), materials)
-        });
+        let domains = (elements == Elements::Recovered)
+            .then(|| Domains::cast_from(model, Smoothing::RECOVERED));
+        let recovered = domains.map(|domains| (domains, materials_of(model)));
         Self { model, inputs, is_held, moves, softness, shortest, recovered }
     }
 
@@ -295,11 +299,12 @@ impl<'a, S: Real> Statics<'a, S> {
     }
 
     fn judge(&self, x: &[Vec3<f64>], found: Found) -> WayToRest {
-        let rest = &self.model.rest_positions;
+        // A body that rests under gravity as it was given is displaced all the same.
+        let rest = self.model.stress_free();
         let (mut displacement, mut reach) = (0.0f64, 0.0f64);
         let (mut square, mut along) = (0.0, 0.0);
         for ((x, rest), way) in x.iter().zip(rest).zip(&found.way) {
-            let now = *x - rest.cast();
+            let now = *x - rest.cast::<S>().cast();
             let end = now + *way;
             displacement = displacement.max(end.length());
             reach = reach.max(x.length());
@@ -332,6 +337,10 @@ impl<'a, S: Real> Statics<'a, S> {
             way: found.way,
         }
     }
+}
+
+fn materials_of<S: Real>(model: &Model<S>) -> Vec<MaterialConstants<f64>> {
+    model.materials.iter().map(MaterialConstants::cast).collect()
 }
 
 fn dot(a: &[Vec3<f64>], b: &[Vec3<f64>]) -> f64 {

@@ -120,7 +120,7 @@ impl Recovered {
         };
         let averages: Vec<Gradient> = (0..domains.len()).map(|n| average(domains, n)).collect();
         for t in 0..domains.tets.len() {
-            let gradient = mean_gradient(domains, &model.rest_positions, &averages, t);
+            let gradient = mean_gradient(domains, model.stress_free(), &averages, t);
             let material = domains.materials[domains.tet_domains[t][0] as usize];
             let volume = (1.0 - smoothing.vertex_share) * domains.tet_volumes[t];
             recovered.push(&gradient, volume, material);

@@ -33,11 +33,11 @@ pub use held::{Held, HeldMotion, Spring};
 pub use law::{Foundation, Friction};
 pub(crate) use meeting::{DEEPEST, Looking, Marks, Moment, depths, turn_normals};
 pub use pair::Kept;
-pub(crate) use pair::{Bond, Pair, from_edges};
+pub(crate) use pair::{Bond, Pair, from_edges, tie_rest};
 pub use pressure::VertexPressures;
 pub use shape::Shape;
-pub(crate) use skin::Skin;
 pub use skin::TissueContact;
+pub(crate) use skin::{Skin, Tie};
 pub use surface::{Sample, sample_boundary, sample_embedded};
 pub use touch::{Felt, Moved, Placed, Side, Touch, Touching};
 

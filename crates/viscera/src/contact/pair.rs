@@ -217,11 +217,24 @@ impl Pair {
 impl Closest {
     /// The way from the triangle to the point, as [`Tie::rest`](super::skin::Tie::rest) has it.
     pub(crate) fn in_triangle(&self, corners: [Vec3<f64>; 3]) -> [f64; 3] {
-        let outer = self.normal * (1.0 / self.normal.length());
-        let along = outer.dot(self.away);
-        let [on_b, on_c] = in_edges(self.away - outer * along, corners);
-        [on_b, on_c, along]
+        in_triangle(self.away, self.normal, corners)
     }
+}
+
+/// The same of any vector [m], `normal` of any length.
+fn in_triangle(away: Vec3<f64>, normal: Vec3<f64>, corners: [Vec3<f64>; 3]) -> [f64; 3] {
+    let outer = normal * (1.0 / normal.length());
+    let along = outer.dot(away);
+    let [on_b, on_c] = in_edges(away - outer * along, corners);
+    [on_b, on_c, along]
+}
+
+/// What [`Tie::rest`](super::skin::Tie::rest) is, for the vector [m] that [`Tie::unstretched`](super::skin::Tie::unstretched)
+/// is to be where the triangle's corners are at these places; nothing where they span no triangle.
+pub(crate) fn tie_rest(unstretched: Vec3<f64>, corners: [Vec3<f64>; 3]) -> Option<[f64; 3]> {
+    let [a, b, c] = corners;
+    let rest = in_triangle(unstretched, (b - a).cross(c - a), corners);
+    rest.iter().all(|x| x.is_finite()).then_some(rest)
 }
 
 /// A vector [m] along a triangle in terms of its edges from the first corner; zero where they span nothing.

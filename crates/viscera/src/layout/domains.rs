@@ -100,21 +100,21 @@ impl<S: Real> Domains<S> {
         let inner = inner_faces(&corners, &materials);
         let (tet_domains, vertices) = number_domains(&corners, &inner);
         let weight = smoothing.recovery * 3.0 / 8.0;
-        let shapes: Vec<Shape> =
-            corners.iter().map(|tet| Shape::new(tet.map(|v| model.places[v as usize]))).collect();
-        let mut domain_volumes = vec![0.0; vertices.len()];
+        let shapes: Vec<Shape> = corners
+            .iter()
+            .map(|tet| Shape::new(tet.map(|v| model.stress_free[v as usize])))
+            .collect();
+        let domain_volumes = volumes_of_domains(&tet_domains, &shapes, vertices.len());
         let mut domain_materials = vec![0; vertices.len()];
-        for (t, domains) in tet_domains.iter().enumerate() {
-            for &n in domains {
-                domain_volumes[n as usize] += 0.25 * shapes[t].volume;
-                domain_materials[n as usize] = materials[t];
-            }
+        for (domains, &material) in tet_domains.iter().zip(&materials) {
+            domains.iter().for_each(|&n| domain_materials[n as usize] = material);
         }
-        let rings = Rings::new(&corners, &tet_domains, &shapes, &domain_volumes);
+        let mut rings = Rings::new(&corners, &tet_domains, vertices.len());
+        rings.find_gradients(&corners, &tet_domains, &shapes, &domain_volumes);
         let mut face_weights = vec![[0.0; 4]; corners.len()];
         for sides in &inner {
             let fit = match smoothing.fitted {
-                true => rings.fit(sides[0], &corners, &tet_domains, &model.places),
+                true => rings.fit(sides[0], &corners, &tet_domains, &model.stress_free),
                 false => 1.0,
             };
             for [tet, face] in sides {
@@ -122,7 +122,8 @@ impl<S: Real> Domains<S> {
             }
         }
         let places: Vec<Vec3<f64>> = vertices.iter().map(|&v| model.places[v as usize]).collect();
-        let (clusters, cluster_volumes) = cluster(&tet_domains, &places, &domain_volumes);
+        let clusters = cluster(&tet_domains, &places);
+        let cluster_volumes = volumes_of_clusters(&clusters, &domain_volumes);
         let cast = |v: Vec3<f64>| v.cast();
         let frames = shapes.iter().zip(&face_weights).map(|(shape, weights)| RestFrame {
             gradients: shape.gradients.map(cast),
@@ -146,6 +147,31 @@ impl<S: Real> Domains<S> {
             clusters,
             cluster_volumes: cluster_volumes.into_iter().map(S::from_f64).collect(),
         }
+    }
+
+    /// The same domains with no stress at other places [m], shape [vertex_count]. Faces stay fitted to where they were.
+    pub(crate) fn with_stress_free(mut self, places: &[Vec3<f64>]) -> Self {
+        let corners = &self.tet_vertices;
+        let shapes: Vec<Shape> =
+            corners.iter().map(|tet| Shape::new(tet.map(|v| places[v as usize]))).collect();
+        let domain_volumes = volumes_of_domains(&self.tet_domains, &shapes, self.vertices.len());
+        let mut rings = Rings {
+            offsets: std::mem::take(&mut self.ring_offsets),
+            vertices: std::mem::take(&mut self.ring_vertices),
+            gradients: Vec::new(),
+        };
+        rings.find_gradients(corners, &self.tet_domains, &shapes, &domain_volumes);
+        let cluster_volumes = volumes_of_clusters(&self.clusters, &domain_volumes);
+        let cast = |v: Vec3<f64>| v.cast();
+        for (frame, shape) in self.frames.iter_mut().zip(&shapes) {
+            (frame.gradients, frame.arms) = (shape.gradients.map(cast), shape.arms.map(cast));
+        }
+        self.tet_volumes = shapes.iter().map(|shape| S::from_f64(shape.volume)).collect();
+        self.volumes = domain_volumes.into_iter().map(S::from_f64).collect();
+        (self.ring_offsets, self.ring_vertices) = (rings.offsets, rings.vertices);
+        self.ring_gradients = rings.gradients.into_iter().map(cast).collect();
+        self.cluster_volumes = cluster_volumes.into_iter().map(S::from_f64).collect();
+        self
     }
 
     /// Number of domains.
@@ -287,31 +313,44 @@ struct Rings {
 }
 
 impl Rings {
+    /// Which vertices each domain sees; gradients are to be found.
+    fn new(tets: &[[u32; 4]], tet_domains: &[[u32; 4]], count: usize) -> Self {
+        let mut seen: Vec<(u32, u32)> = Vec::with_capacity(16 * tets.len());
+        for (domains, tet) in tet_domains.iter().zip(tets) {
+            domains.iter().for_each(|&n| seen.extend(tet.map(|v| (n, v))));
+        }
+        seen.sort_unstable();
+        seen.dedup();
+        let mut offsets = vec![0; count + 1];
+        seen.iter().for_each(|&(n, _)| offsets[n as usize + 1] += 1);
+        (0..count).for_each(|n| offsets[n + 1] += offsets[n]);
+        let vertices = seen.into_iter().map(|(_, v)| v).collect();
+        Self { offsets, vertices, gradients: Vec::new() }
+    }
+
     /// `b_nj = (1/V_n) sum_t V_t/4 g_tj`.
-    fn new(tets: &[[u32; 4]], tet_domains: &[[u32; 4]], shapes: &[Shape], volumes: &[f64]) -> Self {
-        let mut entries: Vec<(u32, u32, u32)> = Vec::with_capacity(16 * tets.len());
-        for (t, domains) in (0..).zip(tet_domains) {
+    fn find_gradients(
+        &mut self,
+        tets: &[[u32; 4]],
+        tet_domains: &[[u32; 4]],
+        shapes: &[Shape],
+        volumes: &[f64],
+    ) {
+        self.gradients.clear();
+        self.gradients.resize(self.vertices.len(), Vec3::ZERO);
+        for ((tet, domains), shape) in tets.iter().zip(tet_domains).zip(shapes) {
             for &n in domains {
-                let corners = (0..).zip(&tets[t as usize]);
-                entries.extend(corners.map(|(corner, &v)| (n, v, 4 * t + corner)));
-            }
-        }
-        entries.sort_unstable();
-        let mut rings = Self { offsets: vec![0], vertices: Vec::new(), gradients: Vec::new() };
-        for domain in entries.chunk_by(|a, b| a.0 == b.0) {
-            for same in domain.chunk_by(|a, b| a.1 == b.1) {
-                let mut sum = Vec3::ZERO;
-                for &(n, _, slot) in same {
-                    let shape = &shapes[slot as usize / 4];
-                    let share = 0.25 * shape.volume / volumes[n as usize];
-                    sum += shape.gradients[slot as usize % 4] * share;
+                let share = 0.25 * shape.volume / volumes[n as usize];
+                let first = self.offsets[n as usize] as usize;
+                let ring = &self.vertices[first..self.offsets[n as usize + 1] as usize];
+                for (v, gradient) in tet.iter().zip(shape.gradients) {
+                    // The ring has all vertices of the domain's tetrahedra.
+                    if let Ok(place) = ring.binary_search(v) {
+                        self.gradients[first + place] += gradient * share;
+                    }
                 }
-                rings.vertices.push(same[0].1);
-                rings.gradients.push(sum);
             }
-            rings.offsets.push(rings.vertices.len() as u32);
         }
-        rings
     }
 
     /// By what the recovered bend of a face must be multiplied to be, in the least squares over all quadratic fields,
@@ -351,13 +390,28 @@ impl Rings {
     }
 }
 
-/// Clusters of up to [`CLUSTER`] domains that share tetrahedra, and their volumes: each domain that is still free, in
-/// order, takes the nearest free ones beside it.
-fn cluster(
-    tet_domains: &[[u32; 4]],
-    places: &[Vec3<f64>],
-    volumes: &[f64],
-) -> (Vec<u32>, Vec<f64>) {
+/// A quarter of each tetrahedron's volume [m^3].
+fn volumes_of_domains(tet_domains: &[[u32; 4]], shapes: &[Shape], count: usize) -> Vec<f64> {
+    let mut volumes = vec![0.0; count];
+    for (domains, shape) in tet_domains.iter().zip(shapes) {
+        domains.iter().for_each(|&n| volumes[n as usize] += 0.25 * shape.volume);
+    }
+    volumes
+}
+
+/// Sums of their domains' [m^3].
+fn volumes_of_clusters(clusters: &[u32], volumes: &[f64]) -> Vec<f64> {
+    let count = clusters.iter().max().map_or(0, |last| *last as usize + 1);
+    let mut sums = vec![0.0; count];
+    for (&cluster, volume) in clusters.iter().zip(volumes) {
+        sums[cluster as usize] += volume;
+    }
+    sums
+}
+
+/// Clusters of up to [`CLUSTER`] domains that share tetrahedra: each domain that is still free, in order, takes the
+/// nearest free ones beside it.
+fn cluster(tet_domains: &[[u32; 4]], places: &[Vec3<f64>]) -> Vec<u32> {
     let mut pairs: Vec<[u32; 2]> = Vec::with_capacity(12 * tet_domains.len());
     for domains in tet_domains {
         for &a in domains {
@@ -368,7 +422,7 @@ fn cluster(
     pairs.dedup();
     const FREE: u32 = u32::MAX;
     let mut clusters = vec![FREE; places.len()];
-    let mut cluster_volumes = Vec::new();
+    let mut number = 0;
     for beside in pairs.chunk_by(|a, b| a[0] == b[0]) {
         let n = beside[0][0] as usize;
         if clusters[n] != FREE {
@@ -381,14 +435,11 @@ fn cluster(
             .map(|m| ((places[m] - places[n]).length_squared(), m))
             .collect();
         near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let number = cluster_volumes.len() as u32;
         let members = near.iter().take(CLUSTER - 1).map(|&(_, m)| m);
-        let mut volume = 0.0;
         for m in std::iter::once(n).chain(members) {
             clusters[m] = number;
-            volume += volumes[m];
         }
-        cluster_volumes.push(volume);
+        number += 1;
     }
-    (clusters, cluster_volumes)
+    clusters
 }

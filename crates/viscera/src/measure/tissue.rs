@@ -192,7 +192,7 @@ impl<S: Real> Tets<'_, S> {
             let vertices = self.model.tet_vertices[tet];
             for corner in 0..4 {
                 let v = vertices[corner] as usize;
-                let (rest, now) = (self.model.places[v], self.positions[v]);
+                let (rest, now) = (self.model.stress_free[v], self.positions[v]);
                 group.rest[corner][0][lane] = rest.x;
                 group.rest[corner][1][lane] = rest.y;
                 group.rest[corner][2][lane] = rest.z;

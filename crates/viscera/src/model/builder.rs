@@ -7,7 +7,7 @@ use super::numbering::Numbering;
 use super::{Body, MaterialConstants, Model, ModelError};
 use crate::coloring::ConstraintGraph;
 use crate::contact::Overlap;
-use crate::contact::{Sample, Skin, TissueContact, sample_boundary};
+use crate::contact::{Sample, Skin, Tie, TissueContact, sample_boundary};
 use crate::elements::attachment::Attachments;
 use crate::elements::kinds::{CONSTANTS, Constant, Kind, Legal};
 use crate::elements::list::KINDS;
@@ -24,6 +24,8 @@ use crate::scalar::{Real, Vec3};
 pub struct ModelBuilder {
     bodies: Vec<Body>,
     positions: Arc<Vec<Vec3<f64>>>,
+    /// Where tetrahedra carry no stress; empty where that is at `positions`.
+    stress_free: Arc<Vec<Vec3<f64>>>,
     tets: Arc<Vec<[u32; 4]>>,
     regions: Arc<Vec<u32>>,
     materials: Vec<Material>,
@@ -52,6 +54,9 @@ impl ModelBuilder {
         check_count("tetrahedra", first_tet + mesh.tets().len(), u32::MAX as usize / 16)?;
         let material = self.intern(material);
         Arc::make_mut(&mut self.positions).extend_from_slice(mesh.vertices());
+        if !self.stress_free.is_empty() {
+            Arc::make_mut(&mut self.stress_free).extend_from_slice(mesh.vertices());
+        }
         let shift = first_vertex as u32;
         Arc::make_mut(&mut self.tets).extend(mesh.tets().iter().map(|tet| tet.map(|v| v + shift)));
         Arc::make_mut(&mut self.regions).extend_from_slice(mesh.regions());
@@ -88,6 +93,51 @@ impl ModelBuilder {
             }
         }
         Ok(count)
+    }
+
+    /// Says where the tetrahedra of a body carry no stress [m], shape [vertex_count of the body]: it begins where it was
+    /// added, under the stress of that deformation. Masses, contact and patches stay those of the shape that was added.
+    pub fn set_stress_free(
+        &mut self,
+        body: usize,
+        positions: &[Vec3<f64>],
+    ) -> Result<(), ModelError> {
+        let Body { vertices, tets } = self.body(body)?.clone();
+        if positions.len() != vertices.len() {
+            let (given, expected) = (positions.len(), vertices.len());
+            let (what, of) = ("the stress-free shape of a body", "positions");
+            return Err(ModelError::Count { what, of, given, expected });
+        }
+        let corner = |v: u32| positions[v as usize - vertices.start];
+        for tet in &self.tets[tets] {
+            let value = crate::mesh::tet_volume(tet.map(corner));
+            if value.is_nan() || value <= 0.0 {
+                let (what, range) = ("volume of a tetrahedron without stress [m^3]", "above zero");
+                return Err(ModelError::BadValue { what, range, value });
+            }
+        }
+        if self.stress_free.is_empty() {
+            self.stress_free = Arc::new(self.positions.to_vec());
+        }
+        Arc::make_mut(&mut self.stress_free)[vertices].copy_from_slice(positions);
+        Ok(())
+    }
+
+    /// Positions [m] without stress where they are not those of [`ModelBuilder::positions`].
+    pub(crate) fn stress_free(&self) -> Option<&[Vec3<f64>]> {
+        (!self.stress_free.is_empty()).then_some(&self.stress_free[..])
+    }
+
+    /// The anchor [m] of an attachment, and of other elements that have one, by its number.
+    pub fn anchor(&self, number: usize) -> Option<Vec3<f64>> {
+        self.anchors.get(number).copied()
+    }
+
+    /// Puts an anchor elsewhere [m]; does nothing where there is none of this number.
+    pub(crate) fn set_anchor(&mut self, number: usize, place: Vec3<f64>) {
+        if let Some(anchor) = self.anchors.get_mut(number) {
+            *anchor = place;
+        }
     }
 
     /// The ranges of a body.
@@ -152,6 +202,16 @@ impl ModelBuilder {
         self.tissue_contact = *contact;
         self.skin = Arc::new(skin);
         overlap
+    }
+
+    /// The surface on which tissue meets tissue.
+    pub(crate) fn skin(&self) -> &Skin {
+        &self.skin
+    }
+
+    /// Takes these ties in the place of the surface's own, of the same points.
+    pub(crate) fn set_ties(&mut self, ties: Vec<Tie>) {
+        Arc::make_mut(&mut self.skin).ties = ties;
     }
 
     /// Vertices of all tetrahedra added so far.
@@ -253,6 +313,10 @@ impl ModelBuilder {
             tet_materials: Arc::clone(&self.tet_material),
             laws: self.materials.iter().map(Material::model).collect(),
             places: Arc::clone(&self.positions),
+            stress_free: match self.stress_free.is_empty() {
+                true => Arc::clone(&self.positions),
+                false => Arc::clone(&self.stress_free),
+            },
             elements: ElementLists::new(&self.elements),
             rest_anchors: self.anchors.iter().map(|anchor| anchor.cast()).collect(),
             samples: Arc::clone(&self.samples),

@@ -138,8 +138,10 @@ pub struct Model<S> {
     pub(crate) tet_materials: Arc<Vec<u32>>,
     /// The law of each material.
     pub(crate) laws: Vec<MaterialModel>,
-    /// Rest positions [m] as they were given: shapes are computed in double precision where they are asked for.
+    /// Rest positions [m] as they were given.
     pub(crate) places: Arc<Vec<Vec3<f64>>>,
+    /// See [`Model::stress_free`]: shapes are computed in double precision where they are asked for.
+    pub(crate) stress_free: Arc<Vec<Vec3<f64>>>,
     /// Springs, attachments: all elements that are no tetrahedra.
     pub elements: ElementLists<S>,
     /// Anchors of the elements that have one where nothing moves them [m], in the order in which they were added.
@@ -165,6 +167,12 @@ impl<S: Real> Model<S> {
         self.rest_positions.len()
     }
 
+    /// Positions [m] at which no tetrahedron carries stress, shape [vertex_count]: the rest positions, except of bodies
+    /// that rest under gravity as they were given.
+    pub fn stress_free(&self) -> &[Vec3<f64>] {
+        &self.stress_free
+    }
+
     /// Number of tetrahedra of all bodies.
     pub fn tet_count(&self) -> usize {
         self.tet_vertices.len()
@@ -178,7 +186,7 @@ impl<S: Real> Model<S> {
     /// Number `i` of [`Model::tets`].
     pub(crate) fn tet(&self, i: usize) -> Tet<S> {
         let vertices = self.tet_vertices[i];
-        let corners = vertices.map(|v| self.places[v as usize]);
+        let corners = vertices.map(|v| self.stress_free[v as usize]);
         let material = self.tet_materials[i];
         Tet {
             vertices,
@@ -279,6 +287,11 @@ impl<S: Real> Model<S> {
         for x in &*self.places {
             x.to_array().into_iter().for_each(|value| add(value.to_bits()));
         }
+        if !Arc::ptr_eq(&self.places, &self.stress_free) {
+            for x in &*self.stress_free {
+                x.to_array().into_iter().for_each(|value| add(value.to_bits()));
+            }
+        }
         let TissueContact { itself, bodies, law } = self.tissue_contact;
         [itself, bodies].iter().for_each(|&is_on| add(u64::from(is_on)));
         [law.stiffness, law.thickness, law.friction].iter().for_each(|x| add(x.to_bits()));
@@ -321,6 +334,7 @@ impl<S: Real> Model<S> {
             tet_materials: Arc::default(),
             laws: Vec::new(),
             places: Arc::default(),
+            stress_free: Arc::default(),
             elements: ElementLists::new(&Default::default()),
             rest_anchors: Vec::new(),
             samples: Arc::default(),

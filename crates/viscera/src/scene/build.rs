@@ -238,7 +238,8 @@ fn build_body(table: &Placed<BodyTable>) -> Result<Body, SceneError> {
         problem,
     })?;
     let placement = RigidTransform::about(Vec3::ZERO, rotation, body.position);
-    Ok(Body { name, shape, refine: body.refine, placement, material, regions })
+    let (refine, balanced) = (body.refine, body.balanced);
+    Ok(Body { name, shape, refine, balanced, placement, material, regions })
 }
 
 /// Numbers that are written win over the preset's, those over the body's, those over defaults.

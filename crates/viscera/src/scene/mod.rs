@@ -144,6 +144,8 @@ pub struct Body {
     pub shape: BodyShape,
     /// How often every tetrahedron is divided into eight.
     pub refine: u32,
+    /// Whether the mesh is its shape at rest under gravity, not that without load.
+    pub balanced: bool,
     /// From the mesh's frame to the world.
     pub placement: RigidTransform,
     /// Its material, where no region says otherwise.

@@ -182,6 +182,9 @@ settings_table! {
         /// How often every tetrahedron is divided into eight: 1 halves the length of edges. Patches are those of the undivided mesh,
         /// with the middles of edges between two of their vertices.
         refine: u32 = 0, whole(0, 3);
+        /// Whether the mesh is the body's shape at rest under gravity, as that of a scan is, and not its shape without load:
+        /// that one is solved for, so that the body begins at rest. Some of it must be held.
+        balanced: bool = false, truth();
         /// Size of a mesh or a liver relative to the file or to the standard liver; 1 where unset.
         scale: Option<f64> = None, optional(number(at_least(1e-3).up_to(1e3)));
         /// Where the body's origin is put.

@@ -1,6 +1,6 @@
 //! What settings alone tell of the method in force.
 
-use super::{DeviceRequest, Method, SolverSettings};
+use super::{DeviceRequest, Elements, Method, SolverSettings};
 
 impl SolverSettings {
     /// The settings in force, as far as they tell it alone: on a device that is asked for by name "auto" is "xpbd". Elsewhere
@@ -9,6 +9,15 @@ impl SolverSettings {
         match self.device {
             DeviceRequest::Auto | DeviceRequest::Cpu => self.clone(),
             DeviceRequest::Gpu | DeviceRequest::Named(_) => self.chosen(Method::Xpbd),
+        }
+    }
+
+    /// The elements before the method is known: "auto" stands for one kind with either method of a CPU. `on_device` where
+    /// the caller has chosen a device.
+    pub(crate) fn foreseen_elements(&self, on_device: bool) -> Elements {
+        match on_device {
+            true => self.chosen_on_device().elements,
+            false => self.foreseen().chosen(Method::QuasiNewton).elements,
         }
     }
 }

@@ -10,6 +10,7 @@ use crate::mesh::{SurfaceMesh, TetMesh};
 use crate::model::{ModelBuilder, ModelError};
 use crate::scalar::Vec3;
 use crate::scene::{Body, BodyShape, Instrument, Region, Scene, nearest_pair};
+use crate::settings::Elements;
 
 /// A mesh before it was refined.
 #[derive(Clone, Debug)]
@@ -65,6 +66,8 @@ pub struct Assembly {
     pub forces: Vec<ResolvedPatch>,
     /// The scene's tools, paths from files as keys.
     pub tools: Vec<Instrument>,
+    /// The elements that bodies which rest under gravity as they are have been balanced for.
+    pub(super) balanced_for: Option<Elements>,
     /// What was repaired, and what a person should know before waiting for the result.
     pub notes: Vec<String>,
 }
@@ -87,6 +90,7 @@ impl Assembly {
         assembly.check_tools_outside(scene)?;
         assembly.note_overlaps(scene);
         assembly.note_loose_parts(scene);
+        assembly.balance(scene, scene.solver.foreseen_elements(false))?;
         Ok(assembly)
     }
 
@@ -122,6 +126,7 @@ impl Assembly {
         finer.tools.clone_from(&self.tools);
         finer.take_samples(scene)?;
         finer.take_skin(scene)?;
+        finer.balance_as(self)?;
         finer.notes.clear();
         Ok(finer)
     }
@@ -134,6 +139,7 @@ impl Assembly {
             motions: Vec::new(),
             forces: Vec::new(),
             tools: Vec::new(),
+            balanced_for: None,
             notes: Vec::new(),
         }
     }

@@ -188,7 +188,50 @@ pub enum AssembleError {
         /// Of the nearest points [m].
         nearest: f64,
     },
+    /// A body that cannot rest under gravity as it was given.
+    #[error(transparent)]
+    Balance(#[from] BalanceError),
     /// The model cannot be built.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}
+
+/// Why a body does not rest under gravity as it was given.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BalanceError {
+    /// Nothing carries its weight.
+    #[error(
+        "body `{body}` is to be balanced, and no fixing holds it, nor a tie to a body that is held, so that nothing carries \
+         its weight; hold some of it, or leave out `balanced`"
+    )]
+    NotHeld {
+        /// The body.
+        body: String,
+    },
+    /// Ties along a line carry it.
+    #[error(
+        "body `{body}` is to be balanced, and would turn about the few points that tie it; tie more of it, hold some of it, or \
+         leave out `balanced`"
+    )]
+    Turns {
+        /// The body.
+        body: String,
+    },
+    /// Its tissue is too soft.
+    #[error(
+        "body `{body}` cannot rest under gravity as it was given: whatever shape it had without load, it would not carry its \
+         weight (rho g L/E is {:.2}); {}, or hold more of it, or leave out `balanced`", .softness, .way_out
+    )]
+    TooSoft {
+        /// The body.
+        body: String,
+        /// The weight of its longest extent, per area, over Young's modulus.
+        softness: f64,
+        /// Which density or stiffness it could carry.
+        way_out: String,
+    },
+    /// Its shape without load is none.
     #[error(transparent)]
     Model(#[from] ModelError),
 }

@@ -1,5 +1,6 @@
 //! Whether what a scene asks for is what computes it: only the CPU, and not every method, computes contact.
 
+use super::assemble::Assembly;
 use super::error::SimulationError;
 use crate::scene::Scene;
 use crate::settings::{DeviceRequest, SolverSettings};
@@ -44,4 +45,27 @@ pub(super) fn check_contact(scene: &Scene, solver: &SolverSettings) -> Result<()
 /// Not all methods compute contact.
 pub(super) fn refuse_method(solver: &SolverSettings) -> Result<(), StepError> {
     if solver.takes_contact() { Ok(()) } else { Err(StepError::ContactNeedsRebase) }
+}
+
+/// Whether the patches are those of the scene and name vertices that there are. Numbers of vertices stay what they are as
+/// materials change and bodies are added, so that patches do not depend on the model's revision.
+pub(super) fn check_patches(scene: &Scene, assembly: &Assembly) -> Result<(), SimulationError> {
+    for (what, found, expected) in [
+        ("bodies", assembly.bodies.len(), scene.bodies.len()),
+        ("fixings", assembly.fixings.len(), scene.fixings.len()),
+        ("motions", assembly.motions.len(), scene.motions.len()),
+        ("forces", assembly.forces.len(), scene.forces.len()),
+        ("tools", assembly.tools.len(), scene.tools.len()),
+    ] {
+        if found != expected {
+            return Err(SimulationError::OtherScene { what, found, expected });
+        }
+    }
+    let vertex_count = assembly.builder.positions().len();
+    let patches = assembly.fixings.iter().chain(&assembly.motions).chain(&assembly.forces);
+    let mut vertices = patches.flat_map(|patch| patch.vertices.iter().copied());
+    match vertices.find(|&vertex| vertex as usize >= vertex_count) {
+        Some(vertex) => Err(SimulationError::Patch { vertex, vertex_count }),
+        None => Ok(()),
+    }
 }

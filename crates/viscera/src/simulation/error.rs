@@ -1,6 +1,6 @@
 //! Why a simulation cannot be built, changed, or go on.
 
-use super::assemble_error::AssembleError;
+use super::assemble_error::{AssembleError, BalanceError};
 use crate::model::ModelError;
 use crate::scene::SceneError;
 use crate::settings::DeviceRequest;
@@ -62,6 +62,9 @@ pub enum SimulationError {
         /// What was asked for.
         device: DeviceRequest,
     },
+    /// A body cannot rest under gravity as it was given.
+    #[error(transparent)]
+    Balance(#[from] BalanceError),
     /// The method cannot do it.
     #[error(transparent)]
     Step(#[from] StepError),

@@ -80,10 +80,13 @@ impl<S: Real> Simulation<S> {
         let mut forces = Vec::new();
         for (index, (fixing, patch)) in scene.fixings.iter().zip(&assembly.fixings).enumerate() {
             let share = fixing.stiffness.map(|total| total / patch.vertices.len() as f64);
-            let on_vertex = |_: usize, v: u32| match share {
+            let anchor = |i: usize| assembly.builder.anchor(patch.attachments[i]);
+            let on_vertex = |i: usize, v: u32| match share {
                 // Springs of a fixing pull at a vertex that something else pins as well: they are part of the
                 // model, and what pins the vertex has to hold against them.
-                Some(stiffness) => (rest[v as usize] - position(v)) * stiffness,
+                Some(stiffness) => {
+                    (anchor(i).unwrap_or(rest[v as usize]) - position(v)) * stiffness
+                }
                 None if pinned_by(v) == Some(PinnedBy::Fixing(index)) => held(v),
                 None => Vec3::ZERO,
             };

@@ -302,9 +302,12 @@ impl<S: Real> Simulation<S> {
         same_device: bool,
     ) -> Result<(), LiveError> {
         let set = |problem: ModelError| LiveError::Simulation(problem.into());
+        let on_device = same_device && self.callers_device;
+        // Of the materials that it was given with: a body that is softened by hand sags.
+        let elements = scene.solver.foreseen_elements(on_device);
+        self.assembly.balance(&self.written, elements).map_err(SimulationError::from)?;
         let builder = self.assembly.with_materials(&scene).map_err(set)?;
         let model = builder.build::<S>().map_err(SimulationError::from)?;
-        let on_device = same_device && self.callers_device;
         self.resumed_method = self.resumed_method.filter(|_| same_device);
         let Chosen { settings: solver, oscillations, solver: ready } = match self.resumed_method {
             Some(method) => automatic::keep_method(&scene, &self.assembly, &model, method),

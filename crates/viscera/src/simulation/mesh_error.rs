@@ -180,7 +180,7 @@ impl<S: Real> Simulation<S> {
         for (of_fine, coarse) in finer.bodies.iter().zip(&self.assembly.bodies) {
             for (i, v) in coarse.vertices.clone().enumerate() {
                 let mass = self.model.masses[v].to_f64();
-                let rest = self.model.rest_positions[v].cast::<f64>();
+                let rest = self.model.stress_free()[v].cast::<S>().cast::<f64>();
                 let gone = (fine[of_fine.vertices.start + i] - places[v]) * beyond;
                 let moved = places[v] - rest;
                 apart += mass * gone.length_squared();

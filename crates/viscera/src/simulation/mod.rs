@@ -5,6 +5,8 @@ pub mod advice;
 mod assemble;
 mod assemble_error;
 mod automatic;
+mod balanced;
+mod carried;
 mod checkpoint;
 mod checks;
 mod choice;
@@ -36,10 +38,10 @@ mod touchable;
 
 pub use acts::Act;
 pub use assemble::{AssembledBody, Assembly, Refinement, ResolvedPatch};
-pub use assemble_error::AssembleError;
+pub use assemble_error::{AssembleError, BalanceError};
 pub use automatic::{ExpectedErrors, automatic_settings};
 pub use checkpoint::Checkpoint;
-use checks::{check_contact, check_device};
+use checks::{check_contact, check_device, check_patches};
 pub use crossings::Crossed;
 pub use error::{FrameError, LiveError, SimulationError};
 pub use forces::Hold;
@@ -149,7 +151,7 @@ impl<S: Real> Simulation<S> {
 
     fn on(
         scene: Scene,
-        assembly: Assembly,
+        mut assembly: Assembly,
         callers_device: bool,
         choose: impl FnOnce(
             &Model<S>,
@@ -159,6 +161,7 @@ impl<S: Real> Simulation<S> {
     ) -> Result<Self, SimulationError> {
         check_patches(&scene, &assembly)?;
         check_device(&scene, callers_device)?;
+        assembly.balance(&scene, scene.solver.foreseen_elements(callers_device))?;
         let model = assembly.builder.build::<S>()?;
         let automatic::Chosen { settings: solver, oscillations, solver: ready } =
             automatic::choose_method(&scene, &assembly, &model, callers_device);
@@ -466,29 +469,6 @@ fn has_loose_parts<S: Real>(layout: &Layout<S>, inputs: &Inputs<S>) -> bool {
         held[layout.part_at(layout.numbering.of(vertex))] = true;
     }
     held.contains(&false)
-}
-
-/// Whether the patches are those of the scene and name vertices that there are. Numbers of vertices stay what they are as
-/// materials change and bodies are added, so that patches do not depend on the model's revision.
-fn check_patches(scene: &Scene, assembly: &Assembly) -> Result<(), SimulationError> {
-    for (what, found, expected) in [
-        ("bodies", assembly.bodies.len(), scene.bodies.len()),
-        ("fixings", assembly.fixings.len(), scene.fixings.len()),
-        ("motions", assembly.motions.len(), scene.motions.len()),
-        ("forces", assembly.forces.len(), scene.forces.len()),
-        ("tools", assembly.tools.len(), scene.tools.len()),
-    ] {
-        if found != expected {
-            return Err(SimulationError::OtherScene { what, found, expected });
-        }
-    }
-    let vertex_count = assembly.builder.positions().len();
-    let patches = assembly.fixings.iter().chain(&assembly.motions).chain(&assembly.forces);
-    let mut vertices = patches.flat_map(|patch| patch.vertices.iter().copied());
-    match vertices.find(|&vertex| vertex as usize >= vertex_count) {
-        Some(vertex) => Err(SimulationError::Patch { vertex, vertex_count }),
-        None => Ok(()),
-    }
 }
 
 /// A substep of a scene [s], of so many per frame.

@@ -8,6 +8,7 @@ mod allocation;
 mod allocation_threads;
 mod at_rest;
 mod automatic;
+mod balanced;
 mod coloring;
 mod contact;
 mod determinism;
