@@ -5,14 +5,15 @@ use clap::{Args, Subcommand};
 use serde::Serialize;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use viscera::mesh::io::{Mesh, MeshFile, ReadReport, gmsh, obj, ply, stl, vtk, vtu};
+use viscera::mesh::io::{Mesh, MeshFile, MeshNames, gmsh, obj, ply, stl, vtk, vtu};
 use viscera::mesh::topology::connected_components;
 use viscera::mesh::{
     MeshRepairs, SurfaceMesh, TetMesh, boundary_surface, inspect, inspect_surface,
 };
 use viscera::scalar::{Vec3, vec3};
+use viscera::scene::RegionLabel;
 use viscera::units::Dimension;
-use viscera_import::{Found, open};
+use viscera_import::{Found, Unit, guess_unit, is_image, open};
 use viscera_report::Table;
 use viscera_resources::files;
 use viscera_volume::summarize;
@@ -29,9 +30,9 @@ pub enum MeshCommand {
     Inspect {
         /// The mesh file
         file: PathBuf,
-        /// The length that 1 in the file stands for; files rarely say
-        #[arg(long, default_value = "1 m")]
-        unit: String,
+        /// The length that 1 in the file stands for, such as "1 mm"; guessed and said where it is not given, as by `viscera run FILE`
+        #[arg(long)]
+        unit: Option<String>,
         /// Print JSON, in SI units, instead of a table
         #[arg(long)]
         json: bool,
@@ -77,9 +78,9 @@ pub struct ConvertArguments {
     /// Which axis of the file becomes x, y and z: "x,z,-y" lays down what stands
     #[arg(long, default_value = "x,y,z", allow_hyphen_values = true)]
     axes: String,
-    /// Keep tetrahedra with these labels only
+    /// Keep tetrahedra of these regions only, by label or by the name in the file
     #[arg(long, value_delimiter = ',', value_name = "LABELS")]
-    region: Vec<u32>,
+    region: Vec<String>,
     /// Keep one unconnected part only, as `viscera mesh inspect` counts them
     #[arg(long, value_name = "NUMBER")]
     component: Option<usize>,
@@ -88,7 +89,10 @@ pub struct ConvertArguments {
 /// Carries out a `viscera mesh` command.
 pub fn execute(command: &MeshCommand) -> Result<()> {
     match command {
-        MeshCommand::Inspect { file, unit, json } => inspect_file(file, length(unit)?, *json),
+        MeshCommand::Inspect { file, unit, json } => {
+            let unit = unit.as_deref().map(length).transpose()?;
+            inspect_file(file, unit, *json)
+        }
         MeshCommand::Labels { file } => list_labels(file),
         MeshCommand::Tetrahedralize { file, out, import } => tetrahedralize(file, out, import),
         MeshCommand::Convert(arguments) => convert(arguments),
@@ -101,21 +105,55 @@ fn length(unit: &str) -> Result<f64> {
     Ok(unit)
 }
 
-fn inspect_file(file: &Path, unit: f64, json: bool) -> Result<()> {
+fn inspect_file(file: &Path, unit: Option<f64>, json: bool) -> Result<()> {
     let name = file.display().to_string();
     let mesh = MeshFile::load(&name, |name| files::read(Path::new(name)))?;
-    match mesh.mesh(unit)? {
-        (Mesh::Surface(surface), report) => print(&name, &inspect_surface(&surface, &report), json),
-        (Mesh::Tets(mesh), report) => print(&name, &inspect(&mesh, &report), json),
+    ensure!(
+        !is_image(&name, &mesh.bytes),
+        "{name} is a scan, not a mesh; look at it by `viscera mesh labels {name}`"
+    );
+    let unit = match unit {
+        Some(meters) => Unit { meters, reason: "unit as given".to_owned() },
+        None => unit_of(file, &mesh)?,
+    };
+    match mesh.mesh(unit.meters)? {
+        (Mesh::Surface(surface), report) => {
+            print(&name, unit, &inspect_surface(&surface, &report), json)
+        }
+        (Mesh::Tets(mesh), report) => print(&name, unit, &inspect(&mesh, &report), json),
     }
 }
 
-fn print<T: Serialize + Display>(name: &str, summary: &T, json: bool) -> Result<()> {
+/// The unit that a scene of the file would have.
+fn unit_of(file: &Path, mesh: &MeshFile) -> Result<Unit> {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    Ok(match mesh.mesh(1.0)?.0 {
+        Mesh::Surface(surface) => {
+            guess_unit(&name, &surface.vertices, surface.enclosed_volume().abs())
+        }
+        Mesh::Tets(mesh) => guess_unit(&name, mesh.vertices(), mesh.volume()),
+    })
+}
+
+/// A summary with the unit that its lengths were read by.
+#[derive(Serialize)]
+struct InUnit<'a, T> {
+    /// Of 1 in the file [m].
+    unit: f64,
+    /// Where the unit is from.
+    unit_reason: String,
+    #[serde(flatten)]
+    summary: &'a T,
+}
+
+fn print<T: Serialize + Display>(name: &str, unit: Unit, summary: &T, json: bool) -> Result<()> {
     if json {
-        let text = serde_json::to_string_pretty(summary).context("cannot write JSON")?;
+        let Unit { meters, reason } = unit;
+        let with_unit = InUnit { unit: meters, unit_reason: reason, summary };
+        let text = serde_json::to_string_pretty(&with_unit).context("cannot write JSON")?;
         files::print(&format!("{text}\n"))
     } else {
-        files::print(&format!("{name}\n{summary}"))
+        files::print(&format!("{name}\n{:<18} {}\n{summary}", "unit", unit.reason))
     }
 }
 
@@ -167,6 +205,7 @@ fn tetrahedralize(file: &Path, out: &Path, arguments: &ImportArguments) -> Resul
         "{}: tetrahedra are written as .vtu, .vtk or .msh",
         out.display()
     );
+    check_other(file, out)?;
     files::prepare_file(out, "--out")?;
     let import = import::import(file, arguments)?;
     for part in &import.parts {
@@ -176,8 +215,7 @@ fn tetrahedralize(file: &Path, out: &Path, arguments: &ImportArguments) -> Resul
             let stem = out.file_stem().unwrap_or_default().to_string_lossy();
             out.with_file_name(format!("{stem}_{}.{ending}", part.name))
         };
-        let report = ReadReport::default();
-        files::write_atomic(&target, &write_tets(&part.mesh, &report, &ending)?)?;
+        files::write_atomic(&target, &write_tets(&part.mesh, &part.names, &ending)?)?;
     }
     files::print(&import::describe(&import))
 }
@@ -192,6 +230,7 @@ fn convert(arguments: &ConvertArguments) -> Result<()> {
         out.display()
     );
     ensure!(scale.is_finite() && *scale > 0.0, "--scale: a number above zero is needed");
+    check_other(file, out)?;
     files::prepare_file(out, "the file to write")?;
     let turn = turn_of(axes)?;
     let factor = length(unit)? * scale;
@@ -201,6 +240,7 @@ fn convert(arguments: &ConvertArguments) -> Result<()> {
         vec3(at[0], at[1], at[2])
     };
     let name = file.display().to_string();
+    let mut notes = Vec::new();
     let bytes = match open(&name, load)? {
         Found::Labels(..) => {
             bail!("{name} is a segmented scan; fill it by `viscera mesh tetrahedralize`")
@@ -224,22 +264,60 @@ fn convert(arguments: &ConvertArguments) -> Result<()> {
             write_surface(&surface, &ending)?
         }
         Found::Tets(mesh, mut report) => {
-            let (mesh, repairs) = chosen(&name, &mesh, region, *component)?;
+            let regions = labels_of(&name, &mesh, &report.names(), region)?;
+            let (mesh, repairs) = chosen(&name, &mesh, &regions, *component)?;
             for patch in &mut report.patches {
                 let kept = patch.vertices.iter().filter_map(|&v| repairs.vertex_after(v));
                 patch.vertices = kept.collect();
             }
             report.patches.retain(|patch| !patch.vertices.is_empty());
+            report.region_names.retain(|(region, _)| mesh.regions().contains(region));
+            notes.extend(report.skipped_texts());
+            notes.extend(report.unused_text());
             let vertices = mesh.vertices().iter().map(|x| place(*x)).collect();
             // What mirrors is rewound there.
             let (mesh, _) = TetMesh::new(vertices, mesh.tets().to_vec(), mesh.regions().to_vec())?;
             match is_surface {
                 true => write_surface(&boundary_surface(&mesh).surface, &ending)?,
-                false => write_tets(&mesh, &report, &ending)?,
+                false => write_tets(&mesh, &report.names(), &ending)?,
             }
         }
     };
-    files::write_atomic(out, &bytes)
+    files::write_atomic(out, &bytes)?;
+    let notes = notes.iter().map(|note| format!("note: {note}\n"));
+    files::print(&notes.collect::<String>())
+}
+
+/// Refuses to write over the file that is read.
+fn check_other(file: &Path, out: &Path) -> Result<()> {
+    // What is not there yet is another.
+    if let (Ok(from), Ok(to)) = (file.canonicalize(), out.canonicalize()) {
+        ensure!(
+            from != to,
+            "{} is the file that is read; give the file to write another name",
+            out.display()
+        );
+    }
+    Ok(())
+}
+
+/// The labels of regions that are given by label or by name.
+fn labels_of(file: &str, mesh: &TetMesh, names: &MeshNames, wanted: &[String]) -> Result<Vec<u32>> {
+    let mut labels = Vec::new();
+    for text in wanted {
+        let name = text.trim();
+        let number = name.parse().ok().filter(|number| mesh.regions().contains(number));
+        let region = number.map_or_else(|| RegionLabel::Name(name.to_owned()), RegionLabel::Number);
+        let mut found = region.numbers(names);
+        found.retain(|number| mesh.regions().contains(number));
+        ensure!(
+            !found.is_empty(),
+            "{file}: no tetrahedron has the label {name}; its regions are {}",
+            names.list_regions(mesh.regions())
+        );
+        labels.append(&mut found);
+    }
+    Ok(labels)
 }
 
 /// Which axis each coordinate comes from, and its sign.
@@ -275,12 +353,6 @@ fn chosen(
     regions: &[u32],
     component: Option<usize>,
 ) -> Result<(TetMesh, MeshRepairs)> {
-    for region in regions {
-        ensure!(
-            mesh.regions().contains(region),
-            "{name}: no tetrahedron has the label {region}; `viscera mesh inspect` lists them"
-        );
-    }
     let parts = connected_components(mesh);
     if let Some(number) = component {
         ensure!(
@@ -306,14 +378,12 @@ fn ending_of(path: &Path) -> Result<String> {
     ending.with_context(|| format!("{}: the ending says which format to write", path.display()))
 }
 
-fn write_tets(mesh: &TetMesh, report: &ReadReport, ending: &str) -> Result<Vec<u8>> {
-    match ending {
-        "msh" => return Ok(gmsh::write_binary(mesh, &report.patches, &report.region_names)?),
-        "vtk" => return Ok(vtk::write(mesh, &report.patches)?),
-        _ => {}
-    }
-    let regions = vtu::Array::integers("region", mesh.regions());
-    Ok(vtu::write(mesh.vertices(), mesh.tets(), &[], &[regions])?)
+fn write_tets(mesh: &TetMesh, names: &MeshNames, ending: &str) -> Result<Vec<u8>> {
+    Ok(match ending {
+        "msh" => gmsh::write_binary(mesh, names)?,
+        "vtk" => vtk::write(mesh, names)?,
+        _ => vtu::write_mesh(mesh, names)?,
+    })
 }
 
 fn write_surface(surface: &SurfaceMesh, ending: &str) -> Result<Vec<u8>> {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use viscera::mesh::io::ReadReport;
+use viscera::mesh::io::{MeshNames, ReadReport};
 use viscera::mesh::winding::fill;
 use viscera::mesh::{SurfaceMesh, TetMesh, tet_volume};
 use viscera::scalar::{Vec3, vec3};
@@ -63,6 +63,8 @@ pub struct Part {
     pub tissue: Tissue,
     /// Parts of it that are made of something else.
     pub inner: Vec<Inner>,
+    /// What its file has names for.
+    pub names: MeshNames,
     /// Where it is held.
     pub holds: Vec<Hold>,
     /// What people should know of it.
@@ -115,7 +117,9 @@ pub fn parts(
             notes.extend(notes_of(&report, unit.meters));
             let mesh = scaled(file, &mesh, unit.meters)?;
             let inner = inner_of(&mesh, &report, &mut notes);
-            Ok(Import { notes, ..alone(file, name, mesh, None, inner) })
+            let mut import = alone(file, name, mesh, None, inner);
+            import.parts.iter_mut().for_each(|part| part.names = report.names());
+            Ok(Import { notes, ..import })
         }
         Found::Surface(surface, report) => {
             observe(&name);
@@ -153,7 +157,8 @@ fn alone(file: &str, name: String, mesh: TetMesh, skin: Option<Skin>, inner: Vec
     let down = vec3(0.0, 0.0, -1.0);
     let holds = at_the_back(&name, &mesh, down, "lowest");
     let tissue = tissue::of_name(&name);
-    let part = Part { name, mesh, skin, tissue, inner, holds, notes: Vec::new() };
+    let names = MeshNames::default();
+    let part = Part { name, mesh, skin, tissue, inner, names, holds, notes: Vec::new() };
     let (file, notes) = (file.to_owned(), Vec::new());
     Import { file, parts: vec![part], touching: Vec::new(), down, notes }
 }
@@ -221,9 +226,8 @@ fn notes_of(report: &ReadReport, unit: f64) -> Vec<String> {
             report.curved
         ));
     }
-    for skipped in &report.skipped {
-        notes.push(format!("left out {} x {}", skipped.count, skipped.kind));
-    }
+    notes.extend(report.unused_text());
+    notes.extend(report.skipped_texts());
     notes
 }
 

@@ -19,7 +19,7 @@ pub enum Found {
 }
 
 /// Whether bytes are those of an image: NIfTI, NRRD, or packed by gzip, as no mesh is.
-fn is_image(name: &str, bytes: &[u8]) -> bool {
+pub fn is_image(name: &str, bytes: &[u8]) -> bool {
     let name = name.to_ascii_lowercase();
     bytes.starts_with(b"NRRD")
         || bytes.starts_with(b"\x1f\x8b")

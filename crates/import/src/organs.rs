@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use viscera::mesh::io::MeshNames;
 use viscera::mesh::tetrahedralize::{surface, tetrahedralize, tetrahedralize_to};
 use viscera::mesh::winding::Solid;
 use viscera::mesh::{SurfaceMesh, TetMesh, boundary_surface};
@@ -244,7 +245,9 @@ fn build(
     if let Some(share) = wall_share {
         tissue.soften(share);
     }
-    Ok(Part { name, mesh, skin: Some(skin), tissue, inner, holds, notes })
+    let regions = inner.iter().map(|inner| (inner.region, inner.name.clone())).collect();
+    let names = MeshNames { regions, ..MeshNames::default() };
+    Ok(Part { name, mesh, skin: Some(skin), tissue, inner, names, holds, notes })
 }
 
 /// Gives the tetrahedra of what lies in an organ a region of their own.

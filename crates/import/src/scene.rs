@@ -22,9 +22,8 @@ impl Import {
     pub fn scene(&self, title: &str) -> Written {
         let mut files = vec![("scene.toml".to_owned(), self.text(title).into_bytes())];
         for part in &self.parts {
-            let regions = vtu::Array::integers("region", part.mesh.regions());
-            // The arrays are as long as the mesh, and its places are finite.
-            let grid = vtu::write(part.mesh.vertices(), part.mesh.tets(), &[], &[regions]);
+            // Patches are of the mesh, and its places are finite.
+            let grid = vtu::write_mesh(&part.mesh, &part.names);
             files.push((format!("{}.vtu", part.name), grid.unwrap_or_default()));
             if let Some(skin) = &part.skin {
                 files.push((format!("{}_skin.ply", part.name), ply::write(skin)));
@@ -58,6 +57,7 @@ impl Import {
                     writeln!(text, "[[fixing]]\nname = {:?}\nbody = {:?}", hold.name, part.name);
                 let _ = writeln!(text, "{}", selector(&hold.place));
             }
+            patches(&mut text, part);
         }
         for touching in &self.touching {
             let (from, to) = (&self.parts[touching.from], &self.parts[touching.to]);
@@ -110,6 +110,32 @@ fn body(text: &mut String, part: &Part) {
         let _ = writeln!(text, "[[body.region]]\nlabel = {}", inner.region);
         let _ = writeln!(text, "{}", keys(&inner.tissue));
     }
+}
+
+/// What the mesh has names for, with a fixing that is not in force yet.
+fn patches(text: &mut String, part: &Part) {
+    const SHOWN: usize = 12;
+    let Some(first) = part.names.patches.first() else { return };
+    let _ = writeln!(text, "\n# The mesh of `{}` has named patches:", part.name);
+    for patch in part.names.patches.iter().take(SHOWN) {
+        let _ = writeln!(text, "#   {}, {} vertices", quoted(&patch.name), patch.vertices.len());
+    }
+    if let Some(more) = part.names.patches.len().checked_sub(SHOWN + 1) {
+        let file = format!("{}.vtu", part.name);
+        let _ = writeln!(text, "#   and {} more: viscera mesh inspect {file} --json", more + 1);
+    }
+    let _ = writeln!(
+        text,
+        "# To hold one of them, take the marks off the next lines; motions and forces take `patch` in the same way.\n\
+         # [[fixing]]\n# body = {:?}\n# patch = {}",
+        part.name,
+        quoted(&first.name)
+    );
+}
+
+/// A name of a file as TOML has text; readers have taken out what would end the line.
+fn quoted(name: &str) -> String {
+    format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
 fn material(text: &mut String, table: &str, tissue: &Tissue) {

@@ -290,7 +290,7 @@ fn triangles_without_area_are_left_out_of_a_surface_and_it_is_said() {
     bench.write("skin.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n");
     let end = bench.run(&[]);
     assert_eq!(end.code, Some(0), "{}", end.stderr);
-    assert!(end.stderr.contains("left out 1 elements of kind triangle without area"));
+    assert!(end.stderr.contains("left out 1 x triangle without area"));
 }
 
 #[test]

@@ -123,3 +123,87 @@ fn surfaces_are_filled_turned_and_written() {
     }
     assert!(!bench.path("a.stl").exists() && !bench.path("a.vtu").exists());
 }
+
+/// Two tetrahedra of two regions with names, and a surface with one.
+const NAMED: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n2 1 \"wall\"\n3 5 \"lobe\"\n3 6 \"tumour\"\n\
+    $EndPhysicalNames\n$Nodes\n5\n1 0 0 0\n2 60 0 0\n3 0 60 0\n4 0 0 60\n5 60 60 60\n$EndNodes\n\
+    $Elements\n3\n1 2 2 1 1 1 2 3\n2 4 2 5 1 1 2 3 4\n3 4 2 6 1 2 3 4 5\n$EndElements\n";
+
+#[test]
+fn a_conversion_keeps_names_and_chooses_regions_by_them() {
+    let bench = Bench::new("");
+    bench.write("organ.msh", NAMED.as_bytes());
+    for name in ["all.vtu", "all.vtk", "all.msh"] {
+        let end = bench.end_of(&["mesh", "convert", "organ.msh", name, "--unit", "1 mm"]);
+        assert_eq!(end.code, Some(0), "{}", end.stderr);
+        let said = "1 x triangle on surfaces of the mesh: those with a name are kept";
+        assert!(end.stdout.contains(said), "{}", end.stdout);
+        let inspect = bench.end_of(&["mesh", "inspect", name]).stdout;
+        for part in ["`wall`", "`lobe`", "`tumour`"] {
+            assert!(inspect.contains(part), "{name}: {part}: {inspect}");
+        }
+    }
+    for (wanted, kept, others) in
+        [("tumour", "region 6", "region 5"), ("5", "region 5", "region 6")]
+    {
+        let choose = ["mesh", "convert", "organ.msh", "part.vtu", "--region", wanted];
+        let end = bench.end_of(&choose);
+        assert_eq!(end.code, Some(0), "{}", end.stderr);
+        let inspect = bench.end_of(&["mesh", "inspect", "part.vtu"]).stdout;
+        assert!(inspect.contains(kept) && !inspect.contains(others), "{inspect}");
+    }
+    let end = bench.end_of(&["mesh", "convert", "organ.msh", "b.vtu", "--region", "tumor"]);
+    let expected = "no tetrahedron has the label tumor; its regions are 5 `lobe`, 6 `tumour`";
+    assert!(end.error().contains(expected), "{}", end.stderr);
+    assert!(!bench.path("b.vtu").exists());
+}
+
+#[test]
+fn a_file_is_not_written_over_itself() {
+    let bench = Bench::new("");
+    bench.write("organ.msh", NAMED.as_bytes());
+    bench.write("cube.obj", CUBE.as_bytes());
+    std::fs::create_dir(bench.path("folder")).expect("a folder");
+    for (file, out) in [
+        ("organ.msh", "organ.msh"),
+        ("organ.msh", "./organ.msh"),
+        ("organ.msh", "folder/../organ.msh"),
+        ("cube.obj", "cube.obj"),
+    ] {
+        let end = bench.end_of(&["mesh", "convert", file, out]);
+        assert!(end.error().contains("is the file that is read"), "{}", end.stderr);
+    }
+    assert_eq!(bench.read("organ.msh"), NAMED.as_bytes());
+    assert_eq!(bench.read("cube.obj"), CUBE.as_bytes());
+}
+
+#[test]
+fn a_mesh_is_looked_at_in_the_unit_that_a_run_would_guess() {
+    let bench = Bench::new("");
+    bench.write("spleen.obj", CUBE.as_bytes());
+    let end = bench.end_of(&["mesh", "inspect", "spleen.obj"]);
+    for part in ["1 in the file as 1 mm: a spleen of 216 ml", "216.0 ml"] {
+        assert!(end.stdout.contains(part), "{part}: {}", end.stdout);
+    }
+    let json = bench.end_of(&["mesh", "inspect", "spleen.obj", "--json"]).stdout;
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(json["unit"], 1e-3);
+    let volume = json["volume"].as_f64().expect("a volume");
+    assert!((volume / 216e-6 - 1.0).abs() < 1e-9, "{volume}");
+    let end = bench.end_of(&["mesh", "inspect", "spleen.obj", "--unit", "1 cm"]);
+    assert!(
+        end.stdout.contains("unit as given") && end.stdout.contains("216.0 l\n"),
+        "{}",
+        end.stdout
+    );
+}
+
+#[test]
+fn a_scan_is_sent_to_the_command_for_scans() {
+    let bench = Bench::new("");
+    for name in ["scan.nrrd", "scan.seg.nrrd", "scan.nii", "scan.nii.gz"] {
+        bench.write(name, &scan());
+        let end = bench.end_of(&["mesh", "inspect", name]);
+        assert!(end.error().contains(&format!("`viscera mesh labels {name}`")), "{}", end.stderr);
+    }
+}

@@ -1,11 +1,13 @@
 //! Meshes and surfaces as scenes.
 
 use viscera::mesh::distance::{SignedDistance, Sphere};
-use viscera::mesh::io::{gmsh, obj};
+use viscera::mesh::io::{MeshNames, Patch, gmsh, obj, vtk};
 use viscera::mesh::tetrahedralize::{surface, tetrahedralize};
 use viscera::mesh::topology::count_open_edges;
 use viscera::mesh::{SurfaceMesh, TetMesh, boundary_surface};
 use viscera::scalar::{Vec3, vec3};
+use viscera::scene::Scene;
+use viscera::simulation::Assembly;
 use viscera_import::{Import, Options, Place, open, parts};
 
 const RADIUS: f64 = 50.0;
@@ -93,6 +95,32 @@ fn an_open_sheet_is_refused() {
     assert!(error.to_string().starts_with("sheet.obj: "), "{error}");
 }
 
+/// Named patches come along, and a person sees how to use them.
+#[test]
+fn patches_of_a_mesh_are_kept_and_shown() {
+    let ball = Sphere { center: Vec3::ZERO, radius: 0.05 };
+    let (mesh, _) = tetrahedralize(&ball, 0.02).expect("a ball");
+    let low = (0u32..).zip(mesh.vertices()).filter(|(_, x)| x.z < -0.03).map(|(v, _)| v).collect();
+    let patches = vec![Patch { name: "the \"wall\"".into(), vertices: low }];
+    let names = MeshNames { patches, regions: vec![(0, "all".into())] };
+    let bytes = vtk::write(&mesh, &names).expect("a file");
+    let made = import("ball.vtk", bytes, &Options { unit: Some(1.0), ..Options::default() });
+    assert_eq!(made.parts[0].names, names);
+    let written = made.scene("ball").files;
+    let text = std::str::from_utf8(&written[0].1).expect("text");
+    let lines = "# [[fixing]]\n# body = \"ball\"\n# patch = \"the \\\"wall\\\"\"\n";
+    assert!(text.contains(lines), "{text}");
+    let on = text.replace(lines, &lines.replace("# ", ""));
+    let scene = Scene::parse("scene.toml", &on, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let load = &mut |name: &str| {
+        let file = written.iter().find(|(known, _)| known == name).expect("a file");
+        Ok(file.1.clone())
+    };
+    let assembly = Assembly::new(&scene, load).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(assembly.fixings[1].vertices, names.patches[0].vertices);
+    assert_eq!(assembly.bodies[0].names, names);
+}
+
 /// Two balls apart, one with a lump of another region that has a name, one without.
 #[test]
 fn every_part_is_held_and_regions_with_names_are_kept() {
@@ -115,8 +143,9 @@ fn every_part_is_held_and_regions_with_names_are_kept() {
     };
     let regions = tets.iter().map(region).collect();
     let (mesh, _) = TetMesh::new(vertices, tets, regions).expect("a mesh");
-    let names = [(3, "liver".to_owned()), (7, "Tumor".to_owned())];
-    let bytes = gmsh::write_binary(&mesh, &[], &names).expect("a file");
+    let regions = vec![(3, "liver".to_owned()), (7, "Tumor".to_owned())];
+    let names = MeshNames { regions, ..MeshNames::default() };
+    let bytes = gmsh::write_binary(&mesh, &names).expect("a file");
     let made = import("organs.msh", bytes, &Options { unit: Some(1.0), ..Options::default() });
     let part = &made.parts[0];
     assert_eq!(part.inner.len(), 1);

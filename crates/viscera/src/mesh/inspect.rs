@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::io::{CountedElements, Format, ReadReport};
+use super::io::{CountedElements, Format, ReadReport, unused_text};
 use super::quality::{self, QualitySummary};
 use super::topology::{self, BoundingBox};
 use super::{SurfaceMesh, TetMesh};
@@ -76,6 +76,8 @@ pub struct MeshSummary {
     pub patches: Vec<(String, usize)>,
     /// Elements of the file that are not part of the mesh.
     pub skipped: Vec<CountedElements>,
+    /// Arrays of whole numbers, one for each cell, that were not taken as regions.
+    pub unused_arrays: Vec<String>,
 }
 
 /// Measures a mesh.
@@ -110,6 +112,7 @@ pub fn inspect(mesh: &TetMesh, report: &ReadReport) -> MeshSummary {
         rewound_tet_count: report.repairs.rewound_tets,
         removed_vertex_count: report.repairs.removed_vertices.len(),
         skipped: report.skipped.clone(),
+        unused_arrays: report.unused_arrays.clone(),
     }
 }
 
@@ -268,7 +271,19 @@ fn write_findings(f: &mut fmt::Formatter<'_>, summary: &MeshSummary) -> fmt::Res
         );
         row(f, "second order", text)?;
     }
-    write_skipped(f, &summary.skipped)
+    write_skipped(f, &summary.skipped)?;
+    if summary.skipped.iter().any(|skipped| skipped.kind == "triangle") {
+        let kept = if summary.patches.is_empty() { "" } else { "; those with names are patches" };
+        row(
+            f,
+            "",
+            format!("triangles are surfaces of the mesh, which tetrahedra do not need{kept}"),
+        )?;
+    }
+    match unused_text(&summary.unused_arrays) {
+        Some(text) => row(f, "note", text),
+        None => Ok(()),
+    }
 }
 
 impl fmt::Display for SurfaceSummary {

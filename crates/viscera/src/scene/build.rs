@@ -11,7 +11,8 @@ use super::tables::{
 };
 use super::tray::build_tools;
 use super::{
-    Ball, Body, BodyShape, Change, Fixing, Region, Scene, SceneError, Spring, Tie, Written,
+    Ball, Body, BodyShape, Change, Fixing, Region, RegionLabel, Scene, SceneError, Spring, Tie,
+    Written,
 };
 use crate::material::{Material, MaterialModel};
 use crate::mesh::shapes::LIVER_SPACING;
@@ -220,13 +221,18 @@ fn build_body(table: &Placed<BodyTable>) -> Result<Body, SceneError> {
     let material = build_material(&body.material, None, &owner, place)?;
     let mut regions: Vec<Region> = Vec::new();
     for Placed { place, value } in &body.region {
-        let label = value.label;
+        let label = value.label.clone();
         let owner = format!("{owner}, region {label}");
         if regions.iter().any(|region| region.label == label) {
             let name = label.to_string();
             return Err(SceneError::NameTaken { place: place.clone(), kind: "region", name });
         }
         let material = build_material(&value.material, Some(&material), &owner, place)?;
+        if value.sphere.is_some() && matches!(label, RegionLabel::Name(_)) {
+            let problem =
+                "a `sphere` gives a new label, which is a number, such as label = 1".into();
+            return Err(SceneError::Shape { place: place.clone(), body: name, problem });
+        }
         let ball =
             value.sphere.as_ref().map(|ball| Ball { center: ball.center, radius: ball.radius });
         regions.push(Region { label, ball, material });

@@ -42,6 +42,7 @@ mod keys;
 mod lookup;
 mod motion;
 mod moved;
+mod region;
 mod selector;
 mod solid;
 mod tables;
@@ -59,6 +60,7 @@ pub use keys::{JawKey, MotionKey};
 pub use motion::{Force, ForceKey, Motion};
 
 pub use crate::scalar::rigid::RigidTransform;
+pub use region::{Ball, Region, RegionLabel};
 pub use selector::{Patch, SelectError, Selector, nearest_pair};
 pub use solid::{RidgedJaw, Solid, SolidSource, Tube};
 pub use tables::{ContactSettings, OutputSettings, TimeSettings, WorldSettings};
@@ -66,7 +68,6 @@ pub use tray::read_tray;
 
 use crate::contact::{ContactLaw, TissueContact};
 use crate::material::{Material, MaterialError};
-use crate::scalar::Vec3;
 use crate::settings::{Node, Place, SettingError, SolverSettings, Value};
 use std::collections::BTreeMap;
 
@@ -211,26 +212,6 @@ pub enum BodyShape {
     },
 }
 
-/// A part of a body made of something else.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Region {
-    /// The label its tetrahedra carry.
-    pub label: u32,
-    /// The ball whose tetrahedra, by their middles, get the label; nothing where the mesh has it.
-    pub ball: Option<Ball>,
-    /// Its material.
-    pub material: Material,
-}
-
-/// A ball in the world, at rest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ball {
-    /// [m].
-    pub center: Vec3<f64>,
-    /// [m].
-    pub radius: f64,
-}
-
 /// Where a body is held.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fixing {
@@ -321,7 +302,7 @@ pub enum SceneError {
     /// A patch with no selector, or with several.
     #[error(
         "{place}: {purpose} has {count} selectors; write exactly one of box, sphere, half_space, \
-         nearest, region"
+         nearest, region, patch"
     )]
     SelectorCount {
         /// Where the patch is.

@@ -1,13 +1,19 @@
-//! Choosing vertices of a body by where they are at rest.
+//! Choosing vertices of a body by where they are at rest, or by what its mesh file calls them.
 
 use super::SceneError;
+use super::region::RegionLabel;
 use super::tables::PatchTable;
+use crate::mesh::TetMesh;
+use crate::mesh::io::MeshNames;
 use crate::scalar::Vec3;
-use crate::settings::Place;
+use crate::settings::{Place, suggest};
+use crate::units::shorten;
 use std::fmt;
 
 /// Which vertices are meant. Coordinates are of the world, at rest [m].
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+///
+/// Recordings number the kinds: a new one comes last.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Selector {
     /// In an axis-aligned box.
     Box {
@@ -39,6 +45,10 @@ pub enum Selector {
     },
     /// Of tetrahedra with a label.
     Region(u32),
+    /// Of tetrahedra whose label has this name in the mesh file.
+    NamedRegion(String),
+    /// That the mesh file has this name for: a physical group, a node set.
+    Patch(String),
 }
 
 /// Why a selector finds nothing. Lengths in metres, printed in millimetres.
@@ -77,11 +87,32 @@ pub enum SelectError {
     /// No tetrahedron carries the label.
     #[error("no tetrahedron has the label {label}; the body's labels are {known}")]
     NoRegion {
-        /// The label.
-        label: u32,
-        /// The labels there are.
+        /// The label, or the name.
+        label: RegionLabel,
+        /// The labels there are, with their names.
         known: String,
     },
+    /// The mesh has no patch of this name.
+    #[error("the body's mesh has no patch `{patch}`; its patches are {known}{hint}")]
+    NoPatch {
+        /// The name.
+        patch: String,
+        /// The names there are.
+        known: String,
+        /// The nearest of them, as a question.
+        hint: String,
+    },
+    /// The mesh has no names of patches at all.
+    #[error(
+        "the body's mesh has no named patches: {}; choose vertices by box, sphere, half_space, nearest or region",
+        if cfg!(feature = "formats") {
+            "they come from physical groups of Gmsh files, node sets of Abaqus files, whole numbers at points of VTK files, \
+             references of Medit and markers of TetGen files"
+        } else {
+            "this build of the program does not read them"
+        }
+    )]
+    NoPatches,
 }
 
 /// A point for a message: "(12, -3.5, 100) mm".
@@ -102,19 +133,16 @@ fn millimetres(metres: f64) -> String {
 impl Selector {
     /// The chosen vertices in ascending order, at least one.
     ///
-    /// `rest_positions` [m], shape [vertex_count]; `tets`, shape [tet_count]; `regions`, shape
-    /// [tet_count]. A vertex on the boundary counts as inside, to within 1e-9 of the body's size, so
-    /// that rounding does not decide.
-    pub fn select(
-        &self,
-        rest_positions: &[Vec3<f64>],
-        tets: &[[u32; 4]],
-        regions: &[u32],
-    ) -> Result<Vec<u32>, SelectError> {
+    /// `mesh` is at rest, `names` are those of its vertices and labels. A vertex on the boundary counts as inside, to within
+    /// 1e-9 of the body's size, so that rounding does not decide.
+    pub fn select(&self, mesh: &TetMesh, names: &MeshNames) -> Result<Vec<u32>, SelectError> {
+        let rest_positions = mesh.vertices();
         let Some((min, max)) = bounds(rest_positions) else { return Err(SelectError::NoVertices) };
-        match *self {
-            Self::Nearest { point, count } => nearest(rest_positions, point, count),
-            Self::Region(label) => in_region(rest_positions.len(), tets, regions, label),
+        match self {
+            Self::Nearest { point, count } => nearest(rest_positions, *point, *count),
+            Self::Region(label) => in_region(mesh, names, RegionLabel::Number(*label)),
+            Self::NamedRegion(name) => in_region(mesh, names, RegionLabel::Name(name.clone())),
+            Self::Patch(name) => in_patch(mesh.vertices().len(), names, name),
             _ => {
                 let slack = 1e-9 * (max - min).length();
                 let inside = |(_, position): &(u32, &Vec3<f64>)| self.distance(**position) <= slack;
@@ -135,7 +163,7 @@ impl Selector {
             Self::Sphere { center, radius } => ((position - center).length() - radius).max(0.0),
             Self::HalfSpace { point, normal } => normal.dot(point - position).max(0.0),
             Self::Nearest { point, .. } => (position - point).length(),
-            Self::Region(_) => 0.0,
+            Self::Region(_) | Self::NamedRegion(_) | Self::Patch(_) => 0.0,
         }
     }
 
@@ -146,7 +174,7 @@ impl Selector {
             Self::Box { .. } => "box",
             Self::Sphere { .. } => "sphere",
             Self::HalfSpace { .. } => "half-space",
-            Self::Nearest { .. } | Self::Region(_) => "selector",
+            _ => "selector",
         };
         match positions.iter().min_by(by_distance) {
             Some(&nearest) => {
@@ -187,26 +215,40 @@ fn nearest(positions: &[Vec3<f64>], point: Vec3<f64>, count: u32) -> Result<Vec<
 }
 
 fn in_region(
-    vertex_count: usize,
-    tets: &[[u32; 4]],
-    regions: &[u32],
-    label: u32,
+    mesh: &TetMesh,
+    names: &MeshNames,
+    label: RegionLabel,
 ) -> Result<Vec<u32>, SelectError> {
-    let labelled = tets.iter().zip(regions).filter(|(_, region)| **region == label);
+    let wanted = label.numbers(names);
+    let labelled = mesh.tets().iter().zip(mesh.regions());
+    let labelled = labelled.filter(|(_, region)| wanted.contains(region));
     let mut selected: Vec<u32> = labelled.flat_map(|(tet, _)| *tet).collect();
     selected.sort_unstable();
     selected.dedup();
+    if selected.is_empty() {
+        return Err(SelectError::NoRegion { label, known: names.list_regions(mesh.regions()) });
+    }
+    Ok(selected)
+}
+
+fn in_patch(vertex_count: usize, names: &MeshNames, name: &str) -> Result<Vec<u32>, SelectError> {
+    if names.patches.is_empty() {
+        return Err(SelectError::NoPatches);
+    }
+    let found = names.patches.iter().find(|patch| patch.name == name);
+    let mut selected = found.map_or_else(Vec::new, |patch| patch.vertices.clone());
     selected.retain(|vertex| (*vertex as usize) < vertex_count);
     if selected.is_empty() {
         const SHOWN: usize = 20;
-        let mut known = regions.to_vec();
-        known.sort_unstable();
-        known.dedup();
-        let mut texts: Vec<_> = known.iter().take(SHOWN).map(u32::to_string).collect();
-        if known.len() > SHOWN {
-            texts.push("...".to_owned());
+        let all: Vec<&str> = names.patches.iter().map(|patch| patch.name.as_str()).collect();
+        let quoted = all.iter().take(SHOWN).map(|name| format!("`{name}`"));
+        let mut known = quoted.collect::<Vec<_>>().join(", ");
+        if all.len() > SHOWN {
+            known.push_str(", ...");
         }
-        return Err(SelectError::NoRegion { label, known: texts.join(", ") });
+        let near = suggest(name, &all);
+        let hint = if near.ends_with('?') { format!("; {near}") } else { String::new() };
+        return Err(SelectError::NoPatch { patch: shorten(name), known, hint });
     }
     Ok(selected)
 }
@@ -226,13 +268,8 @@ pub struct Patch {
 
 impl Patch {
     /// As [`Selector::select`]; an error says where the scene asks for the patch.
-    pub fn select(
-        &self,
-        rest_positions: &[Vec3<f64>],
-        tets: &[[u32; 4]],
-        regions: &[u32],
-    ) -> Result<Vec<u32>, SceneError> {
-        self.selector.select(rest_positions, tets, regions).map_err(|error| SceneError::Selection {
+    pub fn select(&self, mesh: &TetMesh, names: &MeshNames) -> Result<Vec<u32>, SceneError> {
+        self.selector.select(mesh, names).map_err(|error| SceneError::Selection {
             place: self.place.clone(),
             purpose: self.purpose.clone(),
             error: Box::new(error),
@@ -254,7 +291,11 @@ impl PatchTable {
             self.nearest
                 .as_ref()
                 .map(|table| Selector::Nearest { point: table.point, count: table.count }),
-            self.region.map(Selector::Region),
+            self.region.clone().map(|region| match region {
+                RegionLabel::Number(label) => Selector::Region(label),
+                RegionLabel::Name(name) => Selector::NamedRegion(name),
+            }),
+            self.patch.clone().map(Selector::Patch),
         ];
         let mut written = selectors.into_iter().flatten();
         match (written.next(), written.count()) {
@@ -285,18 +326,24 @@ pub fn nearest_pair(from: &[Vec3<f64>], to: &[Vec3<f64>]) -> Option<(usize, usiz
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::io;
     use crate::scalar::vec3;
 
     /// Corners of a cube of 100 mm in two tetrahedra's worth of labels.
-    fn cube() -> (Vec<Vec3<f64>>, Vec<[u32; 4]>, Vec<u32>) {
+    fn cube() -> TetMesh {
         let corner = |i: u32| [i & 1, (i >> 1) & 1, i >> 2].map(|bit| 0.1 * f64::from(bit));
         let positions = (0..8).map(|i| Vec3::from_f64(corner(i))).collect();
-        (positions, vec![[0, 1, 2, 4], [7, 6, 5, 3]], vec![5, 9])
+        TetMesh::new(positions, vec![[0, 1, 2, 4], [7, 6, 5, 3]], vec![5, 9]).expect("a mesh").0
+    }
+
+    fn names() -> MeshNames {
+        let patch = |name: &str, vertices| io::Patch { name: name.into(), vertices };
+        let patches = vec![patch("wall", vec![0, 2, 4]), patch("left wall", vec![1])];
+        MeshNames { patches, regions: vec![(9, "tumour".into())] }
     }
 
     #[test]
     fn selectors_take_what_they_enclose() {
-        let (positions, tets, regions) = cube();
         let far = vec3(0.1, 0.1, 0.1);
         for (selector, expected) in [
             (
@@ -311,17 +358,19 @@ mod tests {
             (Selector::Nearest { point: far, count: 1 }, vec![7]),
             (Selector::Nearest { point: far, count: 3 }, vec![3, 5, 7]),
             (Selector::Region(9), vec![3, 5, 6, 7]),
+            (Selector::NamedRegion("tumour".into()), vec![3, 5, 6, 7]),
+            (Selector::Patch("wall".into()), vec![0, 2, 4]),
+            (Selector::Patch("left wall".into()), vec![1]),
         ] {
-            assert_eq!(selector.select(&positions, &tets, &regions), Ok(expected), "{selector:?}");
+            assert_eq!(selector.select(&cube(), &names()), Ok(expected), "{selector:?}");
         }
     }
 
     #[test]
     fn a_selector_that_finds_nothing_says_where_the_body_is() {
-        let (positions, tets, regions) = cube();
-        let message = |selector: Selector| {
-            selector.select(&positions, &tets, &regions).unwrap_err().to_string()
-        };
+        let without = MeshNames::default();
+        let message =
+            |selector: Selector| selector.select(&cube(), &without).unwrap_err().to_string();
         assert_eq!(
             message(Selector::Sphere { center: vec3(0.1, 0.1, 0.13), radius: 0.01 }),
             "the body reaches from (0, 0, 0) mm to (100, 100, 100) mm, and its nearest vertex \
@@ -335,7 +384,29 @@ mod tests {
             message(Selector::Nearest { point: Vec3::ZERO, count: 9 }),
             "it wants the nearest 9 vertices; the body has 8"
         );
-        assert_eq!(Selector::Region(5).select(&[], &[], &[]), Err(SelectError::NoVertices));
+        let nothing = Selector::Region(5).select(&TetMesh::default(), &without);
+        assert_eq!(nothing, Err(SelectError::NoVertices));
+    }
+
+    #[test]
+    fn a_name_that_a_mesh_does_not_have_is_told_with_those_it_has() {
+        let message =
+            |selector: Selector| selector.select(&cube(), &names()).unwrap_err().to_string();
+        assert_eq!(
+            message(Selector::Patch("wal".into())),
+            "the body's mesh has no patch `wal`; its patches are `wall`, `left wall`; did you mean `wall`?"
+        );
+        assert_eq!(
+            message(Selector::Patch("ligament".into())),
+            "the body's mesh has no patch `ligament`; its patches are `wall`, `left wall`"
+        );
+        assert_eq!(
+            message(Selector::NamedRegion("tumor".into())),
+            "no tetrahedron has the label `tumor`; the body's labels are 5, 9 `tumour`"
+        );
+        let none = Selector::Patch("wall".into()).select(&cube(), &MeshNames::default());
+        let none = none.unwrap_err().to_string();
+        assert!(none.contains("no named patches") && none.contains("Gmsh"), "{none}");
     }
 
     #[test]

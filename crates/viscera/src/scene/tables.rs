@@ -3,6 +3,7 @@
 use super::common::{Interpolation, SIZE};
 use super::hand_tables::HandTable;
 use super::instrument_tables::ToolTable;
+use super::region::{RegionKind, RegionLabel};
 use crate::material::{LARGEST_POISSON, Preset};
 use crate::material::{
     MaterialModel, check_density, check_poisson, check_viscosity, check_young, preset,
@@ -227,8 +228,8 @@ settings_table! {
 settings_table! {
     /// A part of a body that is made of something else: the body's material with these changes.
     pub(super) struct RegionTable {
-        /// The label that the part's tetrahedra carry: in the mesh file, or by `sphere`.
-        label: u32 = required, whole(0, u32::MAX);
+        /// The label that the part's tetrahedra carry: in the mesh file, or by `sphere`. Also the name of a region of the file.
+        label: RegionLabel = required, RegionKind;
         /// Gives the label to the tetrahedra whose middle lies in this ball, in world coordinates at rest: a lump in a
         /// shape. The mesh's own labels where unset.
         sphere: Option<SphereTable> = None, optional(table::<SphereTable>());
@@ -289,8 +290,10 @@ settings_table! {
         half_space: Option<HalfSpaceTable> = None, optional(table::<HalfSpaceTable>());
         /// The vertices nearest to a point.
         nearest: Option<NearestTable> = None, optional(table::<NearestTable>());
-        /// Vertices of the tetrahedra with this label.
-        region: Option<u32> = None, optional(whole(0, u32::MAX));
+        /// Vertices of the tetrahedra with this label, or of the region of this name in the mesh file.
+        region: Option<RegionLabel> = None, optional(RegionKind);
+        /// Vertices that the mesh file has this name for: a physical group, a node set. `viscera mesh inspect` lists them.
+        patch: Option<String> = None, optional(text());
     }
 }
 

@@ -186,21 +186,23 @@ fn key_text(key: &MotionKey) -> String {
 }
 
 fn selector_text(patch: &Patch) -> String {
-    match patch.selector {
+    match &patch.selector {
         Selector::Box { min, max } => {
-            format!("box = {{ min = {}, max = {} }}", lengths(min), lengths(max))
+            format!("box = {{ min = {}, max = {} }}", lengths(*min), lengths(*max))
         }
         Selector::Sphere { center, radius } => {
-            format!("sphere = {{ center = {}, radius = \"{radius} m\" }}", lengths(center))
+            format!("sphere = {{ center = {}, radius = \"{radius} m\" }}", lengths(*center))
         }
         Selector::HalfSpace { point, normal: n } => {
-            let point = lengths(point);
+            let point = lengths(*point);
             format!("half_space = {{ point = {point}, normal = [{}, {}, {}] }}", n.x, n.y, n.z)
         }
         Selector::Nearest { point, count } => {
-            format!("nearest = {{ point = {}, count = {count} }}", lengths(point))
+            format!("nearest = {{ point = {}, count = {count} }}", lengths(*point))
         }
         Selector::Region(label) => format!("region = {label}"),
+        Selector::NamedRegion(name) => format!("region = {}", quote(name)),
+        Selector::Patch(name) => format!("patch = {}", quote(name)),
     }
 }
 

@@ -2,14 +2,14 @@
 
 use super::assemble_error::{AssembleError, MOST_REFINED};
 use crate::mesh::embed::Embedding;
-use crate::mesh::io::{MeshFile, ReadReport};
+use crate::mesh::io::{MeshFile, MeshNames, ReadReport};
 use crate::mesh::refine::{self, Middles};
 use crate::mesh::shapes;
 use crate::mesh::topology::{boundary_surface, connected_components};
 use crate::mesh::{SurfaceMesh, TetMesh};
 use crate::model::{ModelBuilder, ModelError};
 use crate::scalar::Vec3;
-use crate::scene::{Body, BodyShape, Instrument, Region, Scene, nearest_pair};
+use crate::scene::{Body, BodyShape, Instrument, RegionLabel, Scene, nearest_pair};
 use crate::settings::Elements;
 
 /// A mesh before it was refined.
@@ -28,6 +28,8 @@ pub struct AssembledBody {
     pub name: String,
     /// Its tetrahedra at rest, world coordinates.
     pub mesh: TetMesh,
+    /// What its mesh file has names for, by the vertices of the mesh that patches are chosen on.
+    pub names: MeshNames,
     /// What `mesh` was refined from, where the scene asks for that.
     pub refinement: Option<Refinement>,
     /// The surface to show, at rest.
@@ -97,10 +99,12 @@ impl Assembly {
     /// What models are built from, with the materials of another scene of the same bodies.
     pub fn with_materials(&self, scene: &Scene) -> Result<ModelBuilder, ModelError> {
         let mut builder = self.builder.clone();
-        for (index, body) in scene.bodies.iter().enumerate() {
+        for (index, (body, assembled)) in scene.bodies.iter().zip(&self.bodies).enumerate() {
             builder.set_material(index, &body.material)?;
             for region in &body.regions {
-                builder.set_region_material(index, region.label, &region.material)?;
+                for label in region.label.numbers(&assembled.names) {
+                    builder.set_region_material(index, label, &region.material)?;
+                }
             }
         }
         Ok(builder)
@@ -120,7 +124,8 @@ impl Assembly {
             };
             refinement.middles.push(middles);
             let fine = assembled.has_fine_surface.then(|| assembled.surface.clone());
-            finer.put(body, mesh, Some(refinement), fine)?;
+            let names = assembled.names.clone();
+            finer.put(body, (mesh, names), Some(refinement), fine)?;
         }
         finer.add_patches(scene)?;
         finer.tools.clone_from(&self.tools);
@@ -199,14 +204,14 @@ impl Assembly {
         let (mesh, refinement) = refined(body, mesh)?;
         let surface =
             surface.map(|surface| SurfaceMesh { vertices: place(&surface.vertices), ..surface });
-        self.put(body, mesh, refinement, surface)
+        self.put(body, (mesh, report.names()), refinement, surface)
     }
 
     /// Adds a body whose mesh is where it is to be, with a surface that is finer than its boundary where it has one.
     fn put(
         &mut self,
         body: &Body,
-        mesh: TetMesh,
+        (mesh, names): (TetMesh, MeshNames),
         refinement: Option<Refinement>,
         surface: Option<SurfaceMesh>,
     ) -> Result<(), AssembleError> {
@@ -226,16 +231,15 @@ impl Assembly {
 
         let index = self.builder.add_body(&mesh, &body.material)?;
         for region in &body.regions {
-            let count = self.builder.set_region_material(index, region.label, &region.material)?;
+            let mut count = 0;
+            for label in region.label.numbers(&names) {
+                count += self.builder.set_region_material(index, label, &region.material)?;
+            }
             if count == 0 {
-                let mut known: Vec<u32> = mesh.regions().to_vec();
-                known.sort_unstable();
-                known.dedup();
-                let known: Vec<String> = known.iter().take(12).map(u32::to_string).collect();
                 return Err(AssembleError::UnknownRegion {
                     body: body.name.clone(),
-                    label: region.label,
-                    known: known.join(", "),
+                    label: region.label.clone(),
+                    known: names.list_regions(mesh.regions()),
                 });
             }
         }
@@ -243,6 +247,7 @@ impl Assembly {
         self.bodies.push(AssembledBody {
             name: body.name.clone(),
             mesh,
+            names,
             refinement,
             surface,
             embedding,
@@ -260,7 +265,7 @@ impl Assembly {
     ) -> Result<ResolvedPatch, AssembleError> {
         let body = &self.bodies[patch.body];
         let mesh = body.refinement.as_ref().map_or(&body.mesh, |from| &from.coarse);
-        let mut local = patch.select(mesh.vertices(), mesh.tets(), mesh.regions())?;
+        let mut local = patch.select(mesh, &body.names)?;
         for middles in body.refinement.iter().flat_map(|from| &from.middles) {
             local = middles.patch(&local);
         }
@@ -293,12 +298,11 @@ impl Assembly {
                 report.curved, 1e3 * report.bulge
             ));
         }
-        for skipped in &report.skipped {
-            self.notes.push(format!(
-                "body `{name}`: left out {} elements of kind {}",
-                skipped.count, skipped.kind
-            ));
+        if let Some(text) = report.unused_text() {
+            self.notes.push(format!("body `{name}`: {text}"));
         }
+        let skipped = report.skipped_texts();
+        self.notes.extend(skipped.into_iter().map(|text| format!("body `{name}`: {text}")));
     }
 
     /// A vertex that is both fixed and moved follows the motion, the later of two motions wins, and springs
@@ -375,7 +379,15 @@ impl Assembly {
 
 /// A mesh in the world with the labels of the body's balls: of several the last.
 fn labelled(body: &Body, mesh: TetMesh) -> Result<TetMesh, AssembleError> {
-    let balls = || body.regions.iter().filter_map(|region| Some((region, region.ball?)));
+    let balls = || {
+        let of_number = |label: &RegionLabel| match label {
+            RegionLabel::Number(number) => Some(*number),
+            RegionLabel::Name(_) => None,
+        };
+        body.regions
+            .iter()
+            .filter_map(move |region| Some((of_number(&region.label)?, region.ball?)))
+    };
     if balls().next().is_none() {
         return Ok(mesh);
     }
@@ -384,17 +396,17 @@ fn labelled(body: &Body, mesh: TetMesh) -> Result<TetMesh, AssembleError> {
     };
     let middles: Vec<Vec3<f64>> = mesh.tets().iter().map(middle).collect();
     let mut labels = mesh.regions().to_vec();
-    for (Region { label, .. }, ball) in balls() {
+    for (label, ball) in balls() {
         let mut nearest = f64::INFINITY;
         for (own, middle) in labels.iter_mut().zip(&middles) {
             let distance = (*middle - ball.center).length() - ball.radius;
             nearest = nearest.min(distance);
             if distance <= 0.0 {
-                *own = *label;
+                *own = label;
             }
         }
         if nearest > 0.0 {
-            let (body, label) = (body.name.clone(), *label);
+            let body = body.name.clone();
             return Err(AssembleError::EmptyBall { body, label, distance: nearest });
         }
     }

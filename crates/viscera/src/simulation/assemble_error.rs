@@ -6,7 +6,7 @@ use crate::mesh::embed::EmbeddingError;
 use crate::mesh::io::ReadError;
 use crate::mesh::shapes::ShapeError;
 use crate::model::ModelError;
-use crate::scene::{PathError, SceneError};
+use crate::scene::{PathError, RegionLabel, SceneError};
 use crate::settings::Place;
 
 /// Tetrahedra that refinement makes at most: some gigabytes. Finer meshes are read from files.
@@ -69,7 +69,7 @@ pub enum AssembleError {
         /// The body.
         body: String,
         /// The label given.
-        label: u32,
+        label: RegionLabel,
         /// The labels there are.
         known: String,
     },

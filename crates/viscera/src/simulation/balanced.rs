@@ -63,7 +63,9 @@ impl Assembly {
         let mut builder = ModelBuilder::new();
         builder.add_body(&assembled.mesh, &body.material)?;
         for region in &body.regions {
-            builder.set_region_material(0, region.label, &region.material)?;
+            for label in region.label.numbers(&assembled.names) {
+                builder.set_region_material(0, label, &region.material)?;
+            }
         }
         let first = assembled.vertices.start;
         let mut held = vec![false; assembled.vertices.len()];

@@ -61,8 +61,11 @@ impl<S: Real> Simulation<S> {
         let name = names.into_iter().find(|name| !is_taken(name)).unwrap_or_default();
         let time = self.time();
         let key = MotionKey { time, translation: Vec3::ZERO, rotation: Vec3::ZERO };
-        let (body, selector) = (patch.body, patch.selector);
-        self.note(|| Act::TakeHold { name: stem.to_owned(), body, selector, stiffness });
+        let (body, selector) = (patch.body, &patch.selector);
+        self.note(|| {
+            let selector = selector.clone();
+            Act::TakeHold { name: stem.to_owned(), body, selector, stiffness }
+        });
         self.scene.motions.push(Motion {
             name,
             patch,

@@ -34,7 +34,7 @@ impl<S: Real> Simulation<S> {
             Act::TakeHold { name, body, selector, stiffness } => {
                 let place = Place::Override { key: "recording".into() };
                 let purpose = format!("hold `{name}`");
-                let patch = Patch { body: *body, selector: *selector, purpose, place };
+                let patch = Patch { body: *body, selector: selector.clone(), purpose, place };
                 self.take_hold(name, patch, *stiffness).map(|_| ())
             }
             Act::Lead { hold, translation } => self.lead(*hold, *translation),

@@ -47,6 +47,7 @@ mod mesh_hostile;
 mod mesh_io;
 mod mesh_tools;
 mod mesh_writers;
+mod named_patches;
 mod parts;
 mod physics;
 mod pins;

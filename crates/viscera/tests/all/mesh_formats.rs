@@ -111,6 +111,94 @@ fn sets_that_have_names_are_patches_and_regions() {
     assert_eq!(tets("bar.inp").1.region_names, names);
 }
 
+/// As VTK writes text beside numbers.
+#[test]
+fn names_of_regions_are_read_from_field_data() {
+    let names = fixtures("named");
+    assert_eq!(names.len(), 5, "{names:?}");
+    for name in names {
+        let (mesh, report) = tets(&name);
+        assert_eq!(mesh, bar(), "{name}");
+        let regions = [(5, "left lobe".to_owned()), (6, "rest".to_owned())];
+        assert_eq!(report.region_names, regions, "{name}");
+    }
+}
+
+/// As Gmsh exports a box of two volumes: a set of each entity, then its physical groups.
+const BY_GMSH: &str = "*Heading\n box.inp\n*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n5, 1, 1, 1\n\
+    ******* E L E M E N T S *************\n*ELEMENT, type=T3D2, ELSET=Line3\n1, 1, 2\n\
+    *ELEMENT, type=CPS3, ELSET=Surface1\n7, 1, 2, 3\n8, 1, 4, 2\n*ELEMENT, type=CPS3, ELSET=Surface2\n9, 3, 4, 5\n\
+    *ELEMENT, type=C3D4, ELSET=Volume1\n11, 1, 2, 3, 4\n*ELEMENT, type=C3D4, ELSET=Volume2\n12, 2, 3, 4, 5\n\
+    *ELSET,ELSET=PhysicalSurface1\n7, 8,\n*ELSET,ELSET=outlet\n9,\n*ELSET,ELSET=lobe\n12,\n";
+
+#[test]
+fn element_sets_of_abaqus_are_patches_of_surfaces_and_regions_of_solids() {
+    let file = MeshFile { name: "box.inp".into(), bytes: BY_GMSH.into(), beside: None };
+    let (mesh, report) = file.tets(1.0).unwrap_or_else(|error| panic!("{error}"));
+    let patch =
+        |name: &str, vertices: &[u32]| Patch { name: name.into(), vertices: vertices.into() };
+    let expected = [
+        patch("Line3", &[0, 1]),
+        patch("Surface1", &[0, 1, 2, 3]),
+        patch("Surface2", &[2, 3, 4]),
+        patch("PhysicalSurface1", &[0, 1, 2, 3]),
+        patch("outlet", &[2, 3, 4]),
+    ];
+    assert_eq!(report.patches, expected);
+    // A group that a person has named counts before the volume that it is made of.
+    assert_eq!(mesh.regions(), [4, 8]);
+    assert_eq!(report.region_names, [(4, "Volume1".to_owned()), (8, "lobe".to_owned())]);
+}
+
+/// Arrays of one tetrahedron with values of each type, under names that are known and others.
+#[test]
+fn arrays_that_are_not_taken_as_regions_are_told() {
+    let vtu = |arrays: &str| {
+        format!(
+            "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"4\" NumberOfCells=\"1\">\
+             <Points><DataArray type=\"Float64\" NumberOfComponents=\"3\">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points>\
+             <Cells><DataArray type=\"Int32\" Name=\"connectivity\">0 1 2 3</DataArray>\
+             <DataArray type=\"Int32\" Name=\"offsets\">4</DataArray><DataArray type=\"UInt8\" Name=\"types\">10</DataArray>\
+             </Cells><CellData>{arrays}</CellData></Piece></UnstructuredGrid></VTKFile>"
+        )
+    };
+    let array = |kind: &str, name: &str, value: &str| {
+        format!("<DataArray type=\"{kind}\" Name=\"{name}\">{value}</DataArray>")
+    };
+    let of_vtu = [
+        array("Int32", "organ", "3"),
+        array("Float32", "stress", "0.5"),
+        array("Int32", "vtkOriginalCellIds", "0"),
+    ]
+    .concat();
+    let legacy = |arrays: &str| {
+        format!(
+            "# vtk DataFile Version 3.0\n\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\n\
+             CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nCELL_DATA 1\n{arrays}"
+        )
+    };
+    let of_vtk = "SCALARS organ int\nLOOKUP_TABLE default\n3\nSCALARS stress float\nLOOKUP_TABLE default\n0.5\n";
+    let label = array("Int32", "label", "7");
+    let of_vtk_too = of_vtk.to_owned() + "SCALARS label int\nLOOKUP_TABLE default\n7\n";
+    for (name, text, region) in [
+        ("a.vtu", vtu(&of_vtu), 0),
+        ("a.vtu", vtu(&(of_vtu.clone() + &label)), 7),
+        ("a.vtk", legacy(of_vtk), 0),
+        ("a.vtk", legacy(&of_vtk_too), 7),
+    ] {
+        let read = viscera::mesh::io::read_tet_mesh(name, text.as_bytes(), 1.0);
+        let (mesh, report) = read.unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(
+            (mesh.regions(), &report.unused_arrays[..]),
+            (&[region][..], &["organ".to_owned()][..])
+        );
+        let summary = viscera::mesh::inspect(&mesh, &report).to_string();
+        assert!(summary.contains("cell array `organ` is not used"), "{summary}");
+        assert!(summary.contains("gmsh:physical") && summary.contains("region"), "{summary}");
+    }
+    assert_eq!(tets("bar_vtk_ascii.vtu").1.unused_text(), None);
+}
+
 #[test]
 fn other_cells_are_cut_into_tetrahedra() {
     for name in fixtures("mixed") {

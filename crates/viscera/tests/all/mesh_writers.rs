@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use viscera::mesh::io::gltf::{self, Surface};
 use viscera::mesh::io::{
-    Format, Patch, ReadReport, WriteError, gmsh, obj, ply, pvd, read_surface, read_tet_mesh, stl,
-    vtk, vtu,
+    Format, MeshNames, Patch, ReadReport, WriteError, gmsh, obj, ply, pvd, read_surface,
+    read_tet_mesh, stl, vtk, vtu,
 };
 use viscera::mesh::{SurfaceMesh, TetMesh, boundary_surface};
 use viscera::scalar::{Vec3, vec3};
@@ -51,19 +51,31 @@ fn sorted(mut report: ReadReport) -> ReadReport {
 fn tetrahedra_regions_and_patches_are_read_again_as_they_were() {
     let mesh = cubes(3);
     let patches = patches(&mesh);
-    let names = [(7, "lobe \"a\"".to_owned()), (9, "absent".to_owned())];
-    let gmsh = gmsh::write_binary(&mesh, &patches, &names).expect("a file");
-    let vtk = vtk::write(&mesh, &patches).expect("a file");
-    for (name, bytes, format) in
-        [("a.msh", gmsh, Format::Gmsh4Binary), ("a.vtk", vtk, Format::VtkBinary)]
-    {
+    let regions = vec![(0, "größer & <b>".to_owned()), (7, "lobe \"a\" %20".to_owned())];
+    let names = MeshNames { patches: patches.clone(), regions };
+    let gmsh = gmsh::write_binary(&mesh, &names).expect("a file");
+    let vtk = vtk::write(&mesh, &names).expect("a file");
+    // Places in single precision.
+    let single = mesh.vertices().iter().map(|x| x.cast::<f32>().cast()).collect();
+    let single = TetMesh::new(single, mesh.tets().to_vec(), mesh.regions().to_vec());
+    let vtu = vtu::write_mesh(&mesh, &names).expect("a file");
+    for (name, bytes, format) in [
+        ("a.msh", gmsh, Format::Gmsh4Binary),
+        ("a.vtk", vtk, Format::VtkBinary),
+        ("a.vtu", vtu, Format::Vtu),
+    ] {
         let (back, report) =
             read_tet_mesh(name, &bytes, 1.0).unwrap_or_else(|error| panic!("{error}"));
         let report = sorted(report);
-        assert!(back == mesh, "{name}");
-        assert_eq!((report.format, &report.patches), (Some(format), &patches));
-        let named = if name == "a.msh" { vec![(7, "lobe 'a'".to_owned())] } else { Vec::new() };
-        assert_eq!(report.region_names, named);
+        let expected = if name == "a.vtu" { &single.as_ref().expect("cubes").0 } else { &mesh };
+        assert!(back == *expected, "{name}");
+        assert_eq!(report.format, Some(format));
+        let mut found = report.names();
+        if name == "a.msh" {
+            assert_eq!(found.regions[1].1, "lobe 'a' %20");
+            found.regions[1].1.clone_from(&names.regions[1].1);
+        }
+        assert_eq!(found, names, "{name}");
         for end in 0..bytes.len() {
             let cut = read_tet_mesh(name, &bytes[..end], 1.0);
             // Without its patches, or without a line end, a legacy file is whole.
@@ -92,18 +104,20 @@ fn surfaces_are_read_again_as_they_were() {
 #[test]
 fn what_has_no_room_in_a_format_is_refused() {
     let mesh = cubes(1);
-    let patch = [Patch { name: "a".into(), vertices: vec![3, 8] }];
+    let patches = vec![Patch { name: "a".into(), vertices: vec![3, 8] }];
+    let names = MeshNames { patches, ..MeshNames::default() };
     for error in [
-        gmsh::write_binary(&mesh, &patch, &[]).expect_err("a vertex too many"),
-        vtk::write(&mesh, &patch).expect_err("a vertex too many"),
+        gmsh::write_binary(&mesh, &names).expect_err("a vertex too many"),
+        vtk::write(&mesh, &names).expect_err("a vertex too many"),
+        vtu::write_mesh(&mesh, &names).expect_err("a vertex too many"),
     ] {
         assert_eq!(error.to_string(), "patch `a` has vertex 8; the mesh has 8");
     }
     let regions = vec![u32::MAX; mesh.tets().len()];
     let mesh = TetMesh::new(mesh.vertices().to_vec(), mesh.tets().to_vec(), regions).expect("ok").0;
-    let error = gmsh::write_binary(&mesh, &[], &[]).expect_err("a region").to_string();
+    let error = gmsh::write_binary(&mesh, &MeshNames::default()).expect_err("a region").to_string();
     assert!(error.starts_with("region 4294967295 has no room in Gmsh files"), "{error}");
-    assert!(vtk::write(&mesh, &[]).is_ok());
+    assert!(vtk::write(&mesh, &MeshNames::default()).is_ok());
 }
 
 #[test]
@@ -118,10 +132,11 @@ fn read_large(count: u32, longest: Duration) {
     let mesh = cubes(count);
     let regions = vtu::Array::integers("region", mesh.regions());
     let points: Vec<Vec3<f32>> = mesh.vertices().iter().map(|x| x.cast()).collect();
+    let names = MeshNames { patches: patches(&mesh), ..MeshNames::default() };
     for (name, bytes) in [
         ("a.vtu", vtu::write(&points, mesh.tets(), &[], &[regions]).expect("a file")),
-        ("a.msh", gmsh::write_binary(&mesh, &patches(&mesh), &[]).expect("a file")),
-        ("a.vtk", vtk::write(&mesh, &patches(&mesh)).expect("a file")),
+        ("a.msh", gmsh::write_binary(&mesh, &names).expect("a file")),
+        ("a.vtk", vtk::write(&mesh, &names).expect("a file")),
     ] {
         let start = Instant::now();
         let (back, _) = read_tet_mesh(name, &bytes, 1.0).unwrap_or_else(|error| panic!("{error}"));

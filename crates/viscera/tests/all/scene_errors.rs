@@ -189,13 +189,13 @@ fn keys_that_do_not_go_together_are_refused() {
             "half_space = { point = [0, 0, 0], normal = [-1, 0, 0] }",
             "",
             "s.toml, line 12, column 1: fixing 0 has 0 selectors; write exactly one of box, sphere, \
-             half_space, nearest, region",
+             half_space, nearest, region, patch",
         ),
         (
             "half_space",
             "region = 3\nhalf_space",
             "s.toml, line 12, column 1: fixing 0 has 2 selectors; write exactly one of box, sphere, \
-             half_space, nearest, region",
+             half_space, nearest, region, patch",
         ),
         (
             "half_space = { point = [0, 0, 0], normal = [-1, 0, 0] }",

@@ -1,9 +1,12 @@
 //! The shipped scenes, and what a scene file can say.
 
 use viscera::material::MaterialModel;
+use viscera::mesh::io::MeshNames;
 use viscera::mesh::{TetMesh, shapes};
 use viscera::scalar::{Vec3, vec3};
-use viscera::scene::{BodyShape, Scene, SceneError, Selector, describe_markdown, describe_text};
+use viscera::scene::{
+    BodyShape, RegionLabel, Scene, SceneError, Selector, describe_markdown, describe_text,
+};
 use viscera::settings::{
     Acceleration, Accuracy, AndersonGuard, Colors, Count, DeviceRequest, Method, Place, Precision,
     SolverSettings, Start,
@@ -180,9 +183,11 @@ fn every_patch_of_a_shipped_scene_is_found_and_no_vertex_is_held_twice() {
         for patch in fixed.chain(moved) {
             let (mesh, placement) = (&meshes[patch.body], &scene.bodies[patch.body].placement);
             let rest: Vec<_> = mesh.vertices().iter().map(|&x| placement.apply(x)).collect();
-            let vertices = patch.select(&rest, mesh.tets(), mesh.regions()).unwrap();
-            println!("{name}, {}: {} of {} vertices", patch.purpose, vertices.len(), rest.len());
-            assert!(vertices.len() < rest.len() / 4, "{name}, {}", patch.purpose);
+            let count = rest.len();
+            let placed = TetMesh::new(rest, mesh.tets().to_vec(), mesh.regions().to_vec());
+            let vertices = patch.select(&placed.unwrap().0, &MeshNames::default()).unwrap();
+            println!("{name}, {}: {} of {count} vertices", patch.purpose, vertices.len());
+            assert!(vertices.len() < count / 4, "{name}, {}", patch.purpose);
             for vertex in vertices {
                 assert!(held.insert((patch.body, vertex)), "{name}, {}", patch.purpose);
             }
@@ -213,7 +218,7 @@ fn every_key_arrives_in_si_units() {
     assert_eq!(organ.material.model(), MaterialModel::StableNeoHookean);
     assert_eq!((organ.material.young(), organ.material.viscosity()), (5100.0, 0.02));
     let [fibrotic, fat] = organ.regions.as_slice() else { panic!("two regions") };
-    assert_eq!((fibrotic.label, fibrotic.material.young()), (3, 59e3));
+    assert_eq!((&fibrotic.label, fibrotic.material.young()), (&RegionLabel::Number(3), 59e3));
     // What a region leaves unsaid it takes from the body, or from its own preset.
     assert_eq!(fibrotic.material.density(), organ.material.density());
     assert_eq!(fat.material.density(), 950.0);
@@ -402,7 +407,8 @@ fn a_fixing_that_selects_nothing_says_where_the_body_is() {
     let bits = |i: u8| [i & 1, (i >> 1) & 1, i >> 2].map(f64::from);
     let corners: Vec<_> =
         (0..8).map(bits).map(|[x, y, z]| vec3(0.2 * x, 0.05 * y, 0.05 * z)).collect();
-    let error = scene.fixings[0].patch.select(&corners, &[], &[]).unwrap_err();
+    let (mesh, _) = TetMesh::new(corners, vec![[0, 1, 2, 4], [7, 6, 5, 3]], vec![0; 2]).unwrap();
+    let error = scene.fixings[0].patch.select(&mesh, &MeshNames::default()).unwrap_err();
     assert!(matches!(error, SceneError::Selection { .. }));
     assert_eq!(
         error.to_string(),

@@ -1,5 +1,5 @@
-//! Abaqus input (`.inp`): nodes, elements, sets; "Abaqus Keywords Reference Guide". Element sets of solids are regions, node sets
-//! are patches. Materials, steps and loads are passed over.
+//! Abaqus input (`.inp`): nodes, elements, sets; "Abaqus Keywords Reference Guide". Element sets of solids are regions; node sets
+//! and element sets of surfaces and lines are patches. Materials, steps and loads are passed over.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -97,8 +97,16 @@ fn shape_of(kind: &str) -> Option<(Shape, usize)> {
     }
     match kind.as_str() {
         "S3" | "S3R" | "STRI3" | "M3D3" | "R3D3" | "SFM3D3" => Some((Shape::Triangle, 3)),
-        "STRI65" | "M3D6" => Some((Shape::Triangle, 6)),
+        "STRI65" | "M3D6" | "SFM3D6" => Some((Shape::Triangle, 6)),
         "S4" | "S4R" | "M3D4" | "R3D4" | "SFM3D4" => Some((Shape::Quad, 4)),
+        "S8R" | "M3D8" | "SFM3D8" => Some((Shape::Quad, 8)),
+        // Plane stress and plane strain; Gmsh writes the surfaces of solids as such.
+        "CPS3" | "CPE3" => Some((Shape::Triangle, 3)),
+        "CPS6" | "CPE6" => Some((Shape::Triangle, 6)),
+        "CPS4" | "CPS4R" | "CPE4" | "CPE4R" => Some((Shape::Quad, 4)),
+        "CPS8" | "CPS8R" | "CPE8" | "CPE8R" => Some((Shape::Quad, 8)),
+        "T3D2" | "B31" => Some((Shape::Line, 2)),
+        "T3D3" | "B32" => Some((Shape::Line, 3)),
         _ => None,
     }
 }
@@ -293,13 +301,22 @@ impl File {
         Err(Fault::at(element.line, ReadProblem::CountMismatch { what, claimed, found }))
     }
 
-    /// The region of each element: the first set that it is in, since sets of all elements come last in files; 0 without any.
-    fn regions(&self) -> Vec<u32> {
-        let mut regions = vec![0; self.elements.len()];
+    /// Numbers of elements with their places in the list, ascending. Of several elements of one number a set means the first.
+    fn numbered(&self) -> Vec<(u64, u32)> {
         let numbers = self.elements.iter().zip(0u32..).map(|(element, at)| (element.number, at));
         let mut numbers: Vec<(u64, u32)> = numbers.collect();
         numbers.sort_unstable();
-        for ((_, members), region) in self.element_sets.list.iter().zip(1u32..) {
+        numbers
+    }
+
+    /// The region of each element: the first set that it is in, since sets of all elements come last in files; 0 without any.
+    /// Sets that Gmsh makes of each volume come last of all: groups with a name of their own follow them.
+    fn regions(&self, numbers: &[(u64, u32)]) -> Vec<u32> {
+        let mut regions = vec![0; self.elements.len()];
+        let sets = || self.element_sets.list.iter().zip(1u32..);
+        let named = sets().filter(|((name, _), _)| !is_of_one_volume(name));
+        let of_volumes = sets().filter(|((name, _), _)| is_of_one_volume(name));
+        for ((_, members), region) in named.chain(of_volumes) {
             for &member in members {
                 let start = numbers.partition_point(|(number, _)| *number < member);
                 let same = numbers[start..].iter().take_while(|(number, _)| *number == member);
@@ -316,13 +333,39 @@ impl File {
         regions
     }
 
+    /// Nodes of each element set of surfaces or lines. One that has solids too is a region, or all there is.
+    fn surfaces(&self, numbers: &[(u64, u32)]) -> Vec<Patch> {
+        let mut patches = Vec::new();
+        for (name, members) in &self.element_sets.list {
+            let (mut vertices, mut has_solids) = (Vec::new(), false);
+            for &member in members {
+                let at = numbers.partition_point(|(number, _)| *number < member);
+                let found = numbers.get(at).filter(|(number, _)| *number == member);
+                let Some(element) = found.map(|&(_, at)| &self.elements[at as usize]) else {
+                    continue;
+                };
+                if is_solid(element.shape) {
+                    has_solids = true;
+                    break;
+                }
+                let nodes = self.nodes[element.nodes.clone()].iter();
+                vertices.extend(nodes.filter_map(|&node| self.vertices.find(node)));
+            }
+            if !vertices.is_empty() && !has_solids {
+                patches.push(Patch { name: name.clone(), vertices });
+            }
+        }
+        patches
+    }
+
     fn finish<'a>(mut self) -> Result<Content<'a>, Fault> {
         self.vertices.number()?;
         if self.vertices.positions.is_empty() {
             return Err(Fault::whole_file(ReadProblem::Missing { what: "nodes (*NODE)".into() }));
         }
-        let regions = self.regions();
-        let mut cells = self.skipped;
+        let numbers = self.numbered();
+        let regions = self.regions(&numbers);
+        let mut cells = std::mem::take(&mut self.skipped);
         let (mut used, mut indices) = (BTreeSet::new(), Vec::new());
         for (cell, (element, &region)) in self.elements.iter().zip(&regions).enumerate() {
             indices.clear();
@@ -332,14 +375,16 @@ impl File {
                     self.vertices.unknown(name, node, Some(Place::Line(element.line)))
                 })?);
             }
-            used.insert(region);
+            if is_solid(element.shape) {
+                used.insert(region);
+            }
             cells.add(element.shape, &indices, region, cell);
         }
+        let mut patches = self.surfaces(&numbers);
         let lines: Vec<usize> = self.elements.iter().map(|element| element.line).collect();
         let regions = self.element_sets.list.into_iter().zip(1u32..);
         let region_names = regions.filter(|(_, region)| used.contains(region));
         let region_names = region_names.map(|((name, _), region)| (region, name)).collect();
-        let mut patches = Vec::new();
         for (name, set) in self.node_sets.by_name {
             let members = std::mem::take(&mut self.node_sets.list[set].1);
             let vertices = members.iter().filter_map(|&number| self.vertices.find(number));
@@ -354,6 +399,16 @@ impl File {
         let (format, vertices) = (Format::Abaqus, positions);
         Ok(Content { format, vertices, cells, patches, region_names, places })
     }
+}
+
+fn is_solid(shape: Shape) -> bool {
+    !matches!(shape, Shape::Point | Shape::Line | Shape::Triangle | Shape::Quad)
+}
+
+/// Whether a set is one of those that Gmsh makes of each volume: "Volume12".
+fn is_of_one_volume(name: &str) -> bool {
+    let number = name.strip_prefix("Volume");
+    number.is_some_and(|rest| !rest.is_empty() && rest.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
 /// Whether text looks like input of Abaqus: its first line that is no comment begins with a star and a letter.

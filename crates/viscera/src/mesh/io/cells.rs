@@ -72,6 +72,8 @@ pub(super) struct Cells {
     /// A second-order cell: the range of its nodes in `nodes`, corners first.
     pub curved: Vec<Curved>,
     pub nodes: Vec<u32>,
+    /// Names of arrays of whole numbers, one for each cell, that are not taken as regions.
+    pub unused: Vec<String>,
 }
 
 /// A cell that has nodes between its corners.

@@ -45,6 +45,7 @@ impl<'a> Content<'a> {
         if cells.tets.is_empty() {
             return Err(no_tets(format, &cells));
         }
+        let unused_arrays = cells.unused.iter().map(|name| name_of(name)).collect();
         let Cells { tets, regions, of_tets, triangles, mut skipped, split, curved, nodes, .. } =
             cells;
         let bulge = largest_bulge(&vertices, &curved, &nodes);
@@ -71,8 +72,17 @@ impl<'a> Content<'a> {
         let region_names = named.collect();
         let format = Some(format);
         let curved = curved.len();
-        let report =
-            ReadReport { format, repairs, skipped, split, curved, bulge, patches, region_names };
+        let report = ReadReport {
+            format,
+            repairs,
+            skipped,
+            split,
+            curved,
+            bulge,
+            patches,
+            region_names,
+            unused_arrays,
+        };
         Ok((mesh, report))
     }
 

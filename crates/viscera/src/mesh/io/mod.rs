@@ -24,7 +24,8 @@ mod vtk_cells;
 pub mod vtu;
 
 pub use error::{Place, ReadError, ReadProblem, WriteError};
-pub use parsed::{CountedElements, Format, Patch, ReadReport};
+pub(super) use parsed::unused_text;
+pub use parsed::{CountedElements, Format, MeshNames, Patch, ReadReport};
 
 use super::{SurfaceMesh, TetMesh};
 use content::Content;

@@ -112,6 +112,34 @@ pub struct Patch {
     pub vertices: Vec<u32>,
 }
 
+/// What a mesh file has names for, by vertices and labels of the mesh.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MeshNames {
+    /// Named sets of vertices.
+    pub patches: Vec<Patch>,
+    /// Regions that have a name.
+    pub regions: Vec<(u32, String)>,
+}
+
+impl MeshNames {
+    /// The regions of a mesh as messages list them: "3 `tumour`, 5".
+    pub fn list_regions(&self, regions: &[u32]) -> String {
+        const SHOWN: usize = 20;
+        let mut known = regions.to_vec();
+        known.sort_unstable();
+        known.dedup();
+        let text = |region: &u32| match self.regions.iter().find(|(number, _)| number == region) {
+            Some((_, name)) => format!("{region} `{name}`"),
+            None => region.to_string(),
+        };
+        let mut texts: Vec<String> = known.iter().take(SHOWN).map(text).collect();
+        if known.len() > SHOWN {
+            texts.push("...".to_owned());
+        }
+        texts.join(", ")
+    }
+}
+
 /// The report of reading a file, beside the mesh. The default says "not from a file".
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadReport {
@@ -131,4 +159,66 @@ pub struct ReadReport {
     pub patches: Vec<Patch>,
     /// Regions that have a name.
     pub region_names: Vec<(u32, String)>,
+    /// Arrays of whole numbers, one for each cell, that were not taken as regions.
+    pub unused_arrays: Vec<String>,
+}
+
+impl ReadReport {
+    /// What the file has names for.
+    pub fn names(&self) -> MeshNames {
+        MeshNames { patches: self.patches.clone(), regions: self.region_names.clone() }
+    }
+
+    /// What is not part of the mesh, a text for each kind. Elements of surfaces, curves and points stand for names only.
+    pub fn skipped_texts(&self) -> Vec<String> {
+        let kept = match self.patches.len() {
+            0 => "tetrahedra need none of them".to_owned(),
+            1 => "those with a name are kept as a named patch".to_owned(),
+            count => format!("those with names are kept as {count} named patches"),
+        };
+        let text = |CountedElements { kind, count }: &CountedElements| match kind.as_str() {
+            "triangle" => format!("{count} x triangle on surfaces of the mesh: {kept}"),
+            "line" => format!("{count} x line on edges of the mesh: {kept}"),
+            "point" => format!("{count} x point at vertices of the mesh: {kept}"),
+            _ => format!("left out {count} x {kind}"),
+        };
+        self.skipped.iter().map(text).collect()
+    }
+
+    /// Which arrays were not taken as regions, and which would be; nothing where all were.
+    pub fn unused_text(&self) -> Option<String> {
+        unused_text(&self.unused_arrays)
+    }
+}
+
+/// Names that programs give to the array that says which part of a body a cell is of.
+pub(super) const REGIONS: [&str; 12] = [
+    "region",
+    "regions",
+    "RegionId",
+    "gmsh:physical",
+    "medit:ref",
+    "cell_tags",
+    "label",
+    "labels",
+    "material",
+    "MaterialId",
+    "MaterialIds",
+    "CellEntityIds",
+];
+
+/// See [`ReadReport::unused_text`].
+pub(in crate::mesh) fn unused_text(arrays: &[String]) -> Option<String> {
+    const SHOWN: usize = 12;
+    let mut texts: Vec<String> =
+        arrays.iter().take(SHOWN).map(|name| format!("`{name}`")).collect();
+    if arrays.len() > SHOWN {
+        texts.push("...".to_owned());
+    }
+    let (which, known) = (texts.join(", "), REGIONS.join(", "));
+    let (what, is) = if arrays.len() == 1 { ("cell array", "is") } else { ("cell arrays", "are") };
+    let text = format!(
+        "{what} {which} {is} not used: regions come from a cell array with one of the names {known}"
+    );
+    (!arrays.is_empty()).then_some(text)
 }

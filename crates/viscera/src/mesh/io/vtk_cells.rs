@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::cells::{Cells, Shape};
-use super::parsed::Patch;
+use super::parsed::{Patch, REGIONS};
 use super::text::name_of;
 
 /// Cells of a grid in one list of corners.
@@ -103,25 +103,17 @@ impl VtkCells<'_> {
     }
 }
 
-/// Names that programs give to the array that says which part of a body a cell is of.
-const REGIONS: [&str; 12] = [
-    "region",
-    "regions",
-    "RegionId",
-    "gmsh:physical",
-    "medit:ref",
-    "cell_tags",
-    "label",
-    "labels",
-    "material",
-    "MaterialId",
-    "MaterialIds",
-    "CellEntityIds",
-];
-
 /// How good the name of an array is for regions: less is better.
 pub(super) fn rank_of_regions(name: &str) -> Option<usize> {
     REGIONS.iter().position(|known| known.eq_ignore_ascii_case(name))
+}
+
+/// More names of arrays are not kept: a damaged file may have any number.
+pub(super) const MOST_UNUSED: usize = 64;
+
+/// Whether an array at cells that is not taken as regions is worth a word: those by VTK itself number cells.
+pub(super) fn is_worth_a_word(name: &str) -> bool {
+    !name.starts_with("vtk") && !name.is_empty()
 }
 
 /// Regions from numbers, which may be of any type but have to be whole; otherwise the first that is not.
@@ -131,6 +123,19 @@ pub(super) fn regions_of(values: &[f64]) -> Result<Vec<u32>, f64> {
         if is_region { Ok(value as u32) } else { Err(value) }
     };
     values.iter().map(whole).collect()
+}
+
+/// Field data with the labels of regions that have names, and with these names in the same order.
+pub(super) const REGION_NUMBERS: &str = "region_numbers";
+pub(super) const REGION_NAMES: &str = "region_names";
+
+/// Regions with their names; of several names for one the first.
+pub(super) fn named_regions(numbers: Vec<u32>, names: Vec<String>) -> Vec<(u32, String)> {
+    let mut named: BTreeMap<u32, String> = BTreeMap::new();
+    for (number, name) in numbers.into_iter().zip(names) {
+        named.entry(number).or_insert(name);
+    }
+    named.into_iter().collect()
 }
 
 pub(super) const A_REGION: &str = "a region, a whole number of 0 or more";

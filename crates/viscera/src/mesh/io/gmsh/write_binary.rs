@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use crate::mesh::TetMesh;
 use crate::mesh::io::error::{WriteError, check_patch};
-use crate::mesh::io::parsed::Patch;
+use crate::mesh::io::parsed::{MeshNames, Patch};
 use crate::mesh::io::text::name_of;
 use crate::mesh::topology::{BoundingBox, boundary_faces};
 
@@ -69,11 +69,8 @@ impl File {
 /// boundary's triangles between their vertices make up all of them, and as physical points elsewhere.
 ///
 /// Names are those of regions by number; quotation marks in names become `'`.
-pub fn write_binary(
-    mesh: &TetMesh,
-    patches: &[Patch],
-    region_names: &[(u32, String)],
-) -> Result<Vec<u8>, WriteError> {
+pub fn write_binary(mesh: &TetMesh, names: &MeshNames) -> Result<Vec<u8>, WriteError> {
+    let MeshNames { patches, regions: region_names } = names;
     let mut file =
         File(Vec::with_capacity(1000 + 32 * mesh.vertices().len() + 41 * mesh.tets().len()));
     file.text("$MeshFormat\n4.1 1 8\n");

@@ -175,6 +175,37 @@ impl<'a> Numbers<'a> {
         self.each(count, kind, (expected, parse_word), whole, &mut take)
     }
 
+    /// Texts: each on a line, or behind its length.
+    pub fn texts(&mut self, claimed: u64) -> Result<Vec<Vec<u8>>, Fault> {
+        // An empty one takes a byte.
+        let count = self.check_count("texts", claimed, Kind::BYTE)?;
+        let mut texts = Vec::new();
+        for _ in 0..count {
+            let text = if self.is_binary {
+                let length = self.text_length()?;
+                self.lines.bytes(length).ok_or_else(|| self.cut_short())?
+            } else {
+                self.line().ok_or_else(|| self.cut_short())?.text
+            };
+            texts.push(text.to_vec());
+        }
+        Ok(texts)
+    }
+
+    /// The two highest bits of a length's first byte say how many bytes it has.
+    fn text_length(&mut self) -> Result<usize, Fault> {
+        let first = self.lines.bytes(1).ok_or_else(|| self.cut_short())?[0];
+        let more = match first >> 6 {
+            3 => 0,
+            2 => 1,
+            1 => 3,
+            _ => 7,
+        };
+        let rest = self.lines.bytes(more).ok_or_else(|| self.cut_short())?;
+        let length = join(rest) | u64::from(first & 0x3f) << (8 * more);
+        usize::try_from(length).map_err(|_| self.cut_short())
+    }
+
     /// Passes over numbers.
     pub fn skip(&mut self, count: usize, kind: Kind) -> Result<(), Fault> {
         self.floats((count, kind), "a number", |_, _| ())

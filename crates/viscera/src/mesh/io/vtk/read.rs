@@ -9,7 +9,8 @@ use crate::mesh::io::lines::{Line, Words, bad_word, parse_word};
 use crate::mesh::io::parsed::{Format, Patch};
 use crate::mesh::io::text::shorten;
 use crate::mesh::io::vtk_cells::{
-    A_REGION, CellFault, VtkCells, patches_of, rank_of_regions, regions_of,
+    A_REGION, CellFault, MOST_UNUSED, REGION_NAMES, REGION_NUMBERS, VtkCells, is_worth_a_word,
+    named_regions, patches_of, rank_of_regions, regions_of,
 };
 use crate::scalar::{Vec3, vec3};
 
@@ -44,6 +45,10 @@ struct File<'a> {
     /// The best array of regions so far, and its rank.
     regions: Option<(usize, Vec<u32>)>,
     patches: Vec<Patch>,
+    /// Names of arrays of whole numbers at cells.
+    at_cells: Vec<String>,
+    region_numbers: Vec<u32>,
+    region_names: Vec<String>,
 }
 
 pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
@@ -57,6 +62,9 @@ pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
         entries: 0,
         regions: None,
         patches: Vec::new(),
+        at_cells: Vec::new(),
+        region_numbers: Vec::new(),
+        region_names: Vec::new(),
     };
     file.read_header()?;
     while let Some(line) = file.numbers.line() {
@@ -296,7 +304,29 @@ impl<'a> File<'a> {
             let name = unescape(words.next().unwrap_or_default());
             let components: u64 = words.parse("a number of components")?;
             let entries: u64 = words.parse("a number of entries")?;
+            if words.clone().next().is_some_and(|word| word.eq_ignore_ascii_case(b"string")) {
+                let texts = self.numbers.texts(components.saturating_mul(entries))?;
+                if name == REGION_NAMES {
+                    // Only in lines a blank has to be written otherwise.
+                    let plain = |text: &Vec<u8>| match self.numbers.is_binary {
+                        true => String::from_utf8_lossy(text).into_owned(),
+                        false => unescape(text),
+                    };
+                    self.region_names = texts.iter().map(plain).collect();
+                }
+                continue;
+            }
             let kind = kind_of(line, &mut words)?;
+            if name == REGION_NUMBERS && self.owner == Owner::Nothing && kind.is_whole() {
+                let claimed = components.saturating_mul(entries);
+                let count = self.numbers.check_count("values", claimed, kind)?;
+                let numbers = &mut self.region_numbers;
+                self.numbers.wholes((count, kind), A_REGION, |value, _| {
+                    // What is no label is that of no tetrahedron.
+                    numbers.extend(u32::try_from(value).ok());
+                })?;
+                continue;
+            }
             self.read_values(&name, (components, entries), kind)?;
         }
         Ok(())
@@ -310,9 +340,11 @@ impl<'a> File<'a> {
     ) -> Result<(), Fault> {
         let rank = rank_of_regions(name).filter(|_| self.owner == Owner::Cells);
         let is_set = self.owner == Owner::Points;
-        let is_wanted = components == 1
-            && entries as usize == self.entries
-            && (rank.is_some() || (is_set && kind.is_whole()));
+        let is_scalar = components == 1 && entries as usize == self.entries;
+        if self.owner == Owner::Cells && is_scalar && kind.is_whole() && is_worth_a_word(name) {
+            self.at_cells.push(name.to_owned());
+        }
+        let is_wanted = is_scalar && (rank.is_some() || (is_set && kind.is_whole()));
         if !is_wanted {
             return self.skip(components, entries, kind);
         }
@@ -354,7 +386,13 @@ impl<'a> File<'a> {
         }
         let mut cells = Cells::default();
         let mut of_cells: Vec<Place> = Vec::new();
-        let regions = self.regions.map(|(_, regions)| regions).unwrap_or_default();
+        let (rank, regions) = self.regions.unzip();
+        let regions = regions.unwrap_or_default();
+        let others = self
+            .at_cells
+            .into_iter()
+            .filter(|name| rank.is_none() || rank_of_regions(name) != rank);
+        cells.unused = others.take(MOST_UNUSED).collect();
         for List { kind, ends, corners, places } in self.lists {
             let kinds = if kind == 0 { self.types.clone() } else { vec![kind; ends.len()] };
             if kinds.len() != ends.len() {
@@ -387,7 +425,8 @@ impl<'a> File<'a> {
             MeshPlace::Tet(cell) => of_cells.get(cell).copied(),
         });
         let (vertices, patches) = (self.vertices, self.patches);
-        Ok(Content { format, vertices, cells, patches, region_names: Vec::new(), places })
+        let region_names = named_regions(self.region_numbers, self.region_names);
+        Ok(Content { format, vertices, cells, patches, region_names, places })
     }
 }
 

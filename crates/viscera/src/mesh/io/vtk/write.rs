@@ -3,8 +3,9 @@
 use std::fmt::Write;
 
 use crate::mesh::io::error::{WriteError, check_patch};
-use crate::mesh::io::parsed::Patch;
+use crate::mesh::io::parsed::MeshNames;
 use crate::mesh::io::text::name_of;
+use crate::mesh::io::vtk_cells::{REGION_NAMES, REGION_NUMBERS};
 use crate::mesh::{SurfaceMesh, TetMesh};
 use crate::scalar::Vec3;
 
@@ -27,6 +28,24 @@ impl File {
 
     fn numbers<const N: usize>(&mut self, numbers: impl Iterator<Item = [u8; N]>) {
         numbers.for_each(|bytes| self.0.extend_from_slice(&bytes));
+        self.0.push(b'\n');
+    }
+
+    fn region_names(&mut self, regions: &[(u32, String)]) {
+        let count = regions.len();
+        if count == 0 {
+            return;
+        }
+        self.line(format_args!("FIELD FieldData 2\n{REGION_NUMBERS} 1 {count} unsigned_int"));
+        self.numbers(regions.iter().map(|(number, _)| number.to_be_bytes()));
+        self.line(format_args!("{REGION_NAMES} 1 {count} string"));
+        for (_, name) in regions {
+            let name = name_of(name);
+            // Of a length of two bytes, as the highest bits say, which is enough for names as they are cut.
+            let length = 0x8000 | (name.len() as u16 & 0x3fff);
+            self.0.extend_from_slice(&length.to_be_bytes());
+            self.0.extend_from_slice(name.as_bytes());
+        }
         self.0.push(b'\n');
     }
 
@@ -53,10 +72,12 @@ impl File {
 }
 
 /// Tetrahedra as a legacy file, in metres: the cell array `region`, and for each patch an array at points of its name, 1 at its
-/// vertices and 0 at others.
-pub fn write(mesh: &TetMesh, patches: &[Patch]) -> Result<Vec<u8>, WriteError> {
+/// vertices and 0 at others; names of regions as field data, `region_numbers` and `region_names`.
+pub fn write(mesh: &TetMesh, names: &MeshNames) -> Result<Vec<u8>, WriteError> {
+    let patches = &names.patches;
     let (vertex_count, tet_count) = (mesh.vertices().len(), mesh.tets().len());
     let mut file = File::new();
+    file.region_names(&names.regions);
     file.points(mesh.vertices());
     file.cells(mesh.tets(), VTK_TETRA)?;
     file.line(format_args!("CELL_DATA {tet_count}\nFIELD FieldData 1"));

@@ -121,7 +121,7 @@ impl<'a, 'input> DataArray<'a, 'input> {
             "Float32" => numbers!(f32 from_float f64),
             "Float64" => numbers!(f64 from_float f64),
             "Int8" => numbers!(i8 from_whole i128),
-            "UInt8" => numbers!(u8 from_whole i128),
+            "UInt8" | "String" => numbers!(u8 from_whole i128),
             "Int16" => numbers!(i16 from_whole i128),
             "UInt16" => numbers!(u16 from_whole i128),
             "Int32" => numbers!(i32 from_whole i128),

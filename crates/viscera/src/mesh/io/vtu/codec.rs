@@ -45,7 +45,9 @@ pub(super) struct Appended<'a> {
 
 impl<'a> Appended<'a> {
     pub fn new((bytes, is_base64): (&'a [u8], bool), document: &Document) -> Self {
-        let arrays = document.descendants().filter(|node| node.has_tag_name("DataArray"));
+        // Those of text have a name of their own.
+        let is_array = |node: &Node| ["DataArray", "Array"].contains(&node.tag_name().name());
+        let arrays = document.descendants().filter(is_array);
         let offsets = arrays.filter_map(|array| array.attribute("offset")?.trim().parse().ok());
         let mut offsets: Vec<usize> = offsets.collect();
         // Only Base64 asks where an array ends.

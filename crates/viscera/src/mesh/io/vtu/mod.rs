@@ -8,7 +8,7 @@ mod read;
 mod write;
 
 pub(super) use read::read;
-pub use write::{Array, Grid, write, write_surface};
+pub use write::{Array, Grid, write, write_mesh, write_surface};
 
 /// Cell types as VTK numbers them.
 const VTK_TRIANGLE: u8 = 5;

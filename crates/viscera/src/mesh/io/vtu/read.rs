@@ -16,7 +16,8 @@ use crate::mesh::io::lines::bad_word;
 use crate::mesh::io::parsed::{Format, Patch};
 use crate::mesh::io::text::{name_of, shorten};
 use crate::mesh::io::vtk_cells::{
-    A_REGION, CellFault, VtkCells, patches_of, rank_of_regions, regions_of,
+    A_REGION, CellFault, MOST_UNUSED, REGION_NAMES, REGION_NUMBERS, VtkCells, is_worth_a_word,
+    named_regions, patches_of, rank_of_regions, regions_of,
 };
 use crate::scalar::{Vec3, vec3};
 
@@ -69,13 +70,14 @@ pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
     if all.vertices.is_empty() && child(grid, "Piece")?.attribute("NumberOfPoints") != Some("0") {
         return Err(missing(grid, "points".into()));
     }
+    let region_names = read_region_names(grid, codec)?;
     let Pieces { vertices, cells, patches, lines, .. } = all;
     let places = Box::new(move |place| match place {
         MeshPlace::Whole => None,
         MeshPlace::Vertex(vertex) => lines.vertices.get(vertex).copied().map(Place::Line),
         MeshPlace::Tet(cell) => lines.cells.get(cell).copied().map(Place::Line),
     });
-    Ok(Content { format, vertices, cells, patches, region_names: Vec::new(), places })
+    Ok(Content { format, vertices, cells, patches, region_names, places })
 }
 
 impl Pieces {
@@ -93,7 +95,12 @@ impl Pieces {
         let lines = points.lines_of((0..point_count).map(|vertex| 3 * vertex));
         self.lines.vertices.extend(lines);
 
-        let regions = read_regions(piece, codec)?;
+        let (regions, unused) = read_regions(piece, codec)?;
+        for name in unused {
+            if self.cells.unused.len() < MOST_UNUSED && !self.cells.unused.contains(&name) {
+                self.cells.unused.push(name);
+            }
+        }
         // Data of polygons come after those of points and lines.
         let mut before = 0;
         let lists: &[(&str, &str, u64)] = match format {
@@ -176,8 +183,7 @@ impl Pieces {
         let data = piece.children().find(|child| child.has_tag_name("PointData"));
         let arrays = data.into_iter().flat_map(|data| data.children());
         for node in arrays.filter(|node| node.has_tag_name("DataArray")) {
-            let is_scalar = matches!(node.attribute("NumberOfComponents"), None | Some("1" | "0"));
-            let is_set = is_scalar && is_whole(node);
+            let is_set = is_scalar(node) && is_whole(node);
             let Some(name) = node.attribute("Name").filter(|_| is_set) else { continue };
             let values: Vec<i64> = DataArray::new(node, codec)?.numbers("a whole number")?;
             check_count(node, "values at points", count, values.len())?;
@@ -303,15 +309,45 @@ fn check_count(node: Node, what: &str, claimed: usize, found: usize) -> Result<(
     Err(fault_at(node, ReadProblem::CountMismatch { what: what.into(), claimed, found }))
 }
 
-/// Regions of cells, where an array is named as such.
-fn read_regions(piece: Node, codec: Codec) -> Result<Option<Vec<u32>>, Fault> {
+/// Regions of cells, where an array is named as such, and other arrays of whole numbers.
+fn read_regions(piece: Node, codec: Codec) -> Result<(Option<Vec<u32>>, Vec<String>), Fault> {
     let data = piece.children().find(|child| child.has_tag_name("CellData"));
     let arrays = data.into_iter().flat_map(|data| data.children());
     let arrays = arrays.filter(|node| node.has_tag_name("DataArray"));
-    let ranked = arrays.filter_map(|node| Some((rank_of_regions(node.attribute("Name")?)?, node)));
-    let Some((_, node)) = ranked.min_by_key(|(rank, _)| *rank) else { return Ok(None) };
+    let named = arrays.filter_map(|node| Some((node.attribute("Name")?, node)));
+    let ranked = named.clone().filter_map(|(name, node)| Some((rank_of_regions(name)?, node)));
+    let best = ranked.min_by_key(|(rank, _)| *rank).map(|(_, node)| node);
+    let others = named.filter(|(name, node)| {
+        Some(*node) != best && is_scalar(*node) && is_whole(*node) && is_worth_a_word(name)
+    });
+    let others = others.take(MOST_UNUSED).map(|(name, _)| name.to_owned()).collect();
+    let Some(node) = best else { return Ok((None, others)) };
     let values: Vec<f64> = DataArray::new(node, codec)?.numbers(A_REGION)?;
     let regions = regions_of(&values)
         .map_err(|value| fault_at(node, bad_word(A_REGION, value.to_string().as_bytes())))?;
-    Ok(Some(regions))
+    Ok((Some(regions), others))
+}
+
+fn is_scalar(node: Node) -> bool {
+    matches!(node.attribute("NumberOfComponents"), None | Some("1" | "0"))
+}
+
+/// Names of regions, where the field data have them as [`super::write_mesh`] writes them.
+fn read_region_names(grid: Node, codec: Codec) -> Result<Vec<(u32, String)>, Fault> {
+    let data = grid.children().find(|child| child.has_tag_name("FieldData"));
+    let Some(data) = data.filter(|_| cfg!(feature = "formats")) else { return Ok(Vec::new()) };
+    // Arrays of text have an element of their own.
+    let named = |name| data.children().find(|child| child.attribute("Name") == Some(name));
+    let (Some(numbers), Some(names)) = (named(REGION_NUMBERS), named(REGION_NAMES)) else {
+        return Ok(Vec::new());
+    };
+    if !is_whole(numbers) || names.attribute("type") != Some("String") {
+        return Ok(Vec::new());
+    }
+    let numbers: Vec<u32> = DataArray::new(numbers, codec)?.numbers(A_REGION)?;
+    let letters: Vec<u8> = DataArray::new(names, codec)?.numbers("a letter's number, 0 to 255")?;
+    let texts = letters.strip_suffix(&[0]).unwrap_or(&letters).split(|&letter| letter == 0);
+    let texts: Vec<String> = texts.map(|text| String::from_utf8_lossy(text).into_owned()).collect();
+    check_count(names, "names of regions", numbers.len(), texts.len())?;
+    Ok(named_regions(numbers, texts))
 }

@@ -13,8 +13,12 @@ use std::borrow::Cow;
 use std::fmt::Write;
 
 use super::{VTK_TETRA, VTK_TRIANGLE};
-use crate::mesh::io::error::WriteError;
+use crate::mesh::TetMesh;
+use crate::mesh::io::error::{WriteError, check_patch};
+use crate::mesh::io::parsed::MeshNames;
 use crate::mesh::io::pvd::escape_xml;
+use crate::mesh::io::text::name_of;
+use crate::mesh::io::vtk_cells::{REGION_NAMES, REGION_NUMBERS};
 use crate::scalar::{Real, Vec3};
 
 /// A named array with one entry for each point or for each cell, as the bytes of a file.
@@ -50,6 +54,16 @@ impl Array {
         Self { name, vtk_type: "UInt32", components: 1, len, bytes, not_finite: None }
     }
 
+    /// For each of so many entries 1 where it is one of the members, 0 elsewhere.
+    fn members(name: &str, len: usize, members: &[u32]) -> Self {
+        let mut bytes = vec![0; len];
+        for &member in members {
+            bytes[member as usize] = 1;
+        }
+        let (name, vtk_type) = (name_of(name), "UInt8");
+        Self { name, vtk_type, components: 1, len, bytes, not_finite: None }
+    }
+
     /// An array of entries of `N` numbers, with room for so many: for values that need not all be known at a time.
     pub fn with_room<const N: usize>(name: &str, entries: usize) -> Self {
         let bytes = Vec::with_capacity(4 * N * entries);
@@ -77,7 +91,8 @@ impl Array {
     /// Refuses what other programs refuse to read.
     fn check(&self, what: &'static str, wanted: usize) -> Result<(), WriteError> {
         let array = || self.name.clone();
-        let found = self.bytes.len() / (4 * self.components);
+        let width = if self.vtk_type == "UInt8" { 1 } else { 4 };
+        let found = self.bytes.len() / (width * self.components);
         if self.len != wanted || found != wanted {
             return Err(WriteError::Length { array: array(), what, wanted, found });
         }
@@ -102,6 +117,43 @@ pub fn write<R: Real>(
     Ok(grid.frame(points, point_data.to_vec(), cell_data.to_vec())?.concat())
 }
 
+/// A mesh as the bytes of a `.vtu` file, in metres: the cell array `region`; for each patch an array at points of its name, 1 at
+/// its vertices and 0 at others; names of regions as field data, `region_numbers` and `region_names`.
+pub fn write_mesh(mesh: &TetMesh, names: &MeshNames) -> Result<Vec<u8>, WriteError> {
+    let vertex_count = mesh.vertices().len();
+    let regions = Array::integers("region", mesh.regions());
+    let mut grid = Grid::of_tets(vertex_count, mesh.tets(), vec![regions])?;
+    grid.field_data = field_data(&names.regions);
+    let mut patches = Vec::new();
+    for patch in &names.patches {
+        check_patch(patch, vertex_count)?;
+        patches.push(Array::members(&patch.name, vertex_count, &patch.vertices));
+    }
+    Ok(grid.frame(mesh.vertices(), patches, Vec::new())?.concat())
+}
+
+/// Numbers and names of regions, which belong to the file and not to its points or cells. Letters stand as numbers, and zero ends
+/// each name: as VTK writes text.
+fn field_data(regions: &[(u32, String)]) -> String {
+    if regions.is_empty() {
+        return String::new();
+    }
+    let count = regions.len();
+    let numbers: Vec<String> = regions.iter().map(|(number, _)| number.to_string()).collect();
+    let letters = |name: &str| -> String {
+        name_of(name).bytes().map(|byte| format!("{byte} ")).collect::<String>() + "0"
+    };
+    let letters: Vec<String> = regions.iter().map(|(_, name)| letters(name)).collect();
+    format!(
+        "<FieldData>\n\
+         <DataArray type=\"UInt32\" Name=\"{REGION_NUMBERS}\" NumberOfTuples=\"{count}\" format=\"ascii\">\n{}\n</DataArray>\n\
+         <Array type=\"String\" Name=\"{REGION_NAMES}\" NumberOfTuples=\"{count}\" format=\"ascii\">\n{}\n</Array>\n\
+         </FieldData>\n",
+        numbers.join(" "),
+        letters.join("\n")
+    )
+}
+
 /// A grid of triangles as the bytes of a `.vtu` file; shapes as for [`write()`].
 pub fn write_surface<R: Real>(
     points: &[Vec3<R>],
@@ -121,6 +173,8 @@ pub struct Grid {
     /// Connectivity, offsets and types.
     cells: [Array; 3],
     cell_data: Vec<Array>,
+    /// XML of what belongs to the whole.
+    field_data: String,
 }
 
 impl Grid {
@@ -169,7 +223,8 @@ impl Grid {
         let largest = point_count.max(CORNERS * cell_count) as u64;
         let cells =
             [indices("connectivity", corners, largest), indices("offsets", ends, largest), types];
-        Ok(Self { point_count, cell_count, cells, cell_data })
+        let field_data = String::new();
+        Ok(Self { point_count, cell_count, cells, cell_data, field_data })
     }
 
     /// The bytes of a `.vtu` file in parts that follow one another. `points` `[m]`, shape `[point_count]`; each of
@@ -184,7 +239,7 @@ impl Grid {
         points.check("point", self.point_count)?;
         point_data.iter().try_for_each(|array| array.check("point", self.point_count))?;
         cell_data.iter().try_for_each(|array| array.check("cell", self.cell_count))?;
-        let mut file = File::new(self.point_count, self.cell_count);
+        let mut file = File::new(self);
         file.section("Points", [Cow::Owned(points)]);
         file.section("Cells", self.cells.iter().map(Cow::Borrowed));
         file.section("PointData", point_data.into_iter().map(Cow::Owned));
@@ -214,11 +269,12 @@ struct File<'a> {
 
 // Writing to a string cannot fail.
 impl<'a> File<'a> {
-    fn new(point_count: usize, cell_count: usize) -> Self {
+    fn new(grid: &Grid) -> Self {
+        let Grid { point_count, cell_count, field_data, .. } = grid;
         let head = format!(
             "<?xml version=\"1.0\"?>\n\
              <VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n\
-             <UnstructuredGrid>\n<Piece NumberOfPoints=\"{point_count}\" NumberOfCells=\"{cell_count}\">\n"
+             <UnstructuredGrid>\n{field_data}<Piece NumberOfPoints=\"{point_count}\" NumberOfCells=\"{cell_count}\">\n"
         );
         // The head is put in front at the end.
         Self { head, offset: 0, parts: vec![Cow::Borrowed(&[])] }
