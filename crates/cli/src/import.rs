@@ -5,10 +5,11 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use viscera::mesh::quality::summarize_quality;
 use viscera::units::Dimension;
-use viscera_import::{Fineness, Import, Options, open, parts};
+use viscera_import::{Fineness, Import, Options, name_of, open, parts, stem_of};
 use viscera_report::Table;
 use viscera_resources::files;
 
+use crate::made::{Replace, write};
 use crate::progress;
 
 /// How a file becomes bodies.
@@ -64,29 +65,6 @@ pub fn import(file: &Path, arguments: &ImportArguments) -> Result<Import> {
     });
     bar.finish_and_clear();
     Ok(made?)
-}
-
-/// Writes a scene and its meshes into a folder; returns the scene file. A scene that is there and says something else, as one
-/// that a person has changed, is replaced only where `is_forced`.
-pub fn write(import: &Import, title: &str, folder: &Path, is_forced: bool) -> Result<PathBuf> {
-    files::prepare_folder(folder, "--out")?;
-    let scene = folder.join("scene.toml");
-    let written = import.scene(title).files;
-    let is_other = written.iter().any(|(name, bytes)| {
-        folder.join(name) == scene && std::fs::read(&scene).is_ok_and(|known| known != *bytes)
-    });
-    if is_other && !is_forced {
-        bail!(
-            "{0}: there is another scene, perhaps changed by hand; run that one (viscera run {0}), name another folder with --out, \
-             or remove it",
-            scene.display()
-        );
-    }
-    // The scene comes last: where it is, its meshes are.
-    for (name, bytes) in written.iter().rev() {
-        files::write_atomic(&folder.join(name), bytes)?;
-    }
-    Ok(scene)
 }
 
 /// What was made: bodies with their sizes and shapes, and what was assumed.
@@ -153,14 +131,17 @@ fn looks_like_data(path: &Path) -> bool {
 /// The scene of a file from elsewhere, made in a folder beside the results.
 pub fn scene_of(path: &Path, folder: &Path) -> Result<PathBuf> {
     let import = import(path, &ImportArguments::default())?;
-    let scene = write(&import, &title_of(path), &folder.join("scene"), false)?;
-    files::print(&describe(&import))?;
-    files::print(&format!("scene: {}\n", scene.display()))?;
-    Ok(scene)
+    let made = write(&import, &title_of(path), &folder.join("scene"), Replace::Never)?;
+    files::print(&format!("{}{}", describe(&import), made.text()))?;
+    Ok(made.scene)
 }
 
-/// "liver" of `data/liver.nii.gz`.
+/// What a scene of a file is called: "left kidney" of `data/left_kidney.nii.gz`.
 pub fn title_of(path: &Path) -> String {
-    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-    name.split('.').next().unwrap_or_default().replace('_', " ")
+    stem_of(&path.to_string_lossy()).replace('_', " ")
+}
+
+/// The folder for all that is made of a file: `out/left_kidney` of `data/Left_kidney.nii.gz`.
+pub fn folder_of(path: &Path) -> PathBuf {
+    Path::new("out").join(name_of(stem_of(&path.to_string_lossy())))
 }

@@ -9,6 +9,7 @@ mod haptics;
 mod hold;
 mod import;
 mod in_order;
+mod made;
 mod mesh;
 mod output;
 mod progress;

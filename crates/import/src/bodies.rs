@@ -9,6 +9,7 @@ use viscera::scalar::{Vec3, vec3};
 use viscera_volume::VolumeReport;
 
 use crate::hold::{Hold, at_the_back};
+use crate::name::{name_of, stem_of};
 use crate::open::Found;
 use crate::organs::of_labels;
 use crate::size::Fineness;
@@ -103,8 +104,8 @@ pub fn parts(
     options: &Options,
     observe: &mut dyn FnMut(&str),
 ) -> Result<Import, ImportError> {
-    let stem = file.rsplit(['/', '\\']).next().unwrap_or(file);
-    let name = name_of(stem.split('.').next().unwrap_or(stem));
+    let stem = stem_of(file);
+    let name = name_of(stem);
     match found {
         Found::Labels(map, report) => of_scan(file, &map, &report, options, observe),
         Found::Tets(mesh, report) => {
@@ -225,21 +226,4 @@ fn notes_of(report: &ReadReport, unit: f64) -> Vec<String> {
         notes.push(format!("left out {} x {}", skipped.count, skipped.kind));
     }
     notes
-}
-
-/// A name that scenes take: letters, digits, `-` and `_`, not digits alone.
-pub fn name_of(text: &str) -> String {
-    let mut name = String::new();
-    for c in text.trim().chars() {
-        let c = c.to_ascii_lowercase();
-        let kept = if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
-        if !(kept == '_' && name.ends_with('_')) {
-            name.push(kept);
-        }
-    }
-    let name = name.trim_matches('_').to_owned();
-    match name.is_empty() || name.chars().all(|c| c.is_ascii_digit()) {
-        true => format!("body_{name}").trim_end_matches('_').to_owned(),
-        false => name,
-    }
 }

@@ -7,6 +7,7 @@
 mod bodies;
 mod error;
 mod hold;
+mod name;
 mod open;
 mod organs;
 mod scene;
@@ -17,6 +18,7 @@ mod unit;
 pub use bodies::{Import, Inner, Options, Part, Skin, Touching, parts};
 pub use error::ImportError;
 pub use hold::{Hold, Place};
+pub use name::{name_of, stem_of};
 pub use open::{Found, open};
 pub use scene::Written;
 pub use size::Fineness;

@@ -7,6 +7,7 @@ use viscera_volume::{
 };
 
 use crate::ImportError;
+use crate::name::stem_of;
 
 /// What a file is. Meshes are in units of the file.
 pub enum Found {
@@ -44,8 +45,7 @@ pub fn open(
     let used = summarize(&map);
     if let (NamesFrom::None, [only]) = (report.names_from, &used[..]) {
         // A mask of one organ is what its file is named after.
-        let stem = name.rsplit(['/', '\\']).next().and_then(|file| file.split('.').next());
-        map.set_names([(only.label, stem.unwrap_or("organ").to_owned())].into());
+        map.set_names([(only.label, stem_of(name).to_owned())].into());
     } else if report.names_from == NamesFrom::None {
         // Others are read as TotalSegmentator's, and that is said.
         // Labels above 117 are of another program, and stay without names.

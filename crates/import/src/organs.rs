@@ -9,8 +9,9 @@ use viscera::scalar::{Vec3, vec3};
 use viscera_volume::{LabelMap, Organ, OrganReport, Wall, summarize};
 
 use crate::ImportError;
-use crate::bodies::{Import, Inner, Options, Part, Touching, name_of};
+use crate::bodies::{Import, Inner, Options, Part, Touching};
 use crate::hold::{Hold, Place, at_the_back};
+use crate::name::name_of;
 use crate::tissue::{self, Kind};
 
 /// A label that is enclosed by another to this share of its faces is a part of it: a tumour in a liver.

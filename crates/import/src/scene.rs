@@ -8,6 +8,7 @@ use viscera::scalar::Vec3;
 
 use crate::bodies::{Import, Part};
 use crate::hold::{Place, rounded};
+use crate::name::{name_of, stem_of};
 use crate::tissue::Tissue;
 
 /// Files of a scene: names, relative to the scene file, and bytes. The scene file itself comes first.
@@ -18,9 +19,10 @@ pub struct Written {
 }
 
 impl Import {
-    /// The scene file and the meshes that it names.
+    /// The scene file, which has the name of the file that it was made of, and the meshes that it names.
     pub fn scene(&self, title: &str) -> Written {
-        let mut files = vec![("scene.toml".to_owned(), self.text(title).into_bytes())];
+        let scene = format!("{}.toml", name_of(stem_of(&self.file)));
+        let mut files = vec![(scene, self.text(title).into_bytes())];
         for part in &self.parts {
             let regions = vtu::Array::integers("region", part.mesh.regions());
             // The arrays are as long as the mesh, and its places are finite.

@@ -97,7 +97,7 @@ fn a_written_scene_is_read_and_comes_to_rest() {
         let found = written.files.iter().find(|(known, _)| known == name);
         found.map(|(_, bytes)| bytes.clone()).ok_or_else(|| format!("no {name}"))
     };
-    let text = String::from_utf8(file("scene.toml").expect("a scene")).expect("text");
+    let text = String::from_utf8(file("scan.toml").expect("a scene")).expect("text");
     for part in ["# left out, choose by --labels: rib_left_1", "preset = \"liver\"", "label = 9"] {
         assert!(text.contains(part), "{part}: {text}");
     }
