@@ -5,7 +5,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use viscera::mesh::quality::summarize_quality;
 use viscera::units::Dimension;
-use viscera_import::{Fineness, Import, Options, name_of, open, parts, stem_of};
+use viscera_import::{Fineness, Import, Options, millilitres, name_of, open, parts, stem_of};
 use viscera_report::Table;
 use viscera_resources::files;
 
@@ -42,12 +42,8 @@ impl ImportArguments {
                 Err(error) => bail!("{flag}: {error}"),
             },
         };
-        let defaults = Options::default();
-        let fineness = match (length(&self.edge, "--edge")?, self.count) {
-            (Some(edge), _) => Fineness::Edge(edge),
-            (None, Some(count)) => Fineness::Count(count),
-            _ => defaults.fineness,
-        };
+        let edge = length(&self.edge, "--edge")?.map(Fineness::Edge);
+        let fineness = edge.or(self.count.map(Fineness::Count));
         let unit = length(&self.unit, "--unit")?;
         Ok(Options { fineness, unit, labels: self.labels.clone(), hollow: self.hollow })
     }
@@ -69,8 +65,16 @@ pub fn import(file: &Path, arguments: &ImportArguments) -> Result<Import> {
 
 /// What was made: bodies with their sizes and shapes, and what was assumed.
 pub fn describe(import: &Import) -> String {
-    let mut table =
-        Table::new(["body", "tets", "ml", "angles, degrees", "below 10", "tissue", "held at"]);
+    let mut table = Table::new([
+        "body",
+        "tets",
+        "ml in scan",
+        "ml in mesh",
+        "angles, degrees",
+        "below 10",
+        "tissue",
+        "held at",
+    ]);
     for part in &import.parts {
         let quality = summarize_quality(&part.mesh);
         let (low, high) = (quality.min_dihedral.to_degrees(), quality.max_dihedral.to_degrees());
@@ -79,7 +83,8 @@ pub fn describe(import: &Import) -> String {
         table.row([
             part.name.clone(),
             part.mesh.tets().len().to_string(),
-            format!("{:.0}", 1e6 * part.mesh.volume()),
+            part.wanted.map_or_else(|| "-".to_owned(), millilitres),
+            millilitres(part.mesh.volume()),
             format!("{low:.1} to {high:.1}"),
             format!("{:.3} %", 100.0 * share_below(&part.mesh, 10.0)),
             part.tissue.preset.unwrap_or("unknown").to_owned(),
@@ -93,6 +98,9 @@ pub fn describe(import: &Import) -> String {
             "tied: {from} to {to}, {:.0} % of its surface\n",
             100.0 * touching.share
         ));
+    }
+    for warning in &import.warnings {
+        text.push_str(&format!("warning: {warning}\n"));
     }
     for note in &import.notes {
         text.push_str(&format!("note: {}\n", note.trim()));

@@ -3,38 +3,33 @@
 use std::collections::BTreeMap;
 
 use viscera::mesh::io::ReadReport;
-use viscera::mesh::winding::fill;
+use viscera::mesh::topology::{BoundingBox, count_open_edges};
+use viscera::mesh::winding;
 use viscera::mesh::{SurfaceMesh, TetMesh, tet_volume};
 use viscera::scalar::{Vec3, vec3};
 use viscera_volume::VolumeReport;
 
+use crate::filling::{Filled, KEPT, Wanted, fill_to, first_spacing};
 use crate::hold::{Hold, at_the_back};
 use crate::name::{name_of, stem_of};
 use crate::open::Found;
 use crate::organs::of_labels;
-use crate::size::Fineness;
+use crate::size::{Fineness, MOST_OF_SURFACES, finest, spacing_of, tets_of};
 use crate::tissue::Tissue;
-use crate::unit::{Unit, guess, length_text};
+use crate::unit::{Unit, guess, length_text, millilitres};
 use crate::{ImportError, tissue};
 
 /// What is asked for.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// How fine bodies are filled.
-    pub fineness: Fineness,
+    /// How fine bodies are filled; as many tetrahedra as run in real time where nobody says.
+    pub fineness: Option<Fineness>,
     /// The length of 1 in a mesh [m]; guessed where nobody says.
     pub unit: Option<f64>,
     /// Labels by name or number; all soft organs where there are none.
     pub labels: Vec<String>,
     /// Whether hollow organs are a wall around a cavity, in place of filled.
     pub hollow: bool,
-}
-
-impl Default for Options {
-    /// As many tetrahedra as run in real time.
-    fn default() -> Self {
-        Self { fineness: Fineness::Count(20_000), unit: None, labels: Vec::new(), hollow: false }
-    }
 }
 
 /// A surface that is finer than the tetrahedra, and moves with them.
@@ -58,6 +53,8 @@ pub struct Part {
     pub name: String,
     /// Its tetrahedra [m].
     pub mesh: TetMesh,
+    /// The volume that it has in the file [m^3], where that is known without tetrahedra.
+    pub wanted: Option<f64>,
     /// Its fine surface [m], if it has one.
     pub skin: Option<Skin>,
     /// What it is made of.
@@ -93,6 +90,8 @@ pub struct Import {
     pub touching: Vec<Touching>,
     /// Downwards, of length 1.
     pub down: Vec3<f64>,
+    /// What is probably not as it was meant, a line each.
+    pub warnings: Vec<String>,
     /// What was found and what was assumed, a line each.
     pub notes: Vec<String>,
 }
@@ -126,10 +125,7 @@ pub fn parts(
             notes.extend(notes_of(&report, unit.meters));
             let mut surface = surface;
             surface.vertices.iter_mut().for_each(|x| *x = *x * unit.meters);
-            let volume = volume * unit.meters * unit.meters * unit.meters;
-            let spacing = options.fineness.spacing(volume);
-            let filled = fill(&surface, spacing)
-                .map_err(|error| ImportError::Fill { file: file.into(), error })?;
+            let (filled, wanted) = fill_surface(file, &surface, options, &mut notes)?;
             if filled.invented > 0.001 {
                 let percent = 100.0 * filled.invented;
                 notes.push(format!(
@@ -140,9 +136,71 @@ pub fn parts(
                 let count = filled.report.components;
                 notes.push(format!("{count} unconnected parts, each with a hold"));
             }
-            Ok(Import { notes, ..alone(file, name, filled.mesh, Some(surface), Vec::new()) })
+            let mut import = alone(file, name, filled.mesh, Some(surface), Vec::new());
+            import.parts[0].wanted = wanted;
+            let more = format!("--count {}", 8 * import.parts[0].mesh.tets().len());
+            import.warnings.extend(told_loss(&import.parts[0], &more));
+            Ok(Import { notes, ..import })
         }
     }
+}
+
+/// Fills a surface with edges that are short enough for its volume, where it encloses one: it is returned then.
+fn fill_surface(
+    file: &str,
+    surface: &SurfaceMesh,
+    options: &Options,
+    notes: &mut Vec<String>,
+) -> Result<(Filled, Option<f64>), ImportError> {
+    let fail = |error| ImportError::Fill { file: file.into(), error };
+    let volume = surface.enclosed_volume().abs();
+    let size = BoundingBox::around(&surface.vertices).size();
+    let whole_box = size.x * size.y * size.z;
+    let fineness = options.fineness.unwrap_or_default();
+    // What encloses nothing yet may do so once its holes are closed.
+    let is_closed = count_open_edges(surface) == 0 && volume > 0.0;
+    let likely = if is_closed { volume } else { volume.max(0.1 * whole_box) };
+    let asked = fineness.affordable(file, likely, whole_box, MOST_OF_SURFACES)?;
+    let fill_with = |spacing| {
+        let winding::Filled { mesh, report, invented } = winding::fill(surface, spacing)?;
+        Ok(Filled { mesh, report, invented, spacing })
+    };
+    if !is_closed {
+        return Ok((fill_with(asked).map_err(fail)?, None));
+    }
+    let least = Fineness::default().spacing(volume);
+    let finest = spacing_of(volume, tets_of(volume, asked.min(least))).max(finest(
+        volume,
+        whole_box,
+        MOST_OF_SURFACES,
+    ));
+    let first = first_spacing(volume, surface, asked, finest);
+    // Parts of a surface may overlap, and lie in each other: how many bodies they are is not known.
+    let wanted = Wanted { volume, parts: usize::MAX };
+    let filled = fill_to(wanted, first, finest, fill_with).map_err(fail)?;
+    notes.extend(told_edges(filled.spacing, asked));
+    Ok((filled, Some(volume)))
+}
+
+/// That a body has shorter edges [m] than it was to have.
+pub fn told_edges(edge: f64, asked: f64) -> Option<String> {
+    let (short, long) = (1e3 * edge, 1e3 * asked);
+    (edge < 0.99 * asked).then(|| {
+        format!("edges of {short:.1} mm in place of {long:.1} mm, so that it keeps its volume")
+    })
+}
+
+/// What of a body's volume its tetrahedra lack, with what to do; `count` is what it could be filled with.
+pub fn told_loss(part: &Part, command: &str) -> Option<String> {
+    let (wanted, has) = (part.wanted?, part.mesh.volume());
+    ((has / wanted - 1.0).abs() > KEPT).then(|| {
+        format!(
+            "`{}` has {} ml of the {} ml in the file: it is too thin for its edges; more tetrahedra keep more of it, such as {command}",
+            part.name,
+            millilitres(has),
+            millilitres(wanted)
+        )
+    })
 }
 
 fn given(meters: f64) -> Unit {
@@ -154,9 +212,10 @@ fn alone(file: &str, name: String, mesh: TetMesh, skin: Option<Skin>, inner: Vec
     let down = vec3(0.0, 0.0, -1.0);
     let holds = at_the_back(&name, &mesh, down, "lowest");
     let tissue = tissue::of_name(&name);
-    let part = Part { name, mesh, skin, tissue, inner, holds, notes: Vec::new() };
-    let (file, notes) = (file.to_owned(), Vec::new());
-    Import { file, parts: vec![part], touching: Vec::new(), down, notes }
+    let part = Part { name, mesh, wanted: None, skin, tissue, inner, holds, notes: Vec::new() };
+    let (file, parts) = (file.to_owned(), vec![part]);
+    let (touching, warnings, notes) = (Vec::new(), Vec::new(), Vec::new());
+    Import { file, parts, touching, down, warnings, notes }
 }
 
 fn of_scan(

@@ -55,6 +55,20 @@ pub enum ImportError {
         /// Why.
         error: TetrahedralizeError,
     },
+    /// It would take too long, and need too much memory.
+    #[error(
+        "{file}: {asked} would be {tets:.1e} tetrahedra, more than are made and simulated at all; take {nearest}"
+    )]
+    TooFine {
+        /// The file.
+        file: String,
+        /// The option with its value.
+        asked: String,
+        /// About how many it would be.
+        tets: f64,
+        /// The option with the nearest value that works.
+        nearest: String,
+    },
     /// A name that is no label.
     #[error("{file}: there is no label `{wanted}`; {hint}")]
     UnknownLabel {

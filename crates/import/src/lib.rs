@@ -6,6 +6,7 @@
 
 mod bodies;
 mod error;
+mod filling;
 mod hold;
 mod name;
 mod open;
@@ -23,3 +24,4 @@ pub use open::{Found, open};
 pub use scene::Written;
 pub use size::Fineness;
 pub use tissue::Tissue;
+pub use unit::millilitres;

@@ -2,16 +2,21 @@
 
 use std::collections::BTreeMap;
 
-use viscera::mesh::tetrahedralize::{surface, tetrahedralize, tetrahedralize_to};
+use viscera::mesh::distance::SignedDistance;
+use viscera::mesh::tetrahedralize::{
+    TetrahedralizeError, surface, tetrahedralize, tetrahedralize_to,
+};
 use viscera::mesh::winding::Solid;
 use viscera::mesh::{SurfaceMesh, TetMesh, boundary_surface};
 use viscera::scalar::{Vec3, vec3};
 use viscera_volume::{LabelMap, Organ, OrganReport, Wall, summarize};
 
 use crate::ImportError;
-use crate::bodies::{Import, Inner, Options, Part, Touching};
+use crate::bodies::{Import, Inner, Options, Part, Touching, told_edges, told_loss};
+use crate::filling::{Filled, KEPT, RESOLVED, Wanted, fill_to, first_spacing};
 use crate::hold::{Hold, Place, at_the_back};
 use crate::name::name_of;
+use crate::size::{Fineness, MOST_OF_LABELS, finest, spacing_of, tets_of};
 use crate::tissue::{self, Kind};
 
 /// A label that is enclosed by another to this share of its faces is a part of it: a tumour in a liver.
@@ -20,14 +25,11 @@ const ENCLOSED: f64 = 0.8;
 /// Organs are tied where this share of the smaller one's surface touches the other.
 const TIED: f64 = 0.1;
 
-/// A lattice has vertices inside of a wall everywhere where it is so many edges thick.
-const RESOLVED: f64 = 1.3;
-
 /// And need no other hold from this share on.
 const HANGS: f64 = 0.3;
 
-/// An edge is no longer than this share of the cube root of an organ's volume.
-const COARSEST: f64 = 0.4;
+/// A lattice finer than the scan shows no more of it: edges are at least this share of a voxel's.
+const OF_A_VOXEL: f64 = 0.5;
 
 /// A body in the making.
 struct Plan {
@@ -37,6 +39,14 @@ struct Plan {
     inner: Vec<(u16, String)>,
     organ: Organ,
     report: OrganReport,
+}
+
+impl Plan {
+    /// How thick its wall is [m], where it is hollow and large enough for a cavity.
+    fn wall(&self) -> Option<f64> {
+        let size = libm::cbrt(self.report.volume);
+        self.kind.wall().filter(|wall| 2.5 * wall < size)
+    }
 }
 
 /// Bodies of the labels that are asked for, or of all that are soft.
@@ -61,24 +71,78 @@ pub fn of_labels(
         let kind = tissue::kind_of(name);
         plans.push(Plan { label: *label, name: name.clone(), kind, inner, organ, report });
     }
-    let volume: f64 = plans.iter().map(|plan| plan.report.volume).sum();
-    let spacing = options.fineness.spacing(volume);
+    let sizes = Sizes::of(file, &plans, options)?;
     let mut parts: Vec<Part> = Vec::new();
-    for plan in &plans {
-        observe(&plan.name);
-        let mut part = build(file, map, plan, (spacing, options.hollow), down)?;
+    let mut warnings = Vec::new();
+    for (number, plan) in plans.iter().enumerate() {
+        observe(&format!("{}, {} of {}", plan.name, number + 1, plans.len()));
+        let mut part = build(file, map, plan, (sizes, options.hollow), down)?;
         // Names are of one body each.
         if parts.iter().any(|other| other.name == part.name) {
             part.name = format!("{}_{}", part.name, plan.label);
         }
+        let more = format!("--labels {} --count {:.0}", plan.label, 8.0 * sizes.most);
+        // A wall around a cavity has another volume than the organ.
+        let is_wall = options.hollow && plan.wall().is_some();
+        warnings.extend(told_loss(&part, &more).filter(|_| !is_wall));
         parts.push(part);
     }
+    notes.extend(sizes.told(&parts));
     let touching = touching(&parts, libm::cbrt(map.to_world().voxel_volume()));
     for touching in touching.iter().filter(|touching| touching.share >= HANGS) {
         // A gallbladder hangs on its liver.
         parts[touching.from].holds.clear();
     }
-    Ok(Import { file: file.into(), parts, touching, down, notes })
+    Ok(Import { file: file.into(), parts, touching, down, warnings, notes })
+}
+
+/// How fine organs are filled.
+#[derive(Clone, Copy)]
+struct Sizes {
+    /// As it is asked for [m].
+    spacing: f64,
+    /// About so many tetrahedra are asked for, of all organs together.
+    asked: f64,
+    /// Thin organs may have so many, each for itself.
+    most: f64,
+}
+
+impl Sizes {
+    fn of(file: &str, plans: &[Plan], options: &Options) -> Result<Self, ImportError> {
+        let volume: f64 = plans.iter().map(|plan| plan.report.volume).sum();
+        let boxes = plans.iter().map(|plan| box_of(&plan.organ));
+        let largest = boxes.fold(0.0, f64::max);
+        let fineness = options.fineness.unwrap_or_default();
+        let spacing = fineness.affordable(file, volume, largest, MOST_OF_LABELS)?;
+        let least = Fineness::default().spacing(volume);
+        let [asked, most] = [spacing, spacing.min(least)].map(|edge| tets_of(volume, edge));
+        Ok(Self { spacing, asked, most })
+    }
+
+    /// That thin organs make more tetrahedra than were asked for.
+    fn told(self, parts: &[Part]) -> Option<String> {
+        let count: usize = parts.iter().map(|part| part.mesh.tets().len()).sum();
+        (count as f64 > 1.3 * self.asked).then(|| {
+            format!(
+                "{count} tetrahedra in place of about {:.0}: thin organs need short edges; --labels takes fewer organs",
+                self.asked
+            )
+        })
+    }
+
+    /// The shortest edges [m] of an organ.
+    fn finest(self, organ: &Organ, volume: f64) -> f64 {
+        let voxel = organ.voxel_size().into_iter().fold(f64::INFINITY, f64::min);
+        let affordable = finest(volume, box_of(organ), MOST_OF_LABELS);
+        spacing_of(volume, self.most).max(OF_A_VOXEL * voxel).max(affordable)
+    }
+}
+
+/// The volume of the box around an organ [m^3].
+fn box_of(organ: &Organ) -> f64 {
+    let (low, high) = organ.bounds();
+    let size = high - low;
+    size.x * size.y * size.z
 }
 
 /// Labels and their names.
@@ -188,22 +252,28 @@ fn build(
     file: &str,
     map: &LabelMap,
     plan: &Plan,
-    (spacing, is_hollow): (f64, bool),
+    (sizes, is_hollow): (Sizes, bool),
     down: Vec3<f64>,
 ) -> Result<Part, ImportError> {
     let Plan { organ, report, .. } = plan;
     let fail = |error| ImportError::Organs { file: file.into(), organ: plan.name.clone(), error };
-    let voxel = libm::cbrt(map.to_world().voxel_volume());
-    let size = libm::cbrt(report.volume);
     let mut notes = Vec::new();
-    let skin = surface(organ, voxel.max(spacing / 8.0)).map_err(fail)?;
-    let spacing = spacing.min(COARSEST * size);
+    let skin = skin_of(organ, report.volume, sizes.spacing).map_err(fail)?;
+    let finest = sizes.finest(organ, report.volume);
+    let first = first_spacing(report.volume, &skin, sizes.spacing, finest);
     let mut wall_share = None;
-    let wall = plan.kind.wall().filter(|wall| 2.5 * wall < size);
+    let wall = plan.wall();
     let solid = wall.and_then(|_| Solid::new(&skin).ok());
+    let wanted = Wanted { volume: report.volume, parts: report.pieces };
+    let filled = || {
+        fill_to(wanted, first, finest, |spacing| {
+            let made = tetrahedralize_to(|by| organ.offset(by), spacing, report.volume);
+            made.map(|made| Filled::new(made, spacing))
+        })
+    };
     let made = match (wall, &solid) {
         (Some(thin), Some(skin)) if is_hollow => {
-            let thickness = thin.max(RESOLVED * spacing);
+            let thickness = thin.max(RESOLVED * first);
             let text = format!("{:.1} mm", 1e3 * thickness);
             notes.push(match thickness > thin {
                 true => format!(
@@ -213,18 +283,20 @@ fn build(
                 false => format!("a wall of {text} around a cavity"),
             });
             wall_share = Some(thin / thickness);
-            tetrahedralize(&Wall { organ, skin, thickness }, spacing)
+            let made = tetrahedralize(&Wall { organ, skin, thickness }, first);
+            made.map(|made| Filled::new(made, first))
         }
         (Some(thickness), _) => {
             let text = 1e3 * thickness;
             notes.push(format!(
                 "filled, as the scan shows it; --hollow leaves a wall of {text:.1} mm"
             ));
-            tetrahedralize_to(|by| organ.offset(by), spacing, report.volume)
+            filled()
         }
-        _ => tetrahedralize_to(|by| organ.offset(by), spacing, report.volume),
+        _ => filled(),
     };
-    let (mesh, made) = made.map_err(fail)?;
+    let Filled { mesh, report: made, spacing, .. } = made.map_err(fail)?;
+    notes.extend(told_edges(spacing, sizes.spacing));
     if report.crumbs[0] > 0 {
         let [pieces, voxels] = report.crumbs;
         notes.push(format!("left out {pieces} crumbs of {voxels} voxels"));
@@ -245,7 +317,20 @@ fn build(
     if let Some(share) = wall_share {
         tissue.soften(share);
     }
-    Ok(Part { name, mesh, skin: Some(skin), tissue, inner, holds, notes })
+    let (skin, wanted) = (Some(skin), Some(report.volume));
+    Ok(Part { name, mesh, wanted, skin, tissue, inner, holds, notes })
+}
+
+/// The fine surface of an organ: with edges as long as a voxel's, or half as long where a thin organ needs it for its volume.
+fn skin_of(organ: &Organ, volume: f64, spacing: f64) -> Result<SurfaceMesh, TetrahedralizeError> {
+    let voxel = libm::cbrt(organ.voxel_size().iter().product());
+    let coarse = surface(organ, voxel.max(spacing / 8.0));
+    let is_kept = |skin: &SurfaceMesh| (skin.enclosed_volume() / volume - 1.0).abs() <= KEPT;
+    match coarse {
+        Ok(skin) if is_kept(&skin) => Ok(skin),
+        Ok(skin) => Ok(surface(organ, OF_A_VOXEL * voxel).unwrap_or(skin)),
+        Err(_) => surface(organ, OF_A_VOXEL * voxel),
+    }
 }
 
 /// Gives the tetrahedra of what lies in an organ a region of their own.
@@ -266,7 +351,7 @@ fn with_inner(
         for (tet, region) in regions.iter_mut().enumerate() {
             let corners = mesh.corners(tet);
             let middle = (corners[0] + corners[1] + corners[2] + corners[3]) * 0.25;
-            if viscera::mesh::distance::SignedDistance::distance(&shape, middle) < 0.0 {
+            if shape.distance(middle) < 0.0 {
                 *region = u32::from(*label);
                 count += 1;
             }

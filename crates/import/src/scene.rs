@@ -10,6 +10,7 @@ use crate::bodies::{Import, Part};
 use crate::hold::{Place, rounded};
 use crate::name::{name_of, stem_of};
 use crate::tissue::Tissue;
+use crate::unit::millilitres;
 
 /// Files of a scene: names, relative to the scene file, and bytes. The scene file itself comes first.
 #[derive(Clone, Debug)]
@@ -43,7 +44,7 @@ impl Import {
             text,
             "# Made from {file}. Lines that begin with # are comments; `viscera scene describe` lists all keys."
         );
-        for note in &self.notes {
+        for note in self.warnings.iter().chain(&self.notes) {
             let _ = writeln!(text, "# {}", note.trim());
         }
         let _ = writeln!(text, "title = {:?}", plain(title));
@@ -93,8 +94,8 @@ impl Import {
 }
 
 fn body(text: &mut String, part: &Part) {
-    let (count, litres) = (part.mesh.tets().len(), 1e3 * part.mesh.volume());
-    let _ = writeln!(text, "\n# {}: {count} tetrahedra, {:.0} ml.", part.name, 1e3 * litres);
+    let (count, volume) = (part.mesh.tets().len(), millilitres(part.mesh.volume()));
+    let _ = writeln!(text, "\n# {}: {count} tetrahedra, {volume} ml.", part.name);
     for note in &part.notes {
         let _ = writeln!(text, "# {note}");
     }

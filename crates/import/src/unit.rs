@@ -98,7 +98,24 @@ fn short(value: f64) -> String {
 }
 
 fn litres_text(litres: f64) -> String {
-    if litres >= 1.0 { format!("{litres:.2} l") } else { format!("{:.0} ml", 1e3 * litres) }
+    match litres >= 1.0 {
+        true => format!("{litres:.2} l"),
+        false => format!("{} ml", millilitres(1e-3 * litres)),
+    }
+}
+
+/// A volume [m^3] in millilitres, with two digits or more.
+pub fn millilitres(volume: f64) -> String {
+    let value = 1e6 * volume;
+    // So many digits behind the point.
+    let digits = match value.abs() {
+        size if size >= 9.95 => 0,
+        size if size > 0.0 && size.is_finite() => {
+            (1.0 - libm::log10(size).floor()).min(9.0) as usize
+        }
+        _ => 0,
+    };
+    format!("{value:.digits$}")
 }
 
 /// A length as people write it: "32 mm".
@@ -126,6 +143,12 @@ mod tests {
         assert_eq!(guess("liver.stl", &points(250.0), 1.4e6).meters, 1e-3);
         assert_eq!(guess("Left_Kidney.obj", &points(0.11), 1.5e-4).meters, 1.0);
         assert_eq!(guess("spleen.ply", &points(12.0), 210.0).meters, 1e-2);
+    }
+
+    #[test]
+    fn small_volumes_keep_two_digits() {
+        let texts = [1.5e-3, 57.3e-6, 7.46e-6, 3.21e-8, 0.0].map(millilitres);
+        assert_eq!(texts, ["1500", "57", "7.5", "0.032", "0"]);
     }
 
     #[test]

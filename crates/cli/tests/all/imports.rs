@@ -144,6 +144,11 @@ fn a_scan_becomes_a_scene() {
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     assert!(end.stdout.contains("next:  viscera run made/scan.toml"), "{}", end.stdout);
     assert!(bench.path("made/liver.vtu").exists() && bench.path("made/liver_skin.ply").exists());
+    // Volumes of scan and mesh stand side by side.
+    let columns = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    let row = end.stdout.lines().map(columns).find(|row| row.first().is_some_and(|r| r == "liver"));
+    assert_eq!(row.expect("a liver")[2..4], ["47", "47"], "{}", end.stdout);
+    assert!(end.stdout.contains("ml in scan  ml in mesh"), "{}", end.stdout);
     let wrong = bench.end_of(&["scene", "new", "scan.nrrd", "--labels", "kidney"]);
     assert_eq!(wrong.code, Some(1));
     assert!(wrong.stderr.contains("no label `kidney`; labels are 5 liver"), "{}", wrong.stderr);
@@ -197,6 +202,9 @@ fn surfaces_are_filled_turned_and_written() {
         (&["mesh", "tetrahedralize", "cube.obj", "--out", "a.obj"], ".vtu, .vtk or .msh"),
         (&["scene", "new", "cube.obj", "--edge", "0 mm"], "above zero"),
         (&["scene", "new", "none.stl"], "no such file"),
+        // Refused before anything is filled, with what works.
+        (&["scene", "new", "cube.obj", "--edge", "0.01 mm"], "take --edge \"0.9"),
+        (&["scene", "new", "cube.obj", "--count", "4000000000"], "take --count"),
     ] {
         let end = bench.end_of(arguments);
         assert_eq!(end.code, Some(1), "{arguments:?}: {}", end.stdout);
