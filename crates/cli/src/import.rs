@@ -27,9 +27,75 @@ pub struct ImportArguments {
     /// Labels of a scan, by name or number: liver,stomach,5; all soft organs where there are none
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     labels: Vec<String>,
+    /// Names of labels by number, in place of those in the file: 1=liver,2=tumor
+    #[arg(long, value_name = "NUMBER=NAME", value_delimiter = ',', value_parser = label_name)]
+    names: Vec<(u16, String)>,
     /// Leave hollow organs a wall around a cavity, in place of filling them
     #[arg(long)]
     hollow: bool,
+}
+
+/// Options of `viscera scene new` that people try elsewhere: they are told where these work.
+#[derive(Args, Clone, Debug, Default)]
+pub struct OfSceneNew {
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "")]
+    edge: Option<String>,
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "")]
+    count: Option<String>,
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "")]
+    unit: Option<String>,
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "")]
+    labels: Option<String>,
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "")]
+    names: Option<String>,
+    #[arg(long, hide = true)]
+    hollow: bool,
+}
+
+impl OfSceneNew {
+    /// Refuses them, with the commands that do what was meant.
+    pub fn refuse(&self, file: &Path) -> Result<()> {
+        let hollow = self.hollow.then(String::new);
+        let all = [
+            ("edge", &self.edge),
+            ("count", &self.count),
+            ("unit", &self.unit),
+            ("labels", &self.labels),
+            ("names", &self.names),
+            ("hollow", &hollow),
+        ];
+        let given: Vec<(&str, &String)> =
+            all.iter().filter_map(|(name, value)| Some((*name, value.as_ref()?))).collect();
+        let Some((first, _)) = given.first() else { return Ok(()) };
+        if !is_foreign(file) {
+            bail!(
+                "--{first} says how a scene is made of a mesh or a scan (viscera scene new FILE --{first} ...), and {} is no such file",
+                file.display()
+            );
+        }
+        let options = given.iter().map(|(name, value)| match value.as_str() {
+            "" => format!(" --{name}"),
+            value if value.contains(' ') => format!(" --{name} \"{value}\""),
+            value => format!(" --{name} {value}"),
+        });
+        let options: String = options.collect();
+        let name = name_of(stem_of(&file.to_string_lossy()));
+        let scene = folder_of(file).join("scene").join(name + ".toml");
+        bail!(
+            "--{first} says how a scene is made; make it by `viscera scene new {}{options}`, then `viscera run {}`",
+            file.display(),
+            scene.display()
+        )
+    }
+}
+
+/// "5=liver".
+pub fn label_name(text: &str) -> Result<(u16, String), String> {
+    let pair = text.split_once('=').map(|(label, name)| (label.trim().parse(), name.trim()));
+    match pair {
+        Some((Ok(label), name)) if label > 0 && !name.is_empty() => Ok((label, name.to_owned())),
+        _ => Err("write numbers of labels with their names, such as 1=liver,2=tumor".to_owned()),
+    }
 }
 
 impl ImportArguments {
@@ -45,13 +111,22 @@ impl ImportArguments {
         let edge = length(&self.edge, "--edge")?.map(Fineness::Edge);
         let fineness = edge.or(self.count.map(Fineness::Count));
         let unit = length(&self.unit, "--unit")?;
-        Ok(Options { fineness, unit, labels: self.labels.clone(), hollow: self.hollow })
+        let (labels, names, hollow) = (self.labels.clone(), self.names.clone(), self.hollow);
+        Ok(Options { fineness, unit, labels, names, hollow, shapes_only: false })
     }
 }
 
 /// Makes bodies of a file, with a bar that says which.
 pub fn import(file: &Path, arguments: &ImportArguments) -> Result<Import> {
-    let options = arguments.options()?;
+    import_with(file, arguments.options()?)
+}
+
+/// As [`import`], for shapes only.
+pub fn import_shapes(file: &Path, arguments: &ImportArguments) -> Result<Import> {
+    import_with(file, Options { shapes_only: true, ..arguments.options()? })
+}
+
+fn import_with(file: &Path, options: Options) -> Result<Import> {
     let name = file.display().to_string();
     let bar = progress::spinner(format!("reading {name}"));
     let load = |name: &str| files::read(Path::new(name)).map_err(|error| error.to_string());
@@ -129,9 +204,10 @@ pub fn is_foreign(path: &Path) -> bool {
 
 /// Not text that could be a scene without an ending of its own.
 fn looks_like_data(path: &Path) -> bool {
-    const ENDINGS: [&str; 14] = [
+    // Also of images that are not read: the error says what is.
+    const ENDINGS: [&str; 21] = [
         "msh", "vtk", "vtu", "vtp", "ele", "node", "mesh", "inp", "obj", "stl", "ply", "nii", "gz",
-        "nrrd",
+        "nrrd", "nhdr", "mha", "mhd", "mgz", "mgh", "dcm", "hdr",
     ];
     path.extension().is_some_and(|e| ENDINGS.iter().any(|known| e.eq_ignore_ascii_case(known)))
 }

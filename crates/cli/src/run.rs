@@ -66,6 +66,8 @@ pub struct RunArguments {
     /// Record the run, to have it once more with `viscera replay`
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    #[command(flatten)]
+    of_import: import::OfSceneNew,
 }
 
 /// Counts from one on; the error says that, not the largest number there is.
@@ -86,6 +88,7 @@ pub enum Outcome {
 
 /// Carries out `viscera run`.
 pub fn run(arguments: &RunArguments) -> Result<Outcome> {
+    arguments.of_import.refuse(&arguments.scene)?;
     let folder = arguments.out.clone().unwrap_or_else(|| folder_of(&arguments.scene));
     let made;
     let mut arguments = arguments;

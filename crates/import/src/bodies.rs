@@ -12,11 +12,11 @@ use viscera_volume::VolumeReport;
 use crate::filling::{Filled, KEPT, Wanted, fill_to, first_spacing};
 use crate::hold::{Hold, at_the_back};
 use crate::name::{name_of, stem_of};
-use crate::open::Found;
+use crate::open::{Found, rename};
 use crate::organs::of_labels;
 use crate::size::{Fineness, MOST_OF_SURFACES, finest, spacing_of, tets_of};
 use crate::tissue::Tissue;
-use crate::unit::{Unit, guess, length_text, millilitres};
+use crate::unit::{Unit, doubt, guess, length_text, millilitres};
 use crate::{ImportError, tissue};
 
 /// What is asked for.
@@ -28,8 +28,12 @@ pub struct Options {
     pub unit: Option<f64>,
     /// Labels by name or number; all soft organs where there are none.
     pub labels: Vec<String>,
+    /// Names of labels by number, in place of those in the file.
+    pub names: Vec<(u16, String)>,
     /// Whether hollow organs are a wall around a cavity, in place of filled.
     pub hollow: bool,
+    /// Whether bodies are wanted for their shapes, also of bones, and not for a scene.
+    pub shapes_only: bool,
 }
 
 /// A surface that is finer than the tetrahedra, and moves with them.
@@ -105,22 +109,26 @@ pub fn parts(
 ) -> Result<Import, ImportError> {
     let stem = stem_of(file);
     let name = name_of(stem);
+    refuse_unused(file, &found, options)?;
     match found {
-        Found::Labels(map, report) => of_scan(file, &map, &report, options, observe),
+        Found::Labels(mut map, mut report) => {
+            rename(file, &mut map, &mut report, &options.names)?;
+            of_scan(file, &map, &report, options, observe)
+        }
         Found::Tets(mesh, report) => {
             observe(&name);
-            let unit =
-                options.unit.map_or_else(|| guess(stem, mesh.vertices(), mesh.volume()), given);
+            let (unit, doubt) = unit_of(stem, mesh.vertices(), mesh.volume(), options);
             let mut notes = vec![unit.reason.clone()];
             notes.extend(notes_of(&report, unit.meters));
             let mesh = scaled(file, &mesh, unit.meters)?;
             let inner = inner_of(&mesh, &report, &mut notes);
-            Ok(Import { notes, ..alone(file, name, mesh, None, inner) })
+            let warnings = doubt.into_iter().collect();
+            Ok(Import { notes, warnings, ..alone(file, name, mesh, None, inner) })
         }
         Found::Surface(surface, report) => {
             observe(&name);
             let volume = surface.enclosed_volume().abs();
-            let unit = options.unit.map_or_else(|| guess(stem, &surface.vertices, volume), given);
+            let (unit, doubt) = unit_of(stem, &surface.vertices, volume, options);
             let mut notes = vec![unit.reason.clone()];
             notes.extend(notes_of(&report, unit.meters));
             let mut surface = surface;
@@ -138,6 +146,7 @@ pub fn parts(
             }
             let mut import = alone(file, name, filled.mesh, Some(surface), Vec::new());
             import.parts[0].wanted = wanted;
+            import.warnings.extend(doubt);
             let more = format!("--count {}", 8 * import.parts[0].mesh.tets().len());
             import.warnings.extend(told_loss(&import.parts[0], &more));
             Ok(Import { notes, ..import })
@@ -203,8 +212,59 @@ pub fn told_loss(part: &Part, command: &str) -> Option<String> {
     })
 }
 
-fn given(meters: f64) -> Unit {
-    Unit { meters, reason: String::from("unit as given") }
+/// The unit that was given, with a doubt where it makes no organ of the file; or a guess.
+fn unit_of(
+    name: &str,
+    vertices: &[Vec3<f64>],
+    volume: f64,
+    options: &Options,
+) -> (Unit, Option<String>) {
+    match options.unit {
+        None => (guess(name, vertices, volume), None),
+        Some(meters) => {
+            let unit = Unit { meters, reason: String::from("unit as given") };
+            (unit, doubt(name, vertices, volume, meters))
+        }
+    }
+}
+
+/// Refuses options that a file has no use for, rather than to let somebody believe in them.
+fn refuse_unused(file: &str, found: &Found, options: &Options) -> Result<(), ImportError> {
+    let refuse = |is, option, why: String| {
+        Err(ImportError::Option { file: file.to_owned(), is, option, why })
+    };
+    let of_scans = [
+        ("--labels", !options.labels.is_empty()),
+        ("--names", !options.names.is_empty()),
+        ("--hollow", options.hollow),
+    ];
+    let of_scans = of_scans.iter().find(|(_, is_given)| *is_given).map(|(option, _)| *option);
+    match (found, of_scans) {
+        (Found::Labels(..), _) if options.unit.is_some() => refuse(
+            "is a scan",
+            "--unit",
+            "is for meshes: a scan has the size of its voxels in its header; correct that, for example in 3D Slicer".into(),
+        ),
+        (Found::Tets(..), Some("--labels")) => refuse(
+            "is a mesh of tetrahedra",
+            "--labels",
+            format!(
+                "chooses labels of scans; regions of a mesh are chosen by `viscera mesh convert {file} part.vtu --region NUMBER`"
+            ),
+        ),
+        (Found::Tets(..), None) if options.fineness.is_some() => refuse(
+            "is a mesh of tetrahedra",
+            if matches!(options.fineness, Some(Fineness::Edge(_))) { "--edge" } else { "--count" },
+            format!(
+                "says how surfaces and scans are filled; to fill its surface anew, write that by `viscera mesh convert {file} \
+                 surface.stl` and take surface.stl"
+            ),
+        ),
+        (Found::Tets(..) | Found::Surface(..), Some(option)) => {
+            refuse("is a mesh", option, "is for the labels of scans; leave it out".into())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// A scene of one body that is held at its lowest part.

@@ -2,7 +2,6 @@
 
 use viscera::mesh::MeshError;
 use viscera::mesh::io::ReadError;
-use viscera::mesh::tetrahedralize::TetrahedralizeError;
 use viscera::mesh::winding::FillError;
 use viscera_volume::{OrganError, VolumeError};
 
@@ -46,14 +45,38 @@ pub enum ImportError {
         error: OrganError,
     },
     /// An organ cannot be filled.
-    #[error("{file}: `{organ}`: {error}")]
+    #[error("{file}: `{organ}`: {reason}")]
     Organs {
         /// The file.
         file: String,
         /// The organ.
         organ: String,
         /// Why.
-        error: TetrahedralizeError,
+        reason: String,
+    },
+    /// Bone or air is asked for as soft tissue.
+    #[error("{file}: `{name}` {what}; {advice}")]
+    NoSoftTissue {
+        /// The file.
+        file: String,
+        /// The label's name.
+        name: String,
+        /// What it is.
+        what: &'static str,
+        /// What to do.
+        advice: String,
+    },
+    /// An option that this kind of file does not have.
+    #[error("{file} {is}: {option} {why}")]
+    Option {
+        /// The file.
+        file: String,
+        /// What the file is.
+        is: &'static str,
+        /// The option.
+        option: &'static str,
+        /// Why not, and what to do.
+        why: String,
     },
     /// It would take too long, and need too much memory.
     #[error(

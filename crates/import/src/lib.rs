@@ -5,6 +5,7 @@
 //! Bytes in, bytes out: programs read and write the files.
 
 mod bodies;
+mod choose;
 mod error;
 mod filling;
 mod hold;
@@ -17,10 +18,11 @@ mod tissue;
 mod unit;
 
 pub use bodies::{Import, Inner, Options, Part, Skin, Touching, parts};
+pub use choose::same_names;
 pub use error::ImportError;
 pub use hold::{Hold, Place};
 pub use name::{name_of, stem_of};
-pub use open::{Found, open};
+pub use open::{Found, open, rename};
 pub use scene::Written;
 pub use size::Fineness;
 pub use tissue::Tissue;

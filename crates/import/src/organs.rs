@@ -1,7 +1,5 @@
 //! Bodies of a segmented scan.
 
-use std::collections::BTreeMap;
-
 use viscera::mesh::distance::SignedDistance;
 use viscera::mesh::tetrahedralize::{
     TetrahedralizeError, surface, tetrahedralize, tetrahedralize_to,
@@ -9,18 +7,16 @@ use viscera::mesh::tetrahedralize::{
 use viscera::mesh::winding::Solid;
 use viscera::mesh::{SurfaceMesh, TetMesh, boundary_surface};
 use viscera::scalar::{Vec3, vec3};
-use viscera_volume::{LabelMap, Organ, OrganReport, Wall, summarize};
+use viscera_volume::{LabelMap, Organ, OrganReport, Wall};
 
 use crate::ImportError;
 use crate::bodies::{Import, Inner, Options, Part, Touching, told_edges, told_loss};
-use crate::filling::{Filled, KEPT, RESOLVED, Wanted, fill_to, first_spacing};
+use crate::choose::{Choice, Chosen, choose};
+use crate::filling::{Filled, KEPT, Missed, RESOLVED, Wanted, fill_to, first_spacing};
 use crate::hold::{Hold, Place, at_the_back};
 use crate::name::name_of;
 use crate::size::{Fineness, MOST_OF_LABELS, finest, spacing_of, tets_of};
 use crate::tissue::{self, Kind};
-
-/// A label that is enclosed by another to this share of its faces is a part of it: a tumour in a liver.
-const ENCLOSED: f64 = 0.8;
 
 /// Organs are tied where this share of the smaller one's surface touches the other.
 const TIED: f64 = 0.1;
@@ -36,6 +32,7 @@ struct Plan {
     label: u16,
     name: String,
     kind: Kind,
+    /// Labels in it that are regions of their own.
     inner: Vec<(u16, String)>,
     organ: Organ,
     report: OrganReport,
@@ -57,26 +54,30 @@ pub fn of_labels(
     down: Vec3<f64>,
     observe: &mut dyn FnMut(&str),
 ) -> Result<Import, ImportError> {
-    let mut notes = Vec::new();
-    let chosen = choose(file, map, options, &mut notes)?;
-    let hosts = hosts(map, &chosen);
+    let Choice { organs, mut warnings, mut notes } = choose(file, map, options)?;
     let mut plans: Vec<Plan> = Vec::new();
-    for (label, name) in chosen.iter().filter(|(label, _)| !hosts.contains_key(label)) {
-        let inner: Vec<(u16, String)> =
-            chosen.iter().filter(|(l, _)| hosts.get(l) == Some(label)).cloned().collect();
-        let mut labels = vec![*label];
-        labels.extend(inner.iter().map(|(label, _)| *label));
+    for Chosen { label, name, inner, filled } in organs {
+        let mut labels = vec![label];
+        labels.extend(inner.iter().map(|(label, _)| *label).chain(filled));
         let (organ, report) = Organ::new(map, &labels)
             .map_err(|error| ImportError::Organ { file: file.into(), error })?;
-        let kind = tissue::kind_of(name);
-        plans.push(Plan { label: *label, name: name.clone(), kind, inner, organ, report });
+        let kind = tissue::kind_of(&name);
+        plans.push(Plan { label, name, kind, inner, organ, report });
     }
     let sizes = Sizes::of(file, &plans, options)?;
     let mut parts: Vec<Part> = Vec::new();
-    let mut warnings = Vec::new();
+    let mut first_error = None;
     for (number, plan) in plans.iter().enumerate() {
         observe(&format!("{}, {} of {}", plan.name, number + 1, plans.len()));
-        let mut part = build(file, map, plan, (sizes, options.hollow), down)?;
+        let mut part = match build(map, plan, (sizes, options.hollow), down) {
+            Ok(part) => part,
+            // One that has no shape is no reason to be without the others.
+            Err(error) => {
+                warnings.push(format!("`{}` is left out: {}", plan.name, reason(plan, &error)));
+                first_error.get_or_insert((plan, error));
+                continue;
+            }
+        };
         // Names are of one body each.
         if parts.iter().any(|other| other.name == part.name) {
             part.name = format!("{}_{}", part.name, plan.label);
@@ -87,6 +88,10 @@ pub fn of_labels(
         warnings.extend(told_loss(&part, &more).filter(|_| !is_wall));
         parts.push(part);
     }
+    if let Some((plan, error)) = first_error.filter(|_| parts.is_empty()) {
+        let (file, organ, reason) = (file.to_owned(), plan.name.clone(), reason(plan, &error));
+        return Err(ImportError::Organs { file, organ, reason });
+    }
     notes.extend(sizes.told(&parts));
     let touching = touching(&parts, libm::cbrt(map.to_world().voxel_volume()));
     for touching in touching.iter().filter(|touching| touching.share >= HANGS) {
@@ -94,6 +99,18 @@ pub fn of_labels(
         parts[touching.from].holds.clear();
     }
     Ok(Import { file: file.into(), parts, touching, down, warnings, notes })
+}
+
+/// Why an organ is not filled.
+fn reason(plan: &Plan, error: &TetrahedralizeError) -> String {
+    match error.is_missed() {
+        true => {
+            let voxels = plan.report.voxels;
+            let are = if voxels == 1 { "voxel is" } else { "voxels are" };
+            format!("{voxels} {are} too little for a shape; a scan with finer voxels may show it")
+        }
+        false => error.to_string(),
+    }
 }
 
 /// How fine organs are filled.
@@ -145,120 +162,16 @@ fn box_of(organ: &Organ) -> f64 {
     size.x * size.y * size.z
 }
 
-/// Labels and their names.
-fn choose(
-    file: &str,
-    map: &LabelMap,
-    options: &Options,
-    notes: &mut Vec<String>,
-) -> Result<Vec<(u16, String)>, ImportError> {
-    let all: Vec<(u16, String, u64)> = summarize(map)
-        .into_iter()
-        .map(|label| {
-            let name = label.name.unwrap_or_else(|| format!("label_{}", label.label));
-            (label.label, name, label.voxels)
-        })
-        .collect();
-    let known = || {
-        let names: Vec<String> = all.iter().map(|(l, name, _)| format!("{l} {name}")).collect();
-        names.join(", ")
-    };
-    if options.labels.is_empty() {
-        let (mut chosen, mut left) = (Vec::new(), Vec::new());
-        for (label, name, voxels) in &all {
-            // Smaller ones have no shape that a scan could show.
-            if tissue::kind_of(name).is_organ() && *voxels >= 64 {
-                chosen.push((*label, name.clone()));
-            } else {
-                left.push(name.as_str());
-            }
-        }
-        // Of unknown names all are taken.
-        if chosen.is_empty()
-            && all.iter().all(|(_, name, _)| tissue::kind_of(name) == Kind::Unknown)
-        {
-            chosen = all.iter().map(|(label, name, _)| (*label, name.clone())).collect();
-            left.clear();
-        }
-        if chosen.is_empty() {
-            return Err(ImportError::NoTissue { file: file.into(), labels: known() });
-        }
-        if !left.is_empty() {
-            notes.push(format!("left out, choose by --labels: {}", left.join(", ")));
-        }
-        return Ok(chosen);
-    }
-    let mut chosen = Vec::new();
-    for wanted in &options.labels {
-        let is_wanted = |label: u16, name: &str| {
-            wanted.parse() == Ok(label) || name_of(name) == name_of(wanted)
-        };
-        match all.iter().find(|(label, name, _)| is_wanted(*label, name)) {
-            Some((label, name, _)) => {
-                if !chosen.iter().any(|(known, _)| known == label) {
-                    chosen.push((*label, name.clone()));
-                }
-            }
-            None => {
-                let (file, wanted) = (file.to_owned(), wanted.clone());
-                let hint = format!("labels are {}", known());
-                return Err(ImportError::UnknownLabel { file, wanted, hint });
-            }
-        }
-    }
-    Ok(chosen)
-}
-
-/// Labels that lie in another, by label.
-fn hosts(map: &LabelMap, chosen: &[(u16, String)]) -> BTreeMap<u16, u16> {
-    let dims = map.dims();
-    let steps = [1, dims[0], dims[0] * dims[1]];
-    let labels = map.labels();
-    let mut faces: BTreeMap<(u16, u16), usize> = BTreeMap::new();
-    for place in 0..labels.len() {
-        let own = labels[place];
-        if own == 0 {
-            continue;
-        }
-        for axis in 0..3 {
-            let index = place / steps[axis] % dims[axis];
-            let before = (index > 0).then(|| labels[place - steps[axis]]);
-            let behind = (index + 1 < dims[axis]).then(|| labels[place + steps[axis]]);
-            for other in [before, behind] {
-                // Beyond the image there is nothing.
-                let other = other.unwrap_or(0);
-                if other != own {
-                    *faces.entry((own, other)).or_default() += 1;
-                }
-            }
-        }
-    }
-    let mut hosts = BTreeMap::new();
-    for (label, _) in chosen {
-        let of_label = faces.iter().filter(|((own, _), _)| own == label);
-        let all: usize = of_label.clone().map(|(_, count)| count).sum();
-        let most = of_label.filter(|((_, other), _)| *other != 0).max_by_key(|(_, count)| **count);
-        let Some((&(_, host), &count)) = most else { continue };
-        let is_chosen = chosen.iter().any(|(other, _)| *other == host);
-        if is_chosen && count as f64 >= ENCLOSED * all as f64 && !hosts.contains_key(&host) {
-            hosts.insert(*label, host);
-        }
-    }
-    hosts
-}
-
 /// Fills an organ, and says how it was done.
 fn build(
-    file: &str,
     map: &LabelMap,
     plan: &Plan,
     (sizes, is_hollow): (Sizes, bool),
     down: Vec3<f64>,
-) -> Result<Part, ImportError> {
+) -> Result<Part, TetrahedralizeError> {
     let Plan { organ, report, .. } = plan;
-    let fail = |error| ImportError::Organs { file: file.into(), organ: plan.name.clone(), error };
     let mut notes = Vec::new();
-    let skin = skin_of(organ, report.volume, sizes.spacing).map_err(fail)?;
+    let skin = skin_of(organ, report.volume, sizes.spacing)?;
     let finest = sizes.finest(organ, report.volume);
     let first = first_spacing(report.volume, &skin, sizes.spacing, finest);
     let mut wall_share = None;
@@ -295,7 +208,7 @@ fn build(
         }
         _ => filled(),
     };
-    let Filled { mesh, report: made, spacing, .. } = made.map_err(fail)?;
+    let Filled { mesh, report: made, spacing, .. } = made?;
     notes.extend(told_edges(spacing, sizes.spacing));
     if report.crumbs[0] > 0 {
         let [pieces, voxels] = report.crumbs;

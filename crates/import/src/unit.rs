@@ -83,6 +83,42 @@ pub fn guess(name: &str, vertices: &[Vec3<f64>], volume: f64) -> Unit {
     Unit { meters, reason }
 }
 
+/// Lengths of what is simulated [m], in a unit that somebody gave: from a piece of tissue to a person.
+const LENGTHS: std::ops::RangeInclusive<f64> = 1e-3..=3.0;
+
+/// Why a unit is probably not that of a file, see [`guess`], with one that is likely.
+pub fn doubt(name: &str, vertices: &[Vec3<f64>], volume: f64, meters: f64) -> Option<String> {
+    let size = BoundingBox::around(vertices).size();
+    let longest = size.x.max(size.y).max(size.z);
+    let likely = guess(name, vertices, volume).meters;
+    let name = name.to_ascii_lowercase();
+    let unit = |meters: f64| format!("--unit \"{}\"", length_text(meters));
+    let organ = ORGANS.iter().find(|(word, _)| name.contains(word) && volume > 0.0);
+    if let Some(&(word, litres)) = organ {
+        let has = 1e3 * volume * cube(meters);
+        let is_likely = (1.0 / PLAUSIBLE..PLAUSIBLE).contains(&(has / litres));
+        return (!is_likely).then(|| {
+            format!(
+                "with {} it has {}, and an adult's {word} has {}; with {} it would have {}",
+                unit(meters),
+                litres_text(has),
+                litres_text(litres),
+                unit(likely),
+                litres_text(1e3 * volume * cube(likely))
+            )
+        });
+    }
+    (!LENGTHS.contains(&(longest * meters))).then(|| {
+        format!(
+            "with {} it is {} long; with {} it would be {}",
+            unit(meters),
+            length_text(longest * meters),
+            unit(likely),
+            length_text(longest * likely)
+        )
+    })
+}
+
 fn cube(x: f64) -> f64 {
     x * x * x
 }
@@ -99,6 +135,7 @@ fn short(value: f64) -> String {
 
 fn litres_text(litres: f64) -> String {
     match litres >= 1.0 {
+        true if litres >= 1e3 => format!("{} m^3", short(1e-3 * litres)),
         true => format!("{litres:.2} l"),
         false => format!("{} ml", millilitres(1e-3 * litres)),
     }
@@ -143,6 +180,21 @@ mod tests {
         assert_eq!(guess("liver.stl", &points(250.0), 1.4e6).meters, 1e-3);
         assert_eq!(guess("Left_Kidney.obj", &points(0.11), 1.5e-4).meters, 1.0);
         assert_eq!(guess("spleen.ply", &points(12.0), 210.0).meters, 1e-2);
+    }
+
+    #[test]
+    fn a_unit_that_makes_no_organ_is_doubted() {
+        let told = doubt("liver_coarse", &points(5.0), 36.6, 1.0).expect("no liver");
+        let parts = [
+            "--unit \"1000 mm\" it has 36.60 m^3",
+            "liver has 1.50 l",
+            "--unit \"34 mm\" it would have 1.44 l",
+        ];
+        assert!(parts.iter().all(|part| told.contains(part)), "{told}");
+        assert_eq!(doubt("liver_coarse", &points(5.0), 36.6, 0.032), None);
+        let told = doubt("part", &points(120.0), 1e5, 1.0).expect("too long");
+        assert!(told.contains("120000 mm long") && told.contains("\"1 mm\""), "{told}");
+        assert_eq!(doubt("part", &points(120.0), 1e5, 1e-3), None);
     }
 
     #[test]

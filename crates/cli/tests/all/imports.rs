@@ -155,6 +155,103 @@ fn a_scan_becomes_a_scene() {
 }
 
 #[test]
+fn labels_are_listed_with_names_and_without_voxels() {
+    let bench = Bench::new("");
+    let names = "Segment0_LabelValue:=5\nSegment0_Name:=Leber, links\nSegment1_LabelValue:=6\nSegment1_Name:=leber_links\n\
+        Segment2_LabelValue:=7\nSegment2_Name:=Galle\n";
+    let label = |at: [usize; 3]| match at {
+        [4, 4, 4] => 6,
+        at if at.iter().all(|at| (6..12).contains(at)) => 5,
+        _ => 0,
+    };
+    bench.write("scan.nrrd", &label_map([16, 16, 16], names, label));
+    let list = bench.end_of(&["mesh", "labels", "scan.nrrd"]).stdout;
+    for part in ["named, without voxels: 7 Galle", "labels 5,6 have the same name", "0.027"] {
+        assert!(list.contains(part), "{part}: {list}");
+    }
+    let list = bench.end_of(&["mesh", "labels", "scan.nrrd", "--names", "5=liver,6=vessel"]);
+    assert!(list.stdout.contains("liver") && !list.stdout.contains("same name"), "{}", list.stdout);
+    // By the name that its body has.
+    let new = ["scene", "new", "scan.nrrd", "--labels", "leber_links", "--out", "a"];
+    let end = bench.end_of(&new);
+    assert!(bench.path("a/leber_links.vtu").exists(), "{}", end.stderr);
+    let wrong = bench.end_of(&["mesh", "labels", "scan.nrrd", "--names", "liver"]);
+    assert!(wrong.stderr.contains("1=liver,2=tumor"), "{}", wrong.stderr);
+    // Without names, and with numbers of another program.
+    bench.write("lits.nrrd", &label_map([16, 16, 16], "", |at| label(at).saturating_sub(4)));
+    let list = bench.end_of(&["mesh", "labels", "lits.nrrd"]).stdout;
+    assert!(list.contains("label_1") && list.contains("--names 1=liver,2=tumor"), "{list}");
+    // What is no label map says what is.
+    bench.write("scan.mha", b"ObjectType = Image\nNDims = 3\n");
+    bench.write("scan.dat", b"0 1 2 3\n");
+    for command in [
+        ["mesh", "labels", "scan.mha"],
+        ["scene", "new", "scan.mha"],
+        ["mesh", "labels", "scan.dat"],
+    ] {
+        let end = bench.end_of(&command);
+        assert_eq!(end.code, Some(1), "{}", end.stdout);
+        assert!(end.stderr.contains(".nii.gz"), "{command:?}: {}", end.stderr);
+    }
+    let end = bench.end_of(&["run", "scan.mha"]);
+    assert!(end.stderr.contains(".nii.gz"), "{}", end.stderr);
+}
+
+#[test]
+fn options_of_imports_are_told_where_they_work() {
+    let bench = Bench::new("");
+    bench.write("Cube.1.obj", CUBE.as_bytes());
+    let message = bench.end_of(&["run", "Cube.1.obj", "--count", "300"]).error().to_owned();
+    let commands: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    assert_eq!(commands.len(), 2, "{message}");
+    for command in commands {
+        let words = command.strip_prefix("viscera ").expect("a command").split(' ');
+        let end = bench.end_of(&words.collect::<Vec<_>>());
+        assert_eq!(end.code, Some(0), "{command}: {}", end.stderr);
+    }
+    assert!(bench.path("out/cube_1/scene/cube_1.toml").exists());
+    assert!(bench.path("out/cube_1/summary.json").exists());
+    let message = bench.end_of(&["run", "scene.toml", "--labels", "liver"]).error().to_owned();
+    assert!(message.contains("viscera scene new FILE --labels"), "{message}");
+    // A unit that makes no part of a body of it.
+    let end = bench.end_of(&["scene", "new", "Cube.1.obj", "--unit", "1 m", "--out", "large"]);
+    assert_eq!(end.code, Some(0), "{}", end.stderr);
+    assert!(end.stdout.contains("warning: with --unit \"1000 mm\""), "{}", end.stdout);
+    let scene = bench.read("large/cube_1.toml");
+    assert!(String::from_utf8_lossy(&scene).contains("# with --unit"));
+}
+
+#[test]
+fn bones_are_filled_as_shapes_and_made_obstacles() {
+    let bench = Bench::new("");
+    let names = "Segment0_LabelValue:=5\nSegment0_Name:=liver\nSegment1_LabelValue:=6\nSegment1_Name:=rib_left_1\n";
+    let label = |[x, y, z]: [usize; 3]| match [x, y, z] {
+        at if at.iter().all(|at| (2..14).contains(at)) => 5,
+        _ if (17..23).contains(&x) && (2..14).contains(&y) && (2..14).contains(&z) => 6,
+        _ => 0,
+    };
+    bench.write("scan.nrrd", &label_map([26, 16, 16], names, label));
+    let new = ["scene", "new", "scan.nrrd", "--count", "500", "--out", "."];
+    let message = bench.end_of(&[&new[..], &["--labels", "5,6"]].concat()).error().to_owned();
+    let commands: Vec<&str> = message.split('`').skip(3).step_by(2).take(2).collect();
+    for command in &commands {
+        let words = command.strip_prefix("viscera ").expect("a command").split_whitespace();
+        let end = bench.end_of(&words.collect::<Vec<_>>());
+        assert_eq!(end.code, Some(0), "{command}: {}", end.stderr);
+    }
+    assert_eq!(bench.end_of(&new).code, Some(0));
+    let scene = String::from_utf8(bench.read("scan.toml")).expect("text");
+    let tool = "\n[[tool]]\nkind = \"mesh\"\nmesh = \"rib_left_1.stl\"\nunit = \"1 m\"\n";
+    assert!(
+        message.contains("kind = \"mesh\", mesh = \"rib_left_1.stl\", unit = \"1 m\""),
+        "{message}"
+    );
+    bench.write("scan.toml", (scene + tool).as_bytes());
+    let run = bench.end_of(&["run", "scan.toml", "--frames", "1"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+}
+
+#[test]
 fn surfaces_are_filled_turned_and_written() {
     let bench = Bench::new("");
     bench.write("cube.obj", CUBE.as_bytes());
@@ -171,6 +268,7 @@ fn surfaces_are_filled_turned_and_written() {
     ];
     let end = bench.end_of(&fill);
     assert_eq!(end.code, Some(0), "{}", end.stderr);
+    assert!(end.stdout.ends_with("wrote cube.msh\n"), "{}", end.stdout);
     let inspect = bench.end_of(&["mesh", "inspect", "cube.msh"]);
     // 60^3 mm^3 are 216 ml.
     assert!(inspect.stdout.contains("Gmsh 4 binary"), "{}", inspect.stdout);
@@ -202,6 +300,7 @@ fn surfaces_are_filled_turned_and_written() {
         (&["mesh", "tetrahedralize", "cube.obj", "--out", "a.obj"], ".vtu, .vtk or .msh"),
         (&["scene", "new", "cube.obj", "--edge", "0 mm"], "above zero"),
         (&["scene", "new", "none.stl"], "no such file"),
+        (&["scene", "new", "cube.msh", "--count", "9"], "surface.stl"),
         // Refused before anything is filled, with what works.
         (&["scene", "new", "cube.obj", "--edge", "0.01 mm"], "take --edge \"0.9"),
         (&["scene", "new", "cube.obj", "--count", "4000000000"], "take --count"),

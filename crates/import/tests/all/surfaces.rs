@@ -80,6 +80,12 @@ fn a_mesh_is_scaled_as_its_name_and_size_suggest() {
         &Options { unit, ..Options::default() },
     );
     assert!((made.parts[0].mesh.volume() / mesh.volume() / 0.03f64.powi(3) - 1.0).abs() < 1e-12);
+    assert!(made.warnings.is_empty(), "{:?}", made.warnings);
+    // One that makes no liver of it is taken, and doubted.
+    let options = Options { unit: Some(1.0), ..Options::default() };
+    let made = import("my liver.msh", gmsh::write(&mesh).into_bytes(), &options);
+    let [told] = &made.warnings[..] else { panic!("{:?}", made.warnings) };
+    assert!(told.contains("an adult's liver has 1.50 l; with --unit \"36 mm\""), "{told}");
 }
 
 #[test]
