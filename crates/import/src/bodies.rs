@@ -147,7 +147,10 @@ pub fn parts(
             let mut import = alone(file, name, filled.mesh, Some(surface), Vec::new());
             import.parts[0].wanted = wanted;
             import.warnings.extend(doubt);
-            let more = format!("--count {}", 8 * import.parts[0].mesh.tets().len());
+            let more = format!(
+                "more tetrahedra keep more of it, such as --count {}; or parts of its surface overlap",
+                8 * import.parts[0].mesh.tets().len()
+            );
             import.warnings.extend(told_loss(&import.parts[0], &more));
             Ok(Import { notes, ..import })
         }
@@ -199,12 +202,15 @@ pub fn told_edges(edge: f64, asked: f64) -> Option<String> {
     })
 }
 
-/// What of a body's volume its tetrahedra lack, with what to do; `count` is what it could be filled with.
-pub fn told_loss(part: &Part, command: &str) -> Option<String> {
+/// What of a body's volume its tetrahedra lack, with what to do.
+pub fn told_loss(part: &Part, advice: &str) -> Option<String> {
     let (wanted, has) = (part.wanted?, part.mesh.volume());
-    ((has / wanted - 1.0).abs() > KEPT).then(|| {
+    let off = has / wanted - 1.0;
+    (off.abs() > KEPT).then(|| {
+        let less = if off < 0.0 { "less" } else { "more" };
+        let percent = 100.0 * off.abs();
         format!(
-            "`{}` has {} ml of the {} ml in the file: it is too thin for its edges; more tetrahedra keep more of it, such as {command}",
+            "`{}` has {} ml of the {} ml in the file, {percent:.0} % {less}: it is too thin for its edges; {advice}",
             part.name,
             millilitres(has),
             millilitres(wanted)

@@ -14,7 +14,7 @@ use crate::unit::millilitres;
 const ENCLOSED: f64 = 0.8;
 
 /// Smaller ones have no shape that a scan could show, and are taken where somebody asks for them.
-const FEWEST_VOXELS: u64 = 64;
+pub const FEWEST_VOXELS: u64 = 64;
 
 /// A body in the making.
 pub struct Chosen {

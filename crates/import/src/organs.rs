@@ -11,7 +11,7 @@ use viscera_volume::{LabelMap, Organ, OrganReport, Wall};
 
 use crate::ImportError;
 use crate::bodies::{Import, Inner, Options, Part, Touching, told_edges, told_loss};
-use crate::choose::{Choice, Chosen, choose};
+use crate::choose::{Choice, Chosen, FEWEST_VOXELS, choose};
 use crate::filling::{Filled, KEPT, Missed, RESOLVED, Wanted, fill_to, first_spacing};
 use crate::hold::{Hold, Place, at_the_back};
 use crate::name::name_of;
@@ -24,8 +24,10 @@ const TIED: f64 = 0.1;
 /// And need no other hold from this share on.
 const HANGS: f64 = 0.3;
 
-/// A lattice finer than the scan shows no more of it: edges are at least this share of a voxel's.
-const OF_A_VOXEL: f64 = 0.5;
+/// A lattice finer than the scan shows no more of it: edges are at least this share of a voxel's,
+const OF_A_VOXEL: f64 = 0.35;
+/// and those of its surface this one.
+const OF_A_VOXEL_SKIN: f64 = 0.5;
 
 /// A body in the making.
 struct Plan {
@@ -82,7 +84,14 @@ pub fn of_labels(
         if parts.iter().any(|other| other.name == part.name) {
             part.name = format!("{}_{}", part.name, plan.label);
         }
-        let more = format!("--labels {} --count {:.0}", plan.label, 8.0 * sizes.most);
+        let more = match plan.report.voxels as u64 >= FEWEST_VOXELS {
+            true => format!(
+                "more tetrahedra keep more of it, such as --labels {} --count {:.0}",
+                plan.label,
+                8.0 * sizes.most
+            ),
+            false => "its few voxels show no more of its shape".to_owned(),
+        };
         // A wall around a cavity has another volume than the organ.
         let is_wall = options.hollow && plan.wall().is_some();
         warnings.extend(told_loss(&part, &more).filter(|_| !is_wall));
@@ -241,8 +250,8 @@ fn skin_of(organ: &Organ, volume: f64, spacing: f64) -> Result<SurfaceMesh, Tetr
     let is_kept = |skin: &SurfaceMesh| (skin.enclosed_volume() / volume - 1.0).abs() <= KEPT;
     match coarse {
         Ok(skin) if is_kept(&skin) => Ok(skin),
-        Ok(skin) => Ok(surface(organ, OF_A_VOXEL * voxel).unwrap_or(skin)),
-        Err(_) => surface(organ, OF_A_VOXEL * voxel),
+        Ok(skin) => Ok(surface(organ, OF_A_VOXEL_SKIN * voxel).unwrap_or(skin)),
+        Err(_) => surface(organ, OF_A_VOXEL_SKIN * voxel),
     }
 }
 
