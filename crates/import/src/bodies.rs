@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use viscera::mesh::io::ReadReport;
+use viscera::mesh::tetrahedralize::TetrahedralizeError;
 use viscera::mesh::topology::{BoundingBox, count_open_edges};
-use viscera::mesh::winding;
+use viscera::mesh::winding::{self, FillError};
 use viscera::mesh::{SurfaceMesh, TetMesh, tet_volume};
 use viscera::scalar::{Vec3, vec3};
 use viscera_volume::VolumeReport;
@@ -16,7 +17,7 @@ use crate::open::{Found, rename};
 use crate::organs::of_labels;
 use crate::size::{Fineness, MOST_OF_SURFACES, finest, spacing_of, tets_of};
 use crate::tissue::Tissue;
-use crate::unit::{Unit, doubt, guess, length_text, millilitres};
+use crate::unit::{Unit, doubt, edge_below, guess, length_text, millilitres};
 use crate::{ImportError, tissue};
 
 /// What is asked for.
@@ -164,7 +165,13 @@ fn fill_surface(
     options: &Options,
     notes: &mut Vec<String>,
 ) -> Result<(Filled, Option<f64>), ImportError> {
-    let fail = |error| ImportError::Fill { file: file.into(), error };
+    let fail = |error| match error {
+        FillError::Fill(TetrahedralizeError::TooCoarse { spacing, suggestion, .. }) => {
+            let (long, short) = (length_text(spacing), edge_below(suggestion));
+            ImportError::Thin { file: file.into(), long, short }
+        }
+        error => ImportError::Fill { file: file.into(), error },
+    };
     let volume = surface.enclosed_volume().abs();
     let size = BoundingBox::around(&surface.vertices).size();
     let whole_box = size.x * size.y * size.z;

@@ -97,7 +97,12 @@ pub fn choose(file: &str, map: &LabelMap, options: &Options) -> Result<Choice, I
 
 /// Labels with their names, as people look for them.
 fn list(all: &[Label]) -> String {
-    let names: Vec<String> = all.iter().map(|l| format!("{} {}", l.label, l.name)).collect();
+    let text = |label: &Label| match label.name.contains(',') {
+        // `--labels` would take it for two: its number does, or its name as a body.
+        true => format!("{} {} (\"{}\")", label.label, name_of(&label.name), label.name),
+        false => format!("{} {}", label.label, label.name),
+    };
+    let names: Vec<String> = all.iter().map(text).collect();
     names.join(", ")
 }
 

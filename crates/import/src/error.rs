@@ -26,6 +26,18 @@ pub enum ImportError {
         /// Why.
         error: FillError,
     },
+    /// A surface is too thin for its edges.
+    #[error(
+        "{file} is too thin for edges of {long}; `viscera scene new {file} --edge \"{short}\"` fills it"
+    )]
+    Thin {
+        /// The file.
+        file: String,
+        /// The edges that were tried.
+        long: String,
+        /// Edges that were seen to find it.
+        short: String,
+    },
     /// A mesh is none in this unit: too small, or too far away.
     #[error("{file}: with 1 in the file as {unit}, {error}; give another --unit")]
     Scale {

@@ -17,6 +17,7 @@ use crate::hold::{Hold, Place, at_the_back};
 use crate::name::name_of;
 use crate::size::{Fineness, MOST_OF_LABELS, finest, spacing_of, tets_of};
 use crate::tissue::{self, Kind};
+use crate::unit::{edge_below, length_text};
 
 /// Organs are tied where this share of the smaller one's surface touches the other.
 const TIED: f64 = 0.1;
@@ -112,13 +113,18 @@ pub fn of_labels(
 
 /// Why an organ is not filled.
 fn reason(plan: &Plan, error: &TetrahedralizeError) -> String {
-    match error.is_missed() {
-        true => {
-            let voxels = plan.report.voxels;
+    let voxels = plan.report.voxels;
+    match error {
+        error if error.is_missed() && (voxels as u64) < FEWEST_VOXELS => {
             let are = if voxels == 1 { "voxel is" } else { "voxels are" };
             format!("{voxels} {are} too little for a shape; a scan with finer voxels may show it")
         }
-        false => error.to_string(),
+        TetrahedralizeError::TooCoarse { spacing, suggestion, .. } => {
+            let (long, short) = (length_text(*spacing), edge_below(*suggestion));
+            let label = plan.label;
+            format!("too thin for edges of {long}; --labels {label} --edge \"{short}\" fills it")
+        }
+        error => error.to_string(),
     }
 }
 

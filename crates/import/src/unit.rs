@@ -166,6 +166,12 @@ pub fn length_text(meters: f64) -> String {
     format!("{text} mm")
 }
 
+/// A length no longer than this one, to two digits, as people write it.
+pub fn edge_below(meters: f64) -> String {
+    let unit = libm::pow(10.0, libm::log10(meters).floor() - 1.0);
+    length_text((meters / unit).floor() * unit)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -175,6 +175,12 @@ fn labels_are_listed_with_names_and_without_voxels() {
     let new = ["scene", "new", "scan.nrrd", "--labels", "leber_links", "--out", "a"];
     let end = bench.end_of(&new);
     assert!(bench.path("a/leber_links.vtu").exists(), "{}", end.stderr);
+    let wrong = bench.end_of(&["scene", "new", "scan.nrrd", "--labels", "Leber, links"]);
+    assert!(
+        wrong.stderr.contains("labels are 5 leber_links (\"Leber, links\")"),
+        "{}",
+        wrong.stderr
+    );
     let wrong = bench.end_of(&["mesh", "labels", "scan.nrrd", "--names", "liver"]);
     assert!(wrong.stderr.contains("1=liver,2=tumor"), "{}", wrong.stderr);
     // Without names, and with numbers of another program.
