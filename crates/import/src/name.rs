@@ -87,6 +87,7 @@ mod tests {
             ("Größe, links", "groesse_links"),
             ("Leber (Segment 4)", "leber_segment_4"),
             ("Cœur", "coeur"),
+            ("Drüse", "druese"),
             ("U\u{308}ber", "uber"),
             ("12", "body_12"),
             ("肝臓", "body"),

@@ -189,11 +189,13 @@ fn labels_are_listed_with_names_and_without_voxels() {
     assert!(list.contains("label_1") && list.contains("--names 1=liver,2=tumor"), "{list}");
     // What is no label map says what is.
     bench.write("scan.mha", b"ObjectType = Image\nNDims = 3\n");
+    bench.write("scan.hdr", &[0; 400]);
     bench.write("scan.dat", b"0 1 2 3\n");
     for command in [
         ["mesh", "labels", "scan.mha"],
         ["scene", "new", "scan.mha"],
         ["mesh", "labels", "scan.dat"],
+        ["scene", "new", "scan.hdr"],
     ] {
         let end = bench.end_of(&command);
         assert_eq!(end.code, Some(1), "{}", end.stdout);
