@@ -5,10 +5,11 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use viscera::mesh::quality::summarize_quality;
 use viscera::units::Dimension;
-use viscera_import::{Fineness, Import, Options, open, parts};
+use viscera_import::{Fineness, Import, Options, millilitres, name_of, open, parts, stem_of};
 use viscera_report::Table;
 use viscera_resources::files;
 
+use crate::made::{Replace, write};
 use crate::progress;
 
 /// How a file becomes bodies.
@@ -26,9 +27,75 @@ pub struct ImportArguments {
     /// Labels of a scan, by name or number: liver,stomach,5; all soft organs where there are none
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     labels: Vec<String>,
+    /// Names of labels by number, in place of those in the file: 1=liver,2=tumor
+    #[arg(long, value_name = "NUMBER=NAME", value_delimiter = ',', value_parser = label_name)]
+    names: Vec<(u16, String)>,
     /// Leave hollow organs a wall around a cavity, in place of filling them
     #[arg(long)]
     hollow: bool,
+}
+
+/// Options of `viscera scene new` that people try elsewhere: they are told where these work.
+#[derive(Args, Clone, Debug, Default)]
+pub struct OfSceneNew {
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "")]
+    edge: Option<String>,
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "")]
+    count: Option<String>,
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "")]
+    unit: Option<String>,
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "")]
+    labels: Option<String>,
+    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "")]
+    names: Option<String>,
+    #[arg(long, hide = true)]
+    hollow: bool,
+}
+
+impl OfSceneNew {
+    /// Refuses them, with the commands that do what was meant.
+    pub fn refuse(&self, file: &Path) -> Result<()> {
+        let hollow = self.hollow.then(String::new);
+        let all = [
+            ("edge", &self.edge),
+            ("count", &self.count),
+            ("unit", &self.unit),
+            ("labels", &self.labels),
+            ("names", &self.names),
+            ("hollow", &hollow),
+        ];
+        let given: Vec<(&str, &String)> =
+            all.iter().filter_map(|(name, value)| Some((*name, value.as_ref()?))).collect();
+        let Some((first, _)) = given.first() else { return Ok(()) };
+        if !is_foreign(file) {
+            bail!(
+                "--{first} says how a scene is made of a mesh or a scan (viscera scene new FILE --{first} ...), and {} is no such file",
+                file.display()
+            );
+        }
+        let options = given.iter().map(|(name, value)| match value.as_str() {
+            "" => format!(" --{name}"),
+            value if value.contains(' ') => format!(" --{name} \"{value}\""),
+            value => format!(" --{name} {value}"),
+        });
+        let options: String = options.collect();
+        let name = name_of(stem_of(&file.to_string_lossy()));
+        let scene = folder_of(file).join("scene").join(name + ".toml");
+        bail!(
+            "--{first} says how a scene is made; make it by `viscera scene new {}{options}`, then `viscera run {}`",
+            file.display(),
+            scene.display()
+        )
+    }
+}
+
+/// "5=liver".
+pub fn label_name(text: &str) -> Result<(u16, String), String> {
+    let pair = text.split_once('=').map(|(label, name)| (label.trim().parse(), name.trim()));
+    match pair {
+        Some((Ok(label), name)) if label > 0 && !name.is_empty() => Ok((label, name.to_owned())),
+        _ => Err("write numbers of labels with their names, such as 1=liver,2=tumor".to_owned()),
+    }
 }
 
 impl ImportArguments {
@@ -41,20 +108,25 @@ impl ImportArguments {
                 Err(error) => bail!("{flag}: {error}"),
             },
         };
-        let defaults = Options::default();
-        let fineness = match (length(&self.edge, "--edge")?, self.count) {
-            (Some(edge), _) => Fineness::Edge(edge),
-            (None, Some(count)) => Fineness::Count(count),
-            _ => defaults.fineness,
-        };
+        let edge = length(&self.edge, "--edge")?.map(Fineness::Edge);
+        let fineness = edge.or(self.count.map(Fineness::Count));
         let unit = length(&self.unit, "--unit")?;
-        Ok(Options { fineness, unit, labels: self.labels.clone(), hollow: self.hollow })
+        let (labels, names, hollow) = (self.labels.clone(), self.names.clone(), self.hollow);
+        Ok(Options { fineness, unit, labels, names, hollow, shapes_only: false })
     }
 }
 
 /// Makes bodies of a file, with a bar that says which.
 pub fn import(file: &Path, arguments: &ImportArguments) -> Result<Import> {
-    let options = arguments.options()?;
+    import_with(file, arguments.options()?)
+}
+
+/// As [`import`], for shapes only.
+pub fn import_shapes(file: &Path, arguments: &ImportArguments) -> Result<Import> {
+    import_with(file, Options { shapes_only: true, ..arguments.options()? })
+}
+
+fn import_with(file: &Path, options: Options) -> Result<Import> {
     let name = file.display().to_string();
     let bar = progress::spinner(format!("reading {name}"));
     let load = |name: &str| files::read(Path::new(name)).map_err(|error| error.to_string());
@@ -66,33 +138,18 @@ pub fn import(file: &Path, arguments: &ImportArguments) -> Result<Import> {
     Ok(made?)
 }
 
-/// Writes a scene and its meshes into a folder; returns the scene file. A scene that is there and says something else, as one
-/// that a person has changed, is replaced only where `is_forced`.
-pub fn write(import: &Import, title: &str, folder: &Path, is_forced: bool) -> Result<PathBuf> {
-    files::prepare_folder(folder, "--out")?;
-    let scene = folder.join("scene.toml");
-    let written = import.scene(title).files;
-    let is_other = written.iter().any(|(name, bytes)| {
-        folder.join(name) == scene && std::fs::read(&scene).is_ok_and(|known| known != *bytes)
-    });
-    if is_other && !is_forced {
-        bail!(
-            "{0}: there is another scene, perhaps changed by hand; run that one (viscera run {0}), name another folder with --out, \
-             or remove it",
-            scene.display()
-        );
-    }
-    // The scene comes last: where it is, its meshes are.
-    for (name, bytes) in written.iter().rev() {
-        files::write_atomic(&folder.join(name), bytes)?;
-    }
-    Ok(scene)
-}
-
 /// What was made: bodies with their sizes and shapes, and what was assumed.
 pub fn describe(import: &Import) -> String {
-    let mut table =
-        Table::new(["body", "tets", "ml", "angles, degrees", "below 10", "tissue", "held at"]);
+    let mut table = Table::new([
+        "body",
+        "tets",
+        "ml in scan",
+        "ml in mesh",
+        "angles, degrees",
+        "below 10",
+        "tissue",
+        "held at",
+    ]);
     for part in &import.parts {
         let quality = summarize_quality(&part.mesh);
         let (low, high) = (quality.min_dihedral.to_degrees(), quality.max_dihedral.to_degrees());
@@ -101,7 +158,8 @@ pub fn describe(import: &Import) -> String {
         table.row([
             part.name.clone(),
             part.mesh.tets().len().to_string(),
-            format!("{:.0}", 1e6 * part.mesh.volume()),
+            part.wanted.map_or_else(|| "-".to_owned(), millilitres),
+            millilitres(part.mesh.volume()),
             format!("{low:.1} to {high:.1}"),
             format!("{:.3} %", 100.0 * share_below(&part.mesh, 10.0)),
             part.tissue.preset.unwrap_or("unknown").to_owned(),
@@ -115,6 +173,9 @@ pub fn describe(import: &Import) -> String {
             "tied: {from} to {to}, {:.0} % of its surface\n",
             100.0 * touching.share
         ));
+    }
+    for warning in &import.warnings {
+        text.push_str(&format!("warning: {warning}\n"));
     }
     for note in &import.notes {
         text.push_str(&format!("note: {}\n", note.trim()));
@@ -143,9 +204,10 @@ pub fn is_foreign(path: &Path) -> bool {
 
 /// Not text that could be a scene without an ending of its own.
 fn looks_like_data(path: &Path) -> bool {
-    const ENDINGS: [&str; 14] = [
+    // Also of images that are not read: the error says what is.
+    const ENDINGS: [&str; 21] = [
         "msh", "vtk", "vtu", "vtp", "ele", "node", "mesh", "inp", "obj", "stl", "ply", "nii", "gz",
-        "nrrd",
+        "nrrd", "nhdr", "mha", "mhd", "mgz", "mgh", "dcm", "hdr",
     ];
     path.extension().is_some_and(|e| ENDINGS.iter().any(|known| e.eq_ignore_ascii_case(known)))
 }
@@ -153,14 +215,17 @@ fn looks_like_data(path: &Path) -> bool {
 /// The scene of a file from elsewhere, made in a folder beside the results.
 pub fn scene_of(path: &Path, folder: &Path) -> Result<PathBuf> {
     let import = import(path, &ImportArguments::default())?;
-    let scene = write(&import, &title_of(path), &folder.join("scene"), false)?;
-    files::print(&describe(&import))?;
-    files::print(&format!("scene: {}\n", scene.display()))?;
-    Ok(scene)
+    let made = write(&import, &title_of(path), &folder.join("scene"), Replace::Never)?;
+    files::print(&format!("{}{}", describe(&import), made.text()))?;
+    Ok(made.scene)
 }
 
-/// "liver" of `data/liver.nii.gz`.
+/// What a scene of a file is called: "left kidney" of `data/left_kidney.nii.gz`.
 pub fn title_of(path: &Path) -> String {
-    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-    name.split('.').next().unwrap_or_default().replace('_', " ")
+    stem_of(&path.to_string_lossy()).replace('_', " ")
+}
+
+/// The folder for all that is made of a file: `out/left_kidney` of `data/Left_kidney.nii.gz`.
+pub fn folder_of(path: &Path) -> PathBuf {
+    Path::new("out").join(name_of(stem_of(&path.to_string_lossy())))
 }

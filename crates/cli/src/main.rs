@@ -9,6 +9,8 @@ mod haptics;
 mod hold;
 mod import;
 mod in_order;
+mod labels;
+mod made;
 mod mesh;
 mod output;
 mod progress;

@@ -14,11 +14,10 @@ use viscera::scalar::{Vec3, vec3};
 use viscera::scene::RegionLabel;
 use viscera::units::Dimension;
 use viscera_import::{Found, Unit, guess_unit, is_image, open};
-use viscera_report::Table;
 use viscera_resources::files;
-use viscera_volume::summarize;
 
-use crate::import::{self, ImportArguments};
+use crate::import::{self, ImportArguments, label_name};
+use crate::labels;
 
 /// Look at mesh files and segmented scans, fill surfaces, convert formats
 #[derive(Subcommand)]
@@ -41,6 +40,9 @@ pub enum MeshCommand {
     Labels {
         /// The label map
         file: PathBuf,
+        /// Names of labels by number, in place of those in the file: 1=liver,2=tumor
+        #[arg(long, value_name = "NUMBER=NAME", value_delimiter = ',', value_parser = label_name)]
+        names: Vec<(u16, String)>,
     },
     /// Fill a surface, or labels of a scan, with tetrahedra
     ///
@@ -93,7 +95,7 @@ pub fn execute(command: &MeshCommand) -> Result<()> {
             let unit = unit.as_deref().map(length).transpose()?;
             inspect_file(file, unit, *json)
         }
-        MeshCommand::Labels { file } => list_labels(file),
+        MeshCommand::Labels { file, names } => labels::list(file, names),
         MeshCommand::Tetrahedralize { file, out, import } => tetrahedralize(file, out, import),
         MeshCommand::Convert(arguments) => convert(arguments),
     }
@@ -161,43 +163,6 @@ fn load(name: &str) -> Result<Vec<u8>, String> {
     files::read(Path::new(name)).map_err(|error| error.to_string())
 }
 
-fn list_labels(file: &Path) -> Result<()> {
-    let name = file.display().to_string();
-    let Found::Labels(map, report) = open(&name, load)? else {
-        bail!("{name} is a mesh; look at it by `viscera mesh inspect`");
-    };
-    let mut table = Table::new([
-        "label",
-        "name",
-        "voxels",
-        "ml",
-        "pieces",
-        "from, mm",
-        "to, mm",
-        "cut by the image",
-    ]);
-    for label in summarize(&map) {
-        let place = |x: Vec3<f64>| format!("{:.0} {:.0} {:.0}", x.x, x.y, x.z);
-        let [low, high] = label.world_bounds;
-        let cuts: Vec<String> = label
-            .touches_border
-            .iter()
-            .map(|face| format!("{} ({})", face.side, face.voxels))
-            .collect();
-        table.row([
-            label.label.to_string(),
-            label.name.unwrap_or_default(),
-            label.voxels.to_string(),
-            format!("{:.1}", label.milliliters),
-            label.components.to_string(),
-            place(low),
-            place(high),
-            cuts.join(", "),
-        ]);
-    }
-    files::print(&format!("{name}: {report}\n{}", table.to_text()))
-}
-
 fn tetrahedralize(file: &Path, out: &Path, arguments: &ImportArguments) -> Result<()> {
     let ending = ending_of(out)?;
     ensure!(
@@ -207,7 +172,8 @@ fn tetrahedralize(file: &Path, out: &Path, arguments: &ImportArguments) -> Resul
     );
     check_other(file, out)?;
     files::prepare_file(out, "--out")?;
-    let import = import::import(file, arguments)?;
+    let import = import::import_shapes(file, arguments)?;
+    let mut written = String::new();
     for part in &import.parts {
         let target = if import.parts.len() == 1 {
             out.to_owned()
@@ -216,8 +182,9 @@ fn tetrahedralize(file: &Path, out: &Path, arguments: &ImportArguments) -> Resul
             out.with_file_name(format!("{stem}_{}.{ending}", part.name))
         };
         files::write_atomic(&target, &write_tets(&part.mesh, &part.names, &ending)?)?;
+        written.push_str(&format!("wrote {}\n", target.display()));
     }
-    files::print(&import::describe(&import))
+    files::print(&format!("{}{written}", import::describe(&import)))
 }
 
 fn convert(arguments: &ConvertArguments) -> Result<()> {

@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use std::borrow::Cow;
 use std::fs;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use viscera_resources::files::{write_atomic, write_parts_atomic};
 
@@ -55,17 +55,22 @@ impl OutputFolder {
         }
     }
 
-    /// Removes what an earlier run left in a sub-folder: files of these kinds, nothing else.
-    pub fn clear(&self, folder: &str, prefixes: &[&str], extension: &str) -> Result<()> {
-        let Ok(entries) = fs::read_dir(self.path.join(folder)) else { return Ok(()) };
-        for entry in entries.flatten() {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let is_ours = prefixes.iter().any(|prefix| name.starts_with(prefix));
-            // A run that was killed leaves the file it was writing.
-            if is_ours && name.trim_end_matches(".part").ends_with(extension) {
-                self.remove(&format!("{folder}/{name}"))?;
-            }
+    /// Names of files in a sub-folder; none where there is no such folder.
+    pub fn names(&self, folder: &str) -> Vec<String> {
+        let Ok(entries) = fs::read_dir(self.path.join(folder)) else { return Vec::new() };
+        let name = |entry: fs::DirEntry| entry.file_name().to_string_lossy().into_owned();
+        let mut names: Vec<String> = entries.flatten().map(name).collect();
+        names.sort();
+        names
+    }
+
+    /// The first bytes of a file, as many as there are up to a number; none where it cannot be read.
+    pub fn start_of(&self, name: &str, most: u64) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        if let Ok(file) = fs::File::open(self.path.join(name)) {
+            // What cannot be read is not known as a result, and stays.
+            let _ = file.take(most).read_to_end(&mut bytes);
         }
-        Ok(())
+        bytes
     }
 }

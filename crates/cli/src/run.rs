@@ -66,6 +66,8 @@ pub struct RunArguments {
     /// Record the run, to have it once more with `viscera replay`
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    #[command(flatten)]
+    of_import: import::OfSceneNew,
 }
 
 /// Counts from one on; the error says that, not the largest number there is.
@@ -86,8 +88,8 @@ pub enum Outcome {
 
 /// Carries out `viscera run`.
 pub fn run(arguments: &RunArguments) -> Result<Outcome> {
-    let stem = arguments.scene.file_stem().unwrap_or(arguments.scene.as_os_str()).to_owned();
-    let folder = arguments.out.clone().unwrap_or_else(|| PathBuf::from("out").join(&stem));
+    arguments.of_import.refuse(&arguments.scene)?;
+    let folder = arguments.out.clone().unwrap_or_else(|| folder_of(&arguments.scene));
     let made;
     let mut arguments = arguments;
     if import::is_foreign(&arguments.scene) {
@@ -123,6 +125,14 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
         Precision::F64 => {
             start(build::<f64>(scene, assembly, arguments, frames)?, plan, loaded, arguments)
         }
+    }
+}
+
+/// The folder for the results of a scene or a file from elsewhere.
+fn folder_of(scene: &Path) -> PathBuf {
+    match import::is_foreign(scene) {
+        true => import::folder_of(scene),
+        false => Path::new("out").join(scene.file_stem().unwrap_or(scene.as_os_str())),
     }
 }
 

@@ -1,6 +1,7 @@
 //! `viscera scene`.
 
 use crate::import::{self, ImportArguments};
+use crate::made::{Replace, write};
 use anyhow::Result;
 use clap::Subcommand;
 use std::path::{Path, PathBuf};
@@ -30,7 +31,7 @@ pub enum SceneCommand {
         /// The folder for the scene; `out/NAME/scene` where there is none
         #[arg(long, short)]
         out: Option<PathBuf>,
-        /// Replace a scene that is there and says something else
+        /// Replace a scene that is there, also one that was changed by hand or made of another file
         #[arg(long)]
         force: bool,
         #[command(flatten)]
@@ -61,14 +62,16 @@ fn new(
     let title = import::title_of(file);
     let folder = match out {
         Some(folder) => folder.to_owned(),
-        None => Path::new("out").join(title.replace(' ', "_")).join("scene"),
+        None => import::folder_of(file).join("scene"),
     };
     let made = import::import(file, arguments)?;
-    let scene = import::write(&made, &title, &folder, is_forced)?;
-    let shown = scene.display();
+    let replace = if is_forced { Replace::Always } else { Replace::Unchanged };
+    let written = write(&made, &title, &folder, replace)?;
+    let shown = written.scene.display();
     Ok(format!(
-        "{}scene: {shown}\nnext:  viscera run {shown}   or   viscera view {shown}\n",
-        import::describe(&made)
+        "{}{}next:  viscera run {shown}   or   viscera view {shown}\n",
+        import::describe(&made),
+        written.text()
     ))
 }
 

@@ -2,7 +2,7 @@
 //! measures, packs and writes frames while the next ones are simulated.
 
 use crate::output::OutputFolder;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
@@ -166,9 +166,36 @@ impl<S: Real> Written<S> {
     }
 }
 
-/// Removes an earlier run's results, so that no file of it is taken for one of this run. The lists
+/// What the name of a frame says.
+fn is_frame(name: &str) -> bool {
+    let number = ["tets_", "surface_"].iter().find_map(|prefix| name.strip_prefix(prefix));
+    let number = number.and_then(|rest| rest.strip_suffix(".vtu"));
+    number.is_some_and(|n| n.len() >= 6 && n.bytes().all(|digit| digit.is_ascii_digit()))
+}
+
+/// Frames in the folder that a run wrote, and others of such names. A run that was killed leaves the file that it was writing.
+fn frames_there(out: &OutputFolder) -> (Vec<String>, Vec<String>) {
+    // Of every frame, and near its start.
+    const MARK: &[u8] = b"Name=\"displacement [m]\"";
+    let mut names = out.names(FOLDER);
+    names.retain(|name| is_frame(name.trim_end_matches(".part")));
+    names.into_iter().map(|name| format!("{FOLDER}/{name}")).partition(|name| {
+        let start = out.start_of(name, 4096);
+        let is_begun = name.ends_with(".part") && start.is_empty();
+        is_begun || start.windows(MARK.len()).any(|window| window == MARK)
+    })
+}
+
+/// Removes an earlier run's results, so that no file of it is taken for one of this run, and nothing else. The lists
 /// go first: they never name a frame that is gone.
 fn clear(out: &OutputFolder) -> Result<()> {
+    let (frames, others) = frames_there(out);
+    if let Some(other) = others.first() {
+        bail!(
+            "{}: no run of viscera wrote this file, and this one might write over it; choose another folder with --out",
+            out.path().join(other).display()
+        );
+    }
     for name in [
         "tissue.pvd",
         "surface.pvd",
@@ -180,5 +207,5 @@ fn clear(out: &OutputFolder) -> Result<()> {
     ] {
         out.remove(name)?;
     }
-    out.clear(FOLDER, &["tets_", "surface_"], ".vtu")
+    frames.iter().try_for_each(|name| out.remove(name))
 }

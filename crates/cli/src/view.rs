@@ -24,8 +24,7 @@ pub fn execute(arguments: &ViewArguments) -> Result<ExitCode> {
     for argument in &mut passed {
         let path = Path::new(argument);
         if import::is_foreign(path) {
-            let folder = Path::new("out").join(import::title_of(path).replace(' ', "_"));
-            *argument = import::scene_of(path, &folder)?.into_os_string();
+            *argument = import::scene_of(path, &import::folder_of(path))?.into_os_string();
         }
     }
     let started = program.and_then(|program| Command::new(program).args(&passed).status());

@@ -10,7 +10,7 @@ impl Import {
     /// it would need. Calls `observe` with what is being done.
     pub(crate) fn balance(&mut self, observe: &mut dyn FnMut(&str)) {
         for _ in 0..self.parts.len() {
-            observe("its shape without gravity");
+            observe("the shape without gravity");
             let written = self.scene("scene");
             let file = |name: &str| {
                 let known = written.files.iter().find(|(known, _)| known == name);

@@ -3,37 +3,38 @@
 use std::collections::BTreeMap;
 
 use viscera::mesh::io::{MeshNames, ReadReport};
-use viscera::mesh::winding::fill;
+use viscera::mesh::tetrahedralize::TetrahedralizeError;
+use viscera::mesh::topology::{BoundingBox, count_open_edges};
+use viscera::mesh::winding::{self, FillError};
 use viscera::mesh::{SurfaceMesh, TetMesh, tet_volume};
 use viscera::scalar::{Vec3, vec3};
 use viscera_volume::VolumeReport;
 
+use crate::filling::{Filled, KEPT, Wanted, fill_to, first_spacing};
 use crate::hold::{Hold, at_the_back};
-use crate::open::Found;
+use crate::name::{name_of, stem_of};
+use crate::open::{Found, rename};
 use crate::organs::of_labels;
-use crate::size::Fineness;
+use crate::size::{Fineness, MOST_OF_SURFACES, finest, spacing_of, tets_of};
 use crate::tissue::Tissue;
-use crate::unit::{Unit, guess, length_text};
+use crate::unit::{Unit, doubt, edge_below, guess, length_text, millilitres};
 use crate::{ImportError, tissue};
 
 /// What is asked for.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// How fine bodies are filled.
-    pub fineness: Fineness,
+    /// How fine bodies are filled; as many tetrahedra as run in real time where nobody says.
+    pub fineness: Option<Fineness>,
     /// The length of 1 in a mesh [m]; guessed where nobody says.
     pub unit: Option<f64>,
     /// Labels by name or number; all soft organs where there are none.
     pub labels: Vec<String>,
+    /// Names of labels by number, in place of those in the file.
+    pub names: Vec<(u16, String)>,
     /// Whether hollow organs are a wall around a cavity, in place of filled.
     pub hollow: bool,
-}
-
-impl Default for Options {
-    /// As many tetrahedra as run in real time.
-    fn default() -> Self {
-        Self { fineness: Fineness::Count(20_000), unit: None, labels: Vec::new(), hollow: false }
-    }
+    /// Whether bodies are wanted for their shapes, also of bones, and not for a scene.
+    pub shapes_only: bool,
 }
 
 /// A surface that is finer than the tetrahedra, and moves with them.
@@ -57,6 +58,8 @@ pub struct Part {
     pub name: String,
     /// Its tetrahedra [m].
     pub mesh: TetMesh,
+    /// The volume that it has in the file [m^3], where that is known without tetrahedra.
+    pub wanted: Option<f64>,
     /// Its fine surface [m], if it has one.
     pub skin: Option<Skin>,
     /// What it is made of.
@@ -67,6 +70,8 @@ pub struct Part {
     pub names: MeshNames,
     /// Where it is held.
     pub holds: Vec<Hold>,
+    /// Whether it rests under gravity as it is; else it begins without load.
+    pub is_balanced: bool,
     /// What people should know of it.
     pub notes: Vec<String>,
 }
@@ -94,6 +99,8 @@ pub struct Import {
     pub touching: Vec<Touching>,
     /// Downwards, of length 1.
     pub down: Vec3<f64>,
+    /// What is probably not as it was meant, a line each.
+    pub warnings: Vec<String>,
     /// What was found and what was assumed, a line each.
     pub notes: Vec<String>,
 }
@@ -105,34 +112,48 @@ pub fn parts(
     options: &Options,
     observe: &mut dyn FnMut(&str),
 ) -> Result<Import, ImportError> {
-    let stem = file.rsplit(['/', '\\']).next().unwrap_or(file);
-    let name = name_of(stem.split('.').next().unwrap_or(stem));
+    let mut import = bodies(file, found, options, observe)?;
+    if !options.shapes_only {
+        import.balance(observe);
+    }
+    Ok(import)
+}
+
+fn bodies(
+    file: &str,
+    found: Found,
+    options: &Options,
+    observe: &mut dyn FnMut(&str),
+) -> Result<Import, ImportError> {
+    let stem = stem_of(file);
+    let name = name_of(stem);
+    refuse_unused(file, &found, options)?;
     match found {
-        Found::Labels(map, report) => of_scan(file, &map, &report, options, observe),
+        Found::Labels(mut map, mut report) => {
+            rename(file, &mut map, &mut report, &options.names)?;
+            of_scan(file, &map, &report, options, observe)
+        }
         Found::Tets(mesh, report) => {
             observe(&name);
-            let unit =
-                options.unit.map_or_else(|| guess(stem, mesh.vertices(), mesh.volume()), given);
+            let (unit, doubt) = unit_of(stem, mesh.vertices(), mesh.volume(), options);
             let mut notes = vec![unit.reason.clone()];
             notes.extend(notes_of(&report, unit.meters));
             let mesh = scaled(file, &mesh, unit.meters)?;
             let inner = inner_of(&mesh, &report, &mut notes);
+            let warnings = doubt.into_iter().collect();
             let mut import = alone(file, name, mesh, None, inner);
             import.parts.iter_mut().for_each(|part| part.names = report.names());
-            Ok(Import { notes, ..import })
+            Ok(Import { notes, warnings, ..import })
         }
         Found::Surface(surface, report) => {
             observe(&name);
             let volume = surface.enclosed_volume().abs();
-            let unit = options.unit.map_or_else(|| guess(stem, &surface.vertices, volume), given);
+            let (unit, doubt) = unit_of(stem, &surface.vertices, volume, options);
             let mut notes = vec![unit.reason.clone()];
             notes.extend(notes_of(&report, unit.meters));
             let mut surface = surface;
             surface.vertices.iter_mut().for_each(|x| *x = *x * unit.meters);
-            let volume = volume * unit.meters * unit.meters * unit.meters;
-            let spacing = options.fineness.spacing(volume);
-            let filled = fill(&surface, spacing)
-                .map_err(|error| ImportError::Fill { file: file.into(), error })?;
+            let (filled, wanted) = fill_surface(file, &surface, options, &mut notes)?;
             if filled.invented > 0.001 {
                 let percent = 100.0 * filled.invented;
                 notes.push(format!(
@@ -143,13 +164,139 @@ pub fn parts(
                 let count = filled.report.components;
                 notes.push(format!("{count} unconnected parts, each with a hold"));
             }
-            Ok(Import { notes, ..alone(file, name, filled.mesh, Some(surface), Vec::new()) })
+            let mut import = alone(file, name, filled.mesh, Some(surface), Vec::new());
+            import.parts[0].wanted = wanted;
+            import.warnings.extend(doubt);
+            let more = format!(
+                "more tetrahedra keep more of it, such as --count {}; or parts of its surface overlap",
+                8 * import.parts[0].mesh.tets().len()
+            );
+            import.warnings.extend(told_loss(&import.parts[0], &more));
+            Ok(Import { notes, ..import })
         }
     }
 }
 
-fn given(meters: f64) -> Unit {
-    Unit { meters, reason: String::from("unit as given") }
+/// Fills a surface with edges that are short enough for its volume, where it encloses one: it is returned then.
+fn fill_surface(
+    file: &str,
+    surface: &SurfaceMesh,
+    options: &Options,
+    notes: &mut Vec<String>,
+) -> Result<(Filled, Option<f64>), ImportError> {
+    let fail = |error| match error {
+        FillError::Fill(TetrahedralizeError::TooCoarse { spacing, suggestion, .. }) => {
+            let (long, short) = (length_text(spacing), edge_below(suggestion));
+            ImportError::Thin { file: file.into(), long, short }
+        }
+        error => ImportError::Fill { file: file.into(), error },
+    };
+    let volume = surface.enclosed_volume().abs();
+    let size = BoundingBox::around(&surface.vertices).size();
+    let whole_box = size.x * size.y * size.z;
+    let fineness = options.fineness.unwrap_or_default();
+    // What encloses nothing yet may do so once its holes are closed.
+    let is_closed = count_open_edges(surface) == 0 && volume > 0.0;
+    let likely = if is_closed { volume } else { volume.max(0.1 * whole_box) };
+    let asked = fineness.affordable(file, likely, whole_box, MOST_OF_SURFACES)?;
+    let fill_with = |spacing| {
+        let winding::Filled { mesh, report, invented } = winding::fill(surface, spacing)?;
+        Ok(Filled { mesh, report, invented, spacing })
+    };
+    if !is_closed {
+        return Ok((fill_with(asked).map_err(fail)?, None));
+    }
+    let least = Fineness::default().spacing(volume);
+    let finest = spacing_of(volume, tets_of(volume, asked.min(least))).max(finest(
+        volume,
+        whole_box,
+        MOST_OF_SURFACES,
+    ));
+    let first = first_spacing(volume, surface, asked, finest);
+    // Parts of a surface may overlap, and lie in each other: how many bodies they are is not known.
+    let wanted = Wanted { volume, parts: usize::MAX };
+    let filled = fill_to(wanted, first, finest, fill_with).map_err(fail)?;
+    notes.extend(told_edges(filled.spacing, asked));
+    Ok((filled, Some(volume)))
+}
+
+/// That a body has shorter edges [m] than it was to have.
+pub fn told_edges(edge: f64, asked: f64) -> Option<String> {
+    let (short, long) = (1e3 * edge, 1e3 * asked);
+    (edge < 0.99 * asked).then(|| {
+        format!("edges of {short:.1} mm in place of {long:.1} mm, so that it keeps its volume")
+    })
+}
+
+/// What of a body's volume its tetrahedra lack, with what to do.
+pub fn told_loss(part: &Part, advice: &str) -> Option<String> {
+    let (wanted, has) = (part.wanted?, part.mesh.volume());
+    let off = has / wanted - 1.0;
+    (off.abs() > KEPT).then(|| {
+        let less = if off < 0.0 { "less" } else { "more" };
+        let percent = 100.0 * off.abs();
+        format!(
+            "`{}` has {} ml of the {} ml in the file, {percent:.0} % {less}: it is too thin for its edges; {advice}",
+            part.name,
+            millilitres(has),
+            millilitres(wanted)
+        )
+    })
+}
+
+/// The unit that was given, with a doubt where it makes no organ of the file; or a guess.
+fn unit_of(
+    name: &str,
+    vertices: &[Vec3<f64>],
+    volume: f64,
+    options: &Options,
+) -> (Unit, Option<String>) {
+    match options.unit {
+        None => (guess(name, vertices, volume), None),
+        Some(meters) => {
+            let unit = Unit { meters, reason: String::from("unit as given") };
+            (unit, doubt(name, vertices, volume, meters))
+        }
+    }
+}
+
+/// Refuses options that a file has no use for, rather than to let somebody believe in them.
+fn refuse_unused(file: &str, found: &Found, options: &Options) -> Result<(), ImportError> {
+    let refuse = |is, option, why: String| {
+        Err(ImportError::Option { file: file.to_owned(), is, option, why })
+    };
+    let of_scans = [
+        ("--labels", !options.labels.is_empty()),
+        ("--names", !options.names.is_empty()),
+        ("--hollow", options.hollow),
+    ];
+    let of_scans = of_scans.iter().find(|(_, is_given)| *is_given).map(|(option, _)| *option);
+    match (found, of_scans) {
+        (Found::Labels(..), _) if options.unit.is_some() => refuse(
+            "is a scan",
+            "--unit",
+            "is for meshes: a scan has the size of its voxels in its header; correct that, for example in 3D Slicer".into(),
+        ),
+        (Found::Tets(..), Some("--labels")) => refuse(
+            "is a mesh of tetrahedra",
+            "--labels",
+            format!(
+                "chooses labels of scans; regions of a mesh are chosen by `viscera mesh convert {file} part.vtu --region NUMBER`"
+            ),
+        ),
+        (Found::Tets(..), None) if options.fineness.is_some() => refuse(
+            "is a mesh of tetrahedra",
+            if matches!(options.fineness, Some(Fineness::Edge(_))) { "--edge" } else { "--count" },
+            format!(
+                "says how surfaces and scans are filled; to fill its surface anew, write that by `viscera mesh convert {file} \
+                 surface.stl` and take surface.stl"
+            ),
+        ),
+        (Found::Tets(..) | Found::Surface(..), Some(option)) => {
+            refuse("is a mesh", option, "is for the labels of scans; leave it out".into())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// A scene of one body that is held at its lowest part.
@@ -158,9 +305,12 @@ fn alone(file: &str, name: String, mesh: TetMesh, skin: Option<Skin>, inner: Vec
     let holds = at_the_back(&name, &mesh, down, "lowest");
     let tissue = tissue::of_name(&name);
     let names = MeshNames::default();
-    let part = Part { name, mesh, skin, tissue, inner, names, holds, notes: Vec::new() };
-    let (file, notes) = (file.to_owned(), Vec::new());
-    Import { file, parts: vec![part], touching: Vec::new(), down, notes }
+    let (wanted, notes) = (None, Vec::new());
+    let part =
+        Part { name, mesh, wanted, skin, tissue, inner, names, holds, is_balanced: true, notes };
+    let (file, parts) = (file.to_owned(), vec![part]);
+    let (touching, warnings, notes) = (Vec::new(), Vec::new(), Vec::new());
+    Import { file, parts, touching, down, warnings, notes }
 }
 
 fn of_scan(
@@ -229,21 +379,4 @@ fn notes_of(report: &ReadReport, unit: f64) -> Vec<String> {
     notes.extend(report.unused_text());
     notes.extend(report.skipped_texts());
     notes
-}
-
-/// A name that scenes take: letters, digits, `-` and `_`, not digits alone.
-pub fn name_of(text: &str) -> String {
-    let mut name = String::new();
-    for c in text.trim().chars() {
-        let c = c.to_ascii_lowercase();
-        let kept = if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
-        if !(kept == '_' && name.ends_with('_')) {
-            name.push(kept);
-        }
-    }
-    let name = name.trim_matches('_').to_owned();
-    match name.is_empty() || name.chars().all(|c| c.is_ascii_digit()) {
-        true => format!("body_{name}").trim_end_matches('_').to_owned(),
-        false => name,
-    }
 }

@@ -2,7 +2,6 @@
 
 use viscera::mesh::MeshError;
 use viscera::mesh::io::ReadError;
-use viscera::mesh::tetrahedralize::TetrahedralizeError;
 use viscera::mesh::winding::FillError;
 use viscera_volume::{OrganError, VolumeError};
 
@@ -27,6 +26,18 @@ pub enum ImportError {
         /// Why.
         error: FillError,
     },
+    /// A surface is too thin for its edges.
+    #[error(
+        "{file} is too thin for edges of {long}; `viscera scene new {file} --edge \"{short}\"` fills it"
+    )]
+    Thin {
+        /// The file.
+        file: String,
+        /// The edges that were tried.
+        long: String,
+        /// Edges that were seen to find it.
+        short: String,
+    },
     /// A mesh is none in this unit: too small, or too far away.
     #[error("{file}: with 1 in the file as {unit}, {error}; give another --unit")]
     Scale {
@@ -46,14 +57,52 @@ pub enum ImportError {
         error: OrganError,
     },
     /// An organ cannot be filled.
-    #[error("{file}: `{organ}`: {error}")]
+    #[error("{file}: `{organ}`: {reason}")]
     Organs {
         /// The file.
         file: String,
         /// The organ.
         organ: String,
         /// Why.
-        error: TetrahedralizeError,
+        reason: String,
+    },
+    /// Bone or air is asked for as soft tissue.
+    #[error("{file}: `{name}` {what}; {advice}")]
+    NoSoftTissue {
+        /// The file.
+        file: String,
+        /// The label's name.
+        name: String,
+        /// What it is.
+        what: &'static str,
+        /// What to do.
+        advice: String,
+    },
+    /// An option that this kind of file does not have.
+    #[error("{file} {is}: {option} {why}")]
+    Option {
+        /// The file.
+        file: String,
+        /// What the file is.
+        is: &'static str,
+        /// The option.
+        option: &'static str,
+        /// Why not, and what to do.
+        why: String,
+    },
+    /// It would take too long, and need too much memory.
+    #[error(
+        "{file}: {asked} would be {tets:.1e} tetrahedra, more than are made and simulated at all; take {nearest}"
+    )]
+    TooFine {
+        /// The file.
+        file: String,
+        /// The option with its value.
+        asked: String,
+        /// About how many it would be.
+        tets: f64,
+        /// The option with the nearest value that works.
+        nearest: String,
     },
     /// A name that is no label.
     #[error("{file}: there is no label `{wanted}`; {hint}")]

@@ -1,12 +1,15 @@
 //! What a file is.
 
+use std::collections::BTreeMap;
+
 use viscera::mesh::io::{Mesh, MeshFile, ReadReport};
 use viscera::mesh::{SurfaceMesh, TetMesh};
 use viscera_volume::{
-    LabelMap, Limits, NamesFrom, VolumeReport, read, summarize, total_segmentator,
+    LabelMap, Limits, NamesFrom, Note, VolumeReport, read, summarize, total_segmentator,
 };
 
 use crate::ImportError;
+use crate::name::stem_of;
 
 /// What a file is. Meshes are in units of the file.
 pub enum Found {
@@ -18,12 +21,18 @@ pub enum Found {
     Labels(LabelMap, VolumeReport),
 }
 
-/// Whether bytes are those of an image: NIfTI, NRRD, or packed by gzip, as no mesh is.
+/// Endings of images; those that are not read get an error that says what is.
+const IMAGES: [&str; 11] =
+    [".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".mgz", ".mgh", ".img", ".hdr", ".dcm"];
+
+/// Whether bytes are those of an image: NIfTI, NRRD, others that are not read, or packed by gzip, as no mesh is.
 pub fn is_image(name: &str, bytes: &[u8]) -> bool {
     let name = name.to_ascii_lowercase();
     bytes.starts_with(b"NRRD")
         || bytes.starts_with(b"\x1f\x8b")
-        || [".nii", ".nii.gz", ".nrrd", ".nhdr"].iter().any(|end| name.ends_with(end))
+        || bytes.starts_with(b"ObjectType")
+        || bytes.get(128..132) == Some(b"DICM")
+        || IMAGES.iter().any(|end| name.ends_with(end))
         || matches!(bytes.get(344..347), Some(b"n+1" | b"ni1"))
         || matches!(bytes.get(4..7), Some(b"n+2" | b"ni2"))
 }
@@ -44,12 +53,39 @@ pub fn open(
     let used = summarize(&map);
     if let (NamesFrom::None, [only]) = (report.names_from, &used[..]) {
         // A mask of one organ is what its file is named after.
-        let stem = name.rsplit(['/', '\\']).next().and_then(|file| file.split('.').next());
-        map.set_names([(only.label, stem.unwrap_or("organ").to_owned())].into());
+        map.set_names([(only.label, stem_of(name).to_owned())].into());
     } else if report.names_from == NamesFrom::None {
-        // Others are read as TotalSegmentator's, and that is said.
-        // Labels above 117 are of another program, and stay without names.
-        let _ = total_segmentator::name_labels(&mut map, &mut report);
+        // Others are read as TotalSegmentator's where that is likely, and either is said.
+        total_segmentator::name_likely_labels(&mut map, &mut report, &used);
     }
     Ok(Found::Labels(map, report))
+}
+
+/// Gives labels of a scan other names than it has, or than were guessed by their numbers.
+pub fn rename(
+    file: &str,
+    map: &mut LabelMap,
+    report: &mut VolumeReport,
+    names: &[(u16, String)],
+) -> Result<(), ImportError> {
+    if names.is_empty() {
+        return Ok(());
+    }
+    let used = summarize(map);
+    for (label, _) in names {
+        if !used.iter().any(|known| known.label == *label) {
+            let (file, wanted) = (file.to_owned(), label.to_string());
+            let known: Vec<String> = used.iter().map(|known| known.label.to_string()).collect();
+            let hint = format!("labels are {}", known.join(", "));
+            return Err(ImportError::UnknownLabel { file, wanted, hint });
+        }
+    }
+    // What was guessed is not mixed with what is known.
+    let is_guessed = report.names_from == NamesFrom::TotalSegmentator;
+    let mut all = if is_guessed { BTreeMap::new() } else { map.names().clone() };
+    all.extend(names.iter().cloned());
+    map.set_names(all);
+    report.notes.retain(|note| !matches!(note, Note::OtherNumbers { .. }));
+    report.names_from = NamesFrom::Given;
+    Ok(())
 }

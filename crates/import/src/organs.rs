@@ -1,42 +1,53 @@
 //! Bodies of a segmented scan.
 
-use std::collections::BTreeMap;
-
+use viscera::mesh::distance::SignedDistance;
 use viscera::mesh::io::MeshNames;
-use viscera::mesh::tetrahedralize::{surface, tetrahedralize, tetrahedralize_to};
+use viscera::mesh::tetrahedralize::{
+    TetrahedralizeError, surface, tetrahedralize, tetrahedralize_to,
+};
 use viscera::mesh::winding::Solid;
 use viscera::mesh::{SurfaceMesh, TetMesh, boundary_surface};
 use viscera::scalar::{Vec3, vec3};
-use viscera_volume::{LabelMap, Organ, OrganReport, Wall, summarize};
+use viscera_volume::{LabelMap, Organ, OrganReport, Wall};
 
 use crate::ImportError;
-use crate::bodies::{Import, Inner, Options, Part, Touching, name_of};
+use crate::bodies::{Import, Inner, Options, Part, Touching, told_edges, told_loss};
+use crate::choose::{Choice, Chosen, FEWEST_VOXELS, choose};
+use crate::filling::{Filled, KEPT, Missed, RESOLVED, Wanted, fill_to, first_spacing};
 use crate::hold::{Hold, Place, at_the_back};
+use crate::name::name_of;
+use crate::size::{Fineness, MOST_OF_LABELS, finest, spacing_of, tets_of};
 use crate::tissue::{self, Kind};
-
-/// A label that is enclosed by another to this share of its faces is a part of it: a tumour in a liver.
-const ENCLOSED: f64 = 0.8;
+use crate::unit::{edge_below, length_text};
 
 /// Organs are tied where this share of the smaller one's surface touches the other.
 const TIED: f64 = 0.1;
 
-/// A lattice has vertices inside of a wall everywhere where it is so many edges thick.
-const RESOLVED: f64 = 1.3;
-
 /// And need no other hold from this share on.
 const HANGS: f64 = 0.3;
 
-/// An edge is no longer than this share of the cube root of an organ's volume.
-const COARSEST: f64 = 0.4;
+/// A lattice finer than the scan shows no more of it: edges are at least this share of a voxel's,
+const OF_A_VOXEL: f64 = 0.35;
+/// and those of its surface this one.
+const OF_A_VOXEL_SKIN: f64 = 0.5;
 
 /// A body in the making.
 struct Plan {
     label: u16,
     name: String,
     kind: Kind,
+    /// Labels in it that are regions of their own.
     inner: Vec<(u16, String)>,
     organ: Organ,
     report: OrganReport,
+}
+
+impl Plan {
+    /// How thick its wall is [m], where it is hollow and large enough for a cavity.
+    fn wall(&self) -> Option<f64> {
+        let size = libm::cbrt(self.report.volume);
+        self.kind.wall().filter(|wall| 2.5 * wall < size)
+    }
 }
 
 /// Bodies of the labels that are asked for, or of all that are soft.
@@ -47,163 +58,151 @@ pub fn of_labels(
     down: Vec3<f64>,
     observe: &mut dyn FnMut(&str),
 ) -> Result<Import, ImportError> {
-    let mut notes = Vec::new();
-    let chosen = choose(file, map, options, &mut notes)?;
-    let hosts = hosts(map, &chosen);
+    let Choice { organs, mut warnings, mut notes } = choose(file, map, options)?;
     let mut plans: Vec<Plan> = Vec::new();
-    for (label, name) in chosen.iter().filter(|(label, _)| !hosts.contains_key(label)) {
-        let inner: Vec<(u16, String)> =
-            chosen.iter().filter(|(l, _)| hosts.get(l) == Some(label)).cloned().collect();
-        let mut labels = vec![*label];
-        labels.extend(inner.iter().map(|(label, _)| *label));
+    for Chosen { label, name, inner, filled } in organs {
+        let mut labels = vec![label];
+        labels.extend(inner.iter().map(|(label, _)| *label).chain(filled));
         let (organ, report) = Organ::new(map, &labels)
             .map_err(|error| ImportError::Organ { file: file.into(), error })?;
-        let kind = tissue::kind_of(name);
-        plans.push(Plan { label: *label, name: name.clone(), kind, inner, organ, report });
+        let kind = tissue::kind_of(&name);
+        plans.push(Plan { label, name, kind, inner, organ, report });
     }
-    let volume: f64 = plans.iter().map(|plan| plan.report.volume).sum();
-    let spacing = options.fineness.spacing(volume);
+    let sizes = Sizes::of(file, &plans, options)?;
     let mut parts: Vec<Part> = Vec::new();
-    for plan in &plans {
-        observe(&plan.name);
-        let mut part = build(file, map, plan, (spacing, options.hollow), down)?;
+    let mut first_error = None;
+    for (number, plan) in plans.iter().enumerate() {
+        observe(&format!("{}, {} of {}", plan.name, number + 1, plans.len()));
+        let mut part = match build(map, plan, (sizes, options.hollow), down) {
+            Ok(part) => part,
+            // One that has no shape is no reason to be without the others.
+            Err(error) => {
+                warnings.push(format!("`{}` is left out: {}", plan.name, reason(plan, &error)));
+                first_error.get_or_insert((plan, error));
+                continue;
+            }
+        };
         // Names are of one body each.
         if parts.iter().any(|other| other.name == part.name) {
             part.name = format!("{}_{}", part.name, plan.label);
         }
+        let more = match plan.report.voxels as u64 >= FEWEST_VOXELS {
+            true => format!(
+                "more tetrahedra keep more of it, such as --labels {} --count {:.0}",
+                plan.label,
+                8.0 * sizes.most
+            ),
+            false => "its few voxels show no more of its shape".to_owned(),
+        };
+        // A wall around a cavity has another volume than the organ.
+        let is_wall = options.hollow && plan.wall().is_some();
+        warnings.extend(told_loss(&part, &more).filter(|_| !is_wall));
         parts.push(part);
     }
+    if let Some((plan, error)) = first_error.filter(|_| parts.is_empty()) {
+        let (file, organ, reason) = (file.to_owned(), plan.name.clone(), reason(plan, &error));
+        return Err(ImportError::Organs { file, organ, reason });
+    }
+    notes.extend(sizes.told(&parts));
     let touching = touching(&parts, libm::cbrt(map.to_world().voxel_volume()));
     for touching in touching.iter().filter(|touching| touching.share >= HANGS) {
         // A gallbladder hangs on its liver.
         parts[touching.from].holds.clear();
     }
-    Ok(Import { file: file.into(), parts, touching, down, notes })
+    Ok(Import { file: file.into(), parts, touching, down, warnings, notes })
 }
 
-/// Labels and their names.
-fn choose(
-    file: &str,
-    map: &LabelMap,
-    options: &Options,
-    notes: &mut Vec<String>,
-) -> Result<Vec<(u16, String)>, ImportError> {
-    let all: Vec<(u16, String, u64)> = summarize(map)
-        .into_iter()
-        .map(|label| {
-            let name = label.name.unwrap_or_else(|| format!("label_{}", label.label));
-            (label.label, name, label.voxels)
+/// Why an organ is not filled.
+fn reason(plan: &Plan, error: &TetrahedralizeError) -> String {
+    let voxels = plan.report.voxels;
+    match error {
+        error if error.is_missed() && (voxels as u64) < FEWEST_VOXELS => {
+            let are = if voxels == 1 { "voxel is" } else { "voxels are" };
+            format!("{voxels} {are} too little for a shape; a scan with finer voxels may show it")
+        }
+        TetrahedralizeError::TooCoarse { spacing, suggestion, .. } => {
+            let (long, short) = (length_text(*spacing), edge_below(*suggestion));
+            let label = plan.label;
+            format!("too thin for edges of {long}; --labels {label} --edge \"{short}\" fills it")
+        }
+        error => error.to_string(),
+    }
+}
+
+/// How fine organs are filled.
+#[derive(Clone, Copy)]
+struct Sizes {
+    /// As it is asked for [m].
+    spacing: f64,
+    /// About so many tetrahedra are asked for, of all organs together.
+    asked: f64,
+    /// Thin organs may have so many, each for itself.
+    most: f64,
+}
+
+impl Sizes {
+    fn of(file: &str, plans: &[Plan], options: &Options) -> Result<Self, ImportError> {
+        let volume: f64 = plans.iter().map(|plan| plan.report.volume).sum();
+        let boxes = plans.iter().map(|plan| box_of(&plan.organ));
+        let largest = boxes.fold(0.0, f64::max);
+        let fineness = options.fineness.unwrap_or_default();
+        let spacing = fineness.affordable(file, volume, largest, MOST_OF_LABELS)?;
+        let least = Fineness::default().spacing(volume);
+        let [asked, most] = [spacing, spacing.min(least)].map(|edge| tets_of(volume, edge));
+        Ok(Self { spacing, asked, most })
+    }
+
+    /// That thin organs make more tetrahedra than were asked for.
+    fn told(self, parts: &[Part]) -> Option<String> {
+        let count: usize = parts.iter().map(|part| part.mesh.tets().len()).sum();
+        (count as f64 > 1.3 * self.asked).then(|| {
+            format!(
+                "{count} tetrahedra in place of about {:.0}: thin organs need short edges; --labels takes fewer organs",
+                self.asked
+            )
         })
-        .collect();
-    let known = || {
-        let names: Vec<String> = all.iter().map(|(l, name, _)| format!("{l} {name}")).collect();
-        names.join(", ")
-    };
-    if options.labels.is_empty() {
-        let (mut chosen, mut left) = (Vec::new(), Vec::new());
-        for (label, name, voxels) in &all {
-            // Smaller ones have no shape that a scan could show.
-            if tissue::kind_of(name).is_organ() && *voxels >= 64 {
-                chosen.push((*label, name.clone()));
-            } else {
-                left.push(name.as_str());
-            }
-        }
-        // Of unknown names all are taken.
-        if chosen.is_empty()
-            && all.iter().all(|(_, name, _)| tissue::kind_of(name) == Kind::Unknown)
-        {
-            chosen = all.iter().map(|(label, name, _)| (*label, name.clone())).collect();
-            left.clear();
-        }
-        if chosen.is_empty() {
-            return Err(ImportError::NoTissue { file: file.into(), labels: known() });
-        }
-        if !left.is_empty() {
-            notes.push(format!("left out, choose by --labels: {}", left.join(", ")));
-        }
-        return Ok(chosen);
     }
-    let mut chosen = Vec::new();
-    for wanted in &options.labels {
-        let is_wanted = |label: u16, name: &str| {
-            wanted.parse() == Ok(label) || name_of(name) == name_of(wanted)
-        };
-        match all.iter().find(|(label, name, _)| is_wanted(*label, name)) {
-            Some((label, name, _)) => {
-                if !chosen.iter().any(|(known, _)| known == label) {
-                    chosen.push((*label, name.clone()));
-                }
-            }
-            None => {
-                let (file, wanted) = (file.to_owned(), wanted.clone());
-                let hint = format!("labels are {}", known());
-                return Err(ImportError::UnknownLabel { file, wanted, hint });
-            }
-        }
+
+    /// The shortest edges [m] of an organ.
+    fn finest(self, organ: &Organ, volume: f64) -> f64 {
+        let voxel = organ.voxel_size().into_iter().fold(f64::INFINITY, f64::min);
+        let affordable = finest(volume, box_of(organ), MOST_OF_LABELS);
+        spacing_of(volume, self.most).max(OF_A_VOXEL * voxel).max(affordable)
     }
-    Ok(chosen)
 }
 
-/// Labels that lie in another, by label.
-fn hosts(map: &LabelMap, chosen: &[(u16, String)]) -> BTreeMap<u16, u16> {
-    let dims = map.dims();
-    let steps = [1, dims[0], dims[0] * dims[1]];
-    let labels = map.labels();
-    let mut faces: BTreeMap<(u16, u16), usize> = BTreeMap::new();
-    for place in 0..labels.len() {
-        let own = labels[place];
-        if own == 0 {
-            continue;
-        }
-        for axis in 0..3 {
-            let index = place / steps[axis] % dims[axis];
-            let before = (index > 0).then(|| labels[place - steps[axis]]);
-            let behind = (index + 1 < dims[axis]).then(|| labels[place + steps[axis]]);
-            for other in [before, behind] {
-                // Beyond the image there is nothing.
-                let other = other.unwrap_or(0);
-                if other != own {
-                    *faces.entry((own, other)).or_default() += 1;
-                }
-            }
-        }
-    }
-    let mut hosts = BTreeMap::new();
-    for (label, _) in chosen {
-        let of_label = faces.iter().filter(|((own, _), _)| own == label);
-        let all: usize = of_label.clone().map(|(_, count)| count).sum();
-        let most = of_label.filter(|((_, other), _)| *other != 0).max_by_key(|(_, count)| **count);
-        let Some((&(_, host), &count)) = most else { continue };
-        let is_chosen = chosen.iter().any(|(other, _)| *other == host);
-        if is_chosen && count as f64 >= ENCLOSED * all as f64 && !hosts.contains_key(&host) {
-            hosts.insert(*label, host);
-        }
-    }
-    hosts
+/// The volume of the box around an organ [m^3].
+fn box_of(organ: &Organ) -> f64 {
+    let (low, high) = organ.bounds();
+    let size = high - low;
+    size.x * size.y * size.z
 }
 
 /// Fills an organ, and says how it was done.
 fn build(
-    file: &str,
     map: &LabelMap,
     plan: &Plan,
-    (spacing, is_hollow): (f64, bool),
+    (sizes, is_hollow): (Sizes, bool),
     down: Vec3<f64>,
-) -> Result<Part, ImportError> {
+) -> Result<Part, TetrahedralizeError> {
     let Plan { organ, report, .. } = plan;
-    let fail = |error| ImportError::Organs { file: file.into(), organ: plan.name.clone(), error };
-    let voxel = libm::cbrt(map.to_world().voxel_volume());
-    let size = libm::cbrt(report.volume);
     let mut notes = Vec::new();
-    let skin = surface(organ, voxel.max(spacing / 8.0)).map_err(fail)?;
-    let spacing = spacing.min(COARSEST * size);
+    let skin = skin_of(organ, report.volume, sizes.spacing)?;
+    let finest = sizes.finest(organ, report.volume);
+    let first = first_spacing(report.volume, &skin, sizes.spacing, finest);
     let mut wall_share = None;
-    let wall = plan.kind.wall().filter(|wall| 2.5 * wall < size);
+    let wall = plan.wall();
     let solid = wall.and_then(|_| Solid::new(&skin).ok());
+    let wanted = Wanted { volume: report.volume, parts: report.pieces };
+    let filled = || {
+        fill_to(wanted, first, finest, |spacing| {
+            let made = tetrahedralize_to(|by| organ.offset(by), spacing, report.volume);
+            made.map(|made| Filled::new(made, spacing))
+        })
+    };
     let made = match (wall, &solid) {
         (Some(thin), Some(skin)) if is_hollow => {
-            let thickness = thin.max(RESOLVED * spacing);
+            let thickness = thin.max(RESOLVED * first);
             let text = format!("{:.1} mm", 1e3 * thickness);
             notes.push(match thickness > thin {
                 true => format!(
@@ -213,18 +212,20 @@ fn build(
                 false => format!("a wall of {text} around a cavity"),
             });
             wall_share = Some(thin / thickness);
-            tetrahedralize(&Wall { organ, skin, thickness }, spacing)
+            let made = tetrahedralize(&Wall { organ, skin, thickness }, first);
+            made.map(|made| Filled::new(made, first))
         }
         (Some(thickness), _) => {
             let text = 1e3 * thickness;
             notes.push(format!(
                 "filled, as the scan shows it; --hollow leaves a wall of {text:.1} mm"
             ));
-            tetrahedralize_to(|by| organ.offset(by), spacing, report.volume)
+            filled()
         }
-        _ => tetrahedralize_to(|by| organ.offset(by), spacing, report.volume),
+        _ => filled(),
     };
-    let (mesh, made) = made.map_err(fail)?;
+    let Filled { mesh, report: made, spacing, .. } = made?;
+    notes.extend(told_edges(spacing, sizes.spacing));
     if report.crumbs[0] > 0 {
         let [pieces, voxels] = report.crumbs;
         notes.push(format!("left out {pieces} crumbs of {voxels} voxels"));
@@ -247,7 +248,21 @@ fn build(
     }
     let regions = inner.iter().map(|inner| (inner.region, inner.name.clone())).collect();
     let names = MeshNames { regions, ..MeshNames::default() };
-    Ok(Part { name, mesh, skin: Some(skin), tissue, inner, names, holds, notes })
+    let (skin, wanted) = (Some(skin), Some(report.volume));
+    let is_balanced = true;
+    Ok(Part { name, mesh, wanted, skin, tissue, inner, names, holds, is_balanced, notes })
+}
+
+/// The fine surface of an organ: with edges as long as a voxel's, or half as long where a thin organ needs it for its volume.
+fn skin_of(organ: &Organ, volume: f64, spacing: f64) -> Result<SurfaceMesh, TetrahedralizeError> {
+    let voxel = libm::cbrt(organ.voxel_size().iter().product());
+    let coarse = surface(organ, voxel.max(spacing / 8.0));
+    let is_kept = |skin: &SurfaceMesh| (skin.enclosed_volume() / volume - 1.0).abs() <= KEPT;
+    match coarse {
+        Ok(skin) if is_kept(&skin) => Ok(skin),
+        Ok(skin) => Ok(surface(organ, OF_A_VOXEL_SKIN * voxel).unwrap_or(skin)),
+        Err(_) => surface(organ, OF_A_VOXEL_SKIN * voxel),
+    }
 }
 
 /// Gives the tetrahedra of what lies in an organ a region of their own.
@@ -268,7 +283,7 @@ fn with_inner(
         for (tet, region) in regions.iter_mut().enumerate() {
             let corners = mesh.corners(tet);
             let middle = (corners[0] + corners[1] + corners[2] + corners[3]) * 0.25;
-            if viscera::mesh::distance::SignedDistance::distance(&shape, middle) < 0.0 {
+            if shape.distance(middle) < 0.0 {
                 *region = u32::from(*label);
                 count += 1;
             }

@@ -8,7 +8,9 @@ use viscera::scalar::Vec3;
 
 use crate::bodies::{Import, Part};
 use crate::hold::{Place, rounded};
+use crate::name::{name_of, stem_of};
 use crate::tissue::Tissue;
+use crate::unit::millilitres;
 
 /// Files of a scene: names, relative to the scene file, and bytes. The scene file itself comes first.
 #[derive(Clone, Debug)]
@@ -18,9 +20,10 @@ pub struct Written {
 }
 
 impl Import {
-    /// The scene file and the meshes that it names.
+    /// The scene file, which has the name of the file that it was made of, and the meshes that it names.
     pub fn scene(&self, title: &str) -> Written {
-        let mut files = vec![("scene.toml".to_owned(), self.text(title).into_bytes())];
+        let scene = format!("{}.toml", name_of(stem_of(&self.file)));
+        let mut files = vec![(scene, self.text(title).into_bytes())];
         for part in &self.parts {
             // Patches are of the mesh, and its places are finite.
             let grid = vtu::write_mesh(&part.mesh, &part.names);
@@ -40,11 +43,11 @@ impl Import {
             text,
             "# Made from {file}. Lines that begin with # are comments; `viscera scene describe` lists all keys."
         );
-        for note in &self.notes {
+        for note in self.warnings.iter().chain(&self.notes) {
             let _ = writeln!(text, "# {}", note.trim());
         }
         let _ = writeln!(text, "title = {:?}", plain(title));
-        text.push_str("\n# 3 s, in which tissue sags until it hangs still; 1 in place of 0.95 leaves all motion to the tissue's own viscosity.\n");
+        text.push_str("\n# 1 in place of 0.95 leaves all motion to the tissue's own viscosity.\n");
         text.push_str("[time]\nduration = \"3 s\"\nvelocity_factor = 0.95\n");
         let _ = writeln!(text, "\n[world]\ngravity = {}", self.gravity());
         for part in &self.parts {
@@ -91,8 +94,8 @@ impl Import {
 }
 
 fn body(text: &mut String, part: &Part) {
-    let (count, litres) = (part.mesh.tets().len(), 1e3 * part.mesh.volume());
-    let _ = writeln!(text, "\n# {}: {count} tetrahedra, {:.0} ml.", part.name, 1e3 * litres);
+    let (count, volume) = (part.mesh.tets().len(), millilitres(part.mesh.volume()));
+    let _ = writeln!(text, "\n# {}: {count} tetrahedra, {volume} ml.", part.name);
     for note in &part.notes {
         let _ = writeln!(text, "# {note}");
     }
@@ -103,6 +106,10 @@ fn body(text: &mut String, part: &Part) {
     );
     if part.skin.is_some() {
         let _ = writeln!(text, "surface = \"{}_skin.ply\"", part.name);
+    }
+    if part.is_balanced {
+        text.push_str("# As scanned or drawn it is at rest under gravity; without this line it sags from there.\n");
+        text.push_str("balanced = true\n");
     }
     material(text, "body.material", &part.tissue);
     for inner in &part.inner {

@@ -29,8 +29,12 @@ pub enum Kind {
     Soft,
     /// Soft, with a wall of so much [m] around what is in it.
     Hollow(f64),
-    /// Not simulated by itself: bone, air, vessels.
-    Other,
+    /// A vessel, which is simulated where somebody asks for it.
+    Vessel,
+    /// Bone: a million times stiffer than an organ.
+    Bone,
+    /// A gas.
+    Air,
     /// No name that is known.
     Unknown,
 }
@@ -61,7 +65,9 @@ pub fn kind_of(name: &str) -> Kind {
     match find(name).map(|class| class.kind) {
         Some(ClassKind::Soft(_)) => Kind::Soft,
         Some(ClassKind::Hollow { wall, .. }) => Kind::Hollow(wall),
-        Some(_) => Kind::Other,
+        Some(ClassKind::Vessel { .. }) => Kind::Vessel,
+        Some(ClassKind::Rigid) => Kind::Bone,
+        Some(ClassKind::Air) => Kind::Air,
         None => Kind::Unknown,
     }
 }

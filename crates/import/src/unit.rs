@@ -83,6 +83,42 @@ pub fn guess(name: &str, vertices: &[Vec3<f64>], volume: f64) -> Unit {
     Unit { meters, reason }
 }
 
+/// Lengths of what is simulated [m], in a unit that somebody gave: from a piece of tissue to a person.
+const LENGTHS: std::ops::RangeInclusive<f64> = 1e-3..=3.0;
+
+/// Why a unit is probably not that of a file, see [`guess`], with one that is likely.
+pub fn doubt(name: &str, vertices: &[Vec3<f64>], volume: f64, meters: f64) -> Option<String> {
+    let size = BoundingBox::around(vertices).size();
+    let longest = size.x.max(size.y).max(size.z);
+    let likely = guess(name, vertices, volume).meters;
+    let name = name.to_ascii_lowercase();
+    let unit = |meters: f64| format!("--unit \"{}\"", length_text(meters));
+    let organ = ORGANS.iter().find(|(word, _)| name.contains(word) && volume > 0.0);
+    if let Some(&(word, litres)) = organ {
+        let has = 1e3 * volume * cube(meters);
+        let is_likely = (1.0 / PLAUSIBLE..PLAUSIBLE).contains(&(has / litres));
+        return (!is_likely).then(|| {
+            format!(
+                "with {} it has {}, and an adult's {word} has {}; with {} it would have {}",
+                unit(meters),
+                litres_text(has),
+                litres_text(litres),
+                unit(likely),
+                litres_text(1e3 * volume * cube(likely))
+            )
+        });
+    }
+    (!LENGTHS.contains(&(longest * meters))).then(|| {
+        format!(
+            "with {} it is {} long; with {} it would be {}",
+            unit(meters),
+            length_text(longest * meters),
+            unit(likely),
+            length_text(longest * likely)
+        )
+    })
+}
+
 fn cube(x: f64) -> f64 {
     x * x * x
 }
@@ -98,7 +134,25 @@ fn short(value: f64) -> String {
 }
 
 fn litres_text(litres: f64) -> String {
-    if litres >= 1.0 { format!("{litres:.2} l") } else { format!("{:.0} ml", 1e3 * litres) }
+    match litres >= 1.0 {
+        true if litres >= 1e3 => format!("{} m^3", short(1e-3 * litres)),
+        true => format!("{litres:.2} l"),
+        false => format!("{} ml", millilitres(1e-3 * litres)),
+    }
+}
+
+/// A volume [m^3] in millilitres, with two digits or more.
+pub fn millilitres(volume: f64) -> String {
+    let value = 1e6 * volume;
+    // So many digits behind the point.
+    let digits = match value.abs() {
+        size if size >= 9.95 => 0,
+        size if size > 0.0 && size.is_finite() => {
+            (1.0 - libm::log10(size).floor()).min(9.0) as usize
+        }
+        _ => 0,
+    };
+    format!("{value:.digits$}")
 }
 
 /// A length as people write it: "32 mm".
@@ -110,6 +164,12 @@ pub fn length_text(meters: f64) -> String {
         format!("{:.4}", millimetres).trim_end_matches('0').trim_end_matches('.').to_owned()
     };
     format!("{text} mm")
+}
+
+/// A length no longer than this one, to two digits, as people write it.
+pub fn edge_below(meters: f64) -> String {
+    let unit = libm::pow(10.0, libm::log10(meters).floor() - 1.0);
+    length_text((meters / unit).floor() * unit)
 }
 
 #[cfg(test)]
@@ -126,6 +186,27 @@ mod tests {
         assert_eq!(guess("liver.stl", &points(250.0), 1.4e6).meters, 1e-3);
         assert_eq!(guess("Left_Kidney.obj", &points(0.11), 1.5e-4).meters, 1.0);
         assert_eq!(guess("spleen.ply", &points(12.0), 210.0).meters, 1e-2);
+    }
+
+    #[test]
+    fn a_unit_that_makes_no_organ_is_doubted() {
+        let told = doubt("liver_coarse", &points(5.0), 36.6, 1.0).expect("no liver");
+        let parts = [
+            "--unit \"1000 mm\" it has 36.60 m^3",
+            "liver has 1.50 l",
+            "--unit \"34 mm\" it would have 1.44 l",
+        ];
+        assert!(parts.iter().all(|part| told.contains(part)), "{told}");
+        assert_eq!(doubt("liver_coarse", &points(5.0), 36.6, 0.032), None);
+        let told = doubt("part", &points(120.0), 1e5, 1.0).expect("too long");
+        assert!(told.contains("120000 mm long") && told.contains("\"1 mm\""), "{told}");
+        assert_eq!(doubt("part", &points(120.0), 1e5, 1e-3), None);
+    }
+
+    #[test]
+    fn small_volumes_keep_two_digits() {
+        let texts = [1.5e-3, 57.3e-6, 7.46e-6, 3.21e-8, 0.0].map(millilitres);
+        assert_eq!(texts, ["1500", "57", "7.5", "0.032", "0"]);
     }
 
     #[test]

@@ -109,7 +109,7 @@ pub enum VolumeProblem {
     /// More voxels than the caller allows.
     #[error(
         "{sizes} voxels are announced; at most {limit} are read. Crop or resample the label map, \
-        or raise the limit where the header is right"
+        for example in 3D Slicer"
     )]
     TooLarge {
         /// The sizes, as in "10 x 10 x 5".

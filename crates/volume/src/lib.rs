@@ -45,7 +45,7 @@
 //! | `report`, `error` | what was found, what is wrong |
 //! | `organ`, `pieces` | labels as smooth shapes, without crumbs |
 //! | `summary` | labels with their sizes and places |
-//! | `total_segmentator` | names of the labels that TotalSegmentator gives |
+//! | `total_segmentator`, `numbering` | names of the labels that TotalSegmentator gives, and whether labels are numbered so |
 //! | `tissue` | which tissue each structure is made of, by its name |
 
 mod affine;
@@ -54,6 +54,7 @@ mod error;
 mod label_map;
 mod nifti;
 mod nrrd;
+mod numbering;
 mod organ;
 mod pieces;
 mod read;

@@ -121,9 +121,10 @@ pub enum NamesFrom {
     Extension,
     /// The segments of 3D Slicer's `.seg.nrrd`.
     Segments,
-    /// The caller's word that the labels are TotalSegmentator's, see
-    /// [`crate::total_segmentator::name_labels`].
+    /// TotalSegmentator's numbers, on the caller's word or by the organs' sizes, see [`crate::total_segmentator`].
     TotalSegmentator,
+    /// Whoever reads the file gave them.
+    Given,
 }
 
 impl fmt::Display for NamesFrom {
@@ -132,7 +133,8 @@ impl fmt::Display for NamesFrom {
             Self::None => "labels have no names",
             Self::Extension => "names are those in the file's extension",
             Self::Segments => "names are those of the file's segments",
-            Self::TotalSegmentator => "names are TotalSegmentator's, on the caller's word",
+            Self::TotalSegmentator => "names are TotalSegmentator's, by the numbers of labels",
+            Self::Given => "names are as given",
         })
     }
 }
@@ -171,6 +173,11 @@ pub enum Note {
     },
     /// The file goes on behind the image; the rest was not read, nor a checksum at its end.
     GoesOn,
+    /// Labels have no names, and are probably not numbered as by TotalSegmentator.
+    OtherNumbers {
+        /// What does not fit.
+        reason: String,
+    },
     /// Several layers were merged: segment `k` of the file, counting from 0, has label `k + 1`, and
     /// where segments overlap the later one stays.
     LayersMerged {
@@ -209,6 +216,10 @@ impl fmt::Display for Note {
                 write!(f, "an extension of the header was passed over: {reason}")
             }
             Self::GoesOn => f.write_str("the file goes on behind the image; that was not read"),
+            Self::OtherNumbers { reason } => write!(
+                f,
+                "labels do not look like TotalSegmentator's numbers ({reason}), and are called label_1, label_2 and so on; --names 1=liver,2=tumor names them"
+            ),
             Self::LayersMerged { layers, overlaps, strays } => {
                 write!(
                     f,

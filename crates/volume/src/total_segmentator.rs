@@ -4,7 +4,9 @@
 use crate::error::VolumeProblem;
 use crate::error::unsupported;
 use crate::label_map::LabelMap;
-use crate::report::{NamesFrom, VolumeReport};
+use crate::numbering::misfit;
+use crate::report::{NamesFrom, Note, VolumeReport, WorldSpace};
+use crate::summary::LabelSummary;
 
 /// Names by label, less 1: `NAMES[0]` is that of label 1.
 pub const NAMES: [&str; 117] = [
@@ -130,6 +132,21 @@ pub const NAMES: [&str; 117] = [
 /// The name of a label; `None` for background and for labels above 117.
 pub fn name(label: u16) -> Option<&'static str> {
     NAMES.get(usize::from(label).checked_sub(1)?).copied()
+}
+
+/// Gives a label map TotalSegmentator's names where its labels have the sizes and sides of TotalSegmentator's organs, and else
+/// says in the report why not. `labels` are those of [`summarize`](crate::summarize). True where it has names then.
+pub fn name_likely_labels(
+    map: &mut LabelMap,
+    report: &mut VolumeReport,
+    labels: &[LabelSummary],
+) -> bool {
+    let has_sides = report.space != WorldSpace::Unnamed;
+    let misfit = misfit(labels, has_sides);
+    let reason = misfit.or_else(|| name_labels(map, report).err().map(|error| error.to_string()));
+    let is_named = reason.is_none();
+    report.notes.extend(reason.map(|reason| Note::OtherNumbers { reason }));
+    is_named
 }
 
 /// Gives a label map TotalSegmentator's names, and says so in its report. The reader does not do so by

@@ -6,15 +6,25 @@ use crate::common::Bench;
 const CUBE: &str = "v 0 0 0\nv 60 0 0\nv 60 60 0\nv 0 60 0\nv 0 0 60\nv 60 0 60\nv 60 60 60\nv 0 60 60\n\
     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
-/// A label map of one organ, a box of 12 x 12 x 12 voxels of 3 mm.
+/// A label map: a box of 12 x 12 x 12 voxels of 3 mm is a liver, half as large a one beside it a spleen.
 fn scan() -> Vec<u8> {
-    let mut text = String::from(
-        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 16 16 16\nencoding: text\nspace: right-anterior-superior\n\
-         space directions: (3,0,0) (0,3,0) (0,0,3)\nspace origin: (0,0,0)\nSegment0_LabelValue:=5\nSegment0_Name:=liver\n\n",
+    let names = "Segment0_LabelValue:=5\nSegment0_Name:=liver\nSegment1_LabelValue:=6\nSegment1_Name:=spleen\n";
+    label_map([26, 16, 16], names, |[x, y, z]| match [x, y, z] {
+        at if at.iter().all(|at| (2..14).contains(at)) => 5,
+        _ if (17..23).contains(&x) && (2..14).contains(&y) && (2..14).contains(&z) => 6,
+        _ => 0,
+    })
+}
+
+/// An NRRD file of voxels of 3 mm.
+fn label_map(size: [usize; 3], names: &str, label: impl Fn([usize; 3]) -> u16) -> Vec<u8> {
+    let [x, y, z] = size;
+    let mut text = format!(
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: {x} {y} {z}\nencoding: text\nspace: right-anterior-superior\n\
+         space directions: (3,0,0) (0,3,0) (0,0,3)\nspace origin: (0,0,0)\n{names}\n",
     );
-    for n in 0..16 * 16 * 16 {
-        let is_inside = [n % 16, n / 16 % 16, n / 256].iter().all(|at| (2..14).contains(at));
-        text.push_str(if is_inside { "5 " } else { "0 " });
+    for n in 0..x * y * z {
+        text.push_str(&format!("{} ", label([n % x, n / x % y, n / x / y])));
     }
     text.into_bytes()
 }
@@ -25,29 +35,101 @@ fn a_surface_is_run_at_once() {
     bench.write("spleen.obj", CUBE.as_bytes());
     let end = bench.end_of(&["run", "spleen.obj", "--frames", "2", "--out", "out"]);
     assert_eq!(end.code, Some(0), "{}", end.stderr);
-    for part in ["1 in the file as 1 mm", "spleen", "scene.toml"] {
+    for part in ["1 in the file as 1 mm", "spleen", "scene: out/scene/spleen.toml"] {
         assert!(end.stdout.contains(part), "{part}: {}", end.stdout);
     }
-    let scene = std::fs::read_to_string(bench.path("out/scene/scene.toml")).expect("a scene");
+    let scene = std::fs::read_to_string(bench.path("out/scene/spleen.toml")).expect("a scene");
     assert!(
         scene.contains("preset = \"spleen\"") && scene.contains("# 1 in the file as"),
         "{scene}"
     );
     assert!(bench.path("out/picture.png").exists());
-    // And again, as anybody would who has changed it.
-    let again = ["run", "out/scene/scene.toml", "--frames", "1", "--out", "again"];
+    // And again, as anybody would who has changed it: results have the organ's name.
+    let again = ["run", "out/scene/spleen.toml", "--frames", "1"];
     assert_eq!(bench.end_of(&again).code, Some(0));
+    assert!(bench.path("out/spleen/summary.json").exists());
     // What a person has changed is not overwritten.
     let changed = scene.replace("velocity_factor = 0.95", "velocity_factor = 0.9");
-    bench.write("out/scene/scene.toml", changed.as_bytes());
+    bench.write("out/scene/spleen.toml", changed.as_bytes());
     let end = bench.end_of(&["run", "spleen.obj", "--frames", "2", "--out", "out"]);
     assert_eq!(end.code, Some(1));
-    assert!(end.stderr.contains("viscera run out/scene/scene.toml"), "{}", end.stderr);
+    assert!(end.stderr.contains("viscera run out/scene/spleen.toml"), "{}", end.stderr);
     let new = ["scene", "new", "spleen.obj", "--out", "out/scene"];
     assert_eq!(bench.end_of(&new).code, Some(1));
-    assert_eq!(bench.read("out/scene/scene.toml"), changed.as_bytes());
+    assert_eq!(bench.read("out/scene/spleen.toml"), changed.as_bytes());
     assert_eq!(bench.end_of(&[&new[..], &["--force"]].concat()).code, Some(0));
-    assert_eq!(bench.read("out/scene/scene.toml"), scene.as_bytes());
+    assert_eq!(bench.read("out/scene/spleen.toml"), scene.as_bytes());
+}
+
+/// [`CUBE`], as large in all directions as a factor says.
+fn cube(factor: usize) -> String {
+    CUBE.replace("60", &(60 * factor).to_string())
+}
+
+#[test]
+fn imports_replace_and_remove_only_what_imports_wrote() {
+    let bench = Bench::new("");
+    bench.write("phantom.obj", CUBE.as_bytes());
+    let new = |file: &str, more: &[&str]| {
+        bench.end_of(&[&["scene", "new", file, "--count", "300"], more].concat())
+    };
+    assert_eq!(new("phantom.obj", &[]).code, Some(0));
+    let scene = "out/phantom/scene/phantom.toml";
+    let first = bench.read(scene);
+    // The same file with other options: nobody has changed the scene, and the command asks for a new one.
+    let end = bench.end_of(&["scene", "new", "phantom.obj", "--count", "900"]);
+    assert_eq!(end.code, Some(0), "{}", end.stderr);
+    assert_ne!(bench.read(scene), first);
+    // To run a file asks for none.
+    let end = bench.end_of(&["run", "phantom.obj", "--frames", "1"]);
+    assert_eq!(end.code, Some(1));
+    assert!(end.stderr.contains("made with other options or changed by hand"), "{}", end.stderr);
+    // Another file of the same name, by its ending or by what is in it.
+    std::fs::create_dir(bench.path("other")).expect("a folder");
+    bench.write("other/phantom.obj", cube(2).as_bytes());
+    let stl = ["mesh", "convert", "phantom.obj", "phantom.stl"];
+    assert_eq!(bench.end_of(&stl).code, Some(0));
+    for (file, told) in
+        [("phantom.stl", "made of phantom.obj"), ("other/phantom.obj", "another phantom.obj")]
+    {
+        let before = bench.read(scene);
+        let end = new(file, &[]);
+        assert_eq!(end.code, Some(1), "{}", end.stdout);
+        assert!(end.stderr.contains(told), "{}", end.stderr);
+        assert_eq!(bench.read(scene), before);
+        // What the message says works.
+        let command = end.stderr.split("(viscera ").nth(1).and_then(|rest| rest.split(')').next());
+        let words: Vec<&str> = command.expect("a command").split(' ').collect();
+        assert_eq!(bench.end_of(&words).code, Some(0), "{words:?}");
+    }
+    // A mesh of somebody else.
+    std::fs::create_dir(bench.path("shared")).expect("a folder");
+    bench.write("shared/phantom.vtu", b"mine");
+    let end = new("phantom.obj", &["--out", "shared"]);
+    assert!(end.stderr.contains("shared/phantom.vtu: there is another file"), "{}", end.stderr);
+    assert_eq!(bench.read("shared/phantom.vtu"), b"mine");
+    assert_eq!(new("phantom.obj", &["--out", "shared", "--force"]).code, Some(0));
+}
+
+#[test]
+fn meshes_of_an_earlier_scene_are_removed_and_changed_ones_kept() {
+    let bench = Bench::new("");
+    bench.write("scan.nrrd", &scan());
+    let new = |labels: &str| {
+        bench.end_of(&["scene", "new", "scan.nrrd", "--count", "300", "--labels", labels])
+    };
+    assert_eq!(new("5,6").code, Some(0));
+    let folder = "out/scan/scene";
+    assert!(bench.files(folder).contains("spleen.vtu"));
+    bench.write(&format!("{folder}/notes.txt"), b"mine");
+    bench.write(&format!("{folder}/spleen_skin.ply"), b"changed");
+    let end = new("5");
+    assert_eq!(end.code, Some(0), "{}", end.stderr);
+    assert!(end.stdout.contains("before: spleen.vtu\n"), "{}", end.stdout);
+    assert!(end.stdout.contains("since it was changed: spleen_skin.ply"), "{}", end.stdout);
+    let files = bench.files(folder);
+    assert!(!files.contains("spleen.vtu") && files.contains("notes.txt"), "{files:?}");
+    assert!(files.contains("spleen_skin.ply") && files.contains("liver.vtu"), "{files:?}");
 }
 
 #[test]
@@ -60,11 +142,121 @@ fn a_scan_becomes_a_scene() {
     assert!(list.stdout.contains("liver") && list.stdout.contains("46.7"), "{}", list.stdout);
     let end = bench.end_of(&["scene", "new", "scan.nrrd", "--count", "500", "--out", "made"]);
     assert_eq!(end.code, Some(0), "{}", end.stderr);
-    assert!(end.stdout.contains("next:  viscera run made/scene.toml"), "{}", end.stdout);
+    assert!(end.stdout.contains("next:  viscera run made/scan.toml"), "{}", end.stdout);
     assert!(bench.path("made/liver.vtu").exists() && bench.path("made/liver_skin.ply").exists());
+    // Volumes of scan and mesh stand side by side.
+    let columns = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    let row = end.stdout.lines().map(columns).find(|row| row.first().is_some_and(|r| r == "liver"));
+    assert_eq!(row.expect("a liver")[2..4], ["47", "47"], "{}", end.stdout);
+    assert!(end.stdout.contains("ml in scan  ml in mesh"), "{}", end.stdout);
     let wrong = bench.end_of(&["scene", "new", "scan.nrrd", "--labels", "kidney"]);
     assert_eq!(wrong.code, Some(1));
     assert!(wrong.stderr.contains("no label `kidney`; labels are 5 liver"), "{}", wrong.stderr);
+}
+
+#[test]
+fn labels_are_listed_with_names_and_without_voxels() {
+    let bench = Bench::new("");
+    let names = "Segment0_LabelValue:=5\nSegment0_Name:=Leber, links\nSegment1_LabelValue:=6\nSegment1_Name:=leber_links\n\
+        Segment2_LabelValue:=7\nSegment2_Name:=Galle\n";
+    let label = |at: [usize; 3]| match at {
+        [4, 4, 4] => 6,
+        at if at.iter().all(|at| (6..12).contains(at)) => 5,
+        _ => 0,
+    };
+    bench.write("scan.nrrd", &label_map([16, 16, 16], names, label));
+    let list = bench.end_of(&["mesh", "labels", "scan.nrrd"]).stdout;
+    for part in ["named, without voxels: 7 Galle", "labels 5,6 have the same name", "0.027"] {
+        assert!(list.contains(part), "{part}: {list}");
+    }
+    let list = bench.end_of(&["mesh", "labels", "scan.nrrd", "--names", "5=liver,6=vessel"]);
+    assert!(list.stdout.contains("liver") && !list.stdout.contains("same name"), "{}", list.stdout);
+    // By the name that its body has.
+    let new = ["scene", "new", "scan.nrrd", "--labels", "leber_links", "--out", "a"];
+    let end = bench.end_of(&new);
+    assert!(bench.path("a/leber_links.vtu").exists(), "{}", end.stderr);
+    let wrong = bench.end_of(&["scene", "new", "scan.nrrd", "--labels", "Leber, links"]);
+    assert!(
+        wrong.stderr.contains("labels are 5 leber_links (\"Leber, links\")"),
+        "{}",
+        wrong.stderr
+    );
+    let wrong = bench.end_of(&["mesh", "labels", "scan.nrrd", "--names", "liver"]);
+    assert!(wrong.stderr.contains("1=liver,2=tumor"), "{}", wrong.stderr);
+    // Without names, and with numbers of another program.
+    bench.write("lits.nrrd", &label_map([16, 16, 16], "", |at| label(at).saturating_sub(4)));
+    let list = bench.end_of(&["mesh", "labels", "lits.nrrd"]).stdout;
+    assert!(list.contains("label_1") && list.contains("--names 1=liver,2=tumor"), "{list}");
+    // What is no label map says what is.
+    bench.write("scan.mha", b"ObjectType = Image\nNDims = 3\n");
+    bench.write("scan.hdr", &[0; 400]);
+    bench.write("scan.dat", b"0 1 2 3\n");
+    for command in [
+        ["mesh", "labels", "scan.mha"],
+        ["scene", "new", "scan.mha"],
+        ["mesh", "labels", "scan.dat"],
+        ["scene", "new", "scan.hdr"],
+    ] {
+        let end = bench.end_of(&command);
+        assert_eq!(end.code, Some(1), "{}", end.stdout);
+        assert!(end.stderr.contains(".nii.gz"), "{command:?}: {}", end.stderr);
+    }
+    let end = bench.end_of(&["run", "scan.mha"]);
+    assert!(end.stderr.contains(".nii.gz"), "{}", end.stderr);
+}
+
+#[test]
+fn options_of_imports_are_told_where_they_work() {
+    let bench = Bench::new("");
+    bench.write("Cube.1.obj", CUBE.as_bytes());
+    let message = bench.end_of(&["run", "Cube.1.obj", "--count", "300"]).error().to_owned();
+    let commands: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    assert_eq!(commands.len(), 2, "{message}");
+    for command in commands {
+        let words = command.strip_prefix("viscera ").expect("a command").split(' ');
+        let end = bench.end_of(&words.collect::<Vec<_>>());
+        assert_eq!(end.code, Some(0), "{command}: {}", end.stderr);
+    }
+    assert!(bench.path("out/cube_1/scene/cube_1.toml").exists());
+    assert!(bench.path("out/cube_1/summary.json").exists());
+    let message = bench.end_of(&["run", "scene.toml", "--labels", "liver"]).error().to_owned();
+    assert!(message.contains("viscera scene new FILE --labels"), "{message}");
+    // A unit that makes no part of a body of it.
+    let end = bench.end_of(&["scene", "new", "Cube.1.obj", "--unit", "1 m", "--out", "large"]);
+    assert_eq!(end.code, Some(0), "{}", end.stderr);
+    assert!(end.stdout.contains("warning: with --unit \"1000 mm\""), "{}", end.stdout);
+    let scene = bench.read("large/cube_1.toml");
+    assert!(String::from_utf8_lossy(&scene).contains("# with --unit"));
+}
+
+#[test]
+fn bones_are_filled_as_shapes_and_made_obstacles() {
+    let bench = Bench::new("");
+    let names = "Segment0_LabelValue:=5\nSegment0_Name:=liver\nSegment1_LabelValue:=6\nSegment1_Name:=rib_left_1\n";
+    let label = |[x, y, z]: [usize; 3]| match [x, y, z] {
+        at if at.iter().all(|at| (2..14).contains(at)) => 5,
+        _ if (17..23).contains(&x) && (2..14).contains(&y) && (2..14).contains(&z) => 6,
+        _ => 0,
+    };
+    bench.write("scan.nrrd", &label_map([26, 16, 16], names, label));
+    let new = ["scene", "new", "scan.nrrd", "--count", "500", "--out", "."];
+    let message = bench.end_of(&[&new[..], &["--labels", "5,6"]].concat()).error().to_owned();
+    let commands: Vec<&str> = message.split('`').skip(3).step_by(2).take(2).collect();
+    for command in &commands {
+        let words = command.strip_prefix("viscera ").expect("a command").split_whitespace();
+        let end = bench.end_of(&words.collect::<Vec<_>>());
+        assert_eq!(end.code, Some(0), "{command}: {}", end.stderr);
+    }
+    assert_eq!(bench.end_of(&new).code, Some(0));
+    let scene = String::from_utf8(bench.read("scan.toml")).expect("text");
+    let tool = "\n[[tool]]\nkind = \"mesh\"\nmesh = \"rib_left_1.stl\"\nunit = \"1 m\"\n";
+    assert!(
+        message.contains("kind = \"mesh\", mesh = \"rib_left_1.stl\", unit = \"1 m\""),
+        "{message}"
+    );
+    bench.write("scan.toml", (scene + tool).as_bytes());
+    let run = bench.end_of(&["run", "scan.toml", "--frames", "1"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
 }
 
 #[test]
@@ -84,6 +276,7 @@ fn surfaces_are_filled_turned_and_written() {
     ];
     let end = bench.end_of(&fill);
     assert_eq!(end.code, Some(0), "{}", end.stderr);
+    assert!(end.stdout.ends_with("wrote cube.msh\n"), "{}", end.stdout);
     let inspect = bench.end_of(&["mesh", "inspect", "cube.msh"]);
     // 60^3 mm^3 are 216 ml.
     assert!(inspect.stdout.contains("Gmsh 4 binary"), "{}", inspect.stdout);
@@ -115,6 +308,10 @@ fn surfaces_are_filled_turned_and_written() {
         (&["mesh", "tetrahedralize", "cube.obj", "--out", "a.obj"], ".vtu, .vtk or .msh"),
         (&["scene", "new", "cube.obj", "--edge", "0 mm"], "above zero"),
         (&["scene", "new", "none.stl"], "no such file"),
+        (&["scene", "new", "cube.msh", "--count", "9"], "surface.stl"),
+        // Refused before anything is filled, with what works.
+        (&["scene", "new", "cube.obj", "--edge", "0.01 mm"], "take --edge \"0.9"),
+        (&["scene", "new", "cube.obj", "--count", "4000000000"], "take --count"),
     ] {
         let end = bench.end_of(arguments);
         assert_eq!(end.code, Some(1), "{arguments:?}: {}", end.stdout);

@@ -6,6 +6,7 @@ mod data;
 #[path = "../../../viscera/tests/all/common/tied.rs"]
 mod tied;
 
+mod advice;
 mod anatomy;
 mod bad_input;
 mod bench;
@@ -14,6 +15,7 @@ mod bench_scene;
 #[cfg(feature = "gpu")]
 mod devices;
 mod documents;
+mod frames;
 mod haptics;
 mod hold;
 mod imports;

@@ -52,6 +52,25 @@ fn an_abdomen_keeps_its_organs_volumes() {
 }
 
 #[test]
+fn thin_organs_of_a_whole_abdomen_keep_their_volumes() {
+    const FILE: &str = "abdomen_labels.nii.gz";
+    let Some(bytes) = data(FILE) else { return };
+    let made = import(FILE, &bytes, &Options::default());
+    assert!(made.parts.len() > 20, "{}", made.parts.len());
+    let mut tets = 0;
+    for part in &made.parts {
+        let ratio = part.mesh.volume() / part.wanted.expect("a volume");
+        assert!((ratio - 1.0).abs() < 0.02, "{}: {ratio}", part.name);
+        tets += part.mesh.tets().len();
+    }
+    assert_eq!(made.warnings, Vec::<String>::new());
+    // Costal cartilages and ribs' neighbours take more than the 20,000 of all, and not many times as many.
+    assert!((20_000..70_000).contains(&tets), "{tets}");
+    let told = format!("{tets} tetrahedra in place of about 20000");
+    assert!(made.notes.iter().any(|note| note.starts_with(&told)), "{:?}", made.notes);
+}
+
+#[test]
 fn a_surface_from_elsewhere_is_filled() {
     let Some(bytes) = data("liver_surface.obj") else { return };
     let made = import("liver_surface.obj", &bytes, &Options::default());

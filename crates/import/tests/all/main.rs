@@ -1,5 +1,6 @@
 //! From files to scenes.
 
 mod anatomy;
+mod labels;
 mod scans;
 mod surfaces;

@@ -82,6 +82,12 @@ fn a_mesh_is_scaled_as_its_name_and_size_suggest() {
         &Options { unit, ..Options::default() },
     );
     assert!((made.parts[0].mesh.volume() / mesh.volume() / 0.03f64.powi(3) - 1.0).abs() < 1e-12);
+    assert!(made.warnings.is_empty(), "{:?}", made.warnings);
+    // One that makes no liver of it is taken, and doubted.
+    let options = Options { unit: Some(1.0), ..Options::default() };
+    let made = import("my liver.msh", gmsh::write(&mesh).into_bytes(), &options);
+    let [told] = &made.warnings[..] else { panic!("{:?}", made.warnings) };
+    assert!(told.contains("an adult's liver has 1.50 l; with --unit \"36 mm\""), "{told}");
 }
 
 #[test]
@@ -159,4 +165,33 @@ fn every_part_is_held_and_regions_with_names_are_kept() {
         // The lowest 15 % of 60 mm.
         assert!(near(bounds.size().z, 0.009), "{hold:?}");
     }
+}
+
+/// Plates of 160 x 120 mm: what is too thin for the edges of 20,000 tetrahedra is refused with edges that fill it.
+#[test]
+fn thin_plates_keep_their_volume_or_are_told_how() {
+    let plate = |z: f64| {
+        let corner = |n: usize| {
+            let far = |axis: usize| f64::from((n >> axis & 1) as u8);
+            vec3(160.0 * far(0), 120.0 * far(1), z * far(2))
+        };
+        let sides =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        file(&SurfaceMesh { vertices: (0..8).map(corner).collect(), triangles })
+    };
+    for z in [2.0, 3.0, 5.0] {
+        let made = import("plate.obj", plate(z), &Options::default());
+        let ratio = made.parts[0].mesh.volume() / (160.0 * 120.0 * z * 1e-9);
+        assert_eq!((ratio - 1.0).abs() > 0.02, !made.warnings.is_empty(), "{z}: {ratio}");
+        assert!((ratio - 1.0).abs() < 0.02, "{z}: {ratio}");
+    }
+    let found = open("plate.obj", |_| Ok(plate(1.0))).expect("a surface");
+    let error = parts("plate.obj", found, &Options::default(), &mut |_| ()).err().expect("thin");
+    let text = error.to_string();
+    let edge = text.split("--edge \"").nth(1).and_then(|rest| rest.split(" mm\"").next());
+    let edge: f64 = edge.and_then(|edge| edge.parse().ok()).unwrap_or_else(|| panic!("{text}"));
+    let fineness = Some(viscera_import::Fineness::Edge(1e-3 * edge));
+    let made = import("plate.obj", plate(1.0), &Options { fineness, ..Options::default() });
+    assert!((made.parts[0].mesh.volume() / 19.2e-6 - 1.0).abs() < 0.02);
 }

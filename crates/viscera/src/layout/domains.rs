@@ -122,8 +122,8 @@ impl<S: Real> Domains<S> {
             }
         }
         let places: Vec<Vec3<f64>> = vertices.iter().map(|&v| model.places[v as usize]).collect();
-        let clusters = cluster(&tet_domains, &places);
-        let cluster_volumes = volumes_of_clusters(&clusters, &domain_volumes);
+        let (clusters, order) = cluster(&tet_domains, &places);
+        let cluster_volumes = volumes_of_clusters(&clusters, order, &domain_volumes);
         let cast = |v: Vec3<f64>| v.cast();
         let frames = shapes.iter().zip(&face_weights).map(|(shape, weights)| RestFrame {
             gradients: shape.gradients.map(cast),
@@ -161,7 +161,8 @@ impl<S: Real> Domains<S> {
             gradients: Vec::new(),
         };
         rings.find_gradients(corners, &self.tet_domains, &shapes, &domain_volumes);
-        let cluster_volumes = volumes_of_clusters(&self.clusters, &domain_volumes);
+        let cluster_volumes =
+            volumes_of_clusters(&self.clusters, 0..self.clusters.len(), &domain_volumes);
         let cast = |v: Vec3<f64>| v.cast();
         for (frame, shape) in self.frames.iter_mut().zip(&shapes) {
             (frame.gradients, frame.arms) = (shape.gradients.map(cast), shape.arms.map(cast));
@@ -399,19 +400,23 @@ fn volumes_of_domains(tet_domains: &[[u32; 4]], shapes: &[Shape], count: usize) 
     volumes
 }
 
-/// Sums of their domains' [m^3].
-fn volumes_of_clusters(clusters: &[u32], volumes: &[f64]) -> Vec<f64> {
+/// Sums of their domains' [m^3], added up in an order.
+fn volumes_of_clusters(
+    clusters: &[u32],
+    order: impl IntoIterator<Item = usize>,
+    volumes: &[f64],
+) -> Vec<f64> {
     let count = clusters.iter().max().map_or(0, |last| *last as usize + 1);
     let mut sums = vec![0.0; count];
-    for (&cluster, volume) in clusters.iter().zip(volumes) {
-        sums[cluster as usize] += volume;
+    for n in order {
+        sums[clusters[n] as usize] += volumes[n];
     }
     sums
 }
 
 /// Clusters of up to [`CLUSTER`] domains that share tetrahedra: each domain that is still free, in order, takes the
-/// nearest free ones beside it.
-fn cluster(tet_domains: &[[u32; 4]], places: &[Vec3<f64>]) -> Vec<u32> {
+/// nearest free ones beside it. Returns the cluster of each domain, and the order in which they were taken.
+fn cluster(tet_domains: &[[u32; 4]], places: &[Vec3<f64>]) -> (Vec<u32>, Vec<usize>) {
     let mut pairs: Vec<[u32; 2]> = Vec::with_capacity(12 * tet_domains.len());
     for domains in tet_domains {
         for &a in domains {
@@ -422,7 +427,7 @@ fn cluster(tet_domains: &[[u32; 4]], places: &[Vec3<f64>]) -> Vec<u32> {
     pairs.dedup();
     const FREE: u32 = u32::MAX;
     let mut clusters = vec![FREE; places.len()];
-    let mut number = 0;
+    let (mut number, mut order) = (0, Vec::with_capacity(places.len()));
     for beside in pairs.chunk_by(|a, b| a[0] == b[0]) {
         let n = beside[0][0] as usize;
         if clusters[n] != FREE {
@@ -438,8 +443,9 @@ fn cluster(tet_domains: &[[u32; 4]], places: &[Vec3<f64>]) -> Vec<u32> {
         let members = near.iter().take(CLUSTER - 1).map(|&(_, m)| m);
         for m in std::iter::once(n).chain(members) {
             clusters[m] = number;
+            order.push(m);
         }
         number += 1;
     }
-    clusters
+    (clusters, order)
 }

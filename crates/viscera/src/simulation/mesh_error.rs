@@ -29,6 +29,9 @@ const BEYOND_LINEAR: f64 = 2.0;
 /// The error of a mesh that is enough: what one does not see.
 const ENOUGH: f64 = 0.05;
 
+/// Edges shorter by more than this make more than 200 times as many tetrahedra: that is no advice.
+const MOST_TIMES_FINER: f64 = 6.0;
+
 /// Tetrahedra of the largest mesh whose own error is estimated: that takes some seconds.
 pub const MESH_ERROR_TETS: usize = 20_000;
 
@@ -57,12 +60,14 @@ impl MeshReport {
 
     /// What a person should know, and do, where the mesh is too coarse.
     pub fn advice(&self) -> Option<String> {
-        (self.largest_error() > ENOUGH).then(|| {
-            format!(
-                "for 5 % take edges of about {:.2} mm, now {:.2} mm",
-                1e3 * self.edge_for_five_percent,
-                1e3 * self.edge
-            )
+        let (needed, now) = (1e3 * self.edge_for_five_percent, 1e3 * self.edge);
+        (self.largest_error() > ENOUGH).then(|| match now / needed <= MOST_TIMES_FINER {
+            true => format!("for 5 % take edges of about {needed:.2} mm, now {now:.2} mm"),
+            // So many tetrahedra are neither made nor simulated.
+            false => format!(
+                "take finer edges, now {now:.2} mm: with those of {:.2} mm errors are about a quarter",
+                0.5 * now
+            ),
         })
     }
 }

@@ -203,6 +203,8 @@ fn limit_is_the_callers() {
     assert!(read("a", &file, Limits { voxels: 12 }).is_ok());
     let error = read("a", &file, Limits { voxels: 11 }).unwrap_err();
     let sizes = "2 x 3 x 2".to_owned();
+    // No advice that a person cannot follow.
+    assert!(error.to_string().ends_with("for example in 3D Slicer"), "{error}");
     assert_eq!(error.problem, VolumeProblem::TooLarge { sizes, limit: 11 });
 }
 
