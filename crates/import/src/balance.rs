@@ -3,36 +3,72 @@
 use viscera::scene::Scene;
 use viscera::simulation::{AssembleError, Assembly, BalanceError};
 
-use crate::bodies::Import;
+use crate::bodies::{Import, Part};
+use crate::hold::{LARGER_BACKS, at_the_back};
 
 impl Import {
-    /// Tries the scene; a body that is too soft for that begins at rest without load, and sags, with a note that says what
-    /// it would need. Calls `observe` with what is being done.
+    /// Tries the scene. A body that is too soft for its weight is held by more of its back; where that does not do, it
+    /// begins without load, and sags, with a note that says what it would need. Calls `observe` with what is being done.
     pub(crate) fn balance(&mut self, observe: &mut dyn FnMut(&str)) {
-        for _ in 0..self.parts.len() {
-            observe("the shape without gravity");
-            let written = self.scene("scene");
-            let file = |name: &str| {
-                let known = written.files.iter().find(|(known, _)| known == name);
-                known.map(|(_, bytes)| bytes.clone()).ok_or_else(|| format!("{name}: not there"))
-            };
-            let text = written.files.first().map(|(_, bytes)| String::from_utf8_lossy(bytes));
-            let scene = Scene::parse("scene.toml", &text.unwrap_or_default(), &[]);
-            // Any other fault is told where the scene is read.
-            let Ok(scene) = scene else { return };
-            let Err(AssembleError::Balance(error)) = Assembly::new(&scene, &mut |name| file(name))
-            else {
-                return;
-            };
+        let mut tries = vec![0; self.parts.len()];
+        while let Some(error) = self.try_balance(observe) {
             let (BalanceError::NotHeld { body }
             | BalanceError::Turns { body }
             | BalanceError::TooSoft { body, .. }) = &error
             else {
                 return;
             };
-            let Some(part) = self.parts.iter_mut().find(|part| part.name == *body) else { return };
-            part.is_balanced = false;
-            part.notes.push(format!("it will sag at first: {error}"));
+            let Some(index) = self.parts.iter().position(|part| part.name == *body) else { return };
+            let is_soft = matches!(error, BalanceError::TooSoft { .. });
+            let larger = LARGER_BACKS.get(tries[index]).filter(|_| is_soft);
+            tries[index] += 1;
+            match larger.and_then(|&share| self.hold_more(index, share)) {
+                Some(note) => self.parts[index].notes.push(note),
+                None => {
+                    let part = &mut self.parts[index];
+                    part.is_balanced = false;
+                    part.notes.push(format!("it sags at first: {error}"));
+                }
+            }
         }
+    }
+
+    /// Nothing where all is balanced, or where the scene has another fault, which is told where it is read.
+    fn try_balance(&self, observe: &mut dyn FnMut(&str)) -> Option<BalanceError> {
+        if !self.parts.iter().any(|part| part.is_balanced) {
+            return None;
+        }
+        observe("the shape without gravity");
+        let files = self.scene("scene").files;
+        let (_, text) = files.first()?;
+        let scene = Scene::parse("scene.toml", &String::from_utf8_lossy(text), &[]).ok()?;
+        let load = |name: &str| {
+            let known = files.iter().find(|(known, _)| known == name);
+            known.map(|(_, bytes)| bytes.clone()).ok_or_else(|| format!("{name}: not there"))
+        };
+        match Assembly::new(&scene, &mut |name| load(name)) {
+            Err(AssembleError::Balance(error)) => Some(error),
+            _ => None,
+        }
+    }
+
+    /// Holds more of a body's back, where a guess holds it there.
+    fn hold_more(&mut self, index: usize, share: f64) -> Option<String> {
+        let down = self.down;
+        let Part { name, mesh, holds, .. } = &mut self.parts[index];
+        for side in ["back", "lowest"] {
+            let larger = at_the_back(name, mesh, down, (side, share));
+            let is_of_side = |known: &str| larger.iter().any(|hold| hold.name == known);
+            let count = holds.len();
+            holds.retain(|hold| !is_of_side(&hold.name));
+            if holds.len() < count {
+                holds.extend(larger);
+                return Some(format!(
+                    "held by the {side} {:.0} % of it, so that it can rest as it is: less carries no tissue this soft",
+                    100.0 * share
+                ));
+            }
+        }
+        None
     }
 }

@@ -11,7 +11,7 @@ use viscera::scalar::{Vec3, vec3};
 use viscera_volume::VolumeReport;
 
 use crate::filling::{Filled, KEPT, Wanted, fill_to, first_spacing};
-use crate::hold::{Hold, at_the_back};
+use crate::hold::{BACK, Hold, at_the_back};
 use crate::name::{name_of, stem_of};
 use crate::open::{Found, rename};
 use crate::organs::of_labels;
@@ -302,7 +302,7 @@ fn refuse_unused(file: &str, found: &Found, options: &Options) -> Result<(), Imp
 /// A scene of one body that is held at its lowest part.
 fn alone(file: &str, name: String, mesh: TetMesh, skin: Option<Skin>, inner: Vec<Inner>) -> Import {
     let down = vec3(0.0, 0.0, -1.0);
-    let holds = at_the_back(&name, &mesh, down, "lowest");
+    let holds = at_the_back(&name, &mesh, down, ("lowest", BACK));
     let tissue = tissue::of_name(&name);
     let names = MeshNames::default();
     let (wanted, notes) = (None, Vec::new());

@@ -29,14 +29,21 @@ pub enum Place {
     Within(BoundingBox),
 }
 
-/// The share of a body's extent that is its back.
-const BACK: f64 = 0.15;
+/// The share of a body's extent that is its back, and more of it that may have to be.
+pub const BACK: f64 = 0.15;
+pub const LARGER_BACKS: [f64; 2] = [0.3, 0.45];
 
 /// More unconnected parts of a body get no holds of their own.
 const MOST_PARTS: usize = 12;
 
-/// Holds every unconnected part of a body at its lowest end, where gravity pulls it to. `down` is along an axis.
-pub fn at_the_back(body: &str, mesh: &TetMesh, down: Vec3<f64>, side: &str) -> Vec<Hold> {
+/// Holds every unconnected part of a body by a share of its extent at its lowest end, where gravity pulls it to. `down` is
+/// along an axis.
+pub fn at_the_back(
+    body: &str,
+    mesh: &TetMesh,
+    down: Vec3<f64>,
+    (side, share): (&str, f64),
+) -> Vec<Hold> {
     let parts = connected_components(mesh);
     let mut points = vec![Vec::new(); parts.count];
     for (&part, &x) in parts.labels.iter().zip(mesh.vertices()) {
@@ -46,14 +53,14 @@ pub fn at_the_back(body: &str, mesh: &TetMesh, down: Vec3<f64>, side: &str) -> V
         let mut bounds = BoundingBox::around(points);
         let size = bounds.size();
         // Away from the lowest end all but a share is cut off.
-        let cut = size.scale(down) * (1.0 - BACK);
+        let cut = size.scale(down) * (1.0 - share);
         bounds.min += cut.max(Vec3::ZERO);
         bounds.max += cut.min(Vec3::ZERO);
         let name = match number {
             0 => format!("{body}_{side}"),
             _ => format!("{body}_{side}_{}", number + 1),
         };
-        let percent = 100.0 * BACK;
+        let percent = 100.0 * share;
         let reason = format!(
             "the {side} {percent:.0} % of it: a guess; organs hang on ligaments and lie on their neighbours"
         );

@@ -14,7 +14,7 @@ use crate::ImportError;
 use crate::bodies::{Import, Inner, Options, Part, Touching, told_edges, told_loss};
 use crate::choose::{Choice, Chosen, FEWEST_VOXELS, choose};
 use crate::filling::{Filled, KEPT, Missed, RESOLVED, Wanted, fill_to, first_spacing};
-use crate::hold::{Hold, Place, at_the_back};
+use crate::hold::{BACK, Hold, Place, at_the_back};
 use crate::name::name_of;
 use crate::size::{Fineness, MOST_OF_LABELS, finest, spacing_of, tets_of};
 use crate::tissue::{self, Kind};
@@ -240,7 +240,7 @@ fn build(
         let faces: Vec<&str> = holds.iter().map(|hold| hold.reason.as_str()).collect();
         notes.push(format!("cut by the image: {}", faces.join(", ")));
     }
-    holds.extend(at_the_back(&name, &mesh, down, "back"));
+    holds.extend(at_the_back(&name, &mesh, down, ("back", BACK)));
     let filled = wall.filter(|_| !is_hollow).map(|wall| (wall, report.volume));
     let mut tissue = tissue::of_filled(&plan.name, filled);
     if let Some(share) = wall_share {

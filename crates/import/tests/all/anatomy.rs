@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use viscera::mesh::quality::dihedral_angles;
+use viscera::scene::Scene;
+use viscera::simulation::{Assembly, Simulation};
 use viscera_import::{Import, Options, open, parts};
 use viscera_volume::summarize;
 
@@ -78,4 +80,43 @@ fn a_surface_from_elsewhere_is_filled() {
     assert_eq!(part.tissue.preset, Some("liver"));
     let ratio = part.mesh.volume() / part.skin.as_ref().expect("a surface").enclosed_volume();
     assert!((ratio - 1.0).abs() < 0.005, "{ratio}");
+}
+
+fn drift(names: &[&str], frames: u32) -> f32 {
+    const FILE: &str = "abdomen_labels.nii.gz";
+    let Some(bytes) = data(FILE) else { return 0.0 };
+    let labels = names.iter().map(|name| (*name).to_owned()).collect();
+    let made = import(FILE, &bytes, &Options { labels, ..Options::default() });
+    assert!(made.parts.iter().all(|part| part.is_balanced));
+    let files = made.scene("abdomen").files;
+    let text = String::from_utf8(files[0].1.clone()).expect("text");
+    let scene = Scene::parse("abdomen.toml", &text, &[]).expect("a scene");
+    let file = |name: &str| files.iter().find(|(known, _)| known == name).map(|(_, b)| b.clone());
+    let load = &mut |name: &str| file(name).ok_or_else(|| name.to_owned());
+    let assembly = Assembly::new(&scene, load).expect("an assembly");
+    let mut simulation = Simulation::<f32>::new(scene, assembly).expect("a simulation");
+    let start = simulation.model().rest_positions.clone();
+    let mut drift: f32 = 0.0;
+    for _ in 0..frames {
+        simulation.advance_frame().expect("a frame");
+        let places = simulation.state().positions.iter().zip(&start);
+        drift = places.map(|(x, start)| (*x - *start).length()).fold(drift, f32::max);
+    }
+    assert_eq!(simulation.report().deformation.inverted, 0);
+    drift
+}
+
+/// Without a balance the liver goes 50 mm.
+#[test]
+fn organs_of_a_scan_stay_where_the_scan_has_them() {
+    let drift = drift(&["liver", "gallbladder", "kidney_right"], 10);
+    assert!(drift < 1e-3, "{drift} m");
+}
+
+#[test]
+#[ignore = "slow: three seconds of six organs"]
+fn organs_of_a_scan_stay_where_the_scan_has_them_at_length() {
+    let organs = ["liver", "gallbladder", "stomach", "kidney_left", "kidney_right", "spleen"];
+    let drift = drift(&organs, 180);
+    assert!(drift < 1e-3, "{drift} m");
 }

@@ -11,9 +11,6 @@ use crate::elements::shape_gradients;
 use crate::model::Model;
 use crate::scalar::{Mat3, Vec3};
 
-/// Residuals fall to this share of the first, in the norm of the preconditioner.
-const SOLVED: f64 = 1e-6;
-
 /// Iterations at most: more than the longest chain of tetrahedra that fits into memory needs.
 const MOST_ITERATIONS: usize = 4000;
 
@@ -73,26 +70,27 @@ impl Stiffness {
         Self { first, columns, blocks, inverses }
     }
 
-    /// `K d = r`; zero where a vertex is held.
-    pub fn solve(&self, r: &[Vec3<f64>]) -> Vec<Vec3<f64>> {
+    /// `K d = r` up to a residual of the share `solved` of `r`, in the norm of the preconditioner; zero where a vertex is
+    /// held. And how many iterations that took.
+    pub fn solve(&self, r: &[Vec3<f64>], solved: f64) -> (Vec<Vec3<f64>>, usize) {
         let n = r.len();
         let mut residual = r.to_vec();
         let mut solution = vec![Vec3::ZERO; n];
         let [mut direction, mut image, mut preconditioned] = [(); 3].map(|()| vec![Vec3::ZERO; n]);
-        let (mut product, mut begun) = (0.0, 0.0);
-        for iteration in 0..MOST_ITERATIONS {
+        let (mut product, mut begun, mut iterations) = (0.0, 0.0, 0);
+        while iterations < MOST_ITERATIONS {
             for v in 0..n {
                 preconditioned[v] = self.inverses[v] * residual[v];
             }
             let next = dot(&residual, &preconditioned);
-            if iteration == 0 {
+            if iterations == 0 {
                 begun = next;
             }
             // Zero: solved. No number: so was the residual.
-            if next.is_nan() || next <= SOLVED * SOLVED * begun {
+            if next.is_nan() || next <= solved * solved * begun {
                 break;
             }
-            let beta = if iteration == 0 { 0.0 } else { next / product };
+            let beta = if iterations == 0 { 0.0 } else { next / product };
             product = next;
             for v in 0..n {
                 direction[v] = preconditioned[v] + direction[v] * beta;
@@ -103,8 +101,9 @@ impl Stiffness {
                 solution[v] += direction[v] * alpha;
                 residual[v] -= image[v] * alpha;
             }
+            iterations += 1;
         }
-        solution
+        (solution, iterations)
     }
 
     fn times(&self, x: &[Vec3<f64>], image: &mut [Vec3<f64>]) {

@@ -21,6 +21,7 @@ use super::{Found, Statics, dot, longest, materials_of};
 use crate::elements::edge_matrix;
 use crate::layout::{Domains, Smoothing};
 use crate::mesh::tet_volume;
+use crate::mesh::topology::BoundingBox;
 use crate::model::Model;
 use crate::scalar::{Mat3, Vec3};
 use crate::settings::Elements;
@@ -35,12 +36,23 @@ const MOST_ROUNDS: usize = 60;
 /// So many former steps are combined.
 const DEPTH: usize = 6;
 
+/// In so many rounds what is missing falls to a share at least, or it never will.
+const PATIENCE: usize = 8;
+const PROGRESS: f64 = 0.3;
+
 /// Tetrahedra keep this share of their volume at least, or the step is shortened: behind zero there is no way back.
 const KEPT: f64 = 0.2;
 
 /// A load that cannot be carried is given up once the share that can is known to this, or is below the second number.
 const FINEST: f64 = 0.1;
 const LEAST: f64 = 1e-3;
+
+/// Residuals of linear solutions, as a share of the first ones: far from balance, and near it.
+const SOLVED: f64 = 1e-3;
+const LEAST_SOLVED: f64 = 1e-6;
+
+/// Vertices times iterations of linear solves at most: some seconds. A liver of 10,000 tetrahedra takes a tenth of them.
+const MOST_WORK: usize = 120_000_000;
 
 /// A shape that becomes the known one under load.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,14 +86,16 @@ impl Unloaded {
         elements: Elements,
     ) -> Result<Self, TooSoft> {
         let mut search = Search::new(model, inputs, elements);
-        let (mut carried, mut step) = (0.0f64, 1.0);
         let mut at = search.known.clone();
+        let (mut carried, mut step) = (0.0f64, search.first_share());
         let mut unbalanced = 0.0;
         while carried < 1.0 {
             let share = (carried + step).min(1.0);
             match search.carry(share, &at) {
                 Some((positions, left)) => (carried, at, unbalanced) = (share, positions, left),
-                None if step > FINEST * carried.max(LEAST) => step *= 0.5,
+                None if step > FINEST * carried.max(LEAST) && search.work < MOST_WORK => {
+                    step *= 0.5
+                }
                 None => return Err(TooSoft { share: carried }),
             }
         }
@@ -111,6 +125,8 @@ struct Search {
     /// Inverses of the edges' matrices [1/m], and volumes [m^3], of the known shape.
     shapes: Vec<(Mat3<f64>, f64)>,
     stiffness: Stiffness,
+    /// See [`MOST_WORK`].
+    work: usize,
 }
 
 /// What is left at a trial.
@@ -144,7 +160,16 @@ impl Search {
                 .then(|| Domains::new(model, Smoothing::RECOVERED)),
             moves,
             known,
+            work: 0,
         }
+    }
+
+    /// All of the load, or where small strain would have it sag by more than the body is long, a share of it that does not.
+    fn first_share(&mut self) -> f64 {
+        let known = self.known.clone();
+        let sag = self.left_at(&known).map_or(f64::INFINITY, |left| longest(&left.step));
+        let size = BoundingBox::around(&known).size();
+        (size.length() / sag).clamp(LEAST, 1.0)
     }
 
     /// The shape that carries a share of gravity, from that of another share, and what is left out of balance.
@@ -156,7 +181,13 @@ impl Search {
         let mut left = self.left_at(&at)?;
         let mut past = Past::default();
         let mut shortened = 1.0;
-        for _ in 0..MOST_ROUNDS {
+        let mut sizes = Vec::new();
+        for round in 0..MOST_ROUNDS {
+            sizes.push(left.size.sqrt());
+            let is_slow = round >= PATIENCE && sizes[round] > PROGRESS * sizes[round - PATIENCE];
+            if is_slow || self.work > MOST_WORK {
+                return None;
+            }
             if left.unbalanced < BALANCED {
                 return self.is_stable().then_some((at, left.unbalanced));
             }
@@ -206,7 +237,10 @@ impl Search {
         let loads = loads.filter(|(moves, _)| **moves).map(|(_, mass)| mass * mass).sum::<f64>();
         let load = loads.sqrt() * self.inputs.gravity.length();
         let unbalanced = dot(&residual, &residual).sqrt() / load;
-        let way = self.stiffness.solve(&residual);
+        // What is far from balance needs no digits.
+        let solved = (SOLVED * unbalanced).clamp(LEAST_SOLVED, SOLVED);
+        let (way, iterations) = self.stiffness.solve(&residual, solved);
+        self.work += iterations * at.len();
         let step = self.mapped(at, &way);
         let size = dot(&way, &way);
         let is_number = size.is_finite() && unbalanced.is_finite() && longest(&step).is_finite();

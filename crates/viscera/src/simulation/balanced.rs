@@ -35,6 +35,14 @@ impl Assembly {
         if !is_needed || self.balanced_for == Some(elements) {
             return Ok(());
         }
+        if !cfg!(feature = "balance") {
+            self.balanced_for = Some(elements);
+            self.notes.push(
+                "this build does not solve for shapes without gravity: what is `balanced` sags at first"
+                    .into(),
+            );
+            return Ok(());
+        }
         let mut tasks = Vec::new();
         for (index, body) in scene.bodies.iter().enumerate() {
             tasks.push(self.task(scene, index, body)?);
