@@ -325,12 +325,12 @@ impl Past {
 
     /// `f - (dX + dF) gamma` with `gamma` that makes `|f - dF gamma|` least: Gram and Schmidt, newest first.
     fn combine(&self, at: &[Vec3<f64>], step: &[Vec3<f64>]) -> Vec<Vec3<f64>> {
-        let mut basis: Vec<(Vec<Vec3<f64>>, Vec<Vec3<f64>>)> = Vec::new();
+        let mut basis: Vec<[Vec<Vec3<f64>>; 2]> = Vec::new();
         let (mut left, mut combined) = (step.to_vec(), vec![Vec3::ZERO; at.len()]);
         for (moved, changed) in self.moved.iter().zip(&self.changed).rev() {
             let (mut moved, mut changed) = (moved.clone(), changed.clone());
             let whole = dot(&changed, &changed);
-            for (other_moved, other) in &basis {
+            for [other_moved, other] in &basis {
                 let along = dot(&changed, other);
                 add(&mut changed, other, -along);
                 add(&mut moved, other_moved, -along);
@@ -345,7 +345,7 @@ impl Past {
             let along = dot(&left, &changed);
             add(&mut left, &changed, -along);
             add(&mut combined, &moved, -along);
-            basis.push((moved, changed));
+            basis.push([moved, changed]);
         }
         add(&mut combined, &left, 1.0);
         combined
