@@ -8,7 +8,7 @@ use viscera::simulation::{Assembly, Simulation};
 use viscera_import::{Import, Options, open, parts};
 use viscera_volume::summarize;
 
-fn data(name: &str) -> Option<Vec<u8>> {
+pub fn data(name: &str) -> Option<Vec<u8>> {
     let Some(folder) = std::env::var_os("VISCERA_DATA").map(PathBuf::from) else {
         println!("skipped: VISCERA_DATA is not set");
         return None;
