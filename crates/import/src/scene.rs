@@ -76,6 +76,9 @@ impl Import {
             let _ = writeln!(text, "distance = \"{:.2} mm\"", 1e3 * touching.distance);
         }
         text.push_str("\n[output]\nevery = 6\n");
+        if self.parts.len() > 1 {
+            text.push_str("# \"displacement\" shows how far tissue goes.\ncolors = \"bodies\"\n");
+        }
         if self.down.y < 0.0 {
             // From the front, where a surgeon stands.
             text.push_str("view_from = [0.35, 1, 0.3]\n");

@@ -94,6 +94,8 @@ pub struct Drawing<'a> {
     pub lines: Vec<Line>,
     /// Colours of values, and the scale at the right edge.
     pub color_scale: Option<ColorScale>,
+    /// Names and colours of bodies, at the right edge where there is no scale.
+    pub legend: &'a [(String, Color)],
     /// Draws a bar of known length in the lower left corner; true in the middle of the scene.
     pub length_scale: bool,
     /// What lies behind.
@@ -164,6 +166,7 @@ impl Drawing<'_> {
             title: self.title,
             caption: self.caption,
             color_scale: self.color_scale.as_ref(),
+            legend: self.legend,
             pixels_per_meter: self.length_scale.then(|| camera.pixels_per_meter()),
         };
         overlay.draw(&mut image);

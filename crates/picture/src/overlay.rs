@@ -2,7 +2,7 @@
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
-use crate::color::map_color;
+use crate::color::{Color, map_color};
 use crate::error::PictureError;
 use crate::image::{Image, ImageSize};
 
@@ -184,6 +184,8 @@ pub struct Overlay<'a> {
     pub caption: &'a str,
     /// Colours of values, at the right edge.
     pub color_scale: Option<&'a ColorScale>,
+    /// Names and colours of bodies, at the right edge below the scale's title; the first dozen.
+    pub legend: &'a [(String, Color)],
     /// For a bar of known length in the lower left corner: how many pixels a metre takes in the middle of
     /// the scene.
     pub pixels_per_meter: Option<f64>,
@@ -205,6 +207,9 @@ impl Overlay<'_> {
             write_text(image, &layout, x, margin, &title, INK);
             room -= taken + 2;
             draw_color_bar(image, &layout, scale);
+        }
+        if self.color_scale.is_none() {
+            draw_legend(image, &layout, self.legend);
         }
         write_text(image, &layout, margin, margin, &shortened(self.title, room), INK);
         let below = margin + layout.line * 6 / 5;
@@ -274,6 +279,33 @@ fn draw_color_bar(image: &mut Image, layout: &Layout, scale: &ColorScale) {
         fill(image, right..right + layout.letter / 3 + 1, y..y + 1, SOFT_INK);
         let x = right + layout.letter / 2 + layout.letter / 4;
         write_text(image, layout, x, y - layout.line / 2, &label, INK);
+    }
+}
+
+/// So many names a legend has at most.
+const MOST_NAMES: usize = 12;
+
+/// Names at the right edge, each behind a patch of its colour.
+fn draw_legend(image: &mut Image, layout: &Layout, legend: &[(String, Color)]) {
+    let width = layout.size.width() as i32;
+    let mut lines: Vec<(String, Option<Color>)> = legend
+        .iter()
+        .take(MOST_NAMES)
+        .map(|(name, color)| (shortened(name, width / layout.letter / 3), Some(*color)))
+        .collect();
+    if legend.len() > MOST_NAMES {
+        lines.push((format!("and {} more", legend.len() - MOST_NAMES), None));
+    }
+    let longest = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0) as i32;
+    let left = width - layout.margin - longest * layout.letter;
+    let side = layout.line * 3 / 5;
+    for (row, (name, color)) in (0..).zip(&lines) {
+        let top = layout.margin + row * layout.line * 5 / 4;
+        write_text(image, layout, left, top, name, INK);
+        if let Some(color) = color {
+            let (x, y) = (left - layout.letter - side, top + (layout.line - side) / 2);
+            fill(image, x..x + side, y..y + side, color.to_srgb());
+        }
     }
 }
 

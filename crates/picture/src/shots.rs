@@ -3,13 +3,15 @@
 
 use crate::{
     Arrow, Bounds, Camera, Color, ColorScale, Drawing, Facets, Image, ImageSize, Markers, Outline,
-    Paint, PictureError, Surface, TracedOutline, ViewDirection,
+    Paint, PictureError, Surface, TracedOutline, ViewDirection, body_color,
 };
 use std::collections::BTreeSet;
+use std::ops::Range;
 use viscera::contact::Tool;
 use viscera::mesh::SurfaceMesh;
 use viscera::mesh::topology::boundary_surface;
 use viscera::scalar::{Real, Vec3};
+use viscera::scene::PictureColors;
 use viscera::simulation::{FrameReport, PatchKind, ResolvedPatch, Simulation};
 
 /// Arrow of the largest force, as a fraction of the scene's diagonal.
@@ -17,6 +19,9 @@ const LONGEST_ARROW: f64 = 0.18;
 
 /// Radius of a marker, as a fraction of the scene's diagonal.
 const MARKER_RADIUS: f64 = 0.006;
+
+/// Nothing moves where nothing goes further than this share of the scene's diagonal: colours may show something else.
+const STILL: f64 = 0.01;
 
 /// What one picture shows, in single precision to save memory.
 pub struct Shot {
@@ -35,6 +40,10 @@ pub struct Subject {
     title: String,
     view: ViewDirection,
     rest: SurfaceMesh,
+    colors: PictureColors,
+    /// Names and colours of bodies, and their triangles.
+    legend: Vec<(String, Color)>,
+    triangles: Vec<Range<usize>>,
     /// Vertices with a marker: the fixed ones first, then those that are moved or pulled.
     marked: Vec<u32>,
     fixed_count: usize,
@@ -57,7 +66,17 @@ impl Subject {
         moved.extend(of(&assembly.forces));
         let fixed: Vec<u32> = of(&assembly.fixings).difference(&moved).copied().collect();
         let fixed_count = fixed.len();
+        let legend = assembly.bodies.iter().enumerate();
+        let legend = legend.map(|(n, body)| (body.name.clone(), body_color(&body.name, n)));
+        let triangles = assembly.bodies.iter().scan(0, |first, body| {
+            let range = *first..*first + body.surface.triangles.len();
+            *first = range.end;
+            Some(range)
+        });
         Self {
+            colors: simulation.scene().output.colors,
+            legend: legend.collect(),
+            triangles: triangles.collect(),
             title: simulation.scene().title.clone(),
             view: ViewDirection::from_vector(simulation.scene().output.view_from),
             rest: assembly.rest_surface(),
@@ -111,6 +130,13 @@ impl Subject {
         let scale = ColorScale::rounded("displacement [mm]", 0.0, largest)?;
         let diagonal = bounds.diagonal();
         include_tools(&mut bounds, shots);
+        let is_still = 1e-3 * largest < STILL * diagonal;
+        let by_body = match self.colors {
+            PictureColors::Auto => is_still && self.legend.len() > 1,
+            PictureColors::Displacement => false,
+            PictureColors::Bodies => true,
+        };
+        let scale = (!by_body).then_some(scale);
         let mut look = Look { subject: self, bounds, diagonal, strongest, scale };
         for shot in shots {
             for arrow in look.arrows(shot) {
@@ -148,7 +174,8 @@ pub struct Look<'a> {
     diagonal: f64,
     /// The largest force [N].
     strongest: f64,
-    scale: ColorScale,
+    /// Of displacements; nothing where colours show bodies.
+    scale: Option<ColorScale>,
 }
 
 impl Look<'_> {
@@ -171,19 +198,25 @@ impl Look<'_> {
         // What pulls is the point of the picture: it shines through where tissue hides it.
         let marks =
             |positions, color, see_through| Markers { positions, radius, color, see_through };
+        let surface_of = |triangles, paint| Surface { positions: &surface, triangles, paint };
+        let surfaces = match &self.scale {
+            Some(_) => vec![surface_of(&subject.rest.triangles[..], Paint::Values(&values[..]))],
+            None => (subject.triangles.iter().zip(&subject.legend))
+                .map(|(range, (_, color))| {
+                    surface_of(&subject.rest.triangles[range.clone()], Paint::Flat(*color))
+                })
+                .collect(),
+        };
         let drawing = Drawing {
             title: &subject.title,
             caption: &caption(shot),
-            surfaces: vec![Surface {
-                positions: &surface,
-                triangles: &subject.rest.triangles,
-                paint: Paint::Values(&values),
-            }],
+            surfaces,
+            legend: if self.scale.is_none() { &subject.legend } else { &[] },
             tools: &shot.tools,
             traced: vec![rest],
             markers: vec![marks(fixed, Color::FIXED, 0.0), marks(moved, Color::PULLED, 0.4)],
             arrows: in_front(self.arrows(shot), camera),
-            color_scale: Some(self.scale.clone()),
+            color_scale: self.scale.clone(),
             length_scale: true,
             ..Drawing::default()
         };
@@ -242,4 +275,49 @@ fn caption(shot: &Shot) -> String {
         text.push_str(&format!("   {name} {force:.3} N"));
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viscera::scene::Scene;
+    use viscera::simulation::Assembly;
+
+    const TWO: &str = r#"
+        [[body]]
+        name = "liver"
+        shape = "block"
+        size = ["40 mm", "40 mm", "40 mm"]
+        cells = [2, 2, 2]
+        material = { preset = "liver" }
+
+        [[body]]
+        name = "gallbladder"
+        shape = "block"
+        size = ["40 mm", "40 mm", "40 mm"]
+        cells = [2, 2, 2]
+        position = ["50 mm", 0, 0]
+        material = { preset = "liver" }
+    "#;
+
+    /// Pixels of a picture that are rather green.
+    fn green(settings: &[(&str, &str)]) -> usize {
+        let scene = Scene::parse("two.toml", TWO, settings).expect("a legal scene");
+        let load = &mut |file: &str| Err(file.to_owned());
+        let assembly = Assembly::new(&scene, load).expect("two blocks");
+        let simulation = Simulation::<f32>::new(scene, assembly).expect("a simulation");
+        let subject = Subject::of(&simulation);
+        let shots = [subject.shot(&simulation, &simulation.report())];
+        let look = subject.look(&shots).expect("a look");
+        let seen = look.seen_at(ImageSize::new(480, 360).expect("a size")).expect("a camera");
+        let image = look.draw(&shots[0], &seen).expect("a picture");
+        let is_green = |p: &&[u8; 3]| p[1] > p[0].saturating_add(15) && p[1] > p[2];
+        image.pixels().iter().filter(is_green).count()
+    }
+
+    #[test]
+    fn bodies_that_do_not_move_have_colours_of_their_own() {
+        assert!(green(&[]) > 1000, "a gallbladder is green: {}", green(&[]));
+        assert_eq!(green(&[("output.colors", "displacement")]), 0);
+    }
 }

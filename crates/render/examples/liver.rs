@@ -87,6 +87,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         caption: "a tenth of a second after its right end was let go",
         color_scale: scale.as_ref(),
         pixels_per_meter: Some(orbit.pixels_per_meter(image.size().height())),
+        ..Overlay::default()
     };
     overlay.draw(&mut image);
     std::fs::write(file, write_png(&image)?)?;

@@ -461,6 +461,7 @@ impl Viewport {
                 caption: &overlay::caption(snapshot, run, &remarks),
                 color_scale: scale.as_ref(),
                 pixels_per_meter: lens.map(|lens| lens.orbit().pixels_per_meter(height)),
+                ..Overlay::default()
             };
             overlay.draw(&mut image);
             images.push(image);

@@ -71,7 +71,7 @@ pub struct Unloaded {
 /// No shape without load becomes the known one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TooSoft {
-    /// A share of gravity that can be carried; zero where none was found. Stiffness counts as weight does: a body that is as many
+    /// A share of gravity that can be carried, with some room; zero where none was found. Stiffness counts as weight does: a body that is as many
     /// times stiffer can carry all of it.
     pub share: f64,
 }
@@ -96,7 +96,7 @@ impl Unloaded {
                 None if step > FINEST * carried.max(LEAST) && search.work < MOST_WORK => {
                     step *= 0.5
                 }
-                None => return Err(TooSoft { share: carried }),
+                None => return Err(TooSoft { share: carried * (1.0 - FINEST) }),
             }
         }
         let mut sag: Vec<_> = at.iter().zip(&search.known).map(|(a, b)| *a - *b).collect();

@@ -63,7 +63,7 @@ pub use crate::scalar::rigid::RigidTransform;
 pub use region::{Ball, Region, RegionLabel};
 pub use selector::{Patch, SelectError, Selector, nearest_pair};
 pub use solid::{RidgedJaw, Solid, SolidSource, Tube};
-pub use tables::{ContactSettings, OutputSettings, TimeSettings, WorldSettings};
+pub use tables::{ContactSettings, OutputSettings, PictureColors, TimeSettings, WorldSettings};
 pub use tray::read_tray;
 
 use crate::contact::{ContactLaw, TissueContact};

@@ -96,6 +96,18 @@ settings_table! {
     }
 }
 
+choices! {
+    /// What colours of pictures show.
+    pub enum PictureColors {
+        /// Bodies where there are several and none moves by more than a hundredth of their size; displacement elsewhere.
+        Auto = "auto",
+        /// How far the surface is from where it began.
+        Displacement = "displacement",
+        /// Every body has a colour of its own: organs by their names.
+        Bodies = "bodies",
+    }
+}
+
 settings_table! {
     #[default]
     /// Files that a run writes.
@@ -113,6 +125,8 @@ settings_table! {
         picture_time: Option<f64> = None, optional(quantity(Dimension::Time, at_least(0.0)));
         /// Width and height of pictures in pixels.
         picture_size: [u32; 2] = ([960, 720]), several::<2, _>(whole(16, 4096));
+        /// What colours of pictures show.
+        colors: PictureColors = (PictureColors::Auto), one_of::<PictureColors>();
         /// Tell how far forces on tools may be off: the scene runs a second time beside, in half as many substeps, by a thread
         /// of its own where `solver.threads` is not 1.
         force_error: bool = true, truth();
