@@ -4,13 +4,16 @@ use viscera::scene::Scene;
 use viscera::simulation::{AssembleError, Assembly, BalanceError};
 
 use crate::bodies::{Import, Part};
-use crate::hold::{LARGER_BACKS, at_the_back};
+use crate::hold::{Hold, LARGER_BACKS, at_the_back};
 
 impl Import {
     /// Tries the scene. A body that is too soft for its weight is held by more of its back; where that does not do, it
     /// begins without load, and sags, with a note that says what it would need. Calls `observe` with what is being done.
     pub(crate) fn balance(&mut self, observe: &mut dyn FnMut(&str)) {
+        // How often more was held, and what was before.
         let mut tries = vec![0; self.parts.len()];
+        let guessed: Vec<(Vec<Hold>, usize)> =
+            self.parts.iter().map(|part| (part.holds.clone(), part.notes.len())).collect();
         while let Some(error) = self.try_balance(observe) {
             let (BalanceError::NotHeld { body }
             | BalanceError::Turns { body }
@@ -22,14 +25,16 @@ impl Import {
             let is_soft = matches!(error, BalanceError::TooSoft { .. });
             let larger = LARGER_BACKS.get(tries[index]).filter(|_| is_soft);
             tries[index] += 1;
-            match larger.and_then(|&share| self.hold_more(index, share)) {
-                Some(note) => self.parts[index].notes.push(note),
-                None => {
-                    let part = &mut self.parts[index];
-                    part.is_balanced = false;
-                    part.notes.push(format!("it sags at first: {error}"));
-                }
-            }
+            let more = larger.and_then(|&share| self.hold_more(index, share));
+            let part = &mut self.parts[index];
+            let (holds, notes) = &guessed[index];
+            // Of several tries the last one counts.
+            part.notes.truncate(*notes);
+            part.notes.push(more.unwrap_or_else(|| {
+                part.holds.clone_from(holds);
+                part.is_balanced = false;
+                format!("it sags at first: {error}")
+            }));
         }
     }
 

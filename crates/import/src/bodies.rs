@@ -260,7 +260,7 @@ fn unit_of(
     }
 }
 
-/// Refuses options that a file has no use for, rather than to let somebody believe in them.
+/// Refuses options that a file has no use for, rather than ignore them.
 fn refuse_unused(file: &str, found: &Found, options: &Options) -> Result<(), ImportError> {
     let refuse = |is, option, why: String| {
         Err(ImportError::Option { file: file.to_owned(), is, option, why })

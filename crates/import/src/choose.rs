@@ -13,7 +13,7 @@ use crate::unit::millilitres;
 /// A label that is enclosed by another to this share of its faces is a part of it: a tumour in a liver.
 const ENCLOSED: f64 = 0.8;
 
-/// Smaller ones have no shape that a scan could show, and are taken where somebody asks for them.
+/// Smaller ones have no shape that a scan could show, and are taken where asked for.
 pub const FEWEST_VOXELS: u64 = 64;
 
 /// A body in the making.

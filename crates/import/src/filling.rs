@@ -75,7 +75,7 @@ impl Missed for FillError {
 pub fn first_spacing(volume: f64, skin: &SurfaceMesh, asked: f64, finest: f64) -> f64 {
     let thickness = 2.0 * volume / skin.area();
     let resolving = (thickness / RESOLVED).min(COARSEST * libm::cbrt(volume));
-    // What a body needs is no reason to take longer edges than somebody asks for.
+    // What a body needs is no reason to take longer edges than are asked for.
     resolving.max(finest).min(asked)
 }
 

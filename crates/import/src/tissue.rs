@@ -29,7 +29,7 @@ pub enum Kind {
     Soft,
     /// Soft, with a wall of so much [m] around what is in it.
     Hollow(f64),
-    /// A vessel, which is simulated where somebody asks for it.
+    /// A vessel, which is simulated where asked for.
     Vessel,
     /// Bone: a million times stiffer than an organ.
     Bone,

@@ -83,7 +83,7 @@ pub fn guess(name: &str, vertices: &[Vec3<f64>], volume: f64) -> Unit {
     Unit { meters, reason }
 }
 
-/// Lengths of what is simulated [m], in a unit that somebody gave: from a piece of tissue to a person.
+/// Lengths of what is simulated [m], in a unit that was given: from a piece of tissue to a person.
 const LENGTHS: std::ops::RangeInclusive<f64> = 1e-3..=3.0;
 
 /// Why a unit is probably not that of a file, see [`guess`], with one that is likely.

@@ -20,8 +20,9 @@ const LONGEST_ARROW: f64 = 0.18;
 /// Radius of a marker, as a fraction of the scene's diagonal.
 const MARKER_RADIUS: f64 = 0.006;
 
-/// Nothing moves where nothing goes further than this share of the scene's diagonal: colours may show something else.
-const STILL: f64 = 0.01;
+/// Nothing moves where nothing goes further than this share of the scene's diagonal, which nobody sees: colours may show
+/// something else than round-off.
+const STILL: f64 = 1e-3;
 
 /// What one picture shows, in single precision to save memory.
 pub struct Shot {
@@ -132,7 +133,7 @@ impl Subject {
         include_tools(&mut bounds, shots);
         let is_still = 1e-3 * largest < STILL * diagonal;
         let by_body = match self.colors {
-            PictureColors::Auto => is_still && self.legend.len() > 1,
+            PictureColors::Auto => is_still,
             PictureColors::Displacement => false,
             PictureColors::Bodies => true,
         };
@@ -300,12 +301,17 @@ mod tests {
         material = { preset = "liver" }
     "#;
 
-    /// Pixels of a picture that are rather green.
     fn green(settings: &[(&str, &str)]) -> usize {
+        green_after(settings, 0)
+    }
+
+    /// Pixels of a picture after so many frames, in which both fall, that are rather green.
+    fn green_after(settings: &[(&str, &str)], frames: u32) -> usize {
         let scene = Scene::parse("two.toml", TWO, settings).expect("a legal scene");
         let load = &mut |file: &str| Err(file.to_owned());
         let assembly = Assembly::new(&scene, load).expect("two blocks");
-        let simulation = Simulation::<f32>::new(scene, assembly).expect("a simulation");
+        let mut simulation = Simulation::<f32>::new(scene, assembly).expect("a simulation");
+        (0..frames).for_each(|_| simulation.advance_frame().expect("a frame"));
         let subject = Subject::of(&simulation);
         let shots = [subject.shot(&simulation, &simulation.report())];
         let look = subject.look(&shots).expect("a look");
@@ -319,5 +325,7 @@ mod tests {
     fn bodies_that_do_not_move_have_colours_of_their_own() {
         assert!(green(&[]) > 1000, "a gallbladder is green: {}", green(&[]));
         assert_eq!(green(&[("output.colors", "displacement")]), 0);
+        // A hundredth of the scene's size is seen.
+        assert_eq!(green_after(&[], 3), 0);
     }
 }

@@ -102,7 +102,7 @@ fn imports_replace_and_remove_only_what_imports_wrote() {
         let words: Vec<&str> = command.expect("a command").split(' ').collect();
         assert_eq!(bench.end_of(&words).code, Some(0), "{words:?}");
     }
-    // A mesh of somebody else.
+    // A mesh from elsewhere.
     std::fs::create_dir(bench.path("shared")).expect("a folder");
     bench.write("shared/phantom.vtu", b"mine");
     let end = new("phantom.obj", &["--out", "shared"]);

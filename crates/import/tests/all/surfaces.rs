@@ -1,7 +1,8 @@
 //! Meshes and surfaces as scenes.
 
 use viscera::mesh::distance::{SignedDistance, Sphere};
-use viscera::mesh::io::{MeshNames, Patch, gmsh, obj, vtk};
+use viscera::mesh::io::{MeshNames, Patch, gmsh, obj, vtk, vtu};
+use viscera::mesh::shapes::block;
 use viscera::mesh::tetrahedralize::{surface, tetrahedralize};
 use viscera::mesh::topology::count_open_edges;
 use viscera::mesh::{SurfaceMesh, TetMesh, boundary_surface};
@@ -180,18 +181,56 @@ fn thin_plates_keep_their_volume_or_are_told_how() {
         let triangles = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
         file(&SurfaceMesh { vertices: (0..8).map(corner).collect(), triangles })
     };
+    let shapes = Options { shapes_only: true, ..Options::default() };
     for z in [2.0, 3.0, 5.0] {
-        let made = import("plate.obj", plate(z), &Options::default());
+        let made = import("plate.obj", plate(z), &shapes);
         let ratio = made.parts[0].mesh.volume() / (160.0 * 120.0 * z * 1e-9);
         assert_eq!((ratio - 1.0).abs() > 0.02, !made.warnings.is_empty(), "{z}: {ratio}");
         assert!((ratio - 1.0).abs() < 0.02, "{z}: {ratio}");
     }
     let found = open("plate.obj", |_| Ok(plate(1.0))).expect("a surface");
-    let error = parts("plate.obj", found, &Options::default(), &mut |_| ()).err().expect("thin");
+    let error = parts("plate.obj", found, &shapes, &mut |_| ()).err().expect("thin");
     let text = error.to_string();
     let edge = text.split("--edge \"").nth(1).and_then(|rest| rest.split(" mm\"").next());
     let edge: f64 = edge.and_then(|edge| edge.parse().ok()).unwrap_or_else(|| panic!("{text}"));
     let fineness = Some(viscera_import::Fineness::Edge(1e-3 * edge));
-    let made = import("plate.obj", plate(1.0), &Options { fineness, ..Options::default() });
+    let made = import("plate.obj", plate(1.0), &Options { fineness, ..shapes });
     assert!((made.parts[0].mesh.volume() / 19.2e-6 - 1.0).abs() < 0.02);
+}
+
+/// A block of liver that stands on its end [m].
+fn standing(width: f64, height: f64) -> Import {
+    let cells = [2, 2, (2.0 * height / width) as usize];
+    let mesh = block(vec3(width, width, height), cells).expect("a block");
+    let bytes = vtu::write_mesh(&mesh, &MeshNames::default()).expect("a file");
+    import("liver.vtu", bytes, &Options { unit: Some(1.0), ..Options::default() })
+}
+
+/// Of 60 mm in width it falls over above 105 mm at most (7.84 E I/(rho g A), the cube of its length, less what shear takes). Vertices
+/// are held in whole layers: of these heights, 80, 97.5 and 96 mm are left.
+#[test]
+fn soft_tissue_is_held_by_as_much_as_it_needs() {
+    for (height, share) in [(0.08, "15 %"), (0.13, "30 %"), (0.16, "45 %")] {
+        let made = standing(0.06, height);
+        let part = &made.parts[0];
+        assert!(part.is_balanced, "{height}: {:?}", part.notes);
+        let [hold] = &part.holds[..] else { panic!("{:?}", part.holds) };
+        assert!(hold.reason.starts_with(&format!("the lowest {share} of it")), "{hold:?}");
+        let Place::Within(bounds) = &hold.place else { panic!("{hold:?}") };
+        let held: f64 = share.trim_end_matches(" %").parse().expect("a share");
+        assert!((bounds.max.z - 0.01 * held * height).abs() < 1e-6, "{height}: {bounds:?}");
+        assert_eq!(part.notes.len(), usize::from(share != "15 %"), "{:?}", part.notes);
+        let text = String::from_utf8(made.scene("liver").files[0].1.clone()).expect("text");
+        assert!(text.contains("balanced = true"), "{text}");
+    }
+    // A strand of 20 mm stands in no way; it sags, which is said.
+    let made = standing(0.02, 0.2);
+    let part = &made.parts[0];
+    assert!(!part.is_balanced);
+    assert!(part.holds[0].reason.starts_with("the lowest 15 %"), "{:?}", part.holds);
+    let [note] = &part.notes[..] else { panic!("{:?}", part.notes) };
+    assert!(note.starts_with("it sags at first: body `liver` cannot rest"), "{note}");
+    let text = String::from_utf8(made.scene("liver").files[0].1.clone()).expect("text");
+    assert!(!text.contains("balanced = true"), "{text}");
+    assert!(Scene::parse("liver.toml", &text, &[]).is_ok());
 }

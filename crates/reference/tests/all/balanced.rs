@@ -113,6 +113,26 @@ fn what_is_balanced_is_at_rest_before_the_reference() {
     }
 }
 
+/// A column that stands on its end falls over above `7.84 E I/(rho g A)`, the cube of its length (Greenhill, 1881), though
+/// forces are in balance while it is straight; one that hangs does not.
+#[test]
+fn what_would_fall_over_is_too_soft() {
+    let column = beam(0.15, 0.02, 0.02, 3, 0.0).expect("a column");
+    let material = Material::new(MaterialModel::StableNeoHookean, 30e3, 0.4, 1000.0);
+    let mut builder = ModelBuilder::new();
+    builder.add_body(&column, &material.expect("a material")).expect("a body");
+    let model = builder.build::<f64>().expect("a model");
+    let find = |along: f64| {
+        let held = inputs(column.vertices(), column.vertices());
+        let inputs = Inputs { gravity: vec3(along, 0.0, 0.0), ..held };
+        Unloaded::find(&model, &inputs, Elements::Recovered)
+    };
+    let critical = 7.84 * 30e3 * 0.02 * 0.02 / 12.0 / (1000.0 * 9.81 * 0.15f64.powi(3));
+    let Err(TooSoft { share }) = find(-9.81) else { panic!("it stands on a share of {critical}") };
+    assert!(share > 0.5 * critical && share < 1.2 * critical, "{share} of {critical}");
+    assert!(find(9.81).is_ok());
+}
+
 /// A density that is said to work does, and twice as much does not.
 #[test]
 fn what_cannot_be_carried_is_told_with_what_can() {

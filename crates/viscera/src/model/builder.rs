@@ -123,11 +123,6 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Positions [m] without stress where they are not those of [`ModelBuilder::positions`].
-    pub(crate) fn stress_free(&self) -> Option<&[Vec3<f64>]> {
-        (!self.stress_free.is_empty()).then_some(&self.stress_free[..])
-    }
-
     /// The anchor [m] of an attachment, and of other elements that have one, by its number.
     pub fn anchor(&self, number: usize) -> Option<Vec3<f64>> {
         self.anchors.get(number).copied()

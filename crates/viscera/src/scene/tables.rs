@@ -99,7 +99,7 @@ settings_table! {
 choices! {
     /// What colours of pictures show.
     pub enum PictureColors {
-        /// Bodies where there are several and none moves by more than a hundredth of their size; displacement elsewhere.
+        /// Bodies where nothing moves by more than a thousandth of the scene's size; displacement elsewhere.
         Auto = "auto",
         /// How far the surface is from where it began.
         Displacement = "displacement",

@@ -131,7 +131,9 @@ impl Assembly {
         finer.tools.clone_from(&self.tools);
         finer.take_samples(scene)?;
         finer.take_skin(scene)?;
-        finer.balance_as(self)?;
+        if let Some(elements) = self.balanced_for {
+            finer.balance(scene, elements)?;
+        }
         finer.notes.clear();
         Ok(finer)
     }

@@ -36,11 +36,10 @@ impl Assembly {
             return Ok(());
         }
         if !cfg!(feature = "balance") {
-            self.balanced_for = Some(elements);
-            self.notes.push(
-                "this build does not solve for shapes without gravity: what is `balanced` sags at first"
-                    .into(),
-            );
+            if self.balanced_for.replace(elements).is_none() {
+                let note = "this build does not solve for shapes without gravity: what is `balanced` sags at first";
+                self.notes.push(note.into());
+            }
             return Ok(());
         }
         let mut tasks = Vec::new();
@@ -160,23 +159,6 @@ impl Assembly {
                 self.builder.set_anchor(anchor, place);
             }
         }
-    }
-
-    /// The stress-free shapes of a coarser assembly, in this one of its refined meshes.
-    pub(super) fn balance_as(&mut self, coarse: &Self) -> Result<(), BalanceError> {
-        let Some(places) = coarse.builder.stress_free().filter(|_| coarse.balanced_for.is_some())
-        else {
-            return Ok(());
-        };
-        for (index, body) in coarse.bodies.iter().enumerate() {
-            let own = &places[body.vertices.clone()];
-            let middles = crate::mesh::topology::edges(&body.mesh);
-            let middles = middles.iter().map(|&[a, b]| (own[a as usize] + own[b as usize]) * 0.5);
-            let finer: Vec<_> = own.iter().copied().chain(middles).collect();
-            self.builder.set_stress_free(index, &finer)?;
-        }
-        self.balanced_for = coarse.balanced_for;
-        Ok(())
     }
 }
 

@@ -63,13 +63,12 @@ impl Carrying {
         let mut skin = assembly.builder.skin().clone();
         let places = assembly.builder.positions();
         let at = |point: &Point| point.iter().map(|&(v, w)| places[v as usize] * w).sum_of();
-        let carries = |tie: &&usize| {
-            let [a, b] = bodies(&skin, &skin.ties[**tie]);
+        let carries = |tie: &usize| {
+            let [a, b] = bodies(&skin, &skin.ties[*tie]);
             let other = if a == body { b } else { a };
             (a == body || b == body) && self.levels[other] < self.levels[body]
         };
-        let numbers: Vec<usize> = (0..skin.ties.len()).collect();
-        let numbers: Vec<usize> = numbers.iter().filter(carries).copied().collect();
+        let numbers: Vec<usize> = (0..skin.ties.len()).filter(carries).collect();
         let ends: Vec<[Point; 2]> = numbers.iter().map(|&n| ends(&skin, &skin.ties[n])).collect();
         // Where the body is held, and how stiffly.
         let own: Vec<usize> =

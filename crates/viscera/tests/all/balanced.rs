@@ -115,6 +115,38 @@ fn what_carries_weight_is_strained() {
     assert!(note.is_some_and(|note| note.contains("mm elsewhere")), "{:?}", bar.assembly().notes);
 }
 
+/// Reports tell that it rests. Its mesh is off by as much as without gravity where it is pulled, and by nothing where it
+/// is not.
+#[test]
+fn reports_know_of_the_shape_without_load() {
+    let mut bar = simulation(BAR, &[]);
+    drift(&mut bar, 30);
+    let rest = bar.rest().expect("it is held");
+    assert!(rest.error < 1e-3 && rest.stable, "{rest:?}");
+    assert_eq!(bar.mesh_error(), None);
+    let pull = "[[force]]\nbody = \"bar\"\nhalf_space = { point = [\"100 mm\", 0, 0], normal = [1, 0, 0] }\nforce = [0, 0, \"0.01 N\"]\n";
+    let pulled = |gravity: &str| {
+        // Far from where it buckles, a bar gives way as without weight.
+        let settings = [("body.bar.material.young", "60 kPa"), ("world.gravity", gravity)];
+        let mut bar = simulation(&format!("{BAR}\n{pull}"), &settings);
+        drift(&mut bar, 60);
+        bar.mesh_error().expect("an estimate").displacement
+    };
+    let (balanced, weightless) = (pulled("9.81 m/s^2"), pulled("0 m/s^2"));
+    let ratio = balanced / weightless;
+    assert!((0.9..1.1).contains(&ratio), "{balanced} and {weightless}");
+}
+
+/// What a motion holds from the beginning is held.
+#[test]
+fn motions_hold_before_they_move() {
+    let motion = "[[motion]]\nname = \"wall\"\nbody = \"bar\"\nhalf_space = { point = [0, 0, 0], normal = [-1, 0, 0] }\nkeys = [{ time = \"1 s\", translation = [0, 0, 0] }, { time = \"2 s\", translation = [0, 0, \"10 mm\"] }]\n";
+    let (body, _) = BAR.split_once("[[fixing]]").expect("a fixing");
+    let mut bar = simulation(&format!("{body}{motion}"), &[]);
+    let drift = drift(&mut bar, 40);
+    assert!(drift < 1e-5, "{drift:e} m");
+}
+
 #[test]
 fn finer_meshes_are_balanced_as_well() {
     let mut fine = simulation(BAR, &[("body.bar.refine", "1"), ("body.bar.cells_across", "2")]);
