@@ -5,24 +5,26 @@ use clap::{Args, Subcommand};
 use serde::Serialize;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use viscera::mesh::io::{Mesh, MeshFile, MeshNames, gmsh, obj, ply, stl, vtk, vtu};
+use viscera::mesh::io::{Mesh, MeshFile, MeshNames};
 use viscera::mesh::topology::connected_components;
 use viscera::mesh::{
     MeshRepairs, SurfaceMesh, TetMesh, boundary_surface, inspect, inspect_surface,
 };
 use viscera::scalar::{Vec3, vec3};
 use viscera::scene::RegionLabel;
-use viscera::units::Dimension;
 use viscera_import::{Found, Unit, guess_unit, is_image, open};
 use viscera_resources::files;
 
 use crate::import::{self, ImportArguments, label_name};
 use crate::labels;
+use crate::mesh_files::{check_other, ending_of, length, load, write_surface, write_tets};
+use crate::quality::{self, Verdict};
+use crate::repair::{self, RepairArguments};
 
 /// Look at mesh files and segmented scans, fill surfaces, convert formats
 #[derive(Subcommand)]
 pub enum MeshCommand {
-    /// Counts, size, volume, shape quality and what would be repaired
+    /// Counts, size, volume, shape quality, what is wrong, and what to do about it
     ///
     /// Reads Gmsh (.msh, all versions), VTK (.vtk, .vtu, .vtp), TetGen (.ele with .node), Medit (.mesh), Abaqus (.inp), and
     /// surfaces from OBJ, STL and PLY.
@@ -35,6 +37,9 @@ pub enum MeshCommand {
         /// Print JSON, in SI units, instead of a table
         #[arg(long)]
         json: bool,
+        /// Draw how often dihedral angles occur, as SVG
+        #[arg(long, value_name = "FILE")]
+        plot: Option<PathBuf>,
     },
     /// The labels of a segmented scan (NIfTI, NRRD): names, voxels, millilitres, pieces, where the image cuts them
     Labels {
@@ -62,6 +67,11 @@ pub enum MeshCommand {
     /// Writes tetrahedra as .vtu, .vtk and .msh (Gmsh 4.1), surfaces as .obj, .stl and .ply, in metres; the surface of tetrahedra where the format has
     /// no others.
     Convert(ConvertArguments),
+    /// Write a mesh with what is wrong mended or left out
+    ///
+    /// Vertices in one place become one. Tetrahedra that are flat or inside out get a volume where moving vertices inside can give them one, and are
+    /// left out elsewhere, as are those that repeat others; the boundary stays where it is. Surfaces are wound outwards and closed. Says what it did.
+    Repair(RepairArguments),
 }
 
 /// What to change on the way.
@@ -91,38 +101,49 @@ pub struct ConvertArguments {
 /// Carries out a `viscera mesh` command.
 pub fn execute(command: &MeshCommand) -> Result<()> {
     match command {
-        MeshCommand::Inspect { file, unit, json } => {
-            let unit = unit.as_deref().map(length).transpose()?;
-            inspect_file(file, unit, *json)
+        MeshCommand::Inspect { file, unit, json, plot } => {
+            inspect_file(file, unit.as_deref(), *json, plot.as_deref())
         }
         MeshCommand::Labels { file, names } => labels::list(file, names),
         MeshCommand::Tetrahedralize { file, out, import } => tetrahedralize(file, out, import),
         MeshCommand::Convert(arguments) => convert(arguments),
+        MeshCommand::Repair(arguments) => repair::execute(arguments),
     }
 }
 
-fn length(unit: &str) -> Result<f64> {
-    let unit = Dimension::Length.parse(unit).map_err(|error| anyhow::anyhow!("--unit: {error}"))?;
-    ensure!(unit > 0.0, "--unit: a length above zero is needed, for example \"1 mm\"");
-    Ok(unit)
-}
-
-fn inspect_file(file: &Path, unit: Option<f64>, json: bool) -> Result<()> {
+fn inspect_file(file: &Path, given: Option<&str>, json: bool, plot: Option<&Path>) -> Result<()> {
     let name = file.display().to_string();
-    let mesh = MeshFile::load(&name, |name| files::read(Path::new(name)))?;
+    let mesh = MeshFile::load(&name, load).map_err(anyhow::Error::msg)?;
     ensure!(
         !is_image(&name, &mesh.bytes),
         "{name} is a scan, not a mesh; look at it by `viscera mesh labels {name}`"
     );
-    let unit = match unit {
-        Some(meters) => Unit { meters, reason: "unit as given".to_owned() },
+    if let Some(plot) = plot {
+        files::prepare_file(plot, "--plot")?;
+    }
+    let unit = match given {
+        Some(unit) => Unit { meters: length(unit)?, reason: "unit as given".to_owned() },
         None => unit_of(file, &mesh)?,
     };
     match mesh.mesh(unit.meters)? {
         (Mesh::Surface(surface), report) => {
-            print(&name, unit, &inspect_surface(&surface, &report), json)
+            ensure!(
+                plot.is_none(),
+                "--plot draws the angles of tetrahedra; {name} is a surface, fill it by `viscera mesh tetrahedralize`"
+            );
+            let summary = inspect_surface(&surface, &report);
+            let verdict = Verdict::new(file, given, true, &summary.problems());
+            print(&name, unit, (&summary, &verdict), verdict.text(true), json)
         }
-        (Mesh::Tets(mesh), report) => print(&name, unit, &inspect(&mesh, &report), json),
+        (Mesh::Tets(mesh), report) => {
+            let summary = inspect(&mesh, &report);
+            let verdict = Verdict::new(file, given, false, &summary.problems());
+            print(&name, unit, (&summary, &verdict), verdict.text(false), json)?;
+            let Some(plot) = plot else { return Ok(()) };
+            let short = file.file_name().unwrap_or_default().to_string_lossy();
+            let bodies = [(short.into_owned(), summary.angles)];
+            quality::write(plot, "Dihedral angles; 70.5 degrees in a regular tetrahedron", &bodies)
+        }
     }
 }
 
@@ -146,21 +167,24 @@ struct InUnit<'a, T> {
     unit_reason: String,
     #[serde(flatten)]
     summary: &'a T,
+    verdict: &'a Verdict,
 }
 
-fn print<T: Serialize + Display>(name: &str, unit: Unit, summary: &T, json: bool) -> Result<()> {
+fn print<T: Serialize + Display>(
+    name: &str,
+    unit: Unit,
+    (summary, verdict): (&T, &Verdict),
+    text: String,
+    json: bool,
+) -> Result<()> {
     if json {
         let Unit { meters, reason } = unit;
-        let with_unit = InUnit { unit: meters, unit_reason: reason, summary };
+        let with_unit = InUnit { unit: meters, unit_reason: reason, summary, verdict };
         let text = serde_json::to_string_pretty(&with_unit).context("cannot write JSON")?;
         files::print(&format!("{text}\n"))
     } else {
-        files::print(&format!("{name}\n{:<18} {}\n{summary}", "unit", unit.reason))
+        files::print(&format!("{name}\n{:<18} {}\n{summary}{text}", "unit", unit.reason))
     }
-}
-
-fn load(name: &str) -> Result<Vec<u8>, String> {
-    files::read(Path::new(name)).map_err(|error| error.to_string())
 }
 
 fn tetrahedralize(file: &Path, out: &Path, arguments: &ImportArguments) -> Result<()> {
@@ -255,19 +279,6 @@ fn convert(arguments: &ConvertArguments) -> Result<()> {
     files::print(&notes.collect::<String>())
 }
 
-/// Refuses to write over the file that is read.
-fn check_other(file: &Path, out: &Path) -> Result<()> {
-    // What is not there yet is another.
-    if let (Ok(from), Ok(to)) = (file.canonicalize(), out.canonicalize()) {
-        ensure!(
-            from != to,
-            "{} is the file that is read; give the file to write another name",
-            out.display()
-        );
-    }
-    Ok(())
-}
-
 /// The labels of regions that are given by label or by name.
 fn labels_of(file: &str, mesh: &TetMesh, names: &MeshNames, wanted: &[String]) -> Result<Vec<u32>> {
     let mut labels = Vec::new();
@@ -338,25 +349,4 @@ fn chosen(
     let tets = kept.iter().map(|&tet| mesh.tets()[tet]).collect();
     let regions = kept.iter().map(|&tet| mesh.regions()[tet]).collect();
     Ok(TetMesh::new(mesh.vertices().to_vec(), tets, regions)?)
-}
-
-fn ending_of(path: &Path) -> Result<String> {
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-    ending.with_context(|| format!("{}: the ending says which format to write", path.display()))
-}
-
-fn write_tets(mesh: &TetMesh, names: &MeshNames, ending: &str) -> Result<Vec<u8>> {
-    Ok(match ending {
-        "msh" => gmsh::write_binary(mesh, names)?,
-        "vtk" => vtk::write(mesh, names)?,
-        _ => vtu::write_mesh(mesh, names)?,
-    })
-}
-
-fn write_surface(surface: &SurfaceMesh, ending: &str) -> Result<Vec<u8>> {
-    Ok(match ending {
-        "stl" => stl::write(surface),
-        "ply" => ply::write(surface),
-        _ => obj::write(surface, None)?.into_bytes(),
-    })
 }

@@ -19,6 +19,7 @@ mod frames;
 mod haptics;
 mod hold;
 mod imports;
+mod repair;
 mod replay;
 mod run;
 mod saved;

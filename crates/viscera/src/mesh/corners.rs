@@ -72,6 +72,19 @@ pub(super) fn find_crowded_face(tets: &[[u32; 4]]) -> Option<(usize, [u32; 3])> 
         .min()
 }
 
+/// Vertices on faces that belong to one tetrahedron only, or to two of different regions.
+pub(super) fn boundary_vertices(tets: &[[u32; 4]], regions: &[u32], count: usize) -> Vec<bool> {
+    let mut is_boundary = vec![false; count];
+    for sides in sorted_face_sides(tets).chunk_by(|a, b| a.key == b.key) {
+        let region = |side: &FaceSide| regions[side.tet as usize];
+        let is_inside = sides.len() == 2 && region(&sides[0]) == region(&sides[1]);
+        if !is_inside {
+            sides[0].key.iter().for_each(|&v| is_boundary[v as usize] = true);
+        }
+    }
+    is_boundary
+}
+
 /// The smallest box along the axes that holds all points.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BoundingBox {

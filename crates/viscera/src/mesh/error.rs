@@ -53,7 +53,7 @@ pub enum MeshError {
         vertex_count: usize,
     },
     /// A tetrahedron names the same vertex twice.
-    #[error("tetrahedron {tet} names vertex {vertex} twice; remove it or mesh the volume again")]
+    #[error("tetrahedron {tet} names vertex {vertex} twice; `viscera mesh repair` leaves it out")]
     RepeatedVertex {
         /// The tetrahedron.
         tet: usize,
@@ -61,7 +61,9 @@ pub enum MeshError {
         vertex: u32,
     },
     /// Two tetrahedra have the same four vertices.
-    #[error("tetrahedron {tet} repeats tetrahedron {first}; remove one of them")]
+    #[error(
+        "tetrahedron {tet} repeats tetrahedron {first}; `viscera mesh repair` leaves one of them out"
+    )]
     RepeatedTet {
         /// The later of the two.
         tet: usize,
@@ -83,7 +85,7 @@ pub enum MeshError {
     /// A tetrahedron without volume, relative to its own size.
     #[error(
         "tetrahedron {tet} is flat: shape quality {quality:.1e}, at least {:e} is needed; \
-        remove it or mesh the volume again",
+        `viscera mesh repair` gives it a volume or leaves it out",
         super::MIN_SHAPE_QUALITY
     )]
     FlatTet {
@@ -94,7 +96,7 @@ pub enum MeshError {
     },
     /// Three or more tetrahedra share a face, so at least two of them overlap.
     #[error("tetrahedron {tet} is the third on the face of vertices {}, {} and {}; \
-        a face has two sides, remove one of the three", face[0], face[1], face[2])]
+        a face has two sides, `viscera mesh repair` leaves out one of the three", face[0], face[1], face[2])]
     CrowdedFace {
         /// The third tetrahedron.
         tet: usize,

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::io::{CountedElements, Format, ReadReport, unused_text};
 use super::quality::{self, QualitySummary};
 use super::topology::{self, BoundingBox};
+use super::verdict::{self, DEGREES, POOR_ANGLE, Problem};
 use super::{SurfaceMesh, TetMesh};
 
 /// One part of a mesh that no tetrahedron ties to the others.
@@ -56,6 +57,8 @@ pub struct MeshSummary {
     pub max_edge: f64,
     /// Shapes of the tetrahedra.
     pub quality: QualitySummary,
+    /// How many dihedral angles lie in each bin of 5 degrees from 0 to 180, shape `[36]`.
+    pub angles: Vec<usize>,
     /// Unconnected parts, by their lowest vertex.
     pub components: Vec<ComponentSummary>,
     /// Regions, by label.
@@ -102,6 +105,7 @@ pub fn inspect(mesh: &TetMesh, report: &ReadReport) -> MeshSummary {
         mean_edge: lengths.iter().sum::<f64>() / lengths.len().max(1) as f64,
         max_edge: lengths.iter().copied().fold(0.0, f64::max),
         quality: quality::summarize_quality(mesh),
+        angles: verdict::count_angles(mesh),
         components: summarize_components(mesh),
         regions: summarize_regions(mesh, &report.region_names),
         split: report.split.clone(),
@@ -178,6 +182,35 @@ pub fn inspect_surface(mesh: &SurfaceMesh, report: &ReadReport) -> SurfaceSummar
         area: mesh.area(),
         volume: mesh.enclosed_volume(),
         skipped: report.skipped.clone(),
+    }
+}
+
+impl MeshSummary {
+    /// What is wrong, the worst first; nothing with a mesh that can be simulated as it is.
+    pub fn problems(&self) -> Vec<Problem> {
+        let mut problems = Vec::new();
+        if self.folded_face_count > 0 {
+            problems.push(Problem::Folded { faces: self.folded_face_count });
+        }
+        let bins = POOR_ANGLE / DEGREES;
+        let ends = self.angles.iter().take(bins).chain(self.angles.iter().rev().take(bins));
+        let angles: usize = ends.sum();
+        if angles > 0 {
+            let share = angles as f64 / (6 * self.tet_count) as f64;
+            problems.push(Problem::Slivers { angles, share });
+        }
+        if self.components.len() > 1 {
+            problems.push(Problem::Parts { count: self.components.len() });
+        }
+        problems
+    }
+}
+
+impl SurfaceSummary {
+    /// What is wrong; nothing with a closed surface.
+    pub fn problems(&self) -> Vec<Problem> {
+        let open = Problem::Open { edges: self.open_edge_count };
+        if self.open_edge_count > 0 { vec![open] } else { Vec::new() }
     }
 }
 

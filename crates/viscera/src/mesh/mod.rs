@@ -21,10 +21,12 @@ pub mod distance;
 pub mod embed;
 mod lattice;
 pub mod liver;
+pub mod mend;
 pub(crate) mod nearest;
 pub mod normals;
 pub mod shapes;
 pub mod tetrahedralize;
+pub mod verdict;
 pub mod winding;
 
 use crate::scalar::Vec3;
@@ -137,6 +139,28 @@ impl TetMesh {
 }
 
 impl SurfaceMesh {
+    /// Without vertices that no triangle uses, and which those are, ascending. All triangles name vertices that there are.
+    fn without_unused(self) -> (Self, Vec<u32>) {
+        let Self { vertices, mut triangles } = self;
+        let mut number = vec![u32::MAX; vertices.len()];
+        for &vertex in triangles.iter().flatten() {
+            number[vertex as usize] = 0;
+        }
+        let (mut kept, mut removed) = (Vec::with_capacity(vertices.len()), Vec::new());
+        for (vertex, x) in vertices.into_iter().enumerate() {
+            if number[vertex] == u32::MAX {
+                removed.push(vertex as u32);
+            } else {
+                number[vertex] = kept.len() as u32;
+                kept.push(x);
+            }
+        }
+        for vertex in triangles.iter_mut().flatten() {
+            *vertex = number[*vertex as usize];
+        }
+        (Self { vertices: kept, triangles }, removed)
+    }
+
     /// Enclosed volume `[m^3]`, negative if the triangles are wound inwards: the sum of the signed
     /// tetrahedra between a point and each triangle. Has a meaning for closed surfaces only.
     pub fn enclosed_volume(&self) -> f64 {

@@ -39,6 +39,7 @@ mod iterates;
 mod lanes;
 mod live;
 mod measures;
+mod mend;
 mod mesh;
 mod mesh_damage;
 mod mesh_formats;

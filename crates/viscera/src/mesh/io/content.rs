@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use super::cells::{Cells, Curved};
 use super::error::{Fault, Place, ReadProblem};
-use super::parsed::{CountedElements, Format, Patch, ReadReport};
+use super::parsed::{CountedElements, Format, MendedFile, MeshNames, Patch, ReadReport};
 use super::text::name_of;
+use crate::mesh::mend::{mend, mend_surface};
 use crate::mesh::{
     MeshError, MeshPlace, MeshRepairs, SurfaceMesh, TetMesh, boundary_surface, check_vertex,
 };
@@ -86,6 +87,31 @@ impl<'a> Content<'a> {
         Ok((mesh, report))
     }
 
+    /// What it holds, mended, see [`mend`](crate::mesh::mend); positions are multiplied by the unit.
+    pub fn into_mended(
+        mut self,
+        unit_in_meters: f64,
+        weld: Option<f64>,
+    ) -> Result<MendedFile, Fault> {
+        scale(&mut self.vertices, unit_in_meters);
+        let Self { format, vertices, cells, patches, region_names, .. } = self;
+        let wrong = |error: MeshError| Fault { place: None, problem: ReadProblem::Mesh(error) };
+        if !cells.tets.is_empty() {
+            let mended = mend(&vertices, &cells.tets, &cells.regions, weld).map_err(wrong)?;
+            let patches = patches_of_mesh(patches, &MeshRepairs::default(), vertices.len())?;
+            let named = region_names.into_iter().map(|(region, name)| (region, name_of(&name)));
+            let mut names = MeshNames { patches, regions: named.collect() };
+            names.follow(&mended);
+            return Ok(MendedFile::Tets(mended, names));
+        }
+        if cells.triangles.is_empty() {
+            return Err(no_tets(format, &cells));
+        }
+        let surface = SurfaceMesh { vertices, triangles: cells.triangles };
+        let (surface, mending) = mend_surface(&surface, weld).map_err(wrong)?;
+        Ok(MendedFile::Surface(surface, mending))
+    }
+
     /// The surface; positions are multiplied by the unit. That of the tetrahedra where the file has no triangles.
     pub fn into_surface(mut self, unit_in_meters: f64) -> Result<(SurfaceMesh, ReadReport), Fault> {
         if self.cells.triangles.is_empty() && !self.cells.tets.is_empty() {
@@ -120,7 +146,7 @@ impl<'a> Content<'a> {
             skipped.push(CountedElements { kind: "tetrahedron".into(), count: tets.len() });
         }
         let bulge = largest_bulge(&vertices, &curved, &nodes);
-        let (mesh, removed_vertices) = without_unused(vertices, triangles);
+        let (mesh, removed_vertices) = SurfaceMesh { vertices, triangles }.without_unused();
         let repairs = MeshRepairs { removed_vertices, ..MeshRepairs::default() };
         let (format, curved) = (Some(format), curved.len());
         Ok((mesh, ReadReport { format, repairs, skipped, curved, bulge, ..ReadReport::default() }))
@@ -205,27 +231,4 @@ fn largest_bulge(vertices: &[Vec3<f64>], curved: &[Curved], nodes: &[u32]) -> f6
         }
     }
     largest.sqrt()
-}
-
-fn without_unused(
-    vertices: Vec<Vec3<f64>>,
-    mut triangles: Vec<[u32; 3]>,
-) -> (SurfaceMesh, Vec<u32>) {
-    let mut number = vec![u32::MAX; vertices.len()];
-    for &vertex in triangles.iter().flatten() {
-        number[vertex as usize] = 0;
-    }
-    let (mut kept, mut removed) = (Vec::with_capacity(vertices.len()), Vec::new());
-    for (vertex, x) in vertices.into_iter().enumerate() {
-        if number[vertex] == u32::MAX {
-            removed.push(vertex as u32);
-        } else {
-            number[vertex] = kept.len() as u32;
-            kept.push(x);
-        }
-    }
-    for vertex in triangles.iter_mut().flatten() {
-        *vertex = number[*vertex as usize];
-    }
-    (SurfaceMesh { vertices: kept, triangles }, removed)
 }

@@ -25,7 +25,7 @@ pub mod vtu;
 
 pub use error::{Place, ReadError, ReadProblem, WriteError};
 pub(super) use parsed::unused_text;
-pub use parsed::{CountedElements, Format, MeshNames, Patch, ReadReport};
+pub use parsed::{CountedElements, Format, MendedFile, MeshNames, Patch, ReadReport};
 
 use super::{SurfaceMesh, TetMesh};
 use content::Content;
@@ -90,6 +90,12 @@ impl MeshFile {
             let (tets, report) = content.into_tets(unit_in_meters)?;
             Ok((Mesh::Tets(tets), report))
         })
+    }
+
+    /// What it holds, with what is wrong left out or mended, see [`mend`](super::mend). Vertices no farther apart than `weld` [m]
+    /// become one; those that a file in single precision could not tell apart where nothing is said.
+    pub fn mended(&self, unit_in_meters: f64, weld: Option<f64>) -> Result<MendedFile, ReadError> {
+        self.read(unit_in_meters, |content| content.into_mended(unit_in_meters, weld))
     }
 
     fn read<T>(

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use crate::mesh::MeshRepairs;
+use crate::mesh::mend::{Mended, SurfaceMending};
+use crate::mesh::{MeshRepairs, SurfaceMesh};
 
 /// The formats that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -103,6 +104,15 @@ impl CountedElements {
     }
 }
 
+/// What a file holds, mended.
+#[derive(Clone, Debug)]
+pub enum MendedFile {
+    /// Tetrahedra, and their names.
+    Tets(Mended, MeshNames),
+    /// Triangles alone.
+    Surface(SurfaceMesh, SurfaceMending),
+}
+
 /// Vertices that a file has a name for: a physical group, a node set.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Patch {
@@ -122,6 +132,18 @@ pub struct MeshNames {
 }
 
 impl MeshNames {
+    /// Names of a mended mesh in place of those of what it was made of.
+    pub fn follow(&mut self, mended: &Mended) {
+        for patch in &mut self.patches {
+            let after = patch.vertices.iter().filter_map(|&v| *mended.vertices.get(v as usize)?);
+            patch.vertices = after.collect();
+            patch.vertices.sort_unstable();
+            patch.vertices.dedup();
+        }
+        self.patches.retain(|patch| !patch.vertices.is_empty());
+        self.regions.retain(|(region, _)| mended.mesh.regions().contains(region));
+    }
+
     /// The regions of a mesh as messages list them: "3 `tumour`, 5".
     pub fn list_regions(&self, regions: &[u32]) -> String {
         const SHOWN: usize = 20;

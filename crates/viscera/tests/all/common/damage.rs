@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use viscera::mesh::io::{Mesh, MeshFile, ReadReport};
+use viscera::mesh::io::{MendedFile, Mesh, MeshFile, ReadReport};
 use viscera::mesh::{SurfaceMesh, TetMesh};
 
 use super::Random;
@@ -148,7 +148,16 @@ impl Reader {
         );
         let b = self.read(file, what, |file| file.tets(1.0), check_tets);
         let c = self.read(file, what, |file| file.surface(1.0), |mesh, _| check_surface(mesh));
-        a.max(b).max(c)
+        let d = self.read(
+            file,
+            what,
+            |file| file.mended(1.0, None).map(|mended| (mended, ReadReport::default())),
+            |mended, _| match mended {
+                MendedFile::Tets(mended, _) => check_tets(&mended.mesh, &ReadReport::default()),
+                MendedFile::Surface(surface, _) => check_surface(surface),
+            },
+        );
+        a.max(b).max(c).max(d)
     }
 
     fn read<T, E: std::fmt::Display>(
