@@ -22,7 +22,7 @@ use viscera::scalar::Real;
 use viscera::scene::Scene;
 use viscera::settings::{DeviceRequest, Elements, Method, Precision};
 use viscera::simulation::{Assembly, ExpectedErrors, MeshReport, RestReport, Simulation, advice};
-use viscera_resources::{BuiltInScene, Memory, MeshFiles, files, memory};
+use viscera_resources::{Memory, MeshFiles, files, memory, scene_text};
 
 /// Simulate a scene; write meshes, a picture, an animation and the numbers
 ///
@@ -209,13 +209,7 @@ pub fn settings(given: &[String]) -> Result<Vec<(&str, &str)>> {
 /// A scene of a file, or one that is built in, with settings over its own.
 pub fn parse_scene(scene: &Path, overrides: &[(&str, &str)]) -> Result<Scene> {
     let name = scene.display().to_string();
-    let bytes = match BuiltInScene::find(scene) {
-        Some(scene) => scene.text.as_bytes().to_vec(),
-        None => files::read(scene)?,
-    };
-    let Ok(text) = String::from_utf8(bytes) else {
-        bail!("{name} is not a text file; a scene is TOML in UTF-8");
-    };
+    let text = scene_text(scene)?;
     Ok(Scene::parse(&name, &text, overrides)?)
 }
 

@@ -1,6 +1,10 @@
 //! Scenes that are part of the programs: they need no file.
 
+use anyhow::{Result, bail};
 use std::path::Path;
+use viscera::settings::suggest;
+
+use crate::files;
 
 /// A scene that is part of the program.
 pub struct BuiltInScene {
@@ -24,6 +28,24 @@ impl BuiltInScene {
     pub fn find(path: &Path) -> Option<&'static Self> {
         let named = |scene: &&Self| path.as_os_str() == scene.name && !path.exists();
         BUILT_IN.iter().find(named)
+    }
+}
+
+/// The text of a scene file, or of the built-in scene of that name.
+pub fn scene_text(path: &Path) -> Result<String> {
+    let name = path.display().to_string();
+    let bytes = match BuiltInScene::find(path) {
+        Some(scene) => scene.text.as_bytes().to_vec(),
+        // A word alone is no file's name, but a scene's.
+        None if !path.exists() && path.components().count() == 1 && path.extension().is_none() => {
+            let hint = suggest(&name, &BUILT_IN.map(|scene| scene.name));
+            bail!("{name}: there is neither such a file nor a built-in scene; {hint}");
+        }
+        None => files::read(path)?,
+    };
+    match String::from_utf8(bytes) {
+        Ok(text) => Ok(text),
+        Err(_) => bail!("{name} is not a text file; a scene is TOML in UTF-8"),
     }
 }
 

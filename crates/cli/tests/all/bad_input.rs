@@ -84,6 +84,16 @@ fn missing_scene_file() {
     assert_eq!(end.error(), "nowhere.toml: there is no such file; check the name");
 }
 
+/// A word without an ending is the name of a scene.
+#[test]
+fn misspelt_scenes_are_told_with_the_one_that_is_meant() {
+    let end = Bench::new(TINY).end_of(&["run", "twst", "--out", "out"]);
+    let expected = "twst: there is neither such a file nor a built-in scene; did you mean `twist`?";
+    assert_eq!(end.error(), expected);
+    let end = Bench::new(TINY).end_of(&["run", "a/twst", "--out", "out"]);
+    assert_eq!(end.error(), "a/twst: there is no such file; check the name");
+}
+
 #[test]
 fn folder_in_place_of_a_scene() {
     let end = Bench::new(TINY).end_of(&["run", ".", "--out", "out"]);

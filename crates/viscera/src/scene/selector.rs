@@ -275,6 +275,21 @@ impl Patch {
             error: Box::new(error),
         })
     }
+
+    /// What is probably not meant: the vertices nearest to a point that is further from the body than that is large.
+    pub fn doubt(&self, mesh: &TetMesh) -> Option<String> {
+        let Selector::Nearest { point, .. } = self.selector else { return None };
+        let (min, max) = bounds(mesh.vertices())?;
+        let (away, size) = (position_outside(point, min, max).length(), (max - min).length());
+        let (purpose, place) = (&self.purpose, &self.place);
+        (away > size).then(|| {
+            format!(
+                "{place}: {purpose} takes the vertices nearest to a point that is {} mm from its body, which is {} mm large; check its unit",
+                millimetres(away),
+                millimetres(size)
+            )
+        })
+    }
 }
 
 impl PatchTable {
@@ -386,6 +401,23 @@ mod tests {
         );
         let nothing = Selector::Region(5).select(&TetMesh::default(), &without);
         assert_eq!(nothing, Err(SelectError::NoVertices));
+    }
+
+    #[test]
+    fn points_far_from_a_body_are_doubted() {
+        let nearest = |x: f64| Patch {
+            body: 0,
+            selector: Selector::Nearest { point: vec3(x, 0.05, 0.05), count: 1 },
+            purpose: "fixing `wall`".into(),
+            place: Place::Override { key: "fixing.wall.nearest.point".into() },
+        };
+        // The cube's diagonal is 173 mm.
+        assert_eq!(nearest(0.25).doubt(&cube()), None);
+        let doubt = nearest(9.1).doubt(&cube()).expect("a doubt");
+        assert!(doubt.contains("fixing `wall`") && doubt.contains("9000 mm"), "{doubt}");
+        assert!(doubt.contains("173.205 mm large"), "{doubt}");
+        let sphere = Selector::Sphere { center: vec3(9.0, 0.0, 0.0), radius: 9.0 };
+        assert_eq!(Patch { selector: sphere, ..nearest(0.0) }.doubt(&cube()), None);
     }
 
     #[test]

@@ -246,7 +246,7 @@ pub(crate) fn value_error(key: &str, node: &Node, problem: ValueError) -> Settin
 }
 
 /// The nearest valid name where one is near, otherwise all of them.
-pub(crate) fn suggest(written: &str, names: &[&str]) -> String {
+pub fn suggest(written: &str, names: &[&str]) -> String {
     let lower = shorten(&written.to_lowercase());
     let distance = |name: &str| strsim::damerau_levenshtein(&lower, &name.to_lowercase());
     let nearest = names.iter().min_by_key(|name| distance(name));

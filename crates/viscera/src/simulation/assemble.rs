@@ -155,7 +155,7 @@ impl Assembly {
     fn add_patches(&mut self, scene: &Scene) -> Result<(), AssembleError> {
         let assembly = self;
         for fixing in &scene.fixings {
-            let mut patch = assembly.resolve(&fixing.patch)?;
+            let mut patch = assembly.placed(&fixing.patch)?;
             if let Some(stiffness) = fixing.stiffness {
                 let share = stiffness / patch.vertices.len() as f64;
                 for &v in &patch.vertices {
@@ -166,16 +166,16 @@ impl Assembly {
             assembly.fixings.push(patch);
         }
         for motion in &scene.motions {
-            let patch = assembly.resolve(&motion.patch)?;
+            let patch = assembly.placed(&motion.patch)?;
             assembly.motions.push(patch);
         }
         for force in &scene.forces {
-            let patch = assembly.resolve(&force.patch)?;
+            let patch = assembly.placed(&force.patch)?;
             assembly.forces.push(patch);
         }
         for spring in &scene.springs {
-            let from = assembly.resolve(&spring.from)?.vertices;
-            let to = assembly.resolve(&spring.to)?.vertices;
+            let from = assembly.placed(&spring.from)?.vertices;
+            let to = assembly.placed(&spring.to)?.vertices;
             let points = |patch: &[u32]| -> Vec<Vec3<f64>> {
                 patch.iter().map(|&v| assembly.builder.positions()[v as usize]).collect()
             };
@@ -274,6 +274,15 @@ impl Assembly {
         let first = body.vertices.start as u32;
         let vertices = local.into_iter().map(|v| v + first).collect();
         Ok(ResolvedPatch { vertices, attachments: Vec::new() })
+    }
+
+    /// The same, with a note on what is probably a slip in the scene.
+    pub(super) fn placed(
+        &mut self,
+        patch: &crate::scene::Patch,
+    ) -> Result<ResolvedPatch, AssembleError> {
+        self.notes.extend(patch.doubt(&self.bodies[patch.body].mesh));
+        self.resolve(patch)
     }
 
     fn note_report(&mut self, name: &str, report: &ReadReport) {

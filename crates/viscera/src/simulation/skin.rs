@@ -33,6 +33,9 @@ impl Assembly {
             }
         }
         for (number, tie) in (0..).zip(&scene.ties) {
+            for patch in [&tie.from, &tie.to] {
+                self.notes.extend(patch.doubt(&self.bodies[patch.body].mesh));
+            }
             let ties = self.tie(&skin, tie, number)?;
             skin.ties.extend(ties);
         }
