@@ -11,6 +11,7 @@ mod fault;
 mod frame;
 mod functions;
 mod hold;
+mod made;
 mod picture;
 mod rest;
 mod scene;
@@ -33,6 +34,8 @@ mod _viscera {
     use super::functions::{built_in_scenes, describe, digest, version};
     #[pymodule_export]
     use super::hold::Hold;
+    #[pymodule_export]
+    use super::made::labels;
     #[pymodule_export]
     use super::rest::{Rest, rest};
     #[pymodule_export]

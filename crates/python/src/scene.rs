@@ -1,6 +1,7 @@
 //! `viscera.Scene`.
 
 use crate::fault::{Class, OrRaise, error, guarded};
+use crate::made::{self, Given, Label, Length, Made};
 use crate::values;
 use pyo3::prelude::*;
 use pyo3::types::{PyMapping, PyTuple};
@@ -29,6 +30,8 @@ pub struct Scene {
     /// Where its mesh files are looked for: beside its file, and in the data folder.
     place: PathBuf,
     data: Option<PathBuf>,
+    /// What was assumed where it was made of a file.
+    notes: Vec<String>,
     inside: Mutex<Inside>,
 }
 
@@ -91,7 +94,8 @@ impl Scene {
         let parsed = Arc::new(parse(&name, &text, &[])?);
         let data = data.or_else(|| std::env::var_os("VISCERA_DATA").map(PathBuf::from));
         let inside = Inside { overrides: Vec::new(), parsed, files: Files::new() };
-        let scene = Self { name, text, place, data, inside: Mutex::new(inside) };
+        let notes = Vec::new();
+        let scene = Self { name, text, place, data, notes, inside: Mutex::new(inside) };
         if let Some(settings) = settings {
             scene.update(settings)?;
         }
@@ -207,6 +211,50 @@ impl Scene {
         Self::build(name.to_owned(), text, place, None, settings)
     }
 
+    /// Makes a scene of a mesh, a surface or a segmented scan (docs/meshes.md): bodies with their tissue by name, held and tied
+    /// as anatomy suggests, balanced under gravity. `edge` and `count` say how finely; `unit` is the length of 1 in a mesh;
+    /// `labels` of a scan, by name or number, `names` gives them others, `hollow` leaves organs a wall around a cavity. What was
+    /// assumed stands in `notes`, doubts are warnings. Lengths are text with a unit or numbers in metres.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, edge = None, count = None, unit = None, labels = None, names = None, hollow = false, settings = None))]
+    #[expect(clippy::too_many_arguments, reason = "Python's keywords")]
+    fn from_file(
+        py: Python<'_>,
+        path: PathBuf,
+        edge: Option<Length>,
+        count: Option<usize>,
+        unit: Option<Length>,
+        labels: Option<Vec<Label>>,
+        names: Option<BTreeMap<u16, String>>,
+        hollow: bool,
+        settings: Option<&Bound<'_, PyMapping>>,
+    ) -> PyResult<Self> {
+        let given = Given { edge, count, unit, labels, names, hollow };
+        let Made { text, files, notes } = made::make(py, &path, given)?;
+        let name = path.display().to_string();
+        let scene = Self::build(name, text, PathBuf::new(), None, settings)?;
+        scene.inside().files = files;
+        Ok(Self { notes, ..scene })
+    }
+
+    /// What was assumed where it was made of a file, a line each.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+
+    /// Writes it into a folder: its text as a scene file of this name, and the meshes that it has with it.
+    fn write(&self, folder: PathBuf, name: &str) -> PyResult<PathBuf> {
+        let wrong = |problem| error(Class::File, problem);
+        files::prepare_folder(&folder, "folder").map_err(wrong)?;
+        let scene = folder.join(format!("{name}.toml"));
+        for (file, bytes) in &self.content().files {
+            files::write_atomic(&folder.join(file), bytes).map_err(wrong)?;
+        }
+        files::write_atomic(&scene, self.text.as_bytes()).map_err(wrong)?;
+        Ok(scene)
+    }
+
     /// What stands at a key: text with its unit, a number in SI units, a truth, a list; the default where nothing was
     /// written, None where there is none.
     fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
@@ -260,6 +308,7 @@ impl Scene {
             text: self.text.clone(),
             place: self.place.clone(),
             data: self.data.clone(),
+            notes: self.notes.clone(),
             inside: Mutex::new(copy),
         }
     }

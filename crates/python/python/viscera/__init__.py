@@ -37,6 +37,7 @@ from ._viscera import (
     built_in_scenes,
     describe,
     digest,
+    labels,
     rest,
     version,
 )
@@ -70,6 +71,7 @@ __all__ = [
     "describe",
     "digest",
     "fit",
+    "labels",
     "rest",
     "to_pyvista",
     "version",

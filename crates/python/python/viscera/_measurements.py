@@ -209,12 +209,12 @@ def _markers(path: Path, times: Floats) -> tuple[Floats, Floats]:
     seen = np.full((len(times), len(names), 3), np.nan)
     known = set()
     for line, text, marker, place in later:
-        time = _number(path, line, "t", text)
+        seconds = _number(path, line, "t", text)
         if marker not in rest:
             raise SceneError(
                 f"{path}, line {line}: no line with t = rest says where marker `{marker}` is unloaded"
             )
-        at = np.flatnonzero(np.isclose(times, time, rtol=0.0, atol=SAME_TIME))
+        at = np.flatnonzero(np.isclose(times, seconds, rtol=0.0, atol=SAME_TIME))
         if at.size == 0:
             raise SceneError(
                 f"{path}, line {line}: at {text} s there is a marker, and no line of the other table"

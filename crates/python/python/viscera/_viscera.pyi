@@ -21,6 +21,7 @@ __all__ = [
     "built_in_scenes",
     "describe",
     "digest",
+    "labels",
     "rest",
     "version",
 ]
@@ -31,6 +32,21 @@ class Scene:
     def load(
         path: Path, *, settings: Mapping[str, Setting] | None = None, data: Path | None = None
     ) -> Scene: ...
+    @staticmethod
+    def from_file(
+        path: Path,
+        *,
+        edge: str | float | None = None,
+        count: int | None = None,
+        unit: str | float | None = None,
+        labels: Sequence[str | int] | None = None,
+        names: Mapping[int, str] | None = None,
+        hollow: bool = False,
+        settings: Mapping[str, Setting] | None = None,
+    ) -> Scene: ...
+    @property
+    def notes(self) -> list[str]: ...
+    def write(self, folder: Path, name: str) -> Path: ...
     @staticmethod
     def builtin(name: str, *, settings: Mapping[str, Setting] | None = None) -> Scene: ...
     @staticmethod
@@ -222,6 +238,7 @@ class Rest:
     def force_along(self, key: str, name: str) -> Floats: ...
     def pull_back(self, by_positions: Mapping[str, ArrayLike]) -> dict[str, float]: ...
 
+def labels(path: Path) -> list[dict[str, Any]]: ...
 def rest(
     scene: Scene,
     times: ArrayLike | None = None,
