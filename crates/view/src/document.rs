@@ -22,6 +22,7 @@ pub struct Document {
 impl Document {
     /// Reads a scene file, or finds a built-in scene of that name.
     pub fn open(path: &Path, data: Option<&Path>) -> Result<Self> {
+        refuse_recording(path)?;
         let text = match BuiltInScene::find(path) {
             Some(scene) => scene.text.into(),
             None => {
@@ -29,7 +30,9 @@ impl Document {
                     .with_context(|| format!("built-in scenes are {}", built_in_names()))?;
                 let Ok(text) = String::from_utf8(bytes) else {
                     let shown = path.display();
-                    bail!("{shown} is not a text file; a scene is TOML in UTF-8");
+                    bail!(
+                        "{shown} is neither a scene (TOML in UTF-8) nor a mesh or a scan by its ending; open one of those"
+                    );
                 };
                 text.into()
             }
@@ -54,6 +57,15 @@ impl Document {
         let stem = self.path.file_stem().unwrap_or(self.path.as_os_str());
         stem.to_string_lossy().into_owned()
     }
+}
+
+/// Recordings are seen again by another program.
+fn refuse_recording(path: &Path) -> Result<()> {
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("viscera")) {
+        let shown = path.display();
+        bail!("{shown} is a recording of a run; see it again with: viscera replay {shown}");
+    }
+    Ok(())
 }
 
 /// The names of the scenes that need no file.

@@ -20,7 +20,7 @@ pub fn show(ui: &mut Ui, scene: &Scene, actions: &mut Vec<Action>) {
     for body in &scene.bodies {
         let title = match scene.bodies.len() {
             1 => "Material".to_owned(),
-            _ => format!("Material of {}", body.name),
+            _ => format!("Material of {}", body.name.replace('_', " ")),
         };
         section(ui, &title, true, |ui| show_body(ui, body, &mut chooser));
     }

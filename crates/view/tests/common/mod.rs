@@ -1,11 +1,14 @@
 //! The real window without a display: what drives it in tests and in `examples/dragging.rs`.
 #![allow(dead_code)]
 
-use eframe::egui::{Event, Key, Modifiers, Pos2, Rect, Role, Vec2, vec2};
+use eframe::egui::{
+    DroppedFile, DroppedFileHandle, Event, HoveredFile, Key, Modifiers, Pos2, Rect, Role, Vec2,
+    vec2,
+};
 use eframe::egui_wgpu::WgpuSetup;
 use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, wgpu};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use viscera::scene::Scene;
@@ -21,6 +24,20 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// The test harness leaves so much black around the window [pixels].
 pub const MARGIN: u32 = 8;
 
+/// A file as the system drops it.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|error| error.to_string())
+    }
+}
+
 /// The window, driven from outside.
 pub struct Window {
     pub harness: Harness<'static, App>,
@@ -30,6 +47,7 @@ pub struct Window {
     pub device: eframe::wgpu::Device,
     /// Why it had to close.
     pub farewell: Arc<OnceLock<String>>,
+    pub patience: Duration,
 }
 
 fn owned(settings: &[(&str, &str)]) -> Vec<(String, String)> {
@@ -73,6 +91,7 @@ impl Window {
             beside: owned(beside),
             data: None,
             pictures: folder.path().join("pictures"),
+            scenes: folder.path().to_owned(),
             farewell: Arc::clone(&farewell),
         };
         let context = eframe::egui::Context::default();
@@ -85,7 +104,7 @@ impl Window {
             .with_step_dt(1.0 / 60.0)
             .renderer(renderer)
             .build_ui_state(|ui, app: &mut App| app.show(ui), app);
-        Self { harness, folder, device, farewell }
+        Self { harness, folder, device, farewell, patience: PATIENCE }
     }
 
     /// Opens a scene and waits until it moves.
@@ -106,7 +125,7 @@ impl Window {
         while !holds(self.harness.state()) {
             let texts: Vec<_> = self.harness.state().messages().texts().collect();
             assert!(
-                start.elapsed() < PATIENCE,
+                start.elapsed() < self.patience,
                 "waited in vain for {what}; the window says {texts:?}"
             );
             self.harness.step();
@@ -189,6 +208,25 @@ impl Window {
         self.wait("the file", |_| path.exists());
         let text = std::fs::read_to_string(path).expect("a file");
         Scene::parse("saved", &text, &[]).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// Moves files over the window, or away from it where there are none.
+    pub fn hover_files(&mut self, files: &[&Path]) {
+        let hovered = files
+            .iter()
+            .map(|file| HoveredFile { path: Some(file.to_path_buf()), ..HoveredFile::default() });
+        self.harness.input_mut().hovered_files = hovered.collect();
+        self.harness.step();
+    }
+
+    /// Drops files onto the window.
+    pub fn drop_files(&mut self, files: &[&Path]) {
+        self.harness.input_mut().hovered_files.clear();
+        let dropped =
+            files.iter().map(|file| -> DroppedFileHandle { Arc::new(Dropped(file.to_path_buf())) });
+        self.harness.input_mut().dropped_files = dropped.collect();
+        self.harness.step();
+        self.harness.step();
     }
 
     pub fn view(&self) -> Rect {
