@@ -158,7 +158,7 @@ fn a_scene_goes_before_the_meshes_that_are_dropped_with_it() {
     assert!(has(&window, "of 2 files"), "{:?}", window.texts());
     wait_for(&mut window, "two");
     // What was open can be opened again; built-in scenes have a menu of their own.
-    assert_eq!(window.harness.state().preferences().recent, [scene.clone()]);
+    assert_eq!(window.harness.state().preferences().recent, std::slice::from_ref(&scene));
     // Another scene that is opened while one is made is what stays open.
     window.drop_files(&[&mesh]);
     window.drop_files(&[&scene]);

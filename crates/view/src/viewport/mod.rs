@@ -472,7 +472,6 @@ impl Viewport {
                 color_scale: scale.as_ref(),
                 legend: &names,
                 pixels_per_meter: lens.map(|lens| lens.orbit().pixels_per_meter(height)),
-                ..Overlay::default()
             };
             overlay.draw(&mut image);
             images.push(image);
