@@ -3,6 +3,7 @@
 use eframe::egui::{self, Color32, Ui};
 use egui_plot::{Line, Plot, PlotPoints, uniform_grid_spacer};
 
+use super::axes::round_steps;
 use crate::preferences::Preferences;
 use crate::probe::{Curve, VARIANTS};
 
@@ -48,6 +49,7 @@ pub fn show(ui: &mut Ui, preferences: &mut Preferences, curves: &[Curve]) {
     }
     plot.x_axis_label("iteration")
         .y_axis_label("residual")
+        .x_grid_spacer(uniform_grid_spacer(|input| round_steps(&input, 6.0)))
         // Powers of ten, the finest of them.
         .y_grid_spacer(uniform_grid_spacer(|_| [4.0, 2.0, 1.0]))
         .y_axis_formatter(|mark, _| format!("1e{:.0}", mark.value))
