@@ -1,15 +1,12 @@
-//! Files from elsewhere as scenes: `viscera scene new`, and `viscera run` and `viscera view` of a mesh or a scan.
+//! Files from elsewhere as scenes: `viscera scene new`, and `viscera run` of a mesh or a scan.
 
 use anyhow::{Result, bail};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use viscera::mesh::quality::summarize_quality;
 use viscera::units::Dimension;
-use viscera_import::{Fineness, Import, Options, millilitres, name_of, open, parts, stem_of};
-use viscera_report::Table;
+use viscera_import::{Fineness, Import, Options, folder_of, is_foreign, load, name_of, stem_of};
 use viscera_resources::files;
 
-use crate::made::{Replace, write};
 use crate::progress;
 
 /// How a file becomes bodies.
@@ -127,105 +124,18 @@ pub fn import_shapes(file: &Path, arguments: &ImportArguments) -> Result<Import>
 }
 
 fn import_with(file: &Path, options: Options) -> Result<Import> {
-    let name = file.display().to_string();
-    let bar = progress::spinner(format!("reading {name}"));
-    let load = |name: &str| files::read(Path::new(name)).map_err(|error| error.to_string());
-    let found = open(&name, load);
-    let made = found.and_then(|found| {
-        parts(&name, found, &options, &mut |part| bar.set_message(format!("filling {part}")))
-    });
+    let bar = progress::spinner(String::new());
+    let made = load(file, &options, &mut |doing| bar.set_message(doing));
     bar.finish_and_clear();
-    Ok(made?)
+    made
 }
 
-/// What was made: bodies with their sizes and shapes, and what was assumed.
-pub fn describe(import: &Import) -> String {
-    let mut table = Table::new([
-        "body",
-        "tets",
-        "ml in scan",
-        "ml in mesh",
-        "angles, degrees",
-        "below 10",
-        "tissue",
-        "held at",
-    ]);
-    for part in &import.parts {
-        let quality = summarize_quality(&part.mesh);
-        let (low, high) = (quality.min_dihedral.to_degrees(), quality.max_dihedral.to_degrees());
-        let held: Vec<&str> =
-            part.holds.iter().map(|hold| hold.reason.split(':').next().unwrap_or("")).collect();
-        table.row([
-            part.name.clone(),
-            part.mesh.tets().len().to_string(),
-            part.wanted.map_or_else(|| "-".to_owned(), millilitres),
-            millilitres(part.mesh.volume()),
-            format!("{low:.1} to {high:.1}"),
-            format!("{:.3} %", 100.0 * share_below(&part.mesh, 10.0)),
-            part.tissue.preset.unwrap_or("unknown").to_owned(),
-            held.join(", "),
-        ]);
-    }
-    let mut text = table.to_text();
-    for touching in &import.touching {
-        let (from, to) = (&import.parts[touching.from].name, &import.parts[touching.to].name);
-        text.push_str(&format!(
-            "tied: {from} to {to}, {:.0} % of its surface\n",
-            100.0 * touching.share
-        ));
-    }
-    for warning in &import.warnings {
-        text.push_str(&format!("warning: {warning}\n"));
-    }
-    for note in &import.notes {
-        text.push_str(&format!("note: {}\n", note.trim()));
-    }
-    for part in &import.parts {
-        for note in &part.notes {
-            text.push_str(&format!("note: {}: {note}\n", part.name));
-        }
-    }
-    text
-}
-
-/// The share of dihedral angles below a bound [degrees].
-fn share_below(mesh: &viscera::mesh::TetMesh, bound: f64) -> f64 {
-    let angles = (0..mesh.tets().len())
-        .flat_map(|tet| viscera::mesh::quality::dihedral_angles(mesh.corners(tet)));
-    let count = angles.filter(|angle| angle.to_degrees() < bound).count();
-    count as f64 / (6 * mesh.tets().len()).max(1) as f64
-}
-
-/// A mesh, a surface or a scan, in place of a scene file.
-pub fn is_foreign(path: &Path) -> bool {
-    let is_toml = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-    !is_toml && path.is_file() && looks_like_data(path)
-}
-
-/// Not text that could be a scene without an ending of its own.
-fn looks_like_data(path: &Path) -> bool {
-    // Also of images that are not read: the error says what is.
-    const ENDINGS: [&str; 21] = [
-        "msh", "vtk", "vtu", "vtp", "ele", "node", "mesh", "inp", "obj", "stl", "ply", "nii", "gz",
-        "nrrd", "nhdr", "mha", "mhd", "mgz", "mgh", "dcm", "hdr",
-    ];
-    path.extension().is_some_and(|e| ENDINGS.iter().any(|known| e.eq_ignore_ascii_case(known)))
-}
-
-/// The scene of a file from elsewhere, made in a folder beside the results.
+/// The scene of a file from elsewhere, made in a folder beside the results, with a bar that says what goes on.
 pub fn scene_of(path: &Path, folder: &Path) -> Result<PathBuf> {
-    let import = import(path, &ImportArguments::default())?;
-    let made = write(&import, &title_of(path), &folder.join("scene"), Replace::Never)?;
-    files::print(&format!("{}{}", describe(&import), made.text()))?;
+    let bar = progress::spinner(String::new());
+    let made = viscera_import::scene_of(path, folder, &mut |doing| bar.set_message(doing));
+    bar.finish_and_clear();
+    let (import, made) = made?;
+    files::print(&format!("{}{}", import.describe(), made.text()))?;
     Ok(made.scene)
-}
-
-/// What a scene of a file is called: "left kidney" of `data/left_kidney.nii.gz`.
-pub fn title_of(path: &Path) -> String {
-    stem_of(&path.to_string_lossy()).replace('_', " ")
-}
-
-/// The folder for all that is made of a file: `out/left_kidney` of `data/Left_kidney.nii.gz`.
-pub fn folder_of(path: &Path) -> PathBuf {
-    Path::new("out").join(name_of(stem_of(&path.to_string_lossy())))
 }

@@ -10,7 +10,6 @@ mod hold;
 mod import;
 mod in_order;
 mod labels;
-mod made;
 mod mesh;
 mod mesh_files;
 mod output;
@@ -91,10 +90,7 @@ fn main() -> ExitCode {
         Command::Mesh(command) => mesh::execute(&command).map(|()| run::Outcome::Finished),
         Command::Scene(command) => scene::execute(&command).map(|()| run::Outcome::Finished),
         Command::Bench(arguments) => bench::execute(&arguments).map(|()| run::Outcome::Finished),
-        Command::View(arguments) => match view::execute(&arguments) {
-            Ok(code) => return code,
-            Err(error) => Err(error),
-        },
+        Command::View(arguments) => return view::execute(&arguments),
         Command::Devices(arguments) => {
             devices::execute(&arguments).map(|()| run::Outcome::Finished)
         }

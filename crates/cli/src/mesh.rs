@@ -208,7 +208,7 @@ fn tetrahedralize(file: &Path, out: &Path, arguments: &ImportArguments) -> Resul
         files::write_atomic(&target, &write_tets(&part.mesh, &part.names, &ending)?)?;
         written.push_str(&format!("wrote {}\n", target.display()));
     }
-    files::print(&format!("{}{written}", import::describe(&import)))
+    files::print(&format!("{}{written}", import.describe()))
 }
 
 fn convert(arguments: &ConvertArguments) -> Result<()> {

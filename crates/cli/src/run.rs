@@ -92,7 +92,7 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     let folder = arguments.out.clone().unwrap_or_else(|| folder_of(&arguments.scene));
     let made;
     let mut arguments = arguments;
-    if import::is_foreign(&arguments.scene) {
+    if viscera_import::is_foreign(&arguments.scene) {
         // A mesh or a scan: its scene is made first, and stays beside the results to be changed.
         let scene = import::scene_of(&arguments.scene, &folder)?;
         made = RunArguments { scene, ..arguments.clone() };
@@ -130,8 +130,8 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
 
 /// The folder for the results of a scene or a file from elsewhere.
 fn folder_of(scene: &Path) -> PathBuf {
-    match import::is_foreign(scene) {
-        true => import::folder_of(scene),
+    match viscera_import::is_foreign(scene) {
+        true => viscera_import::folder_of(scene),
         false => Path::new("out").join(scene.file_stem().unwrap_or(scene.as_os_str())),
     }
 }

@@ -1,11 +1,11 @@
 //! `viscera scene`.
 
 use crate::import::{self, ImportArguments};
-use crate::made::{Replace, write};
 use anyhow::Result;
 use clap::Subcommand;
 use std::path::{Path, PathBuf};
 use viscera::scene::{Scene, describe_markdown, describe_text};
+use viscera_import::{Replace, folder_of, title_of, write};
 use viscera_report::Table;
 use viscera_resources::{BUILT_IN, BuiltInScene, files};
 
@@ -59,10 +59,10 @@ fn new(
     is_forced: bool,
     arguments: &ImportArguments,
 ) -> Result<String> {
-    let title = import::title_of(file);
+    let title = title_of(file);
     let folder = match out {
         Some(folder) => folder.to_owned(),
-        None => import::folder_of(file).join("scene"),
+        None => folder_of(file).join("scene"),
     };
     let made = import::import(file, arguments)?;
     let replace = if is_forced { Replace::Always } else { Replace::Unchanged };
@@ -70,7 +70,7 @@ fn new(
     let shown = written.scene.display();
     Ok(format!(
         "{}{}next:  viscera run {shown}   or   viscera view {shown}\n",
-        import::describe(&made),
+        made.describe(),
         written.text()
     ))
 }

@@ -1,7 +1,5 @@
 //! `viscera view`: starts the window, which is a program of its own so that this one builds quickly.
 
-use crate::import;
-use anyhow::Result;
 use clap::Args;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -18,17 +16,11 @@ pub struct ViewArguments {
 }
 
 /// Starts the window and waits until it is closed; its exit code is this one's.
-pub fn execute(arguments: &ViewArguments) -> Result<ExitCode> {
+pub fn execute(arguments: &ViewArguments) -> ExitCode {
     let program = std::env::current_exe().map(|this| beside(&this));
-    let mut passed = arguments.arguments.clone();
-    for argument in &mut passed {
-        let path = Path::new(argument);
-        if import::is_foreign(path) {
-            *argument = import::scene_of(path, &import::folder_of(path))?.into_os_string();
-        }
-    }
-    let started = program.and_then(|program| Command::new(program).args(&passed).status());
-    Ok(match started {
+    let passed = &arguments.arguments;
+    let started = program.and_then(|program| Command::new(program).args(passed).status());
+    match started {
         Ok(status) => match u8::try_from(status.code().unwrap_or(1)) {
             Ok(code) => ExitCode::from(code),
             Err(_) => ExitCode::FAILURE,
@@ -41,7 +33,7 @@ pub fn execute(arguments: &ViewArguments) -> Result<ExitCode> {
             );
             ExitCode::FAILURE
         }
-    })
+    }
 }
 
 /// The window's program in the folder of this one.

@@ -52,6 +52,6 @@ pub use error::PictureError;
 pub use facets::Facets;
 pub use image::{Image, ImageSize, write_png};
 pub use marks::{Arrow, Background, Markers, Paint};
-pub use organs::body_color;
+pub use organs::{BodyColor, body_color};
 pub use overlay::{ColorScale, Overlay};
 pub use shots::{Look, Seen, Shot, Subject};

@@ -1,5 +1,8 @@
 //! Colours of bodies: organs look as surgeons know them, others take turns.
 
+use std::ops::Range;
+use viscera::simulation::Assembly;
+
 use crate::color::Color;
 
 /// A part of a name, and what is called so; the first that fits counts.
@@ -48,6 +51,30 @@ const OTHERS: [[u8; 3]; 6] = [
     [150, 104, 140],
     [204, 136, 126],
 ];
+
+/// A body in a picture in which colours tell bodies apart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyColor {
+    /// Its name.
+    pub name: String,
+    /// Its colour.
+    pub color: Color,
+    /// Its triangles, among those of all surfaces one body after the other.
+    pub triangles: Range<usize>,
+}
+
+impl BodyColor {
+    /// All bodies of a scene.
+    pub fn of(assembly: &Assembly) -> Vec<Self> {
+        let mut first = 0;
+        let bodies = assembly.bodies.iter().enumerate().map(|(number, body)| {
+            let triangles = first..first + body.surface.triangles.len();
+            first = triangles.end;
+            Self { name: body.name.clone(), color: body_color(&body.name, number), triangles }
+        });
+        bodies.collect()
+    }
+}
 
 /// The colour of a body, the `number`-th of its scene.
 pub fn body_color(name: &str, number: usize) -> Color {

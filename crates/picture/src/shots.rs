@@ -2,8 +2,8 @@
 //! moves, so that camera and colours are the same in all of them.
 
 use crate::{
-    Arrow, Bounds, Camera, Color, ColorScale, Drawing, Facets, Image, ImageSize, Markers, Outline,
-    Paint, PictureError, Surface, TracedOutline, ViewDirection, body_color,
+    Arrow, BodyColor, Bounds, Camera, Color, ColorScale, Drawing, Facets, Image, ImageSize,
+    Markers, Outline, Paint, PictureError, Surface, TracedOutline, ViewDirection,
 };
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -67,17 +67,13 @@ impl Subject {
         moved.extend(of(&assembly.forces));
         let fixed: Vec<u32> = of(&assembly.fixings).difference(&moved).copied().collect();
         let fixed_count = fixed.len();
-        let legend = assembly.bodies.iter().enumerate();
-        let legend = legend.map(|(n, body)| (body.name.clone(), body_color(&body.name, n)));
-        let triangles = assembly.bodies.iter().scan(0, |first, body| {
-            let range = *first..*first + body.surface.triangles.len();
-            *first = range.end;
-            Some(range)
-        });
+        let bodies = BodyColor::of(assembly).into_iter();
+        let (legend, triangles) =
+            bodies.map(|body| ((body.name, body.color), body.triangles)).unzip();
         Self {
             colors: simulation.scene().output.colors,
-            legend: legend.collect(),
-            triangles: triangles.collect(),
+            legend,
+            triangles,
             title: simulation.scene().title.clone(),
             view: ViewDirection::from_vector(simulation.scene().output.view_from),
             rest: assembly.rest_surface(),

@@ -165,7 +165,7 @@ def test_names_and_shapes_are_checked() -> None:
 
 
 def test_a_ball_that_comes_at_once_presses_as_it_does_slowly() -> None:
-    ball = {
+    ball: dict[str, Any] = {
         "tool.ball.friction": 0.0,
         "tool.ball.keys": [{"time": "0.4 s", "translation": [0, 0, "-7 mm"]}],
     }

@@ -291,7 +291,8 @@ fn draw_triangles(pass: &mut wgpu::RenderPass<'_>, body: &BodyView<'_>) {
     let surface = body.surface;
     pass.set_vertex_buffer(0, surface.vertices().slice(..));
     pass.set_index_buffer(surface.indices().slice(..), wgpu::IndexFormat::Uint32);
-    pass.draw_indexed(0..surface.index_count(), 0, 0..1);
+    let [first, end] = body.triangles.map(|number| (3 * number).min(surface.index_count()));
+    pass.draw_indexed(first..end, 0, 0..1);
 }
 
 fn check(drawing: &GpuDrawing<'_>) -> Result<(), RenderError> {

@@ -47,6 +47,8 @@ impl GpuDrawing<'_> {
 pub struct BodyView<'a> {
     /// Where it is.
     pub surface: &'a GpuSurface,
+    /// Which of its triangles are drawn: from the first on, before the second. Edges are those of all.
+    pub triangles: [u32; 2],
     /// Its colours.
     pub paint: Paint<ScaledValues<'a>>,
     /// Whether the edges of its triangles are drawn.
@@ -58,7 +60,9 @@ pub struct BodyView<'a> {
 impl<'a> BodyView<'a> {
     /// Solid, in the colour of tissue.
     pub fn of(surface: &'a GpuSurface) -> Self {
-        Self { surface, paint: Paint::Flat(Color::TISSUE), wireframe: false, opacity: 1.0 }
+        let triangles = [0, surface.index_count() / 3];
+        let paint = Paint::Flat(Color::TISSUE);
+        Self { surface, triangles, paint, wireframe: false, opacity: 1.0 }
     }
 }
 

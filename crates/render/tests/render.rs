@@ -100,6 +100,26 @@ fn values_take_the_colours_of_the_scale_and_none_is_grey() {
 }
 
 #[test]
+fn parts_of_a_surface_have_colours_of_their_own() {
+    let ball = Ball::new(&device());
+    let canvas = ball.canvas([160, 120], Quality::plain());
+    let all = BodyView::of(&ball.surface);
+    let parts = |color| {
+        let [first, end] = all.triangles;
+        let middle = (first + end) / 2;
+        let rest = BodyView { triangles: [middle, end], paint: Paint::Flat(color), ..all };
+        let bodies = vec![BodyView { triangles: [first, middle], ..all }, rest];
+        ball.picture(&canvas, &GpuDrawing { bodies, ..ball.drawing() })
+    };
+    // Two halves in one colour are the whole.
+    assert_eq!(parts(Color::TISSUE), ball.picture(&canvas, &ball.drawing()));
+    let halves = parts(Color::from_srgb([60, 160, 60]));
+    let green = halves.pixels().iter().filter(|p| p[1] > p[0].saturating_add(15)).count();
+    let red = tissue(&halves);
+    assert!(green > 200 && red > 200, "{green} and {red} pixels");
+}
+
+#[test]
 fn a_marker_is_seen_before_tissue_and_behind_it_where_it_shines_through() {
     let ball = Ball::new(&device());
     let canvas = ball.canvas([160, 120], Quality::plain());

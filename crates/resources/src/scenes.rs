@@ -45,7 +45,9 @@ pub fn scene_text(path: &Path) -> Result<String> {
     };
     match String::from_utf8(bytes) {
         Ok(text) => Ok(text),
-        Err(_) => bail!("{name} is not a text file; a scene is TOML in UTF-8"),
+        Err(_) => bail!(
+            "{name} is neither a scene (TOML in UTF-8) nor a mesh or a scan by its ending; open one of those"
+        ),
     }
 }
 

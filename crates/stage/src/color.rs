@@ -21,7 +21,7 @@ pub fn surface_values<S: Real>(
 ) {
     values.clear();
     match coloring {
-        Coloring::Plain => {}
+        Coloring::Plain | Coloring::Bodies => {}
         Coloring::Displacement => displacements(assembly, positions, values),
         Coloring::Strain => averages(assembly, tets, |tet| tet.stretches[0] - 1.0, values),
         Coloring::Stress => averages(assembly, tets, |tet| tet.von_mises, values),

@@ -3,7 +3,7 @@
 use viscera::scalar::Vec3;
 use viscera::simulation::Assembly;
 use viscera::solver::gpu::{Device, GpuSurface, Skin};
-use viscera_picture::Color;
+use viscera_picture::{BodyColor, Color};
 use viscera_render::{
     Arrow, BodyView, BoundingSphere, GpuDrawing, Markers, Orbit, Paint, ScaledValues, ValueBuffer,
 };
@@ -78,6 +78,8 @@ pub struct PictureContents<'a> {
     pub ghost: Option<&'a RunSurface>,
     /// The values that its colours begin and end at, where they show values.
     pub range: Option<[f32; 2]>,
+    /// Bodies in colours of their own; none where all look the same, or colours show values.
+    pub bodies: &'a [BodyColor],
     /// Whether the triangles are drawn.
     pub wireframe: bool,
     /// Whether it throws a shadow.
@@ -112,6 +114,12 @@ impl PictureContents<'_> {
             None => Paint::Flat(Color::TISSUE),
         };
         let body = BodyView { paint, wireframe: self.wireframe, ..BodyView::of(&surface.surface) };
+        let mut bodies: Vec<_> = self.bodies.iter().map(|one| one_of(one, &body)).collect();
+        match bodies.last_mut() {
+            // Edges are those of all bodies, which are in their places by then.
+            Some(last) => last.wireframe = self.wireframe,
+            None => bodies.push(body),
+        }
         let ghost = self.ghost.map(|ghost| BodyView {
             paint: Paint::Flat(Color::REST),
             opacity: 0.3,
@@ -130,7 +138,7 @@ impl PictureContents<'_> {
         let is_long = |arrow: &Arrow| (arrow.to - arrow.from).length() > Self::PICKED * self.extent;
         let forces = force_arrows(self.tools, &self.orbit, self.force_scale, radius);
         GpuDrawing {
-            bodies: [Some(body), ghost].into_iter().flatten().collect(),
+            bodies: bodies.into_iter().chain(ghost).collect(),
             markers: vec![
                 balls(self.fixed, Self::FIXED, Color::FIXED),
                 balls(self.picked, Self::PICKED, Color::PULLED),
@@ -141,4 +149,10 @@ impl PictureContents<'_> {
             ..GpuDrawing::from(self.orbit)
         }
     }
+}
+
+/// One of several bodies, in its own colour.
+fn one_of<'a>(body: &BodyColor, all: &BodyView<'a>) -> BodyView<'a> {
+    let triangles = [body.triangles.start, body.triangles.end].map(|number| number as u32);
+    BodyView { triangles, paint: Paint::Flat(body.color), wireframe: false, ..*all }
 }

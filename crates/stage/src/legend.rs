@@ -23,8 +23,8 @@ pub struct Legend {
 /// hundred; those of displacement are no outliers, and tools press on few vertices, of which all count.
 fn share_held(coloring: Coloring) -> f64 {
     match coloring {
-        Coloring::Plain | Coloring::Displacement | Coloring::Pressure => 1.0,
         Coloring::Strain | Coloring::Stress => 0.99,
+        _ => 1.0,
     }
 }
 
@@ -36,9 +36,9 @@ const LOWEST: f32 = 0.2;
 /// as colours otherwise.
 fn least(coloring: Coloring) -> f32 {
     match coloring {
-        Coloring::Plain | Coloring::Stress | Coloring::Pressure => 1.0,
         Coloring::Displacement => 1e-4,
         Coloring::Strain => 1e-3,
+        _ => 1.0,
     }
 }
 
@@ -82,7 +82,7 @@ impl Legend {
     pub fn text(&self, value: f32) -> String {
         let value = f64::from(value);
         match self.coloring {
-            Coloring::Plain => String::new(),
+            Coloring::Plain | Coloring::Bodies => String::new(),
             Coloring::Displacement => Dimension::Length.format(value),
             Coloring::Strain => format!("{} %", viscera::units::format_number(100.0 * value)),
             Coloring::Stress | Coloring::Pressure => Dimension::Pressure.format(value),
@@ -93,7 +93,7 @@ impl Legend {
     pub fn scale(&self) -> Option<ColorScale> {
         let high = f64::from(self.high?);
         let (unit, factor) = match self.coloring {
-            Coloring::Plain => return None,
+            Coloring::Plain | Coloring::Bodies => return None,
             Coloring::Displacement => ("mm", 1e3),
             Coloring::Strain => ("%", 100.0),
             Coloring::Stress | Coloring::Pressure if high < 1e3 => ("Pa", 1.0),
@@ -105,7 +105,7 @@ impl Legend {
     /// What the values are.
     pub fn title(&self) -> &'static str {
         match self.coloring {
-            Coloring::Plain => "",
+            Coloring::Plain | Coloring::Bodies => "",
             Coloring::Displacement => "displacement",
             Coloring::Strain => "largest strain",
             Coloring::Stress => "von Mises stress",

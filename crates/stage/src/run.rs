@@ -323,7 +323,9 @@ impl<S: Real> Run for SimulationRun<S> {
         let assembly = self.simulation.assembly();
         let tets = match coloring {
             Coloring::Strain | Coloring::Stress => self.simulation.tets(),
-            Coloring::Plain | Coloring::Displacement | Coloring::Pressure => Vec::new(),
+            Coloring::Plain | Coloring::Bodies | Coloring::Displacement | Coloring::Pressure => {
+                Vec::new()
+            }
         };
         let touches = &self.simulation.state().contact.touches;
         surface_values(assembly, coloring, positions, &tets, touches, &mut snapshot.values);

@@ -15,6 +15,8 @@ pub enum Coloring {
     /// The tissue's own colour.
     #[default]
     Plain,
+    /// Each body's own.
+    Bodies,
     /// Distance from rest [m].
     Displacement,
     /// Largest principal stretch less one.

@@ -2,6 +2,7 @@
 
 mod files;
 mod hearing;
+mod opening;
 mod steering;
 
 use eframe::egui::{self, CentralPanel, Panel, ScrollArea, Ui};
@@ -18,7 +19,7 @@ use crate::choices::{Settings, Side};
 use crate::controller::Controller;
 use crate::curves::ForceCurves;
 use crate::document::Document;
-use crate::engine::{Command, Cure, Engine, Setup, Snapshot};
+use crate::engine::{Command, Cure, Engine, MadeScene, Setup, Snapshot};
 use crate::hands::Hands;
 use crate::help::{self, Request};
 use crate::holds::Holds;
@@ -29,12 +30,13 @@ use crate::preferences::Preferences;
 use crate::probe::Curve;
 use crate::session::Session;
 use crate::viewport::{Gpu, Viewport};
+use opening::Making;
 use viscera_stage::Instruments;
 
 /// What the command line asks for.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The scene file, or the name of a built-in scene.
+    /// The scene file, the name of a built-in scene, or a mesh, a surface or a scan of which one is made.
     pub scene: PathBuf,
     /// Settings laid over it.
     pub settings: Settings,
@@ -44,6 +46,8 @@ pub struct Options {
     pub data: Option<PathBuf>,
     /// Where pictures and recordings go.
     pub pictures: PathBuf,
+    /// The folder in whose `out` scenes of other files are made; the one where the program was started, where it is empty.
+    pub scenes: PathBuf,
     /// Gets why the window had to close, where it did not close by itself.
     pub farewell: Arc<OnceLock<String>>,
 }
@@ -73,6 +77,7 @@ pub struct App {
     /// Where the run is being recorded.
     recorded_run: Option<PathBuf>,
     pictures: PathBuf,
+    scenes: PathBuf,
     farewell: Arc<OnceLock<String>>,
     help_open: bool,
     /// Whether a text field was being written in when the window was shown last.
@@ -84,6 +89,10 @@ pub struct App {
     forces: ForceCurves,
     /// How solvers converge in a step of the first simulation.
     curves: Vec<Curve>,
+    /// The file of which a scene is being made.
+    making: Option<Making>,
+    /// What is to be known of the open scene, where it was made of another file.
+    made: Option<MadeScene>,
     /// What is being saved: where, and of what.
     saving: Vec<(PathBuf, Document, Settings)>,
 }
@@ -97,18 +106,7 @@ impl App {
         preferences: Preferences,
     ) -> anyhow::Result<Self> {
         let mut messages = Messages::default();
-        let data = options.data.as_deref();
-        let opened = Document::open(&options.scene, data)
-            .map_err(|error| format!("{error:#}"))
-            .and_then(|document| Session::new(document, options.settings)?.beside(&options.beside));
-        let session = match opened {
-            Ok(session) => session,
-            Err(error) => {
-                messages.warn(error);
-                let first = Document::open(Path::new(FIRST_SCENE), None)?;
-                Session::new(first, Settings::new()).map_err(anyhow::Error::msg)?
-            }
-        };
+        let (session, making) = opening::first_session(&options, &mut messages)?;
         let wake = context.clone();
         let engine = Engine::start(move || wake.request_repaint())?;
         let mut app = Self {
@@ -126,6 +124,7 @@ impl App {
             recorder: None,
             recorded_run: None,
             pictures: options.pictures,
+            scenes: options.scenes,
             farewell: options.farewell,
             help_open: false,
             was_typing: false,
@@ -134,21 +133,25 @@ impl App {
             forces: ForceCurves::default(),
             curves: Vec::new(),
             saving: Vec::new(),
+            making,
+            made: None,
             session,
             preferences,
             messages,
         };
-        app.name_save();
-        app.engine.send(Command::Color(app.preferences.coloring));
         app.engine.send(Command::Probe(app.preferences.ticked_variants()));
-        let load = app.session.load();
-        app.send([load]);
+        app.begin();
         Ok(app)
     }
 
     /// The newest snapshot, which is shown.
     pub fn snapshot(&self) -> Option<&Snapshot> {
         self.snapshot.as_deref()
+    }
+
+    /// What runs, which does not change meanwhile.
+    pub fn setup(&self) -> Option<&Setup> {
+        self.setup.as_deref()
     }
 
     /// What is open and chosen.
@@ -208,6 +211,7 @@ impl App {
             return;
         }
         self.shown += 1;
+        self.take_dropped(&context);
         self.hear();
         self.take_snapshot();
         self.steer(&context);
@@ -288,8 +292,14 @@ impl App {
 
     fn show_settings(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
         let setup = self.setup.as_deref();
+        if self.making.is_some() && setup.is_none() {
+            ui.weak("Settings come with the scene.");
+            return;
+        }
+        let notes = self.notes().join("\n");
         let (fields, preferences) = (&mut self.fields, &mut self.preferences);
-        panels::scene::show(ui, &self.session, setup, fields, preferences, actions);
+        let numbers = setup.map(|setup| (setup, notes.as_str()));
+        panels::scene::show(ui, &self.session, numbers, fields, preferences, actions);
         let run = self.snapshot.as_ref().and_then(|snapshot| snapshot.runs.first());
         let instruments = &self.hands.instruments;
         panels::instruments::show(ui, &self.tray, instruments, run, &self.controller, actions);

@@ -1,10 +1,10 @@
 //! The scene file that is open.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use viscera::scene::{Scene, SceneError};
-use viscera_resources::{BUILT_IN, BuiltInScene, MeshFiles, files};
+use viscera_resources::{MeshFiles, scene_text};
 
 use crate::choices::Settings;
 
@@ -22,18 +22,8 @@ pub struct Document {
 impl Document {
     /// Reads a scene file, or finds a built-in scene of that name.
     pub fn open(path: &Path, data: Option<&Path>) -> Result<Self> {
-        let text = match BuiltInScene::find(path) {
-            Some(scene) => scene.text.into(),
-            None => {
-                let bytes = files::read(path)
-                    .with_context(|| format!("built-in scenes are {}", built_in_names()))?;
-                let Ok(text) = String::from_utf8(bytes) else {
-                    let shown = path.display();
-                    bail!("{shown} is not a text file; a scene is TOML in UTF-8");
-                };
-                text.into()
-            }
-        };
+        refuse_recording(path)?;
+        let text = scene_text(path)?.into();
         Ok(Self { path: path.to_owned(), text, data: data.map(Path::to_owned) })
     }
 
@@ -56,7 +46,11 @@ impl Document {
     }
 }
 
-/// The names of the scenes that need no file.
-pub fn built_in_names() -> String {
-    BUILT_IN.map(|scene| scene.name).join(", ")
+/// Recordings are seen again by another program.
+fn refuse_recording(path: &Path) -> Result<()> {
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("viscera")) {
+        let shown = path.display();
+        bail!("{shown} is a recording of a run; see it again with: viscera replay {shown}");
+    }
+    Ok(())
 }

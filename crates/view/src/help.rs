@@ -114,6 +114,7 @@ const MOUSE: &[(&str, &str)] = &[
     ("wheel", "nearer, farther"),
     ("left, on an instrument", "move it; wheel or Ctrl in depth, Shift turns it, Alt rolls it"),
     ("Shift at release", "hold on; Esc lets go"),
+    ("drop a file", "open it: a scene, a mesh, a surface or a segmented scan"),
 ];
 
 fn all() -> impl Iterator<Item = &'static Shortcut> {

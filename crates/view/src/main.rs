@@ -15,7 +15,8 @@ use viscera_view::{FIRST_SCENE, Options, window};
 #[derive(Parser)]
 #[command(name = "viscera-view", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// The scene file, or the name of one that `viscera scene list` prints
+    /// The scene file, the name of one that `viscera scene list` prints, or a mesh, a surface or a segmented scan: its scene is
+    /// made in out/NAME/scene
     #[arg(default_value = FIRST_SCENE)]
     scene: PathBuf,
     /// Change a setting: KEY=VALUE, as in `solver.iterations=20` or
@@ -38,6 +39,7 @@ const EXAMPLES: &str = "\
 Examples:
   viscera-view
   viscera-view grab
+  viscera-view liver.stl
   viscera-view scenes/cantilever.toml --set body.bar.material.young=\"10 kPa\"
   viscera-view coarse_bar --beside solver.elements=plain
 

@@ -10,12 +10,17 @@ use crate::panels::Action;
 /// How long a message stays.
 const SHOWN: Duration = Duration::from_secs(9);
 
+/// Lines of a message that is made of several.
+const MOST_LINES: usize = 5;
+
 /// Messages, the newest last.
 #[derive(Debug, Default)]
 pub struct Messages {
     list: Vec<(Instant, bool, String)>,
     /// What takes a while at the moment.
     pub busy: Option<String>,
+    /// What is being done to make a scene of a file.
+    pub making: Option<String>,
     /// What a person should know before going on.
     pub expect: Option<String>,
     /// Why nothing runs.
@@ -26,6 +31,20 @@ impl Messages {
     /// Something worth knowing.
     pub fn tell(&mut self, text: impl Into<String>) {
         self.list.push((Instant::now(), false, text.into()));
+    }
+
+    /// Lines that belong together, the first of them below a title, where there is one.
+    pub fn tell_all(&mut self, title: &str, lines: &[String]) {
+        let shown = if lines.len() > MOST_LINES { MOST_LINES - 1 } else { lines.len() };
+        let mut text: Vec<&str> = vec![title];
+        text.extend(lines[..shown].iter().map(|line| line.trim()));
+        let more =
+            format!("and {} more, which are told at the number of tetrahedra", lines.len() - shown);
+        text.extend((shown < lines.len()).then_some(more.as_str()));
+        text.retain(|line| !line.is_empty());
+        if !text.is_empty() {
+            self.tell(text.join("\n"));
+        }
     }
 
     /// Something that did not work.
@@ -79,7 +98,11 @@ impl Messages {
         area: egui::Rect,
         actions: &mut Vec<Action>,
     ) {
-        if let Some(failure) = &self.failure {
+        if let Some(doing) = &self.making {
+            notice(context, area, "Making a scene", doing, |ui| {
+                ui.spinner();
+            });
+        } else if let Some(failure) = &self.failure {
             notice(context, area, "The simulation has stopped", &failure.message, |ui| {
                 cures(ui, failure.cure, actions);
             });
@@ -138,4 +161,23 @@ fn notice(
             ui.add_space(6.0);
             ui.horizontal_wrapped(contents);
         });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_that_belong_together_are_one_message_and_not_a_long_one() {
+        let mut messages = Messages::default();
+        messages.tell_all("", &[]);
+        assert_eq!(messages.texts().count(), 0);
+        let lines: Vec<String> = (1..=MOST_LINES).map(|n| format!("note {n}")).collect();
+        messages.tell_all("", &lines);
+        messages.tell_all("made", &[&lines[..], &lines[..]].concat());
+        let told: Vec<Vec<&str>> = messages.texts().map(|text| text.lines().collect()).collect();
+        assert_eq!((told.len(), told[0].len(), told[1].len()), (2, MOST_LINES, MOST_LINES + 1));
+        assert_eq!((told[1][0], told[1][1]), ("made", "note 1"));
+        assert!(told[1][MOST_LINES].starts_with("and 6 more"), "{told:?}");
+    }
 }

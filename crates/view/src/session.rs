@@ -102,9 +102,14 @@ impl Session {
         })
     }
 
-    /// Another scene file, with the same generation counter.
-    pub fn open(&mut self, document: Document) -> Result<Command, String> {
-        let opened = Self::new(document, Settings::new())?;
+    /// Another scene file, with settings laid over it and those of a second solver beside; the same generation counter.
+    pub fn open(
+        &mut self,
+        document: Document,
+        settings: Settings,
+        beside: &Settings,
+    ) -> Result<Command, String> {
+        let opened = Self::new(document, settings)?.beside(beside)?;
         *self = Self { generation: self.generation, ..opened };
         Ok(self.load())
     }

@@ -129,6 +129,7 @@ impl Screen {
             surface: &picture.surface,
             ghost: None,
             range: session.legend.range(),
+            bodies: &[],
             wireframe: session.wireframe,
             shadow: true,
             fixed: &fixed,

@@ -105,7 +105,10 @@ fn scene_that_is_not_text() {
     let bench = Bench::new("");
     bench.write("scene.toml", b"title = \"\xff\xfe\"");
     let message = refusal(&bench, &[]);
-    assert_eq!(message, "scene.toml is not a text file; a scene is TOML in UTF-8");
+    assert_eq!(
+        message,
+        "scene.toml is neither a scene (TOML in UTF-8) nor a mesh or a scan by its ending; open one of those"
+    );
 }
 
 #[test]

@@ -16,21 +16,6 @@ use crate::save::save;
 const PATIENCE: Duration = Duration::from_secs(5);
 
 impl App {
-    pub(super) fn open(&mut self, path: &Path) {
-        let data = self.session.document().data.clone();
-        let opened = Document::open(path, data.as_deref())
-            .map_err(|error| format!("{error:#}"))
-            .and_then(|document| self.session.open(document));
-        match opened {
-            Ok(command) => {
-                self.send([command]);
-                self.play(true);
-                self.name_save();
-            }
-            Err(error) => self.messages.warn(error),
-        }
-    }
-
     /// Proposes a name to save under: never that of the file that is open.
     pub(super) fn name_save(&mut self) {
         let document = self.session.document();

@@ -1,5 +1,6 @@
 //! What the simulation's thread says and shows.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::App;
@@ -15,6 +16,8 @@ impl App {
                     self.messages.expect = None;
                     self.messages.busy = Some(text);
                 }
+                Event::Making(doing) => self.hear_making(doing),
+                Event::Made(file, made) => self.take_made(&file, made),
                 Event::Expect(text) => {
                     self.messages.busy = None;
                     self.messages.expect = Some(text);
@@ -29,8 +32,9 @@ impl App {
                     if let Err(error) = self.viewport.enter(&setup) {
                         self.messages.warn(error);
                     }
-                    for note in &setup.assembly.notes {
-                        self.messages.tell(note.clone());
+                    // A reset has nothing new to say.
+                    if self.setup.as_ref().is_none_or(|old| !Arc::ptr_eq(old, &setup)) {
+                        self.tell_notes(&setup);
                     }
                     self.setup = Some(setup);
                 }

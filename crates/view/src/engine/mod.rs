@@ -29,6 +29,8 @@ const PATIENCE: Duration = Duration::from_millis(300);
 pub enum Command {
     /// Builds these simulations and starts them from rest.
     Load(Box<BuildRequest>),
+    /// Makes the scene of a mesh, a surface or a scan, in the second, a folder.
+    Make(PathBuf, PathBuf),
     /// Puts these simulations beside the first one, which goes on: they begin where it is.
     Accompany(Box<BuildRequest>),
     /// Goes on with a mesh that was said to be large.
@@ -81,6 +83,10 @@ pub enum Command {
 pub enum Event {
     /// Something that takes a while has begun.
     Busy(String),
+    /// What is being done to make a scene.
+    Making(String),
+    /// The scene of a file was made, or why not.
+    Made(PathBuf, Result<MadeScene, String>),
     /// It is large: [`Command::Proceed`] goes on, another [`Command::Load`] does not.
     Expect(String),
     /// Everything is built and at rest; frames follow.
@@ -119,6 +125,36 @@ pub enum Event {
     NotTaken(HandId, String),
     /// The simulation has stopped.
     Failed(Failure),
+}
+
+/// A scene that was made of another file.
+#[derive(Clone, Debug)]
+pub struct MadeScene {
+    /// The scene file.
+    pub scene: PathBuf,
+    /// How many bodies it has.
+    pub bodies: usize,
+    /// Tetrahedra of all of them.
+    pub tets: usize,
+    /// What is probably not as it was meant, a line each.
+    pub warnings: Vec<String>,
+    /// What was found and what was assumed, a line each.
+    pub notes: Vec<String>,
+    /// The same of single bodies.
+    pub of_bodies: Vec<String>,
+    /// All of it at length, as for a terminal.
+    pub text: String,
+}
+
+impl MadeScene {
+    /// What it is, in short.
+    pub fn title(&self) -> String {
+        let bodies = match self.bodies {
+            1 => "1 body".to_owned(),
+            count => format!("{count} bodies"),
+        };
+        format!("made {}: {bodies}, {} tetrahedra", self.scene.display(), self.tets)
+    }
 }
 
 /// Why a simulation has stopped, and what one can do.

@@ -1,6 +1,7 @@
 //! What the thread does: builds, computes frame after frame at the pace of the clock, obeys in between.
 
 mod building;
+mod making;
 mod recording;
 
 use std::path::PathBuf;
@@ -196,6 +197,7 @@ impl Worker {
                 self.steps += 1;
                 self.due = Instant::now();
             }
+            Command::Make(file, folder) => self.make(file, &folder),
             Command::Reset => self.reset(),
             Command::Speed(speed) => self.speed = speed,
             Command::Take { hold, body, rest, count, stiffness } => {

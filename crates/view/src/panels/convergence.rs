@@ -3,6 +3,7 @@
 use eframe::egui::{self, Color32, Ui};
 use egui_plot::{Line, Plot, PlotPoints, uniform_grid_spacer};
 
+use super::axes::round_steps;
 use crate::preferences::Preferences;
 use crate::probe::{Curve, VARIANTS};
 
@@ -42,9 +43,13 @@ pub fn show(ui: &mut Ui, preferences: &mut Preferences, curves: &[Curve]) {
     for problem in curves.iter().filter_map(|curve| curve.problem.as_ref()) {
         ui.colored_label(ui.visuals().warn_fg_color, problem);
     }
-    Plot::new("convergence")
-        .x_axis_label("iteration")
+    let mut plot = Plot::new("convergence");
+    for end in decades(curves) {
+        plot = plot.include_y(end);
+    }
+    plot.x_axis_label("iteration")
         .y_axis_label("residual")
+        .x_grid_spacer(uniform_grid_spacer(|input| round_steps(&input, 6.0)))
         // Powers of ten, the finest of them.
         .y_grid_spacer(uniform_grid_spacer(|_| [4.0, 2.0, 1.0]))
         .y_axis_formatter(|mark, _| format!("1e{:.0}", mark.value))
@@ -62,4 +67,32 @@ pub fn show(ui: &mut Ui, preferences: &mut Preferences, curves: &[Curve]) {
                 plot.line(line.color(color.map_or(Color32::GRAY, |number| COLORS[number])));
             }
         });
+}
+
+/// Powers of ten around all residuals: there are at least two marks, however near to each other residuals are.
+fn decades(curves: &[Curve]) -> Vec<f64> {
+    let residuals = curves.iter().flat_map(|curve| &curve.residuals);
+    let powers = residuals.map(|(_, residual)| residual.log10()).filter(|power| power.is_finite());
+    let both =
+        powers.map(|power| [power, power]).reduce(|[low, high], [a, b]| [low.min(a), high.max(b)]);
+    both.map_or_else(Vec::new, |[low, high]| {
+        vec![low.floor(), (low.floor() + 1.0).max(high.ceil())]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn residuals_lie_between_two_powers_of_ten() {
+        let curve = |residuals: &[f64]| {
+            let residuals = (0..).zip(residuals.iter().copied()).collect();
+            Curve { name: "x".into(), residuals, problem: None }
+        };
+        assert_eq!(decades(&[curve(&[3e-3, 4e-3])]), [-3.0, -2.0]);
+        assert_eq!(decades(&[curve(&[1e-3]), curve(&[])]), [-3.0, -2.0]);
+        assert_eq!(decades(&[curve(&[0.5, 0.0]), curve(&[2e-6])]), [-6.0, 0.0]);
+        assert!(decades(&[curve(&[0.0])]).is_empty());
+    }
 }

@@ -1,12 +1,13 @@
 //! The curve of the forces over the last seconds, and what tools have put into the tissue.
 
 use eframe::egui::{Color32, Ui};
-use egui_plot::{FilledArea, Legend, Line, LineStyle, Plot, PlotPoints};
+use egui_plot::{FilledArea, Line, LineStyle, Plot, PlotPoints, uniform_grid_spacer};
 use viscera::solver::Ledger;
 use viscera::units::format_number;
 use viscera_picture::Color;
 
-use crate::curves::{ForceCurve, ForceCurves, REMEMBERED};
+use super::axes::{mark_text, round_steps};
+use crate::curves::{ForceCurve, ForceCurves, REMEMBERED, Source};
 use crate::viewport::on_screen;
 
 /// One curve for each point held and for each tool, dashed for the second solver; a band where it is known what a force may
@@ -24,9 +25,14 @@ pub fn show(ui: &mut Ui, curves: &ForceCurves, now: f64, is_comparison: bool) {
         Color32::from_rgb(88, 168, 92),
         Color32::from_rgb(176, 106, 190),
     ];
-    let mut plot = Plot::new("forces")
+    show_names(ui, curves, colors, is_comparison);
+    let plot = Plot::new("forces")
         .x_axis_label("time in s")
         .y_axis_label("force [N]")
+        .x_grid_spacer(uniform_grid_spacer(|input| round_steps(&input, 8.0)))
+        .y_grid_spacer(uniform_grid_spacer(|input| round_steps(&input, 4.0)))
+        .x_axis_formatter(|mark, _| mark_text(mark.value))
+        .y_axis_formatter(|mark, _| mark_text(mark.value))
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)
@@ -34,10 +40,6 @@ pub fn show(ui: &mut Ui, curves: &ForceCurves, now: f64, is_comparison: bool) {
         .include_x(now)
         .include_x((now - REMEMBERED).max(0.0))
         .set_margin_fraction([0.0, 0.08].into());
-    let is_tool = |curve: &ForceCurve| matches!(curve.source, crate::curves::Source::Tool(_));
-    if curves.list().len() > 1 || is_comparison || curves.list().iter().any(is_tool) {
-        plot = plot.legend(Legend::default().position(egui_plot::Corner::LeftTop));
-    }
     plot.show(ui, |plot| {
         for (number, curve) in curves.list().iter().enumerate() {
             let color = colors[number % colors.len()];
@@ -54,6 +56,23 @@ pub fn show(ui: &mut Ui, curves: &ForceCurves, now: f64, is_comparison: bool) {
                 let line = Line::new(name, points).color(color).width(2.0);
                 plot.line(if side == 1 { line.style(LineStyle::dashed_loose()) } else { line });
             }
+        }
+    });
+}
+
+/// The legend, above the curves and not on them.
+fn show_names(ui: &mut Ui, curves: &ForceCurves, colors: [Color32; 4], is_comparison: bool) {
+    let is_tool = |curve: &ForceCurve| matches!(curve.source, Source::Tool(_));
+    let are_several = curves.list().len() > 1 || curves.list().iter().any(is_tool);
+    if !are_several && !is_comparison {
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        for (curve, color) in curves.list().iter().zip(colors.iter().cycle()) {
+            ui.colored_label(*color, &curve.name);
+        }
+        if is_comparison {
+            ui.weak("A as a line, B dashed");
         }
     });
 }

@@ -14,15 +14,20 @@ use crate::choices::{Side, law_name};
 const SOFTEST: f64 = 0.1;
 const STIFFEST: f64 = 1000.0;
 
+/// Of more bodies than these all are folded away.
+const MOST_OPEN: usize = 4;
+
 /// Numbers of every body.
 pub fn show(ui: &mut Ui, scene: &Scene, actions: &mut Vec<Action>) {
     let mut chooser = Chooser { side: Side::First, actions };
+    // Of many bodies one looks for a few, and for what lies below them.
+    let is_short = scene.bodies.len() <= MOST_OPEN;
     for body in &scene.bodies {
         let title = match scene.bodies.len() {
             1 => "Material".to_owned(),
-            _ => format!("Material of {}", body.name),
+            _ => format!("Material of {}", body.name.replace('_', " ")),
         };
-        section(ui, &title, true, |ui| show_body(ui, body, &mut chooser));
+        section(ui, &title, is_short, |ui| show_body(ui, body, &mut chooser));
     }
 }
 

@@ -1,5 +1,6 @@
 //! The window's panels. Each shows what is, and says what a person wants changed; only the app changes it.
 
+mod axes;
 mod choice;
 pub mod convergence;
 pub mod forces;

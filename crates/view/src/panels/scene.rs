@@ -20,11 +20,11 @@ pub struct Fields {
     pub save: String,
 }
 
-/// The scene's title, its numbers, and text fields for files.
+/// The scene's title, its numbers with notes on them, and text fields for files.
 pub fn show(
     ui: &mut Ui,
     session: &Session,
-    setup: Option<&Setup>,
+    numbers: Option<(&Setup, &str)>,
     fields: &mut Fields,
     preferences: &mut Preferences,
     actions: &mut Vec<Action>,
@@ -40,20 +40,21 @@ pub fn show(
         if !scene.description.is_empty() {
             title.on_hover_text(scene.description.trim());
         }
-        if let Some(setup) = setup {
+        if let Some((setup, notes)) = numbers {
             let vertices = setup.assembly.builder.positions().len();
             let text = format!("{} tetrahedra, {vertices} vertices", setup.tet_count());
-            ui.weak(text).on_hover_text(setup.assembly.notes.join("\n"));
+            ui.weak(text).on_hover_text(notes);
         }
         gravity(ui, session, actions);
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             let label = ui.label("open");
             let field = egui::TextEdit::singleline(&mut fields.open)
-                .hint_text("a scene file")
+                .hint_text("a scene, a mesh, a scan")
                 .desired_width(150.0);
             let field = ui.add(field).labelled_by(label.id);
             let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
-            let button = ui.button("Open").on_hover_text("Reads the scene and begins from rest");
+            let button = ui.button("Open").on_hover_text("Reads the scene, or makes one of a mesh, a surface or a segmented scan, and begins from rest; files can be \
+                 dropped onto the window, too");
             if (entered || button.clicked()) && !fields.open.trim().is_empty() {
                 actions.push(Action::Open(PathBuf::from(fields.open.trim())));
             }
@@ -65,6 +66,7 @@ pub fn show(
                     }
                 }
             });
+            recent(ui, preferences, actions);
         });
         ui.horizontal(|ui| {
             let label = ui.label("save");
@@ -80,6 +82,22 @@ pub fn show(
             "The saved scene repeats everything since the last reset, pulls and changes at their times, to the \
              bit. Without this it begins with the settings as they are now.",
         );
+    });
+}
+
+/// A menu of files that were open before, the newest first.
+fn recent(ui: &mut Ui, preferences: &Preferences, actions: &mut Vec<Action>) {
+    ui.add_enabled_ui(!preferences.recent.is_empty(), |ui| {
+        ui.menu_button("recent", |ui| {
+            for path in &preferences.recent {
+                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+                let button = ui.button(name).on_hover_text(path.display().to_string());
+                if button.clicked() {
+                    actions.push(Action::Open(path.clone()));
+                    ui.close();
+                }
+            }
+        });
     });
 }
 

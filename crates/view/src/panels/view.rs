@@ -11,8 +11,9 @@ use crate::help::Request;
 use crate::holds::Holds;
 use crate::preferences::Preferences;
 
-const COLORINGS: [(Coloring, &str, &str); 5] = [
+const COLORINGS: [(Coloring, &str, &str); 6] = [
     (Coloring::Plain, "tissue", "The tissue's own colour"),
+    (Coloring::Bodies, "bodies", "Each body in a colour of its own, organs as one knows them"),
     (Coloring::Displacement, "displacement", "How far each point is from where it is at rest"),
     (Coloring::Strain, "strain", "By how much the most stretched direction is longer than at rest"),
     (Coloring::Stress, "stress", "Von Mises stress"),

@@ -12,7 +12,7 @@ pub use picture::{Gpu, Picture};
 use eframe::egui::{self, PointerButton, Pos2, Rect, Sense, Ui, vec2};
 use std::sync::Arc;
 use viscera::scalar::Vec3;
-use viscera_picture::{HALF_OPENING, Image, ImageSize, Overlay, ViewDirection};
+use viscera_picture::{BodyColor, HALF_OPENING, Image, ImageSize, Overlay, ViewDirection};
 use viscera_render::Orbit;
 use viscera_stage::{
     Coloring, ForceScale, HandId, Legend, PictureContents, RunSurface, Surroundings, meet_plane,
@@ -43,6 +43,8 @@ pub struct Viewport {
     surfaces: Vec<RunSurface>,
     pictures: Vec<Picture>,
     fixed: Vec<u32>,
+    /// Names and colours of bodies.
+    bodies: Vec<BodyColor>,
     legend: Legend,
     force_scale: ForceScale,
     /// What each picture was seen through last.
@@ -79,6 +81,7 @@ impl Viewport {
             surfaces: Vec::new(),
             pictures: Vec::new(),
             fixed: Vec::new(),
+            bodies: Vec::new(),
             legend: Legend::default(),
             force_scale: ForceScale::default(),
             lenses: Vec::new(),
@@ -96,6 +99,7 @@ impl Viewport {
             .collect::<Result<_, _>>()?;
         self.setup = Some(Arc::clone(setup));
         self.fixed = setup.assembly.fixings.iter().flat_map(|p| p.vertices.clone()).collect();
+        self.bodies = BodyColor::of(&setup.assembly);
         self.drawn = None;
         if !known {
             self.fit_view();
@@ -172,7 +176,8 @@ impl Viewport {
                 Rect::from_min_size(egui::pos2(left, area.top()), vec2(width, area.height()))
             })
             .collect();
-        let taken = overlay::legend_width(&self.legend);
+        let names = named(&self.bodies, preferences.coloring);
+        let taken = overlay::legend_width(&self.legend, names, ui.painter());
         self.lenses = rects.iter().map(|rect| Lens::new(&self.orbit, *rect, taken)).collect();
         for (number, rect) in rects.iter().enumerate() {
             let id = ui.scope_id().with(("viewport", number));
@@ -392,6 +397,7 @@ impl Viewport {
                 surface,
                 ghost,
                 range: self.legend.range(),
+                bodies: named(&self.bodies, snapshot.coloring),
                 wireframe: preferences.wireframe,
                 shadow: preferences.shadow,
                 fixed: &fixed,
@@ -431,8 +437,10 @@ impl Viewport {
         overlay::forces(&painter, lens, run, holds);
         let scale = self.force_scale.metres_per_newton(self.extent);
         overlay::tools(&painter, lens, run, scale);
-        if preferences.coloring != Coloring::Plain {
-            overlay::paint_legend(&self.legend, &painter, lens.rect);
+        match preferences.coloring {
+            Coloring::Plain => {}
+            Coloring::Bodies => overlay::paint_names(&self.bodies, &painter, lens.rect),
+            _ => overlay::paint_legend(&self.legend, &painter, lens.rect),
         }
         let name = if self.shown_runs() > 1 { ["A", "B"][number.min(1)] } else { "" };
         overlay::title(&painter, lens.rect, name, &self.distances(snapshot, number));
@@ -446,6 +454,8 @@ impl Viewport {
     /// The pictures as they are shown, with scale, time and forces written on them; waits for them.
     pub fn images(&self, snapshot: &Snapshot) -> Result<Vec<Image>, String> {
         let scale = self.legend.scale();
+        let names = named(&self.bodies, snapshot.coloring).iter();
+        let names: Vec<_> = names.map(|body| (body.name.clone(), body.color)).collect();
         let title = self.setup.as_ref().map_or("", |setup| &setup.scene.title);
         let shown = self.pictures.iter().take(self.shown_runs());
         let mut images = Vec::new();
@@ -460,12 +470,17 @@ impl Viewport {
                 title: &format!("{title}{side}"),
                 caption: &overlay::caption(snapshot, run, &remarks),
                 color_scale: scale.as_ref(),
+                legend: &names,
                 pixels_per_meter: lens.map(|lens| lens.orbit().pixels_per_meter(height)),
-                ..Overlay::default()
             };
             overlay.draw(&mut image);
             images.push(image);
         }
         Ok(images)
     }
+}
+
+/// Bodies, where colours tell them apart.
+fn named(bodies: &[BodyColor], coloring: Coloring) -> &[BodyColor] {
+    if coloring == Coloring::Bodies { bodies } else { &[] }
 }

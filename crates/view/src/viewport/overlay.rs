@@ -4,7 +4,7 @@ use eframe::egui::{
     Align2, Color32, CornerRadius, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2,
 };
 use viscera::scalar::Vec3;
-use viscera_picture::{Color, map_color};
+use viscera_picture::{BodyColor, Color, map_color};
 use viscera_stage::{
     Legend, RunSnapshot, ToolSnapshot, arrow_end, inverted, millimetres, newton_millimetres,
     newtons,
@@ -24,8 +24,75 @@ pub fn on_screen(color: Color) -> Color32 {
 const WIDTH: f32 = 136.0;
 
 /// What a legend takes of the right edge of a picture [points].
-pub fn legend_width(legend: &Legend) -> f32 {
-    if legend.range().is_some() { WIDTH } else { 0.0 }
+pub fn legend_width(legend: &Legend, names: &[BodyColor], painter: &Painter) -> f32 {
+    match (legend.range(), names) {
+        (_, []) => legend.range().map_or(0.0, |_| WIDTH),
+        _ => names_width(names, painter) + 2.0 * BESIDE,
+    }
+}
+
+/// Of a list of names: what lies around it, the height of a line, the side of a patch of colour [points].
+const BESIDE: f32 = 8.0;
+const NAME_LINE: f32 = 18.0;
+const PATCH: f32 = 11.0;
+
+/// Letters of a name that are shown; the end of a longer one is left out.
+const LONGEST_NAME: usize = 24;
+
+/// A name in words, if need be shortened.
+fn in_words(name: &str) -> String {
+    let name = name.replace('_', " ");
+    match name.chars().count() {
+        count if count > LONGEST_NAME => {
+            name.chars().take(LONGEST_NAME - 1).chain("…".chars()).collect()
+        }
+        _ => name,
+    }
+}
+
+/// Of the list with its patches of colour, without what lies around it.
+fn names_width(names: &[BodyColor], painter: &Painter) -> f32 {
+    let width = |body: &BodyColor| {
+        let font = FontId::proportional(12.0);
+        painter.layout_no_wrap(in_words(&body.name), font, Color32::BLACK).size().x
+    };
+    PATCH + 6.0 + names.iter().map(width).fold(64.0, f32::max)
+}
+
+/// The names that fit into a height [points], and how many are left out.
+fn fitting(count: usize, height: f32) -> (usize, usize) {
+    let lines = ((height / NAME_LINE).floor().max(2.0)) as usize;
+    // The last line says how many there are besides.
+    let shown = if count <= lines { count } else { lines - 1 };
+    (shown, count - shown)
+}
+
+/// Writes the names of bodies into the right upper corner, each behind a patch of its colour.
+pub fn paint_names(bodies: &[BodyColor], painter: &Painter, area: Rect) {
+    let (shown, left_out) = fitting(bodies.len(), area.height() - 4.0 * BESIDE);
+    let lines = shown + usize::from(left_out > 0);
+    let size = vec2(names_width(bodies, painter), NAME_LINE * lines as f32);
+    let corner = area.right_top() + vec2(-BESIDE, BESIDE);
+    let back = Rect::from_min_max(
+        corner - vec2(size.x + 2.0 * BESIDE, 0.0),
+        corner + vec2(0.0, size.y + BESIDE),
+    );
+    painter.rect_filled(back, CornerRadius::same(6), Color32::from_white_alpha(190));
+    let font = FontId::proportional(12.0);
+    let ink = Color32::from_rgb(30, 34, 42);
+    let left = back.left() + BESIDE;
+    let middle = |line: usize| back.top() + 0.5 * BESIDE + NAME_LINE * (line as f32 + 0.5);
+    for (line, body) in bodies.iter().take(shown).enumerate() {
+        let place = pos2(left + 0.5 * PATCH, middle(line));
+        let patch = Rect::from_center_size(place, vec2(PATCH, PATCH));
+        painter.rect_filled(patch, CornerRadius::same(2), on_screen(body.color));
+        let place = pos2(left + PATCH + 6.0, middle(line));
+        painter.text(place, Align2::LEFT_CENTER, in_words(&body.name), font.clone(), ink);
+    }
+    if left_out > 0 {
+        let place = pos2(left, middle(shown));
+        painter.text(place, Align2::LEFT_CENTER, format!("and {left_out} more"), font, ink);
+    }
 }
 
 /// Writes a legend into the right upper corner.
@@ -209,4 +276,19 @@ fn label(painter: &Painter, place: Pos2, anchor: Align2, text: &str, size: f32) 
     );
     painter.galley(rect.min, galley, ink);
     rect
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_do_not_fit_are_counted() {
+        assert_eq!(fitting(3, 200.0), (3, 0));
+        assert_eq!(fitting(11, 11.0 * NAME_LINE), (11, 0));
+        assert_eq!(fitting(12, 11.0 * NAME_LINE), (10, 2));
+        assert_eq!(fitting(5, 1.0), (1, 4));
+        assert_eq!(in_words("kidney_left"), "kidney left");
+        assert_eq!(in_words(&"long_".repeat(9)).chars().count(), LONGEST_NAME);
+    }
 }

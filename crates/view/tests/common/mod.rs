@@ -1,11 +1,14 @@
 //! The real window without a display: what drives it in tests and in `examples/dragging.rs`.
 #![allow(dead_code)]
 
-use eframe::egui::{Event, Key, Modifiers, Pos2, Rect, Role, Vec2, vec2};
+use eframe::egui::{
+    DroppedFile, DroppedFileHandle, Event, HoveredFile, Key, Modifiers, Pos2, Rect, Role, Vec2,
+    vec2,
+};
 use eframe::egui_wgpu::WgpuSetup;
 use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, wgpu};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use viscera::scene::Scene;
@@ -15,11 +18,25 @@ use viscera_view::choices::Side;
 use viscera_view::preferences::Preferences;
 use viscera_view::{App, Options};
 
-/// The longest that anything may take before a test fails; most take tenths of a second.
-const PATIENCE: Duration = Duration::from_secs(20);
+/// The longest that anything may take before a test fails; most take tenths of a second, and making a scene of a surface a few.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The test harness leaves so much black around the window [pixels].
 pub const MARGIN: u32 = 8;
+
+/// A file as the system drops it.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|error| error.to_string())
+    }
+}
 
 /// The window, driven from outside.
 pub struct Window {
@@ -73,6 +90,7 @@ impl Window {
             beside: owned(beside),
             data: None,
             pictures: folder.path().join("pictures"),
+            scenes: folder.path().to_owned(),
             farewell: Arc::clone(&farewell),
         };
         let context = eframe::egui::Context::default();
@@ -189,6 +207,25 @@ impl Window {
         self.wait("the file", |_| path.exists());
         let text = std::fs::read_to_string(path).expect("a file");
         Scene::parse("saved", &text, &[]).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// Moves files over the window, or away from it where there are none.
+    pub fn hover_files(&mut self, files: &[&Path]) {
+        let hovered = files
+            .iter()
+            .map(|file| HoveredFile { path: Some(file.to_path_buf()), ..HoveredFile::default() });
+        self.harness.input_mut().hovered_files = hovered.collect();
+        self.harness.step();
+    }
+
+    /// Drops files onto the window.
+    pub fn drop_files(&mut self, files: &[&Path]) {
+        self.harness.input_mut().hovered_files.clear();
+        let dropped =
+            files.iter().map(|file| -> DroppedFileHandle { Arc::new(Dropped(file.to_path_buf())) });
+        self.harness.input_mut().dropped_files = dropped.collect();
+        self.harness.step();
+        self.harness.step();
     }
 
     pub fn view(&self) -> Rect {

@@ -5,8 +5,9 @@
 
 use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
-use viscera_import::Import;
 use viscera_resources::files;
+
+use crate::{Import, name_of};
 
 /// What becomes of a scene that is there already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,7 +118,7 @@ pub fn write(import: &Import, title: &str, folder: &Path, replace: Replace) -> R
         && let Some(why) = obstacle(&known, &written, &from, &scene, replace)
     {
         // A folder that differs from that of a file of the same name by the ending.
-        let elsewhere = format!("out/{}/scene", viscera_import::name_of(&from.name));
+        let elsewhere = format!("out/{}/scene", name_of(&from.name));
         let file = word(&import.file);
         bail!(
             "{why}; name another folder (viscera scene new {file} --out {elsewhere}), or replace what is there \
@@ -171,7 +172,7 @@ fn obstacle(
         )),
         None if replace == Replace::Unchanged => None,
         _ => Some(format!(
-            "{shown}: there is another scene, made with other options or changed by hand; run that one (viscera run {shown})"
+            "{shown}: there is another scene, made with other options or changed by hand; use that one (viscera run {shown}, viscera view {shown})"
         )),
     }
 }
