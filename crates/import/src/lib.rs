@@ -3,7 +3,7 @@
 //! [`open`] tells by its content what a file is; [`parts`] makes bodies of it; [`Import::scene`] writes the scene file
 //! that puts them together, with comments that say what was measured, what was assumed, and what to look at first.
 //! Those are bytes in, bytes out. [`scene_of`] is what programs do where they get such a file in place of a scene: it reads the
-//! file and writes its scene, where nothing else is lost ([`write`]).
+//! file and writes its scene, where nothing else is lost ([`write()`]).
 
 mod balance;
 mod bodies;
