@@ -12,13 +12,13 @@ use viscera::mesh::{
 };
 use viscera::scalar::{Vec3, vec3};
 use viscera::scene::RegionLabel;
-use viscera_import::{Found, Unit, guess_unit, is_image, open};
+use viscera_import::{Found, Unit, angles_plot, guess_unit, is_image, open};
 use viscera_resources::files;
 
 use crate::import::{self, ImportArguments, label_name};
 use crate::labels;
 use crate::mesh_files::{check_other, ending_of, length, load, write_surface, write_tets};
-use crate::quality::{self, Verdict};
+use crate::quality::Verdict;
 use crate::repair::{self, RepairArguments};
 
 /// Look at mesh files and segmented scans, fill surfaces, convert formats
@@ -142,7 +142,7 @@ fn inspect_file(file: &Path, given: Option<&str>, json: bool, plot: Option<&Path
             let Some(plot) = plot else { return Ok(()) };
             let short = file.file_name().unwrap_or_default().to_string_lossy();
             let bodies = [(short.into_owned(), summary.angles)];
-            quality::write(plot, "Dihedral angles; 70.5 degrees in a regular tetrahedron", &bodies)
+            files::write_atomic(plot, angles_plot(&bodies)?.as_bytes())
         }
     }
 }

@@ -1,11 +1,8 @@
-//! Shapes of meshes as a picture, and what to do about bad ones.
+//! What to do about bad meshes.
 
-use anyhow::Result;
 use serde::Serialize;
 use std::path::Path;
-use viscera::mesh::verdict::{DEGREES, Problem};
-use viscera_report::{Axis, Plot, Series, Style};
-use viscera_resources::files;
+use viscera::mesh::verdict::Problem;
 
 /// What is to be thought of a mesh, and what to do next.
 #[derive(Debug, Serialize)]
@@ -80,25 +77,4 @@ impl Verdict {
 /// A word of a command line.
 fn word(text: &str) -> String {
     if text.contains(' ') { format!("\"{text}\"") } else { text.to_owned() }
-}
-
-/// Draws how often dihedral angles occur in each body: its name, and how many there are in each bin.
-pub fn plot(title: &str, bodies: &[(String, Vec<usize>)]) -> Result<String> {
-    let x = Axis::linear("dihedral angle [degrees]");
-    let mut plot = Plot::new(title, x, Axis::linear("share of angles [%]"));
-    for (name, counts) in bodies {
-        let all = counts.iter().sum::<usize>().max(1) as f64;
-        let step = |(bin, count): (usize, &usize)| {
-            let share = 100.0 * *count as f64 / all;
-            [[(bin * DEGREES) as f64, share], [((bin + 1) * DEGREES) as f64, share]]
-        };
-        let points: Vec<[f64; 2]> = counts.iter().enumerate().flat_map(step).collect();
-        plot.series(Series::new(name.clone(), points).with_style(Style::Line));
-    }
-    plot.to_svg()
-}
-
-/// The same as a file.
-pub fn write(out: &Path, title: &str, bodies: &[(String, Vec<usize>)]) -> Result<()> {
-    files::write_atomic(out, plot(title, bodies)?.as_bytes())
 }

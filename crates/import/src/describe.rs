@@ -1,7 +1,8 @@
 //! What became of a file, as text for people.
 
 use viscera::mesh::TetMesh;
-use viscera::mesh::quality::{dihedral_angles, summarize_quality};
+use viscera::mesh::quality::summarize_quality;
+use viscera::mesh::verdict::{DEGREES, count_angles};
 use viscera_report::Table;
 
 use crate::{Import, millilitres};
@@ -31,7 +32,7 @@ impl Import {
                 part.wanted.map_or_else(|| "-".to_owned(), millilitres),
                 millilitres(part.mesh.volume()),
                 format!("{low:.1} to {high:.1}"),
-                format!("{:.3} %", 100.0 * share_below(&part.mesh, 10.0)),
+                format!("{:.3} %", 100.0 * share_below_ten(&part.mesh)),
                 part.tissue.preset.unwrap_or("unknown").to_owned(),
                 held.join(", "),
             ]);
@@ -59,9 +60,9 @@ impl Import {
     }
 }
 
-/// The share of dihedral angles below a bound [degrees].
-fn share_below(mesh: &TetMesh, bound: f64) -> f64 {
-    let angles = (0..mesh.tets().len()).flat_map(|tet| dihedral_angles(mesh.corners(tet)));
-    let count = angles.filter(|angle| angle.to_degrees() < bound).count();
-    count as f64 / (6 * mesh.tets().len()).max(1) as f64
+/// The share of dihedral angles below 10 degrees.
+fn share_below_ten(mesh: &TetMesh) -> f64 {
+    let counts = count_angles(mesh);
+    let below: usize = counts.iter().take(10 / DEGREES).sum();
+    below as f64 / (6 * mesh.tets().len()).max(1) as f64
 }

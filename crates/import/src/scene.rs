@@ -4,11 +4,13 @@ use std::fmt::Write;
 
 use viscera::mesh::io::{ply, vtu};
 use viscera::mesh::topology::BoundingBox;
+use viscera::mesh::verdict::count_angles;
 use viscera::scalar::Vec3;
 
 use crate::bodies::{Import, Part};
 use crate::hold::{Place, rounded};
 use crate::name::{name_of, stem_of};
+use crate::quality::angles_plot;
 use crate::tissue::Tissue;
 use crate::unit::millilitres;
 
@@ -20,10 +22,11 @@ pub struct Written {
 }
 
 impl Import {
-    /// The scene file, which has the name of the file that it was made of, and the meshes that it names.
+    /// The scene file, which has the name of the file that it was made of, the meshes that it names, and a picture of their
+    /// dihedral angles.
     pub fn scene(&self, title: &str) -> Written {
-        let scene = format!("{}.toml", name_of(stem_of(&self.file)));
-        let mut files = vec![(scene, self.text(title).into_bytes())];
+        let name = name_of(stem_of(&self.file));
+        let mut files = vec![(format!("{name}.toml"), self.text(title).into_bytes())];
         for part in &self.parts {
             // Patches are of the mesh, and its places are finite.
             let grid = vtu::write_mesh(&part.mesh, &part.names);
@@ -32,6 +35,12 @@ impl Import {
                 files.push((format!("{}_skin.ply", part.name), ply::write(skin)));
             }
         }
+        let angles = |part: &Part| (part.name.clone(), count_angles(&part.mesh));
+        let bodies: Vec<(String, Vec<usize>)> = self.parts.iter().map(angles).collect();
+        // A scene is none the worse without it.
+        files.extend(
+            angles_plot(&bodies).ok().map(|svg| (format!("{name}_angles.svg"), svg.into_bytes())),
+        );
         Written { files }
     }
 

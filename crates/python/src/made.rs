@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use viscera::units::Dimension;
-use viscera_import::{Fineness, Found, Options, open, parts, stem_of};
+use viscera_import::{Fineness, Found, Options, load, open, title_of};
 use viscera_resources::files;
 
 use crate::fault::{Class, error, guarded};
@@ -92,20 +92,14 @@ pub struct Made {
 /// Makes a scene of a file, with warnings of Python for what is probably not as it was meant.
 pub fn make(py: Python<'_>, path: &Path, given: Given) -> PyResult<Made> {
     let options = given.options()?;
-    let name = path.display().to_string();
     let import = py
-        .detach(|| {
-            guarded(|| {
-                open(&name, load).and_then(|found| parts(&name, found, &options, &mut |_| ()))
-            })
-        })?
-        .map_err(|problem| error(Class::File, for_python(&problem.to_string())))?;
+        .detach(|| guarded(|| load(path, &options, &mut |_| ())))?
+        .map_err(|problem| error(Class::File, for_python(&format!("{problem:#}"))))?;
     for warning in &import.warnings {
         let message = std::ffi::CString::new(for_python(warning)).unwrap_or_default();
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &message, 1)?;
     }
-    let title = stem_of(&name).replace('_', " ");
-    let mut written = import.scene(&title).files.into_iter();
+    let mut written = import.scene(&title_of(path)).files.into_iter();
     let text = written.next().and_then(|(_, bytes)| String::from_utf8(bytes).ok());
     let of_parts = import
         .parts
@@ -118,10 +112,6 @@ pub fn make(py: Python<'_>, path: &Path, given: Given) -> PyResult<Made> {
         files: written.map(|(name, bytes)| (name, Arc::new(bytes))).collect(),
         notes: notes.map(|note| for_python(&note)).collect(),
     })
-}
-
-fn load(name: &str) -> Result<Vec<u8>, String> {
-    files::read(Path::new(name)).map_err(|error| error.to_string())
 }
 
 /// Messages name options of the program; here they are arguments.
@@ -139,8 +129,9 @@ fn for_python(message: &str) -> String {
 #[pyfunction]
 pub fn labels(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyList>> {
     let name = path.display().to_string();
+    let read = |name: &str| files::read(Path::new(name)).map_err(|error| error.to_string());
     let found = py
-        .detach(|| guarded(|| open(&name, load)))?
+        .detach(|| guarded(|| open(&name, read)))?
         .map_err(|problem| error(Class::File, for_python(&problem.to_string())))?;
     let Found::Labels(map, _) = found else {
         return Err(error(Class::File, format!("{name} is a mesh, which has no labels")));

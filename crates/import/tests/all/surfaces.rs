@@ -126,6 +126,13 @@ fn patches_of_a_mesh_are_kept_and_shown() {
     let assembly = Assembly::new(&scene, load).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(assembly.fixings[1].vertices, names.patches[0].vertices);
     assert_eq!(assembly.bodies[0].names, names);
+    // Beside it a picture of its angles.
+    let (_, svg) = written.iter().find(|(name, _)| name == "ball_angles.svg").expect("a picture");
+    let svg = std::str::from_utf8(svg).expect("text");
+    assert!(
+        svg.contains("<svg") && svg.contains("dihedral angle") && svg.contains(">\nball\n<"),
+        "{svg}"
+    );
 }
 
 /// Two balls apart, one with a lump of another region that has a name, one without.
