@@ -3,6 +3,7 @@
 use serde::Serialize;
 use std::path::Path;
 use viscera::mesh::verdict::Problem;
+use viscera_resources::files::word;
 
 /// What is to be thought of a mesh, and what to do next.
 #[derive(Debug, Serialize)]
@@ -72,9 +73,4 @@ impl Verdict {
         let next: Vec<&str> = self.next.iter().map(String::as_str).collect();
         rows("verdict", &problems) + &rows("next", &next)
     }
-}
-
-/// A word of a command line.
-fn word(text: &str) -> String {
-    if text.contains(' ') { format!("\"{text}\"") } else { text.to_owned() }
 }

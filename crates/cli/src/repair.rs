@@ -24,7 +24,7 @@ pub struct RepairArguments {
     /// The file to write: tetrahedra as .vtu, .vtk or .msh, surfaces as .obj, .stl or .ply
     out: PathBuf,
     /// The length that 1 in the file stands for; what is written is in metres
-    #[arg(long, default_value = "1 m")]
+    #[arg(long, default_value = METRES)]
     unit: String,
     /// Make vertices one that are no farther apart; a millionth of the mesh's size where nothing is said
     #[arg(long, value_name = "LENGTH")]
@@ -37,8 +37,11 @@ pub struct RepairArguments {
     edge: Option<String>,
 }
 
-/// Boxes around a mesh have at most so many edges along their diagonal.
-const FINEST: f64 = 200.0;
+/// The unit of files that are in metres.
+const METRES: &str = "1 m";
+
+/// Boxes around a mesh have at most so many edges along their diagonal: a million tetrahedra or two.
+const FINEST: f64 = 100.0;
 
 /// Carries out the command.
 pub fn execute(arguments: &RepairArguments) -> Result<()> {
@@ -79,10 +82,12 @@ pub fn execute(arguments: &RepairArguments) -> Result<()> {
             let verdict = Verdict::new(out, None, false, &problems).without_repair();
             let mut text = verdict.text(false);
             if !refill && !verdict.good {
+                let (from, to) = (files::word(&name), files::word(&out.display().to_string()));
+                let unit =
+                    if unit == METRES { String::new() } else { format!(" --unit \"{unit}\"") };
                 text.push_str(&format!(
-                    "{:<18} viscera mesh repair {name} {} --refill\n",
-                    "",
-                    out.display()
+                    "{:<18} viscera mesh repair {from} {to}{unit} --refill\n",
+                    ""
                 ));
             }
             (write_tets(&mesh, &names, &ending)?, texts, text)

@@ -119,11 +119,11 @@ pub fn write(import: &Import, title: &str, folder: &Path, replace: Replace) -> R
     {
         // A folder that differs from that of a file of the same name by the ending.
         let elsewhere = format!("out/{}/scene", name_of(&from.name));
-        let file = word(&import.file);
+        let file = files::word(&import.file);
         bail!(
             "{why}; name another folder (viscera scene new {file} --out {elsewhere}), or replace what is there \
              (viscera scene new {file} --out {} --force)",
-            word(&folder.display().to_string())
+            files::word(&folder.display().to_string())
         );
     }
     let files = written.iter().map(|(name, bytes)| (hash_of(bytes), name.clone())).collect();
@@ -174,14 +174,6 @@ fn obstacle(
         _ => Some(format!(
             "{shown}: there is another scene, made with other options or changed by hand; use that one (viscera run {shown}, viscera view {shown})"
         )),
-    }
-}
-
-/// A path as one word of a command.
-fn word(path: &str) -> String {
-    match path.contains([' ', '\'', '(', ')', '&', ';']) {
-        true => format!("\"{path}\""),
-        false => path.to_owned(),
     }
 }
 

@@ -50,6 +50,14 @@ pub fn print(text: &str) -> Result<()> {
     }
 }
 
+/// A path as one word of a command that a message shows.
+pub fn word(path: &str) -> String {
+    match path.contains([' ', '\'', '(', ')', '&', ';']) {
+        true => format!("\"{path}\""),
+        false => path.to_owned(),
+    }
+}
+
 /// Where a scene's mesh files are looked for: beside the scene, then in the data folder.
 #[derive(Clone, Debug)]
 pub struct MeshFiles {

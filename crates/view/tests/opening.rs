@@ -129,7 +129,7 @@ fn files_are_dropped_onto_the_window() {
     assert_eq!(names, ["liver", "spleen"]);
     assert_eq!(window.harness.state().preferences().coloring, Coloring::Bodies);
     window.picture("scan");
-    // What cannot be opened is told, and what runs goes on.
+    // A message says why a file cannot be opened, and the running simulation goes on.
     let (_kept, picture) = file("picture.png", "\u{fffd}");
     std::fs::write(&picture, b"\x89PNG\xff").expect("a file");
     let (_kept, recording) = file("liver-0001.viscera", "");

@@ -10,10 +10,11 @@ mod peel;
 mod smooth;
 mod surface;
 mod weld;
+mod wind;
 
 use super::corners::{shape_quality, sorted_face_sides};
 use super::topology::BoundingBox;
-use super::{MIN_SHAPE_QUALITY, MeshError, TetMesh, check_counts, check_vertex};
+use super::{MIN_SHAPE_QUALITY, MeshError, TetMesh, check_counts, check_vertex, tet_volume};
 use crate::scalar::Vec3;
 pub use surface::{SurfaceMending, mend_surface};
 
@@ -124,9 +125,11 @@ pub fn mend(
     let still = tets.iter().filter(|tet| is_flat(tet, &places)).count();
     mending.unfolded_tets = flat.saturating_sub(still);
     let stays = peel::peel(&places, &tets);
-    mending.peeled_tets = keep(&mut tets, &mut regions, &stays);
+    keep(&mut regions, &stays);
+    mending.peeled_tets = keep(&mut tets, &stays);
     let whole: Vec<bool> = tets.iter().map(|tet| !is_flat(tet, &places)).collect();
-    mending.flat_tets = keep(&mut tets, &mut regions, &whole);
+    keep(&mut regions, &whole);
+    mending.flat_tets = keep(&mut tets, &whole);
     let lost = places.iter_mut().zip(&has_place).filter(|(_, has_place)| !**has_place);
     lost.for_each(|(place, _)| *place = Vec3::ZERO);
     let (mesh, repairs) = TetMesh::new(places, tets, regions)?;
@@ -138,13 +141,11 @@ pub fn mend(
 }
 
 /// Leaves out what does not stay; how many.
-fn keep(tets: &mut Vec<[u32; 4]>, regions: &mut Vec<u32>, stays: &[bool]) -> usize {
-    let before = tets.len();
+fn keep<T>(list: &mut Vec<T>, stays: &[bool]) -> usize {
+    let before = list.len();
     let mut stay = stays.iter();
-    tets.retain(|_| stay.next() == Some(&true));
-    let mut stay = stays.iter();
-    regions.retain(|_| stay.next() == Some(&true));
-    before - tets.len()
+    list.retain(|_| stay.next() == Some(&true));
+    before - list.len()
 }
 
 /// Of tetrahedra with the same vertices the first stays.
@@ -170,59 +171,28 @@ fn leave_out_crowded(tets: &mut Vec<([u32; 4], u32)>, vertices: &[Vec3<f64>]) ->
         present.sort_by(|&a, &b| quality(b).total_cmp(&quality(a)));
         present.iter().skip(2).for_each(|&tet| stays[tet as usize] = false);
     }
-    let before = tets.len();
-    let mut stay = stays.iter();
-    tets.retain(|_| stay.next() == Some(&true));
-    before - tets.len()
+    keep(tets, &stays)
 }
 
 /// Winds tetrahedra as their common faces say, each connected part so that its volume is above zero. Returns how many it
 /// rewound.
 fn wind_alike(tets: &mut [[u32; 4]], vertices: &[Vec3<f64>]) -> usize {
-    let sides = sorted_face_sides(tets);
-    let mut pairs: Vec<[(u32, bool); 2]> = Vec::new();
-    for pair in sides.chunk_by(|a, b| a.key == b.key) {
+    let mut neighbors = Vec::new();
+    for pair in sorted_face_sides(tets).chunk_by(|a, b| a.key == b.key) {
         if let [a, b] = pair {
-            let is_alike = a.even != b.even;
-            pairs.extend([
-                [(a.tet, is_alike), (b.tet, is_alike)],
-                [(b.tet, is_alike), (a.tet, is_alike)],
-            ]);
+            neighbors.push(([a.tet, b.tet], a.even != b.even));
         }
     }
-    pairs.sort_unstable();
-    let volume = |tet: &[u32; 4]| super::tet_volume(tet.map(|v| vertices[v as usize]));
-    // Whether each is turned, once it was reached.
-    let mut turned: Vec<Option<bool>> = vec![None; tets.len()];
     let mut count = 0;
-    for start in 0..tets.len() {
-        if turned[start].is_some() {
-            continue;
-        }
-        turned[start] = Some(false);
-        let (mut part, mut at) = (vec![start as u32], 0);
-        while let Some(&tet) = part.get(at) {
-            at += 1;
-            let is_turned = turned[tet as usize] == Some(true);
-            let first = pairs.partition_point(|pair| pair[0].0 < tet);
-            for &[_, (other, is_alike)] in pairs[first..].iter().take_while(|pair| pair[0].0 == tet)
-            {
-                if turned[other as usize].is_none() {
-                    turned[other as usize] = Some(is_turned == is_alike);
-                    part.push(other);
-                }
-            }
-        }
-        let signed = |&tet: &u32| {
-            let volume = volume(&tets[tet as usize]);
-            if turned[tet as usize] == Some(true) { -volume } else { volume }
+    for part in wind::parts(tets.len(), &neighbors) {
+        let signed = |&(tet, is_turned): &(u32, bool)| {
+            let volume = tet_volume(tets[tet as usize].map(|v| vertices[v as usize]));
+            if is_turned { -volume } else { volume }
         };
         let is_inwards = part.iter().map(signed).sum::<f64>() < 0.0;
-        for &tet in &part {
-            if (turned[tet as usize] == Some(true)) != is_inwards {
-                tets[tet as usize].swap(2, 3);
-                count += 1;
-            }
+        for (tet, _) in part.into_iter().filter(|(_, is_turned)| *is_turned != is_inwards) {
+            tets[tet as usize].swap(2, 3);
+            count += 1;
         }
     }
     count

@@ -17,7 +17,7 @@ const POOR: f64 = 0.2;
 /// Sweeps over all vertices at most.
 const SWEEPS: usize = 12;
 
-/// A step first, and the last one, as a share of the shortest edge around, and of the longest.
+/// The first step and the last one, as a share of the longest edge around.
 const FIRST: f64 = 0.3;
 const LAST: f64 = 1e-3;
 

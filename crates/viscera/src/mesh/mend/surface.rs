@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use super::weld;
+use super::{weld, wind};
 use crate::mesh::{MeshError, SurfaceMesh, check_vertex};
 
 /// What a surface was before it was mended.
@@ -99,36 +99,17 @@ fn wind_alike(triangles: &mut [[u32; 3]]) {
             edges.entry(key).or_default().push((index as u32, from < to));
         }
     }
-    let mut beside: Vec<Vec<(u32, bool)>> = vec![Vec::new(); triangles.len()];
+    let mut neighbors = Vec::new();
     for uses in edges.values() {
         if let &[(a, rises), (b, also)] = &uses[..] {
-            beside[a as usize].push((b, rises != also));
-            beside[b as usize].push((a, rises != also));
+            neighbors.push(([a, b], rises != also));
         }
     }
-    let mut turned: Vec<Option<bool>> = vec![None; triangles.len()];
-    for start in 0..triangles.len() {
-        if turned[start].is_some() {
-            continue;
-        }
-        turned[start] = Some(false);
-        let (mut part, mut at) = (vec![start as u32], 0);
-        while let Some(&triangle) = part.get(at) {
-            at += 1;
-            let is_turned = turned[triangle as usize] == Some(true);
-            for &(other, is_alike) in &beside[triangle as usize] {
-                if turned[other as usize].is_none() {
-                    turned[other as usize] = Some(is_turned == is_alike);
-                    part.push(other);
-                }
-            }
-        }
-        let is_turned = |index: &&u32| turned[**index as usize] == Some(true);
-        let most = 2 * part.iter().filter(is_turned).count() > part.len();
-        for &index in &part {
-            if (turned[index as usize] == Some(true)) != most {
-                triangles[index as usize].swap(1, 2);
-            }
+    for part in wind::parts(triangles.len(), &neighbors) {
+        let turned = part.iter().filter(|(_, is_turned)| *is_turned).count();
+        let most = 2 * turned > part.len();
+        for (triangle, _) in part.into_iter().filter(|(_, is_turned)| *is_turned != most) {
+            triangles[triangle as usize].swap(1, 2);
         }
     }
 }

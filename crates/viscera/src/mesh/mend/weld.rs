@@ -14,8 +14,8 @@ pub fn reach(vertices: &[Vec3<f64>], has_place: &[bool]) -> f64 {
     IN_ONE_PLACE * BoundingBox::around(&known.collect::<Vec<_>>()).size().length()
 }
 
-/// For each vertex the first one that lies no farther than `reach` [m] from it, which is often itself. Those without a place
-/// are told apart.
+/// For each vertex the first one that lies no farther than `reach` [m] from it, which is often itself; always itself for one
+/// without a place.
 pub fn first_in_place(vertices: &[Vec3<f64>], has_place: &[bool], reach: f64) -> Vec<u32> {
     // Cells twice as large as the reach: what is near a vertex lies in one of eight.
     let size = if reach > 0.0 { 2.0 * reach } else { 1.0 };
