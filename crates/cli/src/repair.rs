@@ -1,6 +1,6 @@
 //! `viscera mesh repair`.
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use viscera::mesh::io::{MendedFile, MeshFile, MeshNames, ReadReport};
@@ -66,7 +66,7 @@ pub fn execute(arguments: &RepairArguments) -> Result<()> {
                 "--refill makes tetrahedra of a boundary; {name} is a surface, fill it by `viscera mesh tetrahedralize {name} --out mesh.vtu`"
             );
             let mut texts = mending.texts();
-            let surface = closed(surface, edge, &mut texts)?;
+            let surface = closed(surface, edge, &mut texts).with_context(|| name.clone())?;
             let problems = inspect_surface(&surface, &ReadReport::default()).problems();
             let verdict = Verdict::new(out, None, true, &problems).without_repair().text(true);
             (write_surface(&surface, &ending)?, texts, verdict)
@@ -75,7 +75,11 @@ pub fn execute(arguments: &RepairArguments) -> Result<()> {
             check_ending(out, &ending, &["vtu", "vtk", "msh"], "tetrahedra are")?;
             let mut texts = mended.mending.texts();
             let (mesh, names) = match refill {
-                true => (refilled(&mended.mesh, edge, &mut texts)?, MeshNames::default()),
+                true => {
+                    let mesh =
+                        refilled(&mended.mesh, edge, &mut texts).with_context(|| name.clone())?;
+                    (mesh, MeshNames::default())
+                }
                 false => (mended.mesh, names),
             };
             let problems = inspect(&mesh, &ReadReport::default()).problems();

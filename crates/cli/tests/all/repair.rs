@@ -133,6 +133,7 @@ fn what_cannot_be_mended_is_refused() {
     bench.write("cube.msh", DAMAGED.as_bytes());
     bench.write("soup.obj", cube(12).as_bytes());
     bench.write("flat.obj", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+    bench.write("open.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     for (arguments, expected) in [
         (&["cube.msh", "cube.obj"][..], "tetrahedra are written as .vtu, .vtk, .msh"),
         (&["soup.obj", "soup.vtu"], "surfaces are written as .obj, .stl, .ply"),
@@ -141,6 +142,8 @@ fn what_cannot_be_mended_is_refused() {
         (&["cube.msh", "new.vtu", "--weld", "0 mm"], "--weld"),
         (&["absent.msh", "new.vtu"], "absent.msh"),
         (&["flat.obj", "new.obj"], "flat.obj"),
+        (&["open.obj", "new.obj"], "open.obj: inside and outside of the surface cannot be told"),
+        (&["cube.msh", "new.vtu", "--refill", "--edge", "1 um"], "cube.msh: a spacing of"),
     ] {
         let end = bench.end_of(&[&["mesh", "repair"], arguments].concat());
         assert!(end.error().contains(expected), "{arguments:?}: {}", end.stderr);

@@ -15,6 +15,12 @@ fn cube() -> TetMesh {
     block(SIZE, [4, 3, 2]).expect("a block")
 }
 
+/// Whether a place is not on the boundary of the block.
+fn inside(x: &Vec3<f64>) -> bool {
+    let (x, size) = (x.to_array(), SIZE.to_array());
+    (0..3).all(|axis| x[axis] > 1e-9 && x[axis] < size[axis] - 1e-9)
+}
+
 /// The numbers of a mesh, to be damaged.
 fn numbers(mesh: &TetMesh) -> (Vec<Vec3<f64>>, Vec<[u32; 4]>, Vec<u32>) {
     (mesh.vertices().to_vec(), mesh.tets().to_vec(), mesh.regions().to_vec())
@@ -122,9 +128,6 @@ fn tetrahedra_are_wound_alike() {
 fn what_is_inside_out_gets_a_volume_again() {
     let mesh = cube();
     let (mut vertices, tets, regions) = numbers(&mesh);
-    let inside = |x: &Vec3<f64>| {
-        (0..3).all(|i| x.to_array()[i] > 1e-9 && x.to_array()[i] < SIZE.to_array()[i] - 1e-9)
-    };
     let v = vertices.iter().position(inside).expect("a vertex inside");
     vertices[v] += vec3(0.0, 0.0, 0.03);
     let (tangled, _) =
@@ -165,6 +168,43 @@ fn slivers_are_taken_off_the_boundary() {
     let after = mended(&(vertices, tets, regions));
     assert_eq!((after.mending.peeled_tets, after.mending.flat_tets), (1, 0));
     assert!(by_place(&after.mesh) == by_place(&mesh));
+}
+
+/// Nothing is inside out, but a vertex nearly lies in a face of the tetrahedra around it.
+#[test]
+fn small_angles_become_larger() {
+    let mesh = cube();
+    let (mut vertices, tets, regions) = numbers(&mesh);
+    let v = vertices.iter().position(inside).expect("a vertex inside");
+    let around = tets.iter().find(|tet| tet.contains(&(v as u32))).expect("a tetrahedron");
+    let face = around.iter().filter(|&&w| w as usize != v).map(|&w| vertices[w as usize]);
+    let middle = face.fold(Vec3::ZERO, |sum, x| sum + x) * (1.0 / 3.0);
+    vertices[v] = vertices[v] * 0.03 + middle * 0.97;
+    let (poor, _) = TetMesh::new(vertices.clone(), tets.clone(), regions.clone()).expect("a mesh");
+    let problems = inspect(&poor, &Default::default()).problems();
+    assert!(matches!(problems[..], [Problem::Slivers { .. }]), "{problems:?}");
+    let after = mended(&(vertices, tets, regions));
+    assert_eq!((after.mending.moved_vertices, after.mending.unfolded_tets), (1, 0));
+    let least = summarize_quality(&after.mesh).min_dihedral.to_degrees();
+    assert!(least > 11.0, "{least}");
+    assert!((after.mesh.volume() / mesh.volume() - 1.0).abs() < 1e-12);
+}
+
+/// Without the sliver between them two tetrahedra would hang together by an edge.
+#[test]
+fn slivers_stay_where_the_body_would_come_apart() {
+    let vertices = vec![
+        vec3(-0.01, 0.0, 0.0),
+        vec3(0.01, 0.0, 0.0),
+        vec3(0.0, -0.01, 2e-4),
+        vec3(0.0, 0.01, 2e-4),
+        vec3(-0.01, 0.0, 0.01),
+        vec3(0.01, 0.0, 0.01),
+    ];
+    let tets = vec![[0, 1, 2, 3], [0, 2, 3, 4], [1, 2, 3, 5]];
+    let (mesh, _) = TetMesh::new(vertices, tets, vec![0; 3]).expect("a mesh");
+    let after = mended(&numbers(&mesh));
+    assert_eq!((after.mending.peeled_tets, after.mesh.tets().len()), (0, 3));
 }
 
 #[test]
