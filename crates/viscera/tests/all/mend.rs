@@ -2,7 +2,7 @@
 
 use viscera::mesh::io::{MendedFile, MeshFile, MeshNames, Patch, obj, vtu};
 use viscera::mesh::mend::{Mended, mend, mend_surface};
-use viscera::mesh::quality::summarize_quality;
+use viscera::mesh::quality::{dihedral_angles, summarize_quality};
 use viscera::mesh::shapes::block;
 use viscera::mesh::topology::{connected_components, count_folded_faces, count_open_edges};
 use viscera::mesh::verdict::Problem;
@@ -182,7 +182,11 @@ fn small_angles_become_larger() {
     vertices[v] = vertices[v] * 0.03 + middle * 0.97;
     let (poor, _) = TetMesh::new(vertices.clone(), tets.clone(), regions.clone()).expect("a mesh");
     let problems = inspect(&poor, &Default::default()).problems();
-    assert!(matches!(problems[..], [Problem::Slivers { .. }]), "{problems:?}");
+    let all = (0..poor.tets().len()).flat_map(|tet| dihedral_angles(poor.corners(tet)));
+    let is_poor = |angle: &f64| !(5.0..175.0).contains(&angle.to_degrees());
+    let angles = all.filter(is_poor).count();
+    let share = angles as f64 / (6 * poor.tets().len()) as f64;
+    assert!(angles > 0 && problems == [Problem::Slivers { angles, share }], "{problems:?}");
     let after = mended(&(vertices, tets, regions));
     assert_eq!((after.mending.moved_vertices, after.mending.unfolded_tets), (1, 0));
     let least = summarize_quality(&after.mesh).min_dihedral.to_degrees();
