@@ -69,9 +69,12 @@ pub fn is_built() -> bool {
 /// Builds page and package; on failure what to do.
 pub fn build() -> Result<(), String> {
     let compiler = Compiler::provide()?;
-    let wasm = compiler.build()?;
+    // One after the other: together they would have the same features of the library.
+    let wasm = compiler.build("viscera-web", &["--config", SMALL])?;
+    let files = compiler.build("viscera-web-files", &[])?;
     let mut bundle = cargo(&["run", "--quiet", "--package", "viscera-bundle", "--", "build"]);
-    bundle.arg("--wasm").arg(wasm).args(["--web", "crates/web", "--out", FOLDER]);
+    bundle.arg("--wasm").arg(wasm).arg("--files").arg(files);
+    bundle.args(["--web", "crates/web", "--out", FOLDER]);
     run(bundle, "The page was not made; follow what is said above.")
 }
 
@@ -120,21 +123,24 @@ impl Compiler {
         }
     }
 
-    /// Builds the module; its file.
-    fn build(&self) -> Result<PathBuf, String> {
+    /// Builds the module of a package; its file.
+    fn build(&self, package: &str, options: &[&str]) -> Result<PathBuf, String> {
         let folder = match self {
             Self::Own => FOLDER.to_owned(),
             Self::Debian { .. } => format!("{FOLDER}-fallback"),
         };
-        let arguments = ["build", "--package", "viscera-web", "--lib", "--profile", PROFILE];
+        let arguments = ["build", "--package", package, "--lib", "--profile", PROFILE];
         let mut command = match self {
             Self::Own => cargo(&arguments),
             Self::Debian { linker } => debian(&arguments, linker),
         };
-        command.args(["--target", TARGET, "--target-dir", &folder, "--config", SMALL]);
+        command.args(["--target", TARGET, "--target-dir", &folder]).args(options);
         println!("== module: {}", shown(&command));
         run(command, "The module was not built; follow the first message of the compiler above.")?;
-        Ok(Path::new(&folder).join(TARGET).join(PROFILE).join("viscera_web.wasm"))
+        Ok(Path::new(&folder)
+            .join(TARGET)
+            .join(PROFILE)
+            .join(format!("{}.wasm", package.replace('-', "_"))))
     }
 }
 

@@ -5,7 +5,8 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use viscera_bundle::server::Server;
-use viscera_bundle::{files, module, package, site, sizes};
+use viscera_bundle::sizes::{Sizes, small_copies};
+use viscera_bundle::{files, module, package, site};
 
 const HELP: &str = "\
 Make static files of the page and its wasm module.
@@ -15,7 +16,8 @@ Usage: viscera-bundle build [OPTIONS]
 
   build              wasm-bindgen, names after content; writes
                      OUT/site (the page) and OUT/npm (the package), and prints what travels
-    --wasm FILE      the module         [default: target/web/wasm32-unknown-unknown/web/viscera_web.wasm]
+    --wasm FILE      the page's module  [default: target/web/wasm32-unknown-unknown/web/viscera_web.wasm]
+    --files FILE     that for people's own files  [default: viscera_web_files.wasm beside the default of --wasm]
     --web FOLDER     page/ and package/ are in it                             [default: crates/web]
     --out FOLDER                                                              [default: target/web]
 
@@ -50,6 +52,7 @@ fn main() -> ExitCode {
 
 struct Build {
     wasm: PathBuf,
+    files: PathBuf,
     web: PathBuf,
     out: PathBuf,
 }
@@ -58,15 +61,19 @@ impl Build {
     fn new(options: &[&str]) -> Result<Self> {
         let mut build = Self {
             wasm: "target/web/wasm32-unknown-unknown/web/viscera_web.wasm".into(),
+            files: "target/web/wasm32-unknown-unknown/web/viscera_web_files.wasm".into(),
             web: "crates/web".into(),
             out: "target/web".into(),
         };
         for pair in options.chunks(2) {
             let place = match pair[0] {
                 "--wasm" => &mut build.wasm,
+                "--files" => &mut build.files,
                 "--web" => &mut build.web,
                 "--out" => &mut build.out,
-                other => bail!("unknown option `{other}`; there are --wasm, --web and --out"),
+                other => {
+                    bail!("unknown option `{other}`; there are --wasm, --files, --web and --out")
+                }
             };
             *place = pair.get(1).with_context(|| format!("{} lacks its path", pair[0]))?.into();
         }
@@ -74,15 +81,15 @@ impl Build {
     }
 
     fn run(&self) -> Result<()> {
-        let module = module::build(&self.wasm)?;
+        let module = module::build_all(&self.wasm, &self.files)?;
         let page = files::read(&self.web.join("page"))?;
         let mut generated = module.clone();
         // For people who write programs, not for browsers.
-        generated.remove(module::TYPES);
+        generated.retain(|path, _| !module::is_types(path));
         let site = site::build(&page, &generated)?;
-        let copies = sizes::small_copies(&site.files);
-        let (table, sum) = sizes::table(&site.files, &copies);
-        print!("\n{table}");
+        let copies = small_copies(&site.files);
+        let sizes = Sizes::new(&site.files, &copies);
+        print!("\n{}", sizes.table());
         let place = self.out.join("site");
         let all = site.files.iter().chain(&copies).map(|(path, c)| (path.clone(), c.clone()));
         files::write(&place, &all.collect())?;
@@ -94,7 +101,7 @@ impl Build {
         files::write(&place, &package)?;
         println!("Package: {}", place.display());
         // At the end: what is too large can still be looked at.
-        sizes::check(sum)
+        sizes.check()
     }
 }
 

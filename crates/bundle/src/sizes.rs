@@ -12,8 +12,14 @@ use flate2::write::GzEncoder;
 
 use crate::files::Files;
 
-/// What the page may take as it travels [bytes].
+/// What the page may take as it travels, before a person opens a file of their own [bytes].
 pub const BUDGET: usize = 1_000_000;
+
+/// What the second module may take, which that takes [bytes].
+pub const FILES_BUDGET: usize = 700_000;
+
+/// Of the second module.
+const OF_FILES: &str = "viscera_files";
 
 /// As a server sends it.
 pub fn gzip(content: &[u8]) -> Vec<u8> {
@@ -42,32 +48,60 @@ pub fn small_copies(files: &Files) -> Files {
     large.map(|(path, content)| (format!("{path}.br"), brotli(content))).collect()
 }
 
-/// A line for each file, the largest first, and their sum; the sum with Brotli [bytes].
-pub fn table(files: &Files, copies: &Files) -> (String, usize) {
-    let sizes = |(path, content): (&String, &Vec<u8>)| {
-        let small = copies.get(&format!("{path}.br")).map_or(content.len(), Vec::len);
-        (path.clone(), [content.len(), gzip(content).len(), small])
-    };
-    let mut rows: Vec<(String, [usize; 3])> = files.iter().map(sizes).collect();
-    rows.sort_by_key(|(path, [.., small])| (std::cmp::Reverse(*small), path.clone()));
-    let sums = [0, 1, 2].map(|kind| rows.iter().map(|(_, sizes)| sizes[kind]).sum());
-    rows.push(("sum".to_owned(), sums));
-    let width = rows.iter().map(|(path, _)| path.len()).max().unwrap_or(0);
-    let mut text = format!("{:<width$}  {:>9}  {:>9}  {:>9}\n", "bytes", "raw", "gzip", "Brotli");
-    for (path, [raw, gzip, small]) in rows {
-        let _ = writeln!(text, "{path:<width$}  {raw:>9}  {gzip:>9}  {small:>9}");
-    }
-    (text, sums[2])
+/// What each file takes, the largest first.
+pub struct Sizes {
+    /// Raw, by gzip and by Brotli [bytes].
+    rows: Vec<(String, [usize; 3])>,
 }
 
-/// Refuses a page that takes more than the budget.
-pub fn check(sum: usize) -> Result<()> {
-    if sum > BUDGET {
-        let over = sum - BUDGET;
-        bail!(
-            "the page takes {sum} bytes with Brotli, {over} more than the {BUDGET} it may: look at the largest \
-             lines above; `twiggy top` names what is in the module"
-        );
+impl Sizes {
+    /// Of files, and of those of them that are there once more by Brotli.
+    pub fn new(files: &Files, copies: &Files) -> Self {
+        let sizes = |(path, content): (&String, &Vec<u8>)| {
+            let small = copies.get(&format!("{path}.br")).map_or(content.len(), Vec::len);
+            (path.clone(), [content.len(), gzip(content).len(), small])
+        };
+        let mut rows: Vec<(String, [usize; 3])> = files.iter().map(sizes).collect();
+        rows.sort_by_key(|(path, [.., small])| (std::cmp::Reverse(*small), path.clone()));
+        Self { rows }
     }
-    Ok(())
+
+    /// Sums of the page, and of its second module.
+    fn sums(&self) -> [[usize; 3]; 2] {
+        [false, true].map(|of_files| {
+            let of = self.rows.iter().filter(|(path, _)| path.starts_with(OF_FILES) == of_files);
+            of.fold([0; 3], |sum, (_, sizes)| std::array::from_fn(|kind| sum[kind] + sizes[kind]))
+        })
+    }
+
+    /// A line for each file, and what the page and its second module take.
+    pub fn table(&self) -> String {
+        let [page, of_files] = self.sums();
+        let sums = [("page".to_owned(), page), ("second module".to_owned(), of_files)];
+        let rows = || self.rows.iter().chain(&sums);
+        let width = rows().map(|(path, _)| path.len()).max().unwrap_or(0);
+        let head = ["raw", "gzip", "Brotli"].map(|kind| format!("  {kind:>9}")).concat();
+        let mut text = format!("{:<width$}{head}\n", "bytes");
+        for (path, [raw, gzip, small]) in rows() {
+            let _ = writeln!(text, "{path:<width$}  {raw:>9}  {gzip:>9}  {small:>9}");
+        }
+        text
+    }
+
+    /// Refuses a page that takes more than the budget.
+    pub fn check(&self) -> Result<()> {
+        let [page, of_files] = self.sums().map(|[.., small]| small);
+        for (what, sum, budget) in
+            [("page", page, BUDGET), ("second module", of_files, FILES_BUDGET)]
+        {
+            if sum > budget {
+                let over = sum - budget;
+                bail!(
+                    "the {what} takes {sum} bytes with Brotli, {over} more than the {budget} it may: look at the largest lines \
+                     above; `twiggy top` names what is in a module"
+                );
+            }
+        }
+        Ok(())
+    }
 }

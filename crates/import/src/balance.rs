@@ -1,7 +1,7 @@
 //! Which bodies of a scene can rest under gravity as they are.
 
 use viscera::scene::Scene;
-use viscera::simulation::{AssembleError, Assembly, BalanceError};
+use viscera::simulation::{Assembly, BalanceError};
 
 use crate::bodies::{Import, Part};
 use crate::hold::{Hold, LARGER_BACKS, at_the_back};
@@ -14,46 +14,60 @@ impl Import {
         let mut tries = vec![0; self.parts.len()];
         let guessed: Vec<(Vec<Hold>, usize)> =
             self.parts.iter().map(|part| (part.holds.clone(), part.notes.len())).collect();
-        while let Some(error) = self.try_balance(observe) {
-            let (BalanceError::NotHeld { body }
-            | BalanceError::Turns { body }
-            | BalanceError::TooSoft { body, .. }) = &error
-            else {
+        loop {
+            let errors = self.try_balance(observe);
+            if errors.is_empty() {
                 return;
-            };
-            let Some(index) = self.parts.iter().position(|part| part.name == *body) else { return };
-            let is_soft = matches!(error, BalanceError::TooSoft { .. });
-            let larger = LARGER_BACKS.get(tries[index]).filter(|_| is_soft);
-            tries[index] += 1;
-            let more = larger.and_then(|&share| self.hold_more(index, share));
-            let part = &mut self.parts[index];
-            let (holds, notes) = &guessed[index];
-            // Of several tries the last one counts.
-            part.notes.truncate(*notes);
-            part.notes.push(more.unwrap_or_else(|| {
-                part.holds.clone_from(holds);
-                part.is_balanced = false;
-                format!("it sags at first: {error}")
-            }));
+            }
+            for error in errors {
+                let (BalanceError::NotHeld { body }
+                | BalanceError::Turns { body }
+                | BalanceError::TooSoft { body, .. }) = &error
+                else {
+                    return;
+                };
+                let index = self.parts.iter().position(|part| part.name == *body);
+                let Some(index) = index else { return };
+                let is_soft = matches!(error, BalanceError::TooSoft { .. });
+                let larger = LARGER_BACKS.get(tries[index]).filter(|_| is_soft);
+                tries[index] += 1;
+                let more = larger.and_then(|&share| self.hold_more(index, share));
+                let part = &mut self.parts[index];
+                let (holds, notes) = &guessed[index];
+                // Of several tries the last one counts.
+                part.notes.truncate(*notes);
+                part.notes.push(more.unwrap_or_else(|| {
+                    part.holds.clone_from(holds);
+                    part.is_balanced = false;
+                    format!("it sags at first: {error}")
+                }));
+            }
         }
     }
 
-    /// Nothing where all is balanced, or where the scene has another fault, which is told where it is read.
-    fn try_balance(&self, observe: &mut dyn FnMut(&str)) -> Option<BalanceError> {
+    /// Bodies that cannot rest as they are; none where the scene has another fault.
+    fn try_balance(&mut self, observe: &mut dyn FnMut(&str)) -> Vec<BalanceError> {
         if !self.parts.iter().any(|part| part.is_balanced) {
-            return None;
+            self.balance = None;
+            return Vec::new();
         }
         observe("the shape without gravity");
         let files = self.scene("scene").files;
-        let (_, text) = files.first()?;
-        let scene = Scene::parse("scene.toml", &String::from_utf8_lossy(text), &[]).ok()?;
-        let load = |name: &str| {
+        let text = files.first().map_or("".into(), |(_, text)| String::from_utf8_lossy(text));
+        let Ok(scene) = Scene::parse("scene.toml", &text, &[]) else { return Vec::new() };
+        let mut load = |name: &str| {
             let known = files.iter().find(|(known, _)| known == name);
             known.map(|(_, bytes)| bytes.clone()).ok_or_else(|| format!("{name}: not there"))
         };
-        match Assembly::new(&scene, &mut |name| load(name)) {
-            Err(AssembleError::Balance(error)) => Some(error),
-            _ => None,
+        match Assembly::try_balance(&scene, &mut load, self.balance.as_ref()) {
+            Ok((balance, errors)) => {
+                self.balance = Some(balance);
+                errors
+            }
+            Err(error) => {
+                self.warnings.push(error.to_string());
+                Vec::new()
+            }
         }
     }
 

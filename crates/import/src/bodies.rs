@@ -8,6 +8,7 @@ use viscera::mesh::topology::{BoundingBox, count_open_edges};
 use viscera::mesh::winding::{self, FillError};
 use viscera::mesh::{SurfaceMesh, TetMesh, tet_volume};
 use viscera::scalar::{Vec3, vec3};
+use viscera::simulation::Balance;
 use viscera_volume::VolumeReport;
 
 use crate::filling::{Filled, KEPT, Wanted, fill_to, first_spacing};
@@ -103,6 +104,9 @@ pub struct Import {
     pub warnings: Vec<String>,
     /// What was found and what was assumed, a line each.
     pub notes: Vec<String>,
+    /// How bodies carry gravity that rest as they are, where that was solved for: what an assembly of the scene needs not find
+    /// again.
+    pub balance: Option<Balance>,
 }
 
 /// Turns a file into bodies; calls `observe` with the name of each before it is filled.
@@ -310,7 +314,7 @@ fn alone(file: &str, name: String, mesh: TetMesh, skin: Option<Skin>, inner: Vec
         Part { name, mesh, wanted, skin, tissue, inner, names, holds, is_balanced: true, notes };
     let (file, parts) = (file.to_owned(), vec![part]);
     let (touching, warnings, notes) = (Vec::new(), Vec::new(), Vec::new());
-    Import { file, parts, touching, down, warnings, notes }
+    Import { file, parts, touching, down, warnings, notes, balance: None }
 }
 
 fn of_scan(

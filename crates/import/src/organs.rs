@@ -109,7 +109,7 @@ pub fn of_labels(
         // A gallbladder hangs on its liver.
         parts[touching.from].holds.clear();
     }
-    Ok(Import { file: file.into(), parts, touching, down, warnings, notes })
+    Ok(Import { file: file.into(), parts, touching, down, warnings, notes, balance: None })
 }
 
 /// Why an organ is not filled.

@@ -11,17 +11,17 @@ export type Vector = [number, number, number];
 export interface LoadOptions {
   /**
    * A built-in scene by its name ({@link scenes} lists them), or a scene file's name and text. Where only
-   * {@link LoadOptions.mesh} is given, a scene is made around that mesh: tissue like liver, held at its lowest tenth.
+   * {@link LoadOptions.mesh} is given, a scene is made around that: materials by its name, held where organs are.
    */
   scene?: string | { name: string; text: string };
-  /** Files that the scene names, by the names it uses: meshes as bytes (Gmsh 1 and 2.2, VTU, OBJ for surfaces). */
+  /** Files that the scene names, by the names it uses: meshes as bytes, in every format that the program reads. */
   files?: Record<string, Uint8Array>;
   /**
    * Settings laid over the scene file, by its keys: `{"body.liver.material.young": "8 kPa", "solver.accuracy": "draft"}`.
    * Numbers without a unit are given as text or number; {@link settings} lists keys and what they take.
    */
   settings?: Record<string, string | number | boolean>;
-  /** A tetrahedral mesh of one's own, in place of a scene. Its unit is guessed from its size: an organ's. */
+  /** A mesh, a surface or a segmented scan of one's own, in place of a scene. A mesh's unit is guessed from its size: an organ's. */
   mesh?: { name: string; bytes: Uint8Array };
   /** Factor of the element size of bodies that the scene describes by a shape: 1 as it says, 1.4 coarser, 0.7 finer. Default 1. */
   cells?: number;
@@ -30,6 +30,8 @@ export interface LoadOptions {
    * first call of {@link load} uses it.
    */
   wasm?: string | URL | Response | ArrayBuffer | Uint8Array<ArrayBuffer> | WebAssembly.Module;
+  /** The same for `viscera_files_bg.wasm`, the second module: it is loaded where files of one's own are given. */
+  filesWasm?: string | URL | Response | ArrayBuffer | Uint8Array<ArrayBuffer> | WebAssembly.Module;
 }
 
 /** How a hand takes hold. */

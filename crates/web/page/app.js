@@ -1,6 +1,6 @@
 /** What the page is about at the moment: the scene, its settings, and what leads from one to the next. */
 
-import { readFiles } from "./files.js";
+import { makeScene, readFiles } from "./files.js";
 import { emptyLink, parseLink, problemText, put, writeLink } from "./link.js";
 
 /** @typedef {import("./host.js").Host} Host */
@@ -77,7 +77,7 @@ export class App {
     this.#changed();
   }
 
-  /** A mesh or a scene of a person's own. @param {File[]} files */
+  /** A mesh, a surface, a scan or a scene of a person's own. @param {File[]} files */
   async files(files) {
     try {
       const own = await readFiles(files, this.hello.limits.fileBytes);
@@ -85,10 +85,16 @@ export class App {
       const { color, wireframe } = this.link;
       const link = this.#waiting?.own === names ? this.#waiting : { ...emptyLink(), color, wireframe, own: names };
       this.#given = new Set(link.settings.map(([key]) => key));
-      const transfer = own.map((file) => /** @type {Transferable} */ (file.bytes.buffer));
-      if (await this.#order(link, { own }, [], transfer)) {
+      const made = await makeScene(own, link.settings, (text, stop) => this.#messages.busy(text, stop))
+        .finally(() => this.#messages.idle());
+      if (!made) return;
+      const { scene, notes } = made;
+      const transfer = [...Object.values(scene.files), ...(scene.balance ? [scene.balance] : [])]
+        .map((bytes) => /** @type {Transferable} */ (bytes.buffer));
+      if (await this.#order(link, { own: scene }, [], transfer)) {
         this.own = names;
         this.#waiting = null;
+        for (const note of notes) this.#messages.warn(note);
         this.#messages.tell(`${names} is open. It stays on this device; the link names it and carries the settings.`);
       }
     } catch (error) {

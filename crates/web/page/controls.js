@@ -152,7 +152,7 @@ export class Controls {
     const sizes = SIZES.filter((size) => size >= MESH.finest && size <= MESH.coarsest);
     this.#mesh = menuRow({ name: "mesh size", help: "Size of the cells; another one begins from rest", options: sizes.map((size) => [String(size), meshWords(size)]), words: (size) => meshWords(Number(size)) }, (size) => this.#wishes.mesh(Number(size)));
     this.#mesh.element.hidden = true;
-    const input = /** @type {HTMLInputElement} */ (make("input", { type: "file", multiple: "", accept: ".toml,.msh,.vtu,.obj,.node,.ele,*/*", "aria-label": "Open a mesh or a scene file" }));
+    const input = /** @type {HTMLInputElement} */ (make("input", { type: "file", multiple: "", "aria-label": "Open a mesh, a scan or a scene" }));
     input.addEventListener("change", () => {
       this.#wishes.files([...(input.files ?? [])]);
       input.value = "";
@@ -164,8 +164,8 @@ export class Controls {
       this.#mesh.element.hidden = false;
       rows.push(this.#mesh.element);
     } else this.#mesh = null;
-    return [...rows, gravity.element, make("div", { class: "chips" }, make("label", { class: "file" }, "Open a mesh or scene…", input)),
-      make("p", {}, "Or drop it anywhere: tetrahedra as Gmsh (1, 2.2) or VTU, or a scene file with its meshes and surfaces (OBJ). Your files stay on this device.")];
+    return [...rows, gravity.element, make("div", { class: "chips" }, make("label", { class: "file" }, "Open a mesh, scan or scene…", input)),
+      make("p", {}, "Or drop it anywhere: tetrahedra (Gmsh, VTK, TetGen, Medit, Abaqus), a surface (OBJ, STL, PLY), a segmented scan (NIfTI, NRRD), or a scene file with its meshes. Your files stay on this device.")];
   }
 
   /** @param {any} body */

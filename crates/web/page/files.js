@@ -3,6 +3,13 @@
 import { byId } from "./messages.js";
 
 /** @typedef {{name: string, bytes: Uint8Array}} Own */
+/**
+ * @typedef {object} OwnScene a scene of a person's own files, as the simulation reads it
+ * @property {string} name
+ * @property {string} text
+ * @property {Record<string, Uint8Array>} files
+ * @property {Uint8Array} [balance] how bodies carry gravity that rest as they are
+ */
 
 /** @param {number} bytes */
 function megabytes(bytes) {
@@ -17,7 +24,7 @@ function megabytes(bytes) {
  * @returns {Promise<Own[]>}
  */
 export async function readFiles(files, most) {
-  if (files.length === 0) throw new Error("There was no file in what was dropped: drop a mesh of tetrahedra (.msh, .vtu) or a scene (.toml).");
+  if (files.length === 0) throw new Error("There was no file in what was dropped: drop a mesh, a surface, a segmented scan or a scene (.toml).");
   const size = files.reduce((sum, file) => sum + file.size, 0);
   if (size > most) {
     const name = files.length === 1 ? `“${files[0].name}” has` : "These files have";
@@ -30,6 +37,36 @@ export async function readFiles(files, most) {
       throw new Error(`“${file.name}” cannot be read (${error instanceof Error ? error.message : error}): is it a folder, or has it been moved?`);
     }
   }));
+}
+
+/** Stops the scene that is being made. */
+let stopMaking = () => {};
+
+/**
+ * Makes a scene of files, in a worker of its own; one at a time, the last one.
+ *
+ * @param {Own[]} files
+ * @param {[string, string][]} settings laid over the scene
+ * @param {(text: string, stop: () => void) => void} observe hears what is being done, and how to stop it
+ * @returns {Promise<{scene: OwnScene, notes: string[]} | null>} null: it was stopped
+ */
+export function makeScene(files, settings, observe) {
+  stopMaking();
+  const worker = new Worker(new URL("./maker.js", import.meta.url), { type: "module" });
+  return new Promise((/** @type {(made: {scene: OwnScene, notes: string[]} | null) => void} */ done, failed) => {
+    stopMaking = () => done(null);
+    observe("Reading", stopMaking);
+    worker.onmessage = ({ data }) => {
+      if (data.about === "doing") observe(data.text, stopMaking);
+      else if (data.about === "made") done(data);
+      else failed(new Error(data.text));
+    };
+    worker.onerror = (event) => {
+      event.preventDefault();
+      failed(new Error(event.message || "What reads files could not be loaded: check the connection, then open the file again."));
+    };
+    worker.postMessage({ files, settings }, files.map((file) => /** @type {Transferable} */ (file.bytes.buffer)));
+  }).finally(() => worker.terminate());
 }
 
 /**

@@ -40,6 +40,8 @@ export function button(text, press, attributes = {}) {
 export class Messages {
   #list = byId("messages");
   #card = byId("card");
+  /** @type {HTMLElement | null} */
+  #busy = null;
   /** All that was said, for tests and for bug reports. @type {{text: string, isWarning: boolean}[]} */
   log = [];
 
@@ -51,6 +53,24 @@ export class Messages {
   /** Something that did not work. @param {string} text */
   warn(text) {
     this.#show(text, true);
+  }
+
+  /**
+   * Something that takes a while: the same message until {@link idle}.
+   *
+   * @param {string} text
+   * @param {() => void} stop
+   */
+  busy(text, stop) {
+    this.idle();
+    this.#busy = make("div", { class: "message", role: "status" }, make("p", {}, `${text} …`), button("Stop", stop));
+    this.#list.append(this.#busy);
+  }
+
+  /** It is over. */
+  idle() {
+    this.#busy?.remove();
+    this.#busy = null;
   }
 
   /** Texts that are to be seen now. */
@@ -77,7 +97,7 @@ export class Messages {
     const remove = () => message.remove();
     message.append(button("×", remove, { "aria-label": "Dismiss" }));
     this.#list.append(message);
-    while (this.#list.children.length > 4) this.#list.firstElementChild?.remove();
+    while (this.#list.children.length > 4) [...this.#list.children].find((old) => old !== this.#busy)?.remove();
     this.#list.scrollTop = this.#list.scrollHeight;
     let timer = setTimeout(remove, SHOWN + PER_CHARACTER * text.length);
     // Nobody loses a message that is being read or is reached by key.

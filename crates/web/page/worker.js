@@ -4,7 +4,7 @@
  */
 
 import { Engine } from "./engine.js";
-import init, { Session, limits, presets, sceneForMesh, scenes, settings } from "./viscera.js";
+import init, { Session, limits, presets, scenes, settings } from "./viscera.js";
 
 /** @typedef {{do: string, id?: number, [key: string]: any}} Order */
 
@@ -15,7 +15,7 @@ let hasFailed = false;
 const waiting = [];
 /** The last line that was logged as an error: of a panic it says where. */
 let lastError = "";
-/** What was loaded last, for another mesh size. @type {{name: string, text: string, files: Record<string, Uint8Array>} | null} */
+/** What was loaded last, for another mesh size. @type {import("./files.js").OwnScene | null} */
 let source = null;
 /**
  * @param {{about: string, [key: string]: any}} word
@@ -78,20 +78,6 @@ async function start(order) {
 }
 
 /**
- * Files of a person's own: a scene with its meshes, or a mesh alone.
- *
- * @param {{name: string, bytes: Uint8Array}[]} files
- */
-function ownScene(files) {
-  const isScene = (/** @type {{name: string}} */ file) => /\.toml$/i.test(file.name);
-  const scene = files.find(isScene);
-  const byName = Object.fromEntries(files.filter((file) => !isScene(file)).map((file) => [file.name, file.bytes]));
-  if (scene) return { name: scene.name, text: new TextDecoder().decode(scene.bytes), files: byName };
-  const [mesh] = files;
-  return { name: mesh.name, text: sceneForMesh(mesh.name, mesh.bytes), files: byName };
-}
-
-/**
  * Loads a scene. Settings that it does not take are left out and named.
  *
  * @param {Engine} engine
@@ -99,16 +85,16 @@ function ownScene(files) {
  */
 function load(engine, order) {
   const { session } = engine;
-  const next = order.again && source ? source : order.own ? ownScene(order.own) : { name: order.name, text: order.text, files: {} };
+  const next = order.again && source ? source : order.own ?? { name: order.name, text: order.text, files: {} };
   const request = { name: next.name, text: next.text, settings: order.settings, mesh: order.mesh };
   /** @type {string[]} */
   const problems = [];
   try {
-    session.load(JSON.stringify(request), next.files);
+    session.load(JSON.stringify(request), next.files, next.balance);
   } catch (error) {
     if (error instanceof WebAssembly.RuntimeError || order.settings.length === 0) throw error;
     // One of the settings, or the scene itself: without any of them the scene is heard for itself.
-    session.load(JSON.stringify({ ...request, settings: [] }), next.files);
+    session.load(JSON.stringify({ ...request, settings: [] }), next.files, next.balance);
     for (const [key, value] of order.settings) attempt(problems, key, () => session.set(0, key, value));
   }
   source = next;

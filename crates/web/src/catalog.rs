@@ -1,10 +1,8 @@
-//! What there is to choose from: scenes, presets, settings; and a scene around a mesh file.
+//! What there is to choose from: scenes, presets, settings.
 
 use serde::Serialize;
 use viscera::material::{MaterialModel, PRESETS};
-use viscera::mesh::io;
-use viscera::scalar::Vec3;
-use viscera::scene::{BodyShape, Scene, describe};
+use viscera::scene::{BodyShape, Scene, describe_settings};
 use viscera_resources::BUILT_IN;
 use viscera_stage::Settings;
 
@@ -86,8 +84,8 @@ pub struct SettingEntry {
 
 /// The settings of solver and world.
 pub fn settings() -> Vec<SettingEntry> {
-    let tables = describe().into_iter().filter(|t| ["solver", "world"].contains(&t.path.as_str()));
-    tables
+    describe_settings()
+        .into_iter()
         .flat_map(|table| {
             let path = table.path;
             table.keys.into_iter().map(move |key| {
@@ -116,42 +114,6 @@ fn names_in(type_text: &str) -> Option<Vec<String>> {
     let names: Vec<String> = type_text.split('"').skip(1).step_by(2).map(str::to_owned).collect();
     // An example in quotes, `such as "5 kPa"`, is no list.
     (!names.is_empty() && !type_text.contains("such as")).then_some(names)
-}
-
-/// Lengths that 1 in a mesh file may stand for, and their names.
-const UNITS: [(f64, &str); 4] = [(1.0, "1 m"), (1e-2, "1 cm"), (1e-3, "1 mm"), (1e-6, "1 um")];
-
-/// An organ's size [m], by which the unit of a file is guessed.
-const ORGAN: f64 = 0.15;
-
-/// The share of a body's height that is held where nothing is known of it.
-const HELD: f64 = 0.1;
-
-/// A scene of tissue like liver around a mesh file, held at its lowest tenth; or what is wrong with the file. Files rarely
-/// say their unit: the one that makes a body as large as an organ is taken, and the scene's text says so.
-pub fn scene_for_mesh(name: &str, bytes: &[u8]) -> Result<String, String> {
-    let (mesh, _) = io::read_tet_mesh(name, bytes, 1.0).map_err(|error| error.to_string())?;
-    let low = mesh.vertices().iter().copied().reduce(Vec3::min).unwrap_or_default();
-    let high = mesh.vertices().iter().copied().reduce(Vec3::max).unwrap_or_default();
-    let size = high - low;
-    let largest = size.x.max(size.y).max(size.z);
-    let off = |unit: f64| (largest * unit / ORGAN).ln().abs();
-    let (unit, unit_name) =
-        UNITS.into_iter().min_by(|a, b| off(a.0).total_cmp(&off(b.0))).unwrap_or(UNITS[2]);
-    let up_to = (low.z + HELD * size.z) * unit;
-    let title = name.rsplit('/').next().unwrap_or(name);
-    let [title, file] = [title, name].map(|text| format!("{text:?}"));
-    Ok(format!(
-        "title = {title}\n\
-         description = \"A mesh of your own. Its largest extent is {:.0} mm if 1 in the file is {unit_name}; \
-         its lowest tenth is held.\"\n\n\
-         [time]\nvelocity_factor = 0.98\n\n\
-         [[body]]\nname = \"tissue\"\nmesh = {file}\nunit = \"{unit_name}\"\n\
-         material = {{ preset = \"liver\" }}\n\n\
-         [[fixing]]\nname = \"ground\"\nbody = \"tissue\"\n\
-         half_space = {{ point = [0, 0, \"{up_to} m\"], normal = [0, 0, -1] }}\n",
-        1e3 * largest * unit,
-    ))
 }
 
 /// The settings that make a scene's shapes coarser (a factor above 1) or finer; none where no body has a shape.
@@ -203,23 +165,6 @@ mod tests {
         assert_eq!(named("solver.iterations").kind, "number");
         assert_eq!(named("world.gravity").kind, "text");
         assert!(presets().iter().any(|preset| preset.name == "liver" && preset.young == 5100.0));
-    }
-
-    #[test]
-    fn a_mesh_becomes_a_scene_of_an_organs_size() {
-        let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 100 0 0\n3 0 100 0\n4 0 0 100\n\
-                    $EndNodes\n$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n";
-        let written = scene_for_mesh("folder/organ.msh", text.as_bytes()).expect("a scene");
-        let scene = Scene::parse("organ", &written, &[]).expect("a legal scene");
-        assert_eq!(scene.title, "organ.msh");
-        let mut load = |_: &str| Ok(text.as_bytes().to_vec());
-        let assembly = Assembly::new(&scene, &mut load).expect("meshes");
-        let highest = assembly.builder.positions().iter().fold(0.0, |most, x| f64::max(most, x.z));
-        assert!((highest - 0.1).abs() < 1e-12, "{highest} m");
-        // Three of its four corners are on the ground.
-        assert_eq!(assembly.fixings[0].vertices, [0, 1, 2]);
-        let refused = scene_for_mesh("notes.txt", b"dear diary").expect_err("no mesh");
-        assert!(refused.contains("notes.txt"), "{refused}");
     }
 
     #[test]

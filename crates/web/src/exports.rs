@@ -53,12 +53,6 @@ pub fn presets() -> Result<String, JsError> {
     json(&catalog::presets())
 }
 
-/// A scene around a mesh file.
-#[wasm_bindgen(js_name = sceneForMesh)]
-pub fn scene_for_mesh(name: &str, bytes: &[u8]) -> Result<String, JsError> {
-    catalog::scene_for_mesh(name, bytes).map_err(error)
-}
-
 /// What is refused beyond.
 #[wasm_bindgen]
 pub fn limits() -> String {
@@ -160,8 +154,13 @@ impl Session {
         }
     }
 
-    /// Loads a scene.
-    pub fn load(&mut self, request: &str, files: JsValue) -> Result<(), JsError> {
+    /// Loads a scene; `balance` is what the second module has found for it.
+    pub fn load(
+        &mut self,
+        request: &str,
+        files: JsValue,
+        balance: Option<Vec<u8>>,
+    ) -> Result<(), JsError> {
         let request: LoadRequest =
             serde_json::from_str(request).map_err(|e| error(format!("this is no request: {e}")))?;
         let mut load = |name: &str| {
@@ -173,7 +172,7 @@ impl Session {
                 }
             }
         };
-        self.session.load(&request, &mut load).map_err(error)?;
+        self.session.load(&request, &mut load, balance.as_deref()).map_err(error)?;
         self.positions.clear();
         Ok(())
     }

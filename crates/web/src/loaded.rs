@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use viscera::scalar::Vec3;
 use viscera::scene::{BodyShape, Scene};
-use viscera::simulation::Assembly;
+use viscera::simulation::{Assembly, Balance};
 use viscera_stage::Settings;
 
 use crate::catalog::mesh_settings;
@@ -47,10 +47,11 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// Reads the scene, and makes or reads its meshes; `load` gives the bytes of a file.
+    /// Reads the scene, and makes or reads its meshes; `load` gives the bytes of a file, `balance` those of a [`Balance`].
     pub fn new(
         request: &LoadRequest,
         load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+        balance: Option<&[u8]>,
     ) -> Result<Self, String> {
         if !FACTORS.contains(&request.mesh) {
             return Err(format!(
@@ -76,7 +77,9 @@ impl Loaded {
                 parse(&settings)?
             }
         };
-        let assembly = Assembly::new(&scene, load).map_err(|error| error.to_string())?;
+        let balance = balance.and_then(Balance::from_bytes);
+        let assembly = Assembly::with_balance(&scene, load, balance);
+        let assembly = assembly.map_err(|error| error.to_string())?;
         let tets: usize = assembly.bodies.iter().map(|body| body.tets.len()).sum();
         if tets > MOST_TETS {
             return Err(format!(

@@ -129,13 +129,15 @@ impl Session {
         self.look()
     }
 
-    /// Loads a scene and begins from rest; `load` gives the bytes of its files. On an error what ran before goes on.
+    /// Loads a scene and begins from rest; `load` gives the bytes of its files, `balance` is what the module for files has found
+    /// for it. On an error what ran before goes on.
     pub fn load(
         &mut self,
         request: &LoadRequest,
         load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+        balance: Option<&[u8]>,
     ) -> Result<(), String> {
-        let loaded = Loaded::new(request, load)?;
+        let loaded = Loaded::new(request, load, balance)?;
         let run = self.build(&loaded.scene, &loaded)?;
         let known = self.loaded.as_ref().is_some_and(|old| same_place(old, &loaded));
         self.runs = vec![RunState::new(run)];
@@ -143,6 +145,10 @@ impl Session {
         self.instruments.clear();
         self.force_scale = ForceScale::default();
         self.generation += 1;
+        if loaded.assembly.sags() {
+            let why = "Tissue that rests under gravity as it is sags at first: its shape without gravity is known for other settings.";
+            self.told = Some(why.into());
+        }
         self.loaded = Some(loaded);
         if !known {
             self.home();

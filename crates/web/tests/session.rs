@@ -19,7 +19,7 @@ fn no_files(name: &str) -> Result<Vec<u8>, String> {
 
 fn session(name: &str, settings: &[(&str, &str)], mesh: f64) -> Session {
     let mut session = Session::new(None);
-    session.load(&request(name, settings, mesh), &mut no_files).expect("a scene");
+    session.load(&request(name, settings, mesh), &mut no_files, None).expect("a scene");
     session.resize(800, 600);
     session
 }
@@ -164,14 +164,14 @@ fn what_is_wrong_is_refused_and_what_runs_goes_on() {
     frames(&mut session, 2);
     let before = session.vertices(0).expect("a run").to_vec();
     let huge = request("liver_lifted", &[("body.liver.spacing", "2 mm")], 1.0);
-    let error = session.load(&huge, &mut no_files).expect_err("too large");
+    let error = session.load(&huge, &mut no_files, None).expect_err("too large");
     assert!(error.contains("tetrahedra are more than"), "{error}");
     let mut wrong = request("cantilever", &[], 1.0);
     wrong.mesh = f64::NAN;
-    assert!(session.load(&wrong, &mut no_files).expect_err("no factor").contains("factor"));
+    assert!(session.load(&wrong, &mut no_files, None).expect_err("no factor").contains("factor"));
     wrong.mesh = 1.0;
     wrong.text = "title = ".to_owned();
-    assert!(session.load(&wrong, &mut no_files).expect_err("no scene").contains("line 1"));
+    assert!(session.load(&wrong, &mut no_files, None).expect_err("no scene").contains("line 1"));
     let set = |session: &mut Session, key: &str, value: &str| {
         session.set(0, &vec![(key.to_owned(), value.to_owned())])
     };
@@ -251,7 +251,9 @@ fn the_budget_of_phones_is_that_of_the_plan() {
     for mesh in [2.0, 1.6, 1.25, 1.0, 0.8, 0.65] {
         let mut session = Session::new(None);
         let settings = [("solver.method", "xpbd"), ("solver.device", "cpu")];
-        session.load(&request("liver_lifted", &settings, mesh), &mut no_files).expect("a scene");
+        session
+            .load(&request("liver_lifted", &settings, mesh), &mut no_files, None)
+            .expect("a scene");
         let loaded = session.loaded().expect("a scene");
         rows.push(budget_row(&session, loaded.tets, loaded.vertices));
     }

@@ -7,7 +7,6 @@ export default function init(options: {
 export function scenes(): string;
 export function settings(): string;
 export function presets(): string;
-export function sceneForMesh(name: string, bytes: Uint8Array): string;
 export function limits(): string;
 export function choose(measured: string): string;
 
@@ -18,7 +17,7 @@ export class Session {
   device(): string;
   lost(): string | undefined;
   reopen(canvas?: OffscreenCanvas): Promise<void>;
-  load(request: string, files: Record<string, Uint8Array>): void;
+  load(request: string, files: Record<string, Uint8Array>, balance?: Uint8Array): void;
   loaded(): string;
   loseDevice(): void;
   set(run: number, key: string, value: string): void;

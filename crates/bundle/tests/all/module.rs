@@ -13,15 +13,19 @@ const MODULE: [u8; 36] = [
 ];
 
 #[test]
-fn a_module_gets_a_script_that_finds_it() {
+fn each_module_gets_a_script_that_finds_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("m.wasm");
     std::fs::write(&file, MODULE).expect("written");
-    let module = module::build(&file).expect("a module");
-    let script = String::from_utf8(module[module::SCRIPT].clone()).expect("text");
-    assert!(script.contains("new URL('viscera_bg.wasm', import.meta.url)"), "{script}");
-    assert!(module[module::WASM].starts_with(b"\0asm"));
-    assert!(module.contains_key(module::TYPES));
+    let all = module::build_all(&file, &file).expect("two modules");
+    for (script, wasm) in [(module::SCRIPT, module::WASM), ("viscera_files.js", module::FILES_WASM)]
+    {
+        let script = String::from_utf8(all[script].clone()).expect("text");
+        assert!(script.contains(&format!("new URL('{wasm}', import.meta.url)")), "{script}");
+        assert!(all[wasm].starts_with(b"\0asm"));
+    }
+    let types: Vec<&String> = all.keys().filter(|path| module::is_types(path)).collect();
+    assert_eq!(types, ["viscera.d.ts", "viscera_files.d.ts"]);
 }
 
 #[test]
@@ -29,6 +33,6 @@ fn what_is_no_module_is_refused_with_its_name() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("m.wasm");
     std::fs::write(&file, "no module").expect("written");
-    let error = format!("{:#}", module::build(&file).expect_err("refused"));
+    let error = format!("{:#}", module::build_all(&file, &file).expect_err("refused"));
     assert!(error.contains("m.wasm") && error.contains("wasm-bindgen refuses it"), "{error}");
 }

@@ -1,7 +1,8 @@
 //! Names after content, references, the service worker's list, sizes.
 
 use viscera_bundle::files::Files;
-use viscera_bundle::{site, sizes};
+use viscera_bundle::site;
+use viscera_bundle::sizes::{BUDGET, FILES_BUDGET, Sizes, small_copies};
 
 use crate::files;
 
@@ -126,18 +127,24 @@ fn files_in_folders_are_referred_to_from_where_they_are() {
 fn a_page_beyond_the_budget_is_refused() {
     // Noise: nothing takes nothing off it.
     let mut state = 1_u64;
-    let noise: Vec<u8> = (0..sizes::BUDGET + 10).map(|_| next_byte(&mut state)).collect();
-    let table_of = |name: &str, content: Vec<u8>| {
+    let mut noise = |bytes: usize| (0..bytes).map(|_| next_byte(&mut state)).collect::<Vec<u8>>();
+    let sizes_of = |name: &str, content: Vec<u8>| {
         let files = Files::from([(name.to_owned(), content)]);
-        sizes::table(&files, &sizes::small_copies(&files))
+        Sizes::new(&files, &small_copies(&files))
     };
-    let (table, sum) = table_of("module.wasm", noise);
-    let error = sizes::check(sum).expect_err("refused").to_string();
-    assert!(error.contains("more than the 1000000"), "{error}");
-    assert!(table.contains("module.wasm") && table.contains(&sum.to_string()), "{table}");
-    let zeros = vec![0; 2 * sizes::BUDGET];
-    let (_, sum) = table_of("zeros", zeros);
-    sizes::check(sum).expect("what counts is what travels");
+    let refused = |sizes: &Sizes| sizes.check().expect_err("refused").to_string();
+    let sizes = sizes_of("module.wasm", noise(BUDGET + 10));
+    let (error, table) = (refused(&sizes), sizes.table());
+    assert!(error.contains("page") && error.contains("more than the 1000000"), "{error}");
+    let sum = error.split(' ').find(|word| word.parse::<usize>().is_ok()).expect("a sum");
+    assert!(table.contains("module.wasm") && table.contains(sum), "{table}");
+    let zeros = vec![0; 2 * BUDGET];
+    sizes_of("zeros", zeros).check().expect("what counts is what travels");
+    // The second module is not of the page as it opens, and has a limit of its own.
+    let second = "viscera_files_bg.0.wasm";
+    sizes_of(second, noise(FILES_BUDGET - 1000)).check().expect("within its limit");
+    let error = refused(&sizes_of(second, noise(FILES_BUDGET + 10)));
+    assert!(error.contains("second module"), "{error}");
 }
 
 fn next_byte(state: &mut u64) -> u8 {

@@ -135,6 +135,59 @@ fn a_mesh_that_is_dropped_moves() {
     wait_for_tissue(&tab).save("own_mesh");
 }
 
+/// A segmented scan of 3 mm voxels as NIfTI: two balls that touch, labels without names.
+fn scan() -> Vec<u8> {
+    const SIZE: [usize; 3] = [24, 20, 20];
+    let mut bytes = vec![0u8; 352];
+    let mut put = |at: usize, value: &[u8]| bytes[at..at + value.len()].copy_from_slice(value);
+    put(0, &348i32.to_le_bytes());
+    for (i, size) in [3, SIZE[0], SIZE[1], SIZE[2], 1, 1, 1, 1].into_iter().enumerate() {
+        put(40 + 2 * i, &(size as i16).to_le_bytes());
+    }
+    put(70, &2i16.to_le_bytes());
+    put(72, &8i16.to_le_bytes());
+    for i in 0..4 {
+        put(76 + 4 * i, &3f32.to_le_bytes());
+    }
+    put(108, &352f32.to_le_bytes());
+    put(123, &[2]);
+    put(254, &1i16.to_le_bytes());
+    for row in 0..3 {
+        put(280 + 16 * row + 4 * row, &3f32.to_le_bytes());
+    }
+    put(344, b"n+1\0");
+    for n in 0..SIZE.iter().product() {
+        let [x, y, z] = [n % SIZE[0], n / SIZE[0] % SIZE[1], n / SIZE[0] / SIZE[1]];
+        let apart = |at: [f64; 3], radius: f64| {
+            let d = [x as f64 - at[0], y as f64 - at[1], z as f64 - at[2]];
+            d.iter().map(|d| d * d).sum::<f64>().sqrt() < radius
+        };
+        bytes.push(match (apart([7.0, 9.5, 9.5], 5.5), apart([16.0, 9.5, 9.5], 6.0)) {
+            (_, true) => 5,
+            (true, _) => 2,
+            _ => 0,
+        });
+    }
+    bytes
+}
+
+/// It is filled, tied and held by the second module; and rests as it was scanned by the first one.
+#[test]
+fn a_scan_that_is_dropped_becomes_organs_that_rest_as_they_are() {
+    let Some((tab, _folder)) = dropped("scan.nii", &scan()) else { return };
+    wait_for(&tab, "scan.nii is open");
+    let bodies = tab.evaluate("viscera.state().loaded.bodies.map((body) => body.name).join()");
+    assert_eq!(bodies, "label_2,label_5", "{}", said(&tab));
+    tab.evaluate("viscera.pause()");
+    tab.evaluate("viscera.worker.post('reset')");
+    let before = numbers(&tab, "viscera.vertices(0)");
+    tab.evaluate("viscera.step(60)");
+    let moved = farthest(&before, &numbers(&tab, "viscera.vertices(0)"));
+    assert!(moved < 1e-4, "{moved} m");
+    assert!(!said(&tab).contains("sags"), "{}", said(&tab));
+    wait_for_tissue(&tab).save("own_scan");
+}
+
 #[test]
 fn a_file_that_is_no_mesh_is_told_and_the_scene_goes_on() {
     for (name, content, words) in [

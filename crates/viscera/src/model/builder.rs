@@ -7,7 +7,7 @@ use super::numbering::Numbering;
 use super::{Body, MaterialConstants, Model, ModelError};
 use crate::coloring::ConstraintGraph;
 use crate::contact::Overlap;
-use crate::contact::{Sample, Skin, Tie, TissueContact, sample_boundary};
+use crate::contact::{Sample, Skin, TissueContact, sample_boundary};
 use crate::elements::attachment::Attachments;
 use crate::elements::kinds::{CONSTANTS, Constant, Kind, Legal};
 use crate::elements::list::KINDS;
@@ -204,9 +204,17 @@ impl ModelBuilder {
         &self.skin
     }
 
-    /// Takes these ties in the place of the surface's own, of the same points.
-    pub(crate) fn set_ties(&mut self, ties: Vec<Tie>) {
-        Arc::make_mut(&mut self.skin).ties = ties;
+    /// Says where ties are without force, by their numbers, as [`Tie`](crate::contact::Tie) has it; does nothing where there are none of these.
+    pub(crate) fn set_tie_rests(&mut self, rests: &[(usize, [f64; 3])]) {
+        if rests.is_empty() {
+            return;
+        }
+        let ties = &mut Arc::make_mut(&mut self.skin).ties;
+        for (number, rest) in rests {
+            if let Some(tie) = ties.get_mut(*number) {
+                tie.rest = *rest;
+            }
+        }
     }
 
     /// Vertices of all tetrahedra added so far.

@@ -1,13 +1,20 @@
 //! Every key a scene file can have, from the declarations of the settings themselves.
 
-use super::tables::SceneTable;
+use super::tables::{SceneTable, WorldSettings};
 use crate::material::{PRESET_CAUTION, PRESETS};
-use crate::settings::{KeyDescription, TableDescription, describe_table};
+use crate::settings::{KeyDescription, SolverSettings, TableDescription, describe_table};
 use std::fmt::Write;
 
 /// Every table of a scene file and its keys, the scene itself first.
 pub fn describe() -> Vec<TableDescription> {
     describe_table::<SceneTable>("", false)
+}
+
+/// Those of solver and world, which can be set while a scene runs.
+pub fn describe_settings() -> Vec<TableDescription> {
+    let mut tables = describe_table::<WorldSettings>("world", false);
+    tables.extend(describe_table::<SolverSettings>("solver", false));
+    tables
 }
 
 /// The tables of [`describe`] for printing: what several have in common (a selector of a fixing, of

@@ -51,7 +51,7 @@ mod write;
 
 pub(crate) use build_instrument::check_angle;
 pub use common::Interpolation;
-pub use describe::{describe, describe_markdown, describe_text};
+pub use describe::{describe, describe_markdown, describe_settings, describe_text};
 pub use hand::Hand;
 pub(crate) use hand::key_of;
 pub use instrument::{Course, Instrument, JawDrive, Jaws, Part, ToolKind};

@@ -104,13 +104,9 @@ pub enum SelectError {
     },
     /// The mesh has no names of patches at all.
     #[error(
-        "the body's mesh has no named patches: {}; choose vertices by box, sphere, half_space, nearest or region",
-        if cfg!(feature = "formats") {
-            "they come from physical groups of Gmsh files, node sets of Abaqus files, whole numbers at points of VTK files, \
-             references of Medit and markers of TetGen files"
-        } else {
-            "this build of the program does not read them"
-        }
+        "the body's mesh has no named patches: they come from physical groups of Gmsh files, node sets of Abaqus files, whole \
+         numbers at points of VTK files, references of Medit and markers of TetGen files; choose vertices by box, sphere, \
+         half_space, nearest or region"
     )]
     NoPatches,
 }

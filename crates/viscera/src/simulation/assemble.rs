@@ -1,6 +1,9 @@
 //! From a scene and its files to meshes in the world, vertex patches and a model builder.
 
+use std::sync::Arc;
+
 use super::assemble_error::{AssembleError, MOST_REFINED};
+use super::balance::Balance;
 use crate::mesh::embed::Embedding;
 use crate::mesh::io::{MeshFile, MeshNames, ReadReport};
 use crate::mesh::refine::{self, Middles};
@@ -54,7 +57,7 @@ pub struct ResolvedPatch {
 }
 
 /// A scene with its meshes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Assembly {
     /// The bodies, in the scene's order.
     pub bodies: Vec<AssembledBody>,
@@ -70,6 +73,8 @@ pub struct Assembly {
     pub tools: Vec<Instrument>,
     /// The elements that bodies which rest under gravity as they are have been balanced for.
     pub(super) balanced_for: Option<Elements>,
+    /// How they carry gravity: what was found, or was given before anything was.
+    pub(super) balance: Option<Arc<Balance>>,
     /// What was repaired, and what a person should know before waiting for the result.
     pub notes: Vec<String>,
 }
@@ -81,7 +86,27 @@ impl Assembly {
         scene: &Scene,
         load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
     ) -> Result<Self, AssembleError> {
-        let mut assembly = Self::empty();
+        Self::with_balance(scene, load, None)
+    }
+
+    /// The same with what [`Assembly::balance`] has of another assembly. Of bodies with other materials, meshes, holds or loads
+    /// it is not used.
+    pub fn with_balance(
+        scene: &Scene,
+        load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+        balance: Option<Balance>,
+    ) -> Result<Self, AssembleError> {
+        let mut assembly = Self::without_balance(scene, load)?;
+        assembly.balance = balance.map(Arc::new);
+        assembly.apply_balance(scene, scene.solver.foreseen_elements(false))?;
+        Ok(assembly)
+    }
+
+    pub(super) fn without_balance(
+        scene: &Scene,
+        load: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
+    ) -> Result<Self, AssembleError> {
+        let mut assembly = Self::default();
         for body in &scene.bodies {
             assembly.add_body(body, load)?;
         }
@@ -92,7 +117,6 @@ impl Assembly {
         assembly.check_tools_outside(scene)?;
         assembly.note_overlaps(scene);
         assembly.note_loose_parts(scene);
-        assembly.balance(scene, scene.solver.foreseen_elements(false))?;
         Ok(assembly)
     }
 
@@ -113,7 +137,7 @@ impl Assembly {
     /// The scene that this was made from with every tetrahedron divided into eight. The vertices of each body keep their
     /// places in it, the middles of edges follow.
     pub fn refined(&self, scene: &Scene) -> Result<Self, AssembleError> {
-        let mut finer = Self::empty();
+        let mut finer = Self::default();
         for (assembled, body) in self.bodies.iter().zip(&scene.bodies) {
             let refined = refine::refine(&assembled.mesh);
             let (mesh, middles) = refined
@@ -132,23 +156,10 @@ impl Assembly {
         finer.take_samples(scene)?;
         finer.take_skin(scene)?;
         if let Some(elements) = self.balanced_for {
-            finer.balance(scene, elements)?;
+            finer.apply_balance(scene, elements)?;
         }
         finer.notes.clear();
         Ok(finer)
-    }
-
-    fn empty() -> Self {
-        Self {
-            bodies: Vec::new(),
-            builder: ModelBuilder::new(),
-            fixings: Vec::new(),
-            motions: Vec::new(),
-            forces: Vec::new(),
-            tools: Vec::new(),
-            balanced_for: None,
-            notes: Vec::new(),
-        }
     }
 
     /// What acts on the bodies that are there.

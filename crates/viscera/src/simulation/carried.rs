@@ -15,6 +15,15 @@ use crate::scalar::{Mat3, Vec3};
 /// Forces [N] on vertices of all bodies.
 pub(super) type Forces = Vec<(u32, Vec3<f64>)>;
 
+/// What ties carry.
+#[derive(Default)]
+pub(super) struct Hung {
+    /// On the body, and on what it hangs on.
+    pub forces: Forces,
+    /// Ties by their numbers, and where each is without force, see [`Tie::rest`].
+    pub rests: Vec<(usize, [f64; 3])>,
+}
+
 /// What may be left of force and torque, as a share of the force.
 const CARRIED: f64 = 1e-6;
 
@@ -57,41 +66,39 @@ impl Carrying {
         hanging
     }
 
-    /// Lets the ties of a body that hangs carry `loads`, its weight and what hangs on it: where they are without force
-    /// follows. Returns the forces of the ties, on it and on what it hangs on; nothing where they cannot carry it.
-    pub fn hang(&self, assembly: &mut Assembly, body: usize, loads: &Forces) -> Option<Forces> {
-        let mut skin = assembly.builder.skin().clone();
+    /// Lets the ties of a body that hangs carry `loads`, its weight and what hangs on it. Returns the forces of the ties, on it
+    /// and on what it hangs on, and where they are without force; nothing where they cannot carry it.
+    pub fn hang(&self, assembly: &Assembly, body: usize, loads: &Forces) -> Option<Hung> {
+        let skin = assembly.builder.skin();
         let places = assembly.builder.positions();
         let at = |point: &Point| point.iter().map(|&(v, w)| places[v as usize] * w).sum_of();
         let carries = |tie: &usize| {
-            let [a, b] = bodies(&skin, &skin.ties[*tie]);
+            let [a, b] = bodies(skin, &skin.ties[*tie]);
             let other = if a == body { b } else { a };
             (a == body || b == body) && self.levels[other] < self.levels[body]
         };
         let numbers: Vec<usize> = (0..skin.ties.len()).filter(carries).collect();
-        let ends: Vec<[Point; 2]> = numbers.iter().map(|&n| ends(&skin, &skin.ties[n])).collect();
+        let ends: Vec<[Point; 2]> = numbers.iter().map(|&n| ends(skin, &skin.ties[n])).collect();
         // Where the body is held, and how stiffly.
         let own: Vec<usize> =
-            numbers.iter().map(|&n| usize::from(bodies(&skin, &skin.ties[n])[0] != body)).collect();
+            numbers.iter().map(|&n| usize::from(bodies(skin, &skin.ties[n])[0] != body)).collect();
         let held = ends.iter().zip(&own).zip(&numbers);
         let held: Vec<(Vec3<f64>, f64)> =
             held.map(|((ends, &own), &n)| (at(&ends[own]), skin.ties[n].stiffness)).collect();
         let loads: Vec<_> = loads.iter().map(|&(v, load)| (places[v as usize], load)).collect();
         let carried = rigid(&held, &loads)?;
-        let mut forces = Forces::new();
+        let mut hung = Hung::default();
         for (i, &force) in carried.iter().enumerate() {
             let tie = skin.ties[numbers[i]];
             let on_sample = if own[i] == 0 { force } else { -force };
-            let corners =
-                skin.triangles[tie.triangle as usize].map(|p| at(&of_skin(&skin, p, 1.0)));
+            let corners = skin.triangles[tie.triangle as usize].map(|p| at(&of_skin(skin, p, 1.0)));
             let away = at(&ends[i][0]) - at(&ends[i][1]) + on_sample * (1.0 / tie.stiffness);
-            skin.ties[numbers[i]].rest = tie_rest(away, corners)?;
+            hung.rests.push((numbers[i], tie_rest(away, corners)?));
             for (end, force) in ends[i].iter().zip([on_sample, -on_sample]) {
-                forces.extend(end.iter().map(|&(v, weight)| (v, force * weight)));
+                hung.forces.extend(end.iter().map(|&(v, weight)| (v, force * weight)));
             }
         }
-        assembly.builder.set_ties(skin.ties);
-        Some(forces)
+        Some(hung)
     }
 }
 

@@ -308,7 +308,7 @@ impl<S: Real> Simulation<S> {
         let on_device = same_device && self.callers_device;
         // Of the materials that it was given with: a body that is softened by hand sags.
         let elements = scene.solver.foreseen_elements(on_device);
-        self.assembly.balance(&self.written, elements).map_err(SimulationError::from)?;
+        self.assembly.apply_balance(&self.written, elements).map_err(SimulationError::from)?;
         let builder = self.assembly.with_materials(&scene).map_err(set)?;
         let model = builder.build::<S>().map_err(SimulationError::from)?;
         self.resumed_method = self.resumed_method.filter(|_| same_device);

@@ -5,6 +5,7 @@ pub mod advice;
 mod assemble;
 mod assemble_error;
 mod automatic;
+mod balance;
 mod balanced;
 mod carried;
 mod checkpoint;
@@ -40,6 +41,7 @@ pub use acts::Act;
 pub use assemble::{AssembledBody, Assembly, Refinement, ResolvedPatch};
 pub use assemble_error::{AssembleError, BalanceError};
 pub use automatic::{ExpectedErrors, automatic_settings};
+pub use balance::Balance;
 pub use checkpoint::Checkpoint;
 use checks::{check_contact, check_device, check_patches};
 pub use crossings::Crossed;
@@ -161,7 +163,7 @@ impl<S: Real> Simulation<S> {
     ) -> Result<Self, SimulationError> {
         check_patches(&scene, &assembly)?;
         check_device(&scene, callers_device)?;
-        assembly.balance(&scene, scene.solver.foreseen_elements(callers_device))?;
+        assembly.apply_balance(&scene, scene.solver.foreseen_elements(callers_device))?;
         let model = assembly.builder.build::<S>()?;
         let automatic::Chosen { settings: solver, oscillations, solver: ready } =
             automatic::choose_method(&scene, &assembly, &model, callers_device);

@@ -32,13 +32,17 @@ impl Assembly {
                 skin.add_boundary(number, (tets, first_tet), positions);
             }
         }
+        let places = (!scene.ties.is_empty()).then(|| Places::new(&skin, self.builder.positions()));
+        let mut ties = Vec::new();
         for (number, tie) in (0..).zip(&scene.ties) {
             for patch in [&tie.from, &tie.to] {
                 self.notes.extend(patch.doubt(&self.bodies[patch.body].mesh));
             }
-            let ties = self.tie(&skin, tie, number)?;
-            skin.ties.extend(ties);
+            if let Some(places) = &places {
+                ties.extend(self.tie(&skin, places, tie, number)?);
+            }
         }
+        skin.ties = ties;
         let overlap = self.builder.set_skin(skin, &contact);
         self.check_overlap(scene, overlap)
     }
@@ -72,16 +76,17 @@ impl Assembly {
     }
 
     /// The ties of one of the scene's.
-    fn tie(&self, skin: &Skin, tie: &Tie, group: u32) -> Result<Vec<SkinTie>, AssembleError> {
+    fn tie(
+        &self,
+        skin: &Skin,
+        places: &Places,
+        tie: &Tie,
+        group: u32,
+    ) -> Result<Vec<SkinTie>, AssembleError> {
         let positions = self.builder.positions();
         let [from, to] = [&tie.from, &tie.to].map(|patch| self.resolve(patch));
         let (from, to) = (from?.vertices, to?.vertices);
         let [body, other] = [tie.from.body, tie.to.body].map(|body| body as u32);
-        let at: Vec<Vec3<f64>> = skin
-            .points
-            .iter()
-            .map(|point| mean(point.vertices, point.weights, positions))
-            .collect();
         let is_on: Vec<bool> = (0..)
             .zip(&skin.triangles)
             .map(|(number, triangle)| {
@@ -89,10 +94,8 @@ impl Assembly {
                 skin.bodies[number] == other && borne.iter().all(|share| *share >= BORNE)
             })
             .collect();
-        let (mut tree, mut normals) = (Tree::new(skin, &at), Vec::new());
-        turn_normals(skin, &at, &mut normals);
-        let now = SkinNow { skin, at: &at, normals: &normals };
-        tree.refit(now, 0.0);
+        let Places { tree, at, normals } = places;
+        let now = SkinNow { skin, at, normals };
         let (mut ties, mut untied) = (Vec::new(), Vec::new());
         for (number, sample) in (0..).zip(&skin.samples) {
             let point = SkinPoint { vertices: sample.vertices, weights: sample.weights };
@@ -131,6 +134,24 @@ impl Assembly {
             });
         }
         Ok(ties)
+    }
+}
+
+/// Where the surfaces of all bodies are, and what finds the nearest of their triangles.
+struct Places {
+    tree: Tree,
+    at: Vec<Vec3<f64>>,
+    normals: Vec<Vec3<f64>>,
+}
+
+impl Places {
+    fn new(skin: &Skin, positions: &[Vec3<f64>]) -> Self {
+        let place = |point: &SkinPoint| mean(point.vertices, point.weights, positions);
+        let at: Vec<Vec3<f64>> = skin.points.iter().map(place).collect();
+        let (mut tree, mut normals) = (Tree::new(skin, &at), Vec::new());
+        turn_normals(skin, &at, &mut normals);
+        tree.refit(SkinNow { skin, at: &at, normals: &normals }, 0.0);
+        Self { tree, at, normals }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use viscera::scalar::Vec3;
 use viscera::scene::Scene;
-use viscera::simulation::{AssembleError, Assembly, Simulation};
+use viscera::simulation::{AssembleError, Assembly, Balance, BalanceError, Simulation};
 
 /// A bar that would sag by 30 mm.
 const BAR: &str = r#"
@@ -192,6 +192,77 @@ fn other_elements_are_balanced_anew() {
 }
 
 /// Tissue that is softened while the scene runs sags: what it was made of carried it.
+/// What was found once need not be found again, elsewhere or in a program that cannot.
+#[test]
+fn a_balance_is_taken_over_by_the_scene_that_it_is_of_and_by_no_other() {
+    let stress_free = |assembly: &Assembly| {
+        assembly.builder.build::<f64>().expect("a model").stress_free().to_vec()
+    };
+    let with = |text: &str, settings: &[(&str, &str)], balance: &Balance| {
+        let scene = Scene::parse("scene.toml", text, settings).expect("a legal scene");
+        let mut none = |_: &str| Err("no files".to_owned());
+        Assembly::with_balance(&scene, &mut none, Some(balance.clone())).expect("an assembly")
+    };
+    let (_, found) = assemble(HANGING, &[]).expect("an assembly");
+    assert!(!found.sags());
+    let balance = found.balance().expect("a balance").clone();
+    assert_eq!(Balance::from_bytes(&balance.to_bytes()), Some(balance.clone()));
+    assert_eq!(Balance::from_bytes(b"no balance"), None);
+    let revision =
+        |assembly: &Assembly| assembly.builder.build::<f64>().expect("a model").revision();
+    let again = with(HANGING, &[], &balance);
+    assert_eq!(revision(&again), revision(&found), "shapes, anchors and ties");
+    assert_eq!(again.notes, found.notes);
+
+    // Shapes that are marked show whether they were used.
+    let mut marked = serde_json::to_value(&balance).expect("numbers");
+    let marks = [0, 1].map(|body: usize| {
+        let number = &mut marked["bodies"][body]["shape"][0][0];
+        let moved = number.as_f64().expect("a number") - 1e-6;
+        *number = moved.into();
+        moved
+    });
+    let marked: Balance = serde_json::from_value(marked).expect("a balance");
+    assert_eq!(stress_free(&with(HANGING, &[], &marked))[0].x, marks[0]);
+    let of_lower = |assembly: &Assembly| stress_free(assembly)[assembly.bodies[1].vertices.start].x;
+    for (other, keeps_lower) in [
+        (("body.upper.material.young", "9 kPa"), true),
+        (("world.gravity", "[0, 0, \"-9 m/s^2\"]"), false),
+        (("body.lower.material.density", "900 kg/m^3"), false),
+        (("solver.elements", "plain"), false),
+    ] {
+        let (_, plain) = assemble(HANGING, &[other]).expect("an assembly");
+        let given = with(HANGING, &[other], &marked);
+        // The upper one has other tissue, or carries another load.
+        assert_eq!(stress_free(&given)[0], stress_free(&plain)[0], "{other:?}");
+        assert_eq!(of_lower(&given) == marks[1], keeps_lower, "{other:?}");
+        assert_eq!(of_lower(&given) == of_lower(&plain), !keeps_lower, "{other:?}");
+    }
+}
+
+/// Every body that cannot be balanced is named, and the others are solved for.
+#[test]
+fn all_that_cannot_rest_are_named_at_once() {
+    let settings = [
+        ("body.upper.material.young", "0.1 kPa"),
+        ("body.lower.balanced", "false"),
+        ("contact.bodies", "false"),
+    ];
+    let text =
+        format!("{HANGING}\n{}", BAR.replace("\"bar\"", "\"soft\"").replace("15 kPa", "1 kPa"));
+    let text = format!("{text}\n{}", BAR.replace("\"wall\"", "\"other_wall\""));
+    let scene = Scene::parse("scene.toml", &text, &settings).expect("a legal scene");
+    let mut none = |_: &str| Err("no files".to_owned());
+    let (balance, errors) = Assembly::try_balance(&scene, &mut none, None).expect("meshes");
+    let named = |error: &BalanceError| match error {
+        BalanceError::TooSoft { body, .. } => body.clone(),
+        other => panic!("{other}"),
+    };
+    assert_eq!(errors.iter().map(named).collect::<Vec<_>>(), ["upper", "soft"]);
+    let notes: Vec<&String> = balance.notes().collect();
+    assert!(notes.len() == 1 && notes[0].contains("`bar`"), "{notes:?}");
+}
+
 #[test]
 fn softened_tissue_sags() {
     let change = "[[change]]\ntime = \"0.1 s\"\nset = [\"body.bar.material.young = 8 kPa\"]\n";

@@ -379,6 +379,21 @@ fn recorded_solver_settings_read_back_as_they_were() {
     assert_eq!(Scene::parse(name, text, &overrides).unwrap().solver, scene.solver);
 }
 
+/// A page lists these alone, and has no room for the others.
+#[test]
+fn settings_of_solver_and_world_are_described_as_among_all_keys() {
+    let all = viscera::scene::describe();
+    let settings = viscera::scene::describe_settings();
+    for path in ["world", "solver"] {
+        let of = |tables: &[viscera::settings::TableDescription]| {
+            tables.iter().filter(|table| table.path == path).cloned().collect::<Vec<_>>()
+        };
+        assert_eq!(of(&settings).len(), 1);
+        assert_eq!(of(&settings), of(&all));
+    }
+    assert_eq!(settings.len(), 2);
+}
+
 /// Keys are found in a scene that uses nearly all of them, not in a list kept beside the code.
 #[test]
 fn describe_lists_every_key_and_documents_it() {

@@ -65,10 +65,7 @@ impl<'a> Content<'a> {
             };
             Fault { place, problem: ReadProblem::Mesh(error) }
         })?;
-        let patches = match cfg!(feature = "formats") {
-            true => patches_of_mesh(patches, &repairs, vertex_count)?,
-            false => Vec::new(),
-        };
+        let patches = patches_of_mesh(patches, &repairs, vertex_count)?;
         let named = region_names.into_iter().map(|(region, name)| (region, name_of(&name)));
         let region_names = named.collect();
         let format = Some(format);

@@ -138,8 +138,8 @@ fn read<T>(
         .and_then(|kind| match kind {
             Kind::VtkXml => vtu::read(bytes),
             Kind::Obj => obj::read(bytes),
-            Kind::Gmsh => gmsh::read(bytes),
             _ if !cfg!(feature = "formats") => Err(Fault::not_built("this format")),
+            Kind::Gmsh => gmsh::read(bytes),
             Kind::Vtk => vtk::read(bytes),
             Kind::Medit => medit::read(bytes),
             Kind::Abaqus => abaqus::read(bytes),

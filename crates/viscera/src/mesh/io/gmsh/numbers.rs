@@ -38,7 +38,7 @@ impl<'a> Numbers<'a> {
     }
 
     pub fn is_binary(&self) -> bool {
-        cfg!(feature = "formats") && self.coding != Coding::Text
+        self.coding != Coding::Text
     }
 
     /// The next line of text that is not blank.
@@ -94,7 +94,7 @@ impl<'a> Numbers<'a> {
             Some(bytes) => bytes,
             None => return Err(self.cut_short()),
         };
-        if cfg!(feature = "formats") && self.coding == (Coding::Binary { is_swapped: true }) {
+        if self.coding == (Coding::Binary { is_swapped: true }) {
             bytes.reverse();
         }
         Ok(bytes)

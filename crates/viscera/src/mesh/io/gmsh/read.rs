@@ -57,8 +57,8 @@ pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
                 return Err(line.fault(ReadProblem::SecondPart { what }));
             }
             b"MeshFormat" => file.read_format(section)?,
-            b"PhysicalNames" if cfg!(feature = "formats") => file.read_names()?,
-            b"Entities" if cfg!(feature = "formats") && file.is_four() => file.read_entities()?,
+            b"PhysicalNames" => file.read_names()?,
+            b"Entities" if file.is_four() => file.read_entities()?,
             b"NOD" | b"Nodes" => {
                 file.begin(line, file.vertices.is_some())?;
                 let mut vertices =
@@ -70,7 +70,6 @@ pub(in crate::mesh::io) fn read(bytes: &[u8]) -> Result<Content<'_>, Fault> {
             b"ELM" | b"Elements" => {
                 file.begin(line, file.elements.is_some())?;
                 let mut elements = match (file.is_four(), file.numbers.is_binary()) {
-                    _ if !cfg!(feature = "formats") => file.read_elements()?,
                     (true, _) => file.read_element_blocks()?,
                     (_, true) => file.read_binary_elements()?,
                     _ => file.read_elements()?,
@@ -122,9 +121,6 @@ impl<'a> File<'a> {
                 return Err(line.fault(ReadProblem::Unsupported { found, advice }));
             }
         });
-        if !cfg!(feature = "formats") && (self.is_four() || file_type != 0) {
-            return Err(Fault::not_built("this version of Gmsh"));
-        }
         if file_type == 0 {
             return self.numbers.skip_section(section);
         }
@@ -376,7 +372,7 @@ impl<'a> File<'a> {
                 Shape::Triangle | Shape::Quad => 2,
                 _ => 3,
             };
-            if cfg!(feature = "formats") && dimension < 3 && group > 0 {
+            if dimension < 3 && group > 0 {
                 patches.entry((dimension, group)).or_default().extend_from_slice(&nodes);
             }
             let region = u32::try_from(group).map_err(|_| Fault {
@@ -386,10 +382,7 @@ impl<'a> File<'a> {
             cells.add(shape, &nodes, region, cell);
         }
         let names = self.names;
-        let (patches, region_names) = match cfg!(feature = "formats") {
-            true => named(&names, patches),
-            false => Default::default(),
-        };
+        let (patches, region_names) = named(&names, patches);
         let (of_vertices, of_cells) = (vertices.places, elements.places);
         let places = move |place| match place {
             MeshPlace::Whole => None,

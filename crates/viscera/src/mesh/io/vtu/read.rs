@@ -177,9 +177,6 @@ impl Pieces {
         first: u32,
         count: usize,
     ) -> Result<(), Fault> {
-        if !cfg!(feature = "formats") {
-            return Ok(());
-        }
         let data = piece.children().find(|child| child.has_tag_name("PointData"));
         let arrays = data.into_iter().flat_map(|data| data.children());
         for node in arrays.filter(|node| node.has_tag_name("DataArray")) {
@@ -335,7 +332,7 @@ fn is_scalar(node: Node) -> bool {
 /// Names of regions, where the field data have them as [`super::write_mesh`] writes them.
 fn read_region_names(grid: Node, codec: Codec) -> Result<Vec<(u32, String)>, Fault> {
     let data = grid.children().find(|child| child.has_tag_name("FieldData"));
-    let Some(data) = data.filter(|_| cfg!(feature = "formats")) else { return Ok(Vec::new()) };
+    let Some(data) = data else { return Ok(Vec::new()) };
     // Arrays of text have an element of their own.
     let named = |name| data.children().find(|child| child.attribute("Name") == Some(name));
     let (Some(numbers), Some(names)) = (named(REGION_NUMBERS), named(REGION_NAMES)) else {
