@@ -8,7 +8,9 @@ use indicatif::ProgressBar;
 use std::sync::atomic::{AtomicBool, Ordering};
 use viscera::scalar::Real;
 use viscera::simulation::{FrameReport, Simulation};
-use viscera_picture::{Animation, ImageSize, PictureError, Seen, Shot, Subject, write_png};
+use viscera_picture::{
+    Animation, ImageSize, Look, Medium, PictureError, Seen, Shot, Subject, write_png,
+};
 
 /// Frames of the animated image. More make the file large, fewer make it jerky.
 const MOST_FRAMES: u64 = 75;
@@ -73,23 +75,25 @@ impl Film {
             .shots
             .iter()
             .fold(last, |best, shot| if distance(shot) < distance(best) { shot } else { best });
-        let look = self.subject.look(&self.shots)?;
-        let draw = |shot: &Shot, seen: &Seen| {
+        let [still, film] =
+            [Medium::Picture, Medium::Film].map(|medium| self.subject.look(&self.shots, medium));
+        let (still, film) = (still?, film?);
+        let draw = |look: &Look, shot: &Shot, seen: &Seen| {
             let drawn = look.draw(shot, seen);
             progress.inc(1);
             drawn
         };
-        let (large, small) = (look.seen_at(self.size)?, look.seen_at(self.small_size()?)?);
+        let (large, small) = (still.seen_at(self.size)?, film.seen_at(self.small_size()?)?);
         let goes_on = || !interrupted.load(Ordering::Relaxed);
         // The still picture, and those from which the animation takes its colours.
         let samples = self.samples();
         let mut drawn = Vec::new();
         let first = |number: usize| match number.checked_sub(1) {
-            Some(sample) => Ok((draw(&self.shots[samples[sample]], &small)?, None)),
+            Some(sample) => Ok((draw(&film, &self.shots[samples[sample]], &small)?, None)),
             None => {
-                let still = draw(shown, &large)?;
-                let png = write_png(&still)?;
-                Ok((still, Some(png)))
+                let picture = draw(&still, shown, &large)?;
+                let png = write_png(&picture)?;
+                Ok((picture, Some(png)))
             }
         };
         let is_whole = make_in_order(1 + samples.len(), first, |made: Result<_, PictureError>| {
@@ -105,7 +109,7 @@ impl Film {
         let mut animation = Animation::in_colors_of(&drawn, small.size())?;
         let picture = |number: usize| match samples.binary_search(&number) {
             Ok(sample) => Ok(drawn[sample].clone()),
-            Err(_) => draw(&self.shots[number], &small),
+            Err(_) => draw(&film, &self.shots[number], &small),
         };
         let mut times = self.shots.iter().map(|shot| shot.time);
         let pictures = self.shots.len();

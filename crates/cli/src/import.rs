@@ -3,6 +3,7 @@
 use anyhow::{Result, bail};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use viscera::simulation::Balance;
 use viscera::units::Dimension;
 use viscera_import::{Fineness, Import, Options, folder_of, is_foreign, load, name_of, stem_of};
 use viscera_resources::files;
@@ -130,12 +131,17 @@ fn import_with(file: &Path, options: Options) -> Result<Import> {
     made
 }
 
-/// The scene of a file from elsewhere, made in a folder beside the results, with a bar that says what goes on.
-pub fn scene_of(path: &Path, folder: &Path) -> Result<PathBuf> {
+/// The scene of a file from elsewhere, made in a folder beside the results, with a bar that says what goes on; and how its bodies
+/// carry gravity. What was made is printed, or `is_quiet` a message.
+pub fn scene_of(path: &Path, folder: &Path, is_quiet: bool) -> Result<(PathBuf, Option<Balance>)> {
     let bar = progress::spinner(String::new());
     let made = viscera_import::scene_of(path, folder, &mut |doing| bar.set_message(doing));
     bar.finish_and_clear();
     let (import, made) = made?;
-    files::print(&format!("{}{}", import.describe(), made.text()))?;
-    Ok(made.scene)
+    let text = format!("{}{}", import.describe(), made.text());
+    match is_quiet {
+        true => eprint!("{text}"),
+        false => files::print(&text)?,
+    }
+    Ok((made.scene, import.balance))
 }

@@ -24,8 +24,9 @@ mod series;
 mod summary;
 mod tool_table;
 mod view;
+mod words;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Real-time soft-tissue simulation for surgical applications.
@@ -50,6 +51,12 @@ Examples:
   viscera view grab
   viscera bench --quick";
 
+const COMPLETIONS: &str = "\
+Examples:
+  viscera completions bash > ~/.local/share/bash-completion/completions/viscera
+  viscera completions zsh > ~/.zfunc/_viscera       # with `fpath+=~/.zfunc` before `compinit`
+  viscera completions fish > ~/.config/fish/completions/viscera.fish";
+
 #[derive(Subcommand)]
 enum Command {
     /// Simulate a scene; write meshes, a picture, an animation and the numbers
@@ -70,6 +77,12 @@ enum Command {
     View(view::ViewArguments),
     /// List what there is to compute on, and how fast it is
     Devices(devices::DevicesArguments),
+    /// Print a script by which a shell completes commands and options
+    #[command(after_help = COMPLETIONS)]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
     // For a program, not for a person.
     #[command(hide = true)]
     BenchScene(bench_scene::BenchSceneArguments),
@@ -94,6 +107,7 @@ fn main() -> ExitCode {
         Command::Devices(arguments) => {
             devices::execute(&arguments).map(|()| run::Outcome::Finished)
         }
+        Command::Completions { shell } => completions(shell).map(|()| run::Outcome::Finished),
         Command::BenchScene(arguments) => {
             bench_scene::execute(&arguments).map(|()| run::Outcome::Finished)
         }
@@ -109,6 +123,13 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Prints a shell's script.
+fn completions(shell: clap_complete::Shell) -> anyhow::Result<()> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Arguments::command(), "viscera", &mut script);
+    viscera_resources::files::print(&String::from_utf8_lossy(&script))
 }
 
 /// Graphics drivers look for a display below `XDG_RUNTIME_DIR` and complain on our standard error where it is unset

@@ -2,6 +2,7 @@
 
 use crate::progress;
 use crate::run::{Outcome, Plan, from_one, listen, simulate};
+use crate::words::Words;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::PathBuf;
@@ -134,6 +135,7 @@ impl Replay<'_> {
                     frames: simulation.frame() + (end - first),
                     interrupted: listen()?,
                     save: None,
+                    words: Words::Table,
                 };
                 let mut step = |simulation: &mut Simulation<S>| {
                     player.step(simulation).map(|_| ()).with_context(|| name.to_owned())

@@ -7,8 +7,9 @@ use crate::output::OutputFolder;
 use crate::progress;
 use crate::recording_file::RecordingFile;
 use crate::series::Series;
-use crate::summary::{FrameLine, Summary};
+use crate::summary::{FrameLine, ROW_HEADS, Summary, frame_row};
 use crate::tool_table::ToolTable;
+use crate::words::{Words, heading, json, last_words};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -20,8 +21,8 @@ use std::time::Instant;
 use viscera::record::RecordedFile;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
-use viscera::settings::{DeviceRequest, Elements, Method, Precision};
-use viscera::simulation::{Assembly, ExpectedErrors, MeshReport, RestReport, Simulation, advice};
+use viscera::settings::{DeviceRequest, Precision};
+use viscera::simulation::{Assembly, MeshReport, RestReport, Simulation, advice};
 use viscera_resources::{Memory, MeshFiles, files, memory, scene_text};
 
 /// Simulate a scene; write meshes, a picture, an animation and the numbers
@@ -66,6 +67,12 @@ pub struct RunArguments {
     /// Record the run, to have it once more with `viscera replay`
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// Print a line for every frame, as it is computed
+    #[arg(long, short)]
+    verbose: bool,
+    /// Print what summary.json has, in place of everything else
+    #[arg(long, conflicts_with = "verbose")]
+    json: bool,
     #[command(flatten)]
     of_import: import::OfSceneNew,
 }
@@ -91,23 +98,26 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
     arguments.of_import.refuse(&arguments.scene)?;
     let folder = arguments.out.clone().unwrap_or_else(|| folder_of(&arguments.scene));
     let made;
+    let mut balance = None;
     let mut arguments = arguments;
     if viscera_import::is_foreign(&arguments.scene) {
         // A mesh or a scan: its scene is made first, and stays beside the results to be changed.
-        let scene = import::scene_of(&arguments.scene, &folder)?;
+        let (scene, found) = import::scene_of(&arguments.scene, &folder, arguments.json)?;
+        balance = found;
         made = RunArguments { scene, ..arguments.clone() };
         arguments = &made;
     }
     let (scene, overrides) = read_scene(arguments)?;
     let meshes = MeshFiles::new(&arguments.scene, arguments.data.as_deref());
     let mut loaded = Vec::new();
-    let assembly = Assembly::new(&scene, &mut |name| {
+    let mut load = |name: &str| {
         let bytes = meshes.load(name)?;
         if arguments.record.is_some() {
             loaded.push(RecordedFile::new(name, &bytes));
         }
         Ok(bytes)
-    })?;
+    };
+    let assembly = Assembly::with_balance(&scene, &mut load, balance)?;
     let tets = assembly.bodies.iter().map(|body| body.tets.len()).sum();
     let what = format!("{}: a simulation of {tets} tetrahedra", scene.name);
     let needed = memory::of_run(tets, &scene.solver);
@@ -117,7 +127,13 @@ pub fn run(arguments: &RunArguments) -> Result<Outcome> {
         files::prepare_file(file, "--save")?;
     }
     let interrupted = listen()?;
-    let plan = Plan { overrides, folder, frames, interrupted, save: arguments.save.as_deref() };
+    let words = match (arguments.json, arguments.verbose) {
+        (true, _) => Words::Json,
+        (_, true) => Words::EveryFrame,
+        _ => Words::Table,
+    };
+    let save = arguments.save.as_deref();
+    let plan = Plan { overrides, folder, frames, interrupted, save, words };
     match scene.solver.precision {
         Precision::F32 => {
             start(build::<f32>(scene, assembly, arguments, frames)?, plan, loaded, arguments)
@@ -144,6 +160,7 @@ pub struct Plan<'a> {
     pub frames: u64,
     pub interrupted: Arc<AtomicBool>,
     pub save: Option<&'a Path>,
+    pub words: Words,
 }
 
 /// Whether Ctrl-C or SIGTERM have come, from now on.
@@ -219,11 +236,13 @@ pub fn simulate<S: Real>(
     plan: Plan<'_>,
     step: Step<'_, S>,
 ) -> Result<Outcome> {
-    let Plan { overrides, folder, frames, interrupted, save } = plan;
+    let Plan { overrides, folder, frames, interrupted, save, words } = plan;
     // Where the device is refused no folder stays behind.
     let out = &OutputFolder::create(&folder)?;
     let summary = Summary::new(&simulation, overrides);
-    files::print(&heading(&simulation, &summary, frames))?;
+    if words != Words::Json {
+        files::print(&heading(&simulation, &summary, frames))?;
+    }
     let draws = simulation.scene().output.picture;
     let mut recording = Recording {
         film: draws.then(|| Film::new(&simulation, frames)).transpose()?,
@@ -231,9 +250,10 @@ pub fn simulate<S: Real>(
         tools: ToolTable::default(),
         hold: Hold::new(&simulation, frames),
         summary,
+        words,
     };
     let ended = recording.compute(&mut simulation, frames, &interrupted, step);
-    let Recording { film, series, tools, hold, mut summary } = recording;
+    let Recording { film, series, tools, hold, mut summary, .. } = recording;
     let (mut series, written) = series.end();
     let ended = ended.and_then(|complete| written.map(|()| complete));
     let complete = matches!(ended, Ok(true));
@@ -273,11 +293,7 @@ pub fn simulate<S: Real>(
         let kept = summary.frames.computed();
         bail!("{error:#} ({kept} frames before that are in {})", out.path().display());
     }
-    let mut text = summary.table();
-    for warning in &summary.warnings {
-        text.push_str(&format!("warning: {warning}\n"));
-    }
-    files::print(&format!("{text}results: {}\n", out.path().display()))?;
+    files::print(&last_words(&summary, words, out)?)?;
     match (summary.finished, drawn) {
         (true, true) => return Ok(Outcome::Finished),
         (true, false) => eprintln!("interrupted while drawing; meshes and numbers are complete"),
@@ -292,71 +308,6 @@ fn judged<S: Real>(simulation: &Simulation<S>) -> (Option<RestReport>, Option<Me
     let found = (simulation.rest(), simulation.mesh_error());
     spinner.finish_and_clear();
     found
-}
-
-/// What is computed, and by what.
-fn heading<S: Real>(simulation: &Simulation<S>, summary: &Summary, frames: u64) -> String {
-    let model = &summary.model;
-    let solver = simulation.solver();
-    let work = match solver.method {
-        Method::Xpbd => format!(" x {} iterations", solver.iterations()),
-        Method::Auto | Method::QuasiNewton => {
-            format!(" x {} passes per solve", simulation.iterations())
-        }
-        Method::Explicit => {
-            let small = format!("{:.2e} s", simulation.stable_step());
-            format!(", divided into small steps of at most {small}")
-        }
-    };
-    // The others need no colours.
-    let colors = match solver.method {
-        Method::Auto | Method::QuasiNewton | Method::Explicit => String::new(),
-        Method::Xpbd => format!(" colours: {},", model.colors),
-    };
-    let from = match simulation.frame() {
-        0 => String::new(),
-        frame => format!(" from {} on", frame + 1),
-    };
-    format!(
-        "{}: {} tetrahedra, {} vertices, {:.3} kg,{colors} frames: {frames}{from} of {} substeps{work}\n\
-         {}device: {}\n",
-        summary.title,
-        model.tets,
-        model.vertices,
-        model.mass,
-        simulation.substeps(),
-        method_line(simulation),
-        summary.device,
-    )
-}
-
-/// The method, and the errors that it leads one to expect.
-fn method_line<S: Real>(simulation: &Simulation<S>) -> String {
-    let (solver, asked) = (simulation.solver(), &simulation.scene().solver);
-    let how = match (asked.method, solver.method) {
-        (Method::Auto, _) => format!(", chosen for accuracy {}", asked.accuracy),
-        _ => String::new(),
-    };
-    let ExpectedErrors { motion, at_rest } = simulation.expected_errors();
-    let motion = match motion {
-        Some(share) => format!("motion within about {} %", rounded(100.0 * share)),
-        None => "motion damped by an amount that is not foretold".to_owned(),
-    };
-    let at_rest = rounded(100.0 * at_rest);
-    let tetrahedra = match solver.elements {
-        Elements::Recovered => "recovered-gradient",
-        Elements::Auto | Elements::Plain => "linear, which bend too little where a mesh is coarse",
-    };
-    format!(
-        "method: {}{how}; expected errors of the solver: {motion}, at rest within {at_rest} %\n\
-         tetrahedra: {tetrahedra}\n",
-        solver.method
-    )
-}
-
-/// Two digits at most.
-fn rounded(percent: f64) -> String {
-    if percent < 10.0 { format!("{percent:.1}") } else { format!("{percent:.0}") }
 }
 
 /// Some drivers compile kernels for seconds, here or with the first frame.
@@ -407,6 +358,7 @@ struct Recording<S: Real> {
     tools: ToolTable,
     hold: Hold<S>,
     summary: Summary,
+    words: Words,
 }
 
 impl<S: Real> Recording<S> {
@@ -428,6 +380,9 @@ impl<S: Real> Recording<S> {
         if simulation.is_on_device() {
             bar.set_message("the driver may still be compiling kernels");
         }
+        if self.words == Words::EveryFrame {
+            files::print(ROW_HEADS)?;
+        }
         // Of a replay hands may set the simulation back.
         let mut left = frames.saturating_sub(simulation.frame());
         while left > 0 && !stop && is_written {
@@ -446,6 +401,9 @@ impl<S: Real> Recording<S> {
             if let Some(film) = &mut self.film {
                 film.push(simulation, &report, last);
             }
+            if self.words == Words::EveryFrame {
+                bar.suspend(|| files::print(&frame_row(&report)))?;
+            }
             self.tools.push(&report);
             self.hold.look(simulation);
             self.summary.frames.push(FrameLine { report, wall_seconds });
@@ -459,6 +417,5 @@ impl<S: Real> Recording<S> {
 }
 
 fn write_summary(out: &OutputFolder, summary: &Summary) -> Result<()> {
-    let text = serde_json::to_string_pretty(summary).context("cannot write summary.json")?;
-    out.write("summary.json", text.as_bytes())
+    out.write("summary.json", json(summary)?.as_bytes())
 }

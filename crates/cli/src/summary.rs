@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use viscera::scalar::Real;
 use viscera::scene::Scene;
 use viscera::simulation::{FrameReport, MeshReport, RestReport, Simulation, advice};
+use viscera_report::si;
 
 /// The numbers of one frame and what it took.
 #[derive(Serialize)]
@@ -116,6 +117,24 @@ impl Frames {
     }
 }
 
+/// Heads of [`frame_row`].
+pub const ROW_HEADS: &str =
+    "    time     elastic     kinetic    volume   stretch  inverted  residual\n";
+
+/// A frame as a line of a table.
+pub fn frame_row(report: &FrameReport) -> String {
+    format!(
+        "{:>6.3} s {:>11} {:>11} {:>8.2}% {:>9.3} {:>9} {:>9.1e}\n",
+        report.time,
+        si(report.energy.elastic, "J"),
+        si(report.energy.kinetic, "J"),
+        100.0 * report.deformation.volume_ratio,
+        report.deformation.largest_stretch,
+        report.deformation.inverted,
+        report.relative_residual,
+    )
+}
+
 impl Summary {
     /// Before the first frame.
     pub fn new<S: Real>(simulation: &Simulation<S>, overrides: Vec<(String, String)>) -> Self {
@@ -171,12 +190,9 @@ impl Summary {
         self.frames.wall_seconds
     }
 
-    /// A short table of the run.
+    /// A short table of the run: some frames, and how it ended.
     pub fn table(&self) -> String {
-        let mut text = format!(
-            "{:>8} {:>11} {:>11} {:>9} {:>9} {:>9} {:>9}\n",
-            "time", "elastic", "kinetic", "volume", "stretch", "inverted", "residual"
-        );
+        let mut text = String::from(ROW_HEADS);
         let lines = &self.frames.lines;
         let count = lines.len();
         let rows = 6.min(count);
@@ -187,18 +203,15 @@ impl Summary {
                 continue;
             }
             shown = index;
-            let report = &lines[index].report;
-            text.push_str(&format!(
-                "{:>6.3} s {:>9.3} mJ {:>9.3} mJ {:>8.2}% {:>9.3} {:>9} {:>9.1e}\n",
-                report.time,
-                1e3 * report.energy.elastic,
-                1e3 * report.energy.kinetic,
-                100.0 * report.deformation.volume_ratio,
-                report.deformation.largest_stretch,
-                report.deformation.inverted,
-                report.relative_residual,
-            ));
+            text.push_str(&frame_row(&lines[index].report));
         }
+        text + &self.end()
+    }
+
+    /// How the run ended.
+    pub fn end(&self) -> String {
+        let mut text = String::new();
+        let lines = &self.frames.lines;
         if let Some(last) = lines.last() {
             for patch in &last.report.patches {
                 text.push_str(&format!("{patch:.4}\n"));

@@ -54,4 +54,4 @@ pub use image::{Image, ImageSize, write_png};
 pub use marks::{Arrow, Background, Markers, Paint};
 pub use organs::{BodyColor, body_color};
 pub use overlay::{ColorScale, Overlay};
-pub use shots::{Look, Seen, Shot, Subject};
+pub use shots::{Look, Medium, Seen, Shot, Subject};

@@ -52,13 +52,15 @@ const OTHERS: [[u8; 3]; 6] = [
     [204, 136, 126],
 ];
 
-/// A body in a picture in which colours tell bodies apart.
+/// A body in a picture without a scale of colours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyColor {
     /// Its name.
     pub name: String,
-    /// Its colour.
+    /// Its colour where colours tell bodies apart.
     pub color: Color,
+    /// Its colour as the eye sees it.
+    pub tissue: Color,
     /// Its triangles, among those of all surfaces one body after the other.
     pub triangles: Range<usize>,
 }
@@ -70,7 +72,12 @@ impl BodyColor {
         let bodies = assembly.bodies.iter().enumerate().map(|(number, body)| {
             let triangles = first..first + body.surface.triangles.len();
             first = triangles.end;
-            Self { name: body.name.clone(), color: body_color(&body.name, number), triangles }
+            Self {
+                name: body.name.clone(),
+                color: body_color(&body.name, number),
+                tissue: known_color(&body.name).unwrap_or(Color::TISSUE),
+                triangles,
+            }
         });
         bodies.collect()
     }
@@ -78,9 +85,14 @@ impl BodyColor {
 
 /// The colour of a body, the `number`-th of its scene.
 pub fn body_color(name: &str, number: usize) -> Color {
+    known_color(name).unwrap_or_else(|| Color::from_srgb(OTHERS[number % OTHERS.len()]))
+}
+
+/// The colour of an organ that its name tells.
+fn known_color(name: &str) -> Option<Color> {
     let name = name.to_lowercase();
     let known = KNOWN.iter().find(|(part, _)| name.contains(part));
-    Color::from_srgb(known.map_or(OTHERS[number % OTHERS.len()], |(_, color)| *color))
+    known.map(|(_, color)| Color::from_srgb(*color))
 }
 
 #[cfg(test)]

@@ -20,6 +20,10 @@ const LONGEST_ARROW: f64 = 0.18;
 /// Radius of a marker, as a fraction of the scene's diagonal.
 const MARKER_RADIUS: f64 = 0.006;
 
+/// More markers of fixings than this are smaller, down to a share of the radius.
+const FEW_MARKERS: f64 = 30.0;
+const SMALLEST_MARKER: f64 = 0.35;
+
 /// Nothing moves where nothing goes further than this share of the scene's diagonal, which nobody sees: colours may show
 /// something else than round-off.
 const STILL: f64 = 1e-3;
@@ -42,8 +46,9 @@ pub struct Subject {
     view: ViewDirection,
     rest: SurfaceMesh,
     colors: PictureColors,
-    /// Names and colours of bodies, and their triangles.
+    /// Names and colours of bodies, their colours as tissue, and their triangles.
     legend: Vec<(String, Color)>,
+    tissue: Vec<Color>,
     triangles: Vec<Range<usize>>,
     /// Vertices with a marker: the fixed ones first, then those that are moved or pulled.
     marked: Vec<u32>,
@@ -67,13 +72,13 @@ impl Subject {
         moved.extend(of(&assembly.forces));
         let fixed: Vec<u32> = of(&assembly.fixings).difference(&moved).copied().collect();
         let fixed_count = fixed.len();
-        let bodies = BodyColor::of(assembly).into_iter();
-        let (legend, triangles) =
-            bodies.map(|body| ((body.name, body.color), body.triangles)).unzip();
+        let bodies = BodyColor::of(assembly);
+        let legend = bodies.iter().map(|body| (body.name.clone(), body.color)).collect();
         Self {
             colors: simulation.scene().output.colors,
             legend,
-            triangles,
+            tissue: bodies.iter().map(|body| body.tissue).collect(),
+            triangles: bodies.into_iter().map(|body| body.triangles).collect(),
             title: simulation.scene().title.clone(),
             view: ViewDirection::from_vector(simulation.scene().output.view_from),
             rest: assembly.rest_surface(),
@@ -114,7 +119,7 @@ impl Subject {
     }
 
     /// How pictures of these moments look: room and colours for all of them.
-    pub fn look(&self, shots: &[Shot]) -> Result<Look<'_>, PictureError> {
+    pub fn look(&self, shots: &[Shot], medium: Medium) -> Result<Look<'_>, PictureError> {
         let mut largest = 0.0f64;
         let mut strongest = 0.0f64;
         let mut bounds = Bounds::of(&self.rest.vertices);
@@ -128,13 +133,17 @@ impl Subject {
         let diagonal = bounds.diagonal();
         include_tools(&mut bounds, shots);
         let is_still = 1e-3 * largest < STILL * diagonal;
-        let by_body = match self.colors {
-            PictureColors::Auto => is_still,
-            PictureColors::Displacement => false,
-            PictureColors::Bodies => true,
+        let colors = match self.colors {
+            PictureColors::Auto => match (medium, is_still) {
+                (Medium::Picture, true) if self.legend.len() > 1 => Colors::Bodies,
+                (Medium::Picture, false) => Colors::Values(scale),
+                _ => Colors::Tissue,
+            },
+            PictureColors::Displacement => Colors::Values(scale),
+            PictureColors::Bodies => Colors::Bodies,
+            PictureColors::Tissue => Colors::Tissue,
         };
-        let scale = (!by_body).then_some(scale);
-        let mut look = Look { subject: self, bounds, diagonal, strongest, scale };
+        let mut look = Look { subject: self, bounds, diagonal, strongest, colors };
         for shot in shots {
             for arrow in look.arrows(shot) {
                 look.bounds.include(&[arrow.to]);
@@ -164,6 +173,24 @@ impl Seen {
     }
 }
 
+/// What is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Medium {
+    /// One moment, to look at for long.
+    Picture,
+    /// One after the other: colours that do not change let the eye follow.
+    Film,
+}
+
+/// What colours show.
+enum Colors {
+    /// Displacements.
+    Values(ColorScale),
+    /// Which body is which.
+    Bodies,
+    Tissue,
+}
+
 /// What all pictures of some moments have in common.
 pub struct Look<'a> {
     subject: &'a Subject,
@@ -171,8 +198,7 @@ pub struct Look<'a> {
     diagonal: f64,
     /// The largest force [N].
     strongest: f64,
-    /// Of displacements; nothing where colours show bodies.
-    scale: Option<ColorScale>,
+    colors: Colors,
 }
 
 impl Look<'_> {
@@ -192,28 +218,47 @@ impl Look<'_> {
         let markers: Vec<Vec3<f64>> = shot.markers.iter().map(|x| x.cast()).collect();
         let (fixed, moved) = markers.split_at(subject.fixed_count);
         let radius = MARKER_RADIUS * self.diagonal;
-        // What pulls is the point of the picture: it shines through where tissue hides it.
-        let marks =
-            |positions, color, see_through| Markers { positions, radius, color, see_through };
+        // Many are small: what they hold is the point of the picture.
+        let crowd = (FEW_MARKERS / fixed.len().max(1) as f64).sqrt().clamp(SMALLEST_MARKER, 1.0);
+        // What pulls shines through where tissue hides it.
+        let marks = |positions, radius, color, see_through| Markers {
+            positions,
+            radius,
+            color,
+            see_through,
+        };
         let surface_of = |triangles, paint| Surface { positions: &surface, triangles, paint };
-        let surfaces = match &self.scale {
-            Some(_) => vec![surface_of(&subject.rest.triangles[..], Paint::Values(&values[..]))],
-            None => (subject.triangles.iter().zip(&subject.legend))
-                .map(|(range, (_, color))| {
-                    surface_of(&subject.rest.triangles[range.clone()], Paint::Flat(*color))
-                })
-                .collect(),
+        let flat = |color: &dyn Fn(usize) -> Color| -> Vec<_> {
+            let bodies = subject.triangles.iter().enumerate();
+            let triangles = |range: &Range<usize>| &subject.rest.triangles[range.clone()];
+            let flat = |(n, range)| surface_of(triangles(range), Paint::Flat(color(n)));
+            bodies.map(flat).collect()
+        };
+        let surfaces = match &self.colors {
+            Colors::Values(_) => {
+                vec![surface_of(&subject.rest.triangles[..], Paint::Values(&values[..]))]
+            }
+            Colors::Bodies => flat(&|body| subject.legend[body].1),
+            Colors::Tissue => flat(&|body| subject.tissue[body]),
+        };
+        let (scale, legend) = match &self.colors {
+            Colors::Values(scale) => (Some(scale.clone()), &[][..]),
+            Colors::Bodies => (None, &subject.legend[..]),
+            Colors::Tissue => (None, &[][..]),
         };
         let drawing = Drawing {
             title: &subject.title,
             caption: &caption(shot),
             surfaces,
-            legend: if self.scale.is_none() { &subject.legend } else { &[] },
+            legend,
             tools: &shot.tools,
             traced: vec![rest],
-            markers: vec![marks(fixed, Color::FIXED, 0.0), marks(moved, Color::PULLED, 0.4)],
+            markers: vec![
+                marks(fixed, crowd * radius, Color::FIXED, 0.0),
+                marks(moved, radius, Color::PULLED, 0.4),
+            ],
             arrows: in_front(self.arrows(shot), camera),
-            color_scale: self.scale.clone(),
+            color_scale: scale,
             length_scale: true,
             ..Drawing::default()
         };
@@ -298,11 +343,17 @@ mod tests {
     "#;
 
     fn green(settings: &[(&str, &str)]) -> usize {
-        green_after(settings, 0)
+        green_after(settings, 0, Medium::Picture)
     }
 
     /// Pixels of a picture after so many frames, in which both fall, that are rather green.
-    fn green_after(settings: &[(&str, &str)], frames: u32) -> usize {
+    fn green_after(settings: &[(&str, &str)], frames: u32, medium: Medium) -> usize {
+        let image = image_after(settings, frames, medium);
+        let is_green = |p: &&[u8; 3]| p[1] > p[0].saturating_add(15) && p[1] > p[2];
+        image.pixels().iter().filter(is_green).count()
+    }
+
+    fn image_after(settings: &[(&str, &str)], frames: u32, medium: Medium) -> Image {
         let scene = Scene::parse("two.toml", TWO, settings).expect("a legal scene");
         let load = &mut |file: &str| Err(file.to_owned());
         let assembly = Assembly::new(&scene, load).expect("two blocks");
@@ -310,11 +361,9 @@ mod tests {
         (0..frames).for_each(|_| simulation.advance_frame().expect("a frame"));
         let subject = Subject::of(&simulation);
         let shots = [subject.shot(&simulation, &simulation.report())];
-        let look = subject.look(&shots).expect("a look");
+        let look = subject.look(&shots, medium).expect("a look");
         let seen = look.seen_at(ImageSize::new(480, 360).expect("a size")).expect("a camera");
-        let image = look.draw(&shots[0], &seen).expect("a picture");
-        let is_green = |p: &&[u8; 3]| p[1] > p[0].saturating_add(15) && p[1] > p[2];
-        image.pixels().iter().filter(is_green).count()
+        look.draw(&shots[0], &seen).expect("a picture")
     }
 
     #[test]
@@ -322,6 +371,23 @@ mod tests {
         assert!(green(&[]) > 1000, "a gallbladder is green: {}", green(&[]));
         assert_eq!(green(&[("output.colors", "displacement")]), 0);
         // A hundredth of the scene's size is seen.
-        assert_eq!(green_after(&[], 3), 0);
+        assert_eq!(green_after(&[], 3, Medium::Picture), 0);
+    }
+
+    #[test]
+    fn films_show_tissue_and_pictures_do_where_they_are_told() {
+        assert!(green_after(&[], 3, Medium::Film) > 1000);
+        let tissue = [("output.colors", "tissue")];
+        assert!(green_after(&tissue, 3, Medium::Picture) > 1000);
+        assert_eq!(green_after(&[("output.colors", "displacement")], 3, Medium::Film), 0);
+        // What has no organ's name is red, and colours that tell bodies apart are others.
+        let unnamed = |colors: &str| {
+            let one =
+                [("body.gallbladder.position", "[\"50 mm\", 0, 0]"), ("output.colors", colors)];
+            let image = image_after(&one, 0, Medium::Picture);
+            let is_flesh = |p: &&[u8; 3]| p[0] > 60 && p[0] / 2 > p[1] && p[0] / 2 > p[2];
+            image.pixels().iter().filter(is_flesh).count()
+        };
+        assert!(unnamed("tissue") > 1000, "{}", unnamed("tissue"));
     }
 }

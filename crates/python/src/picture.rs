@@ -5,7 +5,7 @@ use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use viscera::scalar::Real;
 use viscera::simulation::Simulation;
-use viscera_picture::{Image, ImageSize, PictureError, Subject, write_png};
+use viscera_picture::{Image, ImageSize, Medium, PictureError, Subject, write_png};
 
 /// A simulation as it is now, as the bytes of a PNG file.
 pub fn draw<S: Real>(simulation: &Simulation<S>, size: [u32; 2]) -> PyResult<Vec<u8>> {
@@ -27,7 +27,7 @@ pub fn draw_array<'py, S: Real>(
 fn image<S: Real>(simulation: &Simulation<S>, size: [u32; 2]) -> Result<Image, PictureError> {
     let subject = Subject::of(simulation);
     let shots = [subject.shot(simulation, &simulation.report())];
-    let look = subject.look(&shots)?;
+    let look = subject.look(&shots, Medium::Picture)?;
     let [width, height] = size;
     let seen = look.seen_at(ImageSize::new(width, height)?)?;
     look.draw(&shots[0], &seen)

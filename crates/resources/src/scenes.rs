@@ -26,7 +26,8 @@ pub const BUILT_IN: [BuiltInScene; 13] = built_in!["cantilever" "cholecystectomy
 impl BuiltInScene {
     /// The one that is meant where there is no such file.
     pub fn find(path: &Path) -> Option<&'static Self> {
-        let named = |scene: &&Self| path.as_os_str() == scene.name && !path.exists();
+        // A folder of that name, such as one with results, is no scene.
+        let named = |scene: &&Self| path.as_os_str() == scene.name && !path.is_file();
         BUILT_IN.iter().find(named)
     }
 }

@@ -24,3 +24,4 @@ mod replay;
 mod run;
 mod saved;
 mod ties;
+mod words;

@@ -99,8 +99,11 @@ settings_table! {
 choices! {
     /// What colours of pictures show.
     pub enum PictureColors {
-        /// Bodies where nothing moves by more than a thousandth of the scene's size; displacement elsewhere.
+        /// Films show tissue. So do pictures where nothing moves by more than a thousandth of the scene's size, of several bodies
+        /// in their colours; displacement elsewhere.
         Auto = "auto",
+        /// As the eye sees it: wet, organs in colours that their names tell, and other bodies red.
+        Tissue = "tissue",
         /// How far the surface is from where it began.
         Displacement = "displacement",
         /// Every body has a colour of its own: organs by their names.

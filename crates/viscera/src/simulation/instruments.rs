@@ -9,6 +9,7 @@
 //! the force. What they met at the end of a frame decides their speed in the next one, which is part of a saved simulation.
 
 use super::crossings::Crossed;
+use super::force_text::wrench_text;
 use super::holding::tolerance_of;
 use crate::contact::{Tool, Wrench};
 use crate::scalar::rigid::{RigidTransform, rotation_vector};
@@ -58,25 +59,9 @@ impl std::fmt::Display for ToolForce {
     /// One line of a table, to four decimals unless a precision says otherwise.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let digits = f.precision().unwrap_or(4);
-        // What rounds to zero has no sign.
-        let smallest = (0..digits).fold(0.5, |smallest, _| 0.1 * smallest);
-        let unsigned = |component: f64| if component.abs() < smallest { 0.0 } else { component };
-        let ([x, y, z], [a, b, c]) = (self.force.map(unsigned), self.torque);
-        let (force, torque) = (x.hypot(y).hypot(z), a.hypot(b).hypot(c));
-        // Rounded up: an error is no smaller than it is said to be.
-        let scale = 10f64.powi(i32::try_from(digits).unwrap_or(4));
-        let error = |error: Option<f64>| {
-            error.map_or(String::new(), |error| {
-                format!(" +- {:.digits$}", (error * scale).ceil() / scale)
-            })
-        };
-        let (of_force, of_torque) = (error(self.error), error(self.torque_error));
-        write!(
-            f,
-            "{}: force {force:.digits$}{of_force} N, as a vector ({x:.digits$}, {y:.digits$}, {z:.digits$}) N, \
-             torque {torque:.digits$}{of_torque} N m, {} touches",
-            self.name, self.touches
-        )?;
+        let errors = [self.error, self.torque_error];
+        let wrench = wrench_text(self.force, self.torque, errors, digits);
+        write!(f, "{}: {wrench}, {} touches", self.name, self.touches)?;
         let jumped = "; it was put elsewhere, further than a tool moves";
         if self.has_jumped {
             f.write_str(jumped)?;

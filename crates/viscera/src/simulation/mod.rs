@@ -14,6 +14,7 @@ mod choice;
 mod crossings;
 mod device;
 mod error;
+mod force_text;
 mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;

@@ -1,5 +1,6 @@
 //! The numbers of a frame.
 
+use super::force_text::wrench_text;
 use super::instruments::ToolForce;
 use super::ties::TieForce;
 use crate::measure::{DeformationSummary, Energies};
@@ -36,17 +37,7 @@ impl fmt::Display for PatchForce {
     /// One line of a table, to four decimals unless a precision says otherwise.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let digits = f.precision().unwrap_or(4);
-        // What rounds to zero has no sign.
-        let smallest = (0..digits).fold(0.5, |smallest, _| 0.1 * smallest);
-        let unsigned = |component: f64| if component.abs() < smallest { 0.0 } else { component };
-        let ([x, y, z], [a, b, c]) = (self.force.map(unsigned), self.torque);
-        let (force, torque) = (x.hypot(y).hypot(z), a.hypot(b).hypot(c));
-        write!(
-            f,
-            "{}: force {force:.digits$} N, as a vector ({x:.digits$}, {y:.digits$}, {z:.digits$}) N, \
-             torque {torque:.digits$} N m",
-            self.name
-        )
+        write!(f, "{}: {}", self.name, wrench_text(self.force, self.torque, [None; 2], digits))
     }
 }
 

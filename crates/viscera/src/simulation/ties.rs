@@ -1,6 +1,7 @@
 //! What a simulation says of ties between its bodies.
 
 use super::Simulation;
+use super::force_text::Unit;
 use crate::scalar::{Real, Vec3};
 use std::fmt;
 
@@ -23,7 +24,9 @@ impl fmt::Display for TieForce {
         let digits = f.precision().unwrap_or(4);
         let Self { name, points, torn, force } = self;
         let force = Vec3::<f64>::from_f64(*force).length();
-        write!(f, "{name}: {torn} of {points} points torn, force {force:.digits$} N")
+        let unit = Unit::of(force, digits);
+        let (force, prefix) = (unit.number(force), unit.prefix);
+        write!(f, "{name}: {torn} of {points} points torn, force {force} {prefix}N")
     }
 }
 
