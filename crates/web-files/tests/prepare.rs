@@ -114,6 +114,27 @@ patch = "top"
     assert_eq!(apart.files, prepared.files);
 }
 
+/// TetGen's files come in pairs: both are used, whichever is named first.
+#[test]
+fn two_files_of_one_mesh_belong_together() {
+    let mesh = ball();
+    let rows = |count: usize, head: &str, row: &dyn Fn(usize) -> String| -> String {
+        let rows = (0..count).map(|i| format!("{} {}\n", i + 1, row(i)));
+        format!("{count} {head}\n{}", rows.collect::<String>())
+    };
+    let nodes = rows(mesh.vertices().len(), "3 0 0", &|v| {
+        mesh.vertices()[v].to_array().map(|x| x.to_string()).join(" ")
+    });
+    let tets =
+        rows(mesh.tets().len(), "4 0", &|t| mesh.tets()[t].map(|v| (v + 1).to_string()).join(" "));
+    let all = files(&[("ball.node", nodes.as_bytes()), ("ball.ele", tets.as_bytes())]);
+    for first in ["ball.node", "ball.ele"] {
+        let prepared = prepared(first, &all);
+        assert_eq!(prepared.notes, [""; 0]);
+        assert_eq!(assembled(&prepared).bodies[0].mesh.tets().len(), mesh.tets().len());
+    }
+}
+
 #[test]
 fn what_is_wrong_is_told_with_its_file() {
     let mesh = vtu::write_mesh(&ball(), &MeshNames::default()).expect("a file");
