@@ -24,6 +24,9 @@ pub fn scene_of(
     observe: &mut dyn FnMut(String),
 ) -> Result<(Import, Made)> {
     let folder = folder.join("scene");
+    // Innermost first.
+    let new = folder.ancestors().take_while(|folder| !folder.exists()).map(Path::to_owned);
+    let new: Vec<PathBuf> = new.filter(|folder| !folder.as_os_str().is_empty()).collect();
     // Before seconds of work, of which nothing would stay.
     files::prepare_folder(&folder, "--out").with_context(|| {
         let file = file.display();
@@ -31,7 +34,12 @@ pub fn scene_of(
             "the scene of {file} is made in a folder below that in which the program was started"
         )
     })?;
-    let import = load(file, &Options::default(), observe)?;
+    let import = load(file, &Options::default(), observe).inspect_err(|_| {
+        for folder in &new {
+            // One that is not empty by now is another program's.
+            let _ = std::fs::remove_dir(folder);
+        }
+    })?;
     let made = write(&import, &title_of(file), &folder, Replace::Never)?;
     Ok((import, made))
 }
@@ -84,6 +92,20 @@ mod tests {
         let first = told.first().map_or("", |text| text);
         assert!(first.starts_with("reading ") && first.ends_with("Left_kidney.obj"), "{told:?}");
         assert!(told.iter().any(|text| text == "filling left_kidney"), "{told:?}");
+    }
+
+    #[test]
+    fn a_file_that_is_no_mesh_leaves_no_folders() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("cube.obj");
+        std::fs::write(&file, CUBE.replace("60 60 0", "60 nan 0")).expect("a file");
+        let kept = folder.path().join("kept");
+        std::fs::create_dir(&kept).expect("a folder");
+        for out in [folder.path().join("a/b"), kept.clone()] {
+            assert!(scene_of(&file, &out, &mut |_| {}).is_err());
+        }
+        assert!(!folder.path().join("a").exists() && kept.exists());
+        assert!(!kept.join("scene").exists());
     }
 
     #[test]

@@ -354,7 +354,11 @@ mod tests {
     }
 
     fn image_after(settings: &[(&str, &str)], frames: u32, medium: Medium) -> Image {
-        let scene = Scene::parse("two.toml", TWO, settings).expect("a legal scene");
+        image_of(TWO, settings, frames, medium)
+    }
+
+    fn image_of(text: &str, settings: &[(&str, &str)], frames: u32, medium: Medium) -> Image {
+        let scene = Scene::parse("two.toml", text, settings).expect("a legal scene");
         let load = &mut |file: &str| Err(file.to_owned());
         let assembly = Assembly::new(&scene, load).expect("two blocks");
         let mut simulation = Simulation::<f32>::new(scene, assembly).expect("a simulation");
@@ -380,14 +384,22 @@ mod tests {
         let tissue = [("output.colors", "tissue")];
         assert!(green_after(&tissue, 3, Medium::Picture) > 1000);
         assert_eq!(green_after(&[("output.colors", "displacement")], 3, Medium::Film), 0);
-        // What has no organ's name is red, and colours that tell bodies apart are others.
-        let unnamed = |colors: &str| {
-            let one =
-                [("body.gallbladder.position", "[\"50 mm\", 0, 0]"), ("output.colors", colors)];
-            let image = image_after(&one, 0, Medium::Picture);
-            let is_flesh = |p: &&[u8; 3]| p[0] > 60 && p[0] / 2 > p[1] && p[0] / 2 > p[2];
-            image.pixels().iter().filter(is_flesh).count()
+        // What has no organ's name is red, where colours that tell bodies apart are others.
+        let nameless = TWO.replace("name = \"gallbladder\"", "name = \"block\"");
+        let flesh = |colors: &str| {
+            let image = image_of(&nameless, &[("output.colors", colors)], 0, Medium::Picture);
+            let right = (0..image.pixels().len()).filter(|at| at % 480 > 260);
+            let is_flesh = |at: &usize| {
+                let [r, g, b] = image.pixels()[*at].map(f64::from);
+                r > 60.0 && r > 1.5 * g && r > 1.5 * b
+            };
+            right.filter(is_flesh).count()
         };
-        assert!(unnamed("tissue") > 1000, "{}", unnamed("tissue"));
+        assert!(
+            flesh("tissue") > 4 * flesh("bodies").max(250),
+            "{} {}",
+            flesh("tissue"),
+            flesh("bodies")
+        );
     }
 }
