@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::assemble::Assembly;
+use super::assemble::{Assembly, ResolvedPatch};
 use super::assemble_error::{AssembleError, BalanceError};
 use super::balance::{Balance, BodyBalance, Rests, bits, hashed};
 use super::carried::{Carrying, Forces};
@@ -12,9 +12,16 @@ use crate::mesh::topology::BoundingBox;
 use crate::model::{Model, ModelBuilder};
 use crate::rest::{TooSoft, Unloaded};
 use crate::scalar::Vec3;
-use crate::scene::{Body, Scene};
+use crate::scene::{Body, Patch, Scene};
 use crate::settings::Elements;
 use crate::solver::{Inputs, Pin};
+
+/// Vertices of a body that a fixing, or a motion at its beginning, holds, by their numbers in the whole model.
+struct Hold<'a> {
+    body: usize,
+    is_rigid: bool,
+    vertices: &'a [u32],
+}
 
 /// A body that is to be balanced.
 struct Task {
@@ -105,9 +112,33 @@ impl Assembly {
         Ok(())
     }
 
-    /// Differs where a balance would.
+    /// Differs where a balance would. What holds a body rigidly is no part of the model.
     fn key(&self, scene: &Scene) -> Result<u64, BalanceError> {
-        Ok(hashed(self.builder.build::<f64>()?.revision(), bits(scene.world.gravity)))
+        let key = hashed(self.builder.build::<f64>()?.revision(), bits(scene.world.gravity));
+        let key = hashed(key, scene.bodies.iter().map(|body| u64::from(body.balanced)));
+        Ok(self.holds(scene).fold(key, |key, hold| {
+            let vertices = hold.vertices.iter().map(|&v| u64::from(v));
+            let which = [hold.body as u64, u64::from(hold.is_rigid), hold.vertices.len() as u64];
+            hashed(key, which.into_iter().chain(vertices))
+        }))
+    }
+
+    /// What holds bodies from the beginning on.
+    fn holds<'a>(&'a self, scene: &'a Scene) -> impl Iterator<Item = Hold<'a>> {
+        let fixings = scene.fixings.iter().zip(&self.fixings);
+        let fixings =
+            fixings.map(|(fixing, patch)| (&fixing.patch, fixing.stiffness.is_none(), patch));
+        // What a motion leads from the beginning on is held there until it moves.
+        let motions = scene.motions.iter().zip(&self.motions);
+        let motions = motions
+            .filter(|(motion, _)| motion.start <= 0.0 && motion.stiffness.is_none())
+            .map(|(motion, patch)| (&motion.patch, true, patch));
+        let hold = |(of, is_rigid, patch): (&Patch, bool, &'a ResolvedPatch)| Hold {
+            body: of.body,
+            is_rigid,
+            vertices: &patch.vertices,
+        };
+        fixings.chain(motions).map(hold)
     }
 
     fn find_balance(
@@ -175,18 +206,10 @@ impl Assembly {
         let first = assembled.vertices.start;
         let mut held = vec![false; assembled.vertices.len()];
         let mut rigid = held.clone();
-        let fixings = scene.fixings.iter().zip(&self.fixings);
-        let fixings =
-            fixings.map(|(fixing, patch)| (&fixing.patch, fixing.stiffness.is_none(), patch));
-        // What a motion leads from the beginning on is held there until it moves.
-        let motions = scene.motions.iter().zip(&self.motions);
-        let motions = motions
-            .filter(|(motion, _)| motion.start <= 0.0 && motion.stiffness.is_none())
-            .map(|(motion, patch)| (&motion.patch, true, patch));
-        for (_, is_rigid, patch) in fixings.chain(motions).filter(|(of, ..)| of.body == index) {
-            for &v in &patch.vertices {
+        for hold in self.holds(scene).filter(|hold| hold.body == index) {
+            for &v in hold.vertices {
                 held[v as usize - first] = true;
-                rigid[v as usize - first] |= is_rigid;
+                rigid[v as usize - first] |= hold.is_rigid;
             }
         }
         let (loads, is_carried) = (Forces::new(), body.balanced);

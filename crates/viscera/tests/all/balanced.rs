@@ -228,6 +228,7 @@ fn a_balance_is_taken_over_by_the_scene_that_it_is_of_and_by_no_other() {
     for (other, keeps_lower) in [
         (("body.upper.material.young", "9 kPa"), true),
         (("fixing.top.half_space.point", "[0, 0, \"19.9 mm\"]"), true),
+        (("body.upper.balanced", "false"), true),
         (("world.gravity", "[0, 0, \"-9 m/s^2\"]"), false),
         (("body.lower.material.density", "900 kg/m^3"), false),
         (("solver.elements", "plain"), false),
