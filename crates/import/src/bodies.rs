@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use viscera::mesh::io::{MeshNames, ReadReport};
-use viscera::mesh::tetrahedralize::TetrahedralizeError;
+use viscera::mesh::tetrahedralize::{Spacing, TetrahedralizeError};
 use viscera::mesh::topology::{BoundingBox, count_open_edges};
 use viscera::mesh::winding::{self, FillError};
 use viscera::mesh::{SurfaceMesh, TetMesh, tet_volume};
@@ -32,10 +32,22 @@ pub struct Options {
     pub labels: Vec<String>,
     /// Names of labels by number, in place of those in the file.
     pub names: Vec<(u16, String)>,
+    /// Whether tetrahedra grow inwards, away from the surface, which stays as fine.
+    pub graded: bool,
     /// Whether hollow organs are a wall around a cavity, in place of filled.
     pub hollow: bool,
     /// Whether bodies are wanted for their shapes, also of bones, and not for a scene.
     pub shapes_only: bool,
+}
+
+/// How often edges double towards the inside of graded bodies, where there is room.
+const DOUBLINGS: u32 = 3;
+
+impl Options {
+    /// Edges of a length [m] at the surface.
+    pub(crate) fn spacing(&self, surface: f64) -> Spacing {
+        Spacing { surface, doublings: if self.graded { DOUBLINGS } else { 0 } }
+    }
 }
 
 /// A surface that is finer than the tetrahedra, and moves with them.
@@ -204,7 +216,8 @@ fn fill_surface(
     let likely = if is_closed { volume } else { volume.max(0.1 * whole_box) };
     let asked = fineness.affordable(file, likely, whole_box, MOST_OF_SURFACES)?;
     let fill_with = |spacing| {
-        let winding::Filled { mesh, report, invented } = winding::fill(surface, spacing)?;
+        let winding::Filled { mesh, report, invented } =
+            winding::fill(surface, options.spacing(spacing))?;
         Ok(Filled { mesh, report, invented, spacing })
     };
     if !is_closed {
@@ -288,9 +301,13 @@ fn refuse_unused(file: &str, found: &Found, options: &Options) -> Result<(), Imp
                 "chooses labels of scans; regions of a mesh are chosen by `viscera mesh convert {file} part.vtu --region NUMBER`"
             ),
         ),
-        (Found::Tets(..), None) if options.fineness.is_some() => refuse(
+        (Found::Tets(..), None) if options.fineness.is_some() || options.graded => refuse(
             "is a mesh of tetrahedra",
-            if matches!(options.fineness, Some(Fineness::Edge(_))) { "--edge" } else { "--count" },
+            match options.fineness {
+                Some(Fineness::Edge(_)) => "--edge",
+                Some(Fineness::Count(_)) => "--count",
+                None => "--graded",
+            },
             format!(
                 "says how surfaces and scans are filled; to fill its surface anew, write that by `viscera mesh convert {file} \
                  surface.stl` and take surface.stl"

@@ -73,7 +73,7 @@ pub fn of_labels(
     let mut first_error = None;
     for (number, plan) in plans.iter().enumerate() {
         observe(&format!("{}, {} of {}", plan.name, number + 1, plans.len()));
-        let mut part = match build(map, plan, (sizes, options.hollow), down) {
+        let mut part = match build(map, plan, (sizes, options), down) {
             Ok(part) => part,
             // One that has no shape is no reason to be without the others.
             Err(error) => {
@@ -182,7 +182,7 @@ fn box_of(organ: &Organ) -> f64 {
 fn build(
     map: &LabelMap,
     plan: &Plan,
-    (sizes, is_hollow): (Sizes, bool),
+    (sizes, options): (Sizes, &Options),
     down: Vec3<f64>,
 ) -> Result<Part, TetrahedralizeError> {
     let Plan { organ, report, .. } = plan;
@@ -196,12 +196,13 @@ fn build(
     let wanted = Wanted { volume: report.volume, parts: report.pieces };
     let filled = || {
         fill_to(wanted, first, finest, |spacing| {
-            let made = tetrahedralize_to(|by| organ.offset(by), spacing, report.volume);
+            let edges = options.spacing(spacing);
+            let made = tetrahedralize_to(|by| organ.offset(by), edges, report.volume);
             made.map(|made| Filled::new(made, spacing))
         })
     };
     let made = match (wall, &solid) {
-        (Some(thin), Some(skin)) if is_hollow => {
+        (Some(thin), Some(skin)) if options.hollow => {
             let thickness = thin.max(RESOLVED * first);
             let text = format!("{:.1} mm", 1e3 * thickness);
             notes.push(match thickness > thin {
@@ -212,7 +213,7 @@ fn build(
                 false => format!("a wall of {text} around a cavity"),
             });
             wall_share = Some(thin / thickness);
-            let made = tetrahedralize(&Wall { organ, skin, thickness }, first);
+            let made = tetrahedralize(&Wall { organ, skin, thickness }, options.spacing(first));
             made.map(|made| Filled::new(made, first))
         }
         (Some(thickness), _) => {
@@ -241,7 +242,7 @@ fn build(
         notes.push(format!("cut by the image: {}", faces.join(", ")));
     }
     holds.extend(at_the_back(&name, &mesh, down, ("back", BACK)));
-    let filled = wall.filter(|_| !is_hollow).map(|wall| (wall, report.volume));
+    let filled = wall.filter(|_| !options.hollow).map(|wall| (wall, report.volume));
     let mut tissue = tissue::of_filled(&plan.name, filled);
     if let Some(share) = wall_share {
         tissue.soften(share);

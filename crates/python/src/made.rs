@@ -52,6 +52,7 @@ pub struct Given {
     pub unit: Option<Length>,
     pub labels: Option<Vec<Label>>,
     pub names: Option<BTreeMap<u16, String>>,
+    pub graded: bool,
     pub hollow: bool,
 }
 
@@ -76,6 +77,7 @@ impl Given {
             unit: length(&self.unit, "unit")?,
             labels: self.labels.unwrap_or_default().into_iter().map(text).collect(),
             names: self.names.unwrap_or_default().into_iter().collect(),
+            graded: self.graded,
             hollow: self.hollow,
             shapes_only: false,
         })
@@ -116,7 +118,7 @@ pub fn make(py: Python<'_>, path: &Path, given: Given) -> PyResult<Made> {
 
 /// Messages name options of the program; here they are arguments.
 fn for_python(message: &str) -> String {
-    let mut text = message.replace("--hollow", "hollow=True");
+    let mut text = message.replace("--hollow", "hollow=True").replace("--graded", "graded=True");
     for argument in ["edge", "count", "unit", "labels", "names"] {
         text = text.replace(&format!("--{argument} "), &format!("{argument}="));
         text = text.replace(&format!("--{argument}"), argument);

@@ -213,10 +213,11 @@ impl Scene {
 
     /// Makes a scene of a mesh, a surface or a segmented scan (docs/meshes.md): bodies with their tissue by name, held and tied
     /// as anatomy suggests, balanced under gravity. `edge` and `count` say how finely; `unit` is the length of 1 in a mesh;
-    /// `labels` of a scan, by name or number, `names` gives them others, `hollow` leaves organs a wall around a cavity. What was
-    /// assumed stands in `notes`, doubts are warnings. Lengths are text with a unit or numbers in metres.
+    /// `labels` of a scan, by name or number, `names` gives them others, `graded` lets tetrahedra grow inwards, `hollow` leaves
+    /// organs a wall around a cavity. What was assumed stands in `notes`, doubts are warnings. Lengths are text with a unit or
+    /// numbers in metres.
     #[staticmethod]
-    #[pyo3(signature = (path, *, edge = None, count = None, unit = None, labels = None, names = None, hollow = false, settings = None))]
+    #[pyo3(signature = (path, *, edge = None, count = None, unit = None, labels = None, names = None, graded = false, hollow = false, settings = None))]
     #[expect(clippy::too_many_arguments, reason = "Python's keywords")]
     fn from_file(
         py: Python<'_>,
@@ -226,10 +227,11 @@ impl Scene {
         unit: Option<Length>,
         labels: Option<Vec<Label>>,
         names: Option<BTreeMap<u16, String>>,
+        graded: bool,
         hollow: bool,
         settings: Option<&Bound<'_, PyMapping>>,
     ) -> PyResult<Self> {
-        let given = Given { edge, count, unit, labels, names, hollow };
+        let given = Given { edge, count, unit, labels, names, graded, hollow };
         let Made { text, files, notes } = made::make(py, &path, given)?;
         let name = path.display().to_string();
         let scene = Self::build(name, text, PathBuf::new(), None, settings)?;

@@ -52,6 +52,11 @@ def test_a_surface_becomes_a_body_that_stays(tmp_path: Path) -> None:
     simulation.advance(30)
     assert np.abs(simulation["spleen"].positions - before).max() < 1e-4
     # Finer, by a number of tetrahedra.
+    def vertices(graded: bool) -> int:
+        fine = vi.Scene.from_file(file, unit="1 mm", edge=0.004, graded=graded)
+        return len(vi.Simulation(fine)["spleen"])
+
+    assert vertices(True) < vertices(False)
     other = vi.Scene.from_file(file, unit=1e-3, count=4000, settings={"time.duration": "1 s"})
     assert other["time.duration"] == "1 s"
     assert len(vi.Simulation(other)["spleen"]) > len(simulation["spleen"])

@@ -226,6 +226,7 @@ fn options_that_a_file_does_not_use_are_refused() {
         parts(file, found, options, &mut |_| ()).err().map(|error| error.to_string())
     };
     let hollow = Options { hollow: true, ..Options::default() };
+    let graded = Options { graded: true, ..Options::default() };
     let named = Options { names: vec![(1, "liver".into())], ..Options::default() };
     let sized = |fineness| Options { fineness: Some(fineness), ..Options::default() };
     for (file, options, told) in [
@@ -234,6 +235,7 @@ fn options_that_a_file_does_not_use_are_refused() {
         ("a.msh", &named, "--names is for the labels"),
         ("a.msh", &sized(Fineness::Edge(0.01)), "--edge says how"),
         ("a.msh", &sized(Fineness::Count(100)), "--count says how"),
+        ("a.msh", &graded, "--graded says how"),
         ("a.stl", &labels(&["2"]), "--labels is for the labels"),
         ("a.stl", &hollow, "--hollow"),
     ] {

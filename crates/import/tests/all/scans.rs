@@ -153,6 +153,24 @@ fn hollow_organs_get_a_wall() {
     assert!((young(&filled) - (1.0 - ball(0.024) / ball(0.026))).abs() < 0.01);
 }
 
+/// The surface stays as fine, and there are fewer tetrahedra.
+#[test]
+fn graded_organs_have_the_same_surface() {
+    let make = |graded: bool| {
+        let fineness = Some(Fineness::Edge(0.003));
+        let options = Options { labels: vec!["spleen".into()], graded, fineness, ..coarse() };
+        let found = Found::Labels(map(), report());
+        parts("scan.nrrd", found, &options, &mut |_| ()).expect("a spleen").parts.remove(0).mesh
+    };
+    let (uniform, graded) = (make(false), make(true));
+    let outside = |mesh| viscera::mesh::boundary_surface(mesh).surface.triangles.len();
+    assert_eq!(outside(&graded), outside(&uniform));
+    assert!((graded.volume() / uniform.volume() - 1.0).abs() < 1e-9);
+    let ratio = graded.tets().len() as f64 / uniform.tets().len() as f64;
+    println!("{} of {} tetrahedra", graded.tets().len(), uniform.tets().len());
+    assert!(ratio < 0.8, "{ratio}");
+}
+
 #[test]
 fn what_is_no_mesh_and_no_scan_is_told() {
     let error = open("a.nii.gz", |_| Ok(b"\x1f\x8b\x08\0".to_vec())).err().expect("cut short");

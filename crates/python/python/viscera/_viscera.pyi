@@ -41,6 +41,7 @@ class Scene:
         unit: str | float | None = None,
         labels: Sequence[str | int] | None = None,
         names: Mapping[int, str] | None = None,
+        graded: bool = False,
         hollow: bool = False,
         settings: Mapping[str, Setting] | None = None,
     ) -> Scene: ...

@@ -131,6 +131,18 @@ impl<'a> Lattice<'a> {
         })
     }
 
+    /// Cubes along each axis; the last ones have no upper corners.
+    pub fn cubes(&self) -> [usize; 3] {
+        self.cubes
+    }
+
+    /// The vertex at a position, doubled: all three even or all three odd.
+    pub fn corner(&self, at: [usize; 3]) -> Corner {
+        let id = self.id(at[0] % 2, at.map(|n| n / 2));
+        let coordinates = at.map(|n| n as u32);
+        Corner { id, coordinates, sign: self.signs[id as usize] }
+    }
+
     /// Number of lattice vertices.
     pub fn vertex_count(&self) -> usize {
         2 * self.cubes.iter().product::<usize>()
@@ -304,15 +316,15 @@ impl<'a> Lattice<'a> {
         self.warped.len()
     }
 
-    /// Calls `visit` with each lattice tetrahedron that has a corner inside. The first two corners
-    /// share a long edge, and so do the last two.
-    pub fn for_each_tet(&self, mut visit: impl FnMut([Corner; 4])) {
+    /// Calls `visit` with each lattice tetrahedron that has a corner inside and lies in two cubes for which `is_wanted` says
+    /// yes. The first two corners share a long edge, and so do the last two.
+    pub fn for_each_tet(
+        &self,
+        is_wanted: impl Fn([usize; 3]) -> bool,
+        mut visit: impl FnMut([Corner; 4]),
+    ) {
         let [nx, ny, nz] = self.cubes;
-        let corner = |grid: usize, at: [usize; 3]| {
-            let id = self.id(grid, at);
-            let coordinates = at.map(|index| (2 * index + grid) as u32);
-            Corner { id, coordinates, sign: self.signs[id as usize] }
-        };
+        let corner = |grid: usize, at: [usize; 3]| self.corner(at.map(|n| 2 * n + grid));
         for k in 0..nz - 1 {
             for j in 0..ny - 1 {
                 for i in 0..nx - 1 {
@@ -321,8 +333,12 @@ impl<'a> Lattice<'a> {
                         // the two centres.
                         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
                         let mut at = [i, j, k];
+                        let is_first_wanted = is_wanted(at);
                         let first = corner(1, at);
                         at[axis] += 1;
+                        if !(is_first_wanted && is_wanted(at)) {
+                            continue;
+                        }
                         let second = corner(1, at);
                         let ring = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(du, dv)| {
                             let mut at = at;

@@ -17,7 +17,9 @@
 //! [`DIHEDRAL_BOUNDS_DEG`], whatever the function.
 
 pub(super) mod error;
+mod grading;
 
+use self::grading::Grading;
 use super::distance::SignedDistance;
 use super::lattice::{Corner, Lattice, Sign};
 use super::topology::{TET_FACES, connected_components, count_open_edges};
@@ -49,16 +51,32 @@ pub struct TetrahedralizeReport {
     pub non_manifold_edges: usize,
 }
 
+/// How long edges are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spacing {
+    /// The edge of the lattice's cubes at the surface [m], where edges are a little shorter.
+    pub surface: f64,
+    /// How often it doubles towards the inside, where there is room for that: 0 keeps it the same everywhere.
+    pub doublings: u32,
+}
+
+impl From<f64> for Spacing {
+    /// The same everywhere.
+    fn from(surface: f64) -> Self {
+        Self { surface, doublings: 0 }
+    }
+}
+
 /// Fills a shape with tetrahedra.
 ///
-/// `spacing` `[m]` is the edge length of the lattice's cubes, and of the longest edges in the
-/// interior; one cube of the interior holds 12 tetrahedra. All tetrahedra get region 0. The same
-/// arguments give the same bits, on every machine.
+/// `spacing` is the edge length of the lattice's cubes [m], and of the longest edges in the
+/// interior; one cube of the interior holds 12 tetrahedra. A [`Spacing`] lets cubes grow inwards, and keeps the bounds of
+/// angles. All tetrahedra get region 0. The same arguments give the same bits, on every machine.
 pub fn tetrahedralize(
     shape: &dyn SignedDistance,
-    spacing: f64,
+    spacing: impl Into<Spacing>,
 ) -> Result<(TetMesh, TetrahedralizeReport), TetrahedralizeError> {
-    let filling = Filling::of_something(shape, spacing, Extent::Whole)?;
+    let filling = Filling::of_something(shape, spacing.into(), Extent::Whole)?;
     let mut report = TetrahedralizeReport {
         lattice_vertices: filling.lattice_vertices,
         warped_vertices: filling.warped_vertices,
@@ -81,9 +99,10 @@ const MOST_MESHES: usize = 5;
 /// spacing are asked for; vertices of the boundary lie on that. As near as it comes where the volume is not reached.
 pub fn tetrahedralize_to<Shape: SignedDistance>(
     shape: impl Fn(f64) -> Shape,
-    spacing: f64,
+    spacing: impl Into<Spacing>,
     volume: f64,
 ) -> Result<(TetMesh, TetrahedralizeReport), TetrahedralizeError> {
+    let spacing = spacing.into();
     let mut out = 0.0;
     let mut best = tetrahedralize(&shape(out), spacing)?;
     let off = |mesh: &TetMesh| (mesh.volume() / volume - 1.0).abs();
@@ -109,7 +128,7 @@ pub fn surface(
     shape: &dyn SignedDistance,
     spacing: f64,
 ) -> Result<SurfaceMesh, TetrahedralizeError> {
-    Ok(Filling::of_something(shape, spacing, Extent::Skin)?.surface())
+    Ok(Filling::of_something(shape, spacing.into(), Extent::Skin)?.surface())
 }
 
 /// How much of a shape is filled.
@@ -144,7 +163,7 @@ impl Filling {
     /// A filling that is not empty. The error of an empty one names a spacing that was tried.
     fn of_something(
         shape: &dyn SignedDistance,
-        spacing: f64,
+        spacing: Spacing,
         extent: Extent,
     ) -> Result<Self, TetrahedralizeError> {
         let filling = Self::new(shape, spacing, extent)?;
@@ -155,13 +174,13 @@ impl Filling {
         // guess from the bounds would fail for thin shells. The lattice is bounded, so that this ends in seconds.
         let (lower, upper) = shape.bounds();
         let size = (upper - lower).to_array();
-        let mut suggestion = spacing;
+        let (spacing, mut suggestion) = (spacing.surface, spacing.surface);
         for _ in 0..SEARCH_HALVINGS {
             suggestion *= 0.5;
             if Lattice::around(shape, suggestion)?.vertex_count() > SEARCH_LATTICE_VERTICES {
                 break;
             }
-            if !Self::new(shape, suggestion, extent)?.tets.is_empty() {
+            if !Self::new(shape, suggestion.into(), extent)?.tets.is_empty() {
                 return Err(TetrahedralizeError::TooCoarse { spacing, size, suggestion });
             }
         }
@@ -170,12 +189,12 @@ impl Filling {
 
     fn new(
         shape: &dyn SignedDistance,
-        spacing: f64,
+        spacing: Spacing,
         extent: Extent,
     ) -> Result<Self, TetrahedralizeError> {
         // Warping comes before filling: a stencil sees final signs only, so that all tetrahedra at a vertex agree on
         // whether it is on the surface.
-        let mut lattice = Lattice::sample(shape, spacing)?;
+        let mut lattice = Lattice::sample(shape, spacing.surface)?;
         let warped_vertices = lattice.warp();
         let mut builder = Builder {
             lattice_index: vec![NO_VERTEX; lattice.vertex_count()],
@@ -185,11 +204,20 @@ impl Filling {
             on_surface: Vec::new(),
             tets: Vec::new(),
         };
-        lattice.for_each_tet(|corners| {
-            if extent == Extent::Whole || may_touch_surface(&corners) {
+        let is_wanted =
+            |corners: &[Corner; 4]| extent == Extent::Whole || may_touch_surface(corners);
+        let mut fill = |corners| {
+            if is_wanted(&corners) {
                 builder.fill(corners);
             }
-        });
+        };
+        if spacing.doublings > 0 {
+            let grading = Grading::new(&lattice, spacing.doublings);
+            lattice.for_each_tet(|cube| grading.is_fine(cube), &mut fill);
+            grading.for_each_tet(&lattice, fill);
+        } else {
+            lattice.for_each_tet(|_| true, fill);
+        }
         let Builder { vertices, on_surface, tets, .. } = builder;
         let lattice_vertices = lattice.vertex_count();
         Ok(Self { vertices, on_surface, tets, lattice_vertices, warped_vertices })

@@ -14,7 +14,7 @@ use super::corners::BoundingBox;
 use super::distance::{Offset, SignedDistance};
 use super::nearest::nearest_weights;
 use super::tetrahedralize::{
-    TetrahedralizeError, TetrahedralizeReport, tetrahedralize, tetrahedralize_to,
+    Spacing, TetrahedralizeError, TetrahedralizeReport, tetrahedralize, tetrahedralize_to,
 };
 use super::topology::count_open_edges;
 use super::{SurfaceMesh, TetMesh, boundary_surface, check_vertex};
@@ -247,7 +247,8 @@ pub struct Filled {
 
 /// Fills a surface with tetrahedra whose longest edges are `spacing` [m] long, see [`tetrahedralize`]. Of a closed surface they
 /// have the volume.
-pub fn fill(surface: &SurfaceMesh, spacing: f64) -> Result<Filled, FillError> {
+pub fn fill(surface: &SurfaceMesh, spacing: impl Into<Spacing>) -> Result<Filled, FillError> {
+    let spacing = spacing.into();
     let solid = Solid::new(surface)?;
     let volume = surface.enclosed_volume().abs();
     let made = if count_open_edges(surface) == 0 && volume > 0.0 {
@@ -259,7 +260,7 @@ pub fn fill(surface: &SurfaceMesh, spacing: f64) -> Result<Filled, FillError> {
         TetrahedralizeError::Empty => NoInside::Open { highest: solid.highest_winding() }.into(),
         other => FillError::from(other),
     })?;
-    let invented = solid.invented(&boundary_surface(&mesh).surface, 0.5 * spacing);
+    let invented = solid.invented(&boundary_surface(&mesh).surface, 0.5 * spacing.surface);
     if invented > MOST_INVENTED {
         return Err(NoInside::Invented { percent: 100.0 * invented }.into());
     }

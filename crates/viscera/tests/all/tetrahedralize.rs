@@ -1,15 +1,15 @@
 //! Isosurface stuffing keeps what its paper proves: angles, conformity, accuracy.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use viscera::mesh::TetMesh;
 use viscera::mesh::distance::{
     Capsule, Cuboid, Ellipsoid, SignedDistance, SmoothSubtraction, SmoothUnion, Sphere,
 };
 use viscera::mesh::liver::Liver;
-use viscera::mesh::quality::summarize_quality;
+use viscera::mesh::quality::{dihedral_angles, summarize_quality};
 use viscera::mesh::tetrahedralize::{
-    DIHEDRAL_BOUNDS_DEG, TetrahedralizeError, surface, tetrahedralize,
+    DIHEDRAL_BOUNDS_DEG, Spacing, TetrahedralizeError, surface, tetrahedralize,
 };
 use viscera::scalar::{Vec3, vec3};
 
@@ -174,6 +174,83 @@ fn smooth_shapes_become_closed_manifolds_with_the_proved_angles() {
             assert_eq!((report.components, report.non_manifold_edges), (1, 0), "{what}");
             assert_closed_manifold(&boundary, &what);
         }
+    }
+}
+
+/// Triangles by the bits of their corners.
+fn places(triangles: &[[u32; 3]], mesh: &TetMesh) -> BTreeSet<[[u64; 3]; 3]> {
+    let place = |v: u32| mesh.vertices()[v as usize].to_array().map(f64::to_bits);
+    triangles
+        .iter()
+        .map(|triangle| {
+            let mut places = triangle.map(place);
+            places.sort_unstable();
+            places
+        })
+        .collect()
+}
+
+/// To the round-off of a sum of that many.
+fn assert_same_volume(mesh: &TetMesh, other: &TetMesh, what: &str) {
+    let off = (mesh.volume() / other.volume() - 1.0).abs();
+    assert!(off < other.tets().len() as f64 * f64::EPSILON, "{what}: {off:e}");
+}
+
+/// Cubes that grow inwards leave the surface as it is, fill what the small ones do, without gaps and overlaps, and with angles
+/// of undisturbed cubes.
+#[test]
+fn graded_tetrahedra_fill_the_same_body() {
+    let box_like =
+        Cuboid { center: vec3(0.1, 0.0, -0.05), half_size: vec3(0.9, 0.7, 0.8), rounding: 0.1 };
+    let shapes: [(&str, Box<dyn SignedDistance>, f64); 4] = [
+        ("sphere", Box::new(UNIT_SPHERE), 0.07),
+        ("box", Box::new(box_like), 0.12),
+        ("liver", Box::new(Liver::scaled(1.0)), 0.007),
+        ("union", random_union(1), 0.05),
+    ];
+    for (name, shape, spacing) in &shapes {
+        let (uniform, _) = tetrahedralize(shape, *spacing).unwrap();
+        let boundary = places(&assert_conforming(&uniform, name), &uniform);
+        let mut before = uniform.tets().len();
+        for doublings in [1, 3] {
+            let what = format!("{name}, {doublings} doublings");
+            let (mesh, report) =
+                tetrahedralize(shape, Spacing { surface: *spacing, doublings }).unwrap();
+            let boundary_triangles = assert_conforming(&mesh, &what);
+            assert_eq!(places(&boundary_triangles, &mesh), boundary, "{what}");
+            // Positive volumes that add up to the same within the same boundary overlap nowhere.
+            assert_same_volume(&mesh, &uniform, &what);
+            assert_eq!((report.components, report.non_manifold_edges), (1, 0), "{what}");
+            assert_angles_hold(&mesh, &what);
+            let outside: BTreeSet<u32> = boundary_triangles.iter().flatten().copied().collect();
+            let is_inside = |tet: &[u32; 4]| tet.iter().all(|v| !outside.contains(v));
+            for tet in mesh.tets().iter().filter(|tet| is_inside(tet)) {
+                for angle in dihedral_angles(tet.map(|v| mesh.vertices()[v as usize])) {
+                    let degrees = angle.to_degrees();
+                    assert!((44.99..120.01).contains(&degrees), "{what}: {degrees}");
+                }
+            }
+            println!("{what}: {} tets of {}", mesh.tets().len(), uniform.tets().len());
+            assert!(mesh.tets().len() <= before, "{what}");
+            before = mesh.tets().len();
+        }
+        assert!(before < uniform.tets().len(), "{name}");
+    }
+}
+
+/// Holes everywhere stop cubes from growing, wherever they are.
+#[test]
+fn graded_noise_keeps_the_bounds() {
+    // Where features are as small as cubes, what is inside ends right beside them.
+    for (seed, cell) in [(0, 0.4), (1, 0.4), (2, 0.1), (3, 0.1)] {
+        let noise = Noise { seed, cell };
+        let (uniform, _) = tetrahedralize(&noise, 0.04).unwrap();
+        let (mesh, _) = tetrahedralize(&noise, Spacing { surface: 0.04, doublings: 4 }).unwrap();
+        assert!(mesh.tets().len() < uniform.tets().len());
+        let boundary = |mesh: &TetMesh| places(&assert_conforming(mesh, "noise"), mesh);
+        assert_eq!(boundary(&mesh), boundary(&uniform));
+        assert_same_volume(&mesh, &uniform, "noise");
+        assert_angles_hold(&mesh, "noise");
     }
 }
 

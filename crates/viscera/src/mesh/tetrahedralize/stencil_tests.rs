@@ -22,7 +22,7 @@ fn no_stencil_leaves_the_dihedral_bounds() {
     seeded.mark_center_inside();
     // One tetrahedron stands for all: the lattice's symmetries map any to any other or to its
     // mirror image, and the two mirror images meet the parity rule's two cases.
-    seeded.for_each_tet(|tet| corners = corners.or(Some(tet)));
+    seeded.for_each_tet(|_| true, |tet| corners = corners.or(Some(tet)));
     let corners = corners.unwrap();
 
     let (mut smallest, mut largest) = (180.0_f64, 0.0_f64);
