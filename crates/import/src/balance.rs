@@ -1,10 +1,18 @@
 //! Which bodies of a scene can rest under gravity as they are.
 
 use viscera::scene::Scene;
-use viscera::simulation::{Assembly, BalanceError};
+use viscera::simulation::{AssembleError, Assembly, BalanceError};
 
 use crate::bodies::{Import, Part};
 use crate::hold::{Hold, LARGER_BACKS, at_the_back};
+
+/// Contact begins so much farther off than bodies overlap at most, in steps of a tenth of a millimetre,
+const OVERLAP: f64 = 1.2;
+const TENTH: f64 = 1e-4;
+/// and no farther than this [m]: what overlaps more is not what a scan shows.
+const THICKEST: f64 = 8e-3;
+/// How the note of it begins.
+const BEGINS: &str = "contact begins";
 
 impl Import {
     /// Tries the scene. A body that is too soft for its weight is held by more of its back; where that does not do, it
@@ -63,6 +71,21 @@ impl Import {
             Ok((balance, errors)) => {
                 self.balance = Some(balance);
                 errors
+            }
+            Err(AssembleError::BodiesOverlap { one, other, depth, .. })
+                if self.thickness.is_none_or(|thickness| thickness < depth)
+                    && OVERLAP * depth <= THICKEST =>
+            {
+                // What is looked for farther may be found deeper: the last of several counts.
+                self.notes.retain(|note| !note.starts_with(BEGINS));
+                let thickness = (OVERLAP * depth / TENTH).ceil() * TENTH;
+                self.thickness = Some(thickness);
+                self.notes.push(format!(
+                    "{BEGINS} {:.1} mm off surfaces, since {one} and {other} overlap by up to {:.1} mm",
+                    1e3 * thickness,
+                    1e3 * depth
+                ));
+                self.try_balance(observe)
             }
             Err(error) => {
                 self.warnings.push(error.to_string());

@@ -110,6 +110,8 @@ pub struct Import {
     pub parts: Vec<Part>,
     /// Bodies that touch.
     pub touching: Vec<Touching>,
+    /// How far off surfaces contact begins [m], where the scene's default is not enough for bodies that overlap.
+    pub thickness: Option<f64>,
     /// Downwards, of length 1.
     pub down: Vec3<f64>,
     /// What is probably not as it was meant, a line each.
@@ -331,7 +333,7 @@ fn alone(file: &str, name: String, mesh: TetMesh, skin: Option<Skin>, inner: Vec
         Part { name, mesh, wanted, skin, tissue, inner, names, holds, is_balanced: true, notes };
     let (file, parts) = (file.to_owned(), vec![part]);
     let (touching, warnings, notes) = (Vec::new(), Vec::new(), Vec::new());
-    Import { file, parts, touching, down, warnings, notes, balance: None }
+    Import { file, parts, touching, thickness: None, down, warnings, notes, balance: None }
 }
 
 fn of_scan(

@@ -31,6 +31,14 @@ const OF_A_VOXEL: f64 = 0.35;
 /// and those of its surface this one.
 const OF_A_VOXEL_SKIN: f64 = 0.5;
 
+/// Edges of coarser surfaces that are tried, in voxels.
+const COARSER: [f64; 6] = [4.0, 3.0, 2.0, 1.5, 1.0, 0.75];
+/// One shows all where no larger share of the fine one's points is off by more than so many voxels, outside, where other organs are,
+/// and inside.
+const OFF: [(f64, f64, f64); 3] = [(0.05, 0.25, 0.25), (0.005, 0.4, 0.6), (0.0, 1.0, 1.5)];
+/// So many are made to find one of the same volume.
+const MOST_SURFACES: usize = 4;
+
 /// A body in the making.
 struct Plan {
     label: u16,
@@ -109,7 +117,8 @@ pub fn of_labels(
         // A gallbladder hangs on its liver.
         parts[touching.from].holds.clear();
     }
-    Ok(Import { file: file.into(), parts, touching, down, warnings, notes, balance: None })
+    let (file, thickness, balance) = (file.into(), None, None);
+    Ok(Import { file, parts, touching, thickness, down, warnings, notes, balance })
 }
 
 /// Why an organ is not filled.
@@ -249,6 +258,7 @@ fn build(
     }
     let regions = inner.iter().map(|inner| (inner.region, inner.name.clone())).collect();
     let names = MeshNames { regions, ..MeshNames::default() };
+    let skin = coarser(organ, skin, spacing);
     let (skin, wanted) = (Some(skin), Some(report.volume));
     let is_balanced = true;
     Ok(Part { name, mesh, wanted, skin, tissue, inner, names, holds, is_balanced, notes })
@@ -264,6 +274,40 @@ fn skin_of(organ: &Organ, volume: f64, spacing: f64) -> Result<SurfaceMesh, Tetr
         Ok(skin) => Ok(surface(organ, OF_A_VOXEL_SKIN * voxel).unwrap_or(skin)),
         Err(_) => surface(organ, OF_A_VOXEL_SKIN * voxel),
     }
+}
+
+/// The same surface with the longest edges that show all of it, no longer than those of its tetrahedra [m]: what meets other tissue
+/// costs as much as it has points.
+fn coarser(organ: &Organ, skin: SurfaceMesh, most: f64) -> SurfaceMesh {
+    let voxel = libm::cbrt(organ.voxel_size().iter().product());
+    let volume = skin.enclosed_volume();
+    let shows = |coarse: &SurfaceMesh| {
+        let Ok(solid) = Solid::new(coarse) else { return false };
+        // Positive where it lies inside of the fine one.
+        let off: Vec<f64> = skin.vertices.iter().map(|x| solid.distance(*x) / voxel).collect();
+        let count = |is: &dyn Fn(f64) -> bool| off.iter().filter(|off| is(**off)).count();
+        OFF.iter().all(|&(share, outside, inside)| {
+            count(&|off| off < -outside || off > inside) as f64 <= share * off.len() as f64
+        }) && (coarse.enclosed_volume() / volume - 1.0).abs() <= KEPT
+    };
+    let lengths = COARSER.iter().map(|length| length * voxel).filter(|edge| *edge <= most);
+    let coarse = lengths.filter_map(|edge| surface_to(organ, edge, volume)).find(shows);
+    coarse.unwrap_or(skin)
+}
+
+/// The surface of an organ with edges of a length [m], so far out that it encloses a volume [m^3] where that is possible.
+fn surface_to(organ: &Organ, edge: f64, volume: f64) -> Option<SurfaceMesh> {
+    let mut out = 0.0;
+    let mut skin = surface(organ, edge).ok()?;
+    for _ in 1..MOST_SURFACES {
+        let missing = volume - skin.enclosed_volume();
+        if missing.abs() <= 0.5 * KEPT * volume {
+            break;
+        }
+        out += missing / skin.area();
+        skin = surface(&organ.offset(out), edge).ok()?;
+    }
+    Some(skin)
 }
 
 /// Gives the tetrahedra of what lies in an organ a region of their own.

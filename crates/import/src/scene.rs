@@ -59,6 +59,9 @@ impl Import {
         text.push_str("\n# 1 in place of 0.95 leaves all motion to the tissue's own viscosity.\n");
         text.push_str("[time]\nduration = \"3 s\"\nvelocity_factor = 0.95\n");
         let _ = writeln!(text, "\n[world]\ngravity = {}", self.gravity());
+        if let Some(thickness) = self.thickness {
+            let _ = writeln!(text, "\n[contact]\nthickness = \"{:.1} mm\"", 1e3 * thickness);
+        }
         for part in &self.parts {
             body(&mut text, part);
         }

@@ -2,13 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use viscera::mesh::tetrahedralize::surface;
 use viscera::mesh::topology::connected_components;
+use viscera::mesh::winding::Solid;
 use viscera::mesh::{TetMesh, quality::summarize_quality};
 use viscera::scalar::{Mat3, Vec3, vec3};
 use viscera::scene::Scene;
-use viscera::simulation::Assembly;
+use viscera::simulation::{AssembleError, Assembly};
 use viscera_import::{Fineness, Found, Import, Options, open, parts};
-use viscera_volume::{Affine, LabelMap};
+use viscera_volume::{Affine, LabelMap, Organ};
 
 /// Voxels of 3 mm; two balls side by side, a lump in the first, a bone, and a crumb.
 fn map() -> LabelMap {
@@ -151,6 +153,74 @@ fn hollow_organs_get_a_wall() {
     let young = |part: &viscera_import::Part| part.tissue.young.expect("a share") / wall;
     assert!((young(&hollow) - 2.0 / 3.9).abs() < 1e-3);
     assert!((young(&filled) - (1.0 - ball(0.024) / ball(0.026))).abs() < 0.01);
+}
+
+/// A surface that meets others has no more points than it takes to show what the scan does.
+#[test]
+fn surfaces_are_as_coarse_as_the_scan_allows() {
+    let voxel = 3e-3;
+    for part in made(&coarse()).parts {
+        let labels: &[u16] = if part.name == "spleen" { &[1] } else { &[5, 9] };
+        let (organ, _) = Organ::new(&map(), labels).expect("an organ");
+        let fine = surface(&organ, voxel).expect("a surface");
+        let skin = part.skin.expect("a surface");
+        println!("{}: {} of {} points", part.name, skin.vertices.len(), fine.vertices.len());
+        assert!(2 * skin.vertices.len() < fine.vertices.len(), "{}", part.name);
+        let solid = Solid::new(&skin).expect("a body");
+        let off: Vec<f64> = fine.vertices.iter().map(|x| solid.nearest(*x) / voxel).collect();
+        let far = off.iter().filter(|off| **off > 0.25).count();
+        assert!(far as f64 <= 0.05 * off.len() as f64, "{}: {far}", part.name);
+        assert!(off.iter().all(|off| *off < 1.5), "{}", part.name);
+        let ratio = skin.enclosed_volume() / part.wanted.expect("a volume");
+        assert!((ratio - 1.0).abs() < 0.04, "{}: {ratio}", part.name);
+    }
+}
+
+/// Coarse voxels make surfaces that overlap by more than contact is thick: it begins farther off then.
+#[test]
+fn organs_that_overlap_make_a_scene_that_runs() {
+    let size = 6e-3;
+    let (dims, columns) =
+        ([24; 3], [vec3(size, 0.0, 0.0), vec3(0.0, size, 0.0), vec3(0.0, 0.0, size)]);
+    let matrix = Mat3::from_columns(columns[0], columns[1], columns[2]);
+    let mut labels = Vec::new();
+    for (z, y, x) in
+        (0..24).flat_map(|z| (0..24).flat_map(move |y| (0..24).map(move |x| (z, y, x))))
+    {
+        let at = vec3(f64::from(x), f64::from(y), f64::from(z)) * size;
+        let near = |c: [f64; 3], r: f64| (at - vec3(c[0], c[1], c[2])).length() < r;
+        // One lies in a hollow of the other.
+        labels.push(match () {
+            () if near([0.07, 0.07, 0.11], 0.017) => 2,
+            () if near([0.07, 0.07, 0.065], 0.048) => 1,
+            () => 0,
+        });
+    }
+    let names = [(1, "liver"), (2, "gallbladder")].map(|(label, name)| (label, name.to_owned()));
+    let to_world = Affine { matrix, translation: Vec3::ZERO };
+    let map = LabelMap::new(dims, labels, to_world, names.into()).expect("a map");
+    let options = Options { fineness: Some(Fineness::Edge(0.012)), ..Options::default() };
+    let found = Found::Labels(map, report());
+    let import = parts("scan.nii.gz", found, &options, &mut |_| ()).expect("two organs");
+    assert_eq!(import.warnings, [""; 0]);
+    let thickness = import.thickness.expect("they overlap");
+    let told = format!(
+        "contact begins {:.1} mm off surfaces, since gallbladder and liver",
+        1e3 * thickness
+    );
+    assert!(import.notes.iter().any(|note| note.starts_with(&told)), "{:?}", import.notes);
+    let files: BTreeMap<String, Vec<u8>> = import.scene("scan").files.into_iter().collect();
+    let text = std::str::from_utf8(&files["scan.toml"]).expect("text");
+    let scene = |settings: &[(&str, &str)]| {
+        let scene = Scene::parse("scan.toml", text, settings).expect("a legal scene");
+        let mut load = |name: &str| Ok(files[name].clone());
+        Assembly::with_balance(&scene, &mut load, import.balance.clone())
+    };
+    let error = scene(&[("contact.thickness", "1 mm")]).map(|_| ()).expect_err("an overlap");
+    let AssembleError::BodiesOverlap { depth, .. } = error else { panic!("{error}") };
+    assert!(thickness > 1.1 * depth && thickness < 1.3 * depth + 1e-4, "{thickness}, {depth}");
+    let assembly = scene(&[]).unwrap_or_else(|error| panic!("{error}"));
+    assert!(!assembly.sags());
 }
 
 /// The surface stays as fine, and there are fewer tetrahedra.

@@ -301,6 +301,25 @@ fn oscillations_are_those_of_a_clamped_beam() {
     }
 }
 
+/// A body of twice the size gives way to its weight four times as far, whatever it weighs; what is four times as stiff by a quarter.
+#[test]
+fn parts_are_compared_by_how_far_they_move() {
+    let mut builder = ModelBuilder::new();
+    for (size, young) in [(1.0, 5e4), (2.0, 5e4), (1.0, 2e5)] {
+        let mesh = block([0.06, 0.02, 0.02].map(|x| x * size), [6, 2, 2], 0.0);
+        builder.add_body(&mesh, &material(SNH, young, 0.3)).expect("a body");
+    }
+    let model = builder.build::<f32>().expect("a model");
+    let mut solver = Solver::new(&model, &settings(Integrator::Sdirk2, 8));
+    let oscillations = solver.oscillations(&hanging(&model));
+    let moved = |part: &Vec<Oscillation>| part.iter().map(|one| one.weight).sum::<f64>().sqrt();
+    let moved: Vec<f64> = oscillations.parts().iter().map(moved).collect();
+    let [one, large, stiff] = moved[..] else { panic!("three parts: {moved:?}") };
+    // Systems are solved to 3 %.
+    assert!((large / one / 4.0 - 1.0).abs() < 0.03, "{large} of {one}");
+    assert!((stiff / one / 0.25 - 1.0).abs() < 0.03, "{stiff} of {one}");
+}
+
 #[test]
 #[ignore = "slow: many passes and substeps"]
 fn it_rests_where_xpbd_does_at_length() {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! (M + h^2 K) d_1 = M e for each axis e, h long;   (M + h^2 K) d_j+1 = M v_j;   v_j: d_j made orthonormal by M
-//! T = V^T (M + h^2 K) V = Q L Q^T;   w_k^2 = (L_k - 1)/h^2,   a_k = |d_1|_M Q_1k
+//! T = V^T (M + h^2 K) V = Q L Q^T;   w_k^2 = (L_k - 1)/h^2,   a_k = |d_1|_M Q_1k/sqrt(m),   m: the part's mass
 //! ```
 //!
 //! Lanczos' iteration from the static response: its nodes and weights are those of Gauss' quadrature over all
@@ -93,7 +93,9 @@ impl<S: Real> Memory<S> {
         number: usize,
     ) -> Vec<Oscillation> {
         let range = step.layout.parts[number].vertices.clone();
+        let mut mass = 0.0;
         for v in range.clone() {
+            mass += data.constants.masses[v].to_f64();
             let is_free = data.constants.inverse_masses[v] != S::ZERO;
             let load = axis.cast::<S>() * data.constants.masses[v];
             self.gradient[v] = if is_free { load } else { Vec3::ZERO };
@@ -118,7 +120,7 @@ impl<S: Real> Memory<S> {
                 break;
             }
             if round == 0 {
-                moved = left;
+                moved = left / mass;
             }
             new.scale(1.0 / left.sqrt());
             for (v, &vector) in range.clone().zip(&new.vector) {
