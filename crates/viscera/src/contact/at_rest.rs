@@ -1,6 +1,6 @@
 //! Bodies that are close to each other, or overlap, at rest.
 
-use super::meeting::{DEEPEST, Looking, Marks, Moment, depths, turn_normals};
+use super::meeting::{DEEPEST, Looking, Moment, depths, turn_normals};
 use super::skin::{Skin, TissueContact, Topology, mean};
 use super::tree::{SkinNow, Tree, Wanted};
 use crate::mesh::embed::barycentric_weights;
@@ -43,7 +43,6 @@ impl Skin {
         let size = self.samples.iter().map(|sample| sample.edge).fold(0.0, f64::max);
         let reach = (2.0 * thickness).max(size);
         let mut tree = Tree::new(self, &at);
-        let mut marks = Marks::new(positions.len());
         let mut normals = Vec::new();
         turn_normals(self, &at, &mut normals);
         let now = SkinNow { skin: self, at: &at, normals: &normals };
@@ -64,14 +63,14 @@ impl Skin {
             let p = mean(sample.vertices, sample.weights, positions);
             let leaf = tree.leaf_of(number);
             let looking = Looking { sample: number, p, leaf, kept: None, near: None };
-            let meet = |marks: &mut Marks, deepest: f64| {
+            let meet = |deepest: f64| {
                 let moment = Moment { deepest, ..moment };
-                let found = moment.meet(marks, &looking, reach)?;
+                let found = moment.meet(&looking, reach)?;
                 let distance = found.closest.signed().0;
                 Some((distance, self.bodies[found.triangle as usize] as usize))
             };
             let own = self.sample_bodies[number as usize] as usize;
-            let shallow = meet(&mut marks, DEEPEST).filter(|(distance, _)| *distance < thickness);
+            let shallow = meet(DEEPEST).filter(|(distance, _)| *distance < thickness);
             if let Some((distance, other)) = shallow {
                 let [a, b] = [own as u32, other as u32];
                 let shift = shifts.entry([a.min(b), a.max(b)]).or_default();
@@ -81,7 +80,7 @@ impl Skin {
             let is_deep = |(distance, other): &(f64, usize)| {
                 *distance < -thickness && *other != own && inside.is_in(*other, p)
             };
-            let deep = meet(&mut marks, f64::INFINITY).filter(is_deep);
+            let deep = meet(f64::INFINITY).filter(is_deep);
             for (distance, other) in shallow.into_iter().chain(deep) {
                 let is_nearer = nearest.is_none_or(|least| distance < least.distance);
                 if own != other && is_nearer {

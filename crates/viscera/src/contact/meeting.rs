@@ -25,45 +25,15 @@ const STAYS: f64 = 0.1;
 const SHALLOW: f64 = 0.25;
 pub const DEEPEST: f64 = 1.0;
 
-/// Marks of vertices near a sample.
-#[derive(Clone, Debug, Default)]
-pub struct Marks {
-    of_vertices: Vec<u32>,
-    now: u32,
-}
-
-impl Marks {
-    /// Of so many vertices.
-    pub fn new(count: usize) -> Self {
-        Self { of_vertices: vec![0; count], now: 0 }
-    }
-
-    /// Bytes of its array.
-    pub fn bytes(&self) -> usize {
-        size_of_val(&self.of_vertices[..])
-    }
-
-    /// Marks the vertices of a sample and their neighbours, and no others.
-    fn set(&mut self, skin: &Skin, sample: usize) {
-        if self.now == u32::MAX {
-            self.of_vertices.fill(0);
-            self.now = 0;
-        }
-        self.now += 1;
-        let sample = &skin.samples[sample];
-        let bearing =
-            sample.vertices.iter().zip(&sample.weights).filter(|(_, weight)| **weight != 0.0);
-        for (&v, _) in bearing {
-            self.of_vertices[v as usize] = self.now;
-            for &near in skin.topology.neighbours(v) {
-                self.of_vertices[near as usize] = self.now;
-            }
-        }
-    }
-
-    fn are_on(&self, vertices: &[u32]) -> bool {
-        vertices.iter().any(|&v| self.of_vertices[v as usize] == self.now)
-    }
+/// Whether a triangle hangs on a vertex that a sample hangs on, or on a neighbour of one.
+fn is_around(skin: &Skin, sample: u32, triangle: u32) -> bool {
+    let sample = &skin.samples[sample as usize];
+    let corners = skin.topology.corners(triangle);
+    let bearing = sample.vertices.iter().zip(&sample.weights).filter(|(_, weight)| **weight != 0.0);
+    bearing.into_iter().any(|(&v, _)| {
+        let near = skin.topology.neighbours(v);
+        corners.iter().any(|corner| *corner == v || near.binary_search(corner).is_ok())
+    })
 }
 
 /// A skin at one moment.
@@ -130,24 +100,16 @@ impl Moment<'_> {
     }
 
     /// What a sample meets within `reach` [m].
-    pub fn meet(&self, marks: &mut Marks, looking: &Looking, reach: f64) -> Option<Found> {
+    pub fn meet(&self, looking: &Looking, reach: f64) -> Option<Found> {
         let Self { now, contact, tree, .. } = *self;
         let Looking { sample, p, leaf, kept, near } = *looking;
         let skin = now.skin;
         let body = skin.sample_bodies[sample as usize];
         let outward = self.outward(sample);
         let depths = depths(contact, self.deepest);
-        let mut is_marked = false;
-        let may = |triangle: u32| {
-            let is_own = skin.bodies[triangle as usize] == body;
-            if !is_own {
-                return contact.bodies;
-            }
-            if contact.itself && !is_marked {
-                is_marked = true;
-                marks.set(skin, sample as usize);
-            }
-            contact.itself && !marks.are_on(skin.topology.corners(triangle))
+        let may = |triangle: u32| match skin.bodies[triangle as usize] == body {
+            true => contact.itself && !is_around(skin, sample, triangle),
+            false => contact.bodies,
         };
         let suits = |triangle: u32, near: &Closest| {
             let (distance, direction) = near.signed();

@@ -31,7 +31,7 @@ pub use distance::Distance;
 pub use distance_grid::{DistanceGrid, SolidError};
 pub use held::{Held, HeldMotion, Spring};
 pub use law::{Foundation, Friction};
-pub(crate) use meeting::{DEEPEST, Looking, Marks, Moment, depths, turn_normals};
+pub(crate) use meeting::{DEEPEST, Looking, Moment, depths, turn_normals};
 pub use pair::Kept;
 pub(crate) use pair::{Bond, Pair, from_edges, tie_rest};
 pub use pressure::VertexPressures;

@@ -1,5 +1,6 @@
 //! Pairs of tissue and tissue without a step around them: for who measures what it costs to find and to evaluate them.
 
+use super::cpu::threads::Workers;
 use super::step::contacts::{ContactStep, OfVertices, Pairs, Places};
 use super::step::groups::Groups;
 use crate::layout::Layout;
@@ -51,7 +52,7 @@ impl<S: Real> Meetings<S> {
         }
         let step = ContactStep { layout, tools: &[], pins: &[], dt };
         let places = Places { layout, x: points };
-        pairs.find(&step, (places, velocities), 0.0, kept, groups);
+        pairs.find(&step, (places, velocities), 0.0, kept, (&Workers::one(), groups));
         loads.fill(Point::new(Vec3::ZERO, S::ZERO));
         of_vertices.clear();
         pairs.load_vertices(places, dt, of_vertices, loads);

@@ -53,7 +53,7 @@ pub(crate) use quasi_newton::{choose, expected_motion_error};
 pub use report::StepReport;
 pub use shadow::Shadow;
 use step::contacts::ContactStep;
-use step::data::Step;
+use step::data::{Step, StepConstants};
 pub use step::energy::Ledger;
 #[cfg(feature = "gpu")]
 #[doc(hidden)]
@@ -329,8 +329,9 @@ impl<S: Real> Solver<S> {
         }
         let of_frame = ContactStep { layout, tools: &[], pins: &inputs.pins, dt: frame };
         let places = (of_frame.places(&data.points), &data.velocities[..]);
-        let pairs = &mut data.constants.contacts.pairs;
-        let way = pairs.approach(&of_frame, places, free);
+        let StepConstants { contacts, workers, .. } = &mut data.constants;
+        let entrance = workers.entrance();
+        let way = entrance.enter(|| contacts.pairs.approach(&of_frame, places, free, workers));
         (way / free).min(MOST_DIVIDED).ceil().max(1.0) as u32
     }
 

@@ -89,6 +89,21 @@ impl Workers {
         }
     }
 
+    /// `work` on each of `all` with its place, in pieces of at least `grain`.
+    pub fn each_of<T: Send>(
+        &self,
+        all: &mut [T],
+        grain: usize,
+        work: impl Fn(usize, &mut T) + Sync,
+    ) {
+        let shared = Shared::new(all);
+        self.each(shared.len(), grain, |range| {
+            // SAFETY: pieces do not overlap.
+            let piece = unsafe { shared.range(range.clone()) };
+            range.zip(piece).for_each(|(place, one)| work(place, one));
+        });
+    }
+
     /// Combines what `map` makes of pieces of `0..count`, `piece` long each, in order. `partial`
     /// has room for one value per piece.
     pub fn reduce<T: Copy + Send>(

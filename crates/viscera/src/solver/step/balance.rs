@@ -109,7 +109,7 @@ impl ForceBalance {
                 }
             });
         }
-        step.contacts.pairs.each_force_at(layout, place, |v, force| {
+        step.contacts.pairs.each_force_at(place, |v, force| {
             self.residual[layout.numbering.order[v] as usize] -= force;
         });
     }

@@ -44,8 +44,9 @@ pub fn run<S: Real>(
         StepStage::ReadState => read_state(step.layout, data, state),
         StepStage::FindContacts => {
             let StepData { constants, points, velocities, .. } = data;
-            let StepConstants { contacts, groups, .. } = constants;
-            contacts.find(&step.contact(), points, velocities, &state.contact, groups);
+            let StepConstants { contacts, groups, workers, .. } = constants;
+            let by = (&*workers, groups);
+            contacts.find(&step.contact(), points, velocities, &state.contact, by);
         }
         StepStage::EndContacts => {
             let StepData {

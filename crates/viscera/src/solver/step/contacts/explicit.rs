@@ -46,7 +46,7 @@ impl Contacts {
             let placed = Placed { shape: &tool.shape, pose: &self.poses[number] };
             touching.slip(tool, placed, step.layout.samples[touching.sample as usize].place(x));
         }
-        self.pairs.slip(step.places(x), part);
+        self.pairs.slip(x, part);
     }
 
     /// Puts a part back to where its step begins: it has not slipped, and tools have done no work.

@@ -6,6 +6,7 @@ use crate::contact::{Moved, Tool, Touch, Touching};
 use crate::scalar::lanes::Point;
 use crate::scalar::rigid::{RigidTransform, axis_times_sine};
 use crate::scalar::{Real, Vec3};
+use crate::solver::cpu::threads::Workers;
 use crate::solver::step::groups::Groups;
 use crate::state::ContactState;
 use std::ops::Range;
@@ -19,14 +20,14 @@ impl Contacts {
         points: &[Point<S>],
         velocities: &[Vec3<S>],
         kept_state: &ContactState,
-        groups: &mut Groups,
+        (workers, groups): (&Workers, &mut Groups),
     ) {
         self.clear();
         let (layout, tools) = (step.layout, step.tools);
         self.move_tools(step, kept_state);
         let places = (step.places(points), velocities);
         let farthest = self.farthest_tool(step);
-        self.pairs.find(step, places, farthest, kept_state, groups);
+        self.pairs.find(step, places, farthest, kept_state, (workers, groups));
         if tools.is_empty() {
             return;
         }

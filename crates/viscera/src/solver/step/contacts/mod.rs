@@ -280,7 +280,7 @@ impl Contacts {
             sums[0] += after - before;
             sums[1] += (after - before).abs();
         }
-        let of_pairs = self.pairs.change(step.layout, part, [from, to]);
+        let of_pairs = self.pairs.change(part, [from, to]);
         [sums[0] + of_pairs[0], sums[1] + of_pairs[1]]
     }
 
@@ -297,7 +297,7 @@ impl Contacts {
             let d = sample.place(direction);
             sum += d.dot(felt.curvature() * d);
         });
-        sum + self.pairs.curvature(step.places(x), part, direction)
+        sum + self.pairs.curvature(x, part, direction)
     }
 
     /// Calls `add` with the vertices of every sample of a part, their weights and the curvature between them [N/m].

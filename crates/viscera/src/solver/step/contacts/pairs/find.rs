@@ -7,8 +7,9 @@
 //! Lists of what may be near are made anew when vertices have travelled so far, or turned so far, that they may have changed.
 //! They decide where to look, and never what is found.
 
-use super::{NOWHERE, Pairs, Places, Search};
-use crate::contact::search::Found;
+use std::mem::take;
+
+use super::{NOTHING, NOWHERE, Pairs, Places, Search};
 use crate::contact::tree::{Since, SkinNow, Wanted};
 use crate::contact::{
     Bond, DEEPEST, Foundation, Kept, Looking, Moment, Pair, TissueContact, depths, from_edges,
@@ -16,9 +17,13 @@ use crate::contact::{
 };
 use crate::layout::LaidSkin;
 use crate::scalar::{Real, Vec3};
+use crate::solver::cpu::threads::Workers;
 use crate::solver::step::contacts::ContactStep;
 use crate::solver::step::groups::Groups;
 use crate::state::ContactState;
+
+/// Samples of a piece of the search.
+const GRAIN: usize = 64;
 
 /// In a step nothing is looked for further than so many thicknesses.
 const FARTHEST: f64 = 40.0;
@@ -45,7 +50,7 @@ impl Pairs {
         (places, velocities): (Places<'_, S>, &[Vec3<S>]),
         tools: f64,
         state: &ContactState,
-        groups: &mut Groups,
+        (workers, groups): (&Workers, &mut Groups),
     ) {
         self.clear();
         groups.part_all();
@@ -57,24 +62,19 @@ impl Pairs {
             return;
         }
         self.search.prepare(skin, places, reach);
-        let mut kept = state.pairs.iter().peekable();
+        self.search.keep(skin, &state.pairs);
+        self.search.look(skin, places, (workers, reach), Some(&state.pairs));
         let mut ties = skin.ties.iter().peekable();
         for part in 0..step.layout.part_count() {
             self.first[part] = self.pairs.len();
             for place in skin.samples_of(part) {
-                let number = skin.samples[place].number;
-                // What the last step has left is sorted as samples are.
-                let key = |kept: &Kept| (skin.part_of(kept.sample), kept.sample);
-                while kept.next_if(|kept| key(kept) < (part, number)).is_some() {}
-                let kept = kept.next_if(|kept| key(kept) == (part, number));
-                // A state that the caller has changed may name triangles that do not exist.
-                let kept = kept.filter(|kept| (kept.triangle as usize) < skin.parts.len());
+                let kept = state.pairs.get(self.search.kept[place] as usize);
                 self.presses[part] |= kept.is_some();
                 self.gains[part] -= kept.map_or(0.0, |kept| kept.energy);
-                self.meet(skin, places, place, kept, reach);
+                self.meet(skin, place, kept);
                 while let Some(&(_, tie)) = ties.next_if(|tie| tie.0 as usize == place) {
                     if !state.torn.get(tie as usize).copied().unwrap_or(false) {
-                        self.pairs.push(tied(skin, places, place, tie));
+                        self.push(skin, tied(skin, places, place, tie));
                     }
                 }
             }
@@ -101,6 +101,7 @@ impl Pairs {
         frame: &ContactStep<'_, S>,
         (places, velocities): (Places<'_, S>, &[Vec3<S>]),
         free: f64,
+        workers: &Workers,
     ) -> f64 {
         let Some(skin) = &frame.layout.skin else { return 0.0 };
         let thickness = skin.contact.law.thickness;
@@ -111,10 +112,10 @@ impl Pairs {
             return 0.0;
         }
         self.search.prepare(skin, places, reach);
+        self.search.look(skin, places, (workers, reach), None);
         let mut closest = 0.0f64;
-        for place in 0..skin.samples.len() {
-            let sample = &skin.samples[place];
-            let Some(found) = self.search.look(skin, places, place, None, reach) else { continue };
+        for (sample, met) in skin.samples.iter().zip(&self.search.met) {
+            let Some(found) = &met.found else { continue };
             let (distance, normal) = found.closest.signed();
             let mut way = Vec3::ZERO;
             for (&v, &weight) in sample.vertices.iter().zip(&sample.weights) {
@@ -132,19 +133,16 @@ impl Pairs {
         closest
     }
 
-    /// What one sample meets.
-    fn meet<S: Real>(
-        &mut self,
-        skin: &LaidSkin,
-        places: Places<'_, S>,
-        place: usize,
-        kept: Option<&Kept>,
-        reach: f64,
-    ) {
-        let search = &mut self.search;
-        let before = kept.map(|kept| kept.triangle);
-        let Some(found) = search.look(skin, places, place, before, reach) else { return };
-        let moment = search.moment(skin);
+    /// Adds a pair.
+    fn push(&mut self, skin: &LaidSkin, pair: Pair) {
+        self.stencils.push(skin, &pair, &skin.samples[pair.sample as usize]);
+        self.pairs.push(pair);
+    }
+
+    /// The pair of a sample that meets something.
+    fn meet(&mut self, skin: &LaidSkin, place: usize, kept: Option<&Kept>) {
+        let Some(found) = self.search.met[place].found else { return };
+        let moment = self.search.moment(skin);
         let sample = &skin.samples[place];
         let number = sample.number as usize;
         let (_, normal) = found.closest.signed();
@@ -168,14 +166,15 @@ impl Pairs {
             (limit > 0.0).then_some((foundation.area * foundation.stiffness, limit))
         });
         let coefficient = law.friction;
-        self.pairs.push(Pair {
+        let pair = Pair {
             sample: place as u32,
             triangle: found.triangle,
             weights,
             normal,
             offset: slip - found.closest.away,
             bond: Bond::Contact { foundation, shift, friction, coefficient },
-        });
+        };
+        self.push(skin, pair);
     }
 }
 
@@ -249,28 +248,46 @@ impl Search {
         Moment { now, tree, contact: &skin.contact, deepest: DEEPEST }
     }
 
-    /// What a sample meets within reach [m], see [`Moment::meet`], after [`Search::prepare`].
+    /// Which of what the last step has left is whose; both are sorted as samples are.
+    fn keep(&mut self, skin: &LaidSkin, all: &[Kept]) {
+        let mut kept = (0..).zip(all).peekable();
+        for (place, sample) in skin.samples.iter().enumerate() {
+            let own = (sample.part as usize, sample.number);
+            let key = |kept: &Kept| (skin.part_of(kept.sample), kept.sample);
+            while kept.next_if(|(_, kept)| key(kept) < own).is_some() {}
+            let next = kept.next_if(|(_, kept)| key(kept) == own);
+            // A state that the caller has changed may name triangles that do not exist.
+            let known = next.filter(|(_, kept)| (kept.triangle as usize) < skin.parts.len());
+            self.kept[place] = known.map_or(NOTHING, |(number, _)| number);
+        }
+    }
+
+    /// What all samples meet within reach [m], see [`Moment::meet`], after [`Search::prepare`]; and after [`Search::keep`] where
+    /// something is kept.
     fn look<S: Real>(
         &mut self,
         skin: &LaidSkin,
         places: Places<'_, S>,
-        place: usize,
-        kept: Option<u32>,
-        reach: f64,
-    ) -> Option<Found> {
-        let sample = &skin.samples[place];
-        let leaf = self.tree.leaf_of(sample.number);
-        if kept.is_none() && self.tree.meets_nothing(leaf) {
-            return None;
-        }
-        let near = Some(self.near[place]).filter(|near| *near != NOWHERE);
-        let looking =
-            Looking { sample: sample.number, p: sample.place(places.x), leaf, kept, near };
-        let mut marks = std::mem::take(&mut self.marks);
-        let found = self.moment(skin).meet(&mut marks, &looking, reach);
-        self.marks = marks;
-        self.near[place] = found.as_ref().map_or(NOWHERE, |found| found.triangle);
-        found
+        (workers, reach): (&Workers, f64),
+        all_kept: Option<&[Kept]>,
+    ) {
+        let mut all_met = take(&mut self.met);
+        let moment = self.moment(skin);
+        workers.each_of(&mut all_met, GRAIN, |place, met| {
+            let sample = &skin.samples[place];
+            met.found = None;
+            let leaf = self.tree.leaf_of(sample.number);
+            let kept = all_kept.and_then(|all| all.get(self.kept[place] as usize));
+            let kept = kept.map(|kept| kept.triangle);
+            if kept.is_none() && self.tree.meets_nothing(leaf) {
+                return;
+            }
+            let (number, p) = (sample.number, sample.place(places.x));
+            let near = Some(met.near).filter(|near| *near != NOWHERE);
+            met.found = moment.meet(&Looking { sample: number, p, leaf, kept, near }, reach);
+            met.near = met.found.as_ref().map_or(NOWHERE, |found| found.triangle);
+        });
+        self.met = all_met;
     }
 
     /// Places of the skin's points and normals, and lists that are not too old.

@@ -9,20 +9,24 @@
 //! part; parts that share a pair are one group (`groups.rs`).
 
 mod find;
+mod stencils;
 
 use super::{Bound, Sums};
+use crate::contact::search::Found;
 use crate::contact::tree::Tree;
-use crate::contact::{Bond, Felt, Kept, Marks, Pair};
-use crate::layout::{LaidSample, LaidSkin, Layout};
+use crate::contact::{Bond, Felt, Kept, Pair};
+use crate::layout::{LaidSample, Layout};
 use crate::scalar::lanes::Point;
 use crate::scalar::{Mat3, Real, Vec3};
 use crate::solver::step::contacts::OfVertices;
+use stencils::Stencils;
 
 /// Tissue and tissue in a step.
 #[derive(Clone, Debug, Default)]
 pub struct Pairs {
     /// Part by part of their samples.
     pairs: Vec<Pair>,
+    stencils: Stencils,
     /// The same where the step begins.
     at_start: Vec<Pair>,
     /// The first of each part, and the end of the last one's.
@@ -38,7 +42,6 @@ pub struct Pairs {
 #[derive(Clone, Debug, Default)]
 struct Search {
     tree: Tree,
-    marks: Marks,
     /// Where vertices were when it looked last [m].
     seen: Vec<Vec3<f64>>,
     /// How far the vertex that moves most beside the mean of all has moved since the beginning, from look to look [m].
@@ -54,12 +57,26 @@ struct Search {
     normals: Vec<Vec3<f64>>,
     /// Where vertices go in the step [m].
     ways: Vec<Vec3<f64>>,
-    /// The triangle that each sample met when it looked last, or [`NOWHERE`].
-    near: Vec<u32>,
+    /// What each sample meets.
+    met: Vec<Met>,
+    /// What each sample has kept, by its number in the state, or [`NOTHING`].
+    kept: Vec<u32>,
+}
+
+/// What a sample meets.
+#[derive(Clone, Copy, Debug)]
+struct Met {
+    /// Now.
+    found: Option<Found>,
+    /// The triangle that it met when it looked last, or [`NOWHERE`].
+    near: u32,
 }
 
 /// No triangle.
 const NOWHERE: u32 = u32::MAX;
+
+/// Nothing is kept.
+const NOTHING: u32 = u32::MAX;
 
 /// What pairs know of a step.
 #[derive(Clone, Copy)]
@@ -77,13 +94,13 @@ impl Pairs {
         let room = samples + skin.ties.len();
         Self {
             pairs: Vec::with_capacity(room),
+            stencils: Stencils::new(skin, room),
             at_start: Vec::with_capacity(room),
             first: vec![0; layout.part_count() + 1],
             presses: vec![false; layout.part_count()],
             gains: vec![0.0; layout.part_count()],
             search: Search {
                 tree: skin.tree.clone(),
-                marks: Marks::new(vertices),
                 seen: vec![Vec3::ZERO; vertices],
                 travelled: 0.0,
                 listed_at: -1.0,
@@ -93,20 +110,22 @@ impl Pairs {
                 at: vec![Vec3::ZERO; skin.skin.points.len()],
                 normals: Vec::with_capacity(skin.skin.triangles.len()),
                 ways: vec![Vec3::ZERO; vertices],
-                near: vec![NOWHERE; samples],
+                met: vec![Met { found: None, near: NOWHERE }; samples],
+                kept: vec![NOTHING; samples],
             },
         }
     }
 
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
-        let Search { tree, marks, seen, at, ways, normals, near, .. } = &self.search;
+        let Search { tree, seen, at, ways, normals, met, kept, .. } = &self.search;
         (self.pairs.capacity() + self.at_start.capacity()) * size_of::<Pair>()
             + size_of_val(&self.first[..])
             + tree.bytes()
-            + marks.bytes()
+            + self.stencils.bytes()
+            + size_of_val(&met[..])
+            + size_of_val(&kept[..])
             + [seen, at, ways, normals].map(|all| size_of_val(&all[..])).iter().sum::<usize>()
-            + size_of_val(&near[..])
     }
 
     /// How many there are.
@@ -117,6 +136,7 @@ impl Pairs {
     /// Forgets all pairs.
     pub fn clear(&mut self) {
         self.pairs.clear();
+        self.stencils.clear();
         self.at_start.clear();
         self.first.fill(0);
         self.presses.fill(false);
@@ -125,7 +145,7 @@ impl Pairs {
 
     /// Whether there are pairs of a part's samples.
     pub fn is_any(&self, part: usize) -> bool {
-        !self.of_part(part).is_empty()
+        !self.range(part).is_empty()
     }
 
     /// By how much the energy of contact [J] of a part's samples is larger where the step begins than where the last one has
@@ -139,14 +159,6 @@ impl Pairs {
         self.presses.get(part).copied().unwrap_or(false)
     }
 
-    /// Of the samples of a part.
-    fn of_part(&self, part: usize) -> &[Pair] {
-        match (self.first.get(part), self.first.get(part + 1)) {
-            (Some(&start), Some(&end)) => &self.pairs[start..end],
-            _ => &[],
-        }
-    }
-
     /// Calls `act` with every pair of a part's samples, its sample, its way [m] and what it feels at `x`.
     pub fn each<S: Real>(
         &self,
@@ -155,9 +167,10 @@ impl Pairs {
         mut act: impl FnMut(&Pair, &LaidSample, Vec3<f64>, &Felt),
     ) {
         let Some(skin) = &layout.skin else { return };
-        for pair in self.of_part(part) {
+        for number in self.range(part) {
+            let pair = &self.pairs[number];
             let sample = &skin.samples[pair.sample as usize];
-            let away = away(skin, pair, sample, x);
+            let away = self.stencils.of(number).away(x);
             act(pair, sample, away, &pair.feel(away));
         }
     }
@@ -179,17 +192,11 @@ impl Pairs {
     }
 
     /// The change of the energy [J] of a part's pairs from one place to another, and the sum of the magnitudes of its terms.
-    pub fn change<S: Real>(
-        &self,
-        layout: &Layout<S>,
-        part: usize,
-        [from, to]: [&[Point<S>]; 2],
-    ) -> [f64; 2] {
-        let Some(skin) = &layout.skin else { return [0.0; 2] };
+    pub fn change<S: Real>(&self, part: usize, [from, to]: [&[Point<S>]; 2]) -> [f64; 2] {
         let mut sums = [0.0; 2];
-        for pair in self.of_part(part) {
-            let sample = &skin.samples[pair.sample as usize];
-            let [before, after] = [from, to].map(|x| pair.feel(away(skin, pair, sample, x)).energy);
+        for number in self.range(part) {
+            let (pair, stencil) = (&self.pairs[number], self.stencils.of(number));
+            let [before, after] = [from, to].map(|x| pair.feel(stencil.away(x)).energy);
             sums[0] += after - before;
             sums[1] += (after - before).abs();
         }
@@ -197,18 +204,14 @@ impl Pairs {
     }
 
     /// The curvature of the energy of a part's pairs along a direction of vertices [J].
-    pub fn curvature<S: Real>(
-        &self,
-        places: Places<'_, S>,
-        part: usize,
-        direction: &[Point<S>],
-    ) -> f64 {
-        let Some(skin) = &places.layout.skin else { return 0.0 };
+    pub fn curvature<S: Real>(&self, x: &[Point<S>], part: usize, direction: &[Point<S>]) -> f64 {
         let mut sum = 0.0;
-        self.each(places, part, |pair, sample, _, felt| {
-            let d = away(skin, pair, sample, direction);
+        for number in self.range(part) {
+            let stencil = self.stencils.of(number);
+            let felt = self.pairs[number].feel(stencil.away(x));
+            let d = stencil.away(direction);
             sum += d.dot(felt.curvature() * d);
-        });
+        }
         sum
     }
 
@@ -246,35 +249,31 @@ impl Pairs {
     /// sample feels at `x`.
     fn each_vertex<S: Real>(
         &self,
-        places: Places<'_, S>,
+        x: &[Point<S>],
         part: usize,
         mut act: impl FnMut(usize, f64, f64, &Felt),
     ) {
-        let Some(skin) = &places.layout.skin else { return };
-        self.each(places, part, |pair, sample, _, felt| {
+        for number in self.range(part) {
+            let stencil = self.stencils.of(number);
+            let felt = self.pairs[number].feel(stencil.away(x));
             if felt.force == Vec3::ZERO && felt.drag == 0.0 {
-                return;
+                continue;
             }
-            each_weight(skin, pair, sample, |v, weight, sum| act(v, weight, sum, felt));
-        });
+            let sum = stencil.size();
+            stencil.each().for_each(|(v, weight)| act(v, weight, sum, &felt));
+        }
     }
 
     /// Calls with every vertex that pairs bear on and the force [N], places of vertices [m] being from elsewhere.
     pub fn each_force_at<S: Real>(
         &self,
-        layout: &Layout<S>,
         place: impl Fn(usize) -> Vec3<S>,
         mut act: impl FnMut(usize, Vec3<f64>),
     ) {
-        let Some(skin) = &layout.skin else { return };
-        for pair in &self.pairs {
-            let sample = &skin.samples[pair.sample as usize];
-            let mut away = sample.mean(&place);
-            skin.each_corner(pair.triangle, &pair.weights, |v, weight| {
-                away -= place(v).cast::<f64>() * weight;
-            });
-            let force = pair.feel(away).force;
-            each_weight(skin, pair, sample, |v, weight, _| act(v, force * weight));
+        for (number, pair) in self.pairs.iter().enumerate() {
+            let stencil = self.stencils.of(number);
+            let force = pair.feel(stencil.sum(&place)).force;
+            stencil.each().for_each(|(v, weight)| act(v, force * weight));
         }
     }
 
@@ -288,7 +287,7 @@ impl Pairs {
         loads: &mut [Point<S>],
     ) {
         let copies = &places.layout.copy_offsets;
-        self.each_vertex(places, part, |v, weight, sum, felt| {
+        self.each_vertex(places.x, part, |v, weight, sum, felt| {
             let stiffness = match bound {
                 Bound::Without => 0.0,
                 Bound::Here => (felt.stiffness + felt.tie).max(felt.drag),
@@ -308,7 +307,7 @@ impl Pairs {
     ) {
         let copies = &places.layout.copy_offsets;
         for part in 0..places.layout.part_count() {
-            self.each_vertex(places, part, |v, weight, sum, felt| {
+            self.each_vertex(places.x, part, |v, weight, sum, felt| {
                 loads[copies[v] as usize].add(load(dt, felt.force, (weight, 0.0), 0.0));
                 let block = felt.curvature() * (dt * dt * weight.abs() * sum);
                 of_vertices.add(v as u32, block);
@@ -325,27 +324,22 @@ impl Pairs {
         (dt, share): (f64, f64),
         loads: &mut [Point<S>],
     ) {
-        let Some(skin) = &layout.skin else { return };
-        let range = self.range(part);
-        for pair in &mut self.pairs[range] {
-            let sample = &skin.samples[pair.sample as usize];
-            let away = away(skin, pair, sample, x);
-            let felt = pair.slip_now(away);
+        for number in self.range(part) {
+            let (pair, stencil) = (&mut self.pairs[number], self.stencils.of(number));
+            let felt = pair.slip_now(stencil.away(x));
             let stiffness = share * pair.stiffness_near(&felt);
-            each_weight(skin, pair, sample, |v, weight, sum| {
+            let sum = stencil.size();
+            for (v, weight) in stencil.each() {
                 let load = load(dt, felt.force, (weight, sum), stiffness);
                 loads[layout.copy_offsets[v] as usize].add(load);
-            });
+            }
         }
     }
 
     /// Samples slip where the step has ended.
-    pub fn slip<S: Real>(&mut self, Places { layout, x }: Places<'_, S>, part: usize) {
-        let Some(skin) = &layout.skin else { return };
-        let range = self.range(part);
-        for pair in &mut self.pairs[range] {
-            let sample = &skin.samples[pair.sample as usize];
-            pair.slip_now(away(skin, pair, sample, x));
+    pub fn slip<S: Real>(&mut self, x: &[Point<S>], part: usize) {
+        for number in self.range(part) {
+            self.pairs[number].slip_now(self.stencils.of(number).away(x));
         }
     }
 
@@ -386,28 +380,6 @@ impl Pairs {
             });
         }
     }
-}
-
-/// From the triangle's point to the sample, at places `x` or along a direction [m].
-fn away<S: Real>(skin: &LaidSkin, pair: &Pair, sample: &LaidSample, x: &[Point<S>]) -> Vec3<f64> {
-    sample.place(x) - skin.place(pair.triangle, &pair.weights, x)
-}
-
-/// Calls with every vertex that a pair bears on, its weight, and the sum of the magnitudes of all.
-fn each_weight(
-    skin: &LaidSkin,
-    pair: &Pair,
-    sample: &LaidSample,
-    mut act: impl FnMut(usize, f64, f64),
-) {
-    let mut sum: f64 = sample.weights.iter().map(|weight| weight.abs()).sum();
-    skin.each_corner(pair.triangle, &pair.weights, |_, weight| sum += weight.abs());
-    for (&v, &weight) in sample.vertices.iter().zip(&sample.weights) {
-        if weight != 0.0 {
-            act(v as usize, weight, sum);
-        }
-    }
-    skin.each_corner(pair.triangle, &pair.weights, |v, weight| act(v, -weight, sum));
 }
 
 /// `dt^2` times a force [N] at a vertex of this weight, with a bound of stiffness [N/m].
