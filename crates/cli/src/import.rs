@@ -13,7 +13,7 @@ use crate::progress;
 /// How a file becomes bodies.
 #[derive(Args, Clone, Debug, Default)]
 pub struct ImportArguments {
-    /// The length of edges inside, such as "8 mm"
+    /// The length of edges, such as "8 mm"; with --graded of those at the surface
     #[arg(long, value_name = "LENGTH", conflicts_with = "count")]
     edge: Option<String>,
     /// About how many tetrahedra in all; 20,000 where nothing is said

@@ -196,7 +196,7 @@ fn build(
 ) -> Result<Part, TetrahedralizeError> {
     let Plan { organ, report, .. } = plan;
     let mut notes = Vec::new();
-    let skin = skin_of(organ, report.volume, sizes.spacing)?;
+    let (skin, edge) = skin_of(organ, report.volume, sizes.spacing)?;
     let finest = sizes.finest(organ, report.volume);
     let first = first_spacing(report.volume, &skin, sizes.spacing, finest);
     let mut wall_share = None;
@@ -258,27 +258,32 @@ fn build(
     }
     let regions = inner.iter().map(|inner| (inner.region, inner.name.clone())).collect();
     let names = MeshNames { regions, ..MeshNames::default() };
-    let skin = coarser(organ, skin, spacing);
+    let skin = coarser(organ, (skin, edge), spacing);
     let (skin, wanted) = (Some(skin), Some(report.volume));
     let is_balanced = true;
     Ok(Part { name, mesh, wanted, skin, tissue, inner, names, holds, is_balanced, notes })
 }
 
-/// The fine surface of an organ: with edges as long as a voxel's, or half as long where a thin organ needs it for its volume.
-fn skin_of(organ: &Organ, volume: f64, spacing: f64) -> Result<SurfaceMesh, TetrahedralizeError> {
+/// The fine surface of an organ, and the length of its edges [m]: that of a voxel's, or half of it where a thin organ needs it for
+/// its volume.
+fn skin_of(
+    organ: &Organ,
+    volume: f64,
+    spacing: f64,
+) -> Result<(SurfaceMesh, f64), TetrahedralizeError> {
     let voxel = libm::cbrt(organ.voxel_size().iter().product());
-    let coarse = surface(organ, voxel.max(spacing / 8.0));
+    let [long, short] = [voxel.max(spacing / 8.0), OF_A_VOXEL_SKIN * voxel];
     let is_kept = |skin: &SurfaceMesh| (skin.enclosed_volume() / volume - 1.0).abs() <= KEPT;
-    match coarse {
-        Ok(skin) if is_kept(&skin) => Ok(skin),
-        Ok(skin) => Ok(surface(organ, OF_A_VOXEL_SKIN * voxel).unwrap_or(skin)),
-        Err(_) => surface(organ, OF_A_VOXEL_SKIN * voxel),
+    match surface(organ, long) {
+        Ok(skin) if is_kept(&skin) => Ok((skin, long)),
+        Ok(skin) => Ok(surface(organ, short).map_or((skin, long), |skin| (skin, short))),
+        Err(_) => Ok((surface(organ, short)?, short)),
     }
 }
 
 /// The same surface with the longest edges that show all of it, no longer than those of its tetrahedra [m]: what meets other tissue
 /// costs as much as it has points.
-fn coarser(organ: &Organ, skin: SurfaceMesh, most: f64) -> SurfaceMesh {
+fn coarser(organ: &Organ, (skin, edge): (SurfaceMesh, f64), most: f64) -> SurfaceMesh {
     let voxel = libm::cbrt(organ.voxel_size().iter().product());
     let volume = skin.enclosed_volume();
     let shows = |coarse: &SurfaceMesh| {
@@ -290,7 +295,8 @@ fn coarser(organ: &Organ, skin: SurfaceMesh, most: f64) -> SurfaceMesh {
             count(&|off| off < -outside || off > inside) as f64 <= share * off.len() as f64
         }) && (coarse.enclosed_volume() / volume - 1.0).abs() <= KEPT
     };
-    let lengths = COARSER.iter().map(|length| length * voxel).filter(|edge| *edge <= most);
+    let lengths = COARSER.iter().map(|length| length * voxel);
+    let lengths = lengths.filter(|length| *length > edge && *length <= most);
     let coarse = lengths.filter_map(|edge| surface_to(organ, edge, volume)).find(shows);
     coarse.unwrap_or(skin)
 }

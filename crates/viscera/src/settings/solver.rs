@@ -166,8 +166,9 @@ settings_table! {
         /// `threads` and `device`. It loses no motion to damping, and it is the cheapest for small soft bodies;
         /// its cost grows with the square root of the stiffness, and with fineness once more.
         method: Method = (Method::Auto), one_of::<Method>();
-        /// The error of motion that "auto" and "quasi_newton" choose substeps and passes for, as a share of the displacement, over
-        /// half a second: "draft" for 0.15, "standard" for 0.05, "fine" for 0.005, or a number. Rest does not depend on it.
+        /// The error of motion that "auto" and "quasi_newton" choose substeps and passes for, as a share of the displacement of each
+        /// body, over half a second: "draft" for 0.15, "standard" for 0.05, "fine" for 0.005, or a number. A body that moves by less
+        /// than a twentieth of what the softest one does is measured by that twentieth. Rest does not depend on it.
         accuracy: Accuracy = (Accuracy::Standard), Accuracies;
         /// What tetrahedra of stable neo-Hookean tissue are. "recovered": on the same vertices, each also sees how its
         /// neighbours are deformed; coarse meshes bend as fine ones do. "quasi_newton" and "explicit" have them, on the CPU.
