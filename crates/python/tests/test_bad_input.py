@@ -7,6 +7,7 @@ import pickle
 import signal
 import threading
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -199,6 +200,15 @@ def test_simulations_of_their_own_run_at_once(block: vi.Scene) -> None:
     assert {s.digest() for s in all_of_them} == {alone.digest()}
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """The usual answer to Ctrl-C: a shell starts what it runs in the background with the signal ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_stops_a_long_call(block: vi.Scene) -> None:
     simulation = vi.Simulation(block)
     timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))

@@ -51,6 +51,7 @@ def test_a_surface_becomes_a_body_that_stays(tmp_path: Path) -> None:
     assert np.allclose(before.max(axis=0) - before.min(axis=0), 0.06, atol=2e-3)
     simulation.advance(30)
     assert np.abs(simulation["spleen"].positions - before).max() < 1e-4
+
     # Finer, by a number of tetrahedra.
     def vertices(graded: bool) -> int:
         fine = vi.Scene.from_file(file, unit="1 mm", edge=0.004, graded=graded)

@@ -45,6 +45,11 @@ fn attachments_energy(e: ElementMoment, x: array<vec3f, 4>) -> f32 {
     return attachment_energy(x[0], e.anchor, e.constants.x);
 }
 
+// Change of the energy [J] as the vertex moves by `d` [m], with the round-off of the change.
+fn attachments_energy_change(e: ElementMoment, x: array<vec3f, 4>, d: array<vec3f, 4>) -> f32 {
+    return e.constants.x * dot(d[0], x[0] - e.anchor + d[0] * 0.5);
+}
+
 fn attachments_forces(e: ElementMoment, x: array<vec3f, 4>) -> array<vec3f, 4> {
     let force = attachment_force(x[0], e.anchor, e.constants.x);
     return array<vec3f, 4>(force, vec3f(), vec3f(), vec3f());

@@ -66,6 +66,39 @@ fn green_strain_second_piola(
     );
 }
 
+// `E(F + D) - E(F) = sym((F + D/2)^T D)`, in the components of `green_strain_strain`.
+fn green_strain_strain_change(f: mat3x3f, d: mat3x3f) -> array<f32, 6> {
+    let m = f + d * 0.5;
+    return array<f32, 6>(
+        dot(m[0], d[0]),
+        dot(m[1], d[1]),
+        dot(m[2], d[2]),
+        dot(m[1], d[2]) + dot(m[2], d[1]),
+        dot(m[0], d[2]) + dot(m[2], d[0]),
+        dot(m[0], d[1]) + dot(m[1], d[0]),
+    );
+}
+
+// `W(c + change) - W(c)` [Pa] with the round-off of its terms, which vanish with the change.
+fn green_strain_energy_density_change(
+    c: array<f32, 6>,
+    change: array<f32, 6>,
+    lame_lambda: f32,
+    lame_mu: f32,
+) -> f32 {
+    let middle = array<f32, 6>(
+        c[0] + 0.5 * change[0],
+        c[1] + 0.5 * change[1],
+        c[2] + 0.5 * change[2],
+        c[3] + 0.5 * change[3],
+        c[4] + 0.5 * change[4],
+        c[5] + 0.5 * change[5],
+    );
+    let stress = green_strain_second_piola(middle, lame_lambda, lame_mu);
+    let direct = stress[0] * change[0] + stress[1] * change[1] + stress[2] * change[2];
+    return direct + (stress[3] * change[3] + stress[4] * change[4] + stress[5] * change[5]);
+}
+
 // First Piola stress [Pa]: `P = F S`.
 fn green_strain_piola(
     deformation_gradient: mat3x3f,
@@ -186,6 +219,21 @@ fn saint_venant_kirchhoff_energy_density(f: mat3x3f, lame_lambda: f32, lame_mu: 
 
 fn saint_venant_kirchhoff_piola(f: mat3x3f, lame_lambda: f32, lame_mu: f32) -> mat3x3f {
     return green_strain_piola(f, green_strain_strain(f), lame_lambda, lame_mu);
+}
+
+fn saint_venant_kirchhoff_energy_change(
+    f: mat3x3f,
+    d: mat3x3f,
+    lame_lambda: f32,
+    lame_mu: f32,
+) -> f32 {
+    let change = green_strain_strain_change(f, d);
+    return green_strain_energy_density_change(green_strain_strain(f), change, lame_lambda, lame_mu);
+}
+
+// Of the derivative of `tr E`: `F`.
+fn saint_venant_kirchhoff_gradient_map(f: mat3x3f) -> mat3x3f {
+    return f;
 }
 
 // Stretching of a line along `g`, of the Green strain.

@@ -129,6 +129,11 @@ fn cofactor(f: mat3x3f) -> mat3x3f {
     return mat3x3f(cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1]));
 }
 
+// `A : B`.
+fn inner_product(a: mat3x3f, b: mat3x3f) -> f32 {
+    return dot(a[0], b[0]) + dot(a[1], b[1]) + dot(a[2], b[2]);
+}
+
 // Squared Frobenius norm.
 fn norm_squared(f: mat3x3f) -> f32 {
     return dot(f[0], f[0]) + dot(f[1], f[1]) + dot(f[2], f[2]);

@@ -42,7 +42,29 @@ fn neo_hookean_piola(f: mat3x3f, lame_lambda: f32, lame_mu: f32) -> mat3x3f {
     return (f - area) * lame_mu + area * pressure;
 }
 
+// `W(F + D) - W(F)` [Pa] with the round-off of its terms, which vanish with `D`.
+fn neo_hookean_energy_change(f: mat3x3f, d: mat3x3f, lame_lambda: f32, lame_mu: f32) -> f32 {
+    let h = f - IDENTITY;
+    let trace = d[0].x + d[1].y + d[2].z;
+    let turned = inner_product(transpose(h), d);
+    let rest = ((h[0].x + h[1].y + h[2].z) * trace - turned) + inner_product(cofactor(h), d);
+    let higher = inner_product(f, cofactor(d)) + dot(d[0], cross(d[1], d[2]));
+    let volume = (trace + rest) + higher;
+    let shear = (inner_product(h, d) - rest) + 0.5 * norm_squared(d) - higher;
+    let middle = neo_hookean_volume_change(f) + 0.5 * volume;
+    return lame_mu * shear + (lame_lambda + lame_mu) * volume * middle;
+}
+
 // The law.
+
+fn stable_neo_hookean_energy_change(f: mat3x3f, d: mat3x3f, lame_lambda: f32, lame_mu: f32) -> f32 {
+    return neo_hookean_energy_change(f, d, lame_lambda, lame_mu);
+}
+
+// Of the derivative of `det F`: its cofactors.
+fn stable_neo_hookean_gradient_map(f: mat3x3f) -> mat3x3f {
+    return cofactor(f);
+}
 
 fn stable_neo_hookean_energy_density(f: mat3x3f, lame_lambda: f32, lame_mu: f32) -> f32 {
     return neo_hookean_energy_density(f, lame_lambda, lame_mu);

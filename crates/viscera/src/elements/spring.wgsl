@@ -76,6 +76,15 @@ fn springs_energy(e: ElementMoment, x: array<vec3f, 4>) -> f32 {
     return spring_energy(array<vec3f, 2>(x[0], x[1]), e.constants.x, e.constants.y);
 }
 
+// `k (l1 - l0) ((l0 + l1)/2 - L)`, with `l1 - l0 = d01 . (2 e + d01)/(l0 + l1)`.
+fn springs_energy_change(e: ElementMoment, x: array<vec3f, 4>, d: array<vec3f, 4>) -> f32 {
+    let edge = x[1] - x[0];
+    let change = d[1] - d[0];
+    let sum = sqrt(dot(edge, edge)) + sqrt(dot(edge + change, edge + change));
+    let longer = dot(change, edge + edge + change) * (1.0 / max(sum, SPRING_SHORTEST));
+    return e.constants.y * longer * (0.5 * sum - e.constants.x);
+}
+
 fn springs_forces(e: ElementMoment, x: array<vec3f, 4>) -> array<vec3f, 4> {
     let forces = spring_forces(array<vec3f, 2>(x[0], x[1]), e.constants.x, e.constants.y);
     return array<vec3f, 4>(forces[0], forces[1], vec3f(), vec3f());

@@ -11,6 +11,10 @@ fn hinges_energy(e: ElementMoment, x: array<vec3f, 4>) -> f32 {
     return 0.5 * e.constants.x * dot(bend, bend);
 }
 
+fn hinges_energy_change(e: ElementMoment, x: array<vec3f, 4>, d: array<vec3f, 4>) -> f32 {
+    return e.constants.x * dot(hinge_bend(d), hinge_bend(x) + hinge_bend(d) * 0.5);
+}
+
 fn hinges_forces(e: ElementMoment, x: array<vec3f, 4>) -> array<vec3f, 4> {
     let pull = hinge_bend(x) * e.constants.x;
     return array<vec3f, 4>(-pull, pull * 2.0, -pull, vec3f());
@@ -40,6 +44,15 @@ fn strut_pull(x: array<vec3f, 4>, by: f32) -> array<vec3f, 4> {
 fn struts_energy(e: ElementMoment, x: array<vec3f, 4>) -> f32 {
     let residual = strut_residual(e, x);
     return 0.5 * e.constants.y * residual * residual;
+}
+
+// As `springs_energy_change`.
+fn struts_energy_change(e: ElementMoment, x: array<vec3f, 4>, d: array<vec3f, 4>) -> f32 {
+    let axis = strut_axis(x);
+    let change = strut_axis(d);
+    let sum = length(axis) + length(axis + change);
+    let longer = dot(change, axis + axis + change) / sum;
+    return e.constants.y * longer * (0.5 * sum - e.constants.x);
 }
 
 fn struts_forces(e: ElementMoment, x: array<vec3f, 4>) -> array<vec3f, 4> {

@@ -45,7 +45,7 @@ fn switch<'a>(
     text + "    }\n}\n"
 }
 
-/// All laws, and what chooses one: `law_energy_density`, `law_piola`, `law_curvature`. The text of the law of
+/// All laws, and what chooses one: `law_energy_density`, `law_piola` and so on. The text of the law of
 /// Saint Venant and Kirchhoff is [`GREEN_STRAIN`].
 pub static LAW_TEXT: LazyLock<String> = LazyLock::new(|| {
     let mut text = String::new();
@@ -55,18 +55,17 @@ pub static LAW_TEXT: LazyLock<String> = LazyLock::new(|| {
             text += of_law;
         }
     }
-    for (function, more, passed, returned) in [
-        ("energy_density", "", "", "f32"),
-        ("piola", "", "", "mat3x3f"),
-        ("curvature", "g: vec3f, ", "g, ", "f32"),
+    let moduli = ("lame_lambda: f32, lame_mu: f32", "lame_lambda, lame_mu");
+    for (function, given, passed, returned) in [
+        ("energy_density", moduli.0, moduli.1, "f32"),
+        ("piola", moduli.0, moduli.1, "mat3x3f"),
+        ("curvature", &format!("g: vec3f, {}", moduli.0), &format!("g, {}", moduli.1), "f32"),
+        ("energy_change", &format!("d: mat3x3f, {}", moduli.0), &format!("d, {}", moduli.1), "f32"),
+        ("gradient_map", "", "", "mat3x3f"),
     ] {
-        let head = format!(
-            "law_{function}(law: u32, f: mat3x3f, {more}lame_lambda: f32, lame_mu: f32) -> {returned}"
-        );
+        let head = format!("law_{function}(law: u32, f: mat3x3f, {given}) -> {returned}");
         let names = MaterialModel::ALL.iter().map(|(_, name, _)| *name);
-        text += &switch(&head, "law", names, |_, name| {
-            format!("{name}_{function}(f, {passed}lame_lambda, lame_mu)")
-        });
+        text += &switch(&head, "law", names, |_, name| format!("{name}_{function}(f, {passed})"));
     }
     text
 });
@@ -90,6 +89,7 @@ pub static KIND_TEXT: LazyLock<String> = LazyLock::new(|| {
     let at = "e: ElementMoment, x: array<vec3f, 4>";
     for (function, given, passed, returned) in [
         ("energy", at, "e, x", "f32"),
+        ("energy_change", &format!("{at}, d: array<vec3f, 4>"), "e, x, d", "f32"),
         ("forces", at, "e, x", "array<vec3f, 4>"),
         ("curvature", "e: ElementMoment", "e", "f32"),
     ] {

@@ -161,7 +161,7 @@ settings_table! {
         /// "quasi_newton" and "explicit" that is as accurate as `accuracy` asks; on a `device` that is asked for by name,
         /// "xpbd". "xpbd" sweeps over constraints. "quasi_newton" solves
         /// every substep to its end in a dozen passes over the mesh, whatever its size; of the settings below it uses
-        /// `accuracy`, `substeps`, `iterations`, `integrator`, `history`, `threads`, and it is computed by the CPU. "explicit"
+        /// `accuracy`, `substeps`, `iterations`, `integrator`, `history`, `threads` and `device`. "explicit"
         /// divides every substep into as many small steps as it takes to be stable; it uses `explicit_safety`,
         /// `threads` and `device`. It loses no motion to damping, and it is the cheapest for small soft bodies;
         /// its cost grows with the square root of the stiffness, and with fineness once more.

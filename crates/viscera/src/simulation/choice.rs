@@ -53,7 +53,7 @@ impl<S: Real> Backend<S> {
                 Err(SimulationError::BodiesOnDevice { device: device.clone() })
             }
             (DeviceRequest::Auto, Method::Auto | Method::QuasiNewton) => {
-                cpu("the quasi-Newton method is computed by the CPU")
+                cpu("the quasi-Newton method, which no GPU is known to compute faster")
             }
             // A device knows no stiffness but that of the shape at rest.
             (DeviceRequest::Auto, Method::Explicit) => {
@@ -79,10 +79,9 @@ impl<S: Real> Backend<S> {
         ready: Option<Solver<S>>,
         offered: &Offered,
     ) -> Result<Self, SimulationError> {
-        // A method that only the CPU computes leaves its device.
+        // Elements that only the CPU computes leave their device.
         #[cfg(feature = "gpu")]
         if same_device
-            && settings.method != Method::QuasiNewton
             && settings.elements != Elements::Recovered
             && let Some(again) = gpu::again(self, model, settings)
         {

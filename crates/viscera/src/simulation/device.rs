@@ -13,7 +13,7 @@ use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]
 use crate::solver::gpu::{Device, GpuSolver};
 use crate::solver::oscillations::Oscillations;
-use crate::solver::{Inputs, Ledger, Solver, StepError};
+use crate::solver::{Inputs, Ledger, Solver, StepError, substeps_of_solves};
 use crate::state::State;
 
 /// A solver on a graphics processor, as a simulation of any precision sees it.
@@ -162,13 +162,14 @@ impl<S: Real> Backend<S> {
     }
 
     /// The oscillations, where they had to be known, and the substeps of a frame [s]: see [`Solver::oscillations`] and
-    /// [`Solver::substeps`]. Methods that choose by themselves are computed by the CPU.
+    /// [`Solver::substeps`]. `measured`: the same oscillations, found without this backend.
     pub fn substeps(
         &mut self,
         inputs: &Inputs<S>,
         settings: &SolverSettings,
         known: Option<Oscillations>,
         frame: f64,
+        measured: impl FnOnce() -> Oscillations,
     ) -> (Option<Oscillations>, u32) {
         match &mut self.engine {
             Engine::Cpu(solver) if settings.method == Method::QuasiNewton => {
@@ -177,6 +178,11 @@ impl<S: Real> Backend<S> {
                 (Some(oscillations), substeps)
             }
             Engine::Cpu(solver) => (known, solver.substeps_for(&Oscillations::default(), frame)),
+            Engine::Device(_) if settings.method == Method::QuasiNewton => {
+                let oscillations = known.unwrap_or_else(measured);
+                let substeps = substeps_of_solves(settings, &oscillations, frame);
+                (Some(oscillations), substeps)
+            }
             Engine::Device(_) => (known, settings.substeps()),
         }
     }

@@ -215,8 +215,10 @@ impl<S: Real> Simulation<S> {
         let inputs = automatic::fixings(&self.scene, &self.assembly);
         let frame = self.scene.time.frame;
         let known = self.oscillations.take();
+        let Self { scene, assembly, model, solver, backend, .. } = self;
+        let measured = || automatic::oscillations(scene, assembly, model);
         (self.oscillations, self.substeps) =
-            self.backend.substeps(&inputs, &self.solver, known, frame);
+            backend.substeps(&inputs, solver, known, frame, measured);
         let may_lie_on_tools =
             self.instruments.there().contains(&true) && has_loose_parts(self.layout(), &inputs);
         if may_lie_on_tools && self.solver.substeps == Count::Auto {

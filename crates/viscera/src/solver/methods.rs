@@ -12,7 +12,20 @@ impl Plan {
         match settings.method {
             Method::Xpbd => xpbd::plan(layout, settings),
             Method::Explicit => explicit::plan(),
-            Method::Auto | Method::QuasiNewton => quasi_newton::plan(settings, &layout.materials),
+            Method::Auto | Method::QuasiNewton => {
+                quasi_newton::plan(settings, &layout.materials, true)
+            }
+        }
+    }
+
+    /// The same on a device, which takes no step again.
+    #[cfg(feature = "gpu")]
+    pub fn on_device(layout: &Layout<f32>, settings: &SolverSettings) -> Self {
+        match settings.method {
+            Method::Xpbd | Method::Explicit => Self::new(layout, settings),
+            Method::Auto | Method::QuasiNewton => {
+                quasi_newton::plan(settings, &layout.materials, false)
+            }
         }
     }
 
@@ -27,7 +40,7 @@ impl Plan {
             // Small steps are counted by the step.
             Method::Explicit => {}
             Method::Auto | Method::QuasiNewton => {
-                *self = quasi_newton::plan(settings, &layout.materials)
+                *self = quasi_newton::plan(settings, &layout.materials, true)
             }
         }
     }

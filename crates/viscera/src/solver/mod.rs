@@ -81,6 +81,18 @@ pub struct Solver<S> {
     memory: cpu::Memory<S>,
 }
 
+/// Substeps of a frame [s] of the quasi-Newton method, whatever computes them.
+pub(crate) fn substeps_of_solves(
+    settings: &SolverSettings,
+    oscillations: &Oscillations,
+    frame: f64,
+) -> u32 {
+    match settings.substeps {
+        Count::Auto => quasi_newton::substeps_for(oscillations, frame, settings.accuracy.share()),
+        Count::Of(count) => count,
+    }
+}
+
 impl<S: Real> Solver<S> {
     /// Plans the steps and takes the memory for them. `method = "auto"` is the quasi-Newton method here: a solver alone
     /// knows neither frame nor fixings.
@@ -302,9 +314,7 @@ impl<S: Real> Solver<S> {
     /// As [`Solver::substeps`], of oscillations that are known.
     pub fn substeps_for(&self, oscillations: &Oscillations, frame: f64) -> u32 {
         match (self.settings.substeps, self.settings.method) {
-            (Count::Auto, Method::QuasiNewton) => {
-                quasi_newton::substeps_for(oscillations, frame, self.settings.accuracy.share())
-            }
+            (_, Method::QuasiNewton) => substeps_of_solves(&self.settings, oscillations, frame),
             (Count::Auto, Method::Explicit) => explicit::substeps_for(self.stable_step(), frame),
             _ => self.settings.substeps(),
         }

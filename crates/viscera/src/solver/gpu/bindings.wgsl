@@ -112,6 +112,12 @@ struct Frame {
 @group(0) @binding(25) var<storage, read_write> vertex_data: array<vec4f>;
 // All constants but the tetrahedra, and the weights of the norm, as words; see table.wgsl.
 @group(0) @binding(26) var<storage, read> table: array<u32>;
+// Of the quasi-Newton method: tables and numbers of its preconditioner (preconditioner/tables.rs), pairs, and where the solve
+// of each part stands.
+@group(0) @binding(29) var<storage, read> levels: array<u32>;
+@group(0) @binding(30) var<storage, read_write> multilevel: array<f32>;
+@group(0) @binding(31) var<storage, read_write> pairs: array<vec4f>;
+@group(0) @binding(32) var<storage, read_write> progress: array<PartProgress>;
 
 @group(1) @binding(0) var<uniform> job: Job;
 @group(1) @binding(1) var<uniform> frame: Frame;

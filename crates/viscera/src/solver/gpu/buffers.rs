@@ -11,6 +11,8 @@ use super::slots::{Place, Range, Slot, Update, multipliers_start, unknowns_size}
 use crate::layout::Layout;
 use crate::scalar::lanes::LANES;
 use crate::settings::{Acceleration, SolverSettings};
+use crate::solver::quasi_newton::on_device::DeviceLevels;
+use crate::solver::quasi_newton::progress::PartProgress;
 
 /// All buffers of a solver.
 #[derive(Debug)]
@@ -42,12 +44,31 @@ fn check_sizes(
     Err(GpuError::TooLarge { what, needed, limit, name: device.name().to_owned(), largest })
 }
 
+/// What the quasi-Newton method has beside the others.
+fn sizes_of_levels(
+    layout: &Layout<f32>,
+    levels: Option<&DeviceLevels>,
+) -> [(Slot, &'static str, u64); 4] {
+    let pair = 3 * 16 * u64::from(DeviceLayout::stride(layout));
+    let progress = (size_of::<PartProgress>() * layout.part_count()) as u64;
+    let [words, numbers, pairs, progress] = levels.map_or([0; 4], |levels| {
+        [4 * levels.words, 4 * levels.numbers, pair * u64::from(levels.history), progress]
+    });
+    [
+        (Slot::Levels, "tables of levels", words),
+        (Slot::Multilevel, "levels", numbers),
+        (Slot::Pairs, "pairs of steps", pairs),
+        (Slot::Progress, "solves", progress),
+    ]
+}
+
 impl Buffers {
     pub fn new(
         device: &Device,
         layout: &Layout<f32>,
         settings: &SolverSettings,
         on_device: &DeviceLayout,
+        levels: Option<&DeviceLevels>,
         left_over: &[u8],
     ) -> Result<Self, GpuError> {
         let vertices = layout.vertex_count() as u64;
@@ -57,8 +78,7 @@ impl Buffers {
         let accelerated = accelerates(settings);
         let anderson = accelerated && settings.acceleration == Acceleration::Anderson;
         let history = if anderson { unknowns * (u64::from(window(settings)) + 1) } else { 0 };
-        let viscous = layout.is_viscous();
-        let blocks = layout.block_count() as u64;
+        let blocks = if layout.is_viscous() { layout.block_count() as u64 } else { 0 };
         let when = |wanted: bool, size: u64| if wanted { size } else { 0 };
         let table = on_device.table(layout, settings);
         let split = layout.is_split();
@@ -67,7 +87,7 @@ impl Buffers {
             (Copies, "copies of vertices", when(split, 16 * layout.copy_count() as u64)),
             (Loads, "loads", 16 * on_device.slot_count()),
             (Updates, "inputs", size_of::<Update>() as u64 * vertices),
-            (StartStrain, "strains", when(viscous, 6 * 4 * LANES as u64 * blocks)),
+            (StartStrain, "strains", 6 * 4 * LANES as u64 * blocks),
             (Unknowns, "unknowns", unknowns),
             (Iterate, "unknowns", when(accelerated, unknowns)),
             (Older, "unknowns", when(accelerated && !anderson, unknowns)),
@@ -77,6 +97,7 @@ impl Buffers {
             (Control, "control records", control_size(layout.part_count())),
             (VertexData, "vertices", table.vertex_data_size),
         ];
+        let sizes = [&sizes[..], &sizes_of_levels(layout, levels)].concat();
         let constants = [(Tets, "tetrahedra", tets(layout)), (Table, "tables", table.bytes)];
         let of_constants = constants.iter().map(|(_, what, bytes)| (*what, bytes.len() as u64));
         let arrays = sizes.iter().map(|&(_, what, size)| (what, size)).chain(of_constants);
@@ -115,10 +136,9 @@ impl Buffers {
             [filled("copies of corners", &indices), filled("copies of vertices", &offsets)]
         });
         let mut ranges = table.ranges;
-        let rest = unknowns - multipliers_start;
+        let (start, size) = (multipliers_start, unknowns - multipliers_start);
         ranges.push(Range { slot: Points, owner: Unknowns, start: 0, size: points_size });
-        let start = multipliers_start;
-        ranges.push(Range { slot: Multipliers, owner: Unknowns, start, size: rest });
+        ranges.push(Range { slot: Multipliers, owner: Unknowns, start, size });
         let length = (unknowns / 4) as u32;
         Ok(Self { all, ranges, copies, points_size, multipliers_start, length })
     }

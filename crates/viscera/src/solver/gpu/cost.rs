@@ -42,7 +42,7 @@ impl StepCost {
         // How many dispatches there are does not depend on the length of the long vector.
         let plan = Plan::new(layout, settings);
         let pieces = Pieces { count: 1, first_of_vertices: 0, groups: 1 };
-        let record = Recorder::new(layout, settings, [0; 2], pieces).record(&plan);
+        let record = Recorder::new(layout, settings, [0; 2], pieces, None).record(&plan);
         let [prologue, body, epilogue] =
             [record.prologue, record.body, record.epilogue].map(|list| list.len() as u64);
         let dispatches = prologue + u64::from(sweeps) * body + epilogue;

@@ -94,11 +94,6 @@ pub enum GpuError {
         "graphics processors compute in single precision; use `precision = \"f32\"` or `device = \"cpu\"`"
     )]
     DoublePrecision,
-    /// The method has no kernels yet.
-    #[error(
-        "the quasi-Newton method is computed by the CPU only; use `device = \"cpu\"` or \"auto\", or `method = \"xpbd\"`"
-    )]
-    OnlyOnCpu,
     /// The elements have no kernels yet.
     #[error(
         "`elements = \"recovered\"` is computed by the CPU only; use `device = \"cpu\"` or \"auto\", or `elements = \"plain\"`"

@@ -241,7 +241,7 @@ impl GpuSolver {
     }
 
     /// Waits for the device and reads all that a slot holds.
-    pub(super) fn read_buffer(&self, slot: Slot) -> Result<Vec<u8>, GpuError> {
+    pub(in crate::solver) fn read_buffer(&self, slot: Slot) -> Result<Vec<u8>, GpuError> {
         let mut bytes = Vec::new();
         self.read_buffers(&[slot], |read| bytes.extend_from_slice(read[0]))?;
         Ok(bytes)

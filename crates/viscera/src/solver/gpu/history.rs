@@ -21,7 +21,8 @@ impl GpuSolver {
         crate::solver::inputs::check_step(dt, model, inputs)?;
         self.prepare_step(model, inputs, dt);
         self.submit("restart", &[&self.restart], Marks::default());
-        self.multiplier_dt = dt;
+        self.forget_pairs();
+        self.multiplier_dt = dt * self.solve_share();
         Ok(())
     }
 }

@@ -51,9 +51,10 @@ impl GpuSolver {
         let is_free = |place: u32| self.updates[place as usize].is_pinned == 0;
         self.tethers.retain(|tether| is_free(self.update_of[tether.vertex]));
         // Small explicit steps take springs as forces.
+        let he = dt * self.solve_share();
         let squared_dt = match self.settings.method {
-            Method::Xpbd => (dt * dt) as f32,
-            Method::Explicit | Method::Auto | Method::QuasiNewton => 0.0,
+            Method::Xpbd | Method::QuasiNewton => (he * he) as f32,
+            Method::Explicit | Method::Auto => 0.0,
         };
         for update in &mut self.updates {
             self.update_of[update.vertex as usize] = u32::MAX;

@@ -42,6 +42,13 @@ pub enum File {
     Search,
     Take,
     Energy,
+    Begin,
+    Refresh,
+    Invert,
+    EvaluateTrial,
+    Apply,
+    Direction,
+    End,
 }
 
 /// Choices that the text of a file depends on, beside the kernel.
@@ -133,13 +140,34 @@ kernels! {
     SEARCH = Search "search" 256
         [Tets Points Loads StartStrain PartialSums Control VertexData Table];
     TAKE = Take "take" 256 [Unknowns Mapped PartialSums Control VertexData Table];
+    BEGIN_SOLVES = Begin "begin_solves" 256 [Points VertexData Table Levels Progress];
+    BEGIN_SECOND = Begin "begin_second" 256
+        [Points PartialSums VertexData Table Levels Progress];
+    TURN_GROUPS = Refresh "turn_groups" 64 [VertexData Table Levels Multilevel];
+    SUM_BLOCKS = Refresh "sum_blocks" 64 [VertexData Table Levels Multilevel];
+    INVERT_DENSE = Invert "invert_dense" 256 [Levels Multilevel];
+    EVALUATE_ELEMENTS = EvaluateTrial "evaluate_elements" 256
+        [Tets Points Loads PartialSums VertexData Table Progress];
+    EVALUATE_VERTICES = EvaluateTrial "evaluate_vertices" 256
+        [Points Loads PartialSums VertexData Table Progress];
+    RESTRICT_GRADIENT = Apply "restrict_gradient" 64 [VertexData Table Levels Multilevel];
+    CORRECT_COARSE = Apply "correct_coarse" 256 [VertexData Table Levels Multilevel];
+    CORRECT_FINE = Apply "correct_fine" 64 [Levels Multilevel];
+    TAKE_TRIAL = Direction "take_trial" 256
+        [Points PartialSums VertexData Table Levels Multilevel Pairs Progress];
+    CHOOSE_DIRECTION = Direction "choose_direction" 256
+        [Points PartialSums VertexData Table Levels Pairs Progress];
+    MEASURE_END = End "measure_end" 256
+        [Tets Points StartStrain PartialSums VertexData Table Progress];
+    END_STEP = End "end_step" 256 [Points PartialSums Control VertexData Table Progress];
     LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Control VertexData Table];
 }
 
 /// Records and storage, for every kernel.
-const SHARED: [&str; 6] = [
+const SHARED: [&str; 7] = [
     wgsl::KINEMATICS,
     wgsl::GREEN_STRAIN,
+    kernel_text!("../quasi_newton/progress_record.wgsl"),
     kernel_text!("../step/control.wgsl"),
     kernel_text!("control.wgsl"),
     kernel_text!("bindings.wgsl"),
@@ -174,11 +202,16 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
     let laws = || vec![wgsl::LAW_TEXT.as_str(), TISSUE_WGSL];
     let elements = |file| vec![wgsl::KIND_TEXT.as_str(), ELEMENTS, file];
     let history = kernel_text!("../xpbd/history.wgsl");
+    let pieces = || elements(kernel_text!("../step/pieces.wgsl"));
     // The potential, and what the guard decides by it.
     let guard = |own: Vec<&'static str>| {
         let potential =
             [kernel_text!("../step/potential.wgsl"), kernel_text!("../step/guard_decide.wgsl")];
-        [laws(), elements(potential[0]), vec![potential[1]], own].concat()
+        [laws(), pieces(), potential.to_vec(), own].concat()
+    };
+    let levels = kernel_text!("../quasi_newton/preconditioner/levels.wgsl");
+    let solve = |own: Vec<&'static str>| {
+        [laws(), pieces(), vec![kernel_text!("../quasi_newton/progress.wgsl")], own].concat()
     };
     match kernel.file {
         File::Predict => own(kernel_text!("../step/predict.wgsl")),
@@ -208,6 +241,18 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
         File::Search => guard(own(kernel_text!("../step/guard_search.wgsl"))),
         File::Take => guard(vec![SPANS, kernel_text!("../step/guard_take.wgsl")]),
         File::Energy => guard(own(kernel_text!("../step/energy.wgsl"))),
+        File::Begin => solve(own(kernel_text!("../quasi_newton/begin.wgsl"))),
+        File::Refresh => {
+            let own = kernel_text!("../quasi_newton/preconditioner/refresh.wgsl");
+            [laws(), vec![levels, own]].concat()
+        }
+        File::Invert => {
+            vec![levels, kernel_text!("../quasi_newton/preconditioner/invert.wgsl")]
+        }
+        File::EvaluateTrial => solve(own(kernel_text!("../quasi_newton/evaluate.wgsl"))),
+        File::Apply => vec![levels, kernel_text!("../quasi_newton/preconditioner/apply.wgsl")],
+        File::Direction => solve(vec![levels, kernel_text!("../quasi_newton/direction.wgsl")]),
+        File::End => solve(own(kernel_text!("../quasi_newton/end.wgsl"))),
     }
 }
 

@@ -4,7 +4,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::limits::accelerates;
-use super::parts::{Fall, PartRow, Parts, Piece, SmallSteps};
+use super::parts::{Fall, Parts, Piece, SmallSteps};
 use super::slots::{ALIGNMENT, Element, Range, Slot, unknowns_size};
 use crate::elements::kinds::{Kind, MOST};
 use crate::elements::law::LAWS;
@@ -33,11 +33,11 @@ pub(super) const LINE_SUMS: u64 = 16;
 /// `Material` of elements/mod.wgsl.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-struct Material {
-    lame_lambda: f32,
-    lame_mu: f32,
-    compliance: [f32; 3],
-    viscosity: f32,
+pub(super) struct Material {
+    pub lame_lambda: f32,
+    pub lame_mu: f32,
+    pub compliance: [f32; 3],
+    pub viscosity: f32,
 }
 
 /// Where everything stands in the table, the vertex data and the partial sums; the first words of the table.
@@ -86,6 +86,29 @@ pub(super) const VERTEX_DATA: [(&str, Option<Slot>); 10] = [
 ];
 /// Of these, how many there are where steps are not guarded.
 const UNGUARDED: usize = 6;
+
+/// What the quasi-Newton method has from the reference on, in the place of all others: iterate, gradients there and at the
+/// trial, `M` times the former, the direction, the start of the solve, velocities at the start of the step, places at the end
+/// of the first solve.
+const OF_QUASI_NEWTON: [&str; 8] = [
+    "QN_BASE",
+    "QN_GRADIENT",
+    "QN_TRIAL_GRADIENT",
+    "QN_Z",
+    "QN_DIRECTION",
+    "QN_STAGE_START",
+    "QN_START_VELOCITIES",
+    "QN_FIRST",
+];
+
+/// Names and places of the ranges of the vertex data.
+pub(super) fn vertex_ranges() -> impl Iterator<Item = (&'static str, u32)> {
+    let common = VERTEX_DATA.map(|(name, _)| name).into_iter();
+    (0..)
+        .zip(common)
+        .chain((UNGUARDED as u32 - 1..).zip(OF_QUASI_NEWTON))
+        .map(|(i, name)| (name, i))
+}
 
 /// Constants in one buffer, and the ranges of that and others.
 pub(super) struct Table {
@@ -248,8 +271,10 @@ impl DeviceLayout {
         // Data of vertices lie in one buffer, range by range, because the baseline allows a kernel eight
         // storage buffers. A guarded step's three starts are one binding: `predict` writes all of them.
         let each = 16 * u64::from(Self::stride(layout));
-        let count = if guarded { VERTEX_DATA.len() } else { UNGUARDED };
-        for (place, (_, slot)) in VERTEX_DATA[..count].iter().enumerate() {
+        let solves = settings.method == Method::QuasiNewton;
+        let common = if guarded { VERTEX_DATA.len() } else { UNGUARDED };
+        let count = if solves { UNGUARDED - 1 + OF_QUASI_NEWTON.len() } else { common };
+        for (place, (_, slot)) in VERTEX_DATA[..count.min(common)].iter().enumerate() {
             let size = if guarded && *slot == Some(Slot::Starts) { 3 * each } else { each };
             let start = each * place as u64;
             ranges.extend(slot.map(|slot| Range { slot, owner: Slot::VertexData, start, size }));
@@ -260,18 +285,30 @@ impl DeviceLayout {
         ranges.push(Range { slot: Slot::Anchors, owner: Slot::VertexData, start, size });
         (header.stride, header.anchors) = (Self::stride(layout), (start / 16) as u32);
 
+        let [lines, energies, sums] = self.sums(settings);
+        (header.lines, header.energies) = (lines as u32, energies as u32);
+        bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
+        Table { bytes, ranges, vertex_data_size: start + size, sums_size: 4 * sums }
+    }
+
+    /// Where lines of the search and energies begin among the partial sums, and how many there are of all.
+    fn sums(&self, settings: &SolverSettings) -> [u64; 3] {
+        let guarded = settings.guards_steps();
+        let solves = settings.method == Method::QuasiNewton;
         // Sums of the accelerations are read before pieces leave theirs.
-        let pieces = if guarded { self.pieces.len() as u64 } else { 0 };
+        let pieces = if guarded || solves { self.pieces.len() as u64 } else { 0 };
         // Lines of the search have places of their own, because workgroups write them while others still read the
         // pieces' sums; two a piece, because one dispatch reads shares and writes lengths. Energies at the
         // reference, one an element, stay for the whole step.
         let lines = (PRODUCTS * u64::from(self.parts.groups())).max(PIECE_SUMS * pieces);
+        if solves {
+            // In the place of both: products of pairs, and sums at the end of a step.
+            let each = 2 * PIECE_SUMS * pieces;
+            return [lines, lines + each, lines + 2 * each];
+        }
         let energies = lines + 2 * LINE_SUMS * pieces;
-        let elements = header.tet_lanes as usize + self.elements.len();
-        let sums = energies + if guarded { elements as u64 } else { 0 };
-        (header.lines, header.energies) = (lines as u32, energies as u32);
-        bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
-        Table { bytes, ranges, vertex_data_size: start + size, sums_size: 4 * sums }
+        let elements = (LANES * self.corners.len() + self.elements.len()) as u64;
+        [lines, energies, energies + if guarded { elements } else { 0 }]
     }
 
     /// Vertices from one range of the vertex data to the next.
@@ -441,54 +478,4 @@ fn materials(layout: &Layout<f32>) -> Vec<u8> {
     };
     let constants: Vec<Material> = layout.materials.iter().map(of).collect();
     bytemuck::cast_slice(&constants).to_vec()
-}
-
-/// Names and places of words that kernels find in the table.
-pub(super) fn words() -> Vec<(&'static str, u32)> {
-    macro_rules! words {
-        ($record:ty { $($name:literal $field:ident)* }) => {
-            vec![$(($name, (std::mem::offset_of!($record, $field) / 4) as u32)),*]
-        };
-    }
-    let mut all = words!(Header {
-        "MATERIALS_AT" materials "CORNERS_AT" corners "OFFSETS_AT" offsets "ELEMENTS_AT" elements
-        "PIECES_AT" pieces "MEMBERS_AT" members "PARTS_AT" parts
-        "RUNS_AT" runs "BLOCK_PARTS_AT" block_parts "WEIGHTS_AT" weights
-        "SMALL_STEPS_AT" small_steps "FALLS_AT" falls "STRIDE_AT" stride
-        "ANCHORS_AT" anchors "LINES_AT" lines "ENERGIES_AT" energies "TET_LANES_AT" tet_lanes
-        "LAW_ENDS_AT" law_ends
-        "PART_COUNT_AT" part_count
-    });
-    all.extend(words!(Piece {
-        "PIECE_PART" part "PIECE_FIRST" first "PIECE_END" end "PIECE_ARE_VERTICES" are_vertices
-    }));
-    all.extend(words!(Element {
-        "ELEMENT_KIND" kind "ELEMENT_PART" part "ELEMENT_MULTIPLIER" multiplier
-        "ELEMENT_ANCHOR" anchor "ELEMENT_VERTICES" vertices "ELEMENT_COPIES" copies
-        "ELEMENT_SLOTS" slots "ELEMENT_CONSTANTS" constants
-    }));
-    all.extend(words!(Material {
-        "MATERIAL_LAMBDA" lame_lambda "MATERIAL_MU" lame_mu "MATERIAL_VISCOSITY" viscosity
-    }));
-    all.extend(words!(PartRow {
-        "PART_ELEMENT_PIECES" element_pieces "PART_ELEMENT_PIECES_END" element_pieces_end
-        "PART_VERTEX_PIECES" vertex_pieces "PART_VERTEX_PIECES_END" vertex_pieces_end
-        "PART_VERTICES_END" vertices_end "PART_GROUPS_END" groups_end "PART_RUNS" runs
-        "PART_RUNS_END" runs_end "PART_LENGTH" length "PART_REBASE_FACTOR" rebase_factor
-        "PART_BOUND_SHARE" bound_share
-    }));
-    let size = |bytes: usize| (bytes / 4) as u32;
-    all.extend(words!(SmallSteps {
-        "SMALL_COUNT" count "SMALL_DT" dt "SMALL_INVERSE_DT" inverse_dt "SMALL_AHEAD" ahead
-    }));
-    all.extend(words!(Fall { "FALL_IS_FREE" is_free "FALL_ACCELERATION" acceleration }));
-    all.extend([
-        ("FALL_WORDS", size(size_of::<Fall>())),
-        ("SMALL_WORDS", size(size_of::<SmallSteps>())),
-        ("PIECE_WORDS", size(size_of::<Piece>())),
-        ("PART_WORDS", size(size_of::<PartRow>())),
-        ("ELEMENT_WORDS", size(size_of::<Element>())),
-        ("MATERIAL_WORDS", size(size_of::<Material>())),
-    ]);
-    all
 }

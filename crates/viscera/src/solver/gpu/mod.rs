@@ -41,6 +41,7 @@ mod surface;
 mod switch;
 mod timing;
 pub(in crate::solver) mod uniforms;
+mod words;
 
 pub use copy::MemoryCopy;
 pub use cost::StepCost;

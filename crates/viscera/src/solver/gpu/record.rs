@@ -9,6 +9,7 @@ use crate::elements::TetForm;
 use crate::layout::Layout;
 use crate::scalar::lanes::LANES;
 use crate::settings::SolverSettings;
+use crate::solver::quasi_newton::on_device::DeviceLevels;
 use crate::solver::xpbd::is_jacobi;
 
 /// One dispatch.
@@ -49,6 +50,8 @@ pub struct Recorder<'a> {
     /// Vertices from one range of the vertex data to the next.
     pub stride: u32,
     pub pieces: Pieces,
+    /// Of the quasi-Newton method.
+    pub levels: Option<&'a DeviceLevels>,
 }
 
 impl<'a> Recorder<'a> {
@@ -59,6 +62,7 @@ impl<'a> Recorder<'a> {
         settings: &'a SolverSettings,
         vector: [u32; 2],
         pieces: Pieces,
+        levels: Option<&'a DeviceLevels>,
     ) -> Self {
         let [length, multipliers_first] = vector;
         Self {
@@ -75,6 +79,7 @@ impl<'a> Recorder<'a> {
             },
             stride: DeviceLayout::stride(layout),
             pieces,
+            levels,
         }
     }
 

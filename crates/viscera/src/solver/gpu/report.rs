@@ -31,7 +31,8 @@ impl GpuSolver {
     /// How the last step ended for each connected part of the model, see [`crate::model::Model::part_of`];
     /// empty before the first, and where steps are not guarded. Waits for the device.
     pub fn part_reports(&self) -> Result<Vec<StepReport>, GpuError> {
-        if !self.settings.guards_steps() || self.multiplier_dt == 0.0 {
+        let reports = self.settings.guards_steps() || self.levels.is_some();
+        if !reports || self.multiplier_dt == 0.0 {
             return Ok(Vec::new());
         }
         Ok(self.part_records()?.iter().map(|part| part.guard.report()).collect())

@@ -4,9 +4,13 @@ use super::control::{Control, PartControl};
 use super::layout;
 use super::slots::Update;
 use super::uniforms::{FrameConstants, Job};
+use super::words;
 use crate::elements::law::LAWS;
 use crate::scalar::lanes::LANES;
+use crate::settings::MOST_HISTORY;
 use crate::solver::cpu::products::LARGEST_WINDOW;
+use crate::solver::quasi_newton::progress::{PartProgress, SolveState};
+use crate::solver::quasi_newton::tables;
 use crate::solver::step::control::PartGuard;
 use crate::solver::step::modes::MODES;
 use crate::solver::step::{descent, guard};
@@ -44,6 +48,10 @@ pub fn host_layouts() -> Vec<HostLayout> {
             limit was_rejected share descends potential noise kept_speed best_value failures
             mixture_best mixture_failures is_good
         }),
+        record!("SolveState" SolveState {
+            phase passes_left accepted ahead failures rejections calm count newest scale length slope
+        }),
+        record!("PartProgress" PartProgress { states sy yw was_rejected calm }),
         record!("Update" Update { vertex is_pinned force place stiffness inertia }),
         record!("TetBlock" crate::layout::TetBlock<f32> {
             vertices inverse_rest_shape rest_volume material
@@ -67,9 +75,10 @@ pub(super) fn constants() -> String {
         ("SUMS", layout::PIECE_SUMS as u32),
         ("LINE_SUMS", layout::LINE_SUMS as u32),
         ("LARGEST_WINDOW", LARGEST_WINDOW as u32),
+        ("MOST_HISTORY", MOST_HISTORY as u32),
     ];
-    let ranges = (0..).zip(layout::VERTEX_DATA).map(|(place, (name, _))| (name, place));
-    let numbers = layout::words().into_iter().chain(MODES.iter().copied());
+    let ranges = layout::vertex_ranges().chain(tables::words());
+    let numbers = words::words().into_iter().chain(MODES.iter().copied());
     let numbers = numbers.chain(ranges).chain(guarded).chain(shared);
     let mut text: String =
         numbers.map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect();

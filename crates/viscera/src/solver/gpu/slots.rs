@@ -40,13 +40,17 @@ pub enum Slot {
     Table,
     SmallSteps,
     Falls,
+    Levels,
+    Multilevel,
+    Pairs,
+    Progress,
 }
 
 impl Slot {
     /// Whether kernels only read it.
     pub fn is_read_only(self) -> bool {
-        use Slot::{CornerIndices, Materials, Offsets, Table, Tets, Updates};
-        matches!(self, Tets | Materials | CornerIndices | Offsets | Updates | Table)
+        use Slot::{CornerIndices, Levels, Materials, Offsets, Table, Tets, Updates};
+        matches!(self, Tets | Materials | CornerIndices | Offsets | Updates | Table | Levels)
     }
 }
 

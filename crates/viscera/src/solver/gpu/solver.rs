@@ -14,6 +14,7 @@ use super::ring::Frames;
 use super::slots::{Slot, Update};
 use super::stages::StageRange;
 use super::uniforms::{FrameConstants, Job};
+use bytemuck::Zeroable;
 use std::sync::Arc;
 
 use crate::layout::Layout;
@@ -24,6 +25,8 @@ use crate::solver::error::StepError;
 use crate::solver::explicit::Stability;
 use crate::solver::inputs::check_model;
 use crate::solver::plan::{Plan, Stage, StepStage};
+use crate::solver::quasi_newton::on_device::DeviceLevels;
+use crate::solver::quasi_newton::progress::PartProgress;
 use crate::solver::step::tethers::Bundle;
 use crate::state::State;
 
@@ -78,6 +81,8 @@ pub struct GpuSolver {
     pub(super) small_steps: Vec<SmallSteps>,
     /// What nothing holds starts otherwise, where that is asked for.
     pub(super) falls: Option<Falls>,
+    /// Of the quasi-Newton method.
+    pub(super) levels: Option<DeviceLevels>,
 }
 
 impl GpuSolver {
@@ -109,29 +114,16 @@ impl GpuSolver {
         settings: &SolverSettings,
         left_over: &[u8],
     ) -> Result<Self, GpuError> {
-        if settings.precision == Precision::F64 {
-            return Err(GpuError::DoublePrecision);
-        }
-        if settings.method == Method::QuasiNewton {
-            return Err(GpuError::OnlyOnCpu);
-        }
-        if settings.elements == Elements::Recovered {
-            return Err(GpuError::PlainElements);
-        }
-        device.check()?;
-        // Sizes are compared array by array, below.
-        let wgpu::Limits { max_storage_buffer_binding_size, max_buffer_size, .. } = baseline();
-        let own = device.limits();
-        let own = wgpu::Limits { max_storage_buffer_binding_size, max_buffer_size, ..own };
-        if let Some(lacking) = shortfall(&own) {
-            return Err(GpuError::BelowBaseline { name: device.name().to_owned(), lacking });
-        }
+        check(device, settings)?;
         let laid = Arc::new(Layout::new(model, settings));
-        let plan = Plan::new(&laid, settings);
+        let plan = Plan::on_device(&laid, settings);
         let layout = DeviceLayout::new(&laid, settings);
-        let buffers = Buffers::new(device, &laid, settings, &layout, left_over)?;
+        let (levels, table) = DeviceLevels::new(&laid, settings).unzip();
+        let of_levels = levels.as_ref();
+        let buffers = Buffers::new(device, &laid, settings, &layout, of_levels, left_over)?;
         let vector = [buffers.length, (buffers.multipliers_start / 4) as u32];
-        let record = Recorder::new(&laid, settings, vector, layout.pieces()).record(&plan);
+        let recorder = Recorder::new(&laid, settings, vector, layout.pieces(), of_levels);
+        let record = recorder.record(&plan);
         let lists = [record.prologue, record.body, record.epilogue, record.restart];
         let job_count = lists.iter().map(Vec::len).sum::<usize>() as u64;
         let (jobs, frame, uniforms) = make_uniforms(device, job_count);
@@ -175,7 +167,11 @@ impl GpuSolver {
                 if is_explicit { model.part_count() } else { 0 }
             ],
             buffers,
+            levels,
         };
+        if let Some(table) = table {
+            solver.put_levels(&table);
+        }
         solver.upload_constants(&laid);
         solver.put(&laid, &State::at_rest(model));
         // Its memory may have been too little.
@@ -219,16 +215,22 @@ impl GpuSolver {
         let settings = &settings.chosen_on_device();
         let laid = Layout::new(model, settings);
         let model = &laid;
-        let plan = Plan::new(model, settings);
+        let plan = Plan::on_device(model, settings);
         let layout = DeviceLayout::new(model, settings);
         let multipliers = 4 * model.vertex_count() as u32;
         let vector = [multipliers + model.multiplier_count as u32, multipliers];
-        let record = Recorder::new(&laid, settings, vector, layout.pieces()).record(&plan);
+        let levels = DeviceLevels::new(model, settings).map(|(levels, _)| levels);
+        let pieces = layout.pieces();
+        let record = Recorder::new(&laid, settings, vector, pieces, levels.as_ref()).record(&plan);
         [record.prologue, record.body, record.epilogue].map(|list| list.len())
     }
 
-    /// Iterations of the steps to come, at least one; neither stages nor memory depend on them.
+    /// Iterations of the steps to come, at least one, of XPBD, whose stages and memory do not depend on them. Other methods
+    /// keep what they were built with.
     pub fn set_iterations(&mut self, count: u32) {
+        if self.settings.method != Method::Xpbd {
+            return;
+        }
         self.settings.iterations = Count::Of(count.max(1));
         self.plan.set_iterations(&self.layout, &self.settings);
     }
@@ -284,6 +286,20 @@ impl GpuSolver {
         self.buffers.write(&self.device.queue, Slot::Unknowns, bytes);
         self.write_velocities(&state.velocities);
         self.multiplier_dt = state.multiplier_dt;
+        self.forget_pairs();
+    }
+
+    /// Solves begin without what they have learned.
+    pub(super) fn forget_pairs(&mut self) {
+        if self.levels.is_some() {
+            let none = vec![PartProgress::zeroed(); self.part_count];
+            self.buffers.write(&self.device.queue, Slot::Progress, bytemuck::cast_slice(&none));
+        }
+    }
+
+    /// The table of the preconditioner.
+    pub(super) fn put_levels(&self, table: &[u32]) {
+        self.buffers.write(&self.device.queue, Slot::Levels, bytemuck::cast_slice(table));
     }
 
     /// Puts velocities [m/s], the user's order, in the place of those on the device.
@@ -314,10 +330,32 @@ impl GpuSolver {
     }
 }
 
+/// Whether a device computes with these settings.
+fn check(device: &Device, settings: &SolverSettings) -> Result<(), GpuError> {
+    if settings.precision == Precision::F64 {
+        return Err(GpuError::DoublePrecision);
+    }
+    if settings.elements == Elements::Recovered {
+        return Err(GpuError::PlainElements);
+    }
+    device.check()?;
+    // Sizes are compared array by array, where buffers are made.
+    let wgpu::Limits { max_storage_buffer_binding_size, max_buffer_size, .. } = baseline();
+    let own = device.limits();
+    let own = wgpu::Limits { max_storage_buffer_binding_size, max_buffer_size, ..own };
+    match shortfall(&own) {
+        Some(lacking) => Err(GpuError::BelowBaseline { name: device.name().to_owned(), lacking }),
+        None => Ok(()),
+    }
+}
+
 /// Whether parts that nothing holds start where their centre of mass will be.
 fn starts_falling(plan: &Plan) -> bool {
-    let falls =
-        |stage: &Stage| matches!(stage, Stage::Step(StepStage::Predict { start: Start::Auto, .. }));
+    let falls = |stage: &Stage| match stage {
+        Stage::Step(StepStage::Predict { start, .. }) => *start == Start::Auto,
+        Stage::QuasiNewton(_) => true,
+        _ => false,
+    };
     plan.split().prologue.iter().any(falls)
 }
 

@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::record::{Dispatch, Recorder};
-use crate::solver::plan::{Plan, Split, Stage, XpbdStage};
+use crate::solver::plan::{Plan, QuasiNewtonStage, Split, Stage, XpbdStage};
+use crate::solver::quasi_newton::on_device::first_solve;
 
 /// The dispatches of one stage among those of its part of the step.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,12 +39,15 @@ impl Recorder<'_> {
             epilogue: epilogue.0,
             stages: [prologue.1, body.1, epilogue.1],
             stage_starts: [prologue.2, body.2],
-            restart: self.restart_stages(),
+            // The quasi-Newton method has no multipliers.
+            restart: if self.levels.is_some() { Vec::new() } else { self.restart_stages() },
         }
     }
 
     fn list(&self, stages: &[Stage]) -> (Vec<Dispatch>, Vec<StageRange>, Vec<usize>) {
         let (mut dispatches, mut ranges) = (Vec::new(), Vec::<StageRange>::new());
+        // The solve that is under way: lists begin with the first one's stages.
+        let mut solve = first_solve(self.settings);
         let mut starts = Vec::new();
         for stage in stages {
             starts.push(dispatches.len());
@@ -54,7 +58,10 @@ impl Recorder<'_> {
                 Stage::Xpbd(stage) => self.xpbd_stage(stage, &mut dispatches),
                 Stage::Explicit(stage) => self.explicit_stage(stage, &mut dispatches),
                 Stage::QuasiNewton(stage) => {
-                    unreachable!("a device refuses the method of {stage:?}")
+                    if let QuasiNewtonStage::StartSolve(which) = stage {
+                        solve = which;
+                    }
+                    self.quasi_newton_stage(stage, solve, &mut dispatches);
                 }
             }
             let added = first..dispatches.len();

@@ -14,6 +14,7 @@ use crate::settings::RelaxationForm;
 use crate::solver::error::StepError;
 use crate::solver::explicit::{calm_ahead, small_steps};
 use crate::solver::inputs::Inputs;
+use crate::solver::quasi_newton::on_device::share;
 use crate::solver::step::tethers::bundle;
 
 /// Dispatches of iterations, or of small steps, in one submission. Drivers reset a device whose submission
@@ -57,7 +58,7 @@ impl GpuSolver {
         lists.extend(std::iter::repeat_n(body, left as usize));
         lists.push(epilogue);
         self.submit("step", &lists, now);
-        self.multiplier_dt = dt;
+        self.multiplier_dt = dt * self.solve_share();
         Ok(())
     }
 
@@ -101,8 +102,16 @@ impl GpuSolver {
                 most
             }
         };
+        if let Some(table) = self.levels.as_mut().and_then(|levels| levels.fit(model, inputs)) {
+            self.put_levels(&table);
+        }
         self.prepare_step(model, inputs, dt);
         Ok(self.plan.passes(count))
+    }
+
+    /// The share of a step that each of its solves takes, which what is left of it belongs to.
+    pub(super) fn solve_share(&self) -> f64 {
+        if self.levels.is_some() { share(&self.settings) } else { 1.0 }
     }
 
     /// One submission of one compute pass.
@@ -154,12 +163,14 @@ impl GpuSolver {
         }
         let last = self.multiplier_dt;
         let rescale = match settings.keep_multipliers {
+            // Pairs of steps of another length are forgotten.
+            _ if self.levels.is_some() => f64::from(u8::from(dt == self.weights_dt)),
             false => 0.0,
             true if last > 0.0 && last != dt => (dt / last) * (dt / last),
             true => 1.0,
         };
-        if accelerates(settings) && dt != self.weights_dt {
-            self.weights_dt = dt;
+        let is_new = std::mem::replace(&mut self.weights_dt, dt) != dt;
+        if accelerates(settings) && is_new {
             let weights = norm_weights(layout, settings, &self.buffers, dt);
             self.buffers.write(queue, Slot::Weights, bytemuck::cast_slice(&weights));
         }

@@ -5,6 +5,11 @@ fn number(word: u32) -> f32 {
     return bitcast<f32>(table[word]);
 }
 
+// By its bits: compilers may take it for granted that numbers are finite.
+fn is_finite(value: f32) -> bool {
+    return (bitcast<u32>(value) & 0x7f800000u) != 0x7f800000u;
+}
+
 // Of a connected part.
 fn part_row(part: u32) -> u32 {
     return table[PARTS_AT] + PART_WORDS * part;

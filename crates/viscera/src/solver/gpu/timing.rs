@@ -213,7 +213,7 @@ impl GpuSolver {
                 stages.push(StageTime { part, stage, dispatches, seconds: 0.0 });
             }
         }
-        self.multiplier_dt = dt;
+        self.multiplier_dt = dt * self.solve_share();
         let later = stages.len();
         let pairs = later + usize::from(later_iterations > 0);
         let readings = clock.read(2 * pairs as u32)?;

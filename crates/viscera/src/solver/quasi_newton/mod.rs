@@ -18,9 +18,15 @@
 mod choice;
 mod direction;
 mod evaluate;
+#[cfg(feature = "gpu")]
+mod gpu;
+#[cfg(feature = "gpu")]
+pub mod on_device;
 mod oscillations;
 mod parts;
 mod preconditioner;
+#[cfg(feature = "gpu")]
+pub mod progress;
 mod sdirk2;
 pub mod stage;
 mod time;
@@ -47,6 +53,8 @@ pub use choice::{choose, expected_motion_error, substeps_for};
 use evaluate::{Change, Evaluation, Way};
 use parts::{Phase, Progress};
 use preconditioner::Preconditioner;
+#[cfg(feature = "gpu")]
+pub use preconditioner::tables;
 use stage::{QuasiNewtonStage, Solve};
 
 /// Round-off of a change of the potential: so many units of the precision of the sum of its terms' magnitudes.
@@ -72,8 +80,12 @@ fn passes_of(solve: Solve, settings: &SolverSettings, automatic: u32) -> u32 {
     }
 }
 
-/// The stages of a step.
-pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S>]) -> Plan {
+/// The stages of a step. `takes_again`: whether a step of SDIRK2 that stores too much is taken again by implicit Euler.
+pub fn plan<S: Real>(
+    settings: &SolverSettings,
+    materials: &[MaterialConstants<S>],
+    takes_again: bool,
+) -> Plan {
     // Of the part that has most: every part stops by itself after its own.
     let chosen = choose(settings, materials).passes;
     let solve = |solve: Solve| {
@@ -100,8 +112,10 @@ pub fn plan<S: Real>(settings: &SolverSettings, materials: &[MaterialConstants<S
         Integrator::Sdirk2 => {
             nodes.extend(solve(Solve::First));
             nodes.extend(solve(Solve::Second));
-            nodes.push(Node::Run(QuasiNewtonStage::CheckEnergy.into()));
-            nodes.extend(solve(Solve::Euler));
+            if takes_again {
+                nodes.push(Node::Run(QuasiNewtonStage::CheckEnergy.into()));
+                nodes.extend(solve(Solve::Euler));
+            }
         }
         Integrator::ImplicitEuler => nodes.extend(solve(Solve::Euler)),
     }

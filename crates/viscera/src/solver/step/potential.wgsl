@@ -3,12 +3,6 @@
 // sums are of the size of a step's changes and not of all that is stored,
 //
 //   Phi(x) - Phi(x_ref) = sum_e dt^2 (V W - V W_ref) + sum_i m_i/2 (x - x_ref) . ((x - xt) + (x_ref - xt))
-//
-// A piece (512 elements, or vertices, of one part of the model) is summed by one workgroup, pieces by
-// every workgroup that needs their sum, always in the same order.
-
-const THREADS: u32 = 256u;
-const EPSILON: f32 = 1.1920929e-7;
 
 // Places beside the ranges of the vertex data: the positions, and `TRIAL + line * DIRECTION`.
 const POINTS: u32 = 100u;
@@ -43,56 +37,6 @@ const SUM_MASS: u32 = 14u;
 const SUM_MOMENTUM_START: u32 = 15u;
 const SUM_MOMENTUM: u32 = 18u;
 const SUM_LOAD: u32 = 21u;
-alias Sums = array<f32, SUMS>;
-
-var<workgroup> shared_sums: array<f32, 2048>;
-var<workgroup> totals: Sums;
-var<workgroup> decision: u32;
-
-// Sums over the workgroup, eight at a time, into `totals`; maxima where `maxima` has a bit.
-fn reduce(given: Sums, groups: u32, maxima: u32, local: u32) {
-    var values = given;
-    for (var group = 0u; group < groups; group++) {
-        workgroupBarrier();
-        for (var k = 0u; k < 8u; k++) {
-            shared_sums[THREADS * k + local] = values[8u * group + k];
-        }
-        workgroupBarrier();
-        for (var half = THREADS / 2u; half > 0u; half /= 2u) {
-            if local < half {
-                for (var k = 0u; k < 8u; k++) {
-                    let at = THREADS * k + local;
-                    let a = shared_sums[at];
-                    let b = shared_sums[at + half];
-                    let is_maximum = (maxima & (1u << (8u * group + k))) != 0u;
-                    shared_sums[at] = select(a + b, max(a, b), is_maximum);
-                }
-            }
-            workgroupBarrier();
-        }
-        if local < 8u {
-            totals[8u * group + local] = shared_sums[THREADS * local];
-        }
-    }
-    workgroupBarrier();
-}
-
-// The first thread's answer, for all threads.
-fn agree(yes: bool, local: u32) -> bool {
-    if local == 0u {
-        decision = select(0u, 1u, yes);
-    }
-    return workgroupUniformLoad(&decision) != 0u;
-}
-
-// By its bits: compilers may take it for granted that numbers are finite.
-fn is_finite(value: f32) -> bool {
-    return (bitcast<u32>(value) & 0x7f800000u) != 0x7f800000u;
-}
-
-fn vertex_data_of(range: u32, v: u32) -> vec4f {
-    return vertex_data[range * table[STRIDE_AT] + v];
-}
 
 fn place(source: u32, v: u32) -> vec3f {
     if source == POINTS {
@@ -163,15 +107,6 @@ fn tet_answer(block: u32, lane: u32, x: array<vec3f, 4>, with_force: bool) -> ve
         squared = tet.volume * tet.volume * (stress * norm_squared(tet.shape));
     }
     return vec2f(tet.volume * density, squared);
-}
-
-// The vertices of an element, as often as it takes to fill four places.
-fn corners_of(element: u32) -> array<u32, 4> {
-    let tet_lanes = table[TET_LANES_AT];
-    if element < tet_lanes {
-        return vertices_of(element / LANES, element % LANES);
-    }
-    return four_of(element_row(element - tet_lanes) + ELEMENT_VERTICES);
 }
 
 // Energy [J] of an element whose vertices are at `x` and, of a tetrahedron where wanted, its squared force [N^2].
@@ -293,15 +228,6 @@ fn add_motion(v: u32, first: u32, into: ptr<function, Sums>) {
     }
 }
 
-fn first_vertex_of(part: u32) -> u32 {
-    return table[piece_row(table[part_row(part) + PART_VERTEX_PIECES]) + PIECE_FIRST];
-}
-
-// An element of a piece.
-fn member(i: u32) -> u32 {
-    return table[table[MEMBERS_AT] + i];
-}
-
 fn add_piece(row: u32, mode: u32, local: u32, into: ptr<function, Sums>) {
     let end = table[row + PIECE_END];
     if table[row + PIECE_ARE_VERTICES] != 0u {
@@ -314,20 +240,6 @@ fn add_piece(row: u32, mode: u32, local: u32, into: ptr<function, Sums>) {
             add_element(member(i), mode, into);
         }
     }
-}
-
-// Pieces of a part, elements before vertices, and which of all the `i`-th is.
-fn piece_count(part: u32) -> u32 {
-    let row = part_row(part);
-    let elements = table[row + PART_ELEMENT_PIECES_END] - table[row + PART_ELEMENT_PIECES];
-    return elements + table[row + PART_VERTEX_PIECES_END] - table[row + PART_VERTEX_PIECES];
-}
-
-fn piece_at(part: u32, i: u32) -> u32 {
-    let row = part_row(part);
-    let first = table[row + PART_ELEMENT_PIECES];
-    let elements = table[row + PART_ELEMENT_PIECES_END] - first;
-    return select(first + i, table[row + PART_VERTEX_PIECES] + i - elements, i >= elements);
 }
 
 // Energies of elements are in [J], those of inertia in [J s^2].

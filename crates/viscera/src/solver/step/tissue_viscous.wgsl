@@ -37,3 +37,17 @@ fn tissue_change_since(f: mat3x3f, start: array<f32, 6>) -> array<f32, 6> {
         c[5] - start[5],
     );
 }
+
+// Change of the viscous energy from `F` to `F + D`; `before` is the change of the strain at `F`.
+fn tissue_viscous_energy_change(
+    f: mat3x3f,
+    d: mat3x3f,
+    before: array<f32, 6>,
+    viscosity_rate: f32,
+    lame_lambda: f32,
+    lame_mu: f32,
+) -> f32 {
+    let change = green_strain_strain_change(f, d);
+    let density = green_strain_energy_density_change(before, change, lame_lambda, lame_mu);
+    return viscosity_rate * density;
+}

@@ -1,12 +1,13 @@
 //! Every function that a solver calls, in Rust and in WGSL, as a map from a record of numbers to
 //! results. The two texts stand side by side and do the same in the same order.
 
+use viscera::elements::law::{Law, SaintVenantKirchhoff, StableNeoHookean};
 use viscera::elements::singular_values::signed_svd;
 use viscera::elements::{
     CornerLoad, TetCorrection, attachment, deformation_gradient, green_strain, internal_forces,
     neo_hookean, neo_hookean_pair, neo_hookean_stretch, recovered, shape_gradients, spring,
 };
-use viscera::material::{Compliance, MaterialModel};
+use viscera::material::Compliance;
 use viscera::scalar::{Mat3, Scalar, Vec3, vec3};
 use viscera::solver::Tissue;
 
@@ -276,15 +277,18 @@ const STRETCH_BLOCK: &str = "
 ";
 
 fn saint_venant_kirchhoff<T: Scalar>(numbers_in: &[T]) -> Results<T> {
-    tissue(MaterialModel::SaintVenantKirchhoff, &Tet::from(numbers_in))
+    tissue::<T, SaintVenantKirchhoff>(&Tet::from(numbers_in))
 }
 
 fn stable_neo_hookean<T: Scalar>(numbers_in: &[T]) -> Results<T> {
-    tissue(MaterialModel::StableNeoHookean, &Tet::from(numbers_in))
+    tissue::<T, StableNeoHookean>(&Tet::from(numbers_in))
 }
 
-fn tissue<T: Scalar>(model: MaterialModel, t: &Tet<T>) -> Results<T> {
+fn tissue<T: Scalar, L: Law>(t: &Tet<T>) -> Results<T> {
     let f = deformation_gradient(&t.x, &t.shape);
+    let model = L::MODEL;
+    // Small near the shape at rest, and nowhere else, where most terms of a small change cancel.
+    let d = (f - Mat3::IDENTITY).transpose() * T::HALF;
     let Tet { lambda: lame_lambda, mu: lame_mu, viscosity_rate, .. } = *t;
     let tissue = Tissue { model, lame_lambda, lame_mu, viscosity_rate };
     let response = tissue.respond(&f, Some(&t.start));
@@ -292,6 +296,8 @@ fn tissue<T: Scalar>(model: MaterialModel, t: &Tet<T>) -> Results<T> {
     vec![
         ("elastic_energy", vec![response.elastic_energy]),
         ("viscous_energy", vec![response.viscous_energy]),
+        ("energy change", vec![tissue.energy_change_of::<L>(&f, &d, Some(&t.start))]),
+        ("gradient map", numbers(&L::gradient_map(&f).columns)),
         ("elastic piola", numbers(&tissue.respond(&f, None).piola.columns)),
         ("piola", numbers(&response.piola.columns)),
         ("curvature", g.map(|g| tissue.curvature(&f, g)).to_vec()),
@@ -303,6 +309,10 @@ const TISSUE: &str = "
     let elastic = law_piola(law, f, lambda, mu);
     put(law_energy_density(law, f, lambda, mu));
     put(tissue_viscous_energy(change, viscosity_rate, lambda, mu));
+    let d = transpose(f - IDENTITY) * 0.5;
+    let viscous = tissue_viscous_energy_change(f, d, change, viscosity_rate, lambda, mu);
+    put(law_energy_change(law, f, d, lambda, mu) + viscous);
+    put_mat3(law_gradient_map(law, f));
     put_mat3(elastic);
     put_mat3(elastic + tissue_viscous_piola(f, change, viscosity_rate, lambda, mu));
     let g = shape_gradients(shape);
@@ -322,6 +332,7 @@ fn springs<T: Scalar>(numbers_in: &[T]) -> Results<T> {
     let (change, positions) = spring::solve(&x, &w, rest_length, multiplier, compliance);
     let loads = spring::corner_loads(&x, multiplier);
     let [x0, anchor] = x;
+    let d = [held, x[1] * multiplier];
     let (holds, moves) = attachment::solve(x0, w[0], anchor, held, compliance);
     let held_at_rest = attachment::constitutive_multipliers(x0, anchor, compliance);
     let at_rest = spring::constitutive_multiplier(&x, rest_length, compliance);
@@ -329,6 +340,8 @@ fn springs<T: Scalar>(numbers_in: &[T]) -> Results<T> {
         ("spring direction", numbers(&[n])),
         ("spring length", vec![length]),
         ("spring energy", vec![spring::energy(&x, rest_length, stiffness)]),
+        ("spring energy change", vec![spring::energy_change(&x, &d, rest_length, stiffness)]),
+        ("attachment energy change", vec![attachment::energy_change(x0, d[0], anchor, stiffness)]),
         ("element curvature", vec![stiffness, stiffness]),
         ("spring forces", numbers(&spring::forces(&x, rest_length, stiffness))),
         ("spring solve: multiplier", vec![change]),
@@ -366,6 +379,9 @@ const SPRINGS: &str = "
     put_vec3(along.n);
     put(along.length);
     put(element_energy(0u, spring, four));
+    let d = array<vec3f, 4>(held, x[1] * multiplier, vec3f(), vec3f());
+    put(element_energy_change(0u, spring, four, d));
+    put(element_energy_change(1u, attachment, four, d));
     put(element_curvature(0u, spring));
     put(element_curvature(1u, attachment));
     put_vec3(forces[0]);

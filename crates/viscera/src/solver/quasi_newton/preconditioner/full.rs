@@ -108,6 +108,22 @@ impl<S: Real> FullSums<S> {
         run(workers.instructions, EachBlock { blocks, lame, r, a, add });
     }
 
+    /// Pairs of nodes that a group has a share of, with `sum V g_c g_d^T` [m], column by column.
+    #[cfg(feature = "gpu")]
+    pub fn rest_blocks(&self, group: usize) -> impl Iterator<Item = ([u32; 2], [S; 9])> {
+        let blocks = &self.blocks[self.offsets[group]..self.offsets[group + 1]];
+        blocks.iter().flat_map(|eight| {
+            let of_lane = |lane: usize| (eight.nodes[lane], eight.b.map(|row| row[lane]));
+            (0..usize::from(eight.filled)).map(of_lane)
+        })
+    }
+
+    /// Lame's parameters of a group [Pa]: mu and lambda.
+    #[cfg(feature = "gpu")]
+    pub fn lame(&self, group: usize) -> [S; 2] {
+        self.lame[group]
+    }
+
     /// Bytes of its arrays.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.masses[..])

@@ -15,10 +15,16 @@
 
 mod added;
 mod dense;
+#[cfg(feature = "gpu")]
+mod exported;
 mod full;
 mod prolongation;
 mod rotation;
 mod sums;
+#[cfg(feature = "gpu")]
+pub mod tables;
+#[cfg(all(test, feature = "gpu"))]
+mod tables_tests;
 #[cfg(test)]
 mod tests;
 
@@ -37,8 +43,18 @@ use prolongation::Prolongation;
 use rotation::Turn;
 use sums::{DiagonalSums, Grouped, Groups, LocalTets, On, Six, inverse, mapped, times};
 
-/// Nodes of the coarsest level at most, where the levels can be made so: a dense system of three times as many.
-const MOST_COARSE: usize = 64;
+/// How coarse the coarsest level is.
+#[derive(Clone, Copy, Debug)]
+struct Coarseness {
+    /// Nodes that it has at most, where the levels can be made so: a dense system of three times as many.
+    aim: usize,
+    /// With so many it is still solved as a whole.
+    most: usize,
+}
+
+impl Coarseness {
+    const ON_CPU: Self = Self { aim: 64, most: 128 };
+}
 
 /// Nodes of a level that a vertex hangs on, at most.
 const PARENTS: usize = 8;
@@ -91,7 +107,9 @@ impl<S: Real> Preconditioner<S> {
     /// For a layout. Without the sums, which depend on what is free: [`Preconditioner::fit`] takes them.
     pub fn new(layout: &Layout<S>) -> Self {
         Self {
-            parts: layout.parts.iter().map(|part| OfPart::new(layout, part)).collect(),
+            parts: (layout.parts.iter())
+                .map(|part| OfPart::new(layout, part, Coarseness::ON_CPU))
+                .collect(),
             free: vec![true; layout.vertex_count()],
             turns: Vec::new(),
         }
@@ -147,7 +165,7 @@ impl<S: Real> Preconditioner<S> {
 }
 
 impl<S: Real> OfPart<S> {
-    fn new(layout: &Layout<S>, part: &Part) -> Self {
+    fn new(layout: &Layout<S>, part: &Part, coarseness: Coarseness) -> Self {
         let first = part.vertices.start;
         let places = places_of(layout, part);
         let (mut tets, mut links) = (Vec::new(), Vec::new());
@@ -166,7 +184,7 @@ impl<S: Real> OfPart<S> {
                 }
             }
         });
-        let lattice = Lattice::new(&places, &tets, &links, MOST_COARSE);
+        let lattice = Lattice::new(&places, &tets, &links, coarseness.aim);
         let count = |level: usize| {
             if level == 0 { places.len() } else { lattice.levels[level - 1].node_count() }
         };
@@ -178,7 +196,7 @@ impl<S: Real> OfPart<S> {
             levels: vec![DiagonalSums::default(); levels],
             inverses: (0..levels).map(|level| vec![[S::ZERO; 6]; count(level)]).collect(),
             full: FullSums::default(),
-            dense: Dense::new(3 * if has_dense(count(levels)) { count(levels) } else { 0 }),
+            dense: Dense::new(if count(levels) <= coarseness.most { 3 * count(levels) } else { 0 }),
             vectors: (1..=levels).map(|level| vec![Point::default(); count(level)]).collect(),
             residual: vec![Point::default(); places.len()],
             nodes: Vec::with_capacity(4 * PARENTS),
@@ -406,11 +424,6 @@ impl<S: Real> OfPart<S> {
             None => z.iter_mut().zip(residual).for_each(|(z, point)| *z = point.vec3()),
         }
     }
-}
-
-/// Whether a coarsest level of so many nodes is solved as a whole.
-fn has_dense(nodes: usize) -> bool {
-    nodes <= 2 * MOST_COARSE
 }
 
 /// Rest positions [m] of a part's vertices.

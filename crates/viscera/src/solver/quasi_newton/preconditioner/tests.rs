@@ -1,10 +1,10 @@
 //! The preconditioner against the curvature that it is made of.
 
-use super::OfPart;
 use super::full::FullSums;
 use super::prolongation::Prolongation;
 use super::rotation::Turn;
 use super::sums::{Grouped, LocalTets, On};
+use super::{Coarseness, OfPart};
 use crate::elements::law::{Law, StableNeoHookean};
 use crate::layout::Layout;
 use crate::layout::lattice::{Lattice, Weights};
@@ -79,7 +79,7 @@ fn sums_are_those_of_what_is_free_now() {
         let layout = Layout::new(&model, &SolverSettings::default());
         let count = model.vertex_count();
         let free: Vec<bool> = (0..count).map(|v| v % 5 != 0).collect();
-        let part = || OfPart::new(&layout, &layout.parts[0]);
+        let part = || OfPart::new(&layout, &layout.parts[0], Coarseness::ON_CPU);
         let (mut before, mut fresh) = (part(), part());
         assert_eq!(fresh.lattice.levels.len().min(1), levels);
         assert_eq!(fresh.dense.size() == 0, levels == 0);
@@ -110,7 +110,7 @@ fn a_point_is_an_element_of_its_weights() {
     let count = layout.vertex_count();
     let free: Vec<bool> = (0..count).map(|v| v % 5 != 0).collect();
     let new = || {
-        let mut part = OfPart::new(&layout, &layout.parts[0]);
+        let mut part = OfPart::new(&layout, &layout.parts[0], Coarseness::ON_CPU);
         part.rebuild(&layout, 0, &free);
         part
     };

@@ -1,0 +1,55 @@
+//! Names of places in the table, as kernels know them.
+
+use super::layout::{Header, Material};
+use super::parts::{Fall, PartRow, Piece, SmallSteps};
+use super::slots::Element;
+
+/// Names and places of words that kernels find in the table.
+pub(super) fn words() -> Vec<(&'static str, u32)> {
+    macro_rules! words {
+        ($record:ty { $($name:literal $field:ident)* }) => {
+            vec![$(($name, (std::mem::offset_of!($record, $field) / 4) as u32)),*]
+        };
+    }
+    let mut all = words!(Header {
+        "MATERIALS_AT" materials "CORNERS_AT" corners "OFFSETS_AT" offsets "ELEMENTS_AT" elements
+        "PIECES_AT" pieces "MEMBERS_AT" members "PARTS_AT" parts
+        "RUNS_AT" runs "BLOCK_PARTS_AT" block_parts "WEIGHTS_AT" weights
+        "SMALL_STEPS_AT" small_steps "FALLS_AT" falls "STRIDE_AT" stride
+        "ANCHORS_AT" anchors "LINES_AT" lines "ENERGIES_AT" energies "TET_LANES_AT" tet_lanes
+        "LAW_ENDS_AT" law_ends
+        "PART_COUNT_AT" part_count
+    });
+    all.extend(words!(Piece {
+        "PIECE_PART" part "PIECE_FIRST" first "PIECE_END" end "PIECE_ARE_VERTICES" are_vertices
+    }));
+    all.extend(words!(Element {
+        "ELEMENT_KIND" kind "ELEMENT_PART" part "ELEMENT_MULTIPLIER" multiplier
+        "ELEMENT_ANCHOR" anchor "ELEMENT_VERTICES" vertices "ELEMENT_COPIES" copies
+        "ELEMENT_SLOTS" slots "ELEMENT_CONSTANTS" constants
+    }));
+    all.extend(words!(Material {
+        "MATERIAL_LAMBDA" lame_lambda "MATERIAL_MU" lame_mu "MATERIAL_VISCOSITY" viscosity
+    }));
+    all.extend(words!(PartRow {
+        "PART_ELEMENT_PIECES" element_pieces "PART_ELEMENT_PIECES_END" element_pieces_end
+        "PART_VERTEX_PIECES" vertex_pieces "PART_VERTEX_PIECES_END" vertex_pieces_end
+        "PART_VERTICES_END" vertices_end "PART_GROUPS_END" groups_end "PART_RUNS" runs
+        "PART_RUNS_END" runs_end "PART_LENGTH" length "PART_REBASE_FACTOR" rebase_factor
+        "PART_BOUND_SHARE" bound_share
+    }));
+    let size = |bytes: usize| (bytes / 4) as u32;
+    all.extend(words!(SmallSteps {
+        "SMALL_COUNT" count "SMALL_DT" dt "SMALL_INVERSE_DT" inverse_dt "SMALL_AHEAD" ahead
+    }));
+    all.extend(words!(Fall { "FALL_IS_FREE" is_free "FALL_ACCELERATION" acceleration }));
+    all.extend([
+        ("FALL_WORDS", size(size_of::<Fall>())),
+        ("SMALL_WORDS", size(size_of::<SmallSteps>())),
+        ("PIECE_WORDS", size(size_of::<Piece>())),
+        ("PART_WORDS", size(size_of::<PartRow>())),
+        ("ELEMENT_WORDS", size(size_of::<Element>())),
+        ("MATERIAL_WORDS", size(size_of::<Material>())),
+    ]);
+    all
+}
