@@ -10,6 +10,8 @@ use crate::scalar::Real;
 use crate::settings::Elements;
 use crate::settings::{DeviceRequest, Method, SolverSettings};
 use crate::solver::Solver;
+#[cfg(feature = "gpu")]
+use crate::solver::gpu::HAS_SOLVES;
 
 impl<S: Real> Backend<S> {
     /// What the settings ask for; `ready` is a solver of the CPU of these settings, where there is one already.
@@ -79,9 +81,10 @@ impl<S: Real> Backend<S> {
         ready: Option<Solver<S>>,
         offered: &Offered,
     ) -> Result<Self, SimulationError> {
-        // Elements that only the CPU computes leave their device.
+        // Elements, and in light builds a method, that only the CPU computes leave their device.
         #[cfg(feature = "gpu")]
         if same_device
+            && (settings.method != Method::QuasiNewton || HAS_SOLVES)
             && settings.elements != Elements::Recovered
             && let Some(again) = gpu::again(self, model, settings)
         {

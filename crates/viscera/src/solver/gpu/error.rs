@@ -94,6 +94,11 @@ pub enum GpuError {
         "graphics processors compute in single precision; use `precision = \"f32\"` or `device = \"cpu\"`"
     )]
     DoublePrecision,
+    /// The kernels of the method were left out.
+    #[error(
+        "this build leaves the quasi-Newton method to the CPU; use `device = \"cpu\"` or \"auto\", or `method = \"xpbd\"`"
+    )]
+    OnlyOnCpu,
     /// The elements have no kernels yet.
     #[error(
         "`elements = \"recovered\"` is computed by the CPU only; use `device = \"cpu\"` or \"auto\", or `elements = \"plain\"`"

@@ -5,6 +5,7 @@ use super::slots::Slot;
 use crate::elements::TetForm;
 use crate::elements::text::kernel_text;
 use crate::elements::wgsl;
+use crate::solver::quasi_newton::on_device::IS_THERE;
 use crate::solver::step::tissue::{TISSUE_WGSL, VISCOUS_WGSL};
 
 /// A kernel: an entry point of one of the files, with the storage that it names.
@@ -241,6 +242,18 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
         File::Search => guard(own(kernel_text!("../step/guard_search.wgsl"))),
         File::Take => guard(vec![SPANS, kernel_text!("../step/guard_take.wgsl")]),
         File::Energy => guard(own(kernel_text!("../step/energy.wgsl"))),
+        // Pages are light.
+        File::Begin
+        | File::Refresh
+        | File::Invert
+        | File::EvaluateTrial
+        | File::Apply
+        | File::Direction
+        | File::End
+            if !IS_THERE =>
+        {
+            Vec::new()
+        }
         File::Begin => solve(own(kernel_text!("../quasi_newton/begin.wgsl"))),
         File::Refresh => {
             let own = kernel_text!("../quasi_newton/preconditioner/refresh.wgsl");

@@ -43,6 +43,8 @@ mod timing;
 pub(in crate::solver) mod uniforms;
 mod words;
 
+/// Whether this build has the quasi-Newton method on devices.
+pub use super::quasi_newton::on_device::IS_THERE as HAS_SOLVES;
 pub use copy::MemoryCopy;
 pub use cost::StepCost;
 pub use device::{Adapter, Device, baseline, shortfall};

@@ -25,7 +25,7 @@ use crate::solver::error::StepError;
 use crate::solver::explicit::Stability;
 use crate::solver::inputs::check_model;
 use crate::solver::plan::{Plan, Stage, StepStage};
-use crate::solver::quasi_newton::on_device::DeviceLevels;
+use crate::solver::quasi_newton::on_device::{self, DeviceLevels};
 use crate::solver::quasi_newton::progress::PartProgress;
 use crate::solver::step::tethers::Bundle;
 use crate::state::State;
@@ -334,6 +334,9 @@ impl GpuSolver {
 fn check(device: &Device, settings: &SolverSettings) -> Result<(), GpuError> {
     if settings.precision == Precision::F64 {
         return Err(GpuError::DoublePrecision);
+    }
+    if settings.method == Method::QuasiNewton && !on_device::IS_THERE {
+        return Err(GpuError::OnlyOnCpu);
     }
     if settings.elements == Elements::Recovered {
         return Err(GpuError::PlainElements);

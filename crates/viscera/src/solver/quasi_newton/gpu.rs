@@ -4,7 +4,7 @@
 //! dispatch only decides: `Judge` and the ends of solves are parts of what comes after them. A part that is done pays a look
 //! at its record.
 
-use super::on_device::{DeviceLevels, share};
+use super::on_device::{DeviceLevels, IS_THERE, share};
 use super::preconditioner::tables::Header;
 use super::stage::{QuasiNewtonStage, Solve};
 use crate::solver::gpu::kernels::{self, Kernel};
@@ -23,7 +23,7 @@ impl Recorder<'_> {
         solve: Solve,
         into: &mut Vec<Dispatch>,
     ) {
-        let Some(levels) = self.levels else { return };
+        let Some(levels) = self.levels.filter(|_| IS_THERE) else { return };
         let Header { groups, fine, ordinary, vertices, pairs, .. } = levels.header;
         match stage {
             QuasiNewtonStage::Begin => {

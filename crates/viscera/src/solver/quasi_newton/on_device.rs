@@ -9,6 +9,9 @@ use crate::layout::Layout;
 use crate::settings::{Integrator, Method, SolverSettings};
 use crate::solver::inputs::Inputs;
 
+/// Whether kernels of the method are there.
+pub const IS_THERE: bool = cfg!(feature = "gpu-solves");
+
 /// The share of a step that a solve takes.
 pub fn share(settings: &SolverSettings) -> f64 {
     match settings.integrator {
@@ -40,7 +43,7 @@ pub struct DeviceLevels {
 impl DeviceLevels {
     /// With all vertices free; returns the table as well. Nothing for other methods.
     pub fn new(layout: &Layout<f32>, settings: &SolverSettings) -> Option<(Self, Vec<u32>)> {
-        if settings.method != Method::QuasiNewton {
+        if !IS_THERE || settings.method != Method::QuasiNewton {
             return None;
         }
         let mut choices = choose_by_part(settings, layout);
@@ -57,6 +60,9 @@ impl DeviceLevels {
 
     /// The table for the vertices that are free in a step, where that are others than before: never longer than with all.
     pub fn fit(&mut self, layout: &Layout<f32>, inputs: &Inputs<f32>) -> Option<Vec<u32>> {
+        if !IS_THERE {
+            return None;
+        }
         let mut free = vec![true; self.free.len()];
         for pin in &inputs.pins {
             free[layout.numbering.of(pin.vertex)] = false;

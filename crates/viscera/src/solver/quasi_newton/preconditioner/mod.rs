@@ -23,7 +23,7 @@ mod rotation;
 mod sums;
 #[cfg(feature = "gpu")]
 pub mod tables;
-#[cfg(all(test, feature = "gpu"))]
+#[cfg(all(test, feature = "gpu-solves"))]
 mod tables_tests;
 #[cfg(test)]
 mod tests;
