@@ -51,6 +51,9 @@ fn a_drag_pulls_the_tissue_and_it_comes_back() {
     for part in 1..=8 {
         tab.mouse("mouseMoved", [x, y - 15.0 * f64::from(part)], "left");
     }
+    // Browsers hand moves on frame by frame: the last one before the steps.
+    let frame = "new Promise((done) => requestAnimationFrame(() => done(true)))";
+    (0..2).for_each(|_| drop(tab.wait(frame, 5.0)));
     tab.evaluate("viscera.step(30)");
     let held = tab.evaluate("viscera.state().report.runs[0].held");
     let force: f64 =
