@@ -1,13 +1,13 @@
 //! The explicit method on a graphics processor: the CPU's answers, and what it refuses.
 
 use crate::common::device;
-use crate::common::device::{everything, largest};
+use crate::common::device::{everything, handled, largest};
 use crate::common::{SNH, block, material, single_body};
 use viscera::model::Model;
 use viscera::scalar::{Real, vec3};
 use viscera::settings::{Acceleration, Colors, Elements, Method, Precision, SolverSettings};
 use viscera::solver::gpu::{Device, GpuSolver};
-use viscera::solver::{Inputs, Pin, Solver, StepError, Tether};
+use viscera::solver::{Inputs, Solver, StepError};
 use viscera::state::{Learned, State};
 
 /// Some 400 small steps of `everything`: more than one submission.
@@ -28,31 +28,9 @@ fn explicit(colors: Colors) -> SolverSettings {
     }
 }
 
-/// A wall that moves and is let go, one attached vertex held for a while, another led by a spring, a force, anchors that drift
-/// and come back.
+/// So little that the small steps are those of the shape at rest, which is all that a device knows.
 fn inputs_at<S: Real>(model: &Model<f64>, step: u32) -> Inputs<S> {
-    // So little that the small steps are those of the shape at rest, which is all that a device knows.
-    let away = vec3(0.0, 2e-5 * f64::from(step), 3e-5 * f64::from(step));
-    let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81).cast(), ..Inputs::default() };
-    let half = model.vertex_count() as u32 / 2;
-    if step < 4 {
-        let rest = (0..half).zip(&model.rest_positions).filter(|(_, x)| x.x < 1e-9);
-        inputs.pins.extend(rest.map(|(vertex, x)| Pin { vertex, target: (*x + away).cast() }));
-    }
-    if step == 2 {
-        let target = (model.rest_positions[half as usize] + away).cast();
-        inputs.pins.push(Pin { vertex: half, target });
-        inputs.forces.extend([(7, vec3(0.01, 0.02, 0.0).cast()), (7, vec3(0.0, 0.01, 0.0).cast())]);
-    }
-    if (1..4).contains(&step) {
-        let vertex = model.vertex_count() as u32 - 1;
-        let target = (model.rest_positions[vertex as usize] + away).cast();
-        inputs.tethers.push(Tether { vertex, target, stiffness: S::from_f64(30.0) });
-    }
-    if step < 4 {
-        inputs.anchors = model.rest_anchors.iter().map(|a| (*a + away).cast()).collect();
-    }
-    inputs
+    handled(model, step, vec3(0.0, 2e-5, 3e-5))
 }
 
 fn run_on(device: &Device, settings: &SolverSettings, steps: u32) -> State<f32> {

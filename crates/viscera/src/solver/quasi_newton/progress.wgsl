@@ -116,20 +116,14 @@ fn judge(part: u32, record: u32) -> Verdict {
         // The next step is round-off.
         return Verdict(DONE, 0u, 0u, 0u, failures, rejections, length);
     }
-    if phase == FROM_REFERENCE || is_settled(part, record, step) {
+    let before = length * now.slope;
+    let limit = select(SUFFICIENT * before, 0.0, phase == STARTING);
+    if phase == FROM_REFERENCE || is_settled(part, record, step) || suffices(limit) {
         let leaves = phase == ITERATING && step > CLEAR_STEP * resolution();
         return Verdict(ITERATING, 1u, select(0u, 1u, leaves), 0u, 0u, rejections, length);
     }
     if phase == STARTING {
-        let is_good = suffices(0.0);
-        let next = select(FROM_REFERENCE, ITERATING, is_good);
-        let yes = select(0u, 1u, is_good);
-        return Verdict(next, yes, 0u, 1u - yes, failures, rejections, length);
-    }
-    let before = length * now.slope;
-    if suffices(SUFFICIENT * before) {
-        let leaves = step > CLEAR_STEP * resolution();
-        return Verdict(ITERATING, 1u, select(0u, 1u, leaves), 0u, 0u, rejections, length);
+        return Verdict(FROM_REFERENCE, 0u, 0u, 1u, failures, rejections, length);
     }
     // To the minimum of the parabola that has both slopes, within limits.
     var shorter = SHORTEN;

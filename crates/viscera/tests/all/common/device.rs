@@ -7,6 +7,7 @@ use viscera::mesh::TetMesh;
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::solver::gpu::{Adapter, Device};
+use viscera::solver::{Inputs, Pin, Tether};
 
 /// The first adapter there is. Without any the test fails and says what to install.
 pub fn adapter() -> Adapter {
@@ -60,4 +61,29 @@ pub fn everything<S: Real>() -> Model<S> {
         }
     }
     builder.build().expect("a model")
+}
+
+/// What is done to [`everything`] in a step, where anchors, pins and places drift by so much a step [m]: a wall that moves and is
+/// let go, one attached vertex held for a while, another led by a spring, a force, anchors that come back. What is free
+/// changes three times.
+pub fn handled<S: Real>(model: &Model<f64>, step: u32, drift: Vec3<f64>) -> Inputs<S> {
+    let away = drift * f64::from(step);
+    let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81).cast(), ..Inputs::default() };
+    let half = model.vertex_count() as u32 / 2;
+    let place = |vertex: u32| (model.rest_positions[vertex as usize] + away).cast();
+    if step < 4 {
+        let wall = (0..half).filter(|v| model.rest_positions[*v as usize].x < 1e-9);
+        inputs.pins.extend(wall.map(|vertex| Pin { vertex, target: place(vertex) }));
+        inputs.anchors = model.rest_anchors.iter().map(|a| (*a + away).cast()).collect();
+    }
+    if step == 2 {
+        inputs.pins.push(Pin { vertex: half, target: place(half) });
+        inputs.forces.extend([(7, vec3(0.01, 0.02, 0.0).cast()), (7, vec3(0.0, 0.01, 0.0).cast())]);
+    }
+    if (1..4).contains(&step) {
+        let vertex = model.vertex_count() as u32 - 1;
+        let stiffness = S::from_f64(30.0);
+        inputs.tethers.push(Tether { vertex, target: place(vertex), stiffness });
+    }
+    inputs
 }

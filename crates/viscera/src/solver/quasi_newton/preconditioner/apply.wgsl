@@ -47,14 +47,7 @@ fn restrict_gradient(
     let node = (workgroup.x + workgroup.y * groups.x) * SHARED + local / SHARING;
     var sum = vec3f();
     if node < job.count {
-        // The sources of a node of the finest level are vertices without a mark.
-        let stride = table[STRIDE_AT];
-        let offsets = levels[LEVELS_CHILD_OFFSETS] + node;
-        let end = levels[offsets + 1u];
-        for (var i = levels[offsets] + local % SHARING; i < end; i += SHARING) {
-            let at = levels[LEVELS_CHILDREN] + 2u * i;
-            sum += vertex_data[QN_TRIAL_GRADIENT * stride + levels[at]].xyz * levels_number(at + 1u);
-        }
+        sum = add_children(node, local);
     }
     sum = share_sum(sum, local, 64u);
     if node < job.count && local % SHARING == 0u {

@@ -10,6 +10,13 @@ var<workgroup> triangle: array<f32, 3828>;
 var<workgroup> column: array<f32, 87>;
 var<workgroup> is_left_out: array<u32, 87>;
 
+// The row of an entry of the triangle, whatever the rounding of the root.
+fn row_of(i: u32) -> u32 {
+    var r = u32((sqrt(8.0 * f32(i) + 1.0) - 1.0) * 0.5);
+    r = select(r, r - 1u, packed(r, 0u) > i);
+    return select(r, r + 1u, packed(r + 1u, 0u) <= i);
+}
+
 @compute @workgroup_size(256)
 fn invert_dense(
     @builtin(local_invocation_index) local: u32,
@@ -42,10 +49,7 @@ fn invert_dense(
         if is_left_out[k] == 0u {
             let inverse = 1.0 / p;
             for (var i = local; i < size; i += 256u) {
-                // The row of an entry of the triangle, without the rounding of the root.
-                var r = u32((sqrt(8.0 * f32(i) + 1.0) - 1.0) * 0.5);
-                r = select(r, r - 1u, packed(r, 0u) > i);
-                r = select(r, r + 1u, packed(r + 1u, 0u) <= i);
+                let r = row_of(i);
                 let c = i - packed(r, 0u);
                 if r != k && c != k {
                     triangle[i] -= column[r] * column[c] * inverse;
@@ -59,9 +63,7 @@ fn invert_dense(
         workgroupBarrier();
     }
     for (var i = local; i < size; i += 256u) {
-        var r = u32((sqrt(8.0 * f32(i) + 1.0) - 1.0) * 0.5);
-        r = select(r, r - 1u, packed(r, 0u) > i);
-        r = select(r, r + 1u, packed(r + 1u, 0u) <= i);
+        let r = row_of(i);
         let is_out = is_left_out[r] + is_left_out[i - packed(r, 0u)] != 0u;
         multilevel[matrix + i] = select(-triangle[i], 0.0, is_out);
     }

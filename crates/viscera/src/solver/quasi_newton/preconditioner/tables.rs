@@ -226,10 +226,7 @@ impl Builder {
             of_vertices.push(row.iter().copied());
             self.parents.push(row.iter().map(|&(node, weight)| (starts[0] + node, weight)));
         }
-        let mark = |source: u32| {
-            let vertex = first_vertex + source;
-            if is_dense { vertex | OF_VERTEX } else { vertex }
-        };
+        let mark = |vertex: u32| (first_vertex + vertex) | OF_VERTEX;
         let children = of_vertices.turned_round(finest.node_count());
         let marked =
             children.into_iter().map(|row| row.into_iter().map(|(v, w)| (mark(v), w)).collect());
