@@ -72,22 +72,24 @@ fn recovered_gradient(
     return recovered;
 }
 
-fn recovered_vertex_stresses(stress: mat3x3f, rest: RecoveredRestFrame) -> array<mat3x3f, 4> {
+// What `dE/dFh` is as a derivative by the gradient of the domain of corner `p`.
+fn recovered_vertex_stress(stress: mat3x3f, rest: RecoveredRestFrame, p: u32) -> mat3x3f {
     let r = rest.arms;
-    let s0 = stress * rest.gradients[0] * rest.face_weights.x;
-    let s1 = stress * rest.gradients[1] * rest.face_weights.y;
-    let s2 = stress * rest.gradients[2] * rest.face_weights.z;
-    let s3 = stress * rest.gradients[3] * rest.face_weights.w;
-    let sum = s0 + s1 + s2 + s3;
-    let moment = (recovered_outer(s0, r[0]) + recovered_outer(s1, r[1]) + recovered_outer(s2, r[2])
-        + recovered_outer(s3, r[3])) * (1.0 / 3.0);
-    let apart = 4.0 / 3.0;
-    return array<mat3x3f, 4>(
-        moment + recovered_outer(sum - s0 * apart, r[0]),
-        moment + recovered_outer(sum - s1 * apart, r[1]),
-        moment + recovered_outer(sum - s2 * apart, r[2]),
-        moment + recovered_outer(sum - s3 * apart, r[3]),
+    let pulls = array<vec3f, 4>(
+        stress * rest.gradients[0] * rest.face_weights.x,
+        stress * rest.gradients[1] * rest.face_weights.y,
+        stress * rest.gradients[2] * rest.face_weights.z,
+        stress * rest.gradients[3] * rest.face_weights.w,
     );
+    let sum = pulls[0] + pulls[1] + pulls[2] + pulls[3];
+    let moment = (recovered_outer(pulls[0], r[0]) + recovered_outer(pulls[1], r[1])
+        + recovered_outer(pulls[2], r[2]) + recovered_outer(pulls[3], r[3])) * (1.0 / 3.0);
+    return moment + recovered_outer(sum - pulls[p] * (4.0 / 3.0), r[p]);
+}
+
+// `det(F + D) - det F` with the round-off of its terms, which vanish with `D`.
+fn recovered_volume_variation(f: mat3x3f, d: mat3x3f) -> f32 {
+    return (inner_product(cofactor(f), d) + inner_product(f, cofactor(d))) + determinant(d);
 }
 
 fn recovered_tet_stress(
@@ -115,4 +117,14 @@ fn recovered_floor_energy(f: mat3x3f, lame_mu: f32) -> f32 {
 
 fn recovered_floor_piola(f: mat3x3f, lame_mu: f32) -> mat3x3f {
     return cofactor(f) * (RECOVERED_FLOOR_STIFFNESS * lame_mu * recovered_below_floor(f));
+}
+
+// The change of `recovered_floor_energy` from `F` to `F + D`.
+fn recovered_floor_energy_change(f: mat3x3f, d: mat3x3f, lame_mu: f32) -> f32 {
+    let volume = determinant(f) - RECOVERED_VOLUME_FLOOR;
+    let below = min(volume, 0.0);
+    let above = volume - below;
+    // What goes up ends at the floor, what comes down starts there.
+    let change = min(recovered_volume_variation(f, d) + above, -below);
+    return RECOVERED_FLOOR_STIFFNESS * lame_mu * change * (below + 0.5 * change);
 }

@@ -25,7 +25,7 @@ const SINGULAR_VALUES: &str = kernel_text!("singular_values.wgsl");
 /// Twin of [`super::neo_hookean_stretch`]; needs [`SINGULAR_VALUES`].
 const NEO_HOOKEAN_STRETCH: &str = kernel_text!("neo_hookean_stretch.wgsl");
 /// Twin of [`super::recovered`]; needs [`NEO_HOOKEAN`].
-const RECOVERED: &str = kernel_text!("recovered.wgsl");
+pub const RECOVERED: &str = kernel_text!("recovered.wgsl");
 /// Twin of [`super::kinds`], without the kinds.
 const KINDS_SHARED: &str = kernel_text!("kinds.wgsl");
 

@@ -313,19 +313,27 @@ impl SolverSettings {
     pub(crate) fn chosen(&self, method: Method) -> Self {
         let method = if self.method == Method::Auto { method } else { self.method };
         let is_on_device = matches!(self.device, DeviceRequest::Gpu | DeviceRequest::Named(_));
-        let elements = match self.elements {
-            Elements::Auto if method == Method::Xpbd || is_on_device => Elements::Plain,
-            Elements::Auto => Elements::Recovered,
-            asked => asked,
+        Self { method, elements: self.elements_of(method, is_on_device), ..self.clone() }
+    }
+
+    /// The elements of a method.
+    fn elements_of(&self, method: Method, is_on_device: bool) -> Elements {
+        let has_recovered = match method {
+            Method::QuasiNewton => true,
+            Method::Explicit => !is_on_device,
+            Method::Xpbd | Method::Auto => false,
         };
-        Self { method, elements, ..self.clone() }
+        match self.elements {
+            Elements::Auto if has_recovered => Elements::Recovered,
+            Elements::Auto => Elements::Plain,
+            asked => asked,
+        }
     }
 
     /// As [`SolverSettings::chosen`], where a device computes, whatever its name.
     pub(crate) fn chosen_on_device(&self) -> Self {
-        let is_open = self.elements == Elements::Auto;
-        let elements = if is_open { Elements::Plain } else { self.elements };
-        Self { elements, ..self.clone() }.chosen(Method::Xpbd)
+        let method = if self.method == Method::Auto { Method::Xpbd } else { self.method };
+        Self { method, elements: self.elements_of(method, true), ..self.clone() }
     }
 
     /// Keys with a value of their own that only "xpbd" uses, where the method is another one.

@@ -8,17 +8,24 @@ use viscera::measure::measure_tets;
 use viscera::mesh::{TetMesh, shapes};
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
-use viscera::settings::{Count, Integrator, Method, Precision, SolverSettings};
+use viscera::settings::{Count, Elements, Integrator, Method, Precision, SolverSettings};
 use viscera::solver::gpu::GpuSolver;
 use viscera::solver::{Inputs, Pin, Solver};
 use viscera::state::State;
 
 const FRAME: f64 = 1.0 / 60.0;
 
-const BOTH: [Integrator; 2] = [Integrator::Sdirk2, Integrator::ImplicitEuler];
+/// Integrators with the elements that tetrahedra are.
+const ALL: [(Integrator, Elements); 4] = [
+    (Integrator::Sdirk2, Elements::Plain),
+    (Integrator::ImplicitEuler, Elements::Plain),
+    (Integrator::Sdirk2, Elements::Recovered),
+    (Integrator::ImplicitEuler, Elements::Recovered),
+];
+const USUAL: [(Integrator, Elements); 2] = [ALL[0], ALL[2]];
 
-fn quasi_newton(integrator: Integrator) -> SolverSettings {
-    SolverSettings { method: Method::QuasiNewton, integrator, ..SolverSettings::xpbd() }
+fn quasi_newton((integrator, elements): (Integrator, Elements)) -> SolverSettings {
+    SolverSettings { method: Method::QuasiNewton, integrator, elements, ..SolverSettings::xpbd() }
 }
 
 /// Of the same method, in double precision and to the end.
@@ -57,24 +64,27 @@ fn solver(settings: &SolverSettings, model: &Model<f32>) -> GpuSolver {
 /// With many passes both are as exact as single precision is; with those that are chosen the device, whose coarsest level is
 /// smaller, is off by at most twice as much as the processor.
 fn assert_agreement(steps: u32) {
-    for integrator in BOTH {
-        let settings = quasi_newton(integrator);
+    for kind in ALL {
+        let settings = quasi_newton(kind);
         let oracle = run::<f64>(&converged(&settings), steps);
+        let moved = largest(&oracle.positions, &everything::<f64>().rest_positions);
+        assert!(moved > 1e-4 * f64::from(steps), "{moved}");
+        // What a step moves stores energy with its square, and sums of energies err by eight units of the precision: a
+        // solve that judges every trial by them ends so near.
+        let resolved = (8.0 * f64::from(f32::EPSILON)).sqrt() * moved / f64::from(steps);
         let model = everything();
         for iterations in [Count::Auto, Count::Of(40)] {
             let settings = SolverSettings { iterations, ..settings.clone() };
             let gpu = run_on(solver(&settings, &model), &model, steps);
             let cpu = run::<f32>(&settings, steps);
             let [cpu, gpu] = [&cpu, &gpu].map(|state| largest(&state.positions, &oracle.positions));
-            println!("{integrator:?}, {iterations:?}: CPU {cpu:.1e} m, GPU {gpu:.1e} m");
+            println!("{kind:?}, {iterations:?}: CPU {cpu:.1e} m, GPU {gpu:.1e} m");
             // Of places of 0.1 m in single precision, step after step.
             assert!(
-                gpu <= 2.0 * cpu + 4e-8 * f64::from(steps),
-                "{integrator:?}, {iterations:?}: {gpu:e}, {cpu:e}"
+                gpu <= 2.0 * cpu + 4e-8 * f64::from(steps) + resolved,
+                "{kind:?}, {iterations:?}: {gpu:e}, {cpu:e}"
             );
         }
-        let moved = largest(&oracle.positions, &everything::<f64>().rest_positions);
-        assert!(moved > 1e-4 * f64::from(steps), "{moved}");
     }
 }
 
@@ -98,22 +108,28 @@ fn motion_is_as_near_as_the_processors() {
             .collect(),
         ..Inputs::<f64>::default()
     };
-    let settings = quasi_newton(Integrator::Sdirk2);
-    let mut gpu = solver(&settings, &model);
-    let mut cpu = Solver::new(&model, &settings);
-    let mut oracle = Solver::new(&exact, &converged(&settings));
-    let (mut on_cpu, mut on_gpu) = (State::at_rest(&model), State::at_rest(&model));
-    let mut truth = State::at_rest(&exact);
-    for _ in 0..7 {
-        gpu.step(&model, &inputs, FRAME).expect("a legal step");
-        cpu.step(&model, &mut on_cpu, &inputs, FRAME).expect("a legal step");
-        oracle.step(&exact, &mut truth, &wide, FRAME).expect("a legal step");
+    for kind in USUAL {
+        let settings = quasi_newton(kind);
+        let mut gpu = solver(&settings, &model);
+        let mut cpu = Solver::new(&model, &settings);
+        let mut oracle = Solver::new(&exact, &converged(&settings));
+        let (mut on_cpu, mut on_gpu) = (State::at_rest(&model), State::at_rest(&model));
+        let mut truth = State::at_rest(&exact);
+        for _ in 0..7 {
+            gpu.step(&model, &inputs, FRAME).expect("a legal step");
+            cpu.step(&model, &mut on_cpu, &inputs, FRAME).expect("a legal step");
+            oracle.step(&exact, &mut truth, &wide, FRAME).expect("a legal step");
+        }
+        gpu.read(&model, &mut on_gpu).expect("a device");
+        let off = |state: &State<f32>| largest(&state.positions, &truth.positions);
+        let [cpu, gpu] = [off(&on_cpu), off(&on_gpu)];
+        let moved = largest(&truth.positions, &exact.rest_positions);
+        println!("{kind:?}: CPU {cpu:.1e} m, GPU {gpu:.1e} m of {moved:.1e} m");
+        assert!(
+            gpu <= 1.1 * cpu && gpu < 1e-3 * moved,
+            "{kind:?}: {gpu:e} m, CPU {cpu:e} m of {moved:e} m"
+        );
     }
-    gpu.read(&model, &mut on_gpu).expect("a device");
-    let [cpu, gpu] = [&on_cpu, &on_gpu].map(|state| largest(&state.positions, &truth.positions));
-    let moved = largest(&truth.positions, &exact.rest_positions);
-    println!("CPU {cpu:.1e} m, GPU {gpu:.1e} m of {moved:.1e} m");
-    assert!(gpu <= 1.1 * cpu && gpu < 1e-3 * moved, "{gpu:e} m, CPU {cpu:e} m of {moved:e} m");
 }
 
 /// Two steps, for a second, slower driver.
@@ -126,27 +142,28 @@ fn portable_solves_agree_with_the_cpu() {
 #[test]
 fn two_runs_have_the_same_bits_whatever_the_memory_held() {
     let model = everything();
-    for integrator in BOTH {
-        let settings = quasi_newton(integrator);
+    for kind in ALL {
+        let settings = quasi_newton(kind);
         let expected = run_on(solver(&settings, &model), &model, 5);
         for left_over in [f32::NAN, 1e30] {
             let used = GpuSolver::on_used_memory(device(), &model, &settings, left_over);
             let found = run_on(used.expect("a model that fits"), &model, 5);
-            assert!(found == expected, "{integrator:?}, {left_over}");
+            assert!(found == expected, "{kind:?}, {left_over}");
         }
     }
 }
 
 /// A frame of a mesh with several levels, with what the method chooses for soft tissue.
 #[test]
-fn a_frame_is_120_dispatches() {
+fn a_frame_is_at_most_180_dispatches() {
     let mesh = shapes::beam(0.16, 0.04, 0.04, 8, 0.1).expect("a beam");
     let model = single_body::<f32>(&mesh, &material(SNH, 1e4, 0.3));
-    let settings = quasi_newton(Integrator::Sdirk2);
-    let [before, pass, after] = GpuSolver::dispatches_of(&model, &settings);
-    let (passes, per_pass) = (8, 7);
-    assert_eq!(pass, per_pass);
-    assert_eq!(before + passes * pass + after, 120, "{before} and {after}");
+    let passes = 8;
+    for (kind, per_pass, all) in [(USUAL[0], 7, 120), (USUAL[1], 10, 171)] {
+        let [before, pass, after] = GpuSolver::dispatches_of(&model, &quasi_newton(kind));
+        assert_eq!(pass, per_pass, "{kind:?}");
+        assert_eq!(before + passes * pass + after, all, "{kind:?}: {before} and {after}");
+    }
 }
 
 fn bars(count: usize, cells: [usize; 3]) -> Model<f32> {
@@ -169,8 +186,13 @@ fn wall_and_gravity(model: &Model<f32>) -> Inputs<f32> {
 }
 
 /// What swings on a wall, or falls, by the processor and by the device, both with passes enough.
-fn swing(model: &Model<f32>, is_held: bool, frames: u32) -> [Vec<Vec3<f32>>; 2] {
-    let settings = SolverSettings { iterations: Count::Of(40), ..quasi_newton(Integrator::Sdirk2) };
+fn swing(
+    kind: (Integrator, Elements),
+    model: &Model<f32>,
+    is_held: bool,
+    frames: u32,
+) -> [Vec<Vec3<f32>>; 2] {
+    let settings = SolverSettings { iterations: Count::Of(40), ..quasi_newton(kind) };
     let mut inputs = wall_and_gravity(model);
     inputs.pins.retain(|_| is_held);
     let mut gpu = solver(&settings, model);
@@ -194,14 +216,15 @@ fn small_meshes_and_many_bodies_swing_as_on_the_processor() {
         single_body::<f32>(&mesh, &material(SNH, 5e3, 0.4))
     };
     let bar = |cells: usize| bars(1, [cells, 1, 1]);
-    for model in [one, bar(12), bar(13), bar(51), bars(300, [2, 1, 1])] {
-        let [cpu, gpu] = swing(&model, model.part_count() == 1, 4);
+    let models = [one, bar(12), bar(13), bar(51), bars(300, [2, 1, 1])];
+    for (kind, model) in USUAL.into_iter().flat_map(|kind| models.iter().map(move |m| (kind, m))) {
+        let [cpu, gpu] = swing(kind, model, model.part_count() == 1, 4);
         let moved = (cpu.iter().zip(&model.rest_positions))
             .map(|(a, b)| f64::from((*a - *b).length()))
             .fold(0.0, f64::max);
         let apart = cpu.iter().zip(&gpu).map(|(a, b)| f64::from((*a - *b).length()));
         let apart = apart.fold(0.0, f64::max);
-        println!("{} tetrahedra: {apart:.1e} of {moved:.1e} m", model.tet_count());
+        println!("{kind:?}, {} tetrahedra: {apart:.1e} of {moved:.1e} m", model.tet_count());
         assert!(
             apart < 5e-3 * moved + 1e-7,
             "{} tetrahedra: {apart} of {moved}",
@@ -213,10 +236,9 @@ fn small_meshes_and_many_bodies_swing_as_on_the_processor() {
 /// What happens to one body is nothing to the others.
 #[test]
 fn a_body_beside_one_in_trouble_has_the_bits_it_has_alone() {
-    let settings = quasi_newton(Integrator::Sdirk2);
-    let run = |model: &Model<f32>, throws: bool| {
+    let run = |kind, model: &Model<f32>, throws: bool| {
         let count = bars(1, [6, 1, 1]).vertex_count();
-        let mut gpu = solver(&settings, model);
+        let mut gpu = solver(&quasi_newton(kind), model);
         for step in 0..6 {
             let mut inputs = Inputs { gravity: vec3(0.0, 0.0, -9.81), ..Inputs::default() };
             for (v, &x) in model.rest_positions.iter().enumerate() {
@@ -232,9 +254,11 @@ fn a_body_beside_one_in_trouble_has_the_bits_it_has_alone() {
         gpu.read(model, &mut read).expect("a device");
         read.positions[..count].to_vec()
     };
-    let alone = run(&bars(1, [6, 1, 1]), false);
-    let beside = run(&bars(3, [6, 1, 1]), true);
-    assert!(alone == beside);
+    for kind in USUAL {
+        let alone = run(kind, &bars(1, [6, 1, 1]), false);
+        let beside = run(kind, &bars(3, [6, 1, 1]), true);
+        assert!(alone == beside, "{kind:?}");
+    }
 }
 
 const LENGTH: f64 = 0.06;
@@ -344,7 +368,7 @@ fn treat_roughly(
     let mut all = Handled::new(seeds, scrambles);
     let mesh = all.mesh.clone();
     let outside = Outside::new::<f32>(&mesh, YOUNG, POISSON, 1000.0);
-    let mut gpu = solver(&quasi_newton(integrator), &all.model);
+    let mut gpu = solver(&quasi_newton((integrator, Elements::Plain)), &all.model);
     gpu.write(&all.model, &all.state).expect("a state of this model");
     for frame in 0..frames {
         if [0, 5, 10].contains(&frame) {
@@ -393,7 +417,7 @@ fn scrambled_starts_make_no_energy_on_a_device_at_length() {
 #[test]
 fn what_is_no_number_leaves_nothing_behind() {
     let model = everything();
-    let settings = quasi_newton(Integrator::Sdirk2);
+    let settings = quasi_newton(ALL[2]);
     let expected = run_on(solver(&settings, &model), &model, 3);
     let mut gpu = solver(&settings, &model);
     let inputs = Inputs { gravity: vec3(f32::MAX, 0.0, 0.0), ..Inputs::default() };

@@ -118,6 +118,8 @@ struct Frame {
 @group(0) @binding(30) var<storage, read_write> multilevel: array<f32>;
 @group(0) @binding(31) var<storage, read_write> pairs: array<vec4f>;
 @group(0) @binding(32) var<storage, read_write> progress: array<PartProgress>;
+// What passes over recovered-gradient tetrahedra leave to each other (step/recovered/tables.wgsl).
+@group(0) @binding(33) var<storage, read_write> recovery: array<vec4f>;
 
 @group(1) @binding(0) var<uniform> job: Job;
 @group(1) @binding(1) var<uniform> frame: Frame;

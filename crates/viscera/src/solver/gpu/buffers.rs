@@ -13,6 +13,7 @@ use crate::scalar::lanes::LANES;
 use crate::settings::{Acceleration, SolverSettings};
 use crate::solver::quasi_newton::on_device::DeviceLevels;
 use crate::solver::quasi_newton::progress::PartProgress;
+use crate::solver::step::recovered::on_device::Extent;
 
 /// All buffers of a solver.
 #[derive(Debug)]
@@ -48,9 +49,11 @@ fn check_sizes(
 fn sizes_of_levels(
     layout: &Layout<f32>,
     levels: Option<&DeviceLevels>,
-) -> [(Slot, &'static str, u64); 4] {
+) -> [(Slot, &'static str, u64); 5] {
     let pair = 3 * 16 * u64::from(DeviceLayout::stride(layout));
     let progress = (size_of::<PartProgress>() * layout.part_count()) as u64;
+    let extent = levels.and(Extent::new(layout));
+    let recovery = extent.map_or(0, |extent| 16 * extent.vectors(layout));
     let [words, numbers, pairs, progress] = levels.map_or([0; 4], |levels| {
         [4 * levels.words, 4 * levels.numbers, pair * u64::from(levels.history), progress]
     });
@@ -59,6 +62,7 @@ fn sizes_of_levels(
         (Slot::Multilevel, "levels", numbers),
         (Slot::Pairs, "pairs of steps", pairs),
         (Slot::Progress, "solves", progress),
+        (Slot::Recovery, "recovered gradients", recovery),
     ]
 }
 

@@ -99,9 +99,9 @@ pub enum GpuError {
         "this build leaves the quasi-Newton method to the CPU; use `device = \"cpu\"` or \"auto\", or `method = \"xpbd\"`"
     )]
     OnlyOnCpu,
-    /// The elements have no kernels yet.
+    /// The method has no kernels for these elements.
     #[error(
-        "`elements = \"recovered\"` is computed by the CPU only; use `device = \"cpu\"` or \"auto\", or `elements = \"plain\"`"
+        "on a graphics processor only `method = \"quasi_newton\"` has `elements = \"recovered\"`; use that, `elements = \"plain\"`, or `device = \"cpu\"`"
     )]
     PlainElements,
 }

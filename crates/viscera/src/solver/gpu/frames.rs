@@ -17,6 +17,7 @@ use crate::solver::step::balance::ForceBalance;
 use crate::solver::step::contacts::Contacts;
 use crate::solver::step::data::EndOfStep;
 use crate::solver::step::predict::load_tethers;
+use crate::solver::step::recovered::MeasuredTets;
 use crate::state::State;
 
 /// Copies that may be under way at a time; more requests give way until one has arrived.
@@ -213,6 +214,11 @@ impl GpuSolver {
             strains = rest;
             if set.viscous { of_set.as_chunks::<6>().0.to_vec() } else { Vec::new() }
         });
+        let start: &[[f32; 4]] = read.get(4).map_or(&[], |s| bytemuck::cast_slice(s));
+        let mut recovered = model.recovered.as_ref().map(|tables| {
+            let start: Vec<Point<f32>> = start.iter().take(count).map(point).collect();
+            MeasuredTets::new(model, tables, &start, &mut start_strain)
+        });
         let mut end = EndOfStep {
             previous: &before,
             predicted: &places,
@@ -220,7 +226,7 @@ impl GpuSolver {
             inverse_masses: &fourth(acting),
             tethers: &self.tethers,
             start_strain: &mut start_strain,
-            recovered: None,
+            recovered: recovered.as_mut().map(MeasuredTets::of_step),
             contacts: &Contacts::default(),
         };
         balance.measure(model, state, inputs, &mut end);
@@ -270,6 +276,7 @@ pub(super) fn balance_slots(layout: &Layout<f32>) -> Vec<Slot> {
     let mut slots = vec![Slot::Predicted, Slot::ExternalForces, Slot::Previous];
     if layout.is_viscous() {
         slots.push(Slot::StartStrain);
+        slots.extend(layout.recovered.is_some().then_some(Slot::StageStart));
     }
     slots
 }

@@ -47,9 +47,11 @@ pub enum File {
     Refresh,
     Invert,
     EvaluateTrial,
+    EvaluateRecovered,
     Apply,
     Direction,
     End,
+    EndRecovered,
 }
 
 /// Choices that the text of a file depends on, beside the kernel.
@@ -151,6 +153,15 @@ kernels! {
         [Tets Points Loads PartialSums VertexData Table Progress];
     EVALUATE_VERTICES = EvaluateTrial "evaluate_vertices" 256
         [Points Loads PartialSums VertexData Table Progress];
+    RECOVER_GRADIENTS = EvaluateRecovered "recover_gradients" 64
+        [Points VertexData Table Progress Recovery];
+    EVALUATE_RECOVERED = EvaluateRecovered "evaluate_elements" 256
+        [Tets Points Loads PartialSums VertexData Table Progress Recovery];
+    AVERAGE_VOLUMES = EvaluateRecovered "average_volumes" 256 [Table Progress Recovery];
+    GATHER_STRESSES = EvaluateRecovered "gather_stresses" 64
+        [Tets Points Table Progress Recovery];
+    EVALUATE_RECOVERED_VERTICES = EvaluateRecovered "evaluate_vertices" 256
+        [Points Loads PartialSums VertexData Table Progress Recovery];
     RESTRICT_GRADIENT = Apply "restrict_gradient" 64 [VertexData Table Levels Multilevel];
     CORRECT_COARSE = Apply "correct_coarse" 256 [VertexData Table Levels Multilevel];
     CORRECT_FINE = Apply "correct_fine" 64 [Levels Multilevel];
@@ -161,6 +172,12 @@ kernels! {
     MEASURE_END = End "measure_end" 256
         [Tets Points StartStrain PartialSums VertexData Table Progress];
     END_STEP = End "end_step" 256 [Points PartialSums Control VertexData Table Progress];
+    MEASURE_RECOVERED_END = EndRecovered "measure_end" 256
+        [Tets Points StartStrain PartialSums VertexData Table Progress Recovery];
+    RECOVER_ENDS = EndRecovered "recover_ends" 64 [Points VertexData Table Progress Recovery];
+    AVERAGE_ENDS = EndRecovered "average_ends" 256 [Table Recovery];
+    END_RECOVERED_STEP = EndRecovered "end_step" 256
+        [Points PartialSums Control VertexData Table Progress Recovery];
     LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Control VertexData Table];
 }
 
@@ -214,6 +231,9 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
     let solve = |own: Vec<&'static str>| {
         [laws(), pieces(), vec![kernel_text!("../quasi_newton/progress.wgsl")], own].concat()
     };
+    let recovered_tables = [wgsl::RECOVERED, kernel_text!("../step/recovered/tables.wgsl")];
+    let recovered = |own: [&'static str; 2]| solve([recovered_tables, own].concat());
+    let none = kernel_text!("../quasi_newton/recovered_none.wgsl");
     match kernel.file {
         File::Predict => own(kernel_text!("../step/predict.wgsl")),
         File::Rebase => own(kernel_text!("../xpbd/rebase.wgsl")),
@@ -247,9 +267,11 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
         | File::Refresh
         | File::Invert
         | File::EvaluateTrial
+        | File::EvaluateRecovered
         | File::Apply
         | File::Direction
         | File::End
+        | File::EndRecovered
             if !IS_THERE =>
         {
             Vec::new()
@@ -262,10 +284,18 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
         File::Invert => {
             vec![levels, kernel_text!("../quasi_newton/preconditioner/invert.wgsl")]
         }
-        File::EvaluateTrial => solve(own(kernel_text!("../quasi_newton/evaluate.wgsl"))),
+        File::EvaluateTrial => solve(vec![none, kernel_text!("../quasi_newton/evaluate.wgsl")]),
+        File::EvaluateRecovered => recovered([
+            kernel_text!("../quasi_newton/recovered.wgsl"),
+            kernel_text!("../quasi_newton/evaluate.wgsl"),
+        ]),
         File::Apply => vec![levels, kernel_text!("../quasi_newton/preconditioner/apply.wgsl")],
         File::Direction => solve(vec![levels, kernel_text!("../quasi_newton/direction.wgsl")]),
-        File::End => solve(own(kernel_text!("../quasi_newton/end.wgsl"))),
+        File::End => solve(vec![none, kernel_text!("../quasi_newton/end.wgsl")]),
+        File::EndRecovered => recovered([
+            kernel_text!("../quasi_newton/recovered_end.wgsl"),
+            kernel_text!("../quasi_newton/end.wgsl"),
+        ]),
     }
 }
 
@@ -297,6 +327,9 @@ pub fn texts() -> Vec<(String, String)> {
 fn key(kernel: &Kernel, variant: Variant) -> String {
     if varies(kernel) {
         format!("{} {:?} {:?}", kernel.entry, variant.form, variant.swept)
+    } else if matches!(kernel.file, File::EvaluateRecovered | File::EndRecovered) {
+        // Some have the names of those for plain tetrahedra.
+        format!("{} of recovered tetrahedra", kernel.entry)
     } else {
         kernel.entry.to_owned()
     }

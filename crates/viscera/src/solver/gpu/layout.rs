@@ -15,6 +15,8 @@ use crate::material::MaterialConstants;
 use crate::model::for_each_kind;
 use crate::scalar::lanes::LANES;
 use crate::settings::{Method, SolverSettings};
+use crate::solver::step::recovered::on_device;
+use crate::solver::step::strain::is_recovered;
 use crate::sorting;
 
 /// The material of a padding lane.
@@ -54,6 +56,7 @@ pub(super) struct Header {
     pub parts: u32,
     pub runs: u32,
     pub block_parts: u32,
+    pub recovered: u32,
     pub weights: u32,
     pub small_steps: u32,
     pub falls: u32,
@@ -100,6 +103,9 @@ const OF_QUASI_NEWTON: [&str; 8] = [
     "QN_START_VELOCITIES",
     "QN_FIRST",
 ];
+
+/// The place of the start of the solve among these.
+const STAGE_START: u64 = 5;
 
 /// Names and places of the ranges of the vertex data.
 pub(super) fn vertex_ranges() -> impl Iterator<Item = (&'static str, u32)> {
@@ -160,7 +166,9 @@ impl DeviceLayout {
         // part alone. Padding lanes keep slot 0, which is another's: kernels leave them out by their material FILLING.
         let mut corners = Vec::new();
         for set in &layout.tet_sets {
+            let has_loads = !is_recovered(layout, set);
             for (block, &filled) in set.blocks.iter().zip(&set.filled) {
+                let filled = if has_loads { filled } else { 0 };
                 let mut ranks = [[0; LANES]; 4];
                 for lane in 0..filled as usize {
                     for corner in 0..4 {
@@ -187,12 +195,15 @@ impl DeviceLayout {
             total += count;
         }
         // Only now are the offsets known, so the ranks get them in a second pass, in the same order of blocks.
-        let mut blocks = layout.tet_sets.iter().flat_map(|set| set.blocks.iter().zip(&set.filled));
-        for ranks in &mut corners {
-            let Some((block, &filled)) = blocks.next() else { break };
-            for corner in 0..4 {
-                for lane in 0..filled as usize {
-                    ranks[corner][lane] += offsets[block.vertices[corner][lane] as usize];
+        let mut ranks = corners.iter_mut();
+        for set in &layout.tet_sets {
+            let has_loads = !is_recovered(layout, set);
+            for (block, &filled) in set.blocks.iter().zip(&set.filled) {
+                let Some(ranks) = ranks.next().filter(|_| has_loads) else { continue };
+                for corner in 0..4 {
+                    for lane in 0..filled as usize {
+                        ranks[corner][lane] += offsets[block.vertices[corner][lane] as usize];
+                    }
                 }
             }
         }
@@ -263,6 +274,9 @@ impl DeviceLayout {
             let small = vec![SmallSteps::default(); layout.part_count()];
             header.small_steps = add(Some(Slot::SmallSteps), bytemuck::cast_slice(&small));
         }
+        if layout.recovered.is_some() {
+            header.recovered = add(None, &words(&on_device::words(layout)));
+        }
         if accelerates(settings) {
             let weights = vec![0; unknowns_size(layout) as usize];
             header.weights = add(Some(Slot::Weights), &weights);
@@ -279,6 +293,10 @@ impl DeviceLayout {
             let start = each * place as u64;
             ranges.extend(slot.map(|slot| Range { slot, owner: Slot::VertexData, start, size }));
         }
+        // Where the last solve started: viscous recovered-gradient tetrahedra are measured against it.
+        let start = each * (UNGUARDED as u64 - 1 + STAGE_START);
+        let stage = Range { slot: Slot::StageStart, owner: Slot::VertexData, start, size: each };
+        ranges.extend(solves.then_some(stage));
         let start = each * count as u64;
         let size =
             (16 * layout.rest_anchors.len() as u64).next_multiple_of(ALIGNMENT).max(ALIGNMENT);

@@ -10,6 +10,7 @@ use crate::layout::Layout;
 use crate::scalar::lanes::LANES;
 use crate::settings::SolverSettings;
 use crate::solver::quasi_newton::on_device::DeviceLevels;
+use crate::solver::step::recovered::on_device::Extent;
 use crate::solver::xpbd::is_jacobi;
 
 /// One dispatch.
@@ -52,6 +53,8 @@ pub struct Recorder<'a> {
     pub pieces: Pieces,
     /// Of the quasi-Newton method.
     pub levels: Option<&'a DeviceLevels>,
+    /// Of recovered-gradient tetrahedra, which this method has.
+    pub recovered: Option<Extent>,
 }
 
 impl<'a> Recorder<'a> {
@@ -80,6 +83,7 @@ impl<'a> Recorder<'a> {
             stride: DeviceLayout::stride(layout),
             pieces,
             levels,
+            recovered: Extent::new(layout),
         }
     }
 

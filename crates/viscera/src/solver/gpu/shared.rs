@@ -13,6 +13,7 @@ use crate::solver::quasi_newton::progress::{PartProgress, SolveState};
 use crate::solver::quasi_newton::tables;
 use crate::solver::step::control::PartGuard;
 use crate::solver::step::modes::MODES;
+use crate::solver::step::recovered::on_device;
 use crate::solver::step::{descent, guard};
 
 /// Name, bytes, and the name and place [bytes] of every field.
@@ -51,7 +52,7 @@ pub fn host_layouts() -> Vec<HostLayout> {
         record!("SolveState" SolveState {
             phase passes_left accepted ahead failures rejections calm count newest scale length slope
         }),
-        record!("PartProgress" PartProgress { states sy yw was_rejected calm }),
+        record!("PartProgress" PartProgress { states sy yw was_rejected calm takes_trial }),
         record!("Update" Update { vertex is_pinned force place stiffness inertia }),
         record!("TetBlock" crate::layout::TetBlock<f32> {
             vertices inverse_rest_shape rest_volume material
@@ -77,7 +78,7 @@ pub(super) fn constants() -> String {
         ("LARGEST_WINDOW", LARGEST_WINDOW as u32),
         ("MOST_HISTORY", MOST_HISTORY as u32),
     ];
-    let ranges = layout::vertex_ranges().chain(tables::words());
+    let ranges = layout::vertex_ranges().chain(tables::words()).chain(on_device::names());
     let numbers = words::words().into_iter().chain(MODES.iter().copied());
     let numbers = numbers.chain(ranges).chain(guarded).chain(shared);
     let mut text: String =

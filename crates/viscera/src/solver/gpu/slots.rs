@@ -44,6 +44,8 @@ pub enum Slot {
     Multilevel,
     Pairs,
     Progress,
+    Recovery,
+    StageStart,
 }
 
 impl Slot {

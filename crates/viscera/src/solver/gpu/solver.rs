@@ -338,7 +338,7 @@ fn check(device: &Device, settings: &SolverSettings) -> Result<(), GpuError> {
     if settings.method == Method::QuasiNewton && !on_device::IS_THERE {
         return Err(GpuError::OnlyOnCpu);
     }
-    if settings.elements == Elements::Recovered {
+    if settings.elements == Elements::Recovered && settings.method != Method::QuasiNewton {
         return Err(GpuError::PlainElements);
     }
     device.check()?;

@@ -15,6 +15,7 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
         "MATERIALS_AT" materials "CORNERS_AT" corners "OFFSETS_AT" offsets "ELEMENTS_AT" elements
         "PIECES_AT" pieces "MEMBERS_AT" members "PARTS_AT" parts
         "RUNS_AT" runs "BLOCK_PARTS_AT" block_parts "WEIGHTS_AT" weights
+        "RECOVERED_AT" recovered
         "SMALL_STEPS_AT" small_steps "FALLS_AT" falls "STRIDE_AT" stride
         "ANCHORS_AT" anchors "LINES_AT" lines "ENERGIES_AT" energies "TET_LANES_AT" tet_lanes
         "LAW_ENDS_AT" law_ends

@@ -7,7 +7,7 @@
 // The CPU takes a step again by implicit Euler that stores too much. Here it ends where the first solve has, earlier in time:
 // a solve lowers its potential, so that it stores no more than there was.
 //
-// `job.parameter`: c, one of implicit Euler, whose first solve is none.
+// Pieces are measured from `job.first` on. `job.parameter`: c, one of implicit Euler, whose first solve is none.
 
 // Sums of a piece. Of elements: changes of the energy [J] of last and first solve, the same without signs; of all: holds.
 const END_STORED: u32 = 0u;
@@ -123,6 +123,16 @@ fn keep_start_strain(element: u32) {
 }
 
 fn add_element_end(element: u32, is_trial: bool, into: ptr<function, Sums>) {
+    let tet_lanes = table[TET_LANES_AT];
+    if element < tet_lanes && is_recovered(element / LANES) {
+        // Whoever measures forces finds their strains himself.
+        let changes = recovered_ends(element / LANES, element % LANES, is_trial);
+        for (var k = 0u; k < 2u; k++) {
+            (*into)[END_STORED + k] += changes[k];
+            (*into)[END_SIZE + k] += abs(changes[k]);
+        }
+        return;
+    }
     let corners = corners_of(element);
     var x: array<vec3f, 4>;
     for (var i = 0u; i < 4u; i++) {
@@ -137,7 +147,6 @@ fn add_element_end(element: u32, is_trial: bool, into: ptr<function, Sums>) {
         (*into)[END_STORED + k] += change;
         (*into)[END_SIZE + k] += abs(change);
     }
-    let tet_lanes = table[TET_LANES_AT];
     if element < tet_lanes {
         keep_start_strain(element);
     } else if element_is_anchored(table[element_row(element - tet_lanes) + ELEMENT_KIND]) {
@@ -197,13 +206,17 @@ fn measure_end(
     @builtin(workgroup_id) workgroup: vec3u,
     @builtin(num_workgroups) groups: vec3u,
 ) {
-    let piece = workgroup.x + workgroup.y * groups.x;
-    if piece >= job.count {
+    let place = workgroup.x + workgroup.y * groups.x;
+    if place >= job.count {
         return;
     }
+    let piece = job.first + place;
     let row = piece_row(piece);
     let part = table[row + PIECE_PART];
     let is_trial = takes_trial(part, local);
+    if local == 0u && piece == table[part_row(part) + PART_VERTEX_PIECES] {
+        progress[part].takes_trial = select(0u, 1u, is_trial);
+    }
     var sums: Sums;
     var more: Sums;
     if table[row + PIECE_ARE_VERTICES] != 0u {
@@ -313,6 +326,9 @@ fn end_step(
     let count = piece_count(part);
     for (var half = 0u; half < 2u; half++) {
         var sums: Sums;
+        if half == 0u {
+            add_averages(part, local, &sums);
+        }
         for (var i = local; i < count; i += THREADS) {
             let at = ends_at(piece_at(part, i)) + SUMS * half;
             for (var k = 0u; k < SUMS; k++) {

@@ -5,10 +5,6 @@
 //
 // `job.parameter`: he over the step.
 
-fn solve_dt() -> f32 {
-    return frame.dt * job.parameter;
-}
-
 // Of a tetrahedron: the change [J], and forces times he^2 into the places of its corners.
 fn evaluate_tet(block: u32, lane: u32) -> f32 {
     let vertices = vertices_of(block, lane);
@@ -93,7 +89,9 @@ fn evaluate_elements(
     for (var i = table[row + PIECE_FIRST] + local; i < table[row + PIECE_END]; i += THREADS) {
         let element = member(i);
         var change = 0.0;
-        if element < tet_lanes {
+        if element < tet_lanes && is_recovered(element / LANES) {
+            change = squared * evaluate_recovered(element / LANES, element % LANES);
+        } else if element < tet_lanes {
             change = squared * evaluate_tet(element / LANES, element % LANES);
         } else {
             change = squared * evaluate_element(element_row(element - tet_lanes));
@@ -128,6 +126,9 @@ fn evaluate_vertices(
         return;
     }
     var sums: Sums;
+    if piece == table[part_row(part) + PART_VERTEX_PIECES] {
+        add_averages(part, local, &sums);
+    }
     for (var v = table[row + PIECE_FIRST] + local; v < table[row + PIECE_END]; v += THREADS) {
         let y = points[v].xyz;
         sums[SUM_REACH] = max(sums[SUM_REACH], dot(y, y));
@@ -136,7 +137,7 @@ fn evaluate_vertices(
             let predicted = vertex_data_of(PREDICTED, v);
             let away = y - predicted.xyz;
             let way = y - vertex_data_of(QN_BASE, v).xyz;
-            gradient = away * predicted.w - gather(v).xyz;
+            gradient = away * predicted.w - (gather(v).xyz + recovered_force(v));
             let change = predicted.w * dot(way, away - way * 0.5);
             sums[SUM_CHANGE] += change;
             sums[SUM_SIZE] += abs(change);

@@ -1,4 +1,4 @@
-//! The quasi-Newton method on the device: seven dispatches for an iteration.
+//! The quasi-Newton method on the device: seven dispatches for an iteration, ten with recovered-gradient tetrahedra.
 //!
 //! Every workgroup that needs a decision makes it for itself from the sums that the stages before it have left, so that no
 //! dispatch only decides: `Judge` and the ends of solves are parts of what comes after them. A part that is done pays a look
@@ -10,6 +10,7 @@ use super::stage::{QuasiNewtonStage, Solve};
 use crate::solver::gpu::kernels::{self, Kernel};
 use crate::solver::gpu::record::{Dispatch, Recorder};
 use crate::solver::gpu::uniforms::Job;
+use crate::solver::step::recovered::on_device::Extent;
 
 /// Bits of a job's mode, as in `progress.wgsl`: which record is the newer one; solves whose last direction is judged.
 const SECOND_RECORD: u32 = 1;
@@ -45,14 +46,7 @@ impl Recorder<'_> {
             QuasiNewtonStage::StartSolve(Solve::Second) => {
                 into.push(self.of_vertices(&kernels::BEGIN_SECOND, solve));
             }
-            QuasiNewtonStage::Evaluate => {
-                let count = self.pieces.first_of_vertices;
-                if count > 0 {
-                    let job = Job { count, ..self.job(solve) };
-                    into.push(self.each(&kernels::EVALUATE_ELEMENTS, job));
-                }
-                into.push(self.of_vertices(&kernels::EVALUATE_VERTICES, solve));
-            }
+            QuasiNewtonStage::Evaluate => self.evaluate(solve, into),
             QuasiNewtonStage::Precondition => {
                 let job = self.job(solve);
                 into.extend(self.shared(&kernels::RESTRICT_GRADIENT, fine, 8, job));
@@ -65,18 +59,49 @@ impl Recorder<'_> {
             QuasiNewtonStage::Advance => {
                 into.push(self.of_vertices(&kernels::CHOOSE_DIRECTION, solve));
             }
-            QuasiNewtonStage::LimitEnergy => {
-                let count = self.pieces.count;
-                let job = Job { count, ..self.job(solve) };
-                into.push(self.each(&kernels::MEASURE_END, job));
-                into.push(self.of_vertices(&kernels::END_STEP, solve));
-            }
+            QuasiNewtonStage::LimitEnergy => self.limit_energy(solve, into),
             // Parts of the stages that follow.
             QuasiNewtonStage::StartSolve(Solve::First | Solve::Euler)
             | QuasiNewtonStage::Judge
             | QuasiNewtonStage::EndSolve(_)
             | QuasiNewtonStage::CheckEnergy => {}
         }
+    }
+
+    fn evaluate(&self, solve: Solve, into: &mut Vec<Dispatch>) {
+        let Some(Extent { groups, averages }) = self.recovered else {
+            into.extend(self.of_elements(&kernels::EVALUATE_ELEMENTS, solve));
+            into.push(self.of_vertices(&kernels::EVALUATE_VERTICES, solve));
+            return;
+        };
+        let of = |count: u32| Job { count, ..self.job(solve) };
+        into.push(self.each(&kernels::RECOVER_GRADIENTS, of(groups)));
+        into.extend(self.of_elements(&kernels::EVALUATE_RECOVERED, solve));
+        into.push(self.each(&kernels::AVERAGE_VOLUMES, of(averages)));
+        into.push(self.each(&kernels::GATHER_STRESSES, of(groups)));
+        into.push(self.of_vertices(&kernels::EVALUATE_RECOVERED_VERTICES, solve));
+    }
+
+    fn limit_energy(&self, solve: Solve, into: &mut Vec<Dispatch>) {
+        let Some(Extent { groups, averages }) = self.recovered else {
+            let job = Job { count: self.pieces.count, ..self.job(solve) };
+            into.push(self.each(&kernels::MEASURE_END, job));
+            into.push(self.of_vertices(&kernels::END_STEP, solve));
+            return;
+        };
+        let of = |count: u32| Job { count, ..self.job(solve) };
+        // Vertices first: gradients ask whether the last trial is taken.
+        into.push(self.of_vertices(&kernels::MEASURE_RECOVERED_END, solve));
+        into.push(self.each(&kernels::RECOVER_ENDS, of(groups)));
+        into.extend(self.of_elements(&kernels::MEASURE_RECOVERED_END, solve));
+        into.push(self.each(&kernels::AVERAGE_ENDS, of(averages)));
+        into.push(self.of_vertices(&kernels::END_RECOVERED_STEP, solve));
+    }
+
+    /// A workgroup for each piece of elements; nothing where there is none.
+    fn of_elements(&self, kernel: &'static Kernel, solve: Solve) -> Option<Dispatch> {
+        let count = self.pieces.first_of_vertices;
+        (count > 0).then(|| self.each(kernel, Job { count, ..self.job(solve) }))
     }
 
     /// Coarser nodes, 32 a workgroup, and dense levels.

@@ -34,4 +34,5 @@ pub struct PartProgress {
     pub yw: [Products; 2],
     pub was_rejected: u32,
     pub calm: u32,
+    pub takes_trial: u32,
 }

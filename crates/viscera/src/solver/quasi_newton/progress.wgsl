@@ -32,6 +32,11 @@ const SUM_LONGEST: u32 = 4u;
 const SUM_NEXT_LONGEST: u32 = 5u;
 const TRIAL_MAXIMA: u32 = 0x18u;
 
+// The step [s] of a solve; `job.parameter`: its share of the whole.
+fn solve_dt() -> f32 {
+    return frame.dt * job.parameter;
+}
+
 fn newer_record() -> u32 {
     return job.mode & SECOND_RECORD;
 }

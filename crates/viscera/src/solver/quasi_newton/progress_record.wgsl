@@ -30,4 +30,6 @@ struct PartProgress {
     // Whether the last step was rejected, and whether its last solve rejected no trial.
     was_rejected: u32,
     calm: u32,
+    // At the end of a step: whether the last solve ends at its trial.
+    takes_trial: u32,
 }

@@ -418,6 +418,9 @@ fn recovered_tets<T: Scalar>(numbers_in: &[T]) -> Results<T> {
     let stress = recovered::tet_stress(&bent, shares.local, mu, share, pressure);
     let stresses = recovered::vertex_stresses(&stress, &rest);
     let change = neo_hookean::volume_change(&bent);
+    // To an eighth of the volume, which is below the floor.
+    let way = gradients[0] * T::from_f64(-0.5);
+    let [first, second, third] = neo_hookean::volume_variation(&f, &way);
     vec![
         ("bulk_shares", vec![shares.local, shares.domain, shares.cluster]),
         ("recovered_gradient", numbers(&bent.columns)),
@@ -426,6 +429,8 @@ fn recovered_tets<T: Scalar>(numbers_in: &[T]) -> Results<T> {
         ("bulk_energy", vec![recovered::bulk_energy(change, shares.domain)]),
         ("floor_energy", vec![recovered::floor_energy(&f, mu)]),
         ("floor_piola", numbers(&recovered::floor_piola(&f, mu).columns)),
+        ("volume_variation", vec![(first + second) + third]),
+        ("floor_energy_change", vec![recovered::floor_energy_change(&f, &way, mu)]),
     ]
 }
 
@@ -442,17 +447,19 @@ const RECOVERED_TETS: &str = "
     let shares = recovered_bulk_shares(lambda, mu);
     let bent = recovered_gradient(f, gradients, rest);
     let stress = recovered_tet_stress(bent, shares.local, mu, 0.7, pressure);
-    let stresses = recovered_vertex_stresses(stress, rest);
+    let way = gradients[0] * -0.5;
     put(shares.local);
     put(shares.domain);
     put(shares.cluster);
     put_mat3(bent);
     put_mat3(stress);
-    put_mat3(stresses[0]);
-    put_mat3(stresses[1]);
-    put_mat3(stresses[2]);
-    put_mat3(stresses[3]);
+    put_mat3(recovered_vertex_stress(stress, rest, 0u));
+    put_mat3(recovered_vertex_stress(stress, rest, 1u));
+    put_mat3(recovered_vertex_stress(stress, rest, 2u));
+    put_mat3(recovered_vertex_stress(stress, rest, 3u));
     put(recovered_bulk_energy(neo_hookean_volume_change(bent), shares.domain));
     put(recovered_floor_energy(f, mu));
     put_mat3(recovered_floor_piola(f, mu));
+    put(recovered_volume_variation(f, way));
+    put(recovered_floor_energy_change(f, way, mu));
 ";

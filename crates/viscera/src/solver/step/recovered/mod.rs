@@ -16,12 +16,16 @@ mod along;
 mod energies;
 mod kernels;
 mod of_step;
+#[cfg(feature = "gpu")]
+pub(crate) mod on_device;
 mod passes;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use along::{Along, Found, Since};
 pub(crate) use kernels::Load;
+#[cfg(feature = "gpu")]
+pub(crate) use of_step::MeasuredTets;
 pub(crate) use of_step::{along_recovered, load_recovered};
 pub(crate) use passes::RecoveredTets;
 

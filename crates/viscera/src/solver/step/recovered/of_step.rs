@@ -1,11 +1,19 @@
 //! What the methods ask of recovered-gradient tetrahedra in a step.
 #![allow(unsafe_code)]
 
+#[cfg(feature = "gpu")]
+use super::RecoveredTets;
 use super::{Along, Found, Load, Since};
+#[cfg(feature = "gpu")]
+use crate::layout::{Layout, RecoveredTables};
 use crate::material::MaterialModel;
 use crate::scalar::Real;
 use crate::scalar::lanes::{Eight, Point};
 use crate::solver::cpu::threads::Shared;
+#[cfg(feature = "gpu")]
+use crate::solver::cpu::threads::Workers;
+#[cfg(feature = "gpu")]
+use crate::solver::step::data::{OfRecovered, StartStrain};
 use crate::solver::step::data::{Step, StepConstants};
 
 /// The law that they have, by its number.
@@ -47,4 +55,41 @@ pub fn along_recovered<S: Real>(
     };
     let since = Since { strains: &start_strain[NEO_HOOKEAN], dt: step.dt };
     tets.along(workers, step.layout, number, (along, found), since)
+}
+
+/// Recovered-gradient tetrahedra that are measured where a device has left them.
+#[cfg(feature = "gpu")]
+pub struct MeasuredTets {
+    workers: Workers,
+    tets: RecoveredTets<f32>,
+    points: Vec<Point<f32>>,
+    loads: Vec<Point<f32>>,
+}
+
+#[cfg(feature = "gpu")]
+impl MeasuredTets {
+    /// Where tissue is viscous, its strains at the start of the solve, `start` [m], take their places.
+    pub fn new(
+        layout: &Layout<f32>,
+        tables: &RecoveredTables<f32>,
+        start: &[Point<f32>],
+        start_strain: &mut StartStrain<f32>,
+    ) -> Self {
+        let workers = Workers::one();
+        let mut tets = RecoveredTets::new(layout, tables);
+        if !start.is_empty() && layout.tet_sets[NEO_HOOKEAN].viscous {
+            for number in 0..layout.part_count() {
+                tets.evaluate(&workers, layout, number, start);
+                tets.put_strains(&workers, layout, number, 0.0, &mut start_strain[NEO_HOOKEAN]);
+            }
+        }
+        let points = vec![Point::default(); layout.vertex_count()];
+        Self { workers, tets, points, loads: vec![Point::default(); layout.copy_count()] }
+    }
+
+    /// For measures.
+    pub fn of_step(&mut self) -> OfRecovered<'_, f32> {
+        let Self { workers, tets, points, loads } = self;
+        OfRecovered { workers, tets, points, loads }
+    }
 }
