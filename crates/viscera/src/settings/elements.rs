@@ -5,7 +5,7 @@ use super::choices;
 choices! {
     /// How tetrahedra feel that they are deformed.
     pub enum Elements {
-        /// Recovered-gradient ones where method and device have them, which XPBD and graphics processors do not.
+        /// Recovered-gradient ones where method and device have them: not XPBD, nor the explicit method on graphics processors.
         Auto = "auto",
         /// Each by its corners alone, linear tetrahedra: coarse meshes are too stiff where they bend.
         Plain = "plain",

@@ -158,8 +158,14 @@ fn frames_and_reports_agree_with_the_cpu_at_length() {
 /// off by at most twice as much as the CPU is, and its reports are the CPU's within what such steps leave.
 #[test]
 fn solves_of_a_scene_are_as_near_as_the_cpus() {
+    for elements in ["plain", "recovered"] {
+        solves_are_as_near(elements);
+    }
+}
+
+fn solves_are_as_near(elements: &'static str) {
     let with = |device, more: &[(&'static str, &'static str)]| {
-        let method = [("solver.method", "quasi_newton"), ("solver.elements", "plain")];
+        let method = [("solver.method", "quasi_newton"), ("solver.elements", elements)];
         [&method[..], &[("solver.device", device)], more].concat()
     };
     let mut cpu = simulation(&with("cpu", &[])).expect("a simulation");

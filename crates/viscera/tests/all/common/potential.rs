@@ -6,9 +6,14 @@
 //! W = mu/2 (|F|^2 - 3) + lh/2 (J - a)^2 - lh/2 (1 - a)^2,  lh = lambda + mu,  a = 1 + mu/lh
 //! ```
 
+use crate::common::single_body;
+use viscera::layout::{Domains, Smoothing};
+use viscera::material::Material;
 use viscera::mesh::{TetMesh, edge_matrix, tet_volume};
+use viscera::model::Model;
 use viscera::scalar::{Mat3, Real, Vec3};
 use viscera::solver::Inputs;
+use viscera::solver::recovered::Recovered;
 use viscera::state::State;
 
 /// A value [J], and what rounding of positions to a precision can make of it, to first order.
@@ -37,6 +42,8 @@ pub struct Outside<'a> {
     mu: f64,
     /// Of the precision that positions are stored in.
     epsilon: f64,
+    /// Where its tetrahedra are recovered-gradient ones.
+    recovered: Option<(Model<f64>, Domains<f64>)>,
 }
 
 impl<'a> Outside<'a> {
@@ -48,10 +55,31 @@ impl<'a> Outside<'a> {
             tet.iter().for_each(|&v| masses[v as usize] += quarter);
         }
         let lambda = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
-        Self { mesh, masses, lambda, mu: young / (2.0 * (1.0 + poisson)), epsilon: S::EPSILON }
+        let (mu, recovered) = (young / (2.0 * (1.0 + poisson)), None);
+        Self { mesh, masses, lambda, mu, epsilon: S::EPSILON, recovered }
+    }
+
+    /// The same body of recovered-gradient tetrahedra: of this material.
+    pub fn of_recovered(self, tissue: &Material) -> Self {
+        let model = single_body(self.mesh, tissue);
+        let domains = Domains::new(&model, Smoothing::RECOVERED);
+        Self { recovered: Some((model, domains)), ..self }
+    }
+
+    /// By the definition, one tetrahedron at a time.
+    fn recovered_energy(&self, model: &Model<f64>, of: &Domains<f64>, x: &[Vec3<f64>]) -> Rounded {
+        let mut truth = Recovered::new(of);
+        truth.evaluate(of, &model.materials, x);
+        let mut gradient = vec![Vec3::ZERO; x.len()];
+        truth.add_gradient(of, &model.materials, &mut gradient);
+        let rounded = gradient.iter().zip(x).map(|(g, x)| g.length() * self.epsilon * x.length());
+        Rounded { value: truth.energy(of, &model.materials), noise: rounded.sum() }
     }
 
     fn elastic(&self, x: &[Vec3<f64>]) -> Rounded {
+        if let Some((model, domains)) = &self.recovered {
+            return self.recovered_energy(model, domains, x);
+        }
         let (mu, lh) = (self.mu, self.lambda + self.mu);
         let a = 1.0 + mu / lh;
         let (mut value, mut noise) = (0.0, 0.0);
