@@ -5,7 +5,7 @@ use super::choices;
 choices! {
     /// How tetrahedra feel that they are deformed.
     pub enum Elements {
-        /// Recovered-gradient ones where method and device have them: not XPBD, nor the explicit method on graphics processors.
+        /// Recovered-gradient ones where the method has them, which XPBD does not.
         Auto = "auto",
         /// Each by its corners alone, linear tetrahedra: coarse meshes are too stiff where they bend.
         Plain = "plain",

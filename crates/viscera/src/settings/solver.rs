@@ -171,7 +171,7 @@ settings_table! {
         /// than a twentieth of what the softest one does is measured by that twentieth. Rest does not depend on it.
         accuracy: Accuracy = (Accuracy::Standard), Accuracies;
         /// What tetrahedra of stable neo-Hookean tissue are. "recovered": on the same vertices, each also sees how its
-        /// neighbours are deformed; coarse meshes bend as fine ones do. "quasi_newton" has them, and "explicit" on the CPU.
+        /// neighbours are deformed; coarse meshes bend as fine ones do. "quasi_newton" and "explicit" have them.
         /// "plain": linear ones, with which coarse meshes bend too little, four cells across by 16 % at a Poisson's ratio
         /// of 0.3, by half at 0.49; a step costs a third. "auto": "recovered" where method and device have it, otherwise "plain".
         elements: Elements = (Elements::Auto), one_of::<Elements>();
@@ -320,7 +320,7 @@ impl SolverSettings {
     fn elements_of(&self, method: Method, is_on_device: bool) -> Elements {
         let has_recovered = match method {
             Method::QuasiNewton => true,
-            Method::Explicit => !is_on_device,
+            Method::Explicit => !is_on_device || cfg!(feature = "gpu-solves"),
             Method::Xpbd | Method::Auto => false,
         };
         match self.elements {

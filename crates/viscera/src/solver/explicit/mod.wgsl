@@ -1,4 +1,4 @@
-// Stages of the explicit method (solver/explicit/mod.rs): two dispatches for a small step h.
+// Stages of the explicit method (solver/explicit/mod.rs): two dispatches for a small step h, five with recovered-gradient tetrahedra.
 //
 //   x += h/2 v once,   v += h (g + M^-1 f(x + tau v)),   x += h v, in the last one h/2
 //
@@ -13,10 +13,14 @@ fn part_of_block(block: u32) -> u32 {
     return table[table[BLOCK_PARTS_AT] + block];
 }
 
+fn put_vertex_data(range: u32, v: u32, value: vec4f) {
+    vertex_data[range * table[STRIDE_AT] + v] = value;
+}
+
 // Where a pinned vertex is after a share of the step.
 fn led(v: u32, share: f32) -> vec3f {
-    let start = previous[v].xyz;
-    return start + (targets[v].xyz - start) * share;
+    let start = vertex_data_of(PREVIOUS, v).xyz;
+    return start + (vertex_data_of(TARGETS, v).xyz - start) * share;
 }
 
 // Remembers positions and, in `predicted` until the end of the step, velocities. Moves to the middle of the first small step.
@@ -32,17 +36,17 @@ fn begin_explicit(
     if v >= job.count {
         return;
     }
-    previous[v] = vec4f(points[v].xyz, previous[v].w);
-    predicted[v] = vec4f(velocities[v].xyz, predicted[v].w);
+    put_vertex_data(PREVIOUS, v, vec4f(points[v].xyz, vertex_data_of(PREVIOUS, v).w));
+    put_vertex_data(PREDICTED, v, vec4f(vertex_data_of(VELOCITIES, v).xyz, vertex_data_of(PREDICTED, v).w));
     let small = small_row(part_with(PART_VERTICES_END, v));
-    if external_forces[v].w == 0.0 {
-        let way = targets[v].xyz - points[v].xyz;
+    if vertex_data_of(EXTERNAL_FORCES, v).w == 0.0 {
+        let way = vertex_data_of(TARGETS, v).xyz - points[v].xyz;
         points[v] = vec4f(led(v, 0.5 / f32(table[small + SMALL_COUNT])), 0.0);
-        velocities[v] = vec4f(way * frame.inverse_dt, 0.0);
+        put_vertex_data(VELOCITIES, v, vec4f(way * frame.inverse_dt, 0.0));
         return;
     }
     let time = 0.5 * number(small + SMALL_DT) + number(small + SMALL_AHEAD);
-    points[v] = vec4f(points[v].xyz + velocities[v].xyz * time, 0.0);
+    points[v] = vec4f(points[v].xyz + vertex_data_of(VELOCITIES, v).xyz * time, 0.0);
 }
 
 // Green strain one small step before the middle of the first, at x_n - h/2 v_n.
@@ -64,9 +68,11 @@ fn begin_strain(
     let small_dt = number(small_row(part_of_block(block)) + SMALL_DT);
     var x: array<vec3f, 4>;
     for (var i = 0u; i < 4u; i++) {
-        x[i] = previous[vertices[i]].xyz - predicted[vertices[i]].xyz * (0.5 * small_dt);
+        x[i] = vertex_data_of(PREVIOUS, vertices[i]).xyz - vertex_data_of(PREDICTED, vertices[i]).xyz * (0.5 * small_dt);
     }
-    store_start_strain(block, lane, green_strain_strain(deformation_gradient(x, shape_of(block, lane))));
+    let shape = shape_of(block, lane);
+    let f = tet_gradient(block, lane, deformation_gradient(x, shape), shape);
+    store_start_strain(block, lane, green_strain_strain(f));
 }
 
 fn store_start_strain(block: u32, lane: u32, strain: array<f32, 6>) {
@@ -86,7 +92,9 @@ fn load_forces(
     if thread == 0u {
         control.small_step = control.small_steps_done + 1u;
     }
-    if thread < job.tet_count {
+    if thread < job.tet_count && is_recovered(thread / LANES) {
+        load_recovered(thread / LANES, thread % LANES);
+    } else if thread < job.tet_count {
         load_tet(thread / LANES, thread % LANES);
     } else if thread < job.count {
         load_element(element_row(thread - job.tet_count));
@@ -119,9 +127,9 @@ fn load_tet(block: u32, lane: u32) {
     }
     let volume = tets[block].rest_volume[lane] * (small_dt * small_dt);
     let forces = internal_forces(piola, shape, volume);
-    let slots = indices_of(block, lane);
+    let slots = table[CORNERS_AT] + 32u * block + lane;
     for (var i = 0u; i < 4u; i++) {
-        loads[slots[i]] = vec4f(forces[i], 0.0);
+        loads[table[slots + 8u * i]] = vec4f(forces[i], 0.0);
     }
 }
 
@@ -133,7 +141,7 @@ fn load_element(row: u32) {
     var start: array<vec3f, 4>;
     for (var i = 0u; i < 4u; i++) {
         x[i] = points[vertices[i]].xyz;
-        start[i] = x[i] - vertex_data[VELOCITIES * table[STRIDE_AT] + vertices[i]].xyz * h;
+        start[i] = x[i] - vertex_data_of(VELOCITIES, vertices[i]).xyz * h;
     }
     var forces = element_forces(kind, moment_of(row, start, h), x);
     for (var i = 0u; i < element_corners(kind); i++) {
@@ -158,8 +166,8 @@ fn advance_explicit(
     if control.small_step > count {
         return;
     }
-    let on_vertex = external_forces[v];
-    let hold = targets[v];
+    let on_vertex = vertex_data_of(EXTERNAL_FORCES, v);
+    let hold = vertex_data_of(TARGETS, v);
     let is_last = control.small_step == count;
     if on_vertex.w == 0.0 {
         let share = (f32(control.small_step) + 0.5) / f32(count);
@@ -169,11 +177,11 @@ fn advance_explicit(
     let h = number(small + SMALL_DT);
     let x = points[v].xyz;
     let pull = on_vertex.xyz + (hold.xyz - x) * hold.w;
-    let impulse = gather(v).xyz * number(small + SMALL_INVERSE_DT) + pull * h;
-    let velocity = velocities[v].xyz + (impulse * on_vertex.w + frame.gravity * h);
+    let impulse = (gather(v).xyz + recovered_force(v)) * number(small + SMALL_INVERSE_DT) + pull * h;
+    let velocity = vertex_data_of(VELOCITIES, v).xyz + (impulse * on_vertex.w + frame.gravity * h);
     let ahead = number(small + SMALL_AHEAD);
-    let place = x - velocities[v].xyz * ahead;
-    velocities[v] = vec4f(velocity, 0.0);
+    let place = x - vertex_data_of(VELOCITIES, v).xyz * ahead;
+    put_vertex_data(VELOCITIES, v, vec4f(velocity, 0.0));
     points[v] = vec4f(place + velocity * select(h + ahead, 0.5 * h, is_last), 0.0);
 }
 
@@ -188,21 +196,21 @@ fn end_explicit(
     if v >= job.count {
         return;
     }
-    let mass = predicted[v].w;
+    let mass = vertex_data_of(PREDICTED, v).w;
     let x = points[v].xyz;
-    let on_vertex = external_forces[v];
+    let on_vertex = vertex_data_of(EXTERNAL_FORCES, v);
     var back: vec3f;
     if on_vertex.w == 0.0 {
-        let change = velocities[v].xyz - predicted[v].xyz;
+        let change = vertex_data_of(VELOCITIES, v).xyz - vertex_data_of(PREDICTED, v).xyz;
         let load = frame.gravity + on_vertex.xyz * (1.0 / mass);
         back = change * frame.dt - load * frame.squared_dt;
     } else {
         let small = small_row(part_with(PART_VERTICES_END, v));
         let time = 0.5 * number(small + SMALL_DT) - number(small + SMALL_AHEAD);
-        let middle = x - velocities[v].xyz * time;
-        let pull = (targets[v].xyz - middle) * targets[v].w * frame.squared_dt;
+        let middle = x - vertex_data_of(VELOCITIES, v).xyz * time;
+        let pull = (vertex_data_of(TARGETS, v).xyz - middle) * vertex_data_of(TARGETS, v).w * frame.squared_dt;
         let steps = frame.dt * number(small + SMALL_INVERSE_DT);
-        back = (gather(v).xyz * (steps * steps) + pull) * on_vertex.w;
+        back = ((gather(v).xyz + recovered_force(v)) * (steps * steps) + pull) * on_vertex.w;
     }
-    predicted[v] = vec4f(x - back, mass);
+    put_vertex_data(PREDICTED, v, vec4f(x - back, mass));
 }

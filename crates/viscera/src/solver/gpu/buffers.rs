@@ -45,15 +45,14 @@ fn check_sizes(
     Err(GpuError::TooLarge { what, needed, limit, name: device.name().to_owned(), largest })
 }
 
-/// What the quasi-Newton method has beside the others.
+/// What the quasi-Newton method has beside the others, and recovered-gradient tetrahedra.
 fn sizes_of_levels(
     layout: &Layout<f32>,
     levels: Option<&DeviceLevels>,
 ) -> [(Slot, &'static str, u64); 5] {
     let pair = 3 * 16 * u64::from(DeviceLayout::stride(layout));
     let progress = (size_of::<PartProgress>() * layout.part_count()) as u64;
-    let extent = levels.and(Extent::new(layout));
-    let recovery = extent.map_or(0, |extent| 16 * extent.vectors(layout));
+    let recovery = Extent::new(layout).map_or(0, |extent| 16 * extent.vectors(layout));
     let [words, numbers, pairs, progress] = levels.map_or([0; 4], |levels| {
         [4 * levels.words, 4 * levels.numbers, pair * u64::from(levels.history), progress]
     });

@@ -101,7 +101,7 @@ pub enum GpuError {
     OnlyOnCpu,
     /// The method has no kernels for these elements.
     #[error(
-        "on a graphics processor only `method = \"quasi_newton\"` has `elements = \"recovered\"`; use that, `elements = \"plain\"`, or `device = \"cpu\"`"
+        "XPBD has no `elements = \"recovered\"`, nor has a page on a graphics processor; use `elements = \"plain\"`, `device = \"cpu\"`, or another method"
     )]
     PlainElements,
 }

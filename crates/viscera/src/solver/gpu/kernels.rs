@@ -39,6 +39,7 @@ pub enum File {
     HistoryTets,
     HistoryElements,
     Explicit,
+    ExplicitRecovered,
     Evaluate,
     Search,
     Take,
@@ -130,14 +131,25 @@ kernels! {
         [Tets StartStrain Unknowns Control Table];
     REPAIR_ELEMENTS = HistoryElements "repair_elements" 64 [Unknowns Control VertexData Table];
     BEGIN_EXPLICIT = Explicit "begin_explicit" 64
-        [Points Velocities Previous Predicted ExternalForces Targets Control Table];
-    BEGIN_STRAIN = Explicit "begin_strain" 64 [Tets Previous Predicted StartStrain Table];
+        [Points Control VertexData Table];
+    BEGIN_STRAIN = Explicit "begin_strain" 64 [Tets StartStrain VertexData Table];
     LOAD_FORCES = Explicit "load_forces" 64
-        [Tets CornerIndices Points Loads StartStrain Control VertexData Table];
-    ADVANCE_EXPLICIT = Explicit "advance_explicit" 64
-        [Points Loads Velocities Previous ExternalForces Targets Control Table];
-    END_EXPLICIT = Explicit "end_explicit" 64
-        [Points Loads Velocities Predicted ExternalForces Targets Table];
+        [Tets Points Loads StartStrain Control VertexData Table];
+    ADVANCE_EXPLICIT = Explicit "advance_explicit" 64 [Points Loads Control VertexData Table];
+    END_EXPLICIT = Explicit "end_explicit" 64 [Points Loads VertexData Table];
+    RECOVER_PLACES = ExplicitRecovered "recover_places" 64
+        [Points Control VertexData Table Recovery];
+    BEGIN_STRAIN_RECOVERED = ExplicitRecovered "begin_strain" 64
+        [Tets StartStrain VertexData Table Recovery];
+    LOAD_RECOVERED_FORCES = ExplicitRecovered "load_forces" 64
+        [Tets Points Loads StartStrain Control VertexData Table Recovery];
+    AVERAGE_PRESSURES = ExplicitRecovered "average_pressures" 256 [Control Table Recovery];
+    GATHER_SMALL_STRESSES = ExplicitRecovered "gather_stresses" 64
+        [Tets Points Control Table Recovery];
+    ADVANCE_RECOVERED = ExplicitRecovered "advance_explicit" 64
+        [Points Loads Control VertexData Table Recovery];
+    END_EXPLICIT_RECOVERED = ExplicitRecovered "end_explicit" 64
+        [Points Loads VertexData Table Recovery];
     CHEBYSHEV_MIX = Acceleration "chebyshev_mix" 256 [Unknowns Iterate Older Control Table];
     EVALUATE = Evaluate "evaluate" 256 [Tets Points StartStrain PartialSums Control VertexData Table];
     SEARCH = Search "search" 256
@@ -199,6 +211,9 @@ const SUMS: &str = kernel_text!("sums.wgsl");
 /// How elements that are no tetrahedra lie in the table.
 const ELEMENTS: &str = kernel_text!("elements.wgsl");
 
+/// In the place of recovered-gradient tetrahedra.
+const PLAIN: &str = kernel_text!("../step/recovered/none.wgsl");
+
 /// How a sweep reads and writes, and how an acceleration finds what a sweep has left.
 fn swept(swept: Swept) -> [&'static str; 2] {
     let copies = kernel_text!("../xpbd/acceleration_mapped_copies.wgsl");
@@ -217,23 +232,13 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
     let [swept, mapped] = swept(variant.swept);
     let form = wgsl::form_texts(variant.form);
     let own = |file| vec![file];
-    let laws = || vec![wgsl::LAW_TEXT.as_str(), TISSUE_WGSL];
-    let elements = |file| vec![wgsl::KIND_TEXT.as_str(), ELEMENTS, file];
     let history = kernel_text!("../xpbd/history.wgsl");
-    let pieces = || elements(kernel_text!("../step/pieces.wgsl"));
     // The potential, and what the guard decides by it.
     let guard = |own: Vec<&'static str>| {
         let potential =
             [kernel_text!("../step/potential.wgsl"), kernel_text!("../step/guard_decide.wgsl")];
         [laws(), pieces(), potential.to_vec(), own].concat()
     };
-    let levels = kernel_text!("../quasi_newton/preconditioner/levels.wgsl");
-    let solve = |own: Vec<&'static str>| {
-        [laws(), pieces(), vec![kernel_text!("../quasi_newton/progress.wgsl")], own].concat()
-    };
-    let recovered_tables = [wgsl::RECOVERED, kernel_text!("../step/recovered/tables.wgsl")];
-    let recovered = |own: [&'static str; 2]| solve([recovered_tables, own].concat());
-    let none = kernel_text!("../quasi_newton/recovered_none.wgsl");
     match kernel.file {
         File::Predict => own(kernel_text!("../step/predict.wgsl")),
         File::Rebase => own(kernel_text!("../xpbd/rebase.wgsl")),
@@ -257,25 +262,31 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
         File::HistoryElements => {
             [vec![history], elements(kernel_text!("../xpbd/history_elements.wgsl"))].concat()
         }
-        File::Explicit => [laws(), elements(kernel_text!("../explicit/mod.wgsl"))].concat(),
+        File::Explicit => {
+            let own = [PLAIN, kernel_text!("../explicit/recovered_none.wgsl")];
+            [laws(), own.to_vec(), elements(kernel_text!("../explicit/mod.wgsl"))].concat()
+        }
         File::Evaluate => guard(own(kernel_text!("../step/guard_evaluate.wgsl"))),
         File::Search => guard(own(kernel_text!("../step/guard_search.wgsl"))),
         File::Take => guard(vec![SPANS, kernel_text!("../step/guard_take.wgsl")]),
         File::Energy => guard(own(kernel_text!("../step/energy.wgsl"))),
         // Pages are light.
-        File::Begin
-        | File::Refresh
-        | File::Invert
-        | File::EvaluateTrial
-        | File::EvaluateRecovered
-        | File::Apply
-        | File::Direction
-        | File::End
-        | File::EndRecovered
-            if !IS_THERE =>
-        {
-            Vec::new()
-        }
+        file if IS_THERE => files_of_solves(file),
+        _ => Vec::new(),
+    }
+}
+
+/// The files of kernels that pages leave out.
+fn files_of_solves(file: File) -> Vec<&'static str> {
+    let own = |file| vec![file];
+    let levels = kernel_text!("../quasi_newton/preconditioner/levels.wgsl");
+    let solve = |own: Vec<&'static str>| {
+        [laws(), pieces(), vec![kernel_text!("../quasi_newton/progress.wgsl")], own].concat()
+    };
+    let tables = [wgsl::RECOVERED, kernel_text!("../step/recovered/tables.wgsl")];
+    let forces = kernel_text!("../step/recovered/forces.wgsl");
+    let none = kernel_text!("../quasi_newton/recovered_none.wgsl");
+    match file {
         File::Begin => solve(own(kernel_text!("../quasi_newton/begin.wgsl"))),
         File::Refresh => {
             let own = kernel_text!("../quasi_newton/preconditioner/refresh.wgsl");
@@ -284,19 +295,50 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
         File::Invert => {
             vec![levels, kernel_text!("../quasi_newton/preconditioner/invert.wgsl")]
         }
-        File::EvaluateTrial => solve(vec![none, kernel_text!("../quasi_newton/evaluate.wgsl")]),
-        File::EvaluateRecovered => recovered([
-            kernel_text!("../quasi_newton/recovered.wgsl"),
-            kernel_text!("../quasi_newton/evaluate.wgsl"),
-        ]),
+        File::ExplicitRecovered => {
+            let own = [
+                forces,
+                kernel_text!("../explicit/recovered.wgsl"),
+                kernel_text!("../explicit/mod.wgsl"),
+            ];
+            [laws(), pieces(), tables.to_vec(), own.to_vec()].concat()
+        }
+        File::EvaluateTrial => {
+            solve(vec![PLAIN, none, kernel_text!("../quasi_newton/evaluate.wgsl")])
+        }
+        File::EvaluateRecovered => {
+            let own = [
+                forces,
+                kernel_text!("../quasi_newton/recovered.wgsl"),
+                kernel_text!("../quasi_newton/evaluate.wgsl"),
+            ];
+            solve([tables.to_vec(), own.to_vec()].concat())
+        }
         File::Apply => vec![levels, kernel_text!("../quasi_newton/preconditioner/apply.wgsl")],
         File::Direction => solve(vec![levels, kernel_text!("../quasi_newton/direction.wgsl")]),
-        File::End => solve(vec![none, kernel_text!("../quasi_newton/end.wgsl")]),
-        File::EndRecovered => recovered([
-            kernel_text!("../quasi_newton/recovered_end.wgsl"),
-            kernel_text!("../quasi_newton/end.wgsl"),
-        ]),
+        File::End => solve(vec![PLAIN, none, kernel_text!("../quasi_newton/end.wgsl")]),
+        File::EndRecovered => {
+            let own = [
+                kernel_text!("../quasi_newton/recovered_end.wgsl"),
+                kernel_text!("../quasi_newton/end.wgsl"),
+            ];
+            solve([tables.to_vec(), own.to_vec()].concat())
+        }
+        _ => Vec::new(),
     }
+}
+
+fn laws() -> Vec<&'static str> {
+    vec![wgsl::LAW_TEXT.as_str(), TISSUE_WGSL]
+}
+
+fn elements(file: &'static str) -> Vec<&'static str> {
+    vec![wgsl::KIND_TEXT.as_str(), ELEMENTS, file]
+}
+
+/// Sums over pieces.
+fn pieces() -> Vec<&'static str> {
+    elements(kernel_text!("../step/pieces.wgsl"))
 }
 
 /// The whole text that a kernel is compiled from: constants that the host shares, then whole files.
@@ -327,9 +369,12 @@ pub fn texts() -> Vec<(String, String)> {
 fn key(kernel: &Kernel, variant: Variant) -> String {
     if varies(kernel) {
         format!("{} {:?} {:?}", kernel.entry, variant.form, variant.swept)
-    } else if matches!(kernel.file, File::EvaluateRecovered | File::EndRecovered) {
-        // Some have the names of those for plain tetrahedra.
-        format!("{} of recovered tetrahedra", kernel.entry)
+    } else if matches!(
+        kernel.file,
+        File::ExplicitRecovered | File::EvaluateRecovered | File::EndRecovered
+    ) {
+        // Some have the names of those for plain tetrahedra, or of another method.
+        format!("{} {:?}", kernel.entry, kernel.file)
     } else {
         kernel.entry.to_owned()
     }

@@ -274,7 +274,7 @@ impl DeviceLayout {
             let small = vec![SmallSteps::default(); layout.part_count()];
             header.small_steps = add(Some(Slot::SmallSteps), bytemuck::cast_slice(&small));
         }
-        if layout.recovered.is_some() {
+        if on_device::Extent::new(layout).is_some() {
             header.recovered = add(None, &words(&on_device::words(layout)));
         }
         if accelerates(settings) {

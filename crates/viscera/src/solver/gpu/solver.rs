@@ -27,6 +27,7 @@ use crate::solver::inputs::check_model;
 use crate::solver::plan::{Plan, Stage, StepStage};
 use crate::solver::quasi_newton::on_device::{self, DeviceLevels};
 use crate::solver::quasi_newton::progress::PartProgress;
+use crate::solver::step::recovered;
 use crate::solver::step::tethers::Bundle;
 use crate::state::State;
 
@@ -338,7 +339,8 @@ fn check(device: &Device, settings: &SolverSettings) -> Result<(), GpuError> {
     if settings.method == Method::QuasiNewton && !on_device::IS_THERE {
         return Err(GpuError::OnlyOnCpu);
     }
-    if settings.elements == Elements::Recovered && settings.method != Method::QuasiNewton {
+    let has_recovered = recovered::on_device::IS_THERE && settings.method != Method::Xpbd;
+    if settings.elements == Elements::Recovered && !has_recovered {
         return Err(GpuError::PlainElements);
     }
     device.check()?;

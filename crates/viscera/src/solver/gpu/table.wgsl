@@ -53,6 +53,11 @@ fn tissue_of(kind: u32) -> TissueConstants {
     );
 }
 
+// What a range of the vertex data holds of a vertex.
+fn vertex_data_of(range: u32, v: u32) -> vec4f {
+    return vertex_data[range * table[STRIDE_AT] + v];
+}
+
 // Sum of what acts on a vertex, in the order of its places.
 fn gather(v: u32) -> vec4f {
     let row = table[OFFSETS_AT] + v;

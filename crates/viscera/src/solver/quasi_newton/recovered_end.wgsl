@@ -122,7 +122,7 @@ fn average_ends(
     if group >= job.count {
         return;
     }
-    let n = table[recovered_table(RECOVERED_CLUSTER_PLACES) + THREADS * group + local];
+    let n = place_of_thread(group, local);
     var mean = vec3f();
     var of_place = Place();
     if n != NOWHERE_PLACE {

@@ -1,15 +1,7 @@
 // For models without recovered-gradient tetrahedra, in the place of recovered.wgsl and recovered_end.wgsl.
 
-fn is_recovered(block: u32) -> bool {
-    return false;
-}
-
 fn evaluate_recovered(block: u32, lane: u32) -> f32 {
     return 0.0;
-}
-
-fn recovered_force(v: u32) -> vec3f {
-    return vec3f();
 }
 
 fn recovered_ends(block: u32, lane: u32, is_trial: bool) -> vec2f {

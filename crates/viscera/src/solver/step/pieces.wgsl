@@ -46,10 +46,6 @@ fn agree(yes: bool, local: u32) -> bool {
     return workgroupUniformLoad(&decision) != 0u;
 }
 
-fn vertex_data_of(range: u32, v: u32) -> vec4f {
-    return vertex_data[range * table[STRIDE_AT] + v];
-}
-
 // The vertices of an element, as often as it takes to fill four places.
 fn corners_of(element: u32) -> array<u32, 4> {
     let tet_lanes = table[TET_LANES_AT];

@@ -56,6 +56,9 @@ struct Header {
     sums_at: u32,
 }
 
+/// Whether kernels are there: pages leave them out, which are light.
+pub const IS_THERE: bool = cfg!(feature = "gpu-solves");
+
 /// How much there is to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Extent {
@@ -68,7 +71,7 @@ pub struct Extent {
 impl Extent {
     /// Of a layout that has such tetrahedra.
     pub fn new(layout: &Layout<f32>) -> Option<Self> {
-        let tables = layout.recovered.as_ref()?;
+        let tables = layout.recovered.as_ref().filter(|_| IS_THERE)?;
         let averages: usize = tables.parts.iter().map(averages_of).sum();
         let groups = tables.volumes.len() / LANES;
         (groups > 0).then_some(Self { groups: groups as u32, averages: averages as u32 })

@@ -110,11 +110,9 @@ fn matrices_of(range: u32, block: u32, lane: u32) -> array<mat3x3f, 4> {
 
 // What a tetrahedron leaves.
 struct TetState {
-    // `he^2 V dE/dFh` [N m s^2] but for the pressure, and `he^2 V cof Fh`.
+    // `h^2 V dE/dFh` [N m s^2] but for the pressure, and `h^2 V cof Fh`.
     stress: mat3x3f,
     area: mat3x3f,
-    // `V/4` times `J - 1` and its changes [m^3].
-    volumes: vec3f,
     // `cof F` of the linear tetrahedron times this is the stress of the volume floor.
     floor: f32,
 }
@@ -129,9 +127,9 @@ fn put_tet(block: u32, lane: u32, tet: TetState) {
     }
     recovery[tet_row(block, lane, 3u)] = vec4f(tet.area[1], tet.area[2].x);
     recovery[tet_row(block, lane, 4u)] = vec4f(tet.area[2].yz, tet.floor, 0.0);
-    put_volumes(block, lane, tet.volumes);
 }
 
+// `V/4` times `J - 1` and its changes [m^3].
 fn put_volumes(block: u32, lane: u32, volumes: vec3f) {
     recovery[tet_row(block, lane, 5u)] = vec4f(volumes, 0.0);
 }
@@ -140,7 +138,6 @@ fn volumes_of(block: u32, lane: u32) -> vec3f {
     return recovery[tet_row(block, lane, 5u)].xyz;
 }
 
-// But for the volumes.
 fn tet_of(block: u32, lane: u32) -> TetState {
     let a = recovery[tet_row(block, lane, 0u)];
     let b = recovery[tet_row(block, lane, 1u)];
@@ -148,7 +145,7 @@ fn tet_of(block: u32, lane: u32) -> TetState {
     let d = recovery[tet_row(block, lane, 3u)];
     let e = recovery[tet_row(block, lane, 4u)];
     let area = mat3x3f(vec3f(a.w, b.w, c.w), d.xyz, vec3f(d.w, e.xy));
-    return TetState(mat3x3f(a.xyz, b.xyz, c.xyz), area, vec3f(), e.z);
+    return TetState(mat3x3f(a.xyz, b.xyz, c.xyz), area, e.z);
 }
 
 // Whether a block's tetrahedra are recovered-gradient ones, and its number among these.
@@ -206,6 +203,21 @@ fn mean_of_cluster(cluster: u32, given: vec3f, local: u32) -> vec3f {
     let first = local - local % 4u;
     let sum = (shared_means[first] + shared_means[first + 1u]) + (shared_means[first + 2u] + shared_means[first + 3u]);
     return sum * number(recovered_table(RECOVERED_CLUSTER_VOLUMES) + cluster);
+}
+
+// The place of one of the 256 threads of a workgroup of clusters.
+fn place_of_thread(group: u32, local: u32) -> u32 {
+    return table[recovered_table(RECOVERED_CLUSTER_PLACES) + 256u * group + local];
+}
+
+// `p_n` [Pa].
+fn put_pressure(n: u32, pressure: f32) {
+    recovery[column_at(GRADIENTS, n)].w = pressure;
+}
+
+// The factor of a linear tetrahedron's cofactors in the stress [Pa] of its volume floor.
+fn floor_factor(linear: mat3x3f, lame_mu: f32) -> f32 {
+    return RECOVERED_FLOOR_STIFFNESS * lame_mu * recovered_below_floor(linear);
 }
 
 // Change [J] of what a mean volume stores, of a stiffness times a volume [J].
