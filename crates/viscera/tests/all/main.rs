@@ -9,6 +9,7 @@ mod allocation_threads;
 mod at_rest;
 mod automatic;
 mod balanced;
+mod clusters;
 mod coloring;
 mod contact;
 mod determinism;

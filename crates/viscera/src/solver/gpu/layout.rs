@@ -3,6 +3,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::clusters::ClusterTables;
 use super::limits::accelerates;
 use super::parts::{Fall, Parts, Piece, SmallSteps};
 use super::slots::{ALIGNMENT, Element, Range, Slot, unknowns_size};
@@ -67,6 +68,11 @@ pub(super) struct Header {
     pub tet_lanes: u32,
     pub law_ends: [u32; LAWS],
     pub part_count: u32,
+    /// Of clusters: rows, blocks where their colours begin, vertices, corners by the numbers of these.
+    pub clusters: u32,
+    pub cluster_starts: u32,
+    pub cluster_vertices: u32,
+    pub cluster_corners: u32,
 }
 
 /// The ranges of the vertex data, in order, with the slot that kernels know them by; `None` for one that only the
@@ -262,6 +268,12 @@ impl DeviceLayout {
         if settings.method == Method::Explicit {
             let small = vec![SmallSteps::default(); layout.part_count()];
             header.small_steps = add(Some(Slot::SmallSteps), bytemuck::cast_slice(&small));
+        }
+        if let Some(tables) = ClusterTables::new(layout) {
+            header.clusters = add(None, bytemuck::cast_slice(&tables.rows));
+            header.cluster_starts = add(None, &words(&tables.starts));
+            header.cluster_vertices = add(None, &words(&tables.vertices));
+            header.cluster_corners = add(None, &words(tables.corners.as_flattened()));
         }
         if accelerates(settings) {
             let weights = vec![0; unknowns_size(layout) as usize];

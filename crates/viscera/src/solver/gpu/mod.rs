@@ -15,6 +15,7 @@
 //! lengths, weights, rejections) lies in one record there, `Control`; nothing is read back inside a step.
 
 mod buffers;
+mod clusters;
 mod control;
 mod copy;
 mod cost;

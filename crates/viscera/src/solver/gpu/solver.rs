@@ -20,10 +20,10 @@ use std::sync::Arc;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::Vec3;
-use crate::settings::{Count, Elements, Method, Precision, SolverSettings, Start};
+use crate::settings::{Clusters, Count, Elements, Method, Precision, SolverSettings, Start};
 use crate::solver::error::StepError;
 use crate::solver::explicit::Stability;
-use crate::solver::inputs::check_model;
+use crate::solver::inputs::{check_model, check_settings};
 use crate::solver::plan::{Plan, Stage, StepStage};
 use crate::solver::quasi_newton::on_device::{self, DeviceLevels};
 use crate::solver::quasi_newton::progress::PartProgress;
@@ -340,6 +340,11 @@ fn check(device: &Device, settings: &SolverSettings) -> Result<(), GpuError> {
     }
     if settings.elements == Elements::Recovered {
         return Err(GpuError::PlainElements);
+    }
+    check_settings(settings)?;
+    let is_clustered = settings.method == Method::Xpbd && settings.clusters != Clusters::None;
+    if is_clustered && !on_device::IS_THERE {
+        return Err(GpuError::ClustersOnCpu);
     }
     device.check()?;
     // Sizes are compared array by array, where buffers are made.
