@@ -7,8 +7,9 @@ use viscera::layout::{LaidTet, Layout};
 use viscera::mesh::TetMesh;
 use viscera::mesh::shapes::{self, Block, LIVER_SPACING, Splitting};
 use viscera::model::{Model, ModelBuilder};
+use viscera::scalar::lanes::Instructions;
 use viscera::scalar::{Real, Vec3, vec3};
-use viscera::settings::{Clusters, Colors, Count, Precision, SolverSettings, Threads};
+use viscera::settings::{Clusters, Colors, SolverSettings, Threads};
 use viscera::solver::{Inputs, Pin, Solver, StepError};
 use viscera::state::State;
 
@@ -33,7 +34,7 @@ fn first_tets(count: usize) -> TetMesh {
 }
 
 /// A bar of about so many tetrahedra, four times as long as wide.
-fn bar(cells: usize, splitting: Splitting) -> TetMesh {
+pub fn bar(cells: usize, splitting: Splitting) -> TetMesh {
     let shape = Block::new(vec3(0.2, 0.05, 0.05), [4 * cells, cells, cells]);
     Block { splitting, ..shape }.mesh().expect("a bar")
 }
@@ -205,4 +206,92 @@ fn a_hundred_thousand_tetrahedra_have_four_colors_of_clusters() {
             assert!(seen.colors == 4 && seen.lanes < lanes, "{splitting:?}, {size}: {seen:?}");
         }
     }
+}
+
+/// Held at one end, under gravity.
+pub fn hanging<S: Real>(model: &Model<S>) -> Inputs<S> {
+    let ends = (0..).zip(&model.rest_positions).filter(|(_, x)| x.x.to_f64() < 1e-9);
+    let pins = ends.map(|(vertex, x)| Pin { vertex, target: *x }).collect();
+    Inputs { gravity: vec3(0.0, 0.0, -9.81).cast(), pins, ..Inputs::default() }
+}
+
+/// Where a bar comes to rest, and by how much its end sags [m].
+pub fn rest<S: Real>(model: &Model<S>, settings: &SolverSettings) -> (Vec<Vec3<f64>>, f64) {
+    let inputs = hanging(model);
+    let mut run = Run::new(model, settings);
+    for frame in 0..400 {
+        run.frame(&inputs, if frame < 300 { 0.9 } else { 0.5 });
+    }
+    let places: Vec<_> = run.state.positions.iter().map(|x| x.cast::<f64>()).collect();
+    let moved = places.iter().zip(&model.rest_positions).map(|(a, b)| (*a - b.cast()).length());
+    let sag = moved.fold(0.0, f64::max);
+    (places, sag)
+}
+
+/// The largest distance of two lists of places [m].
+pub fn apart(a: &[Vec3<f64>], b: &[Vec3<f64>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_bar_comes_to_the_rest_of_one_level_of_colors() {
+    let mesh = block([0.1, 0.04, 0.04], [6, 2, 2], 0.1);
+    for law in [STVK, SNH] {
+        let tissue = material(law, 2e4, 0.4);
+        let global = exact(5);
+        let (known, sag) = rest(&single_body::<f64>(&mesh, &tissue), &global);
+        for size in [16, 50, 4096] {
+            let settings = SolverSettings { clusters: Clusters::OfTets(size), ..global.clone() };
+            let (double, _) = rest(&single_body::<f64>(&mesh, &tissue), &settings);
+            let (single, _) = rest(&single_body::<f32>(&mesh, &tissue), &settings);
+            let errors = [apart(&double, &known) / sag, apart(&single, &known) / sag];
+            println!("{law:?}, {size}: sag {sag:.4} m, of it apart {errors:?}");
+            assert!(
+                sag > 1e-3 && errors[0] < 1e-6 && errors[1] < 1e-4,
+                "{law:?}, {size}: {errors:?}"
+            );
+        }
+    }
+}
+
+/// Clusters of a colour go to different threads; in each are elastic and viscous constraints by turns.
+#[test]
+fn threads_and_instructions_leave_every_bit() {
+    let tissue = material(SNH, 1e4, 0.45).with_viscosity(0.01).expect("legal");
+    let model = single_body::<f32>(&bar(5, Splitting::Five), &tissue);
+    let inputs = hanging(&model);
+    let run = |threads, instructions, size| {
+        let threads = Threads::Count(threads);
+        let settings = SolverSettings { threads, ..clustered(size) };
+        let mut solver = Solver::new(&model, &settings);
+        solver.use_instructions(instructions);
+        let mut state = State::at_rest(&model);
+        for _ in 0..10 {
+            solver.step(&model, &mut state, &inputs, 1.0 / 600.0).expect("a legal step");
+        }
+        let vectors = state.positions.iter().chain(&state.velocities).flat_map(|v| v.to_array());
+        vectors.chain(state.multipliers).map(f32::to_bits).collect::<Vec<_>>()
+    };
+    for size in [64, 512] {
+        let known = run(1, Instructions::Avx2, size);
+        for threads in [2, 3] {
+            assert_eq!(run(threads, Instructions::Avx2, size), known, "{threads} threads");
+        }
+        assert_eq!(run(2, Instructions::Portable, size), known);
+    }
+    assert_ne!(run(1, Instructions::Avx2, 64), run(1, Instructions::Avx2, 512));
+}
+
+#[test]
+fn clusters_and_a_limited_number_of_colors_do_not_go_together() {
+    let model = single_body::<f64>(&first_tets(65), &material(SNH, 1e4, 0.4));
+    let settings = SolverSettings { colors: Colors::Limited(4), ..clustered(64) };
+    let mut state = State::at_rest(&model);
+    let step = Solver::new(&model, &settings).step(&model, &mut state, &Inputs::default(), 1e-3);
+    assert_eq!(step, Err(StepError::ClustersAndColors { colors: 4 }));
+    let text = StepError::ClustersAndColors { colors: 4 }.to_string();
+    assert!(
+        text.contains("colors = \"unlimited\"") && text.contains("clusters = \"none\""),
+        "{text}"
+    );
 }

@@ -25,6 +25,7 @@ mod explicit_robust;
 mod forces;
 mod free_fall;
 mod gpu;
+mod gpu_clusters;
 mod gpu_explicit;
 mod gpu_guard;
 mod gpu_history;
