@@ -2,7 +2,7 @@
 //!
 //! These cells are truncated octahedra, and four of them meet at a corner, as few as can be. The lattice has a colouring
 //! by four classes in which touching cells differ; cells of one class are .45 of a cell's width apart, which is more
-//! than two tetrahedra reach from some 300 tetrahedra a cell on. Any other way of cutting space needs more colours: boxes
+//! than two tetrahedra reach from some 400 tetrahedra a cell on. Any other way of cutting space needs more colours: boxes
 //! need eight.
 //!
 //! ```text

@@ -1,9 +1,9 @@
 //! Colours of two levels: clusters of tetrahedra have colours, and so have the tetrahedra in each.
 //!
 //! One workgroup of a device, or one thread, sweeps over all tetrahedra of a cluster, colour by colour, while their
-//! vertices lie in its own memory. So a sweep waits for all others as often as there are colours of clusters, four in
-//! even meshes, in place of some forty. What has two levels here are the "graph clusters" of Ton-That, Kry and Andrews,
-//! "Parallel Block Neo-Hookean XPBD Using Graph Clustering", Computers & Graphics 110, 2023; there a cluster is one thread.
+//! vertices lie in memory of its own. So a sweep waits for all others as often as there are colours of clusters, four in
+//! even meshes, in place of some forty. Ton-That, Kry and Andrews, "Parallel Block Neo-Hookean XPBD Using Graph Clustering",
+//! Computers & Graphics 110, 2023, colour groups of constraints in this way; here groups are cells of a lattice.
 //!
 //! Invariants: **no two clusters of one colour share a vertex, and no two tetrahedra of one colour in a cluster do.**
 //! Elements that are no tetrahedra have colours of one level, behind those of the clusters.
