@@ -106,6 +106,13 @@ impl ConstraintGraph {
         (part_of, count as usize)
     }
 
+    /// How many constraints each vertex has.
+    fn valence(&self, vertex_count: usize) -> Vec<u32> {
+        let mut valence = vec![0u32; vertex_count];
+        self.corners.iter().for_each(|&v| valence[v as usize] += 1);
+        valence
+    }
+
     /// Constraints whose vertices lie in many others come first: they have the fewest free
     /// colours left when they wait. Ties by index, so that the result is always the same.
     fn order(&self, valence: &[u32]) -> Vec<u32> {
@@ -123,10 +130,7 @@ impl ConstraintGraph {
             Colors::Unlimited => usize::MAX,
             Colors::Limited(count) => count.max(1) as usize,
         };
-        let mut valence = vec![0u32; vertex_count];
-        for &v in &self.corners {
-            valence[v as usize] += 1;
-        }
+        let valence = self.valence(vertex_count);
 
         // used[v][color]: how many constraints of that colour act on v; copies[v]: the largest.
         let mut used: Vec<Vec<u32>> = vec![Vec::new(); vertex_count];
@@ -198,6 +202,17 @@ impl ConstraintGraph {
 }
 
 impl Coloring {
+    /// One colour, and nothing split: for constraints that get colours elsewhere.
+    pub(crate) fn unsplit(graph: &ConstraintGraph, vertex_count: usize) -> Self {
+        Self {
+            color_count: 1,
+            color_of: vec![0; graph.constraint_count()],
+            copy_of: graph.corners.clone(),
+            copy_offsets: (0..=vertex_count as u32).collect(),
+            largest_clique: graph.valence(vertex_count).into_iter().max().unwrap_or(0),
+        }
+    }
+
     /// Number of copies of all vertices together.
     pub fn copy_count(&self) -> usize {
         self.copy_offsets.last().map_or(0, |&count| count as usize)

@@ -4,6 +4,8 @@
 //!
 //! Vertices are in the solver's numbering (`Model::numbering`); `order` of each set maps back to the user's numbers.
 
+mod cells;
+mod clusters;
 mod domains;
 pub(crate) mod elements;
 pub(crate) mod lattice;
@@ -18,6 +20,10 @@ mod tets;
 use std::ops::Range;
 use std::sync::Arc;
 
+#[cfg(feature = "gpu")]
+pub(crate) use clusters::CLUSTER_VERTICES;
+pub(crate) use clusters::SetClusters;
+use clusters::clustered;
 pub use domains::{Domains, Smoothing};
 pub(crate) use elements::{Before, Moments};
 pub use elements::{ElementSet, ElementSets};
@@ -38,7 +44,7 @@ use crate::material::{MaterialConstants, MaterialModel};
 use crate::model::{Model, Numbering, for_each_kind};
 use crate::scalar::lanes::LANES;
 use crate::scalar::{Real, Vec3};
-use crate::settings::{Elements, Method, SolverSettings};
+use crate::settings::{Clusters, Colors, Elements, Method, SolverSettings};
 
 /// A model, laid out.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,11 +104,18 @@ impl<S: Real> Layout<S> {
             Method::Xpbd => Arc::clone(&model.numbering),
         };
         // Forces are added tetrahedron by tetrahedron where no constraint is solved: no colours, but pieces.
-        let coloring = match settings.method {
-            Method::Auto | Method::QuasiNewton | Method::Explicit => {
+        let clusters = match (settings.method, settings.clusters, settings.colors) {
+            (Method::Xpbd, Clusters::OfTets(size), Colors::Unlimited) => {
+                Some(clustered(model, &graph, numbering, size))
+            }
+            _ => None,
+        };
+        let coloring = match (settings.method, &clusters) {
+            (Method::Auto | Method::QuasiNewton | Method::Explicit, _) => {
                 in_pieces(model, &graph, numbering)
             }
-            Method::Xpbd => {
+            (Method::Xpbd, Some(clusters)) => clusters.coloring.clone(),
+            (Method::Xpbd, None) => {
                 let coloring = graph.color(model.vertex_count(), settings.colors);
                 debug_assert_eq!(coloring.validate(&graph), None);
                 coloring
@@ -115,6 +128,7 @@ impl<S: Real> Layout<S> {
         let mut order = Order {
             graph: &graph,
             coloring: &coloring,
+            clusters: clusters.as_ref(),
             numbering,
             part_of: &part_of,
             copy_offsets: &copy_offsets,
@@ -226,6 +240,7 @@ impl<S: Real> Layout<S> {
             let constants = &set.blocks[block];
             let user = |v: u32| self.numbering.order[v as usize];
             let count = set.form.multiplier_count();
+            let in_cluster = |all: &SetClusters| [all.of_block(block), all.inner[block] as usize];
             LaidTet {
                 number: number as usize,
                 vertices: constants.vertices.map(|corner| user(corner[lane])),
@@ -234,6 +249,7 @@ impl<S: Real> Layout<S> {
                 rest_volume: constants.rest_volume[lane],
                 material: constants.material[lane] as usize,
                 color: set.color_offsets.partition_point(|&first| first as usize <= block) - 1,
+                cluster: set.clusters.as_ref().map(in_cluster),
                 first_multiplier: set.multiplier_offset + LANES * count * block + lane,
             }
         })

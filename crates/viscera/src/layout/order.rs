@@ -1,5 +1,6 @@
 //! Constraints sorted by colour, and their places in the flat arrays.
 
+use super::clusters::Clustering;
 use super::lattice::cell_order;
 use crate::coloring::{Coloring, ConstraintGraph};
 use crate::model::{Model, Numbering};
@@ -50,6 +51,8 @@ pub(super) fn renumbered_copies(coloring: &Coloring, numbering: &Numbering) -> V
 pub(super) struct Order<'a> {
     pub graph: &'a ConstraintGraph,
     pub coloring: &'a Coloring,
+    /// Where colours have two levels.
+    pub clusters: Option<&'a Clustering>,
     pub numbering: &'a Numbering,
     /// Of the solver's vertices, ascending.
     pub part_of: &'a [u32],
@@ -61,13 +64,15 @@ pub(super) struct Order<'a> {
 }
 
 impl Order<'_> {
-    /// Sorts constraints by colour, then by place, and so by part, then by number; returns them with the offsets of
-    /// the colours.
+    /// Sorts constraints by colour, cluster and colour in the cluster, then by place, and so by part, then by number;
+    /// returns them with the offsets of the colours.
     pub fn sort(&self, constraints: impl Iterator<Item = u32>) -> (Vec<u32>, Vec<u32>) {
         let key = |c: u32| {
             let vertices = self.graph.vertices(c as usize).iter();
             let place = vertices.map(|&v| self.numbering.of(v) as u64).fold(u64::MAX, u64::min);
-            [u64::from(self.coloring.color_of[c as usize]), place]
+            let [cluster, inner] = self.cluster(c).map(u64::from);
+            let color = u64::from(self.coloring.color_of[c as usize]);
+            [(color << 32) | cluster, (inner << 32) | place]
         };
         let constraints = sorting::by_key(constraints, key);
         let mut offsets = vec![0u32; self.coloring.color_count as usize + 1];
@@ -86,10 +91,17 @@ impl Order<'_> {
         self.part_of[self.numbering.of(first)] as usize
     }
 
-    /// Tetrahedra of a colour in blocks: up to eight of one part.
+    /// The cluster of a constraint and its colour there; nothing but zeros where colours have one level.
+    pub fn cluster(&self, constraint: u32) -> [u32; 2] {
+        let c = constraint as usize;
+        let of = |all: &Clustering| Some([*all.cluster_of.get(c)?, *all.inner_of.get(c)?]);
+        self.clusters.and_then(of).unwrap_or_default()
+    }
+
+    /// Tetrahedra of a colour in blocks: up to eight of one part, of one colour in one cluster.
     pub fn blocks<'t>(&self, order: &'t [u32], color: &[u32]) -> impl Iterator<Item = &'t [u32]> {
         order[color[0] as usize..color[1] as usize]
-            .chunk_by(|&a, &b| self.part(a) == self.part(b))
+            .chunk_by(|&a, &b| self.part(a) == self.part(b) && self.cluster(a) == self.cluster(b))
             .flat_map(|of_part| of_part.chunks(LANES))
     }
 

@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use super::clusters::SetClusters;
 use super::order::Order;
 use crate::elements::TetForm;
 use crate::material::MaterialModel;
@@ -50,6 +51,8 @@ pub struct TetSet<S> {
     pub(crate) order: Vec<u32>,
     /// Blocks of colour `c` are `color_offsets[c] .. color_offsets[c + 1]`.
     pub(crate) color_offsets: Vec<u32>,
+    /// Where colours have two levels: tetrahedra of a colour may share vertices within a cluster.
+    pub(crate) clusters: Option<SetClusters>,
     /// First multiplier of the elastic constraints.
     pub(crate) multiplier_offset: usize,
     /// First multiplier of the viscous constraints.
@@ -73,8 +76,10 @@ pub struct LaidTet<S> {
     pub rest_volume: S,
     /// Index into [`crate::model::Model::materials`].
     pub material: usize,
-    /// Its colour.
+    /// Its colour, or that of its cluster.
     pub color: usize,
+    /// Its cluster in the set, and its colour there, where colours have two levels.
+    pub cluster: Option<[usize; 2]>,
     /// Where its first elastic multiplier stands in [`crate::state::State::multipliers`].
     pub(super) first_multiplier: usize,
 }
@@ -110,6 +115,7 @@ impl<S: Real> TetSet<S> {
             viscous_blocks: Vec::with_capacity(if is_viscous { count } else { 0 }),
             copies: Vec::with_capacity(if sorted.is_split() { count } else { 0 }),
             color_offsets: vec![0],
+            clusters: sorted.clusters.map(|_| SetClusters::default()),
             multiplier_offset: 0,
             viscous_offset: 0,
             bounds: [model.vertex_count(), sorted.copy_count()],
@@ -121,6 +127,9 @@ impl<S: Real> TetSet<S> {
                 let block = TetBlock::new(model, sorted.numbering, chosen);
                 set.uniform.push(block.material.iter().all(|&m| m == block.material[0]));
                 set.blocks.push(block);
+                if let Some(clusters) = &mut set.clusters {
+                    clusters.push(sorted.cluster(chosen[0]));
+                }
                 if is_viscous {
                     set.viscous_blocks.push(viscous_parts[sorted.part(chosen[0])]);
                 }
@@ -129,6 +138,9 @@ impl<S: Real> TetSet<S> {
                 }
             }
             set.color_offsets.push(set.blocks.len() as u32);
+            if let Some(clusters) = &mut set.clusters {
+                clusters.end_color();
+            }
         }
         [set.multiplier_offset, set.viscous_offset] =
             set.multiplier_counts().map(|count| sorted.take_multipliers(count));
@@ -191,6 +203,7 @@ impl<S: Real> TetSet<S> {
             + size_of_val(&self.viscous_blocks[..])
             + size_of_val(&self.copies[..])
             + size_of_val(&self.order[..])
+            + self.clusters.as_ref().map_or(0, SetClusters::bytes)
     }
 }
 

@@ -18,8 +18,8 @@ pub use accuracy::{Accuracy, FINEST, ROUGHEST};
 pub use device::DeviceRequest;
 pub use elements::Elements;
 pub use solver::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, Count, Integrator, MOST_HISTORY, MOST_THREADS,
-    Method, NeoHookean, Precision, RelaxationForm, SolverSettings, Start, Threads,
+    Acceleration, AndersonGuard, AndersonOn, Clusters, Colors, Count, Integrator, MOST_HISTORY,
+    MOST_THREADS, Method, NeoHookean, Precision, RelaxationForm, SolverSettings, Start, Threads,
 };
 pub use tree::{Place, SettingValue};
 

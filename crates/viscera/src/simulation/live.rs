@@ -15,7 +15,7 @@ use crate::scene::{
 };
 use crate::settings::{Precision, SolverSettings};
 use crate::solver::balance::ForceBalance;
-use crate::solver::check_elements;
+use crate::solver::check_settings;
 use crate::state::{ContactState, Learned, State};
 
 /// What was done by hand since the beginning or the last [`Simulation::reset`].
@@ -316,7 +316,7 @@ impl<S: Real> Simulation<S> {
             Some(method) => automatic::keep_method(&scene, &self.assembly, &model, method),
             None => automatic::choose_method(&scene, &self.assembly, &model, on_device),
         };
-        check_elements(&solver).map_err(SimulationError::from)?;
+        check_settings(&solver).map_err(SimulationError::from)?;
         check_contact(&scene, &solver).map_err(SimulationError::from)?;
         let backend = self.backend.renew(same_device, &model, &solver, ready, &self.offered)?;
         self.under_way = false;

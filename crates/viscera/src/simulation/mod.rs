@@ -76,7 +76,7 @@ use crate::scene::{Change, Scene};
 use crate::settings::{Count, Elements, Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::oscillations::Oscillations;
-use crate::solver::{Inputs, Solver, check_elements, choose};
+use crate::solver::{Inputs, Solver, check_settings, choose};
 use crate::state::{ContactState, State};
 use device::{Backend, Offered};
 
@@ -168,7 +168,7 @@ impl<S: Real> Simulation<S> {
         let model = assembly.builder.build::<S>()?;
         let automatic::Chosen { settings: solver, oscillations, solver: ready } =
             automatic::choose_method(&scene, &assembly, &model, callers_device);
-        check_elements(&solver)?;
+        check_settings(&solver)?;
         check_contact(&scene, &solver)?;
         let mut simulation = Self {
             state: State::at_rest(&model),

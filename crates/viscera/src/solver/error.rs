@@ -32,6 +32,15 @@ pub enum StepError {
         /// The method of the settings.
         method: Method,
     },
+    /// Clusters copy no vertices.
+    #[error(
+        "`clusters` sweeps without copies of vertices, and `colors = {colors}` makes some; use `colors = \"unlimited\"`, or \
+         `clusters = \"none\"`"
+    )]
+    ClustersAndColors {
+        /// The colours of the settings.
+        colors: u32,
+    },
     /// An input names no vertex.
     #[error("a {what} names vertex {vertex}; the model has {vertex_count}")]
     UnknownVertex {

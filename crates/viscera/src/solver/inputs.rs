@@ -5,7 +5,7 @@ use crate::contact::Tool;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
-use crate::settings::{Elements, Method, SolverSettings};
+use crate::settings::{Clusters, Colors, Elements, Method, SolverSettings};
 use crate::state::State;
 
 /// A vertex that is moved, not simulated, during a step.
@@ -103,11 +103,17 @@ fn is_legal<S: Real>(tether: &Tether<S>) -> bool {
     tether.target.is_finite() && tether.stiffness >= S::ZERO && tether.stiffness.is_finite()
 }
 
-/// The method has the elements.
-pub(crate) fn check_elements(settings: &SolverSettings) -> Result<(), StepError> {
+/// The settings go together.
+pub(crate) fn check_settings(settings: &SolverSettings) -> Result<(), StepError> {
     let method = settings.method;
-    match settings.elements {
-        Elements::Recovered if method == Method::Xpbd => Err(StepError::Elements { method }),
+    if method != Method::Xpbd {
+        return Ok(());
+    }
+    match (settings.elements, settings.clusters, settings.colors) {
+        (Elements::Recovered, ..) => Err(StepError::Elements { method }),
+        (_, Clusters::OfTets(_), Colors::Limited(colors)) => {
+            Err(StepError::ClustersAndColors { colors })
+        }
         _ => Ok(()),
     }
 }

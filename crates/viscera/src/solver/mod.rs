@@ -42,7 +42,7 @@ use crate::state::{ContactState, State};
 use cpu::precision::{Task, Within, carry_out};
 pub use error::StepError;
 pub(crate) use explicit::growth as explicit_growth;
-pub(crate) use inputs::check_elements;
+pub(crate) use inputs::check_settings;
 pub use inputs::{Inputs, Pin, Tether};
 use inputs::{check_inputs, check_model, check_state, check_step};
 #[doc(hidden)]
@@ -268,7 +268,7 @@ impl<S: Real> Solver<S> {
         inputs: &Inputs<S>,
         dt: f64,
     ) -> Result<(), StepError> {
-        check_elements(&self.settings)?;
+        check_settings(&self.settings)?;
         let meets = !inputs.tools.is_empty() || model.ties_bodies();
         if meets && !self.settings.takes_contact() {
             return Err(StepError::ContactNeedsRebase);

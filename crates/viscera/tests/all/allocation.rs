@@ -181,6 +181,9 @@ fn a_frame_of_a_scene_allocates_nothing_after_the_first() {
             ];
             frames_allocate_nothing::<f32>(1, &settings);
         }
+        let clusters = [("solver.method", "xpbd"), ("solver.clusters", "32")];
+        let settings = [&clusters[..], &[("solver.acceleration", acceleration)]].concat();
+        frames_allocate_nothing::<f32>(1, &settings);
     }
 }
 

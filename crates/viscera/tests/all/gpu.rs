@@ -6,8 +6,8 @@ use crate::common::{STVK, block, material};
 use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, Count, NeoHookean, Precision, RelaxationForm,
-    SolverSettings,
+    Acceleration, AndersonGuard, AndersonOn, Clusters, Colors, Count, NeoHookean, Precision,
+    RelaxationForm, SolverSettings,
 };
 use viscera::solver::gpu::{Device, GpuSolver, baseline};
 use viscera::solver::plan::{Stage, XpbdStage};
@@ -40,14 +40,14 @@ fn distance(a: &[Vec3<f32>], b: &[Vec3<f64>]) -> f64 {
 /// How much is computed: a motion for each gravity [m/s^2] aside, so many steps, and how far things move at
 /// least [m], on average.
 #[derive(Clone, Copy)]
-struct Length {
-    tilts: &'static [f64],
-    steps: u32,
-    moved: f64,
+pub struct Length {
+    pub tilts: &'static [f64],
+    pub steps: u32,
+    pub moved: f64,
 }
 
-const BRIEF: Length = Length { tilts: &[3.0], steps: 3, moved: 1e-5 };
-const LONG: Length = Length { tilts: &[0.0, 3.0, -6.0], steps: 30, moved: 1e-3 };
+pub const BRIEF: Length = Length { tilts: &[3.0], steps: 3, moved: 1e-5 };
+pub const LONG: Length = Length { tilts: &[0.0, 3.0, -6.0], steps: 30, moved: 1e-3 };
 
 /// Distances [m] from the f64 run, added up over moments of three motions: the CPU's and the GPU's; and
 /// how far things have moved.
@@ -86,7 +86,7 @@ fn distances(device: &Device, settings: &SolverSettings, length: Length) -> [f64
 /// Two runs in single precision differ by their round-off, which has no reason to be the same: the device
 /// may be as far from the run in double precision as the CPU is, and as much again. Where the CPU is
 /// lucky, round-off of the places themselves, which are a tenth of a metre from the origin, stays.
-fn assert_agreement(name: &str, settings: &SolverSettings, length: Length) {
+pub fn assert_agreement(name: &str, settings: &SolverSettings, length: Length) {
     let [cpu, gpu, moved] = distances(device(), settings, length);
     println!(
         "{name}, {:?}: CPU {cpu:.2e} m, GPU {gpu:.2e} m, moved {moved:.2e} m",
@@ -199,7 +199,7 @@ fn accelerations_agree_with_the_cpu_at_length() {
 }
 
 /// The bits of everything that moves after some steps.
-fn bits(model: &Model<f32>, gpu: &mut GpuSolver, steps: u32) -> Vec<u32> {
+pub fn bits(model: &Model<f32>, gpu: &mut GpuSolver, steps: u32) -> Vec<u32> {
     let double: Model<f64> = everything();
     for step in 0..steps {
         gpu.step(model, &inputs_at(&double, step), DT).expect("a legal step");
@@ -355,10 +355,12 @@ fn assert_hands_change(iterations: u32, before: u32) {
     let guarded = SolverSettings { iterations: Count::Of(iterations), ..SolverSettings::xpbd() };
     let plain = SolverSettings { step_guard: false, ..guarded.clone() };
     let anderson = SolverSettings { acceleration: Acceleration::Anderson, ..plain.clone() };
+    let clustered = SolverSettings { clusters: Clusters::OfTets(24), ..plain.clone() };
     let mut hands = 0;
     for (colors, settings) in [
         (Colors::Limited(1), &anderson),
         (Colors::Limited(4), &plain),
+        (Colors::Unlimited, &clustered),
         (Colors::Unlimited, &guarded),
     ] {
         let settings = SolverSettings { colors, ..settings.clone() };

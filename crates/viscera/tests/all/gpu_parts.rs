@@ -121,7 +121,15 @@ fn a_body_beside_one_in_trouble_has_the_bits_it_has_alone_on_a_device() {
 #[test]
 fn no_method_lets_trouble_spread_on_a_device() {
     let mut all = 0;
-    let chosen = ["Jacobi", "4 colours", "Chebyshev", "Anderson", "Anderson by energy", "explicit"];
+    let chosen = [
+        "Jacobi",
+        "4 colours",
+        "clusters",
+        "Chebyshev",
+        "Anderson",
+        "Anderson by energy",
+        "explicit",
+    ];
     for (name, settings) in methods().into_iter().filter(|(name, _)| chosen.contains(name)) {
         let fate = if name == "Jacobi" { Fate::NoNumber } else { Fate::Thrown };
         for body in assert_quiet_is_left_alone(name, &settings, &[fate], 6) {

@@ -9,8 +9,8 @@ use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::lanes::Instructions;
 use viscera::scalar::{Real, Vec3, vec3};
 use viscera::settings::{
-    Acceleration, AndersonGuard, AndersonOn, Colors, Count, Integrator, Method, SolverSettings,
-    Threads,
+    Acceleration, AndersonGuard, AndersonOn, Clusters, Colors, Count, Integrator, Method,
+    SolverSettings, Threads,
 };
 use viscera::solver::{Inputs, Pin, Solver, StepReport, Tether};
 use viscera::state::State;
@@ -206,6 +206,7 @@ pub fn methods() -> Vec<(&'static str, SolverSettings)> {
         ("Jacobi", colored(Colors::Limited(1))),
         ("4 colours", colored(Colors::Limited(4))),
         ("5 colours", colored(Colors::Limited(5))),
+        ("clusters", SolverSettings { clusters: Clusters::OfTets(50), ..plain_steps.clone() }),
         ("Chebyshev", chebyshev(2, 0.8)),
         ("Chebyshev, 4 colours", {
             SolverSettings { colors: Colors::Limited(4), ..chebyshev(1, 1.0) }
@@ -324,8 +325,15 @@ fn assert_kinds_stay_apart((name, settings): &(&str, SolverSettings)) {
 /// What a law, a viscosity, more colours or copies of one body make of the model is not seen by another.
 #[test]
 fn a_body_beside_another_kind_has_the_bits_it_has_alone() {
-    let chosen =
-        ["coloured", "5 colours", "Chebyshev, 4 colours", "Anderson", "explicit", "quasi-Newton"];
+    let chosen = [
+        "coloured",
+        "5 colours",
+        "clusters",
+        "Chebyshev, 4 colours",
+        "Anderson",
+        "explicit",
+        "quasi-Newton",
+    ];
     for method in methods().iter().filter(|(name, _)| chosen.contains(name)) {
         assert_kinds_stay_apart(method);
     }

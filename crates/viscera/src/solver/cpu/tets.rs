@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use super::threads::{Shared, Workers};
-use crate::layout::{Layout, TetBlock, TetSet};
+use crate::layout::{Layout, SetClusters, TetBlock, TetSet};
 use crate::material::Compliance;
 use crate::material::MaterialConstants;
 use crate::scalar::lanes::{self, Eight, LANES, Lanes, Point};
@@ -373,6 +373,36 @@ impl Workers {
         self.each(blocks.len(), GRAIN, |piece| {
             let blocks = blocks.start + piece.start..blocks.start + piece.end;
             lanes::run(self.instructions, Piece { layout, set, blocks, pass });
+        });
+    }
+
+    /// A pass over a colour of a set: block by block in no particular order or, where colours have two levels, cluster by
+    /// cluster, in each block after block. Those of one cluster may share copies.
+    pub fn color_pass<S: Real>(
+        &self,
+        layout: &Layout<S>,
+        set: &TetSet<S>,
+        color: usize,
+        pass: &(impl TetPass<S> + Sync),
+    ) {
+        match &set.clusters {
+            None => self.pass(layout, set, set.color(color), pass),
+            Some(clusters) => self.each_cluster(clusters, color, |blocks| {
+                self.piece(layout, set, blocks, pass);
+            }),
+        }
+    }
+
+    /// `work` on the blocks of each cluster of a colour, or of several in a row.
+    pub fn each_cluster(
+        &self,
+        clusters: &SetClusters,
+        color: usize,
+        work: impl Fn(Range<usize>) + Sync,
+    ) {
+        let own = clusters.color(color);
+        self.each(own.len(), 1, |piece| {
+            work(clusters.blocks(own.start + piece.start..own.start + piece.end));
         });
     }
 

@@ -28,6 +28,7 @@ pub enum File {
     Predict,
     Rebase,
     Sweep,
+    SweepClusters,
     SweepElements,
     Loads,
     LoadsElements,
@@ -110,6 +111,8 @@ kernels! {
     SOLVE_COPIES = Sweep "solve" 64 [Tets Materials CornerIndices Points Multipliers StartStrain];
     SOLVE_JACOBI = Sweep "solve" 64
         [Tets Materials CornerIndices Points Copies Multipliers StartStrain];
+    SOLVE_CLUSTERS = SweepClusters "solve_clusters" 64
+        [Tets Materials Points Multipliers StartStrain Table];
     SOLVE_ELEMENTS = SweepElements "solve_elements" 64 [Points Multipliers VertexData Table];
     SOLVE_ELEMENTS_JACOBI = SweepElements "solve_elements" 64
         [Points Copies Multipliers VertexData Table];
@@ -214,6 +217,9 @@ const ELEMENTS: &str = kernel_text!("elements.wgsl");
 /// In the place of recovered-gradient tetrahedra.
 const PLAIN: &str = kernel_text!("../step/recovered/none.wgsl");
 
+/// The constraints of a tetrahedron.
+const SWEEP_TET: &str = kernel_text!("../xpbd/sweep_tet.wgsl");
+
 /// How a sweep reads and writes, and how an acceleration finds what a sweep has left.
 fn swept(swept: Swept) -> [&'static str; 2] {
     let copies = kernel_text!("../xpbd/acceleration_mapped_copies.wgsl");
@@ -242,7 +248,11 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
     match kernel.file {
         File::Predict => own(kernel_text!("../step/predict.wgsl")),
         File::Rebase => own(kernel_text!("../xpbd/rebase.wgsl")),
-        File::Sweep => [form, vec![swept, kernel_text!("../xpbd/sweep.wgsl")]].concat(),
+        File::Sweep => [form, vec![swept, SWEEP_TET, kernel_text!("../xpbd/sweep.wgsl")]].concat(),
+        File::SweepClusters if !IS_THERE => Vec::new(),
+        File::SweepClusters => {
+            [form, vec![SWEEP_TET, kernel_text!("../xpbd/sweep_cluster.wgsl")]].concat()
+        }
         File::SweepElements => {
             [vec![swept], elements(kernel_text!("../xpbd/sweep_elements.wgsl"))].concat()
         }
@@ -384,7 +394,12 @@ fn key(kernel: &Kernel, variant: Variant) -> String {
 fn varies(kernel: &Kernel) -> bool {
     matches!(
         kernel.file,
-        File::Sweep | File::SweepElements | File::AndersonPush | File::Loads | File::HistoryTets
+        File::Sweep
+            | File::SweepClusters
+            | File::SweepElements
+            | File::AndersonPush
+            | File::Loads
+            | File::HistoryTets
     )
 }
 

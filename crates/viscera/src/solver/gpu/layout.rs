@@ -3,21 +3,19 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::clusters::ClusterTables;
 use super::limits::accelerates;
+use super::members::{block_parts, elements, kind_by_kind, pieces};
 use super::parts::{Fall, Parts, Piece, SmallSteps};
 use super::slots::{ALIGNMENT, Element, Range, Slot, unknowns_size};
-use crate::elements::kinds::{Kind, MOST};
 use crate::elements::law::LAWS;
 use crate::elements::list::KIND_SIZES;
-use crate::layout::ElementSet;
 use crate::layout::Layout;
 use crate::material::MaterialConstants;
-use crate::model::for_each_kind;
 use crate::scalar::lanes::LANES;
 use crate::settings::{Method, SolverSettings};
 use crate::solver::step::recovered::on_device;
 use crate::solver::step::strain::is_recovered;
-use crate::sorting;
 
 /// The material of a padding lane.
 pub(super) const FILLING: u32 = u32::MAX;
@@ -25,8 +23,7 @@ pub(super) const FILLING: u32 = u32::MAX;
 /// Sums that a workgroup of Anderson's leaves.
 pub(super) const PRODUCTS: u64 = 21;
 
-/// Elements or vertices whose energies one workgroup sums, and the numbers that it leaves.
-pub(super) const PIECE: usize = 512;
+/// Numbers that a workgroup leaves of a piece.
 pub(super) const PIECE_SUMS: u64 = 24;
 
 /// Numbers that it leaves of the shares of a step that are tried, and as many of the lengths of a descent.
@@ -70,6 +67,11 @@ pub(super) struct Header {
     pub tet_lanes: u32,
     pub law_ends: [u32; LAWS],
     pub part_count: u32,
+    /// Of clusters: rows, blocks where their colours begin, vertices, corners by the numbers of these.
+    pub clusters: u32,
+    pub cluster_starts: u32,
+    pub cluster_vertices: u32,
+    pub cluster_corners: u32,
 }
 
 /// The ranges of the vertex data, in order, with the slot that kernels know them by; `None` for one that only the
@@ -277,6 +279,12 @@ impl DeviceLayout {
         if on_device::Extent::new(layout).is_some() {
             header.recovered = add(None, &words(&on_device::words(layout)));
         }
+        if let Some(tables) = ClusterTables::new(layout) {
+            header.clusters = add(None, bytemuck::cast_slice(&tables.rows));
+            header.cluster_starts = add(None, &words(&tables.starts));
+            header.cluster_vertices = add(None, &words(&tables.vertices));
+            header.cluster_corners = add(None, &words(tables.corners.as_flattened()));
+        }
         if accelerates(settings) {
             let weights = vec![0; unknowns_size(layout) as usize];
             header.weights = add(Some(Slot::Weights), &weights);
@@ -374,100 +382,6 @@ fn law_ends(layout: &Layout<f32>) -> [u32; LAWS] {
         end += set.block_count() as u32;
         end
     })
-}
-
-/// Elements that are no tetrahedra, sorted by colour, within a colour by kind; places of loads are not yet known.
-fn elements(layout: &Layout<f32>) -> Vec<Element> {
-    let mut all: Vec<(usize, Element)> = Vec::new();
-    for_each_kind!(layout, set => {
-        for color in 0..layout.color_count {
-            all.extend(set.color(color).map(|i| (color, element(set, i, layout))));
-        }
-    });
-    let order = sorting::by_key(0..all.len() as u32, |i| [all[i as usize].0 as u64, 0]);
-    order.into_iter().map(|i| all[i as usize].1).collect()
-}
-
-fn element<K: Kind<N, M>, const N: usize, const M: usize>(
-    set: &ElementSet<f32, K, N, M>,
-    i: usize,
-    layout: &Layout<f32>,
-) -> Element {
-    let corner = |corner: usize| if corner < N { corner } else { 0 };
-    let vertices = set.vertices[i].map(|v| layout.numbering.of(v) as u32);
-    Element {
-        kind: set.number as u32,
-        part: layout.part_at(vertices[0] as usize) as u32,
-        multiplier: set.multipliers(i).start as u32,
-        anchor: set.anchors.get(i).copied().unwrap_or(0),
-        vertices: std::array::from_fn(|c| vertices[corner(c)]),
-        copies: std::array::from_fn(|c| set.copies[i][corner(c)]),
-        slots: [0; MOST],
-        constants: set.constants[i],
-    }
-}
-
-/// Places of elements, kind by kind and in each in the order of its set.
-fn kind_by_kind(elements: &[Element]) -> Vec<usize> {
-    let kind = |i: u32| [u64::from(elements[i as usize].kind), 0];
-    sorting::by_key(0..elements.len() as u32, kind).into_iter().map(|i| i as usize).collect()
-}
-
-/// The first of the elements of a colour, or of all, and how many there are.
-pub fn element_range(layout: &Layout<f32>, color: Option<usize>) -> [u32; 2] {
-    let [mut first, mut count] = [0; 2];
-    for_each_kind!(layout, set => {
-        let range = color.map_or(0..set.len(), |color| set.color(color));
-        first += range.start as u32;
-        count += range.len() as u32;
-    });
-    [first, count]
-}
-
-/// The part of each block.
-fn block_parts(layout: &Layout<f32>) -> Vec<u32> {
-    let of_block = |vertices: &[[u32; LANES]; 4]| layout.part_at(vertices[0][0] as usize) as u32;
-    let sets = layout.tet_sets.iter();
-    sets.flat_map(|set| set.blocks.iter().map(|b| of_block(&b.vertices))).collect()
-}
-
-/// Elements of each part in pieces, then vertices.
-fn pieces(layout: &Layout<f32>, others: &[Element], by_kind: &[usize]) -> (Vec<u32>, Vec<Piece>) {
-    let mut elements = Vec::new();
-    let mut first = 0;
-    for set in &layout.tet_sets {
-        for (block, lane) in set.places() {
-            let part = layout.part_at(set.blocks[block].vertices[0][lane] as usize) as u32;
-            elements.push((part, (LANES * (first + block) + lane) as u32));
-        }
-        first += set.block_count();
-    }
-    // Elements that are no tetrahedra are numbered behind the lanes of all blocks, padding included, so that a kernel
-    // finds block and lane of a tetrahedron by division.
-    let first = (LANES * first) as u32;
-    elements.extend(by_kind.iter().map(|&i| (others[i].part, first + i as u32)));
-    // A part's elements keep the order of a model of their own.
-    let part = |i: u32| elements[i as usize].0;
-    let order = sorting::by_key(0..elements.len() as u32, |i| [u64::from(part(i)), 0]);
-
-    let (mut members, mut pieces) = (Vec::new(), Vec::new());
-    // A piece never reaches across parts: the sums of one must not depend on the size of the part before it.
-    for of_part in order.chunk_by(|&a, &b| part(a) == part(b)) {
-        for piece in of_part.chunks(PIECE) {
-            let first = members.len() as u32;
-            members.extend(piece.iter().map(|&i| elements[i as usize].1));
-            let end = members.len() as u32;
-            pieces.push(Piece { part: part(of_part[0]), first, end, are_vertices: 0 });
-        }
-    }
-    // Vertices behind all elements: `limit_velocities` is dispatched for their pieces alone, which must be a range.
-    for (part, own) in (0..).zip(layout.parts.iter()) {
-        for first in own.vertices.clone().step_by(PIECE) {
-            let end = own.vertices.end.min(first + PIECE) as u32;
-            pieces.push(Piece { part, first: first as u32, end, are_vertices: 1 });
-        }
-    }
-    (members, pieces)
 }
 
 /// Tetrahedra as `TetBlock` of bindings.wgsl.

@@ -15,6 +15,7 @@
 //! lengths, weights, rejections) lies in one record there, `Control`; nothing is read back inside a step.
 
 mod buffers;
+mod clusters;
 mod control;
 mod copy;
 mod cost;
@@ -26,6 +27,7 @@ mod inputs;
 pub mod kernels;
 mod layout;
 pub(in crate::solver) mod limits;
+mod members;
 mod parts;
 mod reading;
 pub(in crate::solver) mod record;

@@ -1,8 +1,9 @@
 //! Dispatches, and how they are made: what the recorders of all stages share.
 
 use super::kernels::{Kernel, Swept, Variant};
-use super::layout::{DeviceLayout, Pieces, element_range};
+use super::layout::{DeviceLayout, Pieces};
 use super::limits::window;
+use super::members::element_range;
 use super::slots::{Place, Slot};
 use super::uniforms::Job;
 use crate::elements::TetForm;

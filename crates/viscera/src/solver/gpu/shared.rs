@@ -6,6 +6,7 @@ use super::slots::Update;
 use super::uniforms::{FrameConstants, Job};
 use super::words;
 use crate::elements::law::LAWS;
+use crate::layout::CLUSTER_VERTICES;
 use crate::scalar::lanes::LANES;
 use crate::settings::MOST_HISTORY;
 use crate::solver::cpu::products::LARGEST_WINDOW;
@@ -77,6 +78,7 @@ pub(super) fn constants() -> String {
         ("LINE_SUMS", layout::LINE_SUMS as u32),
         ("LARGEST_WINDOW", LARGEST_WINDOW as u32),
         ("MOST_HISTORY", MOST_HISTORY as u32),
+        ("CLUSTER_VERTICES", CLUSTER_VERTICES as u32),
     ];
     let ranges = layout::vertex_ranges().chain(tables::words()).chain(on_device::names());
     let numbers = words::words().into_iter().chain(MODES.iter().copied());

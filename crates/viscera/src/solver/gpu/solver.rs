@@ -20,10 +20,10 @@ use std::sync::Arc;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::Vec3;
-use crate::settings::{Count, Elements, Method, Precision, SolverSettings, Start};
+use crate::settings::{Clusters, Count, Elements, Method, Precision, SolverSettings, Start};
 use crate::solver::error::StepError;
 use crate::solver::explicit::Stability;
-use crate::solver::inputs::check_model;
+use crate::solver::inputs::{check_model, check_settings};
 use crate::solver::plan::{Plan, Stage, StepStage};
 use crate::solver::quasi_newton::on_device::{self, DeviceLevels};
 use crate::solver::quasi_newton::progress::PartProgress;
@@ -342,6 +342,11 @@ fn check(device: &Device, settings: &SolverSettings) -> Result<(), GpuError> {
     let has_recovered = recovered::on_device::IS_THERE && settings.method != Method::Xpbd;
     if settings.elements == Elements::Recovered && !has_recovered {
         return Err(GpuError::PlainElements);
+    }
+    check_settings(settings)?;
+    let is_clustered = settings.method == Method::Xpbd && settings.clusters != Clusters::None;
+    if is_clustered && !on_device::IS_THERE {
+        return Err(GpuError::ClustersOnCpu);
     }
     device.check()?;
     // Sizes are compared array by array, where buffers are made.

@@ -1,5 +1,6 @@
 //! Names of places in the table, as kernels know them.
 
+use super::clusters::ClusterRow;
 use super::layout::{Header, Material};
 use super::parts::{Fall, PartRow, Piece, SmallSteps};
 use super::slots::Element;
@@ -19,8 +20,14 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
         "SMALL_STEPS_AT" small_steps "FALLS_AT" falls "STRIDE_AT" stride
         "ANCHORS_AT" anchors "LINES_AT" lines "ENERGIES_AT" energies "TET_LANES_AT" tet_lanes
         "LAW_ENDS_AT" law_ends
-        "PART_COUNT_AT" part_count
+        "PART_COUNT_AT" part_count "CLUSTERS_AT" clusters
+        "CLUSTER_STARTS_AT" cluster_starts "CLUSTER_VERTICES_AT" cluster_vertices
+        "CLUSTER_CORNERS_AT" cluster_corners
     });
+    all.extend(words!(ClusterRow {
+        "CLUSTER_FIRST_START" first_start "CLUSTER_COLORS" colors
+        "CLUSTER_FIRST_VERTEX" first_vertex "CLUSTER_VERTEX_COUNT" vertex_count
+    }));
     all.extend(words!(Piece {
         "PIECE_PART" part "PIECE_FIRST" first "PIECE_END" end "PIECE_ARE_VERTICES" are_vertices
     }));
@@ -45,6 +52,7 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
     }));
     all.extend(words!(Fall { "FALL_IS_FREE" is_free "FALL_ACCELERATION" acceleration }));
     all.extend([
+        ("CLUSTER_WORDS", size(size_of::<ClusterRow>())),
         ("FALL_WORDS", size(size_of::<Fall>())),
         ("SMALL_WORDS", size(size_of::<SmallSteps>())),
         ("PIECE_WORDS", size(size_of::<Piece>())),

@@ -1,6 +1,9 @@
 //! The stages of XPBD as dispatches.
 
+use std::ops::Range;
+
 use super::stage::{IterateStage, Mix, XpbdStage};
+use crate::layout::SetClusters;
 use crate::settings::{AndersonGuard, AndersonOn};
 use crate::solver::gpu::kernels::{self, Swept};
 use crate::solver::gpu::limits::window;
@@ -81,12 +84,26 @@ impl Recorder<'_> {
         };
         for (law, set) in self.layout.tet_sets.iter().enumerate() {
             let blocks = set.color(color);
-            if !blocks.is_empty() {
-                into.push(self.on_copies(self.blocks(tets, law, blocks)));
+            if blocks.is_empty() {
+                continue;
             }
+            into.push(match &set.clusters {
+                None => self.on_copies(self.blocks(tets, law, blocks)),
+                Some(clusters) => self.clusters(law, clusters.color(color)),
+            });
         }
         let elements = self.elements(elements, Some(color));
         into.extend(elements.map(|dispatch| self.on_copies(dispatch)));
+    }
+
+    /// A workgroup for each cluster of some of a set.
+    fn clusters(&self, law: usize, clusters: Range<usize>) -> Dispatch {
+        let before = self.layout.tet_sets[..law].iter();
+        let before: usize =
+            before.filter_map(|set| set.clusters.as_ref()).map(SetClusters::len).sum();
+        let all = self.blocks(&kernels::SOLVE_CLUSTERS, law, 0..0);
+        let (first, count) = ((before + clusters.start) as u32, clusters.len() as u32);
+        Dispatch { job: Job { first, count, ..all.job }, groups: count, ..all }
     }
 
     fn chebyshev(&self, into: &mut Vec<Dispatch>) {

@@ -34,7 +34,7 @@ pub fn load_multipliers<S: Real>(
         for set in &model.tet_sets {
             with_form!(set.form, F => {
                 let pass = Loads { x, multipliers, loads: &shared, form: PhantomData::<F> };
-                constants.workers.pass(model, set, set.color(color), &pass);
+                constants.workers.color_pass(model, set, color, &pass);
             });
         }
     }
@@ -84,7 +84,8 @@ impl<S: Real, F> Loads<'_, S, F> {
                 loads[corner].mass_bound += more[corner].mass_bound;
             }
         }
-        // SAFETY: constraints of one colour share no copy, and every block is worked on once.
+        // SAFETY: constraints of one colour share no copy, or but with others of their cluster, which one thread works on; every
+        // block is worked on once.
         unsafe { tets.add(self.loads, &points(&loads)) };
     }
 }

@@ -22,7 +22,7 @@ pub enum XpbdStage {
     RecomputePositions,
     /// Gives every copy its vertex's position.
     SplitCopies,
-    /// Solves all constraints of one colour; they share no copy.
+    /// Solves all constraints of one colour; they share no copy, but within a cluster.
     SolveColor(u32),
     /// `SplitCopies` and `SolveColor(0)` in one, where every copy has one constraint.
     SplitAndSolve,

@@ -59,7 +59,7 @@ struct Sweep<'a, S> {
     relaxation: Relaxation<S>,
 }
 
-/// Solves all constraints of one colour; they share no copy.
+/// Solves all constraints of one colour; they share no copy, those of one cluster excepted, which are solved in their order.
 pub fn solve_color<S: Real>(
     constants: &StepConstants<S>,
     step: &Step<'_, S>,
@@ -74,15 +74,24 @@ pub fn solve_color<S: Real>(
         dt: step.dt,
         relaxation: Relaxation::new(step.settings),
     };
+    let workers = &constants.workers;
     for (set, strains) in model.tet_sets.iter().zip(&constants.start_strain) {
-        let blocks = set.color(color);
+        let viscous = Viscous { sweep: &sweep, start: strains };
         with_form!(set.form, F => {
             let elastic = Elastic { sweep: &sweep, form: PhantomData::<F> };
-            constants.workers.pass(model, set, blocks.clone(), &elastic);
+            match &set.clusters {
+                // Within a cluster a tetrahedron has both its constraints solved before the next begins, as on a device.
+                Some(clusters) if set.viscous => workers.each_cluster(clusters, color, |blocks| {
+                    for block in blocks {
+                        workers.piece(model, set, block..block + 1, &elastic);
+                        workers.piece(model, set, block..block + 1, &viscous);
+                    }
+                }),
+                _ => workers.color_pass(model, set, color, &elastic),
+            }
         });
-        if set.viscous {
-            let viscous = Viscous { sweep: &sweep, start: strains };
-            constants.workers.pass(model, set, blocks, &viscous);
+        if set.viscous && set.clusters.is_none() {
+            workers.pass(model, set, set.color(color), &viscous);
         }
     }
     let moments = constants.moments(step);
@@ -103,7 +112,8 @@ impl<S: Real, F> Elastic<'_, S, F> {
         let sweep = self.sweep;
         let material = tets.material::<L>();
         let step_volume = tets.volume::<L>() * L::from_f64(sweep.dt * sweep.dt);
-        // SAFETY: constraints of one colour share no copy, and every block is worked on once.
+        // SAFETY: constraints of one colour share no copy, or but with others of their cluster, which one thread works on; every
+        // block is worked on once.
         let corners = unsafe { tets.copies::<L>(&sweep.points) };
         // SAFETY: every block has multipliers of its own.
         let l: [L; N] =
@@ -134,7 +144,8 @@ impl<S: Real> TetPass<S> for Viscous<'_, S> {
             return;
         }
         let material = tets.material::<L>();
-        // SAFETY: constraints of one colour share no copy, and every block is worked on once.
+        // SAFETY: constraints of one colour share no copy, or but with others of their cluster, which one thread works on; every
+        // block is worked on once.
         let corners = unsafe { tets.copies::<L>(&self.sweep.points) };
         let target: [L; 6] = load_rows(self.start[tets.index].as_flattened(), tets.lane);
         let dt = L::from_f64(self.sweep.dt);

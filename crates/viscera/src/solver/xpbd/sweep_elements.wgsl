@@ -16,7 +16,7 @@ fn solve_elements(
     var x: array<vec3f, 4>;
     var w: array<f32, 4>;
     for (var i = 0u; i < 4u; i++) {
-        let point = points[read_place(vertices[i], copies_of_element[i])];
+        let point = read_point(read_place(vertices[i], copies_of_element[i]));
         x[i] = point.xyz;
         w[i] = point.w;
     }

@@ -16,6 +16,10 @@ fn write_place(vertex: u32, copy: u32) -> u32 {
     return vertex;
 }
 
+fn read_point(place: u32) -> vec4f {
+    return points[place];
+}
+
 fn write_point(place: u32, point: vec4f) {
     points[place] = point;
 }
