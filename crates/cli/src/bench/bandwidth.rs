@@ -85,7 +85,7 @@ mod tests {
             bail!("its memory is too small")
         }
 
-        fn stepper<'a>(&self, _: &'a Bench<'_>, _: u32) -> Result<Box<dyn Stepper + 'a>> {
+        fn stepper<'a>(&self, _: &'a Bench<'_>, _: Option<u32>) -> Result<Box<dyn Stepper + 'a>> {
             bail!("it does no steps")
         }
     }

@@ -1,7 +1,8 @@
 //! Hardware to measure on: the processor with so many threads, or a graphics processor.
 
 use super::bandwidth;
-use super::measurement::{Bench, DT};
+use super::measurement::Bench;
+use super::task::{DT, Length};
 use anyhow::{Result, ensure};
 use serde::Serialize;
 use std::time::Instant;
@@ -20,8 +21,12 @@ pub trait Computer {
     /// Bytes read and bytes written per second by a copy.
     fn copy_bandwidth(&self) -> Result<f64>;
 
-    /// A solver on it, with so many sweeps or small steps per step.
-    fn stepper<'a>(&self, bench: &'a Bench<'_>, sweeps: u32) -> Result<Box<dyn Stepper + 'a>>;
+    /// A solver on it, with so many sweeps or small steps per step; with as many as it chooses where none are given.
+    fn stepper<'a>(
+        &self,
+        bench: &'a Bench<'_>,
+        sweeps: Option<u32>,
+    ) -> Result<Box<dyn Stepper + 'a>>;
 }
 
 /// How long steps took, all together.
@@ -35,11 +40,17 @@ pub struct Elapsed {
 
 /// A solver at work.
 pub trait Stepper {
-    /// Goes back to rest, then so many steps.
+    /// Goes back to the start, then so many steps.
     fn run(&mut self, count: u32) -> Result<Elapsed>;
 
     /// Whether all that moves is still a number.
     fn is_finite(&self) -> Result<bool>;
+
+    /// Goes back to the start, then so many steps; where everything is then.
+    fn state_after(&mut self, count: u32) -> Result<State<f32>>;
+
+    /// Passes of the last solve that no part had a use for, because its steps were round-off; none where that is not known.
+    fn unused_passes(&self) -> Result<Option<u32>>;
 
     /// What is known of it.
     fn facts(&self) -> SolverFacts;
@@ -53,8 +64,11 @@ pub trait Stepper {
 pub struct SolverFacts {
     pub threads: Option<usize>,
     pub instructions: Option<String>,
-    /// Of a step.
+    /// Iterations of a solve, or small steps of a step.
+    pub passes: u32,
+    /// Of a step, and of a pass.
     pub dispatches: Option<usize>,
+    pub pass_dispatches: Option<usize>,
     /// Of model, state and solver, where the work is done.
     pub bytes: u64,
     /// Steps are timed together until they take this long [s].
@@ -91,7 +105,11 @@ impl Computer for Processor {
         Ok(bandwidth::of_memory(self.threads))
     }
 
-    fn stepper<'a>(&self, bench: &'a Bench<'_>, sweeps: u32) -> Result<Box<dyn Stepper + 'a>> {
+    fn stepper<'a>(
+        &self,
+        bench: &'a Bench<'_>,
+        sweeps: Option<u32>,
+    ) -> Result<Box<dyn Stepper + 'a>> {
         Ok(Box::new(CpuStepper::new(bench, self.threads, sweeps)))
     }
 }
@@ -107,36 +125,58 @@ pub struct CpuStepper<'a> {
     dt: f64,
 }
 
-/// Speed [m/s] of the far end of a body whose solver ends a solve early where little moves.
+/// Speed [m/s] of the far end of a body that is set in motion.
 const SWING: f32 = 0.5;
 
+/// A wave along it of this length [m] and largest strain, where steps are short: in a thousandth of a second a swing alone
+/// would move vertices by little more than round-off of what inertia does.
+const WAVE_LENGTH: f32 = 0.05;
+const WAVE_STRAIN: f32 = 0.1;
+
 impl<'a> CpuStepper<'a> {
-    pub fn new(bench: &'a Bench<'_>, threads: u32, sweeps: u32) -> Self {
-        let settings = SolverSettings {
-            iterations: Count::Of(sweeps),
-            threads: Threads::Count(threads),
-            ..bench.entry.settings()
-        };
+    pub fn new(bench: &'a Bench<'_>, threads: u32, sweeps: Option<u32>) -> Self {
+        let settings =
+            SolverSettings { threads: Threads::Count(threads), ..settings(bench, sweeps) };
         let solver = Solver::new(&bench.model, &settings);
         let dt = step_size(bench, sweeps, solver.stable_step());
         let mut start = solver.state_at_rest();
-        if settings.method == Method::QuasiNewton {
-            let ends = start.positions.iter().map(|x| x.x);
-            let (low, high) =
-                ends.fold((f32::MAX, f32::MIN), |(low, high), x| (low.min(x), high.max(x)));
-            for (velocity, x) in start.velocities.iter_mut().zip(&start.positions) {
-                let share = (x.x - low) / (high - low);
-                velocity.z = SWING * share * share;
-            }
-        }
+        swing(bench, &mut start);
         Self { bench, solver, state: start.clone(), start, dt }
     }
 }
 
+/// The settings of a solver with so many sweeps.
+pub fn settings(bench: &Bench<'_>, sweeps: Option<u32>) -> SolverSettings {
+    let own = bench.entry.settings();
+    SolverSettings { iterations: sweeps.map_or(own.iterations, Count::Of), ..own }
+}
+
 /// A step [s] with so many sweeps or small steps.
-pub fn step_size(bench: &Bench<'_>, sweeps: u32, stable_step: f64) -> f64 {
-    // A hair below, so that rounding makes no further small step.
-    if bench.is_explicit() { 0.999 * f64::from(sweeps) * stable_step } else { DT }
+pub fn step_size(bench: &Bench<'_>, sweeps: Option<u32>, stable_step: f64) -> f64 {
+    match (bench.dt, sweeps) {
+        (Some(dt), _) => dt,
+        // A hair below, so that rounding makes no further small step.
+        (None, Some(sweeps)) if bench.is_explicit() => 0.999 * f64::from(sweeps) * stable_step,
+        _ => DT,
+    }
+}
+
+/// Sets a body at rest in motion whose solver ends a solve early where little moves.
+pub fn swing(bench: &Bench<'_>, start: &mut State<f32>) {
+    if bench.entry.settings().method != Method::QuasiNewton {
+        return;
+    }
+    let ends = start.positions.iter().map(|x| x.x);
+    let (low, high) = ends.fold((f32::MAX, f32::MIN), |(low, high), x| (low.min(x), high.max(x)));
+    let has_wave = matches!(bench.entry.task.length, Length::Step(_));
+    for (velocity, x) in start.velocities.iter_mut().zip(&mut start.positions) {
+        let share = (x.x - low) / (high - low);
+        velocity.z = SWING * share * share;
+        if has_wave {
+            let number = std::f32::consts::TAU / WAVE_LENGTH;
+            x.x += WAVE_STRAIN / number * (number * (x.x - low)).sin();
+        }
+    }
 }
 
 impl Stepper for CpuStepper<'_> {
@@ -154,12 +194,25 @@ impl Stepper for CpuStepper<'_> {
         Ok(self.state.is_finite())
     }
 
+    fn state_after(&mut self, count: u32) -> Result<State<f32>> {
+        self.run(count)?;
+        Ok(self.state.clone())
+    }
+
+    fn unused_passes(&self) -> Result<Option<u32>> {
+        Ok(None)
+    }
+
     fn facts(&self) -> SolverFacts {
+        // As the step counts its small steps.
+        let small_steps = (self.dt / self.solver.stable_step()).ceil().max(1.0) as u32;
         let bytes = self.bench.model.bytes() + self.state.bytes() + self.solver.bytes();
         SolverFacts {
             threads: Some(self.solver.thread_count()),
             instructions: Some(format!("{:?}", self.solver.instructions()).to_lowercase()),
+            passes: self.solver.plan().passes(small_steps),
             dispatches: None,
+            pass_dispatches: None,
             bytes: bytes as u64,
             // A clock's own cost and coarseness are then a thousandth of it.
             least: 1e-4,

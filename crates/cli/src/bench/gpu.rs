@@ -1,12 +1,15 @@
 //! The graphics processor: solvers on it, and its memory.
 
-use super::computers::{Computer, Elapsed, SolverFacts, StageLine, Stepper, step_size};
+use super::computers::{
+    Computer, Elapsed, SolverFacts, StageLine, Stepper, settings, step_size, swing,
+};
 use super::measurement::Bench;
 use super::results::AdapterFacts;
+use super::task::ReadBack;
 use anyhow::Result;
 use std::cell::RefCell;
 use std::time::Instant;
-use viscera::settings::{Count, SolverSettings};
+use viscera::solver::balance::ForceBalance;
 use viscera::solver::gpu::{Adapter, Device, GpuSolver, MemoryCopy, StepTimes};
 use viscera::state::State;
 
@@ -85,36 +88,64 @@ impl Computer for Gpu {
         Ok(copy.bytes() as f64 * f64::from(COPIES) / fastest)
     }
 
-    fn stepper<'a>(&self, bench: &'a Bench<'_>, sweeps: u32) -> Result<Box<dyn Stepper + 'a>> {
-        let settings = SolverSettings { iterations: Count::Of(sweeps), ..bench.entry.settings() };
+    fn stepper<'a>(
+        &self,
+        bench: &'a Bench<'_>,
+        sweeps: Option<u32>,
+    ) -> Result<Box<dyn Stepper + 'a>> {
+        let settings = settings(bench, sweeps);
         let solver = GpuSolver::new(&self.device()?, &bench.model, &settings)?;
         let dt = step_size(bench, sweeps, solver.stable_step());
-        let rest = State::at_rest(&bench.model);
-        Ok(Box::new(GpuStepper { bench, solver, rest, sweeps, dt }))
+        let mut start = State::at_rest(&bench.model);
+        swing(bench, &mut start);
+        Ok(Box::new(GpuStepper { bench, solver, start, dt }))
     }
 }
 
 struct GpuStepper<'a> {
     bench: &'a Bench<'a>,
     solver: GpuSolver,
-    rest: State<f32>,
-    sweeps: u32,
+    /// Where every batch begins.
+    start: State<f32>,
     /// [s].
     dt: f64,
 }
 
 impl GpuStepper<'_> {
-    fn go_to_rest(&mut self) -> Result<()> {
-        self.solver.write(&self.bench.model, &self.rest)?;
+    fn go_to_start(&mut self) -> Result<()> {
+        self.solver.write(&self.bench.model, &self.start)?;
         Ok(self.solver.wait()?)
+    }
+
+    /// Steps after each of which the host waits for what it reads.
+    fn run_and_read(&mut self, count: u32) -> Result<()> {
+        let (model, inputs) = (&self.bench.model, &self.bench.inputs);
+        let with_forces = self.bench.entry.task.read_back == ReadBack::Forces;
+        let mut state = self.start.clone();
+        let mut balance = ForceBalance::default();
+        for _ in 0..count {
+            self.solver.step(model, inputs, self.dt)?;
+            self.solver.ask_for_frame(with_forces)?;
+            while self.solver.take_frame(model, &mut state)?.is_none() {
+                self.solver.wait()?;
+            }
+            if with_forces {
+                self.solver.force_balance(model, &state, inputs, &mut balance)?;
+            }
+        }
+        Ok(())
     }
 }
 
 impl Stepper for GpuStepper<'_> {
     fn run(&mut self, count: u32) -> Result<Elapsed> {
-        self.go_to_rest()?;
+        self.go_to_start()?;
         let (model, inputs) = (&self.bench.model, &self.bench.inputs);
         let start = Instant::now();
+        if self.bench.entry.task.read_back != ReadBack::Nothing {
+            self.run_and_read(count)?;
+            return Ok(Elapsed { wall: start.elapsed().as_secs_f64(), device: None });
+        }
         let device = self.solver.time_steps(model, inputs, self.dt, count)?;
         Ok(Elapsed { wall: start.elapsed().as_secs_f64(), device })
     }
@@ -125,12 +156,30 @@ impl Stepper for GpuStepper<'_> {
         Ok(state.is_finite())
     }
 
+    fn state_after(&mut self, count: u32) -> Result<State<f32>> {
+        self.go_to_start()?;
+        let model = &self.bench.model;
+        for _ in 0..count {
+            self.solver.step(model, &self.bench.inputs, self.dt)?;
+        }
+        let mut state = State::at_rest(model);
+        self.solver.read(model, &mut state)?;
+        Ok(state)
+    }
+
+    fn unused_passes(&self) -> Result<Option<u32>> {
+        Ok(self.solver.unused_passes()?.into_iter().min())
+    }
+
     fn facts(&self) -> SolverFacts {
         let [prologue, iteration, epilogue] = self.solver.dispatches();
+        let passes = self.solver.passes();
         SolverFacts {
             threads: None,
             instructions: None,
-            dispatches: Some(prologue + iteration * self.sweeps as usize + epilogue),
+            passes,
+            dispatches: Some(prologue + iteration * passes as usize + epilogue),
+            pass_dispatches: Some(iteration),
             bytes: self.solver.bytes(),
             least: LEAST,
             most_steps: MOST_STEPS,
@@ -140,7 +189,7 @@ impl Stepper for GpuStepper<'_> {
     fn stages(&mut self) -> Result<Vec<StageLine>> {
         let mut fastest: Vec<StageLine> = Vec::new();
         for _ in 0..STAGE_REPETITIONS {
-            self.go_to_rest()?;
+            self.go_to_start()?;
             let (model, inputs) = (&self.bench.model, &self.bench.inputs);
             let Some(times) = self.solver.time_step(model, inputs, self.dt)? else { break };
             let now = lines(&times, self.solver.dispatches()[1]);

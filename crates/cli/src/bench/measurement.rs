@@ -1,9 +1,12 @@
 //! One case: a solver on a mesh with so many threads.
 
+use super::accuracy;
 use super::bandwidth::Bandwidth;
 use super::computers::{Computer, Runner, StageLine};
 use super::solvers::SolverEntry;
 use super::subjects::hanging;
+use super::task::DT;
+use super::traffic::TrafficReport;
 use anyhow::Result;
 use serde::Serialize;
 use std::time::Instant;
@@ -13,8 +16,6 @@ use viscera::model::{Model, ModelBuilder};
 use viscera::settings::Method;
 use viscera::solver::Inputs;
 
-/// A step [s]: a sixtieth of a second in ten substeps.
-pub const DT: f64 = 1.0 / 600.0;
 /// The fewest repetitions from which a median is taken.
 const FEWEST: usize = 3;
 /// Where noise hides a sweep, so many times the time is spent before it is given up.
@@ -40,8 +41,16 @@ pub struct Measurement {
     pub instructions: Option<String>,
     /// None for a solver that does not sweep.
     pub sweeps: Option<u32>,
-    /// Of a step on a GPU.
+    /// Iterations of a solve, or small steps, that a step has in fact.
+    pub passes: u32,
+    /// Passes of its last solve that nothing had a use for, where that is known.
+    pub unused_passes: Option<u32>,
+    /// Poisson's ratio of the tissue, and the step [s] where it is not the usual one.
+    pub poisson: f64,
+    pub dt: Option<f64>,
+    /// Of a step on a GPU, and of a pass.
     pub dispatches: Option<usize>,
+    pub pass_dispatches: Option<usize>,
     pub repetitions: usize,
     /// By the host's clock, waiting included.
     pub step_seconds_median: f64,
@@ -54,6 +63,8 @@ pub struct Measurement {
     /// From the difference between two numbers of sweeps, by the device's clock where it has one; none where
     /// noise hides it.
     pub unit_ns_per_tet: Option<f64>,
+    /// Of steps of the quasi-Newton method that a question asks for: their error, as a share of that of inertia alone.
+    pub left: Option<f64>,
     /// Of model, state and solver.
     pub bytes_per_tet: f64,
     pub compulsory_bytes_per_tet: f64,
@@ -83,35 +94,43 @@ pub struct Bench<'a> {
     pub entry: &'a SolverEntry,
     pub model: Model<f32>,
     pub inputs: Inputs<f32>,
+    /// The step [s], where it is fixed, and how many of them what is asked for has.
+    pub dt: Option<f64>,
+    pub steps: u32,
+    /// What a step moves by counting, where the build can count.
+    pub traffic: Option<TrafficReport>,
 }
 
 impl<'a> Bench<'a> {
     pub fn new(entry: &'a SolverEntry, mesh: &TetMesh) -> Result<Self> {
         let mut builder = ModelBuilder::new();
         builder.add_body(mesh, &entry.tissue()?)?;
-        Ok(Self { entry, model: builder.build()?, inputs: hanging(mesh) })
+        let (steps, dt) = entry.task.steps(entry)?;
+        let (model, inputs) = (builder.build()?, hanging(mesh));
+        Ok(Self { entry, model, inputs, dt, steps, traffic: None })
     }
 
-    /// Measures for about so long [s] on what the bandwidth belongs to.
+    /// Measures for about so long [s] on what the bandwidth belongs to; the error of a step as well, where the mesh is given.
     pub fn measure(
         &self,
         name: &str,
         computer: &dyn Computer,
         bandwidth: Bandwidth,
         seconds: f64,
+        judged: Option<&TetMesh>,
     ) -> Result<Measurement> {
-        let counts = self.entry.sweeps.unwrap_or_else(|| [self.entry.settings().iterations(); 2]);
+        let counts = self.entry.sweeps;
         let runner = |sweeps| computer.stepper(self, sweeps).map(Runner::new);
-        let mut few = runner(counts[0])?;
-        let mut more = self.entry.sweeps.map(|sweeps| runner(sweeps[1])).transpose()?;
+        let mut few = runner(counts.map(|counts| counts[0]))?;
+        let mut more = counts.map(|counts| runner(Some(counts[1]))).transpose()?;
         few.warm_up()?;
         more.as_mut().map_or(Ok(()), Runner::warm_up)?;
         // By turns, so that what else the machine does strikes both alike.
         let start = Instant::now();
         let best = |runner: &Runner<'_>| runner.fastest_on_device().unwrap_or(runner.fastest());
-        let unit = |few: &Runner<'_>, more: &Option<Runner<'_>>| match more {
-            Some(more) => unit_cost([best(few), best(more)], counts),
-            None => Some(best(few)),
+        let unit = |few: &Runner<'_>, more: &Option<Runner<'_>>| match (more, counts) {
+            (Some(more), Some(counts)) => unit_cost([best(few), best(more)], counts),
+            _ => Some(best(few)),
         };
         loop {
             let (spent, count) = (start.elapsed().as_secs_f64(), few.repetitions());
@@ -123,7 +142,11 @@ impl<'a> Bench<'a> {
             few.time()?;
             more.as_mut().map_or(Ok(()), Runner::time)?;
         }
+        let unused_passes = few.stepper.unused_passes()?;
         let stages = few.stepper.stages()?;
+        let dt = self.dt.unwrap_or(DT);
+        let left =
+            judged.map(|mesh| accuracy::left(self, mesh, &mut *few.stepper, dt)).transpose()?;
         let tets = self.model.tet_count();
         let per_tet = 1e9 / tets as f64;
         let unit_seconds = unit(&few, &more);
@@ -141,7 +164,13 @@ impl<'a> Bench<'a> {
             colors: layout.color_count,
             instructions: facts.instructions,
             sweeps: self.entry.sweeps.map(|s| s[0]),
+            passes: facts.passes,
+            unused_passes,
+            poisson: self.entry.task.poisson,
+            dt: self.dt,
             dispatches: facts.dispatches,
+            pass_dispatches: facts.pass_dispatches,
+            left,
             repetitions: few.repetitions(),
             step_seconds_median: few.median(),
             step_seconds_min: few.fastest(),
@@ -159,8 +188,11 @@ impl<'a> Bench<'a> {
     /// What no sweep in single precision can do without [B]: of each tetrahedron the four vertex
     /// numbers, `Dm^-1`, volume and material (60 B), each multiplier read and written, and each
     /// vertex's position and inverse mass (16 B) read and written, once. A small step has no
-    /// multipliers, but forces (16 B) and velocities (12 B).
+    /// multipliers, but forces (16 B) and velocities (12 B). Of the quasi-Newton method what its dispatches count.
     fn compulsory_bytes(&self, layout: &Layout<f32>) -> f64 {
+        if let Some(counted) = self.traffic.as_ref().and_then(|t| t.of_unit(self.entry)) {
+            return counted;
+        }
         let count = |set: &TetSet<f32>| set.len() * set.form.multiplier_count();
         let multipliers: usize = layout.tet_sets.iter().map(count).sum();
         let (multipliers, vertex) =
@@ -197,7 +229,7 @@ mod tests {
         let mesh = mesh.mesh().expect("a bar");
         for entry in &SOLVERS {
             let bench = Bench::new(entry, &mesh).expect("a model");
-            let mut stepper = CpuStepper::new(&bench, 1, 1);
+            let mut stepper = CpuStepper::new(&bench, 1, Some(1));
             stepper.run(1).expect("a step");
             let bytes = stepper.facts().bytes;
             let each = bytes as f64 / bench.model.tet_count() as f64;

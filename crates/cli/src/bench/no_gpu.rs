@@ -36,7 +36,7 @@ impl Computer for Gpu {
         match *self {}
     }
 
-    fn stepper<'a>(&self, _: &'a Bench<'_>, _: u32) -> Result<Box<dyn Stepper + 'a>> {
+    fn stepper<'a>(&self, _: &'a Bench<'_>, _: Option<u32>) -> Result<Box<dyn Stepper + 'a>> {
         match *self {}
     }
 }

@@ -3,7 +3,9 @@
 use super::bandwidth::Bandwidth;
 use super::measurement::Measurement;
 use super::questions::Answer;
+use super::rooflines;
 use super::solvers::SolverEntry;
+use super::traffic::TrafficReport;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use viscera_report::{Axis, Document, Plot, Series, Style, Table, percent, si};
@@ -20,6 +22,8 @@ pub struct Results {
     pub bandwidths: Vec<Bandwidth>,
     pub cases: Vec<Measurement>,
     pub answers: Vec<Answer>,
+    /// Of steps of the GPU backend, without a device.
+    pub traffic: Vec<TrafficReport>,
     /// What the graphics processor could not do.
     pub skipped: Vec<Skipped>,
     pub notes: Vec<String>,
@@ -78,7 +82,7 @@ const COLUMNS: [Column; 16] = [
     ("instructions", false, |case| or_dash(case.instructions.as_ref())),
 ];
 
-fn or_dash(value: Option<impl ToString>) -> String {
+pub fn or_dash(value: Option<impl ToString>) -> String {
     value.map_or("-".into(), |value| value.to_string())
 }
 
@@ -92,6 +96,7 @@ impl Results {
             bandwidths: Vec::new(),
             cases: Vec::new(),
             answers: Vec::new(),
+            traffic: Vec::new(),
             skipped: Vec::new(),
             notes: Vec::new(),
         }
@@ -104,7 +109,8 @@ impl Results {
     /// For a terminal.
     pub fn to_text(&self) -> String {
         let mut text = format!("{}\n{}", self.heading(), self.table().to_text());
-        for table in [self.answer_table(), self.skipped_table()].into_iter().flatten() {
+        let answers = rooflines::answers(&self.answers);
+        for table in [answers, self.skipped_table()].into_iter().flatten() {
             text.push_str(&format!("\n{}", table.to_text()));
         }
         for note in &self.notes {
@@ -142,40 +148,6 @@ impl Results {
             table.row(shown().map(|column| column.2(case)));
         }
         table
-    }
-
-    /// What was asked, beside what was found.
-    fn answer_table(&self) -> Option<Table> {
-        let mut table = Table::new([
-            "asked",
-            "tetrahedra",
-            "aim",
-            "solver",
-            "measured on",
-            "device",
-            "step",
-            "step, wall",
-            "dispatches",
-            "of bandwidth",
-            "aim",
-        ]);
-        for answer in &self.answers {
-            let on = answer.threads.map_or("GPU".into(), |n| format!("CPU, {}", threads(n as u32)));
-            table.row([
-                answer.question.to_owned(),
-                answer.asked_tets.to_string(),
-                si(answer.aim_seconds, "s"),
-                answer.solver.to_owned(),
-                answer.tets.to_string(),
-                on,
-                si(answer.step_seconds, "s"),
-                si(answer.wall_seconds, "s"),
-                or_dash(answer.dispatches),
-                answer.bandwidth_fraction.map_or("-".into(), percent),
-                answer.aim_bandwidth_fraction.map_or("-".into(), percent),
-            ]);
-        }
-        (!table.is_empty()).then_some(table)
     }
 
     fn skipped_table(&self) -> Option<Table> {
@@ -218,8 +190,10 @@ impl Results {
         for note in &self.notes {
             document.paragraph(format!("Note: {note}."));
         }
-        if let Some(table) = self.answer_table() {
+        if let Some(table) = rooflines::answers(&self.answers) {
+            document.paragraph(super::ASKED);
             document.table(&table);
+            document.figure("answers-and-aims", &rooflines::aim_plot(&self.answers))?;
         }
         document.paragraph(super::COUNTING);
         if self.adapter.is_some() {
@@ -245,6 +219,23 @@ impl Results {
             document.heading("Stages on the GPU");
             document.table(&table);
         }
+        self.fill_counted(document)
+    }
+
+    /// What follows from counting.
+    fn fill_counted(&self, document: &mut Document) -> Result<()> {
+        let [Some(steps), Some(kernels)] =
+            [rooflines::steps(&self.traffic), rooflines::kernels(&self.traffic)]
+        else {
+            return Ok(());
+        };
+        document.heading("Bytes by counting");
+        document.paragraph(rooflines::COUNTING);
+        document.table(&steps);
+        let gpu = self.bandwidths.iter().find(|bandwidth| bandwidth.threads.is_none());
+        let plot = rooflines::roofline_plot(&self.traffic, &self.answers, gpu);
+        document.figure("rooflines", &plot)?;
+        document.table(&kernels);
         Ok(())
     }
 
@@ -302,12 +293,15 @@ impl Results {
     }
 }
 
-fn threads(count: u32) -> String {
+pub fn threads(count: u32) -> String {
     if count == 1 { "1 thread".into() } else { format!("{count} threads") }
 }
 
 /// Three significant digits.
-fn digits(number: f64) -> String {
+pub fn digits(number: f64) -> String {
+    if number == 0.0 {
+        return "0".into();
+    }
     let decimals = (2 - number.abs().log10().floor() as i32).clamp(0, 6) as usize;
     format!("{number:.decimals$}")
 }

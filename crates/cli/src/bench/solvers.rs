@@ -1,5 +1,6 @@
 //! The solvers that `viscera bench` measures.
 
+use super::task::{Length, Task};
 use viscera::material::{Material, MaterialError, MaterialModel};
 use viscera::settings::{Acceleration, Colors, Elements, Method, SolverSettings};
 
@@ -14,6 +15,7 @@ pub struct SolverEntry {
     /// Two numbers of sweeps, or of small steps, per step. A step is measured with the first, a sweep by the difference
     /// between both. `None` for a solver that does not sweep: its unit is the step.
     pub sweeps: Option<[u32; 2]>,
+    pub task: Task,
     /// What it changes of the default settings.
     change: fn(&mut SolverSettings),
 }
@@ -71,13 +73,19 @@ pub const SOLVERS: [SolverEntry; 16] = [
         None,
         |s| s.method = Method::QuasiNewton,
     ),
-    entry("quasi-newton", "the same, stable neo-Hookean", NEO, None, |s| {
+    entry("quasi-newton", "quasi-Newton, stable neo-Hookean", NEO, None, |s| {
         s.method = Method::QuasiNewton;
     }),
-    entry("quasi-newton-recovered", "the same, recovered-gradient tetrahedra", NEO, None, |s| {
-        s.method = Method::QuasiNewton;
-        s.elements = Elements::Recovered;
-    }),
+    entry(
+        "quasi-newton-recovered",
+        "quasi-Newton, recovered-gradient tetrahedra",
+        NEO,
+        None,
+        |s| {
+            s.method = Method::QuasiNewton;
+            s.elements = Elements::Recovered;
+        },
+    ),
 ];
 
 const fn entry(
@@ -87,7 +95,7 @@ const fn entry(
     sweeps: Option<[u32; 2]>,
     change: fn(&mut SolverSettings),
 ) -> SolverEntry {
-    SolverEntry { name, what, material, sweeps, change }
+    SolverEntry { name, what, material, sweeps, task: Task::USUAL, change }
 }
 
 /// Sweeps and nothing else.
@@ -102,12 +110,16 @@ impl SolverEntry {
     pub fn settings(&self) -> SolverSettings {
         let mut settings = SolverSettings::xpbd();
         (self.change)(&mut settings);
+        if settings.method == Method::Explicit && self.task.length == Length::Usual {
+            // The cost of a small step does not depend on its size; small ones keep any mesh in one piece.
+            settings.explicit_safety = 0.05;
+        }
         settings
     }
 
     /// Soft tissue.
     pub fn tissue(&self) -> Result<Material, MaterialError> {
-        Material::new(self.material, 10e3, 0.45, 1060.0)
+        Material::new(self.material, 10e3, self.task.poisson, 1060.0)
     }
 
     /// What its cost is counted per.
@@ -118,6 +130,4 @@ impl SolverEntry {
 
 fn explicit(settings: &mut SolverSettings) {
     settings.method = Method::Explicit;
-    // The cost of a small step does not depend on its size; small ones keep any mesh in one piece.
-    settings.explicit_safety = 0.05;
 }

@@ -284,18 +284,64 @@ fn questions_are_answered_beside_their_aims() {
     assert_eq!(end.code, Some(0), "{}", end.stderr);
     let results: Value = serde_json::from_slice(&folder.read("out/bench.json")).expect("JSON");
     let answers = results["answers"].as_array().expect("answers");
-    let asked: Vec<_> = answers.iter().map(|a| (&a["solver"], a["aim_seconds"].as_f64())).collect();
-    let [substep, colored, anderson] =
-        [("jacobi-green", 0.25e-3), ("green", 4e-3), ("jacobi-anderson", 1e-3)];
-    for (i, (solver, aim)) in
-        [substep, substep, colored, colored, anderson, anderson].into_iter().enumerate()
-    {
-        assert_eq!(asked[i], (&Value::from(solver), Some(aim)));
-        assert!(answers[i]["step_seconds"].as_f64().is_some_and(|s| s > 0.0), "{}", answers[i]);
+    // Each of the processor and of the device, in turn.
+    let asked: Vec<_> = answers
+        .iter()
+        .step_by(2)
+        .map(|a| (a["solver"].as_str().unwrap_or(""), a["aims"]["seconds"].as_f64()))
+        .collect();
+    let expected = [
+        ("jacobi-green", Some(0.25e-3)),
+        ("green", Some(4e-3)),
+        ("jacobi-anderson", Some(1e-3)),
+        ("quasi-newton", Some(1e-3)),
+        ("exact", None),
+        ("explicit", None),
+        ("quasi-newton", Some(0.3e-3)),
+        ("quasi-newton", Some(0.3e-3)),
+        ("quasi-newton", Some(3e-3)),
+        ("exact", None),
+        ("explicit", None),
+        ("quasi-newton", Some(0.7e-3)),
+        ("quasi-newton", None),
+    ];
+    assert_eq!(asked, expected);
+    for answer in answers {
+        assert!(answer["seconds"].as_f64().is_some_and(|s| s > 0.0), "{answer}");
+        // Nothing is met, nor missed, on another mesh.
+        assert!(answer["is_met"].is_null(), "{answer}");
+        let is_solved = answer["solver"] == "quasi-newton" && !answer["aims"]["left"].is_null();
+        assert_eq!(answer["left"].as_f64().is_some_and(|left| left < 0.1), is_solved, "{answer}");
     }
+    let frames: Vec<_> = answers.iter().filter(|a| a["device"] == "GPU").collect();
+    // Of soft tissue: eight passes, seven dispatches each. A body this small has no coarser level.
+    let [solved, sweeps, explicit] = [3, 4, 5].map(|i| frames[i]);
+    assert_eq!((&solved["steps"], &solved["passes"]), (&Value::from(1), &Value::from(8)));
+    assert!(solved["dispatches"].as_u64() <= Some(120), "{solved}");
+    assert_eq!((&sweeps["steps"], &sweeps["passes"]), (&Value::from(10), &Value::from(2)));
+    assert_eq!(explicit["pass_dispatches"], 2);
+    let small_steps = explicit["passes"].as_u64().expect("small steps");
+    assert!(explicit["dispatches"].as_u64() > Some(2 * small_steps), "{explicit}");
+    let counted = results["traffic"].as_array().expect("traffic");
+    // Those that are alike once.
+    assert_eq!(counted.len(), 7);
+    for step in counted {
+        let of = |key: &str| step[key].as_f64().unwrap_or(0.0);
+        assert!(
+            of("compulsory_bytes") > 0.0 && of("compulsory_bytes") <= of("moved_bytes"),
+            "{step}"
+        );
+        assert!(of("largest_mesh") > 1e5 && of("bytes_per_tet") > 100.0, "{step}");
+    }
+    assert_eq!(counted[5]["passes"], explicit["passes"]);
+    assert_eq!(counted[3]["dispatches"], solved["dispatches"]);
     let sweeps: Vec<_> =
         results["cases"].as_array().expect("cases").iter().map(|case| &case["sweeps"]).collect();
-    assert_eq!(sweeps, [1, 1, 20, 20, 20, 20]);
+    assert_eq!(sweeps[..6], [1, 1, 20, 20, 20, 20]);
+    let report = String::from_utf8(folder.read("out/bench.md")).expect("UTF-8");
+    for text in ["(bench/answers-and-aims.svg)", "(bench/rooflines.svg)", "evaluate_elements"] {
+        assert!(report.contains(text), "{text} is not in {report}");
+    }
     assert!(end.stdout.contains("20 Jacobi + Anderson iterations"), "{}", end.stdout);
 }
 

@@ -149,7 +149,8 @@ fn asked_for(
 /// The one that is expected to be faster, and the CPU where no device can do it.
 fn faster(model: &Model<f32>, settings: &SolverSettings, offered: Option<&Device>) -> Backend<f32> {
     let solver = Solver::new(model, settings);
-    let cost = StepCost::new(solver.layout(), settings, settings.iterations());
+    // The explicit method, whose small steps would count, is left to the CPU (choice.rs).
+    let cost = StepCost::new(solver.layout(), settings, 1);
     let tets = grouped(model.tet_count() as u64);
     // Before any driver is loaded, which takes longer than a small scene.
     if !cost.gpu_pays() {

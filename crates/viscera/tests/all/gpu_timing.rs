@@ -7,7 +7,7 @@ use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::vec3;
 use viscera::settings::{Acceleration, Colors, Count, Method, SolverSettings};
 use viscera::solver::Inputs;
-use viscera::solver::gpu::{GpuSolver, MemoryCopy, StepPart};
+use viscera::solver::gpu::{GpuSolver, MemoryCopy, StepPart, Traffic};
 use viscera::state::State;
 
 const DT: f64 = 1.0 / 600.0;
@@ -96,4 +96,30 @@ fn copies_move_the_bytes_that_they_name() {
     let seconds = copy.time(1).expect("a device");
     assert_eq!(seconds.is_some(), device.has_clock());
     assert!(seconds.is_none_or(|seconds| seconds > 0.0));
+}
+
+/// Without a device: the dispatches of a step that are sent, and the memory that is taken.
+#[test]
+fn counted_traffic_is_that_of_the_solver() {
+    let xpbd = SolverSettings::xpbd();
+    let jacobi = SolverSettings {
+        colors: Colors::Limited(1),
+        acceleration: Acceleration::Anderson,
+        ..xpbd.clone()
+    };
+    let explicit = SolverSettings { method: Method::Explicit, ..xpbd.clone() };
+    let quasi_newton = SolverSettings { method: Method::QuasiNewton, ..xpbd.clone() };
+    for settings in [xpbd, jacobi, explicit, quasi_newton] {
+        let model = bar();
+        let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
+        gpu.step(&model, &Inputs::default(), DT).expect("a legal step");
+        let traffic = Traffic::new(&model, &settings, gpu.passes());
+        assert_eq!(traffic.passes, gpu.passes(), "{:?}", settings.method);
+        assert_eq!(traffic.dispatches.each_ref().map(Vec::len), gpu.dispatches());
+        // The rest are jobs, 256 bytes each, copies' places of a small model, and the least size of a buffer.
+        let counted: u64 = traffic.memory.iter().map(|(_, bytes)| bytes).sum();
+        let rest = gpu.bytes() - counted;
+        let jobs = 256 * (gpu.dispatches().iter().sum::<usize>() as u64 + 8);
+        assert!(rest < jobs + (16 << 10), "{:?}: {rest} of {}", settings.method, gpu.bytes());
+    }
 }

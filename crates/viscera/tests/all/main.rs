@@ -30,6 +30,7 @@ mod gpu_explicit;
 mod gpu_guard;
 mod gpu_history;
 mod gpu_parts;
+mod gpu_passes;
 mod gpu_quasi_newton;
 mod gpu_shaders;
 mod gpu_simulation;

@@ -5,10 +5,10 @@ use wgpu::BufferUsages;
 use super::control::control_size;
 use super::device::Device;
 use super::error::GpuError;
-use super::layout::{DeviceLayout, tets};
+use super::layout::{DeviceLayout, Table, tets};
 use super::limits::{accelerates, window};
 use super::slots::{Place, Range, Slot, Update, multipliers_start, unknowns_size};
-use crate::layout::Layout;
+use crate::layout::{Layout, TetBlock};
 use crate::scalar::lanes::LANES;
 use crate::settings::{Acceleration, SolverSettings};
 use crate::solver::quasi_newton::on_device::DeviceLevels;
@@ -30,14 +30,13 @@ pub(super) struct Buffers {
 }
 
 /// Every array fits into a binding; the error names the one that would need to shrink most.
-fn check_sizes(
-    device: &Device,
-    tets: u64,
-    arrays: impl Iterator<Item = (&'static str, u64)>,
-) -> Result<(), GpuError> {
+fn check_sizes(device: &Device, tets: u64, arrays: &[Size]) -> Result<(), GpuError> {
     let limits = device.limits();
     let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    let Some((what, needed)) = arrays.max_by_key(|(_, size)| *size) else { return Ok(()) };
+    let Some(&Size { what, bytes: needed, .. }) = arrays.iter().max_by_key(|size| size.bytes)
+    else {
+        return Ok(());
+    };
     if needed <= limit {
         return Ok(());
     }
@@ -65,7 +64,55 @@ fn sizes_of_levels(
     ]
 }
 
+/// An array, and the buffer that it is.
+pub(super) struct Size {
+    pub slot: Slot,
+    pub what: &'static str,
+    pub bytes: u64,
+}
+
+/// Copies of corners, and where those of each vertex begin: no slot of their own, see [`Place::CopiesOf`].
+const OF_COPIES: [&str; 2] = ["copies of corners", "copies of vertices"];
+
 impl Buffers {
+    /// All arrays of a model, whose tables these are: `levels` for the quasi-Newton method.
+    pub fn sizes(
+        layout: &Layout<f32>,
+        settings: &SolverSettings,
+        on_device: &DeviceLayout,
+        levels: Option<&DeviceLevels>,
+        table: &Table,
+    ) -> Vec<Size> {
+        let vertices = layout.vertex_count() as u64;
+        let unknowns = unknowns_size(layout);
+        let accelerated = accelerates(settings);
+        let anderson = accelerated && settings.acceleration == Acceleration::Anderson;
+        let history = if anderson { unknowns * (u64::from(window(settings)) + 1) } else { 0 };
+        let all_blocks = layout.block_count() as u64;
+        let blocks = if layout.is_viscous() { all_blocks } else { 0 };
+        let when = |wanted: bool, size: u64| if wanted { size } else { 0 };
+        let copies = when(layout.is_split(), 16 * layout.copy_count() as u64);
+        let lanes = LANES as u64;
+        let own = [
+            (Slot::Copies, "copies of vertices", copies),
+            (Slot::Loads, "loads", 16 * on_device.slot_count()),
+            (Slot::Updates, "inputs", size_of::<Update>() as u64 * vertices),
+            (Slot::StartStrain, "strains", 6 * 4 * lanes * blocks),
+            (Slot::Unknowns, "unknowns", unknowns),
+            (Slot::Iterate, "unknowns before", when(accelerated, unknowns)),
+            (Slot::Older, "older unknowns", when(accelerated && !anderson, unknowns)),
+            (Slot::Residuals, "Anderson's residuals", history),
+            (Slot::Mapped, "Anderson's iterates", history),
+            (Slot::PartialSums, "partial sums", table.sums_size),
+            (Slot::Control, "control records", control_size(layout.part_count())),
+            (Slot::VertexData, "vertices", table.vertex_data_size),
+            (Slot::Tets, "tetrahedra", size_of::<TetBlock<f32>>() as u64 * all_blocks),
+            (Slot::Table, "tables", table.bytes.len() as u64),
+        ];
+        let all = own.into_iter().chain(sizes_of_levels(layout, levels));
+        all.map(|(slot, what, bytes)| Size { slot, what, bytes }).collect()
+    }
+
     pub fn new(
         device: &Device,
         layout: &Layout<f32>,
@@ -74,37 +121,12 @@ impl Buffers {
         levels: Option<&DeviceLevels>,
         left_over: &[u8],
     ) -> Result<Self, GpuError> {
-        let vertices = layout.vertex_count() as u64;
-        let points_size = 16 * vertices;
+        let points_size = 16 * layout.vertex_count() as u64;
         let multipliers_start = multipliers_start(layout.vertex_count());
         let unknowns = unknowns_size(layout);
-        let accelerated = accelerates(settings);
-        let anderson = accelerated && settings.acceleration == Acceleration::Anderson;
-        let history = if anderson { unknowns * (u64::from(window(settings)) + 1) } else { 0 };
-        let blocks = if layout.is_viscous() { layout.block_count() as u64 } else { 0 };
-        let when = |wanted: bool, size: u64| if wanted { size } else { 0 };
         let table = on_device.table(layout, settings);
-        let split = layout.is_split();
-        use Slot::*;
-        let sizes = [
-            (Copies, "copies of vertices", when(split, 16 * layout.copy_count() as u64)),
-            (Loads, "loads", 16 * on_device.slot_count()),
-            (Updates, "inputs", size_of::<Update>() as u64 * vertices),
-            (StartStrain, "strains", 6 * 4 * LANES as u64 * blocks),
-            (Unknowns, "unknowns", unknowns),
-            (Iterate, "unknowns", when(accelerated, unknowns)),
-            (Older, "unknowns", when(accelerated && !anderson, unknowns)),
-            (Residuals, "Anderson's residuals", history),
-            (Mapped, "Anderson's iterates", history),
-            (PartialSums, "partial sums", table.sums_size),
-            (Control, "control records", control_size(layout.part_count())),
-            (VertexData, "vertices", table.vertex_data_size),
-        ];
-        let sizes = [&sizes[..], &sizes_of_levels(layout, levels)].concat();
-        let constants = [(Tets, "tetrahedra", tets(layout)), (Table, "tables", table.bytes)];
-        let of_constants = constants.iter().map(|(_, what, bytes)| (*what, bytes.len() as u64));
-        let arrays = sizes.iter().map(|&(_, what, size)| (what, size)).chain(of_constants);
-        check_sizes(device, layout.tet_count() as u64, arrays)?;
+        let sizes = Self::sizes(layout, settings, on_device, levels, &table);
+        check_sizes(device, layout.tet_count() as u64, &sizes)?;
 
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let make = |label: &str, size: u64, usage: BufferUsages| {
@@ -121,27 +143,35 @@ impl Buffers {
             }
             buffer
         };
-        let filled = |label: &str, bytes: &[u8]| {
-            let buffer = make(label, bytes.len() as u64, usage);
+        let fill = |buffer: wgpu::Buffer, bytes: &[u8]| {
             device.queue.write_buffer(&buffer, 0, bytes);
             buffer
         };
         let mut all = Vec::new();
-        for (slot, label, size) in sizes {
-            let usage = if slot == Unknowns { usage | BufferUsages::VERTEX } else { usage };
-            all.push((slot, make(label, size, usage)));
+        for Size { slot, what, bytes } in sizes {
+            let usage = if slot == Slot::Unknowns { usage | BufferUsages::VERTEX } else { usage };
+            let buffer = make(what, bytes, usage);
+            all.push((
+                slot,
+                match slot {
+                    Slot::Tets => fill(buffer, &tets(layout)),
+                    Slot::Table => fill(buffer, &table.bytes),
+                    _ => buffer,
+                },
+            ));
         }
-        for (slot, label, bytes) in &constants {
-            all.push((*slot, filled(label, bytes)));
-        }
-        let copies = split.then(|| {
-            let [indices, offsets] = DeviceLayout::copies(layout);
-            [filled("copies of corners", &indices), filled("copies of vertices", &offsets)]
+        let copies = layout.is_split().then(|| {
+            let of_copies = DeviceLayout::copies(layout);
+            std::array::from_fn(|i| {
+                let bytes = &of_copies[i];
+                fill(make(OF_COPIES[i], bytes.len() as u64, usage), bytes)
+            })
         });
         let mut ranges = table.ranges;
         let (start, size) = (multipliers_start, unknowns - multipliers_start);
-        ranges.push(Range { slot: Points, owner: Unknowns, start: 0, size: points_size });
-        ranges.push(Range { slot: Multipliers, owner: Unknowns, start, size });
+        let owner = Slot::Unknowns;
+        ranges.push(Range { slot: Slot::Points, owner, start: 0, size: points_size });
+        ranges.push(Range { slot: Slot::Multipliers, owner, start, size });
         let length = (unknowns / 4) as u32;
         Ok(Self { all, ranges, copies, points_size, multipliers_start, length })
     }

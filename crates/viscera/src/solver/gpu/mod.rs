@@ -42,6 +42,7 @@ mod step;
 mod surface;
 mod switch;
 mod timing;
+mod traffic;
 pub(in crate::solver) mod uniforms;
 mod words;
 
@@ -57,3 +58,4 @@ pub use slots::Slot;
 pub use solver::GpuSolver;
 pub use surface::{GpuSurface, Skin};
 pub use timing::{StageTime, StepPart, StepTimes};
+pub use traffic::{DispatchTraffic, Traffic};

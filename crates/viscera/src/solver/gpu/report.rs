@@ -4,6 +4,9 @@ use super::control::{PARTS_START, PartControl, rejected_steps};
 use super::error::GpuError;
 use super::slots::Slot;
 use super::solver::GpuSolver;
+use crate::solver::plan::Solve;
+use crate::solver::quasi_newton::on_device::first_solve;
+use crate::solver::quasi_newton::progress::PartProgress;
 use crate::solver::report::StepReport;
 
 impl GpuSolver {
@@ -36,6 +39,19 @@ impl GpuSolver {
             return Ok(Vec::new());
         }
         Ok(self.part_records()?.iter().map(|part| part.guard.report()).collect())
+    }
+
+    /// Passes of the last solve of the quasi-Newton method that each connected part had no use for, because its next step was
+    /// round-off; empty for other methods. Waits for the device.
+    pub fn unused_passes(&self) -> Result<Vec<u32>, GpuError> {
+        if self.levels.is_none() {
+            return Ok(Vec::new());
+        }
+        let record = usize::from(first_solve(&self.settings) == Solve::First);
+        let bytes = self.read_buffer(Slot::Progress)?;
+        let all = bytes.chunks_exact(size_of::<PartProgress>()).take(self.part_count);
+        let left = |part: PartProgress| part.states[record].passes_left;
+        Ok(all.map(|bytes| left(bytemuck::pod_read_unaligned(bytes))).collect())
     }
 
     fn part_records(&self) -> Result<Vec<PartControl>, GpuError> {

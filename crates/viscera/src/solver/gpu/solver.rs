@@ -13,6 +13,7 @@ use super::record::{Dispatch, Recorder};
 use super::ring::Frames;
 use super::slots::{Slot, Update};
 use super::stages::StageRange;
+use super::traffic::Recorded;
 use super::uniforms::{FrameConstants, Job};
 use bytemuck::Zeroable;
 use std::sync::Arc;
@@ -84,6 +85,8 @@ pub struct GpuSolver {
     pub(super) falls: Option<Falls>,
     /// Of the quasi-Newton method.
     pub(super) levels: Option<DeviceLevels>,
+    /// Of the last step.
+    pub(super) passes: u32,
 }
 
 impl GpuSolver {
@@ -169,6 +172,7 @@ impl GpuSolver {
             ],
             buffers,
             levels,
+            passes: 0,
         };
         if let Some(table) = table {
             solver.put_levels(&table);
@@ -214,16 +218,13 @@ impl GpuSolver {
     /// the other, an iteration is.
     pub fn dispatches_of(model: &Model<f32>, settings: &SolverSettings) -> [usize; 3] {
         let settings = &settings.chosen_on_device();
-        let laid = Layout::new(model, settings);
-        let model = &laid;
-        let plan = Plan::on_device(model, settings);
-        let layout = DeviceLayout::new(model, settings);
-        let multipliers = 4 * model.vertex_count() as u32;
-        let vector = [multipliers + model.multiplier_count as u32, multipliers];
-        let levels = DeviceLevels::new(model, settings).map(|(levels, _)| levels);
-        let pieces = layout.pieces();
-        let record = Recorder::new(&laid, settings, vector, pieces, levels.as_ref()).record(&plan);
+        let record = Recorded::new(&Layout::new(model, settings), settings).record;
         [record.prologue, record.body, record.epilogue].map(|list| list.len())
+    }
+
+    /// Iterations of the last step, or its small steps; none before the first.
+    pub fn passes(&self) -> u32 {
+        self.passes
     }
 
     /// Iterations of the steps to come, at least one, of XPBD, whose stages and memory do not depend on them. Other methods

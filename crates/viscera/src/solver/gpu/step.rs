@@ -106,7 +106,8 @@ impl GpuSolver {
             self.put_levels(&table);
         }
         self.prepare_step(model, inputs, dt);
-        Ok(self.plan.passes(count))
+        self.passes = self.plan.passes(count);
+        Ok(self.passes)
     }
 
     /// The share of a step that each of its solves takes, which what is left of it belongs to.

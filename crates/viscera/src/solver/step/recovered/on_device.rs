@@ -142,6 +142,11 @@ pub fn words(layout: &Layout<f32>) -> Vec<u32> {
     words
 }
 
+/// Entries of the rings of places, or of vertices.
+pub fn ring_entries(tables: &RecoveredTables<f32>) -> usize {
+    own_entries(tables).count()
+}
+
 /// Of each place, see `Place` of tables.wgsl.
 fn place_rows(tables: &RecoveredTables<f32>) -> Vec<[u32; PLACE_WORDS]> {
     let row = |n: usize| {
@@ -159,36 +164,43 @@ fn place_rows(tables: &RecoveredTables<f32>) -> Vec<[u32; PLACE_WORDS]> {
 /// Offsets, and entries of an index and three numbers.
 type Rows = (Vec<u32>, Vec<[u32; 4]>);
 
-/// Rings of places, and those of vertices: `G_n` from vertices, and forces on vertices from places.
-fn rings(layout: &Layout<f32>, tables: &RecoveredTables<f32>) -> [Rows; 2] {
-    let mut of_places: Rows = (vec![0], Vec::new());
-    let mut of_vertices = vec![Vec::new(); layout.vertex_count()];
-    for n in 0..tables.volumes.len() {
+/// Entries of all places in a row: the place, the vertex, whether it is the place's own, and the gradient.
+fn own_entries(
+    tables: &RecoveredTables<f32>,
+) -> impl Iterator<Item = (usize, u32, bool, [f32; 3])> {
+    (0..tables.volumes.len()).flat_map(move |n| {
         // What only fills a group up is no domain.
         let mut is_due = tables.volumes[n] > 0.0;
-        for entry in tables.domain_rings.of(n / LANES) {
+        tables.domain_rings.of(n / LANES).iter().filter_map(move |entry| {
             let b = entry.gradient.map(|of_axis| of_axis[n % LANES]);
             let v = entry.index[n % LANES];
             // Once, with whatever gradient.
             let is_own = is_due && v == tables.vertices[n];
-            // Rings of a group that are shorter than the longest are filled up with nothing.
-            if b == [0.0; 3] && !is_own {
-                continue;
-            }
             is_due &= !is_own;
-            let [x, y, z] = b.map(f32::to_bits);
-            of_places.1.push([v, x, y, z]);
-            let own = if is_own { OWN_PLACE } else { 0 };
-            of_vertices[v as usize].push([n as u32 | own, x, y, z]);
+            // Rings of a group that are shorter than the longest are filled up with nothing.
+            (is_own || b != [0.0; 3]).then_some((n, v, is_own, b))
+        })
+    })
+}
+
+/// Rings of places, and those of vertices: `G_n` from vertices, and forces on vertices from places.
+fn rings(layout: &Layout<f32>, tables: &RecoveredTables<f32>) -> [Rows; 2] {
+    let mut of_places = vec![Vec::new(); tables.volumes.len()];
+    let mut of_vertices = vec![Vec::new(); layout.vertex_count()];
+    for (n, v, is_own, b) in own_entries(tables) {
+        let [x, y, z] = b.map(f32::to_bits);
+        of_places[n].push([v, x, y, z]);
+        let own = if is_own { OWN_PLACE } else { 0 };
+        of_vertices[v as usize].push([n as u32 | own, x, y, z]);
+    }
+    [of_places, of_vertices].map(|rows| {
+        let mut all: Rows = (vec![0], Vec::new());
+        for row in rows {
+            all.1.extend(row);
+            all.0.push(all.1.len() as u32);
         }
-        of_places.0.push(of_places.1.len() as u32);
-    }
-    let mut turned: Rows = (vec![0], Vec::new());
-    for row in of_vertices {
-        turned.1.extend(row);
-        turned.0.push(turned.1.len() as u32);
-    }
-    [of_places, turned]
+        all
+    })
 }
 
 /// Corners that belong to each place: four times a tetrahedron's lane and block, and the corner.
