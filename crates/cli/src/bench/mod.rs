@@ -63,7 +63,7 @@ pub struct BenchArguments {
     ///
     /// Frames of 1/60 s and steps of 1/1000 s on 100k and 1M tetrahedra, with forces read back, passes against
     /// the memory bandwidth, dispatches; each on --sizes instead where these are given. With --device on the device
-    /// alone, unless --threads asks for the processor as well. Under ten minutes on a card of a data centre.
+    /// alone, unless --threads asks for the processor as well. Meant to end within ten minutes on a card of a data centre.
     #[arg(long, conflicts_with_all = ["mesh", "solvers", "quick"])]
     questions: bool,
     /// Numbers of threads, separated by commas [default: 1 and the number of processors]

@@ -52,7 +52,8 @@ const SOFT: f64 = 0.3;
 const OF_FRAME: Task = Task { length: Length::Frame, read_back: ReadBack::Nothing, poisson: SOFT };
 const OF_MILLISECOND: Task = Task { length: Length::Step(1e-3), ..OF_FRAME };
 
-const PASSES_OF_MILLISECOND: u32 = 9;
+/// Passes of a step of 1/1000 s: nine leave an error of 1.8 % of 30,000 tetrahedra, twelve 0.5 %.
+const PASSES_OF_MILLISECOND: u32 = 12;
 
 const fn published(
     what: &'static str,
