@@ -99,11 +99,6 @@ pub enum GpuError {
         "this build leaves the quasi-Newton method to the CPU; use `device = \"cpu\"` or \"auto\", or `method = \"xpbd\"`"
     )]
     OnlyOnCpu,
-    /// The kernel was left out.
-    #[error(
-        "this build leaves `clusters` to the CPU; use `device = \"cpu\"` or \"auto\", or `clusters = \"none\"`"
-    )]
-    ClustersOnCpu,
     /// The elements have no kernels yet.
     #[error(
         "`elements = \"recovered\"` is computed by the CPU only; use `device = \"cpu\"` or \"auto\", or `elements = \"plain\"`"
