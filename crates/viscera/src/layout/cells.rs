@@ -42,6 +42,9 @@ const CLASSES: u64 = 4;
 const TRIES: usize = 12;
 const SMALLER: f64 = 0.93;
 
+/// Slices of a box along an axis.
+const SLICES: usize = 32;
+
 /// Sites along an axis: as many as a key has bits for.
 const MOST_SITES: f64 = (1 << 19) as f64;
 
@@ -61,19 +64,44 @@ pub(super) fn cells(tets: &[[u32; 4]], places: &[Vec3<f64>], most: Most) -> Vec<
         |tet: &[u32; 4]| corners(tet).into_iter().fold(Vec3::ZERO, |sum, x| sum + x) * 0.25;
     let centers: Vec<_> = tets.iter().map(|tet| center(tet) - low).collect();
 
-    let mut wanted = volume * most.tets as f64 / tets.len() as f64;
+    let even = volume * most.tets as f64 / tets.len() as f64;
     let mut made = Vec::new();
-    for _ in 0..TRIES {
-        made = in_lattice(&centers, steps(high - low, wanted), &mut counter);
-        if made.iter().all(|cell| cell.fits(most)) {
-            return made;
+    for spread in [centers.clone(), evened(&centers, high - low)] {
+        let mut wanted = even;
+        for _ in 0..TRIES {
+            made = in_lattice(&spread, steps(high - low, wanted), &mut counter);
+            if made.iter().all(|cell| cell.fits(most)) {
+                return made;
+            }
+            wanted *= SMALLER;
         }
-        wanted *= SMALLER;
     }
-    // The mesh is finer in one place than in another.
+    // Finer in one place than in another still.
     let mut halved = Vec::new();
     made.into_iter().for_each(|cell| halve(cell, &centers, most, &mut counter, &mut halved));
     halved
+}
+
+/// Centres where a mesh is finer in one place than in another: moved along each axis so that slices of the box around have one
+/// number of tetrahedra each.
+fn evened(centers: &[Vec3<f64>], size: Vec3<f64>) -> Vec<Vec3<f64>> {
+    let mut moved = centers.to_vec();
+    for axis in 0..3 {
+        // Slices up to a place: whole ones, and how far into the next.
+        let scale = SLICES as f64 / size[axis].max(f64::MIN_POSITIVE);
+        let slice = |x: f64| ((x * scale).max(0.0) as usize).min(SLICES - 1);
+        let mut below = [0.0; SLICES + 1];
+        centers.iter().for_each(|center| below[slice(center[axis]) + 1] += 1.0);
+        (0..SLICES).for_each(|i| below[i + 1] += below[i]);
+        let share = size[axis] / centers.len() as f64;
+        for center in &mut moved {
+            let x = center[axis];
+            let own = slice(x);
+            let into = x * scale - own as f64;
+            center[axis] = share * (below[own] + into * (below[own + 1] - below[own]));
+        }
+    }
+    moved
 }
 
 /// The lattice's constant along each axis [m], for cells of about this volume [m^3]: the faces of the box around all lie on

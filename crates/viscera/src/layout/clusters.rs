@@ -18,6 +18,9 @@ use crate::scalar::lanes::LANES;
 use crate::settings::Colors;
 use crate::sorting;
 
+/// Whether this build has them: pages, which are light, have colours of one level.
+pub(crate) const HAS_CLUSTERS: bool = cfg!(not(target_arch = "wasm32"));
+
 /// Vertices of a cluster, at most: a workgroup has 16 KiB in the baseline, and each takes 16 bytes.
 pub(crate) const CLUSTER_VERTICES: usize = 960;
 

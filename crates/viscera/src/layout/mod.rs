@@ -22,8 +22,8 @@ use std::sync::Arc;
 
 #[cfg(feature = "gpu")]
 pub(crate) use clusters::CLUSTER_VERTICES;
-pub(crate) use clusters::SetClusters;
 use clusters::clustered;
+pub(crate) use clusters::{HAS_CLUSTERS, SetClusters};
 pub use domains::{Domains, Smoothing};
 pub(crate) use elements::{Before, Moments};
 pub use elements::{ElementSet, ElementSets};
@@ -105,7 +105,7 @@ impl<S: Real> Layout<S> {
         };
         // Forces are added tetrahedron by tetrahedron where no constraint is solved: no colours, but pieces.
         let clusters = match (settings.method, settings.clusters, settings.colors) {
-            (Method::Xpbd, Clusters::OfTets(size), Colors::Unlimited) => {
+            (Method::Xpbd, Clusters::OfTets(size), Colors::Unlimited) if HAS_CLUSTERS => {
                 Some(clustered(model, &graph, numbering, size))
             }
             _ => None,

@@ -212,7 +212,7 @@ settings_table! {
         /// "none", or how many tetrahedra a cluster has at most, for example 512. Clusters have colours, those that share a vertex
         /// different ones, and so have the tetrahedra in each: a workgroup of a device, or a thread, sweeps a whole cluster.
         /// A sweep is then about 4 dispatches instead of 38. Rest is the same; in motion the order of constraints differs.
-        /// Needs `colors = "unlimited"`.
+        /// Needs `colors = "unlimited"`; a page has none.
         clusters: Clusters = (Clusters::None), CLUSTERS;
         /// Over-relaxation factor omega. Above 1 hurries, below 1 calms. Safe up to 1.8 for one
         /// colour, 1.5 for a few, about 1.2 for unlimited; beyond that sweeps overshoot and may

@@ -391,6 +391,8 @@ fn fingerprint<S: Real>(layout: &Layout<S>) -> u64 {
         add(set.form.multiplier_count() as u64);
         add(u64::from(set.viscous));
         set.order.iter().chain(&set.color_offsets).for_each(|&tet| add(tet.into()));
+        let clusters = set.clusters.iter().flat_map(|all| all.offsets.iter().chain(&all.inner));
+        clusters.for_each(|&number| add(number.into()));
     }
     for_each_kind!(layout, set => {
         set.order.iter().chain(&set.color_offsets).for_each(|&i| add(i.into()));

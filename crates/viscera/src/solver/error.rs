@@ -41,6 +41,11 @@ pub enum StepError {
         /// The colours of the settings.
         colors: u32,
     },
+    /// Clusters were left out.
+    #[error(
+        "this build sweeps without clusters; use `clusters = \"none\"`, which comes to the same rest"
+    )]
+    NoClusters,
     /// An input names no vertex.
     #[error("a {what} names vertex {vertex}; the model has {vertex_count}")]
     UnknownVertex {

@@ -2,7 +2,7 @@
 
 use super::error::StepError;
 use crate::contact::Tool;
-use crate::layout::Layout;
+use crate::layout::{HAS_CLUSTERS, Layout};
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
 use crate::settings::{Clusters, Colors, Elements, Method, SolverSettings};
@@ -111,6 +111,7 @@ pub(crate) fn check_settings(settings: &SolverSettings) -> Result<(), StepError>
     }
     match (settings.elements, settings.clusters, settings.colors) {
         (Elements::Recovered, ..) => Err(StepError::Elements { method }),
+        (_, Clusters::OfTets(_), _) if !HAS_CLUSTERS => Err(StepError::NoClusters),
         (_, Clusters::OfTets(_), Colors::Limited(colors)) => {
             Err(StepError::ClustersAndColors { colors })
         }

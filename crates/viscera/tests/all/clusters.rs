@@ -79,6 +79,9 @@ fn graded() -> TetMesh {
     TetMesh::new(vertices, mesh.tets().to_vec(), mesh.regions().to_vec()).expect("a mesh").0
 }
 
+/// Tetrahedra of a cluster by their colour there.
+type Colored = BTreeMap<usize, Vec<LaidTet<f64>>>;
+
 /// What a layout's clusters are like.
 #[derive(Debug, Default)]
 struct Seen {
@@ -100,8 +103,7 @@ fn examine(name: &str, model: &Model<f64>, size: u32) -> Seen {
     let mut counted = vec![0; model.tet_count()];
     let mut multipliers = std::collections::BTreeSet::new();
     // By law, cluster, colour in the cluster.
-    let mut clusters: BTreeMap<(usize, usize), BTreeMap<usize, Vec<LaidTet<f64>>>> =
-        BTreeMap::new();
+    let mut clusters: BTreeMap<(usize, usize), Colored> = BTreeMap::new();
     for law in [STVK, SNH] {
         let set = layout.tets_of(law);
         for tet in layout.tets(set) {
@@ -184,6 +186,9 @@ fn nothing_that_is_swept_at_once_shares_a_vertex() {
         for size in [16, 100, 512, 4096] {
             let seen = examine(name, &model, size);
             assert_eq!(seen.tets, model.tet_count());
+            if size == 512 && ["graded", "five", "six", "liver", "sheet"].contains(&name) {
+                assert_eq!(seen.colors, 4, "{name}");
+            }
             if size == 4096 && name == "first" {
                 assert_eq!(seen.clusters, model.part_count(), "a small part is one cluster");
             }

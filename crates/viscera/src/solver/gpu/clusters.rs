@@ -2,9 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::layout::Layout;
+use crate::layout::{HAS_CLUSTERS, Layout};
 use crate::scalar::lanes::LANES;
-use crate::solver::quasi_newton::on_device::IS_THERE;
 
 /// The table's row of a cluster.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -31,10 +30,10 @@ pub(super) struct ClusterTables {
 }
 
 impl ClusterTables {
-    /// Nothing where colours have one level, and where no kernel would read it.
+    /// Nothing where colours have one level.
     pub fn new(layout: &Layout<f32>) -> Option<Self> {
         let is_clustered = layout.tet_sets.iter().any(|set| set.clusters.is_some());
-        if !IS_THERE || !is_clustered {
+        if !HAS_CLUSTERS || !is_clustered {
             return None;
         }
         let mut tables = Self::default();

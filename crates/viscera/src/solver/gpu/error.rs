@@ -99,11 +99,6 @@ pub enum GpuError {
         "this build leaves the quasi-Newton method to the CPU; use `device = \"cpu\"` or \"auto\", or `method = \"xpbd\"`"
     )]
     OnlyOnCpu,
-    /// The kernel was left out.
-    #[error(
-        "this build leaves `clusters` to the CPU; use `device = \"cpu\"` or \"auto\", or `clusters = \"none\"`"
-    )]
-    ClustersOnCpu,
     /// The method has no kernels for these elements.
     #[error(
         "XPBD has no `elements = \"recovered\"`, nor has a page on a graphics processor; use `elements = \"plain\"`, `device = \"cpu\"`, or another method"

@@ -5,6 +5,7 @@ use super::slots::Slot;
 use crate::elements::TetForm;
 use crate::elements::text::kernel_text;
 use crate::elements::wgsl;
+use crate::layout::HAS_CLUSTERS;
 use crate::solver::quasi_newton::on_device::IS_THERE;
 use crate::solver::step::tissue::{TISSUE_WGSL, VISCOUS_WGSL};
 
@@ -249,7 +250,7 @@ fn files(kernel: &Kernel, variant: Variant) -> Vec<&'static str> {
         File::Predict => own(kernel_text!("../step/predict.wgsl")),
         File::Rebase => own(kernel_text!("../xpbd/rebase.wgsl")),
         File::Sweep => [form, vec![swept, SWEEP_TET, kernel_text!("../xpbd/sweep.wgsl")]].concat(),
-        File::SweepClusters if !IS_THERE => Vec::new(),
+        File::SweepClusters if !HAS_CLUSTERS => Vec::new(),
         File::SweepClusters => {
             [form, vec![SWEEP_TET, kernel_text!("../xpbd/sweep_cluster.wgsl")]].concat()
         }

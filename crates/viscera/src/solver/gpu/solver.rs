@@ -21,7 +21,7 @@ use std::sync::Arc;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::Vec3;
-use crate::settings::{Clusters, Count, Elements, Method, Precision, SolverSettings, Start};
+use crate::settings::{Count, Elements, Method, Precision, SolverSettings, Start};
 use crate::solver::error::StepError;
 use crate::solver::explicit::Stability;
 use crate::solver::inputs::{check_model, check_settings};
@@ -345,10 +345,6 @@ fn check(device: &Device, settings: &SolverSettings) -> Result<(), GpuError> {
         return Err(GpuError::PlainElements);
     }
     check_settings(settings)?;
-    let is_clustered = settings.method == Method::Xpbd && settings.clusters != Clusters::None;
-    if is_clustered && !on_device::IS_THERE {
-        return Err(GpuError::ClustersOnCpu);
-    }
     device.check()?;
     // Sizes are compared array by array, where buffers are made.
     let wgpu::Limits { max_storage_buffer_binding_size, max_buffer_size, .. } = baseline();
