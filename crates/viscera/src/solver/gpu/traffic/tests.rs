@@ -143,7 +143,9 @@ fn counted_bytes_fit_into_what_there_is_room_for() {
                 let bytes: f64 = lines.map(|line| counts.bytes(line, dispatch)[0]).sum();
                 let what = format!("{} {slot:?}: {bytes} of {room} B", kernel.entry);
                 assert!(bytes <= room, "{what}");
-                if WHOLE.contains(&(kernel.entry, slot, is_written)) {
+                // One of two dispatches is for vertices alone.
+                let is_half = *kernel == kernels::MEASURE_RECOVERED_END && dispatch.job.first > 0;
+                if WHOLE.contains(&(kernel.entry, slot, is_written)) && !is_half {
                     seen.push((kernel.entry, slot, is_written));
                     assert!(bytes > 0.9 * room, "{what}");
                 }
