@@ -91,7 +91,7 @@ const fn within(seconds: f64) -> Aims {
 }
 
 /// All of them.
-pub const QUESTIONS: [Question; 13] = [
+pub const QUESTIONS: [Question; 16] = [
     published(
         "one Jacobi substep",
         "jacobi-green",
@@ -102,8 +102,15 @@ pub const QUESTIONS: [Question; 13] = [
     published("20 coloured iterations", "green", K100, [20, 28], within(4e-3)),
     published("20 Jacobi + Anderson iterations", "jacobi-anderson", K100, [20, 28], within(1e-3)),
     frame("quasi-newton", K100, Aims { dispatches: Some(120), left: Some(0.01), ..within(1e-3) }),
-    frame("exact", K100, Aims { dispatches: Some(280), ..NO_AIMS }),
+    frame(
+        "quasi-newton-recovered",
+        K100,
+        Aims { dispatches: Some(180), left: Some(0.01), ..within(1e-3) },
+    ),
+    frame("exact", K100, NO_AIMS),
+    frame("clusters", K100, Aims { dispatches: Some(280), ..NO_AIMS }),
     frame("explicit", K100, Aims { pass_dispatches: Some(2), ..NO_AIMS }),
+    frame("explicit-recovered", K100, Aims { pass_dispatches: Some(6), ..NO_AIMS }),
     read_back("a step of 1/1000 s, positions read back, no tool", ReadBack::Positions),
     read_back("a step of 1/1000 s, forces read back, no tool", ReadBack::Forces),
     frame("quasi-newton", M1, Aims { dispatches: Some(120), left: Some(0.01), ..within(3e-3) }),

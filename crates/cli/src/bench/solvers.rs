@@ -2,7 +2,7 @@
 
 use super::task::{Length, Task};
 use viscera::material::{Material, MaterialError, MaterialModel};
-use viscera::settings::{Acceleration, Colors, Elements, Method, SolverSettings};
+use viscera::settings::{Acceleration, Clusters, Colors, Elements, Method, SolverSettings};
 
 /// One of them.
 #[derive(Clone)]
@@ -32,11 +32,14 @@ const GREEN: MaterialModel = MaterialModel::SaintVenantKirchhoff;
 const NEO: MaterialModel = MaterialModel::StableNeoHookean;
 
 /// All of them, in the order of the results.
-pub const SOLVERS: [SolverEntry; 16] = [
+pub const SOLVERS: [SolverEntry; 17] = [
     entry("green", "XPBD as published, Saint Venant-Kirchhoff", GREEN, FEW, publish),
     entry("pair", "XPBD as published, stable neo-Hookean pair", NEO, FEW, publish),
     entry("green-exact", "the default, Saint Venant-Kirchhoff", GREEN, FEW, |_| {}),
     entry("exact", "the default, stable neo-Hookean", NEO, FEW, |_| {}),
+    entry("clusters", "the default with clusters of 512", NEO, FEW, |s| {
+        s.clusters = Clusters::OfTets(512);
+    }),
     entry("cliques", "the default with 4 colours", NEO, FEW, |s| s.colors = Colors::Limited(4)),
     entry("jacobi", "the default with 1 colour", NEO, FEW, |s| s.colors = Colors::Limited(1)),
     entry("jacobi-green", "`green` with 1 colour", GREEN, FEW, |s| {
