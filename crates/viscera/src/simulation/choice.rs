@@ -81,11 +81,12 @@ impl<S: Real> Backend<S> {
         ready: Option<Solver<S>>,
         offered: &Offered,
     ) -> Result<Self, SimulationError> {
-        // Elements, and in light builds a method, that only the CPU computes leave their device.
+        // In light builds a method, and elements, that only the CPU computes leave their device.
+        #[cfg(feature = "gpu")]
+        let solves = settings.method == Method::QuasiNewton;
         #[cfg(feature = "gpu")]
         if same_device
-            && (settings.method != Method::QuasiNewton || HAS_SOLVES)
-            && settings.elements != Elements::Recovered
+            && (HAS_SOLVES || (!solves && settings.elements != Elements::Recovered))
             && let Some(again) = gpu::again(self, model, settings)
         {
             return match again {

@@ -6,6 +6,7 @@ use crate::common::{SNH, block, material, single_body};
 use viscera::model::Model;
 use viscera::scalar::{Real, vec3};
 use viscera::settings::{Acceleration, Colors, Elements, Method, Precision, SolverSettings};
+use viscera::solver::balance::ForceBalance;
 use viscera::solver::gpu::{Device, GpuSolver};
 use viscera::solver::{Inputs, Solver, StepError};
 use viscera::state::{Learned, State};
@@ -84,6 +85,31 @@ fn device_is_as_close_to_double_precision_as_the_processor() {
     for colors in [Colors::Unlimited, Colors::Limited(1)] {
         for elements in BOTH {
             assert_agreement(colors, elements, STEPS);
+        }
+    }
+}
+
+/// What measures find of forces, those of viscosity among them.
+#[test]
+fn forces_are_measured_as_on_the_processor() {
+    let (model, model64) = (everything::<f32>(), everything());
+    for elements in BOTH {
+        let settings = explicit(Colors::Unlimited, elements);
+        let mut gpu = GpuSolver::new(device::device(), &model, &settings).expect("it fits");
+        let mut cpu = Solver::new(&model, &settings);
+        let (mut on_cpu, mut on_gpu) = (State::at_rest(&model), State::at_rest(&model));
+        let [mut of_cpu, mut of_gpu] = [ForceBalance::default(), ForceBalance::default()];
+        for step in 0..3 {
+            let inputs = inputs_at(&model64, step);
+            gpu.step(&model, &inputs, DT).expect("a legal step");
+            cpu.step(&model, &mut on_cpu, &inputs, DT).expect("a legal step");
+            gpu.read(&model, &mut on_gpu).expect("a device");
+            gpu.force_balance(&model, &on_gpu, &inputs, &mut of_gpu).expect("a balance");
+            cpu.force_balance(&model, &on_cpu, &inputs, &mut of_cpu).expect("a balance");
+            let apart = largest(&of_gpu.residual, &of_cpu.residual);
+            let most = of_cpu.residual.iter().map(|r| r.length()).fold(0.0, f64::max);
+            println!("{elements:?}, step {step}: {apart:.1e} of {most:.1e} N");
+            assert!(most > 0.01 && apart < 1e-2 * most, "{elements:?}: {apart:e} of {most:e} N");
         }
     }
 }

@@ -201,7 +201,15 @@ fn records_lie_alike_on_both_sides() {
 fn steps_map_no_memory() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/solver/gpu");
     let mut maps = Vec::new();
-    for file in std::fs::read_dir(folder).expect("the sources").flatten() {
+    let mut folders = vec![folder];
+    let mut files = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).expect("the sources").flatten() {
+            let is_folder = entry.path().is_dir();
+            if is_folder { folders.push(entry.path()) } else { files.push(entry) }
+        }
+    }
+    for file in files {
         let text = std::fs::read_to_string(file.path()).expect("a source");
         let name = file.file_name().to_string_lossy().into_owned();
         maps.extend((0..text.matches("map_async").count()).map(|_| name.clone()));

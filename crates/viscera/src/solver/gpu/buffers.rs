@@ -10,7 +10,7 @@ use super::limits::{accelerates, window};
 use super::slots::{Place, Range, Slot, Update, multipliers_start, unknowns_size};
 use crate::layout::{Layout, TetBlock};
 use crate::scalar::lanes::LANES;
-use crate::settings::{Acceleration, SolverSettings};
+use crate::settings::{Acceleration, Method, SolverSettings};
 use crate::solver::quasi_newton::on_device::DeviceLevels;
 use crate::solver::quasi_newton::progress::PartProgress;
 use crate::solver::step::recovered::on_device::Extent;
@@ -89,7 +89,9 @@ impl Buffers {
         let anderson = accelerated && settings.acceleration == Acceleration::Anderson;
         let history = if anderson { unknowns * (u64::from(window(settings)) + 1) } else { 0 };
         let all_blocks = layout.block_count() as u64;
-        let blocks = if layout.is_viscous() { all_blocks } else { 0 };
+        // Solves find the strain where they start as they go.
+        let keeps_strain = layout.is_viscous() && settings.method != Method::QuasiNewton;
+        let blocks = if keeps_strain { all_blocks } else { 0 };
         let when = |wanted: bool, size: u64| if wanted { size } else { 0 };
         let copies = when(layout.is_split(), 16 * layout.copy_count() as u64);
         let lanes = LANES as u64;

@@ -141,7 +141,7 @@ impl GpuSolver {
         let of_slot = |slot: &Slot| self.buffers.span(*slot)[1];
         let frame = 2 * self.buffers.points_size + PARTS_START as u64;
         let whole = [Slot::Unknowns, Slot::Velocities].iter().map(of_slot).sum();
-        [frame, balance_slots(&self.layout).iter().map(of_slot).sum(), whole]
+        [frame, self.balance_slots().iter().map(of_slot).sum(), whole]
     }
 
     /// Waits for the device and reads the multipliers [J s^2] at the end of the last step.
@@ -178,9 +178,69 @@ impl GpuSolver {
             self.balance_from(model, state, inputs, &read, balance);
             return Ok(());
         }
-        self.read_buffers(&balance_slots(model), |read| {
+        self.read_buffers(&self.balance_slots(), |read| {
             self.balance_from(model, state, inputs, read, balance);
         })
+    }
+
+    /// Where everything stands that a force balance needs.
+    pub(super) fn balance_slots(&self) -> Vec<Slot> {
+        let mut slots = vec![Slot::Predicted, Slot::ExternalForces, Slot::Previous];
+        if self.layout.is_viscous() {
+            slots.push(match self.settings.method {
+                Method::QuasiNewton => Slot::StageStart,
+                // What small steps ended with tells more.
+                Method::Explicit => Slot::Previous,
+                _ => Slot::StartStrain,
+            });
+        }
+        slots
+    }
+
+    /// Strains that viscosity acts against: where the last solve started; or so that they change in all of the step as they
+    /// do at its end; or those that a step of sweeps has kept.
+    fn put_strains(
+        &self,
+        model: &Layout<f32>,
+        state: &State<f32>,
+        read: &[u8],
+        measured: &mut MeasuredTets,
+    ) {
+        let user = |v: usize| model.numbering.order[v] as usize;
+        let all = |of: &dyn Fn(usize) -> Vec3<f32>| -> Vec<Point<f32>> {
+            (0..model.vertex_count()).map(|v| Point::new(of(v), 0.0)).collect()
+        };
+        match self.settings.method {
+            Method::QuasiNewton => {
+                let rows: &[[f32; 4]] = bytemuck::cast_slice(read);
+                let start = all(&|v| vec3(rows[v][0], rows[v][1], rows[v][2]));
+                for number in 0..model.part_count() {
+                    measured.put_strains(model, number, &start, 0.0);
+                }
+            }
+            Method::Explicit => {
+                let ends = all(&|v| state.positions[user(v)]);
+                for (number, small) in self.small_steps.iter().enumerate() {
+                    let back = 0.5 * small.dt;
+                    let before =
+                        all(&|v| state.positions[user(v)] - state.velocities[user(v)] * back);
+                    measured.put_strains(model, number, &before, 0.0);
+                    let share = 2.0 * self.multiplier_dt as f32 / small.dt;
+                    measured.put_strains(model, number, &ends, share);
+                }
+            }
+            _ => {
+                let mut strains: &[Eight<f32>] = bytemuck::cast_slice(read);
+                for (set, into) in model.tet_sets.iter().zip(&mut measured.start_strain) {
+                    // The device has room for all blocks, measures ask for those of viscous sets.
+                    let (of_set, rest) = strains.split_at(6 * set.block_count());
+                    strains = rest;
+                    if set.viscous {
+                        into.copy_from_slice(of_set.as_chunks::<6>().0);
+                    }
+                }
+            }
+        }
     }
 
     /// The force balance from copies of the slots that it needs.
@@ -206,27 +266,19 @@ impl GpuSolver {
             let place = |v: usize| state.positions[user(v)];
             load_tethers(&self.tethers, &mut places, self.multiplier_dt, mass, place);
         }
-        let mut strains: &[Eight<f32>] = read.get(3).map_or(&[], |s| bytemuck::cast_slice(s));
-        let mut start_strain = model.tet_sets.each_ref().map(|set| {
-            // The device has room for all blocks, measures ask for those of viscous sets.
-            let blocks = if strains.is_empty() { 0 } else { set.block_count() };
-            let (of_set, rest) = strains.split_at(6 * blocks);
-            strains = rest;
-            if set.viscous { of_set.as_chunks::<6>().0.to_vec() } else { Vec::new() }
-        });
-        let start: &[[f32; 4]] = read.get(4).map_or(&[], |s| bytemuck::cast_slice(s));
-        let mut recovered = model.recovered.as_ref().map(|tables| {
-            let start: Vec<Point<f32>> = start.iter().take(count).map(point).collect();
-            MeasuredTets::new(model, tables, &start, &mut start_strain)
-        });
+        let mut measured = MeasuredTets::new(model);
+        if let Some(rows) = read.get(3) {
+            self.put_strains(model, state, rows, &mut measured);
+        }
+        let (recovered, start_strain) = measured.of_step();
         let mut end = EndOfStep {
             previous: &before,
             predicted: &places,
             inertias: &fourth(predicted),
             inverse_masses: &fourth(acting),
             tethers: &self.tethers,
-            start_strain: &mut start_strain,
-            recovered: recovered.as_mut().map(MeasuredTets::of_step),
+            start_strain,
+            recovered,
             contacts: &Contacts::default(),
         };
         balance.measure(model, state, inputs, &mut end);
@@ -269,16 +321,6 @@ impl GpuSolver {
         let [start, size] = self.buffers.span(slot);
         (self.buffers.buffer(slot), start..start + size)
     }
-}
-
-/// The device's values that a force balance needs.
-pub(super) fn balance_slots(layout: &Layout<f32>) -> Vec<Slot> {
-    let mut slots = vec![Slot::Predicted, Slot::ExternalForces, Slot::Previous];
-    if layout.is_viscous() {
-        slots.push(Slot::StartStrain);
-        slots.extend(layout.recovered.is_some().then_some(Slot::StageStart));
-    }
-    slots
 }
 
 fn put_in_user_order(layout: &Layout<f32>, places: &[[f32; 4]], into: &mut [Vec3<f32>]) {

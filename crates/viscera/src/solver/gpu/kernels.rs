@@ -186,10 +186,10 @@ kernels! {
     CHOOSE_DIRECTION = Direction "choose_direction" 256
         [Points PartialSums VertexData Table Levels Pairs Progress];
     MEASURE_END = End "measure_end" 256
-        [Tets Points StartStrain PartialSums VertexData Table Progress];
+        [Tets Points PartialSums VertexData Table Progress];
     END_STEP = End "end_step" 256 [Points PartialSums Control VertexData Table Progress];
     MEASURE_RECOVERED_END = EndRecovered "measure_end" 256
-        [Tets Points StartStrain PartialSums VertexData Table Progress Recovery];
+        [Tets Points PartialSums VertexData Table Progress Recovery];
     RECOVER_ENDS = EndRecovered "recover_ends" 64 [Points VertexData Table Progress Recovery];
     AVERAGE_ENDS = EndRecovered "average_ends" 256 [Table Recovery];
     END_RECOVERED_STEP = EndRecovered "end_step" 256

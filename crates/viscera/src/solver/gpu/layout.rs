@@ -233,7 +233,6 @@ impl DeviceLayout {
 
     /// The constants beside the tetrahedra, and where everything stands.
     pub fn table(&self, layout: &Layout<f32>, settings: &SolverSettings) -> Table {
-        let guarded = settings.guards_steps();
         let (mut bytes, mut ranges) = (vec![0; ALIGNMENT as usize], Vec::new());
         // Appends a piece and returns its first word. A piece with a slot can be bound alone as well: hence it begins
         // where devices allow a binding to, and is padded. Without one, kernels find it by the header only.
@@ -290,25 +289,7 @@ impl DeviceLayout {
             header.weights = add(Some(Slot::Weights), &weights);
         }
 
-        // Data of vertices lie in one buffer, range by range, because the baseline allows a kernel eight
-        // storage buffers. A guarded step's three starts are one binding: `predict` writes all of them.
-        let each = 16 * u64::from(Self::stride(layout));
-        let solves = settings.method == Method::QuasiNewton;
-        let common = if guarded { VERTEX_DATA.len() } else { UNGUARDED };
-        let count = if solves { UNGUARDED - 1 + OF_QUASI_NEWTON.len() } else { common };
-        for (place, (_, slot)) in VERTEX_DATA[..count.min(common)].iter().enumerate() {
-            let size = if guarded && *slot == Some(Slot::Starts) { 3 * each } else { each };
-            let start = each * place as u64;
-            ranges.extend(slot.map(|slot| Range { slot, owner: Slot::VertexData, start, size }));
-        }
-        // Where the last solve started: viscous recovered-gradient tetrahedra are measured against it.
-        let start = each * (UNGUARDED as u64 - 1 + STAGE_START);
-        let stage = Range { slot: Slot::StageStart, owner: Slot::VertexData, start, size: each };
-        ranges.extend(solves.then_some(stage));
-        let start = each * count as u64;
-        let size =
-            (16 * layout.rest_anchors.len() as u64).next_multiple_of(ALIGNMENT).max(ALIGNMENT);
-        ranges.push(Range { slot: Slot::Anchors, owner: Slot::VertexData, start, size });
+        let [start, size] = vertex_data(layout, settings, &mut ranges);
         (header.stride, header.anchors) = (Self::stride(layout), (start / 16) as u32);
 
         let [lines, energies, sums] = self.sums(settings);
@@ -360,6 +341,34 @@ impl DeviceLayout {
             .collect();
         [indices, copy_offsets(layout)].map(|words| bytemuck::cast_slice(&words).to_vec())
     }
+}
+
+/// The ranges of the vertex data; where anchors begin behind them, and their length [bytes].
+fn vertex_data(
+    layout: &Layout<f32>,
+    settings: &SolverSettings,
+    ranges: &mut Vec<Range>,
+) -> [u64; 2] {
+    // Data of vertices lie in one buffer, range by range, because the baseline allows a kernel eight
+    // storage buffers. A guarded step's three starts are one binding: `predict` writes all of them.
+    let each = 16 * u64::from(DeviceLayout::stride(layout));
+    let guarded = settings.guards_steps();
+    let solves = settings.method == Method::QuasiNewton;
+    let common = if guarded { VERTEX_DATA.len() } else { UNGUARDED };
+    let count = if solves { UNGUARDED - 1 + OF_QUASI_NEWTON.len() } else { common };
+    for (place, (_, slot)) in VERTEX_DATA[..count.min(common)].iter().enumerate() {
+        let size = if guarded && *slot == Some(Slot::Starts) { 3 * each } else { each };
+        let start = each * place as u64;
+        ranges.extend(slot.map(|slot| Range { slot, owner: Slot::VertexData, start, size }));
+    }
+    // Where the last solve started: viscous recovered-gradient tetrahedra are measured against it.
+    let start = each * (UNGUARDED as u64 - 1 + STAGE_START);
+    let stage = Range { slot: Slot::StageStart, owner: Slot::VertexData, start, size: each };
+    ranges.extend(solves.then_some(stage));
+    let start = each * count as u64;
+    let size = (16 * layout.rest_anchors.len() as u64).next_multiple_of(ALIGNMENT).max(ALIGNMENT);
+    ranges.push(Range { slot: Slot::Anchors, owner: Slot::VertexData, start, size });
+    [start, size]
 }
 
 /// Where a vertex's copies begin is marked so in parts where no vertex has several: there copies are vertices,

@@ -1,7 +1,6 @@
 //! A frame whose results are on their way: nobody waits for the device, which browsers forbid.
 
 use super::error::GpuError;
-use super::frames::balance_slots;
 use super::reading::{Reading, Sent};
 use super::solver::GpuSolver;
 use crate::model::Model;
@@ -11,7 +10,7 @@ impl GpuSolver {
     /// Asks for what [`GpuSolver::read_frame`] reads of the state behind the last step and, where `with_balance`, for
     /// what [`GpuSolver::force_balance`] needs. Does not wait.
     pub fn ask_for_frame(&mut self, with_balance: bool) -> Result<(), GpuError> {
-        let slots = if with_balance { balance_slots(&self.layout) } else { Vec::new() };
+        let slots = if with_balance { self.balance_slots() } else { Vec::new() };
         let mut ranges = self.frame_ranges().to_vec();
         ranges.extend(slots.into_iter().map(|slot| self.whole(slot)));
         self.sent = Sent { awaited: Some(Reading::start(&self.device, &ranges)?), balance: None };

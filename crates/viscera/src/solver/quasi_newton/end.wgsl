@@ -104,28 +104,9 @@ fn element_change(element: u32, x: array<vec3f, 4>, way: array<vec3f, 4>) -> f32
     return tets[block].rest_volume[lane] * density;
 }
 
-// Measures of forces read the strain at the start of the last solve.
-fn keep_start_strain(element: u32) {
-    let block = element / LANES;
-    let lane = element % LANES;
-    if tissue_of(tets[block].material[lane]).viscosity == 0.0 {
-        return;
-    }
-    let vertices = vertices_of(block, lane);
-    var start: array<vec3f, 4>;
-    for (var i = 0u; i < 4u; i++) {
-        start[i] = vertex_data_of(QN_STAGE_START, vertices[i]).xyz;
-    }
-    let strain = green_strain_strain(deformation_gradient(start, shape_of(block, lane)));
-    for (var p = 0u; p < 6u; p++) {
-        start_strain[6u * block + p][lane] = strain[p];
-    }
-}
-
 fn add_element_end(element: u32, is_trial: bool, into: ptr<function, Sums>) {
     let tet_lanes = table[TET_LANES_AT];
     if element < tet_lanes && is_recovered(element / LANES) {
-        // Whoever measures forces finds their strains himself.
         let changes = recovered_ends(element / LANES, element % LANES, is_trial);
         for (var k = 0u; k < 2u; k++) {
             (*into)[END_STORED + k] += changes[k];
@@ -147,9 +128,7 @@ fn add_element_end(element: u32, is_trial: bool, into: ptr<function, Sums>) {
         (*into)[END_STORED + k] += change;
         (*into)[END_SIZE + k] += abs(change);
     }
-    if element < tet_lanes {
-        keep_start_strain(element);
-    } else if element_is_anchored(table[element_row(element - tet_lanes) + ELEMENT_KIND]) {
+    if element >= tet_lanes && element_is_anchored(table[element_row(element - tet_lanes) + ELEMENT_KIND]) {
         (*into)[END_HELD] += 1.0;
     }
 }

@@ -2,6 +2,7 @@
 #![allow(unsafe_code)]
 
 use super::data::{StartStrain, StepConstants};
+use super::recovered::RecoveredTets;
 use crate::elements::{deformation_gradient, green_strain};
 use crate::layout::{Layout, Part, TetSet};
 use crate::material::MaterialModel;
@@ -42,9 +43,21 @@ pub fn put_strains<S: Real>(
     share: S,
 ) {
     let StepConstants { workers, recovered, start_strain, .. } = constants;
+    put_strains_of(workers, layout, (number, recovered.as_mut()), x, share, start_strain);
+}
+
+/// The same, whoever keeps what recovered-gradient ones work with.
+pub fn put_strains_of<S: Real>(
+    workers: &Workers,
+    layout: &Layout<S>,
+    (number, recovered): (usize, Option<&mut RecoveredTets<S>>),
+    x: &[Point<S>],
+    share: S,
+    start_strain: &mut StartStrain<S>,
+) {
     keep_share(workers, layout, &layout.parts[number], x, share, start_strain);
     let law = MaterialModel::StableNeoHookean as usize;
-    if let Some(tets) = recovered.as_mut().filter(|_| layout.tet_sets[law].viscous) {
+    if let Some(tets) = recovered.filter(|_| layout.tet_sets[law].viscous) {
         tets.evaluate(workers, layout, number, x);
         tets.put_strains(workers, layout, number, share, &mut start_strain[law]);
     }

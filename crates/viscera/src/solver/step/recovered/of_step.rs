@@ -5,9 +5,11 @@
 use super::RecoveredTets;
 use super::{Along, Found, Load, Since};
 #[cfg(feature = "gpu")]
-use crate::layout::{Layout, RecoveredTables};
+use crate::layout::{Layout, TetSet};
 use crate::material::MaterialModel;
 use crate::scalar::Real;
+#[cfg(feature = "gpu")]
+use crate::scalar::lanes::LANES;
 use crate::scalar::lanes::{Eight, Point};
 use crate::solver::cpu::threads::Shared;
 #[cfg(feature = "gpu")]
@@ -15,6 +17,8 @@ use crate::solver::cpu::threads::Workers;
 #[cfg(feature = "gpu")]
 use crate::solver::step::data::{OfRecovered, StartStrain};
 use crate::solver::step::data::{Step, StepConstants};
+#[cfg(feature = "gpu")]
+use crate::solver::step::strain::put_strains_of;
 
 /// The law that they have, by its number.
 const NEO_HOOKEAN: usize = MaterialModel::StableNeoHookean as usize;
@@ -57,39 +61,50 @@ pub fn along_recovered<S: Real>(
     tets.along(workers, step.layout, number, (along, found), since)
 }
 
-/// Recovered-gradient tetrahedra that are measured where a device has left them.
+/// Tetrahedra that are measured where a device has left them.
 #[cfg(feature = "gpu")]
 pub struct MeasuredTets {
     workers: Workers,
-    tets: RecoveredTets<f32>,
+    tets: Option<RecoveredTets<f32>>,
     points: Vec<Point<f32>>,
     loads: Vec<Point<f32>>,
+    /// What viscosity acts against.
+    pub start_strain: StartStrain<f32>,
 }
 
 #[cfg(feature = "gpu")]
 impl MeasuredTets {
-    /// Where tissue is viscous, its strains at the start of the solve, `start` [m], take their places.
-    pub fn new(
-        layout: &Layout<f32>,
-        tables: &RecoveredTables<f32>,
-        start: &[Point<f32>],
-        start_strain: &mut StartStrain<f32>,
-    ) -> Self {
-        let workers = Workers::one();
-        let mut tets = RecoveredTets::new(layout, tables);
-        if !start.is_empty() && layout.tet_sets[NEO_HOOKEAN].viscous {
-            for number in 0..layout.part_count() {
-                tets.evaluate(&workers, layout, number, start);
-                tets.put_strains(&workers, layout, number, 0.0, &mut start_strain[NEO_HOOKEAN]);
-            }
+    /// Takes the memory; without any strain.
+    pub fn new(layout: &Layout<f32>) -> Self {
+        let strains = |set: &TetSet<f32>| {
+            vec![[[0.0; LANES]; 6]; if set.viscous { set.block_count() } else { 0 }]
+        };
+        let has_them = usize::from(layout.recovered.is_some());
+        Self {
+            workers: Workers::one(),
+            tets: layout.recovered.as_ref().map(|tables| RecoveredTets::new(layout, tables)),
+            points: vec![Point::default(); has_them * layout.vertex_count()],
+            loads: vec![Point::default(); has_them * layout.copy_count()],
+            start_strain: layout.tet_sets.each_ref().map(strains),
         }
-        let points = vec![Point::default(); layout.vertex_count()];
-        Self { workers, tets, points, loads: vec![Point::default(); layout.copy_count()] }
     }
 
-    /// For measures.
-    pub fn of_step(&mut self) -> OfRecovered<'_, f32> {
-        let Self { workers, tets, points, loads } = self;
-        OfRecovered { workers, tets, points, loads }
+    /// The strains of a part at some places [m], of which a share of the change since then is left.
+    pub fn put_strains(
+        &mut self,
+        layout: &Layout<f32>,
+        number: usize,
+        x: &[Point<f32>],
+        share: f32,
+    ) {
+        let Self { workers, tets, start_strain, .. } = self;
+        put_strains_of(workers, layout, (number, tets.as_mut()), x, share, start_strain);
+    }
+
+    /// For measures: what recovered-gradient ones work with, and the strains.
+    pub fn of_step(&mut self) -> (Option<OfRecovered<'_, f32>>, &mut StartStrain<f32>) {
+        let Self { workers, tets, points, loads, start_strain } = self;
+        let workers = &*workers;
+        (tets.as_mut().map(|tets| OfRecovered { workers, tets, points, loads }), start_strain)
     }
 }
