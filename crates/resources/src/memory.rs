@@ -4,7 +4,9 @@ use anyhow::{Result, bail};
 use std::fmt;
 use std::str::FromStr;
 use sysinfo::{MemoryRefreshKind, System};
-use viscera::settings::{Acceleration, Colors, Elements, Method, Precision, SolverSettings};
+use viscera::settings::{
+    Acceleration, Clusters, Colors, Elements, Method, Precision, SolverSettings,
+};
 use viscera::units::format_number;
 
 /// Units, powers of a thousand.
@@ -70,6 +72,11 @@ const ITERATES: f64 = 90.0;
 /// Six multipliers and a vertex's share in one entry of Anderson's two histories.
 const HISTORY: f64 = 2.0 * 7.0 * 4.0;
 
+/// A tetrahedron's lane in a block of eight, and how many tetrahedra a cluster has to have for as many lanes to stay empty as
+/// it fills: 0.16 of them do in clusters of 512, at most seven of eight.
+const LANE: f64 = 130.0;
+const EMPTY: f64 = 100.0;
+
 /// What model, state and solver keep at most [B per tetrahedron].
 pub fn kept(settings: &SolverSettings) -> f64 {
     let mut kept = KEPT;
@@ -81,6 +88,9 @@ pub fn kept(settings: &SolverSettings) -> f64 {
     }
     if settings.foreseen().of_solver().elements == Elements::Recovered {
         kept += RECOVERED;
+    }
+    if let Clusters::OfTets(size) = settings.clusters {
+        kept += LANE * (EMPTY / f64::from(size)).min(7.0);
     }
     if settings.acceleration != Acceleration::None {
         kept += ITERATES;

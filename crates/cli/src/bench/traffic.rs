@@ -78,18 +78,15 @@ impl TrafficReport {
     }
 }
 
-/// Of a case; nothing of what no device computes, and where the build has no backend for one.
+/// Of a case; nothing where the build has no backend for devices.
 #[cfg(feature = "gpu")]
 pub fn report(subject: &Subject<'_>, bench: &Bench<'_>, small_steps: u32) -> Option<TrafficReport> {
-    use viscera::settings::{Count, Elements};
+    use viscera::settings::Count;
     use viscera::solver::gpu::Traffic;
 
     const BASELINE: u64 = 128 << 20;
     let entry = bench.entry;
     let mut settings = entry.settings();
-    if settings.elements == Elements::Recovered {
-        return None;
-    }
     if let Some([sweeps, _]) = entry.sweeps {
         settings.iterations = Count::Of(sweeps);
     }
