@@ -264,6 +264,20 @@ fn a_graphics_processor_is_measured_beside_the_processor_at_length() {
     assert_both_are_measured("1k");
 }
 
+/// Those that are alike once, each with its bytes.
+#[cfg(feature = "gpu")]
+fn assert_is_counted(counted: &[Value]) {
+    assert_eq!(counted.len(), 10);
+    for step in counted {
+        let of = |key: &str| step[key].as_f64().unwrap_or(0.0);
+        assert!(
+            of("compulsory_bytes") > 0.0 && of("compulsory_bytes") <= of("moved_bytes"),
+            "{step}"
+        );
+        assert!(of("largest_mesh") > 1e5 && of("bytes_per_tet") > 100.0, "{step}");
+    }
+}
+
 #[test]
 #[cfg(feature = "gpu")]
 fn questions_are_answered_beside_their_aims() {
@@ -331,16 +345,7 @@ fn questions_are_answered_beside_their_aims() {
     let small_steps = explicit["passes"].as_u64().expect("small steps");
     assert!(explicit["dispatches"].as_u64() > Some(2 * small_steps), "{explicit}");
     let counted = results["traffic"].as_array().expect("traffic");
-    // Those that are alike once.
-    assert_eq!(counted.len(), 10);
-    for step in counted {
-        let of = |key: &str| step[key].as_f64().unwrap_or(0.0);
-        assert!(
-            of("compulsory_bytes") > 0.0 && of("compulsory_bytes") <= of("moved_bytes"),
-            "{step}"
-        );
-        assert!(of("largest_mesh") > 1e5 && of("bytes_per_tet") > 100.0, "{step}");
-    }
+    assert_is_counted(counted);
     assert_eq!(counted[7]["passes"], explicit["passes"]);
     assert_eq!(counted[3]["dispatches"], solved["dispatches"]);
     let sweeps: Vec<_> =
