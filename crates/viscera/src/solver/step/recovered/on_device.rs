@@ -283,3 +283,34 @@ pub fn names() -> Vec<(&'static str, u32)> {
     ]);
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::Material;
+    use crate::mesh::shapes::Block;
+    use crate::model::ModelBuilder;
+    use crate::scalar::vec3;
+    use crate::settings::{Elements, Method, SolverSettings};
+
+    /// Rows that are shorter than others of their group are filled up with their first vertex, whichever that is.
+    #[test]
+    fn every_domain_has_its_own_vertex_once() {
+        let tissue = Material::new(MaterialModel::StableNeoHookean, 5e3, 0.4, 1000.0);
+        let mesh = Block::new(vec3(0.04, 0.02, 0.02), [4, 2, 2]).mesh().expect("a block");
+        let mut builder = ModelBuilder::new();
+        builder.add_body(&mesh, &tissue.expect("legal")).expect("a body");
+        let model = builder.build::<f32>().expect("a model");
+        let (method, elements) = (Method::QuasiNewton, Elements::Recovered);
+        let settings = SolverSettings { method, elements, ..SolverSettings::default() };
+        let layout = Layout::new(&model, &settings);
+        let tables = layout.recovered.as_ref().expect("tables");
+        let mut own = vec![0; tables.volumes.len()];
+        for (n, v, is_own, _) in own_entries(tables) {
+            own[n] += usize::from(is_own);
+            assert!(!is_own || v == tables.vertices[n]);
+        }
+        let expected: Vec<usize> = tables.volumes.iter().map(|&v| usize::from(v > 0.0)).collect();
+        assert_eq!(own, expected);
+    }
+}
