@@ -112,15 +112,8 @@ fn average_pressures(
     if agree(!recovered_acts(part), local) {
         return;
     }
-    let n = place_of_thread(group, local);
-    var mean = vec3f();
-    var of_place = Place();
-    if n != NOWHERE_PLACE {
-        of_place = place_of_number(n);
-        mean = mean_of_place(n, of_place);
-    }
-    let of_cluster = mean_of_cluster(64u * group + local / 4u, mean * of_place.volume, local);
-    if n != NOWHERE_PLACE {
-        put_pressure(n, of_place.domain * mean.x + of_place.cluster * of_cluster.x);
+    let means = find_means(group, local);
+    if means.n != NOWHERE_PLACE {
+        put_pressure(means);
     }
 }

@@ -124,24 +124,11 @@ fn average_volumes(
     if agree(!recovered_acts(part), local) {
         return;
     }
-    let n = place_of_thread(group, local);
-    var mean = vec3f();
-    var of_place = Place();
-    if n != NOWHERE_PLACE {
-        of_place = place_of_number(n);
-        mean = mean_of_place(n, of_place);
-    }
-    let of_cluster = mean_of_cluster(64u * group + local / 4u, mean * of_place.volume, local);
+    let means = find_means(group, local);
     var sums: Sums;
-    if n != NOWHERE_PLACE {
-        put_pressure(n, of_place.domain * mean.x + of_place.cluster * of_cluster.x);
-        let squared = solve_dt() * solve_dt();
-        let scale = of_place.volume * squared;
-        let terms = vec3f(
-            scale * place_density(n, of_place),
-            bulk_change(scale * of_place.domain, mean.x, mean.y),
-            bulk_change(scale * of_place.cluster, of_cluster.x, of_cluster.y),
-        );
+    if means.n != NOWHERE_PLACE {
+        put_pressure(means);
+        let terms = place_changes(means, CHANGES, 0u, solve_dt()) * (solve_dt() * solve_dt());
         sums[SUM_CHANGE] = -((terms.x + terms.y) + terms.z);
         sums[SUM_SIZE] = (abs(terms.x) + abs(terms.y)) + abs(terms.z);
     }
@@ -149,19 +136,6 @@ fn average_volumes(
     if local == 0u {
         recovery[recovered_count(RECOVERED_SUMS_AT) + group] = vec4f(totals[SUM_CHANGE], totals[SUM_SIZE], 0.0, 0.0);
     }
-}
-
-// Change of the energy density [Pa] of a place's own gradient, from y back to x, times its share.
-fn place_density(n: u32, of_place: Place) -> f32 {
-    let f = matrix_of(GRADIENTS, n);
-    let d = matrix_of(CHANGES, n);
-    var density = neo_hookean_energy_change(f, d, of_place.local, of_place.lame_mu);
-    if of_place.viscosity > 0.0 {
-        let since = tissue_change_since(f, start_strain_of_place(n));
-        let rate = of_place.viscosity / solve_dt();
-        density += tissue_viscous_energy_change(f, d, since, rate, of_place.local, of_place.lame_mu);
-    }
-    return density * recovered_share(RECOVERED_PLACE_SHARE);
 }
 
 // What averages have left, for one workgroup of a part.

@@ -99,19 +99,6 @@ fn recovered_ends(block: u32, lane: u32, is_trial: bool) -> vec2f {
     return changes;
 }
 
-// Change [J] of what a place stores by its own gradient.
-fn place_end(n: u32, of_place: Place, k: u32) -> f32 {
-    let f = matrix_of(GRADIENTS, n);
-    let d = matrix_of(changes_of(k), n);
-    var density = neo_hookean_energy_change(f, d, of_place.local, of_place.lame_mu);
-    if of_place.viscosity > 0.0 {
-        let since = tissue_change_since(f, green_strain_strain(matrix_of(STARTS, n)));
-        let rate = of_place.viscosity * frame.inverse_dt;
-        density += tissue_viscous_energy_change(f, d, since, rate, of_place.local, of_place.lame_mu);
-    }
-    return of_place.volume * recovered_share(RECOVERED_PLACE_SHARE) * density;
-}
-
 @compute @workgroup_size(256)
 fn average_ends(
     @builtin(local_invocation_index) local: u32,
@@ -122,22 +109,11 @@ fn average_ends(
     if group >= job.count {
         return;
     }
-    let n = place_of_thread(group, local);
-    var mean = vec3f();
-    var of_place = Place();
-    if n != NOWHERE_PLACE {
-        of_place = place_of_number(n);
-        mean = mean_of_place(n, of_place);
-    }
-    let of_cluster = mean_of_cluster(64u * group + local / 4u, mean * of_place.volume, local);
+    let means = find_means(group, local);
     var sums: Sums;
-    if n != NOWHERE_PLACE {
+    if means.n != NOWHERE_PLACE {
         for (var k = 0u; k < 2u; k++) {
-            let terms = vec3f(
-                place_end(n, of_place, k),
-                bulk_change(of_place.volume * of_place.domain, mean.x, mean[k + 1u]),
-                bulk_change(of_place.volume * of_place.cluster, of_cluster.x, of_cluster[k + 1u]),
-            );
+            let terms = place_changes(means, changes_of(k), k, frame.dt);
             sums[END_STORED + k] = (terms.x + terms.y) + terms.z;
             sums[END_SIZE + k] = (abs(terms.x) + abs(terms.y)) + abs(terms.z);
         }

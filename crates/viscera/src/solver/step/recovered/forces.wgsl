@@ -5,18 +5,13 @@
 //
 // `recovered_acts` and `recovered_dt` are the method's: whether a part takes part, and the time h that forces act for.
 
-// Strain of a place that viscosity acts against.
-fn start_strain_of_place(n: u32) -> array<f32, 6> {
-    return green_strain_strain(matrix_of(STARTS, n));
-}
-
 // `h^2 V_n alpha P(G_n)`.
 fn place_stress(n: u32, h: f32) -> mat3x3f {
     let of_place = place_of_number(n);
     let f = matrix_of(GRADIENTS, n);
     var piola = neo_hookean_piola(f, of_place.local, of_place.lame_mu);
     if of_place.viscosity > 0.0 {
-        let since = tissue_change_since(f, start_strain_of_place(n));
+        let since = tissue_change_since(f, green_strain_strain(matrix_of(STARTS, n)));
         let rate = of_place.viscosity / h;
         piola += tissue_viscous_piola(f, since, rate, of_place.local, of_place.lame_mu);
     }

@@ -288,16 +288,21 @@ pub fn names() -> Vec<(&'static str, u32)> {
 mod tests {
     use super::*;
     use crate::material::Material;
-    use crate::mesh::shapes::Block;
+    use crate::mesh::TetMesh;
     use crate::model::ModelBuilder;
     use crate::scalar::vec3;
     use crate::settings::{Elements, Method, SolverSettings};
 
-    /// Rows that are shorter than others of their group are filled up with their first vertex, whichever that is.
+    /// Rows that are shorter than others of their group are filled up with their first vertex: of two tetrahedra that share a
+    /// face the first tip sees four vertices, itself first, and its group has rows of five.
     #[test]
     fn every_domain_has_its_own_vertex_once() {
         let tissue = Material::new(MaterialModel::StableNeoHookean, 5e3, 0.4, 1000.0);
-        let mesh = Block::new(vec3(0.04, 0.02, 0.02), [4, 2, 2]).mesh().expect("a block");
+        let corner = |x: f64, y: f64, z: f64| vec3(x, y, z) * 0.01;
+        let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0; 3]];
+        let corners = corners.map(|[x, y, z]| corner(x, y, z)).to_vec();
+        let mesh = TetMesh::new(corners, vec![[0, 1, 2, 3], [1, 2, 3, 4]], vec![0; 2]);
+        let (mesh, _) = mesh.expect("a mesh");
         let mut builder = ModelBuilder::new();
         builder.add_body(&mesh, &tissue.expect("legal")).expect("a body");
         let model = builder.build::<f32>().expect("a model");
@@ -305,6 +310,12 @@ mod tests {
         let settings = SolverSettings { method, elements, ..SolverSettings::default() };
         let layout = Layout::new(&model, &settings);
         let tables = layout.recovered.as_ref().expect("tables");
+        let is_filled = |entry: &crate::layout::Entry<f32>| {
+            (0..LANES).any(|lane| {
+                entry.index[lane] == tables.vertices[lane] && entry.gradient[0][lane] == 0.0
+            })
+        };
+        assert!(tables.domain_rings.of(0).iter().any(is_filled), "no row is filled up so");
         let mut own = vec![0; tables.volumes.len()];
         for (n, v, is_own, _) in own_entries(tables) {
             own[n] += usize::from(is_own);

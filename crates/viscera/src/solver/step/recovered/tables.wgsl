@@ -205,22 +205,58 @@ fn mean_of_cluster(cluster: u32, given: vec3f, local: u32) -> vec3f {
     return sum * number(recovered_table(RECOVERED_CLUSTER_VOLUMES) + cluster);
 }
 
-// The place of one of the 256 threads of a workgroup of clusters.
-fn place_of_thread(group: u32, local: u32) -> u32 {
-    return table[recovered_table(RECOVERED_CLUSTER_PLACES) + 256u * group + local];
-}
-
-// `p_n` [Pa].
-fn put_pressure(n: u32, pressure: f32) {
-    recovery[column_at(GRADIENTS, n)].w = pressure;
-}
-
 // The factor of a linear tetrahedron's cofactors in the stress [Pa] of its volume floor.
 fn floor_factor(linear: mat3x3f, lame_mu: f32) -> f32 {
     return RECOVERED_FLOOR_STIFFNESS * lame_mu * recovered_below_floor(linear);
 }
 
-// Change [J] of what a mean volume stores, of a stiffness times a volume [J].
+// What a thread of a workgroup of clusters finds: its place, and the means over that and over its cluster.
+struct Means {
+    n: u32,
+    place: Place,
+    of_place: vec3f,
+    of_cluster: vec3f,
+}
+
+// For all threads of the workgroup at once; places are nowhere where a cluster has fewer.
+fn find_means(group: u32, local: u32) -> Means {
+    let n = table[recovered_table(RECOVERED_CLUSTER_PLACES) + 256u * group + local];
+    var place = Place();
+    var mean = vec3f();
+    if n != NOWHERE_PLACE {
+        place = place_of_number(n);
+        mean = mean_of_place(n, place);
+    }
+    let of_cluster = mean_of_cluster(64u * group + local / 4u, mean * place.volume, local);
+    return Means(n, place, mean, of_cluster);
+}
+
+// `p_n` [Pa], where the place's gradient has room for it.
+fn put_pressure(means: Means) {
+    let pressure = means.place.domain * means.of_place.x + means.place.cluster * means.of_cluster.x;
+    recovery[column_at(GRADIENTS, means.n)].w = pressure;
+}
+
+// Changes [J] of what a place stores along the `k`-th changes, which stand at `range`, in a step of `h` [s]: by its own
+// gradient, by its volume, by its cluster's.
+fn place_changes(means: Means, range: u32, k: u32, h: f32) -> vec3f {
+    let place = means.place;
+    let f = matrix_of(GRADIENTS, means.n);
+    let d = matrix_of(range, means.n);
+    var density = neo_hookean_energy_change(f, d, place.local, place.lame_mu);
+    if place.viscosity > 0.0 {
+        let since = tissue_change_since(f, green_strain_strain(matrix_of(STARTS, means.n)));
+        let rate = place.viscosity / h;
+        density += tissue_viscous_energy_change(f, d, since, rate, place.local, place.lame_mu);
+    }
+    return place.volume * vec3f(
+        recovered_share(RECOVERED_PLACE_SHARE) * density,
+        bulk_change(place.domain, means.of_place.x, means.of_place[k + 1u]),
+        bulk_change(place.cluster, means.of_cluster.x, means.of_cluster[k + 1u]),
+    );
+}
+
+// Change [Pa] of what a mean volume stores.
 fn bulk_change(stiffness: f32, mean: f32, change: f32) -> f32 {
     return stiffness * change * (mean + 0.5 * change);
 }
