@@ -136,8 +136,16 @@ pub fn kernels(traffic: &[TrafficReport]) -> Option<Table> {
 }
 
 /// Solvers of which it is shown, the first four that were measured.
-const SHOWN: [&str; 6] =
-    ["quasi-newton", "exact", "explicit", "jacobi-green", "green", "jacobi-anderson"];
+const SHOWN: [&str; 8] = [
+    "quasi-newton",
+    "quasi-newton-recovered",
+    "clusters",
+    "explicit",
+    "exact",
+    "jacobi-green",
+    "green",
+    "jacobi-anderson",
+];
 
 /// The shortest times over bandwidths, and what was measured on this device.
 pub fn roofline_plot(
@@ -195,7 +203,8 @@ pub fn aim_plot(answers: &[Answer]) -> Plot {
     }
     for (answer, aim) in timed() {
         let on = answer.threads.map_or("GPU".into(), |n| threads(n as u32));
-        let name = format!("{}, {} tetrahedra, {on}", answer.question, answer.asked_tets);
+        let Answer { question, solver, asked_tets, .. } = answer;
+        let name = format!("{question}, {solver}, {asked_tets} tetrahedra, {on}");
         let series = Series::new(name, [[aim, 1e3 * answer.seconds]]);
         plot.series(series.with_style(Style::Markers));
     }

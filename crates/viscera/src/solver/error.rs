@@ -25,8 +25,8 @@ pub enum StepError {
     },
     /// The method has linear tetrahedra only.
     #[error(
-        "`elements = \"recovered\"` is computed by the methods \"quasi_newton\" and \"explicit\" on the CPU, and not by \
-         \"{method}\"; use one of those with `device = \"cpu\"`, or `elements = \"plain\"`"
+        "`elements = \"recovered\"` is computed by the methods \"quasi_newton\" and \"explicit\", and not by \"{method}\"; use \
+         one of those, or `elements = \"plain\"`"
     )]
     Elements {
         /// The method of the settings.
