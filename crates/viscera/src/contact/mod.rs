@@ -117,6 +117,34 @@ impl Tool {
     }
 }
 
+/// Tools, and their parts, at most, that a graphics processor computes contact with.
+pub(crate) const MOST_TOOLS_ON_DEVICES: usize = 16;
+
+/// Why a graphics processor cannot compute contact with tools of these shapes, of which a spring may hold some.
+pub(crate) fn beyond_devices<'a>(
+    tools: impl Iterator<Item = (&'a Shape, bool)>,
+) -> Option<&'static str> {
+    let mut count = 0;
+    for (shape, is_held) in tools {
+        count += 1;
+        if matches!(shape, Shape::Mesh(_)) {
+            return Some(SOLID_ON_DEVICE);
+        }
+        if is_held {
+            return Some("a tool that a spring holds does not move; leave out its `spring`");
+        }
+    }
+    (count > MOST_TOOLS_ON_DEVICES).then_some("tools have 16 parts in all at most; use fewer")
+}
+
+/// Of other methods than the one that devices know contact with.
+pub(crate) const METHOD_ON_DEVICE: &str =
+    "only the quasi-Newton method computes contact with tools; use `method = \"quasi_newton\"`";
+
+/// Of a tool of a closed surface.
+pub(crate) const SOLID_ON_DEVICE: &str =
+    "tools of closed surfaces touch nothing; use spheres, capsules, boxes and half-spaces";
+
 /// A tool that is faster than this [m/s], or goes further than so many of its radii in a step where those are more, was put
 /// elsewhere.
 const FASTEST: f64 = 10.0;
@@ -133,6 +161,8 @@ pub struct Wrench {
     pub touches: u32,
     /// Of these hang on pinned vertices only: nothing gives way there.
     pub pinned: u32,
+    /// Samples that may meet it and were left out, because other tools are nearer: on devices alone.
+    pub left_out: u32,
     /// The deepest that tissue is inside the contact's thickness [m].
     pub depth: f64,
     /// Whether the tool has moved too far in the step for motion: what it touched before is forgotten, and tissue inside

@@ -1,26 +1,40 @@
-//! Whether what a scene asks for is what computes it: only the CPU, and not every method, computes contact.
+//! Whether what a scene asks for is what computes it: not every method, and devices not all, computes contact.
 
 use super::assemble::Assembly;
 use super::error::SimulationError;
-use crate::scene::Scene;
-use crate::settings::{DeviceRequest, SolverSettings};
+use crate::contact::{METHOD_ON_DEVICE, SOLID_ON_DEVICE, beyond_devices};
+use crate::scene::{Instrument, Scene};
+use crate::settings::{DeviceRequest, Method, SolverSettings};
 use crate::solver::StepError;
 
 /// Contact is computed where the scene asks for it to be.
 pub(super) fn check_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationError> {
     match device_of(scene, callers_device) {
-        Some(device) if !scene.tools.is_empty() => Err(SimulationError::ToolsOnDevice { device }),
         Some(device) if bodies_meet(scene) => Err(SimulationError::BodiesOnDevice { device }),
-        _ => Ok(()),
+        Some(_) if scene.tools.is_empty() => Ok(()),
+        _ => check_tools(scene, callers_device, scene.solver.method, scene.tools.iter()),
     }
 }
 
-/// Devices compute no contact.
-pub(super) fn refuse_device(scene: &Scene, callers_device: bool) -> Result<(), SimulationError> {
-    match device_of(scene, callers_device) {
-        Some(device) => Err(SimulationError::ToolsOnDevice { device }),
-        None => Ok(()),
-    }
+/// Where the scene asks for a device, that computes contact with these tools by this method.
+pub(super) fn check_tools<'a>(
+    scene: &Scene,
+    callers_device: bool,
+    method: Method,
+    tools: impl Iterator<Item = &'a Instrument> + Clone,
+) -> Result<(), SimulationError> {
+    let Some(device) = device_of(scene, callers_device) else { return Ok(()) };
+    let parts = tools.clone().flat_map(|tool| {
+        tool.parts.iter().map(move |part| (&part.shape, tool.spring.is_some()))
+    });
+    let why = match method {
+        Method::QuasiNewton if tools.clone().any(|tool| !tool.solids.is_empty()) => {
+            Some(SOLID_ON_DEVICE)
+        }
+        Method::QuasiNewton => beyond_devices(parts),
+        _ => Some(METHOD_ON_DEVICE),
+    };
+    why.map_or(Ok(()), |why| Err(SimulationError::ToolsOnDevice { device, why }))
 }
 
 /// The device that is asked for, where one is.

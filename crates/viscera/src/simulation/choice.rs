@@ -43,10 +43,7 @@ impl<S: Real> Backend<S> {
             (DeviceRequest::Cpu, _) => cpu("as asked for"),
             // Only scenes with tools have samples of their surfaces.
             (DeviceRequest::Auto, _) if !model.samples.is_empty() => {
-                cpu("contact with tools is computed on the CPU")
-            }
-            (device, _) if !model.samples.is_empty() => {
-                Err(SimulationError::ToolsOnDevice { device: device.clone() })
+                cpu("contact with tools, which no GPU is known to compute faster")
             }
             (DeviceRequest::Auto, _) if model.ties_bodies() => {
                 cpu("contact between bodies is computed on the CPU")

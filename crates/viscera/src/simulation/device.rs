@@ -14,7 +14,7 @@ use crate::solver::balance::ForceBalance;
 use crate::solver::gpu::{Device, GpuSolver};
 use crate::solver::oscillations::Oscillations;
 use crate::solver::{Inputs, Ledger, Solver, StepError, substeps_of_solves};
-use crate::state::State;
+use crate::state::{ContactState, State};
 
 /// A solver on a graphics processor, as a simulation of any precision sees it.
 pub(super) trait DeviceSolver<S>: Debug + Send {
@@ -40,6 +40,12 @@ pub(super) trait DeviceSolver<S>: Debug + Send {
 
     /// Multipliers after the last step.
     fn multipliers(&self, model: &Model<S>) -> Result<Vec<S>, FrameError>;
+
+    /// Forces on tools after the last step that was read.
+    fn wrenches(&self) -> &[Wrench];
+
+    /// What is kept of contact after the last step.
+    fn contact(&self, model: &Model<S>, state: &State<S>) -> Result<ContactState, FrameError>;
 
     /// The force balance of the last step.
     fn force_balance(
@@ -101,15 +107,15 @@ impl<S: Real> Backend<S> {
         Self { engine, choice, warning: None, gives_way: false, rejected: 0 }
     }
 
-    /// What each part of the last step's tools met; nothing before the first step, and of devices, which have no contact.
+    /// What each part of the last step's tools met; nothing before the first step.
     pub fn wrenches(&self) -> &[Wrench] {
         match &self.engine {
             Engine::Cpu(solver) => solver.wrenches(),
-            Engine::Device(_) => &[],
+            Engine::Device(device) => device.wrenches(),
         }
     }
 
-    /// See [`Solver::ledger`]; empty of devices, which have no contact.
+    /// See [`Solver::ledger`]; empty of devices, which keep none.
     pub fn ledger(&self) -> Ledger {
         match &self.engine {
             Engine::Cpu(solver) => solver.ledger(),

@@ -44,14 +44,13 @@ pub enum SimulationError {
         /// What was asked for.
         device: DeviceRequest,
     },
-    /// A device was asked for in a scene with tools.
-    #[error(
-        "`device = \"{device}\"`: contact is computed on the CPU, and this scene has tools; use `device = \"cpu\"` or \
-         `device = \"auto\"`"
-    )]
+    /// A device was asked for in a scene with tools that it cannot compute contact with.
+    #[error("`device = \"{device}\"`: on a graphics processor {why}, or `device = \"cpu\"`")]
     ToolsOnDevice {
         /// What was asked for.
         device: DeviceRequest,
+        /// What it cannot do, and what it can.
+        why: &'static str,
     },
     /// A device was asked for in a scene with several bodies, which meet.
     #[error(

@@ -4,6 +4,7 @@ use std::any::Any;
 
 use super::device::{Backend, DeviceSolver, Engine};
 use super::error::{FrameError, SimulationError};
+use crate::contact::Wrench;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::{Real, Vec3};
@@ -11,7 +12,7 @@ use crate::settings::{DeviceRequest, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::gpu::{Adapter, Device, GpuError, GpuSolver, StepCost};
 use crate::solver::{Inputs, Solver, StepError};
-use crate::state::State;
+use crate::state::{ContactState, State};
 
 impl DeviceSolver<f32> for GpuSolver {
     fn layout(&self) -> &Layout<f32> {
@@ -63,6 +64,18 @@ impl DeviceSolver<f32> for GpuSolver {
 
     fn multipliers(&self, model: &Model<f32>) -> Result<Vec<f32>, FrameError> {
         Ok(GpuSolver::multipliers(self, model)?)
+    }
+
+    fn wrenches(&self) -> &[Wrench] {
+        GpuSolver::wrenches(self)
+    }
+
+    fn contact(
+        &self,
+        model: &Model<f32>,
+        state: &State<f32>,
+    ) -> Result<ContactState, FrameError> {
+        Ok(GpuSolver::contact(self, model, state)?)
     }
 
     fn force_balance(

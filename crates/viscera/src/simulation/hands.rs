@@ -10,7 +10,7 @@
 
 use super::Simulation;
 use super::acts::Act;
-use super::checks::{refuse_device, refuse_method};
+use super::checks::{check_tools, refuse_method};
 use super::error::LiveError;
 use super::holding::tolerance;
 use super::instruments::there_at;
@@ -60,8 +60,7 @@ impl<S: Real> Simulation<S> {
     /// they are written. Returns its number. It is refused inside tissue, and where it is too thin for the mesh.
     pub fn take_tool(&mut self, instrument: Instrument) -> Result<usize, LiveError> {
         let pose = checked(&instrument.name, &instrument.placement)?;
-        refuse_device(&self.scene, self.callers_device)?;
-        refuse_method(&self.solver).map_err(super::SimulationError::from)?;
+        self.check_tools([&instrument])?;
         let (name, time) = (self.free_name(&instrument.name), self.time());
         let given = self.is_recorded().then(|| instrument.clone());
         let mut tool =
@@ -242,7 +241,11 @@ impl<S: Real> Simulation<S> {
         let places = self.instruments.come_and_go(&self.assembly.tools, there, frame);
         let mut parts = Vec::new();
         self.instruments.parts_at(&self.assembly.tools, time, &mut parts);
+        self.state.contact = self.whole_contact();
         renumber(&mut self.state.contact, &places, &parts);
+        if let Some(device) = self.backend.device_mut() {
+            device.write(&self.model, &self.state);
+        }
         if let Some(shadow) = &mut self.shadow {
             renumber(shadow.contact_mut(), &places, &parts);
         }
@@ -250,6 +253,17 @@ impl<S: Real> Simulation<S> {
             self.choose_substeps();
         }
         Ok(())
+    }
+
+    /// What computes takes contact with all tools, these among them.
+    fn check_tools<'a>(
+        &'a self,
+        new: impl IntoIterator<Item = &'a Instrument>,
+    ) -> Result<(), LiveError> {
+        let all: Vec<&Instrument> = self.assembly.tools.iter().chain(new).collect();
+        let all = all.iter().copied();
+        check_tools(&self.scene, self.callers_device, self.solver.method, all)?;
+        Ok(refuse_method(&self.solver).map_err(super::SimulationError::from)?)
     }
 
     /// Samples as fine as the thinnest of all tools needs that have come by a time [s]. Where that is another mesh of them
@@ -263,14 +277,11 @@ impl<S: Real> Simulation<S> {
         if samples == self.assembly.builder.samples() {
             return Ok(());
         }
-        refuse_device(&self.scene, self.callers_device)?;
-        refuse_method(&self.solver).map_err(super::SimulationError::from)?;
+        self.check_tools([])?;
         let mut builder = self.assembly.builder.clone();
         builder.set_samples(samples).map_err(super::SimulationError::from)?;
         let model = builder.build::<S>().map_err(super::SimulationError::from)?;
-        // A device computes no contact.
-        let stays = self.backend.device().is_none();
-        let backend = self.backend.renew(stays, &model, &self.solver, None, &self.offered)?;
+        let backend = self.backend.renew(true, &model, &self.solver, None, &self.offered)?;
         let mut state = self.whole_state();
         let old = self.assembly.builder.samples();
         state.contact.touches = finer(&state, old, builder.samples());

@@ -411,7 +411,7 @@ impl<S: Real> Simulation<S> {
     /// What moves, the multipliers included, wherever they are. Where a device is lost they are what the tissue
     /// answers to its places.
     pub(super) fn whole_state(&self) -> State<S> {
-        let mut state = self.state.clone();
+        let mut state = State { contact: self.whole_contact(), ..self.state.clone() };
         let Some(device) = self.backend.device() else { return state };
         match device.multipliers(&self.model) {
             Ok(multipliers) => state.multipliers = multipliers,
@@ -423,6 +423,14 @@ impl<S: Real> Simulation<S> {
             }
         }
         state
+    }
+
+    /// What is kept of contact; where a device is lost, none of it.
+    pub(super) fn whole_contact(&self) -> ContactState {
+        match self.backend.device() {
+            Some(device) => device.contact(&self.model, &self.state).unwrap_or_default(),
+            None => self.state.contact.clone(),
+        }
     }
 
     /// Energies; of recovered-gradient tetrahedra with their own, once a step has found it.

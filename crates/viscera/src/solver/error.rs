@@ -92,9 +92,12 @@ pub enum StepError {
          `method = \"quasi_newton\"`, or leave out tools and set `contact.bodies = false`"
     )]
     ContactNeedsRebase,
-    /// Devices do not compute contact.
-    #[error("contact with tools is computed on the CPU: use `device = \"cpu\"`")]
-    ContactOnDevice,
+    /// A device does not compute this contact.
+    #[error("on a graphics processor {why}, or `device = \"cpu\"`")]
+    ContactOnDevice {
+        /// What it cannot do, and what it can.
+        why: &'static str,
+    },
     /// The solver was built for another model.
     #[error("the model is not the one that the solver was built for; build a solver for it")]
     OtherModel,

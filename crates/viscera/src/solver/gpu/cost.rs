@@ -11,6 +11,7 @@ use crate::layout::Layout;
 use crate::settings::{Method, SolverSettings};
 use crate::solver::plan::{Plan, QuasiNewtonStage};
 use crate::solver::quasi_newton::on_device::DeviceLevels;
+use crate::solver::step::contacts::on_device::Samples;
 
 /// A tetrahedron's share of a pass on the CPU [s]. Of a sweep of XPBD: between 27 ns without and 57 ns with rebase and
 /// guards, in single precision, one thread, ten thousand tetrahedra (docs/peers.md); of the others see
@@ -56,7 +57,8 @@ impl StepCost {
         let levels = DeviceLevels::new(layout, settings).map(|(levels, _)| levels);
         // How many dispatches there are depends neither on the length of the long vector nor on the number of pieces.
         let pieces = Pieces { count: 2, first_of_vertices: 1, groups: 1 };
-        let recorder = Recorder::new(layout, settings, [0; 2], pieces, levels.as_ref());
+        let samples = Samples::new(layout);
+        let recorder = Recorder::new(layout, settings, [0; 2], pieces, levels.as_ref(), samples);
         let record = recorder.record(&plan);
         let [prologue, body, epilogue] =
             [record.prologue, record.body, record.epilogue].map(|list| list.len() as u64);

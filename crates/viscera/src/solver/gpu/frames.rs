@@ -7,6 +7,7 @@ use super::error::GpuError;
 use super::reading::{read, staging, wait};
 use super::slots::Slot;
 use super::solver::GpuSolver;
+use crate::contact::Wrench;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::lanes::{Eight, Point};
@@ -15,6 +16,7 @@ use crate::settings::Method;
 use crate::solver::inputs::{Inputs, check_inputs, check_state};
 use crate::solver::step::balance::ForceBalance;
 use crate::solver::step::contacts::Contacts;
+use crate::solver::step::contacts::on_device::ALL_SUMS;
 use crate::solver::step::data::EndOfStep;
 use crate::solver::step::predict::load_tethers;
 use crate::solver::step::recovered::MeasuredTets;
@@ -100,17 +102,22 @@ impl GpuSolver {
 
     /// Waits for the device and reads positions and velocities at the end of the last step, in place; returns how
     /// many steps were rejected so far. Multipliers stay on the device. On an error nothing is changed.
-    pub fn read_frame(&self, model: &Model<f32>, state: &mut State<f32>) -> Result<u64, GpuError> {
+    pub fn read_frame(
+        &mut self,
+        model: &Model<f32>,
+        state: &mut State<f32>,
+    ) -> Result<u64, GpuError> {
         let layout = self.layout_of(model)?;
-        let mut rejected = 0;
+        let mut all = (0, Vec::new());
         read(&self.device, &self.frame_ranges(), |read| {
-            rejected = self.take_frame_parts(&layout, state, read);
+            all = self.take_frame_parts(&layout, state, read);
         })?;
-        Ok(rejected)
+        self.tools.wrenches = all.1;
+        Ok(all.0)
     }
 
     /// What [`GpuSolver::read_frame`] reads.
-    pub(super) fn frame_ranges(&self) -> [(&wgpu::Buffer, Range<u64>); 3] {
+    pub(super) fn frame_ranges(&self) -> [(&wgpu::Buffer, Range<u64>); 4] {
         let part = |slot, size: u64| {
             let [start, _] = self.buffers.span(slot);
             (self.buffers.buffer(slot), start..start + size)
@@ -120,7 +127,17 @@ impl GpuSolver {
             part(Slot::Unknowns, points),
             part(Slot::Velocities, points),
             part(Slot::Control, PARTS_START as u64),
+            match self.samples {
+                Some(_) => part(Slot::ToolSums, self.of_tools()),
+                // Nothing cannot be copied.
+                None => part(Slot::Control, self.of_tools()),
+            },
         ]
+    }
+
+    /// Bytes that are read of tools.
+    fn of_tools(&self) -> u64 {
+        if self.samples.is_some() { 4 * ALL_SUMS as u64 } else { 4 }
     }
 
     /// Takes over copies of those ranges; returns how many steps were rejected so far.
@@ -129,17 +146,21 @@ impl GpuSolver {
         layout: &Layout<f32>,
         state: &mut State<f32>,
         read: &[&[u8]],
-    ) -> u64 {
+    ) -> (u64, Vec<Wrench>) {
         put_in_user_order(layout, bytemuck::cast_slice(read[0]), &mut state.positions);
         put_in_user_order(layout, bytemuck::cast_slice(read[1]), &mut state.velocities);
         state.multiplier_dt = self.multiplier_dt;
-        rejected_steps(read[2])
+        let wrenches = match self.samples {
+            Some(_) => self.tools.all.wrenches(bytemuck::cast_slice(read[3])),
+            None => Vec::new(),
+        };
+        (rejected_steps(read[2]), wrenches)
     }
 
     /// How many bytes [`GpuSolver::read_frame`] reads, [`GpuSolver::force_balance`], and [`GpuSolver::read`].
     pub fn bytes_read_back(&self) -> [u64; 3] {
         let of_slot = |slot: &Slot| self.buffers.span(*slot)[1];
-        let frame = 2 * self.buffers.points_size + PARTS_START as u64;
+        let frame = 2 * self.buffers.points_size + PARTS_START as u64 + self.of_tools();
         let whole = [Slot::Unknowns, Slot::Velocities].iter().map(of_slot).sum();
         [frame, self.balance_slots().iter().map(of_slot).sum(), whole]
     }
@@ -186,6 +207,9 @@ impl GpuSolver {
     /// Where everything stands that a force balance needs.
     pub(super) fn balance_slots(&self) -> Vec<Slot> {
         let mut slots = vec![Slot::Predicted, Slot::ExternalForces, Slot::Previous];
+        if self.samples.is_some() {
+            slots.push(Slot::Contact);
+        }
         if self.layout.is_viscous() {
             slots.push(match self.settings.method {
                 Method::QuasiNewton => Slot::StageStart,
@@ -267,7 +291,15 @@ impl GpuSolver {
             load_tethers(&self.tethers, &mut places, self.multiplier_dt, mass, place);
         }
         let mut measured = MeasuredTets::new(model);
-        if let Some(rows) = read.get(3) {
+        let mut more = read[3..].iter();
+        let contacts = match self.samples {
+            Some(_) => more.next().map(|rows| bytemuck::cast_slice(rows)),
+            None => None,
+        };
+        let contacts = contacts.map_or_else(Contacts::default, |rows| {
+            self.tools.all.contacts(model, rows)
+        });
+        if let Some(rows) = more.next() {
             self.put_strains(model, state, rows, &mut measured);
         }
         let (recovered, start_strain) = measured.of_step();
@@ -279,7 +311,7 @@ impl GpuSolver {
             tethers: &self.tethers,
             start_strain,
             recovered,
-            contacts: &Contacts::default(),
+            contacts: &contacts,
         };
         balance.measure(model, state, inputs, &mut end);
     }

@@ -55,6 +55,8 @@ pub enum File {
     Direction,
     End,
     EndRecovered,
+    FindContacts,
+    EndContacts,
 }
 
 /// Choices that the text of a file depends on, beside the kernel.
@@ -159,7 +161,7 @@ kernels! {
     SEARCH = Search "search" 256
         [Tets Points Loads StartStrain PartialSums Control VertexData Table];
     TAKE = Take "take" 256 [Unknowns Mapped PartialSums Control VertexData Table];
-    BEGIN_SOLVES = Begin "begin_solves" 256 [Points VertexData Table Levels Progress];
+    BEGIN_SOLVES = Begin "begin_solves" 256 [Points Loads VertexData Table Levels Progress];
     BEGIN_SECOND = Begin "begin_second" 256
         [Points PartialSums VertexData Table Levels Progress];
     TURN_GROUPS = Refresh "turn_groups" 64 [VertexData Table Levels Multilevel];
@@ -186,14 +188,17 @@ kernels! {
     CHOOSE_DIRECTION = Direction "choose_direction" 256
         [Points PartialSums VertexData Table Levels Pairs Progress];
     MEASURE_END = End "measure_end" 256
-        [Tets Points PartialSums VertexData Table Progress];
+        [Tets Points Loads PartialSums VertexData Table Progress];
     END_STEP = End "end_step" 256 [Points PartialSums Control VertexData Table Progress];
     MEASURE_RECOVERED_END = EndRecovered "measure_end" 256
-        [Tets Points PartialSums VertexData Table Progress Recovery];
+        [Tets Points Loads PartialSums VertexData Table Progress Recovery];
     RECOVER_ENDS = EndRecovered "recover_ends" 64 [Points VertexData Table Progress Recovery];
     AVERAGE_ENDS = EndRecovered "average_ends" 256 [Table Recovery];
     END_RECOVERED_STEP = EndRecovered "end_step" 256
         [Points PartialSums Control VertexData Table Progress Recovery];
+    FIND_CONTACTS = FindContacts "find_contacts" 64 [Points Loads VertexData Table];
+    END_CONTACTS = EndContacts "end_contacts" 256 [Points Loads PartialSums VertexData Table];
+    REPORT_TOOLS = EndContacts "report_tools" 256 [PartialSums Table];
     LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Control VertexData Table];
 }
 
@@ -214,6 +219,9 @@ const SUMS: &str = kernel_text!("sums.wgsl");
 
 /// How elements that are no tetrahedra lie in the table.
 const ELEMENTS: &str = kernel_text!("elements.wgsl");
+
+/// Samples and tools.
+const TOOLS: &str = kernel_text!("../step/contacts/tools.wgsl");
 
 /// In the place of recovered-gradient tetrahedra.
 const PLAIN: &str = kernel_text!("../step/recovered/none.wgsl");
@@ -297,6 +305,8 @@ fn files_of_solves(file: File) -> Vec<&'static str> {
     let tables = [wgsl::RECOVERED, kernel_text!("../step/recovered/tables.wgsl")];
     let forces = kernel_text!("../step/recovered/forces.wgsl");
     let none = kernel_text!("../quasi_newton/recovered_none.wgsl");
+    let samples = kernel_text!("../step/contacts/solve.wgsl");
+    let samples_end = kernel_text!("../step/contacts/solve_end.wgsl");
     match file {
         File::Begin => solve(own(kernel_text!("../quasi_newton/begin.wgsl"))),
         File::Refresh => {
@@ -315,25 +325,37 @@ fn files_of_solves(file: File) -> Vec<&'static str> {
             [laws(), pieces(), tables.to_vec(), own.to_vec()].concat()
         }
         File::EvaluateTrial => {
-            solve(vec![PLAIN, none, kernel_text!("../quasi_newton/evaluate.wgsl")])
+            let own = [PLAIN, none, TOOLS, samples, kernel_text!("../quasi_newton/evaluate.wgsl")];
+            solve(own.to_vec())
         }
         File::EvaluateRecovered => {
             let own = [
                 forces,
                 kernel_text!("../quasi_newton/recovered.wgsl"),
+                TOOLS,
+                samples,
                 kernel_text!("../quasi_newton/evaluate.wgsl"),
             ];
             solve([tables.to_vec(), own.to_vec()].concat())
         }
         File::Apply => vec![levels, kernel_text!("../quasi_newton/preconditioner/apply.wgsl")],
         File::Direction => solve(vec![levels, kernel_text!("../quasi_newton/direction.wgsl")]),
-        File::End => solve(vec![PLAIN, none, kernel_text!("../quasi_newton/end.wgsl")]),
+        File::End => {
+            let own = [PLAIN, none, TOOLS, samples_end, kernel_text!("../quasi_newton/end.wgsl")];
+            solve(own.to_vec())
+        }
         File::EndRecovered => {
             let own = [
                 kernel_text!("../quasi_newton/recovered_end.wgsl"),
+                TOOLS,
+                samples_end,
                 kernel_text!("../quasi_newton/end.wgsl"),
             ];
             solve([tables.to_vec(), own.to_vec()].concat())
+        }
+        File::FindContacts => vec![TOOLS, kernel_text!("../step/contacts/find.wgsl")],
+        File::EndContacts => {
+            [pieces(), vec![TOOLS, kernel_text!("../step/contacts/end.wgsl")]].concat()
         }
         _ => Vec::new(),
     }
@@ -457,7 +479,7 @@ fn storage_entry(slot: Slot) -> wgpu::BindGroupLayoutEntry {
     }
 }
 
-/// The job of a dispatch, and the constants of the step.
+/// The job of a dispatch, and the constants and tools of the step.
 pub(super) fn uniform_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let entry = |binding, has_dynamic_offset| wgpu::BindGroupLayoutEntry {
         binding,
@@ -470,7 +492,7 @@ pub(super) fn uniform_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         count: None,
     };
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("job and frame"),
-        entries: &[entry(0, true), entry(1, false)],
+        label: Some("job, frame and tools"),
+        entries: &[entry(0, true), entry(1, false), entry(2, false)],
     })
 }

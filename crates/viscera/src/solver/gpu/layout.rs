@@ -14,6 +14,8 @@ use crate::layout::Layout;
 use crate::material::MaterialConstants;
 use crate::scalar::lanes::LANES;
 use crate::settings::{Method, SolverSettings};
+use crate::solver::step::contacts::on_device as on_device_contact;
+use crate::solver::step::contacts::on_device::Samples;
 use crate::solver::step::recovered::on_device;
 use crate::solver::step::strain::is_recovered;
 
@@ -72,6 +74,14 @@ pub(super) struct Header {
     pub cluster_starts: u32,
     pub cluster_vertices: u32,
     pub cluster_corners: u32,
+    /// Of contact: samples, the number of the first among elements, where those of each vertex begin, and these; where their
+    /// vectors begin among the loads, and sums of tools among the partial ones.
+    pub samples: u32,
+    pub first_sample: u32,
+    pub sample_offsets: u32,
+    pub sample_entries: u32,
+    pub contact: u32,
+    pub tool_sums: u32,
 }
 
 /// The ranges of the vertex data, in order, with the slot that kernels know them by; `None` for one that only the
@@ -152,6 +162,8 @@ pub(super) struct DeviceLayout {
     /// The part of each block.
     block_parts: Vec<u32>,
     pub parts: Parts,
+    /// Of the surface, for the methods that compute contact.
+    pub samples: Option<Samples>,
 }
 
 impl DeviceLayout {
@@ -215,10 +227,12 @@ impl DeviceLayout {
                 *slot += offsets[vertex as usize];
             }
         }
-        let (members, pieces) = pieces(layout, &elements, &by_kind);
+        let samples = samples_of(layout, settings);
+        let with_samples = samples.is_some();
+        let (members, pieces) = pieces(layout, &elements, &by_kind, with_samples);
         let parts = Parts::new(layout, settings, &pieces);
         let block_parts = block_parts(layout);
-        Self { offsets, corners, elements, members, pieces, block_parts, parts }
+        Self { offsets, corners, elements, members, pieces, block_parts, parts, samples }
     }
 
     /// Where a vertex's loads begin.
@@ -265,6 +279,7 @@ impl DeviceLayout {
             tet_lanes: (LANES * self.corners.len()) as u32,
             law_ends: law_ends(layout),
             part_count: layout.part_count() as u32,
+            first_sample: u32::MAX,
             ..Header::default()
         };
         // Room only: the host writes these at the start of a step, weights when its length changes. Offsets of
@@ -289,16 +304,31 @@ impl DeviceLayout {
             header.weights = add(Some(Slot::Weights), &weights);
         }
 
+        if let Some(samples) = self.samples {
+            let [rows, offsets, entries] = on_device_contact::tables(layout);
+            header.samples = add(None, &words(&rows));
+            header.sample_offsets = add(None, &words(&offsets));
+            header.sample_entries = add(None, &words(&entries));
+            header.first_sample = header.tet_lanes + self.elements.len() as u32;
+            header.contact = self.slot_count() as u32;
+            let [start, size] = [16 * self.slot_count(), 16 * samples.vectors()];
+            ranges.push(Range { slot: Slot::Contact, owner: Slot::Loads, start, size });
+        }
         let [start, size] = vertex_data(layout, settings, &mut ranges);
         (header.stride, header.anchors) = (Self::stride(layout), (start / 16) as u32);
 
-        let [lines, energies, sums] = self.sums(settings);
+        let [lines, energies, tool_sums] = self.sums(settings);
         (header.lines, header.energies) = (lines as u32, energies as u32);
+        header.tool_sums = tool_sums as u32;
+        let of_tools = self.samples.map_or(0, Samples::sums);
+        let owner = Slot::PartialSums;
+        ranges.push(Range { slot: Slot::ToolSums, owner, start: 4 * tool_sums, size: 4 * of_tools });
+        let sums = tool_sums + of_tools;
         bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
         Table { bytes, ranges, vertex_data_size: start + size, sums_size: 4 * sums }
     }
 
-    /// Where lines of the search and energies begin among the partial sums, and how many there are of all.
+    /// Where lines of the search and energies begin among the partial sums, and how many there are without those of tools.
     fn sums(&self, settings: &SolverSettings) -> [u64; 3] {
         let guarded = settings.guards_steps();
         let solves = settings.method == Method::QuasiNewton;
@@ -382,6 +412,11 @@ pub(super) fn copy_offsets(layout: &Layout<f32>) -> Vec<u32> {
         offsets[part.vertices.clone()].iter_mut().for_each(|first| *first |= WHOLE);
     }
     offsets
+}
+
+/// Samples of the surface, where a method computes contact on devices.
+fn samples_of(layout: &Layout<f32>, settings: &SolverSettings) -> Option<Samples> {
+    Samples::new(layout).filter(|_| settings.method == Method::QuasiNewton)
 }
 
 /// The blocks where the tetrahedra of each law end.

@@ -66,11 +66,12 @@ pub(super) fn block_parts(layout: &Layout<f32>) -> Vec<u32> {
     sets.flat_map(|set| set.blocks.iter().map(|b| of_block(&b.vertices))).collect()
 }
 
-/// Elements of each part in pieces, then vertices.
+/// Elements of each part in pieces, `with_samples` of the surface behind them, then vertices.
 pub(super) fn pieces(
     layout: &Layout<f32>,
     others: &[Element],
     by_kind: &[usize],
+    with_samples: bool,
 ) -> (Vec<u32>, Vec<Piece>) {
     let mut elements = Vec::new();
     let mut first = 0;
@@ -85,6 +86,10 @@ pub(super) fn pieces(
     // finds block and lane of a tetrahedron by division.
     let first = (LANES * first) as u32;
     elements.extend(by_kind.iter().map(|&i| (others[i].part, first + i as u32)));
+    // Behind all of them samples of the surface.
+    let samples = layout.samples.iter().filter(|_| with_samples);
+    let first = first + others.len() as u32;
+    elements.extend(samples.zip(first..).map(|(sample, number)| (sample.part, number)));
     // A part's elements keep the order of a model of their own.
     let part = |i: u32| elements[i as usize].0;
     let order = sorting::by_key(0..elements.len() as u32, |i| [u64::from(part(i)), 0]);

@@ -16,6 +16,7 @@
 
 mod buffers;
 mod clusters;
+mod contact;
 mod control;
 mod copy;
 mod cost;

@@ -11,6 +11,7 @@ use crate::layout::Layout;
 use crate::scalar::lanes::LANES;
 use crate::settings::SolverSettings;
 use crate::solver::quasi_newton::on_device::DeviceLevels;
+use crate::solver::step::contacts::on_device::Samples;
 use crate::solver::step::recovered::on_device::Extent;
 use crate::solver::xpbd::is_jacobi;
 
@@ -56,6 +57,8 @@ pub struct Recorder<'a> {
     pub levels: Option<&'a DeviceLevels>,
     /// Of recovered-gradient tetrahedra, which this method has.
     pub recovered: Option<Extent>,
+    /// Of the surface, where this method computes contact.
+    pub samples: Option<Samples>,
 }
 
 impl<'a> Recorder<'a> {
@@ -67,6 +70,7 @@ impl<'a> Recorder<'a> {
         vector: [u32; 2],
         pieces: Pieces,
         levels: Option<&'a DeviceLevels>,
+        samples: Option<Samples>,
     ) -> Self {
         let [length, multipliers_first] = vector;
         Self {
@@ -85,6 +89,7 @@ impl<'a> Recorder<'a> {
             pieces,
             levels,
             recovered: Extent::new(layout),
+            samples,
         }
     }
 

@@ -27,11 +27,12 @@ impl GpuSolver {
         let layout = self.layout_of(model)?;
         let Some(reading) = &self.sent.awaited else { return Ok(None) };
         let Some(arrived) = reading.has_arrived(&self.device)? else { return Ok(None) };
-        let (rejected, balance) = arrived.look(&self.device, |read| {
+        let ((rejected, wrenches), balance) = arrived.look(&self.device, |read| {
             let (frame, balance) = read.split_at(self.frame_ranges().len());
             let balance: Vec<Vec<u8>> = balance.iter().map(|bytes| bytes.to_vec()).collect();
             (self.take_frame_parts(&layout, state, frame), balance)
         })?;
+        self.tools.wrenches = wrenches;
         self.sent = Sent { awaited: None, balance: Some(balance).filter(|all| !all.is_empty()) };
         Ok(Some(rejected))
     }

@@ -14,6 +14,7 @@ use crate::solver::quasi_newton::progress::{PartProgress, SolveState};
 use crate::solver::quasi_newton::tables;
 use crate::solver::step::control::PartGuard;
 use crate::solver::step::modes::MODES;
+use crate::solver::step::contacts::on_device as contact;
 use crate::solver::step::recovered::on_device;
 use crate::solver::step::{descent, guard};
 
@@ -54,6 +55,8 @@ pub fn host_layouts() -> Vec<HostLayout> {
             phase passes_left accepted ahead failures rejections calm count newest scale length slope
         }),
         record!("PartProgress" PartProgress { states sy yw was_rejected calm takes_trial }),
+        record!("Tool" contact::ToolRecord { poses lengths law way turn }),
+        record!("Tools" contact::ToolRecords { count all }),
         record!("Update" Update { vertex is_pinned force place stiffness inertia }),
         record!("TetBlock" crate::layout::TetBlock<f32> {
             vertices inverse_rest_shape rest_volume material
@@ -81,6 +84,7 @@ pub(super) fn constants() -> String {
         ("CLUSTER_VERTICES", CLUSTER_VERTICES as u32),
     ];
     let ranges = layout::vertex_ranges().chain(tables::words()).chain(on_device::names());
+    let ranges = ranges.chain(contact::names());
     let numbers = words::words().into_iter().chain(MODES.iter().copied());
     let numbers = numbers.chain(ranges).chain(guarded).chain(shared);
     let mut text: String =

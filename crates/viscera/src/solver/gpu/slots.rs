@@ -46,6 +46,8 @@ pub enum Slot {
     Progress,
     Recovery,
     StageStart,
+    Contact,
+    ToolSums,
 }
 
 impl Slot {

@@ -1,6 +1,7 @@
 //! The solver of one model on a graphics processor: its memory and kernels.
 
 use super::buffers::Buffers;
+use super::contact::OfTools;
 use super::control;
 use super::device::{Device, baseline, shortfall};
 use super::error::GpuError;
@@ -28,6 +29,7 @@ use crate::solver::inputs::{check_model, check_settings};
 use crate::solver::plan::{Plan, Stage, StepStage};
 use crate::solver::quasi_newton::on_device::{self, DeviceLevels};
 use crate::solver::quasi_newton::progress::PartProgress;
+use crate::solver::step::contacts::on_device::{Samples, ToolRecords};
 use crate::solver::step::recovered;
 use crate::solver::step::tethers::Bundle;
 use crate::state::State;
@@ -53,6 +55,9 @@ pub struct GpuSolver {
     pub(super) buffers: Buffers,
     pub(super) uniforms: wgpu::BindGroup,
     pub(super) frame: wgpu::Buffer,
+    pub(super) tools: OfTools,
+    /// Of the surface, where contact is computed.
+    pub(super) samples: Option<Samples>,
     pub(super) jobs: wgpu::Buffer,
     /// The model as it lies on the device.
     pub(super) layout: Arc<Layout<f32>>,
@@ -126,11 +131,13 @@ impl GpuSolver {
         let of_levels = levels.as_ref();
         let buffers = Buffers::new(device, &laid, settings, &layout, of_levels, left_over)?;
         let vector = [buffers.length, (buffers.multipliers_start / 4) as u32];
-        let recorder = Recorder::new(&laid, settings, vector, layout.pieces(), of_levels);
+        let samples = layout.samples;
+        let recorder =
+            Recorder::new(&laid, settings, vector, layout.pieces(), of_levels, samples);
         let record = recorder.record(&plan);
         let lists = [record.prologue, record.body, record.epilogue, record.restart];
         let job_count = lists.iter().map(Vec::len).sum::<usize>() as u64;
-        let (jobs, frame, uniforms) = make_uniforms(device, job_count);
+        let Uniforms { jobs, frame, tools, all: uniforms } = make_uniforms(device, job_count);
         let mut next = 0;
         let [prologue, body, epilogue, restart] = lists.map(|list| {
             let prepare = |dispatch: &Dispatch| {
@@ -152,6 +159,8 @@ impl GpuSolver {
             plan,
             uniforms,
             frame,
+            tools: OfTools::new(tools),
+            samples,
             jobs,
             layout: Arc::clone(&laid),
             ready: [prologue, body, epilogue],
@@ -289,6 +298,7 @@ impl GpuSolver {
         self.write_velocities(&state.velocities);
         self.multiplier_dt = state.multiplier_dt;
         self.forget_pairs();
+        self.tools.put((&self.buffers, &self.device.queue), layout, &state.contact);
     }
 
     /// Solves begin without what they have learned.
@@ -366,8 +376,16 @@ fn starts_falling(plan: &Plan) -> bool {
     plan.split().prologue.iter().any(falls)
 }
 
-/// Buffers for so many jobs and for the constants of a step, and how kernels are bound to them.
-fn make_uniforms(device: &Device, job_count: u64) -> (wgpu::Buffer, wgpu::Buffer, wgpu::BindGroup) {
+/// Buffers of jobs, of the constants of a step and of its tools, and how kernels are bound to them.
+struct Uniforms {
+    jobs: wgpu::Buffer,
+    frame: wgpu::Buffer,
+    tools: wgpu::Buffer,
+    all: wgpu::BindGroup,
+}
+
+/// For so many jobs.
+fn make_uniforms(device: &Device, job_count: u64) -> Uniforms {
     let wgpu = &device.device;
     let make = |label, size, usage| {
         wgpu.create_buffer(&wgpu::BufferDescriptor {
@@ -380,8 +398,9 @@ fn make_uniforms(device: &Device, job_count: u64) -> (wgpu::Buffer, wgpu::Buffer
     let uniform = wgpu::BufferUsages::UNIFORM;
     let jobs = make("jobs", JOB_STRIDE * job_count.max(1), uniform);
     let frame = make("frame", size_of::<FrameConstants>() as u64, uniform);
-    let uniforms = wgpu.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("job and frame"),
+    let tools = make("tools", size_of::<ToolRecords>() as u64, uniform);
+    let all = wgpu.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("job, frame and tools"),
         layout: &kernels::uniform_layout(wgpu),
         entries: &[
             wgpu::BindGroupEntry {
@@ -393,9 +412,10 @@ fn make_uniforms(device: &Device, job_count: u64) -> (wgpu::Buffer, wgpu::Buffer
                 }),
             },
             wgpu::BindGroupEntry { binding: 1, resource: frame.as_entire_binding() },
+            wgpu::BindGroupEntry { binding: 2, resource: tools.as_entire_binding() },
         ],
     });
-    (jobs, frame, uniforms)
+    Uniforms { jobs, frame, tools, all }
 }
 
 fn in_solver_order(layout: &Layout<f32>, values: &[Vec3<f32>]) -> Vec<[f32; 4]> {

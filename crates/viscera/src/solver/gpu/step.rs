@@ -77,9 +77,7 @@ impl GpuSolver {
         let layout = self.layout_of(model)?;
         let model = &*layout;
         crate::solver::inputs::check_step(dt, model, inputs)?;
-        if !inputs.tools.is_empty() {
-            return Err(StepError::ContactOnDevice);
-        }
+        self.send_tools(&inputs.tools, dt)?;
         self.sent = Default::default();
         let count = match &self.stability {
             // One small step: the step itself.

@@ -23,6 +23,8 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
         "PART_COUNT_AT" part_count "CLUSTERS_AT" clusters
         "CLUSTER_STARTS_AT" cluster_starts "CLUSTER_VERTICES_AT" cluster_vertices
         "CLUSTER_CORNERS_AT" cluster_corners
+        "SAMPLES_AT" samples "FIRST_SAMPLE_AT" first_sample "SAMPLE_OFFSETS_AT" sample_offsets
+        "SAMPLE_ENTRIES_AT" sample_entries "CONTACT_AT" contact "TOOL_SUMS_AT" tool_sums
     });
     all.extend(words!(ClusterRow {
         "CLUSTER_FIRST_START" first_start "CLUSTER_COLORS" colors

@@ -29,6 +29,22 @@ fn fall_of(part: u32) -> vec3f {
     return vec3f(number(acceleration), number(acceleration + 1u), number(acceleration + 2u));
 }
 
+// Whether a sample of a vertex may touch a tool.
+fn may_touch(v: u32) -> bool {
+    if table[SAMPLE_OFFSETS_AT] == 0u {
+        return false;
+    }
+    let offsets = table[SAMPLE_OFFSETS_AT] + v;
+    let end = table[offsets + 1u];
+    for (var i = table[offsets]; i < end; i++) {
+        let sample = table[table[SAMPLE_ENTRIES_AT] + 2u * i];
+        if loads[table[CONTACT_AT] + SAMPLE_VECTORS * sample].w != 0.0 {
+            return true;
+        }
+    }
+    return false;
+}
+
 fn begin_vertex(v: u32, fall: vec3f) {
     let stride = table[STRIDE_AT];
     let he = frame.dt * job.parameter;
@@ -46,7 +62,7 @@ fn begin_vertex(v: u32, fall: vec3f) {
     vertex_data[QN_START_VELOCITIES * stride + v] = vec4f(velocity, 0.0);
     vertex_data[QN_STAGE_START * stride + v] = vec4f(x, 0.0);
     vertex_data[PREDICTED * stride + v] = vec4f(xt, mass);
-    vertex_data[QN_BASE * stride + v] = vec4f(base, 0.0);
+    vertex_data[QN_BASE * stride + v] = vec4f(base, select(0.0, 1.0, may_touch(v)));
     // There is none where the first solve is the last.
     vertex_data[QN_FIRST * stride + v] = vec4f(x, 0.0);
     points[v] = vec4f(first, 0.0);
@@ -119,7 +135,7 @@ fn continue_vertex(v: u32, fall: vec3f, takes_trial: bool) {
     vertex_data[QN_FIRST * stride + v] = vec4f(x1, 0.0);
     vertex_data[QN_STAGE_START * stride + v] = vec4f(start, 0.0);
     vertex_data[PREDICTED * stride + v] = vec4f(xt, vertex_data_of(PREDICTED, v).w);
-    vertex_data[QN_BASE * stride + v] = vec4f(base, 0.0);
+    vertex_data[QN_BASE * stride + v] = vec4f(base, vertex_data_of(QN_BASE, v).w);
     points[v] = vec4f(first, 0.0);
 }
 

@@ -76,13 +76,14 @@ fn take_vertex(v: u32, kept: Pairs, leaves_pair: bool) {
     let y = points[v].xyz;
     let gradient = vertex_data_of(QN_TRIAL_GRADIENT, v).xyz;
     let z = preconditioned(v, gradient);
+    let base = vertex_data_of(QN_BASE, v);
     if leaves_pair {
-        pairs[pair_at(kept.newest, STEP, v)] = vec4f(y - vertex_data_of(QN_BASE, v).xyz, 0.0);
+        pairs[pair_at(kept.newest, STEP, v)] = vec4f(y - base.xyz, 0.0);
         pairs[pair_at(kept.newest, CHANGE, v)] =
             vec4f(gradient - vertex_data_of(QN_GRADIENT, v).xyz, 0.0);
         pairs[pair_at(kept.newest, IMAGE, v)] = vec4f(z - vertex_data_of(QN_Z, v).xyz, 0.0);
     }
-    vertex_data[QN_BASE * stride + v] = vec4f(y, 0.0);
+    vertex_data[QN_BASE * stride + v] = vec4f(y, base.w);
     vertex_data[QN_GRADIENT * stride + v] = vec4f(gradient, 0.0);
     vertex_data[QN_Z * stride + v] = vec4f(z, 0.0);
 }

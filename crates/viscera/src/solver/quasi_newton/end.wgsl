@@ -28,6 +28,12 @@ const END_MOMENTUM: u32 = 24u;
 const END_SHIFT: u32 = 30u;
 // The velocities of the part's first vertex [m/s], which everything relative is relative to.
 const END_FIRST: u32 = 36u;
+// Of samples: energy [J] that tools add by moving into tissue that stands still; their work [J] by the forces at the start of the
+// step, and at the ends of the last and the first solve; how many are near.
+const END_LIFTED: u32 = 42u;
+const END_WORK_BEFORE: u32 = 43u;
+const END_WORK_AFTER: u32 = 44u;
+const END_NEAR: u32 = 46u;
 
 var<workgroup> is_trusted: u32;
 var<workgroup> both: array<f32, 48>;
@@ -209,7 +215,12 @@ fn measure_end(
         }
     } else {
         for (var i = table[row + PIECE_FIRST] + local; i < table[row + PIECE_END]; i += THREADS) {
-            add_element_end(member(i), is_trial, &sums);
+            let element = member(i);
+            if element >= table[FIRST_SAMPLE_AT] {
+                add_sample_end(element - table[FIRST_SAMPLE_AT], is_trial, &sums, &more);
+            } else {
+                add_element_end(element, is_trial, &sums);
+            }
         }
     }
     reduce(sums, SUMS / 8u, 0u, local);
@@ -237,6 +248,11 @@ fn sum_at(sum: u32) -> vec3f {
     return vec3f(both[sum], both[sum + 1u], both[sum + 2u]);
 }
 
+// Whether anything can stop the centre of mass: a tool can, too.
+fn is_held() -> bool {
+    return both[END_HELD] > 0.0 || both[END_NEAR] > 0.0 || !(both[END_MASS] > 0.0);
+}
+
 // Kinetic energy [J] that is left to a solve, that which it has, and what round-off can pretend.
 struct Balance {
     given: f32,
@@ -249,7 +265,7 @@ fn balance_of(k: u32) -> Balance {
     var given = both[END_KINETIC_START] + both[END_WORK + k] - stored;
     var kinetic = both[END_KINETIC + k];
     let size = both[END_SIZE + k] + both[END_KINETIC_START] + abs(both[END_WORK + k]);
-    if both[END_HELD] == 0.0 && both[END_MASS] > 0.0 {
+    if !is_held() {
         let inverse = 1.0 / both[END_MASS];
         let before = sum_at(END_MOMENTUM_START);
         let after = sum_at(END_MOMENTUM + 3u * k);
@@ -257,6 +273,13 @@ fn balance_of(k: u32) -> Balance {
         given = both[END_RELATIVE_START] - 0.5 * inverse * dot(before, before);
         given += both[END_RELATIVE_WORK + k] - inverse * dot(sum_at(END_LOAD), sum_at(END_SHIFT + 3u * k));
         given -= stored;
+    }
+    if both[END_NEAR] > 0.0 {
+        // Tools move while the tissue stands: that bound charges the overlap that they make. The other charges what they say
+        // that they do, and only forbids to gain.
+        let after = both[END_WORK_AFTER + k];
+        let work = max(after, 0.5 * (both[END_WORK_BEFORE] + after));
+        given = min(given, max(given - both[END_LIFTED] + work, both[END_KINETIC_START]));
     }
     return Balance(given, kinetic, 8.0 * EPSILON * size);
 }
@@ -277,7 +300,7 @@ fn choose_end() -> End {
         }
     }
     var drift = vec3f();
-    if both[END_HELD] == 0.0 && both[END_MASS] > 0.0 {
+    if !is_held() {
         drift = sum_at(END_FIRST + 3u * k) + sum_at(END_MOMENTUM + 3u * k) * (1.0 / both[END_MASS]);
     }
     var share = 1.0;

@@ -93,6 +93,8 @@ fn evaluate_elements(
             change = squared * evaluate_recovered(element / LANES, element % LANES);
         } else if element < tet_lanes {
             change = squared * evaluate_tet(element / LANES, element % LANES);
+        } else if element >= table[FIRST_SAMPLE_AT] {
+            change = squared * evaluate_sample(element - table[FIRST_SAMPLE_AT]);
         } else {
             change = squared * evaluate_element(element_row(element - tet_lanes));
         }
@@ -136,8 +138,12 @@ fn evaluate_vertices(
         if vertex_data_of(EXTERNAL_FORCES, v).w != 0.0 {
             let predicted = vertex_data_of(PREDICTED, v);
             let away = y - predicted.xyz;
-            let way = y - vertex_data_of(QN_BASE, v).xyz;
+            let base = vertex_data_of(QN_BASE, v);
+            let way = y - base.xyz;
             gradient = away * predicted.w - (gather(v).xyz + recovered_force(v));
+            if base.w != 0.0 {
+                gradient -= contact_force(v);
+            }
             let change = predicted.w * dot(way, away - way * 0.5);
             sums[SUM_CHANGE] += change;
             sums[SUM_SIZE] += abs(change);

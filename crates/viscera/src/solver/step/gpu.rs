@@ -5,6 +5,7 @@
 //! that a stage has nothing to do for pay a look at their record. Of a step that passes, the search is six dispatches
 //! that do nothing.
 
+use super::contacts::on_device::{MOST_TOOLS, Samples};
 use super::modes::*;
 use super::stage::{GuardStage, StepStage};
 use crate::settings::Start;
@@ -18,8 +19,21 @@ impl Recorder<'_> {
         match stage {
             // The state lives on the device.
             StepStage::ReadState | StepStage::WriteState => {}
-            // Inputs with tools are refused.
-            StepStage::FindContacts | StepStage::EndContacts => {}
+            StepStage::FindContacts => {
+                let dispatch = |samples: Samples| {
+                    let job = Job { count: samples.count, ..Job::default() };
+                    self.threads(&kernels::FIND_CONTACTS, job)
+                };
+                into.extend(self.samples.map(dispatch));
+            }
+            StepStage::EndContacts => {
+                if let Some(Samples { count, groups }) = self.samples {
+                    let of = |count: u32| Job { count, ..Job::default() };
+                    into.push(self.threads(&kernels::END_CONTACTS, of(count)));
+                    let dispatch = self.threads(&kernels::REPORT_TOOLS, of(groups));
+                    into.push(Dispatch { groups: MOST_TOOLS as u32, ..dispatch });
+                }
+            }
             StepStage::MeasureStrain => self.each_set(&kernels::MEASURE_STRAIN, into),
             StepStage::Predict { start, is_kept } => self.predict(start, is_kept, into),
             StepStage::UpdateVelocities => into.push(self.vertices(&kernels::UPDATE_VELOCITIES, 0)),

@@ -7,6 +7,7 @@ mod held;
 mod inside;
 mod meshes;
 mod motion;
+mod on_device;
 mod organs;
 mod passes;
 mod refused;

@@ -15,6 +15,7 @@ use crate::solver::gpu::record::Dispatch;
 use crate::solver::gpu::slots::{Slot, unknowns_size};
 use crate::solver::quasi_newton::on_device::DeviceLevels;
 use crate::solver::quasi_newton::tables::{ENTRY_WORDS, GROUP_ENTRY_WORDS, Header, OF_VERTEX};
+use crate::solver::step::contacts::on_device::Samples;
 use crate::solver::step::recovered::on_device::{Extent, ring_entries};
 use crate::solver::step::strain::is_recovered;
 
@@ -267,6 +268,9 @@ impl<'a> Counts<'a> {
             Count::AverageByVertexPiece => self.recovered.averages * of_pieces(&|_, v| v),
             Count::JobPiece | Count::JobCluster => f64::from(dispatch.job.count),
             Count::JobClusterVertex => self.of_clusters(dispatch).map(f64::from).sum(),
+            Count::Sample => layout.samples.len() as f64,
+            Count::SampleCorner => 4.0 * layout.samples.len() as f64,
+            Count::SampleGroup => Samples::new(layout).map_or(0.0, |all| f64::from(all.groups)),
             Count::PieceTet
             | Count::PieceRecoveredTet
             | Count::PieceRecoveredCorner

@@ -50,7 +50,9 @@ impl Recorded {
         let first = (multipliers_start(layout.vertex_count()) / 4) as u32;
         let vector = [(unknowns_size(layout) / 4) as u32, first];
         let of_levels = levels.as_ref().map(|(levels, _)| levels);
-        let recorder = Recorder::new(layout, settings, vector, on_device.pieces(), of_levels);
+        let pieces = on_device.pieces();
+        let samples = on_device.samples;
+        let recorder = Recorder::new(layout, settings, vector, pieces, of_levels, samples);
         Self { record: recorder.record(&plan), plan, on_device, levels }
     }
 }

@@ -6,6 +6,8 @@ table! {
     BEGIN_SOLVES, 50 each Vertex: [
         r(Points, ROW, Vertex),
         w(Points, ROW, Vertex),
+        // Whether samples of a vertex may touch anything.
+        r(Loads, WORD, Never),
         r(VertexData, 5 * ROW, Vertex),
         w(VertexData, 6 * ROW, Vertex),
         r(Table, PIECE, VertexPiece),
@@ -140,6 +142,8 @@ table! {
         r(Tets, TET, Tet),
         r(Points, ROW, Vertex).by(Corner),
         again(Points, ROW, Vertex),
+        // Of samples that tools are near.
+        r(Loads, ROW, Never),
         r(PartialSums, OF_END, VertexPiece).by(PieceByVertexPiece),
         w(PartialSums, 2 * SUMS, Piece),
         r(VertexData, 5 * ROW, Vertex).by(Corner),
@@ -238,6 +242,7 @@ table! {
         r(Tets, TET, PieceTet),
         r(Points, ROW, PieceVertex),
         r(Points, ROW, Vertex).by(PieceCorner),
+        r(Loads, ROW, Never),
         r(PartialSums, OF_END, VertexPiece).by(PieceByVertexPiece),
         w(PartialSums, 2 * SUMS, JobPiece),
         r(VertexData, 8 * ROW, PieceVertex),
@@ -281,5 +286,25 @@ table! {
         r(Table, PIECE, VertexPiece),
         r(Recovery, ROW, Average).by(AverageByVertexPiece),
         r(Progress, STATE, Part).by(VertexPiece),
+    ];
+    // Of a surface that nothing touches: where samples are, that none of their slots is in use, and sums.
+    FIND_CONTACTS, 60 each Sample: [
+        r(Points, ROW, Vertex).by(SampleCorner),
+        r(Loads, ROW, Sample),
+        w(Loads, ROW, Sample),
+        r(VertexData, ROW, Vertex).by(SampleCorner),
+        r(Table, 9 * WORD, Sample),
+    ];
+    END_CONTACTS, 30 each Sample: [
+        r(Points, ROW, Vertex).by(SampleCorner),
+        r(Loads, ROW, Sample),
+        r(VertexData, ROW, Vertex).by(SampleCorner),
+        w(PartialSums, 4 * 16, SampleGroup),
+        r(Table, 9 * WORD, Sample),
+    ];
+    REPORT_TOOLS, 16 each SampleGroup: [
+        r(PartialSums, 4 * 16, SampleGroup),
+        w(PartialSums, 4 * 16, Part),
+        r(Table, WORD, Never),
     ];
 }

@@ -102,6 +102,10 @@ pub enum Count {
     PieceElement,
     PieceVertex,
     JobPiece,
+    /// Samples of the surface, their corners, and workgroups that sum their forces.
+    Sample,
+    SampleCorner,
+    SampleGroup,
     /// Vertices of clusters of tetrahedra.
     JobClusterVertex,
     JobCluster,

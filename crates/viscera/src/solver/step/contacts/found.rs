@@ -105,12 +105,9 @@ impl Contacts {
         self.poses.extend(tools.iter().map(|tool| tool.pose));
         self.starts.clear();
         self.jumped.clear();
-        for (number, tool) in tools.iter().enumerate() {
-            let before = kept.poses.get(number).unwrap_or(&tool.pose);
-            let way = (tool.pose.translation - before.translation).length();
-            let has_jumped = tool.jumps(way, step.dt);
+        for (start, has_jumped) in starts(tools, &kept.poses, step.dt) {
             self.jumped.push(has_jumped);
-            self.starts.push(if has_jumped { tool.pose } else { *before });
+            self.starts.push(start);
         }
     }
 
@@ -156,6 +153,20 @@ impl Contacts {
             }
         }
     }
+}
+
+/// Where tools begin a step of `dt` [s], and whether they were put elsewhere; `poses` are those before it.
+pub fn starts<'a>(
+    tools: &'a [Tool],
+    poses: &'a [RigidTransform],
+    dt: f64,
+) -> impl Iterator<Item = (RigidTransform, bool)> + 'a {
+    tools.iter().enumerate().map(move |(number, tool)| {
+        let before = poses.get(number).unwrap_or(&tool.pose);
+        let way = (tool.pose.translation - before.translation).length();
+        let has_jumped = tool.jumps(way, dt);
+        (if has_jumped { tool.pose } else { *before }, has_jumped)
+    })
 }
 
 /// A range cut where blocks of samples end.

@@ -15,6 +15,8 @@ mod explicit;
 mod far;
 mod found;
 mod of_vertices;
+#[cfg(feature = "gpu")]
+pub mod on_device;
 mod pairs;
 
 use std::ops::Range;

@@ -1,0 +1,104 @@
+//! Contact with tools on the device: what the host sends of them, and takes back.
+
+use super::buffers::Buffers;
+use super::error::GpuError;
+use super::reading::read;
+use super::slots::Slot;
+use super::solver::GpuSolver;
+use crate::contact::{METHOD_ON_DEVICE, Tool, Wrench, beyond_devices};
+use crate::layout::Layout;
+use crate::model::Model;
+use crate::scalar::vec3;
+use crate::settings::Method;
+use crate::solver::error::StepError;
+use crate::solver::step::contacts::on_device::{DeviceTools, IS_THERE, ToolRecords};
+use crate::state::{ContactState, State};
+
+/// Tools on a device.
+#[derive(Debug)]
+pub(super) struct OfTools {
+    /// What kernels know of them.
+    pub buffer: wgpu::Buffer,
+    pub all: DeviceTools,
+    /// At the end of the last step that was read.
+    pub wrenches: Vec<Wrench>,
+}
+
+impl OfTools {
+    pub fn new(buffer: wgpu::Buffer) -> Self {
+        Self { buffer, all: DeviceTools::default(), wrenches: Vec::new() }
+    }
+
+    /// Vectors of samples of which a state has kept something, and poses.
+    pub fn put(
+        &mut self,
+        (buffers, queue): (&Buffers, &wgpu::Queue),
+        layout: &Layout<f32>,
+        contact: &ContactState,
+    ) {
+        self.all.put(contact);
+        self.wrenches.clear();
+        let [_, size] = buffers.span(Slot::Contact);
+        let rows = DeviceTools::rows(layout, &contact.touches);
+        if size_of_val(&rows[..]) as u64 == size {
+            buffers.write(queue, Slot::Contact, bytemuck::cast_slice(&rows));
+        }
+    }
+}
+
+/// Why a device cannot compute contact with these tools.
+fn refuses(method: Method, tools: &[Tool]) -> Option<&'static str> {
+    if !IS_THERE {
+        return Some("contact with tools was left out of this build; use `device = \"auto\"`");
+    }
+    if method != Method::QuasiNewton {
+        return Some(METHOD_ON_DEVICE);
+    }
+    beyond_devices(tools.iter().map(|tool| (&tool.shape, tool.held.is_some())))
+}
+
+impl GpuSolver {
+    /// Forces on the tools at the end of the last step that was read by [`GpuSolver::read_frame`] or what is like it; empty
+    /// before.
+    pub fn wrenches(&self) -> &[Wrench] {
+        &self.tools.wrenches
+    }
+
+    /// Sends the tools of a step of `dt` [s].
+    pub(super) fn send_tools(&mut self, tools: &[Tool], dt: f64) -> Result<(), StepError> {
+        if self.samples.is_none() {
+            return match tools {
+                [] => Ok(()),
+                _ => Err(StepError::ContactOnDevice {
+                    why: refuses(self.settings.method, tools).unwrap_or("there are no samples"),
+                }),
+            };
+        }
+        if let Some(why) = refuses(self.settings.method, tools) {
+            return Err(StepError::ContactOnDevice { why });
+        }
+        let share = self.solve_share();
+        let records: ToolRecords = self.tools.all.begin(tools, dt, share);
+        self.device.queue.write_buffer(&self.tools.buffer, 0, bytemuck::bytes_of(&records));
+        Ok(())
+    }
+
+    /// Waits for the device and reads what is kept of contact with tools from step to step.
+    pub fn contact(
+        &self,
+        model: &Model<f32>,
+        state: &State<f32>,
+    ) -> Result<ContactState, GpuError> {
+        let layout = self.layout_of(model)?;
+        let poses = self.tools.all.poses().to_vec();
+        let mut contact = ContactState { poses, ..ContactState::default() };
+        if self.samples.is_some() {
+            let user = |v: usize| layout.numbering.order[v] as usize;
+            let place = |v: usize| state.positions.get(user(v)).copied().unwrap_or(vec3(0.0, 0.0, 0.0));
+            read(&self.device, &[self.whole(Slot::Contact)], |read| {
+                contact.touches = DeviceTools::touches(&layout, bytemuck::cast_slice(read[0]), place);
+            })?;
+        }
+        Ok(contact)
+    }
+}
