@@ -161,7 +161,8 @@ kernels! {
     SEARCH = Search "search" 256
         [Tets Points Loads StartStrain PartialSums Control VertexData Table];
     TAKE = Take "take" 256 [Unknowns Mapped PartialSums Control VertexData Table];
-    BEGIN_SOLVES = Begin "begin_solves" 256 [Points Loads VertexData Table Levels Progress];
+    BEGIN_SOLVES = Begin "begin_solves" 256 
+        [Points Loads VertexData Table Levels Multilevel Progress];
     BEGIN_SECOND = Begin "begin_second" 256
         [Points PartialSums VertexData Table Levels Progress];
     TURN_GROUPS = Refresh "turn_groups" 64 [VertexData Table Levels Multilevel];

@@ -29,20 +29,39 @@ fn fall_of(part: u32) -> vec3f {
     return vec3f(number(acceleration), number(acceleration + 1u), number(acceleration + 2u));
 }
 
-// Whether a sample of a vertex may touch a tool.
-fn may_touch(v: u32) -> bool {
+// Whether a sample of a vertex may touch a tool. Leaves the blocks [N/m] that contact has there, `C` of a sample with weight b:
+//   sum_s b^2 C, of the vertex alone, and sum_s b C, of the tissue around it where that moves alike
+fn begin_contact(v: u32) -> bool {
     if table[SAMPLE_OFFSETS_AT] == 0u {
         return false;
     }
+    var own: array<f32, 6>;
+    var whole: array<f32, 6>;
+    var may_touch = false;
     let offsets = table[SAMPLE_OFFSETS_AT] + v;
     let end = table[offsets + 1u];
     for (var i = table[offsets]; i < end; i++) {
-        let sample = table[table[SAMPLE_ENTRIES_AT] + 2u * i];
-        if loads[table[CONTACT_AT] + SAMPLE_VECTORS * sample].w != 0.0 {
-            return true;
+        let entry = table[SAMPLE_ENTRIES_AT] + 2u * i;
+        let at = table[CONTACT_AT] + SAMPLE_VECTORS * table[entry];
+        if loads[at].w == 0.0 {
+            continue;
+        }
+        may_touch = true;
+        let weight = abs(number(entry + 1u));
+        let a = loads[at + 1u];
+        let b = loads[at + 2u];
+        let block = array<f32, 6>(a.x, a.y, a.z, a.w, b.x, b.y);
+        for (var k = 0u; k < 6u; k++) {
+            own[k] += weight * weight * block[k];
+            whole[k] += weight * block[k];
         }
     }
-    return false;
+    let into = levels[LEVELS_CONTACT] + CONTACT_NUMBERS * v;
+    for (var k = 0u; k < 6u; k++) {
+        multilevel[into + k] = own[k];
+        multilevel[into + 6u + k] = whole[k];
+    }
+    return may_touch;
 }
 
 fn begin_vertex(v: u32, fall: vec3f) {
@@ -62,7 +81,7 @@ fn begin_vertex(v: u32, fall: vec3f) {
     vertex_data[QN_START_VELOCITIES * stride + v] = vec4f(velocity, 0.0);
     vertex_data[QN_STAGE_START * stride + v] = vec4f(x, 0.0);
     vertex_data[PREDICTED * stride + v] = vec4f(xt, mass);
-    vertex_data[QN_BASE * stride + v] = vec4f(base, select(0.0, 1.0, may_touch(v)));
+    vertex_data[QN_BASE * stride + v] = vec4f(base, select(0.0, 1.0, begin_contact(v)));
     // There is none where the first solve is the last.
     vertex_data[QN_FIRST * stride + v] = vec4f(x, 0.0);
     points[v] = vec4f(first, 0.0);

@@ -25,7 +25,7 @@ impl Recorder<'_> {
         into: &mut Vec<Dispatch>,
     ) {
         let Some(levels) = self.levels.filter(|_| IS_THERE) else { return };
-        let Header { groups, fine, ordinary, vertices, pairs, .. } = levels.header;
+        let Header { groups, fine, ordinary, vertices, pairs, contact, .. } = levels.header;
         match stage {
             QuasiNewtonStage::Begin => {
                 into.push(self.vertices(&kernels::APPLY_UPDATES, 1));
@@ -36,7 +36,9 @@ impl Recorder<'_> {
                 // Where the tissue turns to: half a step ahead, or a whole one.
                 let halves = if solve == Solve::Euler { 2 } else { 1 };
                 let job = Job { first: halves, ..self.job(solve) };
-                into.extend(self.shared(&kernels::TURN_GROUPS, groups, 8, job));
+                // Contact of the finest level's nodes comes behind, from a workgroup of its own on.
+                let nodes = if contact > 0 { groups.next_multiple_of(8) + fine } else { 0 };
+                into.extend(self.shared(&kernels::TURN_GROUPS, groups.max(nodes), 8, job));
                 let blocks = vertices + ordinary + pairs;
                 into.extend(self.shared(&kernels::SUM_BLOCKS, blocks, 8, self.job(solve)));
                 if pairs > 0 {

@@ -20,6 +20,11 @@ pub fn share(settings: &SolverSettings) -> f64 {
     }
 }
 
+/// How far ahead of the start of a step the preconditioner turns to, as a share of it.
+pub fn ahead(settings: &SolverSettings) -> f64 {
+    if settings.integrator == Integrator::Sdirk2 { 0.5 } else { 1.0 }
+}
+
 /// The first solve of a step.
 pub fn first_solve(settings: &SolverSettings) -> Solve {
     match settings.integrator {

@@ -12,6 +12,7 @@ use crate::settings::Start;
 use crate::solver::gpu::kernels::{self, Kernel};
 use crate::solver::gpu::record::{Dispatch, Recorder};
 use crate::solver::gpu::uniforms::Job;
+use crate::solver::quasi_newton::on_device::ahead;
 
 impl Recorder<'_> {
     /// Writes a stage down.
@@ -21,7 +22,9 @@ impl Recorder<'_> {
             StepStage::ReadState | StepStage::WriteState => {}
             StepStage::FindContacts => {
                 let dispatch = |samples: Samples| {
-                    let job = Job { count: samples.count, ..Job::default() };
+                    // Where the preconditioner turns to.
+                    let parameter = ahead(self.settings) as f32;
+                    let job = Job { count: samples.count, parameter, ..Job::default() };
                     self.threads(&kernels::FIND_CONTACTS, job)
                 };
                 into.extend(self.samples.map(dispatch));

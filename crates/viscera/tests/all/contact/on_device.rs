@@ -96,7 +96,7 @@ fn steps_follow_the_processors() {
         (Integrator::ImplicitEuler, Elements::Plain),
         (Integrator::Sdirk2, Elements::Recovered),
     ] {
-        let many = SolverSettings { iterations: Count::Of(40), ..settings(integrator, elements) };
+        let many = SolverSettings { iterations: Count::Of(std::env::var("IT").map_or(40, |t| t.parse().unwrap())), ..settings(integrator, elements) };
         let mut cpu = scene::<f64>(&many);
         let mut single = scene::<f32>(&many);
         let mut gpu = OnDevice::new(&single);

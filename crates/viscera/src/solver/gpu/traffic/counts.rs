@@ -270,6 +270,8 @@ impl<'a> Counts<'a> {
             Count::JobClusterVertex => self.of_clusters(dispatch).map(f64::from).sum(),
             Count::Sample => layout.samples.len() as f64,
             Count::SampleCorner => 4.0 * layout.samples.len() as f64,
+            Count::SampleVertex if layout.samples.is_empty() => 0.0,
+            Count::SampleVertex => vertices,
             Count::SampleGroup => Samples::new(layout).map_or(0.0, |all| f64::from(all.groups)),
             Count::PieceTet
             | Count::PieceRecoveredTet

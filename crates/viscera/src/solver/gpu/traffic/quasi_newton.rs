@@ -7,11 +7,13 @@ table! {
         r(Points, ROW, Vertex),
         w(Points, ROW, Vertex),
         // Whether samples of a vertex may touch anything.
-        r(Loads, WORD, Never),
+        r(Loads, WORD, Sample),
         r(VertexData, 5 * ROW, Vertex),
         w(VertexData, 6 * ROW, Vertex),
         r(Table, PIECE, VertexPiece),
+        r(Table, 2 * WORD, SampleCorner),
         r(Levels, LEVELS_PART, Part),
+        w(Multilevel, 48, SampleVertex),
         r(Progress, RECORD, Part),
         w(Progress, RECORD, Part),
     ];
@@ -41,7 +43,7 @@ table! {
         r(Levels, WORD, OrdinaryNode),
         r(Levels, SHARE, Share),
         r(Levels, ENTRY, Entry),
-        r(Levels, GROUP, PairRow),
+        r(Levels, 7 * WORD, PairRow),
         again(Levels, WEIGHT, Entry),
         // `A` and the factor of a turn; for dense pairs `R` as well.
         r(Multilevel, 40, TetGroup).by(Share),

@@ -105,6 +105,8 @@ pub enum Count {
     /// Samples of the surface, their corners, and workgroups that sum their forces.
     Sample,
     SampleCorner,
+    /// A vertex, where there are samples.
+    SampleVertex,
     SampleGroup,
     /// Vertices of clusters of tetrahedra.
     JobClusterVertex,

@@ -2,6 +2,8 @@
 //
 //   turns    R, A and 1 + eta/he of every group, from F = sum_j x_j b_j^T at x + tau v
 //   blocks   D = (m + he^2 k) I + he^2 sum_groups (1 + eta/he) (t I + A B A^T), inverted; pairs of dense nodes
+//            contact adds sum_v w_v^2 K_v to a node that vertices hang on with weights w_v, `K_v` of vertices where the tissue around
+//            moves alike; coarser ones the same of the finest level's, K_f = sum_v w_v K_v
 //   invert   the dense levels: the sweep operator on the lower triangle
 //
 // `job.parameter`: he over the step. A turn is 20 numbers: `R` and `A` by columns, the factor, nothing.
@@ -43,6 +45,16 @@ fn unit(v: vec3f, otherwise: vec3f) -> vec3f {
     return select(otherwise, v * inverseSqrt(select(1.0, squared, is_some)), is_some);
 }
 
+var<workgroup> answer: u32;
+
+// The first thread's answer, for all threads.
+fn workgroup_is(yes: bool, local: u32) -> bool {
+    if local == 0u {
+        answer = select(0u, 1u, yes);
+    }
+    return workgroupUniformLoad(&answer) != 0u;
+}
+
 // The rotation nearest to the first two columns of `f`.
 fn first_rotation(f: mat3x3f) -> mat3x3f {
     let a = unit(f[0], vec3f(1.0, 0.0, 0.0));
@@ -75,16 +87,122 @@ fn rotation_of(f: mat3x3f) -> mat3x3f {
     return first_rotation(r);
 }
 
-// Groups of tetrahedra, eight threads each. `job.first`: how far ahead of the start of the step they turn, in halves of it.
+// Contact of a vertex or a node of the finest level: `at` of its own block, then of all around it.
+fn contact_numbers(thing: u32) -> u32 {
+    return levels[LEVELS_CONTACT] + CONTACT_NUMBERS * thing;
+}
+
+fn contact_of(source: u32) -> u32 {
+    let is_vertex = (source & OF_VERTEX) != 0u;
+    return contact_numbers(select(levels[LEVELS_VERTICES] + source, source & ~OF_VERTEX, is_vertex)) + 6u;
+}
+
+// What vertices give to a node of the finest level.
+fn spread_contact(node: u32, is_one: bool, local: u32) {
+    var own: array<f32, 9>;
+    var whole: array<f32, 9>;
+    let offsets = levels[LEVELS_CHILD_OFFSETS] + node;
+    for (var i = levels[offsets] + local % SHARING; is_one && i < levels[offsets + 1u]; i += SHARING) {
+        let at = levels[LEVELS_CHILDREN] + 2u * i;
+        let weight = levels_number(at + 1u);
+        let block = contact_of(levels[at]);
+        for (var k = 0u; k < 6u; k++) {
+            own[k] += weight * weight * multilevel[block + k];
+            whole[k] += weight * multilevel[block + k];
+        }
+    }
+    own = share_sums(own, local);
+    whole = share_sums(whole, local);
+    if is_one && local % SHARING == 0u {
+        let into = contact_numbers(levels[LEVELS_VERTICES] + node);
+        for (var k = 0u; k < 6u; k++) {
+            multilevel[into + k] = own[k];
+            multilevel[into + 6u + k] = whole[k];
+        }
+    }
+}
+
+// Of a vertex or an ordinary node, into sums as `add_shares` has them.
+fn add_contact(item: u32, local: u32, sums: ptr<function, array<f32, 9>>) {
+    let vertices = levels[LEVELS_VERTICES];
+    if item < vertices + levels[LEVELS_FINE] {
+        for (var k = 0u; k < 6u && local % SHARING == 0u; k++) {
+            (*sums)[k] += multilevel[contact_numbers(item) + k];
+        }
+        return;
+    }
+    let offsets = levels[LEVELS_CHILD_OFFSETS] + item - vertices;
+    for (var i = levels[offsets] + local % SHARING; i < levels[offsets + 1u]; i += SHARING) {
+        let at = levels[LEVELS_CHILDREN] + 2u * i;
+        let weight = levels_number(at + 1u);
+        let block = contact_of(levels[at]);
+        for (var k = 0u; k < 6u; k++) {
+            (*sums)[k] += weight * weight * multilevel[block + k];
+        }
+    }
+}
+
+// The weight of a source in a node that gets its corrections.
+fn weight_in(source: u32, node: u32) -> f32 {
+    let is_vertex = (source & OF_VERTEX) != 0u;
+    let rows = select(levels[LEVELS_UP_OFFSETS] + source, levels[LEVELS_PARENT_OFFSETS] + (source & ~OF_VERTEX), is_vertex);
+    let entries = select(levels[LEVELS_UPS], levels[LEVELS_PARENTS], is_vertex);
+    for (var i = levels[rows]; i < levels[rows + 1u]; i++) {
+        if levels[entries + 2u * i] == node {
+            return levels_number(entries + 2u * i + 1u);
+        }
+    }
+    return 0.0;
+}
+
+// Of a pair of dense nodes, by columns.
+fn add_contact_of_pair(row: u32, local: u32, sums: ptr<function, array<f32, 9>>) {
+    let first = levels[row + 6u];
+    let a = first + (levels[row + 1u] >> 16u);
+    let b = first + (levels[row + 1u] & 0xffffu);
+    let offsets = levels[LEVELS_CHILD_OFFSETS] + a;
+    for (var i = levels[offsets] + local % SHARING; i < levels[offsets + 1u]; i += SHARING) {
+        let at = levels[LEVELS_CHILDREN] + 2u * i;
+        let block = contact_of(levels[at]);
+        let trace = multilevel[block] + multilevel[block + 1u] + multilevel[block + 2u];
+        if trace == 0.0 {
+            continue;
+        }
+        let weight = levels_number(at + 1u) * weight_in(levels[at], b);
+        let d = vector_at(block) * weight;
+        let m = vector_at(block + 3u) * weight;
+        (*sums)[0] += d.x;
+        (*sums)[1] += m.z;
+        (*sums)[2] += m.y;
+        (*sums)[3] += m.z;
+        (*sums)[4] += d.y;
+        (*sums)[5] += m.x;
+        (*sums)[6] += m.y;
+        (*sums)[7] += m.x;
+        (*sums)[8] += d.z;
+    }
+}
+
+// Groups of tetrahedra, eight threads each; behind them nodes of the finest level, where there is contact. `job.first`: how far ahead of the start of the step they turn, in halves of it.
 @compute @workgroup_size(64)
 fn turn_groups(
     @builtin(local_invocation_index) local: u32,
     @builtin(workgroup_id) workgroup: vec3u,
     @builtin(num_workgroups) groups: vec3u,
 ) {
-    let group = (workgroup.x + workgroup.y * groups.x) * SHARED + local / SHARING;
-    let is_one = group < job.count;
-    let row = levels[LEVELS_GROUP_ROWS] + GROUP_WORDS * min(group, job.count - 1u);
+    let first_group = (workgroup.x + workgroup.y * groups.x) * SHARED;
+    let count = levels[LEVELS_GROUPS];
+    // Nodes begin with a workgroup of their own.
+    let first_node = (count + SHARED - 1u) / SHARED * SHARED;
+    let group = first_group + local / SHARING;
+    if workgroup_is(first_group >= first_node, local) {
+        let node = group - first_node;
+        let is_node = node < levels[LEVELS_FINE];
+        spread_contact(min(node, levels[LEVELS_FINE] - 1u), is_node, local);
+        return;
+    }
+    let is_one = group < count;
+    let row = levels[LEVELS_GROUP_ROWS] + GROUP_WORDS * min(group, count - 1u);
     let first = levels[row + 4u];
     let end = select(first, levels[row + 5u], is_one);
     let stride = table[STRIDE_AT];
@@ -226,10 +344,17 @@ fn sum_blocks(
     let items = vertices + levels[LEVELS_ORDINARY];
     let row = levels[LEVELS_PAIR_ROWS] + PAIR_WORDS * (thing - items);
     var sums: array<f32, 9>;
+    let touches = levels[LEVELS_CONTACT] != 0u;
     if thing < items {
         sums = add_shares(thing, local);
+        if touches {
+            add_contact(thing, local, &sums);
+        }
     } else if thing < job.count {
         sums = add_entries(row, local);
+        if touches {
+            add_contact_of_pair(row, local, &sums);
+        }
     }
     let all = share_sums(sums, local);
     if thing >= job.count || local % SHARING != 0u {

@@ -30,11 +30,14 @@ pub const SHARE_WORDS: usize = 8;
 pub const ENTRY_WORDS: usize = 10;
 pub const GROUP_WORDS: usize = 6;
 pub const GROUP_ENTRY_WORDS: usize = 4;
-pub const PAIR_WORDS: usize = 6;
+pub const PAIR_WORDS: usize = 7;
 pub const LEVEL_PART_WORDS: usize = 5;
 
 /// Numbers of the turn of a group: `R`, `A`, and the factor of viscosity.
 pub const TURN_NUMBERS: usize = 20;
+
+/// Numbers of what contact gives to a vertex or a node of the finest level: to itself, and to all around that moves alike.
+pub const CONTACT_NUMBERS: usize = 12;
 
 /// Where everything stands: the first words of the table; places of numbers are those of the other buffer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -71,6 +74,8 @@ pub struct Header {
     pub turns: u32,
     pub residuals: u32,
     pub corrections: u32,
+    /// Of contact, for vertices and then nodes of the finest level; zero where there are no samples of the surface.
+    pub contact: u32,
 }
 
 /// The tables of a model.
@@ -164,7 +169,7 @@ impl Tables {
         for (part, choice) in parts.into_iter().zip(choices) {
             builder.add(&part, choice);
         }
-        builder.finish()
+        builder.finish(!layout.samples.is_empty())
     }
 }
 
@@ -200,7 +205,7 @@ impl Builder {
         }
         let row = [dense, part.dense_count() as u32, self.dense_numbers];
         self.parts.push([row[0], row[1], row[2], choice.passes, choice.history as u32]);
-        self.add_dense(part, first_group);
+        self.add_dense(part, first_group, dense);
         self.add_groups(&part.of_part.groups, &part.of_part.full, first_vertex, part.has_dense);
     }
 
@@ -284,7 +289,7 @@ impl Builder {
     }
 
     /// The pairs of a dense level, the first node not below the second.
-    fn add_dense(&mut self, part: &Exported, first_group: u32) {
+    fn add_dense(&mut self, part: &Exported, first_group: u32, first_node: u32) {
         let count = part.dense_count();
         let OfPart { full, lattice, groups, .. } = &part.of_part;
         let place = |[a, b]: [u32; 2]| (a * (a + 1) / 2 + b) as usize;
@@ -317,7 +322,8 @@ impl Builder {
                     [&masses, &stiffnesses].map(|of| (of[place([a, b])] as f32).to_bits());
                 let end = self.entries.len() as u32;
                 let at = self.dense_numbers;
-                self.pairs.push([at, a << 16 | b, constants[0], constants[1], first, end]);
+                let pair = a << 16 | b;
+                self.pairs.push([at, pair, constants[0], constants[1], first, end, first_node]);
             }
         }
         let size = 3 * count as u32;
@@ -347,7 +353,7 @@ impl Builder {
         }
     }
 
-    fn finish(self) -> Tables {
+    fn finish(self, has_contact: bool) -> Tables {
         let Self { mut header, .. } = self;
         let mut words = vec![0; size_of::<Header>() / 4];
         let mut add = |new: &[u32]| {
@@ -395,6 +401,9 @@ impl Builder {
         header.turns = room(TURN_NUMBERS as u32 * header.groups);
         header.residuals = room(4 * header.nodes);
         header.corrections = room(4 * header.nodes);
+        if has_contact {
+            header.contact = room(CONTACT_NUMBERS as u32 * (header.vertices + header.fine));
+        }
         words[..size_of::<Header>() / 4].copy_from_slice(bytemuck::cast_slice(&[header]));
         Tables { header, words, numbers: numbers.into() }
     }
@@ -416,7 +425,7 @@ pub fn words() -> Vec<(&'static str, u32)> {
         "LEVELS_PAIR_ROWS" pair_rows "LEVELS_ENTRIES" entries "LEVELS_GROUP_ROWS" group_rows
         "LEVELS_GROUP_ENTRIES" group_entries "LEVELS_PART_ROWS" part_rows "LEVELS_INVERSES" inverses
         "LEVELS_DENSE" dense "LEVELS_TURNS" turns "LEVELS_RESIDUALS" residuals
-        "LEVELS_CORRECTIONS" corrections
+        "LEVELS_CORRECTIONS" corrections "LEVELS_CONTACT" contact
     );
     all.extend([
         ("OF_VERTEX", OF_VERTEX),
@@ -427,6 +436,7 @@ pub fn words() -> Vec<(&'static str, u32)> {
         ("PAIR_WORDS", PAIR_WORDS as u32),
         ("LEVEL_PART_WORDS", LEVEL_PART_WORDS as u32),
         ("TURN_NUMBERS", TURN_NUMBERS as u32),
+        ("CONTACT_NUMBERS", CONTACT_NUMBERS as u32),
     ]);
     all
 }

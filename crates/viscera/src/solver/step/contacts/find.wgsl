@@ -115,6 +115,29 @@ fn find_tool(tool: u32, place: vec3f, velocity: vec3f, slot: u32) -> Found {
     return found;
 }
 
+// The curvature of the energy at a place where tools are at the end of the step, without what may be negative in it.
+fn add_curvature(touching: Touching, place: vec3f, direct: ptr<function, vec3f>, mixed: ptr<function, vec3f>) {
+    let tool = tool_of(touching.marks);
+    let law = tools.all[tool].law;
+    let k = touching.stiffness * law.y;
+    let met = meet(touching, AT_END, place);
+    let gap = law.z - met.distance;
+    var along = select(0.0, k, gap > 0.0);
+    along += select(0.0, (SECOND_STAGE - 1.0) * k, gap > 0.5 * law.z);
+    var across = 0.0;
+    let limit = touching.friction.w;
+    if limit > 0.0 {
+        let length = length_of(met.slip);
+        let gives_way = k * length > limit;
+        across = select(k, limit / select(1.0, length, gives_way), gives_way);
+        along += select(0.0, across, (touching.marks & IS_TIED) != 0u);
+    }
+    let n = met.normal;
+    *direct += vec3f(across) + n * n * (along - across);
+    *mixed += vec3f(n.y * n.z, n.x * n.z, n.x * n.y) * (along - across);
+}
+
+// `job.parameter`: how far ahead of the start of the step tissue is stiff, as a share of it.
 @compute @workgroup_size(64)
 fn find_contacts(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     let sample = thread_of(id, groups, 64u);
@@ -163,11 +186,19 @@ fn find_contacts(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         }
     }
     loads[at] = vec4f(0.0, 0.0, 0.0, f32(count + 8u * left_out));
+    var direct = vec3f();
+    var mixed = vec3f();
+    let ahead = place + velocity * (frame.dt * job.parameter);
     for (var i = 0u; i < count; i++) {
+        let stiffness = number(row + SAMPLE_STIFFNESS);
+        let touching = Touching(best[i].plane, best[i].friction, best[i].marks, stiffness);
+        add_curvature(touching, ahead, &direct, &mixed);
         let into = slot_vectors(at, i);
         loads[into] = best[i].plane;
         loads[into + 1u] = best[i].friction;
         loads[into + 2u] = best[i].kept;
         loads[into + 3u] = vec4f(best[i].force, f32(best[i].marks));
     }
+    loads[at + 1u] = vec4f(direct, mixed.x);
+    loads[at + 2u] = vec4f(mixed.yz, 0.0, 0.0);
 }

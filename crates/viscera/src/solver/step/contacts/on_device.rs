@@ -21,9 +21,10 @@ pub const MOST_TOOLS: usize = MOST_TOOLS_ON_DEVICES;
 /// Tools that a sample may meet in a step.
 pub const SLOTS: usize = 3;
 
-/// Vectors of a slot and of a sample, words of a sample in the table, numbers that are summed for a tool.
+/// Vectors of a slot, those before the first and all of a sample, words of a sample in the table, numbers that are summed for a tool.
 const SLOT_VECTORS: usize = 4;
-pub const SAMPLE_VECTORS: usize = 1 + SLOTS * SLOT_VECTORS;
+const FIRST_SLOT: usize = 3;
+pub const SAMPLE_VECTORS: usize = FIRST_SLOT + SLOTS * SLOT_VECTORS;
 const SAMPLE_WORDS: usize = 9;
 const TOOL_SUMS: usize = 16;
 
@@ -43,11 +44,12 @@ const IS_KEPT: u32 = 128;
 const LOCKED: f32 = 1e30;
 
 /// Names and values that kernels share.
-pub fn names() -> [(&'static str, u32); 12] {
+pub fn names() -> [(&'static str, u32); 13] {
     [
         ("MOST_TOOLS", MOST_TOOLS as u32),
         ("SLOTS", SLOTS as u32),
         ("SLOT_VECTORS", SLOT_VECTORS as u32),
+        ("FIRST_SLOT", FIRST_SLOT as u32),
         ("SAMPLE_VECTORS", SAMPLE_VECTORS as u32),
         ("SAMPLE_WORDS", SAMPLE_WORDS as u32),
         ("SAMPLE_WEIGHTS", 4),
@@ -277,7 +279,7 @@ impl DeviceTools {
             let first = touches.partition_point(|touch| key(touch) < own);
             let of_sample = touches[first..].iter().take_while(|touch| key(touch) == own);
             let mut used = 0;
-            for (touch, slot) in of_sample.zip(rows[1..].chunks_exact_mut(SLOT_VECTORS)) {
+            for (touch, slot) in of_sample.zip(rows[FIRST_SLOT..].chunks_exact_mut(SLOT_VECTORS)) {
                 let tied = if touch.is_tied { WILL_BE_TIED } else { 0 };
                 let marks = touch.tool | HAS_PLANE | IS_KEPT | tied;
                 slot[0] = with(touch.normal, touch.offset as f32);
@@ -304,7 +306,7 @@ struct Slot {
 /// The slots that a sample uses.
 fn slots(rows: &[[f32; 4]]) -> impl Iterator<Item = Slot> {
     let used = (rows[0][3] as usize & 7).min(SLOTS);
-    rows[1..].chunks_exact(SLOT_VECTORS).take(used).map(|rows| {
+    rows[FIRST_SLOT..].chunks_exact(SLOT_VECTORS).take(used).map(|rows| {
         let marks = rows[3][3] as u32;
         let tool = marks & (MOST_TOOLS as u32 - 1);
         Slot { plane: rows[0], friction: rows[1], kept: rows[2], force: rows[3], marks, tool }

@@ -7,7 +7,8 @@
 // Changes of energies are computed from changes of distance and slip: round-off is that of the change.
 //
 // A sample has `SAMPLE_VECTORS` vectors behind the loads: its force on the tissue times he^2, in w how many slots it uses in this
-// step and, eight times, a bit for each tool that found none; then its slots, four vectors each:
+// step and, eight times, a bit for each tool that found none; the curvature of its energy [N/m] as xx, yy, zz, yz and xz, xy; then
+// its slots, four vectors each:
 //   plane of the tool's frame, offset;   anchor of friction in the step, its limit;   anchor and normal force at the end of the
 //   last step;   force [N] on the tissue then, and the tool's number with marks
 
@@ -142,7 +143,7 @@ fn contact_at(sample: u32) -> u32 {
 }
 
 fn slot_vectors(at: u32, slot: u32) -> u32 {
-    return at + 1u + SLOT_VECTORS * slot;
+    return at + FIRST_SLOT + SLOT_VECTORS * slot;
 }
 
 // Slots that a sample uses, of the fourth number of its force.
