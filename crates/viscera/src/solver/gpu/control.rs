@@ -38,6 +38,7 @@ pub struct PartControl {
     pub last_change: f32,
     pub guard: PartGuard<f32>,
     pub is_broken: u32,
+    pub pressed_step: u32,
 }
 
 // SAFETY: twelve fields of four bytes each, none of which leaves a gap, and any bits are a value of each.

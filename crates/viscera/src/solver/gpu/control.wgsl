@@ -34,4 +34,6 @@ struct PartControl {
     guard: PartGuard,
     // NaN multipliers were found.
     is_broken: atomic<u32>,
+    // The last step that began with a tool that pressed.
+    pressed_step: atomic<u32>,
 }

@@ -162,9 +162,9 @@ kernels! {
         [Tets Points Loads StartStrain PartialSums Control VertexData Table];
     TAKE = Take "take" 256 [Unknowns Mapped PartialSums Control VertexData Table];
     BEGIN_SOLVES = Begin "begin_solves" 256 
-        [Points Loads VertexData Table Levels Multilevel Progress];
+        [Points Loads Control VertexData Table Levels Multilevel Progress];
     BEGIN_SECOND = Begin "begin_second" 256
-        [Points PartialSums VertexData Table Levels Progress];
+        [Points PartialSums Control VertexData Table Levels Progress];
     TURN_GROUPS = Refresh "turn_groups" 64 [VertexData Table Levels Multilevel];
     SUM_BLOCKS = Refresh "sum_blocks" 64 [VertexData Table Levels Multilevel];
     INVERT_DENSE = Invert "invert_dense" 256 [Levels Multilevel];
@@ -197,7 +197,8 @@ kernels! {
     AVERAGE_ENDS = EndRecovered "average_ends" 256 [Table Recovery];
     END_RECOVERED_STEP = EndRecovered "end_step" 256
         [Points PartialSums Control VertexData Table Progress Recovery];
-    FIND_CONTACTS = FindContacts "find_contacts" 64 [Points Loads VertexData Table];
+    FIND_CONTACTS = FindContacts "find_contacts" 64
+        [Points Loads Control VertexData Table];
     END_CONTACTS = EndContacts "end_contacts" 256 [Points Loads PartialSums VertexData Table];
     REPORT_TOOLS = EndContacts "report_tools" 256 [PartialSums Table];
     LIMIT_VELOCITIES = Energy "limit_velocities" 256 [Points PartialSums Control VertexData Table];

@@ -45,7 +45,7 @@ pub fn host_layouts() -> Vec<HostLayout> {
         record!("Control" Control { small_step small_steps_done step rejected_step rejected parts }),
         record!("PartControl" PartControl {
             sweeps next differences last_norm shares gram iteration omega radius last_change guard
-            is_broken
+            is_broken pressed_step
         }),
         record!("PartGuard" PartGuard<f32> {
             limit was_rejected share descends potential noise kept_speed best_value failures
@@ -54,7 +54,7 @@ pub fn host_layouts() -> Vec<HostLayout> {
         record!("SolveState" SolveState {
             phase passes_left accepted ahead failures rejections calm count newest scale length slope
         }),
-        record!("PartProgress" PartProgress { states sy yw was_rejected calm takes_trial }),
+        record!("PartProgress" PartProgress { states sy yw was_rejected calm takes_trial slides }),
         record!("Tool" contact::ToolRecord { poses lengths law way turn }),
         record!("Tools" contact::ToolRecords { count all }),
         record!("Update" Update { vertex is_pinned force place stiffness inertia }),

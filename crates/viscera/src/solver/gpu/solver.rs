@@ -298,7 +298,8 @@ impl GpuSolver {
         self.write_velocities(&state.velocities);
         self.multiplier_dt = state.multiplier_dt;
         self.forget_pairs();
-        self.tools.put((&self.buffers, &self.device.queue), layout, &state.contact);
+        let into = self.samples.map(|_| (&self.buffers, &self.device.queue));
+        self.tools.put(into, layout, &state.contact);
     }
 
     /// Solves begin without what they have learned.

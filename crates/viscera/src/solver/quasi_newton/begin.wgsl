@@ -9,7 +9,7 @@
 
 // Inertial prediction [m] of a free vertex from where it starts.
 fn inertial(v: u32, start: vec3f, velocity: vec3f) -> vec3f {
-    let he = frame.dt * job.parameter;
+    let he = solve_dt();
     let squared = he * he;
     let on_vertex = vertex_data_of(EXTERNAL_FORCES, v);
     let hold = vertex_data_of(TARGETS, v);
@@ -17,6 +17,15 @@ fn inertial(v: u32, start: vec3f, velocity: vec3f) -> vec3f {
     let place = start + velocity * he;
     let pull = (hold.xyz - (place + frame.gravity * squared)) * hold.w;
     return place + (frame.gravity + (on_vertex.xyz + pull) * (1.0 / mass)) * squared;
+}
+
+// Whether nothing holds a part, but for tools, and whether a tool presses on it where the step begins.
+fn is_free(part: u32) -> bool {
+    return table[table[FALLS_AT] + FALL_WORDS * part + FALL_IS_FREE] != 0u;
+}
+
+fn is_pressed(part: u32) -> bool {
+    return atomicLoad(&control.parts[part].pressed_step) == control.step;
 }
 
 // How what nothing holds is accelerated; zero of what is held.
@@ -66,7 +75,7 @@ fn begin_contact(v: u32) -> bool {
 
 fn begin_vertex(v: u32, fall: vec3f) {
     let stride = table[STRIDE_AT];
-    let he = frame.dt * job.parameter;
+    let he = solve_dt();
     let x = points[v].xyz;
     let velocity = vertex_data_of(VELOCITIES, v).xyz;
     let mass = vertex_data_of(PREDICTED, v).w;
@@ -74,12 +83,13 @@ fn begin_vertex(v: u32, fall: vec3f) {
     var base = x;
     var first = x + velocity * he + fall * (he * he);
     if vertex_data_of(EXTERNAL_FORCES, v).w == 0.0 {
-        base = x + (vertex_data_of(TARGETS, v).xyz - x) * job.parameter;
+        base = x + (vertex_data_of(TARGETS, v).xyz - x) * own_share;
         first = base;
     }
     vertex_data[PREVIOUS * stride + v] = vec4f(x, vertex_data_of(PREVIOUS, v).w);
     vertex_data[QN_START_VELOCITIES * stride + v] = vec4f(velocity, 0.0);
-    vertex_data[QN_STAGE_START * stride + v] = vec4f(x, 0.0);
+    // Measures ask whether its solve was one for all of the step.
+    vertex_data[QN_STAGE_START * stride + v] = vec4f(x, select(0.0, 1.0, own_share == 1.0));
     vertex_data[PREDICTED * stride + v] = vec4f(xt, mass);
     vertex_data[QN_BASE * stride + v] = vec4f(base, select(0.0, 1.0, begin_contact(v)));
     // There is none where the first solve is the last.
@@ -87,7 +97,7 @@ fn begin_vertex(v: u32, fall: vec3f) {
     points[v] = vec4f(first, 0.0);
 }
 
-fn begin_record(part: u32, local: u32) {
+fn begin_record(part: u32, slides: bool, local: u32) {
     let kept = select(0u, 1u, job.set_first != 0u);
     for (var i = local; i < MOST_PRODUCTS; i += THREADS) {
         progress[part].sy[0][i] = progress[part].sy[kept][i];
@@ -102,7 +112,10 @@ fn begin_record(part: u32, local: u32) {
     let keeps = frame.rescale != 0.0 && progress[part].was_rejected == 0u;
     var state = SolveState();
     state.phase = STARTING;
-    state.passes_left = levels[row + 3u];
+    // What slides goes on through the second solve's passes.
+    progress[part].slides = select(0u, 1u, slides);
+    multilevel[levels[LEVELS_STEPS] + part] = own_share;
+    state.passes_left = levels[row + 3u] * select(1u, 2u, slides);
     state.calm = select(0u, progress[part].calm, keeps);
     state.count = select(0u, min(before.count, levels[row + 4u]), keeps);
     state.newest = before.newest;
@@ -122,10 +135,12 @@ fn begin_solves(
     }
     let row = piece_row(job.first + place);
     let part = table[row + PIECE_PART];
+    let slides = job.parameter != 1.0 && is_free(part) && is_pressed(part);
+    own_share = select(job.parameter, 1.0, slides);
     if job.first + place == table[part_row(part) + PART_VERTEX_PIECES] {
-        begin_record(part, local);
+        begin_record(part, slides, local);
     }
-    let fall = fall_of(part);
+    let fall = select(fall_of(part), vec3f(), is_pressed(part));
     for (var v = table[row + PIECE_FIRST] + local; v < table[row + PIECE_END]; v += THREADS) {
         begin_vertex(v, fall);
     }
@@ -135,7 +150,7 @@ var<workgroup> is_trusted: u32;
 
 fn continue_vertex(v: u32, fall: vec3f, takes_trial: bool) {
     let stride = table[STRIDE_AT];
-    let he = frame.dt * job.parameter;
+    let he = solve_dt();
     let d = frame.dt - he;
     let x1 = select(vertex_data_of(QN_BASE, v).xyz, points[v].xyz, takes_trial);
     let x = vertex_data_of(PREVIOUS, v).xyz;
@@ -172,6 +187,8 @@ fn begin_second(
     let piece = job.first + place;
     let row = piece_row(piece);
     let part = table[row + PIECE_PART];
+    own_share = share_of(part);
+    let slides = progress[part].slides != 0u;
     var sums: Sums;
     add_ends(part, local, &sums);
     reduce(sums, 1u, TRIAL_MAXIMA, local);
@@ -186,17 +203,22 @@ fn begin_second(
         }
         if local == 0u {
             var state = progress[part].states[0];
-            state.calm = select(0u, 1u, state.rejections == 0u);
-            state.phase = STARTING;
-            state.passes_left = levels[levels[LEVELS_PART_ROWS] + LEVEL_PART_WORDS * part + 3u];
-            state.accepted = 0u;
-            state.ahead = 0u;
-            state.failures = 0u;
-            state.rejections = 0u;
+            if !slides {
+                state.calm = select(0u, 1u, state.rejections == 0u);
+                state.phase = STARTING;
+                state.passes_left = levels[levels[LEVELS_PART_ROWS] + LEVEL_PART_WORDS * part + 3u];
+                state.accepted = 0u;
+                state.ahead = 0u;
+                state.failures = 0u;
+                state.rejections = 0u;
+            }
             progress[part].states[1] = state;
         }
     }
-    let fall = fall_of(part);
+    if slides {
+        return;
+    }
+    let fall = select(fall_of(part), vec3f(), is_pressed(part));
     for (var v = table[row + PIECE_FIRST] + local; v < table[row + PIECE_END]; v += THREADS) {
         continue_vertex(v, fall, takes_trial);
     }

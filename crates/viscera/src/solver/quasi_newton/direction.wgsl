@@ -42,6 +42,7 @@ fn take_trial(
     let piece = job.first + place;
     let row = piece_row(piece);
     let part = table[row + PIECE_PART];
+    own_share = share_of(part);
     if agree(!acts(part, older_record()), local) {
         return;
     }
@@ -151,6 +152,7 @@ fn choose_direction(
     let piece = job.first + place;
     let row = piece_row(piece);
     let part = table[row + PIECE_PART];
+    own_share = share_of(part);
     if agree(!acts(part, older_record()), local) {
         return;
     }

@@ -44,6 +44,7 @@ fn ends_at(piece: u32) -> u32 {
 
 // The part's last direction is taken where it is trusted.
 fn takes_trial(part: u32, local: u32) -> bool {
+    own_share = share_of(part);
     var sums: Sums;
     add_ends(part, local, &sums);
     reduce(sums, 1u, TRIAL_MAXIMA, local);
@@ -60,7 +61,7 @@ struct Ends {
 }
 
 fn ends_of(v: u32, is_trial: bool) -> Ends {
-    let rate = 1.0 / (frame.dt * job.parameter);
+    let rate = 1.0 / solve_dt();
     let last = select(vertex_data_of(QN_BASE, v).xyz, points[v].xyz, is_trial);
     let first = vertex_data_of(QN_FIRST, v).xyz;
     let after = (last - vertex_data_of(QN_STAGE_START, v).xyz) * rate;
@@ -151,7 +152,7 @@ fn add_vertex_end(
         (*into)[END_HELD] += 1.0;
         return;
     }
-    let he = frame.dt * job.parameter;
+    let he = solve_dt();
     let hold = vertex_data_of(TARGETS, v);
     // Springs at single vertices are taken out of the inertia again: what they store counts as work.
     let mass = max(vertex_data_of(PREDICTED, v).w - hold.w * (he * he), 0.0);
@@ -295,7 +296,7 @@ fn choose_end() -> End {
     if !is_possible(balance) {
         k = 1u;
         balance = balance_of(1u);
-        if !is_possible(balance) || job.parameter == 1.0 {
+        if !is_possible(balance) || own_share == 1.0 {
             return End(2u, 0.5, vec3f());
         }
     }
@@ -369,6 +370,11 @@ fn end_vertex(v: u32, now: End, is_trial: bool) {
     if vertex_data_of(EXTERNAL_FORCES, v).w == 0.0 {
         x = vertex_data_of(TARGETS, v).xyz;
         velocity = (x - start) * frame.inverse_dt;
+    } else if now.solve == 0u && own_share != job.parameter {
+        // Measures of forces take every solve for one of `he` of the others.
+        let shrink = job.parameter * job.parameter;
+        let predicted = vertex_data_of(PREDICTED, v);
+        vertex_data[PREDICTED * stride + v] = vec4f(x - (x - predicted.xyz) * shrink, predicted.w);
     } else if now.solve != 0u {
         // Measures of forces read what the place was to be: here inertia alone.
         vertex_data[PREDICTED * stride + v] = vec4f(x, vertex_data_of(PREDICTED, v).w);

@@ -3,7 +3,7 @@
 //   grad_i Phi(y) = m_i (y_i - xt_i) - he^2 f_i(y),   slope at y: grad Phi(y) . (y - x)
 //   Phi(y) - Phi(x) = sum_i m_i (y - x) . (x - xt + (y - x)/2) + he^2 sum_t V_t (W(F + D) - W(F)),   F + D at y
 //
-// `job.parameter`: he over the step.
+// `job.parameter`: he over the step; see `share_of`.
 
 // Of a tetrahedron: the change [J], and forces times he^2 into the places of its corners.
 fn evaluate_tet(block: u32, lane: u32) -> f32 {
@@ -80,6 +80,7 @@ fn evaluate_elements(
     }
     let row = piece_row(piece);
     let part = table[row + PIECE_PART];
+    own_share = share_of(part);
     if agree(!acts(part, newer_record()), local) {
         return;
     }
@@ -124,6 +125,7 @@ fn evaluate_vertices(
     if piece == table[part_row(part) + PART_VERTEX_PIECES] {
         copy_record(part, local);
     }
+    own_share = share_of(part);
     if agree(!acts(part, newer_record()), local) {
         return;
     }

@@ -33,12 +33,10 @@ impl Recorder<'_> {
                 // Two solves leave the record of the second.
                 begin.job.set_first = u32::from(solve == Solve::First);
                 into.push(begin);
-                // Where the tissue turns to: half a step ahead, or a whole one.
-                let halves = if solve == Solve::Euler { 2 } else { 1 };
-                let job = Job { first: halves, ..self.job(solve) };
                 // Contact of the finest level's nodes comes behind, from a workgroup of its own on.
                 let nodes = if contact > 0 { groups.next_multiple_of(8) + fine } else { 0 };
-                into.extend(self.shared(&kernels::TURN_GROUPS, groups.max(nodes), 8, job));
+                let things = groups.max(nodes);
+                into.extend(self.shared(&kernels::TURN_GROUPS, things, 8, self.job(solve)));
                 let blocks = vertices + ordinary + pairs;
                 into.extend(self.shared(&kernels::SUM_BLOCKS, blocks, 8, self.job(solve)));
                 if pairs > 0 {

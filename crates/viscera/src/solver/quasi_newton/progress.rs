@@ -35,4 +35,5 @@ pub struct PartProgress {
     pub was_rejected: u32,
     pub calm: u32,
     pub takes_trial: u32,
+    pub slides: u32,
 }

@@ -32,9 +32,22 @@ const SUM_LONGEST: u32 = 4u;
 const SUM_NEXT_LONGEST: u32 = 5u;
 const TRIAL_MAXIMA: u32 = 0x18u;
 
-// The step [s] of a solve; `job.parameter`: its share of the whole.
+// The share of the step that solves of the part at hand take: a body that lies on tools alone has one solve for all of it. The
+// second of SDIRK2's would go on from the velocity of the first, which friction has yet to answer.
+var<private> own_share: f32;
+
+fn share_of(part: u32) -> f32 {
+    return select(job.parameter, 1.0, progress[part].slides != 0u);
+}
+
+// The step [s] of a solve.
 fn solve_dt() -> f32 {
-    return frame.dt * job.parameter;
+    return frame.dt * own_share;
+}
+
+// Solves of implicit Euler: their last direction is never taken unchecked.
+fn is_checked() -> bool {
+    return (job.mode & UNCHECKED) == 0u && own_share != 1.0;
 }
 
 fn newer_record() -> u32 {
@@ -93,7 +106,7 @@ fn resolution() -> f32 {
 fn is_settled(part: u32, record: u32, step: f32) -> bool {
     let now = progress[part].states[record];
     let slope = totals[SUM_SLOPE];
-    if (job.mode & UNCHECKED) != 0u || !is_finite(slope) {
+    if !is_checked() || !is_finite(slope) {
         return false;
     }
     if now.phase == STARTING {
@@ -144,7 +157,7 @@ fn goes_on(part: u32, record: u32) -> bool {
     let now = progress[part].states[record];
     let step = now.length * sqrt(totals[SUM_LONGEST]);
     let is_ahead = now.ahead != 0u && now.accepted != 0u;
-    let is_trusted = now.rejections == 0u && now.calm != 0u && (job.mode & UNCHECKED) == 0u;
+    let is_trusted = now.rejections == 0u && now.calm != 0u && is_checked();
     return is_ahead && is_trusted && is_finite(step) && step > UNCHECKED_STEP * resolution();
 }
 

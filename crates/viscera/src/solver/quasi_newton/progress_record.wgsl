@@ -32,4 +32,6 @@ struct PartProgress {
     calm: u32,
     // At the end of a step: whether the last solve ends at its trial.
     takes_trial: u32,
+    // Whether it lies on tools alone: then its step is one of implicit Euler, whose solve goes on through both of SDIRK2's.
+    slides: u32,
 }

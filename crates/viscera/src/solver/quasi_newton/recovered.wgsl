@@ -10,6 +10,7 @@
 // Energies are counted from y, where stresses are, back to x. The last two stages are in step/recovered/forces.wgsl.
 
 fn recovered_acts(part: u32) -> bool {
+    own_share = share_of(part);
     return acts(part, newer_record());
 }
 

@@ -11,13 +11,14 @@ use super::{Block, Scene, ball, method, ramp};
 use crate::common::Random;
 
 /// A block on a plane, at rest before the plane is tilted by so many degrees about an axis in it: gravity turns instead.
-fn tilted<S: Real>(
+/// Returns the gravity at a time [s] as well.
+pub fn tilted<S: Real>(
     settings: &SolverSettings,
     substeps: u32,
     stiffness: f64,
     friction: f64,
     degrees: f64,
-) -> (Scene<S>, impl Fn(&mut Scene<S>, f64)) {
+) -> (Scene<S>, impl Fn(f64) -> Vec3<f64> + Copy) {
     let block =
         Block { cuts: 0, ..Block::new([0.02, 0.02, 0.01], [6, 6, 3], [2e4, 0.3, VISCOSITY]) };
     let mut table = Tool::new(Shape::HalfSpace);
@@ -25,13 +26,26 @@ fn tilted<S: Real>(
     table.pose.translation = vec3(0.0, 0.0, -0.95e-3);
     let inputs = Inputs { tools: vec![table], ..Inputs::default() };
     let scene = Scene::<S>::with(&block, settings, substeps, inputs);
+    let gravity = move |now: f64| {
+        let angle = degrees.to_radians() * ramp(now, 0.3, 0.6);
+        let [sine, cosine] = [libm::sin(angle), libm::cos(angle)];
+        (DOWNHILL * sine - vec3(0.0, 0.0, 1.0) * cosine) * 9.81
+    };
+    (scene, gravity)
+}
+
+/// The same, and what goes on for a time [s].
+fn tilting<S: Real>(
+    settings: &SolverSettings,
+    substeps: u32,
+    stiffness: f64,
+    friction: f64,
+    degrees: f64,
+) -> (Scene<S>, impl Fn(&mut Scene<S>, f64)) {
+    let (scene, gravity) = tilted(settings, substeps, stiffness, friction, degrees);
     let run = move |scene: &mut Scene<S>, time: f64| {
         for _ in 0..(time / scene.dt).round() as u32 {
-            let now = f64::from(scene.steps) * scene.dt;
-            let angle = degrees.to_radians() * ramp(now, 0.3, 0.6);
-            let [sine, cosine] = [libm::sin(angle), libm::cos(angle)];
-            let gravity = (DOWNHILL * sine - vec3(0.0, 0.0, 1.0) * cosine) * 9.81;
-            scene.inputs.gravity = gravity.cast();
+            scene.inputs.gravity = gravity(f64::from(scene.steps) * scene.dt).cast();
             scene.run(scene.dt, |_, _| ());
         }
     };
@@ -42,7 +56,7 @@ fn tilted<S: Real>(
 const VISCOSITY: f64 = 0.01;
 
 /// Across both edges of the block.
-const DOWNHILL: Vec3<f64> = vec3(0.6, 0.8, 0.0);
+pub const DOWNHILL: Vec3<f64> = vec3(0.6, 0.8, 0.0);
 
 fn degrees_of(friction: f64) -> f64 {
     libm::atan(friction).to_degrees()
@@ -57,7 +71,7 @@ fn holds_and_slides(
 ) {
     for friction in [0.13, 0.5, 0.8] {
         let exact = degrees_of(friction);
-        let (mut scene, run) = tilted::<f64>(settings, substeps, stiffness, friction, exact - 0.3);
+        let (mut scene, run) = tilting::<f64>(settings, substeps, stiffness, friction, exact - 0.3);
         run(&mut scene, 1.6);
         let before = scene.state.positions.clone();
         run(&mut scene, 0.5);
@@ -66,7 +80,7 @@ fn holds_and_slides(
         assert!(crept < 1e-7, "{name}, mu {friction}: {crept:e} m below the angle");
         for more in [0.3, 3.0] {
             let degrees = exact + more;
-            let (mut scene, run) = tilted::<f64>(settings, substeps, stiffness, friction, degrees);
+            let (mut scene, run) = tilting::<f64>(settings, substeps, stiffness, friction, degrees);
             let speed = |scene: &Scene<f64>| scene.mean(|s, v| s.velocities[v]).dot(DOWNHILL);
             run(&mut scene, 0.9);
             let before = speed(&scene);
@@ -102,7 +116,7 @@ fn a_block_slides_where_and_as_fast_as_it_should_by_xpbd() {
 fn a_block_slides_with_much_friction_by_explicit_steps() {
     let (settings, substeps) = method("explicit");
     let degrees = degrees_of(0.8) + 3.0;
-    let (mut scene, run) = tilted::<f32>(&settings, substeps, 10.0, 0.8, degrees);
+    let (mut scene, run) = tilting::<f32>(&settings, substeps, 10.0, 0.8, degrees);
     let speed = |scene: &Scene<f32>| scene.mean(|s, v| s.velocities[v]).dot(DOWNHILL);
     run(&mut scene, 0.8);
     let before = speed(&scene);
@@ -116,7 +130,7 @@ fn a_block_slides_with_much_friction_by_explicit_steps() {
 /// A minute on a slope of 20 degrees.
 fn crept<S: Real>(name: &str, seconds: f64) -> f64 {
     let (settings, substeps) = method(name);
-    let (mut scene, run) = tilted::<S>(&settings, substeps, 10.0, 0.5, 20.0);
+    let (mut scene, run) = tilting::<S>(&settings, substeps, 10.0, 0.5, 20.0);
     run(&mut scene, 2.0);
     let before = scene.mean(|s, v| s.positions[v]);
     run(&mut scene, seconds);

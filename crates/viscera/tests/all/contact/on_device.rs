@@ -128,3 +128,36 @@ fn steps_follow_the_processors() {
     }
     let _ = (FRAME, Vec3::<f64>::ZERO);
 }
+
+/// A block on a slope: it holds below the angle of friction, and slides as fast as it should above.
+#[test]
+fn a_block_slides_as_fast_as_it_should() {
+    use super::motion::{DOWNHILL, tilted};
+    let settings = settings(Integrator::Sdirk2, Elements::Plain);
+    let exact = libm::atan(0.5).to_degrees();
+    for more in [-0.3, 3.0] {
+        let (mut scene, gravity) = tilted::<f32>(&settings, 2, 10.0, 0.5, exact + more);
+        scene.state.contact = ContactState::of(&scene.inputs.tools);
+        let mut gpu = OnDevice::new(&scene);
+        let mut run = |scene: &mut Scene<f32>, time: f64| {
+            for _ in 0..(time / scene.dt).round() as u32 {
+                scene.inputs.gravity = gravity(f64::from(scene.steps) * scene.dt).cast();
+                scene.steps += 1;
+                gpu.gpu.step(&scene.model, &scene.inputs, scene.dt).expect("a legal step");
+            }
+            gpu.gpu.read_frame(&scene.model, &mut scene.state).expect("a device");
+            let speed = scene.mean(|s, v| s.velocities[v]).dot(DOWNHILL);
+            (scene.state.positions.clone(), speed)
+        };
+        let (_, _) = run(&mut scene, 0.9);
+        let (before, slow) = run(&mut scene, 0.2);
+        let (after, fast) = run(&mut scene, 0.5);
+        let crept = after.iter().zip(&before).map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
+        let angle = (exact + more).to_radians();
+        let wanted = 9.81 * (libm::sin(angle) - 0.5 * libm::cos(angle));
+        println!("{more}: {crept:e} m, {} of {wanted}", (fast - slow) / 0.5);
+        let mut balance = ForceBalance::default();
+        gpu.gpu.force_balance(&scene.model, &scene.state, &scene.inputs, &mut balance).expect("a balance");
+        println!("residual {:e}; {:?}", balance.relative_residual(), gpu.gpu.wrenches());
+    }
+}

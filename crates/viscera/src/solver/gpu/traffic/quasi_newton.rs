@@ -13,7 +13,9 @@ table! {
         r(Table, PIECE, VertexPiece),
         r(Table, 2 * WORD, SampleCorner),
         r(Levels, LEVELS_PART, Part),
+        r(Control, WORD, Part),
         w(Multilevel, 48, SampleVertex),
+        w(Multilevel, WORD, Part),
         r(Progress, RECORD, Part),
         w(Progress, RECORD, Part),
     ];
@@ -23,6 +25,7 @@ table! {
         r(PartialSums, OF_END, VertexPiece).by(VertexPieceByVertexPiece),
         r(VertexData, 6 * ROW, Vertex),
         w(VertexData, 4 * ROW, Vertex),
+        r(Control, WORD, Part),
         r(Table, PIECE, VertexPiece),
         r(Levels, LEVELS_PART, Part),
         r(Progress, RECORD, Part),
@@ -40,10 +43,10 @@ table! {
         r(VertexData, 2 * ROW, Vertex),
         r(Table, WORD, Never),
         r(Levels, 2 * WORD, Block),
-        r(Levels, WORD, OrdinaryNode),
+        r(Levels, 2 * WORD, OrdinaryNode),
         r(Levels, SHARE, Share),
         r(Levels, ENTRY, Entry),
-        r(Levels, 7 * WORD, PairRow),
+        r(Levels, 8 * WORD, PairRow),
         again(Levels, WEIGHT, Entry),
         // `A` and the factor of a turn; for dense pairs `R` as well.
         r(Multilevel, 40, TetGroup).by(Share),
@@ -295,7 +298,8 @@ table! {
         r(Loads, ROW, Sample),
         w(Loads, ROW, Sample),
         r(VertexData, ROW, Vertex).by(SampleCorner),
-        r(Table, 9 * WORD, Sample),
+        r(Table, 10 * WORD, Sample),
+        w(Control, WORD, Never),
     ];
     END_CONTACTS, 30 each Sample: [
         r(Points, ROW, Vertex).by(SampleCorner),

@@ -191,7 +191,7 @@ pub const LEVELS_PART: u32 = 20;
 pub const WEIGHT: u32 = 8;
 pub const SHARE: u32 = 32;
 pub const ENTRY: u32 = 40;
-pub const GROUP: u32 = 24;
+pub const GROUP: u32 = 28;
 pub const INVERSE: u32 = 24;
 pub const VECTOR: u32 = 12;
 /// Sums of a piece; those that a verdict reads, and the end of a solve; those of a line.

@@ -6,15 +6,24 @@
 //            moves alike; coarser ones the same of the finest level's, K_f = sum_v w_v K_v
 //   invert   the dense levels: the sweep operator on the lower triangle
 //
-// `job.parameter`: he over the step. A turn is 20 numbers: `R` and `A` by columns, the factor, nothing.
+// A turn is 20 numbers: `R` and `A` by columns, the factor, nothing.
 
 // A turn [rad] below which a rotation is near enough, and turns at most.
 const NEAR: f32 = 1e-4;
 const MOST_TURNS: u32 = 20u;
 
-fn squared_he() -> f32 {
-    let he = frame.dt * job.parameter;
-    return he * he;
+// The step [s] of a part's solves, of which some differ where there are tools.
+fn step_of(part: u32) -> f32 {
+    return frame.dt * multilevel[levels[LEVELS_STEPS] + part];
+}
+
+// The part of a vertex or an ordinary node.
+fn part_of_item(item: u32) -> u32 {
+    let vertices = levels[LEVELS_VERTICES];
+    if item < vertices {
+        return part_with(PART_VERTICES_END, item);
+    }
+    return levels[levels[LEVELS_NODE_PARTS] + item - vertices];
 }
 
 fn turn_at(group: u32) -> u32 {
@@ -183,7 +192,7 @@ fn add_contact_of_pair(row: u32, local: u32, sums: ptr<function, array<f32, 9>>)
     }
 }
 
-// Groups of tetrahedra, eight threads each; behind them nodes of the finest level, where there is contact. `job.first`: how far ahead of the start of the step they turn, in halves of it.
+// Groups of tetrahedra, eight threads each; behind them nodes of the finest level, where there is contact.
 @compute @workgroup_size(64)
 fn turn_groups(
     @builtin(local_invocation_index) local: u32,
@@ -207,7 +216,9 @@ fn turn_groups(
     let end = select(first, levels[row + 5u], is_one);
     let stride = table[STRIDE_AT];
     let entries = levels[LEVELS_GROUP_ENTRIES];
-    let ahead = 0.5 * frame.dt * f32(job.first);
+    let he = step_of(levels[row + 6u]);
+    // To the end of the step where that is all of the solve.
+    let ahead = frame.dt * select(0.5, 1.0, he == frame.dt);
     // From one of its vertices: the gradients add up to nothing, and a place far away would drown them.
     let origin = vertex_data[PREVIOUS * stride + levels[entries + GROUP_ENTRY_WORDS * first]].xyz;
     var sums: array<f32, 9>;
@@ -242,7 +253,7 @@ fn turn_groups(
         put_vector(at + 3u * k, r[k]);
         put_vector(at + 9u + 3u * k, map[k]);
     }
-    multilevel[at + 18u] = 1.0 + levels_number(row + 1u) / (frame.dt * job.parameter);
+    multilevel[at + 18u] = 1.0 + levels_number(row + 1u) / he;
 }
 
 // `t I + A B A^T` of the shares of a vertex or node, times the factor of each group: xx, yy, zz, yz, xz, xy.
@@ -308,8 +319,7 @@ fn add_entries(row: u32, local: u32) -> array<f32, 9> {
 }
 
 // The inverse of a symmetric positive definite matrix; zero of one that is not.
-fn put_inverse(item: u32, given: array<f32, 9>, diagonal: f32) {
-    let squared = squared_he();
+fn put_inverse(item: u32, given: array<f32, 9>, squared: f32, diagonal: f32) {
     let d = vec3f(given[0], given[1], given[2]) * squared + vec3f(diagonal);
     let m = vec3f(given[3], given[4], given[5]) * squared;
     let size = d.x + d.y + d.z;
@@ -360,15 +370,22 @@ fn sum_blocks(
     if thing >= job.count || local % SHARING != 0u {
         return;
     }
-    let squared = squared_he();
+    var he = 0.0;
+    if thing >= items {
+        he = step_of(levels[row + 7u]);
+    } else {
+        he = step_of(part_of_item(thing));
+    }
+    let squared = he * he;
     if thing >= items {
         let stiffness = levels_number(row + 3u) * squared;
-        put_pair(row, all, levels_number(row + 2u) + stiffness);
+        put_pair(row, all, squared, levels_number(row + 2u) + stiffness);
         return;
     }
     let stiffness = levels_number(levels[LEVELS_STIFFNESSES] + thing) * squared;
     if thing >= vertices {
-        put_inverse(thing, all, levels_number(levels[LEVELS_MASSES] + thing - vertices) + stiffness);
+        let mass = levels_number(levels[LEVELS_MASSES] + thing - vertices);
+        put_inverse(thing, all, squared, mass + stiffness);
         return;
     }
     // With what springs at single vertices add to their inertia. Pinned ones have no block.
@@ -377,7 +394,7 @@ fn sum_blocks(
     // A part that is solved as a whole has no shares.
     let offsets = levels[LEVELS_SHARE_OFFSETS] + thing;
     if is_free && levels[offsets] != levels[offsets + 1u] {
-        put_inverse(thing, all, inertia + stiffness);
+        put_inverse(thing, all, squared, inertia + stiffness);
     } else {
         for (var k = 0u; k < 6u; k++) {
             multilevel[inverse_at(thing) + k] = 0.0;
@@ -385,11 +402,10 @@ fn sum_blocks(
     }
 }
 
-fn put_pair(row: u32, sums: array<f32, 9>, diagonal: f32) {
+fn put_pair(row: u32, sums: array<f32, 9>, squared: f32, diagonal: f32) {
     let matrix = levels[LEVELS_DENSE] + levels[row];
     let a = levels[row + 1u] >> 16u;
     let b = levels[row + 1u] & 0xffffu;
-    let squared = squared_he();
     for (var j = 0u; j < 3u; j++) {
         for (var i = 0u; i < 3u; i++) {
             let on_diagonal = select(0.0, diagonal, i == j);

@@ -28,9 +28,9 @@ pub const OF_VERTEX: u32 = 1 << 31;
 /// Words of a row of shares, of entries of dense blocks, of groups, of their entries, of dense pairs and of parts.
 pub const SHARE_WORDS: usize = 8;
 pub const ENTRY_WORDS: usize = 10;
-pub const GROUP_WORDS: usize = 6;
+pub const GROUP_WORDS: usize = 7;
 pub const GROUP_ENTRY_WORDS: usize = 4;
-pub const PAIR_WORDS: usize = 7;
+pub const PAIR_WORDS: usize = 8;
 pub const LEVEL_PART_WORDS: usize = 5;
 
 /// Numbers of the turn of a group: `R`, `A`, and the factor of viscosity.
@@ -76,6 +76,10 @@ pub struct Header {
     pub corrections: u32,
     /// Of contact, for vertices and then nodes of the finest level; zero where there are no samples of the surface.
     pub contact: u32,
+    /// Of each part the share of the step that its solves take.
+    pub steps: u32,
+    /// The part of each ordinary node, among the words.
+    pub node_parts: u32,
 }
 
 /// The tables of a model.
@@ -127,6 +131,7 @@ struct Builder {
     ups: Rows,
     shares: [Vec<Vec<[u32; SHARE_WORDS]>>; 3],
     masses: [Vec<f32>; 2],
+    node_parts: [Vec<u32>; 2],
     stiffnesses: [Vec<f32>; 3],
     pairs: Vec<[u32; PAIR_WORDS]>,
     entries: Vec<[u32; ENTRY_WORDS]>,
@@ -158,6 +163,7 @@ impl Tables {
             ups: Rows::begun(),
             shares: Default::default(),
             masses: Default::default(),
+            node_parts: Default::default(),
             stiffnesses: Default::default(),
             pairs: Vec::new(),
             entries: Vec::new(),
@@ -205,7 +211,8 @@ impl Builder {
         }
         let row = [dense, part.dense_count() as u32, self.dense_numbers];
         self.parts.push([row[0], row[1], row[2], choice.passes, choice.history as u32]);
-        self.add_dense(part, first_group, dense);
+        let number = self.parts.len() as u32 - 1;
+        self.add_dense(part, number, first_group, dense);
         self.add_groups(&part.of_part.groups, &part.of_part.full, first_vertex, part.has_dense);
     }
 
@@ -277,6 +284,8 @@ impl Builder {
             self.shares[kind].push(sums.of_node(node).iter().map(words).collect());
         }
         if level > 0 {
+            let number = self.parts.len() as u32;
+            self.node_parts[level.min(2) - 1].extend(vec![number; count]);
             self.masses[level.min(2) - 1].extend(&sums.masses);
         }
         let mut stiffnesses = vec![0.0; count];
@@ -289,7 +298,7 @@ impl Builder {
     }
 
     /// The pairs of a dense level, the first node not below the second.
-    fn add_dense(&mut self, part: &Exported, first_group: u32, first_node: u32) {
+    fn add_dense(&mut self, part: &Exported, number: u32, first_group: u32, first_node: u32) {
         let count = part.dense_count();
         let OfPart { full, lattice, groups, .. } = &part.of_part;
         let place = |[a, b]: [u32; 2]| (a * (a + 1) / 2 + b) as usize;
@@ -323,7 +332,9 @@ impl Builder {
                 let end = self.entries.len() as u32;
                 let at = self.dense_numbers;
                 let pair = a << 16 | b;
-                self.pairs.push([at, pair, constants[0], constants[1], first, end, first_node]);
+                let [mass, stiffness] = constants;
+                let row = [at, pair, mass, stiffness, first, end, first_node, number];
+                self.pairs.push(row);
             }
         }
         let size = 3 * count as u32;
@@ -349,7 +360,9 @@ impl Builder {
             let lame = if has_dense { full.lame(group) } else { [0.0; 2] };
             let [mu, lambda] = lame.map(f32::to_bits);
             let viscosity = (groups.viscosities[group] as f32).to_bits();
-            self.groups.push([groups.laws[group] as u32, viscosity, mu, lambda, first, end]);
+            let part = self.parts.len() as u32 - 1;
+            let law = groups.laws[group] as u32;
+            self.groups.push([law, viscosity, mu, lambda, first, end, part]);
         }
     }
 
@@ -384,6 +397,7 @@ impl Builder {
         (header.share_offsets, header.shares) = (add(&offsets), add(&shares));
         header.masses = add(&bits(&self.masses.concat()));
         header.stiffnesses = add(&bits(&self.stiffnesses.concat()));
+        header.node_parts = add(&self.node_parts.concat());
         header.pairs = self.pairs.len() as u32;
         header.pair_rows = add(self.pairs.as_flattened());
         header.entries = add(self.entries.as_flattened());
@@ -401,6 +415,7 @@ impl Builder {
         header.turns = room(TURN_NUMBERS as u32 * header.groups);
         header.residuals = room(4 * header.nodes);
         header.corrections = room(4 * header.nodes);
+        header.steps = room(self.parts.len() as u32);
         if has_contact {
             header.contact = room(CONTACT_NUMBERS as u32 * (header.vertices + header.fine));
         }
@@ -426,6 +441,7 @@ pub fn words() -> Vec<(&'static str, u32)> {
         "LEVELS_GROUP_ENTRIES" group_entries "LEVELS_PART_ROWS" part_rows "LEVELS_INVERSES" inverses
         "LEVELS_DENSE" dense "LEVELS_TURNS" turns "LEVELS_RESIDUALS" residuals
         "LEVELS_CORRECTIONS" corrections "LEVELS_CONTACT" contact
+        "LEVELS_STEPS" steps "LEVELS_NODE_PARTS" node_parts
     );
     all.extend([
         ("OF_VERTEX", OF_VERTEX),

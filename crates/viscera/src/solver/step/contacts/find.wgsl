@@ -189,15 +189,22 @@ fn find_contacts(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     var direct = vec3f();
     var mixed = vec3f();
     let ahead = place + velocity * (frame.dt * job.parameter);
+    var presses = false;
     for (var i = 0u; i < count; i++) {
         let stiffness = number(row + SAMPLE_STIFFNESS);
         let touching = Touching(best[i].plane, best[i].friction, best[i].marks, stiffness);
         add_curvature(touching, ahead, &direct, &mixed);
+        let gap = tools.all[tool_of(best[i].marks)].law.z - meet(touching, AT_END, place).distance;
+        presses = presses || gap > 0.0 || best[i].friction.w > 0.0;
         let into = slot_vectors(at, i);
         loads[into] = best[i].plane;
         loads[into + 1u] = best[i].friction;
         loads[into + 2u] = best[i].kept;
         loads[into + 3u] = vec4f(best[i].force, f32(best[i].marks));
+    }
+    if presses {
+        // The step has no number yet.
+        atomicStore(&control.parts[table[row + SAMPLE_PART]].pressed_step, control.step + 1u);
     }
     loads[at + 1u] = vec4f(direct, mixed.x);
     loads[at + 2u] = vec4f(mixed.yz, 0.0, 0.0);

@@ -25,7 +25,7 @@ pub const SLOTS: usize = 3;
 const SLOT_VECTORS: usize = 4;
 const FIRST_SLOT: usize = 3;
 pub const SAMPLE_VECTORS: usize = FIRST_SLOT + SLOTS * SLOT_VECTORS;
-const SAMPLE_WORDS: usize = 9;
+const SAMPLE_WORDS: usize = 10;
 const TOOL_SUMS: usize = 16;
 
 /// Sums of all tools.
@@ -44,7 +44,7 @@ const IS_KEPT: u32 = 128;
 const LOCKED: f32 = 1e30;
 
 /// Names and values that kernels share.
-pub fn names() -> [(&'static str, u32); 13] {
+pub fn names() -> [(&'static str, u32); 14] {
     [
         ("MOST_TOOLS", MOST_TOOLS as u32),
         ("SLOTS", SLOTS as u32),
@@ -54,6 +54,7 @@ pub fn names() -> [(&'static str, u32); 13] {
         ("SAMPLE_WORDS", SAMPLE_WORDS as u32),
         ("SAMPLE_WEIGHTS", 4),
         ("SAMPLE_STIFFNESS", 8),
+        ("SAMPLE_PART", 9),
         ("TOOL_SUMS", TOOL_SUMS as u32),
         ("HAS_PLANE", HAS_PLANE),
         ("IS_TIED", IS_TIED),
@@ -97,6 +98,7 @@ pub fn tables(layout: &Layout<f32>) -> [Vec<u32>; 3] {
         row[..4].copy_from_slice(&sample.vertices);
         row[4..8].copy_from_slice(&sample.weights.map(bits));
         row[8] = bits(sample.area * sample.stiffness);
+        row[9] = sample.part;
         row
     };
     let mut of_vertices = vec![Vec::new(); layout.vertex_count()];

@@ -2,7 +2,7 @@
 
 // The poses that a solve of the quasi-Newton method looks at.
 fn pose_of_solve() -> u32 {
-    return select(AT_FIRST, AT_END, (job.mode & (SECOND_RECORD | UNCHECKED)) != 0u);
+    return select(AT_FIRST, AT_END, own_share == 1.0 || (job.mode & SECOND_RECORD) != 0u);
 }
 
 // The change [J] of a sample's energy on the way to the trial; leaves its force there, times he^2.
