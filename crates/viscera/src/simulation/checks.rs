@@ -24,9 +24,9 @@ pub(super) fn check_tools<'a>(
     tools: impl Iterator<Item = &'a Instrument> + Clone,
 ) -> Result<(), SimulationError> {
     let Some(device) = device_of(scene, callers_device) else { return Ok(()) };
-    let parts = tools.clone().flat_map(|tool| {
-        tool.parts.iter().map(move |part| (&part.shape, tool.spring.is_some()))
-    });
+    let parts = tools
+        .clone()
+        .flat_map(|tool| tool.parts.iter().map(move |part| (&part.shape, tool.spring.is_some())));
     let why = match method {
         Method::QuasiNewton if tools.clone().any(|tool| !tool.solids.is_empty()) => {
             Some(SOLID_ON_DEVICE)

@@ -70,11 +70,7 @@ impl DeviceSolver<f32> for GpuSolver {
         GpuSolver::wrenches(self)
     }
 
-    fn contact(
-        &self,
-        model: &Model<f32>,
-        state: &State<f32>,
-    ) -> Result<ContactState, FrameError> {
+    fn contact(&self, model: &Model<f32>, state: &State<f32>) -> Result<ContactState, FrameError> {
         Ok(GpuSolver::contact(self, model, state)?)
     }
 

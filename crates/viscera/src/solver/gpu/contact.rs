@@ -93,9 +93,11 @@ impl GpuSolver {
         let mut contact = ContactState { poses, ..ContactState::default() };
         if self.samples.is_some() {
             let user = |v: usize| layout.numbering.order[v] as usize;
-            let place = |v: usize| state.positions.get(user(v)).copied().unwrap_or(vec3(0.0, 0.0, 0.0));
+            let place =
+                |v: usize| state.positions.get(user(v)).copied().unwrap_or(vec3(0.0, 0.0, 0.0));
             read(&self.device, &[self.whole(Slot::Contact)], |read| {
-                contact.touches = DeviceTools::touches(&layout, bytemuck::cast_slice(read[0]), place);
+                contact.touches =
+                    DeviceTools::touches(&layout, bytemuck::cast_slice(read[0]), place);
             })?;
         }
         Ok(contact)

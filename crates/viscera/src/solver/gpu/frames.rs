@@ -302,9 +302,8 @@ impl GpuSolver {
             Some(_) => more.next().map(|rows| bytemuck::cast_slice(rows)),
             None => None,
         };
-        let contacts = contacts.map_or_else(Contacts::default, |rows| {
-            self.tools.all.contacts(model, rows)
-        });
+        let contacts =
+            contacts.map_or_else(Contacts::default, |rows| self.tools.all.contacts(model, rows));
         if let Some(rows) = more.next() {
             self.put_strains(model, state, rows, &mut measured);
         }

@@ -161,7 +161,7 @@ kernels! {
     SEARCH = Search "search" 256
         [Tets Points Loads StartStrain PartialSums Control VertexData Table];
     TAKE = Take "take" 256 [Unknowns Mapped PartialSums Control VertexData Table];
-    BEGIN_SOLVES = Begin "begin_solves" 256 
+    BEGIN_SOLVES = Begin "begin_solves" 256
         [Points Loads Control VertexData Table Levels Multilevel Progress];
     BEGIN_SECOND = Begin "begin_second" 256
         [Points PartialSums Control VertexData Table Levels Progress];

@@ -322,7 +322,12 @@ impl DeviceLayout {
         header.tool_sums = tool_sums as u32;
         let of_tools = self.samples.map_or(0, Samples::sums);
         let owner = Slot::PartialSums;
-        ranges.push(Range { slot: Slot::ToolSums, owner, start: 4 * tool_sums, size: 4 * of_tools });
+        ranges.push(Range {
+            slot: Slot::ToolSums,
+            owner,
+            start: 4 * tool_sums,
+            size: 4 * of_tools,
+        });
         let sums = tool_sums + of_tools;
         bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
         Table { bytes, ranges, vertex_data_size: start + size, sums_size: 4 * sums }

@@ -12,9 +12,9 @@ use crate::settings::MOST_HISTORY;
 use crate::solver::cpu::products::LARGEST_WINDOW;
 use crate::solver::quasi_newton::progress::{PartProgress, SolveState};
 use crate::solver::quasi_newton::tables;
+use crate::solver::step::contacts::on_device as contact;
 use crate::solver::step::control::PartGuard;
 use crate::solver::step::modes::MODES;
-use crate::solver::step::contacts::on_device as contact;
 use crate::solver::step::recovered::on_device;
 use crate::solver::step::{descent, guard};
 

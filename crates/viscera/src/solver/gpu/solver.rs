@@ -132,8 +132,7 @@ impl GpuSolver {
         let buffers = Buffers::new(device, &laid, settings, &layout, of_levels, left_over)?;
         let vector = [buffers.length, (buffers.multipliers_start / 4) as u32];
         let samples = layout.samples;
-        let recorder =
-            Recorder::new(&laid, settings, vector, layout.pieces(), of_levels, samples);
+        let recorder = Recorder::new(&laid, settings, vector, layout.pieces(), of_levels, samples);
         let record = recorder.record(&plan);
         let lists = [record.prologue, record.body, record.epilogue, record.restart];
         let job_count = lists.iter().map(Vec::len).sum::<usize>() as u64;

@@ -23,65 +23,112 @@ struct Grasp {
     is_finite: bool,
 }
 
-/// A block that is fixed below is squeezed at its top by two jaws, lifted by 3 mm or a plate by 20 mm, turned, let go.
-fn grasp<S: Real>(name: &str, seed: u64, is_plate: bool) -> Grasp {
-    let (size, cells) = match is_plate {
-        true => ([0.06, 0.02, 0.008], [12, 4, 2]),
-        false => ([0.012, 0.016, 0.02], [3, 4, 5]),
-    };
-    let block = Block::new(size, cells, [1e4, 0.45, 0.01]);
-    let mut random = Random(seed);
-    let squeeze = random.uniform(1.5e-3, 3e-3);
-    let turn = random.uniform(-0.5, 0.5);
-    let lift = if is_plate { 0.02 } else { 0.003 };
-    let mut pull = vec3(random.uniform(-1e-3, 3e-3), random.uniform(-3e-3, 3e-3), lift);
-    if !is_plate {
-        (pull.x, pull.y) = (0.3 * pull.x, 0.3 * pull.y);
+/// What jaws do to a block, or to a plate.
+pub struct Plan {
+    pub block: Block,
+    pub jaws: [Tool; 2],
+    /// How far they lift [m].
+    lift: f64,
+    is_plate: bool,
+    squeeze: f64,
+    turn: f64,
+    pull: Vec3<f64>,
+}
+
+/// Young's modulus [Pa] and Poisson's ratio of what is grasped.
+pub const GRASPED: [f64; 2] = [1e4, 0.45];
+
+impl Plan {
+    /// A block that is fixed below is squeezed at its top by two jaws, lifted by 3 mm or a plate by 20 mm, turned, let go.
+    pub fn new(seed: u64, is_plate: bool) -> Self {
+        let (size, cells) = match is_plate {
+            true => ([0.06, 0.02, 0.008], [12, 4, 2]),
+            false => ([0.012, 0.016, 0.02], [3, 4, 5]),
+        };
+        let mut random = Random(seed);
+        let squeeze = random.uniform(1.5e-3, 3e-3);
+        let turn = random.uniform(-0.5, 0.5);
+        let lift = if is_plate { 0.02 } else { 0.003 };
+        let mut pull = vec3(random.uniform(-1e-3, 3e-3), random.uniform(-3e-3, 3e-3), lift);
+        if !is_plate {
+            (pull.x, pull.y) = (0.3 * pull.x, 0.3 * pull.y);
+        }
+        let half = vec3(0.006, 0.008, 0.002);
+        let mut jaw = Tool::new(Shape::RoundedBox { half, radius: 0.001 });
+        jaw.law.friction = random.uniform(0.6, 1.0);
+        let [young, poisson] = GRASPED;
+        Self {
+            block: Block::new(size, cells, [young, poisson, 0.01]),
+            jaws: [jaw.clone(), jaw],
+            lift,
+            is_plate,
+            squeeze,
+            turn,
+            pull,
+        }
     }
-    let mut jaw = Tool::new(Shape::RoundedBox { half: vec3(0.006, 0.008, 0.002), radius: 0.001 });
-    jaw.law.friction = random.uniform(0.6, 1.0);
-    // The plate is held at one end and grasped from above and below at the other; the block is grasped at its sides.
-    let (center, aside, thick) = match is_plate {
-        true => (vec3(0.024, 0.0, 0.004), Vec3::ZERO, 0.004),
-        false => (vec3(0.0, 0.0, 0.014), vec3(0.0, 0.5 * std::f64::consts::PI, 0.0), 0.006),
-    };
-    let held = move |x: Vec3<f64>| if is_plate { x.x < -0.03 + 1e-6 } else { x.z < 1e-6 };
-    let mut inputs =
-        Inputs { pins: block.pins(held), tools: vec![jaw.clone(), jaw], ..Inputs::default() };
+
+    /// What is fixed, and the jaws.
+    pub fn inputs<S: Real>(&self) -> Inputs<S> {
+        let held = |x: Vec3<f64>| if self.is_plate { x.x < -0.03 + 1e-6 } else { x.z < 1e-6 };
+        Inputs { pins: self.block.pins(held), tools: self.jaws.to_vec(), ..Inputs::default() }
+    }
+
+    /// Moves the jaws to where they are at a time [s]. They are clear of the tissue from 1.4 s on.
+    pub fn act(&self, time: f64, tools: &mut [Tool]) {
+        // The plate is held at one end and grasped from above and below at the other; the block is grasped at its sides.
+        let (center, aside, thick) = match self.is_plate {
+            true => (vec3(0.024, 0.0, 0.004), Vec3::ZERO, 0.004),
+            false => (vec3(0.0, 0.0, 0.014), vec3(0.0, 0.5 * std::f64::consts::PI, 0.0), 0.006),
+        };
+        let across = RigidTransform::about(Vec3::ZERO, aside, Vec3::ZERO);
+        let open = 1.2e-3 - (self.squeeze + 1.2e-3) * ramp(time, 0.0, 0.3)
+            + (self.squeeze + 0.012) * ramp(time, 1.2, 1.4);
+        let share = ramp(time, 0.3, 1.0);
+        let away = vec3(0.0, 0.0, 0.05) * ramp(time, 1.4, 1.6);
+        let about = match self.is_plate {
+            true => vec3(self.turn, 0.0, 0.0),
+            false => vec3(0.0, 0.0, self.turn),
+        };
+        let pulled = center + self.pull * share + away;
+        let hand = RigidTransform::about(Vec3::ZERO, about * share, pulled);
+        for (tool, side) in tools.iter_mut().zip([1.0, -1.0]) {
+            let shift = vec3(0.0, 0.0, side * (thick + 0.002 + open));
+            let beside = RigidTransform { translation: shift, ..RigidTransform::IDENTITY };
+            tool.pose = hand.after(&across).after(&beside);
+        }
+    }
+
+    /// How much of the lift the end between the jaws has gone.
+    pub fn lifted<S: Real>(&self, x: &[Vec3<S>]) -> f64 {
+        let near = |x: Vec3<f64>| if self.is_plate { x.x > 0.03 - 1e-6 } else { x.z > 0.02 - 1e-6 };
+        let rest = self.block.mesh.vertices();
+        let ends: Vec<usize> = (0..rest.len()).filter(|&v| near(rest[v])).collect();
+        let risen = |v: &usize| x[*v].cast::<f64>().z - rest[*v].z;
+        ends.iter().map(risen).sum::<f64>() / ends.len() as f64 / self.lift
+    }
+}
+
+fn grasp<S: Real>(name: &str, seed: u64, is_plate: bool) -> Grasp {
+    let plan = Plan::new(seed, is_plate);
+    let mut inputs = plan.inputs();
     let (mut settings, substeps) = method(name);
     if name == "xpbd" {
         // With stiffer contact its sweeps slide too slowly: many steps would be rejected.
         inputs.tools.iter_mut().for_each(|tool| tool.law.stiffness = 2.0);
         settings.iterations = Count::Of(10);
     }
-    let mut scene = Scene::<S>::with(&block, &settings, substeps, inputs);
-    let across = RigidTransform::about(Vec3::ZERO, aside, Vec3::ZERO);
-    let act = |time: f64, tools: &mut [Tool]| {
-        let open = 1.2e-3 - (squeeze + 1.2e-3) * ramp(time, 0.0, 0.3)
-            + (squeeze + 0.012) * ramp(time, 1.2, 1.4);
-        let share = ramp(time, 0.3, 1.0);
-        let away = vec3(0.0, 0.0, 0.05) * ramp(time, 1.4, 1.6);
-        let about = if is_plate { vec3(turn, 0.0, 0.0) } else { vec3(0.0, 0.0, turn) };
-        let hand = RigidTransform::about(Vec3::ZERO, about * share, center + pull * share + away);
-        for (tool, side) in tools.iter_mut().zip([1.0, -1.0]) {
-            let shift = vec3(0.0, 0.0, side * (thick + 0.002 + open));
-            let beside = RigidTransform { translation: shift, ..RigidTransform::IDENTITY };
-            tool.pose = hand.after(&across).after(&beside);
-        }
-    };
+    let mut scene = Scene::<S>::with(&plan.block, &settings, substeps, inputs);
+    let act = |time: f64, tools: &mut [Tool]| plan.act(time, tools);
     scene.run(1.2, act);
-    let near = |x: Vec3<f64>| if is_plate { x.x > 0.03 - 1e-6 } else { x.z > 0.02 - 1e-6 };
-    let rest = block.mesh.vertices();
-    let ends: Vec<usize> = (0..rest.len()).filter(|&v| near(rest[v])).collect();
-    let risen = |v: &usize| scene.state.positions[*v].cast::<f64>().z - rest[*v].z;
-    let lifted = ends.iter().map(risen).sum::<f64>() / ends.len() as f64;
+    let lifted = plan.lifted(&scene.state.positions);
     // Jaws are clear of the tissue from 1.4 s on.
     scene.run(0.6, act);
     let first = scene.solver.ledger().stored;
     scene.run(0.6, act);
     let ledger = scene.solver.ledger();
     Grasp {
-        lifted: lifted / lift,
+        lifted,
         touches: scene.state.contact.touches.len(),
         rest: [first, ledger.stored].map(|stored| stored / ledger.most_stored),
         surplus: ledger.surplus / ledger.most_stored,

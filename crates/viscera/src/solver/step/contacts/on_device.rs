@@ -263,12 +263,14 @@ impl DeviceTools {
         let touches = all.flat_map(|(sample, rows)| {
             let at = sample.mean(&x);
             let kept = slots(rows).filter(|slot| slot.marks & IS_KEPT != 0);
-            let mut of_sample: Vec<Touch> = kept.map(|slot| slot.touch(sample.number, at)).collect();
+            let mut of_sample: Vec<Touch> =
+                kept.map(|slot| slot.touch(sample.number, at)).collect();
             of_sample.sort_by_key(|touch| touch.tool);
             of_sample
         });
         let mut touches: Vec<Touch> = touches.collect();
-        touches.sort_by_key(|touch| (layout.part_of_sample(touch.sample), touch.sample, touch.tool));
+        touches
+            .sort_by_key(|touch| (layout.part_of_sample(touch.sample), touch.sample, touch.tool));
         touches
     }
 
