@@ -120,16 +120,11 @@ impl Tool {
 /// Tools, and their parts, at most, that a graphics processor computes contact with.
 pub(crate) const MOST_TOOLS_ON_DEVICES: usize = 16;
 
-/// Why a graphics processor cannot compute contact with tools of these shapes, of which a spring may hold some.
-pub(crate) fn beyond_devices<'a>(
-    tools: impl Iterator<Item = (&'a Shape, bool)>,
-) -> Option<&'static str> {
+/// Why a graphics processor cannot compute contact with tools; of each part of one, whether a spring holds it.
+pub(crate) fn beyond_devices(tools: impl Iterator<Item = bool>) -> Option<&'static str> {
     let mut count = 0;
-    for (shape, is_held) in tools {
+    for is_held in tools {
         count += 1;
-        if matches!(shape, Shape::Mesh(_)) {
-            return Some(SOLID_ON_DEVICE);
-        }
         if is_held {
             return Some("a tool that a spring holds does not move; leave out its `spring`");
         }
@@ -140,10 +135,6 @@ pub(crate) fn beyond_devices<'a>(
 /// Of other methods than the one that devices know contact with.
 pub(crate) const METHOD_ON_DEVICE: &str =
     "only the quasi-Newton method computes contact with tools; use `method = \"quasi_newton\"`";
-
-/// Of a tool of a closed surface.
-pub(crate) const SOLID_ON_DEVICE: &str =
-    "tools of closed surfaces touch nothing; use spheres, capsules, boxes and half-spaces";
 
 /// A tool that is faster than this [m/s], or goes further than so many of its radii in a step where those are more, was put
 /// elsewhere.

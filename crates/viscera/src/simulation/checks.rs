@@ -2,7 +2,7 @@
 
 use super::assemble::Assembly;
 use super::error::SimulationError;
-use crate::contact::{METHOD_ON_DEVICE, SOLID_ON_DEVICE, beyond_devices};
+use crate::contact::{METHOD_ON_DEVICE, beyond_devices};
 use crate::scene::{Instrument, Scene};
 use crate::settings::{DeviceRequest, Method, SolverSettings};
 use crate::solver::StepError;
@@ -21,16 +21,14 @@ pub(super) fn check_tools<'a>(
     scene: &Scene,
     callers_device: bool,
     method: Method,
-    tools: impl Iterator<Item = &'a Instrument> + Clone,
+    tools: impl Iterator<Item = &'a Instrument>,
 ) -> Result<(), SimulationError> {
     let Some(device) = device_of(scene, callers_device) else { return Ok(()) };
-    let parts = tools
-        .clone()
-        .flat_map(|tool| tool.parts.iter().map(move |part| (&part.shape, tool.spring.is_some())));
+    let parts = tools.flat_map(|tool| {
+        let count = tool.parts.len() + tool.solids.len();
+        std::iter::repeat_n(tool.spring.is_some(), count)
+    });
     let why = match method {
-        Method::QuasiNewton if tools.clone().any(|tool| !tool.solids.is_empty()) => {
-            Some(SOLID_ON_DEVICE)
-        }
         Method::QuasiNewton => beyond_devices(parts),
         _ => Some(METHOD_ON_DEVICE),
     };

@@ -30,13 +30,13 @@ use crate::mesh::SurfaceMesh;
 use crate::scalar::{Vec3, vec3};
 
 /// Cells along each edge of a brick.
-const BRICK: usize = 8;
+pub(crate) const BRICK: usize = 8;
 
 /// Points along each edge of a brick.
 const POINTS: usize = BRICK + 1;
 
 /// Of a brick that is not divided.
-const WHOLE: u32 = u32::MAX;
+pub(crate) const WHOLE: u32 = u32::MAX;
 
 /// Signed distances around a closed surface.
 #[derive(Clone)]
@@ -86,6 +86,31 @@ impl DistanceGrid {
     /// Edge of the cells near the surface [m].
     pub fn cell(&self) -> f64 {
         self.cell
+    }
+
+    /// Lower corner of the grid [m].
+    #[cfg(feature = "gpu")]
+    pub(crate) fn origin(&self) -> Vec3<f64> {
+        self.origin
+    }
+
+    /// Bricks along each axis.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn bricks(&self) -> [usize; 3] {
+        self.bricks
+    }
+
+    /// No point beyond the grid is nearer to the surface than this and its way to the grid [m].
+    #[cfg(feature = "gpu")]
+    pub(crate) fn margin(&self) -> f64 {
+        self.margin
+    }
+
+    /// Appends numbers of divided bricks, distances at corners of bricks, and those at points of divided ones, as words.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn put_words(&self, into: &mut Vec<u32>) {
+        into.extend_from_slice(&self.divided);
+        into.extend(self.corners.iter().chain(&self.points).map(|distance| distance.to_bits()));
     }
 
     /// Bytes of its distances.

@@ -11,24 +11,18 @@ use crate::model::Model;
 use crate::scalar::vec3;
 use crate::settings::Method;
 use crate::solver::error::StepError;
-use crate::solver::step::contacts::on_device::{DeviceTools, IS_THERE, ToolRecords};
+use crate::solver::step::contacts::on_device::{DeviceTools, GRID_ROW, IS_THERE, ToolRecords};
 use crate::state::{ContactState, State};
 
 /// Tools on a device.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct OfTools {
-    /// What kernels know of them.
-    pub buffer: wgpu::Buffer,
     pub all: DeviceTools,
     /// At the end of the last step that was read.
     pub wrenches: Vec<Wrench>,
 }
 
 impl OfTools {
-    pub fn new(buffer: wgpu::Buffer) -> Self {
-        Self { buffer, all: DeviceTools::default(), wrenches: Vec::new() }
-    }
-
     /// Poses, and `into` a device that computes contact what a state has kept of samples.
     pub fn put(
         &mut self,
@@ -45,6 +39,10 @@ impl OfTools {
     }
 }
 
+/// Of tools of closed surfaces that are too large for the cells of their grid.
+const TOO_FINE: &str =
+    "distances of the tools' surfaces do not fit; use a thicker contact, whose cells are larger";
+
 /// Why a device cannot compute contact with these tools.
 fn refuses(method: Method, tools: &[Tool]) -> Option<&'static str> {
     if !IS_THERE {
@@ -53,7 +51,7 @@ fn refuses(method: Method, tools: &[Tool]) -> Option<&'static str> {
     if method != Method::QuasiNewton {
         return Some(METHOD_ON_DEVICE);
     }
-    beyond_devices(tools.iter().map(|tool| (&tool.shape, tool.held.is_some())))
+    beyond_devices(tools.iter().map(|tool| tool.held.is_some()))
 }
 
 impl GpuSolver {
@@ -77,8 +75,16 @@ impl GpuSolver {
             return Err(StepError::ContactOnDevice { why });
         }
         let share = self.solve_share();
+        if let Some(words) = self.tools.all.new_distances(tools) {
+            let rows = words.len() as u64 / u64::from(GRID_ROW);
+            if rows > u64::from(self.device.limits().max_texture_dimension_2d) {
+                self.tools.all.forget_distances();
+                return Err(StepError::ContactOnDevice { why: TOO_FINE });
+            }
+            self.uniforms.put_distances(&self.device, &words);
+        }
         let records: ToolRecords = self.tools.all.begin(tools, dt, share);
-        self.device.queue.write_buffer(&self.tools.buffer, 0, bytemuck::bytes_of(&records));
+        self.device.queue.write_buffer(&self.uniforms.tools, 0, bytemuck::bytes_of(&records));
         Ok(())
     }
 

@@ -483,18 +483,25 @@ fn storage_entry(slot: Slot) -> wgpu::BindGroupLayoutEntry {
 
 /// The job of a dispatch, and the constants and tools of the step.
 pub(super) fn uniform_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry = |binding, has_dynamic_offset| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            has_dynamic_offset,
-            min_binding_size: None,
-        },
-        count: None,
+    let visibility = wgpu::ShaderStages::COMPUTE;
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None };
+    let uniform = |has_dynamic_offset| wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Uniform,
+        has_dynamic_offset,
+        min_binding_size: None,
+    };
+    let distances = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Uint,
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
     };
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("job, frame and tools"),
-        entries: &[entry(0, true), entry(1, false), entry(2, false)],
+        entries: &[
+            entry(0, uniform(true)),
+            entry(1, uniform(false)),
+            entry(2, uniform(false)),
+            entry(3, distances),
+        ],
     })
 }

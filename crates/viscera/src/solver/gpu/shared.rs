@@ -55,7 +55,7 @@ pub fn host_layouts() -> Vec<HostLayout> {
             phase passes_left accepted ahead failures rejections calm count newest scale length slope
         }),
         record!("PartProgress" PartProgress { states sy yw was_rejected calm takes_trial slides }),
-        record!("Tool" contact::ToolRecord { poses lengths law way turn }),
+        record!("Tool" contact::ToolRecord { poses lengths law way turn grid bricks bounds }),
         record!("Tools" contact::ToolRecords { count all }),
         record!("Update" Update { vertex is_pinned force place stiffness inertia }),
         record!("TetBlock" crate::layout::TetBlock<f32> {

@@ -15,7 +15,7 @@ use super::ring::Frames;
 use super::slots::{Slot, Update};
 use super::stages::StageRange;
 use super::traffic::Recorded;
-use super::uniforms::{FrameConstants, Job};
+use super::uniforms::Uniforms;
 use bytemuck::Zeroable;
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ use crate::solver::inputs::{check_model, check_settings};
 use crate::solver::plan::{Plan, Stage, StepStage};
 use crate::solver::quasi_newton::on_device::{self, DeviceLevels};
 use crate::solver::quasi_newton::progress::PartProgress;
-use crate::solver::step::contacts::on_device::{Samples, ToolRecords};
+use crate::solver::step::contacts::on_device::Samples;
 use crate::solver::step::recovered;
 use crate::solver::step::tethers::Bundle;
 use crate::state::State;
@@ -53,12 +53,10 @@ pub struct GpuSolver {
     pub(super) settings: SolverSettings,
     pub(super) plan: Plan,
     pub(super) buffers: Buffers,
-    pub(super) uniforms: wgpu::BindGroup,
-    pub(super) frame: wgpu::Buffer,
+    pub(super) uniforms: Uniforms,
     pub(super) tools: OfTools,
     /// Of the surface, where contact is computed.
     pub(super) samples: Option<Samples>,
-    pub(super) jobs: wgpu::Buffer,
     /// The model as it lies on the device.
     pub(super) layout: Arc<Layout<f32>>,
     pub(super) ready: [Vec<Ready>; 3],
@@ -136,13 +134,17 @@ impl GpuSolver {
         let record = recorder.record(&plan);
         let lists = [record.prologue, record.body, record.epilogue, record.restart];
         let job_count = lists.iter().map(Vec::len).sum::<usize>() as u64;
-        let Uniforms { jobs, frame, tools, all: uniforms } = make_uniforms(device, job_count);
+        let uniforms = Uniforms::new(device, job_count);
         let mut next = 0;
         let [prologue, body, epilogue, restart] = lists.map(|list| {
             let prepare = |dispatch: &Dispatch| {
                 let offset = next;
                 next += JOB_STRIDE;
-                device.queue.write_buffer(&jobs, offset, bytemuck::bytes_of(&dispatch.job));
+                device.queue.write_buffer(
+                    &uniforms.jobs,
+                    offset,
+                    bytemuck::bytes_of(&dispatch.job),
+                );
                 prepare(device, &buffers, dispatch, offset as u32)
             };
             list.iter().map(prepare).collect()
@@ -157,10 +159,8 @@ impl GpuSolver {
             falls: starts_falling(&plan).then(|| Falls::new(&laid)),
             plan,
             uniforms,
-            frame,
-            tools: OfTools::new(tools),
+            tools: OfTools::default(),
             samples,
-            jobs,
             layout: Arc::clone(&laid),
             ready: [prologue, body, epilogue],
             stages: record.stages,
@@ -254,7 +254,7 @@ impl GpuSolver {
 
     /// Bytes of device memory.
     pub fn bytes(&self) -> u64 {
-        self.buffers.bytes() + self.jobs.size() + self.frames.bytes()
+        self.buffers.bytes() + self.uniforms.jobs.size() + self.frames.bytes()
     }
 
     /// Positions [m] as four floats a vertex, of which the last does not count, in the solver's
@@ -374,48 +374,6 @@ fn starts_falling(plan: &Plan) -> bool {
         _ => false,
     };
     plan.split().prologue.iter().any(falls)
-}
-
-/// Buffers of jobs, of the constants of a step and of its tools, and how kernels are bound to them.
-struct Uniforms {
-    jobs: wgpu::Buffer,
-    frame: wgpu::Buffer,
-    tools: wgpu::Buffer,
-    all: wgpu::BindGroup,
-}
-
-/// For so many jobs.
-fn make_uniforms(device: &Device, job_count: u64) -> Uniforms {
-    let wgpu = &device.device;
-    let make = |label, size, usage| {
-        wgpu.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size,
-            usage: usage | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        })
-    };
-    let uniform = wgpu::BufferUsages::UNIFORM;
-    let jobs = make("jobs", JOB_STRIDE * job_count.max(1), uniform);
-    let frame = make("frame", size_of::<FrameConstants>() as u64, uniform);
-    let tools = make("tools", size_of::<ToolRecords>() as u64, uniform);
-    let all = wgpu.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("job, frame and tools"),
-        layout: &kernels::uniform_layout(wgpu),
-        entries: &[
-            wgpu::BindGroupEntry {
-                binding: 0,
-                resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                    buffer: &jobs,
-                    offset: 0,
-                    size: std::num::NonZero::new(size_of::<Job>() as u64),
-                }),
-            },
-            wgpu::BindGroupEntry { binding: 1, resource: frame.as_entire_binding() },
-            wgpu::BindGroupEntry { binding: 2, resource: tools.as_entire_binding() },
-        ],
-    });
-    Uniforms { jobs, frame, tools, all }
 }
 
 fn in_solver_order(layout: &Layout<f32>, values: &[Vec3<f32>]) -> Vec<[f32; 4]> {

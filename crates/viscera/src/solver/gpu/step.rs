@@ -137,7 +137,7 @@ impl GpuSolver {
         for dispatch in list {
             pass.set_pipeline(&dispatch.pipeline);
             pass.set_bind_group(0, &dispatch.storage, &[]);
-            pass.set_bind_group(1, &self.uniforms, &[dispatch.job]);
+            pass.set_bind_group(1, &self.uniforms.all, &[dispatch.job]);
             pass.dispatch_workgroups(dispatch.groups[0], dispatch.groups[1], 1);
         }
     }
@@ -189,6 +189,6 @@ impl GpuSolver {
             part_count: self.part_count as u32,
             chebyshev_damping: settings.chebyshev_damping as f32,
         };
-        self.device.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&constants));
+        self.device.queue.write_buffer(&self.uniforms.frame, 0, bytemuck::bytes_of(&constants));
     }
 }

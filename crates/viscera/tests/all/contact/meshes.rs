@@ -16,7 +16,7 @@ use super::{Block, Scene, ramp};
 const STEPS: u32 = 36;
 
 /// Triangles of a sphere, a capsule or a rounded box, inscribed.
-fn surface(shape: &Shape) -> SurfaceMesh {
+pub fn surface(shape: &Shape) -> SurfaceMesh {
     let quarter = |step: u32| {
         let (sin, cos) =
             libm::sincos(0.5 * std::f64::consts::PI * f64::from(step) / f64::from(STEPS));

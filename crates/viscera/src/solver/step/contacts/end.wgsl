@@ -50,8 +50,7 @@ fn end_slot(at: u32, slot: u32, row: u32, place: vec3f) -> Given {
         }
         if (marks & HAS_PLANE) == 0u {
             let local = into_tool(tool, AT_END, place);
-            let live = distance_to(tool, local);
-            loads[into] = vec4f(live.normal, dot(live.normal, local) - live.value);
+            loads[into] = tangent(tool, local, distance_to(tool, local));
         }
         loads[into + 2u] = vec4f(anchor, felt.pressed);
         marks |= IS_KEPT | select(0u, WILL_BE_TIED, is_tied);

@@ -23,14 +23,14 @@ struct Plane {
     is_met: bool,
 }
 
-fn tangent(at: vec3f, distance: Distance) -> vec4f {
-    return vec4f(distance.normal, dot(distance.normal, at) - distance.value);
+fn steepest_of(tool: u32) -> f32 {
+    return select(1.0, tools.all[tool].bounds.y, u32(tools.all[tool].law.x) == SOLID);
 }
 
 // Along a path in the tool's frame by sphere tracing.
 fn trace(tool: u32, start: vec3f, end: vec3f, thickness: f32) -> Plane {
     let way = end - start;
-    let longest = length_of(way);
+    let longest = length_of(way) * steepest_of(tool);
     if !(longest > 0.0) {
         return Plane(vec4f(), false);
     }
@@ -40,17 +40,19 @@ fn trace(tool: u32, start: vec3f, end: vec3f, thickness: f32) -> Plane {
     for (var i = 0u; i < MOST_TRACED; i++) {
         let distance = distance_to(tool, at);
         if distance.value <= near * 1.02 {
-            return Plane(tangent(at, distance), true);
+            return Plane(tangent(tool, at, distance), true);
         }
         share += (distance.value - near) / longest;
         if share >= 1.0 {
             let last = distance_to(tool, end);
-            return Plane(tangent(end, last), last.value <= near);
+            return Plane(tangent(tool, end, last), last.value <= near);
         }
         at = start + way * share;
     }
-    // Grazing: so near for so long that it counts.
-    return Plane(tangent(at, distance_to(tool, at)), true);
+    // Grazing: so near for so long that it counts. Along a gap between two sides of a tool it may be near to neither.
+    let last = distance_to(tool, at);
+    let is_convex = u32(tools.all[tool].law.x) != SOLID;
+    return Plane(tangent(tool, at, last), is_convex || last.value < thickness);
 }
 
 // The place of what is kept of a tool among the slots of a sample.
@@ -73,7 +75,7 @@ fn find_tool(tool: u32, place: vec3f, velocity: vec3f, slot: u32) -> Found {
     let is_kept = slot != NOWHERE;
     var found: Found;
     found.marks = NOWHERE;
-    if first.value > 2.0 * (thickness + length_of(end - start)) && !is_kept {
+    if first.value > 2.0 * (thickness + length_of(end - start)) * steepest_of(tool) && !is_kept {
         return found;
     }
     found.marks = tool;
@@ -87,7 +89,7 @@ fn find_tool(tool: u32, place: vec3f, velocity: vec3f, slot: u32) -> Found {
     }
     if first.value < thickness {
         let is_shallow = first.value > -SHALLOW * thinnest_of(tool);
-        found.plane = tangent(start, first);
+        found.plane = tangent(tool, start, first);
         if is_kept && !is_shallow {
             found.plane = loads[slot];
         }
@@ -124,6 +126,7 @@ fn add_curvature(touching: Touching, place: vec3f, direct: ptr<function, vec3f>,
     let gap = law.z - met.distance;
     var along = select(0.0, k, gap > 0.0);
     along += select(0.0, (SECOND_STAGE - 1.0) * k, gap > 0.5 * law.z);
+    along *= met.slope * met.slope;
     var across = 0.0;
     let limit = touching.friction.w;
     if limit > 0.0 {

@@ -3,9 +3,12 @@
 //! Every sample of the surface has so many slots, one for each tool that it may meet in a step: no list of pairs, nothing that
 //! could overflow in silence. A sample that may meet more leaves out those that are farthest, and says so.
 
+use std::sync::Arc;
+
 use bytemuck::{Pod, Zeroable};
 
 use super::{Contacts, Gift};
+use crate::contact::distance_grid::{BRICK, DistanceGrid, WHOLE};
 use crate::contact::{Friction, MOST_TOOLS_ON_DEVICES, Shape, Side, Tool, Touch, Touching, Wrench};
 use crate::layout::{LaidSample, Layout};
 use crate::scalar::rigid::{RigidTransform, axis_times_sine};
@@ -31,6 +34,9 @@ const TOOL_SUMS: usize = 16;
 /// Sums of all tools.
 pub const ALL_SUMS: usize = TOOL_SUMS * MOST_TOOLS;
 
+/// Words of a row of distances.
+pub const GRID_ROW: u32 = 4096;
+
 /// Samples whose forces one workgroup sums.
 const SUMMED: usize = 256;
 
@@ -44,7 +50,7 @@ const IS_KEPT: u32 = 128;
 const LOCKED: f32 = 1e30;
 
 /// Names and values that kernels share.
-pub fn names() -> [(&'static str, u32); 14] {
+pub fn names() -> [(&'static str, u32); 17] {
     [
         ("MOST_TOOLS", MOST_TOOLS as u32),
         ("SLOTS", SLOTS as u32),
@@ -56,6 +62,9 @@ pub fn names() -> [(&'static str, u32); 14] {
         ("SAMPLE_STIFFNESS", 8),
         ("SAMPLE_PART", 9),
         ("TOOL_SUMS", TOOL_SUMS as u32),
+        ("GRID_ROW", GRID_ROW),
+        ("BRICK", BRICK as u32),
+        ("WHOLE_BRICK", WHOLE),
         ("HAS_PLANE", HAS_PLANE),
         ("IS_TIED", IS_TIED),
         ("WILL_BE_TIED", WILL_BE_TIED),
@@ -125,6 +134,9 @@ pub struct ToolRecord {
     pub law: [f32; 4],
     pub way: [f32; 4],
     pub turn: [f32; 4],
+    pub grid: [f32; 4],
+    pub bricks: [u32; 4],
+    pub bounds: [f32; 4],
 }
 
 /// `Tools` of tools.wgsl.
@@ -137,8 +149,8 @@ pub struct ToolRecords {
 
 fn kind_and_lengths(shape: &Shape) -> (f64, [f64; 4]) {
     match *shape {
-        // A closed surface never comes here.
-        Shape::HalfSpace | Shape::Mesh(_) => (0.0, [0.0; 4]),
+        Shape::HalfSpace => (0.0, [0.0; 4]),
+        Shape::Mesh(_) => (4.0, [0.0; 4]),
         Shape::Sphere { radius } => (1.0, [0.0, 0.0, 0.0, radius]),
         Shape::Capsule { length, radius } => (2.0, [length, 0.0, 0.0, radius]),
         Shape::RoundedBox { half, radius } => (3.0, [half.x, half.y, half.z, radius]),
@@ -146,7 +158,13 @@ fn kind_and_lengths(shape: &Shape) -> (f64, [f64; 4]) {
 }
 
 impl ToolRecord {
-    fn new(tool: &Tool, start: &RigidTransform, share: f64, has_jumped: bool) -> Self {
+    /// `first`: where the distances of a closed surface begin.
+    fn new(
+        tool: &Tool,
+        start: &RigidTransform,
+        (share, first): (f64, u32),
+        has_jumped: bool,
+    ) -> Self {
         let single = |row: [f64; 4]| row.map(|x| x as f32);
         let pose = |pose: RigidTransform| {
             let [x, y, z] = pose.rotation.columns;
@@ -157,13 +175,21 @@ impl ToolRecord {
         let turn = axis_times_sine(&(tool.pose.rotation * start.rotation.transpose()));
         let (kind, lengths) = kind_and_lengths(&tool.shape);
         let law = tool.law;
-        Self {
+        let mut record = Self {
             poses: [*start, start.towards(&tool.pose, share), tool.pose].map(pose),
             lengths: single(lengths),
             law: single([kind, law.stiffness, law.thickness, law.friction]),
             way: with(way, f32::from(u8::from(tool.is_locked))),
             turn: with(turn, f32::from(u8::from(has_jumped))),
+            ..Self::default()
+        };
+        if let Shape::Mesh(grid) = &tool.shape {
+            let [x, y, z] = grid.bricks();
+            record.grid = with(grid.origin(), grid.cell() as f32);
+            record.bricks = [x as u32, y as u32, z as u32, first];
+            record.bounds = single([grid.margin(), grid.steepest(), grid.thinnest(), 0.0]);
         }
+        record
     }
 }
 
@@ -184,6 +210,8 @@ pub struct DeviceTools {
     poses: Vec<RigidTransform>,
     jumped: Vec<bool>,
     starts: Vec<RigidTransform>,
+    /// Closed surfaces that the device knows, and where the distances of each begin.
+    grids: Vec<(Arc<DistanceGrid>, u32)>,
 }
 
 impl DeviceTools {
@@ -197,6 +225,43 @@ impl DeviceTools {
         &self.poses
     }
 
+    /// Distances of closed surfaces, where the device does not know all of them.
+    pub fn new_distances(&mut self, tools: &[Tool]) -> Option<Vec<u32>> {
+        let solids = || {
+            tools.iter().filter_map(|tool| match &tool.shape {
+                Shape::Mesh(grid) => Some(grid),
+                _ => None,
+            })
+        };
+        let known = |grid| self.grids.iter().any(|(known, _)| Arc::ptr_eq(known, grid));
+        if solids().all(known) {
+            return None;
+        }
+        // Those that are gone make room.
+        self.grids.clear();
+        let mut words = Vec::new();
+        for grid in solids() {
+            if !self.grids.iter().any(|(known, _)| Arc::ptr_eq(known, grid)) {
+                self.grids.push((Arc::clone(grid), words.len() as u32));
+                grid.put_words(&mut words);
+            }
+        }
+        words.resize(words.len().next_multiple_of(GRID_ROW as usize), 0);
+        Some(words)
+    }
+
+    /// The device has none of them.
+    pub fn forget_distances(&mut self) {
+        self.grids.clear();
+    }
+
+    /// Where the distances of a shape begin.
+    fn first_word(&self, shape: &Shape) -> u32 {
+        let Shape::Mesh(grid) = shape else { return 0 };
+        let found = self.grids.iter().find(|(known, _)| Arc::ptr_eq(known, grid));
+        found.map_or(0, |(_, first)| *first)
+    }
+
     /// Tools in a step of `dt` [s], of which the first solve takes a share.
     pub fn begin(&mut self, tools: &[Tool], dt: f64, share: f64) -> ToolRecords {
         let mut records = ToolRecords { count: [tools.len() as u32; 4], ..ToolRecords::default() };
@@ -207,7 +272,8 @@ impl DeviceTools {
         self.poses.extend(tools.iter().map(|tool| tool.pose));
         let all = tools.iter().zip(&self.starts).zip(&self.jumped);
         for (record, ((tool, start), &jumped)) in records.all.iter_mut().zip(all) {
-            *record = ToolRecord::new(tool, start, share, jumped);
+            let of_step = (share, self.first_word(&tool.shape));
+            *record = ToolRecord::new(tool, start, of_step, jumped);
         }
         records
     }

@@ -24,6 +24,11 @@ struct Tool {
     way: vec4f,
     // Axis times sine of its turn; whether it was put elsewhere.
     turn: vec4f,
+    // Of a closed surface (contact/distance_grid): the lower corner of its grid and the edge of small cells [m]; bricks along each
+    // axis and its first word; margin [m], the steepest that its distance is, half of the thickness of its walls [m].
+    grid: vec4f,
+    bricks: vec4u,
+    bounds: vec4f,
 }
 
 struct Tools {
@@ -32,11 +37,14 @@ struct Tools {
 }
 
 @group(1) @binding(2) var<uniform> tools: Tools;
+// Distances of closed surfaces, row by row: of each, the numbers of its divided bricks, corners of bricks, points of divided ones.
+@group(1) @binding(3) var distances: texture_2d<u32>;
 
 const HALF_SPACE: u32 = 0u;
 const SPHERE: u32 = 1u;
 const CAPSULE: u32 = 2u;
 const ROUNDED_BOX: u32 = 3u;
+const SOLID: u32 = 4u;
 
 // Poses.
 const AT_START: u32 = 0u;
@@ -47,9 +55,11 @@ const AT_END: u32 = 2u;
 const SECOND_STAGE: f32 = 10.0;
 const SHALLOW: f32 = 0.25;
 
+// The gradient is `slope` times the normal.
 struct Distance {
     value: f32,
     normal: vec3f,
+    slope: f32,
 }
 
 fn length_of(v: vec3f) -> f32 {
@@ -84,7 +94,7 @@ fn from_core(away: vec3f, radius: f32) -> Distance {
     let length = length_of(away);
     let is_some = length > 0.0;
     let normal = select(vec3f(1.0, 0.0, 0.0), away * (1.0 / select(1.0, length, is_some)), is_some);
-    return Distance(length - radius, normal);
+    return Distance(length - radius, normal, 1.0);
 }
 
 fn inside_box(x: vec3f, core: vec3f, radius: f32) -> Distance {
@@ -97,7 +107,124 @@ fn inside_box(x: vec3f, core: vec3f, radius: f32) -> Distance {
     }
     var normal = vec3f();
     normal[nearest] = select(1.0, -1.0, x[nearest] < 0.0);
-    return Distance(depth[nearest] - radius, normal);
+    return Distance(depth[nearest] - radius, normal, 1.0);
+}
+
+fn grid_word(i: u32) -> u32 {
+    return textureLoad(distances, vec2u(i % GRID_ROW, i / GRID_ROW), 0).x;
+}
+
+// Eight distances and a place between them; an edge of nothing beyond the grid.
+struct Cell {
+    values: array<f32, 8>,
+    edge: f32,
+    share: vec3f,
+}
+
+fn put_values(first: u32, columns: u32, height: u32, cell: ptr<function, Cell>) {
+    for (var k = 0u; k < 8u; k++) {
+        let at = ((k >> 2u) * columns + ((k >> 1u) & 1u)) * height + (k & 1u);
+        (*cell).values[k] = bitcast<f32>(grid_word(first + at));
+    }
+}
+
+fn cell_at(tool: u32, x: vec3f) -> Cell {
+    var cell: Cell;
+    let grid = tools.all[tool].grid;
+    let bricks = tools.all[tool].bricks;
+    let count = bricks.xyz;
+    let at = (x - grid.xyz) * (1.0 / grid.w);
+    let most = vec3f(count * BRICK);
+    if !(all(at >= vec3f()) && all(at <= most)) {
+        return cell;
+    }
+    let brick = min(vec3u(at) / BRICK, count - 1u);
+    let inner = at - vec3f(brick * BRICK);
+    let corners = bricks.w + count.x * count.y * count.z;
+    let points = corners + (count.x + 1u) * (count.y + 1u) * (count.z + 1u);
+    let divided = grid_word(bricks.w + (brick.x * count.y + brick.y) * count.z + brick.z);
+    if divided == WHOLE_BRICK {
+        let first = (brick.x * (count.y + 1u) + brick.y) * (count.z + 1u) + brick.z;
+        put_values(corners + first, count.y + 1u, count.z + 1u, &cell);
+        cell.edge = f32(BRICK) * grid.w;
+        cell.share = inner * (1.0 / f32(BRICK));
+        return cell;
+    }
+    let low = min(vec3u(inner), vec3u(BRICK - 1u));
+    let side = BRICK + 1u;
+    let first = divided * side * side * side + (low.x * side + low.y) * side + low.z;
+    put_values(points + first, side, side, &cell);
+    cell.edge = grid.w;
+    cell.share = inner - vec3f(low);
+    return cell;
+}
+
+// The trilinear function of a cell, and its gradient in the first three.
+fn interpolated(cell: Cell) -> vec4f {
+    let v = cell.values;
+    let t = cell.share;
+    var of_z: array<vec2f, 4>;
+    for (var k = 0u; k < 4u; k++) {
+        let rise = v[2u * k + 1u] - v[2u * k];
+        of_z[k] = vec2f(v[2u * k] + rise * t.z, rise);
+    }
+    var of_y: array<vec3f, 2>;
+    for (var k = 0u; k < 2u; k++) {
+        let a = of_z[2u * k];
+        let b = of_z[2u * k + 1u];
+        of_y[k] = vec3f(a.x + (b.x - a.x) * t.y, b.x - a.x, a.y + (b.y - a.y) * t.y);
+    }
+    let a = of_y[0];
+    let b = of_y[1];
+    let along = a + (b - a) * t.x;
+    return vec4f(vec3f(b.x - a.x, along.y, along.z) * (1.0 / cell.edge), along.x);
+}
+
+// Beyond the grid a bound from below.
+fn beyond_grid(tool: u32, x: vec3f) -> Distance {
+    let grid = tools.all[tool].grid;
+    let high = grid.xyz + vec3f(tools.all[tool].bricks.xyz * BRICK) * grid.w;
+    return from_core(x - min(max(x, grid.xyz), high), -tools.all[tool].bounds.x);
+}
+
+fn solid_distance(tool: u32, x: vec3f) -> Distance {
+    let cell = cell_at(tool, x);
+    if cell.edge == 0.0 {
+        return beyond_grid(tool, x);
+    }
+    let found = interpolated(cell);
+    let slope = length_of(found.xyz);
+    let is_some = slope > 0.0;
+    let normal = select(vec3f(1.0, 0.0, 0.0), found.xyz * (1.0 / select(1.0, slope, is_some)), is_some);
+    return Distance(found.w, normal, slope);
+}
+
+fn solid_value(tool: u32, x: vec3f) -> f32 {
+    let cell = cell_at(tool, x);
+    if cell.edge == 0.0 {
+        return beyond_grid(tool, x).value;
+    }
+    return interpolated(cell).w;
+}
+
+// The plane that stands for a tool at a point of its frame: of length 1, and as far from it as the tool.
+fn tangent(tool: u32, at: vec3f, distance: Distance) -> vec4f {
+    var normal = distance.normal;
+    if u32(tools.all[tool].law.x) == SOLID {
+        // The mean gradient, which is continuous from cell to cell; on a ridge there is none.
+        let half = 0.5 * tools.all[tool].grid.w;
+        var rise = vec3f();
+        for (var axis = 0u; axis < 3u; axis++) {
+            var step = vec3f();
+            step[axis] = half;
+            rise[axis] = solid_value(tool, at + step) - solid_value(tool, at - step);
+        }
+        let length = length_of(rise);
+        if length > 2e-3 * half {
+            normal = rise * (1.0 / length);
+        }
+    }
+    return vec4f(normal, dot(normal, at) - distance.value);
 }
 
 // Distance [m] and its gradient at a point of the tool's frame.
@@ -105,7 +232,10 @@ fn distance_to(tool: u32, x: vec3f) -> Distance {
     let kind = u32(tools.all[tool].law.x);
     let lengths = tools.all[tool].lengths;
     if kind == HALF_SPACE {
-        return Distance(x.z, vec3f(0.0, 0.0, 1.0));
+        return Distance(x.z, vec3f(0.0, 0.0, 1.0), 1.0);
+    }
+    if kind == SOLID {
+        return solid_distance(tool, x);
     }
     if kind == SPHERE {
         return from_core(x, lengths.w);
@@ -127,6 +257,9 @@ fn thinnest_of(tool: u32) -> f32 {
     let lengths = tools.all[tool].lengths;
     if kind == HALF_SPACE {
         return 3e38;
+    }
+    if kind == SOLID {
+        return tools.all[tool].bounds.z;
     }
     if kind == ROUNDED_BOX {
         return min(min(lengths.x, lengths.y), lengths.z);
@@ -174,10 +307,11 @@ fn tool_of(marks: u32) -> u32 {
     return marks & (MOST_TOOLS - 1u);
 }
 
-// Distance, its gradient in the world, slip from the anchor [m].
+// Distance, its gradient in the world as `slope` times the normal, slip from the anchor [m].
 struct Met {
     distance: f32,
     normal: vec3f,
+    slope: f32,
     slip: vec3f,
 }
 
@@ -188,10 +322,12 @@ fn meet(touching: Touching, pose: u32, place: vec3f) -> Met {
     if (touching.marks & HAS_PLANE) != 0u {
         met.distance = dot(touching.plane.xyz, local) - touching.plane.w;
         met.normal = turned(tool, pose, touching.plane.xyz);
+        met.slope = 1.0;
     } else {
         let live = distance_to(tool, local);
         met.distance = live.value;
         met.normal = turned(tool, pose, live.normal);
+        met.slope = live.slope;
     }
     if touching.friction.w > 0.0 {
         let away = turned(tool, pose, local - touching.friction.xyz);
@@ -214,7 +350,7 @@ fn felt_of(touching: Touching, met: Met) -> Felt {
     let k = touching.stiffness * law.y;
     let gap = max(law.z - met.distance, 0.0);
     let deep = max(gap - 0.5 * law.z, 0.0);
-    let pressed = k * gap + (SECOND_STAGE - 1.0) * k * deep;
+    let pressed = (k * gap + (SECOND_STAGE - 1.0) * k * deep) * met.slope;
     var felt = Felt(met.normal * pressed, pressed);
     let limit = touching.friction.w;
     if limit > 0.0 {
