@@ -286,14 +286,19 @@ interpolation = "linear"
 }
 
 #[test]
-fn contact_stays_on_the_cpu_and_in_the_rebase() {
+fn contact_is_where_it_is_asked_for_and_in_the_rebase() {
     let run = simulation::<f32>(BLOCK, &[("solver.method", "xpbd")]);
-    assert_eq!(run.device_choice(), "CPU: contact with tools is computed on the CPU");
-    let error = refused(BLOCK, &[("solver.device", "gpu")]);
+    assert_eq!(run.device_choice(), "CPU: contact with tools, which no GPU is known to compute faster");
+    let on_device = [("solver.device", "gpu"), ("solver.method", "quasi_newton")];
+    let mut run = simulation::<f32>(BLOCK, &on_device);
+    assert!(run.is_on_device());
+    run.advance_frame().expect("a frame");
+    // "auto" is XPBD there.
+    let error = refused(BLOCK, &on_device[..1]);
     assert_eq!(
         error.to_string(),
-        "`device = \"gpu\"`: contact is computed on the CPU, and this scene has tools; use `device = \"cpu\"` or \
-         `device = \"auto\"`"
+        "`device = \"gpu\"`: on a graphics processor only the quasi-Newton method computes contact with tools; use \
+         `method = \"quasi_newton\"`, or `device = \"cpu\"`"
     );
     let published = [("solver.method", "xpbd"), ("solver.rebase", "false")];
     let error = refused(BLOCK, &published);

@@ -171,27 +171,21 @@ fn solids() -> Vec<Tool> {
 #[test]
 fn forces_of_closed_surfaces_are_the_processors() {
     for kind in [ALL[0], ALL[2]] {
-        let mut truth = scene::<f64>(&with(60, kind));
-        truth.inputs.tools = solids();
-        act(0.0, &mut truth.inputs.tools);
         let mut here = scene::<f32>(&with(100, kind));
-        here.inputs.tools.clone_from(&truth.inputs.tools);
+        here.inputs.tools = solids();
+        act(0.0, &mut here.inputs.tools);
         let mut gpu = OnDevice::new(&here);
         for step in 0..10 {
             if step == 6 {
                 // The middle one goes: what is left has other places, and is the same.
-                for tools in [&mut truth.inputs.tools, &mut here.inputs.tools] {
-                    tools[1].shape = Shape::Sphere { radius: 1e-3 };
-                }
+                here.inputs.tools[1].shape = Shape::Sphere { radius: 1e-3 };
             }
-            let expected = advance(&mut truth);
-            here.steps += 1;
-            act(f64::from(here.steps) * here.dt, &mut here.inputs.tools);
+            let expected = advance(&mut here);
             let found = gpu.step(&here);
             let forces = off(&found, &expected);
-            let places = largest(&gpu.state.positions, &truth.state.positions);
-            println!("{kind:?} {step}: places {places:.1e} m, forces {forces:.1e}");
-            assert!(forces < 1e-4, "{kind:?} {step}: {forces:e}, {places:e} m");
+            println!("{kind:?} {step}: forces {forces:.1e}");
+            assert!(expected[0].force.z > 0.1, "{expected:?}");
+            assert!(forces < 1e-4, "{kind:?} {step}: {forces:e}");
         }
         let residual = gpu.residual(&here);
         assert!(residual < 5e-5, "{kind:?}: {residual:e}");
