@@ -149,21 +149,19 @@ fn slab() -> TetMesh {
     block([0.08, 0.08, 0.02], [8, 8, 2], 0.2)
 }
 
-/// Of beams within two. A thin slab takes up to half as many again: the processor's coarsest level of 128 nodes solves most of
-/// a mesh this small at once, the device's has 29, so that its inverse fits into the memory of a workgroup.
+/// Within two, of what is thin as well: there the coarsest level does most of the work.
 #[test]
 fn a_device_takes_as_many_passes_as_the_processor() {
-    for (name, mesh, poisson, is_thin) in [
-        ("beam", beam(), 0.3, false),
-        ("beam, nu 0.45", beam(), 0.45, false),
-        ("slab", slab(), 0.3, true),
-        ("slab, nu 0.45", slab(), 0.45, true),
+    for (name, mesh, poisson) in [
+        ("beam", beam(), 0.3),
+        ("beam, nu 0.45", beam(), 0.45),
+        ("slab", slab(), 0.3),
+        ("slab, nu 0.45", slab(), 0.45),
     ] {
         let handled = Handled::new(&mesh, poisson, Integrator::Sdirk2, false);
         let [cpu, gpu] = counts(name, &handled);
         for (cpu, gpu) in cpu.into_iter().zip(gpu) {
-            let most = if is_thin { cpu / 2 } else { 2 };
-            assert!(cpu.abs_diff(gpu) <= most, "{name}: {gpu} passes, CPU {cpu}");
+            assert!(cpu.abs_diff(gpu) <= 2, "{name}: {gpu} passes, CPU {cpu}");
         }
     }
 }
@@ -179,7 +177,9 @@ fn a_device_takes_as_many_passes_as_the_processor_at_length() {
             (Integrator::Sdirk2, true),
             (Integrator::ImplicitEuler, false),
         ] {
-            counts(name, &Handled::new(mesh, poisson, integrator, is_led));
+            let [cpu, gpu] = counts(name, &Handled::new(mesh, poisson, integrator, is_led));
+            let near = cpu.iter().zip(&gpu).all(|(cpu, gpu)| cpu.abs_diff(*gpu) <= 2);
+            assert!(near, "{name}: {gpu:?} passes, CPU {cpu:?}");
         }
     }
 }

@@ -288,7 +288,10 @@ interpolation = "linear"
 #[test]
 fn contact_is_where_it_is_asked_for_and_in_the_rebase() {
     let run = simulation::<f32>(BLOCK, &[("solver.method", "xpbd")]);
-    assert_eq!(run.device_choice(), "CPU: contact with tools, which no GPU is known to compute faster");
+    assert_eq!(
+        run.device_choice(),
+        "CPU: contact with tools, which no GPU is known to compute faster"
+    );
     let on_device = [("solver.device", "gpu"), ("solver.method", "quasi_newton")];
     let mut run = simulation::<f32>(BLOCK, &on_device);
     assert!(run.is_on_device());

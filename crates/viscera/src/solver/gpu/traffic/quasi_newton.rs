@@ -55,10 +55,11 @@ table! {
         w(Multilevel, INVERSE, Block),
         w(Multilevel, WORD, DenseNumber),
     ];
-    // Every number once for each of up to 87 pivots.
-    INVERT_DENSE, 260 each DenseNumber: [
+    // Every number once for each six of up to 192 pivots.
+    INVERT_DENSE, 400 each DenseNumber: [
         r(Levels, LEVELS_PART, Part),
         r(Multilevel, WORD, DenseNumber),
+        again(Multilevel, 2 * 31 * WORD, DenseNumber),
         w(Multilevel, WORD, DenseNumber),
     ];
     EVALUATE_ELEMENTS, 460 each Tet: [

@@ -55,7 +55,24 @@ fn restrict_gradient(
     }
 }
 
-var<workgroup> right: array<f32, 96>;
+var<workgroup> right: array<f32, 192>;
+
+// Of 32 nodes from one on, into `right` from its place on; `end`: where they end.
+fn add_residuals(first: u32, end: u32, into: u32, local: u32) -> vec3f {
+    let place = local / SHARING;
+    var sum = vec3f();
+    if first + place < end {
+        sum = add_children(first + place, local);
+    }
+    sum = share_sum(sum, local, 256u);
+    if local % SHARING == 0u {
+        // Every place is written, whatever is there of the level.
+        for (var k = 0u; k < 3u; k++) {
+            right[3u * (into + place) + k] = sum[k];
+        }
+    }
+    return sum;
+}
 
 // 32 coarser nodes a workgroup, from `job.first` on; then a workgroup for each dense level: `job.set_first` is the first.
 @compute @workgroup_size(256)
@@ -65,48 +82,33 @@ fn correct_coarse(
     @builtin(num_workgroups) groups: vec3u,
 ) {
     let number = workgroup.x + workgroup.y * groups.x;
-    let is_dense = number >= job.set_first;
-    let part = select(0u, min(number - job.set_first, job.count - 1u), is_dense);
-    let row = levels[LEVELS_PART_ROWS] + LEVEL_PART_WORDS * part;
-    let place = local / SHARING;
-    var node = job.first + 32u * number + place;
-    var has_node = node < levels[LEVELS_ORDINARY];
-    if is_dense {
-        node = levels[row] + place;
-        has_node = place < levels[row + 1u] && number - job.set_first < job.count;
-    }
-    var sum = vec3f();
-    if has_node {
-        sum = add_children(node, local);
-    }
-    sum = share_sum(sum, local, 256u);
-    let is_first = local % SHARING == 0u;
-    if is_first {
-        // Every place is written, whatever is there of the level.
-        right[3u * place] = sum.x;
-        right[3u * place + 1u] = sum.y;
-        right[3u * place + 2u] = sum.z;
-    }
-    workgroupBarrier();
-    if !has_node || !is_first {
+    if number < job.set_first {
+        let first = job.first + 32u * number;
+        let sum = add_residuals(first, levels[LEVELS_ORDINARY], 0u, local);
+        let node = first + local / SHARING;
+        if node < levels[LEVELS_ORDINARY] && local % SHARING == 0u {
+            put_vector(correction_at(node), inverse_times(levels[LEVELS_VERTICES] + node, sum));
+        }
         return;
     }
-    if !is_dense {
-        put_vector(correction_at(node), inverse_times(levels[LEVELS_VERTICES] + node, sum));
+    let part = number - job.set_first;
+    let row = levels[LEVELS_PART_ROWS] + LEVEL_PART_WORDS * min(part, job.count - 1u);
+    let first = levels[row];
+    let end = first + select(0u, levels[row + 1u], part < job.count);
+    for (var nodes = 0u; nodes < MOST_DENSE; nodes += 32u) {
+        add_residuals(first + nodes, end, nodes, local);
+    }
+    workgroupBarrier();
+    let n = 3u * (end - first);
+    if local >= n {
         return;
     }
     let matrix = levels[LEVELS_DENSE] + levels[row + 2u];
-    let n = 3u * levels[row + 1u];
-    var correction = vec3f();
-    for (var k = 0u; k < 3u; k++) {
-        let i = 3u * place + k;
-        var product = 0.0;
-        for (var j = 0u; j < n; j++) {
-            product += multilevel[matrix + packed(max(i, j), min(i, j))] * right[j];
-        }
-        correction[k] = product;
+    var sum = 0.0;
+    for (var j = 0u; j < n; j++) {
+        sum += multilevel[matrix + packed(max(local, j), min(local, j))] * right[j];
     }
-    put_vector(correction_at(node), correction);
+    multilevel[correction_at(first + local / 3u) + local % 3u] = sum;
 }
 
 @compute @workgroup_size(64)

@@ -15,12 +15,12 @@ use crate::layout::Layout;
 use crate::solver::quasi_newton::choice::Choice;
 
 impl Coarseness {
-    /// The lower triangle of a dense system of 87 unknowns fits into the memory of a workgroup.
+    /// As many as the processor aims for; a workgroup has a panel of its columns in its memory.
     pub const ON_DEVICE: Self = Self { aim: MOST_DENSE, most: MOST_DENSE };
 }
 
 /// Nodes of a dense level at most.
-pub const MOST_DENSE: usize = 29;
+pub const MOST_DENSE: usize = 64;
 
 /// A source of a node is marked so where it is a vertex; others are nodes.
 pub const OF_VERTEX: u32 = 1 << 31;
@@ -445,6 +445,7 @@ pub fn words() -> Vec<(&'static str, u32)> {
     );
     all.extend([
         ("OF_VERTEX", OF_VERTEX),
+        ("MOST_DENSE", MOST_DENSE as u32),
         ("SHARE_WORDS", SHARE_WORDS as u32),
         ("ENTRY_WORDS", ENTRY_WORDS as u32),
         ("GROUP_WORDS", GROUP_WORDS as u32),
