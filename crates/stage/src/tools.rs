@@ -263,6 +263,7 @@ mod tests {
                 torque: [0.0; 3],
                 touches: 3,
                 pinned: 0,
+                left_out: 0,
                 depth: 0.0,
                 has_jumped: false,
                 crossed: None,

@@ -38,6 +38,7 @@ pub(super) fn forces(simulation: &Simulation<f64>, rest: &Rest) -> Vec<ToolForce
             torque,
             touches,
             pinned,
+            left_out: 0,
             depth,
             has_jumped: false,
             crossed: None,

@@ -30,6 +30,8 @@ pub struct ToolForce {
     pub touches: u32,
     /// Of these hang on held vertices only: nothing gives way there.
     pub pinned: u32,
+    /// Samples that may meet it and were left out, because three other tools are nearer to them: on a graphics processor alone.
+    pub left_out: u32,
     /// The deepest that tissue is inside the contact's thickness [m].
     pub depth: f64,
     /// Whether it was put elsewhere in the frame, further than a tool moves.
@@ -65,6 +67,10 @@ impl std::fmt::Display for ToolForce {
         let jumped = "; it was put elsewhere, further than a tool moves";
         if self.has_jumped {
             f.write_str(jumped)?;
+        }
+        if self.left_out > 0 {
+            let count = self.left_out;
+            write!(f, "; {count} places were left out, where more than three tools are near")?;
         }
         match &self.crossed {
             Some(Crossed { tool, depth }) => {
@@ -400,6 +406,7 @@ fn force_on(
         sum.torque += torque_about(origin, wrench, placed);
         sum.touches += wrench.touches;
         sum.pinned += wrench.pinned;
+        sum.left_out += wrench.left_out;
         sum.depth = sum.depth.max(wrench.depth);
     }
     ToolForce {
@@ -408,6 +415,7 @@ fn force_on(
         torque: sum.torque.to_array(),
         touches: sum.touches,
         pinned: sum.pinned,
+        left_out: sum.left_out,
         depth: sum.depth,
         has_jumped: false,
         crossed: None,

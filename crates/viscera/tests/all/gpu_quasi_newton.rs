@@ -81,9 +81,9 @@ fn assert_agreement(steps: u32) {
             let cpu = run::<f32>(&settings, steps);
             let [cpu, gpu] = [&cpu, &gpu].map(|state| largest(&state.positions, &oracle.positions));
             println!("{kind:?}, {iterations:?}: CPU {cpu:.1e} m, GPU {gpu:.1e} m");
-            // Of places of 0.1 m in single precision, step after step.
+            // Of places of 0.1 m in single precision, step after step; what swings has it at once.
             assert!(
-                gpu <= 2.0 * cpu + 4e-8 * f64::from(steps) + resolved,
+                gpu <= 2.0 * cpu + 4e-8 * f64::from(steps.max(6)) + resolved,
                 "{kind:?}, {iterations:?}: {gpu:e}, {cpu:e}"
             );
         }

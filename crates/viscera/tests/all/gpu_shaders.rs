@@ -222,7 +222,7 @@ fn steps_map_no_memory() {
         let name = file.file_name().to_string_lossy().into_owned();
         maps.extend((0..text.matches("map_async").count()).map(|_| name.clone()));
     }
-    // `request` and `Reading`, neither of which `step` reaches.
+    // `Frames` and `Reading`, neither of which `step` reaches.
     maps.sort();
-    assert_eq!(maps, ["frames.rs", "reading.rs"]);
+    assert_eq!(maps, ["reading.rs", "ring.rs"]);
 }

@@ -1,43 +1,16 @@
 //! Contact with tools on the device: what the host sends of them, and takes back.
 
-use super::buffers::Buffers;
 use super::error::GpuError;
 use super::reading::read;
 use super::slots::Slot;
 use super::solver::GpuSolver;
 use crate::contact::{METHOD_ON_DEVICE, Tool, Wrench, beyond_devices};
-use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::vec3;
 use crate::settings::Method;
 use crate::solver::error::StepError;
 use crate::solver::step::contacts::on_device::{DeviceTools, GRID_ROW, IS_THERE, ToolRecords};
 use crate::state::{ContactState, State};
-
-/// Tools on a device.
-#[derive(Debug, Default)]
-pub(super) struct OfTools {
-    pub all: DeviceTools,
-    /// At the end of the last step that was read.
-    pub wrenches: Vec<Wrench>,
-}
-
-impl OfTools {
-    /// Poses, and `into` a device that computes contact what a state has kept of samples.
-    pub fn put(
-        &mut self,
-        into: Option<(&Buffers, &wgpu::Queue)>,
-        layout: &Layout<f32>,
-        contact: &ContactState,
-    ) {
-        self.all.put(contact);
-        self.wrenches.clear();
-        if let Some((buffers, queue)) = into {
-            let rows = DeviceTools::rows(layout, &contact.touches);
-            buffers.write(queue, Slot::Contact, bytemuck::cast_slice(&rows));
-        }
-    }
-}
 
 /// Of tools of closed surfaces that are too large for the cells of their grid.
 const TOO_FINE: &str =
@@ -59,6 +32,27 @@ impl GpuSolver {
     /// before.
     pub fn wrenches(&self) -> &[Wrench] {
         &self.tools.wrenches
+    }
+
+    /// Asks for the forces on the tools at the end of the last step, and for nothing else: a kilobyte. Returns the request's
+    /// number, or nothing while three others are under way, and where nothing touches anything. Does not wait.
+    pub fn request_forces(&mut self) -> Option<u64> {
+        self.samples?;
+        let copy = self.forces.take(&self.device)?;
+        let [start, _] = self.buffers.span(Slot::ToolSums);
+        let mut encoder = self.encoder("forces");
+        let sums = self.buffers.buffer(Slot::ToolSums);
+        encoder.copy_buffer_to_buffer(sums, start, &copy, 0, self.of_tools());
+        self.device.queue.submit([encoder.finish()]);
+        Some(self.forces.send(copy))
+    }
+
+    /// The newest forces on the tools that have arrived since the last call, and the request that they answer. Does not wait.
+    pub fn newest_forces(&mut self) -> Option<(u64, Vec<Wrench>)> {
+        let Self { forces, device, tools, .. } = self;
+        forces.newest(device, |number, bytes| {
+            (number, tools.all.wrenches(bytemuck::cast_slice(bytes)))
+        })
     }
 
     /// Sends the tools of a step of `dt` [s].

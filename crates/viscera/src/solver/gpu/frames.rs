@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::control::{PARTS_START, rejected_steps};
 use super::error::GpuError;
-use super::reading::{read, staging, wait};
+use super::reading::{read, wait};
 use super::slots::Slot;
 use super::solver::GpuSolver;
 use crate::contact::Wrench;
@@ -22,9 +22,6 @@ use crate::solver::step::predict::load_tethers;
 use crate::solver::step::recovered::MeasuredTets;
 use crate::state::State;
 
-/// Copies that may be under way at a time; more requests give way until one has arrived.
-const RING: usize = 3;
-
 /// Positions at the end of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
@@ -38,57 +35,21 @@ impl GpuSolver {
     /// Asks for the positions at the end of the last step; returns the request's number, or nothing
     /// while three others are under way. Does not wait.
     pub fn request(&mut self) -> Option<u64> {
-        self.collect();
-        let size = self.buffers.points_size;
-        let buffer = match self.frames.free.pop() {
-            Some(buffer) => buffer,
-            None if self.frames.under_way.len() < RING => staging(&self.device, size),
-            None => return None,
-        };
+        let buffer = self.frames.take(&self.device)?;
         let mut encoder = self.encoder("frame");
+        let size = self.buffers.points_size;
         encoder.copy_buffer_to_buffer(self.positions(), 0, &buffer, 0, size);
         self.device.queue.submit([encoder.finish()]);
-        self.frames.requested += 1;
-        let (number, told) = (self.frames.requested, self.frames.arrivals.0.clone());
-        buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-            // A solver that is gone does not listen.
-            let _ = told.send((number, result.is_ok()));
-        });
-        self.frames.under_way.push((number, buffer));
-        Some(number)
+        Some(self.frames.send(buffer))
     }
 
     /// The newest positions that have arrived since the last call. Does not wait.
     pub fn newest(&mut self, model: &Model<f32>) -> Option<Frame> {
-        self.collect();
         let layout = self.layout_of(model).ok()?;
-        let model = &*layout;
-        let (number, buffer) = self.frames.arrived.take()?;
-        let frame = buffer.slice(..).get_mapped_range().ok().map(|bytes| {
-            let places: &[[f32; 4]] = bytemuck::cast_slice(&bytes);
-            Frame { number, positions: in_user_order(model, places) }
-        });
-        buffer.unmap();
-        self.frames.free.push(buffer);
-        frame
-    }
-
-    /// Keeps the newest copy that has arrived; older ones are free again.
-    fn collect(&mut self) {
-        // Where polling fails the device is lost, and nothing arrives any more.
-        let _ = self.device.device.poll(wgpu::PollType::Poll);
-        let frames = &mut self.frames;
-        while let Ok((number, is_there)) = frames.arrivals.1.try_recv() {
-            let place = frames.under_way.iter().position(|(n, _)| *n == number);
-            let Some(place) = place else { continue };
-            let copy = frames.under_way.swap_remove(place);
-            // Copies arrive in the order of their requests.
-            let older = if is_there { frames.arrived.replace(copy) } else { Some(copy) };
-            if let Some((_, buffer)) = older {
-                buffer.unmap();
-                frames.free.push(buffer);
-            }
-        }
+        self.frames.newest(&self.device, |number, bytes| {
+            let places: &[[f32; 4]] = bytemuck::cast_slice(bytes);
+            Frame { number, positions: in_user_order(&layout, places) }
+        })
     }
 
     /// Waits for the device and reads its whole state. On an error the state is as it was.
@@ -136,7 +97,7 @@ impl GpuSolver {
     }
 
     /// Bytes that are read of tools.
-    fn of_tools(&self) -> u64 {
+    pub(super) fn of_tools(&self) -> u64 {
         if self.samples.is_some() { 4 * ALL_SUMS as u64 } else { 4 }
     }
 

@@ -1,5 +1,6 @@
 //! The kernels: which text each is made of, and what it is bound to.
 
+use super::bindings::{storage_entry, uniform_layout};
 use super::device::{Device, Pipeline};
 use super::slots::Slot;
 use crate::elements::TetForm;
@@ -466,42 +467,4 @@ fn compile(device: &Device, kernel: &Kernel, variant: Variant, label: &str) -> P
         cache: None,
     });
     Pipeline { pipeline, storage }
-}
-
-fn storage_entry(slot: Slot) -> wgpu::BindGroupLayoutEntry {
-    wgpu::BindGroupLayoutEntry {
-        binding: slot as u32,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Storage { read_only: slot.is_read_only() },
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
-        count: None,
-    }
-}
-
-/// The job of a dispatch, and the constants and tools of the step.
-pub(super) fn uniform_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let visibility = wgpu::ShaderStages::COMPUTE;
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None };
-    let uniform = |has_dynamic_offset| wgpu::BindingType::Buffer {
-        ty: wgpu::BufferBindingType::Uniform,
-        has_dynamic_offset,
-        min_binding_size: None,
-    };
-    let distances = wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Uint,
-        view_dimension: wgpu::TextureViewDimension::D2,
-        multisampled: false,
-    };
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("job, frame and tools"),
-        entries: &[
-            entry(0, uniform(true)),
-            entry(1, uniform(false)),
-            entry(2, uniform(false)),
-            entry(3, distances),
-        ],
-    })
 }

@@ -304,33 +304,38 @@ impl DeviceLayout {
             header.weights = add(Some(Slot::Weights), &weights);
         }
 
-        if let Some(samples) = self.samples {
-            let [rows, offsets, entries] = on_device_contact::tables(layout);
-            header.samples = add(None, &words(&rows));
-            header.sample_offsets = add(None, &words(&offsets));
-            header.sample_entries = add(None, &words(&entries));
-            header.first_sample = header.tet_lanes + self.elements.len() as u32;
-            header.contact = self.slot_count() as u32;
-            let [start, size] = [16 * self.slot_count(), 16 * samples.vectors()];
-            ranges.push(Range { slot: Slot::Contact, owner: Slot::Loads, start, size });
+        if self.samples.is_some() {
+            let tables = on_device_contact::tables(layout).map(|table| add(None, &words(&table)));
+            [header.samples, header.sample_offsets, header.sample_entries] = tables;
         }
         let [start, size] = vertex_data(layout, settings, &mut ranges);
         (header.stride, header.anchors) = (Self::stride(layout), (start / 16) as u32);
 
-        let [lines, energies, tool_sums] = self.sums(settings);
+        let [lines, energies, mut sums] = self.sums(settings);
         (header.lines, header.energies) = (lines as u32, energies as u32);
-        header.tool_sums = tool_sums as u32;
-        let of_tools = self.samples.map_or(0, Samples::sums);
-        let owner = Slot::PartialSums;
-        ranges.push(Range {
-            slot: Slot::ToolSums,
-            owner,
-            start: 4 * tool_sums,
-            size: 4 * of_tools,
-        });
-        let sums = tool_sums + of_tools;
+        if let Some(samples) = self.samples {
+            self.place_contact(samples, sums, &mut header, &mut ranges);
+            sums += samples.sums();
+        }
         bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
         Table { bytes, ranges, vertex_data_size: start + size, sums_size: 4 * sums }
+    }
+
+    /// Where contact stands among the loads, and forces of tools among the sums, from one of these on.
+    fn place_contact(
+        &self,
+        samples: Samples,
+        first_sum: u64,
+        header: &mut Header,
+        ranges: &mut Vec<Range>,
+    ) {
+        header.first_sample = header.tet_lanes + self.elements.len() as u32;
+        header.contact = self.slot_count() as u32;
+        header.tool_sums = first_sum as u32;
+        let [start, size] = [16 * self.slot_count(), 16 * samples.vectors()];
+        ranges.push(Range { slot: Slot::Contact, owner: Slot::Loads, start, size });
+        let [start, size] = [4 * first_sum, 4 * samples.sums()];
+        ranges.push(Range { slot: Slot::ToolSums, owner: Slot::PartialSums, start, size });
     }
 
     /// Where lines of the search and energies begin among the partial sums, and how many there are without those of tools.

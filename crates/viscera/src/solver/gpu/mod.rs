@@ -14,6 +14,7 @@
 //! The state lives on the device, vertices in the solver's numbering. What decides during a step (step
 //! lengths, weights, rejections) lies in one record there, `Control`; nothing is read back inside a step.
 
+mod bindings;
 mod buffers;
 mod clusters;
 mod contact;
@@ -43,6 +44,7 @@ mod step;
 mod surface;
 mod switch;
 mod timing;
+mod tools;
 mod traffic;
 pub(in crate::solver) mod uniforms;
 mod words;

@@ -1,7 +1,7 @@
 //! The solver of one model on a graphics processor: its memory and kernels.
 
+use super::bindings::Uniforms;
 use super::buffers::Buffers;
-use super::contact::OfTools;
 use super::control;
 use super::device::{Device, baseline, shortfall};
 use super::error::GpuError;
@@ -14,8 +14,8 @@ use super::record::{Dispatch, Recorder};
 use super::ring::Frames;
 use super::slots::{Slot, Update};
 use super::stages::StageRange;
+use super::tools::OfTools;
 use super::traffic::Recorded;
-use super::uniforms::Uniforms;
 use bytemuck::Zeroable;
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ use crate::solver::inputs::{check_model, check_settings};
 use crate::solver::plan::{Plan, Stage, StepStage};
 use crate::solver::quasi_newton::on_device::{self, DeviceLevels};
 use crate::solver::quasi_newton::progress::PartProgress;
-use crate::solver::step::contacts::on_device::Samples;
+use crate::solver::step::contacts::on_device::{ALL_SUMS, Samples};
 use crate::solver::step::recovered;
 use crate::solver::step::tethers::Bundle;
 use crate::state::State;
@@ -65,6 +65,7 @@ pub struct GpuSolver {
     pub(super) stage_starts: [Vec<usize>; 2],
     pub(super) restart: Vec<Ready>,
     pub(super) frames: Frames,
+    pub(super) forces: Frames,
     pub(super) sent: Sent,
     /// What the device's multipliers belong to [s]; zero before the first step.
     pub(super) multiplier_dt: f64,
@@ -151,7 +152,8 @@ impl GpuSolver {
         });
         let is_explicit = settings.method == Method::Explicit;
         let mut solver = Self {
-            frames: Frames::new(&buffers),
+            frames: Frames::new(buffers.points_size),
+            forces: Frames::new(4 * ALL_SUMS as u64),
             sent: Sent::default(),
             weights_dt: 0.0,
             device: device.clone(),
@@ -254,7 +256,7 @@ impl GpuSolver {
 
     /// Bytes of device memory.
     pub fn bytes(&self) -> u64 {
-        self.buffers.bytes() + self.uniforms.jobs.size() + self.frames.bytes()
+        self.buffers.bytes() + self.uniforms.jobs.size() + self.frames.bytes() + self.forces.bytes()
     }
 
     /// Positions [m] as four floats a vertex, of which the last does not count, in the solver's

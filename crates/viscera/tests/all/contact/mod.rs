@@ -8,6 +8,7 @@ mod inside;
 mod meshes;
 mod motion;
 mod on_device;
+mod on_device_robust;
 mod organs;
 mod passes;
 mod refused;

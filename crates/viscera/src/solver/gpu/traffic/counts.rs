@@ -268,11 +268,9 @@ impl<'a> Counts<'a> {
             Count::AverageByVertexPiece => self.recovered.averages * of_pieces(&|_, v| v),
             Count::JobPiece | Count::JobCluster => f64::from(dispatch.job.count),
             Count::JobClusterVertex => self.of_clusters(dispatch).map(f64::from).sum(),
-            Count::Sample => layout.samples.len() as f64,
-            Count::SampleCorner => 4.0 * layout.samples.len() as f64,
-            Count::SampleVertex if layout.samples.is_empty() => 0.0,
-            Count::SampleVertex => vertices,
-            Count::SampleGroup => Samples::new(layout).map_or(0.0, |all| f64::from(all.groups)),
+            Count::Sample | Count::SampleCorner | Count::SampleVertex | Count::SampleGroup => {
+                self.of_samples(count)
+            }
             Count::PieceTet
             | Count::PieceRecoveredTet
             | Count::PieceRecoveredCorner
@@ -280,6 +278,19 @@ impl<'a> Counts<'a> {
             | Count::PieceElement
             | Count::PieceVertex => self.of_job_pieces(count, dispatch),
             of_recovered => self.recovered.of(of_recovered),
+        }
+    }
+
+    /// Of the surface that tools touch.
+    fn of_samples(&self, count: Count) -> f64 {
+        let Some(Samples { count: samples, groups }) = Samples::new(self.layout) else {
+            return 0.0;
+        };
+        match count {
+            Count::SampleCorner => 4.0 * f64::from(samples),
+            Count::SampleVertex => self.layout.vertex_count() as f64,
+            Count::SampleGroup => f64::from(groups),
+            _ => f64::from(samples),
         }
     }
 
