@@ -4,7 +4,10 @@ use super::device::Device;
 use super::limits::JOB_STRIDE;
 use super::slots::Slot;
 use super::uniforms::{FrameConstants, Job};
-use crate::solver::step::contacts::on_device::{GRID_ROW, ToolRecords};
+use crate::solver::step::contacts::on_device::{GRID_ROW, IS_THERE, ToolRecords};
+
+/// What kernels are bound to beside storage: where no kernel computes contact, no tools and distances.
+const COUNT: usize = if IS_THERE { 4 } else { 2 };
 
 /// How a kernel is bound to a slot.
 pub(super) fn storage_entry(slot: Slot) -> wgpu::BindGroupLayoutEntry {
@@ -41,7 +44,7 @@ pub(super) fn uniform_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
             entry(1, uniform(false)),
             entry(2, uniform(false)),
             entry(3, distances),
-        ],
+        ][..COUNT],
     })
 }
 
@@ -68,15 +71,16 @@ impl Uniforms {
         let jobs = make("jobs", JOB_STRIDE * job_count.max(1));
         let frame = make("frame", size_of::<FrameConstants>() as u64);
         let tools = make("tools", size_of::<ToolRecords>() as u64);
-        let nothing = distances(device, &[0; GRID_ROW as usize]);
-        let all = bind(device, [&jobs, &frame, &tools], &nothing);
+        let nothing = IS_THERE.then(|| distances(device, &[0; GRID_ROW as usize]));
+        let all = bind(device, [&jobs, &frame, &tools], nothing.as_ref());
         Self { jobs, frame, tools, all }
     }
 
     /// Puts distances of closed surfaces, whole rows of words, in the place of those that were there.
     pub fn put_distances(&mut self, device: &Device, words: &[u32]) {
         let Self { jobs, frame, tools, .. } = &*self;
-        self.all = bind(device, [jobs, frame, tools], &distances(device, words));
+        let distances = IS_THERE.then(|| distances(device, words));
+        self.all = bind(device, [jobs, frame, tools], distances.as_ref());
     }
 }
 
@@ -109,7 +113,7 @@ fn distances(device: &Device, words: &[u32]) -> wgpu::TextureView {
 fn bind(
     device: &Device,
     [jobs, frame, tools]: [&wgpu::Buffer; 3],
-    distances: &wgpu::TextureView,
+    distances: Option<&wgpu::TextureView>,
 ) -> wgpu::BindGroup {
     let one_job = wgpu::BufferBinding {
         buffer: jobs,
@@ -120,10 +124,10 @@ fn bind(
         wgpu::BindingResource::Buffer(one_job),
         frame.as_entire_binding(),
         tools.as_entire_binding(),
-        wgpu::BindingResource::TextureView(distances),
     ];
+    let distances = distances.map(wgpu::BindingResource::TextureView);
     let entries: Vec<_> = (0..)
-        .zip(resources)
+        .zip(resources.into_iter().chain(distances).take(COUNT))
         .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
         .collect();
     device.device.create_bind_group(&wgpu::BindGroupDescriptor {

@@ -96,7 +96,7 @@ impl Buffers {
         let when = |wanted: bool, size: u64| if wanted { size } else { 0 };
         let copies = when(layout.is_split(), 16 * layout.copy_count() as u64);
         let lanes = LANES as u64;
-        let contact = on_device.samples.map_or(0, Samples::vectors);
+        let contact = Samples::known(on_device.samples).map_or(0, Samples::vectors);
         let own = [
             (Slot::Copies, "copies of vertices", copies),
             (Slot::Loads, "loads", 16 * (on_device.slot_count() + contact)),

@@ -9,7 +9,9 @@ use crate::model::Model;
 use crate::scalar::vec3;
 use crate::settings::Method;
 use crate::solver::error::StepError;
-use crate::solver::step::contacts::on_device::{DeviceTools, GRID_ROW, IS_THERE, ToolRecords};
+use crate::solver::step::contacts::on_device::{
+    DeviceTools, GRID_ROW, IS_THERE, Samples, ToolRecords,
+};
 use crate::state::{ContactState, State};
 
 /// Of tools of closed surfaces that are too large for the cells of their grid.
@@ -28,6 +30,12 @@ fn refuses(method: Method, tools: &[Tool]) -> Option<&'static str> {
 }
 
 impl GpuSolver {
+    /// Samples of the surface, where contact is computed: known to be none where no kernels are.
+    #[inline]
+    pub(super) fn samples(&self) -> Option<Samples> {
+        Samples::known(self.samples)
+    }
+
     /// Forces on the tools at the end of the last step that was read by [`GpuSolver::read_frame`] or what is like it; empty
     /// before.
     pub fn wrenches(&self) -> &[Wrench] {
@@ -37,7 +45,7 @@ impl GpuSolver {
     /// Asks for the forces on the tools at the end of the last step, and for nothing else: a kilobyte. Returns the request's
     /// number, or nothing while three others are under way, and where nothing touches anything. Does not wait.
     pub fn request_forces(&mut self) -> Option<u64> {
-        self.samples?;
+        self.samples()?;
         let copy = self.forces.take(&self.device)?;
         let [start, _] = self.buffers.span(Slot::ToolSums);
         let mut encoder = self.encoder("forces");
@@ -49,6 +57,7 @@ impl GpuSolver {
 
     /// The newest forces on the tools that have arrived since the last call, and the request that they answer. Does not wait.
     pub fn newest_forces(&mut self) -> Option<(u64, Vec<Wrench>)> {
+        self.samples()?;
         let Self { forces, device, tools, .. } = self;
         forces.newest(device, |number, bytes| {
             (number, tools.all.wrenches(bytemuck::cast_slice(bytes)))
@@ -57,7 +66,7 @@ impl GpuSolver {
 
     /// Sends the tools of a step of `dt` [s].
     pub(super) fn send_tools(&mut self, tools: &[Tool], dt: f64) -> Result<(), StepError> {
-        if self.samples.is_none() {
+        if self.samples().is_none() {
             return match tools {
                 [] => Ok(()),
                 _ => Err(StepError::ContactOnDevice {
@@ -88,10 +97,13 @@ impl GpuSolver {
         model: &Model<f32>,
         state: &State<f32>,
     ) -> Result<ContactState, GpuError> {
+        if !IS_THERE {
+            return Ok(ContactState::default());
+        }
         let layout = self.layout_of(model)?;
         let poses = self.tools.all.poses().to_vec();
         let mut contact = ContactState { poses, ..ContactState::default() };
-        if self.samples.is_some() {
+        if self.samples().is_some() {
             let user = |v: usize| layout.numbering.order[v] as usize;
             let place =
                 |v: usize| state.positions.get(user(v)).copied().unwrap_or(vec3(0.0, 0.0, 0.0));

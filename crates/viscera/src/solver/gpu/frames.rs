@@ -88,7 +88,7 @@ impl GpuSolver {
             part(Slot::Unknowns, points),
             part(Slot::Velocities, points),
             part(Slot::Control, PARTS_START as u64),
-            match self.samples {
+            match self.samples() {
                 Some(_) => part(Slot::ToolSums, self.of_tools()),
                 // Nothing cannot be copied.
                 None => part(Slot::Control, self.of_tools()),
@@ -98,7 +98,7 @@ impl GpuSolver {
 
     /// Bytes that are read of tools.
     pub(super) fn of_tools(&self) -> u64 {
-        if self.samples.is_some() { 4 * ALL_SUMS as u64 } else { 4 }
+        if self.samples().is_some() { 4 * ALL_SUMS as u64 } else { 4 }
     }
 
     /// Takes over copies of those ranges; returns how many steps were rejected so far.
@@ -111,7 +111,7 @@ impl GpuSolver {
         put_in_user_order(layout, bytemuck::cast_slice(read[0]), &mut state.positions);
         put_in_user_order(layout, bytemuck::cast_slice(read[1]), &mut state.velocities);
         state.multiplier_dt = self.multiplier_dt;
-        let wrenches = match self.samples {
+        let wrenches = match self.samples() {
             Some(_) => self.tools.all.wrenches(bytemuck::cast_slice(read[3])),
             None => Vec::new(),
         };
@@ -168,7 +168,7 @@ impl GpuSolver {
     /// Where everything stands that a force balance needs.
     pub(super) fn balance_slots(&self) -> Vec<Slot> {
         let mut slots = vec![Slot::Predicted, Slot::ExternalForces, Slot::Previous];
-        if self.samples.is_some() {
+        if self.samples().is_some() {
             slots.push(Slot::Contact);
         }
         if self.layout.is_viscous() {
@@ -259,7 +259,7 @@ impl GpuSolver {
         }
         let mut measured = MeasuredTets::new(model);
         let mut more = read[3..].iter();
-        let contacts = match self.samples {
+        let contacts = match self.samples() {
             Some(_) => more.next().map(|rows| bytemuck::cast_slice(rows)),
             None => None,
         };

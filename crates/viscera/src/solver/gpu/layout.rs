@@ -124,7 +124,7 @@ pub(super) fn vertex_ranges() -> impl Iterator<Item = (&'static str, u32)> {
     let common = VERTEX_DATA.map(|(name, _)| name).into_iter();
     (0..)
         .zip(common)
-        .chain((UNGUARDED as u32 - 1..).zip(OF_QUASI_NEWTON))
+        .chain((UNGUARDED as u32 - 1..).zip(OF_QUASI_NEWTON).filter(|_| on_device::IS_THERE))
         .map(|(i, name)| (name, i))
 }
 
@@ -228,7 +228,7 @@ impl DeviceLayout {
             }
         }
         let samples = samples_of(layout, settings);
-        let with_samples = samples.is_some();
+        let with_samples = Samples::known(samples).is_some();
         let (members, pieces) = pieces(layout, &elements, &by_kind, with_samples);
         let parts = Parts::new(layout, settings, &pieces);
         let block_parts = block_parts(layout);
@@ -304,7 +304,7 @@ impl DeviceLayout {
             header.weights = add(Some(Slot::Weights), &weights);
         }
 
-        if self.samples.is_some() {
+        if Samples::known(self.samples).is_some() {
             let tables = on_device_contact::tables(layout).map(|table| add(None, &words(&table)));
             [header.samples, header.sample_offsets, header.sample_entries] = tables;
         }
@@ -313,7 +313,7 @@ impl DeviceLayout {
 
         let [lines, energies, mut sums] = self.sums(settings);
         (header.lines, header.energies) = (lines as u32, energies as u32);
-        if let Some(samples) = self.samples {
+        if let Some(samples) = Samples::known(self.samples) {
             self.place_contact(samples, sums, &mut header, &mut ranges);
             sums += samples.sums();
         }

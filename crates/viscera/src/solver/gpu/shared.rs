@@ -10,6 +10,7 @@ use crate::layout::CLUSTER_VERTICES;
 use crate::scalar::lanes::LANES;
 use crate::settings::MOST_HISTORY;
 use crate::solver::cpu::products::LARGEST_WINDOW;
+use crate::solver::quasi_newton::on_device::IS_THERE;
 use crate::solver::quasi_newton::progress::{PartProgress, SolveState};
 use crate::solver::quasi_newton::tables;
 use crate::solver::step::contacts::on_device as contact;
@@ -83,8 +84,10 @@ pub(super) fn constants() -> String {
         ("MOST_HISTORY", MOST_HISTORY as u32),
         ("CLUSTER_VERTICES", CLUSTER_VERTICES as u32),
     ];
-    let ranges = layout::vertex_ranges().chain(tables::words()).chain(on_device::names());
-    let ranges = ranges.chain(contact::names());
+    // Of kernels that pages leave out.
+    let of_solves = IS_THERE
+        .then(|| tables::words().into_iter().chain(on_device::names()).chain(contact::names()));
+    let ranges = layout::vertex_ranges().chain(of_solves.into_iter().flatten());
     let numbers = words::words().into_iter().chain(MODES.iter().copied());
     let numbers = numbers.chain(ranges).chain(guarded).chain(shared);
     let mut text: String =

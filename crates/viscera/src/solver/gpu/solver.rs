@@ -299,7 +299,7 @@ impl GpuSolver {
         self.write_velocities(&state.velocities);
         self.multiplier_dt = state.multiplier_dt;
         self.forget_pairs();
-        let into = self.samples.map(|_| (&self.buffers, &self.device.queue));
+        let into = self.samples().map(|_| (&self.buffers, &self.device.queue));
         self.tools.put(into, layout, &state.contact);
     }
 

@@ -4,11 +4,11 @@ use super::buffers::Buffers;
 use super::slots::Slot;
 use crate::contact::Wrench;
 use crate::layout::Layout;
-use crate::solver::step::contacts::on_device::DeviceTools;
+use crate::solver::step::contacts::on_device::{DeviceTools, IS_THERE};
 use crate::state::ContactState;
 
 /// Tools on a device.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(super) struct OfTools {
     pub all: DeviceTools,
     /// At the end of the last step that was read.
@@ -23,11 +23,17 @@ impl OfTools {
         layout: &Layout<f32>,
         contact: &ContactState,
     ) {
+        let Some((buffers, queue)) = into.filter(|_| IS_THERE) else { return };
         self.all.put(contact);
         self.wrenches.clear();
-        if let Some((buffers, queue)) = into {
-            let rows = DeviceTools::rows(layout, &contact.touches);
-            buffers.write(queue, Slot::Contact, bytemuck::cast_slice(&rows));
-        }
+        let rows = DeviceTools::rows(layout, &contact.touches);
+        buffers.write(queue, Slot::Contact, bytemuck::cast_slice(&rows));
+    }
+}
+
+/// Short: tools hold whole surfaces.
+impl std::fmt::Debug for OfTools {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("OfTools")
     }
 }

@@ -4,6 +4,8 @@ use super::clusters::ClusterRow;
 use super::layout::{Header, Material};
 use super::parts::{Fall, PartRow, Piece, SmallSteps};
 use super::slots::Element;
+use crate::layout::HAS_CLUSTERS;
+use crate::solver::step::contacts::on_device::IS_THERE;
 
 /// Names and places of words that kernels find in the table.
 pub(super) fn words() -> Vec<(&'static str, u32)> {
@@ -20,16 +22,26 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
         "SMALL_STEPS_AT" small_steps "FALLS_AT" falls "STRIDE_AT" stride
         "ANCHORS_AT" anchors "LINES_AT" lines "ENERGIES_AT" energies "TET_LANES_AT" tet_lanes
         "LAW_ENDS_AT" law_ends
-        "PART_COUNT_AT" part_count "CLUSTERS_AT" clusters
-        "CLUSTER_STARTS_AT" cluster_starts "CLUSTER_VERTICES_AT" cluster_vertices
-        "CLUSTER_CORNERS_AT" cluster_corners
-        "SAMPLES_AT" samples "FIRST_SAMPLE_AT" first_sample "SAMPLE_OFFSETS_AT" sample_offsets
-        "SAMPLE_ENTRIES_AT" sample_entries "CONTACT_AT" contact "TOOL_SUMS_AT" tool_sums
+        "PART_COUNT_AT" part_count
     });
-    all.extend(words!(ClusterRow {
-        "CLUSTER_FIRST_START" first_start "CLUSTER_COLORS" colors
-        "CLUSTER_FIRST_VERTEX" first_vertex "CLUSTER_VERTEX_COUNT" vertex_count
-    }));
+    // Of kernels that pages leave out.
+    if HAS_CLUSTERS {
+        all.extend(words!(Header {
+            "CLUSTERS_AT" clusters "CLUSTER_STARTS_AT" cluster_starts
+            "CLUSTER_VERTICES_AT" cluster_vertices "CLUSTER_CORNERS_AT" cluster_corners
+        }));
+        all.extend(words!(ClusterRow {
+            "CLUSTER_FIRST_START" first_start "CLUSTER_COLORS" colors
+            "CLUSTER_FIRST_VERTEX" first_vertex "CLUSTER_VERTEX_COUNT" vertex_count
+        }));
+        all.push(("CLUSTER_WORDS", (size_of::<ClusterRow>() / 4) as u32));
+    }
+    if IS_THERE {
+        all.extend(words!(Header {
+            "SAMPLES_AT" samples "FIRST_SAMPLE_AT" first_sample "SAMPLE_OFFSETS_AT" sample_offsets
+            "SAMPLE_ENTRIES_AT" sample_entries "CONTACT_AT" contact "TOOL_SUMS_AT" tool_sums
+        }));
+    }
     all.extend(words!(Piece {
         "PIECE_PART" part "PIECE_FIRST" first "PIECE_END" end "PIECE_ARE_VERTICES" are_vertices
     }));
@@ -54,7 +66,6 @@ pub(super) fn words() -> Vec<(&'static str, u32)> {
     }));
     all.extend(words!(Fall { "FALL_IS_FREE" is_free "FALL_ACCELERATION" acceleration }));
     all.extend([
-        ("CLUSTER_WORDS", size(size_of::<ClusterRow>())),
         ("FALL_WORDS", size(size_of::<Fall>())),
         ("SMALL_WORDS", size(size_of::<SmallSteps>())),
         ("PIECE_WORDS", size(size_of::<Piece>())),

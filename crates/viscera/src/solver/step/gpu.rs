@@ -27,10 +27,10 @@ impl Recorder<'_> {
                     let job = Job { count: samples.count, parameter, ..Job::default() };
                     self.threads(&kernels::FIND_CONTACTS, job)
                 };
-                into.extend(self.samples.map(dispatch));
+                into.extend(Samples::known(self.samples).map(dispatch));
             }
             StepStage::EndContacts => {
-                if let Some(Samples { count, groups }) = self.samples {
+                if let Some(Samples { count, groups }) = Samples::known(self.samples) {
                     let of = |count: u32| Job { count, ..Job::default() };
                     into.push(self.threads(&kernels::END_CONTACTS, of(count)));
                     let dispatch = self.threads(&kernels::REPORT_TOOLS, of(groups));

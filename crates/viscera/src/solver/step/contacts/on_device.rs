@@ -88,6 +88,12 @@ impl Samples {
         (IS_THERE && count > 0).then_some(Self { count: count as u32, groups })
     }
 
+    /// The same, known to be none where no kernels are: pages leave out what asks.
+    #[inline]
+    pub fn known(samples: Option<Self>) -> Option<Self> {
+        samples.filter(|_| IS_THERE)
+    }
+
     /// Vectors behind the loads.
     pub fn vectors(self) -> u64 {
         SAMPLE_VECTORS as u64 * u64::from(self.count)
@@ -202,7 +208,7 @@ fn place(row: [f32; 4]) -> Vec3<f64> {
 }
 
 /// Tools of the last step, and where they went on from.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub struct DeviceTools {
     /// As they were at its end.
     tools: Vec<Tool>,
