@@ -145,7 +145,8 @@ fn assert_agreement(steps: u32) {
             }
         }
         let residual = gpu.residual(&here);
-        assert!(residual < 1e-4, "{kind:?}: {residual:e}");
+        // Places are stored to 4e-9 m, against 500 N/m at a sample: 2e-6 N, where vertices bear 1e-2 N.
+        assert!(residual < 5e-4, "{kind:?}: {residual:e}");
     }
 }
 
@@ -196,7 +197,8 @@ fn forces_of_closed_surfaces_are_the_processors() {
             assert!(forces < if is_same { 1e-4 } else { 1e-2 }, "{kind:?} {step}: {forces:e}");
         }
         let residual = gpu.residual(&here);
-        assert!(residual < 1e-4, "{kind:?}: {residual:e}");
+        // Places are stored to 4e-9 m, against 500 N/m at a sample: 2e-6 N, where vertices bear 1e-2 N.
+        assert!(residual < 5e-4, "{kind:?}: {residual:e}");
     }
 }
 
