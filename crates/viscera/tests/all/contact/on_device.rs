@@ -237,10 +237,12 @@ fn passes_are_about_as_many_as_the_processors() {
 /// A block on a slope: it holds below the angle of friction, and slides as fast as it should above.
 #[test]
 fn a_block_slides_as_fast_as_it_should() {
-    let exact = libm::atan(0.5).to_degrees();
+    // So much that a block flutters by SDIRK2, which makes it 4e-3 too slow.
+    const FRICTION: f64 = 0.8;
+    let exact = libm::atan(FRICTION).to_degrees();
     let usual = settings(ALL[0]);
     for more in [-0.3, 3.0] {
-        let (mut scene, gravity) = tilted::<f32>(&usual, 2, 10.0, 0.5, exact + more);
+        let (mut scene, gravity) = tilted::<f32>(&usual, 2, 10.0, FRICTION, exact + more);
         scene.state.contact = ContactState::of(&scene.inputs.tools);
         let mut gpu = OnDevice::new(&scene);
         let mut run = |scene: &mut Scene<f32>, time: f64| {
@@ -258,14 +260,14 @@ fn a_block_slides_as_fast_as_it_should() {
         let (after, fast) = run(&mut scene, 0.5);
         let crept = after.iter().zip(&before).map(|(a, b)| (*a - *b).length()).fold(0.0, f32::max);
         let angle = (exact + more).to_radians();
-        let wanted = 9.81 * (libm::sin(angle) - 0.5 * libm::cos(angle));
+        let wanted = 9.81 * (libm::sin(angle) - FRICTION * libm::cos(angle));
         let found = (fast - slow) / 0.5;
         println!("{more}: {crept:e} m, {found} of {wanted} m/s^2");
         if more < 0.0 {
             // Places are stored to 2e-9 m.
             assert!(crept < 1e-7, "{crept:e} m below the angle");
         } else {
-            assert!((found / wanted - 1.0).abs() < 0.01, "{found} of {wanted} m/s^2");
+            assert!((found / wanted - 1.0).abs() < 1e-3, "{found} of {wanted} m/s^2");
         }
         let residual = OnDevice { gpu: gpu.gpu, state: scene.state.clone() }.residual(&scene);
         assert!(residual < 3e-2, "{residual:e}");
