@@ -4,7 +4,7 @@
 use super::Simulation;
 use super::acts::Act;
 use super::automatic::{self, Chosen};
-use super::checks::check_contact;
+use super::checks::{check_contact, check_tools};
 use super::error::{LiveError, SimulationError};
 use super::holding::{GraspOrigins, tolerance};
 use super::instruments::Instruments;
@@ -318,13 +318,17 @@ impl<S: Real> Simulation<S> {
         };
         check_settings(&solver).map_err(SimulationError::from)?;
         check_contact(&scene, &solver).map_err(SimulationError::from)?;
+        if !scene.tools.is_empty() {
+            check_tools(&scene, on_device, solver.method, self.assembly.tools.iter())?;
+        }
+        let contact = self.whole_contact();
         let backend = self.backend.renew(same_device, &model, &solver, ready, &self.offered)?;
         self.under_way = false;
         let rest = State::at_rest(&model);
         let state = State {
             positions: std::mem::take(&mut self.state.positions),
             velocities: std::mem::take(&mut self.state.velocities),
-            contact: std::mem::take(&mut self.state.contact),
+            contact,
             ..rest
         };
         (self.scene, self.model, self.backend) = (scene, model, backend);

@@ -425,12 +425,10 @@ impl<S: Real> Simulation<S> {
         state
     }
 
-    /// What is kept of contact; where a device is lost, none of it.
+    /// What is kept of contact; where a device is lost, where its tools were.
     pub(super) fn whole_contact(&self) -> ContactState {
-        match self.backend.device() {
-            Some(device) => device.contact(&self.model, &self.state).unwrap_or_default(),
-            None => self.state.contact.clone(),
-        }
+        let read = self.backend.device().map(|device| device.contact(&self.model, &self.state));
+        read.and_then(Result::ok).unwrap_or_else(|| self.state.contact.clone())
     }
 
     /// Energies; of recovered-gradient tetrahedra with their own, once a step has found it.

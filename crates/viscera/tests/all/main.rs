@@ -36,6 +36,7 @@ mod gpu_shaders;
 mod gpu_simulation;
 mod gpu_surface;
 mod gpu_timing;
+mod gpu_tools;
 mod hands;
 mod history;
 mod imports;

@@ -62,7 +62,8 @@ impl GpuSolver {
     }
 
     /// Waits for the device and reads positions and velocities at the end of the last step, in place; returns how
-    /// many steps were rejected so far. Multipliers stay on the device. On an error nothing is changed.
+    /// many steps were rejected so far. Multipliers stay on the device, and what tools have touched: [`GpuSolver::contact`]
+    /// has that. On an error nothing is changed.
     pub fn read_frame(
         &mut self,
         model: &Model<f32>,
@@ -112,7 +113,13 @@ impl GpuSolver {
         put_in_user_order(layout, bytemuck::cast_slice(read[1]), &mut state.velocities);
         state.multiplier_dt = self.multiplier_dt;
         let wrenches = match self.samples() {
-            Some(_) => self.tools.all.wrenches(bytemuck::cast_slice(read[3])),
+            Some(_) => {
+                // Who goes on without the device has to know where tools were. What they touched stays there.
+                state.contact.poses.clear();
+                state.contact.poses.extend_from_slice(self.tools.all.poses());
+                state.contact.touches.clear();
+                self.tools.all.wrenches(bytemuck::cast_slice(read[3]))
+            }
             None => Vec::new(),
         };
         (rejected_steps(read[2]), wrenches)

@@ -1,0 +1,177 @@
+//! Scenes with tools on a graphics processor: hands that take and leave them, settings that change, devices that are lost.
+
+use crate::common::device::{device, own_device};
+use viscera::scalar::rigid::RigidTransform;
+use viscera::scalar::vec3;
+use viscera::scene::{Scene, read_tray};
+use viscera::simulation::{Assembly, Simulation, ToolForce};
+
+/// A block on a table and a ball that is pressed into it, stays, and is dragged aside.
+const SCENE: &str = r#"
+world = { gravity = 0 }
+time = { duration = "1 s" }
+solver = { method = "quasi_newton" }
+
+[[body]]
+name = "block"
+shape = "block"
+size = ["30 mm", "30 mm", "15 mm"]
+cells = [5, 5, 3]
+material = { young = "10 kPa", poisson = 0.4 }
+
+[[fixing]]
+name = "table"
+body = "block"
+half_space = { point = [0, 0, 0], normal = [0, 0, -1] }
+
+[[tool]]
+name = "ball"
+kind = "sphere"
+radius = "6 mm"
+friction = 0.5
+position = ["15 mm", "15 mm", "23 mm"]
+keys = [
+    { time = "0.1 s", translation = [0, 0, "-5 mm"] },
+    { time = "0.2 s", translation = ["2 mm", 0, "-5 mm"] },
+]
+"#;
+
+fn parsed(settings: &[(&str, &str)]) -> (Scene, Assembly) {
+    let scene = Scene::parse("tools.toml", SCENE, settings).unwrap_or_else(|e| panic!("{e}"));
+    let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned()));
+    (scene, assembly.unwrap_or_else(|e| panic!("{e}")))
+}
+
+fn on_cpu() -> Simulation<f32> {
+    let (scene, assembly) = parsed(&[("solver.device", "cpu")]);
+    Simulation::new(scene, assembly).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn on_device() -> Simulation<f32> {
+    let (scene, assembly) = parsed(&[]);
+    Simulation::on_device(scene, assembly, device()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn advance(run: &mut Simulation<f32>, frames: u32) {
+    (0..frames).for_each(|_| run.advance_frame().unwrap_or_else(|e| panic!("{e}")));
+}
+
+/// How far forces are apart, of the larger.
+fn apart(a: &ToolForce, b: &ToolForce) -> f64 {
+    let [a, b] = [a, b].map(|tool| vec3(tool.force[0], tool.force[1], tool.force[2]));
+    (a - b).length() / a.length().max(b.length())
+}
+
+fn setting(key: &str, value: &str) -> [(String, String); 1] {
+    [(key.to_owned(), value.to_owned())]
+}
+
+#[test]
+fn a_scene_with_tools_reports_what_the_processor_does() {
+    let (mut cpu, mut gpu) = (on_cpu(), on_device());
+    for _ in 0..4 {
+        advance(&mut cpu, 4);
+        advance(&mut gpu, 4);
+        let (here, there) = (&cpu.tool_forces()[0], &gpu.tool_forces()[0]);
+        assert!(there.force[2] > 0.02 && there.touches > 0, "{there:?}");
+        // With the passes that are chosen.
+        assert!(apart(here, there) < 0.03, "{here} and {there}");
+        assert!(gpu.report().relative_residual < 0.1, "{}", gpu.report().relative_residual);
+    }
+}
+
+/// What a hand takes and leaves again touches, and leaves what others have touched as it was.
+#[test]
+fn tools_come_and_go_on_a_device() {
+    let (mut cpu, mut gpu) = (on_cpu(), on_device());
+    let tray = read_tray(
+        "tray.toml",
+        "[[tool]]\nname = \"probe\"\nkind = \"sphere\"\nradius = \"5 mm\"\n",
+    );
+    let mut probe = tray.unwrap_or_else(|e| panic!("{e}")).remove(0);
+    probe.placement.translation = vec3(0.006, 0.006, 0.024);
+    for run in [&mut cpu, &mut gpu] {
+        advance(run, 12);
+        let number = run.take_tool(probe.clone()).expect("a probe");
+        for step in 1..=6 {
+            let down = vec3(0.0, 0.0, -1e-3) * f64::from(step);
+            let pose = RigidTransform {
+                translation: probe.placement.translation + down,
+                ..probe.placement
+            };
+            run.move_tool(number, pose).expect("a pose");
+            advance(run, 1);
+        }
+    }
+    assert!(gpu.is_on_device());
+    for (here, there) in cpu.tool_forces().iter().zip(&gpu.tool_forces()) {
+        assert!(there.force[2] > 0.02, "{there}");
+        assert!(apart(here, there) < 0.05, "{here} and {there}");
+    }
+    for run in [&mut cpu, &mut gpu] {
+        run.put_away(1).expect("the probe");
+        advance(run, 4);
+        assert_eq!(run.tool_forces()[1].touches, 0);
+    }
+    let (here, there) = (&cpu.tool_forces()[0], &gpu.tool_forces()[0]);
+    assert!(apart(here, there) < 0.05, "{here} and {there}");
+}
+
+/// A moment that was kept is gone on from within the error of a solve; friction's anchors are part of it.
+#[test]
+fn a_kept_moment_has_its_contact() {
+    let mut run = on_device();
+    advance(&mut run, 14);
+    let kept = run.checkpoint();
+    advance(&mut run, 3);
+    let first = run.tool_forces()[0].clone();
+    assert!(first.force[0].abs() > 0.02, "it is dragged: {first}");
+    run.restore(&kept).expect("a moment of this run");
+    advance(&mut run, 3);
+    let again = run.tool_forces()[0].clone();
+    assert!(apart(&first, &again) < 0.02, "{first} and {again}");
+}
+
+/// Settings may change to what computes the contact, and to nothing else.
+#[test]
+fn settings_change_while_tools_touch() {
+    let mut run = on_device();
+    advance(&mut run, 13);
+    let refused = run.change(&setting("solver.method", "xpbd")).expect_err("no contact");
+    assert!(refused.to_string().contains("only the quasi-Newton method"), "{refused}");
+    advance(&mut run, 1);
+    let before = run.tool_forces()[0].clone();
+    assert!(before.force[0].abs() > 0.01, "it is dragged: {before}");
+    // Another number of passes: the same places, the same anchors.
+    run.change(&setting("solver.iterations", "30")).expect("a setting");
+    assert!(run.is_on_device());
+    let mut cpu = on_cpu();
+    advance(&mut cpu, 14);
+    for run in [&mut run, &mut cpu] {
+        advance(run, 2);
+    }
+    let (here, there) = (&cpu.tool_forces()[0], &run.tool_forces()[0]);
+    assert!(apart(here, there) < 0.05, "{here} and {there}");
+    run.change(&setting("solver.device", "cpu")).expect("a device");
+    assert!(!run.is_on_device());
+    advance(&mut run, 1);
+    advance(&mut cpu, 1);
+    let (here, there) = (&cpu.tool_forces()[0], &run.tool_forces()[0]);
+    assert!(apart(here, there) < 0.05, "{here} and {there}");
+}
+
+/// The processor goes on where the device was lost: the tool has not jumped, and presses on.
+#[test]
+fn a_lost_device_leaves_tools_where_they_are() {
+    let device = own_device();
+    let (scene, assembly) = parsed(&[]);
+    let mut run = Simulation::<f32>::on_device(scene, assembly, &device).expect("a simulation");
+    advance(&mut run, 8);
+    device.wgpu().0.destroy();
+    advance(&mut run, 4);
+    assert!(!run.is_on_device());
+    let mut cpu = on_cpu();
+    advance(&mut cpu, 12);
+    let (here, there) = (&cpu.tool_forces()[0], &run.tool_forces()[0]);
+    assert!(!there.has_jumped && apart(here, there) < 0.05, "{here} and {there}");
+}
