@@ -11,6 +11,17 @@ use crate::solver::gpu::slots::{Place, Slot};
 
 /// Two bars, of a size that all levels are there.
 fn model() -> Model<f32> {
+    bars().build().expect("a model")
+}
+
+/// The same with samples of its surface.
+fn touchable() -> Model<f32> {
+    let mut builder = bars();
+    builder.sample_surface(1);
+    builder.build().expect("a model")
+}
+
+fn bars() -> ModelBuilder {
     let mut builder = ModelBuilder::new();
     for (law, viscosity) in
         [(MaterialModel::StableNeoHookean, 0.0), (MaterialModel::SaintVenantKirchhoff, 0.01)]
@@ -19,7 +30,7 @@ fn model() -> Model<f32> {
         let mesh = shapes::beam(0.16, 0.04, 0.04, 4, 0.1).expect("a beam");
         builder.add_body(&mesh, &tissue.expect("legal")).expect("a body");
     }
-    builder.build().expect("a model")
+    builder
 }
 
 /// All ways to solve a model that have kernels of their own.
@@ -128,10 +139,13 @@ const WHOLE: [(&str, Slot, bool); 13] = [
 /// kernel goes through as a whole, all but padding.
 #[test]
 fn counted_bytes_fit_into_what_there_is_room_for() {
-    let model = model();
+    let (plain, touchable) = (model(), touchable());
     let mut seen = Vec::new();
-    for settings in all_settings() {
-        let laid = Laid::new(&model, &settings);
+    let solves = |settings: &SolverSettings| settings.method == Method::QuasiNewton;
+    let with_samples = all_settings().into_iter().filter(solves).map(|s| (&touchable, s));
+    for (model, settings) in all_settings().into_iter().map(|s| (&plain, s)).chain(with_samples) {
+        let has_samples = !model.samples.is_empty();
+        let laid = Laid::new(model, &settings);
         let counts = laid.counts(&settings);
         let Record { prologue, body, epilogue, .. } = &laid.recorded.record;
         for dispatch in [prologue, body, epilogue].into_iter().flatten() {
@@ -145,7 +159,9 @@ fn counted_bytes_fit_into_what_there_is_room_for() {
                 assert!(bytes <= room, "{what}");
                 // One of two dispatches is for vertices alone.
                 let is_half = *kernel == kernels::MEASURE_RECOVERED_END && dispatch.job.first > 0;
-                if WHOLE.contains(&(kernel.entry, slot, is_written)) && !is_half {
+                // Samples are behind the loads, and read where tools are near.
+                let is_whole = !has_samples || slot != Slot::Loads;
+                if WHOLE.contains(&(kernel.entry, slot, is_written)) && !is_half && is_whole {
                     seen.push((kernel.entry, slot, is_written));
                     assert!(bytes > 0.9 * room, "{what}");
                 }
@@ -196,5 +212,19 @@ fn rooflines_follow_from_bytes_and_dispatches() {
         let binding = 128 << 20;
         let largest = traffic.largest_mesh(binding);
         assert!(largest > 100_000 && (largest as f64) < binding as f64, "{largest}");
+    }
+}
+
+/// Contact is three dispatches a step, and none in an iteration.
+#[test]
+fn contact_adds_three_dispatches_to_a_step() {
+    for settings in all_settings() {
+        let [without, with] = [model(), touchable()].map(|model| {
+            let all = Traffic::new(&model, &settings, 1);
+            [0, 1, 2].map(|list| all.dispatches[list].len())
+        });
+        let more = [0, 1, 2].map(|list| with[list] - without[list]);
+        let wanted = if settings.method == Method::QuasiNewton { [1, 0, 2] } else { [0; 3] };
+        assert_eq!(more, wanted, "{:?}", settings.method);
     }
 }
