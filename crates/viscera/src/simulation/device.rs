@@ -22,7 +22,15 @@ pub(super) trait DeviceSolver<S>: Debug + Send {
 
     fn stable_step(&self) -> f64;
 
-    fn step(&mut self, model: &Model<S>, inputs: &Inputs<S>, dt: f64) -> Result<(), FrameError>;
+    /// See [`Solver::steps`].
+    fn steps(
+        &mut self,
+        model: &Model<S>,
+        inputs: &mut Inputs<S>,
+        dt: f64,
+        count: u32,
+        act: &mut dyn FnMut(u32, &mut Inputs<S>),
+    ) -> Result<(), FrameError>;
 
     /// Positions and velocities after the last step; how many steps were rejected so far. On an error nothing
     /// is changed.
@@ -220,10 +228,7 @@ impl<S: Real> Backend<S> {
     ) -> Result<(), FrameError> {
         match &mut self.engine {
             Engine::Cpu(solver) => Ok(solver.steps(model, state, inputs, dt, count, act)?),
-            Engine::Device(device) => (1..=count).try_for_each(|number| {
-                act(number, inputs);
-                device.step(model, inputs, dt)
-            }),
+            Engine::Device(device) => device.steps(model, inputs, dt, count, &mut act),
         }
     }
 

@@ -32,14 +32,16 @@ impl DeviceSolver<f32> for GpuSolver {
         GpuSolver::restart(self, model, inputs, dt)
     }
 
-    fn step(
+    fn steps(
         &mut self,
         model: &Model<f32>,
-        inputs: &Inputs<f32>,
+        inputs: &mut Inputs<f32>,
         dt: f64,
+        count: u32,
+        act: &mut dyn FnMut(u32, &mut Inputs<f32>),
     ) -> Result<(), FrameError> {
         self.device().check()?;
-        Ok(GpuSolver::step(self, model, inputs, dt)?)
+        Ok(GpuSolver::steps(self, model, inputs, dt, count, act)?)
     }
 
     fn read_frame(

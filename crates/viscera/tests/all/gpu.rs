@@ -244,9 +244,9 @@ fn a_device_gives_the_same_bits_again() {
 }
 
 #[test]
-#[ignore = "slow: ten runs of three hundred steps"]
+#[ignore = "slow: six runs of a hundred steps"]
 fn a_device_gives_the_same_bits_again_at_length() {
-    assert_same_bits_again(10, 300);
+    assert_same_bits_again(6, 100);
 }
 
 /// Published order, no rebase: what the device is asked to do in one iteration.

@@ -34,6 +34,7 @@ mod gpu_passes;
 mod gpu_quasi_newton;
 mod gpu_shaders;
 mod gpu_simulation;
+mod gpu_steps;
 mod gpu_surface;
 mod gpu_timing;
 mod gpu_tools;

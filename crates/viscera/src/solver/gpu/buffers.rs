@@ -7,6 +7,7 @@ use super::device::Device;
 use super::error::GpuError;
 use super::layout::{DeviceLayout, Table, tets};
 use super::limits::{accelerates, window};
+use super::outgoing::Outgoing;
 use super::slots::{Place, Range, Slot, Update, multipliers_start, unknowns_size};
 use crate::layout::{Layout, TetBlock};
 use crate::scalar::lanes::LANES;
@@ -208,6 +209,12 @@ impl Buffers {
     pub fn write(&self, queue: &wgpu::Queue, slot: Slot, bytes: &[u8]) {
         let found = self.find(slot);
         queue.write_buffer(found.buffer, found.offset, bytes);
+    }
+
+    /// As [`Buffers::write`], behind all that is on its way.
+    pub fn send(&self, outgoing: &mut Outgoing, slot: Slot, bytes: &[u8]) {
+        let found = self.find(slot);
+        outgoing.write(found.buffer, found.offset, bytes);
     }
 
     /// The buffer or range at a kernel's binding.

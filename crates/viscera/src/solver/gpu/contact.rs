@@ -87,7 +87,7 @@ impl GpuSolver {
             self.uniforms.put_distances(&self.device, &words);
         }
         let records: ToolRecords = self.tools.all.begin(tools, dt, share);
-        self.device.queue.write_buffer(&self.uniforms.tools, 0, bytemuck::bytes_of(&records));
+        self.outgoing.write(&self.uniforms.tools, 0, bytemuck::bytes_of(&records));
         Ok(())
     }
 

@@ -20,7 +20,8 @@ impl GpuSolver {
         let model = &*layout;
         crate::solver::inputs::check_step(dt, model, inputs)?;
         self.prepare_step(model, inputs, dt);
-        self.submit("restart", &[&self.restart], Marks::default());
+        self.outgoing.pass("restart", &self.uniforms.all, &[&self.restart], Marks::default());
+        self.outgoing.submit();
         self.forget_pairs();
         self.multiplier_dt = dt * self.solve_share();
         Ok(())

@@ -3,6 +3,7 @@
 //! ```text
 //! GpuSolver::new      constants, buffers and kernels onto the device; stages written down as dispatches
 //! GpuSolver::step     inputs and constants of the step, one compute pass, one submission; no waiting
+//! GpuSolver::steps    several steps, each with inputs of its own, in one submission
 //! GpuSolver::request  copies what moves into memory that the host can read, behind the last step
 //! GpuSolver::newest   the newest copy that has arrived, if any; never waits
 //! GpuSolver::ask_for_frame, take_frame   all that a simulation needs of a frame, without waiting
@@ -30,6 +31,7 @@ pub mod kernels;
 mod layout;
 pub(in crate::solver) mod limits;
 mod members;
+mod outgoing;
 mod parts;
 mod reading;
 pub(in crate::solver) mod record;

@@ -8,6 +8,7 @@ use super::error::GpuError;
 use super::kernels;
 use super::layout::DeviceLayout;
 use super::limits::{JOB_STRIDE, MOST_GROUPS};
+use super::outgoing::Outgoing;
 use super::parts::{Falls, SmallSteps};
 use super::reading::Sent;
 use super::record::{Dispatch, Recorder};
@@ -64,6 +65,7 @@ pub struct GpuSolver {
     pub(super) stages: [Vec<StageRange>; 3],
     pub(super) stage_starts: [Vec<usize>; 2],
     pub(super) restart: Vec<Ready>,
+    pub(super) outgoing: Outgoing,
     pub(super) frames: Frames,
     pub(super) forces: Frames,
     pub(super) sent: Sent,
@@ -152,6 +154,7 @@ impl GpuSolver {
         });
         let is_explicit = settings.method == Method::Explicit;
         let mut solver = Self {
+            outgoing: Outgoing::new(device),
             frames: Frames::new(buffers.points_size),
             forces: Frames::new(4 * ALL_SUMS as u64),
             sent: Sent::default(),
@@ -312,8 +315,8 @@ impl GpuSolver {
     }
 
     /// The table of the preconditioner.
-    pub(super) fn put_levels(&self, table: &[u32]) {
-        self.buffers.write(&self.device.queue, Slot::Levels, bytemuck::cast_slice(table));
+    pub(super) fn put_levels(&mut self, table: &[u32]) {
+        self.buffers.send(&mut self.outgoing, Slot::Levels, bytemuck::cast_slice(table));
     }
 
     /// Puts velocities [m/s], the user's order, in the place of those on the device.

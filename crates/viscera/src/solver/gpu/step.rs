@@ -2,9 +2,10 @@
 
 use super::inputs::norm_weights;
 use super::limits::accelerates;
+use super::outgoing::MOST_DISPATCHES;
 use super::parts::SmallSteps;
 use super::slots::Slot;
-use super::solver::{GpuSolver, Ready};
+use super::solver::GpuSolver;
 use super::timing::Marks;
 use super::uniforms::FrameConstants;
 use crate::layout::{Layout, Part};
@@ -16,12 +17,6 @@ use crate::solver::explicit::{calm_ahead, small_steps};
 use crate::solver::inputs::Inputs;
 use crate::solver::quasi_newton::on_device::share;
 use crate::solver::step::tethers::bundle;
-
-/// Dispatches of iterations, or of small steps, in one submission. Drivers reset a device whose submission
-/// takes some seconds. Reckoned, not measured: one of a million tetrahedra moves some 0.15 GB, half a
-/// millisecond at 300 GB/s, so that 1024 take half a second. Smaller, and submissions would count beside the
-/// work of small meshes.
-const MOST_DISPATCHES: usize = 1024;
 
 impl GpuSolver {
     /// Advances the state on the device by one step of `dt` [s]: one submission, or several where there are
@@ -35,8 +30,45 @@ impl GpuSolver {
         self.step_marked(model, inputs, dt, Marks::default())
     }
 
+    /// As `count` calls of [`GpuSolver::step`], to the bit, in as few submissions as one of them; `act` gets the number of
+    /// each step, from 1 on, and puts what acts in it into the inputs. Where a step fails the state is that of the step
+    /// before it.
+    pub fn steps(
+        &mut self,
+        model: &Model<f32>,
+        inputs: &mut Inputs<f32>,
+        dt: f64,
+        count: u32,
+        mut act: impl FnMut(u32, &mut Inputs<f32>),
+    ) -> Result<(), StepError> {
+        let recorded = (1..=count).try_for_each(|number| {
+            act(number, inputs);
+            self.record_step(model, inputs, dt, Marks::default())
+        });
+        self.outgoing.submit();
+        recorded
+    }
+
+    /// Submissions of steps so far.
+    pub fn submissions(&self) -> u64 {
+        self.outgoing.submissions()
+    }
+
     /// A step at whose beginning and end the device's clock may be read.
     pub(super) fn step_marked(
+        &mut self,
+        model: &Model<f32>,
+        inputs: &Inputs<f32>,
+        dt: f64,
+        marks: Marks<'_>,
+    ) -> Result<(), StepError> {
+        let recorded = self.record_step(model, inputs, dt, marks);
+        self.outgoing.submit();
+        recorded
+    }
+
+    /// Puts a step behind what is on its way.
+    fn record_step(
         &mut self,
         model: &Model<f32>,
         inputs: &Inputs<f32>,
@@ -46,18 +78,20 @@ impl GpuSolver {
         let mut left = self.begin_step(model, inputs, dt)?;
         let most = self.most_repeats();
         let [prologue, body, epilogue] = self.ready.each_ref().map(Vec::as_slice);
+        let uniforms = &self.uniforms.all;
         let mut lists = vec![prologue];
         let mut now = marks;
         while left > most {
             lists.extend(std::iter::repeat_n(body, most as usize));
-            self.submit("step", &lists, now.before_the_end());
+            self.outgoing.pass("step", uniforms, &lists, now.before_the_end());
+            self.outgoing.submit();
             now = marks.after_the_beginning();
             lists.clear();
             left -= most;
         }
         lists.extend(std::iter::repeat_n(body, left as usize));
         lists.push(epilogue);
-        self.submit("step", &lists, now);
+        self.outgoing.pass("step", uniforms, &lists, now);
         self.multiplier_dt = dt * self.solve_share();
         Ok(())
     }
@@ -96,7 +130,7 @@ impl GpuSolver {
                     *small = SmallSteps::new(small_steps(dt, stable)?, dt, ahead);
                 }
                 let bytes = bytemuck::cast_slice(&self.small_steps);
-                self.buffers.write(&self.device.queue, Slot::SmallSteps, bytes);
+                self.buffers.send(&mut self.outgoing, Slot::SmallSteps, bytes);
                 most
             }
         };
@@ -113,43 +147,19 @@ impl GpuSolver {
         if self.levels.is_some() { share(&self.settings) } else { 1.0 }
     }
 
-    /// One submission of one compute pass.
-    pub(super) fn submit(&self, label: &str, lists: &[&[Ready]], marks: Marks<'_>) {
-        let mut encoder = self.encoder(label);
-        {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some(label),
-                timestamp_writes: marks.writes(),
-            });
-            for list in lists {
-                self.send(&mut pass, list);
-            }
-        }
-        self.device.queue.submit([encoder.finish()]);
-    }
-
     pub(super) fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some(label) };
         self.device.device.create_command_encoder(&descriptor)
     }
 
-    fn send(&self, pass: &mut wgpu::ComputePass<'_>, list: &[Ready]) {
-        for dispatch in list {
-            pass.set_pipeline(&dispatch.pipeline);
-            pass.set_bind_group(0, &dispatch.storage, &[]);
-            pass.set_bind_group(1, &self.uniforms.all, &[dispatch.job]);
-            pass.dispatch_workgroups(dispatch.groups[0], dispatch.groups[1], 1);
-        }
-    }
-
     /// Inputs and constants of a step.
     pub(super) fn prepare_step(&mut self, layout: &Layout<f32>, inputs: &Inputs<f32>, dt: f64) {
         self.collect_updates(layout, inputs, dt);
-        let queue = &self.device.queue;
-        self.buffers.write(queue, Slot::Updates, bytemuck::cast_slice(&self.updates));
+        let outgoing = &mut self.outgoing;
+        self.buffers.send(outgoing, Slot::Updates, bytemuck::cast_slice(&self.updates));
         if let Some(falls) = &mut self.falls {
             falls.find(layout, inputs.gravity, &self.updates);
-            self.buffers.write(queue, Slot::Falls, bytemuck::cast_slice(&falls.all));
+            self.buffers.send(outgoing, Slot::Falls, bytemuck::cast_slice(&falls.all));
         }
         let settings = &self.settings;
         let is_anchored = !layout.rest_anchors.is_empty();
@@ -158,7 +168,7 @@ impl GpuSolver {
             let row = |anchor: &Vec3<f32>| [anchor.x, anchor.y, anchor.z, 0.0];
             let rows: Vec<[f32; 4]> =
                 inputs.anchors_of(&layout.rest_anchors).iter().map(row).collect();
-            self.buffers.write(queue, Slot::Anchors, bytemuck::cast_slice(&rows));
+            self.buffers.send(outgoing, Slot::Anchors, bytemuck::cast_slice(&rows));
         }
         let last = self.multiplier_dt;
         let rescale = match settings.keep_multipliers {
@@ -171,7 +181,7 @@ impl GpuSolver {
         let is_new = std::mem::replace(&mut self.weights_dt, dt) != dt;
         if accelerates(settings) && is_new {
             let weights = norm_weights(layout, settings, &self.buffers, dt);
-            self.buffers.write(queue, Slot::Weights, bytemuck::cast_slice(&weights));
+            self.buffers.send(outgoing, Slot::Weights, bytemuck::cast_slice(&weights));
         }
         let omega = settings.relaxation as f32;
         let constants = FrameConstants {
@@ -189,6 +199,6 @@ impl GpuSolver {
             part_count: self.part_count as u32,
             chebyshev_damping: settings.chebyshev_damping as f32,
         };
-        self.device.queue.write_buffer(&self.uniforms.frame, 0, bytemuck::bytes_of(&constants));
+        self.outgoing.write(&self.uniforms.frame, 0, bytemuck::bytes_of(&constants));
     }
 }

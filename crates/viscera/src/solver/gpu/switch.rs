@@ -56,7 +56,8 @@ impl GpuSolver {
         lists.push(&body[within..]);
         lists.extend(std::iter::repeat_n(body.as_slice(), repeats.saturating_sub(1) as usize));
         lists.push(&self.ready[2]);
-        self.submit("step from a stage", &lists, Marks::default());
+        self.outgoing.pass("step from a stage", &self.uniforms.all, &lists, Marks::default());
+        self.outgoing.submit();
         self.multiplier_dt = dt;
         Ok(count)
     }

@@ -208,7 +208,9 @@ impl GpuSolver {
             let is_left_out = part == StepPart::Iteration && repeats == 0;
             for range in self.stages[list].iter().filter(|_| !is_left_out) {
                 let marks = clock.around(2 * stages.len() as u32);
-                self.submit("stage", &[&self.ready[list][range.dispatches.clone()]], marks);
+                let dispatches = &self.ready[list][range.dispatches.clone()];
+                self.outgoing.pass("stage", &self.uniforms.all, &[dispatches], marks);
+                self.outgoing.submit();
                 let (stage, dispatches) = (range.stage, range.dispatches.len());
                 stages.push(StageTime { part, stage, dispatches, seconds: 0.0 });
             }
@@ -227,13 +229,15 @@ impl GpuSolver {
     }
 
     /// So many iterations, in submissions that no driver takes for a hang.
-    pub(super) fn submit_repeats(&self, mut left: u32, marks: Marks<'_>) {
+    pub(super) fn submit_repeats(&mut self, mut left: u32, marks: Marks<'_>) {
         let mut now = marks;
         while left > 0 {
             let count = left.min(self.most_repeats());
             left -= count;
             let lists = vec![&self.ready[1][..]; count as usize];
-            self.submit("iterations", &lists, if left > 0 { now.before_the_end() } else { now });
+            let marks_of_pass = if left > 0 { now.before_the_end() } else { now };
+            self.outgoing.pass("iterations", &self.uniforms.all, &lists, marks_of_pass);
+            self.outgoing.submit();
             now = marks.after_the_beginning();
         }
     }

@@ -7,7 +7,7 @@ mod held;
 mod inside;
 mod meshes;
 mod motion;
-mod on_device;
+pub mod on_device;
 mod on_device_robust;
 mod organs;
 mod passes;
@@ -49,12 +49,15 @@ impl Block {
         Self { mesh, tissue, cuts: 1 }
     }
 
-    pub fn model<S: Real>(&self) -> Model<S> {
+    pub fn material(&self) -> Material {
         let [young, poisson, viscosity] = self.tissue;
         let tissue = Material::new(SNH, young, poisson, 1060.0).expect("a tissue");
-        let tissue = tissue.with_viscosity(viscosity).expect("a viscosity");
+        tissue.with_viscosity(viscosity).expect("a viscosity")
+    }
+
+    pub fn model<S: Real>(&self) -> Model<S> {
         let mut builder = ModelBuilder::new();
-        builder.add_body(&self.mesh, &tissue).expect("a body");
+        builder.add_body(&self.mesh, &self.material()).expect("a body");
         builder.sample_surface(self.cuts);
         builder.build().expect("a model")
     }
