@@ -135,7 +135,7 @@ mod tests {
         assert!((seconds(&automatic) - 0.76).abs() < 1e-9, "{}", seconds(&automatic));
         assert_eq!(seconds(&with(Method::QuasiNewton)), seconds(&automatic));
         let named = SolverSettings { device: DeviceRequest::Gpu, ..automatic.clone() };
-        assert_eq!(seconds(&named), seconds(&with(Method::Xpbd)));
+        assert_eq!(seconds(&named), seconds(&with(Method::QuasiNewton)));
         assert!((seconds(&with(Method::Xpbd)) - 0.4).abs() < 1e-9);
         assert!((seconds(&with(Method::Explicit)) - 0.5).abs() < 1e-9);
         let fine = SolverSettings { accuracy: Accuracy::Fine, ..automatic.clone() };

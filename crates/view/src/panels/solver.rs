@@ -22,7 +22,7 @@ pub fn show(
         ui.push_id(title, |ui| {
             let mut chooser = Chooser { side, actions };
             known(ui, &mut chooser);
-            // On a device that is named "automatic" is XPBD, and has its rows.
+            // On a device that is named "automatic" is known, and has the rows of its method.
             let in_force = &solver.foreseen();
             method(ui, solver.method, in_force, &mut chooser);
             if chooses_counts(in_force) {

@@ -3,12 +3,12 @@
 use super::{DeviceRequest, Elements, Method, SolverSettings};
 
 impl SolverSettings {
-    /// The settings in force, as far as they tell it alone: on a device that is asked for by name "auto" is "xpbd". Elsewhere
-    /// it stays what it is: a scene chooses, mostly "quasi_newton".
+    /// The settings in force, as far as they tell it alone: on a device that is asked for by name "auto" is "quasi_newton", or
+    /// "xpbd" in a build without it. Elsewhere it stays what it is: a scene chooses, mostly "quasi_newton".
     pub fn foreseen(&self) -> Self {
         match self.device {
             DeviceRequest::Auto | DeviceRequest::Cpu => self.clone(),
-            DeviceRequest::Gpu | DeviceRequest::Named(_) => self.chosen(Method::Xpbd),
+            DeviceRequest::Gpu | DeviceRequest::Named(_) => self.chosen_on_device(),
         }
     }
 
@@ -27,13 +27,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn automatic_is_xpbd_on_a_device_that_is_named_and_nowhere_else() {
+    fn automatic_is_one_method_on_a_device_that_is_named_and_nowhere_else() {
         let on = |device, method| {
             SolverSettings { device, method, ..SolverSettings::default() }.foreseen().method
         };
         let named = || DeviceRequest::Named("any".into());
-        assert_eq!(on(named(), Method::Auto), Method::Xpbd);
-        assert_eq!(on(DeviceRequest::Gpu, Method::Auto), Method::Xpbd);
+        let has_solves = cfg!(feature = "gpu-solves");
+        let expected = if has_solves { Method::QuasiNewton } else { Method::Xpbd };
+        assert_eq!(on(named(), Method::Auto), expected);
+        assert_eq!(on(DeviceRequest::Gpu, Method::Auto), expected);
         assert_eq!(on(named(), Method::Explicit), Method::Explicit);
         assert_eq!(on(DeviceRequest::Auto, Method::Auto), Method::Auto);
         assert_eq!(on(DeviceRequest::Cpu, Method::Auto), Method::Auto);

@@ -168,7 +168,7 @@ settings_table! {
         precision: Precision = (Precision::F32), one_of::<Precision>();
         /// How positions and velocities are advanced. "auto" takes the cheaper one of
         /// "quasi_newton" and "explicit" that is as accurate as `accuracy` asks; on a `device` that is asked for by name,
-        /// "xpbd". "xpbd" sweeps over constraints. "quasi_newton" solves
+        /// "quasi_newton". "xpbd" sweeps over constraints. "quasi_newton" solves
         /// every substep to its end in a dozen passes over the mesh, whatever its size; of the settings below it uses
         /// `accuracy`, `substeps`, `iterations`, `integrator`, `history`, `threads` and `device`. "explicit"
         /// divides every substep into as many small steps as it takes to be stable; it uses `explicit_safety`,
@@ -345,9 +345,12 @@ impl SolverSettings {
         }
     }
 
-    /// As [`SolverSettings::chosen`], where a device computes, whatever its name.
+    /// As [`SolverSettings::chosen`], where a device computes, whatever its name: "auto" is the quasi-Newton method, which
+    /// moves as far as the same scene does on the CPU and takes an eighth of XPBD's dispatches; XPBD in a build without it.
     pub(crate) fn chosen_on_device(&self) -> Self {
-        let method = if self.method == Method::Auto { Method::Xpbd } else { self.method };
+        let has_solves = cfg!(feature = "gpu-solves");
+        let automatic = if has_solves { Method::QuasiNewton } else { Method::Xpbd };
+        let method = if self.method == Method::Auto { automatic } else { self.method };
         Self { method, elements: self.elements_of(method, true), ..self.clone() }
     }
 

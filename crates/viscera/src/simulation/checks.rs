@@ -12,7 +12,11 @@ pub(super) fn check_device(scene: &Scene, callers_device: bool) -> Result<(), Si
     match device_of(scene, callers_device) {
         Some(device) if bodies_meet(scene) => Err(SimulationError::BodiesOnDevice { device }),
         Some(_) if scene.tools.is_empty() => Ok(()),
-        _ => check_tools(scene, callers_device, scene.solver.method, scene.tools.iter()),
+        Some(_) => {
+            let method = scene.solver.chosen_on_device().method;
+            check_tools(scene, callers_device, method, scene.tools.iter())
+        }
+        None => Ok(()),
     }
 }
 

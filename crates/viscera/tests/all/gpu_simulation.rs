@@ -4,7 +4,7 @@
 use crate::common::device::{adapter, device_within, own_device};
 use viscera::scalar::Vec3;
 use viscera::scene::Scene;
-use viscera::settings::{Method, SolverSettings};
+use viscera::settings::{Elements, Method, SolverSettings};
 use viscera::simulation::{Assembly, FrameError, FrameReport, Simulation, SimulationError};
 use viscera::solver::gpu::{GpuError, StepCost, baseline, shortfall};
 
@@ -219,16 +219,19 @@ fn the_choice_is_told_with_its_reason() {
     assert!(error.contains(&name), "{error}");
 }
 
-/// Where a device is asked for by name, "auto" is XPBD, also after a change.
+/// Where a device is asked for by name, "auto" is the quasi-Newton method, also after a change, and what it is expected to be
+/// off by is told.
 #[test]
-fn auto_is_xpbd_on_a_device_that_is_asked_for() {
+fn auto_is_quasi_newton_on_a_device_that_is_asked_for() {
     let auto = [("solver.method", "auto"), ("solver.device", "gpu"), ("solver.accuracy", "fine")];
     let mut on_device = simulation(&auto).expect("a simulation");
     let change = ("body.upper.material.young".to_owned(), "9 kPa".to_owned());
     for _ in 0..2 {
         assert!(on_device.gpu().is_some());
-        assert_eq!(on_device.solver().method, Method::Xpbd);
-        assert_eq!(on_device.expected_errors().motion, None);
+        assert_eq!(on_device.solver().method, Method::QuasiNewton);
+        assert_eq!(on_device.solver().elements, Elements::Recovered);
+        let expected = on_device.expected_errors().motion;
+        assert!(expected.is_some_and(|share| share > 0.0 && share < 0.02), "{expected:?}");
         on_device.change(std::slice::from_ref(&change)).expect("another tissue");
     }
     on_device.change(&[("solver.device".to_owned(), "cpu".to_owned())]).expect("another device");

@@ -96,7 +96,7 @@ pub struct GpuSolver {
 }
 
 impl GpuSolver {
-    /// Puts a model onto the device, at rest, and plans its steps; `method = "auto"` is XPBD there.
+    /// Puts a model onto the device, at rest, and plans its steps; `method = "auto"` is the quasi-Newton method there.
     pub fn new(
         device: &Device,
         model: &Model<f32>,
