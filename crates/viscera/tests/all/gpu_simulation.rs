@@ -219,8 +219,7 @@ fn the_choice_is_told_with_its_reason() {
     assert!(error.contains(&name), "{error}");
 }
 
-/// Where a device is asked for by name, "auto" is the quasi-Newton method, also after a change, and what it is expected to be
-/// off by is told.
+/// Also after a change; what it is expected to be off by is told.
 #[test]
 fn auto_is_quasi_newton_on_a_device_that_is_asked_for() {
     let auto = [("solver.method", "auto"), ("solver.device", "gpu"), ("solver.accuracy", "fine")];

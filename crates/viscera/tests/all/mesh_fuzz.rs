@@ -9,7 +9,7 @@ use crate::common::damage::{LARGEST_DEFLATE_RATIO, Reader};
 use crate::mesh_formats::{fixture, fixtures};
 
 /// So many inputs of a slow test, which ends after three minutes at the latest.
-const MANY: (u64, Duration) = (1_000_000, Duration::from_secs(180));
+const MANY: (u64, Duration) = (250_000, Duration::from_secs(180));
 
 /// Inputs of a fast test: at most about a second's.
 const FEW: (u64, Duration) = (10_000, Duration::from_secs(3600));
@@ -232,7 +232,7 @@ fn damaged_gmsh_text_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_gmsh_text_is_survived_at_length() {
     gmsh_text().survives(MANY);
 }
@@ -243,7 +243,7 @@ fn damaged_gmsh_bytes_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_gmsh_bytes_is_survived_at_length() {
     gmsh_binary().survives(MANY);
 }
@@ -254,7 +254,7 @@ fn damaged_vtk_text_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_vtk_text_is_survived_at_length() {
     vtk_text().survives(MANY);
 }
@@ -265,7 +265,7 @@ fn damaged_vtk_bytes_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_vtk_bytes_is_survived_at_length() {
     vtk_binary().survives(MANY);
 }
@@ -276,7 +276,7 @@ fn damaged_vtk_xml_text_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_vtk_xml_text_is_survived_at_length() {
     xml_text().survives(MANY);
 }
@@ -287,7 +287,7 @@ fn damaged_vtk_xml_bytes_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_vtk_xml_bytes_is_survived_at_length() {
     xml_bytes().survives(MANY);
 }
@@ -298,7 +298,7 @@ fn damaged_vtk_xml_zlib_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_vtk_xml_zlib_is_survived_at_length() {
     xml_zlib().survives(MANY);
 }
@@ -309,7 +309,7 @@ fn damaged_tetgen_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_tetgen_is_survived_at_length() {
     tetgen().survives(MANY);
 }
@@ -320,7 +320,7 @@ fn damaged_medit_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_medit_is_survived_at_length() {
     medit().survives(MANY);
 }
@@ -331,7 +331,7 @@ fn damaged_abaqus_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_abaqus_is_survived_at_length() {
     abaqus().survives(MANY);
 }
@@ -342,7 +342,7 @@ fn damaged_obj_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_obj_is_survived_at_length() {
     obj().survives(MANY);
 }
@@ -353,7 +353,7 @@ fn damaged_stl_text_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_stl_text_is_survived_at_length() {
     stl_text().survives(MANY);
 }
@@ -364,7 +364,7 @@ fn damaged_stl_bytes_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_stl_bytes_is_survived_at_length() {
     stl_binary().survives(MANY);
 }
@@ -375,7 +375,7 @@ fn damaged_ply_text_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_ply_text_is_survived_at_length() {
     ply_text().survives(MANY);
 }
@@ -386,7 +386,7 @@ fn damaged_ply_bytes_is_survived() {
 }
 
 #[test]
-#[ignore = "slow: a million inputs"]
+#[ignore = "slow: a quarter of a million inputs"]
 fn damaged_ply_bytes_is_survived_at_length() {
     ply_binary().survives(MANY);
 }

@@ -197,9 +197,9 @@ fn a_method_that_cannot_go_on_says_which_can() {
 
 #[test]
 fn a_simulation_on_a_device_resumes_to_the_bit() {
-    for settings in [&[][..], &[("solver.method", "explicit")]] {
+    for settings in [[("solver.method", "xpbd")], [("solver.method", "explicit")]] {
         let new = || {
-            let (scene, assembly) = scene(settings);
+            let (scene, assembly) = scene(&settings);
             Simulation::<f32>::on_device(scene, assembly, device()).expect("a device")
         };
         let mut whole = new();

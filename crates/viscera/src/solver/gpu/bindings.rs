@@ -49,7 +49,6 @@ pub(super) fn uniform_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 }
 
 /// Buffers of jobs, of the constants of a step and of its tools, and how kernels are bound to them.
-#[derive(Debug)]
 pub struct Uniforms {
     pub jobs: wgpu::Buffer,
     pub frame: wgpu::Buffer,

@@ -18,7 +18,6 @@ use crate::solver::step::contacts::on_device::Samples;
 use crate::solver::step::recovered::on_device::Extent;
 
 /// All buffers of a solver.
-#[derive(Debug)]
 pub(super) struct Buffers {
     all: Vec<(Slot, wgpu::Buffer)>,
     ranges: Vec<Range>,

@@ -2,11 +2,11 @@
 
 use wgpu::BufferUsages;
 
+use super::clock::Clock;
 use super::device::Device;
 use super::error::GpuError;
 use super::limits::MOST_GROUPS;
 use super::reading;
-use super::timing::Clock;
 
 /// Source and target [B each]: beyond the caches of most devices, and what every device can bind.
 const COPIED: u64 = 128 << 20;

@@ -1,7 +1,7 @@
 //! The warm-start reset on the device.
 
+use super::clock::Marks;
 use super::solver::GpuSolver;
-use super::timing::Marks;
 use crate::model::Model;
 use crate::solver::error::StepError;
 use crate::solver::inputs::Inputs;

@@ -17,6 +17,7 @@
 
 mod bindings;
 mod buffers;
+mod clock;
 mod clusters;
 mod contact;
 mod control;

@@ -9,9 +9,8 @@
 //! A queue's writes take effect before all of the next submission. Inputs of a later step in the same one therefore wait in
 //! memory of their own, and are copied where its pass begins.
 
+use super::clock::Marks;
 use super::device::Device;
-use super::solver::Ready;
-use super::timing::Marks;
 
 /// Dispatches in one submission. Drivers reset a device whose submission takes some seconds. Reckoned, not
 /// measured: one of a million tetrahedra moves some 0.15 GB, half a millisecond at 300 GB/s, so that 1024 take half
@@ -21,8 +20,18 @@ pub(super) const MOST_DISPATCHES: usize = 1024;
 /// Inputs that wait in one submission [B]. Where whole organs are held, steps are sent one by one.
 const MOST_STAGED: u64 = 16 << 20;
 
+/// A dispatch ready to be sent.
+pub(super) struct Ready {
+    pub pipeline: wgpu::ComputePipeline,
+    pub storage: wgpu::BindGroup,
+    /// Where its job lies among the jobs [bytes].
+    pub job: u32,
+    pub groups: [u32; 2],
+    /// Whether it forgets the accelerations' past.
+    pub starts_acceleration: bool,
+}
+
 /// Commands that are not submitted yet. Between calls of a solver there are none.
-#[derive(Debug)]
 pub(super) struct Outgoing {
     device: Device,
     encoder: Option<wgpu::CommandEncoder>,
@@ -57,7 +66,8 @@ impl Outgoing {
         self.submissions
     }
 
-    /// Writes bytes, whole words, behind all that is on its way.
+    /// Writes bytes, whole words, behind all that is on its way. Never inlined, as what follows: pages carry each once.
+    #[inline(never)]
     pub fn write(&mut self, buffer: &wgpu::Buffer, offset: u64, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
@@ -90,6 +100,7 @@ impl Outgoing {
     }
 
     /// One compute pass of lists of dispatches, behind all that is on its way.
+    #[inline(never)]
     pub fn pass(
         &mut self,
         label: &str,
@@ -119,6 +130,7 @@ impl Outgoing {
     }
 
     /// Sends all.
+    #[inline(never)]
     pub fn submit(&mut self) {
         let Some(encoder) = self.encoder.take() else { return };
         if let Some(staging) = self.staging.as_ref().filter(|_| !self.staged.is_empty()) {

@@ -7,7 +7,6 @@ use super::device::Device;
 use super::error::GpuError;
 
 /// One copy of several ranges, on its way.
-#[derive(Debug)]
 pub(super) struct Reading {
     staging: wgpu::Buffer,
     /// Bytes of each range.
@@ -66,7 +65,7 @@ impl Reading {
 }
 
 /// What was asked for behind the last step of a solver.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(super) struct Sent {
     pub awaited: Option<Reading>,
     /// What the force balance of the last step is made of, once it is there.

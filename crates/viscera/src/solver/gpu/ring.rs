@@ -12,7 +12,6 @@ pub type Arrival = (u64, bool);
 const RING: usize = 3;
 
 /// Copies under way.
-#[derive(Debug)]
 pub struct Frames {
     pub free: Vec<wgpu::Buffer>,
     pub under_way: Vec<(u64, wgpu::Buffer)>,

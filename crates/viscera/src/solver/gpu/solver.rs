@@ -8,7 +8,7 @@ use super::error::GpuError;
 use super::kernels;
 use super::layout::DeviceLayout;
 use super::limits::{JOB_STRIDE, MOST_GROUPS};
-use super::outgoing::Outgoing;
+use super::outgoing::{Outgoing, Ready};
 use super::parts::{Falls, SmallSteps};
 use super::reading::Sent;
 use super::record::{Dispatch, Recorder};
@@ -35,20 +35,7 @@ use crate::solver::step::recovered;
 use crate::solver::step::tethers::Bundle;
 use crate::state::State;
 
-/// A dispatch ready to be sent.
-#[derive(Debug)]
-pub(super) struct Ready {
-    pub pipeline: wgpu::ComputePipeline,
-    pub storage: wgpu::BindGroup,
-    /// Where its job lies among the jobs [bytes].
-    pub job: u32,
-    pub groups: [u32; 2],
-    /// Whether it forgets the accelerations' past.
-    pub starts_acceleration: bool,
-}
-
 /// A solver for one model on a graphics processor, in single precision.
-#[derive(Debug)]
 pub struct GpuSolver {
     pub(super) device: Device,
     pub(super) settings: SolverSettings,
@@ -93,6 +80,13 @@ pub struct GpuSolver {
     pub(super) levels: Option<DeviceLevels>,
     /// Of the last step.
     pub(super) passes: u32,
+}
+
+/// Short: it holds a whole model.
+impl std::fmt::Debug for GpuSolver {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("GpuSolver").field("device", &self.device.name()).finish_non_exhaustive()
+    }
 }
 
 impl GpuSolver {

@@ -1,12 +1,12 @@
 //! A step: its inputs and constants, and what is sent.
 
+use super::clock::Marks;
 use super::inputs::norm_weights;
 use super::limits::accelerates;
 use super::outgoing::MOST_DISPATCHES;
 use super::parts::SmallSteps;
 use super::slots::Slot;
 use super::solver::GpuSolver;
-use super::timing::Marks;
 use super::uniforms::FrameConstants;
 use crate::layout::{Layout, Part};
 use crate::model::Model;
@@ -68,6 +68,7 @@ impl GpuSolver {
     }
 
     /// Puts a step behind what is on its way.
+    #[inline(never)]
     fn record_step(
         &mut self,
         model: &Model<f32>,

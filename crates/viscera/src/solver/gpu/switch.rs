@@ -1,10 +1,11 @@
 //! A step that the CPU begins and the device ends: where a result is wrong, the stage from which on it
 //! is tells which twin to look at.
 
+use super::clock::Marks;
 use super::layout::DeviceLayout;
+use super::outgoing::Ready;
 use super::slots::Slot;
-use super::solver::{GpuSolver, Ready};
-use super::timing::Marks;
+use super::solver::GpuSolver;
 use crate::layout::Layout;
 use crate::model::Model;
 use crate::scalar::Vec3;

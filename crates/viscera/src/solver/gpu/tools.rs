@@ -30,10 +30,3 @@ impl OfTools {
         buffers.write(queue, Slot::Contact, bytemuck::cast_slice(&rows));
     }
 }
-
-/// Short: tools hold whole surfaces.
-impl std::fmt::Debug for OfTools {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("OfTools")
-    }
-}

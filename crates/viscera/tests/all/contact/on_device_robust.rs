@@ -11,7 +11,7 @@ use crate::common::potential::Outside;
 use viscera::contact::{Shape, Tool, Wrench};
 use viscera::measure::measure_tets;
 use viscera::mesh::TetMesh;
-use viscera::model::ModelBuilder;
+use viscera::model::{Model, ModelBuilder};
 use viscera::scalar::rigid::{axis_times_sine, rotation_matrix};
 use viscera::scalar::{Vec3, vec3};
 use viscera::settings::{Elements, Integrator, Method, SolverSettings};
@@ -136,7 +136,7 @@ impl Grasped<'_> {
     fn act(&self, time: f64, tools: &mut [Tool]) {
         self.plan.act(time, tools);
         for tool in tools {
-            tool.pose.translation = tool.pose.translation + self.place;
+            tool.pose.translation += self.place;
         }
     }
 
@@ -183,39 +183,57 @@ fn grasp_on_a_device(seeds: Range<u64>, elements: Elements) {
     assert!(slipped * 20 <= count, "{slipped} slipped");
 }
 
-/// How far each is lifted, of the lift; what it gains, and what is left at the end, of the most that it had.
-fn grasp_together(seeds: &[u64], elements: Elements) -> Vec<[f64; 3]> {
-    let plans: Vec<Plan> = seeds.iter().map(|&seed| Plan::new(seed, seed % 2 == 0)).collect();
-    let moved = |(number, plan): (usize, &Plan)| {
-        let mesh = &plan.block.mesh;
-        let vertices = mesh.vertices().iter().map(|x| *x + place(number)).collect();
-        TetMesh::new(vertices, mesh.tets().to_vec(), mesh.regions().to_vec()).expect("a mesh").0
-    };
-    let meshes: Vec<TetMesh> = plans.iter().enumerate().map(moved).collect();
+/// A plan's block where it stands.
+fn moved(number: usize, plan: &Plan) -> TetMesh {
+    let mesh = &plan.block.mesh;
+    let vertices = mesh.vertices().iter().map(|x| *x + place(number)).collect();
+    TetMesh::new(vertices, mesh.tets().to_vec(), mesh.regions().to_vec()).expect("a mesh").0
+}
+
+/// All of them as one model, and what holds and grasps it.
+fn beside_each_other<'a>(
+    plans: Vec<Plan>,
+    meshes: &'a [TetMesh],
+    elements: Elements,
+) -> (Model<f32>, Inputs<f32>, Vec<Grasped<'a>>) {
     let mut builder = ModelBuilder::new();
     let mut inputs = Inputs::<f32>::default();
-    let mut grasps = Vec::new();
-    for (number, (plan, mesh)) in plans.into_iter().zip(&meshes).enumerate() {
+    let mut grasps: Vec<Grasped<'_>> = Vec::new();
+    let [young, poisson] = GRASPED;
+    let tissue = crate::common::material(crate::common::SNH, young, poisson);
+    for (number, (plan, mesh)) in plans.into_iter().zip(meshes).enumerate() {
         builder.add_body(mesh, &plan.block.material()).expect("a body");
-        let first = grasps.last().map_or(0, |last: &Grasped<'_>| last.vertices.end);
+        let first = grasps.last().map_or(0, |last| last.vertices.end);
         let own = plan.inputs::<f64>();
         inputs.tools.extend(own.tools);
         inputs.pins.extend(own.pins.iter().map(|pin| Pin {
             vertex: first as u32 + pin.vertex,
             target: (pin.target + place(number)).cast(),
         }));
-        let [young, poisson] = GRASPED;
         let outside = Outside::new::<f32>(mesh, young, poisson, 1060.0);
-        let tissue = crate::common::material(crate::common::SNH, young, poisson);
-        let outside =
-            if elements == Elements::Recovered { outside.of_recovered(&tissue) } else { outside };
-        let (vertices, account) = (first..first + mesh.vertices().len(), Account::default());
-        let place = place(number);
-        let (peak, gain, lifted) = (0.0, 0.0, 0.0);
-        grasps.push(Grasped { plan, place, vertices, outside, account, peak, gain, lifted });
+        grasps.push(Grasped {
+            plan,
+            place: place(number),
+            vertices: first..first + mesh.vertices().len(),
+            outside: match elements {
+                Elements::Recovered => outside.of_recovered(&tissue),
+                _ => outside,
+            },
+            account: Account::default(),
+            peak: 0.0,
+            gain: 0.0,
+            lifted: 0.0,
+        });
     }
     builder.sample_surface(1);
-    let model = builder.build::<f32>().expect("a model");
+    (builder.build().expect("a model"), inputs, grasps)
+}
+
+/// How far each is lifted, of the lift; what it gains, and what is left at the end, of the most that it had.
+fn grasp_together(seeds: &[u64], elements: Elements) -> Vec<[f64; 3]> {
+    let plans: Vec<Plan> = seeds.iter().map(|&seed| Plan::new(seed, seed % 2 == 0)).collect();
+    let meshes: Vec<TetMesh> = plans.iter().enumerate().map(|(i, plan)| moved(i, plan)).collect();
+    let (model, mut inputs, mut grasps) = beside_each_other(plans, &meshes, elements);
     let act = |grasps: &[Grasped<'_>], time: f64, tools: &mut [Tool]| {
         grasps.iter().zip(tools.chunks_mut(2)).for_each(|(grasp, tools)| grasp.act(time, tools));
     };
@@ -227,8 +245,7 @@ fn grasp_together(seeds: &[u64], elements: Elements) -> Vec<[f64; 3]> {
     gpu.write(&model, &state).expect("a legal state");
     let none = [Wrench::default(); 2];
     let dt: f64 = 1.0 / 120.0;
-    let steps = (2.4 / dt).round() as u32;
-    for step in 0..=steps {
+    for step in 0..=(2.4 / dt).round() as u32 {
         let time = f64::from(step) * dt;
         act(&grasps, time, &mut inputs.tools);
         if step > 0 {
