@@ -26,6 +26,10 @@ const PATIENCE: f64 = 10.0;
 /// by thousandths of that.
 const SWINGING: f64 = 0.2;
 
+/// What stands elsewhere has unbalanced forces of the share of its way that is left. Where inertia accounts for all but this
+/// share of them, the tissue has only begun to move.
+const UNBALANCED: f64 = 0.2;
+
 /// A run at its end, whose loads no longer change, beside its state of rest.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct RestReport {
@@ -43,6 +47,8 @@ pub struct RestReport {
     pub speed: f64,
     /// The share of the way that is gone in a second [1/s]; zero or less where it is not gone.
     pub approach: f64,
+    /// Unbalanced forces of the last step, inertia among them, over the loads.
+    pub residual: f64,
     /// False where the estimate ended early: the distance is at least so much.
     pub complete: bool,
     /// False where the forces push tissue on rather than back along some way.
@@ -72,6 +78,7 @@ impl RestReport {
             () if !has_far_to_go => Standing::AtRest,
             () if self.swing > SWINGING * error => Standing::Swinging,
             () if self.approach > 0.0 && self.time_left() < PATIENCE * time => Standing::Creeping,
+            () if self.stable && self.residual < UNBALANCED * error => Standing::Swinging,
             () => Standing::Elsewhere,
         }
     }
@@ -168,6 +175,7 @@ impl<S: Real> Simulation<S> {
             swing: if is_displaced { measured.excursion / measured.displacement } else { 0.0 },
             speed,
             approach: if length > 0.0 { gone / length } else { 0.0 },
+            residual: self.balance.relative_residual(),
             complete: measured.complete,
             stable: measured.stable,
         })
