@@ -40,6 +40,29 @@ fn tools_of_a_scene_are_seen_with_their_forces() {
     window.picture("palpation");
 }
 
+/// Some drivers compile kernels for seconds: the window says what it waits for, and goes on with the tools there.
+#[test]
+fn a_graphics_processor_that_is_chosen_computes_tools_as_well() {
+    let few = [("solver.method", "quasi_newton"), ("solver.iterations", "4")];
+    let mut window = Window::running("grasp", &few);
+    let menu = window.harness.get_by_role_and_label(Role::ComboBox, "device");
+    menu.scroll_to_me();
+    (0..4).for_each(|_| window.harness.step());
+    window.harness.get_by_role_and_label(Role::ComboBox, "device").click_accesskit();
+    (0..4).for_each(|_| window.harness.step());
+    window.harness.get_by_label("GPU").click_accesskit();
+    window.wait("words", |app| {
+        app.messages().busy.as_ref().is_some_and(|text| text.contains("kernels"))
+    });
+    window.wait("the device", |app| app.messages().busy.is_none());
+    let number = window.harness.state().snapshot().expect("a frame").number;
+    window
+        .wait("frames", |app| app.snapshot().is_some_and(|snapshot| snapshot.number > number + 1));
+    assert!(window.texts().is_empty(), "{:?}", window.texts());
+    assert!(!window.run(0).tools.is_empty());
+    assert!(window.harness.query_by_label_contains("as asked for").is_some());
+}
+
 /// The working end of the tool in a hand, in the window.
 fn end_of(window: &Window, hand: u64) -> Pos2 {
     let run = window.run(0);

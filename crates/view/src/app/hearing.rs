@@ -45,6 +45,7 @@ impl App {
                     }
                     self.setup = Some(setup);
                 }
+                Event::Changed => self.messages.busy = None,
                 Event::Devices(devices) => self.devices = devices,
                 Event::Refused(text) => self.messages.warn(text),
                 Event::Done { path, text, time } => self.write_scene(&path, &text, time),

@@ -91,6 +91,8 @@ pub enum Event {
     Expect(String),
     /// Everything is built and at rest; frames follow.
     Ready(Arc<Setup>),
+    /// Settings whose change took a while are in force.
+    Changed,
     /// Others are beside the first simulation now, or no longer.
     Accompanied(Arc<Setup>),
     /// What computes each of the simulations has changed or been built again: its device, and why.

@@ -74,6 +74,10 @@ const PROBED_EVERY: Duration = Duration::from_millis(700);
 /// How often frames are measured where nothing needs it more often.
 const MEASURED_EVERY: Duration = Duration::from_millis(100);
 
+/// Settings of a device that other kernels belong to: some drivers compile them for seconds.
+const OTHER_KERNELS: [&str; 5] =
+    ["solver.method", "solver.elements", "solver.acceleration", "solver.colors", "solver.clusters"];
+
 impl Worker {
     /// A thread with nothing to do yet.
     pub fn new(
@@ -323,10 +327,29 @@ impl Worker {
             }
             return self.ask_or_start(request, assembly);
         }
-        let Some(running) = &mut self.running else { return };
-        let Some(changed) = running.runs.get_mut(run).filter(|_| !settings.is_empty()) else {
+        let Some(running) = &self.running else { return };
+        let Some(changed) = running.runs.get(run).filter(|_| !settings.is_empty()) else {
             return;
         };
+        let on_device = changed.is_on_device();
+        let compiles = settings.iter().any(|(key, _)| {
+            key == "solver.device" || on_device && OTHER_KERNELS.contains(&key.as_str())
+        });
+        if compiles {
+            self.tell(Event::Busy("building the model, and kernels for its device".to_owned()));
+        }
+        let refused = self.try_change(run, settings);
+        refused.into_iter().for_each(|event| self.tell(event));
+        self.tell_devices();
+        if compiles {
+            self.tell(Event::Changed);
+        }
+    }
+
+    /// Changes what can be changed; returns what is to be told of the rest.
+    fn try_change(&mut self, run: usize, settings: &Settings) -> Vec<Event> {
+        let runs = self.running.as_mut().map(|running| &mut running.runs);
+        let Some(changed) = runs.and_then(|runs| runs.get_mut(run)) else { return Vec::new() };
         let mut refused = Vec::new();
         if changed.change(settings).is_err() {
             // What can be, is.
@@ -338,8 +361,7 @@ impl Worker {
                 }
             }
         }
-        refused.into_iter().for_each(|event| self.tell(event));
-        self.tell_devices();
+        refused
     }
 
     fn save(&mut self, path: PathBuf) {
