@@ -164,15 +164,13 @@ fn a_device_takes_as_many_passes_as_the_processor() {
 fn a_device_takes_as_many_passes_as_the_processor_at_length() {
     let beam = shapes::beam(0.16, 0.04, 0.04, 6, 0.1).expect("a beam");
     let slab = block([0.08, 0.08, 0.02], [12, 12, 3], 0.2);
-    for (name, mesh, poisson) in [("beam", &beam, 0.3), ("slab", &slab, 0.45)] {
-        for (integrator, is_led) in [
-            (Integrator::Sdirk2, false),
-            (Integrator::Sdirk2, true),
-            (Integrator::ImplicitEuler, false),
-        ] {
-            let [cpu, gpu] = counts(name, &Handled::new(mesh, poisson, integrator, is_led));
-            let near = cpu.iter().zip(&gpu).all(|(cpu, gpu)| cpu.abs_diff(*gpu) <= 2);
-            assert!(near, "{name}: {gpu:?} passes, CPU {cpu:?}");
-        }
+    for (name, mesh, poisson, integrator, is_led) in [
+        ("beam", &beam, 0.3, Integrator::Sdirk2, true),
+        ("beam", &beam, 0.3, Integrator::ImplicitEuler, false),
+        ("slab", &slab, 0.45, Integrator::Sdirk2, false),
+    ] {
+        let [cpu, gpu] = counts(name, &Handled::new(mesh, poisson, integrator, is_led));
+        let near = cpu.iter().zip(&gpu).all(|(cpu, gpu)| cpu.abs_diff(*gpu) <= 2);
+        assert!(near, "{name}: {gpu:?} passes, CPU {cpu:?}");
     }
 }

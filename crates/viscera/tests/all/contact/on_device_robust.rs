@@ -244,7 +244,7 @@ fn grasp_together(seeds: &[u64], elements: Elements) -> Vec<[f64; 3]> {
     let mut gpu = GpuSolver::new(device(), &model, &settings).expect("a model that fits");
     gpu.write(&model, &state).expect("a legal state");
     let none = [Wrench::default(); 2];
-    let dt: f64 = 1.0 / 120.0;
+    let dt: f64 = 1.0 / 60.0;
     for step in 0..=(2.4 / dt).round() as u32 {
         let time = f64::from(step) * dt;
         act(&grasps, time, &mut inputs.tools);
@@ -256,10 +256,10 @@ fn grasp_together(seeds: &[u64], elements: Elements) -> Vec<[f64; 3]> {
         let wrenches = wrenches.chain(std::iter::repeat(&none[..]));
         for (grasp, (tools, wrenches)) in grasps.iter_mut().zip(tools.zip(wrenches)) {
             grasp.account.add(tools, wrenches);
-            if step % 6 == 0 {
+            if step % 3 == 0 {
                 grasp.measure(&state, dt);
             }
-            if (1.19..1.2).contains(&time) {
+            if (1.18..1.2).contains(&time) {
                 grasp.lifted = grasp.plan.lifted(&grasp.own(&state).positions);
             }
         }
