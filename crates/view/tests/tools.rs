@@ -51,7 +51,7 @@ fn a_graphics_processor_that_is_chosen_computes_tools_as_well() {
     window.harness.get_by_role_and_label(Role::ComboBox, "device").click_accesskit();
     (0..4).for_each(|_| window.harness.step());
     window.harness.get_by_label("GPU").click_accesskit();
-    window.wait("words", |app| {
+    window.wait("a message", |app| {
         app.messages().busy.as_ref().is_some_and(|text| text.contains("kernels"))
     });
     window.wait("the device", |app| app.messages().busy.is_none());

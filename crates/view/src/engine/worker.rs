@@ -346,7 +346,7 @@ impl Worker {
         }
     }
 
-    /// Changes what can be changed; returns what is to be told of the rest.
+    /// Changes what can be changed; returns the events that report what was refused.
     fn try_change(&mut self, run: usize, settings: &Settings) -> Vec<Event> {
         let runs = self.running.as_mut().map(|running| &mut running.runs);
         let Some(changed) = runs.and_then(|runs| runs.get_mut(run)) else { return Vec::new() };

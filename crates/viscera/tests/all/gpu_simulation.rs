@@ -219,7 +219,7 @@ fn the_choice_is_told_with_its_reason() {
     assert!(error.contains(&name), "{error}");
 }
 
-/// Also after a change; what it is expected to be off by is told.
+/// Also after a change of the tissue. The expected error of its motion is reported.
 #[test]
 fn auto_is_quasi_newton_on_a_device_that_is_asked_for() {
     let auto = [("solver.method", "auto"), ("solver.device", "gpu"), ("solver.accuracy", "fine")];

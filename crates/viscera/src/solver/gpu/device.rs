@@ -16,14 +16,14 @@ pub fn baseline() -> wgpu::Limits {
 /// The parts of the baseline that limits lack, in words; nothing where they have all.
 pub fn shortfall(limits: &wgpu::Limits) -> Option<String> {
     let mut lacking = String::new();
-    let fail = |what: &'static str, asked, given| tell(&mut lacking, what, [given, asked]);
+    let fail = |what: &'static str, asked, given| add_shortfall(&mut lacking, what, [given, asked]);
     baseline().check_limits_with_fail_fn(limits, false, fail);
     (!lacking.is_empty()).then_some(lacking)
 }
 
-/// Once in a page, not once for each limit.
+/// Adds a limit to the list. Not inlined: a page would carry it once for each limit.
 #[inline(never)]
-fn tell(lacking: &mut String, what: &str, [given, asked]: [u64; 2]) {
+fn add_shortfall(lacking: &mut String, what: &str, [given, asked]: [u64; 2]) {
     let comma = if lacking.is_empty() { "" } else { ", " };
     *lacking += &format!("{comma}{what} {given} where {asked} is needed");
 }

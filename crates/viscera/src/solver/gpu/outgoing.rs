@@ -66,7 +66,8 @@ impl Outgoing {
         self.submissions
     }
 
-    /// Writes bytes, whole words, behind all that is on its way. Never inlined, as what follows: pages carry each once.
+    /// Writes bytes, whole words, behind all that is on its way. Not inlined, like the two
+    /// below: a page would carry each several times.
     #[inline(never)]
     pub fn write(&mut self, buffer: &wgpu::Buffer, offset: u64, bytes: &[u8]) {
         if bytes.is_empty() {
