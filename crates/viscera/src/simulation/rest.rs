@@ -78,7 +78,7 @@ impl RestReport {
             () if !has_far_to_go => Standing::AtRest,
             () if self.swing > SWINGING * error => Standing::Swinging,
             () if self.approach > 0.0 && self.time_left() < PATIENCE * time => Standing::Creeping,
-            () if self.stable && self.residual < UNBALANCED * error => Standing::Swinging,
+            () if self.stable && self.residual < UNBALANCED * self.error => Standing::Swinging,
             () => Standing::Elsewhere,
         }
     }
