@@ -9,6 +9,7 @@ use super::task::ReadBack;
 use anyhow::Result;
 use std::cell::RefCell;
 use std::time::Instant;
+use viscera::solver::FrameReading;
 use viscera::solver::balance::ForceBalance;
 use viscera::solver::gpu::{Adapter, Device, GpuSolver, MemoryCopy, StepTimes};
 use viscera::state::State;
@@ -121,11 +122,12 @@ impl GpuStepper<'_> {
     fn run_and_read(&mut self, count: u32) -> Result<()> {
         let (model, inputs) = (&self.bench.model, &self.bench.inputs);
         let with_forces = self.bench.entry.task.read_back == ReadBack::Forces;
+        let reading = if with_forces { FrameReading::Balance } else { FrameReading::State };
         let mut state = self.start.clone();
         let mut balance = ForceBalance::default();
         for _ in 0..count {
             self.solver.step(model, inputs, self.dt)?;
-            self.solver.ask_for_frame(with_forces)?;
+            self.solver.ask_for_frame(reading)?;
             while self.solver.take_frame(model, &mut state)?.is_none() {
                 self.solver.wait()?;
             }

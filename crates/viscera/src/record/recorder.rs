@@ -56,6 +56,8 @@ impl Recorder {
 
     /// After each frame, before hands do anything. Returns the bytes to write next, mostly none.
     pub fn frame<S: Real>(&mut self, simulation: &mut Simulation<S>) -> Vec<u8> {
+        // Of a device that is lost now the next frame reports.
+        let _ = simulation.read_state();
         let acts = simulation.take_acts();
         self.frames.push(Frame { acts, checks: checks(simulation) });
         self.count += 1;

@@ -13,7 +13,7 @@ use crate::solver::balance::ForceBalance;
 #[cfg(feature = "gpu")]
 use crate::solver::gpu::{Device, GpuSolver};
 use crate::solver::oscillations::Oscillations;
-use crate::solver::{Inputs, Ledger, Solver, StepError, substeps_of_solves};
+use crate::solver::{FrameReading, Inputs, Ledger, Solver, StepError, substeps_of_solves};
 use crate::state::{ContactState, State};
 
 /// A solver on a graphics processor, as a simulation of any precision sees it.
@@ -36,8 +36,14 @@ pub(super) trait DeviceSolver<S>: Debug + Send {
     /// is changed.
     fn read_frame(&mut self, model: &Model<S>, state: &mut State<S>) -> Result<u64, FrameError>;
 
-    /// Asks for all that [`DeviceSolver::take_frame`] needs behind the last step, and for the force balance. Does not wait.
-    fn ask_for_frame(&mut self, with_balance: bool) -> Result<(), FrameError>;
+    /// As [`DeviceSolver::read_frame`], multipliers as well, and nothing else is known then than before.
+    fn read(&self, model: &Model<S>, state: &mut State<S>) -> Result<(), FrameError>;
+
+    /// As [`DeviceSolver::read_frame`]; what moves stays there.
+    fn read_forces(&mut self) -> Result<u64, FrameError>;
+
+    /// Asks for what [`DeviceSolver::take_frame`] is to hand over of the state behind the last step. Does not wait.
+    fn ask_for_frame(&mut self, reading: FrameReading) -> Result<(), FrameError>;
 
     /// As [`DeviceSolver::read_frame`] of what was asked for; nothing while it is under way.
     fn take_frame(
@@ -101,6 +107,8 @@ pub(super) struct Backend<S> {
     pub gives_way: bool,
     /// Steps that the device has rejected, as of the last frame.
     pub rejected: u64,
+    /// What was asked for of the frame that is under way.
+    pub asked: FrameReading,
 }
 
 impl<S: Real> Backend<S> {
@@ -112,7 +120,8 @@ impl<S: Real> Backend<S> {
 
     /// A solver, for a reason.
     pub fn new(engine: Engine<S>, choice: String) -> Self {
-        Self { engine, choice, warning: None, gives_way: false, rejected: 0 }
+        let asked = FrameReading::default();
+        Self { engine, choice, warning: None, gives_way: false, rejected: 0, asked }
     }
 
     /// What each part of the last step's tools met; nothing before the first step.
@@ -232,17 +241,26 @@ impl<S: Real> Backend<S> {
         }
     }
 
-    /// Positions and velocities after the last step, where they are not there yet.
-    pub fn read_frame(&mut self, model: &Model<S>, state: &mut State<S>) -> Result<(), FrameError> {
+    /// What is asked for of the state after the last step, where it is not there yet.
+    pub fn read_frame(
+        &mut self,
+        reading: FrameReading,
+        model: &Model<S>,
+        state: &mut State<S>,
+    ) -> Result<(), FrameError> {
         if let Engine::Device(device) = &mut self.engine {
-            self.rejected = device.read_frame(model, state)?;
+            self.rejected = match reading {
+                FrameReading::Forces => device.read_forces()?,
+                FrameReading::State | FrameReading::Balance => device.read_frame(model, state)?,
+            };
         }
         Ok(())
     }
 
     /// Asks for the results of the last step, without waiting; where the CPU computes they are there.
-    pub fn ask_for_frame(&mut self, with_balance: bool) -> Result<(), FrameError> {
-        self.device_mut().map_or(Ok(()), |device| device.ask_for_frame(with_balance))
+    pub fn ask_for_frame(&mut self, reading: FrameReading) -> Result<(), FrameError> {
+        self.asked = reading;
+        self.device_mut().map_or(Ok(()), |device| device.ask_for_frame(reading))
     }
 
     /// Takes over what was asked for; false while it is under way.
@@ -304,6 +322,11 @@ impl<S: Real> Backend<S> {
             }
             Engine::Device(_) => false,
         }
+    }
+
+    /// Whether the CPU goes on after an error: what a step refuses it would refuse as well.
+    pub fn gives_way_after(&self, error: &FrameError) -> bool {
+        self.gives_way && !matches!(error, FrameError::Step(_) | FrameError::Diverged { .. })
     }
 
     /// Goes on with the CPU.

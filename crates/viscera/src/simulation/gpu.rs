@@ -11,7 +11,7 @@ use crate::scalar::{Real, Vec3};
 use crate::settings::{DeviceRequest, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::gpu::{Adapter, Device, GpuError, GpuSolver, StepCost};
-use crate::solver::{Inputs, Solver, StepError};
+use crate::solver::{FrameReading, Inputs, Solver, StepError};
 use crate::state::{ContactState, State};
 
 impl DeviceSolver<f32> for GpuSolver {
@@ -52,8 +52,16 @@ impl DeviceSolver<f32> for GpuSolver {
         Ok(GpuSolver::read_frame(self, model, state)?)
     }
 
-    fn ask_for_frame(&mut self, with_balance: bool) -> Result<(), FrameError> {
-        Ok(GpuSolver::ask_for_frame(self, with_balance)?)
+    fn read(&self, model: &Model<f32>, state: &mut State<f32>) -> Result<(), FrameError> {
+        Ok(GpuSolver::read(self, model, state)?)
+    }
+
+    fn read_forces(&mut self) -> Result<u64, FrameError> {
+        Ok(GpuSolver::read_forces(self)?)
+    }
+
+    fn ask_for_frame(&mut self, reading: FrameReading) -> Result<(), FrameError> {
+        Ok(GpuSolver::ask_for_frame(self, reading)?)
     }
 
     fn take_frame(

@@ -70,6 +70,7 @@ impl<S: Real> Simulation<S> {
         let thinnest = thinnest_until(all, time, tolerance(&self.scene)).unwrap_or(f64::INFINITY);
         let samples = self.assembly.samples_for(thinnest);
         let entry = Entry { samples: &samples, time, may_meet_fixed: false };
+        self.refresh_state();
         self.assembly.check_entry(&tool, &entry, |v| self.state.positions[v].cast())?;
         if let Some(given) = given {
             self.note(|| Act::take_tool(&given));
@@ -229,6 +230,7 @@ impl<S: Real> Simulation<S> {
             return Ok(());
         }
         let (were_any, count) = (self.instruments.there().contains(&true), there.len());
+        self.refresh_state();
         self.sample_for(time)?;
         let comes = |index: &usize| there[*index] && !self.instruments.is_there(*index);
         let samples = self.assembly.builder.samples();
@@ -241,7 +243,7 @@ impl<S: Real> Simulation<S> {
         let places = self.instruments.come_and_go(&self.assembly.tools, there, frame);
         let mut parts = Vec::new();
         self.instruments.parts_at(&self.assembly.tools, time, &mut parts);
-        self.state.contact = self.whole_contact();
+        self.state.contact = self.contact_of(&self.state);
         renumber(&mut self.state.contact, &places, &parts);
         if let Some(device) = self.backend.device_mut() {
             device.write(&self.model, &self.state);

@@ -25,6 +25,11 @@ pub(super) fn tolerance_of(frame: f64) -> f64 {
 #[derive(Clone, Debug, Default)]
 pub(super) struct GraspOrigins(Vec<Option<Vec<Vec3<f64>>>>);
 
+/// Whether a motion that takes hold of its patch where it finds it has begun at a time [s].
+fn begins(scene: &Scene, motion: &Motion, time: f64) -> bool {
+    motion.start > 0.0 && time + tolerance(scene) >= motion.start
+}
+
 impl GraspOrigins {
     /// Places of the patches of all motions.
     pub fn of(all: Vec<Option<Vec<Vec3<f64>>>>) -> Self {
@@ -34,6 +39,13 @@ impl GraspOrigins {
     /// The places, motion by motion.
     pub fn all(&self) -> &[Option<Vec<Vec3<f64>>>] {
         &self.0
+    }
+
+    /// Whether there is a motion at a time [s] whose patch is still to be remembered.
+    pub fn is_due(&self, scene: &Scene, time: f64) -> bool {
+        let is_known = |index: usize| self.0.get(index).is_some_and(Option::is_some);
+        let mut motions = scene.motions.iter().enumerate();
+        motions.any(|(index, motion)| begins(scene, motion, time) && !is_known(index))
     }
 
     /// Remembers the patches that are taken hold of at a time [s], before the frame that begins then.
@@ -47,8 +59,7 @@ impl GraspOrigins {
         self.0.resize(scene.motions.len(), None);
         let motions = scene.motions.iter().zip(&assembly.motions);
         for (taken, (motion, patch)) in self.0.iter_mut().zip(motions) {
-            let is_due = motion.start > 0.0 && time + tolerance(scene) >= motion.start;
-            if is_due && taken.is_none() {
+            if begins(scene, motion, time) && taken.is_none() {
                 let places = patch.vertices.iter().map(|&v| state.positions[v as usize].cast());
                 *taken = Some(places.collect());
             }

@@ -171,9 +171,10 @@ impl<S: Real> Simulation<S> {
         fork.by_hand.clone_from(&self.by_hand);
         fork.balance.clone_from(&self.balance);
         let double = |all: &[Vec3<S>]| all.iter().map(|x| x.cast::<f64>().cast()).collect();
-        let positions: Vec<Vec3<T>> = double(&self.state.positions);
-        let velocities: Vec<Vec3<T>> = double(&self.state.velocities);
-        let contact = self.state.contact.clone();
+        let current = self.current_state();
+        let positions: Vec<Vec3<T>> = double(&current.positions);
+        let velocities: Vec<Vec3<T>> = double(&current.velocities);
+        let contact = current.contact.clone();
         let state = State { positions, velocities, contact, ..State::at_rest(&fork.model) };
         fork.begin_at(state);
         // Constraints in the same order, which settings decide, go on with the multipliers they have.
@@ -268,6 +269,9 @@ impl<S: Real> Simulation<S> {
         self.make_changes()?;
         self.tools_come_and_go()?;
         let time = self.time();
+        if self.taken.is_due(&self.scene, time) {
+            self.refresh_state();
+        }
         self.taken.take(&self.scene, &self.assembly, time, &self.state);
         Ok(())
     }
@@ -321,7 +325,8 @@ impl<S: Real> Simulation<S> {
         if !scene.tools.is_empty() {
             check_tools(&scene, on_device, solver.method, self.assembly.tools.iter())?;
         }
-        let contact = self.whole_contact();
+        self.refresh_state();
+        let contact = self.contact_of(&self.state);
         let backend = self.backend.renew(same_device, &model, &solver, ready, &self.offered)?;
         self.under_way = false;
         let rest = State::at_rest(&model);
@@ -347,6 +352,7 @@ impl<S: Real> Simulation<S> {
         let restarted = self.backend.restart(&self.model, &mut state, &inputs, dt);
         debug_assert!(restarted.is_ok(), "{restarted:?}");
         self.state = state;
+        self.unread = 0;
         (self.stepped, self.is_balanced) = (false, false);
         self.wrenches = None;
         self.shadow = None;
@@ -368,6 +374,7 @@ impl<S: Real> Simulation<S> {
             device.write(&self.model, &state);
         }
         self.state = state;
+        (self.unread, self.frames_since_before) = (0, 1);
         self.shadow = None;
     }
 }

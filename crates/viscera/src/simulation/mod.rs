@@ -26,6 +26,7 @@ mod mesh_error;
 mod meshes;
 #[cfg(feature = "gpu")]
 mod on_device;
+mod reading;
 mod recorded;
 mod report;
 mod rest;
@@ -76,7 +77,7 @@ use crate::scene::{Change, Scene};
 use crate::settings::{Count, Elements, Method, SolverSettings};
 use crate::solver::balance::ForceBalance;
 use crate::solver::oscillations::Oscillations;
-use crate::solver::{Inputs, Solver, check_settings, choose};
+use crate::solver::{FrameReading, Inputs, Solver, check_settings, choose};
 use crate::state::{ContactState, State};
 use device::{Backend, Offered};
 
@@ -119,8 +120,12 @@ pub struct Simulation<S> {
     /// What was done by hand since it was last asked for, where somebody records that.
     acts: Option<Vec<Act>>,
     balance: ForceBalance,
-    /// Positions [m] at the beginning of the last frame, which tell how fast it moves.
+    /// Positions [m] some frames ago, which tell how fast it moves; of the last frame's beginning, or of the frame that was read
+    /// before it.
     before: Vec<Vec3<S>>,
+    frames_since_before: u64,
+    /// Frames since the one that `state` is of.
+    unread: u64,
     /// Whether the solver knows of a step: a new one has nothing to measure yet.
     stepped: bool,
     /// Whether the balance is of a step of this model: a moment that is gone back to has its own.
@@ -191,6 +196,8 @@ impl<S: Real> Simulation<S> {
             acts: None,
             balance: ForceBalance::default(),
             before: model.rest_positions.clone(),
+            frames_since_before: 0,
+            unread: 0,
             stepped: false,
             is_balanced: false,
             wrenches: None,
@@ -305,7 +312,8 @@ impl<S: Real> Simulation<S> {
     }
 
     /// What moves. Positions and velocities stay where they are in memory, as long as the simulation lives. Where a
-    /// graphics processor computes, multipliers stay there: these are older ones.
+    /// graphics processor computes, multipliers stay there: these are older ones; and so do positions and velocities of frames
+    /// that were asked for without ([`Simulation::advance_reading`]).
     pub fn state(&self) -> &State<S> {
         &self.state
     }
@@ -369,12 +377,7 @@ impl<S: Real> Simulation<S> {
     /// As [`Simulation::advance_frame`], without the numbers of the report, which are of an earlier frame then: for
     /// who needs positions, not numbers.
     pub fn advance(&mut self) -> Result<(), FrameError> {
-        self.submit_frame()?;
-        let wait = |simulation: &mut Self| {
-            let Self { backend, model, state, .. } = simulation;
-            backend.read_frame(model, state).map(|()| true)
-        };
-        self.finish_frame(wait).map(|_| ())
+        self.advance_reading(FrameReading::State)
     }
 
     fn diverged(&self) -> FrameError {
@@ -384,11 +387,16 @@ impl<S: Real> Simulation<S> {
     /// Measures the last frame, for [`Simulation::report`]. The balance of forces is
     /// that of a step: after a change of settings it stays as it was until the next one.
     pub fn measure(&mut self) -> Result<(), FrameError> {
+        match self.read_state() {
+            // A device lost since the frame: what was measured stays that of the frame before, and the next one gives way.
+            Err(lost) if self.backend.gives_way_after(&lost) => return Ok(()),
+            read => read?,
+        }
         if self.stepped {
             let Self { backend, model, state, inputs, balance, .. } = self;
             match backend.force_balance(model, state, inputs, balance) {
                 // A device lost since the frame: the balance stays that of the frame before, and the next one gives way.
-                Err(lost) if backend.gives_way && !matches!(lost, FrameError::Step(_)) => {}
+                Err(lost) if backend.gives_way_after(&lost) => {}
                 measured => measured?,
             }
             self.is_balanced = true;
@@ -406,29 +414,6 @@ impl<S: Real> Simulation<S> {
 
     fn measure_tissue(&mut self) {
         self.tissue = measure_tissue(&self.model, &self.state.positions);
-    }
-
-    /// What moves, the multipliers included, wherever they are. Where a device is lost they are what the tissue
-    /// answers to its places.
-    pub(super) fn whole_state(&self) -> State<S> {
-        let mut state = State { contact: self.whole_contact(), ..self.state.clone() };
-        let Some(device) = self.backend.device() else { return state };
-        match device.multipliers(&self.model) {
-            Ok(multipliers) => state.multipliers = multipliers,
-            Err(_) => {
-                let (inputs, dt) = (self.inputs_at(self.time()), self.substep_dt());
-                let mut solver = Solver::new(&self.model, &self.solver);
-                let restarted = solver.restart(&self.model, &mut state, &inputs, dt);
-                debug_assert!(restarted.is_ok(), "{restarted:?}");
-            }
-        }
-        state
-    }
-
-    /// What is kept of contact; where a device is lost, where its tools were.
-    pub(super) fn whole_contact(&self) -> ContactState {
-        let read = self.backend.device().map(|device| device.contact(&self.model, &self.state));
-        read.and_then(Result::ok).unwrap_or_else(|| self.state.contact.clone())
     }
 
     /// Energies; of recovered-gradient tetrahedra with their own, once a step has found it.

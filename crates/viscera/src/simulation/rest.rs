@@ -150,7 +150,7 @@ impl<S: Real> Simulation<S> {
     /// seconds for a large one, and memory while it lasts: for the end of a run.
     pub fn rest(&self) -> Option<RestReport> {
         let (time, frame) = (self.time(), self.scene.time.frame);
-        if !self.stepped || self.has_contact() {
+        if !self.stepped || self.unread > 0 || self.has_contact() {
             return None;
         }
         let inputs = self.inputs_at(time);
@@ -160,7 +160,8 @@ impl<S: Real> Simulation<S> {
         // Over the frame: velocities of a last substep are also what sweeps correct.
         let positions = &self.state.positions;
         let steps = positions.iter().zip(&self.before).map(|(x, y)| x.cast::<f64>() - y.cast());
-        let velocities: Vec<Vec3<f64>> = steps.map(|step| step * (1.0 / frame)).collect();
+        let lasted = frame * self.frames_since_before as f64;
+        let velocities: Vec<Vec3<f64>> = steps.map(|step| step * (1.0 / lasted)).collect();
         let measured =
             WayToRest::measure(&self.model, positions, &velocities, &inputs, self.solver.elements)?;
         let speed = velocities.iter().map(|v| v.length()).fold(0.0, f64::max);

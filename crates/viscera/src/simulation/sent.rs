@@ -5,29 +5,43 @@ use super::error::FrameError;
 use super::shadowed::Shadowed;
 use super::{Simulation, substep_dt};
 use crate::scalar::Real;
-use crate::solver::Inputs;
+use crate::solver::{FrameReading, Inputs};
 use crate::state::State;
 
 impl<S: Real> Simulation<S> {
     /// Begins a frame: a device is sent all of it, the CPU computes it at once. [`Simulation::take_frame`] takes it over.
-    /// `measured` where [`Simulation::measure`] will be asked for after it. What is done by hand in between takes the frame
-    /// back: it is best done before.
+    /// `reading`: what of it will be asked for, [`FrameReading::Balance`] for [`Simulation::measure`]. What is done by hand in
+    /// between takes the frame back: it is best done before.
     ///
     /// ```text
     /// advance()                        send, wait, take over
     /// send_frame(); take_frame()?      the same without waiting: false while the frame is under way
     /// ```
-    pub fn send_frame(&mut self, measured: bool) -> Result<(), FrameError> {
+    pub fn send_frame(&mut self, reading: FrameReading) -> Result<(), FrameError> {
         self.submit_frame()?;
-        let asked = self.backend.ask_for_frame(measured);
+        let asked = self.backend.ask_for_frame(self.at_least(reading));
         self.or_on_the_cpu(asked)
+    }
+
+    /// As [`Simulation::advance`]. Where a device computes and `reading` is [`FrameReading::Forces`], what moves stays there, to be
+    /// drawn: [`Simulation::state`] and all that is measured of it are of the frame that was read last, until
+    /// [`Simulation::read_state`]. Tools, time and what is sent to the device are of this one.
+    pub fn advance_reading(&mut self, reading: FrameReading) -> Result<(), FrameError> {
+        self.submit_frame()?;
+        let reading = self.at_least(reading);
+        let wait = |simulation: &mut Self| {
+            let Self { backend, model, state, .. } = simulation;
+            backend.read_frame(reading, model, state).map(|()| Some(reading))
+        };
+        self.finish_frame(wait).map(|_| ())
     }
 
     /// Takes over the frame that was sent; false while it is under way, or where none was.
     pub fn take_frame(&mut self) -> Result<bool, FrameError> {
+        let asked = self.backend.asked;
         let take = |simulation: &mut Self| {
             let Self { backend, model, state, .. } = simulation;
-            backend.take_frame(model, state)
+            Ok(backend.take_frame(model, state)?.then_some(asked))
         };
         self.finish_frame(take)
     }
@@ -40,7 +54,10 @@ impl<S: Real> Simulation<S> {
     /// Sends the steps of a frame.
     pub(super) fn submit_frame(&mut self) -> Result<(), FrameError> {
         self.begin_frame().map_err(Box::new)?;
-        self.before.copy_from_slice(&self.state.positions);
+        if self.unread == 0 {
+            self.before.copy_from_slice(&self.state.positions);
+            self.frames_since_before = 0;
+        }
         self.under_way = true;
         let sent = self.send_steps();
         self.or_on_the_cpu(sent)
@@ -49,9 +66,9 @@ impl<S: Real> Simulation<S> {
     /// The CPU computes the frame where the device was lost in it, and that is wanted.
     fn or_on_the_cpu(&mut self, computed: Result<(), FrameError>) -> Result<(), FrameError> {
         match computed {
-            // What a step refuses, the CPU would refuse as well.
-            Err(lost) if self.backend.gives_way && !matches!(lost, FrameError::Step(_)) => {
-                // Positions are still those of the last frame; the multipliers are gone with the device.
+            Err(lost) if self.backend.gives_way_after(&lost) => {
+                // Positions are still those that were read last; the multipliers are gone with the device.
+                self.unread = 0;
                 let (time, dt) = (self.time(), self.substep_dt());
                 self.backend.give_way(&self.model, &self.solver, time, &lost);
                 let inputs = self.inputs_at(time);
@@ -113,19 +130,26 @@ impl<S: Real> Simulation<S> {
         }
     }
 
-    /// What is left of a frame once its state is there: `take` gets it, or says that it is under way.
-    pub(super) fn finish_frame(
+    /// What is left of a frame once it is there: `take` gets what was to be read of it, and says what that is, or that it is
+    /// under way.
+    fn finish_frame(
         &mut self,
-        take: impl FnOnce(&mut Self) -> Result<bool, FrameError>,
+        take: impl FnOnce(&mut Self) -> Result<Option<FrameReading>, FrameError>,
     ) -> Result<bool, FrameError> {
         if !self.under_way {
             return Ok(false);
         }
         let taken = take(self);
-        match taken {
-            Ok(false) => return Ok(false),
-            taken => self.or_on_the_cpu(taken.map(|_| ()))?,
-        }
+        let is_unread = match taken {
+            Ok(None) => return Ok(false),
+            Ok(Some(reading)) => reading == FrameReading::Forces && self.is_on_device(),
+            Err(lost) => {
+                self.or_on_the_cpu(Err(lost))?;
+                false
+            }
+        };
+        self.unread = if is_unread { self.unread + 1 } else { 0 };
+        self.frames_since_before += 1;
         self.under_way = false;
         self.rejected_substeps = self.backend.rejected_steps() - self.rejected_before;
         self.frame += 1;

@@ -50,7 +50,7 @@ pub use meetings::Meetings;
 use oscillations::Oscillations;
 use plan::Plan;
 pub(crate) use quasi_newton::{choose, expected_motion_error};
-pub use report::StepReport;
+pub use report::{FrameReading, StepReport};
 pub use shadow::Shadow;
 use step::contacts::ContactStep;
 use step::data::{Step, StepConstants};

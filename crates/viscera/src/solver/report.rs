@@ -1,4 +1,17 @@
-//! How a guarded step ended: a value that every backend fills.
+//! What of a frame is read, and how a guarded step ended: values that every backend has.
+
+/// What of a frame a graphics processor hands back; where the processor of the machine computes, all of it is there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FrameReading {
+    /// Forces on tools, and how many steps were rejected: some hundred bytes. What moves stays on the device, to be drawn from
+    /// there.
+    Forces,
+    /// Positions and velocities as well: 32 bytes a vertex.
+    #[default]
+    State,
+    /// What the balance of forces is made of as well: some 50 bytes a vertex more.
+    Balance,
+}
 
 /// How a guarded step ended, for one connected part of the model or for all of them.
 ///

@@ -6,6 +6,7 @@ use viscera::scalar::Vec3;
 use viscera::scene::Scene;
 use viscera::settings::{Elements, Method, SolverSettings};
 use viscera::simulation::{Assembly, FrameError, FrameReport, Simulation, SimulationError};
+use viscera::solver::FrameReading;
 use viscera::solver::gpu::{GpuError, StepCost, baseline, shortfall};
 
 /// Two bars, joined by springs; one viscous, one in an elastic fixing; a motion that lets go, a force.
@@ -393,9 +394,13 @@ fn a_frame_reads_back_what_is_shown() {
     simulation.advance_frame().expect("a frame");
     let gpu = simulation.gpu().expect("it is there");
     let model = simulation.model();
-    let [frame, balance, whole] = gpu.bytes_read_back();
+    let [forces, frame, balance] =
+        [FrameReading::Forces, FrameReading::State, FrameReading::Balance]
+            .map(|reading| gpu.bytes_of_frame(reading));
+    let whole = gpu.bytes_of_state();
     let vertices = model.vertex_count() as u64;
-    println!("{frame} bytes a frame, {balance} for a force balance, {whole} the whole state");
+    println!("{frame} bytes a frame, {balance} with a force balance, {whole} the whole state");
+    assert!(forces < 64 && balance > frame + 48 * vertices, "{forces}, {balance}");
     assert!((32 * vertices..32 * vertices + 256).contains(&frame), "{frame}");
     assert!(whole > frame + 4 * simulation.layout().multiplier_count as u64 - 256, "{whole}");
     // The caller may look at positions in the same place all the time.
@@ -429,7 +434,8 @@ fn frames_that_nobody_waits_for_are_those_that_are_waited_for() {
     let mut sent = on_device();
     for frame in 0..6 {
         assert!(!sent.take_frame().expect("nothing was sent") && !sent.is_under_way());
-        sent.send_frame(frame == 5).expect("a frame");
+        let reading = if frame == 5 { FrameReading::Balance } else { FrameReading::State };
+        sent.send_frame(reading).expect("a frame");
         assert!(sent.is_under_way() && sent.frame() == frame);
         arrived(&mut sent).expect("it arrives");
         assert_eq!(sent.frame(), frame + 1);
@@ -440,7 +446,7 @@ fn frames_that_nobody_waits_for_are_those_that_are_waited_for() {
     assert_eq!(sent.state(), waited.state());
     // The CPU computes at once, and its frames are taken over in the same way.
     let mut cpu = simulation(&[("solver.device", "cpu")]).expect("a simulation");
-    cpu.send_frame(true).expect("a frame");
+    cpu.send_frame(FrameReading::Balance).expect("a frame");
     assert_eq!(arrived(&mut cpu), Ok(0));
     cpu.measure().expect("measures");
     let other = advanced(simulation(&[("solver.device", "cpu")]).expect("a simulation"), 1);
@@ -453,13 +459,13 @@ fn a_frame_under_way_gives_way_to_a_change_and_to_the_cpu() {
     let device = own_device();
     let (scene, assembly) = assembled(&[]);
     let mut lost = Simulation::on_device(scene, assembly, &device).expect("a simulation");
-    lost.send_frame(false).expect("a frame");
+    lost.send_frame(FrameReading::State).expect("a frame");
     arrived(&mut lost).expect("it arrives");
     // A change between sending and taking over: the frame is computed again, with what was changed.
-    lost.send_frame(false).expect("a frame");
+    lost.send_frame(FrameReading::State).expect("a frame");
     lost.change(&[("world.gravity".into(), "0 m/s^2".into())]).expect("a setting");
     assert!(!lost.is_under_way() && lost.frame() == 1);
-    lost.send_frame(false).expect("a frame");
+    lost.send_frame(FrameReading::State).expect("a frame");
     device.wgpu().0.destroy();
     arrived(&mut lost).expect("computed by the CPU");
     assert_eq!(lost.frame(), 2);
@@ -479,7 +485,7 @@ fn another_device_goes_on_where_the_lost_one_was() {
     assert!(lost.is_on_device() && lost.device_choice().contains("as asked for"));
     let mut kept = advanced(with(crate::common::device::device()), 4);
     device.wgpu().0.destroy();
-    lost.send_frame(false).expect_err("a lost device");
+    lost.send_frame(FrameReading::State).expect_err("a lost device");
     lost.offer_device(Some(crate::common::device::device().clone())).expect("another device");
     assert!(lost.is_on_device() && lost.frame() == 4);
     // Multipliers are gone with the device, as after a change of settings.

@@ -7,7 +7,7 @@ use viscera::scene::{Scene, read_tray};
 use viscera::simulation::{Assembly, Simulation, ToolForce};
 
 /// A block on a table and a ball that is pressed into it, stays, and is dragged aside.
-const SCENE: &str = r#"
+pub const SCENE: &str = r#"
 world = { gravity = 0 }
 time = { duration = "1 s" }
 solver = { method = "quasi_newton" }
@@ -62,7 +62,7 @@ fn apart(a: &ToolForce, b: &ToolForce) -> f64 {
     (a - b).length() / a.length().max(b.length())
 }
 
-fn setting(key: &str, value: &str) -> [(String, String); 1] {
+pub fn setting(key: &str, value: &str) -> [(String, String); 1] {
     [(key.to_owned(), value.to_owned())]
 }
 
@@ -134,7 +134,7 @@ fn a_kept_moment_has_its_contact() {
 
 /// Settings may change to what computes the contact, and to nothing else.
 #[test]
-fn settings_change_while_tools_touch() {
+pub fn settings_change_while_tools_touch() {
     let mut run = on_device();
     advance(&mut run, 13);
     let refused = run.change(&setting("solver.method", "xpbd")).expect_err("no contact");

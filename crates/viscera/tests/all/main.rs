@@ -32,6 +32,7 @@ mod gpu_history;
 mod gpu_parts;
 mod gpu_passes;
 mod gpu_quasi_newton;
+mod gpu_reading;
 mod gpu_shaders;
 mod gpu_simulation;
 mod gpu_steps;

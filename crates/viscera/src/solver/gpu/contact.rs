@@ -1,5 +1,7 @@
 //! Contact with tools on the device: what the host sends of them, and takes back.
 
+use std::mem::offset_of;
+
 use super::error::GpuError;
 use super::reading::read;
 use super::slots::Slot;
@@ -10,7 +12,7 @@ use crate::scalar::vec3;
 use crate::settings::Method;
 use crate::solver::error::StepError;
 use crate::solver::step::contacts::on_device::{
-    DeviceTools, GRID_ROW, IS_THERE, Samples, ToolRecords,
+    DeviceTools, GRID_ROW, IS_THERE, Samples, SentTools, ToolRecords,
 };
 use crate::state::{ContactState, State};
 
@@ -42,15 +44,20 @@ impl GpuSolver {
         &self.tools.wrenches
     }
 
-    /// Asks for the forces on the tools at the end of the last step, and for nothing else: a kilobyte. Returns the request's
-    /// number, or nothing while three others are under way, and where nothing touches anything. Does not wait.
+    /// Bytes that are read of the tools of the last step.
+    pub(super) fn of_tools(&self) -> u64 {
+        self.samples().map_or(0, |_| self.tools.all.bytes_of_sums())
+    }
+
+    /// Asks for the forces on the tools at the end of the last step, and for nothing else: 64 bytes of each. Returns the
+    /// request's number, or nothing while three others are under way, and where there are none. Does not wait.
     pub fn request_forces(&mut self) -> Option<u64> {
-        self.samples()?;
+        let size = Some(self.of_tools()).filter(|size| *size > 0)?;
         let copy = self.forces.take(&self.device)?;
         let [start, _] = self.buffers.span(Slot::ToolSums);
         let mut encoder = self.encoder("forces");
         let sums = self.buffers.buffer(Slot::ToolSums);
-        encoder.copy_buffer_to_buffer(sums, start, &copy, 0, self.of_tools());
+        encoder.copy_buffer_to_buffer(sums, start, &copy, 0, size);
         self.device.queue.submit([encoder.finish()]);
         Some(self.forces.send(copy))
     }
@@ -86,8 +93,15 @@ impl GpuSolver {
             }
             self.uniforms.put_distances(&self.device, &words);
         }
-        let records: ToolRecords = self.tools.all.begin(tools, dt, share);
-        self.outgoing.write(&self.uniforms.tools, 0, bytemuck::bytes_of(&records));
+        let SentTools { count, motions, kinds } = self.tools.all.begin(tools, dt, share);
+        let places = [offset_of!(ToolRecords, all), offset_of!(ToolRecords, kinds)];
+        let [motions_at, kinds_at] = places.map(|place| place as u64);
+        let into = &self.uniforms.tools;
+        self.outgoing.write(into, motions_at, bytemuck::cast_slice(&motions));
+        if let Some(kinds) = kinds {
+            self.outgoing.write(into, 0, bytemuck::bytes_of(&count));
+            self.outgoing.write(into, kinds_at, bytemuck::cast_slice(&kinds));
+        }
         Ok(())
     }
 

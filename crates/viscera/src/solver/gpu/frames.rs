@@ -14,9 +14,9 @@ use crate::scalar::lanes::{Eight, Point};
 use crate::scalar::{Vec3, vec3};
 use crate::settings::Method;
 use crate::solver::inputs::{Inputs, check_inputs, check_state};
+use crate::solver::report::FrameReading;
 use crate::solver::step::balance::ForceBalance;
 use crate::solver::step::contacts::Contacts;
-use crate::solver::step::contacts::on_device::ALL_SUMS;
 use crate::solver::step::data::EndOfStep;
 use crate::solver::step::predict::load_tethers;
 use crate::solver::step::recovered::MeasuredTets;
@@ -61,76 +61,89 @@ impl GpuSolver {
         })
     }
 
-    /// Waits for the device and reads positions and velocities at the end of the last step, in place; returns how
-    /// many steps were rejected so far. Multipliers stay on the device, and what tools have touched: [`GpuSolver::contact`]
-    /// has that. On an error nothing is changed.
+    /// Waits for the device and reads positions and velocities at the end of the last step, in place, and the forces on tools;
+    /// returns how many steps were rejected so far. Multipliers stay on the device, and what tools have touched:
+    /// [`GpuSolver::contact`] has that. On an error nothing is changed.
     pub fn read_frame(
         &mut self,
         model: &Model<f32>,
         state: &mut State<f32>,
     ) -> Result<u64, GpuError> {
         let layout = self.layout_of(model)?;
-        let mut all = (0, Vec::new());
-        read(&self.device, &self.frame_ranges(), |read| {
-            all = self.take_frame_parts(&layout, state, read);
+        let mut all = Default::default();
+        read(&self.device, &self.frame_ranges(FrameReading::State), |read| {
+            self.take_moves(&layout, state, read);
+            all = self.take_forces(read);
         })?;
-        self.tools.wrenches = all.1;
-        Ok(all.0)
+        let (rejected, wrenches) = all;
+        self.tools.wrenches = wrenches;
+        Ok(rejected)
     }
 
-    /// What [`GpuSolver::read_frame`] reads.
-    pub(super) fn frame_ranges(&self) -> [(&wgpu::Buffer, Range<u64>); 4] {
+    /// As [`GpuSolver::read_frame`]; what moves stays on the device.
+    pub fn read_forces(&mut self) -> Result<u64, GpuError> {
+        let mut all = Default::default();
+        read(&self.device, &self.frame_ranges(FrameReading::Forces), |read| {
+            all = self.take_forces(read);
+        })?;
+        let (rejected, wrenches) = all;
+        self.tools.wrenches = wrenches;
+        Ok(rejected)
+    }
+
+    /// Where everything stands that is read of a frame.
+    pub(super) fn frame_ranges(&self, reading: FrameReading) -> Vec<(&wgpu::Buffer, Range<u64>)> {
         let part = |slot, size: u64| {
             let [start, _] = self.buffers.span(slot);
             (self.buffers.buffer(slot), start..start + size)
         };
-        let points = self.buffers.points_size;
-        [
-            part(Slot::Unknowns, points),
-            part(Slot::Velocities, points),
-            part(Slot::Control, PARTS_START as u64),
-            match self.samples() {
-                Some(_) => part(Slot::ToolSums, self.of_tools()),
-                // Nothing cannot be copied.
-                None => part(Slot::Control, self.of_tools()),
-            },
-        ]
-    }
-
-    /// Bytes that are read of tools.
-    pub(super) fn of_tools(&self) -> u64 {
-        if self.samples().is_some() { 4 * ALL_SUMS as u64 } else { 4 }
-    }
-
-    /// Takes over copies of those ranges; returns how many steps were rejected so far.
-    pub(super) fn take_frame_parts(
-        &self,
-        layout: &Layout<f32>,
-        state: &mut State<f32>,
-        read: &[&[u8]],
-    ) -> (u64, Vec<Wrench>) {
-        put_in_user_order(layout, bytemuck::cast_slice(read[0]), &mut state.positions);
-        put_in_user_order(layout, bytemuck::cast_slice(read[1]), &mut state.velocities);
-        state.multiplier_dt = self.multiplier_dt;
-        let wrenches = match self.samples() {
-            Some(_) => {
-                // Who goes on without the device has to know where tools were. What they touched stays there.
-                state.contact.poses.clear();
-                state.contact.poses.extend_from_slice(self.tools.all.poses());
-                state.contact.touches.clear();
-                self.tools.all.wrenches(bytemuck::cast_slice(read[3]))
-            }
-            None => Vec::new(),
+        let of_tools = match self.of_tools() {
+            // Nothing cannot be copied.
+            0 => part(Slot::Control, 4),
+            bytes => part(Slot::ToolSums, bytes),
         };
-        (rejected_steps(read[2]), wrenches)
+        let mut ranges = vec![part(Slot::Control, PARTS_START as u64), of_tools];
+        if reading >= FrameReading::State {
+            let points = self.buffers.points_size;
+            ranges.extend([Slot::Unknowns, Slot::Velocities].map(|slot| part(slot, points)));
+        }
+        if reading == FrameReading::Balance {
+            ranges.extend(self.balance_slots().into_iter().map(|slot| self.whole(slot)));
+        }
+        ranges
     }
 
-    /// How many bytes [`GpuSolver::read_frame`] reads, [`GpuSolver::force_balance`], and [`GpuSolver::read`].
-    pub fn bytes_read_back(&self) -> [u64; 3] {
-        let of_slot = |slot: &Slot| self.buffers.span(*slot)[1];
-        let frame = 2 * self.buffers.points_size + PARTS_START as u64 + self.of_tools();
-        let whole = [Slot::Unknowns, Slot::Velocities].iter().map(of_slot).sum();
-        [frame, self.balance_slots().iter().map(of_slot).sum(), whole]
+    /// How many steps were rejected so far, and the forces on tools, of copies of those ranges.
+    pub(super) fn take_forces(&self, read: &[&[u8]]) -> (u64, Vec<Wrench>) {
+        let wrenches = match self.of_tools() {
+            0 => Vec::new(),
+            _ => self.tools.all.wrenches(bytemuck::cast_slice(read[1])),
+        };
+        (rejected_steps(read[0]), wrenches)
+    }
+
+    /// Takes over what moves, where it is among copies of those ranges.
+    pub(super) fn take_moves(&self, layout: &Layout<f32>, state: &mut State<f32>, read: &[&[u8]]) {
+        let [_, _, positions, velocities, ..] = read else { return };
+        put_in_user_order(layout, bytemuck::cast_slice(positions), &mut state.positions);
+        put_in_user_order(layout, bytemuck::cast_slice(velocities), &mut state.velocities);
+        state.multiplier_dt = self.multiplier_dt;
+        if self.samples().is_some() {
+            // Who goes on without the device has to know where tools were. What they touched stays there.
+            state.contact.poses.clear();
+            state.contact.poses.extend_from_slice(self.tools.all.poses());
+            state.contact.touches.clear();
+        }
+    }
+
+    /// How many bytes a frame of so much is.
+    pub fn bytes_of_frame(&self, reading: FrameReading) -> u64 {
+        self.frame_ranges(reading).iter().map(|(_, range)| range.end - range.start).sum()
+    }
+
+    /// How many bytes [`GpuSolver::read`] reads.
+    pub fn bytes_of_state(&self) -> u64 {
+        [Slot::Unknowns, Slot::Velocities].map(|slot| self.buffers.span(slot)[1]).iter().sum()
     }
 
     /// Waits for the device and reads the multipliers [J s^2] at the end of the last step.

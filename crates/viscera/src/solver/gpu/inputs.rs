@@ -11,9 +11,11 @@ use crate::solver::step::tethers::bundle;
 use crate::solver::xpbd::iterates::fill_multiplier_weights;
 
 impl GpuSolver {
-    /// Loads and holds of vertices in this step, and the freedom of those that the last one held.
+    /// Loads and holds of vertices in this step, and the freedom of those that the last one held; those that the device does
+    /// not know from the last step are to be sent.
     pub(super) fn collect_updates(&mut self, layout: &Layout<f32>, inputs: &Inputs<f32>, dt: f64) {
         bundle(layout, inputs, &mut self.tethers);
+        std::mem::swap(&mut self.updates, &mut self.updates_before);
         self.updates.clear();
         let (updates, update_of) = (&mut self.updates, &mut self.update_of);
         let mut update = |vertex: u32| {
@@ -64,6 +66,14 @@ impl GpuSolver {
                 self.touched.push(update.vertex);
             }
         }
+        // The same vertices are held in the same order, step by step: what stands where it stood is there already.
+        let bytes = bytemuck::bytes_of::<Update>;
+        let all = self.updates.iter().enumerate();
+        let is_new = |(place, update): &(usize, &Update)| {
+            self.updates_before.get(*place).is_none_or(|before| bytes(before) != bytes(update))
+        };
+        self.updates_sent.clear();
+        self.updates_sent.extend(all.filter(is_new).map(|(_, update)| *update));
     }
 }
 

@@ -9,6 +9,7 @@
 //! GpuSolver::ask_for_frame, take_frame   all that a simulation needs of a frame, without waiting
 //! GpuSolver::restart  warm-start reset: multipliers from positions
 //! GpuSolver::time_step  the same, timed stage by stage by the device's clock
+//! GpuSolver::copy_positions, GpuSurface::place_copy   positions of a frame for a picture, on the device
 //! GpuSurface::update  a fine surface behind the last step, ready to be drawn
 //! ```
 //!
@@ -34,6 +35,7 @@ pub(in crate::solver) mod limits;
 mod members;
 mod outgoing;
 mod parts;
+mod positions;
 mod reading;
 pub(in crate::solver) mod record;
 mod report;
@@ -59,6 +61,7 @@ pub use cost::StepCost;
 pub use device::{Adapter, Device, baseline, shortfall};
 pub use error::GpuError;
 pub use frames::Frame;
+pub use positions::DevicePositions;
 pub use shared::{HostLayout, host_layouts};
 pub use slots::Slot;
 pub use solver::GpuSolver;

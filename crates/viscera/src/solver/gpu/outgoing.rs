@@ -43,6 +43,8 @@ pub(super) struct Outgoing {
     /// Bytes of the next memory for them.
     room: u64,
     submissions: u64,
+    /// Of inputs so far.
+    bytes: u64,
 }
 
 impl Outgoing {
@@ -58,12 +60,18 @@ impl Outgoing {
             staging,
             room: 4096,
             submissions: 0,
+            bytes: 0,
         }
     }
 
     /// Submissions so far.
     pub fn submissions(&self) -> u64 {
         self.submissions
+    }
+
+    /// Bytes of inputs so far.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
     }
 
     /// Writes bytes, whole words, behind all that is on its way. Not inlined, like the two
@@ -74,6 +82,7 @@ impl Outgoing {
             return;
         }
         let (start, size) = (self.staged.len() as u64, bytes.len() as u64);
+        self.bytes += size;
         let end = start + size;
         if self.dispatches > 0 && end > self.room {
             self.room = self.room.max(end.next_power_of_two().min(MOST_STAGED));

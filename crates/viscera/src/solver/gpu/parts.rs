@@ -83,6 +83,8 @@ pub(super) struct Falls {
     forces: Vec<Vec3<f64>>,
     /// In this step.
     pub all: Vec<Fall>,
+    /// In the step before it; empty before the first.
+    before: Vec<Fall>,
 }
 
 impl Falls {
@@ -91,11 +93,12 @@ impl Falls {
         let body = |part: &Part| (part.vertices.clone().map(mass).sum(), part.is_anchored());
         let bodies: Vec<_> = layout.parts.iter().map(body).collect();
         let count = bodies.len();
-        Self { bodies, forces: vec![Vec3::ZERO; count], all: vec![Fall::default(); count] }
+        let all = vec![Fall::default(); count];
+        Self { bodies, forces: vec![Vec3::ZERO; count], all, before: Vec::new() }
     }
 
-    /// Finds what nothing holds among what acts on vertices.
-    pub fn find(&mut self, layout: &Layout<f32>, gravity: Vec3<f32>, updates: &[Update]) {
+    /// Finds what nothing holds among what acts on vertices; whether that is news to the device.
+    pub fn find(&mut self, layout: &Layout<f32>, gravity: Vec3<f32>, updates: &[Update]) -> bool {
         self.forces.fill(Vec3::ZERO);
         for (fall, (_, is_attached)) in self.all.iter_mut().zip(&self.bodies) {
             fall.is_free = u32::from(!is_attached);
@@ -114,6 +117,10 @@ impl Falls {
             let acceleration = gravity + (*force * (1.0 / mass)).cast();
             fall.acceleration = acceleration.to_array();
         }
+        let is_news =
+            bytemuck::cast_slice::<Fall, u8>(&self.before) != bytemuck::cast_slice(&self.all);
+        self.before.clone_from(&self.all);
+        is_news
     }
 }
 

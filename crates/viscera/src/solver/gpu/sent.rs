@@ -4,16 +4,15 @@ use super::error::GpuError;
 use super::reading::{Reading, Sent};
 use super::solver::GpuSolver;
 use crate::model::Model;
+use crate::solver::report::FrameReading;
 use crate::state::State;
 
 impl GpuSolver {
-    /// Asks for what [`GpuSolver::read_frame`] reads of the state behind the last step and, where `with_balance`, for
-    /// what [`GpuSolver::force_balance`] needs. Does not wait.
-    pub fn ask_for_frame(&mut self, with_balance: bool) -> Result<(), GpuError> {
-        let slots = if with_balance { self.balance_slots() } else { Vec::new() };
-        let mut ranges = self.frame_ranges().to_vec();
-        ranges.extend(slots.into_iter().map(|slot| self.whole(slot)));
-        self.sent = Sent { awaited: Some(Reading::start(&self.device, &ranges)?), balance: None };
+    /// Asks for what [`GpuSolver::read_frame`] reads of the state behind the last step, and for what
+    /// [`GpuSolver::force_balance`] needs where `reading` says so. Does not wait.
+    pub fn ask_for_frame(&mut self, reading: FrameReading) -> Result<(), GpuError> {
+        let awaited = Reading::start(&self.device, &self.frame_ranges(reading))?;
+        self.sent = Sent { awaited: Some(awaited), balance: None };
         Ok(())
     }
 
@@ -28,9 +27,11 @@ impl GpuSolver {
         let Some(reading) = &self.sent.awaited else { return Ok(None) };
         let Some(arrived) = reading.has_arrived(&self.device)? else { return Ok(None) };
         let ((rejected, wrenches), balance) = arrived.look(&self.device, |read| {
-            let (frame, balance) = read.split_at(self.frame_ranges().len());
+            let of_state = self.frame_ranges(FrameReading::State).len();
+            let balance = read.get(of_state..).unwrap_or_default();
             let balance: Vec<Vec<u8>> = balance.iter().map(|bytes| bytes.to_vec()).collect();
-            (self.take_frame_parts(&layout, state, frame), balance)
+            self.take_moves(&layout, state, read);
+            (self.take_forces(read), balance)
         })?;
         self.tools.wrenches = wrenches;
         self.sent = Sent { awaited: None, balance: Some(balance).filter(|all| !all.is_empty()) };

@@ -56,8 +56,9 @@ pub fn host_layouts() -> Vec<HostLayout> {
             phase passes_left accepted ahead failures rejections calm count newest scale length slope
         }),
         record!("PartProgress" PartProgress { states sy yw was_rejected calm takes_trial slides }),
-        record!("Tool" contact::ToolRecord { poses lengths law way turn grid bricks bounds }),
-        record!("Tools" contact::ToolRecords { count all }),
+        record!("ToolMotion" contact::ToolMotion { poses way turn }),
+        record!("ToolKind" contact::ToolKind { lengths law grid bricks bounds }),
+        record!("Tools" contact::ToolRecords { count all kinds }),
         record!("Update" Update { vertex is_pinned force place stiffness inertia }),
         record!("TetBlock" crate::layout::TetBlock<f32> {
             vertices inverse_rest_shape rest_volume material

@@ -60,7 +60,10 @@ pub struct GpuSolver {
     pub(super) multiplier_dt: f64,
     /// Vertices that the last step pulled or held, the solver's numbers.
     pub(super) touched: Vec<u32>,
+    /// What acts on vertices in a step, in the step before it, and what of it the device is sent.
     pub(super) updates: Vec<Update>,
+    pub(super) updates_before: Vec<Update>,
+    pub(super) updates_sent: Vec<Update>,
     /// Where each vertex stands in `updates`; `u32::MAX` for nowhere.
     pub(super) update_of: Vec<u32>,
     /// Connected parts of the model.
@@ -169,6 +172,8 @@ impl GpuSolver {
             touched: Vec::new(),
             part_count: model.part_count(),
             updates: Vec::new(),
+            updates_before: Vec::new(),
+            updates_sent: Vec::new(),
             update_of: vec![u32::MAX; model.vertex_count()],
             has_moved_anchors: true,
             stability: is_explicit.then(|| Stability::for_a_device(&laid, settings)),

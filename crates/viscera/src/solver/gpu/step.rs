@@ -54,6 +54,11 @@ impl GpuSolver {
         self.outgoing.submissions()
     }
 
+    /// Bytes of inputs of steps that were sent so far.
+    pub fn bytes_sent(&self) -> u64 {
+        self.outgoing.bytes()
+    }
+
     /// A step at whose beginning and end the device's clock may be read.
     pub(super) fn step_marked(
         &mut self,
@@ -157,9 +162,10 @@ impl GpuSolver {
     pub(super) fn prepare_step(&mut self, layout: &Layout<f32>, inputs: &Inputs<f32>, dt: f64) {
         self.collect_updates(layout, inputs, dt);
         let outgoing = &mut self.outgoing;
-        self.buffers.send(outgoing, Slot::Updates, bytemuck::cast_slice(&self.updates));
-        if let Some(falls) = &mut self.falls {
-            falls.find(layout, inputs.gravity, &self.updates);
+        self.buffers.send(outgoing, Slot::Updates, bytemuck::cast_slice(&self.updates_sent));
+        if let Some(falls) = &mut self.falls
+            && falls.find(layout, inputs.gravity, &self.updates)
+        {
             self.buffers.send(outgoing, Slot::Falls, bytemuck::cast_slice(&falls.all));
         }
         let settings = &self.settings;
@@ -196,7 +202,7 @@ impl GpuSolver {
                 RelaxationForm::Published => 1.0,
             },
             relaxation_positions: omega,
-            update_count: self.updates.len() as u32,
+            update_count: self.updates_sent.len() as u32,
             part_count: self.part_count as u32,
             chebyshev_damping: settings.chebyshev_damping as f32,
         };

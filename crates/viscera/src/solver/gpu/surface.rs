@@ -5,7 +5,7 @@
 //! indices:  three `u32` for each triangle
 //! ```
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use bytemuck::{Pod, Zeroable};
 use wgpu::BufferUsages;
@@ -13,8 +13,10 @@ use wgpu::BufferUsages;
 use super::device::{Device, Pipeline};
 use super::error::GpuError;
 use super::limits::MOST_GROUPS;
+use super::positions::DevicePositions;
 use super::reading;
 use super::solver::GpuSolver;
+use crate::layout::Layout;
 use crate::mesh::embed::{Embedding, EmbeddingError};
 use crate::model::Model;
 use crate::scalar::{Vec3, vec3};
@@ -46,11 +48,13 @@ pub struct GpuSurface {
     normals: Ready,
 }
 
-/// Where the caller puts the tetrahedra's vertices: four floats each, the user's order.
+/// Where the caller puts the tetrahedra's vertices: four floats each.
 #[derive(Debug)]
 struct Placed {
     positions: wgpu::Buffer,
     count: usize,
+    /// In the order of the solver that has this; in the user's where there is none.
+    layout: Option<Arc<Layout<f32>>>,
 }
 
 #[derive(Debug)]
@@ -104,13 +108,34 @@ impl GpuSurface {
         vertex_count: usize,
         skins: &[Skin<'_>],
     ) -> Result<Self, GpuError> {
-        let bounds = bounds(vertex_count, |v| v, skins)?;
-        let size = size_of::<[f32; 4]>() as u64 * vertex_count as u64;
+        Self::placed(device, (vertex_count, None), &bounds(vertex_count, |v| v, skins)?, skins)
+    }
+
+    /// Binds surfaces to tetrahedra whose vertices [`GpuSurface::place_copy`] brings from a solver on the same device: the one
+    /// that has made these.
+    pub fn following_copies(
+        positions: &DevicePositions,
+        skins: &[Skin<'_>],
+    ) -> Result<Self, GpuError> {
+        let DevicePositions { device, layout, .. } = positions;
+        let count = layout.vertex_count();
+        let order = |v: u32| layout.numbering.of(v) as u32;
+        let bounds = bounds(count, order, skins)?;
+        Self::placed(device, (count, Some(Arc::clone(layout))), &bounds, skins)
+    }
+
+    fn placed(
+        device: &Device,
+        (count, layout): (usize, Option<Arc<Layout<f32>>>),
+        bounds: &[Bound],
+        skins: &[Skin<'_>],
+    ) -> Result<Self, GpuError> {
+        let size = size_of::<[f32; 4]>() as u64 * count as u64;
         check_size(device, size, bounds.len())?;
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         let positions = buffer(device, BINDINGS[POINTS].0, size, usage);
-        let surface = Self::bind(device, &positions, &bounds, skins)?;
-        Ok(Self { placed: Some(Placed { positions, count: vertex_count }), ..surface })
+        let surface = Self::bind(device, &positions, bounds, skins)?;
+        Ok(Self { placed: Some(Placed { positions, count, layout }), ..surface })
     }
 
     fn bind(
@@ -159,7 +184,9 @@ impl GpuSurface {
     /// [`GpuSurface::update`]. Of a surface that follows a solver, or another number of vertices, an error;
     /// nothing has moved then.
     pub fn place(&self, positions: &[Vec3<f32>]) -> Result<(), GpuError> {
-        let Some(placed) = &self.placed else { return Err(GpuError::FollowsSolver) };
+        let Some(placed) = self.placed.as_ref().filter(|placed| placed.layout.is_none()) else {
+            return Err(GpuError::FollowsSolver);
+        };
         if positions.len() != placed.count {
             let (what, found, expected) = ("positions", positions.len(), placed.count);
             return Err(EmbeddingError::Length { what, found, expected }.into());
@@ -168,6 +195,25 @@ impl GpuSurface {
         let numbers: Vec<[f32; 4]> = positions.iter().map(four).collect();
         self.device.queue.write_buffer(&placed.positions, 0, bytemuck::cast_slice(&numbers));
         Ok(())
+    }
+
+    /// As [`GpuSurface::place`], where a solver on this device has left them: a copy on the device. Of a surface that follows
+    /// something else, [`GpuSurface::follows`], an error; nothing has moved then.
+    pub fn place_copy(&self, positions: &DevicePositions) -> Result<(), GpuError> {
+        let placed = self.placed.as_ref().filter(|_| self.follows(positions));
+        let into = &placed.ok_or(GpuError::FollowsSolver)?.positions;
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("place the surface") };
+        let mut encoder = self.device.device.create_command_encoder(&descriptor);
+        let size = into.size().min(positions.buffer.size());
+        encoder.copy_buffer_to_buffer(&positions.buffer, 0, into, 0, size);
+        self.device.queue.submit([encoder.finish()]);
+        Ok(())
+    }
+
+    /// Whether it takes copies of these positions: of the same solver.
+    pub fn follows(&self, positions: &DevicePositions) -> bool {
+        let placed = self.placed.as_ref().and_then(|placed| placed.layout.as_ref());
+        placed.is_some_and(|layout| positions.is_of(layout))
     }
 
     /// Moves the surface to where the solver's last step, or the caller, has brought the tissue: one

@@ -28,7 +28,7 @@ struct Given {
 fn end_slot(at: u32, slot: u32, row: u32, place: vec3f) -> Given {
     let touching = touching_of(at, slot, row);
     let tool = tool_of(touching.marks);
-    let law = tools.all[tool].law;
+    let law = tools.kinds[tool].law;
     let met = meet(touching, AT_END, place);
     let felt = felt_of(touching, met);
     let into = slot_vectors(at, slot);

@@ -24,7 +24,7 @@ struct Plane {
 }
 
 fn steepest_of(tool: u32) -> f32 {
-    return select(1.0, tools.all[tool].bounds.y, u32(tools.all[tool].law.x) == SOLID);
+    return select(1.0, tools.kinds[tool].bounds.y, u32(tools.kinds[tool].law.x) == SOLID);
 }
 
 // Along a path in the tool's frame by sphere tracing.
@@ -51,7 +51,7 @@ fn trace(tool: u32, start: vec3f, end: vec3f, thickness: f32) -> Plane {
     }
     // Grazing: so near for so long that it counts. Along a gap between two sides of a tool it may be near to neither.
     let last = distance_to(tool, at);
-    let is_convex = u32(tools.all[tool].law.x) != SOLID;
+    let is_convex = u32(tools.kinds[tool].law.x) != SOLID;
     return Plane(tangent(tool, at, last), is_convex || last.value < thickness);
 }
 
@@ -68,7 +68,7 @@ fn kept_slot(at: u32, used: u32, tool: u32) -> u32 {
 
 // What a sample is to a tool: no tool has that number where they are too far apart.
 fn find_tool(tool: u32, place: vec3f, velocity: vec3f, slot: u32) -> Found {
-    let thickness = tools.all[tool].law.z;
+    let thickness = tools.kinds[tool].law.z;
     let start = into_tool(tool, AT_START, place);
     let end = into_tool(tool, AT_END, place + velocity * frame.dt);
     let first = distance_to(tool, start);
@@ -108,7 +108,7 @@ fn find_tool(tool: u32, place: vec3f, velocity: vec3f, slot: u32) -> Found {
     }
     if is_kept {
         let is_tied = (marks & WILL_BE_TIED) != 0u;
-        found.friction = vec4f(found.kept.xyz, tools.all[tool].law.w * found.kept.w);
+        found.friction = vec4f(found.kept.xyz, tools.kinds[tool].law.w * found.kept.w);
         if is_tied {
             found.friction.w = LOCKED;
             found.marks |= IS_TIED;
@@ -120,7 +120,7 @@ fn find_tool(tool: u32, place: vec3f, velocity: vec3f, slot: u32) -> Found {
 // The curvature of the energy at a place where tools are at the end of the step, without what may be negative in it.
 fn add_curvature(touching: Touching, place: vec3f, direct: ptr<function, vec3f>, mixed: ptr<function, vec3f>) {
     let tool = tool_of(touching.marks);
-    let law = tools.all[tool].law;
+    let law = tools.kinds[tool].law;
     let k = touching.stiffness * law.y;
     let met = meet(touching, AT_END, place);
     let gap = law.z - met.distance;
@@ -197,7 +197,7 @@ fn find_contacts(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         let stiffness = number(row + SAMPLE_STIFFNESS);
         let touching = Touching(best[i].plane, best[i].friction, best[i].marks, stiffness);
         add_curvature(touching, ahead, &direct, &mixed);
-        let gap = tools.all[tool_of(best[i].marks)].law.z - meet(touching, AT_END, place).distance;
+        let gap = tools.kinds[tool_of(best[i].marks)].law.z - meet(touching, AT_END, place).distance;
         presses = presses || gap > 0.0 || best[i].friction.w > 0.0;
         let into = slot_vectors(at, i);
         loads[into] = best[i].plane;

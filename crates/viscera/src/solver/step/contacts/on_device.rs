@@ -131,15 +131,21 @@ pub fn tables(layout: &Layout<f32>) -> [Vec<u32>; 3] {
     [layout.samples.iter().flat_map(row).collect(), offsets, of_vertices.concat().concat()]
 }
 
-/// `Tool` of tools.wgsl.
+/// `ToolMotion` of tools.wgsl: of a tool in a step.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub struct ToolRecord {
+pub struct ToolMotion {
     pub poses: [[[f32; 4]; 3]; 3],
-    pub lengths: [f32; 4],
-    pub law: [f32; 4],
     pub way: [f32; 4],
     pub turn: [f32; 4],
+}
+
+/// `ToolKind` of tools.wgsl: of a tool in many steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct ToolKind {
+    pub lengths: [f32; 4],
+    pub law: [f32; 4],
     pub grid: [f32; 4],
     pub bricks: [u32; 4],
     pub bounds: [f32; 4],
@@ -150,7 +156,8 @@ pub struct ToolRecord {
 #[repr(C)]
 pub struct ToolRecords {
     pub count: [u32; 4],
-    pub all: [ToolRecord; MOST_TOOLS],
+    pub all: [ToolMotion; MOST_TOOLS],
+    pub kinds: [ToolKind; MOST_TOOLS],
 }
 
 fn kind_and_lengths(shape: &Shape) -> (f64, [f64; 4]) {
@@ -163,15 +170,9 @@ fn kind_and_lengths(shape: &Shape) -> (f64, [f64; 4]) {
     }
 }
 
-impl ToolRecord {
-    /// `first`: where the distances of a closed surface begin.
-    fn new(
-        tool: &Tool,
-        start: &RigidTransform,
-        (share, first): (f64, u32),
-        has_jumped: bool,
-    ) -> Self {
-        let single = |row: [f64; 4]| row.map(|x| x as f32);
+impl ToolMotion {
+    /// In a step that begins at a pose; its first solve takes a share of it.
+    fn new(tool: &Tool, start: &RigidTransform, share: f64, has_jumped: bool) -> Self {
         let pose = |pose: RigidTransform| {
             let [x, y, z] = pose.rotation.columns;
             let t = pose.translation;
@@ -179,14 +180,23 @@ impl ToolRecord {
         };
         let way = tool.pose.translation - start.translation;
         let turn = axis_times_sine(&(tool.pose.rotation * start.rotation.transpose()));
+        Self {
+            poses: [*start, start.towards(&tool.pose, share), tool.pose].map(pose),
+            way: with(way, f32::from(u8::from(tool.is_locked))),
+            turn: with(turn, f32::from(u8::from(has_jumped))),
+        }
+    }
+}
+
+impl ToolKind {
+    /// `first`: where the distances of a closed surface begin.
+    fn new(tool: &Tool, first: u32) -> Self {
+        let single = |row: [f64; 4]| row.map(|x| x as f32);
         let (kind, lengths) = kind_and_lengths(&tool.shape);
         let law = tool.law;
         let mut record = Self {
-            poses: [*start, start.towards(&tool.pose, share), tool.pose].map(pose),
             lengths: single(lengths),
             law: single([kind, law.stiffness, law.thickness, law.friction]),
-            way: with(way, f32::from(u8::from(tool.is_locked))),
-            turn: with(turn, f32::from(u8::from(has_jumped))),
             ..Self::default()
         };
         if let Shape::Mesh(grid) = &tool.shape {
@@ -218,6 +228,16 @@ pub struct DeviceTools {
     starts: Vec<RigidTransform>,
     /// Closed surfaces that the device knows, and where the distances of each begin.
     grids: Vec<(Arc<DistanceGrid>, u32)>,
+    /// What the device knows of tools from earlier steps.
+    kinds: Vec<ToolKind>,
+}
+
+/// What the device is sent of the tools in a step.
+pub struct SentTools {
+    pub count: [u32; 4],
+    pub motions: Vec<ToolMotion>,
+    /// Nothing where it knows them.
+    pub kinds: Option<Vec<ToolKind>>,
 }
 
 impl DeviceTools {
@@ -269,19 +289,31 @@ impl DeviceTools {
     }
 
     /// Tools in a step of `dt` [s], of which the first solve takes a share.
-    pub fn begin(&mut self, tools: &[Tool], dt: f64, share: f64) -> ToolRecords {
-        let mut records = ToolRecords { count: [tools.len() as u32; 4], ..ToolRecords::default() };
+    pub fn begin(&mut self, tools: &[Tool], dt: f64, share: f64) -> SentTools {
         self.tools.clear();
         self.tools.extend_from_slice(tools);
         (self.starts, self.jumped) = super::found::starts(tools, &self.poses, dt).unzip();
         self.poses.clear();
         self.poses.extend(tools.iter().map(|tool| tool.pose));
-        let all = tools.iter().zip(&self.starts).zip(&self.jumped);
-        for (record, ((tool, start), &jumped)) in records.all.iter_mut().zip(all) {
-            let of_step = (share, self.first_word(&tool.shape));
-            *record = ToolRecord::new(tool, start, of_step, jumped);
+        let kind = |tool: &Tool| ToolKind::new(tool, self.first_word(&tool.shape));
+        let kinds: Vec<ToolKind> = tools.iter().map(kind).collect();
+        let are_new = kinds != self.kinds;
+        if are_new {
+            self.kinds.clone_from(&kinds);
         }
-        records
+        let all = tools.iter().zip(&self.starts).zip(&self.jumped);
+        let motions =
+            all.map(|((tool, start), &jumped)| ToolMotion::new(tool, start, share, jumped));
+        SentTools {
+            count: [tools.len() as u32; 4],
+            motions: motions.collect(),
+            kinds: are_new.then_some(kinds),
+        }
+    }
+
+    /// Bytes of the sums that forces on the tools of the last step are made of.
+    pub fn bytes_of_sums(&self) -> u64 {
+        (size_of::<[f32; TOOL_SUMS]>() * self.tools.len()) as u64
     }
 
     /// Forces on the tools at the end of the step, of the sums that kernels have left.

@@ -12,18 +12,23 @@
 //   plane of the tool's frame, offset;   anchor of friction in the step, its limit;   anchor and normal force at the end of the
 //   last step;   force [N] on the tissue then, and the tool's number with marks
 
-struct Tool {
+// Of a tool in a step.
+struct ToolMotion {
     // To the world from the tool's frame at the start of the step, at the end of its first solve, at its end: columns of the
     // rotation, in w a component of the translation [m].
     poses: array<array<vec4f, 3>, 3>,
-    // Lengths [m], the last of them the radius.
-    lengths: vec4f,
-    // Kind of shape; stiffness, thickness [m] and friction of the contact.
-    law: vec4f,
     // Way of its origin in the step [m]; whether it is locked.
     way: vec4f,
     // Axis times sine of its turn; whether it was put elsewhere.
     turn: vec4f,
+}
+
+// Of a tool in many steps.
+struct ToolKind {
+    // Lengths [m], the last of them the radius.
+    lengths: vec4f,
+    // Kind of shape; stiffness, thickness [m] and friction of the contact.
+    law: vec4f,
     // Of a closed surface (contact/distance_grid): the lower corner of its grid and the edge of small cells [m]; bricks along each
     // axis and its first word; margin [m], the steepest that its distance is, half of the thickness of its walls [m].
     grid: vec4f,
@@ -33,7 +38,8 @@ struct Tool {
 
 struct Tools {
     count: vec4u,
-    all: array<Tool, MOST_TOOLS>,
+    all: array<ToolMotion, MOST_TOOLS>,
+    kinds: array<ToolKind, MOST_TOOLS>,
 }
 
 @group(1) @binding(2) var<uniform> tools: Tools;
@@ -130,8 +136,8 @@ fn put_values(first: u32, columns: u32, height: u32, cell: ptr<function, Cell>) 
 
 fn cell_at(tool: u32, x: vec3f) -> Cell {
     var cell: Cell;
-    let grid = tools.all[tool].grid;
-    let bricks = tools.all[tool].bricks;
+    let grid = tools.kinds[tool].grid;
+    let bricks = tools.kinds[tool].bricks;
     let count = bricks.xyz;
     let at = (x - grid.xyz) * (1.0 / grid.w);
     let most = vec3f(count * BRICK);
@@ -182,9 +188,9 @@ fn interpolated(cell: Cell) -> vec4f {
 
 // Beyond the grid a bound from below.
 fn beyond_grid(tool: u32, x: vec3f) -> Distance {
-    let grid = tools.all[tool].grid;
-    let high = grid.xyz + vec3f(tools.all[tool].bricks.xyz * BRICK) * grid.w;
-    return from_core(x - min(max(x, grid.xyz), high), -tools.all[tool].bounds.x);
+    let grid = tools.kinds[tool].grid;
+    let high = grid.xyz + vec3f(tools.kinds[tool].bricks.xyz * BRICK) * grid.w;
+    return from_core(x - min(max(x, grid.xyz), high), -tools.kinds[tool].bounds.x);
 }
 
 fn solid_distance(tool: u32, x: vec3f) -> Distance {
@@ -210,9 +216,9 @@ fn solid_value(tool: u32, x: vec3f) -> f32 {
 // The plane that stands for a tool at a point of its frame: of length 1, and as far from it as the tool.
 fn tangent(tool: u32, at: vec3f, distance: Distance) -> vec4f {
     var normal = distance.normal;
-    if u32(tools.all[tool].law.x) == SOLID {
+    if u32(tools.kinds[tool].law.x) == SOLID {
         // The mean gradient, which is continuous from cell to cell; on a ridge there is none.
-        let half = 0.5 * tools.all[tool].grid.w;
+        let half = 0.5 * tools.kinds[tool].grid.w;
         var rise = vec3f();
         for (var axis = 0u; axis < 3u; axis++) {
             var step = vec3f();
@@ -229,8 +235,8 @@ fn tangent(tool: u32, at: vec3f, distance: Distance) -> vec4f {
 
 // Distance [m] and its gradient at a point of the tool's frame.
 fn distance_to(tool: u32, x: vec3f) -> Distance {
-    let kind = u32(tools.all[tool].law.x);
-    let lengths = tools.all[tool].lengths;
+    let kind = u32(tools.kinds[tool].law.x);
+    let lengths = tools.kinds[tool].lengths;
     if kind == HALF_SPACE {
         return Distance(x.z, vec3f(0.0, 0.0, 1.0), 1.0);
     }
@@ -253,13 +259,13 @@ fn distance_to(tool: u32, x: vec3f) -> Distance {
 
 // The smallest radius [m] of its surface.
 fn thinnest_of(tool: u32) -> f32 {
-    let kind = u32(tools.all[tool].law.x);
-    let lengths = tools.all[tool].lengths;
+    let kind = u32(tools.kinds[tool].law.x);
+    let lengths = tools.kinds[tool].lengths;
     if kind == HALF_SPACE {
         return 3e38;
     }
     if kind == SOLID {
-        return tools.all[tool].bounds.z;
+        return tools.kinds[tool].bounds.z;
     }
     if kind == ROUNDED_BOX {
         return min(min(lengths.x, lengths.y), lengths.z);
@@ -346,7 +352,7 @@ struct Felt {
 }
 
 fn felt_of(touching: Touching, met: Met) -> Felt {
-    let law = tools.all[tool_of(touching.marks)].law;
+    let law = tools.kinds[tool_of(touching.marks)].law;
     let k = touching.stiffness * law.y;
     let gap = max(law.z - met.distance, 0.0);
     let deep = max(gap - 0.5 * law.z, 0.0);
@@ -372,7 +378,7 @@ fn half_square_change(before: f32, after: f32, change: f32) -> f32 {
 // The change of the energy [J] from one place to another, `way` apart.
 fn contact_change(touching: Touching, pose: u32, before: Met, after: Met, way: vec3f) -> f32 {
     let tool = tool_of(touching.marks);
-    let law = tools.all[tool].law;
+    let law = tools.kinds[tool].law;
     let k = touching.stiffness * law.y;
     var nearer = before.distance - after.distance;
     if (touching.marks & HAS_PLANE) != 0u {
@@ -414,7 +420,7 @@ fn friction_energy(k: f32, limit: f32, length: f32) -> f32 {
 }
 
 fn contact_energy(touching: Touching, met: Met) -> f32 {
-    let law = tools.all[tool_of(touching.marks)].law;
+    let law = tools.kinds[tool_of(touching.marks)].law;
     let k = touching.stiffness * law.y;
     let gap = max(law.z - met.distance, 0.0);
     let deep = max(gap - 0.5 * law.z, 0.0);
