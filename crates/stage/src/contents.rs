@@ -2,7 +2,7 @@
 
 use viscera::scalar::Vec3;
 use viscera::simulation::Assembly;
-use viscera::solver::gpu::{Device, GpuSurface, Skin};
+use viscera::solver::gpu::{Device, DevicePositions, GpuError, GpuSurface, Skin};
 use viscera_picture::{BodyColor, Color};
 use viscera_render::{
     Arrow, BodyView, BoundingSphere, GpuDrawing, Markers, Orbit, Paint, ScaledValues, ValueBuffer,
@@ -29,18 +29,7 @@ pub struct RunSurface {
 impl RunSurface {
     /// Binds the surfaces of all bodies.
     pub fn new(device: &Device, assembly: &Assembly) -> Result<Self, String> {
-        let bodies = &assembly.bodies;
-        let skins: Vec<Skin<'_>> = bodies
-            .iter()
-            .map(|body| Skin {
-                embedding: &body.embedding,
-                triangles: &body.surface.triangles,
-                first_vertex: body.vertices.start,
-            })
-            .collect();
-        let count = assembly.builder.positions().len();
-        let surface = GpuSurface::following(device, count, &skins);
-        let surface = surface.map_err(|error| error.to_string())?;
+        let surface = bound(device, assembly, None)?;
         let values = ValueBuffer::new(device, surface.vertex_count() as usize);
         let rest = assembly.builder.positions().iter().copied();
         Ok(Self {
@@ -54,9 +43,23 @@ impl RunSurface {
         })
     }
 
-    /// Moves it to its place in a snapshot.
-    pub fn place(&mut self, run: &RunSnapshot) -> Result<(), String> {
-        self.surface.place(&run.positions).map_err(|error| error.to_string())?;
+    /// Moves it to its place in a snapshot: by positions that are on the device already, where there are any.
+    pub fn place(&mut self, run: &RunSnapshot, assembly: &Assembly) -> Result<(), String> {
+        let text = |error: GpuError| error.to_string();
+        match run.on_device.as_ref().filter(|there| there.device().is_same(&self.device)) {
+            Some(there) => {
+                if !self.surface.follows(there) {
+                    self.surface = bound(&self.device, assembly, Some(there))?;
+                }
+                self.surface.place_copy(there).map_err(text)?;
+            }
+            None => {
+                if self.surface.follows_copies() {
+                    self.surface = bound(&self.device, assembly, None)?;
+                }
+                self.surface.place(&run.positions).map_err(text)?;
+            }
+        }
         self.surface.update();
         self.has_values = !run.values.is_empty();
         if self.has_values {
@@ -66,6 +69,28 @@ impl RunSurface {
         self.enclosing = BoundingSphere::around(run.positions.iter().map(|x| x.cast()));
         Ok(())
     }
+}
+
+/// The surfaces of all bodies, bound to positions that a solver leaves on the device, or to those that the host brings.
+fn bound(
+    device: &Device,
+    assembly: &Assembly,
+    there: Option<&DevicePositions>,
+) -> Result<GpuSurface, String> {
+    let bodies = assembly.bodies.iter();
+    let skins: Vec<Skin<'_>> = bodies
+        .map(|body| Skin {
+            embedding: &body.embedding,
+            triangles: &body.surface.triangles,
+            first_vertex: body.vertices.start,
+        })
+        .collect();
+    let count = assembly.builder.positions().len();
+    let made = match there {
+        Some(positions) => GpuSurface::following_copies(positions, &skins),
+        None => GpuSurface::following(device, count, &skins),
+    };
+    made.map_err(|error| error.to_string())
 }
 
 /// What a picture shows.
@@ -155,4 +180,63 @@ impl PictureContents<'_> {
 fn one_of<'a>(body: &BodyColor, all: &BodyView<'a>) -> BodyView<'a> {
     let triangles = [body.triangles.start, body.triangles.end].map(|number| number as u32);
     BodyView { triangles, paint: Paint::Flat(body.color), wireframe: false, ..*all }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::build;
+    use crate::snapshot::Coloring;
+    use viscera::scene::Scene;
+    use viscera::solver::FrameReading;
+    use viscera::solver::gpu::Adapter;
+
+    /// Whatever was read last, a picture shows the frame that it is of.
+    #[test]
+    fn surfaces_are_those_of_the_frame() {
+        let text = r#"
+            [world]
+            gravity = "9.81 m/s^2"
+            [solver]
+            device = "gpu"
+            method = "xpbd"
+            [[body]]
+            name = "slab"
+            shape = "block"
+            size = ["30 mm", "30 mm", "20 mm"]
+            cells = [2, 2, 2]
+            material = { preset = "liver" }
+        "#;
+        let device = Adapter::find(None).and_then(|adapter| adapter.open()).expect("a device");
+        let scene = Scene::parse("slab.toml", text, &[]).expect("a legal scene");
+        let assembly = Assembly::new(&scene, &mut |file| Err(file.to_owned())).expect("a slab");
+        let mut run = build(scene, assembly.clone(), Some(&device)).expect("a simulation");
+        assert!(run.is_drawn_unread(&device, Coloring::Plain));
+        let mut snapshot = RunSnapshot::default();
+        let mut surface = RunSurface::new(&device, &assembly).expect("a surface");
+        let places = |surface: &RunSurface| surface.surface.read().expect("a device");
+        let mut all = Vec::new();
+        for _ in 0..3 {
+            run.advance(FrameReading::Forces).expect("a frame");
+            run.fill(Coloring::Plain, Some(&device), &mut snapshot);
+            surface.place(&snapshot, &assembly).expect("a place");
+            all.push(places(&surface));
+        }
+        assert!(snapshot.unread == 3 && all[1] != all[2], "it falls");
+        run.read_state().expect("a device");
+        // Pictures elsewhere have positions from the host, and the same surface changes over to them and back.
+        run.fill(Coloring::Plain, None, &mut snapshot);
+        assert!(snapshot.unread == 0 && snapshot.on_device.is_none());
+        surface.place(&snapshot, &assembly).expect("a place");
+        assert!(places(&surface) == all[2]);
+        run.fill(Coloring::Plain, Some(&device), &mut snapshot);
+        surface.place(&snapshot, &assembly).expect("a place");
+        assert!(places(&surface) == all[2]);
+        // Colours that need positions, and other devices, read them.
+        let other = Adapter::find(None).and_then(|adapter| adapter.open()).expect("a device");
+        assert!(!run.is_drawn_unread(&device, Coloring::Displacement));
+        assert!(!run.is_drawn_unread(&other, Coloring::Plain));
+        run.fill(Coloring::Plain, Some(&other), &mut snapshot);
+        assert!(snapshot.on_device.is_none());
+    }
 }

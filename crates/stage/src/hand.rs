@@ -266,6 +266,7 @@ mod tests {
     use viscera::scalar::{Vec3, vec3};
     use viscera::scene::Scene;
     use viscera::simulation::Assembly;
+    use viscera::solver::FrameReading;
 
     fn slab(cells: &str) -> Box<dyn Run> {
         let text = r#"
@@ -287,7 +288,7 @@ mod tests {
 
     fn seen(run: &mut dyn Run) -> RunSnapshot {
         let mut snapshot = RunSnapshot::default();
-        run.fill(Coloring::Plain, &mut snapshot);
+        run.fill(Coloring::Plain, None, &mut snapshot);
         snapshot
     }
 
@@ -308,7 +309,7 @@ mod tests {
             "{told}"
         );
         assert!(run.told().is_none());
-        run.advance().expect("a frame");
+        run.advance(FrameReading::State).expect("a frame");
         let thinnest = seen(&mut *run).tools[0].parts[0].shape.thinnest();
         assert!(thinnest > 1.1 * grasper.thinnest() && thinnest < LARGEST * grasper.thinnest());
         let jaws = larger_tray(2.0).expect("a legal tray")[1].jaws.clone().expect("jaws");
@@ -323,17 +324,17 @@ mod tests {
             let pose = above(0.08);
             let take = ToolAct::Take { hand, instrument: Box::new(instrument), pose };
             run.act(&take).unwrap_or_else(|error| panic!("{name}: {error}"));
-            run.advance().expect("a frame");
+            run.advance(FrameReading::State).expect("a frame");
             let tools = seen(&mut *run).tools;
             assert_eq!(tools.len(), 1, "{name}");
             assert_eq!((tools[0].hand, tools[0].met.name.as_str()), (Some(hand), name.as_str()));
             let to = moved(&pose, vec3(0.02, 0.0, 0.0)).expect("a place");
             run.act(&ToolAct::Lead { hand, pose: to }).expect("led");
-            run.advance().expect("a frame");
+            run.advance(FrameReading::State).expect("a frame");
             let way = (seen(&mut *run).tools[0].pose.translation - pose.translation).length();
             assert!((way - FASTEST / 60.0).abs() < 1e-9, "{name}: {way} m");
             run.act(&ToolAct::PutAway { hand }).expect("put away");
-            run.advance().expect("a frame");
+            run.advance(FrameReading::State).expect("a frame");
             assert!(seen(&mut *run).tools.is_empty(), "{name}");
         }
     }

@@ -8,8 +8,8 @@ use viscera::settings::{Place, Precision, SolverSettings};
 use viscera::simulation::{
     Assembly, PatchForce, PatchKind, ResolvedPatch, Simulation, SimulationError,
 };
-use viscera::solver::Inputs;
 use viscera::solver::gpu::Device;
+use viscera::solver::{FrameReading, Inputs};
 
 use crate::color::surface_values;
 use crate::hand::{ToolAct, ToolHands};
@@ -47,14 +47,20 @@ pub trait Run: Send {
     fn setting(&self, key: &str) -> Option<String>;
     /// Starts from rest again, with the settings in force.
     fn reset(&mut self) -> Result<(), String>;
-    /// Computes a frame.
-    fn advance(&mut self) -> Result<(), String>;
-    /// Begins a frame without waiting for what computes it; `measured` where [`Run::measure`] follows.
-    fn send(&mut self, measured: bool) -> Result<(), String>;
+    /// Computes a frame, and reads so much of it from a device.
+    fn advance(&mut self, reading: FrameReading) -> Result<(), String>;
+    /// Begins a frame without waiting for what computes it; `reading`: what of it is needed, the balance where
+    /// [`Run::measure`] follows.
+    fn send(&mut self, reading: FrameReading) -> Result<(), String>;
     /// Takes over the frame that was sent; false while it is under way.
     fn receive(&mut self) -> Result<bool, String>;
     /// Whether a frame was sent that was not taken over.
     fn is_under_way(&self) -> bool;
+    /// Positions of the last frame, where they are not here yet.
+    fn read_state(&mut self) -> Result<(), String>;
+    /// Whether a picture on a device needs no more of a frame than [`FrameReading::Forces`]: the frame is on that device, and
+    /// nothing else that is drawn needs to know where tissue is.
+    fn is_drawn_unread(&self, device: &Device, coloring: Coloring) -> bool;
     /// Another device for settings that ask for one, or none; it goes on from the last frame.
     fn offer(&mut self, device: Option<&Device>) -> Result<(), String>;
     /// The scene as it is now.
@@ -63,8 +69,8 @@ pub trait Run: Send {
     fn solver(&self) -> &SolverSettings;
     /// Measures what it is now: residual, energies, stresses.
     fn measure(&mut self) -> Result<(), String>;
-    /// Fills a snapshot with its state now and what was measured last.
-    fn fill(&mut self, coloring: Coloring, snapshot: &mut RunSnapshot);
+    /// Fills a snapshot with its state now and what was measured last; for pictures on a device, where there are any.
+    fn fill(&mut self, coloring: Coloring, device: Option<&Device>, snapshot: &mut RunSnapshot);
     /// What was done to it since it was at rest, as text for its scene file, and its time [s].
     fn done_by_hand(&self) -> (String, f64);
     /// The step that comes next.
@@ -261,14 +267,14 @@ impl<S: Real> Run for SimulationRun<S> {
         self.simulation.reset().map_err(text)
     }
 
-    fn advance(&mut self) -> Result<(), String> {
+    fn advance(&mut self, reading: FrameReading) -> Result<(), String> {
         self.hands.lead(&mut self.simulation);
-        self.simulation.advance().map_err(text)
+        self.simulation.advance_reading(reading).map_err(text)
     }
 
-    fn send(&mut self, measured: bool) -> Result<(), String> {
+    fn send(&mut self, reading: FrameReading) -> Result<(), String> {
         self.hands.lead(&mut self.simulation);
-        self.simulation.send_frame(measured).map_err(text)
+        self.simulation.send_frame(reading).map_err(text)
     }
 
     fn receive(&mut self) -> Result<bool, String> {
@@ -277,6 +283,19 @@ impl<S: Real> Run for SimulationRun<S> {
 
     fn is_under_way(&self) -> bool {
         self.simulation.is_under_way()
+    }
+
+    fn read_state(&mut self) -> Result<(), String> {
+        self.simulation.read_state().map_err(text)
+    }
+
+    fn is_drawn_unread(&self, device: &Device, coloring: Coloring) -> bool {
+        let is_there = self.simulation.gpu().is_some_and(|gpu| gpu.device().is_same(device));
+        let is_plain = matches!(coloring, Coloring::Plain | Coloring::Bodies);
+        // Patches that move have marks where they are.
+        let assembly = self.simulation.assembly();
+        let moves = self.simulation.first_hold() > 0 || !assembly.forces.is_empty();
+        is_there && is_plain && self.held.is_empty() && !moves && self.recorder.is_none()
     }
 
     fn offer(&mut self, device: Option<&Device>) -> Result<(), String> {
@@ -305,7 +324,12 @@ impl<S: Real> Run for SimulationRun<S> {
         Ok(())
     }
 
-    fn fill(&mut self, coloring: Coloring, snapshot: &mut RunSnapshot) {
+    fn fill(&mut self, coloring: Coloring, device: Option<&Device>, snapshot: &mut RunSnapshot) {
+        let drawn =
+            self.simulation.gpu().filter(|gpu| device.is_some_and(|d| gpu.device().is_same(d)));
+        let kept = snapshot.on_device.take();
+        snapshot.on_device = drawn.map(|gpu| gpu.copy_positions(kept));
+        snapshot.unread = self.simulation.unread_frames();
         let positions = &self.simulation.state().positions;
         snapshot.positions.clear();
         snapshot.positions.extend(positions.iter().map(|x| x.cast::<f32>()));

@@ -3,6 +3,7 @@
 use viscera::measure::Energies;
 use viscera::scalar::Vec3;
 use viscera::solver::Ledger;
+use viscera::solver::gpu::DevicePositions;
 
 use crate::tools::ToolSnapshot;
 
@@ -32,14 +33,18 @@ pub enum Coloring {
 pub struct RunSnapshot {
     /// Positions [m] of the tetrahedra's vertices, the user's order, shape [vertex_count].
     pub positions: Vec<Vec3<f32>>,
+    /// Frames since the one that `positions` are of; above zero only where they stay on the device that draws.
+    pub unread: u64,
+    /// Those of this frame, where the device that draws has computed them.
+    pub on_device: Option<DevicePositions>,
     /// Values of the surfaces' vertices, one body after the other; empty for plain tissue.
     pub values: Vec<f32>,
     /// Patches held by hand.
     pub held: Vec<HeldPatch>,
     /// The scene's tools.
     pub tools: Vec<ToolSnapshot>,
-    /// What tools have put into tissue.
-    pub ledger: Ledger,
+    /// What tools have put into tissue, where what computes keeps account of it.
+    pub ledger: Option<Ledger>,
     /// Wall time of the last frame [s].
     pub wall: f64,
     /// Substeps per frame and iterations of each in force: what the method has chosen where it chooses.

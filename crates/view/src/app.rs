@@ -50,6 +50,9 @@ pub struct Options {
     pub scenes: PathBuf,
     /// Gets why the window had to close, where it did not close by itself.
     pub farewell: Arc<OnceLock<String>>,
+    /// Whether simulations on a graphics processor share the window's device, as they do on hardware, where software draws as
+    /// well: pictures wait for them then.
+    pub shares_software: bool,
 }
 
 /// The scene that is opened where none is named: an organ to pull on, without instruments of its own in the way.
@@ -108,10 +111,13 @@ impl App {
         let mut messages = Messages::default();
         let (session, making) = opening::first_session(&options, &mut messages)?;
         let wake = context.clone();
-        let engine = Engine::start(move || wake.request_repaint())?;
+        let gpu = Gpu::new(render_state);
+        let is_shared = options.shares_software || !gpu.device.is_software();
+        let device = is_shared.then(|| gpu.device.clone());
+        let engine = Engine::start(device, move || wake.request_repaint())?;
         let mut app = Self {
             engine,
-            viewport: Viewport::new(Gpu::new(render_state)),
+            viewport: Viewport::new(gpu),
             hands: Hands::default(),
             tray: viscera_stage::tray()?,
             controller: Controller::open(),
@@ -281,9 +287,9 @@ impl App {
             Panel::bottom("curve").resizable(true).default_size(150.0).show(ui, |ui| {
                 let now = self.snapshot.as_ref().map_or(0.0, |snapshot| snapshot.time);
                 if let Some(run) = self.snapshot.as_ref().and_then(|all| all.runs.first())
-                    && !run.tools.is_empty()
+                    && let Some(ledger) = run.ledger.filter(|_| !run.tools.is_empty())
                 {
-                    panels::forces::show_ledger(ui, &run.ledger);
+                    panels::forces::show_ledger(ui, &ledger);
                 }
                 panels::forces::show(ui, &self.forces, now, self.session.is_comparison());
             });

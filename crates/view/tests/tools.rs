@@ -12,7 +12,9 @@ use viscera::scalar::Vec3;
 use viscera::scalar::rigid::RigidTransform;
 use viscera::scene::Scene;
 use viscera::simulation::{Assembly, Simulation};
+use viscera::solver::FrameReading;
 use viscera_stage::ToolAct;
+use viscera_view::app::App;
 use viscera_view::controller::{News, Sticks};
 use viscera_view::curves::Source;
 
@@ -28,7 +30,7 @@ fn tools_of_a_scene_are_seen_with_their_forces() {
     });
     let tool = window.run(0).tools[0].clone();
     assert!(tool.met.error.is_some_and(|error| error > 0.0 && error < tool.force()), "{tool:?}");
-    assert!(window.run(0).ledger.work > 0.0);
+    assert!(window.run(0).ledger.is_some_and(|ledger| ledger.work > 0.0));
     // Steel is grey, and moves.
     let grey = |[r, g, b]: [u8; 3]| r.abs_diff(g) < 16 && b >= r && r < 170;
     let pixels = window.pixels();
@@ -61,6 +63,72 @@ fn a_graphics_processor_that_is_chosen_computes_tools_as_well() {
     assert!(window.texts().is_empty(), "{:?}", window.texts());
     assert!(!window.run(0).tools.is_empty());
     assert!(window.harness.query_by_label_contains("as asked for").is_some());
+}
+
+/// A coarse slab under a probe, computed by the graphics processor.
+const ON_DEVICE: &[(&str, &str)] = &[
+    ("solver.device", "gpu"),
+    ("solver.method", "quasi_newton"),
+    ("solver.iterations", "3"),
+    ("solver.substeps", "1"),
+    ("body.tissue.cells", "[8, 4, 2]"),
+];
+
+/// The picture after so many frames from the beginning, one by one.
+fn stepped(window: &mut Window, frames: u64) -> Vec<[u8; 3]> {
+    window.press("Pause");
+    window.press("Reset");
+    let number = |app: &App| app.snapshot().map(|snapshot| snapshot.number);
+    window.wait("the beginning", |app| number(app) == Some(0));
+    for frame in 1..=frames {
+        window.press("Step");
+        window.wait("a frame", |app| number(app) == Some(frame));
+    }
+    window.pixels()
+}
+
+/// Tissue that stays on the window's device is drawn from there: the same picture, and the mouse finds it where it is.
+#[test]
+fn tissue_that_stays_on_the_device_is_seen_and_taken() {
+    let mut apart = Window::open("palpation", ON_DEVICE);
+    apart.start();
+    assert!(apart.run(0).on_device.is_none() && apart.run(0).unread == 0);
+    let expected = stepped(&mut apart, 24);
+    let mut window = Window::open_on_one_device("palpation", ON_DEVICE);
+    window.start();
+    assert!(window.run(0).on_device.is_some());
+    assert!(stepped(&mut window, 24) == expected, "another picture");
+    assert!(
+        apart.run(0).tools[0].force() > 0.0 && apart.run(0).positions == window.run(0).positions
+    );
+    // No account is kept there: none is shown.
+    assert!(window.run(0).ledger.is_none());
+    assert!(window.harness.query_by_label_contains("work of tools").is_none());
+    window.picture("stays-on-the-device");
+
+    // While it runs, most frames are not read; a press is answered once positions are known.
+    window.press("Run");
+    let is_unread = |app: &App| app.snapshot().is_some_and(|snapshot| snapshot.runs[0].unread > 0);
+    window.wait("a frame that stays", is_unread);
+    let middle = window.view().center();
+    window.harness.hover_at(middle);
+    window.harness.step();
+    window.harness.drag_at(middle);
+    window.harness.step();
+    window.wait("a grip", |app| app.holds().list().len() == 1);
+    window.harness.hover_at(middle + vec2(0.0, -40.0));
+    window.wait("a hold", |app| {
+        app.snapshot().is_some_and(|snapshot| {
+            let run = &snapshot.runs[0];
+            run.unread == 0 && run.held.first().is_some_and(|hold| hold.force.length() > 1e-3)
+        })
+    });
+    window.harness.drop_at(middle + vec2(0.0, -40.0));
+    window.wait("a clean release", |app| {
+        app.holds().list().is_empty()
+            && app.snapshot().is_some_and(|snapshot| snapshot.runs[0].unread > 0)
+    });
+    assert!(window.texts().is_empty(), "{:?}", window.texts());
 }
 
 /// The working end of the tool in a hand, in the window.
@@ -373,7 +441,7 @@ fn take_all_in(names: impl Fn(&str) -> bool) {
             let above = Vec3 { x: 0.0, y: 0.0, z: 0.5 };
             let pose = RigidTransform::about(Vec3::ZERO, Vec3::ZERO, above);
             let take = ToolAct::Take { hand, instrument: Box::new(instrument), pose };
-            let taken = run.act(&take).and_then(|()| run.advance());
+            let taken = run.act(&take).and_then(|()| run.advance(FrameReading::State));
             assert!(taken.is_ok(), "{}: {name}: {taken:?}", built_in.name);
         }
     }

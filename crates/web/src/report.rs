@@ -210,7 +210,7 @@ impl RunReport {
             held: held.collect(),
             patches: patches.collect(),
             tools: snapshot.tools.iter().map(ToolReport::new).collect(),
-            ledger: (!snapshot.tools.is_empty()).then(|| LedgerReport::new(snapshot.ledger)),
+            ledger: snapshot.ledger.filter(|_| !snapshot.tools.is_empty()).map(LedgerReport::new),
         }
     }
 }

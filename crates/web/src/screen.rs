@@ -118,7 +118,7 @@ impl Screen {
         }
         let Some(picture) = self.pictures.get_mut(number) else { return Ok(()) };
         if picture.moved != state.moved {
-            picture.surface.place(&state.snapshot)?;
+            picture.surface.place(&state.snapshot, &loaded.assembly)?;
             picture.moved = state.moved;
         }
         let fixed = fixed(session, &state.snapshot);

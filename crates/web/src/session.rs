@@ -3,6 +3,7 @@
 use viscera::material::PRESETS;
 use viscera::scalar::Vec3;
 use viscera::scene::{BodyShape, Instrument, Scene};
+use viscera::solver::FrameReading;
 use viscera::solver::gpu::Device;
 use viscera_render::Orbit;
 use viscera_stage::{
@@ -299,7 +300,8 @@ impl Session {
         }
         let [wanted, ..] = state.measures;
         state.measures = [false, wanted, state.measures[2]];
-        let sent = state.run.send(wanted);
+        let reading = if wanted { FrameReading::Balance } else { FrameReading::State };
+        let sent = state.run.send(reading);
         self.unless_lost(sent)?;
         self.take_over(run).map(|_| ())
     }
@@ -403,7 +405,7 @@ impl Session {
     fn look_at(&mut self, number: usize) {
         self.count += 1;
         if let Some(state) = self.runs.get_mut(number) {
-            state.run.fill(self.coloring, &mut state.snapshot);
+            state.run.fill(self.coloring, self.device.as_ref(), &mut state.snapshot);
             state.moved = self.count;
             self.force_scale.follow(&state.snapshot.tools);
         }

@@ -14,6 +14,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use viscera::scalar::Vec3;
+use viscera::solver::gpu::Device;
 use viscera_stage::{Coloring, HandId, HoldId, ToolAct};
 
 use viscera_resources::MeshFiles;
@@ -74,6 +75,8 @@ pub enum Command {
     Probe(Vec<SolverVariant>),
     /// What colours show.
     Color(Coloring),
+    /// Asks for positions that are those of a frame, where tissue is drawn from where the device has it.
+    Look,
     /// Ends the thread.
     Quit,
 }
@@ -189,12 +192,17 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Starts the thread. It calls `wake` when there is something to see or hear.
-    pub fn start(wake: impl Fn() + Send + Sync + 'static) -> std::io::Result<Self> {
+    /// Starts the thread. It calls `wake` when there is something to see or hear. `device` is for simulations that ask for one,
+    /// where they share that of the pictures.
+    pub fn start(
+        device: Option<Device>,
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> std::io::Result<Self> {
         let (commands, receive) = channel();
         let (send, events) = channel();
         let exchange = Arc::new(SnapshotExchange::default());
-        let worker = worker::Worker::new(receive, send, Arc::clone(&exchange), Box::new(wake));
+        let worker =
+            worker::Worker::new(receive, send, Arc::clone(&exchange), Box::new(wake), device);
         let thread = std::thread::Builder::new()
             .name("simulation".to_owned())
             .spawn(move || worker.run())?;

@@ -1,6 +1,7 @@
 //! What the thread does: builds, computes frame after frame at the pace of the clock, obeys in between.
 
 mod building;
+mod frames;
 mod making;
 mod recording;
 
@@ -9,6 +10,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 use viscera::simulation::Assembly;
+use viscera::solver::gpu::Device;
 use viscera_stage::{Coloring, GripTarget, Run, ToolAct};
 
 use super::setup::{BuildRequest, Setup};
@@ -28,6 +30,8 @@ pub struct Worker {
     events: Sender<Event>,
     exchange: Arc<SnapshotExchange>,
     wake: Arc<Wake>,
+    /// That of the pictures, where simulations share it.
+    device: Option<Device>,
     /// A large mesh that waits for a person's consent.
     asked: Option<(BuildRequest, Assembly)>,
     running: Option<Running>,
@@ -40,6 +44,8 @@ pub struct Worker {
     due: Instant,
     /// When frames were measured last.
     measured: Option<Instant>,
+    /// When the window asked for positions last.
+    looked: Option<Instant>,
     /// Solvers by which steps are repeated, the thread that does so, and when it was begun last.
     probed: Vec<SolverVariant>,
     prober: Option<Prober>,
@@ -74,6 +80,9 @@ const PROBED_EVERY: Duration = Duration::from_millis(700);
 /// How often frames are measured where nothing needs it more often.
 const MEASURED_EVERY: Duration = Duration::from_millis(100);
 
+/// How long positions are read after the window has asked for them: it may miss a frame or two.
+const LOOKED_AT: Duration = Duration::from_millis(300);
+
 /// Settings of a device that other kernels belong to: some drivers compile them for seconds.
 const OTHER_KERNELS: [&str; 5] =
     ["solver.method", "solver.elements", "solver.acceleration", "solver.colors", "solver.clusters"];
@@ -85,6 +94,7 @@ impl Worker {
         events: Sender<Event>,
         exchange: Arc<SnapshotExchange>,
         wake: Wake,
+        device: Option<Device>,
     ) -> Self {
         let wake: Arc<Wake> = Arc::new(wake);
         let (curves_sent, call) = (events.clone(), Arc::clone(&wake));
@@ -99,6 +109,8 @@ impl Worker {
             events,
             exchange,
             wake,
+            device,
+            looked: None,
             asked: None,
             running: None,
             playing: true,
@@ -220,6 +232,11 @@ impl Worker {
             }
             Command::Color(coloring) => {
                 self.coloring = coloring;
+                self.publish();
+            }
+            Command::Look => {
+                self.looked = Some(Instant::now());
+                self.each(|run| run.read_state());
                 self.publish();
             }
             // The rest was obeyed where commands are gathered.
@@ -410,83 +427,6 @@ impl Worker {
             if let Some(prober) = &self.prober {
                 prober.probe(next_step, self.probed.clone());
             }
-        }
-    }
-
-    /// Computes a frame of each simulation, one after the other: they stay at one time.
-    fn advance(&mut self) {
-        let Some(running) = &mut self.running else { return };
-        let mut failed = None;
-        for (run, wall) in running.runs.iter_mut().zip(&mut running.walls) {
-            let start = Instant::now();
-            failed = failed.or(run.advance().err());
-            *wall = start.elapsed().as_secs_f64();
-        }
-        self.record_frame();
-        let Some(running) = &mut self.running else { return };
-        let told = running.runs.iter_mut().find_map(|run| run.told());
-        running.number += 1;
-        self.steps = self.steps.saturating_sub(1);
-        let frame = Duration::try_from_secs_f64(running.setup.scene.time.frame / self.speed);
-        self.due += frame.unwrap_or_default();
-        // What is lost is not caught up with: tissue would jump.
-        if let Some(earliest) = Instant::now().checked_sub(MOST_LATE) {
-            self.due = self.due.max(earliest);
-        }
-        told.into_iter().for_each(|message| self.warn_once(message));
-        match failed {
-            None => self.publish(),
-            // The last frame stays to be seen; Reset begins anew.
-            Some(message) => self.stop(message),
-        }
-    }
-
-    /// Stops where a simulation has failed.
-    fn stop(&mut self, message: String) {
-        self.end_record(Some("the simulation has stopped".to_owned()));
-        (self.playing, self.steps) = (false, 0);
-        self.tell(Event::Failed(Failure { message, cure: Cure::Reset }));
-    }
-
-    /// Whether this frame is to be measured: colours need it, or the last time was long ago. What is held
-    /// rigidly has its force from there.
-    fn is_measured(&mut self) -> bool {
-        let colors = matches!(self.coloring, Coloring::Strain | Coloring::Stress);
-        let long_ago = self.measured.is_none_or(|since| since.elapsed() > MEASURED_EVERY);
-        if long_ago || !self.playing {
-            self.measured = Some(Instant::now());
-        }
-        colors || long_ago || !self.playing
-    }
-
-    fn publish(&mut self) {
-        let measured = self.is_measured();
-        let Some(running) = &mut self.running else { return };
-        let mut failed = None;
-        let mut snapshot = self.exchange.blank();
-        snapshot.generation = running.setup.generation;
-        snapshot.number = running.number;
-        snapshot.time = running.number as f64 * running.setup.scene.time.frame;
-        snapshot.coloring = self.coloring;
-        snapshot.runs.resize_with(running.runs.len(), Default::default);
-        for ((filled, run), wall) in
-            snapshot.runs.iter_mut().zip(&mut running.runs).zip(&running.walls)
-        {
-            if measured && let Err(message) = run.measure() {
-                failed = Some(message);
-            }
-            run.fill(self.coloring, filled);
-            filled.wall = *wall;
-        }
-        self.exchange.publish(snapshot);
-        (self.wake)();
-        match failed {
-            None if measured => {
-                self.tell_devices();
-                self.probe();
-            }
-            None => {}
-            Some(message) => self.stop(message),
         }
     }
 }

@@ -4,10 +4,12 @@ mod leading;
 mod lens;
 mod overlay;
 mod picture;
+mod pressing;
 
 pub use lens::Lens;
 pub use overlay::on_screen;
 pub use picture::{Gpu, Picture};
+use pressing::Pressed;
 
 use eframe::egui::{self, PointerButton, Pos2, Rect, Sense, Ui, vec2};
 use std::sync::Arc;
@@ -16,12 +18,11 @@ use viscera_picture::{BodyColor, HALF_OPENING, Image, ImageSize, Overlay, ViewDi
 use viscera_render::Orbit;
 use viscera_stage::{
     Coloring, ForceScale, HandId, Legend, PictureContents, RunSurface, Surroundings, meet_plane,
-    pick,
 };
 
 use crate::engine::{Command, Setup, Snapshot};
 use crate::hands::Hands;
-use crate::holds::{Grip, Holds};
+use crate::holds::Holds;
 use crate::preferences::Preferences;
 
 /// A press so near to where something is held takes that up again [points].
@@ -53,6 +54,8 @@ pub struct Viewport {
     drawn: Option<DrawnInputs>,
     /// What the mouse asked for and cannot have.
     told: Option<String>,
+    /// The left button went down, and where tissue was then is not known yet.
+    pressed: Option<Pressed>,
 }
 
 /// What pictures are drawn from: two equal ones give the same pictures.
@@ -87,6 +90,7 @@ impl Viewport {
             lenses: Vec::new(),
             drawn: None,
             told: None,
+            pressed: None,
         }
     }
 
@@ -143,8 +147,9 @@ impl Viewport {
         if self.setup.as_ref().is_none_or(|setup| setup.generation != snapshot.generation) {
             return Ok(());
         }
+        let assembly = self.setup.as_ref().map(|setup| Arc::clone(&setup.assembly));
         for (surface, run) in self.surfaces.iter_mut().zip(&snapshot.runs) {
-            surface.place(run)?;
+            assembly.iter().try_for_each(|assembly| surface.place(run, assembly))?;
         }
         if snapshot.number == 0 {
             self.force_scale = ForceScale::default();
@@ -234,10 +239,18 @@ impl Viewport {
         });
         if let Some(pointer) = response.interact_pointer_pos() {
             if response.drag_started_by(PointerButton::Primary) {
-                let pressed = pressed_at.unwrap_or(pointer);
-                let only_tools = modifiers.command;
-                let grip = (!only_tools).then_some(&preferences.grip);
-                self.press(lens, run, snapshot, pressed, hands, grip, commands);
+                let at = pressed_at.unwrap_or(pointer);
+                self.pressed = Some(Pressed { run, at, only_tools: modifiers.command });
+            }
+            // It is answered as soon as the window knows where tissue is, at once in most cases.
+            if let Some(Pressed { at, only_tools, .. }) = self.pressed.filter(|p| p.run == run) {
+                if snapshot.runs.get(run).is_some_and(|run| run.unread == 0) {
+                    self.pressed = None;
+                    let grip = (!only_tools).then_some(&preferences.grip);
+                    self.press(lens, run, snapshot, at, hands, grip, commands);
+                } else {
+                    commands.push(Command::Look);
+                }
             }
             if hands.instruments.dragged().is_some() {
                 self.lead(ui, lens, (pointer, response.drag_delta()), modifiers, hands, commands);
@@ -249,11 +262,12 @@ impl Viewport {
                 {
                     commands.extend(hands.holds.lead(point));
                 }
-            } else if response.dragged() {
+            } else if response.dragged() && self.pressed.is_none() {
                 self.look_around(response, lens, modifiers);
             }
         }
         if response.drag_stopped() {
+            self.pressed = None;
             hands.instruments.drop_dragged();
             commands.extend(hands.holds.release(preferences.grip.keep || modifiers.shift));
         }
@@ -289,46 +303,6 @@ impl Viewport {
             Ok(acts) => commands.extend(acts.into_iter().map(Command::Tool)),
             Err(told) => self.told = Some(told),
         }
-    }
-
-    /// The left button goes down: on an instrument, on something held, on tissue, or beside it. Tissue is taken with a grip.
-    #[expect(clippy::too_many_arguments, reason = "the window's state, lent for one event")]
-    fn press(
-        &mut self,
-        lens: &Lens,
-        run: usize,
-        snapshot: &Snapshot,
-        pointer: Pos2,
-        hands: &mut Hands,
-        grip: Option<&Grip>,
-        commands: &mut Vec<Command>,
-    ) {
-        let (Some(setup), Some(shown)) = (&self.setup, snapshot.runs.get(run)) else { return };
-        if setup.generation != snapshot.generation {
-            return;
-        }
-        let near = shown.held.iter().find(|hold| {
-            [hold.place, hold.target]
-                .iter()
-                .any(|x| lens.place(*x).is_some_and(|place| place.distance(pointer) < NEAR))
-        });
-        if near.is_some_and(|hold| hands.holds.resume(hold.id)) {
-            return;
-        }
-        let eye = lens.orbit().position();
-        let hit = pick(&setup.assembly, shown, eye, lens.ray(pointer));
-        let tissue = hit.map(|hit| (hit.point - eye).length());
-        if let Some(tool) = leading::tool_at(shown, lens, pointer, tissue, &hands.instruments) {
-            let hand = tool.hand.unwrap_or_else(|| {
-                let scene_tool = setup.assembly.tools.get(tool.number);
-                commands.push(Command::Tool(hands.instruments.hold(tool, scene_tool)));
-                hands.instruments.active().map_or(0, |held| held.id)
-            });
-            hands.instruments.drag(hand);
-            return;
-        }
-        let taken = hit.zip(grip).map(|(hit, grip)| hands.holds.take(&hit, grip));
-        commands.extend(taken);
     }
 
     fn look_around(&mut self, response: &egui::Response, lens: &Lens, modifiers: egui::Modifiers) {

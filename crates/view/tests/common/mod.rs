@@ -70,7 +70,12 @@ impl Window {
     }
 
     fn open_on(setup: WgpuSetup, scene: &str, settings: &[(&str, &str)]) -> Self {
-        Self::open_beside(setup, scene, settings, &[])
+        Self::open_with(setup, scene, [settings, &[]], false)
+    }
+
+    /// Drawn in software, with simulations on the window's device.
+    pub fn open_on_one_device(scene: &str, settings: &[(&str, &str)]) -> Self {
+        Self::open_with(wgpu::default_wgpu_setup(), scene, [settings, &[]], true)
     }
 
     /// With a second solver that has these settings of its own.
@@ -79,6 +84,15 @@ impl Window {
         scene: &str,
         settings: &[(&str, &str)],
         beside: &[(&str, &str)],
+    ) -> Self {
+        Self::open_with(setup, scene, [settings, beside], false)
+    }
+
+    fn open_with(
+        setup: WgpuSetup,
+        scene: &str,
+        [settings, beside]: [&[(&str, &str)]; 2],
+        shares_software: bool,
     ) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let state =
@@ -92,6 +106,7 @@ impl Window {
             pictures: folder.path().join("pictures"),
             scenes: folder.path().to_owned(),
             farewell: Arc::clone(&farewell),
+            shares_software,
         };
         let context = eframe::egui::Context::default();
         let preferences = Preferences::suited_to(&state.adapter);

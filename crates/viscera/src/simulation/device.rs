@@ -132,11 +132,11 @@ impl<S: Real> Backend<S> {
         }
     }
 
-    /// See [`Solver::ledger`]; empty of devices, which keep none.
-    pub fn ledger(&self) -> Ledger {
+    /// See [`Solver::ledger`]; devices keep none.
+    pub fn ledger(&self) -> Option<Ledger> {
         match &self.engine {
-            Engine::Cpu(solver) => solver.ledger(),
-            Engine::Device(_) => Ledger::default(),
+            Engine::Cpu(solver) => Some(solver.ledger()),
+            Engine::Device(_) => None,
         }
     }
 

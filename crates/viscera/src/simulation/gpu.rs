@@ -147,10 +147,11 @@ pub(super) fn choose<S: Real>(
         };
     };
     let chosen = match (&settings.device, offered) {
-        (DeviceRequest::Named(_) | DeviceRequest::Gpu, Some(device)) => {
+        (DeviceRequest::Named(name), Some(device)) if device.is_called(name) => {
             on(device, single, settings, "as asked for")?
         }
-        (DeviceRequest::Named(name), None) => asked_for(Some(name), single, settings)?,
+        (DeviceRequest::Gpu, Some(device)) => on(device, single, settings, "as asked for")?,
+        (DeviceRequest::Named(name), _) => asked_for(Some(name), single, settings)?,
         (DeviceRequest::Gpu, None) => asked_for(None, single, settings)?,
         _ => faster(single, settings, offered),
     };

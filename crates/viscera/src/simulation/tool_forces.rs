@@ -34,8 +34,9 @@ impl<S: Real> Simulation<S> {
         self.wrenches.as_deref().unwrap_or_else(|| self.backend.wrenches())
     }
 
-    /// Work of tools on tissue and the energy that is stored, since the beginning or the last change of settings.
-    pub fn ledger(&self) -> Ledger {
+    /// Work of tools on tissue and the energy that is stored, since the beginning or the last change of settings. Nothing where
+    /// a graphics processor computes, which keeps no account of it.
+    pub fn ledger(&self) -> Option<Ledger> {
         self.backend.ledger()
     }
 

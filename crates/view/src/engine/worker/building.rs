@@ -108,7 +108,7 @@ impl Worker {
             self.tell(Event::Busy(what));
             let wants_gpu =
                 !matches!(scene.solver.device, DeviceRequest::Cpu | DeviceRequest::Auto);
-            match build(scene, Assembly::clone(&setup.assembly), None) {
+            match build(scene, Assembly::clone(&setup.assembly), self.device.as_ref()) {
                 Ok(run) => runs.push(run),
                 Err(message) => {
                     return self.fail(message, if wants_gpu { Cure::Cpu } else { Cure::Open });

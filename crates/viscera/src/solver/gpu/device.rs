@@ -209,6 +209,41 @@ impl Device {
         &self.name
     }
 
+    /// Whether both are one: what the one has made the other can use.
+    pub fn is_same(&self, other: &Self) -> bool {
+        // The graphics interface compares numbers that begin anew with each of its instances.
+        Arc::ptr_eq(&self.pipelines, &other.pipelines)
+    }
+
+    /// Whether settings that ask for this name mean it. A browser has one device and may keep its name for itself.
+    pub fn is_called(&self, name: &str) -> bool {
+        cfg!(target_arch = "wasm32") || self.name.to_lowercase().contains(&name.to_lowercase())
+    }
+
+    /// Makes something whose memory may be too little. That is an error then, and the device, which others may use, goes on.
+    pub(super) fn making<T>(
+        &self,
+        make: impl FnOnce() -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
+        // A browser says so later, and loses the device.
+        if cfg!(target_arch = "wasm32") {
+            return make();
+        }
+        // What follows from it, the use of memory that there is not, is of no interest.
+        let of_memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let of_use = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let made = make();
+        let of_use = pollster::block_on(of_use.pop());
+        let refused = |error: wgpu::Error| {
+            let reason = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+            Err(GpuError::Refused { name: self.name.clone(), reason })
+        };
+        match pollster::block_on(of_memory.pop()) {
+            Some(_) => Err(GpuError::NoRoom { name: self.name.clone() }),
+            None => of_use.map_or(made, refused),
+        }
+    }
+
     /// Whether a processor does its work: right, but slower than the CPU backend.
     pub fn is_software(&self) -> bool {
         self.device.adapter_info().device_type == wgpu::DeviceType::Cpu

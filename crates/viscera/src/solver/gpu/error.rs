@@ -55,6 +55,14 @@ pub enum GpuError {
         /// Tetrahedra that would fit, in proportion.
         largest: u64,
     },
+    /// Its memory is used up.
+    #[error(
+        "{name} has no room for this model: use a coarser mesh, close what else uses its memory, or `device = \"cpu\"`"
+    )]
+    NoRoom {
+        /// The adapter.
+        name: String,
+    },
     /// A fine surface is too large for the device.
     #[error(
         "a surface needs an array of {needed} bytes, and {name} binds at most {limit}: use one of about \

@@ -122,6 +122,15 @@ impl GpuSolver {
         left_over: &[u8],
     ) -> Result<Self, GpuError> {
         check(device, settings)?;
+        device.making(|| Self::made(device, model, settings, left_over))
+    }
+
+    fn made(
+        device: &Device,
+        model: &Model<f32>,
+        settings: &SolverSettings,
+        left_over: &[u8],
+    ) -> Result<Self, GpuError> {
         let laid = Arc::new(Layout::new(model, settings));
         let plan = Plan::on_device(&laid, settings);
         let layout = DeviceLayout::new(&laid, settings);

@@ -216,6 +216,11 @@ impl GpuSurface {
         placed.is_some_and(|layout| positions.is_of(layout))
     }
 
+    /// Whether it takes copies from a device at all.
+    pub fn follows_copies(&self) -> bool {
+        self.placed.as_ref().is_some_and(|placed| placed.layout.is_some())
+    }
+
     /// Moves the surface to where the solver's last step, or the caller, has brought the tissue: one
     /// submission, no waiting.
     pub fn update(&self) {
