@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::time::Instant;
 use viscera::settings::{Count, Method, SolverSettings, Threads};
 use viscera::solver::Solver;
-use viscera::state::State;
+use viscera::state::{ContactState, State};
 
 /// Hardware that solvers are measured on.
 pub trait Computer {
@@ -141,6 +141,7 @@ impl<'a> CpuStepper<'a> {
         let dt = step_size(bench, sweeps, solver.stable_step());
         let mut start = solver.state_at_rest();
         swing(bench, &mut start);
+        start.contact = ContactState::of(&bench.inputs.tools);
         Self { bench, solver, state: start.clone(), start, dt }
     }
 }

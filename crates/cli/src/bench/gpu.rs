@@ -6,13 +6,13 @@ use super::computers::{
 use super::measurement::Bench;
 use super::results::AdapterFacts;
 use super::task::ReadBack;
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use std::cell::RefCell;
 use std::time::Instant;
 use viscera::solver::FrameReading;
 use viscera::solver::balance::ForceBalance;
 use viscera::solver::gpu::{Adapter, Device, GpuSolver, MemoryCopy, StepTimes};
-use viscera::state::State;
+use viscera::state::{ContactState, State};
 
 /// Copies that are timed together, and how often, of which the fastest counts.
 const COPIES: u32 = 8;
@@ -99,6 +99,7 @@ impl Computer for Gpu {
         let dt = step_size(bench, sweeps, solver.stable_step());
         let mut start = State::at_rest(&bench.model);
         swing(bench, &mut start);
+        start.contact = ContactState::of(&bench.inputs.tools);
         Ok(Box::new(GpuStepper { bench, solver, start, dt }))
     }
 }
@@ -121,8 +122,11 @@ impl GpuStepper<'_> {
     /// Steps after each of which the host waits for what it reads.
     fn run_and_read(&mut self, count: u32) -> Result<()> {
         let (model, inputs) = (&self.bench.model, &self.bench.inputs);
-        let with_forces = self.bench.entry.task.read_back == ReadBack::Forces;
-        let reading = if with_forces { FrameReading::Balance } else { FrameReading::State };
+        let reading = match self.bench.entry.task.read_back {
+            ReadBack::Forces => FrameReading::Balance,
+            ReadBack::Tool => FrameReading::Forces,
+            ReadBack::Positions | ReadBack::Nothing => FrameReading::State,
+        };
         let mut state = self.start.clone();
         let mut balance = ForceBalance::default();
         for _ in 0..count {
@@ -131,10 +135,12 @@ impl GpuStepper<'_> {
             while self.solver.take_frame(model, &mut state)?.is_none() {
                 self.solver.wait()?;
             }
-            if with_forces {
+            if reading == FrameReading::Balance {
                 self.solver.force_balance(model, &state, inputs, &mut balance)?;
             }
         }
+        let touches = self.solver.wrenches().iter().any(|wrench| wrench.touches > 0);
+        ensure!(touches || inputs.tools.is_empty(), "the tool has touched nothing");
         Ok(())
     }
 }

@@ -4,8 +4,8 @@ use super::accuracy;
 use super::bandwidth::Bandwidth;
 use super::computers::{Computer, Runner, StageLine};
 use super::solvers::SolverEntry;
-use super::subjects::hanging;
-use super::task::DT;
+use super::subjects::{hanging, supporting};
+use super::task::{DT, ReadBack};
 use super::traffic::TrafficReport;
 use anyhow::Result;
 use serde::Serialize;
@@ -106,7 +106,12 @@ impl<'a> Bench<'a> {
         let mut builder = ModelBuilder::new();
         builder.add_body(mesh, &entry.tissue()?)?;
         let (steps, dt) = entry.task.steps(entry)?;
-        let (model, inputs) = (builder.build()?, hanging(mesh));
+        let mut inputs = hanging(mesh);
+        if entry.task.read_back == ReadBack::Tool {
+            builder.sample_surface(0);
+            inputs.tools.push(supporting(mesh));
+        }
+        let model = builder.build()?;
         Ok(Self { entry, model, inputs, dt, steps, traffic: None })
     }
 

@@ -91,7 +91,7 @@ const fn within(seconds: f64) -> Aims {
 }
 
 /// All of them.
-pub const QUESTIONS: [Question; 16] = [
+pub const QUESTIONS: [Question; 17] = [
     published(
         "one Jacobi substep",
         "jacobi-green",
@@ -113,6 +113,7 @@ pub const QUESTIONS: [Question; 16] = [
     frame("explicit-recovered", K100, Aims { pass_dispatches: Some(6), ..NO_AIMS }),
     read_back("a step of 1/1000 s, positions read back, no tool", ReadBack::Positions),
     read_back("a step of 1/1000 s, forces read back, no tool", ReadBack::Forces),
+    read_back("a step of 1/1000 s with a tool, its force read back", ReadBack::Tool),
     frame("quasi-newton", M1, Aims { dispatches: Some(120), left: Some(0.01), ..within(3e-3) }),
     frame("exact", M1, NO_AIMS),
     frame("explicit", M1, NO_AIMS),

@@ -3,6 +3,7 @@
 use anyhow::{Context, Result};
 use std::borrow::Cow;
 use std::path::Path;
+use viscera::contact::{Shape, Tool};
 use viscera::mesh::shapes::{self, MAX_TETS};
 use viscera::mesh::{TetMesh, io};
 use viscera::scalar::{Real, Vec3, vec3};
@@ -103,6 +104,23 @@ pub fn hanging<S: Real>(mesh: &TetMesh) -> Inputs<S> {
     let pins = (0u32..).zip(mesh.vertices()).filter(|(_, x)| x.x <= end);
     let pins = pins.map(|(vertex, x)| Pin { vertex, target: x.cast() }).collect();
     Inputs { gravity: vec3(0.0, 0.0, -9.81).cast(), pins, ..Inputs::default() }
+}
+
+/// A ball that the middle of what hangs comes to lie on: from below, with its top a hundredth of the length inside.
+pub fn supporting(mesh: &TetMesh) -> Tool {
+    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    for x in mesh.vertices().iter().map(|x| x.to_array()) {
+        for axis in 0..3 {
+            bounds[0][axis] = bounds[0][axis].min(x[axis]);
+            bounds[1][axis] = bounds[1][axis].max(x[axis]);
+        }
+    }
+    let [low, high] = bounds.map(Vec3::from_f64);
+    let (middle, size) = ((low + high) * 0.5, high - low);
+    let radius = 0.25 * size.y;
+    let mut ball = Tool::new(Shape::Sphere { radius });
+    ball.pose.translation = Vec3 { z: low.z + 0.01 * size.x - radius, ..middle };
+    ball
 }
 
 #[cfg(test)]

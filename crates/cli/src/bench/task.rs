@@ -34,6 +34,8 @@ pub enum ReadBack {
     Positions,
     /// The force balance, by which the forces of fixings are known.
     Forces,
+    /// The force on a tool on which the tissue lies, and nothing else.
+    Tool,
 }
 
 /// What is timed.
